@@ -1,0 +1,37 @@
+# SPDX-License-Identifier: BSD-3-Clause
+# Settings of cairn's own targets. Nothing here touches a project that includes cairn.
+
+if(PROJECT_IS_TOP_LEVEL AND NOT CMAKE_BUILD_TYPE)
+  set(CMAKE_BUILD_TYPE Release CACHE STRING "" FORCE)
+endif()
+
+find_program(CCACHE_PROGRAM ccache)
+if(CCACHE_PROGRAM AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
+  set(CMAKE_CXX_COMPILER_LAUNCHER ${CCACHE_PROGRAM})
+endif()
+
+# One tree like the installed one: bin/cairn, lib/libcairn.so, lib/cairn/<plugin>.so
+include(GNUInstallDirs)
+set(CAIRN_BINARY_FOLDER ${CMAKE_BINARY_DIR}/bin)
+set(CAIRN_LIBRARY_FOLDER ${CMAKE_BINARY_DIR}/lib)
+set(CAIRN_PLUGIN_FOLDER ${CAIRN_LIBRARY_FOLDER}/cairn)
+
+# What every target of cairn is compiled with, plugins of third parties not included. No -march: one binary
+# serves all machines, and hot kernels choose their instruction set when they are loaded.
+add_library(cairn_settings INTERFACE)
+target_compile_features(cairn_settings INTERFACE cxx_std_20)
+target_compile_options(cairn_settings INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor
+                       -fvisibility=hidden -fvisibility-inlines-hidden -fno-math-errno -fno-gnu-unique
+                       $<$<BOOL:${CAIRN_WERROR}>:-Werror>)
+if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 13)
+  target_compile_options(cairn_settings INTERFACE -Wno-restrict)  # it warns of its own std::string (GCC bug 105651)
+endif()
+if(CAIRN_SANITIZE)
+  target_compile_options(cairn_settings INTERFACE -fsanitize=${CAIRN_SANITIZE} -fno-omit-frame-pointer)
+  target_link_options(cairn_settings INTERFACE -fsanitize=${CAIRN_SANITIZE})
+endif()
+
+function(cairn_settings target)
+  target_link_libraries(${target} PRIVATE $<BUILD_INTERFACE:cairn_settings>)
+  set_target_properties(${target} PROPERTIES CXX_EXTENSIONS OFF POSITION_INDEPENDENT_CODE ON)
+endfunction()

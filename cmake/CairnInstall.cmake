@@ -1,0 +1,24 @@
+# SPDX-License-Identifier: BSD-3-Clause
+# What `cmake --install` puts down beside the plugins and the program, which install themselves:
+# the core with its headers, and a package that makes find_package(cairn) and cairn_add_plugin()
+# work in another project.
+include(CMakePackageConfigHelpers)
+
+set(CAIRN_PACKAGE_FOLDER ${CMAKE_INSTALL_LIBDIR}/cmake/cairn)
+
+install(TARGETS cairn_core EXPORT cairn-targets LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
+install(DIRECTORY core/include/cairn DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN "*.hpp")
+install(EXPORT cairn-targets NAMESPACE cairn:: DESTINATION ${CAIRN_PACKAGE_FOLDER})
+if(TARGET cairn_app)  # installs itself; where the library is from there is known here
+  set_target_properties(cairn_app PROPERTIES INSTALL_RPATH "$ORIGIN/../${CMAKE_INSTALL_LIBDIR}")
+endif()
+
+configure_package_config_file(cmake/cairnConfig.cmake.in ${CMAKE_CURRENT_BINARY_DIR}/cairnConfig.cmake
+                              INSTALL_DESTINATION ${CAIRN_PACKAGE_FOLDER})
+# Before 1.0 a minor version may change the plugin boundary.
+write_basic_package_version_file(${CMAKE_CURRENT_BINARY_DIR}/cairnConfigVersion.cmake
+                                 COMPATIBILITY SameMinorVersion)
+install(FILES ${CMAKE_CURRENT_BINARY_DIR}/cairnConfig.cmake ${CMAKE_CURRENT_BINARY_DIR}/cairnConfigVersion.cmake
+              cmake/CairnAddPlugin.cmake cmake/plugin_manifest.cpp.in cmake/plugin_sidecar.json.in
+        DESTINATION ${CAIRN_PACKAGE_FOLDER})
+install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR})

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "cairn/graph.hpp"
+
+namespace cairn {
+
+/// Which variables an optimisation holds, so that H is not singular by construction.
+///
+/// Variables marked `FIX` are held. A connected component with neither a held variable nor a prior
+/// (a factor on one variable) on a pose gets its first pose anchored: the first variable with the
+/// component's largest tangent space. Anchors are not written to files.
+struct CAIRN_API Gauge {
+  std::vector<bool> held;      ///< by variable
+  std::vector<int> anchored;   ///< variables held only to fix the gauge, one a component
+  std::vector<int> component;  ///< by variable: its connected component, 0 … components-1
+  int components = 0;
+  int components_with_fixed = 0;
+  std::vector<int> unconstrained;  ///< variables without any factor (held too: nothing moves them)
+
+  /// One or two sentences for a summary, such as
+  /// "no variable is fixed: anchored VERTEX_SE2 0".
+  std::string describe(const Graph& graph) const;
+};
+
+CAIRN_API Gauge resolve_gauge(const Graph& graph);
+
+}  // namespace cairn

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "cairn/block_matrix.hpp"
+#include "cairn/component.hpp"
+
+namespace cairn {
+
+/// How a factorisation ended. Not being positive definite is an outcome, not an error.
+struct Factorization {
+  bool ok = true;
+  int failed_block = -1;  ///< block at which the matrix stopped being positive definite
+};
+
+/// What a solver did; times are sums since the last `analyze`.
+struct LinearSolverStats {
+  std::string ordering;
+  std::int64_t factor_nonzeros = 0;  ///< scalars in L, diagonal included; 0 if not known
+  double factor_flops = 0.0;         ///< multiplications and additions of one factorisation
+  std::string note;                  ///< what a user should know: "supernodal", "falls back to …"
+};
+
+/// Solves H x = g for one block structure at a time, many times: `analyze` does all work that
+/// depends on the structure alone (ordering, elimination tree, allocation); `factorize` and `solve`
+/// only compute. H is symmetric positive definite, only its lower block triangle is stored.
+///
+/// `analyze` throws `Error` where the structure is beyond the solver (index overflow); `factorize`
+/// and `solve` throw `std::logic_error` when called out of order.
+class CAIRN_API LinearSolver : public Component {
+ public:
+  static constexpr std::string_view kKind = "linear_solver";
+  ~LinearSolver() override;
+
+  virtual void analyze(const BlockStructure& structure) = 0;
+  virtual Factorization factorize(const BlockMatrix& H) = 0;
+  /// x may be g. Sizes: structure.size().
+  virtual void solve(std::span<const double> g, std::span<double> x) = 0;
+  virtual const LinearSolverStats& stats() const = 0;
+};
+
+/// Ability: ln|H| of the last factorisation.
+class CAIRN_API LogDeterminant {
+ public:
+  static constexpr std::string_view kAbility = "log_determinant";
+  virtual ~LogDeterminant();
+  virtual double log_determinant() const = 0;
+};
+
+}  // namespace cairn

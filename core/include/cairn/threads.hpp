@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <functional>
+
+#include "cairn/api.hpp"
+
+namespace cairn {
+
+/// Sets the number of threads of cairn's one arena (oneTBB), for this process; 0 means all cores.
+/// Results never depend on it, to the last bit. Not to be called while work runs.
+CAIRN_API void set_threads(int count);
+
+/// The number of threads of the arena.
+CAIRN_API int threads();
+
+/// Calls `body(chunk)` for chunk = 0 … chunks-1, in any order and in parallel; returns when all are
+/// done. How the work is cut into chunks must not depend on the number of threads, so that results
+/// don't either. The first exception is rethrown. With one chunk or one thread it is a plain loop.
+CAIRN_API void for_each_chunk(std::size_t chunks, const std::function<void(std::size_t)>& body);
+
+/// Cuts [0, size) into chunks of `grain` and calls `body(begin, end)` for each, in parallel.
+CAIRN_API void for_each_range(std::size_t size, std::size_t grain,
+                              const std::function<void(std::size_t, std::size_t)>& body);
+
+}  // namespace cairn

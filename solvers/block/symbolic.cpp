@@ -1,0 +1,435 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "block/symbolic.hpp"
+
+#include <algorithm>
+#include <numeric>
+
+namespace cairn::block {
+namespace {
+
+/// The pattern of P H Pᵀ by rows: for each position the smaller positions that it is joined with.
+struct RowPattern {
+  std::vector<std::int64_t> begin;
+  std::vector<std::int32_t> columns;
+
+  RowPattern(const BlockStructure& structure, std::span<const std::int32_t> position) {
+    const int n = structure.blocks();
+    begin.assign(n + 1, 0);
+    for_each_entry(structure, position, [&](std::int32_t row, std::int32_t) { ++begin[row + 1]; });
+    std::partial_sum(begin.begin(), begin.end(), begin.begin());
+    columns.resize(begin[n]);
+    std::vector<std::int64_t> next(begin.begin(), begin.end() - 1);
+    for_each_entry(structure, position,
+                   [&](std::int32_t row, std::int32_t column) { columns[next[row]++] = column; });
+  }
+
+  std::span<const std::int32_t> row(std::int32_t i) const {
+    return std::span(columns).subspan(begin[i], begin[i + 1] - begin[i]);
+  }
+
+ private:
+  template <class Visit>
+  static void for_each_entry(const BlockStructure& s, std::span<const std::int32_t> position,
+                             Visit visit) {
+    for (int j = 0; j < s.blocks(); ++j) {
+      for (std::int64_t e = s.column_begin()[j] + 1; e < s.column_begin()[j + 1]; ++e) {
+        const std::int32_t a = position[s.rows()[e]], b = position[j];
+        visit(std::max(a, b), std::min(a, b));
+      }
+    }
+  }
+};
+
+/// Elimination tree (Liu 1990), with path compression.
+std::vector<std::int32_t> elimination_tree(const RowPattern& pattern, int n) {
+  std::vector<std::int32_t> parent(n, -1), ancestor(n, -1);
+  for (std::int32_t i = 0; i < n; ++i) {
+    for (std::int32_t k : pattern.row(i)) {
+      while (k != -1 && k < i) {
+        const std::int32_t next = ancestor[k];
+        ancestor[k] = i;
+        if (next == -1) parent[k] = i;
+        k = next;
+      }
+    }
+  }
+  return parent;
+}
+
+/// A postorder of a forest: element k is the node visited k-th; children in the order of
+/// `first_child` lists.
+std::vector<std::int32_t> postorder(std::span<const std::int32_t> parent) {
+  const std::int32_t n = static_cast<std::int32_t>(parent.size());
+  std::vector<std::int32_t> first_child(n, -1), sibling(n, -1), result, stack;
+  for (std::int32_t v = n - 1; v >= 0; --v) {
+    if (parent[v] < 0) continue;
+    sibling[v] = first_child[parent[v]];
+    first_child[parent[v]] = v;
+  }
+  result.reserve(n);
+  for (std::int32_t root = 0; root < n; ++root) {
+    if (parent[root] >= 0) continue;
+    stack.push_back(root);
+    while (!stack.empty()) {
+      const std::int32_t v = stack.back();
+      if (first_child[v] >= 0) {
+        stack.push_back(first_child[v]);
+        first_child[v] = sibling[first_child[v]];
+      } else {
+        result.push_back(v);
+        stack.pop_back();
+      }
+    }
+  }
+  return result;
+}
+
+std::int32_t round_up(std::int64_t value) { return static_cast<std::int32_t>((value + 7) / 8 * 8); }
+
+/// Modelled time of one supernode of `columns` scalar columns and `below` scalar rows below them.
+double cost_of(double columns, double below, const CostModel& c) {
+  const double rows = (static_cast<std::int64_t>(columns + below) + 7) / 8 * 8;
+  return c.supernode + c.panel_entry * rows * columns + c.panel_flop * columns * columns * rows +
+         c.update_flop * below * (below + 16.0) * columns +
+         c.extend_entry * 0.5 * below * (below + 8.0);
+}
+
+}  // namespace
+
+Symbolic::Symbolic(const BlockStructure& structure, std::span<const std::int32_t> ordering,
+                   const CostModel& cost) {
+  find_order(structure, ordering);
+  find_supernodes(structure, cost);
+  find_rows(structure);
+  lay_out();
+  map_children();
+  assign_entries(structure);
+}
+
+void Symbolic::find_order(const BlockStructure& structure, std::span<const std::int32_t> ordering) {
+  const int n = structure.blocks();
+  std::vector<std::int32_t> position(n);
+  for (int k = 0; k < n; ++k) position[ordering[k]] = k;
+  const std::vector<std::int32_t> parent = elimination_tree(RowPattern(structure, position), n);
+  const std::vector<std::int32_t> post = postorder(parent);
+  std::vector<std::int32_t> new_position(n);
+  for (int k = 0; k < n; ++k) new_position[post[k]] = k;
+  order_.resize(n);
+  position_.resize(n);
+  parent_.resize(n);
+  for (int k = 0; k < n; ++k) {
+    order_[k] = ordering[post[k]];
+    position_[order_[k]] = k;
+    parent_[k] = parent[post[k]] < 0 ? -1 : new_position[parent[post[k]]];
+  }
+}
+
+/// Groups positions into supernodes: first fundamental ones (a column and its parent with the same
+/// rows), then children are merged into parents where the cost model says that one larger front is
+/// cheaper than two. Merging makes blocks that were not neighbours share a supernode, so the order
+/// is renumbered at the end.
+void Symbolic::find_supernodes(const BlockStructure& structure, const CostModel& cost) {
+  const std::int32_t n = structure.blocks();
+  const auto size_of = [&](std::int32_t p) {
+    return static_cast<std::int64_t>(structure.block_size(order_[p]));
+  };
+
+  // Rows of each column of L, by walking each row's subtree; blocks for the tests, scalars for the
+  // costs.
+  std::vector<std::int64_t> scalar_counts(n);
+  counts_.assign(n, 1);
+  for (std::int32_t p = 0; p < n; ++p) scalar_counts[p] = size_of(p);
+  {
+    const RowPattern pattern(structure, position_);
+    std::vector<std::int32_t> mark(n, -1);
+    for (std::int32_t i = 0; i < n; ++i) {
+      mark[i] = i;
+      for (std::int32_t k : pattern.row(i)) {
+        for (; mark[k] != i; k = parent_[k]) {
+          mark[k] = i;
+          ++counts_[k];
+          scalar_counts[k] += size_of(i);
+        }
+      }
+    }
+  }
+  for (std::int32_t p = 0; p < n; ++p) {
+    for (std::int64_t c = 0; c < size_of(p); ++c) {
+      const double count = static_cast<double>(scalar_counts[p] - c);
+      factor_nonzeros += scalar_counts[p] - c;
+      factor_flops += count * count;
+    }
+  }
+
+  // Fundamental supernodes.
+  std::vector<std::int32_t> child_count(n, 0);
+  for (std::int32_t p = 0; p < n; ++p) {
+    if (parent_[p] >= 0) ++child_count[parent_[p]];
+  }
+  std::vector<std::int32_t> node_of(n),
+      last_of;  // supernode of a position; last position of a supernode
+  for (std::int32_t p = 0; p < n; ++p) {
+    const bool joins =
+        p > 0 && parent_[p - 1] == p && counts_[p - 1] == counts_[p] + 1 && child_count[p] == 1;
+    if (!joins) last_of.push_back(p);
+    last_of.back() = p;
+    node_of[p] = static_cast<std::int32_t>(last_of.size()) - 1;
+  }
+  const std::int32_t nodes = static_cast<std::int32_t>(last_of.size());
+
+  // Merge upwards, in postorder; merged_into leads to the node that a node became part of.
+  std::vector<std::int32_t> parent(nodes), merged_into(nodes, -1);
+  std::vector<double> columns(nodes, 0.0), below(nodes);
+  std::vector<std::vector<std::int32_t>> children(nodes);
+  for (std::int32_t p = 0; p < n; ++p) columns[node_of[p]] += static_cast<double>(size_of(p));
+  for (std::int32_t s = 0; s < nodes; ++s) {
+    const std::int32_t last = last_of[s];
+    below[s] = static_cast<double>(scalar_counts[last] - size_of(last));
+    parent[s] = parent_[last] < 0 ? -1 : node_of[parent_[last]];
+    if (parent[s] >= 0) children[parent[s]].push_back(s);
+  }
+  for (std::int32_t s = 0; s < nodes; ++s) {
+    // Largest overlap first: the child whose rows below are nearest in number to this front adds
+    // the fewest zeros.
+    bool merged = true;
+    while (merged) {
+      merged = false;
+      double best_gain = 0.0;
+      std::int32_t best = -1;
+      for (const std::int32_t c : children[s]) {
+        const double gain = cost_of(columns[c], below[c], cost) +
+                            cost_of(columns[s], below[s], cost) -
+                            cost_of(columns[c] + columns[s], below[s], cost);
+        if (gain > best_gain) {
+          best_gain = gain;
+          best = c;
+        }
+      }
+      if (best < 0) break;
+      merged = true;
+      merged_into[best] = s;
+      columns[s] += columns[best];
+      std::erase(children[s], best);
+      for (const std::int32_t grandchild : children[best]) children[s].push_back(grandchild);
+      children[best].clear();
+      if (children[s].size() > 64)
+        merged = false;  // a hub: one merge is enough, the search must not become quadratic
+    }
+  }
+
+  // Renumber: postorder of the merged tree, the blocks of a node in their old order.
+  const auto representative = [&](std::int32_t s) {
+    while (merged_into[s] >= 0) s = merged_into[s];
+    return s;
+  };
+  std::vector<std::int32_t> rep(nodes), compact(nodes, -1), reps;
+  for (std::int32_t s = 0; s < nodes; ++s) {
+    rep[s] = representative(s);
+    if (rep[s] == s) {
+      compact[s] = static_cast<std::int32_t>(reps.size());
+      reps.push_back(s);
+    }
+  }
+  std::vector<std::int32_t> tree(reps.size());
+  for (std::size_t k = 0; k < reps.size(); ++k) {
+    tree[k] = parent[reps[k]] < 0 ? -1 : compact[rep[parent[reps[k]]]];
+  }
+  const std::vector<std::int32_t> post = postorder(tree);
+  std::vector<std::vector<std::int32_t>> members(reps.size());
+  for (std::int32_t p = 0; p < n; ++p) members[compact[rep[node_of[p]]]].push_back(p);
+
+  std::vector<std::int32_t> new_order;
+  new_order.reserve(n);
+  std::vector<std::int32_t> final_index(reps.size());
+  supernodes_.resize(reps.size());
+  supernode_of_.resize(n);
+  for (std::size_t k = 0; k < post.size(); ++k) {
+    Supernode& node = supernodes_[k];
+    final_index[post[k]] = static_cast<std::int32_t>(k);
+    node.block_begin = static_cast<std::int32_t>(new_order.size());
+    for (const std::int32_t p : members[post[k]]) {
+      supernode_of_[new_order.size()] = static_cast<std::int32_t>(k);
+      new_order.push_back(order_[p]);
+    }
+    node.block_end = static_cast<std::int32_t>(new_order.size());
+  }
+  for (std::size_t k = 0; k < post.size(); ++k) {
+    supernodes_[k].parent = tree[post[k]] < 0 ? -1 : final_index[tree[post[k]]];
+  }
+  order_ = std::move(new_order);
+  for (std::int32_t p = 0; p < n; ++p) position_[order_[p]] = p;
+  offsets_.assign(n + 1, 0);
+  for (std::int32_t p = 0; p < n; ++p) offsets_[p + 1] = offsets_[p] + size_of(p);
+
+  children_begin_.assign(supernodes_.size() + 1, 0);
+  for (const Supernode& node : supernodes_) {
+    if (node.parent >= 0) ++children_begin_[node.parent + 1];
+  }
+  std::partial_sum(children_begin_.begin(), children_begin_.end(), children_begin_.begin());
+  children_.resize(children_begin_.back());
+  std::vector<std::int64_t> next(children_begin_.begin(), children_begin_.end() - 1);
+  for (std::size_t k = 0; k < supernodes_.size(); ++k) {
+    if (supernodes_[k].parent >= 0)
+      children_[next[supernodes_[k].parent]++] = static_cast<std::int32_t>(k);
+  }
+}
+
+/// The block rows below each supernode: those of H and those of its children, beyond its own
+/// blocks.
+void Symbolic::find_rows(const BlockStructure& structure) {
+  const std::int32_t n = structure.blocks();
+  // H by columns in elimination order: for each position the larger positions.
+  std::vector<std::int64_t> begin(n + 1, 0);
+  std::vector<std::int32_t> entries(structure.entries() - n);
+  const auto for_each_entry = [&](auto visit) {
+    for (std::int32_t j = 0; j < n; ++j) {
+      for (std::int64_t e = structure.column_begin()[j] + 1; e < structure.column_begin()[j + 1];
+           ++e) {
+        const std::int32_t a = position_[structure.rows()[e]], b = position_[j];
+        visit(std::min(a, b), std::max(a, b));
+      }
+    }
+  };
+  for_each_entry([&](std::int32_t column, std::int32_t) { ++begin[column + 1]; });
+  std::partial_sum(begin.begin(), begin.end(), begin.begin());
+  std::vector<std::int64_t> next(begin.begin(), begin.end() - 1);
+  for_each_entry([&](std::int32_t column, std::int32_t row) { entries[next[column]++] = row; });
+
+  std::vector<std::int32_t> mark(n, -1);
+  rows_.clear();
+  for (std::size_t k = 0; k < supernodes_.size(); ++k) {
+    Supernode& node = supernodes_[k];
+    node.rows_begin = static_cast<std::int64_t>(rows_.size());
+    const auto add = [&](std::int32_t row) {
+      if (row < node.block_end || mark[row] == static_cast<std::int32_t>(k)) return;
+      mark[row] = static_cast<std::int32_t>(k);
+      rows_.push_back(row);
+    };
+    for (std::int64_t e = begin[node.block_begin]; e < begin[node.block_end]; ++e) add(entries[e]);
+    for (const std::int32_t c : children(static_cast<int>(k))) {
+      for (std::int64_t r = supernodes_[c].rows_begin; r < supernodes_[c].rows_end; ++r)
+        add(rows_[r]);
+    }
+    std::sort(rows_.begin() + node.rows_begin, rows_.end());
+    node.rows_end = static_cast<std::int64_t>(rows_.size());
+  }
+}
+
+void Symbolic::lay_out() {
+  panel_values_ = 0;
+  for (Supernode& node : supernodes_) {
+    std::int64_t below = 0;
+    for (std::int64_t r = node.rows_begin; r < node.rows_end; ++r)
+      below += scalars(rows_[r], rows_[r] + 1);
+    node.columns = static_cast<std::int32_t>(scalars(node.block_begin, node.block_end));
+    node.m = node.columns + static_cast<std::int32_t>(below);
+    node.stride = round_up(node.m);
+    node.panel = panel_values_;
+    panel_values_ += static_cast<std::int64_t>(node.stride) * node.columns;
+  }
+}
+
+/// For each supernode the stretches by which its rows below map onto the parent's front, and onto
+/// the permuted vector.
+void Symbolic::map_children() {
+  for (Supernode& node : supernodes_) {
+    node.gather_begin = static_cast<std::int64_t>(gathers_.size());
+    node.runs_begin = static_cast<std::int64_t>(runs_.size());
+    node.panel_runs = 0;
+    const Supernode* parent = node.parent >= 0 ? &supernodes_[node.parent] : nullptr;
+    std::int64_t parent_row = parent ? parent->rows_begin : 0;
+    std::int32_t parent_scalar = parent ? parent->columns : 0;
+    std::int32_t local = 0;
+    for (std::int64_t r = node.rows_begin; r < node.rows_end; ++r) {
+      const std::int32_t row = rows_[r];
+      const std::int32_t size = static_cast<std::int32_t>(scalars(row, row + 1));
+      const auto extend = [&](std::vector<Run>& list, std::int64_t list_begin, std::int32_t source,
+                              std::int32_t target, bool may_join) {
+        if (may_join && static_cast<std::int64_t>(list.size()) > list_begin) {
+          Run& last = list.back();
+          if (last.source + last.length == source && last.target + last.length == target) {
+            last.length += size;
+            return;
+          }
+        }
+        list.push_back({source, target, size});
+      };
+      extend(gathers_, node.gather_begin, static_cast<std::int32_t>(offsets_[row]),
+             node.columns + local, true);
+      if (row < parent->block_end) {
+        extend(runs_, node.runs_begin, local,
+               static_cast<std::int32_t>(scalars(parent->block_begin, row)), true);
+        node.panel_runs =
+            static_cast<std::int32_t>(static_cast<std::int64_t>(runs_.size()) - node.runs_begin);
+      } else {
+        for (; rows_[parent_row] != row; ++parent_row) {
+          parent_scalar +=
+              static_cast<std::int32_t>(scalars(rows_[parent_row], rows_[parent_row] + 1));
+        }
+        // A run never straddles the edge of the panel.
+        const bool first_below =
+            static_cast<std::int64_t>(runs_.size()) == node.runs_begin + node.panel_runs;
+        extend(runs_, node.runs_begin, local, parent_scalar, !first_below);
+      }
+      local += size;
+    }
+    node.runs_end = static_cast<std::int64_t>(runs_.size());
+    node.gather_end = static_cast<std::int64_t>(gathers_.size());
+  }
+}
+
+void Symbolic::assign_entries(const BlockStructure& structure) {
+  const std::int32_t n = structure.blocks();
+  // Entries of H by the supernode of their earlier block.
+  struct Entry {
+    std::int64_t entry;
+    std::int32_t column;  // block column in H
+  };
+  const auto owner = [&](std::int64_t e, std::int32_t j) {
+    return supernode_of_[std::min(position_[structure.rows()[e]], position_[j])];
+  };
+  assembly_begin_.assign(supernodes_.size() + 1, 0);
+  for (std::int32_t j = 0; j < n; ++j) {
+    for (std::int64_t e = structure.column_begin()[j]; e < structure.column_begin()[j + 1]; ++e) {
+      ++assembly_begin_[owner(e, j) + 1];
+    }
+  }
+  std::partial_sum(assembly_begin_.begin(), assembly_begin_.end(), assembly_begin_.begin());
+  std::vector<Entry> entries(assembly_begin_.back());
+  std::vector<std::int64_t> next(assembly_begin_.begin(), assembly_begin_.end() - 1);
+  for (std::int32_t j = 0; j < n; ++j) {
+    for (std::int64_t e = structure.column_begin()[j]; e < structure.column_begin()[j + 1]; ++e) {
+      entries[next[owner(e, j)]++] = {e, j};
+    }
+  }
+
+  assembly_.reserve(entries.size());
+  std::vector<std::int32_t> front_row(n);  // of a position, in the front of the supernode at hand
+  for (std::size_t k = 0; k < supernodes_.size(); ++k) {
+    const Supernode& node = supernodes_[k];
+    for (std::int32_t p = node.block_begin; p < node.block_end; ++p) {
+      front_row[p] = static_cast<std::int32_t>(scalars(node.block_begin, p));
+    }
+    std::int32_t row = node.columns;
+    for (std::int64_t r = node.rows_begin; r < node.rows_end; ++r) {
+      front_row[rows_[r]] = row;
+      row += static_cast<std::int32_t>(scalars(rows_[r], rows_[r] + 1));
+    }
+    for (std::int64_t e = assembly_begin_[k]; e < assembly_begin_[k + 1]; ++e) {
+      const std::int32_t i = structure.rows()[entries[e].entry], j = entries[e].column;
+      const bool transpose = position_[i] < position_[j];
+      const std::int32_t upper = transpose ? position_[i] : position_[j];
+      const std::int32_t lower = transpose ? position_[j] : position_[i];
+      assembly_.push_back({.source = structure.value_begin()[entries[e].entry],
+                           .target = node.panel +
+                                     static_cast<std::int64_t>(front_row[upper]) * node.stride +
+                                     front_row[lower],
+                           .rows = static_cast<std::int16_t>(structure.block_size(i)),
+                           .columns = static_cast<std::int16_t>(structure.block_size(j)),
+                           .stride = node.stride,
+                           .transpose = transpose});
+    }
+  }
+}
+
+}  // namespace cairn::block

@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "block/kernels.hpp"
+#include "cairn/block_matrix.hpp"
+
+namespace cairn::block {
+
+/// One supernode: consecutive columns of L that share their rows below.
+struct Supernode {
+  std::int32_t block_begin, block_end;  ///< its blocks, in elimination order
+  std::int64_t rows_begin, rows_end;    ///< its block rows below the diagonal, in `Symbolic::rows`
+  std::int32_t parent;                  ///< supernode of the first row below, -1 for a root
+  std::int32_t columns;                 ///< scalar columns
+  std::int32_t m;                       ///< scalar rows of the front: columns and rows below
+  std::int32_t stride;                  ///< m rounded up to 8
+  std::int64_t panel;                   ///< where its panel starts in the factor's values
+  std::int64_t runs_begin,
+      runs_end;  ///< how its update matrix maps onto the parent's front, in `Symbolic::runs`
+  std::int32_t panel_runs;  ///< the first so many runs are columns of the parent's panel
+  std::int64_t gather_begin, gather_end;  ///< its scalar rows below, as stretches of the permuted
+                                          ///< vector, in `Symbolic::gathers`
+
+  /// Doubles of the update matrix.
+  std::int64_t update_size() const { return std::int64_t(m - columns) * update_stride(); }
+  std::int32_t update_stride() const { return stride - columns / 8 * 8; }
+};
+
+/// Where an entry of H goes: into a panel, straight or transposed.
+struct Assembly {
+  std::int64_t source;         ///< in the values of H
+  std::int64_t target;         ///< in the factor's values
+  std::int16_t rows, columns;  ///< of the source block
+  std::int32_t stride;         ///< of the panel
+  bool transpose;
+};
+
+/// How the merging of supernodes weighs work: rough times in nanoseconds on one core. They decide
+/// how much explicit zero is worth one supernode less, and nothing else.
+struct CostModel {
+  double supernode = 120.0;
+  double panel_entry = 0.25;
+  double panel_flop = 0.07;
+  double update_flop = 0.025;
+  double extend_entry = 0.35;
+};
+
+/// Everything about the factorisation P H Pᵀ = L Lᵀ that depends on the structure alone:
+/// elimination order (the given ordering, postordered), supernodes after relaxed amalgamation,
+/// their rows, and the index lists by which numbers move.
+class Symbolic {
+ public:
+  Symbolic() = default;
+  Symbolic(const BlockStructure& structure, std::span<const std::int32_t> ordering,
+           const CostModel& cost = {});
+
+  std::span<const std::int32_t> order() const { return order_; }        ///< position → block
+  std::span<const std::int32_t> position() const { return position_; }  ///< block → position
+  std::span<const std::int64_t> offsets() const {
+    return offsets_;
+  }  ///< position → first scalar row; n+1 entries
+
+  std::span<const Supernode> supernodes() const {
+    return supernodes_;
+  }  ///< in elimination order (a postorder)
+  std::span<const std::int32_t> rows() const { return rows_; }  ///< block positions
+  std::span<const Run> runs() const { return runs_; }
+  /// source: scalar row in the permuted vector; target: row in the front.
+  std::span<const Run> gathers() const { return gathers_; }
+  /// Entries of H by the supernode that they go to.
+  std::span<const Assembly> assembly(int supernode) const {
+    return std::span(assembly_).subspan(
+        assembly_begin_[supernode], assembly_begin_[supernode + 1] - assembly_begin_[supernode]);
+  }
+  std::span<const std::int32_t> children(int supernode) const {
+    return std::span(children_).subspan(
+        children_begin_[supernode], children_begin_[supernode + 1] - children_begin_[supernode]);
+  }
+  std::int64_t panel_values() const {
+    return panel_values_;
+  }  ///< doubles in all panels, padding included
+
+  std::int64_t factor_nonzeros = 0;  ///< scalars in L without amalgamation or padding
+  double factor_flops = 0.0;         ///< Σ (column count)², without amalgamation
+
+ private:
+  void find_order(const BlockStructure& structure, std::span<const std::int32_t> ordering);
+  void find_supernodes(const BlockStructure& structure, const CostModel& cost);
+  void find_rows(const BlockStructure& structure);
+  void lay_out();
+  void map_children();
+  void assign_entries(const BlockStructure& structure);
+  std::int64_t scalars(std::int32_t first, std::int32_t last) const {
+    return offsets_[last] - offsets_[first];
+  }
+
+  std::vector<std::int32_t> order_, position_;
+  std::vector<std::int32_t> parent_;  // elimination tree, by position
+  std::vector<std::int32_t>
+      counts_;  // block rows in each column of L, diagonal included, by position
+  std::vector<std::int64_t> offsets_;
+  std::vector<Supernode> supernodes_;
+  std::vector<std::int32_t> supernode_of_;  // by position
+  std::vector<std::int32_t> rows_;
+  std::vector<Run> runs_, gathers_;
+  std::vector<Assembly> assembly_;
+  std::vector<std::int64_t> assembly_begin_;
+  std::vector<std::int32_t> children_;
+  std::vector<std::int64_t> children_begin_;
+  std::int64_t panel_values_ = 0;
+};
+
+}  // namespace cairn::block

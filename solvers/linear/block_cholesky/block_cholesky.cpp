@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <memory>
+#include <string>
+
+#include "block/supernodal_cholesky.hpp"
+#include "cairn/linear_solver.hpp"
+#include "cairn/registry.hpp"
+
+namespace cairn {
+namespace {
+
+/// cairn's own linear solver: a thin coat over `block::SupernodalCholesky`.
+class BlockCholesky final : public LinearSolver, public LogDeterminant {
+ public:
+  BlockCholesky(std::string ordering, const std::string& kernels)
+      : ordering_(std::move(ordering)), cholesky_(kernels) {}
+
+  void analyze(const BlockStructure& structure) override {
+    cholesky_.analyze(structure, ordering_);
+    const block::Symbolic& symbolic = cholesky_.symbolic();
+    stats_.ordering = ordering_;
+    stats_.factor_nonzeros = symbolic.factor_nonzeros;
+    stats_.factor_flops = symbolic.factor_flops;
+    stats_.note = std::to_string(symbolic.supernodes().size()) + " supernodes, " +
+                  std::string(cholesky_.kernel_set()) + " kernels";
+  }
+  Factorization factorize(const BlockMatrix& H) override { return cholesky_.factorize(H); }
+  void solve(std::span<const double> g, std::span<double> x) override { cholesky_.solve(g, x); }
+  const LinearSolverStats& stats() const override { return stats_; }
+
+  double log_determinant() const override { return cholesky_.log_determinant(); }
+  void* ability(std::string_view name) override {
+    return name == LogDeterminant::kAbility ? static_cast<LogDeterminant*>(this) : nullptr;
+  }
+
+ private:
+  std::string ordering_;
+  block::SupernodalCholesky cholesky_;
+  LinearSolverStats stats_;
+};
+
+}  // namespace
+}  // namespace cairn
+
+void cairn_register(cairn::Registrar& registrar) {
+  using namespace cairn;
+  registrar.add<LinearSolver>("block_cholesky",
+                              OptionTable{}
+                                  .choice("ordering", "amd", {"amd", "natural"},
+                                          "fill-reducing ordering of the block graph")
+                                  .choice("kernels", "auto", {"auto", "portable", "avx2", "avx512"},
+                                          "instruction set, as far as the machine has it"),
+                              [](const Options& options, Registry&) {
+                                return std::make_unique<BlockCholesky>(options.text("ordering"),
+                                                                       options.text("kernels"));
+                              });
+}

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <random>
+#include <utility>
+#include <vector>
+
+#include <Eigen/Dense>
+
+#include "cairn/block_matrix.hpp"
+
+namespace cairn::test {
+
+/// A random connected block pattern: a chain and `extra` further pairs.
+inline BlockStructure random_structure(std::mt19937& rng, int blocks, int extra,
+                                       const std::vector<std::int32_t>& sizes_to_mix) {
+  std::vector<std::int32_t> sizes;
+  for (int k = 0; k < blocks; ++k) sizes.push_back(sizes_to_mix[rng() % sizes_to_mix.size()]);
+  std::vector<std::pair<std::int32_t, std::int32_t>> entries;
+  for (int k = 1; k < blocks; ++k) entries.emplace_back(k, k - 1);
+  for (int k = 0; k < extra; ++k) entries.emplace_back(rng() % blocks, rng() % blocks);
+  return BlockStructure(std::move(sizes), std::move(entries));
+}
+
+/// Random values that make the matrix symmetric positive definite: diagonally dominant by blocks.
+inline void fill_positive_definite(std::mt19937& rng, BlockMatrix& H) {
+  const BlockStructure& s = H.structure();
+  std::uniform_real_distribution<double> uniform(-1.0, 1.0);
+  for (double& value : H.values()) value = uniform(rng);
+  for (int j = 0; j < s.blocks(); ++j) {
+    const int n = s.block_size(j);
+    Eigen::Map<Eigen::MatrixXd> block(H.block(s.column_begin()[j]), n, n);
+    block = (block * block.transpose()).eval();
+    block.diagonal().array() += 2.0 * static_cast<double>(s.size());
+  }
+}
+
+/// The whole symmetric matrix.
+inline Eigen::MatrixXd dense(const BlockMatrix& H) {
+  const BlockStructure& s = H.structure();
+  Eigen::MatrixXd D = Eigen::MatrixXd::Zero(s.size(), s.size());
+  for (int j = 0; j < s.blocks(); ++j) {
+    for (std::int64_t e = s.column_begin()[j]; e < s.column_begin()[j + 1]; ++e) {
+      const int i = s.rows()[e], rows = s.block_size(i), columns = s.block_size(j);
+      const Eigen::Map<const Eigen::MatrixXd> block(H.block(e), rows, columns);
+      D.block(s.offsets()[i], s.offsets()[j], rows, columns) = block;
+      if (i != j) D.block(s.offsets()[j], s.offsets()[i], columns, rows) = block.transpose();
+    }
+  }
+  return D;
+}
+
+}  // namespace cairn::test

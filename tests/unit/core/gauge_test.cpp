@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "cairn/gauge.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "support/planar_graph.hpp"
+
+namespace cairn {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::IsEmpty;
+
+class GaugeTest : public ::testing::Test {
+ protected:
+  GaugeTest() {
+    // Two components: poses 0 1 2 with a point that comes first, and poses 10 11.
+    graph_.add_variable(types_.point, 100, std::array{0.0, 0.0});
+    for (const Id id : {0, 1, 2, 10, 11})
+      graph_.add_variable(types_.pose, id, std::array{0.0, 0.0, 0.0});
+    connect(1, 2);
+    connect(2, 3);
+    connect(4, 5);
+    graph_.add_factor(types_.point_seen, std::array{1, 0}, std::array{1.0, 0.0},
+                      std::array{1.0, 0.0, 1.0});
+  }
+  void connect(int a, int b) {
+    graph_.add_factor(types_.relative_pose, std::array{a, b}, std::array{1.0, 0.0, 0.0},
+                      std::array{1.0, 0.0, 0.0, 1.0, 0.0, 1.0});
+  }
+  test::PlanarTypes types_;
+  Graph graph_;
+};
+
+TEST_F(GaugeTest, AnchorsTheFirstPoseOfEachComponentNotAPoint) {
+  const Gauge gauge = resolve_gauge(graph_);
+  EXPECT_EQ(gauge.components, 2);
+  EXPECT_THAT(gauge.anchored, ElementsAre(1, 4));
+  EXPECT_THAT(gauge.held, ElementsAre(false, true, false, false, true, false));
+  EXPECT_THAT(gauge.component, ElementsAre(0, 0, 0, 0, 1, 1));
+  EXPECT_EQ(gauge.describe(graph_),
+            "2 components without a fixed variable or a prior: anchored the first pose of each "
+            "(VERTEX_SE2 0, VERTEX_SE2 10)");
+}
+
+TEST_F(GaugeTest, LeavesAComponentWithAFixedVariableAlone) {
+  graph_.set_fixed(3);
+  const Gauge gauge = resolve_gauge(graph_);
+  EXPECT_THAT(gauge.anchored, ElementsAre(4));
+  EXPECT_TRUE(gauge.held[3]);
+  EXPECT_FALSE(gauge.held[1]);
+  EXPECT_EQ(gauge.describe(graph_),
+            "a component has no fixed variable: anchored VERTEX_SE2 10, the first pose");
+}
+
+TEST_F(GaugeTest, APriorOnAPoseFixesItsComponent) {
+  graph_.add_factor(types_.prior, std::array{5}, std::array{0.0, 0.0, 0.0},
+                    std::array{1.0, 0.0, 0.0, 1.0, 0.0, 1.0});
+  graph_.set_fixed(1);
+  const Gauge gauge = resolve_gauge(graph_);
+  EXPECT_THAT(gauge.anchored, IsEmpty());
+  EXPECT_EQ(gauge.describe(graph_), "");
+}
+
+TEST_F(GaugeTest, HoldsAVariableThatNoFactorTouches) {
+  const int lost = graph_.add_variable(types_.pose, 99, std::array{0.0, 0.0, 0.0});
+  const Gauge gauge = resolve_gauge(graph_);
+  EXPECT_TRUE(gauge.held[lost]);
+  EXPECT_THAT(gauge.unconstrained, ElementsAre(lost));
+  EXPECT_THAT(
+      gauge.describe(graph_),
+      ::testing::HasSubstr("1 variable has no factor and is held, the first is VERTEX_SE2 99"));
+}
+
+}  // namespace
+}  // namespace cairn

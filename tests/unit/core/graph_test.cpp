@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "cairn/graph.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <limits>
+
+#include "cairn/error.hpp"
+#include "support/planar_graph.hpp"
+
+namespace cairn {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+const std::vector<double> kUnit = {1, 0, 0, 1, 0, 1};
+
+class GraphTest : public ::testing::Test {
+ protected:
+  std::string refusal(const std::function<void()>& call) {
+    try {
+      call();
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ErrorCode::input);
+      return error.what();
+    }
+    return "";
+  }
+  int add_pose(Id id, double x = 0.0) {
+    return graph_.add_variable(types_.pose, id, std::array{x, 0.0, 0.0});
+  }
+  void connect(int a, int b, std::vector<double> information = kUnit) {
+    graph_.add_factor(types_.relative_pose, std::array{a, b}, std::array{1.0, 0.0, 0.0},
+                      information);
+  }
+  test::PlanarTypes types_;
+  Graph graph_;
+};
+
+TEST_F(GraphTest, KnowsVariablesByIdAndIndex) {
+  EXPECT_EQ(add_pose(10), 0);
+  EXPECT_EQ(graph_.add_variable(types_.point, -3, std::array{1.0, 2.0}), 1);
+  EXPECT_EQ(graph_.find(-3), 1);
+  EXPECT_EQ(graph_.find(3), std::nullopt);
+  EXPECT_EQ(graph_.describe_variable(1), "VERTEX_XY -3");
+  EXPECT_THAT(graph_.state(1), ElementsAre(1.0, 2.0));
+  EXPECT_EQ(graph_.tangent_size(), 5);
+}
+
+TEST_F(GraphTest, RefusesBadVariables) {
+  add_pose(1);
+  EXPECT_THAT(refusal([&] { add_pose(1); }),
+              HasSubstr("VERTEX_SE2 1: the id is already that of VERTEX_SE2 1"));
+  EXPECT_THAT(refusal([&] { graph_.add_variable(types_.pose, 2, std::array{1.0}); }),
+              HasSubstr("has 1 numbers, expected 3"));
+  EXPECT_THAT(refusal([&] { add_pose(2, std::numeric_limits<double>::quiet_NaN()); }),
+              HasSubstr("not finite"));
+  EXPECT_EQ(graph_.variable_count(), 1);
+  EXPECT_EQ(graph_.values().pools[0].size(), 3U);
+}
+
+TEST_F(GraphTest, RefusesBadFactorsAndStaysAsItWas) {
+  add_pose(0);
+  add_pose(1);
+  graph_.add_variable(types_.point, 2, std::array{0.0, 0.0});
+  EXPECT_THAT(refusal([&] { connect(0, 0); }),
+              HasSubstr("EDGE_SE2 0 0: joins variable 0 with itself"));
+  EXPECT_THAT(refusal([&] { connect(0, 7); }), HasSubstr("no such variable"));
+  EXPECT_THAT(refusal([&] { connect(0, 2); }),
+              HasSubstr("variable 2 is a VERTEX_XY, expected a VERTEX_SE2"));
+  EXPECT_THAT(refusal([&] {
+                connect(0, 1, {1, 0, 0, 1, 0, -1});
+              }),
+              HasSubstr("EDGE_SE2 0 1: the information matrix is not positive definite"));
+  EXPECT_THAT(refusal([&] {
+                connect(0, 1, {1, 0, 0, 1, 0, 0});
+              }),
+              HasSubstr("not positive definite"));
+  EXPECT_THAT(refusal([&] { connect(0, 1, {1, 0, 0}); }), HasSubstr("information matrix of 6"));
+  EXPECT_THAT(refusal([&] { connect(0, 1, {INFINITY, 0, 0, 1, 0, 1}); }), HasSubstr("not finite"));
+  EXPECT_EQ(graph_.factor_count(), 0);
+  connect(0, 1);
+  EXPECT_EQ(graph_.factor_pools()[0].measurements.size(), 3U);
+  EXPECT_EQ(graph_.factor_pools()[0].sqrt_information.size(), 6U);
+}
+
+TEST_F(GraphTest, KeepsInformationAsGivenAndItsSquareRoot) {
+  add_pose(0);
+  add_pose(1);
+  const std::vector<double> omega = {4, 1, 0.5, 3, 0.2, 2};
+  connect(0, 1, omega);
+  EXPECT_THAT(graph_.information(0), ::testing::ElementsAreArray(omega));
+  const AlignedVector& u = graph_.factor_pools()[0].sqrt_information;
+  Eigen::Matrix3d U = Eigen::Matrix3d::Zero(), Omega;
+  U << u[0], u[1], u[2], 0, u[3], u[4], 0, 0, u[5];
+  Omega << 4, 1, 0.5, 1, 3, 0.2, 0.5, 0.2, 2;
+  EXPECT_LT((U.transpose() * U - Omega).norm(), 1e-14);
+}
+
+TEST_F(GraphTest, ReplacesAMeasurement) {
+  add_pose(0);
+  add_pose(1);
+  connect(0, 1);
+  graph_.set_measurement(0, std::array{5.0, 6.0, 0.5}, std::array{9.0, 0.0, 0.0, 9.0, 0.0, 9.0});
+  EXPECT_THAT(graph_.measurement(0), ElementsAre(5.0, 6.0, 0.5));
+  EXPECT_EQ(graph_.factor_pools()[0].sqrt_information[0], 3.0);
+  EXPECT_THAT(refusal([&] { graph_.set_measurement(0, std::array{1.0}); }),
+              HasSubstr("EDGE_SE2 0 1"));
+}
+
+TEST_F(GraphTest, TellsLoopClosuresFromOdometryByTheOrderOfIds) {
+  for (const Id id : {30, 10, 20}) add_pose(id);  // indices 0, 1, 2
+  graph_.add_variable(types_.point, 15, std::array{0.0, 0.0});
+  connect(1, 2);  // 10 → 20: neighbours, since 15 is no pose
+  connect(0, 2);  // 30 → 20: backwards, but neighbours
+  connect(1, 0);  // 10 → 30
+  graph_.add_factor(types_.point_seen, std::array{1, 3}, std::array{0.0, 0.0},
+                    std::array{1.0, 0.0, 1.0});
+  EXPECT_THAT(loop_closures(graph_), ElementsAre(false, false, true, false));
+}
+
+TEST_F(GraphTest, ACloneIsIndependent) {
+  add_pose(0);
+  add_pose(1);
+  connect(0, 1);
+  Graph copy = graph_.clone();
+  copy.set_state(1, std::array{9.0, 9.0, 0.0});
+  copy.set_fixed(0);
+  EXPECT_EQ(graph_.state(1)[0], 0.0);
+  EXPECT_FALSE(graph_.fixed(0));
+  EXPECT_EQ(copy.factor_count(), 1);
+}
+
+TEST_F(GraphTest, RefusesStatesOfAnotherGraph) {
+  add_pose(0);
+  EXPECT_THROW(graph_.set_values(Values{}), Error);
+}
+
+TEST_F(GraphTest, SquaredNormsAreByPositionAcrossPools) {
+  const Graph graph = test::random_graph(types_, 20, 6, 1);
+  const std::vector<double> norms = squared_norms(graph);
+  std::vector<const double*> x;
+  for (int f = 0; f < graph.factor_count(); ++f) {
+    const FactorRef ref = graph.factor(f);
+    const FactorPool& pool = graph.factor_pools()[ref.pool];
+    const int n = pool.type->residual_size();
+    x.clear();
+    for (const std::int32_t v : graph.factor_variables(f)) x.push_back(graph.state(v).data());
+    Eigen::VectorXd r(n);
+    pool.type->evaluate(x.data(), graph.measurement(f).data(),
+                        pool.sqrt_information.data() + ref.entry * n * (n + 1) / 2, r.data(),
+                        nullptr);
+    EXPECT_NEAR(norms[f], r.squaredNorm(), 1e-12 * (1.0 + norms[f]));
+  }
+}
+
+}  // namespace
+}  // namespace cairn

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "cairn/spelling.hpp"
+
+#include <gtest/gtest.h>
+
+#include <vector>
+
+namespace cairn {
+namespace {
+
+const std::vector<std::string> kNames = {"cholmod", "eigen", "block_cholesky"};
+
+TEST(Spelling, FindsTheNearestName) {
+  EXPECT_EQ(nearest_spelling("colmod", kNames), "cholmod");
+  EXPECT_EQ(nearest_spelling("eigne", kNames), "eigen");
+  EXPECT_EQ(nearest_spelling("Block-Cholesky", kNames), "block_cholesky");
+}
+
+TEST(Spelling, DoesNotGuessWildly) { EXPECT_EQ(nearest_spelling("mumps", kNames), ""); }
+
+TEST(Spelling, AlwaysNamesWhatIsOnOffer) {
+  EXPECT_EQ(what_is_on_offer("mumps", kNames), "; on offer: cholmod, eigen, block_cholesky");
+  EXPECT_EQ(what_is_on_offer("eigne", kNames),
+            "; did you mean 'eigen'? (on offer: cholmod, eigen, block_cholesky)");
+  EXPECT_EQ(what_is_on_offer("x", {}), "; none is on offer");
+}
+
+}  // namespace
+}  // namespace cairn
