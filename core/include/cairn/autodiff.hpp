@@ -13,7 +13,8 @@ namespace cairn::autodiff {
 
 namespace detail {
 
-/// retract(x, δ) at δ = 0 with the derivatives of all N tangent coordinates, δ's own starting at `first`.
+/// retract(x, δ) at δ = 0 with the derivatives of all N tangent coordinates, δ's own starting at
+/// `first`.
 template <class V, int N, class X>
 Eigen::Matrix<Dual<N>, V::kAmbient, 1> lift(const X& x, int first) {
   Eigen::Matrix<Dual<N>, V::kAmbient, 1> state;
@@ -38,17 +39,18 @@ auto evaluate(const States& x, const Z& z, Jacobians& jacobians, std::index_sequ
   Eigen::Matrix<double, F::kResidual, 1> value;
   for (int row = 0; row < F::kResidual; ++row) {
     value[row] = r[row].value;
+    const Eigen::Map<const Eigen::Matrix<double, 1, N>> gradient(r[row].gradient.data());
     (..., (std::get<I>(jacobians).row(row) =
-               r[row].gradient.template segment<kTangents[I]>(first(I, kTangents)).transpose()));
+               gradient.template segment<kTangents[I]>(first(I, kTangents))));
   }
   return value;
 }
 
 }  // namespace detail
 
-/// The error F::residual(x…, z) and, into `jacobians` (a tuple of kResidual × kTangent matrices), its
-/// derivatives with respect to the tangent vector of each variable:
-/// J_k = d/dδ F::residual(…, retract(x_k, δ), …, z) at δ = 0. One pass for all variables together.
+/// The error F::residual(x…, z) and, into `jacobians` (a tuple of kResidual × kTangent matrices),
+/// its derivatives with respect to the tangent vector of each variable: J_k = d/dδ F::residual(…,
+/// retract(x_k, δ), …, z) at δ = 0. One pass for all variables together.
 template <class F, class States, class Z, class Jacobians>
 auto evaluate(const States& x, const Z& z, Jacobians& jacobians) {
   return detail::evaluate<F>(x, z, jacobians,

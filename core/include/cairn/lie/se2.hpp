@@ -10,8 +10,8 @@
 namespace cairn {
 
 /// A pose in the plane: x y [m], theta [rad]; tangent (rho_x, rho_y, phi).
-/// retract(x, δ) = x exp(δ) with the exponential of the group (a body that moves with a constant twist),
-/// and local is its inverse.
+/// retract(x, δ) = x exp(δ) with the exponential of the group (a body that moves with a constant
+/// twist), and local is its inverse.
 struct Se2 {
   static constexpr std::string_view kTag = "VERTEX_SE2";
   static constexpr int kAmbient = 3, kTangent = 3;
@@ -55,7 +55,8 @@ struct Se2 {
     S A, B;
     if (square < 1e-4) {
       A = 1.0 - square * ((1.0 / 6) - square * ((1.0 / 120) - square * (1.0 / 5040)));
-      B = phi * ((1.0 / 2) - square * ((1.0 / 24) - square * ((1.0 / 720) - square * (1.0 / 40320))));
+      B = phi *
+          ((1.0 / 2) - square * ((1.0 / 24) - square * ((1.0 / 720) - square * (1.0 / 40320))));
     } else {
       const S half = phi * 0.5;
       const S s = sin(half);

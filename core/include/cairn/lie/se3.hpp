@@ -94,7 +94,9 @@ struct Se3 {
     if (!x.allFinite()) return "a coordinate is not finite";
     const double norm = x.tail<4>().stableNorm();
     if (norm < 1e-9) return "the quaternion is zero";
-    if (std::abs(norm - 1.0) > 2.3e-16) x.tail<4>() /= norm;
+    // A few last bits off is as good as dividing again gets it; leaving it makes reading what was
+    // written exact.
+    if (std::abs(norm - 1.0) > 1e-15) x.tail<4>() /= norm;
     if (x[6] < 0.0) x.tail<4>() = -x.tail<4>();
     return {};
   }

@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <numbers>
+#include <type_traits>
 
 #include <Eigen/Core>
 
@@ -14,8 +15,8 @@ using Vector2 = Eigen::Matrix<S, 2, 1>;
 template <class S>
 using Matrix2 = Eigen::Matrix<S, 2, 2>;
 
-/// The same angle within [−π, π]. A dual number keeps its derivative. Accurate for any finite angle:
-/// the remainder is exact, so no error grows with the number of turns.
+/// The same angle within [−π, π]. A dual number keeps its derivative. Accurate for any finite
+/// angle: the remainder is exact, so no error grows with the number of turns.
 template <class S>
 S wrap_angle(const S& angle) {
   if (angle <= std::numbers::pi && angle >= -std::numbers::pi) return angle;

@@ -7,8 +7,8 @@
 #include <Eigen/Geometry>
 
 /// Rotations of space as unit quaternions (x, y, z, w) and rotation vectors ω [rad], ‖ω‖ ≤ π.
-/// S is double or a dual number. Closed forms lose digits or divide by zero at small angles; there the
-/// Taylor series stand in, long enough to be exact to the last bit where they take over.
+/// S is double or a dual number. Closed forms lose digits or divide by zero at small angles; there
+/// the Taylor series stand in, long enough to be exact to the last bit where they take over.
 /// Formulas: Solà, Deray, Atchuthan, "A micro Lie theory for state estimation in robotics", 2018.
 namespace cairn::so3 {
 
@@ -132,8 +132,7 @@ S log_factor(const S& square, const S& w) {
   using std::sqrt;
   if (square < 1e-4) {  // 2 atan(n/w)/n
     const S t = square / (w * w);
-    return (1.0 - t * ((1.0 / 3) - t * ((1.0 / 5) - t * ((1.0 / 7) - t * (1.0 / 9))))) *
-           (2.0 / w);
+    return (1.0 - t * ((1.0 / 3) - t * ((1.0 / 5) - t * ((1.0 / 7) - t * (1.0 / 9))))) * (2.0 / w);
   }
   const S n = sqrt(square);
   return atan2(n, w) * 2.0 / n;
@@ -162,8 +161,8 @@ struct JacobianFactors {
           square * ((1.0 / 24) -
                     square * ((1.0 / 720) - square * ((1.0 / 40320) - square * (1.0 / 3628800))));
       c = (1.0 / 6) -
-          square * ((1.0 / 120) - square * ((1.0 / 5040) - square * ((1.0 / 362880) -
-                                                                       square * (1.0 / 39916800))));
+          square * ((1.0 / 120) - square * ((1.0 / 5040) -
+                                            square * ((1.0 / 362880) - square * (1.0 / 39916800))));
     } else {
       const S theta = sqrt(square);
       const S half = sin(theta * 0.5);
@@ -189,8 +188,8 @@ S inverse_jacobian_factor(const S& square) {
   using std::sqrt;
   if (square < 1e-2) {
     return (1.0 / 12) +
-           square * ((1.0 / 720) + square * ((1.0 / 30240) +
-                                              square * ((1.0 / 1209600) + square * (1.0 / 47900160))));
+           square * ((1.0 / 720) + square * ((1.0 / 30240) + square * ((1.0 / 1209600) +
+                                                                       square * (1.0 / 47900160))));
   }
   const S half = sqrt(square) * 0.5;
   return (1.0 - half * cos(half) / sin(half)) / square;
@@ -199,8 +198,8 @@ S inverse_jacobian_factor(const S& square) {
 /// J_l⁻¹(ω) v; J_l⁻¹ = I − ½ [ω]ₓ + d [ω]ₓ².
 template <class S>
 Vector3<S> inverse_left_jacobian_times(const Vector3<S>& omega, const Vector3<S>& v) {
-  const S d = inverse_jacobian_factor<S>(omega[0] * omega[0] + omega[1] * omega[1] +
-                                         omega[2] * omega[2]);
+  const S d =
+      inverse_jacobian_factor<S>(omega[0] * omega[0] + omega[1] * omega[1] + omega[2] * omega[2]);
   const Vector3<S> turned = cross<S>(omega, v);
   return v - turned * 0.5 + cross<S>(omega, turned) * d;
 }

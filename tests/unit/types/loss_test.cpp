@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Laws that every loss on offer obeys, and the shapes of ours.
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <map>
+#include <string>
+
+#include "cairn/error.hpp"
+#include "cairn/loss.hpp"
+#include "cairn/registry.hpp"
+
+namespace cairn::test {
+namespace {
+
+double rho(const Loss& loss, double s) {
+  double value = NAN;
+  loss.evaluate({&s, 1}, {&value, 1}, {});
+  return value;
+}
+double weight(const Loss& loss, double s) {
+  double value = NAN;
+  loss.evaluate({&s, 1}, {}, {&value, 1});
+  return value;
+}
+
+template <class Check>
+void for_every_loss(Check check) {
+  Registry registry;
+  const auto names = registry.names("loss");
+  ASSERT_FALSE(names.empty());
+  for (const std::string& name : names) {
+    SCOPED_TRACE(name);
+    check(*registry.make<Loss>(name));
+  }
+}
+
+TEST(Losses, AreOnOfferByName) {
+  Registry registry;
+  for (const char* name :
+       {"huber", "pseudo_huber", "cauchy", "geman_mcclure", "welsch", "tukey", "dcs"}) {
+    EXPECT_TRUE(registry.has("loss", name)) << name;
+  }
+}
+
+TEST(EveryLoss, IsAlmostTheSquareNearZero) {
+  for_every_loss([](const Loss& loss) {
+    EXPECT_EQ(rho(loss, 0.0), 0.0);
+    EXPECT_EQ(weight(loss, 0.0), 1.0);
+    for (const double s : {1e-30, 1e-12, 1e-6}) {
+      EXPECT_NEAR(rho(loss, s) / s, 1.0, 10.0 * s + 1e-15);
+      EXPECT_NEAR(weight(loss, s), 1.0, 10.0 * s + 1e-15);
+    }
+  });
+}
+
+TEST(EveryLoss, HasTheDerivativesThatDifferencesShow) {
+  for_every_loss([](const Loss& loss) {
+    // Between the corners of huber, tukey and dcs, with their default scales.
+    for (const double s : {0.01, 0.3, 0.9, 1.2, 1.7, 1.9, 3.0, 5.0, 9.3, 20.0, 23.5, 100.0, 1e4}) {
+      const double h = 1e-5 * s;
+      const double slope = (rho(loss, s + h) - rho(loss, s - h)) / (2 * h);
+      EXPECT_NEAR(weight(loss, s), slope, 1e-8 * (1.0 + rho(loss, s) / s)) << s;
+      const double bend = (weight(loss, s + h) - weight(loss, s - h)) / (2 * h);
+      EXPECT_NEAR(loss.second_derivative(s), bend, 1e-8 * (1.0 + std::abs(bend) + 1.0 / s)) << s;
+    }
+  });
+}
+
+TEST(EveryLoss, NeverPullsHarderThanTheSquareAndNeverPushes) {
+  for_every_loss([](const Loss& loss) {
+    double last_rho = 0.0, last_weight = 1.0;
+    for (double s = 1e-3; s < 1e8; s *= 1.3) {
+      EXPECT_LE(rho(loss, s), s * (1.0 + 1e-15));
+      EXPECT_GE(rho(loss, s), last_rho * (1.0 - 1e-15));
+      EXPECT_LE(weight(loss, s), last_weight);
+      EXPECT_GE(weight(loss, s), 0.0);
+      EXPECT_LE(loss.second_derivative(s), 0.0);
+      last_rho = rho(loss, s);
+      last_weight = weight(loss, s);
+    }
+  });
+}
+
+TEST(EveryLoss, IsContinuousAtItsCorner) {
+  Registry registry;
+  for (const std::string& name : registry.names("loss")) {
+    SCOPED_TRACE(name);
+    const auto loss = registry.make<Loss>(name + ":scale=2");
+    const double below = 4.0 * (1 - 1e-12), above = 4.0 * (1 + 1e-12);
+    EXPECT_NEAR(rho(*loss, below), rho(*loss, above), 1e-10);
+    EXPECT_NEAR(weight(*loss, below), weight(*loss, above), 1e-10);
+  }
+}
+
+TEST(EveryLoss, TakesBatches) {
+  for_every_loss([](const Loss& loss) {
+    const std::array<double, 4> s = {0.0, 0.5, 3.0, 100.0};
+    std::array<double, 4> rhos{}, weights{};
+    loss.evaluate(s, rhos, weights);
+    for (std::size_t k = 0; k < s.size(); ++k) {
+      EXPECT_EQ(rhos[k], rho(loss, s[k]));
+      EXPECT_EQ(weights[k], weight(loss, s[k]));
+    }
+  });
+}
+
+TEST(EveryLoss, ScalesWithItsOption) {
+  Registry registry;
+  for (const std::string& name : registry.names("loss")) {
+    SCOPED_TRACE(name);
+    const auto one = registry.make<Loss>(name + ":scale=1"),
+               three = registry.make<Loss>(name + ":scale=3");
+    for (const double s : {0.1, 1.5, 40.0}) {
+      EXPECT_NEAR(rho(*three, 9.0 * s), 9.0 * rho(*one, s), 1e-13 * 9.0 * s);
+      EXPECT_NEAR(weight(*three, 9.0 * s), weight(*one, s), 1e-14);
+    }
+    EXPECT_THROW(registry.make<Loss>(name + ":scale=0"), Error);
+    EXPECT_THROW(registry.make<Loss>(name + ":scale=-1"), Error);
+  }
+}
+
+TEST(Losses, HaveTheValuesOfTheirFormulasAtFourTimesTheScale) {
+  // scale 2, so q = 4, and s = 16
+  const std::map<std::string, double> expected = {
+      {"huber", 2 * 2 * 4 - 4.0},           {"pseudo_huber", 2 * 4 * (std::sqrt(5.0) - 1)},
+      {"cauchy", 4 * std::log(5.0)},        {"geman_mcclure", 4 * 16 / 20.0},
+      {"welsch", 4 * (1 - std::exp(-4.0))}, {"tukey", 4.0 / 3},
+      {"dcs", 3 * 4 - 4 * 4 * 4 / 20.0},  // Φ + ∫ (2Φ / (Φ + u))² du from Φ to s
+  };
+  Registry registry;
+  for (const auto& [name, value] : expected) {
+    EXPECT_NEAR(rho(*registry.make<Loss>(name + ":scale=2"), 16.0), value, 1e-14) << name;
+  }
+  // The scaling factor of [Agarwal13], squared.
+  EXPECT_NEAR(weight(*registry.make<Loss>("dcs:scale=2"), 16.0), std::pow(2 * 4 / 20.0, 2), 1e-15);
+}
+
+}  // namespace
+}  // namespace cairn::test

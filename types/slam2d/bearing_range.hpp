@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cmath>
+
+#include "cairn/define_factor.hpp"
+#include "cairn/lie/point.hpp"
+#include "cairn/lie/se2.hpp"
+
+namespace cairn::slam2d {
+
+/// Landmark l seen from a pose at z = (bearing [rad], range [m]); with p = Rᵀ (l − t):
+/// error = (wrapped atan2(p_y, p_x) − bearing, ‖p‖ − range).
+struct BearingRange {
+  static constexpr std::string_view kTag = "EDGE_BEARING_RANGE_SE2_XY";
+  static constexpr int kResidual = 2, kMeasurement = 2;
+  using Variables = std::tuple<Se2, PointXY>;
+
+  template <class S>
+  static Vector<S, 2> residual(const Vector<S, 3>& pose, const Vector<S, 2>& landmark,
+                               const Vector<double, 2>& z) {
+    using std::atan2;
+    using std::sqrt;
+    const so2::Rotation<S> R(pose[2]);
+    const S dx = landmark[0] - pose[0], dy = landmark[1] - pose[1];
+    const S px = R.c * dx + R.s * dy, py = R.c * dy - R.s * dx;
+    return {wrap_angle<S>(atan2(py, px) - z[0]), sqrt(px * px + py * py) - z[1]};
+  }
+
+  static Vector<double, 2> evaluate(const Vector<double, 3>& pose,
+                                    const Vector<double, 2>& landmark, const Vector<double, 2>& z,
+                                    Eigen::Matrix<double, 2, 3>& J_pose,
+                                    Eigen::Matrix2d& J_landmark) {
+    const so2::Rotation<double> R(pose[2]);
+    const double dx = landmark[0] - pose[0], dy = landmark[1] - pose[1];
+    const double px = R.c * dx + R.s * dy, py = R.c * dy - R.s * dx;
+    const double range = std::sqrt(px * px + py * py);
+    // A pose on top of its landmark sees no direction: no derivative, rather than an infinite one.
+    const double inverse = range > 0.0 ? 1.0 / range : 0.0;
+    const double ux = px * inverse, uy = py * inverse;
+    const double bx = -uy * inverse, by = ux * inverse;  // d bearing / dp
+    J_pose << -bx, -by, range > 0.0 ? -1.0 : 0.0, -ux, -uy, 0;
+    J_landmark << bx * R.c - by * R.s, bx * R.s + by * R.c,  //
+        ux * R.c - uy * R.s, ux * R.s + uy * R.c;
+    return {wrap_angle(std::atan2(py, px) - z[0]), range - z[1]};
+  }
+
+  static std::string normalize(Vector<double, 2>& z) {
+    if (!z.allFinite()) return "a number is not finite";
+    if (z[1] < 0.0) return "the range is negative";
+    z[0] = wrap_angle(z[0]);
+    return {};
+  }
+
+  static bool propagate(int target, const double* const* x, const double* z, double* out) {
+    if (target != 1) return false;
+    const so2::Rotation<double> direction(x[0][2] + z[0]);
+    out[0] = x[0][0] + z[1] * direction.c;
+    out[1] = x[0][1] + z[1] * direction.s;
+    return true;
+  }
+};
+
+}  // namespace cairn::slam2d

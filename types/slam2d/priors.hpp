@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <algorithm>
+
+#include "cairn/define_factor.hpp"
+#include "cairn/lie/point.hpp"
+#include "cairn/lie/se2.hpp"
+
+namespace cairn::slam2d {
+
+/// A pose known to be z = (x y [m], theta [rad]): error = (translation, wrapped angle) of z⁻¹ x.
+struct PosePrior {
+  static constexpr std::string_view kTag = "EDGE_PRIOR_SE2";
+  static constexpr int kResidual = 3, kMeasurement = 3;
+  using Variables = std::tuple<Se2>;
+
+  template <class S>
+  static Vector<S, 3> residual(const Vector<S, 3>& x, const Vector<double, 3>& z) {
+    const so2::Rotation<double> R_z(z[2]);
+    const S dx = x[0] - z[0], dy = x[1] - z[1];
+    return {dx * R_z.c + dy * R_z.s, dy * R_z.c - dx * R_z.s, wrap_angle<S>(x[2] - z[2])};
+  }
+
+  static Vector<double, 3> evaluate(const Vector<double, 3>& x, const Vector<double, 3>& z,
+                                    Eigen::Matrix3d& J) {
+    const Vector<double, 3> e = residual<double>(x, z);
+    const so2::Rotation<double> R_e(e[2]);
+    J << R_e.c, -R_e.s, 0, R_e.s, R_e.c, 0, 0, 0, 1;
+    return e;
+  }
+
+  static std::string normalize(Vector<double, 3>& z) { return Se2::normalize(z); }
+  static bool propagate(int, const double* const*, const double* z, double* out) {
+    std::copy_n(z, 3, out);
+    return true;
+  }
+};
+
+/// A landmark known to be at z = (x y [m]): error = l − z.
+struct LandmarkPrior {
+  static constexpr std::string_view kTag = "EDGE_PRIOR_XY";
+  static constexpr int kResidual = 2, kMeasurement = 2;
+  using Variables = std::tuple<PointXY>;
+
+  template <class S>
+  static Vector<S, 2> residual(const Vector<S, 2>& x, const Vector<double, 2>& z) {
+    return {x[0] - z[0], x[1] - z[1]};
+  }
+  static Vector<double, 2> evaluate(const Vector<double, 2>& x, const Vector<double, 2>& z,
+                                    Eigen::Matrix2d& J) {
+    J.setIdentity();
+    return x - z;
+  }
+
+  static std::string normalize(Vector<double, 2>& z) { return PointXY::normalize(z); }
+  static bool propagate(int, const double* const*, const double* z, double* out) {
+    std::copy_n(z, 2, out);
+    return true;
+  }
+};
+
+}  // namespace cairn::slam2d

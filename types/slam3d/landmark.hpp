@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "cairn/define_factor.hpp"
+#include "cairn/lie/point.hpp"
+#include "cairn/lie/se3.hpp"
+
+namespace cairn::slam3d {
+
+/// Landmark l seen from a pose at z = (x y z [m]) in the frame of the pose: error = Rᵀ (l − t) − z.
+struct Landmark {
+  static constexpr std::string_view kTag = "EDGE_SE3_TRACKXYZ";
+  static constexpr int kResidual = 3, kMeasurement = 3;
+  using Variables = std::tuple<Se3, PointXYZ>;
+
+  template <class S>
+  static Vector<S, 3> residual(const Vector<S, 7>& pose, const Vector<S, 3>& landmark,
+                               const Vector<double, 3>& z) {
+    const Vector<S, 3> apart = landmark - Se3::translation<S>(pose);
+    const Vector<S, 3> seen = so3::rotate_back<S>(Se3::quaternion<S>(pose), apart);
+    return {seen[0] - z[0], seen[1] - z[1], seen[2] - z[2]};
+  }
+
+  static Vector<double, 3> evaluate(const Vector<double, 7>& pose,
+                                    const Vector<double, 3>& landmark, const Vector<double, 3>& z,
+                                    Eigen::Matrix<double, 3, 6>& J_pose,
+                                    Eigen::Matrix3d& J_landmark) {
+    J_landmark = Se3::rotation(pose).transpose();
+    Vector<double, 3> seen;
+    seen.noalias() = J_landmark.lazyProduct(landmark - Se3::position(pose));
+    J_pose.leftCols<3>() = -Eigen::Matrix3d::Identity();
+    J_pose.rightCols<3>() = so3::hat<double>(seen);
+    return seen - z;
+  }
+
+  static std::string normalize(Vector<double, 3>& z) { return PointXYZ::normalize(z); }
+
+  /// The landmark follows from the pose; one landmark does not determine a pose.
+  static bool propagate(int target, const double* const* x, const double* z, double* out) {
+    if (target != 1) return false;
+    const Vector<double, 7> pose = Eigen::Map<const Vector<double, 7>>(x[0]);
+    const Vector<double, 3> seen = Eigen::Map<const Vector<double, 3>>(z);
+    Eigen::Map<Vector<double, 3>>{out} =
+        Se3::position(pose) + so3::rotate<double>(Se3::quaternion<double>(pose), seen);
+    return true;
+  }
+};
+
+}  // namespace cairn::slam3d

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <algorithm>
+
+#include "cairn/define_factor.hpp"
+#include "cairn/lie/point.hpp"
+#include "cairn/lie/se3.hpp"
+#include "metrics.hpp"
+
+namespace cairn::slam3d {
+
+/// A pose known to be z = (x y z [m], qx qy qz qw): error = Metric(z⁻¹ x).
+template <class Metric>
+struct PosePrior {
+  static constexpr std::string_view kTag = "EDGE_PRIOR_SE3:QUAT";
+  static constexpr int kResidual = 6, kMeasurement = 7;
+  static constexpr std::string_view kMetric = Metric::kName;
+  using Variables = std::tuple<Se3>;
+
+  template <class S>
+  static Vector<S, 6> residual(const Vector<S, 7>& x, const Vector<double, 7>& z) {
+    const Vector<S, 7> known = z.template cast<S>();
+    return Metric::template error<S>(Se3::between<S>(known, x));
+  }
+  static Vector<double, 6> evaluate(const Vector<double, 7>& x, const Vector<double, 7>& z,
+                                    Eigen::Matrix<double, 6, 6>& J) {
+    ErrorDerivative D;
+    const Vector<double, 6> e = Metric::derivative(Se3::between<double>(z, x), D);
+    J << D.translation, D.cross, Eigen::Matrix3d::Zero(), D.rotation;
+    return e;
+  }
+
+  static std::string normalize(Vector<double, 7>& z) { return Se3::normalize(z); }
+  static bool propagate(int, const double* const*, const double* z, double* out) {
+    std::copy_n(z, 7, out);
+    return true;
+  }
+};
+
+/// A landmark known to be at z = (x y z [m]): error = l − z.
+struct LandmarkPrior {
+  static constexpr std::string_view kTag = "EDGE_PRIOR_TRACKXYZ";
+  static constexpr int kResidual = 3, kMeasurement = 3;
+  using Variables = std::tuple<PointXYZ>;
+
+  template <class S>
+  static Vector<S, 3> residual(const Vector<S, 3>& x, const Vector<double, 3>& z) {
+    return {x[0] - z[0], x[1] - z[1], x[2] - z[2]};
+  }
+  static Vector<double, 3> evaluate(const Vector<double, 3>& x, const Vector<double, 3>& z,
+                                    Eigen::Matrix3d& J) {
+    J.setIdentity();
+    return x - z;
+  }
+
+  static std::string normalize(Vector<double, 3>& z) { return PointXYZ::normalize(z); }
+  static bool propagate(int, const double* const*, const double* z, double* out) {
+    std::copy_n(z, 3, out);
+    return true;
+  }
+};
+
+}  // namespace cairn::slam3d
