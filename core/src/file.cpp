@@ -53,7 +53,7 @@ class Descriptor {
 std::string read_bytes(const fs::path& file) {
   Descriptor input(::open(file.c_str(), O_RDONLY | O_CLOEXEC));
   if (input.number() < 0) fail(file, "cannot be opened: " + system_message(errno));
-  struct stat status{};
+  struct stat status {};
   if (::fstat(input.number(), &status) != 0) {
     fail(file, "cannot be examined: " + system_message(errno));
   }
@@ -90,7 +90,8 @@ struct Inflater {
   ~Inflater() { inflateEnd(&stream); }
 };
 
-/// Unpacks one gzip member from the front of `packed` onto the end of `out`; returns its packed size.
+/// Unpacks one gzip member from the front of `packed` onto the end of `out`; returns its packed
+/// size.
 std::size_t unpack_member(const fs::path& file, std::string_view packed, std::string& out) {
   Inflater inflater;
   z_stream& z = inflater.stream;
@@ -112,13 +113,14 @@ std::size_t unpack_member(const fs::path& file, std::string_view packed, std::st
     if (status == Z_STREAM_END) return taken;
     const bool starved = taken == packed.size() && z.avail_out > 0;
     if (status == Z_BUF_ERROR || (status == Z_OK && starved)) {
-      fail(file, fmt::format("is gzip data that breaks off after {} bytes ({} unpacked); the file is "
-                             "truncated, get it again",
-                             packed.size(), out.size()));
+      fail(file,
+           fmt::format("is gzip data that breaks off after {} bytes ({} unpacked); the file is "
+                       "truncated, get it again",
+                       packed.size(), out.size()));
     }
     if (status != Z_OK) {
-      fail(file, fmt::format("is gzip data that is damaged near byte {} ({}); get the file again", taken,
-                             z.msg ? z.msg : "unknown reason"));
+      fail(file, fmt::format("is gzip data that is damaged near byte {} ({}); get the file again",
+                             taken, z.msg ? z.msg : "unknown reason"));
     }
   }
 }
@@ -172,7 +174,8 @@ bool write_all(int descriptor, std::string_view bytes) {
 
 void write_to_standard_output(std::string_view bytes) {
   // Through stdio, so that it comes after what the program has printed itself.
-  if (std::fwrite(bytes.data(), 1, bytes.size(), stdout) != bytes.size() || std::fflush(stdout) != 0) {
+  if (std::fwrite(bytes.data(), 1, bytes.size(), stdout) != bytes.size() ||
+      std::fflush(stdout) != 0) {
     throw Error(ErrorCode::input, "standard output cannot be written: " + system_message(errno));
   }
 }
@@ -251,7 +254,7 @@ void write_file(const fs::path& file, std::string_view bytes) {
     bytes = packed;
   }
   const fs::path target = follow_links(file);
-  struct stat status{};
+  struct stat status {};
   const bool exists = ::stat(target.c_str(), &status) == 0;
   if (exists && S_ISDIR(status.st_mode)) fail(file, "is a folder; expected a file name");
   if (exists && !S_ISREG(status.st_mode)) return write_in_place(target, bytes);

@@ -20,8 +20,8 @@ struct NamedFormat {
   std::unique_ptr<Format> format;
 };
 
-/// All formats on offer. One plugin that is broken must not keep a user from a file that another one
-/// reads: its error goes to `problems`, to be told if nothing else fits.
+/// All formats on offer. One plugin that is broken must not keep a user from a file that another
+/// one reads: its error goes to `problems`, to be told if nothing else fits.
 std::vector<NamedFormat> all_formats(Registry& registry, std::vector<std::string>& problems) {
   std::vector<NamedFormat> formats;
   for (const std::string& name : registry.names(Format::kKind)) {
@@ -39,8 +39,9 @@ std::string ending(std::filesystem::path file) {
   if (file.extension() == ".gz") file.replace_extension();
   std::string text = file.extension().string();
   if (!text.empty()) text.erase(0, 1);
-  std::transform(text.begin(), text.end(), text.begin(),
-                 [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; });
+  std::transform(text.begin(), text.end(), text.begin(), [](char c) {
+    return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  });
   return text;
 }
 
@@ -60,9 +61,19 @@ std::string beginning(std::string_view text) {
   return shown;
 }
 
-std::string with_problems(std::string message, const std::vector<std::string>& problems) {
-  for (const std::string& problem : problems) message += "\n  also: " + problem;
-  return message;
+/// Nothing fits. Where formats could not be loaded, that is the likely cause and decides the code.
+Error nothing_fits(ErrorCode code, std::string message, const std::vector<std::string>& problems) {
+  if (problems.empty()) return {code, message};
+  message += "\n  and " + problems.front();
+  if (problems.size() > 1) {
+    message += fmt::format("\n  and {} more formats could not be loaded", problems.size() - 1);
+  }
+  return {ErrorCode::plugin, message};
+}
+
+/// "on offer: a, b", or that there is nothing.
+std::string on_offer(const std::vector<std::string>& names) {
+  return names.empty() ? "none is on offer" : fmt::format("on offer: {}", fmt::join(names, ", "));
 }
 
 /// Chooses by content; where two are equally sure, the file's ending decides.
@@ -86,11 +97,11 @@ NamedFormat detect(const std::filesystem::path& file, std::string_view text, Reg
     for (const NamedFormat& f : formats) {
       if (f.format->can_read()) readers.push_back(f.name);
     }
-    throw Error(ErrorCode::input,
-                with_problems(fmt::format("{}: no format knows this content, which begins with '{}'; "
-                                          "formats on offer: {}",
-                                          file.string(), beginning(text), fmt::join(readers, ", ")),
-                              problems));
+    throw nothing_fits(
+        ErrorCode::input,
+        fmt::format("{}: no format knows this content, which begins with '{}'; formats {}",
+                    file.string(), beginning(text), on_offer(readers)),
+        problems);
   }
   return std::move(*chosen);
 }
@@ -105,13 +116,14 @@ NamedFormat writer_by_ending(const std::filesystem::path& file, Registry& regist
     for (const std::string& e : candidate.format->extensions()) endings.push_back("." + e);
   }
   const std::string found =
-      file == "-" ? "standard output has no ending that tells the format"
-                  : (wanted.empty() ? "the name has no ending that tells the format"
-                                    : fmt::format("no format that writes has the ending '.{}'", wanted));
-  throw Error(ErrorCode::usage,
-              with_problems(fmt::format("{}: {}; endings on offer: {}, or name the format", file.string(),
-                                        found, fmt::join(endings, ", ")),
-                            problems));
+      file == "-"
+          ? "standard output has no ending that tells the format"
+          : (wanted.empty() ? "the name has no ending that tells the format"
+                            : fmt::format("no format that writes has the ending '.{}'", wanted));
+  throw nothing_fits(ErrorCode::usage,
+                     fmt::format("{}: {}; endings {}; or name the format", file.string(), found,
+                                 on_offer(endings)),
+                     problems);
 }
 
 /// "g2o" of "g2o:option=1".

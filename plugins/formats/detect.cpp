@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "detect.hpp"
+
+#include <array>
+#include <cctype>
+
+#include "cairn/error.hpp"
+#include "information.hpp"
+#include "scanner.hpp"
+
+namespace cairn::formats {
+namespace {
+
+constexpr int kLines = 600;      // that hold something: enough to see past a bad one
+constexpr int kLongestRow = 12;  // fields of a KITTI row
+
+struct Votes {
+  int lines = 0;
+  int g2o = 0, toro = 0, isam = 0;
+  int toro_or_isam = 0;                     // by tag either, and the numbers don't tell
+  int vertices = 0;                         // of TORO
+  int tagged = 0;                           // any other word
+  std::array<int, kLongestRow + 1> rows{};  // of numbers, by their count
+};
+
+bool is_word(std::string_view field) {
+  return std::isalpha(static_cast<unsigned char>(field.front())) != 0 || field.front() == '_';
+}
+bool is_number_like(std::string_view field) {
+  return field.find_first_not_of("0123456789+-.eEinfaNIAF") == std::string_view::npos;
+}
+
+/// An edge that is TORO's or iSAM's: from to x y theta and six numbers that tell, or don't.
+void vote_on_edge(Scanner& scanner, Votes& votes) {
+  scanner.expect({2, 3, 6});
+  std::array<double, 6> six;
+  try {
+    scanner.read_id();
+    scanner.read_id();
+    std::array<double, 3> measurement;
+    scanner.read_numbers(measurement);
+    scanner.read_numbers(six);
+  } catch (const Error&) {  // a bad line: its reader will say so
+    ++votes.toro_or_isam;
+    return;
+  }
+  const bool toro = fits_toro(six), isam = fits_isam(six);
+  ++(toro == isam ? votes.toro_or_isam : toro ? votes.toro : votes.isam);
+}
+
+void vote_on_landmark(Scanner& scanner, Votes& votes) {
+  scanner.expect({});
+  const int fields = scanner.count_fields();
+  ++(fields == 7 ? votes.isam : fields == 11 ? votes.toro : votes.toro_or_isam);
+}
+
+void vote(Scanner& scanner, Votes& votes) {
+  const std::string_view tag = scanner.tag();
+  ++votes.lines;
+  if (!is_word(tag)) {
+    scanner.expect_row({}, "");
+    const int fields = scanner.count_fields();
+    if (fields <= kLongestRow && is_number_like(tag)) ++votes.rows[fields];
+  } else if (tag == "VERTEX2" || tag == "VERTEX") {
+    ++votes.toro;
+    ++votes.vertices;
+  } else if (tag == "EDGE2" || tag == "ODOMETRY") {
+    vote_on_edge(scanner, votes);
+  } else if (tag == "EDGE") {
+    ++votes.toro;
+  } else if (tag == "EDGE3") {
+    ++votes.isam;
+  } else if (tag == "LANDMARK") {
+    vote_on_landmark(scanner, votes);
+  } else if (tag.starts_with("VERTEX_") || tag.starts_with("EDGE_") || tag.starts_with("PARAMS_")) {
+    ++votes.g2o;
+  } else {
+    ++votes.tagged;  // FIX among them, which every format with tags takes
+  }
+}
+
+/// Edges whose numbers don't tell go with those that do; if none does, iSAM's lack of vertices
+/// decides.
+void settle_undecided(Votes& votes) {
+  const bool to_toro = votes.toro > votes.isam;
+  (to_toro ? votes.toro : votes.isam) += votes.toro_or_isam;
+}
+
+}  // namespace
+
+Likelihood look_at(std::string_view text) {
+  Votes votes;
+  Scanner scanner(text, "");
+  while (votes.lines < kLines && scanner.next_line()) vote(scanner, votes);
+  if (votes.lines == 0 || text.substr(0, 4096).find('\0') != std::string_view::npos) return {};
+  settle_undecided(votes);
+
+  // Certain only if every line agrees; a share of them, at least 2, otherwise.
+  const auto score = [&votes](int lines) {
+    return lines == 0 ? 0 : 2 + static_cast<int>(98LL * lines / votes.lines);
+  };
+  Likelihood likelihood;
+  likelihood.g2o = score(votes.g2o);
+  likelihood.toro = score(votes.toro);
+  likelihood.isam = score(votes.isam);
+  likelihood.tum = score(votes.rows[8]);
+  likelihood.kitti = score(votes.rows[12]);
+  likelihood.table = score(votes.rows[3] > votes.rows[4] ? votes.rows[3] : votes.rows[4]);
+  // Words that no format knows may be tags of a third party's types, which g2o's reader asks the
+  // registry for; failing that, it says which line it does not understand.
+  if (votes.tagged > 0 && likelihood.g2o == 0) likelihood.g2o = 1;
+  return likelihood;
+}
+
+}  // namespace cairn::formats

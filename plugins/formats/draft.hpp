@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "cairn/format.hpp"
+#include "cairn/registry.hpp"
+
+namespace cairn::formats {
+
+/// What a reader has found in a file so far: variables and factors with the lines that they came
+/// from. Every reader fills one, line by line in whatever order the file has, and `build` makes the
+/// graph when all is known. All numbers lie in one array, all ids in another.
+class Draft {
+ public:
+  struct Variable {
+    std::int32_t kind;
+    Id id;
+    std::int64_t line;
+    std::size_t numbers;  ///< first of ambient_size
+  };
+  struct Factor {
+    std::int32_t kind;
+    std::int64_t line;
+    std::size_t ids;      ///< first of arity
+    std::size_t numbers;  ///< first of measurement_size + n(n+1)/2
+  };
+  struct Held {
+    Id id;
+    std::int64_t line;
+  };
+  struct VariableKind {
+    std::string tag;
+    std::shared_ptr<const VariableType> type;
+    int size;
+  };
+  struct FactorKind {
+    std::string tag;
+    std::shared_ptr<const FactorType> type;
+    std::vector<std::int32_t> variable_kinds;
+    int arity, measurement, residual, information;
+    std::string name;  ///< what the file calls it; the tag unless the reader says otherwise
+  };
+
+  Draft(std::string file, std::string format, Registry& types, const ReadOptions& options,
+        ReadReport& report);
+
+  /// The kind of that tag, asking the registry for its type the first time. Throws `Error`
+  /// (plugin).
+  std::int32_t variable_kind(std::string_view tag);
+  /// `name`: the tag by which the file calls it in messages, if that is another.
+  std::int32_t factor_kind(std::string_view tag, std::string_view name = {});
+  const VariableKind& variable(std::int32_t kind) const { return variable_kinds_[kind]; }
+  const FactorKind& factor(std::int32_t kind) const { return factor_kinds_[kind]; }
+
+  /// Adds a variable; the span is its state, to be filled by the caller at once.
+  std::span<double> add_variable(std::int32_t kind, Id id, std::int64_t line);
+  /// Adds a factor; the spans are to be filled by the caller at once: ids, measurement, information
+  /// (upper triangle row by row).
+  struct FactorSlots {
+    std::span<Id> ids;
+    std::span<double> measurement;
+    std::span<double> information;
+  };
+  FactorSlots add_factor(std::int32_t kind, std::int64_t line);
+  /// To be called when the slots of the last factor are filled: repairs its information where that
+  /// is asked for and possible, and complains if it is not positive definite. `as_in_file`: the
+  /// numbers of the information as they stood there, if that was in another order, for a hint at
+  /// what else they could be.
+  void finish_factor(std::span<const double> as_in_file = {});
+  void add_held(Id id, std::int64_t line) { held_.push_back({id, line}); }
+
+  std::vector<Variable>& variables() { return variables_; }
+  std::vector<Factor>& factors() { return factors_; }
+  FactorSlots slots(const Factor& factor);
+  /// A number of a state or measurement by its place.
+  double number(std::size_t place) const { return numbers_[place]; }
+  ReadReport& report() { return *report_; }
+  const std::string& file() const { return file_; }
+
+  /// The graph: variables by rising id, factors as in the file. If the file has no vertices at all,
+  /// those that its factors join are made, with states propagated along the factors. Throws `Error`
+  /// (input) naming file and line.
+  Graph build();
+
+  [[noreturn]] void fail(std::int64_t line, std::string_view what) const;
+
+ private:
+  void make_missing_variables();
+  void sort_variables();
+  std::int32_t index_of(Id id) const;  ///< among the sorted variables, or -1
+  std::string describe(const Factor& factor) const;
+  void check_ends(const Factor& factor, std::span<int> indices) const;
+  void add_variables_to(Graph& graph) const;
+  void add_factors_to(Graph& graph) const;
+  void hold_variables_of(Graph& graph) const;
+
+  std::string file_;
+  std::string format_;
+  Registry* types_;
+  ReadOptions options_;
+  ReadReport* report_;
+  std::vector<VariableKind> variable_kinds_;
+  std::vector<FactorKind> factor_kinds_;
+  std::vector<Variable> variables_;
+  std::vector<Factor> factors_;
+  std::vector<Held> held_;
+  std::vector<Id> ids_;
+  std::vector<double> numbers_;
+};
+
+}  // namespace cairn::formats

@@ -1,0 +1,184 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// g2o text. Each line is a tag, ids, the numbers of the state or measurement, and the upper
+// triangle of the information row by row. Tags are those of the types on offer, so that a third
+// party's types work in files; only FIX, PARAMS_… and the factors that refer to parameters are
+// known here by name.
+
+#include <array>
+#include <map>
+
+#include <fmt/format.h>
+
+#include "cairn/error.hpp"
+#include "readers.hpp"
+#include "sensor_offset.hpp"
+#include "tag_lines.hpp"
+
+namespace cairn::formats {
+namespace {
+
+constexpr std::string_view kOffset = "PARAMS_SE3OFFSET";
+constexpr std::string_view kPointSeen = "EDGE_SE3_TRACKXYZ";  // pose, point, parameter, x y z
+constexpr std::string_view kPrior = "EDGE_SE3_PRIOR";         // pose, parameter, pose
+constexpr std::string_view kOwnPrior = "EDGE_PRIOR_SE3:QUAT";
+
+/// g2o has parameters of many kinds, all called PARAMS_ and a word in capitals.
+bool is_parameter_tag(std::string_view tag) {
+  return tag.starts_with("PARAMS_") &&
+         tag.find_first_not_of("ABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_") == std::string_view::npos;
+}
+
+class G2oReader {
+ public:
+  G2oReader(std::string_view text, const std::string& name, Registry& types,
+            const ReadOptions& options, ReadReport& report)
+      : types_(types),
+        options_(options),
+        scanner_(text, name),
+        draft_(name, "g2o", types, options, report) {
+    tags_.add("FIX", read_fix);
+    tags_.add(std::string(kOffset), [this](Scanner&, Draft&) { read_offset(); });
+    tags_.add(std::string(kPointSeen), [this](Scanner&, Draft&) { read_point_seen(); });
+    tags_.add(std::string(kPrior), [this](Scanner&, Draft&) { read_prior(); });
+  }
+
+  Graph read() {
+    while (scanner_.next_line()) read_line();
+    apply_offsets();
+    note_unused_parameters();
+    return draft_.build();
+  }
+
+ private:
+  struct Offset {
+    SensorOffset value;
+    std::int64_t line;
+  };
+  /// A factor that refers to a parameter, which may stand further down in the file.
+  struct Reference {
+    std::size_t factor;
+    Id parameter;
+  };
+
+  void read_line() {
+    const std::string_view tag = scanner_.tag();
+    if (const LineReader* reader = tags_.find(tag)) return (*reader)(scanner_, draft_);
+    if (types_.has("variable", tag)) {
+      add_variable_tag(tag);
+    } else if (types_.has("factor", tag)) {
+      add_factor_tag(tag);
+    } else if (is_parameter_tag(tag)) {
+      ++unused_parameters_[shown(tag)];
+      return;
+    } else {
+      return unknown_tag(scanner_, draft_, options_, tags_on_offer());
+    }
+    (*tags_.find(tag))(scanner_, draft_);
+  }
+  void add_variable_tag(std::string_view tag) {
+    tags_.add(std::string(tag), [kind = draft_.variable_kind(tag)](Scanner& scanner, Draft& draft) {
+      read_variable(scanner, draft, kind);
+    });
+  }
+  void add_factor_tag(std::string_view tag) {
+    tags_.add(std::string(tag), [kind = draft_.factor_kind(tag)](Scanner& scanner, Draft& draft) {
+      read_factor(scanner, draft, kind);
+      draft.finish_factor();
+    });
+  }
+  std::vector<std::string> tags_on_offer() const {
+    std::vector<std::string> names = types_.names("variable");
+    const std::vector<std::string> factors = types_.names("factor");
+    names.insert(names.end(), factors.begin(), factors.end());
+    names.insert(names.end(), {"FIX", std::string(kOffset), std::string(kPrior)});
+    return names;
+  }
+
+  void read_offset() {
+    scanner_.expect({1, 7, 0});
+    const Id id = scanner_.read_id();
+    std::array<double, 7> numbers;
+    scanner_.read_numbers(numbers);
+    scanner_.end_line();
+    Offset offset{{}, scanner_.line()};
+    if (const std::string problem = offset.value.set(numbers); !problem.empty()) {
+      scanner_.fail(fmt::format("{} {}: {}", kOffset, id, problem));
+    }
+    const auto [place, added] = offsets_.emplace(id, offset);
+    if (!added) {
+      scanner_.fail(
+          fmt::format("{} {}: the id was already given in line {}; expected every id once", kOffset,
+                      id, place->second.line));
+    }
+  }
+
+  /// A factor line with the id of a parameter after those of the variables.
+  void read_with_parameter(std::int32_t kind) {
+    const Draft::FactorKind& k = draft_.factor(kind);
+    scanner_.expect({k.arity + 1, k.measurement, k.information});
+    const Draft::FactorSlots slots = draft_.add_factor(kind, scanner_.line());
+    for (Id& id : slots.ids) id = scanner_.read_id();
+    references_.push_back({draft_.factors().size() - 1, scanner_.read_id()});
+    scanner_.read_numbers(slots.measurement);
+    scanner_.read_numbers(slots.information);
+    scanner_.end_line();
+    draft_.finish_factor();
+  }
+  void read_point_seen() { read_with_parameter(draft_.factor_kind(kPointSeen)); }
+  void read_prior() { read_with_parameter(draft_.factor_kind(kOwnPrior, kPrior)); }
+
+  void apply_offsets() {
+    for (const Reference& reference : references_) {
+      const Draft::Factor& factor = draft_.factors()[reference.factor];
+      const Draft::FactorKind& kind = draft_.factor(factor.kind);
+      const auto offset = offsets_.find(reference.parameter);
+      if (offset == offsets_.end()) {
+        draft_.fail(factor.line,
+                    fmt::format("{} refers to parameter {}; expected a line '{} {} …' in this file",
+                                kind.name, reference.parameter, kOffset, reference.parameter));
+      }
+      apply(offset->second, factor, kind);
+    }
+  }
+  void apply(const Offset& offset, const Draft::Factor& factor, const Draft::FactorKind& kind) {
+    if (offset.value.is_identity) return;
+    if (kind.name == kPrior) {
+      // x O ≈ z could be written x ≈ z O⁻¹, but then the residual, and with it the information,
+      // would be that of another frame: exact for one metric only.
+      draft_.fail(
+          factor.line,
+          fmt::format(
+              "{} with the sensor offset of line {} cannot be expressed exactly; expected an "
+              "offset of 0 0 0 0 0 0 1, or a prior on the robot's pose",
+              kind.name, offset.line));
+    }
+    const Draft::FactorSlots slots = draft_.slots(factor);
+    offset.value.apply_to_point(slots.measurement.first<3>(), slots.information.first<6>());
+  }
+
+  void note_unused_parameters() {
+    for (const auto& [tag, lines] : unused_parameters_) {
+      draft_.report().notes.push_back(
+          fmt::format("{} left aside ({}): no factor in the file refers to such parameters", tag,
+                      lines == 1 ? "1 line" : fmt::format("{} lines", lines)));
+    }
+  }
+
+  Registry& types_;
+  const ReadOptions& options_;
+  Scanner scanner_;
+  Draft draft_;
+  TagTable tags_;
+  std::map<Id, Offset> offsets_;
+  std::vector<Reference> references_;
+  std::map<std::string, std::int64_t> unused_parameters_;
+};
+
+}  // namespace
+
+Graph read_g2o(std::string_view text, const std::string& name, Registry& types,
+               const ReadOptions& options, ReadReport& report) {
+  return G2oReader(text, name, types, options, report).read();
+}
+
+}  // namespace cairn::formats

@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "information.hpp"
+
+#include <algorithm>
+#include <array>
+#include <utility>
+#include <vector>
+
+namespace cairn::formats {
+namespace {
+
+std::array<double, 6> copy_of(std::span<const double, 6> numbers) {
+  std::array<double, 6> copy;
+  std::copy(numbers.begin(), numbers.end(), copy.begin());
+  return copy;
+}
+
+}  // namespace
+
+void from_toro_order(std::span<double, 6> information) {
+  const auto [i11, i12, i22, i33, i13, i23] = copy_of(information);
+  const std::array<double, 6> rows{i11, i12, i13, i22, i23, i33};
+  std::copy(rows.begin(), rows.end(), information.begin());
+}
+
+void to_toro_order(std::span<double, 6> information) {
+  const auto [i11, i12, i13, i22, i23, i33] = copy_of(information);
+  const std::array<double, 6> toro{i11, i12, i22, i33, i13, i23};
+  std::copy(toro.begin(), toro.end(), information.begin());
+}
+
+void square_from_root(int n, std::span<double> triangle) {
+  // (UᵀU)(i, j) = Σ_{k ≤ i} U(k, i) U(k, j): entries further down need only rows that are further
+  // up, so working from the last row to the first never reads what was already replaced.
+  for (int i = n - 1; i >= 0; --i) {
+    for (int j = n - 1; j >= i; --j) {
+      double sum = 0.0;
+      for (int k = 0; k <= i; ++k) {
+        sum += triangle[triangle_index(n, k, i)] * triangle[triangle_index(n, k, j)];
+      }
+      triangle[triangle_index(n, i, j)] = sum;
+    }
+  }
+}
+
+std::optional<FailedPivot> first_failed_pivot(int n, std::span<const double> information) {
+  constexpr int kSmall = 21;  // up to 6 × 6, which nearly all are, without allocating
+  std::array<double, kSmall> small;
+  std::vector<double> large;
+  double* u = small.data();
+  if (information.size() > kSmall) {
+    large.resize(information.size());
+    u = large.data();
+  }
+  std::copy(information.begin(), information.end(), u);
+  // Row by row: what is left after eliminating row k is A(i, j) − A(k, i) A(k, j) / A(k, k).
+  for (int k = 0; k < n; ++k) {
+    const double* row = u + triangle_index(n, k, k);
+    const double pivot = row[0];
+    if (!(pivot > 0.0)) return FailedPivot{k, pivot};
+    for (int i = k + 1; i < n; ++i) {
+      const double factor = row[i - k] / pivot;
+      double* target = u + triangle_index(n, i, i);
+      for (int j = i; j < n; ++j) target[j - i] -= factor * row[j - k];
+    }
+  }
+  return std::nullopt;
+}
+
+bool repair_misplaced_entries(std::span<double, 21> information) {
+  constexpr int kZRoll = triangle_index(6, 2, 3), kZPitch = triangle_index(6, 2, 4);
+  constexpr int kXYaw = triangle_index(6, 0, 5), kYYaw = triangle_index(6, 1, 5);
+  if (information[kXYaw] != 0.0 || information[kYYaw] != 0.0) return false;
+  if (is_positive_definite(6, information)) return false;
+  std::array<double, 21> mended;
+  std::copy(information.begin(), information.end(), mended.begin());
+  std::swap(mended[kZRoll], mended[kXYaw]);
+  std::swap(mended[kZPitch], mended[kYYaw]);
+  if (!is_positive_definite(6, mended)) return false;
+  std::copy(mended.begin(), mended.end(), information.begin());
+  return true;
+}
+
+bool fits_g2o(std::span<const double, 6> as_in_file) { return is_positive_definite(3, as_in_file); }
+
+bool fits_toro(std::span<const double, 6> as_in_file) {
+  std::array<double, 6> information = copy_of(as_in_file);
+  from_toro_order(information);
+  return is_positive_definite(3, information);
+}
+
+bool fits_isam(std::span<const double, 6> as_in_file) {
+  return as_in_file[0] > 0.0 && as_in_file[3] > 0.0 && as_in_file[5] > 0.0;
+}
+
+std::string other_order_hint(std::span<const double, 6> as_in_file, std::string_view read_as) {
+  if (read_as != "toro" && fits_toro(as_in_file)) {
+    return "; the numbers would fit TORO's order of information (format toro)";
+  }
+  if (read_as != "isam" && fits_isam(as_in_file)) {
+    return "; the numbers would fit iSAM's square root of the information (format isam)";
+  }
+  if (read_as != "g2o" && fits_g2o(as_in_file)) {
+    return "; the numbers would fit g2o's order of information (format g2o)";
+  }
+  return {};
+}
+
+}  // namespace cairn::formats

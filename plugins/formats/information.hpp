@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+
+namespace cairn::formats {
+
+// Information matrices as they stand in files, and as cairn keeps them: the upper triangle row by
+// row, n(n+1)/2 numbers, which is g2o's order.
+
+/// Where entry (row, column), row ≤ column, of an n × n matrix stands in its upper triangle.
+constexpr int triangle_index(int n, int row, int column) {
+  return row * n - row * (row - 1) / 2 + (column - row);
+}
+
+/// TORO's order of a planar pose's information, I11 I12 I22 I33 I13 I23, to rows of the upper
+/// triangle.
+void from_toro_order(std::span<double, 6> information);
+/// The other way round.
+void to_toro_order(std::span<double, 6> information);
+
+/// Upper-triangular square root U (n × n, row by row) to information UᵀU, in place.
+void square_from_root(int n, std::span<double> triangle);
+
+/// The row at which the Cholesky factorisation of an information matrix stops because its pivot is
+/// not positive, and that pivot; nothing if the matrix is positive definite.
+struct FailedPivot {
+  int row;
+  double pivot;
+};
+std::optional<FailedPivot> first_failed_pivot(int n, std::span<const double> information);
+inline bool is_positive_definite(int n, std::span<const double> information) {
+  return !first_failed_pivot(n, information);
+}
+
+/// Mends the information of a spatial relative pose (21 numbers, rows x y z rx ry rz) of a known
+/// kind: the (z, rx) and (z, ry) entries hold what belongs at (x, rz) and (y, rz), as in the
+/// published `cubicle`. Changes nothing, and says so by `false`, unless the matrix is not positive
+/// definite, the places that the entries would move to are zero, and the result is positive
+/// definite.
+bool repair_misplaced_entries(std::span<double, 21> information);
+
+/// What to try when planar information is not positive definite as it was read but would be in the
+/// order of another format; empty if nothing would help. `as_in_file`: the six numbers as they
+/// stand.
+std::string other_order_hint(std::span<const double, 6> as_in_file, std::string_view read_as);
+
+/// Whether six numbers make sense as TORO's information, or as iSAM's square root (positive
+/// diagonal).
+bool fits_toro(std::span<const double, 6> as_in_file);
+bool fits_isam(std::span<const double, 6> as_in_file);
+bool fits_g2o(std::span<const double, 6> as_in_file);
+
+}  // namespace cairn::formats

@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "propagate.hpp"
+
+#include <algorithm>
+#include <functional>
+#include <limits>
+#include <queue>
+#include <tuple>
+#include <vector>
+
+namespace cairn::formats {
+namespace {
+
+class Propagator {
+ public:
+  explicit Propagator(Graph& graph) : graph_(graph), known_(graph.variable_count(), false) {
+    index_factors();
+  }
+
+  Propagation run() {
+    start_from([this](int v) { return has_prior(v) && determine(v); });
+    // Poses before points: a point tells nothing about its neighbours.
+    start_from([this](int v) { return is_pose(v) && start_at_identity(v); });
+    start_from([this](int v) { return start_at_identity(v); });
+    return result_;
+  }
+
+ private:
+  /// Factors by variable, in the order of the file.
+  void index_factors() {
+    begin_.assign(static_cast<std::size_t>(graph_.variable_count()) + 1, 0);
+    for (int f = 0; f < graph_.factor_count(); ++f) {
+      for (const int v : graph_.factor_variables(f)) ++begin_[v + 1];
+    }
+    for (std::size_t v = 1; v < begin_.size(); ++v) begin_[v] += begin_[v - 1];
+    factors_.resize(begin_.back());
+    std::vector<std::size_t> next(begin_.begin(), begin_.end() - 1);
+    for (int f = 0; f < graph_.factor_count(); ++f) {
+      for (const int v : graph_.factor_variables(f)) factors_[next[v]++] = f;
+    }
+  }
+
+  const FactorType& type_of(int f) const {
+    return *graph_.factor_pools()[graph_.factor(f).pool].type;
+  }
+  std::span<const int> factors_of(int v) const {
+    return {factors_.data() + begin_[v], begin_[v + 1] - begin_[v]};
+  }
+  bool is_pose(int v) const {
+    const Placement* placement = graph_.type(v).placement();
+    return !placement || placement->has_orientation();
+  }
+  bool has_prior(int v) const {
+    return std::ranges::any_of(factors_of(v), [this](int f) { return type_of(f).arity() == 1; });
+  }
+
+  /// Tries `start` on every variable that is not known yet, in order, and spreads from where it
+  /// works.
+  void start_from(const std::function<bool(int)>& start) {
+    for (int v = 0; v < graph_.variable_count(); ++v) {
+      if (known_[v] || !start(v)) continue;
+      ++result_.roots;
+      accept(v);
+      spread();
+    }
+  }
+  bool start_at_identity(int v) {
+    std::vector<double> state(static_cast<std::size_t>(graph_.type(v).ambient_size()));
+    graph_.type(v).identity(state.data());
+    graph_.set_state(v, state);
+    return true;
+  }
+
+  void spread() {
+    while (!frontier_.empty()) {
+      const int v = frontier_.top();
+      frontier_.pop();
+      if (!known_[v] && determine(v)) accept(v);
+    }
+  }
+  void accept(int v) {
+    known_[v] = true;
+    for (const int f : factors_of(v)) {
+      for (const int other : graph_.factor_variables(f)) {
+        if (!known_[other]) frontier_.push(other);
+      }
+    }
+  }
+
+  /// How good a factor is for determining v, smaller is better: relative measurements first, from
+  /// the nearest variable before v, then after it; then others; each by its place in the file.
+  using Rank = std::tuple<int, int, int>;
+  Rank rank(int f, int v) const {
+    if (!type_of(f).is_relative()) return {2, 0, f};
+    const auto ends = graph_.factor_variables(f);
+    const int other = ends[0] == v ? ends[1] : ends[0];
+    return other < v ? Rank{0, v - other, f} : Rank{1, other - v, f};
+  }
+  bool others_known(int f, int v) const {
+    return std::ranges::all_of(graph_.factor_variables(f),
+                               [&](int other) { return other == v || known_[other]; });
+  }
+
+  /// Sets the state of v from the best factor that determines it.
+  bool determine(int v) {
+    candidates_.clear();
+    for (const int f : factors_of(v)) {
+      if (others_known(f, v)) candidates_.push_back(rank(f, v));
+    }
+    std::sort(candidates_.begin(), candidates_.end());
+    return std::ranges::any_of(candidates_,
+                               [&](const Rank& r) { return propagate(std::get<2>(r), v); });
+  }
+  bool propagate(int f, int v) {
+    const auto ends = graph_.factor_variables(f);
+    std::vector<const double*> states;
+    int target = 0;
+    for (std::size_t k = 0; k < ends.size(); ++k) {
+      states.push_back(graph_.state(ends[k]).data());
+      if (ends[k] == v) target = static_cast<int>(k);
+    }
+    std::vector<double> state(static_cast<std::size_t>(graph_.type(v).ambient_size()));
+    if (!type_of(f).propagate(target, states.data(), graph_.measurement(f).data(), state.data())) {
+      return false;
+    }
+    graph_.set_state(v, state);
+    return true;
+  }
+
+  Graph& graph_;
+  std::vector<bool> known_;
+  std::vector<std::size_t> begin_;
+  std::vector<int> factors_;
+  std::priority_queue<int, std::vector<int>, std::greater<>> frontier_;
+  std::vector<Rank> candidates_;
+  Propagation result_;
+};
+
+}  // namespace
+
+Propagation propagate_states(Graph& graph) { return Propagator(graph).run(); }
+
+}  // namespace cairn::formats

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "cairn/format.hpp"
+
+namespace cairn::formats {
+
+// Each reads a whole text as `Format::read` does.
+
+Graph read_g2o(std::string_view text, const std::string& name, Registry& types,
+               const ReadOptions& options, ReadReport& report);
+Graph read_toro(std::string_view text, const std::string& name, Registry& types,
+                const ReadOptions& options, ReadReport& report);
+Graph read_isam(std::string_view text, const std::string& name, Registry& types,
+                const ReadOptions& options, ReadReport& report);
+Graph read_tum(std::string_view text, const std::string& name, Registry& types,
+               const ReadOptions& options, ReadReport& report);
+Graph read_kitti(std::string_view text, const std::string& name, Registry& types,
+                 const ReadOptions& options, ReadReport& report);
+Graph read_table(std::string_view text, const std::string& name, Registry& types,
+                 const ReadOptions& options, ReadReport& report);
+
+}  // namespace cairn::formats

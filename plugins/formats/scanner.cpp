@@ -1,0 +1,203 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "scanner.hpp"
+
+#include <charconv>
+#include <cmath>
+#include <cstring>
+#include <utility>
+
+#include <fast_float/fast_float.h>
+#include <fmt/format.h>
+
+#include "cairn/error.hpp"
+
+namespace cairn::formats {
+namespace {
+
+bool is_blank(char c) { return c == ' ' || c == '\t'; }
+
+/// Takes the first field off `text`; empty at the end of the line or at a comment.
+std::string_view take_field(std::string_view& text) {
+  const char* p = text.data();
+  const char* const end = p + text.size();
+  while (p != end && is_blank(*p)) ++p;
+  const char* const begin = p;
+  if (p != end && *p == '#') {
+    text = {};
+    return {};
+  }
+  while (p != end && !is_blank(*p)) ++p;
+  text = std::string_view(p, static_cast<std::size_t>(end - p));
+  return {begin, static_cast<std::size_t>(p - begin)};
+}
+
+/// '+' in front of a digit or a dot, which the parsers of the standard do not take.
+std::string_view without_plus(std::string_view field) {
+  return field.size() > 1 && field[0] == '+' && field[1] != '-' && field[1] != '+' ? field.substr(1)
+                                                                                   : field;
+}
+
+/// Whether the whole field is spelled as a number, infinity and NaN among them. Versions of
+/// fast_float differ in whether they report what is too large or too small for a double; the value
+/// is then infinite, or the nearest double (be it zero), either way.
+bool parse_number(std::string_view field, double& number) {
+  const std::string_view digits = without_plus(field);
+  const char* const end = digits.data() + digits.size();
+  const auto result = fast_float::from_chars(digits.data(), end, number);
+  return (result.ec == std::errc{} || result.ec == std::errc::result_out_of_range) &&
+         result.ptr == end;
+}
+
+std::string expected_fields(const Layout& layout) {
+  const auto count = [](int n, const char* one, const char* many) {
+    return fmt::format("{} {}", n, n == 1 ? one : many);
+  };
+  std::string parts;
+  const auto add = [&parts](const std::string& part) {
+    parts += (parts.empty() ? "" : ", ") + part;
+  };
+  if (layout.ids > 0) add(count(layout.ids, "id", "ids"));
+  if (layout.measurement > 0) {
+    add(count(layout.measurement, "number", "numbers") +
+        (layout.information > 0 ? " of the measurement" : ""));
+  }
+  if (layout.information > 0) add(fmt::format("{} of the information", layout.information));
+  return fmt::format("{}{}", count(layout.total(), "field", "fields"),
+                     parts.empty() ? "" : fmt::format(" ({})", parts));
+}
+
+}  // namespace
+
+std::string located(std::string_view file, std::int64_t line, std::string_view what) {
+  return fmt::format("{}:{}: {}", file, line, what);
+}
+
+std::string shown(std::string_view field) {
+  constexpr std::size_t kLongest = 40;
+  std::string out;
+  for (const char c : field.substr(0, kLongest)) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (byte >= 0x20 && byte < 0x7f) {
+      out += c;
+    } else {
+      out += fmt::format("\\x{:02x}", byte);
+    }
+  }
+  if (field.size() > kLongest) out += "...";
+  return out;
+}
+
+Scanner::Scanner(std::string_view text, std::string file) : file_(std::move(file)), rest_(text) {
+  if (rest_.starts_with("\xef\xbb\xbf")) rest_.remove_prefix(3);
+}
+
+bool Scanner::next_line() {
+  while (!rest_.empty()) {
+    const void* newline = std::memchr(rest_.data(), '\n', rest_.size());
+    const std::size_t length =
+        newline ? static_cast<std::size_t>(static_cast<const char*>(newline) - rest_.data())
+                : rest_.size();
+    std::string_view text = rest_.substr(0, length);
+    rest_.remove_prefix(newline ? length + 1 : length);
+    ++line_;
+    if (!text.empty() && text.back() == '\r') text.remove_suffix(1);
+    start_ = text;
+    fields_ = text;
+    tag_ = take_field(fields_);
+    if (!tag_.empty()) return true;
+  }
+  tag_ = {};
+  return false;
+}
+
+void Scanner::expect(Layout layout) {
+  std::string_view after_tag = start_;
+  take_field(after_tag);
+  start_ = fields_ = after_tag;
+  subject_ = tag_;
+  layout_ = layout;
+  read_ = 0;
+}
+
+void Scanner::expect_row(Layout layout, std::string_view what) {
+  fields_ = start_;
+  subject_ = what;
+  layout_ = layout;
+  read_ = 0;
+}
+
+std::string_view Scanner::next_field() { return take_field(fields_); }
+
+std::string_view Scanner::required_field() {
+  const std::string_view field = next_field();
+  if (field.empty()) fail_count();
+  ++read_;
+  return field;
+}
+
+Id Scanner::read_id() {
+  const std::string_view field = required_field();
+  const std::string_view digits = without_plus(field);
+  Id id = 0;
+  const auto [end, problem] = std::from_chars(digits.data(), digits.data() + digits.size(), id);
+  if (problem != std::errc{} || end != digits.data() + digits.size() || id < 0) fail_id(field);
+  return id;
+}
+
+double Scanner::read_number() {
+  const std::string_view field = required_field();
+  double number = 0.0;
+  if (!parse_number(field, number) || !std::isfinite(number)) fail_number(field);
+  return number;
+}
+
+void Scanner::read_numbers(std::span<double> out) {
+  for (double& number : out) number = read_number();
+}
+
+bool Scanner::more() {
+  std::string_view ahead = fields_;
+  return !take_field(ahead).empty();
+}
+
+void Scanner::end_line() {
+  if (more()) fail_count();
+}
+
+int Scanner::count_fields() const {
+  std::string_view text = start_;
+  int fields = 0;
+  while (!take_field(text).empty()) ++fields;
+  return fields;
+}
+
+void Scanner::fail(std::string_view what) const {
+  throw Error(ErrorCode::input, located(file_, line_, what));
+}
+
+void Scanner::fail_count() const {
+  fail(fmt::format("{} with {} fields; expected {}", shown(subject_), count_fields(),
+                   expected_fields(layout_)));
+}
+
+void Scanner::fail_number(std::string_view field) const {
+  // A field too many or too few is the likelier cause: say that first.
+  if (count_fields() != layout_.total()) fail_count();
+  const std::string where =
+      fmt::format("field {} of {} is '{}'", read_, shown(subject_), shown(field));
+  double number = 0.0;
+  if (!parse_number(field, number)) {
+    fail(where + ", which is not a number; expected a finite number");
+  }
+  const bool digits = field.find_first_of("0123456789") != std::string_view::npos;
+  fail(where + (digits ? ", which is out of the range of a double" : "") +
+       "; expected a finite number");
+}
+
+void Scanner::fail_id(std::string_view field) const {
+  if (count_fields() != layout_.total() && layout_.total() > 0) fail_count();
+  fail(fmt::format("field {} of {} is '{}'; expected an id, a whole number from 0 to {}", read_,
+                   shown(subject_), shown(field), INT64_MAX));
+}
+
+}  // namespace cairn::formats

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "cairn/graph.hpp"
+
+namespace cairn::formats {
+
+/// "file:line: " in front of every complaint about a file.
+std::string located(std::string_view file, std::int64_t line, std::string_view what);
+
+/// What a line should hold after its tag.
+struct Layout {
+  int ids = 0;
+  int measurement = 0;  ///< numbers of the state or measurement
+  int information = 0;  ///< numbers of the information matrix
+  int total() const { return ids + measurement + information; }
+};
+
+/// Walks through a text line by line and field by field, without copying any of it.
+///
+/// Blank lines are passed over, and so is what follows a field that begins with '#'. Fields are
+/// separated by blanks and tabs; a line ends with LF or CR LF. Complaints are `Error` (input) that
+/// name file and line, what was found and what was expected.
+class Scanner {
+ public:
+  /// `text` must outlive the scanner. A byte order mark at its start is passed over.
+  Scanner(std::string_view text, std::string file);
+
+  /// Moves to the next line that holds a field; false at the end of the text.
+  bool next_line();
+  /// The first field of the line.
+  std::string_view tag() const { return tag_; }
+  std::int64_t line() const { return line_; }
+  const std::string& file() const { return file_; }
+
+  /// Reading starts after the tag: says what the line holds, for messages about it.
+  void expect(Layout layout);
+  /// The same for lines without a tag: reading starts at the first field; messages call the line
+  /// `what`.
+  void expect_row(Layout layout, std::string_view what);
+
+  Id read_id();
+  double read_number();
+  void read_numbers(std::span<double> out);
+  /// Whether fields are left on this line.
+  bool more();
+  /// Complains if fields are left.
+  void end_line();
+
+  /// Fields of this line after the tag (or all, in a row).
+  int count_fields() const;
+  [[noreturn]] void fail(std::string_view what) const;
+
+ private:
+  std::string_view next_field();
+  std::string_view required_field();
+  [[noreturn]] void fail_count() const;
+  [[noreturn]] void fail_number(std::string_view field) const;
+  [[noreturn]] void fail_id(std::string_view field) const;
+
+  std::string file_;
+  std::string_view rest_;    // lines not yet visited
+  std::string_view fields_;  // fields of this line not yet read
+  std::string_view start_;   // fields of this line, all that are counted
+  std::string_view tag_;
+  std::string_view subject_;  // how messages call the line
+  std::int64_t line_ = 0;
+  Layout layout_;
+  int read_ = 0;  // fields read since expect
+};
+
+/// A field as it is shown in a message: cut short, bytes that cannot be printed as \xNN.
+std::string shown(std::string_view field);
+
+}  // namespace cairn::formats

@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tag_lines.hpp"
+
+#include <fmt/format.h>
+
+#include "cairn/error.hpp"
+#include "cairn/spelling.hpp"
+
+namespace cairn::formats {
+
+void read_fix(Scanner& scanner, Draft& draft) {
+  scanner.expect({});
+  if (!scanner.more()) scanner.fail("FIX without an id; expected one or more ids");
+  while (scanner.more()) draft.add_held(scanner.read_id(), scanner.line());
+}
+
+void unknown_tag(const Scanner& scanner, Draft& draft, const ReadOptions& options,
+                 std::span<const std::string> on_offer) {
+  if (options.skip_unknown) {
+    ++draft.report().skipped[shown(scanner.tag())];
+    return;
+  }
+  std::string offered;
+  for (const std::string& tag : on_offer) offered += (offered.empty() ? "" : ", ") + tag;
+  const std::string nearest = nearest_spelling(scanner.tag(), on_offer);
+  scanner.fail(
+      fmt::format("unknown tag '{}'{}; on offer: {} (--skip-unknown leaves such lines out)",
+                  shown(scanner.tag()),
+                  nearest.empty() ? "" : fmt::format("; did you mean '{}'?", nearest), offered));
+}
+
+Draft::FactorSlots read_factor(Scanner& scanner, Draft& draft, std::int32_t kind) {
+  const Draft::FactorKind& k = draft.factor(kind);
+  scanner.expect({k.arity, k.measurement, k.information});
+  const Draft::FactorSlots slots = draft.add_factor(kind, scanner.line());
+  for (Id& id : slots.ids) id = scanner.read_id();
+  scanner.read_numbers(slots.measurement);
+  scanner.read_numbers(slots.information);
+  scanner.end_line();
+  return slots;
+}
+
+void read_variable(Scanner& scanner, Draft& draft, std::int32_t kind) {
+  scanner.expect({1, draft.variable(kind).size, 0});
+  const Id id = scanner.read_id();
+  scanner.read_numbers(draft.add_variable(kind, id, scanner.line()));
+  scanner.end_line();
+}
+
+}  // namespace cairn::formats

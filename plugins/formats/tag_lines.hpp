@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <functional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "draft.hpp"
+#include "scanner.hpp"
+
+namespace cairn::formats {
+
+/// What a format does with the lines of one tag.
+using LineReader = std::function<void(Scanner&, Draft&)>;
+
+/// The tags that a format knows, with what reads their lines. A tag is looked up once a line, so
+/// this is a short array with the last hit first, not a map.
+class TagTable {
+ public:
+  void add(std::string tag, LineReader reader) {
+    rows_.push_back({std::move(tag), std::move(reader)});
+  }
+
+  const LineReader* find(std::string_view tag) {
+    if (last_ < rows_.size() && rows_[last_].tag == tag) return &rows_[last_].reader;
+    for (std::size_t i = 0; i < rows_.size(); ++i) {
+      if (rows_[i].tag == tag) {
+        last_ = i;
+        return &rows_[i].reader;
+      }
+    }
+    return nullptr;
+  }
+  std::vector<std::string> tags() const {
+    std::vector<std::string> names;
+    for (const Row& row : rows_) names.push_back(row.tag);
+    return names;
+  }
+
+ private:
+  struct Row {
+    std::string tag;
+    LineReader reader;
+  };
+  std::vector<Row> rows_;
+  std::size_t last_ = 0;
+};
+
+/// `FIX id id …`.
+void read_fix(Scanner& scanner, Draft& draft);
+
+/// A line whose tag nobody knows: counted where that was asked for, else an error with what is on
+/// offer.
+void unknown_tag(const Scanner& scanner, Draft& draft, const ReadOptions& options,
+                 std::span<const std::string> on_offer);
+
+/// Reads ids, measurement and information of a factor line as they stand.
+Draft::FactorSlots read_factor(Scanner& scanner, Draft& draft, std::int32_t kind);
+/// Reads a variable line: id and state.
+void read_variable(Scanner& scanner, Draft& draft, std::int32_t kind);
+
+}  // namespace cairn::formats

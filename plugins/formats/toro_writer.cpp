@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <array>
+#include <string>
+
+#include "information.hpp"
+#include "line_writer.hpp"
+#include "writer_order.hpp"
+#include "writers.hpp"
+
+namespace cairn::formats {
+namespace {
+
+constexpr std::string_view kExpected = "a planar pose graph (VERTEX_SE2, EDGE_SE2) with ids from 0";
+
+void write_vertices(const Graph& graph, LineWriter& out) {
+  const std::vector<int> order = variables_by_id(graph);
+  for (const int v : order) {
+    if (graph.type(v).tag() != "VERTEX_SE2" || graph.id(v) < 0) {
+      cannot_express("toro", graph.describe_variable(v), kExpected);
+    }
+    out.field("VERTEX2").field(graph.id(v)).fields(graph.state(v));
+    out.end_line();
+  }
+  // Not TORO's own, but its readers pass over lines that they don't know, and ours keeps it.
+  for (const int v : order) {
+    if (!graph.fixed(v)) continue;
+    out.field("FIX").field(graph.id(v));
+    out.end_line();
+  }
+}
+
+void write_edge(const Graph& graph, int position, LineWriter& out) {
+  if (graph.factor_pools()[graph.factor(position).pool].type->tag() != "EDGE_SE2") {
+    cannot_express("toro", graph.describe_factor(position), kExpected);
+  }
+  out.field("EDGE2");
+  for (const int v : graph.factor_variables(position)) out.field(graph.id(v));
+  std::array<double, 6> information;
+  std::ranges::copy(graph.information(position), information.begin());
+  to_toro_order(information);
+  out.fields(graph.measurement(position)).fields(information);
+  out.end_line();
+}
+
+}  // namespace
+
+std::string write_toro(const Graph& graph) {
+  LineWriter out;
+  write_vertices(graph, out);
+  for (int f = 0; f < graph.factor_count(); ++f) write_edge(graph, f, out);
+  return out.take();
+}
+
+}  // namespace cairn::formats

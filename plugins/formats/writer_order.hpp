@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "cairn/graph.hpp"
+
+namespace cairn::formats {
+
+/// Indices of all variables by rising id. Throws `Error` (input) if there is none, since an empty
+/// file would say nothing.
+std::vector<int> variables_by_id(const Graph& graph);
+
+/// Refuses to write: "format toro cannot express …; expected …". Throws `Error` (input).
+[[noreturn]] void cannot_express(std::string_view format, const std::string& what,
+                                 std::string_view expected);
+
+}  // namespace cairn::formats

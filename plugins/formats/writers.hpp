@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+
+#include "cairn/graph.hpp"
+
+namespace cairn::formats {
+
+// Each writes a whole graph as `Format::write` does. Numbers are the shortest that read back as the
+// same double, so that a graph that was written and read again is the same to the last bit.
+
+/// Variables by rising id, then FIX lines, then factors in their order, of whatever types.
+std::string write_g2o(const Graph& graph);
+/// Planar pose graphs: VERTEX2 and EDGE2.
+std::string write_toro(const Graph& graph);
+/// Poses by rising id: the id as stamp, position, quaternion. Points (landmarks) are no part of a
+/// trajectory.
+std::string write_tum(const Graph& graph);
+/// Poses by rising id: rows of [R t]. The row number is the id, so ids must be 0, 1, 2 … without a
+/// gap.
+std::string write_kitti(const Graph& graph);
+
+}  // namespace cairn::formats
