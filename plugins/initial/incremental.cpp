@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <numeric>
+
+#include "cairn/gauge.hpp"
+#include "guesses.hpp"
+#include "placing.hpp"
+
+namespace cairn::initial {
+namespace {
+
+/// A graph that grows along the robot's way and is optimised now and then: every new pose is placed
+/// from an estimate that has already been corrected, so that errors of odometry never pile up to
+/// where an optimizer goes astray.
+class Incremental final : public InitialGuess {
+ public:
+  Incremental(int step, Stop stop, std::unique_ptr<Optimizer> optimizer)
+      : step_(step), stop_(stop), optimizer_(std::move(optimizer)) {}
+
+  std::vector<std::string> compute(Graph& graph) override {
+    Growth growth(graph);
+    int since = 0, rounds = 0;
+    for (const int variable : poses_by_id(graph)) {
+      growth.add_pose(variable);
+      if (++since < step_) continue;
+      optimizer_->optimize(growth.grown, stop_);
+      since = 0;
+      ++rounds;
+    }
+    if (growth.grown.factor_count() > 0) optimizer_->optimize(growth.grown, stop_);
+    std::vector<std::string> notes = {"optimised " + counted(rounds + 1, "time", "times") +
+                                      " on the way"};
+    growth.copy_back(notes);
+    return notes;
+  }
+
+ private:
+  /// The part of a graph that has been met so far.
+  struct Growth {
+    explicit Growth(Graph& whole_graph)
+        : whole(whole_graph),
+          factors(whole_graph),
+          gauge(resolve_gauge(whole_graph)),
+          index(whole_graph.variable_count(), -1),
+          used(whole_graph.factor_count(), false) {}
+
+    /// Adds a pose where its first factor to what is there puts it, then what it sees, then all
+    /// factors among them.
+    void add_pose(int variable) {
+      std::vector<double> state(whole.state(variable).begin(), whole.state(variable).end());
+      if (!gauge.held[variable]) {
+        for (const int f : factors[variable]) {
+          if (place(variable, f, state)) break;
+        }
+      }
+      add(variable, state);
+      for (const int f : factors[variable]) {
+        for (const std::int32_t other : whole.factor_variables(f)) {
+          if (index[other] >= 0 || is_pose(whole, other)) continue;
+          std::vector<double> seen(whole.state(other).begin(), whole.state(other).end());
+          if (gauge.held[other] || place(other, f, seen)) add(other, seen);
+        }
+      }
+      add_factors_of(variable);
+    }
+
+    void copy_back(std::vector<std::string>& notes) {
+      Placing placing(whole);
+      for (int v = 0; v < whole.variable_count(); ++v) {
+        if (index[v] < 0) continue;
+        whole.set_state(v, grown.state(index[v]));
+        placing.set_placed(v);
+      }
+      placing.spread();
+      placing.finish(notes);
+    }
+
+    static bool is_pose(const Graph& graph, int variable) {
+      const Placement* placement = graph.type(variable).placement();
+      return !placement || placement->has_orientation();
+    }
+
+    Graph& whole;
+    FactorsOfVariables factors;
+    Gauge gauge;
+    std::vector<int> index;  // in `grown`, -1 while not met
+    std::vector<bool> used;  // factors in `grown`
+    Graph grown;
+
+   private:
+    bool place(int variable, int factor, std::vector<double>& state) {
+      const auto variables = whole.factor_variables(factor);
+      std::vector<const double*> x;
+      int target = -1;
+      for (std::size_t k = 0; k < variables.size(); ++k) {
+        if (variables[k] == variable) {
+          target = static_cast<int>(k);
+          x.push_back(state.data());
+        } else if (index[variables[k]] >= 0) {
+          x.push_back(grown.state(index[variables[k]]).data());
+        } else {
+          return false;
+        }
+      }
+      const FactorType& type = *whole.factor_pools()[whole.factor(factor).pool].type;
+      std::vector<double> placed(state.size());
+      if (!type.propagate(target, x.data(), whole.measurement(factor).data(), placed.data()))
+        return false;
+      state = std::move(placed);
+      return true;
+    }
+
+    void add(int variable, std::span<const double> state) {
+      const auto& type = whole.variable_pools()[whole.pool(variable)].type;
+      index[variable] = grown.add_variable(type, whole.id(variable), state);
+      if (gauge.held[variable]) grown.set_fixed(index[variable]);
+    }
+
+    void add_factors_of(int variable) {
+      std::vector<int> variables;
+      for (const int f : factors[variable]) {
+        if (used[f]) continue;
+        variables.clear();
+        for (const std::int32_t v : whole.factor_variables(f)) variables.push_back(index[v]);
+        if (std::ranges::find(variables, -1) != variables.end()) continue;
+        used[f] = true;
+        grown.add_factor(whole.factor_pools()[whole.factor(f).pool].type, variables,
+                         whole.measurement(f), whole.information(f));
+      }
+    }
+  };
+
+  static std::vector<int> poses_by_id(const Graph& graph) {
+    std::vector<int> order;
+    for (int v = 0; v < graph.variable_count(); ++v) {
+      if (Growth::is_pose(graph, v)) order.push_back(v);
+    }
+    std::ranges::stable_sort(order, {}, [&](int v) { return graph.id(v); });
+    return order;
+  }
+
+  int step_;
+  Stop stop_;
+  std::unique_ptr<Optimizer> optimizer_;
+};
+
+}  // namespace
+
+OptionTable incremental_options() {
+  OptionTable table;
+  table.integer("step", 100, 1, 1e9, "poses between two optimisations")
+      .integer("iterations", 10, 1, 1e6, "largest number of iterations of each")
+      .component("optimizer", "optimizer", "levenberg_marquardt",
+                 "what optimises the part that is known");
+  return table;
+}
+
+std::unique_ptr<InitialGuess> make_incremental(const Options& options,
+                                               std::unique_ptr<Optimizer> optimizer) {
+  const Stop stop{.max_iterations = static_cast<int>(options.integer("iterations")),
+                  .tolerance = 1e-4};
+  return std::make_unique<Incremental>(static_cast<int>(options.integer("step")), stop,
+                                       std::move(optimizer));
+}
+
+}  // namespace cairn::initial

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "cairn/gauge.hpp"
+#include "cairn/graph.hpp"
+
+namespace cairn::initial {
+
+/// The factors on each variable, in the order in which they were added.
+class FactorsOfVariables {
+ public:
+  explicit FactorsOfVariables(const Graph& graph);
+  std::span<const int> operator[](int variable) const {
+    return {factors_.data() + begin_[variable],
+            static_cast<std::size_t>(begin_[variable + 1] - begin_[variable])};
+  }
+
+ private:
+  std::vector<std::int64_t> begin_;
+  std::vector<int> factors_;
+};
+
+/// Places variables one after another: each from a factor whose other variables are placed.
+class Placing {
+ public:
+  explicit Placing(Graph& graph);
+
+  const FactorsOfVariables& factors() const { return factors_; }
+  bool placed(int variable) const { return placed_[variable]; }
+  /// Counts the state that a variable has as its place.
+  void set_placed(int variable) { placed_[variable] = true; }
+
+  /// Places `variable` by `factor` (a position in the graph). False, and nothing done, where
+  /// another variable of the factor is not placed or the measurement does not determine the state.
+  bool place(int variable, int factor);
+
+  /// Where the placing starts: held variables stay where they are. In a component with no pose held
+  /// (a pose being a variable of the component's largest tangent space), the first pose with a
+  /// prior that determines it goes there. Returns the variables placed, by index.
+  std::vector<int> place_roots(const Gauge& gauge);
+
+  /// Breadth first from `start` (in that order) over whatever factors determine a place.
+  void spread(std::vector<int> start);
+  /// From all that is placed.
+  void spread();
+
+  /// Ends the placing: what no factor ties to what is placed keeps its state, and places others
+  /// from there, so that each connected piece is in itself as measured. Poses before landmarks.
+  /// Says so.
+  void finish(std::vector<std::string>& notes);
+
+ private:
+  Graph& graph_;
+  FactorsOfVariables factors_;
+  std::vector<bool> placed_;
+};
+
+/// "1 pose" or "3 poses".
+std::string counted(std::int64_t count, const std::string& singular, const std::string& plural);
+
+}  // namespace cairn::initial

@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "relative_poses.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace cairn::initial {
+namespace {
+
+/// Links in the order in which their factors were added to the graph.
+void append(const FactorPool& pool, std::vector<Link>& links) {
+  for (std::size_t f = 0; f < pool.size(); ++f) {
+    links.push_back({pool.variables[2 * f], pool.variables[2 * f + 1], pool.sequence[f]});
+  }
+}
+
+void sort_by_factor(std::vector<Link>& links) {
+  std::sort(links.begin(), links.end(),
+            [](const Link& a, const Link& b) { return a.factor < b.factor; });
+}
+
+bool is_cartesian(const FactorType& factor, const VariableType& pose, const VariableType& point) {
+  const Placement *pose_placement = pose.placement(), *point_placement = point.placement();
+  if (!pose_placement || !point_placement || point_placement->has_orientation()) return false;
+  const int d = pose_placement->dimension();
+  if (point_placement->dimension() != d || factor.measurement_size() != d ||
+      factor.residual_size() != d) {
+    return false;
+  }
+  const std::array<double, 3> z{0.3, -0.7, 1.1};
+  std::vector<double> origin(static_cast<std::size_t>(pose.ambient_size()));
+  std::vector<double> seen(static_cast<std::size_t>(point.ambient_size()));
+  pose.identity(origin.data());
+  point.identity(seen.data());
+  const std::array<const double*, 2> x{origin.data(), seen.data()};
+  std::vector<double> out(seen.size());
+  if (!factor.propagate(1, x.data(), z.data(), out.data())) return false;
+  std::array<double, 3> t{};
+  point_placement->split(out.data(), nullptr, t.data());
+  return std::equal(t.begin(), t.begin() + d, z.begin(),
+                    [](double a, double b) { return std::abs(a - b) < 1e-12; });
+}
+
+}  // namespace
+
+std::vector<Link> relative_links(const Graph& graph, int variable_pool) {
+  std::vector<Link> links;
+  for (const FactorPool& pool : graph.factor_pools()) {
+    if (pool.type->is_relative() && pool.variable_pools[0] == variable_pool &&
+        pool.type->measurement_size() == pool.type->ambient_size(0)) {
+      append(pool, links);
+    }
+  }
+  sort_by_factor(links);
+  return links;
+}
+
+std::vector<Link> cartesian_links(const Graph& graph, int pose_pool) {
+  std::vector<Link> links;
+  for (const FactorPool& pool : graph.factor_pools()) {
+    if (pool.type->arity() != 2 || pool.variable_pools[0] != pose_pool) continue;
+    const auto& pools = graph.variable_pools();
+    if (is_cartesian(*pool.type, *pools[pose_pool].type, *pools[pool.variable_pools[1]].type)) {
+      append(pool, links);
+    }
+  }
+  sort_by_factor(links);
+  return links;
+}
+
+Eigen::MatrixXd information_matrix(const Graph& graph, int factor) {
+  const auto packed = graph.information(factor);
+  const int n = graph.factor_pools()[graph.factor(factor).pool].type->residual_size();
+  Eigen::MatrixXd information(n, n);
+  for (int row = 0, place = 0; row < n; ++row) {
+    for (int column = row; column < n; ++column, ++place) {
+      information(row, column) = information(column, row) = packed[place];
+    }
+  }
+  return information;
+}
+
+}  // namespace cairn::initial
