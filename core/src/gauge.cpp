@@ -93,7 +93,7 @@ std::string Gauge::describe(const Graph& graph) const {
   std::string text;
   if (anchored.size() == 1) {
     text = fmt::format(
-        "{}: anchored {}, the first pose",
+        "{}: anchored {}",
         components_with_fixed ? "a component has no fixed variable" : "no variable is fixed",
         graph.describe_variable(anchored.front()));
   } else if (anchored.size() > 1) {
@@ -102,7 +102,7 @@ std::string Gauge::describe(const Graph& graph) const {
       names.push_back(graph.describe_variable(anchored[k]));
     }
     text = fmt::format(
-        "{} components without a fixed variable or a prior: anchored the first pose of each ({}{})",
+        "{} components without a fixed variable or a prior: anchored one variable of each ({}{})",
         anchored.size(), fmt::join(names, ", "), anchored.size() > 5 ? ", …" : "");
   }
   if (!unconstrained.empty()) {

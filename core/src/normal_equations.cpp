@@ -5,9 +5,9 @@
 #include <chrono>
 #include <cmath>
 
+#include <fmt/format.h>
 #include <Eigen/Eigenvalues>
 #include <Eigen/SparseCholesky>
-#include <fmt/format.h>
 
 namespace cairn {
 namespace {
@@ -27,8 +27,8 @@ class Timed {
   Clock::time_point begin_;
 };
 
-/// Eigenvalues of the scaled H below this count as zero: rounding leaves a true zero at about 1e-16 times
-/// a small power of the size.
+/// Eigenvalues of the scaled H below this count as zero: rounding leaves a true zero at about 1e-16
+/// times a small power of the size.
 constexpr double kFreeEigenvalue = 1e-12;
 
 Eigen::Map<const Eigen::MatrixXd> diagonal_block(const BlockMatrix& H, int block) {
@@ -39,13 +39,15 @@ Eigen::Map<const Eigen::MatrixXd> diagonal_block(const BlockMatrix& H, int block
 /// How many directions of a variable its own factors leave free, the other variables being held.
 int free_directions_of_block(const BlockMatrix& H, int block) {
   const Eigen::MatrixXd D = diagonal_block(H, block);
-  const Eigen::VectorXd eigenvalues = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(D, Eigen::EigenvaluesOnly).eigenvalues();
+  const Eigen::VectorXd eigenvalues =
+      Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(D, Eigen::EigenvaluesOnly).eigenvalues();
   const double threshold = std::max(eigenvalues.maxCoeff() * 1e-14, 1e-300);
   return static_cast<int>((eigenvalues.array() <= threshold).count());
 }
 
-/// The held variables of a component, described, if all of them are smaller than its largest variable: a
-/// landmark that is held does not stop the poses from turning about it. Empty otherwise.
+/// The held variables of a component, described, if all of them are smaller than its largest
+/// variable: a landmark that is held does not stop the poses from turning about it. Empty
+/// otherwise.
 std::string weak_hold(const Graph& graph, const Gauge& gauge, int component) {
   int largest = 0, largest_held = 0, first_held = -1;
   for (int v = 0; v < graph.variable_count(); ++v) {
@@ -63,7 +65,10 @@ std::string weak_hold(const Graph& graph, const Gauge& gauge, int component) {
 }  // namespace
 
 NormalEquations::NormalEquations(const Graph& graph, LinearSolver& solver)
-    : graph_(&graph), solver_(&solver), gauge_(resolve_gauge(graph)), linearizer_(graph, gauge_.held) {
+    : graph_(&graph),
+      solver_(&solver),
+      gauge_(resolve_gauge(graph)),
+      linearizer_(graph, gauge_.held) {
   if (size() == 0) return;
   H_ = BlockMatrix(linearizer_.structure());
   g_.resize(size());
@@ -113,7 +118,8 @@ int NormalEquations::free_directions() const {
   const ScalarPattern pattern(linearizer_.structure(), ScalarPattern::Triangle::lower);
   std::vector<double> values(pattern.nonzeros());
   pattern.scatter(H_, values);
-  if (!std::all_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); })) return -1;
+  if (!std::all_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); }))
+    return -1;
 
   std::vector<double> scale(size());
   for (std::size_t k = 0; k < scale.size(); ++k) {
@@ -141,23 +147,29 @@ std::string NormalEquations::explain(const Factorization& failure) const {
   }
   const int variable = linearizer_.variable_of(block);
   const std::string name = graph_->describe_variable(variable);
-  std::string text = fmt::format("H is not positive definite: the factorisation stopped at {}", name);
-  if (!std::all_of(H_.values().begin(), H_.values().end(), [](double v) { return std::isfinite(v); })) {
+  std::string text =
+      fmt::format("H is not positive definite: the factorisation stopped at {}", name);
+  if (!std::all_of(H_.values().begin(), H_.values().end(),
+                   [](double v) { return std::isfinite(v); })) {
     return text + "; H holds values that are not finite";
   }
   if (const int free = free_directions(); free > 0) {
     text += fmt::format("; {} gauge freedom{} likely", free, free == 1 ? " is" : "s are");
   }
   if (diagonal_block(H_, block).isZero(0.0)) {
-    return text + fmt::format("; no factor of {} has any weight (is its information zero, or has the loss "
-                              "switched it off?)", name);
+    return text + fmt::format(
+                      "; no factor of {} has any weight (is its information zero, or has the loss "
+                      "switched it off?)",
+                      name);
   }
   if (const int free = free_directions_of_block(H_, block); free > 0) {
     text += fmt::format("; the factors of {} leave {} of its {} directions free", name, free,
                         linearizer_.structure().block_size(block));
   }
-  if (const std::string held = weak_hold(*graph_, gauge_, gauge_.component[variable]); !held.empty()) {
-    text += fmt::format("; its component is held only by {}, which does not fix its rotation: hold a pose", held);
+  if (const std::string held = weak_hold(*graph_, gauge_, gauge_.component[variable]);
+      !held.empty()) {
+    text += fmt::format(
+        "; its component is held only by {}, which does not fix its rotation: hold a pose", held);
   }
   return text;
 }

@@ -5,11 +5,16 @@ namespace cairn {
 
 std::string_view to_string(Status status) {
   switch (status) {
-    case Status::converged: return "converged";
-    case Status::max_iterations: return "max_iterations";
-    case Status::diverged: return "diverged";
-    case Status::not_positive_definite: return "not_positive_definite";
-    case Status::interrupted: return "interrupted";
+    case Status::converged:
+      return "converged";
+    case Status::max_iterations:
+      return "max_iterations";
+    case Status::diverged:
+      return "diverged";
+    case Status::not_positive_definite:
+      return "not_positive_definite";
+    case Status::interrupted:
+      return "interrupted";
   }
   return "unknown";  // only a value that is no Status gets here
 }

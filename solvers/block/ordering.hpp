@@ -2,7 +2,7 @@
 #pragma once
 
 #include <cstdint>
-#include <span>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -10,8 +10,9 @@
 
 namespace cairn::block {
 
-/// Names that `order` takes.
-inline constexpr std::string_view kOrderings[] = {"amd", "natural"};
+/// Names that `order` takes: amd (approximate minimum degree), metis (nested dissection; where the
+/// library was built with METIS), natural.
+const std::vector<std::string>& ordering_names();
 
 /// A fill-reducing ordering of the block graph: element k is the block eliminated k-th. Throws
 /// `Error` (usage) for a name that it does not know.

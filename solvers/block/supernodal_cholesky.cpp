@@ -88,7 +88,19 @@ SupernodalCholesky::SupernodalCholesky(std::string_view kernels)
 void SupernodalCholesky::analyze(const BlockStructure& structure, std::string_view ordering,
                                  const CostModel& cost) {
   factorized_ = false;
-  symbolic_ = Symbolic(structure, order(structure, ordering), cost);
+  if (ordering == "auto") {
+    ordering_.clear();
+    for (const std::string& name : ordering_names()) {
+      if (name == "natural") continue;
+      Symbolic candidate(structure, order(structure, name), cost);
+      if (!ordering_.empty() && candidate.factor_flops >= symbolic_.factor_flops) continue;
+      symbolic_ = std::move(candidate);
+      ordering_ = name;
+    }
+  } else {
+    symbolic_ = Symbolic(structure, order(structure, ordering), cost);
+    ordering_ = ordering;
+  }
   structure_ = &structure;
   version_ = structure.version();
   panels_.resize(symbolic_.panel_values());

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <span>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -28,8 +29,12 @@ class SupernodalCholesky {
   /// run.
   explicit SupernodalCholesky(std::string_view kernels = "auto");
 
+  /// `ordering`: one of `ordering_names()`, or auto: each of them but natural, and the one with the
+  /// fewest flops.
   void analyze(const BlockStructure& structure, std::string_view ordering,
                const CostModel& cost = {});
+  /// The ordering that is in use.
+  const std::string& ordering() const { return ordering_; }
   Factorization factorize(const BlockMatrix& H);
   /// x = H⁻¹ g; x may be g.
   void solve(std::span<const double> g, std::span<double> x);
@@ -53,6 +58,7 @@ class SupernodalCholesky {
   void update(const Supernode& node, double* U, bool parallel_inside);
 
   const Kernels* kernels_;
+  std::string ordering_;
   const BlockStructure* structure_ = nullptr;
   std::uint64_t version_ = 0;
   Symbolic symbolic_;

@@ -16,13 +16,14 @@
 
 namespace cairn {
 
-/// The normal equations H δ = g of a graph with its gauge settled, and the linear solver that solves them:
-/// what every second-order optimizer and estimator needs, with the time of each part taken.
+/// The normal equations H δ = g of a graph with its gauge settled, and the linear solver that
+/// solves them: what every second-order optimizer and estimator needs, with the time of each part
+/// taken.
 ///
 /// The constructor does all that depends on the structure alone (gauge, linearizer, the solver's
 /// analysis); afterwards no call allocates more than the linear solver does. Graph and solver must
-/// outlive this object, and the graph keep its structure. A factorisation that fails is an answer, which
-/// `explain` puts into words.
+/// outlive this object, and the graph keep its structure. A factorisation that fails is an answer,
+/// which `explain` puts into words.
 class CAIRN_API NormalEquations {
  public:
   NormalEquations(const Graph& graph, LinearSolver& solver);
@@ -51,8 +52,9 @@ class CAIRN_API NormalEquations {
   /// step = (what was factorised)⁻¹ g.
   void solve(std::span<double> step);
 
-  /// A sentence on why a factorisation of H failed: the variable at which it stopped, how many gauge
-  /// freedoms are likely, what leaves that variable free. Takes about as long as a factorisation.
+  /// A sentence on why a factorisation of H failed: the variable at which it stopped, how many
+  /// gauge freedoms are likely, what leaves that variable free. Takes about as long as a
+  /// factorisation.
   std::string explain(const Factorization& failure) const;
   /// Directions in which chi2 hardly changes: eigenvalues below 1e-12 of H scaled to unit diagonal,
   /// counted by Sylvester's law of inertia on an LDLᵀ. -1 if they cannot be counted, as when H has

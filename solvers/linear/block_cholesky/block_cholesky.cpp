@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <memory>
 #include <string>
+#include <vector>
 
+#include "block/ordering.hpp"
 #include "block/supernodal_cholesky.hpp"
 #include "cairn/linear_solver.hpp"
 #include "cairn/registry.hpp"
@@ -18,7 +20,7 @@ class BlockCholesky final : public LinearSolver, public LogDeterminant {
   void analyze(const BlockStructure& structure) override {
     cholesky_.analyze(structure, ordering_);
     const block::Symbolic& symbolic = cholesky_.symbolic();
-    stats_.ordering = ordering_;
+    stats_.ordering = cholesky_.ordering();
     stats_.factor_nonzeros = symbolic.factor_nonzeros;
     stats_.factor_flops = symbolic.factor_flops;
     stats_.note = std::to_string(symbolic.supernodes().size()) + " supernodes, " +
@@ -44,6 +46,8 @@ class BlockCholesky final : public LinearSolver, public LogDeterminant {
 
 void cairn_register(cairn::Registrar& registrar) {
   using namespace cairn;
+  std::vector<std::string> orderings = block::ordering_names();
+  orderings.emplace_back("auto");
   registrar.add<LinearSolver>("block_cholesky",
                               OptionTable{}
                                   .choice("ordering", "amd", {"amd", "natural"},

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <string>
 
+#include "block/ordering.hpp"
 #include "cairn/error.hpp"
 #include "cairn/threads.hpp"
 #include "support/block_systems.hpp"
@@ -23,6 +24,12 @@ std::vector<std::string> kernel_sets() {
     if (choose_kernels(name)) sets.emplace_back(name);
   }
   return sets;
+}
+
+std::vector<std::string> orderings() {
+  std::vector<std::string> names = ordering_names();
+  names.emplace_back("auto");
+  return names;
 }
 
 Eigen::VectorXd solve(SupernodalCholesky& cholesky, const Eigen::VectorXd& g) {
@@ -48,7 +55,7 @@ TEST(SupernodalCholesky, AgreesWithDenseAlgebraForEveryKernelSetAndBlockSize) {
     const Eigen::VectorXd expected = oracle.solve(g);
     const double log_determinant = oracle.vectorD().array().log().sum();
     for (const std::string& kernels : kernel_sets()) {
-      for (const char* ordering : {"amd", "natural"}) {
+      for (const std::string& ordering : orderings()) {
         SupernodalCholesky cholesky(kernels);
         cholesky.analyze(structure, ordering);
         ASSERT_TRUE(cholesky.factorize(H).ok);
@@ -133,6 +140,21 @@ TEST(SupernodalCholesky, NamesABlockThatIsNotPositiveAndRecovers) {
   EXPECT_TRUE(cholesky.factorize(H).ok);
   H.block(structure.column_begin()[3])[0] = std::nan("");
   EXPECT_FALSE(cholesky.factorize(H).ok);
+}
+
+TEST(SupernodalCholesky, ChoosesTheOrderingWithTheFewestFlops) {
+  std::mt19937 rng(6);
+  const BlockStructure structure = random_structure(rng, 300, 200, {3});
+  double fewest = 1e300;
+  for (const std::string& name : ordering_names()) {
+    SupernodalCholesky cholesky;
+    cholesky.analyze(structure, name);
+    EXPECT_EQ(cholesky.ordering(), name);
+    if (name != "natural") fewest = std::min(fewest, cholesky.symbolic().factor_flops);
+  }
+  SupernodalCholesky chosen;
+  chosen.analyze(structure, "auto");
+  EXPECT_EQ(chosen.symbolic().factor_flops, fewest);
 }
 
 TEST(SupernodalCholesky, RefusesKernelsThatItDoesNotHave) {

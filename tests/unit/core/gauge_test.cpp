@@ -40,7 +40,7 @@ TEST_F(GaugeTest, AnchorsTheFirstPoseOfEachComponentNotAPoint) {
   EXPECT_THAT(gauge.held, ElementsAre(false, true, false, false, true, false));
   EXPECT_THAT(gauge.component, ElementsAre(0, 0, 0, 0, 1, 1));
   EXPECT_EQ(gauge.describe(graph_),
-            "2 components without a fixed variable or a prior: anchored the first pose of each "
+            "2 components without a fixed variable or a prior: anchored one variable of each "
             "(VERTEX_SE2 0, VERTEX_SE2 10)");
 }
 
@@ -51,7 +51,7 @@ TEST_F(GaugeTest, LeavesAComponentWithAFixedVariableAlone) {
   EXPECT_TRUE(gauge.held[3]);
   EXPECT_FALSE(gauge.held[1]);
   EXPECT_EQ(gauge.describe(graph_),
-            "a component has no fixed variable: anchored VERTEX_SE2 10, the first pose");
+            "a component has no fixed variable: anchored VERTEX_SE2 10");
 }
 
 TEST_F(GaugeTest, APriorOnAPoseFixesItsComponent) {

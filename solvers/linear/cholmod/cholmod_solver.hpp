@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <cholmod.h>
+
+#include "cairn/block_matrix.hpp"
+#include "cairn/linear_solver.hpp"
+
+namespace cairn {
+
+/// How CHOLMOD factorises.
+enum class CholmodMode {
+  automatic,   ///< supernodal where the fill is dense enough to pay (40 flops a nonzero of L)
+  simplicial,  ///< column by column, without BLAS
+  supernodal,  ///< dense blocks through BLAS
+};
+
+/// Adapter of CHOLMOD (Chen, Davis, Hager, Rajamanickam 2008): H = P L Lᵀ Pᵀ, with P from the graph
+/// of the blocks. Block values are scattered into scalar form by a map computed once a structure.
+/// Every instance has a workspace of its own; CHOLMOD neither prints nor aborts.
+class CholmodSolver final : public LinearSolver, public LogDeterminant {
+ public:
+  CholmodSolver(CholmodMode mode, std::string ordering);
+  ~CholmodSolver() override;
+
+  void analyze(const BlockStructure& structure) override;
+  Factorization factorize(const BlockMatrix& H) override;
+  void solve(std::span<const double> g, std::span<double> x) override;
+  const LinearSolverStats& stats() const override { return stats_; }
+
+  double log_determinant() const override;
+  void* ability(std::string_view name) override;
+
+ private:
+  void free_factor();
+  cholmod_sparse matrix();
+  void read_pivots();
+  Factorization failed_at(std::size_t column) const;
+
+  const std::string ordering_;
+  cholmod_common common_;
+  cholmod_factor* L_ = nullptr;
+  // Results and workspace of solve, allocated by CHOLMOD at the first one and reused.
+  cholmod_dense* x_ = nullptr;
+  cholmod_dense* y_ = nullptr;
+  cholmod_dense* e_ = nullptr;
+
+  std::uint64_t version_ = 0;  // of the structure that was analysed
+  ScalarPattern pattern_;
+  std::vector<double> values_;  // of the pattern
+  std::vector<int> block_of_scalar_;
+  std::vector<double> pivots_;  // the diagonal of L
+  LinearSolverStats stats_;
+  bool factorized_ = false;
+};
+
+}  // namespace cairn

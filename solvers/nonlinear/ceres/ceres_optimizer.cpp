@@ -1,0 +1,216 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "ceres_optimizer.hpp"
+
+#include <chrono>
+#include <cmath>
+#include <exception>
+#include <string>
+#include <utility>
+
+#include <dlfcn.h>
+#include <fmt/format.h>
+#include <glog/logging.h>
+
+#include "cairn/error.hpp"
+#include "cairn/gauge.hpp"
+#include "cairn/threads.hpp"
+#include "ceres_problem.hpp"
+
+namespace cairn {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+/// Ceres logs failed steps through glog to standard error; libraries do not print.
+class QuietGlog {
+ public:
+  QuietGlog() : level_(FLAGS_minloglevel) { FLAGS_minloglevel = google::GLOG_FATAL; }
+  ~QuietGlog() { FLAGS_minloglevel = level_; }
+  QuietGlog(const QuietGlog&) = delete;
+  QuietGlog& operator=(const QuietGlog&) = delete;
+
+ private:
+  int level_;
+};
+
+/// Threads inside BLAS make the small dense blocks of a sparse factorisation slower. OpenBLAS is
+/// told so once; others are left alone.
+void keep_blas_to_one_thread() {
+  using SetThreads = void (*)(int);
+  if (auto set = reinterpret_cast<SetThreads>(dlsym(RTLD_DEFAULT, "openblas_set_num_threads")))
+    set(1);
+}
+
+/// Hands Ceres' iterations to the observer, and the reasons to stop to Ceres.
+class Bridge final : public ceres::IterationCallback {
+ public:
+  Bridge(const Graph& graph, const Values& values, const Stop& stop, Observer& observer,
+         Summary& summary)
+      : graph_(graph), values_(values), stop_(stop), observer_(observer), summary_(summary) {}
+
+  ceres::CallbackReturnType operator()(const ceres::IterationSummary& ceres) override {
+    try {
+      tell(ceres);
+    } catch (...) {  // not through Ceres' frames, which are not ours
+      exception_ = std::current_exception();
+      interrupted_ = true;
+    }
+    if (stop_.interrupt && stop_.interrupt->load(std::memory_order_relaxed)) interrupted_ = true;
+    return interrupted_ ? ceres::SOLVER_TERMINATE_SUCCESSFULLY : ceres::SOLVER_CONTINUE;
+  }
+
+  bool interrupted() const { return interrupted_; }
+  /// Of the estimate, as Ceres sees it.
+  double chi2() const { return chi2_; }
+  void rethrow() const {
+    if (exception_) std::rethrow_exception(exception_);
+  }
+
+ private:
+  void tell(const ceres::IterationSummary& ceres) {
+    // The cost of a step that was not taken is that of the trial.
+    if (ceres.iteration == 0 || ceres.step_is_successful) chi2_ = 2.0 * ceres.cost;
+    if (ceres.iteration == 0) {
+      summary_.initial_chi2 = chi2_;
+      observer_.on_start(graph_, chi2_);
+      return;
+    }
+    const Iteration iteration{.number = ceres.iteration,
+                              .chi2 = chi2_,
+                              .step_norm = ceres.step_norm,
+                              .lambda = 1.0 / ceres.trust_region_radius,
+                              .accepted = ceres.step_is_successful,
+                              .seconds = ceres.iteration_time_in_seconds};
+    summary_.iterations.push_back(iteration);
+    if (!observer_.on_iteration(iteration, graph_, values_)) interrupted_ = true;
+  }
+
+  const Graph& graph_;
+  const Values& values_;
+  const Stop& stop_;
+  Observer& observer_;
+  Summary& summary_;
+  double chi2_ = 0.0;
+  bool interrupted_ = false;
+  std::exception_ptr exception_;
+};
+
+/// Ceres compares what one damped step gains; ours promise what is left. A hundredth makes both end
+/// alike.
+constexpr double kToleranceShare = 1e-2;
+
+void set_limits(const Stop& stop, ceres::Solver::Options& options) {
+  options.max_num_iterations = stop.max_iterations;
+  options.function_tolerance = kToleranceShare * stop.tolerance;
+  options.gradient_tolerance = 0.0;  // has units: no bound fits metres and radians
+  options.parameter_tolerance = stop.tolerance > 0.0 ? 1e-15 : 0.0;
+  if (stop.max_seconds > 0.0) options.max_solver_time_in_seconds = stop.max_seconds;
+  options.num_threads = threads();
+  options.update_state_every_iteration = true;  // observers see the states
+}
+
+Status status_of(const ceres::Solver::Summary& ceres, bool interrupted) {
+  if (interrupted) return Status::interrupted;
+  switch (ceres.termination_type) {
+    case ceres::CONVERGENCE:
+    case ceres::USER_SUCCESS:
+      return Status::converged;
+    case ceres::NO_CONVERGENCE:
+      return Status::max_iterations;
+    default:
+      break;
+  }
+  // Ceres tells failures apart in words only. Before the first step it can only be the residuals.
+  const bool took_steps = ceres.num_successful_steps + ceres.num_unsuccessful_steps > 1;
+  return took_steps ? Status::not_positive_definite : Status::diverged;
+}
+
+Seconds seconds_of(const ceres::Solver::Summary& ceres) {
+  Seconds seconds;
+  seconds.linearize = ceres.jacobian_evaluation_time_in_seconds;
+  seconds.analyze = ceres.preprocessor_time_in_seconds;
+  seconds.factorize =
+      ceres.linear_solver_time_in_seconds;  // with its solves, which Ceres does not time apart
+  seconds.update = ceres.residual_evaluation_time_in_seconds;
+  return seconds;
+}
+
+/// Σ ρ(‖r‖²) at the graph's states, with the graph's own loss.
+double chi2_of(const Graph& graph) {
+  const std::vector<double> norms = squared_norms(graph);
+  const std::vector<bool> closes_loop = loop_closures(graph);
+  double sum = 0.0;
+  for (std::size_t k = 0; k < norms.size(); ++k) {
+    double rho = norms[k];
+    const bool robust = graph.loss() && (graph.loss_scope() == LossScope::all || closes_loop[k]);
+    if (robust) graph.loss()->evaluate({&norms[k], 1}, {&rho, 1}, {});
+    sum += rho;
+  }
+  return sum;
+}
+
+bool nothing_to_optimise(const Gauge& gauge) {
+  for (const bool held : gauge.held) {
+    if (!held) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+CeresOptimizer::CeresOptimizer(ceres::Solver::Options options, CeresLoss loss)
+    : options_(std::move(options)), loss_(std::move(loss)) {
+  keep_blas_to_one_thread();
+}
+
+Summary CeresOptimizer::optimize(Graph& graph, const Stop& stop, Observer& observer) {
+  if (graph.loss() && loss_.name != "none") {
+    throw Error(
+        ErrorCode::usage,
+        "optimizer ceres: the graph has a loss already; leave out the option loss=" + loss_.name);
+  }
+  const Clock::time_point begin = Clock::now();
+  const auto elapsed = [&] { return std::chrono::duration<double>(Clock::now() - begin).count(); };
+  Summary summary;
+  summary.optimizer = "ceres";
+  summary.linear_solver = ceres::LinearSolverTypeToString(options_.linear_solver_type);
+  const Gauge gauge = resolve_gauge(graph);
+  if (std::string sentence = gauge.describe(graph); !sentence.empty())
+    summary.notes.push_back(std::move(sentence));
+  const bool idle = nothing_to_optimise(gauge);
+  if (idle) summary.notes.push_back("nothing to optimise: every variable is held");
+  for (const std::string& sentence : summary.notes) observer.on_message(sentence);
+  if (idle || stop.max_iterations <= 0) {
+    summary.initial_chi2 = summary.final_chi2 = chi2_of(graph);
+    summary.status = idle ? Status::converged : Status::max_iterations;
+    observer.on_start(graph, summary.initial_chi2);
+    summary.seconds.total = elapsed();
+    return summary;
+  }
+
+  Values values = graph.values();
+  CeresProblem problem(graph, gauge, values, make_ceres_loss(loss_));
+  Bridge bridge(graph, values, stop, observer, summary);
+  ceres::Solver::Options options = options_;
+  set_limits(stop, options);
+  options.callbacks.push_back(&bridge);
+  ceres::Solver::Summary report;
+  {
+    const QuietGlog quiet;
+    ceres::Solve(options, &problem.problem(), &report);
+  }
+  bridge.rethrow();
+
+  graph.set_values(std::move(values));
+  summary.status = status_of(report, bridge.interrupted());
+  summary.final_chi2 = loss_.name == "none" ? chi2_of(graph) : bridge.chi2();
+  summary.notes.push_back("Ceres: " + report.message);
+  summary.seconds = seconds_of(report);
+  summary.seconds.total = elapsed();
+  summary.solver.note = fmt::format(
+      "{}, {}", ceres::LinearSolverTypeToString(report.linear_solver_type_used),
+      ceres::SparseLinearAlgebraLibraryTypeToString(report.sparse_linear_algebra_library_type));
+  return summary;
+}
+
+}  // namespace cairn

@@ -1,0 +1,177 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "ceres_problem.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <utility>
+
+#include "cairn/error.hpp"
+
+namespace cairn {
+namespace {
+
+class GraphManifold final : public ceres::Manifold {
+ public:
+  explicit GraphManifold(const VariableType& type) : type_(type) {}
+  int AmbientSize() const override { return type_.ambient_size(); }
+  int TangentSize() const override { return type_.tangent_size(); }
+
+  bool Plus(const double* x, const double* delta, double* x_plus_delta) const override {
+    const std::int64_t offset = 0;
+    type_.retract(1, x, &offset, delta, x_plus_delta);
+    return true;
+  }
+  bool PlusJacobian(const double*, double* jacobian) const override {
+    return identity(AmbientSize(), TangentSize(), jacobian);
+  }
+  bool Minus(const double* y, const double* x, double* y_minus_x) const override {
+    type_.local(1, x, y, y_minus_x);
+    return true;
+  }
+  bool MinusJacobian(const double*, double* jacobian) const override {
+    return identity(TangentSize(), AmbientSize(), jacobian);
+  }
+
+ private:
+  static bool identity(int rows, int columns, double* row_major) {
+    std::fill_n(row_major, rows * columns, 0.0);
+    for (int k = 0; k < std::min(rows, columns); ++k) row_major[k * columns + k] = 1.0;
+    return true;
+  }
+  const VariableType& type_;
+};
+
+/// One factor. Borrows measurement and information from the graph.
+class FactorCost final : public ceres::CostFunction {
+ public:
+  FactorCost(const FactorType& type, const double* measurement, const double* sqrt_information)
+      : type_(type), measurement_(measurement), sqrt_information_(sqrt_information) {
+    set_num_residuals(type.residual_size());
+    for (int v = 0; v < type.arity(); ++v)
+      mutable_parameter_block_sizes()->push_back(type.ambient_size(v));
+  }
+
+  bool Evaluate(double const* const* x, double* residuals, double** jacobians) const override {
+    if (!jacobians) {
+      type_.evaluate(x, measurement_, sqrt_information_, residuals, nullptr);
+    } else {
+      evaluate_with_jacobians(x, residuals, jacobians);
+    }
+    return std::all_of(residuals, residuals + num_residuals(),
+                       [](double r) { return std::isfinite(r); });
+  }
+
+ private:
+  void evaluate_with_jacobians(double const* const* x, double* residuals,
+                               double** jacobians) const {
+    // Room for tangent Jacobians, column-major, one behind the other; kept by each of Ceres'
+    // threads.
+    thread_local std::vector<double> room;
+    thread_local std::vector<double*> tangent;
+    const int rows = num_residuals(), arity = type_.arity();
+    int size = 0;
+    for (int v = 0; v < arity; ++v) size += rows * type_.tangent_size(v);
+    room.resize(size);
+    tangent.resize(arity);
+    double* next = room.data();
+    for (int v = 0; v < arity; ++v) {
+      tangent[v] = jacobians[v] ? next : nullptr;
+      next += rows * type_.tangent_size(v);
+    }
+    type_.evaluate(x, measurement_, sqrt_information_, residuals, tangent.data());
+    for (int v = 0; v < arity; ++v) {
+      if (jacobians[v])
+        widen(tangent[v], rows, type_.tangent_size(v), type_.ambient_size(v), jacobians[v]);
+    }
+  }
+
+  /// Column-major rows × tangent to row-major rows × ambient, zeros behind.
+  static void widen(const double* from, int rows, int tangent, int ambient, double* to) {
+    for (int r = 0; r < rows; ++r) {
+      for (int c = 0; c < tangent; ++c) to[r * ambient + c] = from[c * rows + r];
+      std::fill(to + r * ambient + tangent, to + (r + 1) * ambient, 0.0);
+    }
+  }
+
+  const FactorType& type_;
+  const double* measurement_;
+  const double* sqrt_information_;
+};
+
+class WrappedLoss final : public ceres::LossFunction {
+ public:
+  explicit WrappedLoss(const Loss& loss) : loss_(loss) {}
+  void Evaluate(double s, double out[3]) const override {
+    loss_.evaluate({&s, 1}, {&out[0], 1}, {&out[1], 1});
+    out[2] = loss_.second_derivative(s);
+  }
+
+ private:
+  const Loss& loss_;
+};
+
+ceres::Problem::Options lend_everything() {
+  ceres::Problem::Options options;
+  options.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+  options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+  options.manifold_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+  options.disable_all_safety_checks = true;  // the graph has checked
+  return options;
+}
+
+double* state(const Graph& graph, Values& values, int variable) {
+  return values.pools[graph.pool(variable)].data() +
+         static_cast<std::size_t>(graph.slot(variable)) * graph.type(variable).ambient_size();
+}
+
+}  // namespace
+
+std::unique_ptr<ceres::LossFunction> wrap_loss(const Loss& loss) {
+  return std::make_unique<WrappedLoss>(loss);
+}
+
+CeresProblem::CeresProblem(const Graph& graph, const Gauge& gauge, Values& values,
+                           std::unique_ptr<ceres::LossFunction> loss)
+    : loss_(std::move(loss)), problem_(lend_everything()) {
+  if (!loss_ && graph.loss()) loss_ = wrap_loss(*graph.loss());
+  add_variables(graph, gauge, values);
+  add_factors(graph, values);
+}
+
+void CeresProblem::add_variables(const Graph& graph, const Gauge& gauge, Values& values) {
+  for (const VariablePool& pool : graph.variable_pools()) {
+    if (pool.type->tangent_size() > pool.type->ambient_size()) {
+      throw Error(ErrorCode::usage,
+                  "optimizer ceres: " + std::string(pool.type->tag()) +
+                      " has a tangent space larger than its state, which Ceres cannot express");
+    }
+    manifolds_.push_back(std::make_unique<GraphManifold>(*pool.type));
+  }
+  for (int v = 0; v < graph.variable_count(); ++v) {
+    double* x = state(graph, values, v);
+    problem_.AddParameterBlock(x, graph.type(v).ambient_size(), manifolds_[graph.pool(v)].get());
+    if (gauge.held[v]) problem_.SetParameterBlockConstant(x);
+  }
+}
+
+void CeresProblem::add_factors(const Graph& graph, Values& values) {
+  const std::vector<bool> closes_loop = loop_closures(graph);
+  std::vector<double*> x;
+  costs_.reserve(graph.factor_count());
+  for (int position = 0; position < graph.factor_count(); ++position) {
+    const FactorRef ref = graph.factor(position);
+    const FactorPool& pool = graph.factor_pools()[ref.pool];
+    const std::size_t n = pool.type->residual_size(), m = pool.type->measurement_size();
+    costs_.push_back(
+        std::make_unique<FactorCost>(*pool.type, pool.measurements.data() + ref.entry * m,
+                                     pool.sqrt_information.data() + ref.entry * (n * (n + 1) / 2)));
+    x.clear();
+    for (const std::int32_t v : graph.factor_variables(position))
+      x.push_back(state(graph, values, v));
+    const bool robust = graph.loss_scope() == LossScope::all || closes_loop[position];
+    problem_.AddResidualBlock(costs_.back().get(), robust ? loss_.get() : nullptr, x);
+  }
+}
+
+}  // namespace cairn

@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "descent.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <utility>
+
+#include <fmt/format.h>
+
+namespace cairn {
+
+double dot(std::span<const double> a, std::span<const double> b) {
+  return std::inner_product(a.begin(), a.end(), b.begin(), 0.0);
+}
+
+Descent::Descent(std::string optimizer, std::string linear_solver, LinearSolver& solver,
+                 Graph& graph, const Stop& stop, Observer& observer)
+    : estimate(graph.values()),
+      graph_(graph),
+      stop_(stop),
+      observer_(observer),
+      solver_(solver),
+      begin_(Clock::now()),
+      iteration_begin_(begin_) {
+  summary_.optimizer = std::move(optimizer);
+  summary_.linear_solver = std::move(linear_solver);
+  summary_.iterations.reserve(static_cast<std::size_t>(std::clamp(stop.max_iterations, 0, 1000)));
+
+  equations_.emplace(graph, solver);
+  if (std::string gauge = equations_->gauge().describe(graph); !gauge.empty())
+    note(std::move(gauge));
+  const bool nothing_to_do = equations_->size() == 0;
+  if (nothing_to_do) {
+    chi2 = equations_->chi2(estimate);
+    note("nothing to optimise: every variable is held");
+    end(Status::converged);
+  } else {
+    step.resize(static_cast<std::size_t>(equations_->size()));
+    trial = estimate;
+    chi2 = equations_->linearize(estimate);
+  }
+  best_ = estimate;
+  best_chi2_ = summary_.initial_chi2 = chi2;
+  for (const std::string& sentence : summary_.notes) observer_.on_message(sentence);
+  observer_.on_start(graph, chi2);
+  if (!std::isfinite(chi2)) {
+    note("chi2 of the initial estimate is not finite");
+    end(Status::diverged);
+  }
+}
+
+double Descent::seconds_since(Clock::time_point begin) const {
+  return std::chrono::duration<double>(Clock::now() - begin).count();
+}
+
+bool Descent::next_iteration() {
+  if (ended() || must_stop()) return false;
+  if (number_ >= stop_.max_iterations) {
+    end(Status::max_iterations);
+    return false;
+  }
+  ++number_;
+  iteration_begin_ = Clock::now();
+  return true;
+}
+
+bool Descent::must_stop() {
+  if (ended()) return true;
+  if (stop_.interrupt && stop_.interrupt->load(std::memory_order_relaxed)) {
+    end(Status::interrupted);
+  } else if (stop_.max_seconds > 0.0 && seconds_since(begin_) > stop_.max_seconds) {
+    note(fmt::format("stopped by the limit of {} s", stop_.max_seconds));
+    end(Status::max_iterations);
+  }
+  return ended();
+}
+
+bool Descent::keep_if_best() {
+  if (!(chi2 < best_chi2_)) return false;
+  best_chi2_ = chi2;
+  best_ = estimate;  // same sizes: no allocation
+  return true;
+}
+
+void Descent::record(double step_norm, double lambda, bool accepted) {
+  const Iteration iteration{.number = number_,
+                            .chi2 = chi2,
+                            .step_norm = step_norm,
+                            .lambda = lambda,
+                            .accepted = accepted,
+                            .seconds = seconds_since(iteration_begin_)};
+  summary_.iterations.push_back(iteration);
+  if (!observer_.on_iteration(iteration, graph_, best_) && !ended()) end(Status::interrupted);
+}
+
+void Descent::end_not_positive_definite(const Factorization& failure) {
+  note(equations_->explain(failure));
+  end(Status::not_positive_definite);
+}
+
+double Descent::state_norm() const {
+  double sum = 0.0;
+  for (const AlignedVector& pool : estimate.pools) sum += dot(pool, pool);
+  return std::sqrt(sum);
+}
+
+Summary Descent::finish() {
+  summary_.status = status_.value_or(Status::max_iterations);
+  summary_.final_chi2 = best_chi2_;
+  if (summary_.status == Status::converged && chi2 > best_chi2_ * (1.0 + 1e-6)) {
+    note(fmt::format("converged at chi2 {:.9g}; kept the better estimate met on the way", chi2));
+  }
+  summary_.solver = solver_.stats();
+  graph_.set_values(std::move(best_));
+  const double total = seconds_since(begin_);
+  summary_.seconds = equations_->seconds();
+  summary_.seconds.total = total;
+  return std::move(summary_);
+}
+
+}  // namespace cairn

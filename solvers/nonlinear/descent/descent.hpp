@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <chrono>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "cairn/normal_equations.hpp"
+#include "cairn/optimizer.hpp"
+
+namespace cairn {
+
+/// Scalar product.
+double dot(std::span<const double> a, std::span<const double> b);
+
+/// One run of a second-order optimizer, as far as the method does not matter: the normal equations,
+/// the estimate and the best one met, the limits of `Stop`, the records of the iterations, and the
+/// summary.
+///
+///     Descent run("gauss_newton", "block_cholesky", *solver, graph, stop, observer);
+///     while (run.next_iteration()) { … run.record(…); … }
+///     return run.finish();
+///
+/// A run ends by `end(status)`, by a limit, or because there is nothing to optimise; the graph gets
+/// the best estimate in `finish`.
+class Descent {
+ public:
+  /// Builds the normal equations, linearises once, and tells the observer.
+  Descent(std::string optimizer, std::string linear_solver, LinearSolver& solver, Graph& graph,
+          const Stop& stop, Observer& observer);
+
+  NormalEquations& equations() { return *equations_; }
+  const Stop& stop() const { return stop_; }
+  /// Stop.tolerance is 0: no test of convergence is to be made.
+  bool exact() const { return !(stop_.tolerance > 0.0); }
+
+  /// Where the run stands, with its chi2. Whoever moves it brings chi2, H and g up to date.
+  Values estimate;
+  double chi2 = 0.0;
+  /// Room for a trial step.
+  std::vector<double> step;
+  Values trial;
+
+  /// False when the run has ended or a limit is reached. Otherwise a new iteration begins.
+  bool next_iteration();
+  /// Whether this is the last iteration that the limit allows: no need to linearise after it.
+  bool last_iteration() const { return number_ >= stop_.max_iterations; }
+  /// Looks at the interrupt flag and the clock, between the parts of an iteration; ends the run if
+  /// it must stop.
+  bool must_stop();
+
+  /// Remembers the estimate if its chi2 is the lowest so far; true if it is.
+  bool keep_if_best();
+  /// Records the iteration and tells the observer, who may end the run.
+  void record(double step_norm, double lambda, bool accepted);
+
+  void end(Status status) { status_ = status; }
+  bool ended() const { return status_.has_value(); }
+  void note(std::string sentence) { summary_.notes.push_back(std::move(sentence)); }
+  /// Ends the run for a factorisation of H that failed, with a note that says why.
+  void end_not_positive_definite(const Factorization& failure);
+
+  /// Euclidean norm of all states.
+  double state_norm() const;
+
+  /// Leaves the best estimate in the graph.
+  Summary finish();
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  double seconds_since(Clock::time_point begin) const;
+
+  Graph& graph_;
+  const Stop stop_;
+  Observer& observer_;
+  LinearSolver& solver_;
+  Clock::time_point begin_;
+  Clock::time_point iteration_begin_;
+  std::optional<NormalEquations> equations_;
+  Values best_;
+  double best_chi2_ = 0.0;
+  int number_ = 0;
+  std::optional<Status> status_;
+  Summary summary_;
+};
+
+}  // namespace cairn

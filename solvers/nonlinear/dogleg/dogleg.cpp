@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "dogleg.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+#include <vector>
+
+#include "convergence.hpp"
+#include "descent.hpp"
+#include "path.hpp"
+
+namespace cairn {
+namespace {
+
+/// One run: the state that its iterations hand on.
+class Run {
+ public:
+  Run(Descent& descent, const DoglegOptions& options)
+      : run_(descent),
+        equations_(descent.equations()),
+        options_(options),
+        convergence_(descent.stop().tolerance, descent.state_norm()),
+        path_(descent.step.size()),
+        radius_(options.initial_radius) {}
+
+  void iterate() {
+    bool arrived = false;
+    if (!path_is_current_) {
+      if (!factorize() || run_.must_stop()) return;
+      equations_.solve(path_.newton());
+      path_.prepare(equations_.H(), equations_.g(), equations_.diagonal(),
+                    options_.smallest_diagonal);
+      path_is_current_ = true;
+      arrived = convergence_.arrived(dot(equations_.g(), path_.newton()), run_.chi2);
+    }
+    const double radius = radius_;
+    const DoglegPath::Step step = arrived ? path_.end(run_.step) : path_.at(radius, run_.step);
+    const double step_norm = std::sqrt(dot(run_.step, run_.step));
+    if (!std::isfinite(step_norm)) {
+      run_.note("the step is not finite");
+      run_.end(Status::diverged);
+      return;
+    }
+    equations_.retract(run_.estimate, run_.step, run_.trial);
+    const double trial_chi2 = equations_.chi2(run_.trial);
+    if (run_.must_stop()) return;
+
+    const bool lowered = trial_chi2 < run_.chi2;  // false for what is not a number
+    if (arrived || convergence_.exhausted(lowered, step_norm)) run_.end(Status::converged);
+    adapt_radius(lowered ? (run_.chi2 - trial_chi2) / step.promise : -1.0, step.length);
+    if (lowered) take_step(trial_chi2);
+    run_.record(step_norm, 1.0 / radius, lowered);
+  }
+
+ private:
+  /// Factorises H, or where it is singular H + μD with the smallest μ that does: the path then ends
+  /// at a damped step. False if none does.
+  bool factorize() {
+    Factorization factorization = equations_.factorize();
+    if (factorization.ok) return true;
+    if (!explained_) run_.note(equations_.explain(factorization) + "; steps are regularised");
+    explained_ = true;
+    std::vector<double> damping(run_.step.size());
+    for (double mu = 1e-12; mu < 1.0; mu *= 100.0) {
+      for (std::size_t k = 0; k < damping.size(); ++k) {
+        damping[k] = mu * std::max(equations_.diagonal()[k], options_.smallest_diagonal);
+      }
+      factorization = equations_.factorize_damped(damping);
+      if (factorization.ok) return true;
+    }
+    run_.end_not_positive_definite(factorization);
+    return false;
+  }
+
+  void take_step(double trial_chi2) {
+    std::swap(run_.estimate, run_.trial);
+    const bool final = run_.ended() || run_.last_iteration();
+    run_.chi2 = final ? trial_chi2 : equations_.linearize(run_.estimate);
+    run_.keep_if_best();
+    path_is_current_ = false;
+  }
+
+  void adapt_radius(double gain_ratio, double length) {
+    if (!(gain_ratio >= 0.25)) radius_ = 0.25 * length;
+    if (gain_ratio > 0.75) radius_ = std::max(radius_, 3.0 * length);
+  }
+
+  Descent& run_;
+  NormalEquations& equations_;
+  const DoglegOptions& options_;
+  Convergence convergence_;
+  DoglegPath path_;
+  double radius_;
+  bool path_is_current_ = false;
+  bool explained_ = false;
+};
+
+}  // namespace
+
+Dogleg::Dogleg(std::unique_ptr<LinearSolver> solver, DoglegOptions options)
+    : solver_(std::move(solver)), options_(std::move(options)) {}
+
+Summary Dogleg::optimize(Graph& graph, const Stop& stop, Observer& observer) {
+  Descent descent("dogleg", options_.linear_solver, *solver_, graph, stop, observer);
+  Run run(descent, options_);
+  while (descent.next_iteration()) run.iterate();
+  return descent.finish();
+}
+
+}  // namespace cairn

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "cairn/linear_solver.hpp"
+#include "cairn/optimizer.hpp"
+
+namespace cairn {
+
+struct DoglegOptions {
+  std::string linear_solver = "block_cholesky";  ///< its name, for the summary
+  double initial_radius = 1e4;      ///< of the trust region, in the norm of diag(H): about √chi2
+  double smallest_diagonal = 1e-6;  ///< the diagonal of H counts as at least this [units of H]
+};
+
+/// Powell's dogleg (Powell 1970; Nocedal and Wright 2006, ch. 4): the step is the point of the
+/// dogleg path
+/// (`DoglegPath`) within a trust region, whose radius follows how well the model foretold chi2. A
+/// step is taken only if it lowers chi2; one that is not costs neither a linearisation nor a
+/// factorisation. With Stop.tolerance = 0 it makes exactly the number of trial steps asked for.
+class Dogleg final : public Optimizer {
+ public:
+  Dogleg(std::unique_ptr<LinearSolver> solver, DoglegOptions options);
+  using Optimizer::optimize;
+  Summary optimize(Graph& graph, const Stop& stop, Observer& observer) override;
+
+ private:
+  std::unique_ptr<LinearSolver> solver_;
+  DoglegOptions options_;
+};
+
+}  // namespace cairn

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "gauss_newton.hpp"
+
+#include <cmath>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "convergence.hpp"
+#include "descent.hpp"
+
+namespace cairn {
+namespace {
+
+void end_diverged(Descent& run) {
+  std::string sentence =
+      "Gauss-Newton diverged: levenberg_marquardt, dogleg or a better initial guess may do";
+  if (const int free = std::isfinite(run.chi2) ? run.equations().free_directions() : -1; free > 0) {
+    sentence += fmt::format("; {} gauge freedom{} likely", free, free == 1 ? " is" : "s are");
+  }
+  run.note(std::move(sentence));
+  run.end(Status::diverged);
+}
+
+}  // namespace
+
+GaussNewton::GaussNewton(std::unique_ptr<LinearSolver> solver, GaussNewtonOptions options)
+    : solver_(std::move(solver)), options_(std::move(options)) {}
+
+Summary GaussNewton::optimize(Graph& graph, const Stop& stop, Observer& observer) {
+  Descent run("gauss_newton", options_.linear_solver, *solver_, graph, stop, observer);
+  Convergence convergence(stop.tolerance, run.state_norm());
+  NormalEquations& equations = run.equations();
+  bool best = true;
+  int rises = 0;
+  while (run.next_iteration()) {
+    if (const Factorization factorization = equations.factorize(); !factorization.ok) {
+      run.end_not_positive_definite(factorization);
+      break;
+    }
+    if (run.must_stop()) break;
+    equations.solve(run.step);
+    const double step_norm = std::sqrt(dot(run.step, run.step));
+    const double before = run.chi2;
+    const bool arrived = convergence.arrived(dot(equations.g(), run.step), before);
+    equations.retract(run.estimate, run.step, run.trial);
+    if (run.must_stop()) break;
+
+    std::swap(run.estimate, run.trial);
+    const bool final = arrived || run.last_iteration();
+    run.chi2 = final ? equations.chi2(run.estimate) : equations.linearize(run.estimate);
+    best = run.keep_if_best();
+    rises = run.chi2 > before ? rises + 1 : 0;
+    const bool exhausted = convergence.exhausted(best, step_norm);
+    if (!std::isfinite(run.chi2) ||
+        (!run.exact() && !arrived && !exhausted && rises >= options_.rises)) {
+      end_diverged(run);
+    } else if (arrived || exhausted) {
+      run.end(Status::converged);
+    }
+    run.record(step_norm, 0.0, true);
+  }
+  return run.finish();
+}
+
+}  // namespace cairn

@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "levenberg_marquardt.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+#include <vector>
+
+#include "convergence.hpp"
+#include "damping.hpp"
+#include "descent.hpp"
+
+namespace cairn {
+namespace {
+
+/// Where undamped steps cannot be had, so many damped steps in a row that promise less than the
+/// tolerance count as arrival, and only with damping as light as this: under a heavy one every
+/// promise is small.
+constexpr int kSmallPromises = 3;
+constexpr double kLightDamping = 1e-8;
+
+/// One run: the state that its iterations hand on.
+class Run {
+ public:
+  Run(Descent& descent, const LevenbergMarquardtOptions& options)
+      : run_(descent),
+        equations_(descent.equations()),
+        options_(options),
+        damping_(options.initial_lambda, 1e-20, options.largest_lambda),
+        endgame_(options.endgame ? std::sqrt(descent.stop().tolerance) : 0.0),
+        convergence_(descent.stop().tolerance, descent.state_norm()),
+        damped_by_(descent.step.size()) {}
+
+  void iterate() {
+    const bool undamped = endgame_.active();
+    const double lambda = undamped ? 0.0 : damping_.lambda();
+    const Factorization factorization = factorize(lambda);
+    if (!factorization.ok) {
+      take_failure(factorization, undamped);
+      run_.record(0.0, lambda, false);
+      return;
+    }
+    if (run_.must_stop()) return;
+    equations_.solve(run_.step);
+    const double step_norm = std::sqrt(dot(run_.step, run_.step));
+    const double promise = dot(equations_.g(), run_.step) + damping_energy();
+    const bool arrived =
+        undamped ? convergence_.arrived(promise, run_.chi2) : damped_arrival(promise);
+
+    equations_.retract(run_.estimate, run_.step, run_.trial);
+    const double trial_chi2 = equations_.chi2(run_.trial);
+    if (run_.must_stop()) return;
+    const bool lowered = trial_chi2 < run_.chi2;  // false for what is not a number
+    const double gained = run_.chi2 - trial_chi2;
+    if (arrived || convergence_.exhausted(lowered, step_norm)) run_.end(Status::converged);
+
+    const double before = run_.chi2;
+    if (lowered) take_step(trial_chi2);
+    if (undamped && !lowered) endgame_.fail();
+    if (!undamped && lowered) {
+      damping_.ease(gained / promise);
+      if (!run_.exact()) endgame_.consider(gained / before);
+    }
+    if (!undamped && !lowered) raise_damping();
+    run_.record(step_norm, lambda, lowered);
+  }
+
+ private:
+  Factorization factorize(double lambda) {
+    const std::span<const double> diagonal = equations_.diagonal();
+    for (std::size_t k = 0; k < damped_by_.size(); ++k) {
+      damped_by_[k] = lambda * std::max(diagonal[k], options_.smallest_diagonal);
+    }
+    return lambda > 0.0 ? equations_.factorize_damped(damped_by_) : equations_.factorize();
+  }
+
+  /// λ δᵀ D δ: with it the promise gᵀδ + λ δᵀDδ is what the undamped model says of the damped step.
+  double damping_energy() const {
+    double sum = 0.0;
+    for (std::size_t k = 0; k < damped_by_.size(); ++k)
+      sum += damped_by_[k] * run_.step[k] * run_.step[k];
+    return sum;
+  }
+
+  bool damped_arrival(double promise) {
+    const bool small =
+        damping_.lambda() <= kLightDamping && promise <= run_.stop().tolerance * run_.chi2;
+    small_promises_ = small ? small_promises_ + 1 : 0;
+    const bool undamped_impossible = endgame_.ever_failed() || !options_.endgame;
+    return !run_.exact() && undamped_impossible && small_promises_ >= kSmallPromises;
+  }
+
+  void take_step(double trial_chi2) {
+    std::swap(run_.estimate, run_.trial);
+    const bool final = run_.ended() || run_.last_iteration();
+    run_.chi2 = final ? trial_chi2 : equations_.linearize(run_.estimate);
+    run_.keep_if_best();
+  }
+
+  void raise_damping() {
+    damping_.raise();
+    if (!damping_.at_limit() || run_.ended() || run_.exact()) return;
+    run_.note("no step lowers chi2, however small: this is as far as arithmetic goes");
+    run_.end(Status::converged);
+  }
+
+  void take_failure(const Factorization& failure, bool undamped) {
+    if (undamped) {
+      endgame_.fail();
+      if (!explained_) run_.note("without damping " + equations_.explain(failure));
+      explained_ = true;
+    } else if (damping_.at_limit()) {
+      run_.end_not_positive_definite(failure);
+    } else {
+      damping_.raise();
+    }
+  }
+
+  Descent& run_;
+  NormalEquations& equations_;
+  const LevenbergMarquardtOptions& options_;
+  Damping damping_;
+  Endgame endgame_;
+  Convergence convergence_;
+  std::vector<double> damped_by_;  // λ D
+  int small_promises_ = 0;
+  bool explained_ = false;
+};
+
+}  // namespace
+
+LevenbergMarquardt::LevenbergMarquardt(std::unique_ptr<LinearSolver> solver,
+                                       LevenbergMarquardtOptions options)
+    : solver_(std::move(solver)), options_(std::move(options)) {}
+
+Summary LevenbergMarquardt::optimize(Graph& graph, const Stop& stop, Observer& observer) {
+  Descent descent("levenberg_marquardt", options_.linear_solver, *solver_, graph, stop, observer);
+  Run run(descent, options_);
+  while (descent.next_iteration()) run.iterate();
+  return descent.finish();
+}
+
+}  // namespace cairn

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "cairn/linear_solver.hpp"
+#include "cairn/optimizer.hpp"
+
+namespace cairn {
+
+struct LevenbergMarquardtOptions {
+  std::string linear_solver = "block_cholesky";  ///< its name, for the summary
+  double initial_lambda = 1e-6;     ///< damping of the first step, relative to the diagonal of H
+  double largest_lambda = 1e16;     ///< where the run gives up
+  double smallest_diagonal = 1e-6;  ///< D is at least this [units of H]
+  bool endgame = true;              ///< undamped steps near the minimum
+};
+
+/// Levenberg-Marquardt: (H + λ D) δ = g with D = diag(H) (Marquardt's scaling, which makes λ a pure
+/// number whatever the units) and Nielsen's rule for λ. A step is taken only if it lowers chi2; one
+/// that is not costs a factorisation but no linearisation. Convergence is judged on undamped steps
+/// (`Endgame`), so that heavy damping is not taken for arrival. With Stop.tolerance = 0 it makes
+/// exactly the number of trial steps asked for, all of them damped.
+class LevenbergMarquardt final : public Optimizer {
+ public:
+  LevenbergMarquardt(std::unique_ptr<LinearSolver> solver, LevenbergMarquardtOptions options);
+  using Optimizer::optimize;
+  Summary optimize(Graph& graph, const Stop& stop, Observer& observer) override;
+
+ private:
+  std::unique_ptr<LinearSolver> solver_;
+  LevenbergMarquardtOptions options_;
+};
+
+}  // namespace cairn
