@@ -1,0 +1,146 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// cairn bench GRAPH…: solvers side by side on the same graphs.
+#include <algorithm>
+#include <memory>
+
+#include <fmt/format.h>
+
+#include "album.hpp"
+#include "bench_report.hpp"
+#include "bench_run.hpp"
+#include "cairn/error.hpp"
+#include "cairn/threads.hpp"
+#include "commands.hpp"
+#include "help.hpp"
+#include "interrupt.hpp"
+#include "json_text.hpp"
+#include "picture_files.hpp"
+#include "table.hpp"
+
+namespace cairn::app {
+namespace {
+
+void check(const BenchOptions& options, Session& session) {
+  if (options.csv == "-") session.write_file_to_stdout();
+  if (options.html.empty()) return;
+  if (!session.registry().has(Picture::kKind, "html")) {
+    throw Error(ErrorCode::plugin,
+                "no plugin makes pages here: cairn was built without apps/report/dist and without "
+                "npm; leave out --html");
+  }
+  check_folder(options.html);
+}
+
+/// A configuration that could not run at all is an error of the command, but not one that keeps the
+/// others from being reported.
+int exit_code(const std::vector<GraphResult>& graphs, bool interrupted) {
+  if (interrupted) return kExitInterrupted;
+  for (const GraphResult& graph : graphs) {
+    for (const ConfigurationResult& result : graph.results) {
+      if (!result.error.empty()) return static_cast<int>(ErrorCode::numerical);
+    }
+  }
+  return 0;
+}
+
+std::string name_of(const Configuration& configuration) {
+  return configuration.linear_solver.empty()
+             ? configuration.optimizer
+             : fmt::format("{}, {}", configuration.optimizer, configuration.linear_solver);
+}
+
+/// The graph with its first estimate and that of each configuration.
+Scene scene_of_result(const GraphResult& result) {
+  Graph graph = result.loaded.graph.clone();
+  Scene scene = scene_of(graph, short_name(result.loaded.name));
+  scene.estimates.push_back(place(graph, scene, "first estimate", EstimateRole::initial));
+  for (const ConfigurationResult& configuration : result.results) {
+    if (configuration.runs.empty()) continue;
+    const bool first = scene.runs.empty();
+    graph.set_values(configuration.states);
+    scene.estimates.push_back(place(graph, scene, name_of(configuration.configuration),
+                                    first ? EstimateRole::estimate : EstimateRole::peer));
+    // All of them end at nearly the same residuals; once is enough.
+    if (!first) scene.estimates.back().edge_chi2.clear();
+    scene.estimates.back().run = static_cast<int>(scene.runs.size());
+    scene.runs.push_back({name_of(configuration.configuration), median_run(configuration),
+                          threads(), configuration.peak_memory});
+  }
+  return scene;
+}
+
+void write_page(const BenchOptions& options, const std::vector<GraphResult>& graphs,
+                const boost::json::object& report, Session& session) {
+  Album album = begin_album("Solvers side by side", "");
+  album.command = "cairn bench";
+  for (const std::string& graph : options.graphs) album.command += " " + graph;
+  album.bench = json_text(report);
+  for (const GraphResult& graph : graphs) {
+    try {
+      album.scenes.push_back(scene_of_result(graph));
+    } catch (const Error& error) {  // nothing to draw, but all to compare
+      album.notes.emplace_back(error.what());
+    }
+  }
+  write_picture(album, {"html", {}}, options.html, session);
+}
+
+int run(const BenchOptions& options, Session& session) {
+  check(options, session);
+  session.use_threads();
+  bool interrupted = false;
+  const std::vector<GraphResult> graphs = run_bench(options, session, interrupted);
+  if (!options.csv.empty()) write_file(options.csv, bench_csv(graphs));
+  const boost::json::object report = bench_json(options, graphs, interrupted);
+  if (!options.html.empty()) write_page(options, graphs, report, session);
+  session.write_json(report);
+  for (const GraphResult& graph : graphs) {
+    session.print((&graph == &graphs.front() ? "" : "\n") + bench_table(graph, session.colour()));
+  }
+  if (!options.html.empty()) session.print(fmt::format("\npage: {}\n", options.html));
+  return exit_code(graphs, interrupted);
+}
+
+}  // namespace
+
+Command add_bench(CLI::App& program) {
+  auto options = std::make_shared<BenchOptions>();  // lives as long as the parser and the run
+  CLI::App* app =
+      program.add_subcommand("bench", "solvers side by side: medians, ratios, agreement");
+  app->add_option("graphs", options->graphs, kGraphHelp)->type_name("GRAPH")->required();
+  app->add_option("--optimizer", options->optimizers,
+                  "optimizers A,B,… with options as NAME:key=value")
+      ->type_name("NAMES")
+      ->allow_extra_args(false)
+      ->default_str(kDefaultOptimizer);
+  app->add_option("--linear-solver", options->linear_solvers,
+                  "linear solvers A,B,… for each of them")
+      ->type_name("NAMES")
+      ->allow_extra_args(false)
+      ->default_str("all on offer");
+  add_problem_options(*app, options->problem);
+  app->add_option("--repeat", options->repeat, "rounds; in each, every solver runs once")
+      ->type_name("N")
+      ->check(within(1, 1000000))
+      ->capture_default_str();
+  app->add_flag("--no-memory", options->no_memory, "leave out the extra run for the peak memory");
+  app->add_option("--csv", options->csv, "one line a run (- is standard output)")
+      ->type_name("FILE");
+  app->add_option("--html", options->html, "all of it as a page, with the graphs to look round in")
+      ->type_name("FILE");
+  add_input_options(*app, options->input);
+  app->footer(
+      "Every run starts from the same first estimate and ends as optimize does; for N equal steps, "
+      "add\n"
+      "--tolerance 0. Times are of optimisation alone. 'ratio' is the median over rounds of the "
+      "time\n"
+      "against the first line's in the same round. 'memory' is that of a process of its own that "
+      "reads\n"
+      "and optimises once, as cairn optimize.\n\n"
+      "Example:\n"
+      "  cairn bench sphere.g2o @manhattan:poses=3500 --optimizer levenberg_marquardt,ceres --csv "
+      "runs.csv");
+  return {app, [options](Session& session) { return run(*options, session); }};
+}
+
+}  // namespace cairn::app

@@ -1,0 +1,219 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "bench_report.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "cairn/threads.hpp"
+#include "json_report.hpp"
+#include "table.hpp"
+
+namespace cairn::app {
+namespace {
+
+namespace json = boost::json;
+
+double seconds_per_iteration(const ConfigurationResult& result) {
+  std::vector<double> all;
+  for (const Summary& run : result.runs) {
+    if (!run.iterations.empty()) {
+      all.push_back(run.seconds.total / static_cast<double>(run.iterations.size()));
+    }
+  }
+  return median(all);
+}
+
+std::string number_or_dash(fmt::string_view format, double number) {
+  return std::isfinite(number) ? fmt::format(fmt::runtime(format), number) : "-";
+}
+
+std::string spread_text(const std::vector<double>& seconds) {
+  const auto [low, high] = std::minmax_element(seconds.begin(), seconds.end());
+  return fmt::format("{} … {}", seconds_text(*low), seconds_text(*high));
+}
+
+std::string agreement_text(const ConfigurationResult& result, const GraphResult& graph) {
+  const double excess = chi2_excess(result, graph);
+  const std::string text = excess == 0.0 ? "0" : number_or_dash("{:+.1e}", excess);
+  return chi2_agrees(result, graph) ? text : text + " !";
+}
+
+/// What a linear solver is called: as it was written, or what the optimizer says that it used.
+std::string linear_solver_name(const ConfigurationResult& result) {
+  if (!result.configuration.linear_solver.empty()) return result.configuration.linear_solver;
+  if (!result.runs.empty() && !result.runs.front().linear_solver.empty()) {
+    return result.runs.front().linear_solver;
+  }
+  return "-";
+}
+
+std::vector<std::string> row(const ConfigurationResult& result, const GraphResult& graph) {
+  const std::string& optimizer = result.configuration.optimizer;
+  if (result.runs.empty()) {
+    return {optimizer, linear_solver_name(result), result.error.empty() ? "not run" : "failed"};
+  }
+  const Summary& first = result.runs.front();
+  const std::vector<double> seconds = totals(result);
+  const std::int64_t nonzeros = first.solver.factor_nonzeros;
+  return {optimizer,
+          linear_solver_name(result),
+          seconds_text(median(seconds)),
+          spread_text(seconds),
+          number_or_dash("{:.2f}", paired_ratio(result, graph)),
+          number_or_dash("{:.3g}", 1e3 * seconds_per_iteration(result)),
+          fmt::format("{}", first.iterations.size()),
+          chi2_text(first.final_chi2),
+          agreement_text(result, graph),
+          nonzeros > 0 ? count_text(nonzeros) : "-",
+          bytes_text(result.peak_memory),
+          std::string(to_string(first.status))};
+}
+
+json::array runs_json(const ConfigurationResult& result) {
+  json::array all;
+  for (const Summary& run : result.runs) {
+    all.push_back({{"status", to_string(run.status)},
+                   {"chi2", {{"initial", run.initial_chi2}, {"final", run.final_chi2}}},
+                   {"iterations", run.iterations.size()},
+                   {"seconds", seconds_json(run.seconds)}});
+  }
+  return all;
+}
+
+json::object times_json(const ConfigurationResult& result) {
+  const std::vector<double> seconds = totals(result);
+  return {{"median", median(seconds)},
+          {"min", *std::min_element(seconds.begin(), seconds.end())},
+          {"max", *std::max_element(seconds.begin(), seconds.end())},
+          {"per_iteration", seconds_per_iteration(result)}};
+}
+
+json::object configuration_json(const ConfigurationResult& result, const GraphResult& graph) {
+  json::object all{{"optimizer", result.configuration.optimizer},
+                   {"linear_solver", linear_solver_name(result)},
+                   {"error", text_json(result.error)}};
+  if (!result.runs.empty()) {
+    const Summary& first = result.runs.front();
+    all["status"] = to_string(first.status);
+    all["chi2"] = {{"initial", first.initial_chi2},
+                   {"final", first.final_chi2},
+                   {"relative_difference", chi2_excess(result, graph)},
+                   {"agrees", chi2_agrees(result, graph)}};
+    all["iterations"] = first.iterations.size();
+    all["seconds"] = times_json(result);
+    all["ratio"] = paired_ratio(result, graph);
+    all["solver"] = solver_json(first.solver);
+    all["notes"] = strings_json(first.notes);
+  }
+  all["peak_memory_bytes"] =
+      result.peak_memory > 0 ? json::value(result.peak_memory) : json::value(nullptr);
+  all["runs"] = runs_json(result);
+  if (!result.runs.empty()) all["history"] = iterations_json(median_run(result));
+  return all;
+}
+
+/// Quoted if need be (RFC 4180).
+std::string csv_field(const std::string& text) {
+  if (text.find_first_of(",\"\n\r") == std::string::npos) return text;
+  std::string quoted = "\"";
+  for (const char c : text) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
+  return quoted + "\"";
+}
+
+std::string csv_line(const std::vector<std::string>& fields) {
+  return fmt::format("{}\r\n", fmt::join(fields, ","));
+}
+
+std::vector<std::string> csv_fields(const GraphResult& graph, const ConfigurationResult& result,
+                                    std::size_t round) {
+  const Summary& run = result.runs[round];
+  const Seconds& s = run.seconds;
+  std::vector<std::string> fields;
+  for (const std::string& text :
+       {graph.loaded.name, result.configuration.optimizer, linear_solver_name(result),
+        std::string(to_string(run.status)), cpu_name()}) {
+    fields.push_back(csv_field(text));
+  }
+  for (const std::int64_t number : {std::int64_t{threads()}, static_cast<std::int64_t>(round + 1),
+                                    static_cast<std::int64_t>(run.iterations.size()),
+                                    run.solver.factor_nonzeros, result.peak_memory}) {
+    fields.push_back(fmt::format("{}", number));
+  }
+  for (const double number : {run.initial_chi2, run.final_chi2, s.total, s.linearize, s.analyze,
+                              s.factorize, s.solve, s.update}) {
+    fields.push_back(fmt::format("{}", number));
+  }
+  return fields;
+}
+
+}  // namespace
+
+std::string bench_table(const GraphResult& graph, bool colour) {
+  using Align = Table::Align;
+  Table table({{"optimizer", Align::left},
+               {"linear solver", Align::left},
+               {"median", Align::right},
+               {"min … max", Align::right},
+               {"ratio", Align::right},
+               {"ms/it", Align::right},
+               {"it", Align::right},
+               {"chi2", Align::right},
+               {"above best", Align::right},
+               {"nnz(L)", Align::right},
+               {"memory", Align::right},
+               {"status", Align::left}});
+  for (const ConfigurationResult& result : graph.results) table.add(row(result, graph));
+  std::string text =
+      fmt::format("{}: {}, {}\n{}", bold(graph.loaded.name, colour),
+                  plural(graph.loaded.graph.variable_count(), "variable"),
+                  plural(graph.loaded.graph.factor_count(), "factor"), table.text(colour));
+  for (const ConfigurationResult& result : graph.results) {
+    if (!result.error.empty()) {
+      text += fmt::format("failed: {} {}: {}\n", result.configuration.optimizer,
+                          result.configuration.linear_solver, result.error);
+    }
+  }
+  return text;
+}
+
+json::object bench_json(const BenchOptions& options, const std::vector<GraphResult>& graphs,
+                        bool interrupted) {
+  json::object report = begin_report("bench");
+  report["threads"] = threads();
+  report["repeat"] = options.repeat;
+  report["initial"] = options.problem.initial;
+  report["loss"] = text_json(options.problem.loss);
+  report["max_iterations"] = options.problem.stop.max_iterations;
+  report["tolerance"] = options.problem.stop.tolerance;
+  report["interrupted"] = interrupted;
+  json::array& all = report["graphs"].emplace_array();
+  for (const GraphResult& graph : graphs) {
+    json::array rows;
+    for (const ConfigurationResult& result : graph.results)
+      rows.push_back(configuration_json(result, graph));
+    all.push_back({{"graph", graph_json(graph.loaded.graph, graph.loaded.name)},
+                   {"configurations", std::move(rows)}});
+  }
+  end_report(report);
+  return report;
+}
+
+std::string bench_csv(const std::vector<GraphResult>& graphs) {
+  std::string text =
+      csv_line({"graph", "optimizer", "linear_solver", "status", "cpu", "threads", "round",
+                "iterations", "factor_nonzeros", "peak_memory_bytes", "chi2_initial", "chi2_final",
+                "seconds_total", "seconds_linearize", "seconds_analyze", "seconds_factorize",
+                "seconds_solve", "seconds_update"});
+  for (const GraphResult& graph : graphs) {
+    for (const ConfigurationResult& result : graph.results) {
+      for (std::size_t k = 0; k < result.runs.size(); ++k)
+        text += csv_line(csv_fields(graph, result, k));
+    }
+  }
+  return text;
+}
+
+}  // namespace cairn::app

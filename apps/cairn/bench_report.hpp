@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+
+#include <boost/json/object.hpp>
+
+#include "bench_run.hpp"
+
+namespace cairn::app {
+
+/// One line a configuration: medians, ratios, agreement.
+std::string bench_table(const GraphResult& graph, bool colour);
+/// One object a graph, one a configuration, and in it every run.
+boost::json::object bench_json(const BenchOptions& options, const std::vector<GraphResult>& graphs,
+                               bool interrupted);
+/// One line a run, with a title line.
+std::string bench_csv(const std::vector<GraphResult>& graphs);
+
+}  // namespace cairn::app

@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "commands.hpp"
+
+namespace cairn::app {
+
+/// The whole command line: the program, its subcommands and their options.
+class CommandLine {
+ public:
+  explicit CommandLine(Session& session);
+
+  /// Parses, and returns what to run. Help and version are a run too. Throws `Error` (usage) for
+  /// what cannot be understood, with the nearest spelling.
+  std::function<int()> parse(int argc, const char* const* argv);
+
+ private:
+  Session& session_;
+  CLI::App program_;
+  std::vector<Command> commands_;
+};
+
+}  // namespace cairn::app

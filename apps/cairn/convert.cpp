@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// cairn convert IN OUT: reads one format and writes another.
+#include <memory>
+
+#include <fmt/format.h>
+
+#include "commands.hpp"
+#include "graph_files.hpp"
+#include "json_report.hpp"
+#include "table.hpp"
+
+namespace cairn::app {
+namespace {
+
+struct ConvertOptions {
+  std::string input_file;
+  std::string output_file;
+  std::string output_format;
+  InputOptions input;
+};
+
+int run(const ConvertOptions& options, Session& session) {
+  if (options.output_file == "-") session.write_file_to_stdout();
+  check_output(options.output_file, options.output_format, session);
+  const LoadedGraph loaded = load_graph(options.input_file, options.input, session);
+  write_graph(loaded.graph, options.output_file, session.registry(), options.output_format);
+
+  boost::json::object report = begin_report("convert");
+  report["graph"] = graph_json(loaded.graph, loaded.name);
+  report["format"] = loaded.report.format;
+  report["output"] = options.output_file;
+  report["read_notes"] = strings_json(sentences(loaded.report));
+  report["seconds"] = boost::json::object{{"read", loaded.seconds}};
+  session.write_json(report);
+  session.print(fmt::format("{} ({}): {}, {} written to {}\n", loaded.name, loaded.report.format,
+                            plural(loaded.graph.variable_count(), "variable"),
+                            plural(loaded.graph.factor_count(), "factor"), options.output_file));
+  return 0;
+}
+
+}  // namespace
+
+Command add_convert(CLI::App& program) {
+  auto options = std::make_shared<ConvertOptions>();  // lives as long as the parser and the run
+  CLI::App* app =
+      program.add_subcommand("convert", "write a graph or its trajectory in another format");
+  app->add_option("in", options->input_file, kGraphHelp)->type_name("IN")->required();
+  app->add_option("out", options->output_file,
+                  "file (packed if it ends in .gz; - is standard output)")
+      ->type_name("OUT")
+      ->required();
+  app->add_option("--to", options->output_format,
+                  "format of OUT, instead of telling it by the ending")
+      ->type_name("FORMAT");
+  add_input_options(*app, options->input);
+  app->footer(
+      "Example:\n"
+      "  cairn convert manhattan_isam.txt manhattan.g2o.gz\n"
+      "  cairn convert best.g2o - --to tum");
+  return {app, [options](Session& session) { return run(*options, session); }};
+}
+
+}  // namespace cairn::app

@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// cairn generate KIND: a simulated graph, the same on every machine.
+#include <memory>
+
+#include <fmt/format.h>
+
+#include "commands.hpp"
+#include "graph_files.hpp"
+#include "json_report.hpp"
+#include "table.hpp"
+
+namespace cairn::app {
+namespace {
+
+struct GenerateOptions {
+  std::string kind;
+  std::string output;
+  std::string output_format;
+  std::string ground_truth;
+  std::uint64_t seed = 0;
+};
+
+int run(const GenerateOptions& options, Session& session) {
+  if (options.output == "-" || options.ground_truth == "-") session.write_file_to_stdout();
+  check_output(options.output, options.output_format, session);
+  check_output(options.ground_truth, options.output_format, session);
+  const Simulation simulation = simulate(options.kind, options.seed, session);
+  Registry& registry = session.registry();
+  write_graph(simulation.graph, options.output, registry, options.output_format);
+  if (!options.ground_truth.empty()) {
+    write_graph(simulation.truth, options.ground_truth, registry, options.output_format);
+  }
+
+  boost::json::object report = begin_report("generate");
+  report["kind"] = options.kind;
+  report["seed"] = options.seed;
+  report["graph"] = graph_json(simulation.graph, options.output);
+  report["ground_truth"] = text_json(options.ground_truth);
+  session.write_json(report);
+  session.print(fmt::format("{}: {}, {} written to {}\n", options.kind,
+                            plural(simulation.graph.variable_count(), "variable"),
+                            plural(simulation.graph.factor_count(), "factor"), options.output));
+  return 0;
+}
+
+}  // namespace
+
+Command add_generate(CLI::App& program) {
+  auto options = std::make_shared<GenerateOptions>();  // lives as long as the parser and the run
+  CLI::App* app =
+      program.add_subcommand("generate", "make a simulated graph, with its ground truth");
+  app->add_option("kind", options->kind,
+                  "generator: manhattan, sphere … (cairn plugins lists them)")
+      ->type_name("KIND[:k=v]")
+      ->required();
+  app->add_option("-o,--output", options->output, "the noisy graph (- is standard output)")
+      ->type_name("OUT")
+      ->required();
+  app->add_option("--ground-truth", options->ground_truth, "the same graph at its true states")
+      ->type_name("FILE");
+  app->add_option("--to", options->output_format, "format, instead of telling it by the ending")
+      ->type_name("FORMAT");
+  app->add_option("--seed", options->seed, "seed of the noise; the same seed gives the same graph")
+      ->type_name("S")
+      ->capture_default_str();
+  app->footer(
+      "Example:\n"
+      "  cairn generate manhattan:poses=3500 -o graph.g2o --ground-truth truth.g2o --seed 7\n"
+      "Options of a generator: cairn plugins manhattan");
+  return {app, [options](Session& session) { return run(*options, session); }};
+}
+
+}  // namespace cairn::app

@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "graph_files.hpp"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <charconv>
+#include <chrono>
+#include <cstring>
+#include <filesystem>
+#include <optional>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "cairn/error.hpp"
+#include "cairn/registry.hpp"
+#include "table.hpp"
+
+namespace cairn::app {
+namespace {
+
+double seconds_since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+/// Takes `seed=N` out of a generator's options, unless the generator has an option of that name.
+std::uint64_t take_seed(ComponentSpec& spec, const OptionTable& table) {
+  const auto given = spec.values.find("seed");
+  if (given == spec.values.end() || table.find("seed")) return 0;
+  const std::string text = given->second;
+  std::uint64_t seed = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), seed);
+  if (error != std::errc() || end != text.data() + text.size()) {
+    throw Error(ErrorCode::usage,
+                fmt::format("{}: seed is '{}', expected a whole number from 0", spec.name, text));
+  }
+  spec.values.erase(given);
+  return seed;
+}
+
+LoadedGraph generate_graph(const std::string& name, Session& session) {
+  ComponentSpec spec = parse_component(std::string_view(name).substr(1));
+  Registry& registry = session.registry();
+  const std::uint64_t seed = take_seed(spec, registry.options(Generator::kKind, spec.name));
+  LoadedGraph loaded;
+  loaded.graph = registry.make<Generator>(spec)->generate(registry, seed).graph;
+  loaded.report.format = "generated";
+  return loaded;
+}
+
+LoadedGraph read_named_graph(const std::string& name, const InputOptions& options,
+                             Session& session) {
+  LoadedGraph loaded;
+  const std::string file = name == "-" ? "/dev/stdin" : name;
+  loaded.graph = read_graph(file, session.registry(), options.read, loaded.report, options.format);
+  return loaded;
+}
+
+/// "g2o" of "map.G2O.gz".
+std::string ending(std::filesystem::path file) {
+  if (file.extension() == ".gz") file.replace_extension();
+  std::string text = file.extension().string();
+  for (char& c : text) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  return text.empty() ? text : text.substr(1);
+}
+
+void check_named_format(const std::string& file, const std::string& format, Registry& registry) {
+  if (registry.make<Format>(format)->can_write()) return;
+  throw Error(ErrorCode::usage, fmt::format("{}: format '{}' only reads", file, format));
+}
+
+void check_ending(const std::string& file, Registry& registry) {
+  std::vector<std::string> writable;
+  std::optional<Error> broken;
+  for (const std::string& name : registry.names(Format::kKind)) {
+    try {
+      const auto format = registry.make<Format>(name);
+      if (!format->can_write()) continue;
+      for (const std::string& known : format->extensions()) writable.push_back(known);
+    } catch (const Error& error) {
+      // A broken plugin is no reason not to write what another one writes.
+      if (!broken) broken = error;
+    }
+  }
+  if (std::find(writable.begin(), writable.end(), ending(file)) != writable.end()) return;
+  if (writable.empty() && broken) throw Error(*broken);
+  throw Error(
+      ErrorCode::usage,
+      fmt::format("{}: no format writes files of that name; endings on offer: .{}; or name a "
+                  "format with --to",
+                  file == "-" ? "standard output" : file, fmt::join(writable, ", .")));
+}
+
+}  // namespace
+
+void add_input_options(CLI::App& command, InputOptions& options) {
+  command
+      .add_option("--from", options.format, "format of the input, instead of telling it by content")
+      ->type_name("FORMAT");
+  command.add_flag("--skip-unknown", options.read.skip_unknown,
+                   "skip and count lines with unknown tags, instead of refusing the file");
+  command.add_flag("--repair-information", options.read.repair_information,
+                   "mend information matrices where it is known how");
+}
+
+LoadedGraph load_graph(const std::string& name, const InputOptions& options, Session& session) {
+  const auto start = std::chrono::steady_clock::now();
+  LoadedGraph loaded = name.starts_with('@') ? generate_graph(name, session)
+                                             : read_named_graph(name, options, session);
+  loaded.seconds = seconds_since(start);
+  loaded.name = name;
+  for (const std::string& sentence : sentences(loaded.report)) {
+    session.note(fmt::format("{}: {}", name, sentence));
+  }
+  return loaded;
+}
+
+Simulation simulate(const std::string& spec, std::uint64_t seed, Session& session) {
+  Registry& registry = session.registry();
+  return registry.make<Generator>(spec)->generate(registry, seed);
+}
+
+void check_output(const std::string& file, const std::string& format, Session& session) {
+  if (file.empty()) return;
+  Registry& registry = session.registry();
+  if (format.empty()) {
+    check_ending(file, registry);
+  } else {
+    check_named_format(file, format, registry);
+  }
+  check_folder(file);
+}
+
+void check_folder(const std::string& file) {
+  if (file == "-") return;
+  std::filesystem::path folder = std::filesystem::path(file).parent_path();
+  if (folder.empty()) folder = ".";
+  if (::access(folder.c_str(), W_OK | X_OK) != 0 && !std::filesystem::exists(file)) {
+    throw Error(ErrorCode::input, fmt::format("{}: cannot be written: folder {}: {}", file,
+                                              folder.string(), std::strerror(errno)));
+  }
+}
+
+std::vector<std::string> sentences(const ReadReport& report) {
+  std::vector<std::string> all = report.notes;
+  for (const auto& [tag, lines] : report.skipped) {
+    all.push_back(fmt::format("skipped {} with unknown tag '{}'", plural(lines, "line"), tag));
+  }
+  if (report.repaired > 0) {
+    all.push_back(fmt::format("repaired {} information {}", report.repaired,
+                              report.repaired == 1 ? "matrix" : "matrices"));
+  }
+  return all;
+}
+
+}  // namespace cairn::app

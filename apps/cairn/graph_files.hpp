@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+
+#include <CLI/App.hpp>
+
+#include "cairn/format.hpp"
+#include "cairn/generator.hpp"
+#include "session.hpp"
+
+namespace cairn::app {
+
+/// How the graphs named on the command line are read.
+struct InputOptions {
+  std::string format;  ///< empty: by content
+  ReadOptions read;
+};
+void add_input_options(CLI::App& command, InputOptions& options);
+
+/// Shown where a graph is asked for.
+inline constexpr const char* kGraphHelp =
+    "file (.gz too; - is standard input), or @KIND[:k=v] to generate";
+
+struct LoadedGraph {
+  Graph graph;
+  ReadReport report;
+  std::string name;      ///< as on the command line
+  double seconds = 0.0;  ///< that reading took
+};
+
+/// Reads a graph, and tells the user of everything that the reader skipped, mended or made up.
+/// "@manhattan:poses=500,seed=3" is generated: a generator, its options, and the seed.
+LoadedGraph load_graph(const std::string& name, const InputOptions& options, Session& session);
+
+/// Runs a generator, given as `KIND:k=v`.
+Simulation simulate(const std::string& spec, std::uint64_t seed, Session& session);
+
+/// Finds out before the work whether its result can be written: throws `Error` if no format writes
+/// files of that name, or the folder is not there or refuses.
+void check_output(const std::string& file, const std::string& format, Session& session);
+
+/// The part of it that is about the folder.
+void check_folder(const std::string& file);
+
+/// What `ReadReport` says, a sentence each.
+std::vector<std::string> sentences(const ReadReport& report);
+
+}  // namespace cairn::app

@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "help.hpp"
+
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "table.hpp"
+
+namespace cairn::app {
+namespace {
+
+/// "-o, --output FILE"; a positional is shown by its type's name alone.
+std::string left_column(const CLI::Option& option) {
+  if (option.get_positional()) return option.get_type_name();
+  std::string names;
+  for (const std::string& name : option.get_snames()) names += "-" + name + ", ";
+  for (const std::string& name : option.get_lnames()) names += "--" + name + ", ";
+  names.resize(names.size() - 2);
+  const bool takes_value = option.get_items_expected_max() > 0;
+  return takes_value ? names + " " + option.get_type_name() : names;
+}
+
+std::string right_column(const CLI::Option& option) {
+  const std::string value = option.get_default_str();
+  return value.empty() ? option.get_description()
+                       : fmt::format("{} [{}]", option.get_description(), value);
+}
+
+std::string usage(const CLI::App& app, bool has_commands) {
+  if (has_commands) return "Usage: cairn COMMAND [OPTIONS]\n";
+  std::string text = fmt::format("Usage: cairn {} [OPTIONS]", app.get_name());
+  for (const CLI::Option* option : app.get_options()) {
+    if (!option->get_positional()) continue;
+    const std::string word = option->get_type_name();
+    text += " " + (option->get_required() ? word : "[" + word + "]");
+    if (option->get_items_expected_max() > 1) text += "...";
+  }
+  return text + "\n";
+}
+
+Table two_columns() { return Table({{"", Table::Align::left}, {"", Table::Align::left}}, "  "); }
+
+std::string option_lines(const CLI::App& app, bool with_help) {
+  Table lines = two_columns();
+  for (const bool positional : {true, false}) {
+    for (const CLI::Option* option : app.get_options()) {
+      if (option->get_positional() != positional) continue;
+      if (!with_help && (option == app.get_help_ptr() || option == app.get_version_ptr())) continue;
+      lines.add({left_column(*option), right_column(*option)});
+    }
+  }
+  return lines.text(false);
+}
+
+std::string command_lines(const CLI::App& app) {
+  Table lines = two_columns();
+  for (const CLI::App* command : app.get_subcommands({})) {
+    lines.add({command->get_name(), command->get_description()});
+  }
+  return lines.text(false);
+}
+
+/// On one line or two: what every command takes.
+std::string common_options(const CLI::App& program) {
+  std::string line = "Also:";
+  for (const CLI::Option* option : program.get_options()) {
+    if (option == program.get_help_ptr() || option == program.get_version_ptr()) continue;
+    line += " [" + left_column(*option) + "]";
+  }
+  return line + "\n      (what every command takes; see cairn --help)\n";
+}
+
+}  // namespace
+
+CLI::Validator one_of(std::vector<std::string> choices) {
+  return CLI::IsMember(std::move(choices)).description("");
+}
+
+std::string HelpFormatter::make_help(const CLI::App* app, std::string /*name*/,
+                                     CLI::AppFormatMode /*mode*/) const {
+  const bool has_commands = !app->get_subcommands({}).empty();
+  const CLI::App* program = app->get_parent();
+  std::string text = program ? fmt::format("cairn {}: ", app->get_name()) : "";
+  text += app->get_description() + "\n\n" + usage(*app, has_commands) + "\n";
+  if (has_commands) text += "Commands:\n" + command_lines(*app) + "\nOptions of every command:\n";
+  text += option_lines(*app, has_commands);
+  if (program) text += "\n" + common_options(*program);
+  return text + "\n" + app->get_footer() + "\n";
+}
+
+}  // namespace cairn::app

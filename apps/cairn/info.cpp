@@ -1,0 +1,170 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// cairn info GRAPH: what a graph consists of, and what looks wrong.
+#include <memory>
+
+#include <fmt/format.h>
+
+#include "commands.hpp"
+#include "graph_files.hpp"
+#include "graph_survey.hpp"
+#include "json_report.hpp"
+#include "table.hpp"
+
+namespace cairn::app {
+namespace {
+
+namespace json = boost::json;
+
+struct InfoOptions {
+  std::string graph;
+  InputOptions input;
+};
+
+std::string ratio_text(const GraphSurvey& s) {
+  return s.degrees_of_freedom > 0 ? fmt::format(" ({:.4g} per degree of freedom)",
+                                                s.chi2 / static_cast<double>(s.degrees_of_freedom))
+                                  : "";
+}
+
+std::string gauge_text(const Graph& graph, const GraphSurvey& s) {
+  if (s.gauge.anchored.empty()) return "0";
+  return fmt::format("{} ({})", s.gauge_freedoms, s.gauge.describe(graph));
+}
+
+std::string counts_text(const LoadedGraph& loaded, const GraphSurvey& s, bool colour) {
+  Table types({{"type", Table::Align::left},
+               {"count", Table::Align::right},
+               {"size", Table::Align::right},
+               {"chi2", Table::Align::right},
+               {"", Table::Align::left}},
+              "  ");
+  for (const VariableCount& v : s.variables) {
+    types.add({v.tag, fmt::format("{}", v.count), fmt::format("{}", v.tangent_size), "",
+               v.fixed > 0 ? fmt::format("{} fixed", v.fixed) : ""});
+  }
+  for (const FactorCount& f : s.factors) {
+    types.add({f.tag, fmt::format("{}", f.count), fmt::format("{}", f.residual_size),
+               chi2_text(f.chi2), f.metric.empty() ? "" : "metric " + f.metric});
+  }
+  return fmt::format("{} ({})\n{}", bold(loaded.name, colour), loaded.report.format,
+                     types.text(colour));
+}
+
+std::string figures_text(const Graph& graph, const GraphSurvey& s) {
+  Table table({{"", Table::Align::left}, {"", Table::Align::left}}, "  ");
+  table.add({"components", fmt::format("{}", s.gauge.components)});
+  table.add({"odometry / loop closures", fmt::format("{} / {}", s.odometry, s.loops)});
+  table.add({"gauge freedoms", gauge_text(graph, s)});
+  table.add({"residuals / unknowns",
+             fmt::format("{} / {}", graph.residual_size(), graph.tangent_size())});
+  table.add({"degrees of freedom", fmt::format("{}", s.degrees_of_freedom)});
+  table.add({"chi2 as given", chi2_text(s.chi2) + ratio_text(s)});
+  return table.text(false);
+}
+
+std::string list_text(const std::string& title, const std::vector<std::string>& lines,
+                      bool colour) {
+  if (lines.empty()) return "";
+  std::string text = bold(title, colour) + "\n";
+  for (const std::string& line : lines) text += "  " + line + "\n";
+  return text;
+}
+
+std::string worst_text(const GraphSurvey& s, bool colour) {
+  if (!(s.chi2 > 0)) return "";
+  Table table({{"worst factors", Table::Align::left},
+               {"chi2", Table::Align::right},
+               {"share", Table::Align::right}},
+              "  ");
+  for (const WorstFactor& factor : s.worst) {
+    table.add(
+        {factor.name, chi2_text(factor.chi2), fmt::format("{:.1f} %", 100 * factor.chi2 / s.chi2)});
+  }
+  return table.text(colour);
+}
+
+json::array variables_json(const GraphSurvey& s) {
+  json::array all;
+  for (const VariableCount& v : s.variables) {
+    all.push_back({{"type", v.tag},
+                   {"count", v.count},
+                   {"tangent_size", v.tangent_size},
+                   {"fixed", v.fixed}});
+  }
+  return all;
+}
+
+json::array factors_json(const GraphSurvey& s) {
+  json::array all;
+  for (const FactorCount& f : s.factors) {
+    all.push_back({{"type", f.tag},
+                   {"count", f.count},
+                   {"residual_size", f.residual_size},
+                   {"chi2", f.chi2},
+                   {"metric", text_json(f.metric)}});
+  }
+  return all;
+}
+
+json::array worst_json(const GraphSurvey& s) {
+  json::array all;
+  for (const WorstFactor& factor : s.worst) {
+    all.push_back({{"factor", factor.name}, {"chi2", factor.chi2}});
+  }
+  return all;
+}
+
+json::array anchored_json(const Graph& graph, const Gauge& gauge) {
+  json::array ids;
+  for (const int variable : gauge.anchored) ids.push_back(graph.id(variable));
+  return ids;
+}
+
+json::object report_json(const LoadedGraph& loaded, const GraphSurvey& s) {
+  json::object report = begin_report("info");
+  report["graph"] = graph_json(loaded.graph, loaded.name);
+  report["format"] = loaded.report.format;
+  report["variables"] = variables_json(s);
+  report["factors"] = factors_json(s);
+  report["components"] = s.gauge.components;
+  report["gauge"] = {{"freedoms", s.gauge_freedoms},
+                     {"anchored", anchored_json(loaded.graph, s.gauge)}};
+  report["odometry"] = s.odometry;
+  report["loop_closures"] = s.loops;
+  report["doubled"] = s.doubled;
+  report["chain_gaps"] = s.chain_gaps;
+  report["unconstrained"] = std::ssize(s.gauge.unconstrained);
+  report["degrees_of_freedom"] = s.degrees_of_freedom;
+  report["chi2"] = json::object{{"initial", s.chi2}};
+  report["worst"] = worst_json(s);
+  report["suspicions"] = strings_json(s.suspicions);
+  report["read_notes"] = strings_json(sentences(loaded.report));
+  report["seconds"] = json::object{{"read", loaded.seconds}};
+  return report;
+}
+
+int run(const InfoOptions& options, Session& session) {
+  session.use_threads();
+  const LoadedGraph loaded = load_graph(options.graph, options.input, session);
+  const GraphSurvey s = survey(loaded.graph);
+  session.write_json(report_json(loaded, s));
+  const bool colour = session.colour();
+  session.print(counts_text(loaded, s, colour) + figures_text(loaded.graph, s) +
+                worst_text(s, colour) + list_text("what looks wrong", s.suspicions, colour));
+  return 0;
+}
+
+}  // namespace
+
+Command add_info(CLI::App& program) {
+  auto options = std::make_shared<InfoOptions>();  // lives as long as the parser and the run
+  CLI::App* app = program.add_subcommand("info", "what a graph consists of, and what looks wrong");
+  app->add_option("graph", options->graph, kGraphHelp)->type_name("GRAPH")->required();
+  add_input_options(*app, options->input);
+  app->footer(
+      "Example:\n"
+      "  cairn info sphere2500.g2o --types slam3d:metric=g2o");
+  return {app, [options](Session& session) { return run(*options, session); }};
+}
+
+}  // namespace cairn::app

@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "json_report.hpp"
+
+#include <fstream>
+#include <thread>
+
+#include <fmt/format.h>
+
+#include "cairn/version.hpp"
+#include "peak_memory.hpp"
+
+namespace cairn::app {
+namespace {
+
+namespace json = boost::json;
+
+std::string compiler() {
+#if defined(__clang__)
+  return fmt::format("clang {}.{}.{}", __clang_major__, __clang_minor__, __clang_patchlevel__);
+#else
+  return fmt::format("gcc {}.{}.{}", __GNUC__, __GNUC_MINOR__, __GNUC_PATCHLEVEL__);
+#endif
+}
+
+/// The widest instruction set that this processor offers to kernels that choose theirs when loaded.
+std::string simd() {
+#if defined(__x86_64__)
+  if (__builtin_cpu_supports("avx512f")) return "avx512";
+  if (__builtin_cpu_supports("avx2")) return "avx2";
+  return "sse2";
+#elif defined(__aarch64__)
+  return "neon";
+#else
+  return "none";
+#endif
+}
+
+}  // namespace
+
+json::object begin_report(std::string_view command) {
+  return {{"cairn", CAIRN_VERSION}, {"command", command}};
+}
+
+void end_report(json::object& report) {
+  report["peak_memory_bytes"] = peak_memory_bytes();
+  report["machine"] = {{"cpu", cpu_name()}, {"cores", std::thread::hardware_concurrency()}};
+  report["build"] = {{"compiler", compiler()}, {"flags", CAIRN_BUILD_FLAGS}, {"simd", simd()}};
+}
+
+json::object graph_json(const Graph& graph, const std::string& file) {
+  return {{"file", file},
+          {"variables", graph.variable_count()},
+          {"factors", graph.factor_count()},
+          {"residual_size", graph.residual_size()},
+          {"tangent_size", graph.tangent_size()}};
+}
+
+json::object seconds_json(const Seconds& seconds) {
+  return {{"total", seconds.total},     {"linearize", seconds.linearize},
+          {"analyze", seconds.analyze}, {"factorize", seconds.factorize},
+          {"solve", seconds.solve},     {"update", seconds.update}};
+}
+
+json::object solver_json(const LinearSolverStats& stats) {
+  return {{"ordering", stats.ordering},
+          {"factor_nonzeros", stats.factor_nonzeros},
+          {"factor_flops", stats.factor_flops},
+          {"note", stats.note}};
+}
+
+json::array iterations_json(const Summary& summary) {
+  json::array all;
+  for (const Iteration& it : summary.iterations) {
+    all.push_back({{"chi2", it.chi2},
+                   {"step_norm", it.step_norm},
+                   {"lambda", it.lambda},
+                   {"accepted", it.accepted},
+                   {"seconds", it.seconds}});
+  }
+  return all;
+}
+
+json::value text_json(const std::string& text) {
+  return text.empty() ? json::value(nullptr) : json::value(text);
+}
+
+json::array strings_json(const std::vector<std::string>& strings) {
+  return json::array(strings.begin(), strings.end());
+}
+
+std::string cpu_name() {
+  std::ifstream info("/proc/cpuinfo");
+  for (std::string line; std::getline(info, line);) {
+    const std::size_t colon = line.find(": ");
+    if (line.starts_with("model name") && colon != std::string::npos) return line.substr(colon + 2);
+  }
+  return "unknown";
+}
+
+}  // namespace cairn::app

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <boost/json/array.hpp>
+#include <boost/json/object.hpp>
+
+#include "cairn/graph.hpp"
+#include "cairn/optimizer.hpp"
+
+namespace cairn::app {
+
+/// {"cairn": version, "command": …}, how every report begins.
+boost::json::object begin_report(std::string_view command);
+/// Adds "peak_memory_bytes", "machine" and "build", how reports with times end.
+void end_report(boost::json::object& report);
+
+/// {"file", "variables", "factors", "residual_size", "tangent_size"}
+boost::json::object graph_json(const Graph& graph, const std::string& file);
+/// The members of "seconds" that an optimisation has.
+boost::json::object seconds_json(const Seconds& seconds);
+boost::json::object solver_json(const LinearSolverStats& stats);
+/// {"chi2", "step_norm", "lambda", "accepted", "seconds"} of each.
+boost::json::array iterations_json(const Summary& summary);
+/// The text, or null where there is none.
+boost::json::value text_json(const std::string& text);
+boost::json::array strings_json(const std::vector<std::string>& strings);
+
+/// The processor's name, from /proc/cpuinfo; "unknown" where that is silent.
+std::string cpu_name();
+
+}  // namespace cairn::app

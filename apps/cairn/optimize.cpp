@@ -1,0 +1,198 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// cairn optimize GRAPH: one optimisation, its estimate and its report.
+#include <memory>
+#include <string>
+
+#include <fmt/format.h>
+
+#include "cairn/error.hpp"
+#include "cairn/recording.hpp"
+#include "cairn/threads.hpp"
+#include "commands.hpp"
+#include "graph_files.hpp"
+#include "help.hpp"
+#include "interrupt.hpp"
+#include "json_report.hpp"
+#include "problem_setup.hpp"
+#include "progress.hpp"
+#include "table.hpp"
+
+namespace cairn::app {
+namespace {
+
+namespace json = boost::json;
+
+struct OptimizeOptions {
+  std::string graph;
+  std::string output;
+  std::string output_format;
+  InputOptions input;
+  ProblemOptions problem;
+  std::string optimizer = kDefaultOptimizer;
+  std::string linear_solver;  ///< empty: not given
+  std::string covariance = "none";
+  std::string record;  ///< file for the recording, or empty
+};
+
+/// The optimizer with the linear solver that the command line names, or cairn's own, put in.
+ComponentSpec optimizer_spec(const OptimizeOptions& options, Registry& registry) {
+  ComponentSpec spec = parse_component(options.optimizer);
+  const bool takes = takes_linear_solver(registry, spec);
+  const bool given = !options.linear_solver.empty();
+  if (given && (!takes || spec.values.contains(kLinearSolverOption))) {
+    throw linear_solver_refused(registry, spec);
+  }
+  if (takes) {
+    spec.values.emplace(kLinearSolverOption, given ? options.linear_solver : kDefaultLinearSolver);
+  }
+  return spec;
+}
+
+void check(const OptimizeOptions& options, Session& session) {
+  if (options.covariance == "blocks") {
+    throw Error(ErrorCode::usage,
+                "--covariance blocks is not available in this version; leave it out");
+  }
+  if (options.output == "-") session.write_file_to_stdout();
+  check_output(options.output, options.output_format, session);
+  if (options.record == "-") {
+    throw Error(ErrorCode::usage, "--record writes to a file, not to standard output; name one");
+  }
+  if (!options.record.empty()) check_folder(options.record);
+}
+
+int exit_code(Status status) {
+  switch (status) {
+    case Status::converged:
+    case Status::max_iterations:
+      return 0;
+    case Status::diverged:
+    case Status::not_positive_definite:
+      return static_cast<int>(ErrorCode::numerical);
+    case Status::interrupted:
+      return kExitInterrupted;
+  }
+  return static_cast<int>(ErrorCode::numerical);
+}
+
+json::object report_json(const OptimizeOptions& options, const LoadedGraph& loaded,
+                         const Summary& summary) {
+  json::object report = begin_report("optimize");
+  report["graph"] = graph_json(loaded.graph, loaded.name);
+  report["optimizer"] = summary.optimizer;
+  report["linear_solver"] = summary.linear_solver;
+  report["threads"] = threads();
+  report["initial"] = options.problem.initial;
+  report["loss"] = text_json(options.problem.loss);
+  report["status"] = to_string(summary.status);
+  report["chi2"] = {{"initial", summary.initial_chi2}, {"final", summary.final_chi2}};
+  report["iterations"] = iterations_json(summary);
+  json::object seconds{{"read", loaded.seconds}};
+  for (const auto& member : seconds_json(summary.seconds)) seconds.insert(member);
+  report["seconds"] = std::move(seconds);
+  report["solver"] = solver_json(summary.solver);
+  report["notes"] = strings_json(summary.notes);
+  report["read_notes"] = strings_json(sentences(loaded.report));
+  report["output"] = text_json(options.output);
+  report["recording"] = text_json(options.record);
+  end_report(report);
+  return report;
+}
+
+std::string times_text(const Seconds& seconds) {
+  return fmt::format("{} (linearize {}, analyze {}, factorize {}, solve {}, update {})",
+                     seconds_text(seconds.total), seconds_text(seconds.linearize),
+                     seconds_text(seconds.analyze), seconds_text(seconds.factorize),
+                     seconds_text(seconds.solve), seconds_text(seconds.update));
+}
+
+std::string summary_text(const OptimizeOptions& options, const LoadedGraph& loaded,
+                         const Summary& summary) {
+  Table table({{"", Table::Align::left}, {"", Table::Align::left}});
+  table.add({"graph", fmt::format("{}: {}, {}", loaded.name,
+                                  plural(loaded.graph.variable_count(), "variable"),
+                                  plural(loaded.graph.factor_count(), "factor"))});
+  table.add({"solver", summary.linear_solver.empty()
+                           ? summary.optimizer
+                           : fmt::format("{} with {}", summary.optimizer, summary.linear_solver)});
+  table.add({"chi2", fmt::format("{} → {}", chi2_text(summary.initial_chi2),
+                                 chi2_text(summary.final_chi2))});
+  table.add({"status", fmt::format("{} after {}", to_string(summary.status),
+                                   plural(std::ssize(summary.iterations), "iteration"))});
+  table.add({"time", times_text(summary.seconds)});
+  for (const std::string& note : summary.notes) table.add({"note", note});
+  if (!options.output.empty() && options.output != "-") table.add({"written", options.output});
+  if (!options.record.empty()) table.add({"recorded", options.record});
+  return table.text(false);
+}
+
+Summary solve(Graph& graph, Optimizer& optimizer, const OptimizeOptions& options,
+              const InterruptGuard& guard, const Session& session) {
+  Stop stop = options.problem.stop;
+  stop.interrupt = &guard.flag();
+  OptimizationProgress progress(session.common.quiet, stop.max_iterations);
+  if (options.record.empty()) return optimizer.optimize(graph, stop, progress);
+  RecordingWriter recording(options.record, options.optimizer, options.graph, &progress);
+  Summary summary = optimizer.optimize(graph, stop, recording);
+  recording.finish(graph, summary);
+  return summary;
+}
+
+int run(const OptimizeOptions& options, Session& session) {
+  check(options, session);
+  session.use_threads();
+  // Everything that is named is made before the file is read: a wrong name is told at once.
+  Registry& registry = session.registry();
+  const auto optimizer = registry.make<Optimizer>(optimizer_spec(options, registry));
+  const ProblemSetup setup(options.problem, registry);
+
+  LoadedGraph loaded = load_graph(options.graph, options.input, session);
+  for (const std::string& note : setup.apply(loaded.graph)) {
+    session.note(fmt::format("initial guess {}: {}", options.problem.initial, note));
+  }
+  const InterruptGuard guard;  // until the results are written
+  const Summary summary = solve(loaded.graph, *optimizer, options, guard, session);
+  if (!options.output.empty()) {
+    write_graph(loaded.graph, options.output, registry, options.output_format);
+  }
+  session.write_json(report_json(options, loaded, summary));
+  session.print(summary_text(options, loaded, summary));
+  return exit_code(summary.status);
+}
+
+}  // namespace
+
+Command add_optimize(CLI::App& program) {
+  auto options = std::make_shared<OptimizeOptions>();  // lives as long as the parser and the run
+  CLI::App* app = program.add_subcommand("optimize", "find the best estimate of a graph");
+  app->add_option("graph", options->graph, kGraphHelp)->type_name("GRAPH")->required();
+  app->add_option("-o,--output", options->output, "write the estimate (- is standard output)")
+      ->type_name("OUT");
+  app->add_option("--to", options->output_format,
+                  "format of OUT, instead of telling it by the ending")
+      ->type_name("FORMAT");
+  app->add_option("--optimizer", options->optimizer, "who steps, with options as NAME:key=value")
+      ->type_name("NAME")
+      ->capture_default_str();
+  app->add_option("--linear-solver", options->linear_solver, "who solves H x = g in each step")
+      ->type_name("NAME")
+      ->default_str(kDefaultLinearSolver);
+  add_problem_options(*app, options->problem);
+  app->add_option("--record", options->record, "every iteration's positions, for cairn view")
+      ->type_name("FILE");
+  app->add_option("--covariance", options->covariance, "blocks (not in this version) or none")
+      ->type_name("WHICH")
+      ->check(one_of({"blocks", "none"}))
+      ->capture_default_str();
+  add_input_options(*app, options->input);
+  app->footer(
+      "Example:\n"
+      "  cairn optimize city.g2o -o best.g2o --linear-solver cholmod:ordering=metis --json "
+      "run.json\n"
+      "  cairn optimize @manhattan:poses=1000 --initial chordal --loss huber --loss-on loops\n"
+      "Ctrl-C stops with the best estimate written. Names: cairn plugins; options: cairn plugins "
+      "NAME");
+  return {app, [options](Session& session) { return run(*options, session); }};
+}
+
+}  // namespace cairn::app

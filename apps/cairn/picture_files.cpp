@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "picture_files.hpp"
+
+#include <algorithm>
+#include <filesystem>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "cairn/error.hpp"
+#include "cairn/format.hpp"
+#include "graph_files.hpp"
+
+namespace cairn::app {
+
+std::string picture_format(const std::string& file, Session& session) {
+  std::string ending = std::filesystem::path(file).extension().string();
+  for (char& c : ending) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  const std::vector<std::string> names = session.registry().names(Picture::kKind);
+  if (names.empty()) {
+    throw Error(ErrorCode::plugin,
+                "no plugin draws pictures here: cairn was built without Cairo and without the page");
+  }
+  if (ending.empty() || std::find(names.begin(), names.end(), ending.substr(1)) == names.end()) {
+    throw Error(ErrorCode::usage,
+                fmt::format("{}: nothing draws files of that name; endings on offer: .{}", file,
+                            fmt::join(names, ", .")));
+  }
+  check_folder(file);
+  return ending.substr(1);
+}
+
+std::size_t write_picture(const Album& album, const ComponentSpec& picture, const std::string& file,
+                          Session& session) {
+  const std::string bytes = session.registry().make<Picture>(picture)->draw(album);
+  write_file(file, bytes);
+  return bytes.size();
+}
+
+}  // namespace cairn::app

@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "cairn/scene.hpp"
+#include "session.hpp"
+
+namespace cairn::app {
+
+/// The name of kind picture that a file's ending asks for. Throws `Error` (usage) with the endings
+/// on offer, and `Error` (input) if its folder is not there or refuses.
+std::string picture_format(const std::string& file, Session& session);
+
+/// Draws an album into a file ("-" is standard output), and returns its size in bytes.
+std::size_t write_picture(const Album& album, const ComponentSpec& picture, const std::string& file,
+                          Session& session);
+
+}  // namespace cairn::app

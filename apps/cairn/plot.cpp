@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// cairn plot FILE… -o picture.svg: a static picture, as for a paper.
+#include <charconv>
+#include <memory>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "album.hpp"
+#include "cairn/error.hpp"
+#include "commands.hpp"
+#include "help.hpp"
+#include "json_report.hpp"
+#include "picture_files.hpp"
+#include "table.hpp"
+
+namespace cairn::app {
+namespace {
+
+struct PlotOptions {
+  AlbumOptions album;
+  std::string output;
+  std::string what = "auto";
+  std::string size;
+  std::string theme = "light";
+  std::string colour = "class";
+  std::string x = "iterations";
+  std::string linear_solver = "block_cholesky";
+};
+
+/// "900x600" as two options.
+void put_size(const std::string& size, ComponentSpec& picture) {
+  if (size.empty()) return;
+  const std::size_t cross = size.find('x');
+  const auto number = [](std::string_view text) {
+    int value = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    return error == std::errc() && end == text.data() + text.size() ? value : 0;
+  };
+  const int width = number(std::string_view(size).substr(0, cross));
+  const int height =
+      cross == std::string::npos ? 0 : number(std::string_view(size).substr(cross + 1));
+  if (width < 1 || height < 1) {
+    throw Error(ErrorCode::usage, fmt::format("--size is '{}', expected WIDTHxHEIGHT such as "
+                                              "900x600 [px; in a PDF 1/96 inch]",
+                                              size));
+  }
+  picture.values["width"] = fmt::format("{}", width);
+  picture.values["height"] = fmt::format("{}", height);
+}
+
+ComponentSpec picture_spec(const PlotOptions& options, Session& session) {
+  ComponentSpec picture{picture_format(options.output, session), {}};
+  if (picture.name == "html") return picture;
+  picture.values = {{"what", options.what},
+                    {"theme", options.theme},
+                    {"colour", options.colour},
+                    {"x", options.x},
+                    {"linear_solver", options.linear_solver}};
+  put_size(options.size, picture);
+  return picture;
+}
+
+int run(const PlotOptions& options, Session& session) {
+  const ComponentSpec picture = picture_spec(options, session);
+  session.registry().make<Picture>(picture);  // a wrong name is told before files are read
+  session.use_threads();
+  const Album album = load_album(
+      options.album, fmt::format("cairn plot {}", fmt::join(options.album.files, " ")), session);
+  const std::size_t bytes = write_picture(album, picture, options.output, session);
+  boost::json::object report = begin_report("plot");
+  report["picture"] = options.output;
+  report["bytes"] = bytes;
+  report["what"] = options.what;
+  session.write_json(report);
+  session.print(fmt::format("{}: {}\n", options.output,
+                            bytes_text(static_cast<std::int64_t>(bytes))));
+  return 0;
+}
+
+}  // namespace
+
+Command add_plot(CLI::App& program) {
+  auto options = std::make_shared<PlotOptions>();  // lives as long as the parser and the run
+  CLI::App* app = program.add_subcommand("plot", "a static picture: SVG, PNG or PDF");
+  add_album_options(*app, options->album);
+  app->add_option("-o,--output", options->output, "the picture: .svg, .png or .pdf")
+      ->type_name("PICTURE")
+      ->required();
+  app->add_option("--what", options->what,
+                  "trajectory, convergence, bars, sparsity or steps; auto is by FILE")
+      ->type_name("WHAT")
+      ->check(one_of({"auto", "trajectory", "convergence", "bars", "sparsity", "steps"}))
+      ->capture_default_str();
+  app->add_option("--size", options->size, "WIDTHxHEIGHT [px; in a PDF 1/96 inch] [900x600]")
+      ->type_name("SIZE");
+  app->add_option("--theme", options->theme, "light or dark")
+      ->type_name("THEME")
+      ->check(one_of({"light", "dark"}))
+      ->capture_default_str();
+  app->add_option("--colour", options->colour, "of edges: by class or by residual")
+      ->type_name("BY")
+      ->check(one_of({"class", "residual"}))
+      ->capture_default_str();
+  app->add_option("--x", options->x, "of a convergence plot: iterations or time")
+      ->type_name("AXIS")
+      ->check(one_of({"iterations", "time"}))
+      ->capture_default_str();
+  app->add_option("--linear-solver", options->linear_solver, "whose order the sparsity of L has")
+      ->type_name("NAME")
+      ->capture_default_str();
+  app->footer(
+      "FILEs are laid together as by cairn view.\n\n"
+      "Example:\n"
+      "  cairn plot city.g2o best.g2o -o city.svg\n"
+      "  cairn plot run1.json run2.json --what convergence --x time -o curves.pdf\n"
+      "  cairn plot @sphere --what sparsity --linear-solver block_cholesky:ordering=natural -o L.png");
+  return {app, [options](Session& session) { return run(*options, session); }};
+}
+
+}  // namespace cairn::app

@@ -1,0 +1,272 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// cairn plugins [NAME]: what is on offer. The list opens no plugin; one name's options load that
+// plugin.
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <memory>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "cairn/error.hpp"
+#include "cairn/format.hpp"
+#include "cairn/generator.hpp"
+#include "cairn/initial_guess.hpp"
+#include "cairn/linear_solver.hpp"
+#include "cairn/loss.hpp"
+#include "cairn/optimizer.hpp"
+#include "cairn/spelling.hpp"
+#include "commands.hpp"
+#include "json_report.hpp"
+#include "table.hpp"
+
+namespace cairn::app {
+namespace {
+
+namespace json = boost::json;
+
+// List
+// ---------------------------------------------------------------------------------------------
+
+std::string kind_in_words(std::string kind) {
+  std::replace(kind.begin(), kind.end(), '_', ' ');
+  return kind;
+}
+
+std::string list_text(const std::vector<Offer>& offers, bool colour) {
+  Table table({{"kind", Table::Align::left},
+               {"name", Table::Align::left},
+               {"plugin", Table::Align::left},
+               {"licence", Table::Align::left},
+               {"", Table::Align::left}});
+  std::string last_kind;
+  for (const Offer& offer : offers) {
+    table.add({offer.kind == last_kind ? "" : kind_in_words(offer.kind), offer.name,
+               offer.file.filename().string(), offer.licence, offer.summary});
+    last_kind = offer.kind;
+  }
+  return offers.empty() ? "no plugins found\n" : table.text(colour);
+}
+
+std::string problems_text(const Registry& registry, bool colour) {
+  if (registry.problems().empty()) return "";
+  std::string text = "\n" + bold("problems", colour) + "\n";
+  for (const PluginProblem& problem : registry.problems()) {
+    // Most messages begin with the file themselves.
+    const std::string where = problem.where.string();
+    text += problem.message.find(where) != std::string::npos
+                ? fmt::format("  {}\n", problem.message)
+                : fmt::format("  {}: {}\n", where, problem.message);
+  }
+  return text;
+}
+
+json::object offer_json(const Offer& offer) {
+  return {{"kind", offer.kind},      {"name", offer.name},          {"summary", offer.summary},
+          {"plugin", offer.plugin},  {"file", offer.file.string()}, {"licence", offer.licence},
+          {"version", offer.version}};
+}
+
+json::array problems_json(const Registry& registry) {
+  json::array all;
+  for (const PluginProblem& problem : registry.problems()) {
+    all.push_back({{"where", problem.where.string()}, {"message", problem.message}});
+  }
+  return all;
+}
+
+int list(Session& session) {
+  const Registry& registry = session.registry();
+  const std::vector<Offer> offers = registry.offers();
+  json::object report = begin_report("plugins");
+  json::array& all = report["offers"].emplace_array();
+  for (const Offer& offer : offers) all.push_back(offer_json(offer));
+  report["problems"] = problems_json(registry);
+  session.write_json(report);
+  session.print(list_text(offers, session.colour()) + problems_text(registry, session.colour()));
+  return 0;
+}
+
+// One name
+// -------------------------------------------------------------------------------------------
+
+std::string type_text(const OptionSpec& spec) {
+  switch (spec.type) {
+    case OptionType::boolean:
+      return "boolean";
+    case OptionType::integer:
+      return "integer";
+    case OptionType::real:
+      return "real";
+    case OptionType::text:
+      return "text";
+    case OptionType::choice:
+      return "choice";
+    case OptionType::component:
+      return "name of a " + kind_in_words(spec.choices.front());
+  }
+  return "";
+}
+
+std::string range_text(const OptionSpec& spec) {
+  if (spec.type == OptionType::choice) return fmt::format("{}", fmt::join(spec.choices, " | "));
+  const bool low = std::isfinite(spec.minimum), high = std::isfinite(spec.maximum);
+  if (low && high) return fmt::format("{:g} … {:g}", spec.minimum, spec.maximum);
+  if (low) return fmt::format("from {:g}", spec.minimum);
+  return high ? fmt::format("up to {:g}", spec.maximum) : "";
+}
+
+json::value bound_json(double bound) { return std::isfinite(bound) ? json::value(bound) : nullptr; }
+
+json::array options_json(const OptionTable& table) {
+  json::array all;
+  for (const OptionSpec& spec : table.specs()) {
+    all.push_back({{"name", spec.name},
+                   {"type", type_text(spec)},
+                   {"default", spec.default_value},
+                   {"minimum", bound_json(spec.minimum)},
+                   {"maximum", bound_json(spec.maximum)},
+                   {"choices", strings_json(spec.choices)},
+                   {"help", spec.help}});
+  }
+  return all;
+}
+
+template <class Interface>
+std::unique_ptr<Component> made(Registry& registry, const std::string& name) {
+  return registry.make<Interface>(name);
+}
+
+/// A component with its default options; null for kinds that are no components.
+std::unique_ptr<Component> make_component(Registry& registry, const Offer& offer) {
+  if (offer.kind == LinearSolver::kKind) return made<LinearSolver>(registry, offer.name);
+  if (offer.kind == Optimizer::kKind) return made<Optimizer>(registry, offer.name);
+  if (offer.kind == InitialGuess::kKind) return made<InitialGuess>(registry, offer.name);
+  if (offer.kind == Loss::kKind) return made<Loss>(registry, offer.name);
+  if (offer.kind == Format::kKind) return made<Format>(registry, offer.name);
+  if (offer.kind == Generator::kKind) return made<Generator>(registry, offer.name);
+  return nullptr;
+}
+
+std::vector<std::string> format_abilities(const Format& format) {
+  std::vector<std::string> all;
+  if (format.can_read()) all.push_back("reads");
+  if (format.can_write()) all.push_back("writes");
+  for (const std::string& ending : format.extensions()) all.push_back("." + ending);
+  return all;
+}
+
+std::vector<std::string> variable_abilities(const VariableType& type) {
+  std::vector<std::string> all{fmt::format("{} degrees of freedom", type.tangent_size()),
+                               fmt::format("{} numbers", type.ambient_size())};
+  if (type.lie_group()) all.push_back("Lie group");
+  if (const Placement* place = type.placement()) {
+    all.push_back(
+        fmt::format("{} in {}D", place->has_orientation() ? "pose" : "point", place->dimension()));
+  }
+  return all;
+}
+
+std::vector<std::string> factor_abilities(const FactorType& type) {
+  std::vector<std::string> all{fmt::format("on {}", fmt::join(type.variable_tags(), " ")),
+                               fmt::format("measurement of {} numbers", type.measurement_size()),
+                               fmt::format("{} residuals", type.residual_size())};
+  if (type.is_relative()) all.push_back("relative pose");
+  if (!type.metric().empty()) all.push_back(fmt::format("metric {}", type.metric()));
+  return all;
+}
+
+/// What it can do besides what its kind promises.
+std::vector<std::string> abilities(Registry& registry, const Offer& offer) {
+  if (offer.kind == "variable") return variable_abilities(*registry.variable_type(offer.name));
+  if (offer.kind == "factor") return factor_abilities(*registry.factor_type(offer.name));
+  std::vector<std::string> all;
+  const std::unique_ptr<Component> component = make_component(registry, offer);
+  if (!component) return all;
+  if (offer.kind == Format::kKind) all = format_abilities(static_cast<const Format&>(*component));
+  if (query<LogDeterminant>(*component)) all.emplace_back(LogDeterminant::kAbility);
+  return all;
+}
+
+std::string details_text(const Offer& offer, const OptionTable& options,
+                         const std::vector<std::string>& abilities, bool colour) {
+  std::string text = fmt::format("{} ({}): {}\n", bold(offer.name, colour),
+                                 kind_in_words(offer.kind), offer.summary);
+  Table facts({{"", Table::Align::left}, {"", Table::Align::left}}, "  ");
+  facts.add({"plugin", fmt::format("{} {}, {}", offer.plugin, offer.version, offer.file.string())});
+  facts.add({"licence", offer.licence});
+  if (!abilities.empty()) facts.add({"abilities", fmt::format("{}", fmt::join(abilities, ", "))});
+  if (options.specs().empty()) facts.add({"options", "none"});
+  text += facts.text(false);
+  if (options.specs().empty()) return text;
+  Table table({{"option", Table::Align::left},
+               {"default", Table::Align::left},
+               {"type", Table::Align::left},
+               {"", Table::Align::left},
+               {"range", Table::Align::left}},
+              "  ");
+  for (const OptionSpec& spec : options.specs()) {
+    table.add({spec.name, spec.default_value, type_text(spec), spec.help, range_text(spec)});
+  }
+  return text + table.text(colour);
+}
+
+/// Everything of that name, whatever its kind; a plugin's name stands for all that it offers.
+std::vector<Offer> offers_named(const Registry& registry, const std::string& name) {
+  const std::vector<Offer> all = registry.offers();
+  std::vector<Offer> found;
+  std::vector<std::string> names;
+  for (const Offer& offer : all) {
+    if (offer.name == name) found.push_back(offer);
+    names.push_back(offer.name);
+    names.push_back(offer.plugin);
+  }
+  if (!found.empty()) return found;
+  std::copy_if(all.begin(), all.end(), std::back_inserter(found),
+               [&](const Offer& offer) { return offer.plugin == name; });
+  if (!found.empty()) return found;
+  const std::string nearest = nearest_spelling(name, names);
+  throw Error(ErrorCode::plugin, fmt::format("nothing of the name '{}' is on offer; {}", name,
+                                             nearest.empty() ? "cairn plugins lists all"
+                                                             : "did you mean '" + nearest + "'?"));
+}
+
+int show(const std::string& name, Session& session) {
+  Registry& registry = session.registry();
+  json::object report = begin_report("plugins");
+  json::array& all = report["offers"].emplace_array();
+  std::string text;
+  for (const Offer& offer : offers_named(registry, name)) {
+    const OptionTable& options = registry.options(offer.kind, offer.name);
+    const std::vector<std::string> can = abilities(registry, offer);
+    json::object entry = offer_json(offer);
+    entry["abilities"] = strings_json(can);
+    entry["options"] = options_json(options);
+    all.push_back(std::move(entry));
+    text += (text.empty() ? "" : "\n") + details_text(offer, options, can, session.colour());
+  }
+  report["problems"] = problems_json(registry);
+  session.write_json(report);
+  session.print(text);
+  return 0;
+}
+
+}  // namespace
+
+Command add_plugins(CLI::App& program) {
+  auto name = std::make_shared<std::string>();  // lives as long as the parser and the run
+  CLI::App* app = program.add_subcommand("plugins", "what is on offer, or one name's options");
+  app->add_option("name", *name, "a solver, type, format …: its options, abilities and limits")
+      ->type_name("NAME");
+  app->footer(
+      "Plugins are found by --plugin, CAIRN_PLUGIN_PATH, and in the folder cairn beside the core "
+      "library.\n\n"
+      "Example:\n"
+      "  cairn plugins cholmod");
+  return {app, [name](Session& session) {
+            return name->empty() ? list(session) : show(*name, session);
+          }};
+}
+
+}  // namespace cairn::app

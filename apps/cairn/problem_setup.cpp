@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "problem_setup.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "cairn/registry.hpp"
+#include "help.hpp"
+
+namespace cairn::app {
+
+void add_problem_options(CLI::App& command, ProblemOptions& options) {
+  command.add_option("--initial", options.initial, "first estimate: a name of kind initial_guess")
+      ->type_name("NAME")
+      ->capture_default_str();
+  command.add_option("--loss", options.loss, "robust loss, such as huber:scale=1 [none]")
+      ->type_name("NAME");
+  command
+      .add_option("--loss-on", options.loss_on, "factors that the loss applies to: all or loops")
+      ->type_name("WHICH")
+      ->check(one_of({"all", "loops"}))
+      ->capture_default_str();
+  command.add_option("--iterations", options.stop.max_iterations, "largest number of iterations")
+      ->type_name("N")
+      ->check(within(0, 1000000000))
+      ->capture_default_str();
+  command
+      .add_option("--tolerance", options.stop.tolerance,
+                  "stop when chi2 falls by less than this part; 0: exactly N times")
+      ->type_name("T")
+      ->check(within(0.0, 1.0))
+      ->default_str("1e-10");
+}
+
+ProblemSetup::ProblemSetup(const ProblemOptions& options, Registry& registry)
+    : initial_(registry.make<InitialGuess>(options.initial)),
+      scope_(options.loss_on == "loops" ? LossScope::loop_closures : LossScope::all) {
+  if (!options.loss.empty()) loss_ = registry.make<Loss>(options.loss);
+  if (options.loss.empty() && options.loss_on != "all") {
+    throw Error(ErrorCode::usage, "--loss-on says where a loss applies, but there is no --loss");
+  }
+}
+
+std::vector<std::string> ProblemSetup::apply(Graph& graph) const {
+  graph.set_loss(loss_, scope_);
+  return initial_->compute(graph);
+}
+
+namespace {
+
+/// An optimizer's option that chooses among solvers of its own, such as Ceres' linear_solver_type.
+const OptionSpec* own_linear_solver_option(Registry& registry, const ComponentSpec& optimizer) {
+  for (const OptionSpec& spec : registry.options(Optimizer::kKind, optimizer.name).specs()) {
+    if (spec.name.starts_with(kLinearSolverOption) && spec.type != OptionType::component)
+      return &spec;
+  }
+  return nullptr;
+}
+
+}  // namespace
+
+bool takes_linear_solver(Registry& registry, const ComponentSpec& optimizer) {
+  const OptionSpec* option =
+      registry.options(Optimizer::kKind, optimizer.name).find(kLinearSolverOption);
+  return option && option->type == OptionType::component;
+}
+
+Error linear_solver_refused(Registry& registry, const ComponentSpec& optimizer) {
+  if (optimizer.values.contains(kLinearSolverOption)) {
+    return {
+        ErrorCode::usage,
+        fmt::format("the linear solver of '{}' is given twice: by --linear-solver and as an option "
+                    "of --optimizer",
+                    optimizer.name)};
+  }
+  const OptionSpec* own = own_linear_solver_option(registry, optimizer);
+  if (!own) {
+    return {
+        ErrorCode::usage,
+        fmt::format("optimizer '{0}' does not take a linear solver; leave --linear-solver out, or "
+                    "see cairn plugins {0} for its own options",
+                    optimizer.name)};
+  }
+  return {ErrorCode::usage,
+          fmt::format(
+              "optimizer '{0}' brings linear solvers of its own; instead of --linear-solver use "
+              "--optimizer {0}:{1}=NAME{2}",
+              optimizer.name, own->name,
+              own->choices.empty()
+                  ? std::string()
+                  : fmt::format(" with NAME one of {}", fmt::join(own->choices, ", ")))};
+}
+
+}  // namespace cairn::app

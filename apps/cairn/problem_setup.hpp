@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <CLI/App.hpp>
+
+#include "cairn/error.hpp"
+#include "cairn/initial_guess.hpp"
+#include "cairn/loss.hpp"
+#include "cairn/optimizer.hpp"
+#include "session.hpp"
+
+namespace cairn::app {
+
+inline constexpr const char* kDefaultOptimizer = "levenberg_marquardt";
+inline constexpr const char* kDefaultLinearSolver = "block_cholesky";
+/// Of an optimizer: the option that names a component of kind linear_solver.
+inline constexpr const char* kLinearSolverOption = "linear_solver";
+
+/// What `optimize` and `bench` are told about the problem, besides who solves it.
+struct ProblemOptions {
+  std::string initial = "as_given";
+  std::string loss;  ///< empty: none
+  std::string loss_on = "all";
+  Stop stop;
+};
+void add_problem_options(CLI::App& command, ProblemOptions& options);
+
+/// The initial guess and the loss that the options name; made before a graph is read, so that a
+/// wrong name is told at once.
+class ProblemSetup {
+ public:
+  ProblemSetup(const ProblemOptions& options, Registry& registry);
+  /// Gives the graph its loss and its first estimate. Returns notes for the user.
+  std::vector<std::string> apply(Graph& graph) const;
+
+ private:
+  std::unique_ptr<InitialGuess> initial_;
+  std::shared_ptr<const Loss> loss_;  // shared: graphs and their clones use one loss
+  LossScope scope_ = LossScope::all;
+};
+
+/// Whether an optimizer lets its linear solver be chosen: an option `linear_solver` of type
+/// component.
+bool takes_linear_solver(Registry& registry, const ComponentSpec& optimizer);
+
+/// Why a linear solver that was asked for cannot be given to that optimizer, and what to use
+/// instead.
+Error linear_solver_refused(Registry& registry, const ComponentSpec& optimizer);
+
+}  // namespace cairn::app

@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "progress.hpp"
+
+#include <algorithm>
+#include <cstdio>
+
+#include <fmt/format.h>
+
+#include "table.hpp"
+
+namespace cairn::app {
+namespace {
+
+constexpr int kBarWidth = 20;
+constexpr std::chrono::milliseconds kRedraw{50};
+
+/// Every line at first, then ever fewer, so that a log of a long run stays readable.
+bool worth_a_line(int iteration) {
+  int step = 1;
+  while (iteration >= 20 * step) step *= 10;
+  return iteration % step == 0;
+}
+
+void write_error(std::string_view text) {
+  std::fwrite(text.data(), 1, text.size(), stderr);
+  std::fflush(stderr);
+}
+
+}  // namespace
+
+StatusLine::StatusLine(bool quiet) : quiet_(quiet), terminal_(is_terminal(stderr)) {}
+
+void StatusLine::show(std::string_view text) {
+  if (quiet_) return;
+  // \x1b[K wipes what a longer text left behind.
+  write_error(terminal_ ? fmt::format("\r{}\x1b[K", text) : fmt::format("{}\n", text));
+  shown_ = true;
+}
+
+void StatusLine::clear() {
+  if (shown_ && terminal_) write_error("\r\x1b[K");
+  shown_ = false;
+}
+
+std::string bar(double part, int width) {
+  const int full = std::clamp(static_cast<int>(part * width), 0, width);
+  return "[" + std::string(full, '#') + std::string(width - full, ' ') + "]";
+}
+
+void OptimizationProgress::on_start(const Graph& graph, double chi2) {
+  line_.show(fmt::format("{}, {}: chi2 {:.8g}", plural(graph.variable_count(), "variable"),
+                         plural(graph.factor_count(), "factor"), chi2));
+}
+
+bool OptimizationProgress::on_iteration(const Iteration& iteration, const Graph& /*graph*/,
+                                        const Values& /*values*/) {
+  if (!due(iteration.number)) return true;
+  std::string text = fmt::format("iteration {:3}  chi2 {:.8g}  step {:.2e}", iteration.number,
+                                 iteration.chi2, iteration.step_norm);
+  if (iteration.lambda > 0) text += fmt::format("  lambda {:.1e}", iteration.lambda);
+  if (!iteration.accepted) text += "  rejected";
+  if (line_.on_terminal()) {
+    const double part = max_iterations_ > 0 ? double(iteration.number) / max_iterations_ : 1.0;
+    text = fmt::format("{} {}", bar(part, kBarWidth), text);
+  }
+  line_.show(text);
+  return true;
+}
+
+bool OptimizationProgress::due(int iteration) {
+  if (line_.silent()) return false;
+  if (!line_.on_terminal()) return worth_a_line(iteration);
+  const auto now = std::chrono::steady_clock::now();
+  if (now - last_shown_ < kRedraw) return false;
+  last_shown_ = now;
+  return true;
+}
+
+}  // namespace cairn::app

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <chrono>
+#include <string>
+#include <string_view>
+
+#include "cairn/optimizer.hpp"
+
+namespace cairn::app {
+
+/// What is going on, on standard error: one line that is rewritten on a terminal, plain lines
+/// elsewhere.
+class StatusLine {
+ public:
+  explicit StatusLine(bool quiet);
+  StatusLine(const StatusLine&) = delete;
+  StatusLine& operator=(const StatusLine&) = delete;
+  ~StatusLine() { clear(); }
+
+  bool silent() const { return quiet_; }
+  bool on_terminal() const { return terminal_; }
+  void show(std::string_view text);
+  /// Wipes the line, so that other output may follow.
+  void clear();
+
+ private:
+  bool quiet_;
+  bool terminal_;
+  bool shown_ = false;
+};
+
+/// "[#####     ]"
+std::string bar(double part, int width);
+
+/// Shows the progress of an optimisation.
+class OptimizationProgress : public Observer {
+ public:
+  OptimizationProgress(bool quiet, int max_iterations)
+      : line_(quiet), max_iterations_(max_iterations) {}
+  void on_start(const Graph& graph, double chi2) override;
+  bool on_iteration(const Iteration& iteration, const Graph& graph, const Values& values) override;
+
+ private:
+  bool due(int iteration);
+
+  StatusLine line_;
+  int max_iterations_;
+  std::chrono::steady_clock::time_point last_shown_{};
+};
+
+}  // namespace cairn::app

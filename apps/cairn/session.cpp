@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "session.hpp"
+
+#include <poll.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+
+#include <fmt/format.h>
+
+#include "cairn/error.hpp"
+#include "cairn/format.hpp"
+#include "cairn/threads.hpp"
+#include "json_text.hpp"
+#include "table.hpp"
+
+namespace cairn::app {
+
+Registry& Session::registry() {
+  if (!registry_) {
+    PluginSearch search;
+    search.files.assign(common.plugins.begin(), common.plugins.end());
+    auto made = std::make_unique<Registry>(search);
+    for (const std::string& types : common.types) made->set_type_options(parse_component(types));
+    registry_ = std::move(made);
+  }
+  return *registry_;
+}
+
+void Session::use_threads() const { set_threads(common.threads); }
+
+void Session::write_file_to_stdout() {
+  if (common.json == "-") {
+    throw Error(ErrorCode::usage,
+                "both --json and an output file are '-', but there is one standard output; name a "
+                "file for one of them");
+  }
+  stdout_is_file_ = true;
+}
+
+void Session::print(std::string_view text) const {
+  if (common.json == "-") return;
+  if (!stdout_is_file_) return write_stdout(text);
+  if (!common.quiet) std::fwrite(text.data(), 1, text.size(), stderr);
+}
+
+bool Session::colour() const { return use_colour(stdout_is_file_ ? stderr : stdout); }
+
+void Session::note(std::string_view text) const {
+  if (common.quiet || text.empty()) return;
+  fmt::memory_buffer line;
+  fmt::format_to(std::back_inserter(line), "note: {}\n", text);
+  std::fwrite(line.data(), 1, line.size(), stderr);
+}
+
+void Session::write_json(const boost::json::object& report) const {
+  if (!wants_json()) return;
+  const std::string text = json_text(report) + "\n";
+  if (common.json == "-") {
+    write_stdout(text);
+  } else {
+    write_file(common.json, text);
+  }
+}
+
+void write_stdout(std::string_view text) {
+  errno = 0;
+  const bool ok =
+      std::fwrite(text.data(), 1, text.size(), stdout) == text.size() && std::fflush(stdout) == 0;
+  if (ok || errno == EPIPE) return;
+  throw Error(ErrorCode::input,
+              fmt::format("standard output cannot be written: {}", std::strerror(errno)));
+}
+
+bool stdout_reader_is_gone() {
+  pollfd descriptor{STDOUT_FILENO, POLLOUT, 0};
+  return ::poll(&descriptor, 1, 0) == 1 && (descriptor.revents & (POLLERR | POLLHUP)) != 0;
+}
+
+}  // namespace cairn::app

@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// cairn view FILE…: one page for the browser.
+#include <filesystem>
+#include <memory>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "album.hpp"
+#include "cairn/error.hpp"
+#include "cairn/format.hpp"
+#include "commands.hpp"
+#include "json_report.hpp"
+#include "picture_files.hpp"
+#include "table.hpp"
+
+namespace cairn::app {
+namespace {
+
+struct ViewOptions {
+  AlbumOptions album;
+  std::string output;
+};
+
+/// sphere.html for maps/sphere.g2o.gz, in the folder where the program runs.
+std::string default_page(const std::string& file) {
+  if (file == "-" || file.starts_with('@')) return "cairn.html";
+  std::filesystem::path name = std::filesystem::path(file).filename();
+  if (name.extension() == ".gz") name.replace_extension();
+  return name.replace_extension(".html").string();
+}
+
+/// Only pages of cairn are overwritten without having been named.
+void check_default(const std::string& page) {
+  std::error_code error;
+  if (!std::filesystem::exists(page, error)) return;
+  if (std::filesystem::is_regular_file(page, error) &&
+      read_file(page).find("id=\"cairn-data\"") != std::string::npos) {
+    return;
+  }
+  throw Error(ErrorCode::usage,
+              fmt::format("{} is there and is no page of cairn; name another with -o", page));
+}
+
+boost::json::object report_json(const Album& album, const std::string& page, std::size_t bytes) {
+  boost::json::object report = begin_report("view");
+  report["page"] = page;
+  report["bytes"] = bytes;
+  boost::json::array graphs;
+  for (const Scene& scene : album.scenes) {
+    boost::json::array estimates;
+    for (const SceneEstimate& estimate : scene.estimates) {
+      estimates.push_back({{"name", estimate.name},
+                           {"role", to_string(estimate.role)},
+                           {"file", text_json(estimate.file)},
+                           {"chi2", estimate.chi2}});
+    }
+    graphs.push_back({{"name", scene.name},
+                      {"variables", scene.variable_count()},
+                      {"factors", scene.factors},
+                      {"estimates", std::move(estimates)},
+                      {"runs", scene.runs.size()},
+                      {"recordings", scene.recordings.size()}});
+  }
+  report["graphs"] = std::move(graphs);
+  report["bench"] = !album.bench.empty();
+  report["notes"] = strings_json(album.notes);
+  return report;
+}
+
+int run(const ViewOptions& options, Session& session) {
+  std::string page = options.output;
+  if (page.empty()) {
+    page = default_page(options.album.files.front());
+    check_default(page);
+  }
+  if (page == "-") session.write_file_to_stdout();
+  if (!session.registry().has(Picture::kKind, "html")) {
+    throw Error(ErrorCode::plugin,
+                "no plugin makes pages here: cairn was built without apps/report/dist and without "
+                "npm; cairn plot draws static pictures");
+  }
+  check_folder(page);
+  session.use_threads();
+  const Album album = load_album(
+      options.album, fmt::format("cairn view {}", fmt::join(options.album.files, " ")), session);
+  const std::size_t bytes = write_picture(album, {"html", {}}, page, session);
+  session.write_json(report_json(album, page, bytes));
+  session.print(fmt::format("{}: {}; open it in any browser\n", page,
+                            bytes_text(static_cast<std::int64_t>(bytes))));
+  return 0;
+}
+
+}  // namespace
+
+Command add_view(CLI::App& program) {
+  auto options = std::make_shared<ViewOptions>();  // lives as long as the parser and the run
+  CLI::App* app = program.add_subcommand("view", "a page for the browser: look round in a graph");
+  add_album_options(*app, options->album);
+  app->add_option("-o,--output", options->output, "the page [name of the first FILE, .html]")
+      ->type_name("PAGE");
+  app->footer(
+      "Graphs with the same ids are laid over each other: the lowest chi2 is the estimate, the "
+      "first\n"
+      "FILE else the initial guess. Files without factors are ground truth, by id. The page needs "
+      "no\n"
+      "network.\n\n"
+      "Example:\n"
+      "  cairn optimize city.g2o -o best.g2o --json run.json --record run.jsonl\n"
+      "  cairn view city.g2o best.g2o run.json run.jsonl -o city.html");
+  return {app, [options](Session& session) { return run(*options, session); }};
+}
+
+}  // namespace cairn::app

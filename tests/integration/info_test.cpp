@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "integration/process.hpp"
+
+namespace cairn::test {
+namespace {
+
+using ::testing::HasSubstr;
+
+class InfoCommand : public ::testing::Test {
+ protected:
+  boost::json::value info_of(const std::string& text, const Arguments& more = {}) {
+    write_text(folder_.file("graph.g2o"), text);
+    Arguments arguments{"info", folder_.file("graph.g2o"), "--json", "-"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const Outcome outcome = cairn(arguments);
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+    return parse_json(outcome.out);
+  }
+  std::string suspicions(const boost::json::value& report) {
+    std::string all;
+    for (const auto& sentence : report.at("suspicions").as_array())
+      all += sentence.as_string().c_str() + std::string("\n");
+    return all;
+  }
+  TemporaryFolder folder_;
+};
+
+const std::string kIdentity = " 1 0 0 1 0 1\n";
+/// Three poses in a row, one metre apart, and an odometry that says so but for 0.1 m in the second
+/// step.
+const std::string kChain =
+    "VERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 1 0 0\nVERTEX_SE2 2 2 0 0\n"
+    "EDGE_SE2 0 1 1 0 0" +
+    kIdentity + "EDGE_SE2 1 2 1.1 0 0" + kIdentity;
+
+TEST_F(InfoCommand, CountsWhatIsThere) {
+  const auto report = info_of(kChain + "EDGE_SE2 0 2 2 0 0" + kIdentity);
+  EXPECT_EQ(report.at("variables").as_array().at(0).at("type").as_string(), "VERTEX_SE2");
+  EXPECT_EQ(report.at("variables").as_array().at(0).at("count").as_int64(), 3);
+  EXPECT_EQ(report.at("factors").as_array().at(0).at("count").as_int64(), 3);
+  EXPECT_EQ(report.at("odometry").as_int64(), 2);
+  EXPECT_EQ(report.at("loop_closures").as_int64(), 1);
+  EXPECT_EQ(report.at("components").as_int64(), 1);
+  EXPECT_EQ(report.at("gauge").at("freedoms").as_int64(), 3);
+  EXPECT_EQ(report.at("gauge").at("anchored").as_array().at(0).as_int64(), 0);
+  EXPECT_EQ(report.at("degrees_of_freedom").as_int64(), 9 - 6);
+  EXPECT_NEAR(report.at("chi2").at("initial").as_double(), 0.01, 1e-12);
+  EXPECT_EQ(report.at("worst").as_array().at(0).at("factor").as_string(), "EDGE_SE2 1 2");
+}
+
+TEST_F(InfoCommand, AFixedVariableLeavesNoGaugeFreedom) {
+  const auto report = info_of(kChain + "FIX 1\n");
+  EXPECT_EQ(report.at("gauge").at("freedoms").as_int64(), 0);
+  EXPECT_EQ(report.at("variables").as_array().at(0).at("fixed").as_int64(), 1);
+}
+
+TEST_F(InfoCommand, SaysWhatLooksWrong) {
+  const auto report =
+      info_of(kChain + "EDGE_SE2 2 1 -1 0 0" + kIdentity +  // doubled, the other way round
+              "VERTEX_SE2 7 5 5 0\n" +                      // touched by nothing
+              "VERTEX_SE2 8 5 6 0\nVERTEX_SE2 9 6 6 0\nEDGE_SE2 8 9 1 0 0" + kIdentity);
+  EXPECT_EQ(report.at("doubled").as_int64(), 1);
+  EXPECT_EQ(report.at("unconstrained").as_int64(), 1);
+  const std::string all = suspicions(report);
+  EXPECT_THAT(all, HasSubstr("1 factor on variables that another"));
+  EXPECT_THAT(all, HasSubstr("VERTEX_SE2 7"));
+  EXPECT_THAT(all, HasSubstr("2 parts that no factor joins"));
+}
+
+TEST_F(InfoCommand, SuspectsUnitsWhereChi2IsFarFromTheDegreesOfFreedom) {
+  const std::string loop = "EDGE_SE2 0 2 100 0 0" + kIdentity;
+  EXPECT_THAT(suspicions(info_of(kChain + loop)), HasSubstr("far from the measurements"));
+  EXPECT_THAT(suspicions(info_of(kChain + "EDGE_SE2 0 2 2 0 0" + kIdentity)),
+              HasSubstr("too small"));
+}
+
+TEST_F(InfoCommand, SkippedLinesAreCountedAndToldOnStandardError) {
+  const std::string text = kChain + "EDGE_UNHEARD_OF 0 1 2 3\n";
+  write_text(folder_.file("odd.g2o"), text);
+  EXPECT_EQ(cairn({"info", folder_.file("odd.g2o")}).exit_code, 3);
+  const Outcome skipping = cairn({"info", folder_.file("odd.g2o"), "--skip-unknown"});
+  EXPECT_EQ(skipping.exit_code, 0);
+  EXPECT_THAT(skipping.err, HasSubstr("skipped 1 line with unknown tag 'EDGE_UNHEARD_OF'"));
+}
+
+TEST_F(InfoCommand, TellsTheMetric) {
+  const Outcome outcome = cairn({"info", "@sphere", "--types", "slam3d:metric=g2o"});
+  EXPECT_THAT(outcome.out, HasSubstr("metric g2o"));
+  EXPECT_THAT(cairn({"info", "@sphere"}).out, HasSubstr("metric logarithm"));
+}
+
+}  // namespace
+}  // namespace cairn::test

@@ -1,0 +1,233 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <csignal>
+
+#include "cairn/registry.hpp"
+#include "integration/process.hpp"
+
+namespace cairn::test {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+boost::json::value report_of(Arguments arguments) {
+  arguments.insert(arguments.end(), {"--json", "-"});
+  const Outcome outcome = cairn(arguments);
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  return parse_json(outcome.out);
+}
+
+double final_chi2(const boost::json::value& report) {
+  return report.at("chi2").at("final").as_double();
+}
+
+class OptimizeCommand : public ::testing::Test {
+ protected:
+  /// A graph that is worth optimising, as a file.
+  std::string graph() {
+    const std::string file = folder_.file("graph.g2o");
+    const Outcome made = cairn({"generate", "manhattan:poses=200", "-o", file, "--seed", "3"});
+    EXPECT_EQ(made.exit_code, 0) << made.err;
+    return file;
+  }
+  TemporaryFolder folder_;
+};
+
+TEST_F(OptimizeCommand, ReportsAllMembersThatScriptsRelyOn) {
+  const std::string file = graph();
+  const auto report = report_of({"optimize", file, "--threads", "2"});
+  EXPECT_EQ(report.at("cairn").as_string(), "0.1.0");
+  EXPECT_EQ(report.at("command").as_string(), "optimize");
+  EXPECT_EQ(report.at("graph").at("file").as_string(), file);
+  EXPECT_EQ(report.at("graph").at("variables").as_int64(), 200);
+  EXPECT_EQ(report.at("graph").at("tangent_size").as_int64(), 600);
+  EXPECT_EQ(report.at("graph").at("residual_size").as_int64(),
+            3 * report.at("graph").at("factors").as_int64());
+  EXPECT_EQ(report.at("optimizer").as_string(), "levenberg_marquardt");
+  EXPECT_EQ(report.at("linear_solver").as_string(), "block_cholesky");
+  EXPECT_EQ(report.at("threads").as_int64(), 2);
+  EXPECT_EQ(report.at("status").as_string(), "converged");
+  EXPECT_LT(final_chi2(report), report.at("chi2").at("initial").as_double());
+  const auto& iterations = report.at("iterations").as_array();
+  ASSERT_FALSE(iterations.empty());
+  for (const auto& iteration : iterations) {
+    EXPECT_TRUE(iteration.at("accepted").is_bool());
+    for (const char* member : {"chi2", "step_norm", "lambda", "seconds"}) {
+      EXPECT_TRUE(iteration.at(member).is_double()) << member;
+    }
+  }
+  EXPECT_EQ(iterations.back().at("chi2").as_double(), final_chi2(report));
+  for (const char* part :
+       {"read", "total", "linearize", "analyze", "factorize", "solve", "update"}) {
+    EXPECT_TRUE(report.at("seconds").at(part).is_double()) << part;
+  }
+  EXPECT_FALSE(report.at("solver").at("ordering").as_string().empty());
+  EXPECT_GT(report.at("solver").at("factor_nonzeros").as_int64(), 600);
+  EXPECT_TRUE(report.at("solver").at("factor_flops").is_double());
+  EXPECT_GT(report.at("peak_memory_bytes").as_int64(), 1000000);
+  EXPECT_FALSE(report.at("machine").at("cpu").as_string().empty());
+  EXPECT_GE(report.at("machine").at("cores").to_number<int>(), 1);
+  for (const char* member : {"compiler", "flags", "simd"}) {
+    EXPECT_TRUE(report.at("build").at(member).is_string()) << member;
+  }
+}
+
+TEST_F(OptimizeCommand, WritesTheEstimateThatItReports) {
+  const std::string best = folder_.file("best.g2o");
+  const double chi2 = final_chi2(report_of({"optimize", graph(), "-o", best}));
+  const double as_given = report_of({"info", best}).at("chi2").at("initial").as_double();
+  EXPECT_NEAR(as_given / chi2, 1.0, 1e-9);
+}
+
+TEST_F(OptimizeCommand, TheEstimateIsTheSameToTheLastByteForAnyNumberOfThreads) {
+  for (const char* kind : {"@manhattan:poses=1500", "@sphere"}) {
+    std::vector<std::string> estimates;
+    for (const std::string threads : {"1", "2", "3"}) {
+      const Outcome outcome = cairn({"optimize", kind, "-o", "-", "--to", "g2o", "--iterations",
+                                     "3", "--threads", threads, "--quiet"});
+      EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+      EXPECT_THAT(outcome.out, HasSubstr("VERTEX_SE"));
+      estimates.push_back(outcome.out);
+    }
+    EXPECT_TRUE(estimates[0] == estimates[1]) << kind << ": 1 and 2 threads differ";
+    EXPECT_TRUE(estimates[0] == estimates[2]) << kind << ": 1 and 3 threads differ";
+  }
+}
+
+TEST_F(OptimizeCommand, AllLinearSolversAndOptimizersReachTheSameChi2) {
+  const std::string file = graph();
+  const double expected = final_chi2(report_of({"optimize", file}));
+  const Registry registry;
+  for (const std::string& solver : registry.names("linear_solver")) {
+    EXPECT_NEAR(final_chi2(report_of({"optimize", file, "--linear-solver", solver})) / expected, 1,
+                1e-8)
+        << solver;
+  }
+  for (const std::string& optimizer : registry.names("optimizer")) {
+    EXPECT_NEAR(final_chi2(report_of(
+                    {"optimize", file, "--initial", "chordal", "--optimizer", optimizer})) /
+                    expected,
+                1, 1e-8)
+        << optimizer;
+  }
+}
+
+TEST_F(OptimizeCommand, OptionsOfASolverFollowItsName) {
+  const auto report =
+      report_of({"optimize", graph(), "--linear-solver", "block_cholesky:ordering=natural"});
+  EXPECT_EQ(report.at("solver").at("ordering").as_string(), "natural");
+  const Outcome wrong =
+      cairn({"optimize", graph(), "--linear-solver", "block_cholesky:odering=amd"});
+  EXPECT_EQ(wrong.exit_code, 2);
+  EXPECT_THAT(wrong.err, HasSubstr("'ordering'"));
+}
+
+TEST_F(OptimizeCommand, ToleranceZeroRunsExactlyThatManyIterations) {
+  const auto report = report_of({"optimize", graph(), "--tolerance", "0", "--iterations", "12"});
+  EXPECT_EQ(report.at("iterations").as_array().size(), 12u);
+  EXPECT_EQ(report.at("status").as_string(), "max_iterations");
+}
+
+TEST_F(OptimizeCommand, ALossOnLoopsTamesOutliers) {
+  const std::string bad = "@manhattan:poses=200,outliers=20,seed=1";
+  const auto plain = report_of({"optimize", bad, "--initial", "odometry"});
+  const auto robust = report_of(
+      {"optimize", bad, "--initial", "odometry", "--loss", "cauchy", "--loss-on", "loops"});
+  EXPECT_TRUE(plain.at("loss").is_null());
+  EXPECT_EQ(robust.at("loss").as_string(), "cauchy");
+  EXPECT_LT(final_chi2(robust), 0.5 * final_chi2(plain));
+  const Outcome without = cairn({"optimize", bad, "--loss-on", "loops"});
+  EXPECT_EQ(without.exit_code, 2);
+}
+
+TEST_F(OptimizeCommand, AnOptimizerThatTakesNoLinearSolverSaysWhatToUseInstead) {
+  if (!Registry().has("optimizer", "ceres")) GTEST_SKIP() << "built without Ceres";
+  const Outcome outcome =
+      cairn({"optimize", graph(), "--optimizer", "ceres", "--linear-solver", "cholmod"});
+  EXPECT_EQ(outcome.exit_code, 2);
+  EXPECT_THAT(outcome.err, HasSubstr("--optimizer ceres:linear_solver_type="));
+}
+
+TEST_F(OptimizeCommand, TheLinearSolverMayBeGivenOnceOnly) {
+  const Outcome outcome =
+      cairn({"optimize", graph(), "--optimizer", "gauss_newton:linear_solver=eigen",
+             "--linear-solver", "block_cholesky"});
+  EXPECT_EQ(outcome.exit_code, 2);
+  EXPECT_THAT(outcome.err, HasSubstr("twice"));
+  const auto by_option =
+      report_of({"optimize", graph(), "--optimizer", "gauss_newton:linear_solver=eigen"});
+  EXPECT_EQ(by_option.at("linear_solver").as_string(), "eigen");
+}
+
+TEST_F(OptimizeCommand, CovarianceBlocksAreRefusedAndNoneIsTheDefault) {
+  const Outcome blocks = cairn({"optimize", graph(), "--covariance", "blocks"});
+  EXPECT_EQ(blocks.exit_code, 2);
+  EXPECT_THAT(blocks.err, HasSubstr("not available in this version"));
+  EXPECT_EQ(cairn({"optimize", graph(), "--covariance", "none"}).exit_code, 0);
+}
+
+TEST_F(OptimizeCommand, ReadsStandardInputAndWritesStandardOutput) {
+  const std::string file = graph();
+  const Outcome piped =
+      cairn({"optimize", "-", "-o", "-", "--to", "g2o", "--quiet"}, {}, read_text(file));
+  EXPECT_EQ(piped.exit_code, 0) << piped.err;
+  const std::string best = folder_.file("best.g2o");
+  report_of({"optimize", file, "-o", best});
+  EXPECT_TRUE(piped.out == read_text(best));
+  const Outcome both = cairn({"optimize", file, "-o", "-", "--to", "g2o", "--json", "-"});
+  EXPECT_EQ(both.exit_code, 2);
+}
+
+TEST_F(OptimizeCommand, AnOutputThatCannotBeWrittenIsToldBeforeTheWork) {
+  const Outcome ending = cairn({"optimize", graph(), "-o", folder_.file("best.docx")});
+  EXPECT_EQ(ending.exit_code, 2);
+  EXPECT_THAT(ending.err, HasSubstr(".docx"));
+  EXPECT_THAT(ending.err, Not(HasSubstr("iteration")));
+  const Outcome nowhere = cairn({"optimize", graph(), "-o", folder_.file("none/best.g2o")});
+  EXPECT_EQ(nowhere.exit_code, 3);
+  EXPECT_THAT(nowhere.err, Not(HasSubstr("iteration")));
+}
+
+TEST_F(OptimizeCommand, AFailureLeavesTheOldFileAsItWas) {
+  const std::string best = folder_.file("best.g2o");
+  write_text(best, "an older result\n");
+  write_text(folder_.file("bad.g2o"), "VERTEX_SE2 0 0 0 0\nEDGE_SE2 0 9 1 0 0 1 0 0 1 0 1\n");
+  const auto before = folder_.contents();
+  EXPECT_EQ(cairn({"optimize", folder_.file("bad.g2o"), "-o", best}).exit_code, 3);
+  EXPECT_EQ(read_text(best), "an older result\n");
+  EXPECT_EQ(folder_.contents(), before);
+}
+
+TEST_F(OptimizeCommand, ADivergingRunExitsWithFourAndStillWritesItsBest) {
+  // The square of such a distance is no number any more.
+  const std::string far = folder_.file("far.g2o"), best = folder_.file("best.g2o");
+  write_text(far, "VERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 1e200 0 0\nEDGE_SE2 0 1 1 0 0 1 0 0 1 0 1\n");
+  const Outcome outcome = cairn({"optimize", far, "-o", best, "--json", folder_.file("run.json")});
+  EXPECT_EQ(outcome.exit_code, 4) << outcome.err;
+  const auto report = parse_json(read_text(folder_.file("run.json")));
+  EXPECT_EQ(report.at("status").as_string(), "diverged");
+  EXPECT_TRUE(report.at("chi2").at("initial").is_null());
+  EXPECT_THAT(read_text(best), HasSubstr("VERTEX_SE2 1 1e+200 "));
+}
+
+TEST_F(OptimizeCommand, AnInterruptEndsWithTheBestEstimateWritten) {
+  for (const int signal : {SIGINT, SIGTERM}) {
+    const std::string best = folder_.file("best.g2o"), json = folder_.file("run.json");
+    const Outcome outcome = cairn_interrupted({"optimize", graph(), "-o", best, "--json", json,
+                                               "--tolerance", "0", "--iterations", "1000000000"},
+                                              "iteration   2 ", signal);
+    EXPECT_EQ(outcome.exit_code, 130) << outcome.err;
+    const auto report = parse_json(read_text(json));
+    EXPECT_EQ(report.at("status").as_string(), "interrupted");
+    EXPECT_LT(final_chi2(report), report.at("chi2").at("initial").as_double());
+    const double written = report_of({"info", best}).at("chi2").at("initial").as_double();
+    EXPECT_NEAR(written / final_chi2(report), 1.0, 1e-9);
+    std::filesystem::remove(best);
+  }
+}
+
+}  // namespace
+}  // namespace cairn::test

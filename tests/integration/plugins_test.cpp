@@ -1,0 +1,151 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <set>
+
+#include "cairn/registry.hpp"
+#include "integration/process.hpp"
+
+namespace cairn::test {
+namespace {
+
+using ::testing::Contains;
+using ::testing::HasSubstr;
+
+TEST(PluginsCommand, ListsEverythingOnOffer) {
+  const Registry registry;
+  const auto report = parse_json(cairn({"plugins", "--json", "-"}).out);
+  std::set<std::pair<std::string, std::string>> listed;
+  for (const auto& offer : report.at("offers").as_array()) {
+    listed.emplace(offer.at("kind").as_string().c_str(), offer.at("name").as_string().c_str());
+    for (const char* member : {"summary", "plugin", "file", "licence", "version"}) {
+      EXPECT_FALSE(offer.at(member).as_string().empty()) << member;
+    }
+  }
+  const std::string table = cairn({"plugins"}).out;
+  for (const Offer& offer : registry.offers()) {
+    EXPECT_TRUE(listed.contains({offer.kind, offer.name})) << offer.name;
+    EXPECT_THAT(table, HasSubstr(" " + offer.name + " "));
+    EXPECT_THAT(table, HasSubstr(offer.summary));
+  }
+  EXPECT_EQ(listed.size(), registry.offers().size());
+}
+
+TEST(PluginsCommand, OpensNoPluginForTheList) {
+  // The dynamic linker itself tells every object that it looks for.
+  const Outcome list = cairn({"plugins"}, {{"LD_DEBUG", "files"}});
+  EXPECT_EQ(list.exit_code, 0);
+  EXPECT_THAT(list.err, HasSubstr("libcairn.so"));
+  for (const Offer& offer : Registry().offers()) {
+    EXPECT_THAT(list.err, ::testing::Not(HasSubstr(offer.file.filename().string()))) << offer.name;
+  }
+  const Outcome one = cairn({"plugins", "eigen"}, {{"LD_DEBUG", "files"}});
+  EXPECT_THAT(one.err, HasSubstr("eigen.so"));
+}
+
+TEST(PluginsCommand, ShowsTheOptionsOfOneName) {
+  const auto report = parse_json(cairn({"plugins", "levenberg_marquardt", "--json", "-"}).out);
+  const auto& offer = report.at("offers").as_array().at(0);
+  EXPECT_EQ(offer.at("kind").as_string(), "optimizer");
+  std::vector<std::string> names;
+  for (const auto& option : offer.at("options").as_array()) {
+    names.emplace_back(option.at("name").as_string().c_str());
+    EXPECT_FALSE(option.at("help").as_string().empty());
+  }
+  EXPECT_THAT(names, Contains("linear_solver"));
+  const std::string text = cairn({"plugins", "levenberg_marquardt"}).out;
+  for (const std::string& name : names) EXPECT_THAT(text, HasSubstr("  " + name + " "));
+  EXPECT_THAT(text, HasSubstr("BSD-3-Clause"));
+}
+
+TEST(PluginsCommand, ShowsEveryName) {
+  for (const Offer& offer : Registry().offers()) {
+    const Outcome outcome = cairn({"plugins", offer.name});
+    EXPECT_EQ(outcome.exit_code, 0) << offer.name << ": " << outcome.err;
+    EXPECT_THAT(outcome.out, HasSubstr(offer.summary));
+  }
+}
+
+TEST(PluginsCommand, APluginsNameShowsAllThatItOffers) {
+  const std::string text = cairn({"plugins", "generate"}).out;
+  EXPECT_THAT(text, HasSubstr("manhattan (generator)"));
+  EXPECT_THAT(text, HasSubstr("sphere (generator)"));
+}
+
+TEST(PluginsCommand, TellsAbilities) {
+  EXPECT_THAT(cairn({"plugins", "VERTEX_SE2"}).out, HasSubstr("Lie group"));
+  EXPECT_THAT(cairn({"plugins", "EDGE_SE2"}).out, HasSubstr("relative pose"));
+  EXPECT_THAT(cairn({"plugins", "g2o"}).out, HasSubstr("reads, writes, .g2o"));
+}
+
+TEST(PluginsCommand, AnUnknownNameIsAnsweredWithTheNearest) {
+  const Outcome outcome = cairn({"plugins", "block_cholesk"});
+  EXPECT_EQ(outcome.exit_code, 5);
+  EXPECT_THAT(outcome.err, HasSubstr("did you mean 'block_cholesky'?"));
+}
+
+/// A copy of the libraries and plugins, without some files.
+Environment installation_without(const TemporaryFolder& folder,
+                                 const std::vector<std::string>& missing) {
+  const auto plugins = Registry().offers().front().file.parent_path();
+  std::filesystem::copy(plugins, folder.path() / "cairn");
+  for (const auto& entry : std::filesystem::directory_iterator(plugins.parent_path())) {
+    if (entry.path().filename().string().starts_with("libcairn.so")) {
+      std::filesystem::copy(entry.path(), folder.path() / entry.path().filename());
+    }
+  }
+  for (const std::string& name : missing) std::filesystem::remove(folder.path() / "cairn" / name);
+  return {{"LD_LIBRARY_PATH", folder.path().string()}};
+}
+
+TEST(PluginsCommand, ASharedObjectThatIsGoneIsMissedOnlyByWhoAsksForIt) {
+  const TemporaryFolder folder;
+  const Environment environment = installation_without(folder, {"eigen.so"});
+  const Outcome asked =
+      cairn({"optimize", "@ring:poses=40", "--linear-solver", "eigen"}, environment);
+  EXPECT_EQ(asked.exit_code, 5);
+  EXPECT_THAT(asked.err, HasSubstr((folder.path() / "cairn" / "eigen.so").string()));
+  EXPECT_THAT(asked.err, HasSubstr("block_cholesky"));
+  const Outcome bench =
+      cairn({"bench", "@ring:poses=40", "--repeat", "1", "--no-memory"}, environment);
+  EXPECT_EQ(bench.exit_code, 0) << bench.err;
+  EXPECT_THAT(bench.err, HasSubstr("note: left out: linear solver 'eigen'"));
+  for (const Arguments& other :
+       std::vector<Arguments>{{"optimize", "@ring:poses=40"},
+                              {"info", "@ring:poses=40"},
+                              {"plugins"},
+                              {"convert", "@ring:poses=40", "-", "--to", "g2o"}}) {
+    EXPECT_EQ(cairn(other, environment).exit_code, 0) << other.front();
+  }
+}
+
+TEST(PluginsCommand, APluginThatIsGoneAltogetherIsNotOnOffer) {
+  const TemporaryFolder folder;
+  const Environment environment = installation_without(folder, {"eigen.so", "eigen.json"});
+  const Outcome asked =
+      cairn({"optimize", "@ring:poses=40", "--linear-solver", "eigen"}, environment);
+  EXPECT_EQ(asked.exit_code, 5);
+  EXPECT_THAT(asked.err, HasSubstr("there is no linear solver 'eigen'"));
+  EXPECT_THAT(asked.err, HasSubstr("block_cholesky"));
+  const Outcome bench =
+      cairn({"bench", "@ring:poses=40", "--repeat", "1", "--no-memory", "--quiet"}, environment);
+  EXPECT_EQ(bench.exit_code, 0) << bench.err;
+}
+
+TEST(PluginsCommand, ListsWhatIsWrongWithPlugins) {
+  const TemporaryFolder folder;
+  write_text(folder.file("broken.json"), "{ this is no JSON");
+  const Environment path{{"CAIRN_PLUGIN_PATH", folder.path().string()}};
+  const Outcome outcome = cairn({"plugins"}, path);
+  EXPECT_EQ(outcome.exit_code, 0);
+  EXPECT_THAT(outcome.out, HasSubstr("problems"));
+  EXPECT_THAT(outcome.out, HasSubstr("broken.json"));
+  EXPECT_THAT(outcome.out, HasSubstr("levenberg_marquardt"));  // the others are there all the same
+  const auto report = parse_json(cairn({"plugins", "--json", "-"}, path).out);
+  EXPECT_EQ(report.at("problems").as_array().size(), 1u);
+}
+
+}  // namespace
+}  // namespace cairn::test

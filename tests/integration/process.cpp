@@ -1,0 +1,216 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "integration/process.hpp"
+
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <poll.h>
+#include <pty.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <csignal>
+#include <cstdio>
+#include <cstdlib>
+#include <fstream>
+#include <sstream>
+#include <stdexcept>
+
+#include <boost/json/parse.hpp>
+
+namespace cairn::test {
+namespace {
+
+struct Pipe {
+  int read_end = -1;
+  int write_end = -1;
+  Pipe() {
+    int ends[2];
+    if (::pipe2(ends, O_CLOEXEC) != 0) throw std::runtime_error("no pipe");
+    read_end = ends[0];
+    write_end = ends[1];
+  }
+  Pipe(const Pipe&) = delete;
+  Pipe& operator=(const Pipe&) = delete;
+  ~Pipe() {
+    close_read();
+    close_write();
+  }
+  void close_read() { close_end(read_end); }
+  void close_write() { close_end(write_end); }
+
+ private:
+  static void close_end(int& end) {
+    if (end >= 0) ::close(end);
+    end = -1;
+  }
+};
+
+/// In the child, after fork: becomes the command. Never returns.
+[[noreturn]] void become(const Arguments& command, const Environment& environment) {
+  for (const auto& [name, value] : environment) ::setenv(name.c_str(), value.c_str(), 1);
+  std::vector<char*> argv;
+  for (const std::string& word : command) argv.push_back(const_cast<char*>(word.c_str()));
+  argv.push_back(nullptr);
+  ::execvp(argv[0], argv.data());
+  ::_exit(127);
+}
+
+int wait_for(pid_t child) {
+  int status = 0;
+  while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {
+  }
+  return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+}
+
+/// A child with its three streams on pipes.
+class Child {
+ public:
+  Child(const Arguments& command, const Environment& environment) {
+    pid_ = ::fork();
+    if (pid_ == 0) {
+      ::dup2(in_.read_end, STDIN_FILENO);
+      ::dup2(out_.write_end, STDOUT_FILENO);
+      ::dup2(err_.write_end, STDERR_FILENO);
+      become(command, environment);
+    }
+    in_.close_read();
+    out_.close_write();
+    err_.close_write();
+  }
+
+  void feed(const std::string& input) {
+    std::size_t done = 0;
+    while (done < input.size()) {
+      const ssize_t put = ::write(in_.write_end, input.data() + done, input.size() - done);
+      if (put <= 0) break;
+      done += static_cast<std::size_t>(put);
+    }
+    in_.close_write();
+  }
+
+  /// Reads both streams to their ends; sends `signal` when standard error first holds `cue`.
+  Outcome finish(const std::string& cue, int signal) {
+    Outcome outcome;
+    bool sent = cue.empty();
+    while (out_.read_end >= 0 || err_.read_end >= 0) {
+      std::array<pollfd, 2> ends{{{out_.read_end, POLLIN, 0}, {err_.read_end, POLLIN, 0}}};
+      if (::poll(ends.data(), ends.size(), -1) < 0) continue;
+      if (ends[0].revents && !read_some(out_.read_end, outcome.out)) out_.close_read();
+      if (ends[1].revents && !read_some(err_.read_end, outcome.err)) err_.close_read();
+      if (!sent && outcome.err.find(cue) != std::string::npos) {
+        ::kill(pid_, signal);
+        sent = true;
+      }
+    }
+    outcome.exit_code = wait_for(pid_);
+    EXPECT_TRUE(sent) << "the program never said '" << cue << "'; it said: " << outcome.err;
+    return outcome;
+  }
+
+ private:
+  static bool read_some(int end, std::string& text) {
+    char buffer[4096];
+    const ssize_t count = ::read(end, buffer, sizeof buffer);
+    if (count <= 0) return false;
+    text.append(buffer, static_cast<std::size_t>(count));
+    return true;
+  }
+
+  Pipe in_, out_, err_;
+  pid_t pid_ = 0;
+};
+
+Arguments with_program(const Arguments& arguments) {
+  Arguments command{program()};
+  command.insert(command.end(), arguments.begin(), arguments.end());
+  return command;
+}
+
+}  // namespace
+
+std::string program() { return CAIRN_PROGRAM; }
+
+Outcome run_program(const Arguments& command, const Environment& environment,
+                    const std::string& input) {
+  std::signal(SIGPIPE, SIG_IGN);  // a child that reads nothing
+  Child child(command, environment);
+  child.feed(input);
+  return child.finish("", 0);
+}
+
+Outcome cairn(const Arguments& arguments, const Environment& environment,
+              const std::string& input) {
+  return run_program(with_program(arguments), environment, input);
+}
+
+Outcome cairn_interrupted(const Arguments& arguments, const std::string& cue, int signal) {
+  Child child(with_program(arguments), {});
+  child.feed("");
+  return child.finish(cue, signal);
+}
+
+Outcome cairn_on_terminal(const Arguments& arguments, const Environment& environment) {
+  int terminal = -1;
+  const pid_t child = ::forkpty(&terminal, nullptr, nullptr, nullptr);
+  if (child == 0) become(with_program(arguments), environment);
+  Outcome outcome;
+  char buffer[4096];
+  // A terminal whose other side has gone reads as an error, not as an end.
+  for (ssize_t count; (count = ::read(terminal, buffer, sizeof buffer)) > 0;) {
+    outcome.out.append(buffer, static_cast<std::size_t>(count));
+  }
+  outcome.exit_code = wait_for(child);
+  ::close(terminal);
+  return outcome;
+}
+
+TemporaryFolder::TemporaryFolder() {
+  std::string name = (std::filesystem::temp_directory_path() / "cairn-test-XXXXXX").string();
+  if (!::mkdtemp(name.data())) throw std::runtime_error("no temporary folder");
+  path_ = name;
+}
+
+TemporaryFolder::~TemporaryFolder() {
+  std::error_code ignored;
+  std::filesystem::remove_all(path_, ignored);
+}
+
+std::vector<std::string> TemporaryFolder::contents() const {
+  std::vector<std::string> names;
+  for (const auto& entry : std::filesystem::directory_iterator(path_)) {
+    names.push_back(entry.path().filename().string());
+  }
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+std::string read_text(const std::filesystem::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  EXPECT_TRUE(stream) << file;
+  std::ostringstream text;
+  text << stream.rdbuf();
+  return text.str();
+}
+
+void write_text(const std::filesystem::path& file, const std::string& text) {
+  std::ofstream(file, std::ios::binary) << text;
+}
+
+boost::json::value parse_json(const std::string& text) {
+  boost::json::error_code error;
+  boost::json::value value = boost::json::parse(text, error);
+  EXPECT_FALSE(error) << "not JSON, or not JSON alone: " << error.message() << "\n" << text;
+  return error ? boost::json::value(boost::json::object_kind) : value;
+}
+
+std::vector<std::string> lines(const std::string& text) {
+  std::vector<std::string> all;
+  std::istringstream stream(text);
+  for (std::string line; std::getline(stream, line);) all.push_back(line);
+  return all;
+}
+
+}  // namespace cairn::test

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <sys/types.h>
+
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+#include <boost/json/value.hpp>
+
+namespace cairn::test {
+
+using Arguments = std::vector<std::string>;
+using Environment = std::map<std::string, std::string>;
+
+/// What a run of the program left.
+struct Outcome {
+  int exit_code = -1;  ///< -1 where a signal ended it
+  std::string out;
+  std::string err;
+};
+
+/// Runs `cairn` with these arguments to its end. `environment` is added to this process's own;
+/// `input` is its standard input.
+Outcome cairn(const Arguments& arguments, const Environment& environment = {},
+              const std::string& input = "");
+
+/// Runs another program (with the search path) in the same way.
+Outcome run_program(const Arguments& command, const Environment& environment = {},
+                    const std::string& input = "");
+
+/// Starts `cairn`, sends `signal` as soon as its standard error says `cue`, and waits for its end.
+Outcome cairn_interrupted(const Arguments& arguments, const std::string& cue, int signal);
+
+/// Runs `cairn` with standard output and error on a terminal; both arrive in `out`.
+Outcome cairn_on_terminal(const Arguments& arguments, const Environment& environment = {});
+
+/// A folder of its own for each test, removed at its end.
+class TemporaryFolder {
+ public:
+  TemporaryFolder();
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+  ~TemporaryFolder();
+
+  std::string file(const std::string& name) const { return (path_ / name).string(); }
+  const std::filesystem::path& path() const { return path_; }
+  /// Names of what is in it, sorted.
+  std::vector<std::string> contents() const;
+
+ private:
+  std::filesystem::path path_;
+};
+
+std::string read_text(const std::filesystem::path& file);
+void write_text(const std::filesystem::path& file, const std::string& text);
+/// Parses JSON and nothing but JSON: fails the test otherwise.
+boost::json::value parse_json(const std::string& text);
+std::vector<std::string> lines(const std::string& text);
+
+/// The path of the program under test.
+std::string program();
+
+}  // namespace cairn::test

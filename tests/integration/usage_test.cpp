@@ -1,0 +1,210 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What every subcommand has in common: help, errors, common options, streams.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "integration/process.hpp"
+
+namespace cairn::test {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+using ::testing::SizeIs;
+using ::testing::StartsWith;
+
+constexpr int kUsage = 2, kInput = 3, kPlugin = 5;
+
+const std::vector<std::string> kCommands{"info",    "optimize", "bench",  "evaluate",
+                                         "convert", "generate", "plugins"};
+
+/// Code points, which is what a terminal shows.
+std::size_t columns(const std::string& line) {
+  std::size_t count = 0;
+  for (const char c : line) count += (static_cast<unsigned char>(c) & 0xc0) != 0x80;
+  return count;
+}
+
+void expect_fits_a_screen(const Outcome& help) {
+  EXPECT_EQ(help.exit_code, 0) << help.err;
+  EXPECT_LE(lines(help.out).size(), 40u);
+  for (const std::string& line : lines(help.out)) EXPECT_LE(columns(line), 100u) << line;
+  EXPECT_THAT(help.out, HasSubstr("Example:"));
+  EXPECT_THAT(help.out, HasSubstr("Usage: cairn"));
+}
+
+/// One line on standard error that begins with the program's name, and nothing on standard output.
+void expect_error(const Outcome& outcome, int exit_code, const std::string& says) {
+  EXPECT_EQ(outcome.exit_code, exit_code) << outcome.err;
+  EXPECT_EQ(outcome.out, "");
+  EXPECT_THAT(lines(outcome.err), SizeIs(1)) << outcome.err;
+  EXPECT_THAT(outcome.err, StartsWith("cairn: "));
+  EXPECT_THAT(outcome.err, HasSubstr(says));
+}
+
+TEST(Usage, HelpFitsAScreenAndShowsAnExample) {
+  expect_fits_a_screen(cairn({"--help"}));
+  for (const std::string& command : kCommands) {
+    SCOPED_TRACE(command);
+    expect_fits_a_screen(cairn({command, "--help"}));
+    EXPECT_THAT(cairn({"--help"}).out, HasSubstr("  " + command + " "));
+  }
+}
+
+TEST(Usage, WithoutACommandTheHelpGoesToStandardError) {
+  const Outcome outcome = cairn({});
+  EXPECT_EQ(outcome.exit_code, kUsage);
+  EXPECT_EQ(outcome.out, "");
+  EXPECT_EQ(outcome.err, cairn({"--help"}).out);
+}
+
+TEST(Usage, TellsItsVersion) { EXPECT_THAT(cairn({"--version"}).out, StartsWith("cairn ")); }
+
+TEST(Usage, AnUnknownCommandIsAnsweredWithTheNearest) {
+  expect_error(cairn({"optimise", "x.g2o", "--iterations", "3"}), kUsage,
+               "did you mean 'optimize'?");
+  expect_error(cairn({"frobnicate"}), kUsage, "evaluate");
+}
+
+TEST(Usage, AnUnknownOptionIsAnsweredWithTheNearest) {
+  expect_error(cairn({"optimize", "x.g2o", "--iteratons", "5"}), kUsage,
+               "did you mean '--iterations'?");
+  // Its value stands where the graph belongs: the option is still what is wrong.
+  expect_error(cairn({"optimize", "--iteratons", "5", "x.g2o"}), kUsage, "'--iteratons'");
+  expect_error(cairn({"info", "x.g2o", "--thread=2"}), kUsage, "did you mean '--threads'?");
+  expect_error(cairn({"--frobnicate"}), kUsage, "'--frobnicate'");
+}
+
+TEST(Usage, MissingAndSurplusAndMalformedArgumentsAreRefused) {
+  expect_error(cairn({"optimize"}), kUsage, "graph is required");
+  expect_error(cairn({"info", "a.g2o", "b.g2o"}), kUsage, "'b.g2o' is one argument too many");
+  expect_error(cairn({"optimize", "@ring", "--iterations", "many"}), kUsage, "many");
+  expect_error(cairn({"optimize", "@ring", "--iterations=-1"}), kUsage, "-1");
+  expect_error(cairn({"optimize", "@ring", "--tolerance", "2"}), kUsage, "--tolerance");
+  expect_error(cairn({"optimize", "@ring", "--threads", "100000"}), kUsage, "--threads");
+}
+
+TEST(Usage, ExitCodesTellInputFromPluginFromUsage) {
+  expect_error(cairn({"info", "there-is-no-such-file.g2o"}), kInput, "there-is-no-such-file.g2o");
+  expect_error(cairn({"optimize", "@ring", "--linear-solver", "chomod"}), kPlugin,
+               "no linear solver 'chomod'");
+  expect_error(cairn({"optimize", "@ring", "--optimizer", "levenberg"}), kPlugin,
+               "levenberg_marquardt");
+  expect_error(cairn({"optimize", "@ring", "--initial", "oodometry"}), kPlugin, "odometry");
+  expect_error(cairn({"optimize", "@ring", "--plugin", "there-is-no-such-plugin.so"}), kPlugin,
+               "there-is-no-such-plugin.so");
+  expect_error(cairn({"info", "@ring", "--types", "slam3d:metric=manhattan"}), kUsage, "logarithm");
+  expect_error(cairn({"info", "@ring", "--types", "slam3d:metrik=g2o"}), kUsage, "'metric'");
+}
+
+TEST(Usage, ABadFileIsRefusedInOneLineThatNamesTheLine) {
+  const TemporaryFolder folder;
+  write_text(folder.file("bad.g2o"), "VERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 1 zero 0\n");
+  expect_error(cairn({"info", folder.file("bad.g2o")}), kInput, "bad.g2o:2");
+}
+
+TEST(Usage, JsonOnStandardOutputIsAlone) {
+  const TemporaryFolder folder;
+  const std::string graph = folder.file("graph.g2o"), best = folder.file("best.g2o");
+  const std::vector<Arguments> runs{{"generate", "ring:poses=40", "-o", graph, "--json", "-"},
+                                    {"info", graph, "--json", "-"},
+                                    {"optimize", graph, "-o", best, "--json", "-"},
+                                    {"convert", graph, folder.file("graph.tum"), "--json", "-"},
+                                    {"evaluate", best, graph, "--json", "-"},
+                                    {"bench", graph, "--repeat", "1", "--json", "-"},
+                                    {"plugins", "--json", "-"},
+                                    {"plugins", "levenberg_marquardt", "--json", "-"}};
+  for (const Arguments& run : runs) {
+    SCOPED_TRACE(run.front());
+    const Outcome outcome = cairn(run);
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+    const auto report = parse_json(outcome.out).as_object();
+    EXPECT_TRUE(report.at("cairn").is_string());
+    EXPECT_EQ(report.at("command").as_string(), run.front());
+  }
+}
+
+TEST(Usage, CommonOptionsMayStandBeforeTheCommand) {
+  const Outcome before = cairn({"--json", "-", "--quiet", "info", "@ring:poses=20"});
+  EXPECT_EQ(parse_json(before.out).at("command").as_string(), "info");
+}
+
+TEST(Usage, QuietLeavesStandardErrorEmpty) {
+  for (const Arguments& run :
+       std::vector<Arguments>{{"optimize", "@ring:poses=40", "--quiet"},
+                              {"bench", "@ring:poses=40", "--repeat", "1", "--quiet"},
+                              {"info", "@ring:poses=40", "--quiet"}}) {
+    const Outcome outcome = cairn(run);
+    EXPECT_EQ(outcome.exit_code, 0);
+    EXPECT_EQ(outcome.err, "");
+    EXPECT_NE(outcome.out, "");
+  }
+}
+
+TEST(Usage, AConfigurationFileStandsBehindTheCommandLine) {
+  const TemporaryFolder folder;
+  write_text(folder.file("run.toml"),
+             "quiet = true\n[optimize]\niterations = 2\ntolerance = 0\n"
+             "linear-solver = \"eigen\"\n[bench]\nrepeat = 3\n");
+  const Arguments base{"optimize", "@ring:poses=60", "--json",
+                       "-",        "--config",       folder.file("run.toml")};
+  const auto by_file = parse_json(cairn(base).out);
+  EXPECT_EQ(by_file.at("iterations").as_array().size(), 2u);
+  EXPECT_EQ(by_file.at("linear_solver").as_string(), "eigen");
+  Arguments more = base;
+  more.insert(more.end(), {"--iterations", "3"});
+  const auto by_line = parse_json(cairn(more).out);
+  EXPECT_EQ(by_line.at("iterations").as_array().size(), 3u);
+}
+
+TEST(Usage, AConfigurationFileWithUnknownKeysIsRefused) {
+  const TemporaryFolder folder;
+  const auto with = [&](const std::string& text) {
+    write_text(folder.file("run.toml"), text);
+    return cairn({"optimize", "@ring", "--config", folder.file("run.toml")});
+  };
+  expect_error(with("[optimize]\niteratons = 2\n"), kUsage, "did you mean '--iterations'?");
+  expect_error(with("iterations = 2\n"), kUsage, "'iterations'");
+  expect_error(with("[optimise]\niterations = 2\n"), kUsage, "'optimise'");
+  expect_error(cairn({"info", "@ring", "--config", folder.file("none.toml")}), kInput, "none.toml");
+}
+
+TEST(Usage, AReaderThatGoesAwayIsNoError) {
+  for (const std::string& words :
+       {std::string("plugins"), std::string("convert @manhattan:poses=5000 - --to g2o")}) {
+    const Outcome outcome =
+        run_program({"bash", "-c", program() + " " + words + " | true; echo ${PIPESTATUS[0]}"});
+    EXPECT_EQ(outcome.out, "0\n") << words << outcome.err;
+    EXPECT_EQ(outcome.err, "");
+  }
+}
+
+TEST(Usage, AFullDiskIsAnError) {
+  for (const std::string& words :
+       {std::string("plugins"), std::string("convert @ring - --to g2o")}) {
+    const Outcome outcome = run_program({"bash", "-c", program() + " " + words + " > /dev/full"});
+    EXPECT_EQ(outcome.exit_code, kInput) << words;
+    EXPECT_THAT(outcome.err, HasSubstr("cannot be written"));
+  }
+}
+
+TEST(Usage, ColoursOnlyOnATerminalThatWantsThem) {
+  EXPECT_THAT(cairn_on_terminal({"plugins"}, {{"TERM", "xterm"}, {"NO_COLOR", ""}}).out,
+              HasSubstr("\x1b[1m"));
+  EXPECT_THAT(cairn_on_terminal({"plugins"}, {{"TERM", "xterm"}, {"NO_COLOR", "1"}}).out,
+              Not(HasSubstr("\x1b")));
+  EXPECT_THAT(cairn_on_terminal({"plugins"}, {{"TERM", "dumb"}}).out, Not(HasSubstr("\x1b[1m")));
+  EXPECT_THAT(cairn({"plugins"}, {{"TERM", "xterm"}}).out, Not(HasSubstr("\x1b")));
+}
+
+TEST(Usage, ProgressIsOneLineOnATerminalAndPlainLinesElsewhere) {
+  const Arguments run{"optimize", "@ring:poses=60", "--iterations", "4", "--tolerance", "0"};
+  EXPECT_THAT(cairn_on_terminal(run, {{"TERM", "xterm"}}).out, HasSubstr("\r[#"));
+  const std::string err = cairn(run).err;
+  EXPECT_THAT(err, HasSubstr("iteration   4  chi2 "));
+  EXPECT_THAT(err, Not(HasSubstr("\r")));
+  EXPECT_EQ(lines(err).size(), 5u) << err;  // the start, and four iterations
+}
+
+}  // namespace
+}  // namespace cairn::test
