@@ -37,9 +37,18 @@ function(cairn_add_plugin)
     set(arg_LICENCE BSD-3-Clause)
   endif()
 
+  # The texts go into C++ and JSON string literals, which escape alike.
+  foreach(text IN ITEMS DESCRIPTION VERSION LICENCE)
+    string(REPLACE "\\" "\\\\" arg_${text} "${arg_${text}}")
+    string(REPLACE "\"" "\\\"" arg_${text} "${arg_${text}}")
+  endforeach()
+
   set(cpp_offers "")
   set(json_offers "")
   foreach(offer IN LISTS arg_OFFERS)
+    string(REPLACE "\\;" ";" offer "${offer}")
+    string(REPLACE "\\" "\\\\" offer "${offer}")
+    string(REPLACE "\"" "\\\"" offer "${offer}")
     if(NOT offer MATCHES "^([a-z_]+)\\|([^|]+)\\|([^|]+)$")
       message(FATAL_ERROR "cairn_add_plugin(NAME ${arg_NAME}): an offer is \"kind|name|one line\", not \"${offer}\"")
     endif()
