@@ -265,7 +265,18 @@ class AlbumBuilder {
       entry = &entries_.back();
       entry->scene.name = short_name(file);
     }
+    for (SceneRun& shown : entry->scene.runs) {
+      if (!same_run(shown, run)) continue;
+      shown = std::move(run);  // the report says more than the recording
+      return;
+    }
     entry->scene.runs.push_back(std::move(run));
+  }
+
+  /// A recording and a report of one run: no two runs take the same time to the last bit.
+  static bool same_run(const SceneRun& a, const SceneRun& b) {
+    return a.summary.seconds.total == b.summary.seconds.total &&
+           a.summary.final_chi2 == b.summary.final_chi2;
   }
 
   static bool readable(const std::string& file) {

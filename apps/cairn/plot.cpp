@@ -73,8 +73,8 @@ int run(const PlotOptions& options, Session& session) {
   report["bytes"] = bytes;
   report["what"] = options.what;
   session.write_json(report);
-  session.print(fmt::format("{}: {}\n", options.output,
-                            bytes_text(static_cast<std::int64_t>(bytes))));
+  session.print(
+      fmt::format("{}: {}\n", options.output, bytes_text(static_cast<std::int64_t>(bytes))));
   return 0;
 }
 
@@ -114,7 +114,8 @@ Command add_plot(CLI::App& program) {
       "Example:\n"
       "  cairn plot city.g2o best.g2o -o city.svg\n"
       "  cairn plot run1.json run2.json --what convergence --x time -o curves.pdf\n"
-      "  cairn plot @sphere --what sparsity --linear-solver block_cholesky:ordering=natural -o L.png");
+      "  cairn plot @sphere --what sparsity --linear-solver block_cholesky:ordering=natural -o "
+      "L.png");
   return {app, [options](Session& session) { return run(*options, session); }};
 }
 

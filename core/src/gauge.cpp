@@ -37,7 +37,8 @@ Gauge resolve_gauge(const Graph& graph) {
   gauge.component.assign(n, -1);
 
   Forest forest(n);
-  std::vector<bool> touched(n, false), has_prior(n, false);
+  std::vector<bool> touched(n, false);
+  std::vector<int> prior_size(n, 0);
   for (const FactorPool& pool : graph.factor_pools()) {
     const std::size_t arity = static_cast<std::size_t>(pool.type->arity());
     for (std::size_t k = 0; k < pool.variables.size(); k += arity) {
@@ -45,7 +46,7 @@ Gauge resolve_gauge(const Graph& graph) {
         touched[pool.variables[k + a]] = true;
         if (a > 0) forest.join(pool.variables[k], pool.variables[k + a]);
       }
-      if (arity == 1) has_prior[pool.variables[k]] = true;
+      if (arity == 1) prior_size[pool.variables[k]] += pool.type->residual_size();
     }
   }
 
@@ -53,7 +54,7 @@ Gauge resolve_gauge(const Graph& graph) {
     int largest_tangent = 0;
     int first_largest = -1;
     bool fixed = false;
-    bool prior = false;
+    int prior_size = 0;
   };
   std::vector<Anchoring> components;
   for (int v = 0; v < n; ++v) {
@@ -74,15 +75,12 @@ Gauge resolve_gauge(const Graph& graph) {
       c.first_largest = v;
     }
     c.fixed = c.fixed || graph.fixed(v);
-  }
-  for (int v = 0; v < n; ++v) {
-    Anchoring& c = components[gauge.component[v]];
-    if (has_prior[v] && graph.type(v).tangent_size() == c.largest_tangent) c.prior = true;
+    c.prior_size += prior_size[v];
   }
   gauge.components = static_cast<int>(components.size());
   for (const Anchoring& c : components) {
     gauge.components_with_fixed += c.fixed;
-    if (c.fixed || c.prior || gauge.held[c.first_largest]) continue;
+    if (c.fixed || c.prior_size >= c.largest_tangent || gauge.held[c.first_largest]) continue;
     gauge.held[c.first_largest] = true;
     gauge.anchored.push_back(c.first_largest);
   }
@@ -102,7 +100,8 @@ std::string Gauge::describe(const Graph& graph) const {
       names.push_back(graph.describe_variable(anchored[k]));
     }
     text = fmt::format(
-        "{} components without a fixed variable or a prior: anchored one variable of each ({}{})",
+        "{} components without a fixed variable or enough priors: anchored one variable of each "
+        "({}{})",
         anchored.size(), fmt::join(names, ", "), anchored.size() > 5 ? ", …" : "");
   }
   if (!unconstrained.empty()) {

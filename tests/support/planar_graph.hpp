@@ -37,6 +37,16 @@ struct PosePrior {
   }
 };
 
+struct PointPrior {
+  static constexpr std::string_view kTag = "EDGE_PRIOR_XY";
+  static constexpr int kResidual = 2, kMeasurement = 2;
+  using Variables = std::tuple<PointXY>;
+  template <class S>
+  static Vector<S, 2> residual(const Vector<S, 2>& a, const Vector<double, 2>& z) {
+    return a - z.template cast<S>();
+  }
+};
+
 /// A point seen from a pose.
 struct PointSeen {
   static constexpr std::string_view kTag = "EDGE_SE2_XY";
@@ -58,6 +68,7 @@ struct PlanarTypes {
   std::shared_ptr<const VariableType> point = define_variable<PointXY>();
   std::shared_ptr<const FactorType> relative_pose = define_factor<RelativePose>();
   std::shared_ptr<const FactorType> prior = define_factor<PosePrior>();
+  std::shared_ptr<const FactorType> point_prior = define_factor<PointPrior>();
   std::shared_ptr<const FactorType> point_seen = define_factor<PointSeen>();
 };
 

@@ -10,9 +10,10 @@ namespace cairn {
 
 /// Which variables an optimisation holds, so that H is not singular by construction.
 ///
-/// Variables marked `FIX` are held. A connected component with neither a held variable nor a prior
-/// (a factor on one variable) on a pose gets its first pose anchored: the first variable with the
-/// component's largest tangent space. Anchors are not written to files.
+/// Variables marked `FIX` are held. A connected component that has none, and whose priors (factors
+/// on one variable) together measure fewer numbers than a pose has freedoms, gets its first pose
+/// anchored: the first variable with the component's largest tangent space. Anchors are not written
+/// to files.
 struct CAIRN_API Gauge {
   std::vector<bool> held;      ///< by variable
   std::vector<int> anchored;   ///< variables held only to fix the gauge, one a component

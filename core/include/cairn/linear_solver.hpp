@@ -51,4 +51,14 @@ class CAIRN_API LogDeterminant {
   virtual double log_determinant() const = 0;
 };
 
+/// Ability: the order in which the blocks of the analysed structure are eliminated. L has a block
+/// at (row, column) of that order where H has, and where elimination fills in.
+class CAIRN_API EliminationOrder {
+ public:
+  static constexpr std::string_view kAbility = "elimination_order";
+  virtual ~EliminationOrder();
+  /// Element k is the block eliminated k-th. Good until the next `analyze`.
+  virtual std::span<const std::int32_t> elimination_order() const = 0;
+};
+
 }  // namespace cairn

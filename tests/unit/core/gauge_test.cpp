@@ -40,7 +40,7 @@ TEST_F(GaugeTest, AnchorsTheFirstPoseOfEachComponentNotAPoint) {
   EXPECT_THAT(gauge.held, ElementsAre(false, true, false, false, true, false));
   EXPECT_THAT(gauge.component, ElementsAre(0, 0, 0, 0, 1, 1));
   EXPECT_EQ(gauge.describe(graph_),
-            "2 components without a fixed variable or a prior: anchored one variable of each "
+            "2 components without a fixed variable or enough priors: anchored one variable of each "
             "(VERTEX_SE2 0, VERTEX_SE2 10)");
 }
 
@@ -50,8 +50,7 @@ TEST_F(GaugeTest, LeavesAComponentWithAFixedVariableAlone) {
   EXPECT_THAT(gauge.anchored, ElementsAre(4));
   EXPECT_TRUE(gauge.held[3]);
   EXPECT_FALSE(gauge.held[1]);
-  EXPECT_EQ(gauge.describe(graph_),
-            "a component has no fixed variable: anchored VERTEX_SE2 10");
+  EXPECT_EQ(gauge.describe(graph_), "a component has no fixed variable: anchored VERTEX_SE2 10");
 }
 
 TEST_F(GaugeTest, APriorOnAPoseFixesItsComponent) {
@@ -61,6 +60,17 @@ TEST_F(GaugeTest, APriorOnAPoseFixesItsComponent) {
   const Gauge gauge = resolve_gauge(graph_);
   EXPECT_THAT(gauge.anchored, IsEmpty());
   EXPECT_EQ(gauge.describe(graph_), "");
+}
+
+TEST_F(GaugeTest, PriorsOnPointsFixAComponentOnlyTogether) {
+  const auto add_prior = [&] {
+    graph_.add_factor(types_.point_prior, std::array{0}, std::array{0.0, 0.0},
+                      std::array{1.0, 0.0, 1.0});
+  };
+  add_prior();
+  EXPECT_THAT(resolve_gauge(graph_).anchored, ElementsAre(1, 4));
+  add_prior();
+  EXPECT_THAT(resolve_gauge(graph_).anchored, ElementsAre(4));
 }
 
 TEST_F(GaugeTest, HoldsAVariableThatNoFactorTouches) {
