@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: BSD-3-Clause
+import type { NumberArray } from "./contract";
+import { DataError, decodeNumbers } from "./decode";
+
+/** The names of variables: numbers of up to 64 bits, any text, or simply 0, 1, 2, … */
+export class Ids {
+  private index: Map<string, number> | null = null;
+
+  private constructor(
+    readonly count: number,
+    private readonly names: ArrayLike<string | number | bigint> | null,
+  ) {}
+
+  static async decode(json: NumberArray | string[] | "sequence", count: number, where: string): Promise<Ids> {
+    if (json === "sequence") return new Ids(count, null);
+    if (Array.isArray(json)) {
+      if (json.length !== count) throw new DataError(`${where}: ${json.length} instead of ${count}`);
+      return new Ids(count, json.map(String));
+    }
+    return new Ids(count, await decodeNumbers(json, where, count));
+  }
+
+  label(variable: number): string {
+    return this.names ? String(this.names[variable]) : String(variable);
+  }
+
+  /** The variable of that name, or -1. */
+  find(name: string): number {
+    const wanted = name.trim();
+    if (!this.index) {
+      this.index = new Map();
+      for (let i = 0; i < this.count; ++i) this.index.set(this.label(i), i);
+    }
+    return this.index.get(wanted) ?? -1;
+  }
+}

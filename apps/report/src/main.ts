@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: BSD-3-Clause
+import "uplot/dist/uPlot.min.css";
+import "./style.css";
+import type { ReportJson } from "./data/contract";
+import { DataError } from "./data/decode";
+import { decodeGraph, type Graph } from "./data/graph";
+import { App } from "./ui/app";
+import { el } from "./ui/dom";
+
+const kVersion = 1;
+
+function read(): ReportJson {
+  const text = document.getElementById("cairn-data")?.textContent?.trim() ?? "";
+  if (text === "" || text.startsWith("@")) throw new DataError("This page holds no data: cairn view and cairn bench --html fill it.");
+  let report: ReportJson;
+  try {
+    report = JSON.parse(text) as ReportJson;
+  } catch {
+    throw new DataError("The data in this page is not JSON.");
+  }
+  if (report.format !== "cairn-report") throw new DataError("The data in this page is not a report of cairn.");
+  if (report.version !== kVersion) {
+    throw new DataError(`The data in this page has version ${String(report.version)}, and the page knows version ${kVersion} only.`);
+  }
+  return report;
+}
+
+async function start(): Promise<void> {
+  const root = document.getElementById("app")!;
+  root.replaceChildren(el("p", { class: "loading", role: "status" }, "Reading …"));
+  try {
+    const report = read();
+    const graphs: Graph[] = [];
+    for (const [k, graph] of (report.graphs ?? []).entries()) graphs.push(await decodeGraph(graph, k));
+    if (graphs.length === 0 && !report.bench) throw new DataError("There is neither a graph nor a comparison in this page.");
+    document.getElementById("cairn-data")?.replaceChildren();  // decoded: no need to hold it twice
+    root.replaceChildren(new App(report, graphs).build());
+    document.documentElement.dataset.ready = "true";
+  } catch (error) {
+    if (!(error instanceof DataError)) console.error(error);
+    root.replaceChildren(el("div", { class: "scroll" }, el("div", { class: "page narrow", role: "alert" },
+      el("h1", {}, "This page cannot be shown"), el("p", {}, (error as Error).message))));
+  }
+}
+
+void start();

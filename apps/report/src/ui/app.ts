@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The page: what it holds, in tabs.
+import type { ReportJson } from "../data/contract";
+import type { Graph } from "../data/graph";
+import { aboutView } from "./about";
+import { benchView } from "./bench";
+import { choice, el, freshId, iconButton, svg } from "./dom";
+import { plural } from "./format";
+import { MapView } from "./map";
+import { runsView } from "./runs";
+import { toggleTheme } from "./theme";
+
+interface Tab {
+  name: string;
+  button: HTMLButtonElement;
+  panel: HTMLElement;
+}
+
+/** Three stones on each other. */
+function mark(): SVGSVGElement {
+  return svg("svg", { class: "mark", viewBox: "0 0 24 24", "aria-hidden": "true" },
+    svg("ellipse", { cx: 12, cy: 19, rx: 9.5, ry: 3.6 }),
+    svg("ellipse", { cx: 12.6, cy: 12.3, rx: 6.6, ry: 2.8 }),
+    svg("ellipse", { cx: 11.6, cy: 6.6, rx: 3.9, ry: 2.3 }));
+}
+
+export class App {
+  private readonly tabs: Tab[] = [];
+  private readonly tabList = el("div", { class: "tabs", role: "tablist", "aria-label": "Parts of the page" });
+  private readonly main = el("main", {});
+  private map: MapView | null = null;
+  private readonly runs = el("div", { class: "scroll" });
+  private title: HTMLElement = el("span", {});
+  private readonly counts = el("span", { class: "counts" });
+
+  constructor(private readonly report: ReportJson, private readonly graphs: Graph[]) {}
+
+  build(): HTMLElement {
+    const { report, graphs } = this;
+    let renderer = "";
+    if (graphs.length > 0) {
+      try {
+        this.map = new MapView();
+        renderer = this.map.stage.software ? `${this.map.stage.rendererName} (in software)` : this.map.stage.rendererName;
+        this.add("Map", this.map.element);
+      } catch (error) {
+        this.add("Map", el("div", { class: "scroll" }, el("p", { class: "warning" }, `No map: ${(error as Error).message}.`)));
+      }
+      if (graphs.some((graph) => runsView(graph) !== null)) this.add("Runs", this.runs);
+    }
+    if (report.bench) this.add("Comparison", el("div", { class: "scroll" }, benchView(report.bench)));
+    this.add("About", el("div", { class: "scroll" }, aboutView(report, graphs, renderer)));
+    const names = graphs.map((graph, k) => [k, graph.name] as [number, string]);
+    this.title = graphs.length > 1
+      ? choice("Graph", names, 0, (k) => this.show(graphs[k]))
+      : el("span", { class: "title" }, graphs[0]?.name ?? report.title ?? "");
+    const header = el("header", {},
+      el("span", { class: "brand" }, mark(), "cairn"), this.title, this.counts, this.tabList,
+      iconButton("moon", "Light or dark", toggleTheme));
+    if (graphs.length > 0) this.show(graphs[0]);
+    this.open(report.kind === "bench" ? "Comparison" : this.tabs[0].name);
+    document.title = [report.title, "cairn"].filter(Boolean).join(" – ");
+    const page = el("div", { class: "app" }, header, this.main);
+    return page;
+  }
+
+  private add(name: string, content: HTMLElement): void {
+    const id = freshId("tab");
+    const button = el("button", { type: "button", role: "tab", id, "aria-controls": `${id}-panel`, onclick: () => this.open(name) }, name);
+    button.addEventListener("keydown", (event) => {
+      const by = event.key === "ArrowRight" ? 1 : event.key === "ArrowLeft" ? -1 : 0;
+      if (by === 0) return;
+      const next = this.tabs[(this.tabs.findIndex((tab) => tab.name === name) + by + this.tabs.length) % this.tabs.length];
+      this.open(next.name);
+      next.button.focus();
+    });
+    const panel = el("div", { role: "tabpanel", id: `${id}-panel`, "aria-labelledby": id, class: "tab-panel" }, content);
+    this.tabs.push({ name, button, panel });
+    this.tabList.append(button);
+    this.main.append(panel);
+  }
+
+  private open(name: string): void {
+    const wanted = this.tabs.some((tab) => tab.name === name) ? name : this.tabs[0].name;
+    for (const tab of this.tabs) {
+      const on = tab.name === wanted;
+      tab.panel.hidden = !on;
+      tab.button.setAttribute("aria-selected", String(on));
+      tab.button.tabIndex = on ? 0 : -1;
+    }
+    // Which graph it is says nothing about a comparison of many.
+    const ofOneGraph = wanted === "Map" || wanted === "Runs";
+    this.title.hidden = this.counts.hidden = !ofOneGraph;
+  }
+
+  private show(graph: Graph): void {
+    this.map?.show(graph);
+    const what = graph.edges.class.some((c) => c !== 4) ? "edge" : "pair";
+    this.counts.textContent = `${plural(graph.variables.count, "variable")}, ${plural(graph.edges.count, what)}`;
+    this.runs.replaceChildren(runsView(graph) ?? el("div", { class: "page" }, el("p", { class: "lead" }, "Nothing was run on this graph.")));
+  }
+}
