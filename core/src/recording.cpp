@@ -162,7 +162,10 @@ class FrameReader {
     if (run_.name.empty()) run_.name = name;
     recording_.name = run_.name;
     scene_.runs.push_back(run_);
-    if (recording_.frames.empty()) return;
+    if (recording_.frames.empty()) {
+      throw Error(ErrorCode::input,
+                  fmt::format("{}: not even the start was recorded", scene_.name));
+    }
     add_estimate(recording_.frames.front(), "start", EstimateRole::initial);
     add_estimate(recording_.frames.back(), run_.name, EstimateRole::estimate);
     scene_.estimates.back().run = static_cast<int>(scene_.runs.size()) - 1;

@@ -12,7 +12,7 @@ namespace cairn {
 namespace {
 
 /// cairn's own linear solver: a thin coat over `block::SupernodalCholesky`.
-class BlockCholesky final : public LinearSolver, public LogDeterminant {
+class BlockCholesky final : public LinearSolver, public LogDeterminant, public EliminationOrder {
  public:
   BlockCholesky(std::string ordering, const std::string& kernels)
       : ordering_(std::move(ordering)), cholesky_(kernels) {}
@@ -31,8 +31,13 @@ class BlockCholesky final : public LinearSolver, public LogDeterminant {
   const LinearSolverStats& stats() const override { return stats_; }
 
   double log_determinant() const override { return cholesky_.log_determinant(); }
+  std::span<const std::int32_t> elimination_order() const override {
+    return cholesky_.symbolic().order();
+  }
   void* ability(std::string_view name) override {
-    return name == LogDeterminant::kAbility ? static_cast<LogDeterminant*>(this) : nullptr;
+    if (name == LogDeterminant::kAbility) return static_cast<LogDeterminant*>(this);
+    if (name == EliminationOrder::kAbility) return static_cast<EliminationOrder*>(this);
+    return nullptr;
   }
 
  private:

@@ -1,0 +1,146 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "chart.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <fmt/format.h>
+
+namespace cairn::plot {
+namespace {
+
+constexpr double kMargin = 16;
+constexpr double kTickLength = 4;
+
+/// The smallest of 1, 2, 5 times a power of ten that is not below `step`.
+double round_up(double step) {
+  const double power = std::pow(10.0, std::floor(std::log10(step)));
+  for (const double factor : {1.0, 2.0, 5.0}) {
+    if (factor * power >= step * (1 - 1e-9)) return factor * power;
+  }
+  return 10 * power;
+}
+
+}  // namespace
+
+double Range::part(double value) const {
+  if (!logarithmic) return (value - low) / (high - low);
+  return std::log(value / low) / std::log(high / low);
+}
+
+std::vector<double> Range::ticks(int count) const {
+  std::vector<double> all;
+  const double decades = logarithmic ? std::log10(high / low) : 0;
+  if (logarithmic && decades >= 1) {
+    const double step = std::max(1.0, std::ceil(decades / count));
+    for (double e = std::ceil(std::log10(low) - 1e-9); e <= std::log10(high) + 1e-9; e += step) {
+      for (const double factor : {1.0, 2.0, 5.0}) {
+        const double tick = factor * std::pow(10.0, e);
+        // Within few decades one tick in each would be too few.
+        if ((factor == 1 || decades < 2.5) && tick <= high * (1 + 1e-9)) all.push_back(tick);
+      }
+    }
+    if (all.size() >= 2) return all;
+    all.clear();
+  }
+  const double step = round_up((high - low) / std::max(count, 1));
+  for (double k = std::ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; ++k) {
+    all.push_back(k == 0 ? 0 : k * step);
+    if (all.size() > 100) break;  // a range that a double cannot divide
+  }
+  return all;
+}
+
+Range range_of(const std::vector<double>& values, bool logarithmic) {
+  double low = std::numeric_limits<double>::infinity();
+  double high = -low;
+  for (const double value : values) {
+    if (!std::isfinite(value) || (logarithmic && value <= 0)) continue;
+    low = std::min(low, value);
+    high = std::max(high, value);
+  }
+  if (low > high) return {logarithmic ? 1.0 : 0.0, logarithmic ? 10.0 : 1.0, logarithmic};
+  if (logarithmic) {
+    const double room = std::max(std::pow(high / low, 0.04), 1.05);
+    return {low / room, high * room, true};
+  }
+  const double room = high > low ? 0.03 * (high - low) : std::max(std::abs(high) * 0.1, 0.5);
+  return {low - room, high + room, false};
+}
+
+std::string tick_text(double value) {
+  const double size = std::abs(value);
+  if (size != 0 && (size >= 1e6 || size < 1e-3)) {
+    const int exponent = static_cast<int>(std::floor(std::log10(size) + 1e-9));
+    return fmt::format("{:g}e{}", value / std::pow(10.0, exponent), exponent);
+  }
+  return fmt::format("{:.6g}", value);
+}
+
+Box draw_heading(Canvas& canvas, const Theme& theme, const Box& box, const std::string& title,
+                 const std::vector<LegendEntry>& legend) {
+  double y = box.y + kTitleSize;
+  canvas.text(box.x, y, title, kTitleSize, theme.ink, Align::left, true, box.width);
+  double x = box.x;
+  constexpr double kSample = 26, kGap = 18, kRow = 17;
+  if (!legend.empty()) y += kRow + 2;
+  for (const LegendEntry& entry : legend) {
+    const double most = std::min(box.width - kSample - 8, 420.0);
+    const double width = kSample + 6 + std::min(canvas.text_width(entry.name, kTextSize), most);
+    if (x > box.x && x + width > box.right()) {
+      x = box.x;
+      y += kRow;
+    }
+    canvas.line(x, y - 4, x + kSample, y - 4, entry.stroke);
+    canvas.text(x + kSample + 6, y, entry.name, kTextSize, theme.ink, Align::left, false, most);
+    x += width + kGap;
+  }
+  const double used = y + 12 - box.y;
+  return {box.x, box.y + used, box.width, box.height - used};
+}
+
+Chart::Chart(Canvas& canvas, const Theme& theme, const Box& box, const Range& x, const Range& y,
+             const std::string& x_label, const std::string& y_label)
+    : x_(x), y_(y) {
+  const std::vector<double> y_ticks = y.ticks(std::max(2, static_cast<int>(box.height / 60)));
+  double label_width = 0;
+  for (const double tick : y_ticks) {
+    label_width = std::max(label_width, canvas.text_width(tick_text(tick), kTextSize));
+  }
+  const double left = label_width + kTextSize + 18;
+  area_ = {box.x + left, box.y, box.width - left - 8, box.height - 2 * kTextSize - 18};
+  const std::vector<double> x_ticks = x.ticks(std::max(2, static_cast<int>(area_.width / 90)));
+  const Stroke grid{theme.grid, 1, {}};
+  for (const double tick : y_ticks) {
+    canvas.line(area_.x - kTickLength, Chart::y(tick), area_.right(), Chart::y(tick), grid);
+    canvas.text(area_.x - kTickLength - 4, Chart::y(tick) + 4, tick_text(tick), kTextSize,
+                theme.muted, Align::right);
+  }
+  for (const double tick : x_ticks) {
+    canvas.line(Chart::x(tick), area_.y, Chart::x(tick), area_.bottom() + kTickLength, grid);
+    canvas.text(Chart::x(tick), area_.bottom() + kTextSize + 7, tick_text(tick), kTextSize,
+                theme.muted, Align::centre);
+  }
+  canvas.text(area_.x + area_.width / 2, area_.bottom() + 2 * kTextSize + 12, x_label, kTextSize,
+              theme.ink, Align::centre);
+  canvas.text_upwards(box.x + kTextSize, area_.y + area_.height / 2, y_label, kTextSize, theme.ink);
+}
+
+std::vector<Box> panels(const Canvas& canvas, std::size_t count, std::size_t columns) {
+  if (columns == 0) {
+    columns = static_cast<std::size_t>(std::ceil(std::sqrt(static_cast<double>(count))));
+  }
+  const std::size_t rows = (count + columns - 1) / columns;
+  const double width = (canvas.width() - kMargin * double(columns + 1)) / double(columns);
+  const double height = (canvas.height() - kMargin * double(rows + 1)) / double(rows);
+  std::vector<Box> boxes;
+  for (std::size_t k = 0; k < count; ++k) {
+    const std::size_t row = k / columns;
+    boxes.push_back({kMargin + double(k % columns) * (width + kMargin),
+                     kMargin + double(row) * (height + kMargin), width, height});
+  }
+  return boxes;
+}
+
+}  // namespace cairn::plot

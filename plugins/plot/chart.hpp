@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "canvas.hpp"
+
+namespace cairn::plot {
+
+inline constexpr double kTitleSize = 14;
+inline constexpr double kTextSize = 11;
+
+/// An interval of numbers on an axis.
+struct Range {
+  double low = 0, high = 1;
+  bool logarithmic = false;
+
+  /// 0 at low, 1 at high.
+  double part(double value) const;
+  /// Places for grid lines, about `count` of them: 1, 2 or 5 times a power of ten.
+  std::vector<double> ticks(int count) const;
+};
+
+/// A range that holds all values that can be shown (finite; positive if logarithmic), with a little
+/// room round them.
+Range range_of(const std::vector<double>& values, bool logarithmic);
+
+/// "1200", "0.05", "1e-7"
+std::string tick_text(double value);
+
+/// A name, and how it is drawn.
+struct LegendEntry {
+  std::string name;
+  Stroke stroke;
+};
+
+/// A title and below it a legend, in as many rows as it takes; returns what is left of the box.
+Box draw_heading(Canvas& canvas, const Theme& theme, const Box& box, const std::string& title,
+                 const std::vector<LegendEntry>& legend);
+
+/// Axes with grid, ticks and labels within a box.
+class Chart {
+ public:
+  Chart(Canvas& canvas, const Theme& theme, const Box& box, const Range& x, const Range& y,
+        const std::string& x_label, const std::string& y_label);
+  /// Where the data goes.
+  const Box& area() const { return area_; }
+  double x(double value) const { return area_.x + x_.part(value) * area_.width; }
+  double y(double value) const { return area_.bottom() - y_.part(value) * area_.height; }
+
+ private:
+  Box area_;
+  Range x_, y_;
+};
+
+/// The boxes of `count` charts on a page, in rows of `columns`; 0: as square as can be.
+std::vector<Box> panels(const Canvas& canvas, std::size_t count, std::size_t columns = 0);
+
+}  // namespace cairn::plot

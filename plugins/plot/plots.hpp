@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+
+#include "cairn/linear_solver.hpp"
+#include "cairn/scene.hpp"
+#include "canvas.hpp"
+
+namespace cairn::plot {
+
+// Each draws one kind of picture, and throws `Error` (input) where the album has nothing for it.
+
+/// Poses and edges of each graph; `by_residual`: edges coloured by chi2.
+void draw_trajectories(Canvas& canvas, const Theme& theme, const Album& album, bool by_residual);
+/// chi2 of each run against iterations or time, logarithmic.
+void draw_convergence(Canvas& canvas, const Theme& theme, const Album& album, bool against_time);
+/// Seconds of each iteration of each run.
+void draw_steps(Canvas& canvas, const Theme& theme, const Album& album);
+/// Median times of a comparison, with their spread.
+void draw_bars(Canvas& canvas, const Theme& theme, const Album& album);
+/// Where H has blocks, and where L has them in the order of a linear solver.
+void draw_sparsity(Canvas& canvas, const Theme& theme, const Album& album, LinearSolver& solver);
+
+}  // namespace cairn::plot

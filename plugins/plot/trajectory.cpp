@@ -1,0 +1,301 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "cairn/error.hpp"
+#include "chart.hpp"
+#include "plots.hpp"
+
+namespace cairn::plot {
+namespace {
+
+// How a graph in 3D is looked at.
+constexpr double kAzimuth = 35 * std::numbers::pi / 180;
+constexpr double kElevation = 28 * std::numbers::pi / 180;
+// An initial guess that is further out than this many times the rest is cut off, not shrunk to.
+constexpr double kGuessMayExceed = 2.5;
+constexpr int kShades = 48;
+
+struct Point {
+  double x = 0, y = 0;
+  bool there() const { return std::isfinite(x) && std::isfinite(y); }
+};
+
+/// Parallel projection, upwards being up; a planar graph as it is.
+std::vector<Point> project(const Scene& scene, const SceneEstimate& estimate) {
+  std::vector<Point> points(scene.ids.size());
+  for (std::size_t v = 0; v < points.size(); ++v) {
+    if (scene.dimension == 2) {
+      points[v] = {estimate.positions[2 * v], estimate.positions[2 * v + 1]};
+      continue;
+    }
+    const double* p = &estimate.positions[3 * v];
+    const double depth = std::cos(kAzimuth) * p[1] - std::sin(kAzimuth) * p[0];
+    points[v] = {std::cos(kAzimuth) * p[0] + std::sin(kAzimuth) * p[1],
+                 std::cos(kElevation) * p[2] + std::sin(kElevation) * depth};
+  }
+  return points;
+}
+
+struct Bounds {
+  double x0 = std::numeric_limits<double>::infinity(), x1 = -x0, y0 = x0, y1 = -x0;
+
+  void add(const std::vector<Point>& points) {
+    for (const Point& p : points) {
+      if (!p.there()) continue;
+      x0 = std::min(x0, p.x);
+      x1 = std::max(x1, p.x);
+      y0 = std::min(y0, p.y);
+      y1 = std::max(y1, p.y);
+    }
+  }
+  bool empty() const { return x0 > x1; }
+  double size() const { return std::max(x1 - x0, y1 - y0); }
+};
+
+/// An estimate as it is drawn.
+struct Layer {
+  const SceneEstimate* estimate = nullptr;
+  std::vector<Point> points;
+  Stroke stroke;
+};
+
+/// What lies below first: the guess, then peers, the truth, the estimate.
+std::vector<Layer> layers_of(const Scene& scene, const Theme& theme) {
+  std::vector<Layer> layers;
+  std::size_t peers = 0;
+  // Thinner where many lines would run into one.
+  const double width = std::clamp(std::sqrt(1000.0 / std::max(scene.edge_count(), 1)), 0.35, 1.0);
+  for (const SceneEstimate& estimate : scene.estimates) {
+    Layer layer{&estimate, project(scene, estimate), {}};
+    switch (estimate.role) {
+      case EstimateRole::initial:
+        layer.stroke = theme.initial;
+        break;
+      case EstimateRole::estimate:
+        layer.stroke = theme.estimate;
+        break;
+      case EstimateRole::truth:
+        layer.stroke = theme.truth;
+        break;
+      case EstimateRole::peer:
+        layer.stroke = theme.peer(peers++);
+        break;
+    }
+    layer.stroke.width *= width;
+    layers.push_back(std::move(layer));
+  }
+  const auto height = [](const Layer& layer) {
+    constexpr std::array kHeights{0, 3, 2, 1};
+    return kHeights[static_cast<std::size_t>(layer.estimate->role)];
+  };
+  std::stable_sort(layers.begin(), layers.end(),
+                   [&](const Layer& a, const Layer& b) { return height(a) < height(b); });
+  return layers;
+}
+
+Bounds bounds_of(const std::vector<Layer>& layers) {
+  Bounds most, all;
+  for (const Layer& layer : layers) {
+    all.add(layer.points);
+    if (layer.estimate->role != EstimateRole::initial) most.add(layer.points);
+  }
+  if (most.empty() || all.size() <= kGuessMayExceed * most.size()) return all;
+  return most;
+}
+
+/// The same number of pixels a metre on both axes.
+void equalise(Bounds& bounds, const Box& box) {
+  const double room = 0.03 * std::max(bounds.size(), 1e-6);
+  const double width = bounds.x1 - bounds.x0 + 2 * room;
+  const double height = bounds.y1 - bounds.y0 + 2 * room;
+  const double metres = std::max(width / box.width, height / box.height);
+  const double x = (bounds.x0 + bounds.x1) / 2, y = (bounds.y0 + bounds.y1) / 2;
+  bounds = {x - metres * box.width / 2, x + metres * box.width / 2, y - metres * box.height / 2,
+            y + metres * box.height / 2};
+}
+
+bool is_line(EdgeClass edge_class) {
+  return edge_class == EdgeClass::odometry || edge_class == EdgeClass::path;
+}
+
+class Drawing {
+ public:
+  Drawing(Canvas& canvas, const Theme& theme, const Scene& scene, const Box& area,
+          const Bounds& bounds)
+      : canvas_(canvas), theme_(theme), scene_(scene), area_(area), bounds_(bounds) {}
+
+  void draw(const std::vector<Layer>& layers, bool by_residual) {
+    canvas_.clip(area_);
+    for (const Layer& layer : layers) {
+      const bool main = &layer == &layers.back();
+      if (main && by_residual) {
+        draw_residuals(layer);
+      } else {
+        if (main) draw_classes(layer);
+        draw_path(layer);
+      }
+      if (main) draw_landmarks(layer);
+    }
+    canvas_.unclip();
+  }
+
+ private:
+  double x(const Point& p) const {
+    return area_.x + (p.x - bounds_.x0) / (bounds_.x1 - bounds_.x0) * area_.width;
+  }
+  double y(const Point& p) const {
+    return area_.bottom() - (p.y - bounds_.y0) / (bounds_.y1 - bounds_.y0) * area_.height;
+  }
+
+  /// Adds the edge to the path; false if an end of it is not there.
+  bool add(const Layer& layer, std::size_t e) {
+    if (scene_.b[e] < 0) return false;
+    const Point& a = layer.points[std::size_t(scene_.a[e])];
+    const Point& b = layer.points[std::size_t(scene_.b[e])];
+    if (!a.there() || !b.there()) return false;
+    // Edges that go on where the last ended are one line, so that dashes go round corners.
+    if (scene_.a[e] != last_) canvas_.move_to(x(a), y(a));
+    canvas_.line_to(x(b), y(b));
+    last_ = scene_.b[e];
+    return true;
+  }
+
+  void draw_path(const Layer& layer) {
+    last_ = -1;
+    for (std::size_t e = 0; e < scene_.a.size(); ++e) {
+      if (is_line(scene_.edge_class[e])) add(layer, e);
+    }
+    canvas_.stroke(layer.stroke);
+  }
+
+  void draw_classes(const Layer& layer) {
+    for (const auto& [edge_class, stroke] : {std::pair{EdgeClass::landmark, theme_.landmark},
+                                             {EdgeClass::other, theme_.landmark},
+                                             {EdgeClass::loop, theme_.loop}}) {
+      last_ = -1;
+      for (std::size_t e = 0; e < scene_.a.size(); ++e) {
+        if (scene_.edge_class[e] == edge_class) add(layer, e);
+      }
+      canvas_.stroke(stroke);
+    }
+  }
+
+  void draw_landmarks(const Layer& layer) {
+    for (std::size_t v = 0; v < layer.points.size(); ++v) {
+      const Point& p = layer.points[v];
+      if (!scene_.variable_types[scene_.variable_type[v]].pose && p.there()) {
+        canvas_.dot(x(p), y(p), 1.5);
+      }
+    }
+    canvas_.fill(
+        Colour{theme_.landmark.colour.r, theme_.landmark.colour.g, theme_.landmark.colour.b, 1});
+  }
+
+  /// From the least to the worst, which lies on top and is wider.
+  void draw_residuals(const Layer& layer) {
+    const std::vector<float>& chi2 = layer.estimate->edge_chi2;
+    std::vector<double> logarithms;
+    for (const float value : chi2) {
+      if (value > 0) logarithms.push_back(std::log(double(value)));
+    }
+    if (logarithms.empty()) return draw_path(layer);
+    std::sort(logarithms.begin(), logarithms.end());
+    const double low = logarithms[logarithms.size() / 20];
+    const double width = std::max(logarithms.back() - low, 1e-9);
+    std::vector<std::vector<std::size_t>> shades(kShades);
+    for (std::size_t e = 0; e < chi2.size(); ++e) {
+      const double part = chi2[e] > 0 ? (std::log(double(chi2[e])) - low) / width : 0.0;
+      const double shade = std::clamp(part, 0.0, 1.0) * (kShades - 1);
+      shades[static_cast<std::size_t>(std::lround(shade))].push_back(e);
+    }
+    for (int s = 0; s < kShades; ++s) {
+      const double part = double(s) / (kShades - 1);
+      last_ = -1;
+      for (const std::size_t e : shades[std::size_t(s)]) add(layer, e);
+      canvas_.stroke({theme_.residual(part), 0.75 + 2.25 * part * part * part, {}});
+    }
+  }
+
+  Canvas& canvas_;
+  const Theme& theme_;
+  const Scene& scene_;
+  Box area_;
+  Bounds bounds_;
+  std::int32_t last_ = -1;
+};
+
+/// What stands for the length of a 3D graph, which has no axes to read it from.
+void draw_scale(Canvas& canvas, const Theme& theme, const Box& area, const Bounds& bounds) {
+  const double metres = bounds.x1 - bounds.x0;
+  const double length = Range{0, metres / 4, false}.ticks(3).back();
+  const double pixels = length / metres * area.width;
+  const double y = area.bottom() - 8;
+  canvas.line(area.x + 8, y, area.x + 8 + pixels, y, {theme.ink, 2, {}});
+  canvas.text(area.x + 8, y - 6, tick_text(length) + " m", kTextSize, theme.ink);
+}
+
+std::vector<LegendEntry> legend_of(const Scene& scene, const Theme& theme,
+                                   const std::vector<Layer>& layers, bool by_residual) {
+  std::vector<LegendEntry> legend;
+  for (auto layer = layers.rbegin(); layer != layers.rend(); ++layer) {
+    if (by_residual && layer == layers.rbegin()) {
+      legend.push_back({"small residual", {theme.residual(0.1), 1, {}}});
+      legend.push_back({"largest residual", {theme.residual(1), 3, {}}});
+    } else {
+      legend.push_back({layer->estimate->name, layer->stroke});
+    }
+  }
+  const auto has = [&](EdgeClass edge_class) {
+    return std::find(scene.edge_class.begin(), scene.edge_class.end(), edge_class) !=
+           scene.edge_class.end();
+  };
+  if (!by_residual && has(EdgeClass::loop)) legend.push_back({"loop closure", theme.loop});
+  if (!by_residual && has(EdgeClass::landmark)) legend.push_back({"landmark", theme.landmark});
+  return legend;
+}
+
+void draw_scene(Canvas& canvas, const Theme& theme, const Scene& scene, const Box& box,
+                bool by_residual) {
+  const std::vector<Layer> layers = layers_of(scene, theme);
+  Bounds bounds = bounds_of(layers);
+  if (bounds.empty()) throw Error(ErrorCode::input, scene.name + ": nothing of it has a place");
+  const Box rest =
+      draw_heading(canvas, theme, box, scene.name, legend_of(scene, theme, layers, by_residual));
+  if (scene.dimension == 3) {
+    equalise(bounds, rest);
+    Drawing(canvas, theme, scene, rest, bounds).draw(layers, by_residual);
+    return draw_scale(canvas, theme, rest, bounds);
+  }
+  // Room for the axes' texts, which depend little on the numbers.
+  equalise(bounds, {0, 0, rest.width - 70, rest.height - 40});
+  const Chart chart(canvas, theme, rest, {bounds.x0, bounds.x1, false},
+                    {bounds.y0, bounds.y1, false}, "x [m]", "y [m]");
+  Bounds fitted = bounds;
+  Drawing(canvas, theme, scene, chart.area(), fitted).draw(layers, by_residual);
+}
+
+}  // namespace
+
+void draw_trajectories(Canvas& canvas, const Theme& theme, const Album& album, bool by_residual) {
+  std::vector<const Scene*> scenes;
+  for (const Scene& scene : album.scenes) {
+    if (!scene.estimates.empty() && scene.variable_count() > 0) scenes.push_back(&scene);
+  }
+  if (scenes.empty()) {
+    throw Error(ErrorCode::input, "no graph to draw: give one, or a recording of a run");
+  }
+  const std::vector<Box> boxes = panels(canvas, scenes.size());
+  for (std::size_t k = 0; k < scenes.size(); ++k) {
+    draw_scene(canvas, theme, *scenes[k], boxes[k], by_residual);
+  }
+}
+
+}  // namespace cairn::plot

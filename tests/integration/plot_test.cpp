@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <set>
+
+#include "cairn/registry.hpp"
+#include "integration/process.hpp"
+
+namespace cairn::test {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+using ::testing::StartsWith;
+
+class PlotCommand : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    if (!Registry().has("picture", "svg")) GTEST_SKIP() << "built without Cairo";
+    run({"generate", "manhattan:poses=120,outliers=1", "-o", graph_, "--seed", "4"});
+  }
+  static void run(const Arguments& arguments) {
+    const Outcome outcome = cairn(arguments);
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  }
+  std::string plot(Arguments arguments, const std::string& ending) {
+    const std::string file = folder_.file("picture." + ending);
+    arguments.insert(arguments.begin(), "plot");
+    arguments.insert(arguments.end(), {"-o", file});
+    run(arguments);
+    return read_text(file);
+  }
+  TemporaryFolder folder_;
+  std::string graph_ = folder_.file("city.g2o"), report_ = folder_.file("run.json");
+};
+
+TEST_F(PlotCommand, TheEndingChoosesTheFormat) {
+  EXPECT_THAT(plot({graph_}, "svg"), StartsWith("<?xml"));
+  EXPECT_THAT(plot({graph_}, "PNG"), StartsWith("\x89PNG"));
+  EXPECT_THAT(plot({graph_}, "pdf"), StartsWith("%PDF-"));
+  const Outcome other = cairn({"plot", graph_, "-o", folder_.file("picture.gif")});
+  EXPECT_EQ(other.exit_code, 2);
+  EXPECT_THAT(other.err, HasSubstr(".svg"));
+}
+
+TEST_F(PlotCommand, DrawsEveryKind) {
+  run({"optimize", graph_, "--json", report_, "--quiet"});
+  const std::string bench = folder_.file("bench.json");
+  run({"bench", graph_, "--linear-solver", "block_cholesky,eigen", "--repeat", "2", "--no-memory",
+       "--quiet", "--json", bench});
+  std::set<std::string> pictures;
+  for (const Arguments& arguments :
+       {Arguments{graph_}, Arguments{graph_, "--colour", "residual"}, Arguments{bench},
+        Arguments{graph_, "--what", "sparsity"}, Arguments{report_, "--what", "convergence"},
+        Arguments{report_, "--what", "convergence", "--x", "time"},
+        Arguments{report_, "--what", "steps"}, Arguments{graph_, "--theme", "dark"}}) {
+    pictures.insert(plot(arguments, "svg"));
+  }
+  EXPECT_EQ(pictures.size(), 8U) << "each is another picture";
+}
+
+TEST_F(PlotCommand, TheWrongLoopClosureIsTheOneInTheWorstColour) {
+  const std::string best = folder_.file("best.g2o");
+  run({"optimize", graph_, "--initial", "odometry", "--loss", "cauchy", "--loss-on", "loops", "-o",
+       best, "--quiet"});
+  const std::string picture = plot({best, "--colour", "residual"}, "svg");
+  // #5c0a12: the legend's sample, and one edge
+  const std::string worst = "stroke:rgb(36.07";
+  int count = 0;
+  for (std::size_t at = picture.find(worst); at != std::string::npos;
+       at = picture.find(worst, at + 1)) {
+    ++count;
+  }
+  EXPECT_EQ(count, 2);
+}
+
+TEST_F(PlotCommand, TheSparsityOfLIsThatOfTheChosenOrder) {
+  const std::string amd = plot({graph_, "--what", "sparsity"}, "svg");
+  const std::string natural = plot(
+      {graph_, "--what", "sparsity", "--linear-solver", "block_cholesky:ordering=natural"}, "svg");
+  EXPECT_NE(amd, natural);
+  const Outcome silent = cairn({"plot", graph_, "--what", "sparsity", "--linear-solver", "eigen",
+                                "-o", folder_.file("x.svg")});
+  EXPECT_EQ(silent.exit_code, 2);
+  EXPECT_THAT(silent.err, HasSubstr("block_cholesky"));
+}
+
+TEST_F(PlotCommand, TheSizeIsTheOneAskedFor) {
+  const std::string picture = plot({graph_, "--size", "320x200"}, "png");
+  // Width and height stand big-endian in the header chunk of a PNG.
+  EXPECT_EQ(picture.substr(16, 8), std::string("\0\0\x01\x40\0\0\0\xc8", 8));
+  for (const char* size : {"320", "0x5", "ax5", "-3x4", "99999999x9"}) {
+    EXPECT_EQ(cairn({"plot", graph_, "--size", size, "-o", folder_.file("x.png")}).exit_code, 2)
+        << size;
+  }
+}
+
+TEST_F(PlotCommand, AnyNameCanBeDrawn) {
+  const std::string name = folder_.file("<script>\xff\n\x01.g2o");
+  std::filesystem::copy_file(graph_, name);
+  EXPECT_THAT(plot({name}, "svg"), Not(HasSubstr("<script")));
+}
+
+TEST_F(PlotCommand, SaysWhatIsMissing) {
+  const Outcome outcome = cairn({"plot", graph_, "--what", "bars", "-o", folder_.file("x.svg")});
+  EXPECT_EQ(outcome.exit_code, 3);
+  EXPECT_THAT(outcome.err, HasSubstr("cairn bench --json"));
+}
+
+}  // namespace
+}  // namespace cairn::test
