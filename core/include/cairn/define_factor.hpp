@@ -26,12 +26,13 @@ namespace cairn {
 ///                                    const Vector<double, 1>& measured);
 ///     };
 ///
-/// `residual` returns the error in the metric's units, not whitened; it is called with double and with
-/// dual numbers, so that Jacobians come by themselves. The struct may also have
+/// `residual` returns the error in the metric's units, not whitened; it is called with double and
+/// with dual numbers, so that Jacobians come by themselves. The struct may also have
 ///  - `static Vector<double, kResidual> evaluate(x…, z, J…)`: the same error and its analytic
-///    Jacobians with respect to the tangent vectors, `Eigen::Matrix<double, kResidual, V::kTangent>& J`
-///    for each variable. Tests compare them with the automatic ones.
-///  - `static std::string normalize(Vector<double, kMeasurement>& z)`: canonical form, or what is wrong;
+///    Jacobians with respect to the tangent vectors, a matrix of kResidual × V::kTangent by
+///    reference for each variable. Tests compare them with the automatic ones.
+///  - `static std::string normalize(Vector<double, kMeasurement>& z)`: makes it canonical, or says
+///    what is wrong;
 ///  - `static bool propagate(int target, const double* const* x, const double* z, double* out)`;
 ///  - `static constexpr bool kRelative = true`: z is a group element with x_1 ≈ x_0 z;
 ///  - `static constexpr std::string_view kMetric`: the name of the error metric.
@@ -47,7 +48,8 @@ concept FactorTraits = requires {
 
 namespace detail {
 
-template <class F, class Indices = std::make_index_sequence<std::tuple_size_v<typename F::Variables>>>
+template <class F,
+          class Indices = std::make_index_sequence<std::tuple_size_v<typename F::Variables>>>
 class DefinedFactor;
 
 template <class F, std::size_t... I>
@@ -67,8 +69,9 @@ class DefinedFactor<F, std::index_sequence<I...>> final : public FactorType {
   using States = std::tuple<X<I>...>;
   using Jacobians = std::tuple<J<I>...>;
 
-  static constexpr bool kAnalytic =
-      requires(const X<I>&... x, const Z& z, J<I>&... jacobians) { F::evaluate(x..., z, jacobians...); };
+  static constexpr bool kAnalytic = requires(const X<I>&... x, const Z& z, J<I>&... jacobians) {
+    F::evaluate(x..., z, jacobians...);
+  };
 
   static R error(const States& x, const Z& z) {
     return F::template residual<double>(std::get<I>(x)..., z);
@@ -107,19 +110,21 @@ class DefinedFactor<F, std::index_sequence<I...>> final : public FactorType {
     const J<B>& b = std::get<B>(j);
     constexpr int kTa = V<A>::kTangent, kTb = V<B>::kTangent;
     if (A != B && sink.transposed[pair_begin + kPair]) {
-      Eigen::Map<Eigen::Matrix<double, kTb, kTa>>{target}.noalias() = (weight * b.transpose()).lazyProduct(a);
+      Eigen::Map<Eigen::Matrix<double, kTb, kTa>>{target}.noalias() =
+          (weight * b.transpose()).lazyProduct(a);
     } else {
-      Eigen::Map<Eigen::Matrix<double, kTa, kTb>>{target}.noalias() = (weight * a.transpose()).lazyProduct(b);
+      Eigen::Map<Eigen::Matrix<double, kTa, kTb>>{target}.noalias() =
+          (weight * a.transpose()).lazyProduct(b);
     }
   }
   template <std::size_t A, std::size_t... B>
-  static void write_row(const Jacobians& j, double weight, const LinearizeSink& sink, std::size_t pair_begin,
-                        std::index_sequence<B...>) {
+  static void write_row(const Jacobians& j, double weight, const LinearizeSink& sink,
+                        std::size_t pair_begin, std::index_sequence<B...>) {
     (write_block<A, A + B>(j, weight, sink, pair_begin), ...);
   }
   template <std::size_t A>
-  static void write_gradient(const Jacobians& j, const R& r, double weight, const LinearizeSink& sink,
-                             std::size_t f) {
+  static void write_gradient(const Jacobians& j, const R& r, double weight,
+                             const LinearizeSink& sink, std::size_t f) {
     const std::int64_t offset = sink.gradients[f * kArity + A];
     if (offset == LinearizeSink::kNone) return;
     Eigen::Map<Vector<double, V<A>::kTangent>>{sink.scratch + offset}.noalias() =
@@ -144,7 +149,7 @@ class DefinedFactor<F, std::index_sequence<I...>> final : public FactorType {
     return kSizes[variable];
   }
   std::string normalize(double* measurement) const override {
-    if constexpr (requires(Z& z) { F::normalize(z); }) {
+    if constexpr (requires(Z & z) { F::normalize(z); }) {
       Z z = load<kZ>(measurement);
       std::string problem = F::normalize(z);
       store<kZ>(z, measurement);
@@ -167,13 +172,15 @@ class DefinedFactor<F, std::index_sequence<I...>> final : public FactorType {
                  const LinearizeSink& sink, double* out_squared_norms) const override {
     Jacobians jacobians;
     for (std::size_t f = begin; f < end; ++f) {
-      R r = error_and_jacobians(load_states(pool, f), load<kZ>(pool.measurements + f * kZ), jacobians);
+      R r = error_and_jacobians(load_states(pool, f), load<kZ>(pool.measurements + f * kZ),
+                                jacobians);
       const double* u = pool.sqrt_information + f * kU;
       whiten(u, r);
       (whiten(u, std::get<I>(jacobians)), ...);
       if (out_squared_norms) out_squared_norms[f - begin] = r.squaredNorm();
       const double weight = weights ? weights[f - begin] : 1.0;
-      (write_row<I>(jacobians, weight, sink, f * kPairs, std::make_index_sequence<kArity - I>{}), ...);
+      (write_row<I>(jacobians, weight, sink, f * kPairs, std::make_index_sequence<kArity - I>{}),
+       ...);
       (write_gradient<I>(jacobians, r, weight, sink, f), ...);
     }
   }

@@ -20,16 +20,20 @@ using Vector = Eigen::Matrix<S, N, 1>;
 ///       static constexpr int kAmbient = 2;  // doubles stored
 ///       static constexpr int kTangent = 2;  // degrees of freedom
 ///       static Vector<double, 2> identity();
-///       template <class S> static Vector<S, 2> retract(const Vector<S, 2>& x, const Vector<S, 2>& delta);
-///       template <class S> static Vector<S, 2> local(const Vector<S, 2>& x, const Vector<S, 2>& y);
+///       template <class S>
+///       static Vector<S, 2> retract(const Vector<S, 2>& x, const Vector<S, 2>& delta);
+///       template <class S>
+///       static Vector<S, 2> local(const Vector<S, 2>& x, const Vector<S, 2>& y);
 ///     };
 ///
 /// It may also have
-///  - `static std::string normalize(Vector<double, kAmbient>& x)`: canonical form, or what is wrong;
-///  - the group operations `compose(a, b)`, `inverse(a)`, `adjoint(a)` (tangent × tangent), `exp(delta)`,
-///    `log(a)`: then the type has the ability `LieGroup`;
-///  - `static constexpr int kDimension`, `kOriented` and `rotation(x)` (kOriented only), `position(x)`,
-///    `from_placement(R, t)` (R ignored by points): then it has the ability `Placement`.
+///  - `static std::string normalize(Vector<double, kAmbient>& x)`: makes it canonical, or says what
+///    is wrong;
+///  - the group operations `compose(a, b)`, `inverse(a)`, `adjoint(a)` (tangent × tangent),
+///    `exp(delta)`, `log(a)`: then the type has the ability `LieGroup`;
+///  - `static constexpr int kDimension`, `kOriented` and `rotation(x)` (kOriented only),
+///    `position(x)`, `from_placement(R, t)` (R ignored by points): then it has the ability
+///    `Placement`.
 template <class V>
 concept VariableTraits = requires(const Vector<double, V::kAmbient>& x,
                                   const Vector<double, V::kTangent>& delta) {
@@ -61,7 +65,10 @@ concept HasGroup = requires(const Vector<double, V::kAmbient>& a) {
   V::adjoint(a);
 };
 template <class V>
-concept HasPlacement = requires { V::kDimension; V::kOriented; };
+concept HasPlacement = requires {
+  V::kDimension;
+  V::kOriented;
+};
 
 template <class V>
 class GroupOf final : public LieGroup {
@@ -131,13 +138,15 @@ class DefinedVariable final : public VariableType {
       if (delta_offsets[s] < 0) {
         store<kA>(state, out + s * kA);
       } else {
-        store<kA>(V::template retract<double>(state, load<kT>(delta + delta_offsets[s])), out + s * kA);
+        store<kA>(V::template retract<double>(state, load<kT>(delta + delta_offsets[s])),
+                  out + s * kA);
       }
     }
   }
   void local(std::size_t count, const double* x, const double* y, double* delta) const override {
     for (std::size_t s = 0; s < count; ++s) {
-      store<kT>(V::template local<double>(load<kA>(x + s * kA), load<kA>(y + s * kA)), delta + s * kT);
+      store<kT>(V::template local<double>(load<kA>(x + s * kA), load<kA>(y + s * kA)),
+                delta + s * kT);
     }
   }
   const LieGroup* lie_group() const override {
