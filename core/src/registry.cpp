@@ -334,7 +334,9 @@ void Registry::set_type_options(const ComponentSpec& spec) {
                 fmt::format("options of types '{}' come too late: its types are in use already",
                             spec.name));
   }
-  Options(plugin.target.types.at(spec.name).table, spec.values, spec.name);  // checks them
+  // Making them checks them.
+  [[maybe_unused]] const Options checked(plugin.target.types.at(spec.name).table, spec.values,
+                                         spec.name);
   for (const auto& [key, value] : spec.values) plugin.type_options[key] = value;
 }
 

@@ -31,9 +31,9 @@ inline __attribute__((always_inline)) void store_loose(double* p, Vec v) {
 inline __attribute__((always_inline)) Vec broadcast(double value) { return Vec{} + value; }
 
 /// Vectors of rows that a tile is high: as many as leave room for the tile in registers.
-constexpr int kTileVectors = kWidth == 8 ? 3 : kWidth == 4 ? 3 : 2;
+constexpr int kTileVectors = kWidth >= 4 ? 3 : 2;
 /// Columns that a tile is wide.
-constexpr int kTileColumns = kWidth == 8 ? 8 : kWidth == 4 ? 4 : 4;
+constexpr int kTileColumns = kWidth == 8 ? 8 : 4;
 /// Columns of a panel that are factored together.
 constexpr int kPanelColumns = 8;
 

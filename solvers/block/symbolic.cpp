@@ -88,7 +88,7 @@ std::int32_t round_up(std::int64_t value) { return static_cast<std::int32_t>((va
 
 /// Modelled time of one supernode of `columns` scalar columns and `below` scalar rows below them.
 double cost_of(double columns, double below, const CostModel& c) {
-  const double rows = (static_cast<std::int64_t>(columns + below) + 7) / 8 * 8;
+  const double rows = round_up(static_cast<std::int64_t>(columns + below));
   return c.supernode + c.panel_entry * rows * columns + c.panel_flop * columns * columns * rows +
          c.update_flop * below * (below + 16.0) * columns +
          c.extend_entry * 0.5 * below * (below + 8.0);

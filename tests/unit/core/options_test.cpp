@@ -66,7 +66,7 @@ TEST(Options, RefuseAnUnknownNameWithTheNearest) {
 }
 
 TEST(Options, RefuseWhatIsNotOfTheTypeOrOutOfRange) {
-  for (const auto& [name, value] :
+  for (const auto& entry :
        std::vector<std::pair<std::string, std::string>>{{"iterations", "0"},
                                                         {"iterations", "3.5"},
                                                         {"iterations", ""},
@@ -76,9 +76,9 @@ TEST(Options, RefuseWhatIsNotOfTheTypeOrOutOfRange) {
                                                         {"lambda", "1e"},
                                                         {"verbose", "maybe"},
                                                         {"ordering", "metis"}}) {
-    const std::string message = refusal([&] { Options(table(), {{name, value}}, "lm"); });
-    EXPECT_THAT(message, HasSubstr("option '" + name + "'")) << value;
-    EXPECT_THAT(message, HasSubstr("'" + value + "'"));
+    const std::string message = refusal([&] { Options(table(), {entry}, "lm"); });
+    EXPECT_THAT(message, HasSubstr("option '" + entry.first + "'")) << entry.second;
+    EXPECT_THAT(message, HasSubstr("'" + entry.second + "'"));
   }
   EXPECT_THAT(refusal([] {
                 Options(table(), {{"iterations", "0"}}, "lm");
