@@ -121,6 +121,7 @@ export class Stage {
   invalidate(): void {
     if (this.requested) return;
     this.requested = true;
+    this.canvas.dataset.still = "false";
     requestAnimationFrame((now) => {
       this.requested = false;
       this.frame(now);
@@ -129,7 +130,10 @@ export class Stage {
 
   private frame(now: number): void {
     const { drawing, state } = this;
-    if (!drawing || !state || this.host.clientWidth === 0) return;
+    if (!drawing || !state || this.host.clientWidth === 0) {
+      this.canvas.dataset.still = "true";
+      return;
+    }
     this.fly(now);
     const moving = performance.now() - this.lastMotion < kSettle;
     if (moving) this.learn(now);
@@ -139,7 +143,7 @@ export class Stage {
     this.screens.clear();
     this.paintOverlay();
     this.canvas.dataset.draws = String(++this.draws);
-    this.canvas.dataset.still = String(!moving);
+    this.canvas.dataset.still = String(!moving && !this.requested);
     this.onFrame();
     window.clearTimeout(this.settleTimer);
     if (moving) this.settleTimer = window.setTimeout(() => this.invalidate(), kSettle + 10);

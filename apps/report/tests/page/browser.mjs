@@ -51,6 +51,7 @@ export async function open(browser, file, options = {}) {
 
 /** Waits until everything is drawn, and nothing more is to come. */
 export async function settled(page) {
+  await page.evaluate(() => (window.lastDraws = undefined));  // two looks, whatever an earlier wait saw
   await page.waitForFunction(() => {
     const canvas = document.querySelector("canvas.graph");
     if (!canvas || canvas.closest("[hidden]")) return true;
