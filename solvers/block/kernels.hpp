@@ -5,26 +5,49 @@
 
 namespace cairn::block {
 
-/// A stretch of consecutive scalar rows of a child's update matrix, and where they lie in the front
-/// of its parent.
+/// A stretch of consecutive scalar rows below a supernode's diagonal block: where they are in the
+/// permuted vector and in the supernode's front.
 struct Run {
-  std::int32_t source;  ///< first row, counted from the child's first row below its diagonal block
-  std::int32_t target;  ///< first row in the parent's front
+  std::int32_t source;  ///< first row in the vector
+  std::int32_t target;  ///< first row in the front
   std::int32_t length;
+};
+
+/// Eight rows of a parent's front, and which of them are rows of a child's update matrix. Both
+/// count their rows in the same order, so the child's are consecutive.
+struct Spread {
+  std::int32_t source;  ///< the child's first row among them, counted from its first row below its
+                        ///< diagonal block
+  std::int32_t target;  ///< first of the eight rows in the parent's front, a multiple of 8
+  std::uint32_t mask;   ///< bit k: row target + k is one of the child's
+};
+
+/// Where an entry of H goes: into a panel, straight or transposed.
+struct Assembly {
+  std::int64_t source;         ///< in the values of H
+  std::int64_t target;         ///< in the factor's values
+  std::int16_t rows, columns;  ///< of the source block
+  std::int32_t stride;         ///< of the panel
+  bool transpose;
 };
 
 /// The dense work on one supernode, for one instruction set.
 ///
 /// The *front* of a supernode has m rows: its own `columns` (scalar) columns first, then the rows
 /// below. The *panel* holds the front's first `columns` columns, column-major, leading dimension
-/// `stride`, a multiple of 8, on a 64-byte boundary; rows m … stride-1 are padding that is computed
-/// with but never read into a result. The *update matrix* holds what the supernode contributes to
-/// its ancestors, the rest of the front's lower triangle. Its row r (counted in the front) is
-/// stored at r - 8⌊columns/8⌋, so that panel and update matrix have the same rows in one vector;
-/// its columns are counted from `columns`; leading dimension stride - 8⌊columns/8⌋. What lies above
-/// the diagonal of either is not defined.
+/// `stride`, a multiple of 8, on a 64-byte boundary; rows m … stride-1 are padding: zero before,
+/// and zero after. The *update matrix* holds what the supernode contributes to its ancestors, the
+/// rest of the front's lower triangle. Its row r (counted in the front) is stored at r -
+/// 8⌊columns/8⌋, so that panel and update matrix have the same rows in one vector; its columns are
+/// counted from `columns`; leading dimension stride - 8⌊columns/8⌋. What lies above the diagonal is
+/// zero in a factored panel's diagonal blocks of one vector, else not defined.
 struct Kernels {
   const char* name;
+
+  /// Sets a panel of `size` doubles (a multiple of 8) to zero and writes `count` entries of H into
+  /// it.
+  void (*assemble)(const Assembly* entries, int count, const double* values, double* panels,
+                   double* panel, std::int64_t size);
 
   /// Cholesky factorisation of the panel in place: the diagonal block becomes L_JJ, the rows below
   /// L_RJ = A_RJ L_JJ⁻ᵀ. Returns -1, or the first column whose pivot is not positive (its pivot is
@@ -36,17 +59,20 @@ struct Kernels {
   void (*update)(const double* panel, std::int64_t stride, int columns, int m, double* U,
                  int row_begin, int row_end);
 
-  /// Adds the child's update matrix to the parent's front, for the child's columns in runs [first,
-  /// last): into the panel where the target lies in it, else into the parent's update matrix. Runs
-  /// may not straddle the panel's edge.
-  void (*extend_add)(const Run* runs, int first, int last, int count, const double* child,
-                     std::int64_t child_stride, int child_shift, double* panel, std::int64_t stride,
-                     int columns, double* U);
+  /// Adds columns [first, last) of a child's update matrix, whose row 0 is at `child`, to the
+  /// parent's front: all of them to the panel, or all to the update matrix, `parent` being where
+  /// row and column 0 of the front are or would be. May read 8 doubles beyond the child's.
+  void (*extend_add)(const Spread* spreads, int count, int first, int last, const double* child,
+                     std::int64_t child_stride, double* parent, std::int64_t parent_stride);
 
-  /// x = L⁻¹ x for one supernode: x holds m entries; those below the diagonal block are updated.
-  void (*forward)(const double* panel, std::int64_t stride, int columns, int m, double* x);
-  /// x = L⁻ᵀ x for one supernode: the entries below the diagonal block are only read.
-  void (*backward)(const double* panel, std::int64_t stride, int columns, int m, double* x);
+  /// x = L⁻¹ x for one supernode. `own`: its `columns` entries of x; `runs`: where its rows below
+  /// are, as stretches of `vector` (source) and of the front (target), and there they are
+  /// updated. `front`: room for `stride` doubles on a 64-byte boundary.
+  void (*forward)(const double* panel, std::int64_t stride, int columns, double* own,
+                  const Run* runs, int count, double* vector, double* front);
+  /// x = L⁻ᵀ x for one supernode: the rows below are only read.
+  void (*backward)(const double* panel, std::int64_t stride, int columns, int m, double* own,
+                   const Run* runs, int count, const double* vector, double* front);
 };
 
 /// The fastest set that this machine can run, chosen once. `limit` (portable, avx2, avx512; "auto":

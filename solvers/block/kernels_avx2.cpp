@@ -2,4 +2,5 @@
 #define CAIRN_KERNEL_SET avx2
 #define CAIRN_KERNEL_NAME "avx2"
 #define CAIRN_KERNEL_WIDTH 4
+#define CAIRN_KERNEL_HALVES 0
 #include "kernels_body.hpp"

@@ -2,4 +2,5 @@
 #define CAIRN_KERNEL_SET avx512
 #define CAIRN_KERNEL_NAME "avx512"
 #define CAIRN_KERNEL_WIDTH 8
+#define CAIRN_KERNEL_HALVES 0
 #include "kernels_body.hpp"

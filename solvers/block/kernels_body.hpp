@@ -1,13 +1,22 @@
 // SPDX-License-Identifier: BSD-3-Clause
 //
 // The kernels of kernels.hpp, compiled once for each instruction set: the including file sets
-// CAIRN_KERNEL_SET (a name) and CAIRN_KERNEL_WIDTH (doubles in a vector register), and is compiled
-// with that set's flags.
+// CAIRN_KERNEL_SET and CAIRN_KERNEL_NAME (a name), CAIRN_KERNEL_WIDTH (doubles in a vector) and
+// CAIRN_KERNEL_HALVES (1 where a vector takes two registers), and is compiled with that set's
+// flags.
 //
-// Nothing but raw pointers and builtins may stand here: an inline function of the standard library,
-// compiled here for a newer machine, could be the copy that the linker keeps for everyone.
+// Nothing but raw pointers and builtins may stand here (intrinsics are always inlined): an inline
+// function of the standard library, compiled here for a newer machine, could be the copy that the
+// linker keeps for everyone.
+
+#if defined(__AVX2__)
+#include <immintrin.h>
+#endif
 
 #include "kernels.hpp"
+
+/// Loops about arrays that are to stay in registers must not be left as loops.
+#define CAIRN_UNROLL _Pragma("GCC unroll 8")
 
 namespace cairn::block::CAIRN_KERNEL_SET {
 namespace {
@@ -28,212 +37,316 @@ inline __attribute__((always_inline)) Vec load_loose(const double* p) {
 inline __attribute__((always_inline)) void store_loose(double* p, Vec v) {
   *reinterpret_cast<LooseVec*>(p) = v;
 }
-inline __attribute__((always_inline)) Vec broadcast(double value) { return Vec{} + value; }
-
-/// Vectors of rows that a tile is high: as many as leave room for the tile in registers.
-constexpr int kTileVectors = kWidth >= 4 ? 3 : 2;
-/// Columns that a tile is wide.
-constexpr int kTileColumns = kWidth == 8 ? 8 : 4;
-/// Columns of a panel that are factored together.
-constexpr int kPanelColumns = 8;
-
-/// C (+)= -A Bᵀ on a tile of V vectors of rows and N columns; A: rows × K, B: N rows × K, all
-/// column-major.
-template <int V, int N, bool kAccumulate>
-inline __attribute__((always_inline)) void tile(int K, const double* A, std::int64_t lda,
-                                                const double* B, std::int64_t ldb, double* C,
-                                                std::int64_t ldc) {
-  Vec sum[N][V];
-  for (int n = 0; n < N; ++n) {
-    for (int v = 0; v < V; ++v) sum[n][v] = kAccumulate ? load(C + n * ldc + v * kWidth) : Vec{};
-  }
-  for (int k = 0; k < K; ++k) {
-    Vec a[V];
-    for (int v = 0; v < V; ++v) a[v] = load(A + k * lda + v * kWidth);
-    const double* b = B + k * ldb;
-    for (int n = 0; n < N; ++n) {
-      const Vec bn = broadcast(b[n]);
-      for (int v = 0; v < V; ++v) sum[n][v] -= a[v] * bn;
-    }
-  }
-  for (int n = 0; n < N; ++n) {
-    for (int v = 0; v < V; ++v) store(C + n * ldc + v * kWidth, sum[n][v]);
-  }
+inline __attribute__((always_inline)) Vec broadcast(double value) {
+  return value - Vec{};  // + would have to turn -0 into 0
 }
 
-/// The same for N not known when compiling.
-template <int V, bool kAccumulate>
-void tile_of(int N, int K, const double* A, std::int64_t lda, const double* B, std::int64_t ldb,
-             double* C, std::int64_t ldc) {
-  static_assert(kTileColumns == 8 || kTileColumns == 4);
-  if constexpr (kTileColumns == 8) {
+constexpr int min(int a, int b) { return a < b ? a : b; }
+
+typedef long long Mask __attribute__((vector_size(kWidth * sizeof(double))));
+inline __attribute__((always_inline)) Mask lanes() {
+  Mask numbers{};
+  CAIRN_UNROLL
+  for (int k = 0; k < kWidth; ++k) numbers[k] = k;
+  return numbers;
+}
+/// Lane j of v in all lanes; j is known when compiling, once the loops about it are unrolled.
+inline __attribute__((always_inline)) Vec lane(Vec v, int j) {
+  return __builtin_shuffle(v, Mask{} + j);
+}
+inline __attribute__((always_inline)) Vec roots(Vec v) {
+#if defined(__AVX512F__)
+  return _mm512_sqrt_pd(v);
+#elif defined(__AVX2__)
+  return _mm256_sqrt_pd(v);
+#else
+  for (int k = 0; k < kWidth; ++k) v[k] = __builtin_sqrt(v[k]);
+  return v;
+#endif
+}
+/// v with its lane j taken from other.
+inline __attribute__((always_inline)) Vec with_lane(Vec v, Vec other, int j) {
+  return lanes() == j ? other : v;
+}
+/// v with zeros before its lane j.
+inline __attribute__((always_inline)) Vec from_lane(Vec v, int j) {
+  return lanes() < j ? Vec{} : v;
+}
+
+template <int N>
+struct Number {
+  static constexpr int value = N;
+};
+
+/// Σ of the lanes, pairwise.
+inline __attribute__((always_inline)) double total(Vec v) {
+  alignas(64) double part[kWidth];
+  store(part, v);
+  for (int half = kWidth / 2; half > 0; half /= 2) {
+    for (int k = 0; k < half; ++k) part[k] += part[k + half];
+  }
+  return part[0];
+}
+
+/// target[k] += source[k], or = source[k], for k = 0 … length-1: the rest of a vector under a mask
+/// where the machine has one, since most stretches are shorter than a vector.
+inline __attribute__((always_inline)) void add(double* target, const double* source, int length) {
+  int k = 0;
+  for (; k + kWidth <= length; k += kWidth)
+    store_loose(target + k, load_loose(target + k) + load_loose(source + k));
+#if defined(__AVX512F__)
+  const __mmask8 mask = static_cast<__mmask8>((1u << (length - k)) - 1u);
+  _mm512_mask_storeu_pd(target + k, mask,
+                        _mm512_add_pd(_mm512_maskz_loadu_pd(mask, target + k),
+                                      _mm512_maskz_loadu_pd(mask, source + k)));
+#else
+  for (; k < length; ++k) target[k] += source[k];
+#endif
+}
+inline __attribute__((always_inline)) void copy(double* target, const double* source, int length) {
+  int k = 0;
+  for (; k + kWidth <= length; k += kWidth) store_loose(target + k, load_loose(source + k));
+#if defined(__AVX512F__)
+  const __mmask8 mask = static_cast<__mmask8>((1u << (length - k)) - 1u);
+  _mm512_mask_storeu_pd(target + k, mask, _mm512_maskz_loadu_pd(mask, source + k));
+#else
+  for (; k < length; ++k) target[k] = source[k];
+#endif
+}
+
+/// Vectors of rows that a tile is high: as many as leave room for the tile in registers. A machine
+/// of 128 bits has half the room: it takes two registers for a vector of four.
+constexpr int kTileVectors = CAIRN_KERNEL_HALVES ? 1 : 3;
+/// Columns that a tile is wide, and columns of a panel that are factored together.
+constexpr int kTileColumns = kWidth;
+static_assert(kWidth == 8 || kWidth == 4);
+
+/// visit(Number<N>) for N = 1 … kWidth.
+template <class Visit>
+inline __attribute__((always_inline)) void with_columns(int N, Visit visit) {
+  if constexpr (kWidth == 8) {
     switch (N) {
       case 8:
-        return tile<V, 8, kAccumulate>(K, A, lda, B, ldb, C, ldc);
+        return visit(Number<8>{});
       case 7:
-        return tile<V, 7, kAccumulate>(K, A, lda, B, ldb, C, ldc);
+        return visit(Number<7>{});
       case 6:
-        return tile<V, 6, kAccumulate>(K, A, lda, B, ldb, C, ldc);
+        return visit(Number<6>{});
       case 5:
-        return tile<V, 5, kAccumulate>(K, A, lda, B, ldb, C, ldc);
+        return visit(Number<5>{});
       default:
         break;
     }
   }
   switch (N) {
     case 4:
-      return tile<V, 4, kAccumulate>(K, A, lda, B, ldb, C, ldc);
+      return visit(Number<4>{});
     case 3:
-      return tile<V, 3, kAccumulate>(K, A, lda, B, ldb, C, ldc);
+      return visit(Number<3>{});
     case 2:
-      return tile<V, 2, kAccumulate>(K, A, lda, B, ldb, C, ldc);
-    case 1:
-      return tile<V, 1, kAccumulate>(K, A, lda, B, ldb, C, ldc);
+      return visit(Number<2>{});
     default:
-      return;
+      return visit(Number<1>{});
   }
 }
 
-template <bool kAccumulate>
-void tile_of(int vectors, int N, int K, const double* A, std::int64_t lda, const double* B,
-             std::int64_t ldb, double* C, std::int64_t ldc) {
-  if constexpr (kTileVectors == 3) {
-    if (vectors == 3) return tile_of<3, kAccumulate>(N, K, A, lda, B, ldb, C, ldc);
+/// C = -A Bᵀ on a tile of V vectors of rows and N columns; A: rows × K, B: N rows × K, all
+/// column-major.
+template <int V, int N>
+inline __attribute__((always_inline)) void tile(int K, const double* A, std::int64_t lda,
+                                                const double* B, std::int64_t ldb, double* C,
+                                                std::int64_t ldc) {
+  Vec sum[N][V];
+  CAIRN_UNROLL
+  for (int n = 0; n < N; ++n) {
+    CAIRN_UNROLL
+    for (int v = 0; v < V; ++v) sum[n][v] = Vec{};
   }
-  if (vectors == 2) return tile_of<2, kAccumulate>(N, K, A, lda, B, ldb, C, ldc);
-  if (vectors == 1) return tile_of<1, kAccumulate>(N, K, A, lda, B, ldb, C, ldc);
+  for (int k = 0; k < K; ++k) {
+    Vec a[V];
+    CAIRN_UNROLL
+    for (int v = 0; v < V; ++v) a[v] = load(A + k * lda + v * kWidth);
+    const double* b = B + k * ldb;
+    CAIRN_UNROLL
+    for (int n = 0; n < N; ++n) {
+      const Vec bn = broadcast(b[n]);
+      CAIRN_UNROLL
+      for (int v = 0; v < V; ++v) sum[n][v] -= a[v] * bn;
+    }
+  }
+  CAIRN_UNROLL
+  for (int n = 0; n < N; ++n) {
+    CAIRN_UNROLL
+    for (int v = 0; v < V; ++v) store(C + n * ldc + v * kWidth, sum[n][v]);
+  }
 }
 
-constexpr int min(int a, int b) { return a < b ? a : b; }
+/// The same for V and N not known when compiling.
+void tile(int vectors, int columns, int K, const double* A, std::int64_t lda, const double* B,
+          std::int64_t ldb, double* C, std::int64_t ldc) {
+  with_columns(columns, [&](auto n) {
+    constexpr int N = decltype(n)::value;
+    if (vectors == 3) return tile<3, N>(K, A, lda, B, ldb, C, ldc);
+    if (vectors == 2) return tile<2, N>(K, A, lda, B, ldb, C, ldc);
+    return tile<1, N>(K, A, lda, B, ldb, C, ldc);
+  });
+}
 
-// --- factor_panel
-// -----------------------------------------------------------------------------------------------------
+// --- assemble ---
 
-/// Subtracts what the columns to the left contribute to columns [begin, begin + N), from row
-/// `begin` down.
-void update_columns(double* panel, std::int64_t stride, int begin, int N) {
-  constexpr int kHeight = kTileVectors * kWidth;
-  for (int row = begin; row < stride; row += kHeight) {
-    const int vectors = min(kTileVectors, static_cast<int>(stride - row) / kWidth);
-    for (int n = 0; n < N; n += kTileColumns) {
-      tile_of<true>(vectors, min(kTileColumns, N - n), begin, panel + row, stride,
-                    panel + begin + n, stride, panel + (begin + n) * stride + row, stride);
+void assemble(const Assembly* entries, int count, const double* values, double* panels,
+              double* panel, std::int64_t size) {
+  for (std::int64_t k = 0; k < size; k += kWidth) store(panel + k, Vec{});
+  for (const Assembly* entry = entries; entry < entries + count; ++entry) {
+    const double* source = values + entry->source;
+    double* target = panels + entry->target;
+    if (entry->transpose) {
+      for (int c = 0; c < entry->columns; ++c) {
+        for (int r = 0; r < entry->rows; ++r)
+          target[static_cast<std::int64_t>(r) * entry->stride + c] = *source++;
+      }
+    } else {
+      for (int c = 0; c < entry->columns; ++c) {
+        copy(target, source, entry->rows);
+        source += entry->rows;
+        target += entry->stride;
+      }
     }
   }
 }
 
-/// Factors the N × N diagonal block at `diagonal` (lower triangle) and writes the reciprocals of
-/// its pivots.
-template <int N>
-int factor_diagonal(double* diagonal, std::int64_t stride, double* reciprocal) {
-  int failed = -1;
-  double a[N][N];
-  for (int j = 0; j < N; ++j) {
-    for (int i = j; i < N; ++i) a[j][i] = diagonal[j * stride + i];
-  }
-  for (int j = 0; j < N; ++j) {
-    double pivot = a[j][j];
-    if (!(pivot > 0.0) || pivot > 1.7e308) {
-      if (failed < 0) failed = j;
-      pivot = 1.0;
+// --- factor_panel ---
+
+/// x[n][v] -= what the K columns to the left contribute: rows at A, columns at B.
+template <int V, int N>
+inline __attribute__((always_inline)) void subtract_left(Vec (&x)[N][V], int K, const double* A,
+                                                         const double* B, std::int64_t stride) {
+  for (int k = 0; k < K; ++k) {
+    Vec a[V];
+    CAIRN_UNROLL
+    for (int v = 0; v < V; ++v) a[v] = load(A + k * stride + v * kWidth);
+    const double* b = B + k * stride;
+    CAIRN_UNROLL
+    for (int n = 0; n < N; ++n) {
+      const Vec bn = broadcast(b[n]);
+      CAIRN_UNROLL
+      for (int v = 0; v < V; ++v) x[n][v] -= a[v] * bn;
     }
-    const double root = __builtin_sqrt(pivot);
-    const double inverse = 1.0 / root;
-    reciprocal[j] = inverse;
-    a[j][j] = root;
-    for (int i = j + 1; i < N; ++i) a[j][i] *= inverse;
+  }
+}
+
+/// Columns [begin, begin + N) in V vectors of rows from row `begin` down, the diagonal block among
+/// them: subtracts what is to the left, and factors, all in registers. Columns are scaled by their
+/// pivots while factoring (L D Lᵀ) and by the roots of them at the end: a root in each step would
+/// double the wait for the next pivot. Writes 1 / L_jj. Returns -1, or the first column of the N
+/// that has no positive pivot, and what follows it is then worthless.
+template <int V, int N>
+__attribute__((noinline)) int factor_top(double* panel, std::int64_t stride, int begin,
+                                         double* reciprocal) {
+  double* block = panel + begin * stride + begin;
+  Vec x[N][V];
+  CAIRN_UNROLL
+  for (int n = 0; n < N; ++n) {
+    CAIRN_UNROLL
+    for (int v = 0; v < V; ++v) x[n][v] = load(block + n * stride + v * kWidth);
+  }
+  subtract_left<V, N>(x, begin, panel + begin, panel + begin, stride);
+
+  alignas(64) double top[kWidth];
+  Vec pivots = broadcast(1.0);
+  CAIRN_UNROLL
+  for (int j = 0; j < N; ++j) {
+    store(top, x[j][0]);
+    const Vec inverse = 1.0 / lane(x[j][0], j);
+    pivots = with_lane(pivots, x[j][0], j);
+    Vec scaled[V];
+    CAIRN_UNROLL
+    for (int v = 0; v < V; ++v) scaled[v] = x[j][v] * inverse;
+    CAIRN_UNROLL
     for (int k = j + 1; k < N; ++k) {
-      for (int i = k; i < N; ++i) a[k][i] -= a[j][i] * a[j][k];
+      const Vec l = broadcast(top[k]);
+      CAIRN_UNROLL
+      for (int v = 0; v < V; ++v) x[k][v] -= scaled[v] * l;
     }
   }
+  store(top, pivots);
+  int failed = -1;
+  CAIRN_UNROLL
+  for (int j = N - 1; j >= 0; --j) {
+    if (!(top[j] > 0.0) || top[j] > 1.7e308) failed = j;
+  }
+  store(top, 1.0 / roots(pivots));
+  CAIRN_UNROLL
   for (int j = 0; j < N; ++j) {
-    for (int i = j; i < N; ++i) diagonal[j * stride + i] = a[j][i];
+    reciprocal[j] = top[j];
+    const Vec factor = broadcast(top[j]);
+    // Above the diagonal: zero, so that a solve may take whole vectors.
+    store(block + j * stride, from_lane(x[j][0] * factor, j));
+    CAIRN_UNROLL
+    for (int v = 1; v < V; ++v) store(block + j * stride + v * kWidth, x[j][v] * factor);
   }
   return failed;
 }
 
-/// X ← X L⁻ᵀ for V vectors of rows, with the N × N lower triangle L at `diagonal`.
+/// The same columns in V vectors of rows below those of `factor_top`: X ← (A - left) L⁻ᵀ.
 template <int V, int N>
-inline __attribute__((always_inline)) void solve_rows(double* X, std::int64_t stride,
-                                                      const double* diagonal,
-                                                      const double* reciprocal) {
+__attribute__((noinline)) void factor_below(double* panel, std::int64_t stride, int begin, int row,
+                                            const double* reciprocal) {
+  double* block = panel + begin * stride + row;
+  const double* L = panel + begin * stride + begin;
   Vec x[N][V];
-  for (int j = 0; j < N; ++j) {
-    for (int v = 0; v < V; ++v) x[j][v] = load_loose(X + j * stride + v * kWidth);
+  CAIRN_UNROLL
+  for (int n = 0; n < N; ++n) {
+    CAIRN_UNROLL
+    for (int v = 0; v < V; ++v) x[n][v] = load(block + n * stride + v * kWidth);
   }
+  subtract_left<V, N>(x, begin, panel + row, panel + begin, stride);
+  CAIRN_UNROLL
   for (int j = 0; j < N; ++j) {
     const Vec inverse = broadcast(reciprocal[j]);
-    for (int v = 0; v < V; ++v) x[j][v] *= inverse;
+    CAIRN_UNROLL
+    for (int v = 0; v < V; ++v) {
+      x[j][v] *= inverse;
+      store(block + j * stride + v * kWidth, x[j][v]);
+    }
+    CAIRN_UNROLL
     for (int k = j + 1; k < N; ++k) {
-      const Vec l = broadcast(diagonal[j * stride + k]);
+      const Vec l = broadcast(L[j * stride + k]);
+      CAIRN_UNROLL
       for (int v = 0; v < V; ++v) x[k][v] -= x[j][v] * l;
     }
   }
-  for (int j = 0; j < N; ++j) {
-    for (int v = 0; v < V; ++v) store_loose(X + j * stride + v * kWidth, x[j][v]);
-  }
 }
 
-/// Factors columns [begin, begin + N), already updated from the left. The rows of the diagonal
-/// block are done first, scalar by scalar; then those below, vector by vector, the first vector
-/// beginning right below the diagonal block where it can, so that nothing above is touched twice.
 template <int N>
 int factor_columns(double* panel, std::int64_t stride, int begin) {
   double reciprocal[N];
-  double* block = panel + begin * stride;
-  const int failed = factor_diagonal<N>(block + begin, stride, reciprocal);
-  const double* diagonal = block + begin;
-  int row = begin + N;
-  // Single rows up to the next vector boundary (N < 8 only in a panel's last columns).
-  for (; row < stride && row % kWidth != 0; ++row) {
-    double x[N];
-    for (int j = 0; j < N; ++j) x[j] = block[j * stride + row];
-    for (int j = 0; j < N; ++j) {
-      x[j] *= reciprocal[j];
-      for (int k = j + 1; k < N; ++k) x[k] -= x[j] * diagonal[j * stride + k];
-    }
-    for (int j = 0; j < N; ++j) block[j * stride + row] = x[j];
+  const int vectors = static_cast<int>(stride - begin) / kWidth;
+  int row = begin + min(vectors, kTileVectors) * kWidth;
+  int failed = -1;
+  if constexpr (kTileVectors == 3) {
+    failed = vectors >= 3   ? factor_top<3, N>(panel, stride, begin, reciprocal)
+             : vectors == 2 ? factor_top<2, N>(panel, stride, begin, reciprocal)
+                            : factor_top<1, N>(panel, stride, begin, reciprocal);
+    for (; row + 3 * kWidth <= stride; row += 3 * kWidth)
+      factor_below<3, N>(panel, stride, begin, row, reciprocal);
+    const int left = static_cast<int>(stride - row) / kWidth;
+    if (left == 2) factor_below<2, N>(panel, stride, begin, row, reciprocal);
+    if (left == 1) factor_below<1, N>(panel, stride, begin, row, reciprocal);
+  } else {
+    failed = factor_top<1, N>(panel, stride, begin, reciprocal);
+    for (; row < stride; row += kWidth) factor_below<1, N>(panel, stride, begin, row, reciprocal);
   }
-  if constexpr (kWidth > 2) {
-    for (; row + 2 * kWidth <= stride; row += 2 * kWidth)
-      solve_rows<2, N>(block + row, stride, diagonal, reciprocal);
-  }
-  for (; row < stride; row += kWidth) solve_rows<1, N>(block + row, stride, diagonal, reciprocal);
   return failed < 0 ? -1 : begin + failed;
 }
 
 int factor_panel(double* panel, std::int64_t stride, int columns) {
   int failed = -1;
-  for (int begin = 0; begin < columns; begin += kPanelColumns) {
-    const int N = min(kPanelColumns, columns - begin);
-    if (begin > 0) update_columns(panel, stride, begin, N);
+  for (int begin = 0; begin < columns; begin += kWidth) {
     int column = -1;
-    switch (N) {
-      case 8:
-        column = factor_columns<8>(panel, stride, begin);
-        break;
-      case 7:
-        column = factor_columns<7>(panel, stride, begin);
-        break;
-      case 6:
-        column = factor_columns<6>(panel, stride, begin);
-        break;
-      case 5:
-        column = factor_columns<5>(panel, stride, begin);
-        break;
-      case 4:
-        column = factor_columns<4>(panel, stride, begin);
-        break;
-      case 3:
-        column = factor_columns<3>(panel, stride, begin);
-        break;
-      case 2:
-        column = factor_columns<2>(panel, stride, begin);
-        break;
-      default:
-        column = factor_columns<1>(panel, stride, begin);
-        break;
-    }
+    with_columns(min(kWidth, columns - begin), [&](auto N) {
+      column = factor_columns<decltype(N)::value>(panel, stride, begin);
+    });
     if (failed < 0) failed = column;
   }
   return failed;
@@ -251,74 +364,161 @@ void update(const double* panel, std::int64_t stride, int columns, int m, double
     const int vectors = min(kTileVectors, (row_end - row) / kWidth);
     const int last_column = min(m, row + vectors * kWidth);  // columns up to the tile's last row
     for (int column = columns; column < last_column; column += kTileColumns) {
-      tile_of<false>(vectors, min(kTileColumns, last_column - column), columns, panel + row, stride,
-                     panel + column, stride, U + (column - columns) * ldu + (row - shift), ldu);
+      tile(vectors, min(kTileColumns, last_column - column), columns, panel + row, stride,
+           panel + column, stride, U + (column - columns) * ldu + (row - shift), ldu);
     }
   }
 }
 
-// --- extend_add
-// -------------------------------------------------------------------------------------------------------
+// --- extend_add ---
 
-inline __attribute__((always_inline)) void add(double* target, const double* source, int length) {
-  int k = 0;
-  for (; k + kWidth <= length; k += kWidth) {
-    store_loose(target + k, load_loose(target + k) + load_loose(source + k));
+/// target[k] += the next of source, for each bit k of mask: eight rows.
+inline __attribute__((always_inline)) void add_spread(double* target, const double* source,
+                                                      unsigned mask) {
+#if defined(__AVX512F__)
+  __m512d packed = _mm512_loadu_pd(source);
+  asm("" : "+v"(packed));  // to expand from memory is many times slower on some machines
+  store(target, load(target) + _mm512_maskz_expand_pd(static_cast<__mmask8>(mask), packed));
+#else
+  for (int half = 0; half < 8; half += kWidth, mask >>= kWidth) {
+    unsigned bits = mask & ((1u << kWidth) - 1u);
+    if (bits == (1u << kWidth) - 1u) {
+      store(target + half, load(target + half) + load_loose(source));
+      source += kWidth;
+      continue;
+    }
+    for (; bits != 0; bits &= bits - 1) target[half + __builtin_ctz(bits)] += *source++;
   }
-  for (; k < length; ++k) target[k] += source[k];
+#endif
 }
 
-void extend_add(const Run* runs, int first, int last, int count, const double* child,
-                std::int64_t child_stride, int child_shift, double* panel, std::int64_t stride,
-                int columns, double* U) {
-  const int shift = columns / 8 * 8;
-  const std::int64_t ldu = stride - shift;
-  for (int r = first; r < last; ++r) {
-    const Run& run = runs[r];
-    for (int c = 0; c < run.length; ++c) {
-      const double* source = child + (run.source + c) * child_stride + child_shift;
-      const int column = run.target + c;
-      double* target =
-          column < columns ? panel + column * stride : U + (column - columns) * ldu - shift;
-      add(target + column, source + run.source + c, run.length - c);
-      for (int q = r + 1; q < count; ++q)
-        add(target + runs[q].target, source + runs[q].source, runs[q].length);
+void extend_add(const Spread* spreads, int count, int first, int last, const double* child,
+                std::int64_t child_stride, double* parent, std::int64_t parent_stride) {
+  const Spread* const end = spreads + count;
+  while (spreads + 1 < end && spreads[1].source <= first) ++spreads;
+  for (; spreads < end && spreads->source < last; ++spreads) {
+    int column = spreads->source;
+    for (unsigned bits = spreads->mask; bits != 0; bits &= bits - 1, ++column) {
+      if (column < first || column >= last) continue;
+      const double* source = child + column * child_stride;
+      double* target = parent + (spreads->target + __builtin_ctz(bits)) * parent_stride;
+      // From the vector that holds the diagonal: what is above it is nobody's.
+      for (const Spread* s = spreads; s < end; ++s)
+        add_spread(target + s->target, source + s->source, s->mask);
     }
   }
 }
 
-// --- solve
-// ------------------------------------------------------------------------------------------------------------
+// --- solve ---
 
-void forward(const double* panel, std::int64_t stride, int columns, int m, double* x) {
-  for (int j = 0; j < columns; ++j) {
-    const double* column = panel + j * stride;
-    const double xj = x[j] / column[j];
-    x[j] = xj;
-    const Vec factor = broadcast(xj);
-    int i = j + 1;
-    for (; i + kWidth <= m; i += kWidth)
-      store_loose(x + i, load_loose(x + i) - load_loose(column + i) * factor);
-    for (; i < m; ++i) x[i] -= column[i] * xj;
+/// The reciprocals of the pivots of columns [begin, begin + N).
+inline __attribute__((always_inline)) Vec reciprocals(const double* diagonal, std::int64_t stride,
+                                                      int N) {
+  Vec pivots = broadcast(1.0);
+  CAIRN_UNROLL
+  for (int j = 0; j < N; ++j) pivots[j] = diagonal[j * stride + j];
+  return 1.0 / pivots;
+}
+
+/// x ← L⁻¹ x for N columns, their diagonal block at the first vector of `block`; the rows below,
+/// up to `stride`, are updated.
+template <int N>
+__attribute__((noinline)) void forward_columns(const double* block, std::int64_t stride, int rows,
+                                               double* x) {
+  alignas(64) double inverse[kWidth];
+  store(inverse, reciprocals(block, stride, N));
+  Vec top = load(x);
+  Vec factor[N];
+  CAIRN_UNROLL
+  for (int j = 0; j < N; ++j) {
+    const double xj = top[j] * inverse[j];
+    factor[j] = broadcast(xj);
+    top -= load(block + j * stride) * factor[j];
+    inverse[j] = xj;
+  }
+  store(x, top);
+  CAIRN_UNROLL
+  for (int j = 0; j < N; ++j) x[j] = inverse[j];
+  for (int i = kWidth; i < rows; i += kWidth) {
+    Vec sum = load(x + i);
+    CAIRN_UNROLL
+    for (int j = 0; j < N; ++j) sum -= load(block + j * stride + i) * factor[j];
+    store(x + i, sum);
   }
 }
 
-void backward(const double* panel, std::int64_t stride, int columns, int m, double* x) {
-  for (int j = columns - 1; j >= 0; --j) {
-    const double* column = panel + j * stride;
-    Vec sums{};
-    int i = j + 1;
-    for (; i + kWidth <= m; i += kWidth) sums += load_loose(column + i) * load_loose(x + i);
-    double sum = x[j];
-    for (int v = 0; v < kWidth; ++v) sum -= sums[v];
-    for (; i < m; ++i) sum -= column[i] * x[i];
-    x[j] = sum / column[j];
+/// x ← L⁻ᵀ x for the same columns: the rows below are only read.
+template <int N>
+__attribute__((noinline)) void backward_columns(const double* block, std::int64_t stride, int rows,
+                                                double* x) {
+  Vec sums[N] = {};
+  for (int i = kWidth; i < rows; i += kWidth) {
+    const Vec xi = load(x + i);
+    CAIRN_UNROLL
+    for (int j = 0; j < N; ++j) sums[j] += load(block + j * stride + i) * xi;
   }
+  // Rows of the first vector that are below the diagonal block: its own are set to zero first.
+  alignas(64) double top[kWidth];
+  store(top, load(x));
+  double own[N];
+  CAIRN_UNROLL
+  for (int j = 0; j < N; ++j) {
+    own[j] = top[j];
+    top[j] = 0.0;
+  }
+  if constexpr (N < kWidth) {
+    const Vec rest = load(top);
+    CAIRN_UNROLL
+    for (int j = 0; j < N; ++j) sums[j] += load(block + j * stride) * rest;
+  }
+  CAIRN_UNROLL
+  for (int j = 0; j < N; ++j) own[j] -= total(sums[j]);
+  alignas(64) double inverse[kWidth];
+  store(inverse, reciprocals(block, stride, N));
+  CAIRN_UNROLL
+  for (int j = N - 1; j >= 0; --j) {
+    own[j] *= inverse[j];
+    CAIRN_UNROLL
+    for (int k = 0; k < j; ++k) own[k] -= block[k * stride + j] * own[j];
+  }
+  CAIRN_UNROLL
+  for (int j = 0; j < N; ++j) x[j] = own[j];
+}
+
+void forward(const double* panel, std::int64_t stride, int columns, double* own, const Run* runs,
+             int count, double* vector, double* front) {
+  copy(front, own, columns);
+  for (int i = columns; i < stride; ++i) front[i] = 0.0;
+  for (int begin = 0; begin < columns; begin += kWidth) {
+    with_columns(min(kWidth, columns - begin), [&](auto N) {
+      forward_columns<decltype(N)::value>(panel + begin * stride + begin, stride,
+                                          static_cast<int>(stride) - begin, front + begin);
+    });
+  }
+  copy(own, front, columns);
+  for (int r = 0; r < count; ++r)
+    add(vector + runs[r].source, front + runs[r].target, runs[r].length);
+}
+
+void backward(const double* panel, std::int64_t stride, int columns, int m, double* own,
+              const Run* runs, int count, const double* vector, double* front) {
+  copy(front, own, columns);
+  for (int r = 0; r < count; ++r)
+    copy(front + runs[r].target, vector + runs[r].source, runs[r].length);
+  for (int i = m; i < stride; ++i) front[i] = 0.0;
+  for (int begin = (columns - 1) / kWidth * kWidth; begin >= 0; begin -= kWidth) {
+    with_columns(min(kWidth, columns - begin), [&](auto N) {
+      backward_columns<decltype(N)::value>(panel + begin * stride + begin, stride,
+                                           static_cast<int>(stride) - begin, front + begin);
+    });
+  }
+  copy(own, front, columns);
 }
 
 }  // namespace
 
 extern const Kernels kernels;
-const Kernels kernels{CAIRN_KERNEL_NAME, &factor_panel, &update, &extend_add, &forward, &backward};
+const Kernels kernels{CAIRN_KERNEL_NAME, &assemble, &factor_panel, &update,
+                      &extend_add,       &forward,  &backward};
 
 }  // namespace cairn::block::CAIRN_KERNEL_SET

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #define CAIRN_KERNEL_SET portable
 #define CAIRN_KERNEL_NAME "portable"
-#define CAIRN_KERNEL_WIDTH 2
+#define CAIRN_KERNEL_WIDTH 4
+#define CAIRN_KERNEL_HALVES 1
 #include "kernels_body.hpp"

@@ -177,7 +177,7 @@ void SupernodalCholesky::plan_workspace() {
       if (!inside[c]) places.give_back(update_begin_[c] - end, rounded(nodes[c].update_size()));
     }
   }
-  workspace_.resize(end + places.end());
+  workspace_.resize(end + places.end() + 8);  // `extend_add` may read beyond
 }
 
 Factorization SupernodalCholesky::factorize(const BlockMatrix& H) {
@@ -200,28 +200,6 @@ Factorization SupernodalCholesky::factorize(const BlockMatrix& H) {
   std::int32_t position = node.block_begin;
   while (offsets[position + 1] - offsets[node.block_begin] <= *failed) ++position;
   return {.ok = false, .failed_block = symbolic_.order()[position]};
-}
-
-void SupernodalCholesky::assemble(const BlockMatrix& H, std::int32_t s) {
-  const Supernode& node = symbolic_.supernodes()[s];
-  double* panels = panels_.data();
-  std::fill_n(panels + node.panel, static_cast<std::int64_t>(node.stride) * node.columns, 0.0);
-  const double* values = H.values().data();
-  for (const Assembly& entry : symbolic_.assembly(s)) {
-    const double* source = values + entry.source;
-    double* target = panels + entry.target;
-    if (entry.transpose) {
-      for (std::int32_t c = 0; c < entry.columns; ++c) {
-        for (std::int32_t r = 0; r < entry.rows; ++r)
-          target[static_cast<std::int64_t>(r) * entry.stride + c] = *source++;
-      }
-    } else {
-      for (std::int32_t c = 0; c < entry.columns; ++c) {
-        for (std::int32_t r = 0; r < entry.rows; ++r) target[r] = *source++;
-        target += entry.stride;
-      }
-    }
-  }
 }
 
 void SupernodalCholesky::update(const Supernode& node, double* U, bool parallel_inside) {
@@ -248,22 +226,28 @@ void SupernodalCholesky::factorize_supernode(const BlockMatrix& H, std::int32_t 
   double* panel = panels_.data() + node.panel;
   double* U = workspace_.data() + update_begin_[s];
   const auto children = symbolic_.children(s);
-  const auto add_child = [&](const Supernode& child, std::int32_t c, int first, int last) {
-    kernels_->extend_add(symbolic_.runs().data() + child.runs_begin, first, last,
-                         static_cast<int>(child.runs_end - child.runs_begin),
-                         workspace_.data() + update_begin_[c], child.update_stride(),
-                         child.columns % 8, panel, node.stride, node.columns, U);
+  // Adds columns [first, last) of a child to the panel or, beyond it, to the update matrix.
+  const auto add_child = [&](std::int32_t c, int first, int last, double* parent,
+                             std::int64_t parent_stride) {
+    const Supernode& child = nodes[c];
+    kernels_->extend_add(symbolic_.spreads().data() + child.spreads_begin,
+                         static_cast<int>(child.spreads_end - child.spreads_begin), first, last,
+                         workspace_.data() + update_begin_[c] + child.columns % 8,
+                         child.update_stride(), parent, parent_stride);
   };
 
-  assemble(H, s);
-  for (const std::int32_t c : children) add_child(nodes[c], c, 0, nodes[c].panel_runs);
+  const auto entries = symbolic_.assembly(s);
+  kernels_->assemble(entries.data(), static_cast<int>(entries.size()), H.values().data(),
+                     panels_.data(), panel, std::int64_t{node.stride} * node.columns);
+  for (const std::int32_t c : children) add_child(c, 0, nodes[c].panel_rows, panel, node.stride);
   failed_[s] = kernels_->factor_panel(panel, node.stride, node.columns);
   if (node.m == node.columns) return;
   update(node, U, parallel_inside);
-  for (const std::int32_t c : children) {
-    add_child(nodes[c], c, nodes[c].panel_runs,
-              static_cast<int>(nodes[c].runs_end - nodes[c].runs_begin));
-  }
+  // U as if it were a part of the whole front.
+  const std::int64_t stride = node.update_stride();
+  double* front = U - node.columns * stride - node.columns / 8 * 8;
+  for (const std::int32_t c : children)
+    add_child(c, nodes[c].panel_rows, nodes[c].m - nodes[c].columns, front, stride);
 }
 
 void SupernodalCholesky::solve(std::span<const double> g, std::span<double> x) {
@@ -280,25 +264,16 @@ void SupernodalCholesky::solve(std::span<const double> g, std::span<double> x) {
   const auto nodes = symbolic_.supernodes();
   const Run* gathers = symbolic_.gathers().data();
   double* front = front_vector_.data();
-  const auto gather = [&](const Supernode& node) {
-    std::copy_n(p + offsets[node.block_begin], node.columns, front);
-    for (std::int64_t r = node.gather_begin; r < node.gather_end; ++r) {
-      std::copy_n(p + gathers[r].source, gathers[r].length, front + gathers[r].target);
-    }
-  };
   for (const Supernode& node : nodes) {
-    gather(node);
-    kernels_->forward(panels_.data() + node.panel, node.stride, node.columns, node.m, front);
-    std::copy_n(front, node.columns, p + offsets[node.block_begin]);
-    for (std::int64_t r = node.gather_begin; r < node.gather_end; ++r) {
-      std::copy_n(front + gathers[r].target, gathers[r].length, p + gathers[r].source);
-    }
+    kernels_->forward(panels_.data() + node.panel, node.stride, node.columns,
+                      p + offsets[node.block_begin], gathers + node.gather_begin,
+                      static_cast<int>(node.gather_end - node.gather_begin), p, front);
   }
   for (std::size_t s = nodes.size(); s-- > 0;) {
     const Supernode& node = nodes[s];
-    gather(node);
-    kernels_->backward(panels_.data() + node.panel, node.stride, node.columns, node.m, front);
-    std::copy_n(front, node.columns, p + offsets[node.block_begin]);
+    kernels_->backward(panels_.data() + node.panel, node.stride, node.columns, node.m,
+                       p + offsets[node.block_begin], gathers + node.gather_begin,
+                       static_cast<int>(node.gather_end - node.gather_begin), p, front);
   }
   for (std::size_t k = 0; k < order.size(); ++k) {
     std::copy_n(p + offsets[k], offsets[k + 1] - offsets[k], x.data() + from[order[k]]);

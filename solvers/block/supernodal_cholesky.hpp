@@ -54,7 +54,6 @@ class SupernodalCholesky {
   void plan_parallel();
   void plan_workspace();
   void factorize_supernode(const BlockMatrix& H, std::int32_t s, bool parallel_inside);
-  void assemble(const BlockMatrix& H, std::int32_t s);
   void update(const Supernode& node, double* U, bool parallel_inside);
 
   const Kernels* kernels_;

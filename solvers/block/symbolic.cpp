@@ -329,13 +329,12 @@ void Symbolic::lay_out() {
   }
 }
 
-/// For each supernode the stretches by which its rows below map onto the parent's front, and onto
-/// the permuted vector.
+/// For each supernode where its rows below are: in the parent's front, and in the permuted vector.
 void Symbolic::map_children() {
   for (Supernode& node : supernodes_) {
     node.gather_begin = static_cast<std::int64_t>(gathers_.size());
-    node.runs_begin = static_cast<std::int64_t>(runs_.size());
-    node.panel_runs = 0;
+    node.spreads_begin = static_cast<std::int64_t>(spreads_.size());
+    node.panel_rows = 0;
     const Supernode* parent = node.parent >= 0 ? &supernodes_[node.parent] : nullptr;
     std::int64_t parent_row = parent ? parent->rows_begin : 0;
     std::int32_t parent_scalar = parent ? parent->columns : 0;
@@ -343,38 +342,45 @@ void Symbolic::map_children() {
     for (std::int64_t r = node.rows_begin; r < node.rows_end; ++r) {
       const std::int32_t row = rows_[r];
       const std::int32_t size = static_cast<std::int32_t>(scalars(row, row + 1));
-      const auto extend = [&](std::vector<Run>& list, std::int64_t list_begin, std::int32_t source,
-                              std::int32_t target, bool may_join) {
-        if (may_join && static_cast<std::int64_t>(list.size()) > list_begin) {
-          Run& last = list.back();
-          if (last.source + last.length == source && last.target + last.length == target) {
-            last.length += size;
-            return;
-          }
-        }
-        list.push_back({source, target, size});
-      };
-      extend(gathers_, node.gather_begin, static_cast<std::int32_t>(offsets_[row]),
-             node.columns + local, true);
+      gather(node, static_cast<std::int32_t>(offsets_[row]), node.columns + local, size);
       if (row < parent->block_end) {
-        extend(runs_, node.runs_begin, local,
-               static_cast<std::int32_t>(scalars(parent->block_begin, row)), true);
-        node.panel_runs =
-            static_cast<std::int32_t>(static_cast<std::int64_t>(runs_.size()) - node.runs_begin);
+        spread(node, local, static_cast<std::int32_t>(scalars(parent->block_begin, row)), size);
+        node.panel_rows += size;
       } else {
         for (; rows_[parent_row] != row; ++parent_row) {
           parent_scalar +=
               static_cast<std::int32_t>(scalars(rows_[parent_row], rows_[parent_row] + 1));
         }
-        // A run never straddles the edge of the panel.
-        const bool first_below =
-            static_cast<std::int64_t>(runs_.size()) == node.runs_begin + node.panel_runs;
-        extend(runs_, node.runs_begin, local, parent_scalar, !first_below);
+        spread(node, local, parent_scalar, size);
       }
       local += size;
     }
-    node.runs_end = static_cast<std::int64_t>(runs_.size());
+    node.spreads_end = static_cast<std::int64_t>(spreads_.size());
     node.gather_end = static_cast<std::int64_t>(gathers_.size());
+  }
+}
+
+/// Adds rows to the node's stretches, to the last one where they follow on it.
+void Symbolic::gather(const Supernode& node, std::int32_t source, std::int32_t target,
+                      std::int32_t size) {
+  if (static_cast<std::int64_t>(gathers_.size()) > node.gather_begin) {
+    Run& last = gathers_.back();
+    if (last.source + last.length == source && last.target + last.length == target) {
+      last.length += size;
+      return;
+    }
+  }
+  gathers_.push_back({source, target, size});
+}
+
+/// Adds rows to the node's spreads.
+void Symbolic::spread(const Supernode& node, std::int32_t source, std::int32_t target,
+                      std::int32_t size) {
+  for (std::int32_t k = 0; k < size; ++k) {
+    const std::int32_t row = target + k, first = row / 8 * 8;
+    const bool begun = static_cast<std::int64_t>(spreads_.size()) > node.spreads_begin;
+    if (!begun || spreads_.back().target != first) spreads_.push_back({source + k, first, 0});
+    spreads_.back().mask |= 1u << (row - first);
   }
 }
 

@@ -19,9 +19,9 @@ struct Supernode {
   std::int32_t m;                       ///< scalar rows of the front: columns and rows below
   std::int32_t stride;                  ///< m rounded up to 8
   std::int64_t panel;                   ///< where its panel starts in the factor's values
-  std::int64_t runs_begin,
-      runs_end;  ///< how its update matrix maps onto the parent's front, in `Symbolic::runs`
-  std::int32_t panel_runs;  ///< the first so many runs are columns of the parent's panel
+  std::int64_t spreads_begin,
+      spreads_end;  ///< how its update matrix maps onto the parent's front, in `Symbolic::spreads`
+  std::int32_t panel_rows;  ///< the first so many of its rows below are columns of the parent
   std::int64_t gather_begin, gather_end;  ///< its scalar rows below, as stretches of the permuted
                                           ///< vector, in `Symbolic::gathers`
 
@@ -30,23 +30,14 @@ struct Supernode {
   std::int32_t update_stride() const { return stride - columns / 8 * 8; }
 };
 
-/// Where an entry of H goes: into a panel, straight or transposed.
-struct Assembly {
-  std::int64_t source;         ///< in the values of H
-  std::int64_t target;         ///< in the factor's values
-  std::int16_t rows, columns;  ///< of the source block
-  std::int32_t stride;         ///< of the panel
-  bool transpose;
-};
-
 /// How the merging of supernodes weighs work: rough times in nanoseconds on one core. They decide
 /// how much explicit zero is worth one supernode less, and nothing else.
 struct CostModel {
   double supernode = 120.0;
   double panel_entry = 0.25;
-  double panel_flop = 0.07;
+  double panel_flop = 0.05;
   double update_flop = 0.025;
-  double extend_entry = 0.35;
+  double extend_entry = 0.8;
 };
 
 /// Everything about the factorisation P H Pᵀ = L Lᵀ that depends on the structure alone:
@@ -68,7 +59,7 @@ class Symbolic {
     return supernodes_;
   }  ///< in elimination order (a postorder)
   std::span<const std::int32_t> rows() const { return rows_; }  ///< block positions
-  std::span<const Run> runs() const { return runs_; }
+  std::span<const Spread> spreads() const { return spreads_; }
   /// source: scalar row in the permuted vector; target: row in the front.
   std::span<const Run> gathers() const { return gathers_; }
   /// Entries of H by the supernode that they go to.
@@ -93,6 +84,8 @@ class Symbolic {
   void find_rows(const BlockStructure& structure);
   void lay_out();
   void map_children();
+  void gather(const Supernode& node, std::int32_t source, std::int32_t target, std::int32_t size);
+  void spread(const Supernode& node, std::int32_t source, std::int32_t target, std::int32_t size);
   void assign_entries(const BlockStructure& structure);
   std::int64_t scalars(std::int32_t first, std::int32_t last) const {
     return offsets_[last] - offsets_[first];
@@ -106,7 +99,8 @@ class Symbolic {
   std::vector<Supernode> supernodes_;
   std::vector<std::int32_t> supernode_of_;  // by position
   std::vector<std::int32_t> rows_;
-  std::vector<Run> runs_, gathers_;
+  std::vector<Spread> spreads_;
+  std::vector<Run> gathers_;
   std::vector<Assembly> assembly_;
   std::vector<std::int64_t> assembly_begin_;
   std::vector<std::int32_t> children_;
