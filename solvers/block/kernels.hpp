@@ -49,10 +49,15 @@ struct Kernels {
   void (*assemble)(const Assembly* entries, int count, const double* values, double* panels,
                    double* panel, std::int64_t size);
 
-  /// Cholesky factorisation of the panel in place: the diagonal block becomes L_JJ, the rows below
-  /// L_RJ = A_RJ L_JJ⁻ᵀ. Returns -1, or the first column whose pivot is not positive (its pivot is
-  /// then replaced by 1, and so on).
-  int (*factor_panel)(double* panel, std::int64_t stride, int columns);
+  /// Cholesky factorisation of columns [first, last) of the panel in place, those before being
+  /// done, in rows first … row_end-1: the diagonal block becomes L_JJ, the rows below
+  /// L_RJ = A_RJ L_JJ⁻ᵀ. `first` and `row_end` are multiples of 8. Returns -1, or the first column
+  /// whose pivot is not positive; what follows it is then worthless.
+  int (*factor_panel)(double* panel, std::int64_t stride, int first, int last, int row_end);
+  /// The rows [row_begin, row_end), multiples of 8, of columns whose diagonal block is done by
+  /// `factor_panel`.
+  void (*factor_rows)(double* panel, std::int64_t stride, int first, int last, int row_begin,
+                      int row_end);
 
   /// U = -L_RJ L_RJᵀ for the vectors of rows [row_begin, row_end) of the front, both multiples
   /// of 8.
@@ -73,6 +78,12 @@ struct Kernels {
   /// x = L⁻ᵀ x for one supernode: the rows below are only read.
   void (*backward)(const double* panel, std::int64_t stride, int columns, int m, double* own,
                    const Run* runs, int count, const double* vector, double* front);
+  /// The same for eight right-hand sides side by side: every row of `own`, `vector` and `front` is
+  /// eight doubles on a 64-byte boundary.
+  void (*forward_many)(const double* panel, std::int64_t stride, int columns, double* own,
+                       const Run* runs, int count, double* vector, double* front);
+  void (*backward_many)(const double* panel, std::int64_t stride, int columns, int m, double* own,
+                        const Run* runs, int count, const double* vector, double* front);
 };
 
 /// The fastest set that this machine can run, chosen once. `limit` (portable, avx2, avx512; "auto":

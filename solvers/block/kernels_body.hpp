@@ -319,37 +319,63 @@ __attribute__((noinline)) void factor_below(double* panel, std::int64_t stride, 
 }
 
 template <int N>
-int factor_columns(double* panel, std::int64_t stride, int begin) {
-  double reciprocal[N];
-  const int vectors = static_cast<int>(stride - begin) / kWidth;
-  int row = begin + min(vectors, kTileVectors) * kWidth;
-  int failed = -1;
+void factor_rows(double* panel, std::int64_t stride, int begin, int row, int row_end,
+                 const double* reciprocal) {
+  for (; row + kTileVectors * kWidth <= row_end; row += kTileVectors * kWidth)
+    factor_below<kTileVectors, N>(panel, stride, begin, row, reciprocal);
   if constexpr (kTileVectors == 3) {
-    failed = vectors >= 3   ? factor_top<3, N>(panel, stride, begin, reciprocal)
-             : vectors == 2 ? factor_top<2, N>(panel, stride, begin, reciprocal)
-                            : factor_top<1, N>(panel, stride, begin, reciprocal);
-    for (; row + 3 * kWidth <= stride; row += 3 * kWidth)
-      factor_below<3, N>(panel, stride, begin, row, reciprocal);
-    const int left = static_cast<int>(stride - row) / kWidth;
+    const int left = (row_end - row) / kWidth;
     if (left == 2) factor_below<2, N>(panel, stride, begin, row, reciprocal);
     if (left == 1) factor_below<1, N>(panel, stride, begin, row, reciprocal);
+  }
+}
+
+template <int N>
+int factor_columns(double* panel, std::int64_t stride, int begin, int row_end) {
+  double reciprocal[kWidth];
+  const int vectors = min((row_end - begin) / kWidth, kTileVectors);
+  int failed = -1;
+  if constexpr (kTileVectors == 3) {
+    failed = vectors == 3   ? factor_top<3, N>(panel, stride, begin, reciprocal)
+             : vectors == 2 ? factor_top<2, N>(panel, stride, begin, reciprocal)
+                            : factor_top<1, N>(panel, stride, begin, reciprocal);
   } else {
     failed = factor_top<1, N>(panel, stride, begin, reciprocal);
-    for (; row < stride; row += kWidth) factor_below<1, N>(panel, stride, begin, row, reciprocal);
   }
+  factor_rows<N>(panel, stride, begin, begin + vectors * kWidth, row_end, reciprocal);
   return failed < 0 ? -1 : begin + failed;
 }
 
-int factor_panel(double* panel, std::int64_t stride, int columns) {
+int factor_panel(double* panel, std::int64_t stride, int first, int last, int row_end) {
   int failed = -1;
-  for (int begin = 0; begin < columns; begin += kWidth) {
+  for (int begin = first; begin < last; begin += kWidth) {
     int column = -1;
-    with_columns(min(kWidth, columns - begin), [&](auto N) {
-      column = factor_columns<decltype(N)::value>(panel, stride, begin);
+    with_columns(min(kWidth, last - begin), [&](auto N) {
+      column = factor_columns<decltype(N)::value>(panel, stride, begin, row_end);
     });
     if (failed < 0) failed = column;
   }
   return failed;
+}
+
+/// The reciprocals of the pivots of columns [begin, begin + N).
+inline __attribute__((always_inline)) Vec reciprocals(const double* diagonal, std::int64_t stride,
+                                                      int N) {
+  Vec pivots = broadcast(1.0);
+  for (int j = 0; j < N; ++j) pivots[j] = diagonal[j * stride + j];
+  return 1.0 / pivots;
+}
+
+void factor_rows(double* panel, std::int64_t stride, int first, int last, int row_begin,
+                 int row_end) {
+  for (int begin = first; begin < last; begin += kWidth) {
+    const int count = min(kWidth, last - begin);
+    alignas(64) double reciprocal[kWidth];
+    store(reciprocal, reciprocals(panel + begin * stride + begin, stride, count));
+    with_columns(count, [&](auto N) {
+      factor_rows<decltype(N)::value>(panel, stride, begin, row_begin, row_end, reciprocal);
+    });
+  }
 }
 
 // --- update
@@ -410,15 +436,6 @@ void extend_add(const Spread* spreads, int count, int first, int last, const dou
 }
 
 // --- solve ---
-
-/// The reciprocals of the pivots of columns [begin, begin + N).
-inline __attribute__((always_inline)) Vec reciprocals(const double* diagonal, std::int64_t stride,
-                                                      int N) {
-  Vec pivots = broadcast(1.0);
-  CAIRN_UNROLL
-  for (int j = 0; j < N; ++j) pivots[j] = diagonal[j * stride + j];
-  return 1.0 / pivots;
-}
 
 /// x ← L⁻¹ x for N columns, their diagonal block at the first vector of `block`; the rows below,
 /// up to `stride`, are updated.
@@ -515,10 +532,135 @@ void backward(const double* panel, std::int64_t stride, int columns, int m, doub
   copy(own, front, columns);
 }
 
+// --- solve for eight right-hand sides ---
+
+/// Vectors of a row of eight.
+constexpr int kRow = 8 / kWidth;
+
+/// y -= L x for N columns: L's rows at `column`, X's and Y's rows are of eight.
+template <int N>
+inline __attribute__((always_inline)) void subtract_rows(const Vec (&x)[N][kRow],
+                                                         const double* column, std::int64_t stride,
+                                                         double* y) {
+  Vec sum[kRow];
+  CAIRN_UNROLL
+  for (int v = 0; v < kRow; ++v) sum[v] = load(y + v * kWidth);
+  CAIRN_UNROLL
+  for (int n = 0; n < N; ++n) {
+    const Vec l = broadcast(column[n * stride]);
+    CAIRN_UNROLL
+    for (int v = 0; v < kRow; ++v) sum[v] -= l * x[n][v];
+  }
+  CAIRN_UNROLL
+  for (int v = 0; v < kRow; ++v) store(y + v * kWidth, sum[v]);
+}
+
+template <int N>
+void forward_rows(const double* panel, std::int64_t stride, int begin, int m, double* front) {
+  const double* block = panel + begin * stride;
+  Vec x[N][kRow];
+  CAIRN_UNROLL
+  for (int n = 0; n < N; ++n) {
+    const double* row = block + begin + n;
+    const Vec inverse = broadcast(1.0 / row[n * stride]);
+    CAIRN_UNROLL
+    for (int v = 0; v < kRow; ++v) {
+      x[n][v] = load(front + (begin + n) * 8 + v * kWidth);
+      CAIRN_UNROLL
+      for (int k = 0; k < n; ++k) x[n][v] -= broadcast(row[k * stride]) * x[k][v];
+      x[n][v] *= inverse;
+      store(front + (begin + n) * 8 + v * kWidth, x[n][v]);
+    }
+  }
+  for (int i = begin + N; i < m; ++i) subtract_rows<N>(x, block + i, stride, front + i * 8);
+}
+
+template <int N>
+void backward_rows(const double* panel, std::int64_t stride, int begin, int m, double* front) {
+  const double* block = panel + begin * stride;
+  Vec x[N][kRow];
+  CAIRN_UNROLL
+  for (int n = 0; n < N; ++n) {
+    CAIRN_UNROLL
+    for (int v = 0; v < kRow; ++v) x[n][v] = load(front + (begin + n) * 8 + v * kWidth);
+  }
+  for (int i = begin + N; i < m; ++i) {
+    CAIRN_UNROLL
+    for (int n = 0; n < N; ++n) {
+      const Vec l = broadcast(block[n * stride + i]);
+      CAIRN_UNROLL
+      for (int v = 0; v < kRow; ++v) x[n][v] -= l * load(front + i * 8 + v * kWidth);
+    }
+  }
+  CAIRN_UNROLL
+  for (int n = N - 1; n >= 0; --n) {
+    const double* row = block + begin + n;
+    const Vec inverse = broadcast(1.0 / row[n * stride]);
+    CAIRN_UNROLL
+    for (int v = 0; v < kRow; ++v) {
+      x[n][v] *= inverse;
+      store(front + (begin + n) * 8 + v * kWidth, x[n][v]);
+      CAIRN_UNROLL
+      for (int k = 0; k < n; ++k) x[k][v] -= broadcast(row[k * stride]) * x[n][v];
+    }
+  }
+}
+
+/// visit(begin, Number<N>) for the columns of a panel, four at a time.
+template <class Visit>
+inline __attribute__((always_inline)) void four_columns(int begin, int columns, Visit visit) {
+  switch (min(4, columns - begin)) {
+    case 4:
+      return visit(Number<4>{});
+    case 3:
+      return visit(Number<3>{});
+    case 2:
+      return visit(Number<2>{});
+    default:
+      return visit(Number<1>{});
+  }
+}
+
+void forward_many(const double* panel, std::int64_t stride, int columns, double* own,
+                  const Run* runs, int count, double* vector, double* front) {
+  const int below = count > 0 ? runs[count - 1].target + runs[count - 1].length : columns;
+  copy(front, own, columns * 8);
+  for (int i = columns * 8; i < below * 8; i += kWidth) store(front + i, Vec{});
+  for (int begin = 0; begin < columns; begin += 4) {
+    four_columns(begin, columns, [&](auto N) {
+      forward_rows<decltype(N)::value>(panel, stride, begin, below, front);
+    });
+  }
+  copy(own, front, columns * 8);
+  for (int r = 0; r < count; ++r)
+    add(vector + std::int64_t{runs[r].source} * 8, front + runs[r].target * 8, runs[r].length * 8);
+}
+
+void backward_many(const double* panel, std::int64_t stride, int columns, int m, double* own,
+                   const Run* runs, int count, const double* vector, double* front) {
+  copy(front, own, columns * 8);
+  for (int r = 0; r < count; ++r)
+    copy(front + runs[r].target * 8, vector + std::int64_t{runs[r].source} * 8, runs[r].length * 8);
+  for (int begin = (columns - 1) / 4 * 4; begin >= 0; begin -= 4) {
+    four_columns(begin, columns, [&](auto N) {
+      backward_rows<decltype(N)::value>(panel, stride, begin, m, front);
+    });
+  }
+  copy(own, front, columns * 8);
+}
+
 }  // namespace
 
 extern const Kernels kernels;
-const Kernels kernels{CAIRN_KERNEL_NAME, &assemble, &factor_panel, &update,
-                      &extend_add,       &forward,  &backward};
+const Kernels kernels{.name = CAIRN_KERNEL_NAME,
+                      .assemble = &assemble,
+                      .factor_panel = &factor_panel,
+                      .factor_rows = &factor_rows,
+                      .update = &update,
+                      .extend_add = &extend_add,
+                      .forward = &forward,
+                      .backward = &backward,
+                      .forward_many = &forward_many,
+                      .backward_many = &backward_many};
 
 }  // namespace cairn::block::CAIRN_KERNEL_SET

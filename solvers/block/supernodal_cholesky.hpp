@@ -5,9 +5,11 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "block/kernels.hpp"
+#include "block/schedule.hpp"
 #include "block/symbolic.hpp"
 #include "cairn/aligned.hpp"
 #include "cairn/block_matrix.hpp"
@@ -17,12 +19,12 @@ namespace cairn::block {
 
 /// Multifrontal supernodal Cholesky factorisation P H Pᵀ = L Lᵀ of a block matrix.
 ///
-/// Supernodes are worked off in postorder: the entries of H and the children's update matrices are
-/// added into the front, the panel is factored, and what remains is the update matrix for the
-/// parent. All index lists are made once a structure
-/// (`analyze`); a factorisation allocates nothing. Subtrees run in parallel, and so do the tiles of
-/// large fronts; what is added to what, and in which order, does not depend on the number of
-/// threads, so neither does the result.
+/// Supernodes are worked off from the leaves of the elimination tree to its roots: the entries of H
+/// and the children's update matrices are added into the front, the panel is factored, and what
+/// remains is the update matrix for the parent. All index lists are made once a structure
+/// (`analyze`); factorising and solving with one right-hand side allocate nothing on one thread.
+/// Subtrees run in parallel, and so do the tiles of large fronts; what is added to what, and in
+/// which order, does not depend on the number of threads, so neither does the result.
 class SupernodalCholesky {
  public:
   /// `kernels`: auto, portable, avx2 or avx512. Throws `Error` (usage) for what the machine cannot
@@ -30,7 +32,7 @@ class SupernodalCholesky {
   explicit SupernodalCholesky(std::string_view kernels = "auto");
 
   /// `ordering`: one of `ordering_names()`, or auto: each of them but natural, and the one with the
-  /// fewest flops.
+  /// fewest flops. Room is made for as many threads as `threads()` says now.
   void analyze(const BlockStructure& structure, std::string_view ordering,
                const CostModel& cost = {});
   /// The ordering that is in use.
@@ -38,38 +40,52 @@ class SupernodalCholesky {
   Factorization factorize(const BlockMatrix& H);
   /// x = H⁻¹ g; x may be g.
   void solve(std::span<const double> g, std::span<double> x);
+  /// X = H⁻¹ G, both size × columns, column-major; X may be G. Eight columns cost little more than
+  /// two single solves.
+  void solve(std::span<const double> G, std::span<double> X, int columns);
   double log_determinant() const;
 
   const Symbolic& symbolic() const { return symbolic_; }
   std::span<const double> panels() const { return panels_; }
   std::string_view kernel_set() const { return kernels_->name; }
+  /// Doubles of panels and room for update matrices.
+  std::int64_t doubles() const { return std::ssize(panels_) + std::ssize(workspace_); }
 
  private:
-  /// Supernodes [begin, end) of a subtree that one task works off; its update matrices share a
-  /// workspace, planned when analysing.
-  struct Subtree {
-    std::int32_t begin, end;
-    double work = 0.0;
-  };
-  void plan_parallel();
-  void plan_workspace();
-  void factorize_supernode(const BlockMatrix& H, std::int32_t s, bool parallel_inside);
-  void update(const Supernode& node, double* U, bool parallel_inside);
+  void plan_solve();
+  void factorize_supernode(const BlockMatrix& H, std::int32_t s, std::int64_t lane, bool parallel);
+  void factor_panel(const Supernode& node, std::int32_t s, bool parallel);
+  void update(const Supernode& node, double* U, bool parallel);
+  void add_child(std::int32_t c, const double* child, int first, int last, double* front,
+                 std::int64_t stride, bool parallel);
+  double* update_matrix(std::int32_t s, std::int64_t lane) {
+    const std::int64_t begin = schedule_.in_lane[s] ? lane * schedule_.lane_size : 0;
+    return workspace_.data() + begin + schedule_.place[s];
+  }
+  /// Forward and backward substitution on `vectors_`, whose rows hold `width` numbers: 1, or 8.
+  void substitute(int width);
 
   const Kernels* kernels_;
   std::string ordering_;
   const BlockStructure* structure_ = nullptr;
   std::uint64_t version_ = 0;
   Symbolic symbolic_;
+  Schedule schedule_;
   AlignedVector panels_;
   AlignedVector workspace_;
-  std::vector<std::int64_t> update_begin_;  // by supernode: its update matrix in the workspace
-  std::vector<std::int32_t> failed_;        // by supernode: first failed column, -1 if none
-  std::vector<Subtree> subtrees_;
-  std::vector<std::int32_t> top_;  // supernodes above the subtrees, in postorder
-  AlignedVector permuted_;
-  AlignedVector front_vector_;
+  std::vector<std::int32_t> failed_;  // by supernode: first failed column, -1 if none
   bool factorized_ = false;
+
+  // Solving. Rows of the permuted vector, then for each task the rows that its supernodes update
+  // outside it: so tasks do not meet, and are added up in a fixed order.
+  std::vector<Run> gathers_;                // where the rows below of a supernode are
+  std::vector<std::int64_t> gather_begin_;  // by supernode
+  std::vector<Run> outside_;                // source: in the permuted vector; target: the copy
+  std::vector<std::pair<std::int64_t, std::int64_t>> outside_of_;  // by task, in `outside_`
+  std::int64_t vector_rows_ = 0;
+  AlignedVector vectors_;
+  AlignedVector fronts_;  // one for each lane
+  std::int64_t front_rows_ = 0;
 };
 
 }  // namespace cairn::block

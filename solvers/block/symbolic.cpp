@@ -2,6 +2,7 @@
 #include "block/symbolic.hpp"
 
 #include <algorithm>
+#include <functional>
 #include <numeric>
 
 namespace cairn::block {
@@ -56,12 +57,16 @@ std::vector<std::int32_t> elimination_tree(const RowPattern& pattern, int n) {
   return parent;
 }
 
-/// A postorder of a forest: element k is the node visited k-th; children in the order of
-/// `first_child` lists.
-std::vector<std::int32_t> postorder(std::span<const std::int32_t> parent) {
+/// A postorder of a forest: element k is the node visited k-th. `rank`: a node of higher rank is
+/// visited before its siblings; empty: siblings in the order of their numbers.
+std::vector<std::int32_t> postorder(std::span<const std::int32_t> parent,
+                                    std::span<const double> rank = {}) {
   const std::int32_t n = static_cast<std::int32_t>(parent.size());
-  std::vector<std::int32_t> first_child(n, -1), sibling(n, -1), result, stack;
-  for (std::int32_t v = n - 1; v >= 0; --v) {
+  std::vector<std::int32_t> first_child(n, -1), sibling(n, -1), result, stack, last_first(n);
+  for (std::int32_t v = 0; v < n; ++v) last_first[v] = n - 1 - v;
+  if (!rank.empty())
+    std::ranges::stable_sort(last_first, {}, [&](std::int32_t v) { return rank[v]; });
+  for (const std::int32_t v : last_first) {
     if (parent[v] < 0) continue;
     sibling[v] = first_child[parent[v]];
     first_child[parent[v]] = v;
@@ -82,6 +87,28 @@ std::vector<std::int32_t> postorder(std::span<const std::int32_t> parent) {
     }
   }
   return result;
+}
+
+/// How much of the stack of update matrices each node's subtree needs beyond what it leaves on it:
+/// to visit the neediest sibling first keeps the stack smallest (Liu 1986). Children have smaller
+/// numbers than their parents; `size`: of each node's update matrix.
+std::vector<double> stack_ranks(std::span<const std::int32_t> parent,
+                                std::span<const double> size) {
+  const std::size_t n = parent.size();
+  std::vector<std::vector<std::int32_t>> children(n);
+  std::vector<double> peak(n), rank(n);
+  for (std::size_t v = 0; v < n; ++v) {
+    std::ranges::stable_sort(children[v], std::greater{}, [&](std::int32_t c) { return rank[c]; });
+    double held = 0.0;
+    for (const std::int32_t c : children[v]) {
+      peak[v] = std::max(peak[v], held + peak[c]);
+      held += size[c];
+    }
+    peak[v] = std::max(peak[v], held + size[v]);
+    rank[v] = peak[v] - size[v];
+    if (parent[v] >= 0) children[parent[v]].push_back(static_cast<std::int32_t>(v));
+  }
+  return rank;
 }
 
 std::int32_t round_up(std::int64_t value) { return static_cast<std::int32_t>((value + 7) / 8 * 8); }
@@ -234,7 +261,9 @@ void Symbolic::find_supernodes(const BlockStructure& structure, const CostModel&
   for (std::size_t k = 0; k < reps.size(); ++k) {
     tree[k] = parent[reps[k]] < 0 ? -1 : compact[rep[parent[reps[k]]]];
   }
-  const std::vector<std::int32_t> post = postorder(tree);
+  std::vector<double> sizes(reps.size());
+  for (std::size_t k = 0; k < reps.size(); ++k) sizes[k] = below[reps[k]] * below[reps[k]];
+  const std::vector<std::int32_t> post = postorder(tree, stack_ranks(tree, sizes));
   std::vector<std::vector<std::int32_t>> members(reps.size());
   for (std::int32_t p = 0; p < n; ++p) members[compact[rep[node_of[p]]]].push_back(p);
 
@@ -329,10 +358,9 @@ void Symbolic::lay_out() {
   }
 }
 
-/// For each supernode where its rows below are: in the parent's front, and in the permuted vector.
+/// For each supernode where its rows below are in the parent's front.
 void Symbolic::map_children() {
   for (Supernode& node : supernodes_) {
-    node.gather_begin = static_cast<std::int64_t>(gathers_.size());
     node.spreads_begin = static_cast<std::int64_t>(spreads_.size());
     node.panel_rows = 0;
     const Supernode* parent = node.parent >= 0 ? &supernodes_[node.parent] : nullptr;
@@ -342,7 +370,6 @@ void Symbolic::map_children() {
     for (std::int64_t r = node.rows_begin; r < node.rows_end; ++r) {
       const std::int32_t row = rows_[r];
       const std::int32_t size = static_cast<std::int32_t>(scalars(row, row + 1));
-      gather(node, static_cast<std::int32_t>(offsets_[row]), node.columns + local, size);
       if (row < parent->block_end) {
         spread(node, local, static_cast<std::int32_t>(scalars(parent->block_begin, row)), size);
         node.panel_rows += size;
@@ -356,21 +383,7 @@ void Symbolic::map_children() {
       local += size;
     }
     node.spreads_end = static_cast<std::int64_t>(spreads_.size());
-    node.gather_end = static_cast<std::int64_t>(gathers_.size());
   }
-}
-
-/// Adds rows to the node's stretches, to the last one where they follow on it.
-void Symbolic::gather(const Supernode& node, std::int32_t source, std::int32_t target,
-                      std::int32_t size) {
-  if (static_cast<std::int64_t>(gathers_.size()) > node.gather_begin) {
-    Run& last = gathers_.back();
-    if (last.source + last.length == source && last.target + last.length == target) {
-      last.length += size;
-      return;
-    }
-  }
-  gathers_.push_back({source, target, size});
 }
 
 /// Adds rows to the node's spreads.

@@ -22,8 +22,6 @@ struct Supernode {
   std::int64_t spreads_begin,
       spreads_end;  ///< how its update matrix maps onto the parent's front, in `Symbolic::spreads`
   std::int32_t panel_rows;  ///< the first so many of its rows below are columns of the parent
-  std::int64_t gather_begin, gather_end;  ///< its scalar rows below, as stretches of the permuted
-                                          ///< vector, in `Symbolic::gathers`
 
   /// Doubles of the update matrix.
   std::int64_t update_size() const { return std::int64_t(m - columns) * update_stride(); }
@@ -60,8 +58,6 @@ class Symbolic {
   }  ///< in elimination order (a postorder)
   std::span<const std::int32_t> rows() const { return rows_; }  ///< block positions
   std::span<const Spread> spreads() const { return spreads_; }
-  /// source: scalar row in the permuted vector; target: row in the front.
-  std::span<const Run> gathers() const { return gathers_; }
   /// Entries of H by the supernode that they go to.
   std::span<const Assembly> assembly(int supernode) const {
     return std::span(assembly_).subspan(
@@ -84,7 +80,6 @@ class Symbolic {
   void find_rows(const BlockStructure& structure);
   void lay_out();
   void map_children();
-  void gather(const Supernode& node, std::int32_t source, std::int32_t target, std::int32_t size);
   void spread(const Supernode& node, std::int32_t source, std::int32_t target, std::int32_t size);
   void assign_entries(const BlockStructure& structure);
   std::int64_t scalars(std::int32_t first, std::int32_t last) const {
@@ -100,7 +95,6 @@ class Symbolic {
   std::vector<std::int32_t> supernode_of_;  // by position
   std::vector<std::int32_t> rows_;
   std::vector<Spread> spreads_;
-  std::vector<Run> gathers_;
   std::vector<Assembly> assembly_;
   std::vector<std::int64_t> assembly_begin_;
   std::vector<std::int32_t> children_;

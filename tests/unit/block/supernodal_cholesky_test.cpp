@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <optional>
 #include <string>
 
 #include "block/ordering.hpp"
@@ -90,33 +91,119 @@ TEST(SupernodalCholesky, MergesSupernodesWithoutChangingTheResult) {
   EXPECT_LT((solve(fine, g) - solve(coarse, g)).norm(), 1e-13 * g.norm());
 }
 
-TEST(SupernodalCholesky, GivesTheSameBitsForAnyNumberOfThreads) {
-  std::mt19937 rng(3);
-  // Wide enough for tiles inside a front: a grid of 22 × 22 with blocks of 6.
-  const int side = 22;
+/// A grid whose last row of blocks is joined with everything: a tree with one wide front on top.
+BlockStructure grid_with_a_dense_edge(int side, int block_size) {
   std::vector<std::pair<std::int32_t, std::int32_t>> entries;
   for (int r = 0; r < side; ++r) {
     for (int c = 0; c < side; ++c) {
-      if (c > 0) entries.emplace_back(r * side + c, r * side + c - 1);
-      if (r > 0) entries.emplace_back(r * side + c, (r - 1) * side + c);
+      const int here = r * side + c;
+      if (c > 0) entries.emplace_back(here, here - 1);
+      if (r > 0) entries.emplace_back(here, here - side);
+      for (int last = 0; last < side; ++last) {
+        const int edge = (side - 1) * side + last;
+        if (edge > here && (last % 3 == c % 3 || r == side - 1)) entries.emplace_back(edge, here);
+      }
     }
   }
-  const BlockStructure structure(std::vector<std::int32_t>(side * side, 6), entries);
+  return BlockStructure(std::vector<std::int32_t>(side * side, block_size), entries);
+}
+
+TEST(SupernodalCholesky, GivesTheSameBitsForAnyNumberOfThreads) {
+  std::mt19937 rng(3);
+  const BlockStructure structure = grid_with_a_dense_edge(22, 6);
   BlockMatrix H(structure);
   fill_positive_definite(rng, H);
   const Eigen::VectorXd g = Eigen::VectorXd::Random(structure.size());
   const int before = threads();
   std::vector<Eigen::VectorXd> results;
+  std::optional<double> log_determinant;
   for (const int count : {1, 2, 3}) {
     set_threads(count);
     SupernodalCholesky cholesky;
     cholesky.analyze(structure, "amd");
     ASSERT_TRUE(cholesky.factorize(H).ok);
     results.push_back(solve(cholesky, g));
+    EXPECT_EQ(cholesky.log_determinant(), log_determinant.value_or(cholesky.log_determinant()));
+    log_determinant = cholesky.log_determinant();
   }
   set_threads(before);
   EXPECT_TRUE((results[0].array() == results[1].array()).all());
   EXPECT_TRUE((results[0].array() == results[2].array()).all());
+}
+
+TEST(SupernodalCholesky, FactorsWideFrontsForEveryKernelSet) {
+  std::mt19937 rng(21);
+  const BlockStructure structure = grid_with_a_dense_edge(17, 7);
+  BlockMatrix H(structure);
+  fill_positive_definite(rng, H);
+  const Eigen::LDLT<Eigen::MatrixXd> oracle(dense(H));
+  const Eigen::VectorXd g = Eigen::VectorXd::Random(structure.size());
+  const Eigen::VectorXd expected = oracle.solve(g);
+  for (const std::string& kernels : kernel_sets()) {
+    SupernodalCholesky cholesky(kernels);
+    cholesky.analyze(structure, "natural", {.supernode = 1e6});
+    ASSERT_TRUE(cholesky.factorize(H).ok);
+    EXPECT_LT((solve(cholesky, g) - expected).norm(), 1e-12 * expected.norm()) << kernels;
+  }
+}
+
+TEST(SupernodalCholesky, NamesTheBlockThatIsNotPositiveInAWideFront) {
+  std::mt19937 rng(22);
+  const BlockStructure structure = grid_with_a_dense_edge(15, 6);
+  BlockMatrix H(structure);
+  fill_positive_definite(rng, H);
+  const int bad = structure.blocks() - 4;
+  H.block(structure.column_begin()[bad])[0] = -1e6;
+  for (const int count : {1, 2}) {
+    const int before = threads();
+    set_threads(count);
+    SupernodalCholesky cholesky;
+    cholesky.analyze(structure, "natural");
+    EXPECT_EQ(cholesky.factorize(H).failed_block, bad);
+    set_threads(before);
+  }
+}
+
+TEST(SupernodalCholesky, SolvesForManyRightHandSides) {
+  std::mt19937 rng(23);
+  const BlockStructure structure = random_structure(rng, 150, 130, {2, 3, 6});
+  BlockMatrix H(structure);
+  fill_positive_definite(rng, H);
+  const Eigen::LDLT<Eigen::MatrixXd> oracle(dense(H));
+  for (const std::string& kernels : kernel_sets()) {
+    SupernodalCholesky cholesky(kernels);
+    cholesky.analyze(structure, "amd");
+    ASSERT_TRUE(cholesky.factorize(H).ok);
+    for (const int columns : {0, 1, 7, 8, 19}) {
+      Eigen::MatrixXd X = Eigen::MatrixXd::Random(structure.size(), columns);
+      const Eigen::MatrixXd expected = oracle.solve(X);
+      const std::span<double> values(X.data(), static_cast<std::size_t>(X.size()));
+      cholesky.solve(values, values, columns);
+      EXPECT_LE((X - expected).norm(), 1e-12 * expected.norm()) << kernels << ' ' << columns;
+    }
+    // And one again, in the room that the eight have left.
+    const Eigen::VectorXd g = Eigen::VectorXd::Random(structure.size());
+    const Eigen::VectorXd expected = oracle.solve(g);
+    EXPECT_LT((solve(cholesky, g) - expected).norm(), 1e-12 * expected.norm());
+    std::vector<double> wrong(structure.size() + 1);
+    EXPECT_THROW(cholesky.solve(wrong, wrong, 1), std::logic_error);
+  }
+}
+
+TEST(SupernodalCholesky, KeepsTheStackOfUpdateMatricesSmall) {
+  const int side = 60;
+  std::vector<std::pair<std::int32_t, std::int32_t>> entries;
+  for (int k = 0; k < side * side; ++k) {
+    if (k % side > 0) entries.emplace_back(k, k - 1);
+    if (k >= side) entries.emplace_back(k, k - side);
+  }
+  const BlockStructure structure(std::vector<std::int32_t>(side * side, 3), entries);
+  const int before = threads();
+  set_threads(1);
+  SupernodalCholesky cholesky;
+  cholesky.analyze(structure, "amd");
+  set_threads(before);
+  EXPECT_LT(cholesky.doubles(), 3 * cholesky.symbolic().factor_nonzeros);
 }
 
 TEST(SupernodalCholesky, NamesABlockThatIsNotPositiveAndRecovers) {

@@ -1,0 +1,207 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <functional>
+#include <stdexcept>
+
+#include "block/supernodal_cholesky.hpp"
+#include "cairn/threads.hpp"
+
+namespace cairn::block {
+namespace {
+
+/// Right-hand sides that are solved for together.
+constexpr int kTogether = 8;
+
+/// Adds a stretch to the list that starts at `begin`, to its last one where it follows on it.
+void append(std::vector<Run>& runs, std::int64_t begin, const Run& run) {
+  if (std::ssize(runs) > begin) {
+    Run& last = runs.back();
+    if (last.source + last.length == run.source && last.target + last.length == run.target) {
+      last.length += run.length;
+      return;
+    }
+  }
+  runs.push_back(run);
+}
+
+}  // namespace
+
+/// Lists for every supernode where its rows below are in the vector. What a task updates outside
+/// itself goes to copies of its own, behind the permuted vector.
+void SupernodalCholesky::plan_solve() {
+  const auto nodes = symbolic_.supernodes();
+  const auto offsets = symbolic_.offsets();
+  const auto rows = symbolic_.rows();
+  const auto size_of = [&](std::int32_t row) {
+    return static_cast<std::int32_t>(offsets[row + 1] - offsets[row]);
+  };
+  gathers_.clear();
+  gather_begin_.assign(1, 0);
+  outside_.clear();
+  outside_of_.assign(schedule_.tasks.size(), {0, 0});
+  vector_rows_ = structure_->size();
+  front_rows_ = 0;
+
+  std::vector<std::int32_t> outside;
+  std::vector<std::int64_t> copy_of(symbolic_.order().size());
+  for (std::int32_t s = 0; s < std::ssize(nodes); ++s) {
+    const Supernode& node = nodes[s];
+    const std::int32_t t = schedule_.task_of[s];
+    const std::int32_t end = t < 0 ? -1 : nodes[schedule_.tasks[t].end - 1].block_end;
+    if (t >= 0 && schedule_.tasks[t].begin == s) {
+      outside.clear();
+      for (std::int32_t k = s; k < schedule_.tasks[t].end; ++k) {
+        for (std::int64_t r = nodes[k].rows_begin; r < nodes[k].rows_end; ++r) {
+          if (rows[r] >= end) outside.push_back(rows[r]);
+        }
+      }
+      std::ranges::sort(outside);
+      outside.erase(std::ranges::unique(outside).begin(), outside.end());
+      outside_of_[t].first = std::ssize(outside_);
+      for (const std::int32_t row : outside) {
+        copy_of[row] = vector_rows_;
+        append(outside_, outside_of_[t].first,
+               {static_cast<std::int32_t>(offsets[row]), static_cast<std::int32_t>(vector_rows_),
+                size_of(row)});
+        vector_rows_ += size_of(row);
+      }
+      outside_of_[t].second = std::ssize(outside_);
+    }
+
+    std::int32_t target = node.columns;
+    for (std::int64_t r = node.rows_begin; r < node.rows_end; ++r) {
+      const bool copied = t >= 0 && rows[r] >= end;
+      const std::int64_t source = copied ? copy_of[rows[r]] : offsets[rows[r]];
+      append(gathers_, gather_begin_.back(),
+             {static_cast<std::int32_t>(source), target, size_of(rows[r])});
+      target += size_of(rows[r]);
+    }
+    gather_begin_.push_back(std::ssize(gathers_));
+    front_rows_ = std::max<std::int64_t>(front_rows_, node.stride);
+  }
+  vectors_ = AlignedVector(vector_rows_);
+  fronts_ = AlignedVector(front_rows_ * schedule_.lanes);
+}
+
+void SupernodalCholesky::substitute(int width) {
+  const auto nodes = symbolic_.supernodes();
+  const auto offsets = symbolic_.offsets();
+  double* const vector = vectors_.data();
+  const auto front_of = [&](std::size_t lane) {
+    return fronts_.data() + static_cast<std::int64_t>(lane) * front_rows_ * width;
+  };
+  const auto forward = [&](std::int32_t s, double* front) {
+    const Supernode& node = nodes[s];
+    (width == 1 ? kernels_->forward : kernels_->forward_many)(
+        panels_.data() + node.panel, node.stride, node.columns,
+        vector + offsets[node.block_begin] * width, gathers_.data() + gather_begin_[s],
+        static_cast<int>(gather_begin_[s + 1] - gather_begin_[s]), vector, front);
+  };
+  const auto backward = [&](std::int32_t s, double* front) {
+    const Supernode& node = nodes[s];
+    (width == 1 ? kernels_->backward : kernels_->backward_many)(
+        panels_.data() + node.panel, node.stride, node.columns, node.m,
+        vector + offsets[node.block_begin] * width, gathers_.data() + gather_begin_[s],
+        static_cast<int>(gather_begin_[s + 1] - gather_begin_[s]), vector, front);
+  };
+  const auto copies = [&](std::size_t t) {
+    return std::span(outside_).subspan(outside_of_[t].first,
+                                       outside_of_[t].second - outside_of_[t].first);
+  };
+  const auto for_each_task = [&](const auto& body) {
+    std::atomic<std::size_t> next{0};
+    const auto lane_loop = [&](std::size_t lane) {
+      for (std::size_t t = next++; t < schedule_.tasks.size(); t = next++) body(t, front_of(lane));
+    };
+    for_each_chunk(static_cast<std::size_t>(schedule_.lanes), std::ref(lane_loop));
+  };
+
+  for_each_task([&](std::size_t t, double* front) {
+    for (const Run& run : copies(t))
+      std::fill_n(vector + std::int64_t{run.target} * width, run.length * width, 0.0);
+    for (std::int32_t s = schedule_.tasks[t].begin; s < schedule_.tasks[t].end; ++s)
+      forward(s, front);
+  });
+  for (std::size_t t = 0; t < schedule_.tasks.size(); ++t) {
+    for (const Run& run : copies(t)) {
+      double* target = vector + std::int64_t{run.source} * width;
+      const double* source = vector + std::int64_t{run.target} * width;
+      for (std::int32_t k = 0; k < run.length * width; ++k) target[k] += source[k];
+    }
+  }
+  for (const std::vector<std::int32_t>& level : schedule_.levels) {
+    for (const std::int32_t s : level) forward(s, front_of(0));
+  }
+  for (std::size_t l = schedule_.levels.size(); l-- > 0;) {
+    for (const std::int32_t s : schedule_.levels[l]) backward(s, front_of(0));
+  }
+  for_each_task([&](std::size_t t, double* front) {
+    for (const Run& run : copies(t)) {
+      std::copy_n(vector + std::int64_t{run.source} * width, run.length * width,
+                  vector + std::int64_t{run.target} * width);
+    }
+    for (std::int32_t s = schedule_.tasks[t].end; s-- > schedule_.tasks[t].begin;)
+      backward(s, front);
+  });
+}
+
+void SupernodalCholesky::solve(std::span<const double> g, std::span<double> x) {
+  if (!factorized_) throw std::logic_error("solve: there is no factorisation");
+  const auto order = symbolic_.order();
+  const auto offsets = symbolic_.offsets();
+  const auto from = structure_->offsets();
+  double* p = vectors_.data();
+  for (std::size_t k = 0; k < order.size(); ++k) {
+    for (std::int64_t i = 0; i < offsets[k + 1] - offsets[k]; ++i)
+      p[offsets[k] + i] = g[from[order[k]] + i];
+  }
+  substitute(1);
+  for (std::size_t k = 0; k < order.size(); ++k) {
+    for (std::int64_t i = 0; i < offsets[k + 1] - offsets[k]; ++i)
+      x[from[order[k]] + i] = p[offsets[k] + i];
+  }
+}
+
+void SupernodalCholesky::solve(std::span<const double> G, std::span<double> X, int columns) {
+  if (!factorized_) throw std::logic_error("solve: there is no factorisation");
+  const std::int64_t size = structure_->size();
+  if (std::ssize(G) != size * columns || std::ssize(X) != size * columns)
+    throw std::logic_error("solve: right-hand sides or solutions are not size × columns");
+  vectors_.resize(vector_rows_ * kTogether);
+  fronts_.resize(front_rows_ * schedule_.lanes * kTogether);
+  const auto order = symbolic_.order();
+  const auto offsets = symbolic_.offsets();
+  const auto from = structure_->offsets();
+  // Row by row, eight columns side by side; columns that there are not stay zero.
+  const auto for_each_number = [&](int first, int count, auto visit) {
+    for (std::size_t k = 0; k < order.size(); ++k) {
+      for (std::int64_t i = 0; i < offsets[k + 1] - offsets[k]; ++i) {
+        double* row = vectors_.data() + (offsets[k] + i) * kTogether;
+        const std::int64_t at = from[order[k]] + i;
+        for (int c = 0; c < count; ++c) visit(row[c], (first + c) * size + at);
+        for (int c = count; c < kTogether; ++c) row[c] = 0.0;
+      }
+    }
+  };
+  for (int first = 0; first < columns; first += kTogether) {
+    const int count = std::min(kTogether, columns - first);
+    for_each_number(first, count, [&](double& number, std::int64_t at) { number = G[at]; });
+    substitute(kTogether);
+    for_each_number(first, count, [&](double& number, std::int64_t at) { X[at] = number; });
+  }
+}
+
+double SupernodalCholesky::log_determinant() const {
+  if (!factorized_) throw std::logic_error("log_determinant: there is no factorisation");
+  double sum = 0.0;
+  for (const Supernode& node : symbolic_.supernodes()) {
+    const double* panel = panels_.data() + node.panel;
+    for (std::int32_t j = 0; j < node.columns; ++j)
+      sum += std::log(panel[static_cast<std::int64_t>(j) * node.stride + j]);
+  }
+  return 2.0 * sum;
+}
+
+}  // namespace cairn::block
