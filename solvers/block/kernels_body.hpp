@@ -56,7 +56,7 @@ inline __attribute__((always_inline)) Vec lane(Vec v, int j) {
 }
 inline __attribute__((always_inline)) Vec roots(Vec v) {
 #if defined(__AVX512F__)
-  return _mm512_sqrt_pd(v);
+  return _mm512_maskz_sqrt_pd(0xff, v);  // GCC 12 warns of its own header at the plain one
 #elif defined(__AVX2__)
   return _mm256_sqrt_pd(v);
 #else
