@@ -27,7 +27,9 @@ std::string ratio_text(const GraphSurvey& s) {
 }
 
 std::string gauge_text(const Graph& graph, const GraphSurvey& s) {
-  if (s.gauge.anchored.empty()) return "0";
+  if (s.gauge.anchored.empty()) {
+    return s.gauge.left_free.empty() ? "0" : fmt::format("not known ({})", s.gauge.describe(graph));
+  }
   return fmt::format("{} ({})", s.gauge_freedoms, s.gauge.describe(graph));
 }
 
@@ -114,9 +116,9 @@ json::array worst_json(const GraphSurvey& s) {
   return all;
 }
 
-json::array anchored_json(const Graph& graph, const Gauge& gauge) {
+json::array ids_json(const Graph& graph, const std::vector<int>& variables) {
   json::array ids;
-  for (const int variable : gauge.anchored) ids.push_back(graph.id(variable));
+  for (const int variable : variables) ids.push_back(graph.id(variable));
   return ids;
 }
 
@@ -128,7 +130,8 @@ json::object report_json(const LoadedGraph& loaded, const GraphSurvey& s) {
   report["factors"] = factors_json(s);
   report["components"] = s.gauge.components;
   report["gauge"] = {{"freedoms", s.gauge_freedoms},
-                     {"anchored", anchored_json(loaded.graph, s.gauge)}};
+                     {"anchored", ids_json(loaded.graph, s.gauge.anchored)},
+                     {"left_free", ids_json(loaded.graph, s.gauge.left_free)}};
   report["odometry"] = s.odometry;
   report["loop_closures"] = s.loops;
   report["doubled"] = s.doubled;

@@ -62,10 +62,15 @@ json::object seconds_json(const Seconds& seconds) {
 }
 
 json::object solver_json(const LinearSolverStats& stats) {
-  return {{"ordering", stats.ordering},
-          {"factor_nonzeros", stats.factor_nonzeros},
-          {"factor_flops", stats.factor_flops},
-          {"note", stats.note}};
+  json::object object{{"ordering", stats.ordering},
+                      {"factor_nonzeros", stats.factor_nonzeros},
+                      {"factor_flops", stats.factor_flops},
+                      {"note", stats.note}};
+  if (stats.iterations > 0) {
+    object["iterations"] = stats.iterations;
+    object["relative_residual"] = stats.relative_residual;
+  }
+  return object;
 }
 
 json::array iterations_json(const Summary& summary) {

@@ -120,6 +120,11 @@ std::string summary_text(const OptimizeOptions& options, const LoadedGraph& load
   table.add({"status", fmt::format("{} after {}", to_string(summary.status),
                                    plural(std::ssize(summary.iterations), "iteration"))});
   table.add({"time", times_text(summary.seconds)});
+  if (summary.solver.iterations > 0) {
+    table.add({"inner", fmt::format("{}, relative residual at most {:.1e}; {}",
+                                    plural(summary.solver.iterations, "iteration"),
+                                    summary.solver.relative_residual, summary.solver.note)});
+  }
   for (const std::string& note : summary.notes) table.add({"note", note});
   if (!options.output.empty() && options.output != "-") table.add({"written", options.output});
   if (!options.record.empty()) table.add({"recorded", options.record});

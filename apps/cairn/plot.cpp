@@ -88,9 +88,9 @@ Command add_plot(CLI::App& program) {
       ->type_name("PICTURE")
       ->required();
   app->add_option("--what", options->what,
-                  "trajectory, convergence, bars, sparsity or steps; auto is by FILE")
+                  "trajectory, convergence, bars, scaling, sparsity or steps; auto is by FILE")
       ->type_name("WHAT")
-      ->check(one_of({"auto", "trajectory", "convergence", "bars", "sparsity", "steps"}))
+      ->check(one_of({"auto", "trajectory", "convergence", "bars", "scaling", "sparsity", "steps"}))
       ->capture_default_str();
   app->add_option("--size", options->size, "WIDTHxHEIGHT [px; in a PDF 1/96 inch] [900x600]")
       ->type_name("SIZE");

@@ -23,6 +23,7 @@ FactorType::~FactorType() = default;
 Loss::~Loss() = default;
 LinearSolver::~LinearSolver() = default;
 LogDeterminant::~LogDeterminant() = default;
+ManyRightHandSides::~ManyRightHandSides() = default;
 EliminationOrder::~EliminationOrder() = default;
 Optimizer::~Optimizer() = default;
 InitialGuess::~InitialGuess() = default;

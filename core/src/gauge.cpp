@@ -81,6 +81,10 @@ Gauge resolve_gauge(const Graph& graph) {
   for (const Anchoring& c : components) {
     gauge.components_with_fixed += c.fixed;
     if (c.fixed || c.prior_size >= c.largest_tangent || gauge.held[c.first_largest]) continue;
+    if (!graph.type(c.first_largest).lie_group()) {
+      gauge.left_free.push_back(c.first_largest);
+      continue;
+    }
     gauge.held[c.first_largest] = true;
     gauge.anchored.push_back(c.first_largest);
   }
@@ -103,6 +107,13 @@ std::string Gauge::describe(const Graph& graph) const {
         "{} components without a fixed variable or enough priors: anchored one variable of each "
         "({}{})",
         anchored.size(), fmt::join(names, ", "), anchored.size() > 5 ? ", …" : "");
+  }
+  if (!left_free.empty()) {
+    text += fmt::format(
+        "{}the gauge of {} is left free: holding {} would hold more than its place",
+        text.empty() ? "" : "; ",
+        left_free.size() == 1 ? "a component" : fmt::format("{} components", left_free.size()),
+        graph.describe_variable(left_free.front()));
   }
   if (!unconstrained.empty()) {
     text += fmt::format(

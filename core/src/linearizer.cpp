@@ -16,28 +16,45 @@ constexpr std::size_t kFactorChunk = 256;
 /// Block columns gathered by one task, and variables retracted by one.
 constexpr std::size_t kColumnChunk = 512;
 
-/// Several factors write one block: they lie side by side in scratch and are added up in factor
-/// order.
+/// Several factors write one block: what each chunk of factors adds to it has a place of its own in
+/// scratch, and the places are added up in the order of the chunks.
 struct Gather {
-  std::int64_t target;   // in the values of H, or in g
-  std::int64_t scratch;  // of the first contribution
-  std::int32_t size;     // doubles a contribution
-  std::int32_t count;
+  std::int64_t target;  // in the values of H, or in g
+  std::int32_t size;    // doubles
 };
 
-void gather(const Gather& sum, const double* scratch, double* target) {
-  const double* source = scratch + sum.scratch;
+void gather(const Gather& sum, std::span<const std::int64_t> places, const double* scratch,
+            double* target) {
   double* out = target + sum.target;
-  if (sum.count == 0) {
+  if (places.empty()) {
     std::fill_n(out, sum.size, 0.0);
     return;
   }
-  std::copy_n(source, sum.size, out);
-  for (std::int32_t c = 1; c < sum.count; ++c) {
-    source += sum.size;
-    for (std::int32_t k = 0; k < sum.size; ++k) out[k] += source[k];
+  std::copy_n(scratch + places[0], sum.size, out);
+  for (const std::int64_t place : places.subspan(1)) {
+    for (std::int32_t k = 0; k < sum.size; ++k) out[k] += scratch[place + k];
   }
 }
+
+/// Sums of the same kind with the places of each, in compressed rows.
+struct Gathers {
+  std::vector<Gather> sums;
+  std::vector<std::int64_t> places;
+  std::vector<std::int64_t> begin{0};
+
+  /// To be called sum by sum; `contributions` are (sum, place), in the order of the chunks.
+  void sort_in(std::span<const std::pair<std::int64_t, std::int64_t>> contributions) {
+    begin.assign(sums.size() + 1, 0);
+    for (const auto& [sum, place] : contributions) ++begin[sum + 1];
+    std::partial_sum(begin.begin(), begin.end(), begin.begin());
+    places.resize(contributions.size());
+    std::vector<std::int64_t> next(begin.begin(), begin.end() - 1);
+    for (const auto& [sum, place] : contributions) places[next[sum]++] = place;
+  }
+  void add_up(std::size_t k, const double* scratch, double* target) const {
+    gather(sums[k], std::span(places).subspan(begin[k], begin[k + 1] - begin[k]), scratch, target);
+  }
+};
 
 }  // namespace
 
@@ -52,6 +69,7 @@ struct Linearizer::Plan {
   struct Chunk {
     std::int32_t pool;
     std::size_t begin, end;
+    std::int64_t scratch_begin = 0, scratch_end = 0;  // what its factors add to
   };
 
   const Graph* graph;
@@ -62,8 +80,8 @@ struct Linearizer::Plan {
   BlockStructure structure;
   std::vector<PoolTargets> targets;  // by factor pool
   std::vector<Chunk> chunks;
-  std::vector<Gather> block_sums;     // by target
-  std::vector<Gather> gradient_sums;  // by block
+  Gathers block_sums;     // by target
+  Gathers gradient_sums;  // by block
   AlignedVector scratch;
   std::vector<double> partial;  // chi2 by chunk
 
@@ -71,8 +89,6 @@ struct Linearizer::Plan {
       : graph(&g), graph_version(g.structure_version()) {
     number_blocks(held);
     build_structure();
-    assign_targets();
-    find_plain_factors();
     for (std::size_t p = 0; p < g.factor_pools().size(); ++p) {
       const std::size_t size = g.factor_pools()[p].size();
       for (std::size_t begin = 0; begin < size; begin += kFactorChunk) {
@@ -81,6 +97,8 @@ struct Linearizer::Plan {
       }
     }
     partial.resize(chunks.size());
+    assign_targets();
+    find_plain_factors();
   }
 
   void number_blocks(const std::vector<bool>& held) {
@@ -97,9 +115,13 @@ struct Linearizer::Plan {
     sizes.reserve(variable_of.size());
     for (const std::int32_t v : variable_of) sizes.push_back(graph->type(v).tangent_size());
     std::vector<std::pair<std::int32_t, std::int32_t>> entries;
-    for_each_pair([&](std::int32_t, std::size_t, std::int32_t row, std::int32_t column) {
-      if (row >= 0 && column >= 0 && row != column) entries.emplace_back(row, column);
-    });
+    for (const FactorPool& pool : graph->factor_pools()) {
+      for (std::size_t f = 0; f < pool.size(); ++f) {
+        for_each_pair(pool, f, [&](std::size_t, std::int32_t row, std::int32_t column) {
+          if (row != column) entries.emplace_back(row, column);
+        });
+      }
+    }
     structure = BlockStructure(std::move(sizes), std::move(entries));
     for (const VariablePool& pool : graph->variable_pools()) {
       std::vector<std::int64_t>& offsets = delta_offsets.emplace_back();
@@ -110,54 +132,25 @@ struct Linearizer::Plan {
     }
   }
 
-  /// Calls visit(pool, place of the pair in PoolTargets::blocks, block of a, block of b) for all
-  /// pairs a ≤ b of variables of all factors, in the order of the factors.
+  /// Calls visit(place of the pair in PoolTargets::blocks, block of a, block of b) for all pairs
+  /// a ≤ b of variables of one factor that are not held.
   template <class Visit>
-  void for_each_pair(Visit visit) const {
-    for (int position = 0; position < graph->factor_count(); ++position) {
-      const FactorRef ref = graph->factor(position);
-      const std::span<const std::int32_t> v = graph->factor_variables(position);
-      std::size_t pair = static_cast<std::size_t>(ref.entry) * (v.size() * (v.size() + 1) / 2);
-      for (std::size_t a = 0; a < v.size(); ++a) {
-        for (std::size_t b = a; b < v.size(); ++b)
-          visit(ref.pool, pair++, block_of[v[a]], block_of[v[b]]);
+  void for_each_pair(const FactorPool& pool, std::size_t factor, Visit visit) const {
+    const std::size_t arity = static_cast<std::size_t>(pool.type->arity());
+    const std::int32_t* v = pool.variables.data() + factor * arity;
+    std::size_t pair = factor * (arity * (arity + 1) / 2);
+    for (std::size_t a = 0; a < arity; ++a) {
+      for (std::size_t b = a; b < arity; ++b, ++pair) {
+        if (block_of[v[a]] >= 0 && block_of[v[b]] >= 0) visit(pair, block_of[v[a]], block_of[v[b]]);
       }
     }
   }
 
-  /// A block with one contributor is written in place; the others get room in scratch, contribution
-  /// by contribution. So do all gradients.
+  /// A block with one contributor is written in place. To the others each chunk of factors adds in
+  /// a place of its own, and so it does to the gradients.
   void assign_targets() {
-    std::vector<std::int32_t> contributors(structure.entries(), 0),
-        gradient_contributors(structure.blocks(), 0);
-    std::vector<std::int64_t> entry_of_pair;
-    for_each_pair([&](std::int32_t, std::size_t, std::int32_t a, std::int32_t b) {
-      if (a < 0 || b < 0) return;
-      const std::int64_t entry = structure.find(std::max(a, b), std::min(a, b));
-      entry_of_pair.push_back(entry);
-      ++contributors[entry];
-      if (a == b) ++gradient_contributors[a];
-    });
-
-    std::int64_t used = 0;
-    std::vector<std::int64_t> next(structure.entries(), -1), next_gradient(structure.blocks());
-    for (std::int32_t j = 0; j < structure.blocks(); ++j) {
-      for (std::int64_t e = structure.column_begin()[j]; e < structure.column_begin()[j + 1]; ++e) {
-        if (contributors[e] == 1) continue;
-        const std::int32_t size =
-            structure.block_size(structure.rows()[e]) * structure.block_size(j);
-        block_sums.push_back({structure.value_begin()[e], used, size, contributors[e]});
-        next[e] = used;
-        used += static_cast<std::int64_t>(size) * contributors[e];
-      }
-      const std::int32_t size = structure.block_size(j);
-      gradient_sums.push_back({structure.offsets()[j], used, size, gradient_contributors[j]});
-      next_gradient[j] = used;
-      used += static_cast<std::int64_t>(size) * gradient_contributors[j];
-    }
-    scratch.resize(used);
-
     targets.resize(graph->factor_pools().size());
+    std::vector<std::int32_t> contributors(structure.entries(), 0);
     for (std::size_t p = 0; p < targets.size(); ++p) {
       const FactorPool& pool = graph->factor_pools()[p];
       const std::size_t arity = static_cast<std::size_t>(pool.type->arity()),
@@ -165,29 +158,67 @@ struct Linearizer::Plan {
       targets[p].blocks.assign(pool.size() * pairs, LinearizeSink::kNone);
       targets[p].transposed.assign(pool.size() * pairs, 0);
       targets[p].gradients.assign(pool.size() * arity, LinearizeSink::kNone);
-    }
-    auto entry = entry_of_pair.begin();
-    for_each_pair([&](std::int32_t p, std::size_t pair, std::int32_t a, std::int32_t b) {
-      if (a < 0 || b < 0) return;
-      const std::int64_t e = *entry++;
-      if (next[e] < 0) {
-        targets[p].blocks[pair] = structure.value_begin()[e];
-      } else {
-        targets[p].blocks[pair] = ~next[e];
-        next[e] += static_cast<std::int64_t>(structure.block_size(a)) * structure.block_size(b);
-      }
-      targets[p].transposed[pair] = a < b;
-    });
-    for (int position = 0; position < graph->factor_count(); ++position) {
-      const FactorRef ref = graph->factor(position);
-      const std::span<const std::int32_t> v = graph->factor_variables(position);
-      for (std::size_t a = 0; a < v.size(); ++a) {
-        const std::int32_t block = block_of[v[a]];
-        if (block < 0) continue;
-        targets[ref.pool].gradients[ref.entry * v.size() + a] = next_gradient[block];
-        next_gradient[block] += structure.block_size(block);
+      for (std::size_t f = 0; f < pool.size(); ++f) {
+        for_each_pair(pool, f, [&](std::size_t pair, std::int32_t a, std::int32_t b) {
+          const std::int64_t entry = structure.find(std::max(a, b), std::min(a, b));
+          ++contributors[entry];
+          targets[p].blocks[pair] = entry;  // until its target is known
+          targets[p].transposed[pair] = a < b;
+        });
       }
     }
+
+    std::vector<std::int64_t> sum_of(structure.entries(), -1);
+    for (std::int32_t j = 0; j < structure.blocks(); ++j) {
+      const std::int32_t size = structure.block_size(j);
+      gradient_sums.sums.push_back({structure.offsets()[j], size});
+      for (std::int64_t e = structure.column_begin()[j]; e < structure.column_begin()[j + 1]; ++e) {
+        if (contributors[e] == 1) continue;
+        sum_of[e] = std::ssize(block_sums.sums);
+        block_sums.sums.push_back(
+            {structure.value_begin()[e], structure.block_size(structure.rows()[e]) * size});
+      }
+    }
+
+    std::int64_t used = 0;
+    std::vector<std::pair<std::int64_t, std::int64_t>> to_blocks, to_gradients;
+    std::vector<std::int64_t> block_place(block_sums.sums.size(), -1),
+        gradient_place(structure.blocks(), -1);
+    // The place of a sum in the chunk at hand: a new one if the last is an earlier chunk's.
+    const auto place_of = [&](Chunk& chunk, const Gathers& gathers, std::int64_t sum,
+                              std::vector<std::int64_t>& place, auto& contributions) {
+      if (place[sum] < chunk.scratch_begin) {
+        place[sum] = used;
+        used += gathers.sums[sum].size;
+        contributions.emplace_back(sum, place[sum]);
+      }
+      return place[sum];
+    };
+    for (Chunk& chunk : chunks) {
+      const FactorPool& pool = graph->factor_pools()[chunk.pool];
+      PoolTargets& target = targets[chunk.pool];
+      const std::size_t arity = static_cast<std::size_t>(pool.type->arity());
+      chunk.scratch_begin = used;
+      for (std::size_t f = chunk.begin; f < chunk.end; ++f) {
+        for_each_pair(pool, f, [&](std::size_t pair, std::int32_t, std::int32_t) {
+          const std::int64_t entry = target.blocks[pair], sum = sum_of[entry];
+          target.blocks[pair] = sum < 0 ? structure.value_begin()[entry]
+                                        : ~place_of(chunk, block_sums, sum, block_place, to_blocks);
+        });
+        for (std::size_t k = f * arity; k < (f + 1) * arity; ++k) {
+          const std::int32_t block = block_of[pool.variables[k]];
+          if (block >= 0) {
+            target.gradients[k] =
+                place_of(chunk, gradient_sums, block, gradient_place, to_gradients);
+          }
+        }
+      }
+      used = (used + 7) / 8 * 8;  // two threads never write one cache line
+      chunk.scratch_end = used;
+    }
+    scratch.resize(used);
+    block_sums.sort_in(to_blocks);
+    gradient_sums.sort_in(to_gradients);
   }
 
   void find_plain_factors() {
@@ -286,6 +317,7 @@ double Linearizer::linearize(const Values& values, BlockMatrix& H, std::span<dou
                              .transposed = targets.transposed.data(),
                              .gradients = targets.gradients.data()};
     const FactorView& view = views.pools[chunk.pool];
+    std::fill(scratch + chunk.scratch_begin, scratch + chunk.scratch_end, 0.0);
     double norms[kFactorChunk], weights[kFactorChunk];
     const std::size_t count = chunk.end - chunk.begin;
     if (plan.graph->loss()) {
@@ -297,14 +329,13 @@ double Linearizer::linearize(const Values& values, BlockMatrix& H, std::span<dou
       plan.partial[c] = plan.apply_loss(chunk, {norms, count}, {});
     }
   });
-  for_each_range(plan.block_sums.size(), kColumnChunk, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t k = begin; k < end; ++k) gather(plan.block_sums[k], scratch, H_values);
-  });
-  for_each_range(plan.gradient_sums.size(), 4 * kColumnChunk,
-                 [&](std::size_t begin, std::size_t end) {
-                   for (std::size_t k = begin; k < end; ++k)
-                     gather(plan.gradient_sums[k], scratch, g.data());
-                 });
+  const auto add_up = [&](const Gathers& gathers, std::size_t grain, double* target) {
+    for_each_range(gathers.sums.size(), grain, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t k = begin; k < end; ++k) gathers.add_up(k, scratch, target);
+    });
+  };
+  add_up(plan.block_sums, kColumnChunk, H_values);
+  add_up(plan.gradient_sums, 4 * kColumnChunk, g.data());
   return std::accumulate(plan.partial.begin(), plan.partial.end(), 0.0);
 }
 

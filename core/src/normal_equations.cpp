@@ -75,7 +75,14 @@ NormalEquations::NormalEquations(const Graph& graph, LinearSolver& solver)
   diagonal_.resize(size());
   damped_.resize(size());
   const Timed timed(seconds_.analyze);
-  solver.analyze(linearizer_.structure());
+  jacobian_solver_ = query<JacobianSolver>(solver);
+  if (!jacobian_solver_) {
+    solver.analyze(linearizer_.structure());
+    return;
+  }
+  jacobian_.emplace(graph, linearizer_);
+  J_ = JacobianMatrix(jacobian_->structure());
+  jacobian_solver_->analyze(jacobian_->structure());
 }
 
 double NormalEquations::chi2(const Values& values) {
@@ -87,6 +94,7 @@ double NormalEquations::linearize(const Values& values) {
   const Timed timed(seconds_.linearize);
   const double chi2 = linearizer_.linearize(values, H_, g_);
   H_.diagonal(diagonal_);
+  if (jacobian_) jacobian_->evaluate(values, J_);
   return chi2;
 }
 
@@ -97,11 +105,12 @@ void NormalEquations::retract(const Values& values, std::span<const double> step
 
 Factorization NormalEquations::factorize() {
   const Timed timed(seconds_.factorize);
-  return solver_->factorize(H_);
+  return jacobian_solver_ ? jacobian_solver_->factorize(J_, {}) : solver_->factorize(H_);
 }
 
 Factorization NormalEquations::factorize_damped(std::span<const double> damping) {
   const Timed timed(seconds_.factorize);
+  if (jacobian_solver_) return jacobian_solver_->factorize(J_, damping);
   for (std::size_t k = 0; k < damped_.size(); ++k) damped_[k] = diagonal_[k] + damping[k];
   H_.set_diagonal(damped_);
   const Factorization factorization = solver_->factorize(H_);
@@ -111,7 +120,11 @@ Factorization NormalEquations::factorize_damped(std::span<const double> damping)
 
 void NormalEquations::solve(std::span<double> step) {
   const Timed timed(seconds_.solve);
-  solver_->solve(g_, step);
+  if (jacobian_solver_) {
+    jacobian_solver_->minimize(J_.residual(), step);
+  } else {
+    solver_->solve(g_, step);
+  }
 }
 
 int NormalEquations::free_directions() const {

@@ -23,6 +23,38 @@ struct Votes {
   std::array<int, kLongestRow + 1> rows{};  // of numbers, by their count
 };
 
+/// Counts the lines that are as the first line of a BAL file promises: cameras, points and
+/// observations, then a line of four fields for each observation, and one number a line.
+class BalVotes {
+ public:
+  void vote(Scanner& scanner) {
+    scanner.expect_row({}, "");
+    const int fields = scanner.count_fields();
+    if (line_++ == 0) {
+      is_header_ = fields == 3 && read_header(scanner);
+    } else if (is_header_) {
+      fitting_ += fields == (line_ - 1 <= observations_ ? 4 : 1);
+    }
+  }
+  /// How many lines fit; a first line alone proves nothing.
+  int lines() const { return fitting_ > 0 ? 1 + fitting_ : 0; }
+
+ private:
+  bool read_header(Scanner& scanner) {
+    try {
+      const std::int64_t cameras = scanner.read_count(), points = scanner.read_count();
+      observations_ = scanner.read_count();
+      return cameras > 0 && points > 0 && observations_ > 0;
+    } catch (const Error&) {
+      return false;
+    }
+  }
+
+  std::int64_t observations_ = 0, line_ = 0;
+  int fitting_ = 0;  // lines after the first
+  bool is_header_ = false;
+};
+
 bool is_word(std::string_view field) {
   return std::isalpha(static_cast<unsigned char>(field.front())) != 0 || field.front() == '_';
 }
@@ -91,7 +123,11 @@ void settle_undecided(Votes& votes) {
 Likelihood look_at(std::string_view text) {
   Votes votes;
   Scanner scanner(text, "");
-  while (votes.lines < kLines && scanner.next_line()) vote(scanner, votes);
+  BalVotes bal;
+  while (votes.lines < kLines && scanner.next_line()) {
+    bal.vote(scanner);
+    vote(scanner, votes);
+  }
   if (votes.lines == 0 || text.substr(0, 4096).find('\0') != std::string_view::npos) return {};
   settle_undecided(votes);
 
@@ -103,6 +139,7 @@ Likelihood look_at(std::string_view text) {
   likelihood.g2o = score(votes.g2o);
   likelihood.toro = score(votes.toro);
   likelihood.isam = score(votes.isam);
+  likelihood.bal = score(bal.lines());
   likelihood.tum = score(votes.rows[8]);
   likelihood.kitti = score(votes.rows[12]);
   likelihood.table = score(votes.rows[3] > votes.rows[4] ? votes.rows[3] : votes.rows[4]);

@@ -16,6 +16,8 @@ Graph read_toro(std::string_view text, const std::string& name, Registry& types,
                 const ReadOptions& options, ReadReport& report);
 Graph read_isam(std::string_view text, const std::string& name, Registry& types,
                 const ReadOptions& options, ReadReport& report);
+Graph read_bal(std::string_view text, const std::string& name, Registry& types,
+               const ReadOptions& options, ReadReport& report);
 Graph read_tum(std::string_view text, const std::string& name, Registry& types,
                const ReadOptions& options, ReadReport& report);
 Graph read_kitti(std::string_view text, const std::string& name, Registry& types,

@@ -57,6 +57,7 @@ void cairn_register(Registrar& registrar) {
       {"g2o", {"g2o"}, &Likelihood::g2o, read_g2o, write_g2o},
       {"toro", {"graph", "toro"}, &Likelihood::toro, read_toro, write_toro},
       {"isam", {"isam", "txt"}, &Likelihood::isam, read_isam, nullptr},
+      {"bal", {"bal"}, &Likelihood::bal, read_bal, write_bal},
       {"tum", {"tum"}, &Likelihood::tum, read_tum, write_tum},
       {"kitti", {"kitti"}, &Likelihood::kitti, read_kitti, write_kitti},
       {"table", {"dat"}, &Likelihood::table, read_table, nullptr},

@@ -135,13 +135,19 @@ std::string_view Scanner::required_field() {
   return field;
 }
 
-Id Scanner::read_id() {
+Id Scanner::read_id() { return read_whole("an id", INT64_MAX); }
+std::int64_t Scanner::read_count() { return read_whole("a count", INT32_MAX); }
+
+std::int64_t Scanner::read_whole(std::string_view what, std::int64_t largest) {
   const std::string_view field = required_field();
   const std::string_view digits = without_plus(field);
-  Id id = 0;
-  const auto [end, problem] = std::from_chars(digits.data(), digits.data() + digits.size(), id);
-  if (problem != std::errc{} || end != digits.data() + digits.size() || id < 0) fail_id(field);
-  return id;
+  std::int64_t whole = 0;
+  const auto [end, problem] = std::from_chars(digits.data(), digits.data() + digits.size(), whole);
+  if (problem != std::errc{} || end != digits.data() + digits.size() || whole < 0 ||
+      whole > largest) {
+    fail_whole(field, what, largest);
+  }
+  return whole;
 }
 
 double Scanner::read_number() {
@@ -194,10 +200,11 @@ void Scanner::fail_number(std::string_view field) const {
        "; expected a finite number");
 }
 
-void Scanner::fail_id(std::string_view field) const {
+void Scanner::fail_whole(std::string_view field, std::string_view what,
+                         std::int64_t largest) const {
   if (count_fields() != layout_.total() && layout_.total() > 0) fail_count();
-  fail(fmt::format("field {} of {} is '{}'; expected an id, a whole number from 0 to {}", read_,
-                   shown(subject_), shown(field), INT64_MAX));
+  fail(fmt::format("field {} of {} is '{}'; expected {}, a whole number from 0 to {}", read_,
+                   shown(subject_), shown(field), what, largest));
 }
 
 }  // namespace cairn::formats

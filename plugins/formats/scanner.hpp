@@ -45,6 +45,8 @@ class Scanner {
   void expect_row(Layout layout, std::string_view what);
 
   Id read_id();
+  /// How many of something: a whole number from 0 to 2³¹ − 1.
+  std::int64_t read_count();
   double read_number();
   void read_numbers(std::span<double> out);
   /// Whether fields are left on this line.
@@ -61,7 +63,9 @@ class Scanner {
   std::string_view required_field();
   [[noreturn]] void fail_count() const;
   [[noreturn]] void fail_number(std::string_view field) const;
-  [[noreturn]] void fail_id(std::string_view field) const;
+  std::int64_t read_whole(std::string_view what, std::int64_t largest);
+  [[noreturn]] void fail_whole(std::string_view field, std::string_view what,
+                               std::int64_t largest) const;
 
   std::string file_;
   std::string_view rest_;    // lines not yet visited

@@ -14,6 +14,9 @@ namespace cairn::formats {
 std::string write_g2o(const Graph& graph);
 /// Planar pose graphs: VERTEX2 and EDGE2.
 std::string write_toro(const Graph& graph);
+/// Cameras and points, each numbered by rising id, and observations in their order. Rotations and
+/// translations are those of the file that was read but for rounding.
+std::string write_bal(const Graph& graph);
 /// Poses by rising id: the id as stamp, position, quaternion. Points (landmarks) are no part of a
 /// trajectory.
 std::string write_tum(const Graph& graph);

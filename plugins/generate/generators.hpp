@@ -52,4 +52,7 @@ std::unique_ptr<Generator> make_ellipse3d(const Options& options);
 OptionTable ellipse_n_options();
 std::unique_ptr<Generator> make_ellipse_n(const Options& options);
 
+OptionTable bundle_options();
+std::unique_ptr<Generator> make_bundle(const Options& options);
+
 }  // namespace cairn::generate

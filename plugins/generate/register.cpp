@@ -26,4 +26,5 @@ void cairn_register(cairn::Registrar& registrar) {
   add("ellipse3d", ellipse3d_options(), make_ellipse3d);
   add("ellipse_n", ellipse_n_options(), make_ellipse_n);
   add("landmarks2d", landmarks2d_options(), make_landmarks2d);
+  add("bundle", bundle_options(), make_bundle);
 }

@@ -44,6 +44,7 @@ BenchConfiguration read_configuration(const json::value& value) {
     c.high = number(*seconds, "max");
     c.ran = c.median > 0;
   }
+  c.memory = number(value, "peak_memory_bytes");
   if (const json::value* chi2 = member(value, "chi2")) c.initial_chi2 = number(*chi2, "initial");
   for (const json::value& iteration : list(value, "history")) {
     c.chi2.push_back(number(iteration, "chi2"));
@@ -65,7 +66,10 @@ std::vector<BenchGraph> read_bench(std::string_view bench) {
   std::vector<BenchGraph> graphs;
   for (const json::value& value : list(report, "graphs")) {
     BenchGraph graph;
-    if (const json::value* about = member(value, "graph")) graph.name = text(*about, "file");
+    if (const json::value* about = member(value, "graph")) {
+      graph.name = text(*about, "file");
+      graph.variables = number(*about, "variables");
+    }
     for (const json::value& c : list(value, "configurations")) {
       graph.configurations.push_back(read_configuration(c));
     }

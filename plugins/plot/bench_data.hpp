@@ -13,10 +13,12 @@ struct BenchConfiguration {
   double median = 0, low = 0, high = 0;  ///< [s]
   double initial_chi2 = 0;
   std::vector<double> chi2, seconds;  ///< of each iteration
+  double memory = 0;                  ///< peak [bytes]; NaN: not measured
   bool ran = false;
 };
 struct BenchGraph {
   std::string name;
+  double variables = 0;
   std::vector<BenchConfiguration> configurations;
 };
 

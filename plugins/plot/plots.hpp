@@ -19,6 +19,9 @@ void draw_convergence(Canvas& canvas, const Theme& theme, const Album& album, bo
 void draw_steps(Canvas& canvas, const Theme& theme, const Album& album);
 /// Median times of a comparison, with their spread.
 void draw_bars(Canvas& canvas, const Theme& theme, const Album& album);
+/// Time and peak memory of each solver of a comparison against the size of its graphs, both axes
+/// logarithmic, so that a power law is a straight line.
+void draw_scaling(Canvas& canvas, const Theme& theme, const Album& album);
 /// Where H has blocks, and where L has them in the order of a linear solver.
 void draw_sparsity(Canvas& canvas, const Theme& theme, const Album& album, LinearSolver& solver);
 

@@ -29,6 +29,7 @@ class Plot final : public Picture {
     if (what == "convergence") plot::draw_convergence(canvas, theme_, album, against_time_);
     if (what == "steps") plot::draw_steps(canvas, theme_, album);
     if (what == "bars") plot::draw_bars(canvas, theme_, album);
+    if (what == "scaling") plot::draw_scaling(canvas, theme_, album);
     if (what == "sparsity") plot::draw_sparsity(canvas, theme_, album, *solver_);
     return canvas.finish();
   }
@@ -59,7 +60,7 @@ void cairn_register(cairn::Registrar& registrar) {
         format,
         OptionTable{}
             .choice("what", "auto",
-                    {"auto", "trajectory", "convergence", "bars", "sparsity", "steps"},
+                    {"auto", "trajectory", "convergence", "bars", "scaling", "sparsity", "steps"},
                     "what to draw; auto: bars of a comparison, else the trajectory, else curves")
             .integer("width", 900, 100, 20000, "width [px; in a PDF 1/96 inch]")
             .integer("height", 600, 100, 20000, "height [px; in a PDF 1/96 inch]")

@@ -1,92 +1,153 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "block/ordering.hpp"
 
+#include <algorithm>
+#include <charconv>
+#include <cstdlib>
 #include <limits>
 #include <numeric>
+#include <optional>
 
 #include <amd.h>
+#if defined(CAIRN_CAMD)
+#include <camd.h>
+#endif
+#if defined(CAIRN_CCOLAMD)
+#include <ccolamd.h>
+#endif
 #if defined(CAIRN_METIS)
 #include <metis.h>
 #endif
 
+#include "block/block_graph.hpp"
+#include "block/dissection.hpp"
 #include "cairn/error.hpp"
 #include "cairn/spelling.hpp"
 
 namespace cairn::block {
 namespace {
 
+using Blocks = std::vector<std::int32_t>;
+using Groups = std::span<const std::int32_t>;
+
 Error bad_order(const std::string& message) { return {ErrorCode::usage, message}; }
 
-std::vector<std::int32_t> natural(const BlockStructure& structure) {
-  std::vector<std::int32_t> identity(structure.blocks());
-  std::iota(identity.begin(), identity.end(), 0);
-  return identity;
+/// The lower triangle of the block graph as SuiteSparse wants it.
+struct Columns {
+  Blocks begin, rows;
+
+  explicit Columns(const BlockStructure& structure) {
+    if (structure.entries() > std::numeric_limits<std::int32_t>::max()) {
+      throw bad_order(
+          "the block graph has more entries than minimum degree can take; use "
+          "ordering=natural");
+    }
+    begin.assign(structure.column_begin().begin(), structure.column_begin().end());
+    rows.assign(structure.rows().begin(), structure.rows().end());
+  }
+};
+
+/// Group numbers from 0 without gaps, in the same order.
+Blocks compact(Groups groups) {
+  Blocks values(groups.begin(), groups.end());
+  std::ranges::sort(values);
+  values.erase(std::unique(values.begin(), values.end()), values.end());
+  Blocks result;
+  result.reserve(groups.size());
+  for (const std::int32_t group : groups) {
+    result.push_back(
+        static_cast<std::int32_t>(std::ranges::lower_bound(values, group) - values.begin()));
+  }
+  return result;
 }
 
-std::vector<std::int32_t> amd(const BlockStructure& structure) {
-  if (structure.entries() > std::numeric_limits<std::int32_t>::max()) {
-    throw bad_order("the block graph has more entries than AMD can take; use ordering=natural");
-  }
-  const std::vector<std::int32_t> begin(structure.column_begin().begin(),
-                                        structure.column_begin().end());
-  std::vector<std::int32_t> permutation(structure.blocks());
+Blocks natural(const BlockStructure& structure, Groups groups) {
+  Blocks order(structure.blocks());
+  std::iota(order.begin(), order.end(), 0);
+  if (!groups.empty())
+    std::ranges::stable_sort(order, {}, [&](std::int32_t block) { return groups[block]; });
+  return order;
+}
+
+Blocks amd(const BlockStructure& structure) {
+  const Columns graph(structure);
+  Blocks order(structure.blocks());
   double control[AMD_CONTROL];
   amd_defaults(control);
-  const int status = amd_order(structure.blocks(), begin.data(), structure.rows().data(),
-                               permutation.data(), control, nullptr);
+  const int status = amd_order(structure.blocks(), graph.begin.data(), graph.rows.data(),
+                               order.data(), control, nullptr);
   if (status == AMD_OUT_OF_MEMORY)
     throw bad_order("AMD ran out of memory while ordering the block graph");
   if (status != AMD_OK && status != AMD_OK_BUT_JUMBLED)
     throw bad_order("AMD refused the block graph");
-  return permutation;
+  return order;
 }
 
-#if defined(CAIRN_METIS)
-/// Both triangles of the block graph without its diagonal, as METIS wants it.
-struct Adjacency {
-  std::vector<idx_t> begin, neighbours;
+#if defined(CAIRN_CAMD)
+Blocks camd(const BlockStructure& structure, Groups groups) {
+  const Columns graph(structure);
+  const Blocks compacted = compact(groups);
+  Blocks order(structure.blocks());
+  double control[CAMD_CONTROL];
+  camd_defaults(control);
+  const int status =
+      camd_order(structure.blocks(), graph.begin.data(), graph.rows.data(), order.data(), control,
+                 nullptr, groups.empty() ? nullptr : compacted.data());
+  if (status == CAMD_OUT_OF_MEMORY)
+    throw bad_order("CAMD ran out of memory while ordering the block graph");
+  if (status != CAMD_OK && status != CAMD_OK_BUT_JUMBLED)
+    throw bad_order("CAMD refused the block graph");
+  return order;
+}
+#endif
 
-  explicit Adjacency(const BlockStructure& structure) : begin(structure.blocks() + 1, 0) {
-    const auto for_each_edge = [&](auto visit) {
-      for (std::int32_t j = 0; j < structure.blocks(); ++j) {
-        for (std::int64_t e = structure.column_begin()[j] + 1; e < structure.column_begin()[j + 1];
-             ++e) {
-          visit(structure.rows()[e], j);
-        }
-      }
-    };
-    for_each_edge([&](std::int32_t a, std::int32_t b) {
-      ++begin[a + 1];
-      ++begin[b + 1];
-    });
-    std::partial_sum(begin.begin(), begin.end(), begin.begin());
-    neighbours.resize(begin.back());
-    std::vector<idx_t> next(begin.begin(), begin.end() - 1);
-    for_each_edge([&](std::int32_t a, std::int32_t b) {
-      neighbours[next[a]++] = b;
-      neighbours[next[b]++] = a;
-    });
+#if defined(CAIRN_CCOLAMD)
+Blocks ccolamd(const BlockStructure& structure, Groups groups) {
+  Columns graph(structure);
+  Blocks compacted = compact(groups);
+  Blocks order(structure.blocks() + 1);  // one more is its room to work in
+  int stats[CCOLAMD_STATS];
+  constexpr int kLowerTriangle = -1;
+  if (!csymamd(structure.blocks(), graph.rows.data(), graph.begin.data(), order.data(), nullptr,
+               stats, &std::calloc, &std::free, groups.empty() ? nullptr : compacted.data(),
+               kLowerTriangle)) {
+    throw bad_order("CCOLAMD refused the block graph (status " +
+                    std::to_string(stats[CCOLAMD_STATUS]) + ")");
   }
-};
+  order.pop_back();
+  return order;
+}
+#endif
 
-std::vector<std::int32_t> metis(const BlockStructure& structure) {
-  if (2 * structure.entries() > std::numeric_limits<idx_t>::max()) {
+#if defined(CAIRN_METIS)
+Blocks metis(const BlockStructure& structure) {
+  const BlockGraph graph(structure);
+  if (graph.begin.back() > std::numeric_limits<idx_t>::max()) {
     throw bad_order("the block graph has more entries than METIS can take; use ordering=amd");
   }
-  Adjacency graph(structure);
-  if (graph.neighbours.empty())
-    return natural(structure);  // METIS does not take a graph without edges
+  if (graph.neighbours.empty()) return natural(structure, {});  // METIS wants at least one edge
+  std::vector<idx_t> begin(graph.begin.begin(), graph.begin.end());
+  std::vector<idx_t> neighbours(graph.neighbours.begin(), graph.neighbours.end());
   idx_t options[METIS_NOPTIONS];
   METIS_SetDefaultOptions(options);
   options[METIS_OPTION_SEED] = 1;  // the same ordering every time
   options[METIS_OPTION_NUMBERING] = 0;
   idx_t n = structure.blocks();
   std::vector<idx_t> permutation(n), inverse(n);
-  if (METIS_NodeND(&n, graph.begin.data(), graph.neighbours.data(), nullptr, options,
-                   permutation.data(), inverse.data()) != METIS_OK) {
+  if (METIS_NodeND(&n, begin.data(), neighbours.data(), nullptr, options, permutation.data(),
+                   inverse.data()) != METIS_OK) {
     throw bad_order("METIS refused the block graph; use ordering=amd");
   }
   return {permutation.begin(), permutation.end()};
+}
+#endif
+
+#if defined(CAIRN_METIS) && defined(CAIRN_CAMD)
+Blocks nesdis(const BlockStructure& structure, Groups groups) {
+  if (2 * structure.entries() > std::numeric_limits<idx_t>::max()) {
+    throw bad_order("the block graph has more entries than METIS can take; use ordering=amd");
+  }
+  return camd(structure, dissection(structure, groups.empty() ? Blocks() : compact(groups)));
 }
 #endif
 
@@ -95,22 +156,141 @@ std::vector<std::int32_t> metis(const BlockStructure& structure) {
 const std::vector<std::string>& ordering_names() {
   static const std::vector<std::string> names = {
     "amd",
-#if defined(CAIRN_METIS)
-    "metis",
+#if defined(CAIRN_METIS) && defined(CAIRN_CAMD)
+    "nesdis",
 #endif
     "natural"
   };
   return names;
 }
 
-std::vector<std::int32_t> order(const BlockStructure& structure, std::string_view name) {
-  if (name == "natural" || structure.blocks() == 0) return natural(structure);
-  if (name == "amd") return amd(structure);
-#if defined(CAIRN_METIS)
-  if (name == "metis") return metis(structure);
+const std::vector<std::string>& every_ordering_name() {
+  static const std::vector<std::string> names = {
+    "amd",
+    "auto",
+#if defined(CAIRN_CAMD)
+    "camd",
 #endif
+#if defined(CAIRN_CCOLAMD)
+    "ccolamd",
+#endif
+#if defined(CAIRN_METIS)
+    "metis",
+#endif
+    "natural",
+#if defined(CAIRN_METIS) && defined(CAIRN_CAMD)
+    "nesdis",
+#endif
+  };
+  return names;
+}
+
+std::vector<std::int32_t> order(const BlockStructure& structure, std::string_view name,
+                                std::span<const std::int32_t> groups) {
+  if (structure.blocks() == 0) return {};
+  if (name == "natural") return natural(structure, groups);
+  if (name == "auto") return choose(structure, groups).order;
+  if (name == "amd" && groups.empty()) return amd(structure);
+#if defined(CAIRN_CAMD)
+  if (name == "camd" || name == "amd") return camd(structure, groups);
+#endif
+#if defined(CAIRN_CCOLAMD)
+  if (name == "ccolamd") return ccolamd(structure, groups);
+#endif
+#if defined(CAIRN_METIS)
+  if (name == "metis" && groups.empty()) return metis(structure);
+#endif
+#if defined(CAIRN_METIS) && defined(CAIRN_CAMD)
+  if (name == "nesdis") return nesdis(structure, groups);
+#endif
+  if (std::ranges::find(every_ordering_name(), name) != every_ordering_name().end()) {
+    throw bad_order("ordering '" + std::string(name) +
+                    "' cannot put some blocks last; use camd, ccolamd, nesdis or natural");
+  }
   throw bad_order("no ordering '" + std::string(name) + "'" +
-                  what_is_on_offer(name, ordering_names()));
+                  what_is_on_offer(name, every_ordering_name()));
+}
+
+std::vector<std::int32_t> order(const BlockStructure& structure, std::string_view name) {
+  constexpr std::string_view kLast = ",last=";
+  const std::size_t option = name.find(kLast);
+  if (option == std::string_view::npos) return order(structure, name, {});
+  const std::string_view text = name.substr(option + kLast.size());
+  std::int64_t last = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), last);
+  if (error != std::errc() || end != text.data() + text.size() || last < 0)
+    throw bad_order("ordering '" + std::string(name) + "': last=N wants a number of blocks");
+  std::vector<std::int32_t> groups(structure.blocks(), 0);
+  for (std::int64_t b = std::max<std::int64_t>(0, structure.blocks() - last);
+       b < structure.blocks(); ++b) {
+    groups[b] = 1;
+  }
+  return order(structure, name.substr(0, option), last > 0 ? Groups(groups) : Groups());
+}
+
+Choice choose(const BlockStructure& structure, std::span<const std::int32_t> groups) {
+  Choice choice{.name = groups.empty() ? "amd" : "camd", .order = order(structure, "amd", groups)};
+  std::optional<Choice> better =
+      better_than(structure, factor_flops(structure, choice.order), groups);
+  return better ? std::move(*better) : std::move(choice);
+}
+
+std::optional<Choice> better_than([[maybe_unused]] const BlockStructure& structure,
+                                  [[maybe_unused]] double flops,
+                                  [[maybe_unused]] std::span<const std::int32_t> groups) {
+#if defined(CAIRN_METIS) && defined(CAIRN_CAMD)
+  if (!worth_dissecting(structure, flops)) return std::nullopt;
+  Choice other{.name = "nesdis", .order = order(structure, "nesdis", groups)};
+  if (factor_flops(structure, other.order) < flops) return other;
+#endif
+  return std::nullopt;
+}
+
+double factor_flops(const BlockStructure& structure, std::span<const std::int32_t> order) {
+  const std::int32_t n = structure.blocks();
+  const BlockGraph graph(structure);
+  Blocks position(n), parent(n, -1), ancestor(n, -1);
+  for (std::int32_t k = 0; k < n; ++k) position[order[k]] = k;
+  // Elimination tree (Liu 1990), and the rows that each column has by walking each row's subtree.
+  for (std::int32_t row = 0; row < n; ++row) {
+    for (const std::int32_t other : graph.of(order[row])) {
+      for (std::int32_t k = position[other]; k != -1 && k < row;) {
+        const std::int32_t next = ancestor[k];
+        ancestor[k] = row;
+        if (next == -1) parent[k] = row;
+        k = next;
+      }
+    }
+  }
+  std::vector<std::int64_t> count(n, 0);
+  Blocks mark(n, -1);
+  for (std::int32_t row = 0; row < n; ++row) {
+    const std::int32_t size = structure.block_size(order[row]);
+    mark[row] = row;
+    count[row] += size;
+    for (const std::int32_t other : graph.of(order[row])) {
+      for (std::int32_t k = position[other]; k < row && mark[k] != row; k = parent[k]) {
+        mark[k] = row;
+        count[k] += size;
+      }
+    }
+  }
+  double flops = 0.0;
+  for (std::int32_t k = 0; k < n; ++k) {
+    for (std::int32_t c = 0; c < structure.block_size(order[k]); ++c) {
+      const auto rows = static_cast<double>(count[k] - c);
+      flops += rows * rows;
+    }
+  }
+  return flops;
+}
+
+bool worth_dissecting(const BlockStructure& structure, double flops) {
+  // Rough figures of one core: what dissection takes a block, what it saves where it saves at all,
+  // and the speed of a factorisation.
+  constexpr double kSecondsPerBlock = 4e-6, kSaved = 0.25, kFlopsPerSecond = 4e10;
+  constexpr double kFactorizations = 10.0;
+  return kFactorizations * kSaved * flops / kFlopsPerSecond > kSecondsPerBlock * structure.blocks();
 }
 
 }  // namespace cairn::block

@@ -49,13 +49,12 @@ void SupernodalCholesky::analyze(const BlockStructure& structure, std::string_vi
                                  const CostModel& cost) {
   factorized_ = false;
   if (ordering == "auto") {
-    ordering_.clear();
-    for (const std::string& name : ordering_names()) {
-      if (name == "natural") continue;
-      Symbolic candidate(structure, order(structure, name), cost);
-      if (!ordering_.empty() && candidate.factor_flops >= symbolic_.factor_flops) continue;
-      symbolic_ = std::move(candidate);
-      ordering_ = name;
+    // As `choose` does, without counting flops twice.
+    ordering_ = "amd";
+    symbolic_ = Symbolic(structure, order(structure, ordering_), cost);
+    if (const auto better = better_than(structure, symbolic_.factor_flops)) {
+      ordering_ = better->name;
+      symbolic_ = Symbolic(structure, better->order, cost);
     }
   } else {
     symbolic_ = Symbolic(structure, order(structure, ordering), cost);

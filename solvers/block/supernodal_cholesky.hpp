@@ -31,8 +31,8 @@ class SupernodalCholesky {
   /// run.
   explicit SupernodalCholesky(std::string_view kernels = "auto");
 
-  /// `ordering`: one of `ordering_names()`, or auto: each of them but natural, and the one with the
-  /// fewest flops. Room is made for as many threads as `threads()` says now.
+  /// `ordering`: a name that `order` takes, or auto: see `choose`. Room is made for as many threads
+  /// as `threads()` says now.
   void analyze(const BlockStructure& structure, std::string_view ordering,
                const CostModel& cost = {});
   /// The ordering that is in use.

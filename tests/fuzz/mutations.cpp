@@ -44,6 +44,8 @@ struct Shape {
 Shape shape_of(const Seed& seed, const Fields& fields) {
   const std::string& tag = fields[0];
   if (std::isalpha(static_cast<unsigned char>(tag[0])) == 0) {
+    if (seed.format == "bal" && fields.size() == 3) return {false, 3, 0, false, 0};  // its header
+    if (seed.format == "bal" && fields.size() == 4) return {false, 2, 0, true, 0};
     return {false, seed.name == "table" ? 1 : 0, 0, false, 0};
   }
   if (tag == "FIX") return {true, 1, 1, true, 0};
@@ -100,9 +102,11 @@ class LineMutator {
       return;
     }
     const std::size_t first = shape_.tag ? 1 : 0;
+    // A row of a table has 3 or 4 fields, by the first row.
+    const bool either_count = seed_.format == "table";
     for (std::size_t f = first; f < fields_.size(); ++f) {
-      if (fields_.size() == 4 && !shape_.tag)
-        break;  // a row of a table has 3 or 4 fields, by the first row
+      if (either_count) break;
+      if (fields_.size() == 1) break;  // an empty line is allowed
       Fields dropped = fields_;
       dropped.erase(dropped.begin() + static_cast<std::ptrdiff_t>(f));
       add("field " + std::to_string(f) + " dropped", join(dropped, " "));
@@ -114,7 +118,7 @@ class LineMutator {
     }
     // Down to the tag alone; a row without a tag would be an empty line, which is allowed.
     for (std::size_t left = 1; left + 1 < fields_.size(); left += 3) {
-      if (fields_.size() == 4 && left == 3) continue;
+      if (either_count && left == 3) continue;
       add("cut after field " + std::to_string(left - 1),
           join(Fields(fields_.begin(), fields_.begin() + static_cast<std::ptrdiff_t>(left)), " "));
     }
@@ -155,7 +159,8 @@ class LineMutator {
   void change_ends() {
     if (!seed_.vertices) return;
     for (int k = 0; k < shape_.ids; ++k) {
-      add_field("an id of nothing", static_cast<std::size_t>(k) + 1, "987654321");
+      add_field("an id of nothing", static_cast<std::size_t>(k) + (shape_.tag ? 1 : 0),
+                "987654321");
     }
     if (shape_.variable_ids == 2) add_field("an edge to itself", 2, fields_[1]);
   }
@@ -238,6 +243,10 @@ const std::vector<Seed>& seeds() {
        "EDGE3 0 1 1 0 0 0.1 0.2 0.3 10 0 0 0 0 0 10 0 0 0 0 10 0 0 0 100 0 0 100 0 25\n"
        "EDGE3 1 2 1 0 0 0.1 0.2 0.3 10 0 0 0 0 0 10 0 0 0 0 10 0 0 0 100 0 0 100 0 25\n",
        false},
+      {"bal", "bal",
+       "2 2 3\n0 0 -10.5 20.25\n1 0 3 4\n1 1 -5 1e1\n0.1\n-0.2\n0.3\n1\n2\n-3\n500\n-1e-2\n0.5\n"
+       "0\n0\n0\n0.5\n0.25\n-2\n600\n0\n0\n1.5\n-2\n-30\n0.1\n0.2\n-9.5\n",
+       true},
       {"tum", "tum", "0 1 2 3 0 0 0 1\n1 1 2 3 0 0 0.6 0.8\n2 1.5 2 3 0 0 0 1\n", false},
       {"kitti", "kitti", "1 0 0 0 0 1 0 0 0 0 1 0\n0 -1 0 7 1 0 0 8 0 0 1 9\n", false},
       {"table", "table", "0 1 2 0.5\n1 2 2 0.5\n2 3 2 0.5\n", false},

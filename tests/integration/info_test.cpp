@@ -86,6 +86,13 @@ TEST_F(InfoCommand, SkippedLinesAreCountedAndToldOnStandardError) {
   EXPECT_THAT(skipping.err, HasSubstr("skipped 1 line with unknown tag 'EDGE_UNHEARD_OF'"));
 }
 
+TEST_F(InfoCommand, SaysThatTheGaugeOfCamerasIsLeftFree) {
+  const Outcome outcome = cairn({"info", "@bundle:cameras=6,points=100"});
+  EXPECT_EQ(outcome.exit_code, 0);
+  EXPECT_THAT(outcome.out, HasSubstr("not known (the gauge of a component is left free: holding "
+                                     "VERTEX_CAMERA_BAL 0 would hold more than its place)"));
+}
+
 TEST_F(InfoCommand, TellsTheMetric) {
   const Outcome outcome = cairn({"info", "@sphere", "--types", "slam3d:metric=g2o"});
   EXPECT_THAT(outcome.out, HasSubstr("metric g2o"));

@@ -75,6 +75,21 @@ TEST_F(OptimizeCommand, ReportsAllMembersThatScriptsRelyOn) {
   }
 }
 
+TEST_F(OptimizeCommand, ReportsTheInnerIterationsOfAnIterativeSolverOnly) {
+  const std::string file = graph();
+  Registry registry;
+  if (!registry.has("linear_solver", "pcg")) GTEST_SKIP();
+  const auto report = report_of({"optimize", file, "--linear-solver", "pcg:tolerance=1e-8"});
+  const auto& solver = report.at("solver").as_object();
+  EXPECT_GT(solver.at("iterations").as_int64(), 0);
+  EXPECT_GT(solver.at("relative_residual").as_double(), 0.0);
+  EXPECT_LE(solver.at("relative_residual").as_double(), 1e-8);
+  const Outcome text = cairn({"optimize", file, "--linear-solver", "pcg", "--quiet"});
+  EXPECT_THAT(text.out, HasSubstr("relative residual at most"));
+  const auto direct = report_of({"optimize", file});
+  EXPECT_FALSE(direct.at("solver").as_object().contains("iterations"));
+}
+
 TEST_F(OptimizeCommand, WritesTheEstimateThatItReports) {
   const std::string best = folder_.file("best.g2o");
   const double chi2 = final_chi2(report_of({"optimize", graph(), "-o", best}));

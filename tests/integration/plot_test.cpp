@@ -53,12 +53,13 @@ TEST_F(PlotCommand, DrawsEveryKind) {
   std::set<std::string> pictures;
   for (const Arguments& arguments :
        {Arguments{graph_}, Arguments{graph_, "--colour", "residual"}, Arguments{bench},
-        Arguments{graph_, "--what", "sparsity"}, Arguments{report_, "--what", "convergence"},
+        Arguments{bench, "--what", "scaling"}, Arguments{graph_, "--what", "sparsity"},
+        Arguments{report_, "--what", "convergence"},
         Arguments{report_, "--what", "convergence", "--x", "time"},
         Arguments{report_, "--what", "steps"}, Arguments{graph_, "--theme", "dark"}}) {
     pictures.insert(plot(arguments, "svg"));
   }
-  EXPECT_EQ(pictures.size(), 8U) << "each is another picture";
+  EXPECT_EQ(pictures.size(), 9U) << "each is another picture";
 }
 
 TEST_F(PlotCommand, TheWrongLoopClosureIsTheOneInTheWorstColour) {

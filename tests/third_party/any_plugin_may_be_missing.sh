@@ -23,6 +23,7 @@ wanted=(
   "convert $graph $work/copy.g2o"
   "generate manhattan:poses=50 -o $work/manhattan.g2o"
   "generate sphere:turns=5,poses_per_turn=10 -o $work/sphere.g2o"
+  "optimize @bundle:cameras=6,points=100 --optimizer levenberg_marquardt"
   "optimize $graph --linear-solver block_cholesky --optimizer gauss_newton"
   "optimize $graph --linear-solver cholmod --optimizer levenberg_marquardt"
   "optimize $graph --linear-solver eigen --optimizer dogleg"

@@ -28,10 +28,10 @@ struct FactorView {
 /// Where the contribution of a factor to H or to the gradient goes.
 ///
 /// A target is an offset in doubles. Where a factor is the only one that writes a block, the offset
-/// points into the values of H; otherwise several factors meet there, each has a place of its own
-/// in `scratch`, and the linearizer adds them up in a fixed order afterwards: so the sum does not
-/// depend on the number of threads. Scratch offsets are stored as their bitwise complement
-/// (negative).
+/// points into the values of H, and the block is written. Otherwise it points into `scratch`, is
+/// stored as its bitwise complement (negative), and the block is added to what is there: the
+/// linearizer gives each run of factors that one task works off places of its own, and adds these
+/// up in a fixed order afterwards. So no sum depends on the number of threads.
 struct LinearizeSink {
   static constexpr std::int64_t kNone =
       INT64_MIN;  ///< a held variable takes part: nothing to write
@@ -43,10 +43,19 @@ struct LinearizeSink {
   /// `transposed` says so.
   const std::int64_t* blocks = nullptr;
   const std::uint8_t* transposed = nullptr;  ///< size × arity(arity+1)/2
-  /// size × arity: where −J_aᵀ r goes; always in scratch, but stored without complement.
+  /// size × arity: where −J_aᵀ r is added; always in scratch, stored without complement.
   const std::int64_t* gradients = nullptr;
 
-  double* target(std::int64_t offset) const { return offset >= 0 ? H + offset : scratch + ~offset; }
+  /// Writes or adds a block.
+  template <class Block>
+  void put(std::int64_t offset, const Block& block) const {
+    constexpr int kSize = Block::SizeAtCompileTime;
+    if (offset >= 0) {
+      for (int k = 0; k < kSize; ++k) H[offset + k] = block.data()[k];
+    } else {
+      for (int k = 0; k < kSize; ++k) scratch[~offset + k] += block.data()[k];
+    }
+  }
 };
 
 /// A kind of factor (relative pose, landmark seen, prior, …). One object serves all graphs; it has

@@ -12,11 +12,15 @@ namespace cairn {
 ///
 /// Variables marked `FIX` are held. A connected component that has none, and whose priors (factors
 /// on one variable) together measure fewer numbers than a pose has freedoms, gets its first pose
-/// anchored: the first variable with the component's largest tangent space. Anchors are not written
-/// to files.
+/// anchored: the first variable with the component's largest tangent space, if its states form a
+/// Lie group. Then the freedom of the whole component moves it anywhere, and holding it costs
+/// nothing. What is no group, such as a camera whose focal length is unknown, is more than a pose:
+/// holding it would hold what the measurements determine, so its component is left free, which
+/// damped optimizers take well. Anchors are not written to files.
 struct CAIRN_API Gauge {
   std::vector<bool> held;      ///< by variable
   std::vector<int> anchored;   ///< variables held only to fix the gauge, one a component
+  std::vector<int> left_free;  ///< what would be anchored but is no group, one a component
   std::vector<int> component;  ///< by variable: its connected component, 0 … components-1
   int components = 0;
   int components_with_fixed = 0;

@@ -23,6 +23,8 @@ struct LinearSolverStats {
   std::int64_t factor_nonzeros = 0;  ///< scalars in L, diagonal included; 0 if not known
   double factor_flops = 0.0;         ///< multiplications and additions of one factorisation
   std::string note;                  ///< what a user should know: "supernodal", "falls back to …"
+  std::int64_t iterations = 0;     ///< inner iterations of an iterative solver; 0 for a direct one
+  double relative_residual = 0.0;  ///< largest ‖Hx − g‖/‖g‖ so far; iterative solvers only
 };
 
 /// Solves H x = g for one block structure at a time, many times: `analyze` does all work that
@@ -49,6 +51,15 @@ class CAIRN_API LogDeterminant {
   static constexpr std::string_view kAbility = "log_determinant";
   virtual ~LogDeterminant();
   virtual double log_determinant() const = 0;
+};
+
+/// Ability: several right-hand sides at a time, for less than one `solve` each.
+class CAIRN_API ManyRightHandSides {
+ public:
+  static constexpr std::string_view kAbility = "many_right_hand_sides";
+  virtual ~ManyRightHandSides();
+  /// X = H⁻¹ G, both structure.size() × columns, column-major; X may be G.
+  virtual void solve(std::span<const double> G, std::span<double> X, int columns) = 0;
 };
 
 /// Ability: the order in which the blocks of the analysed structure are eliminated. L has a block

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -10,6 +11,7 @@
 #include "cairn/block_matrix.hpp"
 #include "cairn/gauge.hpp"
 #include "cairn/graph.hpp"
+#include "cairn/jacobian.hpp"
 #include "cairn/linear_solver.hpp"
 #include "cairn/linearizer.hpp"
 #include "cairn/optimizer.hpp"
@@ -24,6 +26,9 @@ namespace cairn {
 /// analysis); afterwards no call allocates more than the linear solver does. Graph and solver must
 /// outlive this object, and the graph keep its structure. A factorisation that fails is an answer,
 /// which `explain` puts into words.
+///
+/// A solver with the ability `JacobianSolver` is given the whitened Jacobian instead of H, which is
+/// then evaluated as well: H itself stays at hand for the optimizer.
 class CAIRN_API NormalEquations {
  public:
   NormalEquations(const Graph& graph, LinearSolver& solver);
@@ -74,6 +79,10 @@ class CAIRN_API NormalEquations {
   std::vector<double> g_;
   std::vector<double> diagonal_;
   std::vector<double> damped_;  // room for the diagonal with damping
+
+  JacobianSolver* jacobian_solver_ = nullptr;  // the solver, if it works on J
+  std::optional<JacobianEvaluator> jacobian_;
+  JacobianMatrix J_;
 };
 
 }  // namespace cairn

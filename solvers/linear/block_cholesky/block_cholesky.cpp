@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <memory>
 #include <string>
-#include <vector>
+#include <utility>
 
 #include "block/ordering.hpp"
 #include "block/supernodal_cholesky.hpp"
@@ -12,7 +12,10 @@ namespace cairn {
 namespace {
 
 /// cairn's own linear solver: a thin coat over `block::SupernodalCholesky`.
-class BlockCholesky final : public LinearSolver, public LogDeterminant, public EliminationOrder {
+class BlockCholesky final : public LinearSolver,
+                            public LogDeterminant,
+                            public EliminationOrder,
+                            public ManyRightHandSides {
  public:
   BlockCholesky(std::string ordering, const std::string& kernels)
       : ordering_(std::move(ordering)), cholesky_(kernels) {}
@@ -28,6 +31,9 @@ class BlockCholesky final : public LinearSolver, public LogDeterminant, public E
   }
   Factorization factorize(const BlockMatrix& H) override { return cholesky_.factorize(H); }
   void solve(std::span<const double> g, std::span<double> x) override { cholesky_.solve(g, x); }
+  void solve(std::span<const double> G, std::span<double> X, int columns) override {
+    cholesky_.solve(G, X, columns);
+  }
   const LinearSolverStats& stats() const override { return stats_; }
 
   double log_determinant() const override { return cholesky_.log_determinant(); }
@@ -37,6 +43,7 @@ class BlockCholesky final : public LinearSolver, public LogDeterminant, public E
   void* ability(std::string_view name) override {
     if (name == LogDeterminant::kAbility) return static_cast<LogDeterminant*>(this);
     if (name == EliminationOrder::kAbility) return static_cast<EliminationOrder*>(this);
+    if (name == ManyRightHandSides::kAbility) return static_cast<ManyRightHandSides*>(this);
     return nullptr;
   }
 
@@ -51,16 +58,20 @@ class BlockCholesky final : public LinearSolver, public LogDeterminant, public E
 
 void cairn_register(cairn::Registrar& registrar) {
   using namespace cairn;
-  std::vector<std::string> orderings = block::ordering_names();
-  orderings.emplace_back("auto");
-  registrar.add<LinearSolver>("block_cholesky",
-                              OptionTable{}
-                                  .choice("ordering", "amd", {"amd", "natural"},
-                                          "fill-reducing ordering of the block graph")
-                                  .choice("kernels", "auto", {"auto", "portable", "avx2", "avx512"},
-                                          "instruction set, as far as the machine has it"),
-                              [](const Options& options, Registry&) {
-                                return std::make_unique<BlockCholesky>(options.text("ordering"),
-                                                                       options.text("kernels"));
-                              });
+  registrar.add<LinearSolver>(
+      "block_cholesky",
+      OptionTable{}
+          .choice("ordering", "auto", block::every_ordering_name(),
+                  "fill-reducing ordering of the block graph; auto: by predicted flops")
+          .integer("last", 0, 0, 1e9,
+                   "variables at the end that are eliminated last, as incremental solvers need; "
+                   "not with metis")
+          .choice("kernels", "auto", {"auto", "portable", "avx2", "avx512"},
+                  "instruction set, as far as the machine has it"),
+      [](const Options& options, Registry&) {
+        std::string ordering = options.text("ordering");
+        if (options.integer("last") > 0)
+          ordering += ",last=" + std::to_string(options.integer("last"));
+        return std::make_unique<BlockCholesky>(std::move(ordering), options.text("kernels"));
+      });
 }

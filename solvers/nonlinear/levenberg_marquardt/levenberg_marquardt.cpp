@@ -19,6 +19,16 @@ namespace {
 constexpr int kSmallPromises = 3;
 constexpr double kLightDamping = 1e-8;
 
+double initial_lambda(const LevenbergMarquardtOptions& options, const Gauge& gauge) {
+  if (options.initial_lambda > 0.0) return options.initial_lambda;
+  return gauge.left_free.empty() ? 1e-6 : 1e-4;
+}
+
+/// Undamped steps need an H that is not singular.
+bool may_go_undamped(const LevenbergMarquardtOptions& options, const Gauge& gauge) {
+  return options.endgame && gauge.left_free.empty();
+}
+
 /// One run: the state that its iterations hand on.
 class Run {
  public:
@@ -26,8 +36,9 @@ class Run {
       : run_(descent),
         equations_(descent.equations()),
         options_(options),
-        damping_(options.initial_lambda, 1e-20, options.largest_lambda),
-        endgame_(options.endgame ? std::sqrt(descent.stop().tolerance) : 0.0),
+        damping_(initial_lambda(options, equations_.gauge()), 1e-20, options.largest_lambda),
+        may_go_undamped_(may_go_undamped(options, equations_.gauge())),
+        endgame_(may_go_undamped_ ? std::sqrt(descent.stop().tolerance) : 0.0),
         convergence_(descent.stop().tolerance, descent.state_norm()),
         damped_by_(descent.step.size()) {}
 
@@ -86,7 +97,7 @@ class Run {
     const bool small =
         damping_.lambda() <= kLightDamping && promise <= run_.stop().tolerance * run_.chi2;
     small_promises_ = small ? small_promises_ + 1 : 0;
-    const bool undamped_impossible = endgame_.ever_failed() || !options_.endgame;
+    const bool undamped_impossible = endgame_.ever_failed() || !may_go_undamped_;
     return !run_.exact() && undamped_impossible && small_promises_ >= kSmallPromises;
   }
 
@@ -120,6 +131,7 @@ class Run {
   NormalEquations& equations_;
   const LevenbergMarquardtOptions& options_;
   Damping damping_;
+  bool may_go_undamped_;
   Endgame endgame_;
   Convergence convergence_;
   std::vector<double> damped_by_;  // λ D

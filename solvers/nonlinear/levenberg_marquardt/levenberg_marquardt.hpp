@@ -11,7 +11,11 @@ namespace cairn {
 
 struct LevenbergMarquardtOptions {
   std::string linear_solver = "block_cholesky";  ///< its name, for the summary
-  double initial_lambda = 1e-6;     ///< damping of the first step, relative to the diagonal of H
+  /// Damping of the first step, relative to the diagonal of H. 0: 1e-6, or 1e-4 where the gauge is
+  /// left free: there damping alone holds the estimate, and such problems (cameras and points) are
+  /// so far from linear that a first step with less may throw points behind their cameras, into
+  /// another minimum.
+  double initial_lambda = 0.0;
   double largest_lambda = 1e16;     ///< where the run gives up
   double smallest_diagonal = 1e-6;  ///< D is at least this [units of H]
   bool endgame = true;              ///< undamped steps near the minimum

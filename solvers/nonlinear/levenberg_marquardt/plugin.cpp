@@ -8,8 +8,9 @@ void cairn_register(cairn::Registrar& registrar) {
       cairn::OptionTable{}
           .component("linear_solver", "linear_solver", "block_cholesky",
                      "solves the normal equations")
-          .real("initial_lambda", 1e-6, 1e-20, 1e16,
-                "damping of the first step, as a fraction of the diagonal of H")
+          .real("initial_lambda", 0.0, 0.0, 1e16,
+                "damping of the first step, as a fraction of the diagonal of H; 0: 1e-6, or 1e-4 "
+                "where the gauge is left free")
           .real("largest_lambda", 1e16, 1.0, 1e30, "damping at which the run gives up")
           .real("smallest_diagonal", 1e-6, 0.0, 1e30,
                 "the diagonal of H counts as at least this in the damping")

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "cairn/define_factor.hpp"
 #include "support/planar_graph.hpp"
 
 namespace cairn {
@@ -81,6 +82,49 @@ TEST_F(GaugeTest, HoldsAVariableThatNoFactorTouches) {
   EXPECT_THAT(
       gauge.describe(graph_),
       ::testing::HasSubstr("1 variable has no factor and is held, the first is VERTEX_SE2 99"));
+}
+
+/// A pose with a scale: more than a pose, and no group on offer.
+struct ScaledPose {
+  static constexpr std::string_view kTag = "VERTEX_SCALED";
+  static constexpr int kAmbient = 4, kTangent = 4;
+  static Vector<double, 4> identity() { return Vector<double, 4>::Zero(); }
+  template <class S>
+  static Vector<S, 4> retract(const Vector<S, 4>& x, const Vector<S, 4>& delta) {
+    return x + delta;
+  }
+  template <class S>
+  static Vector<S, 4> local(const Vector<S, 4>& x, const Vector<S, 4>& y) {
+    return y - x;
+  }
+};
+struct ScaledSighting {
+  static constexpr std::string_view kTag = "EDGE_SCALED";
+  static constexpr int kResidual = 1, kMeasurement = 1;
+  using Variables = std::tuple<ScaledPose, ScaledPose>;
+  template <class S>
+  static Vector<S, 1> residual(const Vector<S, 4>& a, const Vector<S, 4>& b,
+                               const Vector<double, 1>& z) {
+    return Vector<S, 1>(b[0] - a[0] - z[0]);
+  }
+};
+
+TEST_F(GaugeTest, LeavesAComponentFreeWhoseLargestVariableIsNoGroup) {
+  const auto type = define_variable<ScaledPose>();
+  const int a = graph_.add_variable(type, 50, std::array{0.0, 0.0, 0.0, 0.0});
+  const int b = graph_.add_variable(type, 51, std::array{1.0, 0.0, 0.0, 0.0});
+  graph_.add_factor(define_factor<ScaledSighting>(), std::array{a, b}, std::array{1.0},
+                    std::array{1.0});
+  const Gauge gauge = resolve_gauge(graph_);
+  EXPECT_EQ(gauge.components, 3);
+  EXPECT_THAT(gauge.anchored, ElementsAre(1, 4)) << "the others are anchored all the same";
+  EXPECT_THAT(gauge.left_free, ElementsAre(a));
+  EXPECT_FALSE(gauge.held[a] || gauge.held[b]);
+  EXPECT_THAT(gauge.describe(graph_),
+              ::testing::EndsWith("; the gauge of a component is left free: holding VERTEX_SCALED "
+                                  "50 would hold more than its place"));
+  graph_.set_fixed(b);
+  EXPECT_THAT(resolve_gauge(graph_).left_free, IsEmpty());
 }
 
 }  // namespace

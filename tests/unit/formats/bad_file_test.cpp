@@ -10,7 +10,7 @@ namespace {
 using ::testing::HasSubstr;
 
 TEST(BadFile, NothingInItIsAnErrorInEveryFormat) {
-  for (const char* format : {"g2o", "toro", "isam", "tum", "kitti", "table"}) {
+  for (const char* format : {"g2o", "toro", "isam", "bal", "tum", "kitti", "table"}) {
     for (const char* text : {"", "\n\n", "# only a comment\r\n"}) {
       EXPECT_EQ(refusal(format, text), "file: the file holds no variable and no factor") << format;
     }

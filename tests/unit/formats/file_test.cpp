@@ -122,7 +122,7 @@ TEST_F(File, SaysWhyAFileCannotBeRead) {
   }
   EXPECT_THAT(message_of([&] { read_graph(put("x.png", "\x89PNG\r\n"), registry()); }),
               HasSubstr("x.png: no format knows this content, which begins with '\\x89PNG\\x0d'; "
-                        "formats on offer: g2o"));
+                        "formats on offer: bal, g2o"));
 }
 
 TEST_F(File, ChoosesTheFormatByContentUnlessItIsNamed) {
@@ -156,8 +156,9 @@ TEST_F(File, WritesByEndingAlsoPacked) {
 
 TEST_F(File, RefusesToWriteWithoutAFormat) {
   const Graph graph = read("g2o", kGraph).graph;
-  EXPECT_THAT(message_of([&] { write_graph(graph, path("a.xyz"), registry()); }, ErrorCode::usage),
-              HasSubstr("no format that writes has the ending '.xyz'; endings on offer: .g2o"));
+  EXPECT_THAT(
+      message_of([&] { write_graph(graph, path("a.xyz"), registry()); }, ErrorCode::usage),
+      HasSubstr("no format that writes has the ending '.xyz'; endings on offer: .bal, .g2o"));
   EXPECT_THAT(message_of([&] { write_graph(graph, "-", registry()); }, ErrorCode::usage),
               HasSubstr("standard output has no ending that tells the format"));
   EXPECT_THAT(

@@ -4,6 +4,7 @@
 #include <cctype>
 
 #include "cairn/error.hpp"
+#include "cairn/jacobian.hpp"
 #include "cairn/linear_solver.hpp"
 #include "cairn/optimizer.hpp"
 #include "cairn/registry.hpp"
@@ -20,6 +21,18 @@ bool can_be_made(Registry& registry, std::string_view kind, const std::string& s
   }
 }
 
+/// A linear solver that leaves work to another: once with each other that is there and takes H (one
+/// that works on the Jacobian cannot solve a part of the system).
+void add_inner_solvers(Registry& registry, const std::string& name, const OptionSpec& option,
+                       std::vector<std::string>& specs) {
+  for (const std::string& inner : registry.names(option.choices[0])) {
+    if (inner == name || inner == option.default_value) continue;
+    if (!can_be_made(registry, LinearSolver::kKind, inner)) continue;
+    if (query<JacobianSolver>(*registry.make<LinearSolver>(inner))) continue;
+    specs.push_back(name + ":" + option.name + "=" + inner);
+  }
+}
+
 }  // namespace
 
 std::vector<std::string> every_component(std::string_view kind) {
@@ -28,6 +41,8 @@ std::vector<std::string> every_component(std::string_view kind) {
   for (const std::string& name : registry.names(kind)) {
     specs.push_back(name);
     for (const OptionSpec& option : registry.options(kind, name).specs()) {
+      if (kind == LinearSolver::kKind && option.type == OptionType::component)
+        add_inner_solvers(registry, name, option, specs);
       if (option.type != OptionType::choice) continue;
       for (const std::string& choice : option.choices) {
         if (choice == option.default_value || option.name == "loss") continue;

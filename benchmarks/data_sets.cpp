@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "data_sets.hpp"
+
+#include <algorithm>
+#include <filesystem>
+
+namespace cairn::performance {
+namespace {
+
+const std::vector<DataSet>& published() {
+  static const std::vector<DataSet> all{
+      {"manhattanOlson3500", "pose2d/manhattanOlson3500.g2o", {}},
+      {"city10000", "pose2d/city10000.g2o", {}},
+      {"10kHog-man", "pose2d/10kHog-man.graph.gz", {}},
+      {"w20000", "pose2d/w20000_isam.txt", {}},
+      {"intel1728", "pose2d/intel1728.g2o", {}},
+      {"killian5489", "pose2d/killian5489_glc.g2o", {}},
+      {"sphere2500", "pose3d/sphere2500.g2o", {}},
+      {"sphere2500a", "pose3d/sphere2500a.g2o", {}},
+      {"torus3D", "pose3d/torus3D.g2o.gz", {}},
+      {"torus10000", "pose3d/torus10000_isam.txt", {}},
+      {"parking-garage", "pose3d/parking-garage.g2o", {}},
+      {"cubicle", "pose3d/cubicle.g2o", {"--repair-information"}},
+      {"sphere_bignoise", "pose3d/sphere_bignoise_vertex3.g2o", {}},
+      {"Victoria Park", "landmark2d/victoriaPark_isam.txt", {"--initial", "incremental"}},
+      {"cityTrees10000", "landmark2d/cityTrees10000_isam.txt", {}},
+      {"ladybug-49", "ba/ladybug-problem-49-7776-pre.txt", {}},
+      {"dubrovnik-3", "ba/dubrovnik-3-7-pre.txt", {}}};
+  return all;
+}
+
+const std::vector<DataSet>& generated() {
+  static const std::vector<DataSet> all{{"manhattan", "@manhattan", {}},
+                                        {"city", "@city", {}},
+                                        {"sphere", "@sphere", {}},
+                                        {"torus", "@torus:turns=60", {}},
+                                        {"grid3d 12³", "@grid3d:nx=12,ny=12,nz=12", {}},
+                                        {"grid3d 20³", "@grid3d:nx=20,ny=20,nz=20", {}},
+                                        {"landmarks2d", "@landmarks2d", {}},
+                                        {"bundle", "@bundle", {}}};
+  return all;
+}
+
+/// Those of the names that there are, in their order.
+std::vector<DataSet> chosen(const std::vector<std::string>& names, const std::string& data) {
+  std::vector<DataSet> sets;
+  for (const std::string& name : names) {
+    const auto of_name = [&](const DataSet& set) { return set.name == name; };
+    const auto real = std::find_if(published().begin(), published().end(), of_name);
+    if (real != published().end()) {
+      DataSet set = *real;
+      set.graph = (std::filesystem::path(data) / set.graph).string();
+      if (!data.empty() && std::filesystem::exists(set.graph)) sets.push_back(std::move(set));
+      continue;
+    }
+    sets.push_back(*std::find_if(generated().begin(), generated().end(), of_name));
+  }
+  return sets;
+}
+
+}  // namespace
+
+std::vector<DataSet> pose_graphs(const std::string& data, bool quick) {
+  if (quick) return chosen({"manhattanOlson3500", "intel1728", "parking-garage", "sphere"}, data);
+  return chosen(
+      {"manhattanOlson3500", "city10000", "10kHog-man", "w20000", "intel1728", "killian5489",
+       "sphere2500", "sphere2500a", "torus3D", "torus10000", "parking-garage", "cubicle",
+       "sphere_bignoise", "manhattan", "city", "sphere", "torus", "grid3d 12³"},
+      data);
+}
+
+std::vector<DataSet> rate_sets(const std::string& data, bool quick) {
+  if (quick) return chosen({"manhattanOlson3500", "sphere2500", "manhattan"}, data);
+  return chosen({"manhattanOlson3500", "sphere2500", "torus3D", "torus10000", "manhattan", "sphere",
+                 "torus", "grid3d 20³"},
+                data);
+}
+
+std::vector<DataSet> thread_sets(const std::string& data, bool quick) {
+  if (quick) return chosen({"manhattanOlson3500", "torus"}, data);
+  return chosen({"manhattanOlson3500", "torus3D", "torus10000", "manhattan", "torus", "grid3d 20³"},
+                data);
+}
+
+std::vector<DataSet> solver_sets(const std::string& data, bool quick) {
+  if (quick) return chosen({"intel1728", "dubrovnik-3", "landmarks2d"}, data);
+  return chosen({"manhattanOlson3500", "sphere2500", "Victoria Park", "cityTrees10000",
+                 "ladybug-49", "dubrovnik-3", "landmarks2d", "bundle"},
+                data);
+}
+
+}  // namespace cairn::performance

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include <boost/json/object.hpp>
+
+#include "measure.hpp"
+
+namespace cairn::performance {
+
+/// What every study is given.
+struct Bench {
+  Cairn cairn;
+  std::string data;  ///< folder of the real graphs, or empty
+  bool quick = false;
+  std::string ours = "block_cholesky";  ///< cairn's own linear solver, with options
+  int rounds = 5;
+};
+
+/// Takes what was measured, one entry at a time, and keeps it at once: a study may take an hour.
+using Keep = std::function<void(boost::json::object entry)>;
+
+/// Ten Gauss-Newton iterations by cairn's own solver, by the best setting of `cholmod` and by the
+/// best of `ceres`; with one thread, then with two.
+void study_graphs(const Bench& bench, const Keep& keep);
+
+/// Rate of the factorisation against dgemm and the memory's bandwidth.
+void study_rates(const Bench& bench, const Keep& keep);
+
+/// One thread against two.
+void study_threads(const Bench& bench, const Keep& keep);
+
+/// Time and memory against size on generated graphs, and one graph of a million poses to
+/// convergence.
+void study_scaling(const Bench& bench, const Keep& keep);
+
+/// Every linear solver on offer, to convergence, with a limit of time.
+void study_solvers(const Bench& bench, const Keep& keep);
+
+// Progress
+// ------------------------------------------------------------------------------------------------
+/// A line on standard error.
+void tell(const std::string& sentence);
+/// Calls `work` for each; one that cannot be measured is told of and left out.
+void for_each_set(const std::string& study, const std::vector<DataSet>& sets,
+                  const std::function<void(const DataSet&)>& work);
+
+}  // namespace cairn::performance

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <boost/json/value.hpp>
+
+#include "page.hpp"
+
+namespace cairn::performance {
+
+/// The sections of docs/performance.md that the report of a study fills. Throws
+/// `std::runtime_error` for a study that it does not know.
+std::vector<Section> sections(const boost::json::value& report);
+
+/// The main comparison's part of it, in tables_graphs.cpp.
+std::vector<Section> graphs_sections(const boost::json::array& entries);
+
+// What `cairn plot` draws, in the words of `cairn bench --json`:
+/// the main comparison, with the best of each family alone, as bars;
+boost::json::value graphs_picture(const boost::json::array& entries);
+/// the growth with size, a line a family.
+boost::json::value scaling_picture(const boost::json::array& entries);
+
+// Numbers in words
+// --------------------------------------------------------------------------------------------
+/// Three digits; "-" for what is not a number.
+std::string digits(double value);
+/// "3.21 ×", "-"
+std::string times(double ratio);
+/// "52 %" of 0.52, "-"
+std::string percent(double part);
+/// "14.2" of 0.0142 s.
+std::string milliseconds(double seconds);
+std::string megabytes(double bytes);
+/// "1.53 M"
+std::string count(double value);
+/// How far apart two numbers are, relative to the second, or to `rounding` if that is larger: "0",
+/// "3e-15".
+std::string apart(double value, double reference, double rounding = 0.0);
+
+/// A table of Markdown; the first column is to the left, the others to the right.
+class MarkdownTable {
+ public:
+  explicit MarkdownTable(const std::vector<std::string>& heading);
+  void add(const std::vector<std::string>& row);
+  const std::string& text() const { return text_; }
+
+ private:
+  std::string text_;
+};
+
+}  // namespace cairn::performance

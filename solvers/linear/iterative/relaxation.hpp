@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "cairn/block_matrix.hpp"
+#include "cairn/linear_solver.hpp"
+#include "iterative/block_rows.hpp"
+#include "iterative/diagonal_blocks.hpp"
+#include "iterative/progress.hpp"
+
+namespace cairn::iterative {
+
+struct RelaxationOptions {
+  double tolerance = 1e-10;  ///< on ‖Hx − g‖/‖g‖
+  /// Sweeps of one solve; 0: as many as 3·10⁸ multiplications allow, some tenths of a second.
+  std::int64_t max_iterations = 0;
+};
+
+/// What block Jacobi and block Gauss-Seidel share: stationary iterations x ← x + M⁻¹ (g − H x) from
+/// x = 0 until the residual is small or the sweeps are used up (Saad 2003, chapter 4).
+///
+/// Every so many sweeps the residual r and the quadratic model φ(x) = ½ xᵀHx − gᵀx are looked at. A
+/// convergent iteration lowers φ always, while ‖r‖, which mixes units, may rise for a while; so φ
+/// tells divergence. The best x is returned in any case, and how the solves ended is told in the
+/// note. A failed factorisation is a diagonal block that is not positive definite; an H that is
+/// indefinite beyond that shows as divergence.
+class Relaxation : public LinearSolver {
+ public:
+  void analyze(const BlockStructure& structure) final;
+  Factorization factorize(const BlockMatrix& H) final;
+  void solve(std::span<const double> g, std::span<double> x) final;
+  const LinearSolverStats& stats() const final { return stats_; }
+
+ protected:
+  Relaxation(std::string name, RelaxationOptions options);
+  /// One sweep on x; may use `residual()` as room.
+  virtual void sweep(std::span<const double> g, std::span<double> x) = 0;
+  /// How many products with H a sweep costs about.
+  virtual int products_per_sweep() const { return 1; }
+  /// Called when H has been loaded.
+  virtual void prepare() {}
+  /// Called on divergence; true if another try from zero, damped more, makes sense.
+  virtual bool damp_more() { return false; }
+  virtual std::string note() const = 0;
+
+  const BlockRows& H() const { return H_; }
+  const DiagonalBlocks& diagonal() const { return diagonal_; }
+  std::span<double> residual() { return r_; }
+
+ private:
+  /// r = g − H x; returns φ(x), and ‖r‖ in `norm`.
+  double look(std::span<const double> x, double& norm);
+  std::int64_t limit() const;
+  /// Sweeps from zero into best_; returns ‖r‖ of it.
+  double iterate(double goal, std::int64_t& iterations, Ending& ending);
+
+  const std::string name_;
+  const RelaxationOptions options_;
+  std::uint64_t version_ = 0;  // of the structure that was analysed
+  BlockRows H_;
+  DiagonalBlocks diagonal_;
+  std::vector<double> g_, x_, r_, best_;
+  Progress progress_;
+  LinearSolverStats stats_;
+  bool factorized_ = false;
+};
+
+}  // namespace cairn::iterative

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "cairn/aligned.hpp"
+#include "cairn/block_matrix.hpp"
+#include "cairn/linear_solver.hpp"
+
+namespace cairn {
+
+/// Dense Cholesky H = L Lᵀ by LAPACK's dpotrf and dpotrs on the lower triangle, in the order given:
+/// n²·8 bytes and n³/3 operations for n scalars, whatever the structure. It uses nothing of
+/// cairn's sparse machinery, which makes it the oracle for the other solvers on small systems.
+class LapackSolver final : public LinearSolver, public LogDeterminant {
+ public:
+  /// `max_size`: scalars beyond which `analyze` throws `Error` (usage).
+  explicit LapackSolver(std::int64_t max_size);
+
+  void analyze(const BlockStructure& structure) override;
+  Factorization factorize(const BlockMatrix& H) override;
+  void solve(std::span<const double> g, std::span<double> x) override;
+  const LinearSolverStats& stats() const override { return stats_; }
+
+  double log_determinant() const override;
+  void* ability(std::string_view name) override;
+
+ private:
+  void scatter(const BlockMatrix& H);
+  Factorization failed_at(std::int64_t scalar) const;
+
+  const std::int64_t max_size_;
+  std::uint64_t version_ = 0;  // of the structure that was analysed
+  int size_ = 0;
+  std::vector<std::int32_t> block_of_scalar_;
+  AlignedVector dense_;  // column-major; the lower triangle is H, then L
+  LinearSolverStats stats_;
+  bool factorized_ = false;
+};
+
+}  // namespace cairn

@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "pcg/pcg_solver.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <utility>
+
+#include "cairn/threads.hpp"
+#include "iterative/vectors.hpp"
+
+namespace cairn {
+namespace {
+
+/// Times that the iteration begins anew from the true residual, which the recursive one drifts away
+/// from by rounding.
+constexpr int kRestarts = 3;
+
+}  // namespace
+
+using iterative::dot;
+using iterative::Ending;
+
+PcgSolver::PcgSolver(std::unique_ptr<Preconditioner> preconditioner, PcgOptions options)
+    : preconditioner_(std::move(preconditioner)), options_(options) {}
+
+void PcgSolver::analyze(const BlockStructure& structure) {
+  version_ = 0;
+  jacobian_version_ = 0;
+  factorized_ = false;
+  H_.analyze(structure);
+  diagonal_.analyze(structure);
+  preconditioner_->analyze(structure);
+  for (std::vector<double>* vector : {&g_, &r_, &z_, &p_, &q_})
+    vector->assign(static_cast<std::size_t>(structure.size()), 0.0);
+  version_ = structure.version();
+  stats_ = {};
+  stats_.ordering = "natural";
+  progress_.reset(stats_, preconditioner_->note(), options_.tolerance);
+}
+
+Factorization PcgSolver::factorize(const BlockMatrix& H) { return factorize(H, nullptr); }
+
+Factorization PcgSolver::factorize(const BlockMatrix& H, const NormalBlocks* factors) {
+  if (version_ == 0 || H.structure().version() != version_)
+    throw std::logic_error("linear_solver pcg: factorize before analyze of that structure");
+  factorized_ = false;
+  if (const Factorization diagonal = diagonal_.factorize(H); !diagonal.ok) return diagonal;
+  if (const Factorization made = preconditioner_->factorize(H, diagonal_, factors); !made.ok)
+    return made;
+  H_.load(H);
+  progress_.describe(stats_, preconditioner_->note());
+  factorized_ = true;
+  return {};
+}
+
+void PcgSolver::analyze(const JacobianStructure& structure) {
+  factors_.analyze(structure);
+  normal_ = BlockMatrix(factors_.structure());
+  analyze(factors_.structure());
+  jacobian_version_ = structure.version();
+}
+
+Factorization PcgSolver::factorize(const JacobianMatrix& J, std::span<const double> damping) {
+  if (jacobian_version_ == 0 || J.structure().version() != jacobian_version_)
+    throw std::logic_error("linear_solver pcg: factorize before analyze of that structure");
+  factors_.load(J, damping);
+  factors_.assemble(normal_);
+  return factorize(normal_, &factors_);
+}
+
+void PcgSolver::minimize(std::span<const double> residual, std::span<double> x) {
+  if (!factorized_ || jacobian_version_ == 0)
+    throw std::logic_error("linear_solver pcg: minimize without a factorisation");
+  factors_.J().multiply_transposed(residual, x);
+  for (double& value : x) value = -value;
+  solve(x, x);
+}
+
+void* PcgSolver::ability(std::string_view name) {
+  const bool wanted = name == JacobianSolver::kAbility && preconditioner_->wants_factors();
+  return wanted ? static_cast<JacobianSolver*>(this) : nullptr;
+}
+
+double PcgSolver::true_residual(std::span<const double> x) {
+  H_.multiply(x, q_);
+  for (std::size_t k = 0; k < r_.size(); ++k) r_[k] = g_[k] - q_[k];
+  return std::sqrt(dot(r_, r_));
+}
+
+double PcgSolver::step(double alpha, std::span<double> x) {
+  return iterative::sum_over_ranges(r_.size(), [&](std::size_t begin, std::size_t end) {
+    double sum = 0.0;
+    for (std::size_t k = begin; k < end; ++k) {
+      x[k] += alpha * p_[k];
+      r_[k] -= alpha * q_[k];
+      sum += r_[k] * r_[k];
+    }
+    return sum;
+  });
+}
+
+Ending PcgSolver::iterate(double goal, std::span<double> x, std::int64_t& iterations) {
+  double rz = preconditioner_->apply(r_, z_);
+  p_ = z_;
+  while (iterations < options_.max_iterations) {
+    const double curvature = H_.multiply_dot(p_, q_);
+    if (!(curvature > 0.0)) return Ending::indefinite;
+    ++iterations;
+    if (std::sqrt(step(rz / curvature, x)) <= goal) return Ending::reached;
+    const double next = preconditioner_->apply(r_, z_);
+    if (!(next > 0.0)) return Ending::indefinite;
+    const double beta = next / rz;
+    rz = next;
+    iterative::sum_over_ranges(p_.size(), [&](std::size_t begin, std::size_t end) {
+      for (std::size_t k = begin; k < end; ++k) p_[k] = z_[k] + beta * p_[k];
+      return 0.0;
+    });
+  }
+  return Ending::limit;
+}
+
+void PcgSolver::solve(std::span<const double> g, std::span<double> x) {
+  if (!factorized_) throw std::logic_error("linear_solver pcg: solve without a factorisation");
+  std::copy(g.begin(), g.end(), g_.begin());  // x may be g
+  r_ = g_;
+  std::fill(x.begin(), x.end(), 0.0);
+  const double length = std::sqrt(dot(g_, g_));
+  const double goal = options_.tolerance * length;
+  double residual = length;
+  std::int64_t iterations = 0;
+  Ending ending = Ending::reached;
+  for (int restart = 0; residual > goal && restart <= kRestarts; ++restart) {
+    const double before = residual;
+    ending = iterate(goal, x, iterations);
+    residual = true_residual(x);
+    if (ending != Ending::reached) break;
+    if (residual > goal) ending = Ending::stagnated;  // unless another round mends it
+    if (residual > 0.5 * before) break;
+  }
+  if (residual <= goal) ending = Ending::reached;
+  progress_.add(stats_, iterations, length > 0.0 ? residual / length : 0.0, ending);
+}
+
+}  // namespace cairn

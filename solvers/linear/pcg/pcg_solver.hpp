@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "cairn/block_matrix.hpp"
+#include "cairn/jacobian.hpp"
+#include "cairn/linear_solver.hpp"
+#include "iterative/block_rows.hpp"
+#include "iterative/diagonal_blocks.hpp"
+#include "iterative/progress.hpp"
+#include "pcg/normal_blocks.hpp"
+#include "pcg/preconditioner.hpp"
+
+namespace cairn {
+
+struct PcgOptions {
+  double tolerance = 1e-10;             ///< on ‖Hx − g‖/‖g‖
+  std::int64_t max_iterations = 20000;  ///< of one solve
+};
+
+/// Conjugate gradients (Hestenes, Stiefel 1952) on the blocks of H with a preconditioner (Saad
+/// 2003, algorithm 9.1). H is never factorised: memory is that of H and of the preconditioner, and
+/// time goes with the square root of the condition number.
+///
+/// A solve ends when ‖Hx − g‖ ≤ tolerance · ‖g‖, by the true residual, or at max_iterations with
+/// the x that it has; either way x is used, since each iterate of conjugate gradients lowers the
+/// quadratic model (Steihaug 1983), and the note of `stats` says how often. That H is not positive
+/// definite is a failed factorisation where a diagonal block, or the preconditioner, shows it;
+/// where only a direction p with pᵀHp ≤ 0 does, in a solve, the x so far is returned and told. An H
+/// that is only semidefinite, as under a free gauge, is solved all the same.
+///
+/// Sums are taken in a fixed order: results do not depend on the number of threads.
+///
+/// With a preconditioner that wants the factors it has the ability `JacobianSolver`, and forms H
+/// from J by itself.
+class PcgSolver final : public LinearSolver, public JacobianSolver {
+ public:
+  PcgSolver(std::unique_ptr<Preconditioner> preconditioner, PcgOptions options);
+
+  void analyze(const BlockStructure& structure) override;
+  Factorization factorize(const BlockMatrix& H) override;
+  void solve(std::span<const double> g, std::span<double> x) override;
+  const LinearSolverStats& stats() const override { return stats_; }
+
+  void analyze(const JacobianStructure& structure) override;
+  Factorization factorize(const JacobianMatrix& J, std::span<const double> damping) override;
+  void minimize(std::span<const double> residual, std::span<double> x) override;
+  void* ability(std::string_view name) override;
+
+ private:
+  Factorization factorize(const BlockMatrix& H, const NormalBlocks* factors);
+  /// Improves x until its residual r is small; both are kept up to date. Adds to `iterations`.
+  iterative::Ending iterate(double goal, std::span<double> x, std::int64_t& iterations);
+  double true_residual(std::span<const double> x);
+  /// r = r − α q, x = x + α p; returns ‖r‖².
+  double step(double alpha, std::span<double> x);
+
+  std::unique_ptr<Preconditioner> preconditioner_;
+  const PcgOptions options_;
+  std::uint64_t version_ = 0;           // of the structure that was analysed
+  std::uint64_t jacobian_version_ = 0;  // likewise, 0 if it was one of H
+  NormalBlocks factors_;
+  BlockMatrix normal_;  // JᵀJ + D
+  iterative::BlockRows H_;
+  iterative::DiagonalBlocks diagonal_;
+  std::vector<double> g_, r_, z_, p_, q_;
+  iterative::Progress progress_;
+  LinearSolverStats stats_;
+  bool factorized_ = false;
+};
+
+}  // namespace cairn

@@ -1,0 +1,5 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#define CAIRN_KERNEL_SET avx2
+#define CAIRN_KERNEL_NAME "avx2"
+#define CAIRN_KERNEL_WIDTH 4
+#include "kernels_body.hpp"

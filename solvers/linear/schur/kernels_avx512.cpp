@@ -1,0 +1,5 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#define CAIRN_KERNEL_SET avx512
+#define CAIRN_KERNEL_NAME "avx512"
+#define CAIRN_KERNEL_WIDTH 8
+#include "kernels_body.hpp"

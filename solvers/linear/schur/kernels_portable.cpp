@@ -1,0 +1,5 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#define CAIRN_KERNEL_SET portable
+#define CAIRN_KERNEL_NAME "portable"
+#define CAIRN_KERNEL_WIDTH 2
+#include "kernels_body.hpp"

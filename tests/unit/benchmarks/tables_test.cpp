@@ -1,0 +1,187 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "tables.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <stdexcept>
+#include <string>
+
+#include <boost/json/parse.hpp>
+
+#include "json_access.hpp"
+
+namespace cairn::performance {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+boost::json::value report(const std::string& study, const std::string& entries) {
+  return boost::json::parse(R"({"study": ")" + study + R"(", "cairn": "0.1.0", "commit": "abc1234",
+      "machine": {"cpu": "Some CPU", "cores": 2},
+      "build": {"compiler": "gcc", "flags": "-O3", "simd": "avx2"}, "entries": [)" +
+                            entries + "]}");
+}
+
+std::string section(const boost::json::value& report, const std::string& name) {
+  for (const Section& section : sections(report)) {
+    if (section.name == name) return section.markdown;
+  }
+  throw std::runtime_error("no section " + name);
+}
+
+std::string times_ten(const std::string& text) {
+  std::string all = text;
+  for (int k = 1; k < 10; ++k) all += "," + text;
+  return all;
+}
+
+/// Two rounds of ten iterations; Ceres ended after two, of which it took one.
+std::string configuration(const std::string& optimizer, const std::string& linear_solver,
+                          double seconds_per_iteration, double chi2) {
+  const std::string run = R"({"iterations": 10, "seconds": {"total": )" +
+                          std::to_string(10 * seconds_per_iteration) + "}}";
+  const std::string history = optimizer.starts_with("ceres")
+                                  ? R"({"accepted": true}, {"accepted": false})"
+                                  : times_ten(R"({"accepted": true})");
+  return R"({"optimizer": ")" + optimizer + R"(", "linear_solver": ")" + linear_solver +
+         R"(", "seconds": {"median": 1, "min": 1, "max": 1, "per_iteration": )" +
+         std::to_string(seconds_per_iteration) + R"(}, "chi2": {"final": )" + std::to_string(chi2) +
+         R"(}, "peak_memory_bytes": 25000000, "runs": [)" + run + "," + run + R"(], "history": [)" +
+         history + "]}";
+}
+
+/// Two published graphs and a generated one; the second CHOLMOD is the faster.
+boost::json::value graphs_report() {
+  const auto entry = [](const std::string& name, const std::string& generated, double ours,
+                        double theirs) {
+    return R"({"name": ")" + name + R"(", "generated": )" + generated +
+           R"(, "threads": 1, "measured": {"graph": {"variables": 100, "factors": 200},
+                 "configurations": [)" +
+           configuration("gauss_newton", "block_cholesky", ours, 146.5) + "," +
+           configuration("gauss_newton", "cholmod:mode=simplicial,ordering=amd", 2 * theirs,
+                         146.5) +
+           "," +
+           configuration("gauss_newton", "cholmod:mode=supernodal,ordering=metis", theirs, 146.5) +
+           "," +
+           configuration("ceres:sparse_library=cx_sparse,initial_radius=1e16", "X", 4 * ours,
+                         293.0) +
+           "]}}";
+  };
+  return report("graphs", entry("first", "false", 0.002, 0.004) + "," +
+                              entry("second", "false", 0.002, 0.016) + "," +
+                              entry("made", "true", 0.002, 0.010));
+}
+
+TEST(PerformanceTables, TakeTheBestSettingOfEachPeer) {
+  const std::string table = section(graphs_report(), "graphs-1");
+  EXPECT_THAT(table, HasSubstr("| first | 100 | 200 | 2.00 | 4.00 (supernodal, metis) | 2.00 × "
+                               "| 8.00 (cx_sparse; 1 of 2 steps taken) | 4.00 × | 0 | 1e+00 | 25 "
+                               "/ 25 / 25 |\n"));
+  EXPECT_THAT(table, Not(HasSubstr("simplicial")));
+}
+
+TEST(PerformanceTables, AverageRatiosOfPublishedAndGeneratedGraphsApart) {
+  const std::string table = section(graphs_report(), "graphs-1");
+  EXPECT_THAT(table, HasSubstr("**published, geometric mean** |  |  |  |  | **4.00 ×**"));
+  EXPECT_THAT(table, HasSubstr("**generated, geometric mean** |  |  |  |  | **5.00 ×**"));
+}
+
+TEST(PerformanceTables, ShowThreadCountsInTablesOfTheirOwn) {
+  EXPECT_THAT(section(graphs_report(), "graphs-2"), Not(HasSubstr("first")));
+}
+
+TEST(PerformanceTables, NameMachineBuildAndCommit) {
+  EXPECT_THAT(section(graphs_report(), "graphs-1"),
+              HasSubstr("*Some CPU, 2 cores, avx2; gcc, `-O3`; commit abc1234.*"));
+}
+
+TEST(PerformanceTables, DrawOnlyTheBestOfEachFamily) {
+  const boost::json::value report = graphs_report();
+  const boost::json::value picture = graphs_picture(list(report, "entries"));
+  EXPECT_EQ(list(picture, "graphs").size(), 3U);
+  EXPECT_EQ(list(list(picture, "graphs").front(), "configurations").size(), 3U);
+}
+
+TEST(PerformanceTables, GiveRatesAgainstTheNearerRoof) {
+  // 2 GFLOP in 0.1 s; 2e9 / (16 * 1.25e8) = 1 flop a byte at 25 GB/s lies below dgemm's 50.
+  const auto rates = report("rates", R"({"name": "big", "factorize": 0.1, "dgemm": 5e10,
+      "bandwidth": 2.5e10, "solver": {"ordering": "amd", "factor_flops": 2e9,
+      "factor_nonzeros": 125000000}})");
+  EXPECT_THAT(section(rates, "rates"),
+              HasSubstr("| big | amd | 125 M | 2 G | 100 | 20.0 | 40 % | 1.00 | 25.0 | 80 % |\n"));
+}
+
+TEST(PerformanceTables, SayWhereThereIsNoDgemmToCompareWith) {
+  const auto rates = report("rates", R"({"name": "big", "factorize": 0.1, "dgemm": null,
+      "bandwidth": 2.5e10, "solver": {"factor_flops": 2e9, "factor_nonzeros": 125000000}})");
+  EXPECT_THAT(section(rates, "rates"), HasSubstr("No OpenBLAS"));
+}
+
+TEST(PerformanceTables, CompareOneThreadWithTwo) {
+  const auto threads = report("threads", R"({"name": "torus",
+      "one": {"iteration": 0.04, "factorize": 0.03}, "two": {"iteration": 0.025, "factorize": 0.015}})");
+  EXPECT_THAT(section(threads, "threads"),
+              HasSubstr("| torus | 30.0 | 15.0 | 2.00 × | 40.0 | 25.0 | 1.60 × |\n"));
+}
+
+/// Three sizes of quadratic growth, the smallest outside the fit, and one left out.
+boost::json::value scaling_report() {
+  const auto entry = [](const std::string& poses, const std::string& seconds) {
+    return R"({"family": "city", "study": "five iterations", "poses": )" + poses +
+           R"(, "graph": {"variables": )" + poses +
+           R"(, "factors": 7}, "iterations": 5, "solver": {}, "seconds": )" + seconds +
+           R"(, "peak_memory_bytes": )" + poses + "000},";
+  };
+  return report("scaling", entry("1000", "77") + entry("10000", "1") + entry("100000", "100") +
+                               R"({"family": "city", "poses": 1000000, "left_out": "too long"})");
+}
+
+TEST(PerformanceTables, FitTheGrowthFromTenThousandPosesOn) {
+  EXPECT_THAT(section(scaling_report(), "growth"),
+              HasSubstr("| city | 10000 … 100000 | 2 | n^2.00 | n^1.00 |\n"));
+}
+
+TEST(PerformanceTables, ListTheSizesThatWereLeftOut) {
+  EXPECT_THAT(section(scaling_report(), "scaling"), HasSubstr("left out: too long"));
+}
+
+TEST(PerformanceTables, PointOutAnotherChi2) {
+  const auto entry = [](const std::string& setting, const std::string& chi2) {
+    return R"({"name": "park", "setting": ")" + setting +
+           R"(", "result": "converged", "finished": true,
+        "graph": {"variables": 9, "factors": 8}, "iterations": 3, "seconds": 0.01,
+        "chi2": {"initial": 1e4, "final": )" +
+           chi2 + "}}";
+  };
+  const auto solvers = report("solvers", entry("ours", "100.0") + "," + entry("same", "100.0") +
+                                             "," + entry("worse", "200.0") + "," +
+                                             R"({"name": "park", "setting": "stuck",
+                                                 "result": "not finished after 60 s"})");
+  const std::string text = section(solvers, "solvers");
+  EXPECT_THAT(text, HasSubstr("**park** (9 variables, 8 factors)\n"));
+  EXPECT_THAT(text, HasSubstr("| `same` | 100 | 0 | 3 |  | 10.0 | 1.00 × | - | converged |\n"));
+  EXPECT_THAT(text,
+              HasSubstr("| 1e+00 | 3 |  | 10.0 | 1.00 × | - | converged, **another chi2** |"));
+  EXPECT_THAT(text, HasSubstr("| `stuck` | - | - | - |  | - | - | - | not finished after 60 s |"));
+}
+
+TEST(PerformanceTables, DoNotTakeRoundingForAnotherChi2) {
+  const auto entry = [](const std::string& chi2) {
+    return R"({"name": "exact", "setting": "x", "result": "converged", "finished": true,
+        "graph": {"variables": 9, "factors": 8}, "chi2": {"initial": 1e4, "final": )" +
+           chi2 + "}}";
+  };
+  const std::string text =
+      section(report("solvers", entry("4e-25") + "," + entry("2e-25")), "solvers");
+  EXPECT_THAT(text, HasSubstr("| 2e-25 | 2e-17 |"));
+  EXPECT_THAT(text, Not(HasSubstr("another chi2")));
+}
+
+TEST(PerformanceTables, RefuseAStudyThatTheyDoNotKnow) {
+  EXPECT_THROW(sections(report("astrology", "")), std::runtime_error);
+}
+
+}  // namespace
+}  // namespace cairn::performance

@@ -1,0 +1,12 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "cairn/registry.hpp"
+#include "camera.hpp"
+#include "reprojection.hpp"
+
+void cairn_register(cairn::Registrar& registrar) {
+  using namespace cairn;
+  registrar.add_types("bundle", OptionTable{}, [](const Options&) {
+    return TypeSet{.variables = {define_variable<bundle::Camera>()},
+                   .factors = {define_factor<bundle::Reprojection>()}};
+  });
+}
