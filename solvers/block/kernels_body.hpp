@@ -52,7 +52,11 @@ inline __attribute__((always_inline)) Mask lanes() {
 }
 /// Lane j of v in all lanes; j is known when compiling, once the loops about it are unrolled.
 inline __attribute__((always_inline)) Vec lane(Vec v, int j) {
+#if defined(__clang__)
+  return broadcast(v[j]);
+#else
   return __builtin_shuffle(v, Mask{} + j);
+#endif
 }
 inline __attribute__((always_inline)) Vec roots(Vec v) {
 #if defined(__AVX512F__)

@@ -58,7 +58,7 @@ void SupernodalCholesky::plan_solve() {
         }
       }
       std::ranges::sort(outside);
-      outside.erase(std::ranges::unique(outside).begin(), outside.end());
+      outside.erase(std::unique(outside.begin(), outside.end()), outside.end());
       outside_of_[t].first = std::ssize(outside_);
       for (const std::int32_t row : outside) {
         copy_of[row] = vector_rows_;
