@@ -83,7 +83,9 @@ struct Linearizer::Plan {
   Gathers block_sums;     // by target
   Gathers gradient_sums;  // by block
   AlignedVector scratch;
-  std::vector<double> partial;  // chi2 by chunk
+  std::vector<double> partial;                     // chi2 by chunk
+  std::vector<FactorView> views;                   // by factor pool, at the states at hand
+  std::vector<std::vector<const double*>> states;  // what the views point to
 
   Plan(const Graph& g, const std::vector<bool>& held)
       : graph(&g), graph_version(g.structure_version()) {
@@ -97,6 +99,8 @@ struct Linearizer::Plan {
       }
     }
     partial.resize(chunks.size());
+    views.resize(g.factor_pools().size());
+    states.resize(views.size());
     assign_targets();
     find_plain_factors();
   }
@@ -257,16 +261,11 @@ struct Linearizer::Plan {
     return std::accumulate(rhos.begin(), rhos.end(), 0.0);
   }
 
-  /// The view of every factor pool at given states.
-  struct Views {
-    std::vector<std::vector<const double*>> states;
-    std::vector<FactorView> pools;
-    Views(const Graph& graph, const Values& values) : states(graph.factor_pools().size()) {
-      for (std::size_t p = 0; p < states.size(); ++p) {
-        pools.push_back(graph.view(static_cast<int>(p), values, states[p]));
-      }
-    }
-  };
+  /// Sets `views` to these states.
+  void look_at(const Values& values) {
+    for (std::size_t p = 0; p < views.size(); ++p)
+      views[p] = graph->view(static_cast<int>(p), values, states[p]);
+  }
 };
 
 Linearizer::Linearizer(const Graph& graph, std::vector<bool> held) {
@@ -285,12 +284,12 @@ int Linearizer::variable_of(int block) const { return plan_->variable_of[block];
 double Linearizer::chi2(const Values& values) const {
   Plan& plan = *plan_;
   plan.check_graph();
-  const Plan::Views views(*plan.graph, values);
+  plan.look_at(values);
   for_each_chunk(plan.chunks.size(), [&](std::size_t c) {
     const Plan::Chunk& chunk = plan.chunks[c];
     double norms[kFactorChunk];
     const std::span<double> used(norms, chunk.end - chunk.begin);
-    plan.graph->factor_pools()[chunk.pool].type->squared_norms(views.pools[chunk.pool], chunk.begin,
+    plan.graph->factor_pools()[chunk.pool].type->squared_norms(plan.views[chunk.pool], chunk.begin,
                                                                chunk.end, norms);
     plan.partial[c] = plan.apply_loss(chunk, used, {});
   });
@@ -304,7 +303,7 @@ double Linearizer::linearize(const Values& values, BlockMatrix& H, std::span<dou
       g.size() != static_cast<std::size_t>(plan.structure.size())) {
     throw std::logic_error("Linearizer::linearize: H or g was not made for this structure");
   }
-  const Plan::Views views(*plan.graph, values);
+  plan.look_at(values);
   double* H_values = H.values().data();
   double* scratch = plan.scratch.data();
   for_each_chunk(plan.chunks.size(), [&](std::size_t c) {
@@ -316,7 +315,7 @@ double Linearizer::linearize(const Values& values, BlockMatrix& H, std::span<dou
                              .blocks = targets.blocks.data(),
                              .transposed = targets.transposed.data(),
                              .gradients = targets.gradients.data()};
-    const FactorView& view = views.pools[chunk.pool];
+    const FactorView& view = plan.views[chunk.pool];
     std::fill(scratch + chunk.scratch_begin, scratch + chunk.scratch_end, 0.0);
     double norms[kFactorChunk], weights[kFactorChunk];
     const std::size_t count = chunk.end - chunk.begin;

@@ -70,9 +70,10 @@ int threads() {
   return a.count;
 }
 
-void for_each_chunk(std::size_t chunks, const std::function<void(std::size_t)>& body) {
+void detail::run_chunks(std::size_t chunks, void (*run)(const void* body, std::size_t chunk),
+                        const void* body) {
   if (chunks <= 1 || threads() == 1) {
-    for (std::size_t chunk = 0; chunk < chunks; ++chunk) body(chunk);
+    for (std::size_t chunk = 0; chunk < chunks; ++chunk) run(body, chunk);
     return;
   }
   char fork = 0, join = 0;
@@ -82,18 +83,11 @@ void for_each_chunk(std::size_t chunks, const std::function<void(std::size_t)>& 
                       [&](const tbb::blocked_range<std::size_t>& range) {
                         CAIRN_TSAN_ACQUIRE(&fork);
                         for (std::size_t chunk = range.begin(); chunk != range.end(); ++chunk)
-                          body(chunk);
+                          run(body, chunk);
                         CAIRN_TSAN_RELEASE(&join);
                       });
   });
   CAIRN_TSAN_ACQUIRE(&join);
-}
-
-void for_each_range(std::size_t size, std::size_t grain,
-                    const std::function<void(std::size_t, std::size_t)>& body) {
-  for_each_chunk((size + grain - 1) / grain, [&](std::size_t chunk) {
-    body(chunk * grain, std::min(size, (chunk + 1) * grain));
-  });
 }
 
 }  // namespace cairn

@@ -6,7 +6,6 @@
 #include <cstdlib>
 #include <limits>
 #include <numeric>
-#include <optional>
 
 #include <amd.h>
 #if defined(CAIRN_CAMD)
@@ -229,60 +228,22 @@ std::vector<std::int32_t> order(const BlockStructure& structure, std::string_vie
 }
 
 Choice choose(const BlockStructure& structure, std::span<const std::int32_t> groups) {
-  Choice choice{.name = groups.empty() ? "amd" : "camd", .order = order(structure, "amd", groups)};
-  std::optional<Choice> better =
-      better_than(structure, factor_flops(structure, choice.order), groups);
-  return better ? std::move(*better) : std::move(choice);
-}
-
-std::optional<Choice> better_than([[maybe_unused]] const BlockStructure& structure,
-                                  [[maybe_unused]] double flops,
-                                  [[maybe_unused]] std::span<const std::int32_t> groups) {
+  const auto choice = [&](std::string name, std::vector<std::int32_t> order) {
+    Symbolic outline = Symbolic::outline(structure, order);
+    return Choice{std::move(name), std::move(order), std::move(outline)};
+  };
+  Choice degree = choice(groups.empty() ? "amd" : "camd", order(structure, "amd", groups));
 #if defined(CAIRN_METIS) && defined(CAIRN_CAMD)
-  if (!worth_dissecting(structure, flops)) return std::nullopt;
-  Choice other{.name = "nesdis", .order = order(structure, "nesdis", groups)};
-  if (factor_flops(structure, other.order) < flops) return other;
+  if (worth_dissecting(structure, degree.outline.factor_flops)) {
+    Choice dissected = choice("nesdis", order(structure, "nesdis", groups));
+    if (dissected.outline.factor_flops < degree.outline.factor_flops) return dissected;
+  }
 #endif
-  return std::nullopt;
+  return degree;
 }
 
 double factor_flops(const BlockStructure& structure, std::span<const std::int32_t> order) {
-  const std::int32_t n = structure.blocks();
-  const BlockGraph graph(structure);
-  Blocks position(n), parent(n, -1), ancestor(n, -1);
-  for (std::int32_t k = 0; k < n; ++k) position[order[k]] = k;
-  // Elimination tree (Liu 1990), and the rows that each column has by walking each row's subtree.
-  for (std::int32_t row = 0; row < n; ++row) {
-    for (const std::int32_t other : graph.of(order[row])) {
-      for (std::int32_t k = position[other]; k != -1 && k < row;) {
-        const std::int32_t next = ancestor[k];
-        ancestor[k] = row;
-        if (next == -1) parent[k] = row;
-        k = next;
-      }
-    }
-  }
-  std::vector<std::int64_t> count(n, 0);
-  Blocks mark(n, -1);
-  for (std::int32_t row = 0; row < n; ++row) {
-    const std::int32_t size = structure.block_size(order[row]);
-    mark[row] = row;
-    count[row] += size;
-    for (const std::int32_t other : graph.of(order[row])) {
-      for (std::int32_t k = position[other]; k < row && mark[k] != row; k = parent[k]) {
-        mark[k] = row;
-        count[k] += size;
-      }
-    }
-  }
-  double flops = 0.0;
-  for (std::int32_t k = 0; k < n; ++k) {
-    for (std::int32_t c = 0; c < structure.block_size(order[k]); ++c) {
-      const auto rows = static_cast<double>(count[k] - c);
-      flops += rows * rows;
-    }
-  }
-  return flops;
+  return Symbolic::outline(structure, order).factor_flops;
 }
 
 bool worth_dissecting(const BlockStructure& structure, double flops) {

@@ -2,12 +2,12 @@
 #pragma once
 
 #include <cstdint>
-#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "block/symbolic.hpp"
 #include "cairn/block_matrix.hpp"
 
 namespace cairn::block {
@@ -47,12 +47,9 @@ std::vector<std::int32_t> order(const BlockStructure& structure, std::string_vie
 struct Choice {
   std::string name;
   std::vector<std::int32_t> order;
+  Symbolic outline;
 };
 Choice choose(const BlockStructure& structure, std::span<const std::int32_t> groups = {});
-/// The second half of `choose`, for who knows the flops of minimum degree already: what is better,
-/// if it is worth looking for and found.
-std::optional<Choice> better_than(const BlockStructure& structure, double flops,
-                                  std::span<const std::int32_t> groups = {});
 
 /// Σ (column count)² over the scalar columns of the factor in that order: what a factorisation
 /// costs in multiplications and additions.

@@ -65,6 +65,135 @@ class Places {
   std::int64_t end_ = 0;
 };
 
+/// The steps of one large front. Each phase waits for the one before.
+class FrontSteps {
+ public:
+  FrontSteps(const Symbolic& symbolic, std::int32_t node, std::int32_t level, Step::Wait children,
+             std::int32_t& gates)
+      : symbolic_(symbolic),
+        node_(symbolic.supernodes()[node]),
+        which_(node),
+        level_(level),
+        gates_(gates) {
+    zero();
+    assemble(children);
+    add_children(Step::Kind::add_to_panel);
+    factor();
+    if (node_.m > node_.columns) {
+      update();
+      add_children(Step::Kind::add_to_update);
+    }
+  }
+
+  /// By phase.
+  const std::vector<std::vector<Step>>& phases() const { return phases_; }
+  /// For the last phase.
+  Step::Wait done() const { return before_; }
+
+ private:
+  Step step(Step::Kind kind, std::int64_t begin = 0, std::int64_t end = 0) const {
+    Step result;
+    result.kind = kind;
+    result.which = which_;
+    result.begin = begin;
+    result.end = end;
+    result.waits[0] = before_;
+    return result;
+  }
+  /// Steps that may run at the same time; what follows waits for all of them.
+  void phase(std::vector<Step> steps) {
+    const std::int32_t gate = gates_++;
+    for (Step& each : steps) each.signals[0] = gate;
+    before_ = {gate, static_cast<std::int32_t>(steps.size())};
+    phases_.push_back(std::move(steps));
+  }
+
+  void zero() {
+    const std::int64_t size = std::int64_t{node_.stride} * node_.columns;
+    std::vector<Step> steps;
+    for (std::int64_t begin = 0; begin < size; begin += kTileZeroed)
+      steps.push_back(step(Step::Kind::zero, begin, std::min(size, begin + kTileZeroed)));
+    phase(std::move(steps));
+  }
+  void assemble(Step::Wait children) {
+    Step all = step(Step::Kind::assemble);
+    all.waits[1] = children;
+    phase({all});
+  }
+  /// One child after the other, since they may add to the same places; small ones together.
+  void add_children(Step::Kind kind) {
+    const auto children = symbolic_.children(which_);
+    const auto count = static_cast<std::int32_t>(children.size());
+    for (std::int32_t c = 0; c < count;) {
+      const Supernode& child = symbolic_.supernodes()[children[c]];
+      const bool to_panel = kind == Step::Kind::add_to_panel;
+      const std::int32_t from = to_panel ? 0 : child.panel_rows;
+      const std::int32_t to = to_panel ? child.panel_rows : child.m - child.columns;
+      std::int32_t end = c + 1;
+      std::vector<Step> steps;
+      if (is_large(child)) {
+        for (std::int32_t begin = from; begin < to; begin += kTileAdded)
+          steps.push_back(step(kind, begin, std::min(to, begin + kTileAdded)));
+      } else {
+        while (end < count && !is_large(symbolic_.supernodes()[children[end]])) ++end;
+        steps.push_back(step(kind));
+      }
+      for (Step& each : steps) {
+        each.child = c;
+        each.child_end = end;
+      }
+      if (!steps.empty()) phase(std::move(steps));
+      c = end;
+    }
+  }
+  /// Strip by strip. The first tile below a strip holds the pivots of the next, which its thread
+  /// factors right away, while others work on the remaining tiles.
+  void factor() {
+    std::int32_t pivots = gates_++;
+    Step first = step(Step::Kind::pivots);
+    first.last = std::min(node_.columns, kStripColumns);
+    first.signals[0] = pivots;
+    phases_.push_back({first});
+    before_ = {pivots, 1};
+    for (std::int32_t begin = 0; begin < node_.columns; begin += kStripColumns) {
+      const std::int32_t last = std::min(node_.columns, begin + kStripColumns);
+      const std::int32_t below = std::min(node_.stride, (last + 7) / 8 * 8);
+      std::vector<Step> steps;
+      for (std::int32_t row = below; row < node_.stride; row += kTileRows) {
+        Step tile = step(Step::Kind::rows, row, std::min(node_.stride, row + kTileRows));
+        tile.waits[1] = {pivots, 1};
+        tile.first = begin;
+        tile.last = last;
+        steps.push_back(tile);
+      }
+      if (last < node_.columns) {
+        pivots = gates_++;
+        steps.front().pivots_follow = true;
+        steps.front().signals[1] = pivots;
+      }
+      if (!steps.empty()) phase(std::move(steps));
+    }
+  }
+  void update() {
+    const int begin = node_.columns / 8 * 8;
+    const int tiles = (node_.stride - begin + kTileRows - 1) / kTileRows;
+    std::vector<Step> steps;
+    for (int tile = tiles - 1; tile >= 0; --tile) {  // the last have the longest rows
+      const int row = begin + tile * kTileRows;
+      steps.push_back(step(Step::Kind::update, row, std::min(node_.stride, row + kTileRows)));
+      steps.back().levels = level_;
+    }
+    phase(std::move(steps));
+  }
+
+  const Symbolic& symbolic_;
+  const Supernode& node_;
+  std::int32_t which_, level_;
+  std::int32_t& gates_;
+  std::vector<std::vector<Step>> phases_;
+  Step::Wait before_;
+};
+
 /// Doubles of an update matrix, up to a cache line.
 std::int64_t room(const Supernode& node) { return (node.update_size() + 7) / 8 * 8; }
 
@@ -79,6 +208,7 @@ Schedule::Schedule(const Symbolic& symbolic, int threads) {
     place_as_stack(symbolic);
   } else {
     place_in_lanes(symbolic);
+    list_steps(symbolic);
   }
   size += 8;  // `extend_add` may read beyond an update matrix
 }
@@ -164,6 +294,50 @@ void Schedule::place_in_lanes(const Symbolic& symbolic) {
     }
   }
   size = begin + places.end();
+}
+
+void Schedule::list_steps(const Symbolic& symbolic) {
+  const auto nodes = symbolic.supernodes();
+  ready.assign(nodes.size(), -1);
+  for (const std::vector<std::int32_t>& level : levels) {
+    for (const std::int32_t s : level) ready[s] = gates++;
+  }
+  for (std::size_t l = 0; l < levels.size(); ++l) level_gates.push_back(gates++);
+  for (std::size_t t = 0; t < tasks.size(); ++t) {
+    Step step;
+    step.kind = Step::Kind::task;
+    step.which = static_cast<std::int32_t>(t);
+    steps.push_back(step);
+  }
+  for (std::size_t l = 0; l < levels.size(); ++l) {
+    const auto level = static_cast<std::int32_t>(l);
+    std::vector<std::vector<Step>> phases;  // of all fronts of the level, side by side
+    std::vector<Step> last;
+    for (const std::int32_t s : levels[l]) {
+      const Step::Wait children{ready[s], static_cast<std::int32_t>(symbolic.children(s).size())};
+      Step end;
+      end.which = s;
+      end.signals[0] = level_gates[l];
+      if (nodes[s].parent >= 0) end.signals[1] = ready[nodes[s].parent];
+      if (!is_large(nodes[s])) {
+        end.kind = Step::Kind::front;
+        end.waits[0] = children;
+        end.levels = level;
+        if (phases.empty()) phases.emplace_back();
+        phases.front().push_back(end);
+        continue;
+      }
+      const FrontSteps front(symbolic, s, level, children, gates);
+      if (phases.size() < front.phases().size()) phases.resize(front.phases().size());
+      for (std::size_t p = 0; p < front.phases().size(); ++p)
+        phases[p].insert(phases[p].end(), front.phases()[p].begin(), front.phases()[p].end());
+      end.waits[0] = front.done();
+      last.push_back(end);
+    }
+    for (const std::vector<Step>& phase : phases)
+      steps.insert(steps.end(), phase.begin(), phase.end());
+    steps.insert(steps.end(), last.begin(), last.end());
+  }
 }
 
 }  // namespace cairn::block

@@ -9,6 +9,45 @@
 
 namespace cairn::block {
 
+/// Large fronts are worked off in tiles of so many rows, and the columns of their panels in strips
+/// that are factored before the rows below them; one tile of what a child adds to them has so many
+/// columns, one tile of setting a panel to zero so many doubles.
+inline constexpr int kTileRows = 96;
+inline constexpr int kStripColumns = 48;
+inline constexpr int kTileAdded = 24;
+inline constexpr std::int64_t kTileZeroed = 1 << 15;
+
+/// Whether a front is worth tiles.
+inline bool is_large(const Supernode& node) { return std::int64_t{node.m} * node.m > 256 * 256; }
+
+/// A piece of the factorisation that one thread does, with what must be done before.
+struct Step {
+  enum class Kind : std::uint8_t {
+    task,          ///< the supernodes of a task
+    front,         ///< a whole supernode above the tasks
+    zero,          ///< doubles [begin, end) of a large front's panel
+    assemble,      ///< the entries of H
+    add_to_panel,  ///< children [child, child_end), or columns [begin, end) of a large child
+    pivots,        ///< the diagonal block of columns [first, last)
+    rows,          ///< rows [begin, end) below it; then the next strip's pivots, if `pivots_follow`
+    update,        ///< rows [begin, end) of the update matrix
+    add_to_update,  ///< as add_to_panel
+    finish          ///< nothing: the supernode is done
+  };
+  struct Wait {
+    std::int32_t gate = -1, count = 0;
+  };
+  Kind kind = Kind::finish;
+  bool pivots_follow = false;
+  std::int32_t which = 0;  ///< task or supernode
+  std::int32_t child = 0, child_end = 0;
+  std::int32_t first = 0, last = 0;
+  std::int64_t begin = 0, end = 0;
+  Wait waits[2];                       ///< until the gate has been signalled so often
+  std::int32_t signals[2] = {-1, -1};  ///< gates, when done
+  std::int32_t levels = 0;             ///< waits until all levels below this are done
+};
+
 /// Who works off which supernode, and where its update matrix is kept meanwhile.
 ///
 /// The elimination tree is cut into *tasks* (one or several neighbouring subtrees) of about equal
@@ -16,6 +55,10 @@ namespace cairn::block {
 /// other. The cut depends on the structure alone, never on the number of threads. The room for
 /// update matrices does: one lane works off everything in postorder, like a stack; several lanes
 /// each take tasks in a stretch of their own.
+///
+/// For several lanes all work is cut into *steps*, in an order in which each comes after all that
+/// it waits for. Whichever lanes there are take the next step in turn and wait, if need be, for
+/// steps that others have taken before; so nobody waits for ever, however many run at once.
 struct Schedule {
   struct Task {
     std::int32_t begin, end;  ///< supernodes
@@ -31,6 +74,11 @@ struct Schedule {
   std::int64_t lane_size = 0;  ///< doubles of a lane's stretch; lane k's starts at k times that
   std::int64_t size = 0;       ///< doubles in all
 
+  std::vector<Step> steps;          ///< none for one lane
+  std::vector<std::int32_t> ready;  ///< by supernode: gate that its children outside tasks signal
+  std::vector<std::int32_t> level_gates;
+  std::int32_t gates = 0;
+
   Schedule() = default;
   Schedule(const Symbolic& symbolic, int threads);
 
@@ -38,6 +86,7 @@ struct Schedule {
   void cut(const Symbolic& symbolic);
   void place_as_stack(const Symbolic& symbolic);
   void place_in_lanes(const Symbolic& symbolic);
+  void list_steps(const Symbolic& symbolic);
 };
 
 }  // namespace cairn::block

@@ -4,9 +4,10 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <functional>
 #include <stdexcept>
 #include <string>
+#include <thread>
+#include <utility>
 
 #include "block/ordering.hpp"
 #include "cairn/error.hpp"
@@ -15,25 +16,23 @@
 namespace cairn::block {
 namespace {
 
-/// A front with more entries than this is cut into tiles, for several threads.
-constexpr std::int64_t kLargeFront = 256 * 256;
-/// Rows of one such tile, and columns of its panel that are factored before the rows below them.
-constexpr int kTileRows = 96;
-constexpr int kTileColumns = 48;
-/// Columns of a child that one task adds to a large front.
-constexpr int kTileAdded = 24;
-
-bool is_large(const Supernode& node) { return std::int64_t{node.m} * node.m > kLargeFront; }
-
-/// body(0) … body(chunks - 1), in parallel if asked for. `std::ref`: nothing is allocated.
-template <class Body>
-void for_each(bool parallel, int chunks, const Body& body) {
-  if (parallel) {
-    for_each_chunk(static_cast<std::size_t>(chunks), std::ref(body));
-  } else {
-    for (int chunk = 0; chunk < chunks; ++chunk) body(static_cast<std::size_t>(chunk));
+/// Waiting is short: spinning is faster than sleeping, unless somebody else needs the core.
+class Patience {
+ public:
+  void wait() {
+    if (++spins_ < kSpins) {
+#if defined(__x86_64__)
+      __builtin_ia32_pause();
+#endif
+    } else {
+      std::this_thread::yield();
+    }
   }
-}
+
+ private:
+  static constexpr int kSpins = 4000;
+  int spins_ = 0;
+};
 
 }  // namespace
 
@@ -49,23 +48,21 @@ void SupernodalCholesky::analyze(const BlockStructure& structure, std::string_vi
                                  const CostModel& cost) {
   factorized_ = false;
   if (ordering == "auto") {
-    // As `choose` does, without counting flops twice.
-    ordering_ = "amd";
-    symbolic_ = Symbolic(structure, order(structure, ordering_), cost);
-    if (const auto better = better_than(structure, symbolic_.factor_flops)) {
-      ordering_ = better->name;
-      symbolic_ = Symbolic(structure, better->order, cost);
-    }
+    Choice choice = choose(structure);
+    ordering_ = std::move(choice.name);
+    symbolic_ = std::move(choice.outline);
+    symbolic_.complete(structure, cost);
   } else {
-    symbolic_ = Symbolic(structure, order(structure, ordering), cost);
     ordering_ = ordering;
+    symbolic_ = Symbolic(structure, order(structure, ordering), cost);
   }
   structure_ = &structure;
   version_ = structure.version();
   schedule_ = Schedule(symbolic_, threads());
-  panels_ = AlignedVector(symbolic_.panel_values());
-  workspace_ = AlignedVector(schedule_.size);
+  panels_ = UninitializedVector(symbolic_.panel_values());
+  workspace_ = UninitializedVector(schedule_.size);
   failed_.assign(symbolic_.supernodes().size(), -1);
+  gates_.assign(schedule_.gates, 0);
   plan_solve();
 }
 
@@ -73,23 +70,14 @@ Factorization SupernodalCholesky::factorize(const BlockMatrix& H) {
   if (!structure_ || H.structure().version() != version_) {
     throw std::logic_error("factorize: analyze this structure first");
   }
-  const std::int32_t count = static_cast<std::int32_t>(failed_.size());
   if (schedule_.lanes == 1) {
-    for (std::int32_t s = 0; s < count; ++s) factorize_supernode(H, s, 0, false);
+    for (std::int32_t s = 0; s < static_cast<std::int32_t>(failed_.size()); ++s)
+      factorize_supernode(H, s, 0);
   } else {
-    std::atomic<std::size_t> next{0};
-    for_each(true, schedule_.lanes, [&](std::size_t lane) {
-      for (std::size_t t = next++; t < schedule_.tasks.size(); t = next++) {
-        const Schedule::Task& task = schedule_.tasks[t];
-        for (std::int32_t s = task.begin; s < task.end; ++s)
-          factorize_supernode(H, s, static_cast<std::int64_t>(lane), false);
-      }
-    });
-    for (const std::vector<std::int32_t>& level : schedule_.levels) {
-      const bool across = level.size() >= static_cast<std::size_t>(schedule_.lanes);
-      for_each(across, static_cast<int>(level.size()),
-               [&](std::size_t k) { factorize_supernode(H, level[k], 0, !across); });
-    }
+    std::ranges::fill(gates_, 0);
+    next_step_ = 0;
+    const auto lane_loop = [&](std::size_t lane) { run_steps(H, static_cast<std::int64_t>(lane)); };
+    for_each_chunk(static_cast<std::size_t>(schedule_.lanes), lane_loop);
   }
 
   factorized_ = true;
@@ -105,83 +93,151 @@ Factorization SupernodalCholesky::factorize(const BlockMatrix& H) {
 }
 
 void SupernodalCholesky::factorize_supernode(const BlockMatrix& H, std::int32_t s,
-                                             std::int64_t lane, bool parallel) {
+                                             std::int64_t lane) {
   const auto nodes = symbolic_.supernodes();
   const Supernode& node = nodes[s];
-  const auto children = symbolic_.children(s);
-  const auto entries = symbolic_.assembly(s);
   double* panel = panels_.data() + node.panel;
-
-  kernels_->assemble(entries.data(), static_cast<int>(entries.size()), H.values().data(),
-                     panels_.data(), panel, std::int64_t{node.stride} * node.columns);
-  for (const std::int32_t c : children)
-    add_child(c, update_matrix(c, lane), 0, nodes[c].panel_rows, panel, node.stride, parallel);
-  factor_panel(node, s, parallel);
-  if (node.m == node.columns) return;
-
-  double* U = update_matrix(s, lane);
-  update(node, U, parallel);
-  // U as if it were a part of the whole front.
-  const std::int64_t stride = node.update_stride();
-  double* front = U - node.columns * stride - node.columns / 8 * 8;
-  for (const std::int32_t c : children) {
-    add_child(c, update_matrix(c, lane), nodes[c].panel_rows, nodes[c].m - nodes[c].columns, front,
-              stride, parallel);
-  }
-}
-
-/// Adds columns [first, last) of a child's update matrix to the panel or, beyond it, to the update
-/// matrix.
-void SupernodalCholesky::add_child(std::int32_t c, const double* child, int first, int last,
-                                   double* front, std::int64_t stride, bool parallel) {
-  const Supernode& node = symbolic_.supernodes()[c];
-  const Spread* spreads = symbolic_.spreads().data() + node.spreads_begin;
-  const int count = static_cast<int>(node.spreads_end - node.spreads_begin);
-  const auto add = [&](int begin, int end) {
-    kernels_->extend_add(spreads, count, begin, end, child + node.columns % 8, node.update_stride(),
-                         front, stride);
-  };
-  if (!parallel || !is_large(node)) return add(first, last);
-  for_each(true, (last - first + kTileAdded - 1) / kTileAdded, [&](std::size_t tile) {
-    const int begin = first + static_cast<int>(tile) * kTileAdded;
-    add(begin, std::min(last, begin + kTileAdded));
-  });
-}
-
-void SupernodalCholesky::factor_panel(const Supernode& node, std::int32_t s, bool parallel) {
-  double* panel = panels_.data() + node.panel;
+  assemble(H, s, std::int64_t{node.stride} * node.columns);
+  for (const std::int32_t c : symbolic_.children(s))
+    add_to_panel(s, c, lane, 0, nodes[c].panel_rows);
+  failed_[s] = -1;
   if (!is_large(node)) {
     failed_[s] = kernels_->factor_panel(panel, node.stride, 0, node.columns, node.stride);
-    return;
+  } else {
+    for (int first = 0; first < node.columns; first += kStripColumns) {
+      const int last = std::min(node.columns, first + kStripColumns);
+      factor_pivots(s, first, last);
+      const int below = std::min(node.stride, (last + 7) / 8 * 8);
+      kernels_->factor_rows(panel, node.stride, first, last, below, node.stride);
+    }
   }
-  failed_[s] = -1;
-  for (int first = 0; first < node.columns; first += kTileColumns) {
-    const int last = std::min(node.columns, first + kTileColumns);
-    const int below = std::min(node.stride, (last + 7) / 8 * 8);
-    const int failed = kernels_->factor_panel(panel, node.stride, first, last, below);
-    if (failed_[s] < 0) failed_[s] = failed;
-    for_each(parallel, (node.stride - below + kTileRows - 1) / kTileRows, [&](std::size_t tile) {
-      const int row = below + static_cast<int>(tile) * kTileRows;
-      kernels_->factor_rows(panel, node.stride, first, last, row,
-                            std::min(node.stride, row + kTileRows));
-    });
+  if (node.m == node.columns) return;
+  kernels_->update(panel, node.stride, node.columns, node.m, update_matrix(s, lane),
+                   node.columns / 8 * 8, node.stride);
+  for (const std::int32_t c : symbolic_.children(s))
+    add_to_update(s, c, lane, nodes[c].panel_rows, nodes[c].m - nodes[c].columns);
+}
+
+/// Entries of H into the panel, `size` doubles of which are set to zero before.
+void SupernodalCholesky::assemble(const BlockMatrix& H, std::int32_t s, std::int64_t size) {
+  const auto entries = symbolic_.assembly(s);
+  kernels_->assemble(entries.data(), static_cast<int>(entries.size()), H.values().data(),
+                     panels_.data(), panels_.data() + symbolic_.supernodes()[s].panel, size);
+}
+
+void SupernodalCholesky::add_to_panel(std::int32_t s, std::int32_t c, std::int64_t lane, int first,
+                                      int last) {
+  const Supernode& node = symbolic_.supernodes()[s];
+  add_child(c, lane, first, last, panels_.data() + node.panel, node.stride);
+}
+
+void SupernodalCholesky::add_to_update(std::int32_t s, std::int32_t c, std::int64_t lane, int first,
+                                       int last) {
+  const Supernode& node = symbolic_.supernodes()[s];
+  // The update matrix as if it were a part of the whole front.
+  const std::int64_t stride = node.update_stride();
+  double* front = update_matrix(s, lane) - node.columns * stride - node.columns / 8 * 8;
+  add_child(c, lane, first, last, front, stride);
+}
+
+/// Adds columns [first, last) of a child's update matrix to a front.
+void SupernodalCholesky::add_child(std::int32_t c, std::int64_t lane, int first, int last,
+                                   double* front, std::int64_t stride) {
+  const Supernode& child = symbolic_.supernodes()[c];
+  kernels_->extend_add(symbolic_.spreads().data() + child.spreads_begin,
+                       static_cast<int>(child.spreads_end - child.spreads_begin), first, last,
+                       update_matrix(c, lane) + child.columns % 8, child.update_stride(), front,
+                       stride);
+}
+
+/// The diagonal block of columns [first, last), those before being done.
+void SupernodalCholesky::factor_pivots(std::int32_t s, int first, int last) {
+  const Supernode& node = symbolic_.supernodes()[s];
+  const int failed = kernels_->factor_panel(panels_.data() + node.panel, node.stride, first, last,
+                                            std::min(node.stride, (last + 7) / 8 * 8));
+  if (failed_[s] < 0) failed_[s] = failed;
+}
+
+void SupernodalCholesky::run_steps(const BlockMatrix& H, std::int64_t lane) {
+  const auto count = static_cast<std::int32_t>(schedule_.steps.size());
+  for (std::int32_t k = next_step_++; k < count; k = next_step_++) {
+    const Step& step = schedule_.steps[k];
+    wait_for(step);
+    run(step, H, lane);
+    for (const std::int32_t gate : step.signals) signal(gate);
   }
 }
 
-void SupernodalCholesky::update(const Supernode& node, double* U, bool parallel) {
-  const double* panel = panels_.data() + node.panel;
-  const int begin = node.columns / 8 * 8;
-  if (!is_large(node)) {
-    kernels_->update(panel, node.stride, node.columns, node.m, U, begin, node.stride);
+void SupernodalCholesky::wait_for(const Step& step) {
+  const auto wait = [&](std::int32_t gate, std::int32_t count) {
+    const std::atomic_ref<std::int32_t> signalled(gates_[gate]);
+    for (Patience patience; signalled.load(std::memory_order_acquire) < count;) patience.wait();
+  };
+  for (const Step::Wait& each : step.waits) {
+    if (each.gate >= 0) wait(each.gate, each.count);
+  }
+  for (std::int32_t l = 0; l < step.levels; ++l)
+    wait(schedule_.level_gates[l], static_cast<std::int32_t>(schedule_.levels[l].size()));
+}
+
+void SupernodalCholesky::signal(std::int32_t gate) {
+  if (gate >= 0)
+    std::atomic_ref<std::int32_t>(gates_[gate]).fetch_add(1, std::memory_order_acq_rel);
+}
+
+void SupernodalCholesky::run(const Step& step, const BlockMatrix& H, std::int64_t lane) {
+  const auto nodes = symbolic_.supernodes();
+  if (step.kind == Step::Kind::task) {
+    const Schedule::Task& task = schedule_.tasks[step.which];
+    for (std::int32_t s = task.begin; s < task.end; ++s) {
+      factorize_supernode(H, s, lane);
+      if (nodes[s].parent >= task.end) signal(schedule_.ready[nodes[s].parent]);
+    }
     return;
   }
-  const int tiles = (node.stride - begin + kTileRows - 1) / kTileRows;
-  for_each(parallel, tiles, [&](std::size_t tile) {
-    // The last tiles have the longest rows: hand them out first.
-    const int first = begin + (tiles - 1 - static_cast<int>(tile)) * kTileRows;
-    kernels_->update(panel, node.stride, node.columns, node.m, U, first,
-                     std::min(node.stride, first + kTileRows));
-  });
+  const std::int32_t s = step.which;
+  const Supernode& node = nodes[s];
+  double* panel = panels_.data() + node.panel;
+  const auto begin = static_cast<int>(step.begin), end = static_cast<int>(step.end);
+  const auto children = symbolic_.children(s).subspan(
+      step.child, static_cast<std::size_t>(step.child_end - step.child));
+  switch (step.kind) {
+    case Step::Kind::task:
+    case Step::Kind::finish:
+      break;
+    case Step::Kind::front:
+      factorize_supernode(H, s, lane);
+      break;
+    case Step::Kind::zero:
+      std::fill(panel + step.begin, panel + step.end, 0.0);
+      break;
+    case Step::Kind::assemble:
+      failed_[s] = -1;
+      assemble(H, s, 0);
+      break;
+    case Step::Kind::add_to_panel:
+      for (const std::int32_t c : children)
+        add_to_panel(s, c, lane, begin, end > begin ? end : nodes[c].panel_rows);
+      break;
+    case Step::Kind::pivots:
+      factor_pivots(s, step.first, step.last);
+      break;
+    case Step::Kind::rows:
+      kernels_->factor_rows(panel, node.stride, step.first, step.last, begin, end);
+      if (step.pivots_follow)
+        factor_pivots(s, step.last, std::min(node.columns, step.last + kStripColumns));
+      break;
+    case Step::Kind::update:
+      kernels_->update(panel, node.stride, node.columns, node.m, update_matrix(s, lane), begin,
+                       end);
+      break;
+    case Step::Kind::add_to_update:
+      for (const std::int32_t c : children) {
+        add_to_update(s, c, lane, end > begin ? begin : nodes[c].panel_rows,
+                      end > begin ? end : nodes[c].m - nodes[c].columns);
+      }
+      break;
+  }
 }
 
 }  // namespace cairn::block

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <span>
 #include <string>
@@ -22,9 +23,9 @@ namespace cairn::block {
 /// Supernodes are worked off from the leaves of the elimination tree to its roots: the entries of H
 /// and the children's update matrices are added into the front, the panel is factored, and what
 /// remains is the update matrix for the parent. All index lists are made once a structure
-/// (`analyze`); factorising and solving with one right-hand side allocate nothing on one thread.
-/// Subtrees run in parallel, and so do the tiles of large fronts; what is added to what, and in
-/// which order, does not depend on the number of threads, so neither does the result.
+/// (`analyze`); factorising and solving with one right-hand side allocate nothing. Subtrees run in
+/// parallel, and so do the tiles of large fronts (`Schedule`); what is added to what, and in which
+/// order, does not depend on the number of threads, so neither does the result.
 class SupernodalCholesky {
  public:
   /// `kernels`: auto, portable, avx2 or avx512. Throws `Error` (usage) for what the machine cannot
@@ -53,11 +54,17 @@ class SupernodalCholesky {
 
  private:
   void plan_solve();
-  void factorize_supernode(const BlockMatrix& H, std::int32_t s, std::int64_t lane, bool parallel);
-  void factor_panel(const Supernode& node, std::int32_t s, bool parallel);
-  void update(const Supernode& node, double* U, bool parallel);
-  void add_child(std::int32_t c, const double* child, int first, int last, double* front,
-                 std::int64_t stride, bool parallel);
+  void factorize_supernode(const BlockMatrix& H, std::int32_t s, std::int64_t lane);
+  void assemble(const BlockMatrix& H, std::int32_t s, std::int64_t size);
+  void add_to_panel(std::int32_t s, std::int32_t c, std::int64_t lane, int first, int last);
+  void add_to_update(std::int32_t s, std::int32_t c, std::int64_t lane, int first, int last);
+  void add_child(std::int32_t c, std::int64_t lane, int first, int last, double* front,
+                 std::int64_t stride);
+  void factor_pivots(std::int32_t s, int first, int last);
+  void run_steps(const BlockMatrix& H, std::int64_t lane);
+  void run(const Step& step, const BlockMatrix& H, std::int64_t lane);
+  void wait_for(const Step& step);
+  void signal(std::int32_t gate);
   double* update_matrix(std::int32_t s, std::int64_t lane) {
     const std::int64_t begin = schedule_.in_lane[s] ? lane * schedule_.lane_size : 0;
     return workspace_.data() + begin + schedule_.place[s];
@@ -71,9 +78,11 @@ class SupernodalCholesky {
   std::uint64_t version_ = 0;
   Symbolic symbolic_;
   Schedule schedule_;
-  AlignedVector panels_;
-  AlignedVector workspace_;
+  UninitializedVector panels_;
+  UninitializedVector workspace_;
   std::vector<std::int32_t> failed_;  // by supernode: first failed column, -1 if none
+  std::vector<std::int32_t> gates_;   // of the schedule's steps: how often each was signalled
+  std::atomic<std::int32_t> next_step_{0};
   bool factorized_ = false;
 
   // Solving. Rows of the permuted vector, then for each task the rows that its supernodes update

@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <functional>
 #include <stdexcept>
 
 #include "block/supernodal_cholesky.hpp"
@@ -115,7 +114,7 @@ void SupernodalCholesky::substitute(int width) {
     const auto lane_loop = [&](std::size_t lane) {
       for (std::size_t t = next++; t < schedule_.tasks.size(); t = next++) body(t, front_of(lane));
     };
-    for_each_chunk(static_cast<std::size_t>(schedule_.lanes), std::ref(lane_loop));
+    for_each_chunk(static_cast<std::size_t>(schedule_.lanes), lane_loop);
   };
 
   for_each_task([&](std::size_t t, double* front) {

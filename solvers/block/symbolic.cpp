@@ -123,9 +123,15 @@ double cost_of(double columns, double below, const CostModel& c) {
 
 }  // namespace
 
-Symbolic::Symbolic(const BlockStructure& structure, std::span<const std::int32_t> ordering,
-                   const CostModel& cost) {
-  find_order(structure, ordering);
+Symbolic Symbolic::outline(const BlockStructure& structure,
+                           std::span<const std::int32_t> ordering) {
+  Symbolic symbolic;
+  symbolic.find_order(structure, ordering);
+  symbolic.count_rows(structure);
+  return symbolic;
+}
+
+void Symbolic::complete(const BlockStructure& structure, const CostModel& cost) {
   find_supernodes(structure, cost);
   find_rows(structure);
   lay_out();
@@ -151,21 +157,16 @@ void Symbolic::find_order(const BlockStructure& structure, std::span<const std::
   }
 }
 
-/// Groups positions into supernodes: first fundamental ones (a column and its parent with the same
-/// rows), then children are merged into parents where the cost model says that one larger front is
-/// cheaper than two. Merging makes blocks that were not neighbours share a supernode, so the order
-/// is renumbered at the end.
-void Symbolic::find_supernodes(const BlockStructure& structure, const CostModel& cost) {
+/// Rows of each column of L, by walking each row's subtree: blocks for the tests, scalars for the
+/// costs.
+void Symbolic::count_rows(const BlockStructure& structure) {
   const std::int32_t n = structure.blocks();
   const auto size_of = [&](std::int32_t p) {
     return static_cast<std::int64_t>(structure.block_size(order_[p]));
   };
-
-  // Rows of each column of L, by walking each row's subtree; blocks for the tests, scalars for the
-  // costs.
-  std::vector<std::int64_t> scalar_counts(n);
+  scalar_counts_.resize(n);
   counts_.assign(n, 1);
-  for (std::int32_t p = 0; p < n; ++p) scalar_counts[p] = size_of(p);
+  for (std::int32_t p = 0; p < n; ++p) scalar_counts_[p] = size_of(p);
   {
     const RowPattern pattern(structure, position_);
     std::vector<std::int32_t> mark(n, -1);
@@ -175,18 +176,29 @@ void Symbolic::find_supernodes(const BlockStructure& structure, const CostModel&
         for (; mark[k] != i; k = parent_[k]) {
           mark[k] = i;
           ++counts_[k];
-          scalar_counts[k] += size_of(i);
+          scalar_counts_[k] += size_of(i);
         }
       }
     }
   }
   for (std::int32_t p = 0; p < n; ++p) {
     for (std::int64_t c = 0; c < size_of(p); ++c) {
-      const double count = static_cast<double>(scalar_counts[p] - c);
-      factor_nonzeros += scalar_counts[p] - c;
+      const double count = static_cast<double>(scalar_counts_[p] - c);
+      factor_nonzeros += scalar_counts_[p] - c;
       factor_flops += count * count;
     }
   }
+}
+
+/// Groups positions into supernodes: first fundamental ones (a column and its parent with the same
+/// rows), then children are merged into parents where the cost model says that one larger front is
+/// cheaper than two. Merging makes blocks that were not neighbours share a supernode, so the order
+/// is renumbered at the end.
+void Symbolic::find_supernodes(const BlockStructure& structure, const CostModel& cost) {
+  const std::int32_t n = structure.blocks();
+  const auto size_of = [&](std::int32_t p) {
+    return static_cast<std::int64_t>(structure.block_size(order_[p]));
+  };
 
   // Fundamental supernodes.
   std::vector<std::int32_t> child_count(n, 0);
@@ -211,7 +223,7 @@ void Symbolic::find_supernodes(const BlockStructure& structure, const CostModel&
   for (std::int32_t p = 0; p < n; ++p) columns[node_of[p]] += static_cast<double>(size_of(p));
   for (std::int32_t s = 0; s < nodes; ++s) {
     const std::int32_t last = last_of[s];
-    below[s] = static_cast<double>(scalar_counts[last] - size_of(last));
+    below[s] = static_cast<double>(scalar_counts_[last] - size_of(last));
     parent[s] = parent_[last] < 0 ? -1 : node_of[parent_[last]];
     if (parent[s] >= 0) children[parent[s]].push_back(s);
   }
@@ -286,6 +298,7 @@ void Symbolic::find_supernodes(const BlockStructure& structure, const CostModel&
     supernodes_[k].parent = tree[post[k]] < 0 ? -1 : final_index[tree[post[k]]];
   }
   order_ = std::move(new_order);
+  scalar_counts_ = {};
   for (std::int32_t p = 0; p < n; ++p) position_[order_[p]] = p;
   offsets_.assign(n + 1, 0);
   for (std::int32_t p = 0; p < n; ++p) offsets_[p + 1] = offsets_[p] + size_of(p);

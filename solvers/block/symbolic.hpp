@@ -45,7 +45,16 @@ class Symbolic {
  public:
   Symbolic() = default;
   Symbolic(const BlockStructure& structure, std::span<const std::int32_t> ordering,
-           const CostModel& cost = {});
+           const CostModel& cost = {})
+      : Symbolic(outline(structure, ordering)) {
+    complete(structure, cost);
+  }
+
+  /// A third of the work: order, elimination tree, `factor_nonzeros` and `factor_flops`, enough to
+  /// compare orderings. `complete` does the rest.
+  static Symbolic outline(const BlockStructure& structure, std::span<const std::int32_t> ordering);
+  /// Of an outline of the same structure.
+  void complete(const BlockStructure& structure, const CostModel& cost = {});
 
   std::span<const std::int32_t> order() const { return order_; }        ///< position → block
   std::span<const std::int32_t> position() const { return position_; }  ///< block → position
@@ -76,6 +85,7 @@ class Symbolic {
 
  private:
   void find_order(const BlockStructure& structure, std::span<const std::int32_t> ordering);
+  void count_rows(const BlockStructure& structure);
   void find_supernodes(const BlockStructure& structure, const CostModel& cost);
   void find_rows(const BlockStructure& structure);
   void lay_out();
@@ -90,6 +100,7 @@ class Symbolic {
   std::vector<std::int32_t> parent_;  // elimination tree, by position
   std::vector<std::int32_t>
       counts_;  // block rows in each column of L, diagonal included, by position
+  std::vector<std::int64_t> scalar_counts_;  // scalar rows, of an outline
   std::vector<std::int64_t> offsets_;
   std::vector<Supernode> supernodes_;
   std::vector<std::int32_t> supernode_of_;  // by position

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
-#include <functional>
 
 #include "cairn/api.hpp"
 
@@ -15,13 +15,29 @@ CAIRN_API void set_threads(int count);
 /// The number of threads of the arena.
 CAIRN_API int threads();
 
+namespace detail {
+CAIRN_API void run_chunks(std::size_t chunks, void (*run)(const void* body, std::size_t chunk),
+                          const void* body);
+}
+
 /// Calls `body(chunk)` for chunk = 0 … chunks-1, in any order and in parallel; returns when all are
 /// done. How the work is cut into chunks must not depend on the number of threads, so that results
 /// don't either. The first exception is rethrown. With one chunk or one thread it is a plain loop.
-CAIRN_API void for_each_chunk(std::size_t chunks, const std::function<void(std::size_t)>& body);
+/// Allocates nothing of its own.
+template <class Body>
+void for_each_chunk(std::size_t chunks, const Body& body) {
+  detail::run_chunks(
+      chunks,
+      [](const void* erased, std::size_t chunk) { (*static_cast<const Body*>(erased))(chunk); },
+      &body);
+}
 
 /// Cuts [0, size) into chunks of `grain` and calls `body(begin, end)` for each, in parallel.
-CAIRN_API void for_each_range(std::size_t size, std::size_t grain,
-                              const std::function<void(std::size_t, std::size_t)>& body);
+template <class Body>
+void for_each_range(std::size_t size, std::size_t grain, const Body& body) {
+  for_each_chunk((size + grain - 1) / grain, [&](std::size_t chunk) {
+    body(chunk * grain, std::min(size, (chunk + 1) * grain));
+  });
+}
 
 }  // namespace cairn

@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// A program of its own: it counts every `operator new` of the process, cairn's libraries included.
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cstdlib>
+#include <new>
+
+#include "block/supernodal_cholesky.hpp"
+#include "cairn/gauge.hpp"
+#include "cairn/linearizer.hpp"
+#include "cairn/threads.hpp"
+#include "support/planar_graph.hpp"
+
+namespace {
+
+std::atomic<int> allocations{0};
+
+void* allocate(std::size_t size, std::size_t alignment) {
+  ++allocations;
+  const std::size_t whole = (size + alignment - 1) / alignment * alignment;
+  if (void* memory = std::aligned_alloc(alignment, whole)) return memory;
+  throw std::bad_alloc();
+}
+
+}  // namespace
+
+void* operator new(std::size_t size) { return allocate(size, alignof(std::max_align_t)); }
+void* operator new(std::size_t size, std::align_val_t alignment) {
+  return allocate(size, static_cast<std::size_t>(alignment));
+}
+void operator delete(void* memory) noexcept { std::free(memory); }
+void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+void operator delete(void* memory, std::align_val_t) noexcept { std::free(memory); }
+void operator delete(void* memory, std::size_t, std::align_val_t) noexcept { std::free(memory); }
+
+namespace cairn {
+namespace {
+
+class AllocationTest : public ::testing::TestWithParam<int> {
+ protected:
+  void SetUp() override {
+    before_ = threads();
+    set_threads(GetParam());
+  }
+  void TearDown() override { set_threads(before_); }
+  int before_ = 0;
+};
+
+TEST_P(AllocationTest, AnIterationAllocatesNothingOnceTheStructureIsAnalysed) {
+  const test::PlanarTypes types;
+  const Graph graph = test::random_graph(types, 2000, 300, 5);
+  Linearizer linearizer(graph, resolve_gauge(graph).held);
+  BlockMatrix H(linearizer.structure());
+  std::vector<double> g(linearizer.structure().size()), x(g.size());
+  block::SupernodalCholesky cholesky;
+  cholesky.analyze(linearizer.structure(), "auto");
+  Values values = graph.values(), moved = values;
+  bool ok = true;
+  const auto iterate = [&] {
+    linearizer.linearize(values, H, g);
+    ok &= cholesky.factorize(H).ok;
+    cholesky.solve(g, x);
+    linearizer.retract(values, x, moved);
+    linearizer.chi2(moved);
+  };
+  iterate();  // the threads that oneTBB starts are made by now
+  const int before = allocations;
+  for (int k = 0; k < 3; ++k) iterate();
+  EXPECT_EQ(allocations - before, 0);
+  EXPECT_TRUE(ok);
+  EXPECT_GT(before, 0);  // or nothing was counted
+}
+
+INSTANTIATE_TEST_SUITE_P(Threads, AllocationTest, ::testing::Values(1, 2));
+
+}  // namespace
+}  // namespace cairn
