@@ -36,11 +36,17 @@ struct Arena {
 
   tbb::task_arena& get() {
     const std::lock_guard lock(mutex);
+    return start();
+  }
+  /// The mutex being held.
+  tbb::task_arena& start() {
     if (!arena) {
       // More threads than cores are allowed: the control lifts oneTBB's own limit.
       control = std::make_unique<tbb::global_control>(tbb::global_control::max_allowed_parallelism,
                                                       static_cast<std::size_t>(count));
       arena = std::make_unique<tbb::task_arena>(count);
+      // Workers start with the first task, and take a while: sooner is better than in the midst.
+      if (count > 1) arena->enqueue([] {});
     }
     return *arena;
   }
@@ -58,10 +64,12 @@ void set_threads(int count) {
   const std::lock_guard lock(a.mutex);
   const int wanted =
       count > 0 ? count : static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
-  if (wanted == a.count) return;
-  a.count = wanted;
-  a.arena.reset();
-  a.control.reset();
+  if (wanted != a.count) {
+    a.count = wanted;
+    a.arena.reset();
+    a.control.reset();
+  }
+  if (wanted > 1) a.start();
 }
 
 int threads() {

@@ -9,7 +9,8 @@
 namespace cairn {
 
 /// Sets the number of threads of cairn's one arena (oneTBB), for this process; 0 means all cores.
-/// Results never depend on it, to the last bit. Not to be called while work runs.
+/// Results never depend on it, to the last bit. Starts the threads, so that the first parallel work
+/// need not. Not to be called while work runs.
 CAIRN_API void set_threads(int count);
 
 /// The number of threads of the arena.
