@@ -16,7 +16,7 @@ namespace {
 
 namespace json = boost::json;
 
-constexpr double kPatience = 900.0;  // seconds of one run
+constexpr double kPatience = 300.0;  // seconds of one run
 // Assumed until two sizes are known: beyond what any of these families shows.
 constexpr double kFirstGuessOfGrowth = 2.0;
 constexpr int kMillion = 1'000'000;
@@ -43,10 +43,11 @@ std::vector<int> sizes(bool quick) {
   return {1000, 3000, 10'000, 30'000, 100'000, 300'000, kMillion};
 }
 
-/// Large runs vary little, and take long.
-int rounds_of(int poses, int rounds) {
+/// Large runs vary little, and take long. `seconds`: what one is expected to take.
+int rounds_of(int poses, double seconds, int rounds) {
+  constexpr double kLong = 60.0;
   if (poses <= 10'000) return rounds;
-  return poses <= 100'000 ? std::min(rounds, 3) : 1;
+  return poses <= 100'000 && seconds < kLong ? std::min(rounds, 3) : 1;
 }
 
 /// What the next size will take, by the growth between the last two.
@@ -112,7 +113,7 @@ void study_family(const Bench& bench, const Family& family, const Keep& keep) {
     json::object entry = measure(bench, family, poses,
                                  {"--optimizer", "gauss_newton", "--linear-solver", bench.ours,
                                   "--iterations", "5", "--tolerance", "0"},
-                                 rounds_of(poses, bench.rounds));
+                                 rounds_of(poses, seconds, bench.rounds));
     entry["study"] = "five iterations";
     if (!entry.contains("left_out")) {
       time.add(poses, number(entry, "seconds"));
