@@ -19,7 +19,8 @@ struct Spread {
   std::int32_t source;  ///< the child's first row among them, counted from its first row below its
                         ///< diagonal block
   std::int32_t target;  ///< first of the eight rows in the parent's front, a multiple of 8
-  std::uint32_t mask;   ///< bit k: row target + k is one of the child's
+  std::uint8_t mask;    ///< bit k: row target + k is one of the child's
+  std::uint8_t packed;  ///< as many bits, from the lowest on: those to load
 };
 
 /// Where an entry of H goes: into a panel, straight or transposed.
@@ -66,7 +67,7 @@ struct Kernels {
 
   /// Adds columns [first, last) of a child's update matrix, whose row 0 is at `child`, to the
   /// parent's front: all of them to the panel, or all to the update matrix, `parent` being where
-  /// row and column 0 of the front are or would be. May read 8 doubles beyond the child's.
+  /// row and column 0 of the front are or would be.
   void (*extend_add)(const Spread* spreads, int count, int first, int last, const double* child,
                      std::int64_t child_stride, double* parent, std::int64_t parent_stride);
 

@@ -404,9 +404,10 @@ void update(const double* panel, std::int64_t stride, int columns, int m, double
 
 /// target[k] += the next of source, for each bit k of mask: eight rows.
 inline __attribute__((always_inline)) void add_spread(double* target, const double* source,
-                                                      unsigned mask) {
+                                                      unsigned mask,
+                                                      [[maybe_unused]] unsigned packed_mask) {
 #if defined(__AVX512F__)
-  __m512d packed = _mm512_loadu_pd(source);
+  __m512d packed = _mm512_maskz_loadu_pd(static_cast<__mmask8>(packed_mask), source);
   asm("" : "+v"(packed));  // to expand from memory is many times slower on some machines
   store(target, load(target) + _mm512_maskz_expand_pd(static_cast<__mmask8>(mask), packed));
 #else
@@ -434,7 +435,7 @@ void extend_add(const Spread* spreads, int count, int first, int last, const dou
       double* target = parent + (spreads->target + __builtin_ctz(bits)) * parent_stride;
       // From the vector that holds the diagonal: what is above it is nobody's.
       for (const Spread* s = spreads; s < end; ++s)
-        add_spread(target + s->target, source + s->source, s->mask);
+        add_spread(target + s->target, source + s->source, s->mask, s->packed);
     }
   }
 }

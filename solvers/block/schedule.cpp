@@ -210,7 +210,6 @@ Schedule::Schedule(const Symbolic& symbolic, int threads) {
     place_in_lanes(symbolic);
     list_steps(symbolic);
   }
-  size += 8;  // `extend_add` may read beyond an update matrix
 }
 
 void Schedule::cut(const Symbolic& symbolic) {

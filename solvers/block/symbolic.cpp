@@ -405,8 +405,10 @@ void Symbolic::spread(const Supernode& node, std::int32_t source, std::int32_t t
   for (std::int32_t k = 0; k < size; ++k) {
     const std::int32_t row = target + k, first = row / 8 * 8;
     const bool begun = static_cast<std::int64_t>(spreads_.size()) > node.spreads_begin;
-    if (!begun || spreads_.back().target != first) spreads_.push_back({source + k, first, 0});
-    spreads_.back().mask |= 1u << (row - first);
+    if (!begun || spreads_.back().target != first) spreads_.push_back({source + k, first, 0, 0});
+    Spread& spread = spreads_.back();
+    spread.mask = static_cast<std::uint8_t>(spread.mask | 1u << (row - first));
+    spread.packed = static_cast<std::uint8_t>(spread.packed << 1 | 1u);
   }
 }
 

@@ -174,7 +174,8 @@ TEST(SupernodalCholesky, SolvesForManyRightHandSides) {
     SupernodalCholesky cholesky(kernels);
     cholesky.analyze(structure, "amd");
     ASSERT_TRUE(cholesky.factorize(H).ok);
-    for (const int columns : {0, 1, 7, 8, 19}) {
+    cholesky.solve({}, {}, 0);
+    for (const int columns : {1, 7, 8, 19}) {
       Eigen::MatrixXd X = Eigen::MatrixXd::Random(structure.size(), columns);
       const Eigen::MatrixXd expected = oracle.solve(X);
       const std::span<double> values(X.data(), static_cast<std::size_t>(X.size()));
