@@ -112,9 +112,9 @@ void study_family(const Bench& bench, const Family& family, const Keep& keep) {
     tell(fmt::format("scaling: {} of {} poses", family.name, poses));
     json::object entry = measure(bench, family, poses,
                                  {"--optimizer", "gauss_newton", "--linear-solver", bench.ours,
-                                  "--iterations", "5", "--tolerance", "0"},
+                                  "--iterations", "10", "--tolerance", "0"},
                                  rounds_of(poses, seconds, bench.rounds));
-    entry["study"] = "five iterations";
+    entry["study"] = "ten iterations";
     if (!entry.contains("left_out")) {
       time.add(poses, number(entry, "seconds"));
       memory.add(poses, number(entry, "peak_memory_bytes"));

@@ -93,7 +93,7 @@ json::object measure(const Bench& bench, const DataSet& set, const Way& way, dou
 }  // namespace
 
 void study_solvers(const Bench& bench, const Keep& keep) {
-  const double limit = bench.quick ? 5.0 : 60.0;
+  const double limit = bench.quick ? 5.0 : 20.0;
   const std::vector<Way> ways = all_ways(bench);
   for (const DataSet& set : solver_sets(bench.data, bench.quick)) {
     for (const Way& way : ways) {

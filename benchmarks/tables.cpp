@@ -99,7 +99,7 @@ constexpr double kSmallestFitted = 10'000;
 
 std::string scaling_table(const json::array& entries) {
   MarkdownTable table({"family", "poses", "factors", "ordering", "nonzeros of L",
-                       "five iterations [s]", "µs a pose and iteration", "peak memory [MB]",
+                       "ten iterations [s]", "µs a pose and iteration", "peak memory [MB]",
                        "kB a pose"});
   for (const json::value& entry : entries) {
     if (text(entry, "study") == "convergence") continue;

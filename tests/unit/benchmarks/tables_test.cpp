@@ -129,7 +129,7 @@ TEST(PerformanceTables, CompareOneThreadWithTwo) {
 /// Three sizes of quadratic growth, the smallest outside the fit, and one left out.
 boost::json::value scaling_report() {
   const auto entry = [](const std::string& poses, const std::string& seconds) {
-    return R"({"family": "city", "study": "five iterations", "poses": )" + poses +
+    return R"({"family": "city", "study": "ten iterations", "poses": )" + poses +
            R"(, "graph": {"variables": )" + poses +
            R"(, "factors": 7}, "iterations": 5, "solver": {}, "seconds": )" + seconds +
            R"(, "peak_memory_bytes": )" + poses + "000},";
