@@ -35,3 +35,17 @@ function(cairn_settings target)
   target_link_libraries(${target} PRIVATE $<BUILD_INTERFACE:cairn_settings>)
   set_target_properties(${target} PROPERTIES CXX_EXTENSIONS OFF POSITION_INDEPENDENT_CODE ON)
 endfunction()
+
+# cairn_kernels(target): adds kernels_portable.cpp and, on x86-64, kernels_avx2.cpp and kernels_avx512.cpp of this folder, each for
+# its instruction set; which of them runs is chosen at run time (cairn/kernel_choice.hpp).
+function(cairn_kernels target)
+  target_sources(${target} PRIVATE kernels_portable.cpp)
+  set_source_files_properties(kernels_portable.cpp PROPERTIES COMPILE_OPTIONS "-O3;-Wno-psabi")
+  if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
+    target_sources(${target} PRIVATE kernels_avx2.cpp kernels_avx512.cpp)
+    target_compile_definitions(${target} PRIVATE CAIRN_X86_KERNELS)
+    set_source_files_properties(kernels_avx2.cpp PROPERTIES COMPILE_OPTIONS "-O3;-mavx2;-mfma")
+    set_source_files_properties(kernels_avx512.cpp PROPERTIES COMPILE_OPTIONS
+      "-O3;-mavx512f;-mavx512dq;-mavx512vl;-mavx2;-mfma;-mprefer-vector-width=512")
+  endif()
+endfunction()

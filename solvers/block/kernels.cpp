@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "kernels.hpp"
 
-#include <string_view>
+#include "cairn/kernel_choice.hpp"
 
 namespace cairn::block {
 
@@ -18,20 +18,11 @@ extern const Kernels kernels;
 #endif
 
 const Kernels* choose_kernels(const char* limit) {
-  const std::string_view name(limit);
-  if (name == "portable") return &portable::kernels;
 #if defined(CAIRN_X86_KERNELS)
-  const bool has_avx2 = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
-  const bool has_avx512 = has_avx2 && __builtin_cpu_supports("avx512f") &&
-                          __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl");
-  if (name == "auto")
-    return has_avx512 ? &avx512::kernels : has_avx2 ? &avx2::kernels : &portable::kernels;
-  if (name == "avx512") return has_avx512 ? &avx512::kernels : nullptr;
-  if (name == "avx2") return has_avx2 ? &avx2::kernels : nullptr;
+  return cairn::choose_kernels(limit, &portable::kernels, &avx2::kernels, &avx512::kernels);
 #else
-  if (name == "auto") return &portable::kernels;
+  return cairn::choose_kernels<Kernels>(limit, &portable::kernels, nullptr, nullptr);
 #endif
-  return nullptr;
 }
 
 }  // namespace cairn::block

@@ -23,6 +23,22 @@ inline BlockStructure random_structure(std::mt19937& rng, int blocks, int extra,
   return BlockStructure(std::move(sizes), std::move(entries));
 }
 
+/// The pattern of a solid block of side³ variables, each joined to its neighbours on six sides.
+inline BlockStructure solid_grid(int side, std::int32_t size) {
+  std::vector<std::pair<std::int32_t, std::int32_t>> entries;
+  const auto index = [&](int x, int y, int z) { return (z * side + y) * side + x; };
+  for (int z = 0; z < side; ++z) {
+    for (int y = 0; y < side; ++y) {
+      for (int x = 0; x < side; ++x) {
+        if (x > 0) entries.emplace_back(index(x, y, z), index(x - 1, y, z));
+        if (y > 0) entries.emplace_back(index(x, y, z), index(x, y - 1, z));
+        if (z > 0) entries.emplace_back(index(x, y, z), index(x, y, z - 1));
+      }
+    }
+  }
+  return {std::vector<std::int32_t>(side * side * side, size), std::move(entries)};
+}
+
 /// Random values that make the matrix symmetric positive definite: diagonally dominant by blocks.
 inline void fill_positive_definite(std::mt19937& rng, BlockMatrix& H) {
   const BlockStructure& s = H.structure();

@@ -8,25 +8,10 @@
 #include <vector>
 
 #include "block/ordering.hpp"
+#include "support/block_systems.hpp"
 
 namespace cairn::block {
 namespace {
-
-/// A grid in space: its upper separators make large fronts, several to a level.
-BlockStructure grid(int side, std::int32_t size) {
-  std::vector<std::pair<std::int32_t, std::int32_t>> entries;
-  const auto index = [&](int x, int y, int z) { return (z * side + y) * side + x; };
-  for (int z = 0; z < side; ++z) {
-    for (int y = 0; y < side; ++y) {
-      for (int x = 0; x < side; ++x) {
-        if (x > 0) entries.emplace_back(index(x, y, z), index(x - 1, y, z));
-        if (y > 0) entries.emplace_back(index(x, y, z), index(x, y - 1, z));
-        if (z > 0) entries.emplace_back(index(x, y, z), index(x, y, z - 1));
-      }
-    }
-  }
-  return {std::vector<std::int32_t>(side * side * side, size), std::move(entries)};
-}
 
 /// Takes all steps one after the other, as one thread alone would, and checks that none has to
 /// wait.
@@ -73,10 +58,11 @@ class OneAfterTheOther {
   int large_ = 0, waiting_ = 0;
 };
 
+// In a solid grid the upper separators make large fronts, several to a level.
 TEST(Schedule, PutsEveryStepAfterAllThatItWaitsFor) {
   for (const char* ordering : {"amd", "natural"}) {
     for (const int side : {2, 6, 11}) {
-      const BlockStructure structure = grid(side, 6);
+      const BlockStructure structure = test::solid_grid(side, 6);
       const Symbolic symbolic(structure, order(structure, ordering));
       const Schedule schedule(symbolic, 3);
       if (schedule.lanes == 1) {
@@ -108,7 +94,7 @@ void expect_cover(std::vector<std::pair<std::int64_t, std::int64_t>> parts, std:
 }
 
 TEST(Schedule, CutsALargeFrontWithoutGapOrOverlap) {
-  const BlockStructure structure = grid(11, 6);
+  const BlockStructure structure = test::solid_grid(11, 6);
   const Symbolic symbolic(structure, order(structure, "amd"));
   const Schedule schedule(symbolic, 2);
   int fronts = 0;

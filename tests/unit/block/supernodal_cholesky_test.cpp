@@ -233,18 +233,7 @@ TEST(SupernodalCholesky, NamesABlockThatIsNotPositiveAndRecovers) {
 TEST(SupernodalCholesky, UsesTheOrderingThatIsChosenForTheStructure) {
   // One is cheap, the other so dear that dissection is tried.
   for (const int side : {5, 13}) {
-    std::vector<std::pair<std::int32_t, std::int32_t>> entries;
-    const auto index = [&](int x, int y, int z) { return (z * side + y) * side + x; };
-    for (int z = 0; z < side; ++z) {
-      for (int y = 0; y < side; ++y) {
-        for (int x = 0; x < side; ++x) {
-          if (x > 0) entries.emplace_back(index(x, y, z), index(x - 1, y, z));
-          if (y > 0) entries.emplace_back(index(x, y, z), index(x, y - 1, z));
-          if (z > 0) entries.emplace_back(index(x, y, z), index(x, y, z - 1));
-        }
-      }
-    }
-    const BlockStructure structure(std::vector<std::int32_t>(side * side * side, 6), entries);
+    const BlockStructure structure = test::solid_grid(side, 6);
     const Choice choice = choose(structure);
     SupernodalCholesky chosen, amd;
     chosen.analyze(structure, "auto");
