@@ -15,6 +15,7 @@ const std::vector<DataSet>& published() {
       {"w20000", "pose2d/w20000_isam.txt", {}},
       {"intel1728", "pose2d/intel1728.g2o", {}},
       {"killian5489", "pose2d/killian5489_glc.g2o", {}},
+      {"kitti_00", "pose2d/kitti_00.g2o", {}},
       {"sphere2500", "pose3d/sphere2500.g2o", {}},
       {"sphere2500a", "pose3d/sphere2500a.g2o", {}},
       {"torus3D", "pose3d/torus3D.g2o.gz", {}},
@@ -79,6 +80,14 @@ std::vector<DataSet> rate_sets(const std::string& data, bool quick) {
 std::vector<DataSet> thread_sets(const std::string& data, bool quick) {
   if (quick) return chosen({"manhattanOlson3500", "torus"}, data);
   return chosen({"manhattanOlson3500", "torus3D", "torus10000", "manhattan", "torus", "grid3d 20³"},
+                data);
+}
+
+std::vector<DataSet> marginals_sets(const std::string& data, bool quick) {
+  if (quick) return chosen({"intel1728", "parking-garage", "manhattan"}, data);
+  return chosen({"manhattanOlson3500", "intel1728", "city10000", "kitti_00", "sphere2500",
+                 "torus3D", "torus10000", "parking-garage", "sphere_bignoise", "manhattan", "city",
+                 "sphere", "torus", "grid3d 12³"},
                 data);
 }
 

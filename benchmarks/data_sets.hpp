@@ -20,6 +20,7 @@ std::vector<DataSet> pose_graphs(const std::string& data, bool quick);
 
 std::vector<DataSet> rate_sets(const std::string& data, bool quick);
 std::vector<DataSet> thread_sets(const std::string& data, bool quick);
+std::vector<DataSet> marginals_sets(const std::string& data, bool quick);
 std::vector<DataSet> solver_sets(const std::string& data, bool quick);
 
 }  // namespace cairn::performance

@@ -38,11 +38,9 @@ struct Arguments {
 using Study = void (*)(const Bench&, const Keep&);
 
 const std::vector<std::pair<std::string, Study>>& all_studies() {
-  static const std::vector<std::pair<std::string, Study>> all{{"graphs", study_graphs},
-                                                              {"rates", study_rates},
-                                                              {"threads", study_threads},
-                                                              {"scaling", study_scaling},
-                                                              {"solvers", study_solvers}};
+  static const std::vector<std::pair<std::string, Study>> all{
+      {"graphs", study_graphs},   {"rates", study_rates},     {"threads", study_threads},
+      {"scaling", study_scaling}, {"solvers", study_solvers}, {"marginals", study_marginals}};
   return all;
 }
 
@@ -118,8 +116,8 @@ int run(int argc, char** argv) {
   CLI::App app("Measures the program cairn, one JSON file a study, and turns those into tables.");
   app.add_option("studies", arguments.studies,
                  "all, or some of: graphs rates threads scaling "
-                 "solvers")
-      ->check(CLI::IsMember({"graphs", "rates", "threads", "scaling", "solvers"}));
+                 "solvers marginals")
+      ->check(CLI::IsMember({"graphs", "rates", "threads", "scaling", "solvers", "marginals"}));
   app.add_option("--cairn", arguments.cairn, "the program to measure");
   app.add_option("--folder", arguments.folder, "where the JSON is")->required();
   app.add_option("--data", arguments.data, "folder of the real graphs");

@@ -51,15 +51,27 @@ json::value Cairn::bench(const DataSet& set, const Contestants& contestants, int
   return report;
 }
 
-Run Cairn::optimize(const DataSet& set, const std::vector<std::string>& arguments, int threads,
-                    double limit) const {
-  std::vector<std::string> words{program_, "optimize", set.graph,   "--json",
-                                 "-",      "--quiet",  "--threads", fmt::format("{}", threads)};
+Run Cairn::run(const std::string& command, const DataSet& set,
+               const std::vector<std::string>& arguments, int threads, double limit) const {
+  std::vector<std::string> words{program_, command,   set.graph,   "--json",
+                                 "-",      "--quiet", "--threads", fmt::format("{}", threads)};
   append(words, set.arguments);
   append(words, arguments);
   Run run{run_program(words, work_, limit), {}};
   run.report = parsed(run.outcome.output);
   return run;
+}
+
+Run Cairn::optimize(const DataSet& set, const std::vector<std::string>& arguments, int threads,
+                    double limit) const {
+  return run("optimize", set, arguments, threads, limit);
+}
+
+Run Cairn::marginals(const DataSet& set, const std::vector<std::string>& arguments, int threads,
+                     double limit) const {
+  std::vector<std::string> words{"--as-given"};
+  append(words, arguments);
+  return run("marginals", set, words, threads, limit);
 }
 
 std::vector<std::string> Cairn::names(const std::string& kind) const {

@@ -19,7 +19,7 @@ struct Contestants {
   std::vector<std::string> complete;
 };
 
-/// One run of `cairn optimize` and what became of it.
+/// One run of `cairn optimize` or `cairn marginals` and what became of it.
 struct Run {
   Outcome outcome;
   boost::json::value report;  ///< null if there is none
@@ -40,6 +40,10 @@ class Cairn {
   Run optimize(const DataSet& set, const std::vector<std::string>& arguments, int threads,
                double limit) const;
 
+  /// `cairn marginals` at the states as given, likewise.
+  Run marginals(const DataSet& set, const std::vector<std::string>& arguments, int threads,
+                double limit) const;
+
   /// The names on offer of a kind, such as "linear_solver".
   std::vector<std::string> names(const std::string& kind) const;
   /// Of the names with options given, those that this build can make.
@@ -47,6 +51,8 @@ class Cairn {
   std::vector<std::string> accepted_optimizers(const std::vector<std::string>& specs) const;
 
  private:
+  Run run(const std::string& command, const DataSet& set, const std::vector<std::string>& arguments,
+          int threads, double limit) const;
   std::vector<std::string> accepted(const std::string& option,
                                     const std::vector<std::string>& specs) const;
 

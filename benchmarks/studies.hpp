@@ -40,6 +40,10 @@ void study_scaling(const Bench& bench, const Keep& keep);
 /// Every linear solver on offer, to convergence, with a limit of time.
 void study_solvers(const Bench& bench, const Keep& keep);
 
+/// All diagonal blocks of the covariance and its last block column: by cairn's own recursion with
+/// one thread and with two, and on small graphs by solves with `cholmod`.
+void study_marginals(const Bench& bench, const Keep& keep);
+
 // Progress
 // ------------------------------------------------------------------------------------------------
 /// A line on standard error.

@@ -228,6 +228,25 @@ std::vector<Section> solvers_sections(const json::array& entries) {
   return {{"solvers", all}};
 }
 
+// Marginals
+// ------------------------------------------------------------------------------------------------
+
+std::vector<Section> marginals_sections(const json::array& entries) {
+  MarkdownTable table({"graph", "variables", "nonzeros of L", "analyse, factorise [ms]",
+                       "diagonal [ms]", "last column [ms]", "both [ms]", "both, 2 threads [ms]",
+                       "both by `cholmod`'s solves [ms]", "faster"});
+  for (const json::value& entry : entries) {
+    const double both = number(entry, "both"), solves = number(entry, "solves");
+    table.add({text(entry, "name"), fmt::format("{:.0f}", number(entry, "graph.variables")),
+               count(number(entry, "solver.factor_nonzeros")),
+               milliseconds(number(entry, "factorize")), milliseconds(number(entry, "diagonal")),
+               milliseconds(number(entry, "column")), milliseconds(both),
+               milliseconds(number(entry, "two_threads")), milliseconds(solves),
+               times(solves / both)});
+  }
+  return {{"marginals", table.text()}};
+}
+
 }  // namespace
 
 std::string digits(double value) {
@@ -302,6 +321,8 @@ std::vector<Section> sections(const json::value& report) {
     all = scaling_sections(entries);
   } else if (study == "solvers") {
     all = solvers_sections(entries);
+  } else if (study == "marginals") {
+    all = marginals_sections(entries);
   } else {
     throw std::runtime_error("no table for a study named '" + study + "'");
   }

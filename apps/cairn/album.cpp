@@ -14,6 +14,7 @@
 #include <boost/json/serialize.hpp>
 
 #include "cairn/error.hpp"
+#include "cairn/graph_marginals.hpp"
 #include "cairn/initial_guess.hpp"
 #include "cairn/recording.hpp"
 #include "cairn/scene_json.hpp"
@@ -253,12 +254,22 @@ class AlbumBuilder {
     SceneRun run = read_run(text, file);
     Entry* entry = find_graph(text_at(report, {"graph", "file"}), file);
     const std::string output = text_at(report, {"output"});
-    if (entry && entry->graph && readable(output) && !known(output)) {
+    const json::value* covariance = report.if_contains("covariance");
+    const bool has_covariance = covariance && covariance->is_object();
+    if (entry && entry->graph && readable(output) && (!known(output) || has_covariance)) {
       const Graph estimate = load_graph(output, options_.input, session_).graph;
       if (same_ids(entry->scene, estimate)) {
-        lay_over(*entry, output, short_name(output), estimate);
-        entry->scene.estimates.back().run = static_cast<int>(entry->scene.runs.size());
+        if (!known(output)) {
+          lay_over(*entry, output, short_name(output), estimate);
+          entry->scene.estimates.back().run = static_cast<int>(entry->scene.runs.size());
+        }
+        if (has_covariance) add_covariances(*entry, output, estimate, *covariance, file);
       }
+    } else if (has_covariance) {
+      note(
+          fmt::format("{}: its covariances are not shown, since the estimate was not written, or "
+                      "is gone: give cairn optimize an output",
+                      file));
     }
     if (!entry) {
       entries_.emplace_back();
@@ -271,6 +282,47 @@ class AlbumBuilder {
       return;
     }
     entry->scene.runs.push_back(std::move(run));
+  }
+
+  /// The covariances in a run's report, turned into positions in the world, go to the estimate that
+  /// the run wrote.
+  static void add_covariances(Entry& entry, const std::string& output, const Graph& graph,
+                              const json::value& covariance, const std::string& where) {
+    const auto estimate = std::ranges::find(entry.scene.estimates, output, &SceneEstimate::file);
+    if (estimate == entry.scene.estimates.end()) return;
+    estimate->covariance_variables.clear();
+    estimate->covariance_upper.clear();
+    try {
+      for (const json::value& block : covariance.at("blocks").as_array()) {
+        const std::optional<int> found = graph.find(block.at("id").to_number<Id>());
+        if (!found) continue;
+        add_ellipse(entry, *estimate, graph, *found, block.at("covariance").as_array());
+      }
+    } catch (const boost::system::system_error& error) {
+      throw Error(ErrorCode::input,
+                  fmt::format("{}: member 'covariance' is not as cairn optimize writes it: {}",
+                              where, error.code().message()));
+    }
+  }
+
+  static void add_ellipse(const Entry& entry, SceneEstimate& estimate, const Graph& graph,
+                          int variable, const json::array& rows) {
+    const VariableType& type = graph.type(variable);
+    const auto size = static_cast<std::size_t>(type.tangent_size());
+    const int dimension = entry.scene.dimension;
+    if (!type.placement() || type.placement()->dimension() != dimension) return;
+    std::vector<double> sigma;
+    for (const json::value& row : rows) {
+      for (const json::value& number : row.as_array()) sigma.push_back(number.to_number<double>());
+    }
+    if (sigma.size() != size * size || std::ranges::all_of(sigma, [](double s) { return s == 0; }))
+      return;  // of another type, or held
+    const std::vector<double> world = position_covariance(type, graph.state(variable), sigma);
+    estimate.covariance_variables.push_back(*entry.graph->find(graph.id(variable)));
+    for (int r = 0; r < dimension; ++r) {
+      for (int c = r; c < dimension; ++c)
+        estimate.covariance_upper.push_back(static_cast<float>(world[c * dimension + r]));
+    }
   }
 
   /// A recording and a report of one run: no two runs take the same time to the last bit.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // cairn optimize GRAPH: one optimisation, its estimate and its report.
 #include <memory>
+#include <optional>
 #include <string>
 
 #include <fmt/format.h>
@@ -9,6 +10,7 @@
 #include "cairn/recording.hpp"
 #include "cairn/threads.hpp"
 #include "commands.hpp"
+#include "covariances.hpp"
 #include "graph_files.hpp"
 #include "help.hpp"
 #include "interrupt.hpp"
@@ -34,25 +36,7 @@ struct OptimizeOptions {
   std::string record;  ///< file for the recording, or empty
 };
 
-/// The optimizer with the linear solver that the command line names, or cairn's own, put in.
-ComponentSpec optimizer_spec(const OptimizeOptions& options, Registry& registry) {
-  ComponentSpec spec = parse_component(options.optimizer);
-  const bool takes = takes_linear_solver(registry, spec);
-  const bool given = !options.linear_solver.empty();
-  if (given && (!takes || spec.values.contains(kLinearSolverOption))) {
-    throw linear_solver_refused(registry, spec);
-  }
-  if (takes) {
-    spec.values.emplace(kLinearSolverOption, given ? options.linear_solver : kDefaultLinearSolver);
-  }
-  return spec;
-}
-
 void check(const OptimizeOptions& options, Session& session) {
-  if (options.covariance == "blocks") {
-    throw Error(ErrorCode::usage,
-                "--covariance blocks is not available in this version; leave it out");
-  }
   if (options.output == "-") session.write_file_to_stdout();
   check_output(options.output, options.output_format, session);
   if (options.record == "-") {
@@ -76,7 +60,7 @@ int exit_code(Status status) {
 }
 
 json::object report_json(const OptimizeOptions& options, const LoadedGraph& loaded,
-                         const Summary& summary) {
+                         const Summary& summary, const DiagonalCovariances& covariances) {
   json::object report = begin_report("optimize");
   report["graph"] = graph_json(loaded.graph, loaded.name);
   report["optimizer"] = summary.optimizer;
@@ -91,6 +75,7 @@ json::object report_json(const OptimizeOptions& options, const LoadedGraph& load
   for (const auto& member : seconds_json(summary.seconds)) seconds.insert(member);
   report["seconds"] = std::move(seconds);
   report["solver"] = solver_json(summary.solver);
+  report["covariance"] = to_json(covariances, loaded.graph);
   report["notes"] = strings_json(summary.notes);
   report["read_notes"] = strings_json(sentences(loaded.report));
   report["output"] = text_json(options.output);
@@ -107,7 +92,7 @@ std::string times_text(const Seconds& seconds) {
 }
 
 std::string summary_text(const OptimizeOptions& options, const LoadedGraph& loaded,
-                         const Summary& summary) {
+                         const Summary& summary, const DiagonalCovariances& covariances) {
   Table table({{"", Table::Align::left}, {"", Table::Align::left}});
   table.add({"graph", fmt::format("{}: {}, {}", loaded.name,
                                   plural(loaded.graph.variable_count(), "variable"),
@@ -124,6 +109,11 @@ std::string summary_text(const OptimizeOptions& options, const LoadedGraph& load
     table.add({"inner", fmt::format("{}, relative residual at most {:.1e}; {}",
                                     plural(summary.solver.iterations, "iteration"),
                                     summary.solver.relative_residual, summary.solver.note)});
+  }
+  if (covariances.there) {
+    table.add({"covariance",
+               fmt::format("of {} by {} in {}", plural(loaded.graph.variable_count(), "variable"),
+                           covariances.linear_solver, seconds_text(covariances.seconds()))});
   }
   for (const std::string& note : summary.notes) table.add({"note", note});
   if (!options.output.empty() && options.output != "-") table.add({"written", options.output});
@@ -148,7 +138,10 @@ int run(const OptimizeOptions& options, Session& session) {
   session.use_threads();
   // Everything that is named is made before the file is read: a wrong name is told at once.
   Registry& registry = session.registry();
-  const auto optimizer = registry.make<Optimizer>(optimizer_spec(options, registry));
+  const ComponentSpec spec = optimizer_spec(options.optimizer, options.linear_solver, registry);
+  const auto optimizer = registry.make<Optimizer>(spec);
+  std::optional<CovarianceSolver> covariance_solver;
+  if (options.covariance == "blocks") covariance_solver = covariance_solver_of(spec, registry);
   const ProblemSetup setup(options.problem, registry);
 
   LoadedGraph loaded = load_graph(options.graph, options.input, session);
@@ -156,12 +149,19 @@ int run(const OptimizeOptions& options, Session& session) {
     session.note(fmt::format("initial guess {}: {}", options.problem.initial, note));
   }
   const InterruptGuard guard;  // until the results are written
-  const Summary summary = solve(loaded.graph, *optimizer, options, guard, session);
+  Summary summary = solve(loaded.graph, *optimizer, options, guard, session);
   if (!options.output.empty()) {
     write_graph(loaded.graph, options.output, registry, options.output_format);
   }
-  session.write_json(report_json(options, loaded, summary));
-  session.print(summary_text(options, loaded, summary));
+  DiagonalCovariances covariances;
+  if (covariance_solver && exit_code(summary.status) == 0) {
+    covariances = diagonal_covariances(loaded.graph, *covariance_solver);
+    if (!covariances.there) summary.notes.push_back("no covariances: " + covariances.why_not);
+  }
+  session.write_json(report_json(options, loaded, summary, covariances));
+  session.print(summary_text(options, loaded, summary, covariances));
+  if (covariance_solver && !covariances.there && exit_code(summary.status) == 0)
+    return static_cast<int>(ErrorCode::numerical);
   return exit_code(summary.status);
 }
 
@@ -185,7 +185,8 @@ Command add_optimize(CLI::App& program) {
   add_problem_options(*app, options->problem);
   app->add_option("--record", options->record, "every iteration's positions, for cairn view")
       ->type_name("FILE");
-  app->add_option("--covariance", options->covariance, "blocks (not in this version) or none")
+  app->add_option("--covariance", options->covariance,
+                  "blocks of every variable, in the report, or none")
       ->type_name("WHICH")
       ->check(one_of({"blocks", "none"}))
       ->capture_default_str();

@@ -13,8 +13,10 @@
 #include "cairn/format.hpp"
 #include "cairn/generator.hpp"
 #include "cairn/initial_guess.hpp"
+#include "cairn/jacobian.hpp"
 #include "cairn/linear_solver.hpp"
 #include "cairn/loss.hpp"
+#include "cairn/marginals.hpp"
 #include "cairn/optimizer.hpp"
 #include "cairn/spelling.hpp"
 #include "commands.hpp"
@@ -185,7 +187,11 @@ std::vector<std::string> abilities(Registry& registry, const Offer& offer) {
   const std::unique_ptr<Component> component = make_component(registry, offer);
   if (!component) return all;
   if (offer.kind == Format::kKind) all = format_abilities(static_cast<const Format&>(*component));
-  if (query<LogDeterminant>(*component)) all.emplace_back(LogDeterminant::kAbility);
+  for (const std::string_view ability :
+       {LogDeterminant::kAbility, ManyRightHandSides::kAbility, EliminationOrder::kAbility,
+        JacobianSolver::kAbility, Marginals::kAbility}) {
+    if (component->ability(ability)) all.emplace_back(ability);
+  }
   return all;
 }
 

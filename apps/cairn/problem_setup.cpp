@@ -9,10 +9,7 @@
 
 namespace cairn::app {
 
-void add_problem_options(CLI::App& command, ProblemOptions& options) {
-  command.add_option("--initial", options.initial, "first estimate: a name of kind initial_guess")
-      ->type_name("NAME")
-      ->capture_default_str();
+void add_loss_options(CLI::App& command, ProblemOptions& options) {
   command.add_option("--loss", options.loss, "robust loss, such as huber:scale=1 [none]")
       ->type_name("NAME");
   command
@@ -20,6 +17,13 @@ void add_problem_options(CLI::App& command, ProblemOptions& options) {
       ->type_name("WHICH")
       ->check(one_of({"all", "loops"}))
       ->capture_default_str();
+}
+
+void add_problem_options(CLI::App& command, ProblemOptions& options) {
+  command.add_option("--initial", options.initial, "first estimate: a name of kind initial_guess")
+      ->type_name("NAME")
+      ->capture_default_str();
+  add_loss_options(command, options);
   command.add_option("--iterations", options.stop.max_iterations, "largest number of iterations")
       ->type_name("N")
       ->check(within(0, 1000000000))
@@ -63,6 +67,18 @@ bool takes_linear_solver(Registry& registry, const ComponentSpec& optimizer) {
   const OptionSpec* option =
       registry.options(Optimizer::kKind, optimizer.name).find(kLinearSolverOption);
   return option && option->type == OptionType::component;
+}
+
+ComponentSpec optimizer_spec(const std::string& optimizer, const std::string& linear_solver,
+                             Registry& registry) {
+  ComponentSpec spec = parse_component(optimizer);
+  const bool takes = takes_linear_solver(registry, spec);
+  const bool given = !linear_solver.empty();
+  if (given && (!takes || spec.values.contains(kLinearSolverOption))) {
+    throw linear_solver_refused(registry, spec);
+  }
+  if (takes) spec.values.emplace(kLinearSolverOption, given ? linear_solver : kDefaultLinearSolver);
+  return spec;
 }
 
 Error linear_solver_refused(Registry& registry, const ComponentSpec& optimizer) {

@@ -28,6 +28,8 @@ struct ProblemOptions {
   Stop stop;
 };
 void add_problem_options(CLI::App& command, ProblemOptions& options);
+/// The part of them that is about the loss.
+void add_loss_options(CLI::App& command, ProblemOptions& options);
 
 /// The initial guess and the loss that the options name; made before a graph is read, so that a
 /// wrong name is told at once.
@@ -36,6 +38,9 @@ class ProblemSetup {
   ProblemSetup(const ProblemOptions& options, Registry& registry);
   /// Gives the graph its loss and its first estimate. Returns notes for the user.
   std::vector<std::string> apply(Graph& graph) const;
+
+  const std::shared_ptr<const Loss>& loss() const { return loss_; }
+  LossScope loss_scope() const { return scope_; }
 
  private:
   std::unique_ptr<InitialGuess> initial_;
@@ -46,6 +51,11 @@ class ProblemSetup {
 /// Whether an optimizer lets its linear solver be chosen: an option `linear_solver` of type
 /// component.
 bool takes_linear_solver(Registry& registry, const ComponentSpec& optimizer);
+
+/// The optimizer with the linear solver that the command line names (empty: none), or cairn's own,
+/// put in. Throws `Error` (usage) where it does not take one.
+ComponentSpec optimizer_spec(const std::string& optimizer, const std::string& linear_solver,
+                             Registry& registry);
 
 /// Why a linear solver that was asked for cannot be given to that optimizer, and what to use
 /// instead.

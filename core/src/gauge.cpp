@@ -38,7 +38,7 @@ Gauge resolve_gauge(const Graph& graph) {
 
   Forest forest(n);
   std::vector<bool> touched(n, false);
-  std::vector<int> prior_size(n, 0);
+  std::vector<std::int64_t> prior_size(n, 0);
   for (const FactorPool& pool : graph.factor_pools()) {
     const std::size_t arity = static_cast<std::size_t>(pool.type->arity());
     for (std::size_t k = 0; k < pool.variables.size(); k += arity) {
@@ -46,7 +46,7 @@ Gauge resolve_gauge(const Graph& graph) {
         touched[pool.variables[k + a]] = true;
         if (a > 0) forest.join(pool.variables[k], pool.variables[k + a]);
       }
-      if (arity == 1) prior_size[pool.variables[k]] += pool.type->residual_size();
+      prior_size[pool.variables[k]] += pool.type->absolute_size();
     }
   }
 
@@ -54,7 +54,7 @@ Gauge resolve_gauge(const Graph& graph) {
     int largest_tangent = 0;
     int first_largest = -1;
     bool fixed = false;
-    int prior_size = 0;
+    std::int64_t prior_size = 0;
   };
   std::vector<Anchoring> components;
   for (int v = 0; v < n; ++v) {

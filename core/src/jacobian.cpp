@@ -211,7 +211,8 @@ void JacobianEvaluator::evaluate(const Values& values, JacobianMatrix& J) const 
     for_each_range(plan.graph->factor_pools()[p].size(), kFactorChunk,
                    [&](std::size_t begin, std::size_t end) {
                      for (std::size_t f = begin; f < end; ++f) plan.evaluate(p, f, view, J);
-                     if (plan.graph->loss()) plan.weigh(p, begin, end, J);
+                     if (plan.graph->loss() && plan.graph->factor_pools()[p].type->takes_loss())
+                       plan.weigh(p, begin, end, J);
                    });
   }
 }

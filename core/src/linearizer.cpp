@@ -242,10 +242,15 @@ struct Linearizer::Plan {
     }
   }
 
+  /// The loss that applies to the factors of a chunk, or null.
+  const Loss* loss_of(const Chunk& chunk) const {
+    return graph->factor_pools()[chunk.pool].type->takes_loss() ? graph->loss() : nullptr;
+  }
+
   /// rho and weight of the factors of one chunk from their squared norms; returns Σ rho.
   double apply_loss(const Chunk& chunk, std::span<const double> norms,
                     std::span<double> weights) const {
-    const Loss* loss = graph->loss();
+    const Loss* loss = loss_of(chunk);
     if (!loss) return std::accumulate(norms.begin(), norms.end(), 0.0);
     double rho[kFactorChunk];
     const std::span<double> rhos(rho, norms.size());
@@ -319,7 +324,7 @@ double Linearizer::linearize(const Values& values, BlockMatrix& H, std::span<dou
     std::fill(scratch + chunk.scratch_begin, scratch + chunk.scratch_end, 0.0);
     double norms[kFactorChunk], weights[kFactorChunk];
     const std::size_t count = chunk.end - chunk.begin;
-    if (plan.graph->loss()) {
+    if (plan.loss_of(chunk)) {
       type.squared_norms(view, chunk.begin, chunk.end, norms);
       plan.partial[c] = plan.apply_loss(chunk, {norms, count}, {weights, count});
       type.linearize(view, chunk.begin, chunk.end, weights, sink, nullptr);

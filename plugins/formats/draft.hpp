@@ -77,6 +77,7 @@ class Draft {
 
   std::vector<Variable>& variables() { return variables_; }
   std::vector<Factor>& factors() { return factors_; }
+  const std::vector<Held>& held() const { return held_; }
   FactorSlots slots(const Factor& factor);
   /// A number of a state or measurement by its place.
   double number(std::size_t place) const { return numbers_[place]; }

@@ -6,6 +6,8 @@
 
 #include <array>
 #include <map>
+#include <memory>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -28,13 +30,22 @@ bool is_parameter_tag(std::string_view tag) {
          tag.find_first_not_of("ABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_") == std::string_view::npos;
 }
 
+struct Offset {
+  SensorOffset value;
+  std::int64_t line;
+};
+using Offsets = std::map<Id, Offset>;
+
 class G2oReader {
  public:
+  /// `first_line`: the number of the text's first line; `offsets`: what lines before it gave.
   G2oReader(std::string_view text, const std::string& name, Registry& types,
-            const ReadOptions& options, ReadReport& report)
+            const ReadOptions& options, ReadReport& report, std::int64_t first_line = 1,
+            Offsets offsets = {})
       : types_(types),
         options_(options),
-        scanner_(text, name),
+        offsets_(std::move(offsets)),
+        scanner_(text, name, first_line),
         draft_(name, "g2o", types, options, report) {
     tags_.add("FIX", read_fix);
     tags_.add(std::string(kOffset), [this](Scanner&, Draft&) { read_offset(); });
@@ -49,11 +60,31 @@ class G2oReader {
     return draft_.build();
   }
 
+  /// What the text says, if it is one line of a stream: parameters come before what refers to them.
+  StreamLine read_stream() {
+    while (scanner_.next_line()) read_line();
+    apply_offsets();
+    StreamLine line;
+    for (const Draft::Variable& v : draft_.variables()) {
+      const Draft::VariableKind& kind = draft_.variable(v.kind);
+      NewVariable variable{kind.type, v.id, {}, false};
+      for (std::size_t k = 0; k < static_cast<std::size_t>(kind.size); ++k)
+        variable.state.push_back(draft_.number(v.numbers + k));
+      line.variables.push_back(std::move(variable));
+    }
+    for (const Draft::Factor& f : draft_.factors()) {
+      const Draft::FactorSlots slots = draft_.slots(f);
+      line.factors.push_back({draft_.factor(f.kind).type,
+                              {slots.ids.begin(), slots.ids.end()},
+                              {slots.measurement.begin(), slots.measurement.end()},
+                              {slots.information.begin(), slots.information.end()}});
+    }
+    for (const Draft::Held& held : draft_.held()) line.held.push_back(held.id);
+    return line;
+  }
+  const Offsets& offsets() const { return offsets_; }
+
  private:
-  struct Offset {
-    SensorOffset value;
-    std::int64_t line;
-  };
   /// A factor that refers to a parameter, which may stand further down in the file.
   struct Reference {
     std::size_t factor;
@@ -166,15 +197,34 @@ class G2oReader {
 
   Registry& types_;
   const ReadOptions& options_;
+  Offsets offsets_;
   Scanner scanner_;
   Draft draft_;
   TagTable tags_;
-  std::map<Id, Offset> offsets_;
   std::vector<Reference> references_;
   std::map<std::string, std::int64_t> unused_parameters_;
 };
 
+/// One line at a time, each by a reader of its own; the offsets of sensors go from one to the next.
+class G2oStream final : public StreamFormat {
+ public:
+  StreamLine read(std::string_view line, const std::string& name, std::int64_t number,
+                  Registry& types, const ReadOptions& options) override {
+    ReadReport report;
+    G2oReader reader(line, name, types, options, report, number, offsets_);
+    StreamLine said = reader.read_stream();
+    said.skipped = !report.skipped.empty();
+    if (reader.offsets().size() != offsets_.size()) offsets_ = reader.offsets();
+    return said;
+  }
+
+ private:
+  Offsets offsets_;
+};
+
 }  // namespace
+
+std::unique_ptr<StreamFormat> make_g2o_stream() { return std::make_unique<G2oStream>(); }
 
 Graph read_g2o(std::string_view text, const std::string& name, Registry& types,
                const ReadOptions& options, ReadReport& report) {

@@ -4,6 +4,7 @@
 #include <string_view>
 #include <vector>
 
+#include "cairn/marginal_prior.hpp"
 #include "line_writer.hpp"
 #include "writer_order.hpp"
 #include "writers.hpp"
@@ -57,6 +58,11 @@ void write_variables(const Graph& graph, LineWriter& out) {
 
 void write_factor(const Graph& graph, int position, LineWriter& out) {
   const std::string_view tag = graph.factor_pools()[graph.factor(position).pool].type->tag();
+  if (tag == MarginalPrior::kTag) {
+    cannot_express("g2o", graph.describe_factor(position),
+                   "a graph without what marginalization left (a trajectory format such as tum "
+                   "writes the poses alone)");
+  }
   check_tag(tag, graph.describe_factor(position));
   const WithOffset* offset = with_offset(tag);
   out.field(offset ? offset->g2o_tag : tag);

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <memory>
 #include <string>
 #include <string_view>
 
 #include "cairn/format.hpp"
+#include "cairn/stream_format.hpp"
 
 namespace cairn::formats {
 
@@ -24,5 +26,8 @@ Graph read_kitti(std::string_view text, const std::string& name, Registry& types
                  const ReadOptions& options, ReadReport& report);
 Graph read_table(std::string_view text, const std::string& name, Registry& types,
                  const ReadOptions& options, ReadReport& report);
+
+/// Reads g2o line by line.
+std::unique_ptr<StreamFormat> make_g2o_stream();
 
 }  // namespace cairn::formats

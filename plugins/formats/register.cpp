@@ -67,4 +67,6 @@ void cairn_register(Registrar& registrar) {
       return std::make_unique<TextFormat>(parts);
     });
   }
+  registrar.add<StreamFormat>("g2o", OptionTable{},
+                              [](const Options&, Registry&) { return make_g2o_stream(); });
 }

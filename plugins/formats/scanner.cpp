@@ -87,7 +87,8 @@ std::string shown(std::string_view field) {
   return out;
 }
 
-Scanner::Scanner(std::string_view text, std::string file) : file_(std::move(file)), rest_(text) {
+Scanner::Scanner(std::string_view text, std::string file, std::int64_t first_line)
+    : file_(std::move(file)), rest_(text), line_(first_line - 1) {
   if (rest_.starts_with("\xef\xbb\xbf")) rest_.remove_prefix(3);
 }
 

@@ -28,8 +28,9 @@ struct Layout {
 /// name file and line, what was found and what was expected.
 class Scanner {
  public:
-  /// `text` must outlive the scanner. A byte order mark at its start is passed over.
-  Scanner(std::string_view text, std::string file);
+  /// `text` must outlive the scanner. A byte order mark at its start is passed over. `first_line`
+  /// is the number of its first line.
+  Scanner(std::string_view text, std::string file, std::int64_t first_line = 1);
 
   /// Moves to the next line that holds a field; false at the end of the text.
   bool next_line();

@@ -85,6 +85,33 @@ struct Kernels {
                        const Run* runs, int count, double* vector, double* front);
   void (*backward_many)(const double* panel, std::int64_t stride, int columns, int m, double* own,
                         const Run* runs, int count, const double* vector, double* front);
+
+  // Selected inversion: blocks of Z = H⁻¹. `Z` is a panel laid out as that of L, with Z_JJ whole;
+  // `U` holds Z_RR, laid out as an update matrix but with both triangles, and zeros in the rows of
+  // its vectors that are no rows of R. c8 is `columns` rounded up to 8.
+
+  /// Rows [row_begin, row_end), multiples of 8, of V = L_JJ⁻ᵀ: c8 × columns, upper triangular, all
+  /// of it zero before.
+  void (*invert_pivots)(const double* panel, std::int64_t stride, int columns, double* V,
+                        int row_begin, int row_end);
+  /// Columns [first, last) of T = V L_RJᵀ, which is Yᵀ for Y = L_RJ L_JJ⁻¹: c8 × rows below.
+  void (*transform_rows)(const double* panel, std::int64_t stride, int columns, const double* V,
+                         double* T, int first, int last);
+  /// Z_RJ = -Z_RR Y for the vectors of rows [row_begin, row_end) of the front, multiples of 8.
+  void (*inverse_rows)(const double* U, std::int64_t stride, int columns, int m, const double* T,
+                       double* Z, int row_begin, int row_end);
+  /// Rows [row_begin, row_end), multiples of 8, of the lower triangle of Z_JJ = V Vᵀ - Yᵀ Z_RJ, and
+  /// what mirrors them above the diagonal. After `inverse_rows`, which spoils the last of Z_JJ.
+  void (*inverse_pivots)(const double* V, const double* T, std::int64_t stride, int columns, int m,
+                         double* Z, int row_begin, int row_end);
+  /// Takes columns [first, last) of a child's Z_RR out of its parent's front, `parent` being where
+  /// row and column 0 of the front are or would be, from the vector on that has the child's row
+  /// `from`; `lead` is the place of row 0 in the column. What is no row of the child becomes zero.
+  void (*gather)(const Spread* spreads, int count, int first, int last, int from, double* U,
+                 std::int64_t child_stride, int lead, const double* parent,
+                 std::int64_t parent_stride);
+  /// Rows [0, from) of columns [first, last) of U, copied from the other side of the diagonal.
+  void (*mirror)(double* U, std::int64_t child_stride, int lead, int from, int first, int last);
 };
 
 /// The fastest set that this machine can run, chosen once. `limit` (portable, avx2, avx512; "auto":

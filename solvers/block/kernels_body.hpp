@@ -654,6 +654,254 @@ void backward_many(const double* panel, std::int64_t stride, int columns, int m,
   copy(own, front, columns * 8);
 }
 
+// --- selected inversion ---
+
+/// X ← (X - left) L⁻ᵀ in N columns of V vectors of rows: `left` are the columns [first, begin).
+template <int V, int N>
+__attribute__((noinline)) void invert_columns(double* X, std::int64_t ldx, const double* panel,
+                                              std::int64_t stride, int first, int begin,
+                                              const double* reciprocal) {
+  double* block = X + begin * ldx;
+  const double* L = panel + begin * stride + begin;
+  Vec x[N][V];
+  CAIRN_UNROLL
+  for (int n = 0; n < N; ++n) {
+    CAIRN_UNROLL
+    for (int v = 0; v < V; ++v) x[n][v] = load(block + n * ldx + v * kWidth);
+  }
+  for (int k = first; k < begin; ++k) {
+    Vec a[V];
+    CAIRN_UNROLL
+    for (int v = 0; v < V; ++v) a[v] = load(X + k * ldx + v * kWidth);
+    const double* b = panel + k * stride + begin;
+    CAIRN_UNROLL
+    for (int n = 0; n < N; ++n) {
+      const Vec bn = broadcast(b[n]);
+      CAIRN_UNROLL
+      for (int v = 0; v < V; ++v) x[n][v] -= a[v] * bn;
+    }
+  }
+  CAIRN_UNROLL
+  for (int j = 0; j < N; ++j) {
+    const Vec inverse = broadcast(reciprocal[j]);
+    CAIRN_UNROLL
+    for (int v = 0; v < V; ++v) {
+      x[j][v] *= inverse;
+      store(block + j * ldx + v * kWidth, x[j][v]);
+    }
+    CAIRN_UNROLL
+    for (int k = j + 1; k < N; ++k) {
+      const Vec l = broadcast(L[j * stride + k]);
+      CAIRN_UNROLL
+      for (int v = 0; v < V; ++v) x[k][v] -= x[j][v] * l;
+    }
+  }
+}
+
+constexpr int round_up(int rows) { return (rows + 7) / 8 * 8; }
+
+void invert_pivots(const double* panel, std::int64_t stride, int columns, double* V, int row_begin,
+                   int row_end) {
+  const std::int64_t ldv = round_up(columns);
+  for (int k = row_begin; k < min(row_end, columns); ++k) V[k * ldv + k] = 1.0;
+  for (int row = row_begin; row < row_end; row += kTileVectors * kWidth) {
+    const int vectors = min(kTileVectors, (row_end - row) / kWidth);
+    for (int begin = row; begin < columns; begin += kWidth) {
+      const int count = min(kWidth, columns - begin);
+      alignas(64) double reciprocal[kWidth];
+      store(reciprocal, reciprocals(panel + begin * stride + begin, stride, count));
+      with_columns(count, [&](auto n) {
+        constexpr int N = decltype(n)::value;
+        if (vectors == 3) {
+          invert_columns<3, N>(V + row, ldv, panel, stride, row, begin, reciprocal);
+        } else if (vectors == 2) {
+          invert_columns<2, N>(V + row, ldv, panel, stride, row, begin, reciprocal);
+        } else {
+          invert_columns<1, N>(V + row, ldv, panel, stride, row, begin, reciprocal);
+        }
+      });
+    }
+  }
+}
+
+/// sum += A B, or -= with `kMinus`: V vectors of rows and N columns; B's row k and column n is at
+/// k · row_step + n · column_step.
+template <bool kMinus, int V, int N>
+inline __attribute__((always_inline)) void accumulate(Vec (&sum)[N][V], int K, const double* A,
+                                                      std::int64_t lda, const double* B,
+                                                      std::int64_t row_step,
+                                                      std::int64_t column_step) {
+  for (int k = 0; k < K; ++k) {
+    Vec a[V];
+    CAIRN_UNROLL
+    for (int v = 0; v < V; ++v) a[v] = load(A + k * lda + v * kWidth);
+    const double* b = B + k * row_step;
+    CAIRN_UNROLL
+    for (int n = 0; n < N; ++n) {
+      const Vec bn = broadcast(b[n * column_step]);
+      CAIRN_UNROLL
+      for (int v = 0; v < V; ++v) {
+        if constexpr (kMinus) {
+          sum[n][v] -= a[v] * bn;
+        } else {
+          sum[n][v] += a[v] * bn;
+        }
+      }
+    }
+  }
+}
+
+/// visit(Number<V>, Number<N>) for a tile of so many vectors and columns.
+template <class Visit>
+inline __attribute__((always_inline)) void with_tile(int vectors, int columns, Visit visit) {
+  with_columns(columns, [&](auto n) {
+    if constexpr (kTileVectors == 3) {
+      if (vectors == 3) return visit(Number<3>{}, n);
+      if (vectors == 2) return visit(Number<2>{}, n);
+    }
+    return visit(Number<1>{}, n);
+  });
+}
+
+template <int V, int N>
+__attribute__((noinline)) void transform_tile(int K, const double* A, std::int64_t lda,
+                                              const double* B, std::int64_t ldb, double* C) {
+  Vec sum[N][V] = {};
+  accumulate<false, V, N>(sum, K, A, lda, B, ldb, 1);
+  CAIRN_UNROLL
+  for (int n = 0; n < N; ++n) {
+    CAIRN_UNROLL
+    for (int v = 0; v < V; ++v) store(C + n * lda + v * kWidth, sum[n][v]);
+  }
+}
+
+void transform_rows(const double* panel, std::int64_t stride, int columns, const double* V,
+                    double* T, int first, int last) {
+  const int c8 = round_up(columns);
+  for (int row = 0; row < c8; row += kTileVectors * kWidth) {
+    const int vectors = min(kTileVectors, (c8 - row) / kWidth);
+    // V is upper triangular: its rows from `row` on begin at column `row`.
+    const double* A = V + std::int64_t{row} * c8 + row;
+    for (int column = first; column < last; column += kTileColumns) {
+      const double* B = panel + row * stride + columns + column;
+      double* C = T + std::int64_t{column} * c8 + row;
+      with_tile(vectors, min(kTileColumns, last - column), [&](auto v, auto n) {
+        transform_tile<decltype(v)::value, decltype(n)::value>(columns - row, A, c8, B, stride, C);
+      });
+    }
+  }
+}
+
+void inverse_rows(const double* U, std::int64_t stride, int columns, int m, const double* T,
+                  double* Z, int row_begin, int row_end) {
+  const int shift = columns / 8 * 8;
+  const std::int64_t ldu = stride - shift;
+  const std::int64_t ldt = round_up(columns);
+  for (int row = row_begin; row < row_end; row += kTileVectors * kWidth) {
+    const int vectors = min(kTileVectors, (row_end - row) / kWidth);
+    for (int column = 0; column < columns; column += kTileColumns) {
+      tile(vectors, min(kTileColumns, columns - column), m - columns, U + (row - shift), ldu,
+           T + column, ldt, Z + column * stride + row, stride);
+    }
+  }
+}
+
+/// One tile of Z_JJ, at `row` and `column`, to a place of its own.
+template <int V, int N>
+__attribute__((noinline)) void pivots_tile(const double* VV, const double* T, std::int64_t stride,
+                                           int columns, int m, const double* Z, int row, int column,
+                                           double* C) {
+  const std::int64_t ld = round_up(columns);
+  Vec sum[N][V] = {};
+  accumulate<false, V, N>(sum, columns - row, VV + row * ld + row, ld, VV + row * ld + column, ld,
+                          1);
+  accumulate<true, V, N>(sum, m - columns, T + row, ld, Z + column * stride + columns, 1, stride);
+  CAIRN_UNROLL
+  for (int n = 0; n < N; ++n) {
+    CAIRN_UNROLL
+    for (int v = 0; v < V; ++v) store(C + (n * V + v) * kWidth, sum[n][v]);
+  }
+}
+
+void inverse_pivots(const double* V, const double* T, std::int64_t stride, int columns, int m,
+                    double* Z, int row_begin, int row_end) {
+  for (int row = row_begin; row < row_end; row += kTileVectors * kWidth) {
+    const int vectors = min(kTileVectors, (row_end - row) / kWidth);
+    const int height = vectors * kWidth;
+    const int last_row = min(columns, row + height);
+    for (int column = 0; column < last_row; column += kTileColumns) {
+      const int width = min(kTileColumns, last_row - column);
+      alignas(64) double C[kTileVectors * kWidth * kTileColumns];
+      with_tile(vectors, width, [&](auto v, auto n) {
+        pivots_tile<decltype(v)::value, decltype(n)::value>(V, T, stride, columns, m, Z, row,
+                                                            column, C);
+      });
+      for (int n = 0; n < width; ++n) {
+        for (int i = column + n > row ? column + n : row; i < last_row; ++i) {
+          const double z = C[n * height + (i - row)];
+          Z[(column + n) * stride + i] = z;
+          Z[i * stride + column + n] = z;
+        }
+      }
+    }
+  }
+}
+
+/// target[0 …] = those of the eight at source whose bit in `mask` is set; `packed_mask` has as many
+/// bits, from the lowest on.
+inline __attribute__((always_inline)) void take_spread(double* target, const double* source,
+                                                       unsigned mask,
+                                                       [[maybe_unused]] unsigned packed_mask) {
+#if defined(__AVX512F__)
+  const __m512d packed = _mm512_maskz_compress_pd(static_cast<__mmask8>(mask), load(source));
+  _mm512_mask_storeu_pd(target, static_cast<__mmask8>(packed_mask), packed);
+#else
+  for (int half = 0; half < 8; half += kWidth, mask >>= kWidth) {
+    unsigned bits = mask & ((1u << kWidth) - 1u);
+    if (bits == (1u << kWidth) - 1u) {
+      store_loose(target, load(source + half));
+      target += kWidth;
+      continue;
+    }
+    for (; bits != 0; bits &= bits - 1) *target++ = source[half + __builtin_ctz(bits)];
+  }
+#endif
+}
+
+void gather(const Spread* spreads, int count, int first, int last, int from, double* U,
+            std::int64_t child_stride, int lead, const double* parent, std::int64_t parent_stride) {
+  const Spread* const end = spreads + count;
+  const Spread* begin = spreads;
+  while (begin + 1 < end && begin[1].source <= from) ++begin;
+  while (spreads + 1 < end && spreads[1].source <= first) ++spreads;
+  for (; spreads < end && spreads->source < last; ++spreads) {
+    int column = spreads->source;
+    for (unsigned bits = spreads->mask; bits != 0; bits &= bits - 1, ++column) {
+      if (column < first || column >= last) continue;
+      const double* source = parent + (spreads->target + __builtin_ctz(bits)) * parent_stride;
+      double* target = U + column * child_stride;
+      for (int k = 0; k < 8; k += kWidth) {
+        store(target + k, Vec{});
+        store(target + child_stride - 8 + k, Vec{});
+      }
+      for (const Spread* s = begin; s < end; ++s)
+        take_spread(target + lead + s->source, source + s->target, s->mask, s->packed);
+    }
+  }
+}
+
+void mirror(double* U, std::int64_t child_stride, int lead, int from, int first, int last) {
+  constexpr int kBlock = 8;
+  for (int begin = 0; begin < from; begin += kBlock) {
+    const int end = min(from, begin + kBlock);
+    for (int column = first; column < last; ++column) {
+      double* target = U + column * child_stride + lead;
+      const double* source = U + lead + column;
+      for (int row = begin; row < end; ++row) target[row] = source[row * child_stride];
+    }
+  }
+}
+
 }  // namespace
 
 extern const Kernels kernels;
@@ -666,6 +914,12 @@ const Kernels kernels{.name = CAIRN_KERNEL_NAME,
                       .forward = &forward,
                       .backward = &backward,
                       .forward_many = &forward_many,
-                      .backward_many = &backward_many};
+                      .backward_many = &backward_many,
+                      .invert_pivots = &invert_pivots,
+                      .transform_rows = &transform_rows,
+                      .inverse_rows = &inverse_rows,
+                      .inverse_pivots = &inverse_pivots,
+                      .gather = &gather,
+                      .mirror = &mirror};
 
 }  // namespace cairn::block::CAIRN_KERNEL_SET

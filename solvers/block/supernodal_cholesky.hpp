@@ -44,6 +44,9 @@ class SupernodalCholesky {
   /// X = H⁻¹ G, both size × columns, column-major; X may be G. Eight columns cost little more than
   /// two single solves.
   void solve(std::span<const double> G, std::span<double> X, int columns);
+  /// X = H⁻¹ [e_i, e_j, …] for scalar rows i, j, …, size × their number, column-major. Forward
+  /// substitution visits only the supernodes between theirs and the root.
+  void inverse_columns(std::span<const std::int64_t> scalars, std::span<double> X);
   double log_determinant() const;
 
   const Symbolic& symbolic() const { return symbolic_; }
@@ -53,6 +56,7 @@ class SupernodalCholesky {
   std::int64_t doubles() const { return std::ssize(panels_) + std::ssize(workspace_); }
 
  private:
+  friend class SelectedInverse;  // the same tree, panels and room, worked off backwards
   void plan_solve();
   void factorize_supernode(const BlockMatrix& H, std::int32_t s, std::int64_t lane);
   void assemble(const BlockMatrix& H, std::int32_t s, std::int64_t size);
@@ -70,7 +74,9 @@ class SupernodalCholesky {
     return workspace_.data() + begin + schedule_.place[s];
   }
   /// Forward and backward substitution on `vectors_`, whose rows hold `width` numbers: 1, or 8.
-  void substitute(int width);
+  /// With `marked`, forward only through the supernodes that are `on_path_`.
+  void substitute(int width, bool marked = false);
+  void mark_path(std::int64_t row);
 
   const Kernels* kernels_;
   std::string ordering_;
@@ -95,6 +101,7 @@ class SupernodalCholesky {
   AlignedVector vectors_;
   AlignedVector fronts_;  // one for each lane
   std::int64_t front_rows_ = 0;
+  std::vector<bool> on_path_;  // by supernode
 };
 
 }  // namespace cairn::block

@@ -84,7 +84,7 @@ void SupernodalCholesky::plan_solve() {
   fronts_ = AlignedVector(front_rows_ * schedule_.lanes);
 }
 
-void SupernodalCholesky::substitute(int width) {
+void SupernodalCholesky::substitute(int width, bool marked) {
   const auto nodes = symbolic_.supernodes();
   const auto offsets = symbolic_.offsets();
   double* const vector = vectors_.data();
@@ -92,6 +92,7 @@ void SupernodalCholesky::substitute(int width) {
     return fronts_.data() + static_cast<std::int64_t>(lane) * front_rows_ * width;
   };
   const auto forward = [&](std::int32_t s, double* front) {
+    if (marked && !on_path_[s]) return;
     const Supernode& node = nodes[s];
     (width == 1 ? kernels_->forward : kernels_->forward_many)(
         panels_.data() + node.panel, node.stride, node.columns,
@@ -189,6 +190,51 @@ void SupernodalCholesky::solve(std::span<const double> G, std::span<double> X, i
     for_each_number(first, count, [&](double& number, std::int64_t at) { number = G[at]; });
     substitute(kTogether);
     for_each_number(first, count, [&](double& number, std::int64_t at) { X[at] = number; });
+  }
+}
+
+/// Puts a row's supernode and all above it on the path.
+void SupernodalCholesky::mark_path(std::int64_t row) {
+  const auto nodes = symbolic_.supernodes();
+  const auto offsets = symbolic_.offsets();
+  const auto after = std::ranges::upper_bound(
+      nodes, row, {}, [&](const Supernode& node) { return offsets[node.block_begin]; });
+  for (auto s = static_cast<std::int32_t>(after - nodes.begin()) - 1; s >= 0 && !on_path_[s];
+       s = nodes[s].parent)
+    on_path_[s] = true;
+}
+
+void SupernodalCholesky::inverse_columns(std::span<const std::int64_t> scalars,
+                                         std::span<double> X) {
+  if (!factorized_) throw std::logic_error("inverse_columns: there is no factorisation");
+  const std::int64_t size = structure_->size();
+  if (std::ssize(X) != size * std::ssize(scalars))
+    throw std::logic_error("inverse_columns: the result is not size × columns");
+  vectors_.resize(vector_rows_ * kTogether);
+  fronts_.resize(front_rows_ * schedule_.lanes * kTogether);
+  const auto order = symbolic_.order();
+  const auto position = symbolic_.position();
+  const auto offsets = symbolic_.offsets();
+  const auto from = structure_->offsets();
+  for (std::int64_t first = 0; first < std::ssize(scalars); first += kTogether) {
+    const auto count = std::min<std::int64_t>(kTogether, std::ssize(scalars) - first);
+    std::fill_n(vectors_.begin(), size * kTogether, 0.0);
+    on_path_.assign(symbolic_.supernodes().size(), false);
+    for (std::int64_t c = 0; c < count; ++c) {
+      const std::int64_t scalar = scalars[first + c];
+      const auto block = std::ranges::upper_bound(from, scalar) - from.begin() - 1;
+      const std::int64_t row = offsets[position[block]] + scalar - from[block];
+      vectors_[row * kTogether + c] = 1.0;
+      mark_path(row);
+    }
+    substitute(kTogether, true);
+    for (std::size_t k = 0; k < order.size(); ++k) {
+      for (std::int64_t i = 0; i < offsets[k + 1] - offsets[k]; ++i) {
+        const double* row = vectors_.data() + (offsets[k] + i) * kTogether;
+        double* to = X.data() + first * size + from[order[k]] + i;
+        for (std::int64_t c = 0; c < count; ++c) to[c * size] = row[c];
+      }
+    }
   }
 }
 

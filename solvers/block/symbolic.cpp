@@ -113,15 +113,14 @@ std::vector<double> stack_ranks(std::span<const std::int32_t> parent,
 
 std::int32_t round_up(std::int64_t value) { return static_cast<std::int32_t>((value + 7) / 8 * 8); }
 
-/// Modelled time of one supernode of `columns` scalar columns and `below` scalar rows below them.
-double cost_of(double columns, double below, const CostModel& c) {
-  const double rows = round_up(static_cast<std::int64_t>(columns + below));
-  return c.supernode + c.panel_entry * rows * columns + c.panel_flop * columns * columns * rows +
-         c.update_flop * below * (below + 16.0) * columns +
-         c.extend_entry * 0.5 * below * (below + 8.0);
-}
-
 }  // namespace
+
+double CostModel::time(double columns, double below) const {
+  const double rows = round_up(static_cast<std::int64_t>(columns + below));
+  return supernode + panel_entry * rows * columns + panel_flop * columns * columns * rows +
+         update_flop * below * (below + 16.0) * columns +
+         extend_entry * 0.5 * below * (below + 8.0);
+}
 
 Symbolic Symbolic::outline(const BlockStructure& structure,
                            std::span<const std::int32_t> ordering) {
@@ -236,9 +235,8 @@ void Symbolic::find_supernodes(const BlockStructure& structure, const CostModel&
       double best_gain = 0.0;
       std::int32_t best = -1;
       for (const std::int32_t c : children[s]) {
-        const double gain = cost_of(columns[c], below[c], cost) +
-                            cost_of(columns[s], below[s], cost) -
-                            cost_of(columns[c] + columns[s], below[s], cost);
+        const double gain = cost.time(columns[c], below[c]) + cost.time(columns[s], below[s]) -
+                            cost.time(columns[c] + columns[s], below[s]);
         if (gain > best_gain) {
           best_gain = gain;
           best = c;

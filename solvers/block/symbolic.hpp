@@ -36,6 +36,9 @@ struct CostModel {
   double panel_flop = 0.05;
   double update_flop = 0.025;
   double extend_entry = 0.8;
+
+  /// Modelled time of one supernode of so many scalar columns and scalar rows below them.
+  double time(double columns, double below) const;
 };
 
 /// Everything about the factorisation P H Pᵀ = L Lᵀ that depends on the structure alone:

@@ -177,13 +177,6 @@ TEST_F(OptimizeCommand, TheLinearSolverMayBeGivenOnceOnly) {
   EXPECT_EQ(by_option.at("linear_solver").as_string(), "eigen");
 }
 
-TEST_F(OptimizeCommand, CovarianceBlocksAreRefusedAndNoneIsTheDefault) {
-  const Outcome blocks = cairn({"optimize", graph(), "--covariance", "blocks"});
-  EXPECT_EQ(blocks.exit_code, 2);
-  EXPECT_THAT(blocks.err, HasSubstr("not available in this version"));
-  EXPECT_EQ(cairn({"optimize", graph(), "--covariance", "none"}).exit_code, 0);
-}
-
 TEST_F(OptimizeCommand, ReadsStandardInputAndWritesStandardOutput) {
   const std::string file = graph();
   const Outcome piped =

@@ -17,6 +17,7 @@
 #include <fstream>
 #include <sstream>
 #include <stdexcept>
+#include <thread>
 
 #include <boost/json/parse.hpp>
 
@@ -82,13 +83,41 @@ class Child {
   }
 
   void feed(const std::string& input) {
+    feed_and_keep_open(input);
+    in_.close_write();
+  }
+
+  void feed_and_keep_open(const std::string& input) {
     std::size_t done = 0;
     while (done < input.size()) {
       const ssize_t put = ::write(in_.write_end, input.data() + done, input.size() - done);
       if (put <= 0) break;
       done += static_cast<std::size_t>(put);
     }
-    in_.close_write();
+  }
+
+  /// Makes room for input that is fed before anything is read.
+  void make_room(std::size_t bytes) {
+    ::fcntl(in_.write_end, F_SETPIPE_SZ, static_cast<int>(bytes));
+  }
+
+  /// Kills the child once it has written that many lines and `delay` has passed, or when it has
+  /// been silent for long.
+  Outcome kill_after(int lines, std::chrono::microseconds delay) {
+    Outcome outcome;
+    while (std::ranges::count(outcome.out, '\n') < lines) {
+      pollfd end{out_.read_end, POLLIN, 0};
+      const int ready = ::poll(&end, 1, 300);
+      if (ready == 0 || (ready > 0 && !read_some(out_.read_end, outcome.out))) break;
+    }
+    std::this_thread::sleep_for(delay);
+    ::kill(pid_, SIGKILL);
+    while (read_some(out_.read_end, outcome.out)) {
+    }
+    while (read_some(err_.read_end, outcome.err)) {
+    }
+    outcome.exit_code = wait_for(pid_);
+    return outcome;
   }
 
   /// Reads both streams to their ends; sends `signal` when standard error first holds `cue`.
@@ -144,6 +173,15 @@ Outcome run_program(const Arguments& command, const Environment& environment,
 Outcome cairn(const Arguments& arguments, const Environment& environment,
               const std::string& input) {
   return run_program(with_program(arguments), environment, input);
+}
+
+Outcome cairn_killed(const Arguments& arguments, const std::string& input, int lines,
+                     std::chrono::microseconds delay) {
+  std::signal(SIGPIPE, SIG_IGN);
+  Child child(with_program(arguments), {});
+  child.make_room(std::max<std::size_t>(input.size(), 1u << 16));
+  child.feed_and_keep_open(input);
+  return child.kill_after(lines, delay);
 }
 
 Outcome cairn_interrupted(const Arguments& arguments, const std::string& cue, int signal) {

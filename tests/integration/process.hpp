@@ -3,6 +3,7 @@
 
 #include <sys/types.h>
 
+#include <chrono>
 #include <filesystem>
 #include <map>
 #include <string>
@@ -33,6 +34,11 @@ Outcome run_program(const Arguments& command, const Environment& environment = {
 
 /// Starts `cairn`, sends `signal` as soon as its standard error says `cue`, and waits for its end.
 Outcome cairn_interrupted(const Arguments& arguments, const std::string& cue, int signal);
+
+/// Starts `cairn` with `input` and more to come, and kills it (SIGKILL) when it has written `lines`
+/// lines and `delay` has passed; what it had written by then.
+Outcome cairn_killed(const Arguments& arguments, const std::string& input, int lines,
+                     std::chrono::microseconds delay);
 
 /// Runs `cairn` with standard output and error on a terminal; both arrive in `out`.
 Outcome cairn_on_terminal(const Arguments& arguments, const Environment& environment = {});

@@ -25,6 +25,14 @@ struct RelativePose {
     const Vector<S, 3> measured = z.template cast<S>();
     return Se2::between<S>(measured, Se2::between<S>(a, b));
   }
+  static bool propagate(int target, const double* const* x, const double* z, double* out) {
+    using Pose = Vector<double, 3>;
+    const Pose measured = Eigen::Map<const Pose>(z);
+    const Pose other = Eigen::Map<const Pose>(x[1 - target]);
+    Eigen::Map<Pose>{out} =
+        Se2::compose<double>(other, target == 1 ? measured : Pose(Se2::inverse<double>(measured)));
+    return true;
+  }
 };
 
 struct PosePrior {

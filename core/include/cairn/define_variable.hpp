@@ -6,6 +6,7 @@
 
 #include <Eigen/Core>
 
+#include "cairn/dual.hpp"
 #include "cairn/variable_type.hpp"
 
 namespace cairn {
@@ -31,6 +32,8 @@ using Vector = Eigen::Matrix<S, N, 1>;
 ///    is wrong;
 ///  - the group operations `compose(a, b)`, `inverse(a)`, `adjoint(a)` (tangent × tangent),
 ///    `exp(delta)`, `log(a)`: then the type has the ability `LieGroup`;
+///  - `retract_jacobian(x, delta)` (tangent × tangent, see `VariableType`): else it is found by
+///    differentiating `retract` and `local`;
 ///  - `static constexpr int kDimension`, `kOriented` and `rotation(x)` (kOriented only),
 ///    `position(x)`, `from_placement(R, t)` (R ignored by points): then it has the ability
 ///    `Placement`.
@@ -147,6 +150,24 @@ class DefinedVariable final : public VariableType {
     for (std::size_t s = 0; s < count; ++s) {
       store<kT>(V::template local<double>(load<kA>(x + s * kA), load<kA>(y + s * kA)),
                 delta + s * kT);
+    }
+  }
+  void retract_jacobian(const double* x, const double* delta, double* D) const override {
+    const Vector<double, kA> from = load<kA>(x);
+    const Vector<double, kT> step = load<kT>(delta);
+    Eigen::Map<Eigen::Matrix<double, kT, kT>> out{D};
+    if constexpr (requires { V::retract_jacobian(from, step); }) {
+      out = V::retract_jacobian(from, step);
+    } else {
+      const Vector<double, kA> there = V::template retract<double>(from, step);
+      Vector<Dual<kT>, kT> lifted;
+      for (int k = 0; k < kT; ++k) lifted[k] = Dual<kT>::variable(step[k], k);
+      const Vector<Dual<kT>, kT> near = V::template local<Dual<kT>>(
+          there.template cast<Dual<kT>>(),
+          V::template retract<Dual<kT>>(from.template cast<Dual<kT>>(), lifted));
+      for (int row = 0; row < kT; ++row) {
+        for (int k = 0; k < kT; ++k) out(row, k) = near[row].gradient[k];
+      }
     }
   }
   const LieGroup* lie_group() const override {

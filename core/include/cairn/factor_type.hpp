@@ -110,6 +110,13 @@ class CAIRN_API FactorType {
 
   /// Human-readable name of the error metric where there is a choice, else empty.
   virtual std::string_view metric() const { return {}; }
+
+  /// How many numbers it measures of where its variables are in the world, as `resolve_gauge`
+  /// counts them: all of a factor on one variable, none of a factor between variables.
+  virtual int absolute_size() const { return arity() == 1 ? residual_size() : 0; }
+
+  /// Whether a graph's robust loss applies. Not where losses are in the measurement already.
+  virtual bool takes_loss() const { return true; }
 };
 
 }  // namespace cairn

@@ -10,13 +10,13 @@ namespace cairn {
 
 /// Which variables an optimisation holds, so that H is not singular by construction.
 ///
-/// Variables marked `FIX` are held. A connected component that has none, and whose priors (factors
-/// on one variable) together measure fewer numbers than a pose has freedoms, gets its first pose
-/// anchored: the first variable with the component's largest tangent space, if its states form a
-/// Lie group. Then the freedom of the whole component moves it anywhere, and holding it costs
-/// nothing. What is no group, such as a camera whose focal length is unknown, is more than a pose:
-/// holding it would hold what the measurements determine, so its component is left free, which
-/// damped optimizers take well. Anchors are not written to files.
+/// Variables marked `FIX` are held. A connected component that has none, and whose priors (mostly
+/// factors on one variable: `FactorType::absolute_size`) together measure fewer numbers than a pose
+/// has freedoms, gets its first pose anchored: the first variable with the component's largest
+/// tangent space, if its states form a Lie group. Then the freedom of the whole component moves it
+/// anywhere, and holding it costs nothing. What is no group, such as a camera whose focal length is
+/// unknown, is more than a pose: holding it would hold what the measurements determine, so its
+/// component is left free, which damped optimizers take well. Anchors are not written to files.
 struct CAIRN_API Gauge {
   std::vector<bool> held;      ///< by variable
   std::vector<int> anchored;   ///< variables held only to fix the gauge, one a component

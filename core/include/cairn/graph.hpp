@@ -53,6 +53,12 @@ struct FactorRef {
   std::int32_t entry;
 };
 
+/// Where variables and factors are after some have left: by old index the new one, or -1.
+struct Renumbering {
+  std::vector<std::int32_t> variable;
+  std::vector<std::int32_t> factor;
+};
+
 /// A factor graph: variables and factors in typed pools, and an estimate.
 ///
 /// A variable is known by its `Id` (as in files) and by its index 0 … size-1 in the order of
@@ -77,6 +83,11 @@ class CAIRN_API Graph {
   /// is not positive definite.
   int add_factor(std::shared_ptr<const FactorType> type, std::span<const int> variables,
                  std::span<const double> measurement, std::span<const double> information);
+
+  /// Takes out the factors and variables marked (by position and by index); what stays keeps its
+  /// order and its state, and moves up. Takes time in proportion to the whole graph. Throws `Error`
+  /// (usage), and removes nothing, if a factor that stays is on a variable that leaves.
+  Renumbering remove(const std::vector<bool>& factors, const std::vector<bool>& variables);
 
   /// Makes room beforehand; purely for speed.
   void reserve(std::size_t variables, std::size_t factors);
@@ -142,6 +153,8 @@ class CAIRN_API Graph {
   };
   int variable_pool_of(const std::shared_ptr<const VariableType>& type);
   int factor_pool_of(const std::shared_ptr<const FactorType>& type);
+  void remove_factors(const std::vector<bool>& leaves, const std::vector<std::int32_t>& position);
+  void remove_variables(const std::vector<bool>& leaves, const std::vector<std::int32_t>& index);
 
   std::vector<VariableRecord> records_;
   std::vector<VariablePool> variable_pools_;
@@ -160,5 +173,8 @@ CAIRN_API std::vector<double> squared_norms(const Graph& graph);
 /// For each factor by position, whether it closes a loop: it joins two variables of one type that
 /// do not follow each other in id order among the variables of that type.
 CAIRN_API std::vector<bool> loop_closures(const Graph& graph);
+
+/// For each factor by position, whether the graph's loss applies to it; all false without a loss.
+CAIRN_API std::vector<bool> under_loss(const Graph& graph);
 
 }  // namespace cairn

@@ -64,6 +64,11 @@ class CAIRN_API VariableType {
   /// tangent_size() doubles each.
   virtual void local(std::size_t count, const double* x, const double* y, double* delta) const = 0;
 
+  /// D (tangent × tangent, column-major) of one variable: a step ε from retract(x, δ) is a step of
+  /// D⁻¹ε in δ, that is, retract(x, δ + ε) = retract(retract(x, δ), D ε) to first order. For a Lie
+  /// group it is the right Jacobian of exp at δ; the identity where states move by addition.
+  virtual void retract_jacobian(const double* x, const double* delta, double* D) const = 0;
+
   virtual const LieGroup* lie_group() const { return nullptr; }
   virtual const Placement* placement() const { return nullptr; }
 };

@@ -100,6 +100,7 @@ void CholmodSolver::analyze(const BlockStructure& structure) {
   L_ = cholmod_analyze_p(&A, order.data(), nullptr, 0, &common_);
   if (!L_) throw_cholmod_error("the analysis", common_.status);
 
+  marginals_.analyze(structure.sizes());
   version_ = structure.version();
   stats_ = {};
   stats_.ordering = ordering_;
@@ -152,18 +153,22 @@ Factorization CholmodSolver::failed_at(std::size_t column) const {
   return {false, block_of_scalar_[static_cast<const int*>(L_->Perm)[column]]};
 }
 
-void CholmodSolver::solve(std::span<const double> g, std::span<double> x) {
+void CholmodSolver::solve(std::span<const double> g, std::span<double> x) { solve(g, x, 1); }
+
+void CholmodSolver::solve(std::span<const double> G, std::span<double> X, int columns) {
   if (!factorized_) throw std::logic_error("linear_solver cholmod: solve without a factorisation");
+  if (columns == 0) return;
   cholmod_dense right{};
-  right.nrow = right.nzmax = right.d = g.size();
-  right.ncol = 1;
-  right.x = const_cast<double*>(g.data());  // only read
+  right.ncol = static_cast<std::size_t>(columns);
+  right.nrow = right.d = G.size() / right.ncol;
+  right.nzmax = G.size();
+  right.x = const_cast<double*>(G.data());  // only read
   right.xtype = CHOLMOD_REAL;
   right.dtype = CHOLMOD_DOUBLE;
   if (!cholmod_solve2(CHOLMOD_A, L_, &right, nullptr, &x_, nullptr, &y_, &e_, &common_)) {
     throw_cholmod_error("a solve", common_.status);
   }
-  std::copy_n(static_cast<const double*>(x_->x), x.size(), x.begin());
+  std::copy_n(static_cast<const double*>(x_->x), X.size(), X.begin());
 }
 
 double CholmodSolver::log_determinant() const {
@@ -175,7 +180,10 @@ double CholmodSolver::log_determinant() const {
 }
 
 void* CholmodSolver::ability(std::string_view name) {
-  return name == LogDeterminant::kAbility ? static_cast<LogDeterminant*>(this) : nullptr;
+  if (name == LogDeterminant::kAbility) return static_cast<LogDeterminant*>(this);
+  if (name == ManyRightHandSides::kAbility) return static_cast<ManyRightHandSides*>(this);
+  if (name == Marginals::kAbility) return static_cast<Marginals*>(&marginals_);
+  return nullptr;
 }
 
 }  // namespace cairn

@@ -9,6 +9,7 @@
 
 #include "cairn/block_matrix.hpp"
 #include "cairn/linear_solver.hpp"
+#include "cairn/marginals.hpp"
 
 namespace cairn {
 
@@ -22,7 +23,7 @@ enum class CholmodMode {
 /// Adapter of CHOLMOD (Chen, Davis, Hager, Rajamanickam 2008): H = P L Lᵀ Pᵀ, with P from the graph
 /// of the blocks. Block values are scattered into scalar form by a map computed once a structure.
 /// Every instance has a workspace of its own; CHOLMOD neither prints nor aborts.
-class CholmodSolver final : public LinearSolver, public LogDeterminant {
+class CholmodSolver final : public LinearSolver, public LogDeterminant, public ManyRightHandSides {
  public:
   CholmodSolver(CholmodMode mode, std::string ordering);
   ~CholmodSolver() override;
@@ -30,6 +31,7 @@ class CholmodSolver final : public LinearSolver, public LogDeterminant {
   void analyze(const BlockStructure& structure) override;
   Factorization factorize(const BlockMatrix& H) override;
   void solve(std::span<const double> g, std::span<double> x) override;
+  void solve(std::span<const double> G, std::span<double> X, int columns) override;
   const LinearSolverStats& stats() const override { return stats_; }
 
   double log_determinant() const override;
@@ -55,6 +57,7 @@ class CholmodSolver final : public LinearSolver, public LogDeterminant {
   std::vector<int> block_of_scalar_;
   std::vector<double> pivots_;  // the diagonal of L
   LinearSolverStats stats_;
+  SolvedMarginals marginals_{*this};
   bool factorized_ = false;
 };
 

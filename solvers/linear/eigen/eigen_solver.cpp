@@ -54,6 +54,7 @@ void EigenSolver::analyze(const BlockStructure& structure) {
   ldlt_.analyzePattern(permuted_);
   right_.resize(pattern_.size());
 
+  marginals_.analyze(structure.sizes());
   version_ = structure.version();
   stats_ = {};
   stats_.ordering = ordering_;
@@ -143,7 +144,9 @@ double EigenSolver::log_determinant() const {
 }
 
 void* EigenSolver::ability(std::string_view name) {
-  return name == LogDeterminant::kAbility ? static_cast<LogDeterminant*>(this) : nullptr;
+  if (name == LogDeterminant::kAbility) return static_cast<LogDeterminant*>(this);
+  if (name == Marginals::kAbility) return static_cast<Marginals*>(&marginals_);
+  return nullptr;
 }
 
 }  // namespace cairn

@@ -8,6 +8,7 @@
 
 #include "cairn/block_matrix.hpp"
 #include "cairn/linear_solver.hpp"
+#include "cairn/marginals.hpp"
 
 namespace cairn {
 
@@ -54,6 +55,7 @@ class EigenSolver final : public LinearSolver, public LogDeterminant {
   Ldlt ldlt_;
   Eigen::VectorXd right_;
   LinearSolverStats stats_;
+  SolvedMarginals marginals_{*this};
   bool factorized_ = false;
 };
 

@@ -40,6 +40,7 @@ void LapackSolver::analyze(const BlockStructure& structure) {
   for (int block = 0; block < structure.blocks(); ++block)
     block_of_scalar_.insert(block_of_scalar_.end(), structure.block_size(block), block);
 
+  marginals_.analyze(structure.sizes());
   version_ = structure.version();
   const auto size = static_cast<double>(n);
   stats_ = {};
@@ -103,7 +104,9 @@ double LapackSolver::log_determinant() const {
 }
 
 void* LapackSolver::ability(std::string_view name) {
-  return name == LogDeterminant::kAbility ? static_cast<LogDeterminant*>(this) : nullptr;
+  if (name == LogDeterminant::kAbility) return static_cast<LogDeterminant*>(this);
+  if (name == Marginals::kAbility) return static_cast<Marginals*>(&marginals_);
+  return nullptr;
 }
 
 }  // namespace cairn

@@ -7,6 +7,7 @@
 #include "cairn/aligned.hpp"
 #include "cairn/block_matrix.hpp"
 #include "cairn/linear_solver.hpp"
+#include "cairn/marginals.hpp"
 
 namespace cairn {
 
@@ -36,6 +37,7 @@ class LapackSolver final : public LinearSolver, public LogDeterminant {
   std::vector<std::int32_t> block_of_scalar_;
   AlignedVector dense_;  // column-major; the lower triangle is H, then L
   LinearSolverStats stats_;
+  SolvedMarginals marginals_{*this};
   bool factorized_ = false;
 };
 

@@ -67,6 +67,7 @@ void SchurSolver::analyze(const BlockStructure& structure) {
   vectors_.clear();
   for (const std::int32_t block : plan_.remaining) vectors_.push_back(structure.offsets()[block]);
   if (!plan_.remaining.empty()) inner_->analyze(plan_.reduced);
+  marginals_.analyze(structure.sizes());
   version_ = structure.version();
   stats_ = {};
   stats_.ordering = "schur(" + std::to_string(plan_.eliminated.size()) + " eliminated)";
@@ -254,6 +255,9 @@ void* SchurSolver::ability(std::string_view name) {
     return static_cast<EliminationOrder*>(this);
   if (name == ManyRightHandSides::kAbility && inner_many_)
     return static_cast<ManyRightHandSides*>(this);
+  // Exact where the inner solver is.
+  if (name == Marginals::kAbility && query<Marginals>(*inner_))
+    return static_cast<Marginals*>(&marginals_);
   return nullptr;
 }
 

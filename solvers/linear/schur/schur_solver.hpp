@@ -10,6 +10,7 @@
 
 #include "cairn/aligned.hpp"
 #include "cairn/linear_solver.hpp"
+#include "cairn/marginals.hpp"
 #include "schur_plan.hpp"
 
 namespace cairn {
@@ -25,7 +26,8 @@ namespace cairn {
 /// one writer, which adds up in the order of E: results do not depend on the number of threads.
 ///
 /// Failures, statistics, the logarithm of the determinant and the order of elimination are those of
-/// the whole; the last two, and many right-hand sides, where the inner solver has the ability.
+/// the whole; the last two, many right-hand sides and marginals (by solves) where the inner solver
+/// has the ability.
 class SchurSolver final : public LinearSolver,
                           public LogDeterminant,
                           public EliminationOrder,
@@ -80,6 +82,7 @@ class SchurSolver final : public LinearSolver,
   std::vector<std::int64_t> vectors_;  // first scalar row in H, by remaining block
   mutable std::vector<std::int32_t> order_;
   LinearSolverStats stats_;
+  SolvedMarginals marginals_{*this};
 };
 
 }  // namespace cairn

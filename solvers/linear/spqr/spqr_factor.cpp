@@ -171,6 +171,25 @@ void SpqrFactor::minimize(std::span<const double> residual, std::span<double> x)
   if (!rotated) throw_spqr_error("a solve", common_.status);
   cholmod_dense* solution = SuiteSparseQR_solve<double>(SPQR_RETX_EQUALS_B, qr_, rotated, &common_);
   cholmod_l_free_dense(&rotated, &common_);
+  copy_solution(solution, x);
+}
+
+void SpqrFactor::solve_normal(std::span<const double> g, std::span<double> x) {
+  cholmod_dense right{};
+  right.nrow = right.nzmax = right.d = g.size();
+  right.ncol = 1;
+  right.x = const_cast<double*>(g.data());  // only read
+  right.xtype = CHOLMOD_REAL;
+  right.dtype = CHOLMOD_DOUBLE;
+  cholmod_dense* half = SuiteSparseQR_solve<double>(SPQR_RTX_EQUALS_ETB, qr_, &right, &common_);
+  if (!half) throw_spqr_error("a solve", common_.status);
+  cholmod_dense* solution = SuiteSparseQR_solve<double>(SPQR_RETX_EQUALS_B, qr_, half, &common_);
+  cholmod_l_free_dense(&half, &common_);
+  copy_solution(solution, x);
+}
+
+/// Takes what SuiteSparseQR returned, and frees it.
+void SpqrFactor::copy_solution(cholmod_dense* solution, std::span<double> x) {
   if (!solution) throw_spqr_error("a solve", common_.status);
   std::copy_n(static_cast<const double*>(solution->x), x.size(), x.begin());
   cholmod_l_free_dense(&solution, &common_);

@@ -28,6 +28,9 @@ class SpqrFactor {
   std::int64_t factorize(const JacobianMatrix& J, std::span<const double> damping);
   /// x = argmin ‖[J; √D] x + [r; 0]‖, in the columns' order of elimination.
   void minimize(std::span<const double> residual, std::span<double> x);
+  /// x = (AᵀA)⁻¹ g for the matrix A that was factorised, by RᵀR x = g (the semi-normal equations);
+  /// both in the columns' order of elimination. x may be g.
+  void solve_normal(std::span<const double> g, std::span<double> x);
   /// |R_kk| of the last factorisation, by column.
   std::span<const double> diagonal() const { return diagonal_; }
 
@@ -37,6 +40,7 @@ class SpqrFactor {
 
  private:
   cholmod_sparse matrix();
+  void copy_solution(cholmod_dense* solution, std::span<double> x);
   void build_pattern(const JacobianStructure& structure, std::span<const std::int32_t> order,
                      bool damped);
   void read_diagonal();

@@ -45,6 +45,7 @@ void SpqrSolver::analyze(const JacobianStructure& structure) {
   }
   permuted_.resize(scalar_.size());
   plain_.emplace(structure, order_, false, common_);
+  marginals_.analyze(structure.column_sizes());
   structure_ = &structure;
   version_ = structure.version();
   stats_ = {};
@@ -83,6 +84,7 @@ double SpqrSolver::log_determinant() const {
 void* SpqrSolver::ability(std::string_view name) {
   if (name == JacobianSolver::kAbility) return static_cast<JacobianSolver*>(this);
   if (name == LogDeterminant::kAbility) return static_cast<LogDeterminant*>(this);
+  if (name == Marginals::kAbility) return static_cast<Marginals*>(&marginals_);
   return nullptr;
 }
 
@@ -97,8 +99,11 @@ Factorization SpqrSolver::factorize(const BlockMatrix&) {
   throw std::logic_error("linear_solver spqr: factorize of H, which it cannot analyze");
 }
 
-void SpqrSolver::solve(std::span<const double>, std::span<double>) {
-  throw std::logic_error("linear_solver spqr: solve of H, which it cannot factorize");
+void SpqrSolver::solve(std::span<const double> g, std::span<double> x) {
+  if (!current_) throw std::logic_error("linear_solver spqr: solve without a factorisation");
+  for (std::size_t k = 0; k < scalar_.size(); ++k) permuted_[k] = g[scalar_[k]];
+  current_->solve_normal(permuted_, permuted_);
+  for (std::size_t k = 0; k < scalar_.size(); ++k) x[scalar_[k]] = permuted_[k];
 }
 
 }  // namespace cairn

@@ -11,6 +11,7 @@
 
 #include "cairn/jacobian.hpp"
 #include "cairn/linear_solver.hpp"
+#include "cairn/marginals.hpp"
 #include "spqr_factor.hpp"
 
 namespace cairn {
@@ -42,6 +43,7 @@ class SpqrSolver final : public LinearSolver, public JacobianSolver, public LogD
 
   void analyze(const BlockStructure& structure) override;
   Factorization factorize(const BlockMatrix& H) override;
+  /// x = (JᵀJ + D)⁻¹ g of the last factorisation of J: RᵀR x = g.
   void solve(std::span<const double> g, std::span<double> x) override;
 
  private:
@@ -56,6 +58,7 @@ class SpqrSolver final : public LinearSolver, public JacobianSolver, public LogD
   std::optional<SpqrFactor> plain_, damped_;
   SpqrFactor* current_ = nullptr;  // the one that was factorised last, with success
   LinearSolverStats stats_;
+  SolvedMarginals marginals_{*this};
 };
 
 }  // namespace cairn

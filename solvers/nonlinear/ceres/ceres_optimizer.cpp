@@ -138,12 +138,11 @@ Seconds seconds_of(const ceres::Solver::Summary& ceres) {
 /// Σ ρ(‖r‖²) at the graph's states, with the graph's own loss.
 double chi2_of(const Graph& graph) {
   const std::vector<double> norms = squared_norms(graph);
-  const std::vector<bool> closes_loop = loop_closures(graph);
+  const std::vector<bool> robust = under_loss(graph);
   double sum = 0.0;
   for (std::size_t k = 0; k < norms.size(); ++k) {
     double rho = norms[k];
-    const bool robust = graph.loss() && (graph.loss_scope() == LossScope::all || closes_loop[k]);
-    if (robust) graph.loss()->evaluate({&norms[k], 1}, {&rho, 1}, {});
+    if (robust[k]) graph.loss()->evaluate({&norms[k], 1}, {&rho, 1}, {});
     sum += rho;
   }
   return sum;

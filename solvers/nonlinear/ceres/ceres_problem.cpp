@@ -169,7 +169,8 @@ void CeresProblem::add_factors(const Graph& graph, Values& values) {
     x.clear();
     for (const std::int32_t v : graph.factor_variables(position))
       x.push_back(state(graph, values, v));
-    const bool robust = graph.loss_scope() == LossScope::all || closes_loop[position];
+    const bool robust =
+        pool.type->takes_loss() && (graph.loss_scope() == LossScope::all || closes_loop[position]);
     problem_.AddResidualBlock(costs_.back().get(), robust ? loss_.get() : nullptr, x);
   }
 }

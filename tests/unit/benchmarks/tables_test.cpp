@@ -183,5 +183,20 @@ TEST(PerformanceTables, RefuseAStudyThatTheyDoNotKnow) {
   EXPECT_THROW(sections(report("astrology", "")), std::runtime_error);
 }
 
+TEST(PerformanceTables, CompareCovariancesWithSolvesWhereThoseWereMeasured) {
+  const std::string table = section(
+      report("marginals",
+             R"({"name": "small", "graph": {"variables": 100}, "solver": {"factor_nonzeros": 5000},
+                 "factorize": 0.001, "both": 0.002, "diagonal": 0.0015, "column": 0.0005,
+                 "two_threads": 0.0016, "solves": 0.05},
+                {"name": "large", "graph": {"variables": 90000}, "solver": {}, "factorize": 0.1,
+                 "both": 0.2, "diagonal": 0.15, "column": 0.05, "two_threads": 0.16,
+                 "solves": null})"),
+      "marginals");
+  EXPECT_THAT(table, HasSubstr("| small | 100 | 5 k | 1.00 | 1.50 | 0.500 | 2.00 | 1.60 | 50.0 | "
+                               "25.0 × |"));
+  EXPECT_THAT(table, HasSubstr("| large | 90000 | - | 100 | 150 | 50.0 | 200 | 160 | - | - |"));
+}
+
 }  // namespace
 }  // namespace cairn::performance

@@ -5,7 +5,9 @@
 #include <atomic>
 #include <cstdlib>
 #include <new>
+#include <vector>
 
+#include "block/selected_inverse.hpp"
 #include "block/supernodal_cholesky.hpp"
 #include "cairn/gauge.hpp"
 #include "cairn/linearizer.hpp"
@@ -73,6 +75,30 @@ TEST_P(AllocationTest, AnIterationAllocatesNothingOnceTheStructureIsAnalysed) {
   EXPECT_EQ(allocations - before, 0);
   EXPECT_TRUE(ok);
   EXPECT_GT(before, 0);  // or nothing was counted
+}
+
+TEST_P(AllocationTest, CovariancesOfAnIterationAllocateNothingOnceTheyWereComputed) {
+  const test::PlanarTypes types;
+  const Graph graph = test::random_graph(types, 2000, 300, 5);
+  Linearizer linearizer(graph, resolve_gauge(graph).held);
+  BlockMatrix H(linearizer.structure());
+  std::vector<double> g(linearizer.structure().size()), column(g.size());
+  linearizer.linearize(graph.values(), H, g);
+  block::SupernodalCholesky cholesky;
+  cholesky.analyze(linearizer.structure(), "auto");
+  block::SelectedInverse inverse(cholesky);
+  const std::vector<std::int64_t> last{linearizer.structure().size() - 1};
+  bool ok = true;
+  const auto iterate = [&] {
+    ok &= cholesky.factorize(H).ok;
+    inverse.compute();
+    cholesky.inverse_columns(last, column);
+  };
+  iterate();
+  const int before = allocations;
+  for (int k = 0; k < 3; ++k) iterate();
+  EXPECT_EQ(allocations - before, 0);
+  EXPECT_TRUE(ok);
 }
 
 INSTANTIATE_TEST_SUITE_P(Threads, AllocationTest, ::testing::Values(1, 2));

@@ -158,5 +158,64 @@ TEST_F(GraphTest, SquaredNormsAreByPositionAcrossPools) {
   }
 }
 
+TEST_F(GraphTest, RemovesFactorsAndVariables) {
+  for (int k = 0; k < 5; ++k) add_pose(10 + k, k);
+  graph_.add_variable(types_.point, 20, std::array{5.0, 6.0});
+  for (int k = 1; k < 5; ++k) connect(k - 1, k);
+  graph_.add_factor(types_.prior, std::array{2}, std::array{2.0, 0.0, 0.0}, kUnit);
+  graph_.add_factor(types_.point_seen, std::array{4, 5}, std::array{1.0, 2.0},
+                    std::array{1.0, 0.0, 1.0});
+  graph_.set_fixed(3);
+  const auto version = graph_.structure_version();
+
+  // Variable 11 with its two factors, and the prior.
+  const Renumbering numbers = graph_.remove({true, true, false, false, true, false},
+                                            {false, true, false, false, false, false});
+  EXPECT_THAT(numbers.variable, ElementsAre(0, -1, 1, 2, 3, 4));
+  EXPECT_THAT(numbers.factor, ElementsAre(-1, -1, 0, 1, -1, 2));
+  EXPECT_NE(graph_.structure_version(), version);
+  ASSERT_EQ(graph_.variable_count(), 5);
+  ASSERT_EQ(graph_.factor_count(), 3);
+  EXPECT_EQ(graph_.find(11), std::nullopt);
+  EXPECT_EQ(graph_.find(13), 2);
+  EXPECT_TRUE(graph_.fixed(2));
+  EXPECT_THAT(graph_.state(2), ElementsAre(3.0, 0.0, 0.0));
+  EXPECT_THAT(graph_.state(4), ElementsAre(5.0, 6.0));
+  EXPECT_EQ(graph_.describe_factor(0), "EDGE_SE2 12 13");
+  EXPECT_EQ(graph_.describe_factor(2), "EDGE_SE2_XY 14 20");
+  EXPECT_THAT(graph_.measurement(2), ElementsAre(1.0, 2.0));
+  EXPECT_EQ(graph_.factor_pools().size(), 2U);  // the one of priors has gone
+  EXPECT_EQ(squared_norms(graph_).size(), 3U);
+
+  // What is freed can be used again.
+  EXPECT_EQ(add_pose(11), 5);
+  connect(5, 1);
+  EXPECT_EQ(graph_.describe_factor(3), "EDGE_SE2 11 12");
+}
+
+TEST_F(GraphTest, RemovesNoVariableThatAFactorNeeds) {
+  add_pose(0);
+  add_pose(1);
+  connect(0, 1);
+  try {
+    graph_.remove({false}, {false, true});
+    ADD_FAILURE() << "it was removed";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ErrorCode::usage);
+    EXPECT_THAT(error.what(), HasSubstr("VERTEX_SE2 1 cannot be removed: EDGE_SE2 0 1 is on it"));
+  }
+  EXPECT_EQ(graph_.variable_count(), 2);
+  EXPECT_THROW(graph_.remove({}, {false, true}), Error);
+}
+
+TEST_F(GraphTest, KnowsWhatALossAppliesTo) {
+  add_pose(0);
+  add_pose(1);
+  add_pose(2);
+  connect(0, 1);
+  connect(0, 2);
+  EXPECT_THAT(under_loss(graph_), ElementsAre(false, false));
+}
+
 }  // namespace
 }  // namespace cairn

@@ -131,6 +131,28 @@ TEST_P(LinearSolverTest, SolvesSeveralRightHandSidesInPlace) {
   }
 }
 
+TEST_P(LinearSolverTest, SolvesForManyRightHandSidesIfItCan) {
+  auto* many = query<ManyRightHandSides>(*solver_);
+  if (!many) GTEST_SKIP() << GetParam() << " solves for one at a time";
+  const BlockStructure structure = sample_structures()[10].structure;
+  BlockMatrix H(structure);
+  fill_positive_definite(H, 18);
+  solver_->analyze(structure);
+  ASSERT_TRUE(solver_->factorize(H).ok);
+  many->solve({}, {}, 0);
+  for (const int columns : {1, 5, 8, 11, 2}) {
+    Eigen::MatrixXd X(structure.size(), columns);
+    for (int c = 0; c < columns; ++c)
+      X.col(c) = random_vector(structure.size(), static_cast<std::uint64_t>(19 + c));
+    const Eigen::MatrixXd G = X;
+    const std::span<double> values(X.data(), static_cast<std::size_t>(X.size()));
+    many->solve(values, values, columns);
+    EXPECT_LE((dense(H) * X - G).norm(), 1e-9 * G.norm()) << columns;
+    const Eigen::VectorXd one = solve(*solver_, G.col(0));
+    EXPECT_LE((X.col(0) - one).norm(), 1e-9 * one.norm());
+  }
+}
+
 TEST_P(LinearSolverTest, NamesTheBlockAtWhichTheMatrixIsNotPositiveDefinite) {
   for (const NamedStructure& sample : sample_structures()) {
     SCOPED_TRACE(sample.name);

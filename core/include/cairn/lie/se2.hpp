@@ -92,6 +92,31 @@ struct Se2 {
     return log<S>(between<S>(x, y));
   }
 
+  /// The right Jacobian of exp at δ, wherever x is: [A B · ; −B A · ; 0 0 1] with A and B as in
+  /// `exp`.
+  static Eigen::Matrix3d retract_jacobian(const Vector<double, 3>&,
+                                          const Vector<double, 3>& delta) {
+    const double phi = delta[2], square = phi * phi;
+    double A, B, b, c;  // b = (1 − cos φ)/φ², c = (φ − sin φ)/φ²
+    if (square < 1e-4) {
+      A = 1.0 - square * ((1.0 / 6) - square * ((1.0 / 120) - square * (1.0 / 5040)));
+      b = (1.0 / 2) - square * ((1.0 / 24) - square * ((1.0 / 720) - square * (1.0 / 40320)));
+      B = phi * b;
+      c = phi * ((1.0 / 6) - square * ((1.0 / 120) - square * (1.0 / 5040)));
+    } else {
+      const double s = std::sin(phi), versine = 2.0 * std::pow(std::sin(0.5 * phi), 2);
+      A = s / phi;
+      B = versine / phi;
+      b = versine / square;
+      c = (phi - s) / square;
+    }
+    Eigen::Matrix3d D;
+    D << A, B, c * delta[0] - b * delta[1],  //
+        -B, A, b * delta[0] + c * delta[1],  //
+        0, 0, 1;
+    return D;
+  }
+
   static std::string normalize(Vector<double, 3>& x) {
     if (!x.allFinite()) return "a coordinate is not finite";
     x[2] = wrap_angle(x[2]);

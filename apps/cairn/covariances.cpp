@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "covariances.hpp"
+
+#include <chrono>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <boost/json/object.hpp>
+
+#include "cairn/error.hpp"
+#include "cairn/graph_marginals.hpp"
+#include "cairn/marginals.hpp"
+#include "problem_setup.hpp"
+
+namespace cairn::app {
+namespace {
+
+namespace json = boost::json;
+
+std::vector<std::string> solvers_that_can(Registry& registry) {
+  std::vector<std::string> names;
+  for (const std::string& name : registry.names(LinearSolver::kKind)) {
+    try {
+      if (query<Marginals>(*registry.make<LinearSolver>(name))) names.push_back(name);
+    } catch (const Error&) {
+      // A plugin that cannot be loaded is nothing to recommend.
+    }
+  }
+  return names;
+}
+
+}  // namespace
+
+CovarianceSolver make_covariance_solver(const std::string& name, Registry& registry) {
+  CovarianceSolver made{name, registry.make<LinearSolver>(name)};
+  if (query<Marginals>(*made.solver)) return made;
+  throw Error(ErrorCode::usage,
+              fmt::format("linear solver '{}' gives no covariances: it has not the ability '{}', "
+                          "since it does not solve exactly; these have: {}",
+                          name, Marginals::kAbility, fmt::join(solvers_that_can(registry), ", ")));
+}
+
+CovarianceSolver covariance_solver_of(const ComponentSpec& optimizer, Registry& registry) {
+  const auto name = optimizer.values.find(kLinearSolverOption);
+  if (takes_linear_solver(registry, optimizer) && name != optimizer.values.end())
+    return make_covariance_solver(name->second, registry);
+  throw Error(ErrorCode::usage,
+              fmt::format("optimizer '{}' solves with linear solvers of its own, which give no "
+                          "covariances; take another optimizer, with one of {}, or write the "
+                          "estimate with -o and run cairn marginals on that with --as-given",
+                          optimizer.name, fmt::join(solvers_that_can(registry), ", ")));
+}
+
+DiagonalCovariances diagonal_covariances(const Graph& graph, CovarianceSolver& solver) {
+  DiagonalCovariances result;
+  result.linear_solver = solver.name;
+  GraphMarginals marginals(graph, *solver.solver);
+  const Factorization factorization = marginals.factorize();
+  result.linearize = marginals.seconds().linearize;
+  result.factorize = marginals.seconds().analyze + marginals.seconds().factorize;
+  if (!factorization.ok) {
+    result.why_not = marginals.explain(factorization);
+    return result;
+  }
+  const auto begin = std::chrono::steady_clock::now();
+  result.blocks = marginals.diagonal();
+  result.marginals =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  result.there = true;
+  return result;
+}
+
+json::value to_json(const DiagonalCovariances& covariances, const Graph& graph) {
+  if (!covariances.there) return nullptr;
+  json::array blocks;
+  std::span<const double> rest = covariances.blocks;
+  for (int v = 0; v < graph.variable_count(); ++v) {
+    const int size = graph.type(v).tangent_size();
+    blocks.push_back({{"id", graph.id(v)}, {"covariance", rows_json(rest, size, size)}});
+    rest = rest.subspan(static_cast<std::size_t>(size) * static_cast<std::size_t>(size));
+  }
+  return {{"linear_solver", covariances.linear_solver},
+          {"seconds",
+           {{"linearize", covariances.linearize},
+            {"factorize", covariances.factorize},
+            {"marginals", covariances.marginals}}},
+          {"blocks", std::move(blocks)}};
+}
+
+json::array rows_json(std::span<const double> matrix, int rows, int columns) {
+  json::array all;
+  for (int r = 0; r < rows; ++r) {
+    json::array row;
+    for (int c = 0; c < columns; ++c)
+      row.push_back(matrix[static_cast<std::size_t>(c) * static_cast<std::size_t>(rows) +
+                           static_cast<std::size_t>(r)]);
+    all.push_back(std::move(row));
+  }
+  return all;
+}
+
+}  // namespace cairn::app

@@ -1,0 +1,437 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// cairn marginals GRAPH: how certain the estimate is.
+#include <charconv>
+#include <chrono>
+#include <cmath>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "cairn/error.hpp"
+#include "cairn/format.hpp"
+#include "cairn/graph_marginals.hpp"
+#include "cairn/threads.hpp"
+#include "commands.hpp"
+#include "covariances.hpp"
+#include "graph_files.hpp"
+#include "help.hpp"
+#include "interrupt.hpp"
+#include "json_report.hpp"
+#include "problem_setup.hpp"
+#include "progress.hpp"
+#include "table.hpp"
+
+namespace cairn::app {
+namespace {
+
+namespace json = boost::json;
+
+/// Rows of the table for people; the rest is in the file and in the report.
+constexpr std::size_t kMostShown = 30;
+
+struct MarginalsOptions {
+  std::string graph;
+  std::string output;
+  InputOptions input;
+  ProblemOptions problem;
+  std::string optimizer = kDefaultOptimizer;
+  std::string linear_solver = kDefaultLinearSolver;
+  bool as_given = false;
+  bool diagonal = false;
+  std::vector<std::string> pairs;  ///< "A:B"
+  std::string column;              ///< an id, "last", or empty
+};
+
+/// What is asked for, by variables of the graph.
+struct Request {
+  bool diagonal = false;
+  std::vector<std::pair<int, int>> pairs;
+  std::optional<int> column;
+};
+
+/// One block of Σ.
+struct Block {
+  int a, b;  ///< variables
+  std::span<const double> values;
+};
+
+struct Answer {
+  std::vector<double> diagonal, pairs, column;
+  double factorize = 0.0, marginals = 0.0;  ///< [s]; analysis with the first
+};
+
+// What is asked for -----------------------------------------------------------------------------
+
+int variable_of(const std::string& text, const Graph& graph, const char* option) {
+  Id id = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), id);
+  if (error != std::errc() || end != text.data() + text.size()) {
+    throw Error(ErrorCode::usage, fmt::format("{}: '{}' is no id of a variable, which is a whole "
+                                              "number",
+                                              option, text));
+  }
+  if (const std::optional<int> found = graph.find(id)) return *found;
+  throw Error(
+      ErrorCode::input,
+      fmt::format("{}: the graph has no variable {}; cairn info shows its ids", option, id));
+}
+
+std::pair<int, int> pair_of(const std::string& text, const Graph& graph) {
+  const std::size_t colon = text.find(':');
+  if (colon == std::string::npos) {
+    throw Error(ErrorCode::usage,
+                fmt::format("--pairs: '{}' is no pair of ids; expected A:B,C:D", text));
+  }
+  return {variable_of(text.substr(0, colon), graph, "--pairs"),
+          variable_of(text.substr(colon + 1), graph, "--pairs")};
+}
+
+Request request_of(const MarginalsOptions& options, const Graph& graph) {
+  Request request;
+  request.diagonal = options.diagonal || (options.pairs.empty() && options.column.empty());
+  for (const std::string& pair : options.pairs) request.pairs.push_back(pair_of(pair, graph));
+  if (options.column == "last") {
+    request.column = graph.variable_count() - 1;
+  } else if (!options.column.empty()) {
+    request.column = variable_of(options.column, graph, "--column");
+  }
+  return request;
+}
+
+Answer compute(const Graph& graph, const Request& request, CovarianceSolver& solver) {
+  Answer answer;
+  GraphMarginals marginals(graph, *solver.solver);
+  if (const Factorization made = marginals.factorize(); !made.ok) {
+    throw Error(ErrorCode::numerical, fmt::format("no covariances: {}", marginals.explain(made)));
+  }
+  answer.factorize = marginals.seconds().analyze + marginals.seconds().factorize;
+  const auto begin = std::chrono::steady_clock::now();
+  if (request.diagonal) answer.diagonal = marginals.diagonal();
+  if (!request.pairs.empty()) answer.pairs = marginals.blocks(request.pairs);
+  if (request.column) answer.column = marginals.column(*request.column);
+  answer.marginals =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  return answer;
+}
+
+// Blocks of the answer ----------------------------------------------------------------------------
+
+std::size_t tangent(const Graph& graph, int variable) {
+  return static_cast<std::size_t>(graph.type(variable).tangent_size());
+}
+
+/// visit(Block) of each pair, whose values follow one another.
+template <class Pairs, class Visit>
+void for_each_block(const Graph& graph, const Pairs& pairs, std::span<const double> values,
+                    const Visit& visit) {
+  for (const auto& [a, b] : pairs) {
+    const std::size_t count = tangent(graph, a) * tangent(graph, b);
+    visit(Block{a, b, values.first(count)});
+    values = values.subspan(count);
+  }
+}
+
+std::vector<std::pair<int, int>> diagonal_pairs(const Graph& graph) {
+  std::vector<std::pair<int, int>> pairs;
+  for (int v = 0; v < graph.variable_count(); ++v) pairs.emplace_back(v, v);
+  return pairs;
+}
+
+/// visit(Block) of each block of a column, which lie below one another.
+template <class Visit>
+void for_each_block_of_column(const Graph& graph, int column, const std::vector<double>& values,
+                              const Visit& visit) {
+  const auto height = static_cast<std::size_t>(graph.tangent_size());
+  std::vector<double> block;
+  std::size_t row = 0;
+  for (int v = 0; v < graph.variable_count(); ++v) {
+    block.clear();
+    for (std::size_t c = 0; c < tangent(graph, column); ++c) {
+      const double* from = values.data() + c * height + row;
+      block.insert(block.end(), from, from + tangent(graph, v));
+    }
+    visit(Block{v, column, block});
+    row += tangent(graph, v);
+  }
+}
+
+/// visit(Block) of everything that was asked for.
+template <class Visit>
+void for_each_block(const Graph& graph, const Request& request, const Answer& answer,
+                    const Visit& visit) {
+  if (request.diagonal) for_each_block(graph, diagonal_pairs(graph), answer.diagonal, visit);
+  for_each_block(graph, request.pairs, answer.pairs, visit);
+  if (request.column) for_each_block_of_column(graph, *request.column, answer.column, visit);
+}
+
+// Reports -----------------------------------------------------------------------------------------
+
+json::array matrix_json(const Graph& graph, const Block& block) {
+  return rows_json(block.values, graph.type(block.a).tangent_size(),
+                   graph.type(block.b).tangent_size());
+}
+
+/// Of a variable's place in the world frame; null where it has none.
+json::value position_json(const Graph& graph, const Block& block) {
+  const VariableType& type = graph.type(block.a);
+  if (!type.placement()) return nullptr;
+  const int dimension = type.placement()->dimension();
+  return rows_json(position_covariance(type, graph.state(block.a), block.values), dimension,
+                   dimension);
+}
+
+void add_blocks(const Graph& graph, const Request& request, const Answer& answer,
+                json::object& report) {
+  if (request.diagonal) {
+    json::array& all = report["diagonal"].emplace_array();
+    for_each_block(graph, diagonal_pairs(graph), answer.diagonal, [&](const Block& block) {
+      all.push_back({{"id", graph.id(block.a)},
+                     {"covariance", matrix_json(graph, block)},
+                     {"position", position_json(graph, block)}});
+    });
+  }
+  if (!request.pairs.empty()) {
+    json::array& all = report["pairs"].emplace_array();
+    for_each_block(graph, request.pairs, answer.pairs, [&](const Block& block) {
+      all.push_back({{"a", graph.id(block.a)},
+                     {"b", graph.id(block.b)},
+                     {"covariance", matrix_json(graph, block)}});
+    });
+  }
+  if (request.column) {
+    json::array all;
+    for_each_block_of_column(graph, *request.column, answer.column, [&](const Block& block) {
+      all.push_back({{"id", graph.id(block.a)}, {"covariance", matrix_json(graph, block)}});
+    });
+    report["column"] = {{"id", graph.id(*request.column)}, {"blocks", std::move(all)}};
+  }
+}
+
+json::object report_json(const MarginalsOptions& options, const LoadedGraph& loaded,
+                         const std::optional<Summary>& summary, const Request& request,
+                         const Answer& answer, const LinearSolverStats& stats) {
+  json::object report = begin_report("marginals");
+  report["graph"] = graph_json(loaded.graph, loaded.name);
+  report["optimizer"] = summary ? json::value(summary->optimizer) : json::value(nullptr);
+  report["linear_solver"] = options.linear_solver;
+  report["threads"] = threads();
+  report["initial"] = options.problem.initial;
+  report["loss"] = text_json(options.problem.loss);
+  if (summary) {
+    report["status"] = to_string(summary->status);
+    report["chi2"] = {{"initial", summary->initial_chi2}, {"final", summary->final_chi2}};
+  }
+  report["seconds"] = {{"read", loaded.seconds},
+                       {"optimize", summary ? summary->seconds.total : 0.0},
+                       {"factorize", answer.factorize},
+                       {"marginals", answer.marginals}};
+  report["solver"] = solver_json(stats);
+  report["notes"] = strings_json(summary ? summary->notes : std::vector<std::string>{});
+  report["read_notes"] = strings_json(sentences(loaded.report));
+  report["output"] = text_json(options.output);
+  add_blocks(loaded.graph, request, answer, report);
+  end_report(report);
+  return report;
+}
+
+/// See docs/formats.md.
+std::string file_text(const LoadedGraph& loaded, const Request& request, const Answer& answer) {
+  std::string text =
+      "# cairn covariances 1\n"
+      "# COVARIANCE id_a id_b rows columns numbers, row by row\n";
+  for_each_block(loaded.graph, request, answer, [&](const Block& block) {
+    const std::size_t rows = tangent(loaded.graph, block.a);
+    const std::size_t columns = tangent(loaded.graph, block.b);
+    text += fmt::format("COVARIANCE {} {} {} {}", loaded.graph.id(block.a),
+                        loaded.graph.id(block.b), rows, columns);
+    for (std::size_t r = 0; r < rows; ++r) {
+      for (std::size_t c = 0; c < columns; ++c)
+        text += fmt::format(" {:.17g}", block.values[c * rows + r]);
+    }
+    text += '\n';
+  });
+  return text;
+}
+
+/// The names of the numbers of δ, if they are the same for all variables as far as they go.
+std::vector<std::string> tangent_names(const Graph& graph) {
+  int dimension = 0;
+  std::size_t most = 0;
+  for (const VariablePool& pool : graph.variable_pools()) {
+    const Placement* place = pool.type->placement();
+    const bool known = place && (dimension == 0 || place->dimension() == dimension);
+    dimension = known ? place->dimension() : -1;
+    most = std::max(most, static_cast<std::size_t>(pool.type->tangent_size()));
+    if (!known) break;
+  }
+  std::vector<std::string> names;
+  if (dimension == 2) names = {"x [m]", "y [m]", "angle [rad]"};
+  if (dimension == 3) names = {"x [m]", "y [m]", "z [m]", "rx [rad]", "ry [rad]", "rz [rad]"};
+  for (const VariablePool& pool : graph.variable_pools())
+    most = std::max(most, static_cast<std::size_t>(pool.type->tangent_size()));
+  while (names.size() < most) names.push_back(fmt::format("delta {}", names.size() + 1));
+  names.resize(most);
+  return names;
+}
+
+Table with_columns(std::vector<Table::Column> first, const std::vector<std::string>& names) {
+  for (const std::string& name : names) first.push_back({name, Table::Align::right});
+  return Table(std::move(first));
+}
+
+/// Standard deviations; only the first and last of many.
+std::string diagonal_text(const Graph& graph, const std::vector<double>& values, bool colour) {
+  Table table = with_columns({{"standard deviation of", Table::Align::left}}, tangent_names(graph));
+  const auto count = static_cast<std::size_t>(graph.variable_count());
+  for_each_block(graph, diagonal_pairs(graph), values, [&](const Block& block) {
+    const auto v = static_cast<std::size_t>(block.a);
+    if (count > kMostShown && v == kMostShown / 2)
+      table.add({fmt::format("… {} more …", count - kMostShown)});
+    if (count > kMostShown && v >= kMostShown / 2 && v < count - kMostShown / 2) return;
+    std::vector<std::string> cells{graph.describe_variable(block.a)};
+    const std::size_t size = tangent(graph, block.a);
+    for (std::size_t k = 0; k < size; ++k)
+      cells.push_back(fmt::format("{:.6g}", std::sqrt(block.values[k * size + k])));
+    table.add(std::move(cells));
+  });
+  return table.text(colour);
+}
+
+/// A block with a row for each of its rows.
+void add_rows(const Graph& graph, const Block& block, Table& table) {
+  const std::size_t rows = tangent(graph, block.a);
+  for (std::size_t r = 0; r < rows; ++r) {
+    std::vector<std::string> cells{
+        r == 0 ? fmt::format("{}, {}", graph.id(block.a), graph.id(block.b)) : ""};
+    for (std::size_t c = 0; c < tangent(graph, block.b); ++c)
+      cells.push_back(fmt::format("{:.6g}", block.values[c * rows + r]));
+    table.add(std::move(cells));
+  }
+}
+
+std::string result_text(const MarginalsOptions& options, const LoadedGraph& loaded,
+                        const std::optional<Summary>& summary, const Request& request,
+                        const Answer& answer, bool colour) {
+  const Graph& graph = loaded.graph;
+  std::string text;
+  if (request.diagonal) text += diagonal_text(graph, answer.diagonal, colour);
+  if (!request.pairs.empty() || request.column) {
+    Table table = with_columns({{"covariance of", Table::Align::left}}, tangent_names(graph));
+    std::size_t shown = 0;
+    const auto add = [&](const Block& block) {
+      if (++shown <= kMostShown) add_rows(graph, block, table);
+    };
+    for_each_block(graph, request.pairs, answer.pairs, add);
+    if (request.column) for_each_block_of_column(graph, *request.column, answer.column, add);
+    if (shown > kMostShown) table.add({fmt::format("… {} more", shown - kMostShown)});
+    text += (text.empty() ? "" : "\n") + table.text(colour);
+  }
+  Table facts({{"", Table::Align::left}, {"", Table::Align::left}});
+  if (summary) {
+    facts.add(
+        {"estimate", fmt::format("{}, chi2 {}, {}", summary->optimizer,
+                                 chi2_text(summary->final_chi2), to_string(summary->status))});
+    for (const std::string& note : summary->notes) facts.add({"note", note});
+  }
+  facts.add(
+      {"time", fmt::format("factorize {}, covariances {} ({})", seconds_text(answer.factorize),
+                           seconds_text(answer.marginals), options.linear_solver)});
+  if (!options.output.empty() && options.output != "-") facts.add({"written", options.output});
+  return text + "\n" + facts.text(false);
+}
+
+// The command -------------------------------------------------------------------------------------
+
+std::optional<Summary> optimize(Graph& graph, Optimizer* optimizer, const MarginalsOptions& options,
+                                const Session& session) {
+  if (!optimizer) return std::nullopt;
+  const InterruptGuard guard;
+  Stop stop = options.problem.stop;
+  stop.interrupt = &guard.flag();
+  OptimizationProgress progress(session.common.quiet, stop.max_iterations);
+  Summary summary = optimizer->optimize(graph, stop, progress);
+  if (summary.status == Status::interrupted) return summary;
+  if (summary.status != Status::converged) {
+    session.note(fmt::format(
+        "the optimisation ended as {}: covariances are of where it stopped, which is no minimum",
+        to_string(summary.status)));
+  }
+  return summary;
+}
+
+int run(const MarginalsOptions& options, Session& session) {
+  if (options.output == "-") session.write_file_to_stdout();
+  if (!options.output.empty()) check_folder(options.output);
+  session.use_threads();
+  // Everything that is named is made before the file is read: a wrong name is told at once.
+  Registry& registry = session.registry();
+  CovarianceSolver solver = make_covariance_solver(options.linear_solver, registry);
+  std::unique_ptr<Optimizer> optimizer;
+  if (!options.as_given) {
+    ComponentSpec spec = parse_component(options.optimizer);
+    // An optimizer that brings its own keeps them: covariances are another matter.
+    if (takes_linear_solver(registry, spec))
+      spec.values.emplace(kLinearSolverOption, options.linear_solver);
+    optimizer = registry.make<Optimizer>(spec);
+  }
+  const ProblemSetup setup(options.problem, registry);
+
+  LoadedGraph loaded = load_graph(options.graph, options.input, session);
+  const Request request = request_of(options, loaded.graph);
+  for (const std::string& note : setup.apply(loaded.graph)) {
+    session.note(fmt::format("initial guess {}: {}", options.problem.initial, note));
+  }
+  const std::optional<Summary> summary = optimize(loaded.graph, optimizer.get(), options, session);
+  if (summary && summary->status == Status::interrupted) return kExitInterrupted;
+  const Answer answer = compute(loaded.graph, request, solver);
+  if (options.output == "-") {
+    write_stdout(file_text(loaded, request, answer));
+  } else if (!options.output.empty()) {
+    write_file(options.output, file_text(loaded, request, answer));
+  }
+  session.write_json(
+      report_json(options, loaded, summary, request, answer, solver.solver->stats()));
+  session.print(result_text(options, loaded, summary, request, answer, session.colour()));
+  return 0;
+}
+
+}  // namespace
+
+Command add_marginals(CLI::App& program) {
+  auto options = std::make_shared<MarginalsOptions>();  // lives as long as the parser and the run
+  CLI::App* app = program.add_subcommand("marginals", "how certain an estimate is: covariances");
+  app->add_option("graph", options->graph, kGraphHelp)->type_name("GRAPH")->required();
+  app->add_flag("--diagonal", options->diagonal,
+                "the block of every variable; what is done if nothing else is asked for");
+  app->add_option("--pairs", options->pairs, "the blocks of these pairs of ids")
+      ->type_name("A:B,…")
+      ->delimiter(',')
+      ->allow_extra_args(false);
+  app->add_option("--column", options->column, "the blocks of all variables with this id, or last")
+      ->type_name("ID");
+  app->add_option("-o,--output", options->output, "write the blocks as text (- is standard output)")
+      ->type_name("FILE");
+  app->add_flag("--as-given", options->as_given,
+                "at the states as they are, or as --initial puts them: do not optimise");
+  app->add_option("--optimizer", options->optimizer, "who finds the estimate first")
+      ->type_name("NAME")
+      ->capture_default_str();
+  app->add_option("--linear-solver", options->linear_solver,
+                  "who solves H x = g, and gives the covariances")
+      ->type_name("NAME")
+      ->capture_default_str();
+  add_problem_options(*app, options->problem);
+  add_input_options(*app, options->input);
+  app->footer(
+      "Covariances are of the step that moves a state, for a pose x exp(d): metres along its own\n"
+      "axes, then radians. Variables that are held, or anchored, have zeros.\n"
+      "Example:\n"
+      "  cairn marginals city.g2o --column last --pairs 17:350,17:351 -o city.cov");
+  return {app, [options](Session& session) { return run(*options, session); }};
+}
+
+}  // namespace cairn::app

@@ -1,0 +1,359 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "online_session.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <utility>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "cairn/error.hpp"
+#include "cairn/format.hpp"
+
+namespace cairn::app {
+namespace {
+
+const std::string kInput = "input";  // what the format's messages call the stream
+
+Error bad_line(const std::string& message) { return {ErrorCode::input, message}; }
+
+std::vector<std::string_view> split(std::string_view line) {
+  std::vector<std::string_view> words;
+  for (std::size_t at = 0; (at = line.find_first_not_of(" \t\r", at)) != std::string_view::npos;) {
+    if (line[at] == '#') break;
+    const std::size_t end = std::min(line.find_first_of(" \t\r", at), line.size());
+    words.push_back(line.substr(at, end - at));
+    at = end;
+  }
+  return words;
+}
+
+template <class Number>
+Number parse(std::string_view word, std::string_view what) {
+  Number number{};
+  const auto [end, problem] = std::from_chars(word.data(), word.data() + word.size(), number);
+  if (problem != std::errc{} || end != word.data() + word.size())
+    throw bad_line(fmt::format("'{}' is no {}", word, what));
+  return number;
+}
+
+std::vector<std::int64_t> parse_ids(std::span<const std::string_view> words,
+                                    std::string_view what) {
+  if (words.empty()) throw bad_line(fmt::format("expected one {} or more", what));
+  std::vector<std::int64_t> ids;
+  for (const std::string_view word : words) ids.push_back(parse<std::int64_t>(word, what));
+  return ids;
+}
+
+void expect_words(const std::vector<std::string_view>& words, std::size_t count,
+                  std::string_view form) {
+  if (words.size() == count) return;
+  throw bad_line(
+      fmt::format("{} with {} words after it; expected '{}'", words[0], words.size() - 1, form));
+}
+
+}  // namespace
+
+OnlineSession::OnlineSession(Estimator& estimator, StreamFormat& format, Registry& registry,
+                             OnlineSettings settings)
+    : estimator_(estimator), format_(format), registry_(registry), settings_(std::move(settings)) {}
+
+OnlineSession::Command OnlineSession::find_command(std::string_view word) {
+  static constexpr std::pair<std::string_view, Command> kCommands[] = {
+      {"NEW", &OnlineSession::declare},
+      {"REMOVE", &OnlineSession::remove},
+      {"CHANGE", &OnlineSession::change},
+      {"MARGINALIZE", &OnlineSession::marginalize},
+      {"SOLVE", &OnlineSession::solve},
+      {"FULL", &OnlineSession::solve_fully},
+      {"COVARIANCE", &OnlineSession::tell_covariance},
+      {"ESTIMATE", &OnlineSession::tell_estimate},
+      {"CHI2", &OnlineSession::tell_chi2},
+      {"SAVE", &OnlineSession::save},
+      {"QUIT", &OnlineSession::quit},
+  };
+  for (const auto& [name, command] : kCommands) {
+    if (name == word) return command;
+  }
+  return nullptr;
+}
+
+OnlineSession::Reply OnlineSession::take(std::string_view line, std::int64_t number) {
+  line_ = number;
+  Reply reply;
+  const Words words = split(line);
+  if (words.empty()) return reply;
+  if (const Command command = find_command(words[0])) {
+    (this->*command)(words, reply);
+  } else {
+    take_data(line, reply);
+  }
+  return reply;
+}
+
+void OnlineSession::restore(std::string_view line, std::int64_t number) {
+  silent_ = true;
+  take(line, number);
+  silent_ = false;
+}
+
+// Data ------------------------------------------------------------------------------------------
+
+void OnlineSession::take_data(std::string_view line, Reply& reply) {
+  StreamLine said = format_.read(line, kInput, line_, registry_, settings_.read);
+  for (NewVariable& variable : said.variables) take_variable(std::move(variable));
+  for (NewFactor& factor : said.factors) take_factor(std::move(factor), reply);
+  // Each is held or none: a line is taken in whole.
+  for (const Id id : said.held) {
+    if (!std::ranges::any_of(waiting_, [id](const NewVariable& v) { return v.id == id; })) {
+      throw bad_line(
+          fmt::format("FIX {}: only what no measurement and no SOLVE has taken in yet can be held; "
+                      "expected FIX "
+                      "right after the line of the variable",
+                      id));
+    }
+  }
+  for (const Id id : said.held) hold(id);
+  reply.changes = !said.skipped;
+}
+
+void OnlineSession::take_variable(NewVariable variable) {
+  const auto same = [&](const NewVariable& other) { return other.id == variable.id; };
+  if (estimator_.has(variable.id) || std::ranges::any_of(waiting_, same)) {
+    throw bad_line(
+        fmt::format("{} {}: the id is already in use", variable.type->tag(), variable.id));
+  }
+  if (!variable.state.empty()) {
+    if (const std::string problem = variable.type->normalize(variable.state.data());
+        !problem.empty())
+      throw bad_line(fmt::format("{} {}: {}", variable.type->tag(), variable.id, problem));
+  }
+  waiting_.push_back(std::move(variable));
+}
+
+void OnlineSession::hold(Id id) {
+  for (NewVariable& variable : waiting_) {
+    if (variable.id == id) variable.fixed = true;
+  }
+}
+
+void OnlineSession::take_factor(NewFactor factor, Reply& reply) {
+  GraphUpdate with;
+  for (const NewVariable& variable : waiting_) {
+    if (std::ranges::count(factor.variables, variable.id) > 0) with.variables.push_back(variable);
+  }
+  with.factors.push_back(std::move(factor));
+  const bool dangling = with.variables.size() < waiting_.size();
+  update(std::move(with), settings_.automatic && !dangling, false, reply);
+}
+
+// Updates ---------------------------------------------------------------------------------------
+
+UpdateReport OnlineSession::update(GraphUpdate update, bool solve, bool full, Reply& reply) {
+  const UpdateOptions how{.defer = !solve, .full = full, .max_seconds = settings_.budget};
+  const UpdateReport report = estimator_.update(update, how);
+  follow(update, report);
+  reply.changes = true;
+  reply.solved = solve;
+  last_seconds_ = report.seconds.total;
+  owed_ = report.owed;
+  if (solve && !silent_) write_results(report, reply);
+  return report;
+}
+
+/// What the estimator has taken is known, and waits no more.
+void OnlineSession::follow(const GraphUpdate& update, const UpdateReport& report) {
+  for (const NewVariable& variable : update.variables) {
+    known_.push_back(variable.id);
+    types_[variable.id] = variable.type;
+    std::erase_if(waiting_, [&](const NewVariable& v) { return v.id == variable.id; });
+  }
+  factor_types_.resize(static_cast<std::size_t>(report.first_factor));
+  for (const NewFactor& factor : update.factors) factor_types_.push_back(factor.type);
+  factor_types_.resize(factor_types_.size() + report.priors.size());
+  const auto forget = [&](Id id) {
+    std::erase(known_, id);
+    types_.erase(id);
+    told_.erase(id);
+  };
+  for (const Id id : update.marginalized) forget(id);
+  for (const Id id : update.removed_variables) forget(id);
+}
+
+void OnlineSession::write_results(const UpdateReport& report, Reply& reply) {
+  for (const std::string& note : report.notes) reply.text += fmt::format("NOTE {}\n", note);
+  if (settings_.output == "last" && !known_.empty()) write_estimate(known_.back(), reply.text);
+  if (settings_.output == "all" || settings_.output == "changed") {
+    for (const Id id : known_) {
+      const std::span<const double> x = estimator_.state(id);
+      std::vector<double>& told = told_[id];
+      if (settings_.output == "changed" && std::ranges::equal(told, x)) continue;
+      told.assign(x.begin(), x.end());
+      write_estimate(id, reply.text);
+    }
+  }
+  if (settings_.marginals == "last" && !known_.empty())
+    write_covariance(known_.back(), known_.back(), reply.text);
+  if (settings_.marginals == "diagonal") {
+    for (const Id id : known_) write_covariance(id, id, reply.text);
+  }
+  acknowledge(reply, report.ok ? "OK" : "SINGULAR");
+}
+
+void OnlineSession::acknowledge(Reply& reply, std::string_view word) const {
+  if (silent_) return;
+  reply.text += fmt::format("{} {} variables {} factors {} owed {}\n", word, line_,
+                            estimator_.variable_count(), estimator_.factor_count(), owed_);
+}
+
+// Commands --------------------------------------------------------------------------------------
+
+void OnlineSession::declare(const Words& words, Reply& reply) {
+  expect_words(words, 3, "NEW TAG id");
+  if (!registry_.has("variable", words[1])) {
+    throw bad_line(fmt::format("there is no type of variable '{}'; on offer: {}", words[1],
+                               fmt::join(registry_.names("variable"), ", ")));
+  }
+  const Id id = parse<Id>(words[2], "id");
+  if (id < 0) throw bad_line(fmt::format("'{}' is no id; expected a whole number from 0", id));
+  take_variable({registry_.variable_type(words[1]), id, {}, false});
+  reply.changes = true;
+}
+
+void OnlineSession::remove(const Words& words, Reply& reply) {
+  const bool factors = words.size() > 1 && words[1] == "FACTOR";
+  if (words.size() < 3 || (!factors && words[1] != "VARIABLE"))
+    throw bad_line("expected 'REMOVE FACTOR k …' or 'REMOVE VARIABLE id …'");
+  const auto ids = parse_ids(std::span(words).subspan(2), factors ? "number of a factor" : "id");
+  GraphUpdate leaving;
+  (factors ? leaving.removed_factors : leaving.removed_variables) = ids;
+  // What only waits has not reached the estimator.
+  const auto waits = [&](Id id) {
+    return std::ranges::any_of(waiting_, [id](const NewVariable& v) { return v.id == id; });
+  };
+  if (!factors) std::erase_if(leaving.removed_variables, waits);
+  update(std::move(leaving), settings_.automatic, false, reply);
+  if (!factors) {
+    std::erase_if(waiting_,
+                  [&](const NewVariable& v) { return std::ranges::count(ids, v.id) > 0; });
+  }
+  if (!reply.solved) acknowledge(reply);
+}
+
+void OnlineSession::change(const Words& words, Reply& reply) {
+  if (words.size() < 3) throw bad_line("expected 'CHANGE k measurement… [information…]'");
+  ChangedFactor changed{parse<FactorId>(words[1], "number of a factor"), {}, {}};
+  const bool known = changed.factor >= 0 && changed.factor < std::ssize(factor_types_);
+  const FactorType* type = known ? factor_types_[changed.factor].get() : nullptr;
+  if (!type) throw bad_line(fmt::format("there is no factor {} that can be changed", words[1]));
+  const auto n = static_cast<std::size_t>(type->residual_size()),
+             size = static_cast<std::size_t>(type->measurement_size()), packed = n * (n + 1) / 2;
+  const std::span<const std::string_view> numbers = std::span(words).subspan(2);
+  if (numbers.size() != size && numbers.size() != size + packed) {
+    throw bad_line(fmt::format(
+        "CHANGE {} with {} numbers; factor {} is a {}: expected its measurement of {}, and its "
+        "information of {} if that changes too",
+        words[1], numbers.size(), words[1], type->tag(), size, packed));
+  }
+  for (std::size_t k = 0; k < numbers.size(); ++k)
+    (k < size ? changed.measurement : changed.information)
+        .push_back(parse<double>(numbers[k], "number"));
+  GraphUpdate changing;
+  changing.changed.push_back(std::move(changed));
+  update(std::move(changing), settings_.automatic, false, reply);
+  if (!reply.solved) acknowledge(reply);
+}
+
+void OnlineSession::marginalize(const Words& words, Reply& reply) {
+  GraphUpdate leaving;
+  leaving.marginalized = parse_ids(std::span(words).subspan(1), "id");
+  const UpdateReport report = update(std::move(leaving), settings_.automatic, false, reply);
+  if (silent_) return;
+  std::string priors;
+  for (const FactorId prior : report.priors) priors += fmt::format("PRIOR {}\n", prior);
+  reply.text = priors + reply.text;
+  if (!reply.solved) acknowledge(reply);
+}
+
+void OnlineSession::solve(const Words& words, Reply& reply) {
+  expect_words(words, 1, "SOLVE");
+  GraphUpdate rest;  // what has a place, though no measurement
+  for (const NewVariable& variable : waiting_) {
+    if (!variable.state.empty()) rest.variables.push_back(variable);
+  }
+  update(std::move(rest), true, false, reply);
+}
+
+void OnlineSession::solve_fully(const Words& words, Reply& reply) {
+  expect_words(words, 1, "FULL");
+  update({}, true, true, reply);
+}
+
+void OnlineSession::tell_covariance(const Words& words, Reply& reply) {
+  expect_words(words, 3, "COVARIANCE id id");
+  if (!write_covariance(parse<Id>(words[1], "id"), parse<Id>(words[2], "id"), reply.text)) {
+    throw Error(ErrorCode::numerical,
+                "there is no covariance: the measurements do not determine everything");
+  }
+  acknowledge(reply);
+}
+
+void OnlineSession::tell_estimate(const Words& words, Reply& reply) {
+  expect_words(words, 2, "ESTIMATE id' or 'ESTIMATE ALL");
+  if (words[1] == "ALL") {
+    for (const Id id : known_) write_estimate(id, reply.text);
+  } else {
+    write_estimate(parse<Id>(words[1], "id"), reply.text);
+  }
+  acknowledge(reply);
+}
+
+void OnlineSession::tell_chi2(const Words& words, Reply& reply) {
+  expect_words(words, 1, "CHI2");
+  reply.text += fmt::format("CHI2 {}\n", estimator_.chi2());
+  acknowledge(reply);
+}
+
+void OnlineSession::save(const Words& words, Reply& reply) {
+  expect_words(words, 2, "SAVE file");
+  if (words[1] == "-") throw bad_line("SAVE writes to a file, not to standard output");
+  write_graph(estimator_.graph(), std::string(words[1]), registry_);
+  acknowledge(reply);
+}
+
+void OnlineSession::quit(const Words& words, Reply& reply) {
+  expect_words(words, 1, "QUIT");
+  reply.quit = true;
+  acknowledge(reply);
+}
+
+// Answers ---------------------------------------------------------------------------------------
+
+const VariableType& OnlineSession::type_of(Id id) const {
+  const auto there = types_.find(id);
+  if (there == types_.end())
+    throw bad_line(fmt::format("there is no variable {} in the estimate", id));
+  return *there->second;
+}
+
+void OnlineSession::write_estimate(Id id, std::string& text) const {
+  text += fmt::format("{} {} {}\n", type_of(id).tag(), id, fmt::join(estimator_.state(id), " "));
+}
+
+/// "COVARIANCE a b rows columns" and the numbers row by row.
+bool OnlineSession::write_covariance(Id a, Id b, std::string& text) {
+  const int rows = type_of(a).tangent_size(), columns = type_of(b).tangent_size();
+  std::vector<double> block(static_cast<std::size_t>(rows) * static_cast<std::size_t>(columns));
+  if (!estimator_.covariance(a, b, block)) return false;
+  text += fmt::format("COVARIANCE {} {} {} {}", a, b, rows, columns);
+  for (int row = 0; row < rows; ++row) {
+    for (int column = 0; column < columns; ++column)
+      text += fmt::format(" {}", block[static_cast<std::size_t>(column * rows + row)]);
+  }
+  text += '\n';
+  return true;
+}
+
+}  // namespace cairn::app

@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+#include <unordered_map>
+#include <vector>
+
+#include "cairn/estimator.hpp"
+#include "cairn/registry.hpp"
+#include "cairn/stream_format.hpp"
+
+namespace cairn::app {
+
+struct OnlineSettings {
+  ReadOptions read;
+  bool automatic = true;           ///< solve after every line that leaves nothing dangling
+  std::string output = "last";     ///< estimates after a solve: none, last, changed or all
+  std::string marginals = "none";  ///< covariances after a solve: none, last or diagonal
+  double budget = 0.0;             ///< [s] of an update; 0: no limit
+};
+
+/// One conversation with `cairn online`: takes lines, and says what to answer (docs/online.md). A
+/// line is taken in whole or not at all.
+class OnlineSession {
+ public:
+  /// What a line came to.
+  struct Reply {
+    std::string text;      ///< lines to be written; empty: nothing
+    bool changes = false;  ///< belongs in a journal, before `text` is written
+    bool solved = false;
+    bool quit = false;
+  };
+
+  OnlineSession(Estimator& estimator, StreamFormat& format, Registry& registry,
+                OnlineSettings settings);
+
+  /// Takes line `number` of the input. Throws `Error` where it cannot, and has then changed
+  /// nothing.
+  Reply take(std::string_view line, std::int64_t number);
+  /// The same without an answer: lines that were taken before, from a journal.
+  void restore(std::string_view line, std::int64_t number);
+
+  double last_seconds() const { return last_seconds_; }
+
+ private:
+  using Words = std::vector<std::string_view>;
+  using Command = void (OnlineSession::*)(const Words&, Reply&);
+  static Command find_command(std::string_view word);
+
+  // A command each; the words are those of its line.
+  void declare(const Words& words, Reply& reply);
+  void remove(const Words& words, Reply& reply);
+  void change(const Words& words, Reply& reply);
+  void marginalize(const Words& words, Reply& reply);
+  void solve(const Words& words, Reply& reply);
+  void solve_fully(const Words& words, Reply& reply);
+  void tell_covariance(const Words& words, Reply& reply);
+  void tell_estimate(const Words& words, Reply& reply);
+  void tell_chi2(const Words& words, Reply& reply);
+  void save(const Words& words, Reply& reply);
+  void quit(const Words& words, Reply& reply);
+
+  void take_data(std::string_view line, Reply& reply);
+  void take_variable(NewVariable variable);
+  void take_factor(NewFactor factor, Reply& reply);
+  void hold(Id id);
+
+  /// Hands an update over; solves where that is due or asked for.
+  UpdateReport update(GraphUpdate update, bool solve, bool full, Reply& reply);
+  void follow(const GraphUpdate& update, const UpdateReport& report);
+  void write_results(const UpdateReport& report, Reply& reply);
+  void acknowledge(Reply& reply, std::string_view word = "OK") const;
+  void write_estimate(Id id, std::string& text) const;
+  bool write_covariance(Id a, Id b, std::string& text);
+  const VariableType& type_of(Id id) const;
+
+  Estimator& estimator_;
+  StreamFormat& format_;
+  Registry& registry_;
+  OnlineSettings settings_;
+  std::int64_t line_ = 0;
+  bool silent_ = false;
+  double last_seconds_ = 0.0;
+  int owed_ = 0;
+  /// Variables that no measurement has touched yet: the estimator gets them with the first that
+  /// does.
+  std::vector<NewVariable> waiting_;
+  std::vector<Id> known_;  ///< those that the estimator has, in the order of arrival
+  std::unordered_map<Id, std::shared_ptr<const VariableType>> types_;
+  std::vector<std::shared_ptr<const FactorType>> factor_types_;  ///< by id; null: of no line
+  std::unordered_map<Id, std::vector<double>> told_;             ///< estimates, for `changed`
+};
+
+}  // namespace cairn::app

@@ -1,0 +1,322 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "batch_estimator.hpp"
+
+#include <algorithm>
+#include <chrono>
+
+#include <fmt/format.h>
+
+#include "cairn/error.hpp"
+#include "cairn/gauge.hpp"
+#include "cairn/loss.hpp"
+#include "cairn/normal_equations.hpp"
+
+namespace cairn {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point begin) {
+  return std::chrono::duration<double>(Clock::now() - begin).count();
+}
+
+bool only_adds(const GraphUpdate& update) {
+  return update.changed.empty() && update.marginalized.empty() && update.removed_factors.empty() &&
+         update.removed_variables.empty();
+}
+
+void add_seconds(const Seconds& from, UpdateSeconds& to) {
+  to.linearize += from.linearize + from.update;
+  to.order += from.analyze;
+  to.factorize += from.factorize;
+  to.solve += from.solve;
+}
+
+}  // namespace
+
+BatchEstimator::BatchEstimator(BatchEstimatorOptions options, std::shared_ptr<BatchTools> tools)
+    : options_(options), tools_(std::move(tools)) {}
+
+UpdateReport BatchEstimator::update(const GraphUpdate& update, const UpdateOptions& options) {
+  const auto begin = Clock::now();
+  const std::lock_guard lock(tools_->mutex);
+  GraphUpdate checked = update;
+  check_update(graph_, ids_, checked);
+  const AppliedUpdate applied = apply(checked);
+  forget_covariances();
+
+  UpdateReport report;
+  report.first_factor = applied.first_factor;
+  report.priors = applied.priors;
+  must_batch_ = must_batch_ || !only_adds(checked);
+  unsolved_factors_ += static_cast<int>(std::ssize(checked.factors));
+  ++since_batch_;
+  if (!options.defer || options.full) {
+    if (options.full || must_batch_ || since_batch_ >= options_.every) {
+      batch_step(options, report);
+    } else {
+      linear_step(report);
+    }
+    if (report.ok) compute_kept(report);
+  }
+  report.seconds.total = seconds_since(begin);
+  return report;
+}
+
+/// All or nothing: only marginalisation can still fail, and that on numbers.
+AppliedUpdate BatchEstimator::apply(GraphUpdate& update) {
+  if (!update.variables.empty()) last_ = update.variables.back().id;
+  if (update.marginalized.empty()) return apply_update(update, graph_, ids_);
+  Graph graph = graph_.clone();
+  FactorIds ids = ids_;
+  AppliedUpdate applied = apply_update(update, graph, ids);
+  graph_ = std::move(graph);
+  ids_ = std::move(ids);
+  return applied;
+}
+
+void BatchEstimator::batch_step(const UpdateOptions& options, UpdateReport& report) {
+  if (graph_.factor_count() == 0) return;
+  Stop stop = options_.stop;
+  stop.max_seconds = options.max_seconds;
+  tools_->user = nullptr;
+  const Summary summary = tools_->optimizer->optimize(graph_, stop);
+  for (const std::string& sentence : summary.notes) note(sentence, report);
+  report.ok = summary.status != Status::not_positive_definite;
+  report.iterations = static_cast<int>(std::ssize(summary.iterations));
+  report.affected_variables = report.iterations * graph_.variable_count();
+  if (report.iterations > 0)
+    report.relinearized_factors = std::max(0, graph_.factor_count() - unsolved_factors_);
+  const bool done = summary.status == Status::converged || !(options.max_seconds > 0.0);
+  report.owed = done ? 0 : graph_.factor_count();
+  add_seconds(summary.seconds, report.seconds);
+  memory_ = std::max(memory_, 8 * summary.solver.factor_nonzeros);
+  linearized_at_ = graph_.values();
+  since_batch_ = 0;
+  unsolved_factors_ = 0;
+  must_batch_ = report.owed > 0;
+}
+
+/// The step from the points of linearisation, of all variables, that the linear system of all
+/// factors asks for.
+void BatchEstimator::linear_step(UpdateReport& report) {
+  extend_linearization_points();
+  tools_->user = nullptr;
+  NormalEquations equations(graph_, *tools_->solver);
+  if (const std::string gauge = equations.gauge().describe(graph_); !gauge.empty())
+    note(gauge, report);
+  if (equations.size() == 0) return;
+  equations.linearize(linearized_at_);
+  const Factorization factorization = equations.factorize();
+  report.ok = factorization.ok;
+  if (report.ok) {
+    std::vector<double> step(static_cast<std::size_t>(equations.size()));
+    equations.solve(step);
+    Values values;
+    equations.retract(linearized_at_, step, values);
+    graph_.set_values(std::move(values));
+    report.iterations = 1;
+    report.affected_variables = graph_.variable_count();
+    unsolved_factors_ = 0;
+  } else {
+    note(equations.explain(factorization), report);
+  }
+  add_seconds(equations.seconds(), report.seconds);
+  memory_ = std::max(memory_, 8 * tools_->solver->stats().factor_nonzeros);
+}
+
+void BatchEstimator::extend_linearization_points() {
+  const Values& states = graph_.values();
+  linearized_at_.pools.resize(states.pools.size());
+  for (std::size_t p = 0; p < states.pools.size(); ++p) {
+    AlignedVector& points = linearized_at_.pools[p];
+    points.insert(points.end(),
+                  states.pools[p].begin() + static_cast<std::ptrdiff_t>(points.size()),
+                  states.pools[p].end());
+  }
+}
+
+void BatchEstimator::note(const std::string& sentence, UpdateReport& report) {
+  if (told_.insert(sentence).second) report.notes.push_back(sentence);
+}
+
+void BatchEstimator::compute_kept(UpdateReport& report) {
+  std::erase_if(crosses_, [&](const auto& pair) { return !has(pair.first) || !has(pair.second); });
+  if ((kept_ == KeptMarginals::none && crosses_.empty()) || graph_.variable_count() == 0) return;
+  const auto begin = Clock::now();
+  report.marginals_by = MarginalsBy::recomputation;
+  if (GraphMarginals* all = covariances()) {
+    std::set<std::pair<Id, Id>> wanted = crosses_;
+    if (kept_ == KeptMarginals::last && has(last_)) wanted.emplace(last_, last_);
+    for (const auto& [a, b] : wanted) {
+      const std::pair<int, int> pair(index(a), index(b));
+      blocks_[{a, b}] = all->blocks({&pair, 1});
+    }
+    if (kept_ == KeptMarginals::diagonal) keep_diagonal(*all);
+  }
+  report.seconds.marginals += seconds_since(begin);
+}
+
+void BatchEstimator::keep_diagonal(GraphMarginals& all) {
+  diagonal_ = all.diagonal();
+  diagonal_begin_.clear();
+  std::size_t next = 0;
+  for (int v = 0; v < graph_.variable_count(); ++v) {
+    diagonal_begin_.push_back(next);
+    next += block_size(v, v);
+  }
+}
+
+GraphMarginals* BatchEstimator::covariances() {
+  require_marginals();
+  if (!covariances_ || tools_->user != this) {
+    tools_->user = this;
+    covariances_.emplace(graph_, *tools_->solver);
+    determined_ = covariances_->factorize().ok;
+  }
+  return determined_ ? &*covariances_ : nullptr;
+}
+
+void BatchEstimator::require_marginals() const {
+  if (query<Marginals>(*tools_->solver)) return;
+  throw Error(ErrorCode::usage,
+              "the estimator's linear solver cannot give covariances (it has not the ability "
+              "'marginals'); linear_solver=block_cholesky can");
+}
+
+void BatchEstimator::keep_marginals(KeptMarginals kept) {
+  if (kept != KeptMarginals::none) require_marginals();
+  kept_ = kept;
+}
+
+std::size_t BatchEstimator::block_size(int a, int b) const {
+  return static_cast<std::size_t>(graph_.type(a).tangent_size()) * graph_.type(b).tangent_size();
+}
+
+int BatchEstimator::index(Id id) const {
+  if (const auto v = graph_.find(id)) return *v;
+  throw Error(ErrorCode::usage, fmt::format("there is no variable {}", id));
+}
+
+void BatchEstimator::keep_cross(Id a, Id b) {
+  require_marginals();
+  index(a);
+  index(b);
+  crosses_.emplace(a, b);
+}
+
+bool BatchEstimator::covariance(Id a, Id b, std::span<double> block) {
+  const int row = index(a), column = index(b);
+  if (block.size() != block_size(row, column)) {
+    throw Error(ErrorCode::usage,
+                fmt::format("the covariance of {} and {} is a block of {} numbers, not {}",
+                            graph_.describe_variable(row), graph_.describe_variable(column),
+                            block_size(row, column), block.size()));
+  }
+  if (const auto kept = blocks_.find({a, b}); kept != blocks_.end()) {
+    std::ranges::copy(kept->second, block.begin());
+    return true;
+  }
+  if (a == b && !diagonal_.empty()) {
+    std::copy_n(diagonal_.begin() + static_cast<std::ptrdiff_t>(diagonal_begin_[row]), block.size(),
+                block.begin());
+    return true;
+  }
+  const std::lock_guard lock(tools_->mutex);
+  GraphMarginals* all = covariances();
+  const std::pair<int, int> pair(row, column);
+  if (all) std::ranges::copy(all->blocks({&pair, 1}), block.begin());
+  return all != nullptr;
+}
+
+bool BatchEstimator::covariance_column(Id id, std::span<const Id> variables,
+                                       std::span<double> out) {
+  const int column = index(id), columns = graph_.type(column).tangent_size();
+  std::vector<std::int64_t> begin;  // of each variable's rows in a whole column
+  std::int64_t rows = 0, height = 0;
+  for (int v = 0; v < graph_.variable_count(); ++v) {
+    begin.push_back(rows);
+    rows += graph_.type(v).tangent_size();
+  }
+  for (const Id row : variables) height += graph_.type(index(row)).tangent_size();
+  if (std::ssize(out) != height * columns) {
+    throw Error(ErrorCode::usage,
+                fmt::format("that column of the covariance has {} numbers, not {}",
+                            height * columns, out.size()));
+  }
+  const std::lock_guard lock(tools_->mutex);
+  GraphMarginals* all = covariances();
+  if (!all) return false;
+  const std::vector<double> whole = all->column(column);
+  auto to = out.begin();
+  for (int c = 0; c < columns; ++c) {
+    for (const Id row : variables) {
+      const int v = index(row);
+      to = std::copy_n(whole.begin() + c * rows + begin[v], graph_.type(v).tangent_size(), to);
+    }
+  }
+  return true;
+}
+
+void BatchEstimator::set_loss(std::shared_ptr<const Loss> loss, LossScope scope) {
+  loss_ = std::move(loss);
+  graph_.set_loss(loss_, scope);
+  forget_covariances();
+  must_batch_ = true;
+}
+
+std::span<const double> BatchEstimator::state(Id id) const { return graph_.state(index(id)); }
+
+double BatchEstimator::chi2() const {
+  const std::vector<double> norms = squared_norms(graph_);
+  const std::vector<bool> robust = under_loss(graph_);
+  double sum = 0.0;
+  for (std::size_t f = 0; f < norms.size(); ++f) {
+    double rho = norms[f];
+    if (robust[f]) graph_.loss()->evaluate({&norms[f], 1}, {&rho, 1}, {});
+    sum += rho;
+  }
+  return sum;
+}
+
+void BatchEstimator::forget_covariances() {
+  covariances_.reset();
+  diagonal_.clear();
+  blocks_.clear();
+}
+
+/// The loss is an option too.
+void BatchEstimator::reset() {
+  Graph empty;
+  if (graph_.loss()) empty.set_loss(loss_, graph_.loss_scope());
+  graph_ = std::move(empty);
+  ids_ = {};
+  linearized_at_ = {};
+  since_batch_ = unsolved_factors_ = 0;
+  must_batch_ = true;
+  crosses_.clear();
+  told_.clear();
+  forget_covariances();
+}
+
+std::unique_ptr<Estimator> BatchEstimator::clone() const {
+  auto copy = std::make_unique<BatchEstimator>(options_, tools_);
+  copy->graph_ = graph_.clone();
+  copy->loss_ = loss_;
+  copy->ids_ = ids_;
+  copy->linearized_at_ = linearized_at_;
+  copy->since_batch_ = since_batch_;
+  copy->must_batch_ = must_batch_;
+  copy->unsolved_factors_ = unsolved_factors_;
+  copy->last_ = last_;
+  copy->kept_ = kept_;
+  copy->diagonal_ = diagonal_;
+  copy->diagonal_begin_ = diagonal_begin_;
+  copy->blocks_ = blocks_;
+  copy->crosses_ = crosses_;
+  copy->told_ = told_;
+  copy->memory_ = memory_;
+  return copy;
+}
+
+}  // namespace cairn

@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "cairn/estimator.hpp"
+#include "cairn/graph_marginals.hpp"
+#include "cairn/graph_update.hpp"
+#include "cairn/linear_solver.hpp"
+#include "cairn/optimizer.hpp"
+
+namespace cairn {
+
+struct BatchEstimatorOptions {
+  /// Updates from one batch step to the next.
+  int every = 1;
+  Stop stop{.max_iterations = 100, .tolerance = 1e-10};
+};
+
+/// Who does the work. Estimators that were cloned share one set of tools, since components cannot
+/// be copied; whoever uses them holds the lock, and `user` tells whose factorisation the solver
+/// has.
+struct BatchTools {
+  std::mutex mutex;
+  std::unique_ptr<Optimizer> optimizer;
+  std::unique_ptr<LinearSolver> solver;
+  const void* user = nullptr;
+};
+
+/// Optimises the whole graph anew. With `every` > 1 that is done every so many updates only, as by
+/// iSAM (Kaess et al. 2008): in between every variable keeps the point at which it is linearised,
+/// and one linear system of all factors is solved for the step from there. Nothing of a
+/// factorisation is used again. An update that removes, changes or marginalises anything is a batch
+/// step.
+class BatchEstimator final : public Estimator {
+ public:
+  BatchEstimator(BatchEstimatorOptions options, std::shared_ptr<BatchTools> tools);
+
+  UpdateReport update(const GraphUpdate& update, const UpdateOptions& options) override;
+  void set_loss(std::shared_ptr<const Loss> loss, LossScope scope) override;
+  std::span<const double> state(Id id) const override;
+  bool has(Id id) const override { return graph_.find(id).has_value(); }
+  int variable_count() const override { return graph_.variable_count(); }
+  int factor_count() const override { return graph_.factor_count(); }
+  double chi2() const override;
+  Graph graph() const override { return graph_.clone(); }
+  /// These throw `Error` (usage) if the linear solver has no marginals.
+  void keep_marginals(KeptMarginals kept) override;
+  void keep_cross(Id a, Id b) override;
+  bool covariance(Id a, Id b, std::span<double> block) override;
+  bool covariance_column(Id id, std::span<const Id> variables, std::span<double> out) override;
+  void reset() override;
+  std::unique_ptr<Estimator> clone() const override;
+  std::int64_t memory() const override { return memory_; }
+
+ private:
+  AppliedUpdate apply(GraphUpdate& update);
+  void batch_step(const UpdateOptions& options, UpdateReport& report);
+  void linear_step(UpdateReport& report);
+  void extend_linearization_points();
+  void note(const std::string& sentence, UpdateReport& report);
+  void compute_kept(UpdateReport& report);
+  int index(Id id) const;
+  void keep_diagonal(GraphMarginals& all);
+  void require_marginals() const;
+  void forget_covariances();
+  /// At the states at hand; null if H is singular. The lock must be held.
+  GraphMarginals* covariances();
+  std::size_t block_size(int a, int b) const;
+
+  BatchEstimatorOptions options_;
+  std::shared_ptr<BatchTools> tools_;
+  Graph graph_;
+  std::shared_ptr<const Loss> loss_;  ///< that of the graph, which must not outlive it
+  FactorIds ids_;
+  Values linearized_at_;      ///< the states of `graph_` are a step from here
+  int since_batch_ = 0;       ///< updates
+  bool must_batch_ = true;    ///< something has changed that a linear step cannot take in
+  int unsolved_factors_ = 0;  ///< new since the last solve
+  Id last_ = 0;               ///< the variable that was added last
+  KeptMarginals kept_ = KeptMarginals::none;
+  /// Those that are kept, as of the last solve; empty when out of date.
+  std::vector<double> diagonal_;
+  std::vector<std::size_t> diagonal_begin_;  ///< by variable
+  std::map<std::pair<Id, Id>, std::vector<double>> blocks_;
+  std::optional<GraphMarginals> covariances_;  ///< good while the tools' user is this
+  bool determined_ = true;                     ///< H is positive definite there
+  std::set<std::pair<Id, Id>> crosses_;
+  std::set<std::string> told_;  ///< notes are told once
+  std::int64_t memory_ = 0;
+};
+
+}  // namespace cairn

@@ -1,0 +1,238 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "covariances.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Core>
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+
+#include "inverse.hpp"
+
+namespace cairn::incremental {
+namespace {
+
+/// More rows than this are not worth a solution each: recomputing is cheaper. Found by measuring.
+constexpr std::size_t kMostRows = 48;
+/// U's eigenvalues are between −1 and 1, and near 0 where a measurement tells much more than was
+/// known: as many digits are lost as they are small.
+constexpr double kLeastEigenvalue = 1e-4;
+/// Rounding adds up slowly; every so many downdates all is computed anew.
+constexpr int kOldest = 1000;
+
+}  // namespace
+
+void Covariances::keep(KeptMarginals kept) {
+  everything_ = everything_ || (kept == KeptMarginals::diagonal && kept_ != kept);
+  kept_ = kept;
+}
+
+void Covariances::keep(std::int32_t a, std::int32_t b) { crosses_[{a, b}]; }
+
+void Covariances::drop(std::int32_t v) {
+  std::erase_if(crosses_, [&](const auto& cross) {
+    return cross.first.first == v || cross.first.second == v;
+  });
+}
+
+void Covariances::renumber(std::span<const std::int32_t> now) {
+  Covariances anew;
+  anew.kept_ = kept_;
+  for (const auto& [pair, block] : crosses_) {
+    const std::int32_t a = now[static_cast<std::size_t>(pair.first)],
+                       b = now[static_cast<std::size_t>(pair.second)];
+    if (a >= 0 && b >= 0) anew.keep(a, b);
+  }
+  *this = std::move(anew);
+}
+
+void Covariances::note(const Models& models, const System& system, int f, double sign,
+                       std::span<const std::uint8_t> held) {
+  if (everything_ || kept_ != KeptMarginals::diagonal) return;
+  if (rows_.size() > kMostRows) {
+    everything_ = true;
+    return;
+  }
+  const int rows = models.rows(f);
+  const double* J = models.jacobian(f);
+  const auto variables = models.variables(f);
+  for (const std::int32_t v : variables) {
+    if (!held[v]) sources_.push_back(v);
+  }
+  for (int r = 0; r < rows; ++r) {
+    Row row{entries_.size(), 0, sign};
+    std::int64_t column = 0;
+    for (const std::int32_t v : variables) {
+      for (std::int32_t c = 0; c < system.size(v); ++c, ++column) {
+        const double value = J[column * rows + r];
+        if (!held[v] && value != 0.0) entries_.push_back({system.offset(v) + c, value});
+      }
+    }
+    row.count = entries_.size() - row.begin;
+    rows_.push_back(row);
+  }
+}
+
+MarginalsBy Covariances::update(const System& system, Tree& tree,
+                                std::span<const std::uint8_t> held) {
+  MarginalsBy by = keeps_anything() ? MarginalsBy::unchanged : MarginalsBy::none;
+  if (kept_ == KeptMarginals::diagonal) {
+    while (std::ssize(place_) < system.variables()) {
+      const std::int32_t size = system.size(static_cast<std::int32_t>(place_.size()));
+      place_.push_back(std::ssize(diagonal_));
+      diagonal_.resize(diagonal_.size() + static_cast<std::size_t>(size * size), 0.0);
+    }
+    if (!everything_ && (!rows_.empty() || !fresh_.empty()))
+      by = downdate(system, tree, held) ? MarginalsBy::downdate : MarginalsBy::recomputation;
+    if (everything_) by = MarginalsBy::recomputation;
+    if (by == MarginalsBy::recomputation) recompute(system, tree);
+  } else if (kept_ == KeptMarginals::last) {
+    by = MarginalsBy::recomputation;
+  }
+  if (!crosses_.empty()) {
+    solve_crosses(system, tree, held);
+    if (by == MarginalsBy::unchanged) by = MarginalsBy::recomputation;
+  }
+  everything_ = false;
+  fresh_.clear();
+  sources_.clear();
+  rows_.clear();
+  entries_.clear();
+  return by;
+}
+
+/// False if it cannot be done accurately.
+bool Covariances::downdate(const System& system, Tree& tree, std::span<const std::uint8_t> held) {
+  const std::size_t n = rows_.size();
+  if (n > kMostRows || ++age_ > kOldest) return false;
+  // Rows that join what is new with one variable say nothing of what was there before; they are
+  // in B like all others, and come out as zero.
+  const std::size_t groups = (n + 7) / 8;
+  while (B_.size() < groups) B_.emplace_back();
+  for (std::size_t g = 0; g < groups; ++g) {
+    AlignedVector& B = B_[g];
+    B.assign(static_cast<std::size_t>(system.scalars()) * 8, 0.0);
+    for (std::size_t r = g * 8; r < std::min(n, g * 8 + 8); ++r) {
+      for (std::size_t e = rows_[r].begin; e < rows_[r].begin + rows_[r].count; ++e)
+        B[static_cast<std::size_t>(entries_[e].scalar) * 8 + r % 8] += entries_[e].value;
+    }
+    tree.solve_many(sources_, B);
+  }
+  if (n > 0 && !apply(system, tree)) return false;
+  for (const std::int32_t v : fresh_) {
+    if (!held[v] && tree.node_of(v) >= 0) solve_for(system, tree, v);
+  }
+  return true;
+}
+
+/// Σ ← Σ − B U⁻¹ Bᵀ on the diagonal. False if U is too badly conditioned.
+bool Covariances::apply(const System& system, const Tree& tree) {
+  const std::size_t n = rows_.size();
+  Eigen::MatrixXd U =
+      Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(n), static_cast<Eigen::Index>(n));
+  for (std::size_t i = 0; i < n; ++i) {
+    U(i, i) = rows_[i].sign;
+    for (std::size_t e = rows_[i].begin; e < rows_[i].begin + rows_[i].count; ++e) {
+      for (std::size_t j = 0; j < n; ++j)
+        U(i, j) -=
+            entries_[e].value * B_[j / 8][static_cast<std::size_t>(entries_[e].scalar) * 8 + j % 8];
+    }
+  }
+  U = 0.5 * (U + U.transpose().eval());
+  const Eigen::VectorXd eigenvalues =
+      Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(U, Eigen::EigenvaluesOnly).eigenvalues();
+  if (eigenvalues.cwiseAbs().minCoeff() < kLeastEigenvalue) return false;
+  const Eigen::MatrixXd inverse = U.inverse();
+
+  std::vector<double> B_v, product;
+  for (std::int32_t v = 0; v < system.variables(); ++v) {
+    if (tree.node_of(v) < 0) {
+      std::fill_n(diagonal(v), system.size(v) * system.size(v), 0.0);
+      continue;
+    }
+    const std::int32_t size = system.size(v);
+    // B_v: size × n; Σ_vv ← Σ_vv − B_v U⁻¹ B_vᵀ.
+    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor, 8, kMostRows + 8> rows(
+        size, static_cast<Eigen::Index>(n));
+    for (std::int32_t k = 0; k < size; ++k) {
+      for (std::size_t j = 0; j < n; ++j)
+        rows(k, static_cast<Eigen::Index>(j)) =
+            B_[j / 8][static_cast<std::size_t>(system.offset(v) + k) * 8 + j % 8];
+    }
+    Eigen::Map<Eigen::MatrixXd> block(diagonal(v), size, size);
+    block.noalias() -= rows * inverse * rows.transpose();
+  }
+  return true;
+}
+
+void Covariances::recompute(const System& system, Tree& tree) {
+  age_ = 0;
+  std::ranges::fill(diagonal_, 0.0);
+  diagonal_of_inverse(system, tree, [&](std::int32_t v, const double* block, std::int64_t stride) {
+    double* out = diagonal(v);
+    const std::int32_t size = system.size(v);
+    for (std::int32_t c = 0; c < size; ++c) {
+      for (std::int32_t r = 0; r < size; ++r) out[c * size + r] = block[c * stride + r];
+    }
+  });
+}
+
+/// Σ_vv by solving along the path from v to its root.
+void Covariances::solve_for(const System& system, Tree& tree, std::int32_t v) {
+  const std::int32_t size = system.size(v);
+  B_.resize(std::max<std::size_t>(B_.size(), 1));
+  AlignedVector& X = B_.front();
+  for (std::int32_t first = 0; first < size; first += 8) {
+    const std::int32_t width = std::min(8, size - first);
+    X.assign(static_cast<std::size_t>(system.scalars()) * 8, 0.0);
+    for (std::int32_t k = 0; k < width; ++k)
+      X[static_cast<std::size_t>(system.offset(v) + first + k) * 8 + k] = 1.0;
+    tree.solve_many_above({&v, 1}, X);
+    for (std::int32_t k = 0; k < width; ++k) {
+      for (std::int32_t r = 0; r < size; ++r)
+        diagonal(v)[(first + k) * size + r] =
+            X[static_cast<std::size_t>(system.offset(v) + r) * 8 + k];
+    }
+  }
+}
+
+void Covariances::solve_crosses(const System& system, Tree& tree,
+                                std::span<const std::uint8_t> held) {
+  B_.resize(std::max<std::size_t>(B_.size(), 1));
+  AlignedVector& X = B_.front();
+  for (auto& [pair, block] : crosses_) {
+    const auto [a, b] = pair;
+    const std::int32_t rows = system.size(a), columns = system.size(b);
+    block.assign(static_cast<std::size_t>(rows * columns), 0.0);
+    if (held[a] || held[b]) continue;
+    for (std::int32_t first = 0; first < columns; first += 8) {
+      const std::int32_t width = std::min(8, columns - first);
+      X.assign(static_cast<std::size_t>(system.scalars()) * 8, 0.0);
+      for (std::int32_t k = 0; k < width; ++k)
+        X[static_cast<std::size_t>(system.offset(b) + first + k) * 8 + k] = 1.0;
+      const std::int32_t both[2] = {a, b};
+      tree.solve_many_above(both, X);
+      for (std::int32_t k = 0; k < width; ++k) {
+        for (std::int32_t r = 0; r < rows; ++r)
+          block[static_cast<std::size_t>((first + k) * rows + r)] =
+              X[static_cast<std::size_t>(system.offset(a) + r) * 8 + k];
+      }
+    }
+  }
+}
+
+const double* Covariances::kept(std::int32_t a, std::int32_t b) const {
+  if (a == b && kept_ == KeptMarginals::diagonal && a < std::ssize(place_))
+    return diagonal_.data() + place_[a];
+  const auto cross = crosses_.find({a, b});
+  return cross == crosses_.end() || cross->second.empty() ? nullptr : cross->second.data();
+}
+
+std::int64_t Covariances::doubles() const {
+  std::int64_t sum = std::ssize(diagonal_);
+  for (const AlignedVector& B : B_) sum += std::ssize(B);
+  return sum;
+}
+
+}  // namespace cairn::incremental

@@ -1,0 +1,664 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "engine.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <numeric>
+#include <utility>
+
+#include "cairn/error.hpp"
+
+namespace cairn::incremental {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point begin) {
+  return std::chrono::duration<double>(Clock::now() - begin).count();
+}
+
+/// Adds the time from here to the end of the scope.
+class Timed {
+ public:
+  explicit Timed(double& seconds) : seconds_(seconds), begin_(Clock::now()) {}
+  Timed(const Timed&) = delete;
+  Timed& operator=(const Timed&) = delete;
+  ~Timed() { seconds_ += seconds_since(begin_); }
+
+ private:
+  double& seconds_;
+  Clock::time_point begin_;
+};
+
+/// What a factor's chi2 may be off by rounding.
+constexpr double kRounding = 1e-18;
+
+// How the accuracy that is asked for, a fraction of chi2, is shared out. Found by trying on the
+// published graphs: what is left at the end stays well within it.
+constexpr double kEnough = 0.3;      ///< of it all: by how much more solving could lower chi2
+constexpr double kStepShare = 0.2;   ///< of a factor's: steps that are not followed down the tree
+constexpr double kMoveShare = 10.0;  ///< of a factor's: model moved so far: evaluated again
+constexpr double kMismatch = 0.05;   ///< Jacobians off by more than this times it are renewed
+/// While a solution leaves less than this fraction of what it has gained, H does as it is.
+constexpr double kFast = 0.5;
+
+const block::Kernels* kernels_named(const std::string& name) {
+  const block::Kernels* kernels = block::choose_kernels(name.c_str());
+  if (kernels) return kernels;
+  throw Error(ErrorCode::usage, "this machine cannot run the kernels '" + name + "'; use auto");
+}
+
+}  // namespace
+
+Engine::Engine(const Settings& settings, std::shared_ptr<Optimizer> rescuer)
+    : settings_(settings),
+      rescuer_(std::move(rescuer)),
+      kernels_(kernels_named(settings.kernels)),
+      tree_(system_, states_, bound_, *kernels_) {}
+
+Engine::Engine(const Engine& other)
+    : settings_(other.settings_),
+      rescuer_(other.rescuer_),
+      kernels_(other.kernels_),
+      graph_(other.graph_.clone()),
+      system_(other.system_),
+      states_(other.states_),
+      models_(other.models_),
+      tree_(other.tree_, system_, states_, bound_),
+      gauge_(other.gauge_),
+      covariances_(other.covariances_),
+      held_(other.held_),
+      live_variable_(other.live_variable_),
+      live_factor_(other.live_factor_),
+      factors_of_(other.factors_of_),
+      bound_(other.bound_),
+      moved_at_(other.moved_at_),
+      touched_at_(other.touched_at_),
+      touched_(other.touched_),
+      sources_(other.sources_),
+      steps_(other.steps_),
+      moving_(other.moving_),
+      retiring_(other.retiring_),
+      checked_at_(other.checked_at_),
+      check_(other.check_),
+      time_(other.time_),
+      structure_changed_(other.structure_changed_),
+      broken_(other.broken_),
+      gauge_is_old_(other.gauge_is_old_),
+      dead_(other.dead_),
+      live_factors_(other.live_factors_),
+      cost_(other.cost_),
+      drift_(other.drift_),
+      decrease_(other.decrease_),
+      ids_(other.ids_),
+      place_of_id_(other.place_of_id_),
+      is_source_(other.is_source_),
+      move_tolerance_(other.move_tolerance_) {}
+
+// --- what changes ---
+
+/// Starts from a whole graph, at its states.
+void Engine::load(Graph graph, std::vector<FactorId> ids) {
+  std::vector<std::int32_t> now;
+  for (int v = 0; v < graph_.variable_count(); ++v) {
+    const auto found = graph.find(graph_.id(v));
+    now.push_back(found && live_variable_[v] ? static_cast<std::int32_t>(*found) : -1);
+  }
+  covariances_.renumber(now);
+  graph_ = std::move(graph);
+  ids_ = std::move(ids);
+  for (std::size_t f = 0; f < ids_.size(); ++f)
+    place_of_id_[static_cast<std::size_t>(ids_[f])] = static_cast<std::int32_t>(f);
+  system_ = System();
+  states_ = States();
+  models_.clear();
+  tree_ = Tree(system_, states_, bound_, *kernels_);
+  gauge_ = GaugeWatch();
+  held_.clear();
+  live_variable_.clear();
+  live_factor_.clear();
+  factors_of_.clear();
+  bound_.clear();
+  moved_at_.clear();
+  touched_.clear();
+  sources_.clear();
+  is_source_.clear();
+  steps_.clear();
+  moving_.clear();
+  retiring_.clear();
+  checked_at_.clear();
+  broken_ = gauge_is_old_ = false;
+  dead_ = live_factors_ = 0;
+  cost_ = drift_ = decrease_ = 0.0;
+  touched_at_.clear();
+  const int variables = graph_.variable_count(), factors = graph_.factor_count();
+  while (states_.size() < variables) added_variable();
+  while (models_.size() < factors) added_factor();
+  settle_gauge();
+}
+
+void Engine::added_variable() {
+  const int v = states_.size();
+  const VariableType& type = graph_.type(v);
+  system_.add_variable(type.tangent_size());
+  states_.add(graph_.variable_pools()[graph_.pool(v)].type, graph_.state(v));
+  steps_.resize(static_cast<std::size_t>(system_.scalars()), 0.0);
+  gauge_.add_variable(type.tangent_size(), type.lie_group() != nullptr, graph_.fixed(v));
+  held_.push_back(1);  // until it has a factor
+  covariances_.note_variable(v);
+  live_variable_.push_back(1);
+  factors_of_.emplace_back();
+  touched_at_.push_back(time_);
+  bound_.push_back(0);
+  moved_at_.push_back(-1);
+  is_source_.push_back(0);
+}
+
+void Engine::added_factor() {
+  const int f = models_.size();
+  if (f == std::ssize(ids_)) {
+    ids_.push_back(next_id());
+    place_of_id_.push_back(f);
+  }
+  const FactorType& type = *graph_.factor_pools()[graph_.factor(f).pool].type;
+  models_.add(graph_, f, loss_applies(f));
+  live_factor_.push_back(1);
+  checked_at_.push_back(-1);
+  const auto variables = graph_.factor_variables(f);
+  gauge_.add_factor(variables.data(), static_cast<int>(variables.size()), type.absolute_size());
+  settle_gauge();
+  for (const std::int32_t v : variables) follow(v);
+  for (const std::int32_t v : variables) factors_of_[v].push_back(f);
+  ++live_factors_;
+  models_.linearize(f, graph_, states_);
+  cost_ += models_.cost(f);
+  put_in(f);
+}
+
+void Engine::changed_factor(int f) { relinearize(f); }
+
+void Engine::remove_factor(int f) {
+  for (const std::int32_t v : models_.variables(f)) follow(v);
+  take_out(f);
+  live_factor_[f] = 0;
+  place_of_id_[static_cast<std::size_t>(ids_[f])] = -1;
+  cost_ -= models_.cost(f);
+  for (const std::int32_t v : models_.variables(f)) std::erase(factors_of_[v], f);
+  for (const std::int32_t v : models_.variables(f)) sum_anew(v);
+  --live_factors_;
+  ++dead_;
+  gauge_is_old_ = true;
+}
+
+void Engine::remove_variable(int v) {
+  live_variable_[v] = 0;
+  if (!held_[v]) {
+    touch(v);
+    retiring_.push_back(v);
+    held_[v] = 1;
+  }
+  ++dead_;
+}
+
+void Engine::settle_gauge() {
+  if (gauge_is_old_) watch_gauge_anew();
+  gauge_.settle([&](std::int32_t v, bool held) { hold(v, held); });
+}
+
+/// Components may have come apart: whom to hold is found out from what is left.
+void Engine::watch_gauge_anew() {
+  gauge_is_old_ = false;
+  gauge_ = GaugeWatch();
+  for (int v = 0; v < states_.size(); ++v) {
+    const VariableType& type = graph_.type(v);
+    gauge_.add_variable(live_variable_[v] ? type.tangent_size() : 0, type.lie_group() != nullptr,
+                        graph_.fixed(v));
+  }
+  for (int f = 0; f < models_.size(); ++f) {
+    if (!live_factor_[f]) continue;
+    const auto variables = models_.variables(f);
+    gauge_.add_factor(variables.data(), static_cast<int>(variables.size()),
+                      graph_.factor_pools()[graph_.factor(f).pool].type->absolute_size());
+  }
+}
+
+void Engine::hold(std::int32_t v, bool held) {
+  if (held && gauge_.anchored(v)) anchored_.push_back(v);
+  if (!live_variable_[v] || (held_[v] != 0) == held) return;
+  const auto factors = factors_of_[v];
+  if (!factors.empty()) covariances_.note_everything();
+  for (const std::int32_t f : factors) {
+    for (const std::int32_t other : models_.variables(f)) follow(other);
+  }
+  for (const std::int32_t f : factors) take_out(f);
+  if (held) {
+    touch(v);
+    retiring_.push_back(v);
+  } else {
+    std::erase(retiring_, v);
+  }
+  held_[v] = held;
+  if (!held) covariances_.note_variable(v);
+  for (const std::int32_t f : factors) put_in(f);
+}
+
+void Engine::set_loss(std::shared_ptr<const Loss> loss, LossScope scope) {
+  Graph graph = snapshot();
+  graph.set_loss(std::move(loss), scope);
+  load(std::move(graph), live_ids());
+}
+
+bool Engine::loss_applies(int f) const {
+  if (!graph_.loss()) return false;
+  const FactorType& type = *graph_.factor_pools()[graph_.factor(f).pool].type;
+  if (!type.takes_loss()) return false;
+  return graph_.loss_scope() == LossScope::all || under_loss(graph_)[f];
+}
+
+void Engine::touch(std::int32_t v) { touched_.push_back(v); }
+
+/// Makes the factor a part of H and g.
+void Engine::put_in(int f) {
+  const auto variables = models_.variables(f);
+  for (std::size_t a = 0; a < variables.size(); ++a) {
+    if (held_[variables[a]]) continue;
+    touch(variables[a]);
+    touched_at_[variables[a]] = time_;
+    for (std::size_t b = a + 1; b < variables.size(); ++b) {
+      if (!held_[variables[b]]) system_.connect(variables[a], variables[b]);
+    }
+  }
+  models_.add_to(system_, f, 1.0, true, held_);
+  covariances_.note(models_, system_, f, 1.0, held_);
+  count_bonds(f, 1);
+  structure_changed_ = true;
+}
+
+/// A factor binds its variables to the world unless it is a relative one between some that move.
+void Engine::count_bonds(int f, std::int32_t sign) {
+  const auto variables = models_.variables(f);
+  bool binds = !models_.relative(f);
+  for (const std::int32_t v : variables) binds = binds || held_[v] || !states_.type(v).lie_group();
+  if (!binds) return;
+  for (const std::int32_t v : variables) bound_[v] += sign;
+}
+
+void Engine::take_out(int f) {
+  count_bonds(f, -1);
+  covariances_.note(models_, system_, f, -1.0, held_);
+  models_.add_to(system_, f, -1.0, true, held_);
+  const auto variables = models_.variables(f);
+  for (std::size_t a = 0; a < variables.size(); ++a) {
+    if (held_[variables[a]]) continue;
+    touch(variables[a]);
+    for (std::size_t b = a + 1; b < variables.size(); ++b) {
+      if (!held_[variables[b]]) system_.disconnect(variables[a], variables[b]);
+    }
+  }
+  structure_changed_ = true;
+}
+
+/// A variable's part of H from its factors, without what subtracting has left of rounding.
+void Engine::sum_anew(std::int32_t v) {
+  if (held_[v]) return;
+  const std::int32_t size = system_.size(v);
+  std::fill_n(system_.diagonal(v), size * size, 0.0);
+  for (const System::Link& link : system_.links(v))
+    std::fill_n(system_.block(link.entry), size * system_.size(link.other), 0.0);
+  for (const std::int32_t f : factors_of_[v]) models_.add_row(system_, f, v, held_);
+}
+
+void Engine::relinearize(int f) {
+  for (const std::int32_t v : models_.variables(f)) follow(v);
+  covariances_.note(models_, system_, f, -1.0, held_);
+  models_.add_to(system_, f, -1.0, true, held_);
+  cost_ -= models_.cost(f);
+  models_.linearize(f, graph_, states_);
+  cost_ += models_.cost(f);
+  models_.add_to(system_, f, 1.0, true, held_);
+  covariances_.note(models_, system_, f, 1.0, held_);
+  for (const std::int32_t v : models_.variables(f)) {
+    if (!held_[v]) touch(v);
+  }
+}
+
+/// Whoever changes the factors of a variable must have followed first.
+void Engine::follow(std::int32_t v) {
+  tree_.follow(v, steps_, changed_);
+  if (!changed_.empty()) apply_steps();
+}
+
+/// Moves the estimate and the models by the steps of `changed_`.
+void Engine::apply_steps() {
+  ++check_;
+  for (const std::int32_t v : changed_) {
+    if (!held_[v]) states_.move(v, steps_.data() + system_.offset(v));
+    moved_at_[v] = check_;
+  }
+  for (const std::int32_t v : changed_) {
+    for (const std::int32_t f : factors_of_[v]) {
+      if (checked_at_[f] == check_) continue;
+      checked_at_[f] = check_;
+      move_model(f);
+    }
+  }
+  for (const std::int32_t v : changed_)
+    std::fill_n(steps_.data() + system_.offset(v), system_.size(v), 0.0);
+  changed_.clear();
+}
+
+/// A variable of the factor whose step was not computed is below a node that the pass ended at: its
+/// model moves by what arrived there.
+void Engine::move_model(int f) {
+  const auto variables = models_.variables(f);
+  const Node* end = nullptr;
+  for (const std::int32_t v : variables) {
+    if (moved_at_[v] != check_ && !held_[v]) end = tree_.end_of_pass(v);
+  }
+  factor_steps_.clear();
+  for (const std::int32_t v : variables) {
+    const double* step = nullptr;
+    if (moved_at_[v] == check_) step = steps_.data() + system_.offset(v);
+    if (step && end) {
+      if (const double* arrived = tree_.arrived(*end, v)) step = arrived;
+    }
+    factor_steps_.push_back(step);
+  }
+  if (models_.move(f, factor_steps_.data(), move_tolerance_)) moving_.push_back(f);
+}
+
+// --- solving ---
+
+void Engine::solve(double max_seconds, UpdateReport& report) {
+  const Clock::time_point begin = Clock::now();
+  settle_gauge();
+  ++time_;
+  if (broken_) return rescue(report, 1e-6);
+  bool again = !touched_.empty() || !sources_.empty();
+  for (int round = 0; again; ++round) {
+    const double before = cost_;
+    if (!bring_factor_up_to_date(report)) {
+      step_back();
+      return rescue(report, 1e-6);
+    }
+    if (round == 0 && negligible()) break;
+    take_step(share(kStepShare), report);
+    ++report.iterations;
+    check(report);
+    // Negated, so that what is not a number is bad too.
+    if (!(cost_ <= 2.0 * before + kRounding * live_factors_)) {
+      step_back();
+      return rescue(report, 1e-6);
+    }
+    const bool enough_time = report.iterations < settings_.iterations &&
+                             (max_seconds <= 0.0 || seconds_since(begin) < 0.5 * max_seconds);
+    again = improve(enough_time, report);
+  }
+}
+
+/// Whether what has not been solved for yet would lower chi2 by nothing that matters.
+bool Engine::negligible() {
+  const double gain = tree_.decrement(sources_, system_.g());
+  return gain <= std::min(settings_.significance, kEnough * settings_.accuracy * cost_);
+}
+
+/// A share of the accuracy that is asked for, of the mean cost of a factor.
+double Engine::share(double part) const {
+  return part * settings_.accuracy * std::max(cost_, 0.0) / std::max(live_factors_, 1);
+}
+
+/// The estimate from before this update.
+void Engine::step_back() {
+  states_.undo(
+      [&](std::int32_t node, std::span<const double> lead) { tree_.undo_lead(node, lead); });
+}
+
+/// Starts anew at the current estimate with an optimizer that never raises chi2.
+void Engine::rescue(UpdateReport& report, double tolerance) {
+  {
+    const Timed timed(report.seconds.linearize);
+    write_back();
+    Graph graph = clean_graph();
+    const Summary summary =
+        rescuer_->optimize(graph, {.max_iterations = 100, .tolerance = tolerance});
+    report.iterations += static_cast<int>(summary.iterations.size());
+    load(std::move(graph), live_ids());
+  }
+  broken_ = !bring_factor_up_to_date(report);
+  report.ok = !broken_;
+  if (broken_) return;
+  take_step(0.0, report);
+  check(report);
+}
+
+void Engine::add_source(std::int32_t v) {
+  if (held_[v] || is_source_[v]) return;
+  is_source_[v] = 1;
+  sources_.push_back(v);
+}
+
+/// The factor of H as it is now. False if H is not positive definite.
+bool Engine::bring_factor_up_to_date(UpdateReport& report) {
+  {
+    const Timed timed(report.seconds.order);
+    tree_.clear_affected();
+    if (structure_changed_ && tree_.worn_out()) touch_all();
+    for (const std::int32_t v : touched_) {
+      if (!held_[v] || tree_.node_of(v) >= 0) tree_.touch(v);
+    }
+    for (const std::int32_t v : retiring_) tree_.retire(v);
+    if (structure_changed_) {
+      tree_.restructure(touched_at_, time_ - settings_.recent);
+      states_.remember();  // nodes keep their numbers from here on
+    }
+    retiring_.clear();
+    structure_changed_ = false;
+    report.affected_variables += tree_.affected_variables();
+    for (const std::int32_t v : touched_) add_source(v);
+    touched_.clear();
+  }
+  const Timed timed(report.seconds.factorize);
+  return tree_.factorize() < 0;
+}
+
+void Engine::touch_all() {
+  for (int v = 0; v < states_.size(); ++v) {
+    if (!live_variable_[v] || held_[v]) continue;
+    follow(v);
+    touch(v);
+  }
+}
+
+void Engine::take_step(double tolerance, UpdateReport& report) {
+  const Timed timed(report.seconds.solve);
+  decrease_ = tree_.solve(sources_, tolerance, system_.g(), steps_, changed_);
+  for (const std::int32_t v : sources_) is_source_[v] = 0;
+  sources_.clear();
+}
+
+/// Moves to the solution, and evaluates the factors whose variables have moved much.
+void Engine::check(UpdateReport& report) {
+  const Timed timed(report.seconds.check);
+  move_tolerance_ = share(kMoveShare);
+  drift_ = 0.0;
+  apply_steps();
+  for (const std::int32_t f : moving_) {
+    if (!live_factor_[f]) continue;
+    for (const std::int32_t v : models_.variables(f)) tree_.settle(v);
+    cost_ -= models_.cost(f);
+    drift_ += models_.correct(f, graph_, states_, system_, held_);
+    cost_ += models_.cost(f);
+    for (const std::int32_t v : models_.variables(f)) add_source(v);
+  }
+  moving_.clear();
+}
+
+/// Whether to solve once more: where the true gradients, which the last step has left, would lower
+/// chi2 noticeably. The factors that have changed much are relinearised then; and all of them, if
+/// that has not helped.
+bool Engine::improve(bool enough_time, UpdateReport& report) {
+  const double allowed = settings_.accuracy * cost_ + kRounding * live_factors_;
+  report.owed = 0;
+  if (drift_ <= 1e-3 * allowed) return false;
+  double left = 0.0;
+  {
+    const Timed timed(report.seconds.solve);
+    left = tree_.decrement(sources_, system_.g());
+  }
+  if (left <= kEnough * allowed) return false;
+  if (!enough_time) {
+    report.owed = static_cast<int>(sources_.size());
+    return false;
+  }
+  if (left < kFast * decrease_) return true;
+  const Timed timed(report.seconds.linearize);
+  if (report.iterations >= 3 && left > decrease_) {
+    relinearize_all();
+    report.relinearized_factors += live_factors_;
+    return true;
+  }
+  const double mismatch = std::min(kMismatch * settings_.accuracy, 1e-2);
+  for (int f = 0; f < models_.size(); ++f) {
+    if (!live_factor_[f] || models_.mismatch(f) <= mismatch) continue;
+    relinearize(f);
+    ++report.relinearized_factors;
+  }
+  return true;
+}
+
+/// Everything at the current estimate: H and g are summed anew, without the rounding of updates.
+void Engine::relinearize_all() {
+  covariances_.note_everything();
+  touch_all();
+  moving_.clear();
+  for (const std::int32_t v : sources_) is_source_[v] = 0;
+  sources_.clear();
+  system_.clear_values();
+  cost_ = drift_ = 0.0;
+  for (int f = 0; f < models_.size(); ++f) {
+    if (!live_factor_[f]) continue;
+    models_.linearize(f, graph_, states_);
+    cost_ += models_.cost(f);
+    models_.add_to(system_, f, 1.0, true, held_);
+  }
+}
+
+std::vector<FactorId> Engine::live_ids() const {
+  std::vector<FactorId> ids;
+  for (std::size_t f = 0; f < ids_.size(); ++f) {
+    if (live_factor_[f]) ids.push_back(ids_[f]);
+  }
+  return ids;
+}
+
+void Engine::compact() {
+  if (dead_ == 0) return;
+  Graph graph = snapshot();
+  load(std::move(graph), live_ids());
+}
+
+/// Without what has been removed.
+Graph Engine::clean_graph() {
+  Graph graph = graph_.clone();
+  if (dead_ == 0) return graph;
+  std::vector<bool> factors(live_factor_.size()), variables(live_variable_.size());
+  for (std::size_t f = 0; f < factors.size(); ++f) factors[f] = !live_factor_[f];
+  for (std::size_t v = 0; v < variables.size(); ++v) variables[v] = !live_variable_[v];
+  graph.remove(factors, variables);
+  return graph;
+}
+
+void Engine::solve_fully(UpdateReport& report) {
+  settle_gauge();
+  ++time_;
+  if (broken_) return rescue(report, 1e-12);
+  structure_changed_ = true;
+  for (int round = 0; round < 50; ++round) {
+    {
+      const Timed timed(report.seconds.linearize);
+      relinearize_all();
+      report.relinearized_factors += live_factors_;
+    }
+    const double before = cost_;
+    const bool ok = bring_factor_up_to_date(report);
+    if (ok) {
+      take_step(0.0, report);
+      ++report.iterations;
+      check(report);
+    }
+    if (!ok || !(cost_ <= 1.01 * before + kRounding * live_factors_)) {
+      step_back();
+      return rescue(report, 1e-12);
+    }
+    if (decrease_ <= 1e-12 * cost_ + kRounding * live_factors_) return;
+  }
+}
+
+double Engine::chi2() {
+  tree_.settle_all();
+  double sum = 0.0;
+  for (int f = 0; f < models_.size(); ++f) {
+    if (live_factor_[f]) sum += models_.cost_now(f, graph_, states_);
+  }
+  return sum;
+}
+
+void Engine::write_back() {
+  tree_.settle_all();
+  Values values = graph_.values();
+  for (int v = 0; v < states_.size(); ++v) {
+    const std::int32_t ambient = states_.ambient(v);
+    std::copy_n(states_.x(v), ambient,
+                values.pools[graph_.pool(v)].begin() + std::ptrdiff_t{graph_.slot(v)} * ambient);
+  }
+  graph_.set_values(std::move(values));
+}
+
+Graph Engine::snapshot() {
+  write_back();
+  return clean_graph();
+}
+
+bool Engine::covariance(int a, int b, double* block) {
+  const std::int32_t rows = system_.size(a), columns = system_.size(b);
+  if (const double* kept = covariances_.kept(a, b); kept && !broken_) {
+    std::copy_n(kept, rows * columns, block);
+    return true;
+  }
+  const std::int32_t row = a;
+  return covariance_column({&row, 1}, b, block);
+}
+
+bool Engine::covariance_column(std::span<const std::int32_t> rows, int b, double* column) {
+  std::int64_t height = 0;
+  for (const std::int32_t v : rows) height += system_.size(v);
+  const std::int32_t columns = system_.size(b);
+  std::fill_n(column, height * columns, 0.0);
+  if (held_[b]) return true;
+  if (broken_ || tree_.node_of(b) < 0) return false;
+  AlignedVector X(static_cast<std::size_t>(system_.scalars()) * 8);
+  const std::int32_t source = b;
+  for (std::int32_t first = 0; first < columns; first += 8) {
+    const std::int32_t width = std::min(8, columns - first);
+    std::ranges::fill(X, 0.0);
+    for (std::int32_t k = 0; k < width; ++k)
+      X[static_cast<std::size_t>(system_.offset(b) + first + k) * 8 + k] = 1.0;
+    if (rows.size() == 1) {
+      const std::int32_t both[2] = {source, rows[0]};
+      tree_.solve_many_above(held_[rows[0]] ? std::span(both, 1) : std::span(both), X);
+    } else {
+      tree_.solve_many({&source, 1}, X);
+    }
+    double* out = column + std::int64_t{first} * height;
+    for (std::int32_t k = 0; k < width; ++k) {
+      for (const std::int32_t v : rows) {
+        for (std::int32_t r = 0; r < system_.size(v); ++r)
+          *out++ = held_[v] ? 0.0 : X[static_cast<std::size_t>(system_.offset(v) + r) * 8 + k];
+      }
+    }
+  }
+  return true;
+}
+
+}  // namespace cairn::incremental

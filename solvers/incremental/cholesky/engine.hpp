@@ -1,0 +1,184 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "cairn/estimator.hpp"
+#include "cairn/graph.hpp"
+#include "cairn/optimizer.hpp"
+#include "covariances.hpp"
+#include "gauge_watch.hpp"
+#include "models.hpp"
+#include "states.hpp"
+#include "system.hpp"
+#include "tree.hpp"
+
+namespace cairn::incremental {
+
+/// What can be chosen about the engine.
+struct Settings {
+  /// By how much chi2 may be above what it would be if everything were relinearised and solved, as
+  /// a fraction of it.
+  double accuracy = 5e-3;
+  /// What lowers chi2 by less than this, and by less than the accuracy allows, is put off until it
+  /// adds up.
+  double significance = 0.1;
+  /// Linear systems solved in one update, at most.
+  int iterations = 10;
+  /// Variables touched within so many updates are ordered last.
+  int recent = 30;
+  std::string kernels = "auto";
+};
+
+/// Solves the nonlinear least-squares problem of a graph that changes: keeps its linear models,
+/// their normal equations and the Cholesky factor, and brings all three up to date with what has
+/// changed.
+///
+/// Variables and factors are numbered as in `graph()`. Nothing is solved before `solve` is called.
+class Engine {
+ public:
+  /// `rescuer`: starts where steps of Gauss-Newton have gone astray. Copies share it.
+  Engine(const Settings& settings, std::shared_ptr<Optimizer> rescuer);
+  Engine(const Engine& other);
+  Engine& operator=(const Engine&) = delete;
+
+  /// The graph: structure and measurements are current, its states are those at which it was loaded
+  /// (see `write_back`).
+  const Graph& graph() const { return graph_; }
+  /// x_v at the current estimate.
+  const double* x(int v) {
+    tree_.settle(v);
+    return states_.x(v);
+  }
+  /// The factor's number in the graph, or -1.
+  std::int32_t place_of(FactorId id) const {
+    return id >= 0 && id < std::ssize(place_of_id_) ? place_of_id_[static_cast<std::size_t>(id)]
+                                                    : -1;
+  }
+  FactorId next_id() const { return std::ssize(place_of_id_); }
+  /// Takes what has been removed out of the graph: everything is numbered anew.
+  void compact();
+
+  /// To be called for what has been added at the end of the graph, by `edit`.
+  Graph& edit() { return graph_; }
+  void added_variable();
+  void added_factor();
+  /// A measurement has been replaced.
+  void changed_factor(int f);
+  void remove_factor(int f);
+  /// All its factors must have been removed.
+  void remove_variable(int v);
+  bool live_factor(int f) const { return live_factor_[f]; }
+  bool live_variable(int v) const { return live_variable_[v]; }
+  const std::vector<std::int32_t>& factors_of(int v) const { return factors_of_[v]; }
+  bool held(int v) const { return held_[v]; }
+  /// Variables that have been anchored to fix the gauge since this was last asked.
+  std::vector<std::int32_t> take_anchored() { return std::exchange(anchored_, {}); }
+  /// Applies a loss to all factors.
+  void set_loss(std::shared_ptr<const Loss> loss, LossScope scope);
+  /// Removed factors and variables that are still in the graph.
+  int dead() const { return dead_; }
+
+  /// Solves until the estimate is as accurate as it is to be, the time is up (0: no limit), or the
+  /// iterations are.
+  void solve(double max_seconds, UpdateReport& report);
+  /// Relinearises everything at the current estimate, with a new order, until it has converged.
+  void solve_fully(UpdateReport& report);
+  /// Σ ρ(‖r‖²) at the current estimate.
+  double chi2();
+  /// A graph of its own of what is live, at the current estimate.
+  Graph snapshot();
+  /// The graph's states become the current estimate.
+  void write_back();
+
+  std::int64_t doubles() const { return system_.doubles() + models_.doubles() + tree_.doubles(); }
+
+  /// Which covariances are to be kept up to date; by `update_covariances`, after solving.
+  Covariances& covariances() { return covariances_; }
+  MarginalsBy update_covariances() { return covariances_.update(system_, tree_, held_); }
+  /// Σ_ab, size_a × size_b, column-major: a kept block or by solving. False if H is singular.
+  bool covariance(int a, int b, double* block);
+  /// The rows of Σ_vb for all of `rows`, one below the other, by solving.
+  bool covariance_column(std::span<const std::int32_t> rows, int b, double* column);
+
+  const Tree& tree() const { return tree_; }
+  const System& system() const { return system_; }
+  const Models& models() const { return models_; }
+
+ private:
+  void load(Graph graph, std::vector<FactorId> ids);
+  void settle_gauge();
+  void watch_gauge_anew();
+  void hold(std::int32_t v, bool held);
+  bool loss_applies(int f) const;
+  void put_in(int f);
+  void take_out(int f);
+  void sum_anew(std::int32_t v);
+  void relinearize(int f);
+  void relinearize_all();
+  void touch(std::int32_t v);
+  void follow(std::int32_t v);
+  void apply_steps();
+  void move_model(int f);
+  void count_bonds(int f, std::int32_t sign);
+  bool bring_factor_up_to_date(UpdateReport& report);
+  bool negligible();
+  double share(double part) const;
+  void touch_all();
+  void take_step(double tolerance, UpdateReport& report);
+  void check(UpdateReport& report);
+  bool improve(bool enough_time, UpdateReport& report);
+  void step_back();
+  void rescue(UpdateReport& report, double tolerance);
+  void add_source(std::int32_t v);
+  Graph clean_graph();
+  std::vector<FactorId> live_ids() const;
+
+  Settings settings_;
+  std::shared_ptr<Optimizer> rescuer_;
+  const block::Kernels* kernels_;
+  Graph graph_;
+  System system_;
+  States states_;
+  Models models_;
+  Tree tree_;
+  GaugeWatch gauge_;
+  Covariances covariances_;
+  std::vector<std::uint8_t> held_;
+  std::vector<std::uint8_t> live_variable_, live_factor_;
+  std::vector<std::vector<std::int32_t>> factors_of_;
+  std::vector<std::int32_t> bound_;     // by variable: see Tree
+  std::vector<std::int64_t> moved_at_;  // by variable: the last apply_steps that moved it
+  std::vector<const double*> factor_steps_;
+  std::vector<std::int64_t> touched_at_;  // by variable: update
+  std::vector<std::int32_t>
+      touched_;  // variables whose part of H has changed since the last solution
+  std::vector<std::int32_t> sources_;  // … or of the right-hand side alone
+  std::vector<double> steps_;          // by scalars; zero between calls
+  std::vector<std::int32_t> moving_;   // factors that have moved since they were last evaluated
+  std::vector<std::int32_t> retiring_;
+  std::vector<std::int32_t> changed_;     // by the last substitution
+  std::vector<std::int64_t> checked_at_;  // by factor: to visit each once
+  std::int64_t check_ = 0;
+  std::int64_t time_ = 0;
+  bool structure_changed_ = false;
+  bool broken_ = false;
+  bool gauge_is_old_ = false;
+  int dead_ = 0;
+  int live_factors_ = 0;
+  double cost_ = 0.0;                      // sum over factors
+  double drift_ = 0.0;                     // in the right-hand side, squared and weighted
+  double decrease_ = 0.0;                  // of the last solution: gᵀH⁻¹g
+  std::vector<FactorId> ids_;              // by factor
+  std::vector<std::int32_t> place_of_id_;  // by FactorId: factor, -1 if it has been removed
+  std::vector<std::uint8_t> is_source_;    // by variable
+  double move_tolerance_ = 0.0;
+  std::vector<std::int32_t> anchored_;
+};
+
+}  // namespace cairn::incremental

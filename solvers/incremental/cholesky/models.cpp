@@ -1,0 +1,278 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "models.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace cairn::incremental {
+namespace {
+
+/// out += J δ; J rows × size. The number of rows known when compiling is what makes this fast.
+template <int Rows>
+void add_product(const double* J, int size, const double* delta, double* out) {
+  for (int k = 0; k < size; ++k) {
+    for (int r = 0; r < Rows; ++r) out[r] += J[r] * delta[k];
+    J += Rows;
+  }
+}
+void add_product(int rows, const double* J, int size, const double* delta, double* out) {
+  switch (rows) {
+    case 2:
+      return add_product<2>(J, size, delta, out);
+    case 3:
+      return add_product<3>(J, size, delta, out);
+    case 6:
+      return add_product<6>(J, size, delta, out);
+    default:
+      for (int k = 0; k < size; ++k) {
+        for (int r = 0; r < rows; ++r) out[r] += J[r] * delta[k];
+        J += rows;
+      }
+  }
+}
+
+/// out += sign · Aᵀ B; A rows × a, B rows × b, out a × b, all column-major.
+template <int Rows>
+void add_transposed_product(const double* A, int a, const double* B, int b, double sign,
+                            double* out) {
+  for (int j = 0; j < b; ++j) {
+    double column[Rows];
+    for (int r = 0; r < Rows; ++r) column[r] = sign * B[j * Rows + r];
+    for (int i = 0; i < a; ++i) {
+      double sum = 0.0;
+      for (int r = 0; r < Rows; ++r) sum += A[i * Rows + r] * column[r];
+      *out++ += sum;
+    }
+  }
+}
+void add_transposed_product(int rows, const double* A, int a, const double* B, int b, double sign,
+                            double* out) {
+  switch (rows) {
+    case 2:
+      return add_transposed_product<2>(A, a, B, b, sign, out);
+    case 3:
+      return add_transposed_product<3>(A, a, B, b, sign, out);
+    case 6:
+      return add_transposed_product<6>(A, a, B, b, sign, out);
+    default:
+      for (int j = 0; j < b; ++j) {
+        for (int i = 0; i < a; ++i) {
+          double sum = 0.0;
+          for (int r = 0; r < rows; ++r) sum += A[i * rows + r] * B[j * rows + r];
+          *out++ += sign * sum;
+        }
+      }
+  }
+}
+
+}  // namespace
+
+void Models::add(const Graph& graph, int position, bool loss_applies) {
+  const FactorRef ref = graph.factor(position);
+  const FactorType& type = *graph.factor_pools()[ref.pool].type;
+  Record record{.place = std::ssize(values_),
+                .variables = static_cast<std::int32_t>(variables_.size()),
+                .pool = ref.pool,
+                .entry = ref.entry,
+                .arity = static_cast<std::int16_t>(type.arity()),
+                .rows = static_cast<std::int16_t>(type.residual_size()),
+                .scalars = 0,
+                .loss_applies = loss_applies,
+                .relative = type.is_relative()};
+  for (int k = 0; k < record.arity; ++k) {
+    tangents_.push_back(static_cast<std::int16_t>(type.tangent_size(k)));
+    record.scalars = static_cast<std::int16_t>(record.scalars + type.tangent_size(k));
+  }
+  const auto factor_variables = graph.factor_variables(position);
+  variables_.insert(variables_.end(), factor_variables.begin(), factor_variables.end());
+  values_.resize(values_.size() +
+                 static_cast<std::size_t>(record.rows) *
+                     static_cast<std::size_t>(record.scalars + 1) +
+                 static_cast<std::size_t>(record.scalars));
+  records_.push_back(record);
+}
+
+/// J of its k-th variable.
+const double* Models::block(const Record& record, int k) const {
+  const double* J = values_.data() + record.place;
+  for (int before = 0; before < k; ++before)
+    J += record.rows * tangents_[static_cast<std::size_t>(record.variables + before)];
+  return J;
+}
+
+/// The whitened residual and, unless J is null, the Jacobian at the current estimate, both weighted
+/// by √ρ′ = √weight. Returns ρ(‖r‖²).
+double Models::evaluate(const Record& record, const Graph& graph, const States& states, double* r,
+                        double* J, double& weight) const {
+  const FactorPool& pool = graph.factor_pools()[record.pool];
+  const FactorType& type = *pool.type;
+  points_.clear();
+  pointers_.clear();
+  double* next = J;
+  for (int k = 0; k < record.arity; ++k) {
+    points_.push_back(states.x(variables_[static_cast<std::size_t>(record.variables + k)]));
+    pointers_.push_back(next);
+    if (J) next += record.rows * tangents_[static_cast<std::size_t>(record.variables + k)];
+  }
+  const std::size_t packed = static_cast<std::size_t>(record.rows) * (record.rows + 1) / 2;
+  const std::size_t entry = static_cast<std::size_t>(record.entry);
+  type.evaluate(
+      points_.data(),
+      pool.measurements.data() + entry * static_cast<std::size_t>(type.measurement_size()),
+      pool.sqrt_information.data() + entry * packed, r, J ? pointers_.data() : nullptr);
+  double s = 0.0;
+  for (int k = 0; k < record.rows; ++k) s += r[k] * r[k];
+  weight = 1.0;
+  if (!record.loss_applies || !graph.loss()) return s;
+  double rho = 0.0;
+  graph.loss()->evaluate({&s, 1}, {&rho, 1}, {&weight, 1});
+  const double root = std::sqrt(weight);
+  for (int k = 0; k < record.rows; ++k) r[k] *= root;
+  if (J) {
+    for (int k = 0; k < record.rows * record.scalars; ++k) J[k] *= root;
+  }
+  return rho;
+}
+
+void Models::linearize(int f, const Graph& graph, const States& states) {
+  Record& record = records_[f];
+  double* const J = values_.data() + record.place;
+  double weight = 1.0;
+  record.cost = evaluate(record, graph, states, J + record.rows * record.scalars, J, weight);
+  std::fill_n(J + record.rows * (record.scalars + 1), record.scalars, 0.0);
+  record.mismatch = record.travel = 0.0;
+}
+
+double Models::cost_now(int f, const Graph& graph, const States& states) const {
+  std::vector<double> r(static_cast<std::size_t>(records_[f].rows));
+  double weight = 1.0;
+  return evaluate(records_[f], graph, states, r.data(), nullptr, weight);
+}
+
+/// Its part of the block that joins its variables ka and kb.
+void Models::add_block(System& system, const Record& record, int ka, int kb, double sign) const {
+  const std::int32_t* v = variables_.data() + record.variables;
+  const std::int32_t a = v[ka], b = v[kb];
+  const double *Ja = block(record, ka), *Jb = block(record, kb);
+  double* target = system.block(system.find(a, b));
+  if (a < b) {
+    add_transposed_product(record.rows, Ja, system.size(a), Jb, system.size(b), sign, target);
+  } else {
+    add_transposed_product(record.rows, Jb, system.size(b), Ja, system.size(a), sign, target);
+  }
+}
+
+void Models::add_to(System& system, int f, double sign, bool with_gradient,
+                    std::span<const std::uint8_t> held) const {
+  const Record& record = records_[f];
+  const int rows = record.rows;
+  const std::int32_t* v = variables_.data() + record.variables;
+  const double* J = values_.data() + record.place;
+  const double* const r = J + rows * record.scalars;
+  const double* beyond = r + rows;
+  for (int ka = 0; ka < record.arity; ++ka) {
+    const std::int32_t a = v[ka], size = system.size(a);
+    if (!held[a]) {
+      add_transposed_product(rows, J, size, J, size, sign, system.diagonal(a));
+      if (with_gradient) {
+        add_transposed_product(rows, J, size, r, 1, -sign, system.g(a));
+        for (int i = 0; i < size; ++i) system.g(a)[i] -= sign * beyond[i];
+      }
+      for (int kb = ka + 1; kb < record.arity; ++kb) {
+        if (!held[v[kb]]) add_block(system, record, ka, kb, sign);
+      }
+    }
+    J += rows * size;
+    beyond += size;
+  }
+}
+
+void Models::add_row(System& system, int f, std::int32_t variable,
+                     std::span<const std::uint8_t> held) const {
+  const Record& record = records_[f];
+  const std::int32_t* v = variables_.data() + record.variables;
+  for (int ka = 0; ka < record.arity; ++ka) {
+    if (v[ka] != variable) continue;
+    const double* J = block(record, ka);
+    const std::int32_t size = system.size(variable);
+    add_transposed_product(record.rows, J, size, J, size, 1.0, system.diagonal(variable));
+    for (int kb = 0; kb < record.arity; ++kb) {
+      if (kb != ka && !held[v[kb]]) add_block(system, record, ka, kb, 1.0);
+    }
+  }
+}
+
+bool Models::move(int f, const double* const* steps, double tolerance) {
+  constexpr int kMost = 64;
+  Record& record = records_[f];
+  const int rows = record.rows;
+  if (rows > kMost) return true;
+  const double* J = values_.data() + record.place;
+  double* r = values_.data() + record.place + rows * record.scalars;
+  std::array<double, kMost> change, part;
+  std::fill_n(change.begin(), rows, 0.0);
+  double apart = 0.0;  // Σ ‖J_k δ_k‖
+  for (int k = 0; k < record.arity; ++k) {
+    const int size = tangents_[static_cast<std::size_t>(record.variables + k)];
+    if (steps[k]) {
+      std::fill_n(part.begin(), rows, 0.0);
+      add_product(rows, J, size, steps[k], part.data());
+      double square = 0.0;
+      for (int i = 0; i < rows; ++i) change[i] += part[i], square += part[i] * part[i];
+      apart += std::sqrt(square);
+    }
+    J += rows * size;
+  }
+  double square = 0.0;
+  for (int i = 0; i < rows; ++i) r[i] += change[i], square += change[i] * change[i];
+  // What moves the variables of a relative factor alike is linear but for the mismatch.
+  record.travel += record.relative ? std::sqrt(square) + record.mismatch * apart : apart;
+  return record.travel * record.travel > tolerance;
+}
+
+double Models::correct(int f, const Graph& graph, const States& states, System& system,
+                       std::span<const std::uint8_t> held) {
+  Record& record = records_[f];
+  const int rows = record.rows, doubles = rows * record.scalars;
+  scratch_.resize(static_cast<std::size_t>(doubles + rows + record.scalars));
+  double* const J_now = scratch_.data();
+  double* const r_now = J_now + doubles;
+  double* const apart = r_now + rows;  // J(x)ᵀ r(x) − Jᵀ r(x)
+  double weight = 1.0;
+  record.cost = evaluate(record, graph, states, r_now, J_now, weight);
+  const double* const J = values_.data() + record.place;
+  double* const r = values_.data() + record.place + doubles;
+  double* const beyond = r + rows;
+  double difference = 0.0, norm = 0.0;
+  for (int c = 0; c < record.scalars; ++c) {
+    double sum = 0.0;
+    for (int i = 0; i < rows; ++i) {
+      const double old = J[c * rows + i], change = J_now[c * rows + i] - old;
+      difference += change * change;
+      norm += old * old;
+      sum += change * r_now[i];
+    }
+    apart[c] = sum;
+  }
+  record.mismatch = norm > 0.0 ? std::sqrt(difference / norm) : difference > 0.0;
+  record.travel = 0.0;
+  double square = 0.0;
+  int c = 0;
+  for (int k = 0; k < record.arity; ++k) {
+    const std::int32_t v = variables_[static_cast<std::size_t>(record.variables + k)],
+                       size = system.size(v);
+    for (int i = 0; i < size; ++i, ++c) {
+      double drift = apart[c] - beyond[c];
+      for (int row = 0; row < rows; ++row) drift += J[c * rows + row] * (r_now[row] - r[row]);
+      beyond[c] = apart[c];
+      if (held[v]) continue;
+      system.g(v)[i] -= drift;
+      square += drift * drift / system.diagonal(v)[i * (size + 1)];
+    }
+  }
+  for (int row = 0; row < rows; ++row) r[row] = r_now[row];
+  return square;
+}
+
+}  // namespace cairn::incremental

@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "cairn/aligned.hpp"
+#include "cairn/graph.hpp"
+#include "states.hpp"
+#include "system.hpp"
+
+namespace cairn::incremental {
+
+/// What the linear system knows of every factor: a whitened Jacobian J, that of some earlier
+/// estimate, and its gradient Jᵀr at the current one.
+///
+/// Steps are always counted from the current estimate. A step δ moves the estimate, x ← x ⊕ δ, and
+/// what is known of the residual and of the gradient by it, r̂ ← r̂ + J δ, γ ← γ + JᵀJ δ. What that
+/// lacks is found by evaluating the factor again at x:
+///
+///  - the *drift* J(x)ᵀr(x) − γ goes into the right-hand side: the estimate converges to where the
+///    true gradient is zero, whatever J is;
+///  - the *mismatch* μ = ‖J(x) − J‖ / ‖J‖ says how fast it does. J itself, and with it H and its
+///    factor, must be computed anew only if it is large.
+///
+/// For a relative measurement between poses of a Lie group, J depends on nothing but where one pose
+/// is as seen from the other; that hardly changes, even if a loop closure moves both by metres. So
+/// H and L last for a long time, while the estimate is as exact as the residuals are.
+class Models {
+ public:
+  /// The next factor, as it stands in the graph at that position.
+  void add(const Graph& graph, int position, bool loss_applies);
+  void clear() { *this = Models(); }
+  int size() const { return static_cast<int>(records_.size()); }
+  std::span<const std::int32_t> variables(int f) const {
+    return std::span(variables_)
+        .subspan(static_cast<std::size_t>(records_[f].variables),
+                 static_cast<std::size_t>(records_[f].arity));
+  }
+
+  /// Linearises at the current estimate: J = J(x), r̂ = r(x), γ = Jᵀr.
+  void linearize(int f, const Graph& graph, const States& states);
+  /// Adds the factor's part of H, and of the right-hand side if `with_gradient`, times `sign`;
+  /// variables that are held have none.
+  void add_to(System& system, int f, double sign, bool with_gradient,
+              std::span<const std::uint8_t> held) const;
+  /// Its part of the block row of one of its variables: H_vv and what joins v with others.
+  void add_row(System& system, int f, std::int32_t variable,
+               std::span<const std::uint8_t> held) const;
+
+  /// r̂ ← r̂ + Σ J_k δ_k; steps[k] is null where δ_k is zero. Returns whether the estimate has moved
+  /// so far since the factor was last evaluated that r̂ may be wrong by √tolerance.
+  bool move(int f, const double* const* steps, double tolerance);
+  /// Evaluates the factor again: its drift goes into the right-hand side. Returns the drift squared
+  /// and weighted with the inverse diagonal of H.
+  double correct(int f, const Graph& graph, const States& states, System& system,
+                 std::span<const std::uint8_t> held);
+
+  double mismatch(int f) const { return records_[f].mismatch; }
+  /// Whether it would not notice if all its variables were moved as a whole.
+  bool relative(int f) const { return records_[f].relative; }
+  /// ρ(‖r‖²) when last evaluated.
+  double cost(int f) const { return records_[f].cost; }
+  /// Rows of the whitened residual.
+  std::int32_t rows(int f) const { return records_[f].rows; }
+  /// ρ(‖r‖²) at the current estimate; nothing is kept of it.
+  double cost_now(int f, const Graph& graph, const States& states) const;
+  /// J of all its variables side by side, rows × scalars, column-major.
+  const double* jacobian(int f) const { return values_.data() + records_[f].place; }
+  std::int32_t scalars(int f) const { return records_[f].scalars; }
+  std::int64_t doubles() const { return std::ssize(values_); }
+
+ private:
+  struct Record {
+    std::int64_t place;  // in values_: J, r̂, γ − Jᵀr̂
+    std::int32_t variables;
+    std::int32_t pool, entry;
+    std::int16_t arity, rows, scalars;
+    bool loss_applies;
+    bool relative;
+    double mismatch = 0.0;
+    double cost = 0.0;
+    double travel = 0.0;  // since it was last evaluated
+  };
+  const double* block(const Record& record, int k) const;
+  void add_block(System& system, const Record& record, int ka, int kb, double sign) const;
+  double evaluate(const Record& record, const Graph& graph, const States& states, double* r,
+                  double* J, double& weight) const;
+
+  std::vector<Record> records_;
+  std::vector<std::int32_t> variables_;
+  std::vector<std::int16_t> tangents_;  // of each of a factor's variables
+  AlignedVector values_;
+  std::vector<double> scratch_;
+  mutable std::vector<double*> pointers_;
+  mutable std::vector<const double*> points_;
+};
+
+}  // namespace cairn::incremental

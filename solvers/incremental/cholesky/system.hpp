@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "cairn/aligned.hpp"
+
+namespace cairn::incremental {
+
+/// The normal equations H δ = g of a graph that grows and changes: H by blocks, each with a place
+/// of its own, found from the variables that it joins. Blocks are added to and taken away from;
+/// nothing is ever assembled anew.
+class System {
+ public:
+  /// One neighbour of a variable, and the block that joins them.
+  struct Link {
+    std::int32_t other;
+    std::int32_t entry;
+  };
+
+  /// A variable with `size` tangent coordinates; returns its number, the next one.
+  std::int32_t add_variable(std::int32_t size);
+  int variables() const { return static_cast<int>(sizes_.size()); }
+  std::int32_t size(std::int32_t v) const { return sizes_[v]; }
+  /// First scalar of a variable in vectors such as g and δ.
+  std::int64_t offset(std::int32_t v) const { return offsets_[v]; }
+  std::int64_t scalars() const { return scalars_; }
+  std::span<const Link> links(std::int32_t v) const { return links_[v]; }
+
+  /// The block of two different variables, which is made if it is not there, and counted: one for
+  /// each factor on both. Returns its entry.
+  std::int32_t connect(std::int32_t a, std::int32_t b);
+  /// Undoes one `connect`; with the last the block is gone.
+  void disconnect(std::int32_t a, std::int32_t b);
+  /// The entry of a pair that has been connected.
+  std::int32_t find(std::int32_t a, std::int32_t b) const;
+
+  /// H_vv, column-major.
+  double* diagonal(std::int32_t v) { return values_.data() + diagonals_[v]; }
+  const double* diagonal(std::int32_t v) const { return values_.data() + diagonals_[v]; }
+  /// H_ab with a < b: size_a × size_b, column-major.
+  double* block(std::int32_t entry) { return values_.data() + entries_[entry].value; }
+  const double* block(std::int32_t entry) const { return values_.data() + entries_[entry].value; }
+  /// The right-hand side, as far as it has not been solved for.
+  std::vector<double>& g() { return g_; }
+  double* g(std::int32_t v) { return g_.data() + offsets_[v]; }
+  const double* g(std::int32_t v) const { return g_.data() + offsets_[v]; }
+
+  /// H and g become zero; the blocks stay.
+  void clear_values();
+
+  std::int64_t doubles() const { return std::ssize(values_) + std::ssize(g_); }
+
+ private:
+  struct Entry {
+    std::int64_t value;
+    std::int32_t doubles;
+    std::int32_t factors;
+  };
+  std::int64_t take(std::int32_t doubles);
+
+  std::vector<std::int32_t> sizes_;
+  std::vector<std::int64_t> offsets_;
+  std::vector<std::int64_t> diagonals_;
+  std::vector<std::vector<Link>> links_;
+  std::vector<Entry> entries_;
+  std::vector<std::int32_t> free_entries_;
+  std::vector<std::vector<std::int64_t>> free_values_;  // by number of doubles
+  AlignedVector values_;
+  std::vector<double> g_;
+  std::int64_t scalars_ = 0;
+};
+
+}  // namespace cairn::incremental

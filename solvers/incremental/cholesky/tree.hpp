@@ -1,0 +1,214 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "block/kernels.hpp"
+#include "block/symbolic.hpp"
+#include "cairn/aligned.hpp"
+#include "small_graph.hpp"
+#include "states.hpp"
+#include "system.hpp"
+
+namespace cairn::incremental {
+
+/// A supernode of the elimination tree: its own variables, which it eliminates, and the variables
+/// of its ancestors that they are joined with by then (its separator). Beside its columns of L it
+/// keeps its update matrix, all that its subtree contributes to its ancestors: they can be computed
+/// anew without looking below.
+struct Node {
+  std::vector<std::int32_t> variables;  ///< own, in the order of elimination, then the separator
+  std::int32_t own = 0;                 ///< so many of them are its own
+  std::int32_t parent = -1;
+  std::vector<std::int32_t> children;
+  std::int32_t columns = 0;              ///< scalars of its own variables
+  std::int32_t m = 0;                    ///< and of the separator
+  std::int32_t stride = 0;               ///< m rounded up to 8
+  std::int64_t sequence = 0;             ///< children have smaller ones than their parents
+  UninitializedVector panel;             ///< stride × columns
+  UninitializedVector update;            ///< as `block::Kernels` lays it out
+  std::vector<block::Run> runs;          ///< where the separator is in vectors, and in the front
+  std::vector<std::int32_t> rows_above;  ///< where each separator variable is in the parent's front
+  std::vector<block::Spread> spreads;    ///< the update matrix's rows in the parent's front, if …
+  bool straight = false;                 ///< … both have the separator in the same order
+  std::int32_t panel_rows = 0;  ///< if so: rows of the update matrix that are parent's columns
+  std::vector<double> owed;     ///< steps of the separator that have not been followed here yet
+  bool owes = false;            ///< whether any of them is not zero
+  /// Whether nothing in this subtree would notice if it were moved as a whole, but for its
+  /// separator: all its factors are relative ones between variables of one group.
+  bool movable = false;
+  std::vector<double> lead;  ///< the group element that all of this subtree is still to be moved by
+  std::vector<double> arrived;  ///< what of the last pass's steps was added to `owed`
+  std::int64_t arrived_at = 0;  ///< that pass
+  bool live = false;
+  bool affected = false;
+
+  std::int32_t below() const { return m - columns; }
+  std::int32_t update_stride() const { return stride - columns / 8 * 8; }
+  /// Element (i, j) of the update matrix, i ≥ j rows of the front, both ≥ columns.
+  std::int64_t update_place(std::int32_t i, std::int32_t j) const {
+    return std::int64_t{j - columns} * update_stride() + (i - columns / 8 * 8);
+  }
+  std::span<const std::int32_t> own_variables() const {
+    return std::span(variables).first(static_cast<std::size_t>(own));
+  }
+  std::span<const std::int32_t> separator() const {
+    return std::span(variables).subspan(static_cast<std::size_t>(own));
+  }
+};
+
+/// The Cholesky factor L of a system that changes, as an elimination tree of supernodes, any top of
+/// which can be taken down, ordered anew and put up again while what hangs below stays.
+///
+/// The columns of L that a change of H reaches are those of the variables that it touches and of
+/// their ancestors: the union of the paths to the roots, an upper part of the tree. `restructure`
+/// orders the variables of that part anew, knowing the fill that what hangs below has already
+/// caused among them (IJRR 2017, 3.2 takes all columns to the right instead; see docs/online.md for
+/// the difference). `factorize` computes it from H and the update matrices of what hangs below, and
+/// `solve` follows a step down the tree as far as it matters (equations 8 to 10 there).
+class Tree {
+ public:
+  /// `bound[v]`: how many factors of a variable notice a motion of everything (priors, factors to
+  /// what is held, factors that are no relative ones).
+  Tree(const System& system, States& states, const std::vector<std::int32_t>& bound,
+       const block::Kernels& kernels)
+      : system_(&system), states_(&states), bound_(&bound), kernels_(&kernels) {}
+
+  /// The same tree, on copies of what it stands on.
+  Tree(const Tree& other, const System& system, States& states,
+       const std::vector<std::int32_t>& bound);
+
+  /// Starts a set of affected nodes.
+  void clear_affected();
+  /// Adds the nodes on the path from a variable to its root; a variable that is in no node yet
+  /// becomes a part of the tree at the next `restructure`.
+  void touch(std::int32_t variable);
+  /// Takes a variable out of the tree at the next `restructure`; it must have been touched, and H
+  /// must not join it with anything any more.
+  void retire(std::int32_t variable);
+
+  /// Orders the affected variables anew, those last that were touched last: `touched_at[v]` says
+  /// when, and from `since` on it counts.
+  void restructure(std::span<const std::int64_t> touched_at, std::int64_t since);
+  /// Whether the factor has become so much more costly than when all of it was last ordered, as
+  /// growing does not explain.
+  bool worn_out() const;
+  /// Computes the affected nodes. Returns -1, or a variable whose pivots are not positive; then the
+  /// tree is worth nothing until everything has been touched and factorised.
+  std::int32_t factorize();
+  /// Solves H δ = g, where g is zero but at `sources` and leaves as zero. `steps`, all zero before,
+  /// gets δ of the variables that `changed` then lists. Returns gᵀ H⁻¹ g.
+  ///
+  /// Steps are followed down the tree where they matter. What the separator of a subtree does sums
+  /// up, squared and weighted with the diagonal of H; a subtree stays where it is, and owes it,
+  /// while that is less than `tolerance`. A subtree that is `movable` follows a motion of its
+  /// separator as a whole by moving as a whole, which is exact and is only noted (`lead`): it owes
+  /// what is left.
+  double solve(std::span<const std::int32_t> sources, double tolerance, std::vector<double>& g,
+               std::vector<double>& steps, std::vector<std::int32_t>& changed);
+  /// gᵀ H⁻¹ g alone: by how much chi2 would fall.
+  double decrement(std::span<const std::int32_t> sources, std::vector<double>& g);
+  /// Follows what the nodes on the path from a variable to its root owe. To be called before the
+  /// factors of a variable change.
+  void follow(std::int32_t variable, std::vector<double>& steps,
+              std::vector<std::int32_t>& changed);
+
+  /// Applies what the nodes above a variable are to be moved by to their states: x_v is then right.
+  void settle(std::int32_t variable);
+  void settle_all();
+  /// Undoes what was noted for a node (see `States::undo`).
+  void undo_lead(std::int32_t node, std::span<const double> lead) {
+    nodes_[node].lead.assign(lead.begin(), lead.end());
+  }
+  /// After `solve` or `follow`, for a variable whose step was not computed: the node above it that
+  /// the pass ended at, or null.
+  const Node* end_of_pass(std::int32_t variable) const;
+  /// What arrived at such a node of the step of one of its separator's variables.
+  const double* arrived(const Node& node, std::int32_t variable) const;
+
+  /// X = H⁻¹ B for eight right-hand sides side by side, rows as in δ. `sources`: variables at which
+  /// B is not zero. X: room for 8 × scalars() doubles, zero but for B.
+  void solve_many(std::span<const std::int32_t> sources, AlignedVector& X);
+  /// The same, but only for the rows of variables on the paths from `sources` to the roots.
+  void solve_many_above(std::span<const std::int32_t> sources, AlignedVector& X);
+
+  /// Node of a variable, -1 for none.
+  std::int32_t node_of(std::int32_t variable) const {
+    return variable < static_cast<std::int32_t>(node_of_.size()) ? node_of_[variable] : -1;
+  }
+  const std::vector<Node>& nodes() const { return nodes_; }
+  const block::Kernels& kernels() const { return *kernels_; }
+  std::span<const std::int32_t> affected() const { return affected_; }
+  int affected_variables() const { return affected_variables_; }
+  std::int64_t doubles() const { return doubles_; }
+  double log_determinant() const;
+  /// Nodes with parents before their children.
+  void top_down(std::vector<std::int32_t>& nodes) const;
+  /// Where the scalars of a variable start among the rows of a node's front.
+  std::int32_t front_row(const Node& node, std::int32_t variable) const;
+
+ private:
+  void make_room_for_variables();
+  std::int32_t new_node();
+  void free_node(std::int32_t n);
+  void take_down(std::vector<std::int32_t>& members, std::vector<std::int32_t>& orphans);
+  void eliminate();
+  void merge();
+  void put_up(std::span<const std::int32_t> orphans);
+  void lay_out(Node& node);
+  void connect_children(const Node& parent);
+  void connect(Node& child, const Node& parent);
+  void assemble(Node& node);
+  void add_scattered(const Node& child, Node& parent);
+  bool factorize_node(Node& node);
+  double forward(std::vector<double>& g);
+  void solve_node(Node& node, const double* y, std::vector<double>& steps,
+                  std::vector<std::int32_t>& changed);
+  double owed_square(const Node& node) const;
+  bool move_as_a_whole(Node& node, double tolerance);
+  void add_lead(Node& node, const double* g);
+  void hand_down(Node& node);
+  void collect_paths(std::span<const std::int32_t> sources);
+  void forward_many(std::span<const std::int32_t> sources, AlignedVector& X);
+  void backward_many(const Node& node, AlignedVector& X);
+
+  const System* system_;
+  States* states_;
+  const std::vector<std::int32_t>* bound_;
+  const block::Kernels* kernels_;
+  std::vector<Node> nodes_;
+  std::vector<std::int32_t> free_;
+  std::vector<std::int32_t> node_of_;   // by variable
+  std::vector<std::int32_t> affected_;  // nodes
+  std::vector<std::int32_t> fresh_;     // touched variables in no node
+  std::vector<std::uint8_t> is_fresh_;  // by variable
+  std::vector<std::uint8_t> retired_;   // by variable
+  std::int64_t next_sequence_ = 0;
+  int affected_variables_ = 0;
+  std::int64_t doubles_ = 0;
+  double cost_ = 0.0;  // of factorising everything, by the cost model [ns]
+  int variables_ = 0;  // in the tree
+  double cost_when_ordered_ = 0.0;
+  int variables_when_ordered_ = 0;
+
+  // Room for restructuring: columns by place in the order, see eliminate().
+  SmallGraph graph_;
+  std::vector<std::int32_t> members_, orphans_, order_, local_;  // local_: by variable
+  std::vector<std::uint8_t> groups_;
+  std::vector<std::int64_t> column_begin_;
+  std::vector<std::int32_t> column_rows_, column_parent_, mark_, first_child_, sibling_,
+      orphan_first_, orphan_next_;
+  std::vector<std::int32_t> merged_into_, top_of_;
+  std::vector<double> scalars_below_, scalars_own_;
+  std::vector<std::int32_t> front_row_;  // by variable, of the node at hand
+  AlignedVector front_;
+  std::vector<double> kept_;
+  std::int64_t pass_ = 0;
+  std::vector<double> rigid_, matrix_, twist_;
+  std::vector<std::int32_t> stack_, path_;
+  std::vector<std::uint8_t> on_path_;  // by node
+};
+
+}  // namespace cairn::incremental

@@ -1,0 +1,286 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <sstream>
+
+#include <boost/json/serialize.hpp>
+
+#include "cairn/registry.hpp"
+#include "integration/process.hpp"
+
+namespace cairn::test {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+boost::json::value report_of(Arguments arguments) {
+  arguments.insert(arguments.end(), {"--json", "-"});
+  const Outcome outcome = cairn(arguments);
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  return parse_json(outcome.out);
+}
+
+/// All numbers of a matrix, row by row.
+std::vector<double> numbers(const boost::json::value& matrix) {
+  std::vector<double> all;
+  for (const auto& row : matrix.as_array()) {
+    for (const auto& number : row.as_array()) all.push_back(number.to_number<double>());
+  }
+  return all;
+}
+
+void expect_near(const std::vector<double>& a, const std::vector<double>& b,
+                 double relative = 1e-7) {
+  ASSERT_EQ(a.size(), b.size());
+  double scale = 1e-5;
+  for (const double x : b) scale = std::max(scale, std::abs(x));
+  for (std::size_t k = 0; k < a.size(); ++k) EXPECT_NEAR(a[k], b[k], relative * scale);
+}
+
+class MarginalsCommand : public ::testing::Test {
+ protected:
+  std::string graph() {
+    const std::string file = folder_.file("graph.g2o");
+    const Outcome made = cairn({"generate", "manhattan:poses=200", "-o", file, "--seed", "3"});
+    EXPECT_EQ(made.exit_code, 0) << made.err;
+    return file;
+  }
+  TemporaryFolder folder_;
+};
+
+TEST_F(MarginalsCommand, ReportsWhatScriptsRelyOn) {
+  const auto report = report_of({"marginals", graph(), "--threads", "2", "--pairs", "17:150,0:3",
+                                 "--column", "last", "--diagonal"});
+  EXPECT_EQ(report.at("command").as_string(), "marginals");
+  EXPECT_EQ(report.at("graph").at("variables").as_int64(), 200);
+  EXPECT_EQ(report.at("optimizer").as_string(), "levenberg_marquardt");
+  EXPECT_EQ(report.at("linear_solver").as_string(), "block_cholesky");
+  EXPECT_EQ(report.at("threads").as_int64(), 2);
+  EXPECT_EQ(report.at("status").as_string(), "converged");
+  for (const char* part : {"read", "optimize", "factorize", "marginals"})
+    EXPECT_TRUE(report.at("seconds").at(part).is_double()) << part;
+  const auto& diagonal = report.at("diagonal").as_array();
+  const auto& column = report.at("column").at("blocks").as_array();
+  ASSERT_EQ(diagonal.size(), 200u);
+  ASSERT_EQ(column.size(), 200u);
+  EXPECT_EQ(report.at("column").at("id").as_int64(), 199);
+  ASSERT_EQ(report.at("pairs").as_array().size(), 2u);
+  EXPECT_EQ(report.at("pairs").at(0).at("a").as_int64(), 17);
+  EXPECT_EQ(report.at("pairs").at(0).at("b").as_int64(), 150);
+  // The first pose is anchored: certain, and so is nothing else.
+  EXPECT_THAT(numbers(diagonal[0].at("covariance")), testing::Each(0.0));
+  EXPECT_THAT(numbers(report.at("pairs").at(1).at("covariance")), testing::Each(0.0));
+  EXPECT_THAT(numbers(column[0].at("covariance")), testing::Each(0.0));
+  EXPECT_GT(diagonal[1].at("covariance").at(0).at(0).as_double(), 0.0);
+  expect_near(numbers(diagonal[199].at("covariance")), numbers(column[199].at("covariance")));
+  const auto position = numbers(diagonal[199].at("position"));
+  const auto own = numbers(diagonal[199].at("covariance"));
+  EXPECT_NEAR(position[0] + position[3], own[0] + own[4], 1e-8 * (own[0] + own[4]));
+}
+
+TEST_F(MarginalsCommand, GivesTheDiagonalIfNothingElseIsAskedFor) {
+  const std::string file = graph();
+  const auto plain = report_of({"marginals", file}).as_object();
+  EXPECT_TRUE(plain.contains("diagonal"));
+  EXPECT_FALSE(plain.contains("pairs") || plain.contains("column"));
+  const auto pairs = report_of({"marginals", file, "--pairs", "1:2"}).as_object();
+  EXPECT_FALSE(pairs.contains("diagonal") || pairs.contains("column"));
+  const Outcome text = cairn({"marginals", file, "--quiet"});
+  EXPECT_THAT(text.out, HasSubstr("standard deviation of"));
+  EXPECT_THAT(text.out, HasSubstr("VERTEX_SE2 199"));
+  EXPECT_THAT(text.out, HasSubstr("… 170 more …"));
+  EXPECT_THAT(text.out, HasSubstr("angle [rad]"));
+}
+
+TEST_F(MarginalsCommand, EverySolverThatCanGivesTheSame) {
+  const std::string file = graph();
+  const auto of = [&](const std::string& solver) {
+    return report_of({"marginals", file, "--linear-solver", solver, "--pairs", "5:5,190:20",
+                      "--diagonal", "--column", "77"});
+  };
+  const auto expected = of("block_cholesky");
+  Registry registry;
+  for (const char* solver : {"cholmod", "eigen", "lapack", "spqr", "schur"}) {
+    if (!registry.has("linear_solver", solver)) continue;
+    SCOPED_TRACE(solver);
+    const auto found = of(solver);
+    for (const std::size_t k : {std::size_t{0}, std::size_t{1}}) {
+      expect_near(numbers(found.at("pairs").at(k).at("covariance")),
+                  numbers(expected.at("pairs").at(k).at("covariance")));
+    }
+    for (std::size_t v = 0; v < 200; v += 13) {
+      expect_near(numbers(found.at("diagonal").at(v).at("covariance")),
+                  numbers(expected.at("diagonal").at(v).at("covariance")));
+      expect_near(numbers(found.at("column").at("blocks").at(v).at("covariance")),
+                  numbers(expected.at("column").at("blocks").at(v).at("covariance")));
+    }
+  }
+}
+
+TEST_F(MarginalsCommand, IsOfTheStatesAsGivenIfToldSo) {
+  const std::string file = graph();
+  const std::string best = folder_.file("best.g2o");
+  report_of({"optimize", file, "-o", best});
+  const auto first = report_of({"marginals", file, "--pairs", "199:199"});
+  const auto as_given = report_of({"marginals", best, "--pairs", "199:199", "--as-given"});
+  EXPECT_TRUE(as_given.at("optimizer").is_null());
+  EXPECT_EQ(as_given.at("seconds").at("optimize").to_number<double>(), 0.0);
+  expect_near(numbers(as_given.at("pairs").at(0).at("covariance")),
+              numbers(first.at("pairs").at(0).at("covariance")));
+}
+
+TEST_F(MarginalsCommand, WritesAFileThatHoldsTheSameNumbers) {
+  const std::string file = graph(), text = folder_.file("out.cov");
+  const auto report = report_of({"marginals", file, "--pairs", "17:150", "--diagonal", "-o", text});
+  std::istringstream in(read_text(text));
+  std::string line;
+  std::getline(in, line);
+  EXPECT_EQ(line, "# cairn covariances 1");
+  int blocks = 0;
+  while (std::getline(in, line)) {
+    if (line.starts_with('#')) continue;
+    std::istringstream words(line);
+    std::string tag;
+    int a = 0, b = 0, rows = 0, columns = 0;
+    words >> tag >> a >> b >> rows >> columns;
+    EXPECT_EQ(tag, "COVARIANCE");
+    std::vector<double> values(static_cast<std::size_t>(rows * columns));
+    for (double& value : values) words >> value;
+    EXPECT_TRUE(words);
+    const auto& expected = blocks < 200
+                               ? report.at("diagonal").at(std::size_t(blocks)).at("covariance")
+                               : report.at("pairs").at(0).at("covariance");
+    // The parser of JSON rounds the last digit in its own way.
+    expect_near(values, numbers(expected), 1e-14);
+    ++blocks;
+  }
+  EXPECT_EQ(blocks, 201);
+  const Outcome piped = cairn({"marginals", file, "--pairs", "17:150", "-o", "-", "--quiet"});
+  EXPECT_TRUE(piped.out.starts_with("# cairn covariances 1\n"));
+  EXPECT_THAT(piped.out, Not(HasSubstr("time")));
+}
+
+TEST_F(MarginalsCommand, RefusesASolverThatCannotBeforeItReadsTheGraph) {
+  Registry registry;
+  for (const char* solver : {"pcg", "jacobi", "gauss_seidel"}) {
+    if (!registry.has("linear_solver", solver)) continue;
+    const Outcome outcome = cairn({"marginals", "nowhere.g2o", "--linear-solver", solver});
+    EXPECT_EQ(outcome.exit_code, 2);
+    EXPECT_THAT(outcome.err,
+                HasSubstr(std::string("linear solver '") + solver + "' gives no covariances"));
+    EXPECT_THAT(outcome.err, HasSubstr("block_cholesky"));
+    EXPECT_THAT(outcome.err, Not(HasSubstr("pcg,")));
+    EXPECT_THAT(cairn({"plugins", solver}).out, Not(HasSubstr("marginals")));
+  }
+  EXPECT_THAT(cairn({"plugins", "block_cholesky"}).out, HasSubstr("marginals"));
+}
+
+TEST_F(MarginalsCommand, SaysWhichIdItDoesNotKnow) {
+  const std::string file = graph();
+  const Outcome unknown = cairn({"marginals", file, "--pairs", "3:4711"});
+  EXPECT_EQ(unknown.exit_code, 3);
+  EXPECT_THAT(unknown.err, HasSubstr("4711"));
+  for (const char* pair : {"3", "3:", "a:4", "3:4x"})
+    EXPECT_EQ(cairn({"marginals", file, "--pairs", pair}).exit_code, 2) << pair;
+  EXPECT_EQ(cairn({"marginals", file, "--column", "first"}).exit_code, 2);
+}
+
+TEST_F(MarginalsCommand, TheBytesAreTheSameForAnyNumberOfThreads) {
+  const std::string file = folder_.file("sphere.g2o");
+  ASSERT_EQ(cairn({"generate", "sphere", "-o", file}).exit_code, 0);
+  std::vector<std::string> files;
+  for (const char* threads : {"1", "2", "3"}) {
+    const Outcome outcome = cairn({"marginals", file, "--as-given", "--diagonal", "--column",
+                                   "last", "-o", "-", "--threads", threads, "--quiet"});
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+    files.push_back(outcome.out);
+  }
+  EXPECT_TRUE(files[0] == files[1]);
+  EXPECT_TRUE(files[0] == files[2]);
+}
+
+TEST_F(MarginalsCommand, SaysWhichVariableMakesHSingular) {
+  const std::string file = folder_.file("loose.g2o");
+  write_text(file,
+             "VERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 1 0 0\nVERTEX_XY 2 1 1\nFIX 0\n"
+             "EDGE_SE2 0 1 1 0 0 1 0 0 1 0 1\nEDGE_SE2_XY 1 2 0 1 1 0 1\n");
+  EXPECT_EQ(cairn({"marginals", file, "--as-given"}).exit_code, 0);
+  write_text(file, "VERTEX_XY 0 0 0\nVERTEX_SE2 1 1 0 0\nFIX 0\nEDGE_SE2_XY 1 0 -1 0 1 0 1\n");
+  const Outcome outcome = cairn({"marginals", file, "--as-given"});
+  EXPECT_EQ(outcome.exit_code, 4);
+  EXPECT_THAT(outcome.err, HasSubstr("no covariances"));
+  EXPECT_THAT(outcome.err, HasSubstr("VERTEX_SE2 1"));
+}
+
+// cairn optimize --covariance
+// -----------------------------------------------------------------------
+
+TEST_F(MarginalsCommand, OptimizeReportsTheSameBlocksAndThePageDrawsThem) {
+  const std::string file = graph(), best = folder_.file("best.g2o"),
+                    json = folder_.file("run.json");
+  const Outcome run =
+      cairn({"optimize", file, "-o", best, "--covariance", "blocks", "--json", json});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_THAT(run.out, HasSubstr("covariance"));
+  const auto report = parse_json(read_text(json));
+  const auto& covariance = report.at("covariance");
+  EXPECT_EQ(covariance.at("linear_solver").as_string(), "block_cholesky");
+  EXPECT_TRUE(covariance.at("seconds").at("marginals").is_double());
+  ASSERT_EQ(covariance.at("blocks").as_array().size(), 200u);
+  const auto expected = report_of({"marginals", best, "--as-given"});
+  for (const std::size_t v : {std::size_t{0}, std::size_t{77}, std::size_t{199}}) {
+    expect_near(numbers(covariance.at("blocks").at(v).at("covariance")),
+                numbers(expected.at("diagonal").at(v).at("covariance")));
+  }
+  Registry registry;
+  if (!registry.has("picture", "html")) return;
+  for (const Arguments& files : {Arguments{file, json}, Arguments{file, best, json}}) {
+    const std::string page = folder_.file("page.html");
+    Arguments view{"view", "-o", page, "--quiet"};
+    view.insert(view.end(), files.begin(), files.end());
+    const Outcome shown = cairn(view);
+    EXPECT_EQ(shown.exit_code, 0) << shown.err;
+    EXPECT_THAT(read_text(page), HasSubstr("\"covariance\":{\"variable\":"));
+  }
+}
+
+TEST_F(MarginalsCommand, OptimizeKeepsItsEstimateWhereThereAreNoCovariances) {
+  const std::string file = folder_.file("loose.g2o"), best = folder_.file("best.g2o");
+  write_text(file, "VERTEX_XY 0 0 0\nVERTEX_SE2 1 1 0 0\nFIX 0\nEDGE_SE2_XY 1 0 -1 0.5 1 0 1\n");
+  const Outcome outcome =
+      cairn({"optimize", file, "-o", best, "--covariance", "blocks", "--json", "-"});
+  EXPECT_EQ(outcome.exit_code, 4);
+  const auto report = parse_json(outcome.out);
+  EXPECT_EQ(report.at("status").as_string(), "converged");
+  EXPECT_TRUE(report.at("covariance").is_null());
+  EXPECT_THAT(boost::json::serialize(report.at("notes")), HasSubstr("no covariances: H is not"));
+  EXPECT_TRUE(std::filesystem::exists(best));
+}
+
+TEST_F(MarginalsCommand, OptimizeReportsNullUnlessAskedFor) {
+  EXPECT_TRUE(report_of({"optimize", graph()}).at("covariance").is_null());
+}
+
+TEST_F(MarginalsCommand, OptimizeRefusesCovariancesThatNobodyCanGiveBeforeItReadsTheGraph) {
+  Registry registry;
+  if (registry.has("linear_solver", "pcg")) {
+    const Outcome pcg =
+        cairn({"optimize", "nowhere.g2o", "--covariance", "blocks", "--linear-solver", "pcg"});
+    EXPECT_EQ(pcg.exit_code, 2);
+    EXPECT_THAT(pcg.err, HasSubstr("block_cholesky"));
+  }
+  if (registry.has("optimizer", "ceres")) {
+    const Outcome ceres =
+        cairn({"optimize", "nowhere.g2o", "--covariance", "blocks", "--optimizer", "ceres"});
+    EXPECT_EQ(ceres.exit_code, 2);
+    EXPECT_THAT(ceres.err, HasSubstr("optimizer 'ceres' solves with linear solvers of its own"));
+  }
+}
+
+}  // namespace
+}  // namespace cairn::test

@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What every estimator owes, whoever wrote it. CAIRN_SEQUENCES says how many random sequences each
+// goes through, CAIRN_SEED with which seed they begin.
+#include <cstdlib>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "cairn/error.hpp"
+#include "cairn/registry.hpp"
+#include "random_sequence.hpp"
+#include "support/dense_system.hpp"
+
+namespace cairn::test {
+namespace {
+
+unsigned from_environment(const char* name, unsigned otherwise) {
+  const char* text = std::getenv(name);
+  return text ? static_cast<unsigned>(std::strtoul(text, nullptr, 10)) : otherwise;
+}
+
+std::vector<std::string> every_estimator() { return Registry().names(Estimator::kKind); }
+
+const std::vector<double> kUnit = {1, 0, 0, 1, 0, 1};
+
+class EveryEstimator : public testing::TestWithParam<std::string> {
+ protected:
+  NewVariable pose(Id id, std::vector<double> state = {}, bool fixed = false) const {
+    return {types_.pose, id, std::move(state), fixed};
+  }
+  NewFactor between(Id a, Id b, std::vector<double> z = {1.0, 0.0, 0.1}) const {
+    return {types_.relative_pose, {a, b}, std::move(z), kUnit};
+  }
+  /// Poses 0 … n-1 in a chain.
+  GraphUpdate chain(int n) const {
+    GraphUpdate update;
+    update.variables.push_back(pose(0, {0.0, 0.0, 0.0}));
+    for (int k = 1; k < n; ++k) {
+      update.variables.push_back(pose(k));
+      update.factors.push_back(between(k - 1, k));
+    }
+    return update;
+  }
+  Registry registry_;
+  PlanarTypes types_;
+  std::unique_ptr<Estimator> estimator_ = registry_.make<Estimator>(GetParam());
+};
+
+TEST_P(EveryEstimator, AgreesWithAFreshSolveWhateverHappens) {
+  const unsigned first = from_environment("CAIRN_SEED", 1),
+                 count = from_environment("CAIRN_SEQUENCES", 300);
+  for (unsigned seed = first; seed < first + count; ++seed) {
+    const auto estimator = registry_.make<Estimator>(GetParam());
+    RandomSequence sequence(*estimator, seed);
+    sequence.run(20);
+    ASSERT_FALSE(HasFailure()) << "seed " << seed << ":\n" << sequence.log();
+  }
+}
+
+TEST_P(EveryEstimator, PlacesWhatIsNewByItsMeasurements) {
+  estimator_->update(chain(3), {.defer = true});
+  const std::span<const double> x = estimator_->state(2);
+  const auto expected = Se2::compose<double>({1.0, 0.0, 0.1}, {1.0, 0.0, 0.1});
+  for (int k = 0; k < 3; ++k) EXPECT_NEAR(x[k], expected[k], 1e-12);
+}
+
+TEST_P(EveryEstimator, NumbersFactorsInTheOrderOfTheirAddition) {
+  EXPECT_EQ(estimator_->update(chain(4)).first_factor, 0);
+  GraphUpdate update;
+  update.removed_factors = {1};
+  update.factors = {between(1, 2), between(0, 3)};
+  EXPECT_EQ(estimator_->update(update).first_factor, 3);
+  EXPECT_EQ(estimator_->factor_count(), 4);
+  update = {};
+  update.marginalized = {1};
+  const UpdateReport report = estimator_->update(update);
+  ASSERT_EQ(report.priors.size(), 1U);
+  EXPECT_EQ(report.priors[0], 5);
+  update = {};
+  update.removed_factors = {1};
+  EXPECT_THROW(estimator_->update(update), Error);
+}
+
+TEST_P(EveryEstimator, SaysWhatItAnchored) {
+  const UpdateReport report = estimator_->update(chain(2), {.full = true});
+  EXPECT_THAT(report.notes, testing::Contains(testing::HasSubstr("anchored VERTEX_SE2 0")));
+}
+
+TEST_P(EveryEstimator, ADeferredUpdateLeavesTheEstimateOfOldVariables) {
+  estimator_->update(chain(3));
+  const std::vector<double> before(estimator_->state(2).begin(), estimator_->state(2).end());
+  GraphUpdate update;
+  update.factors.push_back(between(0, 2, {3.0, 1.0, 0.0}));
+  estimator_->update(update, {.defer = true});
+  EXPECT_EQ(before, std::vector<double>(estimator_->state(2).begin(), estimator_->state(2).end()));
+  estimator_->update({}, {.full = true});
+  EXPECT_NE(before, std::vector<double>(estimator_->state(2).begin(), estimator_->state(2).end()));
+}
+
+TEST_P(EveryEstimator, AFixedVariableStays) {
+  GraphUpdate update = chain(3);
+  update.variables[1] = pose(1, {7.0, 8.0, 0.5}, true);
+  estimator_->update(update, {.full = true});
+  EXPECT_THAT(estimator_->state(1), testing::ElementsAre(7.0, 8.0, 0.5));
+  std::vector<double> block(9, 1.0);
+  ASSERT_TRUE(estimator_->covariance(1, 1, block));
+  EXPECT_THAT(block, testing::Each(0.0));
+  EXPECT_EQ(estimator_->graph().fixed(1), true);
+}
+
+TEST_P(EveryEstimator, RefusesWhatItDoesNotKnow) {
+  estimator_->update(chain(2));
+  EXPECT_THROW(estimator_->state(7), Error);
+  std::vector<double> block(9);
+  EXPECT_THROW(estimator_->covariance(0, 7, block), Error);
+  EXPECT_FALSE(estimator_->has(7));
+  block.resize(4);
+  EXPECT_THROW(estimator_->covariance(1, 1, block), Error);
+}
+
+TEST_P(EveryEstimator, ALossHoldsForEverythingThatIsThere) {
+  if (!registry_.has("loss", "huber")) GTEST_SKIP() << "there is no loss huber";
+  estimator_->update(chain(4));
+  GraphUpdate update;
+  update.factors.push_back(between(0, 3, {3.5, 1.5, 0.6}));
+  estimator_->update(update);
+  const std::shared_ptr<const Loss> huber = registry_.make<Loss>("huber:scale=0.1");
+  estimator_->set_loss(huber);
+  estimator_->update({}, {.full = true});
+  Graph graph = estimator_->graph();
+  graph.set_loss(huber);
+  const DenseSystem system = dense_system(graph);  // what a step could still lower chi2 by
+  EXPECT_LT(system.g.dot(system.H.ldlt().solve(system.g)), 1e-7 * estimator_->chi2());
+}
+
+TEST_P(EveryEstimator, AFixedLagKeepsItsSizeAndItsCovariance) {
+  // A chain with loops of length two; the exact covariance of what stays is that of the whole.
+  constexpr int kLag = 4, kSteps = 15;
+  Graph whole;
+  for (int k = 0; k < kSteps; ++k) {
+    GraphUpdate update;
+    update.variables.push_back(
+        pose(k, k == 0 ? std::vector<double>{0, 0, 0} : std::vector<double>()));
+    if (k > 0) update.factors.push_back(between(k - 1, k, {1.0, 0.0, 0.0}));
+    if (k > 1) update.factors.push_back(between(k - 2, k, {2.0, 0.0, 0.0}));
+    if (k >= kLag) update.marginalized.push_back(k - kLag);
+    estimator_->update(update, {.full = true});
+    whole.add_variable(types_.pose, k, std::array{double(k), 0.0, 0.0});
+    for (const NewFactor& factor : update.factors) {
+      whole.add_factor(factor.type, std::array{static_cast<int>(factor.variables[0]), k},
+                       factor.measurement, factor.information);
+    }
+    ASSERT_LE(estimator_->variable_count(), kLag);
+    if (k == 0) continue;
+    const DenseSystem system = dense_system(whole);
+    const auto rows = system.rows.at(k);
+    const Eigen::Matrix3d wanted = system.Sigma().block<3, 3>(rows.first, rows.first);
+    Eigen::Matrix3d block;
+    ASSERT_TRUE(estimator_->covariance(k, k, {block.data(), 9}));
+    EXPECT_LT((block - wanted).norm(), 1e-8 * wanted.norm()) << "step " << k;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Registered, EveryEstimator, testing::ValuesIn(every_estimator()),
+                         [](const auto& named) { return named.param; });
+GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(EveryEstimator);
+
+}  // namespace
+}  // namespace cairn::test
