@@ -41,6 +41,7 @@ struct ReplayOptions {
   std::string estimator = "incremental_cholesky";
   std::string marginals = "none";
   bool estimate = false;
+  bool finish = false;
   int solve_every = 1;
   double budget = 0.0;  ///< [s]
   int checks = 0;
@@ -84,9 +85,9 @@ class Feeder {
   Feeder(const Graph& whole, Estimator& estimator, const ReplayOptions& options)
       : whole_(whole), estimator_(estimator), options_(options) {}
 
-  Step feed(const Arrival& arrival, bool solve, Replay& replay) {
+  Step feed(const Arrival& arrival, bool solve, bool full, Replay& replay) {
     const GraphUpdate update = update_of(arrival, replay);
-    UpdateOptions how{.defer = !solve, .max_seconds = options_.budget};
+    UpdateOptions how{.defer = !solve, .full = full, .max_seconds = options_.budget};
     Step step;
     step.solved = solve;
     const auto begin = Clock::now();
@@ -191,7 +192,7 @@ Replay replay_all(const Graph& whole, const std::vector<Arrival>& arrivals, Esti
   auto shown = Clock::now();
   for (int k = 0; k < count && !guard.interrupted(); ++k) {
     const bool solve = (k + 1) % options.solve_every == 0 || k + 1 == count || sampled[k];
-    Step step = feeder.feed(arrivals[k], solve, replay);
+    Step step = feeder.feed(arrivals[k], solve, options.finish && k + 1 == count, replay);
     replay.seconds += step.report.seconds;
     replay.estimate += step.estimate;
     replay.total += step.seconds;
@@ -286,6 +287,7 @@ json::object report_json(const ReplayOptions& options, const LoadedGraph& loaded
   report["sorted"] = sorted;
   report["solve_every"] = options.solve_every;
   report["budget"] = options.budget;
+  report["finish"] = options.finish;
   report["status"] = status(replay);
   report["steps"] = steps_json(replay);
   report["chi2"] = {{"final", chi2}};
@@ -502,6 +504,7 @@ Command add_replay(CLI::App& program) {
       ->type_name("S")
       ->check(within(0.0, 1e9))
       ->default_str("0");
+  app->add_flag("--finish", options->finish, "solve the last step for all digits, in its own time");
   app->add_flag("--estimate", options->estimate,
                 "count the time of reading all states, every step");
   app->add_option("--check", options->checks,

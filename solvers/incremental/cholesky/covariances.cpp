@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
@@ -14,7 +15,7 @@ namespace cairn::incremental {
 namespace {
 
 /// More rows than this are not worth a solution each: recomputing is cheaper. Found by measuring.
-constexpr std::size_t kMostRows = 48;
+constexpr std::size_t kMostRows = 24;
 /// U's eigenvalues are between −1 and 1, and near 0 where a measurement tells much more than was
 /// known: as many digits are lost as they are small.
 constexpr double kLeastEigenvalue = 1e-4;
@@ -104,11 +105,9 @@ MarginalsBy Covariances::update(const System& system, Tree& tree,
 
 /// False if it cannot be done accurately.
 bool Covariances::downdate(const System& system, Tree& tree, std::span<const std::uint8_t> held) {
-  const std::size_t n = rows_.size();
-  if (n > kMostRows || ++age_ > kOldest) return false;
-  // Rows that join what is new with one variable say nothing of what was there before; they are
-  // in B like all others, and come out as zero.
-  const std::size_t groups = (n + 7) / 8;
+  if (rows_.size() > kMostRows || ++age_ > kOldest) return false;
+  if (!fresh_.empty() && !rows_.empty() && !take_out_fresh(system, tree)) return false;
+  const std::size_t n = rows_.size(), groups = (n + 7) / 8;
   while (B_.size() < groups) B_.emplace_back();
   for (std::size_t g = 0; g < groups; ++g) {
     AlignedVector& B = B_[g];
@@ -126,9 +125,66 @@ bool Covariances::downdate(const System& system, Tree& tree, std::span<const std
   return true;
 }
 
+/// What the rows say of the variables that were there before, when those that are new have been
+/// eliminated: V_oᵀ M V_o with M = S − S V_f (V_fᵀ S V_f)⁻¹ V_fᵀ S, which has lower rank by as much
+/// as the new ones have freedoms. A pose that came with its odometry alone leaves nothing. False if
+/// the rows do not determine what is new.
+bool Covariances::take_out_fresh(const System& system, const Tree& tree) {
+  const auto is_fresh = [&](std::int64_t scalar) {
+    return std::ranges::any_of(fresh_, [&](std::int32_t v) {
+      return scalar >= system.offset(v) && scalar < system.offset(v) + system.size(v);
+    });
+  };
+  std::vector<std::int64_t> fresh, old;  // scalars
+  for (const Entry& entry : entries_)
+    (is_fresh(entry.scalar) ? fresh : old).push_back(entry.scalar);
+  for (auto* scalars : {&fresh, &old}) {
+    std::ranges::sort(*scalars);
+    scalars->erase(std::unique(scalars->begin(), scalars->end()), scalars->end());
+  }
+  const auto n = static_cast<Eigen::Index>(rows_.size());
+  Eigen::MatrixXd V_f = Eigen::MatrixXd::Zero(n, std::ssize(fresh)),
+                  V_o = Eigen::MatrixXd::Zero(n, std::ssize(old));
+  Eigen::VectorXd S(n);
+  for (Eigen::Index r = 0; r < n; ++r) {
+    const Row& row = rows_[static_cast<std::size_t>(r)];
+    S[r] = row.sign;
+    for (std::size_t e = row.begin; e < row.begin + row.count; ++e) {
+      const std::int64_t scalar = entries_[e].scalar;
+      const auto place = std::ranges::lower_bound(old, scalar);
+      if (place != old.end() && *place == scalar) {
+        V_o(r, place - old.begin()) += entries_[e].value;
+      } else {
+        V_f(r, std::ranges::lower_bound(fresh, scalar) - fresh.begin()) += entries_[e].value;
+      }
+    }
+  }
+  const Eigen::MatrixXd SV = S.asDiagonal() * V_f;
+  const Eigen::LDLT<Eigen::MatrixXd> inner(V_f.transpose() * SV);
+  if (!fresh.empty() && (inner.info() != Eigen::Success || !(inner.rcond() > 1e-12))) return false;
+  Eigen::MatrixXd M = S.asDiagonal();
+  if (!fresh.empty()) M -= SV * inner.solve(SV.transpose());
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> parts(M);
+  rows_.clear();
+  entries_.clear();
+  for (Eigen::Index k = 0; k < n; ++k) {
+    const double value = parts.eigenvalues()[k];
+    if (std::abs(value) < 1e-9) continue;  // those of M are 0 or not far from ±1
+    const Eigen::RowVectorXd row =
+        std::sqrt(std::abs(value)) * (parts.eigenvectors().col(k).transpose() * V_o);
+    rows_.push_back({entries_.size(), old.size(), value > 0.0 ? 1.0 : -1.0});
+    for (std::size_t c = 0; c < old.size(); ++c)
+      entries_.push_back({old[c], row[static_cast<Eigen::Index>(c)]});
+  }
+  std::erase_if(sources_, [&](std::int32_t v) {
+    return std::ranges::find(fresh_, v) != fresh_.end() || tree.node_of(v) < 0;
+  });
+  return true;
+}
+
 /// Σ ← Σ − B U⁻¹ Bᵀ on the diagonal. False if U is too badly conditioned.
 bool Covariances::apply(const System& system, const Tree& tree) {
-  const std::size_t n = rows_.size();
+  const std::size_t n = rows_.size(), groups = (n + 7) / 8, width = groups * 8;
   Eigen::MatrixXd U =
       Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(n), static_cast<Eigen::Index>(n));
   for (std::size_t i = 0; i < n; ++i) {
@@ -142,26 +198,41 @@ bool Covariances::apply(const System& system, const Tree& tree) {
   U = 0.5 * (U + U.transpose().eval());
   const Eigen::VectorXd eigenvalues =
       Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(U, Eigen::EigenvaluesOnly).eigenvalues();
-  if (eigenvalues.cwiseAbs().minCoeff() < kLeastEigenvalue) return false;
+  if (!(eigenvalues.cwiseAbs().minCoeff() >= kLeastEigenvalue)) return false;
+  // U⁻¹ in rows of whole groups of eight, as B has them.
   const Eigen::MatrixXd inverse = U.inverse();
-
-  std::vector<double> B_v, product;
+  AlignedVector inverse_rows(n * width, 0.0), row(width);
+  for (std::size_t i = 0; i < n; ++i) {
+    for (std::size_t j = 0; j < n; ++j)
+      inverse_rows[i * width + j] =
+          inverse(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
+  }
   for (std::int32_t v = 0; v < system.variables(); ++v) {
+    const std::int32_t size = system.size(v);
+    double* const block = diagonal(v);
     if (tree.node_of(v) < 0) {
-      std::fill_n(diagonal(v), system.size(v) * system.size(v), 0.0);
+      std::fill_n(block, size * size, 0.0);
       continue;
     }
-    const std::int32_t size = system.size(v);
-    // B_v: size × n; Σ_vv ← Σ_vv − B_v U⁻¹ B_vᵀ.
-    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor, 8, kMostRows + 8> rows(
-        size, static_cast<Eigen::Index>(n));
-    for (std::int32_t k = 0; k < size; ++k) {
-      for (std::size_t j = 0; j < n; ++j)
-        rows(k, static_cast<Eigen::Index>(j)) =
-            B_[j / 8][static_cast<std::size_t>(system.offset(v) + k) * 8 + j % 8];
+    const std::size_t first = static_cast<std::size_t>(system.offset(v)) * 8;
+    for (std::int32_t c = 0; c < size; ++c) {
+      // A row of B_v U⁻¹, times B_vᵀ.
+      std::ranges::fill(row, 0.0);
+      for (std::size_t j = 0; j < n; ++j) {
+        const double value = B_[j / 8][first + static_cast<std::size_t>(c) * 8 + j % 8];
+        const double* from = inverse_rows.data() + j * width;
+        for (std::size_t k = 0; k < width; ++k) row[k] += value * from[k];
+      }
+      for (std::int32_t r = c; r < size; ++r) {
+        double sum = 0.0;
+        for (std::size_t g = 0; g < groups; ++g) {
+          const double* B_r = B_[g].data() + first + static_cast<std::size_t>(r) * 8;
+          for (std::size_t k = 0; k < 8; ++k) sum += row[g * 8 + k] * B_r[k];
+        }
+        block[c * size + r] -= sum;
+        block[r * size + c] = block[c * size + r];
+      }
     }
-    Eigen::Map<Eigen::MatrixXd> block(diagonal(v), size, size);
-    block.noalias() -= rows * inverse * rows.transpose();
   }
   return true;
 }

@@ -23,9 +23,11 @@ namespace cairn::incremental {
 ///
 ///     B = Σ′ Vᵀ,   U = S − V B,   Σ = Σ′ + B U⁻¹ Bᵀ   ⇒   Σ′_ij = Σ_ij − B_i U⁻¹ B_jᵀ
 ///
-/// (IJRR 2017, equations 11 to 15, there for S = 1 and with the increment's sign turned). B takes a
-/// solution for each row of V, eight at a time; what is new, and what U is too badly conditioned
-/// for, is recomputed: all blocks on the diagonal by the recursion from the roots of the tree down.
+/// (IJRR 2017, equations 11 to 15, there for S = 1 and with the increment's sign turned). Variables
+/// that are new are eliminated from V first, and their own blocks solved for. B takes a solution
+/// for each row that is left, eight at a time. Where these are too many, or U too badly
+/// conditioned, all blocks on the diagonal are computed anew by the recursion from the roots of the
+/// tree down.
 class Covariances {
  public:
   /// What changes: to be called before H does, for every factor that goes or is relinearised, and
@@ -51,6 +53,7 @@ class Covariances {
 
  private:
   bool downdate(const System& system, Tree& tree, std::span<const std::uint8_t> held);
+  bool take_out_fresh(const System& system, const Tree& tree);
   bool apply(const System& system, const Tree& tree);
   void recompute(const System& system, Tree& tree);
   void solve_for(const System& system, Tree& tree, std::int32_t v);

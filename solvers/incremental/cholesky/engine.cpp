@@ -39,9 +39,11 @@ constexpr double kRounding = 1e-18;
 constexpr double kEnough = 0.3;      ///< of it all: by how much more solving could lower chi2
 constexpr double kStepShare = 0.2;   ///< of a factor's: steps that are not followed down the tree
 constexpr double kMoveShare = 10.0;  ///< of a factor's: model moved so far: evaluated again
-constexpr double kMismatch = 0.05;   ///< Jacobians off by more than this times it are renewed
+constexpr double kMismatch = 0.1;    ///< Jacobians off by more than this times it are renewed
 /// While a solution leaves less than this fraction of what it has gained, H does as it is.
 constexpr double kFast = 0.5;
+/// Where it leaves so many times as much, after two attempts, everything is renewed.
+constexpr double kHopeless = 5.0;
 
 const block::Kernels* kernels_named(const std::string& name) {
   const block::Kernels* kernels = block::choose_kernels(name.c_str());
@@ -51,7 +53,7 @@ const block::Kernels* kernels_named(const std::string& name) {
 
 }  // namespace
 
-Engine::Engine(const Settings& settings, std::shared_ptr<Optimizer> rescuer)
+Engine::Engine(const Settings& settings, std::shared_ptr<Rescuer> rescuer)
     : settings_(settings),
       rescuer_(std::move(rescuer)),
       kernels_(kernels_named(settings.kernels)),
@@ -93,6 +95,7 @@ Engine::Engine(const Engine& other)
       decrease_(other.decrease_),
       ids_(other.ids_),
       place_of_id_(other.place_of_id_),
+      under_loss_(other.under_loss_),
       is_source_(other.is_source_),
       move_tolerance_(other.move_tolerance_) {}
 
@@ -132,6 +135,7 @@ void Engine::load(Graph graph, std::vector<FactorId> ids) {
   dead_ = live_factors_ = 0;
   cost_ = drift_ = decrease_ = 0.0;
   touched_at_.clear();
+  under_loss_ = under_loss(graph_);
   const int variables = graph_.variable_count(), factors = graph_.factor_count();
   while (states_.size() < variables) added_variable();
   while (models_.size() < factors) added_factor();
@@ -251,6 +255,7 @@ void Engine::set_loss(std::shared_ptr<const Loss> loss, LossScope scope) {
 
 bool Engine::loss_applies(int f) const {
   if (!graph_.loss()) return false;
+  if (static_cast<std::size_t>(f) < under_loss_.size()) return under_loss_[f];
   const FactorType& type = *graph_.factor_pools()[graph_.factor(f).pool].type;
   if (!type.takes_loss()) return false;
   return graph_.loss_scope() == LossScope::all || under_loss(graph_)[f];
@@ -374,9 +379,12 @@ void Engine::solve(double max_seconds, UpdateReport& report) {
   const Clock::time_point begin = Clock::now();
   settle_gauge();
   ++time_;
+  limit_ = max_seconds;
+  states_.remember();
   if (broken_) return rescue(report, 1e-6);
   bool again = !touched_.empty() || !sources_.empty();
   for (int round = 0; again; ++round) {
+    const Clock::time_point round_begin = Clock::now();
     const double before = cost_;
     if (!bring_factor_up_to_date(report)) {
       step_back();
@@ -391,9 +399,10 @@ void Engine::solve(double max_seconds, UpdateReport& report) {
       step_back();
       return rescue(report, 1e-6);
     }
-    const bool enough_time = report.iterations < settings_.iterations &&
-                             (max_seconds <= 0.0 || seconds_since(begin) < 0.5 * max_seconds);
-    again = improve(enough_time, report);
+    // The next round may have to factorise more than this one had.
+    const bool in_time =
+        max_seconds <= 0.0 || seconds_since(begin) + 2.0 * seconds_since(round_begin) < max_seconds;
+    again = improve(in_time && report.iterations < settings_.iterations, report);
   }
 }
 
@@ -420,8 +429,9 @@ void Engine::rescue(UpdateReport& report, double tolerance) {
     const Timed timed(report.seconds.linearize);
     write_back();
     Graph graph = clean_graph();
+    const std::lock_guard lock(rescuer_->mutex);
     const Summary summary =
-        rescuer_->optimize(graph, {.max_iterations = 100, .tolerance = tolerance});
+        rescuer_->optimizer->optimize(graph, {.max_iterations = 100, .tolerance = tolerance});
     report.iterations += static_cast<int>(summary.iterations.size());
     load(std::move(graph), live_ids());
   }
@@ -443,7 +453,10 @@ bool Engine::bring_factor_up_to_date(UpdateReport& report) {
   {
     const Timed timed(report.seconds.order);
     tree_.clear_affected();
-    if (structure_changed_ && tree_.worn_out()) touch_all();
+    if (structure_changed_ && tree_.worn_out() &&
+        (limit_ <= 0.0 || tree_.seconds_to_order_anew() < limit_)) {
+      touch_all();
+    }
     for (const std::int32_t v : touched_) {
       if (!held_[v] || tree_.node_of(v) >= 0) tree_.touch(v);
     }
@@ -513,7 +526,7 @@ bool Engine::improve(bool enough_time, UpdateReport& report) {
   }
   if (left < kFast * decrease_) return true;
   const Timed timed(report.seconds.linearize);
-  if (report.iterations >= 3 && left > decrease_) {
+  if (report.iterations >= 3 && left > kHopeless * decrease_) {
     relinearize_all();
     report.relinearized_factors += live_factors_;
     return true;
@@ -572,6 +585,8 @@ Graph Engine::clean_graph() {
 void Engine::solve_fully(UpdateReport& report) {
   settle_gauge();
   ++time_;
+  limit_ = 0.0;
+  states_.remember();
   if (broken_) return rescue(report, 1e-12);
   structure_changed_ = true;
   for (int round = 0; round < 50; ++round) {

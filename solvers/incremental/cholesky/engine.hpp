@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <mutex>
 #include <span>
 #include <string>
 #include <utility>
@@ -35,6 +36,13 @@ struct Settings {
   std::string kernels = "auto";
 };
 
+/// The optimizer that starts where steps of Gauss-Newton have gone astray. Copies of an engine
+/// share it, from whatever threads they are used.
+struct Rescuer {
+  std::unique_ptr<Optimizer> optimizer;
+  std::mutex mutex;
+};
+
 /// Solves the nonlinear least-squares problem of a graph that changes: keeps its linear models,
 /// their normal equations and the Cholesky factor, and brings all three up to date with what has
 /// changed.
@@ -42,8 +50,7 @@ struct Settings {
 /// Variables and factors are numbered as in `graph()`. Nothing is solved before `solve` is called.
 class Engine {
  public:
-  /// `rescuer`: starts where steps of Gauss-Newton have gone astray. Copies share it.
-  Engine(const Settings& settings, std::shared_ptr<Optimizer> rescuer);
+  Engine(const Settings& settings, std::shared_ptr<Rescuer> rescuer);
   Engine(const Engine& other);
   Engine& operator=(const Engine&) = delete;
 
@@ -91,6 +98,9 @@ class Engine {
   void solve_fully(UpdateReport& report);
   /// Σ ρ(‖r‖²) at the current estimate.
   double chi2();
+  /// All states at once; then `settled_x` gives them until something is solved.
+  void settle_all() { tree_.settle_all(); }
+  const double* settled_x(int v) const { return states_.x(v); }
   /// A graph of its own of what is live, at the current estimate.
   Graph snapshot();
   /// The graph's states become the current estimate.
@@ -140,7 +150,7 @@ class Engine {
   std::vector<FactorId> live_ids() const;
 
   Settings settings_;
-  std::shared_ptr<Optimizer> rescuer_;
+  std::shared_ptr<Rescuer> rescuer_;
   const block::Kernels* kernels_;
   Graph graph_;
   System system_;
@@ -176,8 +186,10 @@ class Engine {
   double decrease_ = 0.0;                  // of the last solution: gᵀH⁻¹g
   std::vector<FactorId> ids_;              // by factor
   std::vector<std::int32_t> place_of_id_;  // by FactorId: factor, -1 if it has been removed
+  std::vector<bool> under_loss_;           // by factor, of those that were loaded together
   std::vector<std::uint8_t> is_source_;    // by variable
   double move_tolerance_ = 0.0;
+  double limit_ = 0.0;  // seconds that the update at hand may take; 0: any
   std::vector<std::int32_t> anchored_;
 };
 

@@ -21,9 +21,12 @@ double seconds_since(Clock::time_point begin) {
   return std::chrono::duration<double>(Clock::now() - begin).count();
 }
 
+/// So many states are brought up to date one by one.
+constexpr int kFew = 8;
+
 }  // namespace
 
-IncrementalCholesky::IncrementalCholesky(const Options& options, std::shared_ptr<Optimizer> rescuer)
+IncrementalCholesky::IncrementalCholesky(const Options& options, std::shared_ptr<Rescuer> rescuer)
     : options_(options),
       rescuer_(std::move(rescuer)),
       engine_(std::make_unique<Engine>(options.settings, rescuer_)) {}
@@ -43,6 +46,7 @@ IncrementalCholesky::IncrementalCholesky(const IncrementalCholesky& other)
 
 UpdateReport IncrementalCholesky::update(const GraphUpdate& update, const UpdateOptions& options) {
   const Clock::time_point begin = Clock::now();
+  asked_ = 0;
   if (engine_->dead() > 0) engine_->compact();
   GraphUpdate checked = update;
   place_variables(checked, [this](Id id) {
@@ -57,7 +61,19 @@ UpdateReport IncrementalCholesky::update(const GraphUpdate& update, const Update
                 .next = engine_->next_id()},
                checked);
   UpdateReport report;
-  apply(checked, report);
+  if (checked.marginalized.empty()) {
+    apply(checked, report);
+  } else {  // which may fail, on numbers
+    const IncrementalCholesky before(*this);
+    try {
+      apply(checked, report);
+    } catch (...) {
+      engine_ = std::make_unique<Engine>(*before.engine_);
+      variables_ = before.variables_;
+      factors_ = before.factors_;
+      throw;
+    }
+  }
   report.seconds.linearize += seconds_since(begin);
 
   ++since_solved_;
@@ -183,7 +199,10 @@ int IncrementalCholesky::index(Id id) const {
 
 std::span<const double> IncrementalCholesky::state(Id id) const {
   const int v = index(id);
-  return {engine_->x(v), static_cast<std::size_t>(engine_->graph().type(v).ambient_size())};
+  // Whoever asks for many most likely wants all: then they are brought up to date together.
+  if (asked_ <= kFew && ++asked_ > kFew) engine_->settle_all();
+  return {asked_ > kFew ? engine_->settled_x(v) : engine_->x(v),
+          static_cast<std::size_t>(engine_->graph().type(v).ambient_size())};
 }
 
 int IncrementalCholesky::block_size(int a, int b) const {
@@ -230,6 +249,7 @@ void IncrementalCholesky::reset() {
   engine_->covariances().keep(kept_);
   variables_ = factors_ = since_solved_ = since_full_ = 0;
   told_.clear();
+  asked_ = 0;
 }
 
 std::unique_ptr<Estimator> IncrementalCholesky::clone() const {

@@ -21,7 +21,7 @@ class IncrementalCholesky final : public Estimator {
     int full_every = 0;   ///< updates from one full step to the next; 0: never by itself
     double max_seconds = 0.0;
   };
-  IncrementalCholesky(const Options& options, std::shared_ptr<Optimizer> rescuer);
+  IncrementalCholesky(const Options& options, std::shared_ptr<Rescuer> rescuer);
   IncrementalCholesky(const IncrementalCholesky& other);
   IncrementalCholesky& operator=(const IncrementalCholesky&) = delete;
 
@@ -51,12 +51,13 @@ class IncrementalCholesky final : public Estimator {
   void tell_of_anchors(UpdateReport& report);
 
   Options options_;
-  std::shared_ptr<Optimizer> rescuer_;
+  std::shared_ptr<Rescuer> rescuer_;
   std::unique_ptr<Engine> engine_;  // moves when it is reset; never null
   int variables_ = 0, factors_ = 0;
   int since_solved_ = 0, since_full_ = 0;
   KeptMarginals kept_ = KeptMarginals::none;
-  std::set<Id> told_;  // anchors that a note has named
+  mutable int asked_ = 0;  // states, since the last update
+  std::set<Id> told_;      // anchors that a note has named
 };
 
 }  // namespace cairn::incremental

@@ -2,7 +2,6 @@
 #include "models.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 namespace cairn::incremental {
@@ -203,29 +202,56 @@ void Models::add_row(System& system, int f, std::int32_t variable,
   }
 }
 
-bool Models::move(int f, const double* const* steps, double tolerance) {
-  constexpr int kMost = 64;
-  Record& record = records_[f];
-  const int rows = record.rows;
-  if (rows > kMost) return true;
-  const double* J = values_.data() + record.place;
-  double* r = values_.data() + record.place + rows * record.scalars;
-  std::array<double, kMost> change, part;
-  std::fill_n(change.begin(), rows, 0.0);
-  double apart = 0.0;  // Σ ‖J_k δ_k‖
-  for (int k = 0; k < record.arity; ++k) {
-    const int size = tangents_[static_cast<std::size_t>(record.variables + k)];
-    if (steps[k]) {
-      std::fill_n(part.begin(), rows, 0.0);
-      add_product(rows, J, size, steps[k], part.data());
-      double square = 0.0;
-      for (int i = 0; i < rows; ++i) change[i] += part[i], square += part[i] * part[i];
-      apart += std::sqrt(square);
+namespace {
+
+/// r ← r + Σ J_k δ_k for two variables of `Size` coordinates; returns ‖Σ J_k δ_k‖² and adds to
+/// `apart` the sum of ‖J_k δ_k‖.
+template <int Rows, int Size>
+double move_pair(const double* J, const double* const* steps, double* r, double& apart) {
+  double change[Rows] = {};
+  for (int k = 0; k < 2; ++k, J += Rows * Size) {
+    if (!steps[k]) continue;
+    double part[Rows] = {};
+    for (int c = 0; c < Size; ++c) {
+      for (int i = 0; i < Rows; ++i) part[i] += J[c * Rows + i] * steps[k][c];
     }
-    J += rows * size;
+    double square = 0.0;
+    for (int i = 0; i < Rows; ++i) change[i] += part[i], square += part[i] * part[i];
+    apart += std::sqrt(square);
   }
   double square = 0.0;
-  for (int i = 0; i < rows; ++i) r[i] += change[i], square += change[i] * change[i];
+  for (int i = 0; i < Rows; ++i) r[i] += change[i], square += change[i] * change[i];
+  return square;
+}
+
+}  // namespace
+
+bool Models::move(int f, const double* const* steps, double tolerance) {
+  Record& record = records_[f];
+  const int rows = record.rows;
+  const double* J = values_.data() + record.place;
+  double* r = values_.data() + record.place + rows * record.scalars;
+  double apart = 0.0, square = 0.0;  // Σ ‖J_k δ_k‖, ‖Σ J_k δ_k‖²
+  if (record.relative && rows == 3 && record.scalars == 6) {
+    square = move_pair<3, 3>(J, steps, r, apart);
+  } else if (record.relative && rows == 6 && record.scalars == 12) {
+    square = move_pair<6, 6>(J, steps, r, apart);
+  } else {
+    scratch_.assign(static_cast<std::size_t>(2 * rows), 0.0);
+    double *change = scratch_.data(), *part = change + rows;
+    for (int k = 0; k < record.arity; ++k) {
+      const int size = tangents_[static_cast<std::size_t>(record.variables + k)];
+      if (steps[k]) {
+        std::fill_n(part, rows, 0.0);
+        add_product(rows, J, size, steps[k], part);
+        double norm = 0.0;
+        for (int i = 0; i < rows; ++i) change[i] += part[i], norm += part[i] * part[i];
+        apart += std::sqrt(norm);
+      }
+      J += rows * size;
+    }
+    for (int i = 0; i < rows; ++i) r[i] += change[i], square += change[i] * change[i];
+  }
   // What moves the variables of a relative factor alike is linear but for the mismatch.
   record.travel += record.relative ? std::sqrt(square) + record.mismatch * apart : apart;
   return record.travel * record.travel > tolerance;

@@ -33,7 +33,8 @@ void cairn_register(cairn::Registrar& registrar) {
         chosen.solve_every = static_cast<int>(options.integer("solve_every"));
         chosen.full_every = static_cast<int>(options.integer("full_every"));
         chosen.max_seconds = options.real("budget");
-        return std::make_unique<incremental::IncrementalCholesky>(
-            chosen, registry.make<Optimizer>(options.text("rescuer")));
+        auto rescuer = std::make_shared<incremental::Rescuer>();
+        rescuer->optimizer = registry.make<Optimizer>(options.text("rescuer"));
+        return std::make_unique<incremental::IncrementalCholesky>(chosen, std::move(rescuer));
       });
 }

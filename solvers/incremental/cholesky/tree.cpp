@@ -4,11 +4,17 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <utility>
+
+#include "block/ordering.hpp"
+#include "cairn/block_matrix.hpp"
 
 namespace cairn::incremental {
 namespace {
 
 constexpr block::CostModel kCost;
+/// Up to so many variables are ordered by exact degrees.
+constexpr int kSmall = 1500;
 
 std::int32_t round_up(std::int32_t value) { return (value + 7) / 8 * 8; }
 
@@ -88,9 +94,32 @@ void Tree::restructure(std::span<const std::int64_t> touched_at, std::int64_t si
   take_down(members_, orphans_);
   const int n = static_cast<int>(members_.size());
   groups_.resize(n);
+  std::size_t clique_entries = 0;
+  for (int k = 0; k < n; ++k) groups_[k] = touched_at[members_[k]] >= since;
+  for (const std::int32_t o : orphans_)
+    clique_entries += nodes_[o].separator().size() * nodes_[o].separator().size();
+  static const bool has_camd =
+      std::ranges::find(block::every_ordering_name(), "camd") != block::every_ordering_name().end();
+  if (has_camd && n > kSmall && clique_entries < 100 * static_cast<std::size_t>(n)) {
+    order_large();
+  } else {
+    order_small();
+  }
+  for (std::int32_t& place : order_) place = members_[place];  // now variables by place
+  for (int k = 0; k < n; ++k) local_[order_[k]] = k;           // and places by variable
+  eliminate();
+  merge();
+  const bool all = orphans_.empty();
+  put_up(orphans_);
+  if (!all) return;
+  cost_when_ordered_ = cost_;
+  variables_when_ordered_ = variables_;
+}
+
+void Tree::order_small() {
+  const int n = static_cast<int>(members_.size());
   graph_.reset(n);
   for (int k = 0; k < n; ++k) {
-    groups_[k] = touched_at[members_[k]] >= since;
     for (const System::Link& link : system_->links(members_[k])) {
       if (local_[link.other] > k) graph_.join(k, local_[link.other]);
     }
@@ -101,15 +130,31 @@ void Tree::restructure(std::span<const std::int64_t> touched_at, std::int64_t si
     graph_.join_all(stack_);
   }
   graph_.order(groups_, order_);
-  for (std::int32_t& place : order_) place = members_[place];  // now variables by place
-  for (int k = 0; k < n; ++k) local_[order_[k]] = k;           // and places by variable
-  eliminate();
-  merge();
-  const bool all = orphans_.empty();
-  put_up(orphans_);
-  if (!all) return;
-  cost_when_ordered_ = cost_;
-  variables_when_ordered_ = variables_;
+}
+
+/// By approximate minimum degree, which takes hardly more than linear time.
+void Tree::order_large() {
+  std::vector<std::int32_t> sizes;
+  std::vector<std::pair<std::int32_t, std::int32_t>> entries;
+  for (const std::int32_t v : members_) {
+    sizes.push_back(system_->size(v));
+    for (const System::Link& link : system_->links(v)) {
+      if (local_[link.other] > local_[v]) entries.emplace_back(local_[link.other], local_[v]);
+    }
+  }
+  for (const std::int32_t o : orphans_) {
+    for (const std::int32_t a : nodes_[o].separator()) {
+      for (const std::int32_t b : nodes_[o].separator()) {
+        if (local_[a] > local_[b]) entries.emplace_back(local_[a], local_[b]);
+      }
+    }
+  }
+  const std::vector<std::int32_t> groups(groups_.begin(), groups_.end());
+  order_ = block::order(BlockStructure(std::move(sizes), std::move(entries)), "camd", groups);
+}
+
+double Tree::seconds_to_order_anew() const {
+  return 1e-9 * (2.0 * cost_ + 1500.0 * static_cast<double>(variables_));
 }
 
 bool Tree::worn_out() const {

@@ -95,6 +95,8 @@ class Tree {
   /// Whether the factor has become so much more costly than when all of it was last ordered, as
   /// growing does not explain.
   bool worn_out() const;
+  /// About how long it would take to order and factorise all of it.
+  double seconds_to_order_anew() const;
   /// Computes the affected nodes. Returns -1, or a variable whose pivots are not positive; then the
   /// tree is worth nothing until everything has been touched and factorised.
   std::int32_t factorize();
@@ -154,6 +156,8 @@ class Tree {
   std::int32_t new_node();
   void free_node(std::int32_t n);
   void take_down(std::vector<std::int32_t>& members, std::vector<std::int32_t>& orphans);
+  void order_small();
+  void order_large();
   void eliminate();
   void merge();
   void put_up(std::span<const std::int32_t> orphans);

@@ -79,6 +79,27 @@ TEST(EveryVariable, RetractsAndComesBack) {
   });
 }
 
+TEST(EveryVariable, KnowsHowAStepLooksFromWhereItLeads) {
+  for_every_variable([](const VariableType& type, const Regime& regime, Sampler& sampler) {
+    const int n = type.tangent_size();
+    const State x = sampler.state(type, {"any", -1.0});
+    const State delta = sampler.tangent(type, regime);
+    State D(static_cast<std::size_t>(n * n));
+    type.retract_jacobian(x.data(), delta.data(), D.data());
+    const State there = Sampler::retracted(type, x, delta);
+    const double h = 1e-5;
+    for (int c = 0; c < n; ++c) {  // central differences of local(x ⊕ δ, x ⊕ (δ + ε))
+      State forward = delta, backward = delta;
+      forward[c] += h;
+      backward[c] -= h;
+      const State up = local(type, there, Sampler::retracted(type, x, forward)),
+                  down = local(type, there, Sampler::retracted(type, x, backward));
+      for (int r = 0; r < n; ++r)
+        EXPECT_NEAR(D[c * n + r], (up[r] - down[r]) / (2.0 * h), 1e-7 * (1.0 + norm(delta)));
+    }
+  });
+}
+
 TEST(EveryGroup, KeepsDigitsOfTinySteps) {
   Registry registry;
   for (const std::string& tag : registry.names("variable")) {

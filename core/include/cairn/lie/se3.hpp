@@ -89,6 +89,34 @@ struct Se3 {
     return log<S>(between<S>(x, y));
   }
 
+  /// The right Jacobian of exp at δ, wherever x is: [J_r Q; 0 J_r], J_r that of the rotation and Q
+  /// as Barfoot and Furgale (2014, equation 102) have it, at −δ.
+  static Eigen::Matrix<double, 6, 6> retract_jacobian(const Vector<double, 7>&,
+                                                      const Vector<double, 6>& delta) {
+    const Eigen::Matrix3d P = so3::hat<double>(-delta.head<3>()),
+                          W = so3::hat<double>(-delta.tail<3>());
+    const double square = delta.tail<3>().squaredNorm();
+    const so3::JacobianFactors<double> f(square);
+    double c2, c3;
+    if (square < 0.1) {
+      c2 = (1.0 / 24) - square * ((1.0 / 720) - square * ((1.0 / 40320) - square / 3628800));
+      c3 = (1.0 / 120) - square * ((1.0 / 2520) - square * ((1.0 / 120960) - square / 9979200));
+    } else {
+      const double theta = std::sqrt(square);
+      c2 = (0.5 - f.b) / square;
+      c3 = (2.0 * theta - 3.0 * std::sin(theta) + theta * std::cos(theta)) /
+           (2.0 * square * square * theta);
+    }
+    const Eigen::Matrix3d WP = W * P, PW = P * W, WPW = WP * W,
+                          J = so3::right_jacobian(delta.tail<3>());
+    Eigen::Matrix<double, 6, 6> D;
+    D.topLeftCorner<3, 3>() = D.bottomRightCorner<3, 3>() = J;
+    D.bottomLeftCorner<3, 3>().setZero();
+    D.topRightCorner<3, 3>() = 0.5 * P + f.c * (WP + PW + WPW) +
+                               c2 * (W * WP + PW * W - 3.0 * WPW) + c3 * (WPW * W + W * WPW);
+    return D;
+  }
+
   /// Unit quaternion with w ≥ 0, so that a pose has one way to be written.
   static std::string normalize(Vector<double, 7>& x) {
     if (!x.allFinite()) return "a coordinate is not finite";
