@@ -120,6 +120,7 @@ bool Covariances::downdate(const System& system, Tree& tree, std::span<const std
   }
   if (n > 0 && !apply(system, tree)) return false;
   for (const std::int32_t v : fresh_) {
+    std::fill_n(diagonal(v), system.size(v) * system.size(v), 0.0);
     if (!held[v] && tree.node_of(v) >= 0) solve_for(system, tree, v);
   }
   return true;

@@ -198,6 +198,7 @@ void Engine::remove_factor(int f) {
 void Engine::remove_variable(int v) {
   live_variable_[v] = 0;
   if (!held_[v]) {
+    covariances_.note_variable(v);  // to be eliminated from what its factors have said
     touch(v);
     retiring_.push_back(v);
     held_[v] = 1;
@@ -243,7 +244,7 @@ void Engine::hold(std::int32_t v, bool held) {
     std::erase(retiring_, v);
   }
   held_[v] = held;
-  if (!held) covariances_.note_variable(v);
+  covariances_.note_variable(v);
   for (const std::int32_t f : factors) put_in(f);
 }
 

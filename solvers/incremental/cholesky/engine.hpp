@@ -28,7 +28,7 @@ struct Settings {
   double accuracy = 5e-3;
   /// What lowers chi2 by less than this, and by less than the accuracy allows, is put off until it
   /// adds up.
-  double significance = 0.1;
+  double significance = 0.25;
   /// Linear systems solved in one update, at most.
   int iterations = 10;
   /// Variables touched within so many updates are ordered last.

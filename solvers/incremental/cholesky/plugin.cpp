@@ -9,7 +9,7 @@ void cairn_register(cairn::Registrar& registrar) {
       OptionTable{}
           .real("accuracy", 5e-3, 0.0, 1.0,
                 "by which part chi2 may be above that of solving everything anew; 0: all digits")
-          .real("significance", 0.1, 0.0, 1e300,
+          .real("significance", 0.25, 0.0, 1e300,
                 "a step that lowers chi2 by less than this, and than the accuracy allows, waits")
           .integer("iterations", 10, 1, 1e9, "largest number of linear systems solved an update")
           .integer("recent", 30, 0, 1e9, "variables touched in so many updates are ordered last")
