@@ -42,6 +42,49 @@ const std::vector<DataSet>& generated() {
   return all;
 }
 
+/// What `cairn replay` is fed with: it knows other initial guesses than `cairn optimize`.
+const std::vector<DataSet>& replayed() {
+  static const std::vector<std::string> like_g2o{"--types", "slam3d:metric=g2o"};
+  static const std::vector<DataSet> all{
+      {"manhattanOlson3500", "pose2d/manhattanOlson3500.g2o", {}},
+      {"manhattanOlson3500, file's start",
+       "pose2d/manhattanOlson3500.g2o",
+       {"--initial", "as_given"}},
+      {"intel1728", "pose2d/intel1728.g2o", {}},
+      {"city10000", "pose2d/city10000.g2o", {}},
+      {"sphere2500", "pose3d/sphere2500.g2o", like_g2o},
+      {"parking-garage", "pose3d/parking-garage.g2o", like_g2o},
+      {"10kHog-man", "pose2d/10kHog-man.graph.gz", {}},
+      {"killian5489", "pose2d/killian5489_glc.g2o", {}},
+      {"cityTrees10000", "landmark2d/cityTrees10000_isam.txt", {}},
+      {"Victoria Park", "landmark2d/victoriaPark_isam.txt", {}},
+      {"manhattan", "@manhattan", {}},
+      {"city", "@city:poses=5000", {}},
+      {"sphere", "@sphere", {}},
+      {"landmarks2d", "@landmarks2d", {}}};
+  return all;
+}
+
+const std::vector<DataSet>& replayed_quickly() {
+  static const std::vector<DataSet> all{{"intel1728", "pose2d/intel1728.g2o", {}},
+                                        {"manhattan, 600 poses", "@manhattan:poses=600", {}},
+                                        {"landmarks2d, 500 poses", "@landmarks2d:poses=500", {}}};
+  return all;
+}
+
+/// Turns the graph's place in the folder `data` into a path; false if there is none.
+bool locate(DataSet& set, const std::string& data) {
+  if (set.generated()) return true;
+  set.graph = (std::filesystem::path(data) / set.graph).string();
+  return !data.empty() && std::filesystem::exists(set.graph);
+}
+
+std::vector<DataSet> located(const std::vector<DataSet>& all, const std::string& data) {
+  std::vector<DataSet> sets = all;
+  std::erase_if(sets, [&](DataSet& set) { return !locate(set, data); });
+  return sets;
+}
+
 /// Those of the names that there are, in their order.
 std::vector<DataSet> chosen(const std::vector<std::string>& names, const std::string& data) {
   std::vector<DataSet> sets;
@@ -50,8 +93,7 @@ std::vector<DataSet> chosen(const std::vector<std::string>& names, const std::st
     const auto real = std::find_if(published().begin(), published().end(), of_name);
     if (real != published().end()) {
       DataSet set = *real;
-      set.graph = (std::filesystem::path(data) / set.graph).string();
-      if (!data.empty() && std::filesystem::exists(set.graph)) sets.push_back(std::move(set));
+      if (locate(set, data)) sets.push_back(std::move(set));
       continue;
     }
     sets.push_back(*std::find_if(generated().begin(), generated().end(), of_name));
@@ -96,6 +138,18 @@ std::vector<DataSet> solver_sets(const std::string& data, bool quick) {
   return chosen({"manhattanOlson3500", "sphere2500", "Victoria Park", "cityTrees10000",
                  "ladybug-49", "dubrovnik-3", "landmarks2d", "bundle"},
                 data);
+}
+
+std::vector<DataSet> online_sets(const std::string& data, bool quick) {
+  return located(quick ? replayed_quickly() : replayed(), data);
+}
+
+std::vector<DataSet> budget_sets(const std::string& data, bool quick) {
+  if (quick) return {{"city, 1000 poses", "@city:poses=1000", {}}};
+  std::vector<DataSet> sets = located(replayed(), data);
+  std::erase_if(sets,
+                [](const DataSet& set) { return set.name != "city10000" && set.name != "city"; });
+  return sets;
 }
 
 }  // namespace cairn::performance

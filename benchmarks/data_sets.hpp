@@ -22,5 +22,8 @@ std::vector<DataSet> rate_sets(const std::string& data, bool quick);
 std::vector<DataSet> thread_sets(const std::string& data, bool quick);
 std::vector<DataSet> marginals_sets(const std::string& data, bool quick);
 std::vector<DataSet> solver_sets(const std::string& data, bool quick);
+// For `cairn replay`:
+std::vector<DataSet> online_sets(const std::string& data, bool quick);
+std::vector<DataSet> budget_sets(const std::string& data, bool quick);
 
 }  // namespace cairn::performance

@@ -40,7 +40,8 @@ using Study = void (*)(const Bench&, const Keep&);
 const std::vector<std::pair<std::string, Study>>& all_studies() {
   static const std::vector<std::pair<std::string, Study>> all{
       {"graphs", study_graphs},   {"rates", study_rates},     {"threads", study_threads},
-      {"scaling", study_scaling}, {"solvers", study_solvers}, {"marginals", study_marginals}};
+      {"scaling", study_scaling}, {"solvers", study_solvers}, {"marginals", study_marginals},
+      {"online", study_online}};
   return all;
 }
 
@@ -106,6 +107,7 @@ void write_tables(const Arguments& arguments) {
     const fs::path picture = fs::path(arguments.folder) / (name + "_picture.json");
     if (name == "graphs") write(picture, json::serialize(graphs_picture(entries)));
     if (name == "scaling") write(picture, json::serialize(scaling_picture(entries)));
+    if (name == "online") write(picture, json::serialize(online_picture(entries)));
   }
   write(arguments.page, page);
   tell("tables: " + arguments.page);
@@ -116,8 +118,9 @@ int run(int argc, char** argv) {
   CLI::App app("Measures the program cairn, one JSON file a study, and turns those into tables.");
   app.add_option("studies", arguments.studies,
                  "all, or some of: graphs rates threads scaling "
-                 "solvers marginals")
-      ->check(CLI::IsMember({"graphs", "rates", "threads", "scaling", "solvers", "marginals"}));
+                 "solvers marginals online")
+      ->check(CLI::IsMember(
+          {"graphs", "rates", "threads", "scaling", "solvers", "marginals", "online"}));
   app.add_option("--cairn", arguments.cairn, "the program to measure");
   app.add_option("--folder", arguments.folder, "where the JSON is")->required();
   app.add_option("--data", arguments.data, "folder of the real graphs");

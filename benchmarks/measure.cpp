@@ -74,6 +74,11 @@ Run Cairn::marginals(const DataSet& set, const std::vector<std::string>& argumen
   return run("marginals", set, words, threads, limit);
 }
 
+Run Cairn::replay(const DataSet& set, const std::vector<std::string>& arguments, int threads,
+                  double limit) const {
+  return run("replay", set, arguments, threads, limit);
+}
+
 std::vector<std::string> Cairn::names(const std::string& kind) const {
   const json::value report =
       parsed(run_program({program_, "plugins", "--json", "-", "--quiet"}, work_).output);

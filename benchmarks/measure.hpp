@@ -19,7 +19,7 @@ struct Contestants {
   std::vector<std::string> complete;
 };
 
-/// One run of `cairn optimize` or `cairn marginals` and what became of it.
+/// One run of `cairn optimize`, `cairn marginals` or `cairn replay` and what became of it.
 struct Run {
   Outcome outcome;
   boost::json::value report;  ///< null if there is none
@@ -43,6 +43,13 @@ class Cairn {
   /// `cairn marginals` at the states as given, likewise.
   Run marginals(const DataSet& set, const std::vector<std::string>& arguments, int threads,
                 double limit) const;
+
+  /// `cairn replay`, likewise.
+  Run replay(const DataSet& set, const std::vector<std::string>& arguments, int threads,
+             double limit) const;
+
+  /// A folder for files of the runs.
+  const std::filesystem::path& work() const { return work_; }
 
   /// The names on offer of a kind, such as "linear_solver".
   std::vector<std::string> names(const std::string& kind) const;

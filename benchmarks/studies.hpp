@@ -44,6 +44,10 @@ void study_solvers(const Bench& bench, const Keep& keep);
 /// one thread and with two, and on small graphs by solves with `cholmod`.
 void study_marginals(const Bench& bench, const Keep& keep);
 
+/// Graphs as they came about, pose by pose: the incremental estimator against those in batch, with
+/// covariances and with a limit of time.
+void study_online(const Bench& bench, const Keep& keep);
+
 // Progress
 // ------------------------------------------------------------------------------------------------
 /// A line on standard error.

@@ -323,6 +323,8 @@ std::vector<Section> sections(const json::value& report) {
     all = solvers_sections(entries);
   } else if (study == "marginals") {
     all = marginals_sections(entries);
+  } else if (study == "online") {
+    all = online_sections(entries);
   } else {
     throw std::runtime_error("no table for a study named '" + study + "'");
   }

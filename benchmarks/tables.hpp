@@ -18,11 +18,16 @@ std::vector<Section> sections(const boost::json::value& report);
 /// The main comparison's part of it, in tables_graphs.cpp.
 std::vector<Section> graphs_sections(const boost::json::array& entries);
 
+/// The replays' part of it, in tables_online.cpp.
+std::vector<Section> online_sections(const boost::json::array& entries);
+
 // What `cairn plot` draws, in the words of `cairn bench --json`:
 /// the main comparison, with the best of each family alone, as bars;
 boost::json::value graphs_picture(const boost::json::array& entries);
-/// the growth with size, a line a family.
+/// the growth with size, a line a family;
 boost::json::value scaling_picture(const boost::json::array& entries);
+/// the time of the steps of replays, a point for so many steps.
+boost::json::value online_picture(const boost::json::array& entries);
 
 // Numbers in words
 // --------------------------------------------------------------------------------------------

@@ -344,13 +344,14 @@ void OnlineSession::write_estimate(Id id, std::string& text) const {
 
 /// "COVARIANCE a b rows columns" and the numbers row by row.
 bool OnlineSession::write_covariance(Id a, Id b, std::string& text) {
-  const int rows = type_of(a).tangent_size(), columns = type_of(b).tangent_size();
-  std::vector<double> block(static_cast<std::size_t>(rows) * static_cast<std::size_t>(columns));
+  const auto rows = static_cast<std::size_t>(type_of(a).tangent_size()),
+             columns = static_cast<std::size_t>(type_of(b).tangent_size());
+  std::vector<double> block(rows * columns);
   if (!estimator_.covariance(a, b, block)) return false;
   text += fmt::format("COVARIANCE {} {} {} {}", a, b, rows, columns);
-  for (int row = 0; row < rows; ++row) {
-    for (int column = 0; column < columns; ++column)
-      text += fmt::format(" {}", block[static_cast<std::size_t>(column * rows + row)]);
+  for (std::size_t row = 0; row < rows; ++row) {
+    for (std::size_t column = 0; column < columns; ++column)
+      text += fmt::format(" {}", block[column * rows + row]);
   }
   text += '\n';
   return true;

@@ -141,7 +141,7 @@ class Eliminator {
     }
     std::ranges::sort(touched);
     touched.erase(std::unique(touched.begin(), touched.end()), touched.end());
-    std::ranges::stable_partition(touched, [&](int v) { return leaves_[v]; });
+    std::stable_partition(touched.begin(), touched.end(), [&](int v) { return leaves_[v]; });
     Columns columns;
     for (const int v : touched) {
       columns.add(graph_, v);

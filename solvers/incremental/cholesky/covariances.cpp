@@ -276,7 +276,7 @@ void Covariances::solve_crosses(const System& system, Tree& tree,
   for (auto& [pair, block] : crosses_) {
     const auto [a, b] = pair;
     const std::int32_t rows = system.size(a), columns = system.size(b);
-    block.assign(static_cast<std::size_t>(rows * columns), 0.0);
+    block.assign(static_cast<std::size_t>(rows) * static_cast<std::size_t>(columns), 0.0);
     if (held[a] || held[b]) continue;
     for (std::int32_t first = 0; first < columns; first += 8) {
       const std::int32_t width = std::min(8, columns - first);
@@ -287,8 +287,7 @@ void Covariances::solve_crosses(const System& system, Tree& tree,
       tree.solve_many_above(both, X);
       for (std::int32_t k = 0; k < width; ++k) {
         for (std::int32_t r = 0; r < rows; ++r)
-          block[static_cast<std::size_t>((first + k) * rows + r)] =
-              X[static_cast<std::size_t>(system.offset(a) + r) * 8 + k];
+          block[(first + k) * rows + r] = X[static_cast<std::size_t>(system.offset(a) + r) * 8 + k];
       }
     }
   }

@@ -39,6 +39,7 @@ constexpr double kRounding = 1e-18;
 constexpr double kEnough = 0.3;      ///< of it all: by how much more solving could lower chi2
 constexpr double kStepShare = 0.2;   ///< of a factor's: steps that are not followed down the tree
 constexpr double kMoveShare = 10.0;  ///< of a factor's: model moved so far: evaluated again
+constexpr double kMany = 200.0;      ///< factors
 constexpr double kMismatch = 0.1;    ///< Jacobians off by more than this times it are renewed
 /// While a solution leaves less than this fraction of what it has gained, H does as it is.
 constexpr double kFast = 0.5;
@@ -494,7 +495,8 @@ void Engine::take_step(double tolerance, UpdateReport& report) {
 /// Moves to the solution, and evaluates the factors whose variables have moved much.
 void Engine::check(UpdateReport& report) {
   const Timed timed(report.seconds.check);
-  move_tolerance_ = share(kMoveShare);
+  // Of many factors few are as wrong as they may be; of a handful, all.
+  move_tolerance_ = share(kMoveShare * live_factors_ / (live_factors_ + kMany));
   drift_ = 0.0;
   apply_steps();
   for (const std::int32_t f : moving_) {
@@ -521,8 +523,11 @@ bool Engine::improve(bool enough_time, UpdateReport& report) {
     left = tree_.decrement(sources_, system_.g());
   }
   if (left <= kEnough * allowed) return false;
+  const double mismatch = std::min(kMismatch * settings_.accuracy, 1e-2);
+  const auto stale = [&](int f) { return live_factor_[f] && models_.mismatch(f) > mismatch; };
   if (!enough_time) {
-    report.owed = static_cast<int>(sources_.size());
+    for (int f = 0; f < models_.size(); ++f) report.owed += stale(f);
+    report.owed = std::max(report.owed, 1);
     return false;
   }
   if (left < kFast * decrease_) return true;
@@ -532,9 +537,8 @@ bool Engine::improve(bool enough_time, UpdateReport& report) {
     report.relinearized_factors += live_factors_;
     return true;
   }
-  const double mismatch = std::min(kMismatch * settings_.accuracy, 1e-2);
   for (int f = 0; f < models_.size(); ++f) {
-    if (!live_factor_[f] || models_.mismatch(f) <= mismatch) continue;
+    if (!stale(f)) continue;
     relinearize(f);
     ++report.relinearized_factors;
   }

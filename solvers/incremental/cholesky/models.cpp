@@ -96,7 +96,7 @@ void Models::add(const Graph& graph, int position, bool loss_applies) {
 const double* Models::block(const Record& record, int k) const {
   const double* J = values_.data() + record.place;
   for (int before = 0; before < k; ++before)
-    J += record.rows * tangents_[static_cast<std::size_t>(record.variables + before)];
+    J += record.rows * tangents_[record.variables + before];
   return J;
 }
 
@@ -110,9 +110,9 @@ double Models::evaluate(const Record& record, const Graph& graph, const States& 
   pointers_.clear();
   double* next = J;
   for (int k = 0; k < record.arity; ++k) {
-    points_.push_back(states.x(variables_[static_cast<std::size_t>(record.variables + k)]));
+    points_.push_back(states.x(variables_[record.variables + k]));
     pointers_.push_back(next);
-    if (J) next += record.rows * tangents_[static_cast<std::size_t>(record.variables + k)];
+    if (J) next += record.rows * tangents_[record.variables + k];
   }
   const std::size_t packed = static_cast<std::size_t>(record.rows) * (record.rows + 1) / 2;
   const std::size_t entry = static_cast<std::size_t>(record.entry);
@@ -237,10 +237,10 @@ bool Models::move(int f, const double* const* steps, double tolerance) {
   } else if (record.relative && rows == 6 && record.scalars == 12) {
     square = move_pair<6, 6>(J, steps, r, apart);
   } else {
-    scratch_.assign(static_cast<std::size_t>(2 * rows), 0.0);
+    scratch_.assign(2 * static_cast<std::size_t>(rows), 0.0);
     double *change = scratch_.data(), *part = change + rows;
     for (int k = 0; k < record.arity; ++k) {
-      const int size = tangents_[static_cast<std::size_t>(record.variables + k)];
+      const int size = tangents_[record.variables + k];
       if (steps[k]) {
         std::fill_n(part, rows, 0.0);
         add_product(rows, J, size, steps[k], part);
@@ -261,7 +261,8 @@ double Models::correct(int f, const Graph& graph, const States& states, System& 
                        std::span<const std::uint8_t> held) {
   Record& record = records_[f];
   const int rows = record.rows, doubles = rows * record.scalars;
-  scratch_.resize(static_cast<std::size_t>(doubles + rows + record.scalars));
+  const std::int64_t room = std::int64_t{doubles} + rows + record.scalars;
+  scratch_.resize(static_cast<std::size_t>(room));
   double* const J_now = scratch_.data();
   double* const r_now = J_now + doubles;
   double* const apart = r_now + rows;  // J(x)ᵀ r(x) − Jᵀ r(x)
@@ -286,8 +287,7 @@ double Models::correct(int f, const Graph& graph, const States& states, System& 
   double square = 0.0;
   int c = 0;
   for (int k = 0; k < record.arity; ++k) {
-    const std::int32_t v = variables_[static_cast<std::size_t>(record.variables + k)],
-                       size = system.size(v);
+    const std::int32_t v = variables_[record.variables + k], size = system.size(v);
     for (int i = 0; i < size; ++i, ++c) {
       double drift = apart[c] - beyond[c];
       for (int row = 0; row < rows; ++row) drift += J[c * rows + row] * (r_now[row] - r[row]);

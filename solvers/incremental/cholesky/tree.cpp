@@ -607,7 +607,7 @@ bool Tree::move_as_a_whole(Node& node, double tolerance) {
   const std::int32_t ambient = states_->ambient(separator.front());
   rigid_.resize(node.owed.size());
   matrix_.resize(static_cast<std::size_t>(square));
-  twist_.resize(static_cast<std::size_t>(size + 2 * ambient));
+  twist_.resize(static_cast<std::size_t>(std::int64_t{size} + 2 * ambient));
   double* const twist = twist_.data();
   double* const element = twist + size;
   const auto multiply = [&](const double* vector, double* out) {

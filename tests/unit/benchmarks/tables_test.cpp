@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <stdexcept>
 #include <string>
 
@@ -196,6 +197,88 @@ TEST(PerformanceTables, CompareCovariancesWithSolvesWhereThoseWereMeasured) {
   EXPECT_THAT(table, HasSubstr("| small | 100 | 5 k | 1.00 | 1.50 | 0.500 | 2.00 | 1.60 | 50.0 | "
                                "25.0 × |"));
   EXPECT_THAT(table, HasSubstr("| large | 90000 | - | 100 | 150 | 50.0 | 200 | 160 | - | - |"));
+}
+
+/// A run of 200 steps.
+std::string replay(const std::string& name, double seconds, double chi2,
+                   const std::string& more = "") {
+  return R"({"name": ")" + name + R"(", "in_time": true, "limit": 60, "runs": [{"seconds":
+      {"total": )" +
+         std::to_string(seconds) +
+         R"(, "marginals": 0.5}, "steps": {"count": 200, "median": 0.001, "p95": 0.002,
+      "p99": 0.003, "max": 0.004}, "peak_memory_bytes": 3e7, "chi2": )" +
+         std::to_string(chi2) + more + "}]}";
+}
+
+std::string online_entry(const std::string& part, const std::string& contestants,
+                         const std::string& more = "") {
+  return R"({"part": ")" + part + R"(", "name": "town", "contestants": [)" + contestants + "]" +
+         more + "}";
+}
+
+/// chi2 is rounding at the first sample, 2 % above batch at the second; the last is finished.
+boost::json::value online_report() {
+  const std::string checks = R"(, "checks": [
+      {"step": 1, "chi2": 3e-20, "batch": 1e-20, "polished": 1e-20},
+      {"step": 100, "chi2": 51.0, "batch": 50.0, "polished": 50.5},
+      {"step": 200, "chi2": 100.0, "batch": 400.0, "polished": 100.0}])";
+  const std::string late = R"({"name": "batch", "in_time": false, "limit": 60, "runs": []})";
+  return report("online",
+                online_entry("times",
+                             replay("incremental_cholesky", 2.0, 100.5) + "," +
+                                 replay("periodic_batch", 8.0, 103.0) + "," + late,
+                             checks) +
+                    "," +
+                    online_entry("marginals", replay("incremental_cholesky", 2.5, 100.5,
+                                                     R"(, "marginals_by": {"downdate": 150,
+                                                        "recomputation": 50})")));
+}
+
+TEST(PerformanceTables, CompareReplaysAndSayWhichOneWasNotFinished) {
+  EXPECT_THAT(section(online_report(), "online-times"),
+              HasSubstr("| town | 200 | 2.00 | 1.00 | 2.00 | 3.00 | 4.00 | 8.00 | 4.00 × | 4.00 | "
+                        "> 60 | - | 30 / 30 |\n"));
+}
+
+TEST(PerformanceTables, TakeTheLowerOfTwoBatchesAndLeaveSamplesOfRoundingOut) {
+  EXPECT_THAT(section(online_report(), "online-chi2"),
+              HasSubstr("| town | 100.5 | 400 | 100 | 0.500 % | 2.000 % | 0.000 % | 3.000 % |\n"));
+}
+
+TEST(PerformanceTables, TellTheShareOfCovariancesAndHowTheyWereBroughtUpToDate) {
+  EXPECT_THAT(
+      section(online_report(), "online-marginals"),
+      HasSubstr("| town | 200 | 2.50 | 2.00 | 20 % | 1.00 | 2.00 | 3.00 | 4.00 | 150 | 50 | "
+                "0 | 30 |\n"));
+}
+
+TEST(PerformanceTables, CompareALimitOfTimeWithNone) {
+  const std::string check =
+      R"(, "checks": [{"step": 200, "chi2": 100.5, "batch": 100.0, "polished": 100.0}])";
+  const auto limited =
+      report("online", online_entry("budget",
+                                    replay("none", 2.0, 100.5, R"(, "owed": 0)" + check) + "," +
+                                        replay("budget", 1.0, 101.0, R"(, "owed": 17)" + check),
+                                    R"(, "budget": 0.005)"));
+  const std::string table = section(limited, "online-budget");
+  EXPECT_THAT(table, HasSubstr("| town | none | 2.00 | 1.00 | 2.00 | 3.00 | 4.00 | 100.5 | 0.500 % "
+                               "| 0 |\n"));
+  EXPECT_THAT(table, HasSubstr("| town | 5.00 | 1.00 | 1.00 | 2.00 | 3.00 | 4.00 | 101 | 1.000 % | "
+                               "17 |\n"));
+}
+
+TEST(PerformanceTables, DrawAPointForSoManySteps) {
+  const auto steps = report("online", R"({"part": "steps", "name": "town", "setting": "ours",
+      "every": 3, "longest": [0.1, 0.2]}, {"part": "steps", "name": "town", "setting": "theirs",
+      "every": 3, "longest": [0.3, 0.4]})");
+  const boost::json::value picture = online_picture(list(steps, "entries"));
+  ASSERT_EQ(list(picture, "graphs").size(), 1U);
+  const boost::json::array& curves = list(list(picture, "graphs").front(), "configurations");
+  ASSERT_EQ(curves.size(), 2U);
+  const boost::json::array& history = list(curves.front(), "history");
+  ASSERT_EQ(history.size(), 6U);
+  EXPECT_TRUE(std::isnan(number(history[4], "seconds")));
+  EXPECT_EQ(number(history[5], "seconds"), 0.2);
 }
 
 }  // namespace
