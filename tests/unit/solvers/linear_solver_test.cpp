@@ -143,7 +143,7 @@ TEST_P(LinearSolverTest, SolvesForManyRightHandSidesIfItCan) {
   for (const int columns : {1, 5, 8, 11, 2}) {
     Eigen::MatrixXd X(structure.size(), columns);
     for (int c = 0; c < columns; ++c)
-      X.col(c) = random_vector(structure.size(), static_cast<std::uint64_t>(19 + c));
+      X.col(c) = random_vector(structure.size(), std::uint64_t{19} + static_cast<std::uint64_t>(c));
     const Eigen::MatrixXd G = X;
     const std::span<double> values(X.data(), static_cast<std::size_t>(X.size()));
     many->solve(values, values, columns);
