@@ -224,12 +224,13 @@ void assemble(const Assembly* entries, int count, const double* values, double* 
 /// x[n][v] -= what the K columns to the left contribute: rows at A, columns at B.
 template <int V, int N>
 inline __attribute__((always_inline)) void subtract_left(Vec (&x)[N][V], int K, const double* A,
-                                                         const double* B, std::int64_t stride) {
+                                                         std::int64_t lda, const double* B,
+                                                         std::int64_t ldb) {
   for (int k = 0; k < K; ++k) {
     Vec a[V];
     CAIRN_UNROLL
-    for (int v = 0; v < V; ++v) a[v] = load(A + k * stride + v * kWidth);
-    const double* b = B + k * stride;
+    for (int v = 0; v < V; ++v) a[v] = load(A + k * lda + v * kWidth);
+    const double* b = B + k * ldb;
     CAIRN_UNROLL
     for (int n = 0; n < N; ++n) {
       const Vec bn = broadcast(b[n]);
@@ -254,7 +255,7 @@ __attribute__((noinline)) int factor_top(double* panel, std::int64_t stride, int
     CAIRN_UNROLL
     for (int v = 0; v < V; ++v) x[n][v] = load(block + n * stride + v * kWidth);
   }
-  subtract_left<V, N>(x, begin, panel + begin, panel + begin, stride);
+  subtract_left<V, N>(x, begin, panel + begin, stride, panel + begin, stride);
 
   alignas(64) double top[kWidth];
   Vec pivots = broadcast(1.0);
@@ -292,26 +293,30 @@ __attribute__((noinline)) int factor_top(double* panel, std::int64_t stride, int
   return failed;
 }
 
-/// The same columns in V vectors of rows below those of `factor_top`: X ← (A - left) L⁻ᵀ.
+/// X ← (X - left) L⁻ᵀ in columns [begin, begin + N) of V vectors of rows, whose diagonal block in
+/// the panel is done: `left` are the columns [first, begin). X is a panel's own rows below, or
+/// another matrix.
 template <int V, int N>
-__attribute__((noinline)) void factor_below(double* panel, std::int64_t stride, int begin, int row,
-                                            const double* reciprocal) {
-  double* block = panel + begin * stride + row;
+__attribute__((noinline)) void solve_from_right(double* X, std::int64_t ldx, const double* panel,
+                                                std::int64_t stride, int first, int begin,
+                                                const double* reciprocal) {
+  double* block = X + begin * ldx;
   const double* L = panel + begin * stride + begin;
   Vec x[N][V];
   CAIRN_UNROLL
   for (int n = 0; n < N; ++n) {
     CAIRN_UNROLL
-    for (int v = 0; v < V; ++v) x[n][v] = load(block + n * stride + v * kWidth);
+    for (int v = 0; v < V; ++v) x[n][v] = load(block + n * ldx + v * kWidth);
   }
-  subtract_left<V, N>(x, begin, panel + row, panel + begin, stride);
+  subtract_left<V, N>(x, begin - first, X + first * ldx, ldx, panel + first * stride + begin,
+                      stride);
   CAIRN_UNROLL
   for (int j = 0; j < N; ++j) {
     const Vec inverse = broadcast(reciprocal[j]);
     CAIRN_UNROLL
     for (int v = 0; v < V; ++v) {
       x[j][v] *= inverse;
-      store(block + j * stride + v * kWidth, x[j][v]);
+      store(block + j * ldx + v * kWidth, x[j][v]);
     }
     CAIRN_UNROLL
     for (int k = j + 1; k < N; ++k) {
@@ -326,11 +331,11 @@ template <int N>
 void factor_rows(double* panel, std::int64_t stride, int begin, int row, int row_end,
                  const double* reciprocal) {
   for (; row + kTileVectors * kWidth <= row_end; row += kTileVectors * kWidth)
-    factor_below<kTileVectors, N>(panel, stride, begin, row, reciprocal);
+    solve_from_right<kTileVectors, N>(panel + row, stride, panel, stride, 0, begin, reciprocal);
   if constexpr (kTileVectors == 3) {
     const int left = (row_end - row) / kWidth;
-    if (left == 2) factor_below<2, N>(panel, stride, begin, row, reciprocal);
-    if (left == 1) factor_below<1, N>(panel, stride, begin, row, reciprocal);
+    if (left == 2) solve_from_right<2, N>(panel + row, stride, panel, stride, 0, begin, reciprocal);
+    if (left == 1) solve_from_right<1, N>(panel + row, stride, panel, stride, 0, begin, reciprocal);
   }
 }
 
@@ -656,48 +661,6 @@ void backward_many(const double* panel, std::int64_t stride, int columns, int m,
 
 // --- selected inversion ---
 
-/// X ← (X - left) L⁻ᵀ in N columns of V vectors of rows: `left` are the columns [first, begin).
-template <int V, int N>
-__attribute__((noinline)) void invert_columns(double* X, std::int64_t ldx, const double* panel,
-                                              std::int64_t stride, int first, int begin,
-                                              const double* reciprocal) {
-  double* block = X + begin * ldx;
-  const double* L = panel + begin * stride + begin;
-  Vec x[N][V];
-  CAIRN_UNROLL
-  for (int n = 0; n < N; ++n) {
-    CAIRN_UNROLL
-    for (int v = 0; v < V; ++v) x[n][v] = load(block + n * ldx + v * kWidth);
-  }
-  for (int k = first; k < begin; ++k) {
-    Vec a[V];
-    CAIRN_UNROLL
-    for (int v = 0; v < V; ++v) a[v] = load(X + k * ldx + v * kWidth);
-    const double* b = panel + k * stride + begin;
-    CAIRN_UNROLL
-    for (int n = 0; n < N; ++n) {
-      const Vec bn = broadcast(b[n]);
-      CAIRN_UNROLL
-      for (int v = 0; v < V; ++v) x[n][v] -= a[v] * bn;
-    }
-  }
-  CAIRN_UNROLL
-  for (int j = 0; j < N; ++j) {
-    const Vec inverse = broadcast(reciprocal[j]);
-    CAIRN_UNROLL
-    for (int v = 0; v < V; ++v) {
-      x[j][v] *= inverse;
-      store(block + j * ldx + v * kWidth, x[j][v]);
-    }
-    CAIRN_UNROLL
-    for (int k = j + 1; k < N; ++k) {
-      const Vec l = broadcast(L[j * stride + k]);
-      CAIRN_UNROLL
-      for (int v = 0; v < V; ++v) x[k][v] -= x[j][v] * l;
-    }
-  }
-}
-
 constexpr int round_up(int rows) { return (rows + 7) / 8 * 8; }
 
 void invert_pivots(const double* panel, std::int64_t stride, int columns, double* V, int row_begin,
@@ -713,11 +676,11 @@ void invert_pivots(const double* panel, std::int64_t stride, int columns, double
       with_columns(count, [&](auto n) {
         constexpr int N = decltype(n)::value;
         if (vectors == 3) {
-          invert_columns<3, N>(V + row, ldv, panel, stride, row, begin, reciprocal);
+          solve_from_right<3, N>(V + row, ldv, panel, stride, row, begin, reciprocal);
         } else if (vectors == 2) {
-          invert_columns<2, N>(V + row, ldv, panel, stride, row, begin, reciprocal);
+          solve_from_right<2, N>(V + row, ldv, panel, stride, row, begin, reciprocal);
         } else {
-          invert_columns<1, N>(V + row, ldv, panel, stride, row, begin, reciprocal);
+          solve_from_right<1, N>(V + row, ldv, panel, stride, row, begin, reciprocal);
         }
       });
     }

@@ -131,11 +131,11 @@ class FrontSteps {
       const std::int32_t to = to_panel ? child.panel_rows : child.m - child.columns;
       std::int32_t end = c + 1;
       std::vector<Step> steps;
-      if (is_large(child)) {
+      if (is_large(child.m)) {
         for (std::int32_t begin = from; begin < to; begin += kTileAdded)
           steps.push_back(step(kind, begin, std::min(to, begin + kTileAdded)));
       } else {
-        while (end < count && !is_large(symbolic_.supernodes()[children[end]])) ++end;
+        while (end < count && !is_large(symbolic_.supernodes()[children[end]].m)) ++end;
         steps.push_back(step(kind));
       }
       for (Step& each : steps) {
@@ -318,7 +318,7 @@ void Schedule::list_steps(const Symbolic& symbolic) {
       end.which = s;
       end.signals[0] = level_gates[l];
       if (nodes[s].parent >= 0) end.signals[1] = ready[nodes[s].parent];
-      if (!is_large(nodes[s])) {
+      if (!is_large(nodes[s].m)) {
         end.kind = Step::Kind::front;
         end.waits[0] = children;
         end.levels = level;

@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "block/front.hpp"
 #include "block/symbolic.hpp"
 
 namespace cairn::block {
@@ -16,9 +17,6 @@ inline constexpr int kTileRows = 96;
 inline constexpr int kStripColumns = 48;
 inline constexpr int kTileAdded = 24;
 inline constexpr std::int64_t kTileZeroed = 1 << 15;
-
-/// Whether a front is worth tiles.
-inline bool is_large(const Supernode& node) { return std::int64_t{node.m} * node.m > 256 * 256; }
 
 /// A piece of the factorisation that one thread does, with what must be done before.
 struct Step {

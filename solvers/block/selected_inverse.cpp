@@ -5,6 +5,7 @@
 #include <atomic>
 #include <stdexcept>
 
+#include "block/front.hpp"
 #include "cairn/threads.hpp"
 
 namespace cairn::block {
@@ -25,7 +26,7 @@ void SelectedInverse::prepare() {
   supernode_of_.assign(cholesky_->symbolic_.order().size(), 0);
   for (std::int32_t s = 0; s < std::ssize(nodes()); ++s) {
     const Supernode& node = nodes()[s];
-    lane_room_ = std::max(lane_room_, std::int64_t{round_up(node.columns)} * node.m);
+    lane_room_ = std::max(lane_room_, room_to_invert(node.columns, node.m));
     std::fill(supernode_of_.begin() + node.block_begin, supernode_of_.begin() + node.block_end, s);
   }
   room_ = UninitializedVector(lane_room_ * cholesky_->schedule_.lanes);
@@ -42,7 +43,7 @@ void SelectedInverse::compute() {
   }
   for (std::size_t l = schedule.levels.size(); l-- > 0;) {
     for (const std::int32_t s : schedule.levels[l])
-      is_large(nodes()[s]) ? invert_large(s) : invert(s, 0);
+      is_large(nodes()[s].m) ? invert_large(s) : invert(s, 0);
   }
   std::atomic<std::size_t> next{0};
   const auto lane_loop = [&](std::size_t lane) {
@@ -56,20 +57,10 @@ void SelectedInverse::compute() {
 
 /// Z in the columns of one supernode, and Z_RR of its children.
 void SelectedInverse::invert(std::int32_t s, std::int64_t lane) {
-  const Kernels& kernels = *cholesky_->kernels_;
   const Supernode& node = nodes()[s];
-  const double* L = cholesky_->panels_.data() + node.panel;
-  const int c8 = round_up(node.columns);
-  double* V = room_.data() + lane * lane_room_;
-  double* T = V + std::int64_t{c8} * node.columns;
-  std::fill(V, T, 0.0);
-  kernels.invert_pivots(L, node.stride, node.columns, V, 0, c8);
-  if (node.m > node.columns) {
-    kernels.transform_rows(L, node.stride, node.columns, V, T, 0, node.m - node.columns);
-    kernels.inverse_rows(cholesky_->update_matrix(s, lane), node.stride, node.columns, node.m, T,
-                         panel(s), node.columns / 8 * 8, node.stride);
-  }
-  kernels.inverse_pivots(V, T, node.stride, node.columns, node.m, panel(s), 0, c8);
+  invert_front(*cholesky_->kernels_, cholesky_->panels_.data() + node.panel, node.stride,
+               node.columns, node.m, cholesky_->update_matrix(s, lane), panel(s),
+               room_.data() + lane * lane_room_);
   for (const std::int32_t child : cholesky_->symbolic_.children(s)) {
     const int rows = nodes()[child].m - nodes()[child].columns;
     hand_down(s, child, lane, 0, rows);

@@ -100,17 +100,7 @@ void SupernodalCholesky::factorize_supernode(const BlockMatrix& H, std::int32_t 
   assemble(H, s, std::int64_t{node.stride} * node.columns);
   for (const std::int32_t c : symbolic_.children(s))
     add_to_panel(s, c, lane, 0, nodes[c].panel_rows);
-  failed_[s] = -1;
-  if (!is_large(node)) {
-    failed_[s] = kernels_->factor_panel(panel, node.stride, 0, node.columns, node.stride);
-  } else {
-    for (int first = 0; first < node.columns; first += kStripColumns) {
-      const int last = std::min(node.columns, first + kStripColumns);
-      factor_pivots(s, first, last);
-      const int below = std::min(node.stride, (last + 7) / 8 * 8);
-      kernels_->factor_rows(panel, node.stride, first, last, below, node.stride);
-    }
-  }
+  failed_[s] = factor_front(*kernels_, panel, node.stride, node.columns, node.m);
   if (node.m == node.columns) return;
   kernels_->update(panel, node.stride, node.columns, node.m, update_matrix(s, lane),
                    node.columns / 8 * 8, node.stride);

@@ -5,6 +5,8 @@
 #include <functional>
 #include <numeric>
 
+#include "block/front.hpp"
+
 namespace cairn::block {
 namespace {
 
@@ -382,31 +384,19 @@ void Symbolic::map_children() {
       const std::int32_t row = rows_[r];
       const std::int32_t size = static_cast<std::int32_t>(scalars(row, row + 1));
       if (row < parent->block_end) {
-        spread(node, local, static_cast<std::int32_t>(scalars(parent->block_begin, row)), size);
+        append_rows(spreads_, node.spreads_begin, local,
+                    static_cast<std::int32_t>(scalars(parent->block_begin, row)), size);
         node.panel_rows += size;
       } else {
         for (; rows_[parent_row] != row; ++parent_row) {
           parent_scalar +=
               static_cast<std::int32_t>(scalars(rows_[parent_row], rows_[parent_row] + 1));
         }
-        spread(node, local, parent_scalar, size);
+        append_rows(spreads_, node.spreads_begin, local, parent_scalar, size);
       }
       local += size;
     }
     node.spreads_end = static_cast<std::int64_t>(spreads_.size());
-  }
-}
-
-/// Adds rows to the node's spreads.
-void Symbolic::spread(const Supernode& node, std::int32_t source, std::int32_t target,
-                      std::int32_t size) {
-  for (std::int32_t k = 0; k < size; ++k) {
-    const std::int32_t row = target + k, first = row / 8 * 8;
-    const bool begun = static_cast<std::int64_t>(spreads_.size()) > node.spreads_begin;
-    if (!begun || spreads_.back().target != first) spreads_.push_back({source + k, first, 0, 0});
-    Spread& spread = spreads_.back();
-    spread.mask = static_cast<std::uint8_t>(spread.mask | 1u << (row - first));
-    spread.packed = static_cast<std::uint8_t>(spread.packed << 1 | 1u);
   }
 }
 

@@ -93,7 +93,6 @@ class Symbolic {
   void find_rows(const BlockStructure& structure);
   void lay_out();
   void map_children();
-  void spread(const Supernode& node, std::int32_t source, std::int32_t target, std::int32_t size);
   void assign_entries(const BlockStructure& structure);
   std::int64_t scalars(std::int32_t first, std::int32_t last) const {
     return offsets_[last] - offsets_[first];

@@ -92,7 +92,7 @@ CAIRN_API std::string_view to_string(MarginalsBy by);
 
 /// What an update did.
 struct UpdateReport {
-  bool ok = true;  ///< false: H is not positive definite; the estimate is that from before
+  bool ok = true;  ///< false: H is not positive definite; the estimate is the best that is known
   FactorId first_factor = 0;  ///< id of the first of the update's new factors; the others follow it
   /// The ids of the priors that marginalisation left, if any.
   std::vector<FactorId> priors;

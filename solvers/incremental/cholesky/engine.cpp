@@ -276,7 +276,7 @@ void Engine::put_in(int f) {
       if (!held_[variables[b]]) system_.connect(variables[a], variables[b]);
     }
   }
-  models_.add_to(system_, f, 1.0, true, held_);
+  models_.add_to(system_, f, 1.0, held_);
   covariances_.note(models_, system_, f, 1.0, held_);
   count_bonds(f, 1);
   structure_changed_ = true;
@@ -294,7 +294,7 @@ void Engine::count_bonds(int f, std::int32_t sign) {
 void Engine::take_out(int f) {
   count_bonds(f, -1);
   covariances_.note(models_, system_, f, -1.0, held_);
-  models_.add_to(system_, f, -1.0, true, held_);
+  models_.add_to(system_, f, -1.0, held_);
   const auto variables = models_.variables(f);
   for (std::size_t a = 0; a < variables.size(); ++a) {
     if (held_[variables[a]]) continue;
@@ -319,11 +319,11 @@ void Engine::sum_anew(std::int32_t v) {
 void Engine::relinearize(int f) {
   for (const std::int32_t v : models_.variables(f)) follow(v);
   covariances_.note(models_, system_, f, -1.0, held_);
-  models_.add_to(system_, f, -1.0, true, held_);
+  models_.add_to(system_, f, -1.0, held_);
   cost_ -= models_.cost(f);
   models_.linearize(f, graph_, states_);
   cost_ += models_.cost(f);
-  models_.add_to(system_, f, 1.0, true, held_);
+  models_.add_to(system_, f, 1.0, held_);
   covariances_.note(models_, system_, f, 1.0, held_);
   for (const std::int32_t v : models_.variables(f)) {
     if (!held_[v]) touch(v);
@@ -558,7 +558,7 @@ void Engine::relinearize_all() {
     if (!live_factor_[f]) continue;
     models_.linearize(f, graph_, states_);
     cost_ += models_.cost(f);
-    models_.add_to(system_, f, 1.0, true, held_);
+    models_.add_to(system_, f, 1.0, held_);
   }
 }
 

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <vector>
 
+#include "block/front.hpp"
+
 namespace cairn::incremental {
 namespace {
 
@@ -49,25 +51,14 @@ class Recursion {
 
   void compute(const Node& node, const Node* parent, std::size_t depth) {
     if (fronts_.size() <= depth) fronts_.resize(depth + 1);
-    const block::Kernels& kernels = tree_.kernels();
     Front& front = fronts_[depth];
     const std::size_t size = static_cast<std::size_t>(node.stride) * node.columns;
     if (front.panel.size() < size) front.panel = UninitializedVector(size);
     if (parent) gather(node, *parent, fronts_[depth - 1], front);
-    const int c8 = (node.columns + 7) / 8 * 8;
-    const std::size_t inverse = static_cast<std::size_t>(c8) * node.columns;
-    const std::size_t room = inverse + static_cast<std::size_t>(c8) * node.below();
+    const auto room = static_cast<std::size_t>(block::room_to_invert(node.columns, node.m));
     if (room_.size() < room) room_ = UninitializedVector(room);
-    double* V = room_.data();
-    double* T = V + inverse;
-    std::fill(V, T, 0.0);
-    kernels.invert_pivots(node.panel.data(), node.stride, node.columns, V, 0, c8);
-    if (node.below() > 0) {
-      kernels.transform_rows(node.panel.data(), node.stride, node.columns, V, T, 0, node.below());
-      kernels.inverse_rows(front.below.data(), node.stride, node.columns, node.m, T,
-                           front.panel.data(), node.columns / 8 * 8, node.stride);
-    }
-    kernels.inverse_pivots(V, T, node.stride, node.columns, node.m, front.panel.data(), 0, c8);
+    block::invert_front(tree_.kernels(), node.panel.data(), node.stride, node.columns, node.m,
+                        front.below.data(), front.panel.data(), room_.data());
     std::int64_t row = 0;
     for (const std::int32_t v : node.own_variables()) {
       visit_(v, front.panel.data() + row * node.stride + row, node.stride);

@@ -101,9 +101,9 @@ const double* Models::block(const Record& record, int k) const {
 }
 
 /// The whitened residual and, unless J is null, the Jacobian at the current estimate, both weighted
-/// by √ρ′ = √weight. Returns ρ(‖r‖²).
+/// by √ρ′. Returns ρ(‖r‖²).
 double Models::evaluate(const Record& record, const Graph& graph, const States& states, double* r,
-                        double* J, double& weight) const {
+                        double* J) const {
   const FactorPool& pool = graph.factor_pools()[record.pool];
   const FactorType& type = *pool.type;
   points_.clear();
@@ -122,9 +122,8 @@ double Models::evaluate(const Record& record, const Graph& graph, const States& 
       pool.sqrt_information.data() + entry * packed, r, J ? pointers_.data() : nullptr);
   double s = 0.0;
   for (int k = 0; k < record.rows; ++k) s += r[k] * r[k];
-  weight = 1.0;
   if (!record.loss_applies || !graph.loss()) return s;
-  double rho = 0.0;
+  double rho = 0.0, weight = 1.0;
   graph.loss()->evaluate({&s, 1}, {&rho, 1}, {&weight, 1});
   const double root = std::sqrt(weight);
   for (int k = 0; k < record.rows; ++k) r[k] *= root;
@@ -137,16 +136,14 @@ double Models::evaluate(const Record& record, const Graph& graph, const States& 
 void Models::linearize(int f, const Graph& graph, const States& states) {
   Record& record = records_[f];
   double* const J = values_.data() + record.place;
-  double weight = 1.0;
-  record.cost = evaluate(record, graph, states, J + record.rows * record.scalars, J, weight);
+  record.cost = evaluate(record, graph, states, J + record.rows * record.scalars, J);
   std::fill_n(J + record.rows * (record.scalars + 1), record.scalars, 0.0);
   record.mismatch = record.travel = 0.0;
 }
 
 double Models::cost_now(int f, const Graph& graph, const States& states) const {
-  std::vector<double> r(static_cast<std::size_t>(records_[f].rows));
-  double weight = 1.0;
-  return evaluate(records_[f], graph, states, r.data(), nullptr, weight);
+  scratch_.resize(static_cast<std::size_t>(records_[f].rows));
+  return evaluate(records_[f], graph, states, scratch_.data(), nullptr);
 }
 
 /// Its part of the block that joins its variables ka and kb.
@@ -162,8 +159,7 @@ void Models::add_block(System& system, const Record& record, int ka, int kb, dou
   }
 }
 
-void Models::add_to(System& system, int f, double sign, bool with_gradient,
-                    std::span<const std::uint8_t> held) const {
+void Models::add_to(System& system, int f, double sign, std::span<const std::uint8_t> held) const {
   const Record& record = records_[f];
   const int rows = record.rows;
   const std::int32_t* v = variables_.data() + record.variables;
@@ -174,10 +170,8 @@ void Models::add_to(System& system, int f, double sign, bool with_gradient,
     const std::int32_t a = v[ka], size = system.size(a);
     if (!held[a]) {
       add_transposed_product(rows, J, size, J, size, sign, system.diagonal(a));
-      if (with_gradient) {
-        add_transposed_product(rows, J, size, r, 1, -sign, system.g(a));
-        for (int i = 0; i < size; ++i) system.g(a)[i] -= sign * beyond[i];
-      }
+      add_transposed_product(rows, J, size, r, 1, -sign, system.g(a));
+      for (int i = 0; i < size; ++i) system.g(a)[i] -= sign * beyond[i];
       for (int kb = ka + 1; kb < record.arity; ++kb) {
         if (!held[v[kb]]) add_block(system, record, ka, kb, sign);
       }
@@ -266,8 +260,7 @@ double Models::correct(int f, const Graph& graph, const States& states, System& 
   double* const J_now = scratch_.data();
   double* const r_now = J_now + doubles;
   double* const apart = r_now + rows;  // J(x)ᵀ r(x) − Jᵀ r(x)
-  double weight = 1.0;
-  record.cost = evaluate(record, graph, states, r_now, J_now, weight);
+  record.cost = evaluate(record, graph, states, r_now, J_now);
   const double* const J = values_.data() + record.place;
   double* const r = values_.data() + record.place + doubles;
   double* const beyond = r + rows;

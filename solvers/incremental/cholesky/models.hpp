@@ -41,10 +41,9 @@ class Models {
 
   /// Linearises at the current estimate: J = J(x), r̂ = r(x), γ = Jᵀr.
   void linearize(int f, const Graph& graph, const States& states);
-  /// Adds the factor's part of H, and of the right-hand side if `with_gradient`, times `sign`;
-  /// variables that are held have none.
-  void add_to(System& system, int f, double sign, bool with_gradient,
-              std::span<const std::uint8_t> held) const;
+  /// Adds the factor's part of H and of the right-hand side, times `sign`; variables that are held
+  /// have none.
+  void add_to(System& system, int f, double sign, std::span<const std::uint8_t> held) const;
   /// Its part of the block row of one of its variables: H_vv and what joins v with others.
   void add_row(System& system, int f, std::int32_t variable,
                std::span<const std::uint8_t> held) const;
@@ -86,13 +85,13 @@ class Models {
   const double* block(const Record& record, int k) const;
   void add_block(System& system, const Record& record, int ka, int kb, double sign) const;
   double evaluate(const Record& record, const Graph& graph, const States& states, double* r,
-                  double* J, double& weight) const;
+                  double* J) const;
 
   std::vector<Record> records_;
   std::vector<std::int32_t> variables_;
   std::vector<std::int16_t> tangents_;  // of each of a factor's variables
   AlignedVector values_;
-  std::vector<double> scratch_;
+  mutable std::vector<double> scratch_;
   mutable std::vector<double*> pointers_;
   mutable std::vector<const double*> points_;
 };

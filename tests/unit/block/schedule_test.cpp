@@ -101,7 +101,7 @@ TEST(Schedule, CutsALargeFrontWithoutGapOrOverlap) {
   for (const std::vector<std::int32_t>& level : schedule.levels) {
     for (const std::int32_t s : level) {
       const Supernode& node = symbolic.supernodes()[s];
-      if (!is_large(node)) continue;
+      if (!is_large(node.m)) continue;
       ++fronts;
       std::vector<std::pair<std::int64_t, std::int64_t>> zeroed, updated;
       std::vector<std::vector<std::pair<std::int64_t, std::int64_t>>> rows(

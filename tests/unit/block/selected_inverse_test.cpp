@@ -10,21 +10,15 @@
 #include "block/ordering.hpp"
 #include "cairn/threads.hpp"
 #include "support/block_systems.hpp"
+#include "support/kernel_sets.hpp"
 
 namespace cairn::block {
 namespace {
 
 using test::dense;
 using test::fill_positive_definite;
+using test::kernel_sets;
 using test::random_structure;
-
-std::vector<std::string> kernel_sets() {
-  std::vector<std::string> sets;
-  for (const char* name : {"portable", "avx2", "avx512"}) {
-    if (choose_kernels(name)) sets.emplace_back(name);
-  }
-  return sets;
-}
 
 std::vector<double> diagonal(const SelectedInverse& inverse, const BlockStructure& structure) {
   std::int64_t size = 0;
@@ -168,7 +162,7 @@ TEST(SelectedInverse, GivesTheSameBitsForAnyNumberOfThreads) {
     set_threads(count);
     SupernodalCholesky cholesky;
     cholesky.analyze(structure, "amd");
-    ASSERT_TRUE(std::ranges::any_of(cholesky.symbolic().supernodes(), is_large));
+    ASSERT_TRUE(std::ranges::any_of(cholesky.symbolic().supernodes(), is_large, &Supernode::m));
     ASSERT_TRUE(cholesky.factorize(H).ok);
     SelectedInverse inverse(cholesky);
     inverse.compute();
@@ -194,7 +188,7 @@ TEST(SelectedInverse, AgreesInWideFronts) {
     for (const std::string& kernels : kernel_sets()) {
       SupernodalCholesky cholesky(kernels);
       cholesky.analyze(structure, "amd");
-      ASSERT_TRUE(std::ranges::any_of(cholesky.symbolic().supernodes(), is_large));
+      ASSERT_TRUE(std::ranges::any_of(cholesky.symbolic().supernodes(), is_large, &Supernode::m));
       ASSERT_TRUE(cholesky.factorize(H).ok);
       SelectedInverse inverse(cholesky);
       inverse.compute();

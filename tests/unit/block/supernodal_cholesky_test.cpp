@@ -11,21 +11,15 @@
 #include "cairn/error.hpp"
 #include "cairn/threads.hpp"
 #include "support/block_systems.hpp"
+#include "support/kernel_sets.hpp"
 
 namespace cairn::block {
 namespace {
 
 using test::dense;
 using test::fill_positive_definite;
+using test::kernel_sets;
 using test::random_structure;
-
-std::vector<std::string> kernel_sets() {
-  std::vector<std::string> sets;
-  for (const char* name : {"portable", "avx2", "avx512"}) {
-    if (choose_kernels(name)) sets.emplace_back(name);
-  }
-  return sets;
-}
 
 std::vector<std::string> orderings() {
   std::vector<std::string> names = ordering_names();

@@ -6,6 +6,7 @@
 
 #include "cairn/define_factor.hpp"
 #include "support/planar_graph.hpp"
+#include "support/scaled_pose.hpp"
 
 namespace cairn {
 namespace {
@@ -84,20 +85,8 @@ TEST_F(GaugeTest, HoldsAVariableThatNoFactorTouches) {
       ::testing::HasSubstr("1 variable has no factor and is held, the first is VERTEX_SE2 99"));
 }
 
-/// A pose with a scale: more than a pose, and no group on offer.
-struct ScaledPose {
-  static constexpr std::string_view kTag = "VERTEX_SCALED";
-  static constexpr int kAmbient = 4, kTangent = 4;
-  static Vector<double, 4> identity() { return Vector<double, 4>::Zero(); }
-  template <class S>
-  static Vector<S, 4> retract(const Vector<S, 4>& x, const Vector<S, 4>& delta) {
-    return x + delta;
-  }
-  template <class S>
-  static Vector<S, 4> local(const Vector<S, 4>& x, const Vector<S, 4>& y) {
-    return y - x;
-  }
-};
+using test::ScaledPose;
+
 struct ScaledSighting {
   static constexpr std::string_view kTag = "EDGE_SCALED";
   static constexpr int kResidual = 1, kMeasurement = 1;

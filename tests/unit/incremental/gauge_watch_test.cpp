@@ -11,24 +11,12 @@
 #include "cairn/gauge.hpp"
 #include "cairn/lie/point.hpp"
 #include "support/planar_graph.hpp"
+#include "support/scaled_pose.hpp"
 
 namespace cairn::incremental {
 namespace {
 
-/// More than a pose, and no group: a camera with a focal length in the plane.
-struct Camera {
-  static constexpr std::string_view kTag = "VERTEX_CAMERA_2D";
-  static constexpr int kAmbient = 4, kTangent = 4;
-  static Vector<double, 4> identity() { return Vector<double, 4>::Zero(); }
-  template <class S>
-  static Vector<S, 4> retract(const Vector<S, 4>& x, const Vector<S, 4>& delta) {
-    return x + delta;
-  }
-  template <class S>
-  static Vector<S, 4> local(const Vector<S, 4>& x, const Vector<S, 4>& y) {
-    return y - x;
-  }
-};
+using Camera = test::ScaledPose;
 
 struct CameraAtPose {
   static constexpr std::string_view kTag = "EDGE_CAMERA_SE2";

@@ -137,7 +137,7 @@ class Chain {
     models_.linearize(f, graph_, states_);
     if (variables.size() == 2 && !held_[static_cast<std::size_t>(variables[0])])
       system_.connect(variables[0], variables[1]);
-    models_.add_to(system_, f, 1.0, true, held_);
+    models_.add_to(system_, f, 1.0, held_);
   }
 
   std::shared_ptr<const VariableType> type_;

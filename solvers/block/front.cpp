@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "block/front.hpp"
+
+#include <algorithm>
+
+#include "block/schedule.hpp"
+
+namespace cairn::block {
+namespace {
+
+int round_up(int rows) { return (rows + 7) / 8 * 8; }
+
+}  // namespace
+
+int factor_front(const Kernels& kernels, double* panel, std::int64_t stride, int columns, int m) {
+  const int rows = static_cast<int>(stride);
+  if (!is_large(m)) return kernels.factor_panel(panel, stride, 0, columns, rows);
+  int failed = -1;
+  for (int first = 0; first < columns; first += kStripColumns) {
+    const int last = std::min(columns, first + kStripColumns);
+    const int below = std::min(rows, round_up(last));
+    const int column = kernels.factor_panel(panel, stride, first, last, below);
+    if (failed < 0) failed = column;
+    kernels.factor_rows(panel, stride, first, last, below, rows);
+  }
+  return failed;
+}
+
+void append_rows(std::vector<Spread>& spreads, std::size_t begin, std::int32_t source,
+                 std::int32_t target, std::int32_t size) {
+  for (std::int32_t k = 0; k < size; ++k) {
+    const std::int32_t row = target + k, first = row / 8 * 8;
+    if (spreads.size() == begin || spreads.back().target != first)
+      spreads.push_back({source + k, first, 0, 0});
+    Spread& spread = spreads.back();
+    spread.mask = static_cast<std::uint8_t>(spread.mask | 1u << (row - first));
+    spread.packed = static_cast<std::uint8_t>(spread.packed << 1 | 1u);
+  }
+}
+
+std::int64_t room_to_invert(int columns, int m) { return std::int64_t{round_up(columns)} * m; }
+
+void invert_front(const Kernels& kernels, const double* panel, std::int64_t stride, int columns,
+                  int m, const double* U, double* Z, double* room) {
+  const int c8 = round_up(columns);
+  double* V = room;
+  double* T = V + std::int64_t{c8} * columns;
+  std::fill(V, T, 0.0);
+  kernels.invert_pivots(panel, stride, columns, V, 0, c8);
+  if (m > columns) {
+    kernels.transform_rows(panel, stride, columns, V, T, 0, m - columns);
+    kernels.inverse_rows(U, stride, columns, m, T, Z, columns / 8 * 8, static_cast<int>(stride));
+  }
+  kernels.inverse_pivots(V, T, stride, columns, m, Z, 0, c8);
+}
+
+}  // namespace cairn::block

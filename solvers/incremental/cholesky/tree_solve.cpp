@@ -1,0 +1,328 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Substitution, up and down the tree, and what is moved without being solved for.
+#include <algorithm>
+
+#include "tree.hpp"
+
+namespace cairn::incremental {
+namespace {
+
+/// The rows of a node's own variables, one below the other, out of a vector whose rows hold `width`
+/// numbers.
+void gather_own(const System& system, const Node& node, const double* vector, std::int64_t width,
+                double* own) {
+  for (const std::int32_t v : node.own_variables())
+    own = std::copy_n(vector + system.offset(v) * width, system.size(v) * width, own);
+}
+/// And back.
+void scatter_own(const System& system, const Node& node, const double* own, std::int64_t width,
+                 double* vector) {
+  for (const std::int32_t v : node.own_variables()) {
+    std::copy_n(own, system.size(v) * width, vector + system.offset(v) * width);
+    own += system.size(v) * width;
+  }
+}
+
+}  // namespace
+
+/// Solves for a node's own variables, given y (null: zero) and what it owes, and hands the steps of
+/// its front on to its children.
+void Tree::solve_node(Node& node, const double* y, std::vector<double>& steps,
+                      std::vector<std::int32_t>& changed) {
+  double* const front = front_.data();
+  double* const own = front + node.stride;
+  if (y) {
+    gather_own(*system_, node, y, 1, own);
+  } else {
+    std::fill_n(own, node.columns, 0.0);
+  }
+  std::ranges::copy(node.owed, front + node.columns);
+  kernels_->backward(node.panel.data(), node.stride, node.columns, node.m, own, nullptr, 0, nullptr,
+                     front);
+  std::copy_n(own, node.columns, front);
+  const double* next = own;
+  for (const std::int32_t v : node.own_variables()) {
+    const std::int32_t size = system_->size(v);
+    double* step = steps.data() + system_->offset(v);
+    for (std::int32_t k = 0; k < size; ++k) step[k] += next[k];
+    next += size;
+    changed.push_back(v);
+  }
+  std::ranges::fill(node.owed, 0.0);
+  node.owes = false;
+  node.arrived_at = 0;
+  for (const std::int32_t c : node.children) {
+    Node& child = nodes_[c];
+    child.arrived.resize(child.owed.size());
+    double *owed = child.owed.data(), *arrived = child.arrived.data();
+    const auto separator = child.separator();
+    for (std::size_t k = 0; k < separator.size(); ++k) {
+      const std::int32_t size = system_->size(separator[k]);
+      const double* step = front + child.rows_above[k];
+      for (std::int32_t i = 0; i < size; ++i) {
+        *owed++ += step[i];
+        *arrived++ = step[i];
+      }
+    }
+    child.owes = true;
+    child.arrived_at = pass_;
+  }
+}
+
+// --- moving as a whole ---
+
+/// Takes the motion of the separator as a whole out of what a node owes, if little is then left.
+bool Tree::move_as_a_whole(Node& node, double tolerance) {
+  const auto separator = node.separator();
+  const LieGroup& group = *states_->type(separator.front()).lie_group();
+  const std::int32_t size = system_->size(separator.front()), square = size * size;
+  const std::int32_t ambient = states_->ambient(separator.front());
+  rigid_.resize(node.owed.size());
+  matrix_.resize(static_cast<std::size_t>(square));
+  twist_.resize(static_cast<std::size_t>(std::int64_t{size} + 2 * ambient));
+  double* const twist = twist_.data();
+  double* const element = twist + size;
+  const auto multiply = [&](const double* vector, double* out) {
+    for (std::int32_t r = 0; r < size; ++r) {
+      double sum = 0.0;
+      for (std::int32_t c = 0; c < size; ++c) sum += matrix_[c * size + r] * vector[c];
+      out[r] = sum;
+    }
+  };
+  // The motion is that of the separator's first variable: ξ = Ad(x_0) δ_0 …
+  group.adjoint(states_->x(separator.front()), matrix_.data());
+  multiply(node.owed.data(), twist);
+  // … and would be δ_i = Ad(x_i⁻¹) ξ of the others.
+  double left = 0.0;
+  const double* owed = node.owed.data();
+  double* rigid = rigid_.data();
+  for (const std::int32_t v : separator) {
+    group.inverse(states_->x(v), element);
+    group.adjoint(element, matrix_.data());
+    multiply(twist, rigid);
+    const double* weight = system_->diagonal(v);
+    for (std::int32_t k = 0; k < size; ++k) {
+      const double rest = owed[k] - rigid[k];
+      left += weight[k * (size + 1)] * rest * rest;
+    }
+    if (left > tolerance) return false;
+    owed += size;
+    rigid += size;
+  }
+  // x exp(rigid + rest) = x exp(rigid) exp(D rest): what is left is counted from where the motion
+  // has brought x.
+  double *rest = node.owed.data(), *arrived = node.arrived.data();
+  rigid = rigid_.data();
+  for (const std::int32_t v : separator) {
+    states_->type(v).retract_jacobian(states_->x(v), rigid, matrix_.data());
+    for (std::int32_t k = 0; k < size; ++k) arrived[k] -= rest[k], rest[k] -= rigid[k];
+    multiply(rest, rigid);
+    for (std::int32_t k = 0; k < size; ++k) rest[k] = rigid[k], arrived[k] += rest[k];
+    rest += size;
+    arrived += size;
+    rigid += size;
+  }
+  group.exp(twist, element);
+  add_lead(node, element);
+  return true;
+}
+
+/// All of the subtree is to be moved by g, after what it is to be moved by already.
+void Tree::add_lead(Node& node, const double* g) {
+  const std::int32_t v = node.variables.front(), ambient = states_->ambient(v);
+  states_->log_other(static_cast<std::int32_t>(&node - nodes_.data()), node.lead);
+  if (node.lead.empty()) {
+    node.lead.assign(g, g + ambient);
+  } else {
+    states_->type(v).lie_group()->compose(g, node.lead.data(), node.lead.data());
+  }
+}
+
+/// Moves a node's own variables by what its subtree is to be moved by, and leaves the rest of it to
+/// its children.
+void Tree::hand_down(Node& node) {
+  if (node.lead.empty()) return;
+  for (const std::int32_t v : node.own_variables()) states_->lead(v, node.lead.data());
+  for (const std::int32_t c : node.children) add_lead(nodes_[c], node.lead.data());
+  states_->log_other(static_cast<std::int32_t>(&node - nodes_.data()), node.lead);
+  node.lead.clear();
+}
+
+void Tree::settle(std::int32_t variable) {
+  stack_.clear();
+  bool any = false;
+  for (std::int32_t n = node_of(variable); n >= 0; n = nodes_[n].parent) {
+    stack_.push_back(n);
+    any = any || !nodes_[n].lead.empty();
+  }
+  if (!any) return;
+  for (std::size_t k = stack_.size(); k-- > 0;) hand_down(nodes_[stack_[k]]);
+}
+
+void Tree::settle_all() {
+  top_down(stack_);
+  for (const std::int32_t n : stack_) hand_down(nodes_[n]);
+}
+
+const Node* Tree::end_of_pass(std::int32_t variable) const {
+  for (std::int32_t n = node_of(variable); n >= 0; n = nodes_[n].parent) {
+    if (nodes_[n].arrived_at == pass_) return &nodes_[n];
+  }
+  return nullptr;
+}
+
+const double* Tree::arrived(const Node& node, std::int32_t variable) const {
+  const double* at = node.arrived.data();
+  for (const std::int32_t v : node.separator()) {
+    if (v == variable) return at;
+    at += system_->size(v);
+  }
+  return nullptr;
+}
+
+/// What a node owes, squared and weighted with the diagonal of H.
+double Tree::owed_square(const Node& node) const {
+  double sum = 0.0;
+  const double* owed = node.owed.data();
+  for (const std::int32_t v : node.separator()) {
+    const std::int32_t size = system_->size(v);
+    const double* weight = system_->diagonal(v);
+    for (std::int32_t k = 0; k < size; ++k) sum += weight[k * (size + 1)] * owed[k] * owed[k];
+    owed += size;
+  }
+  return sum;
+}
+
+/// g ← L⁻¹ g along `path_`; returns the square of its norm.
+double Tree::forward(std::vector<double>& g) {
+  double square = 0.0;
+  double* const own = front_.data();
+  for (const std::int32_t n : path_) {
+    const Node& node = nodes_[n];
+    double* const front = own + node.stride;
+    gather_own(*system_, node, g.data(), 1, own);
+    kernels_->forward(node.panel.data(), node.stride, node.columns, own, node.runs.data(),
+                      static_cast<int>(node.runs.size()), g.data(), front);
+    for (std::int32_t c = 0; c < node.columns; ++c) square += own[c] * own[c];
+    scatter_own(*system_, node, own, 1, g.data());
+  }
+  return square;
+}
+
+double Tree::decrement(std::span<const std::int32_t> sources, std::vector<double>& g) {
+  collect_paths(sources);
+  const auto for_each_value = [&](auto visit) {
+    std::size_t k = 0;
+    for (const std::int32_t n : path_) {
+      for (const std::int32_t v : nodes_[n].own_variables()) {
+        double* value = g.data() + system_->offset(v);
+        for (std::int32_t i = 0; i < system_->size(v); ++i) visit(value[i], k++);
+      }
+    }
+  };
+  kept_.resize(g.size());
+  for_each_value([&](double value, std::size_t k) { kept_[k] = value; });
+  const double square = forward(g);
+  for_each_value([&](double& value, std::size_t k) { value = kept_[k]; });
+  return square;
+}
+
+double Tree::solve(std::span<const std::int32_t> sources, double tolerance, std::vector<double>& g,
+                   std::vector<double>& steps, std::vector<std::int32_t>& changed) {
+  collect_paths(sources);
+  const double square = forward(g);
+  ++pass_;
+  for (const std::int32_t n : path_) on_path_[n] = 1;
+  stack_.clear();
+  for (const std::int32_t n : path_) {
+    if (nodes_[n].parent < 0) stack_.push_back(n);
+  }
+  while (!stack_.empty()) {
+    const std::int32_t n = stack_.back();
+    stack_.pop_back();
+    Node& node = nodes_[n];
+    const double enough = tolerance * static_cast<double>(node.separator().size());
+    if (!on_path_[n] &&
+        (owed_square(node) <= enough || (node.movable && move_as_a_whole(node, enough)))) {
+      continue;
+    }
+    hand_down(node);
+    solve_node(node, on_path_[n] ? g.data() : nullptr, steps, changed);
+    if (on_path_[n]) {
+      for (const std::int32_t v : node.own_variables())
+        std::fill_n(g.data() + system_->offset(v), system_->size(v), 0.0);
+    }
+    on_path_[n] = 0;
+    stack_.insert(stack_.end(), node.children.begin(), node.children.end());
+  }
+  return square;
+}
+
+void Tree::follow(std::int32_t variable, std::vector<double>& steps,
+                  std::vector<std::int32_t>& changed) {
+  stack_.clear();
+  bool any = false;
+  for (std::int32_t n = node_of(variable); n >= 0; n = nodes_[n].parent) {
+    stack_.push_back(n);
+    any = any || nodes_[n].owes;
+  }
+  settle(variable);
+  if (!any) return;
+  ++pass_;
+  stack_.clear();
+  for (std::int32_t n = node_of(variable); n >= 0; n = nodes_[n].parent) stack_.push_back(n);
+  for (std::size_t k = stack_.size(); k-- > 0;) {
+    if (nodes_[stack_[k]].owes) solve_node(nodes_[stack_[k]], nullptr, steps, changed);
+  }
+}
+
+// --- eight right-hand sides ---
+
+/// The nodes on the paths from these variables to the roots, children first.
+void Tree::collect_paths(std::span<const std::int32_t> sources) {
+  path_.clear();
+  on_path_.resize(nodes_.size(), 0);
+  for (const std::int32_t v : sources) {
+    for (std::int32_t n = node_of(v); n >= 0 && !on_path_[n]; n = nodes_[n].parent) {
+      on_path_[n] = 1;
+      path_.push_back(n);
+    }
+  }
+  for (const std::int32_t n : path_) on_path_[n] = 0;
+  std::ranges::sort(path_, {}, [&](std::int32_t n) { return nodes_[n].sequence; });
+}
+
+void Tree::forward_many(std::span<const std::int32_t> sources, AlignedVector& X) {
+  collect_paths(sources);
+  for (const std::int32_t n : path_) {
+    const Node& node = nodes_[n];
+    double* own = front_.data();
+    double* front = own + std::int64_t{node.columns} * 8;
+    gather_own(*system_, node, X.data(), 8, own);
+    kernels_->forward_many(node.panel.data(), node.stride, node.columns, own, node.runs.data(),
+                           static_cast<int>(node.runs.size()), X.data(), front);
+    scatter_own(*system_, node, own, 8, X.data());
+  }
+}
+
+void Tree::backward_many(const Node& node, AlignedVector& X) {
+  double* own = front_.data();
+  double* front = own + std::int64_t{node.columns} * 8;
+  gather_own(*system_, node, X.data(), 8, own);
+  kernels_->backward_many(node.panel.data(), node.stride, node.columns, node.m, own,
+                          node.runs.data(), static_cast<int>(node.runs.size()), X.data(), front);
+  scatter_own(*system_, node, own, 8, X.data());
+}
+
+void Tree::solve_many(std::span<const std::int32_t> sources, AlignedVector& X) {
+  forward_many(sources, X);
+  top_down(stack_);
+  for (const std::int32_t n : stack_) backward_many(nodes_[n], X);
+}
+
+void Tree::solve_many_above(std::span<const std::int32_t> sources, AlignedVector& X) {
+  forward_many(sources, X);
+  for (std::size_t k = path_.size(); k-- > 0;) backward_many(nodes_[path_[k]], X);
+}
+
+}  // namespace cairn::incremental
