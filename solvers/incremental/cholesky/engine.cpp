@@ -7,6 +7,8 @@
 #include <numeric>
 #include <utility>
 
+#include <Eigen/Core>
+
 #include "cairn/error.hpp"
 
 namespace cairn::incremental {
@@ -37,14 +39,15 @@ constexpr double kRounding = 1e-18;
 // How the accuracy that is asked for, a fraction of chi2, is shared out. Found by trying on the
 // published graphs: what is left at the end stays well within it.
 constexpr double kEnough = 0.3;      ///< of it all: by how much more solving could lower chi2
-constexpr double kStepShare = 0.2;   ///< of a factor's: steps that are not followed down the tree
-constexpr double kMoveShare = 10.0;  ///< of a factor's: model moved so far: evaluated again
-constexpr double kMany = 200.0;      ///< factors
-constexpr double kMismatch = 0.1;    ///< Jacobians off by more than this times it are renewed
+constexpr double kStepShare = 0.05;  ///< of a factor's: steps that are not followed down the tree
+constexpr double kMoveShare = 0.01;  ///< of a factor's: models that moved less have not moved
+/// So much may be left of the steps since the factors were evaluated, before they are again.
+constexpr double kLook = 0.1;
+/// What is left is guessed from what was: a share of what the steps have gained, at least …
+constexpr double kLeastShare = 1e-3;
+constexpr double kForget = 0.8;  ///< … and not less than so much of the guess before
 /// While a solution leaves less than this fraction of what it has gained, H does as it is.
-constexpr double kFast = 0.5;
-/// Where it leaves so many times as much, after two attempts, everything is renewed.
-constexpr double kHopeless = 5.0;
+constexpr double kFast = 0.2;
 
 const block::Kernels* kernels_named(const std::string& name) {
   const block::Kernels* kernels = block::choose_kernels(name.c_str());
@@ -92,7 +95,8 @@ Engine::Engine(const Engine& other)
       dead_(other.dead_),
       live_factors_(other.live_factors_),
       cost_(other.cost_),
-      drift_(other.drift_),
+      gained_(other.gained_),
+      left_share_(other.left_share_),
       decrease_(other.decrease_),
       ids_(other.ids_),
       place_of_id_(other.place_of_id_),
@@ -134,7 +138,8 @@ void Engine::load(Graph graph, std::vector<FactorId> ids) {
   checked_at_.clear();
   broken_ = gauge_is_old_ = false;
   dead_ = live_factors_ = 0;
-  cost_ = drift_ = decrease_ = 0.0;
+  cost_ = decrease_ = gained_ = 0.0;
+  left_share_ = 1.0;
   touched_at_.clear();
   under_loss_ = under_loss(graph_);
   const int variables = graph_.variable_count(), factors = graph_.factor_count();
@@ -167,7 +172,7 @@ void Engine::added_factor() {
     place_of_id_.push_back(f);
   }
   const FactorType& type = *graph_.factor_pools()[graph_.factor(f).pool].type;
-  models_.add(graph_, f, loss_applies(f));
+  models_.add(graph_, states_, f, loss_applies(f));
   live_factor_.push_back(1);
   checked_at_.push_back(-1);
   const auto variables = graph_.factor_variables(f);
@@ -387,7 +392,7 @@ void Engine::solve(double max_seconds, UpdateReport& report) {
   bool again = !touched_.empty() || !sources_.empty();
   for (int round = 0; again; ++round) {
     const Clock::time_point round_begin = Clock::now();
-    const double before = cost_;
+    const double before = cost();
     if (!bring_factor_up_to_date(report)) {
       step_back();
       return rescue(report, 1e-6);
@@ -395,7 +400,8 @@ void Engine::solve(double max_seconds, UpdateReport& report) {
     if (round == 0 && negligible()) break;
     take_step(share(kStepShare), report);
     ++report.iterations;
-    check(report);
+    check(false, report);
+    if (gained_ > 0.0) return;  // nobody has looked
     // Negated, so that what is not a number is bad too.
     if (!(cost_ <= 2.0 * before + kRounding * live_factors_)) {
       step_back();
@@ -410,13 +416,14 @@ void Engine::solve(double max_seconds, UpdateReport& report) {
 
 /// Whether what has not been solved for yet would lower chi2 by nothing that matters.
 bool Engine::negligible() {
+  set_right_hand_side();
   const double gain = tree_.decrement(sources_, system_.g());
-  return gain <= std::min(settings_.significance, kEnough * settings_.accuracy * cost_);
+  return gain <= std::min(settings_.significance, kEnough * settings_.accuracy * cost());
 }
 
 /// A share of the accuracy that is asked for, of the mean cost of a factor.
 double Engine::share(double part) const {
-  return part * settings_.accuracy * std::max(cost_, 0.0) / std::max(live_factors_, 1);
+  return part * settings_.accuracy * cost() / std::max(live_factors_, 1);
 }
 
 /// The estimate from before this update.
@@ -441,7 +448,7 @@ void Engine::rescue(UpdateReport& report, double tolerance) {
   report.ok = !broken_;
   if (broken_) return;
   take_step(0.0, report);
-  check(report);
+  check(true, report);
 }
 
 void Engine::add_source(std::int32_t v) {
@@ -477,6 +484,13 @@ bool Engine::bring_factor_up_to_date(UpdateReport& report) {
   return tree_.factorize() < 0;
 }
 
+void Engine::set_right_hand_side() {
+  for (const std::int32_t v : sources_) {
+    tree_.settle(v);
+    models_.right_hand_side(system_, states_, v);
+  }
+}
+
 void Engine::touch_all() {
   for (int v = 0; v < states_.size(); ++v) {
     if (!live_variable_[v] || held_[v]) continue;
@@ -487,61 +501,62 @@ void Engine::touch_all() {
 
 void Engine::take_step(double tolerance, UpdateReport& report) {
   const Timed timed(report.seconds.solve);
+  set_right_hand_side();
+  for (const std::int32_t v : sources_) {
+    for (std::int32_t i = 0; i < system_.size(v); ++i) {
+      system_.change(v)[i] += system_.g(v)[i];
+      system_.pending(v)[i] = 0.0;
+    }
+    system_.summed(v) = 0;
+  }
   decrease_ = tree_.solve(sources_, tolerance, system_.g(), steps_, changed_);
+  gained_ += decrease_;
   for (const std::int32_t v : sources_) is_source_[v] = 0;
   sources_.clear();
 }
 
-/// Moves to the solution, and evaluates the factors whose variables have moved much.
-void Engine::check(UpdateReport& report) {
+/// Moves to the solution, and if what is known of the factors may be wrong by too much then,
+/// evaluates all that have moved: few of them alone would say nothing of the rest.
+void Engine::check(bool anyway, UpdateReport& report) {
   const Timed timed(report.seconds.check);
-  // Of many factors few are as wrong as they may be; of a handful, all.
-  move_tolerance_ = share(kMoveShare * live_factors_ / (live_factors_ + kMany));
-  drift_ = 0.0;
+  move_tolerance_ = share(kMoveShare);
   apply_steps();
+  if (!anyway && left_share_ * gained_ <= kLook * settings_.accuracy * cost()) return;
+  looked_at_ = std::exchange(gained_, 0.0);
+  looked_factors_ = static_cast<int>(moving_.size());
   for (const std::int32_t f : moving_) {
     if (!live_factor_[f]) continue;
     for (const std::int32_t v : models_.variables(f)) tree_.settle(v);
     cost_ -= models_.cost(f);
-    drift_ += models_.correct(f, graph_, states_, system_, held_);
+    models_.correct(f, graph_, states_, system_, held_);
     cost_ += models_.cost(f);
     for (const std::int32_t v : models_.variables(f)) add_source(v);
   }
   moving_.clear();
 }
 
-/// Whether to solve once more: where the true gradients, which the last step has left, would lower
-/// chi2 noticeably. The factors that have changed much are relinearised then; and all of them, if
-/// that has not helped.
+/// Whether to solve once more: where the true gradients would lower chi2 noticeably. H does as it
+/// is if little has been left; else all of it is renewed.
 bool Engine::improve(bool enough_time, UpdateReport& report) {
   const double allowed = settings_.accuracy * cost_ + kRounding * live_factors_;
   report.owed = 0;
-  if (drift_ <= 1e-3 * allowed) return false;
+  left_share_ = std::max(kForget * left_share_, kLeastShare);
   double left = 0.0;
   {
     const Timed timed(report.seconds.solve);
+    set_right_hand_side();
     left = tree_.decrement(sources_, system_.g());
   }
+  if (looked_at_ > 0.0) left_share_ = std::clamp(left / looked_at_, left_share_, 1.0);
   if (left <= kEnough * allowed) return false;
-  const double mismatch = std::min(kMismatch * settings_.accuracy, 1e-2);
-  const auto stale = [&](int f) { return live_factor_[f] && models_.mismatch(f) > mismatch; };
   if (!enough_time) {
-    for (int f = 0; f < models_.size(); ++f) report.owed += stale(f);
-    report.owed = std::max(report.owed, 1);
+    report.owed = looked_factors_;
     return false;
   }
-  if (left < kFast * decrease_) return true;
+  if (left < kFast * looked_at_) return true;
   const Timed timed(report.seconds.linearize);
-  if (report.iterations >= 3 && left > kHopeless * decrease_) {
-    relinearize_all();
-    report.relinearized_factors += live_factors_;
-    return true;
-  }
-  for (int f = 0; f < models_.size(); ++f) {
-    if (!stale(f)) continue;
-    relinearize(f);
-    ++report.relinearized_factors;
-  }
+  relinearize_all();
+  report.relinearized_factors += live_factors_;
   return true;
 }
 
@@ -553,7 +568,8 @@ void Engine::relinearize_all() {
   for (const std::int32_t v : sources_) is_source_[v] = 0;
   sources_.clear();
   system_.clear_values();
-  cost_ = drift_ = 0.0;
+  cost_ = 0.0;
+  for (int v = 0; v < states_.size(); ++v) states_.put_frame_here(v);
   for (int f = 0; f < models_.size(); ++f) {
     if (!live_factor_[f]) continue;
     models_.linearize(f, graph_, states_);
@@ -605,7 +621,7 @@ void Engine::solve_fully(UpdateReport& report) {
     if (ok) {
       take_step(0.0, report);
       ++report.iterations;
-      check(report);
+      check(true, report);
     }
     if (!ok || !(cost_ <= 1.01 * before + kRounding * live_factors_)) {
       step_back();
@@ -640,10 +656,25 @@ Graph Engine::snapshot() {
   return clean_graph();
 }
 
+/// Σ_ab in the variables' frames becomes T_a Σ_ab T_bᵀ: as seen from the poses.
+void Engine::as_seen_from(int a, int b, double* block, std::int64_t stride) {
+  const std::int32_t rows = system_.size(a), columns = system_.size(b);
+  using Block = Eigen::Map<Eigen::MatrixXd, 0, Eigen::OuterStride<>>;
+  Block sigma(block, rows, columns, Eigen::OuterStride<>(stride));
+  const auto turn = [&](int v, std::int32_t size) {
+    return Eigen::Map<const Eigen::MatrixXd>(states_.frame_to_body(v), size, size);
+  };
+  tree_.settle(a);
+  tree_.settle(b);
+  if (states_.away(a)) sigma = (turn(a, rows) * sigma).eval();
+  if (states_.away(b)) sigma = (sigma * turn(b, columns).transpose()).eval();
+}
+
 bool Engine::covariance(int a, int b, double* block) {
   const std::int32_t rows = system_.size(a), columns = system_.size(b);
   if (const double* kept = covariances_.kept(a, b); kept && !broken_) {
     std::copy_n(kept, rows * columns, block);
+    as_seen_from(a, b, block, rows);
     return true;
   }
   const std::int32_t row = a;
@@ -677,6 +708,11 @@ bool Engine::covariance_column(std::span<const std::int32_t> rows, int b, double
           *out++ = held_[v] ? 0.0 : X[static_cast<std::size_t>(system_.offset(v) + r) * 8 + k];
       }
     }
+  }
+  std::int64_t row = 0;
+  for (const std::int32_t v : rows) {
+    if (!held_[v]) as_seen_from(v, b, column + row, height);
+    row += system_.size(v);
   }
   return true;
 }

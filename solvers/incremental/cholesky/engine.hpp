@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <memory>
 #include <mutex>
@@ -111,7 +112,8 @@ class Engine {
   /// Which covariances are to be kept up to date; by `update_covariances`, after solving.
   Covariances& covariances() { return covariances_; }
   MarginalsBy update_covariances() { return covariances_.update(system_, tree_, held_); }
-  /// Σ_ab, size_a × size_b, column-major: a kept block or by solving. False if H is singular.
+  /// Σ_ab of steps as seen from the poses (x ⊕ δ), size_a × size_b, column-major: a kept block or by
+  /// solving. False if H is singular.
   bool covariance(int a, int b, double* block);
   /// The rows of Σ_vb for all of `rows`, one below the other, by solving.
   bool covariance_column(std::span<const std::int32_t> rows, int b, double* column);
@@ -119,6 +121,7 @@ class Engine {
   const Tree& tree() const { return tree_; }
   const System& system() const { return system_; }
   const Models& models() const { return models_; }
+  const States& states() const { return states_; }
 
  private:
   void load(Graph graph, std::vector<FactorId> ids);
@@ -138,13 +141,17 @@ class Engine {
   void count_bonds(int f, std::int32_t sign);
   bool bring_factor_up_to_date(UpdateReport& report);
   bool negligible();
+  /// Σ ρ(‖r‖²), as far as it is known.
+  double cost() const { return std::max(cost_ - gained_, 0.0); }
   double share(double part) const;
   void touch_all();
+  void set_right_hand_side();
   void take_step(double tolerance, UpdateReport& report);
-  void check(UpdateReport& report);
+  void check(bool anyway, UpdateReport& report);
   bool improve(bool enough_time, UpdateReport& report);
   void step_back();
   void rescue(UpdateReport& report, double tolerance);
+  void as_seen_from(int a, int b, double* block, std::int64_t stride);
   void add_source(std::int32_t v);
   Graph clean_graph();
   std::vector<FactorId> live_ids() const;
@@ -182,7 +189,10 @@ class Engine {
   int dead_ = 0;
   int live_factors_ = 0;
   double cost_ = 0.0;                      // sum over factors
-  double drift_ = 0.0;                     // in the right-hand side, squared and weighted
+  double gained_ = 0.0;     // of the cost, by steps since factors were evaluated
+  double looked_at_ = 0.0;  // that of the steps before the last evaluation
+  int looked_factors_ = 0;   // evaluated then
+  double left_share_ = 1.0;  // how much of it was left to gain
   double decrease_ = 0.0;                  // of the last solution: gᵀH⁻¹g
   std::vector<FactorId> ids_;              // by factor
   std::vector<std::int32_t> place_of_id_;  // by FactorId: factor, -1 if it has been removed

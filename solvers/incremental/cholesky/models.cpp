@@ -67,7 +67,7 @@ void add_transposed_product(int rows, const double* A, int a, const double* B, i
 
 }  // namespace
 
-void Models::add(const Graph& graph, int position, bool loss_applies) {
+void Models::add(const Graph& graph, const States& states, int position, bool loss_applies) {
   const FactorRef ref = graph.factor(position);
   const FactorType& type = *graph.factor_pools()[ref.pool].type;
   Record record{.place = std::ssize(values_),
@@ -78,13 +78,16 @@ void Models::add(const Graph& graph, int position, bool loss_applies) {
                 .rows = static_cast<std::int16_t>(type.residual_size()),
                 .scalars = 0,
                 .loss_applies = loss_applies,
-                .relative = type.is_relative()};
+                .relative = type.is_relative(),
+                .rigid = type.is_relative()};
   for (int k = 0; k < record.arity; ++k) {
     tangents_.push_back(static_cast<std::int16_t>(type.tangent_size(k)));
     record.scalars = static_cast<std::int16_t>(record.scalars + type.tangent_size(k));
   }
   const auto factor_variables = graph.factor_variables(position);
   variables_.insert(variables_.end(), factor_variables.begin(), factor_variables.end());
+  for (const std::int32_t v : factor_variables)
+    record.rigid = record.rigid && states.type(v).lie_group() != nullptr;
   values_.resize(values_.size() +
                  static_cast<std::size_t>(record.rows) *
                      static_cast<std::size_t>(record.scalars + 1) +
@@ -133,12 +136,36 @@ double Models::evaluate(const Record& record, const Graph& graph, const States& 
   return rho;
 }
 
+/// J_k ← J_k T_k: from steps as seen from the poses to steps in the variables' frames.
+void Models::into_frames(const Record& record, const States& states, double* J) const {
+  const int rows = record.rows;
+  for (int k = 0; k < record.arity; ++k) {
+    const std::int32_t v = variables_[record.variables + k];
+    const int size = tangents_[record.variables + k];
+    if (states.away(v)) {
+      const double* T = states.frame_to_body(v);
+      turned_.assign(static_cast<std::size_t>(rows) * static_cast<std::size_t>(size), 0.0);
+      for (int c = 0; c < size; ++c)
+        add_product(rows, J, size, T + c * size, turned_.data() + c * rows);
+      std::ranges::copy(turned_, J);
+    }
+    J += rows * size;
+  }
+}
+
 void Models::linearize(int f, const Graph& graph, const States& states) {
   Record& record = records_[f];
+  const int rows = record.rows;
   double* const J = values_.data() + record.place;
-  record.cost = evaluate(record, graph, states, J + record.rows * record.scalars, J);
-  std::fill_n(J + record.rows * (record.scalars + 1), record.scalars, 0.0);
+  double* const r = J + rows * record.scalars;
+  double* const gradient = r + rows;
+  record.cost = evaluate(record, graph, states, r, J);
+  std::fill_n(gradient, record.scalars, 0.0);
+  add_transposed_product(rows, J, record.scalars, r, 1, 1.0, gradient);
+  std::fill_n(r, rows, 0.0);
+  into_frames(record, states, J);
   record.mismatch = record.travel = 0.0;
+  record.moving = false;
 }
 
 double Models::cost_now(int f, const Graph& graph, const States& states) const {
@@ -164,20 +191,24 @@ void Models::add_to(System& system, int f, double sign, std::span<const std::uin
   const int rows = record.rows;
   const std::int32_t* v = variables_.data() + record.variables;
   const double* J = values_.data() + record.place;
-  const double* const r = J + rows * record.scalars;
-  const double* beyond = r + rows;
+  const double* const change = J + rows * record.scalars;
+  const double* gradient = change + rows;
   for (int ka = 0; ka < record.arity; ++ka) {
     const std::int32_t a = v[ka], size = system.size(a);
     if (!held[a]) {
       add_transposed_product(rows, J, size, J, size, sign, system.diagonal(a));
-      add_transposed_product(rows, J, size, r, 1, -sign, system.g(a));
-      for (int i = 0; i < size; ++i) system.g(a)[i] -= sign * beyond[i];
+      add_transposed_product(rows, J, size, change, 1, sign, system.change(a));
+      for (int i = 0; i < size; ++i) {
+        system.gradient(a)[i] += sign * gradient[i];
+        system.pending(a)[i] += gradient[i];
+      }
+      if (sign < 0.0) system.summed(a) = 1;
       for (int kb = ka + 1; kb < record.arity; ++kb) {
         if (!held[v[kb]]) add_block(system, record, ka, kb, sign);
       }
     }
     J += rows * size;
-    beyond += size;
+    gradient += size;
   }
 }
 
@@ -246,52 +277,82 @@ bool Models::move(int f, const double* const* steps, double tolerance) {
     }
     for (int i = 0; i < rows; ++i) r[i] += change[i], square += change[i] * change[i];
   }
-  // What moves the variables of a relative factor alike is linear but for the mismatch.
-  record.travel += record.relative ? std::sqrt(square) + record.mismatch * apart : apart;
-  return record.travel * record.travel > tolerance;
+  // What moves all its variables as a whole does not count, where J says so too.
+  record.travel += record.rigid      ? std::sqrt(square)
+                   : record.relative ? std::sqrt(square) + record.mismatch * apart
+                                     : apart;
+  if (record.moving || record.travel * record.travel <= tolerance) return false;
+  record.moving = true;
+  return true;
 }
 
-double Models::correct(int f, const Graph& graph, const States& states, System& system,
+void Models::correct(int f, const Graph& graph, const States& states, System& system,
                        std::span<const std::uint8_t> held) {
   Record& record = records_[f];
   const int rows = record.rows, doubles = rows * record.scalars;
-  const std::int64_t room = std::int64_t{doubles} + rows + record.scalars;
-  scratch_.resize(static_cast<std::size_t>(room));
+  scratch_.resize(static_cast<std::size_t>(doubles + rows + record.scalars));
   double* const J_now = scratch_.data();
   double* const r_now = J_now + doubles;
-  double* const apart = r_now + rows;  // J(x)ᵀ r(x) − Jᵀ r(x)
+  double* const beyond = r_now + rows;  // J(x)ᵀ r(x) less γ when last evaluated
   record.cost = evaluate(record, graph, states, r_now, J_now);
   const double* const J = values_.data() + record.place;
-  double* const r = values_.data() + record.place + doubles;
-  double* const beyond = r + rows;
-  double difference = 0.0, norm = 0.0;
+  double* const change = values_.data() + record.place + doubles;
+  double* const gradient = change + rows;
+  std::fill_n(beyond, record.scalars, 0.0);
+  add_transposed_product(rows, J_now, record.scalars, r_now, 1, 1.0, beyond);
   for (int c = 0; c < record.scalars; ++c) {
-    double sum = 0.0;
-    for (int i = 0; i < rows; ++i) {
-      const double old = J[c * rows + i], change = J_now[c * rows + i] - old;
-      difference += change * change;
-      norm += old * old;
-      sum += change * r_now[i];
-    }
-    apart[c] = sum;
+    const double now = beyond[c];
+    beyond[c] -= gradient[c];
+    gradient[c] = now;
   }
-  record.mismatch = norm > 0.0 ? std::sqrt(difference / norm) : difference > 0.0;
+  if (!record.rigid) {
+    into_frames(record, states, J_now);
+    double difference = 0.0, norm = 0.0;
+    for (int k = 0; k < doubles; ++k) {
+      difference += (J_now[k] - J[k]) * (J_now[k] - J[k]);
+      norm += J[k] * J[k];
+    }
+    record.mismatch = norm > 0.0 ? std::sqrt(difference / norm) : difference > 0.0;
+  }
   record.travel = 0.0;
-  double square = 0.0;
-  int c = 0;
+  record.moving = false;
+  int first = 0;
   for (int k = 0; k < record.arity; ++k) {
     const std::int32_t v = variables_[record.variables + k], size = system.size(v);
-    for (int i = 0; i < size; ++i, ++c) {
-      double drift = apart[c] - beyond[c];
-      for (int row = 0; row < rows; ++row) drift += J[c * rows + row] * (r_now[row] - r[row]);
-      beyond[c] = apart[c];
-      if (held[v]) continue;
-      system.g(v)[i] -= drift;
-      square += drift * drift / system.diagonal(v)[i * (size + 1)];
+    if (!held[v]) {
+      add_transposed_product(rows, J + first * rows, size, change, 1, -1.0, system.change(v));
+      for (int i = 0; i < size; ++i) system.gradient(v)[i] += beyond[first + i];
+      system.summed(v) = 1;
     }
+    first += size;
   }
-  for (int row = 0; row < rows; ++row) r[row] = r_now[row];
-  return square;
+  std::fill_n(change, rows, 0.0);
+}
+
+/// out += T_vᵀ γ: a gradient as seen from the variable, in its frame.
+void Models::add_in_frame(const States& states, std::int32_t v, int size, const double* gradient,
+                          double* out) const {
+  if (!states.away(v)) {
+    for (int i = 0; i < size; ++i) out[i] += gradient[i];
+    return;
+  }
+  const double* T = states.frame_to_body(v);
+  for (int i = 0; i < size; ++i) {
+    for (int k = 0; k < size; ++k) out[i] += T[i * size + k] * gradient[k];
+  }
+}
+
+void Models::right_hand_side(System& system, const States& states, std::int32_t v) const {
+  const std::int32_t size = system.size(v);
+  double* const g = system.g(v);
+  if (system.summed(v)) {
+    std::copy_n(system.change(v), size, g);
+    add_in_frame(states, v, size, system.gradient(v), g);
+  } else {
+    std::fill_n(g, size, 0.0);
+    add_in_frame(states, v, size, system.pending(v), g);
+  }
+  for (std::int32_t i = 0; i < size; ++i) g[i] = -g[i];
 }
 
 }  // namespace cairn::incremental

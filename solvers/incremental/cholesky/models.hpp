@@ -15,22 +15,29 @@ namespace cairn::incremental {
 /// What the linear system knows of every factor: a whitened Jacobian J, that of some earlier
 /// estimate, and its gradient Jᵀr at the current one.
 ///
-/// Steps are always counted from the current estimate. A step δ moves the estimate, x ← x ⊕ δ, and
-/// what is known of the residual and of the gradient by it, r̂ ← r̂ + J δ, γ ← γ + JᵀJ δ. What that
-/// lacks is found by evaluating the factor again at x:
+/// Steps are always counted from the current estimate, in the frames of `States`. A step δ moves
+/// the estimate and what is known of the residual and of the gradient by it, r̂ ← r̂ + J δ,
+/// γ ← γ + JᵀJ δ. What that lacks is found by evaluating the factor again at x:
 ///
 ///  - the *drift* J(x)ᵀr(x) − γ goes into the right-hand side: the estimate converges to where the
 ///    true gradient is zero, whatever J is;
 ///  - the *mismatch* μ = ‖J(x) − J‖ / ‖J‖ says how fast it does. J itself, and with it H and its
 ///    factor, must be computed anew only if it is large.
 ///
-/// For a relative measurement between poses of a Lie group, J depends on nothing but where one pose
-/// is as seen from the other; that hardly changes, even if a loop closure moves both by metres. So
-/// H and L last for a long time, while the estimate is as exact as the residuals are.
+/// For a relative measurement between poses of a Lie group, J δ is zero for every motion of both as
+/// a whole, however old J is, since frames stay where they are. What is left of an old J is wrong
+/// by μ times what the step changes in the residual, and that, over all factors, is what the step
+/// gains in chi2: after it no more than about μ² of the gain is left. So H and L last for a long
+/// time, even if a loop closure moves everything by metres.
+///
+/// The gradient is kept as seen from the pose (in the coordinates of x ⊕ δ), where a motion as a
+/// whole does not change it: a factor that is evaluated again agrees with its neighbours that are
+/// not.
 class Models {
  public:
-  /// The next factor, as it stands in the graph at that position.
-  void add(const Graph& graph, int position, bool loss_applies);
+  /// The next factor, as it stands in the graph at that position. Its variables are known to
+  /// `states`.
+  void add(const Graph& graph, const States& states, int position, bool loss_applies);
   void clear() { *this = Models(); }
   int size() const { return static_cast<int>(records_.size()); }
   std::span<const std::int32_t> variables(int f) const {
@@ -48,13 +55,14 @@ class Models {
   void add_row(System& system, int f, std::int32_t variable,
                std::span<const std::uint8_t> held) const;
 
-  /// r̂ ← r̂ + Σ J_k δ_k; steps[k] is null where δ_k is zero. Returns whether the estimate has moved
-  /// so far since the factor was last evaluated that r̂ may be wrong by √tolerance.
+  /// r̂ ← r̂ + Σ J_k δ_k; steps[k] is null where δ_k is zero. Returns true once r̂ has changed by more
+  /// than √tolerance since the factor was last evaluated.
   bool move(int f, const double* const* steps, double tolerance);
-  /// Evaluates the factor again: its drift goes into the right-hand side. Returns the drift squared
-  /// and weighted with the inverse diagonal of H.
-  double correct(int f, const Graph& graph, const States& states, System& system,
-                 std::span<const std::uint8_t> held);
+  /// Evaluates the factor again: its drift goes into the gradient.
+  void correct(int f, const Graph& graph, const States& states, System& system,
+               std::span<const std::uint8_t> held);
+  /// g_v: minus the gradient of all its factors at the current estimate, as far as it is known.
+  void right_hand_side(System& system, const States& states, std::int32_t v) const;
 
   double mismatch(int f) const { return records_[f].mismatch; }
   /// Whether it would not notice if all its variables were moved as a whole.
@@ -72,18 +80,23 @@ class Models {
 
  private:
   struct Record {
-    std::int64_t place;  // in values_: J, r̂, γ − Jᵀr̂
+    std::int64_t place;  // in values_: J; what steps have changed in r̂, and γ, when last evaluated
     std::int32_t variables;
     std::int32_t pool, entry;
     std::int16_t arity, rows, scalars;
     bool loss_applies;
     bool relative;
+    bool rigid;  // relative, and all its variables are of Lie groups
     double mismatch = 0.0;
     double cost = 0.0;
     double travel = 0.0;  // since it was last evaluated
+    bool moving = false;  // `move` has said so since
   };
   const double* block(const Record& record, int k) const;
   void add_block(System& system, const Record& record, int ka, int kb, double sign) const;
+  void add_in_frame(const States& states, std::int32_t v, int size, const double* gradient,
+                    double* out) const;
+  void into_frames(const Record& record, const States& states, double* J) const;
   double evaluate(const Record& record, const Graph& graph, const States& states, double* r,
                   double* J) const;
 
@@ -91,7 +104,7 @@ class Models {
   std::vector<std::int32_t> variables_;
   std::vector<std::int16_t> tangents_;  // of each of a factor's variables
   AlignedVector values_;
-  mutable std::vector<double> scratch_;
+  mutable std::vector<double> scratch_, turned_;
   mutable std::vector<double*> pointers_;
   mutable std::vector<const double*> points_;
 };

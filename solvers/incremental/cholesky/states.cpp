@@ -1,15 +1,26 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "states.hpp"
 
+#include <algorithm>
 #include <utility>
 
 namespace cairn::incremental {
 
 void States::add(std::shared_ptr<const VariableType> type, std::span<const double> state) {
+  const std::int32_t tangent = type->tangent_size();
+  const bool group = type->lie_group() != nullptr;
   records_.push_back({.type = std::move(type),
                       .place = std::ssize(x_),
-                      .ambient = static_cast<std::int32_t>(state.size())});
+                      .ambient = static_cast<std::int32_t>(state.size()),
+                      .matrices = std::ssize(adjoints_),
+                      .tangent = tangent,
+                      .group = group});
   x_.insert(x_.end(), state.begin(), state.end());
+  frames_.insert(frames_.end(), state.begin(), state.end());
+  if (!group) return;
+  adjoints_.resize(adjoints_.size() + static_cast<std::size_t>(tangent * tangent));
+  turns_.resize(adjoints_.size());
+  put_frame_here(size() - 1);
 }
 
 void States::remember() {
@@ -26,16 +37,54 @@ void States::log(std::int32_t v) {
 
 void States::lead(std::int32_t v, const double* g) {
   log(v);
-  double* x = x_.data() + records_[v].place;
-  records_[v].type->lie_group()->compose(g, x, x);
+  Record& record = records_[v];
+  double* x = x_.data() + record.place;
+  record.type->lie_group()->compose(g, x, x);
+  record.away = true;
+  record.known = false;
 }
 
 void States::move(std::int32_t v, const double* delta) {
   log(v);
-  const Record& record = records_[v];
+  Record& record = records_[v];
   const std::int64_t first = 0;
   double* x = x_.data() + record.place;
+  if (record.away) {
+    const std::int32_t size = record.tangent;
+    const double* T = frame_to_body(v);
+    step_.assign(static_cast<std::size_t>(size), 0.0);
+    for (std::int32_t c = 0; c < size; ++c) {
+      for (std::int32_t r = 0; r < size; ++r) step_[r] += T[c * size + r] * delta[c];
+    }
+    delta = step_.data();
+  }
   record.type->retract(1, x, &first, delta, x);
+  record.away = record.group;
+  record.known = false;
+}
+
+void States::put_frame_here(std::int32_t v) {
+  Record& record = records_[v];
+  std::copy_n(x(v), record.ambient, frames_.begin() + record.place);
+  record.away = record.known = false;
+  if (!record.group) return;
+  const LieGroup& group = *record.type->lie_group();
+  element_.resize(static_cast<std::size_t>(record.ambient));
+  group.inverse(x(v), element_.data());
+  group.adjoint(element_.data(), adjoints_.data() + record.matrices);
+}
+
+const double* States::frame_to_body(std::int32_t v) const {
+  const Record& record = records_[v];
+  double* T = turns_.data() + record.matrices;
+  if (record.known) return T;
+  const LieGroup& group = *record.type->lie_group();
+  element_.resize(static_cast<std::size_t>(record.ambient));
+  group.inverse(x(v), element_.data());
+  group.compose(element_.data(), frame(v), element_.data());
+  group.adjoint(element_.data(), T);
+  record.known = true;
+  return T;
 }
 
 }  // namespace cairn::incremental

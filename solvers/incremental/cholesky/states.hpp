@@ -12,7 +12,12 @@
 
 namespace cairn::incremental {
 
-/// The estimate of every variable.
+/// The estimate of every variable, and the frame that steps of it are counted in.
+///
+/// A pose of a Lie group has a frame F, an element that stays as it is while the estimate x moves:
+/// a step δ takes x to F exp(δ) F⁻¹ x, which is x exp(T δ) with T = Ad(x⁻¹ F). So a motion of
+/// several variables as a whole, by exp(η) from the left, has the steps Ad(F⁻¹) η, wherever they
+/// have got to. Of a variable of any other kind T is the identity.
 class States {
  public:
   /// From here on what changes can be undone.
@@ -28,6 +33,7 @@ class States {
         undo_other(change.index, values);
       } else {
         std::copy(values.begin(), values.end(), x_.begin() + records_[change.index].place);
+        records_[change.index].known = false;
       }
     }
     remember();
@@ -48,14 +54,32 @@ class States {
   std::int32_t ambient(std::int32_t v) const { return records_[v].ambient; }
   /// x_v ← g x_v, g being an element of the variable's group.
   void lead(std::int32_t v, const double* g);
-  /// x_v ← x_v ⊕ δ.
+  /// Moves x_v by a step in its frame.
   void move(std::int32_t v, const double* delta);
+
+  /// F_v, like x_v.
+  const double* frame(std::int32_t v) const { return frames_.data() + records_[v].place; }
+  /// F_v ← x_v.
+  void put_frame_here(std::int32_t v);
+  /// Whether T_v may be anything but the identity.
+  bool away(std::int32_t v) const { return records_[v].away; }
+  /// T_v, tangent × tangent, column-major; for a variable that is `away`. Kept until it moves.
+  const double* frame_to_body(std::int32_t v) const;
+  /// Ad(F_v⁻¹), tangent × tangent, column-major; of a variable of a Lie group.
+  const double* world_to_frame(std::int32_t v) const {
+    return adjoints_.data() + records_[v].matrices;
+  }
 
  private:
   struct Record {
     std::shared_ptr<const VariableType> type;
     std::int64_t place;
     std::int32_t ambient;
+    std::int64_t matrices;  // in turns_ and adjoints_
+    std::int32_t tangent;
+    bool group;                  // of a Lie group
+    bool away = false;           // from its frame
+    mutable bool known = false;  // T
   };
   struct Change {
     std::int32_t index;
@@ -67,7 +91,11 @@ class States {
   std::vector<Change> log_;
   std::vector<double> logged_;
   std::vector<Record> records_;
-  AlignedVector x_;
+  AlignedVector x_, frames_;
+  AlignedVector adjoints_;
+  mutable AlignedVector turns_;
+  mutable std::vector<double> element_;
+  std::vector<double> step_;
 };
 
 }  // namespace cairn::incremental

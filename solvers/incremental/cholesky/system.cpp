@@ -13,6 +13,10 @@ std::int32_t System::add_variable(std::int32_t size) {
   diagonals_.push_back(take(size * size));
   links_.emplace_back();
   g_.resize(scalars_, 0.0);
+  pending_.resize(scalars_, 0.0);
+  gradient_.resize(scalars_, 0.0);
+  summed_.push_back(0);
+  change_.resize(scalars_, 0.0);
   return variables() - 1;
 }
 
@@ -56,7 +60,9 @@ std::int32_t System::find(std::int32_t a, std::int32_t b) const {
 
 void System::clear_values() {
   std::ranges::fill(values_, 0.0);
-  std::ranges::fill(g_, 0.0);
+  for (std::vector<double>* vector : {&g_, &pending_, &gradient_, &change_})
+    std::ranges::fill(*vector, 0.0);
+  std::ranges::fill(summed_, 0);
 }
 
 /// Room for so many doubles, set to zero.

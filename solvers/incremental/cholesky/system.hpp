@@ -43,15 +43,26 @@ class System {
   /// H_ab with a < b: size_a × size_b, column-major.
   double* block(std::int32_t entry) { return values_.data() + entries_[entry].value; }
   const double* block(std::int32_t entry) const { return values_.data() + entries_[entry].value; }
-  /// The right-hand side, as far as it has not been solved for.
+  /// The right-hand side, zero but while it is being solved for (see `Models::right_hand_side`).
   std::vector<double>& g() { return g_; }
   double* g(std::int32_t v) { return g_.data() + offsets_[v]; }
   const double* g(std::int32_t v) const { return g_.data() + offsets_[v]; }
 
-  /// H and g become zero; the blocks stay.
+  /// Σ Jᵀr over a variable's factors as far as it has not been solved for, as seen from the
+  /// variable; not kept up to date while `summed(v)` says so, since what follows says it then.
+  double* pending(std::int32_t v) { return pending_.data() + offsets_[v]; }
+  std::uint8_t& summed(std::int32_t v) { return summed_[v]; }
+  /// Σ Jᵀr over a variable's factors, each when it was last evaluated, as seen from the variable.
+  double* gradient(std::int32_t v) { return gradient_.data() + offsets_[v]; }
+  const double* gradient(std::int32_t v) const { return gradient_.data() + offsets_[v]; }
+  /// What steps have changed in it since, in the variable's frame.
+  double* change(std::int32_t v) { return change_.data() + offsets_[v]; }
+  const double* change(std::int32_t v) const { return change_.data() + offsets_[v]; }
+
+  /// H and all vectors become zero; the blocks stay.
   void clear_values();
 
-  std::int64_t doubles() const { return std::ssize(values_) + std::ssize(g_); }
+  std::int64_t doubles() const { return std::ssize(values_) + 4 * std::ssize(g_); }
 
  private:
   struct Entry {
@@ -69,7 +80,8 @@ class System {
   std::vector<std::int32_t> free_entries_;
   std::vector<std::vector<std::int64_t>> free_values_;  // by number of doubles
   AlignedVector values_;
-  std::vector<double> g_;
+  std::vector<double> g_, pending_, gradient_, change_;
+  std::vector<std::uint8_t> summed_;
   std::int64_t scalars_ = 0;
 };
 

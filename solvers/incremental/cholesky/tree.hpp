@@ -42,6 +42,7 @@ struct Node {
   std::vector<double> lead;  ///< the group element that all of this subtree is still to be moved by
   std::vector<double> arrived;  ///< what of the last pass's steps was added to `owed`
   std::int64_t arrived_at = 0;  ///< that pass
+  std::int64_t settled_at = -1;  ///< nothing above has had a lead since that many (see `Tree`)
   bool live = false;
   bool affected = false;
 
@@ -123,6 +124,7 @@ class Tree {
   /// Undoes what was noted for a node (see `States::undo`).
   void undo_lead(std::int32_t node, std::span<const double> lead) {
     nodes_[node].lead.assign(lead.begin(), lead.end());
+    ++leads_;
   }
   /// After `solve` or `follow`, for a variable whose step was not computed: the node above it that
   /// the pass ended at, or null.
@@ -211,7 +213,8 @@ class Tree {
   std::vector<double> kept_;
   std::int64_t pass_ = 0;
   std::vector<double> rigid_, matrix_, twist_;
-  std::vector<std::int32_t> stack_, path_;
+  std::int64_t leads_ = 0;  // so many motions have been noted
+  std::vector<std::int32_t> stack_, path_, settle_path_;
   std::vector<std::uint8_t> on_path_;  // by node
 };
 

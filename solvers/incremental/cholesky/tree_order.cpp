@@ -306,6 +306,7 @@ void Tree::lay_out(Node& node) {
   }
   node.stride = round_up(node.m);
   node.arrived_at = 0;
+  node.settled_at = -1;
   node.owed.assign(static_cast<std::size_t>(node.below()), 0.0);
   make_room(node.panel, std::int64_t{node.stride} * node.columns);
   make_room(node.update, std::int64_t{node.below()} * node.update_stride());

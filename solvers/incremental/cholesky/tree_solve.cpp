@@ -82,24 +82,22 @@ bool Tree::move_as_a_whole(Node& node, double tolerance) {
   twist_.resize(static_cast<std::size_t>(std::int64_t{size} + 2 * ambient));
   double* const twist = twist_.data();
   double* const element = twist + size;
-  const auto multiply = [&](const double* vector, double* out) {
+  const auto multiply = [&](const double* matrix, const double* vector, double* out) {
     for (std::int32_t r = 0; r < size; ++r) {
       double sum = 0.0;
-      for (std::int32_t c = 0; c < size; ++c) sum += matrix_[c * size + r] * vector[c];
+      for (std::int32_t c = 0; c < size; ++c) sum += matrix[c * size + r] * vector[c];
       out[r] = sum;
     }
   };
-  // The motion is that of the separator's first variable: ξ = Ad(x_0) δ_0 …
-  group.adjoint(states_->x(separator.front()), matrix_.data());
-  multiply(node.owed.data(), twist);
-  // … and would be δ_i = Ad(x_i⁻¹) ξ of the others.
+  // The motion is that of the separator's first variable: η = Ad(F_0) δ_0 …
+  group.adjoint(states_->frame(separator.front()), matrix_.data());
+  multiply(matrix_.data(), node.owed.data(), twist);
+  // … and would be δ_i = Ad(F_i⁻¹) η of the others.
   double left = 0.0;
   const double* owed = node.owed.data();
   double* rigid = rigid_.data();
   for (const std::int32_t v : separator) {
-    group.inverse(states_->x(v), element);
-    group.adjoint(element, matrix_.data());
-    multiply(twist, rigid);
+    multiply(states_->world_to_frame(v), twist, rigid);
     const double* weight = system_->diagonal(v);
     for (std::int32_t k = 0; k < size; ++k) {
       const double rest = owed[k] - rigid[k];
@@ -109,14 +107,18 @@ bool Tree::move_as_a_whole(Node& node, double tolerance) {
     owed += size;
     rigid += size;
   }
-  // x exp(rigid + rest) = x exp(rigid) exp(D rest): what is left is counted from where the motion
-  // has brought x.
+  // exp(rigid + rest) = exp(D rest) exp(rigid), with the left Jacobian: what is left is counted
+  // from where the motion has brought x.
   double *rest = node.owed.data(), *arrived = node.arrived.data();
   rigid = rigid_.data();
   for (const std::int32_t v : separator) {
+    for (std::int32_t k = 0; k < size; ++k) {
+      arrived[k] -= rest[k];
+      rest[k] -= rigid[k];
+      rigid[k] = -rigid[k];
+    }
     states_->type(v).retract_jacobian(states_->x(v), rigid, matrix_.data());
-    for (std::int32_t k = 0; k < size; ++k) arrived[k] -= rest[k], rest[k] -= rigid[k];
-    multiply(rest, rigid);
+    multiply(matrix_.data(), rest, rigid);
     for (std::int32_t k = 0; k < size; ++k) rest[k] = rigid[k], arrived[k] += rest[k];
     rest += size;
     arrived += size;
@@ -124,6 +126,7 @@ bool Tree::move_as_a_whole(Node& node, double tolerance) {
   }
   group.exp(twist, element);
   add_lead(node, element);
+  ++leads_;
   return true;
 }
 
@@ -131,6 +134,7 @@ bool Tree::move_as_a_whole(Node& node, double tolerance) {
 void Tree::add_lead(Node& node, const double* g) {
   const std::int32_t v = node.variables.front(), ambient = states_->ambient(v);
   states_->log_other(static_cast<std::int32_t>(&node - nodes_.data()), node.lead);
+  node.settled_at = -1;
   if (node.lead.empty()) {
     node.lead.assign(g, g + ambient);
   } else {
@@ -149,14 +153,14 @@ void Tree::hand_down(Node& node) {
 }
 
 void Tree::settle(std::int32_t variable) {
-  stack_.clear();
-  bool any = false;
-  for (std::int32_t n = node_of(variable); n >= 0; n = nodes_[n].parent) {
-    stack_.push_back(n);
-    any = any || !nodes_[n].lead.empty();
+  settle_path_.clear();
+  for (std::int32_t n = node_of(variable); n >= 0 && nodes_[n].settled_at != leads_;
+       n = nodes_[n].parent)
+    settle_path_.push_back(n);
+  for (std::size_t k = settle_path_.size(); k-- > 0;) {
+    hand_down(nodes_[settle_path_[k]]);
+    nodes_[settle_path_[k]].settled_at = leads_;
   }
-  if (!any) return;
-  for (std::size_t k = stack_.size(); k-- > 0;) hand_down(nodes_[stack_[k]]);
 }
 
 void Tree::settle_all() {

@@ -68,6 +68,12 @@ class Chain {
   /// Solves and moves; returns how many steps were computed.
   std::size_t solve(double tolerance) {
     for (int v = 1; v < kPoses; ++v) {
+      models_.right_hand_side(system_, states_, v);
+      for (int k = 0; k < system_.size(v); ++k) {
+        system_.change(v)[k] += system_.g(v)[k];
+        system_.pending(v)[k] = 0.0;
+      }
+      system_.summed(v) = 0;
       if (std::any_of(system_.g(v), system_.g(v) + system_.size(v),
                       [](double g) { return std::abs(g) > 1e-9; }))
         sources_.push_back(v);
@@ -99,7 +105,7 @@ class Chain {
   }
   /// Pulls once more, somewhere in the loop.
   void pull(double by) {
-    for (int k = 0; k < system_.size(5); ++k) system_.g(5)[k] = by * (k + 1);
+    for (int k = 0; k < system_.size(5); ++k) system_.pending(5)[k] = -by * (k + 1);
   }
   bool leads() const {
     return std::ranges::any_of(tree_.nodes(), [](const Node& node) { return !node.lead.empty(); });
@@ -133,7 +139,7 @@ class Chain {
       for (int column = row; column < n; ++column) information.push_back(100.0 * (row == column));
     }
     const int f = graph_.add_factor(type, variables, z, information);
-    models_.add(graph_, f, false);
+    models_.add(graph_, states_, f, false);
     models_.linearize(f, graph_, states_);
     if (variables.size() == 2 && !held_[static_cast<std::size_t>(variables[0])])
       system_.connect(variables[0], variables[1]);
