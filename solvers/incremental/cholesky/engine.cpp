@@ -40,14 +40,27 @@ constexpr double kRounding = 1e-18;
 // published graphs: what is left at the end stays well within it.
 constexpr double kEnough = 0.3;      ///< of it all: by how much more solving could lower chi2
 constexpr double kStepShare = 0.05;  ///< of a factor's: steps that are not followed down the tree
-constexpr double kMoveShare = 0.01;  ///< of a factor's: models that moved less have not moved
 /// So much may be left of the steps since the factors were evaluated, before they are again.
 constexpr double kLook = 0.1;
+/// A step that has gained so many times what may be left is looked at in any case.
+constexpr double kFar = 3.0;
 /// What is left is guessed from what was: a share of what the steps have gained, at least …
-constexpr double kLeastShare = 1e-3;
-constexpr double kForget = 0.8;  ///< … and not less than so much of the guess before
-/// While a solution leaves less than this fraction of what it has gained, H does as it is.
+constexpr double kLeastShare = 5e-3;
+constexpr double kOthersShare = 0.01;  ///< … where factors are not of poses alone, …
+constexpr double kForget = 0.8;        ///< … and not less than so much of the guess before
+/// What can still be gained is at most so many times what steps have fallen short of.
+constexpr double kCaution = 3.0;
+/// Gradients that promise up to so many times as much say that H is right.
+constexpr double kTrusted = 3.0;
+/// Where some factors are none of poses alone: while a solution leaves less than this fraction of
+/// what it has gained, H does as it is.
 constexpr double kFast = 0.2;
+/// Jacobians of such factors that are off by more than this part are renewed.
+constexpr double kMismatch = 0.05;
+/// In graphs of no more factors all are evaluated after each step.
+constexpr int kFew = 200;
+/// If more than this part of the factors were to be renewed, all are.
+constexpr double kMost = 0.2;
 
 const block::Kernels* kernels_named(const std::string& name) {
   const block::Kernels* kernels = block::choose_kernels(name.c_str());
@@ -96,13 +109,14 @@ Engine::Engine(const Engine& other)
       live_factors_(other.live_factors_),
       cost_(other.cost_),
       gained_(other.gained_),
+      must_look_(other.must_look_),
+      others_(other.others_),
       left_share_(other.left_share_),
       decrease_(other.decrease_),
       ids_(other.ids_),
       place_of_id_(other.place_of_id_),
       under_loss_(other.under_loss_),
-      is_source_(other.is_source_),
-      move_tolerance_(other.move_tolerance_) {}
+      is_source_(other.is_source_) {}
 
 // --- what changes ---
 
@@ -139,6 +153,7 @@ void Engine::load(Graph graph, std::vector<FactorId> ids) {
   broken_ = gauge_is_old_ = false;
   dead_ = live_factors_ = 0;
   cost_ = decrease_ = gained_ = 0.0;
+  others_ = 0;
   left_share_ = 1.0;
   touched_at_.clear();
   under_loss_ = under_loss(graph_);
@@ -172,7 +187,7 @@ void Engine::added_factor() {
     place_of_id_.push_back(f);
   }
   const FactorType& type = *graph_.factor_pools()[graph_.factor(f).pool].type;
-  models_.add(graph_, states_, f, loss_applies(f));
+  models_.add(graph_, f, loss_applies(f));
   live_factor_.push_back(1);
   checked_at_.push_back(-1);
   const auto variables = graph_.factor_variables(f);
@@ -287,16 +302,25 @@ void Engine::put_in(int f) {
   structure_changed_ = true;
 }
 
+/// Whether a factor is anything but a relative one between variables of a group.
+bool Engine::is_other(int f) const {
+  return !models_.relative(f) || std::ranges::any_of(models_.variables(f), [&](std::int32_t v) {
+    return !states_.type(v).lie_group();
+  });
+}
+
 /// A factor binds its variables to the world unless it is a relative one between some that move.
 void Engine::count_bonds(int f, std::int32_t sign) {
   const auto variables = models_.variables(f);
-  bool binds = !models_.relative(f);
-  for (const std::int32_t v : variables) binds = binds || held_[v] || !states_.type(v).lie_group();
+  bool binds = is_other(f);
+  if (binds && variables.size() > 1) others_ += sign;
+  for (const std::int32_t v : variables) binds = binds || held_[v];
   if (!binds) return;
   for (const std::int32_t v : variables) bound_[v] += sign;
 }
 
 void Engine::take_out(int f) {
+  must_look_ = true;
   count_bonds(f, -1);
   covariances_.note(models_, system_, f, -1.0, held_);
   models_.add_to(system_, f, -1.0, held_);
@@ -377,7 +401,7 @@ void Engine::move_model(int f) {
     }
     factor_steps_.push_back(step);
   }
-  if (models_.move(f, factor_steps_.data(), move_tolerance_)) moving_.push_back(f);
+  if (models_.move(f, factor_steps_.data())) moving_.push_back(f);
 }
 
 // --- solving ---
@@ -519,44 +543,72 @@ void Engine::take_step(double tolerance, UpdateReport& report) {
 /// evaluates all that have moved: few of them alone would say nothing of the rest.
 void Engine::check(bool anyway, UpdateReport& report) {
   const Timed timed(report.seconds.check);
-  move_tolerance_ = share(kMoveShare);
   apply_steps();
-  if (!anyway && left_share_ * gained_ <= kLook * settings_.accuracy * cost()) return;
+  const double allowed = settings_.accuracy * cost();
+  anyway = std::exchange(must_look_, false) || live_factors_ <= kFew || anyway;
+  if (!anyway && left_share_ * gained_ <= kLook * allowed && decrease_ <= kFar * allowed) return;
+  const double expected = cost();
   looked_at_ = std::exchange(gained_, 0.0);
-  looked_factors_ = static_cast<int>(moving_.size());
-  for (const std::int32_t f : moving_) {
+  looked_.swap(moving_);
+  moving_.clear();
+  double square = 0.0;
+  int compared = 0;
+  for (const std::int32_t f : looked_) {
     if (!live_factor_[f]) continue;
     for (const std::int32_t v : models_.variables(f)) tree_.settle(v);
     cost_ -= models_.cost(f);
     models_.correct(f, graph_, states_, system_, held_);
     cost_ += models_.cost(f);
     for (const std::int32_t v : models_.variables(f)) add_source(v);
+    if (others_ > 0 && is_other(f)) {
+      const double mismatch = models_.mismatch(f, states_);
+      square += mismatch * mismatch;
+      ++compared;
+    }
   }
-  moving_.clear();
+  mismatch_ = compared > 0 ? std::sqrt(square / compared) : 0.0;
+  shortfall_ = cost_ - expected;
 }
 
-/// Whether to solve once more: where the true gradients would lower chi2 noticeably. H does as it
-/// is if little has been left; else all of it is renewed.
+/// Whether to solve once more: whether that would lower chi2 noticeably.
+///
+/// The gradients that are left would gain gᵀH⁻¹g if H were right, and more often than not no more
+/// than chi2 has fallen short of what was expected of the steps. If both agree, H does as it is;
+/// if the former is much larger, H is not that of the current estimate, and what has moved is
+/// relinearised.
 bool Engine::improve(bool enough_time, UpdateReport& report) {
   const double allowed = settings_.accuracy * cost_ + kRounding * live_factors_;
   report.owed = 0;
-  left_share_ = std::max(kForget * left_share_, kLeastShare);
   double left = 0.0;
   {
     const Timed timed(report.seconds.solve);
     set_right_hand_side();
     left = tree_.decrement(sources_, system_.g());
   }
-  if (looked_at_ > 0.0) left_share_ = std::clamp(left / looked_at_, left_share_, 1.0);
-  if (left <= kEnough * allowed) return false;
+  const bool poses_alone = others_ == 0 && live_factors_ > kFew;
+  const double likely = poses_alone ? std::min(left, kCaution * std::abs(shortfall_)) : left;
+  left_share_ = std::max(kForget * left_share_, poses_alone ? kLeastShare : kOthersShare);
+  if (looked_at_ > 0.0) left_share_ = std::clamp(likely / looked_at_, left_share_, 1.0);
+  const bool right =
+      poses_alone ? left <= std::min(kTrusted * likely, looked_at_) : left <= kFast * looked_at_;
+  const bool enough = (right ? likely : left) <= kEnough * allowed;
+  if (enough && mismatch_ <= kMismatch) return false;
   if (!enough_time) {
-    report.owed = looked_factors_;
+    report.owed = static_cast<int>(looked_.size());
     return false;
   }
-  if (left < kFast * looked_at_) return true;
+  if (right && mismatch_ <= kMismatch) return true;
   const Timed timed(report.seconds.linearize);
-  relinearize_all();
-  report.relinearized_factors += live_factors_;
+  if (report.iterations >= 2 || static_cast<double>(looked_.size()) > kMost * live_factors_) {
+    relinearize_all();
+    report.relinearized_factors += live_factors_;
+    return true;
+  }
+  for (const std::int32_t f : looked_) {
+    if (!live_factor_[f]) continue;
+    relinearize(f);
+    ++report.relinearized_factors;
+  }
   return true;
 }
 

@@ -33,7 +33,7 @@ struct Settings {
   /// Linear systems solved in one update, at most.
   int iterations = 10;
   /// Variables touched within so many updates are ordered last.
-  int recent = 30;
+  int recent = 4;
   std::string kernels = "auto";
 };
 
@@ -112,8 +112,8 @@ class Engine {
   /// Which covariances are to be kept up to date; by `update_covariances`, after solving.
   Covariances& covariances() { return covariances_; }
   MarginalsBy update_covariances() { return covariances_.update(system_, tree_, held_); }
-  /// Σ_ab of steps as seen from the poses (x ⊕ δ), size_a × size_b, column-major: a kept block or by
-  /// solving. False if H is singular.
+  /// Σ_ab of steps as seen from the poses (x ⊕ δ), size_a × size_b, column-major: a kept block or
+  /// by solving. False if H is singular.
   bool covariance(int a, int b, double* block);
   /// The rows of Σ_vb for all of `rows`, one below the other, by solving.
   bool covariance_column(std::span<const std::int32_t> rows, int b, double* column);
@@ -129,6 +129,7 @@ class Engine {
   void watch_gauge_anew();
   void hold(std::int32_t v, bool held);
   bool loss_applies(int f) const;
+  bool is_other(int f) const;
   void put_in(int f);
   void take_out(int f);
   void sum_anew(std::int32_t v);
@@ -178,6 +179,7 @@ class Engine {
   std::vector<std::int32_t> sources_;  // … or of the right-hand side alone
   std::vector<double> steps_;          // by scalars; zero between calls
   std::vector<std::int32_t> moving_;   // factors that have moved since they were last evaluated
+  std::vector<std::int32_t> looked_;   // factors of the last evaluation
   std::vector<std::int32_t> retiring_;
   std::vector<std::int32_t> changed_;     // by the last substitution
   std::vector<std::int64_t> checked_at_;  // by factor: to visit each once
@@ -188,18 +190,20 @@ class Engine {
   bool gauge_is_old_ = false;
   int dead_ = 0;
   int live_factors_ = 0;
-  double cost_ = 0.0;                      // sum over factors
+  double cost_ = 0.0;       // sum over factors
   double gained_ = 0.0;     // of the cost, by steps since factors were evaluated
   double looked_at_ = 0.0;  // that of the steps before the last evaluation
-  int looked_factors_ = 0;   // evaluated then
-  double left_share_ = 1.0;  // how much of it was left to gain
+  bool must_look_ = false;  // something has been taken out: what was gained says little
+  int others_ = 0;         // factors of several variables that notice if these are moved as a whole
+  double mismatch_ = 0.0;  // of these, at the last evaluation
+  double shortfall_ = 0.0;                 // by how much more than expected the cost was then
+  double left_share_ = 1.0;                // how much of it was left to gain
   double decrease_ = 0.0;                  // of the last solution: gᵀH⁻¹g
   std::vector<FactorId> ids_;              // by factor
   std::vector<std::int32_t> place_of_id_;  // by FactorId: factor, -1 if it has been removed
   std::vector<bool> under_loss_;           // by factor, of those that were loaded together
   std::vector<std::uint8_t> is_source_;    // by variable
-  double move_tolerance_ = 0.0;
-  double limit_ = 0.0;  // seconds that the update at hand may take; 0: any
+  double limit_ = 0.0;                     // seconds that the update at hand may take; 0: any
   std::vector<std::int32_t> anchored_;
 };
 

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace cairn::incremental {
 namespace {
@@ -67,7 +68,7 @@ void add_transposed_product(int rows, const double* A, int a, const double* B, i
 
 }  // namespace
 
-void Models::add(const Graph& graph, const States& states, int position, bool loss_applies) {
+void Models::add(const Graph& graph, int position, bool loss_applies) {
   const FactorRef ref = graph.factor(position);
   const FactorType& type = *graph.factor_pools()[ref.pool].type;
   Record record{.place = std::ssize(values_),
@@ -78,16 +79,13 @@ void Models::add(const Graph& graph, const States& states, int position, bool lo
                 .rows = static_cast<std::int16_t>(type.residual_size()),
                 .scalars = 0,
                 .loss_applies = loss_applies,
-                .relative = type.is_relative(),
-                .rigid = type.is_relative()};
+                .relative = type.is_relative()};
   for (int k = 0; k < record.arity; ++k) {
     tangents_.push_back(static_cast<std::int16_t>(type.tangent_size(k)));
     record.scalars = static_cast<std::int16_t>(record.scalars + type.tangent_size(k));
   }
   const auto factor_variables = graph.factor_variables(position);
   variables_.insert(variables_.end(), factor_variables.begin(), factor_variables.end());
-  for (const std::int32_t v : factor_variables)
-    record.rigid = record.rigid && states.type(v).lie_group() != nullptr;
   values_.resize(values_.size() +
                  static_cast<std::size_t>(record.rows) *
                      static_cast<std::size_t>(record.scalars + 1) +
@@ -98,8 +96,7 @@ void Models::add(const Graph& graph, const States& states, int position, bool lo
 /// J of its k-th variable.
 const double* Models::block(const Record& record, int k) const {
   const double* J = values_.data() + record.place;
-  for (int before = 0; before < k; ++before)
-    J += record.rows * tangents_[record.variables + before];
+  for (int before = 0; before < k; ++before) J += record.rows * size_of(record, before);
   return J;
 }
 
@@ -115,7 +112,7 @@ double Models::evaluate(const Record& record, const Graph& graph, const States& 
   for (int k = 0; k < record.arity; ++k) {
     points_.push_back(states.x(variables_[record.variables + k]));
     pointers_.push_back(next);
-    if (J) next += record.rows * tangents_[record.variables + k];
+    if (J) next += record.rows * size_of(record, k);
   }
   const std::size_t packed = static_cast<std::size_t>(record.rows) * (record.rows + 1) / 2;
   const std::size_t entry = static_cast<std::size_t>(record.entry);
@@ -141,7 +138,7 @@ void Models::into_frames(const Record& record, const States& states, double* J) 
   const int rows = record.rows;
   for (int k = 0; k < record.arity; ++k) {
     const std::int32_t v = variables_[record.variables + k];
-    const int size = tangents_[record.variables + k];
+    const int size = size_of(record, k);
     if (states.away(v)) {
       const double* T = states.frame_to_body(v);
       turned_.assign(static_cast<std::size_t>(rows) * static_cast<std::size_t>(size), 0.0);
@@ -164,7 +161,6 @@ void Models::linearize(int f, const Graph& graph, const States& states) {
   add_transposed_product(rows, J, record.scalars, r, 1, 1.0, gradient);
   std::fill_n(r, rows, 0.0);
   into_frames(record, states, J);
-  record.mismatch = record.travel = 0.0;
   record.moving = false;
 }
 
@@ -229,65 +225,42 @@ void Models::add_row(System& system, int f, std::int32_t variable,
 
 namespace {
 
-/// r ← r + Σ J_k δ_k for two variables of `Size` coordinates; returns ‖Σ J_k δ_k‖² and adds to
-/// `apart` the sum of ‖J_k δ_k‖.
+/// r ← r + Σ J_k δ_k for two variables of `Size` coordinates.
 template <int Rows, int Size>
-double move_pair(const double* J, const double* const* steps, double* r, double& apart) {
+void move_pair(const double* J, const double* const* steps, double* r) {
   double change[Rows] = {};
   for (int k = 0; k < 2; ++k, J += Rows * Size) {
     if (!steps[k]) continue;
-    double part[Rows] = {};
     for (int c = 0; c < Size; ++c) {
-      for (int i = 0; i < Rows; ++i) part[i] += J[c * Rows + i] * steps[k][c];
+      for (int i = 0; i < Rows; ++i) change[i] += J[c * Rows + i] * steps[k][c];
     }
-    double square = 0.0;
-    for (int i = 0; i < Rows; ++i) change[i] += part[i], square += part[i] * part[i];
-    apart += std::sqrt(square);
   }
-  double square = 0.0;
-  for (int i = 0; i < Rows; ++i) r[i] += change[i], square += change[i] * change[i];
-  return square;
+  for (int i = 0; i < Rows; ++i) r[i] += change[i];
 }
 
 }  // namespace
 
-bool Models::move(int f, const double* const* steps, double tolerance) {
+bool Models::move(int f, const double* const* steps) {
   Record& record = records_[f];
   const int rows = record.rows;
   const double* J = values_.data() + record.place;
-  double* r = values_.data() + record.place + rows * record.scalars;
-  double apart = 0.0, square = 0.0;  // Σ ‖J_k δ_k‖, ‖Σ J_k δ_k‖²
-  if (record.relative && rows == 3 && record.scalars == 6) {
-    square = move_pair<3, 3>(J, steps, r, apart);
-  } else if (record.relative && rows == 6 && record.scalars == 12) {
-    square = move_pair<6, 6>(J, steps, r, apart);
+  double* change = values_.data() + record.place + rows * record.scalars;
+  if (record.arity == 2 && rows == 3 && record.scalars == 6 && size_of(record, 0) == 3) {
+    move_pair<3, 3>(J, steps, change);
+  } else if (record.arity == 2 && rows == 6 && record.scalars == 12 && size_of(record, 0) == 6) {
+    move_pair<6, 6>(J, steps, change);
   } else {
-    scratch_.assign(2 * static_cast<std::size_t>(rows), 0.0);
-    double *change = scratch_.data(), *part = change + rows;
     for (int k = 0; k < record.arity; ++k) {
-      const int size = tangents_[record.variables + k];
-      if (steps[k]) {
-        std::fill_n(part, rows, 0.0);
-        add_product(rows, J, size, steps[k], part);
-        double norm = 0.0;
-        for (int i = 0; i < rows; ++i) change[i] += part[i], norm += part[i] * part[i];
-        apart += std::sqrt(norm);
-      }
+      const int size = size_of(record, k);
+      if (steps[k]) add_product(rows, J, size, steps[k], change);
       J += rows * size;
     }
-    for (int i = 0; i < rows; ++i) r[i] += change[i], square += change[i] * change[i];
   }
-  // What moves all its variables as a whole does not count, where J says so too.
-  record.travel += record.rigid      ? std::sqrt(square)
-                   : record.relative ? std::sqrt(square) + record.mismatch * apart
-                                     : apart;
-  if (record.moving || record.travel * record.travel <= tolerance) return false;
-  record.moving = true;
-  return true;
+  return !std::exchange(record.moving, true);
 }
 
 void Models::correct(int f, const Graph& graph, const States& states, System& system,
-                       std::span<const std::uint8_t> held) {
+                     std::span<const std::uint8_t> held) {
   Record& record = records_[f];
   const int rows = record.rows, doubles = rows * record.scalars;
   scratch_.resize(static_cast<std::size_t>(doubles + rows + record.scalars));
@@ -305,16 +278,6 @@ void Models::correct(int f, const Graph& graph, const States& states, System& sy
     beyond[c] -= gradient[c];
     gradient[c] = now;
   }
-  if (!record.rigid) {
-    into_frames(record, states, J_now);
-    double difference = 0.0, norm = 0.0;
-    for (int k = 0; k < doubles; ++k) {
-      difference += (J_now[k] - J[k]) * (J_now[k] - J[k]);
-      norm += J[k] * J[k];
-    }
-    record.mismatch = norm > 0.0 ? std::sqrt(difference / norm) : difference > 0.0;
-  }
-  record.travel = 0.0;
   record.moving = false;
   int first = 0;
   for (int k = 0; k < record.arity; ++k) {
@@ -327,6 +290,20 @@ void Models::correct(int f, const Graph& graph, const States& states, System& sy
     first += size;
   }
   std::fill_n(change, rows, 0.0);
+}
+
+double Models::mismatch(int f, const States& states) {
+  const Record& record = records_[f];
+  const int doubles = record.rows * record.scalars;
+  double* const J_now = scratch_.data();
+  const double* const J = values_.data() + record.place;
+  into_frames(record, states, J_now);
+  double difference = 0.0, norm = 0.0;
+  for (int k = 0; k < doubles; ++k) {
+    difference += (J_now[k] - J[k]) * (J_now[k] - J[k]);
+    norm += J[k] * J[k];
+  }
+  return norm > 0.0 ? std::sqrt(difference / norm) : 0.0;
 }
 
 /// out += T_vᵀ γ: a gradient as seen from the variable, in its frame.

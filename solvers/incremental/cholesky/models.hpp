@@ -35,9 +35,8 @@ namespace cairn::incremental {
 /// not.
 class Models {
  public:
-  /// The next factor, as it stands in the graph at that position. Its variables are known to
-  /// `states`.
-  void add(const Graph& graph, const States& states, int position, bool loss_applies);
+  /// The next factor, as it stands in the graph at that position.
+  void add(const Graph& graph, int position, bool loss_applies);
   void clear() { *this = Models(); }
   int size() const { return static_cast<int>(records_.size()); }
   std::span<const std::int32_t> variables(int f) const {
@@ -55,16 +54,17 @@ class Models {
   void add_row(System& system, int f, std::int32_t variable,
                std::span<const std::uint8_t> held) const;
 
-  /// r̂ ← r̂ + Σ J_k δ_k; steps[k] is null where δ_k is zero. Returns true once r̂ has changed by more
-  /// than √tolerance since the factor was last evaluated.
-  bool move(int f, const double* const* steps, double tolerance);
+  /// r̂ ← r̂ + Σ J_k δ_k; steps[k] is null where δ_k is zero. Returns whether it is the first time
+  /// since the factor was last evaluated.
+  bool move(int f, const double* const* steps);
   /// Evaluates the factor again: its drift goes into the gradient.
   void correct(int f, const Graph& graph, const States& states, System& system,
                std::span<const std::uint8_t> held);
+  /// μ = ‖J(x) − J‖ / ‖J‖ of the factor that has just been evaluated.
+  double mismatch(int f, const States& states);
   /// g_v: minus the gradient of all its factors at the current estimate, as far as it is known.
   void right_hand_side(System& system, const States& states, std::int32_t v) const;
 
-  double mismatch(int f) const { return records_[f].mismatch; }
   /// Whether it would not notice if all its variables were moved as a whole.
   bool relative(int f) const { return records_[f].relative; }
   /// ρ(‖r‖²) when last evaluated.
@@ -86,12 +86,10 @@ class Models {
     std::int16_t arity, rows, scalars;
     bool loss_applies;
     bool relative;
-    bool rigid;  // relative, and all its variables are of Lie groups
-    double mismatch = 0.0;
     double cost = 0.0;
-    double travel = 0.0;  // since it was last evaluated
-    bool moving = false;  // `move` has said so since
+    bool moving = false;  // since it was last evaluated
   };
+  int size_of(const Record& record, int k) const { return tangents_[record.variables + k]; }
   const double* block(const Record& record, int k) const;
   void add_block(System& system, const Record& record, int ka, int kb, double sign) const;
   void add_in_frame(const States& states, std::int32_t v, int size, const double* gradient,

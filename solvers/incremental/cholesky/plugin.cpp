@@ -12,7 +12,8 @@ void cairn_register(cairn::Registrar& registrar) {
           .real("significance", 0.25, 0.0, 1e300,
                 "a step that lowers chi2 by less than this, and than the accuracy allows, waits")
           .integer("iterations", 10, 1, 1e9, "largest number of linear systems solved an update")
-          .integer("recent", 30, 0, 1e9, "variables touched in so many updates are ordered last")
+          .integer("recent", 4, 0, 1e9,
+                   "variables touched in so many updates, and near them, are ordered last")
           .integer("solve_every", 1, 1, 1e9, "updates that are solved for together")
           .integer("full_every", 0, 0, 1e9,
                    "updates from one full batch step to the next; 0: only on demand")

@@ -40,8 +40,8 @@ struct Node {
   /// separator: all its factors are relative ones between variables of one group.
   bool movable = false;
   std::vector<double> lead;  ///< the group element that all of this subtree is still to be moved by
-  std::vector<double> arrived;  ///< what of the last pass's steps was added to `owed`
-  std::int64_t arrived_at = 0;  ///< that pass
+  std::vector<double> arrived;   ///< what of the last pass's steps was added to `owed`
+  std::int64_t arrived_at = 0;   ///< that pass
   std::int64_t settled_at = -1;  ///< nothing above has had a lead since that many (see `Tree`)
   bool live = false;
   bool affected = false;
@@ -90,8 +90,8 @@ class Tree {
   /// must not join it with anything any more.
   void retire(std::int32_t variable);
 
-  /// Orders the affected variables anew, those last that were touched last: `touched_at[v]` says
-  /// when, and from `since` on it counts.
+  /// Orders the affected variables anew, those last that were touched last and those near them:
+  /// `touched_at[v]` says when, and from `since` on it counts.
   void restructure(std::span<const std::int64_t> touched_at, std::int64_t since);
   /// Whether the factor has become so much more costly than when all of it was last ordered, as
   /// growing does not explain.
@@ -158,6 +158,7 @@ class Tree {
   std::int32_t new_node();
   void free_node(std::int32_t n);
   void take_down(std::vector<std::int32_t>& members, std::vector<std::int32_t>& orphans);
+  void add_near(std::vector<std::uint8_t>& set);
   void order_small();
   void order_large();
   void eliminate();

@@ -15,6 +15,8 @@ namespace {
 constexpr block::CostModel kCost;
 /// Up to so many variables are ordered by exact degrees.
 constexpr int kSmall = 1500;
+/// So many links away from what has been touched is still near it.
+constexpr int kNear = 5;
 
 std::int32_t round_up(std::int32_t value) { return (value + 7) / 8 * 8; }
 
@@ -36,6 +38,7 @@ void Tree::restructure(std::span<const std::int64_t> touched_at, std::int64_t si
   groups_.resize(n);
   std::size_t clique_entries = 0;
   for (int k = 0; k < n; ++k) groups_[k] = touched_at[members_[k]] >= since;
+  add_near(groups_);
   for (const std::int32_t o : orphans_)
     clique_entries += nodes_[o].separator().size() * nodes_[o].separator().size();
   static const bool has_camd =
@@ -54,6 +57,27 @@ void Tree::restructure(std::span<const std::int64_t> touched_at, std::int64_t si
   if (!all) return;
   cost_when_ordered_ = cost_;
   variables_when_ordered_ = variables_;
+}
+
+/// Adds to a set of members those that a few blocks of H lead to from it: a robot that looks at
+/// places where it has been will look at the next ones soon.
+void Tree::add_near(std::vector<std::uint8_t>& set) {
+  stack_.clear();
+  for (std::size_t k = 0; k < set.size(); ++k) {
+    if (set[k]) stack_.push_back(static_cast<std::int32_t>(k));
+  }
+  std::size_t begin = 0;
+  for (int links = 0; links < kNear; ++links) {
+    const std::size_t end = stack_.size();
+    for (; begin < end; ++begin) {
+      for (const System::Link& link : system_->links(members_[stack_[begin]])) {
+        const std::int32_t other = local_[link.other];
+        if (other < 0 || set[other]) continue;
+        set[other] = 1;
+        stack_.push_back(other);
+      }
+    }
+  }
 }
 
 void Tree::order_small() {

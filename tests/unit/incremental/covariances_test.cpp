@@ -200,8 +200,7 @@ TEST_P(KeptCovariances, AreSolvedForWhereTheyAreNotKept) {
     ASSERT_TRUE(engine.covariance_column(rows, b, column.data()));
     Eigen::Index row = 0;
     for (const std::int32_t a : rows) {
-      const MatrixXd wanted =
-          seen_from_poses(engine, block_of(engine, Sigma, a, b), a, b);
+      const MatrixXd wanted = seen_from_poses(engine, block_of(engine, Sigma, a, b), a, b);
       MatrixXd block(wanted.rows(), wanted.cols());
       ASSERT_TRUE(engine.covariance(a, b, block.data()));
       EXPECT_LE((block - wanted).norm(), 1e-9 * Sigma.norm()) << a << ' ' << b;
