@@ -38,18 +38,18 @@ constexpr double kRounding = 1e-18;
 
 // How the accuracy that is asked for, a fraction of chi2, is shared out. Found by trying on the
 // published graphs: what is left at the end stays well within it.
-constexpr double kEnough = 0.3;      ///< of it all: by how much more solving could lower chi2
+constexpr double kEnough = 0.2;      ///< of it all: by how much more solving could lower chi2
 constexpr double kStepShare = 0.05;  ///< of a factor's: steps that are not followed down the tree
 /// So much may be left of the steps since the factors were evaluated, before they are again.
 constexpr double kLook = 0.1;
 /// A step that has gained so many times what may be left is looked at in any case.
-constexpr double kFar = 3.0;
+constexpr double kFar = 4.0;
 /// What is left is guessed from what was: a share of what the steps have gained, at least …
 constexpr double kLeastShare = 5e-3;
 constexpr double kOthersShare = 0.01;  ///< … where factors are not of poses alone, …
-constexpr double kForget = 0.8;        ///< … and not less than so much of the guess before
+constexpr double kForget = 0.5;        ///< … and not less than so much of the guess before
 /// What can still be gained is at most so many times what steps have fallen short of.
-constexpr double kCaution = 3.0;
+constexpr double kCaution = 6.0;
 /// Gradients that promise up to so many times as much say that H is right.
 constexpr double kTrusted = 3.0;
 /// Where some factors are none of poses alone: while a solution leaves less than this fraction of
@@ -201,7 +201,10 @@ void Engine::added_factor() {
   put_in(f);
 }
 
-void Engine::changed_factor(int f) { relinearize(f); }
+void Engine::changed_factor(int f) {
+  must_look_ = true;
+  relinearize(f);
+}
 
 void Engine::remove_factor(int f) {
   for (const std::int32_t v : models_.variables(f)) follow(v);
@@ -413,6 +416,7 @@ void Engine::solve(double max_seconds, UpdateReport& report) {
   limit_ = max_seconds;
   states_.remember();
   if (broken_) return rescue(report, 1e-6);
+  if (must_look_) bring_back();
   bool again = !touched_.empty() || !sources_.empty();
   for (int round = 0; again; ++round) {
     const Clock::time_point round_begin = Clock::now();
@@ -424,7 +428,7 @@ void Engine::solve(double max_seconds, UpdateReport& report) {
     if (round == 0 && negligible()) break;
     take_step(share(kStepShare), report);
     ++report.iterations;
-    check(false, report);
+    check(round > 0, report);
     if (gained_ > 0.0) return;  // nobody has looked
     // Negated, so that what is not a number is bad too.
     if (!(cost_ <= 2.0 * before + kRounding * live_factors_)) {
@@ -508,6 +512,15 @@ bool Engine::bring_factor_up_to_date(UpdateReport& report) {
   return tree_.factorize() < 0;
 }
 
+/// Where something is taken out, what was little may have become much.
+void Engine::bring_back() {
+  for (int v = 0; v < states_.size(); ++v) {
+    if (held_[v] || tree_.node_of(v) < 0 || !system_.has_set_aside(v)) continue;
+    system_.sum(v);
+    add_source(v);
+  }
+}
+
 void Engine::set_right_hand_side() {
   for (const std::int32_t v : sources_) {
     tree_.settle(v);
@@ -526,13 +539,7 @@ void Engine::touch_all() {
 void Engine::take_step(double tolerance, UpdateReport& report) {
   const Timed timed(report.seconds.solve);
   set_right_hand_side();
-  for (const std::int32_t v : sources_) {
-    for (std::int32_t i = 0; i < system_.size(v); ++i) {
-      system_.change(v)[i] += system_.g(v)[i];
-      system_.pending(v)[i] = 0.0;
-    }
-    system_.summed(v) = 0;
-  }
+  for (const std::int32_t v : sources_) system_.settle(v, false);
   decrease_ = tree_.solve(sources_, tolerance, system_.g(), steps_, changed_);
   gained_ += decrease_;
   for (const std::int32_t v : sources_) is_source_[v] = 0;
@@ -591,8 +598,10 @@ bool Engine::improve(bool enough_time, UpdateReport& report) {
   if (looked_at_ > 0.0) left_share_ = std::clamp(likely / looked_at_, left_share_, 1.0);
   const bool right =
       poses_alone ? left <= std::min(kTrusted * likely, looked_at_) : left <= kFast * looked_at_;
-  const bool enough = (right ? likely : left) <= kEnough * allowed;
-  if (enough && mismatch_ <= kMismatch) return false;
+  if (likely <= kEnough * allowed && mismatch_ <= kMismatch) {
+    set_aside();
+    return false;
+  }
   if (!enough_time) {
     report.owed = static_cast<int>(looked_.size());
     return false;
@@ -610,6 +619,18 @@ bool Engine::improve(bool enough_time, UpdateReport& report) {
     ++report.relinearized_factors;
   }
   return true;
+}
+
+/// Leaves the gradients at hand alone until the factors are evaluated again: with an old H, what
+/// little they have to tell might do more harm than good.
+void Engine::set_aside() {
+  set_right_hand_side();
+  for (const std::int32_t v : sources_) {
+    system_.settle(v, true);
+    std::fill_n(system_.g(v), system_.size(v), 0.0);
+    is_source_[v] = 0;
+  }
+  sources_.clear();
 }
 
 /// Everything at the current estimate: H and g are summed anew, without the rounding of updates.

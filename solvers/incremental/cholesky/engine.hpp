@@ -147,6 +147,8 @@ class Engine {
   double share(double part) const;
   void touch_all();
   void set_right_hand_side();
+  void set_aside();
+  void bring_back();
   void take_step(double tolerance, UpdateReport& report);
   void check(bool anyway, UpdateReport& report);
   bool improve(bool enough_time, UpdateReport& report);
@@ -193,7 +195,7 @@ class Engine {
   double cost_ = 0.0;       // sum over factors
   double gained_ = 0.0;     // of the cost, by steps since factors were evaluated
   double looked_at_ = 0.0;  // that of the steps before the last evaluation
-  bool must_look_ = false;  // something has been taken out: what was gained says little
+  bool must_look_ = false;  // something has been taken out or changed: what was gained says little
   int others_ = 0;         // factors of several variables that notice if these are moved as a whole
   double mismatch_ = 0.0;  // of these, at the last evaluation
   double shortfall_ = 0.0;                 // by how much more than expected the cost was then

@@ -198,7 +198,7 @@ void Models::add_to(System& system, int f, double sign, std::span<const std::uin
         system.gradient(a)[i] += sign * gradient[i];
         system.pending(a)[i] += gradient[i];
       }
-      if (sign < 0.0) system.summed(a) = 1;
+      if (sign < 0.0) system.sum(a);
       for (int kb = ka + 1; kb < record.arity; ++kb) {
         if (!held[v[kb]]) add_block(system, record, ka, kb, sign);
       }
@@ -283,9 +283,9 @@ void Models::correct(int f, const Graph& graph, const States& states, System& sy
   for (int k = 0; k < record.arity; ++k) {
     const std::int32_t v = variables_[record.variables + k], size = system.size(v);
     if (!held[v]) {
+      system.sum(v);
       add_transposed_product(rows, J + first * rows, size, change, 1, -1.0, system.change(v));
       for (int i = 0; i < size; ++i) system.gradient(v)[i] += beyond[first + i];
-      system.summed(v) = 1;
     }
     first += size;
   }

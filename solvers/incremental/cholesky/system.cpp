@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cassert>
+#include <utility>
 
 namespace cairn::incremental {
 
@@ -17,6 +18,7 @@ std::int32_t System::add_variable(std::int32_t size) {
   gradient_.resize(scalars_, 0.0);
   summed_.push_back(0);
   change_.resize(scalars_, 0.0);
+  aside_.resize(scalars_, 0.0);
   return variables() - 1;
 }
 
@@ -58,9 +60,30 @@ std::int32_t System::find(std::int32_t a, std::int32_t b) const {
   return link->entry;
 }
 
+void System::sum(std::int32_t v) {
+  if (summed_[v] != 0) return;
+  summed_[v] = 1;
+  for (std::int64_t k = offsets_[v]; k < offsets_[v] + sizes_[v]; ++k)
+    change_[k] -= std::exchange(aside_[k], 0.0);
+}
+
+void System::settle(std::int32_t v, bool set_aside) {
+  summed_[v] = 0;
+  for (std::int64_t k = offsets_[v]; k < offsets_[v] + sizes_[v]; ++k) {
+    change_[k] += g_[k];
+    if (set_aside) aside_[k] += g_[k];
+    pending_[k] = 0.0;
+  }
+}
+
+bool System::has_set_aside(std::int32_t v) const {
+  const auto begin = aside_.begin() + offsets_[v];
+  return std::any_of(begin, begin + sizes_[v], [](double value) { return value != 0.0; });
+}
+
 void System::clear_values() {
   std::ranges::fill(values_, 0.0);
-  for (std::vector<double>* vector : {&g_, &pending_, &gradient_, &change_})
+  for (std::vector<double>* vector : {&g_, &pending_, &gradient_, &change_, &aside_})
     std::ranges::fill(*vector, 0.0);
   std::ranges::fill(summed_, 0);
 }

@@ -51,7 +51,12 @@ class System {
   /// Σ Jᵀr over a variable's factors as far as it has not been solved for, as seen from the
   /// variable; not kept up to date while `summed(v)` says so, since what follows says it then.
   double* pending(std::int32_t v) { return pending_.data() + offsets_[v]; }
-  std::uint8_t& summed(std::int32_t v) { return summed_[v]; }
+  bool summed(std::int32_t v) const { return summed_[v] != 0; }
+  /// From here on the sums tell, and what had been set aside counts again.
+  void sum(std::int32_t v);
+  /// g_v has been solved for; or is set aside: it counts as if it had been, until `sum`.
+  void settle(std::int32_t v, bool set_aside);
+  bool has_set_aside(std::int32_t v) const;
   /// Σ Jᵀr over a variable's factors, each when it was last evaluated, as seen from the variable.
   double* gradient(std::int32_t v) { return gradient_.data() + offsets_[v]; }
   const double* gradient(std::int32_t v) const { return gradient_.data() + offsets_[v]; }
@@ -62,7 +67,7 @@ class System {
   /// H and all vectors become zero; the blocks stay.
   void clear_values();
 
-  std::int64_t doubles() const { return std::ssize(values_) + 4 * std::ssize(g_); }
+  std::int64_t doubles() const { return std::ssize(values_) + 5 * std::ssize(g_); }
 
  private:
   struct Entry {
@@ -80,7 +85,7 @@ class System {
   std::vector<std::int32_t> free_entries_;
   std::vector<std::vector<std::int64_t>> free_values_;  // by number of doubles
   AlignedVector values_;
-  std::vector<double> g_, pending_, gradient_, change_;
+  std::vector<double> g_, pending_, gradient_, change_, aside_;
   std::vector<std::uint8_t> summed_;
   std::int64_t scalars_ = 0;
 };

@@ -111,7 +111,7 @@ class Tree {
   /// what is left.
   double solve(std::span<const std::int32_t> sources, double tolerance, std::vector<double>& g,
                std::vector<double>& steps, std::vector<std::int32_t>& changed);
-  /// gᵀ H⁻¹ g alone: by how much chi2 would fall.
+  /// gᵀ H⁻¹ g alone: by how much chi2 would fall. Leaves g as zero.
   double decrement(std::span<const std::int32_t> sources, std::vector<double>& g);
   /// Follows what the nodes on the path from a variable to its root owe. To be called before the
   /// factors of a variable change.
@@ -211,7 +211,6 @@ class Tree {
   std::vector<double> scalars_below_, scalars_own_;
   std::vector<std::int32_t> front_row_;  // by variable, of the node at hand
   AlignedVector front_;
-  std::vector<double> kept_;
   std::int64_t pass_ = 0;
   std::vector<double> rigid_, matrix_, twist_;
   std::int64_t leads_ = 0;  // so many motions have been noted

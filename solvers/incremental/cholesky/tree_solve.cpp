@@ -215,19 +215,11 @@ double Tree::forward(std::vector<double>& g) {
 
 double Tree::decrement(std::span<const std::int32_t> sources, std::vector<double>& g) {
   collect_paths(sources);
-  const auto for_each_value = [&](auto visit) {
-    std::size_t k = 0;
-    for (const std::int32_t n : path_) {
-      for (const std::int32_t v : nodes_[n].own_variables()) {
-        double* value = g.data() + system_->offset(v);
-        for (std::int32_t i = 0; i < system_->size(v); ++i) visit(value[i], k++);
-      }
-    }
-  };
-  kept_.resize(g.size());
-  for_each_value([&](double value, std::size_t k) { kept_[k] = value; });
   const double square = forward(g);
-  for_each_value([&](double& value, std::size_t k) { value = kept_[k]; });
+  for (const std::int32_t n : path_) {
+    for (const std::int32_t v : nodes_[n].own_variables())
+      std::fill_n(g.data() + system_->offset(v), system_->size(v), 0.0);
+  }
   return square;
 }
 

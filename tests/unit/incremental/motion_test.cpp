@@ -69,11 +69,7 @@ class Chain {
   std::size_t solve(double tolerance) {
     for (int v = 1; v < kPoses; ++v) {
       models_.right_hand_side(system_, states_, v);
-      for (int k = 0; k < system_.size(v); ++k) {
-        system_.change(v)[k] += system_.g(v)[k];
-        system_.pending(v)[k] = 0.0;
-      }
-      system_.summed(v) = 0;
+      system_.settle(v, false);
       if (std::any_of(system_.g(v), system_.g(v) + system_.size(v),
                       [](double g) { return std::abs(g) > 1e-9; }))
         sources_.push_back(v);
