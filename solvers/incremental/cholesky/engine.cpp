@@ -38,8 +38,8 @@ constexpr double kRounding = 1e-18;
 
 // How the accuracy that is asked for, a fraction of chi2, is shared out. Found by trying on the
 // published graphs: what is left at the end stays well within it.
-constexpr double kEnough = 0.2;      ///< of it all: by how much more solving could lower chi2
-constexpr double kStepShare = 0.05;  ///< of a factor's: steps that are not followed down the tree
+constexpr double kEnough = 0.2;     ///< of it all: by how much more solving could lower chi2
+constexpr double kStepShare = 0.1;  ///< of a factor's: steps that are not followed down the tree
 /// So much may be left of the steps since the factors were evaluated, before they are again.
 constexpr double kLook = 0.1;
 /// A step that has gained so many times what may be left is looked at in any case.
@@ -428,8 +428,7 @@ void Engine::solve(double max_seconds, UpdateReport& report) {
     if (round == 0 && negligible()) break;
     take_step(share(kStepShare), report);
     ++report.iterations;
-    check(round > 0, report);
-    if (gained_ > 0.0) return;  // nobody has looked
+    if (!check(round > 0, report)) return;
     // Negated, so that what is not a number is bad too.
     if (!(cost_ <= 2.0 * before + kRounding * live_factors_)) {
       step_back();
@@ -547,13 +546,14 @@ void Engine::take_step(double tolerance, UpdateReport& report) {
 }
 
 /// Moves to the solution, and if what is known of the factors may be wrong by too much then,
-/// evaluates all that have moved: few of them alone would say nothing of the rest.
-void Engine::check(bool anyway, UpdateReport& report) {
+/// evaluates all that have moved: few of them alone would say nothing of the rest. Whether it has.
+bool Engine::check(bool anyway, UpdateReport& report) {
   const Timed timed(report.seconds.check);
   apply_steps();
   const double allowed = settings_.accuracy * cost();
   anyway = std::exchange(must_look_, false) || live_factors_ <= kFew || anyway;
-  if (!anyway && left_share_ * gained_ <= kLook * allowed && decrease_ <= kFar * allowed) return;
+  if (!anyway && left_share_ * gained_ <= kLook * allowed && decrease_ <= kFar * allowed)
+    return false;
   const double expected = cost();
   looked_at_ = std::exchange(gained_, 0.0);
   looked_.swap(moving_);
@@ -575,6 +575,7 @@ void Engine::check(bool anyway, UpdateReport& report) {
   }
   mismatch_ = compared > 0 ? std::sqrt(square / compared) : 0.0;
   shortfall_ = cost_ - expected;
+  return true;
 }
 
 /// Whether to solve once more: whether that would lower chi2 noticeably.

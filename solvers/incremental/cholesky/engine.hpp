@@ -150,7 +150,7 @@ class Engine {
   void set_aside();
   void bring_back();
   void take_step(double tolerance, UpdateReport& report);
-  void check(bool anyway, UpdateReport& report);
+  bool check(bool anyway, UpdateReport& report);
   bool improve(bool enough_time, UpdateReport& report);
   void step_back();
   void rescue(UpdateReport& report, double tolerance);

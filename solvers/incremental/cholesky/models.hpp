@@ -13,11 +13,12 @@
 namespace cairn::incremental {
 
 /// What the linear system knows of every factor: a whitened Jacobian J, that of some earlier
-/// estimate, and its gradient Jᵀr at the current one.
+/// estimate, its gradient γ = Jᵀr when it was last evaluated, and what steps have changed in r
+/// since.
 ///
 /// Steps are always counted from the current estimate, in the frames of `States`. A step δ moves
-/// the estimate and what is known of the residual and of the gradient by it, r̂ ← r̂ + J δ,
-/// γ ← γ + JᵀJ δ. What that lacks is found by evaluating the factor again at x:
+/// the estimate, and what is known of the residual and of the gradient by J δ and JᵀJ δ. What that
+/// lacks is found by evaluating the factor again at x:
 ///
 ///  - the *drift* J(x)ᵀr(x) − γ goes into the right-hand side: the estimate converges to where the
 ///    true gradient is zero, whatever J is;
@@ -45,7 +46,7 @@ class Models {
                  static_cast<std::size_t>(records_[f].arity));
   }
 
-  /// Linearises at the current estimate: J = J(x), r̂ = r(x), γ = Jᵀr.
+  /// Linearises at the current estimate: J = J(x), γ = Jᵀr.
   void linearize(int f, const Graph& graph, const States& states);
   /// Adds the factor's part of H and of the right-hand side, times `sign`; variables that are held
   /// have none.
@@ -54,8 +55,8 @@ class Models {
   void add_row(System& system, int f, std::int32_t variable,
                std::span<const std::uint8_t> held) const;
 
-  /// r̂ ← r̂ + Σ J_k δ_k; steps[k] is null where δ_k is zero. Returns whether it is the first time
-  /// since the factor was last evaluated.
+  /// The residual changes by Σ J_k δ_k; steps[k] is null where δ_k is zero. Returns whether it is
+  /// the first time since the factor was last evaluated.
   bool move(int f, const double* const* steps);
   /// Evaluates the factor again: its drift goes into the gradient.
   void correct(int f, const Graph& graph, const States& states, System& system,
@@ -80,7 +81,7 @@ class Models {
 
  private:
   struct Record {
-    std::int64_t place;  // in values_: J; what steps have changed in r̂, and γ, when last evaluated
+    std::int64_t place;  // in values_: J; what steps have changed in r; γ
     std::int32_t variables;
     std::int32_t pool, entry;
     std::int16_t arity, rows, scalars;

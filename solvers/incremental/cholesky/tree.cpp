@@ -116,12 +116,11 @@ void Tree::assemble(Node& node) {
 /// what is there of the update matrix, which must have been computed.
 void Tree::add_scattered(const Node& child, Node& parent) {
   const std::int32_t shift = child.columns / 8 * 8;
-  double* const panel = parent.panel.data();
-  double* const update = parent.update.data();
-  // Element (row, column) of the parent's front, row ≥ column.
-  const auto place = [&](std::int32_t row, std::int32_t column) -> double& {
-    return column < parent.columns ? panel[std::int64_t{column} * parent.stride + row]
-                                   : update[parent.update_place(row, column)];
+  // Element (row, column) of the parent's front, row ≥ column, is column_of(column)[row].
+  const auto column_of = [&](std::int32_t column) {
+    return column < parent.columns
+               ? parent.panel.data() + std::int64_t{column} * parent.stride
+               : parent.update.data() + parent.update_place(column, column) - column;
   };
   std::int32_t j = 0;
   const auto separator = child.separator();
@@ -133,8 +132,11 @@ void Tree::add_scattered(const Node& child, Node& parent) {
       for (std::int32_t c = 0; c < width; ++c) {
         const double* column = child.update.data() + std::int64_t{j + c} * child.update_stride() +
                                (i + child.columns - shift);
-        for (std::int32_t r = a == b ? c : 0; r < height; ++r) {
-          place(std::max(to_i + r, to_j + c), std::min(to_i + r, to_j + c)) += column[r];
+        if (to_i >= to_j) {
+          double* target = column_of(to_j + c) + to_i;
+          for (std::int32_t r = a == b ? c : 0; r < height; ++r) target[r] += column[r];
+        } else {
+          for (std::int32_t r = 0; r < height; ++r) column_of(to_i + r)[to_j + c] += column[r];
         }
       }
       i += height;

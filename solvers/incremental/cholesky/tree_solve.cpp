@@ -7,6 +7,9 @@
 namespace cairn::incremental {
 namespace {
 
+/// A motion, in metres and radians, that hardly turns what is left of another.
+constexpr double kShort = 0.05;
+
 /// The rows of a node's own variables, one below the other, out of a vector whose rows hold `width`
 /// numbers.
 void gather_own(const System& system, const Node& node, const double* vector, std::int64_t width,
@@ -108,18 +111,23 @@ bool Tree::move_as_a_whole(Node& node, double tolerance) {
     rigid += size;
   }
   // exp(rigid + rest) = exp(D rest) exp(rigid), with the left Jacobian: what is left is counted
-  // from where the motion has brought x.
+  // from where the motion has brought x. D is the identity but for about half the motion.
   double *rest = node.owed.data(), *arrived = node.arrived.data();
   rigid = rigid_.data();
   for (const std::int32_t v : separator) {
+    double length = 0.0;  // squared
     for (std::int32_t k = 0; k < size; ++k) {
       arrived[k] -= rest[k];
       rest[k] -= rigid[k];
+      length += rigid[k] * rigid[k];
       rigid[k] = -rigid[k];
     }
-    states_->type(v).retract_jacobian(states_->x(v), rigid, matrix_.data());
-    multiply(matrix_.data(), rest, rigid);
-    for (std::int32_t k = 0; k < size; ++k) rest[k] = rigid[k], arrived[k] += rest[k];
+    if (length > kShort * kShort) {
+      states_->type(v).retract_jacobian(states_->x(v), rigid, matrix_.data());
+      multiply(matrix_.data(), rest, rigid);
+      std::copy_n(rigid, size, rest);
+    }
+    for (std::int32_t k = 0; k < size; ++k) arrived[k] += rest[k];
     rest += size;
     arrived += size;
     rigid += size;
