@@ -580,10 +580,10 @@ bool Engine::check(bool anyway, UpdateReport& report) {
 
 /// Whether to solve once more: whether that would lower chi2 noticeably.
 ///
-/// The gradients that are left would gain gᵀH⁻¹g if H were right, and more often than not no more
-/// than chi2 has fallen short of what was expected of the steps. If both agree, H does as it is;
-/// if the former is much larger, H is not that of the current estimate, and what has moved is
-/// relinearised.
+/// The gradients that are left would gain gᵀH⁻¹g if H were right, and for poses alone, as a rule,
+/// not much more than what chi2 has fallen short of (see docs/online.md). If both agree, H does as
+/// it is; if the former is much larger, H is not that of the current estimate, and what has moved
+/// is relinearised.
 bool Engine::improve(bool enough_time, UpdateReport& report) {
   const double allowed = settings_.accuracy * cost_ + kRounding * live_factors_;
   report.owed = 0;
@@ -642,7 +642,7 @@ void Engine::relinearize_all() {
   for (const std::int32_t v : sources_) is_source_[v] = 0;
   sources_.clear();
   system_.clear_values();
-  cost_ = 0.0;
+  cost_ = gained_ = 0.0;
   for (int v = 0; v < states_.size(); ++v) states_.put_frame_here(v);
   for (int f = 0; f < models_.size(); ++f) {
     if (!live_factor_[f]) continue;
