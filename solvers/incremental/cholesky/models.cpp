@@ -263,7 +263,8 @@ void Models::correct(int f, const Graph& graph, const States& states, System& sy
                      std::span<const std::uint8_t> held) {
   Record& record = records_[f];
   const int rows = record.rows, doubles = rows * record.scalars;
-  scratch_.resize(static_cast<std::size_t>(doubles + rows + record.scalars));
+  const std::int64_t room = std::int64_t{doubles} + rows + record.scalars;
+  scratch_.resize(static_cast<std::size_t>(room));
   double* const J_now = scratch_.data();
   double* const r_now = J_now + doubles;
   double* const beyond = r_now + rows;  // J(x)ᵀ r(x) less γ when last evaluated
