@@ -221,21 +221,29 @@ void assemble(const Assembly* entries, int count, const double* values, double* 
 
 // --- factor_panel ---
 
-/// x[n][v] -= what the K columns to the left contribute: rows at A, columns at B.
-template <int V, int N>
-inline __attribute__((always_inline)) void subtract_left(Vec (&x)[N][V], int K, const double* A,
-                                                         std::int64_t lda, const double* B,
-                                                         std::int64_t ldb) {
+/// sum += A B, or -= with `kMinus`: V vectors of rows and N columns; B's row k and column n is at
+/// k · row_step + n · column_step.
+template <bool kMinus, int V, int N>
+inline __attribute__((always_inline)) void accumulate(Vec (&sum)[N][V], int K, const double* A,
+                                                      std::int64_t lda, const double* B,
+                                                      std::int64_t row_step,
+                                                      std::int64_t column_step) {
   for (int k = 0; k < K; ++k) {
     Vec a[V];
     CAIRN_UNROLL
     for (int v = 0; v < V; ++v) a[v] = load(A + k * lda + v * kWidth);
-    const double* b = B + k * ldb;
+    const double* b = B + k * row_step;
     CAIRN_UNROLL
     for (int n = 0; n < N; ++n) {
-      const Vec bn = broadcast(b[n]);
+      const Vec bn = broadcast(b[n * column_step]);
       CAIRN_UNROLL
-      for (int v = 0; v < V; ++v) x[n][v] -= a[v] * bn;
+      for (int v = 0; v < V; ++v) {
+        if constexpr (kMinus) {
+          sum[n][v] -= a[v] * bn;
+        } else {
+          sum[n][v] += a[v] * bn;
+        }
+      }
     }
   }
 }
@@ -255,7 +263,7 @@ __attribute__((noinline)) int factor_top(double* panel, std::int64_t stride, int
     CAIRN_UNROLL
     for (int v = 0; v < V; ++v) x[n][v] = load(block + n * stride + v * kWidth);
   }
-  subtract_left<V, N>(x, begin, panel + begin, stride, panel + begin, stride);
+  accumulate<true, V, N>(x, begin, panel + begin, stride, panel + begin, stride, 1);
 
   alignas(64) double top[kWidth];
   Vec pivots = broadcast(1.0);
@@ -308,8 +316,8 @@ __attribute__((noinline)) void solve_from_right(double* X, std::int64_t ldx, con
     CAIRN_UNROLL
     for (int v = 0; v < V; ++v) x[n][v] = load(block + n * ldx + v * kWidth);
   }
-  subtract_left<V, N>(x, begin - first, X + first * ldx, ldx, panel + first * stride + begin,
-                      stride);
+  accumulate<true, V, N>(x, begin - first, X + first * ldx, ldx, panel + first * stride + begin,
+                         stride, 1);
   CAIRN_UNROLL
   for (int j = 0; j < N; ++j) {
     const Vec inverse = broadcast(reciprocal[j]);
@@ -683,33 +691,6 @@ void invert_pivots(const double* panel, std::int64_t stride, int columns, double
           solve_from_right<1, N>(V + row, ldv, panel, stride, row, begin, reciprocal);
         }
       });
-    }
-  }
-}
-
-/// sum += A B, or -= with `kMinus`: V vectors of rows and N columns; B's row k and column n is at
-/// k · row_step + n · column_step.
-template <bool kMinus, int V, int N>
-inline __attribute__((always_inline)) void accumulate(Vec (&sum)[N][V], int K, const double* A,
-                                                      std::int64_t lda, const double* B,
-                                                      std::int64_t row_step,
-                                                      std::int64_t column_step) {
-  for (int k = 0; k < K; ++k) {
-    Vec a[V];
-    CAIRN_UNROLL
-    for (int v = 0; v < V; ++v) a[v] = load(A + k * lda + v * kWidth);
-    const double* b = B + k * row_step;
-    CAIRN_UNROLL
-    for (int n = 0; n < N; ++n) {
-      const Vec bn = broadcast(b[n * column_step]);
-      CAIRN_UNROLL
-      for (int v = 0; v < V; ++v) {
-        if constexpr (kMinus) {
-          sum[n][v] -= a[v] * bn;
-        } else {
-          sum[n][v] += a[v] * bn;
-        }
-      }
     }
   }
 }

@@ -18,13 +18,6 @@ namespace {
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-boost::json::value report_of(Arguments arguments) {
-  arguments.insert(arguments.end(), {"--json", "-"});
-  const Outcome outcome = cairn(arguments);
-  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
-  return parse_json(outcome.out);
-}
-
 /// All numbers of a matrix, row by row.
 std::vector<double> numbers(const boost::json::value& matrix) {
   std::vector<double> all;
@@ -42,16 +35,7 @@ void expect_near(const std::vector<double>& a, const std::vector<double>& b,
   for (std::size_t k = 0; k < a.size(); ++k) EXPECT_NEAR(a[k], b[k], relative * scale);
 }
 
-class MarginalsCommand : public ::testing::Test {
- protected:
-  std::string graph() {
-    const std::string file = folder_.file("graph.g2o");
-    const Outcome made = cairn({"generate", "manhattan:poses=200", "-o", file, "--seed", "3"});
-    EXPECT_EQ(made.exit_code, 0) << made.err;
-    return file;
-  }
-  TemporaryFolder folder_;
-};
+using MarginalsCommand = WithGraphFile;
 
 TEST_F(MarginalsCommand, ReportsWhatScriptsRelyOn) {
   const auto report = report_of({"marginals", graph(), "--threads", "2", "--pairs", "17:150,0:3",

@@ -13,28 +13,11 @@ namespace {
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-boost::json::value report_of(Arguments arguments) {
-  arguments.insert(arguments.end(), {"--json", "-"});
-  const Outcome outcome = cairn(arguments);
-  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
-  return parse_json(outcome.out);
-}
-
 double final_chi2(const boost::json::value& report) {
   return report.at("chi2").at("final").as_double();
 }
 
-class OptimizeCommand : public ::testing::Test {
- protected:
-  /// A graph that is worth optimising, as a file.
-  std::string graph() {
-    const std::string file = folder_.file("graph.g2o");
-    const Outcome made = cairn({"generate", "manhattan:poses=200", "-o", file, "--seed", "3"});
-    EXPECT_EQ(made.exit_code, 0) << made.err;
-    return file;
-  }
-  TemporaryFolder folder_;
-};
+using OptimizeCommand = WithGraphFile;
 
 TEST_F(OptimizeCommand, ReportsAllMembersThatScriptsRelyOn) {
   const std::string file = graph();

@@ -251,4 +251,18 @@ std::vector<std::string> lines(const std::string& text) {
   return all;
 }
 
+boost::json::value report_of(Arguments arguments) {
+  arguments.insert(arguments.end(), {"--json", "-"});
+  const Outcome outcome = cairn(arguments);
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  return parse_json(outcome.out);
+}
+
+std::string WithGraphFile::graph() {
+  const std::string file = folder_.file("graph.g2o");
+  const Outcome made = cairn({"generate", "manhattan:poses=200", "-o", file, "--seed", "3"});
+  EXPECT_EQ(made.exit_code, 0) << made.err;
+  return file;
+}
+
 }  // namespace cairn::test

@@ -9,6 +9,8 @@
 #include <string>
 #include <vector>
 
+#include <gtest/gtest.h>
+
 #include <boost/json/value.hpp>
 
 namespace cairn::test {
@@ -60,10 +62,19 @@ class TemporaryFolder {
   std::filesystem::path path_;
 };
 
+/// Tests that need a graph worth optimising, as a file.
+class WithGraphFile : public ::testing::Test {
+ protected:
+  std::string graph();
+  TemporaryFolder folder_;
+};
+
 std::string read_text(const std::filesystem::path& file);
 void write_text(const std::filesystem::path& file, const std::string& text);
 /// Parses JSON and nothing but JSON: fails the test otherwise.
 boost::json::value parse_json(const std::string& text);
+/// Runs `cairn` with these arguments, which must go well, and parses its report (`--json`).
+boost::json::value report_of(Arguments arguments);
 std::vector<std::string> lines(const std::string& text);
 
 /// The path of the program under test.

@@ -7,8 +7,6 @@
 #include <numeric>
 #include <utility>
 
-#include <Eigen/Core>
-
 #include "cairn/error.hpp"
 
 namespace cairn::incremental {
@@ -118,297 +116,6 @@ Engine::Engine(const Engine& other)
       under_loss_(other.under_loss_),
       is_source_(other.is_source_) {}
 
-// --- what changes ---
-
-/// Starts from a whole graph, at its states.
-void Engine::load(Graph graph, std::vector<FactorId> ids) {
-  std::vector<std::int32_t> now;
-  for (int v = 0; v < graph_.variable_count(); ++v) {
-    const auto found = graph.find(graph_.id(v));
-    now.push_back(found && live_variable_[v] ? static_cast<std::int32_t>(*found) : -1);
-  }
-  covariances_.renumber(now);
-  graph_ = std::move(graph);
-  ids_ = std::move(ids);
-  for (std::size_t f = 0; f < ids_.size(); ++f)
-    place_of_id_[static_cast<std::size_t>(ids_[f])] = static_cast<std::int32_t>(f);
-  system_ = System();
-  states_ = States();
-  models_.clear();
-  tree_ = Tree(system_, states_, bound_, *kernels_);
-  gauge_ = GaugeWatch();
-  held_.clear();
-  live_variable_.clear();
-  live_factor_.clear();
-  factors_of_.clear();
-  bound_.clear();
-  moved_at_.clear();
-  touched_.clear();
-  sources_.clear();
-  is_source_.clear();
-  steps_.clear();
-  moving_.clear();
-  retiring_.clear();
-  checked_at_.clear();
-  broken_ = gauge_is_old_ = false;
-  dead_ = live_factors_ = 0;
-  cost_ = decrease_ = gained_ = 0.0;
-  others_ = 0;
-  left_share_ = 1.0;
-  touched_at_.clear();
-  under_loss_ = under_loss(graph_);
-  const int variables = graph_.variable_count(), factors = graph_.factor_count();
-  while (states_.size() < variables) added_variable();
-  while (models_.size() < factors) added_factor();
-  settle_gauge();
-}
-
-void Engine::added_variable() {
-  const int v = states_.size();
-  const VariableType& type = graph_.type(v);
-  system_.add_variable(type.tangent_size());
-  states_.add(graph_.variable_pools()[graph_.pool(v)].type, graph_.state(v));
-  steps_.resize(static_cast<std::size_t>(system_.scalars()), 0.0);
-  gauge_.add_variable(type.tangent_size(), type.lie_group() != nullptr, graph_.fixed(v));
-  held_.push_back(1);  // until it has a factor
-  covariances_.note_variable(v);
-  live_variable_.push_back(1);
-  factors_of_.emplace_back();
-  touched_at_.push_back(time_);
-  bound_.push_back(0);
-  moved_at_.push_back(-1);
-  is_source_.push_back(0);
-}
-
-void Engine::added_factor() {
-  const int f = models_.size();
-  if (f == std::ssize(ids_)) {
-    ids_.push_back(next_id());
-    place_of_id_.push_back(f);
-  }
-  const FactorType& type = *graph_.factor_pools()[graph_.factor(f).pool].type;
-  models_.add(graph_, f, loss_applies(f));
-  live_factor_.push_back(1);
-  checked_at_.push_back(-1);
-  const auto variables = graph_.factor_variables(f);
-  gauge_.add_factor(variables.data(), static_cast<int>(variables.size()), type.absolute_size());
-  settle_gauge();
-  for (const std::int32_t v : variables) follow(v);
-  for (const std::int32_t v : variables) factors_of_[v].push_back(f);
-  ++live_factors_;
-  models_.linearize(f, graph_, states_);
-  cost_ += models_.cost(f);
-  put_in(f);
-}
-
-void Engine::changed_factor(int f) {
-  must_look_ = true;
-  relinearize(f);
-}
-
-void Engine::remove_factor(int f) {
-  for (const std::int32_t v : models_.variables(f)) follow(v);
-  take_out(f);
-  live_factor_[f] = 0;
-  place_of_id_[static_cast<std::size_t>(ids_[f])] = -1;
-  cost_ -= models_.cost(f);
-  for (const std::int32_t v : models_.variables(f)) std::erase(factors_of_[v], f);
-  for (const std::int32_t v : models_.variables(f)) sum_anew(v);
-  --live_factors_;
-  ++dead_;
-  gauge_is_old_ = true;
-}
-
-void Engine::remove_variable(int v) {
-  live_variable_[v] = 0;
-  if (!held_[v]) {
-    covariances_.note_variable(v);  // to be eliminated from what its factors have said
-    touch(v);
-    retiring_.push_back(v);
-    held_[v] = 1;
-  }
-  ++dead_;
-}
-
-void Engine::settle_gauge() {
-  if (gauge_is_old_) watch_gauge_anew();
-  gauge_.settle([&](std::int32_t v, bool held) { hold(v, held); });
-}
-
-/// Components may have come apart: whom to hold is found out from what is left.
-void Engine::watch_gauge_anew() {
-  gauge_is_old_ = false;
-  gauge_ = GaugeWatch();
-  for (int v = 0; v < states_.size(); ++v) {
-    const VariableType& type = graph_.type(v);
-    gauge_.add_variable(live_variable_[v] ? type.tangent_size() : 0, type.lie_group() != nullptr,
-                        graph_.fixed(v));
-  }
-  for (int f = 0; f < models_.size(); ++f) {
-    if (!live_factor_[f]) continue;
-    const auto variables = models_.variables(f);
-    gauge_.add_factor(variables.data(), static_cast<int>(variables.size()),
-                      graph_.factor_pools()[graph_.factor(f).pool].type->absolute_size());
-  }
-}
-
-void Engine::hold(std::int32_t v, bool held) {
-  if (held && gauge_.anchored(v)) anchored_.push_back(v);
-  if (!live_variable_[v] || (held_[v] != 0) == held) return;
-  const auto factors = factors_of_[v];
-  if (!factors.empty()) covariances_.note_everything();
-  for (const std::int32_t f : factors) {
-    for (const std::int32_t other : models_.variables(f)) follow(other);
-  }
-  for (const std::int32_t f : factors) take_out(f);
-  if (held) {
-    touch(v);
-    retiring_.push_back(v);
-  } else {
-    std::erase(retiring_, v);
-  }
-  held_[v] = held;
-  covariances_.note_variable(v);
-  for (const std::int32_t f : factors) put_in(f);
-}
-
-void Engine::set_loss(std::shared_ptr<const Loss> loss, LossScope scope) {
-  Graph graph = snapshot();
-  graph.set_loss(std::move(loss), scope);
-  load(std::move(graph), live_ids());
-}
-
-bool Engine::loss_applies(int f) const {
-  if (!graph_.loss()) return false;
-  if (static_cast<std::size_t>(f) < under_loss_.size()) return under_loss_[f];
-  const FactorType& type = *graph_.factor_pools()[graph_.factor(f).pool].type;
-  if (!type.takes_loss()) return false;
-  return graph_.loss_scope() == LossScope::all || under_loss(graph_)[f];
-}
-
-void Engine::touch(std::int32_t v) { touched_.push_back(v); }
-
-/// Makes the factor a part of H and g.
-void Engine::put_in(int f) {
-  const auto variables = models_.variables(f);
-  for (std::size_t a = 0; a < variables.size(); ++a) {
-    if (held_[variables[a]]) continue;
-    touch(variables[a]);
-    touched_at_[variables[a]] = time_;
-    for (std::size_t b = a + 1; b < variables.size(); ++b) {
-      if (!held_[variables[b]]) system_.connect(variables[a], variables[b]);
-    }
-  }
-  models_.add_to(system_, f, 1.0, held_);
-  covariances_.note(models_, system_, f, 1.0, held_);
-  count_bonds(f, 1);
-  structure_changed_ = true;
-}
-
-/// Whether a factor is anything but a relative one between variables of a group.
-bool Engine::is_other(int f) const {
-  return !models_.relative(f) || std::ranges::any_of(models_.variables(f), [&](std::int32_t v) {
-    return !states_.type(v).lie_group();
-  });
-}
-
-/// A factor binds its variables to the world unless it is a relative one between some that move.
-void Engine::count_bonds(int f, std::int32_t sign) {
-  const auto variables = models_.variables(f);
-  bool binds = is_other(f);
-  if (binds && variables.size() > 1) others_ += sign;
-  for (const std::int32_t v : variables) binds = binds || held_[v];
-  if (!binds) return;
-  for (const std::int32_t v : variables) bound_[v] += sign;
-}
-
-void Engine::take_out(int f) {
-  must_look_ = true;
-  count_bonds(f, -1);
-  covariances_.note(models_, system_, f, -1.0, held_);
-  models_.add_to(system_, f, -1.0, held_);
-  const auto variables = models_.variables(f);
-  for (std::size_t a = 0; a < variables.size(); ++a) {
-    if (held_[variables[a]]) continue;
-    touch(variables[a]);
-    for (std::size_t b = a + 1; b < variables.size(); ++b) {
-      if (!held_[variables[b]]) system_.disconnect(variables[a], variables[b]);
-    }
-  }
-  structure_changed_ = true;
-}
-
-/// A variable's part of H from its factors, without what subtracting has left of rounding.
-void Engine::sum_anew(std::int32_t v) {
-  if (held_[v]) return;
-  const std::int32_t size = system_.size(v);
-  std::fill_n(system_.diagonal(v), size * size, 0.0);
-  for (const System::Link& link : system_.links(v))
-    std::fill_n(system_.block(link.entry), size * system_.size(link.other), 0.0);
-  for (const std::int32_t f : factors_of_[v]) models_.add_row(system_, f, v, held_);
-}
-
-void Engine::relinearize(int f) {
-  for (const std::int32_t v : models_.variables(f)) follow(v);
-  covariances_.note(models_, system_, f, -1.0, held_);
-  models_.add_to(system_, f, -1.0, held_);
-  cost_ -= models_.cost(f);
-  models_.linearize(f, graph_, states_);
-  cost_ += models_.cost(f);
-  models_.add_to(system_, f, 1.0, held_);
-  covariances_.note(models_, system_, f, 1.0, held_);
-  for (const std::int32_t v : models_.variables(f)) {
-    if (!held_[v]) touch(v);
-  }
-}
-
-/// Whoever changes the factors of a variable must have followed first.
-void Engine::follow(std::int32_t v) {
-  tree_.follow(v, steps_, changed_);
-  if (!changed_.empty()) apply_steps();
-}
-
-/// Moves the estimate and the models by the steps of `changed_`.
-void Engine::apply_steps() {
-  ++check_;
-  for (const std::int32_t v : changed_) {
-    if (!held_[v]) states_.move(v, steps_.data() + system_.offset(v));
-    moved_at_[v] = check_;
-  }
-  for (const std::int32_t v : changed_) {
-    for (const std::int32_t f : factors_of_[v]) {
-      if (checked_at_[f] == check_) continue;
-      checked_at_[f] = check_;
-      move_model(f);
-    }
-  }
-  for (const std::int32_t v : changed_)
-    std::fill_n(steps_.data() + system_.offset(v), system_.size(v), 0.0);
-  changed_.clear();
-}
-
-/// A variable of the factor whose step was not computed is below a node that the pass ended at: its
-/// model moves by what arrived there.
-void Engine::move_model(int f) {
-  const auto variables = models_.variables(f);
-  const Node* end = nullptr;
-  for (const std::int32_t v : variables) {
-    if (moved_at_[v] != check_ && !held_[v]) end = tree_.end_of_pass(v);
-  }
-  factor_steps_.clear();
-  for (const std::int32_t v : variables) {
-    const double* step = nullptr;
-    if (moved_at_[v] == check_) step = steps_.data() + system_.offset(v);
-    if (step && end) {
-      if (const double* arrived = tree_.arrived(*end, v)) step = arrived;
-    }
-    factor_steps_.push_back(step);
-  }
-  if (models_.move(f, factor_steps_.data())) moving_.push_back(f);
-}
-
-// --- solving ---
-
 void Engine::solve(double max_seconds, UpdateReport& report) {
   const Clock::time_point begin = Clock::now();
   settle_gauge();
@@ -515,7 +222,7 @@ bool Engine::bring_factor_up_to_date(UpdateReport& report) {
 void Engine::bring_back() {
   for (int v = 0; v < states_.size(); ++v) {
     if (held_[v] || tree_.node_of(v) < 0 || !system_.has_set_aside(v)) continue;
-    system_.sum(v);
+    system_.count_all(v);
     add_source(v);
   }
 }
@@ -538,7 +245,7 @@ void Engine::touch_all() {
 void Engine::take_step(double tolerance, UpdateReport& report) {
   const Timed timed(report.seconds.solve);
   set_right_hand_side();
-  for (const std::int32_t v : sources_) system_.settle(v, false);
+  for (const std::int32_t v : sources_) system_.mark_solved(v);
   decrease_ = tree_.solve(sources_, tolerance, system_.g(), steps_, changed_);
   gained_ += decrease_;
   for (const std::int32_t v : sources_) is_source_[v] = 0;
@@ -564,14 +271,12 @@ bool Engine::check(bool anyway, UpdateReport& report) {
     if (!live_factor_[f]) continue;
     for (const std::int32_t v : models_.variables(f)) tree_.settle(v);
     cost_ -= models_.cost(f);
-    models_.correct(f, graph_, states_, system_, held_);
+    const bool compare = others_ > 0 && is_other(f);
+    const double mismatch = models_.correct(f, graph_, states_, system_, held_, compare);
+    square += mismatch * mismatch;
+    compared += compare;
     cost_ += models_.cost(f);
     for (const std::int32_t v : models_.variables(f)) add_source(v);
-    if (others_ > 0 && is_other(f)) {
-      const double mismatch = models_.mismatch(f, states_);
-      square += mismatch * mismatch;
-      ++compared;
-    }
   }
   mismatch_ = compared > 0 ? std::sqrt(square / compared) : 0.0;
   shortfall_ = cost_ - expected;
@@ -627,8 +332,7 @@ bool Engine::improve(bool enough_time, UpdateReport& report) {
 void Engine::set_aside() {
   set_right_hand_side();
   for (const std::int32_t v : sources_) {
-    system_.settle(v, true);
-    std::fill_n(system_.g(v), system_.size(v), 0.0);
+    system_.set_aside(v);
     is_source_[v] = 0;
   }
   sources_.clear();
@@ -728,67 +432,6 @@ void Engine::write_back() {
 Graph Engine::snapshot() {
   write_back();
   return clean_graph();
-}
-
-/// Σ_ab in the variables' frames becomes T_a Σ_ab T_bᵀ: as seen from the poses.
-void Engine::as_seen_from(int a, int b, double* block, std::int64_t stride) {
-  const std::int32_t rows = system_.size(a), columns = system_.size(b);
-  using Block = Eigen::Map<Eigen::MatrixXd, 0, Eigen::OuterStride<>>;
-  Block sigma(block, rows, columns, Eigen::OuterStride<>(stride));
-  const auto turn = [&](int v, std::int32_t size) {
-    return Eigen::Map<const Eigen::MatrixXd>(states_.frame_to_body(v), size, size);
-  };
-  tree_.settle(a);
-  tree_.settle(b);
-  if (states_.away(a)) sigma = (turn(a, rows) * sigma).eval();
-  if (states_.away(b)) sigma = (sigma * turn(b, columns).transpose()).eval();
-}
-
-bool Engine::covariance(int a, int b, double* block) {
-  const std::int32_t rows = system_.size(a), columns = system_.size(b);
-  if (const double* kept = covariances_.kept(a, b); kept && !broken_) {
-    std::copy_n(kept, rows * columns, block);
-    as_seen_from(a, b, block, rows);
-    return true;
-  }
-  const std::int32_t row = a;
-  return covariance_column({&row, 1}, b, block);
-}
-
-bool Engine::covariance_column(std::span<const std::int32_t> rows, int b, double* column) {
-  std::int64_t height = 0;
-  for (const std::int32_t v : rows) height += system_.size(v);
-  const std::int32_t columns = system_.size(b);
-  std::fill_n(column, height * columns, 0.0);
-  if (held_[b]) return true;
-  if (broken_ || tree_.node_of(b) < 0) return false;
-  AlignedVector X(static_cast<std::size_t>(system_.scalars()) * 8);
-  const std::int32_t source = b;
-  for (std::int32_t first = 0; first < columns; first += 8) {
-    const std::int32_t width = std::min(8, columns - first);
-    std::ranges::fill(X, 0.0);
-    for (std::int32_t k = 0; k < width; ++k)
-      X[static_cast<std::size_t>(system_.offset(b) + first + k) * 8 + k] = 1.0;
-    if (rows.size() == 1) {
-      const std::int32_t both[2] = {source, rows[0]};
-      tree_.solve_many_above(held_[rows[0]] ? std::span(both, 1) : std::span(both), X);
-    } else {
-      tree_.solve_many({&source, 1}, X);
-    }
-    double* out = column + std::int64_t{first} * height;
-    for (std::int32_t k = 0; k < width; ++k) {
-      for (const std::int32_t v : rows) {
-        for (std::int32_t r = 0; r < system_.size(v); ++r)
-          *out++ = held_[v] ? 0.0 : X[static_cast<std::size_t>(system_.offset(v) + r) * 8 + k];
-      }
-    }
-  }
-  std::int64_t row = 0;
-  for (const std::int32_t v : rows) {
-    if (!held_[v]) as_seen_from(v, b, column + row, height);
-    row += system_.size(v);
-  }
-  return true;
 }
 
 }  // namespace cairn::incremental

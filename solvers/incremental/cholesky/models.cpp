@@ -198,7 +198,7 @@ void Models::add_to(System& system, int f, double sign, std::span<const std::uin
         system.gradient(a)[i] += sign * gradient[i];
         system.pending(a)[i] += gradient[i];
       }
-      if (sign < 0.0) system.sum(a);
+      if (sign < 0.0) system.count_all(a);
       for (int kb = ka + 1; kb < record.arity; ++kb) {
         if (!held[v[kb]]) add_block(system, record, ka, kb, sign);
       }
@@ -259,8 +259,8 @@ bool Models::move(int f, const double* const* steps) {
   return !std::exchange(record.moving, true);
 }
 
-void Models::correct(int f, const Graph& graph, const States& states, System& system,
-                     std::span<const std::uint8_t> held) {
+double Models::correct(int f, const Graph& graph, const States& states, System& system,
+                       std::span<const std::uint8_t> held, bool compare) {
   Record& record = records_[f];
   const int rows = record.rows, doubles = rows * record.scalars;
   const std::int64_t room = std::int64_t{doubles} + rows + record.scalars;
@@ -284,20 +284,14 @@ void Models::correct(int f, const Graph& graph, const States& states, System& sy
   for (int k = 0; k < record.arity; ++k) {
     const std::int32_t v = variables_[record.variables + k], size = system.size(v);
     if (!held[v]) {
-      system.sum(v);
+      system.count_all(v);
       add_transposed_product(rows, J + first * rows, size, change, 1, -1.0, system.change(v));
       for (int i = 0; i < size; ++i) system.gradient(v)[i] += beyond[first + i];
     }
     first += size;
   }
   std::fill_n(change, rows, 0.0);
-}
-
-double Models::mismatch(int f, const States& states) {
-  const Record& record = records_[f];
-  const int doubles = record.rows * record.scalars;
-  double* const J_now = scratch_.data();
-  const double* const J = values_.data() + record.place;
+  if (!compare) return 0.0;
   into_frames(record, states, J_now);
   double difference = 0.0, norm = 0.0;
   for (int k = 0; k < doubles; ++k) {
@@ -323,7 +317,7 @@ void Models::add_in_frame(const States& states, std::int32_t v, int size, const 
 void Models::right_hand_side(System& system, const States& states, std::int32_t v) const {
   const std::int32_t size = system.size(v);
   double* const g = system.g(v);
-  if (system.summed(v)) {
+  if (system.counts_all(v)) {
     std::copy_n(system.change(v), size, g);
     add_in_frame(states, v, size, system.gradient(v), g);
   } else {

@@ -22,8 +22,7 @@ namespace cairn::incremental {
 ///
 ///  - the *drift* J(x)ᵀr(x) − γ goes into the right-hand side: the estimate converges to where the
 ///    true gradient is zero, whatever J is;
-///  - the *mismatch* μ = ‖J(x) − J‖ / ‖J‖ says how fast it does. J itself, and with it H and its
-///    factor, must be computed anew only if it is large.
+///  - the *mismatch* μ = ‖J(x) − J‖ / ‖J‖ tells how fast it does.
 ///
 /// For a relative measurement between poses of a Lie group, J δ is zero for every motion of both as
 /// a whole, however old J is, since frames stay where they are. What is left of an old J is wrong
@@ -58,11 +57,10 @@ class Models {
   /// The residual changes by Σ J_k δ_k; steps[k] is null where δ_k is zero. Returns whether it is
   /// the first time since the factor was last evaluated.
   bool move(int f, const double* const* steps);
-  /// Evaluates the factor again: its drift goes into the gradient.
-  void correct(int f, const Graph& graph, const States& states, System& system,
-               std::span<const std::uint8_t> held);
-  /// μ = ‖J(x) − J‖ / ‖J‖ of the factor that has just been evaluated.
-  double mismatch(int f, const States& states);
+  /// Evaluates the factor again: its drift goes into the gradient. Returns its mismatch, if it is
+  /// to `compare` Jacobians.
+  double correct(int f, const Graph& graph, const States& states, System& system,
+                 std::span<const std::uint8_t> held, bool compare);
   /// g_v: minus the gradient of all its factors at the current estimate, as far as it is known.
   void right_hand_side(System& system, const States& states, std::int32_t v) const;
 
@@ -76,7 +74,6 @@ class Models {
   double cost_now(int f, const Graph& graph, const States& states) const;
   /// J of all its variables side by side, rows × scalars, column-major.
   const double* jacobian(int f) const { return values_.data() + records_[f].place; }
-  std::int32_t scalars(int f) const { return records_[f].scalars; }
   std::int64_t doubles() const { return std::ssize(values_); }
 
  private:

@@ -34,6 +34,7 @@ class States {
       } else {
         std::copy(values.begin(), values.end(), x_.begin() + records_[change.index].place);
         records_[change.index].known = false;
+        records_[change.index].away = records_[change.index].group;
       }
     }
     remember();

@@ -16,7 +16,7 @@ std::int32_t System::add_variable(std::int32_t size) {
   g_.resize(scalars_, 0.0);
   pending_.resize(scalars_, 0.0);
   gradient_.resize(scalars_, 0.0);
-  summed_.push_back(0);
+  counts_all_.push_back(0);
   change_.resize(scalars_, 0.0);
   aside_.resize(scalars_, 0.0);
   return variables() - 1;
@@ -60,20 +60,31 @@ std::int32_t System::find(std::int32_t a, std::int32_t b) const {
   return link->entry;
 }
 
-void System::sum(std::int32_t v) {
-  if (summed_[v] != 0) return;
-  summed_[v] = 1;
+void System::count_all(std::int32_t v) {
+  if (counts_all_[v] != 0) return;
+  counts_all_[v] = 1;
   for (std::int64_t k = offsets_[v]; k < offsets_[v] + sizes_[v]; ++k)
     change_[k] -= std::exchange(aside_[k], 0.0);
 }
 
-void System::settle(std::int32_t v, bool set_aside) {
-  summed_[v] = 0;
+void System::mark_solved(std::int32_t v) {
+  counts_all_[v] = 0;
   for (std::int64_t k = offsets_[v]; k < offsets_[v] + sizes_[v]; ++k) {
     change_[k] += g_[k];
-    if (set_aside) aside_[k] += g_[k];
     pending_[k] = 0.0;
   }
+}
+
+void System::set_aside(std::int32_t v) {
+  mark_solved(v);
+  for (std::int64_t k = offsets_[v]; k < offsets_[v] + sizes_[v]; ++k)
+    aside_[k] += std::exchange(g_[k], 0.0);
+}
+
+void System::clear_gradient(std::int32_t v) {
+  for (std::vector<double>* vector : {&gradient_, &change_, &pending_, &aside_})
+    std::fill_n(vector->begin() + offsets_[v], sizes_[v], 0.0);
+  counts_all_[v] = 1;
 }
 
 bool System::has_set_aside(std::int32_t v) const {
@@ -85,7 +96,7 @@ void System::clear_values() {
   std::ranges::fill(values_, 0.0);
   for (std::vector<double>* vector : {&g_, &pending_, &gradient_, &change_, &aside_})
     std::ranges::fill(*vector, 0.0);
-  std::ranges::fill(summed_, 0);
+  std::ranges::fill(counts_all_, 0);
 }
 
 /// Room for so many doubles, set to zero.

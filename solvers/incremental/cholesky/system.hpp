@@ -48,21 +48,26 @@ class System {
   double* g(std::int32_t v) { return g_.data() + offsets_[v]; }
   const double* g(std::int32_t v) const { return g_.data() + offsets_[v]; }
 
-  /// Σ Jᵀr over a variable's factors as far as it has not been solved for, as seen from the
-  /// variable; not kept up to date while `summed(v)` says so, since what follows says it then.
-  double* pending(std::int32_t v) { return pending_.data() + offsets_[v]; }
-  bool summed(std::int32_t v) const { return summed_[v] != 0; }
-  /// From here on the sums tell, and what had been set aside counts again.
-  void sum(std::int32_t v);
-  /// g_v has been solved for; or is set aside: it counts as if it had been, until `sum`.
-  void settle(std::int32_t v, bool set_aside);
-  bool has_set_aside(std::int32_t v) const;
+  // The gradient of a variable, −g_v: either all of it, `gradient` and `change`, or what has come
+  // since it was last solved for, `pending`.
+
   /// Σ Jᵀr over a variable's factors, each when it was last evaluated, as seen from the variable.
   double* gradient(std::int32_t v) { return gradient_.data() + offsets_[v]; }
-  const double* gradient(std::int32_t v) const { return gradient_.data() + offsets_[v]; }
   /// What steps have changed in it since, in the variable's frame.
   double* change(std::int32_t v) { return change_.data() + offsets_[v]; }
-  const double* change(std::int32_t v) const { return change_.data() + offsets_[v]; }
+  /// Σ Jᵀr of the factors that have come since g_v was last solved for, as seen from the variable.
+  double* pending(std::int32_t v) { return pending_.data() + offsets_[v]; }
+  bool counts_all(std::int32_t v) const { return counts_all_[v] != 0; }
+  /// All of the gradient counts from here on, with what had been set aside.
+  void count_all(std::int32_t v);
+  /// g_v has been solved for.
+  void mark_solved(std::int32_t v);
+  /// g_v counts as if it had been solved for, until all of the gradient counts again.
+  void set_aside(std::int32_t v);
+  bool has_set_aside(std::int32_t v) const;
+  /// For a variable that no factor in H is on: its gradient is zero, without what rounding has
+  /// left.
+  void clear_gradient(std::int32_t v);
 
   /// H and all vectors become zero; the blocks stay.
   void clear_values();
@@ -86,7 +91,7 @@ class System {
   std::vector<std::vector<std::int64_t>> free_values_;  // by number of doubles
   AlignedVector values_;
   std::vector<double> g_, pending_, gradient_, change_, aside_;
-  std::vector<std::uint8_t> summed_;
+  std::vector<std::uint8_t> counts_all_;  // by variable
   std::int64_t scalars_ = 0;
 };
 

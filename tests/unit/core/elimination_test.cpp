@@ -133,14 +133,20 @@ TEST(Elimination, AHeldVariableThatLeavesStillHoldsTheRest) {
   expect_same_rest(whole, held, rest);
 }
 
-TEST(Elimination, AnAnchorThatLeavesStillAnchorsTheRest) {
+/// Four poses, with nothing that ties them to the world.
+Graph chain_of_odometry() {
   test::PlanarTypes types;
-  Graph whole;
+  Graph graph;
   for (int k = 0; k < 4; ++k)
-    whole.add_variable(types.pose, k, std::array{1.1 * k, 0.1 * k, 0.2 * k});
+    graph.add_variable(types.pose, k, std::array{1.1 * k, 0.1 * k, 0.2 * k});
   for (int k = 1; k < 4; ++k)
-    whole.add_factor(types.relative_pose, std::array{k - 1, k}, std::array{1.0, 0.0, 0.1},
+    graph.add_factor(types.relative_pose, std::array{k - 1, k}, std::array{1.0, 0.0, 0.1},
                      unit_information(3));
+  return graph;
+}
+
+TEST(Elimination, AnAnchorThatLeavesStillAnchorsTheRest) {
+  const Graph whole = chain_of_odometry();
   const Gauge gauge = resolve_gauge(whole);
   ASSERT_THAT(gauge.anchored, ElementsAre(0));
   const Graph rest = marginalized(whole, {0, 1}, gauge.held);
@@ -149,13 +155,7 @@ TEST(Elimination, AnAnchorThatLeavesStillAnchorsTheRest) {
 }
 
 TEST(Elimination, RelativeMeasurementsLeaveARelativePrior) {
-  test::PlanarTypes types;
-  Graph whole;
-  for (int k = 0; k < 4; ++k)
-    whole.add_variable(types.pose, k, std::array{1.1 * k, 0.1 * k, 0.2 * k});
-  for (int k = 1; k < 4; ++k)
-    whole.add_factor(types.relative_pose, std::array{k - 1, k}, std::array{1.0, 0.0, 0.1},
-                     unit_information(3));
+  const Graph whole = chain_of_odometry();
   const std::vector<bool> held = resolve_gauge(whole).held;
   const Graph rest = marginalized(whole, {2}, held);
   ASSERT_EQ(rest.factor_count(), 2);

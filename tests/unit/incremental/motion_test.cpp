@@ -69,7 +69,7 @@ class Chain {
   std::size_t solve(double tolerance) {
     for (int v = 1; v < kPoses; ++v) {
       models_.right_hand_side(system_, states_, v);
-      system_.settle(v, false);
+      system_.mark_solved(v);
       if (std::any_of(system_.g(v), system_.g(v) + system_.size(v),
                       [](double g) { return std::abs(g) > 1e-9; }))
         sources_.push_back(v);

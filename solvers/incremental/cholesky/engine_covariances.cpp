@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Covariances that somebody asks for.
+#include <algorithm>
+
+#include <Eigen/Core>
+
+#include "engine.hpp"
+
+namespace cairn::incremental {
+
+/// Σ_ab in the variables' frames becomes T_a Σ_ab T_bᵀ: as seen from the poses.
+void Engine::as_seen_from(int a, int b, double* block, std::int64_t stride) {
+  const std::int32_t rows = system_.size(a), columns = system_.size(b);
+  using Block = Eigen::Map<Eigen::MatrixXd, 0, Eigen::OuterStride<>>;
+  Block sigma(block, rows, columns, Eigen::OuterStride<>(stride));
+  const auto turn = [&](int v, std::int32_t size) {
+    return Eigen::Map<const Eigen::MatrixXd>(states_.frame_to_body(v), size, size);
+  };
+  tree_.settle(a);
+  tree_.settle(b);
+  if (states_.away(a)) sigma = (turn(a, rows) * sigma).eval();
+  if (states_.away(b)) sigma = (sigma * turn(b, columns).transpose()).eval();
+}
+
+bool Engine::covariance(int a, int b, double* block) {
+  const std::int32_t rows = system_.size(a), columns = system_.size(b);
+  if (const double* kept = covariances_.kept(a, b); kept && !broken_) {
+    std::copy_n(kept, rows * columns, block);
+    as_seen_from(a, b, block, rows);
+    return true;
+  }
+  const std::int32_t row = a;
+  return covariance_column({&row, 1}, b, block);
+}
+
+bool Engine::covariance_column(std::span<const std::int32_t> rows, int b, double* column) {
+  std::int64_t height = 0;
+  for (const std::int32_t v : rows) height += system_.size(v);
+  const std::int32_t columns = system_.size(b);
+  std::fill_n(column, height * columns, 0.0);
+  if (held_[b]) return true;
+  if (broken_ || tree_.node_of(b) < 0) return false;
+  AlignedVector X(static_cast<std::size_t>(system_.scalars()) * 8);
+  const std::int32_t source = b;
+  for (std::int32_t first = 0; first < columns; first += 8) {
+    const std::int32_t width = std::min(8, columns - first);
+    std::ranges::fill(X, 0.0);
+    for (std::int32_t k = 0; k < width; ++k)
+      X[static_cast<std::size_t>(system_.offset(b) + first + k) * 8 + k] = 1.0;
+    if (rows.size() == 1) {
+      const std::int32_t both[2] = {source, rows[0]};
+      tree_.solve_many_above(held_[rows[0]] ? std::span(both, 1) : std::span(both), X);
+    } else {
+      tree_.solve_many({&source, 1}, X);
+    }
+    double* out = column + std::int64_t{first} * height;
+    for (std::int32_t k = 0; k < width; ++k) {
+      for (const std::int32_t v : rows) {
+        for (std::int32_t r = 0; r < system_.size(v); ++r)
+          *out++ = held_[v] ? 0.0 : X[static_cast<std::size_t>(system_.offset(v) + r) * 8 + k];
+      }
+    }
+  }
+  std::int64_t row = 0;
+  for (const std::int32_t v : rows) {
+    if (!held_[v]) as_seen_from(v, b, column + row, height);
+    row += system_.size(v);
+  }
+  return true;
+}
+
+}  // namespace cairn::incremental
