@@ -1,13 +1,18 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // cairn evaluate ESTIMATE TRUTH: errors of a trajectory.
+#include <cmath>
+#include <limits>
 #include <memory>
-#include <set>
+#include <optional>
+#include <utility>
 
 #include <fmt/format.h>
 
+#include "cairn/error.hpp"
 #include "cairn/trajectory.hpp"
 #include "commands.hpp"
 #include "graph_files.hpp"
+#include "help.hpp"
 #include "json_report.hpp"
 #include "table.hpp"
 
@@ -16,29 +21,103 @@ namespace {
 
 namespace json = boost::json;
 
-struct EvaluateOptions {
-  std::string estimate;
-  std::string truth;
-  InputOptions input;
+/// One of the two trajectories.
+struct TrajectoryOptions {
+  std::string file;
+  std::string stamps;  ///< file of time stamps; empty: those of the trajectory's own file, if any
+  std::string axes = "robot";
 };
 
-std::int64_t missing_from(const Trajectory& poses, const Trajectory& other) {
-  std::set<Id> ids;
-  for (const TrajectoryPose& pose : other) ids.insert(pose.id);
-  std::int64_t count = 0;
-  for (const TrajectoryPose& pose : poses) count += !ids.contains(pose.id);
-  return count;
+struct EvaluateOptions {
+  TrajectoryOptions estimate, truth;
+  InputOptions input;
+  std::string match;  ///< id or stamp; empty: what fits the files
+  std::optional<double> offset, max_time_difference;
+  bool planar = false;
+
+  StampMatching matching() const {
+    StampMatching m;
+    m.offset = offset.value_or(m.offset);
+    m.max_difference = max_time_difference.value_or(m.max_difference);
+    return m;
+  }
+};
+
+// Reading -----------------------------------------------------------------------------------------
+
+void set_stamps(Trajectory& poses, const std::vector<double>& stamps,
+                const TrajectoryOptions& options) {
+  if (stamps.size() != poses.size()) {
+    throw Error(ErrorCode::input,
+                fmt::format("{}: {} for {} of {}; expected one for each pose, by rising id",
+                            options.stamps.empty() ? options.file : options.stamps,
+                            plural(static_cast<std::int64_t>(stamps.size()), "stamp"),
+                            plural(static_cast<std::int64_t>(poses.size()), "pose"), options.file));
+  }
+  for (std::size_t k = 0; k < poses.size(); ++k) poses[k].stamp = stamps[k];
+}
+
+Trajectory load_trajectory(const TrajectoryOptions& options, const EvaluateOptions& all,
+                           Session& session) {
+  const LoadedGraph loaded = load_graph(options.file, all.input, session);
+  Trajectory poses = trajectory(loaded.graph);
+  if (!options.stamps.empty()) {
+    set_stamps(poses, read_stamps(options.stamps), options);
+  } else if (!loaded.report.stamps.empty()) {
+    set_stamps(poses, loaded.report.stamps, options);
+  }
+  if (options.axes == "camera") poses = camera_to_robot_axes(std::move(poses));
+  if (all.planar) poses = projected_to_plane(std::move(poses));
+  return poses;
+}
+
+// Pairs -------------------------------------------------------------------------------------------
+
+/// What was asked for that only stamps can do; empty if nothing was.
+std::string option_about_stamps(const EvaluateOptions& options) {
+  if (!options.estimate.stamps.empty()) return "--stamps";
+  if (!options.truth.stamps.empty()) return "--truth-stamps";
+  if (options.offset) return "--offset";
+  if (options.max_time_difference) return "--max-time-difference";
+  return options.match == "stamp" ? "--match stamp" : "";
+}
+
+void need_stamps(const Trajectory& poses, const std::string& file, const std::string& reason,
+                 const std::string& remedy) {
+  if (poses.empty() || poses.front().stamp) return;
+  throw Error(ErrorCode::usage, fmt::format("{}: has no time stamps, which {} asks for; give them "
+                                            "with {} FILE, one a line",
+                                            file, reason, remedy));
+}
+
+bool match_by_stamp(const EvaluateOptions& options, const Trajectory& estimate,
+                    const Trajectory& truth) {
+  const std::string reason = option_about_stamps(options);
+  if (reason.empty()) return options.match != "id" && stamps_tell_more(estimate, truth);
+  if (options.match == "id") {
+    throw Error(ErrorCode::usage,
+                fmt::format("--match id does not look at time stamps; leave out {}", reason));
+  }
+  need_stamps(estimate, options.estimate.file, reason, "--stamps");
+  need_stamps(truth, options.truth.file, reason, "--truth-stamps");
+  return true;
 }
 
 void warn_of_missing(std::int64_t count, const std::string& in, const std::string& not_in,
-                     const Session& session) {
+                     bool by_stamp, const Session& session) {
   if (count == 0) return;
-  session.note(fmt::format("{} of {} {} not in {} and left out", plural(count, "pose"), in,
-                           count == 1 ? "is" : "are", not_in));
+  const std::string verb = by_stamp ? (count == 1 ? "has no match" : "have no match")
+                                    : (count == 1 ? "is not" : "are not");
+  session.note(
+      fmt::format("{} of {} {} in {} and left out", plural(count, "pose"), in, verb, not_in));
 }
 
-std::string table_text(const TrajectoryError& error, bool colour) {
-  Table table({{fmt::format("{} compared", plural(error.poses, "pose")), Table::Align::left},
+// Results -----------------------------------------------------------------------------------------
+
+std::string table_text(const TrajectoryError& error, bool by_stamp, bool colour) {
+  Table table({{fmt::format("{} compared{}", plural(error.poses, "pose"),
+                            by_stamp ? ", matched by time" : ""),
+                Table::Align::left},
                {"translation [m]", Table::Align::right},
                {"rotation [deg]", Table::Align::right}});
   const auto row = [&](const char* name, double translation, double rotation) {
@@ -54,29 +133,75 @@ json::object error_json(double translation, double rotation) {
   return {{"translation", translation}, {"rotation", rotation}};
 }
 
-int run(const EvaluateOptions& options, Session& session) {
-  session.use_threads();
-  const Trajectory estimate =
-      trajectory(load_graph(options.estimate, options.input, session).graph);
-  const Trajectory truth = trajectory(load_graph(options.truth, options.input, session).graph);
-  const TrajectoryError error = compare(estimate, truth);
-  const std::int64_t only_estimate = missing_from(estimate, truth);
-  const std::int64_t only_truth = missing_from(truth, estimate);
-  warn_of_missing(only_estimate, options.estimate, options.truth, session);
-  warn_of_missing(only_truth, options.truth, options.estimate, session);
+json::object association_json(const EvaluateOptions& options, bool by_stamp,
+                              const TrajectoryPairs& pairs) {
+  if (!by_stamp) return {{"by", "id"}};
+  const StampMatching matching = options.matching();
+  return {{"by", "stamp"},
+          {"offset", matching.offset},
+          {"max_time_difference", matching.max_difference},
+          {"largest_time_difference", pairs.largest_difference}};
+}
 
+json::object report_json(const EvaluateOptions& options, bool by_stamp,
+                         const TrajectoryPairs& pairs, const TrajectoryError& error) {
   json::object report = begin_report("evaluate");
-  report["estimate"] = options.estimate;
-  report["truth"] = options.truth;
+  report["estimate"] = options.estimate.file;
+  report["truth"] = options.truth.file;
+  report["association"] = association_json(options, by_stamp, pairs);
+  report["axes"] = {{"estimate", options.estimate.axes}, {"truth", options.truth.axes}};
+  report["planar"] = options.planar;
   report["poses"] = {{"compared", error.poses},
-                     {"only_in_estimate", only_estimate},
-                     {"only_in_truth", only_truth}};
+                     {"only_in_estimate", pairs.only_in_estimate},
+                     {"only_in_truth", pairs.only_in_truth}};
   report["ate"] = error_json(error.ate_translation, error.ate_rotation);
   report["rpe"] = error_json(error.rpe_translation, error.rpe_rotation);
   report["rpe_all"] = error_json(error.rpe_all_translation, error.rpe_all_rotation);
-  session.write_json(report);
-  session.print(table_text(error, session.colour()));
+  return report;
+}
+
+// The command -------------------------------------------------------------------------------------
+
+int run(const EvaluateOptions& options, Session& session) {
+  session.use_threads();
+  const Trajectory estimate = load_trajectory(options.estimate, options, session);
+  const Trajectory truth = load_trajectory(options.truth, options, session);
+  const bool by_stamp = match_by_stamp(options, estimate, truth);
+  const TrajectoryPairs pairs =
+      by_stamp ? pair_by_stamp(estimate, truth, options.matching()) : pair_by_id(estimate, truth);
+  const TrajectoryError error = compare(pairs);
+  warn_of_missing(pairs.only_in_estimate, options.estimate.file, options.truth.file, by_stamp,
+                  session);
+  warn_of_missing(pairs.only_in_truth, options.truth.file, options.estimate.file, by_stamp,
+                  session);
+  session.write_json(report_json(options, by_stamp, pairs, error));
+  session.print(table_text(error, by_stamp, session.colour()));
   return 0;
+}
+
+/// A finite number from `least`.
+CLI::Validator seconds(double least) {
+  const auto check = [least](const std::string& text) {
+    double value = 0.0;
+    const bool good =
+        CLI::detail::lexical_cast(text, value) && std::isfinite(value) && value >= least;
+    return good ? std::string()
+                : fmt::format("'{}' is no number of seconds{}", text,
+                              least == 0.0 ? ", from 0" : "");
+  };
+  return {check, ""};
+}
+
+void add_trajectory_options(CLI::App& app, TrajectoryOptions& options, const std::string& prefix,
+                            const std::string& name) {
+  app.add_option("--" + prefix + "stamps", options.stamps,
+                 "time stamps of " + name + ", one a line, by rising id")
+      ->type_name("FILE");
+  app.add_option("--" + prefix + "axes", options.axes,
+                 "of " + name + ": robot (x ahead, z up) or camera (z ahead, y down)")
+      ->type_name("AXES")
+      ->check(one_of({"robot", "camera"}))
+      ->capture_default_str();
 }
 
 }  // namespace
@@ -85,12 +210,28 @@ Command add_evaluate(CLI::App& program) {
   auto options = std::make_shared<EvaluateOptions>();  // lives as long as the parser and the run
   CLI::App* app =
       program.add_subcommand("evaluate", "errors of an estimate against the ground truth");
-  app->add_option("estimate", options->estimate, "graph or trajectory")
+  app->add_option("estimate", options->estimate.file, "graph or trajectory")
       ->type_name("ESTIMATE")
       ->required();
-  app->add_option("truth", options->truth, "the same poses, by id, at their true places")
+  app->add_option("truth", options->truth.file, "the same poses, by id or time, where they were")
       ->type_name("TRUTH")
       ->required();
+  app->add_option("--match", options->match,
+                  "pair poses by id or stamp; else by stamp where both have times")
+      ->type_name("BY")
+      ->check(one_of({"id", "stamp"}));
+  app->add_option("--max-time-difference", options->max_time_difference,
+                  "how far apart the stamps of a pair may be [s]")
+      ->type_name("S")
+      ->check(seconds(0.0))
+      ->default_str("0.01");
+  app->add_option("--offset", options->offset, "added to the stamps of ESTIMATE [s]")
+      ->type_name("S")
+      ->check(seconds(std::numeric_limits<double>::lowest()))
+      ->default_str("0");
+  add_trajectory_options(*app, options->estimate, "", "ESTIMATE");
+  add_trajectory_options(*app, options->truth, "truth-", "TRUTH");
+  app->add_flag("--planar", options->planar, "compare x, y and yaw only, as seen on a map");
   add_input_options(*app, options->input);
   app->footer(
       "Root mean squares: ATE after the rigid motion that brings ESTIMATE nearest to TRUTH, RPE "
@@ -98,7 +239,8 @@ Command add_evaluate(CLI::App& program) {
       "consecutive poses, RPE all to all over every pair; translation in metres, rotation in "
       "degrees.\n\n"
       "Example:\n"
-      "  cairn evaluate best.g2o truth.g2o --json errors.json");
+      "  cairn evaluate best.g2o truth.g2o --json errors.json\n"
+      "  cairn evaluate slam.tum poses.txt --truth-stamps times.txt --truth-axes camera");
   return {app, [options](Session& session) { return run(*options, session); }};
 }
 

@@ -45,7 +45,9 @@ LoadedGraph generate_graph(const std::string& name, Session& session) {
   Registry& registry = session.registry();
   const std::uint64_t seed = take_seed(spec, registry.options(Generator::kKind, spec.name));
   LoadedGraph loaded;
-  loaded.graph = registry.make<Generator>(spec)->generate(registry, seed).graph;
+  Simulation simulation = registry.make<Generator>(spec)->generate(registry, seed);
+  loaded.graph = std::move(simulation.graph);
+  loaded.truth = std::move(simulation.truth);
   loaded.report.format = "generated";
   return loaded;
 }

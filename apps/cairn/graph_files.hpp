@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include <CLI/App.hpp>
@@ -24,6 +25,7 @@ inline constexpr const char* kGraphHelp =
 
 struct LoadedGraph {
   Graph graph;
+  std::optional<Graph> truth;  ///< of a graph that was generated
   ReadReport report;
   std::string name;      ///< as on the command line
   double seconds = 0.0;  ///< that reading took

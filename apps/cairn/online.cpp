@@ -12,14 +12,17 @@
 #include "cairn/estimator.hpp"
 #include "cairn/format.hpp"
 #include "cairn/journal.hpp"
+#include "cairn/pose_policy.hpp"
 #include "cairn/threads.hpp"
 #include "commands.hpp"
+#include "compact_run.hpp"
 #include "graph_files.hpp"
 #include "help.hpp"
 #include "interrupt.hpp"
 #include "json_report.hpp"
 #include "line_input.hpp"
 #include "online_session.hpp"
+#include "policy_session.hpp"
 #include "problem_setup.hpp"
 #include "table.hpp"
 
@@ -28,8 +31,11 @@ namespace {
 
 namespace json = boost::json;
 
+constexpr const char* kDefaultEstimator = "incremental_cholesky";
+
 struct OnlineOptions {
-  std::string estimator = "incremental_cholesky";
+  std::string estimator;  ///< empty: the default, or the policy's own
+  std::string policy;     ///< empty: everything is taken in
   InputOptions input;
   std::string solve = "auto";
   std::string estimates = "last";
@@ -47,10 +53,10 @@ struct Counts {
 };
 
 /// What must be the same for a journal to give the same estimate again.
-std::string identity(const OnlineOptions& options, const Session& session) {
+std::string identity(const OnlineOptions& options, const std::string& who, const Session& session) {
   const std::string types = fmt::format("{}", fmt::join(session.common.types, " "));
-  return fmt::format("estimator {}, types {}, format {}{}, loss {} on {}, solve {}",
-                     options.estimator, types.empty() ? "as they are" : types, options.input.format,
+  return fmt::format("{}, types {}, format {}{}, loss {} on {}, solve {}", who,
+                     types.empty() ? "as they are" : types, options.input.format,
                      options.input.read.repair_information ? " with repairs" : "",
                      options.problem.loss.empty() ? "none" : options.problem.loss,
                      options.problem.loss_on, options.solve);
@@ -61,26 +67,18 @@ Journal::Sync sync_of(const std::string& name) {
   return name == "none" ? Journal::Sync::none : Journal::Sync::batch;
 }
 
-/// "ERROR line N: …" on one line. The format's messages begin with the place themselves.
-std::string error_line(std::int64_t number, std::string message) {
-  const std::string place = fmt::format("input:{}: ", number);
-  if (message.starts_with(place)) message.erase(0, place.size());
-  std::ranges::replace(message, '\n', ' ');
-  return fmt::format("ERROR line {}: {}\n", number, message);
-}
-
 /// The conversation: lines in, answers out, the journal in between.
 class Conversation {
  public:
-  Conversation(OnlineSession& online, std::optional<Journal>& journal, Counts& counts)
-      : online_(online), journal_(journal), counts_(counts) {}
+  Conversation(LineSession& lines, std::optional<Journal>& journal, Counts& counts)
+      : lines_(lines), journal_(journal), counts_(counts) {}
 
   /// Takes in again what the journal has. Returns the number of the last line.
   std::int64_t restore() {
     std::int64_t number = 0;
     for (const Journal::Record& record : journal_->take_records()) {
       try {
-        online_.restore(record.text, record.number);
+        lines_.restore(record.text, record.number);
       } catch (const Error& error) {
         throw Error(error.code(), fmt::format("the journal's line {} was taken before and is now "
                                               "refused: {}",
@@ -95,19 +93,13 @@ class Conversation {
   /// False once the conversation is over.
   bool take(const std::string& line, std::int64_t number) {
     ++counts_.lines;
-    OnlineSession::Reply reply;
-    try {
-      reply = online_.take(line, number);
-    } catch (const Error& error) {
-      ++counts_.refused;
-      write_stdout(error_line(number, error.what()));
-      return true;
-    }
-    counts_.taken += reply.changes;
+    const LineSession::Reply reply = lines_.take(line, number);
+    counts_.refused += reply.refused;
+    counts_.taken += reply.changes && !reply.refused;
     if (reply.solved) {
       ++counts_.solves;
-      counts_.solve_seconds += online_.last_seconds();
-      counts_.longest = std::max(counts_.longest, online_.last_seconds());
+      counts_.solve_seconds += reply.seconds;
+      counts_.longest = std::max(counts_.longest, reply.seconds);
     }
     if (journal_ && reply.changes) journal_->append(number, line);
     if (!reply.text.empty()) {
@@ -119,18 +111,19 @@ class Conversation {
   }
 
  private:
-  OnlineSession& online_;
+  LineSession& lines_;
   std::optional<Journal>& journal_;
   Counts& counts_;
 };
 
 json::object report_json(const OnlineOptions& options, const Counts& counts,
-                         const Estimator& estimator) {
+                         const LineSession& lines) {
   json::object report = begin_report("online");
-  report["estimator"] = options.estimator;
+  report["estimator"] = text_json(options.estimator);
+  report["policy"] = text_json(options.policy);
   report["threads"] = threads();
-  report["graph"] = {{"variables", estimator.variable_count()},
-                     {"factors", estimator.factor_count()}};
+  report["graph"] = {{"variables", lines.variable_count()}, {"factors", lines.factor_count()}};
+  lines.add_to(report);
   report["lines"] = {{"read", counts.lines},
                      {"taken", counts.taken},
                      {"refused", counts.refused},
@@ -143,42 +136,87 @@ json::object report_json(const OnlineOptions& options, const Counts& counts,
   return report;
 }
 
+/// Who listens: a session with what it talks to.
+struct Listener {
+  std::unique_ptr<StreamFormat> format;
+  std::unique_ptr<Estimator> estimator;  ///< null: the policy has one
+  std::unique_ptr<PosePolicy> policy;    ///< null: everything is taken in
+  std::string identity;                  ///< of the journal
+  std::unique_ptr<LineSession> lines;
+};
+
+Listener follow_graph(const OnlineOptions& options, const ProblemSetup& setup, Session& session) {
+  Registry& registry = session.registry();
+  Listener listener;
+  listener.identity = identity(options, "estimator " + options.estimator, session);
+  listener.format = registry.make<StreamFormat>(options.input.format);
+  listener.estimator = registry.make<Estimator>(options.estimator);
+  listener.estimator->set_loss(setup.loss(), setup.loss_scope());
+  if (options.marginals != "none") {
+    listener.estimator->keep_marginals(options.marginals == "last" ? KeptMarginals::last
+                                                                   : KeptMarginals::diagonal);
+  }
+  listener.lines =
+      std::make_unique<OnlineSession>(*listener.estimator, *listener.format, registry,
+                                      OnlineSettings{.read = options.input.read,
+                                                     .automatic = options.solve == "auto",
+                                                     .output = options.estimates,
+                                                     .marginals = options.marginals,
+                                                     .budget = options.budget});
+  return listener;
+}
+
+Listener follow_policy(const OnlineOptions& options, const ProblemSetup& setup, Session& session) {
+  Registry& registry = session.registry();
+  ComponentSpec spec = parse_component(options.policy);
+  if (!options.estimator.empty() && !spec.values.emplace("estimator", options.estimator).second)
+    throw Error(ErrorCode::usage, "--estimator, and one among the policy's options: give one");
+  Listener listener;
+  // What is written at the end of a pose is read before, which may cost the last bits their place.
+  listener.identity = identity(options,
+                               fmt::format("policy {}, output {}, marginals {}", spec_text(spec),
+                                           options.estimates, options.marginals),
+                               session);
+  listener.format = registry.make<StreamFormat>(options.input.format);
+  listener.policy = registry.make<PosePolicy>(spec);
+  listener.policy->estimator().set_loss(setup.loss(), setup.loss_scope());
+  listener.lines = std::make_unique<PolicySession>(
+      *listener.policy, *listener.format, registry,
+      PolicySettings{options.input.read, options.estimates, options.marginals});
+  return listener;
+}
+
 void check(const OnlineOptions& options, Session& session) {
   session.write_file_to_stdout();  // standard output is the conversation's
   if (options.output == "-")
     throw Error(ErrorCode::usage, "-o writes a file; standard output is for answers");
+  if (!options.policy.empty() && (options.solve != "auto" || options.budget > 0.0)) {
+    throw Error(ErrorCode::usage,
+                "a policy solves when it has to: --solve explicit and --budget are for runs "
+                "without --policy");
+  }
   check_output(options.output, "", session);
   if (!options.journal.empty()) check_folder(options.journal);
 }
 
-int run(const OnlineOptions& options, Session& session) {
+int run(OnlineOptions options, Session& session) {
   check(options, session);
   session.use_threads();
-  Registry& registry = session.registry();
-  const auto estimator = registry.make<Estimator>(options.estimator);
-  const auto format = registry.make<StreamFormat>(options.input.format);
-  const ProblemSetup setup(options.problem, registry);
-  estimator->set_loss(setup.loss(), setup.loss_scope());
-  if (options.marginals != "none") {
-    estimator->keep_marginals(options.marginals == "last" ? KeptMarginals::last
-                                                          : KeptMarginals::diagonal);
-  }
-  OnlineSession online(*estimator, *format, registry,
-                       {.read = options.input.read,
-                        .automatic = options.solve == "auto",
-                        .output = options.estimates,
-                        .marginals = options.marginals,
-                        .budget = options.budget});
+  if (options.policy.empty() && options.estimator.empty()) options.estimator = kDefaultEstimator;
+  const ProblemSetup setup(options.problem, session.registry());
+  const Listener listener = options.policy.empty() ? follow_graph(options, setup, session)
+                                                   : follow_policy(options, setup, session);
+  LineSession& lines = *listener.lines;
   std::optional<Journal> journal;
   Counts counts;
-  Conversation conversation(online, journal, counts);
+  Conversation conversation(lines, journal, counts);
   std::int64_t number = 0;
   if (!options.journal.empty()) {
-    journal.emplace(options.journal, identity(options, session), sync_of(options.sync));
+    journal.emplace(options.journal, listener.identity, sync_of(options.sync));
     session.note(journal->note());
     number = conversation.restore();
     write_stdout(fmt::format("RESTORED {} variables {} factors {}\n", number,
-                             estimator->variable_count(), estimator->factor_count()));
+                             lines.variable_count(), lines.factor_count()));
   }
 
   const InterruptGuard guard;
@@ -186,8 +224,10 @@ int run(const OnlineOptions& options, Session& session) {
   for (std::string line; input.next(line) && conversation.take(line, ++number);) {
   }
   if (journal) journal->commit();
-  if (!options.output.empty()) write_graph(estimator->graph(), options.output, registry);
-  session.write_json(report_json(options, counts, *estimator));
+  lines.finish();
+  if (!options.output.empty())
+    write_graph(lines.estimator().graph(), options.output, session.registry());
+  session.write_json(report_json(options, counts, lines));
   return guard.interrupted() ? kExitInterrupted : 0;
 }
 
@@ -201,7 +241,10 @@ Command add_online(CLI::App& program) {
   app->add_option("--estimator", options->estimator,
                   "who estimates, with options as NAME:key=value")
       ->type_name("NAME")
-      ->capture_default_str();
+      ->default_str(kDefaultEstimator);
+  app->add_option("--policy", options->policy,
+                  "who decides what is kept, such as compact_pose; otherwise everything is")
+      ->type_name("NAME");
   app->add_option("--solve", options->solve, "auto, after every measurement, or explicit: by SOLVE")
       ->type_name("WHEN")
       ->check(one_of({"auto", "explicit"}))
@@ -224,7 +267,7 @@ Command add_online(CLI::App& program) {
                   "log what is taken in, and begin with what the log has")
       ->type_name("FILE");
   app->add_option("--sync", options->sync,
-                  "the journal waits for the disk: every line, batch (before answers) or none")
+                  "it waits for the disk: every line, batch (before answers) or none")
       ->type_name("WHEN")
       ->check(one_of({"every", "batch", "none"}))
       ->capture_default_str();
@@ -235,7 +278,7 @@ Command add_online(CLI::App& program) {
   app->footer(
       "Lines are those of g2o files and SOLVE, FULL, NEW, REMOVE, CHANGE, MARGINALIZE, "
       "COVARIANCE,\n"
-      "ESTIMATE, CHI2, SAVE and QUIT: docs/online.md.\n\n"
+      "ESTIMATE, CHI2, SAVE and QUIT; with --policy NEXT, NOMATCH and DONE: docs/online.md.\n\n"
       "Example:\n"
       "  robot | cairn online --marginals last --journal today.journal");
   return {app, [options](Session& session) { return run(*options, session); }};

@@ -2,8 +2,6 @@
 #include "online_session.hpp"
 
 #include <algorithm>
-#include <charconv>
-#include <cmath>
 #include <utility>
 
 #include <fmt/format.h>
@@ -13,49 +11,6 @@
 #include "cairn/format.hpp"
 
 namespace cairn::app {
-namespace {
-
-const std::string kInput = "input";  // what the format's messages call the stream
-
-Error bad_line(const std::string& message) { return {ErrorCode::input, message}; }
-
-std::vector<std::string_view> split(std::string_view line) {
-  std::vector<std::string_view> words;
-  for (std::size_t at = 0; (at = line.find_first_not_of(" \t\r", at)) != std::string_view::npos;) {
-    if (line[at] == '#') break;
-    const std::size_t end = std::min(line.find_first_of(" \t\r", at), line.size());
-    words.push_back(line.substr(at, end - at));
-    at = end;
-  }
-  return words;
-}
-
-template <class Number>
-Number parse(std::string_view word, std::string_view what) {
-  Number number{};
-  const auto [end, problem] = std::from_chars(word.data(), word.data() + word.size(), number);
-  if (problem != std::errc{} || end != word.data() + word.size())
-    throw bad_line(fmt::format("'{}' is no {}", word, what));
-  return number;
-}
-
-std::vector<std::int64_t> parse_ids(std::span<const std::string_view> words,
-                                    std::string_view what) {
-  if (words.empty()) throw bad_line(fmt::format("expected one {} or more", what));
-  std::vector<std::int64_t> ids;
-  for (const std::string_view word : words) ids.push_back(parse<std::int64_t>(word, what));
-  return ids;
-}
-
-void expect_words(const std::vector<std::string_view>& words, std::size_t count,
-                  std::string_view form) {
-  if (words.size() == count) return;
-  throw bad_line(
-      fmt::format("{} with {} words after it; expected '{}'", words[0], words.size() - 1, form));
-}
-
-}  // namespace
-
 OnlineSession::OnlineSession(Estimator& estimator, StreamFormat& format, Registry& registry,
                              OnlineSettings settings)
     : estimator_(estimator), format_(format), registry_(registry), settings_(std::move(settings)) {}
@@ -80,29 +35,18 @@ OnlineSession::Command OnlineSession::find_command(std::string_view word) {
   return nullptr;
 }
 
-OnlineSession::Reply OnlineSession::take(std::string_view line, std::int64_t number) {
-  line_ = number;
-  Reply reply;
-  const Words words = split(line);
-  if (words.empty()) return reply;
+void OnlineSession::perform(std::string_view line, const Words& words, Reply& reply) {
   if (const Command command = find_command(words[0])) {
     (this->*command)(words, reply);
   } else {
     take_data(line, reply);
   }
-  return reply;
-}
-
-void OnlineSession::restore(std::string_view line, std::int64_t number) {
-  silent_ = true;
-  take(line, number);
-  silent_ = false;
 }
 
 // Data ------------------------------------------------------------------------------------------
 
-void OnlineSession::take_data(std::string_view line, Reply& reply) {
-  StreamLine said = format_.read(line, kInput, line_, registry_, settings_.read);
+void OnlineSession::take_data(std::string_view text, Reply& reply) {
+  StreamLine said = format_.read(text, kStreamName, line(), registry_, settings_.read);
   for (NewVariable& variable : said.variables) take_variable(std::move(variable));
   for (NewFactor& factor : said.factors) take_factor(std::move(factor), reply);
   // Each is held or none: a line is taken in whole.
@@ -157,9 +101,9 @@ UpdateReport OnlineSession::update(GraphUpdate update, bool solve, bool full, Re
   follow(update, report);
   reply.changes = true;
   reply.solved = solve;
-  last_seconds_ = report.seconds.total;
+  if (solve) reply.seconds = report.seconds.total;
   owed_ = report.owed;
-  if (solve && !silent_) write_results(report, reply);
+  if (solve && !silent()) write_results(report, reply);
   return report;
 }
 
@@ -199,26 +143,13 @@ void OnlineSession::write_results(const UpdateReport& report, Reply& reply) {
   if (settings_.marginals == "diagonal") {
     for (const Id id : known_) write_covariance(id, id, reply.text);
   }
-  acknowledge(reply, report.ok ? "OK" : "SINGULAR");
-}
-
-void OnlineSession::acknowledge(Reply& reply, std::string_view word) const {
-  if (silent_) return;
-  reply.text += fmt::format("{} {} variables {} factors {} owed {}\n", word, line_,
-                            estimator_.variable_count(), estimator_.factor_count(), owed_);
+  acknowledge(reply, owed_, report.ok ? "OK" : "SINGULAR");
 }
 
 // Commands --------------------------------------------------------------------------------------
 
 void OnlineSession::declare(const Words& words, Reply& reply) {
-  expect_words(words, 3, "NEW TAG id");
-  if (!registry_.has("variable", words[1])) {
-    throw bad_line(fmt::format("there is no type of variable '{}'; on offer: {}", words[1],
-                               fmt::join(registry_.names("variable"), ", ")));
-  }
-  const Id id = parse<Id>(words[2], "id");
-  if (id < 0) throw bad_line(fmt::format("'{}' is no id; expected a whole number from 0", id));
-  take_variable({registry_.variable_type(words[1]), id, {}, false});
+  take_variable(declared_variable(words, registry_));
   reply.changes = true;
 }
 
@@ -239,12 +170,12 @@ void OnlineSession::remove(const Words& words, Reply& reply) {
     std::erase_if(waiting_,
                   [&](const NewVariable& v) { return std::ranges::count(ids, v.id) > 0; });
   }
-  if (!reply.solved) acknowledge(reply);
+  if (!reply.solved) acknowledge(reply, owed_);
 }
 
 void OnlineSession::change(const Words& words, Reply& reply) {
   if (words.size() < 3) throw bad_line("expected 'CHANGE k measurement… [information…]'");
-  ChangedFactor changed{parse<FactorId>(words[1], "number of a factor"), {}, {}};
+  ChangedFactor changed{parse_whole(words[1], "number of a factor"), {}, {}};
   const bool known = changed.factor >= 0 && changed.factor < std::ssize(factor_types_);
   const FactorType* type = known ? factor_types_[changed.factor].get() : nullptr;
   if (!type) throw bad_line(fmt::format("there is no factor {} that can be changed", words[1]));
@@ -259,22 +190,22 @@ void OnlineSession::change(const Words& words, Reply& reply) {
   }
   for (std::size_t k = 0; k < numbers.size(); ++k)
     (k < size ? changed.measurement : changed.information)
-        .push_back(parse<double>(numbers[k], "number"));
+        .push_back(parse_real(numbers[k], "number"));
   GraphUpdate changing;
   changing.changed.push_back(std::move(changed));
   update(std::move(changing), settings_.automatic, false, reply);
-  if (!reply.solved) acknowledge(reply);
+  if (!reply.solved) acknowledge(reply, owed_);
 }
 
 void OnlineSession::marginalize(const Words& words, Reply& reply) {
   GraphUpdate leaving;
   leaving.marginalized = parse_ids(std::span(words).subspan(1), "id");
   const UpdateReport report = update(std::move(leaving), settings_.automatic, false, reply);
-  if (silent_) return;
+  if (silent()) return;
   std::string priors;
   for (const FactorId prior : report.priors) priors += fmt::format("PRIOR {}\n", prior);
   reply.text = priors + reply.text;
-  if (!reply.solved) acknowledge(reply);
+  if (!reply.solved) acknowledge(reply, owed_);
 }
 
 void OnlineSession::solve(const Words& words, Reply& reply) {
@@ -293,11 +224,11 @@ void OnlineSession::solve_fully(const Words& words, Reply& reply) {
 
 void OnlineSession::tell_covariance(const Words& words, Reply& reply) {
   expect_words(words, 3, "COVARIANCE id id");
-  if (!write_covariance(parse<Id>(words[1], "id"), parse<Id>(words[2], "id"), reply.text)) {
+  if (!write_covariance(parse_whole(words[1], "id"), parse_whole(words[2], "id"), reply.text)) {
     throw Error(ErrorCode::numerical,
                 "there is no covariance: the measurements do not determine everything");
   }
-  acknowledge(reply);
+  acknowledge(reply, owed_);
 }
 
 void OnlineSession::tell_estimate(const Words& words, Reply& reply) {
@@ -305,28 +236,28 @@ void OnlineSession::tell_estimate(const Words& words, Reply& reply) {
   if (words[1] == "ALL") {
     for (const Id id : known_) write_estimate(id, reply.text);
   } else {
-    write_estimate(parse<Id>(words[1], "id"), reply.text);
+    write_estimate(parse_whole(words[1], "id"), reply.text);
   }
-  acknowledge(reply);
+  acknowledge(reply, owed_);
 }
 
 void OnlineSession::tell_chi2(const Words& words, Reply& reply) {
   expect_words(words, 1, "CHI2");
   reply.text += fmt::format("CHI2 {}\n", estimator_.chi2());
-  acknowledge(reply);
+  acknowledge(reply, owed_);
 }
 
 void OnlineSession::save(const Words& words, Reply& reply) {
   expect_words(words, 2, "SAVE file");
   if (words[1] == "-") throw bad_line("SAVE writes to a file, not to standard output");
   write_graph(estimator_.graph(), std::string(words[1]), registry_);
-  acknowledge(reply);
+  acknowledge(reply, owed_);
 }
 
 void OnlineSession::quit(const Words& words, Reply& reply) {
   expect_words(words, 1, "QUIT");
   reply.quit = true;
-  acknowledge(reply);
+  acknowledge(reply, owed_);
 }
 
 // Answers ---------------------------------------------------------------------------------------
@@ -339,22 +270,13 @@ const VariableType& OnlineSession::type_of(Id id) const {
 }
 
 void OnlineSession::write_estimate(Id id, std::string& text) const {
-  text += fmt::format("{} {} {}\n", type_of(id).tag(), id, fmt::join(estimator_.state(id), " "));
+  text += estimate_line(type_of(id), id, estimator_.state(id));
 }
 
-/// "COVARIANCE a b rows columns" and the numbers row by row.
 bool OnlineSession::write_covariance(Id a, Id b, std::string& text) {
-  const auto rows = static_cast<std::size_t>(type_of(a).tangent_size()),
-             columns = static_cast<std::size_t>(type_of(b).tangent_size());
-  std::vector<double> block(rows * columns);
-  if (!estimator_.covariance(a, b, block)) return false;
-  text += fmt::format("COVARIANCE {} {} {} {}", a, b, rows, columns);
-  for (std::size_t row = 0; row < rows; ++row) {
-    for (std::size_t column = 0; column < columns; ++column)
-      text += fmt::format(" {}", block[column * rows + row]);
-  }
-  text += '\n';
-  return true;
+  const std::string line = covariance_line(estimator_, a, type_of(a), b, type_of(b));
+  text += line;
+  return !line.empty();
 }
 
 }  // namespace cairn::app

@@ -13,6 +13,7 @@
 #include "cairn/estimator.hpp"
 #include "cairn/registry.hpp"
 #include "cairn/stream_format.hpp"
+#include "line_session.hpp"
 
 namespace cairn::app {
 
@@ -24,33 +25,20 @@ struct OnlineSettings {
   double budget = 0.0;             ///< [s] of an update; 0: no limit
 };
 
-/// One conversation with `cairn online`: takes lines, and says what to answer (docs/online.md). A
-/// line is taken in whole or not at all.
-class OnlineSession {
+/// Everything that arrives is taken into the graph.
+class OnlineSession final : public LineSession {
  public:
-  /// What a line came to.
-  struct Reply {
-    std::string text;      ///< lines to be written; empty: nothing
-    bool changes = false;  ///< belongs in a journal, before `text` is written
-    bool solved = false;
-    bool quit = false;
-  };
-
   OnlineSession(Estimator& estimator, StreamFormat& format, Registry& registry,
                 OnlineSettings settings);
 
-  /// Takes line `number` of the input. Throws `Error` where it cannot, and has then changed
-  /// nothing.
-  Reply take(std::string_view line, std::int64_t number);
-  /// The same without an answer: lines that were taken before, from a journal.
-  void restore(std::string_view line, std::int64_t number);
-
-  double last_seconds() const { return last_seconds_; }
+  Estimator& estimator() override { return estimator_; }
+  std::int64_t variable_count() const override { return estimator_.variable_count(); }
+  std::int64_t factor_count() const override { return estimator_.factor_count(); }
 
  private:
-  using Words = std::vector<std::string_view>;
   using Command = void (OnlineSession::*)(const Words&, Reply&);
   static Command find_command(std::string_view word);
+  void perform(std::string_view line, const Words& words, Reply& reply) override;
 
   // A command each; the words are those of its line.
   void declare(const Words& words, Reply& reply);
@@ -65,7 +53,7 @@ class OnlineSession {
   void save(const Words& words, Reply& reply);
   void quit(const Words& words, Reply& reply);
 
-  void take_data(std::string_view line, Reply& reply);
+  void take_data(std::string_view text, Reply& reply);
   void take_variable(NewVariable variable);
   void take_factor(NewFactor factor, Reply& reply);
   void hold(Id id);
@@ -74,7 +62,6 @@ class OnlineSession {
   UpdateReport update(GraphUpdate update, bool solve, bool full, Reply& reply);
   void follow(const GraphUpdate& update, const UpdateReport& report);
   void write_results(const UpdateReport& report, Reply& reply);
-  void acknowledge(Reply& reply, std::string_view word = "OK") const;
   void write_estimate(Id id, std::string& text) const;
   bool write_covariance(Id a, Id b, std::string& text);
   const VariableType& type_of(Id id) const;
@@ -83,9 +70,6 @@ class OnlineSession {
   StreamFormat& format_;
   Registry& registry_;
   OnlineSettings settings_;
-  std::int64_t line_ = 0;
-  bool silent_ = false;
-  double last_seconds_ = 0.0;
   int owed_ = 0;
   /// Variables that no measurement has touched yet: the estimator gets them with the first that
   /// does.

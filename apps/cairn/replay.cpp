@@ -24,6 +24,7 @@
 #include "problem_setup.hpp"
 #include "progress.hpp"
 #include "replay_checks.hpp"
+#include "step_times.hpp"
 #include "table.hpp"
 
 namespace cairn::app {
@@ -217,27 +218,10 @@ Replay replay_all(const Graph& whole, const std::vector<Arrival>& arrivals, Esti
 
 // The report ------------------------------------------------------------------------------------
 
-/// Of the sorted times; the smallest that a part of them does not exceed.
-double percentile(const std::vector<double>& sorted, double part) {
-  if (sorted.empty()) return 0.0;
-  const auto rank = static_cast<std::size_t>(std::ceil(part * static_cast<double>(sorted.size())));
-  return sorted[std::clamp<std::size_t>(rank, 1, sorted.size()) - 1];
-}
-
-std::vector<double> sorted_times(const Replay& replay) {
-  std::vector<double> times;
-  for (const Step& step : replay.steps) times.push_back(step.seconds);
-  std::ranges::sort(times);
-  return times;
-}
-
-json::object steps_json(const Replay& replay) {
-  const std::vector<double> times = sorted_times(replay);
-  return {{"count", times.size()},
-          {"median", percentile(times, 0.5)},
-          {"p95", percentile(times, 0.95)},
-          {"p99", percentile(times, 0.99)},
-          {"max", times.empty() ? 0.0 : times.back()}};
+StepTimes step_times(const Replay& replay) {
+  std::vector<double> seconds;
+  for (const Step& step : replay.steps) seconds.push_back(step.seconds);
+  return StepTimes(std::move(seconds));
 }
 
 json::array checks_json(const Replay& replay) {
@@ -289,7 +273,7 @@ json::object report_json(const ReplayOptions& options, const LoadedGraph& loaded
   report["budget"] = options.budget;
   report["finish"] = options.finish;
   report["status"] = status(replay);
-  report["steps"] = steps_json(replay);
+  report["steps"] = step_times_json(step_times(replay));
   report["chi2"] = {{"final", chi2}};
   const bool complete = !replay.checks.empty() &&
                         replay.checks.back().step == static_cast<int>(std::ssize(replay.steps));
@@ -387,7 +371,6 @@ std::string checks_text(const Replay& replay) {
 
 std::string summary_text(const ReplayOptions& options, const LoadedGraph& loaded,
                          const Replay& replay, double chi2) {
-  const std::vector<double> times = sorted_times(replay);
   Table table({{"", Table::Align::left}, {"", Table::Align::left}});
   table.add({"graph", fmt::format("{}: {}, {}", loaded.name,
                                   plural(loaded.graph.variable_count(), "variable"),
@@ -395,11 +378,7 @@ std::string summary_text(const ReplayOptions& options, const LoadedGraph& loaded
   table.add({"estimator", options.estimator});
   table.add({"chi2", chi2_text(chi2)});
   table.add({"time", phases_text(replay)});
-  table.add({"steps", fmt::format("{}: median {}, 95 % {}, 99 % {}, longest {}", times.size(),
-                                  seconds_text(percentile(times, 0.5)),
-                                  seconds_text(percentile(times, 0.95)),
-                                  seconds_text(percentile(times, 0.99)),
-                                  seconds_text(times.empty() ? 0.0 : times.back()))});
+  table.add({"steps", step_times(replay).text()});
   if (!replay.checks.empty()) table.add({"batch", checks_text(replay)});
   if (const int owed = replay.steps.empty() ? 0 : replay.steps.back().report.owed; owed > 0)
     table.add({"owed", plural(owed, "factor") + " to be relinearized"});

@@ -3,8 +3,10 @@
 // planar tables (x y theta, or id x y theta). Where rows have no id, the id is the row number from
 // 0.
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -33,7 +35,8 @@ bool is_rotation(const Eigen::Matrix3d& R) {
          R.determinant() > 0.0;
 }
 
-/// Ids from stamps: the stamps themselves if all are whole numbers, else row numbers.
+/// Ids from stamps: the stamps themselves if all are whole numbers, else row numbers. Either way
+/// the ids rise with the stamps.
 void set_ids_from_stamps(Draft& draft, const std::vector<double>& stamps) {
   bool whole = true;
   for (const double stamp : stamps) whole = whole && is_whole(stamp);
@@ -66,6 +69,8 @@ Graph read_tum(std::string_view text, const std::string& name, Registry& types,
     scanner.end_line();
   }
   set_ids_from_stamps(draft, stamps);
+  std::sort(stamps.begin(), stamps.end());
+  report.stamps = std::move(stamps);
   return draft.build();
 }
 

@@ -1,4 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <cmath>
+#include <sstream>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -70,6 +73,128 @@ TEST(EvaluateCommand, NothingInCommonIsAnError) {
   write_text(folder.file("a.g2o"), "VERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 1 0 0\n");
   write_text(folder.file("b.g2o"), "VERTEX_SE2 5 0 0 0\nVERTEX_SE2 6 1 0 0\n");
   EXPECT_EQ(cairn({"evaluate", folder.file("a.g2o"), folder.file("b.g2o")}).exit_code, 3);
+}
+
+// Time --------------------------------------------------------------------------------------------
+
+/// A drive round a curve, a pose every `step` seconds from `begin`, its stamps `late`.
+std::string tum_drive(int poses, double begin, double step, double late) {
+  std::ostringstream text;
+  text.precision(17);
+  for (int k = 0; k < poses; ++k) {
+    const double time = begin + k * step;
+    text << time + late << ' ' << std::cos(time) << ' ' << std::sin(time) << ' ' << 0.1 * time
+         << " 0 0 " << std::sin(0.5 * time) << ' ' << std::cos(0.5 * time) << '\n';
+  }
+  return text.str();
+}
+
+class EvaluateByTime : public ::testing::Test {
+ protected:
+  EvaluateByTime() {
+    write_text(estimate_, tum_drive(20, 1.5, 0.25, 0.0));
+    write_text(truth_, tum_drive(200, 1.0, 0.05, 0.004));
+  }
+  boost::json::value report(Arguments options) {
+    options.insert(options.begin(), {"evaluate", estimate_, truth_});
+    return report_of(options);
+  }
+  void expect_refusal(Arguments options, int exit_code, const std::string& says) {
+    options.insert(options.begin(), {"evaluate", estimate_, truth_, "--quiet"});
+    const Outcome outcome = cairn(options);
+    EXPECT_EQ(outcome.exit_code, exit_code) << outcome.out;
+    EXPECT_THAT(outcome.err, HasSubstr(says));
+  }
+
+  TemporaryFolder folder_;
+  std::string estimate_ = folder_.file("estimate.tum"), truth_ = folder_.file("truth.tum");
+};
+
+TEST_F(EvaluateByTime, FilesOfOtherRatesAreMatchedByStamp) {
+  const auto errors = report({});
+  EXPECT_NEAR(number(errors, "ate", "translation"), 0.0, 1e-12);
+  EXPECT_NEAR(number(errors, "rpe", "rotation"), 0.0, 1e-6);
+  EXPECT_EQ(errors.at("association").at("by").as_string(), "stamp");
+  EXPECT_EQ(errors.at("association").at("max_time_difference").as_double(), 0.01);
+  EXPECT_NEAR(number(errors, "association", "largest_time_difference"), 0.004, 1e-9);
+  EXPECT_EQ(errors.at("poses").at("compared").as_int64(), 20);
+  EXPECT_EQ(errors.at("poses").at("only_in_truth").as_int64(), 180);
+  EXPECT_THAT(cairn({"evaluate", estimate_, truth_}).out, HasSubstr("matched by time"));
+}
+
+TEST_F(EvaluateByTime, MatchingByIdGoesByRow) {
+  const auto errors = report({"--match", "id"});
+  EXPECT_EQ(errors.at("association").at("by").as_string(), "id");
+  EXPECT_GT(number(errors, "rpe", "translation"), 0.1);
+}
+
+TEST_F(EvaluateByTime, AnOffsetIsAddedToTheEstimate) {
+  write_text(estimate_, tum_drive(20, 1.5, 0.25, 1000.004));
+  expect_refusal({}, 3, "--offset -1000.5 ");
+  const auto errors = report({"--offset", "-1000", "--max-time-difference", "1e-5"});
+  EXPECT_EQ(errors.at("poses").at("compared").as_int64(), 20);
+  EXPECT_NEAR(number(errors, "ate", "translation"), 0.0, 1e-12);
+}
+
+TEST_F(EvaluateByTime, TooLittleDifferenceIsAnErrorThatNamesTheNearest) {
+  expect_refusal({"--max-time-difference", "0.001"}, 3, "the nearest two are 0.004 s apart");
+}
+
+TEST_F(EvaluateByTime, KittiFilesHaveTheirStampsBesideThem) {
+  const std::string kitti = folder_.file("drive.kitti"), times = folder_.file("times.txt");
+  ASSERT_EQ(cairn({"convert", estimate_, kitti}).exit_code, 0);
+  std::string text;
+  for (int k = 0; k < 20; ++k) text += std::to_string(1.5 + k * 0.25) + "\n";
+  write_text(times, text);
+  const auto errors = report_of({"evaluate", kitti, truth_, "--stamps", times});
+  EXPECT_NEAR(number(errors, "ate", "translation"), 0.0, 1e-9);
+  EXPECT_EQ(errors.at("association").at("by").as_string(), "stamp");
+  const auto swapped = report_of({"evaluate", truth_, kitti, "--truth-stamps", times});
+  EXPECT_NEAR(number(swapped, "ate", "translation"), 0.0, 1e-9);
+  EXPECT_EQ(swapped.at("poses").at("compared").as_int64(), 20);
+
+  write_text(times, text + "9\n");
+  const Outcome outcome = cairn({"evaluate", kitti, truth_, "--stamps", times});
+  EXPECT_EQ(outcome.exit_code, 3);
+  EXPECT_THAT(outcome.err, HasSubstr("times.txt: 21 stamps for 20 poses"));
+}
+
+TEST_F(EvaluateByTime, WhatCannotBeDoneWithoutStampsSaysWhereTheyGo) {
+  write_text(truth_, "VERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 1 0 0\n");
+  EXPECT_EQ(cairn({"evaluate", estimate_, truth_}).exit_code, 0);  // by row
+  expect_refusal({"--offset", "1"}, 2, "--truth-stamps FILE");
+  expect_refusal({"--match", "stamp"}, 2, "--truth-stamps FILE");
+  expect_refusal({"--match", "id", "--offset", "1"}, 2, "leave out --offset");
+  expect_refusal({"--offset", "nan"}, 2, "'nan' is no number of seconds");
+  expect_refusal({"--max-time-difference=-1"}, 2, "seconds, from 0");
+}
+
+// Frames ------------------------------------------------------------------------------------------
+
+// Two metres ahead, then, turned to the left, one metre ahead: in a camera's axes, on a road that
+// rises by half a metre.
+TEST(EvaluateCommand, ACameraOnARoadIsComparedWithARobotOnAMap) {
+  const TemporaryFolder folder;
+  const std::string camera = folder.file("camera.txt"), robot = folder.file("robot.g2o");
+  write_text(camera,
+             "1 0 0 0  0 1 0 0  0 0 1 0\n"
+             "0 0 -1 0  0 1 0 0  1 0 0 2\n"
+             "0 0 -1 -1  0 1 0 -0.5  1 0 0 2\n");
+  write_text(robot,
+             "VERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 2 0 1.5707963267948966\n"
+             "VERTEX_SE2 2 2 1 1.5707963267948966\n");
+  const auto same = report_of({"evaluate", robot, camera, "--truth-axes", "camera", "--planar"});
+  for (const char* error : {"ate", "rpe", "rpe_all"}) {
+    EXPECT_NEAR(number(same, error, "translation"), 0.0, 1e-12) << error;
+    EXPECT_NEAR(number(same, error, "rotation"), 0.0, 1e-6) << error;
+  }
+  EXPECT_EQ(same.at("axes").at("truth").as_string(), "camera");
+  EXPECT_TRUE(same.at("planar").as_bool());
+  // The other way round, and what the map does not show.
+  const auto swapped = report_of({"evaluate", camera, robot, "--axes", "camera", "--planar"});
+  EXPECT_NEAR(number(swapped, "rpe_all", "translation"), 0.0, 1e-12);
+  const auto in_space = report_of({"evaluate", robot, camera, "--truth-axes", "camera"});
+  EXPECT_NEAR(number(in_space, "rpe", "translation"), 0.5 / std::sqrt(2.0), 1e-12);
 }
 
 }  // namespace

@@ -96,6 +96,14 @@ class Child {
     }
   }
 
+  /// More of standard output; false at its end.
+  bool read_out(std::string& text) { return read_some(out_.read_end, text); }
+
+  void kill() {
+    ::kill(pid_, SIGKILL);
+    wait_for(pid_);
+  }
+
   /// Makes room for input that is fed before anything is read.
   void make_room(std::size_t bytes) {
     ::fcntl(in_.write_end, F_SETPIPE_SZ, static_cast<int>(bytes));
@@ -188,6 +196,43 @@ Outcome cairn_interrupted(const Arguments& arguments, const std::string& cue, in
   Child child(with_program(arguments), {});
   child.feed("");
   return child.finish(cue, signal);
+}
+
+struct Partner::Process {
+  explicit Process(const Arguments& arguments) : child(with_program(arguments), {}) {}
+  Child child;
+  std::string unheard;
+  bool ended = false;
+};
+
+Partner::Partner(const Arguments& arguments) {
+  std::signal(SIGPIPE, SIG_IGN);
+  process_ = std::make_unique<Process>(arguments);
+}
+
+Partner::~Partner() {
+  if (!process_->ended) process_->child.kill();
+}
+
+void Partner::tell(const std::string& line) { process_->child.feed_and_keep_open(line + "\n"); }
+
+std::optional<std::string> Partner::hear() {
+  std::string& unheard = process_->unheard;
+  std::size_t end = 0;
+  while ((end = unheard.find('\n')) == std::string::npos) {
+    if (!process_->child.read_out(unheard)) return std::nullopt;
+  }
+  std::string line = unheard.substr(0, end);
+  unheard.erase(0, end + 1);
+  return line;
+}
+
+Outcome Partner::end() {
+  process_->child.feed("");
+  Outcome outcome = process_->child.finish("", 0);
+  process_->ended = true;
+  outcome.out = process_->unheard + outcome.out;
+  return outcome;
 }
 
 Outcome cairn_on_terminal(const Arguments& arguments, const Environment& environment) {

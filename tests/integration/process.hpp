@@ -6,6 +6,8 @@
 #include <chrono>
 #include <filesystem>
 #include <map>
+#include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -41,6 +43,26 @@ Outcome cairn_interrupted(const Arguments& arguments, const std::string& cue, in
 /// lines and `delay` has passed; what it had written by then.
 Outcome cairn_killed(const Arguments& arguments, const std::string& input, int lines,
                      std::chrono::microseconds delay);
+
+/// `cairn` as a partner in a conversation: is told lines, and its own are read one by one. Killed
+/// if it has not ended with the object.
+class Partner {
+ public:
+  explicit Partner(const Arguments& arguments);
+  Partner(const Partner&) = delete;
+  Partner& operator=(const Partner&) = delete;
+  ~Partner();
+
+  void tell(const std::string& line);
+  /// The next line, as soon as it is there; none once there will be no more.
+  std::optional<std::string> hear();
+  /// Ends the input, and waits for the end; what had not been heard yet.
+  Outcome end();
+
+ private:
+  struct Process;
+  std::unique_ptr<Process> process_;
+};
 
 /// Runs `cairn` with standard output and error on a terminal; both arrive in `out`.
 Outcome cairn_on_terminal(const Arguments& arguments, const Environment& environment = {});

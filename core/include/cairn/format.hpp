@@ -27,6 +27,7 @@ struct ReadReport {
   std::map<std::string, std::int64_t> skipped;  ///< unknown tag → lines
   std::int64_t repaired = 0;                    ///< information matrices mended
   std::vector<std::string> notes;  ///< sentences: renumbered ids, missing vertices, …
+  std::vector<double> stamps;  ///< time [s] of each pose, by rising id; empty if the file has none
 };
 
 /// A file format. The reader is given the whole text, unpacked.

@@ -1,12 +1,20 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Covariances that somebody asks for.
 #include <algorithm>
+#include <vector>
 
 #include <Eigen/Core>
 
 #include "engine.hpp"
 
 namespace cairn::incremental {
+namespace {
+
+/// What part of all variables are few rows. A path is much shorter than the tree, but the paths of
+/// many rows are most of it.
+constexpr std::int64_t kFewRows = 8;
+
+}  // namespace
 
 /// Σ_ab in the variables' frames becomes T_a Σ_ab T_bᵀ: as seen from the poses.
 void Engine::as_seen_from(int a, int b, double* block, std::int64_t stride) {
@@ -41,17 +49,21 @@ bool Engine::covariance_column(std::span<const std::int32_t> rows, int b, double
   if (held_[b]) return true;
   if (broken_ || tree_.node_of(b) < 0) return false;
   AlignedVector X(static_cast<std::size_t>(system_.scalars()) * 8);
-  const std::int32_t source = b;
+  // Few rows are solved for along their paths alone.
+  const bool few = std::ssize(rows) * kFewRows <= system_.variables();
+  std::vector<std::int32_t> sources{b};
+  for (const std::int32_t v : rows) {
+    if (few && !held_[v]) sources.push_back(v);
+  }
   for (std::int32_t first = 0; first < columns; first += 8) {
     const std::int32_t width = std::min(8, columns - first);
     std::ranges::fill(X, 0.0);
     for (std::int32_t k = 0; k < width; ++k)
       X[static_cast<std::size_t>(system_.offset(b) + first + k) * 8 + k] = 1.0;
-    if (rows.size() == 1) {
-      const std::int32_t both[2] = {source, rows[0]};
-      tree_.solve_many_above(held_[rows[0]] ? std::span(both, 1) : std::span(both), X);
+    if (few) {
+      tree_.solve_many_above(sources, X);
     } else {
-      tree_.solve_many({&source, 1}, X);
+      tree_.solve_many(sources, X);
     }
     double* out = column + std::int64_t{first} * height;
     for (std::int32_t k = 0; k < width; ++k) {

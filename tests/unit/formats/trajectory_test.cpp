@@ -34,6 +34,13 @@ TEST(Trajectory, OtherTumStampsGiveRowNumbersAsIds) {
               ElementsAre("the stamps are not whole numbers: ids are the row numbers from 0"));
 }
 
+TEST(Trajectory, TumStampsAreReportedByRisingId) {
+  EXPECT_THAT(read("tum", "3.5 1 2 3 0 0 0 1\n4 4 5 6 0 0 0 1\n").report.stamps,
+              ElementsAre(3.5, 4));
+  EXPECT_THAT(read("tum", "17 1 2 3 0 0 0 1\n4 4 5 6 0 0 0 1\n").report.stamps, ElementsAre(4, 17));
+  EXPECT_THAT(read("kitti", "1 0 0 0 0 1 0 0 0 0 1 0\n").report.stamps, IsEmpty());
+}
+
 TEST(Trajectory, TumStampsMustRiseWhereRowsAreIds) {
   EXPECT_EQ(refusal("tum", "3.5 1 2 3 0 0 0 1\n3.25 4 5 6 0 0 0 1\n"),
             "file:2: stamp 3.25 after 3.5; expected rising stamps");

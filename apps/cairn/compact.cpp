@@ -1,0 +1,463 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// cairn compact GRAPH: compact pose SLAM, which keeps the poses and loop closures that tell most.
+#include <algorithm>
+#include <cmath>
+#include <memory>
+
+#include <fmt/format.h>
+
+#include "cairn/error.hpp"
+#include "cairn/threads.hpp"
+#include "commands.hpp"
+#include "compact_compare.hpp"
+#include "compact_run.hpp"
+#include "compact_thresholds.hpp"
+#include "help.hpp"
+#include "json_report.hpp"
+#include "step_times.hpp"
+#include "table.hpp"
+
+namespace cairn::app {
+namespace {
+
+namespace json = boost::json;
+
+struct CompactOptions {
+  std::string graph;
+  std::string output, output_format;
+  std::string trajectory;
+  std::string recovery = "v2";
+  std::string policy = "compact_pose";
+  std::string strategy = "fpfl";
+  std::string estimator;
+  std::string registration = "recorded";
+  std::string truth;
+  bool automatic = false;
+  double sample = 0.6;
+  double error_ratio = 2.0;
+  std::string thresholds, save_thresholds;
+  std::optional<double> range, angle, loop_gain, pose_gain, gate;
+  std::uint64_t seed = 1;
+  std::string steps;
+  std::string compare;
+  InputOptions input;
+  ProblemOptions problem;
+};
+
+Recovery recovery_of(const std::string& name) {
+  if (name == "v0") return Recovery::uniform;
+  if (name == "v1") return Recovery::interpolate;
+  return name == "v2" ? Recovery::distribute : Recovery::likely;
+}
+
+// Input -------------------------------------------------------------------------------------------
+
+Recording load_recording(const CompactOptions& options, Session& session) {
+  Recording recording;
+  recording.loaded = load_graph(options.graph, options.input, session);
+  recording.poses = pose_chain(recording.graph());
+  for (const RecordedPose& pose : recording.poses) recording.loops += std::ssize(pose.links);
+  if (!options.truth.empty()) {
+    recording.truth_graph = load_graph(options.truth, options.input, session).graph;
+  } else if (recording.loaded.truth) {
+    recording.truth_graph = recording.loaded.truth->clone();
+  }
+  if (!recording.truth_graph) return recording;
+  recording.truth = trajectory(*recording.truth_graph);
+  const Graph& truth = *recording.truth_graph;
+  const bool same = std::ranges::all_of(recording.poses, [&](const RecordedPose& pose) {
+    const auto there = truth.find(recording.graph().id(pose.variable));
+    return there && truth.type(*there).tag() == recording.graph().type(pose.variable).tag();
+  });
+  if (!same) recording.truth_graph.reset();  // good for errors of the trajectory, no more
+  return recording;
+}
+
+// Thresholds --------------------------------------------------------------------------------------
+
+json::object options_json(const OptionValues& values) {
+  json::object all;
+  for (const auto& [name, value] : values) all[name] = value;
+  return all;
+}
+
+json::object thresholds_json(const FoundThresholds& found) {
+  json::array trials;
+  for (const ThresholdTrial& trial : found.trials) {
+    trials.push_back({{"factor", trial.factor},
+                      {"expected_ratio", trial.expected},
+                      {"realised_ratio", trial.realised},
+                      {"poses", trial.poses},
+                      {"loops", trial.loops}});
+  }
+  return {{"options", options_json(found.options)},
+          {"trials", std::move(trials)},
+          {"expected_ate", found.expected_ate},
+          {"seconds", found.seconds}};
+}
+
+/// Those that the command line gives by themselves.
+OptionValues given_thresholds(const CompactOptions& options) {
+  OptionValues values;
+  const auto put = [&](const char* name, const std::optional<double>& value) {
+    if (value) values[name] = fmt::format("{}", *value);
+  };
+  put("range", options.range);
+  put("angle", options.angle);
+  put("loop_gain", options.loop_gain);
+  put("pose_gain", options.pose_gain);
+  put("gate", options.gate);
+  return values;
+}
+
+bool names_thresholds(const CompactOptions& options, const ComponentSpec& policy) {
+  return options.range || options.angle || options.loop_gain || options.pose_gain ||
+         !options.thresholds.empty() || policy.values.contains("range") ||
+         policy.values.contains("loop_gain") || policy.values.contains("pose_gain");
+}
+
+/// Whom to run, and the thresholds that were found, or read.
+struct Job {
+  CompactJob job;
+  FoundThresholds found;
+};
+
+Job prepare(const CompactOptions& options, const CompactSetting& setting) {
+  Job result;
+  CompactJob& job = result.job;
+  job.registration = options.registration;
+  job.policy = parse_component(options.policy);
+  const auto emplace = [&](const OptionValues& values) {
+    for (const auto& [name, value] : values) job.policy.values.emplace(name, value);
+  };
+  const bool automatic = options.automatic || !names_thresholds(options, job.policy);
+  emplace(given_thresholds(options));
+  if (!options.estimator.empty()) emplace({{"estimator", options.estimator}});
+  if (!options.thresholds.empty())
+    result.found.options = read_thresholds(options.thresholds, job.policy.name);
+  if (automatic) {
+    const auto poses = static_cast<double>(setting.recording.poses.size());
+    const auto count =
+        std::max<std::size_t>(1, static_cast<std::size_t>(std::llround(options.sample * poses)));
+    result.found = find_thresholds(job, count, options.error_ratio, setting);
+  }
+  emplace(result.found.options);
+  const OptionTable& table = setting.session.registry().options(PosePolicy::kKind, job.policy.name);
+  if (table.find("strategy"))
+    emplace({{"strategy", options.strategy == "rfpfl" ? "fpfl" : options.strategy}});
+  if (!options.save_thresholds.empty())
+    write_thresholds(options.save_thresholds, job.policy.name, result.found.options);
+  return result;
+}
+
+// The report --------------------------------------------------------------------------------------
+
+json::object error_json(const TrajectoryError& e) {
+  const auto pair = [](double translation, double rotation) {
+    return json::object{{"translation", translation}, {"rotation", rotation}};
+  };
+  return {{"poses", e.poses},
+          {"ate", pair(e.ate_translation, e.ate_rotation)},
+          {"rpe", pair(e.rpe_translation, e.rpe_rotation)},
+          {"rpe_all", pair(e.rpe_all_translation, e.rpe_all_rotation)}};
+}
+
+std::vector<double> step_seconds(const CompactResult& result) {
+  std::vector<double> seconds;
+  for (const PoseReport& pose : result.poses) seconds.push_back(pose.seconds.total);
+  return seconds;
+}
+
+json::object result_json(const CompactResult& result, const Recording& recording) {
+  json::object report;
+  report["policy"] = result.policy;
+  report["poses"] = {{"in", result.poses.size()}, {"kept", result.compact.variable_count()}};
+  report["loops"] = {{"in", recording.loops},
+                     {"proposed", result.proposed},
+                     {"registered", result.registered},
+                     {"kept", result.kept_loops},
+                     {"false_registered", result.false_registered},
+                     {"false_kept", result.false_kept}};
+  json::object verdicts;
+  for (const auto& [name, count] : result.verdicts) verdicts[name] = count;
+  report["verdicts"] = std::move(verdicts);
+  report["chi2"] = {{"final", result.chi2}};
+  report["seconds"] = {{"total", result.seconds.total},
+                       {"estimate", result.seconds.estimate},
+                       {"covariances", result.seconds.covariances},
+                       {"search", result.seconds.search},
+                       {"registration", result.registration_seconds}};
+  report["steps"] = step_times_json(StepTimes(step_seconds(result)));
+  report["nonzeros"] = {{"information", result.information_nonzeros},
+                        {"factor", result.factor_nonzeros}};
+  json::object errors;
+  for (const auto& [name, error] : result.errors) errors[name] = error_json(error);
+  report["errors"] = errors.empty() ? json::value(nullptr) : json::value(std::move(errors));
+  const auto v2 = result.errors.find("v2");
+  report["rmse"] =
+      v2 == result.errors.end() ? json::value(nullptr) : json::value(v2->second.ate_translation);
+  if (result.normalized) {
+    report["nees"] = {{"squared", result.normalized->squared}, {"dof", result.normalized->dof}};
+  } else {
+    report["nees"] = nullptr;
+  }
+  return report;
+}
+
+json::object report_json(const CompactOptions& options, const Recording& recording, const Job& job,
+                         const CompactResult& result, const std::optional<CompactResult>& control) {
+  json::object report = begin_report("compact");
+  report["graph"] = graph_json(recording.graph(), recording.loaded.name);
+  report["strategy"] = options.strategy;
+  report["registration"] = options.registration;
+  report["threads"] = threads();
+  report["status"] = result.interrupted ? "interrupted" : "converged";
+  report["thresholds"] = thresholds_json(job.found);
+  for (auto& [name, value] : result_json(control ? *control : result, recording))
+    report[name] = value;
+  if (control) report["like"] = result_json(result, recording);
+  report["recovery"] = options.recovery;
+  report["truth"] = text_json(options.truth);
+  report["output"] = text_json(options.output);
+  report["trajectory"] = text_json(options.trajectory);
+  end_report(report);
+  return report;
+}
+
+/// How often the compact graph admits at least as much uncertainty as there is.
+json::object comparison_json(const std::vector<UncertaintyStep>& steps) {
+  constexpr double kRounding = 1e-6;
+  std::size_t marginal = 0, full = 0;
+  double least_marginal = 1e300, least_full = 1e300, least_eigenvalue = 1e300;
+  for (const UncertaintyStep& step : steps) {
+    const double by_marginal = step.marginal / step.marginal_all,
+                 by_full = step.full / step.full_all;
+    marginal += by_marginal > 1.0 - kRounding;
+    full += by_full > 1.0 - kRounding;
+    least_marginal = std::min(least_marginal, by_marginal);
+    least_full = std::min(least_full, by_full);
+    least_eigenvalue = std::min(least_eigenvalue, step.least_eigenvalue);
+  }
+  const auto count = static_cast<double>(std::max<std::size_t>(1, steps.size()));
+  return {{"steps", steps.size()},
+          {"marginal_conservative", static_cast<double>(marginal) / count},
+          {"full_conservative", static_cast<double>(full) / count},
+          {"least_marginal_ratio", least_marginal},
+          {"least_full_ratio", least_full},
+          {"least_eigenvalue", least_eigenvalue}};
+}
+
+std::string steps_csv(const CompactResult& result) {
+  std::string text =
+      "pose,kept,closed_loop,near,candidates,least_gain,matched,linked,poses,loops,seconds,"
+      "estimate,covariances,search\n";
+  std::int64_t poses = 0, loops = 0;
+  for (const PoseReport& pose : result.poses) {
+    std::int64_t matched = 0, linked = 0;
+    for (const LinkReport& link : pose.links) {
+      matched += link.verdict != LinkVerdict::unmatched;
+      linked += link.verdict == LinkVerdict::linked;
+    }
+    poses += pose.kept;
+    loops += linked;
+    text +=
+        fmt::format("{},{},{},{},{},{},{},{},{},{},{:.9f},{:.9f},{:.9f},{:.9f}\n", pose.id,
+                    pose.kept ? 1 : 0, pose.closed_loop ? 1 : 0, pose.near, pose.candidates,
+                    std::isfinite(pose.least_gain) ? fmt::format("{:.9g}", pose.least_gain) : "",
+                    matched, linked, poses, loops, pose.seconds.total, pose.seconds.estimate,
+                    pose.seconds.covariances, pose.seconds.search);
+  }
+  return text;
+}
+
+std::string percent(std::int64_t part, std::int64_t whole) {
+  return whole == 0 ? "-"
+                    : fmt::format("{:.1f} %",
+                                  100.0 * static_cast<double>(part) / static_cast<double>(whole));
+}
+
+std::string errors_text(const TrajectoryError& e) {
+  return fmt::format(
+      "ATE {:.4g} m {:.4g} deg, RPE {:.4g} m {:.4g} deg, all to all {:.4g} m {:.4g} deg",
+      e.ate_translation, e.ate_rotation, e.rpe_translation, e.rpe_rotation, e.rpe_all_translation,
+      e.rpe_all_rotation);
+}
+
+void add_result(Table& table, const CompactResult& result, const Recording& recording) {
+  const auto in = static_cast<std::int64_t>(std::ssize(result.poses));
+  table.add({"poses", fmt::format("{} of {} kept ({})", result.compact.variable_count(), in,
+                                  percent(result.compact.variable_count(), in))});
+  table.add({"loops", fmt::format("{} kept ({} of {} recorded); {} pairs matched, {} of them well",
+                                  result.kept_loops, percent(result.kept_loops, recording.loops),
+                                  recording.loops, result.proposed, result.registered)});
+  const StepTimes times(step_seconds(result));
+  table.add(
+      {"time",
+       fmt::format("{} (estimate {}, covariances {}, search {})",
+                   seconds_text(result.seconds.total), seconds_text(result.seconds.estimate),
+                   seconds_text(result.seconds.covariances), seconds_text(result.seconds.search))});
+  table.add({"a pose", times.text()});
+  table.add({"chi2", chi2_text(result.chi2)});
+  for (const auto& [name, error] : result.errors) table.add({name, errors_text(error)});
+  if (result.normalized && result.normalized->dof > 0) {
+    table.add({"NEES", fmt::format("{:.4g} a degree of freedom ({})",
+                                   result.normalized->squared / result.normalized->dof,
+                                   result.normalized->dof)});
+  }
+}
+
+std::string thresholds_line(const OptionValues& values) {
+  std::string text;
+  for (const auto& [name, value] : values) {
+    if (name == "sensor") continue;
+    text += fmt::format("{}{} {}", text.empty() ? "" : ", ", name, value);
+  }
+  return text;
+}
+
+std::string summary_text(const CompactOptions& options, const Recording& recording, const Job& job,
+                         const CompactResult& result, const std::optional<CompactResult>& control) {
+  Table table({{"", Table::Align::left}, {"", Table::Align::left}});
+  table.add({"graph", fmt::format("{}: {}, {}", recording.loaded.name,
+                                  plural(recording.graph().variable_count(), "pose"),
+                                  plural(recording.loops, "loop closure"))});
+  table.add({"strategy", options.strategy});
+  if (!job.found.options.empty()) table.add({"thresholds", thresholds_line(job.found.options)});
+  add_result(table, control ? *control : result, recording);
+  if (result.interrupted) table.add({"status", "interrupted"});
+  for (const std::string& file : {options.output, options.trajectory, options.save_thresholds,
+                                  options.steps, options.compare}) {
+    if (!file.empty() && file != "-") table.add({"written", file});
+  }
+  return table.text(false);
+}
+
+void check(const CompactOptions& options, Session& session) {
+  if (options.output == "-" || options.trajectory == "-") session.write_file_to_stdout();
+  if (options.output == "-" && options.trajectory == "-")
+    throw Error(ErrorCode::usage, "only one of -o and --trajectory can go to standard output");
+  check_output(options.output, options.output_format, session);
+  check_output(options.trajectory, "", session);
+  if (!options.steps.empty()) check_folder(options.steps);
+  if (!options.compare.empty()) check_folder(options.compare);
+  if (!options.save_thresholds.empty()) check_folder(options.save_thresholds);
+  if (options.automatic && !options.thresholds.empty())
+    throw Error(ErrorCode::usage, "--auto finds thresholds, --thresholds reads them: give one");
+}
+
+int run(const CompactOptions& options, Session& session) {
+  check(options, session);
+  session.use_threads();
+  Registry& registry = session.registry();
+  const ProblemSetup setup(options.problem, registry);
+  const Recording recording = load_recording(options, session);
+  const InterruptGuard guard;  // until the results are written
+  const CompactSetting setting{recording, setup, guard, session};
+  const Job job = prepare(options, setting);
+  const Recovery recovery = recovery_of(options.recovery);
+  std::optional<UncertaintyComparison> comparison;
+  if (!options.compare.empty()) comparison.emplace(setting);
+  const auto run_job = [&](const CompactJob& who, UncertaintyComparison* compare) {
+    CompactRun run(who, setting);
+    run.run(recording.poses.size(), who.policy.name, [&](std::size_t index) {
+      if (compare) compare->add(index, run.policy());
+    });
+    return run.finish(recovery);
+  };
+  const CompactResult result = run_job(job.job, comparison ? &*comparison : nullptr);
+  std::optional<CompactResult> control;
+  if (options.strategy == "rfpfl") {
+    CompactJob random = job.job;
+    random.policy = {"random_poses",
+                     {{"poses", fmt::format("{}", result.compact.variable_count())},
+                      {"loops", fmt::format("{}", result.kept_loops)},
+                      {"seed", fmt::format("{}", options.seed)}}};
+    control = run_job(random, nullptr);
+  }
+  const CompactResult& shown = control ? *control : result;
+  if (!options.output.empty())
+    write_graph(shown.compact, options.output, registry, options.output_format);
+  if (!options.trajectory.empty()) write_graph(shown.way, options.trajectory, registry);
+  if (!options.steps.empty()) write_file(options.steps, steps_csv(shown));
+  json::object report = report_json(options, recording, job, result, control);
+  if (comparison) {
+    write_file(options.compare, comparison_csv(comparison->steps()));
+    report["compare"] = comparison_json(comparison->steps());
+  }
+  session.write_json(report);
+  session.print(summary_text(options, recording, job, result, control));
+  return guard.interrupted() ? kExitInterrupted : 0;
+}
+
+}  // namespace
+
+Command add_compact(CLI::App& program) {
+  auto options = std::make_shared<CompactOptions>();  // lives as long as the parser and the run
+  CLI::App* app = program.add_subcommand(
+      "compact", "compact pose SLAM: keep only the poses and loop closures that tell much");
+  app->add_option("graph", options->graph, kGraphHelp)->type_name("GRAPH")->required();
+  app->add_option("-o,--output", options->output, "write the compact graph")->type_name("OUT");
+  app->add_option("--to", options->output_format, "format of OUT")->type_name("FORMAT");
+  app->add_option("--trajectory", options->trajectory, "write all poses, those left out put back")
+      ->type_name("FILE");
+  app->add_option("--recovery", options->recovery,
+                  "v0 evenly, v1 by distance, v2 along odometry, or likely")
+      ->type_name("HOW")
+      ->check(one_of({"v0", "v1", "v2", "likely"}))
+      ->capture_default_str();
+  app->add_option("--strategy", options->strategy,
+                  "all or few poses and loops: apal, apfl, fpfl; rfpfl at random, as many as fpfl")
+      ->type_name("NAME")
+      ->check(one_of({"apal", "apfl", "fpfl", "rfpfl"}))
+      ->capture_default_str();
+  app->add_option("--policy", options->policy, "who decides, with options as NAME:key=value")
+      ->type_name("NAME")
+      ->capture_default_str();
+  app->add_option("--estimator", options->estimator, "who estimates, instead of the policy's own")
+      ->type_name("NAME");
+  app->add_option("--registration", options->registration,
+                  "who measures loops: recorded, or simulated:range=5,angle=1,false_rate=0.1")
+      ->type_name("NAME")
+      ->capture_default_str();
+  app->add_flag("--auto", options->automatic,
+                "find thresholds in a sample; so it is if none are given");
+  app->add_option("--sample", options->sample, "part of the poses that is the sample")
+      ->type_name("PART")
+      ->check(within(0.0, 1.0))
+      ->capture_default_str();
+  app->add_option("--error-ratio", options->error_ratio,
+                  "errors over those with all loops, at most, in the sample; 0: do not try")
+      ->type_name("X")
+      ->check(within(0.0, 1e9))
+      ->capture_default_str();
+  app->add_option("--thresholds", options->thresholds, "take thresholds from a file")
+      ->type_name("FILE");
+  app->add_option("--save-thresholds", options->save_thresholds, "write those found to a file")
+      ->type_name("FILE");
+  app->add_option("--range", options->range, "how far the sensor matches [m]")->type_name("M");
+  app->add_option("--angle", options->angle, "and between which orientations [rad]")
+      ->type_name("RAD");
+  app->add_option("--loop-gain", options->loop_gain, "a loop must tell more [nats]")
+      ->type_name("G");
+  app->add_option("--pose-gain", options->pose_gain,
+                  "a pose is kept if links to it would tell more")
+      ->type_name("G");
+  app->add_option("--gate", options->gate,
+                  "refuse links that do not fit; so large a part of right ones passes (0.99)")
+      ->type_name("P");
+  app->add_option("--truth", options->truth, "true poses, for errors")->type_name("FILE");
+  app->add_option("--seed", options->seed, "of rfpfl")->type_name("N")->capture_default_str();
+  app->add_option("--steps", options->steps, "a row for each pose, as CSV")->type_name("FILE");
+  app->add_option("--compare", options->compare,
+                  "covariances beside those with everything, each step (slow), as CSV")
+      ->type_name("FILE");
+  add_loss_options(*app, options->problem);
+  add_input_options(*app, options->input);
+  app->footer(
+      "Example:\n"
+      "  cairn compact my.g2o -o compact.g2o --trajectory full.g2o --json report.json\n"
+      "  cairn compact city.g2o --strategy apal --thresholds city.json --truth truth.g2o");
+  return {app, [options](Session& session) { return run(*options, session); }};
+}
+
+}  // namespace cairn::app

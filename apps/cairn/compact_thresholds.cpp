@@ -1,0 +1,170 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "compact_thresholds.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+
+#include <fmt/format.h>
+#include <boost/json/parse.hpp>
+
+#include "cairn/error.hpp"
+#include "json_text.hpp"
+
+namespace cairn::app {
+namespace {
+
+namespace json = boost::json;
+using Clock = std::chrono::steady_clock;
+
+/// So many poses, spread evenly, stand for all in `expected_ate`.
+constexpr int kSpread = 40;
+/// Tries in one direction; the factor between the first and the last is 2⁶.
+constexpr int kMostTrials = 12;
+const double kStep = std::sqrt(2.0);
+
+/// Ids spread evenly over a trajectory, from a list that rises.
+std::vector<Id> spread(const std::vector<Id>& ids) {
+  std::vector<Id> some;
+  const auto count = std::min<std::size_t>(kSpread, ids.size());
+  for (std::size_t k = 1; k <= count; ++k) some.push_back(ids[k * ids.size() / count - 1]);
+  return some;
+}
+
+std::vector<Id> ids_of(const Graph& graph) {
+  std::vector<Id> ids;
+  for (int v = 0; v < graph.variable_count(); ++v) ids.push_back(graph.id(v));
+  std::ranges::sort(ids);
+  return ids;
+}
+
+/// Those of the compact graph that are nearest to given ones.
+std::vector<Id> nearest(const std::vector<Id>& wanted, const std::vector<Id>& there) {
+  std::vector<Id> found;
+  for (const Id id : wanted) {
+    const auto at = std::ranges::lower_bound(there, id);
+    found.push_back(at == there.end() ? there.back() : *at);
+  }
+  found.erase(std::unique(found.begin(), found.end()), found.end());
+  return found;
+}
+
+/// The sample with everything taken in.
+struct Everything {
+  Trajectory way;
+  std::vector<Id> poses;  ///< where errors are looked at
+  double expected = 0.0;  ///< [m]
+};
+
+double expected_error(PosePolicy& policy, const std::vector<Id>& poses) {
+  Estimator& estimator = policy.estimator();
+  return expected_ate(estimator, estimator.graph(), poses);
+}
+
+ThresholdTrial try_thresholds(const CompactJob& job, const OptionValues& options, double factor,
+                              std::size_t count, const Everything& everything,
+                              const CompactSetting& setting) {
+  CompactJob trial = job;
+  for (const auto& [name, value] : options) trial.policy.values.emplace(name, value);
+  CompactRun run(trial, setting);
+  run.run(count, fmt::format("sample, gain × {:.2g}", factor));
+  ThresholdTrial result{.factor = factor};
+  const Graph compact = run.policy().estimator().graph();
+  result.poses = compact.variable_count();
+  result.loops = run.counts().kept_loops;
+  const double apart =
+      compare(trajectory(recovered_way(run.policy(), Recovery::likely)), everything.way)
+          .ate_translation;
+  const double expected = expected_error(run.policy(), nearest(everything.poses, ids_of(compact)));
+  if (everything.expected > 0.0) {
+    result.expected = expected / everything.expected;
+    result.realised = std::hypot(1.0, apart / everything.expected);
+  }
+  return result;
+}
+
+OptionFinder& finder_of(PosePolicy& policy, const CompactJob& job) {
+  auto* finder = query<OptionFinder>(policy);
+  if (!finder) {
+    throw Error(ErrorCode::usage, fmt::format("policy '{}' does not find its options by itself: "
+                                              "give them as {}:key=value",
+                                              job.policy.name, job.policy.name));
+  }
+  return *finder;
+}
+
+}  // namespace
+
+FoundThresholds find_thresholds(const CompactJob& job, std::size_t count, double error_ratio,
+                                const CompactSetting& setting) {
+  const auto begin = Clock::now();
+  CompactJob watching = job;
+  const auto chosen = setting.session.registry().make<PosePolicy>(job.policy);
+  for (const auto& [name, value] : finder_of(*chosen, job).watching())
+    watching.policy.values.insert_or_assign(name, value);
+  CompactRun watch(watching, setting);
+  watch.run(count, "sample");
+  const OptionFinder& finder = finder_of(watch.policy(), job);
+
+  FoundThresholds found;
+  found.options = finder.found();
+  if (error_ratio > 0.0) {
+    Everything everything;
+    const Graph all = watch.policy().estimator().graph();
+    everything.way = trajectory(all);
+    everything.poses = spread(ids_of(all));
+    everything.expected = expected_error(watch.policy(), everything.poses);
+    found.expected_ate = everything.expected;
+    const OptionValues first = found.options;
+    double least = std::numeric_limits<double>::infinity();  // ratio of what is chosen
+    double factor = 1.0;
+    for (int k = 0; k < kMostTrials && !setting.guard.interrupted(); ++k) {
+      const OptionValues options = finder.scaled(first, factor);
+      const ThresholdTrial trial = try_thresholds(job, options, factor, count, everything, setting);
+      found.trials.push_back(trial);
+      const bool good = trial.ratio() <= error_ratio, upwards = factor >= 1.0;
+      if (good || trial.ratio() < least) {
+        found.options = options;
+        least = trial.ratio();
+      }
+      if (k > 0 && good != upwards) break;  // found, or one step too far
+      if (good && trial.loops == 0) break;
+      factor *= k == 0 ? (good ? kStep : 1.0 / kStep) : (upwards ? kStep : 1.0 / kStep);
+    }
+  }
+  found.seconds = std::chrono::duration<double>(Clock::now() - begin).count();
+  return found;
+}
+
+OptionValues read_thresholds(const std::string& file, const std::string& policy) {
+  const std::string text = read_file(file);
+  try {
+    const json::value value = json::parse(text);
+    const json::object& all = value.as_object();
+    if (const auto& name = all.at("policy").as_string(); name != policy) {
+      throw Error(ErrorCode::input, fmt::format("{}: thresholds of policy '{}', not of '{}'", file,
+                                                std::string_view(name), policy));
+    }
+    OptionValues values;
+    for (const auto& [name, option] : all.at("options").as_object())
+      values[name] = std::string(option.as_string());
+    return values;
+  } catch (const Error&) {
+    throw;
+  } catch (const std::exception&) {
+    throw Error(ErrorCode::input,
+                fmt::format("{}: no thresholds; expected what --save-thresholds writes, "
+                            "{{\"policy\": \"{}\", \"options\": {{\"range\": \"2.5\", …}}}}",
+                            file, policy));
+  }
+}
+
+void write_thresholds(const std::string& file, const std::string& policy,
+                      const OptionValues& options) {
+  json::object all;
+  for (const auto& [name, value] : options) all[name] = value;
+  write_file(file, json_text(json::object{{"policy", policy}, {"options", std::move(all)}}) + "\n");
+}
+
+}  // namespace cairn::app

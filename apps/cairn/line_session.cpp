@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "line_session.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <utility>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+namespace cairn::app {
+namespace {
+
+std::vector<std::string_view> split(std::string_view line) {
+  std::vector<std::string_view> words;
+  for (std::size_t at = 0; (at = line.find_first_not_of(" \t\r", at)) != std::string_view::npos;) {
+    if (line[at] == '#') break;
+    const std::size_t end = std::min(line.find_first_of(" \t\r", at), line.size());
+    words.push_back(line.substr(at, end - at));
+    at = end;
+  }
+  return words;
+}
+
+/// "ERROR line N: …" on one line. The format's messages begin with the place themselves.
+std::string error_line(std::int64_t number, std::string message) {
+  const std::string place = fmt::format("{}:{}: ", kStreamName, number);
+  if (message.starts_with(place)) message.erase(0, place.size());
+  std::ranges::replace(message, '\n', ' ');
+  return fmt::format("ERROR line {}: {}\n", number, message);
+}
+
+template <class Number>
+Number parse(std::string_view word, std::string_view what) {
+  Number number{};
+  const auto [end, problem] = std::from_chars(word.data(), word.data() + word.size(), number);
+  if (problem != std::errc{} || end != word.data() + word.size())
+    throw bad_line(fmt::format("'{}' is no {}", word, what));
+  return number;
+}
+
+}  // namespace
+
+LineSession::Reply LineSession::take(std::string_view line, std::int64_t number) {
+  line_ = number;
+  Reply reply;
+  const Words words = split(line);
+  if (words.empty()) return reply;
+  try {
+    perform(line, words, reply);
+  } catch (const Error& error) {
+    reply.text = error_line(number, error.what());
+    reply.refused = true;
+  }
+  return reply;
+}
+
+void LineSession::restore(std::string_view line, std::int64_t number) {
+  line_ = number;
+  Reply reply;
+  const Words words = split(line);
+  if (words.empty()) return;
+  silent_ = true;
+  perform(line, words, reply);
+  silent_ = false;
+}
+
+void LineSession::acknowledge(Reply& reply, int owed, std::string_view word) const {
+  if (silent_) return;
+  reply.text += fmt::format("{} {} variables {} factors {} owed {}\n", word, line_,
+                            variable_count(), factor_count(), owed);
+}
+
+Error bad_line(const std::string& message) { return {ErrorCode::input, message}; }
+
+std::int64_t parse_whole(std::string_view word, std::string_view what) {
+  return parse<std::int64_t>(word, what);
+}
+
+double parse_real(std::string_view word, std::string_view what) {
+  return parse<double>(word, what);
+}
+
+std::vector<std::int64_t> parse_ids(std::span<const std::string_view> words,
+                                    std::string_view what) {
+  if (words.empty()) throw bad_line(fmt::format("expected one {} or more", what));
+  std::vector<std::int64_t> ids;
+  for (const std::string_view word : words) ids.push_back(parse_whole(word, what));
+  return ids;
+}
+
+void expect_words(const std::vector<std::string_view>& words, std::size_t count,
+                  std::string_view form) {
+  if (words.size() == count) return;
+  throw bad_line(
+      fmt::format("{} with {} words after it; expected '{}'", words[0], words.size() - 1, form));
+}
+
+NewVariable declared_variable(const std::vector<std::string_view>& words, Registry& registry) {
+  expect_words(words, 3, "NEW TAG id");
+  if (!registry.has("variable", words[1])) {
+    throw bad_line(fmt::format("there is no type of variable '{}'; on offer: {}", words[1],
+                               fmt::join(registry.names("variable"), ", ")));
+  }
+  const Id id = parse_whole(words[2], "id");
+  if (id < 0) throw bad_line(fmt::format("'{}' is no id; expected a whole number from 0", id));
+  return {registry.variable_type(words[1]), id, {}, false};
+}
+
+std::string estimate_line(const VariableType& type, Id id, std::span<const double> state) {
+  return fmt::format("{} {} {}\n", type.tag(), id, fmt::join(state, " "));
+}
+
+std::string covariance_line(Estimator& estimator, Id a, const VariableType& type_a, Id b,
+                            const VariableType& type_b) {
+  const auto rows = static_cast<std::size_t>(type_a.tangent_size()),
+             columns = static_cast<std::size_t>(type_b.tangent_size());
+  std::vector<double> block(rows * columns);
+  if (!estimator.covariance(a, b, block)) return {};
+  std::string text = fmt::format("COVARIANCE {} {} {} {}", a, b, rows, columns);
+  for (std::size_t row = 0; row < rows; ++row) {
+    for (std::size_t column = 0; column < columns; ++column)
+      text += fmt::format(" {}", block[column * rows + row]);
+  }
+  return text + '\n';
+}
+
+}  // namespace cairn::app

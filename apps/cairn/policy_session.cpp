@@ -1,0 +1,506 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "policy_session.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "cairn/format.hpp"
+
+namespace cairn::app {
+namespace {
+
+bool is_pose(const VariableType& type) {
+  return type.lie_group() && type.placement() && type.placement()->has_orientation();
+}
+
+std::string_view word_of(LinkVerdict verdict) {
+  switch (verdict) {
+    case LinkVerdict::linked:
+      return "LINKED";
+    case LinkVerdict::unmatched:
+      return "UNMATCHED";
+    case LinkVerdict::uninformative:
+      return "UNINFORMATIVE";
+    case LinkVerdict::inconsistent:
+      return "INCONSISTENT";
+    case LinkVerdict::waiting:
+      return "WAITING";
+  }
+  return "";
+}
+
+/// "MATCH i n gain", the expected motion, and the upper triangle of its covariance by rows.
+std::string match_line(const MatchProposal& match, int tangent) {
+  std::string text = fmt::format("MATCH {} {} {}", match.earlier, match.later, match.gain);
+  for (const double number : match.expected.mean) text += fmt::format(" {}", number);
+  if (!match.expected.covariance.empty()) {
+    for (int row = 0; row < tangent; ++row) {
+      for (int column = row; column < tangent; ++column)
+        text += fmt::format(" {}", match.expected.covariance[column * tangent + row]);
+    }
+  }
+  return text + '\n';
+}
+
+bool same(const LinkReport& a, const LinkReport& b) {
+  return a.earlier == b.earlier && a.later == b.later && a.verdict == b.verdict;
+}
+
+}  // namespace
+
+PolicySession::PolicySession(PosePolicy& policy, StreamFormat& format, Registry& registry,
+                             PolicySettings settings)
+    : policy_(policy), format_(format), registry_(registry), settings_(std::move(settings)) {}
+
+PolicySession::Command PolicySession::find_command(std::string_view word) {
+  static constexpr std::pair<std::string_view, Command> kCommands[] = {
+      {"NEW", &PolicySession::declare},
+      {"NEXT", &PolicySession::propose},
+      {"NOMATCH", &PolicySession::note_unmatched},
+      {"DONE", &PolicySession::finish_pose},
+      {"REMOVE", &PolicySession::take_back},
+      {"COVARIANCE", &PolicySession::tell_covariance},
+      {"ESTIMATE", &PolicySession::tell_estimate},
+      {"CHI2", &PolicySession::tell_chi2},
+      {"SAVE", &PolicySession::save},
+      {"QUIT", &PolicySession::quit},
+      {"SOLVE", &PolicySession::refuse},
+      {"FULL", &PolicySession::refuse},
+      {"CHANGE", &PolicySession::refuse},
+      {"MARGINALIZE", &PolicySession::refuse},
+  };
+  for (const auto& [name, command] : kCommands) {
+    if (name == word) return command;
+  }
+  return nullptr;
+}
+
+void PolicySession::perform(std::string_view line, const Words& words, Reply& reply) {
+  if (const Command command = find_command(words[0])) {
+    (this->*command)(words, reply);
+  } else {
+    take_data(line, reply);
+  }
+}
+
+void PolicySession::finish() {
+  if (finished_) return;
+  Reply unheard;
+  finish_way(unheard);
+}
+
+std::int64_t PolicySession::variable_count() const { return std::ssize(policy_.kept()); }
+
+std::int64_t PolicySession::factor_count() const { return policy_.factor_count(); }
+
+void PolicySession::add_to(boost::json::object& report) const {
+  report["poses"] = {{"in", poses_}, {"kept", variable_count()}};
+  report["loops"] = {{"proposed", proposed_}, {"registered", registered_}, {"kept", linked_}};
+}
+
+// Data --------------------------------------------------------------------------------------------
+
+void PolicySession::take_data(std::string_view text, Reply& reply) {
+  StreamLine said = format_.read(text, kStreamName, line(), registry_, settings_.read);
+  for (NewVariable& pose : said.variables) take_pose(std::move(pose), reply);
+  for (NewFactor& factor : said.factors) take_edge(std::move(factor));
+  if (!said.held.empty()) hold(said.held);
+  reply.changes = !said.skipped;
+}
+
+void PolicySession::take_pose(NewVariable pose, Reply& reply) {
+  const std::string name = fmt::format("{} {}", pose.type->tag(), pose.id);
+  if (!is_pose(*pose.type))
+    throw bad_line(name + " is no pose; with a policy a robot's poses alone can come");
+  if (motions_ && motions_->type().tag() != pose.type->tag()) {
+    throw bad_line(fmt::format("{}: the poses before it are {}; expected another", name,
+                               motions_->type().tag()));
+  }
+  if (arrived_.contains(pose.id) || current() == pose.id)
+    throw bad_line(name + ": the id is already in use");
+  if (!pose.state.empty()) {
+    if (const std::string problem = pose.type->normalize(pose.state.data()); !problem.empty())
+      throw bad_line(fmt::format("{}: {}", name, problem));
+  }
+  if (current()) {
+    expect_complete();
+    close(reply);
+  }
+  if (!motions_) motions_.emplace(pose.type);
+  arriving_ = Arrival{std::move(pose), {}};
+}
+
+void PolicySession::hold(std::span<const Id> ids) {
+  for (const Id id : ids) {
+    if (!arriving_ || arriving_->pose.id != id) {
+      throw bad_line(fmt::format(
+          "FIX {}: only a pose that has just come can be held; expected FIX right after the line "
+          "of the pose",
+          id));
+    }
+  }
+  arriving_->pose.fixed = true;
+}
+
+/// Odometry of the pose that arrives, or a link of the newest.
+void PolicySession::take_edge(NewFactor factor) {
+  const Id other = other_end(factor.variables);
+  check_motion(factor, other);
+  if (other == (arriving_ ? newest_ : before_)) {
+    if (!arriving_) {
+      throw bad_line(
+          fmt::format("odometry from pose {} to {} after other lines of pose {}; "
+                      "expected it right after the line that brings the pose",
+                      other, *newest_, *newest_));
+    }
+    arriving_->odometry.push_back(std::move(factor));
+    return;
+  }
+  check_kept(other);
+  expect_complete();
+  begin();
+  if (measured_ && measured_->other != other) offer();
+  if (!measured_) measured_ = Measured{other, {}};
+  measured_->factors.push_back(std::move(factor));
+}
+
+/// The one of two ids that is not the pose of now.
+Id PolicySession::other_end(std::span<const Id> ends) const {
+  const std::optional<Id> pose = current();
+  if (!pose) throw bad_line("there is no pose that is not done; expected the line of the next one");
+  const bool between = ends.size() == 2 && (ends[0] == pose) != (ends[1] == pose);
+  if (!between) {
+    throw bad_line(
+        fmt::format("between {}; expected a motion between pose {}, which is the "
+                    "newest, and another",
+                    fmt::join(ends, " and "), *pose));
+  }
+  return ends[0] == pose ? ends[1] : ends[0];
+}
+
+/// Nothing that the policy would refuse later, when others wait for an answer.
+void PolicySession::check_motion(const NewFactor& factor, Id from) const {
+  const FactorType& type = *factor.type;
+  if (!type.is_relative() || type.variable_tags().front() != motions_->type().tag()) {
+    throw bad_line(fmt::format("{} measures no motion of {}, and a policy takes nothing else",
+                               type.tag(), motions_->type().tag()));
+  }
+  (void)motions_->of_factor(factor, from);
+}
+
+void PolicySession::check_kept(Id id) const {
+  const auto there = arrived_.find(id);
+  if (there == arrived_.end()) throw bad_line(fmt::format("there is no pose {}", id));
+  if (!there->second) {
+    throw bad_line(
+        fmt::format("pose {} was not kept; expected a pose that is, such as NEXT "
+                    "proposes",
+                    id));
+  }
+}
+
+// The way of a pose -------------------------------------------------------------------------------
+
+/// The pose that arrives, or is open.
+std::optional<Id> PolicySession::current() const {
+  if (arriving_) return arriving_->pose.id;
+  return open_ ? newest_ : std::nullopt;
+}
+
+/// Whether the pose that arrives can be handed over.
+bool PolicySession::complete() const {
+  return !arriving_ || !newest_ || !arriving_->odometry.empty();
+}
+
+void PolicySession::expect_complete() const {
+  if (!current())
+    throw bad_line("there is no pose that is not done; expected the line of the next one");
+  if (!complete()) {
+    throw bad_line(
+        fmt::format("pose {} has no odometry yet; expected a measured motion between "
+                    "poses {} and {} first",
+                    arriving_->pose.id, *newest_, arriving_->pose.id));
+  }
+}
+
+void PolicySession::begin() {
+  if (!arriving_) return;
+  NewVariable pose = arriving_->pose;
+  if (newest_ && !pose.fixed) pose.state.clear();  // where its odometry puts it
+  policy_.add_pose(pose, arriving_->odometry);
+  before_ = std::exchange(newest_, pose.id);
+  if (!first_) first_ = pose.id;
+  arriving_.reset();
+  open_ = true;
+  asked_.clear();
+  told_.clear();
+  ++poses_;
+}
+
+/// Offers what was measured between the newest pose and one other.
+void PolicySession::offer() {
+  if (!measured_) return;
+  const Measured measured = *std::exchange(measured_, std::nullopt);
+  asked_.clear();
+  ++registered_;
+  try {
+    const LinkReport link = policy_.offer(measured.other, measured.factors);
+    told_.push_back(link);
+    note_link(link);
+  } catch (const Error& error) {
+    // The lines were taken, and what follows them is not to blame.
+    told_text_ += fmt::format("NOTE the link from {} to {} was not taken: {}\n", measured.other,
+                              *newest_, error.what());
+  }
+}
+
+/// Hands over to the policy what has come.
+void PolicySession::settle(Reply& reply) {
+  if (!complete()) return;
+  reply.changes = reply.changes || arriving_ || measured_;
+  begin();
+  offer();
+}
+
+/// Ends the pose of now.
+PoseReport PolicySession::end() {
+  Reply unheard;
+  settle(unheard);
+  PoseReport report = policy_.end_pose();
+  open_ = false;
+  arrived_[report.id] = report.kept;
+  // The policy lists all links of the pose; those that had been waiting are news.
+  auto told = told_.begin();
+  for (const LinkReport& link : report.links) {
+    if (told != told_.end() && same(*told, link)) {
+      ++told;
+    } else {
+      note_link(link);
+    }
+  }
+  for (const std::string& note : report.notes) told_text_ += fmt::format("NOTE {}\n", note);
+  return report;
+}
+
+/// Ends the pose, and answers.
+void PolicySession::close(Reply& reply) {
+  const PoseReport report = end();
+  reply.changes = reply.solved = true;
+  reply.seconds = report.seconds.total;
+  told_text_ += fmt::format("{} {}\n", report.kept ? "KEPT" : "DROPPED", report.id);
+  write_results(report.kept, reply);
+  answer(reply);
+}
+
+/// The newest pose is kept in any case, and everything solved.
+void PolicySession::finish_way(Reply& reply) {
+  if (!complete()) {
+    told_text_ +=
+        fmt::format("NOTE pose {} is left out: no motion between {} and {} was measured\n",
+                    arriving_->pose.id, *newest_, arriving_->pose.id);
+    arriving_.reset();
+  }
+  if (current()) end();
+  policy_.finish();
+  finished_ = true;
+  if (!newest_) return;
+  arrived_[*newest_] = true;
+  told_text_ += fmt::format("KEPT {}\n", *newest_);
+  write_results(true, reply);
+}
+
+// Commands ----------------------------------------------------------------------------------------
+
+void PolicySession::declare(const Words& words, Reply& reply) {
+  take_pose(declared_variable(words, registry_), reply);
+  reply.changes = true;
+}
+
+/// Asked again before an answer came, it says the same.
+void PolicySession::propose(const Words& words, Reply& reply) {
+  expect_words(words, 1, "NEXT");
+  expect_complete();
+  settle(reply);
+  if (asked_.empty()) {
+    const std::optional<MatchProposal> match = policy_.next_match();
+    reply.changes = true;
+    asked_ = match ? match_line(*match, motions_->tangent_size()) : "MATCH NONE\n";
+    proposed_ += match.has_value();
+  }
+  told_text_ += asked_;
+  answer(reply);
+}
+
+/// Data, as an edge is: not answered.
+void PolicySession::note_unmatched(const Words& words, Reply& reply) {
+  expect_words(words, 3, "NOMATCH id id");
+  const Id ends[] = {parse_whole(words[1], "id"), parse_whole(words[2], "id")};
+  const Id other = other_end(ends);
+  check_kept(other);
+  expect_complete();
+  settle(reply);
+  asked_.clear();
+  told_.push_back(policy_.offer(other, {}));
+  reply.changes = true;
+}
+
+void PolicySession::finish_pose(const Words& words, Reply& reply) {
+  expect_words(words, 1, "DONE");
+  expect_complete();
+  close(reply);
+}
+
+void PolicySession::take_back(const Words& words, Reply& reply) {
+  if (words.size() != 3 || words[1] != "VARIABLE" || !arriving_ ||
+      parse_whole(words[2], "id") != arriving_->pose.id) {
+    throw bad_line(
+        "the policy decides what stays: only a pose that has just come, and has no lines but its "
+        "odometry, can be removed; expected 'REMOVE VARIABLE id' with its id");
+  }
+  arriving_.reset();
+  if (!newest_) motions_.reset();
+  reply.changes = true;
+  answer(reply);
+}
+
+void PolicySession::refuse(const Words& words, Reply& /*reply*/) {
+  const bool solving = words[0] == "SOLVE" || words[0] == "FULL";
+  throw bad_line(fmt::format(
+      "{} is not for a run with a policy, which {}", words[0],
+      solving ? "solves by itself when a loop closes, and everything at the end"
+              : "goes on deciding from what it has taken, and could not take that into account"));
+}
+
+void PolicySession::tell_covariance(const Words& words, Reply& reply) {
+  expect_words(words, 3, "COVARIANCE id id");
+  const Id a = parse_whole(words[1], "id"), b = parse_whole(words[2], "id");
+  for (const Id id : {a, b}) {
+    if (in_graph(id)) continue;
+    throw bad_line(fmt::format("there is no pose {} in the compact graph", id));
+  }
+  settle(reply);
+  Estimator& estimator = read_estimator(reply);
+  const std::string text = covariance_line(estimator, a, motions_->type(), b, motions_->type());
+  if (text.empty() && !silent()) {
+    throw Error(ErrorCode::numerical,
+                "there is no covariance: the measurements do not determine everything");
+  }
+  told_text_ += text;
+  answer(reply);
+}
+
+void PolicySession::tell_estimate(const Words& words, Reply& reply) {
+  expect_words(words, 2, "ESTIMATE id' or 'ESTIMATE ALL");
+  if (words[1] == "ALL") {
+    settle(reply);
+    if (newest_) {
+      read_estimator(reply);
+      for (const Id id : policy_.kept()) write_estimate(id, told_text_);
+      if (!in_graph(*newest_)) write_estimate(*newest_, told_text_);
+    }
+    return answer(reply);
+  }
+  const Id id = parse_whole(words[1], "id");
+  const std::optional<Id> newest = arriving_ && complete() ? current() : newest_;
+  if (newest != id && !in_graph(id)) {
+    throw bad_line(
+        fmt::format("there is no estimate of {}; expected a pose that was kept, or the "
+                    "newest once its odometry is there",
+                    id));
+  }
+  settle(reply);
+  if (newest_ != id) read_estimator(reply);
+  write_estimate(id, told_text_);
+  answer(reply);
+}
+
+void PolicySession::tell_chi2(const Words& words, Reply& reply) {
+  expect_words(words, 1, "CHI2");
+  settle(reply);
+  told_text_ += fmt::format("CHI2 {}\n", read_estimator(reply).chi2());
+  answer(reply);
+}
+
+void PolicySession::save(const Words& words, Reply& reply) {
+  expect_words(words, 2, "SAVE file");
+  if (words[1] == "-") throw bad_line("SAVE writes to a file, not to standard output");
+  settle(reply);
+  Estimator& estimator = read_estimator(reply);
+  if (!silent()) write_graph(estimator.graph(), std::string(words[1]), registry_);
+  answer(reply);
+}
+
+/// Not a change: a journal goes on before it.
+void PolicySession::quit(const Words& words, Reply& reply) {
+  expect_words(words, 1, "QUIT");
+  reply.quit = true;
+  finish_way(reply);
+  reply.changes = false;
+  answer(reply);
+}
+
+// Answers -----------------------------------------------------------------------------------------
+
+void PolicySession::answer(Reply& reply) {
+  reply.text += std::exchange(told_text_, {});
+  acknowledge(reply);
+}
+
+/// Tells of a link, and counts it.
+void PolicySession::note_link(const LinkReport& link) {
+  told_text_ += fmt::format("{} {} {} {} {}\n", word_of(link.verdict), link.earlier, link.later,
+                            link.gain, link.innovation);
+  linked_ += link.verdict == LinkVerdict::linked;
+}
+
+/// What --output and --marginals ask for at the end of a pose.
+void PolicySession::write_results(bool kept, Reply& reply) {
+  const bool all = settings_.output == "all", changed = settings_.output == "changed";
+  if (all || changed) {
+    read_estimator(reply);
+    std::vector<Id> poses = policy_.kept();
+    if (!kept) poses.push_back(*newest_);
+    for (const Id id : poses) {
+      std::string text;
+      write_estimate(id, text);
+      std::string& told = told_states_[id];
+      if (changed && told == text) continue;
+      told_text_ += text;
+      told = std::move(text);
+    }
+  }
+  if (settings_.output == "last") write_estimate(*newest_, told_text_);
+  if (!kept || settings_.marginals == "none") return;  // otherwise they are the same as before
+  Estimator& estimator = read_estimator(reply);
+  const VariableType& type = motions_->type();
+  const std::vector<Id> ids =
+      settings_.marginals == "last" ? std::vector<Id>{*newest_} : policy_.kept();
+  for (const Id id : ids) told_text_ += covariance_line(estimator, id, type, id, type);
+}
+
+bool PolicySession::in_graph(Id id) const {
+  const auto there = arrived_.find(id);
+  if (there != arrived_.end() && there->second) return true;
+  if (newest_ != id) return false;
+  const std::vector<Id> kept = policy_.kept();
+  return !kept.empty() && kept.back() == id;
+}
+
+/// Of a kept pose, for which the estimator must have been read, or of the newest.
+void PolicySession::write_estimate(Id id, std::string& text) const {
+  if (id == newest_) {
+    text += estimate_line(motions_->type(), id, policy_.newest_state());
+  } else {
+    text += estimate_line(motions_->type(), id, policy_.estimator().state(id));
+  }
+}
+
+Estimator& PolicySession::read_estimator(Reply& reply) {
+  reply.changes = true;
+  return policy_.estimator();
+}
+
+}  // namespace cairn::app

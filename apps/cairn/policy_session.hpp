@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <unordered_map>
+#include <vector>
+
+#include "cairn/motion.hpp"
+#include "cairn/pose_policy.hpp"
+#include "cairn/registry.hpp"
+#include "cairn/stream_format.hpp"
+#include "line_session.hpp"
+
+namespace cairn::app {
+
+struct PolicySettings {
+  ReadOptions read;
+  std::string output = "last";     ///< estimates at the end of a pose: none, last, changed or all
+  std::string marginals = "none";  ///< covariances then: none, last or diagonal
+};
+
+/// A policy decides live which poses are kept and which pairs the front end should match.
+///
+/// A pose *arrives* with its line and its odometry, is *open* from the first line on that is
+/// neither (then the policy has it), and ends with DONE, the line of the next pose or the input.
+/// Lines of data only collect; every command first *settles* what came before it, and tells in its
+/// answer what became of it. What a command refuses is found before it settles anything.
+///
+/// A policy may hold back odometry from its estimator until somebody reads that, which costs the
+/// last bits their place. So a question that reads the estimator goes to the journal.
+class PolicySession final : public LineSession {
+ public:
+  PolicySession(PosePolicy& policy, StreamFormat& format, Registry& registry,
+                PolicySettings settings);
+
+  void finish() override;
+  Estimator& estimator() override { return policy_.estimator(); }
+  std::int64_t variable_count() const override;
+  std::int64_t factor_count() const override;
+  void add_to(boost::json::object& report) const override;
+
+ private:
+  struct Arrival {
+    NewVariable pose;
+    std::vector<NewFactor> odometry;
+  };
+  /// What was measured between the newest pose and another one, and not offered yet.
+  struct Measured {
+    Id other = 0;
+    std::vector<NewFactor> factors;
+  };
+
+  using Command = void (PolicySession::*)(const Words&, Reply&);
+  static Command find_command(std::string_view word);
+  void perform(std::string_view line, const Words& words, Reply& reply) override;
+
+  // A command each; the words are those of its line.
+  void declare(const Words& words, Reply& reply);
+  void propose(const Words& words, Reply& reply);
+  void note_unmatched(const Words& words, Reply& reply);
+  void finish_pose(const Words& words, Reply& reply);
+  void take_back(const Words& words, Reply& reply);
+  void tell_covariance(const Words& words, Reply& reply);
+  void tell_estimate(const Words& words, Reply& reply);
+  void tell_chi2(const Words& words, Reply& reply);
+  void save(const Words& words, Reply& reply);
+  void quit(const Words& words, Reply& reply);
+  void refuse(const Words& words, Reply& reply);
+
+  // Data
+  void take_data(std::string_view text, Reply& reply);
+  void take_pose(NewVariable pose, Reply& reply);
+  void take_edge(NewFactor factor);
+  void hold(std::span<const Id> ids);
+  Id other_end(std::span<const Id> ends) const;
+  void check_motion(const NewFactor& factor, Id from) const;
+  void check_kept(Id id) const;
+
+  // The way of a pose
+  std::optional<Id> current() const;
+  bool complete() const;
+  void expect_complete() const;
+  void begin();
+  void offer();
+  void settle(Reply& reply);
+  PoseReport end();
+  void close(Reply& reply);
+  void finish_way(Reply& reply);
+
+  // Answers
+  void answer(Reply& reply);
+  void note_link(const LinkReport& link);
+  void write_results(bool kept, Reply& reply);
+  bool in_graph(Id id) const;
+  void write_estimate(Id id, std::string& text) const;
+  Estimator& read_estimator(Reply& reply);
+
+  PosePolicy& policy_;
+  StreamFormat& format_;
+  Registry& registry_;
+  PolicySettings settings_;
+  std::optional<MotionGroup> motions_;  ///< of the poses' type, from the first pose on
+
+  std::optional<Arrival> arriving_;
+  std::optional<Id> first_, newest_, before_;  ///< that the policy has
+  bool open_ = false, finished_ = false;
+  std::optional<Measured> measured_;
+  std::string asked_;                     ///< MATCH …, while nothing came in answer
+  std::unordered_map<Id, bool> arrived_;  ///< and whether it was kept
+  std::vector<LinkReport> told_;          ///< links of the open pose
+  std::string told_text_;                 ///< what the next answer begins with
+
+  std::unordered_map<Id, std::string> told_states_;  ///< for `changed`
+  std::int64_t poses_ = 0, proposed_ = 0, registered_ = 0, linked_ = 0;
+};
+
+}  // namespace cairn::app

@@ -1,0 +1,171 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// cairn compact GRAPH.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <string>
+
+#include "cairn/registry.hpp"
+#include "integration/process.hpp"
+
+namespace cairn::test {
+namespace {
+
+using testing::AllOf;
+using testing::Each;
+using testing::HasSubstr;
+using testing::SizeIs;
+using testing::StartsWith;
+
+const std::string kWorld = "@manhattan:poses=300,streets=5";
+
+class Compact : public testing::Test {
+ protected:
+  void SetUp() override {
+    if (!Registry().has("pose_policy", "compact_pose")) GTEST_SKIP() << "no policy compact_pose";
+  }
+  boost::json::value report(Arguments arguments) {
+    arguments.insert(arguments.begin(), "compact");
+    arguments.insert(arguments.end(), {"--json", "-", "--quiet"});
+    const Outcome run = cairn(arguments);
+    EXPECT_EQ(run.exit_code, 0) << run.err;
+    return parse_json(run.out);
+  }
+  TemporaryFolder folder_;
+};
+
+std::int64_t whole(const boost::json::value& report, const char* group, const char* name) {
+  return report.at(group).at(name).as_int64();
+}
+
+double ate(const boost::json::value& report, const char* recovery) {
+  return report.at("errors").at(recovery).at("ate").at("translation").as_double();
+}
+
+TEST_F(Compact, LeadsFromAGraphToACompactOneTheWholeWayAndAReport) {
+  const std::string in = folder_.file("in.g2o"), truth = folder_.file("truth.g2o"),
+                    out = folder_.file("out.g2o"), way = folder_.file("way.g2o"),
+                    json = folder_.file("report.json"), steps = folder_.file("steps.csv");
+  ASSERT_EQ(cairn({"generate", "manhattan:poses=300,streets=5", "-o", in, "--ground-truth", truth})
+                .exit_code,
+            0);
+  const Outcome run = cairn({"compact", in, "-o", out, "--trajectory", way, "--json", json,
+                             "--steps", steps, "--truth", truth, "--quiet"});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_THAT(run.out, AllOf(HasSubstr("thresholds"), HasSubstr("poses"), HasSubstr("loops"),
+                             HasSubstr("NEES"), HasSubstr(out), HasSubstr(way)));
+  const boost::json::value told = parse_json(read_text(json));
+  EXPECT_EQ(whole(told, "poses", "in"), 300);
+  const std::int64_t kept = whole(told, "poses", "kept");
+  EXPECT_LT(kept, 280);
+  EXPECT_GT(whole(told, "loops", "kept"), 0);
+  EXPECT_LT(whole(told, "loops", "kept"), whole(told, "loops", "in"));
+  EXPECT_LT(ate(told, "v2"), 0.5);
+  EXPECT_DOUBLE_EQ(told.at("rmse").as_double(), ate(told, "v2"));
+  EXPECT_THAT(lines(read_text(steps)), SizeIs(301));
+
+  const boost::json::value compact = parse_json(cairn({"info", out, "--json", "-"}).out);
+  EXPECT_EQ(whole(compact, "graph", "variables"), kept);
+  // The whole way has every pose once, and is what the errors are of.
+  const boost::json::value evaluated =
+      parse_json(cairn({"evaluate", way, truth, "--json", "-"}).out);
+  EXPECT_EQ(whole(evaluated, "poses", "compared"), 300);
+  EXPECT_NEAR(evaluated.at("ate").at("translation").as_double(), ate(told, "v2"), 1e-9);
+}
+
+TEST_F(Compact, KeepsEverythingThatTheStrategySaysSo) {
+  const boost::json::value all = report(
+      {kWorld, "--strategy", "apal", "--policy", "compact_pose:search=untested", "--range", "5"});
+  EXPECT_EQ(whole(all, "poses", "kept"), 300);
+  EXPECT_EQ(whole(all, "loops", "kept"), whole(all, "loops", "registered"));
+  EXPECT_GT(whole(all, "loops", "kept"), 200);
+  const boost::json::value few =
+      report({kWorld, "--strategy", "fpfl", "--range", "5", "--angle", "3"});
+  EXPECT_LT(whole(few, "poses", "kept"), 250);
+  EXPECT_LT(whole(few, "nonzeros", "factor"), whole(all, "nonzeros", "factor"));
+}
+
+TEST_F(Compact, TheControlHasTheSizeOfWhatItIsComparedWith) {
+  const boost::json::value control =
+      report({kWorld, "--strategy", "rfpfl", "--range", "5", "--angle", "3", "--seed", "3"});
+  EXPECT_EQ(whole(control, "poses", "kept"), whole(control.at("like"), "poses", "kept"));
+  EXPECT_EQ(whole(control, "loops", "kept"), whole(control.at("like"), "loops", "kept"));
+  EXPECT_NE(ate(control, "v2"), ate(control.at("like"), "v2"));
+}
+
+TEST_F(Compact, ThresholdsAreFoundSavedAndRead) {
+  const std::string file = folder_.file("thresholds.json");
+  const boost::json::value found =
+      report({kWorld, "--auto", "--save-thresholds", file, "--error-ratio", "0"});
+  const boost::json::value saved = parse_json(read_text(file));
+  EXPECT_EQ(saved.at("policy").as_string(), "compact_pose");
+  EXPECT_EQ(saved.at("options"), found.at("thresholds").at("options"));
+  const boost::json::value again = report({kWorld, "--thresholds", file});
+  EXPECT_EQ(again.at("poses"), found.at("poses"));
+  EXPECT_EQ(again.at("loops"), found.at("loops"));
+  EXPECT_EQ(again.at("errors"), found.at("errors"));
+  // The command line goes before the file.
+  const boost::json::value stricter = report({kWorld, "--thresholds", file, "--loop-gain", "1000"});
+  EXPECT_EQ(whole(stricter, "loops", "kept"), 0);
+}
+
+TEST_F(Compact, TriesThresholdsUntilTheErrorIsAsAskedFor) {
+  const boost::json::value strict = report({kWorld, "--error-ratio", "1.05"}),
+                           loose = report({kWorld, "--error-ratio", "50"});
+  const auto& tried = strict.at("thresholds").at("trials").as_array();
+  ASSERT_FALSE(tried.empty());
+  EXPECT_GT(whole(strict, "loops", "kept"), whole(loose, "loops", "kept"));
+  EXPECT_GE(loose.at("thresholds").at("trials").as_array().size(), 2U);
+}
+
+TEST_F(Compact, TheGateKeepsFalseMatchesOut) {
+  const Arguments common{kWorld,
+                         "--range",
+                         "3",
+                         "--angle",
+                         "1.6",
+                         "--registration",
+                         "simulated:range=3,angle=1.6,false_rate=0.1"};
+  Arguments gated = common;
+  gated.insert(gated.end(), {"--gate", "0.99"});
+  const boost::json::value open = report(common), closed = report(gated);
+  EXPECT_GT(whole(open, "loops", "false_kept"), 0);
+  EXPECT_GT(whole(closed, "loops", "false_registered"), 0);
+  EXPECT_EQ(whole(closed, "loops", "false_kept"), 0);
+  EXPECT_LT(ate(closed, "v2"), 0.2 * ate(open, "v2"));
+}
+
+TEST_F(Compact, ComparesItsUncertaintyWithThatOfEverything) {
+  const std::string csv = folder_.file("compare.csv");
+  const boost::json::value told =
+      report({"@ellipse3d:poses=60", "--range", "3", "--angle", "0.3", "--compare", csv});
+  EXPECT_EQ(told.at("compare").at("marginal_conservative").as_double(), 1.0);
+  EXPECT_EQ(told.at("compare").at("full_conservative").as_double(), 1.0);
+  const std::vector<std::string> rows = lines(read_text(csv));
+  EXPECT_THAT(rows.front(), StartsWith("pose,kept,marginal,marginal_all,full,full_all"));
+  EXPECT_EQ(static_cast<std::int64_t>(rows.size()) - 1, told.at("compare").at("steps").as_int64());
+}
+
+TEST_F(Compact, SaysWhatIsWrongAndWhatWouldWork) {
+  const auto refused = [](Arguments arguments, int code) {
+    arguments.insert(arguments.begin(), "compact");
+    const Outcome run = cairn(arguments);
+    EXPECT_EQ(run.exit_code, code) << run.err;
+    return run.err;
+  };
+  EXPECT_THAT(refused({"@landmarks2d:poses=20"}, 3), HasSubstr("landmark"));
+  EXPECT_THAT(refused({kWorld, "--auto", "--thresholds", "x.json"}, 2), HasSubstr("give one"));
+  const std::string junk = folder_.file("junk.json");
+  write_text(junk, "{\"policy\": 3}");
+  EXPECT_THAT(refused({kWorld, "--thresholds", junk}, 3), HasSubstr("--save-thresholds"));
+  EXPECT_THAT(refused({"@manhattan:poses=20,loop_density=0"}, 3), HasSubstr("no loop closure"));
+  EXPECT_THAT(refused({kWorld, "--policy", "compact_pose:rage=3"}, 2), HasSubstr("range"));
+  EXPECT_THAT(refused({kWorld, "--policy", "random_poses:poses=10", "--auto"}, 2),
+              HasSubstr("does not find its options"));
+  EXPECT_THAT(refused({kWorld, "--range", "3", "-o", "-", "--trajectory", "-"}, 2),
+              HasSubstr("standard output"));
+}
+
+}  // namespace
+}  // namespace cairn::test
