@@ -72,6 +72,33 @@ const std::vector<DataSet>& replayed_quickly() {
   return all;
 }
 
+/// What `cairn compact` is fed with, with the truth.
+const std::vector<TruthfulSet>& compacted() {
+  static const std::vector<TruthfulSet> all{
+      {.set = {"ellipse3d", "@ellipse3d", {}}},
+      {.set = {"ellipse_n", "@ellipse_n", {}}},
+      {.set = {"kitti_00", "pose2d/kitti_00.g2o", {}},
+       .truth = Truth::camera,
+       .file = "groundtruth/kitti_00_poses.txt"},
+      {.set = {"sphere2500",
+               "pose3d/sphere2500_isam.txt",
+               {"--types", "slam3d:metric=rotation_vector"}},
+       .truth = Truth::edges,
+       .file = "groundtruth/sphere2500_groundtruth_isam.txt"},
+      {.set = {"parking-garage", "pose3d/parking-garage.g2o", {"--types", "slam3d:metric=g2o"}},
+       .truth = Truth::de_facto},
+      {.set = {"10kHog-man", "pose2d/10kHog-man.graph.gz", {}},
+       .truth = Truth::de_facto,
+       .arguments = {"--initial", "chordal"}},
+      {.set = {"manhattanOlson3500", "pose2d/manhattanOlson3500_isam.txt", {}},
+       .truth = Truth::file,
+       .file = "groundtruth/manhattanOlson3500_nodes_groundTruth.dat"},
+      {.set = {"city10000", "pose2d/city10000_isam.txt", {}},
+       .truth = Truth::edges,
+       .file = "groundtruth/city10000_groundtruth_isam.txt"}};
+  return all;
+}
+
 /// Turns the graph's place in the folder `data` into a path; false if there is none.
 bool locate(DataSet& set, const std::string& data) {
   if (set.generated()) return true;
@@ -79,9 +106,18 @@ bool locate(DataSet& set, const std::string& data) {
   return !data.empty() && std::filesystem::exists(set.graph);
 }
 
-std::vector<DataSet> located(const std::vector<DataSet>& all, const std::string& data) {
-  std::vector<DataSet> sets = all;
-  std::erase_if(sets, [&](DataSet& set) { return !locate(set, data); });
+bool locate(TruthfulSet& set, const std::string& data) {
+  if (!set.file.empty()) {
+    set.file = (std::filesystem::path(data) / set.file).string();
+    if (data.empty() || !std::filesystem::exists(set.file)) return false;
+  }
+  return locate(set.set, data);
+}
+
+template <class Set>
+std::vector<Set> located(const std::vector<Set>& all, const std::string& data) {
+  std::vector<Set> sets = all;
+  std::erase_if(sets, [&](Set& set) { return !locate(set, data); });
   return sets;
 }
 
@@ -149,6 +185,42 @@ std::vector<DataSet> budget_sets(const std::string& data, bool quick) {
   std::vector<DataSet> sets = located(replayed(), data);
   std::erase_if(sets,
                 [](const DataSet& set) { return set.name != "city10000" && set.name != "city"; });
+  return sets;
+}
+
+std::vector<TruthfulSet> compact_sets(const std::string& data, bool quick) {
+  if (quick) {
+    return {{.set = {"ellipse3d", "@ellipse3d", {}}},
+            {.set = {"manhattan, 500 poses", "@manhattan:poses=500", {}}}};
+  }
+  return located(compacted(), data);
+}
+
+std::vector<TruthfulSet> comparison_sets(const std::string& data, bool quick) {
+  std::vector<TruthfulSet> sets = located(compacted(), quick ? "" : data);
+  std::erase_if(sets, [](const TruthfulSet& set) {
+    return set.set.name != "ellipse3d" && set.set.name != "parking-garage";
+  });
+  return sets;
+}
+
+std::vector<SimulatedSet> simulated_sets(const std::string& data, bool quick) {
+  const std::string planar = "range=3,angle=3.14";
+  const SimulatedSet ellipse{.set = {.set = {"ellipse3d", "@ellipse3d", {}}},
+                             .range = "range=3,angle=0.2"};
+  if (quick) {
+    return {
+        ellipse,
+        {.set = {.set = {"manhattan, 300 poses", "@manhattan:poses=300", {}}}, .range = planar}};
+  }
+  std::vector<SimulatedSet> sets{
+      ellipse,
+      {.set = {.set = {"sphere, 900 poses", "@sphere:turns=30,poses_per_turn=30,radius=30", {}}},
+       .range = "range=8,angle=0.6"},
+      {.set = {.set = {"manhattan, 2000 poses", "@manhattan:poses=2000", {}}}, .range = planar}};
+  for (const TruthfulSet& set : located(compacted(), data)) {
+    if (set.set.name == "manhattanOlson3500") sets.push_back({.set = set, .range = planar});
+  }
   return sets;
 }
 

@@ -14,6 +14,23 @@ struct DataSet {
   bool generated() const { return graph.starts_with('@'); }
 };
 
+/// Where the true poses of a graph come from.
+enum class Truth {
+  generated,  ///< the generator knows them
+  file,       ///< a graph or a trajectory
+  edges,      ///< measurements without noise, to be optimised
+  camera,     ///< poses of a camera in KITTI's axes
+  de_facto    ///< nobody knows them: the minimum of all measurements
+};
+
+/// A graph for `cairn compact`.
+struct TruthfulSet {
+  DataSet set;
+  Truth truth = Truth::generated;
+  std::string file{};                    ///< with the truth
+  std::vector<std::string> arguments{};  ///< what optimising it needs
+};
+
 // The graphs of each study: the published ones that lie in the folder `data` (empty: none do), then
 // generated ones, which everybody has. `quick`: few and small.
 std::vector<DataSet> pose_graphs(const std::string& data, bool quick);
@@ -25,5 +42,15 @@ std::vector<DataSet> solver_sets(const std::string& data, bool quick);
 // For `cairn replay`:
 std::vector<DataSet> online_sets(const std::string& data, bool quick);
 std::vector<DataSet> budget_sets(const std::string& data, bool quick);
+// For `cairn compact`:
+std::vector<TruthfulSet> compact_sets(const std::string& data, bool quick);
+std::vector<TruthfulSet> comparison_sets(const std::string& data, bool quick);
+
+/// With a registration that measures what the truth is.
+struct SimulatedSet {
+  TruthfulSet set;
+  std::string range;  ///< of the simulated sensor, as options of `--registration simulated`
+};
+std::vector<SimulatedSet> simulated_sets(const std::string& data, bool quick);
 
 }  // namespace cairn::performance

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Measures cairn, study by study, and writes what it found into docs/performance.md.
+// Measures cairn, study by study, and writes what it found into the pages of docs/.
 #include <algorithm>
 #include <cstdio>
 #include <exception>
 #include <filesystem>
 #include <fstream>
-#include <map>
+#include <set>
 #include <sstream>
 #include <stdexcept>
 #include <string>
@@ -29,7 +29,8 @@ namespace json = boost::json;
 
 struct Arguments {
   std::vector<std::string> studies;
-  std::string cairn, folder, data, commit, page;
+  std::vector<std::string> pages;
+  std::string cairn, folder, data, commit;
   std::string ours = "block_cholesky";
   int rounds = 0;
   bool quick = false;
@@ -39,10 +40,35 @@ using Study = void (*)(const Bench&, const Keep&);
 
 const std::vector<std::pair<std::string, Study>>& all_studies() {
   static const std::vector<std::pair<std::string, Study>> all{
-      {"graphs", study_graphs},   {"rates", study_rates},     {"threads", study_threads},
-      {"scaling", study_scaling}, {"solvers", study_solvers}, {"marginals", study_marginals},
-      {"online", study_online}};
+      {"graphs", study_graphs},
+      {"rates", study_rates},
+      {"threads", study_threads},
+      {"scaling", study_scaling},
+      {"solvers", study_solvers},
+      {"marginals", study_marginals},
+      {"online", study_online},
+      {"compact_sets", study_compact_sets},
+      {"compact_growth", study_compact_growth},
+      {"compact_honesty", study_compact_honesty},
+      {"compact_matches", study_compact_matches}};
   return all;
+}
+
+/// Of a group of studies, such as compact_sets, the name before the underscore stands for all.
+bool is_chosen(const std::string& study, const std::vector<std::string>& chosen) {
+  return chosen.empty() || std::ranges::any_of(chosen, [&](const std::string& name) {
+           return study == name || study.starts_with(name + "_");
+         });
+}
+
+/// What can be chosen.
+std::set<std::string> study_names() {
+  std::set<std::string> names;
+  for (const auto& [name, study] : all_studies()) {
+    names.insert(name);
+    names.insert(name.substr(0, name.find('_')));
+  }
+  return names;
 }
 
 std::string read(const fs::path& file) {
@@ -84,8 +110,7 @@ void measure(const Arguments& arguments) {
   const Bench bench{Cairn(arguments.cairn, folder / "work"), arguments.data, arguments.quick,
                     arguments.ours, rounds};
   for (const auto& [name, study] : all_studies()) {
-    const auto& chosen = arguments.studies;
-    if (!chosen.empty() && std::find(chosen.begin(), chosen.end(), name) == chosen.end()) continue;
+    if (!is_chosen(name, arguments.studies)) continue;
     json::object report = begin_report(name, arguments, bench);
     const fs::path file = folder / (name + ".json");
     study(bench, [&](json::object entry) {
@@ -95,22 +120,33 @@ void measure(const Arguments& arguments) {
   }
 }
 
+/// Into the page that has a place for it.
+void put_into(std::vector<std::string>& pages, const Section& section) {
+  const auto page = std::ranges::find_if(
+      pages, [&](const std::string& text) { return has_place(section, text); });
+  put(section, page == pages.end() ? pages.front() : *page);
+}
+
 /// Of every study that there is a report of; the others' sections stay as they are.
 void write_tables(const Arguments& arguments) {
-  std::string page = read(arguments.page);
+  std::vector<std::string> pages;
+  for (const std::string& file : arguments.pages) pages.push_back(read(file));
   for (const auto& [name, study] : all_studies()) {
     const fs::path file = fs::path(arguments.folder) / (name + ".json");
     if (!fs::exists(file)) continue;
     const json::value report = json::parse(read(file));
-    for (const Section& section : sections(report)) put(section, page);
+    for (const Section& section : sections(report)) put_into(pages, section);
     const json::array& entries = list(report, "entries");
     const fs::path picture = fs::path(arguments.folder) / (name + "_picture.json");
     if (name == "graphs") write(picture, json::serialize(graphs_picture(entries)));
     if (name == "scaling") write(picture, json::serialize(scaling_picture(entries)));
     if (name == "online") write(picture, json::serialize(online_picture(entries)));
+    if (name == "compact_growth") write(picture, json::serialize(compact_picture(entries)));
   }
-  write(arguments.page, page);
-  tell("tables: " + arguments.page);
+  for (std::size_t k = 0; k < pages.size(); ++k) {
+    write(arguments.pages[k], pages[k]);
+    tell("tables: " + arguments.pages[k]);
+  }
 }
 
 int run(int argc, char** argv) {
@@ -118,9 +154,8 @@ int run(int argc, char** argv) {
   CLI::App app("Measures the program cairn, one JSON file a study, and turns those into tables.");
   app.add_option("studies", arguments.studies,
                  "all, or some of: graphs rates threads scaling "
-                 "solvers marginals online")
-      ->check(CLI::IsMember(
-          {"graphs", "rates", "threads", "scaling", "solvers", "marginals", "online"}));
+                 "solvers marginals online compact")
+      ->check(CLI::IsMember(study_names()));
   app.add_option("--cairn", arguments.cairn, "the program to measure");
   app.add_option("--folder", arguments.folder, "where the JSON is")->required();
   app.add_option("--data", arguments.data, "folder of the real graphs");
@@ -130,9 +165,9 @@ int run(int argc, char** argv) {
   app.add_option("--rounds", arguments.rounds, "of each comparison [5, quick 2]")
       ->check(CLI::Range(1, 1000));
   app.add_flag("--quick", arguments.quick, "few and small graphs: shows that it works, no more");
-  app.add_option("--tables", arguments.page, "do not measure: fill in the tables of this page");
+  app.add_option("--tables", arguments.pages, "do not measure: fill in the tables of these pages");
   CLI11_PARSE(app, argc, argv);
-  if (!arguments.page.empty()) {
+  if (!arguments.pages.empty()) {
     write_tables(arguments);
   } else {
     measure(arguments);

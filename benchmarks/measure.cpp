@@ -79,6 +79,11 @@ Run Cairn::replay(const DataSet& set, const std::vector<std::string>& arguments,
   return run("replay", set, arguments, threads, limit);
 }
 
+Run Cairn::compact(const DataSet& set, const std::vector<std::string>& arguments, int threads,
+                   double limit) const {
+  return run("compact", set, arguments, threads, limit);
+}
+
 std::vector<std::string> Cairn::names(const std::string& kind) const {
   const json::value report =
       parsed(run_program({program_, "plugins", "--json", "-", "--quiet"}, work_).output);

@@ -19,7 +19,7 @@ struct Contestants {
   std::vector<std::string> complete;
 };
 
-/// One run of `cairn optimize`, `cairn marginals` or `cairn replay` and what became of it.
+/// One run of a command of `cairn` and what became of it.
 struct Run {
   Outcome outcome;
   boost::json::value report;  ///< null if there is none
@@ -47,6 +47,10 @@ class Cairn {
   /// `cairn replay`, likewise.
   Run replay(const DataSet& set, const std::vector<std::string>& arguments, int threads,
              double limit) const;
+
+  /// `cairn compact`, likewise.
+  Run compact(const DataSet& set, const std::vector<std::string>& arguments, int threads,
+              double limit) const;
 
   /// A folder for files of the runs.
   const std::filesystem::path& work() const { return work_; }

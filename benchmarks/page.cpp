@@ -4,9 +4,18 @@
 #include <stdexcept>
 
 namespace cairn::performance {
+namespace {
+
+std::string marker(const Section& section) { return "<!-- table:" + section.name + " -->\n"; }
+
+}  // namespace
+
+bool has_place(const Section& section, const std::string& page) {
+  return page.find(marker(section)) != std::string::npos;
+}
 
 void put(const Section& section, std::string& page) {
-  const std::string begin = "<!-- table:" + section.name + " -->\n", end = "<!-- /table -->";
+  const std::string begin = marker(section), end = "<!-- /table -->";
   const std::size_t at = page.find(begin);
   const std::size_t from = at + begin.size();
   const std::size_t to = at == std::string::npos ? at : page.find(end, from);

@@ -19,4 +19,7 @@ struct Section {
 /// Throws `std::runtime_error` if the page has no such place.
 void put(const Section& section, std::string& page);
 
+/// Whether the page has the section's markers.
+bool has_place(const Section& section, const std::string& page);
+
 }  // namespace cairn::performance

@@ -13,15 +13,19 @@ void tell(const std::string& sentence) {
   std::fflush(stderr);
 }
 
+void attempt(const std::string& what, const std::function<void()>& work) {
+  try {
+    tell(what);
+    work();
+  } catch (const std::exception& error) {
+    tell(fmt::format("{} left out: {}", what, error.what()));
+  }
+}
+
 void for_each_set(const std::string& study, const std::vector<DataSet>& sets,
                   const std::function<void(const DataSet&)>& work) {
   for (const DataSet& set : sets) {
-    try {
-      tell(fmt::format("{}: {}", study, set.name));
-      work(set);
-    } catch (const std::exception& error) {
-      tell(fmt::format("{}: {} left out: {}", study, set.name, error.what()));
-    }
+    attempt(fmt::format("{}: {}", study, set.name), [&] { work(set); });
   }
 }
 

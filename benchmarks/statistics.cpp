@@ -20,6 +20,13 @@ double median(std::vector<double> values) {
   return values.size() % 2 ? values[half] : 0.5 * (values[half - 1] + values[half]);
 }
 
+double percentile(std::vector<double> values, double part) {
+  if (values.empty()) return kNone;
+  std::sort(values.begin(), values.end());
+  const double rank = std::ceil(part * static_cast<double>(values.size()));
+  return values[static_cast<std::size_t>(std::max(rank, 1.0)) - 1];
+}
+
 double geometric_mean(std::span<const double> ratios) {
   if (ratios.empty()) return kNone;
   double sum = 0.0;

@@ -9,6 +9,9 @@ namespace cairn::performance {
 /// The middle value, or the mean of the two in the middle; NaN of nothing.
 double median(std::vector<double> values);
 
+/// The smallest value that a part of them does not exceed; NaN of nothing.
+double percentile(std::vector<double> values, double part);
+
 /// exp of the mean logarithm: what ratios are averaged by, so that a/b and b/a agree. NaN of
 /// nothing.
 double geometric_mean(std::span<const double> ratios);

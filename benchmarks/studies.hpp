@@ -48,11 +48,27 @@ void study_marginals(const Bench& bench, const Keep& keep);
 /// covariances and with a limit of time.
 void study_online(const Bench& bench, const Keep& keep);
 
+// `cairn compact`, whose studies are called compact_…; docs/compact_results.md has their tables.
+
+/// On the graphs of Ila et al. (2017), and others: thresholds, times, errors.
+void study_compact_sets(const Bench& bench, const Keep& keep);
+
+/// Against the number of laps around the same ellipse.
+void study_compact_growth(const Bench& bench, const Keep& keep);
+
+/// Normalised errors over many runs, and covariances beside those with everything.
+void study_compact_honesty(const Bench& bench, const Keep& keep);
+
+/// With a registration of which a tenth is wrong.
+void study_compact_matches(const Bench& bench, const Keep& keep);
+
 // Progress
 // ------------------------------------------------------------------------------------------------
 /// A line on standard error.
 void tell(const std::string& sentence);
-/// Calls `work` for each; one that cannot be measured is told of and left out.
+/// Calls `work`; what cannot be measured is told of and left out.
+void attempt(const std::string& what, const std::function<void()>& work);
+/// The same for each.
 void for_each_set(const std::string& study, const std::vector<DataSet>& sets,
                   const std::function<void(const DataSet&)>& work);
 

@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "json_access.hpp"
+#include "rounds.hpp"
 #include "statistics.hpp"
 #include "studies.hpp"
 
@@ -20,31 +21,11 @@ using Words = std::vector<std::string>;
 
 const std::string kOurs = "incremental_cholesky", kPeriodic = "periodic_batch", kBatch = "batch";
 
-/// Rounds end early for whoever has run for so long: the study is to take less than half an hour.
-constexpr double kEnoughSeconds = 20.0;
 /// A replay is given up after so many seconds; `batch`, which takes the square of it, sooner.
 constexpr double kLimit = 300.0, kLimitOfBatch = 60.0;
 /// `batch` is not even tried on more variables.
 constexpr double kMostVariablesOfBatch = 4000.0;
 constexpr double kBudget = 0.005;  // [s]
-
-/// Somebody who replays a graph, and how it went.
-struct Contestant {
-  std::string name;
-  Words arguments;
-  double limit = kLimit;  ///< [s]
-  json::array runs{};
-  double spent = 0.0;  ///< [s]
-  bool in_time = true;
-
-  bool runs_again() const {
-    if (runs.empty()) return in_time;
-    return in_time && spent * (1.0 + 1.0 / static_cast<double>(runs.size())) <= kEnoughSeconds;
-  }
-  json::object entry() const {
-    return {{"name", name}, {"in_time", in_time}, {"limit", limit}, {"runs", runs}};
-  }
-};
 
 Run replay(const Bench& bench, const DataSet& set, const Words& arguments, double limit) {
   Run run = bench.cairn.replay(set, arguments, 1, limit);
@@ -62,20 +43,10 @@ json::object summary(const json::value& report) {
   return all;
 }
 
-/// In turn, each round beginning with another one.
-void run_rounds(const Bench& bench, const DataSet& set, std::vector<Contestant>& contestants) {
-  const int rounds = bench.quick ? 1 : bench.rounds;
-  for (int round = 0; round < rounds; ++round) {
-    for (std::size_t k = 0; k < contestants.size(); ++k) {
-      Contestant& c = contestants[(k + static_cast<std::size_t>(round)) % contestants.size()];
-      if (std::ssize(c.runs) < round || !c.runs_again()) continue;
-      const Run run = replay(bench, set, c.arguments, c.limit);
-      c.in_time = run.outcome.in_time;
-      if (!c.in_time) continue;
-      c.runs.push_back(summary(run.report));
-      c.spent += run.outcome.seconds;
-    }
-  }
+void replay_rounds(const Bench& bench, const DataSet& set, std::vector<Contestant>& contestants) {
+  run_rounds(
+      bench.quick ? 1 : bench.rounds, contestants,
+      [&](const Contestant& c) { return replay(bench, set, c.arguments, c.limit); }, summary);
 }
 
 Words estimator(const std::string& name, Words more = {}) {
@@ -85,12 +56,10 @@ Words estimator(const std::string& name, Words more = {}) {
 
 json::object begin_entry(const std::string& part, const DataSet& set,
                          const std::vector<Contestant>& contestants) {
-  json::array all;
-  for (const Contestant& c : contestants) all.push_back(c.entry());
   return {{"part", part},
           {"name", set.name},
           {"generated", set.generated()},
-          {"contestants", std::move(all)}};
+          {"contestants", entries_of(contestants)}};
 }
 
 // --- without covariances ---
@@ -99,14 +68,15 @@ json::object measure_times(const Bench& bench, const DataSet& set) {
   // Apart from the clock: what is optimised at the samples disturbs the caches.
   const std::string samples = bench.quick ? "10" : "50";
   const Run check = replay(bench, set, estimator(kOurs, {"--check", samples, "--finish"}), 0.0);
-  std::vector<Contestant> contestants{{.name = kOurs, .arguments = estimator(kOurs)},
-                                      {.name = kPeriodic, .arguments = estimator(kPeriodic)}};
+  std::vector<Contestant> contestants{
+      {.name = kOurs, .arguments = estimator(kOurs), .limit = kLimit},
+      {.name = kPeriodic, .arguments = estimator(kPeriodic), .limit = kLimit}};
   if (number(check.report, "graph.variables") <= kMostVariablesOfBatch) {
     contestants.push_back({.name = kBatch,
                            .arguments = estimator(kBatch),
                            .limit = bench.quick ? 10.0 : kLimitOfBatch});
   }
-  run_rounds(bench, set, contestants);
+  replay_rounds(bench, set, contestants);
   json::object entry = begin_entry("times", set, contestants);
   entry["graph"] = *member(check.report, "graph");
   entry["checks"] = *member(check.report, "checks");
@@ -117,8 +87,8 @@ json::object measure_times(const Bench& bench, const DataSet& set) {
 
 json::object measure_marginals(const Bench& bench, const DataSet& set) {
   const Words arguments = estimator(kOurs, {"--marginals", "diagonal", "--estimate"});
-  std::vector<Contestant> contestants{{.name = kOurs, .arguments = arguments}};
-  run_rounds(bench, set, contestants);
+  std::vector<Contestant> contestants{{.name = kOurs, .arguments = arguments, .limit = kLimit}};
+  replay_rounds(bench, set, contestants);
   return begin_entry("marginals", set, contestants);
 }
 
@@ -128,9 +98,9 @@ json::object measure_marginals(const Bench& bench, const DataSet& set) {
 json::object measure_budget(const Bench& bench, const DataSet& set) {
   const Words with{"--check", "1", "--budget", fmt::format("{}", kBudget)};
   std::vector<Contestant> contestants{
-      {.name = "none", .arguments = estimator(kOurs, {"--check", "1"})},
-      {.name = "budget", .arguments = estimator(kOurs, with)}};
-  run_rounds(bench, set, contestants);
+      {.name = "none", .arguments = estimator(kOurs, {"--check", "1"}), .limit = kLimit},
+      {.name = "budget", .arguments = estimator(kOurs, with), .limit = kLimit}};
+  replay_rounds(bench, set, contestants);
   json::object entry = begin_entry("budget", set, contestants);
   entry["budget"] = kBudget;
   return entry;

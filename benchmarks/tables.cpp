@@ -325,6 +325,14 @@ std::vector<Section> sections(const json::value& report) {
     all = marginals_sections(entries);
   } else if (study == "online") {
     all = online_sections(entries);
+  } else if (study == "compact_sets") {
+    all = compact_sets_sections(entries);
+  } else if (study == "compact_growth") {
+    all = compact_growth_sections(entries);
+  } else if (study == "compact_honesty") {
+    all = compact_honesty_sections(entries);
+  } else if (study == "compact_matches") {
+    all = compact_matches_sections(entries);
   } else {
     throw std::runtime_error("no table for a study named '" + study + "'");
   }

@@ -11,8 +11,8 @@
 
 namespace cairn::performance {
 
-/// The sections of docs/performance.md that the report of a study fills. Throws
-/// `std::runtime_error` for a study that it does not know.
+/// The sections of docs/performance.md and docs/compact_results.md that the report of a study
+/// fills. Throws `std::runtime_error` for a study that it does not know.
 std::vector<Section> sections(const boost::json::value& report);
 
 /// The main comparison's part of it, in tables_graphs.cpp.
@@ -21,13 +21,21 @@ std::vector<Section> graphs_sections(const boost::json::array& entries);
 /// The replays' part of it, in tables_online.cpp.
 std::vector<Section> online_sections(const boost::json::array& entries);
 
+// The parts of `cairn compact`, in tables_compact.cpp.
+std::vector<Section> compact_sets_sections(const boost::json::array& entries);
+std::vector<Section> compact_growth_sections(const boost::json::array& entries);
+std::vector<Section> compact_honesty_sections(const boost::json::array& entries);
+std::vector<Section> compact_matches_sections(const boost::json::array& entries);
+
 // What `cairn plot` draws, in the words of `cairn bench --json`:
 /// the main comparison, with the best of each family alone, as bars;
 boost::json::value graphs_picture(const boost::json::array& entries);
 /// the growth with size, a line a family;
 boost::json::value scaling_picture(const boost::json::array& entries);
-/// the time of the steps of replays, a point for so many steps.
+/// the time of the steps of replays, a point for so many steps;
 boost::json::value online_picture(const boost::json::array& entries);
+/// the growth with the number of poses of `cairn compact`, a line a strategy.
+boost::json::value compact_picture(const boost::json::array& entries);
 
 // Numbers in words
 // --------------------------------------------------------------------------------------------

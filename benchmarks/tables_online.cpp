@@ -7,8 +7,8 @@
 #include <fmt/format.h>
 #include <boost/json/array.hpp>
 
+#include "contestants.hpp"
 #include "json_access.hpp"
-#include "statistics.hpp"
 #include "tables.hpp"
 
 namespace cairn::performance {
@@ -20,41 +20,8 @@ constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 bool is_part(const json::value& entry, const char* part) { return text(entry, "part") == part; }
 
-/// Null if it is not there.
-const json::value* contestant(const json::value& entry, const std::string& name) {
-  for (const json::value& c : list(entry, "contestants")) {
-    if (text(c, "name") == name) return &c;
-  }
-  return nullptr;
-}
-
 const json::value* ours(const json::value& entry) {
   return contestant(entry, "incremental_cholesky");
-}
-
-/// Median over the rounds.
-double median_of(const json::value* c, const char* path) {
-  if (!c) return kNone;
-  std::vector<double> values;
-  for (const json::value& run : list(*c, "runs")) values.push_back(number(run, path));
-  return median(values);
-}
-
-/// Median of the ratios within the rounds that both were in.
-double paired_ratio(const json::value* peer, const json::value* mine) {
-  if (!peer || !mine) return kNone;
-  const json::array &theirs = list(*peer, "runs"), &own = list(*mine, "runs");
-  std::vector<double> ratios;
-  for (std::size_t k = 0; k < std::min(theirs.size(), own.size()); ++k)
-    ratios.push_back(number(theirs[k], "seconds.total") / number(own[k], "seconds.total"));
-  return median(ratios);
-}
-
-/// "> 60" of one that was not finished.
-std::string total(const json::value* c) {
-  const json::value* in_time = c ? member(*c, "in_time") : nullptr;
-  if (in_time && *in_time == false) return fmt::format("> {:.0f}", number(*c, "limit"));
-  return digits(median_of(c, "seconds.total"));
 }
 
 std::string memory(const json::value* c) { return megabytes(median_of(c, "peak_memory_bytes")); }
@@ -166,7 +133,7 @@ std::string marginals_table(const json::array& entries) {
         percent(median_of(mine, "seconds.marginals") / median_of(mine, "seconds.total"))};
     append(row, step_times(mine));
     for (const char* by : {"downdate", "recomputation", "unchanged"}) {
-      const double steps = median_of(mine, (std::string("marginals_by.") + by).c_str());
+      const double steps = median_of(mine, std::string("marginals_by.") + by);
       row.push_back(std::isfinite(steps) ? fmt::format("{:.0f}", steps) : "0");
     }
     row.push_back(memory(mine));

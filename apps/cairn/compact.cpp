@@ -34,7 +34,7 @@ struct CompactOptions {
   std::string truth;
   bool automatic = false;
   double sample = 0.6;
-  double error_ratio = 2.0;
+  double error_ratio = 2.5;
   std::string thresholds, save_thresholds;
   std::optional<double> range, angle, loop_gain, pose_gain, gate;
   std::uint64_t seed = 1;
@@ -84,15 +84,17 @@ json::object options_json(const OptionValues& values) {
 json::object thresholds_json(const FoundThresholds& found) {
   json::array trials;
   for (const ThresholdTrial& trial : found.trials) {
-    trials.push_back({{"factor", trial.factor},
-                      {"expected_ratio", trial.expected},
-                      {"realised_ratio", trial.realised},
-                      {"poses", trial.poses},
-                      {"loops", trial.loops}});
+    trials.push_back({{"loop_gain_factor", trial.links},
+                      {"pose_gain_factor", trial.poses},
+                      {"expected_error", trial.expected},
+                      {"realised_error", trial.realised},
+                      {"poses", trial.poses_kept},
+                      {"loops", trial.loops_kept}});
   }
   return {{"options", options_json(found.options)},
           {"trials", std::move(trials)},
           {"expected_ate", found.expected_ate},
+          {"tolerance", found.tolerance},
           {"seconds", found.seconds}};
 }
 

@@ -20,8 +20,8 @@ using Clock = std::chrono::steady_clock;
 
 /// So many poses, spread evenly, stand for all in `expected_ate`.
 constexpr int kSpread = 40;
-/// Tries in one direction; the factor between the first and the last is 2⁶.
-constexpr int kMostTrials = 12;
+/// Tries in one direction.
+constexpr int kMostTrials = 10;
 const double kStep = std::sqrt(2.0);
 
 /// Ids spread evenly over a trajectory, from a list that rises.
@@ -62,26 +62,61 @@ double expected_error(PosePolicy& policy, const std::vector<Id>& poses) {
   return expected_ate(estimator, estimator.graph(), poses);
 }
 
-ThresholdTrial try_thresholds(const CompactJob& job, const OptionValues& options, double factor,
-                              std::size_t count, const Everything& everything,
-                              const CompactSetting& setting) {
-  CompactJob trial = job;
+/// What all tries share.
+struct Sample {
+  const CompactJob& job;
+  const CompactSetting& setting;
+  std::size_t count;
+  Everything everything;
+};
+
+ThresholdTrial try_thresholds(const Sample& sample, const OptionValues& options, double links,
+                              double poses) {
+  CompactJob trial = sample.job;
   for (const auto& [name, value] : options) trial.policy.values.emplace(name, value);
-  CompactRun run(trial, setting);
-  run.run(count, fmt::format("sample, gain × {:.2g}", factor));
-  ThresholdTrial result{.factor = factor};
+  CompactRun run(trial, sample.setting);
+  run.run(sample.count, fmt::format("sample, gains × {:.2g} {:.2g}", links, poses));
+  ThresholdTrial result{.links = links, .poses = poses};
   const Graph compact = run.policy().estimator().graph();
-  result.poses = compact.variable_count();
-  result.loops = run.counts().kept_loops;
+  result.poses_kept = compact.variable_count();
+  result.loops_kept = run.counts().kept_loops;
   const double apart =
-      compare(trajectory(recovered_way(run.policy(), Recovery::likely)), everything.way)
+      compare(trajectory(recovered_way(run.policy(), Recovery::likely)), sample.everything.way)
           .ate_translation;
-  const double expected = expected_error(run.policy(), nearest(everything.poses, ids_of(compact)));
-  if (everything.expected > 0.0) {
-    result.expected = expected / everything.expected;
-    result.realised = std::hypot(1.0, apart / everything.expected);
-  }
+  result.expected = expected_error(run.policy(), nearest(sample.everything.poses, ids_of(compact)));
+  result.realised = std::hypot(sample.everything.expected, apart);
   return result;
+}
+
+/// The tries, and the best of them.
+void refine(const Sample& sample, const OptionFinder& finder, FoundThresholds& found) {
+  const OptionValues first = found.options;
+  double least = std::numeric_limits<double>::infinity();
+  bool good = false;
+  const auto attempt = [&](double links, double poses) {
+    const OptionValues options = finder.scaled(first, links, poses);
+    found.trials.push_back(try_thresholds(sample, options, links, poses));
+    const ThresholdTrial& trial = found.trials.back();
+    good = trial.error() <= found.tolerance;
+    if (good || trial.error() < least) {  // if none is good, the one with the least error
+      found.options = options;
+      least = trial.error();
+    }
+    return !sample.setting.guard.interrupted();
+  };
+  if (!attempt(1.0, 1.0) || good) return;
+  double factor = 1.0;
+  for (int k = 0; k < kMostTrials && !good; ++k) {
+    // Where lower gains let no more links through, it is poses that are missing.
+    const std::size_t n = found.trials.size();
+    if (n > 2 && found.trials[n - 1].loops_kept == found.trials[n - 3].loops_kept) break;
+    if (!attempt(factor /= kStep, 1.0)) return;
+  }
+  factor = 1.0;
+  for (int k = 0; k < kMostTrials && !good; ++k) {
+    factor /= kStep;
+    if (!attempt(factor, factor)) return;
+  }
 }
 
 OptionFinder& finder_of(PosePolicy& policy, const CompactJob& job) {
@@ -110,28 +145,14 @@ FoundThresholds find_thresholds(const CompactJob& job, std::size_t count, double
   FoundThresholds found;
   found.options = finder.found();
   if (error_ratio > 0.0) {
-    Everything everything;
+    Sample sample{job, setting, count, {}};
     const Graph all = watch.policy().estimator().graph();
-    everything.way = trajectory(all);
-    everything.poses = spread(ids_of(all));
-    everything.expected = expected_error(watch.policy(), everything.poses);
-    found.expected_ate = everything.expected;
-    const OptionValues first = found.options;
-    double least = std::numeric_limits<double>::infinity();  // ratio of what is chosen
-    double factor = 1.0;
-    for (int k = 0; k < kMostTrials && !setting.guard.interrupted(); ++k) {
-      const OptionValues options = finder.scaled(first, factor);
-      const ThresholdTrial trial = try_thresholds(job, options, factor, count, everything, setting);
-      found.trials.push_back(trial);
-      const bool good = trial.ratio() <= error_ratio, upwards = factor >= 1.0;
-      if (good || trial.ratio() < least) {
-        found.options = options;
-        least = trial.ratio();
-      }
-      if (k > 0 && good != upwards) break;  // found, or one step too far
-      if (good && trial.loops == 0) break;
-      factor *= k == 0 ? (good ? kStep : 1.0 / kStep) : (upwards ? kStep : 1.0 / kStep);
-    }
+    sample.everything.way = trajectory(all);
+    sample.everything.poses = spread(ids_of(all));
+    sample.everything.expected = expected_error(watch.policy(), sample.everything.poses);
+    found.expected_ate = sample.everything.expected;
+    found.tolerance = std::max(error_ratio * found.expected_ate, finder.accuracy());
+    refine(sample, finder, found);
   }
   found.seconds = std::chrono::duration<double>(Clock::now() - begin).count();
   return found;

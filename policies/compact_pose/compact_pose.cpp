@@ -379,15 +379,19 @@ OptionValues CompactPose::watching() const {
 
 OptionValues CompactPose::found() const { return finder_.found(options_.range.probability); }
 
-OptionValues CompactPose::scaled(const OptionValues& found, double factor) const {
+OptionValues CompactPose::scaled(const OptionValues& found, double links, double poses) const {
   OptionValues values = found;
-  const auto scale = [&](const char* name) {
+  const auto scale = [&](const char* name, double factor) {
     std::string& gain = values.at(name);
     gain = fmt::format("{:.9g}", factor * std::stod(gain));
   };
-  scale("loop_gain");
-  if (factor < 1.0) scale("pose_gain");
+  scale("loop_gain", links);
+  scale("pose_gain", poses);
   return values;
+}
+
+double CompactPose::accuracy() const {
+  return std::sqrt(graph_.group().twist_covariance(finder_.sensor()).topLeftCorner<3, 3>().trace());
 }
 
 }  // namespace cairn::compact

@@ -68,8 +68,9 @@ class CompactPose final : public PosePolicy, public OptionFinder {
   void* ability(std::string_view name) override;
   OptionValues watching() const override;
   OptionValues found() const override;
-  /// `loop_gain` times the factor; and `pose_gain`, if more is to be let through.
-  OptionValues scaled(const OptionValues& found, double factor) const override;
+  /// `loop_gain` and `pose_gain` times the factors.
+  OptionValues scaled(const OptionValues& found, double links, double poses) const override;
+  double accuracy() const override;
 
  private:
   struct Candidate {

@@ -28,24 +28,29 @@ void ThresholdFinder::note_loop(const DistanceTest& test, const Dimensions& dime
       {*std::ranges::max_element(least.translation), least.rotation, gain, covariance});
 }
 
-OptionValues ThresholdFinder::found(double probability) const {
+Matrix ThresholdFinder::sensor() const {
   if (loops_.empty()) {
     throw Error(ErrorCode::input,
                 "no loop closure in the sample, so it tells nothing of the sensor: take a larger "
                 "part of the data, or give the thresholds");
   }
+  std::vector<std::pair<double, const Matrix*>> by_size;
+  for (const Loop& loop : loops_)
+    by_size.emplace_back(loop.covariance.determinant(), &loop.covariance);
+  const auto middle = by_size.begin() + std::ssize(by_size) / 2;
+  std::ranges::nth_element(by_size, middle, {}, &std::pair<double, const Matrix*>::first);
+  return *middle->second;
+}
+
+OptionValues ThresholdFinder::found(double probability) const {
+  const Matrix sensor = this->sensor();
   double range = 0.0, angle = 0.0;
   std::vector<double> gains;
-  std::vector<std::pair<double, const Matrix*>> by_size;
   for (const Loop& loop : loops_) {
     range = std::max(range, loop.range);
     angle = std::max(angle, loop.angle);
     gains.push_back(loop.gain);
-    by_size.emplace_back(loop.covariance.determinant(), &loop.covariance);
   }
-  const auto middle = by_size.begin() + std::ssize(by_size) / 2;
-  std::ranges::nth_element(by_size, middle, {}, &std::pair<double, const Matrix*>::first);
-  const Matrix& sensor = *middle->second;
   std::string numbers;
   for (Eigen::Index r = 0; r < sensor.rows(); ++r) {
     for (Eigen::Index c = r; c < sensor.cols(); ++c)

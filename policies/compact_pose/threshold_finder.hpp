@@ -22,6 +22,8 @@ class ThresholdFinder {
   /// 90th percentiles; `sensor`, the median of the loops' covariances. Throws `Error` (input) if
   /// there was no loop closure.
   OptionValues found(double probability) const;
+  /// The median of the loops' covariances, by their determinants. Throws as `found`.
+  Matrix sensor() const;
 
  private:
   struct Loop {

@@ -117,9 +117,12 @@ class CAIRN_API OptionFinder {
   virtual OptionValues watching() const = 0;
   /// What it would choose after that. Throws `Error` (input) if the sample does not tell.
   virtual OptionValues found() const = 0;
-  /// A choice that lets more through (factor < 1) or less (factor > 1), as far as it has been found
-  /// to be needed.
-  virtual OptionValues scaled(const OptionValues& found, double factor) const = 0;
+  /// A choice that lets more through than `found` (factors < 1) or less (> 1): of links, and of
+  /// poses.
+  virtual OptionValues scaled(const OptionValues& found, double links, double poses) const = 0;
+  /// How accurate a link of the sample is: root mean square of its translation's error [m]. Errors
+  /// below that are nothing to worry about.
+  virtual double accuracy() const = 0;
 };
 
 /// Feeds the first poses of a recording to a policy, matching by `registration`. `each` is told of

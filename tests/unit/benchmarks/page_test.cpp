@@ -29,6 +29,11 @@ TEST(Page, MayBeWrittenAgainWithTheSameResult) {
   EXPECT_EQ(twice, once);
 }
 
+TEST(Page, KnowsWhichTablesItHasAPlaceFor) {
+  EXPECT_TRUE(has_place({"two", ""}, kPage));
+  EXPECT_FALSE(has_place({"tw", ""}, kPage));
+}
+
 TEST(Page, SaysWhichTableItHasNoPlaceFor) {
   std::string page = kPage;
   try {

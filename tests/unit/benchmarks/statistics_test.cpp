@@ -15,6 +15,14 @@ TEST(Statistics, TakesTheMiddleOrTheMeanOfTheTwoInIt) {
   EXPECT_TRUE(std::isnan(median({})));
 }
 
+TEST(Statistics, TakesTheLeastValueThatAPartDoesNotExceed) {
+  EXPECT_EQ(percentile({4.0, 1.0, 3.0, 2.0}, 0.5), 2.0);
+  EXPECT_EQ(percentile({4.0, 1.0, 3.0, 2.0}, 0.51), 3.0);
+  EXPECT_EQ(percentile({4.0, 1.0, 3.0, 2.0}, 0.99), 4.0);
+  EXPECT_EQ(percentile({4.0, 1.0}, 0.0), 1.0);
+  EXPECT_TRUE(std::isnan(percentile({}, 0.5)));
+}
+
 TEST(Statistics, AveragesRatiosSoThatTwiceAndHalfAreOne) {
   EXPECT_DOUBLE_EQ(geometric_mean(std::array{2.0, 0.5}), 1.0);
   EXPECT_NEAR(geometric_mean(std::array{2.0, 4.0, 8.0}), 4.0, 1e-12);

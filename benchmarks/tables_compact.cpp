@@ -1,0 +1,434 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Tables and picture of `cairn compact`.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <string_view>
+
+#include <fmt/format.h>
+#include <boost/json/array.hpp>
+
+#include "contestants.hpp"
+#include "json_access.hpp"
+#include "statistics.hpp"
+#include "tables.hpp"
+
+namespace cairn::performance {
+namespace {
+
+namespace json = boost::json;
+
+constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+
+/// Tables 2, 3 and 4 of Ila, Polok, Solony and Svoboda, IJRR 2017.
+struct Published {
+  std::string_view name;
+  double range, angle, probability;  // [m, rad]; the text's "0.36°" is 0.36 rad
+  double pose_gain, loop_gain;
+  double apal_seconds, fpfl_seconds;
+  double loops, poses;                    // kept, of all
+  double apal_ate, fpfl_ate, random_ate;  // [m]
+};
+
+constexpr std::array kPublished{Published{"ellipse3d", 2.5, 0.4, 0.125, 5.74, 5.50, 0.502, 0.066,
+                                          0.0291, 0.2352, 0.173, 0.338, kNone},
+                                Published{"ellipse_n", 1.1, 0.3, 0.1, 5.70, 5.11, 146.954, 5.387,
+                                          0.0320, 0.3100, 0.138, 0.235, kNone},
+                                Published{"kitti_00", 25.5, 1.1, 0.1, 8.51, 5.13, 203.045, 6.163,
+                                          0.0163, 0.0781, 3.046, 3.093, 12.017},
+                                Published{"sphere2500", 2.9, 0.1, 0.1, 4.33, 9.14, 655.016, 19.558,
+                                          0.1632, 0.3836, 0.203, 0.457, kNone},
+                                Published{"parking-garage", 95.0, 1.1, 0.1, 5.77, 2.45, 102.989,
+                                          30.602, 0.2086, 0.6429, 0.193, 0.661, 6.197},
+                                Published{"10kHog-man", 8.9, 6.3, 0.1, 2.36, 1.94, 3102.154,
+                                          401.587, 0.0711, 0.4676, 0.917, 1.479, kNone}};
+
+const Published* published(const json::value& entry) {
+  const std::string name = text(entry, "name");
+  const auto* found = std::ranges::find(kPublished, name, &Published::name);
+  return found == kPublished.end() ? nullptr : found;
+}
+
+bool is_part(const json::value& entry, const char* part) { return text(entry, "part") == part; }
+
+bool is_true(const json::value& entry, const char* path) {
+  const json::value* value = member(entry, path);
+  return value && *value == true;
+}
+
+/// "2.9 %" of 0.029.
+std::string percent_of(double part) {
+  return std::isfinite(part) ? fmt::format("{:.1f} %", 100.0 * part) : "-";
+}
+
+std::string whole(double value) {
+  return std::isfinite(value) ? fmt::format("{:.0f}", value) : "-";
+}
+
+// Thresholds
+// ------------------------------------------------------------------------------------------------
+
+/// Options are kept as they are written on the command line.
+double option(const json::value& entry, const std::string& path) {
+  const std::string value = text(entry, path);
+  return value.empty() ? kNone : std::stod(value);
+}
+
+std::string thresholds_table(const json::array& entries) {
+  MarkdownTable table({"graph", "thresholds", "range [m]", "angle [rad]", "s", "pose gain",
+                       "loop gain", "tries", "found in [s]"});
+  for (const json::value& entry : entries) {
+    std::string name = text(entry, "name");
+    if (const Published* paper = published(entry)) {
+      table.add({name, "the paper's", digits(paper->range), digits(paper->angle),
+                 digits(paper->probability), digits(paper->pose_gain), digits(paper->loop_gain), "",
+                 ""});
+      name.clear();
+    }
+    for (const auto& [found, title] : {std::pair{"by_rule", "by the rule"},
+                                       {"plain", "without relocation"},
+                                       {"refined", "refined"}}) {
+      std::vector<std::string> row{name, title};
+      for (const char* of : {"range", "angle", "probability", "pose_gain", "loop_gain"})
+        row.push_back(digits(option(entry, fmt::format("{}.options.{}", found, of))));
+      row.push_back(fmt::format("{}", list(entry, std::string(found) + ".trials").size()));
+      row.push_back(digits(number(entry, std::string(found) + ".seconds")));
+      table.add(row);
+      name.clear();
+    }
+  }
+  return table.text();
+}
+
+// Times
+// ------------------------------------------------------------------------------------------------
+
+double part_of(const json::value* c, const std::string& what) {
+  return median_of(c, what + ".kept") / median_of(c, what + ".in");
+}
+
+/// Of one that was given up it is known that it is more.
+std::string faster(const json::value* apal, const json::value* fpfl) {
+  if (!was_late(apal)) return times(paired_ratio(apal, fpfl));
+  return "> " + times(number(*apal, "limit") / median_of(fpfl, "seconds.total"));
+}
+
+std::string times_table(const json::array& entries) {
+  MarkdownTable table({"graph", "poses", "loops", "thresholds", "APAL [s]", "FPFL [s]", "faster",
+                       "loops kept", "poses kept", "99 % of APAL's steps [ms]", "of FPFL's"});
+  for (const json::value& entry : entries) {
+    const json::value *apal = contestant(entry, "apal"), *fpfl = contestant(entry, "fpfl");
+    const auto row = [&](std::vector<std::string> cells, const char* title, const json::value* c) {
+      cells.insert(cells.end(),
+                   {title, total(apal), total(c), faster(apal, c), percent_of(part_of(c, "loops")),
+                    percent_of(part_of(c, "poses")), milliseconds(median_of(apal, "steps.p99")),
+                    milliseconds(median_of(c, "steps.p99"))});
+      table.add(cells);
+    };
+    row({text(entry, "name"), whole(median_of(fpfl, "poses.in")),
+         whole(median_of(fpfl, "loops.in"))},
+        "refined", fpfl);
+    row({"", "", ""}, "without relocation", contestant(entry, "plain"));
+    row({"", "", ""}, "as published", contestant(entry, "by_rule"));
+    if (const Published* paper = published(entry)) {
+      table.add({"", "", "", "the paper's", digits(paper->apal_seconds),
+                 digits(paper->fpfl_seconds), times(paper->apal_seconds / paper->fpfl_seconds),
+                 percent_of(paper->loops), percent_of(paper->poses), "", ""});
+    }
+  }
+  return table.text();
+}
+
+// Errors
+// ------------------------------------------------------------------------------------------------
+
+constexpr std::array kErrors{"ate.translation", "ate.rotation",        "rpe.translation",
+                             "rpe.rotation",    "rpe_all.translation", "rpe_all.rotation"};
+
+/// A strategy with one way of putting poses back.
+struct Estimate {
+  const char* title;
+  const char* contestant;
+  const char* recovery;
+};
+
+constexpr std::array kEstimates{Estimate{"APAL", "apal", "v2"},
+                                Estimate{"FPFL", "fpfl", "v2"},
+                                Estimate{"FPFL, `likely`", "fpfl", "likely"},
+                                Estimate{"FPFL without relocation", "plain", "v2"},
+                                Estimate{"FPFL as published", "by_rule", "v2"},
+                                Estimate{"RFPFL", "random", "v2"}};
+
+double ate(const json::value* c, const char* recovery = "v2") {
+  return median_of(c, fmt::format("errors.{}.ate.translation", recovery));
+}
+
+std::string errors_table(const json::array& entries) {
+  MarkdownTable table({"graph", "strategy", "ATE [m]", "[°]", "RPE [m]", "[°]", "all to all [m]",
+                       "[°]", "ATE over APAL's", "the paper's", "over FPFL's", "the paper's"});
+  for (const json::value& entry : entries) {
+    std::string name = text(entry, "name") + (is_true(entry, "de_facto") ? " †" : "");
+    const double apal = ate(contestant(entry, "apal")), fpfl = ate(contestant(entry, "fpfl"));
+    const Published* paper = published(entry);
+    for (const Estimate& estimate : kEstimates) {
+      const json::value* c = contestant(entry, estimate.contestant);
+      const std::string who = estimate.contestant;
+      std::vector<std::string> row{name, estimate.title};
+      for (const char* error : kErrors)
+        row.push_back(digits(median_of(c, fmt::format("errors.{}.{}", estimate.recovery, error))));
+      const double error = ate(c, estimate.recovery);
+      const double published_error = !paper            ? kNone
+                                     : who == "random" ? paper->random_ate
+                                     : who == "apal"   ? kNone
+                                                       : paper->fpfl_ate;
+      row.push_back(who == "apal" ? "" : times(error / apal));
+      row.push_back(
+          paper && std::isfinite(published_error) ? times(published_error / paper->apal_ate) : "");
+      row.push_back(who == "random" ? times(error / fpfl) : "");
+      row.push_back(paper && std::isfinite(published_error) && who == "random"
+                        ? times(published_error / paper->fpfl_ate)
+                        : "");
+      table.add(row);
+      name.clear();
+    }
+  }
+  return table.text();
+}
+
+// Growth
+// ------------------------------------------------------------------------------------------------
+
+constexpr std::array kStrategies{std::pair{"apal", "APAL"}, std::pair{"fpfl", "FPFL"},
+                                 std::pair{"by_rule", "FPFL as published"}};
+
+std::string growth_table(const json::array& entries) {
+  MarkdownTable table({"laps", "poses", "loops", "APAL [s]", "FPFL [s]", "poses kept", "loops kept",
+                       "FPFL as published [s]", "poses kept", "loops kept"});
+  for (const json::value& entry : entries) {
+    if (!is_part(entry, "growth")) continue;
+    const json::value *fpfl = contestant(entry, "fpfl"), *by_rule = contestant(entry, "by_rule");
+    // Whoever was in time: they are fed with the same.
+    double poses = kNone, loops = kNone;
+    for (const json::value& c : list(entry, "contestants")) {
+      if (list(c, "runs").empty()) continue;
+      poses = median_of(&c, "poses.in");
+      loops = median_of(&c, "loops.in");
+    }
+    std::vector<std::string> row{whole(number(entry, "laps")), whole(poses), whole(loops),
+                                 total(contestant(entry, "apal"))};
+    for (const json::value* c : {fpfl, by_rule}) {
+      row.insert(row.end(),
+                 {total(c), whole(median_of(c, "poses.kept")), whole(median_of(c, "loops.kept"))});
+    }
+    table.add(row);
+  }
+  return table.text();
+}
+
+std::string nonzeros_table(const json::array& entries) {
+  MarkdownTable table({"laps", "H, APAL", "L, APAL", "H, FPFL", "L, FPFL", "H, FPFL as published",
+                       "L, FPFL as published"});
+  for (const json::value& entry : entries) {
+    if (!is_part(entry, "growth")) continue;
+    std::vector<std::string> row{whole(number(entry, "laps"))};
+    for (const auto& [name, title] : kStrategies) {
+      for (const char* of : {"nonzeros.information", "nonzeros.factor"})
+        row.push_back(count(median_of(contestant(entry, name), of)));
+    }
+    table.add(row);
+  }
+  return table.text();
+}
+
+/// By the runs of some laps: the first few are another matter.
+std::string laws(const json::array& entries) {
+  constexpr double kFewestLaps = 5.0;
+  std::string sentence;
+  for (const auto& [name, title] : kStrategies) {
+    std::vector<double> laps, seconds, nonzeros;
+    for (const json::value& entry : entries) {
+      const json::value* c = contestant(entry, name);
+      const double time = median_of(c, "seconds.total");
+      if (!is_part(entry, "growth") || number(entry, "laps") < kFewestLaps || !std::isfinite(time))
+        continue;
+      laps.push_back(number(entry, "laps"));
+      seconds.push_back(time);
+      nonzeros.push_back(median_of(c, "nonzeros.factor"));
+    }
+    if (laps.size() < 2) continue;
+    sentence += fmt::format("{}{}: time as N^{:.2f}, nonzeros of L as N^{:.2f}",
+                            sentence.empty() ? "" : "; ", title, fitted_exponent(laps, seconds),
+                            fitted_exponent(laps, nonzeros));
+  }
+  return sentence.empty() ? "" : "\nFrom five laps on, " + sentence + ".\n";
+}
+
+std::string title_of(const std::string& name) {
+  for (const auto& [known, title] : kStrategies) {
+    if (name == known) return title;
+  }
+  return name;
+}
+
+std::string laps_table(const json::array& entries) {
+  MarkdownTable table({"strategy", "laps", "poses kept", "loops kept"});
+  MarkdownTable steps({"strategy", "all [s]", "median step, first quarter [ms]", "99 %",
+                       "median step, last quarter", "99 %"});
+  for (const json::value& entry : entries) {
+    if (!is_part(entry, "laps")) continue;
+    std::string title = title_of(text(entry, "name"));
+    if (!is_true(entry, "in_time")) {
+      table.add({title, whole(number(entry, "laps")),
+                 fmt::format("not finished after {:.0f} s", number(entry, "limit")), "-"});
+      continue;
+    }
+    steps.add({title, digits(number(entry, "run.seconds.total")),
+               milliseconds(number(entry, "first_quarter.median")),
+               milliseconds(number(entry, "first_quarter.p99")),
+               milliseconds(number(entry, "last_quarter.median")),
+               milliseconds(number(entry, "last_quarter.p99"))});
+    for (const json::value& after : list(entry, "after")) {
+      table.add({title, whole(number(after, "laps")), whole(number(after, "poses")),
+                 whole(number(after, "loops"))});
+      title.clear();
+    }
+  }
+  return table.text() + "\n" + steps.text();
+}
+
+// Honesty
+// ------------------------------------------------------------------------------------------------
+
+/// Sums of the runs that knew.
+struct Normalized {
+  double squared = 0.0, dof = 0.0;
+  int runs = 0;
+};
+
+Normalized normalized(const json::array& runs) {
+  Normalized sum;
+  for (const json::value& run : runs) {
+    if (!std::isfinite(number(run, "dof"))) continue;
+    sum.squared += number(run, "squared");
+    sum.dof += number(run, "dof");
+    ++sum.runs;
+  }
+  return sum;
+}
+
+std::string nees_table(const json::array& entries) {
+  constexpr double kTwoSided = 1.96;  // of a normal distribution, 95 %
+  MarkdownTable table({"graph", "strategy", "runs", "freedoms in all", "NEES a freedom",
+                       "95 % of honest ones", "so it is"});
+  for (const json::value& entry : entries) {
+    if (!is_part(entry, "nees")) continue;
+    const Normalized sum = normalized(list(entry, "runs"));
+    const double mean = sum.squared / sum.dof;
+    const double half = kTwoSided * std::sqrt(2.0 / sum.dof);  // of chi2 / dof, for many freedoms
+    const char* verdict = mean > 1.0 + half   ? "overconfident"
+                          : mean < 1.0 - half ? "conservative"
+                                              : "honest";
+    table.add({text(entry, "name"), title_of(text(entry, "strategy")), fmt::format("{}", sum.runs),
+               whole(sum.dof), fmt::format("{:.4f}", mean),
+               fmt::format("{:.4f} … {:.4f}", 1.0 - half, 1.0 + half), verdict});
+  }
+  return table.text();
+}
+
+std::string compare_table(const json::array& entries) {
+  MarkdownTable table({"graph", "steps compared", "marginal covariances: not smaller",
+                       "least ratio", "full covariance: not smaller", "least ratio",
+                       "least eigenvalue"});
+  for (const json::value& entry : entries) {
+    if (!is_part(entry, "compare")) continue;
+    const auto of = [&](const char* name) { return number(entry, std::string("compare.") + name); };
+    const double least = of("least_eigenvalue");
+    table.add({text(entry, "name"), whole(of("steps")), percent_of(of("marginal_conservative")),
+               digits(of("least_marginal_ratio")), percent_of(of("full_conservative")),
+               digits(of("least_full_ratio")),
+               std::isfinite(least) ? fmt::format("{:.3g}", least) : "-"});
+  }
+  return table.text();
+}
+
+// False matches
+// ------------------------------------------------------------------------------------------------
+
+/// Of how many links the policy said so, as a median; it names no verdict that it never gave.
+std::string verdicts(const json::value* c, const std::string& verdict) {
+  if (!c) return "-";
+  std::vector<double> counts;
+  for (const json::value& run : list(*c, "runs")) {
+    const double times_given = number(run, "verdicts." + verdict);
+    counts.push_back(std::isfinite(times_given) ? times_given : 0.0);
+  }
+  return whole(median(counts));
+}
+
+std::string matches_table(const json::array& entries) {
+  MarkdownTable table({"graph", "false matches", "gate", "registered", "of them false",
+                       "loops kept", "of them false", "refused", "waiting", "poses kept", "ATE [m]",
+                       "over clean"});
+  for (const json::value& entry : entries) {
+    std::string name = text(entry, "name");
+    const double clean = ate(contestant(entry, "open, clean"));
+    for (const char* which : {"open, clean", "gated, clean", "open, false", "gated, false"}) {
+      const json::value* c = contestant(entry, which);
+      const std::string_view kind = which;
+      const std::string late = fmt::format("> {:.0f} s", c ? number(*c, "limit") : kNone);
+      table.add({name, kind.ends_with("false") ? percent(number(entry, "false_rate")) : "none",
+                 kind.starts_with("gated") ? fmt::format("{}", number(entry, "gate")) : "none",
+                 was_late(c) ? late : whole(median_of(c, "loops.registered")),
+                 whole(median_of(c, "loops.false_registered")), whole(median_of(c, "loops.kept")),
+                 whole(median_of(c, "loops.false_kept")), verdicts(c, "inconsistent"),
+                 verdicts(c, "waiting"), whole(median_of(c, "poses.kept")), digits(ate(c)),
+                 times(ate(c) / clean)});
+      name.clear();
+    }
+  }
+  return table.text();
+}
+
+}  // namespace
+
+std::vector<Section> compact_sets_sections(const json::array& entries) {
+  return {{"compact-thresholds", thresholds_table(entries)},
+          {"compact-times", times_table(entries)},
+          {"compact-errors", errors_table(entries)}};
+}
+
+std::vector<Section> compact_growth_sections(const json::array& entries) {
+  return {
+      {"compact-growth", growth_table(entries) + "\n" + nonzeros_table(entries) + laws(entries)},
+      {"compact-laps", laps_table(entries)}};
+}
+
+std::vector<Section> compact_honesty_sections(const json::array& entries) {
+  return {{"compact-nees", nees_table(entries)}, {"compact-compare", compare_table(entries)}};
+}
+
+std::vector<Section> compact_matches_sections(const json::array& entries) {
+  return {{"compact-matches", matches_table(entries)}};
+}
+
+json::value compact_picture(const json::array& entries) {
+  json::array graphs;
+  for (const json::value& entry : entries) {
+    if (!is_part(entry, "growth")) continue;
+    for (const auto& [name, title] : kStrategies) {
+      const json::value* c = contestant(entry, name);
+      const double seconds = median_of(c, "seconds.total");
+      if (!std::isfinite(seconds)) continue;
+      json::object strategy{{"optimizer", title},
+                            {"seconds", {{"median", seconds}}},
+                            {"peak_memory_bytes", median_of(c, "peak_memory_bytes")}};
+      graphs.push_back({{"graph", {{"file", title}, {"variables", median_of(c, "poses.in")}}},
+                        {"configurations", json::array{std::move(strategy)}}});
+    }
+  }
+  return json::object{{"command", "bench"}, {"graphs", graphs}};
+}
+
+}  // namespace cairn::performance
