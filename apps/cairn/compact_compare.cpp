@@ -11,23 +11,6 @@
 #include <Eigen/Eigenvalues>
 
 namespace cairn::app {
-namespace {
-
-/// Σ of some poses, block by block.
-Eigen::MatrixXd joint_covariance(Estimator& estimator, const std::vector<Id>& poses, int tangent) {
-  const auto n = static_cast<Eigen::Index>(tangent);
-  const Eigen::Index rows = std::ssize(poses) * n;
-  Eigen::MatrixXd Sigma(rows, rows);
-  for (std::size_t k = 0; k < poses.size(); ++k) {
-    const Eigen::Index column = static_cast<Eigen::Index>(k) * n;
-    estimator.covariance_column(poses[k], poses,
-                                {Sigma.data() + column * rows, static_cast<std::size_t>(rows * n)});
-  }
-  return Sigma;
-}
-
-}  // namespace
-
 UncertaintyComparison::UncertaintyComparison(const CompactSetting& setting)
     : recording_(setting.recording),
       everything_(setting.session.registry().make<Estimator>("incremental_cholesky")) {}
@@ -50,8 +33,11 @@ void UncertaintyComparison::add(std::size_t index, PosePolicy& policy) {
                        .kept = static_cast<int>(std::ssize(poses)),
                        .least_eigenvalue = std::numeric_limits<double>::infinity()};
   const int n = graph.type(pose.variable).tangent_size();
-  const Eigen::MatrixXd Sigma = joint_covariance(compact, poses, n),
-                        Sigma_all = joint_covariance(*everything_, poses, n);
+  const std::vector<double> of_compact = joint_covariance(compact, poses, n),
+                            of_all = joint_covariance(*everything_, poses, n);
+  const Eigen::Index rows = std::ssize(poses) * n;
+  const Eigen::Map<const Eigen::MatrixXd> Sigma(of_compact.data(), rows, rows),
+      Sigma_all(of_all.data(), rows, rows);
   for (Eigen::Index at = 0; at < Sigma.rows(); at += n) {
     const Eigen::MatrixXd S = Sigma.block(at, at, n, n), S_all = Sigma_all.block(at, at, n, n);
     step.marginal += S.squaredNorm();

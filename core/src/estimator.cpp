@@ -28,4 +28,14 @@ std::string_view to_string(MarginalsBy by) {
   return "unknown";  // only a value that is no MarginalsBy gets here
 }
 
+std::vector<double> joint_covariance(Estimator& estimator, std::span<const Id> variables,
+                                     int tangent_size) {
+  const std::size_t n = static_cast<std::size_t>(tangent_size), rows = variables.size() * n;
+  std::vector<double> Sigma(rows * rows, 0.0);
+  for (std::size_t k = 0; k < variables.size(); ++k)
+    estimator.covariance_column(variables[k], variables,
+                                std::span(Sigma).subspan(k * n * rows, n * rows));
+  return Sigma;
+}
+
 }  // namespace cairn

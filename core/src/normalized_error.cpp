@@ -4,12 +4,15 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Core>
 #include <Eigen/QR>
 
 #include "cairn/error.hpp"
+#include "cairn/graph_marginals.hpp"
+#include "cairn/linearizer.hpp"
 
 namespace cairn {
 namespace {
@@ -49,76 +52,47 @@ std::vector<std::vector<double>> moved_truth(const Graph& estimate, const Graph&
 
 NormalizedError normalized_error(const Graph& estimate, const Graph& truth) {
   const std::vector<std::vector<double>> moved = moved_truth(estimate, truth);
-  std::vector<Eigen::VectorXd> error;
-  NormalizedError result;
+  std::vector<bool> held(moved.size());
+  for (int v = 0; v < estimate.variable_count(); ++v) held[v] = v == 0 || estimate.fixed(v);
+  Linearizer linearizer(estimate, std::move(held));
+  const BlockStructure& structure = linearizer.structure();
+  NormalizedError result{.dof = static_cast<int>(structure.size())};
+  if (result.dof == 0) return result;
+  BlockMatrix H(structure);
+  Eigen::VectorXd e(structure.size()), g(structure.size()), He(structure.size());
+  const auto span = [](Eigen::VectorXd& x) { return std::span(x.data(), x.size()); };
+  linearizer.linearize(estimate.values(), H, span(g));
   for (int v = 0; v < estimate.variable_count(); ++v) {
-    Eigen::VectorXd e(estimate.type(v).tangent_size());
-    estimate.type(v).local(1, estimate.state(v).data(), moved[v].data(), e.data());
-    if (v > 0 && estimate.fixed(v)) {
-      e.setZero();
-    } else if (v > 0) {
-      result.dof += static_cast<int>(e.size());
-    }
-    error.push_back(std::move(e));
+    const int block = linearizer.block_of(v);
+    if (block < 0) continue;
+    estimate.type(v).local(1, estimate.state(v).data(), moved[v].data(),
+                           e.data() + structure.offsets()[block]);
   }
-  for (int f = 0; f < estimate.factor_count(); ++f) {
-    const FactorRef ref = estimate.factor(f);
-    const FactorPool& pool = estimate.factor_pools()[ref.pool];
-    const auto on = estimate.factor_variables(f);
-    const int rows = pool.type->residual_size();
-    std::vector<const double*> states;
-    std::vector<Eigen::MatrixXd> J;
-    std::vector<double*> jacobians;
-    for (const std::int32_t v : on) {
-      states.push_back(estimate.state(v).data());
-      J.emplace_back(rows, estimate.type(v).tangent_size());
-    }
-    for (Eigen::MatrixXd& block : J) jacobians.push_back(block.data());
-    Eigen::VectorXd residual(rows), whitened = Eigen::VectorXd::Zero(rows);
-    const std::int64_t triangle = std::int64_t{rows} * (rows + 1) / 2;
-    pool.type->evaluate(states.data(), estimate.measurement(f).data(),
-                        pool.sqrt_information.data() + triangle * ref.entry, residual.data(),
-                        jacobians.data());
-    for (std::size_t k = 0; k < J.size(); ++k) whitened += J[k] * error[on[k]];
-    result.squared += whitened.squaredNorm();
-  }
+  H.multiply(span(e), span(He));
+  result.squared = e.dot(He);
   return result;
 }
 
 namespace {
 
-/// The derivative of a variable's position by δ, dimension × tangent; the position itself.
 struct Position {
-  Eigen::VectorXd t;
-  Eigen::MatrixXd G;
+  Eigen::VectorXd t;  ///< [m]
+  Eigen::MatrixXd G;  ///< its derivative by δ, dimension × tangent
 };
 
-Position position(const VariableType& type, std::span<const double> x) {
+Position position(const Graph& graph, int v) {
+  const VariableType& type = graph.type(v);
   const Placement* place = type.placement();
   if (!place) {
     throw Error(ErrorCode::usage,
-                "no expected error: " + std::string(type.tag()) + " is nowhere in space");
+                "no expected error: " + graph.describe_variable(v) + " is nowhere in space");
   }
-  constexpr double kStep = 1e-5;  // positions are smooth in δ: ten digits
-  const int d = place->dimension(), n = type.tangent_size();
-  std::vector<double> moved(x.begin(), x.end()), R(static_cast<std::size_t>(d * d));
-  const auto at = [&](const std::vector<double>& state) {
-    Eigen::VectorXd t(d);
-    place->split(state.data(), R.data(), t.data());
-    return t;
-  };
-  Position result{at(moved), Eigen::MatrixXd(d, n)};
-  Eigen::VectorXd delta = Eigen::VectorXd::Zero(n);
-  const std::int64_t offset = 0;
-  for (int k = 0; k < n; ++k) {
-    delta[k] = kStep;
-    type.retract(1, x.data(), &offset, delta.data(), moved.data());
-    const Eigen::VectorXd ahead = at(moved);
-    delta[k] = -kStep;
-    type.retract(1, x.data(), &offset, delta.data(), moved.data());
-    delta[k] = 0.0;
-    result.G.col(k) = (ahead - at(moved)) / (2.0 * kStep);
-  }
+  const int d = place->dimension();
+  std::vector<double> R(static_cast<std::size_t>(d) * static_cast<std::size_t>(d));
+  Position result{Eigen::VectorXd(d), {}};
+  place->split(graph.state(v).data(), R.data(), result.t.data());
+  const std::vector<double> G = position_jacobian(type, graph.state(v));
+  result.G = Eigen::Map<const Eigen::MatrixXd>(G.data(), d, type.tangent_size());
   return result;
 }
 
@@ -147,22 +121,19 @@ Eigen::MatrixXd rigid_directions(const std::vector<Position>& positions) {
 }  // namespace
 
 double expected_ate(Estimator& estimator, const Graph& graph, std::span<const Id> poses) {
+  if (poses.empty()) return 0.0;
+  const auto n = static_cast<Eigen::Index>(poses.size());
   std::vector<Position> positions;
-  for (const Id id : poses) {
-    const int v = *graph.find(id);
-    positions.push_back(position(graph.type(v), graph.state(v)));
-  }
-  if (positions.empty()) return 0.0;
-  const Eigen::Index d = positions.front().t.size(), n = std::ssize(positions);
-  const Eigen::Index tangent = positions.front().G.cols();
-  Eigen::MatrixXd Sigma(d * n, d * n), column(tangent * n, tangent);
+  for (const Id id : poses) positions.push_back(position(graph, *graph.find(id)));
+  const Eigen::Index d = positions.front().t.size(), tangent = positions.front().G.cols();
+  const std::vector<double> joint = joint_covariance(estimator, poses, static_cast<int>(tangent));
+  const Eigen::Map<const Eigen::MatrixXd> all(joint.data(), tangent * n, tangent * n);
+  Eigen::MatrixXd Sigma(d * n, d * n);
   for (Eigen::Index k = 0; k < n; ++k) {
-    const auto& to = positions[static_cast<std::size_t>(k)];
-    estimator.covariance_column(poses[static_cast<std::size_t>(k)], poses,
-                                {column.data(), static_cast<std::size_t>(column.size())});
     for (Eigen::Index i = 0; i < n; ++i) {
       Sigma.block(d * i, d * k, d, d) = positions[static_cast<std::size_t>(i)].G *
-                                        column.middleRows(tangent * i, tangent) * to.G.transpose();
+                                        all.block(tangent * i, tangent * k, tangent, tangent) *
+                                        positions[static_cast<std::size_t>(k)].G.transpose();
     }
   }
   const Eigen::MatrixXd Q = rigid_directions(positions);

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <numeric>
 #include <string>
 #include <utility>
 
@@ -173,8 +172,7 @@ void CompactGraph::hang_newest() {
   newest_.ahead = compose({}, newest_.odometry);
   newest_.placed =
       group_->place(group_->compose(kept_[anchor_].placed.x, group_->state(newest_.odometry.mean)));
-  anchored_version_ = -1;
-  for (Kept& pose : kept_) pose.version = -1;
+  ++version_;  // covariances with the anchor are with another pose now
   known_ = false;
 }
 
@@ -252,12 +250,6 @@ std::vector<int> CompactGraph::near(double radius) {
   std::vector<int> found = index_->near(newest_.placed.at.t, radius);
   if (newest_.kept) std::erase(found, size() - 1);
   return found;
-}
-
-std::vector<int> CompactGraph::all() const {
-  std::vector<int> poses(static_cast<std::size_t>(newest_.kept ? size() - 1 : size()));
-  std::iota(poses.begin(), poses.end(), 0);
-  return poses;
 }
 
 void CompactGraph::prepare(std::span<const int> poses, PolicySeconds& seconds) {

@@ -78,7 +78,6 @@ class CompactGraph {
   int find(Id id) const;
   /// Kept poses within a distance [m] of the newest, itself not among them.
   std::vector<int> near(double radius);
-  std::vector<int> all() const;
 
   /// Rises whenever the estimate and its covariances change.
   int version() const { return version_; }

@@ -254,7 +254,6 @@ LinkReport CompactPose::offer(Id other, std::span<const NewFactor> measured) {
               .motion = motion,
               .mean = graph_.group().state(motion.mean),
               .covariance = to_matrix(motion.covariance, graph_.group().tangent_size())};
-    link.expected_gain = report.expected_gain;
     report.verdict = judge(link, report);
     if (report.verdict == LinkVerdict::linked) {
       if (candidate)
@@ -276,12 +275,12 @@ LinkReport CompactPose::offer(Id other, std::span<const NewFactor> measured) {
 }
 
 /// Lines 22 and 23 of Algorithm 1, and whether the link fits.
-LinkVerdict CompactPose::judge(Link& link, LinkReport& report) {
+LinkVerdict CompactPose::judge(const Link& link, LinkReport& report) {
   const Displacement d = known_displacement(link.earlier);
-  report.gain = link.gain = mutual_information(link.covariance, d.covariance);
+  report.gain = mutual_information(link.covariance, d.covariance);
   const Fit fit = check_->fit(link, d);
   report.innovation = fit.innovation;
-  if (!(link.gain > loop_gain_)) return LinkVerdict::uninformative;
+  if (!(report.gain > loop_gain_)) return LinkVerdict::uninformative;
   if (!fit.consistent) return LinkVerdict::inconsistent;
   if (check_->needs_another(fit) && !agrees_with_waiting(link)) return LinkVerdict::waiting;
   return LinkVerdict::linked;

@@ -48,7 +48,10 @@ struct CompactPoseOptions {
 ///
 /// What a link tells can only become less by another link. So the candidates' gains are upper
 /// bounds once one was used: only that of the best is computed anew, until the best is up to date.
-/// The choice is the same as if all were computed anew.
+/// The choice is the same as if all were computed anew, as long as the linearisation stands.
+///
+/// With `reuse`, which the paper does not have, a pose that a link leads to a kept one is not kept
+/// itself (`CompactGraph::relocate`): so the map of a place does not grow without end.
 class CompactPose final : public PosePolicy, public OptionFinder {
  public:
   CompactPose(std::unique_ptr<Estimator> estimator, CompactPoseOptions options);
@@ -91,9 +94,8 @@ class CompactPose final : public PosePolicy, public OptionFinder {
   Displacement known_displacement(int pose);
   std::optional<Candidate> take_candidate(int pose);
   double expected_gain(int pose);
-  /// Uses a link, and then those that had been waiting for it.
   void use(const Link& link);
-  LinkVerdict judge(Link& link, LinkReport& report);
+  LinkVerdict judge(const Link& link, LinkReport& report);
   void judge_waiting();
   bool agrees_with_waiting(const Link& link);
 

@@ -13,10 +13,9 @@ namespace cairn::compact {
 struct Link {
   int earlier = 0, later = 0;  ///< kept poses; `later` may be the newest before it is kept
   std::vector<NewFactor> factors;
-  Motion motion{};                         ///< measured, from `earlier` to `later`
-  State mean{};                            ///< of it
-  Matrix covariance{};                     ///< Σ_y of it
-  double expected_gain = 0.0, gain = 0.0;  ///< [nats]
+  Motion motion{};      ///< measured, from `earlier` to `later`
+  State mean{};         ///< of it
+  Matrix covariance{};  ///< Σ_y of it
 };
 
 /// How a link fits to what is known.

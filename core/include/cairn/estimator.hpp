@@ -164,4 +164,9 @@ class CAIRN_API Estimator : public Component {
   virtual std::int64_t memory() const { return 0; }
 };
 
+/// Σ of several variables jointly, all of the same tangent size; column-major, as many rows as
+/// these sizes add up to. A column is solved for each of them. Zeros where H is singular.
+CAIRN_API std::vector<double> joint_covariance(Estimator& estimator, std::span<const Id> variables,
+                                               int tangent_size);
+
 }  // namespace cairn

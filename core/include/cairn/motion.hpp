@@ -44,7 +44,7 @@ class CAIRN_API MotionGroup {
   ///     Σ = Σ₁ + Σ₂ + ¼ E[ad(ξ₁) Σ₂ ad(ξ₁)ᵀ]
   ///         + 1/12 (P₁ Σ₂ + Σ₂ P₁ᵀ + P₂ Σ₁ + Σ₁ P₂ᵀ),   P_k = E[ad(ξ_k) ad(ξ_k)]
   ///
-  /// (Barfoot and Furgale, Associating uncertainty with three-dimensional poses, TRO 2014, eq. 55,
+  /// (Barfoot and Furgale, Associating uncertainty with three-dimensional poses, TRO 2014,
   /// with perturbations on the other side.) E[ξ] is zero to third order, and is left so.
   Motion compose(const Motion& a, const Motion& b,
                  CompositionOrder order = CompositionOrder::first) const;

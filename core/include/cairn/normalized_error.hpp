@@ -16,11 +16,11 @@ struct NormalizedError {
 };
 
 /// The normalised estimation error squared (NEES) of a graph's poses against their true states, all
-/// of them together: eᵀ H e with e_v = local(x_v, truth_v), and H of the factors at the estimate
-/// (Σ = H⁻¹). The truth is moved so that the first pose agrees, which counts as held, as do those
-/// that are fixed. Variables are matched by id. A mean over many runs above `dof` says that the
-/// estimate is overconfident, below that it is conservative. Throws `Error` (input) if a variable
-/// has no true state, (usage) if it is no pose of a Lie group.
+/// of them together: eᵀ H e with e_v = local(x_v, truth_v), and H of the factors at the estimate,
+/// under its loss (Σ = H⁻¹). The truth is moved so that the first pose agrees, which counts as
+/// held, as do those that are fixed. Variables are matched by id. A mean over many runs above `dof`
+/// says that the estimate is overconfident, below that it is conservative. Throws `Error` (input)
+/// if a variable has no true state, (usage) if it is no pose of a Lie group.
 CAIRN_API NormalizedError normalized_error(const Graph& estimate, const Graph& truth);
 
 /// The absolute trajectory error that an estimate's covariance lets expect [m]: the root mean

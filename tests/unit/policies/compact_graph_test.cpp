@@ -2,6 +2,7 @@
 #include "compact_graph.hpp"
 
 #include <algorithm>
+#include <limits>
 #include <ostream>
 
 #include <gmock/gmock.h>
@@ -107,7 +108,7 @@ class Grown {
     const Graph whole = dense();
     const test::DenseSystem system = test::dense_system(whole);
     const MatrixXd Sigma = system.Sigma();
-    const std::vector<int> poses = graph_.all();
+    const std::vector<int> poses = graph_.near(std::numeric_limits<double>::infinity());
     graph_.prepare(poses, seconds_);
     for (const int pose : poses) {
       Displacement d = graph_.displacement(pose);
@@ -126,7 +127,7 @@ class Grown {
     const double radius = draw_.uniform(0.0, 3.0);
     const Eigen::Vector3d here = world_.split(graph_.group().span(graph_.newest_state())).second;
     std::vector<int> expected;
-    for (const int pose : graph_.all()) {
+    for (const int pose : graph_.near(std::numeric_limits<double>::infinity())) {
       const auto at = world_.split(graph_.group().span(graph_.state(pose))).second;
       if ((at - here).norm() <= radius) expected.push_back(pose);
     }
@@ -287,7 +288,7 @@ TEST_P(CompactGraphIn, KnowsTheCovarianceBetweenTwoKeptPoses) {
     grown.keep();
     if (k % 4 == 3) grown.link(grown.draw().integer(k));
   }
-  const std::vector<int> poses = grown.graph().all();
+  const std::vector<int> poses = grown.graph().near(std::numeric_limits<double>::infinity());
   PolicySeconds seconds;
   const int last = grown.graph().size() - 1;
   for (const int pose : poses) {
