@@ -66,6 +66,10 @@ class CompactGraph {
   bool newest_kept() const { return newest_.kept; }
   /// Last kept pose before the newest.
   int predecessor() const { return newest_.predecessor; }
+  /// Covariance of the motion from there.
+  Matrix newest_odometry() const {
+    return to_matrix(newest_.odometry.covariance, group_->tangent_size());
+  }
 
   // Kept poses, numbered in the order of arrival
   // ---------------------------------------------------

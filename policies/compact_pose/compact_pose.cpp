@@ -302,11 +302,21 @@ bool CompactPose::agrees_with_waiting(const Link& link) {
   return false;
 }
 
+/// Relocating gives each of two ways half of the measurement. That must leave little between the
+/// two poses that is worth a pose of its own, and must cost little of what is known of the way that
+/// ends here: where loop closures are not better than odometry, the loss would add up. The more
+/// poses are kept nearby, the less each way matters, and the more is gained by not keeping another.
+bool CompactPose::may_relocate(const Link& link) const {
+  const Matrix half = 2.0 * link.covariance;
+  if (!(mutual_information(expected_covariance(), half) < pose_gain_)) return false;
+  const Matrix way = graph_.newest_odometry();
+  const double lost = mutual_information(way + link.covariance, link.covariance);
+  return lost <= options_.reuse_loss * report_.candidates * graph_.group().tangent_size();
+}
+
 void CompactPose::use(const Link& link) {
   const bool of_newest = link.later == graph_.size() && !graph_.newest_kept();
-  // Half of the measurement's information is what relocating leaves between the two poses.
-  if (options_.reuse && of_newest &&
-      mutual_information(expected_covariance(), 2.0 * link.covariance) < pose_gain_) {
+  if (options_.reuse && of_newest && may_relocate(link)) {
     graph_.relocate(link.earlier, link.motion, report_.seconds);
   } else {
     graph_.link(link.factors, report_.seconds);

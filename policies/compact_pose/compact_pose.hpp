@@ -34,6 +34,8 @@ struct CompactPoseOptions {
   std::vector<double> sensor;
   CompositionOrder composition = CompositionOrder::first;
   bool reuse = false;  ///< a pose that is found to be at a kept one is not kept itself
+  /// … where that costs the way to it at most so much [nats a freedom and kept pose nearby].
+  double reuse_loss = 0.06;
   Search search = Search::index;
   double gate = 0.0;    ///< part of the right links that pass the consistency check; 0: off
   double trust = 0.01;  ///< see `ConsistencyCheck`
@@ -94,6 +96,7 @@ class CompactPose final : public PosePolicy, public OptionFinder {
   Displacement known_displacement(int pose);
   std::optional<Candidate> take_candidate(int pose);
   double expected_gain(int pose);
+  bool may_relocate(const Link& link) const;
   void use(const Link& link);
   LinkVerdict judge(const Link& link, LinkReport& report);
   void judge_waiting();

@@ -53,6 +53,9 @@ OptionTable options_table() {
           "reuse", true,
           "go on from the kept pose that a link leads to, instead of keeping the pose that was "
           "linked: the map stops growing")
+      .real("reuse_loss", 0.06, 0.0, 10.0,
+            "with reuse: where that costs what is known of the way at most this, times the poses "
+            "that are kept nearby [nats a freedom]")
       .component("estimator", Estimator::kKind.data(), "incremental_cholesky", "who estimates");
   return table;
 }
@@ -100,6 +103,7 @@ std::unique_ptr<PosePolicy> make(const Options& options, Registry& registry) {
                   : search == "all" ? Search::all
                                     : Search::untested;
   chosen.reuse = options.boolean("reuse");
+  chosen.reuse_loss = options.real("reuse_loss");
   chosen.gate = options.real("gate");
   chosen.trust = options.real("trust");
   return std::make_unique<CompactPose>(registry.make<Estimator>(options.text("estimator")),

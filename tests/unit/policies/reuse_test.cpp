@@ -64,6 +64,19 @@ TEST_F(Reuse, WithoutNoiseTheMapIsTheTruth) {
   }
 }
 
+/// Where a loop closure is as uncertain as odometry, half of it is a loss: such a pose is kept, as
+/// long as few others are nearby.
+TEST_F(Reuse, WhereItCostsMuchAPoseIsKept) {
+  const auto kept = [&](const std::string& loss, const std::string& sigma) {
+    const std::string sensor = ",sigma_translation=" + sigma + ",sigma_rotation=" + sigma;
+    return drive(kLaps + "4", kPolicy + "true,reuse_loss=" + loss, kSensor + sensor).kept().size();
+  };
+  EXPECT_GT(kept("0", "0.05"), kept("10", "0.05"));
+  EXPECT_GE(kept("0", "0.05"), kept("0.06", "0.05"));
+  // Nearly exact ones cost next to nothing.
+  EXPECT_EQ(kept("0.001", "0.0001"), kept("10", "0.0001"));
+}
+
 TEST_F(Reuse, EveryPoseComesBackOnce) {
   const PolicyRun one = drive("manhattan:poses=400,streets=4,loop_density=0",
                               "compact_pose:range=3,angle=3.15", "simulated:range=3");
