@@ -70,9 +70,7 @@ DataSet with_truth(const Bench& bench, const TruthfulSet& set) {
 
 Run run_compact(const Bench& bench, const DataSet& set, const Words& arguments, double limit) {
   Run run = bench.cairn.compact(set, arguments, 1, limit);
-  const std::string& complaint = run.outcome.complaint;
-  if (run.report.is_null() && run.outcome.in_time)
-    throw std::runtime_error(complaint.empty() ? "killed" : complaint);
+  require_report(run);
   return run;
 }
 

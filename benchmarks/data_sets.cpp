@@ -99,6 +99,24 @@ const std::vector<TruthfulSet>& compacted() {
   return all;
 }
 
+const std::vector<DataSet>& of_thesis() {
+  static const std::vector<std::string> chain{"--initial", "odometry"};
+  static const std::vector<DataSet> all{{"M3500", "pose2d/M3500.g2o", chain},
+                                        {"Intel", "pose2d/intel1228_carlone.g2o", chain},
+                                        {"FR079", "pose2d/FR079.g2o", chain},
+                                        {"MITb", "pose2d/MITb.g2o", chain}};
+  return all;
+}
+
+const std::vector<DataSet>& in_space() {
+  static const std::vector<std::string> like_g2o{"--types", "slam3d:metric=g2o"};
+  static const std::vector<DataSet> all{{"sphere2500", "pose3d/sphere2500_isam.txt", {}},
+                                        {"parking-garage", "pose3d/parking-garage.g2o", like_g2o},
+                                        {"eecs", "pose3d/eecs_glc.g2o", like_g2o},
+                                        {"duderstadt", "pose3d/duderstadt_glc.g2o", like_g2o}};
+  return all;
+}
+
 /// Turns the graph's place in the folder `data` into a path; false if there is none.
 bool locate(DataSet& set, const std::string& data) {
   if (set.generated()) return true;
@@ -120,6 +138,18 @@ std::vector<Set> located(const std::vector<Set>& all, const std::string& data) {
   std::erase_if(sets, [&](Set& set) { return !locate(set, data); });
   return sets;
 }
+
+/// The published ones; if there are none or if it is to be quick, a generated one.
+std::vector<DataSet> located_or(const std::vector<DataSet>& published, const std::string& data,
+                                bool quick, const DataSet& small, const DataSet& generated) {
+  if (quick) return {small};
+  std::vector<DataSet> sets = located(published, data);
+  if (sets.empty()) sets.push_back(generated);
+  return sets;
+}
+
+const DataSet kSmallPlane{"manhattan, 600 poses", "@manhattan:poses=600", {}};
+const DataSet kPlane{"manhattan", "@manhattan", {}};
 
 /// Those of the names that there are, in their order.
 std::vector<DataSet> chosen(const std::vector<std::string>& names, const std::string& data) {
@@ -222,6 +252,27 @@ std::vector<SimulatedSet> simulated_sets(const std::string& data, bool quick) {
     if (set.set.name == "manhattanOlson3500") sets.push_back({.set = set, .range = planar});
   }
   return sets;
+}
+
+std::vector<DataSet> thesis_sets(const std::string& data, bool quick) {
+  return located_or(of_thesis(), data, quick, kSmallPlane, kPlane);
+}
+
+std::vector<DataSet> space_sets(const std::string& data, bool quick) {
+  return located_or(in_space(), data, quick,
+                    {"sphere, 200 poses", "@sphere:turns=10,poses_per_turn=20,radius=20", {}},
+                    {"sphere", "@sphere", {}});
+}
+
+std::vector<DataSet> large_sets(const std::string& data, bool quick) {
+  return located_or({of_thesis().front(), {"city10000", "pose2d/city10000_isam.txt", {}}}, data,
+                    quick, kSmallPlane, kPlane);
+}
+
+std::vector<DataSet> sparsify_online_sets(const std::string& data, bool quick) {
+  return located_or({{"manhattanOlson3500", "pose2d/manhattanOlson3500_isam.txt", {}},
+                     {"city10000", "pose2d/city10000_isam.txt", {}}},
+                    data, quick, kSmallPlane, kPlane);
 }
 
 }  // namespace cairn::performance

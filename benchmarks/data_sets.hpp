@@ -46,6 +46,13 @@ std::vector<DataSet> budget_sets(const std::string& data, bool quick);
 std::vector<TruthfulSet> compact_sets(const std::string& data, bool quick);
 std::vector<TruthfulSet> comparison_sets(const std::string& data, bool quick);
 
+// For `cairn sparsify`; without published graphs, generated ones:
+/// M3500, Intel, FR079 and MITb, those of the thesis.
+std::vector<DataSet> thesis_sets(const std::string& data, bool quick);
+std::vector<DataSet> space_sets(const std::string& data, bool quick);
+std::vector<DataSet> large_sets(const std::string& data, bool quick);
+std::vector<DataSet> sparsify_online_sets(const std::string& data, bool quick);
+
 /// With a registration that measures what the truth is.
 struct SimulatedSet {
   TruthfulSet set;

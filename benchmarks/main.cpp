@@ -50,7 +50,13 @@ const std::vector<std::pair<std::string, Study>>& all_studies() {
       {"compact_sets", study_compact_sets},
       {"compact_growth", study_compact_growth},
       {"compact_honesty", study_compact_honesty},
-      {"compact_matches", study_compact_matches}};
+      {"compact_matches", study_compact_matches},
+      {"sparsify_sets", study_sparsify_sets},
+      {"sparsify_topology", study_sparsify_topology},
+      {"sparsify_problems", study_sparsify_problems},
+      {"sparsify_whole", study_sparsify_whole},
+      {"sparsify_online", study_sparsify_online},
+      {"sparsify_selection", study_sparsify_selection}};
   return all;
 }
 
@@ -154,7 +160,7 @@ int run(int argc, char** argv) {
   CLI::App app("Measures the program cairn, one JSON file a study, and turns those into tables.");
   app.add_option("studies", arguments.studies,
                  "all, or some of: graphs rates threads scaling "
-                 "solvers marginals online compact")
+                 "solvers marginals online compact sparsify")
       ->check(CLI::IsMember(study_names()));
   app.add_option("--cairn", arguments.cairn, "the program to measure");
   app.add_option("--folder", arguments.folder, "where the JSON is")->required();

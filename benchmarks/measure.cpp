@@ -29,6 +29,12 @@ void append(std::vector<std::string>& words, const std::vector<std::string>& mor
 
 }  // namespace
 
+void require_report(const Run& run) {
+  const std::string& complaint = run.outcome.complaint;
+  if (run.report.is_null() && run.outcome.in_time)
+    throw std::runtime_error(complaint.empty() ? "killed" : complaint);
+}
+
 Cairn::Cairn(std::filesystem::path program, std::filesystem::path work)
     : program_(std::move(program)), work_(std::move(work)) {}
 
@@ -82,6 +88,22 @@ Run Cairn::replay(const DataSet& set, const std::vector<std::string>& arguments,
 Run Cairn::compact(const DataSet& set, const std::vector<std::string>& arguments, int threads,
                    double limit) const {
   return run("compact", set, arguments, threads, limit);
+}
+
+Run Cairn::sparsify(const DataSet& set, const std::vector<std::string>& arguments, int threads,
+                    double limit) const {
+  return run("sparsify", set, arguments, threads, limit);
+}
+
+Run Cairn::solve_problems(const std::filesystem::path& problems,
+                          const std::vector<std::string>& arguments, double limit) const {
+  std::vector<std::string> words{program_,          "sparsify",  "--replay",
+                                 problems.string(), "--json",    "-",
+                                 "--quiet",         "--threads", "1"};
+  append(words, arguments);
+  Run run{run_program(words, work_, limit), {}};
+  run.report = parsed(run.outcome.output);
+  return run;
 }
 
 std::vector<std::string> Cairn::names(const std::string& kind) const {

@@ -25,6 +25,9 @@ struct Run {
   boost::json::value report;  ///< null if there is none
 };
 
+/// Throws `std::runtime_error` with the program's complaint if it was in time and gave no report.
+void require_report(const Run& run);
+
 /// The program that is measured. Every run is a process of its own, so that memory can be told and
 /// nothing is warm that would not be for a user.
 class Cairn {
@@ -51,6 +54,14 @@ class Cairn {
   /// `cairn compact`, likewise.
   Run compact(const DataSet& set, const std::vector<std::string>& arguments, int threads,
               double limit) const;
+
+  /// `cairn sparsify`, likewise.
+  Run sparsify(const DataSet& set, const std::vector<std::string>& arguments, int threads,
+               double limit) const;
+
+  /// `cairn sparsify --replay` of recorded problems, with one thread.
+  Run solve_problems(const std::filesystem::path& problems,
+                     const std::vector<std::string>& arguments, double limit) const;
 
   /// A folder for files of the runs.
   const std::filesystem::path& work() const { return work_; }

@@ -62,6 +62,26 @@ void study_compact_honesty(const Bench& bench, const Keep& keep);
 /// With a registration of which a tenth is wrong.
 void study_compact_matches(const Bench& bench, const Keep& keep);
 
+// `cairn sparsify`, whose studies are called sparsify_…; docs/sparsify_results.md has their tables.
+
+/// The graphs of Vallvé's thesis, with several parts of the nodes left and each recovery.
+void study_sparsify_sets(const Bench& bench, const Keep& keep);
+
+/// Two of them with each topology and several numbers of factors.
+void study_sparsify_topology(const Bench& bench, const Keep& keep);
+
+/// The problems of one of them, one by one.
+void study_sparsify_problems(const Bench& bench, const Keep& keep);
+
+/// Poses in space, and larger graphs.
+void study_sparsify_whole(const Bench& bench, const Keep& keep);
+
+/// Pose by pose, beside the same without taking anything out.
+void study_sparsify_online(const Bench& bench, const Keep& keep);
+
+/// Half of the nodes, chosen in several ways.
+void study_sparsify_selection(const Bench& bench, const Keep& keep);
+
 // Progress
 // ------------------------------------------------------------------------------------------------
 /// A line on standard error.

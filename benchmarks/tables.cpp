@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <map>
 #include <set>
 #include <stdexcept>
@@ -247,11 +248,40 @@ std::vector<Section> marginals_sections(const json::array& entries) {
   return {{"marginals", table.text()}};
 }
 
+// --------------------------------------------------------------------------------------------------
+
+struct StudySections {
+  std::string_view study;
+  std::vector<Section> (*sections)(const json::array& entries);
+};
+
+constexpr StudySections kSections[] = {{"graphs", graphs_sections},
+                                       {"rates", rates_sections},
+                                       {"threads", threads_sections},
+                                       {"scaling", scaling_sections},
+                                       {"solvers", solvers_sections},
+                                       {"marginals", marginals_sections},
+                                       {"online", online_sections},
+                                       {"compact_sets", compact_sets_sections},
+                                       {"compact_growth", compact_growth_sections},
+                                       {"compact_honesty", compact_honesty_sections},
+                                       {"compact_matches", compact_matches_sections},
+                                       {"sparsify_sets", sparsify_sets_sections},
+                                       {"sparsify_topology", sparsify_topology_sections},
+                                       {"sparsify_problems", sparsify_problems_sections},
+                                       {"sparsify_whole", sparsify_whole_sections},
+                                       {"sparsify_online", sparsify_online_sections},
+                                       {"sparsify_selection", sparsify_selection_sections}};
+
 }  // namespace
 
 std::string digits(double value) {
   if (!std::isfinite(value)) return "-";
   return std::abs(value) >= 99.95 ? fmt::format("{:.0f}", value) : fmt::format("{:#.3g}", value);
+}
+
+std::string whole(double value) {
+  return std::isfinite(value) ? fmt::format("{:.0f}", value) : "-";
 }
 
 std::string times(double ratio) { return std::isfinite(ratio) ? digits(ratio) + " ×" : "-"; }
@@ -308,34 +338,11 @@ void MarkdownTable::add(const std::vector<std::string>& row) {
 }
 
 std::vector<Section> sections(const json::value& report) {
-  const json::array& entries = list(report, "entries");
   const std::string study = text(report, "study");
-  std::vector<Section> all;
-  if (study == "graphs") {
-    all = graphs_sections(entries);
-  } else if (study == "rates") {
-    all = rates_sections(entries);
-  } else if (study == "threads") {
-    all = threads_sections(entries);
-  } else if (study == "scaling") {
-    all = scaling_sections(entries);
-  } else if (study == "solvers") {
-    all = solvers_sections(entries);
-  } else if (study == "marginals") {
-    all = marginals_sections(entries);
-  } else if (study == "online") {
-    all = online_sections(entries);
-  } else if (study == "compact_sets") {
-    all = compact_sets_sections(entries);
-  } else if (study == "compact_growth") {
-    all = compact_growth_sections(entries);
-  } else if (study == "compact_honesty") {
-    all = compact_honesty_sections(entries);
-  } else if (study == "compact_matches") {
-    all = compact_matches_sections(entries);
-  } else {
+  const auto* of_study = std::ranges::find(kSections, study, &StudySections::study);
+  if (of_study == std::end(kSections))
     throw std::runtime_error("no table for a study named '" + study + "'");
-  }
+  std::vector<Section> all = of_study->sections(list(report, "entries"));
   for (Section& section : all) section.markdown += provenance(report);
   return all;
 }

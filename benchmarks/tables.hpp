@@ -11,8 +11,8 @@
 
 namespace cairn::performance {
 
-/// The sections of docs/performance.md and docs/compact_results.md that the report of a study
-/// fills. Throws `std::runtime_error` for a study that it does not know.
+/// The sections of docs/performance.md, docs/compact_results.md and docs/sparsify_results.md that
+/// the report of a study fills. Throws `std::runtime_error` for a study that it does not know.
 std::vector<Section> sections(const boost::json::value& report);
 
 /// The main comparison's part of it, in tables_graphs.cpp.
@@ -26,6 +26,14 @@ std::vector<Section> compact_sets_sections(const boost::json::array& entries);
 std::vector<Section> compact_growth_sections(const boost::json::array& entries);
 std::vector<Section> compact_honesty_sections(const boost::json::array& entries);
 std::vector<Section> compact_matches_sections(const boost::json::array& entries);
+
+// The parts of `cairn sparsify`, in tables_sparsify.cpp and tables_sparsify_problems.cpp.
+std::vector<Section> sparsify_sets_sections(const boost::json::array& entries);
+std::vector<Section> sparsify_topology_sections(const boost::json::array& entries);
+std::vector<Section> sparsify_problems_sections(const boost::json::array& entries);
+std::vector<Section> sparsify_whole_sections(const boost::json::array& entries);
+std::vector<Section> sparsify_online_sections(const boost::json::array& entries);
+std::vector<Section> sparsify_selection_sections(const boost::json::array& entries);
 
 // What `cairn plot` draws, in the words of `cairn bench --json`:
 /// the main comparison, with the best of each family alone, as bars;
@@ -41,6 +49,8 @@ boost::json::value compact_picture(const boost::json::array& entries);
 // --------------------------------------------------------------------------------------------
 /// Three digits; "-" for what is not a number.
 std::string digits(double value);
+/// "14" of 14.2, "-"
+std::string whole(double value);
 /// "3.21 ×", "-"
 std::string times(double ratio);
 /// "52 %" of 0.52, "-"

@@ -63,10 +63,6 @@ std::string percent_of(double part) {
   return std::isfinite(part) ? fmt::format("{:.1f} %", 100.0 * part) : "-";
 }
 
-std::string whole(double value) {
-  return std::isfinite(value) ? fmt::format("{:.0f}", value) : "-";
-}
-
 // Thresholds
 // ------------------------------------------------------------------------------------------------
 

@@ -18,15 +18,6 @@ using Eigen::VectorXd;
 /// Eigenvalues of the scaled H below this are what rounding left of a zero.
 constexpr double kZeroEigenvalue = 1e-12;
 
-/// Writes or adds a block, as `LinearizeSink::put` does for one of fixed size.
-void put(const LinearizeSink& sink, std::int64_t offset, const MatrixXd& block) {
-  if (offset >= 0) {
-    Eigen::Map<VectorXd>(sink.H + offset, block.size()) = block.reshaped();
-  } else {
-    Eigen::Map<VectorXd>(sink.scratch + ~offset, block.size()) += block.reshaped();
-  }
-}
-
 /// M becomes U M, U being upper triangular and packed row by row. Nothing is done for the identity.
 template <class Matrix>
 void whiten(const double* packed, Matrix& M) {
@@ -134,66 +125,6 @@ MarginalPrior::Evaluation MarginalPrior::evaluate_at(const double* const* x,
   whiten(sqrt_information, result.r);
   if (with_jacobian) whiten(sqrt_information, result.J);
   return result;
-}
-
-namespace {
-
-/// Where the states of one factor of a pool are.
-std::vector<const double*> states_of(const FactorType& type, const FactorView& pool,
-                                     std::size_t factor) {
-  std::vector<const double*> x;
-  const auto arity = static_cast<std::size_t>(type.arity());
-  for (std::size_t k = 0; k < arity; ++k) {
-    x.push_back(pool.states[k] + static_cast<std::ptrdiff_t>(pool.slots[factor * arity + k]) *
-                                     type.ambient_size(static_cast<int>(k)));
-  }
-  return x;
-}
-
-std::size_t packed_size(const FactorType& type) {
-  const auto n = static_cast<std::size_t>(type.residual_size());
-  return n * (n + 1) / 2;
-}
-
-}  // namespace
-
-void MarginalPrior::squared_norms(const FactorView& pool, std::size_t begin, std::size_t end,
-                                  double* out) const {
-  for (std::size_t f = begin; f < end; ++f) {
-    const double* U = pool.sqrt_information + f * packed_size(*this);
-    out[f - begin] = evaluate_at(states_of(*this, pool, f).data(), U, false).r.squaredNorm();
-  }
-}
-
-void MarginalPrior::linearize(const FactorView& pool, std::size_t begin, std::size_t end,
-                              const double* weights, const LinearizeSink& sink,
-                              double* out_squared_norms) const {
-  const int n = arity();
-  const auto pairs = static_cast<std::size_t>(n * (n + 1) / 2);
-  for (std::size_t f = begin; f < end; ++f) {
-    const double* U = pool.sqrt_information + f * packed_size(*this);
-    const Evaluation at = evaluate_at(states_of(*this, pool, f).data(), U, true);
-    if (out_squared_norms) out_squared_norms[f - begin] = at.r.squaredNorm();
-    const double weight = weights ? weights[f - begin] : 1.0;
-    const MatrixXd H = weight * at.J.transpose() * at.J;
-    const VectorXd g = -weight * at.J.transpose() * at.r;
-    std::size_t pair = f * pairs;
-    for (int a = 0; a < n; ++a) {
-      const int row = offsets_[a], rows = offsets_[a + 1] - row;
-      for (int b = a; b < n; ++b, ++pair) {
-        if (sink.blocks[pair] == LinearizeSink::kNone) continue;
-        const int column = offsets_[b], columns = offsets_[b + 1] - column;
-        if (a != b && sink.transposed[pair]) {
-          put(sink, sink.blocks[pair], H.block(column, row, columns, rows));
-        } else {
-          put(sink, sink.blocks[pair], H.block(row, column, rows, columns));
-        }
-      }
-      const std::int64_t target = sink.gradients[f * static_cast<std::size_t>(n) + a];
-      if (target != LinearizeSink::kNone)
-        Eigen::Map<VectorXd>(sink.scratch + target, rows) += g.segment(row, rows);
-    }
-  }
 }
 
 void MarginalPrior::evaluate(const double* const* x, const double* /*measurement*/,

@@ -4,6 +4,7 @@
 #include <string_view>
 #include <vector>
 
+#include "cairn/correlated_pair.hpp"
 #include "cairn/marginal_prior.hpp"
 #include "line_writer.hpp"
 #include "writer_order.hpp"
@@ -62,6 +63,10 @@ void write_factor(const Graph& graph, int position, LineWriter& out) {
     cannot_express("g2o", graph.describe_factor(position),
                    "a graph without what marginalization left (a trajectory format such as tum "
                    "writes the poses alone)");
+  }
+  if (tag == CorrelatedPair::kTag) {
+    cannot_express("g2o", graph.describe_factor(position),
+                   "a graph without correlated pairs, which exist in memory only");
   }
   check_tag(tag, graph.describe_factor(position));
   const WithOffset* offset = with_offset(tag);

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "cairn/api.hpp"
+#include "cairn/evaluated_factor.hpp"
 #include "cairn/factor_type.hpp"
 #include "cairn/variable_type.hpp"
 
@@ -39,7 +40,7 @@ CAIRN_API LinearResidual square_root(std::span<const double> H, std::span<const 
 ///
 /// Each object serves one factor of a graph, with any number of variables of any types; its
 /// measurement is empty, its information the identity. It cannot be written to files.
-class CAIRN_API MarginalPrior final : public FactorType {
+class CAIRN_API MarginalPrior final : public EvaluatedFactorType {
  public:
   static constexpr std::string_view kTag = "MARGINAL_PRIOR";
 
@@ -70,10 +71,6 @@ class CAIRN_API MarginalPrior final : public FactorType {
     return variables_[variable].type->ambient_size();
   }
   std::string normalize(double*) const override { return {}; }
-  void squared_norms(const FactorView& pool, std::size_t begin, std::size_t end,
-                     double* out) const override;
-  void linearize(const FactorView& pool, std::size_t begin, std::size_t end, const double* weights,
-                 const LinearizeSink& sink, double* out_squared_norms) const override;
   void evaluate(const double* const* x, const double* measurement, const double* sqrt_information,
                 double* residual, double* const* jacobians) const override;
   bool propagate(int, const double* const*, const double*, double*) const override { return false; }

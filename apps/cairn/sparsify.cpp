@@ -1,0 +1,373 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// cairn sparsify GRAPH: takes nodes out of a graph and keeps their information in a few factors.
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "cairn/error.hpp"
+#include "cairn/threads.hpp"
+#include "commands.hpp"
+#include "compact_run.hpp"
+#include "graph_files.hpp"
+#include "help.hpp"
+#include "json_report.hpp"
+#include "progress.hpp"
+#include "sparsify_records.hpp"
+#include "sparsify_run.hpp"
+#include "step_times.hpp"
+#include "table.hpp"
+
+namespace cairn::app {
+namespace {
+
+namespace json = boost::json;
+
+struct SparsifyCommandOptions {
+  std::string graph;
+  std::string output, output_format;
+  std::string sparsifier = "sparsify";
+  std::string select;
+  int keep_every = 0;
+  std::vector<std::string> topologies, recoveries;
+  std::string population, scheme;
+  std::string optimizer = kDefaultOptimizer, linear_solver = kDefaultLinearSolver;
+  std::string estimator = "incremental_cholesky";
+  int online = 0;
+  std::string redirect = "late";
+  bool as_given = false, no_kld = false;
+  std::string record, replay;
+  InputOptions input;
+  ProblemOptions problem;
+};
+
+constexpr const char* kDefaultSelection = "keep_every:every=2";
+constexpr std::size_t kRefusedShown = 5;
+
+// Replay ------------------------------------------------------------------------------------------
+
+json::array rows_json(const std::vector<ReplayRow>& rows) {
+  json::array all;
+  for (const ReplayRow& row : rows) {
+    all.push_back({{"topology", row.topology},
+                   {"recovery", row.recovery},
+                   {"nodes", row.nodes == 0 ? json::value(nullptr) : json::value(row.nodes)},
+                   {"problems", row.problems},
+                   {"refused", row.refused},
+                   {"kld", row.kld},
+                   {"kld_deviation", row.kld_deviation},
+                   {"largest_excess", row.largest_excess},
+                   {"factors", row.factors},
+                   {"iterations", row.iterations},
+                   {"not_converged", row.not_converged},
+                   {"not_positive", row.not_positive},
+                   {"seconds",
+                    {{"topology", row.topology_seconds},
+                     {"recovery", row.recovery_seconds},
+                     {"recovery_median", row.recovery_median}}}});
+  }
+  return all;
+}
+
+int replay(const SparsifyCommandOptions& options, Session& session) {
+  const std::vector<DenseBlanket> problems = read_problems(options.replay);
+  const InterruptGuard guard;
+  StatusLine line(session.common.quiet);
+  const auto or_default = [](const std::vector<std::string>& names, const char* name) {
+    return names.empty() ? std::vector<std::string>{name} : names;
+  };
+  const std::vector<ReplayRow> rows = replay_problems(
+      problems, or_default(options.topologies, "ekld"),
+      options.population.empty() ? "tree:2" : options.population,
+      or_default(options.recoveries, "ncfd"),
+      [&](std::size_t done) {
+        if (done % 64 == 0)
+          line.show(fmt::format("{} of {} problems solved", done, problems.size()));
+        return !guard.interrupted();
+      },
+      session.registry());
+  line.clear();
+  json::object report = begin_report("sparsify");
+  report["replay"] = options.replay;
+  report["problems"] = problems.size();
+  report["rows"] = rows_json(rows);
+  report["status"] = guard.interrupted() ? "interrupted" : "converged";
+  end_report(report);
+  session.write_json(report);
+  Table table({{"topology", Table::Align::left},
+               {"recovery", Table::Align::left},
+               {"nodes", Table::Align::right},
+               {"problems", Table::Align::right},
+               {"refused", Table::Align::right},
+               {"KLD", Table::Align::right},
+               {"excess", Table::Align::right},
+               {"iterations", Table::Align::right},
+               {"topology", Table::Align::right},
+               {"recovery", Table::Align::right}});
+  for (const ReplayRow& row : rows) {
+    table.add({row.topology, row.recovery, row.nodes == 0 ? "all" : fmt::format("{}", row.nodes),
+               fmt::format("{}", row.problems), fmt::format("{}", row.refused),
+               fmt::format("{:.4g}", row.kld), fmt::format("{:.1e}", row.largest_excess),
+               fmt::format("{:.1f}", row.iterations), seconds_text(row.topology_seconds),
+               seconds_text(row.recovery_seconds)});
+  }
+  session.print(table.text(session.colour()));
+  return guard.interrupted() ? kExitInterrupted : 0;
+}
+
+// One graph ---------------------------------------------------------------------------------------
+
+/// The component with its options given, one by one, besides those in its name.
+SparsifyJob job_of(const SparsifyCommandOptions& options, Session& session) {
+  SparsifyJob job;
+  job.sparsifier = parse_component(options.sparsifier);
+  const auto one = [](const std::vector<std::string>& names, const char* option) {
+    if (names.size() > 1)
+      throw Error(ErrorCode::usage, fmt::format("{}: several are for --replay only", option));
+    return names.empty() ? std::string() : names.front();
+  };
+  const std::pair<const char*, std::string> given[] = {
+      {"topology", one(options.topologies, "--topology")},
+      {"recovery", one(options.recoveries, "--recovery")},
+      {"population", options.population},
+      {"scheme", options.scheme}};
+  for (const auto& [name, value] : given) {
+    if (!value.empty()) job.sparsifier.values.insert_or_assign(name, value);
+  }
+  // A tree is solved in closed form; nothing else is worth its name there.
+  const auto topology = job.sparsifier.values.find("topology");
+  if (topology != job.sparsifier.values.end() &&
+      (topology->second.starts_with("clt") || topology->second.starts_with("cliquey")))
+    job.sparsifier.values.emplace("recovery", "closed_form");
+  if (options.keep_every > 0 && !options.select.empty())
+    throw Error(ErrorCode::usage, "--keep-every and --select both say which nodes leave: give one");
+  job.selection = parse_component(options.keep_every > 0
+                                      ? fmt::format("keep_every:every={}", options.keep_every)
+                                  : options.select.empty() ? kDefaultSelection
+                                                           : options.select);
+  job.optimizer = optimizer_spec(options.optimizer, "", session.registry());
+  job.linear_solver = options.linear_solver;
+  job.estimator = options.estimator;
+  job.online = options.online;
+  job.as_given = options.as_given;
+  if (options.redirect == "early") {
+    if (options.keep_every == 0 || options.online == 0) {
+      throw Error(ErrorCode::usage,
+                  "--redirect early needs --online and --keep-every: only then it is known of each "
+                  "node whether it stays");
+    }
+    job.redirect_early = options.keep_every;
+  }
+  job.measure = !options.no_kld;
+  return job;
+}
+
+json::value number_json(double number) {
+  return std::isfinite(number) ? json::value(number) : json::value(nullptr);
+}
+
+json::object report_json(const SparsifyCommandOptions& options, const LoadedGraph& loaded,
+                         const SparsifyJob& job, const SparsifyResult& result) {
+  json::object report = begin_report("sparsify");
+  report["graph"] = graph_json(loaded.graph, loaded.name);
+  report["sparsifier"] = spec_text(job.sparsifier);
+  report["selection"] = spec_text(job.selection);
+  report["online"] = job.online;
+  report["threads"] = threads();
+  report["status"] = result.interrupted ? "interrupted" : "converged";
+  report["poses"] = {{"in", result.variables_before}, {"kept", result.sparse.variable_count()}};
+  report["factors"] = {{"in", result.factors_before}, {"out", result.sparse.factor_count()}};
+  const Sparsification& change = result.change;
+  report["problems"] = {{"count", change.problems},
+                        {"mean_blanket", change.mean_blanket},
+                        {"largest_blanket", change.largest_blanket},
+                        {"kld", change.kld},
+                        {"not_converged", change.not_converged}};
+  json::array refused;
+  for (const RefusedNode& node : change.refused)
+    refused.push_back({{"node", node.node}, {"reason", node.reason}});
+  report["refused"] = std::move(refused);
+  report["kld"] = result.error ? json::value(result.error->kld) : json::value(nullptr);
+  report["rmse"] = result.error ? number_json(result.error->rmse) : json::value(nullptr);
+  if (result.error)
+    report["kld_parts"] = {{"covariance", result.error->covariance}, {"mean", result.error->mean}};
+  report["chi2"] = {{"before", result.chi2_before}, {"after", result.chi2_after}};
+  report["seconds"] = {{"total", change.seconds.total},
+                       {"marginalize", change.seconds.marginalize},
+                       {"topology", change.seconds.topology},
+                       {"recovery", change.seconds.recovery},
+                       {"select", result.select_seconds}};
+  if (job.online > 0) {
+    report["redirected"] = result.redirected;
+    report["dropped"] = result.dropped;
+    report["rmse_full"] = number_json(result.rmse_full);
+    report["steps"] = step_times_json(StepTimes(result.steps));
+  }
+  report["notes"] = strings_json(result.notes);
+  report["output"] = text_json(options.output);
+  end_report(report);
+  return report;
+}
+
+std::string summary_text(const SparsifyCommandOptions& options, const LoadedGraph& loaded,
+                         const SparsifyJob& job, const SparsifyResult& result) {
+  const Sparsification& change = result.change;
+  Table table({{"", Table::Align::left}, {"", Table::Align::left}});
+  table.add(
+      {"graph", fmt::format("{}: {}, {}", loaded.name, plural(result.variables_before, "variable"),
+                            plural(result.factors_before, "factor"))});
+  const auto removed = static_cast<std::int64_t>(std::ssize(change.removed_variables));
+  table.add({"taken out",
+             fmt::format("{} ({}{}), in {} whose neighbours are {:.2f} on average, {} at most",
+                         plural(removed, "node"), spec_text(job.selection),
+                         job.online > 0 ? fmt::format(", every {} poses", job.online) : "",
+                         plural(change.problems, "problem"), change.mean_blanket,
+                         change.largest_blanket)});
+  table.add({"left", fmt::format("{}, {} ({})", plural(result.sparse.variable_count(), "variable"),
+                                 plural(result.sparse.factor_count(), "factor"),
+                                 spec_text(job.sparsifier))});
+  if (result.error) {
+    std::string text = fmt::format("KLD {:.4g} nats of the whole", result.error->kld);
+    if (std::isfinite(result.error->rmse))
+      text += fmt::format("; the estimate has moved by {:.3g} m (RMS)", result.error->rmse);
+    if (job.online > 0 && std::isfinite(result.rmse_full))
+      text += fmt::format(", from that with all measurements by {:.3g} m", result.rmse_full);
+    table.add({"lost", text});
+  }
+  table.add(
+      {"time",
+       fmt::format("{} (marginalize {}, topology {}, recovery {}), select {}",
+                   seconds_text(change.seconds.total), seconds_text(change.seconds.marginalize),
+                   seconds_text(change.seconds.topology), seconds_text(change.seconds.recovery),
+                   seconds_text(result.select_seconds))});
+  if (job.online > 0) {
+    table.add({"a pose", StepTimes(result.steps).text()});
+    table.add({"late", fmt::format("{} for nodes that had left redirected, {} dropped",
+                                   plural(result.redirected, "factor"), result.dropped)});
+  }
+  if (result.interrupted) table.add({"status", "interrupted"});
+  for (const std::string& file : {options.output, options.record}) {
+    if (!file.empty() && file != "-") table.add({"written", file});
+  }
+  return table.text(false);
+}
+
+void note_refused(const Sparsification& change, const Session& session) {
+  for (std::size_t k = 0; k < std::min(kRefusedShown, change.refused.size()); ++k)
+    session.note(fmt::format("not taken out: {}", change.refused[k].reason));
+  if (change.refused.size() > kRefusedShown) {
+    session.note(fmt::format("{} nodes in all were not taken out; --json names them",
+                             change.refused.size()));
+  }
+}
+
+int run(const SparsifyCommandOptions& options, Session& session) {
+  session.use_threads();
+  if (!options.replay.empty()) {
+    if (!options.graph.empty())
+      throw Error(ErrorCode::usage, "--replay solves recorded problems, and takes no graph");
+    return replay(options, session);
+  }
+  if (options.graph.empty())
+    throw Error(ErrorCode::usage, "give a graph, or --replay FILE; see cairn sparsify --help");
+  if (options.output == "-") session.write_file_to_stdout();
+  check_output(options.output, options.output_format, session);
+  if (!options.record.empty()) check_folder(options.record);
+  Registry& registry = session.registry();
+  const SparsifyJob job = job_of(options, session);
+  // A wrong name is told before a graph is read.
+  registry.make<Sparsifier>(job.sparsifier);
+  registry.make<NodeSelection>(job.selection);
+  const ProblemSetup setup(options.problem, registry);
+  const LoadedGraph loaded = load_graph(options.graph, options.input, session);
+  const InterruptGuard guard;
+  ProblemRecorder recorder;
+  SparsifySetting setting{setup, options.problem.stop, guard, session, {}};
+  if (!options.record.empty())
+    setting.observer = [&](const SparsificationRecord& record) { recorder.add(record); };
+  const SparsifyResult result = job.online > 0 ? sparsify_online(loaded.graph, job, setting)
+                                               : sparsify_whole(loaded.graph, job, setting);
+  for (const std::string& note : result.notes) session.note(note);
+  note_refused(result.change, session);
+  if (!options.output.empty())
+    write_graph(result.sparse, options.output, registry, options.output_format);
+  if (!options.record.empty()) write_file(options.record, recorder.text());
+  session.write_json(report_json(options, loaded, job, result));
+  session.print(summary_text(options, loaded, job, result));
+  return guard.interrupted() ? kExitInterrupted : 0;
+}
+
+}  // namespace
+
+Command add_sparsify(CLI::App& program) {
+  auto options = std::make_shared<SparsifyCommandOptions>();
+  CLI::App* app = program.add_subcommand(
+      "sparsify", "take nodes out of a graph and keep their information in a few factors");
+  app->add_option("graph", options->graph, kGraphHelp)->type_name("GRAPH");
+  app->add_option("-o,--output", options->output, "write the sparse graph")->type_name("OUT");
+  app->add_option("--to", options->output_format, "format of OUT")->type_name("FORMAT");
+  app->add_option("--keep-every", options->keep_every, "one of so many nodes stays [2]")
+      ->type_name("N")
+      ->check(within(1.0, 1e9));
+  app->add_option("--select", options->select,
+                  "which leave instead: least_loss:part=0.5, smallest_blanket, oldest, coverage")
+      ->type_name("NAME");
+  app->add_option("--topology", options->topologies,
+                  "which are related: clt, mi, dmi, ekld, odd, l1, best [ekld]")
+      ->type_name("NAME");
+  app->add_option("--population", options->population,
+                  "by how many factors: tree:γ, fill:α or loss:KLD [tree:2]")
+      ->type_name("HOW");
+  app->add_option("--recovery", options->recoveries,
+                  "who finds their information: ncfd, fd, ip, pqn; closed_form for trees [ncfd]")
+      ->type_name("NAME");
+  app->add_option(
+         "--scheme", options->scheme,
+         "single: one by one; runs: those in a row together; multi: all connected ones [single]")
+      ->type_name("HOW")
+      ->check(one_of({"single", "runs", "multi"}));
+  app->add_option("--sparsifier", options->sparsifier, "who does it, with more options")
+      ->type_name("NAME")
+      ->capture_default_str();
+  app->add_option("--online", options->online,
+                  "feed the graph pose by pose, and take nodes out every N poses")
+      ->type_name("N")
+      ->check(within(1.0, 1e9));
+  app->add_option(
+         "--redirect", options->redirect,
+         "online: factors to nodes that leave go to the nearest in space once these have left "
+         "(late), or at once to the nearest in order (early)")
+      ->type_name("WHEN")
+      ->check(one_of({"late", "early"}))
+      ->capture_default_str();
+  app->add_option("--estimator", options->estimator, "online: who estimates")
+      ->type_name("NAME")
+      ->capture_default_str();
+  app->add_option("--optimizer", options->optimizer, "who optimises before and after")
+      ->type_name("NAME")
+      ->capture_default_str();
+  app->add_option("--linear-solver", options->linear_solver, "who tells determinants")
+      ->type_name("NAME")
+      ->capture_default_str();
+  app->add_flag("--as-given", options->as_given, "the graph is at its minimum: do not optimise it");
+  app->add_flag("--no-kld", options->no_kld, "do not measure what was lost");
+  app->add_option("--record", options->record, "write every problem that comes up, as JSON")
+      ->type_name("FILE");
+  app->add_option("--replay", options->replay,
+                  "solve recorded problems, by each --topology and each --recovery given")
+      ->type_name("FILE");
+  add_problem_options(*app, options->problem);
+  add_input_options(*app, options->input);
+  app->footer(
+      "Example:\n"
+      "  cairn sparsify my.g2o -o sparse.g2o\n"
+      "  cairn sparsify my.g2o --keep-every 5 --scheme multi --population fill:0.75 -o sparse.g2o");
+  return {app, [options](Session& session) { return run(*options, session); }};
+}
+
+}  // namespace cairn::app

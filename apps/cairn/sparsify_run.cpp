@@ -1,0 +1,359 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "sparsify_run.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <iterator>
+#include <memory>
+#include <unordered_set>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "cairn/arrival_order.hpp"
+#include "cairn/error.hpp"
+#include "cairn/estimator.hpp"
+#include "progress.hpp"
+
+namespace cairn::app {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double since(Clock::time_point begin) {
+  return std::chrono::duration<double>(Clock::now() - begin).count();
+}
+
+/// The parts that the job names.
+struct Parts {
+  Parts(const SparsifyJob& job, const SparsifySetting& setting)
+      : sparsifier(setting.session.registry().make<Sparsifier>(job.sparsifier)),
+        selection(setting.session.registry().make<NodeSelection>(job.selection)),
+        optimizer(setting.session.registry().make<Optimizer>(job.optimizer)),
+        solver(setting.session.registry().make<LinearSolver>(job.linear_solver)) {
+    if (setting.observer) sparsifier->observe(setting.observer);
+  }
+  std::unique_ptr<Sparsifier> sparsifier;
+  std::unique_ptr<NodeSelection> selection;
+  std::unique_ptr<Optimizer> optimizer;
+  std::unique_ptr<LinearSolver> solver;
+};
+
+/// To the minimum; its chi2.
+double optimize(Graph& graph, Parts& parts, const SparsifySetting& setting, const char* what,
+                SparsifyResult& result) {
+  Stop stop = setting.stop;
+  stop.interrupt = &setting.guard.flag();
+  OptimizationProgress progress(setting.session.common.quiet, stop.max_iterations);
+  const Summary summary = parts.optimizer->optimize(graph, stop, progress);
+  if (summary.status == Status::interrupted) {
+    result.interrupted = true;
+  } else if (summary.status != Status::converged) {
+    result.notes.push_back(fmt::format("the optimisation of {} ended as {}: it is not at a minimum",
+                                       what, to_string(summary.status)));
+  }
+  return summary.final_chi2;
+}
+
+/// Which of the graph's variables may leave: all poses but the newest.
+std::vector<int> open_nodes(const Graph& graph) {
+  std::vector<int> nodes;
+  for (int v = 0; v < graph.variable_count(); ++v) {
+    if (!graph.fixed(v) && graph.type(v).lie_group()) nodes.push_back(v);
+  }
+  if (!nodes.empty()) nodes.pop_back();
+  return nodes;
+}
+
+Sparsification take_out(const Graph& graph, std::span<const int> nodes, Parts& parts,
+                        StatusLine& line, const SparsifySetting& setting) {
+  auto shown = Clock::now();
+  return parts.sparsifier->remove(graph, nodes, [&](int done) {
+    if (since(shown) > (line.on_terminal() ? 0.1 : 5.0)) {
+      shown = Clock::now();
+      const double part = static_cast<double>(done) / static_cast<double>(nodes.size());
+      line.show(fmt::format("{} {} of {} nodes taken out", bar(part, 30), done, nodes.size()));
+    }
+    return !setting.guard.interrupted();
+  });
+}
+
+void measure(const Graph& original, Parts& parts, SparsifyResult& result) {
+  try {
+    result.error = sparsification_error(original, result.sparse, *parts.solver);
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::numerical) throw;
+    result.notes.push_back(fmt::format("no KLD: {}", error.what()));
+  }
+}
+
+}  // namespace
+
+SparsifyResult sparsify_whole(const Graph& graph, const SparsifyJob& job,
+                              const SparsifySetting& setting) {
+  SparsifyResult result;
+  Parts parts(job, setting);
+  Graph original = graph.clone();
+  result.variables_before = original.variable_count();
+  result.factors_before = original.factor_count();
+  for (const std::string& note : setting.setup.apply(original)) result.notes.push_back(note);
+  if (!job.as_given) {
+    result.chi2_before = optimize(original, parts, setting, "the graph", result);
+    if (result.interrupted) return result;
+  }
+  StatusLine line(setting.session.common.quiet);
+  line.show("choosing nodes");
+  const auto begin = Clock::now();
+  const std::vector<int> nodes =
+      parts.selection->select(original, open_nodes(original), *parts.sparsifier);
+  result.select_seconds = since(begin);
+  result.change = take_out(original, nodes, parts, line, setting);
+  line.clear();
+  result.interrupted = setting.guard.interrupted();
+  result.sparse = original.clone();
+  apply(result.change, result.sparse);
+  if (result.interrupted) return result;
+  // What is written is at its own minimum, which is where it is compared.
+  result.chi2_after = optimize(result.sparse, parts, setting, "the sparse graph", result);
+  if (job.measure) measure(original, parts, result);
+  return result;
+}
+
+// Online ------------------------------------------------------------------------------------------
+
+namespace {
+
+NewFactor factor_of(const Graph& graph, int f) {
+  NewFactor factor{.type = graph.factor_pools()[graph.factor(f).pool].type,
+                   .variables = {},
+                   .measurement = {},
+                   .information = {}};
+  for (const std::int32_t v : graph.factor_variables(f)) factor.variables.push_back(graph.id(v));
+  const auto z = graph.measurement(f), information = graph.information(f);
+  factor.measurement.assign(z.begin(), z.end());
+  factor.information.assign(information.begin(), information.end());
+  return factor;
+}
+
+void add(Graph& graph, const NewFactor& factor) {
+  std::vector<int> on;
+  for (const Id id : factor.variables) on.push_back(graph.find(id).value());
+  graph.add_factor(factor.type, on, factor.measurement, factor.information);
+}
+
+class OnlineRun {
+ public:
+  OnlineRun(const Graph& recording, const SparsifyJob& job, const SparsifySetting& setting)
+      : recording_(recording),
+        job_(job),
+        setting_(setting),
+        parts_(job, setting),
+        estimator_(setting.session.registry().make<Estimator>(job.estimator)),
+        line_(setting.session.common.quiet),
+        redirection_(job.redirect_early > 0 ? Redirection::Nearest::order
+                                            : Redirection::Nearest::place) {
+    estimator_->set_loss(setting.setup.loss(), setting.setup.loss_scope());
+  }
+
+  SparsifyResult run() {
+    result_.variables_before = recording_.variable_count();
+    result_.factors_before = recording_.factor_count();
+    const std::vector<Arrival> arrivals = arrival_order(recording_);
+    auto shown = Clock::now();
+    int count = 0;
+    for (const Arrival& arrival : arrivals) {
+      const auto begin = Clock::now();
+      feed(arrival);
+      ++count;
+      if (count % job_.online == 0) sparsify();
+      result_.steps.push_back(since(begin));
+      if (since(shown) > (line_.on_terminal() ? 0.1 : 5.0)) {
+        shown = Clock::now();
+        const double part = static_cast<double>(count) / static_cast<double>(arrivals.size());
+        line_.show(fmt::format("{} pose {} of {}, {} kept", bar(part, 30), count, arrivals.size(),
+                               estimator_->variable_count()));
+      }
+      result_.interrupted = setting_.guard.interrupted();
+      if (result_.interrupted) break;
+    }
+    if (!result_.interrupted) sparsify();
+    line_.clear();
+    finish();
+    return std::move(result_);
+  }
+
+ private:
+  void feed(const Arrival& arrival) {
+    GraphUpdate update;
+    for (const int v : arrival.variables) {
+      NewVariable variable{.type = recording_.variable_pools()[recording_.pool(v)].type,
+                           .id = recording_.id(v),
+                           .state = {},
+                           .fixed = recording_.fixed(v)};
+      if (variable.fixed || arrival.factors.empty() || estimator_->variable_count() == 0)
+        variable.state.assign(recording_.state(v).begin(), recording_.state(v).end());
+      update.variables.push_back(std::move(variable));
+    }
+    if (job_.redirect_early > 0) leave_early(arrival);
+    for (const int f : arrival.factors) {
+      const NewFactor as_came = factor_of(recording_, f);
+      // Odometry holds the newest pose to the one before it, whether that is to leave or not.
+      const bool odometry = std::ranges::all_of(as_came.variables, [&](Id id) {
+        return (!arrival.variables.empty() && id == recording_.id(arrival.variables.front())) ||
+               id == newest_;
+      });
+      std::optional<NewFactor> factor = odometry && (newest_ < 0 || estimator_->has(newest_))
+                                            ? as_came
+                                            : redirection_.redirect(as_came);
+      const bool moved = factor && factor->variables != as_came.variables;
+      if (!factor) {
+        ++result_.dropped;
+        continue;
+      }
+      result_.redirected += moved;
+      factors_.push_back(*factor);
+      update.factors.push_back(std::move(*factor));
+    }
+    // The pose is placed by its odometry: the factor to the newest pose that is there.
+    std::ranges::stable_sort(update.factors, std::greater{}, [&](const NewFactor& factor) {
+      Id newest = -1;
+      for (const Id id : factor.variables) {
+        if (estimator_->has(id)) newest = std::max(newest, id);
+      }
+      return newest;
+    });
+    take(estimator_->update(update), update.factors.size());
+    for (const NewVariable& variable : update.variables) pending_.push_back(variable.id);
+    if (!update.variables.empty()) {
+      newest_ = update.variables.front().id;
+      if (job_.redirect_early > 0 && count_++ % job_.redirect_early != 0) early_.insert(newest_);
+    }
+  }
+
+  /// Nodes that are to leave, and that this pose has measured again: they are redirected from now
+  /// on, although they are still there.
+  void leave_early(const Arrival& arrival) {
+    std::vector<Id> leaving;
+    for (const int f : arrival.factors) {
+      for (const std::int32_t v : recording_.factor_variables(f)) {
+        const Id id = recording_.id(v);
+        if (id != newest_ && early_.contains(id) && estimator_->has(id) && !redirection_.has(id))
+          leaving.push_back(id);
+      }
+    }
+    if (leaving.empty()) return;
+    const Graph graph = estimator_->graph();
+    std::vector<int> nodes, all;
+    for (int v = 0; v < graph.variable_count(); ++v) {
+      if (early_.contains(graph.id(v))) all.push_back(v);
+    }
+    for (const Id id : leaving) nodes.push_back(graph.find(id).value());
+    redirection_.leave(graph, nodes, all);
+  }
+
+  void take(const UpdateReport& report, std::size_t count) {
+    for (std::size_t k = 0; k < count; ++k)
+      live_.push_back(report.first_factor + static_cast<FactorId>(k));
+    if (!report.ok) ++failed_;
+  }
+
+  void sparsify() {
+    estimator_->update({}, {.full = true});
+    const Graph graph = estimator_->graph();
+    if (graph.factor_count() != static_cast<int>(std::ssize(live_)))
+      throw std::logic_error("an estimator's graph has other factors than it was given");
+    std::vector<int> nodes;
+    std::vector<Id> later;
+    for (const Id id : pending_) {
+      const int v = graph.find(id).value();
+      if (id == graph.id(graph.variable_count() - 1)) {
+        later.push_back(id);
+      } else if (!graph.fixed(v) && graph.type(v).lie_group()) {
+        nodes.push_back(v);
+      }
+    }
+    pending_ = std::move(later);
+    const auto begin = Clock::now();
+    const std::vector<int> chosen = parts_.selection->select(graph, nodes, *parts_.sparsifier);
+    result_.select_seconds += since(begin);
+    const Sparsification change = take_out(graph, chosen, parts_, line_, setting_);
+    result_.change.add(change);
+    result_.change.removed_variables.insert(result_.change.removed_variables.end(),
+                                            change.removed_variables.begin(),
+                                            change.removed_variables.end());
+    redirection_.leave(graph, change.removed_variables);
+    GraphUpdate update;
+    for (const int f : change.removed_factors) update.removed_factors.push_back(live_[f]);
+    for (const int v : change.removed_variables) update.removed_variables.push_back(graph.id(v));
+    update.factors = change.factors;
+    std::vector<FactorId> stay;
+    std::ranges::set_difference(live_, update.removed_factors, std::back_inserter(stay));
+    live_ = std::move(stay);
+    take(estimator_->update(update), update.factors.size());
+  }
+
+  void finish() {
+    estimator_->update({}, {.full = true});
+    result_.sparse = estimator_->graph();
+    result_.chi2_after = estimator_->chi2();
+    if (failed_ > 0)
+      result_.notes.push_back(fmt::format("{} updates were not positive definite", failed_));
+    if (!job_.measure || result_.interrupted) return;
+    // The same factors with nobody taken out, and all factors as they came: both from where the
+    // sparse graph says that everybody is.
+    Graph redirected, full;
+    for (int v = 0; v < recording_.variable_count(); ++v) {
+      const Id id = recording_.id(v);
+      const Id anchor = redirection_.has(id) ? redirection_.anchor(id) : id;
+      const auto there = result_.sparse.find(anchor);
+      if (!there) continue;
+      const auto x = result_.sparse.state(*there);
+      const std::vector<double> state =
+          anchor == id ? std::vector<double>(x.begin(), x.end()) : redirection_.state(id, x);
+      for (Graph* graph : {&redirected, &full}) {
+        const int added =
+            graph->add_variable(recording_.variable_pools()[recording_.pool(v)].type, id, state);
+        graph->set_fixed(added, recording_.fixed(v));
+      }
+    }
+    for (const NewFactor& factor : factors_) add(redirected, factor);
+    for (int f = 0; f < recording_.factor_count(); ++f) add(full, factor_of(recording_, f));
+    for (Graph* graph : {&redirected, &full})
+      graph->set_loss(setting_.setup.loss(), setting_.setup.loss_scope());
+    optimize(redirected, parts_, setting_, "the graph without removals", result_);
+    measure(redirected, parts_, result_);
+    result_.chi2_before = optimize(full, parts_, setting_, "the whole graph", result_);
+    try {
+      result_.rmse_full = sparsification_error(full, result_.sparse, *parts_.solver).rmse;
+    } catch (const Error& error) {
+      if (error.code() != ErrorCode::numerical) throw;
+      result_.rmse_full = std::nan("");
+    }
+  }
+
+  const Graph& recording_;
+  const SparsifyJob& job_;
+  const SparsifySetting& setting_;
+  Parts parts_;
+  std::unique_ptr<Estimator> estimator_;
+  StatusLine line_;
+  SparsifyResult result_;
+  Redirection redirection_;
+  std::vector<FactorId> live_;  ///< by position in the estimator's graph, rising
+  std::vector<Id> pending_;     ///< nodes on which nothing has been decided
+  Id newest_ = -1;
+  std::int64_t count_ = 0;
+  std::unordered_set<Id> early_;    ///< with early redirection: nodes that are to leave
+  std::vector<NewFactor> factors_;  ///< all that came, redirected
+  int failed_ = 0;
+};
+
+}  // namespace
+
+SparsifyResult sparsify_online(const Graph& recording, const SparsifyJob& job,
+                               const SparsifySetting& setting) {
+  return OnlineRun(recording, job, setting).run();
+}
+
+}  // namespace cairn::app
