@@ -131,11 +131,11 @@ CommandLine::CommandLine(Session& session)
       "Example:\n"
       "  cairn generate sphere -o sphere.g2o && cairn optimize sphere.g2o -o best.g2o\n"
       "  cairn bench sphere.g2o --linear-solver block_cholesky,cholmod,eigen");
-  commands_ = {add_info(program_),    add_optimize(program_), add_bench(program_),
-               add_replay(program_),  add_online(program_),   add_marginals(program_),
-               add_compact(program_), add_sparsify(program_), add_evaluate(program_), add_view(program_),
-               add_plot(program_),    add_convert(program_),  add_generate(program_),
-               add_plugins(program_)};
+  commands_ = {add_info(program_),     add_optimize(program_), add_bench(program_),
+               add_replay(program_),   add_online(program_),   add_marginals(program_),
+               add_compact(program_),  add_sparsify(program_), add_evaluate(program_),
+               add_view(program_),     add_plot(program_),     add_convert(program_),
+               add_generate(program_), add_plugins(program_)};
 }
 
 std::function<int()> CommandLine::parse(int argc, const char* const* argv) {

@@ -46,7 +46,7 @@ struct SparsifyCommandOptions {
   ProblemOptions problem;
 };
 
-constexpr const char* kDefaultSelection = "keep_every:every=2";
+constexpr const char* kDefaultSelection = "smallest_blanket:part=0.5";
 constexpr std::size_t kRefusedShown = 5;
 
 // Replay ------------------------------------------------------------------------------------------
@@ -311,11 +311,12 @@ Command add_sparsify(CLI::App& program) {
   app->add_option("graph", options->graph, kGraphHelp)->type_name("GRAPH");
   app->add_option("-o,--output", options->output, "write the sparse graph")->type_name("OUT");
   app->add_option("--to", options->output_format, "format of OUT")->type_name("FORMAT");
-  app->add_option("--keep-every", options->keep_every, "one of so many nodes stays [2]")
+  app->add_option("--keep-every", options->keep_every, "one of so many nodes stays")
       ->type_name("N")
       ->check(within(1.0, 1e9));
-  app->add_option("--select", options->select,
-                  "which leave instead: least_loss:part=0.5, smallest_blanket, oldest, coverage")
+  app->add_option(
+         "--select", options->select,
+         "which leave: smallest_blanket, least_loss, oldest, coverage [smallest_blanket:part=0.5]")
       ->type_name("NAME");
   app->add_option("--topology", options->topologies,
                   "which are related: clt, mi, dmi, ekld, odd, l1, best [ekld]")

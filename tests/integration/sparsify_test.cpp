@@ -56,7 +56,7 @@ TEST_F(Sparsify, WithoutOptionsTakesOutHalfAndSaysWhatItDid) {
         << line;
   }
   const boost::json::value info = parse_json(cairn({"info", out, "--json", "-"}).out);
-  EXPECT_EQ(info.at("graph").at("variables").as_int64(), 201);
+  EXPECT_EQ(info.at("graph").at("variables").as_int64(), 200);
   // It is at its minimum.
   const boost::json::value best = report_of({"optimize", out, "--quiet"});
   EXPECT_NEAR(number(best.at("chi2").at("initial")), number(best.at("chi2").at("final")), 1e-4);
