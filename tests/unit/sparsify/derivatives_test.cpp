@@ -13,7 +13,6 @@ namespace {
 
 using testing::DoubleNear;
 using testing::Ge;
-using testing::Gt;
 using testing::Le;
 
 constexpr int kFactors = 4, kSize = 3, kEntries = kFactors * kSize * kSize;

@@ -17,7 +17,6 @@ namespace cairn::sparsify {
 namespace {
 
 using testing::DoubleNear;
-using testing::Each;
 using testing::Ge;
 using testing::Gt;
 using testing::Le;

@@ -20,7 +20,6 @@ namespace {
 using testing::ElementsAre;
 using testing::Gt;
 using testing::IsEmpty;
-using testing::Lt;
 using testing::Not;
 
 /// Does nothing; must not be asked.

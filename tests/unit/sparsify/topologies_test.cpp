@@ -19,7 +19,6 @@ namespace cairn::sparsify {
 namespace {
 
 using testing::DoubleNear;
-using testing::Ge;
 using testing::Gt;
 using testing::HasSubstr;
 using testing::Le;
