@@ -367,7 +367,7 @@ Command add_sparsify(CLI::App& program) {
   app->footer(
       "Example:\n"
       "  cairn sparsify my.g2o -o sparse.g2o\n"
-      "  cairn sparsify my.g2o --keep-every 5 --scheme multi --population fill:0.75 -o sparse.g2o");
+      "  cairn sparsify my.g2o --keep-every 5 --scheme runs --population tree:1.5 -o sparse.g2o");
   return {app, [options](Session& session) { return run(*options, session); }};
 }
 
