@@ -13,11 +13,11 @@
 #include <boost/json/parse.hpp>
 #include <boost/json/serialize.hpp>
 
-#include "cairn/error.hpp"
-#include "cairn/graph_marginals.hpp"
-#include "cairn/initial_guess.hpp"
-#include "cairn/recording.hpp"
-#include "cairn/scene_json.hpp"
+#include "cairn/linear/graph_marginals.hpp"
+#include "cairn/report/recording.hpp"
+#include "cairn/report/scene_json.hpp"
+#include "cairn/runtime/error.hpp"
+#include "cairn/solve/initial_guess.hpp"
 #include "json_report.hpp"
 #include "table.hpp"
 

@@ -6,7 +6,7 @@
 
 #include <CLI/App.hpp>
 
-#include "cairn/scene.hpp"
+#include "cairn/report/scene.hpp"
 #include "graph_files.hpp"
 #include "session.hpp"
 

@@ -7,7 +7,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "cairn/threads.hpp"
+#include "cairn/runtime/threads.hpp"
 #include "json_report.hpp"
 #include "table.hpp"
 

@@ -8,7 +8,7 @@
 #include <fmt/format.h>
 #include <boost/json/parse.hpp>
 
-#include "cairn/error.hpp"
+#include "cairn/runtime/error.hpp"
 #include "interrupt.hpp"
 #include "peak_memory.hpp"
 #include "progress.hpp"

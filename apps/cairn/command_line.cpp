@@ -8,9 +8,9 @@
 #include <fmt/format.h>
 #include <CLI/Config.hpp>  // the definitions that App.hpp only declares
 
-#include "cairn/error.hpp"
-#include "cairn/spelling.hpp"
-#include "cairn/version.hpp"
+#include "cairn/runtime/error.hpp"
+#include "cairn/runtime/spelling.hpp"
+#include "cairn/runtime/version.hpp"
 #include "help.hpp"
 
 namespace cairn::app {

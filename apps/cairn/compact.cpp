@@ -6,8 +6,8 @@
 
 #include <fmt/format.h>
 
-#include "cairn/error.hpp"
-#include "cairn/threads.hpp"
+#include "cairn/runtime/error.hpp"
+#include "cairn/runtime/threads.hpp"
 #include "commands.hpp"
 #include "compact_compare.hpp"
 #include "compact_run.hpp"

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "cairn/estimator.hpp"
+#include "cairn/solve/estimator.hpp"
 #include "compact_run.hpp"
 
 namespace cairn::app {

@@ -8,9 +8,9 @@
 
 #include <fmt/format.h>
 
-#include "cairn/linear_solver.hpp"
-#include "cairn/linearizer.hpp"
-#include "cairn/normal_equations.hpp"
+#include "cairn/linear/linear_solver.hpp"
+#include "cairn/linear/linearizer.hpp"
+#include "cairn/linear/normal_equations.hpp"
 #include "progress.hpp"
 #include "table.hpp"
 
@@ -25,9 +25,9 @@ class WatchedRegistration final : public Registration {
   WatchedRegistration(Registration& inner, CompactResult& result)
       : inner_(inner), result_(result), false_(query<FalseMatches>(inner)) {}
   void begin(const RegistrationData& data) override { inner_.begin(data); }
-  std::vector<NewFactor> match(Id earlier, Id later) override {
+  std::vector<Factor> match(Id earlier, Id later) override {
     const auto begin = Clock::now();
-    std::vector<NewFactor> factors = inner_.match(earlier, later);
+    std::vector<Factor> factors = inner_.match(earlier, later);
     result_.registration_seconds += std::chrono::duration<double>(Clock::now() - begin).count();
     ++result_.proposed;
     result_.registered += !factors.empty();

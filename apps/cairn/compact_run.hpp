@@ -9,9 +9,9 @@
 #include <utility>
 #include <vector>
 
-#include "cairn/normalized_error.hpp"
-#include "cairn/pose_policy.hpp"
-#include "cairn/trajectory.hpp"
+#include "cairn/evaluation/normalized_error.hpp"
+#include "cairn/evaluation/trajectory.hpp"
+#include "cairn/policy/pose_policy.hpp"
 #include "graph_files.hpp"
 #include "interrupt.hpp"
 #include "problem_setup.hpp"

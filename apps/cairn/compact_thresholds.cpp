@@ -9,7 +9,7 @@
 #include <fmt/format.h>
 #include <boost/json/parse.hpp>
 
-#include "cairn/error.hpp"
+#include "cairn/runtime/error.hpp"
 #include "json_text.hpp"
 
 namespace cairn::app {

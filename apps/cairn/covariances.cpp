@@ -7,9 +7,9 @@
 #include <fmt/ranges.h>
 #include <boost/json/object.hpp>
 
-#include "cairn/error.hpp"
-#include "cairn/graph_marginals.hpp"
-#include "cairn/marginals.hpp"
+#include "cairn/linear/graph_marginals.hpp"
+#include "cairn/linear/marginals.hpp"
+#include "cairn/runtime/error.hpp"
 #include "problem_setup.hpp"
 
 namespace cairn::app {

@@ -9,9 +9,9 @@
 #include <boost/json/array.hpp>
 #include <boost/json/value.hpp>
 
-#include "cairn/graph.hpp"
-#include "cairn/linear_solver.hpp"
-#include "cairn/registry.hpp"
+#include "cairn/graph/graph.hpp"
+#include "cairn/linear/linear_solver.hpp"
+#include "cairn/plugin/registry.hpp"
 
 namespace cairn::app {
 

@@ -8,8 +8,8 @@
 
 #include <fmt/format.h>
 
-#include "cairn/error.hpp"
-#include "cairn/trajectory.hpp"
+#include "cairn/evaluation/trajectory.hpp"
+#include "cairn/runtime/error.hpp"
 #include "commands.hpp"
 #include "graph_files.hpp"
 #include "help.hpp"

@@ -14,8 +14,8 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "cairn/error.hpp"
-#include "cairn/registry.hpp"
+#include "cairn/plugin/registry.hpp"
+#include "cairn/runtime/error.hpp"
 #include "table.hpp"
 
 namespace cairn::app {

@@ -6,8 +6,8 @@
 
 #include <CLI/App.hpp>
 
-#include "cairn/format.hpp"
-#include "cairn/generator.hpp"
+#include "cairn/io/format.hpp"
+#include "cairn/io/generator.hpp"
 #include "session.hpp"
 
 namespace cairn::app {

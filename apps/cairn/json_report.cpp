@@ -6,7 +6,7 @@
 
 #include <fmt/format.h>
 
-#include "cairn/version.hpp"
+#include "cairn/runtime/version.hpp"
 #include "peak_memory.hpp"
 
 namespace cairn::app {

@@ -8,8 +8,8 @@
 #include <boost/json/array.hpp>
 #include <boost/json/object.hpp>
 
-#include "cairn/graph.hpp"
-#include "cairn/optimizer.hpp"
+#include "cairn/graph/graph.hpp"
+#include "cairn/solve/optimizer.hpp"
 
 namespace cairn::app {
 

@@ -96,7 +96,7 @@ void expect_words(const std::vector<std::string_view>& words, std::size_t count,
       fmt::format("{} with {} words after it; expected '{}'", words[0], words.size() - 1, form));
 }
 
-NewVariable declared_variable(const std::vector<std::string_view>& words, Registry& registry) {
+Variable declared_variable(const std::vector<std::string_view>& words, Registry& registry) {
   expect_words(words, 3, "NEW TAG id");
   if (!registry.has("variable", words[1])) {
     throw bad_line(fmt::format("there is no type of variable '{}'; on offer: {}", words[1],

@@ -9,9 +9,9 @@
 
 #include <boost/json/object.hpp>
 
-#include "cairn/error.hpp"
-#include "cairn/estimator.hpp"
-#include "cairn/registry.hpp"
+#include "cairn/plugin/registry.hpp"
+#include "cairn/runtime/error.hpp"
+#include "cairn/solve/estimator.hpp"
 
 namespace cairn::app {
 
@@ -80,7 +80,7 @@ void expect_words(const std::vector<std::string_view>& words, std::size_t count,
                   std::string_view form);
 
 /// What "NEW TAG id" declares.
-NewVariable declared_variable(const std::vector<std::string_view>& words, Registry& registry);
+Variable declared_variable(const std::vector<std::string_view>& words, Registry& registry);
 
 // Lines of answers --------------------------------------------------------------------------------
 

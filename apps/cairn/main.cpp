@@ -5,7 +5,7 @@
 #include <new>
 #include <string>
 
-#include "cairn/error.hpp"
+#include "cairn/runtime/error.hpp"
 #include "command_line.hpp"
 #include "session.hpp"
 

@@ -11,10 +11,10 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "cairn/error.hpp"
-#include "cairn/format.hpp"
-#include "cairn/graph_marginals.hpp"
-#include "cairn/threads.hpp"
+#include "cairn/io/format.hpp"
+#include "cairn/linear/graph_marginals.hpp"
+#include "cairn/runtime/error.hpp"
+#include "cairn/runtime/threads.hpp"
 #include "commands.hpp"
 #include "covariances.hpp"
 #include "graph_files.hpp"

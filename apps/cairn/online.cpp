@@ -8,12 +8,12 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "cairn/error.hpp"
-#include "cairn/estimator.hpp"
-#include "cairn/format.hpp"
-#include "cairn/journal.hpp"
-#include "cairn/pose_policy.hpp"
-#include "cairn/threads.hpp"
+#include "cairn/io/format.hpp"
+#include "cairn/online/journal.hpp"
+#include "cairn/policy/pose_policy.hpp"
+#include "cairn/runtime/error.hpp"
+#include "cairn/runtime/threads.hpp"
+#include "cairn/solve/estimator.hpp"
 #include "commands.hpp"
 #include "compact_run.hpp"
 #include "graph_files.hpp"

@@ -7,8 +7,8 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "cairn/error.hpp"
-#include "cairn/format.hpp"
+#include "cairn/io/format.hpp"
+#include "cairn/runtime/error.hpp"
 
 namespace cairn::app {
 OnlineSession::OnlineSession(Estimator& estimator, StreamFormat& format, Registry& registry,
@@ -47,11 +47,11 @@ void OnlineSession::perform(std::string_view line, const Words& words, Reply& re
 
 void OnlineSession::take_data(std::string_view text, Reply& reply) {
   StreamLine said = format_.read(text, kStreamName, line(), registry_, settings_.read);
-  for (NewVariable& variable : said.variables) take_variable(std::move(variable));
-  for (NewFactor& factor : said.factors) take_factor(std::move(factor), reply);
+  for (Variable& variable : said.variables) take_variable(std::move(variable));
+  for (Factor& factor : said.factors) take_factor(std::move(factor), reply);
   // Each is held or none: a line is taken in whole.
   for (const Id id : said.held) {
-    if (!std::ranges::any_of(waiting_, [id](const NewVariable& v) { return v.id == id; })) {
+    if (!std::ranges::any_of(waiting_, [id](const Variable& v) { return v.id == id; })) {
       throw bad_line(
           fmt::format("FIX {}: only what no measurement and no SOLVE has taken in yet can be held; "
                       "expected FIX "
@@ -63,8 +63,8 @@ void OnlineSession::take_data(std::string_view text, Reply& reply) {
   reply.changes = !said.skipped;
 }
 
-void OnlineSession::take_variable(NewVariable variable) {
-  const auto same = [&](const NewVariable& other) { return other.id == variable.id; };
+void OnlineSession::take_variable(Variable variable) {
+  const auto same = [&](const Variable& other) { return other.id == variable.id; };
   if (estimator_.has(variable.id) || std::ranges::any_of(waiting_, same)) {
     throw bad_line(
         fmt::format("{} {}: the id is already in use", variable.type->tag(), variable.id));
@@ -78,14 +78,14 @@ void OnlineSession::take_variable(NewVariable variable) {
 }
 
 void OnlineSession::hold(Id id) {
-  for (NewVariable& variable : waiting_) {
+  for (Variable& variable : waiting_) {
     if (variable.id == id) variable.fixed = true;
   }
 }
 
-void OnlineSession::take_factor(NewFactor factor, Reply& reply) {
+void OnlineSession::take_factor(Factor factor, Reply& reply) {
   GraphUpdate with;
-  for (const NewVariable& variable : waiting_) {
+  for (const Variable& variable : waiting_) {
     if (std::ranges::count(factor.variables, variable.id) > 0) with.variables.push_back(variable);
   }
   with.factors.push_back(std::move(factor));
@@ -109,13 +109,13 @@ UpdateReport OnlineSession::update(GraphUpdate update, bool solve, bool full, Re
 
 /// What the estimator has taken is known, and waits no more.
 void OnlineSession::follow(const GraphUpdate& update, const UpdateReport& report) {
-  for (const NewVariable& variable : update.variables) {
+  for (const Variable& variable : update.variables) {
     known_.push_back(variable.id);
     types_[variable.id] = variable.type;
-    std::erase_if(waiting_, [&](const NewVariable& v) { return v.id == variable.id; });
+    std::erase_if(waiting_, [&](const Variable& v) { return v.id == variable.id; });
   }
   factor_types_.resize(static_cast<std::size_t>(report.first_factor));
-  for (const NewFactor& factor : update.factors) factor_types_.push_back(factor.type);
+  for (const Factor& factor : update.factors) factor_types_.push_back(factor.type);
   factor_types_.resize(factor_types_.size() + report.priors.size());
   const auto forget = [&](Id id) {
     std::erase(known_, id);
@@ -162,13 +162,12 @@ void OnlineSession::remove(const Words& words, Reply& reply) {
   (factors ? leaving.removed_factors : leaving.removed_variables) = ids;
   // What only waits has not reached the estimator.
   const auto waits = [&](Id id) {
-    return std::ranges::any_of(waiting_, [id](const NewVariable& v) { return v.id == id; });
+    return std::ranges::any_of(waiting_, [id](const Variable& v) { return v.id == id; });
   };
   if (!factors) std::erase_if(leaving.removed_variables, waits);
   update(std::move(leaving), settings_.automatic, false, reply);
   if (!factors) {
-    std::erase_if(waiting_,
-                  [&](const NewVariable& v) { return std::ranges::count(ids, v.id) > 0; });
+    std::erase_if(waiting_, [&](const Variable& v) { return std::ranges::count(ids, v.id) > 0; });
   }
   if (!reply.solved) acknowledge(reply, owed_);
 }
@@ -211,7 +210,7 @@ void OnlineSession::marginalize(const Words& words, Reply& reply) {
 void OnlineSession::solve(const Words& words, Reply& reply) {
   expect_words(words, 1, "SOLVE");
   GraphUpdate rest;  // what has a place, though no measurement
-  for (const NewVariable& variable : waiting_) {
+  for (const Variable& variable : waiting_) {
     if (!variable.state.empty()) rest.variables.push_back(variable);
   }
   update(std::move(rest), true, false, reply);

@@ -10,9 +10,9 @@
 #include <unordered_map>
 #include <vector>
 
-#include "cairn/estimator.hpp"
-#include "cairn/registry.hpp"
-#include "cairn/stream_format.hpp"
+#include "cairn/io/stream_format.hpp"
+#include "cairn/plugin/registry.hpp"
+#include "cairn/solve/estimator.hpp"
 #include "line_session.hpp"
 
 namespace cairn::app {
@@ -54,8 +54,8 @@ class OnlineSession final : public LineSession {
   void quit(const Words& words, Reply& reply);
 
   void take_data(std::string_view text, Reply& reply);
-  void take_variable(NewVariable variable);
-  void take_factor(NewFactor factor, Reply& reply);
+  void take_variable(Variable variable);
+  void take_factor(Factor factor, Reply& reply);
   void hold(Id id);
 
   /// Hands an update over; solves where that is due or asked for.
@@ -73,7 +73,7 @@ class OnlineSession final : public LineSession {
   int owed_ = 0;
   /// Variables that no measurement has touched yet: the estimator gets them with the first that
   /// does.
-  std::vector<NewVariable> waiting_;
+  std::vector<Variable> waiting_;
   std::vector<Id> known_;  ///< those that the estimator has, in the order of arrival
   std::unordered_map<Id, std::shared_ptr<const VariableType>> types_;
   std::vector<std::shared_ptr<const FactorType>> factor_types_;  ///< by id; null: of no line

@@ -6,9 +6,9 @@
 
 #include <fmt/format.h>
 
-#include "cairn/error.hpp"
-#include "cairn/recording.hpp"
-#include "cairn/threads.hpp"
+#include "cairn/report/recording.hpp"
+#include "cairn/runtime/error.hpp"
+#include "cairn/runtime/threads.hpp"
 #include "commands.hpp"
 #include "covariances.hpp"
 #include "graph_files.hpp"

@@ -7,8 +7,8 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "cairn/error.hpp"
-#include "cairn/format.hpp"
+#include "cairn/io/format.hpp"
+#include "cairn/runtime/error.hpp"
 #include "graph_files.hpp"
 
 namespace cairn::app {

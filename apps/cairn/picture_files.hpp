@@ -4,7 +4,7 @@
 #include <string>
 #include <string_view>
 
-#include "cairn/scene.hpp"
+#include "cairn/report/scene.hpp"
 #include "session.hpp"
 
 namespace cairn::app {

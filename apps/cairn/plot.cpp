@@ -7,7 +7,7 @@
 #include <fmt/ranges.h>
 
 #include "album.hpp"
-#include "cairn/error.hpp"
+#include "cairn/runtime/error.hpp"
 #include "commands.hpp"
 #include "help.hpp"
 #include "json_report.hpp"

@@ -7,7 +7,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "cairn/format.hpp"
+#include "cairn/io/format.hpp"
 
 namespace cairn::app {
 namespace {
@@ -105,13 +105,13 @@ void PolicySession::add_to(boost::json::object& report) const {
 
 void PolicySession::take_data(std::string_view text, Reply& reply) {
   StreamLine said = format_.read(text, kStreamName, line(), registry_, settings_.read);
-  for (NewVariable& pose : said.variables) take_pose(std::move(pose), reply);
-  for (NewFactor& factor : said.factors) take_edge(std::move(factor));
+  for (Variable& pose : said.variables) take_pose(std::move(pose), reply);
+  for (Factor& factor : said.factors) take_edge(std::move(factor));
   if (!said.held.empty()) hold(said.held);
   reply.changes = !said.skipped;
 }
 
-void PolicySession::take_pose(NewVariable pose, Reply& reply) {
+void PolicySession::take_pose(Variable pose, Reply& reply) {
   const std::string name = fmt::format("{} {}", pose.type->tag(), pose.id);
   if (!is_pose(*pose.type))
     throw bad_line(name + " is no pose; with a policy a robot's poses alone can come");
@@ -146,7 +146,7 @@ void PolicySession::hold(std::span<const Id> ids) {
 }
 
 /// Odometry of the pose that arrives, or a link of the newest.
-void PolicySession::take_edge(NewFactor factor) {
+void PolicySession::take_edge(Factor factor) {
   const Id other = other_end(factor.variables);
   check_motion(factor, other);
   if (other == (arriving_ ? newest_ : before_)) {
@@ -182,7 +182,7 @@ Id PolicySession::other_end(std::span<const Id> ends) const {
 }
 
 /// Nothing that the policy would refuse later, when others wait for an answer.
-void PolicySession::check_motion(const NewFactor& factor, Id from) const {
+void PolicySession::check_motion(const Factor& factor, Id from) const {
   const FactorType& type = *factor.type;
   if (!type.is_relative() || type.variable_tags().front() != motions_->type().tag()) {
     throw bad_line(fmt::format("{} measures no motion of {}, and a policy takes nothing else",
@@ -228,7 +228,7 @@ void PolicySession::expect_complete() const {
 
 void PolicySession::begin() {
   if (!arriving_) return;
-  NewVariable pose = arriving_->pose;
+  Variable pose = arriving_->pose;
   if (newest_ && !pose.fixed) pose.state.clear();  // where its odometry puts it
   policy_.add_pose(pose, arriving_->odometry);
   before_ = std::exchange(newest_, pose.id);

@@ -9,10 +9,10 @@
 #include <unordered_map>
 #include <vector>
 
-#include "cairn/motion.hpp"
-#include "cairn/pose_policy.hpp"
-#include "cairn/registry.hpp"
-#include "cairn/stream_format.hpp"
+#include "cairn/geometry/motion.hpp"
+#include "cairn/io/stream_format.hpp"
+#include "cairn/plugin/registry.hpp"
+#include "cairn/policy/pose_policy.hpp"
 #include "line_session.hpp"
 
 namespace cairn::app {
@@ -45,13 +45,13 @@ class PolicySession final : public LineSession {
 
  private:
   struct Arrival {
-    NewVariable pose;
-    std::vector<NewFactor> odometry;
+    Variable pose;
+    std::vector<Factor> odometry;
   };
   /// What was measured between the newest pose and another one, and not offered yet.
   struct Measured {
     Id other = 0;
-    std::vector<NewFactor> factors;
+    std::vector<Factor> factors;
   };
 
   using Command = void (PolicySession::*)(const Words&, Reply&);
@@ -73,11 +73,11 @@ class PolicySession final : public LineSession {
 
   // Data
   void take_data(std::string_view text, Reply& reply);
-  void take_pose(NewVariable pose, Reply& reply);
-  void take_edge(NewFactor factor);
+  void take_pose(Variable pose, Reply& reply);
+  void take_edge(Factor factor);
   void hold(std::span<const Id> ids);
   Id other_end(std::span<const Id> ends) const;
-  void check_motion(const NewFactor& factor, Id from) const;
+  void check_motion(const Factor& factor, Id from) const;
   void check_kept(Id id) const;
 
   // The way of a pose

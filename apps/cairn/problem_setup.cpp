@@ -4,7 +4,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "cairn/registry.hpp"
+#include "cairn/plugin/registry.hpp"
 #include "help.hpp"
 
 namespace cairn::app {

@@ -7,10 +7,10 @@
 
 #include <CLI/App.hpp>
 
-#include "cairn/error.hpp"
-#include "cairn/initial_guess.hpp"
-#include "cairn/loss.hpp"
-#include "cairn/optimizer.hpp"
+#include "cairn/runtime/error.hpp"
+#include "cairn/solve/initial_guess.hpp"
+#include "cairn/solve/optimizer.hpp"
+#include "cairn/types/loss.hpp"
 #include "session.hpp"
 
 namespace cairn::app {

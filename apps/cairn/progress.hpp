@@ -5,7 +5,7 @@
 #include <string>
 #include <string_view>
 
-#include "cairn/optimizer.hpp"
+#include "cairn/solve/optimizer.hpp"
 
 namespace cairn::app {
 

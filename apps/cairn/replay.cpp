@@ -10,11 +10,11 @@
 #include <fmt/format.h>
 
 #include "album.hpp"
-#include "cairn/arrival_order.hpp"
-#include "cairn/error.hpp"
-#include "cairn/estimator.hpp"
-#include "cairn/graph_update.hpp"
-#include "cairn/threads.hpp"
+#include "cairn/geometry/arrival_order.hpp"
+#include "cairn/runtime/error.hpp"
+#include "cairn/runtime/threads.hpp"
+#include "cairn/solve/estimator.hpp"
+#include "cairn/update/graph_update.hpp"
 #include "commands.hpp"
 #include "graph_files.hpp"
 #include "help.hpp"
@@ -98,7 +98,7 @@ class Feeder {
     const auto end = Clock::now();
     step.seconds = std::chrono::duration<double>(end - begin).count();
     step.estimate = std::chrono::duration<double>(end - updated).count();
-    for (const NewVariable& variable : update.variables) known_.push_back(variable.id);
+    for (const Variable& variable : update.variables) known_.push_back(variable.id);
     step.variables = estimator_.variable_count();
     step.factors = estimator_.factor_count();
     return step;
@@ -109,13 +109,13 @@ class Feeder {
     const bool as_given = options_.problem.initial == "as_given";
     GraphUpdate update;
     for (const int v : arrival.variables) {
-      NewVariable variable{
+      Variable variable{
           whole_.variable_pools()[whole_.pool(v)].type, whole_.id(v), {}, whole_.fixed(v)};
       if (as_given || variable.fixed) variable.state = given(v);
       update.variables.push_back(std::move(variable));
     }
     for (const int f : factors_of(arrival)) {
-      NewFactor factor{whole_.factor_pools()[whole_.factor(f).pool].type, {}, {}, {}};
+      Factor factor{whole_.factor_pools()[whole_.factor(f).pool].type, {}, {}, {}};
       for (const std::int32_t v : whole_.factor_variables(f))
         factor.variables.push_back(whole_.id(v));
       factor.measurement.assign(whole_.measurement(f).begin(), whole_.measurement(f).end());

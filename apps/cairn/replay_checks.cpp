@@ -6,8 +6,8 @@
 
 #include <fmt/format.h>
 
-#include "cairn/graph_marginals.hpp"
-#include "cairn/registry.hpp"
+#include "cairn/linear/graph_marginals.hpp"
+#include "cairn/plugin/registry.hpp"
 
 namespace cairn::app {
 namespace {

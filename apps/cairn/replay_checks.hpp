@@ -6,11 +6,11 @@
 #include <string>
 #include <vector>
 
-#include "cairn/arrival_order.hpp"
-#include "cairn/estimator.hpp"
-#include "cairn/graph.hpp"
-#include "cairn/linear_solver.hpp"
-#include "cairn/optimizer.hpp"
+#include "cairn/geometry/arrival_order.hpp"
+#include "cairn/graph/graph.hpp"
+#include "cairn/linear/linear_solver.hpp"
+#include "cairn/solve/estimator.hpp"
+#include "cairn/solve/optimizer.hpp"
 #include "problem_setup.hpp"
 
 namespace cairn::app {

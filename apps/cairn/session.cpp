@@ -10,9 +10,9 @@
 
 #include <fmt/format.h>
 
-#include "cairn/error.hpp"
-#include "cairn/format.hpp"
-#include "cairn/threads.hpp"
+#include "cairn/io/format.hpp"
+#include "cairn/runtime/error.hpp"
+#include "cairn/runtime/threads.hpp"
 #include "json_text.hpp"
 #include "table.hpp"
 

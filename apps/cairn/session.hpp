@@ -8,7 +8,7 @@
 
 #include <boost/json/object.hpp>
 
-#include "cairn/registry.hpp"
+#include "cairn/plugin/registry.hpp"
 
 namespace cairn::app {
 

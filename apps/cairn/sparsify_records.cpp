@@ -15,9 +15,9 @@
 #include <boost/json/serialize.hpp>
 #include <boost/json/value_to.hpp>
 
-#include "cairn/error.hpp"
-#include "cairn/format.hpp"
-#include "cairn/registry.hpp"
+#include "cairn/io/format.hpp"
+#include "cairn/plugin/registry.hpp"
+#include "cairn/runtime/error.hpp"
 #include "json_text.hpp"
 
 namespace cairn::app {

@@ -7,8 +7,8 @@
 
 #include <boost/json/array.hpp>
 
-#include "cairn/registry.hpp"
-#include "cairn/sparsification.hpp"
+#include "cairn/plugin/registry.hpp"
+#include "cairn/sparsification/sparsification.hpp"
 
 namespace cairn::app {
 

@@ -11,9 +11,9 @@
 
 #include <fmt/format.h>
 
-#include "cairn/arrival_order.hpp"
-#include "cairn/error.hpp"
-#include "cairn/estimator.hpp"
+#include "cairn/geometry/arrival_order.hpp"
+#include "cairn/runtime/error.hpp"
+#include "cairn/solve/estimator.hpp"
 #include "progress.hpp"
 
 namespace cairn::app {
@@ -124,11 +124,11 @@ SparsifyResult sparsify_whole(const Graph& graph, const SparsifyJob& job,
 
 namespace {
 
-NewFactor factor_of(const Graph& graph, int f) {
-  NewFactor factor{.type = graph.factor_pools()[graph.factor(f).pool].type,
-                   .variables = {},
-                   .measurement = {},
-                   .information = {}};
+Factor factor_of(const Graph& graph, int f) {
+  Factor factor{.type = graph.factor_pools()[graph.factor(f).pool].type,
+                .variables = {},
+                .measurement = {},
+                .information = {}};
   for (const std::int32_t v : graph.factor_variables(f)) factor.variables.push_back(graph.id(v));
   const auto z = graph.measurement(f), information = graph.information(f);
   factor.measurement.assign(z.begin(), z.end());
@@ -136,7 +136,7 @@ NewFactor factor_of(const Graph& graph, int f) {
   return factor;
 }
 
-void add(Graph& graph, const NewFactor& factor) {
+void add(Graph& graph, const Factor& factor) {
   std::vector<int> on;
   for (const Id id : factor.variables) on.push_back(graph.find(id).value());
   graph.add_factor(factor.type, on, factor.measurement, factor.information);
@@ -187,25 +187,25 @@ class OnlineRun {
   void feed(const Arrival& arrival) {
     GraphUpdate update;
     for (const int v : arrival.variables) {
-      NewVariable variable{.type = recording_.variable_pools()[recording_.pool(v)].type,
-                           .id = recording_.id(v),
-                           .state = {},
-                           .fixed = recording_.fixed(v)};
+      Variable variable{.type = recording_.variable_pools()[recording_.pool(v)].type,
+                        .id = recording_.id(v),
+                        .state = {},
+                        .fixed = recording_.fixed(v)};
       if (variable.fixed || arrival.factors.empty() || estimator_->variable_count() == 0)
         variable.state.assign(recording_.state(v).begin(), recording_.state(v).end());
       update.variables.push_back(std::move(variable));
     }
     if (job_.redirect_early > 0) leave_early(arrival);
     for (const int f : arrival.factors) {
-      const NewFactor as_came = factor_of(recording_, f);
+      const Factor as_came = factor_of(recording_, f);
       // Odometry holds the newest pose to the one before it, whether that is to leave or not.
       const bool odometry = std::ranges::all_of(as_came.variables, [&](Id id) {
         return (!arrival.variables.empty() && id == recording_.id(arrival.variables.front())) ||
                id == newest_;
       });
-      std::optional<NewFactor> factor = odometry && (newest_ < 0 || estimator_->has(newest_))
-                                            ? as_came
-                                            : redirection_.redirect(as_came);
+      std::optional<Factor> factor = odometry && (newest_ < 0 || estimator_->has(newest_))
+                                         ? as_came
+                                         : redirection_.redirect(as_came);
       const bool moved = factor && factor->variables != as_came.variables;
       if (!factor) {
         ++result_.dropped;
@@ -216,7 +216,7 @@ class OnlineRun {
       update.factors.push_back(std::move(*factor));
     }
     // The pose is placed by its odometry: the factor to the newest pose that is there.
-    std::ranges::stable_sort(update.factors, std::greater{}, [&](const NewFactor& factor) {
+    std::ranges::stable_sort(update.factors, std::greater{}, [&](const Factor& factor) {
       Id newest = -1;
       for (const Id id : factor.variables) {
         if (estimator_->has(id)) newest = std::max(newest, id);
@@ -224,7 +224,7 @@ class OnlineRun {
       return newest;
     });
     take(estimator_->update(update), update.factors.size());
-    for (const NewVariable& variable : update.variables) pending_.push_back(variable.id);
+    for (const Variable& variable : update.variables) pending_.push_back(variable.id);
     if (!update.variables.empty()) {
       newest_ = update.variables.front().id;
       if (job_.redirect_early > 0 && count_++ % job_.redirect_early != 0) early_.insert(newest_);
@@ -317,7 +317,7 @@ class OnlineRun {
         graph->set_fixed(added, recording_.fixed(v));
       }
     }
-    for (const NewFactor& factor : factors_) add(redirected, factor);
+    for (const Factor& factor : factors_) add(redirected, factor);
     for (int f = 0; f < recording_.factor_count(); ++f) add(full, factor_of(recording_, f));
     for (Graph* graph : {&redirected, &full})
       graph->set_loss(setting_.setup.loss(), setting_.setup.loss_scope());
@@ -344,8 +344,8 @@ class OnlineRun {
   std::vector<Id> pending_;     ///< nodes on which nothing has been decided
   Id newest_ = -1;
   std::int64_t count_ = 0;
-  std::unordered_set<Id> early_;    ///< with early redirection: nodes that are to leave
-  std::vector<NewFactor> factors_;  ///< all that came, redirected
+  std::unordered_set<Id> early_;  ///< with early redirection: nodes that are to leave
+  std::vector<Factor> factors_;   ///< all that came, redirected
   int failed_ = 0;
 };
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "cairn/sparsification.hpp"
+#include "cairn/sparsification/sparsification.hpp"
 #include "graph_files.hpp"
 #include "interrupt.hpp"
 #include "problem_setup.hpp"

@@ -7,8 +7,8 @@
 #include <fmt/ranges.h>
 
 #include "album.hpp"
-#include "cairn/error.hpp"
-#include "cairn/format.hpp"
+#include "cairn/io/format.hpp"
+#include "cairn/runtime/error.hpp"
 #include "commands.hpp"
 #include "json_report.hpp"
 #include "picture_files.hpp"

@@ -10,8 +10,8 @@
 #include <random>
 #include <vector>
 
-#include <cairn/pose_policy.hpp>
-#include <cairn/registry.hpp>
+#include <cairn/plugin/registry.hpp>
+#include <cairn/policy/pose_policy.hpp>
 
 namespace {
 
@@ -32,7 +32,7 @@ class Sensors {
   explicit Sensors(std::shared_ptr<const cairn::FactorType> relative_pose)
       : relative_pose_(std::move(relative_pose)) {}
 
-  cairn::NewFactor measure(cairn::Id from, cairn::Id to) {
+  cairn::Factor measure(cairn::Id from, cairn::Id to) {
     const auto a = true_pose(from), b = true_pose(to);
     const double c = std::cos(a[2]), s = std::sin(a[2]), x = b[0] - a[0], y = b[1] - a[1];
     const double information = 1.0 / (kSigma * kSigma);
@@ -62,13 +62,13 @@ void run() {
 
   auto policy = registry.make<cairn::PosePolicy>("compact_pose:range=1,angle=0.5");
   for (cairn::Id id = 0; id < kLaps * kPosesPerLap; ++id) {
-    std::vector<cairn::NewFactor> odometry;
+    std::vector<cairn::Factor> odometry;
     if (id > 0) odometry.push_back(sensors.measure(id - 1, id));
     policy->add_pose({pose, id, {}, false}, odometry);
 
     // The policy asks for the pairs that are worth matching, the most informative first.
     while (const auto match = policy->next_match()) {
-      std::vector<cairn::NewFactor> link;  // stays empty if the two do not match
+      std::vector<cairn::Factor> link;  // stays empty if the two do not match
       if (distance(match->earlier, match->later) < kSensorRange)
         link.push_back(sensors.measure(match->earlier, match->later));
       policy->offer(match->earlier, link);

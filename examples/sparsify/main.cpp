@@ -5,10 +5,10 @@
 #include <numeric>
 #include <vector>
 
-#include <cairn/generator.hpp>
-#include <cairn/optimizer.hpp>
-#include <cairn/registry.hpp>
-#include <cairn/sparsification.hpp>
+#include <cairn/io/generator.hpp>
+#include <cairn/plugin/registry.hpp>
+#include <cairn/solve/optimizer.hpp>
+#include <cairn/sparsification/sparsification.hpp>
 
 namespace {
 

@@ -7,9 +7,9 @@
 #include <numbers>
 #include <string>
 
-#include "cairn/graph.hpp"
-#include "cairn/optimizer.hpp"
-#include "cairn/registry.hpp"
+#include "cairn/graph/graph.hpp"
+#include "cairn/plugin/registry.hpp"
+#include "cairn/solve/optimizer.hpp"
 
 int main(int argc, char** argv) try {
   // What is on offer is found when the program runs; a plugin is loaded when one of its names is

@@ -4,7 +4,7 @@
 #include <array>
 #include <cctype>
 
-#include "cairn/error.hpp"
+#include "cairn/runtime/error.hpp"
 #include "information.hpp"
 #include "scanner.hpp"
 

@@ -8,7 +8,7 @@
 
 #include <fmt/format.h>
 
-#include "cairn/error.hpp"
+#include "cairn/runtime/error.hpp"
 #include "information.hpp"
 #include "propagate.hpp"
 #include "scanner.hpp"

@@ -11,7 +11,7 @@
 
 #include <fmt/format.h>
 
-#include "cairn/error.hpp"
+#include "cairn/runtime/error.hpp"
 #include "readers.hpp"
 #include "sensor_offset.hpp"
 #include "tag_lines.hpp"
@@ -67,7 +67,7 @@ class G2oReader {
     StreamLine line;
     for (const Draft::Variable& v : draft_.variables()) {
       const Draft::VariableKind& kind = draft_.variable(v.kind);
-      NewVariable variable{kind.type, v.id, {}, false};
+      Variable variable{kind.type, v.id, {}, false};
       for (std::size_t k = 0; k < static_cast<std::size_t>(kind.size); ++k)
         variable.state.push_back(draft_.number(v.numbers + k));
       line.variables.push_back(std::move(variable));

@@ -4,8 +4,8 @@
 #include <string_view>
 #include <vector>
 
-#include "cairn/correlated_pair.hpp"
-#include "cairn/marginal_prior.hpp"
+#include "cairn/sparsification/correlated_pair.hpp"
+#include "cairn/update/marginal_prior.hpp"
 #include "line_writer.hpp"
 #include "writer_order.hpp"
 #include "writers.hpp"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "cairn/graph.hpp"
+#include "cairn/graph/graph.hpp"
 
 namespace cairn::formats {
 

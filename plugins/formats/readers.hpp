@@ -5,8 +5,8 @@
 #include <string>
 #include <string_view>
 
-#include "cairn/format.hpp"
-#include "cairn/stream_format.hpp"
+#include "cairn/io/format.hpp"
+#include "cairn/io/stream_format.hpp"
 
 namespace cairn::formats {
 

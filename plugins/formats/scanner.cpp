@@ -9,7 +9,7 @@
 #include <fast_float/fast_float.h>
 #include <fmt/format.h>
 
-#include "cairn/error.hpp"
+#include "cairn/runtime/error.hpp"
 
 namespace cairn::formats {
 namespace {

@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-#include "cairn/graph.hpp"
+#include "cairn/graph/graph.hpp"
 
 namespace cairn::formats {
 

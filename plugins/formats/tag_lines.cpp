@@ -3,8 +3,8 @@
 
 #include <fmt/format.h>
 
-#include "cairn/error.hpp"
-#include "cairn/spelling.hpp"
+#include "cairn/runtime/error.hpp"
+#include "cairn/runtime/spelling.hpp"
 
 namespace cairn::formats {
 

@@ -6,7 +6,7 @@
 
 #include <fmt/format.h>
 
-#include "cairn/error.hpp"
+#include "cairn/runtime/error.hpp"
 
 namespace cairn::formats {
 

@@ -5,7 +5,7 @@
 #include <string_view>
 #include <vector>
 
-#include "cairn/graph.hpp"
+#include "cairn/graph/graph.hpp"
 
 namespace cairn::formats {
 

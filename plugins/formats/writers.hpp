@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "cairn/graph.hpp"
+#include "cairn/graph/graph.hpp"
 
 namespace cairn::formats {
 

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "cairn/error.hpp"
+#include "cairn/runtime/error.hpp"
 #include "generators.hpp"
 #include "rigid.hpp"
 

@@ -5,9 +5,9 @@
 #include <memory>
 #include <utility>
 
-#include "cairn/generator.hpp"
-#include "cairn/options.hpp"
-#include "cairn/registry.hpp"
+#include "cairn/io/generator.hpp"
+#include "cairn/plugin/options.hpp"
+#include "cairn/plugin/registry.hpp"
 
 namespace cairn::generate {
 

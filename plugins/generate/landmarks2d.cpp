@@ -5,7 +5,7 @@
 #include <array>
 #include <cmath>
 
-#include "cairn/error.hpp"
+#include "cairn/runtime/error.hpp"
 #include "generators.hpp"
 #include "loops.hpp"
 #include "noise.hpp"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "cairn/options.hpp"
+#include "cairn/plugin/options.hpp"
 
 namespace cairn::generate {
 

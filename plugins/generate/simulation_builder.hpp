@@ -5,8 +5,8 @@
 #include <memory>
 #include <vector>
 
-#include "cairn/generator.hpp"
-#include "cairn/registry.hpp"
+#include "cairn/io/generator.hpp"
+#include "cairn/plugin/registry.hpp"
 #include "loops.hpp"
 #include "noise.hpp"
 #include "rigid.hpp"

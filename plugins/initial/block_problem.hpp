@@ -9,8 +9,8 @@
 
 #include <Eigen/Core>
 
-#include "cairn/block_matrix.hpp"
-#include "cairn/linear_solver.hpp"
+#include "cairn/linear/block_matrix.hpp"
+#include "cairn/linear/linear_solver.hpp"
 
 namespace cairn::initial {
 

@@ -7,8 +7,8 @@
 #include <Eigen/SVD>
 
 #include "block_problem.hpp"
-#include "cairn/error.hpp"
-#include "cairn/gauge.hpp"
+#include "cairn/graph/gauge.hpp"
+#include "cairn/runtime/error.hpp"
 #include "guesses.hpp"
 #include "placing.hpp"
 #include "relative_poses.hpp"

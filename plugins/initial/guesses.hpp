@@ -3,10 +3,10 @@
 
 #include <memory>
 
-#include "cairn/initial_guess.hpp"
-#include "cairn/linear_solver.hpp"
-#include "cairn/optimizer.hpp"
-#include "cairn/options.hpp"
+#include "cairn/linear/linear_solver.hpp"
+#include "cairn/plugin/options.hpp"
+#include "cairn/solve/initial_guess.hpp"
+#include "cairn/solve/optimizer.hpp"
 
 namespace cairn::initial {
 

@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <numeric>
 
-#include "cairn/gauge.hpp"
+#include "cairn/graph/gauge.hpp"
 #include "guesses.hpp"
 #include "placing.hpp"
 

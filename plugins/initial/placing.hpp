@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "cairn/gauge.hpp"
-#include "cairn/graph.hpp"
+#include "cairn/graph/gauge.hpp"
+#include "cairn/graph/graph.hpp"
 
 namespace cairn::initial {
 

@@ -5,7 +5,7 @@
 
 #include <Eigen/Core>
 
-#include "cairn/graph.hpp"
+#include "cairn/graph/graph.hpp"
 
 namespace cairn::initial {
 

@@ -5,7 +5,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
 
-#include "cairn/gauge.hpp"
+#include "cairn/graph/gauge.hpp"
 #include "guesses.hpp"
 #include "placing.hpp"
 #include "relative_poses.hpp"

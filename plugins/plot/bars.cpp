@@ -4,7 +4,7 @@
 #include <fmt/format.h>
 
 #include "bench_data.hpp"
-#include "cairn/error.hpp"
+#include "cairn/runtime/error.hpp"
 #include "chart.hpp"
 #include "plots.hpp"
 

@@ -5,7 +5,7 @@
 
 #include <boost/json/parse.hpp>
 
-#include "cairn/error.hpp"
+#include "cairn/runtime/error.hpp"
 
 namespace cairn::plot {
 namespace {

@@ -9,8 +9,8 @@
 #include <cairo-svg.h>
 #include <fmt/format.h>
 
-#include "cairn/error.hpp"
-#include "cairn/packed_array.hpp"
+#include "cairn/report/packed_array.hpp"
+#include "cairn/runtime/error.hpp"
 
 namespace cairn::plot {
 namespace {

@@ -3,8 +3,8 @@
 
 #include <string>
 
-#include "cairn/linear_solver.hpp"
-#include "cairn/scene.hpp"
+#include "cairn/linear/linear_solver.hpp"
+#include "cairn/report/scene.hpp"
 #include "canvas.hpp"
 
 namespace cairn::plot {

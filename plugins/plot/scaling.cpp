@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "bench_data.hpp"
-#include "cairn/error.hpp"
+#include "cairn/runtime/error.hpp"
 #include "chart.hpp"
 #include "plots.hpp"
 

@@ -5,8 +5,8 @@
 
 #include <fmt/format.h>
 
-#include "cairn/block_matrix.hpp"
-#include "cairn/error.hpp"
+#include "cairn/linear/block_matrix.hpp"
+#include "cairn/runtime/error.hpp"
 #include "chart.hpp"
 #include "plots.hpp"
 

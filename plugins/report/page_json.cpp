@@ -6,10 +6,10 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "cairn/error.hpp"
-#include "cairn/packed_array.hpp"
-#include "cairn/scene_json.hpp"
-#include "cairn/version.hpp"
+#include "cairn/report/packed_array.hpp"
+#include "cairn/report/scene_json.hpp"
+#include "cairn/runtime/error.hpp"
+#include "cairn/runtime/version.hpp"
 #include "report.hpp"
 
 namespace cairn::report {

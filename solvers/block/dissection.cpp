@@ -8,7 +8,7 @@
 #include <metis.h>
 
 #include "block/block_graph.hpp"
-#include "cairn/error.hpp"
+#include "cairn/runtime/error.hpp"
 
 namespace cairn::block {
 namespace {

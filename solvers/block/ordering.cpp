@@ -20,8 +20,8 @@
 
 #include "block/block_graph.hpp"
 #include "block/dissection.hpp"
-#include "cairn/error.hpp"
-#include "cairn/spelling.hpp"
+#include "cairn/runtime/error.hpp"
+#include "cairn/runtime/spelling.hpp"
 
 namespace cairn::block {
 namespace {

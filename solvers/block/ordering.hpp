@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "block/symbolic.hpp"
-#include "cairn/block_matrix.hpp"
+#include "cairn/linear/block_matrix.hpp"
 
 namespace cairn::block {
 

@@ -6,7 +6,7 @@
 #include <stdexcept>
 
 #include "block/front.hpp"
-#include "cairn/threads.hpp"
+#include "cairn/runtime/threads.hpp"
 
 namespace cairn::block {
 namespace {

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "block/supernodal_cholesky.hpp"
-#include "cairn/aligned.hpp"
+#include "cairn/runtime/aligned.hpp"
 
 namespace cairn::block {
 

@@ -10,8 +10,8 @@
 #include <utility>
 
 #include "block/ordering.hpp"
-#include "cairn/error.hpp"
-#include "cairn/threads.hpp"
+#include "cairn/runtime/error.hpp"
+#include "cairn/runtime/threads.hpp"
 
 namespace cairn::block {
 namespace {

@@ -12,9 +12,9 @@
 #include "block/kernels.hpp"
 #include "block/schedule.hpp"
 #include "block/symbolic.hpp"
-#include "cairn/aligned.hpp"
-#include "cairn/block_matrix.hpp"
-#include "cairn/linear_solver.hpp"
+#include "cairn/linear/block_matrix.hpp"
+#include "cairn/linear/linear_solver.hpp"
+#include "cairn/runtime/aligned.hpp"
 
 namespace cairn::block {
 

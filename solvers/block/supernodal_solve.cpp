@@ -5,7 +5,7 @@
 #include <stdexcept>
 
 #include "block/supernodal_cholesky.hpp"
-#include "cairn/threads.hpp"
+#include "cairn/runtime/threads.hpp"
 
 namespace cairn::block {
 namespace {

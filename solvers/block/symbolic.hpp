@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "block/kernels.hpp"
-#include "cairn/block_matrix.hpp"
+#include "cairn/linear/block_matrix.hpp"
 
 namespace cairn::block {
 

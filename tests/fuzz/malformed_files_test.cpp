@@ -10,9 +10,9 @@
 #include <cstdlib>
 #include <ostream>
 
-#include "cairn/error.hpp"
-#include "cairn/format.hpp"
-#include "cairn/registry.hpp"
+#include "cairn/io/format.hpp"
+#include "cairn/plugin/registry.hpp"
+#include "cairn/runtime/error.hpp"
 #include "fuzz/mutations.hpp"
 
 namespace cairn::test {

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <csignal>
 
-#include "cairn/registry.hpp"
+#include "cairn/plugin/registry.hpp"
 #include "integration/process.hpp"
 
 namespace cairn::test {

@@ -8,7 +8,7 @@
 #include <sstream>
 #include <string>
 
-#include "cairn/registry.hpp"
+#include "cairn/plugin/registry.hpp"
 #include "integration/process.hpp"
 
 namespace cairn::test {

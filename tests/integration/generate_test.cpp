@@ -2,7 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "cairn/registry.hpp"
+#include "cairn/plugin/registry.hpp"
 #include "integration/process.hpp"
 
 namespace cairn::test {

@@ -9,7 +9,7 @@
 
 #include <boost/json/serialize.hpp>
 
-#include "cairn/registry.hpp"
+#include "cairn/plugin/registry.hpp"
 #include "integration/process.hpp"
 
 namespace cairn::test {

@@ -14,7 +14,7 @@
 #include <set>
 #include <sstream>
 
-#include "cairn/registry.hpp"
+#include "cairn/plugin/registry.hpp"
 #include "integration/process.hpp"
 
 namespace cairn::test {

@@ -7,7 +7,7 @@
 #include <random>
 #include <sstream>
 
-#include "cairn/registry.hpp"
+#include "cairn/plugin/registry.hpp"
 #include "integration/process.hpp"
 
 namespace cairn::test {

@@ -4,7 +4,7 @@
 
 #include <csignal>
 
-#include "cairn/registry.hpp"
+#include "cairn/plugin/registry.hpp"
 #include "integration/process.hpp"
 
 namespace cairn::test {

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "cairn/registry.hpp"
+#include "cairn/plugin/registry.hpp"
 #include "integration/process.hpp"
 
 namespace cairn::test {

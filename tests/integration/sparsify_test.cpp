@@ -9,13 +9,13 @@
 
 #include <Eigen/Dense>
 
-#include "cairn/error.hpp"
-#include "cairn/format.hpp"
-#include "cairn/generator.hpp"
-#include "cairn/linearizer.hpp"
-#include "cairn/optimizer.hpp"
-#include "cairn/registry.hpp"
-#include "cairn/sparsification.hpp"
+#include "cairn/io/format.hpp"
+#include "cairn/io/generator.hpp"
+#include "cairn/linear/linearizer.hpp"
+#include "cairn/plugin/registry.hpp"
+#include "cairn/runtime/error.hpp"
+#include "cairn/solve/optimizer.hpp"
+#include "cairn/sparsification/sparsification.hpp"
 #include "integration/process.hpp"
 
 namespace cairn::test {

@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <map>
 
-#include "cairn/registry.hpp"
+#include "cairn/plugin/registry.hpp"
 #include "integration/process.hpp"
 
 namespace cairn::test {

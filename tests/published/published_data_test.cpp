@@ -8,10 +8,10 @@
 #include <string>
 #include <vector>
 
-#include "cairn/format.hpp"
-#include "cairn/initial_guess.hpp"
-#include "cairn/optimizer.hpp"
-#include "cairn/registry.hpp"
+#include "cairn/io/format.hpp"
+#include "cairn/plugin/registry.hpp"
+#include "cairn/solve/initial_guess.hpp"
+#include "cairn/solve/optimizer.hpp"
 #include "results_table.hpp"
 #include "support/data.hpp"
 

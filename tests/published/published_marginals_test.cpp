@@ -7,10 +7,10 @@
 #include <string>
 #include <vector>
 
-#include "cairn/format.hpp"
-#include "cairn/graph_marginals.hpp"
-#include "cairn/optimizer.hpp"
-#include "cairn/registry.hpp"
+#include "cairn/io/format.hpp"
+#include "cairn/linear/graph_marginals.hpp"
+#include "cairn/plugin/registry.hpp"
+#include "cairn/solve/optimizer.hpp"
 #include "support/data.hpp"
 
 namespace cairn::test {

@@ -8,7 +8,7 @@
 
 #include <Eigen/Dense>
 
-#include "cairn/block_matrix.hpp"
+#include "cairn/linear/block_matrix.hpp"
 
 namespace cairn::test {
 

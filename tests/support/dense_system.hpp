@@ -7,9 +7,9 @@
 
 #include <Eigen/Dense>
 
-#include "cairn/gauge.hpp"
-#include "cairn/graph.hpp"
-#include "cairn/linearizer.hpp"
+#include "cairn/graph/gauge.hpp"
+#include "cairn/graph/graph.hpp"
+#include "cairn/linear/linearizer.hpp"
 #include "support/block_systems.hpp"
 
 namespace cairn::test {

@@ -6,10 +6,10 @@
 #include <random>
 #include <vector>
 
-#include "cairn/define_factor.hpp"
-#include "cairn/graph.hpp"
-#include "cairn/lie/point.hpp"
-#include "cairn/lie/se2.hpp"
+#include "cairn/graph/graph.hpp"
+#include "cairn/types/define_factor.hpp"
+#include "cairn/types/lie/point.hpp"
+#include "cairn/types/lie/se2.hpp"
 
 namespace cairn::test {
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "cairn/define_variable.hpp"
+#include "cairn/types/define_variable.hpp"
 
 namespace cairn::test {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "cairn/registry.hpp"
+#include "cairn/plugin/registry.hpp"
 #include "camera.hpp"
 #include "reprojection.hpp"
 

@@ -3,8 +3,8 @@
 #include <memory>
 #include <string>
 
-#include "cairn/loss.hpp"
-#include "cairn/registry.hpp"
+#include "cairn/plugin/registry.hpp"
+#include "cairn/types/loss.hpp"
 #include "shapes.hpp"
 
 namespace {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "bearing_range.hpp"
-#include "cairn/registry.hpp"
+#include "cairn/plugin/registry.hpp"
 #include "landmark.hpp"
 #include "priors.hpp"
 #include "relative_pose.hpp"

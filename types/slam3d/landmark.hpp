@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "cairn/define_factor.hpp"
-#include "cairn/lie/point.hpp"
-#include "cairn/lie/se3.hpp"
+#include "cairn/types/define_factor.hpp"
+#include "cairn/types/lie/point.hpp"
+#include "cairn/types/lie/se3.hpp"
 
 namespace cairn::slam3d {
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <string>
 
-#include "cairn/registry.hpp"
+#include "cairn/plugin/registry.hpp"
 #include "landmark.hpp"
 #include "priors.hpp"
 #include "relative_pose.hpp"

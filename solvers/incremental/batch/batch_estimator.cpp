@@ -6,10 +6,10 @@
 
 #include <fmt/format.h>
 
-#include "cairn/error.hpp"
-#include "cairn/gauge.hpp"
-#include "cairn/loss.hpp"
-#include "cairn/normal_equations.hpp"
+#include "cairn/graph/gauge.hpp"
+#include "cairn/linear/normal_equations.hpp"
+#include "cairn/runtime/error.hpp"
+#include "cairn/types/loss.hpp"
 
 namespace cairn {
 namespace {

@@ -11,11 +11,11 @@
 #include <utility>
 #include <vector>
 
-#include "cairn/estimator.hpp"
-#include "cairn/graph_marginals.hpp"
-#include "cairn/graph_update.hpp"
-#include "cairn/linear_solver.hpp"
-#include "cairn/optimizer.hpp"
+#include "cairn/linear/graph_marginals.hpp"
+#include "cairn/linear/linear_solver.hpp"
+#include "cairn/solve/estimator.hpp"
+#include "cairn/solve/optimizer.hpp"
+#include "cairn/update/graph_update.hpp"
 
 namespace cairn {
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "batch_estimator.hpp"
-#include "cairn/registry.hpp"
+#include "cairn/plugin/registry.hpp"
 
 namespace {
 

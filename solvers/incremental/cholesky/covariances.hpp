@@ -7,8 +7,8 @@
 #include <utility>
 #include <vector>
 
-#include "cairn/aligned.hpp"
-#include "cairn/estimator.hpp"
+#include "cairn/runtime/aligned.hpp"
+#include "cairn/solve/estimator.hpp"
 #include "models.hpp"
 #include "system.hpp"
 #include "tree.hpp"

@@ -7,7 +7,7 @@
 #include <numeric>
 #include <utility>
 
-#include "cairn/error.hpp"
+#include "cairn/runtime/error.hpp"
 
 namespace cairn::incremental {
 namespace {

@@ -10,9 +10,9 @@
 #include <utility>
 #include <vector>
 
-#include "cairn/estimator.hpp"
-#include "cairn/graph.hpp"
-#include "cairn/optimizer.hpp"
+#include "cairn/graph/graph.hpp"
+#include "cairn/solve/estimator.hpp"
+#include "cairn/solve/optimizer.hpp"
 #include "covariances.hpp"
 #include "gauge_watch.hpp"
 #include "models.hpp"

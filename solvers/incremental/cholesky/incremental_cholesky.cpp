@@ -8,9 +8,9 @@
 
 #include <fmt/format.h>
 
-#include "cairn/elimination.hpp"
-#include "cairn/error.hpp"
-#include "cairn/graph_update.hpp"
+#include "cairn/runtime/error.hpp"
+#include "cairn/update/elimination.hpp"
+#include "cairn/update/graph_update.hpp"
 
 namespace cairn::incremental {
 namespace {
@@ -101,14 +101,14 @@ UpdateReport IncrementalCholesky::update(const GraphUpdate& update, const Update
 void IncrementalCholesky::apply(const GraphUpdate& update, UpdateReport& report) {
   Graph& graph = engine_->edit();
   report.first_factor = engine_->next_id();
-  for (const NewVariable& variable : update.variables) {
+  for (const Variable& variable : update.variables) {
     const int v = graph.add_variable(variable.type, variable.id, variable.state);
     if (variable.fixed) graph.set_fixed(v);
     engine_->added_variable();
     ++variables_;
   }
   std::vector<int> variables;
-  for (const NewFactor& factor : update.factors) {
+  for (const Factor& factor : update.factors) {
     variables.clear();
     for (const Id id : factor.variables) variables.push_back(index(id));
     graph.add_factor(factor.type, variables, factor.measurement, factor.information);
@@ -146,7 +146,7 @@ void IncrementalCholesky::marginalize(const std::vector<Id>& ids, UpdateReport& 
   std::vector<bool> held(static_cast<std::size_t>(graph.variable_count()));
   for (std::size_t v = 0; v < held.size(); ++v) held[v] = engine_->held(static_cast<int>(v));
   const Elimination elimination = eliminate(graph, leaving, held, factors);
-  for (const NewFactor& prior : elimination.priors) {
+  for (const Factor& prior : elimination.priors) {
     std::vector<int> variables;
     for (const Id id : prior.variables) variables.push_back(index(id));
     report.priors.push_back(engine_->next_id());

@@ -7,7 +7,7 @@
 #include <span>
 #include <string>
 
-#include "cairn/estimator.hpp"
+#include "cairn/solve/estimator.hpp"
 #include "engine.hpp"
 
 namespace cairn::incremental {

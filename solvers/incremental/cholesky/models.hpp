@@ -5,8 +5,8 @@
 #include <span>
 #include <vector>
 
-#include "cairn/aligned.hpp"
-#include "cairn/graph.hpp"
+#include "cairn/graph/graph.hpp"
+#include "cairn/runtime/aligned.hpp"
 #include "states.hpp"
 #include "system.hpp"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "cairn/registry.hpp"
+#include "cairn/plugin/registry.hpp"
 #include "incremental_cholesky.hpp"
 
 void cairn_register(cairn::Registrar& registrar) {

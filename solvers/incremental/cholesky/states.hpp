@@ -7,8 +7,8 @@
 #include <span>
 #include <vector>
 
-#include "cairn/aligned.hpp"
-#include "cairn/variable_type.hpp"
+#include "cairn/runtime/aligned.hpp"
+#include "cairn/types/variable_type.hpp"
 
 namespace cairn::incremental {
 

@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "cairn/aligned.hpp"
+#include "cairn/runtime/aligned.hpp"
 
 namespace cairn::incremental {
 

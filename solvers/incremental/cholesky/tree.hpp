@@ -7,7 +7,7 @@
 
 #include "block/kernels.hpp"
 #include "block/symbolic.hpp"
-#include "cairn/aligned.hpp"
+#include "cairn/runtime/aligned.hpp"
 #include "small_graph.hpp"
 #include "states.hpp"
 #include "system.hpp"

@@ -6,7 +6,7 @@
 
 #include "block/front.hpp"
 #include "block/ordering.hpp"
-#include "cairn/block_matrix.hpp"
+#include "cairn/linear/block_matrix.hpp"
 #include "tree.hpp"
 
 namespace cairn::incremental {

@@ -9,9 +9,9 @@
 #include "block/ordering.hpp"
 #include "block/selected_inverse.hpp"
 #include "block/supernodal_cholesky.hpp"
-#include "cairn/linear_solver.hpp"
-#include "cairn/marginals.hpp"
-#include "cairn/registry.hpp"
+#include "cairn/linear/linear_solver.hpp"
+#include "cairn/linear/marginals.hpp"
+#include "cairn/plugin/registry.hpp"
 
 namespace cairn {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <numeric>
 
-#include "cairn/error.hpp"
+#include "cairn/runtime/error.hpp"
 
 namespace cairn {
 namespace {

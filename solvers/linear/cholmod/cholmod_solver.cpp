@@ -9,7 +9,7 @@
 #include <dlfcn.h>
 #include <fmt/format.h>
 
-#include "cairn/error.hpp"
+#include "cairn/runtime/error.hpp"
 #include "cholmod_ordering.hpp"
 
 namespace cairn {

@@ -6,9 +6,9 @@
 
 #include <Eigen/SparseCholesky>
 
-#include "cairn/block_matrix.hpp"
-#include "cairn/linear_solver.hpp"
-#include "cairn/marginals.hpp"
+#include "cairn/linear/block_matrix.hpp"
+#include "cairn/linear/linear_solver.hpp"
+#include "cairn/linear/marginals.hpp"
 
 namespace cairn {
 

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <numeric>
 
-#include "cairn/threads.hpp"
+#include "cairn/runtime/threads.hpp"
 #include "iterative/small_blocks.hpp"
 
 namespace cairn::iterative {

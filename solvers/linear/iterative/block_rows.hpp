@@ -5,8 +5,8 @@
 #include <span>
 #include <vector>
 
-#include "cairn/aligned.hpp"
-#include "cairn/block_matrix.hpp"
+#include "cairn/linear/block_matrix.hpp"
+#include "cairn/runtime/aligned.hpp"
 
 namespace cairn::iterative {
 

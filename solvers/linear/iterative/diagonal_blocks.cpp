@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numeric>
 
-#include "cairn/threads.hpp"
+#include "cairn/runtime/threads.hpp"
 #include "iterative/small_blocks.hpp"
 
 namespace cairn::iterative {

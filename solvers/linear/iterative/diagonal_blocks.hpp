@@ -5,8 +5,8 @@
 #include <span>
 #include <vector>
 
-#include "cairn/block_matrix.hpp"
-#include "cairn/linear_solver.hpp"
+#include "cairn/linear/block_matrix.hpp"
+#include "cairn/linear/linear_solver.hpp"
 
 namespace cairn::iterative {
 

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <string>
 
-#include "cairn/linear_solver.hpp"
+#include "cairn/linear/linear_solver.hpp"
 
 namespace cairn::iterative {
 

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "cairn/block_matrix.hpp"
-#include "cairn/linear_solver.hpp"
+#include "cairn/linear/block_matrix.hpp"
+#include "cairn/linear/linear_solver.hpp"
 #include "iterative/block_rows.hpp"
 #include "iterative/diagonal_blocks.hpp"
 #include "iterative/progress.hpp"

@@ -6,7 +6,7 @@
 #include <numeric>
 #include <vector>
 
-#include "cairn/threads.hpp"
+#include "cairn/runtime/threads.hpp"
 
 namespace cairn::iterative {
 namespace {

@@ -6,7 +6,7 @@
 
 #include <fmt/format.h>
 
-#include "cairn/threads.hpp"
+#include "cairn/runtime/threads.hpp"
 
 namespace cairn {
 namespace {

@@ -8,7 +8,7 @@
 #include <fmt/format.h>
 
 #include "blas_threads.hpp"
-#include "cairn/error.hpp"
+#include "cairn/runtime/error.hpp"
 
 // The Fortran interface, which every LAPACK has; Debian's LAPACKE is a package of its own.
 extern "C" {

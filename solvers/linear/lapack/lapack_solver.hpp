@@ -4,10 +4,10 @@
 #include <cstdint>
 #include <vector>
 
-#include "cairn/aligned.hpp"
-#include "cairn/block_matrix.hpp"
-#include "cairn/linear_solver.hpp"
-#include "cairn/marginals.hpp"
+#include "cairn/linear/block_matrix.hpp"
+#include "cairn/linear/linear_solver.hpp"
+#include "cairn/linear/marginals.hpp"
+#include "cairn/runtime/aligned.hpp"
 
 namespace cairn {
 

@@ -5,8 +5,8 @@
 #include <span>
 #include <vector>
 
-#include "cairn/block_matrix.hpp"
-#include "cairn/jacobian.hpp"
+#include "cairn/linear/block_matrix.hpp"
+#include "cairn/linear/jacobian.hpp"
 
 namespace cairn {
 

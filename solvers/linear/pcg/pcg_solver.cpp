@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "cairn/threads.hpp"
+#include "cairn/runtime/threads.hpp"
 #include "iterative/vectors.hpp"
 
 namespace cairn {

@@ -7,9 +7,9 @@
 #include <string_view>
 #include <vector>
 
-#include "cairn/block_matrix.hpp"
-#include "cairn/jacobian.hpp"
-#include "cairn/linear_solver.hpp"
+#include "cairn/linear/block_matrix.hpp"
+#include "cairn/linear/jacobian.hpp"
+#include "cairn/linear/linear_solver.hpp"
 #include "iterative/block_rows.hpp"
 #include "iterative/diagonal_blocks.hpp"
 #include "iterative/progress.hpp"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "cairn/registry.hpp"
+#include "cairn/plugin/registry.hpp"
 #include "pcg/block_jacobi.hpp"
 #include "pcg/incomplete_cholesky.hpp"
 #include "pcg/pcg_solver.hpp"

@@ -4,8 +4,8 @@
 #include <span>
 #include <string>
 
-#include "cairn/block_matrix.hpp"
-#include "cairn/linear_solver.hpp"
+#include "cairn/linear/block_matrix.hpp"
+#include "cairn/linear/linear_solver.hpp"
 #include "iterative/diagonal_blocks.hpp"
 #include "pcg/normal_blocks.hpp"
 

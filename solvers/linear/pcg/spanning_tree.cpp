@@ -6,7 +6,7 @@
 #include <numeric>
 #include <utility>
 
-#include "cairn/threads.hpp"
+#include "cairn/runtime/threads.hpp"
 
 namespace cairn {
 namespace {

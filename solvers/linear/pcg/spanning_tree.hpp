@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "cairn/block_matrix.hpp"
+#include "cairn/linear/block_matrix.hpp"
 #include "iterative/diagonal_blocks.hpp"
 
 namespace cairn {

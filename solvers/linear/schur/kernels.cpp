@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "kernels.hpp"
 
-#include "cairn/kernel_choice.hpp"
+#include "cairn/runtime/kernel_choice.hpp"
 
 namespace cairn::schur {
 

@@ -7,7 +7,7 @@
 #include <span>
 #include <utility>
 
-#include "cairn/error.hpp"
+#include "cairn/runtime/error.hpp"
 #include "elimination_set.hpp"
 
 namespace cairn::schur {

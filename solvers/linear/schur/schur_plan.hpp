@@ -5,7 +5,7 @@
 #include <string_view>
 #include <vector>
 
-#include "cairn/block_matrix.hpp"
+#include "cairn/linear/block_matrix.hpp"
 #include "kernels.hpp"
 
 namespace cairn::schur {

@@ -6,8 +6,8 @@
 #include <stdexcept>
 #include <utility>
 
-#include "cairn/error.hpp"
-#include "cairn/threads.hpp"
+#include "cairn/runtime/error.hpp"
+#include "cairn/runtime/threads.hpp"
 
 namespace cairn {
 namespace {

@@ -8,9 +8,9 @@
 #include <string_view>
 #include <vector>
 
-#include "cairn/aligned.hpp"
-#include "cairn/linear_solver.hpp"
-#include "cairn/marginals.hpp"
+#include "cairn/linear/linear_solver.hpp"
+#include "cairn/linear/marginals.hpp"
+#include "cairn/runtime/aligned.hpp"
 #include "schur_plan.hpp"
 
 namespace cairn {

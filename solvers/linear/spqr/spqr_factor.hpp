@@ -7,7 +7,7 @@
 
 #include <SuiteSparseQR.hpp>
 
-#include "cairn/jacobian.hpp"
+#include "cairn/linear/jacobian.hpp"
 
 namespace cairn {
 

@@ -3,7 +3,7 @@
 
 #include <new>
 
-#include "cairn/error.hpp"
+#include "cairn/runtime/error.hpp"
 
 namespace cairn {
 namespace {

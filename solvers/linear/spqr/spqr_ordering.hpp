@@ -7,7 +7,7 @@
 
 #include <cholmod.h>
 
-#include "cairn/jacobian.hpp"
+#include "cairn/linear/jacobian.hpp"
 
 namespace cairn {
 

@@ -5,7 +5,7 @@
 #include <stdexcept>
 
 #include "blas_threads.hpp"
-#include "cairn/error.hpp"
+#include "cairn/runtime/error.hpp"
 #include "spqr_ordering.hpp"
 
 namespace cairn {

@@ -9,9 +9,9 @@
 
 #include <cholmod.h>
 
-#include "cairn/jacobian.hpp"
-#include "cairn/linear_solver.hpp"
-#include "cairn/marginals.hpp"
+#include "cairn/linear/jacobian.hpp"
+#include "cairn/linear/linear_solver.hpp"
+#include "cairn/linear/marginals.hpp"
 #include "spqr_factor.hpp"
 
 namespace cairn {

@@ -11,9 +11,9 @@
 #include <fmt/format.h>
 #include <glog/logging.h>
 
-#include "cairn/error.hpp"
-#include "cairn/gauge.hpp"
-#include "cairn/threads.hpp"
+#include "cairn/graph/gauge.hpp"
+#include "cairn/runtime/error.hpp"
+#include "cairn/runtime/threads.hpp"
 #include "ceres_problem.hpp"
 
 namespace cairn {

@@ -3,7 +3,7 @@
 
 #include <ceres/solver.h>
 
-#include "cairn/optimizer.hpp"
+#include "cairn/solve/optimizer.hpp"
 #include "ceres_options.hpp"
 
 namespace cairn {

@@ -7,7 +7,7 @@
 #include <ceres/loss_function.h>
 #include <ceres/solver.h>
 
-#include "cairn/options.hpp"
+#include "cairn/plugin/options.hpp"
 
 namespace cairn {
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <utility>
 
-#include "cairn/error.hpp"
+#include "cairn/runtime/error.hpp"
 
 namespace cairn {
 namespace {

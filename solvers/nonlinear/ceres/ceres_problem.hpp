@@ -9,8 +9,8 @@
 #include <ceres/manifold.h>
 #include <ceres/problem.h>
 
-#include "cairn/gauge.hpp"
-#include "cairn/graph.hpp"
+#include "cairn/graph/gauge.hpp"
+#include "cairn/graph/graph.hpp"
 
 namespace cairn {
 

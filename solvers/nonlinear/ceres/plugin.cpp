@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "cairn/registry.hpp"
+#include "cairn/plugin/registry.hpp"
 #include "ceres_optimizer.hpp"
 #include "ceres_options.hpp"
 

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "cairn/normal_equations.hpp"
-#include "cairn/optimizer.hpp"
+#include "cairn/linear/normal_equations.hpp"
+#include "cairn/solve/optimizer.hpp"
 
 namespace cairn {
 

@@ -4,8 +4,8 @@
 #include <memory>
 #include <string>
 
-#include "cairn/linear_solver.hpp"
-#include "cairn/optimizer.hpp"
+#include "cairn/linear/linear_solver.hpp"
+#include "cairn/solve/optimizer.hpp"
 
 namespace cairn {
 

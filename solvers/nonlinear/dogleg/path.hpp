@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "cairn/block_matrix.hpp"
+#include "cairn/linear/block_matrix.hpp"
 
 namespace cairn {
 

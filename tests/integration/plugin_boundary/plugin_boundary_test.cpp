@@ -12,10 +12,10 @@
 #include <string>
 #include <vector>
 
-#include "cairn/error.hpp"
-#include "cairn/loss.hpp"
-#include "cairn/plugin.hpp"
-#include "cairn/registry.hpp"
+#include "cairn/plugin/plugin.hpp"
+#include "cairn/plugin/registry.hpp"
+#include "cairn/runtime/error.hpp"
+#include "cairn/types/loss.hpp"
 
 namespace {
 

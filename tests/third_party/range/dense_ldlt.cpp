@@ -5,8 +5,8 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
 
-#include "cairn/linear_solver.hpp"
-#include "cairn/registry.hpp"
+#include "cairn/linear/linear_solver.hpp"
+#include "cairn/plugin/registry.hpp"
 
 namespace {
 

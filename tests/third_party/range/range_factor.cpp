@@ -4,10 +4,10 @@
 #include <string_view>
 #include <tuple>
 
-#include "cairn/define_factor.hpp"
-#include "cairn/lie/point.hpp"
-#include "cairn/lie/se2.hpp"
-#include "cairn/registry.hpp"
+#include "cairn/plugin/registry.hpp"
+#include "cairn/types/define_factor.hpp"
+#include "cairn/types/lie/point.hpp"
+#include "cairn/types/lie/se2.hpp"
 
 namespace {
 

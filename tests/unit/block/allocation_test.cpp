@@ -9,9 +9,9 @@
 
 #include "block/selected_inverse.hpp"
 #include "block/supernodal_cholesky.hpp"
-#include "cairn/gauge.hpp"
-#include "cairn/linearizer.hpp"
-#include "cairn/threads.hpp"
+#include "cairn/graph/gauge.hpp"
+#include "cairn/linear/linearizer.hpp"
+#include "cairn/runtime/threads.hpp"
 #include "support/planar_graph.hpp"
 
 namespace {

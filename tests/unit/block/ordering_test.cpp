@@ -9,11 +9,11 @@
 
 #include "block/supernodal_cholesky.hpp"
 #include "block/symbolic.hpp"
-#include "cairn/error.hpp"
-#include "cairn/format.hpp"
-#include "cairn/gauge.hpp"
-#include "cairn/linearizer.hpp"
-#include "cairn/registry.hpp"
+#include "cairn/graph/gauge.hpp"
+#include "cairn/io/format.hpp"
+#include "cairn/linear/linearizer.hpp"
+#include "cairn/plugin/registry.hpp"
+#include "cairn/runtime/error.hpp"
 #include "support/block_systems.hpp"
 #include "support/data.hpp"
 

@@ -8,7 +8,7 @@
 #include <string>
 
 #include "block/ordering.hpp"
-#include "cairn/threads.hpp"
+#include "cairn/runtime/threads.hpp"
 #include "support/block_systems.hpp"
 #include "support/kernel_sets.hpp"
 

@@ -8,8 +8,8 @@
 #include <string>
 
 #include "block/ordering.hpp"
-#include "cairn/error.hpp"
-#include "cairn/threads.hpp"
+#include "cairn/runtime/error.hpp"
+#include "cairn/runtime/threads.hpp"
 #include "support/block_systems.hpp"
 #include "support/kernel_sets.hpp"
 

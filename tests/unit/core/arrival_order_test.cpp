@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "cairn/arrival_order.hpp"
+#include "cairn/geometry/arrival_order.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "cairn/block_matrix.hpp"
+#include "cairn/linear/block_matrix.hpp"
 
 #include <gtest/gtest.h>
 

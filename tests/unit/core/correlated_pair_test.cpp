@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "cairn/correlated_pair.hpp"
+#include "cairn/sparsification/correlated_pair.hpp"
 
 #include <gtest/gtest.h>
 
@@ -10,7 +10,7 @@
 
 #include <Eigen/Dense>
 
-#include "cairn/error.hpp"
+#include "cairn/runtime/error.hpp"
 #include "support/dense_system.hpp"
 #include "support/planar_graph.hpp"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "cairn/elimination.hpp"
+#include "cairn/update/elimination.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -10,11 +10,11 @@
 
 #include <Eigen/Dense>
 
-#include "cairn/error.hpp"
-#include "cairn/gauge.hpp"
-#include "cairn/lie/se3.hpp"
-#include "cairn/loss.hpp"
-#include "cairn/marginal_prior.hpp"
+#include "cairn/graph/gauge.hpp"
+#include "cairn/runtime/error.hpp"
+#include "cairn/types/lie/se3.hpp"
+#include "cairn/types/loss.hpp"
+#include "cairn/update/marginal_prior.hpp"
 #include "support/dense_system.hpp"
 #include "support/planar_graph.hpp"
 
@@ -49,7 +49,7 @@ Graph marginalized(const Graph& whole, const std::vector<Id>& ids, const std::ve
   const Elimination elimination = eliminate(graph, variables, held);
   for (const int f : elimination.replaced) replaced[f] = true;
   graph.remove(replaced, leaves);
-  for (const NewFactor& prior : elimination.priors) {
+  for (const Factor& prior : elimination.priors) {
     std::vector<int> on;
     for (const Id id : prior.variables) on.push_back(*graph.find(id));
     graph.add_factor(prior.type, on, prior.measurement, prior.information);

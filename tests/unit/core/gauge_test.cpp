@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "cairn/gauge.hpp"
+#include "cairn/graph/gauge.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "cairn/define_factor.hpp"
+#include "cairn/types/define_factor.hpp"
 #include "support/planar_graph.hpp"
 #include "support/scaled_pose.hpp"
 

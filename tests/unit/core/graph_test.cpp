@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "cairn/graph.hpp"
+#include "cairn/graph/graph.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,7 +8,7 @@
 #include <functional>
 #include <limits>
 
-#include "cairn/error.hpp"
+#include "cairn/runtime/error.hpp"
 #include "support/planar_graph.hpp"
 
 namespace cairn {

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "cairn/graph_update.hpp"
+#include "cairn/update/graph_update.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "cairn/error.hpp"
-#include "cairn/marginal_prior.hpp"
+#include "cairn/runtime/error.hpp"
+#include "cairn/update/marginal_prior.hpp"
 #include "support/planar_graph.hpp"
 
 namespace cairn {
@@ -20,8 +20,8 @@ const std::vector<double> kUnit = {1, 0, 0, 1, 0, 1};
 
 class GraphUpdateTest : public ::testing::Test {
  protected:
-  NewVariable pose(Id id, std::vector<double> x = {}) const { return {types_.pose, id, x, false}; }
-  NewFactor between(Id a, Id b) const {
+  Variable pose(Id id, std::vector<double> x = {}) const { return {types_.pose, id, x, false}; }
+  Factor between(Id a, Id b) const {
     return {types_.relative_pose, {a, b}, {1.0, 0.0, 0.5}, kUnit};
   }
   AppliedUpdate apply(GraphUpdate update) {
@@ -157,7 +157,7 @@ TEST_F(GraphUpdateTest, RefusesWhatIsWrongAndChangesNothing) {
                 u.factors[0].information[5] = -1;
               }),
               HasSubstr("not positive definite"));
-  EXPECT_THAT(refused([&](U u) { u.factors = {NewFactor{}}; }), HasSubstr("has no type"));
+  EXPECT_THAT(refused([&](U u) { u.factors = {Factor{}}; }), HasSubstr("has no type"));
   EXPECT_THAT(refused([&](U u) {
                 u.changed = {{9, {0, 0, 0}, {}}};
               }),

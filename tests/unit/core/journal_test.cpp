@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "cairn/journal.hpp"
+#include "cairn/online/journal.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -10,7 +10,7 @@
 #include <functional>
 #include <iterator>
 
-#include "cairn/error.hpp"
+#include "cairn/runtime/error.hpp"
 
 namespace cairn {
 namespace {

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "cairn/linearizer.hpp"
+#include "cairn/linear/linearizer.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <memory>
 
-#include "cairn/gauge.hpp"
-#include "cairn/threads.hpp"
+#include "cairn/graph/gauge.hpp"
+#include "cairn/runtime/threads.hpp"
 #include "support/block_systems.hpp"
 #include "support/planar_graph.hpp"
 

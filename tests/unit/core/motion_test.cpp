@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "cairn/motion.hpp"
+#include "cairn/geometry/motion.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -16,12 +16,12 @@
 
 #include <Eigen/Dense>
 
-#include "cairn/define_factor.hpp"
-#include "cairn/error.hpp"
-#include "cairn/lie/point.hpp"
-#include "cairn/lie/se2.hpp"
-#include "cairn/lie/se3.hpp"
-#include "cairn/registry.hpp"
+#include "cairn/plugin/registry.hpp"
+#include "cairn/runtime/error.hpp"
+#include "cairn/types/define_factor.hpp"
+#include "cairn/types/lie/point.hpp"
+#include "cairn/types/lie/se2.hpp"
+#include "cairn/types/lie/se3.hpp"
 #include "support/dense_system.hpp"
 #include "support/planar_graph.hpp"
 #include "support/scaled_pose.hpp"
@@ -360,9 +360,9 @@ class MotionOfFactor : public testing::Test {
     if (types_.empty()) GTEST_SKIP() << "no plugin offers a relative factor";
   }
   /// Some factor from variable 0 to 1.
-  NewFactor factor(const RelativeType& type) {
+  Factor factor(const RelativeType& type) {
     const MatrixXd Omega = sampler_.positive(type.factor->residual_size(), 10.0);
-    NewFactor factor{type.factor, {0, 1}, sampler_.state(*type.pose), {}};
+    Factor factor{type.factor, {0, 1}, sampler_.state(*type.pose), {}};
     for (int row = 0; row < Omega.rows(); ++row) {
       for (int column = row; column < Omega.cols(); ++column)
         factor.information.push_back(Omega(row, column));
@@ -370,7 +370,7 @@ class MotionOfFactor : public testing::Test {
     type.factor->normalize(factor.measurement.data());
     return factor;
   }
-  static void add(Graph& graph, const NewFactor& factor, int a, int b) {
+  static void add(Graph& graph, const Factor& factor, int a, int b) {
     graph.add_factor(factor.type, std::array{a, b}, factor.measurement, factor.information);
   }
   /// `poses` of them, the first fixed.
@@ -400,7 +400,7 @@ TEST_F(MotionOfFactor, IsTheFactorAgain) {
     SCOPED_TRACE(type.name);
     const MotionGroup group(type.pose);
     const Motion motion = sampler_.motion(*type.pose);
-    const NewFactor factor = group.to_factor(type.factor, 3, 8, motion);
+    const Factor factor = group.to_factor(type.factor, 3, 8, motion);
     EXPECT_EQ(factor.type, type.factor);
     EXPECT_EQ(factor.variables, (std::vector<Id>{3, 8}));
     expect_same(group, group.of_factor(factor, 3), motion, 1e-12);
@@ -412,7 +412,7 @@ TEST_F(MotionOfFactor, IsWhatAGraphKnowsThatHasNothingElse) {
   for (const RelativeType& type : types_) {
     SCOPED_TRACE(type.name);
     const MotionGroup group(type.pose);
-    const NewFactor only = factor(type);
+    const Factor only = factor(type);
     for (const bool turned : {false, true}) {
       Graph graph = poses(type, 2);
       add(graph, only, turned, !turned);
@@ -427,7 +427,7 @@ TEST_F(MotionOfFactor, ComposesAsAGraphDoes) {
   for (const RelativeType& type : types_) {
     SCOPED_TRACE(type.name);
     const MotionGroup group(type.pose);
-    const NewFactor first = factor(type), second = factor(type);
+    const Factor first = factor(type), second = factor(type);
     Graph graph = poses(type, 3);
     add(graph, first, 0, 1);
     add(graph, second, 2, 1);
@@ -441,10 +441,10 @@ TEST_F(MotionOfFactor, IsFusedAsInAGraph) {
   for (const RelativeType& type : types_) {
     SCOPED_TRACE(type.name);
     const MotionGroup group(type.pose);
-    const NewFactor first = factor(type);
+    const Factor first = factor(type);
     // Metrics differ where measurements do. The logarithm is what is minimised, however far apart.
     const bool exact = type.factor->metric() == "logarithm";
-    NewFactor second = factor(type);
+    Factor second = factor(type);
     const Motion shift{sampler_.state(*type.pose, exact ? 0.5 : 1e-4), group.identity().covariance};
     second.measurement = group.compose(group.of_factor(first, 0), shift).mean;
     Graph graph = poses(type, 2);

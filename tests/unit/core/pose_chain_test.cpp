@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "cairn/pose_chain.hpp"
+#include "cairn/geometry/pose_chain.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -14,10 +14,10 @@
 
 #include <Eigen/Dense>
 
-#include "cairn/define_factor.hpp"
-#include "cairn/error.hpp"
-#include "cairn/lie/se2.hpp"
-#include "cairn/lie/se3.hpp"
+#include "cairn/runtime/error.hpp"
+#include "cairn/types/define_factor.hpp"
+#include "cairn/types/lie/se2.hpp"
+#include "cairn/types/lie/se3.hpp"
 #include "support/planar_graph.hpp"
 #include "support/scaled_pose.hpp"
 
@@ -119,13 +119,13 @@ TEST_F(PoseChain, GivesVariablesAndFactorsAsAnEstimatorTakesThem) {
   pose(7);
   const int fixed = pose(3), factor = join(7, 3);
   graph_.set_fixed(fixed);
-  const NewVariable variable = new_variable(graph_, fixed);
+  const Variable variable = new_variable(graph_, fixed);
   EXPECT_EQ(variable.type, types_.pose);
   EXPECT_EQ(variable.id, 3);
   EXPECT_THAT(variable.state, ElementsAre(1.0, 2.0, 0.3));
   EXPECT_TRUE(variable.fixed);
   EXPECT_FALSE(new_variable(graph_, 0).fixed);
-  const NewFactor copy = new_factor(graph_, factor);
+  const Factor copy = new_factor(graph_, factor);
   EXPECT_EQ(copy.type, types_.relative_pose);
   EXPECT_THAT(copy.variables, ElementsAre(7, 3));
   EXPECT_THAT(copy.measurement, ElementsAre(1.0, 0.5, 0.1));

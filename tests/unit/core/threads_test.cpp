@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "cairn/threads.hpp"
+#include "cairn/runtime/threads.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "cairn/trajectory.hpp"
+#include "cairn/evaluation/trajectory.hpp"
 
 #include <array>
 #include <cmath>
@@ -9,8 +9,8 @@
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>
 
-#include "cairn/error.hpp"
-#include "cairn/threads.hpp"
+#include "cairn/runtime/error.hpp"
+#include "cairn/runtime/threads.hpp"
 
 namespace cairn {
 namespace {

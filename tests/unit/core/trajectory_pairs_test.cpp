@@ -8,8 +8,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "cairn/error.hpp"
-#include "cairn/trajectory.hpp"
+#include "cairn/evaluation/trajectory.hpp"
+#include "cairn/runtime/error.hpp"
 
 namespace cairn {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "cairn/trajectory.hpp"
+#include "cairn/evaluation/trajectory.hpp"
 
 #include <unistd.h>
 
@@ -11,8 +11,8 @@
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>
 
-#include "cairn/error.hpp"
-#include "cairn/format.hpp"
+#include "cairn/io/format.hpp"
+#include "cairn/runtime/error.hpp"
 
 namespace cairn {
 namespace {

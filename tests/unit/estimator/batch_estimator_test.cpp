@@ -5,9 +5,9 @@
 
 #include <memory>
 
-#include "cairn/error.hpp"
-#include "cairn/estimator.hpp"
-#include "cairn/registry.hpp"
+#include "cairn/plugin/registry.hpp"
+#include "cairn/runtime/error.hpp"
+#include "cairn/solve/estimator.hpp"
 #include "support/dense_system.hpp"
 #include "support/planar_graph.hpp"
 

@@ -6,8 +6,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "cairn/error.hpp"
-#include "cairn/registry.hpp"
+#include "cairn/plugin/registry.hpp"
+#include "cairn/runtime/error.hpp"
 #include "random_sequence.hpp"
 #include "support/dense_system.hpp"
 
@@ -25,10 +25,10 @@ const std::vector<double> kUnit = {1, 0, 0, 1, 0, 1};
 
 class EveryEstimator : public testing::TestWithParam<std::string> {
  protected:
-  NewVariable pose(Id id, std::vector<double> state = {}, bool fixed = false) const {
+  Variable pose(Id id, std::vector<double> state = {}, bool fixed = false) const {
     return {types_.pose, id, std::move(state), fixed};
   }
-  NewFactor between(Id a, Id b, std::vector<double> z = {1.0, 0.0, 0.1}) const {
+  Factor between(Id a, Id b, std::vector<double> z = {1.0, 0.0, 0.1}) const {
     return {types_.relative_pose, {a, b}, std::move(z), kUnit};
   }
   /// Poses 0 … n-1 in a chain.
@@ -146,7 +146,7 @@ TEST_P(EveryEstimator, AFixedLagKeepsItsSizeAndItsCovariance) {
     if (k >= kLag) update.marginalized.push_back(k - kLag);
     estimator_->update(update, {.full = true});
     whole.add_variable(types_.pose, k, std::array{double(k), 0.0, 0.0});
-    for (const NewFactor& factor : update.factors) {
+    for (const Factor& factor : update.factors) {
       whole.add_factor(factor.type, std::array{static_cast<int>(factor.variables[0]), k},
                        factor.measurement, factor.information);
     }

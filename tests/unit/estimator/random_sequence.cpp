@@ -8,8 +8,8 @@
 #include <gtest/gtest.h>
 #include <Eigen/Eigenvalues>
 
-#include "cairn/error.hpp"
-#include "cairn/marginal_prior.hpp"
+#include "cairn/runtime/error.hpp"
+#include "cairn/update/marginal_prior.hpp"
 #include "support/dense_system.hpp"
 
 namespace cairn::test {
@@ -150,7 +150,7 @@ std::vector<double> RandomSequence::measured(const Truth& a, const Truth& b) {
 void RandomSequence::add_pose(GraphUpdate& update, bool connected) {
   const Id id = next_id_++;
   Truth truth{true, {uniform(-3, 3), uniform(-3, 3), uniform(-3, 3)}};
-  NewVariable variable{types_.pose, id, {}, false};
+  Variable variable{types_.pose, id, {}, false};
   const bool odometry = connected && last_pose_ >= 0;
   if (odometry && chance(0.7)) {
     truth.x = Se2::compose<double>(truth_.at(last_pose_).x,

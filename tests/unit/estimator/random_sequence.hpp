@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "cairn/estimator.hpp"
-#include "cairn/graph_update.hpp"
+#include "cairn/solve/estimator.hpp"
+#include "cairn/update/graph_update.hpp"
 #include "support/planar_graph.hpp"
 
 namespace cairn::test {

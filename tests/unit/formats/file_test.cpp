@@ -11,7 +11,7 @@
 #include <functional>
 #include <iterator>
 
-#include "cairn/error.hpp"
+#include "cairn/runtime/error.hpp"
 #include "unit/formats/reading.hpp"
 
 namespace cairn::test {

@@ -7,7 +7,7 @@
 #include <cstring>
 #include <functional>
 
-#include "cairn/error.hpp"
+#include "cairn/runtime/error.hpp"
 
 namespace cairn::test {
 namespace {

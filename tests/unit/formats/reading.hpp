@@ -5,8 +5,8 @@
 #include <string_view>
 #include <vector>
 
-#include "cairn/format.hpp"
-#include "cairn/registry.hpp"
+#include "cairn/io/format.hpp"
+#include "cairn/plugin/registry.hpp"
 
 namespace cairn::test {
 

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // g2o as it comes, line by line: what the reader of files says of the same text.
-#include "cairn/stream_format.hpp"
+#include "cairn/io/stream_format.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "cairn/error.hpp"
-#include "cairn/marginal_prior.hpp"
+#include "cairn/runtime/error.hpp"
+#include "cairn/update/marginal_prior.hpp"
 #include "unit/formats/reading.hpp"
 
 namespace cairn::test {

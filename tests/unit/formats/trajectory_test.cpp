@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "cairn/trajectory.hpp"
+#include "cairn/evaluation/trajectory.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -8,11 +8,11 @@
 #include <numeric>
 #include <set>
 
-#include "cairn/error.hpp"
-#include "cairn/format.hpp"
-#include "cairn/generator.hpp"
-#include "cairn/optimizer.hpp"
-#include "cairn/registry.hpp"
+#include "cairn/io/format.hpp"
+#include "cairn/io/generator.hpp"
+#include "cairn/plugin/registry.hpp"
+#include "cairn/runtime/error.hpp"
+#include "cairn/solve/optimizer.hpp"
 
 namespace cairn {
 namespace {

@@ -12,7 +12,7 @@
 #include <string>
 #include <utility>
 
-#include "cairn/registry.hpp"
+#include "cairn/plugin/registry.hpp"
 #include "dense.hpp"
 #include "engine.hpp"
 #include "growing_graph.hpp"

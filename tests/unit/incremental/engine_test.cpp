@@ -8,7 +8,7 @@
 #include <ostream>
 #include <string>
 
-#include "cairn/registry.hpp"
+#include "cairn/plugin/registry.hpp"
 #include "growing_graph.hpp"
 
 namespace cairn::incremental {

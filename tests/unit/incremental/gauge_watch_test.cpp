@@ -7,9 +7,9 @@
 #include <array>
 #include <random>
 
-#include "cairn/define_factor.hpp"
-#include "cairn/gauge.hpp"
-#include "cairn/lie/point.hpp"
+#include "cairn/graph/gauge.hpp"
+#include "cairn/types/define_factor.hpp"
+#include "cairn/types/lie/point.hpp"
 #include "support/planar_graph.hpp"
 #include "support/scaled_pose.hpp"
 

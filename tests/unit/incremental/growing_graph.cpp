@@ -5,9 +5,9 @@
 
 #include <fmt/format.h>
 
-#include "cairn/define_factor.hpp"
-#include "cairn/lie/point.hpp"
-#include "cairn/lie/se3.hpp"
+#include "cairn/types/define_factor.hpp"
+#include "cairn/types/lie/point.hpp"
+#include "cairn/types/lie/se3.hpp"
 #include "support/planar_graph.hpp"
 
 namespace cairn::incremental {

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "cairn/graph.hpp"
+#include "cairn/graph/graph.hpp"
 #include "engine.hpp"
 
 namespace cairn::incremental {

@@ -7,7 +7,7 @@
 #include <memory>
 #include <string>
 
-#include "cairn/graph.hpp"
+#include "cairn/graph/graph.hpp"
 #include "dense.hpp"
 #include "growing_graph.hpp"
 #include "models.hpp"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "cairn/initial_guess.hpp"
+#include "cairn/solve/initial_guess.hpp"
 
 #include <algorithm>
 #include <array>
@@ -11,11 +11,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "cairn/error.hpp"
-#include "cairn/format.hpp"
-#include "cairn/gauge.hpp"
-#include "cairn/generator.hpp"
-#include "cairn/registry.hpp"
+#include "cairn/graph/gauge.hpp"
+#include "cairn/io/format.hpp"
+#include "cairn/io/generator.hpp"
+#include "cairn/plugin/registry.hpp"
+#include "cairn/runtime/error.hpp"
 #include "support/data.hpp"
 
 namespace cairn {

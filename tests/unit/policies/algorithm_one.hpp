@@ -12,9 +12,9 @@
 
 #include <boost/math/distributions/normal.hpp>
 
-#include "cairn/estimator.hpp"
-#include "cairn/pose_chain.hpp"
-#include "cairn/registration.hpp"
+#include "cairn/geometry/pose_chain.hpp"
+#include "cairn/policy/registration.hpp"
+#include "cairn/solve/estimator.hpp"
 #include "unit/policies/pose_world.hpp"
 
 namespace cairn::compact {
@@ -52,7 +52,7 @@ class AlgorithmOne {
     Motion e;  // (μ_e, Σ_e)
     for (std::size_t n = 1; n < way.size(); ++n) {
       const Id id = recording.id(way[n].variable);
-      const NewFactor odometry = new_factor(recording, way[n].odometry[0]);
+      const Factor odometry = new_factor(recording, way[n].odometry[0]);
       const Motion u = world_.motions().of_factor(odometry, newest);
       GraphUpdate update;
       if (keep_pose) {
@@ -100,7 +100,7 @@ class AlgorithmOne {
       const Candidate i = *best;
       C.erase(best);
       if (i.id == predecessor || !(i.gain > thresholds_.g_loop)) continue;
-      const std::vector<NewFactor> measured = registration.match(i.id, newest);
+      const std::vector<Factor> measured = registration.match(i.id, newest);
       if (measured.empty()) continue;
       const Motion y = world_.motions().of_factor(measured.front(), i.id);
       const double told = gain(i.id, newest, matrix(y.covariance));

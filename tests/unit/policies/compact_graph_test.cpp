@@ -8,7 +8,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "cairn/error.hpp"
+#include "cairn/runtime/error.hpp"
 #include "support/dense_system.hpp"
 #include "unit/policies/pose_world.hpp"
 
@@ -75,7 +75,7 @@ class Grown {
     }
   }
   void keep() { graph_.keep(seconds_); }
-  NewFactor measured(int pose) {
+  Factor measured(int pose) {
     const MatrixXd Sigma = draw_.covariance(world_.tangent(), 0.04);
     const Pose z = world_.between(ways_[pose].truth, ways_.back().truth);
     return world_.edge(ways_[pose].id, newest(), world_.moved(z, noise_ * draw_.error(Sigma)),
@@ -99,7 +99,7 @@ class Grown {
       add(world_.motions().to_factor(world_.types().edge, chain.from, chain.to, chain.motion),
           dense);
     }
-    for (const NewFactor& link : links_) add(link, dense);
+    for (const Factor& link : links_) add(link, dense);
     return dense;
   }
   /// Whether all covariances from kept poses to the newest are those of the dense graph.
@@ -144,7 +144,7 @@ class Grown {
     Motion motion;
   };
 
-  static void add(const NewFactor& factor, Graph& graph) {
+  static void add(const Factor& factor, Graph& graph) {
     const std::vector<int> on{*graph.find(factor.variables[0]), *graph.find(factor.variables[1])};
     graph.add_factor(factor.type, on, factor.measurement, factor.information);
   }
@@ -182,7 +182,7 @@ class Grown {
   Id next_ = 1;
   std::vector<Way> ways_;  ///< of the kept poses and the newest
   std::vector<Chain> odometry_;
-  std::vector<NewFactor> links_;
+  std::vector<Factor> links_;
   std::vector<Id> fixed_ids_;
 };
 
@@ -341,10 +341,10 @@ TEST_P(CompactGraphIn, FusesSeveralMeasurementsEitherWayRound) {
   const int n = world.tangent();
   const Pose z = world.random(grown.draw(), 1.0, 0.7);
   const MatrixXd S_1 = grown.draw().covariance(n, 0.1), S_2 = grown.draw().covariance(n, 0.2);
-  const NewFactor one = world.edge(3, 4, z, S_1);
+  const Factor one = world.edge(3, 4, z, S_1);
   const Motion back = world.motions().inverse(world.motion(z, S_2));
-  const NewFactor other = world.motions().to_factor(world.types().edge, 4, 3, back);
-  const NewFactor both[] = {one, other};
+  const Factor other = world.motions().to_factor(world.types().edge, 4, 3, back);
+  const Factor both[] = {one, other};
   const CompactGraph& graph = grown.graph();
   const Motion fused = graph.fuse(both, 3, 4);
   EXPECT_LT(world.log(world.between(fused.mean, z)).norm(), 1e-9);
@@ -359,7 +359,7 @@ TEST(CompactGraph, RefusesMeasurementsOfSomethingElse) {
   CompactGraph graph(registry.make<Estimator>("batch"), CompositionOrder::first);
   PolicySeconds seconds;
   graph.start(plane.variable(0), seconds);
-  const NewFactor turned = space.edge(0, 1, space.identity(), MatrixXd::Identity(6, 6));
+  const Factor turned = space.edge(0, 1, space.identity(), MatrixXd::Identity(6, 6));
   try {
     graph.fuse({&turned, 1}, 0, 1);
     FAIL() << "no error";
@@ -367,7 +367,7 @@ TEST(CompactGraph, RefusesMeasurementsOfSomethingElse) {
     EXPECT_EQ(error.code(), ErrorCode::input);
     EXPECT_THAT(error.what(), HasSubstr("VERTEX_SE2"));
   }
-  const NewFactor seen{registry.factor_type("EDGE_SE2_XY"), {0, 1}, {1.0, 2.0}, {1.0, 0.0, 1.0}};
+  const Factor seen{registry.factor_type("EDGE_SE2_XY"), {0, 1}, {1.0, 2.0}, {1.0, 0.0, 1.0}};
   EXPECT_THROW(graph.fuse({&seen, 1}, 0, 1), Error);
 }
 

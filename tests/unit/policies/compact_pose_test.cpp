@@ -8,8 +8,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "cairn/error.hpp"
-#include "cairn/optimizer.hpp"
+#include "cairn/runtime/error.hpp"
+#include "cairn/solve/optimizer.hpp"
 #include "unit/policies/policy_runs.hpp"
 #include "unit/policies/pose_world.hpp"
 
@@ -57,7 +57,7 @@ class Robot {
     return Eigen::Vector3d(0.05 * 0.05, 0.05 * 0.05, 0.02 * 0.02).asDiagonal();
   }
 
-  NewFactor odometry() { return measured(newest(), newest() + 1, step_, odometry_covariance()); }
+  Factor odometry() { return measured(newest(), newest() + 1, step_, odometry_covariance()); }
   /// Ends the newest pose and begins the next.
   PoseReport advance() {
     const PoseReport report = policy_->end_pose();
@@ -65,19 +65,19 @@ class Robot {
     return report;
   }
   void begin() {
-    const NewFactor moved = odometry();
+    const Factor moved = odometry();
     policy_->add_pose(world_.variable(newest() + 1), {&moved, 1});
     truth_.push_back(world_.compose(truth_.back(), step_));
   }
   void turn(double forwards, double angle) { step_ = {forwards, 0.0, angle}; }
   /// From an earlier pose to the newest.
-  NewFactor right(Id other, double sigma = 0.02) {
+  Factor right(Id other, double sigma = 0.02) {
     return measured(other, newest(), world_.between(truth_[other], truth_.back()), Sigma(sigma));
   }
-  NewFactor wrong(Id other, const Pose& motion, double sigma = 0.02) const {
+  Factor wrong(Id other, const Pose& motion, double sigma = 0.02) const {
     return world_.edge(other, newest(), motion, Sigma(sigma));
   }
-  LinkReport offer(const NewFactor& factor) {
+  LinkReport offer(const Factor& factor) {
     return policy_->offer(
         factor.variables[0] == newest() ? factor.variables[1] : factor.variables[0], {&factor, 1});
   }
@@ -89,7 +89,7 @@ class Robot {
 
  private:
   static MatrixXd Sigma(double sigma) { return sigma * sigma * MatrixXd::Identity(3, 3); }
-  NewFactor measured(Id from, Id to, const Pose& motion, const MatrixXd& covariance) {
+  Factor measured(Id from, Id to, const Pose& motion, const MatrixXd& covariance) {
     return world_.edge(from, to, world_.moved(motion, draw_.error(covariance)), covariance);
   }
 
@@ -203,7 +203,7 @@ TEST_F(CompactPoseTest, ConcatenatesToTheOrderThatIsChosen) {
     Motion expected = world.motion(z, Sigma);
     for (Id id = 0; id < 5; ++id) {
       policy->end_pose();
-      const NewFactor moved = world.edge(id, id + 1, z, Sigma);
+      const Factor moved = world.edge(id, id + 1, z, Sigma);
       policy->add_pose(world.variable(id + 1), {&moved, 1});
       if (id > 0) expected = world.motions().compose(expected, world.motion(z, Sigma), order);
     }
@@ -227,7 +227,7 @@ TEST_F(CompactPoseTest, FixedPosesAreKept) {
   for (const Id id : {17, 18, 40}) world.graph.set_fixed(*world.graph.find(id));
   for (const Id id : {17, 18, 40})
     world.graph.set_state(*world.graph.find(id), world.truth.state(*world.truth.find(id)));
-  FunctionRegistration none([](Id, Id) { return std::vector<NewFactor>(); });
+  FunctionRegistration none([](Id, Id) { return std::vector<Factor>(); });
   const PolicyRun few =
       run(make("range=1e6,angle=3.15,probability=0,pose_gain=1e9"), none, world.graph);
   EXPECT_THAT(few.kept(), ElementsAre(0, 17, 18, 40));
@@ -253,7 +253,7 @@ TEST_F(CompactPoseTest, TheNewestStateIsOdometryFromTheLastKeptPose) {
   for (Id id = 0; id < 20; ++id) {
     policy->end_pose();
     const Pose z = world.random(draw, 2.0, 1.0);
-    const NewFactor moved = world.edge(id, id + 1, z, MatrixXd::Identity(3, 3));
+    const Factor moved = world.edge(id, id + 1, z, MatrixXd::Identity(3, 3));
     policy->add_pose(world.variable(id + 1), {&moved, 1});
     x = world.compose(x, z);
     EXPECT_LT(world.log(world.between(x, policy->newest_state())).norm(), 1e-12);
@@ -353,9 +353,9 @@ TEST_F(CompactPoseTest, EdgesMayPointBackwards) {
   for (int v = 0; v < world.graph.variable_count(); ++v)
     backwards.add_variable(poses.types().pose, world.graph.id(v), world.graph.state(v));
   for (int f = 0; f < world.graph.factor_count(); ++f) {
-    const NewFactor factor = new_factor(world.graph, f);
+    const Factor factor = new_factor(world.graph, f);
     const Id from = factor.variables[0], to = factor.variables[1];
-    const NewFactor turned =
+    const Factor turned =
         poses.motions().to_factor(factor.type, to, from, poses.motions().of_factor(factor, to));
     backwards.add_factor(turned.type, std::array{*backwards.find(to), *backwards.find(from)},
                          turned.measurement, turned.information);
@@ -387,7 +387,7 @@ TEST_F(CompactPoseTest, SeveralMeasurementsOfOneMotionCountAsOne) {
   const MatrixXd S_1 = draw.covariance(3, 0.1), S_2 = draw.covariance(3, 0.2);
   const Pose z_1{1.0, 0.1, 0.2}, z_2{1.05, 0.05, 0.25};
   const Motion fused = world.motions().fuse(world.motion(z_1, S_1), world.motion(z_2, S_2));
-  const NewFactor both[] = {
+  const Factor both[] = {
       world.edge(0, 1, z_1, S_1),
       world.motions().to_factor(world.types().edge, 1, 0,
                                 world.motions().inverse(world.motion(z_2, S_2)))};
@@ -410,7 +410,7 @@ TEST_F(CompactPoseTest, GoesOnAfterABadCallAsIfItHadNotBeen) {
   PosePolicy& policy = disturbed.policy();
   const PoseWorld& world = disturbed.world();
   const MatrixXd I = MatrixXd::Identity(3, 3);
-  const auto refuse = [&](const NewVariable& pose, const std::vector<NewFactor>& odometry) {
+  const auto refuse = [&](const Variable& pose, const std::vector<Factor>& odometry) {
     return message_of([&] { policy.add_pose(pose, odometry); }, ErrorCode::input);
   };
   for (int k = 0; k < 60; ++k) {
@@ -422,11 +422,11 @@ TEST_F(CompactPoseTest, GoesOnAfterABadCallAsIfItHadNotBeen) {
                 HasSubstr("1000 is not in the compact graph"));
     EXPECT_THROW(policy.offer(n, {}), Error);  // the newest
     if (n > 0) {
-      const NewFactor elsewhere = world.edge(0, n + 7, world.identity(), I);
+      const Factor elsewhere = world.edge(0, n + 7, world.identity(), I);
       message_of([&] { policy.offer(0, {&elsewhere, 1}); }, ErrorCode::input);
-      const NewFactor unequal{world.types().edge, {0, n}, {1.0, 2.0}, {1, 0, 0, 1, 0, 1}};
+      const Factor unequal{world.types().edge, {0, n}, {1.0, 2.0}, {1, 0, 0, 1, 0, 1}};
       message_of([&] { policy.offer(0, {&unequal, 1}); }, ErrorCode::input);
-      const NewFactor vague{world.types().edge, {0, n}, {1.0, 2.0, 0.0}, {1, 0, 0, -1, 0, 1}};
+      const Factor vague{world.types().edge, {0, n}, {1.0, 2.0, 0.0}, {1, 0, 0, -1, 0, 1}};
       message_of([&] { policy.offer(0, {&vague, 1}); }, ErrorCode::input);
       // It has been asked about 0 now, and so has the other.
       quiet.policy().offer(0, {});
@@ -434,7 +434,7 @@ TEST_F(CompactPoseTest, GoesOnAfterABadCallAsIfItHadNotBeen) {
     }
     for (Robot* robot : {&disturbed, &quiet}) {
       while (const auto match = robot->policy().next_match()) {
-        const NewFactor link = robot->right(match->earlier);
+        const Factor link = robot->right(match->earlier);
         if (match->earlier % 3 == 0) {
           robot->offer(link);
         } else {
@@ -463,9 +463,9 @@ TEST_F(CompactPoseTest, GoesOnAfterABadCallAsIfItHadNotBeen) {
                        {world.edge(n, n + 1, world.identity(), I)}),
                 HasSubstr("VERTEX_SE3:QUAT"));
     refuse(world.variable(n + 1),
-           {NewFactor{registry.factor_type("EDGE_SE2_XY"), {n, n + 1}, {1, 2}, {1, 0, 1}}});
+           {Factor{registry.factor_type("EDGE_SE2_XY"), {n, n + 1}, {1, 2}, {1, 0, 1}}});
     refuse(world.variable(n + 1),
-           {NewFactor{world.types().edge, {n, n + 1}, {1, 2, NAN}, {1, 0, 0, 1, 0, 1}}});
+           {Factor{world.types().edge, {n, n + 1}, {1, 2, NAN}, {1, 0, 0, 1, 0, 1}}});
     disturbed.begin();
     quiet.begin();
     EXPECT_EQ(policy.newest_state(), quiet.policy().newest_state());
@@ -481,7 +481,7 @@ TEST_F(CompactPoseTest, GoesOnAfterABadCallAsIfItHadNotBeen) {
 TEST_F(CompactPoseTest, TheFirstPoseHasNotMoved) {
   const PoseWorld world(planar_types(registry));
   const auto policy = make("range=2");
-  const NewFactor moved = world.edge(0, 1, world.identity(), MatrixXd::Identity(3, 3));
+  const Factor moved = world.edge(0, 1, world.identity(), MatrixXd::Identity(3, 3));
   EXPECT_THAT(message_of(
                   [&] {
                     policy->add_pose(world.variable(1), {&moved, 1});
@@ -511,7 +511,7 @@ TEST_F(CompactPoseTest, RefusesASensorThatIsNoCovariance) {
 
 TEST_F(CompactPoseTest, ATypeThatIsNoRigidMotionIsRefused) {
   const auto policy = make("range=2");
-  const NewVariable point{registry.variable_type("VERTEX_XY"), 0, {1.0, 2.0}, false};
+  const Variable point{registry.variable_type("VERTEX_XY"), 0, {1.0, 2.0}, false};
   message_of([&] { policy->add_pose(point, {}); }, ErrorCode::usage);
   const PoseWorld world(planar_types(registry));
   policy->add_pose(world.variable(0, world.identity()), {});  // goes on

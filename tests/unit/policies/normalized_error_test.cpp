@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "cairn/normalized_error.hpp"
+#include "cairn/evaluation/normalized_error.hpp"
 
 #include <cmath>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "cairn/error.hpp"
-#include "cairn/optimizer.hpp"
+#include "cairn/runtime/error.hpp"
+#include "cairn/solve/optimizer.hpp"
 #include "support/dense_system.hpp"
 #include "unit/policies/policy_runs.hpp"
 #include "unit/policies/pose_world.hpp"

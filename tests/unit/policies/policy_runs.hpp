@@ -8,11 +8,11 @@
 #include <utility>
 #include <vector>
 
-#include "cairn/generator.hpp"
-#include "cairn/pose_chain.hpp"
-#include "cairn/pose_policy.hpp"
-#include "cairn/registration.hpp"
-#include "cairn/registry.hpp"
+#include "cairn/geometry/pose_chain.hpp"
+#include "cairn/io/generator.hpp"
+#include "cairn/plugin/registry.hpp"
+#include "cairn/policy/pose_policy.hpp"
+#include "cairn/policy/registration.hpp"
 
 namespace cairn::compact {
 

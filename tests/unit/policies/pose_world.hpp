@@ -10,9 +10,9 @@
 
 #include <Eigen/Dense>
 
-#include "cairn/estimator.hpp"
-#include "cairn/motion.hpp"
-#include "cairn/registry.hpp"
+#include "cairn/geometry/motion.hpp"
+#include "cairn/plugin/registry.hpp"
+#include "cairn/solve/estimator.hpp"
 #include "rigid_group.hpp"
 
 namespace cairn::compact {
@@ -135,10 +135,10 @@ class PoseWorld {
   Motion motion(const Pose& mean, const Eigen::MatrixXd& covariance) const {
     return {mean, {covariance.data(), covariance.data() + covariance.size()}};
   }
-  NewFactor edge(Id from, Id to, const Pose& mean, const Eigen::MatrixXd& covariance) const {
+  Factor edge(Id from, Id to, const Pose& mean, const Eigen::MatrixXd& covariance) const {
     return motions_.to_factor(types_.edge, from, to, motion(mean, covariance));
   }
-  NewVariable variable(Id id, Pose state = {}, bool fixed = false) const {
+  Variable variable(Id id, Pose state = {}, bool fixed = false) const {
     return {types_.pose, id, std::move(state), fixed};
   }
 

@@ -7,7 +7,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "cairn/error.hpp"
+#include "cairn/runtime/error.hpp"
 #include "unit/policies/policy_runs.hpp"
 #include "unit/policies/pose_world.hpp"
 
@@ -95,7 +95,7 @@ TEST_F(RandomPosesTest, DrawsLoopsEvenly) {
     const auto registration = registry.make<Registration>("recorded");
     registration->begin({.recording = &world.graph});
     for (const RecordedPose& pose : pose_chain(world.graph)) {
-      std::vector<NewFactor> odometry;
+      std::vector<Factor> odometry;
       for (const int f : pose.odometry) odometry.push_back(new_factor(world.graph, f));
       policy.add_pose(new_variable(world.graph, pose.variable), odometry);
       std::vector<Id> matched;
@@ -146,9 +146,9 @@ TEST_F(RandomPosesTest, APoseWithoutAMotionIsRefused) {
   policy->add_pose(new_variable(world.graph, 0), {});
   policy->end_pose();
   EXPECT_THROW(policy->add_pose(new_variable(world.graph, 1), {}), Error);
-  const NewFactor elsewhere = new_factor(world.graph, 1);
+  const Factor elsewhere = new_factor(world.graph, 1);
   EXPECT_THROW(policy->add_pose(new_variable(world.graph, 1), {&elsewhere, 1}), Error);
-  const NewFactor moved = new_factor(world.graph, 0);
+  const Factor moved = new_factor(world.graph, 0);
   policy->add_pose(new_variable(world.graph, 1), {&moved, 1});
   policy->end_pose();
   policy->finish();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "cairn/registration.hpp"
+#include "cairn/policy/registration.hpp"
 
 #include <algorithm>
 #include <array>
@@ -13,11 +13,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "cairn/error.hpp"
-#include "cairn/generator.hpp"
-#include "cairn/motion.hpp"
-#include "cairn/pose_chain.hpp"
-#include "cairn/registry.hpp"
+#include "cairn/geometry/motion.hpp"
+#include "cairn/geometry/pose_chain.hpp"
+#include "cairn/io/generator.hpp"
+#include "cairn/plugin/registry.hpp"
+#include "cairn/runtime/error.hpp"
 
 namespace cairn {
 namespace {
@@ -67,13 +67,13 @@ std::vector<Pair> all_pairs(const Graph& graph) {
 }
 
 /// Σ ‖r‖² of factors on poses at their true states.
-std::vector<double> squared_errors(const Graph& truth, const std::vector<NewFactor>& factors) {
+std::vector<double> squared_errors(const Graph& truth, const std::vector<Factor>& factors) {
   Graph graph;
   for (int v = 0; v < truth.variable_count(); ++v) {
-    const NewVariable variable = new_variable(truth, v);
+    const Variable variable = new_variable(truth, v);
     graph.add_variable(variable.type, variable.id, truth.state(v));
   }
-  for (const NewFactor& factor : factors) {
+  for (const Factor& factor : factors) {
     const std::array<int, 2> variables{*graph.find(factor.variables[0]),
                                        *graph.find(factor.variables[1])};
     graph.add_factor(factor.type, variables, factor.measurement, factor.information);
@@ -89,7 +89,7 @@ void expect_share(std::int64_t count, std::int64_t trials, double probability) {
       << "of " << trials;
 }
 
-void expect_same(const NewFactor& a, const NewFactor& b) {
+void expect_same(const Factor& a, const Factor& b) {
   EXPECT_EQ(a.type, b.type);
   EXPECT_EQ(a.variables, b.variables);
   EXPECT_EQ(a.measurement, b.measurement);
@@ -123,10 +123,10 @@ class Registrations : public testing::Test {
     return registration;
   }
   /// The answers to all pairs of poses.
-  std::map<Pair, std::vector<NewFactor>> match_all(Registration& registration) {
-    std::map<Pair, std::vector<NewFactor>> answers;
+  std::map<Pair, std::vector<Factor>> match_all(Registration& registration) {
+    std::map<Pair, std::vector<Factor>> answers;
     for (const Pair& pair : all_pairs(world.truth)) {
-      std::vector<NewFactor> answer = registration.match(pair.first, pair.second);
+      std::vector<Factor> answer = registration.match(pair.first, pair.second);
       if (!answer.empty()) answers[pair] = std::move(answer);
     }
     return answers;
@@ -218,7 +218,7 @@ TEST_F(Recorded, MatchesAPartOfThePairsFalsely) {
     for (int f = 0; f < world.graph.factor_count(); ++f) {
       const auto v = world.graph.factor_variables(f);
       const Pair pair{world.graph.id(v[0]), world.graph.id(v[1])};
-      const NewFactor wanted = right->match(pair.first, pair.second).front();
+      const Factor wanted = right->match(pair.first, pair.second).front();
       const auto answer = mixed->match(pair.first, pair.second);
       ASSERT_THAT(answer, SizeIs(1));
       ++matched;
@@ -296,7 +296,7 @@ TEST_P(Simulated, MeasuresWithTheTypeOfTheOdometryFromEarlierToLater) {
 
 TEST_P(Simulated, ErrsAsItsInformationSays) {
   for (const std::string noise : {"seed=3", "sigma_translation=0.05,sigma_rotation=0.01"}) {
-    std::vector<NewFactor> measured;
+    std::vector<Factor> measured;
     for (const auto& [pair, answer] : match_all(*make_simulated(noise)))
       measured.push_back(answer.front());
     const std::vector<double> errors = squared_errors(world.truth, measured);
@@ -331,14 +331,14 @@ TEST_P(Simulated, WeighsWhatIsFalseLikeWhatIsRight) {
   const auto simulated = make_simulated("false_rate=0.5");
   const auto answers = match_all(*simulated);
   MotionGroup group(registry.variable_type(type().tag()));
-  std::vector<NewFactor> right, wrong;
+  std::vector<Factor> right, wrong;
   for (const auto& [pair, answer] : answers)
     (was_false(*simulated, pair) ? wrong : right).push_back(answer.front());
-  const auto covariance = [&](const NewFactor& factor) {
+  const auto covariance = [&](const Factor& factor) {
     return group.of_factor(factor, factor.variables[0]).covariance;
   };
   const std::vector<double> expected = covariance(right.front());
-  for (const NewFactor& factor : wrong) {
+  for (const Factor& factor : wrong) {
     EXPECT_THAT(covariance(factor), testing::Pointwise(testing::DoubleNear(1e-12), expected));
   }
   EXPECT_GT(std::ranges::min(squared_errors(world.truth, wrong)), 0.0);
@@ -413,7 +413,7 @@ TEST_P(Simulated, TakesItsCovarianceFromTheLoopsOfTheRecordingOrFromTheOptions) 
   const MotionGroup group(registry.variable_type(type().tag()));
   const int n = group.tangent_size(), d = type().placement()->dimension();
   const auto covariance = [&](const std::string& options) {
-    const NewFactor measured = make_simulated(options)->match(0, 1).front();
+    const Factor measured = make_simulated(options)->match(0, 1).front();
     return group.of_factor(measured, 0).covariance;
   };
   const auto diagonal = [&](double translation, double rotation) {
@@ -441,7 +441,7 @@ TEST_P(EveryMetric, ErrsAsItsInformationSays) {
   simulate("sphere:turns=12,poses_per_turn=30,radius=10");
   const MotionGroup group(registry.variable_type("VERTEX_SE3:QUAT"));
   const auto simulated = make("simulated:range=5,sigma_translation=0.05,sigma_rotation=0.01");
-  std::vector<NewFactor> measured;
+  std::vector<Factor> measured;
   for (const auto& [pair, answer] : match_all(*simulated)) measured.push_back(answer.front());
   EXPECT_EQ(measured.front().type->metric(), GetParam());
 
@@ -496,7 +496,7 @@ TEST_F(PlanarRegistrations, SimulatedErrsWithTheCorrelationsOfTheRecording) {
   const MotionGroup group(registry.variable_type("VERTEX_SE2"));
   const std::vector<double> covariance =
       group.of_factor(new_factor(world.graph, loop), 10).covariance;
-  std::vector<NewFactor> measured;
+  std::vector<Factor> measured;
   for (int seed = 0; seed < 500; ++seed) {
     const auto simulated = make("simulated:range=10,seed=" + std::to_string(seed));
     for (const auto& [pair, answer] : match_all(*simulated)) measured.push_back(answer.front());
@@ -504,7 +504,7 @@ TEST_F(PlanarRegistrations, SimulatedErrsWithTheCorrelationsOfTheRecording) {
   ASSERT_THAT(measured, SizeIs(500 * 15));
   EXPECT_THAT(group.of_factor(measured.front(), measured.front().variables[0]).covariance,
               testing::Pointwise(testing::DoubleNear(1e-12), covariance));
-  const NewFactor another = make("simulated:sigma_translation=0.5")->match(0, 10).front();
+  const Factor another = make("simulated:sigma_translation=0.5")->match(0, 10).front();
   EXPECT_THAT(group.of_factor(another, 0).covariance,
               testing::Pointwise(testing::DoubleNear(1e-12),
                                  {0.25, 0.0, 0.0, 0.0, 0.25, 0.0, 0.0, 0.0, covariance[8]}));
@@ -586,9 +586,9 @@ TEST_F(PlanarRegistrations, OptionsOutOfRangeAreRefused) {
 
 TEST(FunctionRegistrationTest, AnswersWithItsFunction) {
   FunctionRegistration registration([](Id earlier, Id later) {
-    NewFactor factor;
+    Factor factor;
     factor.variables = {earlier, later};
-    return std::vector<NewFactor>{factor};
+    return std::vector<Factor>{factor};
   });
   registration.begin({});
   EXPECT_THAT(registration.match(3, 8).front().variables, ElementsAreArray({3, 8}));

@@ -8,8 +8,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "cairn/normalized_error.hpp"
-#include "cairn/trajectory.hpp"
+#include "cairn/evaluation/normalized_error.hpp"
+#include "cairn/evaluation/trajectory.hpp"
 #include "unit/policies/policy_runs.hpp"
 #include "unit/policies/pose_world.hpp"
 

@@ -6,7 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "cairn/error.hpp"
+#include "cairn/runtime/error.hpp"
 #include "unit/policies/policy_runs.hpp"
 #include "unit/policies/pose_world.hpp"
 
@@ -22,15 +22,15 @@ using Pair = std::pair<Id, Id>;
 class Scribe final : public PosePolicy {
  public:
   std::vector<std::string> log;
-  std::vector<NewVariable> poses;
-  std::vector<std::vector<NewFactor>> odometry;
-  std::vector<std::pair<Pair, std::vector<NewFactor>>> offers;
+  std::vector<Variable> poses;
+  std::vector<std::vector<Factor>> odometry;
+  std::vector<std::pair<Pair, std::vector<Factor>>> offers;
 
   void expect(const Graph& recording, std::span<const RecordedPose> way) override {
     log.push_back("expect " + std::to_string(way.size()) + " of " +
                   std::to_string(recording.variable_count()));
   }
-  void add_pose(const NewVariable& pose, std::span<const NewFactor> moved) override {
+  void add_pose(const Variable& pose, std::span<const Factor> moved) override {
     log.push_back("add " + std::to_string(pose.id));
     poses.push_back(pose);
     odometry.emplace_back(moved.begin(), moved.end());
@@ -43,7 +43,7 @@ class Scribe final : public PosePolicy {
     if (wanted_.empty()) return std::nullopt;
     return MatchProposal{wanted_.back(), poses.back().id, 0.0, {}};
   }
-  LinkReport offer(Id other, std::span<const NewFactor> measured) override {
+  LinkReport offer(Id other, std::span<const Factor> measured) override {
     log.push_back("offer " + std::to_string(other));
     offers.push_back({{other, poses.back().id}, {measured.begin(), measured.end()}});
     std::erase(wanted_, other);
@@ -75,9 +75,9 @@ class RunPolicy : public testing::Test {
 TEST_F(RunPolicy, TellsThePolicyOfEveryPoseInTurn) {
   Simulation world = simulate(registry, "ring:poses=5");
   Scribe policy;
-  const NewFactor answer = new_factor(world.graph, 0);
+  const Factor answer = new_factor(world.graph, 0);
   FunctionRegistration registration([&](Id earlier, Id) {
-    return earlier == 0 ? std::vector<NewFactor>{answer} : std::vector<NewFactor>();
+    return earlier == 0 ? std::vector<Factor>{answer} : std::vector<Factor>();
   });
   std::vector<Id> reported;
   run_policy(world.graph, pose_chain(world.graph), policy, registration,
@@ -97,7 +97,7 @@ TEST_F(RunPolicy, LeavesItToOdometryWherePosesAreButForTheFirstAndFixedOnes) {
   Simulation world = simulate(registry, "ring:poses=6");
   world.graph.set_fixed(3);
   Scribe policy;
-  FunctionRegistration none([](Id, Id) { return std::vector<NewFactor>(); });
+  FunctionRegistration none([](Id, Id) { return std::vector<Factor>(); });
   run_policy(world.graph, pose_chain(world.graph), policy, none);
   for (int k = 0; k < 6; ++k) {
     const auto state = world.graph.state(k);
@@ -114,10 +114,10 @@ TEST_F(RunPolicy, LeavesItToOdometryWherePosesAreButForTheFirstAndFixedOnes) {
 
 TEST_F(RunPolicy, HandsOverAllOdometryOfAPose) {
   Simulation world = simulate(registry, "ring:poses=4");
-  const NewFactor twice = new_factor(world.graph, 1);
+  const Factor twice = new_factor(world.graph, 1);
   world.graph.add_factor(twice.type, std::array{2, 1}, twice.measurement, twice.information);
   Scribe policy;
-  FunctionRegistration none([](Id, Id) { return std::vector<NewFactor>(); });
+  FunctionRegistration none([](Id, Id) { return std::vector<Factor>(); });
   run_policy(world.graph, pose_chain(world.graph), policy, none);
   EXPECT_THAT(policy.odometry[1], SizeIs(1));
   ASSERT_THAT(policy.odometry[2], SizeIs(2));
@@ -127,7 +127,7 @@ TEST_F(RunPolicy, HandsOverAllOdometryOfAPose) {
 TEST_F(RunPolicy, StopsWhenToldAndFinishesAllTheSame) {
   Simulation world = simulate(registry, "ring:poses=9");
   Scribe policy;
-  FunctionRegistration none([](Id, Id) { return std::vector<NewFactor>(); });
+  FunctionRegistration none([](Id, Id) { return std::vector<Factor>(); });
   run_policy(world.graph, pose_chain(world.graph), policy, none,
              [](const PoseReport& report) { return report.id < 3; });
   EXPECT_THAT(policy.poses, SizeIs(4));
@@ -136,7 +136,7 @@ TEST_F(RunPolicy, StopsWhenToldAndFinishesAllTheSame) {
 
 TEST_F(RunPolicy, OfNothingComesNothing) {
   Scribe policy;
-  FunctionRegistration none([](Id, Id) { return std::vector<NewFactor>(); });
+  FunctionRegistration none([](Id, Id) { return std::vector<Factor>(); });
   run_policy(Graph(), {}, policy, none);
   EXPECT_THAT(policy.log, ElementsAre("expect 0 of 0"));
 }

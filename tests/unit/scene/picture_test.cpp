@@ -4,11 +4,11 @@
 
 #include <boost/json/parse.hpp>
 
-#include "cairn/error.hpp"
-#include "cairn/generator.hpp"
-#include "cairn/packed_array.hpp"
-#include "cairn/registry.hpp"
-#include "cairn/scene.hpp"
+#include "cairn/io/generator.hpp"
+#include "cairn/plugin/registry.hpp"
+#include "cairn/report/packed_array.hpp"
+#include "cairn/report/scene.hpp"
+#include "cairn/runtime/error.hpp"
 
 namespace cairn::test {
 namespace {

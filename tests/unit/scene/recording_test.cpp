@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "cairn/recording.hpp"
+#include "cairn/report/recording.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,10 +8,10 @@
 #include <filesystem>
 #include <fstream>
 
-#include "cairn/error.hpp"
-#include "cairn/format.hpp"
-#include "cairn/generator.hpp"
-#include "cairn/registry.hpp"
+#include "cairn/io/format.hpp"
+#include "cairn/io/generator.hpp"
+#include "cairn/plugin/registry.hpp"
+#include "cairn/runtime/error.hpp"
 
 namespace cairn::test {
 namespace {

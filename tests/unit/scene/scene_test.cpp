@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "cairn/scene.hpp"
+#include "cairn/report/scene.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <numeric>
 
-#include "cairn/generator.hpp"
-#include "cairn/registry.hpp"
-#include "cairn/scene_json.hpp"
+#include "cairn/io/generator.hpp"
+#include "cairn/plugin/registry.hpp"
+#include "cairn/report/scene_json.hpp"
 
 namespace cairn::test {
 namespace {

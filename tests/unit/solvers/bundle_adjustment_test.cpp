@@ -6,10 +6,10 @@
 
 #include <Eigen/Geometry>
 
-#include "cairn/format.hpp"
-#include "cairn/gauge.hpp"
-#include "cairn/optimizer.hpp"
-#include "cairn/registry.hpp"
+#include "cairn/graph/gauge.hpp"
+#include "cairn/io/format.hpp"
+#include "cairn/plugin/registry.hpp"
+#include "cairn/solve/optimizer.hpp"
 #include "support/data.hpp"
 
 namespace cairn::test {

@@ -3,11 +3,11 @@
 
 #include <cctype>
 
-#include "cairn/error.hpp"
-#include "cairn/jacobian.hpp"
-#include "cairn/linear_solver.hpp"
-#include "cairn/optimizer.hpp"
-#include "cairn/registry.hpp"
+#include "cairn/linear/jacobian.hpp"
+#include "cairn/linear/linear_solver.hpp"
+#include "cairn/plugin/registry.hpp"
+#include "cairn/runtime/error.hpp"
+#include "cairn/solve/optimizer.hpp"
 
 namespace cairn::test {
 namespace {

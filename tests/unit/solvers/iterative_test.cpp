@@ -7,9 +7,9 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 
-#include "cairn/linear_solver.hpp"
-#include "cairn/registry.hpp"
-#include "cairn/threads.hpp"
+#include "cairn/linear/linear_solver.hpp"
+#include "cairn/plugin/registry.hpp"
+#include "cairn/runtime/threads.hpp"
 #include "iterative/block_rows.hpp"
 #include "iterative/vectors.hpp"
 #include "sample_matrices.hpp"

@@ -11,10 +11,10 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/QR>
 
-#include "cairn/error.hpp"
-#include "cairn/jacobian.hpp"
-#include "cairn/registry.hpp"
-#include "cairn/threads.hpp"
+#include "cairn/linear/jacobian.hpp"
+#include "cairn/plugin/registry.hpp"
+#include "cairn/runtime/error.hpp"
+#include "cairn/runtime/threads.hpp"
 #include "components.hpp"
 #include "sample_jacobians.hpp"
 #include "sample_matrices.hpp"

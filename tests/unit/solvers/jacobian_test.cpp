@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "cairn/jacobian.hpp"
+#include "cairn/linear/jacobian.hpp"
 
 #include <cmath>
 #include <memory>
@@ -7,9 +7,9 @@
 #include <gtest/gtest.h>
 #include <Eigen/Core>
 
-#include "cairn/gauge.hpp"
-#include "cairn/loss.hpp"
-#include "cairn/threads.hpp"
+#include "cairn/graph/gauge.hpp"
+#include "cairn/runtime/threads.hpp"
+#include "cairn/types/loss.hpp"
 #include "sample_graphs.hpp"
 #include "sample_jacobians.hpp"
 #include "sample_matrices.hpp"

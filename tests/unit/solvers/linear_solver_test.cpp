@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // What every linear solver owes, whoever wrote it.
-#include "cairn/linear_solver.hpp"
+#include "cairn/linear/linear_solver.hpp"
 
 #include <cmath>
 #include <limits>
@@ -10,10 +10,10 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 
-#include "cairn/error.hpp"
-#include "cairn/jacobian.hpp"
-#include "cairn/registry.hpp"
-#include "cairn/threads.hpp"
+#include "cairn/linear/jacobian.hpp"
+#include "cairn/plugin/registry.hpp"
+#include "cairn/runtime/error.hpp"
+#include "cairn/runtime/threads.hpp"
 #include "components.hpp"
 #include "sample_matrices.hpp"
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // What every linear solver owes that says it can give covariances, whoever wrote it.
-#include "cairn/marginals.hpp"
+#include "cairn/linear/marginals.hpp"
 
 #include <array>
 #include <cmath>
@@ -11,12 +11,12 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 
-#include "cairn/error.hpp"
-#include "cairn/graph_marginals.hpp"
-#include "cairn/jacobian.hpp"
-#include "cairn/optimizer.hpp"
-#include "cairn/registry.hpp"
-#include "cairn/threads.hpp"
+#include "cairn/linear/graph_marginals.hpp"
+#include "cairn/linear/jacobian.hpp"
+#include "cairn/plugin/registry.hpp"
+#include "cairn/runtime/error.hpp"
+#include "cairn/runtime/threads.hpp"
+#include "cairn/solve/optimizer.hpp"
 #include "components.hpp"
 #include "sample_graphs.hpp"
 #include "sample_jacobians.hpp"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "cairn/normal_equations.hpp"
+#include "cairn/linear/normal_equations.hpp"
 
 #include <cmath>
 
@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 #include <Eigen/Core>
 
-#include "cairn/registry.hpp"
+#include "cairn/plugin/registry.hpp"
 #include "components.hpp"
 #include "sample_graphs.hpp"
 #include "sample_matrices.hpp"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // What every optimizer owes, whoever wrote it.
-#include "cairn/optimizer.hpp"
+#include "cairn/solve/optimizer.hpp"
 
 #include <algorithm>
 #include <atomic>
@@ -10,9 +10,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "cairn/gauge.hpp"
-#include "cairn/registry.hpp"
-#include "cairn/threads.hpp"
+#include "cairn/graph/gauge.hpp"
+#include "cairn/plugin/registry.hpp"
+#include "cairn/runtime/threads.hpp"
 #include "components.hpp"
 #include "sample_graphs.hpp"
 

@@ -8,7 +8,7 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 
-#include "cairn/registry.hpp"
+#include "cairn/plugin/registry.hpp"
 #include "pcg/block_jacobi.hpp"
 #include "pcg/incomplete_cholesky.hpp"
 #include "pcg/spanning_tree.hpp"

@@ -2,9 +2,9 @@
 // Real graphs with known minima, solved by everything that is registered.
 #include <gtest/gtest.h>
 
-#include "cairn/format.hpp"
-#include "cairn/optimizer.hpp"
-#include "cairn/registry.hpp"
+#include "cairn/io/format.hpp"
+#include "cairn/plugin/registry.hpp"
+#include "cairn/solve/optimizer.hpp"
 #include "components.hpp"
 #include "support/data.hpp"
 

@@ -3,9 +3,9 @@
 
 #include <gtest/gtest.h>
 
-#include "cairn/loss.hpp"
-#include "cairn/optimizer.hpp"
-#include "cairn/registry.hpp"
+#include "cairn/plugin/registry.hpp"
+#include "cairn/solve/optimizer.hpp"
+#include "cairn/types/loss.hpp"
 #include "components.hpp"
 #include "sample_graphs.hpp"
 

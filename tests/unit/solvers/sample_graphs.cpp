@@ -6,11 +6,11 @@
 
 #include <Eigen/Cholesky>
 
-#include "cairn/define_factor.hpp"
-#include "cairn/gauge.hpp"
-#include "cairn/lie/point.hpp"
-#include "cairn/lie/se2.hpp"
-#include "cairn/linearizer.hpp"
+#include "cairn/graph/gauge.hpp"
+#include "cairn/linear/linearizer.hpp"
+#include "cairn/types/define_factor.hpp"
+#include "cairn/types/lie/point.hpp"
+#include "cairn/types/lie/se2.hpp"
 #include "sample_matrices.hpp"
 
 namespace cairn::test {

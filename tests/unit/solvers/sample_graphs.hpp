@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "cairn/graph.hpp"
+#include "cairn/graph/graph.hpp"
 
 namespace cairn::test {
 

@@ -7,7 +7,7 @@
 
 #include <Eigen/Core>
 
-#include "cairn/block_matrix.hpp"
+#include "cairn/linear/block_matrix.hpp"
 
 namespace cairn::test {
 

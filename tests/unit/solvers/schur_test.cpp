@@ -11,12 +11,12 @@
 #include <gtest/gtest.h>
 #include <Eigen/Cholesky>
 
-#include "cairn/error.hpp"
-#include "cairn/jacobian.hpp"
-#include "cairn/linear_solver.hpp"
-#include "cairn/optimizer.hpp"
-#include "cairn/registry.hpp"
-#include "cairn/threads.hpp"
+#include "cairn/linear/jacobian.hpp"
+#include "cairn/linear/linear_solver.hpp"
+#include "cairn/plugin/registry.hpp"
+#include "cairn/runtime/error.hpp"
+#include "cairn/runtime/threads.hpp"
+#include "cairn/solve/optimizer.hpp"
 #include "sample_graphs.hpp"
 #include "sample_matrices.hpp"
 

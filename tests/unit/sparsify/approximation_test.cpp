@@ -6,7 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "cairn/error.hpp"
+#include "cairn/runtime/error.hpp"
 #include "unit/sparsify/problems.hpp"
 
 namespace cairn::sparsify {

@@ -10,9 +10,9 @@
 
 #include <gtest/gtest.h>
 
-#include "cairn/generator.hpp"
-#include "cairn/optimizer.hpp"
-#include "cairn/registry.hpp"
+#include "cairn/io/generator.hpp"
+#include "cairn/plugin/registry.hpp"
+#include "cairn/solve/optimizer.hpp"
 #include "local_problem.hpp"
 #include "problems.hpp"
 #include "recovery_problem.hpp"

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "approximation.hpp"
-#include "cairn/dual.hpp"
+#include "cairn/types/dual.hpp"
 #include "recovery.hpp"
 #include "unit/sparsify/problems.hpp"
 

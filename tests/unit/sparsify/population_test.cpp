@@ -2,8 +2,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "cairn/error.hpp"
-#include "cairn/sparsification.hpp"
+#include "cairn/runtime/error.hpp"
+#include "cairn/sparsification/sparsification.hpp"
 
 namespace cairn {
 namespace {

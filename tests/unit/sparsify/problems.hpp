@@ -10,7 +10,7 @@
 #include <Eigen/Dense>
 
 #include "approximation.hpp"
-#include "cairn/sparsification.hpp"
+#include "cairn/sparsification/sparsification.hpp"
 
 namespace cairn::sparsify {
 

@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "cairn/error.hpp"
+#include "cairn/runtime/error.hpp"
 #include "recovery.hpp"
 #include "recovery_problem.hpp"
 #include "topologies.hpp"

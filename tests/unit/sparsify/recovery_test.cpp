@@ -9,7 +9,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "cairn/error.hpp"
+#include "cairn/runtime/error.hpp"
 #include "topologies.hpp"
 #include "unit/sparsify/blankets.hpp"
 

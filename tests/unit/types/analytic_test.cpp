@@ -2,8 +2,8 @@
 // Analytic Jacobians against automatic ones: two derivations of one number, to the last digits.
 #include <gtest/gtest.h>
 
-#include "cairn/autodiff.hpp"
-#include "cairn/define_factor.hpp"
+#include "cairn/types/autodiff.hpp"
+#include "cairn/types/define_factor.hpp"
 #include "sampling.hpp"
 #include "slam2d/bearing_range.hpp"
 #include "slam2d/landmark.hpp"

@@ -8,9 +8,9 @@
 #include <Eigen/Geometry>
 
 #include "bundle/reprojection.hpp"
-#include "cairn/autodiff.hpp"
-#include "cairn/check_factor.hpp"
-#include "cairn/define_factor.hpp"
+#include "cairn/types/autodiff.hpp"
+#include "cairn/types/check_factor.hpp"
+#include "cairn/types/define_factor.hpp"
 #include "sampling.hpp"
 
 namespace cairn::test {

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "cairn/check_factor.hpp"
+#include "cairn/types/check_factor.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "cairn/define_factor.hpp"
-#include "cairn/lie/point.hpp"
-#include "cairn/lie/se2.hpp"
+#include "cairn/types/define_factor.hpp"
+#include "cairn/types/lie/point.hpp"
+#include "cairn/types/lie/se2.hpp"
 
 namespace cairn::test {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "cairn/dual.hpp"
+#include "cairn/types/dual.hpp"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include <Eigen/Geometry>
 #include <array>
 
-#include "cairn/lie/so2.hpp"
+#include "cairn/types/lie/so2.hpp"
 
 namespace cairn::test {
 namespace {

@@ -6,8 +6,8 @@
 #include <memory>
 #include <set>
 
-#include "cairn/check_factor.hpp"
-#include "cairn/registry.hpp"
+#include "cairn/plugin/registry.hpp"
+#include "cairn/types/check_factor.hpp"
 #include "sampling.hpp"
 
 namespace cairn::test {

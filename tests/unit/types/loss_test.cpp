@@ -7,9 +7,9 @@
 #include <map>
 #include <string>
 
-#include "cairn/error.hpp"
-#include "cairn/loss.hpp"
-#include "cairn/registry.hpp"
+#include "cairn/plugin/registry.hpp"
+#include "cairn/runtime/error.hpp"
+#include "cairn/types/loss.hpp"
 
 namespace cairn::test {
 namespace {

@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "cairn/factor_type.hpp"
-#include "cairn/variable_type.hpp"
+#include "cairn/types/factor_type.hpp"
+#include "cairn/types/variable_type.hpp"
 
 namespace cairn::test {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "cairn/lie/so2.hpp"
+#include "cairn/types/lie/so2.hpp"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@
 #include <numbers>
 #include <random>
 
-#include "cairn/dual.hpp"
+#include "cairn/types/dual.hpp"
 
 namespace cairn::so2 {
 namespace {

@@ -5,7 +5,7 @@
 #include <Eigen/Core>
 #include <limits>
 
-#include "cairn/registry.hpp"
+#include "cairn/plugin/registry.hpp"
 #include "sampling.hpp"
 
 namespace cairn::test {

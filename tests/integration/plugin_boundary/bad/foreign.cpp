@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "cairn/plugin.hpp"
+#include "cairn/plugin/plugin.hpp"
 #include "plain_loss.hpp"
 
 namespace {

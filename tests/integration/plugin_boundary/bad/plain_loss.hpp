@@ -5,9 +5,9 @@
 #include <memory>
 #include <span>
 
-#include "cairn/loss.hpp"
-#include "cairn/options.hpp"
-#include "cairn/registry.hpp"
+#include "cairn/plugin/options.hpp"
+#include "cairn/plugin/registry.hpp"
+#include "cairn/types/loss.hpp"
 
 /// ρ(s) = s: the smallest component there is, for plugins whose fault lies elsewhere.
 class PlainLoss final : public cairn::Loss {

@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include "cairn/graph/elements.hpp"
+#include "cairn/runtime/aligned.hpp"
+#include "cairn/runtime/api.hpp"
+#include "cairn/types/factor_type.hpp"
+#include "cairn/types/loss.hpp"
+#include "cairn/types/variable_type.hpp"
+
+namespace cairn {
+
+/// All states of a graph: one contiguous array for each variable pool, in the order of the pools.
+/// Copying it is how an optimizer takes a trial step.
+struct Values {
+  std::vector<AlignedVector> pools;
+};
+
+/// All variables of one type. Shared ownership of the type: a graph may outlive the registry that
+/// the type came from, and graphs share types.
+struct VariablePool {
+  std::shared_ptr<const VariableType> type;
+  std::vector<std::int32_t> variables;  ///< slot → index of the variable in the graph
+};
+
+/// All factors of one type, entry by entry in the order in which they were added.
+struct FactorPool {
+  std::shared_ptr<const FactorType> type;
+  std::vector<std::int32_t> variable_pools;  ///< arity: pool of each of the factor's variables
+  std::vector<std::int32_t> slots;           ///< size × arity: slot within that pool
+  std::vector<std::int32_t> variables;       ///< size × arity: index of the variable in the graph
+  AlignedVector measurements;                ///< size × measurement_size
+  AlignedVector information;           ///< size × n(n+1)/2: upper triangle, row by row, as given
+  AlignedVector sqrt_information;      ///< size × n(n+1)/2: U with UᵀU = information, row by row
+  std::vector<std::int32_t> sequence;  ///< position among all factors of the graph
+
+  std::size_t size() const { return sequence.size(); }
+};
+
+/// One factor of a graph: which pool and which entry of it.
+struct FactorRef {
+  std::int32_t pool;
+  std::int32_t entry;
+};
+
+/// Where variables and factors are after some have left: by old index the new one, or -1.
+struct Renumbering {
+  std::vector<std::int32_t> variable;
+  std::vector<std::int32_t> factor;
+};
+
+/// A factor graph: variables and factors in typed pools, and an estimate.
+///
+/// A variable is known by its `Id` (as in files) and by its index 0 … size-1 in the order of
+/// addition, which everything inside cairn uses. Sizes are those of the types; angles are radians,
+/// lengths metres unless a type says otherwise. A graph can be moved, not copied by accident: see
+/// `clone`.
+class CAIRN_API Graph {
+ public:
+  Graph();
+  Graph(Graph&&) noexcept;
+  Graph& operator=(Graph&&) noexcept;
+  ~Graph();
+  Graph clone() const;
+
+  /// Adds a variable with state `x` (ambient_size doubles, normalized here). Returns its index.
+  /// Throws `Error` (input) for a duplicate id, a wrong size, a state that is not finite.
+  int add_variable(std::shared_ptr<const VariableType> type, Id id, std::span<const double> x);
+
+  /// Adds a factor on variables given by index. `information` is the upper triangle row by row,
+  /// n(n+1)/2 doubles. Returns its position among all factors. Throws `Error` (input) for wrong
+  /// counts or types of variables, a variable twice, numbers that are not finite, information that
+  /// is not positive definite.
+  int add_factor(std::shared_ptr<const FactorType> type, std::span<const int> variables,
+                 std::span<const double> measurement, std::span<const double> information);
+
+  /// Takes out the factors and variables marked (by position and by index); what stays keeps its
+  /// order and its state, and moves up. Takes time in proportion to the whole graph. Throws `Error`
+  /// (usage), and removes nothing, if a factor that stays is on a variable that leaves.
+  Renumbering remove(const std::vector<bool>& factors, const std::vector<bool>& variables);
+
+  /// Makes room beforehand; purely for speed.
+  void reserve(std::size_t variables, std::size_t factors);
+
+  // Variables -----------------------------------------------------------------------------------
+  int variable_count() const { return static_cast<int>(records_.size()); }
+  Id id(int variable) const { return records_[variable].id; }
+  /// Index of the variable with that id, if there is one.
+  std::optional<int> find(Id id) const;
+  const VariableType& type(int variable) const {
+    return *variable_pools_[records_[variable].pool].type;
+  }
+  int pool(int variable) const { return records_[variable].pool; }
+  int slot(int variable) const { return records_[variable].slot; }
+  /// Held fixed by the user (`FIX`).
+  bool fixed(int variable) const { return records_[variable].fixed; }
+  void set_fixed(int variable, bool fixed = true);
+  /// The current state of one variable: ambient_size doubles.
+  std::span<const double> state(int variable) const;
+  void set_state(int variable, std::span<const double> x);
+  /// "VERTEX_SE2 17", for messages.
+  std::string describe_variable(int variable) const;
+
+  // Factors -------------------------------------------------------------------------------------
+  int factor_count() const { return static_cast<int>(factors_.size()); }
+  FactorRef factor(int position) const { return factors_[position]; }
+  std::span<const std::int32_t> factor_variables(int position) const;
+  std::span<const double> measurement(int position) const;
+  std::span<const double> information(int position) const;
+  /// Replaces the measurement and, unless empty, the information of a factor; checks as
+  /// `add_factor`.
+  void set_measurement(int position, std::span<const double> measurement,
+                       std::span<const double> information = {});
+  /// "EDGE_SE2 3 17", for messages.
+  std::string describe_factor(int position) const;
+
+  // Pools and values ------------------------------------------------------------------------------
+  const std::vector<VariablePool>& variable_pools() const { return variable_pools_; }
+  const std::vector<FactorPool>& factor_pools() const { return factor_pools_; }
+  const Values& values() const { return values_; }
+  /// Takes over a set of states; sizes must fit.
+  void set_values(Values values);
+  /// The arrays of a factor pool at given states. `states` is storage for the view: keep it alive.
+  FactorView view(int factor_pool, const Values& values, std::vector<const double*>& states) const;
+
+  std::int64_t tangent_size() const;   ///< over all variables, held or not
+  std::int64_t residual_size() const;  ///< over all factors
+  /// Changes whenever variables, factors or held variables are added or change.
+  std::uint64_t structure_version() const { return structure_version_; }
+
+  // Loss ------------------------------------------------------------------------------------------
+  /// Applies a robust loss (null: none). Shared ownership: clones of a graph use one loss.
+  void set_loss(std::shared_ptr<const Loss> loss, LossScope scope = LossScope::all);
+  const Loss* loss() const { return loss_.get(); }
+  LossScope loss_scope() const { return loss_scope_; }
+
+ private:
+  struct VariableRecord {
+    Id id;
+    std::int32_t pool;
+    std::int32_t slot;
+    bool fixed;
+  };
+  int variable_pool_of(const std::shared_ptr<const VariableType>& type);
+  int factor_pool_of(const std::shared_ptr<const FactorType>& type);
+  void remove_factors(const std::vector<bool>& leaves, const std::vector<std::int32_t>& position);
+  void remove_variables(const std::vector<bool>& leaves, const std::vector<std::int32_t>& index);
+
+  std::vector<VariableRecord> records_;
+  std::vector<VariablePool> variable_pools_;
+  Values values_;
+  std::vector<FactorRef> factors_;
+  std::vector<FactorPool> factor_pools_;
+  std::unordered_map<Id, int> index_of_id_;
+  std::shared_ptr<const Loss> loss_;
+  LossScope loss_scope_ = LossScope::all;
+  std::uint64_t structure_version_ = 0;
+};
+
+/// Σ ‖r‖² of every factor (whitened, no loss, no half), by position; n = factor_count().
+CAIRN_API std::vector<double> squared_norms(const Graph& graph);
+
+/// For each factor by position, whether it closes a loop: it joins two variables of one type that
+/// do not follow each other in id order among the variables of that type.
+CAIRN_API std::vector<bool> loop_closures(const Graph& graph);
+
+/// For each factor by position, whether the graph's loss applies to it; all false without a loss.
+CAIRN_API std::vector<bool> under_loss(const Graph& graph);
+
+}  // namespace cairn

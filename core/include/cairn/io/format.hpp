@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "cairn/graph/graph.hpp"
+#include "cairn/runtime/component.hpp"
+
+namespace cairn {
+
+class Registry;
+
+/// How to read a file.
+struct ReadOptions {
+  bool skip_unknown = false;        ///< skip lines with unknown tags, counted in the report
+  bool repair_information = false;  ///< mend information matrices where the mending is known
+};
+
+/// What reading did beyond building the graph. Nothing is skipped or changed without standing here.
+struct ReadReport {
+  std::string format;
+  std::map<std::string, std::int64_t> skipped;  ///< unknown tag → lines
+  std::int64_t repaired = 0;                    ///< information matrices mended
+  std::vector<std::string> notes;  ///< sentences: renumbered ids, missing vertices, …
+  std::vector<double> stamps;  ///< time [s] of each pose, by rising id; empty if the file has none
+};
+
+/// A file format. The reader is given the whole text, unpacked.
+class CAIRN_API Format : public Component {
+ public:
+  static constexpr std::string_view kKind = "format";
+  ~Format() override;
+
+  virtual bool can_read() const = 0;
+  virtual bool can_write() const = 0;
+  /// File name endings without the dot, such as "g2o"; first the one for new files.
+  virtual std::vector<std::string> extensions() const = 0;
+
+  /// How sure the format is that the text (the start of a file, at least its first lines) is its
+  /// own: 0 not at all, 100 certain. Endings are not looked at.
+  virtual int detect(std::string_view head) const = 0;
+
+  /// Builds a graph. Types come from the registry by tag. Throws `Error` (input) with `name`, line,
+  /// what was found and what was expected.
+  virtual Graph read(std::string_view text, const std::string& name, Registry& types,
+                     const ReadOptions& options, ReadReport& report) = 0;
+
+  /// The graph (its estimate and, where the format has them, its factors) as text. Throws `Error`
+  /// (input) naming the first variable or factor that the format cannot express.
+  virtual std::string write(const Graph& graph) = 0;
+};
+
+/// Reads a graph: unpacks .gz by content, chooses the format by content where `format` is empty.
+/// Throws `Error` (input) when the file cannot be opened, is empty, or no format knows it.
+CAIRN_API Graph read_graph(const std::filesystem::path& file, Registry& registry,
+                           const ReadOptions& options, ReadReport& report,
+                           std::string_view format = {});
+CAIRN_API Graph read_graph(const std::filesystem::path& file, Registry& registry);
+
+/// Writes a graph: format by `format`, else by the file's ending (before .gz, which packs). The
+/// file is written beside and renamed, so that a failure never leaves half a file. "-" is standard
+/// output.
+CAIRN_API void write_graph(const Graph& graph, const std::filesystem::path& file,
+                           Registry& registry, std::string_view format = {});
+
+/// The bytes of a file, unpacked if they are gzip. Throws `Error` (input).
+CAIRN_API std::string read_file(const std::filesystem::path& file);
+
+/// Writes beside and renames. Packs if the name ends in .gz. "-" is standard output. Throws `Error`
+/// (input).
+CAIRN_API void write_file(const std::filesystem::path& file, std::string_view bytes);
+
+}  // namespace cairn

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "cairn/graph/graph.hpp"
+#include "cairn/linear/linear_solver.hpp"
+#include "cairn/linear/marginals.hpp"
+#include "cairn/linear/normal_equations.hpp"
+#include "cairn/runtime/api.hpp"
+
+namespace cairn {
+
+/// Marginal covariances of a graph's variables at its present estimate x.
+///
+/// They are blocks of Σ = H⁻¹, H = Σ ρ′ JᵀJ at x, without any damping: the covariance of the vector
+/// δ with x_true = retract(x, δ), in the units of the tangent space. For a pose, x · exp(δ), the
+/// first numbers of δ are metres along the axes of the pose itself (not of the world) and the
+/// others radians. They are covariances of the estimate if x is a minimum and the factors'
+/// information is true. Held and anchored variables are certain: their blocks are zero, and the
+/// uncertainty of all others is relative to them.
+///
+/// Blocks are column-major, numbered by variables of the graph. Graph and solver must outlive this
+/// object, and the graph keep its structure.
+class CAIRN_API GraphMarginals {
+ public:
+  /// Throws `Error` (usage) if the solver has not the ability `Marginals`.
+  GraphMarginals(const Graph& graph, LinearSolver& solver);
+
+  /// Linearises at the graph's states and factorises H. If that fails, `explain` says why, and
+  /// nothing below may be called.
+  Factorization factorize();
+  std::string explain(const Factorization& failure) const { return equations_.explain(failure); }
+
+  const Gauge& gauge() const { return equations_.gauge(); }
+  /// Scalar unknowns: rows of Σ.
+  std::int64_t size() const { return equations_.size(); }
+  /// Time of each part so far; `solve` is that of covariances.
+  const Seconds& seconds() const { return equations_.seconds(); }
+
+  /// Σ_vv of every variable, one after the other.
+  std::vector<double> diagonal();
+  /// Σ_ij of each pair (i, j), one after the other.
+  std::vector<double> blocks(std::span<const std::pair<int, int>> pairs);
+  /// Σ(:, variable): graph.tangent_size() rows, the variables in order.
+  std::vector<double> column(int variable);
+
+ private:
+  const Graph* graph_;
+  NormalEquations equations_;
+  Marginals* marginals_;
+};
+
+/// The derivative of where a variable is in the world [m] by δ at `x`, retract(x, δ): dimension ×
+/// tangent, column-major. None for a type without the ability `Placement`.
+CAIRN_API std::vector<double> position_jacobian(const VariableType& type,
+                                                std::span<const double> x);
+
+/// The covariance of where a variable is, in the world frame [m²]: G Σ_vv Gᵀ with G the derivative
+/// of its position by δ at `x`. `sigma`: tangent × tangent doubles. Returns dimension × dimension
+/// doubles; none for a type without the ability `Placement`.
+CAIRN_API std::vector<double> position_covariance(const VariableType& type,
+                                                  std::span<const double> x,
+                                                  std::span<const double> sigma);
+
+}  // namespace cairn

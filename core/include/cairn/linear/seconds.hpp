@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+namespace cairn {
+
+/// Seconds of each part of an optimisation; `total` is optimisation alone.
+struct Seconds {
+  double total = 0.0;
+  double linearize = 0.0;
+  double analyze = 0.0;
+  double factorize = 0.0;
+  double solve = 0.0;
+  double update = 0.0;  ///< retraction and chi2 of trial steps
+};
+
+}  // namespace cairn

@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <map>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "cairn/runtime/api.hpp"
+
+namespace cairn {
+
+enum class OptionType {
+  boolean,
+  integer,
+  real,
+  text,
+  choice,     ///< one of `choices`
+  component,  ///< the name (with options) of another component; `choices[0]` is its kind
+};
+
+/// One option of a component: what it is called, what it may be, and one line of help.
+struct OptionSpec {
+  std::string name;
+  OptionType type = OptionType::text;
+  std::string default_value;
+  std::string help;  ///< one line; states the unit if there is one
+  double minimum = -std::numeric_limits<double>::infinity();
+  double maximum = std::numeric_limits<double>::infinity();
+  std::vector<std::string> choices;
+};
+
+/// The options of one component, declared once. The same table checks the command line, fills in
+/// defaults and prints the help.
+///
+///     OptionTable{}
+///         .integer("iterations", 100, 1, 1e6, "largest number of iterations")
+///         .choice("ordering", "amd", {"amd", "natural"}, "fill-reducing ordering")
+class CAIRN_API OptionTable {
+ public:
+  OptionTable& boolean(std::string name, bool default_value, std::string help);
+  OptionTable& integer(std::string name, std::int64_t default_value, double minimum, double maximum,
+                       std::string help);
+  OptionTable& real(std::string name, double default_value, double minimum, double maximum,
+                    std::string help);
+  OptionTable& text(std::string name, std::string default_value, std::string help);
+  OptionTable& choice(std::string name, std::string default_value, std::vector<std::string> choices,
+                      std::string help);
+  OptionTable& component(std::string name, std::string kind, std::string default_value,
+                         std::string help);
+
+  const std::vector<OptionSpec>& specs() const { return specs_; }
+  /// The spec of that name, or null.
+  const OptionSpec* find(std::string_view name) const;
+  /// One line an option, for `--help` and `cairn plugins NAME`.
+  std::string help(std::string_view indent = "  ") const;
+
+ private:
+  std::vector<OptionSpec> specs_;
+};
+
+/// Option values as they were written: name to text.
+using OptionValues = std::map<std::string, std::string, std::less<>>;
+
+/// Checked values of all options of one component. Asking for an option that the table does not
+/// have, or as another type, is a programming error and throws `std::logic_error`.
+class CAIRN_API Options {
+ public:
+  /// Checks `values` against `table`; what is missing gets its default. Throws `Error` (usage) that
+  /// names `owner`, the option and what it may be: unknown name (with the nearest spelling), wrong
+  /// type, out of range.
+  Options(const OptionTable& table, const OptionValues& values, std::string_view owner);
+
+  bool boolean(std::string_view name) const;
+  std::int64_t integer(std::string_view name) const;
+  double real(std::string_view name) const;
+  /// For text, choice and component options.
+  const std::string& text(std::string_view name) const;
+  /// Whether the value was given, not defaulted.
+  bool given(std::string_view name) const;
+
+ private:
+  struct Value {
+    OptionType type;
+    std::string text;
+    double number = 0.0;
+    std::int64_t whole = 0;
+    bool given = false;
+  };
+  const Value& value(std::string_view name, OptionType type) const;
+  std::map<std::string, Value, std::less<>> values_;
+};
+
+/// A component as it is named on a command line: `name` or `name:key=value,key=value`.
+struct ComponentSpec {
+  std::string name;
+  OptionValues values;
+};
+
+/// Parses `name:key=value,key=value`. Throws `Error` (usage) with the text and the form expected.
+CAIRN_API ComponentSpec parse_component(std::string_view text);
+
+/// Splits `a,b:key=value,key=value,c` into its components: a part that holds '=' but no ':' before
+/// it belongs to the component on its left.
+CAIRN_API std::vector<std::string> split_components(std::string_view text);
+
+}  // namespace cairn

@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "cairn/plugin/options.hpp"
+#include "cairn/runtime/api.hpp"
+#include "cairn/runtime/component.hpp"
+#include "cairn/types/factor_type.hpp"
+#include "cairn/types/variable_type.hpp"
+
+namespace cairn {
+
+class Registry;
+
+/// Variable and factor types that a types plugin makes, given its options.
+struct TypeSet {
+  std::vector<std::shared_ptr<const VariableType>> variables;
+  std::vector<std::shared_ptr<const FactorType>> factors;
+};
+
+/// What a plugin's `register_plugin` function is given: it adds what the plugin's manifest
+/// promises. Adding what the manifest does not name, or leaving out what it names, is an error of
+/// the plugin.
+class CAIRN_API Registrar {
+ public:
+  template <class Interface>
+  using Factory = std::function<std::unique_ptr<Interface>(const Options&, Registry&)>;
+
+  /// Adds a component of kind `Interface::kKind`. The factory is given checked options; if its
+  /// component needs others, it makes them from the registry at once (a component must not keep the
+  /// registry).
+  template <class Interface>
+  void add(std::string name, OptionTable table, Factory<Interface> factory) {
+    add_component(Interface::kKind, std::move(name), std::move(table),
+                  [factory = std::move(factory)](const Options& options, Registry& registry)
+                      -> std::unique_ptr<Component> { return factory(options, registry); });
+  }
+
+  /// Adds a set of types under the name of the plugin (kind "types"); options of it are given with
+  /// `Registry::set_type_options`. Their tags are the manifest's "variable" and "factor" offers.
+  void add_types(std::string name, OptionTable table,
+                 std::function<TypeSet(const Options&)> factory);
+
+ private:
+  friend class Registry;
+  struct Target;
+  explicit Registrar(Target& target) : target_(&target) {}
+  void add_component(std::string_view kind, std::string name, OptionTable table,
+                     Factory<Component> factory);
+  Target* target_;
+};
+
+/// A name on offer, as `cairn plugins` lists it; known from the sidecar file, without loading
+/// anything.
+struct Offer {
+  std::string kind;
+  std::string name;
+  std::string summary;
+  std::string plugin;  ///< name of the plugin
+  std::filesystem::path file;
+  std::string licence;
+  std::string version;
+};
+
+/// Something wrong with the plugins found that concerns nobody who does not ask for it: a sidecar
+/// that cannot be read, a folder that is refused, two plugins with one name.
+struct PluginProblem {
+  std::filesystem::path where;
+  std::string message;
+};
+
+/// Where plugins are looked for, in this order.
+struct PluginSearch {
+  std::vector<std::filesystem::path> files;  ///< shared objects named by the user (`--plugin FILE`)
+  bool environment = true;                   ///< folders of CAIRN_PLUGIN_PATH, separated by ':'
+  bool default_folder = true;                ///< the folder `cairn` beside the core library
+};
+
+/// Finds plugins and makes components by kind and name.
+///
+/// The constructor reads the small JSON file beside each shared object and opens none of them (only
+/// those named by file are opened, since a user who names one wants to know at once). A plugin is
+/// loaded when one of its names is asked for, and never unloaded: its objects may outlive the
+/// registry. All errors are `Error` (plugin or usage) and say what is on offer. Not thread-safe.
+class CAIRN_API Registry {
+ public:
+  explicit Registry(const PluginSearch& search = {});
+  Registry(const Registry&) = delete;
+  Registry& operator=(const Registry&) = delete;
+  ~Registry();
+
+  /// All names on offer, sorted by kind and name.
+  std::vector<Offer> offers() const;
+  /// Names of one kind, sorted.
+  std::vector<std::string> names(std::string_view kind) const;
+  const std::vector<PluginProblem>& problems() const;
+
+  /// Makes a component: `make<LinearSolver>("cholmod:ordering=metis")`.
+  template <class Interface>
+  std::unique_ptr<Interface> make(std::string_view spec) {
+    return make<Interface>(parse_component(spec));
+  }
+  template <class Interface>
+  std::unique_ptr<Interface> make(const ComponentSpec& spec) {
+    return std::unique_ptr<Interface>(
+        static_cast<Interface*>(make_component(Interface::kKind, spec).release()));
+  }
+
+  /// The options that a name takes; loads its plugin.
+  const OptionTable& options(std::string_view kind, std::string_view name);
+
+  /// Options of a types plugin (`slam3d:metric=g2o`). Throws if its types were already handed out.
+  void set_type_options(const ComponentSpec& spec);
+  /// The type with that tag. Throws `Error` (plugin) with the tags on offer.
+  std::shared_ptr<const VariableType> variable_type(std::string_view tag);
+  std::shared_ptr<const FactorType> factor_type(std::string_view tag);
+  /// Whether some plugin offers that name.
+  bool has(std::string_view kind, std::string_view name) const;
+
+  /// Loads every plugin on offer, for listings of options and for conformance tests.
+  void load_all();
+
+ private:
+  std::unique_ptr<Component> make_component(std::string_view kind, const ComponentSpec& spec);
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace cairn

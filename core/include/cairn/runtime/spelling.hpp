@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "cairn/runtime/api.hpp"
+
+namespace cairn {
+
+/// The candidate nearest to `word` by edit distance (insert, delete, replace, swap), or an empty
+/// string if none is near enough to be what was meant.
+CAIRN_API std::string nearest_spelling(std::string_view word,
+                                       std::span<const std::string> candidates);
+
+/// "; did you mean 'x'?" or, with nothing near, "; on offer: a, b, c": the end of an error message.
+CAIRN_API std::string what_is_on_offer(std::string_view word,
+                                       std::span<const std::string> candidates);
+
+}  // namespace cairn

@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "cairn/graph/graph.hpp"
+#include "cairn/graph/update.hpp"
+#include "cairn/runtime/component.hpp"
+
+namespace cairn {
+
+/// How hard to work in one update.
+struct UpdateOptions {
+  /// Take in what is new, and solve later: the estimate of old variables stays.
+  bool defer = false;
+  /// Relinearise, reorder and solve everything, until it has converged.
+  bool full = false;
+  /// 0: no limit. Otherwise relinearisation that would take longer is left to later updates, which
+  /// is reported as `owed`.
+  double max_seconds = 0.0;
+};
+
+/// Seconds of each part of an update.
+struct UpdateSeconds {
+  double total = 0.0;
+  double linearize = 0.0;  ///< evaluating factors
+  double order = 0.0;      ///< finding the affected part, ordering it, its symbolic analysis
+  double factorize = 0.0;
+  double solve = 0.0;      ///< back substitution
+  double check = 0.0;      ///< finding out what should be relinearised
+  double marginals = 0.0;  ///< keeping covariances up to date
+
+  CAIRN_API UpdateSeconds& operator+=(const UpdateSeconds& other);
+};
+
+/// How the covariances that are kept were brought up to date.
+enum class MarginalsBy { none, unchanged, downdate, recomputation };
+/// "none", "unchanged", "downdate", "recomputation".
+CAIRN_API std::string_view to_string(MarginalsBy by);
+
+/// What an update did.
+struct UpdateReport {
+  bool ok = true;  ///< false: H is not positive definite; the estimate is the best that is known
+  FactorId first_factor = 0;  ///< id of the first of the update's new factors; the others follow it
+  /// The ids of the priors that marginalisation left, if any.
+  std::vector<FactorId> priors;
+  int iterations = 0;            ///< linear systems solved
+  int affected_variables = 0;    ///< whose columns of the factor were computed anew, summed
+  int relinearized_factors = 0;  ///< besides the new ones
+  int owed = 0;                  ///< factors that should be relinearised, left to later updates
+  MarginalsBy marginals_by = MarginalsBy::none;
+  UpdateSeconds seconds;
+  /// What a user should know, a sentence each, such as which variable was anchored.
+  std::vector<std::string> notes;
+};
+
+/// Which covariances an estimator keeps up to date after every update.
+enum class KeptMarginals {
+  none,
+  last,     ///< the block of the variable that was added last
+  diagonal  ///< the blocks of all variables
+};
+
+/// An estimate that follows a graph while it grows and changes: measurements go in, and the states
+/// that they make most likely come out, with their covariances.
+///
+/// A variable is known by its `Id` and a factor by its `FactorId`. Every update is atomic: what it
+/// asks for is checked before anything changes, so an `Error` (input: an unknown id, a duplicate, a
+/// wrong size, …) leaves the estimator as it was. A component of the graph without a fixed variable
+/// or prior gets its first pose anchored, as by `resolve_gauge`, and says so in a note. Minimised
+/// is the sum of ρ(‖r‖²), as by an `Optimizer`.
+class CAIRN_API Estimator : public Component {
+ public:
+  static constexpr std::string_view kKind = "estimator";
+  ~Estimator() override;
+
+  virtual UpdateReport update(const GraphUpdate& update, const UpdateOptions& options = {}) = 0;
+
+  /// The loss of all factors, those to come included (null: none). Everything is relinearised at
+  /// the next update.
+  virtual void set_loss(std::shared_ptr<const Loss> loss, LossScope scope = LossScope::all) = 0;
+
+  /// The current estimate of one variable: ambient_size doubles, good until the next update. Throws
+  /// `Error` (usage) for an id that is not there.
+  virtual std::span<const double> state(Id id) const = 0;
+  virtual bool has(Id id) const = 0;
+  virtual int variable_count() const = 0;
+  virtual int factor_count() const = 0;
+  /// Σ ρ(‖r‖²) at the current estimate; takes as long as evaluating every factor once.
+  virtual double chi2() const = 0;
+  /// Everything at the current estimate, as a graph of its own. Anchored variables are not marked
+  /// as fixed in it.
+  virtual Graph graph() const = 0;
+
+  // Covariances: of the tangent vector δ at the current estimate, x ⊕ δ ---------------------------
+  /// From the next update on, keep these.
+  virtual void keep_marginals(KeptMarginals kept) = 0;
+  /// Keep the cross block of these two as well.
+  virtual void keep_cross(Id a, Id b) = 0;
+  /// Σ_ab (tangent_a × tangent_b, column-major) of any two variables, a = b included: what is kept
+  /// is copied, anything else solved for. Held variables have zeros. False if H is singular.
+  virtual bool covariance(Id a, Id b, std::span<double> block) = 0;
+  /// Σ(:, id): for each variable in the order of `variables` the block of rows; column-major with
+  /// as many rows as the tangent sizes add up to.
+  virtual bool covariance_column(Id id, std::span<const Id> variables, std::span<double> out) = 0;
+
+  /// Forgets everything but its options.
+  virtual void reset() = 0;
+  /// A copy, for questions of the kind "what if": neither knows of what the other does.
+  virtual std::unique_ptr<Estimator> clone() const = 0;
+  /// Peak room that is taken by factor and covariances [bytes], as far as it is known.
+  virtual std::int64_t memory() const { return 0; }
+};
+
+/// Σ of several variables jointly, all of the same tangent size; column-major, as many rows as
+/// these sizes add up to. A column is solved for each of them. Zeros where H is singular.
+CAIRN_API std::vector<double> joint_covariance(Estimator& estimator, std::span<const Id> variables,
+                                               int tangent_size);
+
+}  // namespace cairn

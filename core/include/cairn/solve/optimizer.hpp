@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <atomic>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "cairn/graph/graph.hpp"
+#include "cairn/linear/linear_solver.hpp"
+#include "cairn/linear/seconds.hpp"
+#include "cairn/runtime/component.hpp"
+
+namespace cairn {
+
+/// When to stop.
+struct Stop {
+  int max_iterations = 100;
+  /// Stop when a step could lower chi2 by less than this fraction. 0: run exactly `max_iterations`.
+  double tolerance = 1e-10;
+  double max_seconds = 0.0;  ///< 0: no limit
+  const std::atomic<bool>* interrupt =
+      nullptr;  ///< stop with the best estimate when it becomes true
+};
+
+enum class Status { converged, max_iterations, diverged, not_positive_definite, interrupted };
+
+/// "converged", "max_iterations", … as in the JSON of the command line.
+CAIRN_API std::string_view to_string(Status status);
+
+/// One iteration. chi2 is that of the estimate after it.
+struct Iteration {
+  int number = 0;  ///< from 1
+  double chi2 = 0.0;
+  double step_norm = 0.0;  ///< Euclidean norm of the step in the tangent space
+  double lambda = 0.0;     ///< damping or 1/trust-region radius; 0 where there is none
+  bool accepted = true;
+  double seconds = 0.0;  ///< of this iteration
+};
+
+/// Is told of what happens during long work. Progress bars, logs, recordings and early stops hang
+/// on it.
+class CAIRN_API Observer {
+ public:
+  virtual ~Observer();
+  /// Before the first iteration.
+  virtual void on_start(const Graph& graph, double chi2);
+  /// After each iteration, with the best states so far. Return false to stop.
+  virtual bool on_iteration(const Iteration& iteration, const Graph& graph, const Values& values);
+  /// A sentence for the user, such as which variable was anchored.
+  virtual void on_message(std::string_view message);
+};
+
+/// How an optimisation ended.
+struct Summary {
+  std::string optimizer;
+  std::string linear_solver;
+  Status status = Status::max_iterations;
+  double initial_chi2 = 0.0;
+  double final_chi2 = 0.0;
+  std::vector<Iteration> iterations;
+  Seconds seconds;
+  LinearSolverStats solver;
+  /// What a user should know, a sentence each: the gauge, why a factorisation failed and at which
+  /// variable, where it stopped.
+  std::vector<std::string> notes;
+};
+
+/// Minimises Σ ρ(‖r‖²) over a graph's variables, starting from its states and leaving the best
+/// states found in it. The graph's structure is not changed; a gauge that is left free is anchored
+/// (`resolve_gauge`). A diverging, interrupted or failed run leaves the best estimate too, and says
+/// so in `Summary::status`. Throws `Error` only for bad calls.
+class CAIRN_API Optimizer : public Component {
+ public:
+  static constexpr std::string_view kKind = "optimizer";
+  ~Optimizer() override;
+
+  virtual Summary optimize(Graph& graph, const Stop& stop, Observer& observer) = 0;
+  /// With nobody watching.
+  Summary optimize(Graph& graph, const Stop& stop = {});
+};
+
+}  // namespace cairn

@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "cairn/runtime/api.hpp"
+
+namespace cairn {
+
+/// What a factor type sees of a pool: plain arrays, one entry a factor.
+struct FactorView {
+  std::size_t size = 0;
+  /// size × arity: index of each variable's state within its type's array.
+  const std::int32_t* slots = nullptr;
+  /// size × measurement_size.
+  const double* measurements = nullptr;
+  /// size × n(n+1)/2, n = residual size: U upper triangular with UᵀU = information, row by row.
+  const double* sqrt_information = nullptr;
+  /// arity arrays of states, one for each of the factor's variables in order (the same array twice
+  /// if two variables are of one type).
+  const double* const* states = nullptr;
+};
+
+/// Where the contribution of a factor to H or to the gradient goes.
+///
+/// A target is an offset in doubles. Where a factor is the only one that writes a block, the offset
+/// points into the values of H, and the block is written. Otherwise it points into `scratch`, is
+/// stored as its bitwise complement (negative), and the block is added to what is there: the
+/// linearizer gives each run of factors that one task works off places of its own, and adds these
+/// up in a fixed order afterwards. So no sum depends on the number of threads.
+struct LinearizeSink {
+  static constexpr std::int64_t kNone =
+      INT64_MIN;  ///< a held variable takes part: nothing to write
+
+  double* H = nullptr;
+  double* scratch = nullptr;
+  /// size × arity(arity+1)/2, pairs (a, b) with a ≤ b in the order (0,0) (0,1) … (1,1) (1,2) …
+  /// The block is J_aᵀ J_b (tangent_a × tangent_b, column-major), or its transpose where
+  /// `transposed` says so.
+  const std::int64_t* blocks = nullptr;
+  const std::uint8_t* transposed = nullptr;  ///< size × arity(arity+1)/2
+  /// size × arity: where −J_aᵀ r is added; always in scratch, stored without complement.
+  const std::int64_t* gradients = nullptr;
+
+  /// Writes or adds a block.
+  template <class Block>
+  void put(std::int64_t offset, const Block& block) const {
+    constexpr int kSize = Block::SizeAtCompileTime;
+    if (offset >= 0) {
+      for (int k = 0; k < kSize; ++k) H[offset + k] = block.data()[k];
+    } else {
+      for (int k = 0; k < kSize; ++k) scratch[~offset + k] += block.data()[k];
+    }
+  }
+};
+
+/// A kind of factor (relative pose, landmark seen, prior, …). One object serves all graphs; it has
+/// no state but its options. Every function but `evaluate` works on a range of a pool: one virtual
+/// call a pool, and a fixed-size, inlined loop inside it. Authors don't derive from this: see
+/// `define_factor.hpp`.
+///
+/// Residuals are whitened: r = U e with e the error in the metric's units and UᵀU the information.
+class CAIRN_API FactorType {
+ public:
+  virtual ~FactorType();
+
+  /// The name in files and messages, such as EDGE_SE2.
+  virtual std::string_view tag() const = 0;
+  virtual int arity() const = 0;
+  /// Tags of the variable types, `arity()` of them.
+  virtual std::span<const std::string_view> variable_tags() const = 0;
+  virtual int residual_size() const = 0;
+  virtual int measurement_size() const = 0;  ///< doubles a measurement, in memory and in files
+  virtual int tangent_size(int variable) const = 0;
+  virtual int ambient_size(int variable) const = 0;
+
+  /// Brings a measurement that was read into canonical form. Empty, or what is wrong with it.
+  virtual std::string normalize(double* measurement) const = 0;
+
+  /// out[f - begin] = ‖r_f‖² for f in [begin, end).
+  virtual void squared_norms(const FactorView& pool, std::size_t begin, std::size_t end,
+                             double* out) const = 0;
+
+  /// Adds what factors [begin, end) contribute to H = Σ w JᵀJ and g = −Σ w Jᵀr. `weights` (null:
+  /// all one) holds end - begin weights, the first derivative of the loss. out_squared_norms,
+  /// unless null, gets ‖r_f‖² as `squared_norms` gives it.
+  virtual void linearize(const FactorView& pool, std::size_t begin, std::size_t end,
+                         const double* weights, const LinearizeSink& sink,
+                         double* out_squared_norms) const = 0;
+
+  /// One factor by itself: the whitened residual (residual_size) and, for each variable whose
+  /// pointer is not null, the whitened Jacobian dr/dδ (residual_size × tangent_size, column-major).
+  /// For adapters and tests; jacobians itself may be null.
+  virtual void evaluate(const double* const* x, const double* measurement,
+                        const double* sqrt_information, double* residual,
+                        double* const* jacobians) const = 0;
+
+  /// Computes the state of variable `target` that makes the error zero, given the others. False if
+  /// the measurement does not determine it. Spanning trees and odometry chains hang on it.
+  virtual bool propagate(int target, const double* const* x, const double* measurement,
+                         double* out) const = 0;
+
+  /// Whether the measurement is a group element z of the variables' Lie group with x_1 ≈ x_0 z
+  /// (both variables of one type): what composing and the chordal guess need.
+  virtual bool is_relative() const = 0;
+
+  /// Human-readable name of the error metric where there is a choice, else empty.
+  virtual std::string_view metric() const { return {}; }
+
+  /// How many numbers it measures of where its variables are in the world, as `resolve_gauge`
+  /// counts them: all of a factor on one variable, none of a factor between variables.
+  virtual int absolute_size() const { return arity() == 1 ? residual_size() : 0; }
+
+  /// Whether a graph's robust loss applies. Not where losses are in the measurement already.
+  virtual bool takes_loss() const { return true; }
+};
+
+}  // namespace cairn

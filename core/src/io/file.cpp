@@ -1,0 +1,268 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Bytes of files, packed or not: read_file and write_file of format.hpp.
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#include <zlib.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <limits>
+#include <string>
+#include <system_error>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "cairn/io/format.hpp"
+#include "cairn/runtime/error.hpp"
+
+namespace cairn {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kChunk = std::size_t{1} << 18;
+
+[[noreturn]] void fail(const fs::path& file, const std::string& what) {
+  throw Error(ErrorCode::input, fmt::format("{}: {}", file.string(), what));
+}
+
+std::string system_message(int number) { return std::generic_category().message(number); }
+
+/// Owns a file descriptor.
+class Descriptor {
+ public:
+  explicit Descriptor(int number) : number_(number) {}
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+  ~Descriptor() {
+    if (number_ >= 0) ::close(number_);
+  }
+  int number() const { return number_; }
+  /// Closes now, to learn of errors that show only then (a full disk, a network share).
+  bool close() { return ::close(std::exchange(number_, -1)) == 0; }
+
+ private:
+  int number_;
+};
+
+std::string read_bytes(const fs::path& file) {
+  Descriptor input(::open(file.c_str(), O_RDONLY | O_CLOEXEC));
+  if (input.number() < 0) fail(file, "cannot be opened: " + system_message(errno));
+  struct stat status {};
+  if (::fstat(input.number(), &status) != 0) {
+    fail(file, "cannot be examined: " + system_message(errno));
+  }
+  if (S_ISDIR(status.st_mode)) fail(file, "is a folder; expected a file");
+
+  // The size is only a hint: pipes have none, and a file may grow while it is read.
+  std::string bytes;
+  std::size_t used = 0;
+  bytes.resize(static_cast<std::size_t>(std::max<off_t>(status.st_size, 0)) + 1);
+  for (;;) {
+    if (used == bytes.size()) bytes.resize(bytes.size() + std::max(kChunk, bytes.size() / 2));
+    const ssize_t got = ::read(input.number(), bytes.data() + used, bytes.size() - used);
+    if (got < 0 && errno == EINTR) continue;
+    if (got < 0) fail(file, "cannot be read: " + system_message(errno));
+    if (got == 0) break;
+    used += static_cast<std::size_t>(got);
+  }
+  bytes.resize(used);
+  return bytes;
+}
+
+bool is_gzip(std::string_view bytes) {
+  return bytes.size() >= 2 && bytes[0] == '\x1f' && bytes[1] == '\x8b';
+}
+
+/// Owns zlib's state for unpacking.
+struct Inflater {
+  z_stream stream{};
+  Inflater() {
+    if (inflateInit2(&stream, 15 + 16) != Z_OK) throw std::bad_alloc();
+  }
+  Inflater(const Inflater&) = delete;
+  Inflater& operator=(const Inflater&) = delete;
+  ~Inflater() { inflateEnd(&stream); }
+};
+
+/// Unpacks one gzip member from the front of `packed` onto the end of `out`; returns its packed
+/// size.
+std::size_t unpack_member(const fs::path& file, std::string_view packed, std::string& out) {
+  Inflater inflater;
+  z_stream& z = inflater.stream;
+  std::size_t taken = 0;
+  for (;;) {
+    // zlib counts in unsigned int: feed it piecewise.
+    const std::size_t feed =
+        std::min<std::size_t>(packed.size() - taken, std::numeric_limits<uInt>::max() / 2);
+    z.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(packed.data() + taken));
+    z.avail_in = static_cast<uInt>(feed);
+    const std::size_t used = out.size();
+    out.resize(used + std::max(kChunk, used / 2 < (std::size_t{1} << 30) ? used / 2 : kChunk));
+    z.next_out = reinterpret_cast<Bytef*>(out.data() + used);
+    z.avail_out = static_cast<uInt>(out.size() - used);
+    const std::size_t room = z.avail_out;
+    const int status = inflate(&z, Z_NO_FLUSH);
+    taken += feed - z.avail_in;
+    out.resize(used + (room - z.avail_out));
+    if (status == Z_STREAM_END) return taken;
+    const bool starved = taken == packed.size() && z.avail_out > 0;
+    if (status == Z_BUF_ERROR || (status == Z_OK && starved)) {
+      fail(file,
+           fmt::format("is gzip data that breaks off after {} bytes ({} unpacked); the file is "
+                       "truncated, get it again",
+                       packed.size(), out.size()));
+    }
+    if (status != Z_OK) {
+      fail(file, fmt::format("is gzip data that is damaged near byte {} ({}); get the file again",
+                             taken, z.msg ? z.msg : "unknown reason"));
+    }
+  }
+}
+
+std::string unpack(const fs::path& file, std::string_view packed) {
+  std::string out;
+  while (!packed.empty()) {
+    if (!is_gzip(packed)) {
+      // Tapes and some tools pad with zeros; anything else is not ours to ignore.
+      if (packed.find_first_not_of('\0') == std::string_view::npos) break;
+      fail(file, fmt::format("has {} bytes after the end of its gzip data", packed.size()));
+    }
+    packed.remove_prefix(unpack_member(file, packed, out));
+  }
+  return out;
+}
+
+std::string pack(const fs::path& file, std::string_view bytes) {
+  z_stream z{};
+  if (deflateInit2(&z, Z_DEFAULT_COMPRESSION, Z_DEFLATED, 15 + 16, 8, Z_DEFAULT_STRATEGY) != Z_OK) {
+    throw std::bad_alloc();
+  }
+  std::string out;
+  int status = Z_OK;
+  do {
+    const std::size_t feed = std::min<std::size_t>(bytes.size(), std::size_t{1} << 30);
+    z.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(bytes.data()));
+    z.avail_in = static_cast<uInt>(feed);
+    const std::size_t used = out.size();
+    out.resize(used + kChunk);
+    z.next_out = reinterpret_cast<Bytef*>(out.data() + used);
+    z.avail_out = static_cast<uInt>(kChunk);
+    status = deflate(&z, feed == bytes.size() ? Z_FINISH : Z_NO_FLUSH);
+    bytes.remove_prefix(feed - z.avail_in);
+    out.resize(used + kChunk - z.avail_out);
+  } while (status == Z_OK || (status == Z_BUF_ERROR && !bytes.empty()));
+  deflateEnd(&z);
+  if (status != Z_STREAM_END) fail(file, "could not be packed");
+  return out;
+}
+
+bool write_all(int descriptor, std::string_view bytes) {
+  while (!bytes.empty()) {
+    const ssize_t put = ::write(descriptor, bytes.data(), bytes.size());
+    if (put < 0 && errno == EINTR) continue;
+    if (put < 0) return false;
+    bytes.remove_prefix(static_cast<std::size_t>(put));
+  }
+  return true;
+}
+
+void write_to_standard_output(std::string_view bytes) {
+  // Through stdio, so that it comes after what the program has printed itself.
+  if (std::fwrite(bytes.data(), 1, bytes.size(), stdout) != bytes.size() ||
+      std::fflush(stdout) != 0) {
+    throw Error(ErrorCode::input, "standard output cannot be written: " + system_message(errno));
+  }
+}
+
+/// Pipes, terminals, /dev/null: renaming a file over them would remove them.
+void write_in_place(const fs::path& file, std::string_view bytes) {
+  Descriptor output(::open(file.c_str(), O_WRONLY | O_CLOEXEC));
+  if (output.number() < 0 || !write_all(output.number(), bytes) || !output.close()) {
+    fail(file, "cannot be written: " + system_message(errno));
+  }
+}
+
+/// A file that is removed unless it was moved to its final place.
+class TemporaryFile {
+ public:
+  /// `mode` as for open(2).
+  TemporaryFile(const fs::path& target, mode_t mode) {
+    for (int attempt = 0;; ++attempt) {
+      path_ = target;
+      path_ += fmt::format(".{}-{}.part", ::getpid(), attempt);
+      descriptor_ = ::open(path_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, mode);
+      if (descriptor_ >= 0) return;
+      if (errno != EEXIST || attempt == 100) {
+        fail(target, "cannot be written: " + system_message(errno));
+      }
+    }
+  }
+  TemporaryFile(const TemporaryFile&) = delete;
+  TemporaryFile& operator=(const TemporaryFile&) = delete;
+  ~TemporaryFile() {
+    if (descriptor_ >= 0) ::close(descriptor_);
+    if (!path_.empty()) ::unlink(path_.c_str());
+  }
+
+  void write(std::string_view bytes) {
+    if (!write_all(descriptor_, bytes) || ::close(std::exchange(descriptor_, -1)) != 0) {
+      fail(path_, "cannot be written: " + system_message(errno));
+    }
+  }
+  void set_mode(mode_t mode) { ::fchmod(descriptor_, mode); }
+  void move_to(const fs::path& target) {
+    if (::rename(path_.c_str(), target.c_str()) != 0) {
+      fail(target, "cannot be written: " + system_message(errno));
+    }
+    path_.clear();
+  }
+
+ private:
+  fs::path path_;
+  int descriptor_ = -1;
+};
+
+/// The file that a chain of symbolic links ends in, so that replacing it keeps the links.
+fs::path follow_links(fs::path file) {
+  std::error_code ignored;
+  for (int depth = 0; depth < 40 && fs::is_symlink(file, ignored); ++depth) {
+    const fs::path next = fs::read_symlink(file, ignored);
+    if (ignored) break;
+    file = next.is_absolute() ? next : file.parent_path() / next;
+  }
+  return file;
+}
+
+}  // namespace
+
+std::string read_file(const fs::path& file) {
+  std::string bytes = read_bytes(file);
+  return is_gzip(bytes) ? unpack(file, bytes) : bytes;
+}
+
+void write_file(const fs::path& file, std::string_view bytes) {
+  if (file == "-") return write_to_standard_output(bytes);
+  std::string packed;
+  if (file.extension() == ".gz") {
+    packed = pack(file, bytes);
+    bytes = packed;
+  }
+  const fs::path target = follow_links(file);
+  struct stat status {};
+  const bool exists = ::stat(target.c_str(), &status) == 0;
+  if (exists && S_ISDIR(status.st_mode)) fail(file, "is a folder; expected a file name");
+  if (exists && !S_ISREG(status.st_mode)) return write_in_place(target, bytes);
+
+  TemporaryFile temporary(target, 0666);
+  if (exists) temporary.set_mode(status.st_mode & 07777);
+  temporary.write(bytes);
+  temporary.move_to(target);
+}
+
+}  // namespace cairn

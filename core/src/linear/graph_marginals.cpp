@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "cairn/linear/graph_marginals.hpp"
+
+#include <algorithm>
+
+#include <Eigen/Core>
+
+#include "cairn/runtime/error.hpp"
+
+namespace cairn {
+namespace {
+
+Marginals& marginals_of(LinearSolver& solver) {
+  if (auto* marginals = query<Marginals>(solver)) return *marginals;
+  throw Error(ErrorCode::usage,
+              "this linear solver cannot give covariances (it has not the ability 'marginals'); "
+              "block_cholesky can");
+}
+
+std::int64_t tangent(const Graph& graph, int variable) {
+  return graph.type(variable).tangent_size();
+}
+
+}  // namespace
+
+GraphMarginals::GraphMarginals(const Graph& graph, LinearSolver& solver)
+    : graph_(&graph), equations_(graph, solver), marginals_(&marginals_of(solver)) {}
+
+Factorization GraphMarginals::factorize() {
+  if (size() == 0) return {};
+  equations_.linearize(graph_->values());
+  return equations_.factorize();
+}
+
+std::vector<double> GraphMarginals::diagonal() {
+  const Linearizer& linearizer = equations_.linearizer();
+  std::int64_t held = 0, free = 0;
+  for (int v = 0; v < graph_->variable_count(); ++v)
+    (linearizer.block_of(v) < 0 ? held : free) += tangent(*graph_, v) * tangent(*graph_, v);
+  std::vector<double> of_blocks(free), all(free + held);
+  if (size() > 0) marginals_->diagonal_blocks(of_blocks);
+  auto from = of_blocks.begin();  // blocks are in the order of the variables
+  auto to = all.begin();
+  for (int v = 0; v < graph_->variable_count(); ++v) {
+    const std::int64_t count = tangent(*graph_, v) * tangent(*graph_, v);
+    if (linearizer.block_of(v) >= 0) {
+      std::copy_n(from, count, to);
+      from += count;
+    }
+    to += count;
+  }
+  return all;
+}
+
+std::vector<double> GraphMarginals::blocks(std::span<const std::pair<int, int>> pairs) {
+  const Linearizer& linearizer = equations_.linearizer();
+  const auto count = [&](const std::pair<int, int>& pair) {
+    return tangent(*graph_, pair.first) * tangent(*graph_, pair.second);
+  };
+  const auto free = [&](const std::pair<int, int>& pair) {
+    return linearizer.block_of(pair.first) >= 0 && linearizer.block_of(pair.second) >= 0;
+  };
+  std::vector<std::pair<std::int32_t, std::int32_t>> wanted;
+  std::int64_t values = 0, all_values = 0;
+  for (const auto& pair : pairs) {
+    all_values += count(pair);
+    if (!free(pair)) continue;
+    wanted.emplace_back(linearizer.block_of(pair.first), linearizer.block_of(pair.second));
+    values += count(pair);
+  }
+  std::vector<double> of_blocks(values), all(all_values);
+  if (!wanted.empty()) marginals_->blocks(wanted, of_blocks);
+  auto from = of_blocks.begin();
+  auto to = all.begin();
+  for (const auto& pair : pairs) {
+    if (free(pair)) {
+      std::copy_n(from, count(pair), to);
+      from += count(pair);
+    }
+    to += count(pair);
+  }
+  return all;
+}
+
+std::vector<double> GraphMarginals::column(int variable) {
+  const Linearizer& linearizer = equations_.linearizer();
+  const std::int64_t columns = tangent(*graph_, variable), rows = graph_->tangent_size();
+  std::vector<double> all(rows * columns);
+  const int block = linearizer.block_of(variable);
+  if (block < 0) return all;
+  std::vector<double> of_blocks(size() * columns);
+  marginals_->block_column(block, of_blocks);
+  for (std::int64_t c = 0; c < columns; ++c) {
+    auto from = of_blocks.begin() + c * size();
+    auto to = all.begin() + c * rows;
+    for (int v = 0; v < graph_->variable_count(); ++v) {
+      const std::int64_t count = tangent(*graph_, v);
+      if (linearizer.block_of(v) >= 0) {
+        std::copy_n(from, count, to);
+        from += count;
+      }
+      to += count;
+    }
+  }
+  return all;
+}
+
+std::vector<double> position_jacobian(const VariableType& type, std::span<const double> x) {
+  const Placement* place = type.placement();
+  if (!place) return {};
+  const int n = type.tangent_size(), d = place->dimension();
+  // Positions are smooth in δ, and a step of 1e-5 leaves ten digits of central differences.
+  constexpr double kStep = 1e-5;
+  std::vector<double> G(static_cast<std::size_t>(d) * static_cast<std::size_t>(n));
+  Eigen::Map<Eigen::MatrixXd> derivative(G.data(), d, n);
+  std::vector<double> delta(n, 0.0), moved(x.size()), R(d * d);
+  const auto position = [&](int k, double step) {
+    delta[k] = step;
+    const std::int64_t offset = 0;
+    type.retract(1, x.data(), &offset, delta.data(), moved.data());
+    delta[k] = 0.0;
+    Eigen::VectorXd t(d);
+    place->split(moved.data(), R.data(), t.data());
+    return t;
+  };
+  for (int k = 0; k < n; ++k)
+    derivative.col(k) = (position(k, kStep) - position(k, -kStep)) / (2.0 * kStep);
+  return G;
+}
+
+std::vector<double> position_covariance(const VariableType& type, std::span<const double> x,
+                                        std::span<const double> sigma) {
+  const Placement* place = type.placement();
+  if (!place) return {};
+  const int n = type.tangent_size(), d = place->dimension();
+  const std::vector<double> derivative = position_jacobian(type, x);
+  const Eigen::Map<const Eigen::MatrixXd> G(derivative.data(), d, n), Sigma(sigma.data(), n, n);
+  std::vector<double> out(d * d);
+  Eigen::Map<Eigen::MatrixXd>(out.data(), d, d) = G * Sigma * G.transpose();
+  return out;
+}
+
+}  // namespace cairn

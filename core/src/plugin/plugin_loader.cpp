@@ -1,0 +1,191 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "plugin_loader.hpp"
+
+#define BOOST_DLL_USE_STD_FS
+#include <sys/stat.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <fstream>
+#include <iterator>
+#include <map>
+#include <sstream>
+#include <system_error>
+
+#include <fmt/format.h>
+#include <boost/dll/runtime_symbol_info.hpp>
+#include <boost/dll/shared_library.hpp>
+#include <boost/json.hpp>
+
+#include "cairn/runtime/error.hpp"
+
+namespace cairn {
+namespace {
+
+namespace fs = std::filesystem;
+
+Error plugin_error(const std::string& message) { return {ErrorCode::plugin, message}; }
+
+/// Loaded libraries by path. They stay for the rest of the process: objects that a plugin made, and
+/// exceptions that it threw, may outlive whoever loaded it. That is why this is a singleton that is
+/// never destroyed.
+std::map<fs::path, boost::dll::shared_library>& loaded_libraries() {
+  static auto* libraries = new std::map<fs::path, boost::dll::shared_library>();
+  return *libraries;
+}
+
+bool others_may_write(const fs::path& path) {
+  struct stat status {};
+  return ::stat(path.c_str(), &status) == 0 && (status.st_mode & S_IWOTH) != 0;
+}
+
+std::vector<std::string> split_fingerprint(std::string_view text) {
+  std::vector<std::string> parts;
+  while (!text.empty()) {
+    const std::size_t end = text.find("; ");
+    parts.emplace_back(text.substr(0, end));
+    text = end == std::string_view::npos ? std::string_view{} : text.substr(end + 2);
+  }
+  return parts;
+}
+
+/// Both fingerprints side by side, with a mark where they differ.
+std::string compare_fingerprints(std::string_view core, std::string_view plugin) {
+  std::vector<std::string> left = split_fingerprint(core), right = split_fingerprint(plugin);
+  const std::size_t rows = std::max(left.size(), right.size());
+  left.resize(rows);
+  right.resize(rows);
+  std::size_t width = 4;
+  for (const std::string& part : left) width = std::max(width, part.size());
+  std::string table = fmt::format("    {:<{}}    {}\n", "core", width, "plugin");
+  for (std::size_t k = 0; k < rows; ++k) {
+    table += fmt::format("  {} {:<{}}    {}\n", left[k] == right[k] ? ' ' : '!', left[k], width,
+                         right[k]);
+  }
+  table.pop_back();
+  return table;
+}
+
+boost::dll::shared_library open_library(const fs::path& library) {
+  try {
+    return boost::dll::shared_library(
+        library, boost::dll::load_mode::rtld_now | boost::dll::load_mode::rtld_local);
+  } catch (const std::system_error& error) {
+    // The dynamic linker's words first: an undefined symbol must not be blamed on anything else.
+    throw plugin_error(
+        fmt::format("{}\n  while loading plugin {}", error.what(), library.string()));
+  }
+}
+
+}  // namespace
+
+const char* core_fingerprint() { return CAIRN_ABI_FINGERPRINT; }
+
+Sidecar read_sidecar(const fs::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  const std::string text(std::istreambuf_iterator<char>(stream), {});
+  const auto broken = [&](const std::string& why) {
+    return plugin_error(
+        fmt::format("{}: {}; build the plugin again, or remove the file", file.string(), why));
+  };
+  if (!stream) throw broken("cannot be read");
+  boost::system::error_code error;
+  const boost::json::value root = boost::json::parse(text, error);
+  if (error) throw broken("is not JSON (" + error.message() + ")");
+  const boost::json::object* object = root.if_object();
+  const auto text_of = [&](const boost::json::object* from, const char* key) {
+    const boost::json::value* value = from ? from->if_contains(key) : nullptr;
+    if (!value || !value->is_string()) throw broken(fmt::format("has no text '{}'", key));
+    return std::string(value->get_string());
+  };
+  Sidecar sidecar;
+  sidecar.name = text_of(object, "name");
+  sidecar.version = text_of(object, "version");
+  sidecar.licence = text_of(object, "licence");
+  sidecar.description = text_of(object, "description");
+  const fs::path library = text_of(object, "file");
+  if (library.has_parent_path()) throw broken("names a file in another folder");
+  sidecar.library = file.parent_path() / library;
+  const boost::json::value* offers = object->if_contains("offers");
+  if (!offers || !offers->is_array()) throw broken("has no list 'offers'");
+  for (const boost::json::value& offer : offers->get_array()) {
+    const boost::json::object* entry = offer.if_object();
+    sidecar.offers.push_back(
+        {text_of(entry, "kind"), text_of(entry, "name"), text_of(entry, "summary")});
+  }
+  return sidecar;
+}
+
+std::vector<fs::path> plugin_folders(const PluginSearch& search,
+                                     std::vector<PluginProblem>& problems) {
+  std::vector<fs::path> folders;
+  const auto add = [&](const fs::path& folder, bool must_exist) {
+    std::error_code error;
+    const fs::path canonical = fs::canonical(folder, error);
+    if (error || !fs::is_directory(canonical)) {
+      if (must_exist)
+        problems.push_back({folder, fmt::format("{}: no such folder", folder.string())});
+      return;
+    }
+    if (others_may_write(canonical)) {
+      problems.push_back(
+          {folder,
+           fmt::format("{}: refused, since other users may write to this folder; 'chmod o-w' it",
+                       folder.string())});
+      return;
+    }
+    if (std::ranges::find(folders, canonical) == folders.end()) folders.push_back(canonical);
+  };
+  if (const char* list = search.environment ? std::getenv("CAIRN_PLUGIN_PATH") : nullptr) {
+    std::istringstream stream(list);
+    for (std::string folder; std::getline(stream, folder, ':');) {
+      if (folder.empty()) continue;  // an empty part would mean the working directory
+      if (fs::path(folder).is_relative()) {
+        problems.push_back(
+            {folder,
+             fmt::format("{}: refused, CAIRN_PLUGIN_PATH takes absolute folders only", folder)});
+        continue;
+      }
+      add(folder, true);
+    }
+  }
+  if (search.default_folder) {
+    add(fs::path(boost::dll::this_line_location().string()).parent_path() / "cairn", false);
+  }
+  return folders;
+}
+
+const PluginManifest& load_plugin(const fs::path& library) {
+  std::error_code error;
+  const fs::path path = fs::canonical(library, error);
+  if (error) throw plugin_error(fmt::format("{}: {}", library.string(), error.message()));
+  auto& libraries = loaded_libraries();
+  auto it = libraries.find(path);
+  if (it == libraries.end()) {
+    if (others_may_write(path) || others_may_write(path.parent_path())) {
+      throw plugin_error(fmt::format(
+          "{}: refused, since other users may write to it or its folder; 'chmod o-w' them",
+          library.string()));
+    }
+    boost::dll::shared_library opened = open_library(path);
+    if (!opened.has(CAIRN_STRINGIFY(CAIRN_PLUGIN_ENTRY))) {
+      throw plugin_error(
+          fmt::format("{}: not a plugin of cairn: it has no entry point {}; build it with "
+                      "cairn_add_plugin()",
+                      library.string(), CAIRN_STRINGIFY(CAIRN_PLUGIN_ENTRY)));
+    }
+    it = libraries.emplace(path, std::move(opened)).first;
+  }
+  const PluginManifest* manifest =
+      it->second.get<PluginEntry>(CAIRN_STRINGIFY(CAIRN_PLUGIN_ENTRY))();
+  if (std::string_view(manifest->fingerprint) != core_fingerprint()) {
+    throw plugin_error(fmt::format(
+        "{}: built differently from the core, so its objects cannot be passed around\n{}\n"
+        "  build the plugin with the compiler and flags of the core (leave out -march=native "
+        "and -mavx…)",
+        library.string(), compare_fingerprints(core_fingerprint(), manifest->fingerprint)));
+  }
+  return *manifest;
+}
+
+}  // namespace cairn

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "cairn/plugin/plugin.hpp"
+#include "cairn/plugin/registry.hpp"
+
+namespace cairn {
+
+/// What a sidecar file says of its plugin, without opening the shared object.
+struct Sidecar {
+  std::string name;
+  std::string version;
+  std::string licence;
+  std::string description;
+  std::filesystem::path library;
+  struct Offered {
+    std::string kind, name, summary;
+  };
+  std::vector<Offered> offers;
+};
+
+/// Reads one sidecar file. Throws `Error` (plugin) saying what is missing in it.
+Sidecar read_sidecar(const std::filesystem::path& file);
+
+/// The folders of a search, in order, that exist. What is refused (a folder that others may write
+/// to, one named in the environment that does not exist) is added to `problems`.
+std::vector<std::filesystem::path> plugin_folders(const PluginSearch& search,
+                                                  std::vector<PluginProblem>& problems);
+
+/// Loads a shared object (now, locally, for the rest of the process) and returns its manifest.
+/// Throws `Error` (plugin): the dynamic linker's own words if it cannot be loaded, no entry point,
+/// another fingerprint.
+const PluginManifest& load_plugin(const std::filesystem::path& library);
+
+/// The fingerprint of the core itself.
+const char* core_fingerprint();
+
+}  // namespace cairn

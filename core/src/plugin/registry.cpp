@@ -1,0 +1,362 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "cairn/plugin/registry.hpp"
+
+#include <algorithm>
+#include <map>
+#include <set>
+#include <tuple>
+
+#include <fmt/format.h>
+
+#include "cairn/runtime/error.hpp"
+#include "cairn/runtime/spelling.hpp"
+#include "plugin_loader.hpp"
+
+namespace cairn {
+namespace {
+
+namespace fs = std::filesystem;
+using Key = std::pair<std::string, std::string>;  // kind and name
+
+Error plugin_error(const std::string& message) { return {ErrorCode::plugin, message}; }
+
+/// "linear solver 'cholmod'"
+std::string in_words(std::string_view kind, std::string_view name) {
+  std::string words(kind);
+  std::ranges::replace(words, '_', ' ');
+  return fmt::format("{} '{}'", words, name);
+}
+
+}  // namespace
+
+/// What the plugin being registered has added so far.
+struct Registrar::Target {
+  struct Component {
+    OptionTable table;
+    Factory<cairn::Component> factory;
+  };
+  struct Types {
+    OptionTable table;
+    std::function<TypeSet(const Options&)> factory;
+  };
+  std::map<Key, Component> components;
+  std::map<std::string, Types> types;
+};
+
+void Registrar::add_component(std::string_view kind, std::string name, OptionTable table,
+                              Factory<Component> factory) {
+  const auto [it, added] = target_->components.emplace(
+      Key(kind, name), Target::Component{std::move(table), std::move(factory)});
+  if (!added) throw plugin_error(fmt::format("it adds {} twice", in_words(kind, name)));
+}
+
+void Registrar::add_types(std::string name, OptionTable table,
+                          std::function<TypeSet(const Options&)> factory) {
+  const auto [it, added] =
+      target_->types.emplace(name, Target::Types{std::move(table), std::move(factory)});
+  if (!added) throw plugin_error(fmt::format("it adds {} twice", in_words("types", name)));
+}
+
+struct Registry::Impl {
+  /// One plugin found.
+  struct Plugin {
+    Sidecar sidecar;
+    enum class State { found, loaded } state = State::found;
+    Registrar::Target target;
+    OptionValues type_options;
+    bool types_made = false;
+  };
+
+  std::vector<std::unique_ptr<Plugin>> plugins;
+  std::map<Key, std::vector<Plugin*>, std::less<>> index;
+  std::vector<PluginProblem> problems;
+  std::map<std::string, std::shared_ptr<const VariableType>, std::less<>> variable_types;
+  std::map<std::string, std::shared_ptr<const FactorType>, std::less<>> factor_types;
+
+  void add_plugin(Sidecar sidecar) {
+    auto plugin = std::make_unique<Plugin>();
+    plugin->sidecar = std::move(sidecar);
+    for (const Sidecar::Offered& offer : plugin->sidecar.offers) {
+      std::vector<Plugin*>& owners = index[{offer.kind, offer.name}];
+      owners.push_back(plugin.get());
+      if (owners.size() > 1) {
+        problems.push_back({plugin->sidecar.library, conflict(offer.kind, offer.name, owners)});
+      }
+    }
+    plugins.push_back(std::move(plugin));
+  }
+
+  static std::string conflict(std::string_view kind, std::string_view name,
+                              const std::vector<Plugin*>& owners) {
+    std::vector<std::string> files;
+    for (const Plugin* owner : owners) files.push_back(owner->sidecar.library.string());
+    return fmt::format(
+        "{} plugins offer {}: {}; remove one, or take its folder off the search path",
+        owners.size(), in_words(kind, name), fmt::join(files, " and "));
+  }
+
+  std::vector<std::string> names(std::string_view kind) const {
+    std::vector<std::string> result;
+    for (const auto& [key, owners] : index) {
+      if (key.first == kind) result.push_back(key.second);
+    }
+    return result;
+  }
+
+  Plugin& find(std::string_view kind, std::string_view name) {
+    const auto it = index.find(Key(kind, name));
+    if (it == index.end()) {
+      const std::vector<std::string> offered = names(kind);
+      std::string message =
+          fmt::format("there is no {}{}", in_words(kind, name), what_is_on_offer(name, offered));
+      for (const PluginProblem& problem : problems)
+        message += fmt::format("\n  note: {}", problem.message);
+      throw plugin_error(message);
+    }
+    if (it->second.size() > 1) throw plugin_error(conflict(kind, name, it->second));
+    return *it->second.front();
+  }
+
+  Plugin& load(std::string_view kind, std::string_view name) {
+    Plugin& plugin = find(kind, name);
+    load(plugin, in_words(kind, name), kind);
+    return plugin;
+  }
+
+  void load(Plugin& plugin, const std::string& wanted, std::string_view kind) {
+    if (plugin.state == Plugin::State::loaded) return;
+    const fs::path& library = plugin.sidecar.library;
+    if (!fs::exists(library)) {
+      std::string others;
+      for (const std::string& other : names(kind)) {
+        const Plugin& owner = *index.find(Key(kind, other))->second.front();
+        if (&owner != &plugin && fs::exists(owner.sidecar.library))
+          others += (others.empty() ? "" : ", ") + other;
+      }
+      throw plugin_error(fmt::format(
+          "{} is not to be had: the shared object {} is missing; build or install plugin "
+          "'{}'{}",
+          wanted, library.string(), plugin.sidecar.name,
+          others.empty() ? "" : ", or choose from what is there: " + others));
+    }
+    const PluginManifest& manifest = load_plugin(library);
+    Registrar::Target target;
+    try {
+      Registrar registrar(target);
+      manifest.register_plugin(registrar);
+    } catch (const std::exception& error) {
+      throw plugin_error(fmt::format("{}: plugin '{}' failed while registering: {}",
+                                     library.string(), manifest.name, error.what()));
+    } catch (...) {
+      throw plugin_error(
+          fmt::format("{}: plugin '{}' failed while registering", library.string(), manifest.name));
+    }
+    check_promises(plugin, manifest, target);
+    plugin.target = std::move(target);
+    plugin.state = Plugin::State::loaded;
+  }
+
+  /// Manifest, sidecar and what was really registered must agree. Variables and factors are checked
+  /// when the types are made.
+  static void check_promises(const Plugin& plugin, const PluginManifest& manifest,
+                             const Registrar::Target& target) {
+    std::set<Key> promised, announced, kept;
+    for (int k = 0; k < manifest.offer_count; ++k)
+      promised.emplace(manifest.offers[k].kind, manifest.offers[k].name);
+    for (const Sidecar::Offered& offer : plugin.sidecar.offers)
+      announced.emplace(offer.kind, offer.name);
+    for (const auto& [key, component] : target.components) kept.insert(key);
+    for (const auto& [name, types] : target.types) kept.emplace("types", name);
+    const std::string file = plugin.sidecar.library.string();
+    if (promised != announced) {
+      throw plugin_error(
+          fmt::format("{}: the file beside it ({}.json) is not of this build: they offer different "
+                      "names; build the plugin again",
+                      file, plugin.sidecar.library.stem().string()));
+    }
+    for (const Key& key : promised) {
+      if (key.first != "variable" && key.first != "factor" && !kept.contains(key)) {
+        throw plugin_error(fmt::format("{}: the plugin offers {} but does not register it", file,
+                                       in_words(key.first, key.second)));
+      }
+    }
+    for (const Key& key : kept) {
+      if (!promised.contains(key)) {
+        throw plugin_error(
+            fmt::format("{}: the plugin registers {}, which its manifest does not offer", file,
+                        in_words(key.first, key.second)));
+      }
+    }
+  }
+
+  /// Makes all types of a plugin at once, so that they share their options.
+  void make_types(Plugin& plugin) {
+    if (plugin.types_made) return;
+    const std::string file = plugin.sidecar.library.string();
+    for (const auto& [name, types] : plugin.target.types) {
+      TypeSet set = types.factory(Options(types.table, plugin.type_options, name));
+      for (auto& type : set.variables) {
+        check_type_offered(plugin, "variable", type->tag(), file);
+        variable_types.emplace(type->tag(), std::move(type));
+      }
+      for (auto& type : set.factors) {
+        check_type_offered(plugin, "factor", type->tag(), file);
+        factor_types.emplace(type->tag(), std::move(type));
+      }
+    }
+    plugin.types_made = true;
+  }
+
+  void check_type_offered(const Plugin& plugin, std::string_view kind, std::string_view tag,
+                          const std::string& file) {
+    const auto it = index.find(Key(kind, tag));
+    if (it == index.end() || std::ranges::find(it->second, &plugin) == it->second.end()) {
+      throw plugin_error(fmt::format("{}: the plugin makes {}, which its manifest does not offer",
+                                     file, in_words(kind, tag)));
+    }
+  }
+
+  template <class Type>
+  std::shared_ptr<const Type> type_of(
+      std::string_view kind, std::string_view tag,
+      std::map<std::string, std::shared_ptr<const Type>, std::less<>>& made) {
+    Plugin& plugin = load(kind, tag);
+    make_types(plugin);
+    const auto it = made.find(tag);
+    if (it == made.end()) {
+      throw plugin_error(fmt::format("{}: the plugin offers {} but does not make it",
+                                     plugin.sidecar.library.string(), in_words(kind, tag)));
+    }
+    return it->second;
+  }
+};
+
+Registry::Registry(const PluginSearch& search) : impl_(std::make_unique<Impl>()) {
+  std::vector<fs::path> seen;
+  const auto add = [&](const Sidecar& sidecar) {
+    std::error_code error;
+    const fs::path canonical = fs::weakly_canonical(sidecar.library, error);
+    if (std::ranges::find(seen, canonical) != seen.end()) return;
+    seen.push_back(canonical);
+    impl_->add_plugin(sidecar);
+  };
+  for (const fs::path& file : search.files) {
+    // Named by the user: opened at once, so that what is wrong with it is said at once.
+    const PluginManifest& manifest = load_plugin(file);
+    Sidecar sidecar{.name = manifest.name,
+                    .version = manifest.version,
+                    .licence = manifest.licence,
+                    .description = manifest.description,
+                    .library = fs::canonical(file),
+                    .offers = {}};
+    for (int k = 0; k < manifest.offer_count; ++k) {
+      sidecar.offers.push_back(
+          {manifest.offers[k].kind, manifest.offers[k].name, manifest.offers[k].summary});
+    }
+    add(sidecar);
+  }
+  for (const fs::path& folder : plugin_folders(search, impl_->problems)) {
+    std::vector<fs::path> files;
+    std::error_code error;
+    for (const fs::directory_entry& entry : fs::directory_iterator(folder, error)) {
+      if (entry.path().extension() == ".json") files.push_back(entry.path());
+    }
+    std::ranges::sort(files);
+    for (const fs::path& file : files) {
+      try {
+        add(read_sidecar(file));
+      } catch (const Error& problem) {
+        impl_->problems.push_back({file, problem.what()});
+      }
+    }
+  }
+}
+
+Registry::~Registry() = default;
+
+std::vector<Offer> Registry::offers() const {
+  std::vector<Offer> result;
+  for (const auto& plugin : impl_->plugins) {
+    const Sidecar& sidecar = plugin->sidecar;
+    for (const Sidecar::Offered& offer : sidecar.offers) {
+      result.push_back({.kind = offer.kind,
+                        .name = offer.name,
+                        .summary = offer.summary,
+                        .plugin = sidecar.name,
+                        .file = sidecar.library,
+                        .licence = sidecar.licence,
+                        .version = sidecar.version});
+    }
+  }
+  std::ranges::stable_sort(result, [](const Offer& a, const Offer& b) {
+    return std::tie(a.kind, a.name) < std::tie(b.kind, b.name);
+  });
+  return result;
+}
+
+std::vector<std::string> Registry::names(std::string_view kind) const { return impl_->names(kind); }
+const std::vector<PluginProblem>& Registry::problems() const { return impl_->problems; }
+bool Registry::has(std::string_view kind, std::string_view name) const {
+  return impl_->index.contains(Key(kind, name));
+}
+
+std::unique_ptr<Component> Registry::make_component(std::string_view kind,
+                                                    const ComponentSpec& spec) {
+  Impl::Plugin& plugin = impl_->load(kind, spec.name);
+  const auto& component = plugin.target.components.at(Key(kind, spec.name));
+  const Options options(component.table, spec.values, spec.name);
+  std::unique_ptr<Component> made = component.factory(options, *this);
+  if (!made) {
+    throw plugin_error(fmt::format("{}: the plugin made nothing for {}",
+                                   plugin.sidecar.library.string(), in_words(kind, spec.name)));
+  }
+  return made;
+}
+
+const OptionTable& Registry::options(std::string_view kind, std::string_view name) {
+  Impl::Plugin& plugin = impl_->load(kind, name);
+  if (const auto it = plugin.target.components.find(Key(kind, name));
+      it != plugin.target.components.end()) {
+    return it->second.table;
+  }
+  if (const auto it = plugin.target.types.find(std::string(name));
+      kind == "types" && it != plugin.target.types.end()) {
+    return it->second.table;
+  }
+  static const OptionTable none;  // a single variable or factor type has no options of its own
+  return none;
+}
+
+void Registry::set_type_options(const ComponentSpec& spec) {
+  Impl::Plugin& plugin = impl_->load("types", spec.name);
+  if (plugin.types_made) {
+    throw Error(ErrorCode::usage,
+                fmt::format("options of types '{}' come too late: its types are in use already",
+                            spec.name));
+  }
+  // Making them checks them.
+  [[maybe_unused]] const Options checked(plugin.target.types.at(spec.name).table, spec.values,
+                                         spec.name);
+  for (const auto& [key, value] : spec.values) plugin.type_options[key] = value;
+}
+
+std::shared_ptr<const VariableType> Registry::variable_type(std::string_view tag) {
+  if (const auto it = impl_->variable_types.find(tag); it != impl_->variable_types.end())
+    return it->second;
+  return impl_->type_of("variable", tag, impl_->variable_types);
+}
+
+std::shared_ptr<const FactorType> Registry::factor_type(std::string_view tag) {
+  if (const auto it = impl_->factor_types.find(tag); it != impl_->factor_types.end())
+    return it->second;
+  return impl_->type_of("factor", tag, impl_->factor_types);
+}
+
+void Registry::load_all() {
+  for (const auto& plugin : impl_->plugins) {
+    impl_->load(*plugin, fmt::format("plugin '{}'", plugin->sidecar.name),
+                plugin->sidecar.offers.empty() ? "" : plugin->sidecar.offers.front().kind);
+  }
+}
+
+}  // namespace cairn

@@ -1,9 +1,0 @@
-// SPDX-License-Identifier: BSD-3-Clause
-#include "cairn/registration.hpp"
-
-namespace cairn {
-
-Registration::~Registration() = default;
-FalseMatches::~FalseMatches() = default;
-
-}  // namespace cairn

@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "cairn/types/evaluated_factor.hpp"
+
+#include <cstdint>
+#include <vector>
+
+#include <Eigen/Core>
+
+namespace cairn {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+/// Writes or adds a block, as `LinearizeSink::put` does for one of fixed size.
+void put(const LinearizeSink& sink, std::int64_t offset, const MatrixXd& block) {
+  if (offset >= 0) {
+    Eigen::Map<VectorXd>(sink.H + offset, block.size()) = block.reshaped();
+  } else {
+    Eigen::Map<VectorXd>(sink.scratch + ~offset, block.size()) += block.reshaped();
+  }
+}
+
+/// Where the states of one factor of a pool are.
+std::vector<const double*> states_of(const FactorType& type, const FactorView& pool,
+                                     std::size_t factor) {
+  std::vector<const double*> x;
+  const auto arity = static_cast<std::size_t>(type.arity());
+  for (std::size_t k = 0; k < arity; ++k) {
+    x.push_back(pool.states[k] + static_cast<std::ptrdiff_t>(pool.slots[factor * arity + k]) *
+                                     type.ambient_size(static_cast<int>(k)));
+  }
+  return x;
+}
+
+std::size_t packed_size(const FactorType& type) {
+  const auto n = static_cast<std::size_t>(type.residual_size());
+  return n * (n + 1) / 2;
+}
+
+}  // namespace
+
+EvaluatedFactorType::~EvaluatedFactorType() = default;
+
+void EvaluatedFactorType::squared_norms(const FactorView& pool, std::size_t begin, std::size_t end,
+                                        double* out) const {
+  VectorXd r(residual_size());
+  const auto numbers = static_cast<std::size_t>(measurement_size());
+  for (std::size_t f = begin; f < end; ++f) {
+    evaluate(states_of(*this, pool, f).data(), pool.measurements + f * numbers,
+             pool.sqrt_information + f * packed_size(*this), r.data(), nullptr);
+    out[f - begin] = r.squaredNorm();
+  }
+}
+
+void EvaluatedFactorType::linearize(const FactorView& pool, std::size_t begin, std::size_t end,
+                                    const double* weights, const LinearizeSink& sink,
+                                    double* out_squared_norms) const {
+  const int n = arity(), m = residual_size();
+  const auto pairs = static_cast<std::size_t>(n * (n + 1) / 2);
+  const auto numbers = static_cast<std::size_t>(measurement_size());
+  VectorXd r(m);
+  std::vector<MatrixXd> J;
+  std::vector<double*> out;
+  for (int k = 0; k < n; ++k) J.emplace_back(m, tangent_size(k));
+  for (MatrixXd& block : J) out.push_back(block.data());
+  for (std::size_t f = begin; f < end; ++f) {
+    evaluate(states_of(*this, pool, f).data(), pool.measurements + f * numbers,
+             pool.sqrt_information + f * packed_size(*this), r.data(), out.data());
+    if (out_squared_norms) out_squared_norms[f - begin] = r.squaredNorm();
+    const double weight = weights ? weights[f - begin] : 1.0;
+    std::size_t pair = f * pairs;
+    for (int a = 0; a < n; ++a) {
+      for (int b = a; b < n; ++b, ++pair) {
+        if (sink.blocks[pair] == LinearizeSink::kNone) continue;
+        if (a != b && sink.transposed[pair]) {
+          put(sink, sink.blocks[pair], weight * J[b].transpose() * J[a]);
+        } else {
+          put(sink, sink.blocks[pair], weight * J[a].transpose() * J[b]);
+        }
+      }
+      const std::int64_t target = sink.gradients[f * static_cast<std::size_t>(n) + a];
+      if (target != LinearizeSink::kNone)
+        Eigen::Map<VectorXd>(sink.scratch + target, J[a].cols()) -= weight * J[a].transpose() * r;
+    }
+  }
+}
+
+}  // namespace cairn

@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "cairn/types/factor_type.hpp"
+#include "cairn/types/loss.hpp"
+#include "cairn/types/variable_type.hpp"
+
+namespace cairn {
+
+LieGroup::~LieGroup() = default;
+Placement::~Placement() = default;
+VariableType::~VariableType() = default;
+FactorType::~FactorType() = default;
+Loss::~Loss() = default;
+
+}  // namespace cairn

@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "cairn/graph/update.hpp"
+#include "cairn/runtime/api.hpp"
+#include "cairn/types/factor_type.hpp"
+#include "cairn/types/variable_type.hpp"
+
+namespace cairn {
+
+/// A motion from one pose to another, and how uncertain it is: z · exp(ξ), ξ ~ N(0, Σ).
+struct Motion {
+  std::vector<double> mean;        ///< z, ambient_size doubles
+  std::vector<double> covariance;  ///< Σ, tangent × tangent, column-major
+};
+
+/// To which order in ξ the covariance of a composition is computed.
+enum class CompositionOrder {
+  first,   ///< Smith and Cheeseman 1986: Jacobians
+  fourth,  ///< Barfoot and Furgale 2014: all terms of fourth order of Baker, Campbell and Hausdorff
+};
+
+/// Arithmetic with uncertain motions of one Lie group, whichever it is (the ability `LieGroup` of
+/// a variable type). Perturbations stand on the right throughout, as in `VariableType::retract`.
+/// Motions that are combined must be independent of each other.
+class CAIRN_API MotionGroup {
+ public:
+  /// Throws `Error` (usage) if the type's states form no Lie group.
+  explicit MotionGroup(std::shared_ptr<const VariableType> type);
+
+  const VariableType& type() const { return *type_; }
+  int ambient_size() const { return ambient_; }
+  int tangent_size() const { return tangent_; }
+
+  /// No motion at all, known exactly.
+  Motion identity() const;
+  /// First a, then b: mean z_a z_b. First order: Σ = A Σ_a Aᵀ + Σ_b with A = Ad(z_b⁻¹). Fourth
+  /// order, with Σ₁ = A Σ_a Aᵀ, Σ₂ = Σ_b and ad the derivative of Ad at the identity:
+  ///
+  ///     Σ = Σ₁ + Σ₂ + ¼ E[ad(ξ₁) Σ₂ ad(ξ₁)ᵀ]
+  ///         + 1/12 (P₁ Σ₂ + Σ₂ P₁ᵀ + P₂ Σ₁ + Σ₁ P₂ᵀ),   P_k = E[ad(ξ_k) ad(ξ_k)]
+  ///
+  /// (Barfoot and Furgale, Associating uncertainty with three-dimensional poses, TRO 2014,
+  /// with perturbations on the other side.) E[ξ] is zero to third order, and is left so.
+  Motion compose(const Motion& a, const Motion& b,
+                 CompositionOrder order = CompositionOrder::first) const;
+  /// Backwards: mean z⁻¹, Σ = Ad(z) Σ Ad(z)ᵀ, which is exact.
+  Motion inverse(const Motion& a) const;
+  /// Two independent measurements of one motion, as one: the likeliest z, which has the least
+  /// ‖log(z_a⁻¹ z)‖² + ‖log(z_b⁻¹ z)‖² (Mahalanobis), and the sum of their information there. So
+  /// does a graph with both as factors, and it does not matter which comes first. Throws `Error`
+  /// (numerical) if a covariance is not positive definite.
+  Motion fuse(const Motion& a, const Motion& b) const;
+
+  /// What a relative factor (`FactorType::is_relative`) measures, as a motion from its first
+  /// variable to its second. The covariance is that of ξ to first order, whatever the factor's
+  /// error metric: Σ⁻¹ = DᵀΩD with D = ∂error/∂ξ where the error is zero. Throws `Error` (usage)
+  /// for another factor, (input) for numbers that a graph would not take either.
+  Motion of_factor(const FactorType& type, std::span<const double> measurement,
+                   std::span<const double> information) const;
+  /// The same from variable `from`, which may be the factor's second.
+  Motion of_factor(const Factor& factor, Id from) const;
+  /// The other way round: a factor of that type that says just this. Throws `Error` (numerical) if
+  /// the covariance is not positive definite.
+  Factor to_factor(std::shared_ptr<const FactorType> type, Id from, Id to,
+                   const Motion& motion) const;
+
+ private:
+  std::vector<double> of_error_metric(const FactorType& type, std::span<const double> z) const;
+
+  std::shared_ptr<const VariableType> type_;
+  const LieGroup* group_;
+  int ambient_, tangent_;
+  std::vector<double> ad_;  ///< ad(e_k) of each unit vector, one after the other
+};
+
+}  // namespace cairn

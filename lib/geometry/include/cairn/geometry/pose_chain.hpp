@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "cairn/graph/graph.hpp"
+#include "cairn/graph/update.hpp"
+#include "cairn/runtime/api.hpp"
+
+namespace cairn {
+
+/// A recorded pose graph as a robot drove it: what each pose brings.
+struct RecordedPose {
+  int variable = 0;           ///< index in the graph
+  std::vector<int> odometry;  ///< factors to the pose before, either way round; none for the first
+  std::vector<int> links;     ///< all other factors to earlier poses
+};
+
+/// The poses of a graph by rising id. Throws `Error` (input), with what would work, if it is not a
+/// pose graph with unbroken odometry: a variable that is no pose of a Lie group, or of another type
+/// than the first; a factor that is not relative; a pose without a factor to the one before.
+CAIRN_API std::vector<RecordedPose> pose_chain(const Graph& graph);
+
+/// A variable and a factor of a graph, as an estimator takes them.
+CAIRN_API Variable new_variable(const Graph& graph, int variable);
+CAIRN_API Factor new_factor(const Graph& graph, int factor);
+
+/// One pose on the way from one pose of a compact graph to the next.
+struct ChainStep {
+  Id pose = 0;                 ///< where the step ends
+  std::vector<double> motion;  ///< measured, from the pose before [ambient_size]
+  /// Σ of it, tangent × tangent, column-major; empty: not known.
+  std::vector<double> covariance{};
+};
+
+/// Odometry between two poses that follow each other in a compact graph, and the poses that were
+/// left out between them. The last step ends at `to`.
+struct OdometryChain {
+  Id from = 0, to = 0;
+  std::vector<ChainStep> steps;
+};
+
+/// How the poses between two kept ones are put back: v0 to v2 as by Ila et al. 2017, equations 23
+/// to 26.
+enum class Recovery {
+  uniform,      ///< v0: evenly along the geodesic between the two
+  interpolate,  ///< v1: along it, in proportion to the measured distances
+  distribute,   ///< v2: along the measured motions, their mismatch spread in proportion to distance
+  likely,       ///< along the measured motions, their mismatch spread as is most likely
+};
+
+/// A pose that was put back.
+struct RecoveredPose {
+  Id id = 0;
+  std::vector<double> state;
+};
+
+/// The states of the poses of a chain but its first, given those of its two ends. With the motions
+/// z_1 … z_q, w_m = Σ_{k≤m} ‖z_k‖ / Σ_{k≤q} ‖z_k‖ (norms of translations; m/q where nothing moves):
+///
+///     v0, v1:  x_from · exp(w_m log(x_from⁻¹ x_to)),  w_m = m/q for v0
+///     v2:      x_from · (z_1 ⋯ z_m) · exp(w_m log((z_1 ⋯ z_q)⁻¹ x_from⁻¹ x_to))
+///
+/// v2 turns the mismatch with the robot, which is wrong where the robot turns. `likely` does not:
+/// given the mismatch d at the end, the expected perturbation at m is K_m d, with P_m the
+/// first-order covariance of z_1 ⋯ z_m,
+///
+///     x_from · (z_1 ⋯ z_m) · exp(K_m d),  K_m = P_m Ad((z_{m+1} ⋯ z_q)⁻¹)ᵀ P_q⁻¹.
+///
+/// At m = q all of them give x_to. The type must have `LieGroup` and `Placement`; `likely` needs
+/// the covariance of every step. Throws `Error` (usage) otherwise.
+CAIRN_API std::vector<RecoveredPose> recover(const VariableType& type, const OdometryChain& chain,
+                                             std::span<const double> from,
+                                             std::span<const double> to, Recovery how);
+
+}  // namespace cairn

@@ -1,0 +1,243 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "cairn/geometry/pose_chain.hpp"
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <utility>
+
+#include <fmt/format.h>
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
+
+#include "cairn/runtime/error.hpp"
+
+namespace cairn {
+namespace {
+
+Error bad_input(const std::string& message) { return {ErrorCode::input, message}; }
+
+bool is_pose(const VariableType& type) {
+  return type.lie_group() && type.placement() && type.placement()->has_orientation();
+}
+
+/// The variables by rising id, once it is sure that they are poses of one type.
+std::vector<int> poses_by_id(const Graph& graph) {
+  std::vector<int> poses(static_cast<std::size_t>(graph.variable_count()));
+  for (int v = 0; v < graph.variable_count(); ++v) {
+    poses[v] = v;
+    if (!is_pose(graph.type(v))) {
+      throw bad_input(
+          fmt::format("{} is no pose of a Lie group, and this takes pose graphs only: a robot's "
+                      "poses and the motions between them, without landmarks",
+                      graph.describe_variable(v)));
+    }
+    if (graph.pool(v) != graph.pool(0)) {
+      throw bad_input(fmt::format("{} and {} are poses of different types; a robot's way takes one",
+                                  graph.describe_variable(0), graph.describe_variable(v)));
+    }
+  }
+  std::ranges::sort(poses, {}, [&](int v) { return graph.id(v); });
+  return poses;
+}
+
+}  // namespace
+
+std::vector<RecordedPose> pose_chain(const Graph& graph) {
+  const std::vector<int> poses = poses_by_id(graph);
+  std::vector<int> place(poses.size());
+  std::vector<RecordedPose> chain(poses.size());
+  for (std::size_t k = 0; k < poses.size(); ++k) {
+    place[poses[k]] = static_cast<int>(k);
+    chain[k].variable = poses[k];
+  }
+  for (int f = 0; f < graph.factor_count(); ++f) {
+    if (!graph.factor_pools()[graph.factor(f).pool].type->is_relative()) {
+      throw bad_input(
+          fmt::format("{} is not the motion from one pose to another, and this takes pose graphs "
+                      "only: leave it out, and mark poses that are known as FIX",
+                      graph.describe_factor(f)));
+    }
+    const auto on = graph.factor_variables(f);
+    const auto [earlier, later] = std::minmax({place[on[0]], place[on[1]]});
+    (later == earlier + 1 ? chain[later].odometry : chain[later].links).push_back(f);
+  }
+  for (std::size_t k = 1; k < chain.size(); ++k) {
+    if (!chain[k].odometry.empty()) continue;
+    throw bad_input(
+        fmt::format("no factor joins {} to {}, the pose before it by id: odometry must be unbroken "
+                    "and ids rise along the robot's way",
+                    graph.describe_variable(poses[k]), graph.describe_variable(poses[k - 1])));
+  }
+  return chain;
+}
+
+Variable new_variable(const Graph& graph, int variable) {
+  const std::span<const double> x = graph.state(variable);
+  return {graph.variable_pools()[graph.pool(variable)].type,
+          graph.id(variable),
+          {x.begin(), x.end()},
+          graph.fixed(variable)};
+}
+
+Factor new_factor(const Graph& graph, int factor) {
+  const std::span<const double> z = graph.measurement(factor), omega = graph.information(factor);
+  Factor copy{graph.factor_pools()[graph.factor(factor).pool].type,
+              {},
+              {z.begin(), z.end()},
+              {omega.begin(), omega.end()}};
+  for (const std::int32_t v : graph.factor_variables(factor)) copy.variables.push_back(graph.id(v));
+  return copy;
+}
+
+// Recovery ----------------------------------------------------------------------------------------
+
+namespace {
+
+using State = std::vector<double>;
+
+void check(const VariableType& type, const OdometryChain& chain, std::span<const double> from,
+           std::span<const double> to) {
+  if (!type.lie_group() || !type.placement()) {
+    throw Error(ErrorCode::usage,
+                fmt::format("recover: {} has not the abilities LieGroup and Placement; poses such "
+                            "as VERTEX_SE2 and VERTEX_SE3:QUAT have",
+                            type.tag()));
+  }
+  const std::size_t size = static_cast<std::size_t>(type.ambient_size());
+  const bool fit = from.size() == size && to.size() == size &&
+                   std::ranges::all_of(chain.steps, [&](const ChainStep& step) {
+                     return step.motion.size() == size;
+                   });
+  if (!fit) {
+    throw Error(ErrorCode::usage,
+                fmt::format("recover: a state or a motion of {} is {} numbers", type.tag(), size));
+  }
+}
+
+/// w_1 … w_q: which share of the way is behind the robot after each step.
+std::vector<double> shares_of_way(const VariableType& type, const OdometryChain& chain,
+                                  Recovery how) {
+  const Placement& placement = *type.placement();
+  const int d = placement.dimension();
+  std::vector<double> shares, R(static_cast<std::size_t>(d * d));
+  Eigen::VectorXd t(d);
+  double way = 0.0;
+  for (const ChainStep& step : chain.steps) {
+    placement.split(step.motion.data(), R.data(), t.data());
+    way += t.stableNorm();
+    shares.push_back(way);
+  }
+  const double steps = static_cast<double>(shares.size());
+  const bool uniform = how == Recovery::uniform || !(way > 0.0);
+  for (std::size_t m = 0; m < shares.size(); ++m)
+    shares[m] = uniform ? static_cast<double>(m + 1) / steps : shares[m] / way;
+  return shares;
+}
+
+/// A type's group, with states by value.
+class Group {
+ public:
+  explicit Group(const VariableType& type) : type_(type), group_(*type.lie_group()) {}
+
+  State compose(std::span<const double> a, std::span<const double> b) const {
+    State ab(ambient());
+    group_.compose(a.data(), b.data(), ab.data());
+    type_.normalize(ab.data());
+    return ab;
+  }
+  /// log(a⁻¹ b)
+  Eigen::VectorXd difference(std::span<const double> a, std::span<const double> b) const {
+    State inverse(ambient());
+    group_.inverse(a.data(), inverse.data());
+    Eigen::VectorXd delta(type_.tangent_size());
+    group_.log(compose(inverse, b).data(), delta.data());
+    return delta;
+  }
+  /// Ad(a⁻¹)
+  Eigen::MatrixXd adjoint_of_inverse(std::span<const double> a) const {
+    State inverse(ambient());
+    group_.inverse(a.data(), inverse.data());
+    Eigen::MatrixXd Ad(type_.tangent_size(), type_.tangent_size());
+    group_.adjoint(inverse.data(), Ad.data());
+    return Ad;
+  }
+  /// a · exp(δ)
+  State moved(std::span<const double> a, const Eigen::VectorXd& delta) const {
+    State step(ambient());
+    group_.exp(delta.data(), step.data());
+    return compose(a, step);
+  }
+
+ private:
+  std::size_t ambient() const { return static_cast<std::size_t>(type_.ambient_size()); }
+
+  const VariableType& type_;
+  const LieGroup& group_;
+};
+
+std::vector<Eigen::VectorXd> shared_corrections(const std::vector<double>& shares,
+                                                const Eigen::VectorXd& mismatch) {
+  std::vector<Eigen::VectorXd> corrections;
+  for (const double share : shares) corrections.push_back(share * mismatch);
+  return corrections;
+}
+
+/// K_m d of each step, from the last to the first: Ad((z_{m+1} ⋯ z_q)⁻¹)ᵀ P_q⁻¹ d is carried back.
+std::vector<Eigen::VectorXd> likely_corrections(const Group& group, const OdometryChain& chain,
+                                                const Eigen::VectorXd& mismatch) {
+  const Eigen::Index n = mismatch.size();
+  std::vector<Eigen::MatrixXd> adjoints, P;
+  for (const ChainStep& step : chain.steps) {
+    if (std::ssize(step.covariance) != n * n) {
+      throw Error(
+          ErrorCode::usage,
+          fmt::format("recover: the likely recovery needs the covariance of every step, and "
+                      "that to pose {} has none",
+                      step.pose));
+    }
+    adjoints.push_back(group.adjoint_of_inverse(step.motion));
+    Eigen::MatrixXd sum = Eigen::Map<const Eigen::MatrixXd>(step.covariance.data(), n, n);
+    if (!P.empty()) sum += adjoints.back() * P.back() * adjoints.back().transpose();
+    P.push_back(std::move(sum));
+  }
+  std::vector<Eigen::VectorXd> corrections(P.size());
+  Eigen::VectorXd carried = Eigen::VectorXd::Zero(n);
+  for (std::size_t m = P.size(); m-- > 0;) {
+    carried = m + 1 == P.size() ? Eigen::VectorXd(P.back().ldlt().solve(mismatch))
+                                : Eigen::VectorXd(adjoints[m + 1].transpose() * carried);
+    corrections[m] = P[m] * carried;
+  }
+  return corrections;
+}
+
+}  // namespace
+
+std::vector<RecoveredPose> recover(const VariableType& type, const OdometryChain& chain,
+                                   std::span<const double> from, std::span<const double> to,
+                                   Recovery how) {
+  check(type, chain, from, to);
+  const Group group(type);
+  const std::vector<double> w = shares_of_way(type, chain, how);
+
+  // x_from (z_1 ⋯ z_m), or x_from alone: what v0 and v1 take for the measured motions.
+  std::vector<State> reckoned;
+  State x(from.begin(), from.end());
+  for (const ChainStep& step : chain.steps) {
+    if (how == Recovery::distribute || how == Recovery::likely) x = group.compose(x, step.motion);
+    reckoned.push_back(x);
+  }
+  const Eigen::VectorXd mismatch = group.difference(x, to);
+
+  std::vector<RecoveredPose> poses;
+  const std::vector<Eigen::VectorXd> corrections = how == Recovery::likely
+                                                       ? likely_corrections(group, chain, mismatch)
+                                                       : shared_corrections(w, mismatch);
+  for (std::size_t m = 0; m < reckoned.size(); ++m)
+    poses.push_back({chain.steps[m].pose, group.moved(reckoned[m], corrections[m])});
+  if (!poses.empty()) poses.back().state.assign(to.begin(), to.end());  // to the last bit
+  return poses;
+}
+
+}  // namespace cairn

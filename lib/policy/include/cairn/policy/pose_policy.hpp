@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <functional>
+#include <limits>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "cairn/geometry/motion.hpp"
+#include "cairn/geometry/pose_chain.hpp"
+#include "cairn/plugin/options.hpp"
+#include "cairn/policy/registration.hpp"
+#include "cairn/runtime/component.hpp"
+#include "cairn/solve/estimator.hpp"
+
+namespace cairn {
+
+/// Two poses whose sensor data are worth matching.
+struct MatchProposal {
+  Id earlier = 0, later = 0;
+  double gain = 0.0;  ///< what a link is expected to tell [nats]
+  Motion expected;    ///< from `earlier` to `later`, as far as it is known
+};
+
+/// What became of a measured link.
+enum class LinkVerdict {
+  linked,         ///< it is in the graph
+  unmatched,      ///< there was nothing to link
+  uninformative,  ///< it tells too little
+  inconsistent,   ///< it contradicts the estimate, or other links
+  waiting,        ///< nothing speaks against it, and too little for it: until another link does
+};
+/// "linked", "unmatched", ….
+CAIRN_API std::string_view to_string(LinkVerdict verdict);
+
+struct LinkReport {
+  Id earlier = 0, later = 0;
+  double expected_gain = 0.0;  ///< before it was measured [nats]
+  double gain = 0.0;           ///< with the covariance of the measurement [nats]
+  double innovation = 0.0;     ///< squared Mahalanobis distance from what was expected
+  LinkVerdict verdict = LinkVerdict::unmatched;
+};
+
+/// Seconds that a pose took, without the matching itself.
+struct PolicySeconds {
+  double total = 0.0;
+  double estimate = 0.0;     ///< updates of the estimator
+  double covariances = 0.0;  ///< cross covariances
+  double search = 0.0;       ///< candidates and their gains
+
+  CAIRN_API PolicySeconds& operator+=(const PolicySeconds& other);
+};
+
+/// What became of a pose, and of the links that were measured for it.
+struct PoseReport {
+  Id id = 0;
+  bool kept = true;
+  bool closed_loop = false;
+  int near = 0;                                                 ///< poses that the index found
+  int candidates = 0;                                           ///< those near enough to be matched
+  double least_gain = std::numeric_limits<double>::infinity();  ///< among the candidates [nats]
+  std::vector<LinkReport> links;  ///< also earlier ones that had been waiting
+  PolicySeconds seconds;
+  std::vector<std::string> notes;
+};
+
+/// Decides online which poses of a robot's way are kept and which of its loop closures are used.
+///
+/// For each pose: `add_pose`; then, as long as `next_match` proposes a pair, somebody matches it
+/// and says what came out by `offer`; then `end_pose`. `run_policy` does so for a recording. Poses
+/// that are not kept have no variable in the estimator; their motions are concatenated.
+class CAIRN_API PosePolicy : public Component {
+ public:
+  static constexpr std::string_view kKind = "pose_policy";
+  ~PosePolicy() override;
+
+  /// Told before the first pose if what follows is a recording, for those who plan ahead; does
+  /// nothing unless a policy overrides it.
+  virtual void expect(const Graph& recording, std::span<const RecordedPose> poses);
+  /// The next pose, with its measured motion from the pose before (several factors are fused; none
+  /// for the first pose). A pose marked as fixed is kept. Throws `Error` (input) if there is no
+  /// motion, or something that is no motion between the two; nothing has changed then.
+  virtual void add_pose(const Variable& pose, std::span<const Factor> odometry) = 0;
+  /// The pair that is most worth matching with the newest pose; none: no pair is.
+  virtual std::optional<MatchProposal> next_match() = 0;
+  /// What was measured between the newest pose and a pose that is kept, proposed or not; nothing:
+  /// they do not match. Throws `Error` (input) if the other pose is not there (any more).
+  virtual LinkReport offer(Id other, std::span<const Factor> measured) = 0;
+  /// Ends the pose: decides whether to keep it.
+  virtual PoseReport end_pose() = 0;
+  /// The way ends here: the newest pose is kept in any case, and everything is solved until it has
+  /// converged.
+  virtual void finish() = 0;
+
+  /// The compact graph's estimate. Only to be read, but for `set_loss` before the first pose.
+  virtual Estimator& estimator() = 0;
+  /// The poses that are kept, in the order of arrival.
+  virtual std::vector<Id> kept() const = 0;
+  /// How many factors there are between them; the estimator need not have all of them yet.
+  virtual int factor_count() const = 0;
+  /// The newest pose as it is estimated, kept or not.
+  virtual std::vector<double> newest_state() const = 0;
+  /// From each kept pose to the next one on the way, in order. A way may lead back to a pose that
+  /// was kept before.
+  virtual const std::vector<OdometryChain>& chains() const = 0;
+};
+
+/// Ability of a policy that finds options for itself from what it has seen.
+class CAIRN_API OptionFinder {
+ public:
+  static constexpr std::string_view kAbility = "option_finder";
+  virtual ~OptionFinder();
+  /// The options with which to watch a sample of the data: everything is taken in.
+  virtual OptionValues watching() const = 0;
+  /// What it would choose after that. Throws `Error` (input) if the sample does not tell.
+  virtual OptionValues found() const = 0;
+  /// A choice that lets more through than `found` (factors < 1) or less (> 1): of links, and of
+  /// poses.
+  virtual OptionValues scaled(const OptionValues& found, double links, double poses) const = 0;
+  /// How accurate a link of the sample is: root mean square of its translation's error [m]. Errors
+  /// below that are nothing to worry about.
+  virtual double accuracy() const = 0;
+};
+
+/// Feeds the first poses of a recording to a policy, matching by `registration`. `each` is told of
+/// every pose, and stops the run by returning false. The policy is finished at the end.
+CAIRN_API void run_policy(const Graph& recording, std::span<const RecordedPose> poses,
+                          PosePolicy& policy, Registration& registration,
+                          const std::function<bool(const PoseReport&)>& each = {});
+
+/// All poses of a way, the left-out ones put back between those that are kept; without factors.
+CAIRN_API Graph recovered_way(PosePolicy& policy, Recovery how);
+
+}  // namespace cairn

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <functional>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "cairn/graph/graph.hpp"
+#include "cairn/graph/update.hpp"
+#include "cairn/runtime/component.hpp"
+
+namespace cairn {
+
+/// What a registration may look into. What it is given must outlive it.
+struct RegistrationData {
+  const Graph* recording = nullptr;  ///< poses with all measurements that were made
+  const Graph* truth = nullptr;      ///< the true states of the same poses; null: unknown
+};
+
+/// Whoever can tell how two poses lie to each other from what was sensed at them: a matcher of
+/// scans or images, a recording of one, or a simulation. It is asked for the pairs that a policy
+/// finds worth the effort.
+class CAIRN_API Registration : public Component {
+ public:
+  static constexpr std::string_view kKind = "registration";
+  ~Registration() override;
+
+  /// Told once, before the first match. Throws `Error` (usage) if something is missing that it
+  /// needs, such as the truth.
+  virtual void begin(const RegistrationData& data) = 0;
+  /// The measured motions between two poses: relative factors on them, in either order. None if
+  /// the two do not match.
+  virtual std::vector<Factor> match(Id earlier, Id later) = 0;
+};
+
+/// Ability of a registration that knows which of its answers are false: for experiments, which
+/// count what became of them.
+class CAIRN_API FalseMatches {
+ public:
+  static constexpr std::string_view kAbility = "false_matches";
+  virtual ~FalseMatches();
+  /// Whether what `match` answers for these two poses, in either order, is a motion that was not
+  /// measured but made up. False where it answers nothing.
+  virtual bool was_false(Id earlier, Id later) const = 0;
+};
+
+/// A function as a registration, for front ends in C++.
+class CAIRN_API FunctionRegistration final : public Registration {
+ public:
+  using Function = std::function<std::vector<Factor>(Id earlier, Id later)>;
+  explicit FunctionRegistration(Function match) : match_(std::move(match)) {}
+  void begin(const RegistrationData&) override {}
+  std::vector<Factor> match(Id earlier, Id later) override { return match_(earlier, later); }
+
+ private:
+  Function match_;
+};
+
+}  // namespace cairn

@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "cairn/policy/pose_policy.hpp"
+
+#include <array>
+
+namespace cairn {
+
+PosePolicy::~PosePolicy() = default;
+OptionFinder::~OptionFinder() = default;
+void PosePolicy::expect(const Graph&, std::span<const RecordedPose>) {}
+
+std::string_view to_string(LinkVerdict verdict) {
+  constexpr std::array<std::string_view, 5> kNames{"linked", "unmatched", "uninformative",
+                                                   "inconsistent", "waiting"};
+  return kNames[static_cast<std::size_t>(verdict)];
+}
+
+PolicySeconds& PolicySeconds::operator+=(const PolicySeconds& other) {
+  total += other.total;
+  estimate += other.estimate;
+  covariances += other.covariances;
+  search += other.search;
+  return *this;
+}
+
+void run_policy(const Graph& recording, std::span<const RecordedPose> poses, PosePolicy& policy,
+                Registration& registration, const std::function<bool(const PoseReport&)>& each) {
+  policy.expect(recording, poses);
+  bool first = true;
+  for (const RecordedPose& pose : poses) {
+    Variable variable = new_variable(recording, pose.variable);
+    if (!first && !variable.fixed) variable.state.clear();  // where its odometry puts it
+    first = false;
+    std::vector<Factor> odometry;
+    for (const int f : pose.odometry) odometry.push_back(new_factor(recording, f));
+    policy.add_pose(variable, odometry);
+    while (const auto match = policy.next_match())
+      policy.offer(match->earlier, registration.match(match->earlier, match->later));
+    const PoseReport report = policy.end_pose();
+    if (each && !each(report)) break;
+  }
+  if (!first) policy.finish();
+}
+
+Graph recovered_way(PosePolicy& policy, Recovery how) {
+  const Graph compact = policy.estimator().graph();
+  Graph way;
+  if (compact.variable_count() == 0) return way;
+  const std::shared_ptr<const VariableType>& type = compact.variable_pools().front().type;
+  const auto state = [&](Id id) { return compact.state(*compact.find(id)); };
+  const std::vector<OdometryChain>& chains = policy.chains();
+  const Id first = chains.empty() ? compact.id(0) : chains.front().from;
+  way.add_variable(type, first, state(first));
+  for (const OdometryChain& chain : chains) {
+    for (const RecoveredPose& pose :
+         recover(*type, chain, state(chain.from), state(chain.to), how)) {
+      if (way.find(pose.id)) continue;  // a way that led back to it
+      const auto kept = compact.find(pose.id);
+      way.add_variable(type, pose.id, kept ? compact.state(*kept) : pose.state);
+    }
+  }
+  return way;
+}
+
+}  // namespace cairn

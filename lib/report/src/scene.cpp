@@ -1,0 +1,251 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "cairn/report/scene.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+
+#include "cairn/graph/gauge.hpp"
+#include "cairn/runtime/error.hpp"
+
+namespace cairn {
+namespace {
+
+constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+constexpr std::size_t kMostTypes = 255;
+
+/// A place in space, planar ones at z = 0.
+struct Place {
+  Eigen::Vector3d t = Eigen::Vector3d::Constant(kNone);
+  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
+  bool oriented = false;
+};
+
+Place place_of(const VariableType& type, const double* x) {
+  Place place;
+  const Placement* placement = type.placement();
+  if (!placement) return place;
+  std::array<double, 9> R{};
+  std::array<double, 3> t{};
+  placement->split(x, R.data(), t.data());
+  place.t = Eigen::Vector3d(t[0], t[1], placement->dimension() == 3 ? t[2] : 0.0);
+  place.oriented = placement->has_orientation();
+  if (!place.oriented) return place;
+  if (placement->dimension() == 3) {
+    place.R = Eigen::Map<const Eigen::Matrix3d>(R.data());
+  } else {
+    place.R.topLeftCorner<2, 2>() = Eigen::Map<const Eigen::Matrix2d>(R.data());
+  }
+  return place;
+}
+
+bool is_pose(const VariableType& type) {
+  return type.placement() && type.placement()->has_orientation();
+}
+
+int dimension_of(const Graph& graph, const std::string& name) {
+  int dimension = 0;
+  for (const VariablePool& pool : graph.variable_pools()) {
+    if (pool.type->placement() && !pool.variables.empty()) {
+      dimension = std::max(dimension, pool.type->placement()->dimension());
+    }
+  }
+  if (dimension == 0) {
+    throw Error(
+        ErrorCode::input,
+        fmt::format("{}: none of its variables has a place in space, so there is nothing to "
+                    "draw",
+                    name));
+  }
+  return dimension;
+}
+
+/// The middle of the bounding box, in whole metres so that it reads well.
+std::array<double, 3> middle(const Graph& graph) {
+  Eigen::AlignedBox3d box;
+  for (int v = 0; v < graph.variable_count(); ++v) {
+    const Place place = place_of(graph.type(v), graph.state(v).data());
+    if (place.t.allFinite()) box.extend(place.t);
+  }
+  if (box.isEmpty()) return {};
+  const Eigen::Vector3d center = box.center();
+  return {std::round(center[0]), std::round(center[1]), std::round(center[2])};
+}
+
+void add_variables(const Graph& graph, Scene& scene) {
+  if (graph.variable_pools().size() > kMostTypes || graph.factor_pools().size() > kMostTypes) {
+    throw Error(ErrorCode::input, fmt::format("{}: more than {} types of variables or factors",
+                                              scene.name, kMostTypes));
+  }
+  for (const VariablePool& pool : graph.variable_pools()) {
+    scene.variable_types.push_back(
+        {std::string(pool.type->tag()), is_pose(*pool.type), pool.type->tangent_size()});
+  }
+  for (int v = 0; v < graph.variable_count(); ++v) {
+    scene.ids.push_back(graph.id(v));
+    scene.variable_type.push_back(static_cast<std::uint8_t>(graph.pool(v)));
+    if (graph.fixed(v)) scene.fixed.push_back(v);
+  }
+  scene.held = resolve_gauge(graph).held;
+}
+
+EdgeClass class_of(const Graph& graph, int factor, bool closes_loop) {
+  const auto variables = graph.factor_variables(factor);
+  if (variables.size() == 1) return EdgeClass::prior;
+  if (variables.size() != 2) return EdgeClass::other;
+  const bool first = is_pose(graph.type(variables[0]));
+  const bool second = is_pose(graph.type(variables[1]));
+  if (first != second) return EdgeClass::landmark;
+  if (!first) return EdgeClass::other;
+  return closes_loop ? EdgeClass::loop : EdgeClass::odometry;
+}
+
+void add_edges(const Graph& graph, Scene& scene) {
+  for (const FactorPool& pool : graph.factor_pools()) {
+    scene.edge_types.push_back({std::string(pool.type->tag()), pool.type->residual_size()});
+  }
+  const std::vector<bool> closes = loop_closures(graph);
+  scene.factors = graph.factor_count();
+  bool one_each = true;
+  for (int f = 0; f < graph.factor_count(); ++f) {
+    const auto variables = graph.factor_variables(f);
+    one_each = one_each && variables.size() <= 2;
+    for (std::size_t k = variables.size() == 1 ? 0 : 1; k < variables.size(); ++k) {
+      scene.a.push_back(variables[0]);
+      scene.b.push_back(variables.size() == 1 ? -1 : variables[k]);
+      scene.edge_class.push_back(class_of(graph, f, closes[f]));
+      scene.edge_type.push_back(static_cast<std::uint8_t>(graph.factor(f).pool));
+      scene.factor.push_back(f);
+    }
+  }
+  if (one_each) scene.factor.clear();
+}
+
+/// A file without factors shows as a line through its poses, by rising id.
+void add_path(const Graph& graph, Scene& scene) {
+  std::vector<std::int32_t> poses;
+  for (int v = 0; v < graph.variable_count(); ++v) {
+    if (is_pose(graph.type(v))) poses.push_back(v);
+  }
+  std::sort(poses.begin(), poses.end(), [&](int x, int y) { return graph.id(x) < graph.id(y); });
+  scene.edge_types.push_back({"path", 0});
+  for (std::size_t k = 1; k < poses.size(); ++k) {
+    scene.a.push_back(poses[k - 1]);
+    scene.b.push_back(poses[k]);
+    scene.edge_class.push_back(EdgeClass::path);
+    scene.edge_type.push_back(0);
+  }
+}
+
+void set_place(SceneEstimate& estimate, const Scene& scene, std::size_t variable,
+               const Place& place) {
+  const auto d = static_cast<std::size_t>(scene.dimension);
+  for (std::size_t k = 0; k < d; ++k) estimate.positions[d * variable + k] = place.t[int(k)];
+  if (!place.oriented) return;
+  if (d == 2) {
+    estimate.orientation[variable] = static_cast<float>(std::atan2(place.R(1, 0), place.R(0, 0)));
+  } else {
+    const Eigen::Quaterniond q(place.R);
+    const Eigen::Vector4f xyzw = q.coeffs().cast<float>();
+    std::copy_n(xyzw.data(), 4, estimate.orientation.begin() + std::ptrdiff_t(4 * variable));
+  }
+}
+
+SceneEstimate nowhere(const Scene& scene, std::string name, EstimateRole role) {
+  SceneEstimate estimate;
+  estimate.name = std::move(name);
+  estimate.role = role;
+  estimate.positions.assign(scene.ids.size() * std::size_t(scene.dimension), kNone);
+  estimate.orientation.assign(scene.ids.size() * (scene.dimension == 2 ? 1 : 4),
+                              std::numeric_limits<float>::quiet_NaN());
+  return estimate;
+}
+
+}  // namespace
+
+Picture::~Picture() = default;
+
+std::string_view to_string(EstimateRole role) {
+  switch (role) {
+    case EstimateRole::initial:
+      return "initial";
+    case EstimateRole::estimate:
+      return "estimate";
+    case EstimateRole::truth:
+      return "truth";
+    case EstimateRole::peer:
+      break;
+  }
+  return "peer";
+}
+
+Scene scene_of(const Graph& graph, std::string name) {
+  Scene scene;
+  scene.name = std::move(name);
+  scene.dimension = dimension_of(graph, scene.name);
+  scene.origin = middle(graph);
+  add_variables(graph, scene);
+  if (graph.factor_count() > 0) {
+    add_edges(graph, scene);
+  } else {
+    add_path(graph, scene);
+  }
+  return scene;
+}
+
+SceneEstimate place(const Graph& graph, const Scene& scene, std::string name, EstimateRole role) {
+  SceneEstimate estimate = nowhere(scene, std::move(name), role);
+  for (int v = 0; v < graph.variable_count(); ++v) {
+    set_place(estimate, scene, std::size_t(v), place_of(graph.type(v), graph.state(v).data()));
+  }
+  if (graph.factor_count() == 0) return estimate;
+  const std::vector<double> norms = squared_norms(graph);
+  estimate.chi2 = 0.0;
+  for (const double norm : norms) estimate.chi2 += norm;
+  estimate.edge_chi2.resize(scene.a.size());
+  for (std::size_t e = 0; e < scene.a.size(); ++e) {
+    estimate.edge_chi2[e] =
+        static_cast<float>(norms[scene.factor.empty() ? e : std::size_t(scene.factor[e])]);
+  }
+  return estimate;
+}
+
+SceneEstimate place_by_id(const Graph& other, const Scene& scene, std::string name,
+                          EstimateRole role, int& matched) {
+  SceneEstimate estimate = nowhere(scene, std::move(name), role);
+  matched = 0;
+  for (std::size_t v = 0; v < scene.ids.size(); ++v) {
+    const std::optional<int> found = other.find(scene.ids[v]);
+    if (!found) continue;
+    const VariableType& type = other.type(*found);
+    // A landmark of one file is not a pose of another that happens to have its number.
+    if (!type.placement() || is_pose(type) != scene.variable_types[scene.variable_type[v]].pose) {
+      continue;
+    }
+    set_place(estimate, scene, v, place_of(type, other.state(*found).data()));
+    ++matched;
+  }
+  return estimate;
+}
+
+void copy_positions(const Graph& graph, const Values& values, int dimension,
+                    const std::array<double, 3>& origin, std::vector<float>& out) {
+  const auto d = static_cast<std::size_t>(dimension);
+  out.resize(d * std::size_t(graph.variable_count()));
+  for (std::size_t p = 0; p < graph.variable_pools().size(); ++p) {
+    const VariablePool& pool = graph.variable_pools()[p];
+    const auto size = static_cast<std::size_t>(pool.type->ambient_size());
+    for (std::size_t slot = 0; slot < pool.variables.size(); ++slot) {
+      const Place place = place_of(*pool.type, values.pools[p].data() + slot * size);
+      for (std::size_t k = 0; k < d; ++k) {
+        out[d * std::size_t(pool.variables[slot]) + k] =
+            static_cast<float>(place.t[int(k)] - origin[k]);
+      }
+    }
+  }
+}
+
+}  // namespace cairn

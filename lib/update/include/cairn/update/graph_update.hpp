@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "cairn/graph/graph.hpp"
+#include "cairn/graph/update.hpp"
+#include "cairn/runtime/api.hpp"
+
+namespace cairn {
+
+// What every estimator does with an update before and besides solving: checking it, placing what is
+// new, and carrying it out on a graph.
+
+/// The ids of a graph's factors by position, while factors come and go: they rise with the position
+/// and are never used twice.
+class CAIRN_API FactorIds {
+ public:
+  /// The id that the next factor will get.
+  FactorId next() const { return next_; }
+  FactorId id(int position) const { return ids_[position]; }
+  /// Where the factor is; none if it is not there (any more).
+  std::optional<int> position(FactorId id) const;
+  /// For a factor added to the end of the graph.
+  FactorId add();
+  /// Follows `Graph::remove`.
+  void remove(const Renumbering& numbers);
+
+ private:
+  std::vector<FactorId> ids_;
+  FactorId next_ = 0;
+};
+
+/// How to find the factors that an update refers to.
+struct FactorLookup {
+  /// Position in the graph of the factor with that id, if it is there.
+  std::function<std::optional<int>(FactorId)> position;
+  FactorId next = 0;  ///< id of the update's first new factor
+};
+
+/// Gives the new variables that have no state one: where the first of the update's factors that can
+/// puts them, given the others. `state_of` is the estimate of a variable that was there before
+/// (empty: unknown). Returns which of `update.variables` no factor places.
+CAIRN_API std::vector<int> place_variables(
+    GraphUpdate& update, const std::function<std::span<const double>(Id)>& state_of);
+
+/// Checks that an update can be carried out on a graph, to the last number, and changes nothing but
+/// the update: its new variables get normalized states, also those that came without one. Throws
+/// `Error` (input) that says which variable or factor is wrong, and why.
+CAIRN_API void check_update(const Graph& graph, const FactorLookup& factors, GraphUpdate& update);
+CAIRN_API void check_update(const Graph& graph, const FactorIds& factors, GraphUpdate& update);
+
+/// What carrying out an update came to.
+struct AppliedUpdate {
+  FactorId first_factor = 0;
+  std::vector<FactorId> priors;  ///< that marginalisation left
+};
+
+/// Carries out an update that was checked, in the order that `GraphUpdate` states: marginalisation
+/// at the graph's states (`eliminate`), holding what `resolve_gauge` holds.
+CAIRN_API AppliedUpdate apply_update(const GraphUpdate& update, Graph& graph, FactorIds& factors);
+
+}  // namespace cairn

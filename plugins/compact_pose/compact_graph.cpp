@@ -1,0 +1,339 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "compact_graph.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <string>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "cairn/runtime/error.hpp"
+
+namespace cairn::compact {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double since(Clock::time_point begin) {
+  return std::chrono::duration<double>(Clock::now() - begin).count();
+}
+
+[[noreturn]] void refuse(const std::string& message) { throw Error(ErrorCode::input, message); }
+
+}  // namespace
+
+CompactGraph::CompactGraph(std::unique_ptr<Estimator> estimator, CompositionOrder order)
+    : estimator_(std::move(estimator)), order_(order) {
+  estimator_->keep_marginals(KeptMarginals::diagonal);
+}
+
+void CompactGraph::start(const Variable& pose, PolicySeconds& seconds) {
+  const auto begin = Clock::now();
+  auto group = std::make_unique<RigidGroup>(pose.type);
+  Variable first = pose;
+  if (first.state.empty()) {
+    first.state.resize(static_cast<std::size_t>(pose.type->ambient_size()));
+    pose.type->identity(first.state.data());
+  }
+  GraphUpdate update;
+  update.variables.push_back(first);
+  estimator_->update(update);
+  group_ = std::move(group);
+  index_ = std::make_unique<PoseIndex>(group_->dimension());
+  newest_ = {};
+  newest_.pose = first;
+  newest_.kept = true;
+  kept_.push_back({.id = pose.id});
+  solved_ = 1;
+  anchor_ = 0;
+  number_.emplace(pose.id, 0);
+  index_->add(group_->place(group_->state(first.state)).at.t);
+  refresh();
+  seconds.estimate += since(begin);
+}
+
+Motion CompactGraph::fuse(std::span<const Factor> factors, Id from, Id to) const {
+  const MotionGroup& motions = group_->motions();
+  if (factors.empty()) refuse(fmt::format("no measured motion from pose {} to {}", from, to));
+  Motion all;
+  for (const Factor& factor : factors) {
+    const auto& on = factor.variables;
+    const bool forwards = on == std::vector<Id>{from, to}, back = on == std::vector<Id>{to, from};
+    if (!forwards && !back)
+      refuse(fmt::format("a measurement that is not between poses {} and {}", from, to));
+    if (!factor.type) refuse("a measurement without a type");
+    if (!factor.type->is_relative() ||
+        factor.type->variable_tags().front() != motions.type().tag()) {
+      refuse(fmt::format("{} between {} and {} measures no motion of {}", factor.type->tag(), from,
+                         to, motions.type().tag()));
+    }
+    const Motion motion = motions.of_factor(factor, from);
+    all = all.mean.empty() ? motion : motions.fuse(all, motion);
+  }
+  return all;
+}
+
+void CompactGraph::advance(const Variable& pose, const Motion& motion,
+                           const std::shared_ptr<const FactorType>& type) {
+  Newest next;
+  next.pose = pose;
+  next.type = type;
+  next.predecessor = newest_.kept ? size() - 1 : newest_.predecessor;
+  if (newest_.kept) {
+    next.odometry = motion;
+  } else {
+    next.odometry = group_->motions().compose(newest_.odometry, motion, order_);
+    next.steps = std::move(newest_.steps);
+  }
+  // After a relocation the way begins at another pose than where it ended.
+  const bool relocated = !newest_.kept && next.steps.empty();
+  const Motion& step = relocated ? next.odometry : motion;
+  next.steps.push_back({pose.id, step.mean, step.covariance});
+  next.ahead = compose(kept_[next.predecessor].ahead, next.odometry);
+  newest_ = std::move(next);
+  newest_.placed = group_->place(
+      group_->compose(kept_[newest_.predecessor].placed.x, group_->state(newest_.odometry.mean)));
+  known_ = false;
+}
+
+/// To first order, as the estimator's H has it.
+CompactGraph::Ahead CompactGraph::compose(const Ahead& ahead, const Motion& motion) const {
+  const int n = group_->tangent_size();
+  const State z = group_->state(motion.mean);
+  Matrix S = to_matrix(motion.covariance, n);
+  if (ahead.covariance.size() == 0) return {z, S};  // from the anchor itself
+  const Matrix A = group_->adjoint_of_inverse(z);
+  S += A * ahead.covariance * A.transpose();
+  return {group_->compose(ahead.mean, z), S};
+}
+
+void CompactGraph::keep(PolicySeconds& seconds) {
+  if (newest_.kept) return;
+  const Id from = kept_[newest_.predecessor].id;
+  Kept pose{.id = newest_.pose.id, .placed = newest_.placed, .ahead = newest_.ahead};
+  pose.variable = newest_.pose;
+  pose.odometry =
+      group_->motions().to_factor(newest_.type, from, newest_.pose.id, newest_.odometry);
+  if (newest_.steps.empty()) {  // it has just been relocated
+    newest_.steps.push_back({newest_.pose.id, newest_.odometry.mean, newest_.odometry.covariance});
+  }
+  chains_.push_back({from, newest_.pose.id, std::move(newest_.steps)});
+  number_.emplace(pose.id, size());
+  index_->add(newest_.placed.at.t);
+  kept_.push_back(std::move(pose));
+  newest_.kept = true;
+  if (newest_.pose.fixed) update({}, seconds);  // which is more than odometry
+}
+
+void CompactGraph::link(std::span<const Factor> links, PolicySeconds& seconds) {
+  keep(seconds);
+  update(links, seconds);
+}
+
+void CompactGraph::relocate(int pose, const Motion& measured, PolicySeconds& seconds) {
+  const MotionGroup& motions = group_->motions();
+  if (pose == newest_.predecessor) {  // another measurement of the same motion
+    newest_.odometry = motions.fuse(newest_.odometry, measured);
+    update({}, seconds);
+    hang_newest();
+    return;
+  }
+  Motion half = measured;
+  for (double& entry : half.covariance) entry *= 2.0;
+  const int other = newest_.predecessor;
+  const std::pair<int, int> ends = std::minmax(pose, other);
+  Motion bridge = motions.compose(half, motions.inverse(newest_.odometry), order_);
+  if (pose > other) bridge = motions.inverse(bridge);
+  const auto known = bridges_.find(ends);
+  if (known != bridges_.end()) bridge = motions.fuse(known->second.motion, bridge);
+  const Factor factor =
+      motions.to_factor(newest_.type, kept_[ends.first].id, kept_[ends.second].id, bridge);
+  if (known == bridges_.end()) {
+    const FactorId id = update({&factor, 1}, seconds);
+    bridges_.emplace(ends, Bridge{id, bridge});
+  } else {
+    update({}, seconds, {{known->second.factor, factor.measurement, factor.information}});
+    known->second.motion = bridge;
+  }
+  const Motion back = motions.inverse(half);
+  newest_.steps.push_back({kept_[pose].id, back.mean, back.covariance});
+  chains_.push_back({kept_[other].id, kept_[pose].id, std::move(newest_.steps)});
+  newest_.steps.clear();
+  newest_.predecessor = pose;
+  newest_.odometry = half;
+  hang_newest();
+}
+
+/// Puts the newest pose, which is not kept, where its odometry from its predecessor says; that is
+/// in the estimator, and the anchor from now on.
+void CompactGraph::hang_newest() {
+  anchor_ = newest_.predecessor;
+  newest_.ahead = compose({}, newest_.odometry);
+  newest_.placed =
+      group_->place(group_->compose(kept_[anchor_].placed.x, group_->state(newest_.odometry.mean)));
+  ++version_;  // covariances with the anchor are with another pose now
+  known_ = false;
+}
+
+FactorId CompactGraph::update(std::span<const Factor> links, PolicySeconds& seconds,
+                              std::vector<ChangedFactor> changed) {
+  if (links.empty() && changed.empty() && solved_ == size()) return 0;
+  const auto begin = Clock::now();
+  GraphUpdate update;
+  for (int k = solved_; k < size(); ++k) {
+    Variable& variable = kept_[k].variable;
+    if (!variable.fixed || variable.state.empty()) {
+      const auto state = group_->span(kept_[k].placed.x);
+      variable.state.assign(state.begin(), state.end());
+    }
+    update.variables.push_back(variable);
+    update.factors.push_back(kept_[k].odometry);
+  }
+  update.factors.insert(update.factors.end(), links.begin(), links.end());
+  update.changed = std::move(changed);
+  const UpdateReport report = estimator_->update(update);  // throws before anything has changed
+  const FactorId first_link = report.first_factor + (size() - solved_);
+  for (; solved_ < size(); ++solved_) {
+    kept_[solved_].ahead = {};
+    kept_[solved_].variable = {};
+    kept_[solved_].odometry = {};
+  }
+  anchor_ = newest_.kept ? size() - 1 : newest_.predecessor;
+  newest_.ahead = newest_.kept ? Ahead() : compose({}, newest_.odometry);
+  refresh();
+  seconds.estimate += since(begin);
+  return first_link;
+}
+
+Estimator& CompactGraph::estimator() {
+  PolicySeconds unattended;
+  update({}, unattended);
+  return *estimator_;
+}
+
+void CompactGraph::solve_fully() {
+  PolicySeconds unattended;
+  update({}, unattended);
+  estimator_->update({}, {.full = true});
+  refresh();
+}
+
+/// Reads the estimate, which has changed.
+void CompactGraph::refresh() {
+  for (int k = 0; k < size(); ++k) {
+    kept_[k].placed = group_->place(group_->state(estimator_->state(kept_[k].id)));
+    index_->move(k, kept_[k].placed.at.t);
+  }
+  newest_.placed = newest_.kept
+                       ? kept_.back().placed
+                       : group_->place(group_->compose(kept_[newest_.predecessor].placed.x,
+                                                       group_->state(newest_.odometry.mean)));
+  ++version_;
+  known_ = false;
+}
+
+int CompactGraph::find(Id id) const {
+  const auto place = number_.find(id);
+  return place == number_.end() ? -1 : place->second;
+}
+
+std::vector<Id> CompactGraph::kept() const {
+  std::vector<Id> ids;
+  for (const Kept& pose : kept_) ids.push_back(pose.id);
+  return ids;
+}
+
+int CompactGraph::factor_count() const { return estimator_->factor_count() + (size() - solved_); }
+
+std::vector<int> CompactGraph::near(double radius) {
+  std::vector<int> found = index_->near(newest_.placed.at.t, radius);
+  if (newest_.kept) std::erase(found, size() - 1);
+  return found;
+}
+
+void CompactGraph::prepare(std::span<const int> poses, PolicySeconds& seconds) {
+  const auto begin = Clock::now();
+  const int n = group_->tangent_size();
+  const auto doubles = static_cast<std::size_t>(n) * static_cast<std::size_t>(n);
+  std::vector<Id> ids;
+  std::vector<int> missing;
+  for (const int pose : poses) {
+    if (ahead(pose) || kept_[pose].version == version_) continue;
+    missing.push_back(pose);
+    ids.push_back(kept_[pose].id);
+  }
+  const Id anchor_id = kept_[anchor_].id;
+  if (!ids.empty() && anchored_version_ != version_) {
+    anchored_version_ = version_;
+    S_aa_.resize(n, n);
+    estimator_->covariance(anchor_id, anchor_id, {S_aa_.data(), doubles});
+    known_ = false;
+  }
+  if (!ids.empty()) {
+    Eigen::MatrixXd column(std::ssize(ids) * n, n);
+    estimator_->covariance_column(anchor_id, ids,
+                                  {column.data(), static_cast<std::size_t>(column.size())});
+    for (std::size_t k = 0; k < missing.size(); ++k) {
+      Kept& pose = kept_[missing[k]];
+      pose.cross = column.middleRows(static_cast<Eigen::Index>(k) * n, n);
+      pose.own.resize(n, n);
+      estimator_->covariance(pose.id, pose.id, {pose.own.data(), doubles});
+      pose.version = version_;
+    }
+  }
+  if (!known_ && anchored_version_ == version_) know_newest();
+  seconds.covariances += since(begin);
+}
+
+bool CompactGraph::prepared(int pose) const {
+  return ahead(pose) || kept_[pose].version == version_;
+}
+
+/// A and Σ_nn of the newest pose, from the anchor's Σ_aa.
+void CompactGraph::know_newest() {
+  const int n = group_->tangent_size();
+  if (newest_.ahead.covariance.size() == 0) {
+    A_ = Matrix::Identity(n, n);
+    S_nn_ = S_aa_;
+  } else {
+    A_ = group_->adjoint_of_inverse(newest_.ahead.mean);
+    S_nn_ = A_ * S_aa_ * A_.transpose() + newest_.ahead.covariance;
+  }
+  known_ = true;
+}
+
+Displacement CompactGraph::displacement(int pose) const {
+  return group_->displacement(kept_[pose].placed, newest_.placed);
+}
+
+void CompactGraph::set_covariance(int pose, Displacement& d) const {
+  const Kept& kept = kept_[pose];
+  const bool newest_ahead = newest_.ahead.covariance.size() > 0;
+  if (newest_ahead && pose == newest_.predecessor) {
+    d.covariance = to_matrix(newest_.odometry.covariance, group_->tangent_size());
+  } else if (!ahead(pose)) {
+    group_->set_covariance(kept.own, kept.cross.lazyProduct(A_.transpose()), S_nn_, d);
+  } else {
+    // Odometry alone is between them: Σ_an = Ad(d⁻¹) Σ_ai Ad(d⁻¹)ᵀ + Σ_d.
+    d.covariance = newest_.ahead.covariance;
+    if (pose != anchor_) d.covariance -= d.adjoint * kept.ahead.covariance * d.adjoint.transpose();
+  }
+}
+
+Displacement CompactGraph::between(int a, int b) {
+  PolicySeconds unattended;
+  update({}, unattended);
+  const int n = group_->tangent_size();
+  const auto block = [&](int i, int k) {
+    Matrix S(n, n);
+    estimator_->covariance(kept_[i].id, kept_[k].id,
+                           {S.data(), static_cast<std::size_t>(S.size())});
+    return S;
+  };
+  Displacement d = group_->displacement(kept_[a].placed, kept_[b].placed);
+  group_->set_covariance(block(a, a), block(a, b), block(b, b), d);
+  return d;
+}
+
+}  // namespace cairn::compact

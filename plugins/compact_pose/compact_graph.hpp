@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <map>
+#include <memory>
+#include <span>
+#include <unordered_map>
+#include <utility>
+#include <vector>
+
+#include "cairn/geometry/motion.hpp"
+#include "cairn/geometry/pose_chain.hpp"
+#include "cairn/policy/pose_policy.hpp"
+#include "cairn/solve/estimator.hpp"
+#include "pose_index.hpp"
+#include "rigid_group.hpp"
+
+namespace cairn::compact {
+
+/// A compact pose graph while it grows: the poses that are kept, in an estimator, and the newest
+/// pose, which may not be kept.
+///
+/// Poses that odometry alone has added are a chain at the end of the graph, and tell the others
+/// nothing. So they reach the estimator only when a link closes a loop, or somebody reads it, and
+/// all of them at once; replacing a redundant pose by the next one costs it nothing either
+/// (Algorithm 1, line 12). Until then their states and covariances follow from those of the pose
+/// that the chain hangs on, the anchor a, which the estimator has: with μ the concatenated motion
+/// from there and A = Ad(μ⁻¹),
+///
+///     x_n = x_a μ,  Σ_in = Σ_ia Aᵀ,  Σ_nn = A Σ_aa Aᵀ + Σ_μ,
+///
+/// just as the estimator would have them.
+class CompactGraph {
+ public:
+  CompactGraph(std::unique_ptr<Estimator> estimator, CompositionOrder order);
+
+  /// With everything that is kept.
+  Estimator& estimator();
+  bool empty() const { return kept_.empty(); }
+  const RigidGroup& group() const { return *group_; }
+
+  /// The first pose of all.
+  void start(const Variable& pose, PolicySeconds& seconds);
+  /// All measurements of the motion between two poses as one. Throws `Error` (input) if one of them
+  /// measures something else.
+  Motion fuse(std::span<const Factor> factors, Id from, Id to) const;
+  /// The next pose, moved by `motion` from the one before: from then on the newest.
+  void advance(const Variable& pose, const Motion& motion,
+               const std::shared_ptr<const FactorType>& type);
+  /// Keeps the newest pose.
+  void keep(PolicySeconds& seconds);
+  /// Keeps the newest pose, and takes these links in.
+  void link(std::span<const Factor> links, PolicySeconds& seconds);
+  /// The newest pose, which is not kept, has been matched with a kept one, `measured` from there.
+  /// Instead of keeping it, the way between its predecessor and that pose becomes a link of these
+  /// two, and goes on from that pose. The measurement takes part in both, so each gets half of its
+  /// information: two halves that are taken for independent tell no more than the one measurement.
+  void relocate(int pose, const Motion& measured, PolicySeconds& seconds);
+  /// Relinearises and solves everything until it has converged.
+  void solve_fully();
+
+  // The newest pose
+  // --------------------------------------------------------------------------------
+  Id newest_id() const { return newest_.pose.id; }
+  const State& newest_state() const { return newest_.placed.x; }
+  bool newest_kept() const { return newest_.kept; }
+  /// Last kept pose before the newest.
+  int predecessor() const { return newest_.predecessor; }
+  /// Covariance of the motion from there.
+  Matrix newest_odometry() const {
+    return to_matrix(newest_.odometry.covariance, group_->tangent_size());
+  }
+
+  // Kept poses, numbered in the order of arrival
+  // ---------------------------------------------------
+  int size() const { return static_cast<int>(kept_.size()); }
+  Id id(int pose) const { return kept_[pose].id; }
+  const State& state(int pose) const { return kept_[pose].placed.x; }
+  std::vector<Id> kept() const;
+  int factor_count() const;
+  /// The number of a kept pose; -1: it is not there.
+  int find(Id id) const;
+  /// Kept poses within a distance [m] of the newest, itself not among them.
+  std::vector<int> near(double radius);
+
+  /// Rises whenever the estimate and its covariances change.
+  int version() const { return version_; }
+  /// Sees to it that the covariances of these poses with the newest are known.
+  void prepare(std::span<const int> poses, PolicySeconds& seconds);
+  bool prepared(int pose) const;
+  /// Where the newest is as seen from a kept pose.
+  Placed newest_seen_from(int pose) const {
+    return RigidGroup::seen_from(kept_[pose].placed, newest_.placed);
+  }
+  /// From a kept pose to the newest; without covariance.
+  Displacement displacement(int pose) const;
+  /// Its covariance; the pose must have been prepared.
+  void set_covariance(int pose, Displacement& displacement) const;
+  /// Between two kept poses, with its covariance; by solving, for which all of them must reach the
+  /// estimator.
+  Displacement between(int a, int b);
+
+  const std::vector<OdometryChain>& chains() const { return chains_; }
+
+ private:
+  /// A motion from the anchor, with its covariance.
+  struct Ahead {
+    State mean{};
+    Matrix covariance{};
+  };
+  struct Kept {
+    Id id = 0;
+    PlacedState placed{};
+    int version = -1;       ///< of the covariances below
+    Matrix own{}, cross{};  ///< Σ_ii; Σ_ia
+    Ahead ahead{};          ///< while the estimator does not have it
+    Variable variable{};    ///< likewise
+    Factor odometry{};      ///< likewise
+  };
+  struct Newest {
+    Variable pose;
+    PlacedState placed{};
+    bool kept = false;
+    int predecessor = -1;
+    std::shared_ptr<const FactorType> type;
+    Motion odometry;  ///< from the predecessor
+    Ahead ahead;
+    std::vector<ChainStep> steps;
+  };
+
+  /// Whether odometry from the anchor alone tells where a pose is, or it is the anchor.
+  bool ahead(int pose) const { return pose == anchor_ || pose >= solved_; }
+  Ahead compose(const Ahead& ahead, const Motion& motion) const;
+  /// Hands over what the estimator does not have yet, and links. Returns the number of the first of
+  /// these.
+  FactorId update(std::span<const Factor> links, PolicySeconds& seconds,
+                  std::vector<ChangedFactor> changed = {});
+  void refresh();
+  void hang_newest();
+  void know_newest();
+
+  std::unique_ptr<Estimator> estimator_;
+  CompositionOrder order_;
+  std::unique_ptr<RigidGroup> group_;
+  std::unique_ptr<PoseIndex> index_;
+  std::vector<Kept> kept_;
+  int solved_ = 0;   ///< so many of them has the estimator
+  int anchor_ = -1;  ///< one of those: where the newest pose and those since the last update hang
+  std::unordered_map<Id, int> number_;
+  Newest newest_;
+  std::vector<OdometryChain> chains_;
+  /// Links that stand for ways between kept poses, by the two (the smaller number first).
+  struct Bridge {
+    FactorId factor = 0;
+    Motion motion;
+  };
+  std::map<std::pair<int, int>, Bridge> bridges_;
+  int version_ = 0;
+
+  int anchored_version_ = -1;
+  Matrix S_aa_;         ///< of that version
+  bool known_ = false;  ///< A_ and S_nn_ are those of the newest pose
+  Matrix A_, S_nn_;
+};
+
+}  // namespace cairn::compact

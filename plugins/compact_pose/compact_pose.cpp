@@ -1,0 +1,406 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "compact_pose.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include <fmt/format.h>
+#include <Eigen/Cholesky>
+
+#include "cairn/runtime/error.hpp"
+
+namespace cairn::compact {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+/// Covariances are asked for within so many radii.
+constexpr double kAhead = 2.0;
+/// Links that wait: older ones are given up when there are more.
+constexpr std::size_t kMostWaiting = 32;
+
+/// Adds the time until it goes to a sum.
+class Timed {
+ public:
+  explicit Timed(double& sum) : sum_(sum), begin_(Clock::now()) {}
+  ~Timed() { sum_ += std::chrono::duration<double>(Clock::now() - begin_).count(); }
+  Timed(const Timed&) = delete;
+  Timed& operator=(const Timed&) = delete;
+
+ private:
+  double& sum_;
+  Clock::time_point begin_;
+};
+
+[[noreturn]] void refuse(const std::string& message) { throw Error(ErrorCode::input, message); }
+
+/// (I + 1)^power − 1 of the gain I of a link as good as the odometry between two poses, which is
+/// n/2 ln 2: what the thresholds of section 5.2 come to for such data.
+double default_gain(int tangent_size, double power) {
+  return std::pow(0.5 * tangent_size * std::log(2.0) + 1.0, power) - 1.0;
+}
+
+/// Σ̄_y as the options give it; empty: not given.
+Matrix sensor_covariance(const std::vector<double>& numbers, const RigidGroup& group) {
+  Matrix S;
+  const int n = group.tangent_size();
+  const auto given = static_cast<int>(numbers.size());
+  if (given == 2) {
+    S = group.isotropic(numbers[0], numbers[1]);
+  } else if (given == n * (n + 1) / 2) {
+    S.resize(n, n);
+    for (int r = 0, k = 0; r < n; ++r) {
+      for (int c = r; c < n; ++c, ++k) S(r, c) = S(c, r) = numbers[k];
+    }
+  } else if (given != 0) {
+    throw Error(ErrorCode::usage,
+                fmt::format("compact_pose: sensor has {} numbers; expected 2 (standard deviations "
+                            "of translation and rotation) or {} (upper triangle of the "
+                            "covariance of {})",
+                            given, n * (n + 1) / 2, group.motions().type().tag()));
+  }
+  if (given != 0 && !(S.allFinite() && Eigen::LLT<Matrix>(S).info() == Eigen::Success))
+    throw Error(ErrorCode::usage, "compact_pose: sensor is no positive definite covariance");
+  return S;
+}
+
+constexpr auto kByGain = [](const auto& a, const auto& b) {
+  return a.gain < b.gain || (a.gain == b.gain && a.pose < b.pose);
+};
+
+}  // namespace
+
+CompactPose::CompactPose(std::unique_ptr<Estimator> estimator, CompactPoseOptions options)
+    : options_(std::move(options)), graph_(std::move(estimator), options_.composition) {}
+
+void CompactPose::start(const Variable& pose) {
+  // Before anything has changed: what the options say fits this type of pose.
+  const Matrix sensor = sensor_covariance(options_.sensor, RigidGroup(pose.type));
+  graph_.start(pose, report_.seconds);
+  sensor_ = sensor;
+  const RigidGroup& group = graph_.group();
+  const int n = group.tangent_size();
+  test_.emplace(group, options_.range);
+  radius_ = options_.search == Search::index ? options_.range.radius(group.dimension()) : kInfinity;
+  check_.emplace(group, options_.range, options_.gate, options_.trust);
+  const auto threshold = [&](bool everything, double chosen, double power) {
+    if (everything) return -kInfinity;
+    return chosen < 0.0 ? default_gain(n, power) : chosen;
+  };
+  loop_gain_ = threshold(options_.all_loops, options_.loop_gain, 1.36);
+  pose_gain_ = threshold(options_.all_poses, options_.pose_gain, 1.7);
+}
+
+void CompactPose::add_pose(const Variable& pose, std::span<const Factor> odometry) {
+  if (open_) throw Error(ErrorCode::usage, "add_pose before the pose before it was ended");
+  PoseReport report;
+  report.id = pose.id;
+  if (graph_.empty()) {
+    if (!odometry.empty())
+      refuse(fmt::format("pose {} is the first, and moved from another", pose.id));
+    std::swap(report_, report);
+    start(pose);
+  } else {
+    if (pose.type->tag() != graph_.group().motions().type().tag()) {
+      refuse(fmt::format("pose {} is a {}; the poses before it are {}", pose.id, pose.type->tag(),
+                         graph_.group().motions().type().tag()));
+    }
+    if (graph_.find(pose.id) >= 0 || pose.id == graph_.newest_id())
+      refuse(fmt::format("pose {} is there already", pose.id));
+    if (odometry.empty())
+      refuse(fmt::format("pose {} comes without a measured motion from pose {}", pose.id,
+                         graph_.newest_id()));
+    const Motion motion = graph_.fuse(odometry, graph_.newest_id(), pose.id);
+    std::swap(report_, report);
+    const Timed timed(report_.seconds.total);
+    odometry_ = to_matrix(motion.covariance, graph_.group().tangent_size());
+    graph_.advance(pose, motion, odometry.front().type);
+    if (pose.fixed) graph_.keep(report_.seconds);
+  }
+  open_ = true;
+  searched_ = false;
+  candidates_.clear();
+  dimensions_.clear();
+}
+
+Matrix CompactPose::expected_covariance() const { return sensor_.size() > 0 ? sensor_ : odometry_; }
+
+/// After a link everything is to be computed anew, and mostly for one pose only: the best of what
+/// is left, which is then used or tells too little for all others. If it is not so, all that are
+/// left are solved for together.
+Displacement CompactPose::known_displacement(int pose) {
+  if (!graph_.prepared(pose)) {
+    std::vector<int> poses{pose};
+    if (asked_version_ == graph_.version()) {
+      for (const Candidate& other : candidates_) {
+        if (other.gain > loop_gain_) poses.push_back(other.pose);
+      }
+    }
+    asked_version_ = graph_.version();
+    graph_.prepare(poses, report_.seconds);
+  } else {
+    graph_.prepare({&pose, 1}, report_.seconds);
+  }
+  Displacement d = graph_.displacement(pose);
+  graph_.set_covariance(pose, d);
+  return d;
+}
+
+double CompactPose::expected_gain(int pose) {
+  return mutual_information(expected_covariance(), known_displacement(pose).covariance);
+}
+
+/// Lines 14 and 15 of Algorithm 1.
+void CompactPose::search() {
+  searched_ = true;
+  if (graph_.predecessor() < 0) return;
+  const Timed timed(report_.seconds.search);
+  const std::vector<int> near = graph_.near(radius_);
+  std::vector<int> possible;
+  for (const int pose : near) {
+    if (options_.search == Search::index && !test_->possible(graph_.newest_seen_from(pose)))
+      continue;
+    possible.push_back(pose);
+  }
+  const double solving = report_.seconds.covariances;
+  if (!std::ranges::all_of(possible, [&](int pose) { return graph_.prepared(pose); })) {
+    // Where nothing has changed for more than one pose, those that the next will need as well.
+    if (solved_version_ == graph_.version())
+      graph_.prepare(graph_.near(kAhead * radius_), report_.seconds);
+    solved_version_ = graph_.version();
+  }
+  graph_.prepare(possible, report_.seconds);
+  report_.seconds.search -= report_.seconds.covariances - solving;
+  const Matrix expected = expected_covariance();
+  for (const int pose : possible) {
+    Displacement d = graph_.displacement(pose);
+    graph_.set_covariance(pose, d);
+    const Dimensions dimensions = test_->dimensions(d);
+    if (options_.search != Search::untested && !test_->passes(dimensions)) continue;
+    const double gain = mutual_information(expected, d.covariance);
+    ++report_.candidates;
+    report_.least_gain = std::min(report_.least_gain, gain);
+    if (pose != graph_.predecessor()) {
+      candidates_.push_back(
+          {pose, graph_.version(), gain, static_cast<int>(std::ssize(dimensions_))});
+      dimensions_.push_back(dimensions);
+    }
+  }
+  report_.near = static_cast<int>(std::ssize(near));
+  std::ranges::make_heap(candidates_, kByGain);
+}
+
+std::optional<MatchProposal> CompactPose::next_match() {
+  if (!open_) throw Error(ErrorCode::usage, "next_match without a pose");
+  const Timed timed(report_.seconds.total);
+  if (!searched_) search();
+  while (!candidates_.empty()) {
+    Candidate& best = candidates_.front();
+    if (!(best.gain > loop_gain_)) break;
+    if (best.version == graph_.version()) {
+      const Displacement d = known_displacement(best.pose);
+      const auto mean = graph_.group().span(d.mean);
+      return MatchProposal{graph_.id(best.pose),
+                           graph_.newest_id(),
+                           best.gain,
+                           {{mean.begin(), mean.end()},
+                            {d.covariance.data(), d.covariance.data() + d.covariance.size()}}};
+    }
+    std::ranges::pop_heap(candidates_, kByGain);
+    candidates_.back().gain = expected_gain(candidates_.back().pose);
+    candidates_.back().version = graph_.version();
+    std::ranges::push_heap(candidates_, kByGain);
+  }
+  return std::nullopt;
+}
+
+/// Takes a pose off the list; mostly it is the first, since that was proposed.
+std::optional<CompactPose::Candidate> CompactPose::take_candidate(int pose) {
+  auto place = std::ranges::find(candidates_, pose, &Candidate::pose);
+  if (place == candidates_.end()) return std::nullopt;
+  const Candidate candidate = *place;
+  if (place == candidates_.begin()) {
+    std::ranges::pop_heap(candidates_, kByGain);
+    candidates_.pop_back();
+  } else {
+    candidates_.erase(place);
+    std::ranges::make_heap(candidates_, kByGain);
+  }
+  return candidate;
+}
+
+LinkReport CompactPose::offer(Id other, std::span<const Factor> measured) {
+  if (!open_) throw Error(ErrorCode::usage, "offer without a pose");
+  const Timed timed(report_.seconds.total);
+  const int pose = graph_.find(other);
+  if (pose < 0) {
+    refuse(fmt::format("pose {} is not in the compact graph{}", other,
+                       other == graph_.newest_id() ? "; it is the newest" : ""));
+  }
+  if (other == graph_.newest_id()) refuse(fmt::format("a link from pose {} to itself", other));
+  const Motion motion =
+      measured.empty() ? Motion() : graph_.fuse(measured, other, graph_.newest_id());
+  if (!searched_) search();
+  LinkReport report{.earlier = other, .later = graph_.newest_id()};
+  const std::optional<Candidate> candidate = take_candidate(pose);
+  if (candidate) report.expected_gain = candidate->gain;
+  if (!measured.empty()) {
+    Link link{.earlier = pose,
+              .later = graph_.newest_kept() ? graph_.size() - 1 : graph_.size(),
+              .factors = {measured.begin(), measured.end()},
+              .motion = motion,
+              .mean = graph_.group().state(motion.mean),
+              .covariance = to_matrix(motion.covariance, graph_.group().tangent_size())};
+    report.verdict = judge(link, report);
+    if (report.verdict == LinkVerdict::linked) {
+      if (candidate)
+        finder_.note_loop(*test_, dimensions_[candidate->place], report.gain, link.covariance);
+      use(link);
+    } else if (report.verdict == LinkVerdict::waiting) {
+      if (!graph_.newest_kept()) graph_.keep(report_.seconds);
+      waiting_.push_back({std::move(link), report});
+      if (waiting_.size() > kMostWaiting) {  // nothing has agreed with it for so long
+        waiting_.front().report.verdict = LinkVerdict::inconsistent;
+        report_.links.push_back(waiting_.front().report);
+        waiting_.erase(waiting_.begin());
+      }
+    }
+  }
+  report_.links.push_back(report);
+  if (report.verdict == LinkVerdict::linked) judge_waiting();
+  return report;
+}
+
+/// Lines 22 and 23 of Algorithm 1, and whether the link fits.
+LinkVerdict CompactPose::judge(const Link& link, LinkReport& report) {
+  const Displacement d = known_displacement(link.earlier);
+  report.gain = mutual_information(link.covariance, d.covariance);
+  const Fit fit = check_->fit(link, d);
+  report.innovation = fit.innovation;
+  if (!(report.gain > loop_gain_)) return LinkVerdict::uninformative;
+  if (!fit.consistent) return LinkVerdict::inconsistent;
+  if (check_->needs_another(fit) && !agrees_with_waiting(link)) return LinkVerdict::waiting;
+  return LinkVerdict::linked;
+}
+
+bool CompactPose::agrees_with_waiting(const Link& link) {
+  for (std::size_t k = 0; k < waiting_.size(); ++k) {
+    const Link& other = waiting_[k].link;
+    const bool kept = link.later < graph_.size();
+    if (other.earlier == link.earlier && other.later == link.later) continue;
+    // Before it is kept, the newest pose is known by its displacement only.
+    const Displacement later =
+        kept ? graph_.between(other.later, link.later) : known_displacement(other.later);
+    const Fit fit =
+        check_->agreement(other, link, graph_.between(other.earlier, link.earlier), later);
+    if (!fit.consistent || check_->needs_another(fit)) continue;
+    return true;
+  }
+  return false;
+}
+
+/// Relocating gives each of two ways half of the measurement. That must leave little between the
+/// two poses that is worth a pose of its own, and must cost little of what is known of the way that
+/// ends here: where loop closures are not better than odometry, the loss would add up. The more
+/// poses are kept nearby, the less each way matters, and the more is gained by not keeping another.
+bool CompactPose::may_relocate(const Link& link) const {
+  const Matrix half = 2.0 * link.covariance;
+  if (!(mutual_information(expected_covariance(), half) < pose_gain_)) return false;
+  const Matrix way = graph_.newest_odometry();
+  const double lost = mutual_information(way + link.covariance, link.covariance);
+  return lost <= options_.reuse_loss * report_.candidates * graph_.group().tangent_size();
+}
+
+void CompactPose::use(const Link& link) {
+  const bool of_newest = link.later == graph_.size() && !graph_.newest_kept();
+  if (options_.reuse && of_newest && may_relocate(link)) {
+    graph_.relocate(link.earlier, link.motion, report_.seconds);
+  } else {
+    graph_.link(link.factors, report_.seconds);
+  }
+  report_.closed_loop = true;
+}
+
+/// After a link was used, what waits is looked at again: it fits closely now, or not at all.
+void CompactPose::judge_waiting() {
+  for (bool again = true; std::exchange(again, false);) {
+    for (std::size_t k = 0; k < waiting_.size() && !again; ++k) {
+      Waiting& old = waiting_[k];
+      const Displacement d = graph_.between(old.link.earlier, old.link.later);
+      const Fit fit = check_->fit(old.link, d);
+      old.report.innovation = fit.innovation;
+      old.report.gain = mutual_information(old.link.covariance, d.covariance);
+      if (fit.consistent && check_->needs_another(fit)) continue;
+      if (!fit.consistent) {
+        old.report.verdict = LinkVerdict::inconsistent;
+      } else if (!(old.report.gain > loop_gain_)) {
+        old.report.verdict = LinkVerdict::uninformative;
+      } else {
+        old.report.verdict = LinkVerdict::linked;
+        use(old.link);
+      }
+      report_.links.push_back(old.report);
+      waiting_.erase(waiting_.begin() + static_cast<std::ptrdiff_t>(k));
+      again = true;
+    }
+  }
+}
+
+/// Line 32 of Algorithm 1.
+PoseReport CompactPose::end_pose() {
+  if (!open_) throw Error(ErrorCode::usage, "end_pose without a pose");
+  {
+    const Timed timed(report_.seconds.total);
+    if (!searched_) search();
+    if (!graph_.newest_kept() && !report_.closed_loop && report_.least_gain > pose_gain_)
+      graph_.keep(report_.seconds);
+    if (graph_.predecessor() >= 0 && report_.candidates > 0) finder_.note_pose(report_.least_gain);
+  }
+  open_ = false;
+  report_.kept = graph_.newest_kept();
+  return report_;
+}
+
+void CompactPose::finish() {
+  if (open_) throw Error(ErrorCode::usage, "finish before the newest pose was ended");
+  if (graph_.empty()) return;
+  if (!graph_.newest_kept()) graph_.keep(report_.seconds);
+  graph_.solve_fully();
+}
+
+std::vector<double> CompactPose::newest_state() const {
+  if (graph_.empty()) throw Error(ErrorCode::usage, "newest_state before the first pose");
+  const auto state = graph_.group().span(graph_.newest_state());
+  return {state.begin(), state.end()};
+}
+
+void* CompactPose::ability(std::string_view name) {
+  if (name == OptionFinder::kAbility) return static_cast<OptionFinder*>(this);
+  return PosePolicy::ability(name);
+}
+
+OptionValues CompactPose::watching() const {
+  return {{"strategy", "apal"}, {"search", "untested"}};
+}
+
+OptionValues CompactPose::found() const { return finder_.found(options_.range.probability); }
+
+OptionValues CompactPose::scaled(const OptionValues& found, double links, double poses) const {
+  OptionValues values = found;
+  const auto scale = [&](const char* name, double factor) {
+    std::string& gain = values.at(name);
+    gain = fmt::format("{:.9g}", factor * std::stod(gain));
+  };
+  scale("loop_gain", links);
+  scale("pose_gain", poses);
+  return values;
+}
+
+double CompactPose::accuracy() const {
+  return std::sqrt(graph_.group().twist_covariance(finder_.sensor()).topLeftCorner<3, 3>().trace());
+}
+
+}  // namespace cairn::compact

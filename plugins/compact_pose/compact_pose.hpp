@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <chrono>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "cairn/policy/pose_policy.hpp"
+#include "compact_graph.hpp"
+#include "consistency.hpp"
+#include "proximity.hpp"
+#include "threshold_finder.hpp"
+
+namespace cairn::compact {
+
+/// Which poses are tested for being near.
+enum class Search {
+  index,     ///< those that the spatial index finds
+  all,       ///< all of them, which finds the same
+  untested,  ///< all count as near
+};
+
+struct CompactPoseOptions {
+  bool all_loops = false;  ///< every loop closure that is found is used (strategy apal)
+  bool all_poses = false;  ///< every pose is kept (apal, apfl)
+  SensorRange range;
+  double loop_gain = -1.0;  ///< g_loop [nats]; negative: by the size of a pose
+  double pose_gain = -1.0;  ///< g_pose [nats]; negative: likewise
+  /// Σ̄_y, what a registration is expected to be worth, upper triangle by rows, or the standard
+  /// deviations of translation [m] and rotation [rad]. Empty: like the newest odometry.
+  std::vector<double> sensor;
+  CompositionOrder composition = CompositionOrder::first;
+  bool reuse = false;  ///< a pose that is found to be at a kept one is not kept itself
+  /// … where that costs the way to it at most so much [nats a freedom and kept pose nearby].
+  double reuse_loss = 0.06;
+  Search search = Search::index;
+  double gate = 0.0;    ///< part of the right links that pass the consistency check; 0: off
+  double trust = 0.01;  ///< see `ConsistencyCheck`
+};
+
+/// Compact pose SLAM: Algorithm 1 of Ila, Polok, Solony and Svoboda, IJRR 2017, section 4.
+///
+/// A link is used if it tells more than g_loop, expected and then measured; the most informative
+/// first, and what the others would tell after it is looked at again. A pose is kept if it got a
+/// link, or if linking it to any pose nearby (the one before it among them) would tell more than
+/// g_pose: then it is somewhere new.
+///
+/// What a link tells can only become less by another link. So the candidates' gains are upper
+/// bounds once one was used: only that of the best is computed anew, until the best is up to date.
+/// The choice is the same as if all were computed anew, as long as the linearisation stands.
+///
+/// With `reuse`, which the paper does not have, a pose that a link leads to a kept one is not kept
+/// itself (`CompactGraph::relocate`): so the map of a place does not grow without end.
+class CompactPose final : public PosePolicy, public OptionFinder {
+ public:
+  CompactPose(std::unique_ptr<Estimator> estimator, CompactPoseOptions options);
+
+  void add_pose(const Variable& pose, std::span<const Factor> odometry) override;
+  std::optional<MatchProposal> next_match() override;
+  LinkReport offer(Id other, std::span<const Factor> measured) override;
+  PoseReport end_pose() override;
+  void finish() override;
+
+  Estimator& estimator() override { return graph_.estimator(); }
+  std::vector<Id> kept() const override { return graph_.kept(); }
+  int factor_count() const override { return graph_.factor_count(); }
+  std::vector<double> newest_state() const override;
+  const std::vector<OdometryChain>& chains() const override { return graph_.chains(); }
+
+  void* ability(std::string_view name) override;
+  OptionValues watching() const override;
+  OptionValues found() const override;
+  /// `loop_gain` and `pose_gain` times the factors.
+  OptionValues scaled(const OptionValues& found, double links, double poses) const override;
+  double accuracy() const override;
+
+ private:
+  struct Candidate {
+    int pose = 0;
+    int version = 0;  ///< of the estimate with which the gain was computed
+    double gain = 0.0;
+    int place = 0;  ///< in `dimensions_`
+  };
+  /// A link that waits for another one to agree, and the pose that it was measured for.
+  struct Waiting {
+    Link link;
+    LinkReport report;
+  };
+
+  void start(const Variable& pose);
+  Matrix expected_covariance() const;
+  void search();
+  Displacement known_displacement(int pose);
+  std::optional<Candidate> take_candidate(int pose);
+  double expected_gain(int pose);
+  bool may_relocate(const Link& link) const;
+  void use(const Link& link);
+  LinkVerdict judge(const Link& link, LinkReport& report);
+  void judge_waiting();
+  bool agrees_with_waiting(const Link& link);
+
+  CompactPoseOptions options_;
+  CompactGraph graph_;
+  std::optional<DistanceTest> test_;
+  std::optional<ConsistencyCheck> check_;
+  double radius_ = 0.0;  ///< no pose farther away can be a candidate [m]
+  Matrix sensor_;        ///< Σ̄_y, if it was given
+  double loop_gain_ = 0.0, pose_gain_ = 0.0;
+
+  // The newest pose:
+  PoseReport report_;
+  Matrix odometry_;  ///< covariance of its motion from the pose before, kept or not
+  bool open_ = false, searched_ = false;
+  std::vector<Candidate> candidates_;   ///< a heap by gain
+  int solved_version_ = -1;             ///< of the graph when candidates were last solved for
+  int asked_version_ = -1;              ///< of the graph when a single candidate was looked at anew
+  std::vector<Dimensions> dimensions_;  ///< of the candidates, before any link of this pose
+
+  std::vector<Waiting> waiting_;
+  ThresholdFinder finder_;
+};
+
+}  // namespace cairn::compact

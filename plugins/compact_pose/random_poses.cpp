@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "random_poses.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <random>
+#include <string>
+#include <utility>
+
+#include "cairn/runtime/error.hpp"
+
+namespace cairn::compact {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using Pair = std::pair<Id, Id>;
+
+/// The same on every machine, unlike std::shuffle.
+template <class T>
+void shuffle(std::vector<T>& all, std::mt19937_64& engine) {
+  for (std::size_t left = all.size(); left > 1; --left)
+    std::swap(all[left - 1], all[engine() % left]);
+}
+
+/// The pairs (earlier, later) that a recording has loop closures of, each once.
+std::vector<Pair> linked_pairs(const Graph& recording, std::span<const RecordedPose> poses) {
+  std::set<Pair> pairs;
+  for (const RecordedPose& pose : poses) {
+    for (const int f : pose.links) {
+      Id earlier = recording.id(pose.variable);
+      for (const std::int32_t v : recording.factor_variables(f))
+        earlier = std::min(earlier, recording.id(v));
+      pairs.emplace(earlier, recording.id(pose.variable));
+    }
+  }
+  return {pairs.begin(), pairs.end()};
+}
+
+}  // namespace
+
+RandomPoses::RandomPoses(std::unique_ptr<Estimator> estimator, int poses, int loops,
+                         std::uint64_t seed)
+    : poses_(poses),
+      loops_(loops),
+      seed_(seed),
+      graph_(std::move(estimator), CompositionOrder::first) {}
+
+void RandomPoses::expect(const Graph& recording, std::span<const RecordedPose> poses) {
+  kept_.clear();
+  linked_.clear();
+  if (poses.empty()) return;
+  std::mt19937_64 engine(seed_);
+  kept_ = {recording.id(poses.front().variable), recording.id(poses.back().variable)};
+  std::vector<Pair> pairs = linked_pairs(recording, poses);
+  shuffle(pairs, engine);
+  int loops = 0;
+  const auto room = static_cast<std::size_t>(poses_);
+  const auto draw = [&](bool with_new_poses) {
+    for (Pair& pair : pairs) {
+      const std::size_t more =
+          (kept_.contains(pair.first) ? 0u : 1u) + (kept_.contains(pair.second) ? 0u : 1u);
+      if (loops == loops_ || pair.first == pair.second) continue;
+      if (more > 0 && (!with_new_poses || kept_.size() + more > room)) continue;
+      kept_.insert({pair.first, pair.second});
+      linked_[pair.second].push_back(pair.first);
+      pair.second = pair.first;  // drawn
+      ++loops;
+    }
+  };
+  draw(/*with_new_poses=*/true);
+  std::vector<Id> others;
+  for (const RecordedPose& pose : poses) others.push_back(recording.id(pose.variable));
+  shuffle(others, engine);
+  for (const Id id : others) {
+    if (kept_.size() < room) kept_.insert(id);
+  }
+  draw(/*with_new_poses=*/false);
+}
+
+void RandomPoses::add_pose(const Variable& pose, std::span<const Factor> odometry) {
+  if (kept_.empty()) {
+    throw Error(ErrorCode::usage,
+                "random_poses draws from a recording; it cannot follow a robot live");
+  }
+  if (!graph_.empty() && (graph_.find(pose.id) >= 0 || pose.id == graph_.newest_id())) {
+    throw Error(ErrorCode::input, "pose " + std::to_string(pose.id) + " is there already");
+  }
+  report_ = {};
+  report_.id = pose.id;
+  const auto begin = Clock::now();
+  if (graph_.empty()) {
+    graph_.start(pose, report_.seconds);
+  } else {
+    const Motion motion = graph_.fuse(odometry, graph_.newest_id(), pose.id);
+    graph_.advance(pose, motion, odometry.front().type);
+    if (kept_.contains(pose.id) || pose.fixed) graph_.keep(report_.seconds);
+  }
+  report_.seconds.total = std::chrono::duration<double>(Clock::now() - begin).count();
+  const auto planned = linked_.find(pose.id);
+  to_match_ = planned == linked_.end() ? std::vector<Id>() : planned->second;
+}
+
+std::optional<MatchProposal> RandomPoses::next_match() {
+  if (to_match_.empty()) return std::nullopt;
+  return MatchProposal{
+      .earlier = to_match_.back(), .later = report_.id, .gain = 0.0, .expected = {}};
+}
+
+LinkReport RandomPoses::offer(Id other, std::span<const Factor> measured) {
+  std::erase(to_match_, other);
+  LinkReport link{.earlier = other, .later = report_.id};
+  if (!measured.empty()) {
+    const auto begin = Clock::now();
+    graph_.link(measured, report_.seconds);
+    report_.seconds.total += std::chrono::duration<double>(Clock::now() - begin).count();
+    link.verdict = LinkVerdict::linked;
+    report_.closed_loop = true;
+  }
+  report_.links.push_back(link);
+  return link;
+}
+
+PoseReport RandomPoses::end_pose() {
+  report_.kept = graph_.newest_kept();
+  return report_;
+}
+
+void RandomPoses::finish() {
+  if (graph_.empty()) return;
+  if (!graph_.newest_kept()) graph_.keep(report_.seconds);
+  graph_.solve_fully();
+}
+
+std::vector<double> RandomPoses::newest_state() const {
+  if (graph_.empty()) throw Error(ErrorCode::usage, "newest_state before the first pose");
+  const auto state = graph_.group().span(graph_.newest_state());
+  return {state.begin(), state.end()};
+}
+
+}  // namespace cairn::compact

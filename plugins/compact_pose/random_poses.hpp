@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+#include <span>
+#include <vector>
+
+#include "cairn/policy/pose_policy.hpp"
+#include "compact_graph.hpp"
+
+namespace cairn::compact {
+
+/// The control: as many poses and loop closures of a recording as somebody else keeps, drawn at
+/// random (RFPFL of the paper). Loop closures are drawn first, with their poses, as far as there is
+/// room for them; then more poses.
+class RandomPoses final : public PosePolicy {
+ public:
+  RandomPoses(std::unique_ptr<Estimator> estimator, int poses, int loops, std::uint64_t seed);
+
+  void expect(const Graph& recording, std::span<const RecordedPose> poses) override;
+  void add_pose(const Variable& pose, std::span<const Factor> odometry) override;
+  std::optional<MatchProposal> next_match() override;
+  LinkReport offer(Id other, std::span<const Factor> measured) override;
+  PoseReport end_pose() override;
+  void finish() override;
+
+  Estimator& estimator() override { return graph_.estimator(); }
+  std::vector<Id> kept() const override { return graph_.kept(); }
+  int factor_count() const override { return graph_.factor_count(); }
+  std::vector<double> newest_state() const override;
+  const std::vector<OdometryChain>& chains() const override { return graph_.chains(); }
+
+ private:
+  int poses_, loops_;
+  std::uint64_t seed_;
+  CompactGraph graph_;
+  std::set<Id> kept_;                     ///< the plan
+  std::map<Id, std::vector<Id>> linked_;  ///< by later pose the earlier ones
+  PoseReport report_;
+  std::vector<Id> to_match_;
+};
+
+}  // namespace cairn::compact

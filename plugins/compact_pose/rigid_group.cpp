@@ -1,0 +1,198 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "rigid_group.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+
+#include "cairn/runtime/error.hpp"
+
+namespace cairn::compact {
+namespace {
+
+Placed split(const Placement& placement, const State& x) {
+  std::array<double, 9> R{};
+  std::array<double, 3> t{};
+  placement.split(x.data(), R.data(), t.data());
+  Placed at;
+  if (placement.dimension() == 2) {
+    at.R.topLeftCorner<2, 2>() = Eigen::Map<const Eigen::Matrix2d>(R.data());
+    at.t.head<2>() = Eigen::Map<const Eigen::Vector2d>(t.data());
+  } else {
+    at.R = Eigen::Map<const Eigen::Matrix3d>(R.data());
+    at.t = Eigen::Map<const Eigen::Vector3d>(t.data());
+  }
+  return at;
+}
+
+// The arithmetic of a candidate, for each of the two sizes.
+
+template <int N>
+using Fixed = Eigen::Matrix<double, N, N>;
+/// Entries of a matrix of that size, which lie side by side.
+template <int N>
+Eigen::Map<const Fixed<N>> fixed(const Matrix& M) {
+  return Eigen::Map<const Fixed<N>>(M.data());
+}
+
+template <int N>
+void set_covariance_of(const Matrix& S_ii, const Matrix& S_in, const Matrix& S_nn,
+                       Displacement& d) {
+  const auto A = fixed<N>(d.adjoint);
+  Fixed<N> left;
+  left.noalias() = A.lazyProduct(fixed<N>(S_ii));
+  Fixed<N> AS, sum;
+  AS.noalias() = A.lazyProduct(fixed<N>(S_in));
+  sum.noalias() = left.lazyProduct(A.transpose());
+  sum += fixed<N>(S_nn) - AS - AS.transpose();
+  d.covariance = sum;
+}
+
+template <int N>
+double gain_of(const Matrix& S_y, const Matrix& S_d) {
+  const Eigen::LLT<Fixed<N>> prior(fixed<N>(S_y) + fixed<N>(S_d)), measured(fixed<N>(S_y));
+  // |L| of both: a quotient of products, and one logarithm.
+  return std::log(prior.matrixLLT().diagonal().prod() / measured.matrixLLT().diagonal().prod());
+}
+
+[[noreturn]] void refuse(const VariableType& type, const std::string& why) {
+  throw Error(ErrorCode::usage, "compact_pose takes graphs of poses that are rigid motions, and " +
+                                    std::string(type.tag()) + " " + why);
+}
+
+}  // namespace
+
+RigidGroup::RigidGroup(const std::shared_ptr<const VariableType>& type)
+    : motions_(type), group_(type->lie_group()), placement_(type->placement()) {
+  if (!placement_ || !placement_->has_orientation()) refuse(*type, "has no position and heading");
+  dimension_ = placement_->dimension();
+  if (tangent_size() != (dimension_ == 2 ? 3 : 6) || motions_.ambient_size() > kMostAmbient)
+    refuse(*type, "has " + std::to_string(tangent_size()) + " degrees of freedom");
+  // exp is smooth: central differences with this step leave eleven digits.
+  constexpr double kStep = 1e-4;
+  twist_.resize(6, tangent_size());
+  for (int k = 0; k < tangent_size(); ++k) {
+    Eigen::VectorXd step = Eigen::VectorXd::Zero(tangent_size());
+    State ahead{}, back{};
+    step[k] = kStep;
+    group_->exp(step.data(), ahead.data());
+    step[k] = -kStep;
+    group_->exp(step.data(), back.data());
+    const Placed a = split(*placement_, ahead), b = split(*placement_, back);
+    twist_.col(k).head<3>() = (a.t - b.t) / (2.0 * kStep);
+    const Eigen::AngleAxisd turn(Eigen::Matrix3d(b.R.transpose() * a.R));
+    twist_.col(k).tail<3>() = turn.angle() * turn.axis() / (2.0 * kStep);
+  }
+  twist_ = twist_.unaryExpr(
+      [](double x) { return std::abs(x - std::round(x)) < 1e-6 ? std::round(x) : x; });
+  twist_is_identity_ = tangent_size() == 6 && twist_ == Eigen::MatrixXd::Identity(6, 6);
+  check_rigid();
+}
+
+/// R_ab = R_a R_b and t_ab = t_a + R_a t_b, tried on a few elements.
+void RigidGroup::check_rigid() const {
+  Eigen::VectorXd tangent(tangent_size());
+  for (int trial = 0; trial < 4; ++trial) {
+    State x[2]{}, product{};
+    for (int side = 0; side < 2; ++side) {
+      for (int k = 0; k < tangent_size(); ++k) tangent[k] = std::sin(1.0 + trial + 2.7 * k + side);
+      group_->exp(tangent.data(), x[side].data());
+    }
+    group_->compose(x[0].data(), x[1].data(), product.data());
+    const Placed a = split(*placement_, x[0]), b = split(*placement_, x[1]),
+                 ab = split(*placement_, product);
+    if ((ab.R - a.R * b.R).norm() > 1e-9 || (ab.t - a.t - a.R * b.t).norm() > 1e-9)
+      refuse(motions_.type(), "composes in another way");
+  }
+}
+
+State RigidGroup::state(std::span<const double> x) const {
+  State state{};
+  std::ranges::copy(x, state.begin());
+  return state;
+}
+
+State RigidGroup::compose(const State& a, const State& b) const {
+  State ab{};
+  group_->compose(a.data(), b.data(), ab.data());
+  return ab;
+}
+
+State RigidGroup::between(const State& a, const State& b) const {
+  State back{}, out{};
+  group_->inverse(a.data(), back.data());
+  group_->compose(back.data(), b.data(), out.data());
+  return out;
+}
+
+Vector RigidGroup::log(const State& a) const {
+  Vector tangent(tangent_size());
+  group_->log(a.data(), tangent.data());
+  return tangent;
+}
+
+Matrix RigidGroup::adjoint_of_inverse(const State& a) const {
+  State back{};
+  group_->inverse(a.data(), back.data());
+  Matrix A(tangent_size(), tangent_size());
+  group_->adjoint(back.data(), A.data());
+  return A;
+}
+
+PlacedState RigidGroup::place(const State& x) const {
+  PlacedState placed{x, {}, split(*placement_, x)};
+  group_->inverse(x.data(), placed.inverse.data());
+  return placed;
+}
+
+Placed RigidGroup::seen_from(const PlacedState& x_i, const PlacedState& x_n) {
+  return {x_i.at.R.transpose() * x_n.at.R, x_i.at.R.transpose() * (x_n.at.t - x_i.at.t)};
+}
+
+Displacement RigidGroup::displacement(const PlacedState& x_i, const PlacedState& x_n) const {
+  Displacement d;
+  d.mean = compose(x_i.inverse, x_n.x);
+  d.at = seen_from(x_i, x_n);
+  const State back = compose(x_n.inverse, x_i.x);
+  d.adjoint.resize(tangent_size(), tangent_size());
+  group_->adjoint(back.data(), d.adjoint.data());
+  return d;
+}
+
+void RigidGroup::set_covariance(const Matrix& S_ii, const Matrix& S_in, const Matrix& S_nn,
+                                Displacement& d) const {
+  if (tangent_size() == 3) {
+    set_covariance_of<3>(S_ii, S_in, S_nn, d);
+  } else {
+    set_covariance_of<6>(S_ii, S_in, S_nn, d);
+  }
+}
+
+Eigen::Matrix<double, 6, 6> RigidGroup::twist_covariance(const Matrix& covariance) const {
+  if (twist_is_identity_) return fixed<6>(covariance);
+  return twist_ * covariance * twist_.transpose();
+}
+
+Matrix RigidGroup::isotropic(double sigma_translation, double sigma_rotation) const {
+  // Information, since a plane's twists are fewer than six: Σ⁻¹ = Tᵀ W T.
+  Eigen::Matrix<double, 6, 1> weights;
+  weights.head<3>().setConstant(1.0 / (sigma_translation * sigma_translation));
+  weights.tail<3>().setConstant(1.0 / (sigma_rotation * sigma_rotation));
+  const Matrix information = twist_.transpose() * weights.asDiagonal() * twist_;
+  return information.inverse();
+}
+
+double mutual_information(const Matrix& S_y, const Matrix& S_d) {
+  // Rounding may leave Σ_d indefinite by a little where everything is known well.
+  return std::max(0.0, S_y.rows() == 3 ? gain_of<3>(S_y, S_d) : gain_of<6>(S_y, S_d));
+}
+
+Matrix to_matrix(std::span<const double> numbers, int n) {
+  return Eigen::Map<const Eigen::MatrixXd>(numbers.data(), n, n);
+}
+
+}  // namespace cairn::compact

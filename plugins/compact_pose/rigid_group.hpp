@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <array>
+#include <memory>
+#include <span>
+
+#include <Eigen/Core>
+
+#include "cairn/geometry/motion.hpp"
+#include "cairn/types/variable_type.hpp"
+
+namespace cairn::compact {
+
+inline constexpr int kMostTangent = 6, kMostAmbient = 16;
+/// Of the tangent space of a pose, in the plane or in space.
+using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, kMostTangent,
+                             kMostTangent>;
+using Vector = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, kMostTangent, 1>;
+using State = std::array<double, kMostAmbient>;
+
+/// Where a pose is: rotation and position [m]; about z and in z = 0 for one in the plane.
+struct Placed {
+  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d t = Eigen::Vector3d::Zero();
+};
+
+/// A pose with what displacements from and to it take.
+struct PlacedState {
+  State x{}, inverse{};
+  Placed at;
+};
+
+/// x_i⁻¹ x_n of two estimated poses, and its covariance (equations 16 and 17).
+struct Displacement {
+  State mean{};
+  Placed at;          ///< the same
+  Matrix adjoint;     ///< Ad(mean⁻¹): a step of x_i moves the displacement by −adjoint · step
+  Matrix covariance;  ///< of ξ, mean · exp(ξ)
+};
+
+/// Poses that are rigid motions of the plane or of space, whatever type implements them: its
+/// abilities `LieGroup` and `Placement`, checked to belong together.
+class RigidGroup {
+ public:
+  /// Throws `Error` (usage) for a type whose states are not rigid motions.
+  explicit RigidGroup(const std::shared_ptr<const VariableType>& type);
+
+  const MotionGroup& motions() const { return motions_; }
+  int tangent_size() const { return motions_.tangent_size(); }
+  int dimension() const { return dimension_; }
+
+  State state(std::span<const double> x) const;
+  std::span<const double> span(const State& x) const {
+    return {x.data(), static_cast<std::size_t>(motions_.ambient_size())};
+  }
+  State compose(const State& a, const State& b) const;
+  State between(const State& a, const State& b) const;  ///< a⁻¹ b
+  Vector log(const State& a) const;
+  Matrix adjoint_of_inverse(const State& a) const;  ///< Ad(a⁻¹)
+  PlacedState place(const State& x) const;
+
+  /// Where x_n is as seen from x_i.
+  static Placed seen_from(const PlacedState& x_i, const PlacedState& x_n);
+  /// x_i⁻¹ x_n without its covariance.
+  Displacement displacement(const PlacedState& x_i, const PlacedState& x_n) const;
+  /// Its covariance from those of the poses: Σ_nn + A Σ_ii Aᵀ − A Σ_in − (A Σ_in)ᵀ, A = Ad(mean⁻¹).
+  void set_covariance(const Matrix& S_ii, const Matrix& S_in, const Matrix& S_nn,
+                      Displacement& displacement) const;
+
+  /// The covariance of a tangent vector ξ as one of (velocity, angular velocity) in the body's
+  /// frame: six rows, those that a plane does not have are zero.
+  Eigen::Matrix<double, 6, 6> twist_covariance(const Matrix& covariance) const;
+  /// The way back, of what is independent in each: the covariance of ξ for standard deviations of
+  /// translation [m] and rotation [rad] along every axis.
+  Matrix isotropic(double sigma_translation, double sigma_rotation) const;
+
+ private:
+  void check_rigid() const;
+
+  MotionGroup motions_;
+  const LieGroup* group_;
+  const Placement* placement_;
+  int dimension_;
+  /// (velocity, angular velocity) of a tangent vector; constant, since perturbations stand on the
+  /// right.
+  Eigen::Matrix<double, 6, Eigen::Dynamic, Eigen::ColMajor, 6, kMostTangent> twist_;
+  bool twist_is_identity_ = false;
+};
+
+/// ½ ln(|Σ_y + Σ_d| / |Σ_y|): what a measurement with covariance Σ_y tells of a displacement with
+/// covariance Σ_d [nats] (equation 22).
+double mutual_information(const Matrix& S_y, const Matrix& S_d);
+
+Matrix to_matrix(std::span<const double> numbers, int n);
+
+}  // namespace cairn::compact

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <vector>
+
+#include "cairn/plugin/options.hpp"
+#include "proximity.hpp"
+
+namespace cairn::compact {
+
+/// Finds the thresholds of compact pose SLAM from a sample of the data (section 5.2): everything is
+/// taken in, and noted are the displacement of every loop closure before it was closed, what it
+/// told, and what the link of every new pose told.
+class ThresholdFinder {
+ public:
+  void note_loop(const DistanceTest& test, const Dimensions& dimensions, double gain,
+                 const Matrix& covariance);
+  void note_pose(double gain) { pose_gains_.push_back(gain); }
+
+  /// Options of compact_pose: `range` and `angle`, so that every noted loop closure passes the
+  /// distance test; `loop_gain` = (l₉₀ + 1)^1.36 − 1 and `pose_gain` = (p₉₀ + 1)^1.7 − 1 with the
+  /// 90th percentiles; `sensor`, the median of the loops' covariances. Throws `Error` (input) if
+  /// there was no loop closure.
+  OptionValues found(double probability) const;
+  /// The median of the loops' covariances, by their determinants. Throws as `found`.
+  Matrix sensor() const;
+
+ private:
+  struct Loop {
+    double range, angle;  // least ones with which it would have passed [m, rad]
+    double gain;
+    Matrix covariance;
+  };
+  std::vector<Loop> loops_;
+  std::vector<double> pose_gains_;
+};
+
+/// Of some numbers, the smallest that a part of them does not exceed.
+double percentile(std::vector<double> numbers, double part);
+
+}  // namespace cairn::compact

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "cairn/types/variable_type.hpp"
+#include "pair_random.hpp"
+
+namespace cairn::registration {
+
+/// How far a motion goes, or may go.
+struct Extent {
+  double length = 0.0;  ///< of the translation [m]
+  double angle = 0.0;   ///< of the rotation, 0 to π [rad]
+};
+
+/// The motions between poses of one type, of which it takes the abilities `LieGroup` and
+/// `Placement`.
+class RigidMotions {
+ public:
+  /// Throws `Error` (usage) if the type lacks one of the two, or has no orientation.
+  explicit RigidMotions(std::shared_ptr<const VariableType> type);
+
+  /// x⁻¹ y
+  std::vector<double> between(std::span<const double> x, std::span<const double> y) const;
+  /// z exp(ξ)
+  std::vector<double> perturbed(std::span<const double> z, const double* xi) const;
+  Extent extent(std::span<const double> motion) const;
+  /// One of all motions within that extent, each as likely as any other: translations uniform in
+  /// the disc or ball, rotations by the group's invariant measure.
+  std::vector<double> draw(const Extent& within, PairRandom& random) const;
+
+  /// Which components of a tangent vector turn a pose, and which move it without turning it.
+  const std::vector<int>& rotations() const { return rotations_; }
+  const std::vector<int>& translations() const { return translations_; }
+
+ private:
+  std::vector<double> state() const;
+
+  std::shared_ptr<const VariableType> type_;
+  const LieGroup* group_;
+  const Placement* placement_;
+  std::vector<int> rotations_, translations_;
+};
+
+}  // namespace cairn::registration

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The picture `html`: one page that opens from disk, without a network.
+#include <dlfcn.h>
+
+#include <filesystem>
+#include <memory>
+#include <string>
+
+#include <fmt/format.h>
+
+#include "cairn/io/format.hpp"
+#include "cairn/plugin/registry.hpp"
+#include "cairn/runtime/error.hpp"
+#include "report.hpp"
+
+void cairn_register(cairn::Registrar& registrar);
+
+namespace cairn {
+namespace {
+
+/// The page as it was built: in the folder `report` beside this plugin.
+std::filesystem::path page_file() {
+  Dl_info info{};
+  if (dladdr(reinterpret_cast<const void*>(&cairn_register), &info) == 0) {
+    throw Error(ErrorCode::plugin, "html: where its plugin is cannot be told");
+  }
+  return std::filesystem::path(info.dli_fname).parent_path() / "report" / "report.html";
+}
+
+class Html final : public Picture {
+ public:
+  std::string draw(const Album& album) override {
+    const std::filesystem::path file = page_file();
+    if (!std::filesystem::exists(file)) {
+      throw Error(ErrorCode::plugin,
+                  fmt::format("html: {} is missing; install cairn again", file.string()));
+    }
+    return report::fill(read_file(file), report::page_json(album));
+  }
+};
+
+}  // namespace
+}  // namespace cairn
+
+void cairn_register(cairn::Registrar& registrar) {
+  using namespace cairn;
+  registrar.add<Picture>("html", OptionTable{},
+                         [](const Options&, Registry&) { return std::make_unique<Html>(); });
+}

@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "approximation.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+
+#include "cairn/runtime/error.hpp"
+
+namespace cairn::sparsify {
+namespace {
+
+using Eigen::Dynamic;
+
+/// Σ (x − ln x − 1) over the eigenvalues of the inverse of M.
+template <int m>
+double excess(const Matrix& M) {
+  const Eigen::Matrix<double, m, m> fixed = M;
+  const Eigen::Matrix<double, m, m> inverse = fixed.inverse();
+  return inverse.trace() + std::log(std::max(fixed.determinant(), 1e-300)) -
+         static_cast<double>(M.rows());
+}
+
+template <int m>
+Approximation::Best best_of(const Matrix& M_given, const Matrix& W_given, double floor) {
+  using Fixed = Eigen::Matrix<double, m, m>;
+  const Fixed M = M_given, W = W_given;
+  const Fixed X = M.inverse();
+  Fixed B = X - W;
+  B = (0.5 * (B + B.transpose())).eval();
+  Eigen::SelfAdjointEigenSolver<Fixed> eigen(B);
+  const auto& beta = eigen.eigenvalues();
+  Eigen::Matrix<double, m, 1> weights(beta.size());
+  double least = 0.0;
+  for (Eigen::Index i = 0; i < beta.size(); ++i) {
+    weights[i] = std::max(1.0 - beta[i], floor);
+    const double x = beta[i] + weights[i];
+    least += x - std::log(x);
+  }
+  const double now = X.trace() + std::log(std::max(M.determinant(), 1e-300));
+  return {eigen.eigenvectors() * weights.asDiagonal() * eigen.eigenvectors().transpose(),
+          0.5 * (now - least)};
+}
+
+/// Of a singular matrix rounding may leave pivots that are positive: what is left of a diagonal
+/// element once the others are eliminated is then next to nothing of it.
+bool singular(const Matrix& A, const Eigen::LLT<Matrix>& llt) {
+  return (llt.matrixLLT().diagonal().array().square() < 1e-13 * A.diagonal().array()).any();
+}
+
+}  // namespace
+
+ScaledProblem::ScaledProblem(const RecoveryProblem& problem) : rank(problem.rank) {
+  for (const RecoveryProblem::Factor& factor : problem.factors) {
+    const Matrix J = Eigen::Map<const Matrix>(factor.jacobian.data(), factor.size, problem.rank);
+    const Eigen::SelfAdjointEigenSolver<Matrix> eigen(J * J.transpose());
+    if (!(eigen.eigenvalues()[0] > 1e-14 * eigen.eigenvalues()[factor.size - 1]))
+      throw Error(ErrorCode::numerical, "a factor of the topology measures one thing twice");
+    Phi_root.push_back(eigen.operatorInverseSqrt());
+    Q.push_back(Phi_root.back() * J);
+  }
+}
+
+Matrix ScaledProblem::scaled(int k, const Matrix& information) const {
+  const Matrix root = Phi_root[k].inverse();
+  return root * information * root;
+}
+
+Matrix nearest_positive(const Matrix& A, double floor) {
+  const Eigen::SelfAdjointEigenSolver<Matrix> eigen(0.5 * (A + A.transpose()));
+  return eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(floor).asDiagonal() *
+         eigen.eigenvectors().transpose();
+}
+
+Approximation::Approximation(const ScaledProblem& problem)
+    : problem_(&problem), M_(problem.Q.size()) {}
+
+bool Approximation::set(std::vector<Matrix> W) {
+  W_ = std::move(W);
+  return refresh();
+}
+
+bool Approximation::refresh() {
+  const int r = problem_->rank;
+  Matrix L = Matrix::Zero(r, r);
+  trace_ = 0.0;
+  for (int k = 0; k < problem_->factors(); ++k) {
+    const Matrix WQ = W_[k] * problem_->Q[k];
+    L.noalias() += problem_->Q[k].transpose() * WQ;
+    trace_ += W_[k].trace();
+  }
+  const Eigen::LLT<Matrix> llt(L);
+  if (llt.info() != Eigen::Success || singular(L, llt)) return false;
+  log_determinant_ = 2.0 * llt.matrixLLT().diagonal().array().log().sum();
+  S_ = llt.solve(Matrix::Identity(r, r));
+  for (int k = 0; k < problem_->factors(); ++k)
+    M_[k] = problem_->Q[k] * S_ * problem_->Q[k].transpose();
+  return true;
+}
+
+void Approximation::change(int k, const Matrix& W) {
+  const Eigen::Index m = W.rows();
+  const Matrix D = W - W_[k];
+  const Eigen::PartialPivLU<Matrix> lu(Matrix::Identity(m, m) + D * M_[k]);
+  Matrix C = lu.solve(D);
+  C = (0.5 * (C + C.transpose())).eval();
+  trace_ += D.trace();
+  log_determinant_ += std::log(std::max(lu.determinant(), 1e-300));
+  SQt_.noalias() = S_ * problem_->Q[k].transpose();
+  QS_.noalias() = C * SQt_.transpose();
+  S_.noalias() -= SQt_ * QS_;
+  for (int j = 0; j < problem_->factors(); ++j) {
+    R_.noalias() = problem_->Q[j] * SQt_;
+    M_[j].noalias() -= R_ * C * R_.transpose();
+  }
+  W_[k] = W;
+}
+
+double Approximation::kld() const { return 0.5 * (trace_ - log_determinant_ - problem_->rank); }
+
+Approximation::Best Approximation::best(int k, double floor) const {
+  switch (problem_->size(k)) {
+    case 3:
+      return best_of<3>(M_[k], W_[k], floor);
+    case 6:
+      return best_of<6>(M_[k], W_[k], floor);
+    default:
+      return best_of<Dynamic>(M_[k], W_[k], floor);
+  }
+}
+
+double Approximation::bound(int k) const {
+  switch (problem_->size(k)) {
+    case 3:
+      return 0.5 * excess<3>(M_[k]);
+    case 6:
+      return 0.5 * excess<6>(M_[k]);
+    default:
+      return 0.5 * excess<Dynamic>(M_[k]);
+  }
+}
+
+double Approximation::gradient() const {
+  double most = 0.0;
+  for (int k = 0; k < problem_->factors(); ++k) {
+    const Eigen::Index m = W_[k].rows();
+    const Matrix moved = W_[k] - Matrix::Identity(m, m) + M_[k];
+    most = std::max(most, (W_[k] - nearest_positive(moved)).cwiseAbs().maxCoeff());
+  }
+  return 0.5 * most;
+}
+
+}  // namespace cairn::sparsify

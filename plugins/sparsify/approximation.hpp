@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "cairn/sparsification/sparsification.hpp"
+
+namespace cairn::sparsify {
+
+using Matrix = Eigen::MatrixXd;
+using Vector = Eigen::VectorXd;
+
+/// Smallest eigenvalue of a factor's information, in units in which its optimum alone is 1.
+inline constexpr double kFloor = 1e-7;
+
+/// A recovery problem in units in which each factor's optimum without the others would be the
+/// identity: with Φ = (J Jᵀ)⁻¹, Q = Φ^½ J has orthonormal rows, and Ω = Φ^½ W Φ^½. The cost is then
+///
+///     2 KLD = Σ_k tr W_k − ln |Σ_k Q_kᵀ W_k Q_k| − r
+///
+/// and its gradient by W_k I − M_k, M_k = Q_k Λ̆⁻¹ Q_kᵀ.
+struct ScaledProblem {
+  /// Throws `Error` (numerical) where a Jacobian is not of full rank.
+  explicit ScaledProblem(const RecoveryProblem& problem);
+
+  int rank = 0;
+  std::vector<Matrix> Q;         ///< m × r
+  std::vector<Matrix> Phi_root;  ///< Φ^½, symmetric
+
+  int factors() const { return static_cast<int>(Q.size()); }
+  int size(int k) const { return static_cast<int>(Q[k].rows()); }
+  Matrix information(int k, const Matrix& W) const { return Phi_root[k] * W * Phi_root[k]; }
+  Matrix scaled(int k, const Matrix& information) const;
+};
+
+/// The nearest symmetric positive semidefinite matrix in the Frobenius norm, with eigenvalues of at
+/// least `floor` (Higham 1988).
+Matrix nearest_positive(const Matrix& A, double floor = kFloor);
+
+/// Λ̆ = Σ_k Q_kᵀ W_k Q_k, its inverse S and all M_k, while single W_k change.
+///
+/// What the other factors say in the space of factor k is, by the matrix inversion lemma,
+///
+///     (Q_k Υ_k⁻¹ Q_kᵀ)⁻¹ = M_k⁻¹ − W_k,   Υ_k = Λ̆ − Q_kᵀ W_k Q_k,
+///
+/// which holds where Υ_k is singular as well (then M_k⁻¹ − W_k is what is left of it once all other
+/// directions are eliminated; zero where nobody else measures what k does). So all three
+/// propositions of factor descent (T 4.12, 4.13, 4.15) are one formula in m × m matrices, and a
+/// step changes S by rank m.
+class Approximation {
+ public:
+  explicit Approximation(const ScaledProblem& problem);
+
+  /// Sets all W anew and factorises. False if Λ̆ is singular.
+  bool set(std::vector<Matrix> W);
+  /// Computes S and all M anew from W; false if Λ̆ is singular.
+  bool refresh();
+  /// Changes one W.
+  void change(int k, const Matrix& W);
+
+  const ScaledProblem& problem() const { return *problem_; }
+  const Matrix& W(int k) const { return W_[k]; }
+  const std::vector<Matrix>& W() const { return W_; }
+  const Matrix& M(int k) const { return M_[k]; }
+  const Matrix& S() const { return S_; }
+  double kld() const;
+
+  /// The W_k that minimises the cost while the others stay, under W_k ⪰ `floor`, and the KLD that
+  /// this gains. With B = M_k⁻¹ − W_k = V diag(β) Vᵀ it is V diag(max(1 − β, floor)) Vᵀ: for any
+  /// X = B + W ⪰ B, tr X − ln |X| is least where each eigenvalue is max(1, β) in the same basis. (T
+  /// sets the negative eigenvalues of Ω_k to ε instead, which is not the minimum.)
+  struct Best {
+    Matrix W;
+    double gain = 0.0;  ///< [nats]
+  };
+  Best best(int k, double floor = kFloor) const;
+  /// What `best` gains at most, without an eigendecomposition [nats].
+  double bound(int k) const;
+  /// Largest element of `RecoveryResult::gradient`.
+  double gradient() const;
+
+ private:
+  const ScaledProblem* problem_;
+  std::vector<Matrix> W_, M_;
+  Matrix S_;
+  double trace_ = 0.0, log_determinant_ = 0.0;
+  Matrix SQt_, QS_, R_;  // room
+};
+
+}  // namespace cairn::sparsify

@@ -1,0 +1,182 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "selections.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <queue>
+#include <set>
+#include <utility>
+
+#include "cairn/runtime/error.hpp"
+#include "work_graph.hpp"
+
+namespace cairn::sparsify {
+namespace {
+
+std::size_t share(double part, std::size_t all) {
+  return std::min(all, static_cast<std::size_t>(std::llround(part * static_cast<double>(all))));
+}
+
+/// Where a pose is, and its orientation.
+struct Place {
+  std::array<double, 3> t{};
+  Matrix R;
+};
+
+Place place_of(const Graph& graph, int v) {
+  const Placement* placement = graph.type(v).placement();
+  if (!placement) {
+    throw Error(ErrorCode::usage,
+                "selection coverage: " + graph.describe_variable(v) + " is nowhere in particular");
+  }
+  const int n = placement->dimension();
+  Place place{.R = Matrix::Identity(n, n)};
+  placement->split(graph.state(v).data(), place.R.data(), place.t.data());
+  return place;
+}
+
+/// The angle between two orientations [rad].
+double turn(const Matrix& A, const Matrix& B) {
+  const Matrix C = A.transpose() * B;
+  const double cosine = C.rows() == 2 ? 0.5 * C.trace() : 0.5 * (C.trace() - 1.0);
+  return std::acos(std::clamp(cosine, -1.0, 1.0));
+}
+
+}  // namespace
+
+std::vector<int> KeepEvery::select(const Graph& graph, std::span<const int> nodes,
+                                   Sparsifier& /*sparsifier*/) {
+  std::vector<int> chosen;
+  for (const int v : nodes) {
+    const bool stays = seen_++ % every_ == 0 || v + 1 == graph.variable_count();
+    if (!stays) chosen.push_back(v);
+  }
+  return chosen;
+}
+
+std::vector<int> LeastLoss::select(const Graph& graph, std::span<const int> nodes,
+                                   Sparsifier& sparsifier) {
+  const std::size_t wanted = share(part_, nodes.size());
+  Graph work = graph.clone();
+  std::set<Id> left;
+  for (const int v : nodes) left.insert(graph.id(v));
+  std::vector<int> chosen;
+  while (chosen.size() < wanted && !left.empty()) {
+    std::vector<int> there;
+    for (const Id id : left) there.push_back(work.find(id).value());
+    const std::vector<double> losses = sparsifier.losses(work, there);
+    std::vector<std::size_t> order(there.size());
+    for (std::size_t k = 0; k < order.size(); ++k) order[k] = k;
+    std::ranges::stable_sort(order, {}, [&](std::size_t k) { return losses[k]; });
+    const std::size_t round = std::max<std::size_t>(1, (wanted - chosen.size()) / 8);
+    const WorkGraph neighbours(work);
+    std::set<int> touched;
+    std::vector<int> leaving;
+    for (const std::size_t k : order) {
+      if (leaving.size() == round || !std::isfinite(losses[k])) break;
+      if (touched.contains(there[k])) continue;
+      for (const int other : neighbours.blanket({&there[k], 1})) touched.insert(other);
+      leaving.push_back(there[k]);
+    }
+    if (leaving.empty()) break;
+    for (const int v : leaving) {
+      chosen.push_back(graph.find(work.id(v)).value());
+      left.erase(work.id(v));
+    }
+    apply(sparsifier.remove(work, leaving), work);
+  }
+  return chosen;
+}
+
+std::vector<int> SmallestBlanket::select(const Graph& graph, std::span<const int> nodes,
+                                         Sparsifier& /*sparsifier*/) {
+  std::vector<std::set<int>> neighbours(graph.variable_count());
+  for (int f = 0; f < graph.factor_count(); ++f) {
+    for (const int a : graph.factor_variables(f)) {
+      for (const int b : graph.factor_variables(f)) {
+        if (a != b) neighbours[a].insert(b);
+      }
+    }
+  }
+  std::set<std::pair<std::size_t, int>> queue;
+  std::vector<bool> may(graph.variable_count());
+  for (const int v : nodes) {
+    may[v] = true;
+    queue.emplace(neighbours[v].size(), v);
+  }
+  const std::size_t wanted = share(part_, nodes.size());
+  std::vector<int> chosen;
+  while (chosen.size() < wanted && !queue.empty()) {
+    const int v = queue.begin()->second;
+    queue.erase(queue.begin());
+    chosen.push_back(v);
+    const std::vector<int> around(neighbours[v].begin(), neighbours[v].end());
+    const auto change = [&](int node, auto&& what) {
+      if (may[node]) queue.erase({neighbours[node].size(), node});
+      what(neighbours[node]);
+      if (may[node]) queue.emplace(neighbours[node].size(), node);
+    };
+    for (const int other : around) change(other, [&](std::set<int>& of) { of.erase(v); });
+    may[v] = false;
+    for (std::size_t k = 0; around.size() > 1 && k < around.size(); ++k) {
+      const int a = around[k], b = around[(k + 1) % around.size()];
+      if (a == b) continue;
+      change(a, [&](std::set<int>& of) { of.insert(b); });
+      change(b, [&](std::set<int>& of) { of.insert(a); });
+    }
+  }
+  return chosen;
+}
+
+std::vector<int> Oldest::select(const Graph& /*graph*/, std::span<const int> nodes,
+                                Sparsifier& /*sparsifier*/) {
+  const auto count = static_cast<std::ptrdiff_t>(share(part_, nodes.size()));
+  return {nodes.begin(), nodes.begin() + count};
+}
+
+std::vector<int> Coverage::select(const Graph& graph, std::span<const int> nodes,
+                                  Sparsifier& /*sparsifier*/) {
+  std::vector<bool> may(graph.variable_count());
+  for (const int v : nodes) may[v] = true;
+  using Cell = std::array<std::int64_t, 3>;
+  std::map<Cell, std::vector<Place>> kept;
+  const auto cell = [&](const Place& place) {
+    Cell at{};
+    for (std::size_t k = 0; k < 3; ++k)
+      at[k] = static_cast<std::int64_t>(std::floor(place.t[k] / distance_));
+    return at;
+  };
+  const auto covered = [&](const Place& place) {
+    const Cell at = cell(place);
+    for (std::int64_t x = -1; x <= 1; ++x) {
+      for (std::int64_t y = -1; y <= 1; ++y) {
+        for (std::int64_t z = -1; z <= 1; ++z) {
+          const auto there = kept.find({at[0] + x, at[1] + y, at[2] + z});
+          if (there == kept.end()) continue;
+          for (const Place& other : there->second) {
+            const double apart = std::hypot(place.t[0] - other.t[0], place.t[1] - other.t[1],
+                                            place.t[2] - other.t[2]);
+            if (apart < distance_ && turn(place.R, other.R) < angle_) return true;
+          }
+        }
+      }
+    }
+    return false;
+  };
+  std::vector<int> chosen;
+  for (int v = 0; v < graph.variable_count(); ++v) {
+    if (!may[v] && !graph.type(v).placement()) continue;
+    Place place = place_of(graph, v);
+    if (may[v] && covered(place)) {
+      chosen.push_back(v);
+    } else {
+      kept[cell(place)].push_back(std::move(place));
+    }
+  }
+  return chosen;
+}
+
+}  // namespace cairn::sparsify

@@ -1,0 +1,246 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "sparsify.hpp"
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cstdlib>
+#include <limits>
+#include <utility>
+
+#include "cairn/runtime/error.hpp"
+#include "cairn/sparsification/correlated_pair.hpp"
+
+namespace cairn::sparsify {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+class Timed {
+ public:
+  explicit Timed(double& sum) : sum_(sum), begin_(Clock::now()) {}
+  ~Timed() { sum_ += std::chrono::duration<double>(Clock::now() - begin_).count(); }
+  Timed(const Timed&) = delete;
+  Timed& operator=(const Timed&) = delete;
+
+ private:
+  double& sum_;
+  Clock::time_point begin_;
+};
+
+}  // namespace
+
+Sparsify::Sparsify(std::unique_ptr<Topology> topology, std::unique_ptr<FactorRecovery> recovery,
+                   SparsifyOptions options)
+    : topology_(std::move(topology)), recovery_(std::move(recovery)), options_(options) {}
+
+/// Nodes that leave together: one by one, or those that factors connect, in the order in which
+/// their first is asked for.
+std::vector<std::vector<int>> Sparsify::groups(const WorkGraph& work,
+                                               std::span<const int> nodes) const {
+  std::vector<std::vector<int>> result;
+  std::vector<bool> wanted(work.graph().variable_count());
+  for (const int v : nodes) wanted[v] = true;
+  for (const int v : nodes) {
+    if (!wanted[v]) continue;
+    wanted[v] = false;
+    std::vector<int> group{v};
+    for (std::size_t k = 0; options_.scheme != Scheme::single && k < group.size(); ++k) {
+      for (const int other : work.blanket({&group[k], 1})) {
+        if (!wanted[other] || static_cast<int>(std::ssize(group)) >= options_.largest_group)
+          continue;
+        if (options_.scheme == Scheme::runs && std::abs(other - group[k]) != 1) continue;
+        wanted[other] = false;
+        group.push_back(other);
+      }
+    }
+    result.push_back(std::move(group));
+  }
+  return result;
+}
+
+void Sparsify::recover(const BlanketProjection& coordinates, Solved& solved,
+                       SparsificationSeconds& seconds) {
+  const Timed timed(seconds.recovery);
+  solved.recovery = recovery_->recover(coordinates.problem(solved.marginal.dense, solved.topology));
+}
+
+/// Where more than one node is open, as where a landmark has been seen too little, there is no
+/// node to be relative to.
+BlanketProjection Sparsify::projected(const DenseBlanket& dense) const {
+  if (options_.projection == Projection::node) {
+    try {
+      return {dense, Projection::node};
+    } catch (const Error& error) {
+      if (error.code() != ErrorCode::numerical) throw;
+    }
+  }
+  return {dense, Projection::eigen};
+}
+
+Sparsify::Solved Sparsify::solve(const WorkGraph& work, const LocalProblem& local,
+                                 SparsificationSeconds& seconds) {
+  Solved solved;
+  {
+    const Timed timed(seconds.marginalize);
+    solved.marginal = marginalize(work, local, options_.resolve);
+  }
+  const DenseBlanket& dense = solved.marginal.dense;
+  const int nodes = static_cast<int>(std::ssize(dense.node_sizes));
+  if (nodes < 2) return solved;
+  const BlanketProjection coordinates = projected(dense);
+  const int all = nodes * (nodes - 1) / 2;
+  const bool bounded = options_.population.kind == Population::Kind::loss;
+  for (int count = options_.population.count(nodes);;) {
+    {
+      const Timed timed(seconds.topology);
+      solved.topology = topology_->choose(dense, count);
+    }
+    recover(coordinates, solved, seconds);
+    // A topology that does not grow any more has done what it can.
+    const int size = static_cast<int>(std::ssize(solved.topology));
+    if (!bounded || solved.recovery.kld <= options_.population.value || count >= all ||
+        size < count) {
+      break;
+    }
+    count = std::min(all, count + std::max(1, count / 8));
+  }
+  return solved;
+}
+
+void Sparsify::add_factors(WorkGraph& work, const LocalProblem& local, const Solved& solved) {
+  for (std::size_t k = 0; k < solved.topology.size(); ++k) {
+    const std::vector<FactorModel>& models = solved.marginal.dense.models;
+    const FactorChoice& choice = solved.topology[k];
+    std::vector<int> nodes;
+    std::vector<std::array<int, 2>> between;
+    std::vector<double> measurement;
+    int size = 0;
+    for (const int number : choice) {
+      std::array<int, 2> ends{};
+      for (std::size_t end = 0; end < 2; ++end) {
+        const int node = local.blanket[models[number].nodes[end]];
+        const auto at = std::ranges::find(nodes, node);
+        ends[end] = static_cast<int>(at - nodes.begin());
+        if (at == nodes.end()) nodes.push_back(node);
+      }
+      between.push_back(ends);
+      const std::vector<double>& z = solved.marginal.relative[number];
+      measurement.insert(measurement.end(), z.begin(), z.end());
+      size += models[number].size;
+    }
+    std::vector<double> information =
+        packed(Eigen::Map<const Matrix>(solved.recovery.information[k].data(), size, size));
+    work.add(choice.size() == 1 ? local.type : pair_type(local.type, between), std::move(nodes),
+             std::move(measurement), std::move(information));
+  }
+}
+
+/// One type for each pattern, so that a graph has them in few pools.
+std::shared_ptr<const FactorType> Sparsify::pair_type(
+    const std::shared_ptr<const FactorType>& relative,
+    const std::vector<std::array<int, 2>>& between) {
+  for (const PairType& known : pair_types_) {
+    if (known.relative == relative && known.between == between) return known.type;
+  }
+  pair_types_.push_back(
+      {relative, between, std::make_shared<CorrelatedPair>(relative, between[0], between.at(1))});
+  return pair_types_.back().type;
+}
+
+void Sparsify::take_out(WorkGraph& work, std::vector<int> group, Sparsification& result) {
+  const Graph& graph = work.graph();
+  const LocalProblem local = crop(work, std::move(group));
+  const auto refuse = [&](const std::string& reason) {
+    for (const int v : local.removed) result.refused.push_back({graph.id(v), reason});
+  };
+  if (!local.refusal.empty()) return refuse(local.refusal);
+  Solved solved;
+  const bool related = local.blanket.size() > 1;
+  if (!local.blanket.empty()) {
+    try {
+      solved = solve(work, local, result.seconds);
+    } catch (const Error& error) {
+      if (error.code() != ErrorCode::numerical) throw;
+      return refuse(error.what());
+    }
+  }
+  if (related) {
+    const auto n = static_cast<int>(std::ssize(local.blanket));
+    result.mean_blanket = (result.problems * result.mean_blanket + n) / (result.problems + 1);
+    ++result.problems;
+    result.largest_blanket = std::max(result.largest_blanket, n);
+    result.kld += solved.recovery.kld;
+    result.not_converged += !solved.recovery.converged;
+  }
+  // With a blanket of one node nothing that the factors say is about anything else; those within
+  // the blanket stay then.
+  for (const int f : local.factors) work.remove_factor(f);
+  for (const int v : local.removed) work.remove_variable(v);
+  add_factors(work, local, solved);
+  if (!observer_) return;
+  SparsificationRecord record;
+  for (const int v : local.removed) record.removed.push_back(graph.id(v));
+  for (const int v : local.blanket) record.blanket.push_back(graph.id(v));
+  record.states = solved.marginal.states;
+  record.variable_type = graph.type(local.removed.front()).tag();
+  if (local.type) record.factor_type = local.type->tag();
+  if (related) {
+    record.dense = &solved.marginal.dense;
+    record.recovery = &solved.recovery;
+  }
+  record.factors_before = static_cast<int>(std::ssize(local.factors));
+  record.factors_after = static_cast<int>(std::ssize(solved.topology));
+  observer_(record);
+}
+
+Sparsification Sparsify::remove(const Graph& graph, std::span<const int> nodes,
+                                const std::function<bool(int)>& step) {
+  Sparsification result;
+  const Timed timed(result.seconds.total);
+  WorkGraph work(graph);
+  int done = 0;
+  for (std::vector<int>& group : groups(work, nodes)) {
+    done += static_cast<int>(std::ssize(group));
+    take_out(work, std::move(group), result);
+    if (step && !step(done)) break;
+  }
+  for (int v = 0; v < graph.variable_count(); ++v) {
+    if (work.gone(v)) result.removed_variables.push_back(v);
+  }
+  for (int f = 0; f < work.factor_count(); ++f) {
+    const WorkFactor& factor = work.factor(f);
+    if (factor.there && factor.position < 0) {
+      Factor fresh{.type = factor.type,
+                   .variables = {},
+                   .measurement = factor.measurement,
+                   .information = factor.information};
+      for (const int v : factor.variables) fresh.variables.push_back(graph.id(v));
+      result.factors.push_back(std::move(fresh));
+    } else if (!factor.there && factor.position >= 0) {
+      result.removed_factors.push_back(factor.position);
+    }
+  }
+  return result;
+}
+
+std::vector<double> Sparsify::losses(const Graph& graph, std::span<const int> nodes) {
+  const WorkGraph work(graph);
+  std::vector<double> klds;
+  SparsificationSeconds seconds;
+  for (const int v : nodes) {
+    const LocalProblem local = crop(work, {v});
+    double kld = std::numeric_limits<double>::infinity();
+    if (local.refusal.empty()) {
+      try {
+        kld = local.blanket.size() > 1 ? solve(work, local, seconds).recovery.kld : 0.0;
+      } catch (const Error& error) {
+        if (error.code() != ErrorCode::numerical) throw;
+      }
+    }
+    klds.push_back(kld);
+  }
+  return klds;
+}
+
+}  // namespace cairn::sparsify

@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <array>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "cairn/sparsification/sparsification.hpp"
+#include "local_problem.hpp"
+#include "population.hpp"
+#include "recovery_problem.hpp"
+#include "work_graph.hpp"
+
+namespace cairn::sparsify {
+
+/// Which nodes leave together (T 4.5).
+enum class Scheme {
+  single,  ///< none
+  runs,    ///< those that follow each other in the order of the graph and are connected
+  multi,   ///< all that are connected
+};
+
+struct SparsifyOptions {
+  Population population;
+  Projection projection = Projection::node;
+  Scheme scheme = Scheme::single;
+  bool resolve = true;     ///< the cropped problem is solved by itself
+  int largest_group = 50;  ///< nodes that leave together, at most
+};
+
+/// The whole process (T figure 4.2): crop, marginalise, choose a topology, recover its factors.
+class Sparsify final : public Sparsifier {
+ public:
+  Sparsify(std::unique_ptr<Topology> topology, std::unique_ptr<FactorRecovery> recovery,
+           SparsifyOptions options);
+
+  Sparsification remove(const Graph& graph, std::span<const int> nodes,
+                        const std::function<bool(int)>& step) override;
+  void observe(SparsificationObserver observer) override { observer_ = std::move(observer); }
+  std::vector<double> losses(const Graph& graph, std::span<const int> nodes) override;
+
+ private:
+  /// How one blanket came out.
+  struct Solved {
+    Marginal marginal;
+    std::vector<FactorChoice> topology;
+    RecoveryResult recovery;
+  };
+  Solved solve(const WorkGraph& work, const LocalProblem& local, SparsificationSeconds& seconds);
+  BlanketProjection projected(const DenseBlanket& dense) const;
+  void recover(const BlanketProjection& coordinates, Solved& solved,
+               SparsificationSeconds& seconds);
+  void add_factors(WorkGraph& work, const LocalProblem& local, const Solved& solved);
+  std::shared_ptr<const FactorType> pair_type(const std::shared_ptr<const FactorType>& relative,
+                                              const std::vector<std::array<int, 2>>& between);
+  void take_out(WorkGraph& work, std::vector<int> group, Sparsification& result);
+  std::vector<std::vector<int>> groups(const WorkGraph& work, std::span<const int> nodes) const;
+
+  std::unique_ptr<Topology> topology_;
+  std::unique_ptr<FactorRecovery> recovery_;
+  SparsifyOptions options_;
+  SparsificationObserver observer_;
+  struct PairType {
+    std::shared_ptr<const FactorType> relative;
+    std::vector<std::array<int, 2>> between;
+    std::shared_ptr<const FactorType> type;
+  };
+  std::vector<PairType> pair_types_;
+};
+
+}  // namespace cairn::sparsify

@@ -1,0 +1,382 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "topologies.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <numeric>
+#include <set>
+#include <utility>
+
+#include <fmt/format.h>
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <boost/graph/adjacency_list.hpp>
+#include <boost/graph/kruskal_min_spanning_tree.hpp>
+
+#include "cairn/runtime/error.hpp"
+#include "recovery.hpp"
+#include "recovery_problem.hpp"
+
+namespace cairn::sparsify {
+namespace {
+
+double log_determinant(const Matrix& A) {
+  const Eigen::LLT<Matrix> llt(A);
+  if (llt.info() == Eigen::Success) return 2.0 * llt.matrixLLT().diagonal().array().log().sum();
+  return std::log(std::max(std::abs(A.determinant()), 1e-300));
+}
+
+/// ε in Λ's units.
+double epsilon_of(const DenseBlanket& blanket, double part) {
+  const double mean = information(blanket).trace() / std::max(1, blanket.size());
+  return part * mean;
+}
+
+Matrix regularized_covariance(const DenseBlanket& blanket, double part) {
+  const int d = blanket.size();
+  return (Matrix(information(blanket)) + epsilon_of(blanket, part) * Matrix::Identity(d, d))
+      .llt()
+      .solve(Matrix::Identity(d, d));
+}
+
+/// The blocks of two nodes.
+Matrix pair_block(const Matrix& A, const std::vector<int>& begin, int i, int j) {
+  const int m = begin[i + 1] - begin[i], n = begin[j + 1] - begin[j];
+  Matrix block(m + n, m + n);
+  block << A.block(begin[i], begin[i], m, m), A.block(begin[i], begin[j], m, n),
+      A.block(begin[j], begin[i], n, m), A.block(begin[j], begin[j], n, n);
+  return block;
+}
+
+/// ½ ln(|Σ_ii| |Σ_jj| / |Σ_pair|)
+double information_of(const Matrix& pair, int m) {
+  const auto n = pair.rows() - m;
+  return 0.5 * (log_determinant(pair.topLeftCorner(m, m)) +
+                log_determinant(pair.bottomRightCorner(n, n)) - log_determinant(pair));
+}
+
+/// (T 4.17): what i knows by itself, over what it would know if j were unknown.
+double information_form(const DenseBlanket& blanket, const std::vector<int>& begin, int i, int j,
+                        double epsilon) {
+  const Matrix L = information(blanket);
+  std::vector<int> kept, others;
+  for (int node = 0; node + 1 < static_cast<int>(begin.size()); ++node) {
+    for (int k = begin[node]; k < begin[node + 1]; ++k)
+      (node == i || node == j ? kept : others).push_back(k);
+  }
+  Matrix pair = L(kept, kept);
+  if (!others.empty()) {
+    const Matrix across = L(kept, others);
+    pair -= across * Matrix(L(others, others)).ldlt().solve(across.transpose());
+  }
+  // `kept` is in the order of the nodes; which of the two is first makes no difference.
+  const int m = begin[std::min(i, j) + 1] - begin[std::min(i, j)];
+  const auto n = pair.rows() - m;
+  const Matrix first = pair.topLeftCorner(m, m), across = pair.topRightCorner(m, n);
+  const Matrix I = epsilon * Matrix::Identity(m, m);
+  const Matrix second = pair.bottomRightCorner(n, n) + epsilon * Matrix::Identity(n, n);
+  return 0.5 * (log_determinant(first + I) -
+                log_determinant(first - across * second.llt().solve(across.transpose()) + I));
+}
+
+struct Pair {
+  int model;
+  double weight;
+};
+
+/// The models of pairs of nodes; of several between the same two nodes the first.
+std::vector<int> pair_models(const DenseBlanket& blanket) {
+  std::vector<int> models;
+  std::set<std::pair<int, int>> seen;
+  for (int k = 0; k < static_cast<int>(std::ssize(blanket.models)); ++k) {
+    const std::vector<int>& nodes = blanket.models[k].nodes;
+    if (nodes.size() == 2 && seen.insert(std::minmax(nodes[0], nodes[1])).second)
+      models.push_back(k);
+  }
+  return models;
+}
+
+/// The models of pairs of nodes, each with a weight.
+template <class Weight>
+std::vector<Pair> weighted_pairs(const DenseBlanket& blanket, const Weight& weight) {
+  std::vector<Pair> pairs;
+  for (const int k : pair_models(blanket)) {
+    const std::vector<int>& nodes = blanket.models[k].nodes;
+    pairs.push_back({k, weight(nodes[0], nodes[1])});
+  }
+  std::ranges::stable_sort(pairs, std::greater{}, &Pair::weight);
+  return pairs;
+}
+
+/// The spanning tree with the largest sum of weights, of pairs that are sorted; the others follow
+/// in their order.
+std::vector<FactorChoice> tree_first(const DenseBlanket& blanket, const std::vector<Pair>& pairs,
+                                     int population) {
+  using Edge =
+      boost::property<boost::edge_index_t, int, boost::property<boost::edge_weight_t, double>>;
+  using Tree =
+      boost::adjacency_list<boost::vecS, boost::vecS, boost::undirectedS, boost::no_property, Edge>;
+  const std::size_t nodes = blanket.node_sizes.size();
+  Tree graph(nodes);
+  for (int k = 0; k < static_cast<int>(std::ssize(pairs)); ++k) {
+    const FactorModel& model = blanket.models[pairs[k].model];
+    // By rank, not by weight: ties are broken in the order of the pairs on every machine.
+    boost::add_edge(static_cast<std::size_t>(model.nodes[0]),
+                    static_cast<std::size_t>(model.nodes[1]), Edge(k, k), graph);
+  }
+  std::vector<boost::graph_traits<Tree>::edge_descriptor> tree;
+  boost::kruskal_minimum_spanning_tree(graph, std::back_inserter(tree));
+  if (tree.size() + 1 < nodes) {
+    throw Error(
+        ErrorCode::usage,
+        fmt::format("the {} nodes of a blanket cannot be connected by relative factors", nodes));
+  }
+  std::vector<bool> taken(pairs.size());
+  std::vector<FactorChoice> chosen;
+  for (const auto& edge : tree) {
+    const int k = boost::get(boost::edge_index, graph, edge);
+    taken[k] = true;
+    chosen.push_back({pairs[k].model});
+  }
+  for (std::size_t k = 0; k < pairs.size() && static_cast<int>(std::ssize(chosen)) < population;
+       ++k) {
+    if (!taken[k]) chosen.push_back({pairs[k].model});
+  }
+  return chosen;
+}
+
+std::vector<Pair> by_matrix(const DenseBlanket& blanket, const Matrix& weights) {
+  return weighted_pairs(blanket, [&](int i, int j) { return weights(i, j); });
+}
+
+int tree_size(const DenseBlanket& blanket) {
+  return static_cast<int>(std::ssize(blanket.node_sizes)) - 1;
+}
+
+/// Σ̂ without what the factors of a tree tell: (T 4.23), or exactly.
+Matrix downdated(const DenseBlanket& blanket, const std::vector<FactorChoice>& tree,
+                 const TopologyOptions& options) {
+  const int d = blanket.size();
+  const Matrix S = regularized_covariance(blanket, options.epsilon);
+  Matrix grown = S, left = information(blanket);
+  const BlanketProjection projection(blanket, Projection::node);
+  for (const FactorChoice& choice : tree) {
+    const auto J = jacobian(blanket.models[choice.front()], d);
+    const Matrix JT = J * coordinates(projection, d);
+    const Matrix spread = JT * JT.transpose();  // Ω⁻¹ by (T 4.4)
+    if (options.exact_downdate) {
+      left -= J.transpose() * spread.inverse() * J;
+    } else {
+      const Matrix SJt = S * J.transpose();
+      grown += SJt * (spread + J * SJt).llt().solve(SJt.transpose());
+    }
+  }
+  if (!options.exact_downdate) return grown;
+  // A tree alone claims more than all of Λ in some directions, so what is left may be negative.
+  return nearest_positive(left, epsilon_of(blanket, options.epsilon)).inverse();
+}
+
+}  // namespace
+
+Matrix mutual_information(const DenseBlanket& blanket, const TopologyOptions& options) {
+  const int n = static_cast<int>(std::ssize(blanket.node_sizes));
+  const std::vector<int> begin = offsets(blanket);
+  Matrix result = Matrix::Zero(n, n);
+  const bool by_covariance = options.regularization == Regularization::covariance;
+  const Matrix S = by_covariance ? regularized_covariance(blanket, options.epsilon) : Matrix();
+  const double epsilon = epsilon_of(blanket, options.epsilon);
+  for (int i = 0; i < n; ++i) {
+    for (int j = i + 1; j < n; ++j) {
+      result(i, j) = result(j, i) =
+          by_covariance ? information_of(pair_block(S, begin, i, j), blanket.node_sizes[i])
+                        : information_form(blanket, begin, i, j, epsilon);
+    }
+  }
+  return result;
+}
+
+std::vector<FactorChoice> ChowLiuTree::choose(const DenseBlanket& blanket, int /*population*/) {
+  return tree_first(blanket, by_matrix(blanket, mutual_information(blanket, options_)),
+                    tree_size(blanket));
+}
+
+std::vector<FactorChoice> MutualInformation::choose(const DenseBlanket& blanket, int population) {
+  return tree_first(blanket, by_matrix(blanket, mutual_information(blanket, options_)), population);
+}
+
+std::vector<FactorChoice> DowndatedInformation::choose(const DenseBlanket& blanket,
+                                                       int population) {
+  std::vector<FactorChoice> chosen = ChowLiuTree::choose(blanket, population);
+  if (static_cast<int>(std::ssize(chosen)) >= population) return chosen;
+  const Matrix S = downdated(blanket, chosen, options_);
+  const std::vector<int> begin = offsets(blanket);
+  const std::vector<Pair> pairs = weighted_pairs(blanket, [&](int i, int j) {
+    return information_of(pair_block(S, begin, i, j), blanket.node_sizes[i]);
+  });
+  std::vector<bool> taken(blanket.models.size());
+  for (const FactorChoice& choice : chosen) taken[choice.front()] = true;
+  for (const Pair& pair : pairs) {
+    if (static_cast<int>(std::ssize(chosen)) >= population) break;
+    if (!taken[pair.model]) chosen.push_back({pair.model});
+  }
+  return chosen;
+}
+
+std::vector<FactorChoice> ExpectedDivergence::choose(const DenseBlanket& blanket, int population) {
+  std::vector<FactorChoice> chosen = ChowLiuTree::choose(blanket, population);
+  if (static_cast<int>(std::ssize(chosen)) >= population) return chosen;
+  // All models at once: those that are not chosen weigh nothing yet.
+  std::vector<FactorChoice> all = chosen;
+  std::vector<bool> taken(blanket.models.size());
+  for (const FactorChoice& choice : chosen) taken[choice.front()] = true;
+  for (const int k : pair_models(blanket)) {
+    if (!taken[k]) all.push_back({k});
+  }
+  const RecoveryProblem problem =
+      BlanketProjection(blanket, Projection::node).problem(blanket, all);
+  const ScaledProblem scaled(problem);
+  Approximation at(scaled);
+  std::vector<Matrix> W;
+  for (std::size_t k = 0; k < all.size(); ++k) {
+    const int m = scaled.size(static_cast<int>(k));
+    W.push_back(k < chosen.size() ? Matrix(Matrix::Identity(m, m)) : Matrix(Matrix::Zero(m, m)));
+  }
+  if (!at.set(std::move(W))) return chosen;
+  std::vector<bool> open(all.size(), true);
+  std::fill_n(open.begin(), chosen.size(), false);
+  while (static_cast<int>(std::ssize(chosen)) < population) {
+    Approximation::Best best;
+    int which = -1;
+    for (int k = 0; k < static_cast<int>(std::ssize(all)); ++k) {
+      if (!open[k] || (which >= 0 && at.bound(k) <= best.gain)) continue;
+      Approximation::Best tried = at.best(k);
+      if (which < 0 || tried.gain > best.gain) {
+        best = std::move(tried);
+        which = k;
+      }
+    }
+    if (which < 0) break;
+    open[which] = false;
+    chosen.push_back(all[which]);
+    at.change(which, best.W);
+  }
+  return chosen;
+}
+
+std::vector<FactorChoice> OffDiagonalDeterminant::choose(const DenseBlanket& blanket,
+                                                         int population) {
+  const std::vector<int> begin = offsets(blanket);
+  const auto L = information(blanket);
+  const std::vector<Pair> pairs = weighted_pairs(blanket, [&](int i, int j) {
+    const int m = blanket.node_sizes[i], n = blanket.node_sizes[j];
+    const Matrix block = L.block(begin[i], begin[j], m, n);
+    return m == n ? std::abs(block.determinant()) : block.norm();
+  });
+  return tree_first(blanket, pairs, population);
+}
+
+std::vector<FactorChoice> SparseInverse::choose(const DenseBlanket& blanket, int population) {
+  const int d = blanket.size();
+  // In units in which every variance is 1, or λ would mean another thing for metres and radians.
+  Matrix S = regularized_covariance(blanket, options_.epsilon);
+  const Vector scale = S.diagonal().cwiseSqrt().cwiseInverse();
+  S = (scale.asDiagonal() * S * scale.asDiagonal()).eval();
+  const Matrix off = S - Matrix(S.diagonal().asDiagonal());
+  const double lambda = options_.l1_weight * off.cwiseAbs().maxCoeff();
+  Matrix Z = Matrix::Identity(d, d), U = Matrix::Zero(d, d);
+  double rho = 1.0;
+  for (int k = 0; k < 500; ++k) {
+    const Eigen::SelfAdjointEigenSolver<Matrix> eigen(rho * (Z - U) - S);
+    const Vector x =
+        (eigen.eigenvalues().array() + (eigen.eigenvalues().array().square() + 4.0 * rho).sqrt()) /
+        (2.0 * rho);
+    const Matrix X = eigen.eigenvectors() * x.asDiagonal() * eigen.eigenvectors().transpose();
+    const Matrix before = Z, sum = X + U;
+    Z = sum.array().sign() * (sum.array().abs() - lambda / rho).max(0.0);
+    U += X - Z;
+    const double primal = (X - Z).norm(), dual = rho * (Z - before).norm();
+    if (primal + dual < 1e-6 * d) break;
+    // Boyd, Parikh, Chu, Peleato and Eckstein 2011, section 3.4.1.
+    const double factor = primal > 10.0 * dual ? 2.0 : dual > 10.0 * primal ? 0.5 : 1.0;
+    rho *= factor;
+    U /= factor;
+  }
+  const std::vector<int> begin = offsets(blanket);
+  return tree_first(
+      blanket,
+      weighted_pairs(
+          blanket,
+          [&](int i, int j) {
+            return Z.block(begin[i], begin[j], blanket.node_sizes[i], blanket.node_sizes[j]).norm();
+          }),
+      population);
+}
+
+std::vector<FactorChoice> Cliquey::choose(const DenseBlanket& blanket, int population) {
+  const std::vector<FactorChoice> tree = ChowLiuTree::choose(blanket, population);
+  // Edges that share a node, in the order of the tree: the strongest is paired first.
+  std::vector<FactorChoice> chosen;
+  std::vector<bool> taken(tree.size());
+  const auto nodes = [&](std::size_t k) -> const std::vector<int>& {
+    return blanket.models[tree[k].front()].nodes;
+  };
+  for (std::size_t i = 0; i < tree.size(); ++i) {
+    if (taken[i]) continue;
+    taken[i] = true;
+    chosen.push_back(tree[i]);
+    for (std::size_t j = i + 1; j < tree.size(); ++j) {
+      if (taken[j] || std::ranges::find_first_of(nodes(i), nodes(j)) == nodes(i).end()) continue;
+      taken[j] = true;
+      chosen.back().push_back(tree[j].front());
+      break;
+    }
+  }
+  return chosen;
+}
+
+std::vector<FactorChoice> Exhaustive::choose(const DenseBlanket& blanket, int population) {
+  const std::vector<Pair> pairs = weighted_pairs(blanket, [](int, int) { return 0.0; });
+  const int all = static_cast<int>(std::ssize(pairs));
+  if (all < tree_size(blanket))
+    throw Error(ErrorCode::usage, "the nodes of a blanket cannot be connected by relative factors");
+  const int count = std::clamp(population, tree_size(blanket), all);
+  double topologies = 1.0;
+  for (int k = 0; k < count; ++k) topologies *= static_cast<double>(all - k) / (k + 1);
+  if (topologies > static_cast<double>(options_.most)) {
+    throw Error(ErrorCode::usage,
+                fmt::format("best: {} nodes have {:.3g} topologies of {} factors; at most {} are "
+                            "tried (option most), since it takes every one of them",
+                            blanket.node_sizes.size(), topologies, count, options_.most));
+  }
+  const BlanketProjection coordinates(blanket, Projection::node);
+  FactorDescent descent({.tolerance = 1e-4}, /*greedy=*/true);
+  std::vector<int> picked(count);
+  std::iota(picked.begin(), picked.end(), 0);
+  std::vector<FactorChoice> best;
+  double least = std::numeric_limits<double>::infinity();
+  while (true) {
+    std::vector<FactorChoice> topology;
+    for (const int k : picked) topology.push_back({pairs[k].model});
+    try {
+      const double kld = descent.recover(coordinates.problem(blanket, topology)).kld;
+      if (kld < least) {
+        least = kld;
+        best = topology;
+      }
+    } catch (const Error&) {  // does not connect all nodes
+    }
+    int k = count - 1;
+    while (k >= 0 && picked[k] == all - count + k) --k;
+    if (k < 0) break;
+    ++picked[k];
+    for (int next = k + 1; next < count; ++next) picked[next] = picked[next - 1] + 1;
+  }
+  if (best.empty())
+    throw Error(ErrorCode::usage, "the nodes of a blanket cannot be connected by relative factors");
+  return best;
+}
+
+}  // namespace cairn::sparsify
