@@ -106,7 +106,7 @@ CompactRun::CompactRun(const CompactJob& job, const CompactSetting& setting)
       policy_(setting.session.registry().make<PosePolicy>(job.policy)),
       registration_(setting.session.registry().make<Registration>(job.registration)) {
   const Recording& recording = setting.recording;
-  policy_->estimator().set_loss(setting.setup.loss(), setting.setup.loss_scope());
+  policy_->estimator().set_loss(setting.setup.loss(), setting.setup.loss_selector());
   registration_->begin({.recording = &recording.graph(),
                         .truth = recording.truth_graph ? &*recording.truth_graph : nullptr});
   result_.policy = spec_text(job.policy);

@@ -84,7 +84,7 @@ void count_doubled(const Graph& graph, GraphSurvey& s) {
     if (variables.size() < 2) continue;
     std::vector<int> key(variables.begin(), variables.end());
     std::sort(key.begin(), key.end());
-    key.push_back(graph.factor(f).pool);
+    key.push_back(graph.ref(f).pool);
     s.doubled += !seen.insert(std::move(key)).second;
   }
 }

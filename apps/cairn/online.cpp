@@ -151,7 +151,7 @@ Listener follow_graph(const OnlineOptions& options, const ProblemSetup& setup, S
   listener.identity = identity(options, "estimator " + options.estimator, session);
   listener.format = registry.make<StreamFormat>(options.input.format);
   listener.estimator = registry.make<Estimator>(options.estimator);
-  listener.estimator->set_loss(setup.loss(), setup.loss_scope());
+  listener.estimator->set_loss(setup.loss(), setup.loss_selector());
   if (options.marginals != "none") {
     listener.estimator->keep_marginals(options.marginals == "last" ? KeptMarginals::last
                                                                    : KeptMarginals::diagonal);
@@ -179,7 +179,7 @@ Listener follow_policy(const OnlineOptions& options, const ProblemSetup& setup, 
                                session);
   listener.format = registry.make<StreamFormat>(options.input.format);
   listener.policy = registry.make<PosePolicy>(spec);
-  listener.policy->estimator().set_loss(setup.loss(), setup.loss_scope());
+  listener.policy->estimator().set_loss(setup.loss(), setup.loss_selector());
   listener.lines = std::make_unique<PolicySession>(
       *listener.policy, *listener.format, registry,
       PolicySettings{options.input.read, options.estimates, options.marginals});

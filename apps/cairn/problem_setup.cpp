@@ -13,9 +13,9 @@ void add_loss_options(CLI::App& command, ProblemOptions& options) {
   command.add_option("--loss", options.loss, "robust loss, such as huber:scale=1 [none]")
       ->type_name("NAME");
   command
-      .add_option("--loss-on", options.loss_on, "factors that the loss applies to: all or loops")
+      .add_option("--loss-on", options.loss_on,
+                  "factors that the loss applies to: all, loops, or those of a type by its tag")
       ->type_name("WHICH")
-      ->check(one_of({"all", "loops"}))
       ->capture_default_str();
 }
 
@@ -38,7 +38,7 @@ void add_problem_options(CLI::App& command, ProblemOptions& options) {
 
 ProblemSetup::ProblemSetup(const ProblemOptions& options, Registry& registry)
     : initial_(registry.make<InitialGuess>(options.initial)),
-      scope_(options.loss_on == "loops" ? LossScope::loop_closures : LossScope::all) {
+      selector_(FactorSelector::parse(options.loss_on)) {
   if (!options.loss.empty()) loss_ = registry.make<Loss>(options.loss);
   if (options.loss.empty() && options.loss_on != "all") {
     throw Error(ErrorCode::usage, "--loss-on says where a loss applies, but there is no --loss");
@@ -46,7 +46,7 @@ ProblemSetup::ProblemSetup(const ProblemOptions& options, Registry& registry)
 }
 
 std::vector<std::string> ProblemSetup::apply(Graph& graph) const {
-  graph.set_loss(loss_, scope_);
+  graph.set_loss(loss_, selector_);
   return initial_->compute(graph);
 }
 

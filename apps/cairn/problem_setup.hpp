@@ -40,12 +40,12 @@ class ProblemSetup {
   std::vector<std::string> apply(Graph& graph) const;
 
   const std::shared_ptr<const Loss>& loss() const { return loss_; }
-  LossScope loss_scope() const { return scope_; }
+  const FactorSelector& loss_selector() const { return selector_; }
 
  private:
   std::unique_ptr<InitialGuess> initial_;
   std::shared_ptr<const Loss> loss_;  // shared: graphs and their clones use one loss
-  LossScope scope_ = LossScope::all;
+  FactorSelector selector_;
 };
 
 /// Whether an optimizer lets its linear solver be chosen: an option `linear_solver` of type

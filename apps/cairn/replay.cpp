@@ -109,13 +109,12 @@ class Feeder {
     const bool as_given = options_.problem.initial == "as_given";
     GraphUpdate update;
     for (const int v : arrival.variables) {
-      Variable variable{
-          whole_.variable_pools()[whole_.pool(v)].type, whole_.id(v), {}, whole_.fixed(v)};
+      Variable variable{whole_.type_of(v), whole_.id(v), {}, whole_.fixed(v)};
       if (as_given || variable.fixed) variable.state = given(v);
       update.variables.push_back(std::move(variable));
     }
     for (const int f : factors_of(arrival)) {
-      Factor factor{whole_.factor_pools()[whole_.factor(f).pool].type, {}, {}, {}};
+      Factor factor{whole_.type_of_factor(f), {}, {}, {}};
       for (const std::int32_t v : whole_.factor_variables(f))
         factor.variables.push_back(whole_.id(v));
       factor.measurement.assign(whole_.measurement(f).begin(), whole_.measurement(f).end());
@@ -424,7 +423,7 @@ int run(const ReplayOptions& options, Session& session) {
   const auto estimator = registry.make<Estimator>(options.estimator);
   const ProblemSetup setup(options.problem, registry);
   keep(*estimator, options.marginals);
-  estimator->set_loss(setup.loss(), setup.loss_scope());
+  estimator->set_loss(setup.loss(), setup.loss_selector());
 
   const LoadedGraph loaded = load_graph(options.graph, options.input, session);
   const std::vector<Arrival> arrivals = arrival_order(loaded.graph);

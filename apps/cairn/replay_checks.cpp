@@ -46,23 +46,22 @@ BatchChecker::BatchChecker(const Graph& whole, const ProblemSetup& setup, Regist
 
 void BatchChecker::add(const Arrival& arrival) {
   for (const int v : arrival.variables) {
-    index_[v] = so_far_.add_variable(whole_.variable_pools()[whole_.pool(v)].type, whole_.id(v),
-                                     whole_.state(v));
+    index_[v] = so_far_.add_variable(whole_.type_of(v), whole_.id(v), whole_.state(v));
     if (whole_.fixed(v)) so_far_.set_fixed(index_[v]);
   }
   std::vector<int> variables;
   for (const int f : arrival.factors) {
     variables.clear();
     for (const std::int32_t v : whole_.factor_variables(f)) variables.push_back(index_[v]);
-    so_far_.add_factor(whole_.factor_pools()[whole_.factor(f).pool].type, variables,
-                       whole_.measurement(f), whole_.information(f));
+    so_far_.add_factor(whole_.type_of_factor(f), variables, whole_.measurement(f),
+                       whole_.information(f));
   }
 }
 
 BatchCheck BatchChecker::check(int step, Estimator& estimator) {
   BatchCheck result{.step = step, .chi2 = estimator.chi2()};
   Graph polished = estimator.graph();
-  polished.set_loss(setup_.loss(), setup_.loss_scope());
+  polished.set_loss(setup_.loss(), setup_.loss_selector());
   if (covariances_) result.covariance_difference = covariance_difference(estimator, polished);
   Graph batch = so_far_.clone();
   setup_.apply(batch);

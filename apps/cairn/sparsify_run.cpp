@@ -125,10 +125,8 @@ SparsifyResult sparsify_whole(const Graph& graph, const SparsifyJob& job,
 namespace {
 
 Factor factor_of(const Graph& graph, int f) {
-  Factor factor{.type = graph.factor_pools()[graph.factor(f).pool].type,
-                .variables = {},
-                .measurement = {},
-                .information = {}};
+  Factor factor{
+      .type = graph.type_of_factor(f), .variables = {}, .measurement = {}, .information = {}};
   for (const std::int32_t v : graph.factor_variables(f)) factor.variables.push_back(graph.id(v));
   const auto z = graph.measurement(f), information = graph.information(f);
   factor.measurement.assign(z.begin(), z.end());
@@ -153,7 +151,7 @@ class OnlineRun {
         line_(setting.session.common.quiet),
         redirection_(job.redirect_early > 0 ? Redirection::Nearest::order
                                             : Redirection::Nearest::place) {
-    estimator_->set_loss(setting.setup.loss(), setting.setup.loss_scope());
+    estimator_->set_loss(setting.setup.loss(), setting.setup.loss_selector());
   }
 
   SparsifyResult run() {
@@ -187,7 +185,7 @@ class OnlineRun {
   void feed(const Arrival& arrival) {
     GraphUpdate update;
     for (const int v : arrival.variables) {
-      Variable variable{.type = recording_.variable_pools()[recording_.pool(v)].type,
+      Variable variable{.type = recording_.type_of(v),
                         .id = recording_.id(v),
                         .state = {},
                         .fixed = recording_.fixed(v)};
@@ -312,15 +310,14 @@ class OnlineRun {
       const std::vector<double> state =
           anchor == id ? std::vector<double>(x.begin(), x.end()) : redirection_.state(id, x);
       for (Graph* graph : {&redirected, &full}) {
-        const int added =
-            graph->add_variable(recording_.variable_pools()[recording_.pool(v)].type, id, state);
+        const int added = graph->add_variable(recording_.type_of(v), id, state);
         graph->set_fixed(added, recording_.fixed(v));
       }
     }
     for (const Factor& factor : factors_) add(redirected, factor);
     for (int f = 0; f < recording_.factor_count(); ++f) add(full, factor_of(recording_, f));
     for (Graph* graph : {&redirected, &full})
-      graph->set_loss(setting_.setup.loss(), setting_.setup.loss_scope());
+      graph->set_loss(setting_.setup.loss(), setting_.setup.loss_selector());
     optimize(redirected, parts_, setting_, "the graph without removals", result_);
     measure(redirected, parts_, result_);
     result_.chi2_before = optimize(full, parts_, setting_, "the whole graph", result_);

@@ -42,7 +42,7 @@ Numbering number_variables(const Graph& graph) {
 
 void write_observation(const Graph& graph, int position, const Numbering& n, LineWriter& out) {
   constexpr std::array<double, 3> kUnit{1.0, 0.0, 1.0};
-  if (graph.factor_pools()[graph.factor(position).pool].type->tag() != "EDGE_PROJECT_BAL") {
+  if (graph.factor_type(position).tag() != "EDGE_PROJECT_BAL") {
     cannot_express("bal", graph.describe_factor(position), kExpected);
   }
   if (!std::ranges::equal(graph.information(position), kUnit)) {

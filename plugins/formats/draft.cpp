@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "cairn/graph/packed.hpp"
 #include "cairn/runtime/error.hpp"
 #include "information.hpp"
 #include "propagate.hpp"
@@ -94,6 +95,9 @@ void Draft::finish_factor(std::span<const double> as_in_file) {
     ++report_->repaired;
     return;
   }
+  std::vector<double> root(information.size());
+  const bool zero = std::ranges::all_of(information, [](double x) { return x == 0.0; });
+  if (!zero && square_root(information, kind.residual, root.data())) return;  // semidefinite
   std::string advice;
   if (kind.residual == 3 && kind.type->is_relative()) {
     if (as_in_file.empty()) as_in_file = information;
@@ -110,8 +114,8 @@ void Draft::finish_factor(std::span<const double> as_in_file) {
   }
   fail(factor.line,
        fmt::format(
-           "the information of {} is not positive definite (pivot {} of its Cholesky factor is "
-           "{:.6g}); expected a positive definite {}x{} matrix{}",
+           "the information of {} is not positive semidefinite or zero (pivot {} of its Cholesky "
+           "factor is {:.6g}); expected a positive semidefinite {}x{} matrix{}",
            describe(factor), failed->row + 1, failed->pivot, kind.residual, kind.residual, advice));
 }
 

@@ -58,7 +58,7 @@ void write_variables(const Graph& graph, LineWriter& out) {
 }
 
 void write_factor(const Graph& graph, int position, LineWriter& out) {
-  const std::string_view tag = graph.factor_pools()[graph.factor(position).pool].type->tag();
+  const std::string_view tag = graph.factor_type(position).tag();
   if (tag == MarginalPrior::kTag) {
     cannot_express("g2o", graph.describe_factor(position),
                    "a graph without what marginalization left (a trajectory format such as tum "

@@ -40,9 +40,7 @@ class Propagator {
     }
   }
 
-  const FactorType& type_of(int f) const {
-    return *graph_.factor_pools()[graph_.factor(f).pool].type;
-  }
+  const FactorType& type_of(int f) const { return graph_.factor_type(f); }
   std::span<const int> factors_of(int v) const {
     return {factors_.data() + begin_[v], begin_[v + 1] - begin_[v]};
   }

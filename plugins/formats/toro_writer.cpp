@@ -31,7 +31,7 @@ void write_vertices(const Graph& graph, LineWriter& out) {
 }
 
 void write_edge(const Graph& graph, int position, LineWriter& out) {
-  if (graph.factor_pools()[graph.factor(position).pool].type->tag() != "EDGE_SE2") {
+  if (graph.factor_type(position).tag() != "EDGE_SE2") {
     cannot_express("toro", graph.describe_factor(position), kExpected);
   }
   out.field("EDGE2");

@@ -87,7 +87,7 @@ class ChordalPool {
         const int v = queue.back();
         queue.pop_back();
         for (int f : placing_.factors()[v]) {
-          if (!graph_.factor_pools()[graph_.factor(f).pool].type->is_relative()) continue;
+          if (!graph_.factor_type(f).is_relative()) continue;
           for (int other : graph_.factor_variables(f)) reach(other);
         }
       }

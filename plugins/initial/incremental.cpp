@@ -102,7 +102,7 @@ class Incremental final : public InitialGuess {
           return false;
         }
       }
-      const FactorType& type = *whole.factor_pools()[whole.factor(factor).pool].type;
+      const FactorType& type = whole.factor_type(factor);
       std::vector<double> placed(state.size());
       if (!type.propagate(target, x.data(), whole.measurement(factor).data(), placed.data()))
         return false;
@@ -111,7 +111,7 @@ class Incremental final : public InitialGuess {
     }
 
     void add(int variable, std::span<const double> state) {
-      const auto& type = whole.variable_pools()[whole.pool(variable)].type;
+      const auto& type = whole.type_of(variable);
       index[variable] = grown.add_variable(type, whole.id(variable), state);
       if (gauge.held[variable]) grown.set_fixed(index[variable]);
     }
@@ -124,8 +124,8 @@ class Incremental final : public InitialGuess {
         for (const std::int32_t v : whole.factor_variables(f)) variables.push_back(index[v]);
         if (std::ranges::find(variables, -1) != variables.end()) continue;
         used[f] = true;
-        grown.add_factor(whole.factor_pools()[whole.factor(f).pool].type, variables,
-                         whole.measurement(f), whole.information(f));
+        grown.add_factor(whole.type_of_factor(f), variables, whole.measurement(f),
+                         whole.information(f));
       }
     }
   };

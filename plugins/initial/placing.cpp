@@ -37,7 +37,7 @@ bool Placing::place(int variable, int factor) {
     }
     x[k] = graph_.state(variables[k]).data();
   }
-  const FactorType& type = *graph_.factor_pools()[graph_.factor(factor).pool].type;
+  const FactorType& type = graph_.factor_type(factor);
   std::vector<double> out(static_cast<std::size_t>(graph_.type(variable).ambient_size()));
   if (!type.propagate(target, x.data(), graph_.measurement(factor).data(), out.data()))
     return false;

@@ -71,7 +71,7 @@ std::vector<Link> cartesian_links(const Graph& graph, int pose_pool) {
 
 Eigen::MatrixXd information_matrix(const Graph& graph, int factor) {
   const auto packed = graph.information(factor);
-  const int n = graph.factor_pools()[graph.factor(factor).pool].type->residual_size();
+  const int n = graph.factor_type(factor).residual_size();
   Eigen::MatrixXd information(n, n);
   for (int row = 0, place = 0; row < n; ++row) {
     for (int column = row; column < n; ++column, ++place) {

@@ -37,7 +37,7 @@ RecordedLinks recorded_links(const RegistrationData& data, std::string_view owne
   RecordedLinks links;
   bool has_odometry = false;
   for (int f = 0; f < recording.factor_count(); ++f) {
-    const FactorPool& pool = recording.factor_pools()[recording.factor(f).pool];
+    const FactorPool& pool = recording.factor_pools()[recording.ref(f).pool];
     if (!pool.type->is_relative()) continue;
     const auto& pose = recording.variable_pools()[pool.variable_pools[0]].type;
     if (links.pose && links.pose != pose) {

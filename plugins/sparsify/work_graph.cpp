@@ -36,11 +36,9 @@ Matrix unpacked(std::span<const double> upper, int n) {
 
 WorkGraph::WorkGraph(const Graph& graph)
     : graph_(&graph), on_(graph.variable_count()), gone_(graph.variable_count()) {
-  const std::vector<bool> robust = under_loss(graph);
-  std::vector<double> weights(graph.factor_count(), 1.0);
-  if (graph.loss()) graph.loss()->evaluate(squared_norms(graph), {}, weights);
+  const std::vector<double> norms = squared_norms(graph);
   for (int f = 0; f < graph.factor_count(); ++f) {
-    const auto [pool, entry] = graph.factor(f);
+    const auto [pool, entry] = graph.ref(f);
     const FactorPool& of = graph.factor_pools()[pool];
     const auto variables = graph.factor_variables(f);
     const auto z = graph.measurement(f);
@@ -54,9 +52,11 @@ WorkGraph::WorkGraph(const Graph& graph)
     const auto count = information.size();
     const double* root = of.sqrt_information.data() + static_cast<std::size_t>(entry) * count;
     factor.sqrt_information.assign(root, root + count);
-    if (robust[f]) {
+    if (graph.loss(f)) {
+      double weight = 1.0;
+      graph.weigh(pool, static_cast<std::size_t>(entry), {&norms[f], 1}, {}, {&weight, 1});
       // A factor without any weight must stay positive definite.
-      const double weight = std::max(weights[f], 1e-9);
+      weight = std::max(weight, 1e-9);
       for (double& x : factor.information) x *= weight;
       for (double& x : factor.sqrt_information) x *= std::sqrt(weight);
     }

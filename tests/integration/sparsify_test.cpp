@@ -283,7 +283,7 @@ TEST_F(Sparsify, AFactorForANodeThatHasLeftSaysTheSameOfAnother) {
   redirection.leave(graph, leaving);
   EXPECT_TRUE(redirection.has(graph.id(3)));
   EXPECT_FALSE(redirection.has(graph.id(5)));
-  const auto type = graph.factor_pools()[graph.factor(0).pool].type;
+  const auto type = graph.type_of_factor(0);
   const auto information = graph.information(0);
   for (const auto& [a, b] : std::vector<std::pair<int, int>>{{3, 20}, {20, 3}, {4, 9}}) {
     // What it measures is where the two are: so it must fit wherever it goes.

@@ -46,7 +46,7 @@ Gauge resolve_gauge(const Graph& graph) {
         touched[pool.variables[k + a]] = true;
         if (a > 0) forest.join(pool.variables[k], pool.variables[k + a]);
       }
-      prior_size[pool.variables[k]] += pool.type->absolute_size();
+      prior_size[pool.variables[k]] += graph.absolute_size(pool.sequence[k / arity]);
     }
   }
 

@@ -3,11 +3,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <numeric>
 
 #include <fmt/format.h>
-#include <Eigen/Cholesky>
-#include <Eigen/Core>
 
+#include "cairn/graph/packed.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/threads.hpp"
 
@@ -20,26 +21,28 @@ bool all_finite(std::span<const double> values) {
   return std::ranges::all_of(values, [](double v) { return std::isfinite(v); });
 }
 
-/// U, packed row by row, with UᵀU = Ω. False if Ω is not positive definite.
-bool square_root(std::span<const double> information, int n, double* packed) {
-  using Small = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 16, 16>;
-  const auto factor = [&](auto omega) {
-    std::size_t k = 0;
-    for (int row = 0; row < n; ++row) {
-      for (int column = row; column < n; ++column) omega(column, row) = information[k++];
-    }
-    const Eigen::LLT<decltype(omega), Eigen::Lower> llt(omega);
-    if (llt.info() != Eigen::Success) return false;
-    k = 0;
-    for (int row = 0; row < n; ++row) {
-      for (int column = row; column < n; ++column) packed[k++] = llt.matrixLLT()(column, row);
-    }
-    return std::isfinite(packed[k - 1]);
-  };
-  if (n == 3) return factor(Eigen::Matrix3d::Zero().eval());
-  if (n == 6) return factor(Eigen::Matrix<double, 6, 6>::Zero().eval());
-  if (n <= 16) return factor(Small(n, n));
-  return factor(Eigen::MatrixXd(n, n));
+/// U with UᵀU = Ω, packed row by row, and the rank of Ω; rank 0 if Ω is indefinite or zero.
+struct Root {
+  std::vector<double> packed;
+  int rank = 0;
+};
+
+Root root_of(std::span<const double> information, int n) {
+  Root root{std::vector<double>(information.size()), 0};
+  if (!square_root(information, n, root.packed.data())) return root;
+  for (std::size_t k = 0; n > 0; k += static_cast<std::size_t>(n--))
+    root.rank += root.packed[k] > 0.0;
+  return root;
+}
+
+std::size_t size_of(int n) { return static_cast<std::size_t>(n); }
+
+/// What is wrong with an information matrix, or nothing.
+std::string problem_of(const Root& root, std::span<const double> information) {
+  if (root.rank > 0) return {};
+  return std::ranges::all_of(information, [](double x) { return x == 0.0; })
+             ? "the information matrix is zero: the factor would measure nothing"
+             : "the information matrix is not positive semidefinite";
 }
 
 }  // namespace
@@ -57,8 +60,7 @@ Graph Graph::clone() const {
   copy.factors_ = factors_;
   copy.factor_pools_ = factor_pools_;
   copy.index_of_id_ = index_of_id_;
-  copy.loss_ = loss_;
-  copy.loss_scope_ = loss_scope_;
+  copy.losses_ = losses_;
   copy.structure_version_ = structure_version_;
   return copy;
 }
@@ -69,7 +71,8 @@ void Graph::reserve(std::size_t variables, std::size_t factors) {
   factors_.reserve(factors);
 }
 
-int Graph::variable_pool_of(const std::shared_ptr<const VariableType>& type) {
+/// The pool of a type; one past the last if there is none yet.
+int Graph::find_pool(const std::shared_ptr<const VariableType>& type) const {
   for (std::size_t p = 0; p < variable_pools_.size(); ++p) {
     if (variable_pools_[p].type == type) return static_cast<int>(p);
     if (variable_pools_[p].type->tag() == type->tag()) {
@@ -79,25 +82,26 @@ int Graph::variable_pool_of(const std::shared_ptr<const VariableType>& type) {
                       type->tag()));
     }
   }
-  variable_pools_.push_back({type, {}});
-  values_.pools.emplace_back();
-  return static_cast<int>(variable_pools_.size()) - 1;
+  return static_cast<int>(variable_pools_.size());
 }
 
-int Graph::factor_pool_of(const std::shared_ptr<const FactorType>& type) {
-  for (std::size_t p = 0; p < factor_pools_.size(); ++p) {
-    if (factor_pools_[p].type == type) return static_cast<int>(p);
-  }
-  FactorPool pool;
-  pool.type = type;
-  factor_pools_.push_back(std::move(pool));
-  return static_cast<int>(factor_pools_.size()) - 1;
+int Graph::find_pool(const std::shared_ptr<const FactorType>& type) const {
+  const auto at =
+      std::ranges::find(factor_pools_, type, [](const FactorPool& pool) { return pool.type; });
+  return static_cast<int>(at - factor_pools_.begin());
+}
+
+int Graph::add(const Variable& variable) {
+  const int index = add_variable(variable.type, variable.id, variable.state);
+  if (variable.fixed) set_fixed(index);
+  return index;
 }
 
 int Graph::add_variable(std::shared_ptr<const VariableType> type, Id id,
                         std::span<const double> x) {
+  if (!type) throw bad_input(fmt::format("variable {} has no type", id));
   const std::string_view tag = type->tag();
-  const std::size_t size = static_cast<std::size_t>(type->ambient_size());
+  const std::size_t size = size_of(type->ambient_size());
   if (x.size() != size) {
     throw bad_input(fmt::format("{} {} has {} numbers, expected {}", tag, id, x.size(), size));
   }
@@ -107,48 +111,57 @@ int Graph::add_variable(std::shared_ptr<const VariableType> type, Id id,
     throw bad_input(
         fmt::format("{} {}: the id is already that of {}", tag, id, describe_variable(*there)));
   }
-  const int pool = variable_pool_of(type);
-  AlignedVector& states = values_.pools[pool];
-  const std::size_t begin = states.size();
-  states.insert(states.end(), x.begin(), x.end());
-  if (const std::string problem = type->normalize(states.data() + begin); !problem.empty()) {
-    states.resize(begin);
+  std::vector<double> state(x.begin(), x.end());
+  if (const std::string problem = type->normalize(state.data()); !problem.empty())
     throw bad_input(fmt::format("{} {}: {}", tag, id, problem));
+  const int p = find_pool(type);
+  // Nothing is refused from here on.
+  if (p == std::ssize(variable_pools_)) {
+    variable_pools_.push_back({std::move(type), {}});
+    values_.pools.emplace_back();
   }
+  values_.pools[p].insert(values_.pools[p].end(), state.begin(), state.end());
   const int index = variable_count();
-  const std::int32_t slot = static_cast<std::int32_t>(variable_pools_[pool].variables.size());
-  variable_pools_[pool].variables.push_back(index);
-  records_.push_back({id, pool, slot, false});
+  std::vector<std::int32_t>& variables = variable_pools_[p].variables;
+  records_.push_back({id, p, static_cast<std::int32_t>(variables.size()), false});
+  variables.push_back(index);
   index_of_id_.emplace(id, index);
   ++structure_version_;
   return index;
 }
 
-int Graph::add_factor(std::shared_ptr<const FactorType> type, std::span<const int> variables,
-                      std::span<const double> measurement, std::span<const double> information) {
-  const std::string_view tag = type->tag();
-  const int arity = type->arity(), n = type->residual_size();
-  if (variables.size() != static_cast<std::size_t>(arity)) {
+int Graph::add(const Factor& factor) {
+  if (!factor.type) throw bad_input("a factor has no type");
+  std::vector<int> variables;
+  for (const Id id : factor.variables) {
+    const std::optional<int> v = find(id);
+    if (!v) {
+      std::string name(factor.type->tag());
+      for (const Id each : factor.variables) name += fmt::format(" {}", each);
+      throw bad_input(fmt::format("{}: there is no variable {}", name, id));
+    }
+    variables.push_back(*v);
+  }
+  return add_factor(factor.type, variables, factor.measurement, factor.information, factor.loss);
+}
+
+void Graph::check_ends(const FactorType& type, std::span<const int> variables) const {
+  const std::string_view tag = type.tag();
+  const int arity = type.arity();
+  if (variables.size() != size_of(arity)) {
     throw bad_input(fmt::format("{} joins {} variables, not {}", tag, arity, variables.size()));
   }
-  const auto name = [&] {
-    std::string text(tag);
-    for (const int v : variables) {
-      text += v >= 0 && v < variable_count() ? fmt::format(" {}", id(v))
-                                             : fmt::format(" (index {})", v);
-    }
-    return text;
-  };
+  const auto name = [&] { return name_of(type, variables); };
   for (int k = 0; k < arity; ++k) {
     const int v = variables[k];
     if (v < 0 || v >= variable_count())
       throw bad_input(fmt::format("{}: there is no such variable", name()));
-    if (this->type(v).tag() != type->variable_tags()[k]) {
+    if (this->type(v).tag() != type.variable_tags()[k]) {
       throw bad_input(fmt::format("{}: variable {} is a {}, expected a {}", name(), id(v),
-                                  this->type(v).tag(), type->variable_tags()[k]));
+                                  this->type(v).tag(), type.variable_tags()[k]));
     }
-    if (this->type(v).ambient_size() != type->ambient_size(k) ||
-        this->type(v).tangent_size() != type->tangent_size(k)) {
+    if (this->type(v).ambient_size() != type.ambient_size(k) ||
+        this->type(v).tangent_size() != type.tangent_size(k)) {
       throw Error(ErrorCode::plugin,
                   fmt::format("{}: the factor type and the variable type {} disagree about the "
                               "variable's sizes",
@@ -159,35 +172,53 @@ int Graph::add_factor(std::shared_ptr<const FactorType> type, std::span<const in
         throw bad_input(fmt::format("{}: joins variable {} with itself", name(), id(v)));
     }
   }
-  const std::size_t measurement_size = static_cast<std::size_t>(type->measurement_size());
-  const std::size_t information_size = static_cast<std::size_t>(n * (n + 1) / 2);
+}
+
+std::string Graph::name_of(const FactorType& type, std::span<const int> variables) const {
+  std::string text(type.tag());
+  for (const int v : variables) {
+    text +=
+        v >= 0 && v < variable_count() ? fmt::format(" {}", id(v)) : fmt::format(" (index {})", v);
+  }
+  return text;
+}
+
+int Graph::add_factor(std::shared_ptr<const FactorType> type, std::span<const int> variables,
+                      std::span<const double> measurement, std::span<const double> information,
+                      std::shared_ptr<const Loss> loss) {
+  if (!type) throw bad_input("a factor has no type");
+  check_ends(*type, variables);
+  const int n = type->residual_size();
+  const std::size_t measurement_size = size_of(type->measurement_size());
+  const std::size_t information_size = size_of(n * (n + 1) / 2);
   if (measurement.size() != measurement_size || information.size() != information_size) {
-    throw bad_input(fmt::format(
-        "{}: {} + {} numbers, expected a measurement of {} and an information matrix of {}", name(),
-        measurement.size(), information.size(), measurement_size, information_size));
+    throw bad_input(
+        fmt::format("{}: {} + {} numbers, expected a measurement of {} and the upper triangle of "
+                    "an information matrix, {}",
+                    name_of(*type, variables), measurement.size(), information.size(),
+                    measurement_size, information_size));
   }
   if (!all_finite(measurement) || !all_finite(information)) {
-    throw bad_input(fmt::format("{}: has a number that is not finite", name()));
+    throw bad_input(fmt::format("{}: has a number that is not finite", name_of(*type, variables)));
   }
-
-  const int p = factor_pool_of(type);
+  std::vector<double> z(measurement.begin(), measurement.end());
+  std::string problem = type->normalize(z.data());
+  const Root root = root_of(information, n);
+  if (problem.empty()) problem = problem_of(root, information);
+  if (!problem.empty()) throw bad_input(fmt::format("{}: {}", name_of(*type, variables), problem));
+  const int p = find_pool(type);
+  const std::int16_t of_loss = loss_index(*type, loss);
+  // Nothing is refused from here on.
+  if (p == std::ssize(factor_pools_)) {
+    factor_pools_.emplace_back().type = std::move(type);
+    for (const int v : variables) factor_pools_[p].variable_pools.push_back(records_[v].pool);
+  }
   FactorPool& pool = factor_pools_[p];
-  if (pool.variable_pools.empty()) {
-    for (const int v : variables) pool.variable_pools.push_back(records_[v].pool);
-  }
-  const std::size_t m = pool.measurements.size(), u = pool.sqrt_information.size();
-  pool.measurements.insert(pool.measurements.end(), measurement.begin(), measurement.end());
-  pool.sqrt_information.resize(u + information_size);
-  std::string problem = type->normalize(pool.measurements.data() + m);
-  if (problem.empty() && !square_root(information, n, pool.sqrt_information.data() + u)) {
-    problem = "the information matrix is not positive definite";
-  }
-  if (!problem.empty()) {
-    pool.measurements.resize(m);
-    pool.sqrt_information.resize(u);
-    throw bad_input(fmt::format("{}: {}", name(), problem));
-  }
+  pool.measurements.insert(pool.measurements.end(), z.begin(), z.end());
   pool.information.insert(pool.information.end(), information.begin(), information.end());
+  pool.sqrt_information.insert(pool.sqrt_information.end(), root.packed.begin(), root.packed.end());
+  pool.ranks.push_back(static_cast<std::int16_t>(root.rank));
+  pool.losses.push_back(of_loss);
   for (const int v : variables) {
     pool.variables.push_back(v);
     pool.slots.push_back(records_[v].slot);
@@ -240,6 +271,23 @@ Renumbering Graph::remove(const std::vector<bool>& factors, const std::vector<bo
   return numbers;
 }
 
+Renumbering Graph::erase(Id id) {
+  const std::optional<int> v = find(id);
+  if (!v) throw Error(ErrorCode::usage, fmt::format("there is no variable {} to erase", id));
+  std::vector<bool> variables(records_.size(), false), factors(factors_.size(), false);
+  variables[*v] = true;
+  for (const int f : factors_of(*v)) factors[f] = true;
+  return remove(factors, variables);
+}
+
+Renumbering Graph::erase_factor(int position) {
+  if (position < 0 || position >= factor_count())
+    throw Error(ErrorCode::usage, fmt::format("there is no factor {} to erase", position));
+  std::vector<bool> factors(factors_.size(), false);
+  factors[position] = true;
+  return remove(factors, std::vector<bool>(records_.size(), false));
+}
+
 void Graph::remove_factors(const std::vector<bool>& leaves,
                            const std::vector<std::int32_t>& position) {
   std::vector<FactorPool> pools;
@@ -258,6 +306,8 @@ void Graph::remove_factors(const std::vector<bool>& leaves,
       move_group(pool.measurements, f, kept, measurement);
       move_group(pool.information, f, kept, packed);
       move_group(pool.sqrt_information, f, kept, packed);
+      pool.ranks[kept] = pool.ranks[f];
+      pool.losses[kept] = pool.losses[f];
       pool.sequence[kept] = now;
       factors[now] = {static_cast<std::int32_t>(pools.size()), static_cast<std::int32_t>(kept++)};
     }
@@ -267,6 +317,8 @@ void Graph::remove_factors(const std::vector<bool>& leaves,
     pool.measurements.resize(kept * measurement);
     pool.information.resize(kept * packed);
     pool.sqrt_information.resize(kept * packed);
+    pool.ranks.resize(kept);
+    pool.losses.resize(kept);
     pool.sequence.resize(kept);
     pools.push_back(std::move(pool));
   }
@@ -339,6 +391,11 @@ void Graph::set_state(int variable, std::span<const double> x) {
                                slot(variable) * static_cast<std::ptrdiff_t>(size));
 }
 
+Variable Graph::variable(int variable) const {
+  const std::span<const double> x = state(variable);
+  return {type_of(variable), id(variable), {x.begin(), x.end()}, fixed(variable)};
+}
+
 std::string Graph::describe_variable(int variable) const {
   return fmt::format("{} {}", type(variable).tag(), id(variable));
 }
@@ -362,6 +419,41 @@ std::span<const double> Graph::information(int position) const {
   return {pool.information.data() + factors_[position].entry * size, size};
 }
 
+std::span<const double> Graph::sqrt_information(int position) const {
+  const FactorPool& pool = factor_pools_[factors_[position].pool];
+  const std::size_t n = size_of(pool.type->residual_size()), size = n * (n + 1) / 2;
+  return {pool.sqrt_information.data() + factors_[position].entry * size, size};
+}
+
+int Graph::information_rank(int position) const {
+  return factor_pools_[factors_[position].pool].ranks[factors_[position].entry];
+}
+
+int Graph::absolute_size(int position) const {
+  // A marginal prior may count more than it has rows: all that can be known.
+  const FactorType& type = factor_type(position);
+  const int rank = information_rank(position);
+  return rank == type.residual_size() ? type.absolute_size() : std::min(type.absolute_size(), rank);
+}
+
+Factor Graph::factor(int position) const {
+  Factor factor{type_of_factor(position), {}, {}, {}, losses_[loss_of(position)]};
+  for (const std::int32_t v : factor_variables(position)) factor.variables.push_back(id(v));
+  const std::span<const double> z = measurement(position), omega = information(position);
+  factor.measurement.assign(z.begin(), z.end());
+  factor.information.assign(omega.begin(), omega.end());
+  return factor;
+}
+
+std::vector<int> Graph::factors_of(int variable) const {
+  std::vector<int> result;
+  for (int f = 0; f < factor_count(); ++f) {
+    const auto on = factor_variables(f);
+    if (std::ranges::find(on, variable) != on.end()) result.push_back(f);
+  }
+  return result;
+}
+
 void Graph::set_measurement(int position, std::span<const double> measurement,
                             std::span<const double> information) {
   FactorPool& pool = factor_pools_[factors_[position].pool];
@@ -374,20 +466,21 @@ void Graph::set_measurement(int position, std::span<const double> measurement,
     throw bad_input(fmt::format("{}: a measurement is {} finite numbers and its information {}",
                                 describe_factor(position), size, packed));
   }
-  std::vector<double> z(measurement.begin(), measurement.end()), root(packed);
+  std::vector<double> z(measurement.begin(), measurement.end());
   std::string problem = pool.type->normalize(z.data());
-  if (problem.empty() && !information.empty() &&
-      !square_root(information, static_cast<int>(n), root.data())) {
-    problem = "the information matrix is not positive definite";
+  Root root;
+  if (!information.empty()) {
+    root = root_of(information, static_cast<int>(n));
+    if (problem.empty()) problem = problem_of(root, information);
   }
   if (!problem.empty()) throw bad_input(fmt::format("{}: {}", describe_factor(position), problem));
   std::ranges::copy(z, pool.measurements.begin() + static_cast<std::ptrdiff_t>(entry * size));
-  if (!information.empty()) {
-    std::ranges::copy(information,
-                      pool.information.begin() + static_cast<std::ptrdiff_t>(entry * packed));
-    std::ranges::copy(root,
-                      pool.sqrt_information.begin() + static_cast<std::ptrdiff_t>(entry * packed));
-  }
+  if (information.empty()) return;
+  const auto begin = static_cast<std::ptrdiff_t>(entry * packed);
+  std::ranges::copy(information, pool.information.begin() + begin);
+  std::ranges::copy(root.packed, pool.sqrt_information.begin() + begin);
+  if (pool.ranks[entry] != root.rank) ++structure_version_;  // the gauge may be another
+  pool.ranks[entry] = static_cast<std::int16_t>(root.rank);
 }
 
 std::string Graph::describe_factor(int position) const {
@@ -434,49 +527,60 @@ std::int64_t Graph::residual_size() const {
   return total;
 }
 
-void Graph::set_loss(std::shared_ptr<const Loss> loss, LossScope scope) {
-  loss_ = std::move(loss);
-  loss_scope_ = scope;
+std::int16_t Graph::loss_index(const FactorType& type, const std::shared_ptr<const Loss>& loss) {
+  if (!loss || !type.takes_loss()) return 0;
+  const auto at = std::ranges::find(losses_, loss);
+  if (at == losses_.end()) {
+    if (losses_.size() > static_cast<std::size_t>(std::numeric_limits<std::int16_t>::max()))
+      throw Error(ErrorCode::usage, "a graph holds at most 32767 different losses");
+    losses_.push_back(loss);
+    return static_cast<std::int16_t>(losses_.size() - 1);
+  }
+  return static_cast<std::int16_t>(at - losses_.begin());
 }
 
-namespace {
-
-/// For each variable its place among the variables of its type, by rising id.
-std::vector<std::int32_t> rank_within_type(const Graph& graph) {
-  std::vector<std::int32_t> rank(graph.variable_count());
-  for (const VariablePool& pool : graph.variable_pools()) {
-    std::vector<std::int32_t> order = pool.variables;
-    const auto by_id = [&](std::int32_t a, std::int32_t b) { return graph.id(a) < graph.id(b); };
-    if (!std::ranges::is_sorted(order, by_id)) std::ranges::sort(order, by_id);
-    for (std::size_t k = 0; k < order.size(); ++k) rank[order[k]] = static_cast<std::int32_t>(k);
-  }
-  return rank;
+std::int16_t Graph::loss_of(int position) const {
+  return factor_pools_[factors_[position].pool].losses[factors_[position].entry];
 }
 
-}  // namespace
-
-std::vector<bool> loop_closures(const Graph& graph) {
-  const std::vector<std::int32_t> rank = rank_within_type(graph);
-  std::vector<bool> result(graph.factor_count());
-  for (int f = 0; f < graph.factor_count(); ++f) {
-    const auto v = graph.factor_variables(f);
-    result[f] = v.size() == 2 && graph.pool(v[0]) == graph.pool(v[1]) &&
-                std::abs(rank[v[0]] - rank[v[1]]) != 1;
-  }
-  return result;
+void Graph::set_loss(int position, std::shared_ptr<const Loss> loss) {
+  const FactorRef at = factors_[position];
+  factor_pools_[at.pool].losses[at.entry] = loss_index(factor_type(position), loss);
 }
 
-std::vector<bool> under_loss(const Graph& graph) {
-  if (!graph.loss()) return std::vector<bool>(static_cast<std::size_t>(graph.factor_count()));
-  std::vector<bool> result =
-      graph.loss_scope() == LossScope::all
-          ? std::vector<bool>(static_cast<std::size_t>(graph.factor_count()), true)
-          : loop_closures(graph);
-  for (const FactorPool& pool : graph.factor_pools()) {
-    if (pool.type->takes_loss()) continue;
-    for (const std::int32_t position : pool.sequence) result[position] = false;
+void Graph::set_loss(const std::shared_ptr<const Loss>& loss, const FactorSelector& which) {
+  const std::vector<bool> selected = select(*this, which);
+  losses_.resize(1);
+  for (int f = 0; f < factor_count(); ++f) set_loss(f, selected[f] ? loss : nullptr);
+}
+
+const Loss* Graph::loss(int position) const { return losses_[loss_of(position)].get(); }
+
+bool Graph::any_loss(int factor_pool, std::size_t begin, std::size_t end) const {
+  if (!has_losses()) return false;
+  const std::vector<std::int16_t>& of = factor_pools_[factor_pool].losses;
+  return std::any_of(of.begin() + static_cast<std::ptrdiff_t>(begin),
+                     of.begin() + static_cast<std::ptrdiff_t>(end),
+                     [](std::int16_t k) { return k != 0; });
+}
+
+void Graph::weigh(int factor_pool, std::size_t begin, std::span<const double> norms,
+                  std::span<double> rho, std::span<double> weights) const {
+  const std::int16_t* of = factor_pools_[factor_pool].losses.data() + begin;
+  // Neighbours mostly have one loss: a call for each run of them.
+  for (std::size_t first = 0, last = 0; first < norms.size(); first = last) {
+    while (last < norms.size() && of[last] == of[first]) ++last;
+    const std::size_t count = last - first;
+    const auto part = [&](std::span<double> all) {
+      return all.empty() ? all : all.subspan(first, count);
+    };
+    if (const Loss* loss = losses_[of[first]].get()) {
+      loss->evaluate(norms.subspan(first, count), part(rho), part(weights));
+    } else {
+      std::ranges::copy(norms.subspan(first, rho.empty() ? 0 : count), part(rho).begin());
+      std::ranges::fill(part(weights), 1.0);
+    }
   }
-  return result;
 }
 
 std::vector<double> squared_norms(const Graph& graph) {
@@ -491,6 +595,26 @@ std::vector<double> squared_norms(const Graph& graph) {
       pool.type->squared_norms(view, begin, end, norms.data() + begin);
     });
     for (std::size_t k = 0; k < pool.size(); ++k) result[pool.sequence[k]] = norms[k];
+  }
+  return result;
+}
+
+double chi2(const Graph& graph) {
+  const std::vector<double> norms = squared_norms(graph);
+  double sum = 0.0;
+  for (int f = 0; f < graph.factor_count(); ++f) {
+    const FactorRef at = graph.ref(f);
+    double rho = 0.0;
+    graph.weigh(at.pool, static_cast<std::size_t>(at.entry), {&norms[f], 1}, {&rho, 1}, {});
+    sum += rho;
+  }
+  return sum;
+}
+
+std::vector<std::vector<int>> factors_by_variable(const Graph& graph) {
+  std::vector<std::vector<int>> result(graph.variable_count());
+  for (int f = 0; f < graph.factor_count(); ++f) {
+    for (const std::int32_t v : graph.factor_variables(f)) result[v].push_back(f);
   }
   return result;
 }

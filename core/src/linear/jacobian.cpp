@@ -100,14 +100,13 @@ struct JacobianEvaluator::Plan {
   /// By factor pool: entry × arity, where that variable's block starts in the values, -1 if held.
   std::vector<std::vector<std::int64_t>> targets;
   /// By factor pool: the factors that the loss leaves alone.
-  std::vector<std::vector<std::uint8_t>> plain;
 
   Plan(const Graph& g, const Linearizer& linearizer)
       : graph(&g), graph_version(g.structure_version()) {
     std::vector<std::int32_t> row_sizes, columns;
     std::vector<std::int64_t> row_begin{0};
     for (int position = 0; position < g.factor_count(); ++position) {
-      row_sizes.push_back(g.factor_pools()[g.factor(position).pool].type->residual_size());
+      row_sizes.push_back(g.factor_type(position).residual_size());
       for (const std::int32_t v : g.factor_variables(position)) {
         if (const int block = linearizer.block_of(v); block >= 0) columns.push_back(block);
       }
@@ -117,7 +116,6 @@ struct JacobianEvaluator::Plan {
     structure = JacobianStructure(std::move(row_sizes), {column_sizes.begin(), column_sizes.end()},
                                   std::move(row_begin), std::move(columns));
     assign_targets(linearizer);
-    find_plain_factors();
   }
 
   void assign_targets(const Linearizer& linearizer) {
@@ -125,20 +123,12 @@ struct JacobianEvaluator::Plan {
       targets.emplace_back(pool.size() * static_cast<std::size_t>(pool.type->arity()), -1);
     std::int64_t entry = 0;
     for (int position = 0; position < graph->factor_count(); ++position) {
-      const FactorRef ref = graph->factor(position);
+      const FactorRef ref = graph->ref(position);
       const std::span<const std::int32_t> variables = graph->factor_variables(position);
       for (std::size_t a = 0; a < variables.size(); ++a) {
         if (linearizer.block_of(variables[a]) < 0) continue;
         targets[ref.pool][ref.entry * variables.size() + a] = structure.value_begin()[entry++];
       }
-    }
-  }
-
-  void find_plain_factors() {
-    const std::vector<bool> closes_loop = loop_closures(*graph);
-    for (const FactorPool& pool : graph->factor_pools()) {
-      std::vector<std::uint8_t>& flags = plain.emplace_back();
-      for (const std::int32_t position : pool.sequence) flags.push_back(!closes_loop[position]);
     }
   }
 
@@ -175,9 +165,9 @@ struct JacobianEvaluator::Plan {
       norms[f - begin] = std::inner_product(r.begin(), r.end(), r.begin(), 0.0);
     }
     const std::size_t count = end - begin;
-    graph->loss()->evaluate({norms, count}, {}, {weights, count});
+    graph->weigh(static_cast<int>(p), begin, {norms, count}, {}, {weights, count});
     for (std::size_t f = begin; f < end; ++f) {
-      if (graph->loss_scope() == LossScope::loop_closures && plain[p][f]) continue;
+      if (weights[f - begin] == 1.0) continue;
       const std::int32_t row = pool.sequence[f];
       const double scale = std::sqrt(weights[f - begin]);
       const auto scale_all = [scale](double* first, const double* last) {
@@ -211,7 +201,7 @@ void JacobianEvaluator::evaluate(const Values& values, JacobianMatrix& J) const 
     for_each_range(plan.graph->factor_pools()[p].size(), kFactorChunk,
                    [&](std::size_t begin, std::size_t end) {
                      for (std::size_t f = begin; f < end; ++f) plan.evaluate(p, f, view, J);
-                     if (plan.graph->loss() && plan.graph->factor_pools()[p].type->takes_loss())
+                     if (plan.graph->any_loss(static_cast<int>(p), begin, end))
                        plan.weigh(p, begin, end, J);
                    });
   }

@@ -63,8 +63,6 @@ struct Linearizer::Plan {
     std::vector<std::int64_t> blocks;
     std::vector<std::uint8_t> transposed;
     std::vector<std::int64_t> gradients;
-    std::vector<std::uint8_t>
-        plain;  // loss scope loop_closures: factors that the loss leaves alone
   };
   struct Chunk {
     std::int32_t pool;
@@ -102,7 +100,6 @@ struct Linearizer::Plan {
     views.resize(g.factor_pools().size());
     states.resize(views.size());
     assign_targets();
-    find_plain_factors();
   }
 
   void number_blocks(const std::vector<bool>& held) {
@@ -225,16 +222,6 @@ struct Linearizer::Plan {
     gradient_sums.sort_in(to_gradients);
   }
 
-  void find_plain_factors() {
-    const std::vector<bool> closes_loop = loop_closures(*graph);
-    for (std::size_t p = 0; p < targets.size(); ++p) {
-      const FactorPool& pool = graph->factor_pools()[p];
-      targets[p].plain.resize(pool.size());
-      for (std::size_t f = 0; f < pool.size(); ++f)
-        targets[p].plain[f] = !closes_loop[pool.sequence[f]];
-    }
-  }
-
   void check_graph() const {
     if (graph->structure_version() != graph_version) {
       throw std::logic_error(
@@ -242,27 +229,16 @@ struct Linearizer::Plan {
     }
   }
 
-  /// The loss that applies to the factors of a chunk, or null.
-  const Loss* loss_of(const Chunk& chunk) const {
-    return graph->factor_pools()[chunk.pool].type->takes_loss() ? graph->loss() : nullptr;
+  bool has_loss(const Chunk& chunk) const {
+    return graph->any_loss(chunk.pool, chunk.begin, chunk.end);
   }
 
-  /// rho and weight of the factors of one chunk from their squared norms; returns Σ rho.
+  /// Σ rho of the factors of one chunk from their squared norms, and their weights.
   double apply_loss(const Chunk& chunk, std::span<const double> norms,
                     std::span<double> weights) const {
-    const Loss* loss = loss_of(chunk);
-    if (!loss) return std::accumulate(norms.begin(), norms.end(), 0.0);
     double rho[kFactorChunk];
     const std::span<double> rhos(rho, norms.size());
-    loss->evaluate(norms, rhos, weights);
-    if (graph->loss_scope() == LossScope::loop_closures) {
-      const std::uint8_t* plain = targets[chunk.pool].plain.data() + chunk.begin;
-      for (std::size_t k = 0; k < norms.size(); ++k) {
-        if (!plain[k]) continue;
-        rhos[k] = norms[k];
-        if (!weights.empty()) weights[k] = 1.0;
-      }
-    }
+    graph->weigh(chunk.pool, chunk.begin, norms, rhos, weights);
     return std::accumulate(rhos.begin(), rhos.end(), 0.0);
   }
 
@@ -286,7 +262,7 @@ const BlockStructure& Linearizer::structure() const { return plan_->structure; }
 int Linearizer::block_of(int variable) const { return plan_->block_of[variable]; }
 int Linearizer::variable_of(int block) const { return plan_->variable_of[block]; }
 
-double Linearizer::chi2(const Values& values) const {
+double Linearizer::chi2(const Values& values) {
   Plan& plan = *plan_;
   plan.check_graph();
   plan.look_at(values);
@@ -324,13 +300,13 @@ double Linearizer::linearize(const Values& values, BlockMatrix& H, std::span<dou
     std::fill(scratch + chunk.scratch_begin, scratch + chunk.scratch_end, 0.0);
     double norms[kFactorChunk], weights[kFactorChunk];
     const std::size_t count = chunk.end - chunk.begin;
-    if (plan.loss_of(chunk)) {
+    if (plan.has_loss(chunk)) {
       type.squared_norms(view, chunk.begin, chunk.end, norms);
       plan.partial[c] = plan.apply_loss(chunk, {norms, count}, {weights, count});
       type.linearize(view, chunk.begin, chunk.end, weights, sink, nullptr);
     } else {
       type.linearize(view, chunk.begin, chunk.end, nullptr, sink, norms);
-      plan.partial[c] = plan.apply_loss(chunk, {norms, count}, {});
+      plan.partial[c] = std::accumulate(norms, norms + count, 0.0);
     }
   });
   const auto add_up = [&](const Gathers& gathers, std::size_t grain, double* target) {

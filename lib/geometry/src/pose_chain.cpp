@@ -53,7 +53,7 @@ std::vector<RecordedPose> pose_chain(const Graph& graph) {
     chain[k].variable = poses[k];
   }
   for (int f = 0; f < graph.factor_count(); ++f) {
-    if (!graph.factor_pools()[graph.factor(f).pool].type->is_relative()) {
+    if (!graph.factor_type(f).is_relative()) {
       throw bad_input(
           fmt::format("{} is not the motion from one pose to another, and this takes pose graphs "
                       "only: leave it out, and mark poses that are known as FIX",
@@ -75,18 +75,12 @@ std::vector<RecordedPose> pose_chain(const Graph& graph) {
 
 Variable new_variable(const Graph& graph, int variable) {
   const std::span<const double> x = graph.state(variable);
-  return {graph.variable_pools()[graph.pool(variable)].type,
-          graph.id(variable),
-          {x.begin(), x.end()},
-          graph.fixed(variable)};
+  return {graph.type_of(variable), graph.id(variable), {x.begin(), x.end()}, graph.fixed(variable)};
 }
 
 Factor new_factor(const Graph& graph, int factor) {
   const std::span<const double> z = graph.measurement(factor), omega = graph.information(factor);
-  Factor copy{graph.factor_pools()[graph.factor(factor).pool].type,
-              {},
-              {z.begin(), z.end()},
-              {omega.begin(), omega.end()}};
+  Factor copy{graph.type_of_factor(factor), {}, {z.begin(), z.end()}, {omega.begin(), omega.end()}};
   for (const std::int32_t v : graph.factor_variables(factor)) copy.variables.push_back(graph.id(v));
   return copy;
 }

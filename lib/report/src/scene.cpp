@@ -117,7 +117,7 @@ void add_edges(const Graph& graph, Scene& scene) {
       scene.a.push_back(variables[0]);
       scene.b.push_back(variables.size() == 1 ? -1 : variables[k]);
       scene.edge_class.push_back(class_of(graph, f, closes[f]));
-      scene.edge_type.push_back(static_cast<std::uint8_t>(graph.factor(f).pool));
+      scene.edge_type.push_back(static_cast<std::uint8_t>(graph.ref(f).pool));
       scene.factor.push_back(f);
     }
   }

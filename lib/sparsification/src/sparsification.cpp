@@ -130,8 +130,7 @@ void Redirection::leave(const Graph& graph, std::span<const int> nodes, std::spa
     move(id, place.type, state(id, graph.state(graph.find(place.anchor).value())));
   }
   for (const int v : nodes) {
-    if (graph.type(v).lie_group())
-      move(graph.id(v), graph.variable_pools()[graph.pool(v)].type, graph.state(v));
+    if (graph.type(v).lie_group()) move(graph.id(v), graph.type_of(v), graph.state(v));
   }
 }
 

@@ -56,7 +56,6 @@ class Eliminator {
         factors_(factors),
         leaves_(static_cast<std::size_t>(graph.variable_count()), false) {
     for (const int v : variables) leaves_[v] = true;
-    if (graph.loss() && !factors.empty()) under_loss_ = under_loss(graph);
   }
 
   Elimination run() const {
@@ -122,7 +121,7 @@ class Eliminator {
     for (std::size_t k = columns.leaving; k < columns.variables.size(); ++k) {
       const int v = columns.variables[k];
       const std::span<const double> x = graph_.state(v);
-      variables.push_back({graph_.variable_pools()[graph_.pool(v)].type, {x.begin(), x.end()}});
+      variables.push_back({graph_.type_of(v), {x.begin(), x.end()}});
       factor.variables.push_back(graph_.id(v));
     }
     const auto type = std::make_shared<MarginalPrior>(std::move(variables), std::move(residual),
@@ -164,7 +163,7 @@ class Eliminator {
   }
 
   void add(int f, const Columns& columns, Quadratic& total) const {
-    const FactorRef ref = graph_.factor(f);
+    const FactorRef ref = graph_.ref(f);
     const FactorPool& pool = graph_.factor_pools()[ref.pool];
     const FactorType& type = *pool.type;
     const int rows = type.residual_size();
@@ -197,9 +196,9 @@ class Eliminator {
   }
 
   double weight_of(int factor, double squared_norm) const {
-    if (under_loss_.empty() || !under_loss_[factor]) return 1.0;
     double weight = 1.0;
-    graph_.loss()->evaluate({&squared_norm, 1}, {}, {&weight, 1});
+    const FactorRef at = graph_.ref(factor);
+    graph_.weigh(at.pool, static_cast<std::size_t>(at.entry), {&squared_norm, 1}, {}, {&weight, 1});
     return weight;
   }
 
@@ -236,7 +235,7 @@ class Eliminator {
       for (const std::int32_t v : graph_.factor_variables(f)) {
         if (is_given(v)) return kAll;
       }
-      total += graph_.factor_pools()[graph_.factor(f).pool].type->absolute_size();
+      total += graph_.absolute_size(f);
     }
     return static_cast<int>(std::min<std::int64_t>(total, kAll));
   }
@@ -245,7 +244,6 @@ class Eliminator {
   const std::vector<bool>& held_;
   std::span<const int> factors_;
   std::vector<bool> leaves_;
-  std::vector<bool> under_loss_;
 };
 
 }  // namespace

@@ -206,16 +206,14 @@ class Checker {
           "removed",
           describe(factor), id));
     }
-    return sketch_.add_variable(graph_.variable_pools()[graph_.pool(*v)].type, id,
-                                graph_.state(*v));
+    return sketch_.add_variable(graph_.type_of(*v), id, graph_.state(*v));
   }
 
   void check_factors() {
     for (const Factor& factor : update_.factors) {
       if (!factor.type) throw bad_input("a new factor has no type");
-      std::vector<int> variables;
-      for (const Id id : factor.variables) variables.push_back(in_sketch(id, factor));
-      sketch_.add_factor(factor.type, variables, factor.measurement, factor.information);
+      for (const Id id : factor.variables) in_sketch(id, factor);
+      sketch_.add(factor);
     }
   }
 
@@ -228,14 +226,7 @@ class Checker {
       throw bad_input(fmt::format("there is no factor {} to be {}; ids so far go up to {}", id,
                                   wanted, behind - 1));
     }
-    const FactorPool& pool = graph_.factor_pools()[graph_.factor(*position).pool];
-    Factor factor{pool.type, {}, {}, {}};
-    for (const std::int32_t v : graph_.factor_variables(*position))
-      factor.variables.push_back(graph_.id(v));
-    const auto z = graph_.measurement(*position), information = graph_.information(*position);
-    factor.measurement.assign(z.begin(), z.end());
-    factor.information.assign(information.begin(), information.end());
-    return factor;
+    return graph_.factor(*position);
   }
 
   void check_changed() {
@@ -249,9 +240,8 @@ class Checker {
       }
       factor.measurement = changed.measurement;
       if (!changed.information.empty()) factor.information = changed.information;
-      std::vector<int> variables;
-      for (const Id id : factor.variables) variables.push_back(in_sketch(id, factor));
-      sketch_.add_factor(factor.type, variables, factor.measurement, factor.information);
+      for (const Id id : factor.variables) in_sketch(id, factor);
+      sketch_.add(factor);
     }
   }
 
@@ -304,64 +294,94 @@ void check_update(const Graph& graph, const FactorIds& factors, GraphUpdate& upd
 
 // Carrying out ------------------------------------------------------------------------------------
 
+UpdateTarget::~UpdateTarget() = default;
+
+AppliedUpdate carry_out(const GraphUpdate& update, LossRule& losses, UpdateTarget& target) {
+  AppliedUpdate applied{target.next_factor(), {}};
+  Graph& graph = target.graph();
+  for (const Variable& variable : update.variables) {
+    losses.added_variable(graph, graph.add(variable));
+    target.added_variable();
+  }
+  const auto add = [&](const Factor& factor) {
+    losses.added_factor(graph, graph.add(factor));
+    target.added_factor();
+  };
+  for (const Factor& factor : update.factors) add(factor);
+  for (const ChangedFactor& change : update.changed) {
+    const int f = target.position(change.factor).value();
+    graph.set_measurement(f, change.measurement, change.information);
+    target.changed_factor(f);
+  }
+  const auto variables_of = [&](const std::vector<Id>& ids) {
+    std::vector<int> variables;
+    for (const Id id : ids) {
+      if (const std::optional<int> v = graph.find(id)) variables.push_back(*v);
+    }
+    return variables;
+  };
+  if (!update.marginalized.empty()) {
+    const std::vector<int> variables = variables_of(update.marginalized);
+    const Elimination elimination = target.eliminate(variables);
+    for (const Factor& prior : elimination.priors) {
+      applied.priors.push_back(target.next_factor());
+      add(prior);
+    }
+    for (const int v : variables) losses.removed_variable(graph, v);
+    target.remove(elimination.replaced, variables);
+  }
+  if (update.removed_factors.empty() && update.removed_variables.empty()) return applied;
+  std::vector<int> factors;
+  for (const FactorId id : update.removed_factors) factors.push_back(target.position(id).value());
+  const std::vector<int> variables = variables_of(update.removed_variables);
+  for (const int v : variables) losses.removed_variable(graph, v);
+  target.remove(factors, variables);
+  return applied;
+}
+
 namespace {
 
-/// Marks for `Graph::remove`.
-struct Leaving {
-  std::vector<bool> factors, variables;
-  explicit Leaving(const Graph& graph)
-      : factors(static_cast<std::size_t>(graph.factor_count()), false),
-        variables(static_cast<std::size_t>(graph.variable_count()), false) {}
+class PlainTarget final : public UpdateTarget {
+ public:
+  PlainTarget(Graph& graph, FactorIds& ids) : graph_(graph), ids_(ids) {}
+
+  Graph& graph() override { return graph_; }
+  FactorId next_factor() const override { return ids_.next(); }
+  std::optional<int> position(FactorId id) const override { return ids_.position(id); }
+  void added_variable() override {}
+  void added_factor() override { ids_.add(); }
+  void changed_factor(int) override {}
+  Elimination eliminate(std::span<const int> variables) override {
+    return cairn::eliminate(graph_, variables, resolve_gauge(graph_).held);
+  }
+  void remove(std::span<const int> factors, std::span<const int> variables) override {
+    std::vector<bool> factor_leaves(static_cast<std::size_t>(graph_.factor_count()), false);
+    std::vector<bool> variable_leaves(static_cast<std::size_t>(graph_.variable_count()), false);
+    for (const int f : factors) factor_leaves[f] = true;
+    for (const int v : variables) variable_leaves[v] = true;
+    for (int f = 0; !variables.empty() && f < graph_.factor_count(); ++f) {
+      for (const std::int32_t v : graph_.factor_variables(f))
+        factor_leaves[f] = factor_leaves[f] || variable_leaves[v];
+    }
+    ids_.remove(graph_.remove(factor_leaves, variable_leaves));
+  }
+
+ private:
+  Graph& graph_;
+  FactorIds& ids_;
 };
-
-void add_factor(const Factor& factor, Graph& graph, FactorIds& ids) {
-  std::vector<int> variables;
-  for (const Id id : factor.variables) variables.push_back(*graph.find(id));
-  graph.add_factor(factor.type, variables, factor.measurement, factor.information);
-  ids.add();
-}
-
-void marginalize(const GraphUpdate& update, Graph& graph, FactorIds& ids, AppliedUpdate& applied) {
-  std::vector<int> variables;
-  for (const Id id : update.marginalized) variables.push_back(*graph.find(id));
-  const Elimination elimination = eliminate(graph, variables, resolve_gauge(graph).held);
-  Leaving leaving(graph);
-  for (const int f : elimination.replaced) leaving.factors[f] = true;
-  for (const int v : variables) leaving.variables[v] = true;
-  ids.remove(graph.remove(leaving.factors, leaving.variables));
-  for (const Factor& prior : elimination.priors) {
-    applied.priors.push_back(ids.next());
-    add_factor(prior, graph, ids);
-  }
-}
-
-void remove(const GraphUpdate& update, Graph& graph, FactorIds& ids) {
-  Leaving leaving(graph);
-  for (const FactorId id : update.removed_factors) leaving.factors[*ids.position(id)] = true;
-  for (const Id id : update.removed_variables) leaving.variables[*graph.find(id)] = true;
-  for (int f = 0; !update.removed_variables.empty() && f < graph.factor_count(); ++f) {
-    for (const std::int32_t v : graph.factor_variables(f))
-      leaving.factors[f] = leaving.factors[f] || leaving.variables[v];
-  }
-  ids.remove(graph.remove(leaving.factors, leaving.variables));
-}
 
 }  // namespace
 
+AppliedUpdate apply_update(const GraphUpdate& update, Graph& graph, FactorIds& factors,
+                           LossRule& losses) {
+  PlainTarget target(graph, factors);
+  return carry_out(update, losses, target);
+}
+
 AppliedUpdate apply_update(const GraphUpdate& update, Graph& graph, FactorIds& factors) {
-  AppliedUpdate applied{factors.next(), {}};
-  for (const Variable& variable : update.variables) {
-    const int v = graph.add_variable(variable.type, variable.id, variable.state);
-    if (variable.fixed) graph.set_fixed(v);
-  }
-  for (const Factor& factor : update.factors) add_factor(factor, graph, factors);
-  for (const ChangedFactor& changed : update.changed)
-    graph.set_measurement(*factors.position(changed.factor), changed.measurement,
-                          changed.information);
-  if (!update.marginalized.empty()) marginalize(update, graph, factors, applied);
-  if (!update.removed_factors.empty() || !update.removed_variables.empty())
-    remove(update, graph, factors);
-  return applied;
+  LossRule none;
+  return apply_update(update, graph, factors, none);
 }
 
 }  // namespace cairn

@@ -66,12 +66,14 @@ UpdateReport BatchEstimator::update(const GraphUpdate& update, const UpdateOptio
 /// All or nothing: only marginalisation can still fail, and that on numbers.
 AppliedUpdate BatchEstimator::apply(GraphUpdate& update) {
   if (!update.variables.empty()) last_ = update.variables.back().id;
-  if (update.marginalized.empty()) return apply_update(update, graph_, ids_);
+  if (update.marginalized.empty()) return apply_update(update, graph_, ids_, losses_);
   Graph graph = graph_.clone();
   FactorIds ids = ids_;
-  AppliedUpdate applied = apply_update(update, graph, ids);
+  LossRule losses = losses_;
+  AppliedUpdate applied = apply_update(update, graph, ids, losses);
   graph_ = std::move(graph);
   ids_ = std::move(ids);
+  losses_ = std::move(losses);
   return applied;
 }
 
@@ -258,25 +260,28 @@ bool BatchEstimator::covariance_column(Id id, std::span<const Id> variables,
   return true;
 }
 
-void BatchEstimator::set_loss(std::shared_ptr<const Loss> loss, LossScope scope) {
-  loss_ = std::move(loss);
-  graph_.set_loss(loss_, scope);
+void BatchEstimator::set_loss(std::shared_ptr<const Loss> loss, const FactorSelector& which) {
+  graph_.set_loss(loss, which);
+  losses_ = LossRule(std::move(loss), which, graph_);
   forget_covariances();
   must_batch_ = true;
 }
 
-std::span<const double> BatchEstimator::state(Id id) const { return graph_.state(index(id)); }
+std::vector<Id> BatchEstimator::variables() const {
+  std::vector<Id> ids;
+  for (int v = 0; v < graph_.variable_count(); ++v) ids.push_back(graph_.id(v));
+  return ids;
+}
 
-double BatchEstimator::chi2() const {
-  const std::vector<double> norms = squared_norms(graph_);
-  const std::vector<bool> robust = under_loss(graph_);
-  double sum = 0.0;
-  for (std::size_t f = 0; f < norms.size(); ++f) {
-    double rho = norms[f];
-    if (robust[f]) graph_.loss()->evaluate({&norms[f], 1}, {&rho, 1}, {});
-    sum += rho;
-  }
-  return sum;
+std::vector<FactorId> BatchEstimator::factors() const {
+  std::vector<FactorId> ids;
+  for (int f = 0; f < graph_.factor_count(); ++f) ids.push_back(ids_.id(f));
+  return ids;
+}
+
+Factor BatchEstimator::factor(FactorId id) const {
+  if (const auto f = ids_.position(id)) return graph_.factor(*f);
+  throw Error(ErrorCode::usage, fmt::format("there is no factor {}", id));
 }
 
 void BatchEstimator::forget_covariances() {
@@ -287,9 +292,8 @@ void BatchEstimator::forget_covariances() {
 
 /// The loss is an option too.
 void BatchEstimator::reset() {
-  Graph empty;
-  if (graph_.loss()) empty.set_loss(loss_, graph_.loss_scope());
-  graph_ = std::move(empty);
+  graph_ = {};
+  losses_.clear();
   ids_ = {};
   linearized_at_ = {};
   since_batch_ = unsolved_factors_ = 0;
@@ -302,7 +306,7 @@ void BatchEstimator::reset() {
 std::unique_ptr<Estimator> BatchEstimator::clone() const {
   auto copy = std::make_unique<BatchEstimator>(options_, tools_);
   copy->graph_ = graph_.clone();
-  copy->loss_ = loss_;
+  copy->losses_ = losses_;
   copy->ids_ = ids_;
   copy->linearized_at_ = linearized_at_;
   copy->since_batch_ = since_batch_;

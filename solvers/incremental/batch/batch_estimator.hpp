@@ -45,13 +45,20 @@ class BatchEstimator final : public Estimator {
   BatchEstimator(BatchEstimatorOptions options, std::shared_ptr<BatchTools> tools);
 
   UpdateReport update(const GraphUpdate& update, const UpdateOptions& options) override;
-  void set_loss(std::shared_ptr<const Loss> loss, LossScope scope) override;
-  std::span<const double> state(Id id) const override;
+  void set_loss(std::shared_ptr<const Loss> loss, const FactorSelector& which) override;
   bool has(Id id) const override { return graph_.find(id).has_value(); }
   int variable_count() const override { return graph_.variable_count(); }
   int factor_count() const override { return graph_.factor_count(); }
-  double chi2() const override;
-  Graph graph() const override { return graph_.clone(); }
+  std::vector<Id> variables() const override;
+  std::shared_ptr<const VariableType> type(Id id) const override {
+    return graph_.type_of(index(id));
+  }
+  std::vector<FactorId> factors() const override;
+  bool has_factor(FactorId id) const override { return ids_.position(id).has_value(); }
+  Factor factor(FactorId id) const override;
+  std::span<const double> state(Id id) override { return graph_.state(index(id)); }
+  double chi2() override { return cairn::chi2(graph_); }
+  Graph graph() override { return graph_.clone(); }
   /// These throw `Error` (usage) if the linear solver has no marginals.
   void keep_marginals(KeptMarginals kept) override;
   void keep_cross(Id a, Id b) override;
@@ -79,7 +86,7 @@ class BatchEstimator final : public Estimator {
   BatchEstimatorOptions options_;
   std::shared_ptr<BatchTools> tools_;
   Graph graph_;
-  std::shared_ptr<const Loss> loss_;  ///< that of the graph, which must not outlive it
+  LossRule losses_;  ///< of factors to come
   FactorIds ids_;
   Values linearized_at_;      ///< the states of `graph_` are a step from here
   int since_batch_ = 0;       ///< updates

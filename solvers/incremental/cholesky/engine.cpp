@@ -60,61 +60,22 @@ constexpr int kFew = 200;
 /// If more than this part of the factors were to be renewed, all are.
 constexpr double kMost = 0.2;
 
-const block::Kernels* kernels_named(const std::string& name) {
+const block::Kernels& kernels_named(const std::string& name) {
   const block::Kernels* kernels = block::choose_kernels(name.c_str());
-  if (kernels) return kernels;
+  if (kernels) return *kernels;
   throw Error(ErrorCode::usage, "this machine cannot run the kernels '" + name + "'; use auto");
 }
 
 }  // namespace
 
 Engine::Engine(const Settings& settings, std::shared_ptr<Rescuer> rescuer)
-    : settings_(settings),
-      rescuer_(std::move(rescuer)),
-      kernels_(kernels_named(settings.kernels)),
+    : EngineState(settings, std::move(rescuer), kernels_named(settings.kernels)),
       tree_(system_, states_, bound_, *kernels_) {}
 
 Engine::Engine(const Engine& other)
-    : settings_(other.settings_),
-      rescuer_(other.rescuer_),
-      kernels_(other.kernels_),
+    : EngineState(other),
       graph_(other.graph_.clone()),
-      system_(other.system_),
-      states_(other.states_),
-      models_(other.models_),
-      tree_(other.tree_, system_, states_, bound_),
-      gauge_(other.gauge_),
-      covariances_(other.covariances_),
-      held_(other.held_),
-      live_variable_(other.live_variable_),
-      live_factor_(other.live_factor_),
-      factors_of_(other.factors_of_),
-      bound_(other.bound_),
-      moved_at_(other.moved_at_),
-      touched_at_(other.touched_at_),
-      touched_(other.touched_),
-      sources_(other.sources_),
-      steps_(other.steps_),
-      moving_(other.moving_),
-      retiring_(other.retiring_),
-      checked_at_(other.checked_at_),
-      check_(other.check_),
-      time_(other.time_),
-      structure_changed_(other.structure_changed_),
-      broken_(other.broken_),
-      gauge_is_old_(other.gauge_is_old_),
-      dead_(other.dead_),
-      live_factors_(other.live_factors_),
-      cost_(other.cost_),
-      gained_(other.gained_),
-      must_look_(other.must_look_),
-      others_(other.others_),
-      left_share_(other.left_share_),
-      decrease_(other.decrease_),
-      ids_(other.ids_),
-      place_of_id_(other.place_of_id_),
-      under_loss_(other.under_loss_),
-      is_source_(other.is_source_) {}
+      tree_(other.tree_, system_, states_, bound_) {}
 
 void Engine::solve(double max_seconds, UpdateReport& report) {
   const Clock::time_point begin = Clock::now();
@@ -371,14 +332,18 @@ void Engine::compact() {
 }
 
 /// Without what has been removed.
-Graph Engine::clean_graph() {
+Graph Engine::clean_graph() const {
   Graph graph = graph_.clone();
-  if (dead_ == 0) return graph;
+  remove_dead(graph);
+  return graph;
+}
+
+void Engine::remove_dead(Graph& graph) const {
+  if (dead_ == 0) return;
   std::vector<bool> factors(live_factor_.size()), variables(live_variable_.size());
   for (std::size_t f = 0; f < factors.size(); ++f) factors[f] = !live_factor_[f];
   for (std::size_t v = 0; v < variables.size(); ++v) variables[v] = !live_variable_[v];
   graph.remove(factors, variables);
-  return graph;
 }
 
 void Engine::solve_fully(UpdateReport& report) {
@@ -409,29 +374,42 @@ void Engine::solve_fully(UpdateReport& report) {
   }
 }
 
-double Engine::chi2() {
-  tree_.settle_all();
+std::vector<double> Engine::x(int v) const {
+  std::vector<double> x(static_cast<std::size_t>(states_.ambient(v)));
+  if (!tree_.read(v, x.data())) std::copy_n(states_.x(v), x.size(), x.begin());
+  return x;
+}
+
+double Engine::chi2() const {
+  const States states = current();
   double sum = 0.0;
   for (int f = 0; f < models_.size(); ++f) {
-    if (live_factor_[f]) sum += models_.cost_now(f, graph_, states_);
+    if (live_factor_[f]) sum += models_.cost_now(f, graph_, states);
   }
   return sum;
 }
 
-void Engine::write_back() {
-  tree_.settle_all();
+/// The states as the graph's pools hold them.
+Values Engine::values_of(const States& states) const {
   Values values = graph_.values();
-  for (int v = 0; v < states_.size(); ++v) {
-    const std::int32_t ambient = states_.ambient(v);
-    std::copy_n(states_.x(v), ambient,
+  for (int v = 0; v < states.size(); ++v) {
+    const std::int32_t ambient = states.ambient(v);
+    std::copy_n(states.x(v), ambient,
                 values.pools[graph_.pool(v)].begin() + std::ptrdiff_t{graph_.slot(v)} * ambient);
   }
-  graph_.set_values(std::move(values));
+  return values;
 }
 
-Graph Engine::snapshot() {
-  write_back();
-  return clean_graph();
+void Engine::write_back() {
+  tree_.settle_all();
+  graph_.set_values(values_of(states_));
+}
+
+Graph Engine::snapshot() const {
+  Graph graph = graph_.clone();
+  graph.set_values(values_of(current()));
+  remove_dead(graph);
+  return graph;
 }
 
 }  // namespace cairn::incremental

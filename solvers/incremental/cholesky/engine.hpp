@@ -44,12 +44,59 @@ struct Rescuer {
   std::mutex mutex;
 };
 
+/// What an engine knows from one update to the next, but for the graph and the tree.
+struct EngineState {
+  EngineState(const Settings& settings, std::shared_ptr<Rescuer> rescuer,
+              const block::Kernels& kernels)
+      : settings_(settings), rescuer_(std::move(rescuer)), kernels_(&kernels) {}
+
+  Settings settings_;
+  std::shared_ptr<Rescuer> rescuer_;
+  const block::Kernels* kernels_;
+  System system_;
+  States states_;
+  Models models_;
+  GaugeWatch gauge_;
+  Covariances covariances_;
+  std::vector<std::uint8_t> held_;
+  std::vector<std::uint8_t> live_variable_, live_factor_;
+  std::vector<std::vector<std::int32_t>> factors_of_;
+  std::vector<std::int32_t> bound_;       // by variable: see Tree
+  std::vector<std::int64_t> moved_at_;    // by variable: the last apply_steps that moved it
+  std::vector<std::int64_t> touched_at_;  // by variable: update
+  std::vector<std::int32_t>
+      touched_;  // variables whose part of H has changed since the last solution
+  std::vector<std::int32_t> sources_;  // … or of the right-hand side alone
+  std::vector<double> steps_;          // by scalars; zero between calls
+  std::vector<std::int32_t> moving_;   // factors that have moved since they were last evaluated
+  std::vector<std::int32_t> retiring_;
+  std::vector<std::int64_t> checked_at_;  // by factor: to visit each once
+  std::int64_t check_ = 0;
+  std::int64_t time_ = 0;
+  bool structure_changed_ = false;
+  bool broken_ = false;
+  bool gauge_is_old_ = false;
+  int dead_ = 0;
+  int live_factors_ = 0;
+  double cost_ = 0.0;                      // sum over factors
+  double gained_ = 0.0;                    // of the cost, by steps since factors were evaluated
+  bool must_look_ = false;                 // something has been taken out or changed: what was
+                                           // gained says little
+  int others_ = 0;                         // factors of several variables that notice if these are
+                                           // moved as a whole
+  double left_share_ = 1.0;                // how much of the shortfall was left to gain
+  double decrease_ = 0.0;                  // of the last solution: gᵀH⁻¹g
+  std::vector<FactorId> ids_;              // by factor
+  std::vector<std::int32_t> place_of_id_;  // by FactorId: factor, -1 if it has been removed
+  std::vector<std::uint8_t> is_source_;    // by variable
+};
+
 /// Solves the nonlinear least-squares problem of a graph that changes: keeps its linear models,
 /// their normal equations and the Cholesky factor, and brings all three up to date with what has
 /// changed.
 ///
 /// Variables and factors are numbered as in `graph()`. Nothing is solved before `solve` is called.
-class Engine {
+class Engine : private EngineState {
  public:
   Engine(const Settings& settings, std::shared_ptr<Rescuer> rescuer);
   Engine(const Engine& other);
@@ -58,11 +105,10 @@ class Engine {
   /// The graph: structure and measurements are current, its states are those at which it was loaded
   /// (see `write_back`).
   const Graph& graph() const { return graph_; }
-  /// x_v at the current estimate.
-  const double* x(int v) {
-    tree_.settle(v);
-    return states_.x(v);
-  }
+  /// x_v at the current estimate, ambient_size doubles. Changes nothing.
+  std::vector<double> x(int v) const;
+  /// All states at the current estimate. Changes nothing.
+  States current() const { return tree_.settled(); }
   /// The factor's number in the graph, or -1.
   std::int32_t place_of(FactorId id) const {
     return id >= 0 && id < std::ssize(place_of_id_) ? place_of_id_[static_cast<std::size_t>(id)]
@@ -87,8 +133,10 @@ class Engine {
   bool held(int v) const { return held_[v]; }
   /// Variables that have been anchored to fix the gauge since this was last asked.
   std::vector<std::int32_t> take_anchored() { return std::exchange(anchored_, {}); }
-  /// Applies a loss to all factors.
-  void set_loss(std::shared_ptr<const Loss> loss, LossScope scope);
+  /// Gives the selected factors a loss, and all others none.
+  void set_loss(const std::shared_ptr<const Loss>& loss, const FactorSelector& which);
+  /// Ids of the factors that are there, rising.
+  std::vector<FactorId> live_ids() const;
   /// Removed factors and variables that are still in the graph.
   int dead() const { return dead_; }
 
@@ -98,12 +146,9 @@ class Engine {
   /// Relinearises everything at the current estimate, with a new order, until it has converged.
   void solve_fully(UpdateReport& report);
   /// Σ ρ(‖r‖²) at the current estimate.
-  double chi2();
-  /// All states at once; then `settled_x` gives them until something is solved.
-  void settle_all() { tree_.settle_all(); }
-  const double* settled_x(int v) const { return states_.x(v); }
+  double chi2() const;
   /// A graph of its own of what is live, at the current estimate.
-  Graph snapshot();
+  Graph snapshot() const;
   /// The graph's states become the current estimate.
   void write_back();
 
@@ -128,7 +173,6 @@ class Engine {
   void settle_gauge();
   void watch_gauge_anew();
   void hold(std::int32_t v, bool held);
-  bool loss_applies(int f) const;
   bool is_other(int f) const;
   void put_in(int f);
   void take_out(int f);
@@ -154,59 +198,24 @@ class Engine {
   bool improve(bool enough_time, UpdateReport& report);
   void step_back();
   void rescue(UpdateReport& report, double tolerance);
-  void as_seen_from(int a, int b, double* block, std::int64_t stride);
+  void as_seen_from(int a, int b, double* block, std::int64_t stride) const;
   void add_source(std::int32_t v);
-  Graph clean_graph();
-  std::vector<FactorId> live_ids() const;
+  Graph clean_graph() const;
+  void remove_dead(Graph& graph) const;
+  Values values_of(const States& states) const;
 
-  Settings settings_;
-  std::shared_ptr<Rescuer> rescuer_;
-  const block::Kernels* kernels_;
-  Graph graph_;
-  System system_;
-  States states_;
-  Models models_;
-  Tree tree_;
-  GaugeWatch gauge_;
-  Covariances covariances_;
-  std::vector<std::uint8_t> held_;
-  std::vector<std::uint8_t> live_variable_, live_factor_;
-  std::vector<std::vector<std::int32_t>> factors_of_;
-  std::vector<std::int32_t> bound_;     // by variable: see Tree
-  std::vector<std::int64_t> moved_at_;  // by variable: the last apply_steps that moved it
+  // The passes at hand: of no meaning between calls.
   std::vector<const double*> factor_steps_;
-  std::vector<std::int64_t> touched_at_;  // by variable: update
-  std::vector<std::int32_t>
-      touched_;  // variables whose part of H has changed since the last solution
-  std::vector<std::int32_t> sources_;  // … or of the right-hand side alone
-  std::vector<double> steps_;          // by scalars; zero between calls
-  std::vector<std::int32_t> moving_;   // factors that have moved since they were last evaluated
   std::vector<std::int32_t> looked_;   // factors of the last evaluation
-  std::vector<std::int32_t> retiring_;
-  std::vector<std::int32_t> changed_;     // by the last substitution
-  std::vector<std::int64_t> checked_at_;  // by factor: to visit each once
-  std::int64_t check_ = 0;
-  std::int64_t time_ = 0;
-  bool structure_changed_ = false;
-  bool broken_ = false;
-  bool gauge_is_old_ = false;
-  int dead_ = 0;
-  int live_factors_ = 0;
-  double cost_ = 0.0;       // sum over factors
-  double gained_ = 0.0;     // of the cost, by steps since factors were evaluated
-  double looked_at_ = 0.0;  // that of the steps before the last evaluation
-  bool must_look_ = false;  // something has been taken out or changed: what was gained says little
-  int others_ = 0;         // factors of several variables that notice if these are moved as a whole
-  double mismatch_ = 0.0;  // of these, at the last evaluation
-  double shortfall_ = 0.0;                 // by how much more than expected the cost was then
-  double left_share_ = 1.0;                // how much of it was left to gain
-  double decrease_ = 0.0;                  // of the last solution: gᵀH⁻¹g
-  std::vector<FactorId> ids_;              // by factor
-  std::vector<std::int32_t> place_of_id_;  // by FactorId: factor, -1 if it has been removed
-  std::vector<bool> under_loss_;           // by factor, of those that were loaded together
-  std::vector<std::uint8_t> is_source_;    // by variable
-  double limit_ = 0.0;                     // seconds that the update at hand may take; 0: any
+  std::vector<std::int32_t> changed_;  // by the last substitution
+  double looked_at_ = 0.0;             // what steps had gained before the last evaluation
+  double mismatch_ = 0.0;   // of factors on several variables that are not relative, then
+  double shortfall_ = 0.0;  // by how much more than expected the cost was then
+  double limit_ = 0.0;      // seconds that the update at hand may take; 0: any
   std::vector<std::int32_t> anchored_;
+
+  Graph graph_;
+  Tree tree_;  // refers to the state
 };
 
 }  // namespace cairn::incremental

@@ -43,7 +43,6 @@ void Engine::load(Graph graph, std::vector<FactorId> ids) {
   others_ = 0;
   left_share_ = 1.0;
   touched_at_.clear();
-  under_loss_ = under_loss(graph_);
   const int variables = graph_.variable_count(), factors = graph_.factor_count();
   while (states_.size() < variables) added_variable();
   while (models_.size() < factors) added_factor();
@@ -54,7 +53,7 @@ void Engine::added_variable() {
   const int v = states_.size();
   const VariableType& type = graph_.type(v);
   system_.add_variable(type.tangent_size());
-  states_.add(graph_.variable_pools()[graph_.pool(v)].type, graph_.state(v));
+  states_.add(graph_.type_of(v), graph_.state(v));
   steps_.resize(static_cast<std::size_t>(system_.scalars()), 0.0);
   gauge_.add_variable(type.tangent_size(), type.lie_group() != nullptr, graph_.fixed(v));
   held_.push_back(1);  // until it has a factor
@@ -73,12 +72,11 @@ void Engine::added_factor() {
     ids_.push_back(next_id());
     place_of_id_.push_back(f);
   }
-  const FactorType& type = *graph_.factor_pools()[graph_.factor(f).pool].type;
-  models_.add(graph_, f, loss_applies(f));
+  models_.add(graph_, f);
   live_factor_.push_back(1);
   checked_at_.push_back(-1);
   const auto variables = graph_.factor_variables(f);
-  gauge_.add_factor(variables.data(), static_cast<int>(variables.size()), type.absolute_size());
+  gauge_.add_factor(variables.data(), static_cast<int>(variables.size()), graph_.absolute_size(f));
   settle_gauge();
   for (const std::int32_t v : variables) follow(v);
   for (const std::int32_t v : variables) factors_of_[v].push_back(f);
@@ -90,6 +88,7 @@ void Engine::added_factor() {
 
 void Engine::changed_factor(int f) {
   must_look_ = true;
+  if (graph_.factor_type(f).absolute_size() > 0) gauge_is_old_ = true;  // its rank may be another
   relinearize(f);
 }
 
@@ -135,7 +134,7 @@ void Engine::watch_gauge_anew() {
     if (!live_factor_[f]) continue;
     const auto variables = models_.variables(f);
     gauge_.add_factor(variables.data(), static_cast<int>(variables.size()),
-                      graph_.factor_pools()[graph_.factor(f).pool].type->absolute_size());
+                      graph_.absolute_size(f));
   }
 }
 
@@ -160,18 +159,10 @@ void Engine::hold(std::int32_t v, bool held) {
   for (const std::int32_t f : factors) put_in(f);
 }
 
-void Engine::set_loss(std::shared_ptr<const Loss> loss, LossScope scope) {
+void Engine::set_loss(const std::shared_ptr<const Loss>& loss, const FactorSelector& which) {
   Graph graph = snapshot();
-  graph.set_loss(std::move(loss), scope);
+  graph.set_loss(loss, which);
   load(std::move(graph), live_ids());
-}
-
-bool Engine::loss_applies(int f) const {
-  if (!graph_.loss()) return false;
-  if (static_cast<std::size_t>(f) < under_loss_.size()) return under_loss_[f];
-  const FactorType& type = *graph_.factor_pools()[graph_.factor(f).pool].type;
-  if (!type.takes_loss()) return false;
-  return graph_.loss_scope() == LossScope::all || under_loss(graph_)[f];
 }
 
 void Engine::touch(std::int32_t v) { touched_.push_back(v); }

@@ -17,17 +17,24 @@ constexpr std::int64_t kFewRows = 8;
 }  // namespace
 
 /// Σ_ab in the variables' frames becomes T_a Σ_ab T_bᵀ: as seen from the poses.
-void Engine::as_seen_from(int a, int b, double* block, std::int64_t stride) {
+void Engine::as_seen_from(int a, int b, double* block, std::int64_t stride) const {
   const std::int32_t rows = system_.size(a), columns = system_.size(b);
   using Block = Eigen::Map<Eigen::MatrixXd, 0, Eigen::OuterStride<>>;
   Block sigma(block, rows, columns, Eigen::OuterStride<>(stride));
+  std::vector<double> x, T;
   const auto turn = [&](int v, std::int32_t size) {
-    return Eigen::Map<const Eigen::MatrixXd>(states_.frame_to_body(v), size, size);
+    T.resize(static_cast<std::size_t>(size) * size);
+    states_.frame_to_body(v, x.data(), T.data());
+    return Eigen::Map<const Eigen::MatrixXd>(T.data(), size, size);
   };
-  tree_.settle(a);
-  tree_.settle(b);
-  if (states_.away(a)) sigma = (turn(a, rows) * sigma).eval();
-  if (states_.away(b)) sigma = (sigma * turn(b, columns).transpose()).eval();
+  const auto away = [&](int v) {
+    x.resize(static_cast<std::size_t>(states_.ambient(v)));
+    if (tree_.read(v, x.data())) return true;
+    std::copy_n(states_.x(v), x.size(), x.begin());
+    return states_.away(v);
+  };
+  if (away(a)) sigma = (turn(a, rows) * sigma).eval();
+  if (away(b)) sigma = (sigma * turn(b, columns).transpose()).eval();
 }
 
 bool Engine::covariance(int a, int b, double* block) {

@@ -21,7 +21,7 @@ double seconds_since(Clock::time_point begin) {
   return std::chrono::duration<double>(Clock::now() - begin).count();
 }
 
-/// So many states are brought up to date one by one.
+/// So many states are read one by one.
 constexpr int kFew = 8;
 
 }  // namespace
@@ -37,6 +37,7 @@ IncrementalCholesky::IncrementalCholesky(const IncrementalCholesky& other)
       engine_(std::make_unique<Engine>(*other.engine_)),
       variables_(other.variables_),
       factors_(other.factors_),
+      losses_(other.losses_),
       since_solved_(other.since_solved_),
       since_full_(other.since_full_),
       kept_(other.kept_),
@@ -46,20 +47,20 @@ IncrementalCholesky::IncrementalCholesky(const IncrementalCholesky& other)
 
 UpdateReport IncrementalCholesky::update(const GraphUpdate& update, const UpdateOptions& options) {
   const Clock::time_point begin = Clock::now();
-  asked_ = 0;
-  if (engine_->dead() > 0) engine_->compact();
+  if (engine_->dead() > 0) {
+    engine_->compact();
+    forget_what_was_read();
+  }
   GraphUpdate checked = update;
   place_variables(checked, [this](Id id) {
     const auto v = find(id);
     return v ? state(id) : std::span<const double>();
   });
-  check_update(engine_->graph(),
-               {.position = [this](FactorId id) -> std::optional<int> {
-                  const int place = engine_->place_of(id);
-                  return place < 0 ? std::nullopt : std::optional<int>(place);
-                },
-                .next = engine_->next_id()},
-               checked);
+  check_update(
+      engine_->graph(),
+      {.position = [this](FactorId id) { return position(id); }, .next = engine_->next_id()},
+      checked);
+  forget_what_was_read();
   UpdateReport report;
   if (checked.marginalized.empty()) {
     apply(checked, report);
@@ -71,6 +72,7 @@ UpdateReport IncrementalCholesky::update(const GraphUpdate& update, const Update
       engine_ = std::make_unique<Engine>(*before.engine_);
       variables_ = before.variables_;
       factors_ = before.factors_;
+      losses_ = before.losses_;
       throw;
     }
   }
@@ -98,78 +100,68 @@ UpdateReport IncrementalCholesky::update(const GraphUpdate& update, const Update
   return report;
 }
 
-void IncrementalCholesky::apply(const GraphUpdate& update, UpdateReport& report) {
-  Graph& graph = engine_->edit();
-  report.first_factor = engine_->next_id();
-  for (const Variable& variable : update.variables) {
-    const int v = graph.add_variable(variable.type, variable.id, variable.state);
-    if (variable.fixed) graph.set_fixed(v);
-    engine_->added_variable();
-    ++variables_;
-  }
-  std::vector<int> variables;
-  for (const Factor& factor : update.factors) {
-    variables.clear();
-    for (const Id id : factor.variables) variables.push_back(index(id));
-    graph.add_factor(factor.type, variables, factor.measurement, factor.information);
-    engine_->added_factor();
-    ++factors_;
-  }
-  for (const ChangedFactor& change : update.changed) {
-    const int f = engine_->place_of(change.factor);
-    graph.set_measurement(f, change.measurement, change.information);
-    engine_->changed_factor(f);
-  }
-  if (!update.marginalized.empty()) marginalize(update.marginalized, report);
-  for (const FactorId id : update.removed_factors) {
-    const int f = engine_->place_of(id);
-    if (f < 0) continue;  // went with a variable that was marginalised
-    engine_->remove_factor(f);
-    --factors_;
-  }
-  for (const Id id : update.removed_variables) {
-    if (const auto v = find(id)) remove_variable(*v);
-  }
-}
+/// The engine as what an update is carried out on.
+class IncrementalCholesky::Target final : public UpdateTarget {
+ public:
+  explicit Target(IncrementalCholesky& owner) : owner_(owner), engine_(*owner.engine_) {}
 
-void IncrementalCholesky::marginalize(const std::vector<Id>& ids, UpdateReport& report) {
-  std::vector<int> leaving, factors;
-  for (const Id id : ids) {
-    leaving.push_back(index(id));
-    const auto& on_it = engine_->factors_of(leaving.back());
+  Graph& graph() override { return engine_.edit(); }
+  FactorId next_factor() const override { return engine_.next_id(); }
+  std::optional<int> position(FactorId id) const override { return owner_.position(id); }
+  void added_variable() override {
+    engine_.added_variable();
+    ++owner_.variables_;
+  }
+  void added_factor() override {
+    engine_.added_factor();
+    ++owner_.factors_;
+  }
+  void changed_factor(int position) override { engine_.changed_factor(position); }
+  Elimination eliminate(std::span<const int> variables) override;
+  void remove(std::span<const int> factors, std::span<const int> variables) override;
+
+ private:
+  void remove_factor(int f) {
+    engine_.remove_factor(f);
+    --owner_.factors_;
+  }
+
+  IncrementalCholesky& owner_;
+  Engine& engine_;
+};
+
+Elimination IncrementalCholesky::Target::eliminate(std::span<const int> variables) {
+  std::vector<int> factors;
+  for (const int v : variables) {
+    const auto& on_it = engine_.factors_of(v);
     factors.insert(factors.end(), on_it.begin(), on_it.end());
   }
   std::ranges::sort(factors);
   factors.erase(std::unique(factors.begin(), factors.end()), factors.end());
-  engine_->write_back();
-  Graph& graph = engine_->edit();
+  engine_.write_back();
+  const Graph& graph = engine_.graph();
   std::vector<bool> held(static_cast<std::size_t>(graph.variable_count()));
-  for (std::size_t v = 0; v < held.size(); ++v) held[v] = engine_->held(static_cast<int>(v));
-  const Elimination elimination = eliminate(graph, leaving, held, factors);
-  for (const Factor& prior : elimination.priors) {
-    std::vector<int> variables;
-    for (const Id id : prior.variables) variables.push_back(index(id));
-    report.priors.push_back(engine_->next_id());
-    graph.add_factor(prior.type, variables, prior.measurement, prior.information);
-    engine_->added_factor();
-    ++factors_;
-  }
-  for (const int f : elimination.replaced) {
-    engine_->remove_factor(f);
-    --factors_;
-  }
-  for (const int v : leaving) remove_variable(v);
+  for (std::size_t v = 0; v < held.size(); ++v) held[v] = engine_.held(static_cast<int>(v));
+  return cairn::eliminate(graph, variables, held, factors);
 }
 
-void IncrementalCholesky::remove_variable(int v) {
-  const std::vector<std::int32_t> factors = engine_->factors_of(v);
-  for (const std::int32_t f : factors) {
-    engine_->remove_factor(f);
-    --factors_;
+void IncrementalCholesky::Target::remove(std::span<const int> factors,
+                                         std::span<const int> variables) {
+  for (const int f : factors) remove_factor(f);
+  for (const int v : variables) {
+    const std::vector<std::int32_t> on_it = engine_.factors_of(v);
+    for (const std::int32_t f : on_it) remove_factor(f);
+    engine_.remove_variable(v);
+    --owner_.variables_;
+    engine_.covariances().drop(v);
   }
-  engine_->remove_variable(v);
-  --variables_;
-  engine_->covariances().drop(v);
+}
+
+void IncrementalCholesky::apply(const GraphUpdate& update, UpdateReport& report) {
+  Target target(*this);
+  AppliedUpdate applied = carry_out(update, losses_, target);
+  report.first_factor = applied.first_factor;
+  report.priors = std::move(applied.priors);
 }
 
 void IncrementalCholesky::tell_of_anchors(UpdateReport& report) {
@@ -181,8 +173,10 @@ void IncrementalCholesky::tell_of_anchors(UpdateReport& report) {
   }
 }
 
-void IncrementalCholesky::set_loss(std::shared_ptr<const Loss> loss, LossScope scope) {
-  engine_->set_loss(std::move(loss), scope);
+void IncrementalCholesky::set_loss(std::shared_ptr<const Loss> loss, const FactorSelector& which) {
+  forget_what_was_read();
+  engine_->set_loss(loss, which);
+  losses_ = LossRule(std::move(loss), which, engine_->graph());
 }
 
 // --- what is known ---
@@ -197,12 +191,35 @@ int IncrementalCholesky::index(Id id) const {
   throw Error(ErrorCode::usage, fmt::format("there is no variable {}", id));
 }
 
-std::span<const double> IncrementalCholesky::state(Id id) const {
+std::optional<int> IncrementalCholesky::position(FactorId id) const {
+  const int place = engine_->place_of(id);
+  return place < 0 ? std::nullopt : std::optional<int>(place);
+}
+
+std::vector<Id> IncrementalCholesky::variables() const {
+  std::vector<Id> ids;
+  for (int v = 0; v < engine_->graph().variable_count(); ++v) {
+    if (engine_->live_variable(v)) ids.push_back(engine_->graph().id(v));
+  }
+  return ids;
+}
+
+std::shared_ptr<const VariableType> IncrementalCholesky::type(Id id) const {
+  return engine_->graph().type_of(index(id));
+}
+
+Factor IncrementalCholesky::factor(FactorId id) const {
+  if (const auto f = position(id)) return engine_->graph().factor(*f);
+  throw Error(ErrorCode::usage, fmt::format("there is no factor {}", id));
+}
+
+std::span<const double> IncrementalCholesky::state(Id id) {
   const int v = index(id);
-  // Whoever asks for many most likely wants all: then they are brought up to date together.
-  if (asked_ <= kFew && ++asked_ > kFew) engine_->settle_all();
-  return {asked_ > kFew ? engine_->settled_x(v) : engine_->x(v),
-          static_cast<std::size_t>(engine_->graph().type(v).ambient_size())};
+  // Where many are read, most likely all will be: together they are cheaper.
+  if (!all_ && std::ssize(read_) >= kFew) all_ = engine_->current();
+  const auto size = static_cast<std::size_t>(engine_->graph().type(v).ambient_size());
+  if (all_) return {all_->x(v), size};
+  return read_.try_emplace(v, engine_->x(v)).first->second;
 }
 
 int IncrementalCholesky::block_size(int a, int b) const {
@@ -248,8 +265,9 @@ void IncrementalCholesky::reset() {
   engine_ = std::make_unique<Engine>(options_.settings, rescuer_);
   engine_->covariances().keep(kept_);
   variables_ = factors_ = since_solved_ = since_full_ = 0;
+  losses_.clear();
   told_.clear();
-  asked_ = 0;
+  forget_what_was_read();
 }
 
 std::unique_ptr<Estimator> IncrementalCholesky::clone() const {

@@ -68,8 +68,8 @@ void add_transposed_product(int rows, const double* A, int a, const double* B, i
 
 }  // namespace
 
-void Models::add(const Graph& graph, int position, bool loss_applies) {
-  const FactorRef ref = graph.factor(position);
+void Models::add(const Graph& graph, int position) {
+  const FactorRef ref = graph.ref(position);
   const FactorType& type = *graph.factor_pools()[ref.pool].type;
   Record record{.place = std::ssize(values_),
                 .variables = static_cast<std::int32_t>(variables_.size()),
@@ -78,7 +78,6 @@ void Models::add(const Graph& graph, int position, bool loss_applies) {
                 .arity = static_cast<std::int16_t>(type.arity()),
                 .rows = static_cast<std::int16_t>(type.residual_size()),
                 .scalars = 0,
-                .loss_applies = loss_applies,
                 .relative = type.is_relative()};
   for (int k = 0; k < record.arity; ++k) {
     tangents_.push_back(static_cast<std::int16_t>(type.tangent_size(k)));
@@ -122,9 +121,9 @@ double Models::evaluate(const Record& record, const Graph& graph, const States& 
       pool.sqrt_information.data() + entry * packed, r, J ? pointers_.data() : nullptr);
   double s = 0.0;
   for (int k = 0; k < record.rows; ++k) s += r[k] * r[k];
-  if (!record.loss_applies || !graph.loss()) return s;
+  if (!graph.any_loss(record.pool, entry, entry + 1)) return s;
   double rho = 0.0, weight = 1.0;
-  graph.loss()->evaluate({&s, 1}, {&rho, 1}, {&weight, 1});
+  graph.weigh(record.pool, entry, {&s, 1}, {&rho, 1}, {&weight, 1});
   const double root = std::sqrt(weight);
   for (int k = 0; k < record.rows; ++k) r[k] *= root;
   if (J) {

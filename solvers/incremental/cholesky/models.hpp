@@ -36,7 +36,7 @@ namespace cairn::incremental {
 class Models {
  public:
   /// The next factor, as it stands in the graph at that position.
-  void add(const Graph& graph, int position, bool loss_applies);
+  void add(const Graph& graph, int position);
   void clear() { *this = Models(); }
   int size() const { return static_cast<int>(records_.size()); }
   std::span<const std::int32_t> variables(int f) const {
@@ -82,7 +82,6 @@ class Models {
     std::int32_t variables;
     std::int32_t pool, entry;
     std::int16_t arity, rows, scalars;
-    bool loss_applies;
     bool relative;
     double cost = 0.0;
     bool moving = false;  // since it was last evaluated

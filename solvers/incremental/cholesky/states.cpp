@@ -78,13 +78,18 @@ const double* States::frame_to_body(std::int32_t v) const {
   const Record& record = records_[v];
   double* T = turns_.data() + record.matrices;
   if (record.known) return T;
-  const LieGroup& group = *record.type->lie_group();
-  element_.resize(static_cast<std::size_t>(record.ambient));
-  group.inverse(x(v), element_.data());
-  group.compose(element_.data(), frame(v), element_.data());
-  group.adjoint(element_.data(), T);
+  frame_to_body(v, x(v), T);
   record.known = true;
   return T;
+}
+
+void States::frame_to_body(std::int32_t v, const double* x, double* T) const {
+  const LieGroup& group = *records_[v].type->lie_group();
+  thread_local std::vector<double> element;
+  element.resize(static_cast<std::size_t>(records_[v].ambient));
+  group.inverse(x, element.data());
+  group.compose(element.data(), frame(v), element.data());
+  group.adjoint(element.data(), T);
 }
 
 }  // namespace cairn::incremental

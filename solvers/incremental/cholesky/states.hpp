@@ -66,6 +66,8 @@ class States {
   bool away(std::int32_t v) const { return records_[v].away; }
   /// T_v, tangent × tangent, column-major; for a variable that is `away`. Kept until it moves.
   const double* frame_to_body(std::int32_t v) const;
+  /// T_v if the variable of a Lie group were at x; tangent × tangent doubles.
+  void frame_to_body(std::int32_t v, const double* x, double* T) const;
   /// Ad(F_v⁻¹), tangent × tangent, column-major; of a variable of a Lie group.
   const double* world_to_frame(std::int32_t v) const {
     return adjoints_.data() + records_[v].matrices;
@@ -95,7 +97,7 @@ class States {
   AlignedVector x_, frames_;
   AlignedVector adjoints_;
   mutable AlignedVector turns_;
-  mutable std::vector<double> element_;
+  std::vector<double> element_;
   std::vector<double> step_;
 };
 

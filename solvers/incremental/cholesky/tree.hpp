@@ -121,6 +121,11 @@ class Tree {
   /// Applies what the nodes above a variable are to be moved by to their states: x_v is then right.
   void settle(std::int32_t variable);
   void settle_all();
+  /// Whether anything of that is to be applied to x_v, and if so x_v as it would be, in `x`.
+  /// Changes nothing.
+  bool read(std::int32_t variable, double* x) const;
+  /// All states, as `settle_all` would leave them.
+  States settled() const;
   /// Undoes what was noted for a node (see `States::undo`).
   void undo_lead(std::int32_t node, std::span<const double> lead) {
     nodes_[node].lead.assign(lead.begin(), lead.end());

@@ -176,6 +176,50 @@ void Tree::settle_all() {
   for (const std::int32_t n : stack_) hand_down(nodes_[n]);
 }
 
+bool Tree::read(std::int32_t variable, double* x) const {
+  const std::int32_t first = node_of(variable);
+  if (first < 0) return false;
+  const LieGroup* group = states_->type(variable).lie_group();
+  std::vector<double> total;
+  for (std::int32_t n = first; n >= 0 && nodes_[n].settled_at != leads_; n = nodes_[n].parent) {
+    const std::vector<double>& lead = nodes_[n].lead;
+    if (lead.empty()) continue;
+    if (total.empty()) {
+      total.assign(lead.begin(), lead.end());
+    } else {
+      group->compose(lead.data(), total.data(), total.data());
+    }
+  }
+  if (total.empty()) return false;
+  group->compose(total.data(), states_->x(variable), x);
+  return true;
+}
+
+States Tree::settled() const {
+  States states = *states_;
+  std::vector<std::vector<double>> total(nodes_.size());  // by node, with all above it
+  std::vector<std::uint8_t> known(nodes_.size(), 0);
+  std::vector<std::int32_t> path;
+  for (std::int32_t v = 0; v < states.size(); ++v) {
+    const LieGroup* group = states.type(v).lie_group();
+    for (std::int32_t n = node_of(v); n >= 0 && !known[n]; n = nodes_[n].parent) path.push_back(n);
+    for (; !path.empty(); path.pop_back()) {
+      const Node& node = nodes_[path.back()];
+      std::vector<double>& sum = total[path.back()];
+      if (node.parent >= 0) sum = total[node.parent];
+      if (sum.empty()) {
+        sum.assign(node.lead.begin(), node.lead.end());
+      } else if (!node.lead.empty()) {
+        group->compose(sum.data(), node.lead.data(), sum.data());
+      }
+      known[path.back()] = 1;
+    }
+    if (const std::int32_t n = node_of(v); n >= 0 && !total[n].empty())
+      states.lead(v, total[n].data());
+  }
+  return states;
+}
+
 const Node* Tree::end_of_pass(std::int32_t variable) const {
   for (std::int32_t n = node_of(variable); n >= 0; n = nodes_[n].parent) {
     if (nodes_[n].arrived_at == pass_) return &nodes_[n];

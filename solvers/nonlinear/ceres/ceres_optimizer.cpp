@@ -135,19 +135,6 @@ Seconds seconds_of(const ceres::Solver::Summary& ceres) {
   return seconds;
 }
 
-/// Σ ρ(‖r‖²) at the graph's states, with the graph's own loss.
-double chi2_of(const Graph& graph) {
-  const std::vector<double> norms = squared_norms(graph);
-  const std::vector<bool> robust = under_loss(graph);
-  double sum = 0.0;
-  for (std::size_t k = 0; k < norms.size(); ++k) {
-    double rho = norms[k];
-    if (robust[k]) graph.loss()->evaluate({&norms[k], 1}, {&rho, 1}, {});
-    sum += rho;
-  }
-  return sum;
-}
-
 bool nothing_to_optimise(const Gauge& gauge) {
   for (const bool held : gauge.held) {
     if (!held) return false;
@@ -163,7 +150,7 @@ CeresOptimizer::CeresOptimizer(ceres::Solver::Options options, CeresLoss loss)
 }
 
 Summary CeresOptimizer::optimize(Graph& graph, const Stop& stop, Observer& observer) {
-  if (graph.loss() && loss_.name != "none") {
+  if (graph.has_losses() && loss_.name != "none") {
     throw Error(
         ErrorCode::usage,
         "optimizer ceres: the graph has a loss already; leave out the option loss=" + loss_.name);
@@ -180,7 +167,7 @@ Summary CeresOptimizer::optimize(Graph& graph, const Stop& stop, Observer& obser
   if (idle) summary.notes.push_back("nothing to optimise: every variable is held");
   for (const std::string& sentence : summary.notes) observer.on_message(sentence);
   if (idle || stop.max_iterations <= 0) {
-    summary.initial_chi2 = summary.final_chi2 = chi2_of(graph);
+    summary.initial_chi2 = summary.final_chi2 = chi2(graph);
     summary.status = idle ? Status::converged : Status::max_iterations;
     observer.on_start(graph, summary.initial_chi2);
     summary.seconds.total = elapsed();
@@ -202,7 +189,7 @@ Summary CeresOptimizer::optimize(Graph& graph, const Stop& stop, Observer& obser
 
   graph.set_values(std::move(values));
   summary.status = status_of(report, bridge.interrupted());
-  summary.final_chi2 = loss_.name == "none" ? chi2_of(graph) : bridge.chi2();
+  summary.final_chi2 = loss_.name == "none" ? chi2(graph) : bridge.chi2();
   summary.notes.push_back("Ceres: " + report.message);
   summary.seconds = seconds_of(report);
   summary.seconds.total = elapsed();

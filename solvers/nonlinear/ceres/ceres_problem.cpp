@@ -133,8 +133,12 @@ std::unique_ptr<ceres::LossFunction> wrap_loss(const Loss& loss) {
 
 CeresProblem::CeresProblem(const Graph& graph, const Gauge& gauge, Values& values,
                            std::unique_ptr<ceres::LossFunction> loss)
-    : loss_(std::move(loss)), problem_(lend_everything()) {
-  if (!loss_ && graph.loss()) loss_ = wrap_loss(*graph.loss());
+    : problem_(lend_everything()) {
+  const bool own = loss != nullptr;
+  if (own) losses_.push_back(std::move(loss));
+  for (const std::shared_ptr<const Loss>& each : graph.losses()) {
+    if (!own) losses_.push_back(each ? wrap_loss(*each) : nullptr);
+  }
   add_variables(graph, gauge, values);
   add_factors(graph, values);
 }
@@ -156,11 +160,10 @@ void CeresProblem::add_variables(const Graph& graph, const Gauge& gauge, Values&
 }
 
 void CeresProblem::add_factors(const Graph& graph, Values& values) {
-  const std::vector<bool> closes_loop = loop_closures(graph);
   std::vector<double*> x;
   costs_.reserve(graph.factor_count());
   for (int position = 0; position < graph.factor_count(); ++position) {
-    const FactorRef ref = graph.factor(position);
+    const FactorRef ref = graph.ref(position);
     const FactorPool& pool = graph.factor_pools()[ref.pool];
     const std::size_t n = pool.type->residual_size(), m = pool.type->measurement_size();
     costs_.push_back(
@@ -169,9 +172,9 @@ void CeresProblem::add_factors(const Graph& graph, Values& values) {
     x.clear();
     for (const std::int32_t v : graph.factor_variables(position))
       x.push_back(state(graph, values, v));
-    const bool robust =
-        pool.type->takes_loss() && (graph.loss_scope() == LossScope::all || closes_loop[position]);
-    problem_.AddResidualBlock(costs_.back().get(), robust ? loss_.get() : nullptr, x);
+    const bool plain = !pool.type->takes_loss();
+    const auto loss = static_cast<std::size_t>(losses_.size() == 1 ? 0 : pool.losses[ref.entry]);
+    problem_.AddResidualBlock(costs_.back().get(), plain ? nullptr : losses_[loss].get(), x);
   }
 }
 

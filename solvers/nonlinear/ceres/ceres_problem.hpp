@@ -24,8 +24,8 @@ namespace cairn {
 /// Ceres minimises ½ Σ ρ(‖r‖²), cairn states twice that.
 class CeresProblem {
  public:
-  /// `values`, which Ceres moves, must outlive this object. `loss`: a loss of Ceres' own for the
-  /// factors in the graph's loss scope, or null for the graph's.
+  /// `values`, which Ceres moves, must outlive this object. `loss`: a loss of Ceres' own for all
+  /// factors that take one, or null for each factor's own.
   CeresProblem(const Graph& graph, const Gauge& gauge, Values& values,
                std::unique_ptr<ceres::LossFunction> loss);
 
@@ -37,8 +37,8 @@ class CeresProblem {
 
   // Owned here and only lent to the problem, which therefore is the last to come and the first to
   // go.
-  std::unique_ptr<ceres::LossFunction> loss_;
-  std::vector<std::unique_ptr<ceres::Manifold>> manifolds_;  // by variable pool
+  std::vector<std::unique_ptr<ceres::LossFunction>> losses_;  // as Graph::losses(), or Ceres' own
+  std::vector<std::unique_ptr<ceres::Manifold>> manifolds_;   // by variable pool
   std::vector<std::unique_ptr<ceres::CostFunction>> costs_;
   ceres::Problem problem_;
 };

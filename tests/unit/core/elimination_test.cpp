@@ -159,7 +159,7 @@ TEST(Elimination, RelativeMeasurementsLeaveARelativePrior) {
   const std::vector<bool> held = resolve_gauge(whole).held;
   const Graph rest = marginalized(whole, {2}, held);
   ASSERT_EQ(rest.factor_count(), 2);
-  const FactorType& prior = *rest.factor_pools()[rest.factor(1).pool].type;
+  const FactorType& prior = rest.factor_type(1);
   EXPECT_EQ(prior.tag(), MarginalPrior::kTag);
   EXPECT_EQ(prior.residual_size(), 3);
   EXPECT_EQ(prior.absolute_size(), 0);

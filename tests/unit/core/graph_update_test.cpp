@@ -156,7 +156,7 @@ TEST_F(GraphUpdateTest, RefusesWhatIsWrongAndChangesNothing) {
                 u.factors = {between(0, 1)};
                 u.factors[0].information[5] = -1;
               }),
-              HasSubstr("not positive definite"));
+              HasSubstr("not positive semidefinite"));
   EXPECT_THAT(refused([&](U u) { u.factors = {Factor{}}; }), HasSubstr("has no type"));
   EXPECT_THAT(refused([&](U u) {
                 u.changed = {{9, {0, 0, 0}, {}}};

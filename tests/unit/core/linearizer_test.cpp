@@ -42,9 +42,8 @@ struct Oracle {
     const BlockStructure& s = linearizer.structure();
     H = Eigen::MatrixXd::Zero(s.size(), s.size());
     g = Eigen::VectorXd::Zero(s.size());
-    const std::vector<bool> loops = loop_closures(graph);
     for (int f = 0; f < graph.factor_count(); ++f) {
-      const FactorRef ref = graph.factor(f);
+      const FactorRef ref = graph.ref(f);
       const FactorPool& pool = graph.factor_pools()[ref.pool];
       const int n = pool.type->residual_size(), arity = pool.type->arity();
       std::vector<const double*> x;
@@ -60,9 +59,9 @@ struct Oracle {
                           pool.sqrt_information.data() + ref.entry * n * (n + 1) / 2, r.data(),
                           J_data.data());
       double rho = r.squaredNorm(), weight = 1.0;
-      if (graph.loss() && (graph.loss_scope() == LossScope::all || loops[f])) {
+      if (const Loss* loss = graph.loss(f)) {
         const double squared = rho;
-        graph.loss()->evaluate({&squared, 1}, {&rho, 1}, {&weight, 1});
+        loss->evaluate({&squared, 1}, {&rho, 1}, {&weight, 1});
       }
       chi2 += rho;
       for (int a = 0; a < arity; ++a) {
@@ -118,7 +117,7 @@ TEST_P(LinearizerTest, WeighsByTheLossOnAllFactorsOrOnLoopClosures) {
   Graph graph = test::random_graph(types_, 40, 12, 3);
   graph.set_loss(std::make_shared<Cauchy>());
   expect_oracle(graph);
-  graph.set_loss(std::make_shared<Cauchy>(), LossScope::loop_closures);
+  graph.set_loss(std::make_shared<Cauchy>(), FactorSelector::loops());
   expect_oracle(graph);
 }
 
@@ -156,7 +155,7 @@ TEST_P(LinearizerTest, RetractsEveryVariableByItsOwnStep) {
 
 TEST_P(LinearizerTest, RefusesAGraphThatHasChanged) {
   Graph graph = test::random_graph(types_, 12, 4, 2);
-  const Linearizer linearizer(graph, resolve_gauge(graph).held);
+  Linearizer linearizer(graph, resolve_gauge(graph).held);
   graph.set_fixed(2);
   EXPECT_THROW(linearizer.chi2(graph.values()), std::logic_error);
 }

@@ -3,6 +3,11 @@
 // goes through, CAIRN_SEED with which seed they begin.
 #include <cstdlib>
 
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <random>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -159,6 +164,40 @@ TEST_P(EveryEstimator, AFixedLagKeepsItsSizeAndItsCovariance) {
     ASSERT_TRUE(estimator_->covariance(k, k, {block.data(), 9}));
     EXPECT_LT((block - wanted).norm(), 1e-8 * wanted.norm()) << "step " << k;
   }
+}
+
+TEST_P(EveryEstimator, ReadingChangesNoLaterResult) {
+  // The same updates twice, read at every step the one, never the other.
+  const std::unique_ptr<Estimator> quiet = registry_.make<Estimator>(GetParam());
+  std::mt19937 rng(5);
+  std::normal_distribution<double> noise(0.0, 0.05);
+  constexpr int kSteps = 120, kLap = 20;
+  for (int k = 0; k < kSteps; ++k) {
+    GraphUpdate update;
+    update.variables.push_back(
+        pose(k, k == 0 ? std::vector<double>{0, 0, 0} : std::vector<double>()));
+    const double turn = 2.0 * std::numbers::pi / kLap;
+    if (k > 0)
+      update.factors.push_back(
+          between(k - 1, k, {1.0 + noise(rng), noise(rng), turn + noise(rng)}));
+    if (k >= kLap && k % 3 == 0)
+      update.factors.push_back(between(k - kLap, k, {noise(rng), noise(rng), noise(rng)}));
+    quiet->update(update);
+    estimator_->update(update);
+    estimator_->state(k);
+    estimator_->state(k / 2);
+    if (k % 4 == 1) estimator_->chi2();
+    if (k % 5 == 2) estimator_->graph();
+    std::vector<double> block(9);
+    if (k % 6 == 3) estimator_->covariance(k / 3, k, block);
+    if (k % 7 == 4) {
+      for (int v = 0; v <= k; ++v) estimator_->state(v);
+    }
+    if (k % 11 == 5) estimator_->clone()->state(0);
+  }
+  const Graph a = estimator_->graph(), b = quiet->graph();
+  for (int v = 0; v < kSteps; ++v)
+    EXPECT_TRUE(std::ranges::equal(a.state(v), b.state(v))) << a.describe_variable(v);
 }
 
 INSTANTIATE_TEST_SUITE_P(Registered, EveryEstimator, testing::ValuesIn(every_estimator()),

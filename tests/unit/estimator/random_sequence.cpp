@@ -196,7 +196,7 @@ void RandomSequence::add_prior(GraphUpdate& update, Id a) {
 void RandomSequence::change_factor(GraphUpdate& update) {
   if (mirror_.factor_count() == 0) return;
   const int f = static_cast<int>(rng_() % static_cast<unsigned>(mirror_.factor_count()));
-  const FactorType& type = *mirror_.factor_pools()[mirror_.factor(f).pool].type;
+  const FactorType& type = mirror_.factor_type(f);
   if (type.tag() == MarginalPrior::kTag) return;
   const auto on = mirror_.factor_variables(f);
   const Truth& a = truth_.at(mirror_.id(on[0]));

@@ -179,8 +179,9 @@ std::string spatial_edge(const std::string& information) {
 constexpr const char* kMisplaced = "1000 0 0 0 0 0 1000 0 0 0 0 10 20 30 0 10 0 0 10 0 100";
 
 TEST(G2o, RepairsMisplacedInformationOnlyWhenAsked) {
-  EXPECT_THAT(refusal("g2o", spatial_edge(kMisplaced)),
-              HasSubstr("file:3: the information of EDGE_SE3:QUAT 0 1 is not positive definite"));
+  EXPECT_THAT(
+      refusal("g2o", spatial_edge(kMisplaced)),
+      HasSubstr("file:3: the information of EDGE_SE3:QUAT 0 1 is not positive semidefinite"));
   EXPECT_THAT(refusal("g2o", spatial_edge(kMisplaced)), HasSubstr("--repair-information"));
   const Reading r = read("g2o", spatial_edge(kMisplaced), {.repair_information = true});
   EXPECT_EQ(r.report.repaired, 1);
@@ -200,8 +201,9 @@ TEST(G2o, RefusesInformationThatTheRepairDoesNotMend) {
   // Still indefinite once moved; and places to move to that are taken.
   for (const char* information : {"10 0 0 0 0 0 10 0 0 0 0 10 20 30 0 10 0 0 10 0 1",
                                   "1000 0 0 0 0 1 1000 0 0 0 0 10 20 30 0 10 0 0 10 0 100"}) {
-    EXPECT_THAT(refusal("g2o", spatial_edge(information), {.repair_information = true}),
-                HasSubstr("file:3: the information of EDGE_SE3:QUAT 0 1 is not positive definite"));
+    EXPECT_THAT(
+        refusal("g2o", spatial_edge(information), {.repair_information = true}),
+        HasSubstr("file:3: the information of EDGE_SE3:QUAT 0 1 is not positive semidefinite"));
   }
 }
 

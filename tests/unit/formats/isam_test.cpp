@@ -86,12 +86,13 @@ TEST(Isam, RefusesVerticesAndSaysWhatToDo) {
 }
 
 TEST(Isam, RefusesARootThatIsSingular) {
-  EXPECT_EQ(refusal("isam", std::string(kChain) + "EDGE2 2 3 1 0 0 44 0 44 31 0 0\n"),
-            "file:3: the information of EDGE2 2 3 is not positive definite (pivot 3 of its "
-            "Cholesky factor is 0); "
-            "expected a positive definite 3x3 matrix; the numbers would fit TORO's order of "
-            "information (format "
-            "toro)");
+  EXPECT_EQ(
+      refusal("isam", std::string(kChain) + "EDGE2 2 3 1 0 0 44 0 44 31 0 0\n"),
+      "file:3: the information of EDGE2 2 3 is not positive semidefinite or zero (pivot 3 of its "
+      "Cholesky factor is 0); "
+      "expected a positive semidefinite 3x3 matrix; the numbers would fit TORO's order of "
+      "information (format "
+      "toro)");
 }
 
 TEST(Isam, RefusesAnIdThatIsPlanarAndSpatial) {

@@ -49,7 +49,7 @@ std::vector<Id> Reading::ids(int factor) const {
   return ids;
 }
 std::string Reading::factor_tag(int factor) const {
-  return std::string(graph.factor_pools()[graph.factor(factor).pool].type->tag());
+  return std::string(graph.factor_type(factor).tag());
 }
 std::string Reading::variable_tag(Id id) const {
   const auto index = graph.find(id);

@@ -72,10 +72,10 @@ MatrixXd block_of(const Engine& engine, const MatrixXd& Sigma, int a, int b) {
 /// A block of the inverse, which is in the variables' frames, as seen from the poses.
 MatrixXd seen_from_poses(Engine& engine, MatrixXd block, int a, int b) {
   const auto turn = [&](int v) -> MatrixXd {
-    engine.x(v);  // where it is by now
+    const States now = engine.current();
     const int size = engine.system().size(v);
-    if (!engine.states().away(v)) return MatrixXd::Identity(size, size);
-    return Eigen::Map<const MatrixXd>(engine.states().frame_to_body(v), size, size);
+    if (!now.away(v)) return MatrixXd::Identity(size, size);
+    return Eigen::Map<const MatrixXd>(now.frame_to_body(v), size, size);
   };
   return turn(a) * block * turn(b).transpose();
 }

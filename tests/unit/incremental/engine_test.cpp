@@ -104,8 +104,9 @@ TEST_P(EngineOnGrowingGraphs, GivesAllDigitsIfAskedTo) {
 std::vector<double> states_of(Engine& engine) {
   std::vector<double> states;
   for (int v = 0; v < engine.graph().variable_count(); ++v) {
-    if (engine.live_variable(v))
-      states.insert(states.end(), engine.x(v), engine.x(v) + engine.graph().type(v).ambient_size());
+    if (!engine.live_variable(v)) continue;
+    const std::vector<double> x = engine.x(v);
+    states.insert(states.end(), x.begin(), x.end());
   }
   return states;
 }

@@ -94,8 +94,7 @@ void GrowingGraph::add_pose(Engine& engine) {
   }
   const State z = noisy(between(poses_.back().truth, truth));
   const int before = *engine.graph().find(poses_.back().id);
-  const double* x = engine.x(before);
-  const State at = compose({x, x + truth.size()}, z);
+  const State at = compose(engine.x(before), z);
   poses_.push_back({next_id_, truth});
   const int v = add_variable(engine, types_.pose, at, fixed);
   add_factor(engine, types_.relative_pose, {before, v}, z);

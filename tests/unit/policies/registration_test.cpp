@@ -195,7 +195,7 @@ TEST_F(Recorded, TakesOnlyMotionsForMatches) {
   for (int f = 0; f < world.graph.factor_count(); ++f) {
     const auto v = world.graph.factor_variables(f);
     if (v.size() != 2) continue;
-    const bool motion = world.graph.factor_pools()[world.graph.factor(f).pool].type->is_relative();
+    const bool motion = world.graph.factor_type(f).is_relative();
     ++(motion ? motions : sights);
     EXPECT_EQ(!recorded->match(world.graph.id(v[0]), world.graph.id(v[1])).empty(), motion);
   }

@@ -35,7 +35,7 @@ Eigen::VectorXd residuals(const Graph& graph, const Values& values) {
   Eigen::VectorXd all(graph.residual_size());
   Eigen::Index row = 0;
   for (int position = 0; position < graph.factor_count(); ++position) {
-    const FactorRef ref = graph.factor(position);
+    const FactorRef ref = graph.ref(position);
     std::vector<const double*> pools;
     const FactorView view = graph.view(ref.pool, values, pools);
     const FactorType& type = *graph.factor_pools()[ref.pool].type;
@@ -106,7 +106,7 @@ TEST(JacobianEvaluator, SquaresToTheNormalEquationsUnderAnyLoss) {
   graphs.push_back(poses_and_points(12, 0.1));
   graphs.back().set_loss(std::make_shared<Logarithmic>());
   graphs.push_back(ring_of_poses(30, 0.1, 3));
-  graphs.back().set_loss(std::make_shared<Logarithmic>(), LossScope::loop_closures);
+  graphs.back().set_loss(std::make_shared<Logarithmic>(), FactorSelector::loops());
   for (const Graph& graph : graphs) {
     Evaluated evaluated(graph);
     BlockMatrix H(evaluated.linearizer.structure());

@@ -16,7 +16,7 @@ std::vector<std::string> registered_losses() { return Registry().names("loss"); 
 
 class RobustLossTest : public testing::TestWithParam<std::string> {
  protected:
-  Graph graph(LossScope scope) {
+  Graph graph(const FactorSelector& scope) {
     Graph graph = ring_of_poses(40, 0.03, 3);
     graph.set_loss(registry_.make<Loss>(GetParam()), scope);
     return graph;
@@ -28,7 +28,7 @@ INSTANTIATE_TEST_SUITE_P(Registered, RobustLossTest, testing::ValuesIn(registere
                          test_name);
 
 TEST_P(RobustLossTest, EveryOptimizerReachesTheSameMinimum) {
-  for (const LossScope scope : {LossScope::all, LossScope::loop_closures}) {
+  for (const FactorSelector& scope : {FactorSelector::all(), FactorSelector::loops()}) {
     double expected = -1.0;
     for (const char* name : {"levenberg_marquardt", "dogleg", "ceres"}) {
       if (!registry_.has("optimizer", name)) continue;
@@ -45,7 +45,7 @@ TEST_P(RobustLossTest, EveryOptimizerReachesTheSameMinimum) {
 
 TEST_P(RobustLossTest, WeighsOutliersDown) {
   if (!registry_.has("optimizer", "levenberg_marquardt")) GTEST_SKIP();
-  Graph plain = ring_of_poses(40, 0.03, 3), robust = graph(LossScope::loop_closures);
+  Graph plain = ring_of_poses(40, 0.03, 3), robust = graph(FactorSelector::loops());
   const auto optimizer = registry_.make<Optimizer>(with_some_linear_solver("levenberg_marquardt"));
   optimizer->optimize(plain);
   optimizer->optimize(robust);

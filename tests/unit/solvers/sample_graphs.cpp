@@ -213,12 +213,11 @@ double dense_minimum(const Graph& graph) {
 
 double chi2_of(const Graph& graph) {
   const std::vector<double> norms = squared_norms(graph);
-  const std::vector<bool> closes_loop = loop_closures(graph);
   double sum = 0.0;
   for (int position = 0; position < graph.factor_count(); ++position) {
     double rho = norms[position];
-    const bool robust = graph.loss_scope() == LossScope::all || closes_loop[position];
-    if (graph.loss() && robust) graph.loss()->evaluate({&norms[position], 1}, {&rho, 1}, {});
+    if (const Loss* loss = graph.loss(position))
+      loss->evaluate({&norms[position], 1}, {&rho, 1}, {});
     sum += rho;
   }
   return sum;

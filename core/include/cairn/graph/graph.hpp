@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "cairn/graph/elements.hpp"
+#include "cairn/graph/factor_selector.hpp"
 #include "cairn/runtime/aligned.hpp"
 #include "cairn/runtime/api.hpp"
 #include "cairn/types/factor_type.hpp"
@@ -40,6 +41,8 @@ struct FactorPool {
   AlignedVector measurements;                ///< size × measurement_size
   AlignedVector information;           ///< size × n(n+1)/2: upper triangle, row by row, as given
   AlignedVector sqrt_information;      ///< size × n(n+1)/2: U with UᵀU = information, row by row
+  std::vector<std::int16_t> ranks;     ///< size: rank of the information
+  std::vector<std::int16_t> losses;    ///< size: index of the loss in `Graph::losses()`, 0: none
   std::vector<std::int32_t> sequence;  ///< position among all factors of the graph
 
   std::size_t size() const { return sequence.size(); }
@@ -74,13 +77,26 @@ class CAIRN_API Graph {
   /// Adds a variable with state `x` (ambient_size doubles, normalized here). Returns its index.
   /// Throws `Error` (input) for a duplicate id, a wrong size, a state that is not finite.
   int add_variable(std::shared_ptr<const VariableType> type, Id id, std::span<const double> x);
+  /// The same for a variable as a value, which may be fixed.
+  int add(const Variable& variable);
 
   /// Adds a factor on variables given by index. `information` is the upper triangle row by row,
-  /// n(n+1)/2 doubles. Returns its position among all factors. Throws `Error` (input) for wrong
-  /// counts or types of variables, a variable twice, numbers that are not finite, information that
-  /// is not positive definite.
+  /// n(n+1)/2 doubles, positive semidefinite and not zero: directions that it does not measure have
+  /// no part in chi2. `loss`: see `set_loss`. Returns its position among all factors. Throws
+  /// `Error` (input), and leaves the graph as it was, for wrong counts or types of variables, a
+  /// variable twice, numbers that are not finite, information that is indefinite or zero.
   int add_factor(std::shared_ptr<const FactorType> type, std::span<const int> variables,
-                 std::span<const double> measurement, std::span<const double> information);
+                 std::span<const double> measurement, std::span<const double> information,
+                 std::shared_ptr<const Loss> loss = nullptr);
+  /// The same for a factor as a value, whose variables are named by id. Throws also where there is
+  /// no variable of that id.
+  int add(const Factor& factor);
+
+  /// Takes out a variable with all factors on it; what stays moves up. Takes time in proportion to
+  /// the whole graph: use `remove` for many. Throws `Error` (usage) if there is no such variable.
+  Renumbering erase(Id id);
+  /// Takes out one factor, likewise.
+  Renumbering erase_factor(int position);
 
   /// Takes out the factors and variables marked (by position and by index); what stays keeps its
   /// order and its state, and moves up. Takes time in proportion to the whole graph. Throws `Error`
@@ -95,9 +111,12 @@ class CAIRN_API Graph {
   Id id(int variable) const { return records_[variable].id; }
   /// Index of the variable with that id, if there is one.
   std::optional<int> find(Id id) const;
-  const VariableType& type(int variable) const {
-    return *variable_pools_[records_[variable].pool].type;
+  const VariableType& type(int variable) const { return *type_of(variable); }
+  const std::shared_ptr<const VariableType>& type_of(int variable) const {
+    return variable_pools_[records_[variable].pool].type;
   }
+  /// The variable as a value, at its current state.
+  Variable variable(int variable) const;
   int pool(int variable) const { return records_[variable].pool; }
   int slot(int variable) const { return records_[variable].slot; }
   /// Held fixed by the user (`FIX`).
@@ -111,10 +130,25 @@ class CAIRN_API Graph {
 
   // Factors -------------------------------------------------------------------------------------
   int factor_count() const { return static_cast<int>(factors_.size()); }
-  FactorRef factor(int position) const { return factors_[position]; }
+  FactorRef ref(int position) const { return factors_[position]; }
+  const FactorType& factor_type(int position) const { return *type_of_factor(position); }
+  const std::shared_ptr<const FactorType>& type_of_factor(int position) const {
+    return factor_pools_[factors_[position].pool].type;
+  }
+  /// The factor as a value, its variables by id.
+  Factor factor(int position) const;
+  /// Positions of all factors on a variable, rising. Takes time in proportion to the whole graph;
+  /// see `factors_by_variable` for all variables at once.
+  std::vector<int> factors_of(int variable) const;
   std::span<const std::int32_t> factor_variables(int position) const;
   std::span<const double> measurement(int position) const;
   std::span<const double> information(int position) const;
+  /// U with UᵀU = information, upper triangle row by row.
+  std::span<const double> sqrt_information(int position) const;
+  int information_rank(int position) const;
+  /// How many numbers the factor measures of where its variables are in the world
+  /// (`FactorType::absolute_size`), at most the rank of its information.
+  int absolute_size(int position) const;
   /// Replaces the measurement and, unless empty, the information of a factor; checks as
   /// `add_factor`.
   void set_measurement(int position, std::span<const double> measurement,
@@ -137,10 +171,25 @@ class CAIRN_API Graph {
   std::uint64_t structure_version() const { return structure_version_; }
 
   // Loss ------------------------------------------------------------------------------------------
-  /// Applies a robust loss (null: none). Shared ownership: clones of a graph use one loss.
-  void set_loss(std::shared_ptr<const Loss> loss, LossScope scope = LossScope::all);
-  const Loss* loss() const { return loss_.get(); }
-  LossScope loss_scope() const { return loss_scope_; }
+  /// Robust loss of one factor (null: none), which the factor keeps whatever else is added or
+  /// removed. Without effect on a factor whose type takes none (`FactorType::takes_loss`). Shared
+  /// ownership: clones of a graph use one loss.
+  void set_loss(int position, std::shared_ptr<const Loss> loss);
+  /// Sets the loss of the selected factors, and takes it from all others. Factors that are added
+  /// later come with their own.
+  void set_loss(const std::shared_ptr<const Loss>& loss, const FactorSelector& which = {});
+  /// The loss of a factor, or null.
+  const Loss* loss(int position) const;
+  /// Whether any factor has a loss.
+  bool has_losses() const { return losses_.size() > 1; }
+  /// All losses in use, the first of them null: none.
+  const std::vector<std::shared_ptr<const Loss>>& losses() const { return losses_; }
+  /// ρ(s) and its derivative ρ′(s) of the squared norms s of entries [begin, begin + norms.size())
+  /// of a factor pool, each by its own loss (s and 1 without). Either output may be empty.
+  void weigh(int factor_pool, std::size_t begin, std::span<const double> norms,
+             std::span<double> rho, std::span<double> weights) const;
+  /// Whether one of these entries has a loss.
+  bool any_loss(int factor_pool, std::size_t begin, std::size_t end) const;
 
  private:
   struct VariableRecord {
@@ -149,8 +198,12 @@ class CAIRN_API Graph {
     std::int32_t slot;
     bool fixed;
   };
-  int variable_pool_of(const std::shared_ptr<const VariableType>& type);
-  int factor_pool_of(const std::shared_ptr<const FactorType>& type);
+  int find_pool(const std::shared_ptr<const VariableType>& type) const;
+  int find_pool(const std::shared_ptr<const FactorType>& type) const;
+  void check_ends(const FactorType& type, std::span<const int> variables) const;
+  std::string name_of(const FactorType& type, std::span<const int> variables) const;
+  std::int16_t loss_of(int position) const;
+  std::int16_t loss_index(const FactorType& type, const std::shared_ptr<const Loss>& loss);
   void remove_factors(const std::vector<bool>& leaves, const std::vector<std::int32_t>& position);
   void remove_variables(const std::vector<bool>& leaves, const std::vector<std::int32_t>& index);
 
@@ -160,19 +213,17 @@ class CAIRN_API Graph {
   std::vector<FactorRef> factors_;
   std::vector<FactorPool> factor_pools_;
   std::unordered_map<Id, int> index_of_id_;
-  std::shared_ptr<const Loss> loss_;
-  LossScope loss_scope_ = LossScope::all;
+  std::vector<std::shared_ptr<const Loss>> losses_{nullptr};
   std::uint64_t structure_version_ = 0;
 };
 
 /// Σ ‖r‖² of every factor (whitened, no loss, no half), by position; n = factor_count().
 CAIRN_API std::vector<double> squared_norms(const Graph& graph);
 
-/// For each factor by position, whether it closes a loop: it joins two variables of one type that
-/// do not follow each other in id order among the variables of that type.
-CAIRN_API std::vector<bool> loop_closures(const Graph& graph);
+/// Σ ρ(‖r‖²) at the graph's states: chi2 as it is stated everywhere in cairn, without a half.
+CAIRN_API double chi2(const Graph& graph);
 
-/// For each factor by position, whether the graph's loss applies to it; all false without a loss.
-CAIRN_API std::vector<bool> under_loss(const Graph& graph);
+/// By variable, the positions of the factors on it, rising.
+CAIRN_API std::vector<std::vector<int>> factors_by_variable(const Graph& graph);
 
 }  // namespace cairn

@@ -34,7 +34,7 @@ class CAIRN_API Linearizer {
   int variable_of(int block) const;
 
   /// Σ ρ(‖r‖²): chi2 as cairn states it everywhere, without a half.
-  double chi2(const Values& values) const;
+  double chi2(const Values& values);
 
   /// Fills H (on `structure()`) and g (structure().size() doubles). Returns chi2 at `values`.
   double linearize(const Values& values, BlockMatrix& H, std::span<double> g);

@@ -82,21 +82,36 @@ class CAIRN_API Estimator : public Component {
 
   virtual UpdateReport update(const GraphUpdate& update, const UpdateOptions& options = {}) = 0;
 
-  /// The loss of all factors, those to come included (null: none). Everything is relinearised at
-  /// the next update.
-  virtual void set_loss(std::shared_ptr<const Loss> loss, LossScope scope = LossScope::all) = 0;
+  /// Gives the selected factors this loss (null: none) and takes theirs from all others; factors to
+  /// come that have no loss of their own get it if they are selected when they arrive, and keep it.
+  /// Everything is relinearised at the next update.
+  virtual void set_loss(std::shared_ptr<const Loss> loss, const FactorSelector& which = {}) = 0;
 
-  /// The current estimate of one variable: ambient_size doubles, good until the next update. Throws
-  /// `Error` (usage) for an id that is not there.
-  virtual std::span<const double> state(Id id) const = 0;
+  // What it holds
+  // -----------------------------------------------------------------------------------
   virtual bool has(Id id) const = 0;
   virtual int variable_count() const = 0;
   virtual int factor_count() const = 0;
+  /// Ids of all variables, in the order of their addition.
+  virtual std::vector<Id> variables() const = 0;
+  /// Type of a variable. Throws `Error` (usage) for an id that is not there.
+  virtual std::shared_ptr<const VariableType> type(Id id) const = 0;
+  /// Ids of all factors, rising.
+  virtual std::vector<FactorId> factors() const = 0;
+  virtual bool has_factor(FactorId id) const = 0;
+  /// A factor as a value. Throws `Error` (usage) for an id that is not there.
+  virtual Factor factor(FactorId id) const = 0;
+
+  // The estimate. These are not `const`: an estimator may finish its work when it is asked. What is
+  // asked never changes a later result.
+  /// The current estimate of one variable: ambient_size doubles, good until the next update. Throws
+  /// `Error` (usage) for an id that is not there.
+  virtual std::span<const double> state(Id id) = 0;
   /// Σ ρ(‖r‖²) at the current estimate; takes as long as evaluating every factor once.
-  virtual double chi2() const = 0;
+  virtual double chi2() = 0;
   /// Everything at the current estimate, as a graph of its own. Anchored variables are not marked
   /// as fixed in it.
-  virtual Graph graph() const = 0;
+  virtual Graph graph() = 0;
 
   // Covariances: of the tangent vector δ at the current estimate, x ⊕ δ ---------------------------
   /// From the next update on, keep these.

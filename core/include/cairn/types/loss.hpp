@@ -25,12 +25,4 @@ class CAIRN_API Loss : public Component {
   virtual double second_derivative(double s) const = 0;
 };
 
-/// Which factors a loss applies to.
-enum class LossScope {
-  all,
-  /// Factors between two variables of one type that do not follow each other in id order: odometry,
-  /// priors and landmark observations keep their plain square.
-  loop_closures,
-};
-
 }  // namespace cairn

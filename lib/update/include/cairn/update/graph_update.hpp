@@ -9,6 +9,8 @@
 #include "cairn/graph/graph.hpp"
 #include "cairn/graph/update.hpp"
 #include "cairn/runtime/api.hpp"
+#include "cairn/update/elimination.hpp"
+#include "cairn/update/loss_rule.hpp"
 
 namespace cairn {
 
@@ -59,8 +61,34 @@ struct AppliedUpdate {
   std::vector<FactorId> priors;  ///< that marginalisation left
 };
 
-/// Carries out an update that was checked, in the order that `GraphUpdate` states: marginalisation
-/// at the graph's states (`eliminate`), holding what `resolve_gauge` holds.
+/// What an update is carried out on: a graph, and whatever follows its changes.
+class CAIRN_API UpdateTarget {
+ public:
+  virtual ~UpdateTarget();
+
+  /// The graph that variables and factors are added to, at its current estimate where `eliminate`
+  /// was called.
+  virtual Graph& graph() = 0;
+  virtual FactorId next_factor() const = 0;
+  virtual std::optional<int> position(FactorId id) const = 0;
+  /// The graph has a variable or a factor more at its end, a factor another measurement.
+  virtual void added_variable() = 0;
+  virtual void added_factor() = 0;
+  virtual void changed_factor(int position) = 0;
+  /// What takes the place of these variables (`cairn::eliminate`); changes nothing.
+  virtual Elimination eliminate(std::span<const int> variables) = 0;
+  /// Takes out these factors, and these variables with all factors on them.
+  virtual void remove(std::span<const int> factors, std::span<const int> variables) = 0;
+};
+
+/// Carries out an update that was checked, in the order that `GraphUpdate` states.
+CAIRN_API AppliedUpdate carry_out(const GraphUpdate& update, LossRule& losses,
+                                  UpdateTarget& target);
+
+/// The same on a graph alone: marginalisation at the graph's states (`eliminate`), holding what
+/// `resolve_gauge` holds. Without a rule each factor has the loss that it brings.
+CAIRN_API AppliedUpdate apply_update(const GraphUpdate& update, Graph& graph, FactorIds& factors,
+                                     LossRule& losses);
 CAIRN_API AppliedUpdate apply_update(const GraphUpdate& update, Graph& graph, FactorIds& factors);
 
 }  // namespace cairn
