@@ -18,7 +18,7 @@ constexpr std::size_t kTileColumns = 48;
 
 }  // namespace
 
-/// Room, once a structure.
+/// Room, once per structure.
 void SelectedInverse::prepare() {
   if (version_ == cholesky_->version_) return;
   panels_ = UninitializedVector(cholesky_->symbolic_.panel_values());

@@ -37,8 +37,8 @@ struct Settings {
   std::string kernels = "auto";
 };
 
-/// The optimizer that starts where steps of Gauss-Newton have gone astray. Copies of an engine
-/// share it, from whatever threads they are used.
+/// The fallback optimizer for when Gauss-Newton diverges. Copies of an engine share it, in all
+/// threads.
 struct Rescuer {
   std::unique_ptr<Optimizer> optimizer;
   std::mutex mutex;
@@ -192,15 +192,15 @@ class Engine {
   bool gauge_is_old_ = false;
   int dead_ = 0;
   int live_factors_ = 0;
-  double cost_ = 0.0;       // sum over factors
-  double gained_ = 0.0;     // of the cost, by steps since factors were evaluated
-  double looked_at_ = 0.0;  // that of the steps before the last evaluation
-  bool must_look_ = false;  // something has been taken out or changed: what was gained says little
-  int others_ = 0;         // factors of several variables that notice if these are moved as a whole
-  double mismatch_ = 0.0;  // of these, at the last evaluation
-  double shortfall_ = 0.0;                 // by how much more than expected the cost was then
-  double left_share_ = 1.0;                // how much of it was left to gain
-  double decrease_ = 0.0;                  // of the last solution: gᵀH⁻¹g
+  double cost_ = 0.0;        // sum over factors
+  double gained_ = 0.0;      // of the cost, by steps since factors were evaluated
+  double looked_at_ = 0.0;   // that of the steps before the last evaluation
+  bool must_look_ = false;   // something has been taken out or changed: what was gained says little
+  int others_ = 0;           // factors of several variables that depend on rigid motions of these
+  double mismatch_ = 0.0;    // of these, at the last evaluation
+  double shortfall_ = 0.0;   // by how much more than expected the cost was then
+  double left_share_ = 1.0;  // how much of it was left to gain
+  double decrease_ = 0.0;    // of the last solution: gᵀH⁻¹g
   std::vector<FactorId> ids_;              // by factor
   std::vector<std::int32_t> place_of_id_;  // by FactorId: factor, -1 if it has been removed
   std::vector<bool> under_loss_;           // by factor, of those that were loaded together

@@ -33,7 +33,7 @@ Descent::Descent(std::string optimizer, std::string linear_solver, LinearSolver&
   const bool nothing_to_do = equations_->size() == 0;
   if (nothing_to_do) {
     chi2 = equations_->chi2(estimate);
-    note("nothing to optimise: every variable is held");
+    note("nothing to optimise: every variable is constant");
     end(Status::converged);
   } else {
     step.resize(static_cast<std::size_t>(equations_->size()));
