@@ -195,7 +195,7 @@ class Engine {
   double cost_ = 0.0;        // sum over factors
   double gained_ = 0.0;      // of the cost, by steps since factors were evaluated
   double looked_at_ = 0.0;   // that of the steps before the last evaluation
-  bool must_look_ = false;   // something has been taken out or changed: what was gained says little
+  bool must_look_ = false;   // something has been removed or changed: `gained_` is no measure then
   int others_ = 0;           // factors of several variables that depend on rigid motions of these
   double mismatch_ = 0.0;    // of these, at the last evaluation
   double shortfall_ = 0.0;   // by how much more than expected the cost was then
