@@ -55,7 +55,8 @@ void CompactGraph::start(const Variable& pose, PolicySeconds& seconds) {
 
 Motion CompactGraph::fuse(std::span<const Factor> factors, Id from, Id to) const {
   const MotionGroup& motions = group_->motions();
-  if (factors.empty()) refuse(fmt::format("no measured motion from pose {} to {}", from, to));
+  if (factors.empty())
+    refuse(fmt::format("no measured relative pose from pose {} to {}", from, to));
   Motion all;
   for (const Factor& factor : factors) {
     const auto& on = factor.variables;
