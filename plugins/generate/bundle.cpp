@@ -298,7 +298,7 @@ OptionTable bundle_options() {
   OptionTable table;
   table
       .choice("layout", "ring", {"ring", "street"},
-              "cameras around a thing, or along a street: who shares points with whom")
+              "cameras around an object, or along a street: which cameras share points")
       .integer("cameras", 50, 4, 1e6, "number of cameras")
       .integer("points", 2000, 8, 1e8, "number of points")
       .integer("track", 6, 2, 1e6, "cameras that see a point, at most")
