@@ -53,7 +53,7 @@ std::string name_of(const Configuration& configuration) {
 Scene scene_of_result(const GraphResult& result) {
   Graph graph = result.loaded.graph.clone();
   Scene scene = scene_of(graph, short_name(result.loaded.name));
-  scene.estimates.push_back(place(graph, scene, "first estimate", EstimateRole::initial));
+  scene.estimates.push_back(place(graph, scene, "initial estimate", EstimateRole::initial));
   for (const ConfigurationResult& configuration : result.results) {
     if (configuration.runs.empty()) continue;
     const bool first = scene.runs.empty();
@@ -130,7 +130,8 @@ Command add_bench(CLI::App& program) {
       ->type_name("FILE");
   add_input_options(*app, options->input);
   app->footer(
-      "Every run starts from the same first estimate and ends as optimize does; for N equal steps, "
+      "Every run starts from the same initial estimate and ends as optimize does; for N equal "
+      "steps, "
       "add\n"
       "--tolerance 0. Times are of optimisation alone. 'ratio' is the median over rounds of the "
       "time\n"

@@ -76,9 +76,10 @@ int run(const ViewOptions& options, Session& session) {
   }
   if (page == "-") session.write_file_to_stdout();
   if (!session.registry().has(Picture::kKind, "html")) {
-    throw Error(ErrorCode::plugin,
-                "no plugin makes pages here: cairn was built without apps/report/dist and without "
-                "npm; cairn plot draws static pictures");
+    throw Error(
+        ErrorCode::plugin,
+        "no plugin makes reports here: cairn was built without apps/report/dist and without "
+        "npm; cairn plot draws static plots");
   }
   check_folder(page);
   session.use_threads();
