@@ -302,7 +302,7 @@ void add_result(Table& table, const CompactResult& result, const Recording& reco
   table.add({"chi2", chi2_text(result.chi2)});
   for (const auto& [name, error] : result.errors) table.add({name, errors_text(error)});
   if (result.normalized && result.normalized->dof > 0) {
-    table.add({"NEES", fmt::format("{:.4g} a degree of freedom ({})",
+    table.add({"NEES", fmt::format("{:.4g} per degree of freedom ({})",
                                    result.normalized->squared / result.normalized->dof,
                                    result.normalized->dof)});
   }
