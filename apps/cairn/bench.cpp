@@ -124,9 +124,9 @@ Command add_bench(CLI::App& program) {
       ->check(within(1, 1000000))
       ->capture_default_str();
   app->add_flag("--no-memory", options->no_memory, "leave out the extra run for the peak memory");
-  app->add_option("--csv", options->csv, "one line a run (- is standard output)")
+  app->add_option("--csv", options->csv, "one line per run (- is standard output)")
       ->type_name("FILE");
-  app->add_option("--html", options->html, "all of it as a page, with the graphs to look round in")
+  app->add_option("--html", options->html, "all of it as an HTML report with the graphs")
       ->type_name("FILE");
   add_input_options(*app, options->input);
   app->footer(
