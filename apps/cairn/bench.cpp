@@ -24,9 +24,10 @@ void check(const BenchOptions& options, Session& session) {
   if (options.csv == "-") session.write_file_to_stdout();
   if (options.html.empty()) return;
   if (!session.registry().has(Picture::kKind, "html")) {
-    throw Error(ErrorCode::plugin,
-                "no plugin makes pages here: cairn was built without apps/report/dist and without "
-                "npm; leave out --html");
+    throw Error(
+        ErrorCode::plugin,
+        "no plugin makes reports here: cairn was built without apps/report/dist and without "
+        "npm; leave out --html");
   }
   check_folder(options.html);
 }

@@ -184,7 +184,7 @@ Id PolicySession::other_end(std::span<const Id> ends) const {
 void PolicySession::check_motion(const Factor& factor, Id from) const {
   const FactorType& type = *factor.type;
   if (!type.is_relative() || type.variable_tags().front() != motions_->type().tag()) {
-    throw bad_line(fmt::format("{} measures no motion of {}, and a policy takes nothing else",
+    throw bad_line(fmt::format("{} is no relative pose of {}, and a policy takes nothing else",
                                type.tag(), motions_->type().tag()));
   }
   (void)motions_->of_factor(factor, from);

@@ -96,7 +96,7 @@ int run(const ViewOptions& options, Session& session) {
 
 Command add_view(CLI::App& program) {
   auto options = std::make_shared<ViewOptions>();  // lives as long as the parser and the run
-  CLI::App* app = program.add_subcommand("view", "a page for the browser: look round in a graph");
+  CLI::App* app = program.add_subcommand("view", "an HTML report with interactive graphs");
   add_album_options(*app, options->album);
   app->add_option("-o,--output", options->output, "the page [name of the first FILE, .html]")
       ->type_name("PAGE");

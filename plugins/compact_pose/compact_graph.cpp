@@ -66,7 +66,7 @@ Motion CompactGraph::fuse(std::span<const Factor> factors, Id from, Id to) const
     if (!factor.type) refuse("a measurement without a type");
     if (!factor.type->is_relative() ||
         factor.type->variable_tags().front() != motions.type().tag()) {
-      refuse(fmt::format("{} between {} and {} measures no motion of {}", factor.type->tag(), from,
+      refuse(fmt::format("{} between {} and {} is no relative pose of {}", factor.type->tag(), from,
                          to, motions.type().tag()));
     }
     const Motion motion = motions.of_factor(factor, from);

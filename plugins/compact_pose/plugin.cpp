@@ -28,8 +28,9 @@ OptionTable options_table() {
               "what that angle is of: each element of the rotation vector, the whole rotation, or "
               "the direction of view")
       .choice("view_axis", "z", {"x", "y", "z"}, "of the body, along which the sensor looks")
-      .real("probability", 0.1, 0.0, 1.0,
-            "a pose is a candidate if it is within range so probably, in each dimension (s)")
+      .real(
+          "probability", 0.1, 0.0, 1.0,
+          "probability of being within range, in each dimension, that makes a pose a candidate (s)")
       .real("loop_gain", -1.0, -1.0, 1e9,
             "information gain that a link must exceed [nats] (g_loop); "
             "-1: (n/2 ln 2 + 1)^1.36 - 1, n = 3 or 6")
@@ -37,22 +38,21 @@ OptionTable options_table() {
             "a pose is kept if the information gain of any link to it would exceed this [nats] "
             "(g_pose); -1: (n/2 ln 2 + 1)^1.7 - 1")
       .text("sensor", "",
-            "expected covariance of a match: two standard deviations [m] [rad], or its upper "
-            "triangle; nothing: as the newest odometry")
+            "expected covariance of a match: standard deviations [m] and [rad], or its upper "
+            "triangle; empty: as the newest odometry")
       .choice("composition", "first", {"first", "fourth"},
               "order of the covariance of composed relative poses: Smith and Cheeseman, Barfoot "
               "and Furgale")
       .choice("search", "index", {"index", "all", "untested"},
               "candidates from a spatial index, by testing all poses, or all poses without a test")
       .real("gate", 0.0, 0.0, 0.999999,
-            "check links for consistency; so large a part of the right ones passes; 0: no check")
+            "fraction of the correct links that pass the consistency check; 0: no check")
       .real("trust", 0.01, 0.0, 1.0,
-            "with gate: a link that a false match would fit more probably than this waits until "
-            "another agrees")
-      .boolean(
-          "reuse", true,
-          "go on from the kept pose that a link leads to, instead of keeping the pose that was "
-          "linked: the map stops growing")
+            "with gate: a link waits for another to agree if a false match would pass with a "
+            "higher probability than this")
+      .boolean("reuse", true,
+               "continue from the kept pose that a link leads to, instead of keeping the pose that "
+               "was linked: the map stops growing")
       .real("reuse_loss", 0.06, 0.0, 10.0,
             "with reuse: largest loss of information about the link, times the poses that are kept "
             "nearby [nats per DoF]")

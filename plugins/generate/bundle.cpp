@@ -305,14 +305,14 @@ OptionTable bundle_options() {
       .real("pixel_sigma", 1.0, 1e-9, 1e6,
             "noise of what is measured, each axis [px]; BAL files can only express 1")
       .real("translation_sigma", 0.1, 0.0, 1e6,
-            "error of a camera's first position, each axis [m]; the first camera is known")
-      .real("rotation_sigma", 0.01, 0.0, 3.0, "error of its first orientation, each axis [rad]")
-      .real("focal_sigma", 10.0, 0.0, 1e6, "error of its first focal length [px]")
-      .real("distortion_sigma", 0.01, 0.0, 10.0, "error of its first k1 and k2")
-      .real("point_sigma", 0.2, 0.0, 1e6, "error of a point's first position, each axis [m]")
+            "error of a camera's initial position, each axis [m]; none for the first camera")
+      .real("rotation_sigma", 0.01, 0.0, 3.0, "error of its initial orientation, each axis [rad]")
+      .real("focal_sigma", 10.0, 0.0, 1e6, "error of its initial focal length [px]")
+      .real("distortion_sigma", 0.01, 0.0, 10.0, "error of its initial k1 and k2")
+      .real("point_sigma", 0.2, 0.0, 1e6, "error of a point's initial position, each axis [m]")
       .real("noise", 1.0, 0.0, 1000.0,
             "factor on all noise and errors; 0: all exact, weighted as for 1")
-      .integer("outliers", 0, 0, 1e9, "sightings of one point taken for another");
+      .integer("outliers", 0, 0, 1e9, "observations associated with a wrong point");
   return table;
 }
 

@@ -186,7 +186,7 @@ OptionTable landmarks2d_options() {
       .real("landmark_sigma", 0.1, 1e-9, 1e6, "noise of a landmark's position, or of its range [m]")
       .real("bearing_sigma", 0.02, 1e-9, 3.0, "noise of a landmark's bearing [rad]");
   add_noise_options(table, {.translation_sigma = 0.05, .rotation_sigma = 0.01});
-  table.integer("outliers", 0, 0, 1e9, "sightings of one landmark taken for another");
+  table.integer("outliers", 0, 0, 1e9, "observations associated with a wrong landmark");
   return table;
 }
 

@@ -1,7 +1,8 @@
 #!/bin/sh
 # SPDX-License-Identifier: BSD-3-Clause
 # Fails where a text for readers uses a word of the table "Words to avoid" of docs/glossary.md, and names file and line.
-# Texts for readers: the documentation, messages and --help texts (string literals), and the comments of headers.
+# Texts for readers: the documentation; messages, --help texts and descriptions of plugins (string literals); and the
+# comments of headers.
 #
 #   glossary.sh SOURCE_FOLDER [FOLDER]    FOLDER: of the texts searched, instead of SOURCE_FOLDER (for the test of this)
 set -eu
@@ -30,7 +31,7 @@ awk '/^## /{in_table = /^## Words to avoid/}
 cd "$searched"
 mkdir "$work/texts"
 for place in docs README.md CHANGELOG.md CONTRIBUTING.md apps/cairn core lib types solvers plugins; do
-  [ ! -e "$place" ] || find "$place" -type f \( -name '*.md' -o -name '*.hpp' -o -name '*.cpp' \)
+  [ ! -e "$place" ] || find "$place" -type f \( -name '*.md' -o -name '*.hpp' -o -name '*.cpp' -o -name CMakeLists.txt \)
 done | grep -v '^docs/glossary\.md$' > "$work/files"
 [ -s "$work/files" ] || { echo "no files to search in $searched" >&2; exit 1; }
 while IFS= read -r file; do

@@ -101,7 +101,7 @@ void check(const VariableType& type, const OdometryChain& chain, std::span<const
            std::span<const double> to) {
   if (!type.lie_group() || !type.placement()) {
     throw Error(ErrorCode::usage,
-                fmt::format("recover: {} has not the abilities LieGroup and Placement; poses such "
+                fmt::format("recover: {} lacks the ability LieGroup or Placement; poses such "
                             "as VERTEX_SE2 and VERTEX_SE3:QUAT have",
                             type.tag()));
   }
