@@ -155,7 +155,8 @@ TEST(CompactTables, CallCovariancesHonestWithinTheBandOfChi2) {
 }
 
 TEST(CompactTables, CompareCovariancesWithThoseOfEverything) {
-  const auto compared = report("compact_consistency", R"({"part": "compare", "name": "town", "compare":
+  const auto compared =
+      report("compact_consistency", R"({"part": "compare", "name": "town", "compare":
       {"steps": 166, "marginal_conservative": 0.995, "full_conservative": 1.0,
        "least_marginal_ratio": 0.99, "least_full_ratio": 1.2, "least_eigenvalue": 0.987}},
       {"part": "compare", "name": "village", "compare": null})");

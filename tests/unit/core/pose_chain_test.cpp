@@ -354,7 +354,7 @@ TEST_P(Recover, RefusesWhatDoesNotFit) {
   };
   const OdometryChain one = chain({arc(1, 0)});
   EXPECT_THAT(refusal(*define_variable<test::ScaledPose>(), one, to),
-              HasSubstr("VERTEX_SCALED has not the abilities LieGroup and Placement"));
+              HasSubstr("VERTEX_SCALED lacks the ability LieGroup or Placement"));
   EXPECT_THAT(refusal(*type_, one, State{1.0}), HasSubstr("numbers"));
   EXPECT_THAT(refusal(*type_, chain({State{1.0}}), to), HasSubstr("numbers"));
   EXPECT_EQ(refusal(*type_, one, to), "");
