@@ -42,7 +42,7 @@ class Recording:
             before = pose
 
     def match(self, earlier, later):
-        """The lines with the measured motion between two poses; none if they do not match."""
+        """The lines with the measured relative pose of two poses; none if they do not match."""
         return self.measured.get(frozenset((earlier, later)), [])
 
 
@@ -75,7 +75,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
     parser.add_argument("graph", help="a recorded pose graph (g2o)")
     parser.add_argument("-o", "--output", required=True, help="where the compact graph goes")
-    parser.add_argument("--policy", default="compact_pose", help="who decides, with its options")
+    parser.add_argument("--policy", default="compact_pose", help="the pose policy, with its options")
     parser.add_argument("--cairn", default="cairn", help="the program")
     options = parser.parse_args()
 

@@ -12,7 +12,7 @@
 
 namespace cairn::app {
 
-/// What `view` and `plot` are told to show.
+/// What `view` and `plot` show.
 struct AlbumOptions {
   std::vector<std::string> files;
   std::vector<std::string> names;  ///< of the estimates, in the order of the files
@@ -34,7 +34,7 @@ void add_album_options(CLI::App& command, AlbumOptions& options);
 /// Everything else stands by itself. Throws `Error` for files that cannot be read.
 Album load_album(const AlbumOptions& options, const std::string& command, Session& session);
 
-/// Title, time, machine and build of an album that `command` makes.
+/// Title, time, machine and build of an `Album` that `command` makes.
 Album begin_album(const std::string& title, const std::string& command);
 
 /// "sphere.g2o" of "maps/sphere.g2o"; a generator's name as it is.

@@ -24,9 +24,10 @@ void check(const BenchOptions& options, Session& session) {
   if (options.csv == "-") session.write_file_to_stdout();
   if (options.html.empty()) return;
   if (!session.registry().has(Picture::kKind, "html")) {
-    throw Error(ErrorCode::plugin,
-                "no plugin makes pages here: cairn was built without apps/report/dist and without "
-                "npm; leave out --html");
+    throw Error(
+        ErrorCode::plugin,
+        "no plugin makes reports here: cairn was built without apps/report/dist and without "
+        "npm; leave out --html");
   }
   check_folder(options.html);
 }
@@ -53,7 +54,7 @@ std::string name_of(const Configuration& configuration) {
 Scene scene_of_result(const GraphResult& result) {
   Graph graph = result.loaded.graph.clone();
   Scene scene = scene_of(graph, short_name(result.loaded.name));
-  scene.estimates.push_back(place(graph, scene, "first estimate", EstimateRole::initial));
+  scene.estimates.push_back(place(graph, scene, "initial estimate", EstimateRole::initial));
   for (const ConfigurationResult& configuration : result.results) {
     if (configuration.runs.empty()) continue;
     const bool first = scene.runs.empty();
@@ -124,13 +125,14 @@ Command add_bench(CLI::App& program) {
       ->check(within(1, 1000000))
       ->capture_default_str();
   app->add_flag("--no-memory", options->no_memory, "leave out the extra run for the peak memory");
-  app->add_option("--csv", options->csv, "one line a run (- is standard output)")
+  app->add_option("--csv", options->csv, "one line per run (- is standard output)")
       ->type_name("FILE");
-  app->add_option("--html", options->html, "all of it as a page, with the graphs to look round in")
+  app->add_option("--html", options->html, "all of it as an HTML report with the graphs")
       ->type_name("FILE");
   add_input_options(*app, options->input);
   app->footer(
-      "Every run starts from the same first estimate and ends as optimize does; for N equal steps, "
+      "Every run starts from the same initial estimate and ends as optimize does; for N equal "
+      "steps, "
       "add\n"
       "--tolerance 0. Times are of optimisation alone. 'ratio' is the median over rounds of the "
       "time\n"

@@ -9,12 +9,12 @@
 
 namespace cairn::app {
 
-/// One line a configuration: medians, ratios, agreement.
+/// One line per configuration: medians, ratios, agreement.
 std::string bench_table(const GraphResult& graph, bool colour);
-/// One object a graph, one a configuration, and in it every run.
+/// One object per graph, one per configuration, and in it every run.
 boost::json::object bench_json(const BenchOptions& options, const std::vector<GraphResult>& graphs,
                                bool interrupted);
-/// One line a run, with a title line.
+/// One line per run, with a title line.
 std::string bench_csv(const std::vector<GraphResult>& graphs);
 
 }  // namespace cairn::app

@@ -22,7 +22,7 @@ struct BenchOptions {
   std::string html;
 };
 
-/// One way of solving: an optimizer and, where it takes one, a linear solver; as they were written.
+/// One configuration: an optimizer and, where it takes one, a linear solver; as they were written.
 struct Configuration {
   std::string optimizer;
   std::string linear_solver;  ///< empty: the optimizer brings its own
@@ -51,8 +51,8 @@ struct GraphResult {
 };
 
 /// Runs everything. Within a round each configuration runs once, on a clone of the graph at its
-/// first estimate; each round begins with another one, so that none always follows the same. Stops
-/// at an interrupt with the runs that are whole by then, which `interrupted` tells.
+/// initial estimate; each round begins with another one, so that none always follows the same.
+/// Stops at an interrupt with the runs that are whole by then, which `interrupted` shows.
 std::vector<GraphResult> run_bench(const BenchOptions& options, Session& session,
                                    bool& interrupted);
 

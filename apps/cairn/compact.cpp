@@ -302,7 +302,7 @@ void add_result(Table& table, const CompactResult& result, const Recording& reco
   table.add({"chi2", chi2_text(result.chi2)});
   for (const auto& [name, error] : result.errors) table.add({name, errors_text(error)});
   if (result.normalized && result.normalized->dof > 0) {
-    table.add({"NEES", fmt::format("{:.4g} a degree of freedom ({})",
+    table.add({"NEES", fmt::format("{:.4g} per degree of freedom ({})",
                                    result.normalized->squared / result.normalized->dof,
                                    result.normalized->dof)});
   }
@@ -396,7 +396,7 @@ int run(const CompactOptions& options, Session& session) {
 Command add_compact(CLI::App& program) {
   auto options = std::make_shared<CompactOptions>();  // lives as long as the parser and the run
   CLI::App* app = program.add_subcommand(
-      "compact", "compact pose SLAM: keep only the poses and loop closures that tell much");
+      "compact", "compact pose SLAM: keep only the most informative poses and loop closures");
   app->add_option("graph", options->graph, kGraphHelp)->type_name("GRAPH")->required();
   app->add_option("-o,--output", options->output, "write the compact graph")->type_name("OUT");
   app->add_option("--to", options->output_format, "format of OUT")->type_name("FORMAT");
@@ -412,13 +412,13 @@ Command add_compact(CLI::App& program) {
       ->type_name("NAME")
       ->check(one_of({"apal", "apfl", "fpfl", "rfpfl"}))
       ->capture_default_str();
-  app->add_option("--policy", options->policy, "who decides, with options as NAME:key=value")
+  app->add_option("--policy", options->policy, "the pose policy, with options as NAME:key=value")
       ->type_name("NAME")
       ->capture_default_str();
-  app->add_option("--estimator", options->estimator, "who estimates, instead of the policy's own")
+  app->add_option("--estimator", options->estimator, "the estimator, instead of the policy's own")
       ->type_name("NAME");
   app->add_option("--registration", options->registration,
-                  "who measures loops: recorded, or simulated:range=5,angle=1,false_rate=0.1")
+                  "matcher: recorded, or simulated:range=5,angle=1,false_rate=0.1")
       ->type_name("NAME")
       ->capture_default_str();
   app->add_flag("--auto", options->automatic,
@@ -439,10 +439,11 @@ Command add_compact(CLI::App& program) {
   app->add_option("--range", options->range, "how far the sensor matches [m]")->type_name("M");
   app->add_option("--angle", options->angle, "and between which orientations [rad]")
       ->type_name("RAD");
-  app->add_option("--loop-gain", options->loop_gain, "a loop must tell more [nats]")
+  app->add_option("--loop-gain", options->loop_gain,
+                  "information gain that a loop closure must exceed [nats]")
       ->type_name("G");
   app->add_option("--pose-gain", options->pose_gain,
-                  "a pose is kept if links to it would tell more")
+                  "a pose is kept if the gain of a link to it would exceed this [nats]")
       ->type_name("G");
   app->add_option("--gate", options->gate,
                   "refuse links that do not fit; so large a part of right ones passes (0.99)")

@@ -10,10 +10,10 @@
 
 namespace cairn::app {
 
-/// How uncertain a compact graph says its poses are, beside what is known of the same poses from
-/// everything that was measured. Norms are Frobenius'.
+/// The covariances of a compact graph's poses beside those of the same poses from all measurements.
+/// Norms are Frobenius'.
 struct UncertaintyStep {
-  Id pose = 0;                ///< newest pose of the way
+  Id pose = 0;                ///< newest pose of the trajectory
   int kept = 0;               ///< poses compared
   double marginal = 0.0;      ///< of the compact graph's marginal covariances, side by side
   double marginal_all = 0.0;  ///< of the same poses' with everything

@@ -29,7 +29,7 @@ struct Recording {
   const Graph& graph() const { return loaded.graph; }
 };
 
-/// A policy's name with options, and who registers for it.
+/// A policy's name with options, and its registration.
 struct CompactJob {
   ComponentSpec policy;
   std::string registration = "recorded";
@@ -65,8 +65,8 @@ struct CompactSetting {
 class CompactRun {
  public:
   CompactRun(const CompactJob& job, const CompactSetting& setting);
-  /// Runs over so many poses; once. `title` is shown with the progress, and `after` is told of each
-  /// pose by its number.
+  /// Runs over so many poses; once. `title` is shown with the progress, and `after` is called with
+  /// the number of each pose.
   void run(std::size_t count, const std::string& title,
            const std::function<void(std::size_t)>& after = {});
 

@@ -12,7 +12,7 @@ namespace cairn::app {
 struct ThresholdTrial {
   double links = 1.0, poses = 1.0;  ///< factors of what the policy found at first
   double expected = 0.0;            ///< expected error [m]
-  double realised = 0.0;            ///< the same, by how far it is from the way with everything
+  double realised = 0.0;  ///< the same, by the distance from the trajectory with everything
   std::int64_t poses_kept = 0, loops_kept = 0;
   double error() const { return std::max(expected, realised); }
 };

@@ -49,8 +49,7 @@ Command add_convert(CLI::App& program) {
                   "file (packed if it ends in .gz; - is standard output)")
       ->type_name("OUT")
       ->required();
-  app->add_option("--to", options->output_format,
-                  "format of OUT, instead of telling it by the ending")
+  app->add_option("--to", options->output_format, "format of OUT, instead of by the ending")
       ->type_name("FORMAT");
   add_input_options(*app, options->input);
   app->footer(

@@ -35,7 +35,7 @@ CovarianceSolver make_covariance_solver(const std::string& name, Registry& regis
   CovarianceSolver made{name, registry.make<LinearSolver>(name)};
   if (query<Marginals>(*made.solver)) return made;
   throw Error(ErrorCode::usage,
-              fmt::format("linear solver '{}' gives no covariances: it has not the ability '{}', "
+              fmt::format("linear solver '{}' gives no covariances: it lacks the ability '{}', "
                           "since it does not solve exactly; these have: {}",
                           name, Marginals::kAbility, fmt::join(solvers_that_can(registry), ", ")));
 }

@@ -86,7 +86,7 @@ void need_stamps(const Trajectory& poses, const std::string& file, const std::st
                  const std::string& remedy) {
   if (poses.empty() || poses.front().stamp) return;
   throw Error(ErrorCode::usage, fmt::format("{}: has no time stamps, which {} asks for; give them "
-                                            "with {} FILE, one a line",
+                                            "with {} FILE, one per line",
                                             file, reason, remedy));
 }
 
@@ -195,7 +195,7 @@ CLI::Validator seconds(double least) {
 void add_trajectory_options(CLI::App& app, TrajectoryOptions& options, const std::string& prefix,
                             const std::string& name) {
   app.add_option("--" + prefix + "stamps", options.stamps,
-                 "time stamps of " + name + ", one a line, by rising id")
+                 "time stamps of " + name + ", one per line, by rising id")
       ->type_name("FILE");
   app.add_option("--" + prefix + "axes", options.axes,
                  "of " + name + ": robot (x ahead, z up) or camera (z ahead, y down)")

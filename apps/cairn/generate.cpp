@@ -58,7 +58,7 @@ Command add_generate(CLI::App& program) {
       ->required();
   app->add_option("--ground-truth", options->ground_truth, "the same graph at its true states")
       ->type_name("FILE");
-  app->add_option("--to", options->output_format, "format, instead of telling it by the ending")
+  app->add_option("--to", options->output_format, "format, instead of by the ending")
       ->type_name("FORMAT");
   app->add_option("--seed", options->seed, "seed of the noise; the same seed gives the same graph")
       ->type_name("S")

@@ -98,13 +98,12 @@ void check_ending(const std::string& file, Registry& registry) {
 }  // namespace
 
 void add_input_options(CLI::App& command, InputOptions& options) {
-  command
-      .add_option("--from", options.format, "format of the input, instead of telling it by content")
+  command.add_option("--from", options.format, "format of the input, instead of by content")
       ->type_name("FORMAT");
   command.add_flag("--skip-unknown", options.read.skip_unknown,
                    "skip and count lines with unknown tags, instead of refusing the file");
   command.add_flag("--repair-information", options.read.repair_information,
-                   "mend information matrices where it is known how");
+                   "repair known mistakes in information matrices");
 }
 
 LoadedGraph load_graph(const std::string& name, const InputOptions& options, Session& session) {

@@ -31,7 +31,7 @@ struct LoadedGraph {
   double seconds = 0.0;  ///< that reading took
 };
 
-/// Reads a graph, and tells the user of everything that the reader skipped, mended or made up.
+/// Reads a graph, and notes everything that the reader skipped, repaired or added.
 /// "@manhattan:poses=500,seed=3" is generated: a generator, its options, and the seed.
 LoadedGraph load_graph(const std::string& name, const InputOptions& options, Session& session);
 

@@ -121,7 +121,7 @@ void suspect_structure(const Graph& graph, GraphSurvey& s) {
   }
   const auto parts = s.gauge.components - std::ssize(s.gauge.unconstrained);
   if (parts > 1) {
-    say(fmt::format("{} parts that no factor joins: where they lie to each other is not determined",
+    say(fmt::format("{} parts that no factor joins: their relative poses are not determined",
                     parts));
   }
   if (s.doubled > 0) {

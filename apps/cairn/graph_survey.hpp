@@ -41,7 +41,7 @@ struct GraphSurvey {
   Gauge gauge;
   std::int64_t gauge_freedoms = 0;  ///< degrees of freedom that no measurement determines
   std::int64_t degrees_of_freedom =
-      0;  ///< residuals minus variables that are not held: what chi2 should be
+      0;  ///< residuals minus those of variables that are not constant: the expected chi2
   double chi2 = 0.0;
   std::vector<WorstFactor> worst;       ///< by falling chi2
   std::vector<std::string> suspicions;  ///< a sentence each

@@ -60,7 +60,7 @@ std::string figures_text(const Graph& graph, const GraphSurvey& s) {
   table.add({"residuals / unknowns",
              fmt::format("{} / {}", graph.residual_size(), graph.tangent_size())});
   table.add({"degrees of freedom", fmt::format("{}", s.degrees_of_freedom)});
-  table.add({"chi2 as given", chi2_text(s.chi2) + ratio_text(s)});
+  table.add({"chi2, initial", chi2_text(s.chi2) + ratio_text(s)});
   return table.text(false);
 }
 

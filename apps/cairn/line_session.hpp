@@ -36,7 +36,7 @@ class LineSession {
   /// The same without an answer: lines that were taken before, from a journal. Throws `Error` where
   /// one is refused.
   void restore(std::string_view line, std::int64_t number);
-  /// No line follows. Not in a journal: whoever restores one goes on from before this.
+  /// No line follows. Not in a journal: a restored session continues from before this.
   virtual void finish() {}
 
   /// The graph and its estimate. Only to be read.
@@ -54,7 +54,7 @@ class LineSession {
   virtual void perform(std::string_view line, const Words& words, Reply& reply) = 0;
 
   std::int64_t line() const { return line_; }
-  /// Restoring: nobody reads the answers.
+  /// Restoring: answers are discarded.
   bool silent() const { return silent_; }
   /// The line that ends an answer.
   void acknowledge(Reply& reply, int owed = 0, std::string_view word = "OK") const;

@@ -417,18 +417,18 @@ Command add_marginals(CLI::App& program) {
       ->type_name("FILE");
   app->add_flag("--as-given", options->as_given,
                 "at the states as they are, or as --initial puts them: do not optimise");
-  app->add_option("--optimizer", options->optimizer, "who finds the estimate first")
+  app->add_option("--optimizer", options->optimizer, "the optimizer that finds the estimate")
       ->type_name("NAME")
       ->capture_default_str();
   app->add_option("--linear-solver", options->linear_solver,
-                  "who solves H x = g, and gives the covariances")
+                  "solves H x = g, and gives the covariances")
       ->type_name("NAME")
       ->capture_default_str();
   add_problem_options(*app, options->problem);
   add_input_options(*app, options->input);
   app->footer(
       "Covariances are of the step that moves a state, for a pose x exp(d): metres along its own\n"
-      "axes, then radians. Variables that are held, or anchored, have zeros.\n"
+      "axes, then radians. Variables that are fixed, or anchored, have zeros.\n"
       "Example:\n"
       "  cairn marginals city.g2o --column last --pairs 17:350,17:351 -o city.cov");
   return {app, [options](Session& session) { return run(*options, session); }};

@@ -239,11 +239,11 @@ Command add_online(CLI::App& program) {
   CLI::App* app =
       program.add_subcommand("online", "estimate from standard input while measurements arrive");
   app->add_option("--estimator", options->estimator,
-                  "who estimates, with options as NAME:key=value")
+                  "the estimator, with options as NAME:key=value")
       ->type_name("NAME")
       ->default_str(kDefaultEstimator);
   app->add_option("--policy", options->policy,
-                  "who decides what is kept, such as compact_pose; otherwise everything is")
+                  "decides which poses are kept, such as compact_pose; default: all are")
       ->type_name("NAME");
   app->add_option("--solve", options->solve, "auto, after every measurement, or explicit: by SOLVE")
       ->type_name("WHEN")
@@ -259,7 +259,7 @@ Command add_online(CLI::App& program) {
       ->type_name("WHICH")
       ->check(one_of({"none", "last", "diagonal"}))
       ->capture_default_str();
-  app->add_option("--budget", options->budget, "seconds an update may take; 0: no limit")
+  app->add_option("--budget", options->budget, "seconds that an update may take; 0: no limit")
       ->type_name("S")
       ->check(within(0.0, 1e9))
       ->default_str("0");

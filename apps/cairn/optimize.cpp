@@ -173,13 +173,13 @@ Command add_optimize(CLI::App& program) {
   app->add_option("graph", options->graph, kGraphHelp)->type_name("GRAPH")->required();
   app->add_option("-o,--output", options->output, "write the estimate (- is standard output)")
       ->type_name("OUT");
-  app->add_option("--to", options->output_format,
-                  "format of OUT, instead of telling it by the ending")
+  app->add_option("--to", options->output_format, "format of OUT, instead of by the ending")
       ->type_name("FORMAT");
-  app->add_option("--optimizer", options->optimizer, "who steps, with options as NAME:key=value")
+  app->add_option("--optimizer", options->optimizer,
+                  "the optimizer, with options as NAME:key=value")
       ->type_name("NAME")
       ->capture_default_str();
-  app->add_option("--linear-solver", options->linear_solver, "who solves H x = g in each step")
+  app->add_option("--linear-solver", options->linear_solver, "solves H x = g in each step")
       ->type_name("NAME")
       ->default_str(kDefaultLinearSolver);
   add_problem_options(*app, options->problem);

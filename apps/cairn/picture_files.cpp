@@ -18,9 +18,9 @@ std::string picture_format(const std::string& file, Session& session) {
   for (char& c : ending) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
   const std::vector<std::string> names = session.registry().names(Picture::kKind);
   if (names.empty()) {
-    throw Error(
-        ErrorCode::plugin,
-        "no plugin draws pictures here: cairn was built without Cairo and without the page");
+    throw Error(ErrorCode::plugin,
+                "no plugin draws reports or plots here: cairn was built without Cairo and without "
+                "the page");
   }
   if (ending.empty() || std::find(names.begin(), names.end(), ending.substr(1)) == names.end()) {
     throw Error(ErrorCode::usage,

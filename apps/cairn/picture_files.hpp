@@ -13,7 +13,7 @@ namespace cairn::app {
 /// on offer, and `Error` (input) if its folder is not there or refuses.
 std::string picture_format(const std::string& file, Session& session);
 
-/// Draws an album into a file ("-" is standard output), and returns its size in bytes.
+/// Draws an `Album` into a file ("-" is standard output), and returns its size in bytes.
 std::size_t write_picture(const Album& album, const ComponentSpec& picture, const std::string& file,
                           Session& session);
 

@@ -82,9 +82,9 @@ int run(const PlotOptions& options, Session& session) {
 
 Command add_plot(CLI::App& program) {
   auto options = std::make_shared<PlotOptions>();  // lives as long as the parser and the run
-  CLI::App* app = program.add_subcommand("plot", "a static picture: SVG, PNG or PDF");
+  CLI::App* app = program.add_subcommand("plot", "a static plot: SVG, PNG or PDF");
   add_album_options(*app, options->album);
-  app->add_option("-o,--output", options->output, "the picture: .svg, .png or .pdf")
+  app->add_option("-o,--output", options->output, "the plot: .svg, .png or .pdf")
       ->type_name("PICTURE")
       ->required();
   app->add_option("--what", options->what,

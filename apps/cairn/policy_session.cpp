@@ -173,10 +173,9 @@ Id PolicySession::other_end(std::span<const Id> ends) const {
   if (!pose) throw bad_line("there is no pose that is not done; expected the line of the next one");
   const bool between = ends.size() == 2 && (ends[0] == pose) != (ends[1] == pose);
   if (!between) {
-    throw bad_line(
-        fmt::format("between {}; expected a motion between pose {}, which is the "
-                    "newest, and another",
-                    fmt::join(ends, " and "), *pose));
+    throw bad_line(fmt::format(
+        "between {}; expected a relative pose between pose {}, which is the newest, and another",
+        fmt::join(ends, " and "), *pose));
   }
   return ends[0] == pose ? ends[1] : ends[0];
 }
@@ -185,7 +184,7 @@ Id PolicySession::other_end(std::span<const Id> ends) const {
 void PolicySession::check_motion(const Factor& factor, Id from) const {
   const FactorType& type = *factor.type;
   if (!type.is_relative() || type.variable_tags().front() != motions_->type().tag()) {
-    throw bad_line(fmt::format("{} measures no motion of {}, and a policy takes nothing else",
+    throw bad_line(fmt::format("{} is no relative pose of {}, and a policy takes nothing else",
                                type.tag(), motions_->type().tag()));
   }
   (void)motions_->of_factor(factor, from);
@@ -219,10 +218,9 @@ void PolicySession::expect_complete() const {
   if (!current())
     throw bad_line("there is no pose that is not done; expected the line of the next one");
   if (!complete()) {
-    throw bad_line(
-        fmt::format("pose {} has no odometry yet; expected a measured motion between "
-                    "poses {} and {} first",
-                    arriving_->pose.id, *newest_, arriving_->pose.id));
+    throw bad_line(fmt::format(
+        "pose {} has no odometry yet; expected a relative pose between poses {} and {} first",
+        arriving_->pose.id, *newest_, arriving_->pose.id));
   }
 }
 
@@ -299,7 +297,7 @@ void PolicySession::close(Reply& reply) {
 void PolicySession::finish_way(Reply& reply) {
   if (!complete()) {
     told_text_ +=
-        fmt::format("NOTE pose {} is left out: no motion between {} and {} was measured\n",
+        fmt::format("NOTE pose {} is left out: no relative pose between {} and {} was measured\n",
                     arriving_->pose.id, *newest_, arriving_->pose.id);
     arriving_.reset();
   }

@@ -27,11 +27,11 @@ struct PolicySettings {
 ///
 /// A pose *arrives* with its line and its odometry, is *open* from the first line on that is
 /// neither (then the policy has it), and ends with DONE, the line of the next pose or the input.
-/// Lines of data only collect; every command first *settles* what came before it, and tells in its
-/// answer what became of it. What a command refuses is found before it settles anything.
+/// Lines of data only collect; every command first *settles* what came before it, and reports the
+/// outcome in its answer. What a command refuses is found before it settles anything.
 ///
-/// A policy may hold back odometry from its estimator until somebody reads that, which costs the
-/// last bits their place. So a question that reads the estimator goes to the journal.
+/// A policy may defer odometry until its estimator is read, which changes the last bits. So a query
+/// that reads the estimator goes to the journal.
 class PolicySession final : public LineSession {
  public:
   PolicySession(PosePolicy& policy, StreamFormat& format, Registry& registry,

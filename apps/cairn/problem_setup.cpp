@@ -20,7 +20,8 @@ void add_loss_options(CLI::App& command, ProblemOptions& options) {
 }
 
 void add_problem_options(CLI::App& command, ProblemOptions& options) {
-  command.add_option("--initial", options.initial, "first estimate: a name of kind initial_guess")
+  command
+      .add_option("--initial", options.initial, "initial estimate: a name of kind initial_guess")
       ->type_name("NAME")
       ->capture_default_str();
   add_loss_options(command, options);

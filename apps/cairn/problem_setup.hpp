@@ -20,7 +20,7 @@ inline constexpr const char* kDefaultLinearSolver = "block_cholesky";
 /// Of an optimizer: the option that names a component of kind linear_solver.
 inline constexpr const char* kLinearSolverOption = "linear_solver";
 
-/// What `optimize` and `bench` are told about the problem, besides who solves it.
+/// Options of `optimize` and `bench` about the problem, besides those of the solvers.
 struct ProblemOptions {
   std::string initial = "as_given";
   std::string loss;  ///< empty: none
@@ -32,11 +32,11 @@ void add_problem_options(CLI::App& command, ProblemOptions& options);
 void add_loss_options(CLI::App& command, ProblemOptions& options);
 
 /// The initial guess and the loss that the options name; made before a graph is read, so that a
-/// wrong name is told at once.
+/// wrong name is reported at once.
 class ProblemSetup {
  public:
   ProblemSetup(const ProblemOptions& options, Registry& registry);
-  /// Gives the graph its loss and its first estimate. Returns notes for the user.
+  /// Gives the graph its loss and its initial estimate. Returns notes for the user.
   std::vector<std::string> apply(Graph& graph) const;
 
   const std::shared_ptr<const Loss>& loss() const { return loss_; }

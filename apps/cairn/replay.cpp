@@ -437,7 +437,7 @@ int run(const ReplayOptions& options, Session& session) {
   const Replay replay = replay_all(loaded.graph, arrivals, *estimator,
                                    checker ? &*checker : nullptr, options, guard, session);
   if (replay.placed_as_given > 1) {
-    session.note(fmt::format("{} the states of the file: no measurement at arrival tells where",
+    session.note(fmt::format("{} the states of the file: no measurement determined them at first",
                              plural(replay.placed_as_given, "variable") + " began with"));
   }
   const double chi2 = estimator->chi2();
@@ -454,15 +454,15 @@ int run(const ReplayOptions& options, Session& session) {
 
 Command add_replay(CLI::App& program) {
   auto options = std::make_shared<ReplayOptions>();  // lives as long as the parser and the run
-  CLI::App* app = program.add_subcommand("replay", "feed a graph to an estimator as it came about");
+  CLI::App* app = program.add_subcommand(
+      "replay", "feed a graph to an estimator in the order of its measurements");
   app->add_option("graph", options->graph, kGraphHelp)->type_name("GRAPH")->required();
   app->add_option("-o,--output", options->output, "write the last estimate (- is standard output)")
       ->type_name("OUT");
-  app->add_option("--to", options->output_format,
-                  "format of OUT, instead of telling it by the ending")
+  app->add_option("--to", options->output_format, "format of OUT, instead of by the ending")
       ->type_name("FORMAT");
   app->add_option("--estimator", options->estimator,
-                  "who estimates, with options as NAME:key=value")
+                  "the estimator, with options as NAME:key=value")
       ->type_name("NAME")
       ->capture_default_str();
   app->add_option("--marginals", options->marginals, "covariances kept: none, last or diagonal")
@@ -478,7 +478,7 @@ Command add_replay(CLI::App& program) {
       ->type_name("N")
       ->check(within(1, 1000000000))
       ->capture_default_str();
-  app->add_option("--budget", options->budget, "seconds an update may take; 0: no limit")
+  app->add_option("--budget", options->budget, "seconds that an update may take; 0: no limit")
       ->type_name("S")
       ->check(within(0.0, 1e9))
       ->default_str("0");

@@ -19,7 +19,7 @@ namespace cairn::app {
 struct BatchCheck {
   int step = 0;           ///< from 1
   double chi2 = 0.0;      ///< of the estimator
-  double batch = 0.0;     ///< of an optimisation from the first guess of everything so far
+  double batch = 0.0;     ///< of an optimisation of everything so far from the initial estimate
   double polished = 0.0;  ///< of an optimisation from the estimator's estimate
   /// Largest ‖Σ_ii − Σ'_ii‖ / ‖Σ'_ii‖ of the covariances kept, Σ' being the selected inverse of the
   /// same graph at the same estimate; none if that was not asked for.
@@ -35,7 +35,7 @@ class BatchChecker {
   /// Both outlive this object. `covariances`: compare the kept block diagonal too.
   BatchChecker(const Graph& whole, const ProblemSetup& setup, Registry& registry, bool covariances);
 
-  /// What has arrived is part of the checks from now on.
+  /// These elements are part of the checks from now on.
   void add(const Arrival& arrival);
   BatchCheck check(int step, Estimator& estimator);
 

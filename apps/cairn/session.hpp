@@ -42,7 +42,7 @@ class Session {
   void print(std::string_view text) const;
   /// Whether `print` may colour.
   bool colour() const;
-  /// A line on standard error that a user should see, such as what a reader had to mend.
+  /// A line on standard error that a user should see, such as what a reader had to repair.
   void note(std::string_view text) const;
 
   bool wants_json() const { return !common.json.empty(); }
@@ -58,7 +58,7 @@ class Session {
 /// `Error` (input) where the output cannot be written for another reason, such as a full disk.
 void write_stdout(std::string_view text);
 
-/// Standard output is a pipe (or socket) that nobody reads any more.
+/// Standard output is a pipe (or socket) whose reader is gone.
 bool stdout_reader_is_gone();
 
 }  // namespace cairn::app

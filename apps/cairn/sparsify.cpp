@@ -325,14 +325,14 @@ Command add_sparsify(CLI::App& program) {
                   "by how many factors: tree:γ, fill:α or loss:KLD [tree:2]")
       ->type_name("HOW");
   app->add_option("--recovery", options->recoveries,
-                  "who finds their information: ncfd, fd, ip, pqn; closed_form for trees [ncfd]")
+                  "factor recovery: ncfd, fd, ip, pqn; closed_form for trees [ncfd]")
       ->type_name("NAME");
   app->add_option(
          "--scheme", options->scheme,
          "single: one by one; runs: those in a row together; multi: all connected ones [single]")
       ->type_name("HOW")
       ->check(one_of({"single", "runs", "multi"}));
-  app->add_option("--sparsifier", options->sparsifier, "who does it, with more options")
+  app->add_option("--sparsifier", options->sparsifier, "the sparsifier, with more options")
       ->type_name("NAME")
       ->capture_default_str();
   app->add_option("--online", options->online,
@@ -346,13 +346,14 @@ Command add_sparsify(CLI::App& program) {
       ->type_name("WHEN")
       ->check(one_of({"late", "early"}))
       ->capture_default_str();
-  app->add_option("--estimator", options->estimator, "online: who estimates")
+  app->add_option("--estimator", options->estimator, "online: the estimator")
       ->type_name("NAME")
       ->capture_default_str();
-  app->add_option("--optimizer", options->optimizer, "who optimises before and after")
+  app->add_option("--optimizer", options->optimizer, "the optimizer, before and after")
       ->type_name("NAME")
       ->capture_default_str();
-  app->add_option("--linear-solver", options->linear_solver, "who tells determinants")
+  app->add_option("--linear-solver", options->linear_solver,
+                  "the linear solver that gives determinants")
       ->type_name("NAME")
       ->capture_default_str();
   app->add_flag("--as-given", options->as_given, "the graph is at its minimum: do not optimise it");

@@ -44,8 +44,8 @@ struct ReplayRow {
 };
 
 /// Solves every problem with every topology and recovery, interleaved: each problem by all in turn.
-/// `population` as the sparsifier takes it, but for loss. `step` is told how many problems are
-/// solved, and returns whether to go on.
+/// `population` as the sparsifier takes it, but for loss. `step` is called with the number of
+/// problems solved, and returns whether to go on.
 std::vector<ReplayRow> replay_problems(const std::vector<DenseBlanket>& problems,
                                        const std::vector<std::string>& topologies,
                                        const std::string& population,

@@ -76,9 +76,10 @@ int run(const ViewOptions& options, Session& session) {
   }
   if (page == "-") session.write_file_to_stdout();
   if (!session.registry().has(Picture::kKind, "html")) {
-    throw Error(ErrorCode::plugin,
-                "no plugin makes pages here: cairn was built without apps/report/dist and without "
-                "npm; cairn plot draws static pictures");
+    throw Error(
+        ErrorCode::plugin,
+        "no plugin makes reports here: cairn was built without apps/report/dist and without "
+        "npm; cairn plot draws static plots");
   }
   check_folder(page);
   session.use_threads();
@@ -95,7 +96,7 @@ int run(const ViewOptions& options, Session& session) {
 
 Command add_view(CLI::App& program) {
   auto options = std::make_shared<ViewOptions>();  // lives as long as the parser and the run
-  CLI::App* app = program.add_subcommand("view", "a page for the browser: look round in a graph");
+  CLI::App* app = program.add_subcommand("view", "an HTML report with interactive graphs");
   add_album_options(*app, options->album);
   app->add_option("-o,--output", options->output, "the page [name of the first FILE, .html]")
       ->type_name("PAGE");

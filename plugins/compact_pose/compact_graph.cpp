@@ -55,7 +55,8 @@ void CompactGraph::start(const Variable& pose, PolicySeconds& seconds) {
 
 Motion CompactGraph::fuse(std::span<const Factor> factors, Id from, Id to) const {
   const MotionGroup& motions = group_->motions();
-  if (factors.empty()) refuse(fmt::format("no measured motion from pose {} to {}", from, to));
+  if (factors.empty())
+    refuse(fmt::format("no measured relative pose from pose {} to {}", from, to));
   Motion all;
   for (const Factor& factor : factors) {
     const auto& on = factor.variables;
@@ -65,7 +66,7 @@ Motion CompactGraph::fuse(std::span<const Factor> factors, Id from, Id to) const
     if (!factor.type) refuse("a measurement without a type");
     if (!factor.type->is_relative() ||
         factor.type->variable_tags().front() != motions.type().tag()) {
-      refuse(fmt::format("{} between {} and {} measures no motion of {}", factor.type->tag(), from,
+      refuse(fmt::format("{} between {} and {} is no relative pose of {}", factor.type->tag(), from,
                          to, motions.type().tag()));
     }
     const Motion motion = motions.of_factor(factor, from);

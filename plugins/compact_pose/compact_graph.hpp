@@ -20,12 +20,12 @@ namespace cairn::compact {
 /// A compact pose graph while it grows: the poses that are kept, in an estimator, and the newest
 /// pose, which may not be kept.
 ///
-/// Poses that odometry alone has added are a chain at the end of the graph, and tell the others
-/// nothing. So they reach the estimator only when a link closes a loop, or somebody reads it, and
-/// all of them at once; replacing a redundant pose by the next one costs it nothing either
-/// (Algorithm 1, line 12). Until then their states and covariances follow from those of the pose
-/// that the chain hangs on, the anchor a, which the estimator has: with μ the concatenated motion
-/// from there and A = Ad(μ⁻¹),
+/// Poses that odometry alone has added are a chain at the end of the graph, without information
+/// about the others. So they are passed to the estimator only when a link closes a loop, or the
+/// estimator is read, and all of them at once; replacing a redundant pose by the next one does not
+/// involve it either (Algorithm 1, line 12). Until then their states and covariances follow from
+/// those of the pose at which the chain starts, the anchor a, which the estimator has: with μ the
+/// composed relative pose from there and A = Ad(μ⁻¹),
 ///
 ///     x_n = x_a μ,  Σ_in = Σ_ia Aᵀ,  Σ_nn = A Σ_aa Aᵀ + Σ_μ,
 ///
@@ -41,8 +41,8 @@ class CompactGraph {
 
   /// The first pose of all.
   void start(const Variable& pose, PolicySeconds& seconds);
-  /// All measurements of the motion between two poses as one. Throws `Error` (input) if one of them
-  /// measures something else.
+  /// All measurements of the relative pose of two poses, fused. Throws `Error` (input) if one of
+  /// them measures something else.
   Motion fuse(std::span<const Factor> factors, Id from, Id to) const;
   /// The next pose, moved by `motion` from the one before: from then on the newest.
   void advance(const Variable& pose, const Motion& motion,
@@ -52,9 +52,10 @@ class CompactGraph {
   /// Keeps the newest pose, and takes these links in.
   void link(std::span<const Factor> links, PolicySeconds& seconds);
   /// The newest pose, which is not kept, has been matched with a kept one, `measured` from there.
-  /// Instead of keeping it, the way between its predecessor and that pose becomes a link of these
-  /// two, and goes on from that pose. The measurement takes part in both, so each gets half of its
-  /// information: two halves that are taken for independent tell no more than the one measurement.
+  /// Instead of keeping it, the chain between its predecessor and that pose becomes a link of these
+  /// two, and the trajectory continues from that pose. The measurement is used in both, so each
+  /// gets half of its information: two halves that are treated as independent have no more
+  /// information than the one measurement.
   void relocate(int pose, const Motion& measured, PolicySeconds& seconds);
   /// Relinearises and solves everything until it has converged.
   void solve_fully();
@@ -128,11 +129,11 @@ class CompactGraph {
     std::vector<ChainStep> steps;
   };
 
-  /// Whether odometry from the anchor alone tells where a pose is, or it is the anchor.
+  /// Whether a pose is connected to the anchor by odometry alone, or is the anchor.
   bool ahead(int pose) const { return pose == anchor_ || pose >= solved_; }
   Ahead compose(const Ahead& ahead, const Motion& motion) const;
-  /// Hands over what the estimator does not have yet, and links. Returns the number of the first of
-  /// these.
+  /// Passes to the estimator what it does not have yet, and links. Returns the number of the first
+  /// of these.
   FactorId update(std::span<const Factor> links, PolicySeconds& seconds,
                   std::vector<ChangedFactor> changed = {});
   void refresh();
@@ -145,11 +146,12 @@ class CompactGraph {
   std::unique_ptr<PoseIndex> index_;
   std::vector<Kept> kept_;
   int solved_ = 0;   ///< so many of them has the estimator
-  int anchor_ = -1;  ///< one of those: where the newest pose and those since the last update hang
+  int anchor_ = -1;  ///< one of those: where the chain of the newest pose and those since the last
+                     ///< update starts
   std::unordered_map<Id, int> number_;
   Newest newest_;
   std::vector<OdometryChain> chains_;
-  /// Links that stand for ways between kept poses, by the two (the smaller number first).
+  /// Links that replace chains between kept poses, by the two (the smaller number first).
   struct Bridge {
     FactorId factor = 0;
     Motion motion;

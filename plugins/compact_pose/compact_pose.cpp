@@ -111,8 +111,8 @@ void CompactPose::add_pose(const Variable& pose, std::span<const Factor> odometr
     if (graph_.find(pose.id) >= 0 || pose.id == graph_.newest_id())
       refuse(fmt::format("pose {} is there already", pose.id));
     if (odometry.empty())
-      refuse(fmt::format("pose {} comes without a measured motion from pose {}", pose.id,
-                         graph_.newest_id()));
+      refuse(
+          fmt::format("pose {} comes without odometry from pose {}", pose.id, graph_.newest_id()));
     const Motion motion = graph_.fuse(odometry, graph_.newest_id(), pose.id);
     std::swap(report_, report);
     const Timed timed(report_.seconds.total);

@@ -34,7 +34,7 @@ struct CompactPoseOptions {
   std::vector<double> sensor;
   CompositionOrder composition = CompositionOrder::first;
   bool reuse = false;  ///< a pose that is found to be at a kept one is not kept itself
-  /// … where that costs the way to it at most so much [nats a freedom and kept pose nearby].
+  /// … where the link loses at most this information [nats per DoF and kept pose nearby].
   double reuse_loss = 0.06;
   Search search = Search::index;
   double gate = 0.0;    ///< part of the right links that pass the consistency check; 0: off
@@ -43,16 +43,16 @@ struct CompactPoseOptions {
 
 /// Compact pose SLAM: Algorithm 1 of Ila, Polok, Solony and Svoboda, IJRR 2017, section 4.
 ///
-/// A link is used if it tells more than g_loop, expected and then measured; the most informative
-/// first, and what the others would tell after it is looked at again. A pose is kept if it got a
-/// link, or if linking it to any pose nearby (the one before it among them) would tell more than
-/// g_pose: then it is somewhere new.
+/// A link is used if its information gain exceeds g_loop, expected and then measured; the most
+/// informative first, after which the gains of the others are evaluated again. A pose is kept if it
+/// got a link, or if the gain of linking it to any pose nearby (the previous one among them)
+/// exceeds g_pose: then it is in a new place.
 ///
-/// What a link tells can only become less by another link. So the candidates' gains are upper
-/// bounds once one was used: only that of the best is computed anew, until the best is up to date.
-/// The choice is the same as if all were computed anew, as long as the linearisation stands.
+/// The gain of a link is never increased by another link. So the candidates' gains are upper bounds
+/// once one was used: only that of the best is recomputed, until the best is up to date. The choice
+/// is the same as if all were recomputed, as long as the linearisation is unchanged.
 ///
-/// With `reuse`, which the paper does not have, a pose that a link leads to a kept one is not kept
+/// With `reuse`, which the paper does not have, a pose that is linked to a kept one is not kept
 /// itself (`CompactGraph::relocate`): so the map of a place does not grow without end.
 class CompactPose final : public PosePolicy, public OptionFinder {
  public:
@@ -112,11 +112,11 @@ class CompactPose final : public PosePolicy, public OptionFinder {
 
   // The newest pose:
   PoseReport report_;
-  Matrix odometry_;  ///< covariance of its motion from the pose before, kept or not
+  Matrix odometry_;  ///< covariance of its odometry from the previous pose, kept or not
   bool open_ = false, searched_ = false;
-  std::vector<Candidate> candidates_;   ///< a heap by gain
-  int solved_version_ = -1;             ///< of the graph when candidates were last solved for
-  int asked_version_ = -1;              ///< of the graph when a single candidate was looked at anew
+  std::vector<Candidate> candidates_;  ///< a heap by gain
+  int solved_version_ = -1;            ///< of the graph when candidates were last solved for
+  int asked_version_ = -1;             ///< of the graph when a single candidate was evaluated again
   std::vector<Dimensions> dimensions_;  ///< of the candidates, before any link of this pose
 
   std::vector<Waiting> waiting_;

@@ -18,7 +18,7 @@ struct Link {
   Matrix covariance{};  ///< Σ_y of it
 };
 
-/// How a link fits to what is known.
+/// How consistent a link is with the estimate.
 struct Fit {
   double innovation = 0.0;  ///< squared Mahalanobis distance, eᵀ S⁻¹ e
   double chance =
@@ -26,16 +26,16 @@ struct Fit {
   bool consistent = true;
 };
 
-/// Tells false loop closures from right ones. A false match says something arbitrary, so it looks
-/// very informative; what gives it away is that it does not fit.
+/// Distinguishes false loop closures from correct ones. A false match contradicts the estimate, so
+/// its apparent information gain is high; it is detected by its inconsistency.
 ///
-/// The gate: e = log(d⁻¹ z) of a measurement z and the estimated displacement d must have
-/// eᵀ S⁻¹ e < χ², S = Σ_d + Σ_y, with the quantile that so many right links stay below. Where Σ_d
-/// is large that proves little: a false match, uniform over what the sensor could have said, fits
-/// with a probability of the ellipsoid's volume over that of the sensor's range. If that is not
-/// small, another link has to agree: two links between the same stretches of the way close a cycle
-/// with the odometry between their ends (pairwise consistency, Mangelson et al. 2018), which must
-/// be the identity within its own covariance.
+/// The gate: e = log(d⁻¹ z) of a measurement z and the estimated displacement d must have eᵀ S⁻¹ e
+/// < χ², S = Σ_d + Σ_y, with the quantile that so many right links stay below. Where Σ_d is large
+/// that proves little: a false match, uniform over the sensor's range, passes with a probability of
+/// the ellipsoid's volume over that of the range. If that is not small, another link has to agree:
+/// two links between the same parts of the trajectory close a cycle with the odometry between their
+/// ends (pairwise consistency, Mangelson et al. 2018), which must be the identity within its own
+/// covariance.
 class ConsistencyCheck {
  public:
   /// `gate`: part of the right links that pass; 0 turns the check off. `trust`: a link needs

@@ -28,35 +28,35 @@ OptionTable options_table() {
               "what that angle is of: each element of the rotation vector, the whole rotation, or "
               "the direction of view")
       .choice("view_axis", "z", {"x", "y", "z"}, "of the body, along which the sensor looks")
-      .real("probability", 0.1, 0.0, 1.0,
-            "a pose is a candidate if it is within range so probably, in each dimension (s)")
+      .real(
+          "probability", 0.1, 0.0, 1.0,
+          "probability of being within range, in each dimension, that makes a pose a candidate (s)")
       .real("loop_gain", -1.0, -1.0, 1e9,
-            "a link must tell more than this [nats] (g_loop); -1: (n/2 ln 2 + 1)^1.36 - 1, n = 3 "
-            "or 6")
+            "information gain that a link must exceed [nats] (g_loop); "
+            "-1: (n/2 ln 2 + 1)^1.36 - 1, n = 3 or 6")
       .real("pose_gain", -1.0, -1.0, 1e9,
-            "a pose is kept if any link to it would tell more than this [nats] (g_pose); -1: (n/2 "
-            "ln 2 + 1)^1.7 - 1")
+            "a pose is kept if the information gain of any link to it would exceed this [nats] "
+            "(g_pose); -1: (n/2 ln 2 + 1)^1.7 - 1")
       .text("sensor", "",
-            "expected covariance of a match: two standard deviations [m] [rad], or its upper "
-            "triangle; nothing: as the newest odometry")
+            "expected covariance of a match: standard deviations [m] and [rad], or its upper "
+            "triangle; empty: as the newest odometry")
       .choice("composition", "first", {"first", "fourth"},
-              "order of the covariance of concatenated motions: Smith and Cheeseman, Barfoot and "
-              "Furgale")
+              "order of the covariance of composed relative poses: Smith and Cheeseman, Barfoot "
+              "and Furgale")
       .choice("search", "index", {"index", "all", "untested"},
               "candidates from a spatial index, by testing all poses, or all poses without a test")
       .real("gate", 0.0, 0.0, 0.999999,
-            "check links for consistency; so large a part of the right ones passes; 0: no check")
+            "fraction of the correct links that pass the consistency check; 0: no check")
       .real("trust", 0.01, 0.0, 1.0,
-            "with gate: a link that a false match would fit more probably than this waits until "
-            "another agrees")
-      .boolean(
-          "reuse", true,
-          "go on from the kept pose that a link leads to, instead of keeping the pose that was "
-          "linked: the map stops growing")
+            "with gate: a link waits for another to agree if a false match would pass with a "
+            "higher probability than this")
+      .boolean("reuse", true,
+               "continue from the kept pose that a link leads to, instead of keeping the pose that "
+               "was linked: the map stops growing")
       .real("reuse_loss", 0.06, 0.0, 10.0,
-            "with reuse: where that costs what is known of the way at most this, times the poses "
-            "that are kept nearby [nats a freedom]")
-      .component("estimator", Estimator::kKind.data(), "incremental_cholesky", "who estimates");
+            "with reuse: largest loss of information about the link, times the poses that are kept "
+            "nearby [nats per DoF]")
+      .component("estimator", Estimator::kKind.data(), "incremental_cholesky", "estimator");
   return table;
 }
 
@@ -68,8 +68,8 @@ std::vector<double> numbers(const std::string& text) {
     const char* const end = word.data() + word.size();
     if (const auto [at, problem] = std::from_chars(word.data(), end, number);
         problem != std::errc{} || at != end) {
-      throw Error(ErrorCode::usage,
-                  "compact_pose: sensor: '" + word + "' is no number; expected numbers and blanks");
+      throw Error(ErrorCode::usage, "compact_pose: sensor: '" + word +
+                                        "' is no number; expected numbers separated by spaces");
     }
     all.push_back(number);
   }
@@ -115,7 +115,7 @@ OptionTable random_options() {
   table.integer("poses", 100, 2, 1e9, "kept, the first and the last among them")
       .integer("loops", 10, 0, 1e9, "loop closures used, if there are so many between those")
       .integer("seed", 1, 0, 1e15, "of the draw")
-      .component("estimator", Estimator::kKind.data(), "incremental_cholesky", "who estimates");
+      .component("estimator", Estimator::kKind.data(), "incremental_cholesky", "estimator");
   return table;
 }
 

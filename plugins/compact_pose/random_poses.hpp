@@ -14,7 +14,7 @@
 
 namespace cairn::compact {
 
-/// The control: as many poses and loop closures of a recording as somebody else keeps, drawn at
+/// The control: as many poses and loop closures of a recording as another policy keeps, drawn at
 /// random (RFPFL of the paper). Loop closures are drawn first, with their poses, as far as there is
 /// room for them; then more poses.
 class RandomPoses final : public PosePolicy {

@@ -60,8 +60,9 @@ double gain_of(const Matrix& S_y, const Matrix& S_d) {
 }
 
 [[noreturn]] void refuse(const VariableType& type, const std::string& why) {
-  throw Error(ErrorCode::usage, "compact_pose takes graphs of poses that are rigid motions, and " +
-                                    std::string(type.tag()) + " " + why);
+  throw Error(ErrorCode::usage,
+              "compact_pose takes graphs of poses that are rigid transformations, and " +
+                  std::string(type.tag()) + " " + why);
 }
 
 }  // namespace

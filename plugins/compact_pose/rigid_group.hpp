@@ -39,11 +39,11 @@ struct Displacement {
   Matrix covariance;  ///< of ξ, mean · exp(ξ)
 };
 
-/// Poses that are rigid motions of the plane or of space, whatever type implements them: its
-/// abilities `LieGroup` and `Placement`, checked to belong together.
+/// Poses that are rigid transformations of the plane or of space, whatever type implements them:
+/// its abilities `LieGroup` and `Placement`, checked to belong together.
 class RigidGroup {
  public:
-  /// Throws `Error` (usage) for a type whose states are not rigid motions.
+  /// Throws `Error` (usage) for a type whose states are not rigid transformations.
   explicit RigidGroup(const std::shared_ptr<const VariableType>& type);
 
   const MotionGroup& motions() const { return motions_; }
@@ -71,7 +71,7 @@ class RigidGroup {
   /// The covariance of a tangent vector ξ as one of (velocity, angular velocity) in the body's
   /// frame: six rows, those that a plane does not have are zero.
   Eigen::Matrix<double, 6, 6> twist_covariance(const Matrix& covariance) const;
-  /// The way back, of what is independent in each: the covariance of ξ for standard deviations of
+  /// The inverse, for independent components: the covariance of ξ for standard deviations of
   /// translation [m] and rotation [rad] along every axis.
   Matrix isotropic(double sigma_translation, double sigma_rotation) const;
 
@@ -88,8 +88,8 @@ class RigidGroup {
   bool twist_is_identity_ = false;
 };
 
-/// ½ ln(|Σ_y + Σ_d| / |Σ_y|): what a measurement with covariance Σ_y tells of a displacement with
-/// covariance Σ_d [nats] (equation 22).
+/// ½ ln(|Σ_y + Σ_d| / |Σ_y|): the information gain of a measurement with covariance Σ_y of a
+/// displacement with covariance Σ_d [nats] (equation 22).
 double mutual_information(const Matrix& S_y, const Matrix& S_d);
 
 Matrix to_matrix(std::span<const double> numbers, int n);

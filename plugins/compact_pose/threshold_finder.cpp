@@ -31,7 +31,7 @@ void ThresholdFinder::note_loop(const DistanceTest& test, const Dimensions& dime
 Matrix ThresholdFinder::sensor() const {
   if (loops_.empty()) {
     throw Error(ErrorCode::input,
-                "no loop closure in the sample, so it tells nothing of the sensor: take a larger "
+                "no loop closure in the sample, so the sensor's range is unknown: take a larger "
                 "part of the data, or give the thresholds");
   }
   std::vector<std::pair<double, const Matrix*>> by_size;

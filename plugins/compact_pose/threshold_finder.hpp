@@ -8,16 +8,16 @@
 
 namespace cairn::compact {
 
-/// Finds the thresholds of compact pose SLAM from a sample of the data (section 5.2): everything is
-/// taken in, and noted are the displacement of every loop closure before it was closed, what it
-/// told, and what the link of every new pose told.
+/// Finds the thresholds of compact pose SLAM from a sample of the data (section 5.2): all
+/// measurements are used, and recorded are the displacement of every loop closure before it was
+/// closed, its information gain, and that of the link of every new pose.
 class ThresholdFinder {
  public:
   void note_loop(const DistanceTest& test, const Dimensions& dimensions, double gain,
                  const Matrix& covariance);
   void note_pose(double gain) { pose_gains_.push_back(gain); }
 
-  /// Options of compact_pose: `range` and `angle`, so that every noted loop closure passes the
+  /// Options of compact_pose: `range` and `angle`, so that every recorded loop closure passes the
   /// distance test; `loop_gain` = (l₉₀ + 1)^1.36 − 1 and `pose_gain` = (p₉₀ + 1)^1.7 − 1 with the
   /// 90th percentiles; `sensor`, the median of the loops' covariances. Throws `Error` (input) if
   /// there was no loop closure.

@@ -57,7 +57,7 @@ class BalReader {
     if (scanner_.next_line()) return;
     draft_.fail(
         scanner_.line(),
-        fmt::format("the file ends here, in {} {} of {}; expected what the header promises: "
+        fmt::format("the file ends here, in {} {} of {}; expected what the header declares: "
                     "{} cameras, {} points and {} observations",
                     what, k + 1, count, cameras_, points_, observations_));
   }

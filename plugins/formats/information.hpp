@@ -19,7 +19,7 @@ constexpr int triangle_index(int n, int row, int column) {
 /// TORO's order of a planar pose's information, I11 I12 I22 I33 I13 I23, to rows of the upper
 /// triangle.
 void from_toro_order(std::span<double, 6> information);
-/// The other way round.
+/// The inverse.
 void to_toro_order(std::span<double, 6> information);
 
 /// Upper-triangular square root U (n × n, row by row) to information UᵀU, in place.
@@ -36,9 +36,9 @@ inline bool is_positive_definite(int n, std::span<const double> information) {
   return !first_failed_pivot(n, information);
 }
 
-/// Mends the information of a spatial relative pose (21 numbers, rows x y z rx ry rz) of a known
-/// kind: the (z, rx) and (z, ry) entries hold what belongs at (x, rz) and (y, rz), as in the
-/// published `cubicle`. Changes nothing, and says so by `false`, unless the matrix is not positive
+/// Repairs a known mistake in the information of a spatial relative pose (21 numbers, rows x y z rx
+/// ry rz): the (z, rx) and (z, ry) entries contain the values of (x, rz) and (y, rz), as in the
+/// published `cubicle`. Changes nothing, and returns false, unless the matrix is not positive
 /// definite, the places that the entries would move to are zero, and the result is positive
 /// definite.
 bool repair_misplaced_entries(std::span<double, 21> information);

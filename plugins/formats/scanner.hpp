@@ -24,8 +24,8 @@ struct Layout {
 /// Walks through a text line by line and field by field, without copying any of it.
 ///
 /// Blank lines are passed over, and so is what follows a field that begins with '#'. Fields are
-/// separated by blanks and tabs; a line ends with LF or CR LF. Complaints are `Error` (input) that
-/// name file and line, what was found and what was expected.
+/// separated by spaces and tabs; a line ends with LF or CR LF. Errors are `Error` (input) and name
+/// file and line, what was found and what was expected.
 class Scanner {
  public:
   /// `text` must outlive the scanner. A byte order mark at its start is passed over. `first_line`

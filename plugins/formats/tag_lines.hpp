@@ -16,8 +16,8 @@ namespace cairn::formats {
 /// What a format does with the lines of one tag.
 using LineReader = std::function<void(Scanner&, Draft&)>;
 
-/// The tags that a format knows, with what reads their lines. A tag is looked up once a line, so
-/// this is a short array with the last hit first, not a map.
+/// The tags that a format knows, with the readers of their lines. A tag is looked up once per line,
+/// so this is a short array with the last hit first, not a map.
 class TagTable {
  public:
   void add(std::string tag, LineReader reader) {
@@ -52,7 +52,7 @@ class TagTable {
 /// `FIX id id …`.
 void read_fix(Scanner& scanner, Draft& draft);
 
-/// A line whose tag nobody knows: counted where that was asked for, else an error with what is on
+/// A line with an unknown tag: counted where that was asked for, else an error with the tags on
 /// offer.
 void unknown_tag(const Scanner& scanner, Draft& draft, const ReadOptions& options,
                  std::span<const std::string> on_offer);

@@ -10,7 +10,7 @@
 namespace cairn::formats {
 
 /// Indices of all variables by rising id. Throws `Error` (input) if there is none, since an empty
-/// file would say nothing.
+/// file is not readable as a graph.
 std::vector<int> variables_by_id(const Graph& graph);
 
 /// Refuses to write: "format toro cannot express …; expected …". Throws `Error` (input).

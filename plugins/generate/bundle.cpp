@@ -298,21 +298,21 @@ OptionTable bundle_options() {
   OptionTable table;
   table
       .choice("layout", "ring", {"ring", "street"},
-              "cameras around a thing, or along a street: who shares points with whom")
+              "cameras around an object, or along a street: which cameras share points")
       .integer("cameras", 50, 4, 1e6, "number of cameras")
       .integer("points", 2000, 8, 1e8, "number of points")
       .integer("track", 6, 2, 1e6, "cameras that see a point, at most")
       .real("pixel_sigma", 1.0, 1e-9, 1e6,
             "noise of what is measured, each axis [px]; BAL files can only express 1")
       .real("translation_sigma", 0.1, 0.0, 1e6,
-            "error of a camera's first position, each axis [m]; the first camera is known")
-      .real("rotation_sigma", 0.01, 0.0, 3.0, "error of its first orientation, each axis [rad]")
-      .real("focal_sigma", 10.0, 0.0, 1e6, "error of its first focal length [px]")
-      .real("distortion_sigma", 0.01, 0.0, 10.0, "error of its first k1 and k2")
-      .real("point_sigma", 0.2, 0.0, 1e6, "error of a point's first position, each axis [m]")
+            "error of a camera's initial position, each axis [m]; none for the first camera")
+      .real("rotation_sigma", 0.01, 0.0, 3.0, "error of its initial orientation, each axis [rad]")
+      .real("focal_sigma", 10.0, 0.0, 1e6, "error of its initial focal length [px]")
+      .real("distortion_sigma", 0.01, 0.0, 10.0, "error of its initial k1 and k2")
+      .real("point_sigma", 0.2, 0.0, 1e6, "error of a point's initial position, each axis [m]")
       .real("noise", 1.0, 0.0, 1000.0,
             "factor on all noise and errors; 0: all exact, weighted as for 1")
-      .integer("outliers", 0, 0, 1e9, "sightings of one point taken for another");
+      .integer("outliers", 0, 0, 1e9, "observations associated with a wrong point");
   return table;
 }
 

@@ -25,7 +25,7 @@ OptionTable city_options() {
   table.integer("poses", 10000, 2, 1e8, "number of poses")
       .real("step", 1.0, 1e-3, 1e3, "distance between poses [m]")
       .integer("block", 12, 1, 10000, "mean steps between two crossings")
-      .integer("streets", 0, 0, 100000, "streets each way; 0: as many as fit the poses")
+      .integer("streets", 0, 0, 100000, "streets in each direction; 0: as many as fit the poses")
       .real("loop_radius", 1.5, 1e-3, 1e4, "loops are closed with places nearer than this [m]")
       .real("loop_angle", 0.8, 0.0, 3.15, "and seen from a heading that differs less [rad]")
       .real("loop_density", 0.4, 0.0, 1.0, "probability that a place within reach is recognised")

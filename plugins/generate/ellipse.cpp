@@ -116,7 +116,7 @@ std::unique_ptr<Generator> make_ellipse3d(const Options& options) {
 OptionTable ellipse_n_options() {
   OptionTable table;
   table.integer("laps", 10, 1, 100000, "times around")
-      .integer("poses_per_lap", 106, 3, 100000, "poses a lap, at equal steps along it");
+      .integer("poses_per_lap", 106, 3, 100000, "poses per lap, at equal steps along it");
   add_ellipse_options(table);
   return table;
 }

@@ -177,8 +177,8 @@ OptionTable landmarks2d_options() {
   table.integer("poses", 2000, 2, 1e8, "number of poses")
       .real("step", 1.0, 1e-3, 1e3, "distance between poses [m]")
       .integer("block", 8, 1, 10000, "steps between two crossings")
-      .integer("streets", 0, 0, 100000, "streets each way; 0: as many as fit the poses")
-      .real("landmark_density", 0.02, 1e-9, 1e3, "landmarks a square metre")
+      .integer("streets", 0, 0, 100000, "streets in each direction; 0: as many as fit the poses")
+      .real("landmark_density", 0.02, 1e-9, 1e3, "landmarks per square metre")
       .choice("sensor", "cartesian", {"cartesian", "bearing_range"},
               "what is measured of a landmark")
       .real("sensor_range", 6.0, 1e-3, 1e4, "landmarks nearer than this are seen [m]")
@@ -186,7 +186,7 @@ OptionTable landmarks2d_options() {
       .real("landmark_sigma", 0.1, 1e-9, 1e6, "noise of a landmark's position, or of its range [m]")
       .real("bearing_sigma", 0.02, 1e-9, 3.0, "noise of a landmark's bearing [rad]");
   add_noise_options(table, {.translation_sigma = 0.05, .rotation_sigma = 0.01});
-  table.integer("outliers", 0, 0, 1e9, "sightings of one landmark taken for another");
+  table.integer("outliers", 0, 0, 1e9, "observations associated with a wrong landmark");
   return table;
 }
 

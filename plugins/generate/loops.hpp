@@ -60,7 +60,7 @@ class CellGrid {
     std::int64_t seen = 0;
   };
   std::array<std::int64_t, 3> cell_of(const std::array<double, 3>& at) const;
-  /// 21 bits a coordinate: a world of two million cells along each axis.
+  /// 21 bits per coordinate: a world of two million cells along each axis.
   static std::uint64_t key(const std::array<std::int64_t, 3>& c) {
     constexpr std::uint64_t kMask = (1u << 21) - 1;
     return (static_cast<std::uint64_t>(c[0]) & kMask) |
@@ -73,7 +73,7 @@ class CellGrid {
   std::unordered_map<std::uint64_t, Cell> cells_;  // only ever looked up: its order does not matter
 };
 
-/// The loop closures of a path, by rising `later`, nearest first: what a robot meets on its way.
+/// The loop closures of a path, by rising `later`, nearest first, in the order of the trajectory.
 /// Time and memory go with the number of poses if `cell_capacity` is given.
 template <class Pose>
 std::vector<Loop> find_loops(const std::vector<Pose>& path, const LoopRule& rule, Random& random);

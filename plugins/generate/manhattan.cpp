@@ -14,7 +14,7 @@ OptionTable manhattan_options() {
   table.integer("poses", 3500, 2, 1e8, "number of poses")
       .real("step", 1.0, 1e-3, 1e3, "distance between poses [m]")
       .integer("block", 4, 1, 10000, "steps between two crossings")
-      .integer("streets", 0, 0, 100000, "streets each way; 0: as many as fit the poses")
+      .integer("streets", 0, 0, 100000, "streets in each direction; 0: as many as fit the poses")
       .real("loop_radius", 1.5, 1e-3, 1e4, "loops are closed with places nearer than this [m]")
       .real("loop_density", 0.2, 0.0, 1.0, "probability that a place within reach is recognised")
       .integer("loops_per_pose", 3, 0, 1000, "largest number of loops that a pose closes");

@@ -12,9 +12,9 @@ void add_noise_options(OptionTable& table, const Noise& defaults, bool shares) {
   if (shares) {
     table
         .real("translation_error", defaults.translation_share, 0.0, 10.0,
-              "further noise as a share of the length of the motion")
+              "further noise as a fraction of the length of the relative pose")
         .real("rotation_error", defaults.rotation_share, 0.0, 10.0,
-              "further noise as a share of the angle of the motion");
+              "further noise as a fraction of its angle");
   }
   table.real("noise", defaults.scale, 0.0, 1000.0,
              "factor on all noise; 0: exact measurements, weighted as for 1");

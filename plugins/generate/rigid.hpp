@@ -8,9 +8,9 @@
 
 namespace cairn::generate {
 
-// Rigid motions as the generators need them: plain doubles and a fixed order of operations, since
-// they are part of the promise that a seed gives the same graph everywhere. Their arrays are those
-// of the variable types of the same name.
+// Rigid transformations for the generators: plain doubles and a fixed order of operations, since a
+// seed must give the same graph on every machine. Their arrays are those of the variable types of
+// the same name.
 
 /// A pose in the plane: position [m] and heading [rad].
 struct Pose2 {
@@ -54,11 +54,11 @@ double rotation_angle(const Pose3& a);
 double length(const Pose2& a);
 double length(const Pose3& a);
 
-/// A motion with that translation [m] and rotation vector [rad] (heading in 2D).
+/// A transformation with that translation [m] and rotation vector [rad] (heading in 2D).
 Pose2 from_vectors(const std::array<double, 3>& translation_rotation);
 Pose3 from_vectors(const std::array<double, 6>& translation_rotation);
 
-/// A motion by at most `reach` [m] along each axis, with any rotation.
+/// A transformation by at most `reach` [m] along each axis, with any rotation.
 void draw_motion(Random& random, double reach, Pose2& out);
 void draw_motion(Random& random, double reach, Pose3& out);
 

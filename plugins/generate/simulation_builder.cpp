@@ -179,7 +179,7 @@ template Simulation simulate(const std::vector<Pose3>&, const std::vector<Loop>&
                              const Outliers&, Registry&, std::uint64_t);
 
 void add_outlier_option(OptionTable& table) {
-  table.integer("outliers", 0, 0, 1e9, "wrong loop closures, weighted like right ones");
+  table.integer("outliers", 0, 0, 1e9, "wrong loop closures, weighted like correct ones");
 }
 
 }  // namespace cairn::generate

@@ -37,9 +37,10 @@ std::vector<Pose3> wind_up(const Sphere& sphere) {
 OptionTable sphere_options() {
   OptionTable table;
   table.integer("turns", 50, 2, 100000, "turns around the sphere")
-      .integer("poses_per_turn", 50, 3, 100000, "poses a turn")
+      .integer("poses_per_turn", 50, 3, 100000, "poses per turn")
       .real("radius", 50.0, 1e-3, 1e6, "radius of the sphere [m]")
-      .real("loop_density", 1.0, 0.0, 1.0, "probability that a pose sees the one a turn earlier");
+      .real("loop_density", 1.0, 0.0, 1.0,
+            "probability of a loop closure with the pose one turn earlier");
   add_noise_options(table, {.translation_sigma = 0.1, .rotation_sigma = 0.02});
   add_outlier_option(table);
   return table;

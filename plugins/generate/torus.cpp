@@ -38,10 +38,11 @@ std::vector<Pose3> wind_around(const Torus& torus) {
 OptionTable torus_options() {
   OptionTable table;
   table.integer("turns", 100, 3, 100000, "turns around the tube")
-      .integer("poses_per_turn", 50, 3, 100000, "poses a turn")
+      .integer("poses_per_turn", 50, 3, 100000, "poses per turn")
       .real("major_radius", 40.0, 1e-3, 1e6, "radius of the circle that the tube follows [m]")
       .real("minor_radius", 15.0, 1e-3, 1e6, "radius of the tube [m]")
-      .real("loop_density", 0.8, 0.0, 1.0, "probability that a pose sees the one a turn earlier");
+      .real("loop_density", 0.8, 0.0, 1.0,
+            "probability of a loop closure with the pose one turn earlier");
   add_noise_options(table, {.translation_sigma = 0.1, .rotation_sigma = 0.02});
   add_outlier_option(table);
   return table;

@@ -151,7 +151,7 @@ OptionTable incremental_options() {
   table.integer("step", 100, 1, 1e9, "poses between two optimisations")
       .integer("iterations", 10, 1, 1e6, "largest number of iterations of each")
       .component("optimizer", "optimizer", "levenberg_marquardt",
-                 "what optimises the part that is known");
+                 "the optimizer of the part of the graph added so far");
   return table;
 }
 

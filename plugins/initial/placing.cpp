@@ -110,7 +110,7 @@ void Placing::finish(std::vector<std::string>& notes) {
   }
   if (kept == 0) return;
   notes.push_back(counted(kept, "variable keeps its state", "variables keep their states") +
-                  ": no factor determines where they are, given what is placed (first: " +
+                  ": no factor determines their states from those initialised (first: " +
                   graph_.describe_variable(first) + ")");
 }
 

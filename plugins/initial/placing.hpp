@@ -39,9 +39,9 @@ class Placing {
   /// another variable of the factor is not placed or the measurement does not determine the state.
   bool place(int variable, int factor);
 
-  /// Where the placing starts: held variables stay where they are. In a component with no pose held
-  /// (a pose being a variable of the component's largest tangent space), the first pose with a
-  /// prior that determines it goes there. Returns the variables placed, by index.
+  /// Initialises the roots: constant variables keep their states. In a component without a constant
+  /// pose (a pose being a variable of the component's largest tangent space), the first pose with a
+  /// prior that determines it takes its state from that. Returns the variables placed, by index.
   std::vector<int> place_roots(const Gauge& gauge);
 
   /// Breadth first from `start` (in that order) over whatever factors determine a place.
@@ -51,7 +51,7 @@ class Placing {
 
   /// Ends the placing: what no factor ties to what is placed keeps its state, and places others
   /// from there, so that each connected piece is in itself as measured. Poses before landmarks.
-  /// Says so.
+  /// Adds a note about it.
   void finish(std::vector<std::string>& notes);
 
  private:

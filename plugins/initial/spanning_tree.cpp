@@ -68,7 +68,7 @@ class SpanningTree final : public InitialGuess {
 
 OptionTable spanning_tree_options() {
   return OptionTable{}.choice("weight", "depth", {"depth", "information"},
-                              "shortest way to the root: fewest factors, or least variance");
+                              "shortest path to the root: fewest factors, or least variance");
 }
 
 std::unique_ptr<InitialGuess> make_spanning_tree(const Options& options) {

@@ -7,7 +7,7 @@
 
 namespace cairn::plot {
 
-/// What pictures need of the report of `cairn bench --json`.
+/// The part of the report of `cairn bench --json` that plots need.
 struct BenchConfiguration {
   std::string name;
   double median = 0, low = 0, high = 0;  ///< [s]

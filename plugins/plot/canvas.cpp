@@ -182,7 +182,7 @@ void Canvas::check() const {
   cairo_status_t status = cairo_status(context_.get());
   if (status == CAIRO_STATUS_SUCCESS) status = cairo_surface_status(surface_.get());
   if (status == CAIRO_STATUS_SUCCESS) return;
-  throw Error(ErrorCode::input, fmt::format("the picture of {} x {} pixels could not be drawn: {}",
+  throw Error(ErrorCode::input, fmt::format("the plot of {} x {} pixels could not be drawn: {}",
                                             width_, height_, cairo_status_to_string(status)));
 }
 

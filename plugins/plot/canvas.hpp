@@ -77,7 +77,7 @@ class Canvas {
   void text_upwards(double x, double y, std::string_view text, double size, const Colour& colour);
   double text_width(std::string_view text, double size, bool bold = false);
 
-  /// The file. Throws `Error` (input) if drawing went wrong (a picture too large).
+  /// The file. Throws `Error` (input) if drawing failed (a plot too large).
   std::string finish();
 
  private:

@@ -9,7 +9,7 @@
 
 namespace cairn::plot {
 
-// Each draws one kind of picture, and throws `Error` (input) where the album has nothing for it.
+// Each draws one kind of plot, and throws `Error` (input) where `album` has no data for it.
 
 /// Poses and edges of each graph; `by_residual`: edges coloured by chi2.
 void draw_trajectories(Canvas& canvas, const Theme& theme, const Album& album, bool by_residual);

@@ -172,7 +172,7 @@ void draw_sparsity(Canvas& canvas, const Theme& theme, const Album& album, Linea
     throw Error(ErrorCode::input, "no graph with factors whose matrix could be drawn");
   }
   const BlockStructure H = structure_of(*scene);
-  if (H.blocks() == 0) throw Error(ErrorCode::input, scene->name + ": all variables are held");
+  if (H.blocks() == 0) throw Error(ErrorCode::input, scene->name + ": all variables are constant");
   solver.analyze(H);
   const std::vector<Box> boxes = panels(canvas, 2);
   draw_panel(canvas, theme, boxes[0], scene->name + ": H", pattern_of_H(H));

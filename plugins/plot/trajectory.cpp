@@ -266,7 +266,8 @@ void draw_scene(Canvas& canvas, const Theme& theme, const Scene& scene, const Bo
                 bool by_residual) {
   const std::vector<Layer> layers = layers_of(scene, theme);
   Bounds bounds = bounds_of(layers);
-  if (bounds.empty()) throw Error(ErrorCode::input, scene.name + ": nothing of it has a place");
+  if (bounds.empty())
+    throw Error(ErrorCode::input, scene.name + ": none of its variables has a position");
   const Box rest =
       draw_heading(canvas, theme, box, scene.name, legend_of(scene, theme, layers, by_residual));
   if (scene.dimension == 3) {

@@ -78,9 +78,10 @@ class Recorded final : public Registration, public FalseMatches {
 
 OptionTable recorded_options() {
   return OptionTable{}
-      .real("false_rate", 0.0, 0.0, 1.0,
-            "part of the pairs that match whose measured motion is replaced by a random one")
-      .integer("seed", 1, 0, 1e15, "which pairs that are, and with which motions");
+      .real(
+          "false_rate", 0.0, 0.0, 1.0,
+          "fraction of the matching pairs whose measurement is replaced by a random relative pose")
+      .integer("seed", 1, 0, 1e15, "of the choice of pairs and of relative poses");
 }
 
 std::unique_ptr<Registration> make_recorded(const Options& options) {

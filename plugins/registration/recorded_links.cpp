@@ -42,8 +42,7 @@ RecordedLinks recorded_links(const RegistrationData& data, std::string_view owne
     const auto& pose = recording.variable_pools()[pool.variable_pools[0]].type;
     if (links.pose && links.pose != pose) {
       throw Error(ErrorCode::input, "registration " + std::string(owner) +
-                                        ": the recording measures motions between poses of two "
-                                        "types, " +
+                                        ": the recording has poses of two types, " +
                                         std::string(links.pose->tag()) + " and " +
                                         std::string(pose->tag()) + " (" +
                                         recording.describe_factor(f) + "); they must be of one");

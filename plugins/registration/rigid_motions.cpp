@@ -60,10 +60,11 @@ void draw_rotation(PairRandom& random, double most, std::span<double> w) {
 RigidMotions::RigidMotions(std::shared_ptr<const VariableType> type)
     : type_(std::move(type)), group_(type_->lie_group()), placement_(type_->placement()) {
   if (!group_ || !placement_ || !placement_->has_orientation()) {
-    throw Error(ErrorCode::usage,
-                "registration: " + std::string(type_->tag()) +
-                    " is no pose whose motions can be made up: its type must have the abilities "
-                    "LieGroup and Placement, with an orientation, as VERTEX_SE2 has");
+    throw Error(
+        ErrorCode::usage,
+        "registration: " + std::string(type_->tag()) +
+            " is no pose whose relative poses can be simulated: its type must have the abilities "
+            "LieGroup and Placement, with an orientation, as VERTEX_SE2 has");
   }
   std::vector<double> unit(static_cast<std::size_t>(type_->tangent_size())), x = state();
   for (int k = 0; k < type_->tangent_size(); ++k) {

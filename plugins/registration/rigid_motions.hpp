@@ -10,14 +10,13 @@
 
 namespace cairn::registration {
 
-/// How far a motion goes, or may go.
+/// The extent of a relative pose, or its limit.
 struct Extent {
   double length = 0.0;  ///< of the translation [m]
   double angle = 0.0;   ///< of the rotation, 0 to π [rad]
 };
 
-/// The motions between poses of one type, of which it takes the abilities `LieGroup` and
-/// `Placement`.
+/// Relative poses of one type of pose, by its abilities `LieGroup` and `Placement`.
 class RigidMotions {
  public:
   /// Throws `Error` (usage) if the type lacks one of the two, or has no orientation.
@@ -28,11 +27,11 @@ class RigidMotions {
   /// z exp(ξ)
   std::vector<double> perturbed(std::span<const double> z, const double* xi) const;
   Extent extent(std::span<const double> motion) const;
-  /// One of all motions within that extent, each as likely as any other: translations uniform in
-  /// the disc or ball, rotations by the group's invariant measure.
+  /// A random relative pose within that extent, uniformly distributed: translations uniform in the
+  /// disc or ball, rotations by the group's invariant measure.
   std::vector<double> draw(const Extent& within, PairRandom& random) const;
 
-  /// Which components of a tangent vector turn a pose, and which move it without turning it.
+  /// Which components of a tangent vector rotate a pose, and which translate it without rotation.
   const std::vector<int>& rotations() const { return rotations_; }
   const std::vector<int>& translations() const { return translations_; }
 

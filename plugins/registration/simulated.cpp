@@ -42,7 +42,7 @@ Error bad_data(ErrorCode code, const std::string& message) {
 /// are to be out of it on every machine.
 bool less(double a, double b) { return a < (1.0 - 1e-9) * b; }
 
-/// A sensor that sees how poses truly lie to each other, and measures it with noise:
+/// A sensor that measures the true relative poses with noise:
 ///
 ///     z = x_earlier⁻¹ x_later exp(ξ),   ξ ~ N(0, Σ)
 ///
@@ -64,8 +64,8 @@ class Simulated final : public Registration, public FalseMatches {
     const RecordedLinks links = recorded_links(data, "simulated");
     if (links.all.empty()) {
       throw bad_data(ErrorCode::input,
-                     "the recording has no relative factor between poses, such as EDGE_SE2, so "
-                     "that it is not known which factors to make");
+                     "the recording has no relative factor between poses, such as EDGE_SE2, so the "
+                     "type of the factors to make is unknown");
     }
     odometry_ = links.odometry;
     motions_.emplace(links.pose);
@@ -178,11 +178,12 @@ OptionTable simulated_options() {
             "noise of measured translations, each axis [m]; 0: as in the recording")
       .real("sigma_rotation", 0.0, 0.0, 3.0,
             "noise of measured rotations, each axis [rad]; 0: as in the recording")
-      .real("failure_rate", 0.0, 0.0, 1.0, "part of the pairs within range that are not matched")
+      .real("failure_rate", 0.0, 0.0, 1.0,
+            "fraction of the pairs within range that are not matched")
       .real("false_rate", 0.0, 0.0, 1.0,
-            "part of the pairs matched within range whose motion is wrong: any within range")
+            "fraction of the pairs matched within range with a random relative pose within range")
       .real("far_rate", 0.0, 0.0, 1.0,
-            "part of the pairs out of range that are matched all the same, with a wrong motion")
+            "fraction of the pairs out of range that are matched, with a random relative pose")
       .integer("seed", 1, 0, 1e15, "of noise, failures and false matches");
 }
 

@@ -122,9 +122,9 @@ std::string notes_json(const Album& album) {
     for (const Recording& recording : scene.recordings) {
       const std::size_t shown = fitting(recording).size();
       if (shown == recording.frames.size()) continue;
-      notes.push_back(
-          json_string(fmt::format("{}: {} of {} recorded frames are shown, to keep the page small",
-                                  recording.name, shown, recording.frames.size())));
+      notes.push_back(json_string(
+          fmt::format("{}: {} of {} recorded iterations are shown, to keep the file small",
+                      recording.name, shown, recording.frames.size())));
     }
   }
   return fmt::format("[{}]", fmt::join(notes, ","));

@@ -22,7 +22,7 @@ namespace {
 std::filesystem::path page_file() {
   Dl_info info{};
   if (dladdr(reinterpret_cast<const void*>(&cairn_register), &info) == 0) {
-    throw Error(ErrorCode::plugin, "html: where its plugin is cannot be told");
+    throw Error(ErrorCode::plugin, "html: the location of its plugin cannot be determined");
   }
   return std::filesystem::path(info.dli_fname).parent_path() / "report" / "report.html";
 }

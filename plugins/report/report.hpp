@@ -8,7 +8,8 @@
 
 namespace cairn::report {
 
-/// What the page holds of an album, as docs/report.md describes it; may stand within a <script>.
+/// The data of the HTML report for an `Album`, as docs/report.md describes it; may be embedded in a
+/// <script>.
 std::string page_json(const Album& album);
 
 /// Puts the data into the page. Throws `Error` (plugin) if `page` has not exactly one place for it.

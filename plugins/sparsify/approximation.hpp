@@ -41,12 +41,12 @@ Matrix nearest_positive(const Matrix& A, double floor = kFloor);
 
 /// Λ̆ = Σ_k Q_kᵀ W_k Q_k, its inverse S and all M_k, while single W_k change.
 ///
-/// What the other factors say in the space of factor k is, by the matrix inversion lemma,
+/// The information of the other factors in the space of factor k is, by the matrix inversion lemma,
 ///
 ///     (Q_k Υ_k⁻¹ Q_kᵀ)⁻¹ = M_k⁻¹ − W_k,   Υ_k = Λ̆ − Q_kᵀ W_k Q_k,
 ///
 /// which holds where Υ_k is singular as well (then M_k⁻¹ − W_k is what is left of it once all other
-/// directions are eliminated; zero where nobody else measures what k does). So all three
+/// directions are eliminated; zero where no other factor measures the same). So all three
 /// propositions of factor descent (T 4.12, 4.13, 4.15) are one formula in m × m matrices, and a
 /// step changes S by rank m.
 class Approximation {

@@ -34,7 +34,7 @@ void begin(const RecoveryProblem& problem, InitialInformation initial, Approxima
   }
   if (!at.set(std::move(W))) {
     throw Error(ErrorCode::numerical,
-                "the factors of the topology do not determine how the nodes lie to each other");
+                "the factors of the topology do not determine the relative poses of the nodes");
   }
   if (initial != InitialInformation::ffd) return;
   for (int k = 0; k < scaled.factors(); ++k) at.change(k, at.best(k).W);

@@ -20,7 +20,7 @@ OptionTable with_mutual_information(OptionTable table = {}) {
       .choice("regularization", "covariance", {"covariance", "information"},
               "mutual information where Λ is singular: of (Λ + εI)⁻¹, or with εI in each "
               "determinant of Λ's marginals")
-      .real("epsilon", 0.01, 1e-12, 1e3, "ε, as a part of Λ's mean diagonal");
+      .real("epsilon", 0.01, 1e-12, 1e3, "ε, as a fraction of Λ's mean diagonal");
   return table;
 }
 
@@ -44,8 +44,9 @@ void add_topologies(Registrar& registrar) {
   registrar.add<Topology>("ekld", with_mutual_information(), make_topology<ExpectedDivergence>);
   registrar.add<Topology>("cliquey", with_mutual_information(), make_topology<Cliquey>);
   OptionTable downdate = with_mutual_information();
-  downdate.choice("downdate", "sum", {"sum", "exact"},
-                  "what the tree tells is taken off by the sum of equation 4.23, or exactly");
+  downdate.choice(
+      "downdate", "sum", {"sum", "exact"},
+      "the information of the tree is subtracted by the sum of equation 4.23, or exactly");
   registrar.add<Topology>("dmi", downdate, [](const Options& options, Registry&) {
     TopologyOptions chosen = topology_options(options);
     chosen.exact_downdate = options.text("downdate") == "exact";
@@ -56,7 +57,7 @@ void add_topologies(Registrar& registrar) {
   });
   OptionTable l1 = with_mutual_information();
   l1.real("weight", 0.1, 0.0, 1.0,
-          "of the sum of absolute values, as a part of the largest correlation");
+          "of the sum of absolute values, as a fraction of the largest correlation");
   registrar.add<Topology>("l1", l1, [](const Options& options, Registry&) {
     TopologyOptions chosen = topology_options(options);
     chosen.l1_weight = options.real("weight");
@@ -109,7 +110,8 @@ void add_recoveries(Registrar& registrar) {
   OptionTable interior = iterative_table();
   interior.real("start", 0.1, 0.0, 1e6, "ω: the barrier's weight, in proportion to the gradients")
       .real("decrease", 0.1, 1e-6, 0.999, "the weight is multiplied by this")
-      .boolean("conservative", false, "the approximation claims nothing that Λ does not");
+      .boolean("conservative", false,
+               "keep the approximation conservative: at most the information Λ");
   registrar.add<FactorRecovery>("ip", interior, [](const Options& options, Registry&) {
     return std::unique_ptr<FactorRecovery>(std::make_unique<InteriorPoint>(
         recovery_options(options),
@@ -162,8 +164,9 @@ OptionTable sparsify_table() {
   table.component("topology", Topology::kKind.data(), "ekld", "which nodes new factors relate")
       .text("population", "tree:2",
             "how many: tree:γ times as many as a tree, fill:α of all pairs, loss:KLD as few as "
-            "lose less than that [nats]")
-      .component("recovery", FactorRecovery::kKind.data(), "ncfd", "who finds their information")
+            "keep the divergence below that [nats]")
+      .component("recovery", FactorRecovery::kKind.data(), "ncfd",
+                 "method that finds their information")
       .choice("scheme", "single", {"single", "runs", "multi"},
               "nodes leave one by one, those that follow each other together, or all that are "
               "connected together")

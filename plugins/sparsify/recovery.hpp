@@ -10,7 +10,7 @@
 
 namespace cairn::sparsify {
 
-/// What every iterative method is told.
+/// Parameters of every iterative method.
 struct RecoveryOptions {
   InitialInformation initial = InitialInformation::scaled;
   /// Ends where no element of `RecoveryResult::gradient` is larger.
@@ -91,7 +91,7 @@ class InteriorPoint final : public IterativeRecovery {
 
 /// Limited-memory projected quasi-Newton (Schmidt, van den Berg, Friedlander and Murphy 2009): a
 /// quadratic model from the last steps, minimised over W ⪰ 0 by spectral projected gradients, then
-/// a line search along the way there.
+/// a line search in that direction.
 class ProjectedQuasiNewton final : public IterativeRecovery {
  public:
   ProjectedQuasiNewton(RecoveryOptions options, int memory)

@@ -30,7 +30,7 @@ Place place_of(const Graph& graph, int v) {
   const Placement* placement = graph.type(v).placement();
   if (!placement) {
     throw Error(ErrorCode::usage,
-                "selection coverage: " + graph.describe_variable(v) + " is nowhere in particular");
+                "selection coverage: " + graph.describe_variable(v) + " has no position");
   }
   const int n = placement->dimension();
   Place place{.R = Matrix::Identity(n, n)};

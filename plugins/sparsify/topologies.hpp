@@ -17,10 +17,10 @@ enum class Regularization {
 
 struct TopologyOptions {
   Regularization regularization = Regularization::covariance;
-  double epsilon = 0.01;        ///< ε as a part of Λ's mean diagonal
+  double epsilon = 0.01;        ///< ε as a fraction of Λ's mean diagonal
   bool exact_downdate = false;  ///< dmi: Σ̂ without the tree, exactly, instead of by (T 4.23)
-  double l1_weight = 0.1;       ///< λ of (T 4.19), as a part of the largest off-diagonal of Σ̂
-  std::int64_t most = 200000;   ///< best: so many topologies at most
+  double l1_weight = 0.1;  ///< λ of (T 4.19), as a fraction of the largest off-diagonal of Σ̂
+  std::int64_t most = 200000;  ///< best: so many topologies at most
 };
 
 /// Mutual information of each pair of nodes [nats]; n × n.
@@ -43,8 +43,8 @@ class MutualInformation final : public ChowLiuTree {
   std::vector<FactorChoice> choose(const DenseBlanket& blanket, int population) override;
 };
 
-/// That tree, and the pairs with the largest mutual information once what the tree tells has been
-/// taken off (T 4.23).
+/// That tree, and the pairs with the largest mutual information once the information of the tree
+/// has been subtracted (T 4.23).
 class DowndatedInformation final : public ChowLiuTree {
  public:
   using ChowLiuTree::ChowLiuTree;

@@ -10,7 +10,7 @@
 
 namespace cairn::block {
 
-/// Who is joined with whom, both ways, without the diagonal.
+/// The neighbours of each block, in both directions, without the diagonal.
 struct BlockGraph {
   std::vector<std::int64_t> begin;
   std::vector<std::int32_t> neighbours;

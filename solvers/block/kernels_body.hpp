@@ -446,7 +446,7 @@ void extend_add(const Spread* spreads, int count, int first, int last, const dou
       if (column < first || column >= last) continue;
       const double* source = child + column * child_stride;
       double* target = parent + (spreads->target + __builtin_ctz(bits)) * parent_stride;
-      // From the vector that holds the diagonal: what is above it is nobody's.
+      // From the vector that holds the diagonal: what is above it is unused.
       for (const Spread* s = spreads; s < end; ++s)
         add_spread(target + s->target, source + s->source, s->mask, s->packed);
     }

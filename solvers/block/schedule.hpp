@@ -46,7 +46,7 @@ struct Step {
   std::int32_t levels = 0;             ///< waits until all levels below this are done
 };
 
-/// Who works off which supernode, and where its update matrix is kept meanwhile.
+/// Which thread processes each supernode, and where its update matrix is kept meanwhile.
 ///
 /// The elimination tree is cut into *tasks* (one or several neighbouring subtrees) of about equal
 /// work and the *levels* above them: the supernodes of one level have nothing to do with each
@@ -56,7 +56,7 @@ struct Step {
 ///
 /// For several lanes all work is cut into *steps*, in an order in which each comes after all that
 /// it waits for. Whichever lanes there are take the next step in turn and wait, if need be, for
-/// steps that others have taken before; so nobody waits for ever, however many run at once.
+/// steps that others have taken before; so there is no deadlock, however many run at once.
 struct Schedule {
   struct Task {
     std::int32_t begin, end;  ///< supernodes

@@ -18,7 +18,7 @@ constexpr std::size_t kTileColumns = 48;
 
 }  // namespace
 
-/// Room, once a structure.
+/// Room, once per structure.
 void SelectedInverse::prepare() {
   if (version_ == cholesky_->version_) return;
   panels_ = UninitializedVector(cholesky_->symbolic_.panel_values());
@@ -149,7 +149,7 @@ void SelectedInverse::diagonal_blocks(std::span<double> out) const {
   for (std::size_t k = 0; k < order.size(); ++k)
     begin[k + 1] = begin[k] + std::int64_t{sizes[k]} * sizes[k];
   if (std::ssize(out) != begin.back())
-    throw std::logic_error("diagonal_blocks: out has not the size of all diagonal blocks");
+    throw std::logic_error("diagonal_blocks: out does not have the size of all diagonal blocks");
   for (std::size_t p = 0; p < order.size(); ++p) {
     const Supernode& node = nodes()[supernode_of_[p]];
     const std::int64_t at = offsets[p] - offsets[node.block_begin];

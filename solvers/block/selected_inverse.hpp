@@ -17,11 +17,11 @@ namespace cairn::block {
 ///
 ///     Z_RJ = -Z_RR Y,    Z_JJ = L_JJ⁻ᵀ L_JJ⁻¹ - Yᵀ Z_RJ,
 ///
-/// and Z_RR is known, since R lies within the front of the parent. So the tree is worked off from
-/// its roots to its leaves: the factorisation backwards, each supernode handing Z_RR to its
-/// children where the factorisation had taken their update matrices from. It uses the very same
-/// places in the factorisation's own room, which is free by then; what it allocates are the panels
-/// of Z (as large as those of L) and a little room for each thread, both once a structure. It takes
+/// and Z_RR is known, since R lies within the front of the parent. So the tree is processed from
+/// its roots to its leaves: the factorisation in reverse, each supernode passing Z_RR to its
+/// children where the factorisation had read their update matrices. It uses the same offsets in the
+/// factorisation's own memory, which is free by then; what it allocates are the panels of Z (as
+/// large as those of L) and a little memory for each thread, both once per structure. It takes
 /// about three times the arithmetic of a factorisation. Subtrees run in parallel, and so do rows of
 /// large fronts; every number has one writer and one order of summation, so the result does not
 /// depend on the number of threads.

@@ -22,7 +22,7 @@ namespace cairn::block {
 ///
 /// Supernodes are worked off from the leaves of the elimination tree to its roots: the entries of H
 /// and the children's update matrices are added into the front, the panel is factored, and what
-/// remains is the update matrix for the parent. All index lists are made once a structure
+/// remains is the update matrix for the parent. All index lists are made once per structure
 /// (`analyze`); factorising and solving with one right-hand side allocate nothing. Subtrees run in
 /// parallel, and so do the tiles of large fronts (`Schedule`); what is added to what, and in which
 /// order, does not depend on the number of threads, so neither does the result.

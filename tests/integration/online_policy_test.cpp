@@ -506,14 +506,15 @@ TEST_F(OnlinePolicy, SaysWhatIsWrongAndWhatWasExpected) {
   EXPECT_EQ(error({}, "NEXT"),
             "there is no pose that is not done; expected the line of the next one");
   EXPECT_EQ(error(two, "NEXT"),
-            "pose 1 has no odometry yet; expected a measured motion between poses 0 and 1 first");
+            "pose 1 has no odometry yet; expected a relative pose between poses 0 and 1 first");
   EXPECT_EQ(error(two, "NEW VERTEX_SE2 2"), error(two, "DONE"));
   EXPECT_EQ(error(two, "NEW VERTEX_SE3:QUAT 1"),
             "VERTEX_SE3:QUAT 1: the poses before it are VERTEX_SE2; expected another");
   EXPECT_EQ(error(two, "NEW VERTEX_TRACKXYZ 1"),
             "VERTEX_TRACKXYZ 1 is no pose; with a policy a robot's poses alone can come");
-  EXPECT_EQ(error(two, "EDGE_SE2 0 9" + kStep),
-            "between 0 and 9; expected a motion between pose 1, which is the newest, and another");
+  EXPECT_EQ(
+      error(two, "EDGE_SE2 0 9" + kStep),
+      "between 0 and 9; expected a relative pose between pose 1, which is the newest, and another");
   EXPECT_THAT(error(two, "EDGE_SE2 0 1 1 0 0 1 0 0 -1 0 1"), HasSubstr("not positive definite"));
   EXPECT_EQ(error(square(), "EDGE_SE2 9 4" + kStep), "there is no pose 9");
   EXPECT_EQ(error(square(), "FIX 2"),

@@ -171,7 +171,7 @@ TEST_F(ViewCommand, BenchWritesThePageOfWhatItCompared) {
                      configuration.at("chi2").at("final").to_number<double>());
   }
   EXPECT_EQ(roles(page.at("graphs").at(0)),
-            (std::map<std::string, std::string>{{"first estimate", "initial"},
+            (std::map<std::string, std::string>{{"initial estimate", "initial"},
                                                 {"levenberg_marquardt, block_cholesky", "estimate"},
                                                 {"levenberg_marquardt, eigen", "peer"}}));
   // The same report shows later, too.

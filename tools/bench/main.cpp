@@ -49,7 +49,7 @@ const std::vector<std::pair<std::string, Study>>& all_studies() {
       {"online", study_online},
       {"compact_sets", study_compact_sets},
       {"compact_growth", study_compact_growth},
-      {"compact_honesty", study_compact_honesty},
+      {"compact_consistency", study_compact_consistency},
       {"compact_matches", study_compact_matches},
       {"sparsify_sets", study_sparsify_sets},
       {"sparsify_topology", study_sparsify_topology},

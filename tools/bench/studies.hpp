@@ -57,7 +57,7 @@ void study_compact_sets(const Bench& bench, const Keep& keep);
 void study_compact_growth(const Bench& bench, const Keep& keep);
 
 /// Normalised errors over many runs, and covariances beside those with everything.
-void study_compact_honesty(const Bench& bench, const Keep& keep);
+void study_compact_consistency(const Bench& bench, const Keep& keep);
 
 /// With a registration of which a tenth is wrong.
 void study_compact_matches(const Bench& bench, const Keep& keep);

@@ -61,7 +61,7 @@ std::vector<Section> rates_sections(const json::array& entries) {
           : fmt::format("No OpenBLAS to open here, so no `dgemm`; triad: {} GB/s.\n\n",
                         digits(1e-9 * bandwidth));
   MarkdownTable table({"graph", "ordering", "nonzeros of L", "flops", "factorise [ms]", "GFLOP/s",
-                       "of `dgemm`", "flops a byte", "roof [GFLOP/s]", "of the roof"});
+                       "of `dgemm`", "flops per byte", "roof [GFLOP/s]", "of the roof"});
   for (const json::value& entry : entries) {
     const double rate = number(entry, "solver.factor_flops") / number(entry, "factorize");
     const double peak = number(entry, "dgemm"), intensity = flops_per_byte(entry);
@@ -100,8 +100,8 @@ constexpr double kSmallestFitted = 10'000;
 
 std::string scaling_table(const json::array& entries) {
   MarkdownTable table({"family", "poses", "factors", "ordering", "nonzeros of L",
-                       "ten iterations [s]", "µs a pose and iteration", "peak memory [MB]",
-                       "kB a pose"});
+                       "ten iterations [s]", "µs per pose and iteration", "peak memory [MB]",
+                       "kB per pose"});
   for (const json::value& entry : entries) {
     if (text(entry, "study") == "convergence") continue;
     const double poses = number(entry, "poses"), seconds = number(entry, "seconds");
@@ -264,7 +264,7 @@ constexpr StudySections kSections[] = {{"graphs", graphs_sections},
                                        {"online", online_sections},
                                        {"compact_sets", compact_sets_sections},
                                        {"compact_growth", compact_growth_sections},
-                                       {"compact_honesty", compact_honesty_sections},
+                                       {"compact_consistency", compact_consistency_sections},
                                        {"compact_matches", compact_matches_sections},
                                        {"sparsify_sets", sparsify_sets_sections},
                                        {"sparsify_topology", sparsify_topology_sections},

@@ -73,8 +73,8 @@ double option(const json::value& entry, const std::string& path) {
 }
 
 std::string thresholds_table(const json::array& entries) {
-  MarkdownTable table({"graph", "thresholds", "range [m]", "angle [rad]", "s", "pose gain",
-                       "loop gain", "tries", "found in [s]"});
+  MarkdownTable table({"graph", "thresholds", "range [m]", "angle [rad]", "s",
+                       "gain threshold, poses", "gain threshold, loops", "tries", "found in [s]"});
   for (const json::value& entry : entries) {
     std::string name = text(entry, "name");
     if (const Published* paper = published(entry)) {
@@ -319,16 +319,16 @@ Normalized normalized(const json::array& runs) {
 
 std::string nees_table(const json::array& entries) {
   constexpr double kTwoSided = 1.96;  // of a normal distribution, 95 %
-  MarkdownTable table({"graph", "strategy", "runs", "freedoms in all", "NEES a freedom",
-                       "95 % of honest ones", "so it is"});
+  MarkdownTable table(
+      {"graph", "strategy", "runs", "DoF in total", "NEES/DoF", "95 % if consistent", "verdict"});
   for (const json::value& entry : entries) {
     if (!is_part(entry, "nees")) continue;
     const Normalized sum = normalized(list(entry, "runs"));
     const double mean = sum.squared / sum.dof;
-    const double half = kTwoSided * std::sqrt(2.0 / sum.dof);  // of chi2 / dof, for many freedoms
+    const double half = kTwoSided * std::sqrt(2.0 / sum.dof);  // of chi2 / dof, for many DoF
     const char* verdict = mean > 1.0 + half   ? "overconfident"
                           : mean < 1.0 - half ? "conservative"
-                                              : "honest";
+                                              : "consistent";
     table.add({text(entry, "name"), title_of(text(entry, "strategy")), fmt::format("{}", sum.runs),
                whole(sum.dof), fmt::format("{:.4f}", mean),
                fmt::format("{:.4f} … {:.4f}", 1.0 - half, 1.0 + half), verdict});
@@ -404,7 +404,7 @@ std::vector<Section> compact_growth_sections(const json::array& entries) {
       {"compact-laps", laps_table(entries)}};
 }
 
-std::vector<Section> compact_honesty_sections(const json::array& entries) {
+std::vector<Section> compact_consistency_sections(const json::array& entries) {
   return {{"compact-nees", nees_table(entries)}, {"compact-compare", compare_table(entries)}};
 }
 

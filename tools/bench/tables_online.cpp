@@ -96,9 +96,9 @@ std::string times_table(const json::array& entries) {
 }
 
 std::string chi2_table(const json::array& entries) {
-  MarkdownTable table({"graph", "chi2", "batch, from the guess", "batch, from the estimate",
-                       "above batch", "at most, at the samples", "finished",
-                       "`periodic_batch` above batch"});
+  MarkdownTable table({"graph", "chi2", "batch, from the initial estimate",
+                       "batch, from the estimate", "above batch", "at most, at the samples",
+                       "finished", "`periodic_batch` above batch"});
   for (const json::value& entry : entries) {
     if (!is_part(entry, "times")) continue;
     const json::value *mine = ours(entry), *check = last_check(entry);
@@ -144,7 +144,7 @@ std::string marginals_table(const json::array& entries) {
 
 std::string budget_table(const json::array& entries) {
   MarkdownTable table({"graph", "limit [ms]", "all [s]", "median step [ms]", "95 %", "99 %",
-                       "longest", "chi2", "above batch", "owed at the end"});
+                       "longest", "chi2", "above batch", "deferred at the end"});
   for (const json::value& entry : entries) {
     if (!is_part(entry, "budget")) continue;
     // All of them go for the same minimum: the best of it is what they are compared with.

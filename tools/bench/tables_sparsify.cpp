@@ -228,9 +228,9 @@ std::string whole_table(const json::array& entries) {
 }
 
 std::string large_table(const json::array& entries) {
-  MarkdownTable table({"graph", "taken out", "poses", "factors", "blanket", "largest", "KLD",
-                       "of that means", "KLD a node taken out", "RMSE [m]", "time [s]",
-                       "a node taken out [ms]"});
+  MarkdownTable table({"graph", "removed", "poses", "factors", "blanket", "largest", "KLD",
+                       "of that means", "KLD per node removed", "RMSE [m]", "time [s]",
+                       "per node removed [ms]"});
   for (const json::value& entry : entries) {
     if (text(entry, "part") != "large") continue;
     for (const json::value& each : list(entry, "contestants")) {
@@ -246,9 +246,9 @@ std::string large_table(const json::array& entries) {
 }
 
 std::string online_table(const json::array& entries) {
-  MarkdownTable table({"graph", "late factors go", "poses", "factors", "KLD", "of that means",
-                       "RMSE [m]", "RMSE from all measurements [m]", "median step [ms]", "99 %",
-                       "longest", "taking out, all [s]"});
+  MarkdownTable table({"graph", "late factors are redirected", "poses", "factors", "KLD",
+                       "of that means", "RMSE [m]", "RMSE from all measurements [m]",
+                       "median step [ms]", "99 %", "longest", "removal, all [s]"});
   for (const json::value& entry : entries) {
     const json::value *late = contestant(entry, "late"), *early = contestant(entry, "early");
     const auto step = [&](const char* which) {
@@ -272,7 +272,7 @@ std::string online_table(const json::array& entries) {
 
 std::string selection_table(const json::array& entries) {
   MarkdownTable table({"graph", "selection", "poses", "factors", "blanket", "largest", "KLD",
-                       "of that means", "RMSE [m]", "selecting [s]", "taking out [s]"});
+                       "of that means", "RMSE [m]", "selecting [s]", "removal [s]"});
   for (const json::value& entry : entries) {
     std::string graph = text(entry, "name");
     for (const json::value& each : list(entry, "contestants")) {

@@ -155,8 +155,8 @@ std::string recovery_tables(const json::array& entries) {
 
 std::string initial_table(const json::array& entries) {
   constexpr std::array kGuesses{"identity", "odb", "ffd", "scaled"};
-  MarkdownTable table({"recorded", "nodes", "problems", "identity", "`odb`", "`ffd`", "`scaled`",
-                       "the least there is"});
+  MarkdownTable table(
+      {"recorded", "nodes", "problems", "identity", "`odb`", "`ffd`", "`scaled`", "minimum"});
   for (const char* recording : kRecordings) {
     const json::value* entry = part(entries, "initial", recording);
     if (!entry) continue;

@@ -74,7 +74,7 @@ struct Camera {
     return Se3::rotation(pose<double>(x));
   }
   static Vector<double, 3> position(const Vector<double, 10>& x) { return x.segment<3>(3); }
-  /// A place says nothing about f, k1 and k2: they are those of `identity`.
+  /// A placement does not determine f, k1 and k2: they are those of `identity`.
   static Vector<double, 10> from_placement(const Eigen::Matrix3d& R, const Vector<double, 3>& t) {
     Vector<double, 10> x = identity();
     x.tail<7>() = Se3::from_placement(R, t);

@@ -110,14 +110,14 @@ std::string Gauge::describe(const Graph& graph) const {
   }
   if (!left_free.empty()) {
     text += fmt::format(
-        "{}the gauge of {} is left free: holding {} would hold more than its place",
+        "{}the gauge of {} is left free: anchoring {} would constrain more than its pose",
         text.empty() ? "" : "; ",
         left_free.size() == 1 ? "a component" : fmt::format("{} components", left_free.size()),
         graph.describe_variable(left_free.front()));
   }
   if (!unconstrained.empty()) {
     text += fmt::format(
-        "{}{} {} no factor and {} held, the first is {}", text.empty() ? "" : "; ",
+        "{}{} {} no factor and {} constant, the first is {}", text.empty() ? "" : "; ",
         unconstrained.size(), unconstrained.size() == 1 ? "variable has" : "variables have",
         unconstrained.size() == 1 ? "is" : "are", graph.describe_variable(unconstrained.front()));
   }

@@ -119,8 +119,8 @@ NamedFormat writer_by_ending(const std::filesystem::path& file, Registry& regist
   }
   const std::string found =
       file == "-"
-          ? "standard output has no ending that tells the format"
-          : (wanted.empty() ? "the name has no ending that tells the format"
+          ? "standard output has no ending that determines the format"
+          : (wanted.empty() ? "the name has no ending that determines the format"
                             : fmt::format("no format that writes has the ending '.{}'", wanted));
   throw nothing_fits(ErrorCode::usage,
                      fmt::format("{}: {}; endings {}; or name the format", file.string(), found,

@@ -13,7 +13,7 @@ namespace {
 Marginals& marginals_of(LinearSolver& solver) {
   if (auto* marginals = query<Marginals>(solver)) return *marginals;
   throw Error(ErrorCode::usage,
-              "this linear solver cannot give covariances (it has not the ability 'marginals'); "
+              "this linear solver cannot give covariances (it lacks the ability 'marginals'); "
               "block_cholesky can");
 }
 

@@ -156,7 +156,8 @@ int NormalEquations::free_directions() const {
 std::string NormalEquations::explain(const Factorization& failure) const {
   const int block = failure.failed_block;
   if (block < 0 || block >= linearizer_.structure().blocks()) {
-    return "H is not positive definite, and the linear solver could not tell at which variable";
+    return "H is not positive definite, and the linear solver could not determine at which "
+           "variable";
   }
   const int variable = linearizer_.variable_of(block);
   const std::string name = graph_->describe_variable(variable);
@@ -182,7 +183,8 @@ std::string NormalEquations::explain(const Factorization& failure) const {
   if (const std::string held = weak_hold(*graph_, gauge_, gauge_.component[variable]);
       !held.empty()) {
     text += fmt::format(
-        "; its component is held only by {}, which does not fix its rotation: hold a pose", held);
+        "; only {} is constant in its component, which does not determine its rotation: fix a pose",
+        held);
   }
   return text;
 }

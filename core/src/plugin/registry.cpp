@@ -134,7 +134,7 @@ struct Registry::Impl {
           others += (others.empty() ? "" : ", ") + other;
       }
       throw plugin_error(fmt::format(
-          "{} is not to be had: the shared object {} is missing; build or install plugin "
+          "{} is not available: the shared object {} is missing; build or install plugin "
           "'{}'{}",
           wanted, library.string(), plugin.sidecar.name,
           others.empty() ? "" : ", or choose from what is there: " + others));

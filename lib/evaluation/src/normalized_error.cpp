@@ -85,7 +85,7 @@ Position position(const Graph& graph, int v) {
   const Placement* place = type.placement();
   if (!place) {
     throw Error(ErrorCode::usage,
-                "no expected error: " + graph.describe_variable(v) + " is nowhere in space");
+                "no expected error: " + graph.describe_variable(v) + " has no position");
   }
   const int d = place->dimension();
   std::vector<double> R(static_cast<std::size_t>(d) * static_cast<std::size_t>(d));

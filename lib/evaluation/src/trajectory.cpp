@@ -34,7 +34,7 @@ double stamp_of(std::string_view text, const std::string& where) {
   const auto [end, problem] = std::from_chars(text.data(), text.data() + text.size(), stamp);
   if (problem != std::errc{} || end != text.data() + text.size() || !std::isfinite(stamp)) {
     throw Error(ErrorCode::input,
-                fmt::format("{}: found '{}'; expected a time stamp, one finite number a line",
+                fmt::format("{}: found '{}'; expected a time stamp, one finite number per line",
                             where, text.substr(0, 40)));
   }
   return stamp;

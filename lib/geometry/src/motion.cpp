@@ -122,9 +122,10 @@ bool invert(const MatrixXd& S, MatrixXd& inverse) {
 MatrixXd information_of(const Motion& motion, int n) {
   MatrixXd Omega;
   if (!invert(covariance(motion, n), Omega)) {
-    throw Error(ErrorCode::numerical,
-                "a motion has a covariance that is not positive definite, and so no information "
-                "matrix (one that is known exactly has none either)");
+    throw Error(
+        ErrorCode::numerical,
+        "a relative pose has a covariance that is not positive definite, and so no information "
+        "matrix (one that is known exactly has none either)");
   }
   return Omega;
 }
@@ -155,10 +156,11 @@ MotionGroup::MotionGroup(std::shared_ptr<const VariableType> type) : type_(std::
   if (!type_) throw bad_call("MotionGroup: no variable type");
   group_ = type_->lie_group();
   if (!group_) {
-    throw bad_call(fmt::format(
-        "{} forms no Lie group (it has not the ability LieGroup), and motions are elements of one; "
-        "poses such as VERTEX_SE2 and VERTEX_SE3:QUAT do",
-        type_->tag()));
+    throw bad_call(
+        fmt::format("{} forms no Lie group (it lacks the ability LieGroup), and relative poses are "
+                    "elements of one; "
+                    "poses such as VERTEX_SE2 and VERTEX_SE3:QUAT do",
+                    type_->tag()));
   }
   ambient_ = type_->ambient_size();
   tangent_ = type_->tangent_size();
@@ -236,7 +238,7 @@ Motion MotionGroup::fuse(const Motion& a, const Motion& b) const {
   type_->normalize(x.data());
   MatrixXd Sigma;
   if (!invert(H, Sigma))
-    throw Error(ErrorCode::numerical, "two motions cannot be fused: their numbers overflow");
+    throw Error(ErrorCode::numerical, "two relative poses cannot be fused: their numbers overflow");
   return {std::move(x), symmetric(Sigma)};
 }
 
@@ -309,8 +311,8 @@ Factor MotionGroup::to_factor(std::shared_ptr<const FactorType> type, Id from, I
   const std::vector<double> metric = of_error_metric(*type, motion.mean);
   if (type->residual_size() != tangent_) {
     throw bad_call(fmt::format(
-        "{} has {} residuals and a motion {} degrees of freedom: it cannot say all that is known "
-        "of one; a factor type with as many of both can",
+        "{} has {} residuals and a relative pose {} degrees of freedom: it cannot measure all of "
+        "them; a factor type with as many of both can",
         type->tag(), type->residual_size(), tangent_));
   }
   const MatrixXd D_inverse = MatrixMap(metric.data(), tangent_, tangent_).inverse();

@@ -30,11 +30,11 @@ std::vector<int> poses_by_id(const Graph& graph) {
     if (!is_pose(graph.type(v))) {
       throw bad_input(
           fmt::format("{} is no pose of a Lie group, and this takes pose graphs only: a robot's "
-                      "poses and the motions between them, without landmarks",
+                      "poses and relative poses between them, without landmarks",
                       graph.describe_variable(v)));
     }
     if (graph.pool(v) != graph.pool(0)) {
-      throw bad_input(fmt::format("{} and {} are poses of different types; a robot's way takes one",
+      throw bad_input(fmt::format("{} and {} are poses of different types; a trajectory has one",
                                   graph.describe_variable(0), graph.describe_variable(v)));
     }
   }
@@ -67,7 +67,7 @@ std::vector<RecordedPose> pose_chain(const Graph& graph) {
     if (!chain[k].odometry.empty()) continue;
     throw bad_input(
         fmt::format("no factor joins {} to {}, the pose before it by id: odometry must be unbroken "
-                    "and ids rise along the robot's way",
+                    "and ids increase along the trajectory",
                     graph.describe_variable(poses[k]), graph.describe_variable(poses[k - 1])));
   }
   return chain;
@@ -95,7 +95,7 @@ void check(const VariableType& type, const OdometryChain& chain, std::span<const
            std::span<const double> to) {
   if (!type.lie_group() || !type.placement()) {
     throw Error(ErrorCode::usage,
-                fmt::format("recover: {} has not the abilities LieGroup and Placement; poses such "
+                fmt::format("recover: {} lacks the ability LieGroup or Placement; poses such "
                             "as VERTEX_SE2 and VERTEX_SE3:QUAT have",
                             type.tag()));
   }

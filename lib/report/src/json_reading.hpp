@@ -12,8 +12,8 @@
 
 namespace cairn {
 
-/// Reads members of JSON that somebody else wrote, each with a default for what is not there and an
-/// `Error` (input) that names `where` and the member for what is of another type.
+/// Reads members of JSON from any source, each with a default for what is not there and an `Error`
+/// (input) that names `where` and the member for what is of another type.
 class JsonReader {
  public:
   /// Parses text that must be one object.

@@ -54,11 +54,10 @@ int dimension_of(const Graph& graph, const std::string& name) {
     }
   }
   if (dimension == 0) {
-    throw Error(
-        ErrorCode::input,
-        fmt::format("{}: none of its variables has a place in space, so there is nothing to "
-                    "draw",
-                    name));
+    throw Error(ErrorCode::input,
+                fmt::format("{}: none of its variables has a position, so there is nothing to "
+                            "draw",
+                            name));
   }
   return dimension;
 }

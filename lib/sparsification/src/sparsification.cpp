@@ -173,7 +173,7 @@ class Gaussian {
  public:
   Gaussian(const Graph& graph, LinearSolver& solver, const char* what) : equations_(graph, solver) {
     auto* determinant = query<LogDeterminant>(solver);
-    if (!determinant) throw Error(ErrorCode::usage, "the linear solver does not tell determinants");
+    if (!determinant) throw Error(ErrorCode::usage, "the linear solver does not give determinants");
     if (equations_.size() == 0) return;
     equations_.linearize(graph.values());
     if (const Factorization f = equations_.factorize(); !f.ok)

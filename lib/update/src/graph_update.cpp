@@ -153,7 +153,7 @@ class Checker {
     check_leaving();
     for (const int k : unplaced_) {
       throw bad_input(
-          fmt::format("{} {}: has no state, and no factor of the update tells where it is; give it "
+          fmt::format("{} {}: has no state, and no factor of the update determines it; give it "
                       "a state",
                       update_.variables[k].type->tag(), update_.variables[k].id));
     }

@@ -182,7 +182,7 @@ GraphMarginals* BatchEstimator::covariances() {
 void BatchEstimator::require_marginals() const {
   if (query<Marginals>(*tools_->solver)) return;
   throw Error(ErrorCode::usage,
-              "the estimator's linear solver cannot give covariances (it has not the ability "
+              "the estimator's linear solver cannot give covariances (it lacks the ability "
               "'marginals'); linear_solver=block_cholesky can");
 }
 

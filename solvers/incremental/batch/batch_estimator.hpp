@@ -25,9 +25,9 @@ struct BatchEstimatorOptions {
   Stop stop{.max_iterations = 100, .tolerance = 1e-10};
 };
 
-/// Who does the work. Estimators that were cloned share one set of tools, since components cannot
-/// be copied; whoever uses them holds the lock, and `user` tells whose factorisation the solver
-/// has.
+/// The optimizer and the linear solver. Estimators that were cloned share one set, since components
+/// cannot be copied; an estimator locks it during use, and `user` is the one whose factorisation
+/// the solver has.
 struct BatchTools {
   std::mutex mutex;
   std::unique_ptr<Optimizer> optimizer;
@@ -35,7 +35,7 @@ struct BatchTools {
   const void* user = nullptr;
 };
 
-/// Optimises the whole graph anew. With `every` > 1 that is done every so many updates only, as by
+/// Optimises the whole graph again. With `every` > 1 that is done every so many updates only, as by
 /// iSAM (Kaess et al. 2008): in between every variable keeps the point at which it is linearised,
 /// and one linear system of all factors is solved for the step from there. Nothing of a
 /// factorisation is used again. An update that removes, changes or marginalises anything is a batch
@@ -79,7 +79,7 @@ class BatchEstimator final : public Estimator {
   void keep_diagonal(GraphMarginals& all);
   void require_marginals() const;
   void forget_covariances();
-  /// At the states at hand; null if H is singular. The lock must be held.
+  /// At the current states; null if H is singular. The mutex must be locked.
   GraphMarginals* covariances();
   std::size_t block_size(int a, int b) const;
 
@@ -101,7 +101,7 @@ class BatchEstimator final : public Estimator {
   std::optional<GraphMarginals> covariances_;  ///< good while the tools' user is this
   bool determined_ = true;                     ///< H is positive definite there
   std::set<std::pair<Id, Id>> crosses_;
-  std::set<std::string> told_;  ///< notes are told once
+  std::set<std::string> told_;  ///< notes are reported once
   std::int64_t memory_ = 0;
 };
 

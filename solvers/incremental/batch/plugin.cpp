@@ -10,12 +10,12 @@ OptionTable batch_options() {
   OptionTable table;
   table
       .component("optimizer", Optimizer::kKind.data(), "levenberg_marquardt",
-                 "who optimises; takes the linear solver below if it has an option of that name")
+                 "the optimizer; uses the linear solver below if it has an option of that name")
       .component("linear_solver", LinearSolver::kKind.data(), "block_cholesky",
                  "solves the normal equations, and for covariances")
       .integer("iterations", 100, 1, 1e9, "largest number of iterations of a batch step")
       .real("tolerance", 1e-10, 0.0, 1.0,
-            "a batch step ends when chi2 falls by less than this part; 0: exactly that many "
+            "a batch step ends when chi2 falls by less than this fraction; 0: exactly that many "
             "iterations");
   return table;
 }

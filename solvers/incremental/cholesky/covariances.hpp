@@ -26,7 +26,7 @@ namespace cairn::incremental {
 /// (IJRR 2017, equations 11 to 15, there for S = 1 and with the increment's sign turned). Variables
 /// that are new are eliminated from V first, and their own blocks solved for. B takes a solution
 /// for each row that is left, eight at a time. Where these are too many, or U too badly
-/// conditioned, all blocks on the diagonal are computed anew by the recursion from the roots of the
+/// conditioned, all blocks on the diagonal are recomputed by the recursion from the roots of the
 /// tree down.
 class Covariances {
  public:
@@ -45,7 +45,7 @@ class Covariances {
   void drop(std::int32_t v);
   bool keeps_anything() const { return kept_ != KeptMarginals::none || !crosses_.empty(); }
 
-  /// Brings everything up to date with the tree.
+  /// Updates everything from the tree.
   MarginalsBy update(const System& system, Tree& tree, std::span<const std::uint8_t> held);
   /// A kept block, size_a × size_b, column-major; null if it is not kept.
   const double* kept(std::int32_t a, std::int32_t b) const;

@@ -37,8 +37,8 @@ struct Settings {
   std::string kernels = "auto";
 };
 
-/// The optimizer that starts where steps of Gauss-Newton have gone astray. Copies of an engine
-/// share it, from whatever threads they are used.
+/// The fallback optimizer for when Gauss-Newton diverges. Copies of an engine share it, in all
+/// threads.
 struct Rescuer {
   std::unique_ptr<Optimizer> optimizer;
   std::mutex mutex;

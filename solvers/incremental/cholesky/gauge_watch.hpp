@@ -6,24 +6,25 @@
 
 namespace cairn::incremental {
 
-/// Follows the connected components of a graph that grows, and says which variables are to be held,
-/// as `resolve_gauge` would: those marked as fixed, those without any factor, and one pose of each
-/// component that would float otherwise. What leaves the graph needs a new watch.
+/// Follows the connected components of a graph that grows, and determines which variables are
+/// constant, as `resolve_gauge` would: those marked as fixed, those without any factor, and one
+/// pose of each component whose gauge is free otherwise. What leaves the graph needs a new watch.
 class GaugeWatch {
  public:
-  /// The next variable. `anchors`: its states form a group, so that holding it costs nothing.
+  /// The next variable. `anchors`: its states form a group, so that anchoring it does not change
+  /// the minimum.
   void add_variable(int tangent, bool anchors, bool fixed);
   /// A factor on these variables, which measures `absolute` numbers of where they are.
   void add_factor(const std::int32_t* variables, int arity, int absolute);
   void set_fixed(std::int32_t v);
 
-  /// Calls set(v, held) for every variable whose holding may have changed since the last call.
+  /// Calls set(v, constant) for every variable for which that may have changed since the last call.
   template <class Set>
   void settle(Set set) {
     for (const std::int32_t v : dirty_) settle_one(v, set);
     dirty_.clear();
   }
-  /// Components that float, since their first pose is no group.
+  /// Components whose gauge is free, since their first pose is no group.
   bool left_free(std::int32_t v);
   bool anchored(std::int32_t v) { return components_[root(v)].anchor == v; }
 

@@ -168,8 +168,9 @@ void IncrementalCholesky::tell_of_anchors(UpdateReport& report) {
   for (const std::int32_t v : engine_->take_anchored()) {
     if (!engine_->live_variable(v) || engine_->graph().fixed(v)) continue;
     if (!told_.insert(engine_->graph().id(v)).second) continue;
-    report.notes.push_back(fmt::format("nothing says where the component of {0} is: anchored {0}",
-                                       engine_->graph().describe_variable(v)));
+    report.notes.push_back(
+        fmt::format("the pose of the component of {0} is not determined: anchored {0}",
+                    engine_->graph().describe_variable(v)));
   }
 }
 

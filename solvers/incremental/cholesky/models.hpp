@@ -12,27 +12,26 @@
 
 namespace cairn::incremental {
 
-/// What the linear system knows of every factor: a whitened Jacobian J, that of some earlier
-/// estimate, its gradient γ = Jᵀr when it was last evaluated, and what steps have changed in r
-/// since.
+/// The linear model of every factor: a whitened Jacobian J, that of some earlier estimate, its
+/// gradient γ = Jᵀr when it was last evaluated, and the change of r by the steps since.
 ///
-/// Steps are always counted from the current estimate, in the frames of `States`. A step δ moves
-/// the estimate, and what is known of the residual and of the gradient by J δ and JᵀJ δ. What that
-/// lacks is found by evaluating the factor again at x:
+/// Steps are always expressed from the current estimate, in the frames of `States`. A step δ moves
+/// the estimate, and the modelled residual and gradient by J δ and JᵀJ δ. The error of that is
+/// found by evaluating the factor again at x:
 ///
 ///  - the *drift* J(x)ᵀr(x) − γ goes into the right-hand side: the estimate converges to where the
 ///    true gradient is zero, whatever J is;
-///  - the *mismatch* μ = ‖J(x) − J‖ / ‖J‖ tells how fast it does.
+///  - the *mismatch* μ = ‖J(x) − J‖ / ‖J‖ determines how fast it does.
 ///
-/// For a relative measurement between poses of a Lie group, J δ is zero for every motion of both as
-/// a whole, however old J is, since frames stay where they are. What is left of an old J is wrong
-/// by μ times what the step changes in the residual, and that, over all factors, is what the step
-/// gains in chi2: after it no more than about μ² of the gain is left. So H and L last for a long
-/// time, even if a loop closure moves everything by metres.
+/// For a relative measurement between poses of a Lie group, J δ is zero for every rigid motion of
+/// both, however old J is, since frames are constant. The remaining error of an old J is μ times
+/// the change of the residual by the step, and that, over all factors, is the decrease of chi2:
+/// after the step no more than about μ² of it is left. So H and L last for a long time, even if a
+/// loop closure moves everything by metres.
 ///
-/// The gradient is kept as seen from the pose (in the coordinates of x ⊕ δ), where a motion as a
-/// whole does not change it: a factor that is evaluated again agrees with its neighbours that are
-/// not.
+/// The gradient is kept in the frame of the pose (in the coordinates of x ⊕ δ), where a rigid
+/// motion of the whole does not change it: a factor that is evaluated again agrees with its
+/// neighbours that are not.
 class Models {
  public:
   /// The next factor, as it stands in the graph at that position.
@@ -47,8 +46,8 @@ class Models {
 
   /// Linearises at the current estimate: J = J(x), γ = Jᵀr.
   void linearize(int f, const Graph& graph, const States& states);
-  /// Adds the factor's part of H and of the right-hand side, times `sign`; variables that are held
-  /// have none.
+  /// Adds the factor's part of H and of the right-hand side, times `sign`; constant variables have
+  /// none.
   void add_to(System& system, int f, double sign, std::span<const std::uint8_t> held) const;
   /// Its part of the block row of one of its variables: H_vv and what joins v with others.
   void add_row(System& system, int f, std::int32_t variable,
@@ -61,10 +60,10 @@ class Models {
   /// to `compare` Jacobians.
   double correct(int f, const Graph& graph, const States& states, System& system,
                  std::span<const std::uint8_t> held, bool compare);
-  /// g_v: minus the gradient of all its factors at the current estimate, as far as it is known.
+  /// g_v: minus the gradient of all its factors at the current estimate, by the model.
   void right_hand_side(System& system, const States& states, std::int32_t v) const;
 
-  /// Whether it would not notice if all its variables were moved as a whole.
+  /// Whether it is invariant to rigid motions of all its variables.
   bool relative(int f) const { return records_[f].relative; }
   /// ρ(‖r‖²) when last evaluated.
   double cost(int f) const { return records_[f].cost; }

@@ -8,20 +8,20 @@ void cairn_register(cairn::Registrar& registrar) {
       "incremental_cholesky",
       OptionTable{}
           .real("accuracy", 5e-3, 0.0, 1.0,
-                "by which part chi2 may be above that of solving everything anew; 0: all digits")
+                "relative amount by which chi2 may exceed that of a full batch solution; 0: none")
           .real("significance", 0.25, 0.0, 1e300,
-                "a step that lowers chi2 by less than this, and than the accuracy allows, waits")
-          .integer("iterations", 10, 1, 1e9, "largest number of linear systems solved an update")
+                "a step that lowers chi2 by less than this, and than the accuracy allows, is "
+                "deferred")
+          .integer("iterations", 10, 1, 1e9, "largest number of linear systems solved per update")
           .integer("recent", 4, 0, 1e9,
                    "variables touched in so many updates, and near them, are ordered last")
           .integer("solve_every", 1, 1, 1e9, "updates that are solved for together")
           .integer("full_every", 0, 0, 1e9,
                    "updates from one full batch step to the next; 0: only on demand")
-          .real(
-              "budget", 0.0, 0.0, 1e9,
-              "seconds an update may take before relinearising is left to later ones; 0: no limit")
+          .real("budget", 0.0, 0.0, 1e9,
+                "seconds that an update may take before relinearisation is deferred; 0: no limit")
           .component("rescuer", Optimizer::kKind.data(), "levenberg_marquardt",
-                     "optimises everything where a step has raised chi2")
+                     "fallback optimizer: runs on the whole graph where a step has raised chi2")
           .choice("kernels", "auto", {"auto", "portable", "avx2", "avx512"},
                   "instruction set, as far as the machine has it"),
       [](const Options& options, Registry& registry) {

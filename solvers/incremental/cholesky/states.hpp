@@ -12,12 +12,12 @@
 
 namespace cairn::incremental {
 
-/// The estimate of every variable, and the frame that steps of it are counted in.
+/// The estimate of every variable, and the frame in which its steps are expressed.
 ///
-/// A pose of a Lie group has a frame F, an element that stays as it is while the estimate x moves:
-/// a step δ takes x to F exp(δ) F⁻¹ x, which is x exp(T δ) with T = Ad(x⁻¹ F). So a motion of
-/// several variables as a whole, by exp(η) from the left, has the steps Ad(F⁻¹) η, wherever they
-/// have got to. Of a variable of any other kind T is the identity.
+/// A pose of a Lie group has a frame F, an element that is constant while the estimate x moves: a
+/// step δ takes x to F exp(δ) F⁻¹ x, which is x exp(T δ) with T = Ad(x⁻¹ F). So a rigid motion of
+/// several variables, by exp(η) from the left, has the steps Ad(F⁻¹) η, whatever their estimates.
+/// For a variable of any other kind T is the identity.
 class States {
  public:
   /// From here on what changes can be undone.
@@ -39,7 +39,7 @@ class States {
     }
     remember();
   }
-  /// Notes values of somebody else's that are about to change.
+  /// Logs values outside this class that are about to change.
   void log_other(std::int32_t index, std::span<const double> values) {
     log_.push_back({index, true, logged_.size(), values.size()});
     logged_.insert(logged_.end(), values.begin(), values.end());

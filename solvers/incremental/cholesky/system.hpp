@@ -58,7 +58,7 @@ class System {
   /// Σ Jᵀr of the factors that have come since g_v was last solved for, as seen from the variable.
   double* pending(std::int32_t v) { return pending_.data() + offsets_[v]; }
   bool counts_all(std::int32_t v) const { return counts_all_[v] != 0; }
-  /// All of the gradient counts from here on, with what had been set aside.
+  /// All of the gradient counts from here on, including what had been deferred.
   void count_all(std::int32_t v);
   /// g_v has been solved for.
   void mark_solved(std::int32_t v);

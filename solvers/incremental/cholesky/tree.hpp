@@ -16,8 +16,8 @@ namespace cairn::incremental {
 
 /// A supernode of the elimination tree: its own variables, which it eliminates, and the variables
 /// of its ancestors that they are joined with by then (its separator). Beside its columns of L it
-/// keeps its update matrix, all that its subtree contributes to its ancestors: they can be computed
-/// anew without looking below.
+/// keeps its update matrix, all that its subtree contributes to its ancestors: they can be
+/// recomputed without reading what is below.
 struct Node {
   std::vector<std::int32_t> variables;  ///< own, in the order of elimination, then the separator
   std::int32_t own = 0;                 ///< so many of them are its own
@@ -34,13 +34,14 @@ struct Node {
   std::vector<block::Spread> spreads;    ///< the update matrix's rows in the parent's front, if …
   bool straight = false;                 ///< … both have the separator in the same order
   std::int32_t panel_rows = 0;  ///< if so: rows of the update matrix that are parent's columns
-  std::vector<double> owed;     ///< steps of the separator that have not been followed here yet
+  std::vector<double> owed;     ///< steps of the separator that are deferred: not applied here yet
   bool owes = false;            ///< whether any of them is not zero
-  /// Whether nothing in this subtree would notice if it were moved as a whole, but for its
-  /// separator: all its factors are relative ones between variables of one group.
+  /// Whether this subtree is invariant to rigid motions, except for its separator: all its factors
+  /// are relative ones between variables of one group.
   bool movable = false;
-  std::vector<double> lead;  ///< the group element that all of this subtree is still to be moved by
-  std::vector<double> arrived;   ///< what of the last pass's steps was added to `owed`
+  std::vector<double>
+      lead;  ///< the group element by which all of this subtree is still to be moved
+  std::vector<double> arrived;   ///< the part of the last pass's steps that was added to `owed`
   std::int64_t arrived_at = 0;   ///< that pass
   std::int64_t settled_at = -1;  ///< nothing above has had a lead since that many (see `Tree`)
   bool live = false;
@@ -60,19 +61,19 @@ struct Node {
   }
 };
 
-/// The Cholesky factor L of a system that changes, as an elimination tree of supernodes, any top of
-/// which can be taken down, ordered anew and put up again while what hangs below stays.
+/// The Cholesky factor L of a system that changes, as an elimination tree of supernodes, any upper
+/// part of which can be detached, reordered and re-eliminated while the subtrees below it stay.
 ///
 /// The columns of L that a change of H reaches are those of the variables that it touches and of
 /// their ancestors: the union of the paths to the roots, an upper part of the tree. `restructure`
-/// orders the variables of that part anew, knowing the fill that what hangs below has already
+/// reorders the variables of that part, including the fill that the subtrees below have already
 /// caused among them (IJRR 2017, 3.2 takes all columns to the right instead; see docs/online.md for
-/// the difference). `factorize` computes it from H and the update matrices of what hangs below, and
-/// `solve` follows a step down the tree as far as it matters (equations 8 to 10 there).
+/// the difference). `factorize` computes it from H and the update matrices of the subtrees below,
+/// and `solve` propagates a step down the tree as far as it matters (equations 8 to 10 there).
 class Tree {
  public:
-  /// `bound[v]`: how many factors of a variable notice a motion of everything (priors, factors to
-  /// what is held, factors that are no relative ones).
+  /// `bound[v]`: how many factors of a variable depend on a rigid motion of everything (priors,
+  /// factors to constant variables, factors that are not relative).
   Tree(const System& system, States& states, const std::vector<std::int32_t>& bound,
        const block::Kernels& kernels)
       : system_(&system), states_(&states), bound_(&bound), kernels_(&kernels) {}
@@ -90,31 +91,31 @@ class Tree {
   /// must not join it with anything any more.
   void retire(std::int32_t variable);
 
-  /// Orders the affected variables anew, those last that were touched last and those near them:
+  /// Reorders the affected variables, those last that were touched last and those near them:
   /// `touched_at[v]` says when, and from `since` on it counts.
   void restructure(std::span<const std::int64_t> touched_at, std::int64_t since);
-  /// Whether the factor has become so much more costly than when all of it was last ordered, as
-  /// growing does not explain.
+  /// Whether the factor has become more costly, since all of it was last ordered, than the growth
+  /// of the graph explains.
   bool worn_out() const;
   /// About how long it would take to order and factorise all of it.
   double seconds_to_order_anew() const;
   /// Computes the affected nodes. Returns -1, or a variable whose pivots are not positive; then the
-  /// tree is worth nothing until everything has been touched and factorised.
+  /// tree is invalid until everything has been touched and factorised.
   std::int32_t factorize();
   /// Solves H δ = g, where g is zero but at `sources` and leaves as zero. `steps`, all zero before,
   /// gets δ of the variables that `changed` then lists. Returns gᵀ H⁻¹ g.
   ///
-  /// Steps are followed down the tree where they matter. What the separator of a subtree does sums
-  /// up, squared and weighted with the diagonal of H; a subtree stays where it is, and owes it,
-  /// while that is less than `tolerance`. A subtree that is `movable` follows a motion of its
-  /// separator as a whole by moving as a whole, which is exact and is only noted (`lead`): it owes
-  /// what is left.
+  /// Steps are propagated down the tree where they matter. The steps of a subtree's separator are
+  /// accumulated, squared and weighted with the diagonal of H; they are deferred (`owed`) while
+  /// that is less than `tolerance`. A subtree that is `movable` follows a rigid motion of its
+  /// separator by moving as a whole, which is exact and is only recorded (`lead`); the rest is
+  /// deferred.
   double solve(std::span<const std::int32_t> sources, double tolerance, std::vector<double>& g,
                std::vector<double>& steps, std::vector<std::int32_t>& changed);
-  /// gᵀ H⁻¹ g alone: by how much chi2 would fall. Leaves g as zero.
+  /// gᵀ H⁻¹ g alone, the predicted decrease of chi2. Leaves g as zero.
   double decrement(std::span<const std::int32_t> sources, std::vector<double>& g);
-  /// Follows what the nodes on the path from a variable to its root owe. To be called before the
-  /// factors of a variable change.
+  /// Applies the deferred steps of the nodes on the path from a variable to its root. To be called
+  /// before the factors of a variable change.
   void follow(std::int32_t variable, std::vector<double>& steps,
               std::vector<std::int32_t>& changed);
 
@@ -134,7 +135,7 @@ class Tree {
   /// After `solve` or `follow`, for a variable whose step was not computed: the node above it that
   /// the pass ended at, or null.
   const Node* end_of_pass(std::int32_t variable) const;
-  /// What arrived at such a node of the step of one of its separator's variables.
+  /// The part of the step of one of its separator's variables that was added to such a node.
   const double* arrived(const Node& node, std::int32_t variable) const;
 
   /// X = H⁻¹ B for eight right-hand sides side by side, rows as in δ. `sources`: variables at which

@@ -6,7 +6,7 @@
 namespace cairn {
 
 /// Threads inside BLAS make small dense blocks slower, and results depend on their number. OpenBLAS
-/// is told so once; the reference BLAS has no threads, and others are left alone.
+/// is restricted to one thread, once; the reference BLAS has no threads, and others are left alone.
 inline void keep_blas_to_one_thread() {
   using SetThreads = void (*)(int);
   if (auto set = reinterpret_cast<SetThreads>(dlsym(RTLD_DEFAULT, "openblas_set_num_threads")))

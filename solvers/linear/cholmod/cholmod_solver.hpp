@@ -15,13 +15,13 @@ namespace cairn {
 
 /// How CHOLMOD factorises.
 enum class CholmodMode {
-  automatic,   ///< supernodal where the fill is dense enough to pay (40 flops a nonzero of L)
+  automatic,   ///< supernodal where the fill is dense enough to pay (40 flops per nonzero of L)
   simplicial,  ///< column by column, without BLAS
   supernodal,  ///< dense blocks through BLAS
 };
 
 /// Adapter of CHOLMOD (Chen, Davis, Hager, Rajamanickam 2008): H = P L Lᵀ Pᵀ, with P from the graph
-/// of the blocks. Block values are scattered into scalar form by a map computed once a structure.
+/// of the blocks. Block values are scattered into scalar form by a map computed once per structure.
 /// Every instance has a workspace of its own; CHOLMOD neither prints nor aborts.
 class CholmodSolver final : public LinearSolver, public LogDeterminant, public ManyRightHandSides {
  public:

@@ -14,8 +14,8 @@ namespace cairn {
 
 /// Adapter of Eigen's SimplicialLDLT: P H Pᵀ = L D Lᵀ, with P from the graph of the blocks (AMD) or
 /// the order given. The permuted upper triangle is scattered straight from the blocks by a map
-/// computed once a structure, so that Eigen copies nothing. H counts as positive definite if all of
-/// D is.
+/// computed once per structure, so that Eigen copies nothing. H counts as positive definite if all
+/// of D is.
 class EigenSolver final : public LinearSolver, public LogDeterminant {
  public:
   explicit EigenSolver(std::string ordering);
@@ -31,7 +31,7 @@ class EigenSolver final : public LinearSolver, public LogDeterminant {
  private:
   using Matrix = Eigen::SparseMatrix<double>;
 
-  /// SimplicialLDLT with a look at the structure of L, which Eigen shows only after a
+  /// SimplicialLDLT with access to the structure of L, which Eigen gives only after a
   /// factorisation.
   class Ldlt : public Eigen::SimplicialLDLT<Matrix, Eigen::Upper, Eigen::NaturalOrdering<int>> {
    public:

@@ -10,7 +10,7 @@ void cairn_register(cairn::Registrar& registrar) {
           .integer("max_iterations", 0, 0, 1e12,
                    "sweeps (forwards and backwards) of one solve; 0: as many as 3e8 "
                    "multiplications allow; a step "
-                   "that has not arrived by then is used, and that is told")
+                   "that has not converged by then is used, and reported")
           .real("omega", 1.0, 1e-3, 1.999, "over-relaxation; 1 is Gauss-Seidel itself"),
       [](const cairn::Options& options, cairn::Registry&) {
         return std::make_unique<cairn::GaussSeidelSolver>(

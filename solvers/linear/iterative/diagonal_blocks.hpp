@@ -20,7 +20,7 @@ void forward_block(const double* L, int n, double* x);
 void backward_block(const double* L, int n, double* x);
 
 /// The Cholesky factors of the diagonal blocks of H. That all of them are positive definite is
-/// necessary for H to be, and the only part of it that an iterative solver can tell beforehand.
+/// necessary for H to be, and the only part of it that an iterative solver can check beforehand.
 class DiagonalBlocks {
  public:
   void analyze(const BlockStructure& structure);

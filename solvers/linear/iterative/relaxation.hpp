@@ -23,10 +23,10 @@ struct RelaxationOptions {
 /// What block Jacobi and block Gauss-Seidel share: stationary iterations x ← x + M⁻¹ (g − H x) from
 /// x = 0 until the residual is small or the sweeps are used up (Saad 2003, chapter 4).
 ///
-/// Every so many sweeps the residual r and the quadratic model φ(x) = ½ xᵀHx − gᵀx are looked at. A
+/// Every so many sweeps the residual r and the quadratic model φ(x) = ½ xᵀHx − gᵀx are evaluated. A
 /// convergent iteration lowers φ always, while ‖r‖, which mixes units, may rise for a while; so φ
-/// tells divergence. The best x is returned in any case, and how the solves ended is told in the
-/// note. A failed factorisation is a diagonal block that is not positive definite; an H that is
+/// detects divergence. The best x is returned in any case, and the note reports how the solves
+/// ended. A failed factorisation is a diagonal block that is not positive definite; an H that is
 /// indefinite beyond that shows as divergence.
 class Relaxation : public LinearSolver {
  public:

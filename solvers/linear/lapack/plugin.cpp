@@ -7,7 +7,7 @@ void cairn_register(cairn::Registrar& registrar) {
       "lapack",
       cairn::OptionTable{}.integer(
           "max_size", 8000, 1, 46000,
-          "unknown scalars beyond which it refuses: a dense matrix of 8000 takes 0.5 GB"),
+          "largest number of scalar unknowns: a dense matrix of 8000 takes 0.5 GB"),
       [](const cairn::Options& options, cairn::Registry&) {
         return std::make_unique<cairn::LapackSolver>(options.integer("max_size"));
       });

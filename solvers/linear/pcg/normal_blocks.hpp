@@ -11,7 +11,7 @@
 namespace cairn {
 
 /// H = JᵀJ + D by blocks, or the part of it that comes of some of the factors. All index work is
-/// done once a structure; sums are taken in the order of the factors.
+/// done once per structure; sums are taken in the order of the factors.
 class NormalBlocks {
  public:
   void analyze(const JacobianStructure& structure);

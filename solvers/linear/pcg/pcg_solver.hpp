@@ -31,12 +31,12 @@ struct PcgOptions {
 /// the x that it has; either way x is used, since each iterate of conjugate gradients lowers the
 /// quadratic model (Steihaug 1983), and the note of `stats` says how often. That H is not positive
 /// definite is a failed factorisation where a diagonal block, or the preconditioner, shows it;
-/// where only a direction p with pᵀHp ≤ 0 does, in a solve, the x so far is returned and told. An H
-/// that is only semidefinite, as under a free gauge, is solved all the same.
+/// where only a direction p with pᵀHp ≤ 0 does, in a solve, the x so far is returned and reported.
+/// An H that is only semidefinite, as under a free gauge, is solved all the same.
 ///
 /// Sums are taken in a fixed order: results do not depend on the number of threads.
 ///
-/// With a preconditioner that wants the factors it has the ability `JacobianSolver`, and forms H
+/// With a preconditioner that needs the factors it has the ability `JacobianSolver`, and forms H
 /// from J by itself.
 class PcgSolver final : public LinearSolver, public JacobianSolver {
  public:

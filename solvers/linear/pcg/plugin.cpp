@@ -35,7 +35,7 @@ void cairn_register(cairn::Registrar& registrar) {
                   "what is solved exactly in each iteration")
           .real("tolerance", 1e-10, 1e-15, 1.0, "on the relative residual |Hx - g| / |g|")
           .integer("max_iterations", 20000, 1, 1e9,
-                   "of one solve; a step that has not arrived by then is used, and that is told")
+                   "of one solve; a step that has not converged by then is used, and reported")
           .real("loops", 0.3, 0.0, 1e3,
                 "subgraph: loop closures taken besides the spanning tree, as a fraction of the "
                 "blocks"),

@@ -16,8 +16,8 @@ std::vector<double> coupling_strengths(const BlockMatrix& H,
 
 /// The entries of a subgraph of the block graph, rising: a spanning forest of the largest weight
 /// (Kruskal 1956), and of the other edges the `extra` with the largest stretch, that is, the
-/// strength times the length of the way round through the forest, edges being as long as they are
-/// weak. Ties go to the lower entry, so the choice is always the same.
+/// strength times the length of the path in the forest, with the length of an edge the inverse of
+/// its strength. Ties go to the lower entry, so the choice is always the same.
 std::vector<std::int64_t> choose_subgraph(const BlockStructure& structure,
                                           const std::vector<double>& strength, std::int64_t extra);
 

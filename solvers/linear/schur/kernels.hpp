@@ -57,7 +57,7 @@ using Backward = void (*)(const Neighbour* first, const Neighbour* last, const d
                           const std::int64_t* begin, const double* y, double* z, int rows,
                           int inner);
 
-/// The dense work on small blocks, for one instruction set. Each choice is made once a structure;
+/// The dense work on small blocks, for one instruction set. Each choice is made once per structure;
 /// sizes 2, 3, 6 and 9 have code of their own, and any other size takes the general one.
 struct Kernels {
   const char* name;

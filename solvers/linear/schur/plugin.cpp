@@ -9,8 +9,8 @@ void cairn_register(cairn::Registrar& registrar) {
           .component("linear_solver", "linear_solver", "block_cholesky",
                      "solves the reduced system")
           .choice("eliminate", "auto", {"auto", "smallest", "independent_set"},
-                  "blocks that go first; auto: the smallest where they are most of all and not "
-                  "joined, else an independent set")
+                  "blocks that are eliminated first; auto: the smallest where they are most of all "
+                  "and not adjacent, else an independent set")
           .choice("kernels", "auto", {"auto", "portable", "avx2", "avx512"},
                   "instruction set, as far as the machine has it"),
       [](const cairn::Options& options, cairn::Registry& registry) {

@@ -130,7 +130,7 @@ void SchurPlan::lay_out_y(const BlockStructure& structure) {
   if (y_values > std::numeric_limits<std::uint32_t>::max()) {
     throw Error(ErrorCode::usage,
                 "linear_solver schur: the blocks between eliminated and remaining variables have "
-                "more than 2^32 values; eliminate=independent_set or another solver may do");
+                "more than 2^32 values; try eliminate=independent_set or another solver");
   }
 }
 

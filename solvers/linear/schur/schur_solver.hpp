@@ -16,14 +16,14 @@
 namespace cairn {
 
 /// Solves H x = g by eliminating an independent set E of blocks first, such as the points of a
-/// bundle adjustment, and leaving the others, R, to any linear solver (Brown 1958; Triggs et al.
-/// 2000, §6.1):
+/// bundle adjustment, and solving for the others, R, by any linear solver (Brown 1958; Triggs et
+/// al. 2000, §6.1):
 ///
 ///     S = H_RR − H_RE H_EE⁻¹ H_ER,   S x_R = g_R − H_RE H_EE⁻¹ g_E,   x_E = H_EE⁻¹(g_E − H_ER x_R)
 ///
 /// H_EE is block diagonal, so each of its blocks is factorised by itself. All index work is done
-/// once a structure (`schur::SchurPlan`); after that nothing is allocated here. Each block of S has
-/// one writer, which adds up in the order of E: results do not depend on the number of threads.
+/// once per structure (`schur::SchurPlan`); after that nothing is allocated here. Each block of S
+/// has one writer, which adds up in the order of E: results do not depend on the number of threads.
 ///
 /// Failures, statistics, the logarithm of the determinant and the order of elimination are those of
 /// the whole; the last two, many right-hand sides and marginals (by solves) where the inner solver
@@ -49,7 +49,8 @@ class SchurSolver final : public LinearSolver,
   void* ability(std::string_view name) override;
 
  private:
-  /// One right-hand side on its way: z and y are room for E and R, y with schur::kOverread more.
+  /// One right-hand side during a solve: z and y are memory for E and R, y with schur::kOverread
+  /// more.
   struct Side {
     const double* g;
     double* x;

@@ -12,7 +12,7 @@
 namespace cairn {
 
 /// One sparse matrix J P, or [J; √D] P with the damping as rows of its own below, and its QR
-/// factorisation by SuiteSparseQR. The pattern, the way of the blocks' values into it, and
+/// factorisation by SuiteSparseQR. The pattern, the map of the blocks' values into it, and
 /// SuiteSparseQR's symbolic analysis are made once, in the constructor.
 class SpqrFactor {
  public:

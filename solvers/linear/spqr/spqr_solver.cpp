@@ -90,7 +90,7 @@ void* SpqrSolver::ability(std::string_view name) {
 
 void SpqrSolver::analyze(const BlockStructure&) {
   throw Error(ErrorCode::usage,
-              "linear_solver spqr factorises the Jacobian, and here only H = JᵀJ is at hand, as "
+              "linear_solver spqr factorises the Jacobian, and here only H = JᵀJ is available, as "
               "for a reduced system; use block_cholesky, cholmod or eigen here, or spqr as the "
               "linear solver of the optimizer itself");
 }

@@ -24,9 +24,9 @@ namespace cairn {
 /// The column ordering is computed on the graph of the blocks, the symbolic analysis once a
 /// structure: that of J when analysing, that of [J; √D] at the first damped factorisation. A J
 /// without full column rank is a failed `Factorization` with the first block that depends on those
-/// eliminated before it. There is no way from H alone back to J: `analyze(BlockStructure)` throws
-/// `Error` (usage) that says so. SuiteSparseQR keeps Q as Householder vectors and allocates its
-/// factor anew each time.
+/// eliminated before it. J cannot be recovered from H alone: `analyze(BlockStructure)` throws
+/// `Error` (usage). SuiteSparseQR keeps Q as Householder vectors and allocates a new factor each
+/// time.
 class SpqrSolver final : public LinearSolver, public JacobianSolver, public LogDeterminant {
  public:
   explicit SpqrSolver(std::string ordering);

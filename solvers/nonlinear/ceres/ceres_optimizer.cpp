@@ -164,7 +164,7 @@ Summary CeresOptimizer::optimize(Graph& graph, const Stop& stop, Observer& obser
   if (std::string sentence = gauge.describe(graph); !sentence.empty())
     summary.notes.push_back(std::move(sentence));
   const bool idle = nothing_to_optimise(gauge);
-  if (idle) summary.notes.push_back("nothing to optimise: every variable is held");
+  if (idle) summary.notes.push_back("nothing to optimise: every variable is constant");
   for (const std::string& sentence : summary.notes) observer.on_message(sentence);
   if (idle || stop.max_iterations <= 0) {
     summary.initial_chi2 = summary.final_chi2 = chi2(graph);

@@ -3,21 +3,21 @@
 
 namespace cairn {
 
-/// Decides when an optimisation has arrived, from what undamped steps promise.
+/// Decides when an optimisation has converged, from the predicted decreases of undamped steps.
 ///
-/// The full Gauss-Newton step δ = H⁻¹g promises to lower chi2 by gᵀδ (the Newton decrement). Where
-/// the residuals at the minimum are large Gauss-Newton converges linearly, and the promises form a
-/// geometric series p, qp, q²p, … whose sum p/(1−q) is what is left to gain. That sum, not its
-/// first member, is compared with the tolerance: so a run that creeps is not taken for one that has
-/// arrived.
+/// The full Gauss-Newton step δ = H⁻¹g has the predicted decrease gᵀδ of chi2 (the Newton
+/// decrement). Where the residuals at the minimum are large Gauss-Newton converges linearly, and
+/// the predicted decreases form a geometric series p, qp, q²p, … whose sum p/(1−q) is the remaining
+/// decrease. That sum, not its first member, is compared with the tolerance: so slow convergence is
+/// not mistaken for convergence.
 class Convergence {
  public:
   /// `tolerance`: fraction of chi2; 0 never converges. `state_norm`: Euclidean norm of all states.
   Convergence(double tolerance, double state_norm)
       : tolerance_(tolerance), state_norm_(state_norm) {}
 
-  /// Whether what is left to gain is below the tolerance. `promise`: gᵀδ of the undamped step at an
-  /// estimate with that chi2; to be called once a linearisation.
+  /// Whether the remaining decrease is below the tolerance. `promise`: gᵀδ of the undamped step at
+  /// an estimate with that chi2; to be called once per linearisation.
   bool arrived(double promise, double chi2);
 
   /// Whether arithmetic allows no further progress: to be called with each step; true when

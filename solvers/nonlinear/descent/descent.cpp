@@ -33,7 +33,7 @@ Descent::Descent(std::string optimizer, std::string linear_solver, LinearSolver&
   const bool nothing_to_do = equations_->size() == 0;
   if (nothing_to_do) {
     chi2 = equations_->chi2(estimate);
-    note("nothing to optimise: every variable is held");
+    note("nothing to optimise: every variable is constant");
     end(Status::converged);
   } else {
     step.resize(static_cast<std::size_t>(equations_->size()));
@@ -109,7 +109,8 @@ Summary Descent::finish() {
   summary_.status = status_.value_or(Status::max_iterations);
   summary_.final_chi2 = best_chi2_;
   if (summary_.status == Status::converged && chi2 > best_chi2_ * (1.0 + 1e-6)) {
-    note(fmt::format("converged at chi2 {:.9g}; kept the better estimate met on the way", chi2));
+    note(fmt::format("converged at chi2 {:.9g}; kept a better estimate of an earlier iteration",
+                     chi2));
   }
   summary_.solver = solver_.stats();
   graph_.set_values(std::move(best_));

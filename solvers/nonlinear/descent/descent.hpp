@@ -27,7 +27,7 @@ double dot(std::span<const double> a, std::span<const double> b);
 /// the best estimate in `finish`.
 class Descent {
  public:
-  /// Builds the normal equations, linearises once, and tells the observer.
+  /// Builds the normal equations, linearises once, and notifies the observer.
   Descent(std::string optimizer, std::string linear_solver, LinearSolver& solver, Graph& graph,
           const Stop& stop, Observer& observer);
 
@@ -36,7 +36,7 @@ class Descent {
   /// Stop.tolerance is 0: no test of convergence is to be made.
   bool exact() const { return !(stop_.tolerance > 0.0); }
 
-  /// Where the run stands, with its chi2. Whoever moves it brings chi2, H and g up to date.
+  /// The current estimate, with its chi2. Code that changes it must update chi2, H and g.
   Values estimate;
   double chi2 = 0.0;
   /// Room for a trial step.
@@ -47,19 +47,19 @@ class Descent {
   bool next_iteration();
   /// Whether this is the last iteration that the limit allows: no need to linearise after it.
   bool last_iteration() const { return number_ >= stop_.max_iterations; }
-  /// Looks at the interrupt flag and the clock, between the parts of an iteration; ends the run if
-  /// it must stop.
+  /// Checks the interrupt flag and the clock, between the parts of an iteration; ends the run if it
+  /// must stop.
   bool must_stop();
 
   /// Remembers the estimate if its chi2 is the lowest so far; true if it is.
   bool keep_if_best();
-  /// Records the iteration and tells the observer, who may end the run.
+  /// Records the iteration and notifies the observer, which may end the run.
   void record(double step_norm, double lambda, bool accepted);
 
   void end(Status status) { status_ = status; }
   bool ended() const { return status_.has_value(); }
   void note(std::string sentence) { summary_.notes.push_back(std::move(sentence)); }
-  /// Ends the run for a factorisation of H that failed, with a note that says why.
+  /// Ends the run for a factorisation of H that failed, with a note that gives the reason.
   void end_not_positive_definite(const Factorization& failure);
 
   /// Euclidean norm of all states.

@@ -12,7 +12,7 @@ namespace cairn {
 struct DoglegOptions {
   std::string linear_solver = "block_cholesky";  ///< its name, for the summary
   double initial_radius = 1e4;      ///< of the trust region, in the norm of diag(H): about √chi2
-  double smallest_diagonal = 1e-6;  ///< the diagonal of H counts as at least this [units of H]
+  double smallest_diagonal = 1e-6;  ///< lower bound of the diagonal of H [units of H]
 };
 
 /// Powell's dogleg (Powell 1970; Nocedal and Wright 2006, ch. 4): the step is the point of the

@@ -10,7 +10,7 @@ void cairn_register(cairn::Registrar& registrar) {
                      "solves the normal equations")
           .real("initial_radius", 1e4, 1e-12, 1e30, "of the trust region, in the norm of diag(H)")
           .real("smallest_diagonal", 1e-6, 0.0, 1e30,
-                "the diagonal of H counts as at least this in that norm"),
+                "lower bound of the diagonal of H in that norm"),
       [](const cairn::Options& options, cairn::Registry& registry) {
         const std::string& solver = options.text("linear_solver");
         return std::make_unique<cairn::Dogleg>(

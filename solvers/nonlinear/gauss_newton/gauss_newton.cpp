@@ -14,7 +14,7 @@ namespace {
 
 void end_diverged(Descent& run) {
   std::string sentence =
-      "Gauss-Newton diverged: levenberg_marquardt, dogleg or a better initial guess may do";
+      "Gauss-Newton diverged: try levenberg_marquardt, dogleg or a better initial guess";
   if (const int free = std::isfinite(run.chi2) ? run.equations().free_directions() : -1; free > 0) {
     sentence += fmt::format("; {} gauge freedom{} likely", free, free == 1 ? " is" : "s are");
   }

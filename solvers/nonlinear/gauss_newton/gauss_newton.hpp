@@ -14,10 +14,10 @@ struct GaussNewtonOptions {
   int rises = 8;  ///< iterations in a row in which chi2 may rise before the run counts as diverging
 };
 
-/// Gauss-Newton (Ila et al. 2017, eq. 3-4): H δ = g, x ← retract(x, δ), every step taken whole.
-/// From far chi2 may rise on the way to the minimum; the best estimate met is kept all the same.
-/// With Stop.tolerance = 0 it does exactly the iterations asked for, stopping earlier only for
-/// numbers that are not finite or a factorisation that fails.
+/// Gauss-Newton (Ila et al. 2017, eq. 3-4): H δ = g, x ← retract(x, δ), every step taken whole. Far
+/// from the minimum chi2 may rise; the best estimate found is kept all the same. With
+/// Stop.tolerance = 0 it does exactly the iterations asked for, stopping earlier only for numbers
+/// that are not finite or a factorisation that fails.
 class GaussNewton final : public Optimizer {
  public:
   GaussNewton(std::unique_ptr<LinearSolver> solver, GaussNewtonOptions options);

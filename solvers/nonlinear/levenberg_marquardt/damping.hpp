@@ -5,9 +5,9 @@
 
 namespace cairn {
 
-/// How much a Levenberg-Marquardt step is damped: H + λ D. λ follows the gain ratio
-/// ρ = (chi2 lowered) / (chi2 promised) as Nielsen (1999) has it: λ ← λ max(1/3, 1 − (2ρ − 1)³)
-/// after a step that is taken, λ ← λν with ν = 2, 4, 8, … after steps that are not.
+/// How much a Levenberg-Marquardt step is damped: H + λ D. λ follows the gain ratio ρ = (actual
+/// decrease of chi2) / (predicted decrease) by the rule of Nielsen (1999): λ ← λ max(1/3, 1 − (2ρ −
+/// 1)³) after a step that is taken, λ ← λν with ν = 2, 4, 8, … after steps that are not.
 class Damping {
  public:
   Damping(double initial, double smallest, double largest)
@@ -25,17 +25,17 @@ class Damping {
   double growth_ = 2.0;
 };
 
-/// When to leave the damping out. Close to the minimum damping only delays: weak modes, such as the
-/// far end of a long chain, creep as long as λ is above their share of H, and a small promise then
-/// means nothing. So once steps gain little, whole Gauss-Newton steps are tried; if one is
-/// rejected, damping returns, and the next trial waits twice as long.
+/// When to omit the damping. Close to the minimum damping only delays: weak modes, such as the far
+/// end of a long chain, converge slowly as long as λ is above their eigenvalues, and a small
+/// predicted decrease then means nothing. So once steps lower chi2 little, undamped Gauss-Newton
+/// steps are tried; if one is rejected, damping returns, and the next trial waits twice as long.
 class Endgame {
  public:
   /// `gain`: fraction of chi2 below which an accepted step counts as little; 0 for never.
   explicit Endgame(double gain) : gain_(gain) {}
 
   bool active() const { return active_; }
-  /// Whether whole steps have been tried and had to be given up.
+  /// Whether undamped steps have been tried and abandoned.
   bool ever_failed() const { return failures_ > 0; }
   /// To be called after each damped step that was taken, with the fraction of chi2 that it lowered.
   void consider(double gain);

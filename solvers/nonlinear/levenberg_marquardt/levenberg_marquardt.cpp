@@ -111,7 +111,7 @@ class Run {
   void raise_damping() {
     damping_.raise();
     if (!damping_.at_limit() || run_.ended() || run_.exact()) return;
-    run_.note("no step lowers chi2, however small: this is as far as arithmetic goes");
+    run_.note("no step lowers chi2, however small: limited by rounding");
     run_.end(Status::converged);
   }
 

@@ -12,8 +12,8 @@ namespace cairn {
 struct LevenbergMarquardtOptions {
   std::string linear_solver = "block_cholesky";  ///< its name, for the summary
   /// Damping of the first step, relative to the diagonal of H. 0: 1e-6, or 1e-4 where the gauge is
-  /// left free: there damping alone holds the estimate, and such problems (cameras and points) are
-  /// so far from linear that a first step with less may throw points behind their cameras, into
+  /// left free: there damping alone makes H regular, and such problems (cameras and points) are so
+  /// far from linear that a first step with less may throw points behind their cameras, into
   /// another minimum.
   double initial_lambda = 0.0;
   double largest_lambda = 1e16;     ///< where the run gives up
@@ -24,8 +24,8 @@ struct LevenbergMarquardtOptions {
 /// Levenberg-Marquardt: (H + λ D) δ = g with D = diag(H) (Marquardt's scaling, which makes λ a pure
 /// number whatever the units) and Nielsen's rule for λ. A step is taken only if it lowers chi2; one
 /// that is not costs a factorisation but no linearisation. Convergence is judged on undamped steps
-/// (`Endgame`), so that heavy damping is not taken for arrival. With Stop.tolerance = 0 it makes
-/// exactly the number of trial steps asked for, all of them damped.
+/// (`Endgame`), so that heavy damping is not mistaken for convergence. With Stop.tolerance = 0 it
+/// makes exactly the number of trial steps asked for, all of them damped.
 class LevenbergMarquardt final : public Optimizer {
  public:
   LevenbergMarquardt(std::unique_ptr<LinearSolver> solver, LevenbergMarquardtOptions options);

@@ -13,7 +13,7 @@ void cairn_register(cairn::Registrar& registrar) {
                 "where the gauge is left free")
           .real("largest_lambda", 1e16, 1.0, 1e30, "damping at which the run gives up")
           .real("smallest_diagonal", 1e-6, 0.0, 1e30,
-                "the diagonal of H counts as at least this in the damping")
+                "lower bound of the diagonal of H in the damping")
           .boolean("endgame", true,
                    "undamped steps near the minimum, which also judge convergence"),
       [](const cairn::Options& options, cairn::Registry& registry) {

@@ -245,7 +245,7 @@ TEST_F(PluginBoundary, AFolderThatIsNotThereIsReported) {
 TEST_F(PluginBoundary, AMissingSharedObjectIsNamedWithWhatIsThere) {
   fs::remove(copy("nothing_wrong", "plain"));
   cairn::Registry registry(search_in({folder(), kBad / "twice/first"}));
-  EXPECT_EQ(message_of(registry, "plain"), "loss 'plain' is not to be had: the shared object " +
+  EXPECT_EQ(message_of(registry, "plain"), "loss 'plain' is not available: the shared object " +
                                                (folder() / "plain.so").string() +
                                                " is missing; build or install plugin 'plain', or "
                                                "choose from what is there: first, twice");

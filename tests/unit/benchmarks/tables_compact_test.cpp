@@ -145,17 +145,18 @@ TEST(CompactTables, CallCovariancesHonestWithinTheBandOfChi2) {
         strategy, squared);
   };
   const std::string table =
-      section(report("compact_honesty",
+      section(report("compact_consistency",
                      entry("fpfl", 8000) + "," + entry("apal", 10300) + "," + entry("apfl", 12000)),
               "compact-nees");
   EXPECT_THAT(table, HasSubstr("| town | FPFL | 2 | 20000 | 0.9000 | 0.9804 … 1.0196 | "
                                "conservative |\n"));
-  EXPECT_THAT(table, HasSubstr("| 1.0150 | 0.9804 … 1.0196 | honest |\n"));
+  EXPECT_THAT(table, HasSubstr("| 1.0150 | 0.9804 … 1.0196 | consistent |\n"));
   EXPECT_THAT(table, HasSubstr("| 1.1000 | 0.9804 … 1.0196 | overconfident |\n"));
 }
 
 TEST(CompactTables, CompareCovariancesWithThoseOfEverything) {
-  const auto compared = report("compact_honesty", R"({"part": "compare", "name": "town", "compare":
+  const auto compared =
+      report("compact_consistency", R"({"part": "compare", "name": "town", "compare":
       {"steps": 166, "marginal_conservative": 0.995, "full_conservative": 1.0,
        "least_marginal_ratio": 0.99, "least_full_ratio": 1.2, "least_eigenvalue": 0.987}},
       {"part": "compare", "name": "village", "compare": null})");

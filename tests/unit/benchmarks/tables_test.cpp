@@ -91,7 +91,7 @@ TEST(PerformanceTables, DrawOnlyTheBestOfEachFamily) {
 }
 
 TEST(PerformanceTables, GiveRatesAgainstTheNearerRoof) {
-  // 2 GFLOP in 0.1 s; 2e9 / (16 * 1.25e8) = 1 flop a byte at 25 GB/s lies below dgemm's 50.
+  // 2 GFLOP in 0.1 s; 2e9 / (16 * 1.25e8) = 1 flop per byte at 25 GB/s lies below dgemm's 50.
   const auto rates = report("rates", R"({"name": "big", "factorize": 0.1, "dgemm": 5e10,
       "bandwidth": 2.5e10, "solver": {"ordering": "amd", "factor_flops": 2e9,
       "factor_nonzeros": 125000000}})");

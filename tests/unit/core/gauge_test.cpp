@@ -82,7 +82,7 @@ TEST_F(GaugeTest, HoldsAVariableThatNoFactorTouches) {
   EXPECT_THAT(gauge.unconstrained, ElementsAre(lost));
   EXPECT_THAT(
       gauge.describe(graph_),
-      ::testing::HasSubstr("1 variable has no factor and is held, the first is VERTEX_SE2 99"));
+      ::testing::HasSubstr("1 variable has no factor and is constant, the first is VERTEX_SE2 99"));
 }
 
 using test::ScaledPose;
@@ -109,9 +109,10 @@ TEST_F(GaugeTest, LeavesAComponentFreeWhoseLargestVariableIsNoGroup) {
   EXPECT_THAT(gauge.anchored, ElementsAre(1, 4)) << "the others are anchored all the same";
   EXPECT_THAT(gauge.left_free, ElementsAre(a));
   EXPECT_FALSE(gauge.held[a] || gauge.held[b]);
-  EXPECT_THAT(gauge.describe(graph_),
-              ::testing::EndsWith("; the gauge of a component is left free: holding VERTEX_SCALED "
-                                  "50 would hold more than its place"));
+  EXPECT_THAT(
+      gauge.describe(graph_),
+      ::testing::EndsWith("; the gauge of a component is left free: anchoring VERTEX_SCALED "
+                          "50 would constrain more than its pose"));
   graph_.set_fixed(b);
   EXPECT_THAT(resolve_gauge(graph_).left_free, IsEmpty());
 }

@@ -86,7 +86,7 @@ TEST_F(PoseChain, NamesTheGapInItsOdometry) {
   for (const Id id : {1, 2, 5, 6}) pose(id);
   join(1, 2), join(5, 6), join(1, 5);
   EXPECT_THAT(refusal(), AllOf(HasSubstr("no factor joins VERTEX_SE2 5 to VERTEX_SE2 2"),
-                               HasSubstr("ids rise along the robot's way")));
+                               HasSubstr("ids increase along the trajectory")));
 }
 
 TEST_F(PoseChain, RefusesLandmarks) {
@@ -354,7 +354,7 @@ TEST_P(Recover, RefusesWhatDoesNotFit) {
   };
   const OdometryChain one = chain({arc(1, 0)});
   EXPECT_THAT(refusal(*define_variable<test::ScaledPose>(), one, to),
-              HasSubstr("VERTEX_SCALED has not the abilities LieGroup and Placement"));
+              HasSubstr("VERTEX_SCALED lacks the ability LieGroup or Placement"));
   EXPECT_THAT(refusal(*type_, one, State{1.0}), HasSubstr("numbers"));
   EXPECT_THAT(refusal(*type_, chain({State{1.0}}), to), HasSubstr("numbers"));
   EXPECT_EQ(refusal(*type_, one, to), "");

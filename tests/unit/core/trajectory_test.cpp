@@ -113,7 +113,7 @@ TEST_F(ReadStamps, OneNumberALine) {
 
 TEST_F(ReadStamps, NamesTheLineThatIsWrong) {
   EXPECT_THAT(refusal("1\n2 3\n"),
-              EndsWith("txt:2: found '2 3'; expected a time stamp, one finite number a line"));
+              EndsWith("txt:2: found '2 3'; expected a time stamp, one finite number per line"));
   for (const char* bad : {"nan", "inf", "1e999", "one", "1,5"}) {
     EXPECT_THAT(refusal(std::string("1\n\n") + bad), testing::HasSubstr("txt:3: found '")) << bad;
   }

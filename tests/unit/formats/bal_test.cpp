@@ -109,7 +109,7 @@ TEST(Bal, SaysWhereAFileWasCutShort) {
               HasSubstr("file:6: the file ends here, in camera 1 of 2"));
   EXPECT_THAT(refusal("bal", kHeader + kObservations + kCameras + "1\n2\n3\n4\n"),
               HasSubstr("file:27: the file ends here, in point 2 of 2; expected what the header "
-                        "promises: 2 cameras, 2 points and 3 observations"));
+                        "declares: 2 cameras, 2 points and 3 observations"));
 }
 
 TEST(Bal, DoesNotMakeRoomForWhatAHeaderOnlyPromises) {

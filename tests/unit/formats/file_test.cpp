@@ -160,7 +160,7 @@ TEST_F(File, RefusesToWriteWithoutAFormat) {
       message_of([&] { write_graph(graph, path("a.xyz"), registry()); }, ErrorCode::usage),
       HasSubstr("no format that writes has the ending '.xyz'; endings on offer: .bal, .g2o"));
   EXPECT_THAT(message_of([&] { write_graph(graph, "-", registry()); }, ErrorCode::usage),
-              HasSubstr("standard output has no ending that tells the format"));
+              HasSubstr("standard output has no ending that determines the format"));
   EXPECT_THAT(
       message_of([&] { write_graph(graph, path("a.txt"), registry(), "isam"); }, ErrorCode::usage),
       HasSubstr("format 'isam' only reads"));

@@ -452,7 +452,7 @@ TEST_F(CompactPoseTest, GoesOnAfterABadCallAsIfItHadNotBeen) {
     EXPECT_THROW(policy.end_pose(), Error);
     EXPECT_THROW(policy.next_match(), Error);
     EXPECT_THROW(policy.offer(0, {}), Error);
-    EXPECT_THAT(refuse(world.variable(n + 1), {}), HasSubstr("without a measured motion"));
+    EXPECT_THAT(refuse(world.variable(n + 1), {}), HasSubstr("without odometry from pose"));
     EXPECT_THAT(refuse(world.variable(n), {world.edge(n, n + 1, world.identity(), I)}),
                 HasSubstr("is there already"));
     EXPECT_THAT(refuse(world.variable(0), {world.edge(n, n + 1, world.identity(), I)}),

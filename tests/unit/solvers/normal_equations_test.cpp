@@ -92,7 +92,7 @@ TEST_P(NormalEquationsTest, ExplainsAGraphHeldByAPointAlone) {
       equations.explain({.ok = false, .failed_block = equations.linearizer().block_of(2)});
   EXPECT_THAT(text, HasSubstr("VERTEX_SE2 2"));
   EXPECT_THAT(text, HasSubstr("1 gauge freedom is likely"));
-  EXPECT_THAT(text, HasSubstr("held only by VERTEX_XY 1000"));
+  EXPECT_THAT(text, HasSubstr("only VERTEX_XY 1000 is constant"));
 }
 
 TEST_P(NormalEquationsTest, ExplainsVariablesWithoutWeight) {

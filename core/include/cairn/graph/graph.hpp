@@ -167,7 +167,7 @@ class CAIRN_API Graph {
 
   std::int64_t tangent_size() const;   ///< over all variables, held or not
   std::int64_t residual_size() const;  ///< over all factors
-  /// Changes whenever variables, factors or held variables are added or change.
+  /// Changes whenever variables or factors are added or change, or which variables are fixed.
   std::uint64_t structure_version() const { return structure_version_; }
 
   // Loss ------------------------------------------------------------------------------------------

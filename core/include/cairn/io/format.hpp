@@ -18,14 +18,15 @@ class Registry;
 /// How to read a file.
 struct ReadOptions {
   bool skip_unknown = false;        ///< skip lines with unknown tags, counted in the report
-  bool repair_information = false;  ///< mend information matrices where the mending is known
+  bool repair_information = false;  ///< repair known mistakes in information matrices
 };
 
-/// What reading did beyond building the graph. Nothing is skipped or changed without standing here.
+/// What reading did beyond building the graph. Everything that is skipped or changed is listed
+/// here.
 struct ReadReport {
   std::string format;
   std::map<std::string, std::int64_t> skipped;  ///< unknown tag → lines
-  std::int64_t repaired = 0;                    ///< information matrices mended
+  std::int64_t repaired = 0;                    ///< information matrices repaired
   std::vector<std::string> notes;  ///< sentences: renumbered ids, missing vertices, …
   std::vector<double> stamps;  ///< time [s] of each pose, by rising id; empty if the file has none
 };
@@ -41,8 +42,8 @@ class CAIRN_API Format : public Component {
   /// File name endings without the dot, such as "g2o"; first the one for new files.
   virtual std::vector<std::string> extensions() const = 0;
 
-  /// How sure the format is that the text (the start of a file, at least its first lines) is its
-  /// own: 0 not at all, 100 certain. Endings are not looked at.
+  /// The confidence that the text (the beginning of a file, at least its first lines) is in this
+  /// format: 0 certainly not, 100 certain. File name endings are not considered.
   virtual int detect(std::string_view head) const = 0;
 
   /// Builds a graph. Types come from the registry by tag. Throws `Error` (input) with `name`, line,

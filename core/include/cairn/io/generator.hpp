@@ -11,7 +11,7 @@ namespace cairn {
 
 class Registry;
 
-/// A simulated data set: noisy measurements with a first estimate, and the truth.
+/// A simulated data set: noisy measurements with an initial estimate, and the ground truth.
 struct Simulation {
   Graph graph;  ///< estimate: as a robot would have it (odometry), first pose true
   Graph truth;  ///< the same variables at their true states; the same factors

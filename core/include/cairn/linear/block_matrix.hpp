@@ -11,8 +11,8 @@
 namespace cairn {
 
 /// Where the blocks of a sparse symmetric block matrix are: the lower triangle by block columns.
-/// Blocks of different sizes live in one matrix. Structure and values are separate: whoever has
-/// analysed a structure keeps that until `version` changes.
+/// Blocks of different sizes live in one matrix. Structure and values are separate: a symbolic
+/// analysis of a structure is valid until `version` changes.
 class CAIRN_API BlockStructure {
  public:
   BlockStructure() = default;

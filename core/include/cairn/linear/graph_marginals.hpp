@@ -28,7 +28,7 @@ namespace cairn {
 /// object, and the graph keep its structure.
 class CAIRN_API GraphMarginals {
  public:
-  /// Throws `Error` (usage) if the solver has not the ability `Marginals`.
+  /// Throws `Error` (usage) if the solver lacks the ability `Marginals`.
   GraphMarginals(const Graph& graph, LinearSolver& solver);
 
   /// Linearises at the graph's states and factorises H. If that fails, `explain` says why, and

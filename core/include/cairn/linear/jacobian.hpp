@@ -16,15 +16,15 @@
 namespace cairn {
 
 /// Where the blocks of a whitened Jacobian J are: block rows are factors, block columns unknowns.
-/// Structure and values are separate: whoever has analysed a structure keeps that until `version`
+/// Structure and values are separate: a symbolic analysis of a structure is valid until `version`
 /// changes.
 class CAIRN_API JacobianStructure {
  public:
   JacobianStructure() = default;
   /// `row_sizes`, `column_sizes`: scalars of each block row (residual) and block column (unknown).
   /// Entries of block row i are row_begin[i] … row_begin[i+1]-1, in any order, `columns` their
-  /// block columns; no column twice in a row. A row without entries is a factor of which every
-  /// variable is held.
+  /// block columns; no column twice in a row. A row without entries is a factor all of whose
+  /// variables are constant.
   JacobianStructure(std::vector<std::int32_t> row_sizes, std::vector<std::int32_t> column_sizes,
                     std::vector<std::int64_t> row_begin, std::vector<std::int32_t> columns);
 
@@ -88,10 +88,10 @@ class CAIRN_API JacobianMatrix {
   AlignedVector residual_;
 };
 
-/// Evaluates the whitened Jacobian of a graph at given states: one block row a factor, in the order
-/// of the factors' positions, and one block column a variable that is not held, numbered as
-/// `Linearizer::block_of` does. Rows are scaled by √ρ′, so that JᵀJ is the H, and −Jᵀr the g, of
-/// the linearizer.
+/// Evaluates the whitened Jacobian of a graph at given states: one block row per factor, in the
+/// order of the factors' positions, and one block column per variable that is not constant,
+/// numbered as `Linearizer::block_of` does. Rows are scaled by √ρ′, so that JᵀJ is the H, and −Jᵀr
+/// the g, of the linearizer.
 ///
 /// Each factor is evaluated by a call of its own (`FactorType::evaluate`), in parallel; every
 /// number has one writer, so results do not depend on the number of threads. Graph and linearizer

@@ -64,7 +64,7 @@ class CAIRN_API SolvedMarginals : public Marginals {
  private:
   struct Wanted {
     std::int32_t row, column;  ///< blocks
-    bool transpose;            ///< asked for the other way round
+    bool transpose;            ///< requested as the transposed block
     std::int64_t target;       ///< where it goes
   };
   void fetch(std::vector<Wanted>& wanted, std::span<double> out);

@@ -28,14 +28,14 @@ namespace cairn {
 /// which `explain` puts into words.
 ///
 /// A solver with the ability `JacobianSolver` is given the whitened Jacobian instead of H, which is
-/// then evaluated as well: H itself stays at hand for the optimizer.
+/// then evaluated as well: H itself is available to the optimizer.
 class CAIRN_API NormalEquations {
  public:
   NormalEquations(const Graph& graph, LinearSolver& solver);
 
   const Gauge& gauge() const { return gauge_; }
   const Linearizer& linearizer() const { return linearizer_; }
-  /// Scalar unknowns; 0 if everything is held, and then nothing else may be called.
+  /// Scalar unknowns; 0 if all variables are constant, and then nothing else may be called.
   std::int64_t size() const { return linearizer_.structure().size(); }
 
   /// Σ ρ(‖r‖²) at `values`.
@@ -57,8 +57,8 @@ class CAIRN_API NormalEquations {
   /// step = (what was factorised)⁻¹ g.
   void solve(std::span<double> step);
 
-  /// A sentence on why a factorisation of H failed: the variable at which it stopped, how many
-  /// gauge freedoms are likely, what leaves that variable free. Takes about as long as a
+  /// A sentence on why a factorisation of H failed: the variable at which it stopped, the likely
+  /// number of gauge freedoms, and why that variable is not determined. Takes about as long as a
   /// factorisation.
   std::string explain(const Factorization& failure) const;
   /// Directions in which chi2 hardly changes: eigenvalues below 1e-12 of H scaled to unit diagonal,

@@ -54,7 +54,7 @@ class CAIRN_API OptionTable {
   const std::vector<OptionSpec>& specs() const { return specs_; }
   /// The spec of that name, or null.
   const OptionSpec* find(std::string_view name) const;
-  /// One line an option, for `--help` and `cairn plugins NAME`.
+  /// One line per option, for `--help` and `cairn plugins NAME`.
   std::string help(std::string_view indent = "  ") const;
 
  private:

@@ -26,7 +26,7 @@ struct TypeSet {
 };
 
 /// What a plugin's `register_plugin` function is given: it adds what the plugin's manifest
-/// promises. Adding what the manifest does not name, or leaving out what it names, is an error of
+/// declares. Adding what the manifest does not name, or leaving out what it names, is an error of
 /// the plugin.
 class CAIRN_API Registrar {
  public:
@@ -69,8 +69,8 @@ struct Offer {
   std::string version;
 };
 
-/// Something wrong with the plugins found that concerns nobody who does not ask for it: a sidecar
-/// that cannot be read, a folder that is refused, two plugins with one name.
+/// A defect of the plugins found that matters only when the plugin is asked for: a sidecar that
+/// cannot be read, a folder that is refused, two plugins with one name.
 struct PluginProblem {
   std::filesystem::path where;
   std::string message;

@@ -21,8 +21,8 @@ struct UpdateOptions {
   bool defer = false;
   /// Relinearise, reorder and solve everything, until it has converged.
   bool full = false;
-  /// 0: no limit. Otherwise relinearisation that would take longer is left to later updates, which
-  /// is reported as `owed`.
+  /// 0: no limit. Otherwise relinearisation that would take longer is deferred to later updates,
+  /// and reported as `owed`.
   double max_seconds = 0.0;
 };
 
@@ -33,30 +33,30 @@ struct UpdateSeconds {
   double order = 0.0;      ///< finding the affected part, ordering it, its symbolic analysis
   double factorize = 0.0;
   double solve = 0.0;      ///< back substitution
-  double check = 0.0;      ///< finding out what should be relinearised
+  double check = 0.0;      ///< deciding what should be relinearised
   double marginals = 0.0;  ///< keeping covariances up to date
 
   CAIRN_API UpdateSeconds& operator+=(const UpdateSeconds& other);
 };
 
-/// How the covariances that are kept were brought up to date.
+/// How the covariances that are kept were updated.
 enum class MarginalsBy { none, unchanged, downdate, recomputation };
 /// "none", "unchanged", "downdate", "recomputation".
 CAIRN_API std::string_view to_string(MarginalsBy by);
 
 /// What an update did.
 struct UpdateReport {
-  bool ok = true;  ///< false: H is not positive definite; the estimate is the best that is known
+  bool ok = true;  ///< false: H is not positive definite; the estimate is the best available
   FactorId first_factor = 0;  ///< id of the first of the update's new factors; the others follow it
   /// The ids of the priors that marginalisation left, if any.
   std::vector<FactorId> priors;
   int iterations = 0;            ///< linear systems solved
-  int affected_variables = 0;    ///< whose columns of the factor were computed anew, summed
+  int affected_variables = 0;    ///< whose columns of the factor were recomputed, summed
   int relinearized_factors = 0;  ///< besides the new ones
-  int owed = 0;                  ///< factors that should be relinearised, left to later updates
+  int owed = 0;                  ///< factors whose relinearisation was deferred to later updates
   MarginalsBy marginals_by = MarginalsBy::none;
   UpdateSeconds seconds;
-  /// What a user should know, a sentence each, such as which variable was anchored.
+  /// Notes for the user, one sentence each, such as which variable was anchored.
   std::vector<std::string> notes;
 };
 
@@ -67,14 +67,14 @@ enum class KeptMarginals {
   diagonal  ///< the blocks of all variables
 };
 
-/// An estimate that follows a graph while it grows and changes: measurements go in, and the states
-/// that they make most likely come out, with their covariances.
+/// Keeps the maximum likelihood estimate of a graph, with covariances, up to date while the graph
+/// grows and changes.
 ///
 /// A variable is known by its `Id` and a factor by its `FactorId`. Every update is atomic: what it
 /// asks for is checked before anything changes, so an `Error` (input: an unknown id, a duplicate, a
 /// wrong size, …) leaves the estimator as it was. A component of the graph without a fixed variable
-/// or prior gets its first pose anchored, as by `resolve_gauge`, and says so in a note. Minimised
-/// is the sum of ρ(‖r‖²), as by an `Optimizer`.
+/// or prior gets its first pose anchored, as by `resolve_gauge`, which a note reports. It minimises
+/// the sum of ρ(‖r‖²), as an `Optimizer` does.
 class CAIRN_API Estimator : public Component {
  public:
   static constexpr std::string_view kKind = "estimator";
@@ -119,7 +119,8 @@ class CAIRN_API Estimator : public Component {
   /// Keep the cross block of these two as well.
   virtual void keep_cross(Id a, Id b) = 0;
   /// Σ_ab (tangent_a × tangent_b, column-major) of any two variables, a = b included: what is kept
-  /// is copied, anything else solved for. Held variables have zeros. False if H is singular.
+  /// is copied, anything else solved for. Blocks of constant variables are zero. False if H is
+  /// singular.
   virtual bool covariance(Id a, Id b, std::span<double> block) = 0;
   /// Σ(:, id): for each variable in the order of `variables` the block of rows; column-major with
   /// as many rows as the tangent sizes add up to.
@@ -127,9 +128,9 @@ class CAIRN_API Estimator : public Component {
 
   /// Forgets everything but its options.
   virtual void reset() = 0;
-  /// A copy, for questions of the kind "what if": neither knows of what the other does.
+  /// A copy, for questions of the kind "what if": neither is affected by changes of the other.
   virtual std::unique_ptr<Estimator> clone() const = 0;
-  /// Peak room that is taken by factor and covariances [bytes], as far as it is known.
+  /// Peak memory of factor and covariances [bytes], as far as it is known.
   virtual std::int64_t memory() const { return 0; }
 };
 

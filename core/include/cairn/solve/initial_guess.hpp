@@ -10,8 +10,8 @@
 
 namespace cairn {
 
-/// Computes a first estimate of a graph from its factors, replacing the states that it has. Held
-/// variables (`FIX`, anchors) keep theirs.
+/// Computes an initial estimate of a graph from its factors, replacing the states that it has.
+/// Constant variables (fixed by `FIX`, or anchored) keep theirs.
 class CAIRN_API InitialGuess : public Component {
  public:
   static constexpr std::string_view kKind = "initial_guess";

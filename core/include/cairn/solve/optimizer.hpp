@@ -38,8 +38,8 @@ struct Iteration {
   double seconds = 0.0;  ///< of this iteration
 };
 
-/// Is told of what happens during long work. Progress bars, logs, recordings and early stops hang
-/// on it.
+/// Is notified of the progress of an optimisation: the base of progress bars, logs, recordings and
+/// early stops.
 class CAIRN_API Observer {
  public:
   virtual ~Observer();
@@ -61,22 +61,22 @@ struct Summary {
   std::vector<Iteration> iterations;
   Seconds seconds;
   LinearSolverStats solver;
-  /// What a user should know, a sentence each: the gauge, why a factorisation failed and at which
+  /// Notes for the user, one sentence each: the gauge, why a factorisation failed and at which
   /// variable, where it stopped.
   std::vector<std::string> notes;
 };
 
 /// Minimises Σ ρ(‖r‖²) over a graph's variables, starting from its states and leaving the best
 /// states found in it. The graph's structure is not changed; a gauge that is left free is anchored
-/// (`resolve_gauge`). A diverging, interrupted or failed run leaves the best estimate too, and says
-/// so in `Summary::status`. Throws `Error` only for bad calls.
+/// (`resolve_gauge`). A diverging, interrupted or failed run leaves the best estimate too, and is
+/// reported in `Summary::status`. Throws `Error` only for bad calls.
 class CAIRN_API Optimizer : public Component {
  public:
   static constexpr std::string_view kKind = "optimizer";
   ~Optimizer() override;
 
   virtual Summary optimize(Graph& graph, const Stop& stop, Observer& observer) = 0;
-  /// With nobody watching.
+  /// Without an observer.
   Summary optimize(Graph& graph, const Stop& stop = {});
 };
 

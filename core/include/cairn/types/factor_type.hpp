@@ -34,7 +34,7 @@ struct FactorView {
 /// up in a fixed order afterwards. So no sum depends on the number of threads.
 struct LinearizeSink {
   static constexpr std::int64_t kNone =
-      INT64_MIN;  ///< a held variable takes part: nothing to write
+      INT64_MIN;  ///< one of the variables is constant: nothing to write
 
   double* H = nullptr;
   double* scratch = nullptr;
@@ -60,7 +60,7 @@ struct LinearizeSink {
 
 /// A kind of factor (relative pose, landmark seen, prior, …). One object serves all graphs; it has
 /// no state but its options. Every function but `evaluate` works on a range of a pool: one virtual
-/// call a pool, and a fixed-size, inlined loop inside it. Authors don't derive from this: see
+/// call per range, with a fixed-size, inlined loop inside it. Authors don't derive from this: see
 /// `define_factor.hpp`.
 ///
 /// Residuals are whitened: r = U e with e the error in the metric's units and UᵀU the information.
@@ -74,7 +74,7 @@ class CAIRN_API FactorType {
   /// Tags of the variable types, `arity()` of them.
   virtual std::span<const std::string_view> variable_tags() const = 0;
   virtual int residual_size() const = 0;
-  virtual int measurement_size() const = 0;  ///< doubles a measurement, in memory and in files
+  virtual int measurement_size() const = 0;  ///< doubles per measurement, in memory and in files
   virtual int tangent_size(int variable) const = 0;
   virtual int ambient_size(int variable) const = 0;
 
@@ -100,12 +100,12 @@ class CAIRN_API FactorType {
                         double* const* jacobians) const = 0;
 
   /// Computes the state of variable `target` that makes the error zero, given the others. False if
-  /// the measurement does not determine it. Spanning trees and odometry chains hang on it.
+  /// the measurement does not determine it. Spanning trees and odometry chains are built with it.
   virtual bool propagate(int target, const double* const* x, const double* measurement,
                          double* out) const = 0;
 
   /// Whether the measurement is a group element z of the variables' Lie group with x_1 ≈ x_0 z
-  /// (both variables of one type): what composing and the chordal guess need.
+  /// (both variables of one type): what composition and the chordal initial guess need.
   virtual bool is_relative() const = 0;
 
   /// Human-readable name of the error metric where there is a choice, else empty.

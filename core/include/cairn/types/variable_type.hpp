@@ -55,8 +55,8 @@ class CAIRN_API VariableType {
   virtual std::string normalize(double* x) const = 0;
 
   /// out[s] = retract(x[s], delta at delta_offsets[s]) for s = 0 … count-1; a negative offset means
-  /// that the variable is held: out[s] = x[s]. x and out hold ambient_size() doubles a variable and
-  /// may be the same array.
+  /// that the variable is constant: out[s] = x[s]. x and out hold ambient_size() doubles per
+  /// variable and may be the same array.
   virtual void retract(std::size_t count, const double* x, const std::int64_t* delta_offsets,
                        const double* delta, double* out) const = 0;
 

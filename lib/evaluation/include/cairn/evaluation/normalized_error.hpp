@@ -9,7 +9,7 @@
 
 namespace cairn {
 
-/// Whether an estimate's covariance is honest.
+/// Whether an estimate is consistent with its covariance.
 struct NormalizedError {
   double squared = 0.0;  ///< eᵀ Σ⁻¹ e
   int dof = 0;           ///< its mean if the covariance is right
@@ -17,17 +17,17 @@ struct NormalizedError {
 
 /// The normalised estimation error squared (NEES) of a graph's poses against their true states, all
 /// of them together: eᵀ H e with e_v = local(x_v, truth_v), and H of the factors at the estimate,
-/// under its loss (Σ = H⁻¹). The truth is moved so that the first pose agrees, which counts as
-/// held, as do those that are fixed. Variables are matched by id. A mean over many runs above `dof`
-/// says that the estimate is overconfident, below that it is conservative. Throws `Error` (input)
+/// under its loss (Σ = H⁻¹). The truth is moved so that the first pose agrees, which is constant,
+/// as are those that are fixed. Variables are matched by id. A mean over many runs above `dof`
+/// means that the estimate is overconfident, below that it is conservative. Throws `Error` (input)
 /// if a variable has no true state, (usage) if it is no pose of a Lie group.
 CAIRN_API NormalizedError normalized_error(const Graph& estimate, const Graph& truth);
 
-/// The absolute trajectory error that an estimate's covariance lets expect [m]: the root mean
-/// square of the positions of some poses, after the rigid motion that fits them best, to first
-/// order: E² = tr((I − P) Σ_p) / n with Σ_p the joint covariance of their positions in the world
-/// and P the projector on what a rigid motion does to them. Takes a column of Σ for each of the
-/// poses. Throws `Error` (usage) for variables without `Placement`.
+/// The absolute trajectory error predicted by an estimate's covariance [m]: the root mean square of
+/// the position errors of some poses, after rigid alignment, to first order: E² = tr((I − P) Σ_p) /
+/// n with Σ_p the joint covariance of their positions in the world and P the projector on what a
+/// rigid motion does to them. Takes a column of Σ for each of the poses. Throws `Error` (usage) for
+/// variables without `Placement`.
 CAIRN_API double expected_ate(Estimator& estimator, const Graph& graph, std::span<const Id> poses);
 
 }  // namespace cairn

@@ -27,7 +27,7 @@ using Trajectory = std::vector<TrajectoryPose>;
 /// does not know any, but the report of reading it may (`ReadReport::stamps`).
 CAIRN_API Trajectory trajectory(const Graph& graph);
 
-/// Time stamps [s] of a text with one number a line, such as KITTI's times.txt; '#' begins a
+/// Time stamps [s] of a text with one number per line, such as KITTI's times.txt; '#' begins a
 /// comment. Throws `Error` (input) with file and line where one is no finite number or not above
 /// the one before.
 CAIRN_API std::vector<double> read_stamps(const std::filesystem::path& file);

@@ -12,7 +12,7 @@
 
 namespace cairn {
 
-/// A motion from one pose to another, and how uncertain it is: z · exp(ξ), ξ ~ N(0, Σ).
+/// A relative pose with covariance: z · exp(ξ), ξ ~ N(0, Σ).
 struct Motion {
   std::vector<double> mean;        ///< z, ambient_size doubles
   std::vector<double> covariance;  ///< Σ, tangent × tangent, column-major
@@ -24,9 +24,9 @@ enum class CompositionOrder {
   fourth,  ///< Barfoot and Furgale 2014: all terms of fourth order of Baker, Campbell and Hausdorff
 };
 
-/// Arithmetic with uncertain motions of one Lie group, whichever it is (the ability `LieGroup` of
-/// a variable type). Perturbations stand on the right throughout, as in `VariableType::retract`.
-/// Motions that are combined must be independent of each other.
+/// Arithmetic with relative poses with covariance on any Lie group (the ability `LieGroup` of a
+/// variable type). Perturbations are on the right throughout, as in `VariableType::retract`.
+/// Relative poses that are combined must be independent of each other.
 class CAIRN_API MotionGroup {
  public:
   /// Throws `Error` (usage) if the type's states form no Lie group.
@@ -36,7 +36,7 @@ class CAIRN_API MotionGroup {
   int ambient_size() const { return ambient_; }
   int tangent_size() const { return tangent_; }
 
-  /// No motion at all, known exactly.
+  /// The identity, with zero covariance.
   Motion identity() const;
   /// First a, then b: mean z_a z_b. First order: Σ = A Σ_a Aᵀ + Σ_b with A = Ad(z_b⁻¹). Fourth
   /// order, with Σ₁ = A Σ_a Aᵀ, Σ₂ = Σ_b and ad the derivative of Ad at the identity:
@@ -50,22 +50,22 @@ class CAIRN_API MotionGroup {
                  CompositionOrder order = CompositionOrder::first) const;
   /// Backwards: mean z⁻¹, Σ = Ad(z) Σ Ad(z)ᵀ, which is exact.
   Motion inverse(const Motion& a) const;
-  /// Two independent measurements of one motion, as one: the likeliest z, which has the least
-  /// ‖log(z_a⁻¹ z)‖² + ‖log(z_b⁻¹ z)‖² (Mahalanobis), and the sum of their information there. So
-  /// does a graph with both as factors, and it does not matter which comes first. Throws `Error`
-  /// (numerical) if a covariance is not positive definite.
+  /// Two independent measurements of one relative pose, fused: the likeliest z, which has the least
+  /// ‖log(z_a⁻¹ z)‖² + ‖log(z_b⁻¹ z)‖² (Mahalanobis), and the sum of their information there. A
+  /// graph with both as factors has the same minimum, and the result does not depend on their
+  /// order. Throws `Error` (numerical) if a covariance is not positive definite.
   Motion fuse(const Motion& a, const Motion& b) const;
 
-  /// What a relative factor (`FactorType::is_relative`) measures, as a motion from its first
-  /// variable to its second. The covariance is that of ξ to first order, whatever the factor's
-  /// error metric: Σ⁻¹ = DᵀΩD with D = ∂error/∂ξ where the error is zero. Throws `Error` (usage)
-  /// for another factor, (input) for numbers that a graph would not take either.
+  /// The measurement of a relative factor (`FactorType::is_relative`), as a relative pose from its
+  /// first variable to its second. The covariance is that of ξ to first order, whatever the
+  /// factor's error metric: Σ⁻¹ = DᵀΩD with D = ∂error/∂ξ where the error is zero. Throws `Error`
+  /// (usage) for another factor, (input) for numbers that a graph would not take either.
   Motion of_factor(const FactorType& type, std::span<const double> measurement,
                    std::span<const double> information) const;
   /// The same from variable `from`, which may be the factor's second.
   Motion of_factor(const Factor& factor, Id from) const;
-  /// The other way round: a factor of that type that says just this. Throws `Error` (numerical) if
-  /// the covariance is not positive definite.
+  /// The inverse: a factor of that type with this measurement and information. Throws `Error`
+  /// (numerical) if the covariance is not positive definite.
   Factor to_factor(std::shared_ptr<const FactorType> type, Id from, Id to,
                    const Motion& motion) const;
 

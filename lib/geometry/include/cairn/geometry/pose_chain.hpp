@@ -11,11 +11,12 @@
 
 namespace cairn {
 
-/// A recorded pose graph as a robot drove it: what each pose brings.
+/// A recorded pose graph in the order of the trajectory: what is added with each pose.
 struct RecordedPose {
-  int variable = 0;           ///< index in the graph
-  std::vector<int> odometry;  ///< factors to the pose before, either way round; none for the first
-  std::vector<int> links;     ///< all other factors to earlier poses
+  int variable = 0;  ///< index in the graph
+  std::vector<int>
+      odometry;  ///< factors to the previous pose, in either direction; none for the first
+  std::vector<int> links;  ///< all other factors to earlier poses
 };
 
 /// The poses of a graph by rising id. Throws `Error` (input), with what would work, if it is not a
@@ -27,7 +28,7 @@ CAIRN_API std::vector<RecordedPose> pose_chain(const Graph& graph);
 CAIRN_API Variable new_variable(const Graph& graph, int variable);
 CAIRN_API Factor new_factor(const Graph& graph, int factor);
 
-/// One pose on the way from one pose of a compact graph to the next.
+/// One pose between two consecutive poses of a compact graph.
 struct ChainStep {
   Id pose = 0;                 ///< where the step ends
   std::vector<double> motion;  ///< measured, from the pose before [ambient_size]
@@ -47,8 +48,8 @@ struct OdometryChain {
 enum class Recovery {
   uniform,      ///< v0: evenly along the geodesic between the two
   interpolate,  ///< v1: along it, in proportion to the measured distances
-  distribute,   ///< v2: along the measured motions, their mismatch spread in proportion to distance
-  likely,       ///< along the measured motions, their mismatch spread as is most likely
+  distribute,   ///< v2: along the odometry, its mismatch distributed in proportion to distance
+  likely,       ///< along the odometry, its mismatch distributed by maximum likelihood
 };
 
 /// A pose that was put back.
@@ -57,8 +58,9 @@ struct RecoveredPose {
   std::vector<double> state;
 };
 
-/// The states of the poses of a chain but its first, given those of its two ends. With the motions
-/// z_1 … z_q, w_m = Σ_{k≤m} ‖z_k‖ / Σ_{k≤q} ‖z_k‖ (norms of translations; m/q where nothing moves):
+/// The states of the poses of a chain but its first, given those of its two ends. With the relative
+/// poses z_1 … z_q, w_m = Σ_{k≤m} ‖z_k‖ / Σ_{k≤q} ‖z_k‖ (norms of translations; m/q where nothing
+/// moves):
 ///
 ///     v0, v1:  x_from · exp(w_m log(x_from⁻¹ x_to)),  w_m = m/q for v0
 ///     v2:      x_from · (z_1 ⋯ z_m) · exp(w_m log((z_1 ⋯ z_q)⁻¹ x_from⁻¹ x_to))

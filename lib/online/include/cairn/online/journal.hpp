@@ -18,7 +18,7 @@ namespace cairn {
 /// every other is a record: the CRC-32 of the rest in hexadecimal, a number, and the text. What
 /// stands behind the last good record (a line that was being written) is cut off when the file is
 /// opened; a bad record with a good one behind it is damage, and refused. The file is locked while
-/// it is open. Whole or not at all: nothing else is promised of what was not committed.
+/// it is open. Records that were not committed may be missing, but none is ever read in part.
 class CAIRN_API Journal {
  public:
   struct Record {

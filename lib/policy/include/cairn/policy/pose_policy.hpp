@@ -21,17 +21,17 @@ namespace cairn {
 /// Two poses whose sensor data are worth matching.
 struct MatchProposal {
   Id earlier = 0, later = 0;
-  double gain = 0.0;  ///< what a link is expected to tell [nats]
-  Motion expected;    ///< from `earlier` to `later`, as far as it is known
+  double gain = 0.0;  ///< expected information gain of a link [nats]
+  Motion expected;    ///< from `earlier` to `later`, by the estimate
 };
 
-/// What became of a measured link.
+/// The outcome of a measured link.
 enum class LinkVerdict {
   linked,         ///< it is in the graph
   unmatched,      ///< there was nothing to link
-  uninformative,  ///< it tells too little
+  uninformative,  ///< its information gain is below the threshold
   inconsistent,   ///< it contradicts the estimate, or other links
-  waiting,        ///< nothing speaks against it, and too little for it: until another link does
+  waiting,        ///< consistent, but not confirmed: until another link agrees
 };
 /// "linked", "unmatched", ….
 CAIRN_API std::string_view to_string(LinkVerdict verdict);
@@ -54,7 +54,7 @@ struct PolicySeconds {
   CAIRN_API PolicySeconds& operator+=(const PolicySeconds& other);
 };
 
-/// What became of a pose, and of the links that were measured for it.
+/// The outcome of a pose, and of the links that were measured for it.
 struct PoseReport {
   Id id = 0;
   bool kept = true;
@@ -67,22 +67,22 @@ struct PoseReport {
   std::vector<std::string> notes;
 };
 
-/// Decides online which poses of a robot's way are kept and which of its loop closures are used.
+/// Decides online which poses of a trajectory are kept and which loop closures are used.
 ///
-/// For each pose: `add_pose`; then, as long as `next_match` proposes a pair, somebody matches it
-/// and says what came out by `offer`; then `end_pose`. `run_policy` does so for a recording. Poses
-/// that are not kept have no variable in the estimator; their motions are concatenated.
+/// For each pose: `add_pose`; then, as long as `next_match` proposes a pair, the caller matches it
+/// and passes the result to `offer`; then `end_pose`. `run_policy` does so for a recording. Poses
+/// that are not kept have no variable in the estimator; their odometry is composed.
 class CAIRN_API PosePolicy : public Component {
  public:
   static constexpr std::string_view kKind = "pose_policy";
   ~PosePolicy() override;
 
-  /// Told before the first pose if what follows is a recording, for those who plan ahead; does
-  /// nothing unless a policy overrides it.
+  /// Called before the first pose if what follows is a recording, for policies that need it as a
+  /// whole; does nothing unless a policy overrides it.
   virtual void expect(const Graph& recording, std::span<const RecordedPose> poses);
-  /// The next pose, with its measured motion from the pose before (several factors are fused; none
-  /// for the first pose). A pose marked as fixed is kept. Throws `Error` (input) if there is no
-  /// motion, or something that is no motion between the two; nothing has changed then.
+  /// The next pose, with its odometry from the previous pose (several factors are fused; none for
+  /// the first pose). A pose marked as fixed is kept. Throws `Error` (input) if there is no
+  /// odometry, or a factor that is no relative pose of the two; nothing has changed then.
   virtual void add_pose(const Variable& pose, std::span<const Factor> odometry) = 0;
   /// The pair that is most worth matching with the newest pose; none: no pair is.
   virtual std::optional<MatchProposal> next_match() = 0;
@@ -91,8 +91,8 @@ class CAIRN_API PosePolicy : public Component {
   virtual LinkReport offer(Id other, std::span<const Factor> measured) = 0;
   /// Ends the pose: decides whether to keep it.
   virtual PoseReport end_pose() = 0;
-  /// The way ends here: the newest pose is kept in any case, and everything is solved until it has
-  /// converged.
+  /// Ends the trajectory: the newest pose is kept in any case, and everything is solved to
+  /// convergence.
   virtual void finish() = 0;
 
   /// The compact graph's estimate. Only to be read, but for `set_loss` before the first pose.
@@ -103,8 +103,8 @@ class CAIRN_API PosePolicy : public Component {
   virtual int factor_count() const = 0;
   /// The newest pose as it is estimated, kept or not.
   virtual std::vector<double> newest_state() const = 0;
-  /// From each kept pose to the next one on the way, in order. A way may lead back to a pose that
-  /// was kept before.
+  /// From each kept pose to the next one of the trajectory, in order. A chain may end at a pose
+  /// that was kept before.
   virtual const std::vector<OdometryChain>& chains() const = 0;
 };
 
@@ -113,25 +113,25 @@ class CAIRN_API OptionFinder {
  public:
   static constexpr std::string_view kAbility = "option_finder";
   virtual ~OptionFinder();
-  /// The options with which to watch a sample of the data: everything is taken in.
+  /// The options with which to process a sample of the data: all measurements are used.
   virtual OptionValues watching() const = 0;
-  /// What it would choose after that. Throws `Error` (input) if the sample does not tell.
+  /// What it would choose after that. Throws `Error` (input) if the sample does not determine it.
   virtual OptionValues found() const = 0;
-  /// A choice that lets more through than `found` (factors < 1) or less (> 1): of links, and of
-  /// poses.
+  /// A choice that accepts more than `found` (factors < 1) or less (> 1): of links, and of poses.
   virtual OptionValues scaled(const OptionValues& found, double links, double poses) const = 0;
   /// How accurate a link of the sample is: root mean square of its translation's error [m]. Errors
-  /// below that are nothing to worry about.
+  /// below that are negligible.
   virtual double accuracy() const = 0;
 };
 
-/// Feeds the first poses of a recording to a policy, matching by `registration`. `each` is told of
-/// every pose, and stops the run by returning false. The policy is finished at the end.
+/// Feeds the first poses of a recording to a policy, matching by `registration`. `each` is called
+/// for every pose, and stops the run by returning false. The policy is finished at the end.
 CAIRN_API void run_policy(const Graph& recording, std::span<const RecordedPose> poses,
                           PosePolicy& policy, Registration& registration,
                           const std::function<bool(const PoseReport&)>& each = {});
 
-/// All poses of a way, the left-out ones put back between those that are kept; without factors.
+/// All poses of a trajectory, the left-out ones recovered between those that are kept; without
+/// factors.
 CAIRN_API Graph recovered_way(PosePolicy& policy, Recovery how);
 
 }  // namespace cairn

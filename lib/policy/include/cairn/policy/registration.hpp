@@ -12,36 +12,35 @@
 
 namespace cairn {
 
-/// What a registration may look into. What it is given must outlive it.
+/// The data that a registration may use. They must outlive it.
 struct RegistrationData {
   const Graph* recording = nullptr;  ///< poses with all measurements that were made
   const Graph* truth = nullptr;      ///< the true states of the same poses; null: unknown
 };
 
-/// Whoever can tell how two poses lie to each other from what was sensed at them: a matcher of
-/// scans or images, a recording of one, or a simulation. It is asked for the pairs that a policy
-/// finds worth the effort.
+/// Measures the relative pose of two poses from their sensor data: a matcher of scans or images, a
+/// recording of one, or a simulation. It is called for the pairs that a policy proposes.
 class CAIRN_API Registration : public Component {
  public:
   static constexpr std::string_view kKind = "registration";
   ~Registration() override;
 
-  /// Told once, before the first match. Throws `Error` (usage) if something is missing that it
-  /// needs, such as the truth.
+  /// Called once, before the first match. Throws `Error` (usage) if something is missing that it
+  /// needs, such as the ground truth.
   virtual void begin(const RegistrationData& data) = 0;
-  /// The measured motions between two poses: relative factors on them, in either order. None if
+  /// The measured relative poses of two poses: relative factors on them, in either order. None if
   /// the two do not match.
   virtual std::vector<Factor> match(Id earlier, Id later) = 0;
 };
 
 /// Ability of a registration that knows which of its answers are false: for experiments, which
-/// count what became of them.
+/// count their outcomes.
 class CAIRN_API FalseMatches {
  public:
   static constexpr std::string_view kAbility = "false_matches";
   virtual ~FalseMatches();
-  /// Whether what `match` answers for these two poses, in either order, is a motion that was not
-  /// measured but made up. False where it answers nothing.
+  /// Whether the result of `match` for these two poses, in either order, is a false match, not a
+  /// measurement. False where there is no result.
   virtual bool was_false(Id earlier, Id later) const = 0;
 };
 

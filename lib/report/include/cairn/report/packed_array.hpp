@@ -26,8 +26,8 @@ CAIRN_API std::string packed_json(std::span<const std::int64_t> numbers, Packing
 CAIRN_API std::string packed_json(std::span<const std::uint8_t> numbers, Packing packing);
 
 /// Points as 16-bit steps within their bounding box, with "min" and "max" beside the numbers: half
-/// the size of f32, to 1/65534 of the box. `dimension` numbers a point; a point with a number that
-/// is not finite becomes one that is not there.
+/// the size of f32, to 1/65534 of the box. `dimension` numbers per point; a point with a number
+/// that is not finite becomes one that is not there.
 CAIRN_API std::string packed_points_json(std::span<const float> points, int dimension);
 
 /// What packed text holds, by the array's "type". Throws `Error` (input), naming `where`, for text

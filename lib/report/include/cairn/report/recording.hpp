@@ -21,8 +21,8 @@ namespace cairn {
 /// killed leaves what it had; a name that ends in .gz is not packed.
 class CAIRN_API RecordingWriter : public Observer {
  public:
-  /// Opens the file, throwing `Error` (input) if it cannot be written. `next`, unless null, is told
-  /// everything too. `name`: what is recorded, such as the optimizer's name.
+  /// Opens the file, throwing `Error` (input) if it cannot be written. `next`, unless null, is
+  /// notified as well. `name`: what is recorded, such as the optimizer's name.
   RecordingWriter(const std::filesystem::path& file, std::string name, std::string graph_file,
                   Observer* next = nullptr);
   ~RecordingWriter() override;
@@ -31,7 +31,7 @@ class CAIRN_API RecordingWriter : public Observer {
   bool on_iteration(const Iteration& iteration, const Graph& graph, const Values& values) override;
   void on_message(std::string_view message) override;
 
-  /// The graph as the optimizer left it, and what it says of itself. Throws `Error` (input) if
+  /// The graph as the optimizer left it, and the optimizer's summary. Throws `Error` (input) if
   /// something could not be written (a full disk).
   void finish(const Graph& graph, const Summary& summary);
 
@@ -40,12 +40,12 @@ class CAIRN_API RecordingWriter : public Observer {
   std::unique_ptr<Impl> impl_;
 };
 
-/// Whether the start of a file says that it is a recording.
+/// Whether the beginning of a file is the header of a recording.
 CAIRN_API bool is_recording(std::string_view head);
 
-/// Reads a recording: a scene with the graph's structure, the recording, its first and last frame
-/// as estimates (initial and estimate), and the run. A last line that was cut short is left out.
-/// Throws `Error` (input) with `name` and line for what is damaged.
+/// Reads a recording: a `Scene` with the graph's structure, the snapshots, the first and the last
+/// of them as estimates (initial and estimate), and the run. A last line that was cut short is left
+/// out. Throws `Error` (input) with `name` and line for what is damaged.
 CAIRN_API Scene read_recording(std::string_view text, const std::string& name);
 
 }  // namespace cairn

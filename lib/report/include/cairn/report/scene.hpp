@@ -15,7 +15,7 @@
 
 namespace cairn {
 
-/// What an edge of a picture stands for; the numbers are those of docs/report.md.
+/// The kind of an edge in a report or plot; the numbers are those of docs/report.md.
 enum class EdgeClass : std::uint8_t {
   odometry = 0,  ///< a relative factor between poses that follow each other
   loop = 1,      ///< any other relative factor between poses
@@ -25,16 +25,16 @@ enum class EdgeClass : std::uint8_t {
   other = 5,
 };
 
-/// Which part an estimate plays beside others: decides its colour and dash.
+/// The role of an estimate beside others: determines its colour and dash.
 enum class EstimateRole { initial, estimate, truth, peer };
 CAIRN_API std::string_view to_string(EstimateRole role);
 
-/// One set of places for the variables of a scene.
+/// One set of positions for the variables of a `Scene`.
 struct SceneEstimate {
   std::string name;
   EstimateRole role = EstimateRole::estimate;
   std::string file;                ///< where it is from, or empty
-  int run = -1;                    ///< index into Scene::runs, or -1
+  int run = -1;                    ///< index into `Scene::runs`, or -1
   std::vector<double> positions;   ///< dimension × variables [m], world frame; NaN: not there
   std::vector<float> orientation;  ///< empty, or as in docs/report.md: 1 or 4 numbers each
   std::vector<float> edge_chi2;    ///< empty, or ‖r‖² of each edge; NaN: none
@@ -51,16 +51,16 @@ struct SceneRun {
   std::int64_t peak_memory_bytes = 0;  ///< 0: not known
 };
 
-/// Places at one iteration of a run.
+/// Positions at one iteration of a run.
 struct Frame {
   int iteration = 0;  ///< 0: the start
   double time = 0.0;  ///< [s] since the start
   double chi2 = 0.0;
   double seconds = 0.0;          ///< that this iteration took
-  std::vector<float> positions;  ///< dimension × variables [m], relative to Scene::origin
+  std::vector<float> positions;  ///< dimension × variables [m], relative to `Scene::origin`
 };
 
-/// The frames of a run, by rising iteration.
+/// The snapshots of a run, by increasing iteration.
 struct Recording {
   std::string name;
   std::vector<Frame> frames;
@@ -77,8 +77,8 @@ struct SceneEdgeType {
   int residual_size = 0;
 };
 
-/// A graph as pictures need it: what joins what and where it is, without types or measurements. It
-/// is made of a graph (`scene_of`) or read from a recording.
+/// A graph as reports and plots need it: its structure and positions, without types or
+/// measurements. It is made from a graph (`scene_of`) or read from a run log.
 struct Scene {
   std::string name;
   int dimension = 2;               ///< 2 or 3
@@ -87,8 +87,8 @@ struct Scene {
   std::vector<Id> ids;
   std::vector<SceneVariableType> variable_types;
   std::vector<std::uint8_t> variable_type;
-  std::vector<std::int32_t> fixed;  ///< held by the user
-  std::vector<bool> held;           ///< held by the user or to settle the gauge; no columns in H
+  std::vector<std::int32_t> fixed;  ///< by the user
+  std::vector<bool> held;           ///< constant: fixed or anchored; no columns in H
   // Edges: a factor on n > 2 variables has n - 1, from its first variable to each other.
   std::vector<std::int32_t> a, b;  ///< variables; b = -1 for a factor on one
   std::vector<EdgeClass> edge_class;
@@ -107,7 +107,7 @@ struct Scene {
 };
 
 /// The structure of a graph, without an estimate: `place` gives one. Throws `Error` (input) if the
-/// graph has no variable that sits somewhere in space, or more than 255 types.
+/// graph has no variable with a position in space, or more than 255 types.
 CAIRN_API Scene scene_of(const Graph& graph, std::string name);
 
 /// Where the graph's variables are, with ‖r‖² of each edge and chi2 unless it has no factors.
@@ -115,8 +115,9 @@ CAIRN_API Scene scene_of(const Graph& graph, std::string name);
 CAIRN_API SceneEstimate place(const Graph& graph, const Scene& scene, std::string name,
                               EstimateRole role);
 
-/// Where the variables of another graph are, matched by id to those of the scene; poses only, and
-/// without the third coordinate in a scene of two. Returns how many ids matched in `matched`.
+/// The positions of the variables of another graph, matched by id to those of `scene`; poses only,
+/// and without the third coordinate where `scene` has two. Returns how many ids matched in
+/// `matched`.
 CAIRN_API SceneEstimate place_by_id(const Graph& other, const Scene& scene, std::string name,
                                     EstimateRole role, int& matched);
 
@@ -124,7 +125,7 @@ CAIRN_API SceneEstimate place_by_id(const Graph& other, const Scene& scene, std:
 CAIRN_API void copy_positions(const Graph& graph, const Values& values, int dimension,
                               const std::array<double, 3>& origin, std::vector<float>& out);
 
-/// All that goes into one picture.
+/// The content of one report or plot.
 struct Album {
   std::string title;
   std::string command;             ///< how it was made, or empty
@@ -135,15 +136,15 @@ struct Album {
   std::string bench;  ///< the report of `cairn bench --json`, or empty
 };
 
-/// Draws an album. The names of this kind are those of output formats (html, svg, …); what is drawn
-/// and how is a matter of each one's options. Names and texts from files may hold anything.
+/// Draws an `Album`. The names of this kind are those of output formats (html, svg, …); what is
+/// drawn and how depends on the options of each. Names and texts from files may contain anything.
 class CAIRN_API Picture : public Component {
  public:
   static constexpr std::string_view kKind = "picture";
   ~Picture() override;
 
-  /// The bytes of the file. Throws `Error` (input) where the album lacks what is to be drawn,
-  /// saying what would have it.
+  /// The bytes of the file. Throws `Error` (input) where `album` lacks what is to be drawn, naming
+  /// what would provide it.
   virtual std::string draw(const Album& album) = 0;
 };
 

@@ -62,7 +62,7 @@ class CAIRN_API Topology : public Component {
 struct CAIRN_API Population {
   enum class Kind {
     tree,  ///< γ times as many as a spanning tree (T 4.21)
-    fill,  ///< a part α of all pairs (T 4.22)
+    fill,  ///< the fraction α of all pairs (T 4.22)
     loss,  ///< as few as keep the KLD of the blanket below a bound [nats]
   };
   Kind kind = Kind::tree;
@@ -174,13 +174,13 @@ struct SparsificationSeconds {
   CAIRN_API SparsificationSeconds& operator+=(const SparsificationSeconds& other);
 };
 
-/// A node that could not be taken out, and why.
+/// A node that could not be removed, and why.
 struct RefusedNode {
   Id node = 0;
   std::string reason;
 };
 
-/// What taking nodes out of a graph comes to. Nothing has changed yet: see `apply`.
+/// The result of removing nodes from a graph. Nothing has changed yet: see `apply`.
 struct Sparsification {
   std::vector<int> removed_variables;  ///< by index, rising
   std::vector<int> removed_factors;    ///< by position, rising
@@ -204,26 +204,26 @@ class CAIRN_API Sparsifier : public Component {
   static constexpr std::string_view kKind = "sparsifier";
   ~Sparsifier() override;
 
-  /// Takes out `nodes` (by index), in that order; the graph should be at its minimum. `step`, if
-  /// there is one, is told after each blanket how many nodes have gone; it returns whether to go
-  /// on.
+  /// Removes `nodes` (by index), in that order; the graph should be at its minimum. `step`, if
+  /// there is one, is called after each blanket with the number of nodes removed; it returns
+  /// whether to go on.
   virtual Sparsification remove(const Graph& graph, std::span<const int> nodes,
                                 const std::function<bool(int)>& step = {}) = 0;
-  /// Is told of every problem from now on (empty: nobody is).
+  /// Is called for every problem from now on (empty: none).
   virtual void observe(SparsificationObserver observer) = 0;
-  /// For each node (by index) the KLD that taking it out, and nothing else, would cost [nats];
-  /// infinite where it cannot be taken out.
+  /// For each node (by index) the KLD that removing it, and nothing else, would cost [nats];
+  /// infinite where it cannot be removed.
   virtual std::vector<double> losses(const Graph& graph, std::span<const int> nodes) = 0;
 };
 
-/// Chooses which nodes are taken out.
+/// Chooses which nodes are removed.
 class CAIRN_API NodeSelection : public Component {
  public:
   static constexpr std::string_view kKind = "node_selection";
   ~NodeSelection() override;
 
-  /// Nodes by index, in the order in which they are to be taken out; `nodes` are those that may
-  /// leave, rising. `sparsifier` tells what that would cost, and can be tried on a copy.
+  /// Nodes by index, in the order in which they are to be removed; `nodes` are those that may be
+  /// removed, rising. `sparsifier` computes what that would cost, and can be tried on a copy.
   virtual std::vector<int> select(const Graph& graph, std::span<const int> nodes,
                                   Sparsifier& sparsifier) = 0;
 };
@@ -231,9 +231,9 @@ class CAIRN_API NodeSelection : public Component {
 /// Carries a sparsification out.
 CAIRN_API void apply(const Sparsification& change, Graph& graph);
 
-/// Where nodes were that have been taken out, for factors that come for them later: such a factor
-/// is moved to the nearest node that stays (T 4.6.4), by the relative pose of the two when the node
-/// left, which is taken for exact.
+/// Positions of removed nodes, for later factors on them: such a factor is redirected to the
+/// nearest node that stays (T 4.6.4), by the relative pose of the two when the node was removed,
+/// which is treated as exact.
 class CAIRN_API Redirection {
  public:
   enum class Nearest {
@@ -244,13 +244,13 @@ class CAIRN_API Redirection {
 
   /// These nodes of `graph` (by index) are about to leave it. Each, and each that had been
   /// redirected to one of them, goes to the nearest pose of its type that stays; `also` are others
-  /// that nobody is to go to.
+  /// to which nothing is redirected.
   void leave(const Graph& graph, std::span<const int> nodes, std::span<const int> also = {});
   bool has(Id node) const { return at_.contains(node); }
   /// Where a node that left would be now: the pose that it goes to, and its state from there.
   Id anchor(Id node) const { return at_.at(node).anchor; }
   std::vector<double> state(Id node, std::span<const double> anchor) const;
-  /// The factor, on nodes that are there. None if that cannot be said: it is not relative, or both
+  /// The factor, on nodes that are there. None if that is not defined: it is not relative, or both
   /// its ends have become one node, or no pose was left.
   std::optional<Factor> redirect(const Factor& factor) const;
 
@@ -258,7 +258,7 @@ class CAIRN_API Redirection {
   struct Place {
     std::shared_ptr<const VariableType> type;
     Id anchor = 0;
-    bool lost = false;           ///< there was nobody to go to
+    bool lost = false;           ///< there was no node to redirect to
     std::vector<double> motion;  ///< from the anchor
   };
   Nearest nearest_;
@@ -267,20 +267,21 @@ class CAIRN_API Redirection {
 
 // Measures ----------------------------------------------------------------------------------------
 
-/// How far a sparse graph is from what it was made of.
+/// The divergence of a sparse graph from the original.
 struct SparsificationError {
   double kld = 0.0;         ///< D(original ‖ sparse) of the nodes of both [nats] (T 3.4)
-  double covariance = 0.0;  ///< of that, what different covariances come to
-  double mean = 0.0;        ///< and different means: ½ (μ̆ − μ)ᵀ Λ̆ (μ̆ − μ)
+  double covariance = 0.0;  ///< of that, the part of the covariances
+  double mean = 0.0;        ///< and that of the means: ½ (μ̆ − μ)ᵀ Λ̆ (μ̆ − μ)
   double rmse = 0.0;        ///< of positions, in the common frame [m]; NaN without positions
 };
 
 /// D(p‖q) = ½ (tr(Λ̆Σ) − ln |Λ̆Σ| + ‖μ̆ − μ‖²_Λ̆ − d), p the marginal of `original` on the nodes of
 /// `sparse`, q `sparse`, each linearised at its own states, which should be minima. Of p only the
-/// blocks of Σ on the pattern of Λ̆ are computed, so it works on many thousands of nodes. What is
-/// held in one graph must be held in the other; where nothing is, the first node of `sparse` is.
-/// `solver` must be able to tell determinants and marginals (`block_cholesky` is). Throws `Error`
-/// (input) if `sparse` has a node that `original` has not, (numerical) where H is singular.
+/// blocks of Σ on the pattern of Λ̆ are computed, so it works on many thousands of nodes. Nodes
+/// that are constant in one graph must be constant in the other; where none is, the first node of
+/// `sparse` is. `solver` must have the abilities `LogDeterminant` and `Marginals` (`block_cholesky`
+/// has). Throws `Error` (input) if `sparse` has a node that `original` has not, (numerical) where H
+/// is singular.
 CAIRN_API SparsificationError sparsification_error(const Graph& original, const Graph& sparse,
                                                    LinearSolver& solver);
 

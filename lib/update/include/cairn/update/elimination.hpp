@@ -22,10 +22,11 @@ struct Elimination {
 /// the covariance that the whole one has for what stays; the constant that chi2 loses is dropped.
 ///
 /// One prior for each group of factors that share a variable to be eliminated. `held` (by variable)
-/// says which of those that leave do not move: they are not eliminated but kept at their state, and
-/// so are those marked as fixed that stay. A prior that came of anything held, or of priors, counts
-/// as absolute for the gauge (`FactorType::absolute_size`). What the measurements do not determine
-/// drops out, be it of the variables that leave or of those that stay.
+/// gives those of the removed variables that are constant: they are not eliminated but kept at
+/// their state, and so are fixed variables that stay. A prior that was made from constant
+/// variables, or from priors, counts as absolute for the gauge (`FactorType::absolute_size`). What
+/// the measurements do not determine drops out, be it of the variables that leave or of those that
+/// stay.
 ///
 /// Takes time in proportion to the number of factors, and cubic in the size of a group. Throws
 /// `Error` (numerical) where a Jacobian is not finite.

@@ -68,8 +68,8 @@ json::object measure_matches(const Bench& bench, const SimulatedSet& simulated) 
 
 }  // namespace
 
-void study_compact_honesty(const Bench& bench, const Keep& keep) {
-  tell("compact, honesty: normalised errors");
+void study_compact_consistency(const Bench& bench, const Keep& keep) {
+  tell("compact, consistency: normalised errors");
   const Thresholds thresholds =
       find_thresholds(bench, {"ellipse3d", "@ellipse3d:seed=1000", {}}, "refined");
   for (const char* strategy : {"fpfl", "apal"}) keep(measure_errors(bench, thresholds, strategy));
