@@ -10,12 +10,12 @@
 
 #include "cairn/io/format.hpp"
 #include "cairn/online/journal.hpp"
+#include "cairn/policy/policy_run.hpp"
 #include "cairn/policy/pose_policy.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/threads.hpp"
 #include "cairn/solve/estimator.hpp"
 #include "commands.hpp"
-#include "compact_run.hpp"
 #include "graph_files.hpp"
 #include "help.hpp"
 #include "interrupt.hpp"

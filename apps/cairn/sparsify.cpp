@@ -10,10 +10,10 @@
 
 #include <fmt/format.h>
 
+#include "cairn/policy/policy_run.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/threads.hpp"
 #include "commands.hpp"
-#include "compact_run.hpp"
 #include "graph_files.hpp"
 #include "help.hpp"
 #include "json_report.hpp"
