@@ -11,7 +11,8 @@
 
 #include <fmt/format.h>
 
-#include "cairn/geometry/arrival_order.hpp"
+#include "cairn/geometry/pose_chain.hpp"
+#include "cairn/online/recorded_graph.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/solve/estimator.hpp"
 #include "progress.hpp"
@@ -124,18 +125,6 @@ SparsifyResult sparsify_whole(const Graph& graph, const SparsifyJob& job,
 
 namespace {
 
-Factor factor_of(const Graph& graph, int f) {
-  Factor factor{.type = graph.factor_pools()[graph.factor(f).pool].type,
-                .variables = {},
-                .measurement = {},
-                .information = {}};
-  for (const std::int32_t v : graph.factor_variables(f)) factor.variables.push_back(graph.id(v));
-  const auto z = graph.measurement(f), information = graph.information(f);
-  factor.measurement.assign(z.begin(), z.end());
-  factor.information.assign(information.begin(), information.end());
-  return factor;
-}
-
 void add(Graph& graph, const Factor& factor) {
   std::vector<int> on;
   for (const Id id : factor.variables) on.push_back(graph.find(id).value());
@@ -185,23 +174,12 @@ class OnlineRun {
 
  private:
   void feed(const Arrival& arrival) {
-    GraphUpdate update;
-    for (const int v : arrival.variables) {
-      Variable variable{.type = recording_.variable_pools()[recording_.pool(v)].type,
-                        .id = recording_.id(v),
-                        .state = {},
-                        .fixed = recording_.fixed(v)};
-      if (variable.fixed || arrival.factors.empty() || estimator_->variable_count() == 0)
-        variable.state.assign(recording_.state(v).begin(), recording_.state(v).end());
-      update.variables.push_back(std::move(variable));
-    }
-    if (job_.redirect_early > 0) leave_early(arrival);
-    for (const int f : arrival.factors) {
-      const Factor as_came = factor_of(recording_, f);
+    GraphUpdate update = arrival_update(recording_, arrival);
+    if (job_.redirect_early > 0) leave_early(update);
+    for (const Factor& as_came : std::exchange(update.factors, {})) {
       // Odometry holds the newest pose to the one before it, whether that is to leave or not.
       const bool odometry = std::ranges::all_of(as_came.variables, [&](Id id) {
-        return (!arrival.variables.empty() && id == recording_.id(arrival.variables.front())) ||
-               id == newest_;
+        return (!arrival.variables.empty() && id == recording_.id(arrival.pose())) || id == newest_;
       });
       std::optional<Factor> factor = odometry && (newest_ < 0 || estimator_->has(newest_))
                                          ? as_came
@@ -223,6 +201,7 @@ class OnlineRun {
       }
       return newest;
     });
+    leave_states_to_factors(update, *estimator_);
     take(estimator_->update(update), update.factors.size());
     for (const Variable& variable : update.variables) pending_.push_back(variable.id);
     if (!update.variables.empty()) {
@@ -233,11 +212,10 @@ class OnlineRun {
 
   /// Nodes that are to leave, and that this pose has measured again: they are redirected from now
   /// on, although they are still there.
-  void leave_early(const Arrival& arrival) {
+  void leave_early(const GraphUpdate& update) {
     std::vector<Id> leaving;
-    for (const int f : arrival.factors) {
-      for (const std::int32_t v : recording_.factor_variables(f)) {
-        const Id id = recording_.id(v);
+    for (const Factor& factor : update.factors) {
+      for (const Id id : factor.variables) {
         if (id != newest_ && early_.contains(id) && estimator_->has(id) && !redirection_.has(id))
           leaving.push_back(id);
       }
@@ -318,7 +296,7 @@ class OnlineRun {
       }
     }
     for (const Factor& factor : factors_) add(redirected, factor);
-    for (int f = 0; f < recording_.factor_count(); ++f) add(full, factor_of(recording_, f));
+    for (int f = 0; f < recording_.factor_count(); ++f) add(full, new_factor(recording_, f));
     for (Graph* graph : {&redirected, &full})
       graph->set_loss(setting_.setup.loss(), setting_.setup.loss_scope());
     optimize(redirected, parts_, setting_, "the graph without removals", result_);

@@ -14,64 +14,6 @@
 #include "cairn/runtime/error.hpp"
 
 namespace cairn {
-namespace {
-
-Error bad_input(const std::string& message) { return {ErrorCode::input, message}; }
-
-bool is_pose(const VariableType& type) {
-  return type.lie_group() && type.placement() && type.placement()->has_orientation();
-}
-
-/// The variables by rising id, once it is sure that they are poses of one type.
-std::vector<int> poses_by_id(const Graph& graph) {
-  std::vector<int> poses(static_cast<std::size_t>(graph.variable_count()));
-  for (int v = 0; v < graph.variable_count(); ++v) {
-    poses[v] = v;
-    if (!is_pose(graph.type(v))) {
-      throw bad_input(
-          fmt::format("{} is no pose of a Lie group, and this takes pose graphs only: a robot's "
-                      "poses and the motions between them, without landmarks",
-                      graph.describe_variable(v)));
-    }
-    if (graph.pool(v) != graph.pool(0)) {
-      throw bad_input(fmt::format("{} and {} are poses of different types; a robot's way takes one",
-                                  graph.describe_variable(0), graph.describe_variable(v)));
-    }
-  }
-  std::ranges::sort(poses, {}, [&](int v) { return graph.id(v); });
-  return poses;
-}
-
-}  // namespace
-
-std::vector<RecordedPose> pose_chain(const Graph& graph) {
-  const std::vector<int> poses = poses_by_id(graph);
-  std::vector<int> place(poses.size());
-  std::vector<RecordedPose> chain(poses.size());
-  for (std::size_t k = 0; k < poses.size(); ++k) {
-    place[poses[k]] = static_cast<int>(k);
-    chain[k].variable = poses[k];
-  }
-  for (int f = 0; f < graph.factor_count(); ++f) {
-    if (!graph.factor_pools()[graph.factor(f).pool].type->is_relative()) {
-      throw bad_input(
-          fmt::format("{} is not the motion from one pose to another, and this takes pose graphs "
-                      "only: leave it out, and mark poses that are known as FIX",
-                      graph.describe_factor(f)));
-    }
-    const auto on = graph.factor_variables(f);
-    const auto [earlier, later] = std::minmax({place[on[0]], place[on[1]]});
-    (later == earlier + 1 ? chain[later].odometry : chain[later].links).push_back(f);
-  }
-  for (std::size_t k = 1; k < chain.size(); ++k) {
-    if (!chain[k].odometry.empty()) continue;
-    throw bad_input(
-        fmt::format("no factor joins {} to {}, the pose before it by id: odometry must be unbroken "
-                    "and ids rise along the robot's way",
-                    graph.describe_variable(poses[k]), graph.describe_variable(poses[k - 1])));
-  }
-  return chain;
-}
 
 Variable new_variable(const Graph& graph, int variable) {
   const std::span<const double> x = graph.state(variable);

@@ -75,7 +75,7 @@ bool has_all_of(const Graph& truth, const Graph& recording) {
 PolicyData policy_data(Graph recording, std::optional<Graph> truth) {
   PolicyData data;
   data.poses = pose_chain(recording);
-  for (const RecordedPose& pose : data.poses) data.loops += std::ssize(pose.links);
+  for (const Arrival& pose : data.poses) data.loops += std::ssize(pose.links);
   if (truth) {
     data.truth = trajectory(*truth);
     if (has_all_of(*truth, recording)) data.truth_graph = std::move(truth);

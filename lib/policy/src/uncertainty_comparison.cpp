@@ -18,22 +18,18 @@ UncertaintyComparison::UncertaintyComparison(const PolicyData& data,
 
 void UncertaintyComparison::add(std::size_t index, PosePolicy& policy) {
   const Graph& graph = data_.recording;
-  const RecordedPose& pose = data_.poses[index];
-  GraphUpdate update;
-  update.variables.push_back(new_variable(graph, pose.variable));
-  if (index > 0 && !update.variables.back().fixed) update.variables.back().state.clear();
-  for (const auto* factors : {&pose.odometry, &pose.links}) {
-    for (const int f : *factors) update.factors.push_back(new_factor(graph, f));
-  }
+  const int pose = data_.poses[index].pose();
+  GraphUpdate update = arrival_update(graph, data_.poses[index]);
+  leave_states_to_factors(update, *everything_);
   everything_->update(update);
 
   Estimator& compact = policy.estimator();
   std::vector<Id> poses = policy.kept();
   poses.erase(poses.begin());  // the first is held
-  UncertaintyStep step{.pose = graph.id(pose.variable),
+  UncertaintyStep step{.pose = graph.id(pose),
                        .kept = static_cast<int>(std::ssize(poses)),
                        .least_eigenvalue = std::numeric_limits<double>::infinity()};
-  const int n = graph.type(pose.variable).tangent_size();
+  const int n = graph.type(pose).tangent_size();
   const std::vector<double> of_compact = joint_covariance(compact, poses, n),
                             of_all = joint_covariance(*everything_, poses, n);
   const Eigen::Index rows = std::ssize(poses) * n;

@@ -94,10 +94,10 @@ TEST_F(RandomPosesTest, DrawsLoopsEvenly) {
     policy.expect(world.graph, pose_chain(world.graph));
     const auto registration = registry.make<Registration>("recorded");
     registration->begin({.recording = &world.graph});
-    for (const RecordedPose& pose : pose_chain(world.graph)) {
+    for (const Arrival& pose : pose_chain(world.graph)) {
       std::vector<Factor> odometry;
       for (const int f : pose.odometry) odometry.push_back(new_factor(world.graph, f));
-      policy.add_pose(new_variable(world.graph, pose.variable), odometry);
+      policy.add_pose(new_variable(world.graph, pose.pose()), odometry);
       std::vector<Id> matched;
       while (const auto match = policy.next_match()) {
         ++drawn[{match->earlier, match->later}];

@@ -26,7 +26,7 @@ class Scribe final : public PosePolicy {
   std::vector<std::vector<Factor>> odometry;
   std::vector<std::pair<Pair, std::vector<Factor>>> offers;
 
-  void expect(const Graph& recording, std::span<const RecordedPose> way) override {
+  void expect(const Graph& recording, std::span<const Arrival> way) override {
     log.push_back("expect " + std::to_string(way.size()) + " of " +
                   std::to_string(recording.variable_count()));
   }

@@ -26,7 +26,7 @@ struct PolicyData {
   Graph recording;
   std::optional<Graph> truth_graph;  ///< true states of the same variables, of the same types
   std::optional<Trajectory> truth;   ///< true poses, perhaps of other types
-  std::vector<RecordedPose> poses;
+  std::vector<Arrival> poses;
   std::int64_t loops = 0;  ///< factors besides odometry
 };
 
