@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "sparsify_run.hpp"
+#include "cairn/sparsification/sparsify_graph.hpp"
 
 #include <algorithm>
 #include <chrono>
@@ -15,9 +15,8 @@
 #include "cairn/online/recorded_graph.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/solve/estimator.hpp"
-#include "progress.hpp"
 
-namespace cairn::app {
+namespace cairn {
 namespace {
 
 using Clock = std::chrono::steady_clock;
@@ -29,10 +28,10 @@ double since(Clock::time_point begin) {
 /// The parts that the job names.
 struct Parts {
   Parts(const SparsifyJob& job, const SparsifySetting& setting)
-      : sparsifier(setting.session.registry().make<Sparsifier>(job.sparsifier)),
-        selection(setting.session.registry().make<NodeSelection>(job.selection)),
-        optimizer(setting.session.registry().make<Optimizer>(job.optimizer)),
-        solver(setting.session.registry().make<LinearSolver>(job.linear_solver)) {
+      : sparsifier(setting.registry.make<Sparsifier>(job.sparsifier)),
+        selection(setting.registry.make<NodeSelection>(job.selection)),
+        optimizer(setting.registry.make<Optimizer>(job.optimizer)),
+        solver(setting.registry.make<LinearSolver>(job.linear_solver)) {
     if (setting.observer) sparsifier->observe(setting.observer);
   }
   std::unique_ptr<Sparsifier> sparsifier;
@@ -44,10 +43,9 @@ struct Parts {
 /// To the minimum; its chi2.
 double optimize(Graph& graph, Parts& parts, const SparsifySetting& setting, const char* what,
                 SparsifyResult& result) {
-  Stop stop = setting.stop;
-  stop.interrupt = &setting.guard.flag();
-  OptimizationProgress progress(setting.session.common.quiet, stop.max_iterations);
-  const Summary summary = parts.optimizer->optimize(graph, stop, progress);
+  Observer silent;
+  const Summary summary = parts.optimizer->optimize(
+      graph, setting.stop, setting.optimisation ? *setting.optimisation : silent);
   if (summary.status == Status::interrupted) {
     result.interrupted = true;
   } else if (summary.status != Status::converged) {
@@ -67,16 +65,16 @@ std::vector<int> open_nodes(const Graph& graph) {
   return nodes;
 }
 
+void report(const SparsifySetting& setting, const SparsifyProgress& progress) {
+  if (setting.progress) setting.progress(progress);
+}
+
 Sparsification take_out(const Graph& graph, std::span<const int> nodes, Parts& parts,
-                        StatusLine& line, const SparsifySetting& setting) {
-  auto shown = Clock::now();
+                        const SparsifySetting& setting) {
+  const int total = static_cast<int>(std::ssize(nodes));
   return parts.sparsifier->remove(graph, nodes, [&](int done) {
-    if (since(shown) > (line.on_terminal() ? 0.1 : 5.0)) {
-      shown = Clock::now();
-      const double part = static_cast<double>(done) / static_cast<double>(nodes.size());
-      line.show(fmt::format("{} {} of {} nodes taken out", bar(part, 30), done, nodes.size()));
-    }
-    return !setting.guard.interrupted();
+    report(setting, {SparsifyProgress::Phase::remove, done, total});
+    return !setting.interrupted();
   });
 }
 
@@ -98,20 +96,19 @@ SparsifyResult sparsify_whole(const Graph& graph, const SparsifyJob& job,
   Graph original = graph.clone();
   result.variables_before = original.variable_count();
   result.factors_before = original.factor_count();
-  for (const std::string& note : setting.setup.apply(original)) result.notes.push_back(note);
+  original.set_loss(setting.loss, setting.loss_scope);
+  if (setting.initialise) result.notes = setting.initialise(original);
   if (!job.as_given) {
     result.chi2_before = optimize(original, parts, setting, "the graph", result);
     if (result.interrupted) return result;
   }
-  StatusLine line(setting.session.common.quiet);
-  line.show("choosing nodes");
+  report(setting, {SparsifyProgress::Phase::select});
   const auto begin = Clock::now();
   const std::vector<int> nodes =
       parts.selection->select(original, open_nodes(original), *parts.sparsifier);
   result.select_seconds = since(begin);
-  result.change = take_out(original, nodes, parts, line, setting);
-  line.clear();
-  result.interrupted = setting.guard.interrupted();
+  result.change = take_out(original, nodes, parts, setting);
+  result.interrupted = setting.interrupted();
   result.sparse = original.clone();
   apply(result.change, result.sparse);
   if (result.interrupted) return result;
@@ -138,18 +135,17 @@ class OnlineRun {
         job_(job),
         setting_(setting),
         parts_(job, setting),
-        estimator_(setting.session.registry().make<Estimator>(job.estimator)),
-        line_(setting.session.common.quiet),
+        estimator_(setting.registry.make<Estimator>(job.estimator)),
         redirection_(job.redirect_early > 0 ? Redirection::Nearest::order
                                             : Redirection::Nearest::place) {
-    estimator_->set_loss(setting.setup.loss(), setting.setup.loss_scope());
+    estimator_->set_loss(setting.loss, setting.loss_scope);
   }
 
   SparsifyResult run() {
     result_.variables_before = recording_.variable_count();
     result_.factors_before = recording_.factor_count();
     const std::vector<Arrival> arrivals = arrival_order(recording_);
-    auto shown = Clock::now();
+    const int total = static_cast<int>(std::ssize(arrivals));
     int count = 0;
     for (const Arrival& arrival : arrivals) {
       const auto begin = Clock::now();
@@ -157,17 +153,11 @@ class OnlineRun {
       ++count;
       if (count % job_.online == 0) sparsify();
       result_.steps.push_back(since(begin));
-      if (since(shown) > (line_.on_terminal() ? 0.1 : 5.0)) {
-        shown = Clock::now();
-        const double part = static_cast<double>(count) / static_cast<double>(arrivals.size());
-        line_.show(fmt::format("{} pose {} of {}, {} kept", bar(part, 30), count, arrivals.size(),
-                               estimator_->variable_count()));
-      }
-      result_.interrupted = setting_.guard.interrupted();
+      report(setting_, {SparsifyProgress::Phase::feed, count, total, estimator_->variable_count()});
+      result_.interrupted = setting_.interrupted();
       if (result_.interrupted) break;
     }
     if (!result_.interrupted) sparsify();
-    line_.clear();
     finish();
     return std::move(result_);
   }
@@ -255,7 +245,7 @@ class OnlineRun {
     const auto begin = Clock::now();
     const std::vector<int> chosen = parts_.selection->select(graph, nodes, *parts_.sparsifier);
     result_.select_seconds += since(begin);
-    const Sparsification change = take_out(graph, chosen, parts_, line_, setting_);
+    const Sparsification change = take_out(graph, chosen, parts_, setting_);
     result_.change.add(change);
     result_.change.removed_variables.insert(result_.change.removed_variables.end(),
                                             change.removed_variables.begin(),
@@ -278,8 +268,8 @@ class OnlineRun {
     if (failed_ > 0)
       result_.notes.push_back(fmt::format("{} updates were not positive definite", failed_));
     if (!job_.measure || result_.interrupted) return;
-    // The same factors with nobody taken out, and all factors as they came: both from where the
-    // sparse graph says that everybody is.
+    // The same factors with no node taken out, and all factors as they arrived: both from the
+    // estimate of the sparse graph.
     Graph redirected, full;
     for (int v = 0; v < recording_.variable_count(); ++v) {
       const Id id = recording_.id(v);
@@ -297,8 +287,7 @@ class OnlineRun {
     }
     for (const Factor& factor : factors_) add(redirected, factor);
     for (int f = 0; f < recording_.factor_count(); ++f) add(full, new_factor(recording_, f));
-    for (Graph* graph : {&redirected, &full})
-      graph->set_loss(setting_.setup.loss(), setting_.setup.loss_scope());
+    for (Graph* graph : {&redirected, &full}) graph->set_loss(setting_.loss, setting_.loss_scope);
     optimize(redirected, parts_, setting_, "the graph without removals", result_);
     measure(redirected, parts_, result_);
     result_.chi2_before = optimize(full, parts_, setting_, "the whole graph", result_);
@@ -315,7 +304,6 @@ class OnlineRun {
   const SparsifySetting& setting_;
   Parts parts_;
   std::unique_ptr<Estimator> estimator_;
-  StatusLine line_;
   SparsifyResult result_;
   Redirection redirection_;
   std::vector<FactorId> live_;  ///< by position in the estimator's graph, rising
@@ -334,4 +322,4 @@ SparsifyResult sparsify_online(const Graph& recording, const SparsifyJob& job,
   return OnlineRun(recording, job, setting).run();
 }
 
-}  // namespace cairn::app
+}  // namespace cairn
