@@ -1,21 +1,28 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // cairn compact GRAPH: compact pose SLAM, which keeps the poses and loop closures that tell most.
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <memory>
+#include <utility>
 
 #include <fmt/format.h>
 
+#include "cairn/policy/policy_run.hpp"
+#include "cairn/policy/threshold_search.hpp"
+#include "cairn/policy/uncertainty_comparison.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/threads.hpp"
 #include "commands.hpp"
-#include "compact_compare.hpp"
-#include "compact_run.hpp"
-#include "compact_thresholds.hpp"
+#include "graph_files.hpp"
 #include "help.hpp"
+#include "interrupt.hpp"
 #include "json_report.hpp"
+#include "problem_setup.hpp"
+#include "progress.hpp"
 #include "step_times.hpp"
 #include "table.hpp"
+#include "threshold_files.hpp"
 
 namespace cairn::app {
 namespace {
@@ -45,33 +52,47 @@ struct CompactOptions {
 };
 
 Recovery recovery_of(const std::string& name) {
-  if (name == "v0") return Recovery::uniform;
-  if (name == "v1") return Recovery::interpolate;
-  return name == "v2" ? Recovery::distribute : Recovery::likely;
+  return std::ranges::find(kRecoveryNames, name, &decltype(kRecoveryNames)::value_type::first)
+      ->second;
 }
 
 // Input -------------------------------------------------------------------------------------------
 
+struct Recording {
+  std::string name;
+  PolicyData data;
+};
+
 Recording load_recording(const CompactOptions& options, Session& session) {
-  Recording recording;
-  recording.loaded = load_graph(options.graph, options.input, session);
-  recording.poses = pose_chain(recording.graph());
-  for (const RecordedPose& pose : recording.poses) recording.loops += std::ssize(pose.links);
-  if (!options.truth.empty()) {
-    recording.truth_graph = load_graph(options.truth, options.input, session).graph;
-  } else if (recording.loaded.truth) {
-    recording.truth_graph = recording.loaded.truth->clone();
-  }
-  if (!recording.truth_graph) return recording;
-  recording.truth = trajectory(*recording.truth_graph);
-  const Graph& truth = *recording.truth_graph;
-  const bool same = std::ranges::all_of(recording.poses, [&](const RecordedPose& pose) {
-    const auto there = truth.find(recording.graph().id(pose.variable));
-    return there && truth.type(*there).tag() == recording.graph().type(pose.variable).tag();
-  });
-  if (!same) recording.truth_graph.reset();  // good for errors of the trajectory, no more
-  return recording;
+  LoadedGraph loaded = load_graph(options.graph, options.input, session);
+  if (!options.truth.empty())
+    loaded.truth = load_graph(options.truth, options.input, session).graph;
+  return {loaded.name, policy_data(std::move(loaded.graph), std::move(loaded.truth))};
 }
+
+/// Shows how far a run is.
+class PolicyProgress {
+ public:
+  explicit PolicyProgress(bool quiet) : line_(quiet) {}
+  void show(std::string_view title, std::size_t count, const PolicyResult& result) {
+    const std::size_t at = result.poses.size();
+    if (at == 1) kept_ = 0;
+    kept_ += result.poses.back().kept;
+    const auto now = std::chrono::steady_clock::now();
+    if (now - shown_ < std::chrono::milliseconds(line_.on_terminal() ? 50 : 5000)) return;
+    shown_ = now;
+    line_.show(fmt::format("{} {} pose {} of {}: {} kept, {}, {}", title,
+                           bar(static_cast<double>(at) / static_cast<double>(count), 20), at, count,
+                           kept_, plural(result.kept_loops, "loop closure"),
+                           seconds_text(result.seconds.total)));
+  }
+  void clear() { line_.clear(); }
+
+ private:
+  int kept_ = 0;
+  StatusLine line_;
+  std::chrono::steady_clock::time_point shown_ = std::chrono::steady_clock::now();
+};
 
 // Thresholds --------------------------------------------------------------------------------------
 
@@ -118,15 +139,15 @@ bool names_thresholds(const CompactOptions& options, const ComponentSpec& policy
          policy.values.contains("loop_gain") || policy.values.contains("pose_gain");
 }
 
-/// Whom to run, and the thresholds that were found, or read.
+/// What to run, and the thresholds that were found, or read.
 struct Job {
-  CompactJob job;
+  PolicyJob job;
   FoundThresholds found;
 };
 
-Job prepare(const CompactOptions& options, const CompactSetting& setting) {
+Job prepare(const CompactOptions& options, const PolicySetting& setting) {
   Job result;
-  CompactJob& job = result.job;
+  PolicyJob& job = result.job;
   job.registration = options.registration;
   job.policy = parse_component(options.policy);
   const auto emplace = [&](const OptionValues& values) {
@@ -138,13 +159,13 @@ Job prepare(const CompactOptions& options, const CompactSetting& setting) {
   if (!options.thresholds.empty())
     result.found.options = read_thresholds(options.thresholds, job.policy.name);
   if (automatic) {
-    const auto poses = static_cast<double>(setting.recording.poses.size());
+    const auto poses = static_cast<double>(setting.data.poses.size());
     const auto count =
         std::max<std::size_t>(1, static_cast<std::size_t>(std::llround(options.sample * poses)));
     result.found = find_thresholds(job, count, options.error_ratio, setting);
   }
   emplace(result.found.options);
-  const OptionTable& table = setting.session.registry().options(PosePolicy::kKind, job.policy.name);
+  const OptionTable& table = setting.registry.options(PosePolicy::kKind, job.policy.name);
   if (table.find("strategy"))
     emplace({{"strategy", options.strategy == "rfpfl" ? "fpfl" : options.strategy}});
   if (!options.save_thresholds.empty())
@@ -164,17 +185,17 @@ json::object error_json(const TrajectoryError& e) {
           {"rpe_all", pair(e.rpe_all_translation, e.rpe_all_rotation)}};
 }
 
-std::vector<double> step_seconds(const CompactResult& result) {
+std::vector<double> step_seconds(const PolicyResult& result) {
   std::vector<double> seconds;
   for (const PoseReport& pose : result.poses) seconds.push_back(pose.seconds.total);
   return seconds;
 }
 
-json::object result_json(const CompactResult& result, const Recording& recording) {
+json::object result_json(const PolicyResult& result, const Recording& recording) {
   json::object report;
   report["policy"] = result.policy;
   report["poses"] = {{"in", result.poses.size()}, {"kept", result.compact.variable_count()}};
-  report["loops"] = {{"in", recording.loops},
+  report["loops"] = {{"in", recording.data.loops},
                      {"proposed", result.proposed},
                      {"registered", result.registered},
                      {"kept", result.kept_loops},
@@ -207,9 +228,9 @@ json::object result_json(const CompactResult& result, const Recording& recording
 }
 
 json::object report_json(const CompactOptions& options, const Recording& recording, const Job& job,
-                         const CompactResult& result, const std::optional<CompactResult>& control) {
+                         const PolicyResult& result, const std::optional<PolicyResult>& control) {
   json::object report = begin_report("compact");
-  report["graph"] = graph_json(recording.graph(), recording.loaded.name);
+  report["graph"] = graph_json(recording.data.recording, recording.name);
   report["strategy"] = options.strategy;
   report["registration"] = options.registration;
   report["threads"] = threads();
@@ -226,30 +247,26 @@ json::object report_json(const CompactOptions& options, const Recording& recordi
   return report;
 }
 
-/// How often the compact graph admits at least as much uncertainty as there is.
 json::object comparison_json(const std::vector<UncertaintyStep>& steps) {
-  constexpr double kRounding = 1e-6;
-  std::size_t marginal = 0, full = 0;
-  double least_marginal = 1e300, least_full = 1e300, least_eigenvalue = 1e300;
-  for (const UncertaintyStep& step : steps) {
-    const double by_marginal = step.marginal / step.marginal_all,
-                 by_full = step.full / step.full_all;
-    marginal += by_marginal > 1.0 - kRounding;
-    full += by_full > 1.0 - kRounding;
-    least_marginal = std::min(least_marginal, by_marginal);
-    least_full = std::min(least_full, by_full);
-    least_eigenvalue = std::min(least_eigenvalue, step.least_eigenvalue);
-  }
-  const auto count = static_cast<double>(std::max<std::size_t>(1, steps.size()));
+  const Conservativeness c = conservativeness(steps);
   return {{"steps", steps.size()},
-          {"marginal_conservative", static_cast<double>(marginal) / count},
-          {"full_conservative", static_cast<double>(full) / count},
-          {"least_marginal_ratio", least_marginal},
-          {"least_full_ratio", least_full},
-          {"least_eigenvalue", least_eigenvalue}};
+          {"marginal_conservative", c.marginal},
+          {"full_conservative", c.full},
+          {"least_marginal_ratio", c.least_marginal_ratio},
+          {"least_full_ratio", c.least_full_ratio},
+          {"least_eigenvalue", c.least_eigenvalue}};
 }
 
-std::string steps_csv(const CompactResult& result) {
+std::string comparison_csv(const std::vector<UncertaintyStep>& steps) {
+  std::string text = "pose,kept,marginal,marginal_all,full,full_all,least_eigenvalue\n";
+  for (const UncertaintyStep& s : steps) {
+    text += fmt::format("{},{},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g}\n", s.pose, s.kept, s.marginal,
+                        s.marginal_all, s.full, s.full_all, s.least_eigenvalue);
+  }
+  return text;
+}
+
+std::string steps_csv(const PolicyResult& result) {
   std::string text =
       "pose,kept,closed_loop,near,candidates,least_gain,matched,linked,poses,loops,seconds,"
       "estimate,covariances,search\n";
@@ -285,13 +302,14 @@ std::string errors_text(const TrajectoryError& e) {
       e.rpe_all_rotation);
 }
 
-void add_result(Table& table, const CompactResult& result, const Recording& recording) {
+void add_result(Table& table, const PolicyResult& result, const Recording& recording) {
   const auto in = static_cast<std::int64_t>(std::ssize(result.poses));
   table.add({"poses", fmt::format("{} of {} kept ({})", result.compact.variable_count(), in,
                                   percent(result.compact.variable_count(), in))});
-  table.add({"loops", fmt::format("{} kept ({} of {} recorded); {} pairs matched, {} of them well",
-                                  result.kept_loops, percent(result.kept_loops, recording.loops),
-                                  recording.loops, result.proposed, result.registered)});
+  table.add(
+      {"loops", fmt::format("{} kept ({} of {} recorded); {} pairs matched, {} of them well",
+                            result.kept_loops, percent(result.kept_loops, recording.data.loops),
+                            recording.data.loops, result.proposed, result.registered)});
   const StepTimes times(step_seconds(result));
   table.add(
       {"time",
@@ -318,11 +336,11 @@ std::string thresholds_line(const OptionValues& values) {
 }
 
 std::string summary_text(const CompactOptions& options, const Recording& recording, const Job& job,
-                         const CompactResult& result, const std::optional<CompactResult>& control) {
+                         const PolicyResult& result, const std::optional<PolicyResult>& control) {
   Table table({{"", Table::Align::left}, {"", Table::Align::left}});
-  table.add({"graph", fmt::format("{}: {}, {}", recording.loaded.name,
-                                  plural(recording.graph().variable_count(), "pose"),
-                                  plural(recording.loops, "loop closure"))});
+  table.add({"graph", fmt::format("{}: {}, {}", recording.name,
+                                  plural(recording.data.recording.variable_count(), "pose"),
+                                  plural(recording.data.loops, "loop closure"))});
   table.add({"strategy", options.strategy});
   if (!job.found.options.empty()) table.add({"thresholds", thresholds_line(job.found.options)});
   add_result(table, control ? *control : result, recording);
@@ -354,29 +372,41 @@ int run(const CompactOptions& options, Session& session) {
   const ProblemSetup setup(options.problem, registry);
   const Recording recording = load_recording(options, session);
   const InterruptGuard guard;  // until the results are written
-  const CompactSetting setting{recording, setup, guard, session};
+  PolicyProgress progress(session.common.quiet);
+  const PolicySetting setting{
+      .data = recording.data,
+      .registry = registry,
+      .loss = setup.loss(),
+      .loss_on = setup.loss_selector(),
+      .interrupt = &guard.flag(),
+      .progress = [&](std::string_view title, std::size_t count, const PolicyResult& counts) {
+        progress.show(title, count, counts);
+      }};
   const Job job = prepare(options, setting);
   const Recovery recovery = recovery_of(options.recovery);
   std::optional<UncertaintyComparison> comparison;
-  if (!options.compare.empty()) comparison.emplace(setting);
-  const auto run_job = [&](const CompactJob& who, UncertaintyComparison* compare) {
-    CompactRun run(who, setting);
-    run.run(recording.poses.size(), who.policy.name, [&](std::size_t index) {
+  if (!options.compare.empty()) {
+    comparison.emplace(recording.data, registry.make<Estimator>("incremental_cholesky"));
+  };
+  const auto run_job = [&](const PolicyJob& chosen, UncertaintyComparison* compare) {
+    PolicyRun run(chosen, setting);
+    run.run(recording.data.poses.size(), chosen.policy.name, [&](std::size_t index) {
       if (compare) compare->add(index, run.policy());
     });
+    progress.clear();
     return run.finish(recovery);
   };
-  const CompactResult result = run_job(job.job, comparison ? &*comparison : nullptr);
-  std::optional<CompactResult> control;
+  const PolicyResult result = run_job(job.job, comparison ? &*comparison : nullptr);
+  std::optional<PolicyResult> control;
   if (options.strategy == "rfpfl") {
-    CompactJob random = job.job;
+    PolicyJob random = job.job;
     random.policy = {"random_poses",
                      {{"poses", fmt::format("{}", result.compact.variable_count())},
                       {"loops", fmt::format("{}", result.kept_loops)},
                       {"seed", fmt::format("{}", options.seed)}}};
     control = run_job(random, nullptr);
   }
-  const CompactResult& shown = control ? *control : result;
+  const PolicyResult& shown = control ? *control : result;
   if (!options.output.empty())
     write_graph(shown.compact, options.output, registry, options.output_format);
   if (!options.trajectory.empty()) write_graph(shown.way, options.trajectory, registry);

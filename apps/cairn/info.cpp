@@ -4,9 +4,9 @@
 
 #include <fmt/format.h>
 
+#include "cairn/evaluation/graph_survey.hpp"
 #include "commands.hpp"
 #include "graph_files.hpp"
-#include "graph_survey.hpp"
 #include "json_report.hpp"
 #include "table.hpp"
 
@@ -40,11 +40,11 @@ std::string counts_text(const LoadedGraph& loaded, const GraphSurvey& s, bool co
                {"chi2", Table::Align::right},
                {"", Table::Align::left}},
               "  ");
-  for (const VariableCount& v : s.variables) {
+  for (const GraphSurvey::VariableCount& v : s.variables) {
     types.add({v.tag, fmt::format("{}", v.count), fmt::format("{}", v.tangent_size), "",
                v.fixed > 0 ? fmt::format("{} fixed", v.fixed) : ""});
   }
-  for (const FactorCount& f : s.factors) {
+  for (const GraphSurvey::FactorCount& f : s.factors) {
     types.add({f.tag, fmt::format("{}", f.count), fmt::format("{}", f.residual_size),
                chi2_text(f.chi2), f.metric.empty() ? "" : "metric " + f.metric});
   }
@@ -78,7 +78,7 @@ std::string worst_text(const GraphSurvey& s, bool colour) {
                {"chi2", Table::Align::right},
                {"share", Table::Align::right}},
               "  ");
-  for (const WorstFactor& factor : s.worst) {
+  for (const GraphSurvey::WorstFactor& factor : s.worst) {
     table.add(
         {factor.name, chi2_text(factor.chi2), fmt::format("{:.1f} %", 100 * factor.chi2 / s.chi2)});
   }
@@ -87,7 +87,7 @@ std::string worst_text(const GraphSurvey& s, bool colour) {
 
 json::array variables_json(const GraphSurvey& s) {
   json::array all;
-  for (const VariableCount& v : s.variables) {
+  for (const GraphSurvey::VariableCount& v : s.variables) {
     all.push_back({{"type", v.tag},
                    {"count", v.count},
                    {"tangent_size", v.tangent_size},
@@ -98,7 +98,7 @@ json::array variables_json(const GraphSurvey& s) {
 
 json::array factors_json(const GraphSurvey& s) {
   json::array all;
-  for (const FactorCount& f : s.factors) {
+  for (const GraphSurvey::FactorCount& f : s.factors) {
     all.push_back({{"type", f.tag},
                    {"count", f.count},
                    {"residual_size", f.residual_size},
@@ -110,7 +110,7 @@ json::array factors_json(const GraphSurvey& s) {
 
 json::array worst_json(const GraphSurvey& s) {
   json::array all;
-  for (const WorstFactor& factor : s.worst) {
+  for (const GraphSurvey::WorstFactor& factor : s.worst) {
     all.push_back({{"factor", factor.name}, {"chi2", factor.chi2}});
   }
   return all;
@@ -149,7 +149,7 @@ json::object report_json(const LoadedGraph& loaded, const GraphSurvey& s) {
 int run(const InfoOptions& options, Session& session) {
   session.use_threads();
   const LoadedGraph loaded = load_graph(options.graph, options.input, session);
-  const GraphSurvey s = survey(loaded.graph);
+  const GraphSurvey s = survey_graph(loaded.graph);
   session.write_json(report_json(loaded, s));
   const bool colour = session.colour();
   session.print(counts_text(loaded, s, colour) + figures_text(loaded.graph, s) +

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // cairn online: measurements from standard input as they come, estimates to standard output.
-#include <algorithm>
-#include <chrono>
 #include <memory>
 #include <optional>
 
@@ -9,20 +7,21 @@
 #include <fmt/ranges.h>
 
 #include "cairn/io/format.hpp"
+#include "cairn/online/conversation.hpp"
 #include "cairn/online/journal.hpp"
+#include "cairn/online/online_session.hpp"
+#include "cairn/policy/policy_run.hpp"
+#include "cairn/policy/policy_session.hpp"
 #include "cairn/policy/pose_policy.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/threads.hpp"
 #include "cairn/solve/estimator.hpp"
 #include "commands.hpp"
-#include "compact_run.hpp"
 #include "graph_files.hpp"
 #include "help.hpp"
 #include "interrupt.hpp"
 #include "json_report.hpp"
 #include "line_input.hpp"
-#include "online_session.hpp"
-#include "policy_session.hpp"
 #include "problem_setup.hpp"
 #include "table.hpp"
 
@@ -47,11 +46,6 @@ struct OnlineOptions {
   ProblemOptions problem;
 };
 
-struct Counts {
-  std::int64_t lines = 0, taken = 0, refused = 0, solves = 0, restored = 0;
-  double solve_seconds = 0.0, longest = 0.0;
-};
-
 /// What must be the same for a journal to give the same estimate again.
 std::string identity(const OnlineOptions& options, const std::string& who, const Session& session) {
   const std::string types = fmt::format("{}", fmt::join(session.common.types, " "));
@@ -67,63 +61,19 @@ Journal::Sync sync_of(const std::string& name) {
   return name == "none" ? Journal::Sync::none : Journal::Sync::batch;
 }
 
-/// The conversation: lines in, answers out, the journal in between.
-class Conversation {
- public:
-  Conversation(LineSession& lines, std::optional<Journal>& journal, Counts& counts)
-      : lines_(lines), journal_(journal), counts_(counts) {}
-
-  /// Takes in again what the journal has. Returns the number of the last line.
-  std::int64_t restore() {
-    std::int64_t number = 0;
-    for (const Journal::Record& record : journal_->take_records()) {
-      try {
-        lines_.restore(record.text, record.number);
-      } catch (const Error& error) {
-        throw Error(error.code(), fmt::format("the journal's line {} was taken before and is now "
-                                              "refused: {}",
-                                              record.number, error.what()));
-      }
-      number = record.number;
-      ++counts_.restored;
-    }
-    return number;
-  }
-
-  /// False once the conversation is over.
-  bool take(const std::string& line, std::int64_t number) {
-    ++counts_.lines;
-    const LineSession::Reply reply = lines_.take(line, number);
-    counts_.refused += reply.refused;
-    counts_.taken += reply.changes && !reply.refused;
-    if (reply.solved) {
-      ++counts_.solves;
-      counts_.solve_seconds += reply.seconds;
-      counts_.longest = std::max(counts_.longest, reply.seconds);
-    }
-    if (journal_ && reply.changes) journal_->append(number, line);
-    if (!reply.text.empty()) {
-      if (journal_) journal_->commit();  // what is acknowledged is not lost
-      write_stdout(reply.text);
-      if (stdout_reader_is_gone()) return false;
-    }
-    return !reply.quit;
-  }
-
- private:
-  LineSession& lines_;
-  std::optional<Journal>& journal_;
-  Counts& counts_;
-};
-
-json::object report_json(const OnlineOptions& options, const Counts& counts,
+json::object report_json(const OnlineOptions& options, const Conversation::Counts& counts,
                          const LineSession& lines) {
   json::object report = begin_report("online");
   report["estimator"] = text_json(options.estimator);
   report["policy"] = text_json(options.policy);
   report["threads"] = threads();
   report["graph"] = {{"variables", lines.variable_count()}, {"factors", lines.factor_count()}};
-  lines.add_to(report);
+  if (const auto* policy = dynamic_cast<const PolicySession*>(&lines)) {
+    const PolicySession::Counts& kept = policy->counts();
+    report["poses"] = {{"in", kept.poses}, {"kept", lines.variable_count()}};
+    report["loops"] = {
+        {"proposed", kept.proposed}, {"registered", kept.registered}, {"kept", kept.linked}};
+  }
   report["lines"] = {{"read", counts.lines},
                      {"taken", counts.taken},
                      {"refused", counts.refused},
@@ -136,7 +86,7 @@ json::object report_json(const OnlineOptions& options, const Counts& counts,
   return report;
 }
 
-/// Who listens: a session with what it talks to.
+/// A session with the components behind it.
 struct Listener {
   std::unique_ptr<StreamFormat> format;
   std::unique_ptr<Estimator> estimator;  ///< null: the policy has one
@@ -208,26 +158,24 @@ int run(OnlineOptions options, Session& session) {
                                                    : follow_policy(options, setup, session);
   LineSession& lines = *listener.lines;
   std::optional<Journal> journal;
-  Counts counts;
-  Conversation conversation(lines, journal, counts);
-  std::int64_t number = 0;
   if (!options.journal.empty()) {
     journal.emplace(options.journal, listener.identity, sync_of(options.sync));
     session.note(journal->note());
-    number = conversation.restore();
-    write_stdout(fmt::format("RESTORED {} variables {} factors {}\n", number,
-                             lines.variable_count(), lines.factor_count()));
   }
+  Conversation conversation(lines, journal ? &*journal : nullptr);
+  if (journal) write_stdout(conversation.restore());
 
   const InterruptGuard guard;
   LineInput input(guard.flag());
-  for (std::string line; input.next(line) && conversation.take(line, ++number);) {
+  for (std::string line; input.next(line);) {
+    const LineSession::Reply reply = conversation.take(line);
+    if (!reply.text.empty()) write_stdout(reply.text);
+    if (reply.quit || (!reply.text.empty() && stdout_reader_is_gone())) break;
   }
-  if (journal) journal->commit();
-  lines.finish();
+  conversation.finish();
   if (!options.output.empty())
     write_graph(lines.estimator().graph(), options.output, session.registry());
-  session.write_json(report_json(options, counts, lines));
+  session.write_json(report_json(options, conversation.counts(), lines));
   return guard.interrupted() ? kExitInterrupted : 0;
 }
 

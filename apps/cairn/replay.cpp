@@ -10,11 +10,11 @@
 #include <fmt/format.h>
 
 #include "album.hpp"
-#include "cairn/geometry/arrival_order.hpp"
+#include "cairn/evaluation/batch_comparison.hpp"
+#include "cairn/online/recorded_graph.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/threads.hpp"
 #include "cairn/solve/estimator.hpp"
-#include "cairn/update/graph_update.hpp"
 #include "commands.hpp"
 #include "graph_files.hpp"
 #include "help.hpp"
@@ -23,7 +23,6 @@
 #include "picture_files.hpp"
 #include "problem_setup.hpp"
 #include "progress.hpp"
-#include "replay_checks.hpp"
 #include "step_times.hpp"
 #include "table.hpp"
 
@@ -80,15 +79,17 @@ KeptMarginals kept_marginals(const std::string& name) {
   return name == "diagonal" ? KeptMarginals::diagonal : KeptMarginals::none;
 }
 
-/// Feeds a graph to an estimator.
+/// Feeds a graph to an estimator, and takes the time.
 class Feeder {
  public:
   Feeder(const Graph& whole, Estimator& estimator, const ReplayOptions& options)
       : whole_(whole), estimator_(estimator), options_(options) {}
 
   Step feed(const Arrival& arrival, bool solve, bool full, Replay& replay) {
-    const GraphUpdate update = update_of(arrival, replay);
-    UpdateOptions how{.defer = !solve, .full = full, .max_seconds = options_.budget};
+    GraphUpdate update = arrival_update(whole_, arrival);
+    if (options_.problem.initial != "as_given")
+      replay.placed_as_given += leave_states_to_factors(update, estimator_);
+    const UpdateOptions how{.defer = !solve, .full = full, .max_seconds = options_.budget};
     Step step;
     step.solved = solve;
     const auto begin = Clock::now();
@@ -105,57 +106,6 @@ class Feeder {
   }
 
  private:
-  GraphUpdate update_of(const Arrival& arrival, Replay& replay) {
-    const bool as_given = options_.problem.initial == "as_given";
-    GraphUpdate update;
-    for (const int v : arrival.variables) {
-      Variable variable{whole_.type_of(v), whole_.id(v), {}, whole_.fixed(v)};
-      if (as_given || variable.fixed) variable.state = given(v);
-      update.variables.push_back(std::move(variable));
-    }
-    for (const int f : factors_of(arrival)) {
-      Factor factor{whole_.type_of_factor(f), {}, {}, {}};
-      for (const std::int32_t v : whole_.factor_variables(f))
-        factor.variables.push_back(whole_.id(v));
-      factor.measurement.assign(whole_.measurement(f).begin(), whole_.measurement(f).end());
-      factor.information.assign(whole_.information(f).begin(), whole_.information(f).end());
-      update.factors.push_back(std::move(factor));
-    }
-    if (!as_given) give_states_to_the_unplaced(arrival, update, replay);
-    return update;
-  }
-
-  std::vector<double> given(int v) const {
-    const std::span<const double> x = whole_.state(v);
-    return {x.begin(), x.end()};
-  }
-
-  /// A pose is placed by the first factor that can: that to the pose before it comes first.
-  std::vector<int> factors_of(const Arrival& arrival) {
-    std::vector<int> factors = arrival.factors;
-    const int pose = arrival.variables.empty() ? -1 : arrival.variables.front();
-    const auto odometry = std::ranges::find_if(factors, [&](int f) {
-      const auto on = whole_.factor_variables(f);
-      return on.size() == 2 && std::ranges::count(on, pose) == 1 &&
-             std::ranges::count(on, last_pose_) == 1;
-    });
-    if (odometry != factors.end()) std::rotate(factors.begin(), odometry, odometry + 1);
-    last_pose_ = pose;
-    return factors;
-  }
-
-  /// The others are left to the estimator, in its own time.
-  void give_states_to_the_unplaced(const Arrival& arrival, GraphUpdate& update,
-                                   Replay& replay) const {
-    GraphUpdate trial = update;
-    for (const int k : place_variables(trial, [this](Id id) {
-           return estimator_.has(id) ? estimator_.state(id) : std::span<const double>();
-         })) {
-      update.variables[k].state = given(arrival.variables[k]);
-      ++replay.placed_as_given;
-    }
-  }
-
   void read_estimate() {
     copy_.clear();
     for (const Id id : known_) {
@@ -167,7 +117,6 @@ class Feeder {
   const Graph& whole_;
   Estimator& estimator_;
   const ReplayOptions& options_;
-  int last_pose_ = -1;
   std::vector<Id> known_;
   std::vector<double> copy_;  // a reader's copy of the estimate
 };
@@ -431,7 +380,14 @@ int run(const ReplayOptions& options, Session& session) {
   if (sorted)
     session.note("the file is not in the order of arrival: sorted by the ids of its poses");
   std::optional<BatchChecker> checker;
-  if (options.checks > 0) checker.emplace(loaded.graph, setup, registry, options.covariance_check);
+  if (options.checks > 0) {
+    checker.emplace(loaded.graph,
+                    BatchProblem{.loss = setup.loss(),
+                                 .loss_on = setup.loss_selector(),
+                                 .initialise = [&](Graph& graph) { setup.apply(graph); },
+                                 .covariances = options.covariance_check},
+                    registry);
+  }
 
   const InterruptGuard guard;  // until the results are written
   const Replay replay = replay_all(loaded.graph, arrivals, *estimator,

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // cairn sparsify GRAPH: takes nodes out of a graph and keeps their information in a few factors.
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <memory>
 #include <optional>
@@ -10,16 +11,18 @@
 
 #include <fmt/format.h>
 
+#include "cairn/policy/policy_run.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/threads.hpp"
+#include "cairn/sparsification/sparsify_graph.hpp"
 #include "commands.hpp"
-#include "compact_run.hpp"
 #include "graph_files.hpp"
 #include "help.hpp"
+#include "interrupt.hpp"
 #include "json_report.hpp"
+#include "problem_setup.hpp"
 #include "progress.hpp"
 #include "sparsify_records.hpp"
-#include "sparsify_run.hpp"
 #include "step_times.hpp"
 #include "table.hpp"
 
@@ -257,6 +260,51 @@ std::string summary_text(const SparsifyCommandOptions& options, const LoadedGrap
   return table.text(false);
 }
 
+/// Shows how far a sparsification is.
+class NodeProgress {
+ public:
+  explicit NodeProgress(bool quiet) : line_(quiet) {}
+  void show(const SparsifyProgress& progress) {
+    const auto now = std::chrono::steady_clock::now();
+    const bool select = progress.phase == SparsifyProgress::Phase::select;
+    if (!select && now - shown_ < std::chrono::milliseconds(line_.on_terminal() ? 100 : 5000))
+      return;
+    shown_ = now;
+    if (select) return line_.show("choosing nodes");
+    const std::string done =
+        bar(static_cast<double>(progress.done) / static_cast<double>(progress.total), 30);
+    if (progress.phase == SparsifyProgress::Phase::feed) {
+      line_.show(fmt::format("{} pose {} of {}, {} kept", done, progress.done, progress.total,
+                             progress.kept));
+    } else {
+      line_.show(fmt::format("{} {} of {} nodes taken out", done, progress.done, progress.total));
+    }
+  }
+
+ private:
+  StatusLine line_;
+  std::chrono::steady_clock::time_point shown_ = std::chrono::steady_clock::now();
+};
+
+SparsifyResult sparsify(const Graph& graph, const SparsifyJob& job, const ProblemSetup& setup,
+                        Stop stop, const InterruptGuard& guard, SparsificationObserver observer,
+                        Session& session) {
+  stop.interrupt = &guard.flag();
+  NodeProgress nodes(session.common.quiet);
+  OptimizationProgress iterations(session.common.quiet, stop.max_iterations);
+  const SparsifySetting setting{
+      .registry = session.registry(),
+      .stop = stop,
+      .loss = setup.loss(),
+      .loss_on = setup.loss_selector(),
+      .initialise = [&](Graph& whole) { return setup.apply(whole); },
+      .observer = std::move(observer),
+      .optimisation = &iterations,
+      .progress = [&](const SparsifyProgress& progress) { nodes.show(progress); }};
+  return job.online > 0 ? sparsify_online(graph, job, setting)
+                        : sparsify_whole(graph, job, setting);
+}
+
 void note_refused(const Sparsification& change, const Session& session) {
   for (std::size_t k = 0; k < std::min(kRefusedShown, change.refused.size()); ++k)
     session.note(fmt::format("not taken out: {}", change.refused[k].reason));
@@ -287,11 +335,11 @@ int run(const SparsifyCommandOptions& options, Session& session) {
   const LoadedGraph loaded = load_graph(options.graph, options.input, session);
   const InterruptGuard guard;
   ProblemRecorder recorder;
-  SparsifySetting setting{setup, options.problem.stop, guard, session, {}};
+  SparsificationObserver observer;
   if (!options.record.empty())
-    setting.observer = [&](const SparsificationRecord& record) { recorder.add(record); };
-  const SparsifyResult result = job.online > 0 ? sparsify_online(loaded.graph, job, setting)
-                                               : sparsify_whole(loaded.graph, job, setting);
+    observer = [&](const SparsificationRecord& record) { recorder.add(record); };
+  const SparsifyResult result =
+      sparsify(loaded.graph, job, setup, options.problem.stop, guard, std::move(observer), session);
   for (const std::string& note : result.notes) session.note(note);
   note_refused(result.change, session);
   if (!options.output.empty())

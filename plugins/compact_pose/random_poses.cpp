@@ -23,14 +23,14 @@ void shuffle(std::vector<T>& all, std::mt19937_64& engine) {
 }
 
 /// The pairs (earlier, later) that a recording has loop closures of, each once.
-std::vector<Pair> linked_pairs(const Graph& recording, std::span<const RecordedPose> poses) {
+std::vector<Pair> linked_pairs(const Graph& recording, std::span<const Arrival> poses) {
   std::set<Pair> pairs;
-  for (const RecordedPose& pose : poses) {
+  for (const Arrival& pose : poses) {
     for (const int f : pose.links) {
-      Id earlier = recording.id(pose.variable);
+      Id earlier = recording.id(pose.pose());
       for (const std::int32_t v : recording.factor_variables(f))
         earlier = std::min(earlier, recording.id(v));
-      pairs.emplace(earlier, recording.id(pose.variable));
+      pairs.emplace(earlier, recording.id(pose.pose()));
     }
   }
   return {pairs.begin(), pairs.end()};
@@ -45,12 +45,12 @@ RandomPoses::RandomPoses(std::unique_ptr<Estimator> estimator, int poses, int lo
       seed_(seed),
       graph_(std::move(estimator), CompositionOrder::first) {}
 
-void RandomPoses::expect(const Graph& recording, std::span<const RecordedPose> poses) {
+void RandomPoses::expect(const Graph& recording, std::span<const Arrival> poses) {
   kept_.clear();
   linked_.clear();
   if (poses.empty()) return;
   std::mt19937_64 engine(seed_);
-  kept_ = {recording.id(poses.front().variable), recording.id(poses.back().variable)};
+  kept_ = {recording.id(poses.front().pose()), recording.id(poses.back().pose())};
   std::vector<Pair> pairs = linked_pairs(recording, poses);
   shuffle(pairs, engine);
   int loops = 0;
@@ -69,7 +69,7 @@ void RandomPoses::expect(const Graph& recording, std::span<const RecordedPose> p
   };
   draw(/*with_new_poses=*/true);
   std::vector<Id> others;
-  for (const RecordedPose& pose : poses) others.push_back(recording.id(pose.variable));
+  for (const Arrival& pose : poses) others.push_back(recording.id(pose.pose()));
   shuffle(others, engine);
   for (const Id id : others) {
     if (kept_.size() < room) kept_.insert(id);

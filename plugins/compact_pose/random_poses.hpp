@@ -21,7 +21,7 @@ class RandomPoses final : public PosePolicy {
  public:
   RandomPoses(std::unique_ptr<Estimator> estimator, int poses, int loops, std::uint64_t seed);
 
-  void expect(const Graph& recording, std::span<const RecordedPose> poses) override;
+  void expect(const Graph& recording, std::span<const Arrival> poses) override;
   void add_pose(const Variable& pose, std::span<const Factor> odometry) override;
   std::optional<MatchProposal> next_match() override;
   LinkReport offer(Id other, std::span<const Factor> measured) override;

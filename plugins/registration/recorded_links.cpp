@@ -15,7 +15,7 @@ namespace cairn::registration {
 namespace {
 
 Motion measured_motion(const Graph& recording, int factor, const MotionGroup& group) {
-  const Factor measured = new_factor(recording, factor);
+  const Factor measured = recording.factor(factor);
   return group.of_factor(measured, std::min(measured.variables[0], measured.variables[1]));
 }
 

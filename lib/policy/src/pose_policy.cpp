@@ -7,7 +7,7 @@ namespace cairn {
 
 PosePolicy::~PosePolicy() = default;
 OptionFinder::~OptionFinder() = default;
-void PosePolicy::expect(const Graph&, std::span<const RecordedPose>) {}
+void PosePolicy::expect(const Graph&, std::span<const Arrival>) {}
 
 std::string_view to_string(LinkVerdict verdict) {
   constexpr std::array<std::string_view, 5> kNames{"linked", "unmatched", "uninformative",
@@ -23,17 +23,16 @@ PolicySeconds& PolicySeconds::operator+=(const PolicySeconds& other) {
   return *this;
 }
 
-void run_policy(const Graph& recording, std::span<const RecordedPose> poses, PosePolicy& policy,
+void run_policy(const Graph& recording, std::span<const Arrival> poses, PosePolicy& policy,
                 Registration& registration, const std::function<bool(const PoseReport&)>& each) {
   policy.expect(recording, poses);
   bool first = true;
-  for (const RecordedPose& pose : poses) {
-    Variable variable = new_variable(recording, pose.variable);
-    if (!first && !variable.fixed) variable.state.clear();  // where its odometry puts it
+  for (const Arrival& arrival : poses) {
+    GraphUpdate update = arrival_update(recording, arrival);
+    Variable& pose = update.variables.front();
+    if (!first && !pose.fixed) pose.state.clear();  // where its odometry puts it
     first = false;
-    std::vector<Factor> odometry;
-    for (const int f : pose.odometry) odometry.push_back(new_factor(recording, f));
-    policy.add_pose(variable, odometry);
+    policy.add_pose(pose, std::span(update.factors).first(arrival.odometry.size()));
     while (const auto match = policy.next_match())
       policy.offer(match->earlier, registration.match(match->earlier, match->later));
     const PoseReport report = policy.end_pose();

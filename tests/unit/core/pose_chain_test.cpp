@@ -31,9 +31,7 @@ using ::testing::IsEmpty;
 using ::testing::SizeIs;
 using State = std::vector<double>;
 
-// The chain ---------------------------------------------------------------------------------------
-
-class PoseChain : public testing::Test {
+class GraphElements : public testing::Test {
  protected:
   int pose(Id id) { return graph_.add_variable(types_.pose, id, std::array{1.0, 2.0, 0.3}); }
   /// By id.
@@ -41,91 +39,21 @@ class PoseChain : public testing::Test {
     return graph_.add_factor(types_.relative_pose, std::array{*graph_.find(a), *graph_.find(b)},
                              std::array{1.0, 0.5, 0.1}, std::array{2.0, 0.0, 0.0, 3.0, 0.0, 4.0});
   }
-  std::string refusal() {
-    try {
-      pose_chain(graph_);
-    } catch (const Error& error) {
-      EXPECT_EQ(error.code(), ErrorCode::input);
-      return error.what();
-    }
-    return {};
-  }
-
   const test::PlanarTypes types_{};
   Graph graph_;
 };
 
-TEST_F(PoseChain, IsByRisingIdWhateverTheOrderInTheGraph) {
-  const int v30 = pose(30), v10 = pose(10), v40 = pose(40), v20 = pose(20);
-  const int loop = join(40, 10), f34 = join(40, 30), f12 = join(10, 20), other_loop = join(10, 40),
-            f23 = join(20, 30), f21 = join(20, 10), third_loop = join(10, 30);
-  const std::vector<RecordedPose> chain = pose_chain(graph_);
-  ASSERT_THAT(chain, SizeIs(4));
-  const std::array variables{v10, v20, v30, v40};
-  for (std::size_t k = 0; k < 4; ++k) EXPECT_EQ(chain[k].variable, variables[k]);
-  EXPECT_THAT(chain[0].odometry, IsEmpty());
-  EXPECT_THAT(chain[1].odometry, ElementsAre(f12, f21));
-  EXPECT_THAT(chain[2].odometry, ElementsAre(f23));
-  EXPECT_THAT(chain[3].odometry, ElementsAre(f34));
-  EXPECT_THAT(chain[0].links, IsEmpty());
-  EXPECT_THAT(chain[1].links, IsEmpty());
-  EXPECT_THAT(chain[2].links, ElementsAre(third_loop));
-  EXPECT_THAT(chain[3].links, ElementsAre(loop, other_loop));
-}
-
-TEST_F(PoseChain, MayBeShort) {
-  EXPECT_THAT(pose_chain(graph_), IsEmpty());
-  const int only = pose(5);
-  const std::vector<RecordedPose> chain = pose_chain(graph_);
-  ASSERT_THAT(chain, SizeIs(1));
-  EXPECT_EQ(chain[0].variable, only);
-  EXPECT_THAT(chain[0].odometry, IsEmpty());
-}
-
-TEST_F(PoseChain, NamesTheGapInItsOdometry) {
-  for (const Id id : {1, 2, 5, 6}) pose(id);
-  join(1, 2), join(5, 6), join(1, 5);
-  EXPECT_THAT(refusal(), AllOf(HasSubstr("no factor joins VERTEX_SE2 5 to VERTEX_SE2 2"),
-                               HasSubstr("ids increase along the trajectory")));
-}
-
-TEST_F(PoseChain, RefusesLandmarks) {
-  pose(1);
-  graph_.add_variable(types_.point, 9, std::array{0.0, 0.0});
-  EXPECT_THAT(refusal(), AllOf(HasSubstr("VERTEX_XY 9 is no pose"), HasSubstr("pose graphs only")));
-}
-
-TEST_F(PoseChain, RefusesWhatFormsNoGroup) {
-  graph_.add_variable(define_variable<test::ScaledPose>(), 4, std::array{0.0, 0.0, 0.0, 0.0});
-  EXPECT_THAT(refusal(), HasSubstr("VERTEX_SCALED 4 is no pose of a Lie group"));
-}
-
-TEST_F(PoseChain, RefusesPosesOfTwoTypes) {
-  pose(1);
-  graph_.add_variable(define_variable<Se3>(), 2, std::array{0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0});
-  EXPECT_THAT(refusal(),
-              HasSubstr("VERTEX_SE2 1 and VERTEX_SE3:QUAT 2 are poses of different types"));
-}
-
-TEST_F(PoseChain, RefusesFactorsThatAreNoMotions) {
-  pose(1), pose(2);
-  join(1, 2);
-  graph_.add_factor(types_.prior, std::array{1}, std::array{0.0, 0.0, 0.0},
-                    std::array{1.0, 0.0, 0.0, 1.0, 0.0, 1.0});
-  EXPECT_THAT(refusal(), AllOf(HasSubstr("EDGE_PRIOR_SE2 2 is not the motion"), HasSubstr("FIX")));
-}
-
-TEST_F(PoseChain, GivesVariablesAndFactorsAsAnEstimatorTakesThem) {
+TEST_F(GraphElements, GivesVariablesAndFactorsAsAnEstimatorTakesThem) {
   pose(7);
   const int fixed = pose(3), factor = join(7, 3);
   graph_.set_fixed(fixed);
-  const Variable variable = new_variable(graph_, fixed);
+  const Variable variable = graph_.variable(fixed);
   EXPECT_EQ(variable.type, types_.pose);
   EXPECT_EQ(variable.id, 3);
   EXPECT_THAT(variable.state, ElementsAre(1.0, 2.0, 0.3));
   EXPECT_TRUE(variable.fixed);
-  EXPECT_FALSE(new_variable(graph_, 0).fixed);
-  const Factor copy = new_factor(graph_, factor);
+  EXPECT_FALSE(graph_.variable(0).fixed);
+  const Factor copy = graph_.factor(factor);
   EXPECT_EQ(copy.type, types_.relative_pose);
   EXPECT_THAT(copy.variables, ElementsAre(7, 3));
   EXPECT_THAT(copy.measurement, ElementsAre(1.0, 0.5, 0.1));

@@ -13,6 +13,7 @@
 #include <boost/math/distributions/normal.hpp>
 
 #include "cairn/geometry/pose_chain.hpp"
+#include "cairn/online/recorded_graph.hpp"
 #include "cairn/policy/registration.hpp"
 #include "cairn/solve/estimator.hpp"
 #include "unit/policies/pose_world.hpp"
@@ -42,17 +43,17 @@ class AlgorithmOne {
   std::vector<double> gains;  ///< of those
 
   void run(const Graph& recording, Registration& registration) {
-    const std::vector<RecordedPose> way = pose_chain(recording);
+    const std::vector<Arrival> way = pose_chain(recording);
     GraphUpdate first;
-    first.variables.push_back(new_variable(recording, way[0].variable));
+    first.variables.push_back(recording.variable(way[0].pose()));
     estimator_->update(first);
     kept = {first.variables[0].id};
     bool keep_pose = true;
     Id newest = kept.back();
     Motion e;  // (μ_e, Σ_e)
     for (std::size_t n = 1; n < way.size(); ++n) {
-      const Id id = recording.id(way[n].variable);
-      const Factor odometry = new_factor(recording, way[n].odometry[0]);
+      const Id id = recording.id(way[n].pose());
+      const Factor odometry = recording.factor(way[n].odometry[0]);
       const Motion u = world_.motions().of_factor(odometry, newest);
       GraphUpdate update;
       if (keep_pose) {

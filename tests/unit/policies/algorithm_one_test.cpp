@@ -47,7 +47,7 @@ std::vector<Example> examples() {
 void vary_odometry(const PoseWorld& poses, Graph& graph) {
   Draw draw(1);
   for (int f = 0; f < graph.factor_count(); ++f) {
-    Factor factor = new_factor(graph, f);
+    Factor factor = graph.factor(f);
     Motion motion = poses.motions().of_factor(factor, factor.variables[0]);
     for (double& number : motion.covariance) number *= 0.6;
     const double more = draw.uniform(0.0, 1.0);

@@ -353,7 +353,7 @@ TEST_F(CompactPoseTest, EdgesMayPointBackwards) {
   for (int v = 0; v < world.graph.variable_count(); ++v)
     backwards.add_variable(poses.types().pose, world.graph.id(v), world.graph.state(v));
   for (int f = 0; f < world.graph.factor_count(); ++f) {
-    const Factor factor = new_factor(world.graph, f);
+    const Factor factor = world.graph.factor(f);
     const Id from = factor.variables[0], to = factor.variables[1];
     const Factor turned =
         poses.motions().to_factor(factor.type, to, from, poses.motions().of_factor(factor, to));

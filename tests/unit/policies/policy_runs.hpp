@@ -43,7 +43,7 @@ struct PolicyRun {
 inline PolicyRun run(std::unique_ptr<PosePolicy> policy, Registration& registration,
                      const Graph& recording) {
   PolicyRun result{std::move(policy), {}};
-  const std::vector<RecordedPose> poses = pose_chain(recording);
+  const std::vector<Arrival> poses = pose_chain(recording);
   run_policy(recording, poses, *result.policy, registration, [&](const PoseReport& report) {
     result.reports.push_back(report);
     return true;
@@ -65,7 +65,7 @@ inline Simulation simulate(Registry& registry, const std::string& generator,
 
 inline std::vector<Id> all_ids(const Graph& graph) {
   std::vector<Id> ids;
-  for (const RecordedPose& pose : pose_chain(graph)) ids.push_back(graph.id(pose.variable));
+  for (const Arrival& pose : pose_chain(graph)) ids.push_back(graph.id(pose.pose()));
   return ids;
 }
 

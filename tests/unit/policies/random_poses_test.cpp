@@ -94,10 +94,10 @@ TEST_F(RandomPosesTest, DrawsLoopsEvenly) {
     policy.expect(world.graph, pose_chain(world.graph));
     const auto registration = registry.make<Registration>("recorded");
     registration->begin({.recording = &world.graph});
-    for (const RecordedPose& pose : pose_chain(world.graph)) {
+    for (const Arrival& pose : pose_chain(world.graph)) {
       std::vector<Factor> odometry;
-      for (const int f : pose.odometry) odometry.push_back(new_factor(world.graph, f));
-      policy.add_pose(new_variable(world.graph, pose.variable), odometry);
+      for (const int f : pose.odometry) odometry.push_back(world.graph.factor(f));
+      policy.add_pose(world.graph.variable(pose.pose()), odometry);
       std::vector<Id> matched;
       while (const auto match = policy.next_match()) {
         ++drawn[{match->earlier, match->later}];
@@ -132,7 +132,7 @@ TEST_F(RandomPosesTest, FixedPosesAreKeptBesides) {
 TEST_F(RandomPosesTest, CannotFollowARobotLive) {
   const auto policy = registry.make<PosePolicy>("random_poses:poses=10");
   try {
-    policy->add_pose(new_variable(world.graph, 0), {});
+    policy->add_pose(world.graph.variable(0), {});
     FAIL() << "no error";
   } catch (const Error& error) {
     EXPECT_EQ(error.code(), ErrorCode::usage);
@@ -143,13 +143,13 @@ TEST_F(RandomPosesTest, CannotFollowARobotLive) {
 TEST_F(RandomPosesTest, APoseWithoutAMotionIsRefused) {
   const auto policy = registry.make<PosePolicy>("random_poses:poses=10,loops=0");
   policy->expect(world.graph, pose_chain(world.graph));
-  policy->add_pose(new_variable(world.graph, 0), {});
+  policy->add_pose(world.graph.variable(0), {});
   policy->end_pose();
-  EXPECT_THROW(policy->add_pose(new_variable(world.graph, 1), {}), Error);
-  const Factor elsewhere = new_factor(world.graph, 1);
-  EXPECT_THROW(policy->add_pose(new_variable(world.graph, 1), {&elsewhere, 1}), Error);
-  const Factor moved = new_factor(world.graph, 0);
-  policy->add_pose(new_variable(world.graph, 1), {&moved, 1});
+  EXPECT_THROW(policy->add_pose(world.graph.variable(1), {}), Error);
+  const Factor elsewhere = world.graph.factor(1);
+  EXPECT_THROW(policy->add_pose(world.graph.variable(1), {&elsewhere, 1}), Error);
+  const Factor moved = world.graph.factor(0);
+  policy->add_pose(world.graph.variable(1), {&moved, 1});
   policy->end_pose();
   policy->finish();
   EXPECT_THAT(policy->chains(), SizeIs(1));

@@ -70,7 +70,7 @@ std::vector<Pair> all_pairs(const Graph& graph) {
 std::vector<double> squared_errors(const Graph& truth, const std::vector<Factor>& factors) {
   Graph graph;
   for (int v = 0; v < truth.variable_count(); ++v) {
-    const Variable variable = new_variable(truth, v);
+    const Variable variable = truth.variable(v);
     graph.add_variable(variable.type, variable.id, truth.state(v));
   }
   for (const Factor& factor : factors) {
@@ -160,7 +160,7 @@ TEST_F(Recorded, AnswersEitherWayRoundWithWhatIsThereAndWithNothingElse) {
     ASSERT_THAT(answer, SizeIs(wanted == factors.end() ? 0 : 1));
     ASSERT_THAT(reverse, SizeIs(answer.size()));
     if (answer.empty()) continue;
-    expect_same(answer.front(), new_factor(world.graph, wanted->second));
+    expect_same(answer.front(), world.graph.factor(wanted->second));
     expect_same(reverse.front(), answer.front());
     EXPECT_FALSE(was_false(*recorded, pair));
   }
@@ -180,8 +180,8 @@ TEST_F(Recorded, AnswersWithEachOfSeveralFactorsAsItStands) {
   for (const Pair& pair : {Pair{10, 30}, Pair{30, 10}}) {
     const auto answer = make("recorded")->match(pair.first, pair.second);
     ASSERT_THAT(answer, SizeIs(2));
-    expect_same(answer[0], new_factor(graph, first));
-    expect_same(answer[1], new_factor(graph, second));
+    expect_same(answer[0], graph.factor(first));
+    expect_same(answer[1], graph.factor(second));
     const auto made_up = make("recorded:false_rate=1")->match(pair.first, pair.second);
     ASSERT_THAT(made_up, SizeIs(1));
     EXPECT_THAT(made_up[0].variables, ElementsAre(10, 30));
@@ -495,7 +495,7 @@ TEST_F(PlanarRegistrations, SimulatedErrsWithTheCorrelationsOfTheRecording) {
                                           std::array{400.0, 300.0, -700.0, 900.0, -900.0, 2500.0});
   const MotionGroup group(registry.variable_type("VERTEX_SE2"));
   const std::vector<double> covariance =
-      group.of_factor(new_factor(world.graph, loop), 10).covariance;
+      group.of_factor(world.graph.factor(loop), 10).covariance;
   std::vector<Factor> measured;
   for (int seed = 0; seed < 500; ++seed) {
     const auto simulated = make("simulated:range=10,seed=" + std::to_string(seed));

@@ -26,7 +26,7 @@ class Scribe final : public PosePolicy {
   std::vector<std::vector<Factor>> odometry;
   std::vector<std::pair<Pair, std::vector<Factor>>> offers;
 
-  void expect(const Graph& recording, std::span<const RecordedPose> way) override {
+  void expect(const Graph& recording, std::span<const Arrival> way) override {
     log.push_back("expect " + std::to_string(way.size()) + " of " +
                   std::to_string(recording.variable_count()));
   }
@@ -75,7 +75,7 @@ class RunPolicy : public testing::Test {
 TEST_F(RunPolicy, TellsThePolicyOfEveryPoseInTurn) {
   Simulation world = simulate(registry, "ring:poses=5");
   Scribe policy;
-  const Factor answer = new_factor(world.graph, 0);
+  const Factor answer = world.graph.factor(0);
   FunctionRegistration registration([&](Id earlier, Id) {
     return earlier == 0 ? std::vector<Factor>{answer} : std::vector<Factor>();
   });
@@ -114,7 +114,7 @@ TEST_F(RunPolicy, LeavesItToOdometryWherePosesAreButForTheFirstAndFixedOnes) {
 
 TEST_F(RunPolicy, HandsOverAllOdometryOfAPose) {
   Simulation world = simulate(registry, "ring:poses=4");
-  const Factor twice = new_factor(world.graph, 1);
+  const Factor twice = world.graph.factor(1);
   world.graph.add_factor(twice.type, std::array{2, 1}, twice.measurement, twice.information);
   Scribe policy;
   FunctionRegistration none([](Id, Id) { return std::vector<Factor>(); });

@@ -11,22 +11,6 @@
 
 namespace cairn {
 
-/// A recorded pose graph in the order of the trajectory: what is added with each pose.
-struct RecordedPose {
-  int variable = 0;  ///< index in the graph
-  std::vector<int>
-      odometry;  ///< factors to the previous pose, in either direction; none for the first
-  std::vector<int> links;  ///< all other factors to earlier poses
-};
-
-/// The poses of a graph by rising id. Throws `Error` (input), with what would work, if it is not a
-/// pose graph with unbroken odometry: a variable that is no pose of a Lie group, or of another type
-/// than the first; a factor that is not relative; a pose without a factor to the one before.
-CAIRN_API std::vector<RecordedPose> pose_chain(const Graph& graph);
-
-/// A variable and a factor of a graph, as an estimator takes them.
-CAIRN_API Variable new_variable(const Graph& graph, int variable);
-CAIRN_API Factor new_factor(const Graph& graph, int factor);
 
 /// One pose between two consecutive poses of a compact graph.
 struct ChainStep {

@@ -11,6 +11,7 @@
 
 #include "cairn/geometry/motion.hpp"
 #include "cairn/geometry/pose_chain.hpp"
+#include "cairn/online/recorded_graph.hpp"
 #include "cairn/plugin/options.hpp"
 #include "cairn/policy/registration.hpp"
 #include "cairn/runtime/component.hpp"
@@ -79,7 +80,7 @@ class CAIRN_API PosePolicy : public Component {
 
   /// Called before the first pose if what follows is a recording, for policies that need it as a
   /// whole; does nothing unless a policy overrides it.
-  virtual void expect(const Graph& recording, std::span<const RecordedPose> poses);
+  virtual void expect(const Graph& recording, std::span<const Arrival> poses);
   /// The next pose, with its odometry from the previous pose (several factors are fused; none for
   /// the first pose). A pose marked as fixed is kept. Throws `Error` (input) if there is no
   /// odometry, or a factor that is no relative pose of the two; nothing has changed then.
@@ -126,7 +127,7 @@ class CAIRN_API OptionFinder {
 
 /// Feeds the first poses of a recording to a policy, matching by `registration`. `each` is called
 /// for every pose, and stops the run by returning false. The policy is finished at the end.
-CAIRN_API void run_policy(const Graph& recording, std::span<const RecordedPose> poses,
+CAIRN_API void run_policy(const Graph& recording, std::span<const Arrival> poses,
                           PosePolicy& policy, Registration& registration,
                           const std::function<bool(const PoseReport&)>& each = {});
 

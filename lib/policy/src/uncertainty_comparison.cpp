@@ -1,38 +1,35 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "compact_compare.hpp"
+#include "cairn/policy/uncertainty_comparison.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
-#include <fmt/format.h>
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <Eigen/Eigenvalues>
 
-namespace cairn::app {
-UncertaintyComparison::UncertaintyComparison(const CompactSetting& setting)
-    : recording_(setting.recording),
-      everything_(setting.session.registry().make<Estimator>("incremental_cholesky")) {}
+namespace cairn {
+
+UncertaintyComparison::UncertaintyComparison(const PolicyData& data,
+                                             std::unique_ptr<Estimator> everything)
+    : data_(data), everything_(std::move(everything)) {}
 
 void UncertaintyComparison::add(std::size_t index, PosePolicy& policy) {
-  const Graph& graph = recording_.graph();
-  const RecordedPose& pose = recording_.poses[index];
-  GraphUpdate update;
-  update.variables.push_back(new_variable(graph, pose.variable));
-  if (index > 0 && !update.variables.back().fixed) update.variables.back().state.clear();
-  for (const auto* factors : {&pose.odometry, &pose.links}) {
-    for (const int f : *factors) update.factors.push_back(new_factor(graph, f));
-  }
+  const Graph& graph = data_.recording;
+  const int pose = data_.poses[index].pose();
+  GraphUpdate update = arrival_update(graph, data_.poses[index]);
+  leave_states_to_factors(update, *everything_);
   everything_->update(update);
 
   Estimator& compact = policy.estimator();
   std::vector<Id> poses = policy.kept();
   poses.erase(poses.begin());  // the first is held
-  UncertaintyStep step{.pose = graph.id(pose.variable),
+  UncertaintyStep step{.pose = graph.id(pose),
                        .kept = static_cast<int>(std::ssize(poses)),
                        .least_eigenvalue = std::numeric_limits<double>::infinity()};
-  const int n = graph.type(pose.variable).tangent_size();
+  const int n = graph.type(pose).tangent_size();
   const std::vector<double> of_compact = joint_covariance(compact, poses, n),
                             of_all = joint_covariance(*everything_, poses, n);
   const Eigen::Index rows = std::ssize(poses) * n;
@@ -53,13 +50,23 @@ void UncertaintyComparison::add(std::size_t index, PosePolicy& policy) {
   if (!poses.empty()) steps_.push_back(step);
 }
 
-std::string comparison_csv(const std::vector<UncertaintyStep>& steps) {
-  std::string text = "pose,kept,marginal,marginal_all,full,full_all,least_eigenvalue\n";
-  for (const UncertaintyStep& s : steps) {
-    text += fmt::format("{},{},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g}\n", s.pose, s.kept, s.marginal,
-                        s.marginal_all, s.full, s.full_all, s.least_eigenvalue);
+Conservativeness conservativeness(std::span<const UncertaintyStep> steps) {
+  constexpr double kRounding = 1e-6;
+  Conservativeness result;
+  std::size_t marginal = 0, full = 0;
+  for (const UncertaintyStep& step : steps) {
+    const double by_marginal = step.marginal / step.marginal_all,
+                 by_full = step.full / step.full_all;
+    marginal += by_marginal > 1.0 - kRounding;
+    full += by_full > 1.0 - kRounding;
+    result.least_marginal_ratio = std::min(result.least_marginal_ratio, by_marginal);
+    result.least_full_ratio = std::min(result.least_full_ratio, by_full);
+    result.least_eigenvalue = std::min(result.least_eigenvalue, step.least_eigenvalue);
   }
-  return text;
+  const auto count = static_cast<double>(std::max<std::size_t>(1, steps.size()));
+  result.marginal = static_cast<double>(marginal) / count;
+  result.full = static_cast<double>(full) / count;
+  return result;
 }
 
-}  // namespace cairn::app
+}  // namespace cairn

@@ -1,17 +1,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "graph_survey.hpp"
+#include "cairn/evaluation/graph_survey.hpp"
 
 #include <algorithm>
 #include <map>
 #include <numeric>
 #include <set>
+#include <string_view>
 #include <utility>
 
 #include <fmt/format.h>
 
-#include "table.hpp"
-
-namespace cairn::app {
+namespace cairn {
 namespace {
 
 constexpr std::size_t kWorst = 5;
@@ -19,9 +18,14 @@ constexpr std::size_t kWorst = 5;
 // a word.
 constexpr double kLargeRatio = 100.0, kSmallRatio = 0.01;
 
+/// "1 factor", "2 factors"
+std::string counted(std::int64_t count, std::string_view noun) {
+  return fmt::format("{} {}{}", count, noun, count == 1 ? "" : "s");
+}
+
 void count_variables(const Graph& graph, GraphSurvey& s) {
   for (const VariablePool& pool : graph.variable_pools()) {
-    VariableCount& count = s.variables.emplace_back();
+    GraphSurvey::VariableCount& count = s.variables.emplace_back();
     count.tag = pool.type->tag();
     count.count = std::ssize(pool.variables);
     count.tangent_size = pool.type->tangent_size();
@@ -31,7 +35,7 @@ void count_variables(const Graph& graph, GraphSurvey& s) {
 
 void count_factors(const Graph& graph, const std::vector<double>& norms, GraphSurvey& s) {
   for (const FactorPool& pool : graph.factor_pools()) {
-    FactorCount& count = s.factors.emplace_back();
+    GraphSurvey::FactorCount& count = s.factors.emplace_back();
     count.tag = pool.type->tag();
     count.count = std::ssize(pool.sequence);
     count.residual_size = pool.type->residual_size();
@@ -53,7 +57,7 @@ std::vector<std::pair<int, int>> relative_pairs(const Graph& graph) {
   return pairs;
 }
 
-void tell_odometry_from_loops(const Graph& graph, GraphSurvey& s) {
+void count_odometry_and_loops(const Graph& graph, GraphSurvey& s) {
   const std::vector<bool> loop = loop_closures(graph);
   for (const FactorPool& pool : graph.factor_pools()) {
     if (!pool.type->is_relative()) continue;
@@ -116,7 +120,7 @@ void suspect_structure(const Graph& graph, GraphSurvey& s) {
   if (graph.factor_count() == 0) say("there are no factors: nothing to optimise");
   if (!s.gauge.unconstrained.empty()) {
     say(fmt::format("{} without any factor; the first is {}",
-                    plural(std::ssize(s.gauge.unconstrained), "variable"),
+                    counted(std::ssize(s.gauge.unconstrained), "variable"),
                     graph.describe_variable(s.gauge.unconstrained.front())));
   }
   const auto parts = s.gauge.components - std::ssize(s.gauge.unconstrained);
@@ -126,11 +130,11 @@ void suspect_structure(const Graph& graph, GraphSurvey& s) {
   }
   if (s.doubled > 0) {
     say(fmt::format("{} on variables that another of the type joins already (doubled edges)",
-                    plural(s.doubled, "factor")));
+                    counted(s.doubled, "factor")));
   }
   if (s.chain_gaps > 0) {
     say(fmt::format("the odometry chain has {}: consecutive poses that no factor joins",
-                    plural(s.chain_gaps, "gap")));
+                    counted(s.chain_gaps, "gap")));
   }
 }
 
@@ -153,9 +157,9 @@ void suspect_numbers(GraphSurvey& s) {
   }
   if (!s.worst.empty() && s.worst.size() == kWorst && s.chi2 > 0) {
     double share = 0.0;
-    for (const WorstFactor& factor : s.worst) share += factor.chi2 / s.chi2;
+    for (const GraphSurvey::WorstFactor& factor : s.worst) share += factor.chi2 / s.chi2;
     std::int64_t factors = 0;
-    for (const FactorCount& count : s.factors) factors += count.count;
+    for (const GraphSurvey::FactorCount& count : s.factors) factors += count.count;
     if (factors >= 100 && share > 0.5) {
       say(fmt::format("the {} worst of {} factors make {:.0f} % of chi2: outliers?", kWorst,
                       factors, 100 * share));
@@ -165,12 +169,12 @@ void suspect_numbers(GraphSurvey& s) {
 
 }  // namespace
 
-GraphSurvey survey(const Graph& graph) {
+GraphSurvey survey_graph(const Graph& graph) {
   GraphSurvey s;
   const std::vector<double> norms = squared_norms(graph);
   count_variables(graph, s);
   count_factors(graph, norms, s);
-  tell_odometry_from_loops(graph, s);
+  count_odometry_and_loops(graph, s);
   count_chain_gaps(graph, s);
   count_doubled(graph, s);
   count_freedoms(graph, s);
@@ -180,4 +184,4 @@ GraphSurvey survey(const Graph& graph) {
   return s;
 }
 
-}  // namespace cairn::app
+}  // namespace cairn

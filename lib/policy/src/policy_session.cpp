@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "policy_session.hpp"
+#include "cairn/policy/policy_session.hpp"
 
 #include <algorithm>
 #include <utility>
@@ -9,7 +9,7 @@
 
 #include "cairn/io/format.hpp"
 
-namespace cairn::app {
+namespace cairn {
 namespace {
 
 bool is_pose(const VariableType& type) {
@@ -62,9 +62,9 @@ PolicySession::Command PolicySession::find_command(std::string_view word) {
       {"NOMATCH", &PolicySession::note_unmatched},
       {"DONE", &PolicySession::finish_pose},
       {"REMOVE", &PolicySession::take_back},
-      {"COVARIANCE", &PolicySession::tell_covariance},
-      {"ESTIMATE", &PolicySession::tell_estimate},
-      {"CHI2", &PolicySession::tell_chi2},
+      {"COVARIANCE", &PolicySession::report_covariance},
+      {"ESTIMATE", &PolicySession::report_estimate},
+      {"CHI2", &PolicySession::report_chi2},
       {"SAVE", &PolicySession::save},
       {"QUIT", &PolicySession::quit},
       {"SOLVE", &PolicySession::refuse},
@@ -88,18 +88,13 @@ void PolicySession::perform(std::string_view line, const Words& words, Reply& re
 
 void PolicySession::finish() {
   if (finished_) return;
-  Reply unheard;
-  finish_way(unheard);
+  Reply unread;
+  finish_way(unread);
 }
 
 std::int64_t PolicySession::variable_count() const { return std::ssize(policy_.kept()); }
 
 std::int64_t PolicySession::factor_count() const { return policy_.factor_count(); }
-
-void PolicySession::add_to(boost::json::object& report) const {
-  report["poses"] = {{"in", poses_}, {"kept", variable_count()}};
-  report["loops"] = {{"proposed", proposed_}, {"registered", registered_}, {"kept", linked_}};
-}
 
 // Data --------------------------------------------------------------------------------------------
 
@@ -130,7 +125,7 @@ void PolicySession::take_pose(Variable pose, Reply& reply) {
     close(reply);
   }
   if (!motions_) motions_.emplace(pose.type);
-  arriving_ = Arrival{std::move(pose), {}};
+  arriving_ = ArrivingPose{std::move(pose), {}};
 }
 
 void PolicySession::hold(std::span<const Id> ids) {
@@ -234,8 +229,8 @@ void PolicySession::begin() {
   arriving_.reset();
   open_ = true;
   asked_.clear();
-  told_.clear();
-  ++poses_;
+  reported_.clear();
+  ++counts_.poses;
 }
 
 /// Offers what was measured between the newest pose and one other.
@@ -243,15 +238,15 @@ void PolicySession::offer() {
   if (!measured_) return;
   const Measured measured = *std::exchange(measured_, std::nullopt);
   asked_.clear();
-  ++registered_;
+  ++counts_.registered;
   try {
     const LinkReport link = policy_.offer(measured.other, measured.factors);
-    told_.push_back(link);
+    reported_.push_back(link);
     note_link(link);
   } catch (const Error& error) {
     // The lines were taken, and what follows them is not to blame.
-    told_text_ += fmt::format("NOTE the link from {} to {} was not taken: {}\n", measured.other,
-                              *newest_, error.what());
+    answer_ += fmt::format("NOTE the link from {} to {} was not taken: {}\n", measured.other,
+                           *newest_, error.what());
   }
 }
 
@@ -265,21 +260,21 @@ void PolicySession::settle(Reply& reply) {
 
 /// Ends the pose of now.
 PoseReport PolicySession::end() {
-  Reply unheard;
-  settle(unheard);
+  Reply unread;
+  settle(unread);
   PoseReport report = policy_.end_pose();
   open_ = false;
   arrived_[report.id] = report.kept;
   // The policy lists all links of the pose; those that had been waiting are news.
-  auto told = told_.begin();
+  auto reported = reported_.begin();
   for (const LinkReport& link : report.links) {
-    if (told != told_.end() && same(*told, link)) {
-      ++told;
+    if (reported != reported_.end() && same(*reported, link)) {
+      ++reported;
     } else {
       note_link(link);
     }
   }
-  for (const std::string& note : report.notes) told_text_ += fmt::format("NOTE {}\n", note);
+  for (const std::string& note : report.notes) answer_ += fmt::format("NOTE {}\n", note);
   return report;
 }
 
@@ -288,7 +283,7 @@ void PolicySession::close(Reply& reply) {
   const PoseReport report = end();
   reply.changes = reply.solved = true;
   reply.seconds = report.seconds.total;
-  told_text_ += fmt::format("{} {}\n", report.kept ? "KEPT" : "DROPPED", report.id);
+  answer_ += fmt::format("{} {}\n", report.kept ? "KEPT" : "DROPPED", report.id);
   write_results(report.kept, reply);
   answer(reply);
 }
@@ -296,7 +291,7 @@ void PolicySession::close(Reply& reply) {
 /// The newest pose is kept in any case, and everything solved.
 void PolicySession::finish_way(Reply& reply) {
   if (!complete()) {
-    told_text_ +=
+    answer_ +=
         fmt::format("NOTE pose {} is left out: no relative pose between {} and {} was measured\n",
                     arriving_->pose.id, *newest_, arriving_->pose.id);
     arriving_.reset();
@@ -306,7 +301,7 @@ void PolicySession::finish_way(Reply& reply) {
   finished_ = true;
   if (!newest_) return;
   arrived_[*newest_] = true;
-  told_text_ += fmt::format("KEPT {}\n", *newest_);
+  answer_ += fmt::format("KEPT {}\n", *newest_);
   write_results(true, reply);
 }
 
@@ -326,9 +321,9 @@ void PolicySession::propose(const Words& words, Reply& reply) {
     const std::optional<MatchProposal> match = policy_.next_match();
     reply.changes = true;
     asked_ = match ? match_line(*match, motions_->tangent_size()) : "MATCH NONE\n";
-    proposed_ += match.has_value();
+    counts_.proposed += match.has_value();
   }
-  told_text_ += asked_;
+  answer_ += asked_;
   answer(reply);
 }
 
@@ -341,7 +336,7 @@ void PolicySession::note_unmatched(const Words& words, Reply& reply) {
   expect_complete();
   settle(reply);
   asked_.clear();
-  told_.push_back(policy_.offer(other, {}));
+  reported_.push_back(policy_.offer(other, {}));
   reply.changes = true;
 }
 
@@ -372,7 +367,7 @@ void PolicySession::refuse(const Words& words, Reply& /*reply*/) {
               : "goes on deciding from what it has taken, and could not take that into account"));
 }
 
-void PolicySession::tell_covariance(const Words& words, Reply& reply) {
+void PolicySession::report_covariance(const Words& words, Reply& reply) {
   expect_words(words, 3, "COVARIANCE id id");
   const Id a = parse_whole(words[1], "id"), b = parse_whole(words[2], "id");
   for (const Id id : {a, b}) {
@@ -386,18 +381,18 @@ void PolicySession::tell_covariance(const Words& words, Reply& reply) {
     throw Error(ErrorCode::numerical,
                 "there is no covariance: the measurements do not determine everything");
   }
-  told_text_ += text;
+  answer_ += text;
   answer(reply);
 }
 
-void PolicySession::tell_estimate(const Words& words, Reply& reply) {
+void PolicySession::report_estimate(const Words& words, Reply& reply) {
   expect_words(words, 2, "ESTIMATE id' or 'ESTIMATE ALL");
   if (words[1] == "ALL") {
     settle(reply);
     if (newest_) {
       read_estimator(reply);
-      for (const Id id : policy_.kept()) write_estimate(id, told_text_);
-      if (!in_graph(*newest_)) write_estimate(*newest_, told_text_);
+      for (const Id id : policy_.kept()) write_estimate(id, answer_);
+      if (!in_graph(*newest_)) write_estimate(*newest_, answer_);
     }
     return answer(reply);
   }
@@ -411,14 +406,14 @@ void PolicySession::tell_estimate(const Words& words, Reply& reply) {
   }
   settle(reply);
   if (newest_ != id) read_estimator(reply);
-  write_estimate(id, told_text_);
+  write_estimate(id, answer_);
   answer(reply);
 }
 
-void PolicySession::tell_chi2(const Words& words, Reply& reply) {
+void PolicySession::report_chi2(const Words& words, Reply& reply) {
   expect_words(words, 1, "CHI2");
   settle(reply);
-  told_text_ += fmt::format("CHI2 {}\n", read_estimator(reply).chi2());
+  answer_ += fmt::format("CHI2 {}\n", read_estimator(reply).chi2());
   answer(reply);
 }
 
@@ -443,15 +438,15 @@ void PolicySession::quit(const Words& words, Reply& reply) {
 // Answers -----------------------------------------------------------------------------------------
 
 void PolicySession::answer(Reply& reply) {
-  reply.text += std::exchange(told_text_, {});
+  reply.text += std::exchange(answer_, {});
   acknowledge(reply);
 }
 
 /// Tells of a link, and counts it.
 void PolicySession::note_link(const LinkReport& link) {
-  told_text_ += fmt::format("{} {} {} {} {}\n", word_of(link.verdict), link.earlier, link.later,
-                            link.gain, link.innovation);
-  linked_ += link.verdict == LinkVerdict::linked;
+  answer_ += fmt::format("{} {} {} {} {}\n", word_of(link.verdict), link.earlier, link.later,
+                         link.gain, link.innovation);
+  counts_.linked += link.verdict == LinkVerdict::linked;
 }
 
 /// What --output and --marginals ask for at the end of a pose.
@@ -464,19 +459,19 @@ void PolicySession::write_results(bool kept, Reply& reply) {
     for (const Id id : poses) {
       std::string text;
       write_estimate(id, text);
-      std::string& told = told_states_[id];
-      if (changed && told == text) continue;
-      told_text_ += text;
-      told = std::move(text);
+      std::string& reported = reported_states_[id];
+      if (changed && reported == text) continue;
+      answer_ += text;
+      reported = std::move(text);
     }
   }
-  if (settings_.output == "last") write_estimate(*newest_, told_text_);
+  if (settings_.output == "last") write_estimate(*newest_, answer_);
   if (!kept || settings_.marginals == "none") return;  // otherwise they are the same as before
   Estimator& estimator = read_estimator(reply);
   const VariableType& type = motions_->type();
   const std::vector<Id> ids =
       settings_.marginals == "last" ? std::vector<Id>{*newest_} : policy_.kept();
-  for (const Id id : ids) told_text_ += covariance_line(estimator, id, type, id, type);
+  for (const Id id : ids) answer_ += covariance_line(estimator, id, type, id, type);
 }
 
 bool PolicySession::in_graph(Id id) const {
@@ -501,4 +496,4 @@ Estimator& PolicySession::read_estimator(Reply& reply) {
   return policy_.estimator();
 }
 
-}  // namespace cairn::app
+}  // namespace cairn

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "sparsify_run.hpp"
+#include "cairn/sparsification/sparsify_graph.hpp"
 
 #include <algorithm>
 #include <chrono>
@@ -11,12 +11,12 @@
 
 #include <fmt/format.h>
 
-#include "cairn/geometry/arrival_order.hpp"
+#include "cairn/geometry/pose_chain.hpp"
+#include "cairn/online/recorded_graph.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/solve/estimator.hpp"
-#include "progress.hpp"
 
-namespace cairn::app {
+namespace cairn {
 namespace {
 
 using Clock = std::chrono::steady_clock;
@@ -28,10 +28,10 @@ double since(Clock::time_point begin) {
 /// The parts that the job names.
 struct Parts {
   Parts(const SparsifyJob& job, const SparsifySetting& setting)
-      : sparsifier(setting.session.registry().make<Sparsifier>(job.sparsifier)),
-        selection(setting.session.registry().make<NodeSelection>(job.selection)),
-        optimizer(setting.session.registry().make<Optimizer>(job.optimizer)),
-        solver(setting.session.registry().make<LinearSolver>(job.linear_solver)) {
+      : sparsifier(setting.registry.make<Sparsifier>(job.sparsifier)),
+        selection(setting.registry.make<NodeSelection>(job.selection)),
+        optimizer(setting.registry.make<Optimizer>(job.optimizer)),
+        solver(setting.registry.make<LinearSolver>(job.linear_solver)) {
     if (setting.observer) sparsifier->observe(setting.observer);
   }
   std::unique_ptr<Sparsifier> sparsifier;
@@ -43,10 +43,9 @@ struct Parts {
 /// To the minimum; its chi2.
 double optimize(Graph& graph, Parts& parts, const SparsifySetting& setting, const char* what,
                 SparsifyResult& result) {
-  Stop stop = setting.stop;
-  stop.interrupt = &setting.guard.flag();
-  OptimizationProgress progress(setting.session.common.quiet, stop.max_iterations);
-  const Summary summary = parts.optimizer->optimize(graph, stop, progress);
+  Observer silent;
+  const Summary summary = parts.optimizer->optimize(
+      graph, setting.stop, setting.optimisation ? *setting.optimisation : silent);
   if (summary.status == Status::interrupted) {
     result.interrupted = true;
   } else if (summary.status != Status::converged) {
@@ -66,16 +65,16 @@ std::vector<int> open_nodes(const Graph& graph) {
   return nodes;
 }
 
+void report(const SparsifySetting& setting, const SparsifyProgress& progress) {
+  if (setting.progress) setting.progress(progress);
+}
+
 Sparsification take_out(const Graph& graph, std::span<const int> nodes, Parts& parts,
-                        StatusLine& line, const SparsifySetting& setting) {
-  auto shown = Clock::now();
+                        const SparsifySetting& setting) {
+  const int total = static_cast<int>(std::ssize(nodes));
   return parts.sparsifier->remove(graph, nodes, [&](int done) {
-    if (since(shown) > (line.on_terminal() ? 0.1 : 5.0)) {
-      shown = Clock::now();
-      const double part = static_cast<double>(done) / static_cast<double>(nodes.size());
-      line.show(fmt::format("{} {} of {} nodes taken out", bar(part, 30), done, nodes.size()));
-    }
-    return !setting.guard.interrupted();
+    report(setting, {SparsifyProgress::Phase::remove, done, total});
+    return !setting.interrupted();
   });
 }
 
@@ -97,20 +96,19 @@ SparsifyResult sparsify_whole(const Graph& graph, const SparsifyJob& job,
   Graph original = graph.clone();
   result.variables_before = original.variable_count();
   result.factors_before = original.factor_count();
-  for (const std::string& note : setting.setup.apply(original)) result.notes.push_back(note);
+  original.set_loss(setting.loss, setting.loss_on);
+  if (setting.initialise) result.notes = setting.initialise(original);
   if (!job.as_given) {
     result.chi2_before = optimize(original, parts, setting, "the graph", result);
     if (result.interrupted) return result;
   }
-  StatusLine line(setting.session.common.quiet);
-  line.show("choosing nodes");
+  report(setting, {SparsifyProgress::Phase::select});
   const auto begin = Clock::now();
   const std::vector<int> nodes =
       parts.selection->select(original, open_nodes(original), *parts.sparsifier);
   result.select_seconds = since(begin);
-  result.change = take_out(original, nodes, parts, line, setting);
-  line.clear();
-  result.interrupted = setting.guard.interrupted();
+  result.change = take_out(original, nodes, parts, setting);
+  result.interrupted = setting.interrupted();
   result.sparse = original.clone();
   apply(result.change, result.sparse);
   if (result.interrupted) return result;
@@ -123,16 +121,6 @@ SparsifyResult sparsify_whole(const Graph& graph, const SparsifyJob& job,
 // Online ------------------------------------------------------------------------------------------
 
 namespace {
-
-Factor factor_of(const Graph& graph, int f) {
-  Factor factor{
-      .type = graph.type_of_factor(f), .variables = {}, .measurement = {}, .information = {}};
-  for (const std::int32_t v : graph.factor_variables(f)) factor.variables.push_back(graph.id(v));
-  const auto z = graph.measurement(f), information = graph.information(f);
-  factor.measurement.assign(z.begin(), z.end());
-  factor.information.assign(information.begin(), information.end());
-  return factor;
-}
 
 void add(Graph& graph, const Factor& factor) {
   std::vector<int> on;
@@ -147,18 +135,17 @@ class OnlineRun {
         job_(job),
         setting_(setting),
         parts_(job, setting),
-        estimator_(setting.session.registry().make<Estimator>(job.estimator)),
-        line_(setting.session.common.quiet),
+        estimator_(setting.registry.make<Estimator>(job.estimator)),
         redirection_(job.redirect_early > 0 ? Redirection::Nearest::order
                                             : Redirection::Nearest::place) {
-    estimator_->set_loss(setting.setup.loss(), setting.setup.loss_selector());
+    estimator_->set_loss(setting.loss, setting.loss_on);
   }
 
   SparsifyResult run() {
     result_.variables_before = recording_.variable_count();
     result_.factors_before = recording_.factor_count();
     const std::vector<Arrival> arrivals = arrival_order(recording_);
-    auto shown = Clock::now();
+    const int total = static_cast<int>(std::ssize(arrivals));
     int count = 0;
     for (const Arrival& arrival : arrivals) {
       const auto begin = Clock::now();
@@ -166,40 +153,23 @@ class OnlineRun {
       ++count;
       if (count % job_.online == 0) sparsify();
       result_.steps.push_back(since(begin));
-      if (since(shown) > (line_.on_terminal() ? 0.1 : 5.0)) {
-        shown = Clock::now();
-        const double part = static_cast<double>(count) / static_cast<double>(arrivals.size());
-        line_.show(fmt::format("{} pose {} of {}, {} kept", bar(part, 30), count, arrivals.size(),
-                               estimator_->variable_count()));
-      }
-      result_.interrupted = setting_.guard.interrupted();
+      report(setting_, {SparsifyProgress::Phase::feed, count, total, estimator_->variable_count()});
+      result_.interrupted = setting_.interrupted();
       if (result_.interrupted) break;
     }
     if (!result_.interrupted) sparsify();
-    line_.clear();
     finish();
     return std::move(result_);
   }
 
  private:
   void feed(const Arrival& arrival) {
-    GraphUpdate update;
-    for (const int v : arrival.variables) {
-      Variable variable{.type = recording_.type_of(v),
-                        .id = recording_.id(v),
-                        .state = {},
-                        .fixed = recording_.fixed(v)};
-      if (variable.fixed || arrival.factors.empty() || estimator_->variable_count() == 0)
-        variable.state.assign(recording_.state(v).begin(), recording_.state(v).end());
-      update.variables.push_back(std::move(variable));
-    }
-    if (job_.redirect_early > 0) leave_early(arrival);
-    for (const int f : arrival.factors) {
-      const Factor as_came = factor_of(recording_, f);
+    GraphUpdate update = arrival_update(recording_, arrival);
+    if (job_.redirect_early > 0) leave_early(update);
+    for (const Factor& as_came : std::exchange(update.factors, {})) {
       // Odometry holds the newest pose to the one before it, whether that is to leave or not.
       const bool odometry = std::ranges::all_of(as_came.variables, [&](Id id) {
-        return (!arrival.variables.empty() && id == recording_.id(arrival.variables.front())) ||
-               id == newest_;
+        return (!arrival.variables.empty() && id == recording_.id(arrival.pose())) || id == newest_;
       });
       std::optional<Factor> factor = odometry && (newest_ < 0 || estimator_->has(newest_))
                                          ? as_came
@@ -221,6 +191,7 @@ class OnlineRun {
       }
       return newest;
     });
+    leave_states_to_factors(update, *estimator_);
     take(estimator_->update(update), update.factors.size());
     for (const Variable& variable : update.variables) pending_.push_back(variable.id);
     if (!update.variables.empty()) {
@@ -231,11 +202,10 @@ class OnlineRun {
 
   /// Nodes that are to leave, and that this pose has measured again: they are redirected from now
   /// on, although they are still there.
-  void leave_early(const Arrival& arrival) {
+  void leave_early(const GraphUpdate& update) {
     std::vector<Id> leaving;
-    for (const int f : arrival.factors) {
-      for (const std::int32_t v : recording_.factor_variables(f)) {
-        const Id id = recording_.id(v);
+    for (const Factor& factor : update.factors) {
+      for (const Id id : factor.variables) {
         if (id != newest_ && early_.contains(id) && estimator_->has(id) && !redirection_.has(id))
           leaving.push_back(id);
       }
@@ -275,7 +245,7 @@ class OnlineRun {
     const auto begin = Clock::now();
     const std::vector<int> chosen = parts_.selection->select(graph, nodes, *parts_.sparsifier);
     result_.select_seconds += since(begin);
-    const Sparsification change = take_out(graph, chosen, parts_, line_, setting_);
+    const Sparsification change = take_out(graph, chosen, parts_, setting_);
     result_.change.add(change);
     result_.change.removed_variables.insert(result_.change.removed_variables.end(),
                                             change.removed_variables.begin(),
@@ -298,8 +268,8 @@ class OnlineRun {
     if (failed_ > 0)
       result_.notes.push_back(fmt::format("{} updates were not positive definite", failed_));
     if (!job_.measure || result_.interrupted) return;
-    // The same factors with nobody taken out, and all factors as they came: both from where the
-    // sparse graph says that everybody is.
+    // The same factors with no node taken out, and all factors as they arrived: both from the
+    // estimate of the sparse graph.
     Graph redirected, full;
     for (int v = 0; v < recording_.variable_count(); ++v) {
       const Id id = recording_.id(v);
@@ -315,9 +285,8 @@ class OnlineRun {
       }
     }
     for (const Factor& factor : factors_) add(redirected, factor);
-    for (int f = 0; f < recording_.factor_count(); ++f) add(full, factor_of(recording_, f));
-    for (Graph* graph : {&redirected, &full})
-      graph->set_loss(setting_.setup.loss(), setting_.setup.loss_selector());
+    for (int f = 0; f < recording_.factor_count(); ++f) add(full, recording_.factor(f));
+    for (Graph* graph : {&redirected, &full}) graph->set_loss(setting_.loss, setting_.loss_on);
     optimize(redirected, parts_, setting_, "the graph without removals", result_);
     measure(redirected, parts_, result_);
     result_.chi2_before = optimize(full, parts_, setting_, "the whole graph", result_);
@@ -334,7 +303,6 @@ class OnlineRun {
   const SparsifySetting& setting_;
   Parts parts_;
   std::unique_ptr<Estimator> estimator_;
-  StatusLine line_;
   SparsifyResult result_;
   Redirection redirection_;
   std::vector<FactorId> live_;  ///< by position in the estimator's graph, rising
@@ -353,4 +321,4 @@ SparsifyResult sparsify_online(const Graph& recording, const SparsifyJob& job,
   return OnlineRun(recording, job, setting).run();
 }
 
-}  // namespace cairn::app
+}  // namespace cairn

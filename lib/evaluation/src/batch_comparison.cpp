@@ -1,16 +1,23 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "replay_checks.hpp"
+#include "cairn/evaluation/batch_comparison.hpp"
 
 #include <algorithm>
 #include <cmath>
+#include <span>
+#include <utility>
+#include <vector>
 
 #include <fmt/format.h>
 
 #include "cairn/linear/graph_marginals.hpp"
-#include "cairn/plugin/registry.hpp"
+#include "cairn/linear/marginals.hpp"
+#include "cairn/runtime/error.hpp"
 
-namespace cairn::app {
+namespace cairn {
 namespace {
+
+constexpr const char* kOptimizer = "levenberg_marquardt";
+constexpr const char* kLinearSolver = "block_cholesky";
 
 /// ‖a − b‖ / ‖b‖ of two blocks.
 double relative_difference(std::span<const double> a, std::span<const double> b) {
@@ -29,42 +36,31 @@ double BatchCheck::excess() const {
   return best > 0.0 ? chi2 / best - 1.0 : 0.0;
 }
 
-BatchChecker::BatchChecker(const Graph& whole, const ProblemSetup& setup, Registry& registry,
-                           bool covariances)
-    : whole_(whole),
-      setup_(setup),
-      covariances_(covariances),
-      optimizer_(registry.make<Optimizer>(kDefaultOptimizer)),
-      solver_(registry.make<LinearSolver>(kDefaultLinearSolver)),
-      index_(static_cast<std::size_t>(whole.variable_count()), -1) {
-  if (covariances && !query<Marginals>(*solver_)) {
-    throw Error(
-        ErrorCode::usage,
-        fmt::format("--covariance-check: linear solver {} has no marginals", kDefaultLinearSolver));
+BatchChecker::BatchChecker(const Graph& recording, BatchProblem problem, Registry& registry)
+    : recording_(recording),
+      problem_(std::move(problem)),
+      optimizer_(registry.make<Optimizer>(kOptimizer)),
+      solver_(registry.make<LinearSolver>(kLinearSolver)) {
+  if (problem_.covariances && !query<Marginals>(*solver_)) {
+    throw Error(ErrorCode::usage,
+                fmt::format("covariances cannot be compared: linear solver {} has no marginals",
+                            kLinearSolver));
   }
 }
 
 void BatchChecker::add(const Arrival& arrival) {
-  for (const int v : arrival.variables) {
-    index_[v] = so_far_.add_variable(whole_.type_of(v), whole_.id(v), whole_.state(v));
-    if (whole_.fixed(v)) so_far_.set_fixed(index_[v]);
-  }
-  std::vector<int> variables;
-  for (const int f : arrival.factors) {
-    variables.clear();
-    for (const std::int32_t v : whole_.factor_variables(f)) variables.push_back(index_[v]);
-    so_far_.add_factor(whole_.type_of_factor(f), variables, whole_.measurement(f),
-                       whole_.information(f));
-  }
+  apply_update(arrival_update(recording_, arrival), so_far_, ids_);
 }
 
 BatchCheck BatchChecker::check(int step, Estimator& estimator) {
   BatchCheck result{.step = step, .chi2 = estimator.chi2()};
   Graph polished = estimator.graph();
-  polished.set_loss(setup_.loss(), setup_.loss_selector());
-  if (covariances_) result.covariance_difference = covariance_difference(estimator, polished);
+  polished.set_loss(problem_.loss, problem_.loss_on);
+  if (problem_.covariances)
+    result.covariance_difference = covariance_difference(estimator, polished);
   Graph batch = so_far_.clone();
-  setup_.apply(batch);
+  batch.set_loss(problem_.loss, problem_.loss_on);
+  if (problem_.initialise) problem_.initialise(batch);
   result.batch = optimized_chi2(std::move(batch));
   result.polished = optimized_chi2(std::move(polished));
   return result;
@@ -93,4 +89,4 @@ double BatchChecker::covariance_difference(Estimator& estimator, const Graph& gr
   return largest;
 }
 
-}  // namespace cairn::app
+}  // namespace cairn

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "online_session.hpp"
+#include "cairn/online/online_session.hpp"
 
 #include <algorithm>
 #include <utility>
@@ -10,7 +10,7 @@
 #include "cairn/io/format.hpp"
 #include "cairn/runtime/error.hpp"
 
-namespace cairn::app {
+namespace cairn {
 OnlineSession::OnlineSession(Estimator& estimator, StreamFormat& format, Registry& registry,
                              OnlineSettings settings)
     : estimator_(estimator), format_(format), registry_(registry), settings_(std::move(settings)) {}
@@ -23,9 +23,9 @@ OnlineSession::Command OnlineSession::find_command(std::string_view word) {
       {"MARGINALIZE", &OnlineSession::marginalize},
       {"SOLVE", &OnlineSession::solve},
       {"FULL", &OnlineSession::solve_fully},
-      {"COVARIANCE", &OnlineSession::tell_covariance},
-      {"ESTIMATE", &OnlineSession::tell_estimate},
-      {"CHI2", &OnlineSession::tell_chi2},
+      {"COVARIANCE", &OnlineSession::report_covariance},
+      {"ESTIMATE", &OnlineSession::report_estimate},
+      {"CHI2", &OnlineSession::report_chi2},
       {"SAVE", &OnlineSession::save},
       {"QUIT", &OnlineSession::quit},
   };
@@ -120,7 +120,7 @@ void OnlineSession::follow(const GraphUpdate& update, const UpdateReport& report
   const auto forget = [&](Id id) {
     std::erase(known_, id);
     types_.erase(id);
-    told_.erase(id);
+    reported_.erase(id);
   };
   for (const Id id : update.marginalized) forget(id);
   for (const Id id : update.removed_variables) forget(id);
@@ -132,9 +132,9 @@ void OnlineSession::write_results(const UpdateReport& report, Reply& reply) {
   if (settings_.output == "all" || settings_.output == "changed") {
     for (const Id id : known_) {
       const std::span<const double> x = estimator_.state(id);
-      std::vector<double>& told = told_[id];
-      if (settings_.output == "changed" && std::ranges::equal(told, x)) continue;
-      told.assign(x.begin(), x.end());
+      std::vector<double>& reported = reported_[id];
+      if (settings_.output == "changed" && std::ranges::equal(reported, x)) continue;
+      reported.assign(x.begin(), x.end());
       write_estimate(id, reply.text);
     }
   }
@@ -221,7 +221,7 @@ void OnlineSession::solve_fully(const Words& words, Reply& reply) {
   update({}, true, true, reply);
 }
 
-void OnlineSession::tell_covariance(const Words& words, Reply& reply) {
+void OnlineSession::report_covariance(const Words& words, Reply& reply) {
   expect_words(words, 3, "COVARIANCE id id");
   if (!write_covariance(parse_whole(words[1], "id"), parse_whole(words[2], "id"), reply.text)) {
     throw Error(ErrorCode::numerical,
@@ -230,7 +230,7 @@ void OnlineSession::tell_covariance(const Words& words, Reply& reply) {
   acknowledge(reply, owed_);
 }
 
-void OnlineSession::tell_estimate(const Words& words, Reply& reply) {
+void OnlineSession::report_estimate(const Words& words, Reply& reply) {
   expect_words(words, 2, "ESTIMATE id' or 'ESTIMATE ALL");
   if (words[1] == "ALL") {
     for (const Id id : known_) write_estimate(id, reply.text);
@@ -240,7 +240,7 @@ void OnlineSession::tell_estimate(const Words& words, Reply& reply) {
   acknowledge(reply, owed_);
 }
 
-void OnlineSession::tell_chi2(const Words& words, Reply& reply) {
+void OnlineSession::report_chi2(const Words& words, Reply& reply) {
   expect_words(words, 1, "CHI2");
   reply.text += fmt::format("CHI2 {}\n", estimator_.chi2());
   acknowledge(reply, owed_);
@@ -278,4 +278,4 @@ bool OnlineSession::write_covariance(Id a, Id b, std::string& text) {
   return !line.empty();
 }
 
-}  // namespace cairn::app
+}  // namespace cairn

@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "line_session.hpp"
+#include "cairn/online/line_session.hpp"
 
 #include <algorithm>
 #include <charconv>
+#include <optional>
 #include <utility>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-namespace cairn::app {
+namespace cairn {
 namespace {
 
 std::vector<std::string_view> split(std::string_view line) {
@@ -23,23 +24,25 @@ std::vector<std::string_view> split(std::string_view line) {
 }
 
 /// "ERROR line N: …" on one line. The format's messages begin with the place themselves.
-std::string error_line(std::int64_t number, std::string message) {
-  const std::string place = fmt::format("{}:{}: ", kStreamName, number);
+std::string error_line(std::int64_t number, std::string message, std::string_view stream) {
+  const std::string place = fmt::format("{}:{}: ", stream, number);
   if (message.starts_with(place)) message.erase(0, place.size());
   std::ranges::replace(message, '\n', ' ');
   return fmt::format("ERROR line {}: {}\n", number, message);
 }
 
 template <class Number>
-Number parse(std::string_view word, std::string_view what) {
+std::optional<Number> number_of(std::string_view word) {
   Number number{};
   const auto [end, problem] = std::from_chars(word.data(), word.data() + word.size(), number);
-  if (problem != std::errc{} || end != word.data() + word.size())
-    throw bad_line(fmt::format("'{}' is no {}", word, what));
+  if (problem != std::errc{} || end != word.data() + word.size()) return std::nullopt;
   return number;
 }
 
 }  // namespace
+
+LineSession::~LineSession() = default;
+void LineSession::finish() {}
 
 LineSession::Reply LineSession::take(std::string_view line, std::int64_t number) {
   line_ = number;
@@ -49,7 +52,7 @@ LineSession::Reply LineSession::take(std::string_view line, std::int64_t number)
   try {
     perform(line, words, reply);
   } catch (const Error& error) {
-    reply.text = error_line(number, error.what());
+    reply.text = error_line(number, error.what(), kStreamName);
     reply.refused = true;
   }
   return reply;
@@ -71,32 +74,35 @@ void LineSession::acknowledge(Reply& reply, int owed, std::string_view word) con
                             variable_count(), factor_count(), owed);
 }
 
-Error bad_line(const std::string& message) { return {ErrorCode::input, message}; }
+Error LineSession::bad_line(const std::string& message) { return {ErrorCode::input, message}; }
 
-std::int64_t parse_whole(std::string_view word, std::string_view what) {
-  return parse<std::int64_t>(word, what);
+std::int64_t LineSession::parse_whole(std::string_view word, std::string_view what) {
+  const std::optional<std::int64_t> number = number_of<std::int64_t>(word);
+  if (!number) throw bad_line(fmt::format("'{}' is no {}", word, what));
+  return *number;
 }
 
-double parse_real(std::string_view word, std::string_view what) {
-  return parse<double>(word, what);
+double LineSession::parse_real(std::string_view word, std::string_view what) {
+  const std::optional<double> number = number_of<double>(word);
+  if (!number) throw bad_line(fmt::format("'{}' is no {}", word, what));
+  return *number;
 }
 
-std::vector<std::int64_t> parse_ids(std::span<const std::string_view> words,
-                                    std::string_view what) {
+std::vector<std::int64_t> LineSession::parse_ids(std::span<const std::string_view> words,
+                                                 std::string_view what) {
   if (words.empty()) throw bad_line(fmt::format("expected one {} or more", what));
   std::vector<std::int64_t> ids;
   for (const std::string_view word : words) ids.push_back(parse_whole(word, what));
   return ids;
 }
 
-void expect_words(const std::vector<std::string_view>& words, std::size_t count,
-                  std::string_view form) {
+void LineSession::expect_words(const Words& words, std::size_t count, std::string_view form) {
   if (words.size() == count) return;
   throw bad_line(
       fmt::format("{} with {} words after it; expected '{}'", words[0], words.size() - 1, form));
 }
 
-Variable declared_variable(const std::vector<std::string_view>& words, Registry& registry) {
+Variable LineSession::declared_variable(const Words& words, Registry& registry) {
   expect_words(words, 3, "NEW TAG id");
   if (!registry.has("variable", words[1])) {
     throw bad_line(fmt::format("there is no type of variable '{}'; on offer: {}", words[1],
@@ -107,12 +113,13 @@ Variable declared_variable(const std::vector<std::string_view>& words, Registry&
   return {registry.variable_type(words[1]), id, {}, false};
 }
 
-std::string estimate_line(const VariableType& type, Id id, std::span<const double> state) {
+std::string LineSession::estimate_line(const VariableType& type, Id id,
+                                       std::span<const double> state) {
   return fmt::format("{} {} {}\n", type.tag(), id, fmt::join(state, " "));
 }
 
-std::string covariance_line(Estimator& estimator, Id a, const VariableType& type_a, Id b,
-                            const VariableType& type_b) {
+std::string LineSession::covariance_line(Estimator& estimator, Id a, const VariableType& type_a,
+                                         Id b, const VariableType& type_b) {
   const auto rows = static_cast<std::size_t>(type_a.tangent_size()),
              columns = static_cast<std::size_t>(type_b.tangent_size());
   std::vector<double> block(rows * columns);
@@ -125,4 +132,4 @@ std::string covariance_line(Estimator& estimator, Id a, const VariableType& type
   return text + '\n';
 }
 
-}  // namespace cairn::app
+}  // namespace cairn

@@ -11,11 +11,12 @@
 
 #include "cairn/geometry/motion.hpp"
 #include "cairn/io/stream_format.hpp"
+#include "cairn/online/line_session.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/policy/pose_policy.hpp"
-#include "line_session.hpp"
+#include "cairn/runtime/api.hpp"
 
-namespace cairn::app {
+namespace cairn {
 
 struct PolicySettings {
   ReadOptions read;
@@ -32,8 +33,16 @@ struct PolicySettings {
 ///
 /// A policy may defer odometry until its estimator is read, which changes the last bits. So a query
 /// that reads the estimator goes to the journal.
-class PolicySession final : public LineSession {
+class CAIRN_API PolicySession final : public LineSession {
  public:
+  struct Counts {
+    std::int64_t poses = 0;       ///< that came
+    std::int64_t proposed = 0;    ///< pairs to be matched
+    std::int64_t registered = 0;  ///< pairs that were measured
+    std::int64_t linked = 0;      ///< links that are in the graph
+  };
+
+  /// What is referred to must outlive the session.
   PolicySession(PosePolicy& policy, StreamFormat& format, Registry& registry,
                 PolicySettings settings);
 
@@ -41,10 +50,10 @@ class PolicySession final : public LineSession {
   Estimator& estimator() override { return policy_.estimator(); }
   std::int64_t variable_count() const override;
   std::int64_t factor_count() const override;
-  void add_to(boost::json::object& report) const override;
+  const Counts& counts() const { return counts_; }
 
  private:
-  struct Arrival {
+  struct ArrivingPose {
     Variable pose;
     std::vector<Factor> odometry;
   };
@@ -64,9 +73,9 @@ class PolicySession final : public LineSession {
   void note_unmatched(const Words& words, Reply& reply);
   void finish_pose(const Words& words, Reply& reply);
   void take_back(const Words& words, Reply& reply);
-  void tell_covariance(const Words& words, Reply& reply);
-  void tell_estimate(const Words& words, Reply& reply);
-  void tell_chi2(const Words& words, Reply& reply);
+  void report_covariance(const Words& words, Reply& reply);
+  void report_estimate(const Words& words, Reply& reply);
+  void report_chi2(const Words& words, Reply& reply);
   void save(const Words& words, Reply& reply);
   void quit(const Words& words, Reply& reply);
   void refuse(const Words& words, Reply& reply);
@@ -105,17 +114,17 @@ class PolicySession final : public LineSession {
   PolicySettings settings_;
   std::optional<MotionGroup> motions_;  ///< of the poses' type, from the first pose on
 
-  std::optional<Arrival> arriving_;
+  std::optional<ArrivingPose> arriving_;
   std::optional<Id> first_, newest_, before_;  ///< that the policy has
   bool open_ = false, finished_ = false;
   std::optional<Measured> measured_;
   std::string asked_;                     ///< MATCH …, while nothing came in answer
   std::unordered_map<Id, bool> arrived_;  ///< and whether it was kept
-  std::vector<LinkReport> told_;          ///< links of the open pose
-  std::string told_text_;                 ///< what the next answer begins with
+  std::vector<LinkReport> reported_;      ///< links of the open pose
+  std::string answer_;                    ///< what the next answer begins with
 
-  std::unordered_map<Id, std::string> told_states_;  ///< for `changed`
-  std::int64_t poses_ = 0, proposed_ = 0, registered_ = 0, linked_ = 0;
+  std::unordered_map<Id, std::string> reported_states_;  ///< for `changed`
+  Counts counts_;
 };
 
-}  // namespace cairn::app
+}  // namespace cairn

@@ -11,11 +11,12 @@
 #include <vector>
 
 #include "cairn/io/stream_format.hpp"
+#include "cairn/online/line_session.hpp"
 #include "cairn/plugin/registry.hpp"
+#include "cairn/runtime/api.hpp"
 #include "cairn/solve/estimator.hpp"
-#include "line_session.hpp"
 
-namespace cairn::app {
+namespace cairn {
 
 struct OnlineSettings {
   ReadOptions read;
@@ -25,9 +26,10 @@ struct OnlineSettings {
   double budget = 0.0;             ///< [s] of an update; 0: no limit
 };
 
-/// Everything that arrives is taken into the graph.
-class OnlineSession final : public LineSession {
+/// Everything that arrives is taken into the graph of an estimator.
+class CAIRN_API OnlineSession final : public LineSession {
  public:
+  /// What is referred to must outlive the session.
   OnlineSession(Estimator& estimator, StreamFormat& format, Registry& registry,
                 OnlineSettings settings);
 
@@ -47,9 +49,9 @@ class OnlineSession final : public LineSession {
   void marginalize(const Words& words, Reply& reply);
   void solve(const Words& words, Reply& reply);
   void solve_fully(const Words& words, Reply& reply);
-  void tell_covariance(const Words& words, Reply& reply);
-  void tell_estimate(const Words& words, Reply& reply);
-  void tell_chi2(const Words& words, Reply& reply);
+  void report_covariance(const Words& words, Reply& reply);
+  void report_estimate(const Words& words, Reply& reply);
+  void report_chi2(const Words& words, Reply& reply);
   void save(const Words& words, Reply& reply);
   void quit(const Words& words, Reply& reply);
 
@@ -77,7 +79,7 @@ class OnlineSession final : public LineSession {
   std::vector<Id> known_;  ///< those that the estimator has, in the order of arrival
   std::unordered_map<Id, std::shared_ptr<const VariableType>> types_;
   std::vector<std::shared_ptr<const FactorType>> factor_types_;  ///< by id; null: of no line
-  std::unordered_map<Id, std::vector<double>> told_;             ///< estimates, for `changed`
+  std::unordered_map<Id, std::vector<double>> reported_;         ///< estimates, for `changed`
 };
 
-}  // namespace cairn::app
+}  // namespace cairn

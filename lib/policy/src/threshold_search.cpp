@@ -1,26 +1,25 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "compact_thresholds.hpp"
+#include "cairn/policy/threshold_search.hpp"
 
 #include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include <fmt/format.h>
-#include <boost/json/parse.hpp>
 
+#include "cairn/evaluation/normalized_error.hpp"
 #include "cairn/runtime/error.hpp"
-#include "json_text.hpp"
 
-namespace cairn::app {
+namespace cairn {
 namespace {
 
-namespace json = boost::json;
 using Clock = std::chrono::steady_clock;
 
 /// So many poses, spread evenly, stand for all in `expected_ate`.
 constexpr int kSpread = 40;
-/// Tries in one direction.
+/// Trials in one direction.
 constexpr int kMostTrials = 10;
 const double kStep = std::sqrt(2.0);
 
@@ -62,19 +61,19 @@ double expected_error(PosePolicy& policy, const std::vector<Id>& poses) {
   return expected_ate(estimator, estimator.graph(), poses);
 }
 
-/// What all tries share.
+/// What all trials share.
 struct Sample {
-  const CompactJob& job;
-  const CompactSetting& setting;
+  const PolicyJob& job;
+  const PolicySetting& setting;
   std::size_t count;
   Everything everything;
 };
 
 ThresholdTrial try_thresholds(const Sample& sample, const OptionValues& options, double links,
                               double poses) {
-  CompactJob trial = sample.job;
+  PolicyJob trial = sample.job;
   for (const auto& [name, value] : options) trial.policy.values.emplace(name, value);
-  CompactRun run(trial, sample.setting);
+  PolicyRun run(trial, sample.setting);
   run.run(sample.count, fmt::format("sample, gains × {:.2g} {:.2g}", links, poses));
   ThresholdTrial result{.links = links, .poses = poses};
   const Graph compact = run.policy().estimator().graph();
@@ -88,21 +87,33 @@ ThresholdTrial try_thresholds(const Sample& sample, const OptionValues& options,
   return result;
 }
 
-/// The tries, and the best of them.
-void refine(const Sample& sample, const OptionFinder& finder, FoundThresholds& found) {
+OptionFinder& finder_of(PosePolicy& policy, const PolicyJob& job) {
+  auto* finder = query<OptionFinder>(policy);
+  if (!finder) {
+    throw Error(ErrorCode::usage, fmt::format("policy '{}' does not find its options by itself: "
+                                              "give them as {}:key=value",
+                                              job.policy.name, job.policy.name));
+  }
+  return *finder;
+}
+
+}  // namespace
+
+void refine_thresholds(const OptionFinder& finder, const ThresholdTest& test,
+                       FoundThresholds& found, const std::function<bool()>& interrupted) {
   const OptionValues first = found.options;
   double least = std::numeric_limits<double>::infinity();
   bool good = false;
   const auto attempt = [&](double links, double poses) {
     const OptionValues options = finder.scaled(first, links, poses);
-    found.trials.push_back(try_thresholds(sample, options, links, poses));
+    found.trials.push_back(test(options, links, poses));
     const ThresholdTrial& trial = found.trials.back();
     good = trial.error() <= found.tolerance;
     if (good || trial.error() < least) {  // if none is good, the one with the least error
       found.options = options;
       least = trial.error();
     }
-    return !sample.setting.guard.interrupted();
+    return !interrupted || !interrupted();
   };
   if (!attempt(1.0, 1.0) || good) return;
   double factor = 1.0;
@@ -119,26 +130,14 @@ void refine(const Sample& sample, const OptionFinder& finder, FoundThresholds& f
   }
 }
 
-OptionFinder& finder_of(PosePolicy& policy, const CompactJob& job) {
-  auto* finder = query<OptionFinder>(policy);
-  if (!finder) {
-    throw Error(ErrorCode::usage, fmt::format("policy '{}' does not find its options by itself: "
-                                              "give them as {}:key=value",
-                                              job.policy.name, job.policy.name));
-  }
-  return *finder;
-}
-
-}  // namespace
-
-FoundThresholds find_thresholds(const CompactJob& job, std::size_t count, double error_ratio,
-                                const CompactSetting& setting) {
+FoundThresholds find_thresholds(const PolicyJob& job, std::size_t count, double error_ratio,
+                                const PolicySetting& setting) {
   const auto begin = Clock::now();
-  CompactJob watching = job;
-  const auto chosen = setting.session.registry().make<PosePolicy>(job.policy);
+  PolicyJob watching = job;
+  const auto chosen = setting.registry.make<PosePolicy>(job.policy);
   for (const auto& [name, value] : finder_of(*chosen, job).watching())
     watching.policy.values.insert_or_assign(name, value);
-  CompactRun watch(watching, setting);
+  PolicyRun watch(watching, setting);
   watch.run(count, "sample");
   const OptionFinder& finder = finder_of(watch.policy(), job);
 
@@ -152,40 +151,13 @@ FoundThresholds find_thresholds(const CompactJob& job, std::size_t count, double
     sample.everything.expected = expected_error(watch.policy(), sample.everything.poses);
     found.expected_ate = sample.everything.expected;
     found.tolerance = std::max(error_ratio * found.expected_ate, finder.accuracy());
-    refine(sample, finder, found);
+    const auto test = [&](const OptionValues& options, double links, double poses) {
+      return try_thresholds(sample, options, links, poses);
+    };
+    refine_thresholds(finder, test, found, [&] { return setting.interrupted(); });
   }
   found.seconds = std::chrono::duration<double>(Clock::now() - begin).count();
   return found;
 }
 
-OptionValues read_thresholds(const std::string& file, const std::string& policy) {
-  const std::string text = read_file(file);
-  try {
-    const json::value value = json::parse(text);
-    const json::object& all = value.as_object();
-    if (const auto& name = all.at("policy").as_string(); name != policy) {
-      throw Error(ErrorCode::input, fmt::format("{}: thresholds of policy '{}', not of '{}'", file,
-                                                std::string_view(name), policy));
-    }
-    OptionValues values;
-    for (const auto& [name, option] : all.at("options").as_object())
-      values[name] = std::string(option.as_string());
-    return values;
-  } catch (const Error&) {
-    throw;
-  } catch (const std::exception&) {
-    throw Error(ErrorCode::input,
-                fmt::format("{}: no thresholds; expected what --save-thresholds writes, "
-                            "{{\"policy\": \"{}\", \"options\": {{\"range\": \"2.5\", …}}}}",
-                            file, policy));
-  }
-}
-
-void write_thresholds(const std::string& file, const std::string& policy,
-                      const OptionValues& options) {
-  json::object all;
-  for (const auto& [name, value] : options) all[name] = value;
-  write_file(file, json_text(json::object{{"policy", policy}, {"options", std::move(all)}}) + "\n");
-}
-
-}  // namespace cairn::app
+}  // namespace cairn

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "cairn/online/journal.hpp"
+#include "cairn/online/line_session.hpp"
+#include "cairn/runtime/api.hpp"
+
+namespace cairn {
+
+/// A session with a journal beside it: what has been acknowledged is not lost.
+///
+///     conversation.restore();
+///     while (read a line) {
+///       const LineSession::Reply reply = conversation.take(line);
+///       write reply.text; end if reply.quit;
+///     }
+///     conversation.finish();
+class CAIRN_API Conversation {
+ public:
+  struct Counts {
+    std::int64_t lines = 0;  ///< read, without those restored
+    std::int64_t taken = 0, refused = 0, solves = 0, restored = 0;
+    double solve_seconds = 0.0, longest = 0.0;  ///< [s] of all solves, and of the longest
+  };
+
+  /// `journal` may be null. Both outlive this object.
+  explicit Conversation(LineSession& session, Journal* journal = nullptr)
+      : session_(session), journal_(journal) {}
+
+  /// Takes in again what the journal has; numbers of lines go on from there. Returns the answer:
+  /// "RESTORED …". Throws `Error` where a line is refused now.
+  std::string restore();
+  /// Takes the next line, without its end. What changes anything is in the journal, and committed,
+  /// before the reply is handed out.
+  LineSession::Reply take(const std::string& line);
+  /// No line follows: commits the journal and ends the session.
+  void finish();
+
+  const Counts& counts() const { return counts_; }
+
+ private:
+  LineSession& session_;
+  Journal* journal_;
+  std::int64_t number_ = 0;
+  Counts counts_;
+};
+
+}  // namespace cairn

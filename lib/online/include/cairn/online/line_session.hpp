@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "cairn/plugin/registry.hpp"
+#include "cairn/runtime/api.hpp"
+#include "cairn/runtime/error.hpp"
+#include "cairn/solve/estimator.hpp"
+
+namespace cairn {
+
+/// The protocol of docs/online.md, whatever carries its lines: text in, text out. A line is taken
+/// in whole or not at all. Only SAVE touches a file.
+class CAIRN_API LineSession {
+ public:
+  /// What a line came to.
+  struct Reply {
+    std::string text;      ///< lines to be written; empty: nothing
+    bool changes = false;  ///< belongs in a journal, before `text` is written
+    bool refused = false;  ///< the text says why
+    bool solved = false;
+    double seconds = 0.0;  ///< that solving took
+    bool quit = false;
+  };
+
+  virtual ~LineSession();
+
+  /// Takes line `number` of the input. One that cannot be taken is answered by "ERROR line N: …".
+  Reply take(std::string_view line, std::int64_t number);
+  /// The same without an answer: lines that were taken before, from a journal. Throws `Error` where
+  /// one is refused.
+  void restore(std::string_view line, std::int64_t number);
+  /// No line follows. Not for a journal: a restored session goes on from before this.
+  virtual void finish();
+
+  /// The graph and its estimate. Only to be read.
+  virtual Estimator& estimator() = 0;
+  virtual std::int64_t variable_count() const = 0;
+  virtual std::int64_t factor_count() const = 0;
+
+ protected:
+  using Words = std::vector<std::string_view>;
+  /// What the format's messages call the stream.
+  static constexpr const char* kStreamName = "input";
+
+  /// Does what a line with these words asks for; never called without any. Throws `Error` where it
+  /// cannot. Nothing has changed then, or `reply.changes` says so.
+  virtual void perform(std::string_view line, const Words& words, Reply& reply) = 0;
+
+  std::int64_t line() const { return line_; }
+  /// Restoring: answers are not read.
+  bool silent() const { return silent_; }
+  /// The line that ends an answer.
+  void acknowledge(Reply& reply, int owed = 0, std::string_view word = "OK") const;
+
+  // Words of a line; `what` names what was expected, for messages.
+  static Error bad_line(const std::string& message);
+  static std::int64_t parse_whole(std::string_view word, std::string_view what);
+  static double parse_real(std::string_view word, std::string_view what);
+  static std::vector<std::int64_t> parse_ids(std::span<const std::string_view> words,
+                                             std::string_view what);
+  /// Refuses a command with more or fewer words than its form.
+  static void expect_words(const Words& words, std::size_t count, std::string_view form);
+  /// What "NEW TAG id" declares.
+  static Variable declared_variable(const Words& words, Registry& registry);
+
+  // Lines of answers.
+  /// "VERTEX_SE2 7 x y theta"
+  static std::string estimate_line(const VariableType& type, Id id, std::span<const double> state);
+  /// "COVARIANCE a b rows columns" and the numbers row by row; empty if there is none.
+  static std::string covariance_line(Estimator& estimator, Id a, const VariableType& type_a, Id b,
+                                     const VariableType& type_b);
+
+ private:
+  std::int64_t line_ = 0;
+  bool silent_ = false;
+};
+
+}  // namespace cairn

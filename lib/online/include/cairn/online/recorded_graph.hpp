@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <vector>
+
+#include "cairn/graph/graph.hpp"
+#include "cairn/graph/update.hpp"
+#include "cairn/runtime/api.hpp"
+#include "cairn/solve/estimator.hpp"
+
+namespace cairn {
+
+/// One step of a recording: a pose, what it sees for the first time, and the measurements that
+/// became possible with it.
+struct Arrival {
+  std::vector<int> variables;  ///< by index in the graph: the pose first
+  /// Factors between this pose and the one before, either way round; by position in the graph.
+  std::vector<int> odometry;
+  std::vector<int> links;  ///< all other factors, by position: loop closures, landmarks, priors
+
+  int pose() const { return variables.front(); }
+};
+
+/// The order in which a graph that was recorded came about. A step is a pose, in the order of ids,
+/// with everything else of which it is the latest: the factors whose other variables are there, and
+/// the landmarks that no earlier pose has seen. Every variable and every factor is in one step. A
+/// pose is what has an orientation, or no place in space; variables that no pose ever meets come
+/// with the last step (a graph without poses is one step).
+CAIRN_API std::vector<Arrival> arrival_order(const Graph& graph);
+
+/// Whether a graph lists its poses and factors in the order in which they arrived.
+CAIRN_API bool in_arrival_order(const std::vector<Arrival>& arrivals);
+
+/// The same for a pose graph with unbroken odometry; none for an empty graph. Throws `Error`
+/// (input), with what would work, for anything else: a variable that is no pose of a Lie group, or
+/// of another type than the first; a factor that is not relative; a pose without a factor to the
+/// one before.
+CAIRN_API std::vector<Arrival> pose_chain(const Graph& graph);
+
+/// What a step brings to an estimator: its variables with their recorded states, then its odometry
+/// and its other factors, so that a pose without a state is initialised from its odometry.
+CAIRN_API GraphUpdate arrival_update(const Graph& graph, const Arrival& arrival);
+
+/// Leaves the initial states to the estimator: empties those of new variables that are not fixed
+/// and that a factor of the update can compute from the current estimate. Returns how many others
+/// keep theirs.
+CAIRN_API int leave_states_to_factors(GraphUpdate& update, const Estimator& estimator);
+
+}  // namespace cairn

@@ -1,0 +1,187 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "cairn/online/recorded_graph.hpp"
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <string>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "cairn/geometry/pose_chain.hpp"
+#include "cairn/runtime/error.hpp"
+#include "cairn/update/graph_update.hpp"
+
+namespace cairn {
+namespace {
+
+constexpr int kNever = std::numeric_limits<int>::max();
+
+bool is_pose(const Graph& graph, int variable) {
+  const Placement* placement = graph.type(variable).placement();
+  return !placement || placement->has_orientation();
+}
+
+/// The step of each pose; kNever for all else.
+std::vector<int> steps_of_poses(const Graph& graph, int& steps) {
+  std::vector<int> poses;
+  for (int v = 0; v < graph.variable_count(); ++v) {
+    if (is_pose(graph, v)) poses.push_back(v);
+  }
+  std::ranges::stable_sort(poses, {}, [&](int v) { return graph.id(v); });
+  std::vector<int> step(static_cast<std::size_t>(graph.variable_count()), kNever);
+  for (std::size_t k = 0; k < poses.size(); ++k) step[poses[k]] = static_cast<int>(k);
+  steps = std::max(1, static_cast<int>(poses.size()));
+  return step;
+}
+
+/// A landmark comes with the first factor that it shares with nothing that comes later. Landmarks
+/// that only other landmarks meet follow these; so this is repeated while anything changes.
+void settle_landmarks(const Graph& graph, std::vector<int>& step) {
+  const std::vector<int> poses = step;
+  for (bool changed = true; changed;) {
+    changed = false;
+    for (int f = 0; f < graph.factor_count(); ++f) {
+      const auto on = graph.factor_variables(f);
+      for (const std::int32_t v : on) {
+        if (poses[v] != kNever || on.size() < 2) continue;
+        int latest = 0;
+        for (const std::int32_t other : on) {
+          if (other != v) latest = std::max(latest, step[other]);
+        }
+        if (latest < step[v]) {
+          step[v] = latest;
+          changed = true;
+        }
+      }
+    }
+  }
+}
+
+/// Whether a factor is on these two variables, either way round, and on nothing else.
+bool joins(const Graph& graph, int factor, int a, int b) {
+  const auto on = graph.factor_variables(factor);
+  return on.size() == 2 && ((on[0] == a && on[1] == b) || (on[0] == b && on[1] == a));
+}
+
+}  // namespace
+
+std::vector<Arrival> arrival_order(const Graph& graph) {
+  int steps = 0;
+  std::vector<int> step = steps_of_poses(graph, steps);
+  settle_landmarks(graph, step);
+  std::vector<Arrival> arrivals(static_cast<std::size_t>(steps));
+  for (int pass = 0; pass < 2; ++pass) {  // poses, then what they see
+    for (int v = 0; v < graph.variable_count(); ++v) {
+      if (is_pose(graph, v) == (pass == 0))
+        arrivals[std::min(step[v], steps - 1)].variables.push_back(v);
+    }
+  }
+  for (int f = 0; f < graph.factor_count(); ++f) {
+    int latest = 0;
+    for (const std::int32_t v : graph.factor_variables(f))
+      latest = std::max(latest, std::min(step[v], steps - 1));
+    const bool odometry =
+        latest > 0 && joins(graph, f, arrivals[latest].pose(), arrivals[latest - 1].pose());
+    (odometry ? arrivals[latest].odometry : arrivals[latest].links).push_back(f);
+  }
+  return arrivals;
+}
+
+bool in_arrival_order(const std::vector<Arrival>& arrivals) {
+  int last_pose = -1, last_factor = -1;
+  for (const Arrival& arrival : arrivals) {
+    if (!arrival.variables.empty()) {
+      if (arrival.pose() < last_pose) return false;
+      last_pose = arrival.pose();
+    }
+    int latest = last_factor;
+    for (const auto* factors : {&arrival.odometry, &arrival.links}) {  // each rises
+      if (factors->empty()) continue;
+      if (factors->front() < last_factor) return false;
+      latest = std::max(latest, factors->back());
+    }
+    last_factor = latest;
+  }
+  return true;
+}
+
+// Pose graphs -------------------------------------------------------------------------------------
+
+namespace {
+
+Error bad_input(const std::string& message) { return {ErrorCode::input, message}; }
+
+/// Whether all variables are poses of one type.
+void check_poses(const Graph& graph) {
+  for (int v = 0; v < graph.variable_count(); ++v) {
+    const VariableType& type = graph.type(v);
+    if (!type.lie_group() || !type.placement() || !type.placement()->has_orientation()) {
+      throw bad_input(
+          fmt::format("{} is no pose of a Lie group, and this takes pose graphs only: a robot's "
+                      "poses and the motions between them, without landmarks",
+                      graph.describe_variable(v)));
+    }
+    if (graph.pool(v) != graph.pool(0)) {
+      throw bad_input(fmt::format("{} and {} are poses of different types; a robot's way takes one",
+                                  graph.describe_variable(0), graph.describe_variable(v)));
+    }
+  }
+}
+
+void check_relative(const Graph& graph) {
+  for (int f = 0; f < graph.factor_count(); ++f) {
+    if (graph.factor_type(f).is_relative()) continue;
+    throw bad_input(
+        fmt::format("{} is not the motion from one pose to another, and this takes pose graphs "
+                    "only: leave it out, and mark poses that are known as FIX",
+                    graph.describe_factor(f)));
+  }
+}
+
+}  // namespace
+
+std::vector<Arrival> pose_chain(const Graph& graph) {
+  check_poses(graph);
+  check_relative(graph);
+  if (graph.variable_count() == 0) return {};
+  std::vector<Arrival> chain = arrival_order(graph);
+  for (std::size_t k = 1; k < chain.size(); ++k) {
+    if (!chain[k].odometry.empty()) continue;
+    throw bad_input(fmt::format(
+        "no factor joins {} to {}, the pose before it by id: odometry must be unbroken and ids "
+        "rise along the robot's way",
+        graph.describe_variable(chain[k].pose()), graph.describe_variable(chain[k - 1].pose())));
+  }
+  return chain;
+}
+
+// Updates -----------------------------------------------------------------------------------------
+
+GraphUpdate arrival_update(const Graph& graph, const Arrival& arrival) {
+  GraphUpdate update;
+  for (const int v : arrival.variables) update.variables.push_back(graph.variable(v));
+  for (const auto* factors : {&arrival.odometry, &arrival.links}) {
+    for (const int f : *factors) update.factors.push_back(graph.factor(f));
+  }
+  return update;
+}
+
+int leave_states_to_factors(GraphUpdate& update, const Estimator& estimator) {
+  std::vector<std::vector<double>> recorded;
+  for (Variable& variable : update.variables) {
+    recorded.push_back(variable.state);
+    if (!variable.fixed) variable.state.clear();
+  }
+  GraphUpdate trial = update;
+  const std::vector<int> unplaced = place_variables(trial, [&](Id id) {
+    return estimator.has(id) ? estimator.state(id) : std::span<const double>();
+  });
+  for (const int k : unplaced) update.variables[k].state = std::move(recorded[k]);
+  return static_cast<int>(std::ssize(unplaced));
+}
+
+}  // namespace cairn

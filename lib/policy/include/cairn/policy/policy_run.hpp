@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "cairn/evaluation/normalized_error.hpp"
+#include "cairn/evaluation/trajectory.hpp"
+#include "cairn/plugin/registry.hpp"
+#include "cairn/policy/pose_policy.hpp"
+#include "cairn/runtime/api.hpp"
+
+namespace cairn {
+
+/// What policies are run on: a recorded pose graph and, if it is known, the truth.
+struct PolicyData {
+  Graph recording;
+  std::optional<Graph> truth_graph;  ///< true states of the same variables, of the same types
+  std::optional<Trajectory> truth;   ///< true poses, perhaps of other types
+  std::vector<Arrival> poses;
+  std::int64_t loops = 0;  ///< factors besides odometry
+};
+
+/// Throws `Error` (input) as `pose_chain` does. A `truth` that lacks a pose of the recording, or
+/// has it with another type, gives errors of the trajectory only.
+CAIRN_API PolicyData policy_data(Graph recording, std::optional<Graph> truth = {});
+
+/// A policy and a registration by name, with options.
+struct PolicyJob {
+  ComponentSpec policy;
+  std::string registration = "recorded";
+};
+
+/// How one policy fared.
+struct PolicyResult {
+  std::string policy;  ///< with its options
+  std::vector<PoseReport> poses;
+  Graph compact;  ///< the estimate of what was kept
+  Graph way;      ///< the whole trajectory: what was left out is put back
+  /// By the name of the recovery ("v0", …); empty without the truth.
+  std::map<std::string, TrajectoryError> errors;
+  std::optional<NormalizedError> normalized;
+  double chi2 = 0.0;
+  std::int64_t proposed = 0, registered = 0, kept_loops = 0;
+  std::int64_t false_registered = 0, false_kept = 0;  ///< as far as the registration knows
+  std::map<std::string, std::int64_t> verdicts;
+  PolicySeconds seconds;
+  double registration_seconds = 0.0;
+  std::int64_t information_nonzeros = 0, factor_nonzeros = 0;
+  bool interrupted = false;
+};
+
+/// What all runs over the same data share. Everything referred to must outlive the runs.
+struct PolicySetting {
+  const PolicyData& data;
+  Registry& registry;
+  std::shared_ptr<const Loss> loss = nullptr;  ///< shared: graphs and their clones use one loss
+  FactorSelector loss_on;
+  const std::atomic<bool>* interrupt = nullptr;  ///< a run ends early once it is true
+  /// Called after each pose, with the run's title, how many poses it has, and its counts so far.
+  std::function<void(std::string_view title, std::size_t poses, const PolicyResult& counts)>
+      progress = {};
+
+  bool interrupted() const { return interrupt && interrupt->load(); }
+};
+
+/// A policy over the first poses of a recording, counted and timed.
+class CAIRN_API PolicyRun {
+ public:
+  /// `setting` must outlive the run. Throws `Error` for a name or an option that there is not, or
+  /// where the registration needs a truth that is not known.
+  PolicyRun(const PolicyJob& job, const PolicySetting& setting);
+
+  /// Runs over `count` poses; once. `title` goes to the progress; `after` is called with the number
+  /// of each pose after the policy has ended it.
+  void run(std::size_t count, std::string_view title,
+           const std::function<void(std::size_t)>& after = {});
+
+  PosePolicy& policy() { return *policy_; }
+  /// Counts and times so far, without graphs and errors.
+  const PolicyResult& counts() const { return result_; }
+  /// Everything, with the left-out poses put back by `recovery`; once.
+  PolicyResult finish(Recovery recovery);
+
+ private:
+  const PolicySetting& setting_;
+  std::unique_ptr<PosePolicy> policy_;
+  std::unique_ptr<Registration> registration_;
+  PolicyResult result_;
+};
+
+/// Short names of the ways of recovery.
+inline constexpr std::array<std::pair<std::string_view, Recovery>, 4> kRecoveryNames{
+    {{"v0", Recovery::uniform},
+     {"v1", Recovery::interpolate},
+     {"v2", Recovery::distribute},
+     {"likely", Recovery::likely}}};
+
+/// "compact_pose:range=5,angle=0.5"
+CAIRN_API std::string spec_text(const ComponentSpec& spec);
+
+}  // namespace cairn

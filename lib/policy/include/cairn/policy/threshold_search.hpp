@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+#include "cairn/plugin/options.hpp"
+#include "cairn/policy/policy_run.hpp"
+#include "cairn/policy/pose_policy.hpp"
+#include "cairn/runtime/api.hpp"
+
+namespace cairn {
+
+/// How a policy fares on a sample with given thresholds.
+struct ThresholdTrial {
+  double links = 1.0, poses = 1.0;  ///< factors of the gains that the policy found at first
+  double expected = 0.0;            ///< error that its covariance lets expect [m]
+  double realised = 0.0;            ///< the same, by its distance from the estimate of everything
+  std::int64_t poses_kept = 0, loops_kept = 0;
+  double error() const { return std::max(expected, realised); }
+};
+
+struct FoundThresholds {
+  OptionValues options;
+  std::vector<ThresholdTrial> trials;
+  double expected_ate = 0.0;  ///< of the sample with everything [m]
+  double tolerance = 0.0;     ///< what the error of a trial may be [m]
+  double seconds = 0.0;
+};
+
+/// Finds a policy's thresholds on the first `count` poses of a recording: the policy watches the
+/// sample with everything taken in, and chooses (Ila et al. 2017, section 5.2). Then, unless
+/// `error_ratio` is 0, the choice is tried on the sample, and `refine_thresholds` lowers it until
+/// the error is at most `error_ratio` times that of everything, or that of a single link. The error
+/// is the larger of two estimates, neither of which needs the truth: what the covariances let
+/// expect (`expected_ate`), and √(E² + D²) with E the expected error of everything and D the
+/// distance between the two trajectories. Throws `Error` (usage) if the policy is no
+/// `OptionFinder`, and (input) if the sample does not determine thresholds.
+CAIRN_API FoundThresholds find_thresholds(const PolicyJob& job, std::size_t count,
+                                          double error_ratio, const PolicySetting& setting);
+
+/// Runs a sample with the options; the factors of the gains are for the record.
+using ThresholdTest =
+    std::function<ThresholdTrial(const OptionValues& options, double links, double poses)>;
+
+/// Lowers thresholds until the error of a trial is within `found.tolerance`: first the gains of
+/// links, by factors of √2 and at most ten times, until lower ones let no more links through; then
+/// those of links and poses together, from the beginning. `found.options` are what was found at
+/// first, and become those of the first trial that is good or, if none is, of that with the least
+/// error. Stops early once `interrupted` returns true.
+CAIRN_API void refine_thresholds(const OptionFinder& finder, const ThresholdTest& test,
+                                 FoundThresholds& found,
+                                 const std::function<bool()>& interrupted = {});
+
+}  // namespace cairn

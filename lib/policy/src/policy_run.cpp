@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "cairn/policy/policy_run.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <span>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "cairn/linear/linear_solver.hpp"
+#include "cairn/linear/linearizer.hpp"
+#include "cairn/linear/normal_equations.hpp"
+
+namespace cairn {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+/// Its analysis says how many nonzeros a factor of the information matrix has.
+constexpr const char* kCountingSolver = "block_cholesky";
+
+/// Counts and times what goes through it.
+class WatchedRegistration final : public Registration {
+ public:
+  WatchedRegistration(Registration& inner, PolicyResult& result)
+      : inner_(inner), result_(result), false_(query<FalseMatches>(inner)) {}
+  void begin(const RegistrationData& data) override { inner_.begin(data); }
+  std::vector<Factor> match(Id earlier, Id later) override {
+    const auto begin = Clock::now();
+    std::vector<Factor> factors = inner_.match(earlier, later);
+    result_.registration_seconds += std::chrono::duration<double>(Clock::now() - begin).count();
+    ++result_.proposed;
+    result_.registered += !factors.empty();
+    if (!factors.empty() && was_false(earlier, later)) ++result_.false_registered;
+    return factors;
+  }
+  bool was_false(Id earlier, Id later) const { return false_ && false_->was_false(earlier, later); }
+
+ private:
+  Registration& inner_;
+  PolicyResult& result_;
+  FalseMatches* false_;
+};
+
+void count_nonzeros(PolicyResult& result, Registry& registry) {
+  const auto solver = registry.make<LinearSolver>(kCountingSolver);
+  const NormalEquations equations(result.compact, *solver);
+  if (equations.size() == 0) return;
+  // H keeps its lower triangle, with whole blocks on the diagonal.
+  const std::int64_t block = result.compact.type(0).tangent_size();
+  result.information_nonzeros =
+      2 * static_cast<std::int64_t>(equations.H().values().size()) - block * equations.size();
+  result.factor_nonzeros = solver->stats().factor_nonzeros;
+}
+
+void evaluate(PosePolicy& policy, const PolicyData& data, PolicyResult& result) {
+  if (!data.truth) return;
+  for (const auto& [name, how] : kRecoveryNames) {
+    result.errors[std::string(name)] = compare(trajectory(recovered_way(policy, how)), *data.truth);
+  }
+  if (data.truth_graph) result.normalized = normalized_error(result.compact, *data.truth_graph);
+}
+
+bool has_all_of(const Graph& truth, const Graph& recording) {
+  for (int v = 0; v < recording.variable_count(); ++v) {
+    const auto there = truth.find(recording.id(v));
+    if (!there || truth.type(*there).tag() != recording.type(v).tag()) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+PolicyData policy_data(Graph recording, std::optional<Graph> truth) {
+  PolicyData data;
+  data.poses = pose_chain(recording);
+  for (const Arrival& pose : data.poses) data.loops += std::ssize(pose.links);
+  if (truth) {
+    data.truth = trajectory(*truth);
+    if (has_all_of(*truth, recording)) data.truth_graph = std::move(truth);
+  }
+  data.recording = std::move(recording);
+  return data;
+}
+
+std::string spec_text(const ComponentSpec& spec) {
+  std::string text = spec.name;
+  for (const auto& [name, value] : spec.values)
+    text += fmt::format("{}{}={}", text.size() == spec.name.size() ? ":" : ",", name, value);
+  return text;
+}
+
+PolicyRun::PolicyRun(const PolicyJob& job, const PolicySetting& setting)
+    : setting_(setting),
+      policy_(setting.registry.make<PosePolicy>(job.policy)),
+      registration_(setting.registry.make<Registration>(job.registration)) {
+  const PolicyData& data = setting.data;
+  policy_->estimator().set_loss(setting.loss, setting.loss_on);
+  registration_->begin(
+      {.recording = &data.recording, .truth = data.truth_graph ? &*data.truth_graph : nullptr});
+  result_.policy = spec_text(job.policy);
+}
+
+void PolicyRun::run(std::size_t count, std::string_view title,
+                    const std::function<void(std::size_t)>& after) {
+  WatchedRegistration watched(*registration_, result_);
+  run_policy(setting_.data.recording, std::span(setting_.data.poses).first(count), *policy_,
+             watched, [&](const PoseReport& pose) {
+               result_.poses.push_back(pose);
+               result_.seconds += pose.seconds;
+               for (const LinkReport& link : pose.links) {
+                 ++result_.verdicts[std::string(to_string(link.verdict))];
+                 if (link.verdict != LinkVerdict::linked) continue;
+                 ++result_.kept_loops;
+                 result_.false_kept += watched.was_false(link.earlier, link.later);
+               }
+               if (setting_.progress) setting_.progress(title, count, result_);
+               if (after) after(result_.poses.size() - 1);
+               return !setting_.interrupted();
+             });
+  result_.interrupted = setting_.interrupted();
+}
+
+PolicyResult PolicyRun::finish(Recovery recovery) {
+  result_.compact = policy_->estimator().graph();
+  result_.chi2 = policy_->estimator().chi2();
+  result_.way = recovered_way(*policy_, recovery);
+  count_nonzeros(result_, setting_.registry);
+  evaluate(*policy_, setting_.data, result_);
+  return std::move(result_);
+}
+
+}  // namespace cairn

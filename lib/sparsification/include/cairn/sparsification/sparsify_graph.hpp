@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "cairn/graph/graph.hpp"
+#include "cairn/plugin/options.hpp"
+#include "cairn/plugin/registry.hpp"
+#include "cairn/runtime/api.hpp"
+#include "cairn/solve/optimizer.hpp"
+#include "cairn/sparsification/sparsification.hpp"
+#include "cairn/types/loss.hpp"
+
+namespace cairn {
+
+/// Which components take nodes out of a graph, and which nodes.
+struct SparsifyJob {
+  ComponentSpec sparsifier;  ///< with its options
+  ComponentSpec selection;
+  ComponentSpec optimizer;
+  std::string linear_solver = "block_cholesky";    ///< for determinants
+  std::string estimator = "incremental_cholesky";  ///< online
+  int online = 0;                                  ///< online: take nodes out after so many poses
+  /// Online: one of so many nodes is known to stay, and factors to older nodes that are to leave
+  /// are redirected at once, to the nearest by id (Vallvé 2018, section 4.6.4); 0: only once these
+  /// have left, and to the nearest in space.
+  int redirect_early = 0;
+  bool as_given = false;  ///< the graph is at its minimum: it is not optimised before
+  bool measure = true;    ///< KLD and RMSE of the whole
+};
+
+struct SparsifyResult {
+  Graph sparse;  ///< at its minimum
+  Sparsification change;
+  std::int64_t variables_before = 0, factors_before = 0;
+  /// From the original graph; online, from a graph with the same factors redirected.
+  std::optional<SparsificationError> error;
+  /// Online: distance of the estimate from the minimum of all factors as they arrived [m]; NaN: not
+  /// known.
+  double rmse_full = std::nan("");
+  double chi2_before = 0.0, chi2_after = 0.0;
+  double select_seconds = 0.0;
+  // Online
+  std::int64_t redirected = 0, dropped = 0;  ///< factors on nodes that had left
+  std::vector<double> steps;                 ///< seconds of each pose, sparsification included
+  bool interrupted = false;
+  std::vector<std::string> notes;
+};
+
+/// How far a sparsification is.
+struct SparsifyProgress {
+  enum class Phase {
+    select,  ///< nodes are about to be chosen
+    remove,  ///< `done` of `total` chosen nodes are taken out
+    feed,    ///< online: `done` of `total` poses have arrived, `kept` variables are in the graph
+  };
+  Phase phase = Phase::select;
+  int done = 0, total = 0, kept = 0;
+};
+
+/// The rest of the problem. Everything referred to must outlive the calls.
+struct SparsifySetting {
+  Registry& registry;
+  Stop stop = {};  ///< of the optimisations; its interrupt ends everything early
+  std::shared_ptr<const Loss> loss = nullptr;  ///< shared: graphs and their clones use one loss
+  FactorSelector loss_on;
+  /// Computes the initial estimate of a whole graph, and returns notes; empty: as it is.
+  std::function<std::vector<std::string>(Graph&)> initialise = {};
+  SparsificationObserver observer = {};  ///< gets every problem; may be empty
+  Observer* optimisation = nullptr;      ///< follows the optimisations; may be null
+  std::function<void(const SparsifyProgress&)> progress = {};
+
+  bool interrupted() const { return stop.interrupt && stop.interrupt->load(); }
+};
+
+/// Optimises a whole graph, takes nodes out of it, optimises what is left, and measures what was
+/// lost. Every free variable that forms a Lie group may leave, but for the newest. Throws `Error`
+/// for names and options that there are not.
+CAIRN_API SparsifyResult sparsify_whole(const Graph& graph, const SparsifyJob& job,
+                                        const SparsifySetting& setting);
+
+/// Feeds a recorded graph to an estimator pose by pose, and takes nodes out after every
+/// `job.online` poses. Factors that arrive for nodes that have left are redirected to others, or
+/// dropped (Vallvé 2018, section 4.6.4).
+CAIRN_API SparsifyResult sparsify_online(const Graph& recording, const SparsifyJob& job,
+                                         const SparsifySetting& setting);
+
+}  // namespace cairn

@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "cairn/online/online_session.hpp"
+
+#include <algorithm>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace cairn {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::Not;
+using ::testing::StartsWith;
+
+const std::string kStep = " 1 0 0.1 100 0 0 100 0 100";  // measurement and information
+
+class OnlineSessionTest : public ::testing::Test {
+ protected:
+  void begin(OnlineSettings settings) {
+    number_ = 0;
+    format_ = registry_.make<StreamFormat>("g2o");
+    estimator_ = registry_.make<Estimator>("batch");
+    session_ = std::make_unique<OnlineSession>(*estimator_, *format_, registry_, settings);
+  }
+  void SetUp() override { begin({.read = {}, .output = "none"}); }
+  LineSession::Reply take(const std::string& line) { return session_->take(line, ++number_); }
+  /// The answers to all of these.
+  std::string take_all(const std::vector<std::string>& lines) {
+    std::string text;
+    for (const std::string& line : lines) text += take(line).text;
+    return text;
+  }
+  const std::vector<std::string> two_poses_ = {"VERTEX_SE2 0 0 0 0", "FIX 0", "NEW VERTEX_SE2 1",
+                                               "EDGE_SE2 0 1" + kStep};
+  Registry registry_;
+  std::unique_ptr<StreamFormat> format_;
+  std::unique_ptr<Estimator> estimator_;
+  std::unique_ptr<OnlineSession> session_;
+  std::int64_t number_ = 0;
+};
+
+TEST_F(OnlineSessionTest, TakesDataInSilenceAndAnswersWhenItHasSolved) {
+  EXPECT_THAT(take("VERTEX_SE2 0 0 0 0").text, IsEmpty());
+  EXPECT_EQ(session_->variable_count(), 0);  // no measurement has touched it
+  EXPECT_TRUE(take("FIX 0").changes);
+  EXPECT_THAT(take("NEW VERTEX_SE2 1").text, IsEmpty());
+  const LineSession::Reply reply = take("EDGE_SE2 0 1" + kStep);
+  EXPECT_EQ(reply.text, "OK 4 variables 2 factors 1 owed 0\n");
+  EXPECT_TRUE(reply.changes);
+  EXPECT_TRUE(reply.solved);
+  EXPECT_FALSE(reply.refused);
+  EXPECT_FALSE(reply.quit);
+}
+
+TEST_F(OnlineSessionTest, QuestionsChangeNothing) {
+  take_all(two_poses_);
+  for (const auto& [question, answer] :
+       {std::pair<std::string, std::string>{"ESTIMATE 1", "VERTEX_SE2 1 1 0 0.1\nOK "},
+        {"ESTIMATE ALL", "VERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 1 0 0.1\nOK "},
+        {"COVARIANCE 1 1", "COVARIANCE 1 1 3 3 0.01"},
+        {"CHI2", "CHI2 "}}) {
+    const LineSession::Reply reply = take(question);
+    EXPECT_THAT(reply.text, StartsWith(answer));
+    EXPECT_FALSE(reply.changes) << question;
+    EXPECT_FALSE(reply.refused) << question;
+  }
+}
+
+TEST_F(OnlineSessionTest, ARefusedLineLeavesNothingBehind) {
+  take_all(two_poses_);
+  for (const std::string line :
+       {"EDGE_SE2 0 1 1 0", "EDGE_SE2 0 9 1 0 0 1 0 0 1 0 1", "VERTEX_SE2 1 0 0 0", "FIX 0",
+        "NEW VERTEX_SE9 4", "REMOVE FACTOR 7", "CHANGE 0 1", "COVARIANCE 0", "ESTIMATE 9", "SAVE -",
+        "SOLVE now", "WHAT 1"}) {
+    const LineSession::Reply reply = take(line);
+    EXPECT_TRUE(reply.refused) << line;
+    EXPECT_FALSE(reply.changes) << line;
+    EXPECT_THAT(reply.text, StartsWith("ERROR line " + std::to_string(number_) + ": ")) << line;
+    EXPECT_EQ(std::ranges::count(reply.text, '\n'), 1) << line;
+  }
+  EXPECT_EQ(session_->variable_count(), 2);
+  EXPECT_EQ(session_->factor_count(), 1);
+}
+
+TEST_F(OnlineSessionTest, BlankLinesAndCommentsAreNoLines) {
+  for (const std::string line : {"", "   \t", "# a comment"}) {
+    const LineSession::Reply reply = take(line);
+    EXPECT_THAT(reply.text, IsEmpty());
+    EXPECT_FALSE(reply.changes);
+  }
+}
+
+TEST_F(OnlineSessionTest, SolvesOnlyWhenAskedToWhereThatIsSo) {
+  begin({.read = {}, .automatic = false, .output = "last"});
+  for (const std::string& line : two_poses_) EXPECT_THAT(take(line).text, IsEmpty());
+  EXPECT_THAT(take("SOLVE").text, HasSubstr("VERTEX_SE2 1 1 0 0.1\nOK 5 "));
+}
+
+TEST_F(OnlineSessionTest, WritesWhatChanged) {
+  begin({.read = {}, .output = "changed"});
+  take_all(two_poses_);
+  const std::string next = take_all({"NEW VERTEX_SE2 2", "EDGE_SE2 1 2" + kStep});
+  EXPECT_THAT(next, Not(HasSubstr("VERTEX_SE2 0 ")));
+  EXPECT_THAT(next, HasSubstr("VERTEX_SE2 2 "));
+}
+
+TEST_F(OnlineSessionTest, ChangesRemovesAndMarginalizes) {
+  take_all(two_poses_);
+  take_all({"NEW VERTEX_SE2 2", "EDGE_SE2 1 2" + kStep});
+  take("CHANGE 0 2 0 0 25 0 0 25 0 25");
+  EXPECT_THAT(take("ESTIMATE 1").text, StartsWith("VERTEX_SE2 1 2 "));
+  EXPECT_THAT(take("MARGINALIZE 0 1").text, StartsWith("PRIOR 2\n"));
+  EXPECT_EQ(session_->variable_count(), 1);
+  EXPECT_THAT(take("ESTIMATE 0").text, HasSubstr("there is no variable 0"));
+  take("REMOVE FACTOR 2");
+  EXPECT_EQ(session_->factor_count(), 0);
+}
+
+TEST_F(OnlineSessionTest, RestoredLinesGiveTheSameEstimateWithoutAnswers) {
+  std::vector<std::string> lines = two_poses_;
+  lines.insert(lines.end(), {"NEW VERTEX_SE2 2", "EDGE_SE2 1 2" + kStep,
+                             "EDGE_SE2 0 2 1.9 0.2 0.3 50 0 0 50 0 50"});
+  take_all(lines);
+  const std::string estimate = take("ESTIMATE ALL").text;
+  begin({.read = {}, .output = "all"});
+  for (const std::string& line : lines) session_->restore(line, ++number_);
+  EXPECT_EQ(take("ESTIMATE ALL").text, estimate);
+  EXPECT_THROW(session_->restore("NONSENSE", 99), Error);
+}
+
+TEST_F(OnlineSessionTest, QuitEndsIt) {
+  const LineSession::Reply reply = take("QUIT");
+  EXPECT_TRUE(reply.quit);
+  EXPECT_EQ(reply.text, "OK 1 variables 0 factors 0 owed 0\n");
+}
+
+}  // namespace
+}  // namespace cairn

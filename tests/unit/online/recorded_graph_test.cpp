@@ -1,0 +1,248 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "cairn/online/recorded_graph.hpp"
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "cairn/plugin/registry.hpp"
+#include "cairn/runtime/error.hpp"
+#include "cairn/types/lie/se3.hpp"
+#include "support/planar_graph.hpp"
+#include "support/scaled_pose.hpp"
+
+namespace cairn {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::SizeIs;
+
+const std::vector<double> kUnit3 = {1, 0, 0, 1, 0, 1}, kUnit2 = {1, 0, 1};
+
+class ArrivalOrder : public ::testing::Test {
+ protected:
+  int pose(Id id) { return graph_.add_variable(types_.pose, id, std::array{0.0, 0.0, 0.0}); }
+  int point(Id id) { return graph_.add_variable(types_.point, id, std::array{0.0, 0.0}); }
+  int between(int a, int b) {
+    return graph_.add_factor(types_.relative_pose, std::array{a, b}, std::array{1.0, 0.0, 0.0},
+                             kUnit3);
+  }
+  int seen(int pose, int point) {
+    return graph_.add_factor(types_.point_seen, std::array{pose, point}, std::array{1.0, 0.0},
+                             kUnit2);
+  }
+  test::PlanarTypes types_;
+  Graph graph_;
+};
+
+TEST_F(ArrivalOrder, APoseComesWithWhatItSeesFirst) {
+  const int l = point(100);
+  const int a = pose(1), b = pose(2), c = pose(3);
+  const int ab = between(a, b), bl = seen(b, l), bc = between(b, c), cl = seen(c, l),
+            ac = between(a, c);
+  const std::vector<Arrival> order = arrival_order(graph_);
+  ASSERT_THAT(order, SizeIs(3));
+  EXPECT_THAT(order[0].variables, ElementsAre(a));
+  EXPECT_THAT(order[0].odometry, IsEmpty());
+  EXPECT_THAT(order[0].links, IsEmpty());
+  EXPECT_THAT(order[1].variables, ElementsAre(b, l));
+  EXPECT_THAT(order[1].odometry, ElementsAre(ab));
+  EXPECT_THAT(order[1].links, ElementsAre(bl));
+  EXPECT_THAT(order[2].variables, ElementsAre(c));
+  EXPECT_THAT(order[2].odometry, ElementsAre(bc));
+  EXPECT_THAT(order[2].links, ElementsAre(cl, ac));
+  EXPECT_TRUE(in_arrival_order(order));
+}
+
+TEST_F(ArrivalOrder, PosesComeByIdWhateverTheOrderOfTheFile) {
+  const int c = pose(30), a = pose(10), b = pose(20);
+  const int bc = between(b, c), ab = between(a, b);
+  const std::vector<Arrival> order = arrival_order(graph_);
+  ASSERT_THAT(order, SizeIs(3));
+  EXPECT_THAT(order[0].variables, ElementsAre(a));
+  EXPECT_THAT(order[1].odometry, ElementsAre(ab));
+  EXPECT_THAT(order[2].odometry, ElementsAre(bc));
+  EXPECT_FALSE(in_arrival_order(order));
+}
+
+TEST_F(ArrivalOrder, HasEveryVariableAndFactorOnce) {
+  graph_ = test::random_graph(types_, 20, 9, 3);
+  const int lonely = point(1000);
+  const int prior =
+      graph_.add_factor(types_.point_prior, std::array{lonely}, std::array{0.0, 0.0}, kUnit2);
+  std::vector<int> variables(static_cast<std::size_t>(graph_.variable_count()), 0),
+      factors(static_cast<std::size_t>(graph_.factor_count()), 0), step(variables.size());
+  const std::vector<Arrival> order = arrival_order(graph_);
+  for (std::size_t k = 0; k < order.size(); ++k) {
+    for (const int v : order[k].variables) {
+      ++variables[v];
+      step[v] = static_cast<int>(k);
+    }
+    for (const auto* some : {&order[k].odometry, &order[k].links}) {
+      for (const int f : *some) {
+        ++factors[f];
+        for (const std::int32_t v : graph_.factor_variables(f)) {
+          EXPECT_EQ(variables[v], 1) << graph_.describe_factor(f);  // it is there
+        }
+      }
+    }
+  }
+  EXPECT_THAT(variables, ::testing::Each(1));
+  EXPECT_THAT(factors, ::testing::Each(1));
+  EXPECT_EQ(step[lonely], 19);
+  EXPECT_EQ(order.back().links.back(), prior);
+}
+
+TEST_F(ArrivalOrder, IsBrokenByAFactorThatComesTooEarly) {
+  const int a = pose(1), b = pose(2), c = pose(3);
+  between(a, b);
+  between(a, c);
+  between(b, c);
+  EXPECT_TRUE(in_arrival_order(arrival_order(graph_)));
+  between(b, a);
+  EXPECT_FALSE(in_arrival_order(arrival_order(graph_)));
+}
+
+// Pose graphs -------------------------------------------------------------------------------------
+
+class PoseChain : public testing::Test {
+ protected:
+  int pose(Id id) { return graph_.add_variable(types_.pose, id, std::array{1.0, 2.0, 0.3}); }
+  /// By id.
+  int join(Id a, Id b) {
+    return graph_.add_factor(types_.relative_pose, std::array{*graph_.find(a), *graph_.find(b)},
+                             std::array{1.0, 0.5, 0.1}, std::array{2.0, 0.0, 0.0, 3.0, 0.0, 4.0});
+  }
+  std::string refusal() {
+    try {
+      pose_chain(graph_);
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ErrorCode::input);
+      return error.what();
+    }
+    return {};
+  }
+
+  const test::PlanarTypes types_{};
+  Graph graph_;
+};
+
+TEST_F(PoseChain, IsByRisingIdWhateverTheOrderInTheGraph) {
+  const int v30 = pose(30), v10 = pose(10), v40 = pose(40), v20 = pose(20);
+  const int loop = join(40, 10), f34 = join(40, 30), f12 = join(10, 20), other_loop = join(10, 40),
+            f23 = join(20, 30), f21 = join(20, 10), third_loop = join(10, 30);
+  const std::vector<Arrival> chain = pose_chain(graph_);
+  ASSERT_THAT(chain, SizeIs(4));
+  const std::array variables{v10, v20, v30, v40};
+  for (std::size_t k = 0; k < 4; ++k) EXPECT_EQ(chain[k].pose(), variables[k]);
+  EXPECT_THAT(chain[0].odometry, IsEmpty());
+  EXPECT_THAT(chain[1].odometry, ElementsAre(f12, f21));
+  EXPECT_THAT(chain[2].odometry, ElementsAre(f23));
+  EXPECT_THAT(chain[3].odometry, ElementsAre(f34));
+  EXPECT_THAT(chain[0].links, IsEmpty());
+  EXPECT_THAT(chain[1].links, IsEmpty());
+  EXPECT_THAT(chain[2].links, ElementsAre(third_loop));
+  EXPECT_THAT(chain[3].links, ElementsAre(loop, other_loop));
+}
+
+TEST_F(PoseChain, MayBeShort) {
+  EXPECT_THAT(pose_chain(graph_), IsEmpty());
+  const int only = pose(5);
+  const std::vector<Arrival> chain = pose_chain(graph_);
+  ASSERT_THAT(chain, SizeIs(1));
+  EXPECT_EQ(chain[0].pose(), only);
+  EXPECT_THAT(chain[0].odometry, IsEmpty());
+}
+
+TEST_F(PoseChain, NamesTheGapInItsOdometry) {
+  for (const Id id : {1, 2, 5, 6}) pose(id);
+  join(1, 2), join(5, 6), join(1, 5);
+  EXPECT_THAT(refusal(), AllOf(HasSubstr("no factor joins VERTEX_SE2 5 to VERTEX_SE2 2"),
+                               HasSubstr("ids rise along the robot's way")));
+}
+
+TEST_F(PoseChain, RefusesLandmarks) {
+  pose(1);
+  graph_.add_variable(types_.point, 9, std::array{0.0, 0.0});
+  EXPECT_THAT(refusal(), AllOf(HasSubstr("VERTEX_XY 9 is no pose"), HasSubstr("pose graphs only")));
+}
+
+TEST_F(PoseChain, RefusesWhatFormsNoGroup) {
+  graph_.add_variable(define_variable<test::ScaledPose>(), 4, std::array{0.0, 0.0, 0.0, 0.0});
+  EXPECT_THAT(refusal(), HasSubstr("VERTEX_SCALED 4 is no pose of a Lie group"));
+}
+
+TEST_F(PoseChain, RefusesPosesOfTwoTypes) {
+  pose(1);
+  graph_.add_variable(define_variable<Se3>(), 2, std::array{0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0});
+  EXPECT_THAT(refusal(),
+              HasSubstr("VERTEX_SE2 1 and VERTEX_SE3:QUAT 2 are poses of different types"));
+}
+
+TEST_F(PoseChain, RefusesFactorsThatAreNoMotions) {
+  pose(1), pose(2);
+  join(1, 2);
+  graph_.add_factor(types_.prior, std::array{1}, std::array{0.0, 0.0, 0.0},
+                    std::array{1.0, 0.0, 0.0, 1.0, 0.0, 1.0});
+  EXPECT_THAT(refusal(), AllOf(HasSubstr("EDGE_PRIOR_SE2 2 is not the motion"), HasSubstr("FIX")));
+}
+
+// Updates -----------------------------------------------------------------------------------------
+
+TEST_F(ArrivalOrder, AnUpdateHasTheOdometryFirst) {
+  const int a = pose(1), b = pose(2), l = point(100);
+  const int bl = seen(b, l), ab = between(a, b);
+  graph_.set_fixed(a);
+  graph_.set_state(b, std::array{3.0, 4.0, 0.5});
+  const std::vector<Arrival> order = arrival_order(graph_);
+  const GraphUpdate first = arrival_update(graph_, order[0]),
+                    second = arrival_update(graph_, order[1]);
+  ASSERT_THAT(first.variables, SizeIs(1));
+  EXPECT_TRUE(first.variables[0].fixed);
+  EXPECT_THAT(first.factors, IsEmpty());
+  ASSERT_THAT(second.variables, SizeIs(2));
+  EXPECT_EQ(second.variables[0].id, 2);
+  EXPECT_THAT(second.variables[0].state, ElementsAre(3.0, 4.0, 0.5));
+  EXPECT_EQ(second.variables[1].id, 100);
+  ASSERT_THAT(second.factors, SizeIs(2));
+  EXPECT_THAT(second.factors[0].variables, ElementsAre(1, 2));    // ab
+  EXPECT_THAT(second.factors[1].variables, ElementsAre(2, 100));  // bl
+  EXPECT_LT(bl, ab);
+}
+
+TEST_F(ArrivalOrder, StatesAreLeftToTheFactorsThatCanComputeThem) {
+  const int a = pose(1), b = pose(2), c = pose(3), l = point(100);
+  between(a, b);
+  between(b, c);
+  seen(b, l);  // the test's factor to a point computes none
+  graph_.set_fixed(c);
+  Registry registry;
+  const auto estimator = registry.make<Estimator>("incremental_cholesky");
+  const std::vector<Arrival> order = arrival_order(graph_);
+
+  GraphUpdate first = arrival_update(graph_, order[0]);
+  EXPECT_EQ(leave_states_to_factors(first, *estimator), 1);
+  EXPECT_THAT(first.variables[0].state, SizeIs(3));
+  estimator->update(first);
+
+  GraphUpdate second = arrival_update(graph_, order[1]);
+  EXPECT_EQ(leave_states_to_factors(second, *estimator), 1);
+  EXPECT_THAT(second.variables[0].state, IsEmpty());
+  EXPECT_THAT(second.variables[1].state, SizeIs(2));
+  estimator->update(second);
+  EXPECT_THAT(estimator->state(2), ElementsAre(1.0, 0.0, 0.0));
+
+  GraphUpdate third = arrival_update(graph_, order[2]);
+  EXPECT_EQ(leave_states_to_factors(third, *estimator), 0);
+  EXPECT_THAT(third.variables[0].state, SizeIs(3));  // fixed
+}
+
+}  // namespace
+}  // namespace cairn

@@ -1,0 +1,150 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "cairn/policy/policy_run.hpp"
+
+#include <atomic>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "cairn/io/generator.hpp"
+#include "cairn/runtime/error.hpp"
+
+namespace cairn {
+namespace {
+
+using ::testing::Each;
+using ::testing::ElementsAre;
+using ::testing::IsEmpty;
+using ::testing::Key;
+using ::testing::SizeIs;
+
+class PolicyRunTest : public ::testing::Test {
+ protected:
+  Simulation simulate(const std::string& generator) {
+    return registry_.make<Generator>(generator)->generate(registry_, 5);
+  }
+  PolicyData world(const std::string& generator) {
+    Simulation made = simulate(generator);
+    return policy_data(std::move(made.graph), std::move(made.truth));
+  }
+  Registry registry_;
+};
+
+const PolicyJob kEverything{parse_component("compact_pose:strategy=apal,range=8,angle=3.15")};
+
+TEST_F(PolicyRunTest, DataCountTheLoopsAndKeepTheTruth) {
+  Simulation made = simulate("manhattan:poses=60,streets=3");
+  const int factors = made.graph.factor_count();
+  const PolicyData data = policy_data(std::move(made.graph), std::move(made.truth));
+  EXPECT_THAT(data.poses, SizeIs(60));
+  EXPECT_EQ(data.loops, factors - 59);
+  EXPECT_TRUE(data.truth_graph.has_value());
+  EXPECT_THAT(*data.truth, SizeIs(60));
+}
+
+TEST_F(PolicyRunTest, ATruthThatLacksPosesIsGoodForTheTrajectoryOnly) {
+  Simulation made = simulate("ring:poses=20");
+  Simulation shorter = simulate("ring:poses=12");
+  const PolicyData data = policy_data(std::move(made.graph), std::move(shorter.truth));
+  EXPECT_FALSE(data.truth_graph.has_value());
+  EXPECT_THAT(*data.truth, SizeIs(12));
+}
+
+TEST_F(PolicyRunTest, RefusesWhatIsNoPoseGraph) {
+  Simulation made = simulate("landmarks2d");
+  EXPECT_THROW(policy_data(std::move(made.graph)), Error);
+}
+
+TEST_F(PolicyRunTest, CountsWhatBecameOfEveryPoseAndLoop) {
+  const PolicyData data = world("manhattan:poses=80,streets=3");
+  const PolicySetting setting{.data = data, .registry = registry_};
+  PolicyRun run(kEverything, setting);
+  std::vector<std::size_t> after;
+  run.run(80, "all", [&](std::size_t index) { after.push_back(index); });
+  const PolicyResult result = run.finish(Recovery::distribute);
+  ASSERT_THAT(after, SizeIs(80));
+  EXPECT_EQ(after.back(), 79U);
+  EXPECT_THAT(result.poses, SizeIs(80));
+  EXPECT_EQ(result.compact.variable_count(), 80);
+  EXPECT_EQ(result.way.variable_count(), 80);
+  EXPECT_FALSE(result.interrupted);
+  EXPECT_GT(result.kept_loops, 0);
+  EXPECT_LE(result.kept_loops, result.registered);
+  EXPECT_LE(result.registered, result.proposed);
+  EXPECT_EQ(result.verdicts.at("linked"), result.kept_loops);
+  std::int64_t verdicts = 0;
+  for (const auto& [name, count] : result.verdicts) verdicts += count;
+  EXPECT_EQ(verdicts, result.proposed);
+  EXPECT_EQ(result.compact.factor_count(), 79 + result.kept_loops);
+  // Each 3 × 3 block of the diagonal, and two for each pair that is joined.
+  EXPECT_EQ(result.information_nonzeros % 9, 0);
+  EXPECT_GE(result.factor_nonzeros, result.information_nonzeros / 2);
+}
+
+TEST_F(PolicyRunTest, WithTheTruthErrorsAreKnownForEveryRecovery) {
+  const PolicyData data = world("ring:poses=40,noise=0");
+  const PolicySetting setting{.data = data, .registry = registry_};
+  PolicyRun run(kEverything, setting);
+  run.run(40, "");
+  const PolicyResult result = run.finish(Recovery::likely);
+  EXPECT_THAT(result.errors, ElementsAre(Key("likely"), Key("v0"), Key("v1"), Key("v2")));
+  for (const auto& [name, error] : result.errors) EXPECT_LT(error.ate_translation, 1e-6) << name;
+  ASSERT_TRUE(result.normalized.has_value());
+  EXPECT_EQ(result.normalized->dof, 39 * 3);
+  EXPECT_NEAR(result.normalized->squared, 0.0, 1e-9);
+}
+
+TEST_F(PolicyRunTest, WithoutTheTruthThereAreNoErrors) {
+  Simulation made = simulate("ring:poses=20");
+  const PolicyData data = policy_data(std::move(made.graph));
+  const PolicySetting setting{.data = data, .registry = registry_};
+  PolicyRun run(kEverything, setting);
+  run.run(20, "");
+  const PolicyResult result = run.finish(Recovery::distribute);
+  EXPECT_THAT(result.errors, IsEmpty());
+  EXPECT_FALSE(result.normalized.has_value());
+}
+
+TEST_F(PolicyRunTest, ReportsProgressAndStopsWhenInterrupted) {
+  const PolicyData data = world("ring:poses=30");
+  std::atomic<bool> interrupt = false;
+  std::vector<std::string> titles;
+  const PolicySetting setting{
+      .data = data,
+      .registry = registry_,
+      .interrupt = &interrupt,
+      .progress = [&](std::string_view title, std::size_t poses, const PolicyResult& counts) {
+        titles.emplace_back(title);
+        EXPECT_EQ(poses, 25U);
+        EXPECT_EQ(counts.poses.size(), titles.size());
+        if (titles.size() == 10) interrupt = true;
+      }};
+  PolicyRun run(kEverything, setting);
+  run.run(25, "sample");
+  EXPECT_THAT(titles, SizeIs(10));
+  EXPECT_THAT(titles, Each("sample"));
+  const PolicyResult result = run.finish(Recovery::distribute);
+  EXPECT_TRUE(result.interrupted);
+  EXPECT_EQ(result.way.variable_count(), 10);
+}
+
+TEST_F(PolicyRunTest, CountsFalseMatches) {
+  const PolicyData data = world("manhattan:poses=150,streets=4");
+  const PolicySetting setting{.data = data, .registry = registry_};
+  PolicyRun run({kEverything.policy, "simulated:range=6,angle=3.14,false_rate=0.5"}, setting);
+  run.run(150, "");
+  EXPECT_GT(run.counts().false_registered, 0);
+  EXPECT_LT(run.counts().false_registered, run.counts().registered);
+  EXPECT_LE(run.counts().false_kept, run.counts().false_registered);
+}
+
+TEST(SpecText, NamesTheComponentAndItsOptions) {
+  EXPECT_EQ(spec_text({"compact_pose", {}}), "compact_pose");
+  EXPECT_EQ(spec_text({"compact_pose", {{"range", "5"}, {"angle", "0.5"}}}),
+            "compact_pose:angle=0.5,range=5");
+}
+
+}  // namespace
+}  // namespace cairn

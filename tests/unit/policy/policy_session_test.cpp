@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "cairn/policy/policy_session.hpp"
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "cairn/runtime/error.hpp"
+
+namespace cairn {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::StartsWith;
+
+const std::string kQuarter = " 1 0 1.5707963267948966 400 0 0 400 0 400";
+const std::string kHere = " 0 0 0 400 0 0 400 0 400";
+
+/// Once round a square: pose 4 is where pose 0 was.
+class PolicySessionTest : public ::testing::Test {
+ protected:
+  void begin() {
+    number_ = 0;
+    format_ = registry_.make<StreamFormat>("g2o");
+    policy_ = registry_.make<PosePolicy>("compact_pose:range=3,angle=0.8");
+    session_ = std::make_unique<PolicySession>(*policy_, *format_, registry_,
+                                               PolicySettings{.read = {}, .output = "none"});
+  }
+  void SetUp() override { begin(); }
+  LineSession::Reply take(const std::string& line) { return session_->take(line, ++number_); }
+  static std::vector<std::string> square() {
+    std::vector<std::string> lines{"NEW VERTEX_SE2 0"};
+    for (int k = 1; k <= 4; ++k) {
+      lines.push_back("NEW VERTEX_SE2 " + std::to_string(k));
+      lines.push_back("EDGE_SE2 " + std::to_string(k - 1) + " " + std::to_string(k) + kQuarter);
+    }
+    return lines;
+  }
+  std::string drive() {
+    std::string text;
+    for (const std::string& line : square()) text += take(line).text;
+    return text;
+  }
+  Registry registry_;
+  std::unique_ptr<StreamFormat> format_;
+  std::unique_ptr<PosePolicy> policy_;
+  std::unique_ptr<PolicySession> session_;
+  std::int64_t number_ = 0;
+};
+
+TEST_F(PolicySessionTest, ThePoseBeforeEndsWhereThePoseAfterItBegins) {
+  EXPECT_THAT(take("NEW VERTEX_SE2 0").text, IsEmpty());
+  EXPECT_EQ(take("NEW VERTEX_SE2 1").text, "KEPT 0\nOK 2 variables 1 factors 0 owed 0\n");
+  EXPECT_THAT(take("EDGE_SE2 0 1" + kQuarter).text, IsEmpty());
+  EXPECT_THAT(take("DONE").text, HasSubstr("OK 4 "));
+}
+
+TEST_F(PolicySessionTest, ProposesTheSamePairUntilItIsMeasured) {
+  drive();
+  const std::string first = take("NEXT").text;
+  EXPECT_THAT(first, StartsWith("MATCH 0 4 "));
+  EXPECT_THAT(take("NEXT").text, StartsWith(first.substr(0, first.find('\n'))));
+  EXPECT_THAT(take("EDGE_SE2 0 4" + kHere).text, IsEmpty());
+  const std::string done = take("DONE").text;
+  EXPECT_THAT(done, StartsWith("LINKED 0 4 "));
+  EXPECT_THAT(done, HasSubstr("KEPT 4\nOK "));
+  const PolicySession::Counts& counts = session_->counts();
+  EXPECT_EQ(counts.poses, 5);
+  EXPECT_EQ(counts.proposed, 1);
+  EXPECT_EQ(counts.registered, 1);
+  EXPECT_EQ(counts.linked, 1);
+}
+
+TEST_F(PolicySessionTest, WhatDoesNotMatchIsProposedNoMore) {
+  drive();
+  EXPECT_THAT(take("NEXT").text, StartsWith("MATCH 0 4 "));
+  EXPECT_TRUE(take("NOMATCH 0 4").changes);
+  EXPECT_THAT(take("NEXT").text, StartsWith("MATCH NONE\n"));
+  EXPECT_EQ(session_->counts().linked, 0);
+}
+
+TEST_F(PolicySessionTest, RefusesWhatDoesNotGoWithAPolicy) {
+  drive();
+  const std::vector<std::string> lines = {"SOLVE",
+                                          "FULL",
+                                          "CHANGE 0 1 0 0",
+                                          "MARGINALIZE 0",
+                                          "REMOVE VARIABLE 0",
+                                          "FIX 0",
+                                          "VERTEX_SE2 0 0 0 0",
+                                          "NEW VERTEX_XY 9",
+                                          "EDGE_SE2 1 2" + kHere,
+                                          "EDGE_SE2 9 4" + kHere,
+                                          "NEXT pair",
+                                          "ESTIMATE 9",
+                                          "COVARIANCE 0 9",
+                                          "SAVE -"};
+  for (const std::string& line : lines) {
+    const LineSession::Reply reply = take(line);
+    EXPECT_TRUE(reply.refused) << line;
+    EXPECT_FALSE(reply.changes) << line;
+    EXPECT_THAT(reply.text, StartsWith("ERROR line " + std::to_string(number_) + ": ")) << line;
+  }
+  EXPECT_THAT(take("NEXT").text, StartsWith("MATCH 0 4 "));
+}
+
+TEST_F(PolicySessionTest, APoseThatCameByMistakeCanBeTakenBack) {
+  drive();
+  take("DONE");
+  EXPECT_THAT(take("NEW VERTEX_SE2 5").text, IsEmpty());
+  EXPECT_THAT(take("NEXT").text, HasSubstr("pose 5 has no odometry yet"));
+  EXPECT_THAT(take("REMOVE VARIABLE 5").text, HasSubstr("OK "));
+  EXPECT_THAT(take("ESTIMATE 5").text, StartsWith("ERROR"));
+  EXPECT_EQ(session_->counts().poses, 5);
+}
+
+TEST_F(PolicySessionTest, TheEndKeepsTheNewestPose) {
+  drive();
+  const LineSession::Reply reply = take("QUIT");
+  EXPECT_TRUE(reply.quit);
+  EXPECT_FALSE(reply.changes);  // a restored session goes on from before it
+  EXPECT_THAT(reply.text, HasSubstr("KEPT 4\n"));
+  EXPECT_TRUE(session_->estimator().has(4));
+}
+
+TEST_F(PolicySessionTest, RestoredLinesGiveTheSameEstimate) {
+  std::vector<std::string> lines = square();
+  lines.insert(lines.end(), {"EDGE_SE2 0 4" + kHere, "DONE"});
+  for (const std::string& line : lines) take(line);
+  const std::string estimate = take("ESTIMATE ALL").text;
+  begin();
+  for (const std::string& line : lines) session_->restore(line, ++number_);
+  EXPECT_EQ(take("ESTIMATE ALL").text, estimate);
+  EXPECT_EQ(session_->counts().linked, 1);
+}
+
+}  // namespace
+}  // namespace cairn

@@ -1,0 +1,172 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "cairn/sparsification/sparsify_graph.hpp"
+
+#include <array>
+#include <atomic>
+#include <cmath>
+#include <memory>
+#include <set>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "cairn/io/generator.hpp"
+#include "cairn/runtime/error.hpp"
+
+namespace cairn {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::Not;
+using ::testing::SizeIs;
+
+class SparsifyGraph : public ::testing::Test {
+ protected:
+  SparsifyJob job(const std::string& selection) {
+    return {.sparsifier = parse_component("sparsify"),
+            .selection = parse_component(selection),
+            .optimizer = parse_component("levenberg_marquardt:linear_solver=block_cholesky")};
+  }
+  Graph simulate(const std::string& generator) {
+    return registry_.make<Generator>(generator)->generate(registry_, 5).graph;
+  }
+  /// Poses in a chain without a loop, from odometry that turns a little.
+  Graph chain(int poses) {
+    Graph graph;
+    const auto pose = registry_.variable_type("VERTEX_SE2");
+    const auto edge = registry_.factor_type("EDGE_SE2");
+    for (int k = 0; k < poses; ++k) {
+      graph.add_variable(pose, k, std::array{double(k), 0.1 * k, 0.05 * k});
+      if (k == 0) continue;
+      graph.add_factor(edge, std::array{k - 1, k}, std::array{1.0, 0.1, 0.05},
+                       std::vector<double>{50, 3, 1, 80, 2, 200});
+    }
+    graph.set_fixed(0);
+    return graph;
+  }
+  static std::set<Id> ids(const Graph& graph) {
+    std::set<Id> all;
+    for (int v = 0; v < graph.variable_count(); ++v) all.insert(graph.id(v));
+    return all;
+  }
+
+  Registry registry_;
+  SparsifySetting setting_{.registry = registry_};
+};
+
+TEST_F(SparsifyGraph, KeepsAllOfAChain) {
+  const SparsifyResult result = sparsify_whole(chain(11), job("keep_every:every=2"), setting_);
+  EXPECT_EQ(result.variables_before, 11);
+  EXPECT_EQ(result.factors_before, 10);
+  // 0 is fixed and stays, and so does the newest.
+  EXPECT_TRUE(result.sparse.find(0).has_value());
+  EXPECT_TRUE(result.sparse.find(10).has_value());
+  EXPECT_LE(result.sparse.variable_count(), 7);
+  EXPECT_EQ(result.sparse.factor_count(), result.sparse.variable_count() - 1);
+  ASSERT_TRUE(result.error.has_value());
+  EXPECT_NEAR(result.error->kld, 0.0, 1e-8);  // between two neighbours one factor says it all
+  EXPECT_NEAR(result.error->rmse, 0.0, 1e-8);
+  EXPECT_THAT(result.notes, IsEmpty());
+}
+
+TEST_F(SparsifyGraph, LosesSomethingWhereLoopsMeet) {
+  const Graph graph = simulate("manhattan:poses=120,streets=3");
+  const SparsifyResult result = sparsify_whole(graph, job("smallest_blanket:part=0.5"), setting_);
+  EXPECT_NEAR(result.sparse.variable_count(), 60, 3);
+  ASSERT_TRUE(result.error.has_value());
+  EXPECT_GT(result.error->kld, 1e-6);
+  EXPECT_LT(result.error->rmse, 0.1);
+  EXPECT_GT(result.chi2_before, 0.0);
+  EXPECT_EQ(graph.variable_count(), 120);  // untouched
+}
+
+TEST_F(SparsifyGraph, MeasuresAndOptimisesOnlyWhereAsked) {
+  SparsifyJob quick = job("keep_every:every=3");
+  quick.measure = false;
+  quick.as_given = true;
+  const SparsifyResult result =
+      sparsify_whole(simulate("manhattan:poses=60,streets=3"), quick, setting_);
+  EXPECT_FALSE(result.error.has_value());
+  EXPECT_EQ(result.chi2_before, 0.0);
+  EXPECT_GT(result.chi2_after, 0.0);
+}
+
+TEST_F(SparsifyGraph, SaysWhereAnOptimisationDidNotConverge) {
+  setting_.stop.max_iterations = 1;
+  const SparsifyResult result = sparsify_whole(simulate("sphere:turns=3,poses_per_turn=12"),
+                                               job("keep_every:every=2"), setting_);
+  EXPECT_THAT(result.notes, Not(IsEmpty()));
+  EXPECT_THAT(result.notes.front(), HasSubstr("the graph ended as max_iterations"));
+}
+
+TEST_F(SparsifyGraph, EndsEarlyWhenInterrupted) {
+  std::atomic<bool> interrupt = false;
+  setting_.stop.interrupt = &interrupt;
+  setting_.progress = [&](const SparsifyProgress& progress) {
+    if (progress.phase == SparsifyProgress::Phase::remove && progress.done >= 3) interrupt = true;
+  };
+  const SparsifyResult result =
+      sparsify_whole(simulate("manhattan:poses=60,streets=3"), job("keep_every:every=2"), setting_);
+  EXPECT_TRUE(result.interrupted);
+  EXPECT_FALSE(result.error.has_value());
+  EXPECT_LT(result.change.removed_variables.size(), 20U);
+}
+
+TEST_F(SparsifyGraph, RefusesNamesThatThereAreNot) {
+  EXPECT_THROW(sparsify_whole(chain(4), job("no_such_selection"), setting_), Error);
+}
+
+// Online ------------------------------------------------------------------------------------------
+
+TEST_F(SparsifyGraph, OnlineAChainKeepsAllItsInformation) {
+  SparsifyJob online = job("keep_every:every=2");
+  online.online = 4;
+  std::vector<int> done;
+  setting_.progress = [&](const SparsifyProgress& progress) {
+    if (progress.phase == SparsifyProgress::Phase::feed) done.push_back(progress.done);
+  };
+  const SparsifyResult result = sparsify_online(chain(21), online, setting_);
+  EXPECT_THAT(done, SizeIs(21));
+  EXPECT_EQ(done.back(), 21);
+  EXPECT_THAT(result.steps, SizeIs(21));
+  EXPECT_EQ(result.redirected, 0);  // odometry alone never meets a node that has left
+  EXPECT_EQ(result.dropped, 0);
+  EXPECT_LT(result.sparse.variable_count(), 14);
+  ASSERT_TRUE(result.error.has_value());
+  EXPECT_NEAR(result.error->kld, 0.0, 1e-8);
+  EXPECT_NEAR(result.rmse_full, 0.0, 1e-8);
+}
+
+TEST_F(SparsifyGraph, OnlineRedirectsLoopClosuresOfNodesThatHaveLeft) {
+  const Graph graph = simulate("manhattan:poses=150,streets=3");
+  SparsifyJob online = job("keep_every:every=3");
+  online.online = 10;
+  const SparsifyResult late = sparsify_online(graph, online, setting_);
+  EXPECT_GT(late.redirected, 0);
+  EXPECT_LT(late.sparse.variable_count(), 75);
+  EXPECT_TRUE(std::isfinite(late.rmse_full));
+  ASSERT_TRUE(late.error.has_value());
+
+  // Of nodes that are known to leave, factors are redirected while they are still there.
+  online.redirect_early = 3;
+  const SparsifyResult early = sparsify_online(graph, online, setting_);
+  EXPECT_GE(early.redirected + early.dropped, late.redirected + late.dropped);
+  EXPECT_EQ(ids(early.sparse), ids(late.sparse));
+}
+
+TEST_F(SparsifyGraph, OnlineWithoutRemovalsIsTheWholeGraph) {
+  const Graph graph = simulate("manhattan:poses=60,streets=3");
+  SparsifyJob online = job("keep_every:every=1");
+  online.online = 10;
+  const SparsifyResult result = sparsify_online(graph, online, setting_);
+  EXPECT_EQ(ids(result.sparse), ids(graph));
+  EXPECT_EQ(result.sparse.factor_count(), graph.factor_count());
+  EXPECT_NEAR(result.chi2_after, result.chi2_before, 1e-6 * result.chi2_before);
+  EXPECT_NEAR(result.rmse_full, 0.0, 1e-4);
+}
+
+}  // namespace
+}  // namespace cairn
