@@ -97,7 +97,7 @@ void Draft::finish_factor(std::span<const double> as_in_file) {
   }
   std::vector<double> root(information.size());
   const bool zero = std::ranges::all_of(information, [](double x) { return x == 0.0; });
-  if (!zero && square_root(information, kind.residual, root.data())) return;  // semidefinite
+  if (!zero && square_root(information, kind.residual, root)) return;  // semidefinite
   std::string advice;
   if (kind.residual == 3 && kind.type->is_relative()) {
     if (as_in_file.empty()) as_in_file = information;

@@ -29,7 +29,7 @@ struct Root {
 
 Root root_of(std::span<const double> information, int n) {
   Root root{std::vector<double>(information.size()), 0};
-  if (!square_root(information, n, root.packed.data())) return root;
+  if (!square_root(information, n, root.packed)) return root;
   for (std::size_t k = 0; n > 0; k += static_cast<std::size_t>(n--))
     root.rank += root.packed[k] > 0.0;
   return root;

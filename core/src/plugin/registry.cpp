@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <map>
+#include <mutex>
 #include <set>
 #include <tuple>
 
@@ -25,6 +26,13 @@ std::string in_words(std::string_view kind, std::string_view name) {
   std::string words(kind);
   std::ranges::replace(words, '_', ' ');
   return fmt::format("{} '{}'", words, name);
+}
+
+const char* const kThisProgram = "this program";
+
+/// Where a name comes from, for messages: a shared object, or this program.
+std::string origin(const Sidecar& sidecar) {
+  return sidecar.library.empty() ? kThisProgram : sidecar.library.string();
 }
 
 }  // namespace
@@ -67,13 +75,15 @@ struct Registry::Impl {
     bool types_made = false;
   };
 
+  /// Held during every call. Recursive: factories make components from the registry.
+  mutable std::recursive_mutex mutex;
   std::vector<std::unique_ptr<Plugin>> plugins;
   std::map<Key, std::vector<Plugin*>, std::less<>> index;
   std::vector<PluginProblem> problems;
   std::map<std::string, std::shared_ptr<const VariableType>, std::less<>> variable_types;
   std::map<std::string, std::shared_ptr<const FactorType>, std::less<>> factor_types;
 
-  void add_plugin(Sidecar sidecar) {
+  Plugin& add_plugin(Sidecar sidecar) {
     auto plugin = std::make_unique<Plugin>();
     plugin->sidecar = std::move(sidecar);
     for (const Sidecar::Offered& offer : plugin->sidecar.offers) {
@@ -84,12 +94,49 @@ struct Registry::Impl {
       }
     }
     plugins.push_back(std::move(plugin));
+    return *plugins.back();
+  }
+
+  /// What this program adds in one call, as a plugin that is loaded already.
+  void add_own(std::vector<Sidecar::Offered> offers, Registrar::Target target) {
+    std::set<Key> keys;
+    for (const Sidecar::Offered& offer : offers) {
+      const auto owners = index.find(Key(offer.kind, offer.name));
+      const bool before =
+          owners != index.end() && std::ranges::any_of(owners->second, [](const Plugin* owner) {
+            return owner->sidecar.library.empty();
+          });
+      if (before || !keys.emplace(offer.kind, offer.name).second) {
+        throw Error(ErrorCode::usage,
+                    fmt::format("this program adds {} twice", in_words(offer.kind, offer.name)));
+      }
+    }
+    Plugin& plugin = add_plugin({.name = kThisProgram,
+                                 .version = {},
+                                 .licence = {},
+                                 .description = {},
+                                 .library = {},
+                                 .offers = std::move(offers)});
+    plugin.target = std::move(target);
+    plugin.state = Plugin::State::loaded;
+    for (const auto& [kind, tag] : keys) {  // a plugin's of that name is handed out no more
+      if (kind == "variable") variable_types.erase(tag);
+      if (kind == "factor") factor_types.erase(tag);
+    }
   }
 
   static std::string conflict(std::string_view kind, std::string_view name,
                               const std::vector<Plugin*>& owners) {
     std::vector<std::string> files;
-    for (const Plugin* owner : owners) files.push_back(owner->sidecar.library.string());
+    bool own = false;
+    for (const Plugin* owner : owners) {
+      files.push_back(origin(owner->sidecar));
+      own = own || owner->sidecar.library.empty();
+    }
+    if (own) {
+      return fmt::format("{} is offered by {}; give that of this program another name",
+                         in_words(kind, name), fmt::join(files, " and by "));
+    }
     return fmt::format(
         "{} plugins offer {}: {}; remove one, or take its folder off the search path",
         owners.size(), in_words(kind, name), fmt::join(files, " and "));
@@ -130,8 +177,8 @@ struct Registry::Impl {
       std::string others;
       for (const std::string& other : names(kind)) {
         const Plugin& owner = *index.find(Key(kind, other))->second.front();
-        if (&owner != &plugin && fs::exists(owner.sidecar.library))
-          others += (others.empty() ? "" : ", ") + other;
+        const bool there = owner.sidecar.library.empty() || fs::exists(owner.sidecar.library);
+        if (&owner != &plugin && there) others += (others.empty() ? "" : ", ") + other;
       }
       throw plugin_error(fmt::format(
           "{} is not available: the shared object {} is missing; build or install plugin "
@@ -192,19 +239,26 @@ struct Registry::Impl {
   /// Makes all types of a plugin at once, so that they share their options.
   void make_types(Plugin& plugin) {
     if (plugin.types_made) return;
-    const std::string file = plugin.sidecar.library.string();
+    const std::string file = origin(plugin.sidecar);
     for (const auto& [name, types] : plugin.target.types) {
       TypeSet set = types.factory(Options(types.table, plugin.type_options, name));
       for (auto& type : set.variables) {
         check_type_offered(plugin, "variable", type->tag(), file);
-        variable_types.emplace(type->tag(), std::move(type));
+        if (!contested("variable", type->tag()))
+          variable_types.emplace(type->tag(), std::move(type));
       }
       for (auto& type : set.factors) {
         check_type_offered(plugin, "factor", type->tag(), file);
-        factor_types.emplace(type->tag(), std::move(type));
+        if (!contested("factor", type->tag())) factor_types.emplace(type->tag(), std::move(type));
       }
     }
     plugin.types_made = true;
+  }
+
+  /// Whether several offer that name; asking for it is then an error.
+  bool contested(std::string_view kind, std::string_view name) const {
+    const auto it = index.find(Key(kind, name));
+    return it != index.end() && it->second.size() > 1;
   }
 
   void check_type_offered(const Plugin& plugin, std::string_view kind, std::string_view tag,
@@ -225,7 +279,7 @@ struct Registry::Impl {
     const auto it = made.find(tag);
     if (it == made.end()) {
       throw plugin_error(fmt::format("{}: the plugin offers {} but does not make it",
-                                     plugin.sidecar.library.string(), in_words(kind, tag)));
+                                     origin(plugin.sidecar), in_words(kind, tag)));
     }
     return it->second;
   }
@@ -275,6 +329,7 @@ Registry::Registry(const PluginSearch& search) : impl_(std::make_unique<Impl>())
 Registry::~Registry() = default;
 
 std::vector<Offer> Registry::offers() const {
+  const std::lock_guard lock(impl_->mutex);
   std::vector<Offer> result;
   for (const auto& plugin : impl_->plugins) {
     const Sidecar& sidecar = plugin->sidecar;
@@ -294,26 +349,35 @@ std::vector<Offer> Registry::offers() const {
   return result;
 }
 
-std::vector<std::string> Registry::names(std::string_view kind) const { return impl_->names(kind); }
-const std::vector<PluginProblem>& Registry::problems() const { return impl_->problems; }
+std::vector<std::string> Registry::names(std::string_view kind) const {
+  const std::lock_guard lock(impl_->mutex);
+  return impl_->names(kind);
+}
+std::vector<PluginProblem> Registry::problems() const {
+  const std::lock_guard lock(impl_->mutex);
+  return impl_->problems;
+}
 bool Registry::has(std::string_view kind, std::string_view name) const {
+  const std::lock_guard lock(impl_->mutex);
   return impl_->index.contains(Key(kind, name));
 }
 
 std::unique_ptr<Component> Registry::make_component(std::string_view kind,
                                                     const ComponentSpec& spec) {
+  const std::lock_guard lock(impl_->mutex);
   Impl::Plugin& plugin = impl_->load(kind, spec.name);
   const auto& component = plugin.target.components.at(Key(kind, spec.name));
   const Options options(component.table, spec.values, spec.name);
   std::unique_ptr<Component> made = component.factory(options, *this);
   if (!made) {
-    throw plugin_error(fmt::format("{}: the plugin made nothing for {}",
-                                   plugin.sidecar.library.string(), in_words(kind, spec.name)));
+    throw plugin_error(fmt::format("{}: the plugin made nothing for {}", origin(plugin.sidecar),
+                                   in_words(kind, spec.name)));
   }
   return made;
 }
 
 const OptionTable& Registry::options(std::string_view kind, std::string_view name) {
+  const std::lock_guard lock(impl_->mutex);
   Impl::Plugin& plugin = impl_->load(kind, name);
   if (const auto it = plugin.target.components.find(Key(kind, name));
       it != plugin.target.components.end()) {
@@ -328,6 +392,7 @@ const OptionTable& Registry::options(std::string_view kind, std::string_view nam
 }
 
 void Registry::set_type_options(const ComponentSpec& spec) {
+  const std::lock_guard lock(impl_->mutex);
   Impl::Plugin& plugin = impl_->load("types", spec.name);
   if (plugin.types_made) {
     throw Error(ErrorCode::usage,
@@ -341,22 +406,76 @@ void Registry::set_type_options(const ComponentSpec& spec) {
 }
 
 std::shared_ptr<const VariableType> Registry::variable_type(std::string_view tag) {
+  const std::lock_guard lock(impl_->mutex);
   if (const auto it = impl_->variable_types.find(tag); it != impl_->variable_types.end())
     return it->second;
   return impl_->type_of("variable", tag, impl_->variable_types);
 }
 
 std::shared_ptr<const FactorType> Registry::factor_type(std::string_view tag) {
+  const std::lock_guard lock(impl_->mutex);
   if (const auto it = impl_->factor_types.find(tag); it != impl_->factor_types.end())
     return it->second;
   return impl_->type_of("factor", tag, impl_->factor_types);
 }
 
 void Registry::load_all() {
+  const std::lock_guard lock(impl_->mutex);
   for (const auto& plugin : impl_->plugins) {
     impl_->load(*plugin, fmt::format("plugin '{}'", plugin->sidecar.name),
                 plugin->sidecar.offers.empty() ? "" : plugin->sidecar.offers.front().kind);
   }
+}
+
+void Registry::add_component(std::string_view kind, std::string name, OptionTable table,
+                             Registrar::Factory<Component> factory, std::string summary) {
+  const std::lock_guard lock(impl_->mutex);
+  Registrar::Target target;
+  target.components.emplace(Key(kind, name),
+                            Registrar::Target::Component{std::move(table), std::move(factory)});
+  impl_->add_own({{std::string(kind), std::move(name), std::move(summary)}}, std::move(target));
+}
+
+void Registry::add(std::shared_ptr<const VariableType> type, std::string summary) {
+  if (!type) throw Error(ErrorCode::usage, "there is no variable type to add: it is null");
+  const std::lock_guard lock(impl_->mutex);
+  Registrar::Target target;
+  const std::string tag(type->tag());
+  target.types.emplace(tag, Registrar::Target::Types{{}, [type](const Options&) {
+                                                       return TypeSet{{type}, {}};
+                                                     }});
+  impl_->add_own({{"variable", tag, std::move(summary)}}, std::move(target));
+}
+
+void Registry::add(std::shared_ptr<const FactorType> type, std::string summary) {
+  if (!type) throw Error(ErrorCode::usage, "there is no factor type to add: it is null");
+  const std::lock_guard lock(impl_->mutex);
+  Registrar::Target target;
+  const std::string tag(type->tag());
+  target.types.emplace(tag, Registrar::Target::Types{{}, [type](const Options&) {
+                                                       return TypeSet{{}, {type}};
+                                                     }});
+  impl_->add_own({{"factor", tag, std::move(summary)}}, std::move(target));
+}
+
+void Registry::add_types(std::string name, OptionTable table,
+                         std::function<TypeSet(const Options&)> factory, std::string summary) {
+  const std::lock_guard lock(impl_->mutex);
+  const TypeSet types = factory(Options(table, {}, name));
+  std::vector<Sidecar::Offered> offers = {{"types", name, std::move(summary)}};
+  for (const auto& type : types.variables)
+    offers.push_back({"variable", std::string(type->tag()), "of types '" + name + "'"});
+  for (const auto& type : types.factors)
+    offers.push_back({"factor", std::string(type->tag()), "of types '" + name + "'"});
+  Registrar::Target target;
+  target.types.emplace(std::move(name),
+                       Registrar::Target::Types{std::move(table), std::move(factory)});
+  impl_->add_own(std::move(offers), std::move(target));
+}
+
+Registry& default_registry() {
+  static Registry registry;
+  return registry;
 }
 
 }  // namespace cairn

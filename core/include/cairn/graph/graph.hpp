@@ -19,6 +19,8 @@
 
 namespace cairn {
 
+class Information;
+
 /// All states of a graph: one contiguous array for each variable pool, in the order of the pools.
 /// Copying it is how an optimizer takes a trial step.
 struct Values {
@@ -97,6 +99,19 @@ class CAIRN_API Graph {
   Renumbering erase(Id id);
   /// Takes out one factor, likewise.
   Renumbering erase_factor(int position);
+
+  // Values: to be had from cairn/cairn.hpp, which also says what they throw -----------------------
+  /// Adds a variable with a first estimate, such as a `Pose2`. Returns its index.
+  template <class T>
+  int add(Id id, const T& value);
+  /// Adds a measurement, such as a `Between`, with its information and, unless null, a robust loss
+  /// of its own. Returns its position among all factors.
+  template <class M>
+  int add(const M& measurement, const Information& information,
+          std::shared_ptr<const Loss> loss = nullptr);
+  /// The present estimate of a variable, such as at<Pose2>(3).
+  template <class T>
+  T at(Id id) const;
 
   /// Takes out the factors and variables marked (by position and by index); what stays keeps its
   /// order and its state, and moves up. Takes time in proportion to the whole graph. Throws `Error`

@@ -2,11 +2,14 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "cairn/graph/elements.hpp"
 
 namespace cairn {
+
+class Information;
 
 /// A factor within an estimator: numbered in the order of addition, from 0, never used twice.
 using FactorId = std::int64_t;
@@ -30,6 +33,18 @@ struct GraphUpdate {
   std::vector<FactorId> removed_factors;
   /// Variables that leave with all factors on them.
   std::vector<Id> removed_variables;
+
+  // Values: to be had from cairn/cairn.hpp --------------------------------------------------------
+  /// A variable with a first estimate, such as a `Pose2`.
+  template <class T>
+  void add(Id id, const T& value);
+  /// A variable that a measurement of this update places: add<Pose2>(3).
+  template <class T>
+  void add(Id id);
+  /// A measurement, such as a `Between`, with its information and, unless null, a loss of its own.
+  template <class M>
+  void add(const M& measurement, const Information& information,
+           std::shared_ptr<const Loss> loss = nullptr);
 
   bool empty() const {
     return variables.empty() && factors.empty() && changed.empty() && marginalized.empty() &&

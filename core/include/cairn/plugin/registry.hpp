@@ -63,8 +63,8 @@ struct Offer {
   std::string kind;
   std::string name;
   std::string summary;
-  std::string plugin;  ///< name of the plugin
-  std::filesystem::path file;
+  std::string plugin;          ///< name of the plugin; "this program" if it was added in-process
+  std::filesystem::path file;  ///< shared object; empty if it was added in-process
   std::string licence;
   std::string version;
 };
@@ -88,7 +88,12 @@ struct PluginSearch {
 /// The constructor reads the small JSON file beside each shared object and opens none of them (only
 /// those named by file are opened, since a user who names one wants to know at once). A plugin is
 /// loaded when one of its names is asked for, and never unloaded: its objects may outlive the
-/// registry. All errors are `Error` (plugin or usage) and say what is on offer. Not thread-safe.
+/// registry. A program adds components and types of its own with `add` and `add_types`: these need
+/// no shared object. A name that is offered twice is an error, with both origins, for whoever asks
+/// for it and for nobody else. All errors are `Error` (plugin or usage) and say what is on offer.
+///
+/// Thread-safe: calls wait for each other, also while a factory makes a component. What was made is
+/// not guarded by the registry any more.
 class CAIRN_API Registry {
  public:
   explicit Registry(const PluginSearch& search = {});
@@ -100,7 +105,34 @@ class CAIRN_API Registry {
   std::vector<Offer> offers() const;
   /// Names of one kind, sorted.
   std::vector<std::string> names(std::string_view kind) const;
-  const std::vector<PluginProblem>& problems() const;
+  std::vector<PluginProblem> problems() const;
+
+  // What this program adds
+  // -------------------------------------------------------------------------
+  /// Adds a component of kind `Interface::kKind`; `factory` as for `Registrar::add`. `summary` is a
+  /// line for listings. Throws `Error` (usage) if this program has added that name before.
+  ///
+  ///     registry.add<LinearSolver>("mine", {}, [](const Options&, Registry&) {
+  ///       return std::make_unique<Mine>();
+  ///     });
+  template <class Interface>
+  void add(std::string name, OptionTable table, Registrar::Factory<Interface> factory,
+           std::string summary = {}) {
+    add_component(
+        Interface::kKind, std::move(name), std::move(table),
+        [factory = std::move(factory)](const Options& options, Registry& registry)
+            -> std::unique_ptr<Component> { return factory(options, registry); },
+        std::move(summary));
+  }
+  /// Adds one type under its tag, also for reading files that hold it:
+  /// add(define_factor<Range>()). Throws `Error` (usage) for null, or a tag that this program has
+  /// added before.
+  void add(std::shared_ptr<const VariableType> type, std::string summary = {});
+  void add(std::shared_ptr<const FactorType> type, std::string summary = {});
+  /// Adds types that take options (`set_type_options`) under the name of their set. `factory` is
+  /// called with the defaults at once, for the tags, and again when the first type is asked for.
+  void add_types(std::string name, OptionTable table,
+                 std::function<TypeSet(const Options&)> factory, std::string summary = {});
 
   /// Makes a component: `make<LinearSolver>("cholmod:ordering=metis")`.
   template <class Interface>
@@ -129,8 +161,17 @@ class CAIRN_API Registry {
 
  private:
   std::unique_ptr<Component> make_component(std::string_view kind, const ComponentSpec& spec);
+  void add_component(std::string_view kind, std::string name, OptionTable table,
+                     Registrar::Factory<Component> factory, std::string summary);
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };
+
+/// The registry that short forms such as `optimize` use: one for the process, with the plugins that
+/// are found where `PluginSearch` looks by default, made when it is first asked for. Global,
+/// because what is installed is a property of the process, and because graphs, files and estimators
+/// fit together only if their types come from one registry. Who wants another passes it on
+/// explicitly.
+CAIRN_API Registry& default_registry();
 
 }  // namespace cairn

@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "cairn/typed/run.hpp"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <numbers>
+#include <string>
+
+#include "cairn/typed/build.hpp"
+
+namespace cairn {
+namespace {
+
+Graph drifted_square() {
+  constexpr double kQuarter = std::numbers::pi / 2;
+  Graph graph;
+  graph.add(0, Pose2(0.0, 0.0, 0.0));
+  graph.add(1, Pose2(4.1, 0.0, kQuarter));
+  graph.add(2, Pose2(4.2, 4.1, 2 * kQuarter));
+  graph.add(3, Pose2(0.1, 4.2, 3 * kQuarter));
+  for (const Id from : {0, 1, 2, 3})
+    graph.add(Between(from, (from + 1) % 4, Pose2(4.0, 0.0, kQuarter)),
+              Information::sigmas(0.1, 0.1, 0.05));
+  return graph;
+}
+
+TEST(Optimize, FindsTheMinimumByDefaultAndByName) {
+  for (const char* name :
+       {"levenberg_marquardt", "dogleg:linear_solver=cholmod", "dogleg:linear_solver=eigen"}) {
+    Graph graph = drifted_square();
+    const double before = chi2(graph);
+    const Summary summary = optimize(graph, name);
+    EXPECT_EQ(summary.status, Status::converged) << name;
+    EXPECT_NEAR(summary.initial_chi2, before, 1e-12 * before);
+    EXPECT_NEAR(chi2(graph), summary.final_chi2, 1e-12);
+    EXPECT_TRUE(graph.at<Pose2>(2).equals({4.0, 4.0, std::numbers::pi}, 1e-6)) << name;
+  }
+  Graph graph = drifted_square();
+  EXPECT_EQ(optimize(graph).optimizer, "levenberg_marquardt");
+}
+
+TEST(Optimize, TakesAStopAndARegistry) {
+  Registry registry;
+  Graph graph = drifted_square();
+  const Summary summary =
+      optimize(graph, "gauss_newton", {.max_iterations = 1, .tolerance = 0.0}, registry);
+  EXPECT_EQ(summary.iterations.size(), 1U);
+}
+
+TEST(Chi2, HasTheLossOfTheGraph) {
+  Graph graph = drifted_square();
+  const double square = chi2(graph);
+  graph.set_loss(make<Loss>("cauchy:scale=0.5"));
+  EXPECT_LT(chi2(graph), square);
+  EXPECT_NEAR(chi2(graph), optimize(graph, "gauss_newton", {.max_iterations = 0}).initial_chi2,
+              1e-12);
+}
+
+TEST(ReadAndWrite, KeepTheGraph) {
+  std::string folder = (std::filesystem::temp_directory_path() / "cairn-typed-XXXXXX").string();
+  ASSERT_NE(mkdtemp(folder.data()), nullptr);
+  const std::filesystem::path file = std::filesystem::path(folder) / "square.g2o";
+  const Graph graph = drifted_square();
+  write(graph, file);
+  const Graph back = read(file);
+  std::filesystem::remove_all(folder);
+  EXPECT_EQ(back.variable_count(), 4);
+  EXPECT_EQ(back.factor_count(), 4);
+  EXPECT_EQ(chi2(back), chi2(graph));
+  EXPECT_TRUE(back.at<Pose2>(3).equals(graph.at<Pose2>(3), 0.0));
+}
+
+}  // namespace
+}  // namespace cairn

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "cairn/graph/symbol.hpp"
+
+#include <gtest/gtest.h>
+
+namespace cairn {
+namespace {
+
+using symbols::L;
+using symbols::X;
+
+TEST(Symbols, AreLettersWithAnIndex) {
+  EXPECT_EQ(as_symbol(symbol('x', 3)), (Symbol{'x', 3}));
+  EXPECT_EQ(as_symbol(symbol('Z', (Id{1} << 45) - 1)), (Symbol{'Z', (Id{1} << 45) - 1}));
+  EXPECT_EQ(X(3), symbol('x', 3));
+  EXPECT_EQ(L(2), symbol('l', 2));
+  static_assert(X(1) != L(1));
+}
+
+TEST(Symbols, FollowEachOtherAndAreExactAsDoubles) {
+  EXPECT_EQ(X(8) + 1, X(9));
+  for (const char letter : {'A', 'x', 'z'}) {
+    const Id id = symbol(letter, (Id{1} << 45) - 1);
+    EXPECT_EQ(static_cast<Id>(static_cast<double>(id)), id);
+    EXPECT_LT(id, Id{1} << 53);
+    EXPECT_GT(id, 0);
+  }
+}
+
+TEST(Symbols, AreNotIdsOfFiles) {
+  for (const Id id : {Id{0}, Id{7}, Id{-1}, Id{1} << 40, Id{1} << 60, INT64_MIN, INT64_MAX})
+    EXPECT_EQ(as_symbol(id), std::nullopt) << id;
+}
+
+TEST(Symbols, PrintAsTheyAreRead) {
+  EXPECT_EQ(id_text(X(12)), "x12");
+  EXPECT_EQ(id_text(12), "12");
+  EXPECT_EQ(id_text(-3), "-3");
+}
+
+TEST(Symbols, RefuseOtherLettersAndIndices) {
+  EXPECT_THROW(symbol('1', 3), Error);
+  EXPECT_THROW(symbol('x', -1), Error);
+  EXPECT_THROW(symbol('x', Id{1} << 45), Error);
+}
+
+}  // namespace
+}  // namespace cairn
