@@ -26,7 +26,7 @@ struct CompactOptions {
   std::string graph;
   std::string output, output_format;
   std::string trajectory;
-  std::string recovery = "v2";
+  std::string recovery{to_string(Recovery::distribute)};
   std::string policy = "compact_pose";
   std::string strategy = "fpfl";
   std::string estimator;
@@ -43,12 +43,6 @@ struct CompactOptions {
   InputOptions input;
   ProblemOptions problem;
 };
-
-Recovery recovery_of(const std::string& name) {
-  if (name == "v0") return Recovery::uniform;
-  if (name == "v1") return Recovery::interpolate;
-  return name == "v2" ? Recovery::distribute : Recovery::likely;
-}
 
 // Input -------------------------------------------------------------------------------------------
 
@@ -195,7 +189,7 @@ json::object result_json(const CompactResult& result, const Recording& recording
   json::object errors;
   for (const auto& [name, error] : result.errors) errors[name] = error_json(error);
   report["errors"] = errors.empty() ? json::value(nullptr) : json::value(std::move(errors));
-  const auto v2 = result.errors.find("v2");
+  const auto v2 = result.errors.find(std::string(to_string(Recovery::distribute)));
   report["rmse"] =
       v2 == result.errors.end() ? json::value(nullptr) : json::value(v2->second.ate_translation);
   if (result.normalized) {
@@ -356,7 +350,7 @@ int run(const CompactOptions& options, Session& session) {
   const InterruptGuard guard;  // until the results are written
   const CompactSetting setting{recording, setup, guard, session};
   const Job job = prepare(options, setting);
-  const Recovery recovery = recovery_of(options.recovery);
+  const Recovery recovery = parse_enum<Recovery>(options.recovery, "--recovery");
   std::optional<UncertaintyComparison> comparison;
   if (!options.compare.empty()) comparison.emplace(setting);
   const auto run_job = [&](const CompactJob& who, UncertaintyComparison* compare) {
@@ -405,7 +399,7 @@ Command add_compact(CLI::App& program) {
   app->add_option("--recovery", options->recovery,
                   "v0 evenly, v1 by distance, v2 along odometry, or likely")
       ->type_name("HOW")
-      ->check(one_of({"v0", "v1", "v2", "likely"}))
+      ->check(one_of(names_of_enum<Recovery>()))
       ->capture_default_str();
   app->add_option("--strategy", options->strategy,
                   "all or few poses and loops: apal, apfl, fpfl; rfpfl at random, as many as fpfl")

@@ -78,16 +78,11 @@ void count_nonzeros(CompactResult& result, Registry& registry) {
   result.factor_nonzeros = solver->stats().factor_nonzeros;
 }
 
-constexpr std::array<std::pair<const char*, Recovery>, 4> kRecoveries{
-    {{"v0", Recovery::uniform},
-     {"v1", Recovery::interpolate},
-     {"v2", Recovery::distribute},
-     {"likely", Recovery::likely}}};
-
 void evaluate(PosePolicy& policy, const Recording& recording, CompactResult& result) {
   if (!recording.truth) return;
-  for (const auto& [name, how] : kRecoveries)
-    result.errors[name] = compare(trajectory(recovered_way(policy, how)), *recording.truth);
+  for (const auto& [how, name] : enum_names(Recovery{}))
+    result.errors[std::string(name)] =
+        compare(trajectory(recovered_way(policy, how)), *recording.truth);
   if (recording.truth_graph)
     result.normalized = normalized_error(result.compact, *recording.truth_graph);
 }
