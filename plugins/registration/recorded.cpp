@@ -76,16 +76,8 @@ class Recorded final : public Registration, public FalseMatches {
 
 }  // namespace
 
-OptionTable recorded_options() {
-  return OptionTable{}
-      .real("false_rate", 0.0, 0.0, 1.0,
-            "part of the pairs that match whose measured motion is replaced by a random one")
-      .integer("seed", 1, 0, 1e15, "which pairs that are, and with which motions");
-}
-
-std::unique_ptr<Registration> make_recorded(const Options& options) {
-  return std::make_unique<Recorded>(options.real("false_rate"),
-                                    static_cast<std::uint64_t>(options.integer("seed")));
+std::unique_ptr<Registration> make_recorded(const RecordedOptions& options) {
+  return std::make_unique<Recorded>(options.false_rate, options.seed);
 }
 
 }  // namespace cairn::registration
