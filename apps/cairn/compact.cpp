@@ -33,7 +33,7 @@ struct CompactOptions {
   std::string graph;
   std::string output, output_format;
   std::string trajectory;
-  std::string recovery = "v2";
+  std::string recovery{to_string(Recovery::distribute)};
   std::string policy = "compact_pose";
   std::string strategy = "fpfl";
   std::string estimator;
@@ -50,11 +50,6 @@ struct CompactOptions {
   InputOptions input;
   ProblemOptions problem;
 };
-
-Recovery recovery_of(const std::string& name) {
-  return std::ranges::find(kRecoveryNames, name, &decltype(kRecoveryNames)::value_type::first)
-      ->second;
-}
 
 // Input -------------------------------------------------------------------------------------------
 
@@ -216,7 +211,7 @@ json::object result_json(const PolicyResult& result, const Recording& recording)
   json::object errors;
   for (const auto& [name, error] : result.errors) errors[name] = error_json(error);
   report["errors"] = errors.empty() ? json::value(nullptr) : json::value(std::move(errors));
-  const auto v2 = result.errors.find("v2");
+  const auto v2 = result.errors.find(std::string(to_string(Recovery::distribute)));
   report["rmse"] =
       v2 == result.errors.end() ? json::value(nullptr) : json::value(v2->second.ate_translation);
   if (result.normalized) {
@@ -383,7 +378,7 @@ int run(const CompactOptions& options, Session& session) {
         progress.show(title, count, counts);
       }};
   const Job job = prepare(options, setting);
-  const Recovery recovery = recovery_of(options.recovery);
+  const Recovery recovery = parse_enum<Recovery>(options.recovery, "--recovery");
   std::optional<UncertaintyComparison> comparison;
   if (!options.compare.empty()) {
     comparison.emplace(recording.data, registry.make<Estimator>("incremental_cholesky"));
@@ -435,7 +430,7 @@ Command add_compact(CLI::App& program) {
   app->add_option("--recovery", options->recovery,
                   "v0 evenly, v1 by distance, v2 along odometry, or likely")
       ->type_name("HOW")
-      ->check(one_of({"v0", "v1", "v2", "likely"}))
+      ->check(one_of(names_of_enum<Recovery>()))
       ->capture_default_str();
   app->add_option("--strategy", options->strategy,
                   "all or few poses and loops: apal, apfl, fpfl; rfpfl at random, as many as fpfl")

@@ -74,7 +74,9 @@ constexpr auto kByGain = [](const auto& a, const auto& b) {
 }  // namespace
 
 CompactPose::CompactPose(std::unique_ptr<Estimator> estimator, CompactPoseOptions options)
-    : options_(std::move(options)), graph_(std::move(estimator), options_.composition) {}
+    : options_(std::move(options)),
+      range_(options_.sensor_range()),
+      graph_(std::move(estimator), options_.composition) {}
 
 void CompactPose::start(const Variable& pose) {
   // Before anything has changed: what the options say fits this type of pose.
@@ -83,15 +85,15 @@ void CompactPose::start(const Variable& pose) {
   sensor_ = sensor;
   const RigidGroup& group = graph_.group();
   const int n = group.tangent_size();
-  test_.emplace(group, options_.range);
-  radius_ = options_.search == Search::index ? options_.range.radius(group.dimension()) : kInfinity;
-  check_.emplace(group, options_.range, options_.gate, options_.trust);
+  test_.emplace(group, range_);
+  radius_ = options_.search == Search::index ? range_.radius(group.dimension()) : kInfinity;
+  check_.emplace(group, range_, options_.gate, options_.trust);
   const auto threshold = [&](bool everything, double chosen, double power) {
     if (everything) return -kInfinity;
     return chosen < 0.0 ? default_gain(n, power) : chosen;
   };
-  loop_gain_ = threshold(options_.all_loops, options_.loop_gain, 1.36);
-  pose_gain_ = threshold(options_.all_poses, options_.pose_gain, 1.7);
+  loop_gain_ = threshold(options_.strategy == Strategy::apal, options_.loop_gain, 1.36);
+  pose_gain_ = threshold(options_.strategy != Strategy::fpfl, options_.pose_gain, 1.7);
 }
 
 void CompactPose::add_pose(const Variable& pose, std::span<const Factor> odometry) {
@@ -386,7 +388,7 @@ OptionValues CompactPose::watching() const {
   return {{"strategy", "apal"}, {"search", "untested"}};
 }
 
-OptionValues CompactPose::found() const { return finder_.found(options_.range.probability); }
+OptionValues CompactPose::found() const { return finder_.found(range_.probability); }
 
 OptionValues CompactPose::scaled(const OptionValues& found, double links, double poses) const {
   OptionValues values = found;

@@ -10,36 +10,12 @@
 
 #include "cairn/policy/pose_policy.hpp"
 #include "compact_graph.hpp"
+#include "compact_pose_options.hpp"
 #include "consistency.hpp"
 #include "proximity.hpp"
 #include "threshold_finder.hpp"
 
 namespace cairn::compact {
-
-/// Which poses are tested for being near.
-enum class Search {
-  index,     ///< those that the spatial index finds
-  all,       ///< all of them, which finds the same
-  untested,  ///< all count as near
-};
-
-struct CompactPoseOptions {
-  bool all_loops = false;  ///< every loop closure that is found is used (strategy apal)
-  bool all_poses = false;  ///< every pose is kept (apal, apfl)
-  SensorRange range;
-  double loop_gain = -1.0;  ///< g_loop [nats]; negative: by the size of a pose
-  double pose_gain = -1.0;  ///< g_pose [nats]; negative: likewise
-  /// Σ̄_y, what a registration is expected to be worth, upper triangle by rows, or the standard
-  /// deviations of translation [m] and rotation [rad]. Empty: like the newest odometry.
-  std::vector<double> sensor;
-  CompositionOrder composition = CompositionOrder::first;
-  bool reuse = false;  ///< a pose that is found to be at a kept one is not kept itself
-  /// … where the link loses at most this information [nats per DoF and kept pose nearby].
-  double reuse_loss = 0.06;
-  Search search = Search::index;
-  double gate = 0.0;    ///< part of the right links that pass the consistency check; 0: off
-  double trust = 0.01;  ///< see `ConsistencyCheck`
-};
 
 /// Compact pose SLAM: Algorithm 1 of Ila, Polok, Solony and Svoboda, IJRR 2017, section 4.
 ///
@@ -103,6 +79,7 @@ class CompactPose final : public PosePolicy, public OptionFinder {
   bool agrees_with_waiting(const Link& link);
 
   CompactPoseOptions options_;
+  SensorRange range_;
   CompactGraph graph_;
   std::optional<DistanceTest> test_;
   std::optional<ConsistencyCheck> check_;

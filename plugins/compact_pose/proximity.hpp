@@ -3,6 +3,7 @@
 
 #include <array>
 
+#include "cairn/runtime/enum_names.hpp"
 #include "rigid_group.hpp"
 
 namespace cairn::compact {
@@ -21,6 +22,11 @@ enum class RotationTest {
   magnitude,  ///< the angle
   view,       ///< the angle between the two view directions, whatever the roll
 };
+constexpr auto enum_names(RotationTest) {
+  return std::to_array<EnumName<RotationTest>>({{RotationTest::elements, "elements"},
+                                                {RotationTest::magnitude, "magnitude"},
+                                                {RotationTest::view, "view"}});
+}
 
 /// From where a sensor sees the same as from another pose.
 struct SensorRange {

@@ -7,12 +7,32 @@
 #include <optional>
 #include <set>
 #include <span>
+#include <string>
 #include <vector>
 
+#include "cairn/plugin/option_fields.hpp"
 #include "cairn/policy/pose_policy.hpp"
 #include "compact_graph.hpp"
 
 namespace cairn::compact {
+
+/// Options of the pose policy `random_poses`.
+struct RandomPosesOptions {
+  int poses = 100;         ///< kept, the first and the last among them
+  int loops = 10;          ///< loop closures used
+  std::uint64_t seed = 1;  ///< of the draw
+  std::string estimator = "incremental_cholesky";
+
+  static auto fields() {
+    using O = RandomPosesOptions;
+    return OptionFields<O>()
+        .integer("poses", &O::poses, 2, 1e9, "kept, the first and the last among them")
+        .integer("loops", &O::loops, 0, 1e9,
+                 "loop closures used, if there are so many between those")
+        .integer("seed", &O::seed, 0, 1e15, "of the draw")
+        .component<Estimator>("estimator", &O::estimator, "estimator");
+  }
+};
 
 /// The control: as many poses and loop closures of a recording as another policy keeps, drawn at
 /// random (RFPFL of the paper). Loop closures are drawn first, with their poses, as far as there is

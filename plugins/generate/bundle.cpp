@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "bundle.hpp"
 #include "cairn/runtime/error.hpp"
 #include "generators.hpp"
 #include "rigid.hpp"
@@ -23,19 +24,6 @@ constexpr double kHalfWidth = 600.0, kHalfHeight = 450;  // of an image [px]
 constexpr double kNearest = 2.0, kFurthest = 30.0;       // depths at which a point is seen [m]
 constexpr int kTries = 200;                              // to place a point that two cameras see
 constexpr int kLeastSightings = 8;  // of a camera: sixteen numbers for its nine unknowns
-
-/// How first estimates and measurements err.
-struct Errors {
-  double pixel, translation, rotation, focal, distortion, point;
-  double scale;
-};
-
-struct World {
-  bool street;
-  int cameras, points, track;
-  std::int64_t outliers;
-  Errors errors;
-};
 
 struct Camera {
   double f, k1, k2;
@@ -85,21 +73,21 @@ Pose3 along(int k) {
   return looking({kStep * k, 0.0, 0.0}, {1.0, k % 2 == 0 ? kSideways : -kSideways, 0.0});
 }
 
-std::vector<Camera> place_cameras(const World& world, Random& random) {
+std::vector<Camera> place_cameras(const BundleOptions& world, Random& random) {
   std::vector<Camera> cameras(static_cast<std::size_t>(world.cameras));
   for (int k = 0; k < world.cameras; ++k) {
     Camera& camera = cameras[k];
     camera.f = kFocalLength * random.uniform(0.95, 1.05);
     camera.k1 = random.uniform(-0.1, 0.0);
     camera.k2 = random.uniform(0.0, 0.02);
-    camera.pose = world.street ? along(k) : around(k, world.cameras);
+    camera.pose = world.layout == Layout::street ? along(k) : around(k, world.cameras);
   }
   return cameras;
 }
 
 /// On a ball of 5 m at the origin, or on the fronts of the houses, 8 m to both sides.
-SurfacePoint draw_point(const World& world, Random& random) {
-  if (world.street) {
+SurfacePoint draw_point(const BundleOptions& world, Random& random) {
+  if (world.layout == Layout::street) {
     constexpr double kSide = 8.0, kDepth = 1.5;  // [m]
     const bool left = random.chance(0.5);
     const double x = random.uniform(kNearest, world.cameras + kFurthest);
@@ -146,8 +134,8 @@ bool sees(const Camera& camera, const SurfacePoint& point, Pixel& pixel) {
 }
 
 /// The cameras that may see a point: all, or those of the stretch of the street before it.
-std::array<int, 2> candidates(const World& world, const Point& at) {
-  if (!world.street) return {0, world.cameras};
+std::array<int, 2> candidates(const BundleOptions& world, const Point& at) {
+  if (world.layout != Layout::street) return {0, world.cameras};
   const double first = std::floor(at[0] - 1.5 * kFurthest), last = std::ceil(at[0]);
   return {std::max(0, static_cast<int>(first)),
           std::min(world.cameras, std::max(0, static_cast<int>(last)))};
@@ -155,7 +143,7 @@ std::array<int, 2> candidates(const World& world, const Point& at) {
 
 class Scene {
  public:
-  Scene(const World& world, std::uint64_t seed) : world_(world) {
+  Scene(const BundleOptions& world, std::uint64_t seed) : world_(world) {
     Random path(seed, Random::Stream::path), place(seed, Random::Stream::landmarks);
     cameras = place_cameras(world, path);
     for (int k = 0; k < world.points; ++k) add_point(place);
@@ -212,13 +200,13 @@ class Scene {
                     " are the least; ask for more points, or for longer tracks (track=)");
   }
 
-  const World& world_;
+  const BundleOptions& world_;
   std::vector<Sighting> seen_;
 };
 
 /// Wrong data associations: what is seen of one point, taken for another that the camera would see
 /// somewhere else.
-void confuse(Scene& scene, const World& world, Random& random) {
+void confuse(Scene& scene, const BundleOptions& world, Random& random) {
   const double least = 20.0 * world.errors.pixel * std::max(world.errors.scale, 1.0);
   const auto right = static_cast<std::int64_t>(scene.sightings.size());
   for (std::int64_t k = 0; k < world.outliers; ++k) {
@@ -245,7 +233,7 @@ void confuse(Scene& scene, const World& world, Random& random) {
 }
 
 /// The first estimate of a camera.
-Camera disturbed(const Camera& truth, const Errors& errors, Random& random) {
+Camera disturbed(const Camera& truth, const BundleErrors& errors, Random& random) {
   std::array<double, 6> motion;
   for (int k = 0; k < 6; ++k) {
     motion[k] = errors.scale * (k < 3 ? errors.translation : errors.rotation) * random.gaussian();
@@ -257,11 +245,12 @@ Camera disturbed(const Camera& truth, const Errors& errors, Random& random) {
   return {truth.f + f, truth.k1 + k1, truth.k2 + k2, compose(truth.pose, from_vectors(motion))};
 }
 
-Simulation build(const Scene& scene, const World& world, Registry& types, std::uint64_t seed) {
+Simulation build(const Scene& scene, const BundleOptions& world, Registry& types,
+                 std::uint64_t seed) {
   const auto camera = types.variable_type("VERTEX_CAMERA_BAL");
   const auto point = types.variable_type("VERTEX_TRACKXYZ");
   const auto projection = types.factor_type("EDGE_PROJECT_BAL");
-  const Errors& errors = world.errors;
+  const BundleErrors& errors = world.errors;
   Random guess(seed, Random::Stream::loops), noise(seed, Random::Stream::noise);
 
   Graph graph;
@@ -294,41 +283,7 @@ Simulation build(const Scene& scene, const World& world, Registry& types, std::u
 
 }  // namespace
 
-OptionTable bundle_options() {
-  OptionTable table;
-  table
-      .choice("layout", "ring", {"ring", "street"},
-              "cameras around an object, or along a street: which cameras share points")
-      .integer("cameras", 50, 4, 1e6, "number of cameras")
-      .integer("points", 2000, 8, 1e8, "number of points")
-      .integer("track", 6, 2, 1e6, "cameras that see a point, at most")
-      .real("pixel_sigma", 1.0, 1e-9, 1e6,
-            "noise of what is measured, each axis [px]; BAL files can only express 1")
-      .real("translation_sigma", 0.1, 0.0, 1e6,
-            "error of a camera's initial position, each axis [m]; none for the first camera")
-      .real("rotation_sigma", 0.01, 0.0, 3.0, "error of its initial orientation, each axis [rad]")
-      .real("focal_sigma", 10.0, 0.0, 1e6, "error of its initial focal length [px]")
-      .real("distortion_sigma", 0.01, 0.0, 10.0, "error of its initial k1 and k2")
-      .real("point_sigma", 0.2, 0.0, 1e6, "error of a point's initial position, each axis [m]")
-      .real("noise", 1.0, 0.0, 1000.0,
-            "factor on all noise and errors; 0: all exact, weighted as for 1")
-      .integer("outliers", 0, 0, 1e9, "observations associated with a wrong point");
-  return table;
-}
-
-std::unique_ptr<Generator> make_bundle(const Options& options) {
-  const World world{.street = options.text("layout") == "street",
-                    .cameras = static_cast<int>(options.integer("cameras")),
-                    .points = static_cast<int>(options.integer("points")),
-                    .track = static_cast<int>(options.integer("track")),
-                    .outliers = options.integer("outliers"),
-                    .errors = {.pixel = options.real("pixel_sigma"),
-                               .translation = options.real("translation_sigma"),
-                               .rotation = options.real("rotation_sigma"),
-                               .focal = options.real("focal_sigma"),
-                               .distortion = options.real("distortion_sigma"),
-                               .point = options.real("point_sigma"),
-                               .scale = options.real("noise")}};
+std::unique_ptr<Generator> make_bundle(const BundleOptions& world) {
   return std::make_unique<FunctionGenerator>([world](Registry& types, std::uint64_t seed) {
     Scene scene(world, seed);
     Random wrong(seed, Random::Stream::outliers);

@@ -14,6 +14,7 @@
 #include <cmath>
 
 #include "cairn/runtime/error.hpp"
+#include "ellipse.hpp"
 #include "generators.hpp"
 #include "loops.hpp"
 #include "noise.hpp"
@@ -65,33 +66,17 @@ std::vector<Pose3> drive(const std::vector<Ellipse>& turns, int poses) {
   return path;
 }
 
-void add_ellipse_options(OptionTable& table) {
-  table
-      .choice("axes", "semi", {"semi", "whole"},
-              "whether the paper's lengths are half axes or whole ones")
-      .real("height", 2.4, 0.0, 1e6, "rise of the path above its lowest points [m]")
-      .real("loop_radius", 3.0, 1e-3, 1e4, "poses nearer than this are linked [m]")
-      .real("loop_angle", 0.2, 0.0, 3.15, "if their orientations differ less than this [rad]")
-      .real("loop_density", 1.0, 0.0, 1.0, "probability of such a link");
-  add_noise_options(table,
-                    {.translation_sigma = 1e-3,
-                     .rotation_sigma = 1e-3,
-                     .translation_share = 0.05,
-                     .rotation_share = 0.05},
-                    /*shares=*/true);
-  add_outlier_option(table);
-}
-
-std::unique_ptr<Generator> make(const Options& options, std::vector<Ellipse> turns, int poses) {
-  const double scale = options.text("axes") == "whole" ? 0.5 : 1.0;
-  for (Ellipse& turn : turns) turn = {scale * turn.a, scale * turn.b, options.real("height")};
+std::unique_ptr<Generator> make(const EllipseOptions& options, std::vector<Ellipse> turns,
+                                int poses) {
+  const double scale = options.axes == Axes::whole ? 0.5 : 1.0;
+  for (Ellipse& turn : turns) turn = {scale * turn.a, scale * turn.b, options.height};
   LoopRule rule;
-  rule.radius = options.real("loop_radius");
-  rule.max_angle = options.real("loop_angle");
-  rule.probability = options.real("loop_density");
+  rule.radius = options.loop_radius;
+  rule.max_angle = options.loop_angle;
+  rule.probability = options.loop_density;
   rule.gap = 2;
-  const Noise noise = read_noise(options, /*shares=*/true);
-  const Outliers outliers{options.integer("outliers"), 0.5 * rule.radius};
+  const Noise noise = options.noise;
+  const Outliers outliers{options.outliers, 0.5 * rule.radius};
   return std::make_unique<FunctionGenerator>([=](Registry& types, std::uint64_t seed) {
     Random meet(seed, Random::Stream::loops);
     const std::vector<Pose3> path = drive(turns, poses);
@@ -101,35 +86,19 @@ std::unique_ptr<Generator> make(const Options& options, std::vector<Ellipse> tur
 
 }  // namespace
 
-OptionTable ellipse3d_options() {
-  OptionTable table;
-  table.integer("poses", 170, 3, 1e7, "number of poses");
-  add_ellipse_options(table);
-  return table;
+std::unique_ptr<Generator> make_ellipse3d(const Ellipse3dOptions& options) {
+  return make(options.ellipse, {{10.0, 6.0, 0.0}, {20.0, 6.0, 0.0}}, options.poses);
 }
 
-std::unique_ptr<Generator> make_ellipse3d(const Options& options) {
-  return make(options, {{10.0, 6.0, 0.0}, {20.0, 6.0, 0.0}},
-              static_cast<int>(options.integer("poses")));
-}
-
-OptionTable ellipse_n_options() {
-  OptionTable table;
-  table.integer("laps", 10, 1, 100000, "times around")
-      .integer("poses_per_lap", 106, 3, 100000, "poses per lap, at equal steps along it");
-  add_ellipse_options(table);
-  return table;
-}
-
-std::unique_ptr<Generator> make_ellipse_n(const Options& options) {
-  const std::int64_t laps = options.integer("laps"),
-                     poses = laps * options.integer("poses_per_lap");
+std::unique_ptr<Generator> make_ellipse_n(const EllipseNOptions& options) {
+  const std::int64_t laps = options.laps, poses = laps * options.poses_per_lap;
   if (poses > 10'000'000) {
     throw Error(ErrorCode::usage,
                 "generate ellipse_n: " + std::to_string(poses) +
                     " poses are too many; laps times poses_per_lap may be 10000000");
   }
-  return make(options, std::vector<Ellipse>(static_cast<std::size_t>(laps), {20.0, 6.0, 0.0}),
+  return make(options.ellipse,
+              std::vector<Ellipse>(static_cast<std::size_t>(laps), {20.0, 6.0, 0.0}),
               static_cast<int>(poses));
 }
 

@@ -6,6 +6,7 @@
 #include <cstdlib>
 
 #include "generators.hpp"
+#include "grid3d.hpp"
 #include "loops.hpp"
 #include "noise.hpp"
 #include "simulation_builder.hpp"
@@ -72,25 +73,11 @@ std::vector<Loop> see_neighbours(const Lattice& lattice, double density, Random&
 
 }  // namespace
 
-OptionTable grid3d_options() {
-  OptionTable table;
-  table.integer("nx", 10, 2, 1000, "nodes along x")
-      .integer("ny", 10, 2, 1000, "nodes along y")
-      .integer("nz", 10, 2, 1000, "nodes along z")
-      .real("spacing", 1.0, 1e-3, 1e3, "distance between nodes [m]")
-      .real("loop_density", 0.9, 0.0, 1.0, "probability that a visited neighbour is seen");
-  add_noise_options(table, {.translation_sigma = 0.05, .rotation_sigma = 0.02});
-  add_outlier_option(table);
-  return table;
-}
-
-std::unique_ptr<Generator> make_grid3d(const Options& options) {
-  const Lattice lattice{static_cast<int>(options.integer("nx")),
-                        static_cast<int>(options.integer("ny")),
-                        static_cast<int>(options.integer("nz")), options.real("spacing")};
-  const double density = options.real("loop_density");
-  const Noise noise = read_noise(options);
-  const Outliers outliers{options.integer("outliers"), lattice.spacing};
+std::unique_ptr<Generator> make_grid3d(const Grid3dOptions& options) {
+  const Lattice lattice{options.nx, options.ny, options.nz, options.spacing};
+  const double density = options.loop_density;
+  const Noise noise = options.noise;
+  const Outliers outliers{options.outliers, lattice.spacing};
   return std::make_unique<FunctionGenerator>([=](Registry& types, std::uint64_t seed) {
     Random meet(seed, Random::Stream::loops);
     return simulate(visit_all(lattice), see_neighbours(lattice, density, meet), noise, outliers,

@@ -7,6 +7,7 @@
 
 #include "cairn/runtime/error.hpp"
 #include "generators.hpp"
+#include "landmarks2d.hpp"
 #include "loops.hpp"
 #include "noise.hpp"
 #include "simulation_builder.hpp"
@@ -172,38 +173,19 @@ class LandmarkBuilder {
 
 }  // namespace
 
-OptionTable landmarks2d_options() {
-  OptionTable table;
-  table.integer("poses", 2000, 2, 1e8, "number of poses")
-      .real("step", 1.0, 1e-3, 1e3, "distance between poses [m]")
-      .integer("block", 8, 1, 10000, "steps between two crossings")
-      .integer("streets", 0, 0, 100000, "streets in each direction; 0: as many as fit the poses")
-      .real("landmark_density", 0.02, 1e-9, 1e3, "landmarks per square metre")
-      .choice("sensor", "cartesian", {"cartesian", "bearing_range"},
-              "what is measured of a landmark")
-      .real("sensor_range", 6.0, 1e-3, 1e4, "landmarks nearer than this are seen [m]")
-      .real("loop_density", 0.5, 0.0, 1.0, "probability that a landmark within range is seen")
-      .real("landmark_sigma", 0.1, 1e-9, 1e6, "noise of a landmark's position, or of its range [m]")
-      .real("bearing_sigma", 0.02, 1e-9, 3.0, "noise of a landmark's bearing [rad]");
-  add_noise_options(table, {.translation_sigma = 0.05, .rotation_sigma = 0.01});
-  table.integer("outliers", 0, 0, 1e9, "observations associated with a wrong landmark");
-  return table;
-}
-
-std::unique_ptr<Generator> make_landmarks2d(const Options& options) {
-  const std::int64_t poses = options.integer("poses");
-  const int block = static_cast<int>(options.integer("block"));
-  int streets = static_cast<int>(options.integer("streets"));
+std::unique_ptr<Generator> make_landmarks2d(const Landmarks2dOptions& options) {
+  const std::int64_t poses = options.poses;
+  const int block = options.block;
+  int streets = options.streets;
   if (streets == 0) streets = streets_for(poses, block, 3.0);
-  StreetWorld world{options.real("step"), {}, {}};
+  StreetWorld world{options.step, {}, {}};
   world.east_gaps.assign(static_cast<std::size_t>(std::max(streets - 1, 1)), block);
   world.north_gaps = world.east_gaps;
-  const Sensor sensor{options.text("sensor") == "bearing_range", options.real("sensor_range"),
-                      options.real("loop_density"), options.real("landmark_sigma"),
-                      options.real("bearing_sigma")};
-  const double density = options.real("landmark_density");
-  const std::int64_t outliers = options.integer("outliers");
-  const Noise noise = read_noise(options);
+  const Sensor sensor{options.sensor == LandmarkSensor::bearing_range, options.sensor_range,
+                      options.loop_density, options.landmark_sigma, options.bearing_sigma};
+  const double density = options.landmark_density;
+  const std::int64_t outliers = options.outliers;
+  const Noise noise = options.noise;
   return std::make_unique<FunctionGenerator>([=](Registry& types, std::uint64_t seed) {
     Random walk(seed, Random::Stream::path), meet(seed, Random::Stream::loops);
     Random wrong(seed, Random::Stream::outliers);

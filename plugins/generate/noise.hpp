@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "cairn/plugin/options.hpp"
+#include "cairn/plugin/option_fields.hpp"
 
 namespace cairn::generate {
 
@@ -15,11 +15,33 @@ struct Noise {
   double translation_share = 0.0;
   double rotation_share = 0.0;
   double scale = 1.0;
+
+  /// Options translation_sigma, rotation_sigma and noise.
+  static auto fields() { return add_scale(sigmas()); }
+  /// The same, and translation_error and rotation_error.
+  static auto fields_with_shares() {
+    return add_scale(sigmas()
+                         .real("translation_error", &Noise::translation_share, 0.0, 10.0,
+                               "further noise as a fraction of the length of the relative pose")
+                         .real("rotation_error", &Noise::rotation_share, 0.0, 10.0,
+                               "further noise as a fraction of its angle"));
+  }
+
+ private:
+  static OptionFields<Noise> sigmas() {
+    return OptionFields<Noise>()
+        .real("translation_sigma", &Noise::translation_sigma, 1e-9, 1e6,
+              "noise of measured translations, each axis [m]")
+        .real("rotation_sigma", &Noise::rotation_sigma, 1e-9, 3.0,
+              "noise of measured rotations, each axis [rad]");
+  }
+  static OptionFields<Noise> add_scale(OptionFields<Noise> fields) {
+    return fields.real("noise", &Noise::scale, 0.0, 1000.0,
+                       "factor on all noise; 0: exact measurements, weighted as for 1");
+  }
 };
 
-/// Options noise, translation_sigma, rotation_sigma (and with `shares` translation_error,
-/// rotation_error).
-void add_noise_options(OptionTable& table, const Noise& defaults, bool shares = false);
-Noise read_noise(const Options& options, bool shares = false);
+/// Help of the option outliers where these are loop closures.
+inline constexpr const char* kOutlierHelp = "wrong loop closures, weighted like correct ones";
 
 }  // namespace cairn::generate

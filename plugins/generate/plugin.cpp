@@ -1,30 +1,26 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include "bundle.hpp"
 #include "cairn/plugin/registry.hpp"
-#include "generators.hpp"
-
-namespace {
-
-using Make = std::unique_ptr<cairn::Generator> (*)(const cairn::Options&);
-
-cairn::Registrar::Factory<cairn::Generator> factory(Make make) {
-  return [make](const cairn::Options& options, cairn::Registry&) { return make(options); };
-}
-
-}  // namespace
+#include "city.hpp"
+#include "ellipse.hpp"
+#include "grid3d.hpp"
+#include "landmarks2d.hpp"
+#include "manhattan.hpp"
+#include "ring.hpp"
+#include "sphere.hpp"
+#include "torus.hpp"
 
 void cairn_register(cairn::Registrar& registrar) {
-  using namespace cairn::generate;  // NOLINT: the list below is all that this file is
-  const auto add = [&](const char* name, cairn::OptionTable table, Make make) {
-    registrar.add<cairn::Generator>(name, std::move(table), factory(make));
-  };
-  add("manhattan", manhattan_options(), make_manhattan);
-  add("city", city_options(), make_city);
-  add("ring", ring_options(), make_ring);
-  add("sphere", sphere_options(), make_sphere);
-  add("torus", torus_options(), make_torus);
-  add("grid3d", grid3d_options(), make_grid3d);
-  add("ellipse3d", ellipse3d_options(), make_ellipse3d);
-  add("ellipse_n", ellipse_n_options(), make_ellipse_n);
-  add("landmarks2d", landmarks2d_options(), make_landmarks2d);
-  add("bundle", bundle_options(), make_bundle);
+  using namespace cairn;
+  using namespace cairn::generate;
+  registrar.add<Generator, ManhattanOptions>("manhattan", make_manhattan);
+  registrar.add<Generator, CityOptions>("city", make_city);
+  registrar.add<Generator, RingOptions>("ring", make_ring);
+  registrar.add<Generator, SphereOptions>("sphere", make_sphere);
+  registrar.add<Generator, TorusOptions>("torus", make_torus);
+  registrar.add<Generator, Grid3dOptions>("grid3d", make_grid3d);
+  registrar.add<Generator, Ellipse3dOptions>("ellipse3d", make_ellipse3d);
+  registrar.add<Generator, EllipseNOptions>("ellipse_n", make_ellipse_n);
+  registrar.add<Generator, Landmarks2dOptions>("landmarks2d", make_landmarks2d);
+  registrar.add<Generator, BundleOptions>("bundle", make_bundle);
 }

@@ -178,8 +178,4 @@ template Simulation simulate(const std::vector<Pose2>&, const std::vector<Loop>&
 template Simulation simulate(const std::vector<Pose3>&, const std::vector<Loop>&, const Noise&,
                              const Outliers&, Registry&, std::uint64_t);
 
-void add_outlier_option(OptionTable& table) {
-  table.integer("outliers", 0, 0, 1e9, "wrong loop closures, weighted like correct ones");
-}
-
 }  // namespace cairn::generate

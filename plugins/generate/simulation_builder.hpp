@@ -70,7 +70,4 @@ Simulation simulate(const std::vector<Pose>& path, const std::vector<Loop>& loop
                     const Noise& noise, const Outliers& outliers, Registry& types,
                     std::uint64_t seed);
 
-/// Option outliers.
-void add_outlier_option(OptionTable& table);
-
 }  // namespace cairn::generate

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // A robot that winds its way up a sphere, as in the data sets sphere400 and sphere2500 of Kaess,
 // Ranganathan and Dellaert (iSAM, TRO 2008): each pose sees the one below it, a turn earlier.
+#include "sphere.hpp"
 #include "generators.hpp"
 #include "loops.hpp"
 #include "noise.hpp"
@@ -34,25 +35,12 @@ std::vector<Pose3> wind_up(const Sphere& sphere) {
 
 }  // namespace
 
-OptionTable sphere_options() {
-  OptionTable table;
-  table.integer("turns", 50, 2, 100000, "turns around the sphere")
-      .integer("poses_per_turn", 50, 3, 100000, "poses per turn")
-      .real("radius", 50.0, 1e-3, 1e6, "radius of the sphere [m]")
-      .real("loop_density", 1.0, 0.0, 1.0,
-            "probability of a loop closure with the pose one turn earlier");
-  add_noise_options(table, {.translation_sigma = 0.1, .rotation_sigma = 0.02});
-  add_outlier_option(table);
-  return table;
-}
-
-std::unique_ptr<Generator> make_sphere(const Options& options) {
-  const Sphere sphere{static_cast<int>(options.integer("turns")),
-                      static_cast<int>(options.integer("poses_per_turn")), options.real("radius")};
-  const double density = options.real("loop_density");
-  const Noise noise = read_noise(options);
+std::unique_ptr<Generator> make_sphere(const SphereOptions& options) {
+  const Sphere sphere{options.turns, options.poses_per_turn, options.radius};
+  const double density = options.loop_density;
+  const Noise noise = options.noise;
   const double spacing = kPi * sphere.radius / sphere.turns;  // between two turns [m]
-  const Outliers outliers{options.integer("outliers"), spacing};
+  const Outliers outliers{options.outliers, spacing};
   return std::make_unique<FunctionGenerator>([=](Registry& types, std::uint64_t seed) {
     Random meet(seed, Random::Stream::loops);
     const std::vector<Pose3> path = wind_up(sphere);

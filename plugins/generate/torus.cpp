@@ -2,6 +2,7 @@
 // A robot that winds around the tube of a torus until the turns close: as in the data sets
 // torus10000 (iSAM) and torus3D (Carlone et al., ICRA 2015), each pose sees the one a turn earlier,
 // and the last turn sees the first.
+#include "torus.hpp"
 #include "generators.hpp"
 #include "loops.hpp"
 #include "noise.hpp"
@@ -35,27 +36,13 @@ std::vector<Pose3> wind_around(const Torus& torus) {
 
 }  // namespace
 
-OptionTable torus_options() {
-  OptionTable table;
-  table.integer("turns", 100, 3, 100000, "turns around the tube")
-      .integer("poses_per_turn", 50, 3, 100000, "poses per turn")
-      .real("major_radius", 40.0, 1e-3, 1e6, "radius of the circle that the tube follows [m]")
-      .real("minor_radius", 15.0, 1e-3, 1e6, "radius of the tube [m]")
-      .real("loop_density", 0.8, 0.0, 1.0,
-            "probability of a loop closure with the pose one turn earlier");
-  add_noise_options(table, {.translation_sigma = 0.1, .rotation_sigma = 0.02});
-  add_outlier_option(table);
-  return table;
-}
-
-std::unique_ptr<Generator> make_torus(const Options& options) {
-  const Torus torus{static_cast<int>(options.integer("turns")),
-                    static_cast<int>(options.integer("poses_per_turn")),
-                    options.real("major_radius"), options.real("minor_radius")};
-  const double density = options.real("loop_density");
-  const Noise noise = read_noise(options);
+std::unique_ptr<Generator> make_torus(const TorusOptions& options) {
+  const Torus torus{options.turns, options.poses_per_turn, options.major_radius,
+                    options.minor_radius};
+  const double density = options.loop_density;
+  const Noise noise = options.noise;
   const double spacing = 2.0 * kPi * torus.major_radius / torus.turns;  // between two turns [m]
-  const Outliers outliers{options.integer("outliers"), spacing};
+  const Outliers outliers{options.outliers, spacing};
   return std::make_unique<FunctionGenerator>([=](Registry& types, std::uint64_t seed) {
     Random meet(seed, Random::Stream::loops);
     const std::vector<Pose3> path = wind_around(torus);

@@ -308,17 +308,9 @@ class Chordal final : public InitialGuess {
 
 }  // namespace
 
-OptionTable chordal_options() {
-  return OptionTable{}
-      .component("linear_solver", "linear_solver", "block_cholesky",
-                 "solves for orientations and positions")
-      .choice("weight", "information", {"information", "unit"},
-              "weight of a relative orientation: its information, or one");
-}
-
-std::unique_ptr<InitialGuess> make_chordal(const Options& options,
+std::unique_ptr<InitialGuess> make_chordal(const ChordalOptions& options,
                                            std::unique_ptr<LinearSolver> solver) {
-  return std::make_unique<Chordal>(options.text("weight") == "unit", std::move(solver));
+  return std::make_unique<Chordal>(options.weight == ChordalWeight::unit, std::move(solver));
 }
 
 }  // namespace cairn::initial

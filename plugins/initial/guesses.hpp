@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <array>
 #include <memory>
+#include <string>
 
 #include "cairn/linear/linear_solver.hpp"
-#include "cairn/plugin/options.hpp"
+#include "cairn/plugin/option_fields.hpp"
 #include "cairn/solve/initial_guess.hpp"
 #include "cairn/solve/optimizer.hpp"
 
@@ -14,15 +16,67 @@ std::unique_ptr<InitialGuess> make_as_given();
 
 std::unique_ptr<InitialGuess> make_odometry();
 
-OptionTable spanning_tree_options();
-std::unique_ptr<InitialGuess> make_spanning_tree(const Options& options);
+/// Which way from a variable to the root of a tree is the shortest.
+enum class TreeWeight {
+  depth,        ///< with the fewest factors
+  information,  ///< with the least variance
+};
+constexpr auto enum_names(TreeWeight) {
+  return std::to_array<EnumName<TreeWeight>>(
+      {{TreeWeight::depth, "depth"}, {TreeWeight::information, "information"}});
+}
 
-OptionTable chordal_options();
-std::unique_ptr<InitialGuess> make_chordal(const Options& options,
+struct SpanningTreeOptions {
+  TreeWeight weight = TreeWeight::depth;
+
+  static auto fields() {
+    return OptionFields<SpanningTreeOptions>().choice(
+        "weight", &SpanningTreeOptions::weight,
+        "shortest path to the root: fewest factors, or least variance");
+  }
+};
+
+std::unique_ptr<InitialGuess> make_spanning_tree(const SpanningTreeOptions& options);
+
+/// Weight of a relative orientation.
+enum class ChordalWeight { information, unit };
+constexpr auto enum_names(ChordalWeight) {
+  return std::to_array<EnumName<ChordalWeight>>(
+      {{ChordalWeight::information, "information"}, {ChordalWeight::unit, "unit"}});
+}
+
+struct ChordalOptions {
+  std::string linear_solver = "block_cholesky";
+  ChordalWeight weight = ChordalWeight::information;
+
+  static auto fields() {
+    using O = ChordalOptions;
+    return OptionFields<O>()
+        .component<LinearSolver>("linear_solver", &O::linear_solver,
+                                 "solves for orientations and positions")
+        .choice("weight", &O::weight, "weight of a relative orientation: its information, or one");
+  }
+};
+
+std::unique_ptr<InitialGuess> make_chordal(const ChordalOptions& options,
                                            std::unique_ptr<LinearSolver> solver);
 
-OptionTable incremental_options();
-std::unique_ptr<InitialGuess> make_incremental(const Options& options,
+struct IncrementalOptions {
+  int step = 100;       ///< poses between two optimisations
+  int iterations = 10;  ///< of each, at most
+  std::string optimizer = "levenberg_marquardt";
+
+  static auto fields() {
+    using O = IncrementalOptions;
+    return OptionFields<O>()
+        .integer("step", &O::step, 1, 1e9, "poses between two optimisations")
+        .integer("iterations", &O::iterations, 1, 1e6, "largest number of iterations of each")
+        .component<Optimizer>("optimizer", &O::optimizer,
+                              "the optimizer of the part of the graph added so far");
+  }
+};
+
+std::unique_ptr<InitialGuess> make_incremental(const IncrementalOptions& options,
                                                std::unique_ptr<Optimizer> optimizer);
 
 }  // namespace cairn::initial

@@ -146,21 +146,10 @@ class Incremental final : public InitialGuess {
 
 }  // namespace
 
-OptionTable incremental_options() {
-  OptionTable table;
-  table.integer("step", 100, 1, 1e9, "poses between two optimisations")
-      .integer("iterations", 10, 1, 1e6, "largest number of iterations of each")
-      .component("optimizer", "optimizer", "levenberg_marquardt",
-                 "the optimizer of the part of the graph added so far");
-  return table;
-}
-
-std::unique_ptr<InitialGuess> make_incremental(const Options& options,
+std::unique_ptr<InitialGuess> make_incremental(const IncrementalOptions& options,
                                                std::unique_ptr<Optimizer> optimizer) {
-  const Stop stop{.max_iterations = static_cast<int>(options.integer("iterations")),
-                  .tolerance = 1e-4};
-  return std::make_unique<Incremental>(static_cast<int>(options.integer("step")), stop,
-                                       std::move(optimizer));
+  const Stop stop{.max_iterations = options.iterations, .tolerance = 1e-4};
+  return std::make_unique<Incremental>(options.step, stop, std::move(optimizer));
 }
 
 }  // namespace cairn::initial

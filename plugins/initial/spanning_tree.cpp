@@ -66,13 +66,8 @@ class SpanningTree final : public InitialGuess {
 
 }  // namespace
 
-OptionTable spanning_tree_options() {
-  return OptionTable{}.choice("weight", "depth", {"depth", "information"},
-                              "shortest path to the root: fewest factors, or least variance");
-}
-
-std::unique_ptr<InitialGuess> make_spanning_tree(const Options& options) {
-  return std::make_unique<SpanningTree>(options.text("weight") == "information");
+std::unique_ptr<InitialGuess> make_spanning_tree(const SpanningTreeOptions& options) {
+  return std::make_unique<SpanningTree>(options.weight == TreeWeight::information);
 }
 
 }  // namespace cairn::initial

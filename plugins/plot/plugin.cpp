@@ -4,49 +4,63 @@
 #include <string>
 
 #include "cairn/plugin/registry.hpp"
+#include "plot_options.hpp"
 #include "plots.hpp"
 
 namespace cairn {
 namespace {
 
+using plot::PlotOptions;
+using plot::Subject;
+
 class Plot final : public Picture {
  public:
-  Plot(std::string format, const Options& options, Registry& registry)
-      : format_(std::move(format)),
-        what_(options.text("what")),
-        theme_(plot::theme(options.text("theme"))),
-        width_(static_cast<int>(options.integer("width"))),
-        height_(static_cast<int>(options.integer("height"))),
-        by_residual_(options.text("colour") == "residual"),
-        against_time_(options.text("x") == "time") {
-    if (what_ == "sparsity") solver_ = registry.make<LinearSolver>(options.text("linear_solver"));
+  Plot(std::string format, const PlotOptions& options, Registry& registry)
+      : format_(std::move(format)), options_(options), theme_(plot::theme(options.theme)) {
+    if (options.what == Subject::sparsity)
+      solver_ = registry.make<LinearSolver>(options.linear_solver);
   }
 
   std::string draw(const Album& album) override {
-    plot::Canvas canvas(format_, width_, height_, theme_.paper);
-    const std::string what = what_ == "auto" ? choose(album) : what_;
-    if (what == "trajectory") plot::draw_trajectories(canvas, theme_, album, by_residual_);
-    if (what == "convergence") plot::draw_convergence(canvas, theme_, album, against_time_);
-    if (what == "steps") plot::draw_steps(canvas, theme_, album);
-    if (what == "bars") plot::draw_bars(canvas, theme_, album);
-    if (what == "scaling") plot::draw_scaling(canvas, theme_, album);
-    if (what == "sparsity") plot::draw_sparsity(canvas, theme_, album, *solver_);
+    plot::Canvas canvas(format_, options_.width, options_.height, theme_.paper);
+    switch (options_.what == Subject::automatic ? choose(album) : options_.what) {
+      case Subject::automatic:
+        break;  // has been chosen
+      case Subject::trajectory:
+        plot::draw_trajectories(canvas, theme_, album,
+                                options_.colour == plot::EdgeColour::by_residual);
+        break;
+      case Subject::convergence:
+        plot::draw_convergence(canvas, theme_, album, options_.x == plot::Abscissa::time);
+        break;
+      case Subject::bars:
+        plot::draw_bars(canvas, theme_, album);
+        break;
+      case Subject::scaling:
+        plot::draw_scaling(canvas, theme_, album);
+        break;
+      case Subject::sparsity:
+        plot::draw_sparsity(canvas, theme_, album, *solver_);
+        break;
+      case Subject::steps:
+        plot::draw_steps(canvas, theme_, album);
+        break;
+    }
     return canvas.finish();
   }
 
  private:
-  static std::string choose(const Album& album) {
-    if (!album.bench.empty()) return "bars";
+  static Subject choose(const Album& album) {
+    if (!album.bench.empty()) return Subject::bars;
     for (const Scene& scene : album.scenes) {
-      if (!scene.estimates.empty()) return "trajectory";
+      if (!scene.estimates.empty()) return Subject::trajectory;
     }
-    return "convergence";
+    return Subject::convergence;
   }
 
-  std::string format_, what_;
+  std::string format_;
+  PlotOptions options_;
   plot::Theme theme_;
-  int width_, height_;
-  bool by_residual_, against_time_;
   std::unique_ptr<LinearSolver> solver_;
 };
 
@@ -56,20 +70,8 @@ class Plot final : public Picture {
 void cairn_register(cairn::Registrar& registrar) {
   using namespace cairn;
   for (const std::string format : {"svg", "png", "pdf"}) {
-    registrar.add<Picture>(
-        format,
-        OptionTable{}
-            .choice("what", "auto",
-                    {"auto", "trajectory", "convergence", "bars", "scaling", "sparsity", "steps"},
-                    "what to draw; auto: bars of a comparison, else the trajectory, else curves")
-            .integer("width", 900, 100, 20000, "width [px; in a PDF 1/96 inch]")
-            .integer("height", 600, 100, 20000, "height [px; in a PDF 1/96 inch]")
-            .choice("theme", "light", {"light", "dark"}, "colours for light or dark paper")
-            .choice("colour", "class", {"class", "residual"}, "what colours edges")
-            .choice("x", "iterations", {"iterations", "time"}, "axis of convergence")
-            .component("linear_solver", std::string(LinearSolver::kKind), "block_cholesky",
-                       "whose elimination order the sparsity of L has"),
-        [format](const Options& options, Registry& registry) {
+    registrar.add<Picture, plot::PlotOptions>(
+        format, [format](const plot::PlotOptions& options, Registry& registry) {
           return std::make_unique<Plot>(format, options, registry);
         });
   }

@@ -3,15 +3,8 @@
 #include "registrations.hpp"
 
 void cairn_register(cairn::Registrar& registrar) {
-  using cairn::Options;
-  using cairn::Registration;
-  using cairn::Registry;
-  namespace registration = cairn::registration;
-
-  registrar.add<Registration>(
-      "recorded", registration::recorded_options(),
-      [](const Options& options, Registry&) { return registration::make_recorded(options); });
-  registrar.add<Registration>(
-      "simulated", registration::simulated_options(),
-      [](const Options& options, Registry&) { return registration::make_simulated(options); });
+  using namespace cairn;
+  using namespace cairn::registration;
+  registrar.add<Registration, RecordedOptions>("recorded", make_recorded);
+  registrar.add<Registration, SimulatedOptions>("simulated", make_simulated);
 }

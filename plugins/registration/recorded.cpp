@@ -76,17 +76,8 @@ class Recorded final : public Registration, public FalseMatches {
 
 }  // namespace
 
-OptionTable recorded_options() {
-  return OptionTable{}
-      .real(
-          "false_rate", 0.0, 0.0, 1.0,
-          "fraction of the matching pairs whose measurement is replaced by a random relative pose")
-      .integer("seed", 1, 0, 1e15, "of the choice of pairs and of relative poses");
-}
-
-std::unique_ptr<Registration> make_recorded(const Options& options) {
-  return std::make_unique<Recorded>(options.real("false_rate"),
-                                    static_cast<std::uint64_t>(options.integer("seed")));
+std::unique_ptr<Registration> make_recorded(const RecordedOptions& options) {
+  return std::make_unique<Recorded>(options.false_rate, options.seed);
 }
 
 }  // namespace cairn::registration

@@ -23,17 +23,6 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// What the sensor can do, and how often it cannot.
-struct Sensor {
-  Extent range;                    ///< poses nearer than this can be matched
-  double sigma_translation = 0.0;  ///< [m]; 0: as in the recording
-  double sigma_rotation = 0.0;     ///< [rad]; 0: as in the recording
-  double failure_rate = 0.0;       ///< of the pairs within range, those that are not matched
-  double false_rate = 0.0;         ///< of the pairs matched within range, those with another motion
-  double far_rate = 0.0;           ///< of the pairs out of range, those that are matched, falsely
-  std::uint64_t seed = 1;
-};
-
 Error bad_data(ErrorCode code, const std::string& message) {
   return {code, "registration simulated: " + message};
 }
@@ -52,7 +41,7 @@ bool less(double a, double b) { return a < (1.0 - 1e-9) * b; }
 /// changes none of those that are left.
 class Simulated final : public Registration, public FalseMatches {
  public:
-  explicit Simulated(const Sensor& sensor) : sensor_(sensor) {}
+  explicit Simulated(const SimulatedOptions& sensor) : sensor_(sensor) {}
 
   void begin(const RegistrationData& data) override {
     if (!data.truth) {
@@ -155,7 +144,7 @@ class Simulated final : public Registration, public FalseMatches {
     return L_ * n;
   }
 
-  Sensor sensor_;
+  SimulatedOptions sensor_;
   const Graph* truth_ = nullptr;
   std::shared_ptr<const FactorType> odometry_;
   std::optional<RigidMotions> motions_;
@@ -164,38 +153,10 @@ class Simulated final : public Registration, public FalseMatches {
   MatrixXd L_;
 };
 
-/// No angle between two orientations is larger; a little more than π, so that none is as large.
-constexpr double kAnyAngle = 3.1416;
-
 }  // namespace
 
-OptionTable simulated_options() {
-  return OptionTable{}
-      .real("range", 2.0, 1e-3, 1e6, "poses nearer to each other than this can be matched [m]")
-      .real("angle", kAnyAngle, 1e-3, kAnyAngle,
-            "if their orientations differ by less than this [rad]; 3.1416: any")
-      .real("sigma_translation", 0.0, 0.0, 1e6,
-            "noise of measured translations, each axis [m]; 0: as in the recording")
-      .real("sigma_rotation", 0.0, 0.0, 3.0,
-            "noise of measured rotations, each axis [rad]; 0: as in the recording")
-      .real("failure_rate", 0.0, 0.0, 1.0,
-            "fraction of the pairs within range that are not matched")
-      .real("false_rate", 0.0, 0.0, 1.0,
-            "fraction of the pairs matched within range with a random relative pose within range")
-      .real("far_rate", 0.0, 0.0, 1.0,
-            "fraction of the pairs out of range that are matched, with a random relative pose")
-      .integer("seed", 1, 0, 1e15, "of noise, failures and false matches");
-}
-
-std::unique_ptr<Registration> make_simulated(const Options& options) {
-  return std::make_unique<Simulated>(
-      Sensor{.range = {.length = options.real("range"), .angle = options.real("angle")},
-             .sigma_translation = options.real("sigma_translation"),
-             .sigma_rotation = options.real("sigma_rotation"),
-             .failure_rate = options.real("failure_rate"),
-             .false_rate = options.real("false_rate"),
-             .far_rate = options.real("far_rate"),
-             .seed = static_cast<std::uint64_t>(options.integer("seed"))});
+std::unique_ptr<Registration> make_simulated(const SimulatedOptions& options) {
+  return std::make_unique<Simulated>(options);
 }
 
 }  // namespace cairn::registration

@@ -7,12 +7,6 @@
 
 namespace cairn::sparsify {
 
-InitialInformation initial_information(const std::string& name) {
-  if (name == "identity") return InitialInformation::identity;
-  if (name == "odb") return InitialInformation::odb;
-  return name == "ffd" ? InitialInformation::ffd : InitialInformation::scaled;
-}
-
 void begin(const RecoveryProblem& problem, InitialInformation initial, Approximation& at) {
   const ScaledProblem& scaled = at.problem();
   double rows = 0.0;

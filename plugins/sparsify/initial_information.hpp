@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <string>
-#include <vector>
+#include <array>
 
 #include "approximation.hpp"
+#include "cairn/runtime/enum_names.hpp"
 
 namespace cairn::sparsify {
 
@@ -15,8 +15,12 @@ enum class InitialInformation {
   ffd,       ///< identity, and one cycle of factor descent
   scaled,  ///< s (J_k J_kᵀ)⁻¹, one s for all: the one with which tr Λ̆ = r, as at the minimum
 };
-InitialInformation initial_information(const std::string& name);
-inline const std::vector<std::string> kInitialNames{"odb", "scaled", "identity", "ffd"};
+constexpr auto enum_names(InitialInformation) {
+  return std::to_array<EnumName<InitialInformation>>({{InitialInformation::odb, "odb"},
+                                                      {InitialInformation::scaled, "scaled"},
+                                                      {InitialInformation::identity, "identity"},
+                                                      {InitialInformation::ffd, "ffd"}});
+}
 
 /// Sets the approximation there. Throws `Error` (numerical) if the factors do not determine all
 /// coordinates.

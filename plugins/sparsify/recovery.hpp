@@ -5,18 +5,32 @@
 #include <memory>
 
 #include "approximation.hpp"
+#include "cairn/plugin/option_fields.hpp"
 #include "cairn/sparsification/sparsification.hpp"
 #include "initial_information.hpp"
 
 namespace cairn::sparsify {
 
-/// Parameters of every iterative method.
+/// Options of `fd` and `ncfd`, and of every iterative method.
 struct RecoveryOptions {
-  InitialInformation initial = InitialInformation::scaled;
+  InitialInformation initial = InitialInformation::odb;
   /// Ends where no element of `RecoveryResult::gradient` is larger.
   double tolerance = 1e-3;
   int iterations = 10000;
   double seconds = 0.0;  ///< 0: no limit
+
+  static auto fields() {
+    using O = RecoveryOptions;
+    return OptionFields<O>()
+        .choice("initial", &O::initial,
+                "begin at off-diagonal blocks of Λ, at each factor's optimum alone (scaled), at "
+                "identity matrices, or at these after a cycle of factor descent")
+        .real("tolerance", &O::tolerance, 0.0, 1.0,
+              "largest element of the gradient at the end, each factor in units of its own optimum")
+        .integer("iterations", &O::iterations, 0, 1000000000,
+                 "at most; 0: see how good the beginning is")
+        .real("seconds", &O::seconds, 0.0, 1e6, "for one problem, at most; 0: no limit");
+  }
 };
 
 /// Time that has gone, what is recorded of it, and whether it is up.
@@ -72,21 +86,45 @@ class FactorDescent final : public IterativeRecovery {
 };
 
 struct InteriorPointOptions {
+  RecoveryOptions recovery;
   double start = 0.1;     ///< ω: ρ₀ = ω ‖∇KLD‖ / ‖∇barrier‖
   double decrease = 0.1;  ///< ρ is multiplied by this
   bool conservative = false;
+
+  static auto fields() {
+    using O = InteriorPointOptions;
+    return OptionFields<O>()
+        .part(&O::recovery)
+        .real("start", &O::start, 0.0, 1e6,
+              "ω: the barrier's weight, in proportion to the gradients")
+        .real("decrease", &O::decrease, 1e-6, 0.999, "the weight is multiplied by this")
+        .boolean("conservative", &O::conservative,
+                 "keep the approximation conservative: at most the information Λ");
+  }
 };
 
 /// Newton's method on KLD − ρ Σ ln |Ω_k| for falling ρ (T 4.5 to 4.7), or with −ρ ln |Λ − Λ̆| as
 /// well, which keeps the approximation conservative (Λ̆ ⪯ Λ).
 class InteriorPoint final : public IterativeRecovery {
  public:
-  InteriorPoint(RecoveryOptions options, InteriorPointOptions interior)
-      : IterativeRecovery(options), interior_(interior) {}
+  explicit InteriorPoint(const InteriorPointOptions& options)
+      : IterativeRecovery(options.recovery), interior_(options) {}
   RecoveryResult recover(const RecoveryProblem& problem) override;
 
  private:
   InteriorPointOptions interior_;
+};
+
+struct ProjectedQuasiNewtonOptions {
+  RecoveryOptions recovery;
+  int memory = 10;  ///< steps that the quadratic model remembers
+
+  static auto fields() {
+    using O = ProjectedQuasiNewtonOptions;
+    return OptionFields<O>()
+        .part(&O::recovery)
+        .integer("memory", &O::memory, 1, 1000, "steps that the quadratic model remembers");
+  }
 };
 
 /// Limited-memory projected quasi-Newton (Schmidt, van den Berg, Friedlander and Murphy 2009): a
@@ -94,8 +132,8 @@ class InteriorPoint final : public IterativeRecovery {
 /// a line search in that direction.
 class ProjectedQuasiNewton final : public IterativeRecovery {
  public:
-  ProjectedQuasiNewton(RecoveryOptions options, int memory)
-      : IterativeRecovery(options), memory_(memory) {}
+  explicit ProjectedQuasiNewton(const ProjectedQuasiNewtonOptions& options)
+      : IterativeRecovery(options.recovery), memory_(options.memory) {}
   RecoveryResult recover(const RecoveryProblem& problem) override;
 
  private:

@@ -1,9 +1,19 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include "cairn/plugin/option_fields.hpp"
 #include "cairn/sparsification/sparsification.hpp"
 
 namespace cairn::sparsify {
+
+struct KeepEveryOptions {
+  int every = 2;  ///< one of so many nodes stays
+
+  static auto fields() {
+    return OptionFields<KeepEveryOptions>().integer("every", &KeepEveryOptions::every, 1,
+                                                    1000000000, "one of so many nodes stays");
+  }
+};
 
 /// Every N-th node stays, the first of all among them, and the last of the graph; the others leave
 /// in their order (T 4.6.4). Counts on where the call before ended, for nodes that come bit by bit.
@@ -18,9 +28,19 @@ class KeepEvery final : public NodeSelection {
   std::int64_t seen_ = 0;
 };
 
-/// The part of the nodes whose removal increases the divergence least leaves, round by round: in
-/// each those with the least divergence that are not neighbours, of an eighth of what is still to
-/// leave; then the rest is evaluated again.
+/// Options of `least_loss`, `smallest_blanket` and `oldest`.
+struct PartOptions {
+  double part = 0.5;  ///< of the nodes that may leave
+
+  static auto fields() {
+    return OptionFields<PartOptions>().real("part", &PartOptions::part, 0.0, 1.0,
+                                            "of the nodes that may leave");
+  }
+};
+
+/// The part of the nodes whose loss costs least leaves, round by round: in each those that cost
+/// least and are not neighbours, of an eighth of what is still to leave; then what is left is
+/// looked at again.
 class LeastLoss final : public NodeSelection {
  public:
   explicit LeastLoss(double part) : part_(part) {}
@@ -52,6 +72,18 @@ class Oldest final : public NodeSelection {
 
  private:
   double part_;
+};
+
+struct CoverageOptions {
+  double distance = 1.0;  ///< [m]
+  double angle = 0.7;     ///< [rad]
+
+  static auto fields() {
+    using O = CoverageOptions;
+    return OptionFields<O>()
+        .real("distance", &O::distance, 1e-9, 1e9, "a node that stays is nearer than this [m]")
+        .real("angle", &O::angle, 0.0, 3.15, "and turned by less than this [rad]");
+  }
 };
 
 /// A node leaves if one that stays is so near, in place and in orientation: what stays covers the

@@ -4,8 +4,10 @@
 #include <array>
 #include <memory>
 #include <span>
+#include <string>
 #include <vector>
 
+#include "cairn/plugin/option_fields.hpp"
 #include "cairn/sparsification/sparsification.hpp"
 #include "local_problem.hpp"
 #include "population.hpp"
@@ -20,13 +22,39 @@ enum class Scheme {
   runs,    ///< those that follow each other in the order of the graph and are connected
   multi,   ///< all that are connected
 };
+constexpr auto enum_names(Scheme) {
+  return std::to_array<EnumName<Scheme>>(
+      {{Scheme::single, "single"}, {Scheme::runs, "runs"}, {Scheme::multi, "multi"}});
+}
 
 struct SparsifyOptions {
+  std::string topology = "ekld";
   Population population;
-  Projection projection = Projection::node;
+  std::string recovery = "ncfd";
   Scheme scheme = Scheme::single;
+  Projection projection = Projection::node;
   bool resolve = true;     ///< the cropped problem is solved by itself
   int largest_group = 50;  ///< nodes that leave together, at most
+
+  static auto fields() {
+    using O = SparsifyOptions;
+    return OptionFields<O>()
+        .component<Topology>("topology", &O::topology, "which nodes new factors relate")
+        .text(
+            "population", &O::population, Population::parse,
+            [](const Population& population) { return population.text(); },
+            "how many: tree:γ times as many as a tree, fill:α of all pairs, loss:KLD as few as "
+            "keep the divergence below that [nats]")
+        .component<FactorRecovery>("recovery", &O::recovery, "method that finds their information")
+        .choice("scheme", &O::scheme,
+                "nodes leave one by one, those that follow each other together, or all that are "
+                "connected together")
+        .choice("projection", &O::projection,
+                "coordinates where Λ is singular: relative to a node, or its eigenvectors")
+        .boolean("resolve", &O::resolve, "solve the cropped problem by itself first")
+        .integer("largest_group", &O::largest_group, 1, 100000,
+                 "nodes that leave together, at most");
+  }
 };
 
 /// The whole process (T figure 4.2): crop, marginalise, choose a topology, recover its factors.

@@ -157,26 +157,26 @@ int tree_size(const DenseBlanket& blanket) {
 }
 
 /// Σ̂ without what the factors of a tree tell: (T 4.23), or exactly.
-Matrix downdated(const DenseBlanket& blanket, const std::vector<FactorChoice>& tree,
-                 const TopologyOptions& options) {
+Matrix downdated(const DenseBlanket& blanket, const std::vector<FactorChoice>& tree, double epsilon,
+                 Downdate how) {
   const int d = blanket.size();
-  const Matrix S = regularized_covariance(blanket, options.epsilon);
+  const Matrix S = regularized_covariance(blanket, epsilon);
   Matrix grown = S, left = information(blanket);
   const BlanketProjection projection(blanket, Projection::node);
   for (const FactorChoice& choice : tree) {
     const auto J = jacobian(blanket.models[choice.front()], d);
     const Matrix JT = J * coordinates(projection, d);
     const Matrix spread = JT * JT.transpose();  // Ω⁻¹ by (T 4.4)
-    if (options.exact_downdate) {
+    if (how == Downdate::exact) {
       left -= J.transpose() * spread.inverse() * J;
     } else {
       const Matrix SJt = S * J.transpose();
       grown += SJt * (spread + J * SJt).llt().solve(SJt.transpose());
     }
   }
-  if (!options.exact_downdate) return grown;
+  if (how == Downdate::sum) return grown;
   // A tree alone claims more than all of Λ in some directions, so what is left may be negative.
-  return nearest_positive(left, epsilon_of(blanket, options.epsilon)).inverse();
+  return nearest_positive(left, epsilon_of(blanket, epsilon)).inverse();
 }
 
 }  // namespace
@@ -211,7 +211,7 @@ std::vector<FactorChoice> DowndatedInformation::choose(const DenseBlanket& blank
                                                        int population) {
   std::vector<FactorChoice> chosen = ChowLiuTree::choose(blanket, population);
   if (static_cast<int>(std::ssize(chosen)) >= population) return chosen;
-  const Matrix S = downdated(blanket, chosen, options_);
+  const Matrix S = downdated(blanket, chosen, options_.epsilon, downdate_);
   const std::vector<int> begin = offsets(blanket);
   const std::vector<Pair> pairs = weighted_pairs(blanket, [&](int i, int j) {
     return information_of(pair_block(S, begin, i, j), blanket.node_sizes[i]);
@@ -285,7 +285,7 @@ std::vector<FactorChoice> SparseInverse::choose(const DenseBlanket& blanket, int
   const Vector scale = S.diagonal().cwiseSqrt().cwiseInverse();
   S = (scale.asDiagonal() * S * scale.asDiagonal()).eval();
   const Matrix off = S - Matrix(S.diagonal().asDiagonal());
-  const double lambda = options_.l1_weight * off.cwiseAbs().maxCoeff();
+  const double lambda = weight_ * off.cwiseAbs().maxCoeff();
   Matrix Z = Matrix::Identity(d, d), U = Matrix::Zero(d, d);
   double rho = 1.0;
   for (int k = 0; k < 500; ++k) {
@@ -345,14 +345,15 @@ std::vector<FactorChoice> Exhaustive::choose(const DenseBlanket& blanket, int po
   const int count = std::clamp(population, tree_size(blanket), all);
   double topologies = 1.0;
   for (int k = 0; k < count; ++k) topologies *= static_cast<double>(all - k) / (k + 1);
-  if (topologies > static_cast<double>(options_.most)) {
+  if (topologies > static_cast<double>(most_)) {
     throw Error(ErrorCode::usage,
                 fmt::format("best: {} nodes have {:.3g} topologies of {} factors; at most {} are "
                             "tried (option most), since it takes every one of them",
-                            blanket.node_sizes.size(), topologies, count, options_.most));
+                            blanket.node_sizes.size(), topologies, count, most_));
   }
   const BlanketProjection coordinates(blanket, Projection::node);
-  FactorDescent descent({.tolerance = 1e-4}, /*greedy=*/true);
+  FactorDescent descent({.initial = InitialInformation::scaled, .tolerance = 1e-4},
+                        /*greedy=*/true);
   std::vector<int> picked(count);
   std::iota(picked.begin(), picked.end(), 0);
   std::vector<FactorChoice> best;

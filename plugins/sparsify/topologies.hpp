@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <array>
+#include <cstdint>
 #include <memory>
 #include <vector>
 
 #include "approximation.hpp"
+#include "cairn/plugin/option_fields.hpp"
 #include "cairn/sparsification/sparsification.hpp"
 
 namespace cairn::sparsify {
@@ -14,13 +17,68 @@ enum class Regularization {
   covariance,   ///< of Σ̂ = (Λ + εI)⁻¹ (T 4.18)
   information,  ///< of Λ, all other nodes marginalised, with εI in each determinant (T 4.17)
 };
+constexpr auto enum_names(Regularization) {
+  return std::to_array<EnumName<Regularization>>(
+      {{Regularization::covariance, "covariance"}, {Regularization::information, "information"}});
+}
 
+/// Options of every topology that begins with a Chow-Liu tree.
 struct TopologyOptions {
   Regularization regularization = Regularization::covariance;
-  double epsilon = 0.01;        ///< ε as a fraction of Λ's mean diagonal
-  bool exact_downdate = false;  ///< dmi: Σ̂ without the tree, exactly, instead of by (T 4.23)
-  double l1_weight = 0.1;  ///< λ of (T 4.19), as a fraction of the largest off-diagonal of Σ̂
-  std::int64_t most = 200000;  ///< best: so many topologies at most
+  double epsilon = 0.01;  ///< ε as a part of Λ's mean diagonal
+
+  static auto fields() {
+    using O = TopologyOptions;
+    return OptionFields<O>()
+        .choice("regularization", &O::regularization,
+                "mutual information where Λ is singular: of (Λ + εI)⁻¹, or with εI in each "
+                "determinant of Λ's marginals")
+        .real("epsilon", &O::epsilon, 1e-12, 1e3, "ε, as a fraction of Λ's mean diagonal");
+  }
+};
+
+/// How what a tree tells is taken off Σ̂.
+enum class Downdate {
+  sum,    ///< by (T 4.23)
+  exact,  ///< exactly
+};
+constexpr auto enum_names(Downdate) {
+  return std::to_array<EnumName<Downdate>>({{Downdate::sum, "sum"}, {Downdate::exact, "exact"}});
+}
+
+struct DowndatedInformationOptions {
+  TopologyOptions tree;
+  Downdate downdate = Downdate::sum;
+
+  static auto fields() {
+    using O = DowndatedInformationOptions;
+    return OptionFields<O>().part(&O::tree).choice(
+        "downdate", &O::downdate,
+        "the information of the tree is subtracted by the sum of equation 4.23, or exactly");
+  }
+};
+
+struct SparseInverseOptions {
+  TopologyOptions tree;
+  double weight = 0.1;  ///< λ of (T 4.19), as a part of the largest off-diagonal of Σ̂
+
+  static auto fields() {
+    using O = SparseInverseOptions;
+    return OptionFields<O>().part(&O::tree).real(
+        "weight", &O::weight, 0.0, 1.0,
+        "of the sum of absolute values, as a fraction of the largest correlation");
+  }
+};
+
+struct ExhaustiveOptions {
+  TopologyOptions tree;
+  std::int64_t most = 200000;  ///< topologies
+
+  static auto fields() {
+    using O = ExhaustiveOptions;
+    return OptionFields<O>().part(&O::tree).integer(
+        "most", &O::most, 1, 1000000000, "topologies to try; where there are more, it refuses");
+  }
 };
 
 /// Mutual information of each pair of nodes [nats]; n × n.
@@ -47,8 +105,12 @@ class MutualInformation final : public ChowLiuTree {
 /// has been subtracted (T 4.23).
 class DowndatedInformation final : public ChowLiuTree {
  public:
-  using ChowLiuTree::ChowLiuTree;
+  explicit DowndatedInformation(const DowndatedInformationOptions& options)
+      : ChowLiuTree(options.tree), downdate_(options.downdate) {}
   std::vector<FactorChoice> choose(const DenseBlanket& blanket, int population) override;
+
+ private:
+  Downdate downdate_;
 };
 
 /// That tree, and one by one the factor that lowers the KLD most by one step of factor descent.
@@ -68,8 +130,12 @@ class OffDiagonalDeterminant final : public Topology {
 /// and Huang 2016), a spanning tree first. By the alternating direction method of multipliers.
 class SparseInverse final : public ChowLiuTree {
  public:
-  using ChowLiuTree::ChowLiuTree;
+  explicit SparseInverse(const SparseInverseOptions& options)
+      : ChowLiuTree(options.tree), weight_(options.weight) {}
   std::vector<FactorChoice> choose(const DenseBlanket& blanket, int population) override;
+
+ private:
+  double weight_;
 };
 
 /// The Chow-Liu tree with its edges in correlated pairs that share a node (Mazuran, Burgard and
@@ -84,8 +150,12 @@ class Cliquey final : public ChowLiuTree {
 /// Every topology of that population is tried, and the one with the least KLD taken.
 class Exhaustive final : public ChowLiuTree {
  public:
-  using ChowLiuTree::ChowLiuTree;
+  explicit Exhaustive(const ExhaustiveOptions& options)
+      : ChowLiuTree(options.tree), most_(options.most) {}
   std::vector<FactorChoice> choose(const DenseBlanket& blanket, int population) override;
+
+ private:
+  std::int64_t most_;
 };
 
 }  // namespace cairn::sparsify

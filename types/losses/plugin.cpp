@@ -5,6 +5,7 @@
 
 #include "cairn/plugin/registry.hpp"
 #include "cairn/types/loss.hpp"
+#include "loss_options.hpp"
 #include "shapes.hpp"
 
 namespace {
@@ -34,26 +35,21 @@ class ScaledLoss final : public Loss {
 };
 
 template <class Shape>
-void add(Registrar& registrar, std::string name, double default_scale) {
-  registrar.add<Loss>(
-      std::move(name),
-      OptionTable{}.real("scale", default_scale, 1e-6, 1e6,
-                         "norm of the whitened residual [sigma] where it turns robust"),
-      [](const Options& options, Registry&) -> std::unique_ptr<Loss> {
-        return std::make_unique<ScaledLoss<Shape>>(options.real("scale"));
-      });
+void add(Registrar& registrar, std::string name) {
+  using Chosen = losses::LossOptions<Shape>;
+  registrar.add<Loss, Chosen>(std::move(name), [](const Chosen& options) {
+    return std::make_unique<ScaledLoss<Shape>>(options.scale);
+  });
 }
 
 }  // namespace
 
 void cairn_register(Registrar& registrar) {
-  // Where [Zhang97] has one, the scale that is 95 % as efficient as least squares on normal noise
-  // of one dimension. Residuals of more dimensions are longer: a larger scale suits them.
-  add<losses::Huber>(registrar, "huber", 1.345);
-  add<losses::PseudoHuber>(registrar, "pseudo_huber", 1.345);
-  add<losses::Cauchy>(registrar, "cauchy", 2.3849);
-  add<losses::GemanMcClure>(registrar, "geman_mcclure", 1.0);
-  add<losses::Welsch>(registrar, "welsch", 2.9846);
-  add<losses::Tukey>(registrar, "tukey", 4.6851);
-  add<losses::DynamicCovarianceScaling>(registrar, "dcs", 1.0);
+  add<losses::Huber>(registrar, "huber");
+  add<losses::PseudoHuber>(registrar, "pseudo_huber");
+  add<losses::Cauchy>(registrar, "cauchy");
+  add<losses::GemanMcClure>(registrar, "geman_mcclure");
+  add<losses::Welsch>(registrar, "welsch");
+  add<losses::Tukey>(registrar, "tukey");
+  add<losses::DynamicCovarianceScaling>(registrar, "dcs");
 }

@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include <string>
-
 #include "cairn/plugin/registry.hpp"
 #include "landmark.hpp"
 #include "priors.hpp"
 #include "relative_pose.hpp"
+#include "slam3d_options.hpp"
 
 namespace {
 
@@ -17,11 +16,14 @@ TypeSet types() {
            define_factor<slam3d::PosePrior<Metric>>(), define_factor<slam3d::LandmarkPrior>()}};
 }
 
-TypeSet types_of(const Options& options) {
-  const std::string& metric = options.text("metric");
-  if (metric == slam3d::QuaternionVector::kName) return types<slam3d::QuaternionVector>();
-  if (metric == slam3d::TranslationAndRotationVector::kName) {
-    return types<slam3d::TranslationAndRotationVector>();
+TypeSet types_of(const slam3d::Slam3dOptions& options) {
+  switch (options.metric) {
+    case slam3d::Metric::logarithm:
+      break;
+    case slam3d::Metric::quaternion_vector:
+      return types<slam3d::QuaternionVector>();
+    case slam3d::Metric::translation_and_rotation_vector:
+      return types<slam3d::TranslationAndRotationVector>();
   }
   return types<slam3d::Logarithm>();
 }
@@ -29,11 +31,5 @@ TypeSet types_of(const Options& options) {
 }  // namespace
 
 void cairn_register(Registrar& registrar) {
-  registrar.add_types(
-      "slam3d",
-      OptionTable{}.choice(
-          "metric", "logarithm", {"logarithm", "g2o", "rotation_vector"},
-          "error of pose measurements: logarithm of the group; g2o: translation and "
-          "vector part of the quaternion; translation and rotation vector"),
-      types_of);
+  registrar.add_types<slam3d::Slam3dOptions>("slam3d", types_of);
 }

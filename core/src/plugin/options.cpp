@@ -14,9 +14,6 @@
 namespace cairn {
 namespace {
 
-/// The shortest text that reads back as the same number.
-std::string shortest(double value) { return fmt::format("{}", value); }
-
 std::string range_text(const OptionSpec& spec) {
   const bool low = std::isfinite(spec.minimum), high = std::isfinite(spec.maximum);
   if (low && high) return fmt::format("{} to {}", spec.minimum, spec.maximum);
@@ -63,66 +60,71 @@ std::vector<std::string> names(const OptionTable& table) {
 
 }  // namespace
 
-OptionTable& OptionTable::boolean(std::string name, bool default_value, std::string help) {
-  specs_.push_back({.name = std::move(name),
-                    .type = OptionType::boolean,
-                    .default_value = default_value ? "true" : "false",
-                    .help = std::move(help),
-                    .choices = {}});
+std::string option_text(bool value) { return value ? "true" : "false"; }
+std::string option_text(std::int64_t value) { return fmt::format("{}", value); }
+std::string option_text(double value) { return fmt::format("{}", value); }
+
+OptionTable& OptionTable::add(OptionSpec spec) {
+  if (find(spec.name))
+    throw std::logic_error(fmt::format("option '{}' is declared twice", spec.name));
+  specs_.push_back(std::move(spec));
   return *this;
+}
+
+OptionTable& OptionTable::boolean(std::string name, bool default_value, std::string help) {
+  return add({.name = std::move(name),
+              .type = OptionType::boolean,
+              .default_value = option_text(default_value),
+              .help = std::move(help),
+              .choices = {}});
 }
 
 OptionTable& OptionTable::integer(std::string name, std::int64_t default_value, double minimum,
                                   double maximum, std::string help) {
-  specs_.push_back({.name = std::move(name),
-                    .type = OptionType::integer,
-                    .default_value = fmt::format("{}", default_value),
-                    .help = std::move(help),
-                    .minimum = minimum,
-                    .maximum = maximum,
-                    .choices = {}});
-  return *this;
+  return add({.name = std::move(name),
+              .type = OptionType::integer,
+              .default_value = option_text(default_value),
+              .help = std::move(help),
+              .minimum = minimum,
+              .maximum = maximum,
+              .choices = {}});
 }
 
 OptionTable& OptionTable::real(std::string name, double default_value, double minimum,
                                double maximum, std::string help) {
-  specs_.push_back({.name = std::move(name),
-                    .type = OptionType::real,
-                    .default_value = shortest(default_value),
-                    .help = std::move(help),
-                    .minimum = minimum,
-                    .maximum = maximum,
-                    .choices = {}});
-  return *this;
+  return add({.name = std::move(name),
+              .type = OptionType::real,
+              .default_value = option_text(default_value),
+              .help = std::move(help),
+              .minimum = minimum,
+              .maximum = maximum,
+              .choices = {}});
 }
 
 OptionTable& OptionTable::text(std::string name, std::string default_value, std::string help) {
-  specs_.push_back({.name = std::move(name),
-                    .type = OptionType::text,
-                    .default_value = std::move(default_value),
-                    .help = std::move(help),
-                    .choices = {}});
-  return *this;
+  return add({.name = std::move(name),
+              .type = OptionType::text,
+              .default_value = std::move(default_value),
+              .help = std::move(help),
+              .choices = {}});
 }
 
 OptionTable& OptionTable::choice(std::string name, std::string default_value,
                                  std::vector<std::string> choices, std::string help) {
-  specs_.push_back({.name = std::move(name),
-                    .type = OptionType::choice,
-                    .default_value = std::move(default_value),
-                    .help = std::move(help),
-                    .choices = std::move(choices)});
-  return *this;
+  return add({.name = std::move(name),
+              .type = OptionType::choice,
+              .default_value = std::move(default_value),
+              .help = std::move(help),
+              .choices = std::move(choices)});
 }
 
 OptionTable& OptionTable::component(std::string name, std::string kind, std::string default_value,
                                     std::string help) {
-  specs_.push_back({.name = std::move(name),
-                    .type = OptionType::component,
-                    .default_value = std::move(default_value),
-                    .help = std::move(help),
-                    .choices = {std::move(kind)}});
-  return *this;
+  return add({.name = std::move(name),
+              .type = OptionType::component,
+              .default_value = std::move(default_value),
+              .help = std::move(help),
+              .choices = {std::move(kind)}});
 }
 
 const OptionSpec* OptionTable::find(std::string_view name) const {
@@ -241,6 +243,24 @@ ComponentSpec parse_component(std::string_view text) {
     if (rest.empty()) throw malformed("ends with a comma");
   }
   return spec;
+}
+
+std::string to_text(const ComponentSpec& spec) {
+  if (spec.name.empty() || spec.name.find(':') != std::string::npos)
+    throw Error(ErrorCode::usage, fmt::format("'{}' is no name of a component", spec.name));
+  std::string text = spec.name;
+  char before = ':';
+  for (const auto& [name, value] : spec.values) {
+    if (value.find(',') != std::string::npos) {
+      throw Error(ErrorCode::usage,
+                  fmt::format("{}: option '{}' is '{}'; the form name:key=value,key=value cannot "
+                              "hold a value with a comma",
+                              spec.name, name, value));
+    }
+    text += fmt::format("{}{}={}", before, name, value);
+    before = ',';
+  }
+  return text;
 }
 
 std::vector<std::string> split_components(std::string_view text) {

@@ -56,7 +56,7 @@ void count_nonzeros(PolicyResult& result, Registry& registry) {
 
 void evaluate(PosePolicy& policy, const PolicyData& data, PolicyResult& result) {
   if (!data.truth) return;
-  for (const auto& [name, how] : kRecoveryNames) {
+  for (const auto& [how, name] : enum_names(Recovery{})) {
     result.errors[std::string(name)] = compare(trajectory(recovered_way(policy, how)), *data.truth);
   }
   if (data.truth_graph) result.normalized = normalized_error(result.compact, *data.truth_graph);

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <string>
 
+#include <fmt/format.h>
+
 #include "cairn/runtime/error.hpp"
 #include "cairn/sparsification/sparsification.hpp"
 
@@ -37,6 +39,11 @@ Population Population::parse(const std::string& text) {
     refuse(text);
   }
   return population;
+}
+
+std::string Population::text() const {
+  const char* const name = kind == Kind::tree ? "tree" : kind == Kind::fill ? "fill" : "loss";
+  return fmt::format("{}:{}", name, value);
 }
 
 int Population::count(int nodes) const {

@@ -34,8 +34,8 @@ void add_seconds(const Seconds& from, UpdateSeconds& to) {
 
 }  // namespace
 
-BatchEstimator::BatchEstimator(BatchEstimatorOptions options, std::shared_ptr<BatchTools> tools)
-    : options_(options), tools_(std::move(tools)) {}
+BatchEstimator::BatchEstimator(int every, const Stop& stop, std::shared_ptr<BatchTools> tools)
+    : every_(every), stop_(stop), tools_(std::move(tools)) {}
 
 UpdateReport BatchEstimator::update(const GraphUpdate& update, const UpdateOptions& options) {
   const auto begin = Clock::now();
@@ -52,7 +52,7 @@ UpdateReport BatchEstimator::update(const GraphUpdate& update, const UpdateOptio
   unsolved_factors_ += static_cast<int>(std::ssize(checked.factors));
   ++since_batch_;
   if (!options.defer || options.full) {
-    if (options.full || must_batch_ || since_batch_ >= options_.every) {
+    if (options.full || must_batch_ || since_batch_ >= every_) {
       batch_step(options, report);
     } else {
       linear_step(report);
@@ -79,7 +79,7 @@ AppliedUpdate BatchEstimator::apply(GraphUpdate& update) {
 
 void BatchEstimator::batch_step(const UpdateOptions& options, UpdateReport& report) {
   if (graph_.factor_count() == 0) return;
-  Stop stop = options_.stop;
+  Stop stop = stop_;
   stop.max_seconds = options.max_seconds;
   tools_->user = nullptr;
   const Summary summary = tools_->optimizer->optimize(graph_, stop);
@@ -304,7 +304,7 @@ void BatchEstimator::reset() {
 }
 
 std::unique_ptr<Estimator> BatchEstimator::clone() const {
-  auto copy = std::make_unique<BatchEstimator>(options_, tools_);
+  auto copy = std::make_unique<BatchEstimator>(every_, stop_, tools_);
   copy->graph_ = graph_.clone();
   copy->losses_ = losses_;
   copy->ids_ = ids_;

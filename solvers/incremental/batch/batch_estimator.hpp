@@ -13,16 +13,46 @@
 
 #include "cairn/linear/graph_marginals.hpp"
 #include "cairn/linear/linear_solver.hpp"
+#include "cairn/plugin/option_fields.hpp"
 #include "cairn/solve/estimator.hpp"
 #include "cairn/solve/optimizer.hpp"
 #include "cairn/update/graph_update.hpp"
 
 namespace cairn {
 
-struct BatchEstimatorOptions {
-  /// Updates from one batch step to the next.
-  int every = 1;
-  Stop stop{.max_iterations = 100, .tolerance = 1e-10};
+/// Options of the estimator `batch`.
+struct BatchOptions {
+  std::string optimizer = "levenberg_marquardt";
+  std::string linear_solver = "block_cholesky";
+  int iterations = 100;      ///< of a batch step, at most
+  double tolerance = 1e-10;  ///< see `Stop`
+
+  static auto fields() {
+    using O = BatchOptions;
+    return OptionFields<O>()
+        .component<Optimizer>(
+            "optimizer", &O::optimizer,
+            "the optimizer; uses the linear solver below if it has an option of that name")
+        .component<LinearSolver>("linear_solver", &O::linear_solver,
+                                 "solves the normal equations, and for covariances")
+        .integer("iterations", &O::iterations, 1, 1e9,
+                 "largest number of iterations of a batch step")
+        .real("tolerance", &O::tolerance, 0.0, 1.0,
+              "a batch step ends when chi2 falls by less than this fraction; 0: exactly that many "
+              "iterations");
+  }
+};
+
+/// Options of the estimator `periodic_batch`.
+struct PeriodicBatchOptions {
+  BatchOptions batch;
+  int every = 100;  ///< updates from one batch step to the next
+
+  static auto fields() {
+    using O = PeriodicBatchOptions;
+    return OptionFields<O>().part(&O::batch).integer("every", &O::every, 1, 1e9,
+                                                     "updates from one batch step to the next");
+  }
 };
 
 /// The optimizer and the linear solver. Estimators that were cloned share one set, since components
@@ -42,7 +72,8 @@ struct BatchTools {
 /// step.
 class BatchEstimator final : public Estimator {
  public:
-  BatchEstimator(BatchEstimatorOptions options, std::shared_ptr<BatchTools> tools);
+  /// `every`: updates from one batch step to the next; `stop`: when a batch step ends.
+  BatchEstimator(int every, const Stop& stop, std::shared_ptr<BatchTools> tools);
 
   UpdateReport update(const GraphUpdate& update, const UpdateOptions& options) override;
   void set_loss(std::shared_ptr<const Loss> loss, const FactorSelector& which) override;
@@ -83,7 +114,8 @@ class BatchEstimator final : public Estimator {
   GraphMarginals* covariances();
   std::size_t block_size(int a, int b) const;
 
-  BatchEstimatorOptions options_;
+  int every_;
+  Stop stop_;
   std::shared_ptr<BatchTools> tools_;
   Graph graph_;
   LossRule losses_;  ///< of factors to come

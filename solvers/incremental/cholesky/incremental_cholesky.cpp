@@ -26,7 +26,8 @@ constexpr int kFew = 8;
 
 }  // namespace
 
-IncrementalCholesky::IncrementalCholesky(const Options& options, std::shared_ptr<Rescuer> rescuer)
+IncrementalCholesky::IncrementalCholesky(const IncrementalCholeskyOptions& options,
+                                         std::shared_ptr<Rescuer> rescuer)
     : options_(options),
       rescuer_(std::move(rescuer)),
       engine_(std::make_unique<Engine>(options.settings, rescuer_)) {}
@@ -80,7 +81,7 @@ UpdateReport IncrementalCholesky::update(const GraphUpdate& update, const Update
 
   ++since_solved_;
   ++since_full_;
-  const double max_seconds = options.max_seconds > 0.0 ? options.max_seconds : options_.max_seconds;
+  const double max_seconds = options.max_seconds > 0.0 ? options.max_seconds : options_.budget;
   if (options.full || (options_.full_every > 0 && since_full_ >= options_.full_every)) {
     engine_->solve_fully(report);
     since_full_ = since_solved_ = 0;

@@ -9,22 +9,59 @@
 #include <string>
 #include <vector>
 
+#include "cairn/plugin/option_fields.hpp"
 #include "cairn/solve/estimator.hpp"
+#include "cairn/solve/optimizer.hpp"
 #include "cairn/update/loss_rule.hpp"
 #include "engine.hpp"
 
 namespace cairn::incremental {
 
+/// Options of the estimator `incremental_cholesky`.
+struct IncrementalCholeskyOptions {
+  Settings settings;
+  int solve_every = 1;  ///< updates that are solved for together
+  int full_every = 0;   ///< updates from one full step to the next; 0: never by itself
+  double budget = 0.0;  ///< of an update [s]; 0: no limit
+  std::string rescuer = "levenberg_marquardt";  ///< optimises where a step has raised chi2
+
+  static auto fields() {
+    using O = IncrementalCholeskyOptions;
+    return OptionFields<O>()
+        .part(&O::settings, accuracy_fields())
+        .integer("solve_every", &O::solve_every, 1, 1e9, "updates that are solved for together")
+        .integer("full_every", &O::full_every, 0, 1e9,
+                 "updates from one full batch step to the next; 0: only on demand")
+        .real("budget", &O::budget, 0.0, 1e9,
+              "seconds that an update may take before relinearisation is deferred; 0: no limit")
+        .component<Optimizer>(
+            "rescuer", &O::rescuer,
+            "fallback optimizer: runs on the whole graph where a step has raised chi2")
+        .part(&O::settings,
+              OptionFields<Settings>().choice("kernels", &Settings::kernels,
+                                              {"auto", "portable", "avx2", "avx512"},
+                                              "instruction set, as far as the machine has it"));
+  }
+
+ private:
+  static OptionFields<Settings> accuracy_fields() {
+    return OptionFields<Settings>()
+        .real("accuracy", &Settings::accuracy, 0.0, 1.0,
+              "relative amount by which chi2 may exceed that of a full batch solution; 0: none")
+        .real(
+            "significance", &Settings::significance, 0.0, 1e300,
+            "a step that lowers chi2 by less than this, and than the accuracy allows, is deferred")
+        .integer("iterations", &Settings::iterations, 1, 1e9,
+                 "largest number of linear systems solved per update")
+        .integer("recent", &Settings::recent, 0, 1e9,
+                 "variables touched in so many updates, and near them, are ordered last");
+  }
+};
+
 /// The estimator `incremental_cholesky`: `Engine` behind the interface, which speaks of ids.
 class IncrementalCholesky final : public Estimator {
  public:
-  struct Options {
-    Settings settings;
-    int solve_every = 1;  ///< updates that are solved for together
-    int full_every = 0;   ///< updates from one full step to the next; 0: never by itself
-    double max_seconds = 0.0;
-  };
-  IncrementalCholesky(const Options& options, std::shared_ptr<Rescuer> rescuer);
+  IncrementalCholesky(const IncrementalCholeskyOptions& options, std::shared_ptr<Rescuer> rescuer);
   IncrementalCholesky(const IncrementalCholesky& other);
   IncrementalCholesky& operator=(const IncrementalCholesky&) = delete;
 
@@ -62,7 +99,7 @@ class IncrementalCholesky final : public Estimator {
   }
   void tell_of_anchors(UpdateReport& report);
 
-  Options options_;
+  IncrementalCholeskyOptions options_;
   std::shared_ptr<Rescuer> rescuer_;
   std::unique_ptr<Engine> engine_;  // moves when it is reset; never null
   int variables_ = 0, factors_ = 0;

@@ -6,9 +6,9 @@
 #include <utility>
 #include <vector>
 
-#include "block/ordering.hpp"
 #include "block/selected_inverse.hpp"
 #include "block/supernodal_cholesky.hpp"
+#include "block_cholesky_options.hpp"
 #include "cairn/linear/linear_solver.hpp"
 #include "cairn/linear/marginals.hpp"
 #include "cairn/plugin/registry.hpp"
@@ -90,8 +90,8 @@ class BlockCholesky final : public LinearSolver,
                             public EliminationOrder,
                             public ManyRightHandSides {
  public:
-  BlockCholesky(std::string ordering, const std::string& kernels)
-      : ordering_(std::move(ordering)), cholesky_(kernels) {}
+  explicit BlockCholesky(const BlockCholeskyOptions& options)
+      : ordering_(options.ordering_text()), cholesky_(options.kernels) {}
 
   void analyze(const BlockStructure& structure) override {
     cholesky_.analyze(structure, ordering_);
@@ -138,20 +138,7 @@ class BlockCholesky final : public LinearSolver,
 
 void cairn_register(cairn::Registrar& registrar) {
   using namespace cairn;
-  registrar.add<LinearSolver>(
+  registrar.add<LinearSolver, BlockCholeskyOptions>(
       "block_cholesky",
-      OptionTable{}
-          .choice("ordering", "auto", block::every_ordering_name(),
-                  "fill-reducing ordering of the block graph; auto: by predicted flops")
-          .integer("last", 0, 0, 1e9,
-                   "variables at the end that are eliminated last, as incremental solvers need; "
-                   "not with metis")
-          .choice("kernels", "auto", {"auto", "portable", "avx2", "avx512"},
-                  "instruction set, as far as the machine has it"),
-      [](const Options& options, Registry&) {
-        std::string ordering = options.text("ordering");
-        if (options.integer("last") > 0)
-          ordering += ",last=" + std::to_string(options.integer("last"));
-        return std::make_unique<BlockCholesky>(std::move(ordering), options.text("kernels"));
-      });
+      [](const BlockCholeskyOptions& options) { return std::make_unique<BlockCholesky>(options); });
 }

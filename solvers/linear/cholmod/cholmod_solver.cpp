@@ -37,15 +37,14 @@ void keep_blas_to_one_thread() {
 
 }  // namespace
 
-CholmodSolver::CholmodSolver(CholmodMode mode, std::string ordering)
-    : ordering_(std::move(ordering)) {
+CholmodSolver::CholmodSolver(const CholmodOptions& options) : ordering_(options.ordering) {
   cholmod_start(&common_);
   common_.print = 0;
   common_.try_catch = 1;  // statuses only: no message, no handler
   common_.error_handler = nullptr;
-  common_.supernodal = mode == CholmodMode::simplicial   ? CHOLMOD_SIMPLICIAL
-                       : mode == CholmodMode::supernodal ? CHOLMOD_SUPERNODAL
-                                                         : CHOLMOD_AUTO;
+  common_.supernodal = options.mode == CholmodMode::simplicial   ? CHOLMOD_SIMPLICIAL
+                       : options.mode == CholmodMode::supernodal ? CHOLMOD_SUPERNODAL
+                                                                 : CHOLMOD_AUTO;
   common_.final_ll = 1;  // LLᵀ stops at the first pivot that is not positive; LDLᵀ would go on
   common_.quick_return_if_not_posdef = 1;
   common_.nmethods = 1;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <array>
 #include <memory>
 #include <string>
 #include <vector>
@@ -10,6 +11,7 @@
 #include "cairn/linear/block_matrix.hpp"
 #include "cairn/linear/linear_solver.hpp"
 #include "cairn/linear/marginals.hpp"
+#include "cairn/plugin/option_fields.hpp"
 
 namespace cairn {
 
@@ -20,12 +22,33 @@ enum class CholmodMode {
   supernodal,  ///< dense blocks through BLAS
 };
 
+constexpr auto enum_names(CholmodMode) {
+  return std::to_array<EnumName<CholmodMode>>({{CholmodMode::automatic, "auto"},
+                                               {CholmodMode::simplicial, "simplicial"},
+                                               {CholmodMode::supernodal, "supernodal"}});
+}
+
+struct CholmodOptions {
+  CholmodMode mode = CholmodMode::automatic;
+  std::string ordering = "amd";  ///< fill-reducing, see `order_scalars`
+
+  static auto fields() {
+    using O = CholmodOptions;
+    return OptionFields<O>()
+        .choice("mode", &O::mode,
+                "simplicial is column by column, supernodal by dense blocks through BLAS; auto "
+                "chooses by fill")
+        .choice("ordering", &O::ordering, {"amd", "csymamd", "metis", "nesdis", "natural"},
+                "fill-reducing ordering, computed on the graph of the blocks");
+  }
+};
+
 /// Adapter of CHOLMOD (Chen, Davis, Hager, Rajamanickam 2008): H = P L Lᵀ Pᵀ, with P from the graph
 /// of the blocks. Block values are scattered into scalar form by a map computed once per structure.
 /// Every instance has a workspace of its own; CHOLMOD neither prints nor aborts.
 class CholmodSolver final : public LinearSolver, public LogDeterminant, public ManyRightHandSides {
  public:
-  CholmodSolver(CholmodMode mode, std::string ordering);
+  explicit CholmodSolver(const CholmodOptions& options);
   ~CholmodSolver() override;
 
   void analyze(const BlockStructure& structure) override;

@@ -31,7 +31,7 @@ std::vector<int> amd_order(const BlockStructure& structure) {
 
 }  // namespace
 
-EigenSolver::EigenSolver(std::string ordering) : ordering_(std::move(ordering)) {}
+EigenSolver::EigenSolver(const EigenOptions& options) : ordering_(options.ordering) {}
 
 void EigenSolver::analyze(const BlockStructure& structure) {
   version_ = 0;

@@ -9,8 +9,19 @@
 #include "cairn/linear/block_matrix.hpp"
 #include "cairn/linear/linear_solver.hpp"
 #include "cairn/linear/marginals.hpp"
+#include "cairn/plugin/option_fields.hpp"
 
 namespace cairn {
+
+struct EigenOptions {
+  std::string ordering = "amd";
+
+  static auto fields() {
+    return OptionFields<EigenOptions>().choice(
+        "ordering", &EigenOptions::ordering, {"amd", "natural"},
+        "fill-reducing ordering, computed on the graph of the blocks");
+  }
+};
 
 /// Adapter of Eigen's SimplicialLDLT: P H Pᵀ = L D Lᵀ, with P from the graph of the blocks (AMD) or
 /// the order given. The permuted upper triangle is scattered straight from the blocks by a map
@@ -18,7 +29,7 @@ namespace cairn {
 /// of D is.
 class EigenSolver final : public LinearSolver, public LogDeterminant {
  public:
-  explicit EigenSolver(std::string ordering);
+  explicit EigenSolver(const EigenOptions& options);
 
   void analyze(const BlockStructure& structure) override;
   Factorization factorize(const BlockMatrix& H) override;

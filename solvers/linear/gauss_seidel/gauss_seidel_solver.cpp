@@ -9,8 +9,8 @@
 
 namespace cairn {
 
-GaussSeidelSolver::GaussSeidelSolver(double omega, iterative::RelaxationOptions options)
-    : Relaxation("gauss_seidel", options), omega_(omega) {}
+GaussSeidelSolver::GaussSeidelSolver(const GaussSeidelOptions& options)
+    : Relaxation("gauss_seidel", options.relaxation), omega_(options.omega) {}
 
 void GaussSeidelSolver::relax(int block, std::span<const double> g, std::span<double> x) {
   const BlockStructure& s = H().structure();

@@ -8,6 +8,21 @@
 
 namespace cairn {
 
+struct GaussSeidelOptions {
+  iterative::RelaxationOptions relaxation;
+  double omega = 1.0;
+
+  static auto fields() {
+    using O = GaussSeidelOptions;
+    return OptionFields<O>()
+        .part(&O::relaxation,
+              iterative::RelaxationOptions::fields(
+                  "sweeps (forwards and backwards) of one solve; 0: as many as 3e8 multiplications "
+                  "allow; a step that has not converged by then is used, and reported"))
+        .real("omega", &O::omega, 1e-3, 1.999, "over-relaxation; 1 is Gauss-Seidel itself");
+  }
+};
+
 /// Symmetric block Gauss-Seidel, over-relaxed by ω (SSOR): for every block i forwards, then
 /// backwards, x_i ← x_i + ω (H_ii⁻¹ (g_i − Σ_{j≠i} H_ij x_j) − x_i) (Duckett, Marsland, Shapiro
 /// 2000; Vallvé 2018, eq. 2.35). Each block is the best answer to its neighbours as they are. It
@@ -16,7 +31,7 @@ namespace cairn {
 /// smaller constant than Jacobi's. In the order of the variables, on one thread.
 class GaussSeidelSolver final : public iterative::Relaxation {
  public:
-  GaussSeidelSolver(double omega, iterative::RelaxationOptions options);
+  explicit GaussSeidelSolver(const GaussSeidelOptions& options);
 
  private:
   void sweep(std::span<const double> g, std::span<double> x) override;

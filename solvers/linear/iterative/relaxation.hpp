@@ -4,10 +4,12 @@
 #include <cstdint>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "cairn/linear/block_matrix.hpp"
 #include "cairn/linear/linear_solver.hpp"
+#include "cairn/plugin/option_fields.hpp"
 #include "iterative/block_rows.hpp"
 #include "iterative/diagonal_blocks.hpp"
 #include "iterative/progress.hpp"
@@ -18,6 +20,14 @@ struct RelaxationOptions {
   double tolerance = 1e-10;  ///< on ‖Hx − g‖/‖g‖
   /// Sweeps of one solve; 0: as many as 3·10⁸ multiplications allow, some tenths of a second.
   std::int64_t max_iterations = 0;
+
+  /// `sweeps`: help of `max_iterations`.
+  static OptionFields<RelaxationOptions> fields(std::string sweeps) {
+    using O = RelaxationOptions;
+    return OptionFields<O>()
+        .real("tolerance", &O::tolerance, 1e-15, 1.0, "on the relative residual |Hx - g| / |g|")
+        .integer("max_iterations", &O::max_iterations, 0, 1e12, std::move(sweeps));
+  }
 };
 
 /// What block Jacobi and block Gauss-Seidel share: stationary iterations x ← x + M⁻¹ (g − H x) from

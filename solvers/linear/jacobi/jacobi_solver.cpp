@@ -29,8 +29,8 @@ class Noise {
 
 }  // namespace
 
-JacobiSolver::JacobiSolver(double omega, iterative::RelaxationOptions options)
-    : Relaxation("jacobi", options), given_(omega), omega_(omega) {}
+JacobiSolver::JacobiSolver(const JacobiOptions& options)
+    : Relaxation("jacobi", options.relaxation), given_(options.omega), omega_(options.omega) {}
 
 /// The Rayleigh quotient of D⁻¹H in the inner product of H, in which it is symmetric.
 double JacobiSolver::largest_eigenvalue() {

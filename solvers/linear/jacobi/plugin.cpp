@@ -3,18 +3,8 @@
 #include "jacobi_solver.hpp"
 
 void cairn_register(cairn::Registrar& registrar) {
-  registrar.add<cairn::LinearSolver>(
-      "jacobi",
-      cairn::OptionTable{}
-          .real("tolerance", 1e-10, 1e-15, 1.0, "on the relative residual |Hx - g| / |g|")
-          .integer("max_iterations", 0, 0, 1e12,
-                   "sweeps of one solve; 0: as many as 3e8 multiplications allow; a step "
-                   "that has not converged by then is used, and reported")
-          .real("omega", 0.0, 0.0, 2.0, "damping; 0 chooses one for which it converges"),
-      [](const cairn::Options& options, cairn::Registry&) {
-        return std::make_unique<cairn::JacobiSolver>(
-            options.real("omega"), cairn::iterative::RelaxationOptions{
-                                       .tolerance = options.real("tolerance"),
-                                       .max_iterations = options.integer("max_iterations")});
-      });
+  using namespace cairn;
+  registrar.add<LinearSolver, JacobiOptions>("jacobi", [](const JacobiOptions& options) {
+    return std::make_unique<JacobiSolver>(options);
+  });
 }

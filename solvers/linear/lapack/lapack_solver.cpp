@@ -19,7 +19,7 @@ void dpotrs_(const char* uplo, const int* n, const int* nrhs, const double* a, c
 
 namespace cairn {
 
-LapackSolver::LapackSolver(std::int64_t max_size) : max_size_(max_size) {
+LapackSolver::LapackSolver(const LapackOptions& options) : max_size_(options.max_size) {
   keep_blas_to_one_thread();
 }
 

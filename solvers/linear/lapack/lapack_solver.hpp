@@ -7,17 +7,28 @@
 #include "cairn/linear/block_matrix.hpp"
 #include "cairn/linear/linear_solver.hpp"
 #include "cairn/linear/marginals.hpp"
+#include "cairn/plugin/option_fields.hpp"
 #include "cairn/runtime/aligned.hpp"
 
 namespace cairn {
+
+struct LapackOptions {
+  std::int64_t max_size = 8000;  ///< unknown scalars
+
+  static auto fields() {
+    return OptionFields<LapackOptions>().integer(
+        "max_size", &LapackOptions::max_size, 1, 46000,
+        "largest number of scalar unknowns: a dense matrix of 8000 takes 0.5 GB");
+  }
+};
 
 /// Dense Cholesky H = L Lᵀ by LAPACK's dpotrf and dpotrs on the lower triangle, in the order given:
 /// n²·8 bytes and n³/3 operations for n scalars, whatever the structure. It uses nothing of
 /// cairn's sparse machinery, which makes it the oracle for the other solvers on small systems.
 class LapackSolver final : public LinearSolver, public LogDeterminant {
  public:
-  /// `max_size`: scalars beyond which `analyze` throws `Error` (usage).
-  explicit LapackSolver(std::int64_t max_size);
+  /// Beyond `options.max_size` scalars `analyze` throws `Error` (usage).
+  explicit LapackSolver(const LapackOptions& options);
 
   void analyze(const BlockStructure& structure) override;
   Factorization factorize(const BlockMatrix& H) override;

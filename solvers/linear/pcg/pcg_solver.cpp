@@ -21,7 +21,7 @@ constexpr int kRestarts = 3;
 using iterative::dot;
 using iterative::Ending;
 
-PcgSolver::PcgSolver(std::unique_ptr<Preconditioner> preconditioner, PcgOptions options)
+PcgSolver::PcgSolver(std::unique_ptr<Preconditioner> preconditioner, const PcgOptions& options)
     : preconditioner_(std::move(preconditioner)), options_(options) {}
 
 void PcgSolver::analyze(const BlockStructure& structure) {

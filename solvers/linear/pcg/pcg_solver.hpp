@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -10,6 +11,7 @@
 #include "cairn/linear/block_matrix.hpp"
 #include "cairn/linear/jacobian.hpp"
 #include "cairn/linear/linear_solver.hpp"
+#include "cairn/plugin/option_fields.hpp"
 #include "iterative/block_rows.hpp"
 #include "iterative/diagonal_blocks.hpp"
 #include "iterative/progress.hpp"
@@ -18,9 +20,33 @@
 
 namespace cairn {
 
+/// What is solved exactly in each iteration.
+enum class Preconditioning { block_jacobi, incomplete_cholesky, subgraph };
+
+constexpr auto enum_names(Preconditioning) {
+  return std::to_array<EnumName<Preconditioning>>(
+      {{Preconditioning::block_jacobi, "block_jacobi"},
+       {Preconditioning::incomplete_cholesky, "incomplete_cholesky"},
+       {Preconditioning::subgraph, "subgraph"}});
+}
+
 struct PcgOptions {
+  Preconditioning preconditioner = Preconditioning::incomplete_cholesky;
   double tolerance = 1e-10;             ///< on ‖Hx − g‖/‖g‖
   std::int64_t max_iterations = 20000;  ///< of one solve
+  double loops = 0.3;                   ///< of `Subgraph`
+
+  static auto fields() {
+    using O = PcgOptions;
+    return OptionFields<O>()
+        .choice("preconditioner", &O::preconditioner, "what is solved exactly in each iteration")
+        .real("tolerance", &O::tolerance, 1e-15, 1.0, "on the relative residual |Hx - g| / |g|")
+        .integer("max_iterations", &O::max_iterations, 1, 1e9,
+                 "of one solve; a step that has not converged by then is used, and reported")
+        .real("loops", &O::loops, 0.0, 1e3,
+              "subgraph: loop closures taken besides the spanning tree, as a fraction of the "
+              "blocks");
+  }
 };
 
 /// Conjugate gradients (Hestenes, Stiefel 1952) on the blocks of H with a preconditioner (Saad
@@ -40,7 +66,7 @@ struct PcgOptions {
 /// from J by itself.
 class PcgSolver final : public LinearSolver, public JacobianSolver {
  public:
-  PcgSolver(std::unique_ptr<Preconditioner> preconditioner, PcgOptions options);
+  PcgSolver(std::unique_ptr<Preconditioner> preconditioner, const PcgOptions& options);
 
   void analyze(const BlockStructure& structure) override;
   Factorization factorize(const BlockMatrix& H) override;

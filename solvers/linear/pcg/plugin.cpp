@@ -7,42 +7,31 @@
 
 namespace {
 
-/// Who factorises the subgraph: nearly a tree, so any sparse Cholesky will do.
-std::string subgraph_solver(const cairn::Registry& registry) {
-  const bool ours = registry.has(cairn::LinearSolver::kKind, "block_cholesky");
+using namespace cairn;
+
+/// What factorises the subgraph: nearly a tree, so any sparse Cholesky will do.
+std::string subgraph_solver(const Registry& registry) {
+  const bool ours = registry.has(LinearSolver::kKind, "block_cholesky");
   return ours ? "block_cholesky" : "eigen";
 }
 
-std::unique_ptr<cairn::Preconditioner> make_preconditioner(const cairn::Options& options,
-                                                           cairn::Registry& registry) {
-  const std::string& name = options.text("preconditioner");
-  if (name == "incomplete_cholesky") return std::make_unique<cairn::IncompleteCholesky>();
-  if (name == "subgraph") {
-    return std::make_unique<cairn::Subgraph>(
-        registry.make<cairn::LinearSolver>(subgraph_solver(registry)), options.real("loops"));
+std::unique_ptr<Preconditioner> make_preconditioner(const PcgOptions& options, Registry& registry) {
+  switch (options.preconditioner) {
+    case Preconditioning::block_jacobi:
+      break;
+    case Preconditioning::incomplete_cholesky:
+      return std::make_unique<IncompleteCholesky>();
+    case Preconditioning::subgraph:
+      return std::make_unique<Subgraph>(registry.make<LinearSolver>(subgraph_solver(registry)),
+                                        options.loops);
   }
-  return std::make_unique<cairn::BlockJacobi>();
+  return std::make_unique<BlockJacobi>();
 }
 
 }  // namespace
 
-void cairn_register(cairn::Registrar& registrar) {
-  registrar.add<cairn::LinearSolver>(
-      "pcg",
-      cairn::OptionTable{}
-          .choice("preconditioner", "incomplete_cholesky",
-                  {"block_jacobi", "incomplete_cholesky", "subgraph"},
-                  "what is solved exactly in each iteration")
-          .real("tolerance", 1e-10, 1e-15, 1.0, "on the relative residual |Hx - g| / |g|")
-          .integer("max_iterations", 20000, 1, 1e9,
-                   "of one solve; a step that has not converged by then is used, and reported")
-          .real("loops", 0.3, 0.0, 1e3,
-                "subgraph: loop closures taken besides the spanning tree, as a fraction of the "
-                "blocks"),
-      [](const cairn::Options& options, cairn::Registry& registry) {
-        return std::make_unique<cairn::PcgSolver>(
-            make_preconditioner(options, registry),
-            cairn::PcgOptions{.tolerance = options.real("tolerance"),
-                              .max_iterations = options.integer("max_iterations")});
-      });
+void cairn_register(Registrar& registrar) {
+  registrar.add<LinearSolver, PcgOptions>("pcg", [](const PcgOptions& options, Registry& registry) {
+    return std::make_unique<PcgSolver>(make_preconditioner(options, registry), options);
+  });
 }

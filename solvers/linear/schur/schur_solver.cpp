@@ -39,17 +39,16 @@ void solve_upper(const double* L, double* v, int size) {
 
 }  // namespace
 
-SchurSolver::SchurSolver(std::unique_ptr<LinearSolver> inner, std::string eliminate,
-                         const std::string& kernels)
+SchurSolver::SchurSolver(std::unique_ptr<LinearSolver> inner, const SchurOptions& options)
     : inner_(std::move(inner)),
       inner_determinant_(query<LogDeterminant>(*inner_)),
       inner_order_(query<EliminationOrder>(*inner_)),
       inner_many_(query<ManyRightHandSides>(*inner_)),
-      eliminate_(std::move(eliminate)),
-      kernels_(schur::choose_kernels(kernels.c_str())) {
+      eliminate_(options.eliminate),
+      kernels_(schur::choose_kernels(options.kernels.c_str())) {
   if (!kernels_) {
     throw Error(ErrorCode::usage, "linear_solver schur: this machine cannot run the kernels '" +
-                                      kernels + "'; use auto");
+                                      options.kernels + "'; use auto");
   }
 }
 

@@ -10,10 +10,28 @@
 
 #include "cairn/linear/linear_solver.hpp"
 #include "cairn/linear/marginals.hpp"
+#include "cairn/plugin/option_fields.hpp"
 #include "cairn/runtime/aligned.hpp"
 #include "schur_plan.hpp"
 
 namespace cairn {
+
+struct SchurOptions {
+  std::string linear_solver = "block_cholesky";  ///< of the reduced system
+  std::string eliminate = "auto";                ///< see `schur::elimination_set`
+  std::string kernels = "auto";                  ///< auto, portable, avx2 or avx512
+
+  static auto fields() {
+    using O = SchurOptions;
+    return OptionFields<O>()
+        .component<LinearSolver>("linear_solver", &O::linear_solver, "solves the reduced system")
+        .choice("eliminate", &O::eliminate, {"auto", "smallest", "independent_set"},
+                "blocks that are eliminated first; auto: the smallest where they are most of all "
+                "and not adjacent, else an independent set")
+        .choice("kernels", &O::kernels, {"auto", "portable", "avx2", "avx512"},
+                "instruction set, as far as the machine has it");
+  }
+};
 
 /// Solves H x = g by eliminating an independent set E of blocks first, such as the points of a
 /// bundle adjustment, and solving for the others, R, by any linear solver (Brown 1958; Triggs et
@@ -33,10 +51,9 @@ class SchurSolver final : public LinearSolver,
                           public EliminationOrder,
                           public ManyRightHandSides {
  public:
-  /// `eliminate`: see `schur::elimination_set`. `kernels`: auto, portable, avx2 or avx512; throws
-  /// `Error` (usage) for what the machine cannot run.
-  SchurSolver(std::unique_ptr<LinearSolver> inner, std::string eliminate,
-              const std::string& kernels);
+  /// `inner` solves the reduced system. Throws `Error` (usage) for kernels that the machine cannot
+  /// run.
+  SchurSolver(std::unique_ptr<LinearSolver> inner, const SchurOptions& options);
 
   void analyze(const BlockStructure& structure) override;
   Factorization factorize(const BlockMatrix& H) override;

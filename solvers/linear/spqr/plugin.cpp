@@ -3,12 +3,7 @@
 #include "spqr_solver.hpp"
 
 void cairn_register(cairn::Registrar& registrar) {
-  registrar.add<cairn::LinearSolver>(
-      "spqr",
-      cairn::OptionTable{}.choice(
-          "ordering", "amd", {"amd", "metis", "nesdis", "colamd", "natural"},
-          "fill-reducing column ordering, computed on the graph of the blocks"),
-      [](const cairn::Options& options, cairn::Registry&) {
-        return std::make_unique<cairn::SpqrSolver>(options.text("ordering"));
-      });
+  using namespace cairn;
+  registrar.add<LinearSolver, SpqrOptions>(
+      "spqr", [](const SpqrOptions& options) { return std::make_unique<SpqrSolver>(options); });
 }

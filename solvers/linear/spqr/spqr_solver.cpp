@@ -10,7 +10,7 @@
 
 namespace cairn {
 
-SpqrSolver::SpqrSolver(std::string ordering) : ordering_(std::move(ordering)) {
+SpqrSolver::SpqrSolver(const SpqrOptions& options) : ordering_(options.ordering) {
   cholmod_l_start(&common_);
   common_.print = 0;
   common_.try_catch = 1;  // statuses only: no message, no handler

@@ -12,9 +12,20 @@
 #include "cairn/linear/jacobian.hpp"
 #include "cairn/linear/linear_solver.hpp"
 #include "cairn/linear/marginals.hpp"
+#include "cairn/plugin/option_fields.hpp"
 #include "spqr_factor.hpp"
 
 namespace cairn {
+
+struct SpqrOptions {
+  std::string ordering = "amd";
+
+  static auto fields() {
+    return OptionFields<SpqrOptions>().choice(
+        "ordering", &SpqrOptions::ordering, {"amd", "metis", "nesdis", "colamd", "natural"},
+        "fill-reducing column ordering, computed on the graph of the blocks");
+  }
+};
 
 /// Square-root SAM (Dellaert, Kaess 2006, section 3; Vallvé 2018, chapter 2): J P = Q R by
 /// SuiteSparseQR (Davis 2011), multifrontal Householder QR of the whitened Jacobian, and
@@ -29,7 +40,7 @@ namespace cairn {
 /// time.
 class SpqrSolver final : public LinearSolver, public JacobianSolver, public LogDeterminant {
  public:
-  explicit SpqrSolver(std::string ordering);
+  explicit SpqrSolver(const SpqrOptions& options);
   ~SpqrSolver() override;
 
   void analyze(const JacobianStructure& structure) override;

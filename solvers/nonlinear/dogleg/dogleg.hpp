@@ -5,14 +5,25 @@
 #include <string>
 
 #include "cairn/linear/linear_solver.hpp"
+#include "cairn/plugin/option_fields.hpp"
 #include "cairn/solve/optimizer.hpp"
 
 namespace cairn {
 
 struct DoglegOptions {
-  std::string linear_solver = "block_cholesky";  ///< its name, for the summary
+  std::string linear_solver = "block_cholesky";  ///< of the normal equations
   double initial_radius = 1e4;      ///< of the trust region, in the norm of diag(H): about √chi2
-  double smallest_diagonal = 1e-6;  ///< lower bound of the diagonal of H [units of H]
+  double smallest_diagonal = 1e-6;  ///< the diagonal of H counts as at least this [units of H]
+
+  static auto fields() {
+    using O = DoglegOptions;
+    return OptionFields<O>()
+        .component<LinearSolver>("linear_solver", &O::linear_solver, "solves the normal equations")
+        .real("initial_radius", &O::initial_radius, 1e-12, 1e30,
+              "of the trust region, in the norm of diag(H)")
+        .real("smallest_diagonal", &O::smallest_diagonal, 0.0, 1e30,
+              "lower bound of the diagonal of H in that norm");
+  }
 };
 
 /// Powell's dogleg (Powell 1970; Nocedal and Wright 2006, ch. 4): the step is the point of the

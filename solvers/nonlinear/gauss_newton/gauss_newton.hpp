@@ -5,13 +5,22 @@
 #include <string>
 
 #include "cairn/linear/linear_solver.hpp"
+#include "cairn/plugin/option_fields.hpp"
 #include "cairn/solve/optimizer.hpp"
 
 namespace cairn {
 
 struct GaussNewtonOptions {
-  std::string linear_solver = "block_cholesky";  ///< its name, for the summary
+  std::string linear_solver = "block_cholesky";  ///< of the normal equations
   int rises = 8;  ///< iterations in a row in which chi2 may rise before the run counts as diverging
+
+  static auto fields() {
+    using O = GaussNewtonOptions;
+    return OptionFields<O>()
+        .component<LinearSolver>("linear_solver", &O::linear_solver, "solves the normal equations")
+        .integer("rises", &O::rises, 1, 1e6,
+                 "iterations in a row in which chi2 may rise before the run counts as diverging");
+  }
 };
 
 /// Gauss-Newton (Ila et al. 2017, eq. 3-4): H δ = g, x ← retract(x, δ), every step taken whole. Far

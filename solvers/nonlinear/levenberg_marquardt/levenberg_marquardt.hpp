@@ -5,12 +5,13 @@
 #include <string>
 
 #include "cairn/linear/linear_solver.hpp"
+#include "cairn/plugin/option_fields.hpp"
 #include "cairn/solve/optimizer.hpp"
 
 namespace cairn {
 
 struct LevenbergMarquardtOptions {
-  std::string linear_solver = "block_cholesky";  ///< its name, for the summary
+  std::string linear_solver = "block_cholesky";  ///< of the normal equations
   /// Damping of the first step, relative to the diagonal of H. 0: 1e-6, or 1e-4 where the gauge is
   /// left free: there damping alone makes H regular, and such problems (cameras and points) are so
   /// far from linear that a first step with less may throw points behind their cameras, into
@@ -19,6 +20,20 @@ struct LevenbergMarquardtOptions {
   double largest_lambda = 1e16;     ///< where the run gives up
   double smallest_diagonal = 1e-6;  ///< D is at least this [units of H]
   bool endgame = true;              ///< undamped steps near the minimum
+
+  static auto fields() {
+    using O = LevenbergMarquardtOptions;
+    return OptionFields<O>()
+        .component<LinearSolver>("linear_solver", &O::linear_solver, "solves the normal equations")
+        .real("initial_lambda", &O::initial_lambda, 0.0, 1e16,
+              "damping of the first step, as a fraction of the diagonal of H; 0: 1e-6, or 1e-4 "
+              "where the gauge is left free")
+        .real("largest_lambda", &O::largest_lambda, 1.0, 1e30, "damping at which the run gives up")
+        .real("smallest_diagonal", &O::smallest_diagonal, 0.0, 1e30,
+              "lower bound of the diagonal of H in the damping")
+        .boolean("endgame", &O::endgame,
+                 "undamped steps near the minimum, which also judge convergence");
+  }
 };
 
 /// Levenberg-Marquardt: (H + λ D) δ = g with D = diag(H) (Marquardt's scaling, which makes λ a pure

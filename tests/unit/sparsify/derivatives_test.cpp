@@ -103,7 +103,7 @@ TEST(Derivatives, NewtonEndsInFewStepsAtAStationaryPoint) {
     const RecoveryProblem problem = seed % 2 == 0
                                         ? full_problem(draw, kSize, 6 + draw.integer(6), kFactors)
                                         : pairwise_problem(draw, kSize, 4, kFactors - 3);
-    const RecoveryResult result = InteriorPoint({.tolerance = 1e-5}, {}).recover(problem);
+    const RecoveryResult result = InteriorPoint({.recovery = {.tolerance = 1e-5}}).recover(problem);
     EXPECT_TRUE(result.converged);
     EXPECT_THAT(result.iterations, Le(60));
     const ScaledProblem scaled(problem);

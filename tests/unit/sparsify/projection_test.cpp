@@ -59,7 +59,7 @@ TEST_F(Projections, GiveTheSameKld) {
     const std::vector<FactorChoice> topology =
         MutualInformation(TopologyOptions{}).choose(blanket, 2 * (nodes - 1));
     const auto kld = [&](Projection projection) {
-      return InteriorPoint({.tolerance = 1e-6}, {})
+      return InteriorPoint({.recovery = {.tolerance = 1e-6}})
           .recover(BlanketProjection(blanket, projection).problem(blanket, topology))
           .kld;
     };

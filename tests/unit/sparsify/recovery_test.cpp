@@ -25,8 +25,9 @@ using testing::Lt;
 std::unique_ptr<FactorRecovery> method(const std::string& name, const RecoveryOptions& options) {
   if (name == "fd") return std::make_unique<FactorDescent>(options, false);
   if (name == "ncfd") return std::make_unique<FactorDescent>(options, true);
-  if (name == "ip") return std::make_unique<InteriorPoint>(options, InteriorPointOptions{});
-  return std::make_unique<ProjectedQuasiNewton>(options, 10);
+  if (name == "ip")
+    return std::make_unique<InteriorPoint>(InteriorPointOptions{.recovery = options});
+  return std::make_unique<ProjectedQuasiNewton>(ProjectedQuasiNewtonOptions{.recovery = options});
 }
 const std::vector<std::string> kMethods{"fd", "ncfd", "ip", "pqn"};
 
@@ -103,13 +104,12 @@ TEST_F(Recovery, DoesNotDependOnTheInitialGuess) {
     const DenseBlanket& blanket = (*blankets_)[b];
     const RecoveryProblem problem = problem_of(blanket, populated(blanket));
     const double kld = method("ip", {.tolerance = 1e-6})->recover(problem).kld;
-    for (const std::string& initial : kInitialNames) {
+    for (const auto& [initial, from] : enum_names(InitialInformation{})) {
       for (const std::string name : {"ip", "ncfd"}) {
-        SCOPED_TRACE(testing::Message() << "blanket " << b << ", " << name << " from " << initial);
-        const RecoveryResult result = method(name, {.initial = initial_information(initial),
-                                                    .tolerance = 1e-6,
-                                                    .iterations = 100000})
-                                          ->recover(problem);
+        SCOPED_TRACE(testing::Message() << "blanket " << b << ", " << name << " from " << from);
+        const RecoveryResult result =
+            method(name, {.initial = initial, .tolerance = 1e-6, .iterations = 100000})
+                ->recover(problem);
         EXPECT_TRUE(result.converged);
         EXPECT_THAT(result.kld, DoubleNear(kld, 1e-6));
       }
@@ -122,12 +122,13 @@ TEST_F(Recovery, InteriorPointTakesFewSteps) {
   for (std::size_t b = 0; b < blankets_->size(); b += 4) {
     const DenseBlanket& blanket = (*blankets_)[b];
     const RecoveryProblem problem = problem_of(blanket, populated(blanket));
-    for (const std::string& initial : kInitialNames) {
-      SCOPED_TRACE(testing::Message() << "blanket " << b << " from " << initial);
-      const RecoveryOptions options{.initial = initial_information(initial)};
-      EXPECT_THAT(InteriorPoint(options, {}).recover(problem).iterations, Le(80));
-      EXPECT_THAT(InteriorPoint(options, {.conservative = true}).recover(problem).iterations,
-                  Le(120));
+    for (const auto& [initial, from] : enum_names(InitialInformation{})) {
+      SCOPED_TRACE(testing::Message() << "blanket " << b << " from " << from);
+      const RecoveryOptions options{.initial = initial};
+      EXPECT_THAT(InteriorPoint({.recovery = options}).recover(problem).iterations, Le(80));
+      EXPECT_THAT(
+          InteriorPoint({.recovery = options, .conservative = true}).recover(problem).iterations,
+          Le(120));
     }
   }
 }
@@ -206,9 +207,8 @@ TEST_F(Recovery, ClosedFormIsTheMinimumOfATree) {
     EXPECT_TRUE(closed.converged);
     expect_possible(problem, closed);
     for (const std::string name : {"fd", "ncfd"}) {
-      for (const std::string& initial : kInitialNames) {
-        const RecoveryResult result =
-            method(name, {.initial = initial_information(initial)})->recover(problem);
+      for (const auto& [initial, from] : enum_names(InitialInformation{})) {
+        const RecoveryResult result = method(name, {.initial = initial})->recover(problem);
         EXPECT_TRUE(result.converged);
         EXPECT_EQ(result.iterations, 0);
         EXPECT_THAT(result.kld, DoubleNear(closed.kld, 1e-9));
@@ -251,11 +251,9 @@ TEST_F(Recovery, WhatDoesNotConnectAllNodesIsRefused) {
     }
     const RecoveryProblem problem = problem_of(blanket, topology);
     for (const std::string& name : kMethods) {
-      for (const std::string& initial : kInitialNames) {
-        SCOPED_TRACE(testing::Message() << name << " from " << initial << ", " << times);
-        EXPECT_EQ(code_of([&] {
-                    method(name, {.initial = initial_information(initial)})->recover(problem);
-                  }),
+      for (const auto& [initial, from] : enum_names(InitialInformation{})) {
+        SCOPED_TRACE(testing::Message() << name << " from " << from << ", " << times);
+        EXPECT_EQ(code_of([&] { method(name, {.initial = initial})->recover(problem); }),
                   ErrorCode::numerical);
       }
     }
@@ -269,9 +267,9 @@ TEST_F(Recovery, AConservativeOneClaimsNothingThatTheDenseOneDoesNot) {
     const DenseBlanket& blanket = (*blankets_)[b];
     const RecoveryProblem problem = problem_of(blanket, populated(blanket, 1.5));
     const int r = problem.rank;
-    const RecoveryResult free = InteriorPoint({.tolerance = 1e-5}, {}).recover(problem);
+    const RecoveryResult free = InteriorPoint({.recovery = {.tolerance = 1e-5}}).recover(problem);
     const RecoveryResult held =
-        InteriorPoint({.tolerance = 1e-5}, {.conservative = true}).recover(problem);
+        InteriorPoint({.recovery = {.tolerance = 1e-5}, .conservative = true}).recover(problem);
     EXPECT_TRUE(held.converged);
     expect_possible(problem, held);
     const Matrix I = Matrix::Identity(r, r);
@@ -315,9 +313,8 @@ TEST_F(Recovery, DescentNeverGoesUp) {
     const DenseBlanket& blanket = (*blankets_)[b];
     const RecoveryProblem problem = problem_of(blanket, populated(blanket));
     for (const std::string name : {"fd", "ncfd"}) {
-      for (const std::string initial : {"odb", "identity"}) {
-        const auto descent =
-            method(name, {.initial = initial_information(initial), .tolerance = 1e-5});
+      for (const auto initial : {InitialInformation::odb, InitialInformation::identity}) {
+        const auto descent = method(name, {.initial = initial, .tolerance = 1e-5});
         descent->trace(true);
         const RecoveryResult result = descent->recover(problem);
         ASSERT_FALSE(result.trace.empty());
@@ -349,12 +346,11 @@ TEST_F(Recovery, AllPairsRepresentWhatIsMadeOfThem) {
     set_information(blanket, all, Omega);
     const RecoveryProblem problem = problem_of(blanket, all);
     for (const std::string name : {"ncfd", "ip", "fd"}) {
-      for (const std::string& initial : kInitialNames) {
-        SCOPED_TRACE(testing::Message() << name << " from " << initial << ", " << times);
-        const RecoveryResult result = method(name, {.initial = initial_information(initial),
-                                                    .tolerance = 1e-6,
-                                                    .iterations = 200000})
-                                          ->recover(problem);
+      for (const auto& [initial, from] : enum_names(InitialInformation{})) {
+        SCOPED_TRACE(testing::Message() << name << " from " << from << ", " << times);
+        const RecoveryResult result =
+            method(name, {.initial = initial, .tolerance = 1e-6, .iterations = 200000})
+                ->recover(problem);
         EXPECT_TRUE(result.converged);
         EXPECT_THAT(result.kld, Lt(1e-9));
         const std::vector<Matrix> found = informations(problem, result);

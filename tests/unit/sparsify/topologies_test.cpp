@@ -37,13 +37,14 @@ std::vector<std::pair<std::string, std::unique_ptr<Topology>>> topologies() {
   all.emplace_back("mi", std::make_unique<MutualInformation>(TopologyOptions{}));
   all.emplace_back("mi:regularization=information",
                    std::make_unique<MutualInformation>(information));
-  all.emplace_back("dmi", std::make_unique<DowndatedInformation>(TopologyOptions{}));
+  all.emplace_back("dmi", std::make_unique<DowndatedInformation>(DowndatedInformationOptions{}));
   all.emplace_back("dmi:downdate=exact",
-                   std::make_unique<DowndatedInformation>(TopologyOptions{.exact_downdate = true}));
+                   std::make_unique<DowndatedInformation>(
+                       DowndatedInformationOptions{.downdate = Downdate::exact}));
   all.emplace_back("ekld", std::make_unique<ExpectedDivergence>(TopologyOptions{}));
   all.emplace_back("odd", std::make_unique<OffDiagonalDeterminant>());
-  all.emplace_back("l1", std::make_unique<SparseInverse>(TopologyOptions{}));
-  all.emplace_back("best", std::make_unique<Exhaustive>(TopologyOptions{}));
+  all.emplace_back("l1", std::make_unique<SparseInverse>(SparseInverseOptions{}));
+  all.emplace_back("best", std::make_unique<Exhaustive>(ExhaustiveOptions{}));
   return all;
 }
 
@@ -232,7 +233,7 @@ TEST_F(Topologies, NoneIsBetterThanTheBest) {
     const auto all = topologies();
     for (const int population : {nodes - 1, nodes, nodes + 1}) {
       const std::vector<FactorChoice> best =
-          Exhaustive(TopologyOptions{}).choose(blanket, population);
+          Exhaustive(ExhaustiveOptions{}).choose(blanket, population);
       ASSERT_TRUE(connects(blanket, best));
       const double least = kld(blanket, best);
       for (const auto& [name, topology] : all) {
@@ -250,9 +251,9 @@ TEST_F(Topologies, BestRefusesMoreThanItMayTry) {
   Draw draw(6);
   const DenseBlanket blanket = random_blanket(registry, 2, 5, draw, 3);
   // 10 over 5 are 252.
-  EXPECT_EQ(Exhaustive(TopologyOptions{.most = 252}).choose(blanket, 5).size(), 5U);
+  EXPECT_EQ(Exhaustive(ExhaustiveOptions{.most = 252}).choose(blanket, 5).size(), 5U);
   try {
-    Exhaustive(TopologyOptions{.most = 251}).choose(blanket, 5);
+    Exhaustive(ExhaustiveOptions{.most = 251}).choose(blanket, 5);
     FAIL() << "it tried";
   } catch (const Error& error) {
     EXPECT_EQ(error.code(), ErrorCode::usage);
@@ -338,9 +339,9 @@ TEST_F(Topologies, BothDowndatesAddToTheTree) {
   int better = 0, all = 0;
   for (const DenseBlanket& blanket : some(4, 6)) {
     const std::vector<FactorChoice> tree = ChowLiuTree(TopologyOptions{}).choose(blanket, 0);
-    for (const bool exact : {false, true}) {
+    for (const Downdate how : {Downdate::sum, Downdate::exact}) {
       const std::vector<FactorChoice> chosen =
-          DowndatedInformation(TopologyOptions{.exact_downdate = exact})
+          DowndatedInformation(DowndatedInformationOptions{.downdate = how})
               .choose(blanket, static_cast<int>(tree.size()) + 2);
       ASSERT_EQ(chosen.size(), tree.size() + 2);
       EXPECT_TRUE(std::equal(tree.begin(), tree.end(), chosen.begin()));

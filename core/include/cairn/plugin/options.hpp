@@ -32,8 +32,9 @@ struct OptionSpec {
   std::vector<std::string> choices;
 };
 
-/// The options of one component, declared once. The same table checks the command line, fills in
-/// defaults and prints the help.
+/// The options of one component. The same table checks the command line, fills in defaults and
+/// prints the help. A component with a struct of options has its table from there
+/// (`OptionFields`); one without writes it down:
 ///
 ///     OptionTable{}
 ///         .integer("iterations", 100, 1, 1e6, "largest number of iterations")
@@ -50,6 +51,8 @@ class CAIRN_API OptionTable {
                       std::string help);
   OptionTable& component(std::string name, std::string kind, std::string default_value,
                          std::string help);
+  /// Any of these. Throws `std::logic_error` if there is an option of that name already.
+  OptionTable& add(OptionSpec spec);
 
   const std::vector<OptionSpec>& specs() const { return specs_; }
   /// The spec of that name, or null.
@@ -60,6 +63,11 @@ class CAIRN_API OptionTable {
  private:
   std::vector<OptionSpec> specs_;
 };
+
+/// A value as it is written on a command line: the shortest text that reads back as the same.
+CAIRN_API std::string option_text(bool value);
+CAIRN_API std::string option_text(std::int64_t value);
+CAIRN_API std::string option_text(double value);
 
 /// Option values as they were written: name to text.
 using OptionValues = std::map<std::string, std::string, std::less<>>;
@@ -101,6 +109,11 @@ struct ComponentSpec {
 
 /// Parses `name:key=value,key=value`. Throws `Error` (usage) with the text and the form expected.
 CAIRN_API ComponentSpec parse_component(std::string_view text);
+
+/// The inverse of `parse_component`. Throws `Error` (usage) for what that form cannot hold: a name
+/// with ':' and a value with ',', such as that of a component with two options of its own, which a
+/// `ComponentSpec` can.
+CAIRN_API std::string to_text(const ComponentSpec& spec);
 
 /// Splits `a,b:key=value,key=value,c` into its components: a part that holds '=' but no ':' before
 /// it belongs to the component on its left.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <concepts>
 #include <filesystem>
 #include <functional>
 #include <memory>
@@ -9,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "cairn/plugin/option_fields.hpp"
 #include "cairn/plugin/options.hpp"
 #include "cairn/runtime/api.hpp"
 #include "cairn/runtime/component.hpp"
@@ -43,10 +45,34 @@ class CAIRN_API Registrar {
                       -> std::unique_ptr<Component> { return factory(options, registry); });
   }
 
+  /// Adds a component whose options are a struct (`OptionFields`), which the factory is given:
+  /// called as `factory(options, registry)`, or `factory(options)` if it takes no registry.
+  template <class Interface, OptionStruct Struct, class MakeComponent>
+  void add(std::string name, MakeComponent factory) {
+    add<Interface>(std::move(name), Struct::fields().table(),
+                   [factory = std::move(factory)](
+                       const Options& options, Registry& registry) -> std::unique_ptr<Interface> {
+                     const Struct chosen = Struct::fields().read(options);
+                     if constexpr (std::invocable<const MakeComponent&, const Struct&, Registry&>) {
+                       return factory(chosen, registry);
+                     } else {
+                       return factory(chosen);
+                     }
+                   });
+  }
+
   /// Adds a set of types under the name of the plugin (kind "types"); options of it are given with
   /// `Registry::set_type_options`. Their tags are the manifest's "variable" and "factor" offers.
   void add_types(std::string name, OptionTable table,
                  std::function<TypeSet(const Options&)> factory);
+  /// Likewise with options that are a struct.
+  template <OptionStruct Struct>
+  void add_types(std::string name, std::function<TypeSet(const Struct&)> factory) {
+    add_types(std::move(name), Struct::fields().table(),
+              [factory = std::move(factory)](const Options& options) {
+                return factory(Struct::fields().read(options));
+              });
+  }
 
  private:
   friend class Registry;
@@ -143,6 +169,12 @@ class CAIRN_API Registry {
   std::unique_ptr<Interface> make(const ComponentSpec& spec) {
     return std::unique_ptr<Interface>(
         static_cast<Interface*>(make_component(Interface::kKind, spec).release()));
+  }
+  /// `make<Optimizer>("dogleg", DoglegOptions{.initial_radius = 10.0})`; every option has the
+  /// value that the struct has.
+  template <class Interface, OptionStruct Struct>
+  std::unique_ptr<Interface> make(std::string_view name, const Struct& options) {
+    return make<Interface>(to_spec(name, options));
   }
 
   /// The options that a name takes; loads its plugin.

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <array>
 #include <memory>
 #include <span>
 #include <vector>
 
 #include "cairn/graph/update.hpp"
 #include "cairn/runtime/api.hpp"
+#include "cairn/runtime/enum_names.hpp"
 #include "cairn/types/factor_type.hpp"
 #include "cairn/types/variable_type.hpp"
 
@@ -23,6 +25,10 @@ enum class CompositionOrder {
   first,   ///< Smith and Cheeseman 1986: Jacobians
   fourth,  ///< Barfoot and Furgale 2014: all terms of fourth order of Baker, Campbell and Hausdorff
 };
+constexpr auto enum_names(CompositionOrder) {
+  return std::to_array<EnumName<CompositionOrder>>(
+      {{CompositionOrder::first, "first"}, {CompositionOrder::fourth, "fourth"}});
+}
 
 /// Arithmetic with relative poses with covariance on any Lie group (the ability `LieGroup` of a
 /// variable type). Perturbations are on the right throughout, as in `VariableType::retract`.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <array>
 #include <memory>
 #include <span>
 #include <vector>
@@ -8,6 +9,7 @@
 #include "cairn/graph/graph.hpp"
 #include "cairn/graph/update.hpp"
 #include "cairn/runtime/api.hpp"
+#include "cairn/runtime/enum_names.hpp"
 
 namespace cairn {
 
@@ -35,6 +37,12 @@ enum class Recovery {
   distribute,   ///< v2: along the odometry, its mismatch distributed in proportion to distance
   likely,       ///< along the odometry, its mismatch distributed by maximum likelihood
 };
+constexpr auto enum_names(Recovery) {
+  return std::to_array<EnumName<Recovery>>({{Recovery::uniform, "v0"},
+                                            {Recovery::interpolate, "v1"},
+                                            {Recovery::distribute, "v2"},
+                                            {Recovery::likely, "likely"}});
+}
 
 /// A pose that was put back.
 struct RecoveredPose {

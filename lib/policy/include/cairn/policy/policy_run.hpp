@@ -98,13 +98,6 @@ class CAIRN_API PolicyRun {
   PolicyResult result_;
 };
 
-/// Short names of the ways of recovery.
-inline constexpr std::array<std::pair<std::string_view, Recovery>, 4> kRecoveryNames{
-    {{"v0", Recovery::uniform},
-     {"v1", Recovery::interpolate},
-     {"v2", Recovery::distribute},
-     {"likely", Recovery::likely}}};
-
 /// "compact_pose:range=5,angle=0.5"
 CAIRN_API std::string spec_text(const ComponentSpec& spec);
 

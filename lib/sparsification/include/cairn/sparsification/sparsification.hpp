@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <array>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -15,6 +16,7 @@
 #include "cairn/linear/linear_solver.hpp"
 #include "cairn/runtime/api.hpp"
 #include "cairn/runtime/component.hpp"
+#include "cairn/runtime/enum_names.hpp"
 
 // Sparsification: taking nodes out of a graph, and replacing the dense Gaussian that marginalising
 // them leaves by a few factors, which can be relinearised. Chapter 4 of J. Vallvé, Information
@@ -70,6 +72,8 @@ struct CAIRN_API Population {
 
   /// "tree:2", "fill:0.5", "loss:0.01". Throws `Error` (usage) for anything else.
   static Population parse(const std::string& text);
+  /// What `parse` reads back as the same.
+  std::string text() const;
 
   /// Factors for a blanket of n nodes, rounded up and clipped to [n − 1, n (n − 1) / 2] (T 4.20);
   /// of `loss` the least.
@@ -101,6 +105,10 @@ enum class Projection {
   eigen,  ///< those of the eigenvectors of Λ whose eigenvalues are not zero
   node,   ///< relative to the blanket's first node, which must be all that Λ leaves open
 };
+constexpr auto enum_names(Projection) {
+  return std::to_array<EnumName<Projection>>(
+      {{Projection::node, "node"}, {Projection::eigen, "eigen"}});
+}
 
 /// Coordinates z with δ = T z in which the dense Gaussian is N(0, I): TᵀΛT = I.
 class CAIRN_API BlanketProjection {

@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "compact_pose_options.hpp"
+
+#include <charconv>
+#include <sstream>
+
+#include "cairn/runtime/error.hpp"
+
+namespace cairn::compact {
+namespace {
+
+std::vector<double> numbers(const std::string& text) {
+  std::istringstream words(text);
+  std::vector<double> all;
+  for (std::string word; words >> word;) {
+    double number = 0.0;
+    const char* const end = word.data() + word.size();
+    if (const auto [at, problem] = std::from_chars(word.data(), end, number);
+        problem != std::errc{} || at != end) {
+      throw Error(ErrorCode::usage, "compact_pose: sensor: '" + word +
+                                        "' is no number; expected numbers separated by spaces");
+    }
+    all.push_back(number);
+  }
+  return all;
+}
+
+std::string text_of(const std::vector<double>& numbers) {
+  std::string text;
+  for (const double number : numbers) text += (text.empty() ? "" : " ") + option_text(number);
+  return text;
+}
+
+using O = CompactPoseOptions;
+
+OptionFields<O> range_fields() {
+  return OptionFields<O>()
+      .choice("strategy", &O::strategy,
+              "all poses and all loops, all poses and few loops, or few of both")
+      .real("range", &O::range, 0.0, 1e9,
+            "how far the sensor matches along x of the earlier pose [m]")
+      .real("range_y", &O::range_y, 0.0, 1e9, "along y [m]; 0: as range")
+      .real("range_z", &O::range_z, 0.0, 1e9, "along z [m]; 0: as range")
+      .real("angle", &O::angle, 0.0, 3.15, "how much orientations may differ [rad]")
+      .choice("rotation", &O::rotation,
+              "what that angle is of: each element of the rotation vector, the whole rotation, or "
+              "the direction of view")
+      .choice("view_axis", &O::view_axis, "of the body, along which the sensor looks")
+      .real("probability", &O::probability, 0.0, 1.0,
+            "probability of being within range, in each dimension, that makes a pose a candidate "
+            "(s)");
+}
+
+}  // namespace
+
+OptionFields<CompactPoseOptions> CompactPoseOptions::fields() {
+  return range_fields()
+      .real("loop_gain", &O::loop_gain, -1.0, 1e9,
+            "information gain that a link must exceed [nats] (g_loop); -1: (n/2 ln 2 + 1)^1.36 - "
+            "1, n = 3 or 6")
+      .real("pose_gain", &O::pose_gain, -1.0, 1e9,
+            "a pose is kept if the information gain of any link to it would exceed this [nats] "
+            "(g_pose); -1: (n/2 ln 2 + 1)^1.7 - 1")
+      .text("sensor", &O::sensor, numbers, text_of,
+            "expected covariance of a match: standard deviations [m] and [rad], or its upper "
+            "triangle; empty: as the newest odometry")
+      .choice("composition", &O::composition,
+              "order of the covariance of composed relative poses: Smith and Cheeseman, Barfoot "
+              "and Furgale")
+      .choice("search", &O::search,
+              "candidates from a spatial index, by testing all poses, or all poses without a test")
+      .real("gate", &O::gate, 0.0, 0.999999,
+            "fraction of the correct links that pass the consistency check; 0: no check")
+      .real("trust", &O::trust, 0.0, 1.0,
+            "with gate: a link waits for another to agree if a false match would pass with a "
+            "higher probability than this")
+      .boolean("reuse", &O::reuse,
+               "continue from the kept pose that a link leads to, instead of keeping the pose that "
+               "was linked: the map stops growing")
+      .real("reuse_loss", &O::reuse_loss, 0.0, 10.0,
+            "with reuse: largest loss of information about the link, times the poses that are kept "
+            "nearby [nats per DoF]")
+      .component<Estimator>("estimator", &O::estimator, "estimator");
+}
+
+}  // namespace cairn::compact

@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "cairn/geometry/motion.hpp"
+#include "cairn/plugin/option_fields.hpp"
+#include "cairn/solve/estimator.hpp"
+#include "proximity.hpp"
+
+namespace cairn::compact {
+
+/// What is kept (section 5 of the paper).
+enum class Strategy {
+  apal,  ///< all poses, all loop closures
+  apfl,  ///< all poses, few loop closures
+  fpfl,  ///< few of both
+};
+constexpr auto enum_names(Strategy) {
+  return std::to_array<EnumName<Strategy>>(
+      {{Strategy::apal, "apal"}, {Strategy::apfl, "apfl"}, {Strategy::fpfl, "fpfl"}});
+}
+
+/// An axis of a body.
+enum class Axis { x, y, z };
+constexpr auto enum_names(Axis) {
+  return std::to_array<EnumName<Axis>>({{Axis::x, "x"}, {Axis::y, "y"}, {Axis::z, "z"}});
+}
+
+/// Which poses are tested for being near.
+enum class Search {
+  index,     ///< those that the spatial index finds
+  all,       ///< all of them, which finds the same
+  untested,  ///< all count as near
+};
+constexpr auto enum_names(Search) {
+  return std::to_array<EnumName<Search>>(
+      {{Search::index, "index"}, {Search::all, "all"}, {Search::untested, "untested"}});
+}
+
+/// Options of the pose policy `compact_pose`.
+struct CompactPoseOptions {
+  Strategy strategy = Strategy::fpfl;
+  double range = 5.0;                   ///< of the sensor, along x of the earlier pose [m]
+  double range_y = 0.0, range_z = 0.0;  ///< along y and z [m]; 0: as `range`
+  double angle = 0.5;                   ///< how much orientations may differ [rad]
+  RotationTest rotation = RotationTest::magnitude;  ///< what `angle` is of
+  Axis view_axis = Axis::z;                         ///< along which the sensor looks
+  double probability = 0.1;                         ///< s, of being within, in each dimension
+  double loop_gain = -1.0;  ///< g_loop [nats]; negative: by the size of a pose
+  double pose_gain = -1.0;  ///< g_pose [nats]; negative: likewise
+  /// Σ̄_y, what a registration is expected to be worth, upper triangle by rows, or the standard
+  /// deviations of translation [m] and rotation [rad]. Empty: like the newest odometry.
+  std::vector<double> sensor{};
+  CompositionOrder composition = CompositionOrder::first;
+  Search search = Search::index;
+  double gate = 0.0;    ///< part of the right links that pass the consistency check; 0: off
+  double trust = 0.01;  ///< see `ConsistencyCheck`
+  bool reuse = true;    ///< a pose that is found to be at a kept one is not kept itself
+  /// … where that costs the way to it at most so much [nats a freedom and kept pose nearby].
+  double reuse_loss = 0.06;
+  std::string estimator = "incremental_cholesky";
+
+  /// The range along every axis, `range` where none is given.
+  SensorRange sensor_range() const {
+    return {
+        .translation = {range, range_y > 0.0 ? range_y : range, range_z > 0.0 ? range_z : range},
+        .rotation = angle,
+        .probability = probability,
+        .test = rotation,
+        .view_axis = static_cast<int>(view_axis)};
+  }
+
+  static OptionFields<CompactPoseOptions> fields();
+};
+
+}  // namespace cairn::compact

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <array>
+#include <string>
+
+#include "cairn/linear/linear_solver.hpp"
+#include "cairn/plugin/option_fields.hpp"
+
+namespace cairn::plot {
+
+/// What a picture shows.
+enum class Subject { automatic, trajectory, convergence, bars, scaling, sparsity, steps };
+constexpr auto enum_names(Subject) {
+  return std::to_array<EnumName<Subject>>({{Subject::automatic, "auto"},
+                                           {Subject::trajectory, "trajectory"},
+                                           {Subject::convergence, "convergence"},
+                                           {Subject::bars, "bars"},
+                                           {Subject::scaling, "scaling"},
+                                           {Subject::sparsity, "sparsity"},
+                                           {Subject::steps, "steps"}});
+}
+
+/// What the colour of an edge stands for: its class, or its chi2.
+enum class EdgeColour { by_class, by_residual };
+constexpr auto enum_names(EdgeColour) {
+  return std::to_array<EnumName<EdgeColour>>(
+      {{EdgeColour::by_class, "class"}, {EdgeColour::by_residual, "residual"}});
+}
+
+/// What convergence is drawn against.
+enum class Abscissa { iterations, time };
+constexpr auto enum_names(Abscissa) {
+  return std::to_array<EnumName<Abscissa>>(
+      {{Abscissa::iterations, "iterations"}, {Abscissa::time, "time"}});
+}
+
+/// Options of the pictures `svg`, `png` and `pdf`.
+struct PlotOptions {
+  Subject what = Subject::automatic;
+  int width = 900, height = 600;  ///< [px; in a PDF 1/96 inch]
+  std::string theme = "light";    ///< see `theme`
+  EdgeColour colour = EdgeColour::by_class;
+  Abscissa x = Abscissa::iterations;
+  std::string linear_solver = "block_cholesky";  ///< whose elimination order is drawn
+
+  static auto fields() {
+    using O = PlotOptions;
+    return OptionFields<O>()
+        .choice("what", &O::what,
+                "what to draw; auto: bars of a comparison, else the trajectory, else curves")
+        .integer("width", &O::width, 100, 20000, "width [px; in a PDF 1/96 inch]")
+        .integer("height", &O::height, 100, 20000, "height [px; in a PDF 1/96 inch]")
+        .choice("theme", &O::theme, {"light", "dark"}, "colours for light or dark paper")
+        .choice("colour", &O::colour, "what colours edges")
+        .choice("x", &O::x, "axis of convergence")
+        .component<LinearSolver>("linear_solver", &O::linear_solver,
+                                 "whose elimination order the sparsity of L has");
+  }
+};
+
+}  // namespace cairn::plot

@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The options of every component on offer, plugins of third parties included.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <set>
+#include <string>
+
+#include "cairn/plugin/registry.hpp"
+#include "cairn/runtime/error.hpp"
+#include "cairn/solve/optimizer.hpp"
+#include "levenberg_marquardt/levenberg_marquardt.hpp"
+
+namespace cairn {
+namespace {
+
+using ::testing::HasSubstr;
+
+/// Calls back with each component that has options, and its table.
+void for_each_component(const std::function<void(const Offer&, const OptionTable&)>& call) {
+  Registry registry;
+  for (const Offer& offer : registry.offers()) {
+    if (offer.kind == "variable" || offer.kind == "factor") continue;  // their plugin has them
+    SCOPED_TRACE(offer.kind + " " + offer.name);
+    call(offer, registry.options(offer.kind, offer.name));
+  }
+}
+
+TEST(ComponentOptions, DefaultsParseBackToThemselves) {
+  int seen = 0;
+  for_each_component([&](const Offer& offer, const OptionTable& table) {
+    const Options defaults(table, {}, offer.name);
+    OptionValues written;
+    for (const OptionSpec& spec : table.specs()) written[spec.name] = spec.default_value;
+    const Options read(table, written, offer.name);
+    for (const OptionSpec& spec : table.specs()) {
+      SCOPED_TRACE(spec.name);
+      ++seen;
+      switch (spec.type) {
+        case OptionType::boolean:
+          EXPECT_EQ(option_text(defaults.boolean(spec.name)), spec.default_value);
+          break;
+        case OptionType::integer:
+          EXPECT_EQ(option_text(defaults.integer(spec.name)), spec.default_value);
+          break;
+        case OptionType::real:
+          EXPECT_EQ(option_text(defaults.real(spec.name)), spec.default_value);
+          break;
+        case OptionType::component:
+          EXPECT_EQ(to_text(parse_component(spec.default_value)), spec.default_value);
+          [[fallthrough]];
+        case OptionType::choice:
+        case OptionType::text:
+          EXPECT_EQ(defaults.text(spec.name), spec.default_value);
+          EXPECT_EQ(read.text(spec.name), spec.default_value);
+          break;
+      }
+      EXPECT_FALSE(defaults.given(spec.name));
+      EXPECT_TRUE(read.given(spec.name));
+    }
+  });
+  EXPECT_GT(seen, 100);
+}
+
+TEST(ComponentOptions, HaveANameAndALineOfHelpEach) {
+  for_each_component([](const Offer&, const OptionTable& table) {
+    std::set<std::string> names;
+    for (const OptionSpec& spec : table.specs()) {
+      EXPECT_TRUE(names.insert(spec.name).second) << spec.name;
+      EXPECT_FALSE(spec.help.empty()) << spec.name;
+      EXPECT_EQ(spec.help.find('\n'), std::string::npos) << spec.name;
+      EXPECT_LT(spec.minimum, spec.maximum) << spec.name;
+    }
+  });
+}
+
+TEST(ComponentOptions, AStructDoesWhatItsTextDoes) {
+  Registry registry;
+  const LevenbergMarquardtOptions options{.linear_solver = "eigen:ordering=natural",
+                                          .largest_lambda = 10.0};
+  EXPECT_EQ(to_text("levenberg_marquardt", options),
+            "levenberg_marquardt:largest_lambda=10,linear_solver=eigen:ordering=natural");
+  EXPECT_NE(registry.make<Optimizer>("levenberg_marquardt", options), nullptr);
+}
+
+TEST(ComponentOptions, AStructIsCheckedLikeText) {
+  Registry registry;
+  const auto refusal = [&](const LevenbergMarquardtOptions& options) -> std::string {
+    try {
+      registry.make<Optimizer>("levenberg_marquardt", options);
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_THAT(refusal({.largest_lambda = 0.5}),
+              HasSubstr("option 'largest_lambda' is '0.5', expected a number, 1 to 1e+30"));
+  EXPECT_THAT(refusal({.linear_solver = "eigen:ordering=netural"}),
+              HasSubstr("option 'ordering' cannot be 'netural'; did you mean 'natural'?"));
+}
+
+}  // namespace
+}  // namespace cairn
