@@ -17,6 +17,7 @@
 #include <boost/dll/shared_library.hpp>
 #include <boost/json.hpp>
 
+#include "cairn/plugin/fingerprint.hpp"
 #include "cairn/runtime/error.hpp"
 
 namespace cairn {
@@ -64,6 +65,16 @@ std::string compare_fingerprints(std::string_view core, std::string_view plugin)
   }
   table.pop_back();
   return table;
+}
+
+/// What to do about two fingerprints that differ.
+std::string remedy(std::string_view core, std::string_view plugin) {
+  const std::vector<std::string> left = split_fingerprint(core), right = split_fingerprint(plugin);
+  // First come the version and the headers of cairn.
+  if (right.size() < 2 || !std::equal(left.begin(), left.begin() + 2, right.begin()))
+    return "build the plugin again, with the headers of this cairn";
+  return "build the plugin with the compiler and flags of the core (leave out -march=native, "
+         "-mavx… and -D_GLIBCXX_DEBUG)";
 }
 
 boost::dll::shared_library open_library(const fs::path& library) {
@@ -180,10 +191,9 @@ const PluginManifest& load_plugin(const fs::path& library) {
       it->second.get<PluginEntry>(CAIRN_STRINGIFY(CAIRN_PLUGIN_ENTRY))();
   if (std::string_view(manifest->fingerprint) != core_fingerprint()) {
     throw plugin_error(fmt::format(
-        "{}: built differently from the core, so its objects cannot be passed around\n{}\n"
-        "  build the plugin with the compiler and flags of the core (leave out -march=native "
-        "and -mavx…)",
-        library.string(), compare_fingerprints(core_fingerprint(), manifest->fingerprint)));
+        "{}: built differently from the core, so its objects cannot be passed around\n{}\n  {}",
+        library.string(), compare_fingerprints(core_fingerprint(), manifest->fingerprint),
+        remedy(core_fingerprint(), manifest->fingerprint)));
   }
   return *manifest;
 }

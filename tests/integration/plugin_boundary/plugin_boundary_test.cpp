@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "cairn/plugin/fingerprint.hpp"
 #include "cairn/plugin/plugin.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
@@ -115,8 +116,8 @@ TEST_F(PluginBoundary, AnotherEigenAlignmentIsRefusedWithBothFingerprints) {
   EXPECT_THAT(message, testing::ContainsRegex(
                            "\n  ! Eigen [0-9.]+ max-align=[0-9]+ max-static-align=[0-9]+ +"
                            "Eigen [0-9.]+ max-align=64 max-static-align=64\n"));
-  EXPECT_THAT(message, testing::ContainsRegex("\n    cairn abi [0-9]+ +cairn abi [0-9]+\n"));
-  EXPECT_THAT(message, HasSubstr("leave out -march=native and -mavx"));
+  EXPECT_THAT(message, testing::ContainsRegex("\n    headers [0-9a-f]+ +headers [0-9a-f]+\n"));
+  EXPECT_THAT(message, HasSubstr("leave out -march=native, -mavx"));
 }
 #endif
 
@@ -132,6 +133,29 @@ TEST_F(PluginBoundary, AWrongFingerprintIsRefusedWithBothFingerprints) {
   }
   for (const char* part : {"cairn abi 0", "msvc 19", "Eigen 2"})
     EXPECT_THAT(message, HasSubstr(part));
+  EXPECT_THAT(message, HasSubstr("\n  build the plugin again, with the headers of this cairn"));
+}
+
+TEST_F(PluginBoundary, AStandardLibraryWithChecksIsRefusedWithBothFingerprints) {
+  cairn::Registry registry(search_in({kBad / "debug_library"}));
+  const std::string message = message_of(registry, "plain");
+  EXPECT_THAT(message,
+              StartsWith(so("debug_library", "checked") + ": built differently from the core"));
+  EXPECT_THAT(message,
+              testing::ContainsRegex("\n  ! libstdc\\+\\+ cxx11-abi=[01] debug=0 assertions=[01] +"
+                                     "libstdc\\+\\+ cxx11-abi=[01] debug=1 assertions=[01]\n"));
+  EXPECT_THAT(message, testing::ContainsRegex("\n    headers [0-9a-f]+ +headers [0-9a-f]+\n"));
+  EXPECT_THAT(message, HasSubstr("-D_GLIBCXX_DEBUG"));
+}
+
+TEST_F(PluginBoundary, UnoptimisedCodeIsAcceptedAndNamed) {
+  cairn::Registry slow(search_in({kBad / "unoptimized"}));
+  EXPECT_THAT(slow.unoptimized(), IsEmpty());  // nothing is loaded yet
+  EXPECT_NE(slow.make<cairn::Loss>("plain"), nullptr);
+  EXPECT_THAT(slow.unoptimized(), ElementsAre("slow"));
+  cairn::Registry quick(search_in({kBad / "optimized"}));
+  EXPECT_NE(quick.make<cairn::Loss>("plain"), nullptr);
+  EXPECT_THAT(quick.unoptimized(), IsEmpty());
 }
 
 TEST_F(PluginBoundary, NoEntryPointIsNoPlugin) {

@@ -124,6 +124,10 @@ class CAIRN_API Registry {
   /// Whether some plugin offers that name.
   bool has(std::string_view kind, std::string_view name) const;
 
+  /// Names of the plugins loaded so far whose code was compiled without optimisation: right, but
+  /// many times slower.
+  std::vector<std::string> unoptimized() const;
+
   /// Loads every plugin on offer, for listings of options and for conformance tests.
   void load_all();
 
