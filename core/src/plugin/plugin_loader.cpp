@@ -40,6 +40,16 @@ bool others_may_write(const fs::path& path) {
   return ::stat(path.c_str(), &status) == 0 && (status.st_mode & S_IWOTH) != 0;
 }
 
+/// The folder of one user's plugins, by the XDG base directory specification, in which a relative
+/// XDG_DATA_HOME counts for nothing. Empty where neither it nor HOME is set.
+fs::path user_folder() {
+  if (const char* data = std::getenv("XDG_DATA_HOME"); data && fs::path(data).is_absolute())
+    return fs::path(data) / "cairn" / "plugins";
+  if (const char* home = std::getenv("HOME"); home && fs::path(home).is_absolute())
+    return fs::path(home) / ".local" / "share" / "cairn" / "plugins";
+  return {};
+}
+
 std::vector<std::string> split_fingerprint(std::string_view text) {
   std::vector<std::string> parts;
   while (!text.empty()) {
@@ -159,6 +169,9 @@ std::vector<fs::path> plugin_folders(const PluginSearch& search,
       }
       add(folder, true);
     }
+  }
+  if (search.user_folder) {
+    if (const fs::path folder = user_folder(); !folder.empty()) add(folder, false);
   }
   if (search.default_folder) {
     add(fs::path(boost::dll::this_line_location().string()).parent_path() / "cairn", false);

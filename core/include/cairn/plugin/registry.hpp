@@ -80,7 +80,8 @@ struct PluginProblem {
 struct PluginSearch {
   std::vector<std::filesystem::path> files;  ///< shared objects named by the user (`--plugin FILE`)
   bool environment = true;                   ///< folders of CAIRN_PLUGIN_PATH, separated by ':'
-  bool default_folder = true;                ///< the folder `cairn` beside the core library
+  bool user_folder = true;     ///< $XDG_DATA_HOME/cairn/plugins, or ~/.local/share/cairn/plugins
+  bool default_folder = true;  ///< the folder `cairn` beside the core library
 };
 
 /// Finds plugins and makes components by kind and name.
