@@ -4,7 +4,7 @@
 #                  DESCRIPTION "one line"
 #                  OFFERS "kind|name|one line" …
 #                  SOURCES file.cpp …
-#                  [VERSION 1.0.0] [LICENCE BSD-3-Clause] [LIBRARIES target …] [FOLDER folder])
+#                  [VERSION 1.0.0] [LICENCE MIT] [LIBRARIES target …] [FOLDER folder])
 #
 # Builds a plugin: the shared object name.so with cairn's entry point, and beside it name.json, which repeats
 # the manifest so that listing plugins opens none of them. One of the sources defines
@@ -12,10 +12,32 @@
 #     void cairn_register(cairn::Registrar& registrar);   // in the global namespace
 #
 # which adds exactly what OFFERS names. The target is cairn_plugin_<name>. In cairn's own build the plugin goes
-# to lib/cairn and is installed; in another project, to the folder of the target, or to FOLDER (put that on
-# CAIRN_PLUGIN_PATH).
+# to lib/cairn and is installed there. In another project
+# - it is built in the folder of the target, or in FOLDER (which CAIRN_PLUGIN_PATH may name);
+# - `cmake --install` puts it in CAIRN_PLUGIN_INSTALL_FOLDER, by default the folder of the user's plugins, which cairn
+#   searches: $XDG_DATA_HOME/cairn/plugins, or ~/.local/share/cairn/plugins;
+# - where no build type is given, it is Release: without optimisation a plugin is tens of times slower;
+# - without LICENCE, the licence is "unstated".
 
 set(CAIRN_PLUGIN_TEMPLATE_FOLDER ${CMAKE_CURRENT_LIST_DIR})
+
+# Settings of another project's plugins.
+macro(cairn_third_party_defaults)
+  get_property(multi_config GLOBAL PROPERTY GENERATOR_IS_MULTI_CONFIG)
+  if(NOT CMAKE_BUILD_TYPE AND NOT multi_config)
+    message(STATUS "cairn: no build type given, so it is Release")
+    set(CMAKE_BUILD_TYPE Release CACHE STRING "Release, Debug, RelWithDebInfo or MinSizeRel" FORCE)
+  endif()
+  set(user_data "$ENV{XDG_DATA_HOME}")
+  if(NOT IS_ABSOLUTE "${user_data}")
+    set(user_data "$ENV{HOME}/.local/share")
+  endif()
+  if(NOT IS_ABSOLUTE "${user_data}")
+    set(user_data share)  # below the prefix
+  endif()
+  set(CAIRN_PLUGIN_INSTALL_FOLDER "${user_data}/cairn/plugins" CACHE STRING
+      "Where cmake --install puts plugins of cairn; relative to the prefix if it is not absolute")
+endmacro()
 
 function(cairn_add_plugin)
   cmake_parse_arguments(PARSE_ARGV 0 arg "" "NAME;DESCRIPTION;VERSION;LICENCE;FOLDER" "OFFERS;SOURCES;LIBRARIES")
@@ -33,8 +55,14 @@ function(cairn_add_plugin)
   if(NOT arg_VERSION)
     set(arg_VERSION 0.0.0)
   endif()
+  if(COMMAND cairn_settings)  # cairn's own build
+    set(default_licence BSD-3-Clause)
+  else()
+    set(default_licence unstated)
+    cairn_third_party_defaults()
+  endif()
   if(NOT arg_LICENCE)
-    set(arg_LICENCE BSD-3-Clause)
+    set(arg_LICENCE ${default_licence})
   endif()
 
   # The texts go into C++ and JSON string literals, which escape alike.
@@ -67,20 +95,25 @@ function(cairn_add_plugin)
   target_link_libraries(${target} PRIVATE cairn::core ${arg_LIBRARIES})
   # A symbol that g++ marks unique would be shared between plugins that must not see each other.
   target_compile_options(${target} PRIVATE $<$<CXX_COMPILER_ID:GNU>:-fno-gnu-unique>)
-  if(COMMAND cairn_settings)  # cairn's own build
+  set(folder ${CMAKE_CURRENT_BINARY_DIR})
+  set(install_folder ${CAIRN_PLUGIN_INSTALL_FOLDER})
+  if(COMMAND cairn_settings)
     cairn_settings(${target})
+    set(folder ${CAIRN_PLUGIN_FOLDER})
+    set(install_folder ${CMAKE_INSTALL_LIBDIR}/cairn)
+    set_target_properties(${target} PROPERTIES INSTALL_RPATH "$ORIGIN/..")
+  else()  # the libraries of cairn, and its own, are where they were when it was built
+    set_target_properties(${target} PROPERTIES INSTALL_RPATH_USE_LINK_PATH ON)
   endif()
   if(arg_FOLDER)
     set(folder ${arg_FOLDER})
-  elseif(COMMAND cairn_settings)
-    set(folder ${CAIRN_PLUGIN_FOLDER})
-    install(TARGETS ${target} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/cairn)
-    install(FILES ${folder}/${arg_NAME}.json DESTINATION ${CMAKE_INSTALL_LIBDIR}/cairn)
-  else()
-    set(folder ${CMAKE_CURRENT_BINARY_DIR})
   endif()
   set_target_properties(${target} PROPERTIES
     OUTPUT_NAME ${arg_NAME} PREFIX "" SUFFIX ".so" LIBRARY_OUTPUT_DIRECTORY ${folder}
-    CXX_VISIBILITY_PRESET hidden VISIBILITY_INLINES_HIDDEN ON INSTALL_RPATH "$ORIGIN/..")
+    CXX_VISIBILITY_PRESET hidden VISIBILITY_INLINES_HIDDEN ON)
   configure_file(${CAIRN_PLUGIN_TEMPLATE_FOLDER}/plugin_sidecar.json.in ${folder}/${arg_NAME}.json @ONLY)
+  if(NOT (arg_FOLDER AND COMMAND cairn_settings))  # that is one of cairn's tests
+    install(TARGETS ${target} LIBRARY DESTINATION ${install_folder})
+    install(FILES ${folder}/${arg_NAME}.json DESTINATION ${install_folder})
+  endif()
 endfunction()

@@ -7,10 +7,9 @@ include(CMakePackageConfigHelpers)
 set(CAIRN_PACKAGE_FOLDER ${CMAKE_INSTALL_LIBDIR}/cmake/cairn)
 
 install(TARGETS cairn_core cairn_slam EXPORT cairn-targets LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
-install(DIRECTORY core/include/cairn lib/geometry/include/cairn lib/update/include/cairn lib/online/include/cairn
-                  lib/policy/include/cairn lib/evaluation/include/cairn lib/sparsification/include/cairn
-                  lib/report/include/cairn
-        DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN "*.hpp")
+foreach(folder IN LISTS CAIRN_PUBLIC_FOLDERS ITEMS ${CAIRN_GENERATED_FOLDER})
+  install(DIRECTORY ${folder}/cairn DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN "*.hpp")
+endforeach()
 install(EXPORT cairn-targets NAMESPACE cairn:: DESTINATION ${CAIRN_PACKAGE_FOLDER})
 if(TARGET cairn_app)  # installs itself; where the library is from there is known here
   set_target_properties(cairn_app PROPERTIES INSTALL_RPATH "$ORIGIN/../${CMAKE_INSTALL_LIBDIR}")

@@ -4,6 +4,7 @@
 #include <memory>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "album.hpp"
 #include "bench_report.hpp"
@@ -99,6 +100,10 @@ int run(const BenchOptions& options, Session& session) {
     session.print((&graph == &graphs.front() ? "" : "\n") + bench_table(graph, session.colour()));
   }
   if (!options.html.empty()) session.print(fmt::format("\npage: {}\n", options.html));
+  if (const auto slow = session.registry().unoptimized(); !slow.empty()) {
+    session.note(
+        fmt::format("unoptimised build, times mean little: plugin {}", fmt::join(slow, ", ")));
+  }
   return exit_code(graphs, interrupted);
 }
 

@@ -13,9 +13,11 @@ namespace {
 
 constexpr int kExitBug = 1;
 
-/// One line on standard error, whatever the message looked like.
+/// One line on standard error, whatever the message looked like; only a table, whose lines are
+/// indented by four columns, keeps its lines.
 void print_error(std::string message) {
-  for (std::size_t k = 0; (k = message.find('\n', k)) != std::string::npos;) {
+  const bool table = message.find("\n    ") != std::string::npos;
+  for (std::size_t k = 0; !table && (k = message.find('\n', k)) != std::string::npos;) {
     const std::size_t next = message.find_first_not_of(" \n", k);
     message.replace(k, (next == std::string::npos ? message.size() : next) - k, "; ");
   }

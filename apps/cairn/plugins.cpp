@@ -195,13 +195,20 @@ std::vector<std::string> abilities(Registry& registry, const Offer& offer) {
   return all;
 }
 
-std::string details_text(const Offer& offer, const OptionTable& options,
+/// Of a plugin that is loaded.
+bool is_optimized(const Registry& registry, const Offer& offer) {
+  const std::vector<std::string> slow = registry.unoptimized();
+  return std::ranges::find(slow, offer.plugin) == slow.end();
+}
+
+std::string details_text(const Offer& offer, bool optimized, const OptionTable& options,
                          const std::vector<std::string>& abilities, bool colour) {
   std::string text = fmt::format("{} ({}): {}\n", bold(offer.name, colour),
                                  kind_in_words(offer.kind), offer.summary);
   Table facts({{"", Table::Align::left}, {"", Table::Align::left}}, "  ");
   facts.add({"plugin", fmt::format("{} {}, {}", offer.plugin, offer.version, offer.file.string())});
   facts.add({"licence", offer.licence});
+  if (!optimized) facts.add({"build", "unoptimised"});
   if (!abilities.empty()) facts.add({"abilities", fmt::format("{}", fmt::join(abilities, ", "))});
   if (options.specs().empty()) facts.add({"options", "none"});
   text += facts.text(false);
@@ -247,10 +254,13 @@ int show(const std::string& name, Session& session) {
     const OptionTable& options = registry.options(offer.kind, offer.name);
     const std::vector<std::string> can = abilities(registry, offer);
     json::object entry = offer_json(offer);
+    const bool optimized = is_optimized(registry, offer);
+    entry["optimized"] = optimized;
     entry["abilities"] = strings_json(can);
     entry["options"] = options_json(options);
     all.push_back(std::move(entry));
-    text += (text.empty() ? "" : "\n") + details_text(offer, options, can, session.colour());
+    text +=
+        (text.empty() ? "" : "\n") + details_text(offer, optimized, options, can, session.colour());
   }
   report["problems"] = problems_json(registry);
   session.write_json(report);

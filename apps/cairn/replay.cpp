@@ -208,7 +208,7 @@ std::string_view status(const Replay& replay) {
 }
 
 json::object report_json(const ReplayOptions& options, const LoadedGraph& loaded, bool sorted,
-                         const Replay& replay, const Estimator& estimator, double chi2) {
+                         const Replay& replay, Estimator& estimator, double chi2) {
   json::object report = begin_report("replay");
   report["graph"] = graph_json(loaded.graph, loaded.name);
   report["estimator"] = options.estimator;

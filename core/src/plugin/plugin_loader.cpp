@@ -17,6 +17,7 @@
 #include <boost/dll/shared_library.hpp>
 #include <boost/json.hpp>
 
+#include "cairn/plugin/fingerprint.hpp"
 #include "cairn/runtime/error.hpp"
 
 namespace cairn {
@@ -37,6 +38,16 @@ std::map<fs::path, boost::dll::shared_library>& loaded_libraries() {
 bool others_may_write(const fs::path& path) {
   struct stat status {};
   return ::stat(path.c_str(), &status) == 0 && (status.st_mode & S_IWOTH) != 0;
+}
+
+/// The folder of one user's plugins, by the XDG base directory specification, in which a relative
+/// XDG_DATA_HOME counts for nothing. Empty where neither it nor HOME is set.
+fs::path user_folder() {
+  if (const char* data = std::getenv("XDG_DATA_HOME"); data && fs::path(data).is_absolute())
+    return fs::path(data) / "cairn" / "plugins";
+  if (const char* home = std::getenv("HOME"); home && fs::path(home).is_absolute())
+    return fs::path(home) / ".local" / "share" / "cairn" / "plugins";
+  return {};
 }
 
 std::vector<std::string> split_fingerprint(std::string_view text) {
@@ -64,6 +75,16 @@ std::string compare_fingerprints(std::string_view core, std::string_view plugin)
   }
   table.pop_back();
   return table;
+}
+
+/// What to do about two fingerprints that differ.
+std::string remedy(std::string_view core, std::string_view plugin) {
+  const std::vector<std::string> left = split_fingerprint(core), right = split_fingerprint(plugin);
+  // First come the version and the headers of cairn.
+  if (right.size() < 2 || !std::equal(left.begin(), left.begin() + 2, right.begin()))
+    return "build the plugin again, with the headers of this cairn";
+  return "build the plugin with the compiler and flags of the core (leave out -march=native, "
+         "-mavx… and -D_GLIBCXX_DEBUG)";
 }
 
 boost::dll::shared_library open_library(const fs::path& library) {
@@ -149,6 +170,9 @@ std::vector<fs::path> plugin_folders(const PluginSearch& search,
       add(folder, true);
     }
   }
+  if (search.user_folder) {
+    if (const fs::path folder = user_folder(); !folder.empty()) add(folder, false);
+  }
   if (search.default_folder) {
     add(fs::path(boost::dll::this_line_location().string()).parent_path() / "cairn", false);
   }
@@ -180,10 +204,9 @@ const PluginManifest& load_plugin(const fs::path& library) {
       it->second.get<PluginEntry>(CAIRN_STRINGIFY(CAIRN_PLUGIN_ENTRY))();
   if (std::string_view(manifest->fingerprint) != core_fingerprint()) {
     throw plugin_error(fmt::format(
-        "{}: built differently from the core, so its objects cannot be passed around\n{}\n"
-        "  build the plugin with the compiler and flags of the core (leave out -march=native "
-        "and -mavx…)",
-        library.string(), compare_fingerprints(core_fingerprint(), manifest->fingerprint)));
+        "{}: built differently from the core, so its objects cannot be passed around\n{}\n  {}",
+        library.string(), compare_fingerprints(core_fingerprint(), manifest->fingerprint),
+        remedy(core_fingerprint(), manifest->fingerprint)));
   }
   return *manifest;
 }

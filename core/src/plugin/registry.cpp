@@ -70,6 +70,7 @@ struct Registry::Impl {
   struct Plugin {
     Sidecar sidecar;
     enum class State { found, loaded } state = State::found;
+    bool optimized = true;  // known once it is loaded
     Registrar::Target target;
     OptionValues type_options;
     bool types_made = false;
@@ -200,6 +201,7 @@ struct Registry::Impl {
     }
     check_promises(plugin, manifest, target);
     plugin.target = std::move(target);
+    plugin.optimized = manifest.optimized;
     plugin.state = Plugin::State::loaded;
   }
 
@@ -417,6 +419,14 @@ std::shared_ptr<const FactorType> Registry::factor_type(std::string_view tag) {
   if (const auto it = impl_->factor_types.find(tag); it != impl_->factor_types.end())
     return it->second;
   return impl_->type_of("factor", tag, impl_->factor_types);
+}
+
+std::vector<std::string> Registry::unoptimized() const {
+  std::vector<std::string> names;
+  for (const auto& plugin : impl_->plugins) {
+    if (!plugin->optimized) names.push_back(plugin->sidecar.name);
+  }
+  return names;
 }
 
 void Registry::load_all() {

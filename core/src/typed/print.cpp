@@ -49,7 +49,7 @@ std::string to_string(const Graph& graph, int lines) {
   for (int f = 0; f < std::min(lines, graph.factor_count()); ++f) {
     std::string ids;
     for (const int v : graph.factor_variables(f)) ids += " " + id_text(graph.id(v));
-    const FactorType& type = *graph.factor_pools()[graph.factor(f).pool].type;
+    const FactorType& type = graph.factor_type(f);
     text += fmt::format("  {}{}:{}\n", type.tag(), ids, numbers(graph.measurement(f)));
   }
   return text + more(graph.factor_count(), lines);

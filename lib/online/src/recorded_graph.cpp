@@ -170,7 +170,7 @@ GraphUpdate arrival_update(const Graph& graph, const Arrival& arrival) {
   return update;
 }
 
-int leave_states_to_factors(GraphUpdate& update, const Estimator& estimator) {
+int leave_states_to_factors(GraphUpdate& update, Estimator& estimator) {
   std::vector<std::vector<double>> recorded;
   for (Variable& variable : update.variables) {
     recorded.push_back(variable.state);

@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "cairn/plugin/fingerprint.hpp"
 #include "cairn/plugin/plugin.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
@@ -64,7 +65,7 @@ cairn::PluginSearch search_in(std::initializer_list<fs::path> folders) {
   std::string list;
   for (const fs::path& folder : folders) list += (list.empty() ? "" : ":") + folder.string();
   setenv("CAIRN_PLUGIN_PATH", list.c_str(), 1);
-  return {.files = {}, .environment = true, .default_folder = false};
+  return {.files = {}, .environment = true, .user_folder = false, .default_folder = false};
 }
 
 /// The message of the error that asking for a loss ends with; it must be an error of the plugin.
@@ -115,8 +116,8 @@ TEST_F(PluginBoundary, AnotherEigenAlignmentIsRefusedWithBothFingerprints) {
   EXPECT_THAT(message, testing::ContainsRegex(
                            "\n  ! Eigen [0-9.]+ max-align=[0-9]+ max-static-align=[0-9]+ +"
                            "Eigen [0-9.]+ max-align=64 max-static-align=64\n"));
-  EXPECT_THAT(message, testing::ContainsRegex("\n    cairn abi [0-9]+ +cairn abi [0-9]+\n"));
-  EXPECT_THAT(message, HasSubstr("leave out -march=native and -mavx"));
+  EXPECT_THAT(message, testing::ContainsRegex("\n    headers [0-9a-f]+ +headers [0-9a-f]+\n"));
+  EXPECT_THAT(message, HasSubstr("leave out -march=native, -mavx"));
 }
 #endif
 
@@ -132,6 +133,29 @@ TEST_F(PluginBoundary, AWrongFingerprintIsRefusedWithBothFingerprints) {
   }
   for (const char* part : {"cairn abi 0", "msvc 19", "Eigen 2"})
     EXPECT_THAT(message, HasSubstr(part));
+  EXPECT_THAT(message, HasSubstr("\n  build the plugin again, with the headers of this cairn"));
+}
+
+TEST_F(PluginBoundary, AStandardLibraryWithChecksIsRefusedWithBothFingerprints) {
+  cairn::Registry registry(search_in({kBad / "debug_library"}));
+  const std::string message = message_of(registry, "plain");
+  EXPECT_THAT(message,
+              StartsWith(so("debug_library", "checked") + ": built differently from the core"));
+  EXPECT_THAT(message,
+              testing::ContainsRegex("\n  ! libstdc\\+\\+ cxx11-abi=[01] debug=0 assertions=[01] +"
+                                     "libstdc\\+\\+ cxx11-abi=[01] debug=1 assertions=[01]\n"));
+  EXPECT_THAT(message, testing::ContainsRegex("\n    headers [0-9a-f]+ +headers [0-9a-f]+\n"));
+  EXPECT_THAT(message, HasSubstr("-D_GLIBCXX_DEBUG"));
+}
+
+TEST_F(PluginBoundary, UnoptimisedCodeIsAcceptedAndNamed) {
+  cairn::Registry slow(search_in({kBad / "unoptimized"}));
+  EXPECT_THAT(slow.unoptimized(), IsEmpty());  // nothing is loaded yet
+  EXPECT_NE(slow.make<cairn::Loss>("plain"), nullptr);
+  EXPECT_THAT(slow.unoptimized(), ElementsAre("slow"));
+  cairn::Registry quick(search_in({kBad / "optimized"}));
+  EXPECT_NE(quick.make<cairn::Loss>("plain"), nullptr);
+  EXPECT_THAT(quick.unoptimized(), IsEmpty());
 }
 
 TEST_F(PluginBoundary, NoEntryPointIsNoPlugin) {
@@ -233,6 +257,64 @@ TEST_F(PluginBoundary, TheWorkingDirectoryIsNeverSearched) {
     EXPECT_THAT(registry.offers(), IsEmpty()) << "CAIRN_PLUGIN_PATH='" << path << "'";
   }
   fs::current_path("/");
+}
+
+TEST_F(PluginBoundary, TheUsersOwnFolderIsSearched) {
+  const cairn::PluginSearch users_only{
+      .files = {}, .environment = false, .user_folder = true, .default_folder = false};
+  const auto found = [&] { return cairn::Registry(users_only).has("loss", "plain"); };
+  copy("nothing_wrong", "plain");
+  fs::create_directories(folder() / "data/cairn");
+  fs::create_directories(folder() / "home/.local/share/cairn");
+  const auto put_into = [&](const fs::path& place) {
+    fs::remove_all(folder() / "data/cairn/plugins");
+    fs::remove_all(folder() / "home/.local/share/cairn/plugins");
+    fs::create_directory(folder() / place);
+    for (const char* file : {"plain.so", "plain.json"})
+      fs::copy_file(folder() / file, folder() / place / file);
+  };
+  setenv("HOME", (folder() / "home").c_str(), 1);
+  setenv("XDG_DATA_HOME", (folder() / "data").c_str(), 1);
+  EXPECT_FALSE(found());
+  EXPECT_THAT(cairn::Registry(users_only).problems(), IsEmpty());  // nobody has to have one
+  put_into("data/cairn/plugins");
+  EXPECT_TRUE(found());
+  EXPECT_FALSE(cairn::Registry(search_in({})).has("loss", "plain"));  // switched off
+
+  put_into("home/.local/share/cairn/plugins");
+  EXPECT_FALSE(found());
+  fs::current_path(folder());
+  for (const char* unusable : {"", "data"}) {  // empty, and relative
+    setenv("XDG_DATA_HOME", unusable, 1);
+    EXPECT_TRUE(found());
+  }
+  fs::current_path("/");
+  unsetenv("XDG_DATA_HOME");
+  EXPECT_TRUE(found());
+  unsetenv("HOME");
+  EXPECT_FALSE(found());
+}
+
+TEST_F(PluginBoundary, TheUsersOwnFolderComesAfterTheEnvironmentAndIsRefusedIfOthersMayWriteToIt) {
+  const fs::path users = folder() / "cairn/plugins";
+  fs::create_directories(users);
+  for (const char* ending : {".so", ".json"}) {
+    const std::string file = std::string("twice_first") + ending;
+    fs::copy_file(kBad / "twice/first" / file, users / file);
+  }
+  cairn::PluginSearch search = search_in({kBad / "twice/second"});
+  search.user_folder = true;
+  setenv("XDG_DATA_HOME", folder().c_str(), 1);
+  {
+    cairn::Registry registry(search);
+    EXPECT_THAT(message_of(registry, "twice"),
+                HasSubstr(so("twice/second", "twice_second") + " and " +
+                          (users / "twice_first.so").string()));
+  }
+  fs::permissions(users, fs::perms::others_write, fs::perm_options::add);
+  cairn::Registry registry(search);
+  EXPECT_FALSE(registry.has("loss", "first"));
+  EXPECT_THAT(messages(registry), ElementsAre(HasSubstr("other users may write to this folder")));
 }
 
 TEST_F(PluginBoundary, AFolderThatIsNotThereIsReported) {

@@ -28,11 +28,6 @@ const std::string kCameras =
 const std::string kPoints = "1.5\n-30\n-2\n0.1\n0.2\n-9.5\n";
 const std::string kFile = kHeader + kObservations + kCameras + kPoints;
 
-double chi2(const Graph& graph) {
-  const std::vector<double> norms = squared_norms(graph);
-  return std::accumulate(norms.begin(), norms.end(), 0.0);
-}
-
 TEST(Bal, NumbersCamerasFirstAndPointsAfterThem) {
   const Reading reading = read("bal", kFile);
   ASSERT_EQ(reading.graph.variable_count(), 4);

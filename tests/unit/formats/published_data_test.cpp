@@ -104,11 +104,6 @@ Loaded load(const std::string& file, const ReadOptions& options = {}) {
   return loaded;
 }
 
-double chi2(const Graph& graph) {
-  const std::vector<double> norms = squared_norms(graph);
-  return std::accumulate(norms.begin(), norms.end(), 0.0);
-}
-
 class PublishedData : public testing::TestWithParam<DataSet> {};
 
 TEST_P(PublishedData, HasTheCountsOfItsReadme) {

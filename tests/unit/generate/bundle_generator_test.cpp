@@ -29,11 +29,6 @@ class BundleGenerator : public testing::TestWithParam<const char*> {
 };
 INSTANTIATE_TEST_SUITE_P(Layouts, BundleGenerator, testing::Values("ring", "street"));
 
-double chi2(const Graph& graph) {
-  const std::vector<double> norms = squared_norms(graph);
-  return std::accumulate(norms.begin(), norms.end(), 0.0);
-}
-
 TEST_P(BundleGenerator, MakesTheCamerasAndPointsAskedFor) {
   const Graph graph = simulate(",cameras=20,points=500,track=4").graph;
   ASSERT_EQ(graph.variable_count(), 520);

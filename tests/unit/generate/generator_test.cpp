@@ -21,11 +21,6 @@ Simulation simulate(Registry& registry, const std::string& spec, std::uint64_t s
   return registry.make<Generator>(spec)->generate(registry, seed);
 }
 
-double chi2(const Graph& graph) {
-  const std::vector<double> norms = squared_norms(graph);
-  return std::accumulate(norms.begin(), norms.end(), 0.0);
-}
-
 /// FNV-1a over the bits of doubles.
 class Checksum {
  public:

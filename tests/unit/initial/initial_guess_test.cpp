@@ -26,11 +26,6 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
-double chi2(const Graph& graph) {
-  const std::vector<double> norms = squared_norms(graph);
-  return std::accumulate(norms.begin(), norms.end(), 0.0);
-}
-
 std::vector<std::string> guess(Registry& registry, const std::string& name, Graph& graph) {
   return registry.make<InitialGuess>(name)->compute(graph);
 }

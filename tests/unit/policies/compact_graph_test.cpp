@@ -325,7 +325,7 @@ TEST_P(CompactGraphIn, PosesThatAreNotKeptLeaveNothingBehind) {
     x = grown.world().compose(x, step.motion);
   }
   EXPECT_THAT(ids, ElementsAre(1, 2, 3, 4, 5));
-  const Estimator& estimator = grown.graph().estimator();
+  Estimator& estimator = grown.graph().estimator();
   EXPECT_EQ(estimator.variable_count(), 2);
   EXPECT_EQ(estimator.factor_count(), 1);
   EXPECT_LT(grown.world()

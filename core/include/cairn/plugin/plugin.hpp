@@ -1,12 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <string>
-
-#include <Eigen/Core>
-
 #include "cairn/runtime/api.hpp"
-#include "cairn/runtime/version.hpp"
 
 namespace cairn {
 
@@ -30,31 +25,11 @@ struct PluginManifest {
   int offer_count;
   const char* fingerprint;  ///< of the code of the plugin: see CAIRN_ABI_FINGERPRINT
   void (*register_plugin)(Registrar&);
+  bool optimized;  ///< whether its code was compiled with optimisation; read after `fingerprint`
 };
 
 #define CAIRN_STRINGIFY_(x) #x
 #define CAIRN_STRINGIFY(x) CAIRN_STRINGIFY_(x)
-
-#if defined(__clang__)
-#define CAIRN_COMPILER_ "clang " CAIRN_STRINGIFY(__clang_major__)
-#else
-#define CAIRN_COMPILER_ "gcc " CAIRN_STRINGIFY(__GNUC__)
-#endif
-#if defined(_GLIBCXX_USE_CXX11_ABI)
-#define CAIRN_STDLIB_ "libstdc++ cxx11-abi=" CAIRN_STRINGIFY(_GLIBCXX_USE_CXX11_ABI)
-#else
-#define CAIRN_STDLIB_ "libc++"
-#endif
-
-/// Everything that must agree between core and plugin for their objects to be passed around: as one
-/// string, `;`-separated, fixed when the plugin is compiled. (Values of macros, so that core and
-/// plugin are compared as they were really compiled.) The compiler's name is in it, its major
-/// version only for clang or gcc releases that changed nothing in the C++ ABI is not checked.
-#define CAIRN_ABI_FINGERPRINT \
-  "cairn abi " CAIRN_STRINGIFY(CAIRN_ABI_VERSION) "; " CAIRN_COMPILER_ "; " CAIRN_STDLIB_         \
-  "; Eigen " CAIRN_STRINGIFY(EIGEN_WORLD_VERSION) "." CAIRN_STRINGIFY(EIGEN_MAJOR_VERSION) "."     \
-  CAIRN_STRINGIFY(EIGEN_MINOR_VERSION) " max-align=" CAIRN_STRINGIFY(EIGEN_MAX_ALIGN_BYTES)        \
-  " max-static-align=" CAIRN_STRINGIFY(EIGEN_MAX_STATIC_ALIGN_BYTES)
 
 /// The name of the entry point, and its type.
 #define CAIRN_PLUGIN_ENTRY cairn_plugin_v1

@@ -106,7 +106,8 @@ struct PluginProblem {
 struct PluginSearch {
   std::vector<std::filesystem::path> files;  ///< shared objects named by the user (`--plugin FILE`)
   bool environment = true;                   ///< folders of CAIRN_PLUGIN_PATH, separated by ':'
-  bool default_folder = true;                ///< the folder `cairn` beside the core library
+  bool user_folder = true;     ///< $XDG_DATA_HOME/cairn/plugins, or ~/.local/share/cairn/plugins
+  bool default_folder = true;  ///< the folder `cairn` beside the core library
 };
 
 /// Finds plugins and makes components by kind and name.
@@ -187,6 +188,10 @@ class CAIRN_API Registry {
   std::shared_ptr<const FactorType> factor_type(std::string_view tag);
   /// Whether some plugin offers that name.
   bool has(std::string_view kind, std::string_view name) const;
+
+  /// Names of the plugins loaded so far whose code was compiled without optimisation: right, but
+  /// many times slower.
+  std::vector<std::string> unoptimized() const;
 
   /// Loads every plugin on offer, for listings of options and for conformance tests.
   void load_all();

@@ -32,16 +32,16 @@ inline int tangent_size(const Graph& graph, Id id) {
   return graph.type(index_of(graph, id)).tangent_size();
 }
 
-/// The state of an estimator's variable, if it has the size of a `T`.
+/// The state of an estimator's variable, if it is a `T`.
 template <StateValue T>
-std::span<const double> state_of(const Estimator& estimator, Id id) {
-  const std::span<const double> state = estimator.state(id);
-  if (state.size() != static_cast<std::size_t>(T::Traits::kAmbient)) {
-    throw Error(ErrorCode::usage, "the state of variable " + id_text(id) + " has " +
-                                      std::to_string(state.size()) + " numbers, a " + T::kName +
-                                      " " + std::to_string(T::Traits::kAmbient));
+std::span<const double> state_of(Estimator& estimator, Id id) {
+  const std::string_view tag = estimator.type(id)->tag();
+  if (tag != T::Traits::kTag) {
+    throw Error(ErrorCode::usage, std::string(tag) + " " + id_text(id) + " is not a " +
+                                      std::string(T::Traits::kTag) + ", which a " + T::kName +
+                                      " is read from");
   }
-  return state;
+  return estimator.state(id);
 }
 
 }  // namespace detail
@@ -85,9 +85,9 @@ inline Eigen::MatrixXd covariance(const Graph& graph, Id id,
 }
 
 /// The current estimate of one variable of an estimator. Throws `Error` (usage) for an id that is
-/// not there, or a state that has not as many numbers as a `T`.
+/// not there, or a variable of another type.
 template <StateValue T>
-T estimate(const Estimator& estimator, Id id) {
+T estimate(Estimator& estimator, Id id) {
   return T::from_state(detail::state_of<T>(estimator, id));
 }
 

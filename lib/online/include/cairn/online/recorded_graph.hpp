@@ -44,6 +44,6 @@ CAIRN_API GraphUpdate arrival_update(const Graph& graph, const Arrival& arrival)
 /// Leaves the initial states to the estimator: empties those of new variables that are not fixed
 /// and that a factor of the update can compute from the current estimate. Returns how many others
 /// keep theirs.
-CAIRN_API int leave_states_to_factors(GraphUpdate& update, const Estimator& estimator);
+CAIRN_API int leave_states_to_factors(GraphUpdate& update, Estimator& estimator);
 
 }  // namespace cairn
