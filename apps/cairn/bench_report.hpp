@@ -9,11 +9,10 @@
 
 namespace cairn::app {
 
-/// One line a configuration: medians, ratios, agreement.
-std::string bench_table(const GraphResult& graph, bool colour);
+/// One line per configuration: medians, ratios, agreement.
+std::string bench_table(const GraphResult& graph, const Stop& stop, bool colour);
 /// One object a graph, one a configuration, and in it every run.
-boost::json::object bench_json(const BenchOptions& options, const std::vector<GraphResult>& graphs,
-                               bool interrupted);
+boost::json::object bench_json(const BenchOptions& options, const BenchResult& result);
 /// One line a run, with a title line.
 std::string bench_csv(const std::vector<GraphResult>& graphs);
 
