@@ -35,7 +35,7 @@ struct Configuration {
 /// What is compared.
 struct Comparison {
   std::vector<Configuration> configurations;
-  std::vector<std::string> left_out;  ///< iterative linear solvers on offer that nobody named
+  std::vector<std::string> left_out;  ///< iterative linear solvers on offer, none being named
 };
 
 /// The product of optimizers and linear solvers. An optimizer that brings linear solvers of its

@@ -168,7 +168,9 @@ int run(const OptimizeOptions& options, Session& session) {
   }
   DiagonalCovariances covariances;
   if (covariance_solver && exit_code(summary.status) == 0) {
-    covariances = diagonal_covariances(loaded.graph, *covariance_solver);
+    covariances =
+        call_plugin([&] { return "covariances by " + in_words(spec); },
+                    [&] { return diagonal_covariances(loaded.graph, *covariance_solver); });
     if (!covariances.there) summary.notes.push_back("no covariances: " + covariances.why_not);
   }
   session.write_json(report_json(options, loaded, summary, covariances));

@@ -280,6 +280,9 @@ TEST(Usage, AnExceptionInAPluginNamesThePluginsPart) {
     EXPECT_THAT(outcome.err, HasSubstr("with linear solver 'fragile:in="));
   }
   expect_error(with("number"), kPlugin, "threw what is no std::exception");
+  expect_error(cairn({"marginals", "@ring:poses=30", "--quiet", "--plugin", solver, "--optimizer",
+                      "dogleg:linear_solver=fragile"}),
+               kPlugin, "optimizer 'dogleg:linear_solver=fragile' failed: the solver broke");
 
   write_text(folder.file("brittle.g2o"),
              "VERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 1 0 0\nEDGE_SE2 0 1 1 0 0 1 0 0 1 0 1\n"
