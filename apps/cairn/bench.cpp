@@ -35,38 +35,36 @@ void check(const BenchOptions& options, Session& session) {
 
 /// A configuration that could not run at all is an error of the command, but not one that keeps the
 /// others from being reported.
-int exit_code(const std::vector<GraphResult>& graphs, bool interrupted) {
-  if (interrupted) return kExitInterrupted;
-  for (const GraphResult& graph : graphs) {
+int exit_code(const BenchResult& bench) {
+  if (bench.interrupted) return kExitInterrupted;
+  bool failed = false;
+  for (const GraphResult& graph : bench.graphs) {
     for (const ConfigurationResult& result : graph.results) {
-      if (!result.error.empty()) return static_cast<int>(ErrorCode::numerical);
+      if (result.plugin_fault) return static_cast<int>(ErrorCode::plugin);
+      failed = failed || !result.error.empty();
     }
   }
-  return 0;
-}
-
-std::string name_of(const Configuration& configuration) {
-  return configuration.linear_solver.empty()
-             ? configuration.optimizer
-             : fmt::format("{}, {}", configuration.optimizer, configuration.linear_solver);
+  return failed ? static_cast<int>(ErrorCode::numerical) : 0;
 }
 
 /// The graph with its first estimate and that of each configuration.
 Scene scene_of_result(const GraphResult& result) {
   Graph graph = result.loaded.graph.clone();
-  Scene scene = scene_of(graph, short_name(result.loaded.name));
+  Scene scene = scene_of(graph, result.loaded.label);
+  const std::vector<std::string> labels = configuration_labels(result.results);
   scene.estimates.push_back(place(graph, scene, "initial estimate", EstimateRole::initial));
-  for (const ConfigurationResult& configuration : result.results) {
+  for (std::size_t k = 0; k < labels.size(); ++k) {
+    const ConfigurationResult& configuration = result.results[k];
     if (configuration.runs.empty()) continue;
     const bool first = scene.runs.empty();
     graph.set_values(configuration.states);
-    scene.estimates.push_back(place(graph, scene, name_of(configuration.configuration),
-                                    first ? EstimateRole::estimate : EstimateRole::peer));
+    scene.estimates.push_back(
+        place(graph, scene, labels[k], first ? EstimateRole::estimate : EstimateRole::peer));
     // All of them end at nearly the same residuals; once is enough.
     if (!first) scene.estimates.back().edge_chi2.clear();
     scene.estimates.back().run = static_cast<int>(scene.runs.size());
-    scene.runs.push_back({name_of(configuration.configuration), median_run(configuration),
-                          threads(), configuration.peak_memory});
+    scene.runs.push_back(
+        {labels[k], median_run(configuration), threads(), configuration.peak_memory});
   }
   return scene;
 }
@@ -90,21 +88,21 @@ void write_page(const BenchOptions& options, const std::vector<GraphResult>& gra
 int run(const BenchOptions& options, Session& session) {
   check(options, session);
   session.use_threads();
-  bool interrupted = false;
-  const std::vector<GraphResult> graphs = run_bench(options, session, interrupted);
-  if (!options.csv.empty()) write_file(options.csv, bench_csv(graphs));
-  const boost::json::object report = bench_json(options, graphs, interrupted);
-  if (!options.html.empty()) write_page(options, graphs, report, session);
+  const BenchResult bench = run_bench(options, session);
+  if (!options.csv.empty()) write_file(options.csv, bench_csv(bench.graphs));
+  const boost::json::object report = bench_json(options, bench);
+  if (!options.html.empty()) write_page(options, bench.graphs, report, session);
   session.write_json(report);
-  for (const GraphResult& graph : graphs) {
-    session.print((&graph == &graphs.front() ? "" : "\n") + bench_table(graph, session.colour()));
+  for (const GraphResult& graph : bench.graphs) {
+    session.print((&graph == &bench.graphs.front() ? "" : "\n") +
+                  bench_table(graph, options.problem.stop, session.colour()));
   }
   if (!options.html.empty()) session.print(fmt::format("\npage: {}\n", options.html));
   if (const auto slow = session.registry().unoptimized(); !slow.empty()) {
     session.note(
         fmt::format("unoptimised build, times mean little: plugin {}", fmt::join(slow, ", ")));
   }
-  return exit_code(graphs, interrupted);
+  return exit_code(bench);
 }
 
 }  // namespace
@@ -114,6 +112,9 @@ Command add_bench(CLI::App& program) {
   CLI::App* app =
       program.add_subcommand("bench", "solvers side by side: medians, ratios, agreement");
   app->add_option("graphs", options->graphs, kGraphHelp)->type_name("GRAPH")->required();
+  app->add_option("--name", options->names, "what to call the first GRAPH, the second … [its name]")
+      ->type_name("TEXT")
+      ->allow_extra_args(false);
   app->add_option("--optimizer", options->optimizers,
                   "optimizers A,B,… with options as NAME:key=value")
       ->type_name("NAMES")
@@ -123,8 +124,9 @@ Command add_bench(CLI::App& program) {
                   "linear solvers A,B,… for each of them")
       ->type_name("NAMES")
       ->allow_extra_args(false)
-      ->default_str("all on offer");
+      ->default_str("all direct ones on offer");
   add_problem_options(*app, options->problem);
+  add_time_limit(*app, options->problem.stop);
   app->add_option("--repeat", options->repeat, "rounds; in each, every solver runs once")
       ->type_name("N")
       ->check(within(1, 1000000))

@@ -16,6 +16,8 @@ namespace {
 
 namespace json = boost::json;
 
+constexpr std::size_t kColumns = 12;  // of the table
+
 double seconds_per_iteration(const ConfigurationResult& result) {
   std::vector<double> all;
   for (const Summary& run : result.runs) {
@@ -50,10 +52,22 @@ std::string linear_solver_name(const ConfigurationResult& result) {
   return "-";
 }
 
-std::vector<std::string> row(const ConfigurationResult& result, const GraphResult& graph) {
+/// How the runs ended.
+std::string status_text(const ConfigurationResult& result, const Stop& stop) {
+  const bool late = std::ranges::any_of(
+      result.runs, [&](const Summary& run) { return ran_out_of_time(run, stop); });
+  return late ? "time limit" : std::string(to_string(result.runs.front().status));
+}
+
+std::vector<std::string> row(const ConfigurationResult& result, const GraphResult& graph,
+                             const Stop& stop) {
   const std::string& optimizer = result.configuration.optimizer;
   if (result.runs.empty()) {
-    return {optimizer, linear_solver_name(result), result.error.empty() ? "not run" : "failed"};
+    std::vector<std::string> cells(kColumns);
+    cells.front() = optimizer;
+    cells[1] = linear_solver_name(result);
+    cells.back() = result.error.empty() ? "not run" : "failed";
+    return cells;
   }
   const Summary& first = result.runs.front();
   const std::vector<double> seconds = totals(result);
@@ -69,13 +83,23 @@ std::vector<std::string> row(const ConfigurationResult& result, const GraphResul
           agreement_text(result, graph),
           nonzeros > 0 ? count_text(nonzeros) : "-",
           bytes_text(result.peak_memory),
-          std::string(to_string(first.status))};
+          status_text(result, stop)};
 }
 
-json::array runs_json(const ConfigurationResult& result) {
+/// The optimizer that all rows have, or nothing.
+std::string common_optimizer(const GraphResult& graph) {
+  const std::string& first = graph.results.front().configuration.optimizer;
+  const bool same = std::ranges::all_of(graph.results, [&](const ConfigurationResult& result) {
+    return result.configuration.optimizer == first;
+  });
+  return same ? first : std::string();
+}
+
+json::array runs_json(const ConfigurationResult& result, const Stop& stop) {
   json::array all;
   for (const Summary& run : result.runs) {
     all.push_back({{"status", to_string(run.status)},
+                   {"out_of_time", ran_out_of_time(run, stop)},
                    {"chi2", {{"initial", run.initial_chi2}, {"final", run.final_chi2}}},
                    {"iterations", run.iterations.size()},
                    {"seconds", seconds_json(run.seconds)}});
@@ -91,8 +115,10 @@ json::object times_json(const ConfigurationResult& result) {
           {"per_iteration", seconds_per_iteration(result)}};
 }
 
-json::object configuration_json(const ConfigurationResult& result, const GraphResult& graph) {
-  json::object all{{"optimizer", result.configuration.optimizer},
+json::object configuration_json(const ConfigurationResult& result, const GraphResult& graph,
+                                const std::string& label, const Stop& stop) {
+  json::object all{{"label", label},
+                   {"optimizer", result.configuration.optimizer},
                    {"linear_solver", linear_solver_name(result)},
                    {"error", text_json(result.error)}};
   if (!result.runs.empty()) {
@@ -110,7 +136,7 @@ json::object configuration_json(const ConfigurationResult& result, const GraphRe
   }
   all["peak_memory_bytes"] =
       result.peak_memory > 0 ? json::value(result.peak_memory) : json::value(nullptr);
-  all["runs"] = runs_json(result);
+  all["runs"] = runs_json(result, stop);
   if (!result.runs.empty()) all["history"] = iterations_json(median_run(result));
   return all;
 }
@@ -133,7 +159,7 @@ std::vector<std::string> csv_fields(const GraphResult& graph, const Configuratio
   const Seconds& s = run.seconds;
   std::vector<std::string> fields;
   for (const std::string& text :
-       {graph.loaded.name, result.configuration.optimizer, linear_solver_name(result),
+       {graph.loaded.label, result.configuration.optimizer, linear_solver_name(result),
         std::string(to_string(run.status)), cpu_name()}) {
     fields.push_back(csv_field(text));
   }
@@ -151,25 +177,26 @@ std::vector<std::string> csv_fields(const GraphResult& graph, const Configuratio
 
 }  // namespace
 
-std::string bench_table(const GraphResult& graph, bool colour) {
+std::string bench_table(const GraphResult& graph, const Stop& stop, bool colour) {
   using Align = Table::Align;
-  Table table({{"optimizer", Align::left},
-               {"linear solver", Align::left},
-               {"median", Align::right},
-               {"min … max", Align::right},
-               {"ratio", Align::right},
-               {"ms/it", Align::right},
-               {"it", Align::right},
-               {"chi2", Align::right},
-               {"above best", Align::right},
-               {"nnz(L)", Align::right},
-               {"memory", Align::right},
-               {"status", Align::left}});
-  for (const ConfigurationResult& result : graph.results) table.add(row(result, graph));
-  std::string text =
-      fmt::format("{}: {}, {}\n{}", bold(graph.loaded.name, colour),
-                  plural(graph.loaded.graph.variable_count(), "variable"),
-                  plural(graph.loaded.graph.factor_count(), "factor"), table.text(colour));
+  std::vector<Table::Column> columns{
+      {"optimizer", Align::left},     {"linear solver", Align::left}, {"median", Align::right},
+      {"min … max", Align::right, 4}, {"ratio", Align::right},        {"ms/it", Align::right, 2},
+      {"it", Align::right},           {"chi2", Align::right},         {"above best", Align::right},
+      {"nnz(L)", Align::right, 3},    {"memory", Align::right, 1},    {"status", Align::left}};
+  const std::string optimizer = common_optimizer(graph);
+  const int leading = optimizer.empty() ? 0 : 1;  // columns that say the same in every row
+  columns.erase(columns.begin(), columns.begin() + leading);
+  Table table(std::move(columns));
+  for (const ConfigurationResult& result : graph.results) {
+    std::vector<std::string> cells = row(result, graph, stop);
+    cells.erase(cells.begin(), cells.begin() + leading);
+    table.add(std::move(cells));
+  }
+  std::string text = fmt::format("{}: {}, {}{}\n{}", bold(graph.loaded.label, colour),
+                                 plural(graph.loaded.graph.variable_count(), "variable"),
+                                 plural(graph.loaded.graph.factor_count(), "factor"),
+                                 optimizer.empty() ? "" : "; " + optimizer, table.text(colour));
   for (const ConfigurationResult& result : graph.results) {
     if (!result.error.empty()) {
       text += fmt::format("failed: {} {}: {}\n", result.configuration.optimizer,
@@ -179,22 +206,25 @@ std::string bench_table(const GraphResult& graph, bool colour) {
   return text;
 }
 
-json::object bench_json(const BenchOptions& options, const std::vector<GraphResult>& graphs,
-                        bool interrupted) {
+json::object bench_json(const BenchOptions& options, const BenchResult& result) {
+  const Stop& stop = options.problem.stop;
   json::object report = begin_report("bench");
   report["threads"] = threads();
   report["repeat"] = options.repeat;
   report["initial"] = options.problem.initial;
   report["loss"] = text_json(options.problem.loss);
-  report["max_iterations"] = options.problem.stop.max_iterations;
-  report["tolerance"] = options.problem.stop.tolerance;
-  report["interrupted"] = interrupted;
+  report["max_iterations"] = stop.max_iterations;
+  report["tolerance"] = stop.tolerance;
+  report["max_seconds"] = stop.max_seconds;
+  report["left_out"] = strings_json(result.left_out);
+  report["interrupted"] = result.interrupted;
   json::array& all = report["graphs"].emplace_array();
-  for (const GraphResult& graph : graphs) {
+  for (const GraphResult& graph : result.graphs) {
+    const std::vector<std::string> labels = configuration_labels(graph.results);
     json::array rows;
-    for (const ConfigurationResult& result : graph.results)
-      rows.push_back(configuration_json(result, graph));
-    all.push_back({{"graph", graph_json(graph.loaded.graph, graph.loaded.name)},
+    for (std::size_t k = 0; k < labels.size(); ++k)
+      rows.push_back(configuration_json(graph.results[k], graph, labels[k], stop));
+    all.push_back({{"graph", graph_json(graph.loaded.graph, graph.loaded.name, graph.loaded.label)},
                    {"configurations", std::move(rows)}});
   }
   end_report(report);

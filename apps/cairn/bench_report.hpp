@@ -10,10 +10,9 @@
 namespace cairn::app {
 
 /// One line per configuration: medians, ratios, agreement.
-std::string bench_table(const GraphResult& graph, bool colour);
+std::string bench_table(const GraphResult& graph, const Stop& stop, bool colour);
 /// One object per graph, one per configuration, and in it every run.
-boost::json::object bench_json(const BenchOptions& options, const std::vector<GraphResult>& graphs,
-                               bool interrupted);
+boost::json::object bench_json(const BenchOptions& options, const BenchResult& result);
 /// One line per run, with a title line.
 std::string bench_csv(const std::vector<GraphResult>& graphs);
 

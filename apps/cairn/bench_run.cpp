@@ -6,10 +6,15 @@
 #include <utility>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <boost/json/parse.hpp>
 
+#include "cairn/linear/iterative_solver.hpp"
 #include "cairn/runtime/error.hpp"
+#include "cairn/runtime/plugin_call.hpp"
+#include "graph_labels.hpp"
 #include "interrupt.hpp"
+#include "option_words.hpp"
 #include "peak_memory.hpp"
 #include "progress.hpp"
 
@@ -29,21 +34,23 @@ std::vector<std::string> split_all(const std::vector<std::string>& lists) {
   return all;
 }
 
-/// All linear solvers on offer, cairn's own first: it is what the others are compared with. One
-/// that cannot be loaded is left out: nobody asked for it by name.
-std::vector<std::string> all_linear_solvers(Session& session) {
-  std::vector<std::string> all;
+/// The direct linear solvers on offer, cairn's own first: it is what the others are compared with.
+/// `left_out` gets the iterative ones. One that cannot be made is left out with a note: nobody
+/// asked for it by name.
+std::vector<std::string> direct_linear_solvers(Session& session,
+                                               std::vector<std::string>& left_out) {
+  std::vector<std::string> direct;
   for (const std::string& name : session.registry().names(LinearSolver::kKind)) {
     try {
-      session.registry().make<LinearSolver>(name);
-      all.push_back(name);
+      const auto solver = session.registry().make<LinearSolver>(name);
+      (query<IterativeSolver>(*solver) ? left_out : direct).push_back(name);
     } catch (const Error& error) {
       session.note(fmt::format("left out: {}", error.what()));
     }
   }
-  std::stable_partition(all.begin(), all.end(),
-                        [](const std::string& name) { return name == kDefaultLinearSolver; });
-  return all;
+  std::ranges::stable_partition(
+      direct, [](const std::string& name) { return name == kDefaultLinearSolver; });
+  return direct;
 }
 
 /// The command line with which `cairn optimize` does what one run of a bench does.
@@ -61,6 +68,7 @@ std::vector<std::string> optimize_arguments(const BenchOptions& options, const s
   if (!options.problem.loss.empty()) add("--loss-on", options.problem.loss_on);
   add("--iterations", fmt::format("{}", options.problem.stop.max_iterations));
   add("--tolerance", fmt::format("{}", options.problem.stop.tolerance));
+  add("--max-seconds", fmt::format("{}", options.problem.stop.max_seconds));
   add("--from", options.input.format);
   add("--threads", fmt::format("{}", common.threads));
   if (options.input.read.skip_unknown) words.push_back("--skip-unknown");
@@ -72,14 +80,49 @@ std::vector<std::string> optimize_arguments(const BenchOptions& options, const s
 
 /// Peak memory can only be told for a whole process: one of its own for each configuration.
 std::int64_t measure_memory(const BenchOptions& options, const std::string& graph,
-                            const Configuration& configuration, const CommonOptions& common) {
-  const auto text = output_of_self(optimize_arguments(options, graph, configuration, common));
+                            const Configuration& configuration, const CommonOptions& common,
+                            const InterruptGuard& guard) {
+  const auto text =
+      output_of_self(optimize_arguments(options, graph, configuration, common), guard.flag());
   if (!text) return 0;
   boost::json::error_code error;
   const boost::json::value report = boost::json::parse(*text, error);
   if (error || !report.is_object()) return 0;
   const boost::json::value* bytes = report.get_object().if_contains("peak_memory_bytes");
   return bytes && bytes->is_int64() ? bytes->get_int64() : 0;
+}
+
+/// "optimizer 'dogleg' with linear solver 'eigen'"
+std::string in_words(const Configuration& configuration) {
+  return fmt::format("optimizer '{}'{}", configuration.optimizer,
+                     configuration.linear_solver.empty()
+                         ? ""
+                         : fmt::format(" with linear solver '{}'", configuration.linear_solver));
+}
+
+/// Throws `Error` (plugin), with what is on offer, if that name is not.
+void check_on_offer(std::string_view kind, const std::string& name, Registry& registry) {
+  if (!registry.has(kind, name)) registry.options(kind, name);
+}
+
+/// What `work` throws as the fault of a plugin; empty if it throws nothing.
+template <class Work>
+std::string fault_of_plugin(const Work& work) {
+  try {
+    work();
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::plugin) throw;
+    return error.what();
+  }
+  return {};
+}
+
+/// Whether the linear solvers of the command line are for that optimizer. One that cannot be asked,
+/// since its plugin is broken, stands there once.
+bool chooses_linear_solver(Registry& registry, const ComponentSpec& optimizer) {
+  bool takes = false;
+  fault_of_plugin([&] { takes = takes_linear_solver(registry, optimizer); });
+  return takes && !optimizer.values.contains(kLinearSolverOption);
 }
 
 /// One graph's runs, and the progress that is shown meanwhile.
@@ -103,7 +146,7 @@ class GraphBench {
 
   void show(double part, const std::string& what, const Configuration& configuration) {
     const std::string text = fmt::format(
-        "{}: {}, {}{}{}", graph_.loaded.name, what, configuration.optimizer,
+        "{}: {}, {}{}{}", graph_.loaded.label, what, configuration.optimizer,
         configuration.linear_solver.empty() ? "" : " with ", configuration.linear_solver);
     line_.show(line_.on_terminal() ? bar(part, kBarWidth) + " " + text : text);
   }
@@ -111,9 +154,10 @@ class GraphBench {
   void measure_all_memory() {
     for (ConfigurationResult& result : graph_.results) {
       if (guard_.interrupted()) return;
+      if (!result.error.empty()) continue;
       show(0.0, "memory", result.configuration);
-      result.peak_memory =
-          measure_memory(options_, graph_.loaded.name, result.configuration, session_.common);
+      result.peak_memory = measure_memory(options_, graph_.loaded.name, result.configuration,
+                                          session_.common, guard_);
     }
   }
 
@@ -124,9 +168,10 @@ class GraphBench {
       show((round + static_cast<double>(k) / static_cast<double>(size())) / options_.repeat,
            fmt::format("round {} of {}", round + 1, options_.repeat), result.configuration);
       try {
-        run_once(result);
+        call_plugin([&] { return in_words(result.configuration); }, [&] { run_once(result); });
       } catch (const Error& error) {
-        result.error = error.what();
+        result.error = in_command_line_words(error.what());
+        result.plugin_fault = error.code() == ErrorCode::plugin;
       }
     }
   }
@@ -150,14 +195,18 @@ class GraphBench {
 };
 
 GraphResult prepare(const std::string& name, const BenchOptions& options, const ProblemSetup& setup,
-                    const std::vector<Configuration>& all, Session& session) {
+                    const Comparison& compared, Session& session) {
   GraphResult result;
   result.loaded = load_graph(name, options.input, session);
   for (const std::string& note : setup.apply(result.loaded.graph)) {
     session.note(fmt::format("{}: initial guess {}: {}", name, options.problem.initial, note));
   }
-  for (const Configuration& configuration : all)
-    result.results.push_back({configuration, {}, 0, {}, {}});
+  for (const Configuration& configuration : compared.configurations) {
+    ConfigurationResult& row = result.results.emplace_back();
+    row.configuration = configuration;
+    row.error = configuration.broken;
+    row.plugin_fault = !configuration.broken.empty();
+  }
   return result;
 }
 
@@ -184,42 +233,80 @@ ComponentSpec Configuration::spec() const {
   return spec;
 }
 
-std::vector<Configuration> configurations(const BenchOptions& options, Session& session) {
+Comparison comparison(const BenchOptions& options, Session& session) {
   Registry& registry = session.registry();
+  Comparison compared;
   const std::vector<std::string> given = split_all(options.linear_solvers);
-  const std::vector<std::string> solvers = given.empty() ? all_linear_solvers(session) : given;
-  std::vector<Configuration> all;
+  const std::vector<std::string> solvers =
+      given.empty() ? direct_linear_solvers(session, compared.left_out) : given;
+  for (const std::string& solver : solvers)
+    check_on_offer(LinearSolver::kKind, parse_component(solver).name, registry);
+  std::vector<Configuration>& all = compared.configurations;
   bool solvers_used = false;
   ComponentSpec refusing;
   for (const std::string& optimizer : split_all(options.optimizers)) {
     const ComponentSpec spec = parse_component(optimizer);
-    if (takes_linear_solver(registry, spec) && !spec.values.contains(kLinearSolverOption)) {
-      for (const std::string& solver : solvers) all.push_back({optimizer, solver});
+    check_on_offer(Optimizer::kKind, spec.name, registry);
+    if (chooses_linear_solver(registry, spec)) {
+      for (const std::string& solver : solvers) all.push_back({optimizer, solver, {}});
       solvers_used = true;
     } else {
-      all.push_back({optimizer, ""});
+      all.push_back({optimizer, "", {}});
       refusing = spec;
     }
   }
   if (!given.empty() && !solvers_used) throw linear_solver_refused(registry, refusing);
-  for (const Configuration& configuration : all) registry.make<Optimizer>(configuration.spec());
-  return all;
+  if (!solvers_used) compared.left_out.clear();
+  for (Configuration& configuration : all) {
+    configuration.broken = fault_of_plugin([&] { registry.make<Optimizer>(configuration.spec()); });
+  }
+  if (!compared.left_out.empty()) {
+    session.note(fmt::format("left out as iterative: {}; --linear-solver compares them too",
+                             fmt::join(compared.left_out, ", ")));
+  }
+  return compared;
 }
 
-std::vector<GraphResult> run_bench(const BenchOptions& options, Session& session,
-                                   bool& interrupted) {
-  Registry& registry = session.registry();
-  const std::vector<Configuration> all = configurations(options, session);
-  const ProblemSetup setup(options.problem, registry);
+BenchResult run_bench(const BenchOptions& options, Session& session) {
+  const std::vector<std::string> labels = graph_labels(options.graphs, options.names);
+  const Comparison compared = comparison(options, session);
+  const ProblemSetup setup(options.problem, session.registry());
   const InterruptGuard guard;
-  std::vector<GraphResult> graphs;
-  for (const std::string& name : options.graphs) {
-    if (guard.interrupted()) break;
-    graphs.push_back(prepare(name, options, setup, all, session));
-    GraphBench(options, graphs.back(), session, guard).run();
+  BenchResult result{.graphs = {}, .left_out = compared.left_out};
+  for (std::size_t k = 0; k < options.graphs.size() && !guard.interrupted(); ++k) {
+    result.graphs.push_back(prepare(options.graphs[k], options, setup, compared, session));
+    result.graphs.back().loaded.label = labels[k];
+    GraphBench(options, result.graphs.back(), session, guard).run();
   }
-  interrupted = guard.interrupted();
-  return graphs;
+  result.interrupted = guard.interrupted();
+  return result;
+}
+
+bool ran_out_of_time(const Summary& run, const Stop& stop) {
+  return stop.max_seconds > 0.0 && run.status == Status::max_iterations &&
+         std::ssize(run.iterations) < stop.max_iterations && run.seconds.total >= stop.max_seconds;
+}
+
+std::vector<std::string> configuration_labels(const std::vector<ConfigurationResult>& results) {
+  const auto is_common = [&](std::string Configuration::*name) {
+    return std::ranges::all_of(results, [&](const ConfigurationResult& result) {
+      return result.configuration.*name == results.front().configuration.*name;
+    });
+  };
+  const bool one_optimizer = is_common(&Configuration::optimizer);
+  const bool one_solver = is_common(&Configuration::linear_solver);
+  std::vector<std::string> labels;
+  for (const ConfigurationResult& result : results) {
+    const auto& [optimizer, solver, broken] = result.configuration;
+    if (solver.empty() || (one_solver && !one_optimizer)) {
+      labels.push_back(optimizer);
+    } else if (one_optimizer && !one_solver) {
+      labels.push_back(solver);
+    } else {
+      labels.push_back(fmt::format("{}, {}", optimizer, solver));
+    }
+  }
+  return labels;
 }
 
 double median(std::vector<double> values) {

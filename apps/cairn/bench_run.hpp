@@ -12,8 +12,9 @@ namespace cairn::app {
 
 struct BenchOptions {
   std::vector<std::string> graphs;
+  std::vector<std::string> names;  ///< what to call the first of them, the second …
   std::vector<std::string> optimizers{kDefaultOptimizer};
-  std::vector<std::string> linear_solvers;  ///< empty: all on offer
+  std::vector<std::string> linear_solvers;  ///< empty: all direct ones on offer
   InputOptions input;
   ProblemOptions problem;
   int repeat = 5;
@@ -26,15 +27,22 @@ struct BenchOptions {
 struct Configuration {
   std::string optimizer;
   std::string linear_solver;  ///< empty: the optimizer brings its own
+  std::string broken;         ///< why it cannot be made although it is on offer, else empty
 
   ComponentSpec spec() const;
 };
 
+/// What is compared.
+struct Comparison {
+  std::vector<Configuration> configurations;
+  std::vector<std::string> left_out;  ///< iterative linear solvers on offer, none being named
+};
+
 /// The product of optimizers and linear solvers. An optimizer that brings linear solvers of its
-/// own, or names one in its options, stands there once. Throws `Error` for names that are not on
-/// offer, so that nothing is found out half way; only where all are meant, one that cannot be
-/// loaded is left out, with a note.
-std::vector<Configuration> configurations(const BenchOptions& options, Session& session);
+/// own, or names one in its options, stands there once. Where no linear solver is named, all direct
+/// ones on offer are meant; notes say what is left out. Throws `Error` for names that are not on
+/// offer and for bad options, before anything runs.
+Comparison comparison(const BenchOptions& options, Session& session);
 
 /// What one configuration did on one graph; `runs[k]` belongs to round k.
 struct ConfigurationResult {
@@ -42,6 +50,7 @@ struct ConfigurationResult {
   std::vector<Summary> runs;
   std::int64_t peak_memory = 0;  ///< [bytes], 0: not measured
   std::string error;             ///< why it could not run, else empty
+  bool plugin_fault = false;     ///< whether the error is that of a plugin
   Values states;                 ///< of the first run, if a page is to show them
 };
 
@@ -50,11 +59,17 @@ struct GraphResult {
   std::vector<ConfigurationResult> results;
 };
 
+struct BenchResult {
+  std::vector<GraphResult> graphs;
+  std::vector<std::string> left_out;  ///< as in `Comparison`
+  bool interrupted = false;
+};
+
 /// Runs everything. Within a round each configuration runs once, on a clone of the graph at its
-/// initial estimate; each round begins with another one, so that none always follows the same.
-/// Stops at an interrupt with the runs that are whole by then, which `interrupted` shows.
-std::vector<GraphResult> run_bench(const BenchOptions& options, Session& session,
-                                   bool& interrupted);
+/// initial estimate; each round begins with another one, so that none always follows the same. A
+/// configuration that fails has no further runs; the others go on. Stops at an interrupt with the
+/// runs that are whole by then.
+BenchResult run_bench(const BenchOptions& options, Session& session);
 
 // What the rounds say
 // ------------------------------------------------------------------------------
@@ -63,6 +78,11 @@ double median(std::vector<double> values);
 std::vector<double> totals(const ConfigurationResult& result);
 /// The run whose total time is the median one (the lower of two). There must be one.
 const Summary& median_run(const ConfigurationResult& result);
+/// Whether a run was ended by the limit of time.
+bool ran_out_of_time(const Summary& run, const Stop& stop);
+/// What tells the configurations of a graph apart, one label each: "cholmod" where all have the
+/// same optimizer, "dogleg" where all have the same linear solver, else both.
+std::vector<std::string> configuration_labels(const std::vector<ConfigurationResult>& results);
 /// Median over the rounds of the ratio to the first configuration that ran, in the same round.
 double paired_ratio(const ConfigurationResult& result, const GraphResult& graph);
 /// How far chi2 is above the lowest of all configurations, relative to that.

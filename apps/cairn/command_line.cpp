@@ -63,6 +63,13 @@ std::string suggestion(const std::string& word, const std::vector<std::string>& 
   return nearest.empty() ? "" : fmt::format("; did you mean '{}'?", nearest);
 }
 
+Error unknown_command(const std::string& word, const CLI::App& program) {
+  std::vector<std::string> commands;
+  for (const CLI::App* known : program.get_subcommands({})) commands.push_back(known->get_name());
+  return {ErrorCode::usage,
+          fmt::format("there is no command '{}'{}", word, what_is_on_offer(word, commands))};
+}
+
 Error unknown_word(const std::vector<std::string>& words, const CLI::App& program,
                    const CLI::App* command) {
   const std::string name = command ? "cairn " + command->get_name() : "cairn";
@@ -76,17 +83,41 @@ Error unknown_word(const std::vector<std::string>& words, const CLI::App& progra
     return {ErrorCode::usage, fmt::format("{}: '{}' is one argument too many; see {} --help", name,
                                           words.front(), name)};
   }
-  std::vector<std::string> commands;
-  for (const CLI::App* known : program.get_subcommands({})) commands.push_back(known->get_name());
-  return {ErrorCode::usage, fmt::format("there is no command '{}'{}", words.front(),
-                                        what_is_on_offer(words.front(), commands))};
+  return unknown_command(words.front(), program);
 }
 
-/// CLI11's words for other mistakes (a number that is none, an argument that is missing) with
-/// where.
-Error malformed(const std::string& what, const CLI::App* command) {
-  const std::string name = command ? "cairn " + command->get_name() : "cairn";
-  return {ErrorCode::usage, fmt::format("{}; see {} --help", what, name)};
+/// An argument or option that is missing.
+Error missing(const CLI::RequiredError& error, const CLI::App& command) {
+  for (const CLI::Option* option : command.get_options()) {
+    if (error.what() != option->get_name() + " is required") continue;
+    const std::string what = option->get_positional()
+                                 ? option->get_type_name()
+                                 : option->get_name() + " " + option->get_type_name();
+    return {ErrorCode::usage, fmt::format("{} is missing; usage: {}", what, usage_line(command))};
+  }
+  return {ErrorCode::usage, fmt::format("{}; usage: {}", error.what(), usage_line(command))};
+}
+
+/// A value that is missing, of the wrong type, or refused by the option's own validator, whose
+/// words stand after the option's name.
+Error bad_value(const CLI::ParseError& error, const CLI::App& program, const CLI::App* command) {
+  std::string what = error.what();
+  for (const CLI::App* app : {command, &program}) {
+    if (!app) continue;
+    for (const CLI::Option* option : app->get_options()) {
+      const std::string name = option->get_name();
+      const bool needs_value = dynamic_cast<const CLI::ArgumentMismatch*>(&error) != nullptr;
+      if (needs_value && what.starts_with(name + ":"))
+        what = fmt::format("{} needs a value: {} {}", name, name, option->get_type_name());
+      const std::string unreadable = fmt::format("Could not convert: {} = ", name);
+      if (what.starts_with(unreadable)) {
+        what = fmt::format("{}: '{}' is no {}", name, what.substr(unreadable.size()),
+                           option->get_type_name());
+      }
+    }
+  }
+  const std::string where = command ? "cairn " + command->get_name() : "cairn";
+  return {ErrorCode::usage, fmt::format("{}; see {} --help", what, where)};
 }
 
 /// What a configuration file says that nobody takes: CLI11 only tells "section.name".
@@ -136,6 +167,21 @@ CommandLine::CommandLine(Session& session)
                add_compact(program_),  add_sparsify(program_), add_evaluate(program_),
                add_view(program_),     add_plot(program_),     add_convert(program_),
                add_generate(program_), add_plugins(program_)};
+  help_ = program_.add_subcommand("help", "this text, or that of a command");
+  help_->add_option("command", command_to_explain_, "the command that is to be explained")
+      ->type_name("COMMAND");
+  help_->footer(
+      "Example:\n"
+      "  cairn help bench");
+}
+
+std::string CommandLine::help_text() const {
+  if (command_to_explain_.empty())  // App::help would be that of the command `help`
+    return program_.get_formatter()->make_help(&program_, "", CLI::AppFormatMode::Normal);
+  for (const CLI::App* command : program_.get_subcommands([](const CLI::App*) { return true; })) {
+    if (command->get_name() == command_to_explain_) return command->help();
+  }
+  throw unknown_command(command_to_explain_, program_);
 }
 
 std::function<int()> CommandLine::parse(int argc, const char* const* argv) {
@@ -159,8 +205,11 @@ std::function<int()> CommandLine::parse(int argc, const char* const* argv) {
     // so unknown words are what went wrong first, whatever the parser complains of.
     const std::vector<std::string> left = program_.remaining(true);
     if (!left.empty()) throw unknown_word(left, program_, chosen());
-    throw malformed(error.what(), chosen());
+    const auto* required = dynamic_cast<const CLI::RequiredError*>(&error);
+    if (required && chosen()) throw missing(*required, *chosen());
+    throw bad_value(error, program_, chosen());
   }
+  if (help_->parsed()) return [text = help_text()] { return write_stdout(text), 0; };
   for (const Command& command : commands_) {
     if (command.app->parsed()) return [&] { return command.run(session_); };
   }

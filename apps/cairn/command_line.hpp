@@ -3,6 +3,7 @@
 
 #include <functional>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "commands.hpp"
@@ -19,9 +20,14 @@ class CommandLine {
   std::function<int()> parse(int argc, const char* const* argv);
 
  private:
+  /// What `cairn help` and `cairn help COMMAND` print.
+  std::string help_text() const;
+
   Session& session_;
   CLI::App program_;
   std::vector<Command> commands_;
+  CLI::App* help_ = nullptr;  // owned by the program
+  std::string command_to_explain_;
 };
 
 }  // namespace cairn::app

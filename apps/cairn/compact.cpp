@@ -403,8 +403,11 @@ int run(const CompactOptions& options, Session& session) {
   }
   const PolicyResult& shown = control ? *control : result;
   if (!options.output.empty())
-    write_graph(shown.compact, options.output, registry, options.output_format);
-  if (!options.trajectory.empty()) write_graph(shown.way, options.trajectory, registry);
+    write_graph(shown.compact, options.output, registry,
+                output_format(options.output, options.output_format));
+  if (!options.trajectory.empty()) {
+    write_graph(shown.way, options.trajectory, registry, output_format(options.trajectory, ""));
+  }
   if (!options.steps.empty()) write_file(options.steps, steps_csv(shown));
   json::object report = report_json(options, recording, job, result, control);
   if (comparison) {

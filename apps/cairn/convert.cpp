@@ -23,7 +23,8 @@ int run(const ConvertOptions& options, Session& session) {
   if (options.output_file == "-") session.write_file_to_stdout();
   check_output(options.output_file, options.output_format, session);
   const LoadedGraph loaded = load_graph(options.input_file, options.input, session);
-  write_graph(loaded.graph, options.output_file, session.registry(), options.output_format);
+  write_graph(loaded.graph, options.output_file, session.registry(),
+              output_format(options.output_file, options.output_format));
 
   boost::json::object report = begin_report("convert");
   report["graph"] = graph_json(loaded.graph, loaded.name);

@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // cairn generate KIND: a simulated graph, the same on every machine.
+#include <cstdint>
+#include <limits>
 #include <memory>
 
 #include <fmt/format.h>
 
 #include "commands.hpp"
 #include "graph_files.hpp"
+#include "help.hpp"
 #include "json_report.hpp"
 #include "table.hpp"
 
@@ -26,9 +29,11 @@ int run(const GenerateOptions& options, Session& session) {
   check_output(options.ground_truth, options.output_format, session);
   const Simulation simulation = simulate(options.kind, options.seed, session);
   Registry& registry = session.registry();
-  write_graph(simulation.graph, options.output, registry, options.output_format);
+  write_graph(simulation.graph, options.output, registry,
+              output_format(options.output, options.output_format));
   if (!options.ground_truth.empty()) {
-    write_graph(simulation.truth, options.ground_truth, registry, options.output_format);
+    write_graph(simulation.truth, options.ground_truth, registry,
+                output_format(options.ground_truth, options.output_format));
   }
 
   boost::json::object report = begin_report("generate");
@@ -62,6 +67,7 @@ Command add_generate(CLI::App& program) {
       ->type_name("FORMAT");
   app->add_option("--seed", options->seed, "seed of the noise; the same seed gives the same graph")
       ->type_name("S")
+      ->check(within(std::uint64_t{0}, std::numeric_limits<std::uint64_t>::max()))
       ->capture_default_str();
   app->footer(
       "Example:\n"

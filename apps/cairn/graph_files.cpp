@@ -16,10 +16,14 @@
 
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
+#include "cairn/runtime/plugin_call.hpp"
+#include "graph_labels.hpp"
 #include "table.hpp"
 
 namespace cairn::app {
 namespace {
+
+constexpr const char* kPipeFormat = "g2o";
 
 double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -45,7 +49,9 @@ LoadedGraph generate_graph(const std::string& name, Session& session) {
   Registry& registry = session.registry();
   const std::uint64_t seed = take_seed(spec, registry.options(Generator::kKind, spec.name));
   LoadedGraph loaded;
-  Simulation simulation = registry.make<Generator>(spec)->generate(registry, seed);
+  Simulation simulation =
+      call_plugin([&] { return "generator '" + spec.name + "'"; },
+                  [&] { return registry.make<Generator>(spec)->generate(registry, seed); });
   loaded.graph = std::move(simulation.graph);
   loaded.truth = std::move(simulation.truth);
   loaded.report.format = "generated";
@@ -92,7 +98,7 @@ void check_ending(const std::string& file, Registry& registry) {
       ErrorCode::usage,
       fmt::format("{}: no format writes files of that name; endings on offer: .{}; or name a "
                   "format with --to",
-                  file == "-" ? "standard output" : file, fmt::join(writable, ", .")));
+                  file, fmt::join(writable, ", .")));
 }
 
 }  // namespace
@@ -106,12 +112,17 @@ void add_input_options(CLI::App& command, InputOptions& options) {
                    "repair known mistakes in information matrices");
 }
 
+std::string output_format(const std::string& file, const std::string& named) {
+  return named.empty() && file == "-" ? kPipeFormat : named;
+}
+
 LoadedGraph load_graph(const std::string& name, const InputOptions& options, Session& session) {
   const auto start = std::chrono::steady_clock::now();
   LoadedGraph loaded = name.starts_with('@') ? generate_graph(name, session)
                                              : read_named_graph(name, options, session);
   loaded.seconds = seconds_since(start);
   loaded.name = name;
+  loaded.label = graph_label(name);
   for (const std::string& sentence : sentences(loaded.report)) {
     session.note(fmt::format("{}: {}", name, sentence));
   }
@@ -120,16 +131,18 @@ LoadedGraph load_graph(const std::string& name, const InputOptions& options, Ses
 
 Simulation simulate(const std::string& spec, std::uint64_t seed, Session& session) {
   Registry& registry = session.registry();
-  return registry.make<Generator>(spec)->generate(registry, seed);
+  return call_plugin([&] { return "generator '" + spec + "'"; },
+                     [&] { return registry.make<Generator>(spec)->generate(registry, seed); });
 }
 
 void check_output(const std::string& file, const std::string& format, Session& session) {
   if (file.empty()) return;
   Registry& registry = session.registry();
-  if (format.empty()) {
+  const std::string chosen = output_format(file, format);
+  if (chosen.empty()) {
     check_ending(file, registry);
   } else {
-    check_named_format(file, format, registry);
+    check_named_format(file, chosen, registry);
   }
   check_folder(file);
 }

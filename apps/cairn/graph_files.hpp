@@ -28,6 +28,7 @@ struct LoadedGraph {
   std::optional<Graph> truth;  ///< of a graph that was generated
   ReadReport report;
   std::string name;      ///< as on the command line
+  std::string label;     ///< what results call it: see `graph_label`
   double seconds = 0.0;  ///< that reading took
 };
 
@@ -38,8 +39,12 @@ LoadedGraph load_graph(const std::string& name, const InputOptions& options, Ses
 /// Runs a generator, given as `KIND:k=v`.
 Simulation simulate(const std::string& spec, std::uint64_t seed, Session& session);
 
+/// The format in which a graph is written to `file`: the one that `--to` names, else that of pipes
+/// (g2o) where the file is standard output, else empty: the file's ending tells it.
+std::string output_format(const std::string& file, const std::string& named);
+
 /// Finds out before the work whether its result can be written: throws `Error` if no format writes
-/// files of that name, or the folder is not there or refuses.
+/// files of that name, or the folder is not there or refuses. `format` is what `--to` names.
 void check_output(const std::string& file, const std::string& format, Session& session);
 
 /// The part of it that is about the folder.

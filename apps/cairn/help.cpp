@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "help.hpp"
 
+#include <algorithm>
 #include <utility>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "table.hpp"
 
@@ -25,18 +27,6 @@ std::string right_column(const CLI::Option& option) {
   const std::string value = option.get_default_str();
   return value.empty() ? option.get_description()
                        : fmt::format("{} [{}]", option.get_description(), value);
-}
-
-std::string usage(const CLI::App& app, bool has_commands) {
-  if (has_commands) return "Usage: cairn COMMAND [OPTIONS]\n";
-  std::string text = fmt::format("Usage: cairn {} [OPTIONS]", app.get_name());
-  for (const CLI::Option* option : app.get_options()) {
-    if (!option->get_positional()) continue;
-    const std::string word = option->get_type_name();
-    text += " " + (option->get_required() ? word : "[" + word + "]");
-    if (option->get_items_expected_max() > 1) text += "...";
-  }
-  return text + "\n";
 }
 
 Table two_columns() { return Table({{"", Table::Align::left}, {"", Table::Align::left}}, "  "); }
@@ -74,7 +64,29 @@ std::string common_options(const CLI::App& program) {
 }  // namespace
 
 CLI::Validator one_of(std::vector<std::string> choices) {
-  return CLI::IsMember(std::move(choices)).description("");
+  const auto check = [choices = std::move(choices)](const std::string& text) {
+    const bool good = std::ranges::find(choices, text) != choices.end();
+    return good ? std::string() : fmt::format("'{}' is none of {}", text, fmt::join(choices, ", "));
+  };
+  return {check, ""};
+}
+
+std::string usage_line(const CLI::App& command) {
+  std::string text = fmt::format("cairn {} [OPTIONS]", command.get_name());
+  for (const CLI::Option* option : command.get_options()) {
+    if (!option->get_positional()) continue;
+    const std::string word = option->get_type_name();
+    text += " " + (option->get_required() ? word : "[" + word + "]");
+    if (option->get_items_expected_max() > 1) text += "...";
+  }
+  for (const CLI::Option* option : command.get_options()) {
+    if (option->get_positional() || !option->get_required()) continue;
+    const bool is_short = !option->get_snames().empty();
+    text += fmt::format(" {}{} {}", is_short ? "-" : "--",
+                        is_short ? option->get_snames().front() : option->get_lnames().front(),
+                        option->get_type_name());
+  }
+  return text;
 }
 
 std::string HelpFormatter::make_help(const CLI::App* app, std::string /*name*/,
@@ -82,7 +94,8 @@ std::string HelpFormatter::make_help(const CLI::App* app, std::string /*name*/,
   const bool has_commands = !app->get_subcommands({}).empty();
   const CLI::App* program = app->get_parent();
   std::string text = program ? fmt::format("cairn {}: ", app->get_name()) : "";
-  text += app->get_description() + "\n\n" + usage(*app, has_commands) + "\n";
+  text += app->get_description() + "\n\n" +
+          "Usage: " + (has_commands ? "cairn COMMAND [OPTIONS]" : usage_line(*app)) + "\n\n";
   if (has_commands) text += "Commands:\n" + command_lines(*app) + "\nOptions of every command:\n";
   text += option_lines(*app, has_commands);
   if (program) text += "\n" + common_options(*program);

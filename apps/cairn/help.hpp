@@ -2,19 +2,31 @@
 #pragma once
 
 #include <string>
+#include <type_traits>
 #include <vector>
 
+#include <fmt/format.h>
 #include <CLI/App.hpp>
 #include <CLI/Formatter.hpp>
 
 namespace cairn::app {
 
-/// Validators that do not write themselves into the help, whose first column must stay narrow.
+/// Validators that do not write themselves into the help, whose first column must stay narrow. They
+/// say what is expected: "'many' is no whole number from 0 to 1024".
 template <class Number>
 CLI::Validator within(Number low, Number high) {
-  return CLI::Range(low, high).description("");
+  const auto check = [low, high](const std::string& text) {
+    Number value{};
+    const bool good = CLI::detail::lexical_cast(text, value) && value >= low && value <= high;
+    const char* kind = std::is_integral_v<Number> ? "whole number" : "number";
+    return good ? std::string() : fmt::format("'{}' is no {} from {} to {}", text, kind, low, high);
+  };
+  return {check, ""};
 }
 CLI::Validator one_of(std::vector<std::string> choices);
+
+/// "cairn generate [OPTIONS] KIND -o OUT": the arguments and options that a command must be given.
+std::string usage_line(const CLI::App& command);
 
 /// Help that fits a screen: at most 40 lines of 100 columns. One line per option, with its default
 /// in brackets; a command's help also names the options that every command takes.

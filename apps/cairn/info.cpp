@@ -3,6 +3,7 @@
 #include <memory>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "cairn/evaluation/graph_survey.hpp"
 #include "commands.hpp"
@@ -48,7 +49,7 @@ std::string counts_text(const LoadedGraph& loaded, const GraphSurvey& s, bool co
     types.add({f.tag, fmt::format("{}", f.count), fmt::format("{}", f.residual_size),
                chi2_text(f.chi2), f.metric.empty() ? "" : "metric " + f.metric});
   }
-  return fmt::format("{} ({})\n{}", bold(loaded.name, colour), loaded.report.format,
+  return fmt::format("{} ({})\n{}", bold(loaded.label, colour), loaded.report.format,
                      types.text(colour));
 }
 
@@ -68,7 +69,9 @@ std::string list_text(const std::string& title, const std::vector<std::string>& 
                       bool colour) {
   if (lines.empty()) return "";
   std::string text = bold(title, colour) + "\n";
-  for (const std::string& line : lines) text += "  " + line + "\n";
+  for (const std::string& line : lines) {
+    text += fmt::format("  {}\n", fmt::join(folded(line, output_width() - 4), "\n    "));
+  }
   return text;
 }
 

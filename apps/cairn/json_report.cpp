@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "cairn/runtime/version.hpp"
+#include "graph_labels.hpp"
 #include "peak_memory.hpp"
 
 namespace cairn::app {
@@ -47,8 +48,9 @@ void end_report(json::object& report) {
   report["build"] = {{"compiler", compiler()}, {"flags", CAIRN_BUILD_FLAGS}, {"simd", simd()}};
 }
 
-json::object graph_json(const Graph& graph, const std::string& file) {
+json::object graph_json(const Graph& graph, const std::string& file, const std::string& name) {
   return {{"file", file},
+          {"name", name.empty() ? graph_label(file) : name},
           {"variables", graph.variable_count()},
           {"factors", graph.factor_count()},
           {"residual_size", graph.residual_size()},

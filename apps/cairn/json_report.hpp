@@ -18,8 +18,10 @@ boost::json::object begin_report(std::string_view command);
 /// Adds "peak_memory_bytes", "machine" and "build", how reports with times end.
 void end_report(boost::json::object& report);
 
-/// {"file", "variables", "factors", "residual_size", "tangent_size"}
-boost::json::object graph_json(const Graph& graph, const std::string& file);
+/// {"file", "name", "variables", "factors", "residual_size", "tangent_size"}; `name` is what tables
+/// and pictures call the graph (empty: its `graph_label`).
+boost::json::object graph_json(const Graph& graph, const std::string& file,
+                               const std::string& name = "");
 /// The members of "seconds" that an optimisation has.
 boost::json::object seconds_json(const Seconds& seconds);
 boost::json::object solver_json(const LinearSolverStats& stats);

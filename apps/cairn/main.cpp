@@ -4,9 +4,11 @@
 #include <exception>
 #include <new>
 #include <string>
+#include <utility>
 
 #include "cairn/runtime/error.hpp"
 #include "command_line.hpp"
+#include "option_words.hpp"
 #include "session.hpp"
 
 namespace {
@@ -16,6 +18,7 @@ constexpr int kExitBug = 1;
 /// One line on standard error, whatever the message looked like; only a table, whose lines are
 /// indented by four columns, keeps its lines.
 void print_error(std::string message) {
+  message = cairn::app::in_command_line_words(std::move(message));
   const bool table = message.find("\n    ") != std::string::npos;
   for (std::size_t k = 0; !table && (k = message.find('\n', k)) != std::string::npos;) {
     const std::size_t next = message.find_first_not_of(" \n", k);
@@ -45,6 +48,9 @@ int main(int argc, char** argv) {
     return static_cast<int>(cairn::ErrorCode::numerical);
   } catch (const std::exception& error) {
     print_error(std::string("internal error: ") + error.what() + " (please report it)");
+    return kExitBug;
+  } catch (...) {
+    print_error("internal error: an exception that is no std::exception (please report it)");
     return kExitBug;
   }
 }

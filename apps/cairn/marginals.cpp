@@ -14,6 +14,7 @@
 #include "cairn/io/format.hpp"
 #include "cairn/linear/graph_marginals.hpp"
 #include "cairn/runtime/error.hpp"
+#include "cairn/runtime/plugin_call.hpp"
 #include "cairn/runtime/threads.hpp"
 #include "commands.hpp"
 #include "covariances.hpp"
@@ -353,7 +354,8 @@ std::optional<Summary> optimize(Graph& graph, Optimizer* optimizer, const Margin
   Stop stop = options.problem.stop;
   stop.interrupt = &guard.flag();
   OptimizationProgress progress(session.common.quiet, stop.max_iterations);
-  Summary summary = optimizer->optimize(graph, stop, progress);
+  Summary summary = call_plugin([&] { return fmt::format("optimizer '{}'", options.optimizer); },
+                                [&] { return optimizer->optimize(graph, stop, progress); });
   if (summary.status == Status::interrupted) return summary;
   if (summary.status != Status::converged) {
     session.note(fmt::format(
@@ -387,7 +389,9 @@ int run(const MarginalsOptions& options, Session& session) {
   }
   const std::optional<Summary> summary = optimize(loaded.graph, optimizer.get(), options, session);
   if (summary && summary->status == Status::interrupted) return kExitInterrupted;
-  const Answer answer = compute(loaded.graph, request, solver);
+  const Answer answer =
+      call_plugin([&] { return fmt::format("linear solver '{}'", options.linear_solver); },
+                  [&] { return compute(loaded.graph, request, solver); });
   if (options.output == "-") {
     write_stdout(file_text(loaded, request, answer));
   } else if (!options.output.empty()) {

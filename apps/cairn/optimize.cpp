@@ -8,6 +8,7 @@
 
 #include "cairn/report/recording.hpp"
 #include "cairn/runtime/error.hpp"
+#include "cairn/runtime/plugin_call.hpp"
 #include "cairn/runtime/threads.hpp"
 #include "commands.hpp"
 #include "covariances.hpp"
@@ -62,7 +63,7 @@ int exit_code(Status status) {
 json::object report_json(const OptimizeOptions& options, const LoadedGraph& loaded,
                          const Summary& summary, const DiagonalCovariances& covariances) {
   json::object report = begin_report("optimize");
-  report["graph"] = graph_json(loaded.graph, loaded.name);
+  report["graph"] = graph_json(loaded.graph, loaded.name, loaded.label);
   report["optimizer"] = summary.optimizer;
   report["linear_solver"] = summary.linear_solver;
   report["threads"] = threads();
@@ -94,7 +95,7 @@ std::string times_text(const Seconds& seconds) {
 std::string summary_text(const OptimizeOptions& options, const LoadedGraph& loaded,
                          const Summary& summary, const DiagonalCovariances& covariances) {
   Table table({{"", Table::Align::left}, {"", Table::Align::left}});
-  table.add({"graph", fmt::format("{}: {}, {}", loaded.name,
+  table.add({"graph", fmt::format("{}: {}, {}", loaded.label,
                                   plural(loaded.graph.variable_count(), "variable"),
                                   plural(loaded.graph.factor_count(), "factor"))});
   table.add({"solver", summary.linear_solver.empty()
@@ -119,6 +120,15 @@ std::string summary_text(const OptimizeOptions& options, const LoadedGraph& load
   if (!options.output.empty() && options.output != "-") table.add({"written", options.output});
   if (!options.record.empty()) table.add({"recorded", options.record});
   return table.text(false);
+}
+
+/// "optimizer 'dogleg' with linear solver 'eigen'"
+std::string in_words(const ComponentSpec& optimizer) {
+  const auto solver = optimizer.values.find(kLinearSolverOption);
+  return fmt::format("optimizer '{}'{}", optimizer.name,
+                     solver == optimizer.values.end()
+                         ? ""
+                         : fmt::format(" with linear solver '{}'", solver->second));
 }
 
 Summary solve(Graph& graph, Optimizer& optimizer, const OptimizeOptions& options,
@@ -149,13 +159,18 @@ int run(const OptimizeOptions& options, Session& session) {
     session.note(fmt::format("initial guess {}: {}", options.problem.initial, note));
   }
   const InterruptGuard guard;  // until the results are written
-  Summary summary = solve(loaded.graph, *optimizer, options, guard, session);
+  Summary summary =
+      call_plugin([&] { return in_words(spec); },
+                  [&] { return solve(loaded.graph, *optimizer, options, guard, session); });
   if (!options.output.empty()) {
-    write_graph(loaded.graph, options.output, registry, options.output_format);
+    write_graph(loaded.graph, options.output, registry,
+                output_format(options.output, options.output_format));
   }
   DiagonalCovariances covariances;
   if (covariance_solver && exit_code(summary.status) == 0) {
-    covariances = diagonal_covariances(loaded.graph, *covariance_solver);
+    covariances =
+        call_plugin([&] { return "covariances by " + in_words(spec); },
+                    [&] { return diagonal_covariances(loaded.graph, *covariance_solver); });
     if (!covariances.there) summary.notes.push_back("no covariances: " + covariances.why_not);
   }
   session.write_json(report_json(options, loaded, summary, covariances));
@@ -183,6 +198,7 @@ Command add_optimize(CLI::App& program) {
       ->type_name("NAME")
       ->default_str(kDefaultLinearSolver);
   add_problem_options(*app, options->problem);
+  add_time_limit(*app, options->problem.stop);
   app->add_option("--record", options->record, "every iteration's positions, for cairn view")
       ->type_name("FILE");
   app->add_option("--covariance", options->covariance,

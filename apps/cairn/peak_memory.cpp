@@ -2,22 +2,31 @@
 #include "peak_memory.hpp"
 
 #include <fcntl.h>
+#include <poll.h>
 #include <spawn.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <cerrno>
+#include <csignal>
 #include <fstream>
 #include <string>
 
 namespace cairn::app {
 namespace {
 
-std::string read_all(int descriptor) {
+constexpr int kLookAtInterrupt = 100;  // [ms] between two looks
+
+/// What a child writes, to its end. An interrupt of this process alone does not reach the child.
+std::string read_all(int descriptor, pid_t child, const std::atomic<bool>& interrupt) {
   std::string text;
   char buffer[4096];
   for (;;) {
+    pollfd end{descriptor, POLLIN, 0};
+    const int ready = ::poll(&end, 1, kLookAtInterrupt);
+    if (interrupt.load()) ::kill(child, SIGTERM);
+    if (ready == 0 || (ready < 0 && errno == EINTR)) continue;
     const ssize_t count = ::read(descriptor, buffer, sizeof buffer);
     if (count < 0 && errno == EINTR) continue;
     if (count <= 0) return text;
@@ -48,7 +57,8 @@ std::int64_t peak_memory_bytes() {
   return static_cast<std::int64_t>(usage.ru_maxrss) * 1024;
 }
 
-std::optional<std::string> output_of_self(const std::vector<std::string>& arguments) {
+std::optional<std::string> output_of_self(const std::vector<std::string>& arguments,
+                                          const std::atomic<bool>& interrupt) {
   int ends[2];
   if (::pipe2(ends, O_CLOEXEC) != 0) return std::nullopt;
   std::vector<std::string> words{"cairn"};
@@ -66,7 +76,7 @@ std::optional<std::string> output_of_self(const std::vector<std::string>& argume
       ::posix_spawn(&child, "/proc/self/exe", &actions, nullptr, argv.data(), ::environ);
   posix_spawn_file_actions_destroy(&actions);
   ::close(ends[1]);
-  std::string text = failed ? std::string() : read_all(ends[0]);
+  std::string text = failed ? std::string() : read_all(ends[0], child, interrupt);
   ::close(ends[0]);
   if (failed || !exited(child)) return std::nullopt;
   return text;

@@ -9,9 +9,17 @@
 
 #include "cairn/io/format.hpp"
 #include "cairn/runtime/error.hpp"
+#include "cairn/runtime/plugin_call.hpp"
 #include "graph_files.hpp"
 
 namespace cairn::app {
+
+std::string default_picture(const std::string& file, const std::string& ending) {
+  if (file == "-" || file.starts_with('@')) return "cairn." + ending;
+  std::filesystem::path name = std::filesystem::path(file).filename();
+  if (name.extension() == ".gz") name.replace_extension();
+  return name.replace_extension(ending).string();
+}
 
 std::string picture_format(const std::string& file, Session& session) {
   std::string ending = std::filesystem::path(file).extension().string();
@@ -33,7 +41,9 @@ std::string picture_format(const std::string& file, Session& session) {
 
 std::size_t write_picture(const Album& album, const ComponentSpec& picture, const std::string& file,
                           Session& session) {
-  const std::string bytes = session.registry().make<Picture>(picture)->draw(album);
+  const std::string bytes =
+      call_plugin([&] { return fmt::format("picture '{}'", picture.name); },
+                  [&] { return session.registry().make<Picture>(picture)->draw(album); });
   write_file(file, bytes);
   return bytes.size();
 }

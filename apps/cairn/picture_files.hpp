@@ -9,6 +9,11 @@
 
 namespace cairn::app {
 
+/// What a picture of `file` is called that nobody has named: "sphere.svg" for maps/sphere.g2o.gz
+/// and the ending "svg", in the folder where the program runs; "cairn.svg" for what is not from a
+/// file.
+std::string default_picture(const std::string& file, const std::string& ending);
+
 /// The name of kind picture that a file's ending asks for. Throws `Error` (usage) with the endings
 /// on offer, and `Error` (input) if its folder is not there or refuses.
 std::string picture_format(const std::string& file, Session& session);

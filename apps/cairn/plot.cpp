@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // cairn plot FILE… -o picture.svg: a static picture, as for a paper.
 #include <charconv>
+#include <filesystem>
 #include <memory>
+#include <string>
+#include <system_error>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -49,8 +52,24 @@ void put_size(const std::string& size, ComponentSpec& picture) {
   picture.values["height"] = fmt::format("{}", height);
 }
 
-ComponentSpec picture_spec(const PlotOptions& options, Session& session) {
-  ComponentSpec picture{picture_format(options.output, session), {}};
+/// The picture that `-o` names, or one named after the first file: no other file is overwritten
+/// without having been named.
+std::string output_of(const PlotOptions& options, Session& session) {
+  if (!options.output.empty()) return options.output;
+  std::string ending = "svg";
+  if (!session.registry().has(Picture::kKind, ending)) ending = "html";
+  std::string file = default_picture(options.album.files.front(), ending);
+  std::error_code error;
+  if (std::filesystem::exists(file, error)) {
+    throw Error(ErrorCode::usage,
+                fmt::format("{} is there already; name it, or another, with -o", file));
+  }
+  return file;
+}
+
+ComponentSpec picture_spec(const PlotOptions& options, const std::string& output,
+                           Session& session) {
+  ComponentSpec picture{picture_format(output, session), {}};
   if (picture.name == "html") return picture;
   picture.values = {{"what", options.what},
                     {"theme", options.theme},
@@ -62,19 +81,19 @@ ComponentSpec picture_spec(const PlotOptions& options, Session& session) {
 }
 
 int run(const PlotOptions& options, Session& session) {
-  const ComponentSpec picture = picture_spec(options, session);
+  const std::string output = output_of(options, session);
+  const ComponentSpec picture = picture_spec(options, output, session);
   session.registry().make<Picture>(picture);  // a wrong name is told before files are read
   session.use_threads();
   const Album album = load_album(
       options.album, fmt::format("cairn plot {}", fmt::join(options.album.files, " ")), session);
-  const std::size_t bytes = write_picture(album, picture, options.output, session);
+  const std::size_t bytes = write_picture(album, picture, output, session);
   boost::json::object report = begin_report("plot");
-  report["picture"] = options.output;
+  report["picture"] = output;
   report["bytes"] = bytes;
   report["what"] = options.what;
   session.write_json(report);
-  session.print(
-      fmt::format("{}: {}\n", options.output, bytes_text(static_cast<std::int64_t>(bytes))));
+  session.print(fmt::format("{}: {}\n", output, bytes_text(static_cast<std::int64_t>(bytes))));
   return 0;
 }
 
@@ -84,11 +103,11 @@ Command add_plot(CLI::App& program) {
   auto options = std::make_shared<PlotOptions>();  // lives as long as the parser and the run
   CLI::App* app = program.add_subcommand("plot", "a static plot: SVG, PNG or PDF");
   add_album_options(*app, options->album);
-  app->add_option("-o,--output", options->output, "the plot: .svg, .png or .pdf")
-      ->type_name("PICTURE")
-      ->required();
+  app->add_option("-o,--output", options->output,
+                  "the plot: .svg, .png or .pdf [name of the first FILE, .svg]")
+      ->type_name("PICTURE");
   app->add_option("--what", options->what,
-                  "trajectory, convergence, bars, scaling, sparsity or steps; auto is by FILE")
+                  "trajectory, convergence, bars, scaling, sparsity, steps; auto: by FILE")
       ->type_name("WHAT")
       ->check(one_of({"auto", "trajectory", "convergence", "bars", "scaling", "sparsity", "steps"}))
       ->capture_default_str();
@@ -106,7 +125,8 @@ Command add_plot(CLI::App& program) {
       ->type_name("AXIS")
       ->check(one_of({"iterations", "time"}))
       ->capture_default_str();
-  app->add_option("--linear-solver", options->linear_solver, "whose order the sparsity of L has")
+  app->add_option("--linear-solver", options->linear_solver,
+                  "its elimination order gives the sparsity of L")
       ->type_name("NAME")
       ->capture_default_str();
   app->footer(

@@ -11,6 +11,7 @@
 
 #include "cairn/io/format.hpp"
 #include "cairn/io/generator.hpp"
+#include "cairn/linear/iterative_solver.hpp"
 #include "cairn/linear/jacobian.hpp"
 #include "cairn/linear/linear_solver.hpp"
 #include "cairn/linear/marginals.hpp"
@@ -36,16 +37,16 @@ std::string kind_in_words(std::string kind) {
   return kind;
 }
 
+/// The kinds, and below each what is on offer.
 std::string list_text(const std::vector<Offer>& offers, bool colour) {
-  Table table({{"kind", Table::Align::left},
-               {"name", Table::Align::left},
-               {"plugin", Table::Align::left},
-               {"licence", Table::Align::left},
-               {"", Table::Align::left}});
+  Table table({{"kind and name", Table::Align::left},
+               {"", Table::Align::left},
+               {"plugin", Table::Align::left, 2},
+               {"licence", Table::Align::left, 1}});
   std::string last_kind;
   for (const Offer& offer : offers) {
-    table.add({offer.kind == last_kind ? "" : kind_in_words(offer.kind), offer.name,
-               offer.file.filename().string(), offer.licence, offer.summary});
+    if (offer.kind != last_kind) table.add({kind_in_words(offer.kind)});
+    table.add({"  " + offer.name, offer.summary, offer.file.filename().string(), offer.licence});
     last_kind = offer.kind;
   }
   return offers.empty() ? "no plugins found\n" : table.text(colour);
@@ -93,6 +94,12 @@ int list(Session& session) {
 // One name
 // -------------------------------------------------------------------------------------------
 
+/// "an optimizer", "a linear solver"
+std::string with_article(const std::string& noun) {
+  const bool vowel = std::string_view("aeiou").find(noun.front()) != std::string_view::npos;
+  return (vowel ? "an " : "a ") + noun;
+}
+
 std::string type_text(const OptionSpec& spec) {
   switch (spec.type) {
     case OptionType::boolean:
@@ -106,7 +113,7 @@ std::string type_text(const OptionSpec& spec) {
     case OptionType::choice:
       return "choice";
     case OptionType::component:
-      return "name of a " + kind_in_words(spec.choices.front());
+      return fmt::format("name of {}", with_article(kind_in_words(spec.choices.front())));
   }
   return "";
 }
@@ -117,6 +124,13 @@ std::string range_text(const OptionSpec& spec) {
   if (low && high) return fmt::format("{:g} … {:g}", spec.minimum, spec.maximum);
   if (low) return fmt::format("from {:g}", spec.minimum);
   return high ? fmt::format("up to {:g}", spec.maximum) : "";
+}
+
+/// "real, 0 … 1", "auto | portable", "name of a linear solver"
+std::string value_text(const OptionSpec& spec) {
+  const std::string range = range_text(spec);
+  if (spec.type == OptionType::choice) return range;
+  return range.empty() ? type_text(spec) : fmt::format("{}, {}", type_text(spec), range);
 }
 
 json::value bound_json(double bound) { return std::isfinite(bound) ? json::value(bound) : nullptr; }
@@ -189,7 +203,7 @@ std::vector<std::string> abilities(Registry& registry, const Offer& offer) {
   if (offer.kind == Format::kKind) all = format_abilities(static_cast<const Format&>(*component));
   for (const std::string_view ability :
        {LogDeterminant::kAbility, ManyRightHandSides::kAbility, EliminationOrder::kAbility,
-        JacobianSolver::kAbility, Marginals::kAbility}) {
+        JacobianSolver::kAbility, Marginals::kAbility, IterativeSolver::kAbility}) {
     if (component->ability(ability)) all.emplace_back(ability);
   }
   return all;
@@ -203,8 +217,9 @@ bool is_optimized(const Registry& registry, const Offer& offer) {
 
 std::string details_text(const Offer& offer, bool optimized, const OptionTable& options,
                          const std::vector<std::string>& abilities, bool colour) {
-  std::string text = fmt::format("{} ({}): {}\n", bold(offer.name, colour),
-                                 kind_in_words(offer.kind), offer.summary);
+  const std::string title = fmt::format("{} ({}): {}", bold(offer.name, colour),
+                                        kind_in_words(offer.kind), offer.summary);
+  std::string text = fmt::format("{}\n", fmt::join(folded(title, output_width() - 2), "\n  "));
   Table facts({{"", Table::Align::left}, {"", Table::Align::left}}, "  ");
   facts.add({"plugin", fmt::format("{} {}, {}", offer.plugin, offer.version, offer.file.string())});
   facts.add({"licence", offer.licence});
@@ -215,12 +230,11 @@ std::string details_text(const Offer& offer, bool optimized, const OptionTable& 
   if (options.specs().empty()) return text;
   Table table({{"option", Table::Align::left},
                {"default", Table::Align::left},
-               {"type", Table::Align::left},
-               {"", Table::Align::left},
-               {"range", Table::Align::left}},
+               {"value", Table::Align::left},
+               {"meaning", Table::Align::left}},
               "  ");
   for (const OptionSpec& spec : options.specs()) {
-    table.add({spec.name, spec.default_value, type_text(spec), spec.help, range_text(spec)});
+    table.add({spec.name, spec.default_value, value_text(spec), spec.help});
   }
   return text + table.text(colour);
 }

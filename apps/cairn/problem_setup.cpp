@@ -5,6 +5,7 @@
 #include <fmt/ranges.h>
 
 #include "cairn/plugin/registry.hpp"
+#include "cairn/runtime/plugin_call.hpp"
 #include "help.hpp"
 
 namespace cairn::app {
@@ -37,8 +38,17 @@ void add_problem_options(CLI::App& command, ProblemOptions& options) {
       ->default_str("1e-10");
 }
 
+void add_time_limit(CLI::App& command, Stop& stop) {
+  command
+      .add_option("--max-seconds", stop.max_seconds,
+                  "stop a run that takes longer, with its best estimate; 0: no limit [0]")
+      ->type_name("S")
+      ->check(within(0.0, 1e9));
+}
+
 ProblemSetup::ProblemSetup(const ProblemOptions& options, Registry& registry)
-    : initial_(registry.make<InitialGuess>(options.initial)),
+    : initial_name_(options.initial),
+      initial_(registry.make<InitialGuess>(options.initial)),
       selector_(FactorSelector::parse(options.loss_on)) {
   if (!options.loss.empty()) loss_ = registry.make<Loss>(options.loss);
   if (options.loss.empty() && options.loss_on != "all") {
@@ -48,7 +58,8 @@ ProblemSetup::ProblemSetup(const ProblemOptions& options, Registry& registry)
 
 std::vector<std::string> ProblemSetup::apply(Graph& graph) const {
   graph.set_loss(loss_, selector_);
-  return initial_->compute(graph);
+  return call_plugin([&] { return fmt::format("initial guess '{}'", initial_name_); },
+                     [&] { return initial_->compute(graph); });
 }
 
 namespace {

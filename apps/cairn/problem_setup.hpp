@@ -28,6 +28,8 @@ struct ProblemOptions {
   Stop stop;
 };
 void add_problem_options(CLI::App& command, ProblemOptions& options);
+/// --max-seconds, the limit of each run.
+void add_time_limit(CLI::App& command, Stop& stop);
 /// The part of them that is about the loss.
 void add_loss_options(CLI::App& command, ProblemOptions& options);
 
@@ -43,6 +45,7 @@ class ProblemSetup {
   const FactorSelector& loss_selector() const { return selector_; }
 
  private:
+  std::string initial_name_;
   std::unique_ptr<InitialGuess> initial_;
   std::shared_ptr<const Loss> loss_;  // shared: graphs and their clones use one loss
   FactorSelector selector_;

@@ -13,6 +13,7 @@ namespace {
 
 constexpr int kBarWidth = 20;
 constexpr std::chrono::milliseconds kRedraw{50};
+constexpr std::size_t kUnknownWidth = 80;  // columns of a terminal that does not say
 
 /// Every line at first, then ever fewer, so that a log of a long run stays readable.
 bool worth_a_line(int iteration) {
@@ -32,8 +33,14 @@ StatusLine::StatusLine(bool quiet) : quiet_(quiet), terminal_(is_terminal(stderr
 
 void StatusLine::show(std::string_view text) {
   if (quiet_) return;
-  // \x1b[K wipes what a longer text left behind.
-  write_error(terminal_ ? fmt::format("\r{}\x1b[K", text) : fmt::format("{}\n", text));
+  if (terminal_) {
+    // A line that reaches the last column wraps, and could not be rewritten any more.
+    const std::size_t width = terminal_width(stderr);
+    const std::string line = shortened(std::string(text), (width == 0 ? kUnknownWidth : width) - 1);
+    write_error(fmt::format("\r{}\x1b[K", line));  // \x1b[K wipes what a longer text left behind
+  } else {
+    write_error(fmt::format("{}\n", text));
+  }
   shown_ = true;
 }
 

@@ -9,8 +9,8 @@
 
 namespace cairn::app {
 
-/// What is going on, on standard error: one line that is rewritten on a terminal, plain lines
-/// elsewhere.
+/// What is going on, on standard error: on a terminal one line that is rewritten, and shortened to
+/// what fits; plain lines elsewhere.
 class StatusLine {
  public:
   explicit StatusLine(bool quiet);

@@ -398,7 +398,8 @@ int run(const ReplayOptions& options, Session& session) {
   }
   const double chi2 = estimator->chi2();
   if (!options.output.empty())
-    write_graph(estimator->graph(), options.output, registry, options.output_format);
+    write_graph(estimator->graph(), options.output, registry,
+                output_format(options.output, options.output_format));
   if (!options.steps.empty()) write_file(options.steps, steps_csv(replay));
   if (!options.plot.empty()) draw_steps(replay, options, loaded, session);
   session.write_json(report_json(options, loaded, sorted, replay, *estimator, chi2));

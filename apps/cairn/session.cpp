@@ -14,6 +14,7 @@
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/threads.hpp"
 #include "json_text.hpp"
+#include "option_words.hpp"
 #include "table.hpp"
 
 namespace cairn::app {
@@ -51,7 +52,7 @@ bool Session::colour() const { return use_colour(stdout_is_file_ ? stderr : stdo
 void Session::note(std::string_view text) const {
   if (common.quiet || text.empty()) return;
   fmt::memory_buffer line;
-  fmt::format_to(std::back_inserter(line), "note: {}\n", text);
+  fmt::format_to(std::back_inserter(line), "note: {}\n", in_command_line_words(std::string(text)));
   std::fwrite(line.data(), 1, line.size(), stderr);
 }
 

@@ -343,7 +343,8 @@ int run(const SparsifyCommandOptions& options, Session& session) {
   for (const std::string& note : result.notes) session.note(note);
   note_refused(result.change, session);
   if (!options.output.empty())
-    write_graph(result.sparse, options.output, registry, options.output_format);
+    write_graph(result.sparse, options.output, registry,
+                output_format(options.output, options.output_format));
   if (!options.record.empty()) write_file(options.record, recorder.text());
   session.write_json(report_json(options, loaded, job, result));
   session.print(summary_text(options, loaded, job, result));

@@ -22,14 +22,6 @@ struct ViewOptions {
   std::string output;
 };
 
-/// sphere.html for maps/sphere.g2o.gz, in the folder where the program runs.
-std::string default_page(const std::string& file) {
-  if (file == "-" || file.starts_with('@')) return "cairn.html";
-  std::filesystem::path name = std::filesystem::path(file).filename();
-  if (name.extension() == ".gz") name.replace_extension();
-  return name.replace_extension(".html").string();
-}
-
 /// Only pages of cairn are overwritten without having been named.
 void check_default(const std::string& page) {
   std::error_code error;
@@ -71,7 +63,7 @@ boost::json::object report_json(const Album& album, const std::string& page, std
 int run(const ViewOptions& options, Session& session) {
   std::string page = options.output;
   if (page.empty()) {
-    page = default_page(options.album.files.front());
+    page = default_picture(options.album.files.front(), "html");
     check_default(page);
   }
   if (page == "-") session.write_file_to_stdout();

@@ -109,7 +109,7 @@ void Draft::finish_factor(std::span<const double> as_in_file) {
     if (repair_misplaced_entries(copy)) {
       advice +=
           "; moving its (z, rx) and (z, ry) entries to (x, rz) and (y, rz) would make it so: "
-          "--repair-information";
+          "ReadOptions::repair_information";
     }
   }
   fail(factor.line,

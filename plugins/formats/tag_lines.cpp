@@ -23,10 +23,10 @@ void unknown_tag(const Scanner& scanner, Draft& draft, const ReadOptions& option
   std::string offered;
   for (const std::string& tag : on_offer) offered += (offered.empty() ? "" : ", ") + tag;
   const std::string nearest = nearest_spelling(scanner.tag(), on_offer);
-  scanner.fail(
-      fmt::format("unknown tag '{}'{}; on offer: {} (--skip-unknown leaves such lines out)",
-                  shown(scanner.tag()),
-                  nearest.empty() ? "" : fmt::format("; did you mean '{}'?", nearest), offered));
+  scanner.fail(fmt::format(
+      "unknown tag '{}'{}; on offer: {} (ReadOptions::skip_unknown leaves such lines out)",
+      shown(scanner.tag()), nearest.empty() ? "" : fmt::format("; did you mean '{}'?", nearest),
+      offered));
 }
 
 Draft::FactorSlots read_factor(Scanner& scanner, Draft& draft, std::int32_t kind) {

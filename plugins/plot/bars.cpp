@@ -62,7 +62,7 @@ void draw_graph(Canvas& canvas, const Theme& theme, const Box& box, const BenchG
 
 void draw_bars(Canvas& canvas, const Theme& theme, const Album& album) {
   if (album.bench.empty()) {
-    throw Error(ErrorCode::input, "no comparison to draw: give the file of cairn bench --json");
+    throw Error(ErrorCode::input, "no comparison to draw: give the JSON that cairn bench writes");
   }
   const std::vector<BenchGraph> graphs = read_bench(album.bench);
   const std::vector<Box> boxes = panels(canvas, graphs.size(), 1);

@@ -35,9 +35,12 @@ const json::array& list(const json::value& value, const char* name) {
 
 BenchConfiguration read_configuration(const json::value& value) {
   BenchConfiguration c;
-  c.name = text(value, "optimizer");
-  const std::string solver = text(value, "linear_solver");
-  if (!solver.empty() && solver != "-") c.name += ", " + solver;
+  c.name = text(value, "label");
+  if (c.name.empty()) {  // reports of earlier versions
+    c.name = text(value, "optimizer");
+    const std::string solver = text(value, "linear_solver");
+    if (!solver.empty() && solver != "-") c.name += ", " + solver;
+  }
   if (const json::value* seconds = member(value, "seconds")) {
     c.median = number(*seconds, "median");
     c.low = number(*seconds, "min");
@@ -67,7 +70,8 @@ std::vector<BenchGraph> read_bench(std::string_view bench) {
   for (const json::value& value : list(report, "graphs")) {
     BenchGraph graph;
     if (const json::value* about = member(value, "graph")) {
-      graph.name = text(*about, "file");
+      graph.name = text(*about, "name");
+      if (graph.name.empty()) graph.name = text(*about, "file");
       graph.variables = number(*about, "variables");
     }
     for (const json::value& c : list(value, "configurations")) {

@@ -4,30 +4,13 @@
 #include <string>
 #include <vector>
 
+#include "axis.hpp"
 #include "canvas.hpp"
 
 namespace cairn::plot {
 
 inline constexpr double kTitleSize = 14;
 inline constexpr double kTextSize = 11;
-
-/// An interval of numbers on an axis.
-struct Range {
-  double low = 0, high = 1;
-  bool logarithmic = false;
-
-  /// 0 at low, 1 at high.
-  double part(double value) const;
-  /// Places for grid lines, about `count` of them: 1, 2 or 5 times a power of ten.
-  std::vector<double> ticks(int count) const;
-};
-
-/// A range that holds all values that can be shown (finite; positive if logarithmic), with a little
-/// room round them.
-Range range_of(const std::vector<double>& values, bool logarithmic);
-
-/// "1200", "0.05", "1e-7"
-std::string tick_text(double value);
 
 /// A name, and how it is drawn.
 struct LegendEntry {

@@ -11,6 +11,8 @@
 namespace cairn::plot {
 namespace {
 
+constexpr const char* kIteration = "iteration";
+
 /// One run: chi2 after iterations 0, 1, … and the seconds of iterations 1, 2, …
 struct Curve {
   std::string name;
@@ -55,8 +57,8 @@ std::vector<CurveGroup> needed_curves(const Album& album) {
   std::vector<CurveGroup> groups = curves_of(album);
   if (groups.empty()) {
     throw Error(ErrorCode::input,
-                "no run to draw: give the file of cairn optimize --json or --record, or of cairn "
-                "bench --json");
+                "no run to draw: give a recording, or the JSON that cairn optimize or cairn bench "
+                "writes");
   }
   return groups;
 }
@@ -86,7 +88,9 @@ void draw_lines(Canvas& canvas, const Theme& theme, const Box& box, const CurveG
     ys.insert(ys.end(), line.y.begin(), line.y.end());
   }
   const Box rest = draw_heading(canvas, theme, box, title, legend_of(theme, group));
-  const Chart chart(canvas, theme, rest, range_of(xs, false), range_of(ys, true), x_label, y_label);
+  Range x = range_of(xs, false);
+  x.whole = x_label == kIteration;
+  const Chart chart(canvas, theme, rest, x, range_of(ys, true), x_label, y_label);
   for (std::size_t k = 0; k < lines.size(); ++k) {
     const Points& line = lines[k];
     bool open = false;
@@ -136,7 +140,7 @@ void draw_convergence(Canvas& canvas, const Theme& theme, const Album& album, bo
     std::vector<Points> lines;
     for (const Curve& curve : groups[g].curves) lines.push_back(convergence(curve, against_time));
     draw_lines(canvas, theme, boxes[g], groups[g], lines, groups[g].name + ": convergence",
-               against_time ? "time [s]" : "iteration", "χ² (logarithmic)");
+               against_time ? "time [s]" : kIteration, "χ² (logarithmic)");
   }
 }
 
@@ -147,7 +151,7 @@ void draw_steps(Canvas& canvas, const Theme& theme, const Album& album) {
     std::vector<Points> lines;
     for (const Curve& curve : groups[g].curves) lines.push_back(steps(curve));
     draw_lines(canvas, theme, boxes[g], groups[g], lines, groups[g].name + ": time of each step",
-               "iteration", "time [ms] (logarithmic)");
+               kIteration, "time [ms] (logarithmic)");
   }
 }
 

@@ -14,10 +14,12 @@
 namespace cairn::plot {
 namespace {
 
+constexpr double kMebibyte = 1024.0 * 1024.0;
+
 /// One solver over all graphs that it ran on.
 struct Line {
   std::string name;
-  std::vector<std::pair<double, double>> seconds, megabytes;  ///< against the number of variables
+  std::vector<std::pair<double, double>> seconds, mebibytes;  ///< against the number of variables
 };
 
 std::vector<Line> lines_of(const std::vector<BenchGraph>& graphs) {
@@ -29,12 +31,12 @@ std::vector<Line> lines_of(const std::vector<BenchGraph>& graphs) {
                                [&](const Line& known) { return known.name == c.name; });
       if (line == lines.end()) line = lines.insert(line, Line{c.name, {}, {}});
       line->seconds.emplace_back(graph.variables, c.median);
-      if (c.memory > 0) line->megabytes.emplace_back(graph.variables, 1e-6 * c.memory);
+      if (c.memory > 0) line->mebibytes.emplace_back(graph.variables, c.memory / kMebibyte);
     }
   }
   for (Line& line : lines) {
     std::sort(line.seconds.begin(), line.seconds.end());
-    std::sort(line.megabytes.begin(), line.megabytes.end());
+    std::sort(line.mebibytes.begin(), line.mebibytes.end());
   }
   return lines;
 }
@@ -75,12 +77,12 @@ void draw_panel(Canvas& canvas, const Theme& theme, const Box& box, const std::v
 
 void draw_scaling(Canvas& canvas, const Theme& theme, const Album& album) {
   if (album.bench.empty()) {
-    throw Error(ErrorCode::input, "no comparison to draw: give the file of cairn bench --json");
+    throw Error(ErrorCode::input, "no comparison to draw: give the JSON that cairn bench writes");
   }
   const std::vector<Line> lines = lines_of(read_bench(album.bench));
   const std::vector<Box> boxes = panels(canvas, 2, 2);
   draw_panel(canvas, theme, boxes[0], lines, &Line::seconds, "Time of optimisation", "time [s]");
-  draw_panel(canvas, theme, boxes[1], lines, &Line::megabytes, "Peak memory", "peak memory [MB]");
+  draw_panel(canvas, theme, boxes[1], lines, &Line::mebibytes, "Peak memory", "peak memory [MiB]");
 }
 
 }  // namespace cairn::plot

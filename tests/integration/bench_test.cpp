@@ -4,14 +4,21 @@
 
 #include <algorithm>
 #include <csignal>
+#include <filesystem>
 
+#include "cairn/linear/iterative_solver.hpp"
+#include "cairn/linear/linear_solver.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "integration/process.hpp"
 
 namespace cairn::test {
 namespace {
 
+using ::testing::Contains;
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::StartsWith;
+using ::testing::UnorderedElementsAreArray;
 
 TEST(BenchCommand, ReportsTheProductOfOptimizersAndLinearSolvers) {
   const TemporaryFolder folder;
@@ -81,12 +88,145 @@ TEST(BenchCommand, EveryRunStartsFromTheSameFirstEstimate) {
   }
 }
 
-TEST(BenchCommand, ByDefaultComparesAllLinearSolversWithCairnsOwn) {
-  const auto report = parse_json(
-      cairn({"bench", "@ring:poses=60", "--repeat", "1", "--json", "-", "--no-memory"}).out);
-  const auto& rows = report.at("graphs").as_array().at(0).at("configurations").as_array();
-  EXPECT_EQ(rows.size(), Registry().names("linear_solver").size());
-  EXPECT_EQ(rows[0].at("linear_solver").as_string(), "block_cholesky");
+TEST(BenchCommand, ByDefaultComparesAllDirectLinearSolversWithCairnsOwn) {
+  const Outcome outcome =
+      cairn({"bench", "@ring:poses=60", "--repeat", "1", "--json", "-", "--no-memory"});
+  const auto report = parse_json(outcome.out);
+  std::vector<std::string> direct, iterative, rows, left_out;
+  Registry registry;
+  for (const std::string& name : registry.names("linear_solver")) {
+    const auto solver = registry.make<LinearSolver>(name);
+    (query<IterativeSolver>(*solver) ? iterative : direct).push_back(name);
+  }
+  for (const auto& row : report.at("graphs").at(0).at("configurations").as_array())
+    rows.emplace_back(row.at("linear_solver").as_string());
+  for (const auto& name : report.at("left_out").as_array()) left_out.emplace_back(name.as_string());
+  EXPECT_EQ(rows.front(), "block_cholesky");
+  EXPECT_THAT(rows, UnorderedElementsAreArray(direct));
+  EXPECT_EQ(left_out, iterative);
+  for (const char* name : {"pcg", "jacobi", "gauss_seidel"}) {
+    if (!registry.has("linear_solver", name)) continue;
+    EXPECT_THAT(left_out, Contains(name));
+    EXPECT_THAT(outcome.err, HasSubstr(name));
+  }
+  EXPECT_THAT(outcome.err, HasSubstr("note: left out as iterative: "));
+}
+
+TEST(BenchCommand, AnIterativeSolverThatIsNamedIsCompared) {
+  if (!Registry().has("linear_solver", "pcg")) GTEST_SKIP();
+  const auto report = report_of({"bench", "@ring:poses=40", "--repeat", "1", "--no-memory",
+                                 "--linear-solver", "block_cholesky,pcg"});
+  EXPECT_EQ(report.at("graphs").at(0).at("configurations").as_array().size(), 2u);
+  EXPECT_TRUE(report.at("left_out").as_array().empty());
+}
+
+TEST(BenchCommand, ARunThatTakesTooLongIsStoppedAndItsRowSaysSo) {
+  const TemporaryFolder folder;
+  const Arguments run{"bench",           "@manhattan:poses=200",
+                      "--linear-solver", "eigen",
+                      "--max-seconds",   "1e-9",
+                      "--repeat",        "2",
+                      "--json",          folder.file("bench.json")};
+  const Outcome outcome = cairn(run);
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("time limit"));
+  const auto report = parse_json(read_text(folder.file("bench.json")));
+  EXPECT_EQ(report.at("max_seconds").as_double(), 1e-9);
+  const auto& row = report.at("graphs").at(0).at("configurations").at(0);
+  ASSERT_EQ(row.at("runs").as_array().size(), 2u);
+  for (const auto& one : row.at("runs").as_array()) EXPECT_TRUE(one.at("out_of_time").as_bool());
+  EXPECT_EQ(row.at("iterations").to_number<int>(), 0);
+  EXPECT_GT(row.at("peak_memory_bytes").to_number<double>(), 0.0);
+
+  const auto patient = report_of({"bench", "@ring:poses=40", "--linear-solver", "eigen",
+                                  "--max-seconds", "1000", "--repeat", "1", "--no-memory"});
+  const auto& ended = patient.at("graphs").at(0).at("configurations").at(0);
+  EXPECT_FALSE(ended.at("runs").at(0).at("out_of_time").as_bool());
+  EXPECT_EQ(ended.at("status").as_string(), "converged");
+}
+
+TEST(BenchCommand, ABrokenPluginLeavesARowThatSaysSo) {
+  const TemporaryFolder folder;
+  for (const std::string where : {"construction", "analyze", "factorize", "number"}) {
+    SCOPED_TRACE(where);
+    const Outcome outcome =
+        cairn({"bench", "@ring:poses=40", "--repeat", "2", "--no-memory", "--quiet", "--plugin",
+               CAIRN_BAD_PLUGINS "/solver_throws/fragile.so", "--linear-solver",
+               "block_cholesky,fragile:in=" + where + ",eigen", "--json", folder.file("b.json")});
+    EXPECT_EQ(outcome.exit_code, 5) << outcome.err;
+    EXPECT_THAT(outcome.out, HasSubstr("failed"));
+    EXPECT_THAT(outcome.out, HasSubstr("linear solver 'fragile"));
+    const auto report = parse_json(read_text(folder.file("b.json")));
+    const auto& rows = report.at("graphs").at(0).at("configurations").as_array();
+    ASSERT_EQ(rows.size(), 3u);
+    EXPECT_EQ(rows[0].at("runs").as_array().size(), 2u);
+    EXPECT_EQ(rows[1].at("runs").as_array().size(), 0u);
+    EXPECT_THAT(std::string(rows[1].at("error").as_string()), HasSubstr("fragile"));
+    EXPECT_EQ(rows[2].at("runs").as_array().size(), 2u);
+    EXPECT_TRUE(rows[2].at("error").is_null());
+  }
+}
+
+TEST(BenchCommand, NamesGraphsByTheirFiles) {
+  const TemporaryFolder folder;
+  for (const char* name : {"a", "b"}) {
+    std::filesystem::create_directory(folder.path() / name);
+    ASSERT_EQ(cairn({"generate", "ring:poses=30", "-o", folder.file(name) + "/ring.g2o"}).exit_code,
+              0);
+  }
+  std::filesystem::copy_file(folder.file("a/ring.g2o"), folder.file("lap.g2o"));
+  const std::string a = folder.file("a/ring.g2o"), b = folder.file("b/ring.g2o"),
+                    lap = folder.file("lap.g2o");
+  const auto names = [&](Arguments more) {
+    Arguments run{"bench",
+                  "--linear-solver",
+                  "eigen",
+                  "--repeat",
+                  "1",
+                  "--no-memory",
+                  "--quiet",
+                  "--csv",
+                  folder.file("runs.csv"),
+                  "--json",
+                  folder.file("bench.json")};
+    run.insert(run.end(), more.begin(), more.end());
+    const Outcome outcome = cairn(run);
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+    std::vector<std::string> all;
+    const auto csv = lines(read_text(folder.file("runs.csv")));
+    const auto report = parse_json(read_text(folder.file("bench.json")));
+    std::size_t line = 0;
+    for (const auto& graph : report.at("graphs").as_array()) {
+      all.emplace_back(graph.at("graph").at("name").as_string());
+      EXPECT_THAT(outcome.out, HasSubstr(all.back() + ": 30 variables"));
+      EXPECT_THAT(csv.at(++line), StartsWith(all.back() + ","));
+    }
+    EXPECT_EQ(report.at("graphs").at(0).at("graph").at("file").as_string(), more.front());
+    return all;
+  };
+  EXPECT_THAT(names({lap, a}), ElementsAre("lap.g2o", "ring.g2o"));
+  EXPECT_THAT(names({a, lap, b}), ElementsAre("a/ring.g2o", "lap.g2o", "b/ring.g2o"));
+  EXPECT_THAT(names({a, b, "--name", "first"}), ElementsAre("first", "b/ring.g2o"));
+  const Outcome many = cairn({"bench", a, "--name", "x", "--name", "y"});
+  EXPECT_EQ(many.exit_code, 2);
+  EXPECT_THAT(many.err, HasSubstr("--name is given 2 times for 1 graph"));
+}
+
+TEST(BenchCommand, LabelsLeaveOutWhatAllConfigurationsHave) {
+  const auto labels = [](const std::string& optimizers, const std::string& solvers) {
+    const auto report = report_of({"bench", "@ring:poses=30", "--repeat", "1", "--no-memory",
+                                   "--optimizer", optimizers, "--linear-solver", solvers});
+    std::vector<std::string> all;
+    for (const auto& row : report.at("graphs").at(0).at("configurations").as_array())
+      all.emplace_back(row.at("label").as_string());
+    return all;
+  };
+  EXPECT_THAT(labels("dogleg", "eigen,block_cholesky"), ElementsAre("eigen", "block_cholesky"));
+  EXPECT_THAT(labels("dogleg,gauss_newton", "eigen"), ElementsAre("dogleg", "gauss_newton"));
+  EXPECT_THAT(labels("dogleg", "eigen"), ElementsAre("dogleg, eigen"));
+  EXPECT_THAT(labels("dogleg,gauss_newton", "eigen,block_cholesky"),
+              ElementsAre("dogleg, eigen", "dogleg, block_cholesky", "gauss_newton, eigen",
+                          "gauss_newton, block_cholesky"));
 }
 
 TEST(BenchCommand, FlagsAChi2ThatIsHigherThanTheOthers) {
@@ -116,6 +256,15 @@ TEST(BenchCommand, AWrongNameIsToldBeforeAnythingRuns) {
   EXPECT_EQ(outcome.exit_code, 5);
   EXPECT_THAT(outcome.err, HasSubstr("'eigen'"));
   EXPECT_EQ(outcome.out, "");
+}
+
+TEST(BenchCommand, AnInterruptEndsTheProcessThatMeasuresMemory) {
+  // Sent to the program alone, as by a container or a script; its child would run for days.
+  const Outcome outcome = cairn_interrupted({"bench", "@ring:poses=60", "--linear-solver", "eigen",
+                                             "--iterations", "1000000000", "--tolerance", "0"},
+                                            "memory", SIGINT);
+  EXPECT_EQ(outcome.exit_code, 130) << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("not run"));
 }
 
 TEST(BenchCommand, AnInterruptReportsWhatWasMeasuredSoFar) {

@@ -41,11 +41,16 @@ TEST(ConvertCommand, NeedsAFormatWhereTheNameTellsNone) {
   EXPECT_EQ(outcome.exit_code, 2);
   EXPECT_THAT(outcome.err, HasSubstr(".g2o"));
   EXPECT_TRUE(folder.contents().empty());
-  const Outcome pipe = cairn({"convert", "@ring", "-"});
-  EXPECT_EQ(pipe.exit_code, 2);
-  EXPECT_THAT(pipe.err, HasSubstr("--to"));
+  EXPECT_THAT(outcome.err, HasSubstr("--to"));
   EXPECT_EQ(cairn({"convert", "@ring", folder.file("GRAPH.G2O")}).exit_code, 0);
   EXPECT_EQ(cairn({"convert", "@ring", folder.file("graph.docx"), "--to", "g2o"}).exit_code, 0);
+}
+
+TEST(ConvertCommand, StandardOutputIsG2oUnlessToldOtherwise) {
+  const Outcome pipe = cairn({"convert", "@ring:poses=20", "-"});
+  EXPECT_EQ(pipe.exit_code, 0) << pipe.err;
+  EXPECT_EQ(pipe.out, cairn({"convert", "@ring:poses=20", "-", "--to", "g2o"}).out);
+  EXPECT_NE(pipe.out, cairn({"convert", "@ring:poses=20", "-", "--to", "toro"}).out);
 }
 
 TEST(ConvertCommand, TheFormatOfTheInputMayBeForced) {

@@ -220,5 +220,28 @@ TEST_F(OptimizeCommand, AnInterruptEndsWithTheBestEstimateWritten) {
   }
 }
 
+TEST_F(OptimizeCommand, StopsAtALimitOfTime) {
+  const auto report = report_of({"optimize", "@manhattan:poses=200", "--max-seconds", "1e-9"});
+  EXPECT_EQ(report.at("status").as_string(), "max_iterations");
+  EXPECT_TRUE(report.at("iterations").as_array().empty());
+  const Outcome text =
+      cairn({"optimize", "@manhattan:poses=200", "--max-seconds", "1e-9", "--quiet"});
+  EXPECT_THAT(text.out, HasSubstr("stopped by the limit of 1e-09 s"));
+}
+
+TEST_F(OptimizeCommand, NamesTheGraphByItsFile) {
+  const TemporaryFolder folder;
+  const std::string file = folder.file("ring.g2o");
+  ASSERT_EQ(cairn({"generate", "ring:poses=30", "-o", file}).exit_code, 0);
+  for (const char* command : {"optimize", "info"}) {
+    const Outcome outcome = cairn({command, file, "--quiet"});
+    EXPECT_THAT(outcome.out, HasSubstr("ring.g2o"));
+    EXPECT_THAT(outcome.out, Not(HasSubstr(folder.path().string())));
+    const auto graph = report_of({command, file}).at("graph");
+    EXPECT_EQ(graph.at("name").as_string(), "ring.g2o");
+    EXPECT_EQ(graph.at("file").as_string(), file);
+  }
+}
+
 }  // namespace
 }  // namespace cairn::test

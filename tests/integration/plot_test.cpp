@@ -11,6 +11,7 @@
 namespace cairn::test {
 namespace {
 
+using ::testing::ContainsRegex;
 using ::testing::HasSubstr;
 using ::testing::Not;
 using ::testing::StartsWith;
@@ -98,6 +99,55 @@ TEST_F(PlotCommand, TheSizeIsTheOneAskedFor) {
   }
 }
 
+TEST_F(PlotCommand, WithoutANameThePictureIsCalledAsTheFirstFile) {
+  const auto in_folder = [&](const std::string& words) {
+    return run_program(
+        {"bash", "-c", "cd '" + folder_.path().string() + "' && " + program() + " plot " + words});
+  };
+  const Outcome first = in_folder("city.g2o");
+  EXPECT_EQ(first.exit_code, 0) << first.err;
+  EXPECT_THAT(first.out, StartsWith("city.svg: "));
+  const std::string picture = read_text(folder_.file("city.svg"));
+  EXPECT_THAT(picture, StartsWith("<?xml"));
+  write_text(folder_.file("city.svg"), "somebody's own");
+  const Outcome second = in_folder("city.g2o --theme dark");
+  EXPECT_EQ(second.exit_code, 2);
+  EXPECT_THAT(second.err, HasSubstr("city.svg is there already; name it, or another, with -o"));
+  EXPECT_EQ(read_text(folder_.file("city.svg")), "somebody's own");
+}
+
+TEST_F(PlotCommand, SizesAreInUnitsThatFit) {
+  const std::string file = folder_.file("small.png");
+  const Outcome outcome = cairn({"plot", graph_, "-o", file});
+  EXPECT_THAT(outcome.out, ContainsRegex("[1-9][0-9]*\\.[0-9] KiB"));
+}
+
+TEST_F(PlotCommand, AComparisonShowsNamesAndLabelsNotPaths) {
+  const std::string bench = folder_.file("bench.json");
+  run({"bench", graph_, "--linear-solver", "block_cholesky,eigen", "--repeat", "2", "--no-memory",
+       "--quiet", "--name", "city", "--json", bench});
+  const std::string text = read_text(bench);
+  const auto with = [&](const std::string& old, const std::string& other) {
+    std::string changed = text;
+    std::size_t at = 0;
+    int count = 0;
+    for (; (at = changed.find(old, at)) != std::string::npos; at += other.size(), ++count)
+      changed.replace(at, old.size(), other);
+    EXPECT_GT(count, 0) << old;
+    write_text(bench, changed);
+  };
+  for (const std::string what : {"bars", "scaling", "convergence"}) {
+    write_text(bench, text);
+    const std::string picture = plot({bench, "--what", what}, "svg");
+    with(graph_, folder_.file("elsewhere/" + std::string(60, 'x')));
+    EXPECT_EQ(plot({bench, "--what", what}, "svg"), picture) << what;
+    with("levenberg_marquardt", "dogleg");
+    EXPECT_EQ(plot({bench, "--what", what}, "svg"), picture) << what;
+    with("\"eigen\"", "\"other\"");
+    EXPECT_NE(plot({bench, "--what", what}, "svg"), picture) << what;
+  }
+}
+
 TEST_F(PlotCommand, AnyNameCanBeDrawn) {
   const std::string name = folder_.file("<script>\xff\n\x01.g2o");
   std::filesystem::copy_file(graph_, name);
@@ -107,7 +157,7 @@ TEST_F(PlotCommand, AnyNameCanBeDrawn) {
 TEST_F(PlotCommand, SaysWhatIsMissing) {
   const Outcome outcome = cairn({"plot", graph_, "--what", "bars", "-o", folder_.file("x.svg")});
   EXPECT_EQ(outcome.exit_code, 3);
-  EXPECT_THAT(outcome.err, HasSubstr("cairn bench --json"));
+  EXPECT_THAT(outcome.err, HasSubstr("the JSON that cairn bench writes"));
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cerrno>
 #include <csignal>
 #include <cstdio>
@@ -235,9 +236,11 @@ Outcome Partner::end() {
   return outcome;
 }
 
-Outcome cairn_on_terminal(const Arguments& arguments, const Environment& environment) {
+Outcome cairn_on_terminal(const Arguments& arguments, const Environment& environment, int columns) {
   int terminal = -1;
-  const pid_t child = ::forkpty(&terminal, nullptr, nullptr, nullptr);
+  winsize size{};
+  size.ws_col = static_cast<unsigned short>(columns);
+  const pid_t child = ::forkpty(&terminal, nullptr, nullptr, &size);
   if (child == 0) become(with_program(arguments), environment);
   Outcome outcome;
   char buffer[4096];
@@ -294,6 +297,27 @@ std::vector<std::string> lines(const std::string& text) {
   std::istringstream stream(text);
   for (std::string line; std::getline(stream, line);) all.push_back(line);
   return all;
+}
+
+std::string unfolded(const std::string& text) {
+  std::string words;
+  for (const char c : text) {
+    const bool blank = c == ' ' || c == '\n';
+    if (!blank || (!words.empty() && words.back() != ' ')) words += blank ? ' ' : c;
+  }
+  return words;
+}
+
+std::size_t columns(const std::string& line) {
+  std::size_t count = 0;
+  for (std::size_t k = 0; k < line.size(); ++k) {
+    if (line[k] == '\x1b') {
+      while (k < line.size() && std::isalpha(static_cast<unsigned char>(line[k])) == 0) ++k;
+    } else if (line[k] != '\r') {
+      count += (static_cast<unsigned char>(line[k]) & 0xc0) != 0x80;
+    }
+  }
+  return count;
 }
 
 boost::json::value report_of(Arguments arguments) {

@@ -64,8 +64,10 @@ class Partner {
   std::unique_ptr<Process> process_;
 };
 
-/// Runs `cairn` with standard output and error on a terminal; both arrive in `out`.
-Outcome cairn_on_terminal(const Arguments& arguments, const Environment& environment = {});
+/// Runs `cairn` with standard output and error on a terminal of so many columns (0: it does not
+/// say); both arrive in `out`.
+Outcome cairn_on_terminal(const Arguments& arguments, const Environment& environment = {},
+                          int columns = 0);
 
 /// A folder of its own for each test, removed at its end.
 class TemporaryFolder {
@@ -98,6 +100,10 @@ boost::json::value parse_json(const std::string& text);
 /// Runs `cairn` with these arguments, which must go well, and parses its report (`--json`).
 boost::json::value report_of(Arguments arguments);
 std::vector<std::string> lines(const std::string& text);
+/// The words with one blank between them, as they were before the program folded them to lines.
+std::string unfolded(const std::string& text);
+/// How many columns of a terminal a line takes: its code points, escape sequences not counted.
+std::size_t columns(const std::string& line);
 
 /// The path of the program under test.
 std::string program();

@@ -3,6 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <utility>
+
 #include "integration/process.hpp"
 
 namespace cairn::test {
@@ -15,15 +18,8 @@ using ::testing::StartsWith;
 
 constexpr int kUsage = 2, kInput = 3, kPlugin = 5;
 
-const std::vector<std::string> kCommands{"info",    "optimize", "bench",  "evaluate",
-                                         "convert", "generate", "plugins"};
-
-/// Code points, which is what a terminal shows.
-std::size_t columns(const std::string& line) {
-  std::size_t count = 0;
-  for (const char c : line) count += (static_cast<unsigned char>(c) & 0xc0) != 0x80;
-  return count;
-}
+const std::vector<std::string> kCommands{"info",     "optimize", "bench", "evaluate", "convert",
+                                         "generate", "plugins",  "view",  "plot"};
 
 void expect_fits_a_screen(const Outcome& help) {
   EXPECT_EQ(help.exit_code, 0) << help.err;
@@ -51,6 +47,17 @@ TEST(Usage, HelpFitsAScreenAndShowsAnExample) {
   }
 }
 
+TEST(Usage, HelpIsACommandToo) {
+  EXPECT_EQ(cairn({"help"}).out, cairn({"--help"}).out);
+  for (const std::string& command : kCommands) {
+    const Outcome outcome = cairn({"help", command});
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+    EXPECT_EQ(outcome.out, cairn({command, "--help"}).out);
+  }
+  expect_fits_a_screen(cairn({"help", "help"}));
+  expect_error(cairn({"help", "optimise"}), kUsage, "did you mean 'optimize'?");
+}
+
 TEST(Usage, WithoutACommandTheHelpGoesToStandardError) {
   const Outcome outcome = cairn({});
   EXPECT_EQ(outcome.exit_code, kUsage);
@@ -76,9 +83,19 @@ TEST(Usage, AnUnknownOptionIsAnsweredWithTheNearest) {
 }
 
 TEST(Usage, MissingAndSurplusAndMalformedArgumentsAreRefused) {
-  expect_error(cairn({"optimize"}), kUsage, "graph is required");
+  expect_error(cairn({"optimize"}), kUsage,
+               "GRAPH is missing; usage: cairn optimize [OPTIONS] GRAPH");
+  expect_error(cairn({"bench"}), kUsage, "usage: cairn bench [OPTIONS] GRAPH...");
+  expect_error(cairn({"generate", "ring"}), kUsage,
+               "--output OUT is missing; usage: cairn generate [OPTIONS] KIND[:k=v] -o OUT");
   expect_error(cairn({"info", "a.g2o", "b.g2o"}), kUsage, "'b.g2o' is one argument too many");
-  expect_error(cairn({"optimize", "@ring", "--iterations", "many"}), kUsage, "many");
+  expect_error(cairn({"optimize", "@ring", "--iterations", "many"}), kUsage,
+               "--iterations: 'many' is no whole number from 0 to 1000000000");
+  expect_error(cairn({"generate", "ring", "-o", "x.g2o", "--seed", "abc"}), kUsage,
+               "--seed: 'abc' is no whole number from 0");
+  expect_error(cairn({"optimize", "@ring", "--covariance", "all"}), kUsage,
+               "--covariance: 'all' is none of blocks, none");
+  expect_error(cairn({"optimize", "@ring", "--json"}), kUsage, "--json needs a value: --json FILE");
   expect_error(cairn({"optimize", "@ring", "--iterations=-1"}), kUsage, "-1");
   expect_error(cairn({"optimize", "@ring", "--tolerance", "2"}), kUsage, "--tolerance");
   expect_error(cairn({"optimize", "@ring", "--threads", "100000"}), kUsage, "--threads");
@@ -195,6 +212,94 @@ TEST(Usage, ColoursOnlyOnATerminalThatWantsThem) {
               Not(HasSubstr("\x1b")));
   EXPECT_THAT(cairn_on_terminal({"plugins"}, {{"TERM", "dumb"}}).out, Not(HasSubstr("\x1b[1m")));
   EXPECT_THAT(cairn({"plugins"}, {{"TERM", "xterm"}}).out, Not(HasSubstr("\x1b")));
+}
+
+TEST(Usage, ProgressNeverWrapsOnATerminal) {
+  const TemporaryFolder folder;
+  const std::string graph = folder.file(std::string(100, 'x') + ".g2o");
+  ASSERT_EQ(cairn({"generate", "ring:poses=40", "-o", graph}).exit_code, 0);
+  for (const auto& [told, width] : std::vector<std::pair<int, std::size_t>>{{60, 60}, {0, 80}}) {
+    const Outcome bench = cairn_on_terminal(
+        {"bench", graph, "--repeat", "2", "--linear-solver", "eigen", "--json", "-"},
+        {{"TERM", "xterm"}}, told);
+    std::size_t longest = 0;
+    for (std::size_t begin = 0; (begin = bench.out.find('\r', begin)) != std::string::npos;) {
+      const std::size_t end = bench.out.find_first_of("\r\n", ++begin);
+      longest = std::max(longest, columns(bench.out.substr(begin, end - begin)));
+    }
+    EXPECT_EQ(longest, width - 1);  // the last column would wrap on some
+  }
+}
+
+TEST(Usage, TablesFitTheTerminal) {
+  for (const auto& [told, width] : std::vector<std::pair<int, std::size_t>>{{72, 72}, {0, 100}}) {
+    for (const Arguments& run : std::vector<Arguments>{
+             {"plugins"},
+             {"plugins", "incremental_cholesky"},
+             {"plugins", "schur"},
+             {"bench", "@ring:poses=40", "--repeat", "1", "--quiet", "--no-memory"},
+             {"bench", "@ring:poses=40", "--repeat", "1", "--quiet", "--no-memory", "--optimizer",
+              "levenberg_marquardt:initial_lambda=1e-7,dogleg"},
+             {"info", "@bundle"},
+             {"marginals", "@sphere:turns=2", "--quiet"}}) {
+      const Outcome outcome = cairn_on_terminal(run, {}, told);
+      EXPECT_EQ(outcome.exit_code, 0);
+      for (const std::string& line : lines(outcome.out)) {
+        if (line.find(".so") != std::string::npos) continue;  // a path stays whole, to be copied
+        EXPECT_LE(columns(line), width) << line;
+      }
+    }
+  }
+}
+
+TEST(Usage, PipesNeedNoNameOfAFormat) {
+  const std::string cairn_ = program();
+  const Outcome outcome =
+      run_program({"bash", "-c",
+                   cairn_ + " generate ring:poses=50 -o - | " + cairn_ + " optimize - -o - | " +
+                       cairn_ + " convert - - | " + cairn_ + " info - --json -"});
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  const auto report = parse_json(outcome.out);
+  EXPECT_EQ(report.at("graph").at("variables").as_int64(), 50);
+  EXPECT_EQ(report.at("graph").at("file").as_string(), "-");
+  EXPECT_EQ(report.at("graph").at("name").as_string(), "standard input");
+  EXPECT_EQ(report.at("format").as_string(), "g2o");
+}
+
+TEST(Usage, AnExceptionInAPluginNamesThePluginsPart) {
+  const TemporaryFolder folder;
+  const std::string solver = CAIRN_BAD_PLUGINS "/solver_throws/fragile.so";
+  const auto with = [&](const std::string& where) {
+    return cairn({"optimize", "@ring:poses=30", "--quiet", "--plugin", solver, "--linear-solver",
+                  "fragile:in=" + where});
+  };
+  expect_error(with("construction"), kPlugin, "linear solver 'fragile' failed: the solver broke");
+  for (const char* where : {"analyze", "factorize"}) {
+    const Outcome outcome = with(where);
+    expect_error(outcome, kPlugin, std::string("failed: the solver broke in ") + where);
+    EXPECT_THAT(outcome.err, HasSubstr("with linear solver 'fragile:in="));
+  }
+  expect_error(with("number"), kPlugin, "threw what is no std::exception");
+  expect_error(cairn({"marginals", "@ring:poses=30", "--quiet", "--plugin", solver, "--optimizer",
+                      "dogleg:linear_solver=fragile"}),
+               kPlugin, "optimizer 'dogleg:linear_solver=fragile' failed: the solver broke");
+
+  write_text(folder.file("brittle.g2o"),
+             "VERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 1 0 0\nEDGE_SE2 0 1 1 0 0 1 0 0 1 0 1\n"
+             "EDGE_BRITTLE 1 7 1\n");
+  const std::string factor = CAIRN_BAD_PLUGINS "/factor_throws/brittle.so";
+  for (const char* command : {"info", "optimize"}) {
+    expect_error(cairn({command, folder.file("brittle.g2o"), "--plugin", factor, "--quiet"}),
+                 kPlugin, "factor 'EDGE_BRITTLE' failed: the measurement is out of my range");
+  }
+}
+
+TEST(Usage, MessagesOfLibrariesNameTheOptionsOfTheProgram) {
+  const TemporaryFolder folder;
+  write_text(folder.file("odd.g2o"), "VERTEX_SE2 0 0 0 0\nEDGE_ODD 0 1\n");
+  const Outcome outcome = cairn({"info", folder.file("odd.g2o")});
+  expect_error(outcome, kInput, "--skip-unknown leaves such lines out");
+  EXPECT_THAT(outcome.err, Not(HasSubstr("ReadOptions")));
 }
 
 TEST(Usage, ProgressIsOneLineOnATerminalAndPlainLinesElsewhere) {

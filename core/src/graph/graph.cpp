@@ -11,6 +11,7 @@
 #include "cairn/graph/packed.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/threads.hpp"
+#include "graph/factor_call.hpp"
 
 namespace cairn {
 namespace {
@@ -592,7 +593,8 @@ std::vector<double> squared_norms(const Graph& graph) {
     const FactorView view = graph.view(static_cast<int>(p), graph.values(), states);
     norms.resize(pool.size());
     for_each_range(pool.size(), 512, [&](std::size_t begin, std::size_t end) {
-      pool.type->squared_norms(view, begin, end, norms.data() + begin);
+      call_factor(*pool.type,
+                  [&] { pool.type->squared_norms(view, begin, end, norms.data() + begin); });
     });
     for (std::size_t k = 0; k < pool.size(); ++k) result[pool.sequence[k]] = norms[k];
   }

@@ -10,6 +10,7 @@
 
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
+#include "cairn/runtime/plugin_call.hpp"
 #include "cairn/runtime/spelling.hpp"
 
 namespace cairn {
@@ -147,7 +148,9 @@ Graph read_graph(const std::filesystem::path& file, Registry& registry, const Re
                 fmt::format("{}: format '{}' only writes", file.string(), reader.name));
   }
   report.format = reader.name;
-  return reader.format->read(text, file.string(), registry, options, report);
+  return call_plugin(
+      [&] { return fmt::format("{}: format '{}'", file.string(), reader.name); },
+      [&] { return reader.format->read(text, file.string(), registry, options, report); });
 }
 
 Graph read_graph(const std::filesystem::path& file, Registry& registry) {
@@ -164,7 +167,8 @@ void write_graph(const Graph& graph, const std::filesystem::path& file, Registry
     throw Error(ErrorCode::usage,
                 fmt::format("{}: format '{}' only reads", file.string(), writer.name));
   }
-  write_file(file, writer.format->write(graph));
+  write_file(file, call_plugin([&] { return fmt::format("format '{}'", writer.name); },
+                               [&] { return writer.format->write(graph); }));
 }
 
 }  // namespace cairn

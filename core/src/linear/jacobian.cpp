@@ -9,6 +9,7 @@
 
 #include "cairn/runtime/threads.hpp"
 #include "cairn/types/loss.hpp"
+#include "graph/factor_call.hpp"
 
 namespace cairn {
 namespace {
@@ -148,10 +149,12 @@ struct JacobianEvaluator::Plan {
       const std::int64_t target = targets[p][f * arity + a];
       jacobians[a] = target < 0 ? nullptr : J.values().data() + target;
     }
-    type.evaluate(
-        states.data(), view.measurements + f * static_cast<std::size_t>(type.measurement_size()),
-        view.sqrt_information + f * (n * (n + 1) / 2),
-        J.residual().data() + structure.row_offsets()[pool.sequence[f]], jacobians.data());
+    call_factor(type, [&] {
+      type.evaluate(
+          states.data(), view.measurements + f * static_cast<std::size_t>(type.measurement_size()),
+          view.sqrt_information + f * (n * (n + 1) / 2),
+          J.residual().data() + structure.row_offsets()[pool.sequence[f]], jacobians.data());
+    });
   }
 
   /// Scales the rows of factors [begin, end) of a pool by the square root of their weight.

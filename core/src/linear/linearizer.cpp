@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "cairn/runtime/threads.hpp"
+#include "graph/factor_call.hpp"
 
 namespace cairn {
 namespace {
@@ -270,8 +271,9 @@ double Linearizer::chi2(const Values& values) {
     const Plan::Chunk& chunk = plan.chunks[c];
     double norms[kFactorChunk];
     const std::span<double> used(norms, chunk.end - chunk.begin);
-    plan.graph->factor_pools()[chunk.pool].type->squared_norms(plan.views[chunk.pool], chunk.begin,
-                                                               chunk.end, norms);
+    const FactorType& type = *plan.graph->factor_pools()[chunk.pool].type;
+    call_factor(type,
+                [&] { type.squared_norms(plan.views[chunk.pool], chunk.begin, chunk.end, norms); });
     plan.partial[c] = plan.apply_loss(chunk, used, {});
   });
   return std::accumulate(plan.partial.begin(), plan.partial.end(), 0.0);
@@ -301,11 +303,13 @@ double Linearizer::linearize(const Values& values, BlockMatrix& H, std::span<dou
     double norms[kFactorChunk], weights[kFactorChunk];
     const std::size_t count = chunk.end - chunk.begin;
     if (plan.has_loss(chunk)) {
-      type.squared_norms(view, chunk.begin, chunk.end, norms);
+      call_factor(type, [&] { type.squared_norms(view, chunk.begin, chunk.end, norms); });
       plan.partial[c] = plan.apply_loss(chunk, {norms, count}, {weights, count});
-      type.linearize(view, chunk.begin, chunk.end, weights, sink, nullptr);
+      call_factor(type,
+                  [&] { type.linearize(view, chunk.begin, chunk.end, weights, sink, nullptr); });
     } else {
-      type.linearize(view, chunk.begin, chunk.end, nullptr, sink, norms);
+      call_factor(type,
+                  [&] { type.linearize(view, chunk.begin, chunk.end, nullptr, sink, norms); });
       plan.partial[c] = std::accumulate(norms, norms + count, 0.0);
     }
   });

@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 
 #include "cairn/runtime/error.hpp"
+#include "cairn/runtime/plugin_call.hpp"
 #include "cairn/runtime/spelling.hpp"
 #include "plugin_loader.hpp"
 
@@ -370,7 +371,9 @@ std::unique_ptr<Component> Registry::make_component(std::string_view kind,
   Impl::Plugin& plugin = impl_->load(kind, spec.name);
   const auto& component = plugin.target.components.at(Key(kind, spec.name));
   const Options options(component.table, spec.values, spec.name);
-  std::unique_ptr<Component> made = component.factory(options, *this);
+  std::unique_ptr<Component> made = call_plugin(
+      [&] { return plugin.sidecar.library.string() + ": " + in_words(kind, spec.name); },
+      [&] { return component.factory(options, *this); });
   if (!made) {
     throw plugin_error(fmt::format("{}: the plugin made nothing for {}", origin(plugin.sidecar),
                                    in_words(kind, spec.name)));

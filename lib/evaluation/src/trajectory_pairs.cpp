@@ -81,12 +81,12 @@ std::string diagnosis(const Trajectory& estimate, const Trajectory& truth, doubl
       theirs.first, theirs.last);
   if (ours.last < theirs.first || theirs.last < ours.first) {
     const double microseconds = std::round(1e6 * (offset + theirs.first - ours.first));
-    return fmt::format("{}; --offset {:.15g} would let both begin together", found,
+    return fmt::format("{}; StampMatching::offset {:.15g} would let both begin together", found,
                        1e-6 * microseconds);
   }
   return fmt::format(
-      "{}, and the nearest two are {:.6g} s apart; allow more with --max-time-difference, or shift "
-      "those of the estimate with --offset",
+      "{}, and the nearest two are {:.6g} s apart; allow more with StampMatching::max_difference, "
+      "or shift those of the estimate with StampMatching::offset",
       found, nearest);
 }
 

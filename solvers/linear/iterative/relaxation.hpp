@@ -4,10 +4,12 @@
 #include <cstdint>
 #include <span>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
 #include "cairn/linear/block_matrix.hpp"
+#include "cairn/linear/iterative_solver.hpp"
 #include "cairn/linear/linear_solver.hpp"
 #include "cairn/plugin/option_fields.hpp"
 #include "iterative/block_rows.hpp"
@@ -38,12 +40,16 @@ struct RelaxationOptions {
 /// detects divergence. The best x is returned in any case, and the note reports how the solves
 /// ended. A failed factorisation is a diagonal block that is not positive definite; an H that is
 /// indefinite beyond that shows as divergence.
-class Relaxation : public LinearSolver {
+class Relaxation : public LinearSolver, public IterativeSolver {
  public:
   void analyze(const BlockStructure& structure) final;
   Factorization factorize(const BlockMatrix& H) final;
   void solve(std::span<const double> g, std::span<double> x) final;
   const LinearSolverStats& stats() const final { return stats_; }
+  double tolerance() const final { return options_.tolerance; }
+  void* ability(std::string_view name) final {
+    return name == IterativeSolver::kAbility ? static_cast<IterativeSolver*>(this) : nullptr;
+  }
 
  protected:
   Relaxation(std::string name, RelaxationOptions options);

@@ -78,6 +78,7 @@ void PcgSolver::minimize(std::span<const double> residual, std::span<double> x) 
 }
 
 void* PcgSolver::ability(std::string_view name) {
+  if (name == IterativeSolver::kAbility) return static_cast<IterativeSolver*>(this);
   const bool wanted = name == JacobianSolver::kAbility && preconditioner_->wants_factors();
   return wanted ? static_cast<JacobianSolver*>(this) : nullptr;
 }

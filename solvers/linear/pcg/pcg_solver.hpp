@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "cairn/linear/block_matrix.hpp"
+#include "cairn/linear/iterative_solver.hpp"
 #include "cairn/linear/jacobian.hpp"
 #include "cairn/linear/linear_solver.hpp"
 #include "cairn/plugin/option_fields.hpp"
@@ -64,7 +65,7 @@ struct PcgOptions {
 ///
 /// With a preconditioner that needs the factors it has the ability `JacobianSolver`, and forms H
 /// from J by itself.
-class PcgSolver final : public LinearSolver, public JacobianSolver {
+class PcgSolver final : public LinearSolver, public IterativeSolver, public JacobianSolver {
  public:
   PcgSolver(std::unique_ptr<Preconditioner> preconditioner, const PcgOptions& options);
 
@@ -72,6 +73,7 @@ class PcgSolver final : public LinearSolver, public JacobianSolver {
   Factorization factorize(const BlockMatrix& H) override;
   void solve(std::span<const double> g, std::span<double> x) override;
   const LinearSolverStats& stats() const override { return stats_; }
+  double tolerance() const override { return options_.tolerance; }
 
   void analyze(const JacobianStructure& structure) override;
   Factorization factorize(const JacobianMatrix& J, std::span<const double> damping) override;

@@ -6,6 +6,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "cairn/linear/iterative_solver.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/threads.hpp"
 
@@ -255,6 +256,7 @@ void* SchurSolver::ability(std::string_view name) {
   if (name == ManyRightHandSides::kAbility && inner_many_)
     return static_cast<ManyRightHandSides*>(this);
   // Exact where the inner solver is.
+  if (name == IterativeSolver::kAbility) return query<IterativeSolver>(*inner_);
   if (name == Marginals::kAbility && query<Marginals>(*inner_))
     return static_cast<Marginals*>(&marginals_);
   return nullptr;

@@ -159,19 +159,20 @@ TEST(PairByStamp, AgreesWithTheRuleAppliedToAllPairs) {
 }
 
 TEST(PairByStamp, SaysWhatWouldHelpWhereTooLittleMatches) {
-  EXPECT_THAT(refusal(at({0.5, 9.5}), at({1000.25, 1010.5}), {}),
-              AllOf(HasSubstr("of 2 estimated and 2 true poses only 0 match within 0.01 s"),
-                    HasSubstr("estimate go from 0.5 to 9.5 s"),
-                    HasSubstr("truth from 1000.25 to 1010.5 s"), HasSubstr("--offset 999.75 ")));
+  EXPECT_THAT(
+      refusal(at({0.5, 9.5}), at({1000.25, 1010.5}), {}),
+      AllOf(HasSubstr("of 2 estimated and 2 true poses only 0 match within 0.01 s"),
+            HasSubstr("estimate go from 0.5 to 9.5 s"), HasSubstr("truth from 1000.25 to 1010.5 s"),
+            HasSubstr("StampMatching::offset 999.75 ")));
   // The offset that was given already is part of what is advised.
   EXPECT_THAT(refusal(at({0.5, 9.5}), at({1000.25, 1010.5}), {.offset = 100}),
               AllOf(HasSubstr("shifted by 100 s, go from 100.5 to 109.5 s"),
-                    HasSubstr("--offset 999.75 ")));
+                    HasSubstr("StampMatching::offset 999.75 ")));
   EXPECT_THAT(refusal(at({0.5, 1.5, 2.5}), at({0.25, 1.25, 2.5}), {}),
-              AllOf(HasSubstr("only 1 match"), HasSubstr("--max-time-difference")));
+              AllOf(HasSubstr("only 1 match"), HasSubstr("StampMatching::max_difference")));
   EXPECT_THAT(refusal(at({0.5, 1.5}), at({1, 2}), {}), HasSubstr("nearest two are 0.5 s apart"));
   EXPECT_THAT(refusal(at({}), at({1, 2}), {}),
-              AllOf(HasSubstr("of 0 estimated"), Not(HasSubstr("--offset"))));
+              AllOf(HasSubstr("of 0 estimated"), Not(HasSubstr("StampMatching::offset"))));
 }
 
 TEST(StampsTellMore, WhereBothHaveThemAndTheyAreNotTheIds) {

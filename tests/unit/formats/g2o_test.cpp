@@ -182,7 +182,8 @@ TEST(G2o, RepairsMisplacedInformationOnlyWhenAsked) {
   EXPECT_THAT(
       refusal("g2o", spatial_edge(kMisplaced)),
       HasSubstr("file:3: the information of EDGE_SE3:QUAT 0 1 is not positive semidefinite"));
-  EXPECT_THAT(refusal("g2o", spatial_edge(kMisplaced)), HasSubstr("--repair-information"));
+  EXPECT_THAT(refusal("g2o", spatial_edge(kMisplaced)),
+              HasSubstr("ReadOptions::repair_information"));
   const Reading r = read("g2o", spatial_edge(kMisplaced), {.repair_information = true});
   EXPECT_EQ(r.report.repaired, 1);
   EXPECT_THAT(r.information(0), ElementsAre(1000, 0, 0, 0, 0, 20, 1000, 0, 0, 0, 30, 10, 0, 0, 0,

@@ -7,6 +7,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 
+#include "cairn/linear/iterative_solver.hpp"
 #include "cairn/linear/linear_solver.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/threads.hpp"
@@ -122,6 +123,18 @@ INSTANTIATE_TEST_SUITE_P(Each, IterativeSolverTest,
                            return name.substr(
                                name.find('=') == std::string::npos ? 0 : name.find('=') + 1);
                          });
+
+TEST_P(IterativeSolverTest, SaysThatItIsIterativeAndToWhichTolerance) {
+  Registry registry;
+  const auto solver = registry.make<LinearSolver>(with("tolerance=1e-5"));
+  const auto* iterative = query<IterativeSolver>(*solver);
+  ASSERT_TRUE(iterative);
+  EXPECT_EQ(iterative->tolerance(), 1e-5);
+  if (!registry.has("linear_solver", "schur")) return;
+  if (GetParam().find(':') != std::string::npos) return;  // options of an option cannot be written
+  const auto schur = registry.make<LinearSolver>("schur:linear_solver=" + GetParam());
+  EXPECT_TRUE(query<IterativeSolver>(*schur)) << "exact where its inner solver is";
+}
 
 TEST_P(IterativeSolverTest, ReachesWhicheverToleranceIsAsked) {
   const BlockStructure structure = sample_structures()[9].structure;  // a grid

@@ -133,7 +133,7 @@ export interface ConfigurationJson {
   solver?: { ordering?: string; factor_nonzeros?: number; factor_flops?: number; note?: string };
   notes?: string[];
   peak_memory_bytes?: number | null;
-  runs?: { status?: string; seconds?: SecondsJson }[];
+  runs?: { status?: string; out_of_time?: boolean; seconds?: SecondsJson }[];
   history?: IterationJson[];
 }
 
@@ -159,7 +159,7 @@ export interface BenchJson {
   machine?: Machine;
   build?: Build;
   graphs: {
-    graph: { file: string; variables?: number; factors?: number; residual_size?: number; tangent_size?: number };
+    graph: { file: string; name?: string; variables?: number; factors?: number; residual_size?: number; tangent_size?: number };
     configurations: ConfigurationJson[];
   }[];
 }

@@ -4,7 +4,7 @@ import type { BenchJson, ConfigurationJson } from "../data/contract";
 import { barChart, type Bar } from "./bars";
 import { lineChart } from "./chart";
 import { el, freshId } from "./dom";
-import { bytes, count, kNone, number, plural, seconds, shortNames } from "./format";
+import { bytes, count, graphNames, kNone, number, plural, seconds } from "./format";
 import { statusText } from "./runs";
 import { chi2Line } from "./series";
 import { table, type Cell } from "./table";
@@ -41,7 +41,7 @@ function graphTable(title: string, all: ConfigurationJson[]): HTMLElement {
       count(c.iterations), number(c.chi2?.final, 8), agreement(c),
       count(c.solver?.factor_nonzeros || null), bytes(c.peak_memory_bytes),
       failed ? { text: c.error ? "failed" : "not run", class: "notable", about: c.error ?? "" }
-        : { text: statusText(c.status), class: c.status === "converged" ? "" : "notable" },
+        : { text: c.runs?.some((run) => run.out_of_time) ? "time limit" : statusText(c.status), class: c.status === "converged" ? "" : "notable" },
     ];
   });
   return table(title, [
@@ -115,7 +115,7 @@ function overview(bench: BenchJson): HTMLElement | null {
   for (const { configurations } of bench.graphs) {
     for (const name of fullNames(configurations)) if (!names.includes(name)) names.push(name);
   }
-  const titles = shortNames(bench.graphs.map(({ graph }) => graph.file));
+  const titles = graphNames(bench.graphs.map(({ graph }) => graph));
   const rows = bench.graphs.map(({ graph, configurations }, g): Cell[] => {
     const own = fullNames(configurations);
     const fastest = Math.min(...configurations.map((c) => (isNumber(c.ratio) ? c.ratio : Infinity)));
@@ -138,7 +138,7 @@ function fullNames(all: ConfigurationJson[]): string[] {
 
 export function benchView(bench: BenchJson): HTMLElement {
   const { machine, build } = bench;
-  const titles = shortNames(bench.graphs.map(({ graph }) => graph.file));
+  const titles = graphNames(bench.graphs.map(({ graph }) => graph));
   const facts: [string, string][] = [
     ["machine", [machine?.cpu, isNumber(machine?.cores) ? plural(machine.cores, "core") : ""].filter(Boolean).join(", ")],
     ["build", ["cairn " + (bench.cairn ?? ""), build?.compiler, build?.flags, build?.simd].filter(Boolean).join(", ")],

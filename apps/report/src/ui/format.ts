@@ -61,6 +61,12 @@ export function shortNames(files: string[]): string[] {
   return new Set(names).size === new Set(files).size ? names : files;
 }
 
+/** What to call each graph of a report: the name that it gives, else that of the file. */
+export function graphNames(graphs: { file: string; name?: string }[]): string[] {
+  const files = shortNames(graphs.map(({ file }) => file));
+  return graphs.map(({ name }, k) => name || files[k]);
+}
+
 export function plural(n: number, one: string, many = `${one}s`): string {
   return `${count(n)} ${n === 1 ? one : many}`;
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 import { describe, expect, test } from "vitest";
-import { bytes, count, logLabel, number, seconds, shortNames } from "../../src/ui/format";
+import { bytes, count, graphNames, logLabel, number, seconds, shortNames } from "../../src/ui/format";
 import { chi2Line, elapsed } from "../../src/ui/series";
 
 describe("numbers as people read them", () => {
@@ -19,6 +19,10 @@ describe("numbers as people read them", () => {
 test("files are called by their names alone where these differ", () => {
   expect(shortNames(["/a/b/x.g2o", "c/y.g2o", "@torus"])).toEqual(["x.g2o", "y.g2o", "@torus"]);
   expect(shortNames(["a/x.g2o", "b/x.g2o"])).toEqual(["a/x.g2o", "b/x.g2o"]);
+});
+
+test("graphs are called by the name that a report gives, else by their files", () => {
+  expect(graphNames([{ file: "/a/x.g2o", name: "city" }, { file: "/b/y.g2o" }])).toEqual(["city", "y.g2o"]);
 });
 
 describe("iterations", () => {

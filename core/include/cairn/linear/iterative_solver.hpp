@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string_view>
+
+#include "cairn/runtime/api.hpp"
+
+namespace cairn {
+
+/// Ability of an iterative linear solver, whose x meets a tolerance at best. A linear solver
+/// without it is a direct one: its x is exact up to rounding. A comparison of all solvers on offer
+/// leaves iterative ones out, since the time that they take depends on the graph's condition, not
+/// on its size alone.
+class CAIRN_API IterativeSolver {
+ public:
+  static constexpr std::string_view kAbility = "iterative";
+  virtual ~IterativeSolver();
+  /// A solve ends when ‖Hx − g‖/‖g‖ is at most this, or at a limit of iterations.
+  virtual double tolerance() const = 0;
+};
+
+}  // namespace cairn
