@@ -84,8 +84,8 @@ class CAIRN_API Graph {
   int add_factor(std::shared_ptr<const FactorType> type, std::span<const int> variables,
                  std::span<const double> measurement, std::span<const double> information);
 
-  // Values: to be had from cairn/cairn.hpp, which also says what they throw -----------------------
-  /// Adds a variable with a first estimate, such as a `Pose2`. Returns its index.
+  // Values: defined in cairn/typed/build.hpp, which also says what they throw -------------------
+  /// Adds a variable with an initial estimate, such as a `Pose2`. Returns its index.
   template <class T>
   int add(Id id, const T& value);
   /// Adds a measurement, such as a `Between`, with its information and, unless null, a robust loss
