@@ -100,8 +100,8 @@ class CAIRN_API Graph {
   /// Takes out one factor, likewise.
   Renumbering erase_factor(int position);
 
-  // Values: to be had from cairn/cairn.hpp, which also says what they throw -----------------------
-  /// Adds a variable with a first estimate, such as a `Pose2`. Returns its index.
+  // Values: defined in cairn/typed/build.hpp, which also says what they throw -------------------
+  /// Adds a variable with an initial estimate, such as a `Pose2`. Returns its index.
   template <class T>
   int add(Id id, const T& value);
   /// Adds a measurement, such as a `Between`, with its information and, unless null, a robust loss

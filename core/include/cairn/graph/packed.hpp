@@ -18,7 +18,7 @@ constexpr std::size_t packed_size(int n) {
   return static_cast<std::size_t>(n) * static_cast<std::size_t>(n + 1) / 2;
 }
 
-/// Packs the upper triangle of a square matrix; what is below the diagonal is not looked at.
+/// Packs the upper triangle of a square matrix; what is below the diagonal is not read.
 /// `out`: packed_size(n) doubles.
 template <class Matrix>
 void pack(const Eigen::MatrixBase<Matrix>& A, double* out) {

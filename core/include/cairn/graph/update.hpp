@@ -34,8 +34,8 @@ struct GraphUpdate {
   /// Variables that leave with all factors on them.
   std::vector<Id> removed_variables;
 
-  // Values: to be had from cairn/cairn.hpp --------------------------------------------------------
-  /// A variable with a first estimate, such as a `Pose2`.
+  // Values: defined in cairn/typed/build.hpp ------------------------------------------------------
+  /// A variable with an initial estimate, such as a `Pose2`.
   template <class T>
   void add(Id id, const T& value);
   /// A variable that a measurement of this update places: add<Pose2>(3).

@@ -116,8 +116,9 @@ struct PluginSearch {
 /// those named by file are opened, since a user who names one wants to know at once). A plugin is
 /// loaded when one of its names is asked for, and never unloaded: its objects may outlive the
 /// registry. A program adds components and types of its own with `add` and `add_types`: these need
-/// no shared object. A name that is offered twice is an error, with both origins, for whoever asks
-/// for it and for nobody else. All errors are `Error` (plugin or usage) and say what is on offer.
+/// no shared object. A name that is offered twice is an error, with both origins, when it is asked
+/// for; other names are not affected. All errors are `Error` (plugin or usage) and say what is on
+/// offer.
 ///
 /// Thread-safe: calls wait for each other, also while a factory makes a component. What was made is
 /// not guarded by the registry any more.
@@ -207,8 +208,8 @@ class CAIRN_API Registry {
 /// The registry that short forms such as `optimize` use: one for the process, with the plugins that
 /// are found where `PluginSearch` looks by default, made when it is first asked for. Global,
 /// because what is installed is a property of the process, and because graphs, files and estimators
-/// fit together only if their types come from one registry. Who wants another passes it on
-/// explicitly.
+/// fit together only if their types come from one registry. A program that wants another passes it
+/// on.
 CAIRN_API Registry& default_registry();
 
 }  // namespace cairn

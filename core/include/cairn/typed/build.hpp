@@ -56,7 +56,7 @@ inline int index_of(const Graph& graph, Id id) {
 
 }  // namespace detail
 
-/// A variable with a first estimate, for `Graph::add`, a `GraphUpdate` or a `PosePolicy`.
+/// A variable with an initial estimate, for `Graph::add`, a `GraphUpdate` or a `PosePolicy`.
 template <StateValue T>
 Variable make_variable(Id id, const T& value, Registry& registry = default_registry()) {
   return {detail::variable_type_of<T>(registry), id, detail::copied(value), false};
@@ -78,7 +78,7 @@ Factor make_factor(const M& measurement, const Information& information,
           information.packed(), std::move(loss)};
 }
 
-/// Adds a variable with that first estimate; returns its index. Throws `Error` (input) for an id
+/// Adds a variable with that initial estimate; returns its index. Throws `Error` (input) for an id
 /// that is there already.
 template <StateValue T>
 int add(Graph& graph, Id id, const T& value, Registry& registry = default_registry()) {
