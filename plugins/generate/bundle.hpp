@@ -53,7 +53,7 @@ struct BundleOptions {
   int cameras = 50;
   int points = 2000;
   int track = 6;  ///< cameras that see a point, at most
-  BundleErrors errors;
+  BundleErrors errors{};
   std::int64_t outliers = 0;
 
   static auto fields() {

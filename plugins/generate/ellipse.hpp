@@ -47,7 +47,7 @@ struct EllipseOptions {
 /// Options of the generator `ellipse3d`.
 struct Ellipse3dOptions {
   int poses = 170;
-  EllipseOptions ellipse;
+  EllipseOptions ellipse{};
 
   static auto fields() {
     using O = Ellipse3dOptions;
@@ -61,7 +61,7 @@ struct Ellipse3dOptions {
 struct EllipseNOptions {
   std::int64_t laps = 10;  ///< times around
   std::int64_t poses_per_lap = 106;
-  EllipseOptions ellipse;
+  EllipseOptions ellipse{};
 
   static auto fields() {
     using O = EllipseNOptions;

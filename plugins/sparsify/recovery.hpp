@@ -86,7 +86,7 @@ class FactorDescent final : public IterativeRecovery {
 };
 
 struct InteriorPointOptions {
-  RecoveryOptions recovery;
+  RecoveryOptions recovery{};
   double start = 0.1;     ///< ω: ρ₀ = ω ‖∇KLD‖ / ‖∇barrier‖
   double decrease = 0.1;  ///< ρ is multiplied by this
   bool conservative = false;
@@ -116,7 +116,7 @@ class InteriorPoint final : public IterativeRecovery {
 };
 
 struct ProjectedQuasiNewtonOptions {
-  RecoveryOptions recovery;
+  RecoveryOptions recovery{};
   int memory = 10;  ///< steps that the quadratic model remembers
 
   static auto fields() {

@@ -29,7 +29,7 @@ constexpr auto enum_names(Scheme) {
 
 struct SparsifyOptions {
   std::string topology = "ekld";
-  Population population;
+  Population population{};
   std::string recovery = "ncfd";
   Scheme scheme = Scheme::single;
   Projection projection = Projection::node;

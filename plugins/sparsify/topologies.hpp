@@ -47,7 +47,7 @@ constexpr auto enum_names(Downdate) {
 }
 
 struct DowndatedInformationOptions {
-  TopologyOptions tree;
+  TopologyOptions tree{};
   Downdate downdate = Downdate::sum;
 
   static auto fields() {
@@ -59,7 +59,7 @@ struct DowndatedInformationOptions {
 };
 
 struct SparseInverseOptions {
-  TopologyOptions tree;
+  TopologyOptions tree{};
   double weight = 0.1;  ///< λ of (T 4.19), as a part of the largest off-diagonal of Σ̂
 
   static auto fields() {
@@ -71,7 +71,7 @@ struct SparseInverseOptions {
 };
 
 struct ExhaustiveOptions {
-  TopologyOptions tree;
+  TopologyOptions tree{};
   std::int64_t most = 200000;  ///< topologies
 
   static auto fields() {

@@ -45,7 +45,7 @@ struct BatchOptions {
 
 /// Options of the estimator `periodic_batch`.
 struct PeriodicBatchOptions {
-  BatchOptions batch;
+  BatchOptions batch{};
   int every = 100;  ///< updates from one batch step to the next
 
   static auto fields() {

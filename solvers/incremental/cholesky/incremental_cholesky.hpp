@@ -19,7 +19,7 @@ namespace cairn::incremental {
 
 /// Options of the estimator `incremental_cholesky`.
 struct IncrementalCholeskyOptions {
-  Settings settings;
+  Settings settings{};
   int solve_every = 1;  ///< updates that are solved for together
   int full_every = 0;   ///< updates from one full step to the next; 0: never by itself
   double budget = 0.0;  ///< of an update [s]; 0: no limit

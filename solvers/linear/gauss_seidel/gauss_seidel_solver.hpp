@@ -9,7 +9,7 @@
 namespace cairn {
 
 struct GaussSeidelOptions {
-  iterative::RelaxationOptions relaxation;
+  iterative::RelaxationOptions relaxation{};
   double omega = 1.0;
 
   static auto fields() {

@@ -9,7 +9,7 @@
 namespace cairn {
 
 struct JacobiOptions {
-  iterative::RelaxationOptions relaxation;
+  iterative::RelaxationOptions relaxation{};
   double omega = 0.0;  ///< 0 chooses one
 
   static auto fields() {

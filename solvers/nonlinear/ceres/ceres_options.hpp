@@ -34,7 +34,7 @@ struct CeresOptions {
   std::string trust_region = "levenberg_marquardt";
   std::string dogleg = "traditional_dogleg";
   double initial_radius = 1e4;  ///< of the trust region
-  CeresLoss loss;
+  CeresLoss loss{};
 
   static auto fields() {
     using O = CeresOptions;
