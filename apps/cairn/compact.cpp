@@ -14,6 +14,7 @@
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/threads.hpp"
 #include "commands.hpp"
+#include "compact.hpp"
 #include "graph_files.hpp"
 #include "help.hpp"
 #include "interrupt.hpp"
@@ -28,28 +29,6 @@ namespace cairn::app {
 namespace {
 
 namespace json = boost::json;
-
-struct CompactOptions {
-  std::string graph;
-  std::string output, output_format;
-  std::string trajectory;
-  std::string recovery = "v2";
-  std::string policy = "compact_pose";
-  std::string strategy = "fpfl";
-  std::string estimator;
-  std::string registration = "recorded";
-  std::string truth;
-  bool automatic = false;
-  double sample = 0.6;
-  double error_ratio = 2.5;
-  std::string thresholds, save_thresholds;
-  std::optional<double> range, angle, loop_gain, pose_gain, gate;
-  std::uint64_t seed = 1;
-  std::string steps;
-  std::string compare;
-  InputOptions input;
-  ProblemOptions problem;
-};
 
 Recovery recovery_of(const std::string& name) {
   return std::ranges::find(kRecoveryNames, name, &decltype(kRecoveryNames)::value_type::first)
@@ -365,7 +344,9 @@ void check(const CompactOptions& options, Session& session) {
     throw Error(ErrorCode::usage, "--auto finds thresholds, --thresholds reads them: give one");
 }
 
-int run(const CompactOptions& options, Session& session) {
+}  // namespace
+
+int run_compact(const CompactOptions& options, Session& session) {
   check(options, session);
   session.use_threads();
   Registry& registry = session.registry();
@@ -421,75 +402,74 @@ int run(const CompactOptions& options, Session& session) {
   return guard.interrupted() ? kExitInterrupted : 0;
 }
 
-}  // namespace
+void add_compact_options(CLI::App& command, CompactOptions& options,
+                         std::vector<std::string> strategies) {
+  command.add_option("graph", options.graph, kGraphHelp)->type_name("GRAPH")->required();
+  command.add_option("-o,--output", options.output, "write the compact graph")->type_name("OUT");
+  command.add_option("--to", options.output_format, "format of OUT")->type_name("FORMAT");
+  command
+      .add_option("--trajectory", options.trajectory, "write all poses, those left out put back")
+      ->type_name("FILE");
+  command
+      .add_option("--recovery", options.recovery,
+                  "v0 evenly, v1 by distance, v2 along odometry, or likely")
+      ->type_name("HOW")
+      ->check(one_of({"v0", "v1", "v2", "likely"}))
+      ->capture_default_str();
+  command
+      .add_option("--strategy", options.strategy, "all or few poses and loops: apal, apfl, fpfl")
+      ->type_name("NAME")
+      ->check(one_of(std::move(strategies)))
+      ->capture_default_str();
+  command.add_option("--policy", options.policy, "who decides, with options as NAME:key=value")
+      ->type_name("NAME")
+      ->capture_default_str();
+  command
+      .add_option("--estimator", options.estimator, "who estimates, instead of the policy's own")
+      ->type_name("NAME");
+  command
+      .add_option("--registration", options.registration,
+                  "who measures loops: recorded, or simulated:range=5,angle=1,false_rate=0.1")
+      ->type_name("NAME")
+      ->capture_default_str();
+  command.add_flag("--auto", options.automatic,
+                   "find thresholds in a sample; so it is if none are given");
+  command.add_option("--sample", options.sample, "part of the poses that is the sample")
+      ->type_name("PART")
+      ->check(within(0.0, 1.0))
+      ->capture_default_str();
+  command.add_option("--thresholds", options.thresholds, "take thresholds from a file")
+      ->type_name("FILE");
+  command.add_option("--save-thresholds", options.save_thresholds, "write those found to a file")
+      ->type_name("FILE");
+  command.add_option("--range", options.range, "how far the sensor matches [m]")->type_name("M");
+  command.add_option("--angle", options.angle, "and between which orientations [rad]")
+      ->type_name("RAD");
+  command.add_option("--loop-gain", options.loop_gain, "a loop must tell more [nats]")
+      ->type_name("G");
+  command
+      .add_option("--pose-gain", options.pose_gain, "a pose is kept if links to it would tell more")
+      ->type_name("G");
+  command
+      .add_option("--gate", options.gate,
+                  "refuse links that do not fit; so large a part of right ones passes (0.99)")
+      ->type_name("P");
+  command.add_option("--truth", options.truth, "true poses, for errors")->type_name("FILE");
+  command.add_option("--steps", options.steps, "a row for each pose, as CSV")->type_name("FILE");
+  add_loss_options(command, options.problem);
+  add_input_options(command, options.input);
+}
 
 Command add_compact(CLI::App& program) {
   auto options = std::make_shared<CompactOptions>();  // lives as long as the parser and the run
   CLI::App* app = program.add_subcommand(
       "compact", "compact pose SLAM: keep only the poses and loop closures that tell much");
-  app->add_option("graph", options->graph, kGraphHelp)->type_name("GRAPH")->required();
-  app->add_option("-o,--output", options->output, "write the compact graph")->type_name("OUT");
-  app->add_option("--to", options->output_format, "format of OUT")->type_name("FORMAT");
-  app->add_option("--trajectory", options->trajectory, "write all poses, those left out put back")
-      ->type_name("FILE");
-  app->add_option("--recovery", options->recovery,
-                  "v0 evenly, v1 by distance, v2 along odometry, or likely")
-      ->type_name("HOW")
-      ->check(one_of({"v0", "v1", "v2", "likely"}))
-      ->capture_default_str();
-  app->add_option("--strategy", options->strategy,
-                  "all or few poses and loops: apal, apfl, fpfl; rfpfl at random, as many as fpfl")
-      ->type_name("NAME")
-      ->check(one_of({"apal", "apfl", "fpfl", "rfpfl"}))
-      ->capture_default_str();
-  app->add_option("--policy", options->policy, "who decides, with options as NAME:key=value")
-      ->type_name("NAME")
-      ->capture_default_str();
-  app->add_option("--estimator", options->estimator, "who estimates, instead of the policy's own")
-      ->type_name("NAME");
-  app->add_option("--registration", options->registration,
-                  "who measures loops: recorded, or simulated:range=5,angle=1,false_rate=0.1")
-      ->type_name("NAME")
-      ->capture_default_str();
-  app->add_flag("--auto", options->automatic,
-                "find thresholds in a sample; so it is if none are given");
-  app->add_option("--sample", options->sample, "part of the poses that is the sample")
-      ->type_name("PART")
-      ->check(within(0.0, 1.0))
-      ->capture_default_str();
-  app->add_option("--error-ratio", options->error_ratio,
-                  "errors over those with all loops, at most, in the sample; 0: do not try")
-      ->type_name("X")
-      ->check(within(0.0, 1e9))
-      ->capture_default_str();
-  app->add_option("--thresholds", options->thresholds, "take thresholds from a file")
-      ->type_name("FILE");
-  app->add_option("--save-thresholds", options->save_thresholds, "write those found to a file")
-      ->type_name("FILE");
-  app->add_option("--range", options->range, "how far the sensor matches [m]")->type_name("M");
-  app->add_option("--angle", options->angle, "and between which orientations [rad]")
-      ->type_name("RAD");
-  app->add_option("--loop-gain", options->loop_gain, "a loop must tell more [nats]")
-      ->type_name("G");
-  app->add_option("--pose-gain", options->pose_gain,
-                  "a pose is kept if links to it would tell more")
-      ->type_name("G");
-  app->add_option("--gate", options->gate,
-                  "refuse links that do not fit; so large a part of right ones passes (0.99)")
-      ->type_name("P");
-  app->add_option("--truth", options->truth, "true poses, for errors")->type_name("FILE");
-  app->add_option("--seed", options->seed, "of rfpfl")->type_name("N")->capture_default_str();
-  app->add_option("--steps", options->steps, "a row for each pose, as CSV")->type_name("FILE");
-  app->add_option("--compare", options->compare,
-                  "covariances beside those with everything, each step (slow), as CSV")
-      ->type_name("FILE");
-  add_loss_options(*app, options->problem);
-  add_input_options(*app, options->input);
+  add_compact_options(*app, *options, {"apal", "apfl", "fpfl"});
   app->footer(
       "Example:\n"
       "  cairn compact my.g2o -o compact.g2o --trajectory full.g2o --json report.json\n"
       "  cairn compact city.g2o --strategy apal --thresholds city.json --truth truth.g2o");
-  return {app, [options](Session& session) { return run(*options, session); }};
+  return {app, [options](Session& session) { return run_compact(*options, session); }};
 }
 
 }  // namespace cairn::app

@@ -28,8 +28,8 @@ std::string right_column(const CLI::Option& option) {
 }
 
 std::string usage(const CLI::App& app, bool has_commands) {
-  if (has_commands) return "Usage: cairn COMMAND [OPTIONS]\n";
-  std::string text = fmt::format("Usage: cairn {} [OPTIONS]", app.get_name());
+  if (has_commands) return fmt::format("Usage: {} COMMAND [OPTIONS]\n", command_name(app));
+  std::string text = fmt::format("Usage: {} [OPTIONS]", command_name(app));
   for (const CLI::Option* option : app.get_options()) {
     if (!option->get_positional()) continue;
     const std::string word = option->get_type_name();
@@ -73,6 +73,11 @@ std::string common_options(const CLI::App& program) {
 
 }  // namespace
 
+std::string command_name(const CLI::App& command) {
+  const CLI::App* parent = command.get_parent();
+  return parent ? command_name(*parent) + " " + command.get_name() : "cairn";
+}
+
 CLI::Validator one_of(std::vector<std::string> choices) {
   return CLI::IsMember(std::move(choices)).description("");
 }
@@ -81,11 +86,14 @@ std::string HelpFormatter::make_help(const CLI::App* app, std::string /*name*/,
                                      CLI::AppFormatMode /*mode*/) const {
   const bool has_commands = !app->get_subcommands({}).empty();
   const CLI::App* program = app->get_parent();
-  std::string text = program ? fmt::format("cairn {}: ", app->get_name()) : "";
+  std::string text = program ? command_name(*app) + ": " : "";
   text += app->get_description() + "\n\n" + usage(*app, has_commands) + "\n";
-  if (has_commands) text += "Commands:\n" + command_lines(*app) + "\nOptions of every command:\n";
-  text += option_lines(*app, has_commands);
-  if (program) text += "\n" + common_options(*program);
+  if (has_commands) text += "Commands:\n" + command_lines(*app);
+  if (has_commands && !program) text += "\nOptions of every command:\n";
+  text += option_lines(*app, has_commands && !program);
+  if (!program) return text + "\n" + app->get_footer() + "\n";
+  while (program->get_parent()) program = program->get_parent();
+  text += "\n" + common_options(*program);
   return text + "\n" + app->get_footer() + "\n";
 }
 

@@ -16,6 +16,9 @@ CLI::Validator within(Number low, Number high) {
 }
 CLI::Validator one_of(std::vector<std::string> choices);
 
+/// "cairn study compact": a command with those it belongs to.
+std::string command_name(const CLI::App& command);
+
 /// Help that fits a screen: at most 40 lines of 100 columns. One line an option, with its default
 /// in brackets; a command's help also names the options that every command takes.
 class HelpFormatter : public CLI::FormatterBase {

@@ -15,8 +15,8 @@ using ::testing::StartsWith;
 
 constexpr int kUsage = 2, kInput = 3, kPlugin = 5;
 
-const std::vector<std::string> kCommands{"info",    "optimize", "bench",  "evaluate",
-                                         "convert", "generate", "plugins"};
+const std::vector<std::string> kCommands{"info",    "optimize", "bench",   "evaluate",
+                                         "convert", "generate", "plugins", "study"};
 
 /// Code points, which is what a terminal shows.
 std::size_t columns(const std::string& line) {
