@@ -72,7 +72,7 @@ Error unknown_command(const std::string& word, const CLI::App& program) {
 
 Error unknown_word(const std::vector<std::string>& words, const CLI::App& program,
                    const CLI::App* command) {
-  const std::string name = command ? "cairn " + command->get_name() : "cairn";
+  const std::string name = command ? command_name(*command) : "cairn";
   const auto option = std::find_if(words.begin(), words.end(), looks_like_option);
   if (option != words.end() && (command || option == words.begin())) {
     const std::string word = bare_option(*option);
@@ -116,7 +116,7 @@ Error bad_value(const CLI::ParseError& error, const CLI::App& program, const CLI
       }
     }
   }
-  const std::string where = command ? "cairn " + command->get_name() : "cairn";
+  const std::string where = command ? command_name(*command) : "cairn";
   return {ErrorCode::usage, fmt::format("{}; see {} --help", what, where)};
 }
 
@@ -166,7 +166,7 @@ CommandLine::CommandLine(Session& session)
                add_replay(program_),   add_online(program_),   add_marginals(program_),
                add_compact(program_),  add_sparsify(program_), add_evaluate(program_),
                add_view(program_),     add_plot(program_),     add_convert(program_),
-               add_generate(program_), add_plugins(program_)};
+               add_generate(program_), add_plugins(program_),  add_study(program_)};
   help_ = program_.add_subcommand("help", "this text, or that of a command");
   help_->add_option("command", command_to_explain_, "the command that is to be explained")
       ->type_name("COMMAND");
@@ -186,8 +186,10 @@ std::string CommandLine::help_text() const {
 
 std::function<int()> CommandLine::parse(int argc, const char* const* argv) {
   const auto chosen = [&]() -> const CLI::App* {
-    const auto used = program_.get_subcommands();
-    return used.empty() ? nullptr : used.front();
+    const CLI::App* app = &program_;  // a study is a command of a command
+    for (auto used = app->get_subcommands(); !used.empty(); used = app->get_subcommands())
+      app = used.front();
+    return app == &program_ ? nullptr : app;
   };
   try {
     program_.parse(argc, argv);

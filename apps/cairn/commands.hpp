@@ -28,6 +28,7 @@ Command add_online(CLI::App& program);
 Command add_marginals(CLI::App& program);
 Command add_compact(CLI::App& program);
 Command add_sparsify(CLI::App& program);
+Command add_study(CLI::App& program);
 Command add_evaluate(CLI::App& program);
 Command add_view(CLI::App& program);
 Command add_plot(CLI::App& program);

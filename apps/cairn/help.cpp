@@ -63,6 +63,11 @@ std::string common_options(const CLI::App& program) {
 
 }  // namespace
 
+std::string command_name(const CLI::App& command) {
+  const CLI::App* parent = command.get_parent();
+  return parent ? command_name(*parent) + " " + command.get_name() : "cairn";
+}
+
 CLI::Validator one_of(std::vector<std::string> choices) {
   const auto check = [choices = std::move(choices)](const std::string& text) {
     const bool good = std::ranges::find(choices, text) != choices.end();
@@ -72,7 +77,7 @@ CLI::Validator one_of(std::vector<std::string> choices) {
 }
 
 std::string usage_line(const CLI::App& command) {
-  std::string text = fmt::format("cairn {} [OPTIONS]", command.get_name());
+  std::string text = command_name(command) + " [OPTIONS]";
   for (const CLI::Option* option : command.get_options()) {
     if (!option->get_positional()) continue;
     const std::string word = option->get_type_name();
@@ -93,12 +98,15 @@ std::string HelpFormatter::make_help(const CLI::App* app, std::string /*name*/,
                                      CLI::AppFormatMode /*mode*/) const {
   const bool has_commands = !app->get_subcommands({}).empty();
   const CLI::App* program = app->get_parent();
-  std::string text = program ? fmt::format("cairn {}: ", app->get_name()) : "";
-  text += app->get_description() + "\n\n" +
-          "Usage: " + (has_commands ? "cairn COMMAND [OPTIONS]" : usage_line(*app)) + "\n\n";
-  if (has_commands) text += "Commands:\n" + command_lines(*app) + "\nOptions of every command:\n";
-  text += option_lines(*app, has_commands);
-  if (program) text += "\n" + common_options(*program);
+  std::string text = program ? command_name(*app) + ": " : "";
+  text += app->get_description() + "\n\nUsage: " +
+          (has_commands ? command_name(*app) + " COMMAND [OPTIONS]" : usage_line(*app)) + "\n\n";
+  if (has_commands) text += "Commands:\n" + command_lines(*app);
+  if (has_commands && !program) text += "\nOptions of every command:\n";
+  text += option_lines(*app, has_commands && !program);
+  if (!program) return text + "\n" + app->get_footer() + "\n";
+  while (program->get_parent()) program = program->get_parent();
+  text += "\n" + common_options(*program);
   return text + "\n" + app->get_footer() + "\n";
 }
 

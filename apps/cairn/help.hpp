@@ -25,6 +25,9 @@ CLI::Validator within(Number low, Number high) {
 }
 CLI::Validator one_of(std::vector<std::string> choices);
 
+/// "cairn study compact": a command with those it belongs to.
+std::string command_name(const CLI::App& command);
+
 /// "cairn generate [OPTIONS] KIND -o OUT": the arguments and options that a command must be given.
 std::string usage_line(const CLI::App& command);
 

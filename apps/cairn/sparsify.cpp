@@ -22,6 +22,7 @@
 #include "json_report.hpp"
 #include "problem_setup.hpp"
 #include "progress.hpp"
+#include "sparsify.hpp"
 #include "sparsify_records.hpp"
 #include "step_times.hpp"
 #include "table.hpp"
@@ -31,114 +32,17 @@ namespace {
 
 namespace json = boost::json;
 
-struct SparsifyCommandOptions {
-  std::string graph;
-  std::string output, output_format;
-  std::string sparsifier = "sparsify";
-  std::string select;
-  int keep_every = 0;
-  std::vector<std::string> topologies, recoveries;
-  std::string population, scheme;
-  std::string optimizer = kDefaultOptimizer, linear_solver = kDefaultLinearSolver;
-  std::string estimator = "incremental_cholesky";
-  int online = 0;
-  std::string redirect = "late";
-  bool as_given = false, no_kld = false;
-  std::string record, replay;
-  InputOptions input;
-  ProblemOptions problem;
-};
-
 constexpr const char* kDefaultSelection = "smallest_blanket:part=0.5";
 constexpr std::size_t kRefusedShown = 5;
-
-// Replay ------------------------------------------------------------------------------------------
-
-json::array rows_json(const std::vector<ReplayRow>& rows) {
-  json::array all;
-  for (const ReplayRow& row : rows) {
-    all.push_back({{"topology", row.topology},
-                   {"recovery", row.recovery},
-                   {"nodes", row.nodes == 0 ? json::value(nullptr) : json::value(row.nodes)},
-                   {"problems", row.problems},
-                   {"refused", row.refused},
-                   {"kld", row.kld},
-                   {"kld_deviation", row.kld_deviation},
-                   {"largest_excess", row.largest_excess},
-                   {"factors", row.factors},
-                   {"iterations", row.iterations},
-                   {"not_converged", row.not_converged},
-                   {"not_positive", row.not_positive},
-                   {"seconds",
-                    {{"topology", row.topology_seconds},
-                     {"recovery", row.recovery_seconds},
-                     {"recovery_median", row.recovery_median}}}});
-  }
-  return all;
-}
-
-int replay(const SparsifyCommandOptions& options, Session& session) {
-  const std::vector<DenseBlanket> problems = read_problems(options.replay);
-  const InterruptGuard guard;
-  StatusLine line(session.common.quiet);
-  const auto or_default = [](const std::vector<std::string>& names, const char* name) {
-    return names.empty() ? std::vector<std::string>{name} : names;
-  };
-  const std::vector<ReplayRow> rows = replay_problems(
-      problems, or_default(options.topologies, "ekld"),
-      options.population.empty() ? "tree:2" : options.population,
-      or_default(options.recoveries, "ncfd"),
-      [&](std::size_t done) {
-        if (done % 64 == 0)
-          line.show(fmt::format("{} of {} problems solved", done, problems.size()));
-        return !guard.interrupted();
-      },
-      session.registry());
-  line.clear();
-  json::object report = begin_report("sparsify");
-  report["replay"] = options.replay;
-  report["problems"] = problems.size();
-  report["rows"] = rows_json(rows);
-  report["status"] = guard.interrupted() ? "interrupted" : "converged";
-  end_report(report);
-  session.write_json(report);
-  Table table({{"topology", Table::Align::left},
-               {"recovery", Table::Align::left},
-               {"nodes", Table::Align::right},
-               {"problems", Table::Align::right},
-               {"refused", Table::Align::right},
-               {"KLD", Table::Align::right},
-               {"excess", Table::Align::right},
-               {"iterations", Table::Align::right},
-               {"topology", Table::Align::right},
-               {"recovery", Table::Align::right}});
-  for (const ReplayRow& row : rows) {
-    table.add({row.topology, row.recovery, row.nodes == 0 ? "all" : fmt::format("{}", row.nodes),
-               fmt::format("{}", row.problems), fmt::format("{}", row.refused),
-               fmt::format("{:.4g}", row.kld), fmt::format("{:.1e}", row.largest_excess),
-               fmt::format("{:.1f}", row.iterations), seconds_text(row.topology_seconds),
-               seconds_text(row.recovery_seconds)});
-  }
-  session.print(table.text(session.colour()));
-  return guard.interrupted() ? kExitInterrupted : 0;
-}
-
-// One graph ---------------------------------------------------------------------------------------
 
 /// The component with its options given, one by one, besides those in its name.
 SparsifyJob job_of(const SparsifyCommandOptions& options, Session& session) {
   SparsifyJob job;
   job.sparsifier = parse_component(options.sparsifier);
-  const auto one = [](const std::vector<std::string>& names, const char* option) {
-    if (names.size() > 1)
-      throw Error(ErrorCode::usage, fmt::format("{}: several are for --replay only", option));
-    return names.empty() ? std::string() : names.front();
-  };
-  const std::pair<const char*, std::string> given[] = {
-      {"topology", one(options.topologies, "--topology")},
-      {"recovery", one(options.recoveries, "--recovery")},
-      {"population", options.population},
-      {"scheme", options.scheme}};
+  const std::pair<const char*, std::string> given[] = {{"topology", options.topology},
+                                                       {"recovery", options.recovery},
+                                                       {"population", options.population},
+                                                       {"scheme", options.scheme}};
   for (const auto& [name, value] : given) {
     if (!value.empty()) job.sparsifier.values.insert_or_assign(name, value);
   }
@@ -225,12 +129,12 @@ std::string summary_text(const SparsifyCommandOptions& options, const LoadedGrap
       {"graph", fmt::format("{}: {}, {}", loaded.name, plural(result.variables_before, "variable"),
                             plural(result.factors_before, "factor"))});
   const auto removed = static_cast<std::int64_t>(std::ssize(change.removed_variables));
-  table.add({"taken out",
-             fmt::format("{} ({}{}), in {} whose neighbours are {:.2f} on average, {} at most",
-                         plural(removed, "node"), spec_text(job.selection),
-                         job.online > 0 ? fmt::format(", every {} poses", job.online) : "",
-                         plural(change.problems, "problem"), change.mean_blanket,
-                         change.largest_blanket)});
+  table.add(
+      {"removed", fmt::format("{} ({}{}), in {} whose neighbours are {:.2f} on average, {} at most",
+                              plural(removed, "node"), spec_text(job.selection),
+                              job.online > 0 ? fmt::format(", every {} poses", job.online) : "",
+                              plural(change.problems, "problem"), change.mean_blanket,
+                              change.largest_blanket)});
   table.add({"left", fmt::format("{}, {} ({})", plural(result.sparse.variable_count(), "variable"),
                                  plural(result.sparse.factor_count(), "factor"),
                                  spec_text(job.sparsifier))});
@@ -314,21 +218,16 @@ void note_refused(const Sparsification& change, const Session& session) {
   }
 }
 
-int run(const SparsifyCommandOptions& options, Session& session) {
+}  // namespace
+
+int run_sparsify(const SparsifyCommandOptions& options, Session& session) {
   session.use_threads();
-  if (!options.replay.empty()) {
-    if (!options.graph.empty())
-      throw Error(ErrorCode::usage, "--replay solves recorded problems, and takes no graph");
-    return replay(options, session);
-  }
-  if (options.graph.empty())
-    throw Error(ErrorCode::usage, "give a graph, or --replay FILE; see cairn sparsify --help");
   if (options.output == "-") session.write_file_to_stdout();
   check_output(options.output, options.output_format, session);
   if (!options.record.empty()) check_folder(options.record);
   Registry& registry = session.registry();
   const SparsifyJob job = job_of(options, session);
-  // A wrong name is told before a graph is read.
+  // A wrong name is refused before a graph is read.
   registry.make<Sparsifier>(job.sparsifier);
   registry.make<NodeSelection>(job.selection);
   const ProblemSetup setup(options.problem, registry);
@@ -351,74 +250,72 @@ int run(const SparsifyCommandOptions& options, Session& session) {
   return guard.interrupted() ? kExitInterrupted : 0;
 }
 
-}  // namespace
+void add_sparsify_options(CLI::App& command, SparsifyCommandOptions& options) {
+  command.add_option("graph", options.graph, kGraphHelp)->type_name("GRAPH")->required();
+  command.add_option("-o,--output", options.output, "write the sparse graph")->type_name("OUT");
+  command.add_option("--to", options.output_format, "format of OUT")->type_name("FORMAT");
+  command.add_option("--keep-every", options.keep_every, "one of so many nodes stays")
+      ->type_name("N")
+      ->check(within(1.0, 1e9));
+  command
+      .add_option(
+          "--select", options.select,
+          "which leave: smallest_blanket, least_loss, oldest, coverage [smallest_blanket:part=0.5]")
+      ->type_name("NAME");
+  command
+      .add_option("--topology", options.topology,
+                  "which are related: clt, mi, dmi, ekld, odd, l1, best [ekld]")
+      ->type_name("NAME");
+  command
+      .add_option("--population", options.population,
+                  "by how many factors: tree:γ, fill:α or loss:KLD [tree:2]")
+      ->type_name("HOW");
+  command
+      .add_option("--recovery", options.recovery,
+                  "factor recovery: ncfd, fd, ip, pqn; closed_form for trees [ncfd]")
+      ->type_name("NAME");
+  command
+      .add_option(
+          "--scheme", options.scheme,
+          "single: one by one; runs: those in a row together; multi: all connected ones [single]")
+      ->type_name("HOW")
+      ->check(one_of({"single", "runs", "multi"}));
+  command.add_option("--sparsifier", options.sparsifier, "the sparsifier, with more options")
+      ->type_name("NAME")
+      ->capture_default_str();
+  command
+      .add_option("--online", options.online,
+                  "feed the graph pose by pose, and take nodes out every N poses")
+      ->type_name("N")
+      ->check(within(1.0, 1e9));
+  command.add_option("--estimator", options.estimator, "online: the estimator")
+      ->type_name("NAME")
+      ->capture_default_str();
+  command.add_option("--optimizer", options.optimizer, "the optimizer, before and after")
+      ->type_name("NAME")
+      ->capture_default_str();
+  command
+      .add_option("--linear-solver", options.linear_solver,
+                  "the linear solver that gives determinants")
+      ->type_name("NAME")
+      ->capture_default_str();
+  command.add_flag("--as-given", options.as_given,
+                   "the graph is at its minimum: do not optimise it");
+  command.add_flag("--no-kld", options.no_kld, "do not measure what was lost");
+  add_problem_options(command, options.problem);
+  add_input_options(command, options.input);
+}
 
 Command add_sparsify(CLI::App& program) {
   auto options = std::make_shared<SparsifyCommandOptions>();
   CLI::App* app = program.add_subcommand(
       "sparsify", "take nodes out of a graph and keep their information in a few factors");
-  app->add_option("graph", options->graph, kGraphHelp)->type_name("GRAPH");
-  app->add_option("-o,--output", options->output, "write the sparse graph")->type_name("OUT");
-  app->add_option("--to", options->output_format, "format of OUT")->type_name("FORMAT");
-  app->add_option("--keep-every", options->keep_every, "one of so many nodes stays")
-      ->type_name("N")
-      ->check(within(1.0, 1e9));
-  app->add_option(
-         "--select", options->select,
-         "which leave: smallest_blanket, least_loss, oldest, coverage [smallest_blanket:part=0.5]")
-      ->type_name("NAME");
-  app->add_option("--topology", options->topologies,
-                  "which are related: clt, mi, dmi, ekld, odd, l1, best [ekld]")
-      ->type_name("NAME");
-  app->add_option("--population", options->population,
-                  "by how many factors: tree:γ, fill:α or loss:KLD [tree:2]")
-      ->type_name("HOW");
-  app->add_option("--recovery", options->recoveries,
-                  "factor recovery: ncfd, fd, ip, pqn; closed_form for trees [ncfd]")
-      ->type_name("NAME");
-  app->add_option(
-         "--scheme", options->scheme,
-         "single: one by one; runs: those in a row together; multi: all connected ones [single]")
-      ->type_name("HOW")
-      ->check(one_of({"single", "runs", "multi"}));
-  app->add_option("--sparsifier", options->sparsifier, "the sparsifier, with more options")
-      ->type_name("NAME")
-      ->capture_default_str();
-  app->add_option("--online", options->online,
-                  "feed the graph pose by pose, and take nodes out every N poses")
-      ->type_name("N")
-      ->check(within(1.0, 1e9));
-  app->add_option(
-         "--redirect", options->redirect,
-         "online: factors to nodes that leave go to the nearest in space once these have left "
-         "(late), or at once to the nearest in order (early)")
-      ->type_name("WHEN")
-      ->check(one_of({"late", "early"}))
-      ->capture_default_str();
-  app->add_option("--estimator", options->estimator, "online: the estimator")
-      ->type_name("NAME")
-      ->capture_default_str();
-  app->add_option("--optimizer", options->optimizer, "the optimizer, before and after")
-      ->type_name("NAME")
-      ->capture_default_str();
-  app->add_option("--linear-solver", options->linear_solver,
-                  "the linear solver that gives determinants")
-      ->type_name("NAME")
-      ->capture_default_str();
-  app->add_flag("--as-given", options->as_given, "the graph is at its minimum: do not optimise it");
-  app->add_flag("--no-kld", options->no_kld, "do not measure what was lost");
-  app->add_option("--record", options->record, "write every problem that comes up, as JSON")
-      ->type_name("FILE");
-  app->add_option("--replay", options->replay,
-                  "solve recorded problems, by each --topology and each --recovery given")
-      ->type_name("FILE");
-  add_problem_options(*app, options->problem);
-  add_input_options(*app, options->input);
+  add_sparsify_options(*app, *options);
   app->footer(
       "Example:\n"
       "  cairn sparsify my.g2o -o sparse.g2o\n"
       "  cairn sparsify my.g2o --keep-every 5 --scheme runs --population tree:1.5 -o sparse.g2o");
-  return {app, [options](Session& session) { return run(*options, session); }};
+  return {app, [options](Session& session) { return run_sparsify(*options, session); }};
 }
 
 }  // namespace cairn::app

@@ -164,8 +164,8 @@ std::vector<DenseBlanket> read_problems(const std::string& file) {
     }
   } catch (const std::exception& error) {
     throw Error(ErrorCode::input,
-                fmt::format("{}: no sparsification problems; expected what cairn sparsify --record "
-                            "writes ({})",
+                fmt::format("{}: no sparsification problems; expected what cairn study "
+                            "sparsify --record writes ({})",
                             file, error.what()));
   }
   return problems;

@@ -26,12 +26,15 @@ class Compact : public testing::Test {
   void SetUp() override {
     if (!Registry().has("pose_policy", "compact_pose")) GTEST_SKIP() << "no policy compact_pose";
   }
-  boost::json::value report(Arguments arguments) {
-    arguments.insert(arguments.begin(), "compact");
+  boost::json::value report(Arguments arguments, const Arguments& command = {"compact"}) {
+    arguments.insert(arguments.begin(), command.begin(), command.end());
     arguments.insert(arguments.end(), {"--json", "-", "--quiet"});
     const Outcome run = cairn(arguments);
     EXPECT_EQ(run.exit_code, 0) << run.err;
     return parse_json(run.out);
+  }
+  boost::json::value study(Arguments arguments) {
+    return report(std::move(arguments), {"study", "compact"});
   }
   TemporaryFolder folder_;
 };
@@ -89,7 +92,7 @@ TEST_F(Compact, KeepsEverythingThatTheStrategySaysSo) {
 
 TEST_F(Compact, TheControlHasTheSizeOfWhatItIsComparedWith) {
   const boost::json::value control =
-      report({kWorld, "--strategy", "rfpfl", "--range", "5", "--angle", "3", "--seed", "3"});
+      study({kWorld, "--strategy", "rfpfl", "--range", "5", "--angle", "3", "--seed", "3"});
   EXPECT_EQ(whole(control, "poses", "kept"), whole(control.at("like"), "poses", "kept"));
   EXPECT_EQ(whole(control, "loops", "kept"), whole(control.at("like"), "loops", "kept"));
   EXPECT_NE(ate(control, "v2"), ate(control.at("like"), "v2"));
@@ -98,7 +101,7 @@ TEST_F(Compact, TheControlHasTheSizeOfWhatItIsComparedWith) {
 TEST_F(Compact, ThresholdsAreFoundSavedAndRead) {
   const std::string file = folder_.file("thresholds.json");
   const boost::json::value found =
-      report({kWorld, "--auto", "--save-thresholds", file, "--error-ratio", "0"});
+      study({kWorld, "--auto", "--save-thresholds", file, "--error-ratio", "0"});
   const boost::json::value saved = parse_json(read_text(file));
   EXPECT_EQ(saved.at("policy").as_string(), "compact_pose");
   EXPECT_EQ(saved.at("options"), found.at("thresholds").at("options"));
@@ -112,8 +115,8 @@ TEST_F(Compact, ThresholdsAreFoundSavedAndRead) {
 }
 
 TEST_F(Compact, LowersThresholdsUntilTheErrorIsAsAskedFor) {
-  const boost::json::value strict = report({kWorld, "--error-ratio", "1.05"}),
-                           loose = report({kWorld, "--error-ratio", "50"});
+  const boost::json::value strict = study({kWorld, "--error-ratio", "1.05"}),
+                           loose = study({kWorld, "--error-ratio", "50"});
   const auto& tried = strict.at("thresholds").at("trials").as_array();
   EXPECT_GE(tried.size(), 2U);
   EXPECT_LT(tried.back().at("loop_gain_factor").as_double(), 1.0);
@@ -121,7 +124,7 @@ TEST_F(Compact, LowersThresholdsUntilTheErrorIsAsAskedFor) {
   // The rule's own choice, if that is good enough.
   EXPECT_EQ(loose.at("thresholds").at("trials").as_array().size(), 1U);
   EXPECT_EQ(loose.at("thresholds").at("options"),
-            report({kWorld, "--error-ratio", "0"}).at("thresholds").at("options"));
+            study({kWorld, "--error-ratio", "0"}).at("thresholds").at("options"));
 }
 
 TEST_F(Compact, TheGateKeepsFalseMatchesOut) {
@@ -144,7 +147,7 @@ TEST_F(Compact, TheGateKeepsFalseMatchesOut) {
 TEST_F(Compact, ComparesItsUncertaintyWithThatOfEverything) {
   const std::string csv = folder_.file("compare.csv");
   const Arguments common{"@ellipse3d:poses=60", "--range", "3", "--angle", "0.3", "--compare", csv};
-  report(common);
+  study(common);
   for (const std::string& line : lines(read_text(csv))) {
     if (line.starts_with("pose")) continue;
     // The two are linearised at estimates that differ by a little, and so may the norms.
@@ -160,7 +163,7 @@ TEST_F(Compact, ComparesItsUncertaintyWithThatOfEverything) {
   // Where every pose at a known place is given up, its measurements are halved.
   Arguments halved = common;
   halved.insert(halved.end(), {"--policy", "compact_pose:reuse_loss=10"});
-  const boost::json::value told = report(halved);
+  const boost::json::value told = study(halved);
   EXPECT_EQ(told.at("compare").at("marginal_conservative").as_double(), 1.0);
   EXPECT_EQ(told.at("compare").at("full_conservative").as_double(), 1.0);
   const std::vector<std::string> rows = lines(read_text(csv));

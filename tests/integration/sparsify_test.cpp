@@ -37,6 +37,11 @@ class Sparsify : public testing::Test {
     arguments.emplace_back("--quiet");
     return report_of(arguments);
   }
+  boost::json::value study(Arguments arguments, const std::string& name = "sparsify") {
+    arguments.insert(arguments.begin(), {"study", name});
+    arguments.emplace_back("--quiet");
+    return report_of(arguments);
+  }
   TemporaryFolder folder_;
 };
 
@@ -85,8 +90,8 @@ TEST_F(Sparsify, MoreFactorsLoseLess) {
 
 TEST_F(Sparsify, ABoundOnTheLossIsKept) {
   const std::string file = folder_.file("problems.json");
-  report({"@manhattan:poses=150,streets=4", "--keep-every", "4", "--population", "loss:0.1",
-          "--record", file});
+  study({"@manhattan:poses=150,streets=4", "--keep-every", "4", "--population", "loss:0.1",
+         "--record", file});
   const boost::json::value recorded = parse_json(read_text(file));
   const boost::json::array& problems = recorded.at("problems").as_array();
   ASSERT_THAT(problems, SizeIs(testing::Gt(90U)));
@@ -124,8 +129,8 @@ TEST_F(Sparsify, ConnectedNodesThatLeaveTogetherAreFewerProblems) {
 
 TEST_F(Sparsify, OnlineFollowsTheGraphAndRedirectsWhatComesLate) {
   for (const char* redirect : {"late", "early"}) {
-    const boost::json::value told = report({"@manhattan:poses=500,streets=4", "--keep-every", "4",
-                                            "--online", "50", "--redirect", redirect});
+    const boost::json::value told = study({"@manhattan:poses=500,streets=4", "--keep-every", "4",
+                                           "--online", "50", "--redirect", redirect});
     EXPECT_EQ(told.at("poses").at("kept").as_int64(), 126) << redirect;
     EXPECT_GT(told.at("redirected").as_int64(), 0);
     EXPECT_EQ(told.at("steps").at("count").as_int64(), 500);
@@ -158,9 +163,10 @@ TEST_F(Sparsify, CorrelatedPairsLoseLessThanTheTreeTheyAreMadeOf) {
 TEST_F(Sparsify, ReplaysWhatItRecorded) {
   const std::string file = folder_.file("problems.json");
   const boost::json::value told =
-      report({"@manhattan:poses=300", "--keep-every", "4", "--topology", "mi", "--record", file});
-  const boost::json::value again = report({"--replay", file, "--topology", "mi", "--topology",
-                                           "clt", "--recovery", "ncfd", "--recovery", "ip"});
+      study({"@manhattan:poses=300", "--keep-every", "4", "--topology", "mi", "--record", file});
+  const boost::json::value again = study(
+      {file, "--topology", "mi", "--topology", "clt", "--recovery", "ncfd", "--recovery", "ip"},
+      "problems");
   EXPECT_EQ(again.at("problems").as_int64(), told.at("problems").at("count").as_int64());
   const boost::json::array& rows = again.at("rows").as_array();
   double all = 0.0;
@@ -174,28 +180,31 @@ TEST_F(Sparsify, ReplaysWhatItRecorded) {
 }
 
 TEST_F(Sparsify, SaysWhatIsWrongAndWhatWouldWork) {
-  const auto refused = [](Arguments arguments, int code) {
-    arguments.insert(arguments.begin(), "sparsify");
+  const auto refused = [](Arguments arguments, int code, const Arguments& command = {"sparsify"}) {
+    arguments.insert(arguments.begin(), command.begin(), command.end());
     const Outcome run = cairn(arguments);
     EXPECT_EQ(run.exit_code, code) << run.err;
     return run.err;
   };
-  EXPECT_THAT(refused({}, 2), HasSubstr("--replay"));
+  EXPECT_THAT(refused({}, 2), HasSubstr("cairn sparsify"));
   EXPECT_THAT(refused({"@manhattan", "--population", "tree:0.5"}, 2), HasSubstr("tree:2"));
   EXPECT_THAT(refused({"@manhattan", "--topology", "mii"}, 5), HasSubstr("mi"));
   EXPECT_THAT(refused({"@manhattan", "--topology", "mi", "--topology", "clt"}, 2),
-              HasSubstr("--replay"));
+              HasSubstr("--topology"));
   EXPECT_THAT(refused({"@manhattan", "--keep-every", "3", "--select", "oldest"}, 2),
               HasSubstr("give one"));
-  EXPECT_THAT(refused({"@manhattan", "--redirect", "early"}, 2), HasSubstr("--keep-every"));
+  EXPECT_THAT(refused({"@manhattan", "--redirect", "early"}, 2, {"study", "sparsify"}),
+              HasSubstr("--keep-every"));
   EXPECT_THAT(refused({"@manhattan:poses=60", "--topology", "mi", "--recovery", "closed_form"}, 2),
               HasSubstr("ncfd"));
   EXPECT_THAT(
       refused({"@manhattan:poses=60", "--topology", "cliquey", "-o", folder_.file("pairs.g2o")}, 3),
       HasSubstr("CORRELATED_PAIR"));
-  EXPECT_THAT(refused({"--replay", folder_.file("none.json")}, 3), HasSubstr("none.json"));
+  EXPECT_THAT(refused({folder_.file("none.json")}, 3, {"study", "problems"}),
+              HasSubstr("none.json"));
   write_text(folder_.file("wrong.json"), "{}");
-  EXPECT_THAT(refused({"--replay", folder_.file("wrong.json")}, 3), HasSubstr("--record"));
+  EXPECT_THAT(refused({folder_.file("wrong.json")}, 3, {"study", "problems"}),
+              HasSubstr("--record"));
 }
 
 TEST_F(Sparsify, WhatCannotLeaveStaysAndIsNamed) {

@@ -57,10 +57,11 @@ json::value Cairn::bench(const DataSet& set, const Contestants& contestants, int
   return report;
 }
 
-Run Cairn::run(const std::string& command, const DataSet& set,
+Run Cairn::run(const std::vector<std::string>& command, const DataSet& set,
                const std::vector<std::string>& arguments, int threads, double limit) const {
-  std::vector<std::string> words{program_, command,   set.graph,   "--json",
-                                 "-",      "--quiet", "--threads", fmt::format("{}", threads)};
+  std::vector<std::string> words{program_};
+  append(words, command);
+  append(words, {set.graph, "--json", "-", "--quiet", "--threads", fmt::format("{}", threads)});
   append(words, set.arguments);
   append(words, arguments);
   Run run{run_program(words, work_, limit), {}};
@@ -70,36 +71,35 @@ Run Cairn::run(const std::string& command, const DataSet& set,
 
 Run Cairn::optimize(const DataSet& set, const std::vector<std::string>& arguments, int threads,
                     double limit) const {
-  return run("optimize", set, arguments, threads, limit);
+  return run({"optimize"}, set, arguments, threads, limit);
 }
 
 Run Cairn::marginals(const DataSet& set, const std::vector<std::string>& arguments, int threads,
                      double limit) const {
   std::vector<std::string> words{"--as-given"};
   append(words, arguments);
-  return run("marginals", set, words, threads, limit);
+  return run({"marginals"}, set, words, threads, limit);
 }
 
 Run Cairn::replay(const DataSet& set, const std::vector<std::string>& arguments, int threads,
                   double limit) const {
-  return run("replay", set, arguments, threads, limit);
+  return run({"replay"}, set, arguments, threads, limit);
 }
 
 Run Cairn::compact(const DataSet& set, const std::vector<std::string>& arguments, int threads,
                    double limit) const {
-  return run("compact", set, arguments, threads, limit);
+  return run({"study", "compact"}, set, arguments, threads, limit);
 }
 
 Run Cairn::sparsify(const DataSet& set, const std::vector<std::string>& arguments, int threads,
                     double limit) const {
-  return run("sparsify", set, arguments, threads, limit);
+  return run({"study", "sparsify"}, set, arguments, threads, limit);
 }
 
 Run Cairn::solve_problems(const std::filesystem::path& problems,
                           const std::vector<std::string>& arguments, double limit) const {
-  std::vector<std::string> words{program_,          "sparsify",  "--replay",
-                                 problems.string(), "--json",    "-",
-                                 "--quiet",         "--threads", "1"};
+  std::vector<std::string> words{
+      program_, "study", "problems", problems.string(), "--json", "-", "--quiet", "--threads", "1"};
   append(words, arguments);
   Run run{run_program(words, work_, limit), {}};
   run.report = parsed(run.outcome.output);

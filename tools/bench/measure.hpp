@@ -51,15 +51,15 @@ class Cairn {
   Run replay(const DataSet& set, const std::vector<std::string>& arguments, int threads,
              double limit) const;
 
-  /// `cairn compact`, likewise.
+  /// `cairn study compact`, likewise.
   Run compact(const DataSet& set, const std::vector<std::string>& arguments, int threads,
               double limit) const;
 
-  /// `cairn sparsify`, likewise.
+  /// `cairn study sparsify`, likewise.
   Run sparsify(const DataSet& set, const std::vector<std::string>& arguments, int threads,
                double limit) const;
 
-  /// `cairn sparsify --replay` of recorded problems, with one thread.
+  /// `cairn study problems`, with one thread.
   Run solve_problems(const std::filesystem::path& problems,
                      const std::vector<std::string>& arguments, double limit) const;
 
@@ -73,8 +73,8 @@ class Cairn {
   std::vector<std::string> accepted_optimizers(const std::vector<std::string>& specs) const;
 
  private:
-  Run run(const std::string& command, const DataSet& set, const std::vector<std::string>& arguments,
-          int threads, double limit) const;
+  Run run(const std::vector<std::string>& command, const DataSet& set,
+          const std::vector<std::string>& arguments, int threads, double limit) const;
   std::vector<std::string> accepted(const std::string& option,
                                     const std::vector<std::string>& specs) const;
 

@@ -122,11 +122,11 @@ void check_poses(const Graph& graph) {
     if (!type.lie_group() || !type.placement() || !type.placement()->has_orientation()) {
       throw bad_input(
           fmt::format("{} is no pose of a Lie group, and this takes pose graphs only: a robot's "
-                      "poses and the motions between them, without landmarks",
+                      "poses and relative poses between them, without landmarks",
                       graph.describe_variable(v)));
     }
     if (graph.pool(v) != graph.pool(0)) {
-      throw bad_input(fmt::format("{} and {} are poses of different types; a robot's way takes one",
+      throw bad_input(fmt::format("{} and {} are poses of different types; a trajectory has one",
                                   graph.describe_variable(0), graph.describe_variable(v)));
     }
   }
@@ -153,7 +153,7 @@ std::vector<Arrival> pose_chain(const Graph& graph) {
     if (!chain[k].odometry.empty()) continue;
     throw bad_input(fmt::format(
         "no factor joins {} to {}, the pose before it by id: odometry must be unbroken and ids "
-        "rise along the robot's way",
+        "increase along the trajectory",
         graph.describe_variable(chain[k].pose()), graph.describe_variable(chain[k - 1].pose())));
   }
   return chain;

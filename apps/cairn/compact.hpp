@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <CLI/App.hpp>
+
+#include "graph_files.hpp"
+#include "problem_setup.hpp"
+#include "session.hpp"
+
+namespace cairn::app {
+
+struct CompactOptions {
+  std::string graph;
+  std::string output, output_format;
+  std::string trajectory;
+  std::string recovery = "v2";
+  std::string policy = "compact_pose";
+  std::string strategy = "fpfl";
+  std::string estimator;
+  std::string registration = "recorded";
+  std::string truth;
+  bool automatic = false;
+  double sample = 0.6;
+  std::string thresholds, save_thresholds;
+  std::optional<double> range, angle, loop_gain, pose_gain, gate;
+  std::string steps;
+  InputOptions input;
+  ProblemOptions problem;
+  // Of studies, besides the strategy rfpfl:
+  double error_ratio = 2.5;
+  std::uint64_t seed = 1;
+  std::string compare;
+};
+
+/// The options of `cairn compact`, with the strategies on offer.
+void add_compact_options(CLI::App& command, CompactOptions& options,
+                         std::vector<std::string> strategies);
+
+/// Returns the exit code.
+int run_compact(const CompactOptions& options, Session& session);
+
+}  // namespace cairn::app

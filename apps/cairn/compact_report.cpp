@@ -1,0 +1,219 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "compact_report.hpp"
+
+#include <cmath>
+#include <cstdint>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "cairn/runtime/threads.hpp"
+#include "json_report.hpp"
+#include "step_times.hpp"
+#include "table.hpp"
+
+namespace cairn::app {
+namespace {
+
+namespace json = boost::json;
+
+json::object options_json(const OptionValues& values) {
+  json::object all;
+  for (const auto& [name, value] : values) all[name] = value;
+  return all;
+}
+
+json::object thresholds_json(const FoundThresholds& found) {
+  json::array trials;
+  for (const ThresholdTrial& trial : found.trials) {
+    trials.push_back({{"loop_gain_factor", trial.links},
+                      {"pose_gain_factor", trial.poses},
+                      {"expected_error", trial.expected},
+                      {"realised_error", trial.realised},
+                      {"poses", trial.poses_kept},
+                      {"loops", trial.loops_kept}});
+  }
+  return {{"options", options_json(found.options)},
+          {"trials", std::move(trials)},
+          {"expected_ate", found.expected_ate},
+          {"tolerance", found.tolerance},
+          {"seconds", found.seconds}};
+}
+
+json::object error_json(const TrajectoryError& e) {
+  const auto pair = [](double translation, double rotation) {
+    return json::object{{"translation", translation}, {"rotation", rotation}};
+  };
+  return {{"poses", e.poses},
+          {"ate", pair(e.ate_translation, e.ate_rotation)},
+          {"rpe", pair(e.rpe_translation, e.rpe_rotation)},
+          {"rpe_all", pair(e.rpe_all_translation, e.rpe_all_rotation)}};
+}
+
+std::vector<double> step_seconds(const PolicyResult& result) {
+  std::vector<double> seconds;
+  for (const PoseReport& pose : result.poses) seconds.push_back(pose.seconds.total);
+  return seconds;
+}
+
+json::object result_json(const PolicyResult& result, const PolicyData& data) {
+  json::object report;
+  report["policy"] = result.policy;
+  report["poses"] = {{"in", result.poses.size()}, {"kept", result.compact.variable_count()}};
+  report["loops"] = {{"in", data.loops},
+                     {"proposed", result.proposed},
+                     {"registered", result.registered},
+                     {"kept", result.kept_loops},
+                     {"false_registered", result.false_registered},
+                     {"false_kept", result.false_kept}};
+  json::object verdicts;
+  for (const auto& [name, count] : result.verdicts) verdicts[name] = count;
+  report["verdicts"] = std::move(verdicts);
+  report["chi2"] = {{"final", result.chi2}};
+  report["seconds"] = {{"total", result.seconds.total},
+                       {"estimate", result.seconds.estimate},
+                       {"covariances", result.seconds.covariances},
+                       {"search", result.seconds.search},
+                       {"registration", result.registration_seconds}};
+  report["steps"] = step_times_json(StepTimes(step_seconds(result)));
+  report["nonzeros"] = {{"information", result.information_nonzeros},
+                        {"factor", result.factor_nonzeros}};
+  json::object errors;
+  for (const auto& [name, error] : result.errors) errors[name] = error_json(error);
+  report["errors"] = errors.empty() ? json::value(nullptr) : json::value(std::move(errors));
+  const auto v2 = result.errors.find("v2");
+  report["rmse"] =
+      v2 == result.errors.end() ? json::value(nullptr) : json::value(v2->second.ate_translation);
+  if (result.normalized) {
+    report["nees"] = {{"squared", result.normalized->squared}, {"dof", result.normalized->dof}};
+  } else {
+    report["nees"] = nullptr;
+  }
+  return report;
+}
+
+std::string percent(std::int64_t part, std::int64_t whole) {
+  return whole == 0 ? "-"
+                    : fmt::format("{:.1f} %",
+                                  100.0 * static_cast<double>(part) / static_cast<double>(whole));
+}
+
+std::string errors_text(const TrajectoryError& e) {
+  return fmt::format(
+      "ATE {:.4g} m {:.4g} deg, RPE {:.4g} m {:.4g} deg, all to all {:.4g} m {:.4g} deg",
+      e.ate_translation, e.ate_rotation, e.rpe_translation, e.rpe_rotation, e.rpe_all_translation,
+      e.rpe_all_rotation);
+}
+
+void add_result(Table& table, const PolicyResult& result, const PolicyData& data) {
+  const auto in = static_cast<std::int64_t>(std::ssize(result.poses));
+  table.add({"poses", fmt::format("{} of {} kept ({})", result.compact.variable_count(), in,
+                                  percent(result.compact.variable_count(), in))});
+  table.add({"loops", fmt::format("{} kept ({} of {} recorded); {} pairs matched, {} of them well",
+                                  result.kept_loops, percent(result.kept_loops, data.loops),
+                                  data.loops, result.proposed, result.registered)});
+  const StepTimes times(step_seconds(result));
+  table.add(
+      {"time",
+       fmt::format("{} (estimate {}, covariances {}, search {})",
+                   seconds_text(result.seconds.total), seconds_text(result.seconds.estimate),
+                   seconds_text(result.seconds.covariances), seconds_text(result.seconds.search))});
+  table.add({"a pose", times.text()});
+  table.add({"chi2", chi2_text(result.chi2)});
+  for (const auto& [name, error] : result.errors) table.add({name, errors_text(error)});
+  if (result.normalized && result.normalized->dof > 0) {
+    table.add({"NEES", fmt::format("{:.4g} per degree of freedom ({})",
+                                   result.normalized->squared / result.normalized->dof,
+                                   result.normalized->dof)});
+  }
+}
+
+std::string thresholds_line(const OptionValues& values) {
+  std::string text;
+  for (const auto& [name, value] : values) {
+    if (name == "sensor") continue;
+    text += fmt::format("{}{} {}", text.empty() ? "" : ", ", name, value);
+  }
+  return text;
+}
+
+}  // namespace
+
+json::object report_json(const CompactOptions& options, const CompactOutcome& outcome) {
+  json::object report = begin_report("compact");
+  report["graph"] = graph_json(outcome.data.recording, outcome.name);
+  report["strategy"] = options.strategy;
+  report["registration"] = options.registration;
+  report["threads"] = threads();
+  report["status"] = outcome.result.interrupted ? "interrupted" : "converged";
+  report["thresholds"] = thresholds_json(outcome.found);
+  for (auto& [name, value] : result_json(outcome.shown(), outcome.data)) report[name] = value;
+  if (outcome.control) report["like"] = result_json(outcome.result, outcome.data);
+  report["recovery"] = options.recovery;
+  report["truth"] = text_json(options.truth);
+  report["output"] = text_json(options.output);
+  report["trajectory"] = text_json(options.trajectory);
+  end_report(report);
+  return report;
+}
+
+json::object comparison_json(const std::vector<UncertaintyStep>& steps) {
+  const Conservativeness c = conservativeness(steps);
+  return {{"steps", steps.size()},
+          {"marginal_conservative", c.marginal},
+          {"full_conservative", c.full},
+          {"least_marginal_ratio", c.least_marginal_ratio},
+          {"least_full_ratio", c.least_full_ratio},
+          {"least_eigenvalue", c.least_eigenvalue}};
+}
+
+std::string comparison_csv(const std::vector<UncertaintyStep>& steps) {
+  std::string text = "pose,kept,marginal,marginal_all,full,full_all,least_eigenvalue\n";
+  for (const UncertaintyStep& s : steps) {
+    text += fmt::format("{},{},{:.9g},{:.9g},{:.9g},{:.9g},{:.9g}\n", s.pose, s.kept, s.marginal,
+                        s.marginal_all, s.full, s.full_all, s.least_eigenvalue);
+  }
+  return text;
+}
+
+std::string steps_csv(const PolicyResult& result) {
+  std::string text =
+      "pose,kept,closed_loop,near,candidates,least_gain,matched,linked,poses,loops,seconds,"
+      "estimate,covariances,search\n";
+  std::int64_t poses = 0, loops = 0;
+  for (const PoseReport& pose : result.poses) {
+    std::int64_t matched = 0, linked = 0;
+    for (const LinkReport& link : pose.links) {
+      matched += link.verdict != LinkVerdict::unmatched;
+      linked += link.verdict == LinkVerdict::linked;
+    }
+    poses += pose.kept;
+    loops += linked;
+    text +=
+        fmt::format("{},{},{},{},{},{},{},{},{},{},{:.9f},{:.9f},{:.9f},{:.9f}\n", pose.id,
+                    pose.kept ? 1 : 0, pose.closed_loop ? 1 : 0, pose.near, pose.candidates,
+                    std::isfinite(pose.least_gain) ? fmt::format("{:.9g}", pose.least_gain) : "",
+                    matched, linked, poses, loops, pose.seconds.total, pose.seconds.estimate,
+                    pose.seconds.covariances, pose.seconds.search);
+  }
+  return text;
+}
+
+std::string summary_text(const CompactOptions& options, const CompactOutcome& outcome) {
+  Table table({{"", Table::Align::left}, {"", Table::Align::left}});
+  table.add({"graph", fmt::format("{}: {}, {}", outcome.name,
+                                  plural(outcome.data.recording.variable_count(), "pose"),
+                                  plural(outcome.data.loops, "loop closure"))});
+  table.add({"strategy", options.strategy});
+  if (!outcome.found.options.empty())
+    table.add({"thresholds", thresholds_line(outcome.found.options)});
+  add_result(table, outcome.shown(), outcome.data);
+  if (outcome.result.interrupted) table.add({"status", "interrupted"});
+  for (const std::string& file : {options.output, options.trajectory, options.save_thresholds,
+                                  options.steps, options.compare}) {
+    if (!file.empty() && file != "-") table.add({"written", file});
+  }
+  return table.text(false);
+}
+
+}  // namespace cairn::app

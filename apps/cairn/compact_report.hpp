@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <boost/json/object.hpp>
+
+#include "cairn/policy/policy_run.hpp"
+#include "cairn/policy/threshold_search.hpp"
+#include "cairn/policy/uncertainty_comparison.hpp"
+#include "compact.hpp"
+
+namespace cairn::app {
+
+/// What a run of `cairn compact` came to.
+struct CompactOutcome {
+  const std::string& name;  ///< of the graph
+  const PolicyData& data;
+  const FoundThresholds& found;
+  PolicyResult result;
+  std::optional<PolicyResult> control;  ///< as many poses and loops at random
+
+  /// What is written and shown.
+  const PolicyResult& shown() const { return control ? *control : result; }
+};
+
+boost::json::object report_json(const CompactOptions& options, const CompactOutcome& outcome);
+std::string summary_text(const CompactOptions& options, const CompactOutcome& outcome);
+
+/// A row for each pose.
+std::string steps_csv(const PolicyResult& result);
+
+boost::json::object comparison_json(const std::vector<UncertaintyStep>& steps);
+std::string comparison_csv(const std::vector<UncertaintyStep>& steps);
+
+}  // namespace cairn::app

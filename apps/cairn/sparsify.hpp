@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+
+#include <CLI/App.hpp>
+
+#include "graph_files.hpp"
+#include "problem_setup.hpp"
+#include "session.hpp"
+
+namespace cairn::app {
+
+struct SparsifyCommandOptions {
+  std::string graph;
+  std::string output, output_format;
+  std::string sparsifier = "sparsify";
+  std::string select;
+  int keep_every = 0;
+  std::string topology, recovery, population, scheme;
+  std::string optimizer = kDefaultOptimizer, linear_solver = kDefaultLinearSolver;
+  std::string estimator = "incremental_cholesky";
+  int online = 0;
+  bool as_given = false, no_kld = false;
+  InputOptions input;
+  ProblemOptions problem;
+  // Of studies:
+  std::string redirect = "late";
+  std::string record;
+};
+
+/// The options of `cairn sparsify`.
+void add_sparsify_options(CLI::App& command, SparsifyCommandOptions& options);
+
+/// Returns the exit code.
+int run_sparsify(const SparsifyCommandOptions& options, Session& session);
+
+}  // namespace cairn::app

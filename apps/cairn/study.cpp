@@ -1,0 +1,185 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// cairn study NAME: what the tables of the papers need and a robot does not.
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "cairn/sparsification/sparsification.hpp"
+#include "commands.hpp"
+#include "compact.hpp"
+#include "help.hpp"
+#include "interrupt.hpp"
+#include "json_report.hpp"
+#include "progress.hpp"
+#include "sparsify.hpp"
+#include "sparsify_records.hpp"
+#include "table.hpp"
+
+namespace cairn::app {
+namespace {
+
+namespace json = boost::json;
+
+Command add_study_compact(CLI::App& study) {
+  auto options = std::make_shared<CompactOptions>();  // lives as long as the parser and the run
+  CLI::App* app =
+      study.add_subcommand("compact", "cairn compact with a control, and beside everything");
+  add_compact_options(*app, *options, {"apal", "apfl", "fpfl", "rfpfl"});
+  app->get_option("--strategy")
+      ->description(
+          "all or few poses and loops: apal, apfl, fpfl; rfpfl at random, as many as fpfl");
+  app->add_option("--seed", options->seed, "of rfpfl")->type_name("N")->capture_default_str();
+  app->add_option("--error-ratio", options->error_ratio,
+                  "errors over those with all loops, at most, in the sample; 0: do not try")
+      ->type_name("X")
+      ->check(within(0.0, 1e9))
+      ->capture_default_str();
+  app->add_option("--compare", options->compare,
+                  "covariances beside those with everything, each step (slow), as CSV")
+      ->type_name("FILE");
+  app->footer(
+      "Example:\n"
+      "  cairn study compact city.g2o --thresholds city.json --strategy rfpfl --seed 3");
+  return {app, [options](Session& session) { return run_compact(*options, session); }};
+}
+
+Command add_study_sparsify(CLI::App& study) {
+  auto options = std::make_shared<SparsifyCommandOptions>();
+  CLI::App* app = study.add_subcommand(
+      "sparsify", "cairn sparsify as in the thesis, and with its problems recorded");
+  add_sparsify_options(*app, *options);
+  app->add_option(
+         "--redirect", options->redirect,
+         "online: factors to nodes that leave go to the nearest in space once these have left "
+         "(late), or at once to the nearest in order (early)")
+      ->type_name("WHEN")
+      ->check(one_of({"late", "early"}))
+      ->capture_default_str();
+  app->add_option("--record", options->record, "write every problem that comes up, as JSON")
+      ->type_name("FILE");
+  app->footer(
+      "Example:\n"
+      "  cairn study sparsify city.g2o --keep-every 5 --online 100 --redirect early "
+      "--record problems.json");
+  return {app, [options](Session& session) { return run_sparsify(*options, session); }};
+}
+
+// Problems ----------------------------------------------------------------------------------------
+
+struct ProblemsOptions {
+  std::string problems;
+  std::vector<std::string> topologies{"ekld"}, recoveries{"ncfd"};
+  std::string population = "tree:2";
+};
+
+json::array rows_json(const std::vector<ReplayRow>& rows) {
+  json::array all;
+  for (const ReplayRow& row : rows) {
+    all.push_back({{"topology", row.topology},
+                   {"recovery", row.recovery},
+                   {"nodes", row.nodes == 0 ? json::value(nullptr) : json::value(row.nodes)},
+                   {"problems", row.problems},
+                   {"refused", row.refused},
+                   {"kld", row.kld},
+                   {"kld_deviation", row.kld_deviation},
+                   {"largest_excess", row.largest_excess},
+                   {"factors", row.factors},
+                   {"iterations", row.iterations},
+                   {"not_converged", row.not_converged},
+                   {"not_positive", row.not_positive},
+                   {"seconds",
+                    {{"topology", row.topology_seconds},
+                     {"recovery", row.recovery_seconds},
+                     {"recovery_median", row.recovery_median}}}});
+  }
+  return all;
+}
+
+int solve_problems(const ProblemsOptions& options, Session& session) {
+  session.use_threads();
+  const std::vector<DenseBlanket> problems = read_problems(options.problems);
+  const InterruptGuard guard;
+  StatusLine line(session.common.quiet);
+  const std::vector<ReplayRow> rows = replay_problems(
+      problems, options.topologies, options.population, options.recoveries,
+      [&](std::size_t done) {
+        if (done % 64 == 0)
+          line.show(fmt::format("{} of {} problems solved", done, problems.size()));
+        return !guard.interrupted();
+      },
+      session.registry());
+  line.clear();
+  json::object report = begin_report("study");
+  report["file"] = options.problems;
+  report["problems"] = problems.size();
+  report["rows"] = rows_json(rows);
+  report["status"] = guard.interrupted() ? "interrupted" : "converged";
+  end_report(report);
+  session.write_json(report);
+  Table table({{"topology", Table::Align::left},
+               {"recovery", Table::Align::left},
+               {"nodes", Table::Align::right},
+               {"problems", Table::Align::right},
+               {"refused", Table::Align::right},
+               {"KLD", Table::Align::right},
+               {"excess", Table::Align::right},
+               {"iterations", Table::Align::right},
+               {"topology", Table::Align::right},
+               {"recovery", Table::Align::right}});
+  for (const ReplayRow& row : rows) {
+    table.add({row.topology, row.recovery, row.nodes == 0 ? "all" : fmt::format("{}", row.nodes),
+               fmt::format("{}", row.problems), fmt::format("{}", row.refused),
+               fmt::format("{:.4g}", row.kld), fmt::format("{:.1e}", row.largest_excess),
+               fmt::format("{:.1f}", row.iterations), seconds_text(row.topology_seconds),
+               seconds_text(row.recovery_seconds)});
+  }
+  session.print(table.text(session.colour()));
+  return guard.interrupted() ? kExitInterrupted : 0;
+}
+
+Command add_study_problems(CLI::App& study) {
+  auto options = std::make_shared<ProblemsOptions>();
+  CLI::App* app = study.add_subcommand(
+      "problems", "solve recorded sparsification problems by each topology and recovery");
+  app->add_option("problems", options->problems, "what cairn study sparsify --record has written")
+      ->type_name("FILE")
+      ->required();
+  app->add_option("--topology", options->topologies, "which are related (repeatedly) [ekld]")
+      ->type_name("NAME")
+      ->allow_extra_args(false);
+  app->add_option("--population", options->population, "by how many factors: tree:γ or fill:α")
+      ->type_name("HOW")
+      ->capture_default_str();
+  app->add_option("--recovery", options->recoveries,
+                  "what finds their information (repeatedly) [ncfd]")
+      ->type_name("NAME")
+      ->allow_extra_args(false);
+  app->footer(
+      "Example:\n"
+      "  cairn study problems problems.json --topology mi --recovery fd --recovery ncfd");
+  return {app, [options](Session& session) { return solve_problems(*options, session); }};
+}
+
+}  // namespace
+
+Command add_study(CLI::App& program) {
+  CLI::App* app = program.add_subcommand("study", "what only the tables of papers need");
+  app->require_subcommand(1);
+  const std::vector<Command> studies = {add_study_compact(*app), add_study_sparsify(*app),
+                                        add_study_problems(*app)};
+  app->footer(
+      "Example:\n"
+      "  cairn study sparsify @manhattan --keep-every 5 --record problems.json\n"
+      "  cairn study problems problems.json --recovery ncfd --recovery ip");
+  return {app, [studies](Session& session) {
+            for (const Command& study : studies) {
+              if (study.app->parsed()) return study.run(session);
+            }
+            return 0;
+          }};
+}
+
+}  // namespace cairn::app
