@@ -45,7 +45,7 @@ class Recorded final : public Registration, public FalseMatches {
     if (found == factors_.end()) return {};
     PairRandom random(seed_, earlier, later);
     std::vector<Factor> answer;
-    for (const int f : found->second) answer.push_back(new_factor(*recording_, f));
+    for (const int f : found->second) answer.push_back(recording_->factor(f));
     if (random.chance(false_rate_)) {
       answer.resize(1);
       answer.front().measurement = motions_->draw(extent_, random);

@@ -1,0 +1,70 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: BSD-3-Clause
+# any_folder_may_go.sh [--quick] [FOLDER...]: in a copy of the sources, deletes one plugin's folder after the other (or
+# those given), configures and builds what is left, and runs the tests that are left. With --quick it builds the program
+# and the plugins, without the tests, and only looks at what the program still offers. By hand: the tests take hours.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/../.."
+tests=ON
+if [[ ${1:-} == --quick ]]; then
+  tests=OFF
+  shift
+fi
+# Libraries that several plugins share are no plugins: what needs them goes with them.
+shared=' solvers/block solvers/linear/blas solvers/linear/iterative solvers/nonlinear/descent '
+
+tree=build/any_folder
+rm -rf "$tree/aside"
+mkdir -p "$tree/aside"
+# The build of the last run is kept.
+find "$tree" -mindepth 1 -maxdepth 1 ! -name build ! -name aside -exec rm -rf {} +
+git ls-files -z --cached --others --exclude-standard | xargs -0 tar --ignore-failed-read -cf - 2>/dev/null |
+  tar -xf - -C "$tree"
+cd "$tree"
+unset CAIRN_PLUGIN_PATH
+if [[ ! -f build/release/CMakeCache.txt ]] && command -v ninja >/dev/null; then
+  export CMAKE_GENERATOR=Ninja
+fi
+XDG_DATA_HOME=$PWD/aside
+export XDG_DATA_HOME
+
+folders=("$@")
+if ((${#folders[@]} == 0)); then
+  for list in types/*/CMakeLists.txt solvers/*/*/CMakeLists.txt plugins/*/CMakeLists.txt; do
+    folder=${list%/CMakeLists.txt}
+    [[ $shared == *" $folder "* ]] || folders+=("$folder")
+  done
+fi
+
+# without FOLDER: everything but it, from configuring to the tests. All plugins are linked again, so that none is left
+# over from the run before.
+without() {
+  rm -rf build/release/lib/cairn
+  cmake --preset release -DCAIRN_WERROR=ON -DCAIRN_TESTS=$tests &&
+    cmake --build build/release -j "$(nproc)" &&
+    build/release/bin/cairn plugins &&
+    { [[ $tests == OFF ]] || ctest --test-dir build/release --output-on-failure -j "$(nproc)"; }
+}
+
+failed=()
+for folder in "${folders[@]}"; do
+  [[ -f $folder/CMakeLists.txt ]] || {
+    printf '%s: no folder of a plugin\n' "$folder" >&2
+    exit 2
+  }
+  log=aside/${folder//\//_}.log
+  mv "$folder" aside/gone
+  if without >"$log" 2>&1; then
+    offered=$(build/release/bin/cairn plugins --json - | grep -c '"kind"' || true)
+    printf 'without %-36s %s names on offer\n' "$folder" "$offered"
+  else
+    printf 'without %-36s FAILED: %s\n' "$folder" "$tree/$log"
+    grep -m 5 -iE 'error|\*\*\*Failed|FAILED' "$log" || tail -n 5 "$log"
+    failed+=("$folder")
+  fi
+  mv aside/gone "$folder"
+done
+if ((${#failed[@]})); then
+  printf 'the rest does not do without: %s\n' "${failed[*]}" >&2
+  exit 1
+fi
