@@ -181,19 +181,11 @@ FactorId CompactGraph::update(std::span<const Factor> links, PolicySeconds& seco
                               std::vector<ChangedFactor> changed) {
   if (links.empty() && changed.empty() && solved_ == size()) return 0;
   const auto begin = Clock::now();
-  GraphUpdate update;
-  for (int k = solved_; k < size(); ++k) {
-    Variable& variable = kept_[k].variable;
-    if (!variable.fixed || variable.state.empty()) {
-      const auto state = group_->span(kept_[k].placed.x);
-      variable.state.assign(state.begin(), state.end());
-    }
-    update.variables.push_back(variable);
-    update.factors.push_back(kept_[k].odometry);
-  }
+  GraphUpdate update = odometry_from(solved_);
   update.factors.insert(update.factors.end(), links.begin(), links.end());
   update.changed = std::move(changed);
   const UpdateReport report = estimator_->update(update);  // throws before anything has changed
+  copy_.reset();
   const FactorId first_link = report.first_factor + (size() - solved_);
   for (; solved_ < size(); ++solved_) {
     kept_[solved_].ahead = {};
@@ -207,10 +199,28 @@ FactorId CompactGraph::update(std::span<const Factor> links, PolicySeconds& seco
   return first_link;
 }
 
+GraphUpdate CompactGraph::odometry_from(int first) const {
+  GraphUpdate update;
+  for (int k = first; k < size(); ++k) {
+    Variable variable = kept_[k].variable;
+    if (!variable.fixed || variable.state.empty()) {
+      const auto state = group_->span(kept_[k].placed.x);
+      variable.state.assign(state.begin(), state.end());
+    }
+    update.variables.push_back(std::move(variable));
+    update.factors.push_back(kept_[k].odometry);
+  }
+  return update;
+}
+
 Estimator& CompactGraph::estimator() {
-  PolicySeconds unattended;
-  update({}, unattended);
-  return *estimator_;
+  if (solved_ == size()) return *estimator_;
+  if (!copy_) {
+    copy_ = estimator_->clone();
+    copied_ = solved_;
+  }
+  if (copied_ < size()) copy_->update(odometry_from(std::exchange(copied_, size())));
+  return *copy_;
 }
 
 void CompactGraph::solve_fully() {

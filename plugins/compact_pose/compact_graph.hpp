@@ -21,8 +21,8 @@ namespace cairn::compact {
 /// pose, which may not be kept.
 ///
 /// Poses that odometry alone has added are a chain at the end of the graph, without information
-/// about the others. So they are passed to the estimator only when a link closes a loop, or the
-/// estimator is read, and all of them at once; replacing a redundant pose by the next one does not
+/// about the others. So they are passed to the estimator only when a link closes a loop,
+/// and all of them at once (readers get a copy that has them); replacing a redundant pose by the next one does not
 /// involve it either (Algorithm 1, line 12). Until then their states and covariances follow from
 /// those of the pose at which the chain starts, the anchor a, which the estimator has: with μ the
 /// composed relative pose from there and A = Ad(μ⁻¹),
@@ -34,7 +34,8 @@ class CompactGraph {
  public:
   CompactGraph(std::unique_ptr<Estimator> estimator, CompositionOrder order);
 
-  /// With everything that is kept.
+  /// With everything that is kept: the estimator, or while it does not have all odometry yet, a copy
+  /// that has. Good until the graph changes; reading it changes no later result.
   Estimator& estimator();
   bool empty() const { return kept_.empty(); }
   const RigidGroup& group() const { return *group_; }
@@ -140,7 +141,12 @@ class CompactGraph {
   void hang_newest();
   void know_newest();
 
+  /// Kept poses from this number on, which odometry alone has added, with that.
+  GraphUpdate odometry_from(int first) const;
+
   std::unique_ptr<Estimator> estimator_;
+  std::unique_ptr<Estimator> copy_;  ///< for readers, with the first `copied_` poses; or null
+  int copied_ = 0;
   CompositionOrder order_;
   std::unique_ptr<RigidGroup> group_;
   std::unique_ptr<PoseIndex> index_;

@@ -24,7 +24,7 @@ using testing::SizeIs;
 using Names = std::vector<std::string>;
 
 /// The layers of the core: each may include itself and those before it.
-const Names kLayers{"runtime", "types", "graph", "linear", "solve", "plugin", "io"};
+const Names kLayers{"runtime", "types", "graph", "linear", "solve", "plugin", "io", "typed"};
 /// Libraries beside plugins, which plugins (and libraries) may include.
 const Names kShared{"solvers/block", "solvers/linear/blas", "solvers/linear/iterative",
                     "solvers/nonlinear/descent"};

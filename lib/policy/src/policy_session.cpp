@@ -375,7 +375,7 @@ void PolicySession::report_covariance(const Words& words, Reply& reply) {
     throw bad_line(fmt::format("there is no pose {} in the compact graph", id));
   }
   settle(reply);
-  Estimator& estimator = read_estimator(reply);
+  Estimator& estimator = policy_.estimator();
   const std::string text = covariance_line(estimator, a, motions_->type(), b, motions_->type());
   if (text.empty() && !silent()) {
     throw Error(ErrorCode::numerical,
@@ -390,7 +390,6 @@ void PolicySession::report_estimate(const Words& words, Reply& reply) {
   if (words[1] == "ALL") {
     settle(reply);
     if (newest_) {
-      read_estimator(reply);
       for (const Id id : policy_.kept()) write_estimate(id, answer_);
       if (!in_graph(*newest_)) write_estimate(*newest_, answer_);
     }
@@ -405,7 +404,6 @@ void PolicySession::report_estimate(const Words& words, Reply& reply) {
                     id));
   }
   settle(reply);
-  if (newest_ != id) read_estimator(reply);
   write_estimate(id, answer_);
   answer(reply);
 }
@@ -413,7 +411,7 @@ void PolicySession::report_estimate(const Words& words, Reply& reply) {
 void PolicySession::report_chi2(const Words& words, Reply& reply) {
   expect_words(words, 1, "CHI2");
   settle(reply);
-  answer_ += fmt::format("CHI2 {}\n", read_estimator(reply).chi2());
+  answer_ += fmt::format("CHI2 {}\n", policy_.estimator().chi2());
   answer(reply);
 }
 
@@ -421,7 +419,7 @@ void PolicySession::save(const Words& words, Reply& reply) {
   expect_words(words, 2, "SAVE file");
   if (words[1] == "-") throw bad_line("SAVE writes to a file, not to standard output");
   settle(reply);
-  Estimator& estimator = read_estimator(reply);
+  Estimator& estimator = policy_.estimator();
   if (!silent()) write_graph(estimator.graph(), std::string(words[1]), registry_);
   answer(reply);
 }
@@ -453,7 +451,6 @@ void PolicySession::note_link(const LinkReport& link) {
 void PolicySession::write_results(bool kept, Reply& reply) {
   const bool all = settings_.output == "all", changed = settings_.output == "changed";
   if (all || changed) {
-    read_estimator(reply);
     std::vector<Id> poses = policy_.kept();
     if (!kept) poses.push_back(*newest_);
     for (const Id id : poses) {
@@ -467,7 +464,7 @@ void PolicySession::write_results(bool kept, Reply& reply) {
   }
   if (settings_.output == "last") write_estimate(*newest_, answer_);
   if (!kept || settings_.marginals == "none") return;  // otherwise they are the same as before
-  Estimator& estimator = read_estimator(reply);
+  Estimator& estimator = policy_.estimator();
   const VariableType& type = motions_->type();
   const std::vector<Id> ids =
       settings_.marginals == "last" ? std::vector<Id>{*newest_} : policy_.kept();
@@ -489,11 +486,6 @@ void PolicySession::write_estimate(Id id, std::string& text) const {
   } else {
     text += estimate_line(motions_->type(), id, policy_.estimator().state(id));
   }
-}
-
-Estimator& PolicySession::read_estimator(Reply& reply) {
-  reply.changes = true;
-  return policy_.estimator();
 }
 
 }  // namespace cairn

@@ -118,5 +118,37 @@ TEST_F(Reuse, TheEstimateIsNotWorseThanOdometryMakesIt) {
   EXPECT_LT(error, 0.2 * odometry);
 }
 
+TEST(ReadingAPolicy, ChangesNoLaterResult) {
+  Registry registry;
+  const Simulation world = simulate(registry, "manhattan:poses=250");
+  const auto end_of = [&](bool read) {
+    const auto policy = registry.make<PosePolicy>("compact_pose:range=3,angle=0.8");
+    const auto registration = registry.make<Registration>("recorded");
+    registration->begin({.recording = &world.graph, .truth = &world.truth});
+    int reads = 0;
+    const std::vector<Arrival> poses = pose_chain(world.graph);
+    run_policy(world.graph, poses, *policy, *registration, [&](const PoseReport& report) {
+      if (!read || report.id % 3 != 0) return true;
+      Estimator& estimator = policy->estimator();
+      for (const Id id : policy->kept()) estimator.state(id);
+      estimator.chi2();
+      std::vector<double> block(9);
+      estimator.covariance(policy->kept().front(), policy->kept().back(), block);
+      ++reads;
+      return true;
+    });
+    EXPECT_EQ(reads > 0, read);
+    return policy->estimator().graph();
+  };
+  const Graph quiet = end_of(false), asked = end_of(true);
+  ASSERT_EQ(quiet.variable_count(), asked.variable_count());
+  ASSERT_GT(quiet.variable_count(), 30);
+  ASSERT_GT(quiet.factor_count(), quiet.variable_count());
+  for (int v = 0; v < quiet.variable_count(); ++v) {
+    EXPECT_EQ(quiet.id(v), asked.id(v));
+    EXPECT_TRUE(std::ranges::equal(quiet.state(v), asked.state(v))) << quiet.describe_variable(v);
+  }
+}
+
 }  // namespace
 }  // namespace cairn::compact

@@ -30,9 +30,6 @@ struct PolicySettings {
 /// neither (then the policy has it), and ends with DONE, the line of the next pose or the input.
 /// Lines of data only collect; every command first *settles* what came before it, and reports the
 /// outcome in its answer. What a command refuses is found before it settles anything.
-///
-/// A policy may defer odometry until its estimator is read, which changes the last bits. So a query
-/// that reads the estimator goes to the journal.
 class CAIRN_API PolicySession final : public LineSession {
  public:
   struct Counts {
@@ -106,7 +103,6 @@ class CAIRN_API PolicySession final : public LineSession {
   void write_results(bool kept, Reply& reply);
   bool in_graph(Id id) const;
   void write_estimate(Id id, std::string& text) const;
-  Estimator& read_estimator(Reply& reply);
 
   PosePolicy& policy_;
   StreamFormat& format_;
