@@ -80,7 +80,7 @@ std::vector<double> totals(const ConfigurationResult& result);
 const Summary& median_run(const ConfigurationResult& result);
 /// Whether a run was ended by the limit of time.
 bool ran_out_of_time(const Summary& run, const Stop& stop);
-/// What tells the configurations of a graph apart, one label each: "cholmod" where all have the
+/// Labels that differ between the configurations of a graph, one each: "cholmod" where all have the
 /// same optimizer, "dogleg" where all have the same linear solver, else both.
 std::vector<std::string> configuration_labels(const std::vector<ConfigurationResult>& results);
 /// Median over the rounds of the ratio to the first configuration that ran, in the same round.

@@ -40,7 +40,7 @@ LoadedGraph load_graph(const std::string& name, const InputOptions& options, Ses
 Simulation simulate(const std::string& spec, std::uint64_t seed, Session& session);
 
 /// The format in which a graph is written to `file`: the one that `--to` names, else that of pipes
-/// (g2o) where the file is standard output, else empty: the file's ending tells it.
+/// (g2o) where the file is standard output, else empty: that of the file's ending.
 std::string output_format(const std::string& file, const std::string& named);
 
 /// Finds out before the work whether its result can be written: throws `Error` if no format writes

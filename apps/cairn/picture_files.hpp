@@ -9,7 +9,7 @@
 
 namespace cairn::app {
 
-/// What a picture of `file` is called that nobody has named: "sphere.svg" for maps/sphere.g2o.gz
+/// The name of a plot of `file` where none is given: "sphere.svg" for maps/sphere.g2o.gz
 /// and the ending "svg", in the folder where the program runs; "cairn.svg" for what is not from a
 /// file.
 std::string default_picture(const std::string& file, const std::string& ending);

@@ -57,7 +57,7 @@ class Table {
 std::size_t display_width(std::string_view text);
 /// The text if it takes at most `width` columns, else its beginning and "…".
 std::string shortened(const std::string& text, std::size_t width);
-/// The text in lines of at most `width` columns, broken at blanks and after commas; longer words
+/// The text in lines of at most `width` columns, broken at spaces and after commas; longer words
 /// stay whole.
 std::vector<std::string> folded(const std::string& text, std::size_t width);
 

@@ -59,7 +59,7 @@ struct CompactPoseOptions {
   double gate = 0.0;    ///< part of the right links that pass the consistency check; 0: off
   double trust = 0.01;  ///< see `ConsistencyCheck`
   bool reuse = true;    ///< a pose that is found to be at a kept one is not kept itself
-  /// … where that costs the way to it at most so much [nats a freedom and kept pose nearby].
+  /// … where the link loses at most this information [nats per DoF and kept pose nearby].
   double reuse_loss = 0.06;
   std::string estimator = "incremental_cholesky";
 

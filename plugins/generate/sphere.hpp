@@ -15,7 +15,7 @@ struct SphereOptions {
   int turns = 50;  ///< around the sphere
   int poses_per_turn = 50;
   double radius = 50.0;       ///< of the sphere [m]
-  double loop_density = 1.0;  ///< probability that a pose sees the one a turn earlier
+  double loop_density = 1.0;  ///< probability that a pose sees that of the previous turn
   Noise noise{.translation_sigma = 0.1, .rotation_sigma = 0.02};
   std::int64_t outliers = 0;
 

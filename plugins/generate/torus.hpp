@@ -16,7 +16,7 @@ struct TorusOptions {
   int poses_per_turn = 50;
   double major_radius = 40.0;  ///< of the circle that the tube follows [m]
   double minor_radius = 15.0;  ///< of the tube [m]
-  double loop_density = 0.8;   ///< probability that a pose sees the one a turn earlier
+  double loop_density = 0.8;   ///< probability that a pose sees that of the previous turn
   Noise noise{.translation_sigma = 0.1, .rotation_sigma = 0.02};
   std::int64_t outliers = 0;
 

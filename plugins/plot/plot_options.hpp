@@ -9,7 +9,7 @@
 
 namespace cairn::plot {
 
-/// What a picture shows.
+/// The kinds of plots.
 enum class Subject { automatic, trajectory, convergence, bars, scaling, sparsity, steps };
 constexpr auto enum_names(Subject) {
   return std::to_array<EnumName<Subject>>({{Subject::automatic, "auto"},
@@ -35,7 +35,7 @@ constexpr auto enum_names(Abscissa) {
       {{Abscissa::iterations, "iterations"}, {Abscissa::time, "time"}});
 }
 
-/// Options of the pictures `svg`, `png` and `pdf`.
+/// Options of the plots `svg`, `png` and `pdf`.
 struct PlotOptions {
   Subject what = Subject::automatic;
   int width = 900, height = 600;  ///< [px; in a PDF 1/96 inch]

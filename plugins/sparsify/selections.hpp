@@ -38,9 +38,9 @@ struct PartOptions {
   }
 };
 
-/// The part of the nodes whose loss costs least leaves, round by round: in each those that cost
-/// least and are not neighbours, of an eighth of what is still to leave; then what is left is
-/// looked at again.
+/// The part of the nodes whose removal increases the divergence least leaves, round by round: in
+/// each those with the least divergence that are not neighbours, of an eighth of what is still to
+/// leave; then the rest is evaluated again.
 class LeastLoss final : public NodeSelection {
  public:
   explicit LeastLoss(double part) : part_(part) {}

@@ -37,7 +37,7 @@ struct TopologyOptions {
   }
 };
 
-/// How what a tree tells is taken off Σ̂.
+/// How the information of a tree is subtracted from Σ̂.
 enum class Downdate {
   sum,    ///< by (T 4.23)
   exact,  ///< exactly

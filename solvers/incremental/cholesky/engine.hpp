@@ -80,10 +80,10 @@ struct EngineState {
   int live_factors_ = 0;
   double cost_ = 0.0;                      // sum over factors
   double gained_ = 0.0;                    // of the cost, by steps since factors were evaluated
-  bool must_look_ = false;                 // something has been taken out or changed: what was
-                                           // gained says little
-  int others_ = 0;                         // factors of several variables that notice if these are
-                                           // moved as a whole
+  bool must_look_ = false;                 // something has been removed or changed: `gained_` is
+                                           // no measure then
+  int others_ = 0;                         // factors of several variables that depend on rigid
+                                           // motions of these
   double left_share_ = 1.0;                // how much of the shortfall was left to gain
   double decrease_ = 0.0;                  // of the last solution: gᵀH⁻¹g
   std::vector<FactorId> ids_;              // by factor

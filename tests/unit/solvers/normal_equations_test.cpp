@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "cairn/linear/normal_equations.hpp"
+#include "cairn/solve/optimizer.hpp"
 
 #include <cmath>
 

@@ -47,7 +47,7 @@ class CAIRN_API BatchChecker {
   /// and the linear solver has none.
   BatchChecker(const Graph& recording, BatchProblem problem, Registry& registry);
 
-  /// What has arrived is part of the checks from now on.
+  /// Adds a step of the recording to the graph that is compared.
   void add(const Arrival& arrival);
   BatchCheck check(int step, Estimator& estimator);
 

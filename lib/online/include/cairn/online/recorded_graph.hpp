@@ -14,14 +14,14 @@ namespace cairn {
 /// became possible with it.
 struct Arrival {
   std::vector<int> variables;  ///< by index in the graph: the pose first
-  /// Factors between this pose and the one before, either way round; by position in the graph.
+  /// Factors between this pose and the one before, in either direction; by position in the graph.
   std::vector<int> odometry;
   std::vector<int> links;  ///< all other factors, by position: loop closures, landmarks, priors
 
   int pose() const { return variables.front(); }
 };
 
-/// The order in which a graph that was recorded came about. A step is a pose, in the order of ids,
+/// The order in which a graph was recorded. A step is a pose, in the order of ids,
 /// with everything else of which it is the latest: the factors whose other variables are there, and
 /// the landmarks that no earlier pose has seen. Every variable and every factor is in one step. A
 /// pose is what has an orientation, or no place in space; variables that no pose ever meets come

@@ -16,7 +16,7 @@
 
 namespace cairn {
 
-/// Lays together what belongs together, for an album:
+/// Combines graphs, trajectories, recordings and runs into what `Album` holds:
 ///
 /// - graphs with the same ids over the first of them; the one with the lowest chi2 is the estimate,
 ///   the first otherwise the initial estimate, all others peers;
@@ -30,7 +30,7 @@ class CAIRN_API AlbumBuilder {
  public:
   /// Reads a graph that a report names; none where it is not there (any more). May throw `Error`.
   using Load = std::function<std::optional<Graph>(const std::string& file)>;
-  /// Receives a sentence on what is not shown; all of them are in the album too.
+  /// Receives a sentence on what is not shown; all of them are in `Album` too.
   using Note = std::function<void(const std::string& sentence)>;
 
   explicit AlbumBuilder(Load load, Note note = {})
@@ -50,12 +50,12 @@ class CAIRN_API AlbumBuilder {
     initial_ = &initial;
   }
 
-  /// Puts scenes, notes and comparison into an album; once. Throws `Error` (input) if no graph has
+  /// Puts graphs, notes and comparison into `album`; once. Throws `Error` (input) if no graph has
   /// the ids of the truth, (usage) if there are two comparisons.
   void finish(Album& album);
 
  private:
-  /// A scene, and the graph that it is of, unless it came from a recording.
+  /// A `Scene` with its graph, unless it came from a recording.
   struct Entry {
     Scene scene;
     std::optional<Graph> graph;

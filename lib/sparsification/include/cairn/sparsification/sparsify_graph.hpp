@@ -58,7 +58,7 @@ struct SparsifyProgress {
   enum class Phase {
     select,  ///< nodes are about to be chosen
     remove,  ///< `done` of `total` chosen nodes are taken out
-    feed,    ///< online: `done` of `total` poses have arrived, `kept` variables are in the graph
+    feed,    ///< online: `done` of `total` poses are fed, `kept` variables are in the graph
   };
   Phase phase = Phase::select;
   int done = 0, total = 0, kept = 0;
