@@ -34,7 +34,7 @@ struct CAIRN_API BatchCheck {
 /// How the batch optimisations are set up.
 struct BatchProblem {
   std::shared_ptr<const Loss> loss = nullptr;  ///< shared: graphs and their clones use one loss
-  FactorSelector loss_on;
+  FactorSelector loss_on = {};
   /// Computes the initial estimate of everything so far; empty: the recorded states.
   std::function<void(Graph&)> initialise = {};
   bool covariances = false;  ///< compare the kept block diagonal too
