@@ -284,7 +284,7 @@ void PolicySession::close(Reply& reply) {
   reply.changes = reply.solved = true;
   reply.seconds = report.seconds.total;
   answer_ += fmt::format("{} {}\n", report.kept ? "KEPT" : "DROPPED", report.id);
-  write_results(report.kept, reply);
+  write_results(report.kept);
   answer(reply);
 }
 
@@ -302,7 +302,7 @@ void PolicySession::finish_way(Reply& reply) {
   if (!newest_) return;
   arrived_[*newest_] = true;
   answer_ += fmt::format("KEPT {}\n", *newest_);
-  write_results(true, reply);
+  write_results(true);
 }
 
 // Commands ----------------------------------------------------------------------------------------
@@ -448,7 +448,7 @@ void PolicySession::note_link(const LinkReport& link) {
 }
 
 /// What --output and --marginals ask for at the end of a pose.
-void PolicySession::write_results(bool kept, Reply& reply) {
+void PolicySession::write_results(bool kept) {
   const bool all = settings_.output == "all", changed = settings_.output == "changed";
   if (all || changed) {
     std::vector<Id> poses = policy_.kept();

@@ -100,7 +100,7 @@ class CAIRN_API PolicySession final : public LineSession {
   // Answers
   void answer(Reply& reply);
   void note_link(const LinkReport& link);
-  void write_results(bool kept, Reply& reply);
+  void write_results(bool kept);
   bool in_graph(Id id) const;
   void write_estimate(Id id, std::string& text) const;
 
