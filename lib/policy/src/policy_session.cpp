@@ -289,7 +289,7 @@ void PolicySession::close(Reply& reply) {
 }
 
 /// The newest pose is kept in any case, and everything solved.
-void PolicySession::finish_way(Reply& reply) {
+void PolicySession::finish_way() {
   if (!complete()) {
     answer_ +=
         fmt::format("NOTE pose {} is left out: no relative pose between {} and {} was measured\n",
@@ -428,7 +428,7 @@ void PolicySession::save(const Words& words, Reply& reply) {
 void PolicySession::quit(const Words& words, Reply& reply) {
   expect_words(words, 1, "QUIT");
   reply.quit = true;
-  finish_way(reply);
+  finish_way();
   reply.changes = false;
   answer(reply);
 }

@@ -135,7 +135,7 @@ class Chain {
       for (int column = row; column < n; ++column) information.push_back(100.0 * (row == column));
     }
     const int f = graph_.add_factor(type, variables, z, information);
-    models_.add(graph_, f, false);
+    models_.add(graph_, f);
     models_.linearize(f, graph_, states_);
     if (variables.size() == 2 && !held_[static_cast<std::size_t>(variables[0])])
       system_.connect(variables[0], variables[1]);

@@ -95,7 +95,7 @@ class CAIRN_API PolicySession final : public LineSession {
   void settle(Reply& reply);
   PoseReport end();
   void close(Reply& reply);
-  void finish_way(Reply& reply);
+  void finish_way();
 
   // Answers
   void answer(Reply& reply);
