@@ -88,8 +88,7 @@ void PolicySession::perform(std::string_view line, const Words& words, Reply& re
 
 void PolicySession::finish() {
   if (finished_) return;
-  Reply unread;
-  finish_way(unread);
+  finish_way();
 }
 
 std::int64_t PolicySession::variable_count() const { return std::ssize(policy_.kept()); }
@@ -260,7 +259,6 @@ void PolicySession::settle(Reply& reply) {
 
 /// Ends the pose of now.
 PoseReport PolicySession::end() {
-  Reply unread;
   settle(unread);
   PoseReport report = policy_.end_pose();
   open_ = false;
