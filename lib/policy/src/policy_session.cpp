@@ -88,8 +88,7 @@ void PolicySession::perform(std::string_view line, const Words& words, Reply& re
 
 void PolicySession::finish() {
   if (finished_) return;
-  Reply unread;
-  finish_way(unread);
+  finish_way();
 }
 
 std::int64_t PolicySession::variable_count() const { return std::ssize(policy_.kept()); }
@@ -260,7 +259,6 @@ void PolicySession::settle(Reply& reply) {
 
 /// Ends the pose of now.
 PoseReport PolicySession::end() {
-  Reply unread;
   settle(unread);
   PoseReport report = policy_.end_pose();
   open_ = false;
@@ -284,12 +282,12 @@ void PolicySession::close(Reply& reply) {
   reply.changes = reply.solved = true;
   reply.seconds = report.seconds.total;
   answer_ += fmt::format("{} {}\n", report.kept ? "KEPT" : "DROPPED", report.id);
-  write_results(report.kept, reply);
+  write_results(report.kept);
   answer(reply);
 }
 
 /// The newest pose is kept in any case, and everything solved.
-void PolicySession::finish_way(Reply& reply) {
+void PolicySession::finish_way() {
   if (!complete()) {
     answer_ +=
         fmt::format("NOTE pose {} is left out: no relative pose between {} and {} was measured\n",
@@ -302,7 +300,7 @@ void PolicySession::finish_way(Reply& reply) {
   if (!newest_) return;
   arrived_[*newest_] = true;
   answer_ += fmt::format("KEPT {}\n", *newest_);
-  write_results(true, reply);
+  write_results(true);
 }
 
 // Commands ----------------------------------------------------------------------------------------
@@ -428,7 +426,7 @@ void PolicySession::save(const Words& words, Reply& reply) {
 void PolicySession::quit(const Words& words, Reply& reply) {
   expect_words(words, 1, "QUIT");
   reply.quit = true;
-  finish_way(reply);
+  finish_way();
   reply.changes = false;
   answer(reply);
 }
@@ -448,7 +446,7 @@ void PolicySession::note_link(const LinkReport& link) {
 }
 
 /// What --output and --marginals ask for at the end of a pose.
-void PolicySession::write_results(bool kept, Reply& reply) {
+void PolicySession::write_results(bool kept) {
   const bool all = settings_.output == "all", changed = settings_.output == "changed";
   if (all || changed) {
     std::vector<Id> poses = policy_.kept();

@@ -95,12 +95,12 @@ class CAIRN_API PolicySession final : public LineSession {
   void settle(Reply& reply);
   PoseReport end();
   void close(Reply& reply);
-  void finish_way(Reply& reply);
+  void finish_way();
 
   // Answers
   void answer(Reply& reply);
   void note_link(const LinkReport& link);
-  void write_results(bool kept, Reply& reply);
+  void write_results(bool kept);
   bool in_graph(Id id) const;
   void write_estimate(Id id, std::string& text) const;
 
