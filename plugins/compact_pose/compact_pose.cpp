@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 #include <Eigen/Cholesky>
 
+#include "cairn/graph/packed.hpp"
 #include "cairn/runtime/error.hpp"
 
 namespace cairn::compact {
@@ -47,20 +48,17 @@ double default_gain(int tangent_size, double power) {
 Matrix sensor_covariance(const std::vector<double>& numbers, const RigidGroup& group) {
   Matrix S;
   const int n = group.tangent_size();
-  const auto given = static_cast<int>(numbers.size());
+  const std::size_t given = numbers.size();
   if (given == 2) {
     S = group.isotropic(numbers[0], numbers[1]);
-  } else if (given == n * (n + 1) / 2) {
-    S.resize(n, n);
-    for (int r = 0, k = 0; r < n; ++r) {
-      for (int c = r; c < n; ++c, ++k) S(r, c) = S(c, r) = numbers[k];
-    }
+  } else if (given == packed_size(n)) {
+    S = unpack(numbers, n);
   } else if (given != 0) {
     throw Error(ErrorCode::usage,
                 fmt::format("compact_pose: sensor has {} numbers; expected 2 (standard deviations "
                             "of translation and rotation) or {} (upper triangle of the "
                             "covariance of {})",
-                            given, n * (n + 1) / 2, group.motions().type().tag()));
+                            given, packed_size(n), group.motions().type().tag()));
   }
   if (given != 0 && !(S.allFinite() && Eigen::LLT<Matrix>(S).info() == Eigen::Success))
     throw Error(ErrorCode::usage, "compact_pose: sensor is no positive definite covariance");

@@ -5,6 +5,8 @@
 #include <array>
 #include <cmath>
 
+#include "cairn/graph/packed.hpp"
+
 namespace cairn::initial {
 namespace {
 
@@ -70,15 +72,7 @@ std::vector<Link> cartesian_links(const Graph& graph, int pose_pool) {
 }
 
 Eigen::MatrixXd information_matrix(const Graph& graph, int factor) {
-  const auto packed = graph.information(factor);
-  const int n = graph.factor_type(factor).residual_size();
-  Eigen::MatrixXd information(n, n);
-  for (int row = 0, place = 0; row < n; ++row) {
-    for (int column = row; column < n; ++column, ++place) {
-      information(row, column) = information(column, row) = packed[place];
-    }
-  }
-  return information;
+  return unpack(graph.information(factor), graph.factor_type(factor).residual_size());
 }
 
 }  // namespace cairn::initial

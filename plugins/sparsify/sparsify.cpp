@@ -8,6 +8,7 @@
 #include <limits>
 #include <utility>
 
+#include "cairn/graph/packed.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/sparsification/correlated_pair.hpp"
 
@@ -130,7 +131,7 @@ void Sparsify::add_factors(WorkGraph& work, const LocalProblem& local, const Sol
       size += models[number].size;
     }
     std::vector<double> information =
-        packed(Eigen::Map<const Matrix>(solved.recovery.information[k].data(), size, size));
+        pack(Eigen::Map<const Matrix>(solved.recovery.information[k].data(), size, size));
     work.add(choice.size() == 1 ? local.type : pair_type(local.type, between), std::move(nodes),
              std::move(measurement), std::move(information));
   }

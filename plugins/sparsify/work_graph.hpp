@@ -49,9 +49,4 @@ class WorkGraph {
   std::vector<bool> gone_;
 };
 
-/// Upper triangle, row by row, of a symmetric matrix; and U with UᵀU = A.
-std::vector<double> packed(const Matrix& A);
-std::vector<double> packed_root(const Matrix& A);
-Matrix unpacked(std::span<const double> upper, int n);
-
 }  // namespace cairn::sparsify

@@ -6,7 +6,9 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <Eigen/Core>
 
+#include "cairn/graph/packed.hpp"
 #include "cairn/io/format.hpp"
 
 namespace cairn {
@@ -37,10 +39,8 @@ std::string match_line(const MatchProposal& match, int tangent) {
   std::string text = fmt::format("MATCH {} {} {}", match.earlier, match.later, match.gain);
   for (const double number : match.expected.mean) text += fmt::format(" {}", number);
   if (!match.expected.covariance.empty()) {
-    for (int row = 0; row < tangent; ++row) {
-      for (int column = row; column < tangent; ++column)
-        text += fmt::format(" {}", match.expected.covariance[column * tangent + row]);
-    }
+    const Eigen::Map<const Eigen::MatrixXd> S(match.expected.covariance.data(), tangent, tangent);
+    for (const double number : pack(S)) text += fmt::format(" {}", number);
   }
   return text + '\n';
 }
@@ -259,6 +259,7 @@ void PolicySession::settle(Reply& reply) {
 
 /// Ends the pose of now.
 PoseReport PolicySession::end() {
+  Reply unread;
   settle(unread);
   PoseReport report = policy_.end_pose();
   open_ = false;
