@@ -9,6 +9,7 @@
 #include <utility>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <Eigen/LU>
@@ -251,22 +252,29 @@ std::vector<double> MotionGroup::of_error_metric(const FactorType& type,
 
 Motion MotionGroup::of_factor(const FactorType& type, std::span<const double> measurement,
                               std::span<const double> information) const {
+  return measured(type, measurement, information, std::string(type.tag()));
+}
+
+Motion MotionGroup::measured(const FactorType& type, std::span<const double> measurement,
+                             std::span<const double> information, const std::string& name) const {
   const int rows = type.residual_size();
   if (measurement.size() != static_cast<std::size_t>(type.measurement_size()) ||
       information.size() != packed_size(rows)) {
     throw bad_input(fmt::format(
-        "{}: {} + {} numbers, expected a measurement of {} and an information matrix of {}",
-        type.tag(), measurement.size(), information.size(), type.measurement_size(),
-        packed_size(rows)));
+        "{}: {} + {} numbers, expected a measurement of {} and an information matrix of {}", name,
+        measurement.size(), information.size(), type.measurement_size(), packed_size(rows)));
   }
   Motion motion{{measurement.begin(), measurement.end()}, {}};
   if (const std::string problem = type.normalize(motion.mean.data()); !problem.empty())
-    throw bad_input(fmt::format("{}: {}", type.tag(), problem));
+    throw bad_input(fmt::format("{}: {}", name, problem));
   const std::vector<double> metric = of_error_metric(type, motion.mean);
   const MatrixMap D(metric.data(), rows, tangent_);
   MatrixXd Sigma;
   if (!invert(D.transpose() * unpack(information, rows) * D, Sigma)) {
-    throw bad_input(fmt::format("{}: the information matrix is not positive definite", type.tag()));
+    throw bad_input(
+        fmt::format("{}: the information matrix is not positive definite, and the covariance of a "
+                    "relative pose is its inverse; expected one of full rank",
+                    name));
   }
   motion.covariance = symmetric(Sigma);
   return motion;
@@ -279,7 +287,9 @@ Motion MotionGroup::of_factor(const Factor& factor, Id from) const {
     throw bad_input(fmt::format("{} joins {} variables, not {}", factor.type->tag(),
                                 factor.type->arity(), on.size()));
   }
-  const Motion motion = of_factor(*factor.type, factor.measurement, factor.information);
+  const Motion motion =
+      measured(*factor.type, factor.measurement, factor.information,
+               fmt::format("{} {}", factor.type->tag(), fmt::join(factor.variables, " ")));
   if (from == on[0]) return motion;
   if (from == on[1]) return inverse(motion);
   throw bad_call(fmt::format("{} {} {} is no motion from variable {}, which is not on it",
