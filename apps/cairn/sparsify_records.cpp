@@ -21,6 +21,7 @@
 #include "cairn/io/format.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
+#include "cairn/runtime/timed.hpp"
 #include "json_text.hpp"
 
 namespace cairn::app {
@@ -204,7 +205,7 @@ std::vector<ReplayRow> replay_problems(const std::vector<DenseBlanket>& problems
           both(t, r, nodes, [](Tally& tally) { ++tally.row.refused; });
         continue;
       }
-      const double seconds = std::chrono::duration<double>(Clock::now() - begin).count();
+      const double seconds = seconds_since(begin);
       const RecoveryProblem problem = projection.problem(blanket, chosen);
       double least = std::numeric_limits<double>::infinity();
       std::vector<double> klds(methods.size(), least);

@@ -11,30 +11,17 @@
 
 #include "cairn/graph/packed.hpp"
 #include "cairn/runtime/error.hpp"
+#include "cairn/runtime/timed.hpp"
 
 namespace cairn::compact {
 namespace {
 
-using Clock = std::chrono::steady_clock;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// Covariances are asked for within so many radii.
 constexpr double kAhead = 2.0;
 /// Links that wait: older ones are given up when there are more.
 constexpr std::size_t kMostWaiting = 32;
-
-/// Adds the time until it goes to a sum.
-class Timed {
- public:
-  explicit Timed(double& sum) : sum_(sum), begin_(Clock::now()) {}
-  ~Timed() { sum_ += std::chrono::duration<double>(Clock::now() - begin_).count(); }
-  Timed(const Timed&) = delete;
-  Timed& operator=(const Timed&) = delete;
-
- private:
-  double& sum_;
-  Clock::time_point begin_;
-};
 
 [[noreturn]] void refuse(const std::string& message) { throw Error(ErrorCode::input, message); }
 
