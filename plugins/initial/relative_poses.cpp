@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 
+#include "cairn/geometry/pose.hpp"
 #include "cairn/graph/packed.hpp"
 
 namespace cairn::initial {
@@ -23,10 +24,9 @@ void sort_by_factor(std::vector<Link>& links) {
 }
 
 bool is_cartesian(const FactorType& factor, const VariableType& pose, const VariableType& point) {
-  const Placement *pose_placement = pose.placement(), *point_placement = point.placement();
-  if (!pose_placement || !point_placement || point_placement->has_orientation()) return false;
-  const int d = pose_placement->dimension();
-  if (point_placement->dimension() != d || factor.measurement_size() != d ||
+  if (!has_position(pose) || !is_point(point)) return false;
+  const int d = pose.placement()->dimension();
+  if (point.placement()->dimension() != d || factor.measurement_size() != d ||
       factor.residual_size() != d) {
     return false;
   }
@@ -38,8 +38,7 @@ bool is_cartesian(const FactorType& factor, const VariableType& pose, const Vari
   const std::array<const double*, 2> x{origin.data(), seen.data()};
   std::vector<double> out(seen.size());
   if (!factor.propagate(1, x.data(), z.data(), out.data())) return false;
-  std::array<double, 3> t{};
-  point_placement->split(out.data(), nullptr, t.data());
+  const Eigen::Vector3d t = position(point, out);
   return std::equal(t.begin(), t.begin() + d, z.begin(),
                     [](double a, double b) { return std::abs(a - b) < 1e-12; });
 }

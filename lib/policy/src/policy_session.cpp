@@ -8,15 +8,12 @@
 #include <fmt/ranges.h>
 #include <Eigen/Core>
 
+#include "cairn/geometry/pose.hpp"
 #include "cairn/graph/packed.hpp"
 #include "cairn/io/format.hpp"
 
 namespace cairn {
 namespace {
-
-bool is_pose(const VariableType& type) {
-  return type.lie_group() && type.placement() && type.placement()->has_orientation();
-}
 
 std::string_view word_of(LinkVerdict verdict) {
   switch (verdict) {

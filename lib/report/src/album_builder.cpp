@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 #include <Eigen/Core>
 
+#include "cairn/geometry/pose.hpp"
 #include "cairn/graph/packed.hpp"
 #include "cairn/linear/graph_marginals.hpp"
 #include "cairn/runtime/error.hpp"
@@ -55,7 +56,7 @@ void add_ellipse(const Scene& scene, const Graph& of_scene, SceneEstimate& estim
   const VariableType& type = graph.type(*variable);
   const auto size = static_cast<std::size_t>(type.tangent_size());
   const int dimension = scene.dimension;
-  if (!type.placement() || type.placement()->dimension() != dimension) return;
+  if (!has_position(type) || type.placement()->dimension() != dimension) return;
   const std::vector<double>& sigma = reported.covariance;
   if (sigma.size() != size * size || std::ranges::all_of(sigma, [](double s) { return s == 0; }))
     return;  // of another type, or held

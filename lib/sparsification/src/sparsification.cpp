@@ -11,6 +11,7 @@
 #include <Eigen/Core>
 
 #include "cairn/geometry/motion.hpp"
+#include "cairn/geometry/pose.hpp"
 #include "cairn/graph/gauge.hpp"
 #include "cairn/linear/graph_marginals.hpp"
 #include "cairn/linear/linear_solver.hpp"
@@ -63,25 +64,16 @@ namespace {
 
 struct Point {
   int variable;
-  std::vector<double> t;  ///< what is near is near in these
+  Eigen::Vector3d t;  ///< what is near is near in these
 };
 
-std::vector<double> position(const VariableType& type, std::span<const double> x) {
-  const Placement* placement = type.placement();
-  if (!placement) return {};
-  const auto n = static_cast<std::size_t>(placement->dimension());
-  std::vector<double> R(n * n), t(n);
-  placement->split(x.data(), R.data(), t.data());
-  return t;
-}
-
 /// The point nearest to t; -1: there is none.
-int nearest(const std::vector<Point>& points, const std::vector<double>& t) {
+int nearest(const std::vector<Point>& points, const Eigen::Vector3d& t) {
   int best = -1;
   double least = std::numeric_limits<double>::infinity();
   for (const Point& point : points) {
     double squares = 0.0;
-    for (std::size_t k = 0; k < t.size(); ++k) squares += (point.t[k] - t[k]) * (point.t[k] - t[k]);
+    for (int k = 0; k < 3; ++k) squares += (point.t[k] - t[k]) * (point.t[k] - t[k]);
     if (squares < least) {
       least = squares;
       best = point.variable;
@@ -97,8 +89,8 @@ void Redirection::leave(const Graph& graph, std::span<const int> nodes, std::spa
   for (const int v : nodes) leaving[v] = true;
   for (const int v : also) leaving[v] = true;
   const auto where = [&](const VariableType& type, Id id, std::span<const double> x) {
-    return nearest_ == Nearest::order ? std::vector<double>{static_cast<double>(id)}
-                                      : position(type, x);
+    if (nearest_ == Nearest::order) return Eigen::Vector3d(static_cast<double>(id), 0.0, 0.0);
+    return has_position(type) ? position(type, x) : Eigen::Vector3d(0.0, 0.0, 0.0);
   };
   std::unordered_map<std::string_view, std::vector<Point>> points;
   for (int v = 0; v < graph.variable_count(); ++v) {
@@ -219,13 +211,10 @@ Shift shift(const Graph& original, const Graph& sparse, const std::vector<int>& 
     // Both are seen from q, whose H it is multiplied with.
     type.local(1, sparse.state(v).data(), original.state(at[v]).data(), delta.data());
     result.tangent.push_back(std::move(delta));
-    const Placement* placement = type.placement();
-    if (!placement) continue;
-    const int n = placement->dimension();
-    std::vector<double> R(n * n), p(n), q(n);
-    placement->split(original.state(at[v]).data(), R.data(), p.data());
-    placement->split(sparse.state(v).data(), R.data(), q.data());
-    for (int k = 0; k < n; ++k) squares += (p[k] - q[k]) * (p[k] - q[k]);
+    if (!has_position(type)) continue;
+    const Eigen::Vector3d p = position(type, original.state(at[v]));
+    const Eigen::Vector3d q = position(type, sparse.state(v));
+    for (int k = 0; k < 3; ++k) squares += (p[k] - q[k]) * (p[k] - q[k]);
     ++positions;
   }
   result.rmse =
