@@ -7,7 +7,7 @@
 #include "approximation.hpp"
 #include "cairn/plugin/option_fields.hpp"
 #include "cairn/runtime/timed.hpp"
-#include "cairn/sparsification/sparsification.hpp"
+#include "cairn/sparsification/recovery.hpp"
 #include "initial_information.hpp"
 
 namespace cairn::sparsify {

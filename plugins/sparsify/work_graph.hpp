@@ -5,9 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "approximation.hpp"
 #include "cairn/graph/graph.hpp"
-#include "cairn/sparsification/sparsification.hpp"
 
 namespace cairn::sparsify {
 

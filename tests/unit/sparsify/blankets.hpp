@@ -10,13 +10,13 @@
 
 #include <gtest/gtest.h>
 
+#include "blanket_matrices.hpp"
 #include "cairn/graph/packed.hpp"
 #include "cairn/io/generator.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/solve/optimizer.hpp"
 #include "local_problem.hpp"
 #include "problems.hpp"
-#include "recovery_problem.hpp"
 #include "work_graph.hpp"
 
 namespace cairn::sparsify {
