@@ -10,6 +10,7 @@
 #include "cairn/linear/graph_marginals.hpp"
 #include "cairn/linear/marginals.hpp"
 #include "cairn/runtime/error.hpp"
+#include "cairn/runtime/timed.hpp"
 #include "problem_setup.hpp"
 
 namespace cairn::app {
@@ -64,8 +65,7 @@ DiagonalCovariances diagonal_covariances(const Graph& graph, CovarianceSolver& s
   }
   const auto begin = std::chrono::steady_clock::now();
   result.blocks = marginals.diagonal();
-  result.marginals =
-      std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  result.marginals = seconds_since(begin);
   result.there = true;
   return result;
 }

@@ -17,6 +17,7 @@
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/plugin_call.hpp"
+#include "cairn/runtime/timed.hpp"
 #include "graph_labels.hpp"
 #include "table.hpp"
 
@@ -24,10 +25,6 @@ namespace cairn::app {
 namespace {
 
 constexpr const char* kPipeFormat = "g2o";
-
-double seconds_since(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
 
 /// Takes `seed=N` out of a generator's options, unless the generator has an option of that name.
 std::uint64_t take_seed(ComponentSpec& spec, const OptionTable& table) {

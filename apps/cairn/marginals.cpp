@@ -16,6 +16,7 @@
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/plugin_call.hpp"
 #include "cairn/runtime/threads.hpp"
+#include "cairn/runtime/timed.hpp"
 #include "commands.hpp"
 #include "covariances.hpp"
 #include "graph_files.hpp"
@@ -114,8 +115,7 @@ Answer compute(const Graph& graph, const Request& request, CovarianceSolver& sol
   if (request.diagonal) answer.diagonal = marginals.diagonal();
   if (!request.pairs.empty()) answer.pairs = marginals.blocks(request.pairs);
   if (request.column) answer.column = marginals.column(*request.column);
-  answer.marginals =
-      std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  answer.marginals = seconds_since(begin);
   return answer;
 }
 

@@ -10,6 +10,7 @@
 #include "cairn/evaluation/batch_comparison.hpp"
 #include "cairn/online/recorded_graph.hpp"
 #include "cairn/runtime/error.hpp"
+#include "cairn/runtime/timed.hpp"
 #include "cairn/solve/estimator.hpp"
 #include "commands.hpp"
 #include "graph_files.hpp"
@@ -48,9 +49,8 @@ class Feeder {
     step.report = estimator_.update(update, how);
     const auto updated = Clock::now();
     if (options_.estimate || options_.marginals != "none") read_estimate();
-    const auto end = Clock::now();
-    step.seconds = std::chrono::duration<double>(end - begin).count();
-    step.estimate = std::chrono::duration<double>(end - updated).count();
+    step.seconds = seconds_since(begin);
+    step.estimate = seconds_since(updated);
     for (const Variable& variable : update.variables) known_.push_back(variable.id);
     step.variables = estimator_.variable_count();
     step.factors = estimator_.factor_count();

@@ -8,16 +8,20 @@
 #include <limits>
 #include <map>
 #include <memory>
+#include <stdexcept>
 
 #include <fmt/format.h>
 #include <Eigen/Cholesky>
+#include <Eigen/Core>
 #include <boost/json/parse.hpp>
 #include <boost/json/serialize.hpp>
 #include <boost/json/value_to.hpp>
 
+#include "cairn/graph/packed.hpp"
 #include "cairn/io/format.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
+#include "cairn/runtime/timed.hpp"
 #include "json_text.hpp"
 
 namespace cairn::app {
@@ -31,24 +35,19 @@ json::array array_of(const Numbers& numbers) {
   return json::array(numbers.begin(), numbers.end());
 }
 
+/// The upper triangle of a symmetric matrix that is stored column by column.
 std::vector<double> upper(const std::vector<double>& square, int n) {
-  std::vector<double> numbers;
-  for (int r = 0; r < n; ++r) {
-    for (int c = r; c < n; ++c) numbers.push_back(square[static_cast<std::size_t>(c) * n + r]);
-  }
-  return numbers;
+  return pack(Eigen::Map<const Eigen::MatrixXd>(square.data(), n, n));
 }
 
+/// The inverse of `upper`. Throws `std::invalid_argument` if the numbers are too few or too many.
 std::vector<double> square(const std::vector<double>& upper, int n) {
-  std::vector<double> numbers(static_cast<std::size_t>(n) * n);
-  std::size_t k = 0;
-  for (int r = 0; r < n; ++r) {
-    for (int c = r; c < n; ++c, ++k) {
-      numbers.at(static_cast<std::size_t>(c) * n + r) = upper.at(k);
-      numbers.at(static_cast<std::size_t>(r) * n + c) = upper.at(k);
-    }
+  if (upper.size() != packed_size(n)) {
+    throw std::invalid_argument(fmt::format("an information matrix of {} numbers, expected {}",
+                                            upper.size(), packed_size(n)));
   }
-  return numbers;
+  const Eigen::MatrixXd A = unpack(upper, n);
+  return {A.data(), A.data() + A.size()};
 }
 
 /// First column of each node.
@@ -206,7 +205,7 @@ std::vector<ReplayRow> replay_problems(const std::vector<DenseBlanket>& problems
           both(t, r, nodes, [](Tally& tally) { ++tally.row.refused; });
         continue;
       }
-      const double seconds = std::chrono::duration<double>(Clock::now() - begin).count();
+      const double seconds = seconds_since(begin);
       const RecoveryProblem problem = projection.problem(blanket, chosen);
       double least = std::numeric_limits<double>::infinity();
       std::vector<double> klds(methods.size(), least);

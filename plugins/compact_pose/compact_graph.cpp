@@ -9,15 +9,12 @@
 #include <fmt/format.h>
 
 #include "cairn/runtime/error.hpp"
+#include "cairn/runtime/timed.hpp"
 
 namespace cairn::compact {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-
-double since(Clock::time_point begin) {
-  return std::chrono::duration<double>(Clock::now() - begin).count();
-}
 
 [[noreturn]] void refuse(const std::string& message) { throw Error(ErrorCode::input, message); }
 
@@ -50,7 +47,7 @@ void CompactGraph::start(const Variable& pose, PolicySeconds& seconds) {
   number_.emplace(pose.id, 0);
   index_->add(group_->place(group_->state(first.state)).at.t);
   refresh();
-  seconds.estimate += since(begin);
+  seconds.estimate += seconds_since(begin);
 }
 
 Motion CompactGraph::fuse(std::span<const Factor> factors, Id from, Id to) const {
@@ -195,7 +192,7 @@ FactorId CompactGraph::update(std::span<const Factor> links, PolicySeconds& seco
   anchor_ = newest_.kept ? size() - 1 : newest_.predecessor;
   newest_.ahead = newest_.kept ? Ahead() : compose({}, newest_.odometry);
   refresh();
-  seconds.estimate += since(begin);
+  seconds.estimate += seconds_since(begin);
   return first_link;
 }
 
@@ -294,7 +291,7 @@ void CompactGraph::prepare(std::span<const int> poses, PolicySeconds& seconds) {
     }
   }
   if (!known_ && anchored_version_ == version_) know_newest();
-  seconds.covariances += since(begin);
+  seconds.covariances += seconds_since(begin);
 }
 
 bool CompactGraph::prepared(int pose) const {

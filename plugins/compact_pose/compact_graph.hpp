@@ -22,10 +22,10 @@ namespace cairn::compact {
 ///
 /// Poses that odometry alone has added are a chain at the end of the graph, without information
 /// about the others. So they are passed to the estimator only when a link closes a loop,
-/// and all of them at once (readers get a copy that has them); replacing a redundant pose by the next one does not
-/// involve it either (Algorithm 1, line 12). Until then their states and covariances follow from
-/// those of the pose at which the chain starts, the anchor a, which the estimator has: with μ the
-/// composed relative pose from there and A = Ad(μ⁻¹),
+/// and all of them at once (readers get a copy that has them); replacing a redundant pose by the
+/// next one does not involve it either (Algorithm 1, line 12). Until then their states and
+/// covariances follow from those of the pose at which the chain starts, the anchor a, which the
+/// estimator has: with μ the composed relative pose from there and A = Ad(μ⁻¹),
 ///
 ///     x_n = x_a μ,  Σ_in = Σ_ia Aᵀ,  Σ_nn = A Σ_aa Aᵀ + Σ_μ,
 ///
@@ -34,8 +34,8 @@ class CompactGraph {
  public:
   CompactGraph(std::unique_ptr<Estimator> estimator, CompositionOrder order);
 
-  /// With everything that is kept: the estimator, or while it does not have all odometry yet, a copy
-  /// that has. Good until the graph changes; reading it changes no later result.
+  /// With everything that is kept: the estimator, or while it does not have all odometry yet, a
+  /// copy that has. Good until the graph changes; reading it changes no later result.
   Estimator& estimator();
   bool empty() const { return kept_.empty(); }
   const RigidGroup& group() const { return *group_; }
@@ -91,7 +91,7 @@ class CompactGraph {
   void prepare(std::span<const int> poses, PolicySeconds& seconds);
   bool prepared(int pose) const;
   /// Where the newest is as seen from a kept pose.
-  Placed newest_seen_from(int pose) const {
+  Pose newest_seen_from(int pose) const {
     return RigidGroup::seen_from(kept_[pose].placed, newest_.placed);
   }
   /// From a kept pose to the newest; without covariance.

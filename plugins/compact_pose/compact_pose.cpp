@@ -9,31 +9,19 @@
 #include <fmt/format.h>
 #include <Eigen/Cholesky>
 
+#include "cairn/graph/packed.hpp"
 #include "cairn/runtime/error.hpp"
+#include "cairn/runtime/timed.hpp"
 
 namespace cairn::compact {
 namespace {
 
-using Clock = std::chrono::steady_clock;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// Covariances are asked for within so many radii.
 constexpr double kAhead = 2.0;
 /// Links that wait: older ones are given up when there are more.
 constexpr std::size_t kMostWaiting = 32;
-
-/// Adds the time until it goes to a sum.
-class Timed {
- public:
-  explicit Timed(double& sum) : sum_(sum), begin_(Clock::now()) {}
-  ~Timed() { sum_ += std::chrono::duration<double>(Clock::now() - begin_).count(); }
-  Timed(const Timed&) = delete;
-  Timed& operator=(const Timed&) = delete;
-
- private:
-  double& sum_;
-  Clock::time_point begin_;
-};
 
 [[noreturn]] void refuse(const std::string& message) { throw Error(ErrorCode::input, message); }
 
@@ -47,20 +35,17 @@ double default_gain(int tangent_size, double power) {
 Matrix sensor_covariance(const std::vector<double>& numbers, const RigidGroup& group) {
   Matrix S;
   const int n = group.tangent_size();
-  const auto given = static_cast<int>(numbers.size());
+  const std::size_t given = numbers.size();
   if (given == 2) {
     S = group.isotropic(numbers[0], numbers[1]);
-  } else if (given == n * (n + 1) / 2) {
-    S.resize(n, n);
-    for (int r = 0, k = 0; r < n; ++r) {
-      for (int c = r; c < n; ++c, ++k) S(r, c) = S(c, r) = numbers[k];
-    }
+  } else if (given == packed_size(n)) {
+    S = unpack(numbers, n);
   } else if (given != 0) {
     throw Error(ErrorCode::usage,
                 fmt::format("compact_pose: sensor has {} numbers; expected 2 (standard deviations "
                             "of translation and rotation) or {} (upper triangle of the "
                             "covariance of {})",
-                            given, n * (n + 1) / 2, group.motions().type().tag()));
+                            given, packed_size(n), group.motions().type().tag()));
   }
   if (given != 0 && !(S.allFinite() && Eigen::LLT<Matrix>(S).info() == Eigen::Success))
     throw Error(ErrorCode::usage, "compact_pose: sensor is no positive definite covariance");

@@ -117,7 +117,7 @@ DistanceTest::DistanceTest(const RigidGroup& group, const SensorRange& range)
   if (group.dimension() == 2) range_.test = RotationTest::elements;  // there is one angle
 }
 
-bool DistanceTest::possible(const Placed& d) const {
+bool DistanceTest::possible(const Pose& d) const {
   if (reach_ == kInfinity) return true;
   for (int r = 0; r < group_.dimension(); ++r) {
     if (std::abs(d.t[r]) > reach_ * range_.translation[r]) return false;

@@ -56,7 +56,7 @@ class DistanceTest {
 
   const SensorRange& range() const { return range_; }
   /// False if no covariance could make the displacement pass: its mean alone is too far off.
-  bool possible(const Placed& displacement) const;
+  bool possible(const Pose& displacement) const;
   Dimensions dimensions(const Displacement& displacement) const;
   bool passes(const Dimensions& dimensions) const;
   /// The smallest translation and rotation thresholds with which it would pass.

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "cairn/runtime/error.hpp"
+#include "cairn/runtime/timed.hpp"
 
 namespace cairn::compact {
 namespace {
@@ -95,7 +96,7 @@ void RandomPoses::add_pose(const Variable& pose, std::span<const Factor> odometr
     graph_.advance(pose, motion, odometry.front().type);
     if (kept_.contains(pose.id) || pose.fixed) graph_.keep(report_.seconds);
   }
-  report_.seconds.total = std::chrono::duration<double>(Clock::now() - begin).count();
+  report_.seconds.total = seconds_since(begin);
   const auto planned = linked_.find(pose.id);
   to_match_ = planned == linked_.end() ? std::vector<Id>() : planned->second;
 }
@@ -112,7 +113,7 @@ LinkReport RandomPoses::offer(Id other, std::span<const Factor> measured) {
   if (!measured.empty()) {
     const auto begin = Clock::now();
     graph_.link(measured, report_.seconds);
-    report_.seconds.total += std::chrono::duration<double>(Clock::now() - begin).count();
+    report_.seconds.total += seconds_since(begin);
     link.verdict = LinkVerdict::linked;
     report_.closed_loop = true;
   }

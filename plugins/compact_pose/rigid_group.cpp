@@ -14,21 +14,6 @@
 namespace cairn::compact {
 namespace {
 
-Placed split(const Placement& placement, const State& x) {
-  std::array<double, 9> R{};
-  std::array<double, 3> t{};
-  placement.split(x.data(), R.data(), t.data());
-  Placed at;
-  if (placement.dimension() == 2) {
-    at.R.topLeftCorner<2, 2>() = Eigen::Map<const Eigen::Matrix2d>(R.data());
-    at.t.head<2>() = Eigen::Map<const Eigen::Vector2d>(t.data());
-  } else {
-    at.R = Eigen::Map<const Eigen::Matrix3d>(R.data());
-    at.t = Eigen::Map<const Eigen::Vector3d>(t.data());
-  }
-  return at;
-}
-
 // The arithmetic of a candidate, for each of the two sizes.
 
 template <int N>
@@ -69,7 +54,7 @@ double gain_of(const Matrix& S_y, const Matrix& S_d) {
 
 RigidGroup::RigidGroup(const std::shared_ptr<const VariableType>& type)
     : motions_(type), group_(type->lie_group()), placement_(type->placement()) {
-  if (!placement_ || !placement_->has_orientation()) refuse(*type, "has no position and heading");
+  if (!is_pose(*type)) refuse(*type, "has no position and heading");
   dimension_ = placement_->dimension();
   if (tangent_size() != (dimension_ == 2 ? 3 : 6) || motions_.ambient_size() > kMostAmbient)
     refuse(*type, "has " + std::to_string(tangent_size()) + " degrees of freedom");
@@ -83,7 +68,7 @@ RigidGroup::RigidGroup(const std::shared_ptr<const VariableType>& type)
     group_->exp(step.data(), ahead.data());
     step[k] = -kStep;
     group_->exp(step.data(), back.data());
-    const Placed a = split(*placement_, ahead), b = split(*placement_, back);
+    const Pose a = pose_of(*placement_, ahead.data()), b = pose_of(*placement_, back.data());
     twist_.col(k).head<3>() = (a.t - b.t) / (2.0 * kStep);
     const Eigen::AngleAxisd turn(Eigen::Matrix3d(b.R.transpose() * a.R));
     twist_.col(k).tail<3>() = turn.angle() * turn.axis() / (2.0 * kStep);
@@ -104,8 +89,8 @@ void RigidGroup::check_rigid() const {
       group_->exp(tangent.data(), x[side].data());
     }
     group_->compose(x[0].data(), x[1].data(), product.data());
-    const Placed a = split(*placement_, x[0]), b = split(*placement_, x[1]),
-                 ab = split(*placement_, product);
+    const Pose a = pose_of(*placement_, x[0].data()), b = pose_of(*placement_, x[1].data()),
+               ab = pose_of(*placement_, product.data());
     if ((ab.R - a.R * b.R).norm() > 1e-9 || (ab.t - a.t - a.R * b.t).norm() > 1e-9)
       refuse(motions_.type(), "composes in another way");
   }
@@ -145,12 +130,12 @@ Matrix RigidGroup::adjoint_of_inverse(const State& a) const {
 }
 
 PlacedState RigidGroup::place(const State& x) const {
-  PlacedState placed{x, {}, split(*placement_, x)};
+  PlacedState placed{x, {}, pose_of(*placement_, x.data())};
   group_->inverse(x.data(), placed.inverse.data());
   return placed;
 }
 
-Placed RigidGroup::seen_from(const PlacedState& x_i, const PlacedState& x_n) {
+Pose RigidGroup::seen_from(const PlacedState& x_i, const PlacedState& x_n) {
   return {x_i.at.R.transpose() * x_n.at.R, x_i.at.R.transpose() * (x_n.at.t - x_i.at.t)};
 }
 

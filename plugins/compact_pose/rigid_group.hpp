@@ -8,6 +8,7 @@
 #include <Eigen/Core>
 
 #include "cairn/geometry/motion.hpp"
+#include "cairn/geometry/pose.hpp"
 #include "cairn/types/variable_type.hpp"
 
 namespace cairn::compact {
@@ -19,22 +20,16 @@ using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColM
 using Vector = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, kMostTangent, 1>;
 using State = std::array<double, kMostAmbient>;
 
-/// Where a pose is: rotation and position [m]; about z and in z = 0 for one in the plane.
-struct Placed {
-  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
-  Eigen::Vector3d t = Eigen::Vector3d::Zero();
-};
-
 /// A pose with what displacements from and to it take.
 struct PlacedState {
   State x{}, inverse{};
-  Placed at;
+  Pose at;
 };
 
 /// x_i⁻¹ x_n of two estimated poses, and its covariance (equations 16 and 17).
 struct Displacement {
   State mean{};
-  Placed at;          ///< the same
+  Pose at;            ///< the same
   Matrix adjoint;     ///< Ad(mean⁻¹): a step of x_i moves the displacement by −adjoint · step
   Matrix covariance;  ///< of ξ, mean · exp(ξ)
 };
@@ -61,7 +56,7 @@ class RigidGroup {
   PlacedState place(const State& x) const;
 
   /// Where x_n is as seen from x_i.
-  static Placed seen_from(const PlacedState& x_i, const PlacedState& x_n);
+  static Pose seen_from(const PlacedState& x_i, const PlacedState& x_n);
   /// x_i⁻¹ x_n without its covariance.
   Displacement displacement(const PlacedState& x_i, const PlacedState& x_n) const;
   /// Its covariance from those of the poses: Σ_nn + A Σ_ii Aᵀ − A Σ_in − (A Σ_in)ᵀ, A = Ad(mean⁻¹).

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 #include <Eigen/LU>
 
+#include "cairn/graph/packed.hpp"
 #include "cairn/runtime/error.hpp"
 
 namespace cairn::compact {
@@ -52,10 +53,8 @@ OptionValues ThresholdFinder::found(double probability) const {
     gains.push_back(loop.gain);
   }
   std::string numbers;
-  for (Eigen::Index r = 0; r < sensor.rows(); ++r) {
-    for (Eigen::Index c = r; c < sensor.cols(); ++c)
-      numbers += fmt::format("{}{:.6g}", numbers.empty() ? "" : " ", sensor(r, c));
-  }
+  for (const double number : pack(sensor))
+    numbers += fmt::format("{}{:.6g}", numbers.empty() ? "" : " ", number);
   // Rounded up, so that the farthest loop closure still passes.
   const double up = 1.0 + 1e-6;
   return {

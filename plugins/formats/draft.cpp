@@ -52,7 +52,7 @@ std::int32_t Draft::factor_kind(std::string_view tag, std::string_view name) {
                         type->arity(),
                         type->measurement_size(),
                         residual,
-                        residual * (residual + 1) / 2,
+                        static_cast<int>(packed_size(residual)),
                         std::string(name)};
   factor_kinds_.push_back(kind);
   return static_cast<std::int32_t>(factor_kinds_.size()) - 1;

@@ -8,6 +8,8 @@
 #include <tuple>
 #include <vector>
 
+#include "cairn/geometry/pose.hpp"
+
 namespace cairn::formats {
 namespace {
 
@@ -20,7 +22,7 @@ class Propagator {
   Propagation run() {
     start_from([this](int v) { return has_prior(v) && determine(v); });
     // Poses before points: a point tells nothing about its neighbours.
-    start_from([this](int v) { return is_pose(v) && start_at_identity(v); });
+    start_from([this](int v) { return !is_point(graph_.type(v)) && start_at_identity(v); });
     start_from([this](int v) { return start_at_identity(v); });
     return result_;
   }
@@ -43,10 +45,6 @@ class Propagator {
   const FactorType& type_of(int f) const { return graph_.factor_type(f); }
   std::span<const int> factors_of(int v) const {
     return {factors_.data() + begin_[v], begin_[v + 1] - begin_[v]};
-  }
-  bool is_pose(int v) const {
-    const Placement* placement = graph_.type(v).placement();
-    return !placement || placement->has_orientation();
   }
   bool has_prior(int v) const {
     return std::ranges::any_of(factors_of(v), [this](int f) { return type_of(f).arity() == 1; });

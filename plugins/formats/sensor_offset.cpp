@@ -3,6 +3,8 @@
 
 #include <Eigen/Geometry>
 
+#include "cairn/graph/packed.hpp"
+
 namespace cairn::formats {
 
 std::string SensorOffset::set(std::span<const double, 7> numbers) {
@@ -21,15 +23,9 @@ void SensorOffset::apply_to_point(std::span<double, 3> measurement,
   if (is_identity) return;
   Eigen::Map<Eigen::Vector3d> z(measurement.data());
   z = (R * z + t).eval();
-  Eigen::Matrix3d omega;
-  omega << information[0], information[1], information[2],  //
-      information[1], information[3], information[4],       //
-      information[2], information[4], information[5];
+  const Eigen::Matrix3d omega = unpack<3>(information.data());
   const Eigen::Matrix3d turned = R * omega * R.transpose();
-  std::size_t k = 0;
-  for (int row = 0; row < 3; ++row) {
-    for (int column = row; column < 3; ++column) information[k++] = turned(row, column);
-  }
+  pack(turned, information.data());
 }
 
 }  // namespace cairn::formats

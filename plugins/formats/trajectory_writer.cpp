@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include <array>
-
 #include <fmt/format.h>
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
+#include "cairn/geometry/pose.hpp"
 #include "line_writer.hpp"
 #include "writer_order.hpp"
 #include "writers.hpp"
@@ -15,39 +14,16 @@ namespace {
 /// Readers of TUM files take stamps for doubles.
 constexpr Id kLargestStamp = Id{1} << 53;
 
-/// A variable's placement, or an error: what is nowhere in space is no part of a trajectory.
-const Placement& placement_of(const Graph& graph, int v, std::string_view format) {
-  const Placement* placement = graph.type(v).placement();
-  if (!placement) cannot_express(format, graph.describe_variable(v), "poses and points");
-  return *placement;
-}
-
-/// The poses by rising id; points are left out.
+/// The poses by rising id; points are left out. What has no position is no part of a trajectory.
 std::vector<int> poses_by_id(const Graph& graph, std::string_view format) {
   std::vector<int> poses;
   for (const int v : variables_by_id(graph)) {
-    if (placement_of(graph, v, format).has_orientation()) poses.push_back(v);
+    if (!has_position(graph.type(v)))
+      cannot_express(format, graph.describe_variable(v), "poses and points");
+    if (has_orientation(graph.type(v))) poses.push_back(v);
   }
   if (poses.empty()) cannot_express(format, "a graph without a pose", "at least one pose");
   return poses;
-}
-
-struct Pose {
-  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
-  Eigen::Vector3d t = Eigen::Vector3d::Zero();
-};
-
-/// A pose in space; a planar one lies in z = 0.
-Pose pose_of(const Graph& graph, int v) {
-  const Placement& placement = *graph.type(v).placement();
-  const int n = placement.dimension();
-  std::array<double, 9> R{};
-  std::array<double, 3> t{};
-  placement.split(graph.state(v).data(), R.data(), t.data());
-  Pose pose;
-  pose.R.topLeftCorner(n, n) = Eigen::Map<const Eigen::MatrixXd>(R.data(), n, n);
-  pose.t.head(n) = Eigen::Map<const Eigen::VectorXd>(t.data(), n);
-  return pose;
 }
 
 /// qx qy qz qw with qw ≥ 0. A spatial pose that is kept as a quaternion is written as it is kept,
@@ -69,7 +45,7 @@ std::string write_tum(const Graph& graph) {
       cannot_express("tum", graph.describe_variable(v),
                      "ids from 0 to 2^53, which a stamp holds exactly");
     }
-    const Pose pose = pose_of(graph, v);
+    const Pose pose = pose_of(graph.type(v), graph.state(v));
     const Eigen::Vector4d q = quaternion_of(graph, v, pose);
     out.field(graph.id(v)).fields({pose.t.data(), 3}).fields({q.data(), 4});
     out.end_line();
@@ -86,7 +62,7 @@ std::string write_kitti(const Graph& graph) {
           "kitti", fmt::format("{} in row {}", graph.describe_variable(v), row),
           "poses 0, 1, 2 … without a gap, since the row is the id (format tum keeps ids)");
     }
-    const Pose pose = pose_of(graph, v);
+    const Pose pose = pose_of(graph.type(v), graph.state(v));
     for (int i = 0; i < 3; ++i) {
       for (int j = 0; j < 3; ++j) out.field(pose.R(i, j));
       out.field(pose.t[i]);

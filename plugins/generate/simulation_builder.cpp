@@ -6,6 +6,7 @@
 #include <cmath>
 #include <utility>
 
+#include "cairn/graph/packed.hpp"
 #include "cairn/runtime/error.hpp"
 
 namespace cairn::generate {
@@ -99,7 +100,7 @@ void SimulationBuilder<Pose>::add_factor(int from, int to, const Pose& measured,
   constexpr int kN = Pose::kTangent;
   const Sigmas sigma = sigmas_of(noise_, motion);
   const double scale = noise_.scale == 0.0 ? 1.0 : noise_.scale;
-  std::array<double, kN*(kN + 1) / 2> information{};
+  std::array<double, packed_size(kN)> information{};
   for (int row = 0, place = 0; row < kN; place += kN - row, ++row) {
     const double s = scale * (row < Pose::kDimension ? sigma.translation : sigma.rotation);
     information[place] = 1.0 / (s * s);

@@ -7,6 +7,7 @@
 #include <Eigen/SVD>
 
 #include "block_problem.hpp"
+#include "cairn/geometry/pose.hpp"
 #include "cairn/graph/gauge.hpp"
 #include "cairn/runtime/error.hpp"
 #include "guesses.hpp"
@@ -224,8 +225,8 @@ class ChordalPool {
   void set_state(int variable, const Vector& t) {
     const VariableType& type = graph_.type(variable);
     std::vector<double> x(static_cast<std::size_t>(type.ambient_size()));
-    const bool oriented = type.placement()->has_orientation();
-    type.placement()->join(oriented ? rotation(variable).data() : nullptr, t.data(), x.data());
+    const double* R = has_orientation(type) ? rotation(variable).data() : nullptr;
+    type.placement()->join(R, t.data(), x.data());
     graph_.set_state(variable, x);
     placing_.set_placed(variable);
   }
@@ -276,9 +277,9 @@ class Chordal final : public InitialGuess {
     placing.place_roots(resolve_gauge(graph));
     std::int64_t relative = 0;
     for (std::size_t pool = 0; pool < graph.variable_pools().size(); ++pool) {
-      const Placement* placement = graph.variable_pools()[pool].type->placement();
-      if (!placement || !placement->has_orientation()) continue;
-      relative += placement->dimension() == 2
+      const VariableType& type = *graph.variable_pools()[pool].type;
+      if (!has_orientation(type)) continue;
+      relative += type.placement()->dimension() == 2
                       ? compute_pool<2>(graph, placing, static_cast<int>(pool), notes)
                       : compute_pool<3>(graph, placing, static_cast<int>(pool), notes);
     }

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <numeric>
 
+#include "cairn/geometry/pose.hpp"
 #include "cairn/graph/gauge.hpp"
 #include "guesses.hpp"
 #include "placing.hpp"
@@ -56,7 +57,7 @@ class Incremental final : public InitialGuess {
       add(variable, state);
       for (const int f : factors[variable]) {
         for (const std::int32_t other : whole.factor_variables(f)) {
-          if (index[other] >= 0 || is_pose(whole, other)) continue;
+          if (index[other] >= 0 || !is_point(whole.type(other))) continue;
           std::vector<double> seen(whole.state(other).begin(), whole.state(other).end());
           if (gauge.held[other] || place(other, f, seen)) add(other, seen);
         }
@@ -73,11 +74,6 @@ class Incremental final : public InitialGuess {
       }
       placing.spread();
       placing.finish(notes);
-    }
-
-    static bool is_pose(const Graph& graph, int variable) {
-      const Placement* placement = graph.type(variable).placement();
-      return !placement || placement->has_orientation();
     }
 
     Graph& whole;
@@ -133,7 +129,7 @@ class Incremental final : public InitialGuess {
   static std::vector<int> poses_by_id(const Graph& graph) {
     std::vector<int> order;
     for (int v = 0; v < graph.variable_count(); ++v) {
-      if (Growth::is_pose(graph, v)) order.push_back(v);
+      if (!is_point(graph.type(v))) order.push_back(v);
     }
     std::ranges::stable_sort(order, {}, [&](int v) { return graph.id(v); });
     return order;

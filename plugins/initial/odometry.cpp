@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <array>
 
+#include "cairn/geometry/pose.hpp"
 #include "cairn/graph/gauge.hpp"
 #include "guesses.hpp"
 #include "placing.hpp"
@@ -14,8 +15,7 @@ namespace {
 std::vector<bool> chain_types(const Graph& graph) {
   std::vector<bool> chain(graph.variable_pools().size(), false);
   for (std::size_t p = 0; p < chain.size(); ++p) {
-    const Placement* placement = graph.variable_pools()[p].type->placement();
-    chain[p] = placement && placement->has_orientation();
+    chain[p] = has_orientation(*graph.variable_pools()[p].type);
   }
   for (const FactorPool& pool : graph.factor_pools()) {
     if (pool.type->is_relative()) chain[pool.variable_pools[0]] = true;

@@ -5,6 +5,9 @@
 #include <array>
 #include <cmath>
 
+#include "cairn/geometry/pose.hpp"
+#include "cairn/graph/packed.hpp"
+
 namespace cairn::initial {
 namespace {
 
@@ -21,10 +24,9 @@ void sort_by_factor(std::vector<Link>& links) {
 }
 
 bool is_cartesian(const FactorType& factor, const VariableType& pose, const VariableType& point) {
-  const Placement *pose_placement = pose.placement(), *point_placement = point.placement();
-  if (!pose_placement || !point_placement || point_placement->has_orientation()) return false;
-  const int d = pose_placement->dimension();
-  if (point_placement->dimension() != d || factor.measurement_size() != d ||
+  if (!has_position(pose) || !is_point(point)) return false;
+  const int d = pose.placement()->dimension();
+  if (point.placement()->dimension() != d || factor.measurement_size() != d ||
       factor.residual_size() != d) {
     return false;
   }
@@ -36,8 +38,7 @@ bool is_cartesian(const FactorType& factor, const VariableType& pose, const Vari
   const std::array<const double*, 2> x{origin.data(), seen.data()};
   std::vector<double> out(seen.size());
   if (!factor.propagate(1, x.data(), z.data(), out.data())) return false;
-  std::array<double, 3> t{};
-  point_placement->split(out.data(), nullptr, t.data());
+  const Eigen::Vector3d t = position(point, out);
   return std::equal(t.begin(), t.begin() + d, z.begin(),
                     [](double a, double b) { return std::abs(a - b) < 1e-12; });
 }
@@ -70,15 +71,7 @@ std::vector<Link> cartesian_links(const Graph& graph, int pose_pool) {
 }
 
 Eigen::MatrixXd information_matrix(const Graph& graph, int factor) {
-  const auto packed = graph.information(factor);
-  const int n = graph.factor_type(factor).residual_size();
-  Eigen::MatrixXd information(n, n);
-  for (int row = 0, place = 0; row < n; ++row) {
-    for (int column = row; column < n; ++column, ++place) {
-      information(row, column) = information(column, row) = packed[place];
-    }
-  }
-  return information;
+  return unpack(graph.information(factor), graph.factor_type(factor).residual_size());
 }
 
 }  // namespace cairn::initial

@@ -9,6 +9,7 @@
 #include <string>
 #include <utility>
 
+#include "cairn/geometry/pose.hpp"
 #include "cairn/runtime/error.hpp"
 
 namespace cairn::registration {
@@ -19,20 +20,6 @@ using Translation = std::array<double, 3>;  // D
 
 double norm(std::span<const double> v) {
   return std::sqrt(std::inner_product(v.begin(), v.end(), v.begin(), 0.0));
-}
-
-/// tr R = D − 2 + 2 cos θ, and the strict lower triangle of ½(R − Rᵀ) has the norm |sin θ|, in the
-/// plane and in space.
-double angle_of(const Rotation& R, int dimension) {
-  double trace = 0.0, square = 0.0;
-  for (int column = 0; column < dimension; ++column) {
-    trace += R[column * dimension + column];
-    for (int row = column + 1; row < dimension; ++row) {
-      const double half = 0.5 * (R[column * dimension + row] - R[row * dimension + column]);
-      square += half * half;
-    }
-  }
-  return std::atan2(std::sqrt(square), 0.5 * (trace - (dimension - 2)));
 }
 
 /// Uniform in the unit ball of as many dimensions.
@@ -59,7 +46,7 @@ void draw_rotation(PairRandom& random, double most, std::span<double> w) {
 
 RigidMotions::RigidMotions(std::shared_ptr<const VariableType> type)
     : type_(std::move(type)), group_(type_->lie_group()), placement_(type_->placement()) {
-  if (!group_ || !placement_ || !placement_->has_orientation()) {
+  if (!is_pose(*type_)) {
     throw Error(
         ErrorCode::usage,
         "registration: " + std::string(type_->tag()) +
@@ -102,11 +89,8 @@ std::vector<double> RigidMotions::perturbed(std::span<const double> z, const dou
 }
 
 Extent RigidMotions::extent(std::span<const double> motion) const {
-  Rotation R;
-  Translation t;
-  placement_->split(motion.data(), R.data(), t.data());
-  const int dimension = placement_->dimension();
-  return {norm(std::span(t).first(dimension)), angle_of(R, dimension)};
+  const Pose pose = pose_of(*placement_, motion.data());
+  return {norm({pose.t.data(), 3}), rotation_angle(pose.R)};
 }
 
 std::vector<double> RigidMotions::draw(const Extent& within, PairRandom& random) const {

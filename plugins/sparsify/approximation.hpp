@@ -5,7 +5,7 @@
 
 #include <Eigen/Core>
 
-#include "cairn/sparsification/sparsification.hpp"
+#include "cairn/sparsification/recovery.hpp"
 
 namespace cairn::sparsify {
 

@@ -7,6 +7,7 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 
+#include "cairn/graph/packed.hpp"
 #include "cairn/runtime/error.hpp"
 #include "recovery.hpp"
 
@@ -29,7 +30,7 @@ class Packing {
     for (int k = 0; k < problem.factors(); ++k) {
       begin_.push_back(size_);
       const int m = problem.size(k);
-      size_ += m * (m + 1) / 2;
+      size_ += static_cast<int>(packed_size(m));
     }
   }
   int size() const { return size_; }
@@ -43,9 +44,7 @@ class Packing {
   }
   static Matrix unpack(const double* x, Eigen::Index m) {
     Matrix A(m, m);
-    for (Eigen::Index a = 0; a < m; ++a) {
-      for (Eigen::Index b = a; b < m; ++b) A(a, b) = A(b, a) = *x++;
-    }
+    cairn::unpack(x, A);
     return A;
   }
 

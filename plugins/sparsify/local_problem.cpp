@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 #include <Eigen/Cholesky>
 
+#include "cairn/graph/packed.hpp"
 #include "cairn/runtime/error.hpp"
 
 namespace cairn::sparsify {
@@ -150,7 +151,7 @@ void add_models(const Graph& graph, const LocalProblem& local, Marginal& margina
   const FactorType& type = *local.type;
   const int m = type.residual_size(), t = variable.tangent_size();
   const int n = static_cast<int>(std::ssize(local.blanket)), d = n * t;
-  const std::vector<double> unit = packed(Matrix::Identity(m, m));
+  const std::vector<double> unit = pack(Matrix::Identity(m, m));
   std::vector<double> back(variable.ambient_size()), z(variable.ambient_size());
   Vector r(m);
   for (int i = 0; i < n; ++i) {

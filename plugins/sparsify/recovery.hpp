@@ -6,7 +6,8 @@
 
 #include "approximation.hpp"
 #include "cairn/plugin/option_fields.hpp"
-#include "cairn/sparsification/sparsification.hpp"
+#include "cairn/runtime/timed.hpp"
+#include "cairn/sparsification/recovery.hpp"
 #include "initial_information.hpp"
 
 namespace cairn::sparsify {
@@ -38,7 +39,7 @@ class RecoveryClock {
  public:
   RecoveryClock(const RecoveryOptions& options, bool trace)
       : options_(options), trace_(trace), begin_(Clock::now()) {}
-  double seconds() const { return std::chrono::duration<double>(Clock::now() - begin_).count(); }
+  double seconds() const { return seconds_since(begin_); }
   bool up() const { return options_.seconds > 0.0 && seconds() > options_.seconds; }
   void record(double kld) {
     if (trace_) points_.push_back({seconds(), kld});

@@ -10,6 +10,9 @@
 #include <set>
 #include <utility>
 
+#include <Eigen/Core>
+
+#include "cairn/geometry/pose.hpp"
 #include "cairn/runtime/error.hpp"
 #include "work_graph.hpp"
 
@@ -18,31 +21,6 @@ namespace {
 
 std::size_t share(double part, std::size_t all) {
   return std::min(all, static_cast<std::size_t>(std::llround(part * static_cast<double>(all))));
-}
-
-/// Where a pose is, and its orientation.
-struct Place {
-  std::array<double, 3> t{};
-  Matrix R;
-};
-
-Place place_of(const Graph& graph, int v) {
-  const Placement* placement = graph.type(v).placement();
-  if (!placement) {
-    throw Error(ErrorCode::usage,
-                "selection coverage: " + graph.describe_variable(v) + " has no position");
-  }
-  const int n = placement->dimension();
-  Place place{.R = Matrix::Identity(n, n)};
-  placement->split(graph.state(v).data(), place.R.data(), place.t.data());
-  return place;
-}
-
-/// The angle between two orientations [rad].
-double turn(const Matrix& A, const Matrix& B) {
-  const Matrix C = A.transpose() * B;
-  const double cosine = C.rows() == 2 ? 0.5 * C.trace() : 0.5 * (C.trace() - 1.0);
-  return std::acos(std::clamp(cosine, -1.0, 1.0));
 }
 
 }  // namespace
@@ -142,24 +120,26 @@ std::vector<int> Coverage::select(const Graph& graph, std::span<const int> nodes
   std::vector<bool> may(graph.variable_count());
   for (const int v : nodes) may[v] = true;
   using Cell = std::array<std::int64_t, 3>;
-  std::map<Cell, std::vector<Place>> kept;
-  const auto cell = [&](const Place& place) {
+  std::map<Cell, std::vector<Pose>> kept;
+  const auto cell = [&](const Pose& pose) {
     Cell at{};
     for (std::size_t k = 0; k < 3; ++k)
-      at[k] = static_cast<std::int64_t>(std::floor(place.t[k] / distance_));
+      at[k] = static_cast<std::int64_t>(std::floor(pose.t[static_cast<int>(k)] / distance_));
     return at;
   };
-  const auto covered = [&](const Place& place) {
-    const Cell at = cell(place);
+  const auto covered = [&](const Pose& pose) {
+    const Cell at = cell(pose);
     for (std::int64_t x = -1; x <= 1; ++x) {
       for (std::int64_t y = -1; y <= 1; ++y) {
         for (std::int64_t z = -1; z <= 1; ++z) {
           const auto there = kept.find({at[0] + x, at[1] + y, at[2] + z});
           if (there == kept.end()) continue;
-          for (const Place& other : there->second) {
-            const double apart = std::hypot(place.t[0] - other.t[0], place.t[1] - other.t[1],
-                                            place.t[2] - other.t[2]);
-            if (apart < distance_ && turn(place.R, other.R) < angle_) return true;
+          for (const Pose& other : there->second) {
+            const Eigen::Vector3d apart = pose.t - other.t;
+            if (std::hypot(apart[0], apart[1], apart[2]) < distance_ &&
+                rotation_angle(pose.R.transpose() * other.R) < angle_) {
+              return true;
+            }
           }
         }
       }
@@ -168,12 +148,16 @@ std::vector<int> Coverage::select(const Graph& graph, std::span<const int> nodes
   };
   std::vector<int> chosen;
   for (int v = 0; v < graph.variable_count(); ++v) {
-    if (!may[v] && !graph.type(v).placement()) continue;
-    Place place = place_of(graph, v);
-    if (may[v] && covered(place)) {
+    if (!has_position(graph.type(v))) {
+      if (!may[v]) continue;
+      throw Error(ErrorCode::usage,
+                  "selection coverage: " + graph.describe_variable(v) + " has no position");
+    }
+    const Pose pose = pose_of(graph.type(v), graph.state(v));
+    if (may[v] && covered(pose)) {
       chosen.push_back(v);
     } else {
-      kept[cell(place)].push_back(std::move(place));
+      kept[cell(pose)].push_back(pose);
     }
   }
   return chosen;

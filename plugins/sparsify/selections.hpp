@@ -2,7 +2,7 @@
 #pragma once
 
 #include "cairn/plugin/option_fields.hpp"
-#include "cairn/sparsification/sparsification.hpp"
+#include "cairn/sparsification/selection.hpp"
 
 namespace cairn::sparsify {
 

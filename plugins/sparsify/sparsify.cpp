@@ -3,33 +3,18 @@
 
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <cstdlib>
 #include <limits>
 #include <utility>
 
+#include <fmt/format.h>
+
+#include "cairn/graph/packed.hpp"
 #include "cairn/runtime/error.hpp"
+#include "cairn/runtime/timed.hpp"
 #include "cairn/sparsification/correlated_pair.hpp"
 
 namespace cairn::sparsify {
-namespace {
-
-using Clock = std::chrono::steady_clock;
-
-class Timed {
- public:
-  explicit Timed(double& sum) : sum_(sum), begin_(Clock::now()) {}
-  ~Timed() { sum_ += std::chrono::duration<double>(Clock::now() - begin_).count(); }
-  Timed(const Timed&) = delete;
-  Timed& operator=(const Timed&) = delete;
-
- private:
-  double& sum_;
-  Clock::time_point begin_;
-};
-
-}  // namespace
-
 Sparsify::Sparsify(std::unique_ptr<Topology> topology, std::unique_ptr<FactorRecovery> recovery,
                    SparsifyOptions options)
     : topology_(std::move(topology)), recovery_(std::move(recovery)), options_(options) {}
@@ -96,7 +81,17 @@ Sparsify::Solved Sparsify::solve(const WorkGraph& work, const LocalProblem& loca
       const Timed timed(seconds.topology);
       solved.topology = topology_->choose(dense, count);
     }
-    recover(coordinates, solved, seconds);
+    try {
+      recover(coordinates, solved, seconds);
+    } catch (const Error& error) {
+      const int open = dense.size() - dense.node_sizes.front();
+      if (error.code() != ErrorCode::numerical || coordinates.rank >= open) throw;
+      throw Error(ErrorCode::numerical,
+                  fmt::format("{}: its factors do not determine the relative poses of its {} "
+                              "neighbours (their information has rank {} of {})",
+                              work.graph().describe_variable(local.removed.front()), nodes,
+                              coordinates.rank, open));
+    }
     // A topology that does not grow any more has done what it can.
     const int size = static_cast<int>(std::ssize(solved.topology));
     if (!bounded || solved.recovery.kld <= options_.population.value || count >= all ||
@@ -130,7 +125,7 @@ void Sparsify::add_factors(WorkGraph& work, const LocalProblem& local, const Sol
       size += models[number].size;
     }
     std::vector<double> information =
-        packed(Eigen::Map<const Matrix>(solved.recovery.information[k].data(), size, size));
+        pack(Eigen::Map<const Matrix>(solved.recovery.information[k].data(), size, size));
     work.add(choice.size() == 1 ? local.type : pair_type(local.type, between), std::move(nodes),
              std::move(measurement), std::move(information));
   }

@@ -8,10 +8,10 @@
 #include <vector>
 
 #include "cairn/plugin/option_fields.hpp"
-#include "cairn/sparsification/sparsification.hpp"
+#include "cairn/sparsification/recovery.hpp"
+#include "cairn/sparsification/sparsifier.hpp"
+#include "cairn/sparsification/topology.hpp"
 #include "local_problem.hpp"
-#include "population.hpp"
-#include "recovery_problem.hpp"
 #include "work_graph.hpp"
 
 namespace cairn::sparsify {

@@ -16,9 +16,9 @@
 #include <boost/graph/adjacency_list.hpp>
 #include <boost/graph/kruskal_min_spanning_tree.hpp>
 
+#include "blanket_matrices.hpp"
 #include "cairn/runtime/error.hpp"
 #include "recovery.hpp"
-#include "recovery_problem.hpp"
 
 namespace cairn::sparsify {
 namespace {
@@ -183,7 +183,7 @@ Matrix downdated(const DenseBlanket& blanket, const std::vector<FactorChoice>& t
 
 Matrix mutual_information(const DenseBlanket& blanket, const TopologyOptions& options) {
   const int n = static_cast<int>(std::ssize(blanket.node_sizes));
-  const std::vector<int> begin = offsets(blanket);
+  const std::vector<int> begin = blanket.offsets();
   Matrix result = Matrix::Zero(n, n);
   const bool by_covariance = options.regularization == Regularization::covariance;
   const Matrix S = by_covariance ? regularized_covariance(blanket, options.epsilon) : Matrix();
@@ -212,7 +212,7 @@ std::vector<FactorChoice> DowndatedInformation::choose(const DenseBlanket& blank
   std::vector<FactorChoice> chosen = ChowLiuTree::choose(blanket, population);
   if (static_cast<int>(std::ssize(chosen)) >= population) return chosen;
   const Matrix S = downdated(blanket, chosen, options_.epsilon, downdate_);
-  const std::vector<int> begin = offsets(blanket);
+  const std::vector<int> begin = blanket.offsets();
   const std::vector<Pair> pairs = weighted_pairs(blanket, [&](int i, int j) {
     return information_of(pair_block(S, begin, i, j), blanket.node_sizes[i]);
   });
@@ -268,7 +268,7 @@ std::vector<FactorChoice> ExpectedDivergence::choose(const DenseBlanket& blanket
 
 std::vector<FactorChoice> OffDiagonalDeterminant::choose(const DenseBlanket& blanket,
                                                          int population) {
-  const std::vector<int> begin = offsets(blanket);
+  const std::vector<int> begin = blanket.offsets();
   const auto L = information(blanket);
   const std::vector<Pair> pairs = weighted_pairs(blanket, [&](int i, int j) {
     const int m = blanket.node_sizes[i], n = blanket.node_sizes[j];
@@ -304,7 +304,7 @@ std::vector<FactorChoice> SparseInverse::choose(const DenseBlanket& blanket, int
     rho *= factor;
     U /= factor;
   }
-  const std::vector<int> begin = offsets(blanket);
+  const std::vector<int> begin = blanket.offsets();
   return tree_first(
       blanket,
       weighted_pairs(

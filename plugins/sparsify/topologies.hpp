@@ -8,7 +8,7 @@
 
 #include "approximation.hpp"
 #include "cairn/plugin/option_fields.hpp"
-#include "cairn/sparsification/sparsification.hpp"
+#include "cairn/sparsification/topology.hpp"
 
 namespace cairn::sparsify {
 

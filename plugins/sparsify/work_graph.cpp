@@ -7,32 +7,23 @@
 
 #include <Eigen/Cholesky>
 
+#include "cairn/graph/packed.hpp"
 #include "cairn/runtime/error.hpp"
 
 namespace cairn::sparsify {
 
-std::vector<double> packed(const Matrix& A) {
-  std::vector<double> upper;
-  for (Eigen::Index r = 0; r < A.rows(); ++r) {
-    for (Eigen::Index c = r; c < A.cols(); ++c) upper.push_back(A(r, c));
-  }
-  return upper;
-}
+namespace {
 
-std::vector<double> packed_root(const Matrix& A) {
-  const Eigen::LLT<Matrix> llt(A);
-  if (llt.info() != Eigen::Success)
+/// U with UᵀU = A. Throws `Error` (numerical) unless A is positive definite.
+std::vector<double> cholesky_factor(std::span<const double> A, int n) {
+  const Eigen::LLT<Eigen::MatrixXd> llt(unpack(A, n));
+  Eigen::MatrixXd U = llt.matrixU();
+  if (llt.info() != Eigen::Success || !U.allFinite())
     throw Error(ErrorCode::numerical, "an information matrix is not positive definite");
-  return packed(llt.matrixU());
+  return pack(U);
 }
 
-Matrix unpacked(std::span<const double> upper, int n) {
-  Matrix A(n, n);
-  for (int r = 0, k = 0; r < n; ++r) {
-    for (int c = r; c < n; ++c, ++k) A(r, c) = A(c, r) = upper[k];
-  }
-  return A;
-}
+}  // namespace
 
 WorkGraph::WorkGraph(const Graph& graph)
     : graph_(&graph), on_(graph.variable_count()), gone_(graph.variable_count()) {
@@ -89,7 +80,7 @@ void WorkGraph::add(std::shared_ptr<const FactorType> type, std::vector<int> var
   const int n = type->residual_size();
   const int f = factor_count();
   for (const int v : variables) on_[v].push_back(f);
-  std::vector<double> root = packed_root(unpacked(information, n));
+  std::vector<double> root = cholesky_factor(information, n);
   factors_.push_back({.type = std::move(type),
                       .variables = std::move(variables),
                       .measurement = std::move(measurement),

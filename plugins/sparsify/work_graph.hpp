@@ -5,9 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "approximation.hpp"
 #include "cairn/graph/graph.hpp"
-#include "cairn/sparsification/sparsification.hpp"
 
 namespace cairn::sparsify {
 
@@ -48,10 +46,5 @@ class WorkGraph {
   std::vector<std::vector<int>> on_;
   std::vector<bool> gone_;
 };
-
-/// Upper triangle, row by row, of a symmetric matrix; and U with UᵀU = A.
-std::vector<double> packed(const Matrix& A);
-std::vector<double> packed_root(const Matrix& A);
-Matrix unpacked(std::span<const double> upper, int n);
 
 }  // namespace cairn::sparsify

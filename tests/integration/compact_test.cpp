@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <filesystem>
 #include <sstream>
 #include <string>
 
@@ -189,6 +190,19 @@ TEST_F(Compact, SaysWhatIsWrongAndWhatWouldWork) {
               HasSubstr("does not find its options"));
   EXPECT_THAT(refused({kWorld, "--range", "3", "-o", "-", "--trajectory", "-"}, 2),
               HasSubstr("standard output"));
+}
+
+TEST_F(Compact, RefusesAnEdgeThatLeavesADirectionUnknown) {
+  const std::string in = folder_.file("in.g2o"), out = folder_.file("out.g2o");
+  write_text(in,
+             "VERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 1 0 0\nVERTEX_SE2 2 2 0 0\n"
+             "EDGE_SE2 0 1 1 0 0 100 0 0 100 0 100\n"
+             "EDGE_SE2 1 2 1 0 0 100 0 0 100 0 0\n"
+             "EDGE_SE2 0 2 2 0 0 100 0 0 100 0 100\n");
+  const Outcome run = cairn({"compact", in, "--range", "3", "-o", out, "--quiet"});
+  EXPECT_EQ(run.exit_code, 3);
+  EXPECT_THAT(run.err, HasSubstr("EDGE_SE2 1 2: the information matrix is not positive definite"));
+  EXPECT_FALSE(std::filesystem::exists(out));
 }
 
 }  // namespace

@@ -25,6 +25,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using testing::AllOf;
 using testing::HasSubstr;
+using testing::Not;
 using testing::SizeIs;
 
 class Sparsify : public testing::Test {
@@ -74,6 +75,27 @@ TEST_F(Sparsify, AllPairsOfSmallBlanketsLoseNothing) {
   EXPECT_NEAR(number(told.at("kld")), 0.0, 1e-6);
   EXPECT_EQ(told.at("poses").at("kept").as_int64(), 21);  // the newest too
   EXPECT_EQ(told.at("factors").at("out").as_int64(), 20);
+}
+
+// Without the edge's angle, what the node tells of its neighbours leaves their angle open.
+TEST_F(Sparsify, LeavesANodeInWhoseEdgesDoNotRelateItsNeighbours) {
+  const std::string in = folder_.file("in.g2o"), out = folder_.file("out.g2o");
+  write_text(in,
+             "VERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 1 0 0\nVERTEX_SE2 2 2 0 0\nVERTEX_SE2 3 3 0.1 0\n"
+             "VERTEX_SE2 4 4 0.1 0\nVERTEX_SE2 5 5 0.1 0\nFIX 0\n"
+             "EDGE_SE2 0 1 1 0 0 100 0 0 100 0 100\n"
+             "EDGE_SE2 1 2 1 0 0 100 0 0 100 0 0\n"
+             "EDGE_SE2 2 3 1 0 0 100 0 0 100 0 100\n"
+             "EDGE_SE2 3 4 1 0 0 100 0 0 100 0 100\n"
+             "EDGE_SE2 4 5 1 0 0 100 0 0 100 0 100\n"
+             "EDGE_SE2 0 5 5.01 0 0 100 0 0 100 0 100\n");
+  const Outcome run = cairn({"sparsify", in, "--keep-every", "2", "-o", out});
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_THAT(run.err, AllOf(HasSubstr("not taken out: VERTEX_SE2 2"), HasSubstr("rank 2 of 3")));
+  const std::string left = read_text(out);
+  EXPECT_THAT(left, AllOf(HasSubstr("EDGE_SE2 1 2 1 0 0 100 0 0 100 0 0\n"),
+                          HasSubstr("VERTEX_SE2 2 "), Not(HasSubstr("nan"))));
+  EXPECT_THAT(left, Not(HasSubstr("VERTEX_SE2 4 ")));
 }
 
 TEST_F(Sparsify, MoreFactorsLoseLess) {

@@ -191,7 +191,7 @@ int Graph::add_factor(std::shared_ptr<const FactorType> type, std::span<const in
   check_ends(*type, variables);
   const int n = type->residual_size();
   const std::size_t measurement_size = size_of(type->measurement_size());
-  const std::size_t information_size = size_of(n * (n + 1) / 2);
+  const std::size_t information_size = packed_size(n);
   if (measurement.size() != measurement_size || information.size() != information_size) {
     throw bad_input(
         fmt::format("{}: {} + {} numbers, expected a measurement of {} and the upper triangle of "
@@ -296,8 +296,7 @@ void Graph::remove_factors(const std::vector<bool>& leaves,
   for (FactorPool& pool : factor_pools_) {
     const std::size_t arity = static_cast<std::size_t>(pool.type->arity()),
                       measurement = static_cast<std::size_t>(pool.type->measurement_size()),
-                      n = static_cast<std::size_t>(pool.type->residual_size()),
-                      packed = n * (n + 1) / 2;
+                      packed = packed_size(pool.type->residual_size());
     std::size_t kept = 0;
     for (std::size_t f = 0; f < pool.size(); ++f) {
       const std::int32_t now = position[pool.sequence[f]];
@@ -415,14 +414,13 @@ std::span<const double> Graph::measurement(int position) const {
 
 std::span<const double> Graph::information(int position) const {
   const FactorPool& pool = factor_pools_[factors_[position].pool];
-  const std::size_t n = static_cast<std::size_t>(pool.type->residual_size()),
-                    size = n * (n + 1) / 2;
+  const std::size_t size = packed_size(pool.type->residual_size());
   return {pool.information.data() + factors_[position].entry * size, size};
 }
 
 std::span<const double> Graph::sqrt_information(int position) const {
   const FactorPool& pool = factor_pools_[factors_[position].pool];
-  const std::size_t n = size_of(pool.type->residual_size()), size = n * (n + 1) / 2;
+  const std::size_t size = packed_size(pool.type->residual_size());
   return {pool.sqrt_information.data() + factors_[position].entry * size, size};
 }
 
@@ -458,8 +456,7 @@ std::vector<int> Graph::factors_of(int variable) const {
 void Graph::set_measurement(int position, std::span<const double> measurement,
                             std::span<const double> information) {
   FactorPool& pool = factor_pools_[factors_[position].pool];
-  const std::size_t n = static_cast<std::size_t>(pool.type->residual_size()),
-                    packed = n * (n + 1) / 2;
+  const std::size_t packed = packed_size(pool.type->residual_size());
   const std::size_t size = static_cast<std::size_t>(pool.type->measurement_size());
   const std::size_t entry = static_cast<std::size_t>(factors_[position].entry);
   if (measurement.size() != size || (!information.empty() && information.size() != packed) ||
@@ -471,7 +468,7 @@ void Graph::set_measurement(int position, std::span<const double> measurement,
   std::string problem = pool.type->normalize(z.data());
   Root root;
   if (!information.empty()) {
-    root = root_of(information, static_cast<int>(n));
+    root = root_of(information, pool.type->residual_size());
     if (problem.empty()) problem = problem_of(root, information);
   }
   if (!problem.empty()) throw bad_input(fmt::format("{}: {}", describe_factor(position), problem));

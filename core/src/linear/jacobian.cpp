@@ -7,6 +7,7 @@
 #include <numeric>
 #include <stdexcept>
 
+#include "cairn/graph/packed.hpp"
 #include "cairn/runtime/threads.hpp"
 #include "cairn/types/loss.hpp"
 #include "graph/factor_call.hpp"
@@ -138,7 +139,6 @@ struct JacobianEvaluator::Plan {
     const FactorPool& pool = graph->factor_pools()[p];
     const FactorType& type = *pool.type;
     const auto arity = static_cast<std::size_t>(type.arity());
-    const auto n = static_cast<std::size_t>(type.residual_size());
     thread_local std::vector<const double*> states;
     thread_local std::vector<double*> jacobians;
     states.resize(arity);
@@ -152,7 +152,7 @@ struct JacobianEvaluator::Plan {
     call_factor(type, [&] {
       type.evaluate(
           states.data(), view.measurements + f * static_cast<std::size_t>(type.measurement_size()),
-          view.sqrt_information + f * (n * (n + 1) / 2),
+          view.sqrt_information + f * packed_size(type.residual_size()),
           J.residual().data() + structure.row_offsets()[pool.sequence[f]], jacobians.data());
     });
   }

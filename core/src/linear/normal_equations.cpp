@@ -2,30 +2,16 @@
 #include "cairn/linear/normal_equations.hpp"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 
 #include <fmt/format.h>
 #include <Eigen/Eigenvalues>
 #include <Eigen/SparseCholesky>
 
+#include "cairn/runtime/timed.hpp"
+
 namespace cairn {
 namespace {
-
-using Clock = std::chrono::steady_clock;
-
-/// Adds the time from here to the end of the scope.
-class Timed {
- public:
-  explicit Timed(double& seconds) : seconds_(seconds), begin_(Clock::now()) {}
-  Timed(const Timed&) = delete;
-  Timed& operator=(const Timed&) = delete;
-  ~Timed() { seconds_ += std::chrono::duration<double>(Clock::now() - begin_).count(); }
-
- private:
-  double& seconds_;
-  Clock::time_point begin_;
-};
 
 /// Eigenvalues of the scaled H below this count as zero: rounding leaves a true zero at about 1e-16
 /// times a small power of the size.

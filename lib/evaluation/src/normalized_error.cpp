@@ -10,6 +10,7 @@
 #include <Eigen/Core>
 #include <Eigen/QR>
 
+#include "cairn/geometry/pose.hpp"
 #include "cairn/linear/graph_marginals.hpp"
 #include "cairn/linear/linearizer.hpp"
 #include "cairn/runtime/error.hpp"
@@ -24,8 +25,7 @@ std::vector<std::vector<double>> moved_truth(const Graph& estimate, const Graph&
   for (int v = 0; v < estimate.variable_count(); ++v) {
     const VariableType& type = estimate.type(v);
     const LieGroup* group = type.lie_group();
-    const bool is_pose = group && type.placement() && type.placement()->has_orientation();
-    if (!is_pose || type.tag() != estimate.type(0).tag()) {
+    if (!is_pose(type) || type.tag() != estimate.type(0).tag()) {
       throw Error(ErrorCode::usage, "no normalised error: " + estimate.describe_variable(v) +
                                         " is no pose of a Lie group, or of another than the first");
     }
@@ -80,20 +80,16 @@ struct Position {
   Eigen::MatrixXd G;  ///< its derivative by δ, dimension × tangent
 };
 
-Position position(const Graph& graph, int v) {
+Position linearized_position(const Graph& graph, int v) {
   const VariableType& type = graph.type(v);
-  const Placement* place = type.placement();
-  if (!place) {
+  if (!has_position(type)) {
     throw Error(ErrorCode::usage,
                 "no expected error: " + graph.describe_variable(v) + " has no position");
   }
-  const int d = place->dimension();
-  std::vector<double> R(static_cast<std::size_t>(d) * static_cast<std::size_t>(d));
-  Position result{Eigen::VectorXd(d), {}};
-  place->split(graph.state(v).data(), R.data(), result.t.data());
+  const int d = type.placement()->dimension();
   const std::vector<double> G = position_jacobian(type, graph.state(v));
-  result.G = Eigen::Map<const Eigen::MatrixXd>(G.data(), d, type.tangent_size());
-  return result;
+  return {position(type, graph.state(v)).head(d),
+          Eigen::Map<const Eigen::MatrixXd>(G.data(), d, type.tangent_size())};
 }
 
 /// What the generators of rigid motions do to positions: columns, orthonormal.
@@ -124,7 +120,7 @@ double expected_ate(Estimator& estimator, const Graph& graph, std::span<const Id
   if (poses.empty()) return 0.0;
   const auto n = static_cast<Eigen::Index>(poses.size());
   std::vector<Position> positions;
-  for (const Id id : poses) positions.push_back(position(graph, *graph.find(id)));
+  for (const Id id : poses) positions.push_back(linearized_position(graph, *graph.find(id)));
   const Eigen::Index d = positions.front().t.size(), tangent = positions.front().G.cols();
   const std::vector<double> joint = joint_covariance(estimator, poses, static_cast<int>(tangent));
   const Eigen::Map<const Eigen::MatrixXd> all(joint.data(), tangent * n, tangent * n);

@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 #include <Eigen/Core>
 
+#include "cairn/geometry/pose.hpp"
 #include "cairn/io/format.hpp"
 #include "cairn/runtime/error.hpp"
 
@@ -45,19 +46,12 @@ double stamp_of(std::string_view text, const std::string& where) {
 Trajectory trajectory(const Graph& graph) {
   Trajectory result;
   for (int v = 0; v < graph.variable_count(); ++v) {
-    const Placement* placement = graph.type(v).placement();
-    if (!placement || !placement->has_orientation()) continue;
+    if (!has_orientation(graph.type(v))) continue;
+    const Pose at = pose_of(graph.type(v), graph.state(v));
     TrajectoryPose pose;
     pose.id = graph.id(v);
-    if (placement->dimension() == 3) {
-      placement->split(graph.state(v).data(), pose.R.data(), pose.t.data());
-    } else {
-      std::array<double, 4> R{};
-      std::array<double, 2> t{};
-      placement->split(graph.state(v).data(), R.data(), t.data());
-      pose.t = {t[0], t[1], 0.0};
-      pose.R = {R[0], R[1], 0.0, R[2], R[3], 0.0, 0.0, 0.0, 1.0};
-    }
+    std::copy_n(at.t.data(), 3, pose.t.begin());
+    std::copy_n(at.R.data(), 9, pose.R.begin());
     result.push_back(pose);
   }
   std::sort(result.begin(), result.end(),

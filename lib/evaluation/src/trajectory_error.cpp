@@ -11,6 +11,7 @@
 #include <Eigen/Geometry>
 #include <Eigen/SVD>
 
+#include "cairn/geometry/pose.hpp"
 #include "cairn/runtime/threads.hpp"
 
 namespace cairn {
@@ -22,11 +23,6 @@ using Eigen::Quaterniond;
 using Eigen::Vector3d;
 
 constexpr double kDegrees = 57.295779513082320877;  // of a radian
-
-struct Pose {
-  Matrix3d R;
-  Vector3d t;
-};
 
 Pose pose_of(const TrajectoryPose& pose) {
   return {Eigen::Map<const Matrix3d>(pose.R.data()), Eigen::Map<const Vector3d>(pose.t.data())};

@@ -9,10 +9,12 @@
 #include <utility>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <Eigen/LU>
 
+#include "cairn/graph/packed.hpp"
 #include "cairn/runtime/error.hpp"
 
 namespace cairn {
@@ -130,26 +132,6 @@ MatrixXd information_of(const Motion& motion, int n) {
   return Omega;
 }
 
-MatrixXd unpacked(std::span<const double> information, int n) {
-  MatrixXd Omega(n, n);
-  std::size_t k = 0;
-  for (int row = 0; row < n; ++row) {
-    for (int column = row; column < n; ++column)
-      Omega(row, column) = Omega(column, row) = information[k++];
-  }
-  return Omega;
-}
-
-std::vector<double> packed(const MatrixXd& Omega) {
-  std::vector<double> information;
-  information.reserve(static_cast<std::size_t>(Omega.rows() * (Omega.rows() + 1) / 2));
-  for (Eigen::Index row = 0; row < Omega.rows(); ++row) {
-    for (Eigen::Index column = row; column < Omega.cols(); ++column)
-      information.push_back(0.5 * (Omega(row, column) + Omega(column, row)));
-  }
-  return information;
-}
-
 }  // namespace
 
 MotionGroup::MotionGroup(std::shared_ptr<const VariableType> type) : type_(std::move(type)) {
@@ -261,7 +243,7 @@ std::vector<double> MotionGroup::of_error_metric(const FactorType& type,
   }
   std::vector<double> one = numbers(ambient_), error = numbers(rows), D = numbers(rows * tangent_);
   type_->identity(one.data());
-  const std::vector<double> unit = packed(MatrixXd::Identity(rows, rows));
+  const std::vector<double> unit = pack(MatrixXd::Identity(rows, rows));
   const std::array<const double*, 2> x{one.data(), z.data()};
   const std::array<double*, 2> jacobians{nullptr, D.data()};
   type.evaluate(x.data(), z.data(), unit.data(), error.data(), jacobians.data());
@@ -270,22 +252,29 @@ std::vector<double> MotionGroup::of_error_metric(const FactorType& type,
 
 Motion MotionGroup::of_factor(const FactorType& type, std::span<const double> measurement,
                               std::span<const double> information) const {
+  return measured(type, measurement, information, std::string(type.tag()));
+}
+
+Motion MotionGroup::measured(const FactorType& type, std::span<const double> measurement,
+                             std::span<const double> information, const std::string& name) const {
   const int rows = type.residual_size();
   if (measurement.size() != static_cast<std::size_t>(type.measurement_size()) ||
-      information.size() != static_cast<std::size_t>(rows * (rows + 1) / 2)) {
+      information.size() != packed_size(rows)) {
     throw bad_input(fmt::format(
-        "{}: {} + {} numbers, expected a measurement of {} and an information matrix of {}",
-        type.tag(), measurement.size(), information.size(), type.measurement_size(),
-        rows * (rows + 1) / 2));
+        "{}: {} + {} numbers, expected a measurement of {} and an information matrix of {}", name,
+        measurement.size(), information.size(), type.measurement_size(), packed_size(rows)));
   }
   Motion motion{{measurement.begin(), measurement.end()}, {}};
   if (const std::string problem = type.normalize(motion.mean.data()); !problem.empty())
-    throw bad_input(fmt::format("{}: {}", type.tag(), problem));
+    throw bad_input(fmt::format("{}: {}", name, problem));
   const std::vector<double> metric = of_error_metric(type, motion.mean);
   const MatrixMap D(metric.data(), rows, tangent_);
   MatrixXd Sigma;
-  if (!invert(D.transpose() * unpacked(information, rows) * D, Sigma)) {
-    throw bad_input(fmt::format("{}: the information matrix is not positive definite", type.tag()));
+  if (!invert(D.transpose() * unpack(information, rows) * D, Sigma)) {
+    throw bad_input(
+        fmt::format("{}: the information matrix is not positive definite, and the covariance of a "
+                    "relative pose is its inverse; expected one of full rank",
+                    name));
   }
   motion.covariance = symmetric(Sigma);
   return motion;
@@ -298,7 +287,9 @@ Motion MotionGroup::of_factor(const Factor& factor, Id from) const {
     throw bad_input(fmt::format("{} joins {} variables, not {}", factor.type->tag(),
                                 factor.type->arity(), on.size()));
   }
-  const Motion motion = of_factor(*factor.type, factor.measurement, factor.information);
+  const Motion motion =
+      measured(*factor.type, factor.measurement, factor.information,
+               fmt::format("{} {}", factor.type->tag(), fmt::join(factor.variables, " ")));
   if (from == on[0]) return motion;
   if (from == on[1]) return inverse(motion);
   throw bad_call(fmt::format("{} {} {} is no motion from variable {}, which is not on it",
@@ -316,9 +307,8 @@ Factor MotionGroup::to_factor(std::shared_ptr<const FactorType> type, Id from, I
         type->tag(), type->residual_size(), tangent_));
   }
   const MatrixXd D_inverse = MatrixMap(metric.data(), tangent_, tangent_).inverse();
-  std::vector<double> information =
-      packed(D_inverse.transpose() * information_of(motion, tangent_) * D_inverse);
-  return {std::move(type), {from, to}, motion.mean, std::move(information)};
+  const MatrixXd Omega = D_inverse.transpose() * information_of(motion, tangent_) * D_inverse;
+  return {std::move(type), {from, to}, motion.mean, pack(0.5 * (Omega + Omega.transpose()))};
 }
 
 }  // namespace cairn

@@ -11,6 +11,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
 
+#include "cairn/geometry/pose.hpp"
 #include "cairn/runtime/error.hpp"
 
 namespace cairn {
@@ -23,7 +24,7 @@ using State = std::vector<double>;
 
 void check(const VariableType& type, const OdometryChain& chain, std::span<const double> from,
            std::span<const double> to) {
-  if (!type.lie_group() || !type.placement()) {
+  if (!type.lie_group() || !has_position(type)) {
     throw Error(ErrorCode::usage,
                 fmt::format("recover: {} lacks the ability LieGroup or Placement; poses such "
                             "as VERTEX_SE2 and VERTEX_SE3:QUAT have",
@@ -43,13 +44,11 @@ void check(const VariableType& type, const OdometryChain& chain, std::span<const
 /// w_1 … w_q: which share of the way is behind the robot after each step.
 std::vector<double> shares_of_way(const VariableType& type, const OdometryChain& chain,
                                   Recovery how) {
-  const Placement& placement = *type.placement();
-  const int d = placement.dimension();
-  std::vector<double> shares, R(static_cast<std::size_t>(d * d));
-  Eigen::VectorXd t(d);
+  const int d = type.placement()->dimension();
+  std::vector<double> shares;
   double way = 0.0;
   for (const ChainStep& step : chain.steps) {
-    placement.split(step.motion.data(), R.data(), t.data());
+    const Eigen::VectorXd t = position(type, step.motion).head(d);
     way += t.stableNorm();
     shares.push_back(way);
   }

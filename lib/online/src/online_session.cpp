@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "cairn/graph/packed.hpp"
 #include "cairn/io/format.hpp"
 #include "cairn/runtime/error.hpp"
 
@@ -178,8 +179,8 @@ void OnlineSession::change(const Words& words, Reply& reply) {
   const bool known = changed.factor >= 0 && changed.factor < std::ssize(factor_types_);
   const FactorType* type = known ? factor_types_[changed.factor].get() : nullptr;
   if (!type) throw bad_line(fmt::format("there is no factor {} that can be changed", words[1]));
-  const auto n = static_cast<std::size_t>(type->residual_size()),
-             size = static_cast<std::size_t>(type->measurement_size()), packed = n * (n + 1) / 2;
+  const std::size_t size = static_cast<std::size_t>(type->measurement_size()),
+                    packed = packed_size(type->residual_size());
   const std::span<const std::string_view> numbers = std::span(words).subspan(2);
   if (numbers.size() != size && numbers.size() != size + packed) {
     throw bad_line(fmt::format(

@@ -11,6 +11,7 @@
 
 #include <fmt/format.h>
 
+#include "cairn/geometry/pose.hpp"
 #include "cairn/geometry/pose_chain.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/update/graph_update.hpp"
@@ -20,16 +21,11 @@ namespace {
 
 constexpr int kNever = std::numeric_limits<int>::max();
 
-bool is_pose(const Graph& graph, int variable) {
-  const Placement* placement = graph.type(variable).placement();
-  return !placement || placement->has_orientation();
-}
-
 /// The step of each pose; kNever for all else.
 std::vector<int> steps_of_poses(const Graph& graph, int& steps) {
   std::vector<int> poses;
   for (int v = 0; v < graph.variable_count(); ++v) {
-    if (is_pose(graph, v)) poses.push_back(v);
+    if (!is_point(graph.type(v))) poses.push_back(v);
   }
   std::ranges::stable_sort(poses, {}, [&](int v) { return graph.id(v); });
   std::vector<int> step(static_cast<std::size_t>(graph.variable_count()), kNever);
@@ -76,7 +72,7 @@ std::vector<Arrival> arrival_order(const Graph& graph) {
   std::vector<Arrival> arrivals(static_cast<std::size_t>(steps));
   for (int pass = 0; pass < 2; ++pass) {  // poses, then what they see
     for (int v = 0; v < graph.variable_count(); ++v) {
-      if (is_pose(graph, v) == (pass == 0))
+      if (is_point(graph.type(v)) == (pass == 1))
         arrivals[std::min(step[v], steps - 1)].variables.push_back(v);
     }
   }
@@ -119,7 +115,7 @@ Error bad_input(const std::string& message) { return {ErrorCode::input, message}
 void check_poses(const Graph& graph) {
   for (int v = 0; v < graph.variable_count(); ++v) {
     const VariableType& type = graph.type(v);
-    if (!type.lie_group() || !type.placement() || !type.placement()->has_orientation()) {
+    if (!is_pose(type)) {
       throw bad_input(
           fmt::format("{} is no pose of a Lie group, and this takes pose graphs only: a robot's "
                       "poses and relative poses between them, without landmarks",

@@ -11,6 +11,7 @@
 #include "cairn/linear/linear_solver.hpp"
 #include "cairn/linear/linearizer.hpp"
 #include "cairn/linear/normal_equations.hpp"
+#include "cairn/runtime/timed.hpp"
 
 namespace cairn {
 namespace {
@@ -29,7 +30,7 @@ class WatchedRegistration final : public Registration {
   std::vector<Factor> match(Id earlier, Id later) override {
     const auto begin = Clock::now();
     std::vector<Factor> factors = inner_.match(earlier, later);
-    result_.registration_seconds += std::chrono::duration<double>(Clock::now() - begin).count();
+    result_.registration_seconds += seconds_since(begin);
     ++result_.proposed;
     result_.registered += !factors.empty();
     if (!factors.empty() && was_false(earlier, later)) ++result_.false_registered;

@@ -6,15 +6,14 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <Eigen/Core>
 
+#include "cairn/geometry/pose.hpp"
+#include "cairn/graph/packed.hpp"
 #include "cairn/io/format.hpp"
 
 namespace cairn {
 namespace {
-
-bool is_pose(const VariableType& type) {
-  return type.lie_group() && type.placement() && type.placement()->has_orientation();
-}
 
 std::string_view word_of(LinkVerdict verdict) {
   switch (verdict) {
@@ -37,10 +36,8 @@ std::string match_line(const MatchProposal& match, int tangent) {
   std::string text = fmt::format("MATCH {} {} {}", match.earlier, match.later, match.gain);
   for (const double number : match.expected.mean) text += fmt::format(" {}", number);
   if (!match.expected.covariance.empty()) {
-    for (int row = 0; row < tangent; ++row) {
-      for (int column = row; column < tangent; ++column)
-        text += fmt::format(" {}", match.expected.covariance[column * tangent + row]);
-    }
+    const Eigen::Map<const Eigen::MatrixXd> S(match.expected.covariance.data(), tangent, tangent);
+    for (const double number : pack(S)) text += fmt::format(" {}", number);
   }
   return text + '\n';
 }

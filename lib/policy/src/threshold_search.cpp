@@ -11,6 +11,7 @@
 
 #include "cairn/evaluation/normalized_error.hpp"
 #include "cairn/runtime/error.hpp"
+#include "cairn/runtime/timed.hpp"
 
 namespace cairn {
 namespace {
@@ -156,7 +157,7 @@ FoundThresholds find_thresholds(const PolicyJob& job, std::size_t count, double 
     };
     refine_thresholds(finder, test, found, [&] { return setting.interrupted(); });
   }
-  found.seconds = std::chrono::duration<double>(Clock::now() - begin).count();
+  found.seconds = seconds_since(begin);
   return found;
 }
 

@@ -8,7 +8,10 @@
 #include <string_view>
 
 #include <fmt/format.h>
+#include <Eigen/Core>
 
+#include "cairn/geometry/pose.hpp"
+#include "cairn/graph/packed.hpp"
 #include "cairn/linear/graph_marginals.hpp"
 #include "cairn/runtime/error.hpp"
 
@@ -53,16 +56,15 @@ void add_ellipse(const Scene& scene, const Graph& of_scene, SceneEstimate& estim
   const VariableType& type = graph.type(*variable);
   const auto size = static_cast<std::size_t>(type.tangent_size());
   const int dimension = scene.dimension;
-  if (!type.placement() || type.placement()->dimension() != dimension) return;
+  if (!has_position(type) || type.placement()->dimension() != dimension) return;
   const std::vector<double>& sigma = reported.covariance;
   if (sigma.size() != size * size || std::ranges::all_of(sigma, [](double s) { return s == 0; }))
     return;  // of another type, or held
   const std::vector<double> world = position_covariance(type, graph.state(*variable), sigma);
   estimate.covariance_variables.push_back(*of_scene.find(reported.id));
-  for (int r = 0; r < dimension; ++r) {
-    for (int c = r; c < dimension; ++c)
-      estimate.covariance_upper.push_back(static_cast<float>(world[c * dimension + r]));
-  }
+  const Eigen::Map<const Eigen::MatrixXd> S(world.data(), dimension, dimension);
+  for (const double number : pack(S))
+    estimate.covariance_upper.push_back(static_cast<float>(number));
 }
 
 /// The lowest chi2 is the estimate; where it is not the first file's, that one is what it began

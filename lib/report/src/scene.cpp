@@ -8,6 +8,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
+#include "cairn/geometry/pose.hpp"
 #include "cairn/graph/gauge.hpp"
 #include "cairn/runtime/error.hpp"
 
@@ -17,39 +18,10 @@ namespace {
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 constexpr std::size_t kMostTypes = 255;
 
-/// A place in space, planar ones at z = 0.
-struct Place {
-  Eigen::Vector3d t = Eigen::Vector3d::Constant(kNone);
-  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
-  bool oriented = false;
-};
-
-Place place_of(const VariableType& type, const double* x) {
-  Place place;
-  const Placement* placement = type.placement();
-  if (!placement) return place;
-  std::array<double, 9> R{};
-  std::array<double, 3> t{};
-  placement->split(x, R.data(), t.data());
-  place.t = Eigen::Vector3d(t[0], t[1], placement->dimension() == 3 ? t[2] : 0.0);
-  place.oriented = placement->has_orientation();
-  if (!place.oriented) return place;
-  if (placement->dimension() == 3) {
-    place.R = Eigen::Map<const Eigen::Matrix3d>(R.data());
-  } else {
-    place.R.topLeftCorner<2, 2>() = Eigen::Map<const Eigen::Matrix2d>(R.data());
-  }
-  return place;
-}
-
-bool is_pose(const VariableType& type) {
-  return type.placement() && type.placement()->has_orientation();
-}
-
 int dimension_of(const Graph& graph, const std::string& name) {
   int dimension = 0;
   for (const VariablePool& pool : graph.variable_pools()) {
-    if (pool.type->placement() && !pool.variables.empty()) {
+    if (has_position(*pool.type) && !pool.variables.empty()) {
       dimension = std::max(dimension, pool.type->placement()->dimension());
     }
   }
@@ -66,8 +38,8 @@ int dimension_of(const Graph& graph, const std::string& name) {
 std::array<double, 3> middle(const Graph& graph) {
   Eigen::AlignedBox3d box;
   for (int v = 0; v < graph.variable_count(); ++v) {
-    const Place place = place_of(graph.type(v), graph.state(v).data());
-    if (place.t.allFinite()) box.extend(place.t);
+    const Eigen::Vector3d t = position(graph.type(v), graph.state(v));
+    if (t.allFinite()) box.extend(t);
   }
   if (box.isEmpty()) return {};
   const Eigen::Vector3d center = box.center();
@@ -81,7 +53,7 @@ void add_variables(const Graph& graph, Scene& scene) {
   }
   for (const VariablePool& pool : graph.variable_pools()) {
     scene.variable_types.push_back(
-        {std::string(pool.type->tag()), is_pose(*pool.type), pool.type->tangent_size()});
+        {std::string(pool.type->tag()), has_orientation(*pool.type), pool.type->tangent_size()});
   }
   for (int v = 0; v < graph.variable_count(); ++v) {
     scene.ids.push_back(graph.id(v));
@@ -95,8 +67,8 @@ EdgeClass class_of(const Graph& graph, int factor, bool closes_loop) {
   const auto variables = graph.factor_variables(factor);
   if (variables.size() == 1) return EdgeClass::prior;
   if (variables.size() != 2) return EdgeClass::other;
-  const bool first = is_pose(graph.type(variables[0]));
-  const bool second = is_pose(graph.type(variables[1]));
+  const bool first = has_orientation(graph.type(variables[0]));
+  const bool second = has_orientation(graph.type(variables[1]));
   if (first != second) return EdgeClass::landmark;
   if (!first) return EdgeClass::other;
   return closes_loop ? EdgeClass::loop : EdgeClass::odometry;
@@ -127,7 +99,7 @@ void add_edges(const Graph& graph, Scene& scene) {
 void add_path(const Graph& graph, Scene& scene) {
   std::vector<std::int32_t> poses;
   for (int v = 0; v < graph.variable_count(); ++v) {
-    if (is_pose(graph.type(v))) poses.push_back(v);
+    if (has_orientation(graph.type(v))) poses.push_back(v);
   }
   std::sort(poses.begin(), poses.end(), [&](int x, int y) { return graph.id(x) < graph.id(y); });
   scene.edge_types.push_back({"path", 0});
@@ -140,14 +112,16 @@ void add_path(const Graph& graph, Scene& scene) {
 }
 
 void set_place(SceneEstimate& estimate, const Scene& scene, std::size_t variable,
-               const Place& place) {
+               const VariableType& type, std::span<const double> x) {
+  if (!has_position(type)) return;
+  const Pose pose = pose_of(type, x);
   const auto d = static_cast<std::size_t>(scene.dimension);
-  for (std::size_t k = 0; k < d; ++k) estimate.positions[d * variable + k] = place.t[int(k)];
-  if (!place.oriented) return;
+  for (std::size_t k = 0; k < d; ++k) estimate.positions[d * variable + k] = pose.t[int(k)];
+  if (!has_orientation(type)) return;
   if (d == 2) {
-    estimate.orientation[variable] = static_cast<float>(std::atan2(place.R(1, 0), place.R(0, 0)));
+    estimate.orientation[variable] = static_cast<float>(std::atan2(pose.R(1, 0), pose.R(0, 0)));
   } else {
-    const Eigen::Quaterniond q(place.R);
+    const Eigen::Quaterniond q(pose.R);
     const Eigen::Vector4f xyzw = q.coeffs().cast<float>();
     std::copy_n(xyzw.data(), 4, estimate.orientation.begin() + std::ptrdiff_t(4 * variable));
   }
@@ -198,7 +172,7 @@ Scene scene_of(const Graph& graph, std::string name) {
 SceneEstimate place(const Graph& graph, const Scene& scene, std::string name, EstimateRole role) {
   SceneEstimate estimate = nowhere(scene, std::move(name), role);
   for (int v = 0; v < graph.variable_count(); ++v) {
-    set_place(estimate, scene, std::size_t(v), place_of(graph.type(v), graph.state(v).data()));
+    set_place(estimate, scene, std::size_t(v), graph.type(v), graph.state(v));
   }
   if (graph.factor_count() == 0) return estimate;
   const std::vector<double> norms = squared_norms(graph);
@@ -221,10 +195,11 @@ SceneEstimate place_by_id(const Graph& other, const Scene& scene, std::string na
     if (!found) continue;
     const VariableType& type = other.type(*found);
     // A landmark of one file is not a pose of another that happens to have its number.
-    if (!type.placement() || is_pose(type) != scene.variable_types[scene.variable_type[v]].pose) {
+    if (!has_position(type) ||
+        has_orientation(type) != scene.variable_types[scene.variable_type[v]].pose) {
       continue;
     }
-    set_place(estimate, scene, v, place_of(type, other.state(*found).data()));
+    set_place(estimate, scene, v, type, other.state(*found));
     ++matched;
   }
   return estimate;
@@ -238,10 +213,9 @@ void copy_positions(const Graph& graph, const Values& values, int dimension,
     const VariablePool& pool = graph.variable_pools()[p];
     const auto size = static_cast<std::size_t>(pool.type->ambient_size());
     for (std::size_t slot = 0; slot < pool.variables.size(); ++slot) {
-      const Place place = place_of(*pool.type, values.pools[p].data() + slot * size);
+      const Eigen::Vector3d t = position(*pool.type, {values.pools[p].data() + slot * size, size});
       for (std::size_t k = 0; k < d; ++k) {
-        out[d * std::size_t(pool.variables[slot]) + k] =
-            static_cast<float>(place.t[int(k)] - origin[k]);
+        out[d * std::size_t(pool.variables[slot]) + k] = static_cast<float>(t[int(k)] - origin[k]);
       }
     }
   }

@@ -6,24 +6,13 @@
 
 #include <Eigen/Core>
 
+#include "cairn/graph/packed.hpp"
 #include "cairn/runtime/error.hpp"
 
 namespace cairn {
-namespace {
 
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-
-/// U, upper triangular, packed row by row.
-MatrixXd unpacked(const double* packed, int n) {
-  MatrixXd U = MatrixXd::Zero(n, n);
-  for (int r = 0; r < n; ++r) {
-    for (int c = r; c < n; ++c) U(r, c) = *packed++;
-  }
-  return U;
-}
-
-}  // namespace
 
 CorrelatedPair::CorrelatedPair(std::shared_ptr<const FactorType> relative, std::array<int, 2> first,
                                std::array<int, 2> second)
@@ -40,9 +29,7 @@ CorrelatedPair::CorrelatedPair(std::shared_ptr<const FactorType> relative, std::
     throw Error(ErrorCode::usage, "a correlated pair is on three variables");
   tags_.assign(3, relative_->variable_tags()[0]);
   const int m = relative_->residual_size();
-  for (int r = 0; r < m; ++r) {
-    for (int c = r; c < m; ++c) unit_.push_back(r == c ? 1.0 : 0.0);
-  }
+  unit_ = pack(MatrixXd::Identity(m, m));
 }
 
 std::string CorrelatedPair::normalize(double* measurement) const {
@@ -68,12 +55,12 @@ void CorrelatedPair::evaluate(const double* const* x, const double* measurement,
     J.block(k * m, a * t, m, t) = Ja;
     J.block(k * m, b * t, m, t) = Jb;
   }
-  const MatrixXd U = unpacked(sqrt_information, 2 * m);
-  Eigen::Map<VectorXd>(residual, 2 * m) = U.triangularView<Eigen::Upper>() * r;
+  const MatrixXd both = unpack({sqrt_information, packed_size(2 * m)}, 2 * m);
+  const auto U = both.triangularView<Eigen::Upper>();
+  Eigen::Map<VectorXd>(residual, 2 * m) = U * r;
   for (int v = 0; jacobians && v < 3; ++v) {
     if (!jacobians[v]) continue;
-    Eigen::Map<MatrixXd>(jacobians[v], 2 * m, t) =
-        U.triangularView<Eigen::Upper>() * J.middleCols(v * t, t);
+    Eigen::Map<MatrixXd>(jacobians[v], 2 * m, t) = U * J.middleCols(v * t, t);
   }
 }
 

@@ -14,16 +14,13 @@
 #include "cairn/geometry/pose_chain.hpp"
 #include "cairn/online/recorded_graph.hpp"
 #include "cairn/runtime/error.hpp"
+#include "cairn/runtime/timed.hpp"
 #include "cairn/solve/estimator.hpp"
 
 namespace cairn {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-
-double since(Clock::time_point begin) {
-  return std::chrono::duration<double>(Clock::now() - begin).count();
-}
 
 /// The parts that the job names.
 struct Parts {
@@ -106,7 +103,7 @@ SparsifyResult sparsify_whole(const Graph& graph, const SparsifyJob& job,
   const auto begin = Clock::now();
   const std::vector<int> nodes =
       parts.selection->select(original, open_nodes(original), *parts.sparsifier);
-  result.select_seconds = since(begin);
+  result.select_seconds = seconds_since(begin);
   result.change = take_out(original, nodes, parts, setting);
   result.interrupted = setting.interrupted();
   result.sparse = original.clone();
@@ -152,7 +149,7 @@ class OnlineRun {
       feed(arrival);
       ++count;
       if (count % job_.online == 0) sparsify();
-      result_.steps.push_back(since(begin));
+      result_.steps.push_back(seconds_since(begin));
       report(setting_, {SparsifyProgress::Phase::feed, count, total, estimator_->variable_count()});
       result_.interrupted = setting_.interrupted();
       if (result_.interrupted) break;
@@ -244,7 +241,7 @@ class OnlineRun {
     pending_ = std::move(later);
     const auto begin = Clock::now();
     const std::vector<int> chosen = parts_.selection->select(graph, nodes, *parts_.sparsifier);
-    result_.select_seconds += since(begin);
+    result_.select_seconds += seconds_since(begin);
     const Sparsification change = take_out(graph, chosen, parts_, setting_);
     result_.change.add(change);
     result_.change.removed_variables.insert(result_.change.removed_variables.end(),

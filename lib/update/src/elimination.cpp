@@ -163,9 +163,7 @@ class Eliminator {
   }
 
   void add(int f, const Columns& columns, Quadratic& total) const {
-    const FactorRef ref = graph_.ref(f);
-    const FactorPool& pool = graph_.factor_pools()[ref.pool];
-    const FactorType& type = *pool.type;
+    const FactorType& type = graph_.factor_type(f);
     const int rows = type.residual_size();
     const auto variables = graph_.factor_variables(f);
     std::vector<const double*> x;
@@ -177,9 +175,8 @@ class Eliminator {
     }
     for (MatrixXd& block : J) targets.push_back(block.data());
     VectorXd r(rows);
-    const std::size_t packed = static_cast<std::size_t>(rows) * (rows + 1) / 2;
-    type.evaluate(x.data(), graph_.measurement(f).data(),
-                  pool.sqrt_information.data() + ref.entry * packed, r.data(), targets.data());
+    type.evaluate(x.data(), graph_.measurement(f).data(), graph_.sqrt_information(f).data(),
+                  r.data(), targets.data());
     const double weight = weight_of(f, r.squaredNorm());
     for (std::size_t a = 0; a < variables.size(); ++a) {
       const auto row = columns.place.find(variables[a]);

@@ -7,6 +7,7 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 
+#include "cairn/graph/packed.hpp"
 #include "cairn/runtime/error.hpp"
 
 namespace cairn {
@@ -95,12 +96,7 @@ MarginalPrior::MarginalPrior(std::vector<Variable> variables, LinearResidual res
 }
 
 std::vector<double> MarginalPrior::unit_information() const {
-  std::vector<double> packed;
-  for (int row = 0; row < residual_.rows; ++row) {
-    for (int column = row; column < residual_.rows; ++column)
-      packed.push_back(row == column ? 1.0 : 0.0);
-  }
-  return packed;
+  return pack(Eigen::MatrixXd::Identity(residual_.rows, residual_.rows));
 }
 
 /// dr/dε of variable k is A_k D_k⁻¹: a step ε from x_k changes local(origin_k, x_k) by D_k⁻¹ε (see

@@ -9,16 +9,13 @@
 #include "cairn/graph/gauge.hpp"
 #include "cairn/linear/normal_equations.hpp"
 #include "cairn/runtime/error.hpp"
+#include "cairn/runtime/timed.hpp"
 #include "cairn/types/loss.hpp"
 
 namespace cairn {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-
-double seconds_since(Clock::time_point begin) {
-  return std::chrono::duration<double>(Clock::now() - begin).count();
-}
 
 bool only_adds(const GraphUpdate& update) {
   return update.changed.empty() && update.marginalized.empty() && update.removed_factors.empty() &&

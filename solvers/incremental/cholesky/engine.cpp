@@ -8,28 +8,12 @@
 #include <utility>
 
 #include "cairn/runtime/error.hpp"
+#include "cairn/runtime/timed.hpp"
 
 namespace cairn::incremental {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-
-double seconds_since(Clock::time_point begin) {
-  return std::chrono::duration<double>(Clock::now() - begin).count();
-}
-
-/// Adds the time from here to the end of the scope.
-class Timed {
- public:
-  explicit Timed(double& seconds) : seconds_(seconds), begin_(Clock::now()) {}
-  Timed(const Timed&) = delete;
-  Timed& operator=(const Timed&) = delete;
-  ~Timed() { seconds_ += seconds_since(begin_); }
-
- private:
-  double& seconds_;
-  Clock::time_point begin_;
-};
 
 /// What a factor's chi2 may be off by rounding.
 constexpr double kRounding = 1e-18;

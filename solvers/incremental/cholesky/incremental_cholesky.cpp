@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "cairn/runtime/error.hpp"
+#include "cairn/runtime/timed.hpp"
 #include "cairn/update/elimination.hpp"
 #include "cairn/update/graph_update.hpp"
 
@@ -16,10 +17,6 @@ namespace cairn::incremental {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-
-double seconds_since(Clock::time_point begin) {
-  return std::chrono::duration<double>(Clock::now() - begin).count();
-}
 
 /// So many states are read one by one.
 constexpr int kFew = 8;

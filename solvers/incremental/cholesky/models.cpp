@@ -5,6 +5,8 @@
 #include <cmath>
 #include <utility>
 
+#include "cairn/graph/packed.hpp"
+
 namespace cairn::incremental {
 namespace {
 
@@ -113,7 +115,7 @@ double Models::evaluate(const Record& record, const Graph& graph, const States& 
     pointers_.push_back(next);
     if (J) next += record.rows * size_of(record, k);
   }
-  const std::size_t packed = static_cast<std::size_t>(record.rows) * (record.rows + 1) / 2;
+  const std::size_t packed = packed_size(record.rows);
   const std::size_t entry = static_cast<std::size_t>(record.entry);
   type.evaluate(
       points_.data(),

@@ -14,6 +14,7 @@
 #include "cairn/graph/gauge.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/threads.hpp"
+#include "cairn/runtime/timed.hpp"
 #include "ceres_problem.hpp"
 
 namespace cairn {
@@ -156,7 +157,6 @@ Summary CeresOptimizer::optimize(Graph& graph, const Stop& stop, Observer& obser
         "optimizer ceres: the graph has a loss already; leave out the option loss=" + loss_.name);
   }
   const Clock::time_point begin = Clock::now();
-  const auto elapsed = [&] { return std::chrono::duration<double>(Clock::now() - begin).count(); };
   Summary summary;
   summary.optimizer = "ceres";
   summary.linear_solver = ceres::LinearSolverTypeToString(options_.linear_solver_type);
@@ -170,7 +170,7 @@ Summary CeresOptimizer::optimize(Graph& graph, const Stop& stop, Observer& obser
     summary.initial_chi2 = summary.final_chi2 = chi2(graph);
     summary.status = idle ? Status::converged : Status::max_iterations;
     observer.on_start(graph, summary.initial_chi2);
-    summary.seconds.total = elapsed();
+    summary.seconds.total = seconds_since(begin);
     return summary;
   }
 
@@ -192,7 +192,7 @@ Summary CeresOptimizer::optimize(Graph& graph, const Stop& stop, Observer& obser
   summary.final_chi2 = loss_.name == "none" ? chi2(graph) : bridge.chi2();
   summary.notes.push_back("Ceres: " + report.message);
   summary.seconds = seconds_of(report);
-  summary.seconds.total = elapsed();
+  summary.seconds.total = seconds_since(begin);
   summary.solver.note = fmt::format(
       "{}, {}", ceres::LinearSolverTypeToString(report.linear_solver_type_used),
       ceres::SparseLinearAlgebraLibraryTypeToString(report.sparse_linear_algebra_library_type));

@@ -6,6 +6,7 @@
 #include <string>
 #include <utility>
 
+#include "cairn/graph/packed.hpp"
 #include "cairn/runtime/error.hpp"
 
 namespace cairn {
@@ -165,10 +166,10 @@ void CeresProblem::add_factors(const Graph& graph, Values& values) {
   for (int position = 0; position < graph.factor_count(); ++position) {
     const FactorRef ref = graph.ref(position);
     const FactorPool& pool = graph.factor_pools()[ref.pool];
-    const std::size_t n = pool.type->residual_size(), m = pool.type->measurement_size();
-    costs_.push_back(
-        std::make_unique<FactorCost>(*pool.type, pool.measurements.data() + ref.entry * m,
-                                     pool.sqrt_information.data() + ref.entry * (n * (n + 1) / 2)));
+    const std::size_t m = pool.type->measurement_size();
+    costs_.push_back(std::make_unique<FactorCost>(
+        *pool.type, pool.measurements.data() + ref.entry * m,
+        pool.sqrt_information.data() + ref.entry * packed_size(pool.type->residual_size())));
     x.clear();
     for (const std::int32_t v : graph.factor_variables(position))
       x.push_back(state(graph, values, v));

@@ -8,6 +8,8 @@
 
 #include <fmt/format.h>
 
+#include "cairn/runtime/timed.hpp"
+
 namespace cairn {
 
 double dot(std::span<const double> a, std::span<const double> b) {
@@ -48,10 +50,6 @@ Descent::Descent(std::string optimizer, std::string linear_solver, LinearSolver&
     note("chi2 of the initial estimate is not finite");
     end(Status::diverged);
   }
-}
-
-double Descent::seconds_since(Clock::time_point begin) const {
-  return std::chrono::duration<double>(Clock::now() - begin).count();
 }
 
 bool Descent::next_iteration() {

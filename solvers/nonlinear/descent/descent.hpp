@@ -70,7 +70,6 @@ class Descent {
 
  private:
   using Clock = std::chrono::steady_clock;
-  double seconds_since(Clock::time_point begin) const;
 
   Graph& graph_;
   const Stop stop_;

@@ -54,7 +54,7 @@ TEST_P(RigidGroupIn, IsTheTypesGroup) {
     const auto [R, t] = world.split(world.between(a, b));
     EXPECT_LT((d.at.R - R).norm(), 1e-12);
     EXPECT_LT((d.at.t - t).norm(), 1e-12);
-    const Placed seen = RigidGroup::seen_from(from, to);
+    const cairn::Pose seen = RigidGroup::seen_from(from, to);
     EXPECT_LT((seen.R - R).norm(), 1e-12);
     EXPECT_LT((seen.t - t).norm(), 1e-12);
     const MatrixXd A = numerical_jacobian(n, [&](const VectorXd& step) {

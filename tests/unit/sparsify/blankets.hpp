@@ -10,12 +10,13 @@
 
 #include <gtest/gtest.h>
 
+#include "blanket_matrices.hpp"
+#include "cairn/graph/packed.hpp"
 #include "cairn/io/generator.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/solve/optimizer.hpp"
 #include "local_problem.hpp"
 #include "problems.hpp"
-#include "recovery_problem.hpp"
 #include "work_graph.hpp"
 
 namespace cairn::sparsify {
@@ -67,7 +68,7 @@ inline DenseBlanket random_blanket(Registry& registry, int dimension, int nodes,
     std::vector<double> back(pose->ambient_size()), z(pose->ambient_size());
     lie.inverse(graph.state(a).data(), back.data());
     lie.compose(back.data(), graph.state(b).data(), z.data());
-    graph.add_factor(edge, std::array{a, b}, z, packed(20.0 * draw.definite(t)));
+    graph.add_factor(edge, std::array{a, b}, z, pack(20.0 * draw.definite(t)));
   };
   for (int v = 1; v <= nodes; ++v) relate(0, v);
   for (int k = 0; k < more_edges; ++k) {

@@ -3,9 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "blanket_matrices.hpp"
 #include "cairn/runtime/error.hpp"
 #include "recovery.hpp"
-#include "recovery_problem.hpp"
 #include "topologies.hpp"
 #include "unit/sparsify/blankets.hpp"
 

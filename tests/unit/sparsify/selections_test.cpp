@@ -11,6 +11,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "cairn/graph/packed.hpp"
 #include "cairn/runtime/error.hpp"
 #include "unit/sparsify/blankets.hpp"
 
@@ -79,7 +80,7 @@ class Selections : public testing::Test {
     for (int v = 0; v < n; ++v) graph.add_variable(pose, v, std::array{1.0 * v, 0.0, 0.0});
     for (const std::array<int, 2>& pair : pairs) {
       graph.add_factor(edge, pair, std::array{1.0 * (pair[1] - pair[0]), 0.0, 0.0},
-                       packed(Matrix::Identity(3, 3)));
+                       pack(Matrix::Identity(3, 3)));
     }
     return graph;
   }
@@ -237,7 +238,7 @@ TEST_F(Selections, LeastLossNeverTakesWhatTheSparsifierCannot) {
   graph.set_fixed(17);
   graph.set_fixed(0);
   const auto prior = registry.factor_type("EDGE_PRIOR_SE2");
-  graph.add_factor(prior, std::array{33}, graph.state(33), packed(Matrix::Identity(3, 3)));
+  graph.add_factor(prior, std::array{33}, graph.state(33), pack(Matrix::Identity(3, 3)));
   const auto sparsifier = registry.make<Sparsifier>("sparsify");
   const std::vector<double> losses = sparsifier->losses(graph, all(graph));
   for (const int v : {0, 17, 33}) EXPECT_EQ(losses[v], std::numeric_limits<double>::infinity());

@@ -4,6 +4,7 @@
 #include <array>
 #include <memory>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "cairn/graph/update.hpp"
@@ -76,6 +77,9 @@ class CAIRN_API MotionGroup {
                    const Motion& motion) const;
 
  private:
+  /// of_factor with what messages call the factor.
+  Motion measured(const FactorType& type, std::span<const double> measurement,
+                  std::span<const double> information, const std::string& name) const;
   std::vector<double> of_error_metric(const FactorType& type, std::span<const double> z) const;
 
   std::shared_ptr<const VariableType> type_;

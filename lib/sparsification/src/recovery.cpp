@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include "cairn/sparsification/recovery.hpp"
+
 #include <cmath>
 
 #include <Eigen/Cholesky>
@@ -6,7 +8,6 @@
 #include <Eigen/LU>
 
 #include "cairn/runtime/error.hpp"
-#include "cairn/sparsification/sparsification.hpp"
 
 namespace cairn {
 namespace {
@@ -50,6 +51,8 @@ Matrix by_first_node(const DenseBlanket& blanket) {
 
 }  // namespace
 
+FactorRecovery::~FactorRecovery() = default;
+
 BlanketProjection::BlanketProjection(const DenseBlanket& blanket, Projection projection) {
   const int d = blanket.size();
   const Matrix T = projection == Projection::node
@@ -64,8 +67,7 @@ RecoveryProblem BlanketProjection::problem(const DenseBlanket& blanket,
                                            std::span<const FactorChoice> topology) const {
   const int d = blanket.size();
   const MatrixMap T(T_.data(), d, rank), L(blanket.information.data(), d, d);
-  std::vector<int> begin{0};
-  for (const int n : blanket.node_sizes) begin.push_back(begin.back() + n);
+  const std::vector<int> begin = blanket.offsets();
   RecoveryProblem problem{.rank = rank, .factors = {}};
   for (const FactorChoice& choice : topology) {
     RecoveryProblem::Factor factor;

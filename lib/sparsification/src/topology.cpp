@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include "cairn/sparsification/topology.hpp"
+
 #include <algorithm>
 #include <charconv>
 #include <cmath>
@@ -7,7 +9,6 @@
 #include <fmt/format.h>
 
 #include "cairn/runtime/error.hpp"
-#include "cairn/sparsification/sparsification.hpp"
 
 namespace cairn {
 namespace {
@@ -20,6 +21,8 @@ namespace {
 }
 
 }  // namespace
+
+Topology::~Topology() = default;
 
 Population Population::parse(const std::string& text) {
   const std::size_t colon = text.find(':');

@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <array>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "cairn/runtime/api.hpp"
+#include "cairn/runtime/component.hpp"
+#include "cairn/runtime/enum_names.hpp"
+#include "cairn/sparsification/blanket.hpp"
+
+// (T n) is equation or section n of the thesis that sparsification.hpp names.
+
+namespace cairn {
+
+/// The information matrices Ω_k ≻ 0 of a topology's factors are sought that minimise
+///
+///     KLD = ½ (tr Λ̆ − ln |Λ̆| − r),   Λ̆ = Σ_k J_kᵀ Ω_k J_k
+///
+/// (T 4.2), in r coordinates in which the dense Gaussian is N(0, I): the projection (T 4.3),
+/// scaled.
+struct RecoveryProblem {
+  struct Factor {
+    int size = 0;                  ///< m
+    std::vector<double> jacobian;  ///< J_k, m × r, of full rank
+    /// J_a⁻ᵀ Λ_ab J_b⁻¹ (T 4.8) with the two nodes' blocks; not symmetric in general. Empty: not
+    /// defined.
+    std::vector<double> off_diagonal;
+  };
+  int rank = 0;  ///< r
+  std::vector<Factor> factors;
+};
+
+/// How coordinates are chosen in which the dense Gaussian has a covariance (T 4.3).
+enum class Projection {
+  eigen,  ///< those of the eigenvectors of Λ whose eigenvalues are not zero
+  node,   ///< relative to the blanket's first node, which must be all that Λ leaves open
+};
+constexpr auto enum_names(Projection) {
+  return std::to_array<EnumName<Projection>>(
+      {{Projection::node, "node"}, {Projection::eigen, "eigen"}});
+}
+
+/// Coordinates z with δ = T z in which the dense Gaussian is N(0, I): TᵀΛT = I.
+class CAIRN_API BlanketProjection {
+ public:
+  /// Throws `Error` (numerical) if Λ is zero, or, for `node`, if more than one node is open.
+  BlanketProjection(const DenseBlanket& blanket, Projection projection);
+
+  int rank = 0;                                        ///< r
+  const std::vector<double>& T() const { return T_; }  ///< d × r
+  /// The recovery problem of a topology.
+  RecoveryProblem problem(const DenseBlanket& blanket,
+                          std::span<const FactorChoice> topology) const;
+
+ private:
+  std::vector<double> T_;
+};
+
+/// Where a recovery stood, for plots of its convergence.
+struct RecoveryPoint {
+  double seconds = 0.0;
+  double kld = 0.0;
+};
+
+struct RecoveryResult {
+  std::vector<std::vector<double>> information;  ///< Ω_k, m × m, positive definite
+  double kld = 0.0;                              ///< [nats]
+  /// Largest element of the projected gradient, each factor in units in which its optimum alone
+  /// would be the identity: max |W − P(W − 2 ∂KLD/∂W)| / 2 with P the nearest W ⪰ 0.
+  double gradient = 0.0;
+  int iterations = 0;
+  bool converged = true;
+  double seconds = 0.0;
+  std::vector<RecoveryPoint> trace;  ///< if it was asked for
+};
+
+/// Finds the information of a topology's factors (T 4.3).
+class CAIRN_API FactorRecovery : public Component {
+ public:
+  static constexpr std::string_view kKind = "factor_recovery";
+  ~FactorRecovery() override;
+
+  /// Throws `Error` (usage) if the method cannot solve such a problem, (numerical) if the factors
+  /// do not determine all r coordinates.
+  virtual RecoveryResult recover(const RecoveryProblem& problem) = 0;
+  /// Record `RecoveryResult::trace` from now on.
+  virtual void trace(bool on) { (void)on; }
+};
+
+}  // namespace cairn

@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <functional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "cairn/graph/graph.hpp"
+#include "cairn/graph/update.hpp"
+#include "cairn/runtime/api.hpp"
+#include "cairn/runtime/component.hpp"
+#include "cairn/sparsification/blanket.hpp"
+#include "cairn/sparsification/recovery.hpp"
+
+// (T n) is equation or section n of the thesis that sparsification.hpp names.
+
+namespace cairn {
+
+/// A sparsification problem as it came up, and how it was solved.
+struct SparsificationRecord {
+  std::vector<Id> removed;                   ///< the nodes that leave
+  std::vector<Id> blanket;                   ///< the nodes that stay
+  std::vector<std::vector<double>> states;   ///< of the blanket, where it was linearised
+  std::string variable_type, factor_type;    ///< tags
+  const DenseBlanket* dense = nullptr;       ///< good during the call
+  const RecoveryResult* recovery = nullptr;  ///< likewise; null: the blanket had one node
+  int factors_before = 0;                    ///< that leave
+  int factors_after = 0;                     ///< that come
+};
+using SparsificationObserver = std::function<void(const SparsificationRecord&)>;
+
+/// Seconds of each part.
+struct SparsificationSeconds {
+  double total = 0.0;
+  double marginalize = 0.0;  ///< cropping, solving and marginalising the local problem
+  double topology = 0.0;
+  double recovery = 0.0;
+
+  CAIRN_API SparsificationSeconds& operator+=(const SparsificationSeconds& other);
+};
+
+/// A node that could not be removed, and why.
+struct RefusedNode {
+  Id node = 0;
+  std::string reason;
+};
+
+/// The result of removing nodes from a graph. Nothing has changed yet: see `apply`.
+struct Sparsification {
+  std::vector<int> removed_variables;  ///< by index, rising
+  std::vector<int> removed_factors;    ///< by position, rising
+  std::vector<Factor> factors;         ///< that take their place
+  std::vector<RefusedNode> refused;
+
+  int problems = 0;           ///< blankets of two nodes and more
+  double mean_blanket = 0.0;  ///< nodes of a blanket, on average
+  int largest_blanket = 0;
+  double kld = 0.0;       ///< sum over the problems, each by itself [nats]
+  int not_converged = 0;  ///< recoveries that ended before
+  SparsificationSeconds seconds;
+
+  /// Adds what was done after this, on the graph that this led to.
+  CAIRN_API void add(const Sparsification& later);
+};
+
+/// Takes nodes out of a graph and keeps their information, as well as a few factors can (T 4.2).
+class CAIRN_API Sparsifier : public Component {
+ public:
+  static constexpr std::string_view kKind = "sparsifier";
+  ~Sparsifier() override;
+
+  /// Removes `nodes` (by index), in that order; the graph should be at its minimum. `step`, if
+  /// there is one, is called after each blanket with the number of nodes removed; it returns
+  /// whether to go on.
+  virtual Sparsification remove(const Graph& graph, std::span<const int> nodes,
+                                const std::function<bool(int)>& step = {}) = 0;
+  /// Is called for every problem from now on (empty: none).
+  virtual void observe(SparsificationObserver observer) = 0;
+  /// For each node (by index) the KLD that removing it, and nothing else, would cost [nats];
+  /// infinite where it cannot be removed.
+  virtual std::vector<double> losses(const Graph& graph, std::span<const int> nodes) = 0;
+};
+
+/// Carries a sparsification out.
+CAIRN_API void apply(const Sparsification& change, Graph& graph);
+
+}  // namespace cairn

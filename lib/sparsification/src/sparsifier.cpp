@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "cairn/sparsification/sparsifier.hpp"
+
+#include <algorithm>
+
+#include "cairn/sparsification/selection.hpp"
+
+namespace cairn {
+
+Sparsifier::~Sparsifier() = default;
+NodeSelection::~NodeSelection() = default;
+
+SparsificationSeconds& SparsificationSeconds::operator+=(const SparsificationSeconds& other) {
+  total += other.total;
+  marginalize += other.marginalize;
+  topology += other.topology;
+  recovery += other.recovery;
+  return *this;
+}
+
+void Sparsification::add(const Sparsification& later) {
+  const int all = problems + later.problems;
+  if (all > 0) mean_blanket = (problems * mean_blanket + later.problems * later.mean_blanket) / all;
+  problems = all;
+  largest_blanket = std::max(largest_blanket, later.largest_blanket);
+  refused.insert(refused.end(), later.refused.begin(), later.refused.end());
+  kld += later.kld;
+  not_converged += later.not_converged;
+  seconds += later.seconds;
+}
+
+void apply(const Sparsification& change, Graph& graph) {
+  std::vector<bool> factors(graph.factor_count()), variables(graph.variable_count());
+  for (const int f : change.removed_factors) factors[f] = true;
+  for (const int v : change.removed_variables) variables[v] = true;
+  graph.remove(factors, variables);
+  for (const Factor& factor : change.factors) {
+    std::vector<int> on;
+    for (const Id id : factor.variables) on.push_back(graph.find(id).value());
+    graph.add_factor(factor.type, on, factor.measurement, factor.information);
+  }
+}
+
+}  // namespace cairn
