@@ -256,6 +256,7 @@ void PolicySession::settle(Reply& reply) {
 
 /// Ends the pose of now.
 PoseReport PolicySession::end() {
+  Reply unread;
   settle(unread);
   PoseReport report = policy_.end_pose();
   open_ = false;
