@@ -64,7 +64,7 @@ struct PolicySetting {
   const PolicyData& data;
   Registry& registry;
   std::shared_ptr<const Loss> loss = nullptr;  ///< shared: graphs and their clones use one loss
-  FactorSelector loss_on;
+  FactorSelector loss_on = {};
   const std::atomic<bool>* interrupt = nullptr;  ///< a run ends early once it is true
   /// Called after each pose, with the run's title, how many poses it has, and its counts so far.
   std::function<void(std::string_view title, std::size_t poses, const PolicyResult& counts)>

@@ -69,7 +69,7 @@ struct SparsifySetting {
   Registry& registry;
   Stop stop = {};  ///< of the optimisations; its interrupt ends everything early
   std::shared_ptr<const Loss> loss = nullptr;  ///< shared: graphs and their clones use one loss
-  FactorSelector loss_on;
+  FactorSelector loss_on = {};
   /// Computes the initial estimate of a whole graph, and returns notes; empty: as it is.
   std::function<std::vector<std::string>(Graph&)> initialise = {};
   SparsificationObserver observer = {};  ///< gets every problem; may be empty
