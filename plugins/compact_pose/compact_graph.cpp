@@ -101,7 +101,7 @@ CompactGraph::Ahead CompactGraph::compose(const Ahead& ahead, const Motion& moti
   const State z = group_->state(motion.mean);
   Matrix S = to_matrix(motion.covariance, n);
   if (ahead.covariance.size() == 0) return {z, S};  // from the anchor itself
-  const Matrix A = group_->adjoint_of_inverse(z);
+  const Matrix A = group_->adjoint(group_->inverse(z));
   S += A * ahead.covariance * A.transpose();
   return {group_->compose(ahead.mean, z), S};
 }
@@ -201,7 +201,7 @@ GraphUpdate CompactGraph::odometry_from(int first) const {
   for (int k = first; k < size(); ++k) {
     Variable variable = kept_[k].variable;
     if (!variable.fixed || variable.state.empty()) {
-      const auto state = group_->span(kept_[k].placed.x);
+      const auto state = group_->view(kept_[k].placed.x);
       variable.state.assign(state.begin(), state.end());
     }
     update.variables.push_back(std::move(variable));
@@ -305,7 +305,7 @@ void CompactGraph::know_newest() {
     A_ = Matrix::Identity(n, n);
     S_nn_ = S_aa_;
   } else {
-    A_ = group_->adjoint_of_inverse(newest_.ahead.mean);
+    A_ = group_->adjoint(group_->inverse(newest_.ahead.mean));
     S_nn_ = A_ * S_aa_ * A_.transpose() + newest_.ahead.covariance;
   }
   known_ = true;

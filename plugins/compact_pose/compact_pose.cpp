@@ -189,7 +189,7 @@ std::optional<MatchProposal> CompactPose::next_match() {
     if (!(best.gain > loop_gain_)) break;
     if (best.version == graph_.version()) {
       const Displacement d = known_displacement(best.pose);
-      const auto mean = graph_.group().span(d.mean);
+      const auto mean = graph_.group().view(d.mean);
       return MatchProposal{graph_.id(best.pose),
                            graph_.newest_id(),
                            best.gain,
@@ -360,7 +360,7 @@ void CompactPose::finish() {
 
 std::vector<double> CompactPose::newest_state() const {
   if (graph_.empty()) throw Error(ErrorCode::usage, "newest_state before the first pose");
-  const auto state = graph_.group().span(graph_.newest_state());
+  const auto state = graph_.group().view(graph_.newest_state());
   return {state.begin(), state.end()};
 }
 

@@ -50,7 +50,7 @@ Fit ConsistencyCheck::agreement(const Link& first, const Link& second, const Dis
   const State to_start = group_.compose(b_back, u_back);
   const State cycle = group_.compose(group_.compose(to_start, first.mean), later.mean);
   const auto carried = [&](const Matrix& S, const State& by) -> Matrix {
-    const Matrix A = group_.adjoint_of_inverse(by);
+    const Matrix A = group_.adjoint(group_.inverse(by));
     return A * S * A.transpose();
   };
   Matrix S = carried(second.covariance, b_back);

@@ -134,7 +134,7 @@ void RandomPoses::finish() {
 
 std::vector<double> RandomPoses::newest_state() const {
   if (graph_.empty()) throw Error(ErrorCode::usage, "newest_state before the first pose");
-  const auto state = graph_.group().span(graph_.newest_state());
+  const auto state = graph_.group().view(graph_.newest_state());
   return {state.begin(), state.end()};
 }
 

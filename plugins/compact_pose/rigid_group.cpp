@@ -50,25 +50,29 @@ double gain_of(const Matrix& S_y, const Matrix& S_d) {
                   std::string(type.tag()) + " " + why);
 }
 
+const VariableType& pose_type(const std::shared_ptr<const VariableType>& type) {
+  if (!type) throw Error(ErrorCode::usage, "compact_pose: a pose without a type");
+  if (!has_orientation(*type)) refuse(*type, "has no position and heading");
+  return *type;
+}
+
 }  // namespace
 
 RigidGroup::RigidGroup(const std::shared_ptr<const VariableType>& type)
-    : motions_(type), group_(type->lie_group()), placement_(type->placement()) {
-  if (!is_pose(*type)) refuse(*type, "has no position and heading");
-  dimension_ = placement_->dimension();
-  if (tangent_size() != (dimension_ == 2 ? 3 : 6) || motions_.ambient_size() > kMostAmbient)
+    : PoseGroup(pose_type(type)),
+      motions_(type),
+      placement_(type->placement()),
+      dimension_(placement_->dimension()) {
+  if (tangent_size() != (dimension_ == 2 ? 3 : 6))
     refuse(*type, "has " + std::to_string(tangent_size()) + " degrees of freedom");
   // exp is smooth: central differences with this step leave eleven digits.
   constexpr double kStep = 1e-4;
   twist_.resize(6, tangent_size());
   for (int k = 0; k < tangent_size(); ++k) {
-    Eigen::VectorXd step = Eigen::VectorXd::Zero(tangent_size());
-    State ahead{}, back{};
+    Vector step = Vector::Zero(tangent_size());
     step[k] = kStep;
-    group_->exp(step.data(), ahead.data());
-    step[k] = -kStep;
-    group_->exp(step.data(), back.data());
-    const Pose a = pose_of(*placement_, ahead.data()), b = pose_of(*placement_, back.data());
+    const Pose a = pose_of(*placement_, exp(step).data());
+    const Pose b = pose_of(*placement_, exp(-step).data());
     twist_.col(k).head<3>() = (a.t - b.t) / (2.0 * kStep);
     const Eigen::AngleAxisd turn(Eigen::Matrix3d(b.R.transpose() * a.R));
     twist_.col(k).tail<3>() = turn.angle() * turn.axis() / (2.0 * kStep);
@@ -81,14 +85,14 @@ RigidGroup::RigidGroup(const std::shared_ptr<const VariableType>& type)
 
 /// R_ab = R_a R_b and t_ab = t_a + R_a t_b, tried on a few elements.
 void RigidGroup::check_rigid() const {
-  Eigen::VectorXd tangent(tangent_size());
+  Vector tangent(tangent_size());
   for (int trial = 0; trial < 4; ++trial) {
-    State x[2]{}, product{};
+    State x[2]{};
     for (int side = 0; side < 2; ++side) {
       for (int k = 0; k < tangent_size(); ++k) tangent[k] = std::sin(1.0 + trial + 2.7 * k + side);
-      group_->exp(tangent.data(), x[side].data());
+      x[side] = exp(tangent);
     }
-    group_->compose(x[0].data(), x[1].data(), product.data());
+    const State product = compose(x[0], x[1]);
     const Pose a = pose_of(*placement_, x[0].data()), b = pose_of(*placement_, x[1].data()),
                ab = pose_of(*placement_, product.data());
     if ((ab.R - a.R * b.R).norm() > 1e-9 || (ab.t - a.t - a.R * b.t).norm() > 1e-9)
@@ -96,43 +100,8 @@ void RigidGroup::check_rigid() const {
   }
 }
 
-State RigidGroup::state(std::span<const double> x) const {
-  State state{};
-  std::ranges::copy(x, state.begin());
-  return state;
-}
-
-State RigidGroup::compose(const State& a, const State& b) const {
-  State ab{};
-  group_->compose(a.data(), b.data(), ab.data());
-  return ab;
-}
-
-State RigidGroup::between(const State& a, const State& b) const {
-  State back{}, out{};
-  group_->inverse(a.data(), back.data());
-  group_->compose(back.data(), b.data(), out.data());
-  return out;
-}
-
-Vector RigidGroup::log(const State& a) const {
-  Vector tangent(tangent_size());
-  group_->log(a.data(), tangent.data());
-  return tangent;
-}
-
-Matrix RigidGroup::adjoint_of_inverse(const State& a) const {
-  State back{};
-  group_->inverse(a.data(), back.data());
-  Matrix A(tangent_size(), tangent_size());
-  group_->adjoint(back.data(), A.data());
-  return A;
-}
-
 PlacedState RigidGroup::place(const State& x) const {
-  PlacedState placed{x, {}, pose_of(*placement_, x.data())};
-  group_->inverse(x.data(), placed.inverse.data());
-  return placed;
+  return {x, inverse(x), pose_of(*placement_, x.data())};
 }
 
 Pose RigidGroup::seen_from(const PlacedState& x_i, const PlacedState& x_n) {
@@ -140,13 +109,8 @@ Pose RigidGroup::seen_from(const PlacedState& x_i, const PlacedState& x_n) {
 }
 
 Displacement RigidGroup::displacement(const PlacedState& x_i, const PlacedState& x_n) const {
-  Displacement d;
-  d.mean = compose(x_i.inverse, x_n.x);
-  d.at = seen_from(x_i, x_n);
-  const State back = compose(x_n.inverse, x_i.x);
-  d.adjoint.resize(tangent_size(), tangent_size());
-  group_->adjoint(back.data(), d.adjoint.data());
-  return d;
+  return {
+      compose(x_i.inverse, x_n.x), seen_from(x_i, x_n), adjoint(compose(x_n.inverse, x_i.x)), {}};
 }
 
 void RigidGroup::set_covariance(const Matrix& S_ii, const Matrix& S_in, const Matrix& S_nn,

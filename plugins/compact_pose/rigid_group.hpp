@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <array>
 #include <memory>
 #include <span>
 
@@ -9,16 +8,15 @@
 
 #include "cairn/geometry/motion.hpp"
 #include "cairn/geometry/pose.hpp"
+#include "cairn/geometry/state_group.hpp"
 #include "cairn/types/variable_type.hpp"
 
 namespace cairn::compact {
 
-inline constexpr int kMostTangent = 6, kMostAmbient = 16;
 /// Of the tangent space of a pose, in the plane or in space.
-using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::ColMajor, kMostTangent,
-                             kMostTangent>;
-using Vector = Eigen::Matrix<double, Eigen::Dynamic, 1, Eigen::ColMajor, kMostTangent, 1>;
-using State = std::array<double, kMostAmbient>;
+using Matrix = PoseGroup::Matrix;
+using Vector = PoseGroup::Tangent;
+using State = PoseGroup::State;
 
 /// A pose with what displacements from and to it take.
 struct PlacedState {
@@ -36,23 +34,14 @@ struct Displacement {
 
 /// Poses that are rigid transformations of the plane or of space, whatever type implements them:
 /// its abilities `LieGroup` and `Placement`, checked to belong together.
-class RigidGroup {
+class RigidGroup : public PoseGroup {
  public:
   /// Throws `Error` (usage) for a type whose states are not rigid transformations.
   explicit RigidGroup(const std::shared_ptr<const VariableType>& type);
 
   const MotionGroup& motions() const { return motions_; }
-  int tangent_size() const { return motions_.tangent_size(); }
   int dimension() const { return dimension_; }
 
-  State state(std::span<const double> x) const;
-  std::span<const double> span(const State& x) const {
-    return {x.data(), static_cast<std::size_t>(motions_.ambient_size())};
-  }
-  State compose(const State& a, const State& b) const;
-  State between(const State& a, const State& b) const;  ///< a⁻¹ b
-  Vector log(const State& a) const;
-  Matrix adjoint_of_inverse(const State& a) const;  ///< Ad(a⁻¹)
   PlacedState place(const State& x) const;
 
   /// Where x_n is as seen from x_i.
@@ -74,12 +63,11 @@ class RigidGroup {
   void check_rigid() const;
 
   MotionGroup motions_;
-  const LieGroup* group_;
   const Placement* placement_;
   int dimension_;
   /// (velocity, angular velocity) of a tangent vector; constant, since perturbations stand on the
   /// right.
-  Eigen::Matrix<double, 6, Eigen::Dynamic, Eigen::ColMajor, 6, kMostTangent> twist_;
+  Eigen::Matrix<double, 6, Eigen::Dynamic, Eigen::ColMajor, 6, PoseSize::kMostTangent> twist_;
   bool twist_is_identity_ = false;
 };
 

@@ -5,6 +5,9 @@
 #include <span>
 #include <vector>
 
+#include <Eigen/Core>
+
+#include "cairn/geometry/state_group.hpp"
 #include "cairn/types/variable_type.hpp"
 #include "pair_random.hpp"
 
@@ -25,7 +28,7 @@ class RigidMotions {
   /// x⁻¹ y
   std::vector<double> between(std::span<const double> x, std::span<const double> y) const;
   /// z exp(ξ)
-  std::vector<double> perturbed(std::span<const double> z, const double* xi) const;
+  std::vector<double> perturbed(std::span<const double> z, const Eigen::VectorXd& xi) const;
   Extent extent(std::span<const double> motion) const;
   /// A random relative pose within that extent, uniformly distributed: translations uniform in the
   /// disc or ball, rotations by the group's invariant measure.
@@ -36,11 +39,8 @@ class RigidMotions {
   const std::vector<int>& translations() const { return translations_; }
 
  private:
-  std::vector<double> state() const;
-
-  std::shared_ptr<const VariableType> type_;
-  const LieGroup* group_;
-  const Placement* placement_;
+  StateGroup group_;
+  std::shared_ptr<const VariableType> type_;  ///< keeps what group_ refers to
   std::vector<int> rotations_, translations_;
 };
 

@@ -67,10 +67,9 @@ class Simulated final : public Registration, public FalseMatches {
     Match match = measure(earlier, later);
     if (match.outcome == Outcome::none) return {};
     const auto [from, to] = std::minmax(earlier, later);
-    std::vector<double> z =
-        match.outcome == Outcome::wrong
-            ? motions_->draw(sensor_.range, match.random)
-            : motions_->perturbed(match.motion, draw_noise(match.random).data());
+    std::vector<double> z = match.outcome == Outcome::wrong
+                                ? motions_->draw(sensor_.range, match.random)
+                                : motions_->perturbed(match.motion, draw_noise(match.random));
     return {group_->to_factor(odometry_, from, to, {std::move(z), covariance_})};
   }
 

@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 #include <Eigen/Cholesky>
 
+#include "cairn/geometry/state_group.hpp"
 #include "cairn/graph/packed.hpp"
 #include "cairn/runtime/error.hpp"
 
@@ -147,17 +148,16 @@ class DenseSystem {
 /// A model for each pair of the blanket's nodes, and what it measures.
 void add_models(const Graph& graph, const LocalProblem& local, Marginal& marginal) {
   const VariableType& variable = graph.type(local.blanket.front());
-  const LieGroup& group = *variable.lie_group();
+  const StateGroup group(variable);
   const FactorType& type = *local.type;
   const int m = type.residual_size(), t = variable.tangent_size();
   const int n = static_cast<int>(std::ssize(local.blanket)), d = n * t;
   const std::vector<double> unit = pack(Matrix::Identity(m, m));
-  std::vector<double> back(variable.ambient_size()), z(variable.ambient_size());
   Vector r(m);
   for (int i = 0; i < n; ++i) {
-    group.inverse(marginal.states[i].data(), back.data());
+    const std::vector<double> back = group.inverse(marginal.states[i]);
     for (int j = i + 1; j < n; ++j) {
-      group.compose(back.data(), marginal.states[j].data(), z.data());
+      std::vector<double> z = group.compose(back, marginal.states[j]);
       type.normalize(z.data());
       FactorModel model{.nodes = {i, j}, .size = m, .jacobian = std::vector<double>(m * d)};
       const double* x[] = {marginal.states[i].data(), marginal.states[j].data()};

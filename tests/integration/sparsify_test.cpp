@@ -53,7 +53,7 @@ TEST_F(Sparsify, WithoutOptionsTakesOutHalfAndSaysWhatItDid) {
   ASSERT_EQ(cairn({"generate", "manhattan:poses=400", "-o", in}).exit_code, 0);
   const Outcome run = cairn({"sparsify", in, "-o", out, "--quiet"});
   ASSERT_EQ(run.exit_code, 0) << run.err;
-  EXPECT_THAT(run.out, AllOf(HasSubstr("taken out"), HasSubstr("left"), HasSubstr("KLD"),
+  EXPECT_THAT(run.out, AllOf(HasSubstr("removed"), HasSubstr("left"), HasSubstr("KLD"),
                              HasSubstr("time"), HasSubstr(out)));
   // Any tool for g2o files can read the result: its tags are those of the input.
   for (const std::string& line : lines(read_text(out))) {

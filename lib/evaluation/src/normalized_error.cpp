@@ -11,6 +11,7 @@
 #include <Eigen/QR>
 
 #include "cairn/geometry/pose.hpp"
+#include "cairn/geometry/state_group.hpp"
 #include "cairn/linear/graph_marginals.hpp"
 #include "cairn/linear/linearizer.hpp"
 #include "cairn/runtime/error.hpp"
@@ -21,10 +22,9 @@ namespace {
 /// x_0 t_0⁻¹ t_v of each variable: the truth as seen from the estimate's first pose.
 std::vector<std::vector<double>> moved_truth(const Graph& estimate, const Graph& truth) {
   std::vector<std::vector<double>> moved;
-  std::vector<double> motion, back;
+  std::vector<double> motion;
   for (int v = 0; v < estimate.variable_count(); ++v) {
     const VariableType& type = estimate.type(v);
-    const LieGroup* group = type.lie_group();
     if (!is_pose(type) || type.tag() != estimate.type(0).tag()) {
       throw Error(ErrorCode::usage, "no normalised error: " + estimate.describe_variable(v) +
                                         " is no pose of a Lie group, or of another than the first");
@@ -34,16 +34,10 @@ std::vector<std::vector<double>> moved_truth(const Graph& estimate, const Graph&
       throw Error(ErrorCode::input,
                   "no normalised error: the truth has no " + estimate.describe_variable(v));
     }
+    const StateGroup group(type);
     const auto true_state = truth.state(*other);
-    std::vector<double> state(true_state.size());
-    if (v == 0) {
-      back.resize(state.size());
-      motion.resize(state.size());
-      group->inverse(true_state.data(), back.data());
-      group->compose(estimate.state(0).data(), back.data(), motion.data());
-    }
-    group->compose(motion.data(), true_state.data(), state.data());
-    moved.push_back(std::move(state));
+    if (v == 0) motion = group.compose(estimate.state(0), group.inverse(true_state));
+    moved.push_back(group.compose(motion, true_state));
   }
   return moved;
 }

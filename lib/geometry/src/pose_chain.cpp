@@ -12,6 +12,7 @@
 #include <Eigen/Core>
 
 #include "cairn/geometry/pose.hpp"
+#include "cairn/geometry/state_group.hpp"
 #include "cairn/runtime/error.hpp"
 
 namespace cairn {
@@ -19,8 +20,6 @@ namespace cairn {
 // Recovery ----------------------------------------------------------------------------------------
 
 namespace {
-
-using State = std::vector<double>;
 
 void check(const VariableType& type, const OdometryChain& chain, std::span<const double> from,
            std::span<const double> to) {
@@ -59,47 +58,6 @@ std::vector<double> shares_of_way(const VariableType& type, const OdometryChain&
   return shares;
 }
 
-/// A type's group, with states by value.
-class Group {
- public:
-  explicit Group(const VariableType& type) : type_(type), group_(*type.lie_group()) {}
-
-  State compose(std::span<const double> a, std::span<const double> b) const {
-    State ab(ambient());
-    group_.compose(a.data(), b.data(), ab.data());
-    type_.normalize(ab.data());
-    return ab;
-  }
-  /// log(a⁻¹ b)
-  Eigen::VectorXd difference(std::span<const double> a, std::span<const double> b) const {
-    State inverse(ambient());
-    group_.inverse(a.data(), inverse.data());
-    Eigen::VectorXd delta(type_.tangent_size());
-    group_.log(compose(inverse, b).data(), delta.data());
-    return delta;
-  }
-  /// Ad(a⁻¹)
-  Eigen::MatrixXd adjoint_of_inverse(std::span<const double> a) const {
-    State inverse(ambient());
-    group_.inverse(a.data(), inverse.data());
-    Eigen::MatrixXd Ad(type_.tangent_size(), type_.tangent_size());
-    group_.adjoint(inverse.data(), Ad.data());
-    return Ad;
-  }
-  /// a · exp(δ)
-  State moved(std::span<const double> a, const Eigen::VectorXd& delta) const {
-    State step(ambient());
-    group_.exp(delta.data(), step.data());
-    return compose(a, step);
-  }
-
- private:
-  std::size_t ambient() const { return static_cast<std::size_t>(type_.ambient_size()); }
-
-  const VariableType& type_;
-  const LieGroup& group_;
-};
-
 std::vector<Eigen::VectorXd> shared_corrections(const std::vector<double>& shares,
                                                 const Eigen::VectorXd& mismatch) {
   std::vector<Eigen::VectorXd> corrections;
@@ -108,7 +66,7 @@ std::vector<Eigen::VectorXd> shared_corrections(const std::vector<double>& share
 }
 
 /// K_m d of each step, from the last to the first: Ad((z_{m+1} ⋯ z_q)⁻¹)ᵀ P_q⁻¹ d is carried back.
-std::vector<Eigen::VectorXd> likely_corrections(const Group& group, const OdometryChain& chain,
+std::vector<Eigen::VectorXd> likely_corrections(const StateGroup& group, const OdometryChain& chain,
                                                 const Eigen::VectorXd& mismatch) {
   const Eigen::Index n = mismatch.size();
   std::vector<Eigen::MatrixXd> adjoints, P;
@@ -120,7 +78,7 @@ std::vector<Eigen::VectorXd> likely_corrections(const Group& group, const Odomet
                       "that to pose {} has none",
                       step.pose));
     }
-    adjoints.push_back(group.adjoint_of_inverse(step.motion));
+    adjoints.push_back(group.adjoint(group.inverse(step.motion)));
     Eigen::MatrixXd sum = Eigen::Map<const Eigen::MatrixXd>(step.covariance.data(), n, n);
     if (!P.empty()) sum += adjoints.back() * P.back() * adjoints.back().transpose();
     P.push_back(std::move(sum));
@@ -141,24 +99,27 @@ std::vector<RecoveredPose> recover(const VariableType& type, const OdometryChain
                                    std::span<const double> from, std::span<const double> to,
                                    Recovery how) {
   check(type, chain, from, to);
-  const Group group(type);
+  const StateGroup group(type);
   const std::vector<double> w = shares_of_way(type, chain, how);
 
   // x_from (z_1 ⋯ z_m), or x_from alone: what v0 and v1 take for the measured motions.
-  std::vector<State> reckoned;
-  State x(from.begin(), from.end());
+  std::vector<std::vector<double>> reckoned;
+  std::vector<double> x(from.begin(), from.end());
   for (const ChainStep& step : chain.steps) {
-    if (how == Recovery::distribute || how == Recovery::likely) x = group.compose(x, step.motion);
+    if (how == Recovery::distribute || how == Recovery::likely)
+      x = group.normalized(group.compose(x, step.motion));
     reckoned.push_back(x);
   }
-  const Eigen::VectorXd mismatch = group.difference(x, to);
+  const Eigen::VectorXd mismatch = group.log(group.normalized(group.between(x, to)));
 
   std::vector<RecoveredPose> poses;
   const std::vector<Eigen::VectorXd> corrections = how == Recovery::likely
                                                        ? likely_corrections(group, chain, mismatch)
                                                        : shared_corrections(w, mismatch);
-  for (std::size_t m = 0; m < reckoned.size(); ++m)
-    poses.push_back({chain.steps[m].pose, group.moved(reckoned[m], corrections[m])});
+  for (std::size_t m = 0; m < reckoned.size(); ++m) {
+    poses.push_back({chain.steps[m].pose,
+                     group.normalized(group.compose(reckoned[m], group.exp(corrections[m])))});
+  }
   if (!poses.empty()) poses.back().state.assign(to.begin(), to.end());  // to the last bit
   return poses;
 }

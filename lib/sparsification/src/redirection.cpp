@@ -11,6 +11,7 @@
 
 #include "cairn/geometry/motion.hpp"
 #include "cairn/geometry/pose.hpp"
+#include "cairn/geometry/state_group.hpp"
 
 namespace cairn {
 namespace {
@@ -57,11 +58,7 @@ void Redirection::leave(const Graph& graph, std::span<const int> nodes, std::spa
     place.lost = to < 0;
     if (!place.lost) {
       place.anchor = graph.id(to);
-      const LieGroup& group = *place.type->lie_group();
-      std::vector<double> back(x.size());
-      place.motion.resize(x.size());
-      group.inverse(graph.state(to).data(), back.data());
-      group.compose(back.data(), x.data(), place.motion.data());
+      place.motion = StateGroup(*place.type).between(graph.state(to), x);
     }
     at_.insert_or_assign(id, std::move(place));
   };
@@ -81,9 +78,7 @@ void Redirection::leave(const Graph& graph, std::span<const int> nodes, std::spa
 
 std::vector<double> Redirection::state(Id node, std::span<const double> anchor) const {
   const Place& place = at_.at(node);
-  std::vector<double> x(anchor.size());
-  place.type->lie_group()->compose(anchor.data(), place.motion.data(), x.data());
-  return x;
+  return StateGroup(*place.type).compose(anchor, place.motion);
 }
 
 std::optional<Factor> Redirection::redirect(const Factor& factor) const {

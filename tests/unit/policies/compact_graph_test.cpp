@@ -92,7 +92,7 @@ class Grown {
     for (const Way& way : ways_) {
       const int kept = graph_.find(way.id);
       const State& x = kept >= 0 ? graph_.state(kept) : graph_.newest_state();
-      const int v = dense.add_variable(world_.types().pose, way.id, graph_.group().span(x));
+      const int v = dense.add_variable(world_.types().pose, way.id, graph_.group().view(x));
       dense.set_fixed(v, std::ranges::find(fixed_ids_, way.id) != fixed_ids_.end());
     }
     for (const Chain& chain : odometry_) {
@@ -125,10 +125,10 @@ class Grown {
   /// Whether the poses within some radius are those that are there by their states.
   void compare_near() {
     const double radius = draw_.uniform(0.0, 3.0);
-    const Eigen::Vector3d here = world_.split(graph_.group().span(graph_.newest_state())).second;
+    const Eigen::Vector3d here = world_.split(graph_.group().view(graph_.newest_state())).second;
     std::vector<int> expected;
     for (const int pose : graph_.near(std::numeric_limits<double>::infinity())) {
-      const auto at = world_.split(graph_.group().span(graph_.state(pose))).second;
+      const auto at = world_.split(graph_.group().view(graph_.state(pose))).second;
       if ((at - here).norm() <= radius) expected.push_back(pose);
     }
     EXPECT_EQ(graph_.near(radius), expected);
