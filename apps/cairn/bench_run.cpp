@@ -48,8 +48,9 @@ std::vector<std::string> direct_linear_solvers(Session& session,
       session.note(fmt::format("left out: {}", error.what()));
     }
   }
-  std::ranges::stable_partition(
-      direct, [](const std::string& name) { return name == kDefaultLinearSolver; });
+  // clang 14 does not compile std::ranges::stable_partition of libstdc++ 12.
+  std::stable_partition(direct.begin(), direct.end(),
+                        [](const std::string& name) { return name == kDefaultLinearSolver; });
   return direct;
 }
 

@@ -95,9 +95,6 @@ void Draft::finish_factor(std::span<const double> as_in_file) {
     ++report_->repaired;
     return;
   }
-  std::vector<double> root(information.size());
-  const bool zero = std::ranges::all_of(information, [](double x) { return x == 0.0; });
-  if (!zero && square_root(information, kind.residual, root)) return;  // semidefinite
   std::string advice;
   if (kind.residual == 3 && kind.type->is_relative()) {
     if (as_in_file.empty()) as_in_file = information;
@@ -112,6 +109,10 @@ void Draft::finish_factor(std::span<const double> as_in_file) {
           "ReadOptions::repair_information";
     }
   }
+  // Semidefinite is fine, unless the numbers fit another meaning.
+  std::vector<double> root(information.size());
+  const bool zero = std::ranges::all_of(information, [](double x) { return x == 0.0; });
+  if (advice.empty() && !zero && square_root(information, kind.residual, root)) return;
   fail(factor.line,
        fmt::format(
            "the information of {} is not positive semidefinite or zero (pivot {} of its Cholesky "

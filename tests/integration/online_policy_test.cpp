@@ -515,7 +515,8 @@ TEST_F(OnlinePolicy, SaysWhatIsWrongAndWhatWasExpected) {
   EXPECT_EQ(
       error(two, "EDGE_SE2 0 9" + kStep),
       "between 0 and 9; expected a relative pose between pose 1, which is the newest, and another");
-  EXPECT_THAT(error(two, "EDGE_SE2 0 1 1 0 0 1 0 0 -1 0 1"), HasSubstr("not positive definite"));
+  EXPECT_THAT(error(two, "EDGE_SE2 0 1 1 0 0 1 0 0 -1 0 1"),
+              HasSubstr("not positive semidefinite"));
   EXPECT_EQ(error(square(), "EDGE_SE2 9 4" + kStep), "there is no pose 9");
   EXPECT_EQ(error(square(), "FIX 2"),
             "FIX 2: only a pose that has just come can be held; expected FIX right after the line "

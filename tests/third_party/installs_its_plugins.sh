@@ -14,6 +14,7 @@ fail() {
   exit 1
 }
 export XDG_DATA_HOME=$user_data
+rm -rf "$user_data" # of an earlier run
 
 # Optimised, although nobody asked for it.
 "$cairn" plugins --plugin "$build/dense_ldlt.so" dense_ldlt --json - >"$work/dense.json"
@@ -22,7 +23,6 @@ grep -q '"optimized": *true' "$work/dense.json" || fail "not optimised: $(cat "$
 grep -q 'unoptimised' "$work/dense.txt" && fail "$(cat "$work/dense.txt")"
 
 # Installed, it is found by nothing but its place, and by nobody else.
-rm -rf "$user_data"
 "$cairn" info "$graph" >"$work/out" 2>&1 && fail "the graph was read before the plugin was installed"
 cmake --install "$build" >"$work/log"
 for file in range.so range.json dense_ldlt.so dense_ldlt.json; do

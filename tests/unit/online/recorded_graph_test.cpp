@@ -165,7 +165,7 @@ TEST_F(PoseChain, NamesTheGapInItsOdometry) {
   for (const Id id : {1, 2, 5, 6}) pose(id);
   join(1, 2), join(5, 6), join(1, 5);
   EXPECT_THAT(refusal(), AllOf(HasSubstr("no factor joins VERTEX_SE2 5 to VERTEX_SE2 2"),
-                               HasSubstr("ids rise along the robot's way")));
+                               HasSubstr("ids increase along the trajectory")));
 }
 
 TEST_F(PoseChain, RefusesLandmarks) {
