@@ -230,7 +230,7 @@ TEST(PublishedFiles, CubicleIsRefusedWithoutRepair) {
   } catch (const std::exception& error) {
     EXPECT_THAT(error.what(),
                 HasSubstr("cubicle.g2o:5753: the information of EDGE_SE3:QUAT 1 2 is not positive "
-                          "definite"));
+                          "semidefinite"));
     EXPECT_THAT(error.what(), HasSubstr("ReadOptions::repair_information"));
   }
 }
