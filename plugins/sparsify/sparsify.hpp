@@ -42,7 +42,7 @@ struct SparsifyOptions {
         .component<Topology>("topology", &O::topology, "which nodes new factors relate")
         .text(
             "population", &O::population, Population::parse,
-            [](const Population& population) { return population.text(); },
+            [](const Population& value) { return value.text(); },
             "how many: tree:γ times as many as a tree, fill:α of all pairs, loss:KLD as few as "
             "keep the divergence below that [nats]")
         .component<FactorRecovery>("recovery", &O::recovery, "method that finds their information")
