@@ -170,10 +170,10 @@ TEST_F(ViewCommand, BenchWritesThePageOfWhatItCompared) {
     EXPECT_DOUBLE_EQ(history.back().at("chi2").to_number<double>(),
                      configuration.at("chi2").at("final").to_number<double>());
   }
-  EXPECT_EQ(roles(page.at("graphs").at(0)),
-            (std::map<std::string, std::string>{{"initial estimate", "initial"},
-                                                {"block_cholesky", "estimate"},
-                                                {"eigen", "peer"}}));
+  EXPECT_EQ(
+      roles(page.at("graphs").at(0)),
+      (std::map<std::string, std::string>{
+          {"initial estimate", "initial"}, {"block_cholesky", "estimate"}, {"eigen", "peer"}}));
   // The same report shows later, too.
   EXPECT_EQ(data_of({"view", report_}).at("bench").at("graphs").as_array().size(), 1U);
 }

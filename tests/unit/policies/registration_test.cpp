@@ -494,8 +494,7 @@ TEST_F(PlanarRegistrations, SimulatedErrsWithTheCorrelationsOfTheRecording) {
                                           std::array{-3.0, 0.5, 0.8},
                                           std::array{400.0, 300.0, -700.0, 900.0, -900.0, 2500.0});
   const MotionGroup group(registry.variable_type("VERTEX_SE2"));
-  const std::vector<double> covariance =
-      group.of_factor(world.graph.factor(loop), 10).covariance;
+  const std::vector<double> covariance = group.of_factor(world.graph.factor(loop), 10).covariance;
   std::vector<Factor> measured;
   for (int seed = 0; seed < 500; ++seed) {
     const auto simulated = make("simulated:range=10,seed=" + std::to_string(seed));

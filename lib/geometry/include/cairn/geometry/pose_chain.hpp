@@ -13,7 +13,6 @@
 
 namespace cairn {
 
-
 /// One pose between two consecutive poses of a compact graph.
 struct ChainStep {
   Id pose = 0;                 ///< where the step ends

@@ -96,8 +96,8 @@ class CAIRN_API PosePolicy : public Component {
   /// convergence.
   virtual void finish() = 0;
 
-  /// The compact graph's estimate, good until the next call. Only to be read, which changes no later
-  /// result, but for `set_loss` before the first pose.
+  /// The compact graph's estimate, good until the next call. Only to be read, which changes no
+  /// later result, but for `set_loss` before the first pose.
   virtual Estimator& estimator() = 0;
   /// The poses that are kept, in the order of arrival.
   virtual std::vector<Id> kept() const = 0;
