@@ -147,12 +147,13 @@ TEST(BenchCommand, ARunThatTakesTooLongIsStoppedAndItsRowSaysSo) {
 
 TEST(BenchCommand, ABrokenPluginLeavesARowThatSaysSo) {
   const TemporaryFolder folder;
+  const std::string fragile = CAIRN_BAD_PLUGINS "/solver_throws/fragile.so";
   for (const std::string where : {"construction", "analyze", "factorize", "number"}) {
     SCOPED_TRACE(where);
     const Outcome outcome =
         cairn({"bench", "@ring:poses=40", "--repeat", "2", "--no-memory", "--quiet", "--plugin",
-               CAIRN_BAD_PLUGINS "/solver_throws/fragile.so", "--linear-solver",
-               "block_cholesky,fragile:in=" + where + ",eigen", "--json", folder.file("b.json")});
+               fragile, "--linear-solver", "block_cholesky,fragile:in=" + where + ",eigen",
+               "--json", folder.file("b.json")});
     EXPECT_EQ(outcome.exit_code, 5) << outcome.err;
     EXPECT_THAT(outcome.out, HasSubstr("failed"));
     EXPECT_THAT(outcome.out, HasSubstr("linear solver 'fragile"));
