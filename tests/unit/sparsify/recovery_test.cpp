@@ -251,9 +251,9 @@ TEST_F(Recovery, WhatDoesNotConnectAllNodesIsRefused) {
     }
     const RecoveryProblem problem = problem_of(blanket, topology);
     for (const std::string& name : kMethods) {
-      for (const auto& [initial, from] : enum_names(InitialInformation{})) {
-        SCOPED_TRACE(testing::Message() << name << " from " << from << ", " << times);
-        EXPECT_EQ(code_of([&] { method(name, {.initial = initial})->recover(problem); }),
+      for (const EnumName<InitialInformation>& from : enum_names(InitialInformation{})) {
+        SCOPED_TRACE(testing::Message() << name << " from " << from.name << ", " << times);
+        EXPECT_EQ(code_of([&] { method(name, {.initial = from.value})->recover(problem); }),
                   ErrorCode::numerical);
       }
     }
