@@ -45,6 +45,6 @@ int main() {
   }
   policy->finish();
   std::cout << "poses kept: " << policy->estimator().variable_count()
-            << "\nthe whole way: " << recovered_way(*policy, Recovery::likely).variable_count()
+            << "\nthe trajectory: " << recovered_way(*policy, Recovery::likely).variable_count()
             << " poses\n";
 }

@@ -19,7 +19,7 @@ constexpr auto enum_names(Layout) {
   return std::to_array<EnumName<Layout>>({{Layout::ring, "ring"}, {Layout::street, "street"}});
 }
 
-/// How first estimates and measurements err: standard deviations.
+/// Errors of initial estimates and measurements: standard deviations.
 struct BundleErrors {
   double pixel = 1.0;        ///< each axis [px]
   double translation = 0.1;  ///< each axis [m]
