@@ -92,7 +92,7 @@ function(cairn_add_plugin)
   set(manifest ${CMAKE_CURRENT_BINARY_DIR}/${arg_NAME}_manifest.cpp)
   configure_file(${CAIRN_PLUGIN_TEMPLATE_FOLDER}/plugin_manifest.cpp.in ${manifest} @ONLY)
   add_library(${target} MODULE ${arg_SOURCES} ${manifest})
-  target_link_libraries(${target} PRIVATE cairn::core ${arg_LIBRARIES})
+  target_link_libraries(${target} PRIVATE cairn::core cairn::lie ${arg_LIBRARIES})
   # A symbol that g++ marks unique would be shared between plugins that must not see each other.
   target_compile_options(${target} PRIVATE $<$<CXX_COMPILER_ID:GNU>:-fno-gnu-unique>)
   set(folder ${CMAKE_CURRENT_BINARY_DIR})

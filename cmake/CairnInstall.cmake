@@ -6,7 +6,7 @@ include(CMakePackageConfigHelpers)
 
 set(CAIRN_PACKAGE_FOLDER ${CMAKE_INSTALL_LIBDIR}/cmake/cairn)
 
-install(TARGETS cairn_core cairn_slam EXPORT cairn-targets LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
+install(TARGETS cairn_core cairn_lie cairn_slam EXPORT cairn-targets LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
 foreach(folder IN LISTS CAIRN_PUBLIC_FOLDERS ITEMS ${CAIRN_GENERATED_FOLDER})
   install(DIRECTORY ${folder}/cairn DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN "*.hpp")
 endforeach()

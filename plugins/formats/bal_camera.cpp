@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "cairn/types/lie/so3.hpp"
+#include "cairn/lie/so3.hpp"
 
 namespace cairn::formats {
 namespace {

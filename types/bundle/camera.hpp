@@ -5,7 +5,7 @@
 #include <string_view>
 
 #include "cairn/types/define_variable.hpp"
-#include "cairn/types/lie/se3.hpp"
+#include "cairn/lie/se3.hpp"
 
 namespace cairn::bundle {
 

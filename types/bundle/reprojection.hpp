@@ -6,8 +6,8 @@
 #include <tuple>
 
 #include "cairn/types/define_factor.hpp"
-#include "cairn/types/lie/point.hpp"
-#include "cairn/types/lie/se3.hpp"
+#include "cairn/lie/point.hpp"
+#include "cairn/lie/se3.hpp"
 #include "camera.hpp"
 
 namespace cairn::bundle {

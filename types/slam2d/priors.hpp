@@ -4,8 +4,8 @@
 #include <algorithm>
 
 #include "cairn/types/define_factor.hpp"
-#include "cairn/types/lie/point.hpp"
-#include "cairn/types/lie/se2.hpp"
+#include "cairn/lie/point.hpp"
+#include "cairn/lie/se2.hpp"
 
 namespace cairn::slam2d {
 

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "cairn/types/define_factor.hpp"
-#include "cairn/types/lie/se2.hpp"
+#include "cairn/lie/se2.hpp"
 
 namespace cairn::slam2d {
 

@@ -2,8 +2,8 @@
 #pragma once
 
 #include "cairn/types/define_factor.hpp"
-#include "cairn/types/lie/point.hpp"
-#include "cairn/types/lie/se3.hpp"
+#include "cairn/lie/point.hpp"
+#include "cairn/lie/se3.hpp"
 
 namespace cairn::slam3d {
 

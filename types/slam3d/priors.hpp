@@ -4,8 +4,8 @@
 #include <algorithm>
 
 #include "cairn/types/define_factor.hpp"
-#include "cairn/types/lie/point.hpp"
-#include "cairn/types/lie/se3.hpp"
+#include "cairn/lie/point.hpp"
+#include "cairn/lie/se3.hpp"
 #include "metrics.hpp"
 
 namespace cairn::slam3d {

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "cairn/types/define_factor.hpp"
-#include "cairn/types/lie/se3.hpp"
+#include "cairn/lie/se3.hpp"
 #include "metrics.hpp"
 
 namespace cairn::slam3d {

@@ -365,20 +365,20 @@ std::vector<double> Engine::x(int v) const {
 }
 
 double Engine::chi2() const {
-  const States states = current();
+  const Estimate estimate = current();
   double sum = 0.0;
   for (int f = 0; f < models_.size(); ++f) {
-    if (live_factor_[f]) sum += models_.cost_now(f, graph_, states);
+    if (live_factor_[f]) sum += models_.cost_now(f, graph_, estimate);
   }
   return sum;
 }
 
 /// The states as the graph's pools hold them.
-Values Engine::values_of(const States& states) const {
+Values Engine::values_of(const Estimate& estimate) const {
   Values values = graph_.values();
-  for (int v = 0; v < states.size(); ++v) {
-    const std::int32_t ambient = states.ambient(v);
-    std::copy_n(states.x(v), ambient,
+  for (int v = 0; v < estimate.size(); ++v) {
+    const std::int32_t ambient = states_.ambient(v);
+    std::copy_n(estimate.x(v), ambient,
                 values.pools[graph_.pool(v)].begin() + std::ptrdiff_t{graph_.slot(v)} * ambient);
   }
   return values;
@@ -386,7 +386,7 @@ Values Engine::values_of(const States& states) const {
 
 void Engine::write_back() {
   tree_.settle_all();
-  graph_.set_values(values_of(states_));
+  graph_.set_values(values_of(states_.estimate()));
 }
 
 Graph Engine::snapshot() const {

@@ -108,7 +108,7 @@ class Engine : private EngineState {
   /// x_v at the current estimate, ambient_size doubles. Changes nothing.
   std::vector<double> x(int v) const;
   /// All states at the current estimate. Changes nothing.
-  States current() const { return tree_.settled(); }
+  Estimate current() const { return tree_.settled(); }
   /// The factor's number in the graph, or -1.
   std::int32_t place_of(FactorId id) const {
     return id >= 0 && id < std::ssize(place_of_id_) ? place_of_id_[static_cast<std::size_t>(id)]
@@ -202,7 +202,7 @@ class Engine : private EngineState {
   void add_source(std::int32_t v);
   Graph clean_graph() const;
   void remove_dead(Graph& graph) const;
-  Values values_of(const States& states) const;
+  Values values_of(const Estimate& estimate) const;
 
   // The passes at hand: of no meaning between calls.
   std::vector<const double*> factor_steps_;

@@ -218,7 +218,8 @@ std::span<const double> IncrementalCholesky::state(Id id) {
   if (!all_ && std::ssize(read_) >= kFew) all_ = engine_->current();
   const auto size = static_cast<std::size_t>(engine_->graph().type(v).ambient_size());
   if (all_) return {all_->x(v), size};
-  return read_.try_emplace(v, engine_->x(v)).first->second;
+  const auto known = read_.find(v);
+  return known != read_.end() ? known->second : read_.emplace(v, engine_->x(v)).first->second;
 }
 
 int IncrementalCholesky::block_size(int a, int b) const {

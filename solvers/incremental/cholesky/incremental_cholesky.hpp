@@ -107,7 +107,7 @@ class IncrementalCholesky final : public Estimator {
   int since_solved_ = 0, since_full_ = 0;
   KeptMarginals kept_ = KeptMarginals::none;
   std::map<int, std::vector<double>> read_;  // states by variable, since the last update
-  std::optional<States> all_;                // or all of them
+  std::optional<Estimate> all_;              // or all of them
   std::set<Id> told_;                        // anchors that a note has named
 };
 

@@ -101,17 +101,17 @@ const double* Models::block(const Record& record, int k) const {
   return J;
 }
 
-/// The whitened residual and, unless J is null, the Jacobian at the current estimate, both weighted
-/// by √ρ′. Returns ρ(‖r‖²).
-double Models::evaluate(const Record& record, const Graph& graph, const States& states, double* r,
-                        double* J) const {
+/// The whitened residual and, unless J is null, the Jacobian at an estimate, both weighted by √ρ′.
+/// Returns ρ(‖r‖²).
+double Models::evaluate(const Record& record, const Graph& graph, const Estimate& estimate,
+                        double* r, double* J) const {
   const FactorPool& pool = graph.factor_pools()[record.pool];
   const FactorType& type = *pool.type;
   points_.clear();
   pointers_.clear();
   double* next = J;
   for (int k = 0; k < record.arity; ++k) {
-    points_.push_back(states.x(variables_[record.variables + k]));
+    points_.push_back(estimate.x(variables_[record.variables + k]));
     pointers_.push_back(next);
     if (J) next += record.rows * size_of(record, k);
   }
@@ -157,7 +157,7 @@ void Models::linearize(int f, const Graph& graph, const States& states) {
   double* const J = values_.data() + record.place;
   double* const r = J + rows * record.scalars;
   double* const gradient = r + rows;
-  record.cost = evaluate(record, graph, states, r, J);
+  record.cost = evaluate(record, graph, states.estimate(), r, J);
   std::fill_n(gradient, record.scalars, 0.0);
   add_transposed_product(rows, J, record.scalars, r, 1, 1.0, gradient);
   std::fill_n(r, rows, 0.0);
@@ -165,9 +165,9 @@ void Models::linearize(int f, const Graph& graph, const States& states) {
   record.moving = false;
 }
 
-double Models::cost_now(int f, const Graph& graph, const States& states) const {
+double Models::cost_now(int f, const Graph& graph, const Estimate& estimate) const {
   scratch_.resize(static_cast<std::size_t>(records_[f].rows));
-  return evaluate(records_[f], graph, states, scratch_.data(), nullptr);
+  return evaluate(records_[f], graph, estimate, scratch_.data(), nullptr);
 }
 
 /// Its part of the block that joins its variables ka and kb.
@@ -269,7 +269,7 @@ double Models::correct(int f, const Graph& graph, const States& states, System& 
   double* const J_now = scratch_.data();
   double* const r_now = J_now + doubles;
   double* const beyond = r_now + rows;  // J(x)ᵀ r(x) less γ when last evaluated
-  record.cost = evaluate(record, graph, states, r_now, J_now);
+  record.cost = evaluate(record, graph, states.estimate(), r_now, J_now);
   const double* const J = values_.data() + record.place;
   double* const change = values_.data() + record.place + doubles;
   double* const gradient = change + rows;

@@ -69,8 +69,8 @@ class Models {
   double cost(int f) const { return records_[f].cost; }
   /// Rows of the whitened residual.
   std::int32_t rows(int f) const { return records_[f].rows; }
-  /// ρ(‖r‖²) at the current estimate; nothing is kept of it.
-  double cost_now(int f, const Graph& graph, const States& states) const;
+  /// ρ(‖r‖²) at an estimate; nothing is kept of it.
+  double cost_now(int f, const Graph& graph, const Estimate& estimate) const;
   /// J of all its variables side by side, rows × scalars, column-major.
   const double* jacobian(int f) const { return values_.data() + records_[f].place; }
   std::int64_t doubles() const { return std::ssize(values_); }
@@ -91,7 +91,7 @@ class Models {
   void add_in_frame(const States& states, std::int32_t v, int size, const double* gradient,
                     double* out) const;
   void into_frames(const Record& record, const States& states, double* J) const;
-  double evaluate(const Record& record, const Graph& graph, const States& states, double* r,
+  double evaluate(const Record& record, const Graph& graph, const Estimate& estimate, double* r,
                   double* J) const;
 
   std::vector<Record> records_;

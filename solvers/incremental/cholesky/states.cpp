@@ -10,12 +10,12 @@ void States::add(std::shared_ptr<const VariableType> type, std::span<const doubl
   const std::int32_t tangent = type->tangent_size();
   const bool group = type->lie_group() != nullptr;
   records_.push_back({.type = std::move(type),
-                      .place = std::ssize(x_),
+                      .place = std::ssize(frames_),
                       .ambient = static_cast<std::int32_t>(state.size()),
                       .matrices = std::ssize(adjoints_),
                       .tangent = tangent,
                       .group = group});
-  x_.insert(x_.end(), state.begin(), state.end());
+  estimate_.add(state);
   frames_.insert(frames_.end(), state.begin(), state.end());
   if (!group) return;
   adjoints_.resize(adjoints_.size() + static_cast<std::size_t>(tangent * tangent));
@@ -31,14 +31,13 @@ void States::remember() {
 void States::log(std::int32_t v) {
   const Record& record = records_[v];
   log_.push_back({v, false, logged_.size(), static_cast<std::size_t>(record.ambient)});
-  logged_.insert(logged_.end(), x_.begin() + record.place,
-                 x_.begin() + record.place + record.ambient);
+  logged_.insert(logged_.end(), x(v), x(v) + record.ambient);
 }
 
 void States::lead(std::int32_t v, const double* g) {
   log(v);
   Record& record = records_[v];
-  double* x = x_.data() + record.place;
+  double* x = estimate_.x(v);
   record.type->lie_group()->compose(g, x, x);
   record.away = true;
   record.known = false;
@@ -48,7 +47,7 @@ void States::move(std::int32_t v, const double* delta) {
   log(v);
   Record& record = records_[v];
   const std::int64_t first = 0;
-  double* x = x_.data() + record.place;
+  double* x = estimate_.x(v);
   if (record.away) {
     const std::int32_t size = record.tangent;
     const double* T = frame_to_body(v);

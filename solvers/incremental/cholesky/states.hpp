@@ -12,6 +12,23 @@
 
 namespace cairn::incremental {
 
+/// The states of all variables, one after the other.
+class Estimate {
+ public:
+  void add(std::span<const double> state) {
+    places_.push_back(std::ssize(x_));
+    x_.insert(x_.end(), state.begin(), state.end());
+  }
+  int size() const { return static_cast<int>(places_.size()); }
+  /// x_v, ambient_size doubles.
+  double* x(std::int32_t v) { return x_.data() + places_[v]; }
+  const double* x(std::int32_t v) const { return x_.data() + places_[v]; }
+
+ private:
+  std::vector<std::int64_t> places_;
+  AlignedVector x_;
+};
+
 /// The estimate of every variable, and the frame in which its steps are expressed.
 ///
 /// A pose of a Lie group has a frame F, an element that is constant while the estimate x moves: a
@@ -32,7 +49,7 @@ class States {
       if (change.other) {
         undo_other(change.index, values);
       } else {
-        std::copy(values.begin(), values.end(), x_.begin() + records_[change.index].place);
+        std::ranges::copy(values, estimate_.x(change.index));
         records_[change.index].known = false;
         records_[change.index].away = records_[change.index].group;
       }
@@ -51,7 +68,9 @@ class States {
 
   const VariableType& type(std::int32_t v) const { return *records_[v].type; }
   /// x_v, ambient_size doubles.
-  const double* x(std::int32_t v) const { return x_.data() + records_[v].place; }
+  const double* x(std::int32_t v) const { return estimate_.x(v); }
+  /// The states alone.
+  const Estimate& estimate() const { return estimate_; }
   std::int32_t ambient(std::int32_t v) const { return records_[v].ambient; }
   /// x_v ← g x_v, g being an element of the variable's group.
   void lead(std::int32_t v, const double* g);
@@ -76,7 +95,7 @@ class States {
  private:
   struct Record {
     std::shared_ptr<const VariableType> type;
-    std::int64_t place;
+    std::int64_t place;  // in frames_
     std::int32_t ambient;
     std::int64_t matrices;  // in turns_ and adjoints_
     std::int32_t tangent;
@@ -94,7 +113,8 @@ class States {
   std::vector<Change> log_;
   std::vector<double> logged_;
   std::vector<Record> records_;
-  AlignedVector x_, frames_;
+  Estimate estimate_;
+  AlignedVector frames_;  // like the estimate
   AlignedVector adjoints_;
   mutable AlignedVector turns_;
   std::vector<double> element_;

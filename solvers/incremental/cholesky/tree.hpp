@@ -126,7 +126,7 @@ class Tree {
   /// Changes nothing.
   bool read(std::int32_t variable, double* x) const;
   /// All states, as `settle_all` would leave them.
-  States settled() const;
+  Estimate settled() const;
   /// Undoes what was noted for a node (see `States::undo`).
   void undo_lead(std::int32_t node, std::span<const double> lead) {
     nodes_[node].lead.assign(lead.begin(), lead.end());

@@ -195,29 +195,32 @@ bool Tree::read(std::int32_t variable, double* x) const {
   return true;
 }
 
-States Tree::settled() const {
-  States states = *states_;
-  std::vector<std::vector<double>> total(nodes_.size());  // by node, with all above it
-  std::vector<std::uint8_t> known(nodes_.size(), 0);
+Estimate Tree::settled() const {
+  constexpr std::int32_t kUnknown = -2, kNone = -1;
+  Estimate estimate = states_->estimate();
+  std::vector<std::vector<double>> totals;                      // leads with all above them
+  std::vector<std::int32_t> total_of(nodes_.size(), kUnknown);  // by node: which total
   std::vector<std::int32_t> path;
-  for (std::int32_t v = 0; v < states.size(); ++v) {
-    const LieGroup* group = states.type(v).lie_group();
-    for (std::int32_t n = node_of(v); n >= 0 && !known[n]; n = nodes_[n].parent) path.push_back(n);
+  for (std::int32_t v = 0; v < estimate.size(); ++v) {
+    const std::int32_t own = node_of(v);
+    if (own < 0) continue;
+    const LieGroup* group = states_->type(v).lie_group();
+    for (std::int32_t n = own; n >= 0 && total_of[n] == kUnknown; n = nodes_[n].parent)
+      path.push_back(n);
     for (; !path.empty(); path.pop_back()) {
       const Node& node = nodes_[path.back()];
-      std::vector<double>& sum = total[path.back()];
-      if (node.parent >= 0) sum = total[node.parent];
-      if (sum.empty()) {
-        sum.assign(node.lead.begin(), node.lead.end());
-      } else if (!node.lead.empty()) {
-        group->compose(sum.data(), node.lead.data(), sum.data());
-      }
-      known[path.back()] = 1;
+      const std::int32_t above = node.parent < 0 ? kNone : total_of[node.parent];
+      total_of[path.back()] = above;
+      if (node.lead.empty()) continue;
+      totals.push_back(node.lead);
+      if (above != kNone)
+        group->compose(totals[above].data(), node.lead.data(), totals.back().data());
+      total_of[path.back()] = static_cast<std::int32_t>(std::ssize(totals) - 1);
     }
-    if (const std::int32_t n = node_of(v); n >= 0 && !total[n].empty())
-      states.lead(v, total[n].data());
+    if (const std::int32_t total = total_of[own]; total != kNone)
+      group->compose(totals[total].data(), estimate.x(v), estimate.x(v));
   }
-  return states;
+  return estimate;
 }
 
 const Node* Tree::end_of_pass(std::int32_t variable) const {

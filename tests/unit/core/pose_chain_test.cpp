@@ -16,8 +16,8 @@
 
 #include "cairn/runtime/error.hpp"
 #include "cairn/types/define_factor.hpp"
-#include "cairn/types/lie/se2.hpp"
-#include "cairn/types/lie/se3.hpp"
+#include "cairn/lie/se2.hpp"
+#include "cairn/lie/se3.hpp"
 #include "support/planar_graph.hpp"
 #include "support/scaled_pose.hpp"
 

@@ -12,9 +12,9 @@
 
 #include "cairn/geometry/state_group.hpp"
 #include "cairn/types/define_variable.hpp"
-#include "cairn/types/lie/point.hpp"
-#include "cairn/types/lie/se2.hpp"
-#include "cairn/types/lie/se3.hpp"
+#include "cairn/lie/point.hpp"
+#include "cairn/lie/se2.hpp"
+#include "cairn/lie/se3.hpp"
 
 namespace cairn {
 namespace {

@@ -72,10 +72,11 @@ MatrixXd block_of(const Engine& engine, const MatrixXd& Sigma, int a, int b) {
 /// A block of the inverse, which is in the variables' frames, as seen from the poses.
 MatrixXd seen_from_poses(Engine& engine, MatrixXd block, int a, int b) {
   const auto turn = [&](int v) -> MatrixXd {
-    const States now = engine.current();
     const int size = engine.system().size(v);
-    if (!now.away(v)) return MatrixXd::Identity(size, size);
-    return Eigen::Map<const MatrixXd>(now.frame_to_body(v), size, size);
+    MatrixXd T = MatrixXd::Identity(size, size);
+    if (engine.states().type(v).lie_group())
+      engine.states().frame_to_body(v, engine.x(v).data(), T.data());
+    return T;
   };
   return turn(a) * block * turn(b).transpose();
 }

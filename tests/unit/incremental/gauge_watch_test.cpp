@@ -9,7 +9,7 @@
 
 #include "cairn/graph/gauge.hpp"
 #include "cairn/types/define_factor.hpp"
-#include "cairn/types/lie/point.hpp"
+#include "cairn/lie/point.hpp"
 #include "support/planar_graph.hpp"
 #include "support/scaled_pose.hpp"
 

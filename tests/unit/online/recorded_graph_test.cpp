@@ -11,7 +11,7 @@
 
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
-#include "cairn/types/lie/se3.hpp"
+#include "cairn/lie/se3.hpp"
 #include "support/planar_graph.hpp"
 #include "support/scaled_pose.hpp"
 

@@ -8,7 +8,7 @@
 
 #include "cairn/runtime/error.hpp"
 #include "cairn/types/define_variable.hpp"
-#include "cairn/types/lie/se2.hpp"
+#include "cairn/lie/se2.hpp"
 #include "support/scaled_pose.hpp"
 #include "unit/policies/pose_world.hpp"
 

@@ -9,8 +9,8 @@
 #include "cairn/graph/gauge.hpp"
 #include "cairn/linear/linearizer.hpp"
 #include "cairn/types/define_factor.hpp"
-#include "cairn/types/lie/point.hpp"
-#include "cairn/types/lie/se2.hpp"
+#include "cairn/lie/point.hpp"
+#include "cairn/lie/se2.hpp"
 #include "sample_matrices.hpp"
 
 namespace cairn::test {

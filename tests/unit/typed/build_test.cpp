@@ -11,7 +11,7 @@
 
 #include <Eigen/LU>
 
-#include "cairn/types/lie/se2.hpp"
+#include "cairn/lie/se2.hpp"
 
 namespace cairn {
 namespace {

@@ -9,10 +9,10 @@
 #include <unsupported/Eigen/MatrixFunctions>
 
 #include "cairn/types/dual.hpp"
-#include "cairn/types/pose2.hpp"
-#include "cairn/types/pose3.hpp"
-#include "cairn/types/rot2.hpp"
-#include "cairn/types/rot3.hpp"
+#include "cairn/typed/pose2.hpp"
+#include "cairn/typed/pose3.hpp"
+#include "cairn/typed/rot2.hpp"
+#include "cairn/typed/rot3.hpp"
 #include "unit/types/sampling.hpp"
 
 namespace cairn::test {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "cairn/graph/symbol.hpp"
+#include "cairn/typed/symbol.hpp"
 
 #include <gtest/gtest.h>
 

@@ -6,8 +6,8 @@
 #include <cmath>
 
 #include "cairn/types/define_factor.hpp"
-#include "cairn/types/lie/point.hpp"
-#include "cairn/types/lie/se2.hpp"
+#include "cairn/lie/point.hpp"
+#include "cairn/lie/se2.hpp"
 
 namespace cairn::test {
 namespace {

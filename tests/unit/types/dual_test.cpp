@@ -7,7 +7,7 @@
 #include <Eigen/Geometry>
 #include <array>
 
-#include "cairn/types/lie/so2.hpp"
+#include "cairn/lie/so2.hpp"
 
 namespace cairn::test {
 namespace {

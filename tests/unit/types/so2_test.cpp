@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "cairn/types/lie/so2.hpp"
+#include "cairn/lie/so2.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "cairn/types/lie/so3.hpp"
+#include "cairn/lie/so3.hpp"
 
 #include <gtest/gtest.h>
 
 #include <numbers>
 #include <unsupported/Eigen/MatrixFunctions>
 
-#include "cairn/types/lie/so2.hpp"
+#include "cairn/lie/so2.hpp"
 #include "sampling.hpp"
 
 namespace cairn::test {

@@ -7,7 +7,7 @@
 
 #include "cairn/plugin/registry.hpp"
 #include "cairn/types/define_factor.hpp"
-#include "cairn/types/lie/se2.hpp"
+#include "cairn/lie/se2.hpp"
 
 namespace {
 

@@ -6,7 +6,7 @@
 #include <string_view>
 
 #include "cairn/types/define_variable.hpp"
-#include "cairn/types/lie/so3.hpp"
+#include "cairn/lie/so3.hpp"
 
 namespace cairn {
 

@@ -12,7 +12,7 @@
 #include "cairn/graph/elements.hpp"
 #include "cairn/graph/graph.hpp"
 #include "cairn/graph/information.hpp"
-#include "cairn/graph/symbol.hpp"
+#include "cairn/typed/symbol.hpp"
 #include "cairn/graph/update.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"

@@ -6,10 +6,10 @@
 
 #include <Eigen/Core>
 
-#include "cairn/types/group_value.hpp"
-#include "cairn/types/lie/se2.hpp"
-#include "cairn/types/point.hpp"
-#include "cairn/types/rot2.hpp"
+#include "cairn/typed/group_value.hpp"
+#include "cairn/lie/se2.hpp"
+#include "cairn/typed/point.hpp"
+#include "cairn/typed/rot2.hpp"
 
 namespace cairn {
 

@@ -5,7 +5,7 @@
 #include <string_view>
 
 #include "cairn/types/define_variable.hpp"
-#include "cairn/types/lie/so2.hpp"
+#include "cairn/lie/so2.hpp"
 
 namespace cairn {
 

@@ -9,9 +9,9 @@
 #include <Eigen/Geometry>
 
 #include "cairn/runtime/error.hpp"
-#include "cairn/types/group_value.hpp"
-#include "cairn/types/lie/so3.hpp"
-#include "cairn/types/point.hpp"
+#include "cairn/typed/group_value.hpp"
+#include "cairn/lie/so3.hpp"
+#include "cairn/typed/point.hpp"
 
 namespace cairn {
 

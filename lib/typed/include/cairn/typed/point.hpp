@@ -8,8 +8,8 @@
 #include <string>
 #include <type_traits>
 
-#include "cairn/types/group_value.hpp"
-#include "cairn/types/lie/point.hpp"
+#include "cairn/typed/group_value.hpp"
+#include "cairn/lie/point.hpp"
 
 namespace cairn {
 

@@ -4,9 +4,9 @@
 #include <string>
 #include <type_traits>
 
-#include "cairn/types/group_value.hpp"
-#include "cairn/types/lie/so2.hpp"
-#include "cairn/types/point.hpp"
+#include "cairn/typed/group_value.hpp"
+#include "cairn/lie/so2.hpp"
+#include "cairn/typed/point.hpp"
 
 namespace cairn {
 

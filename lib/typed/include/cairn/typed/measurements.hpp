@@ -12,9 +12,9 @@
 
 #include "cairn/graph/elements.hpp"
 #include "cairn/types/define_factor.hpp"
-#include "cairn/types/point.hpp"
-#include "cairn/types/pose2.hpp"
-#include "cairn/types/pose3.hpp"
+#include "cairn/typed/point.hpp"
+#include "cairn/typed/pose2.hpp"
+#include "cairn/typed/pose3.hpp"
 
 namespace cairn {
 

@@ -6,10 +6,10 @@
 
 #include <Eigen/Core>
 
-#include "cairn/types/group_value.hpp"
-#include "cairn/types/lie/se3.hpp"
-#include "cairn/types/point.hpp"
-#include "cairn/types/rot3.hpp"
+#include "cairn/typed/group_value.hpp"
+#include "cairn/lie/se3.hpp"
+#include "cairn/typed/point.hpp"
+#include "cairn/typed/rot3.hpp"
 
 namespace cairn {
 

@@ -7,7 +7,7 @@
 
 #include <fmt/format.h>
 
-#include "cairn/graph/symbol.hpp"
+#include "cairn/typed/symbol.hpp"
 
 namespace cairn {
 namespace {
