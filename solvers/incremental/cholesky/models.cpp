@@ -123,7 +123,7 @@ double Models::evaluate(const Record& record, const Graph& graph, const Estimate
       pool.sqrt_information.data() + entry * packed, r, J ? pointers_.data() : nullptr);
   double s = 0.0;
   for (int k = 0; k < record.rows; ++k) s += r[k] * r[k];
-  if (!graph.any_loss(record.pool, entry, entry + 1)) return s;
+  if (!graph.has_losses() || !graph.any_loss(record.pool, entry, entry + 1)) return s;
   double rho = 0.0, weight = 1.0;
   graph.weigh(record.pool, entry, {&s, 1}, {&rho, 1}, {&weight, 1});
   const double root = std::sqrt(weight);

@@ -2,7 +2,9 @@
 #include "states.hpp"
 
 #include <algorithm>
+#include <array>
 #include <utility>
+#include <vector>
 
 namespace cairn::incremental {
 
@@ -84,11 +86,16 @@ const double* States::frame_to_body(std::int32_t v) const {
 
 void States::frame_to_body(std::int32_t v, const double* x, double* T) const {
   const LieGroup& group = *records_[v].type->lie_group();
-  thread_local std::vector<double> element;
-  element.resize(static_cast<std::size_t>(records_[v].ambient));
-  group.inverse(x, element.data());
-  group.compose(element.data(), frame(v), element.data());
-  group.adjoint(element.data(), T);
+  std::array<double, 8> few;  // a pose's numbers
+  std::vector<double> many;
+  double* element = few.data();
+  if (const auto size = static_cast<std::size_t>(records_[v].ambient); size > few.size()) {
+    many.resize(size);
+    element = many.data();
+  }
+  group.inverse(x, element);
+  group.compose(element, frame(v), element);
+  group.adjoint(element, T);
 }
 
 }  // namespace cairn::incremental
