@@ -38,6 +38,7 @@ fi
 # run_tests: the test programs whole, two at a time, which takes half of the time of a process per test; then what is no
 # program of GoogleTest.
 run_tests() {
+  # shellcheck disable=SC2016  # the inner shell expands it
   find build/release/tests -maxdepth 1 -type f -perm -u+x -print0 |
     xargs -0 -P "$(nproc)" -I{} sh -c \
       '"$1" --gtest_brief=1 >"$1.log" 2>&1 || { printf "FAILED: %s\n" "$1"; grep -A 15 FAILED "$1.log"; exit 1; }' _ {} &&
