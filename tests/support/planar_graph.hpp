@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "cairn/graph/graph.hpp"
-#include "cairn/types/define_factor.hpp"
 #include "cairn/lie/point.hpp"
 #include "cairn/lie/se2.hpp"
+#include "cairn/types/define_factor.hpp"
 
 namespace cairn::test {
 

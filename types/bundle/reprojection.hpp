@@ -5,9 +5,9 @@
 #include <string_view>
 #include <tuple>
 
-#include "cairn/types/define_factor.hpp"
 #include "cairn/lie/point.hpp"
 #include "cairn/lie/se3.hpp"
+#include "cairn/types/define_factor.hpp"
 #include "camera.hpp"
 
 namespace cairn::bundle {

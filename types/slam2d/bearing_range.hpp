@@ -3,9 +3,9 @@
 
 #include <cmath>
 
-#include "cairn/types/define_factor.hpp"
 #include "cairn/lie/point.hpp"
 #include "cairn/lie/se2.hpp"
+#include "cairn/types/define_factor.hpp"
 
 namespace cairn::slam2d {
 

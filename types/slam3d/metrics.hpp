@@ -3,8 +3,8 @@
 
 #include <string_view>
 
-#include "cairn/types/define_variable.hpp"
 #include "cairn/lie/se3.hpp"
+#include "cairn/types/define_variable.hpp"
 
 /// How an error pose E = (t, q), which is the identity when a measurement fits, becomes six
 /// numbers. Tools differ here, and so do their chi2. A metric is a struct with

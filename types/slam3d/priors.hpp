@@ -3,9 +3,9 @@
 
 #include <algorithm>
 
-#include "cairn/types/define_factor.hpp"
 #include "cairn/lie/point.hpp"
 #include "cairn/lie/se3.hpp"
+#include "cairn/types/define_factor.hpp"
 #include "metrics.hpp"
 
 namespace cairn::slam3d {

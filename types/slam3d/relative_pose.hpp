@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include "cairn/types/define_factor.hpp"
 #include "cairn/lie/se3.hpp"
+#include "cairn/types/define_factor.hpp"
 #include "metrics.hpp"
 
 namespace cairn::slam3d {

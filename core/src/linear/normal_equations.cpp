@@ -91,13 +91,14 @@ void NormalEquations::retract(const Values& values, std::span<const double> step
 
 Factorization NormalEquations::factorize() {
   const Timed timed(seconds_.factorize);
+  damped_ = diagonal_;
   return jacobian_solver_ ? jacobian_solver_->factorize(J_, {}) : solver_->factorize(H_);
 }
 
 Factorization NormalEquations::factorize_damped(std::span<const double> damping) {
   const Timed timed(seconds_.factorize);
-  if (jacobian_solver_) return jacobian_solver_->factorize(J_, damping);
   for (std::size_t k = 0; k < damped_.size(); ++k) damped_[k] = diagonal_[k] + damping[k];
+  if (jacobian_solver_) return jacobian_solver_->factorize(J_, damping);
   H_.set_diagonal(damped_);
   const Factorization factorization = solver_->factorize(H_);
   H_.set_diagonal(diagonal_);
@@ -111,6 +112,21 @@ void NormalEquations::solve(std::span<double> step) {
   } else {
     solver_->solve(g_, step);
   }
+}
+
+double NormalEquations::backward_error(std::span<const double> step) {
+  residual_.resize(step.size());
+  H_.multiply(step, residual_);
+  double error = 0.0, length = 0.0, gradient = 0.0, largest = 0.0;
+  for (std::size_t k = 0; k < step.size(); ++k) {
+    const double r = std::abs(residual_[k] + (damped_[k] - diagonal_[k]) * step[k] - g_[k]);
+    if (!(r <= error)) error = r;
+    if (std::isnan(error)) return error;
+    length = std::max(length, std::abs(step[k]));
+    gradient = std::max(gradient, std::abs(g_[k]));
+    largest = std::max(largest, damped_[k]);
+  }
+  return error == 0.0 ? 0.0 : error / (largest * length + gradient);
 }
 
 int NormalEquations::free_directions() const {

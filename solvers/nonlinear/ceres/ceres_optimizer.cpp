@@ -185,11 +185,14 @@ Summary CeresOptimizer::optimize(Graph& graph, const Stop& stop, Observer& obser
     const QuietGlog quiet;
     ceres::Solve(options, &problem.problem(), &report);
   }
+  graph.set_values(std::move(values));  // the last that was accepted, also where something threw
+  problem.rethrow();
   bridge.rethrow();
 
-  graph.set_values(std::move(values));
   summary.status = status_of(report, bridge.interrupted());
   summary.final_chi2 = loss_.name == "none" ? chi2(graph) : bridge.chi2();
+  if (summary.status == Status::converged && !std::isfinite(summary.final_chi2))
+    summary.status = Status::diverged;
   summary.notes.push_back("Ceres: " + report.message);
   summary.seconds = seconds_of(report);
   summary.seconds.total = seconds_since(begin);

@@ -3,10 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <string>
 #include <utility>
 
-#include "cairn/graph/packed.hpp"
 #include "cairn/runtime/error.hpp"
 
 namespace cairn {
@@ -14,21 +14,19 @@ namespace {
 
 class GraphManifold final : public ceres::Manifold {
  public:
-  explicit GraphManifold(const VariableType& type) : type_(type) {}
+  GraphManifold(const VariableType& type, CaughtException& caught) : type_(type), caught_(caught) {}
   int AmbientSize() const override { return type_.ambient_size(); }
   int TangentSize() const override { return type_.tangent_size(); }
 
   bool Plus(const double* x, const double* delta, double* x_plus_delta) const override {
     const std::int64_t offset = 0;
-    type_.retract(1, x, &offset, delta, x_plus_delta);
-    return true;
+    return run([&] { type_.retract(1, x, &offset, delta, x_plus_delta); });
   }
   bool PlusJacobian(const double*, double* jacobian) const override {
     return identity(AmbientSize(), TangentSize(), jacobian);
   }
   bool Minus(const double* y, const double* x, double* y_minus_x) const override {
-    type_.local(1, x, y, y_minus_x);
-    return true;
+    return run([&] { type_.local(1, x, y, y_minus_x); });
   }
   bool MinusJacobian(const double*, double* jacobian) const override {
     return identity(TangentSize(), AmbientSize(), jacobian);
@@ -40,27 +38,41 @@ class GraphManifold final : public ceres::Manifold {
     for (int k = 0; k < std::min(rows, columns); ++k) row_major[k * columns + k] = 1.0;
     return true;
   }
+  template <class Work>
+  bool run(const Work& work) const {
+    return caught_.run([&] { return "variable '" + std::string(type_.tag()) + "'"; }, work);
+  }
   const VariableType& type_;
+  CaughtException& caught_;
 };
 
-/// One factor. Borrows measurement and information from the graph.
+/// One factor. Borrows measurement and information from the graph, which names it in errors.
 class FactorCost final : public ceres::CostFunction {
  public:
-  FactorCost(const FactorType& type, const double* measurement, const double* sqrt_information)
-      : type_(type), measurement_(measurement), sqrt_information_(sqrt_information) {
+  FactorCost(const Graph& graph, int position, CaughtException& caught)
+      : graph_(graph),
+        position_(position),
+        type_(graph.factor_type(position)),
+        measurement_(graph.measurement(position).data()),
+        sqrt_information_(graph.sqrt_information(position).data()),
+        caught_(caught) {
+    const FactorType& type = type_;
     set_num_residuals(type.residual_size());
     for (int v = 0; v < type.arity(); ++v)
       mutable_parameter_block_sizes()->push_back(type.ambient_size(v));
   }
 
   bool Evaluate(double const* const* x, double* residuals, double** jacobians) const override {
-    if (!jacobians) {
-      type_.evaluate(x, measurement_, sqrt_information_, residuals, nullptr);
-    } else {
-      evaluate_with_jacobians(x, residuals, jacobians);
-    }
-    return std::all_of(residuals, residuals + num_residuals(),
-                       [](double r) { return std::isfinite(r); });
+    const auto name = [&] { return "factor '" + graph_.describe_factor(position_) + "'"; };
+    const bool returned = caught_.run(name, [&] {
+      if (!jacobians) {
+        type_.evaluate(x, measurement_, sqrt_information_, residuals, nullptr);
+      } else {
+        evaluate_with_jacobians(x, residuals, jacobians);
+      }
+    });
+    return returned && std::all_of(residuals, residuals + num_residuals(),
+                                   [](double r) { return std::isfinite(r); });
   }
 
  private:
@@ -95,21 +107,29 @@ class FactorCost final : public ceres::CostFunction {
     }
   }
 
+  const Graph& graph_;
+  int position_;
   const FactorType& type_;
   const double* measurement_;
   const double* sqrt_information_;
+  CaughtException& caught_;
 };
 
 class WrappedLoss final : public ceres::LossFunction {
  public:
-  explicit WrappedLoss(const Loss& loss) : loss_(loss) {}
+  WrappedLoss(const Loss& loss, CaughtException& caught) : loss_(loss), caught_(caught) {}
   void Evaluate(double s, double out[3]) const override {
-    loss_.evaluate({&s, 1}, {&out[0], 1}, {&out[1], 1});
-    out[2] = loss_.second_derivative(s);
+    const bool returned = caught_.run([] { return "the loss"; },
+                                      [&] {
+                                        loss_.evaluate({&s, 1}, {&out[0], 1}, {&out[1], 1});
+                                        out[2] = loss_.second_derivative(s);
+                                      });
+    if (!returned) out[0] = out[1] = out[2] = std::numeric_limits<double>::quiet_NaN();
   }
 
  private:
   const Loss& loss_;
+  CaughtException& caught_;
 };
 
 ceres::Problem::Options lend_everything() {
@@ -128,17 +148,13 @@ double* state(const Graph& graph, Values& values, int variable) {
 
 }  // namespace
 
-std::unique_ptr<ceres::LossFunction> wrap_loss(const Loss& loss) {
-  return std::make_unique<WrappedLoss>(loss);
-}
-
 CeresProblem::CeresProblem(const Graph& graph, const Gauge& gauge, Values& values,
                            std::unique_ptr<ceres::LossFunction> loss)
     : problem_(lend_everything()) {
   const bool own = loss != nullptr;
   if (own) losses_.push_back(std::move(loss));
   for (const std::shared_ptr<const Loss>& each : graph.losses()) {
-    if (!own) losses_.push_back(each ? wrap_loss(*each) : nullptr);
+    if (!own) losses_.push_back(each ? std::make_unique<WrappedLoss>(*each, caught_) : nullptr);
   }
   add_variables(graph, gauge, values);
   add_factors(graph, values);
@@ -151,7 +167,7 @@ void CeresProblem::add_variables(const Graph& graph, const Gauge& gauge, Values&
                   "optimizer ceres: " + std::string(pool.type->tag()) +
                       " has a tangent space larger than its state, which Ceres cannot express");
     }
-    manifolds_.push_back(std::make_unique<GraphManifold>(*pool.type));
+    manifolds_.push_back(std::make_unique<GraphManifold>(*pool.type, caught_));
   }
   for (int v = 0; v < graph.variable_count(); ++v) {
     double* x = state(graph, values, v);
@@ -166,10 +182,7 @@ void CeresProblem::add_factors(const Graph& graph, Values& values) {
   for (int position = 0; position < graph.factor_count(); ++position) {
     const FactorRef ref = graph.ref(position);
     const FactorPool& pool = graph.factor_pools()[ref.pool];
-    const std::size_t m = pool.type->measurement_size();
-    costs_.push_back(std::make_unique<FactorCost>(
-        *pool.type, pool.measurements.data() + ref.entry * m,
-        pool.sqrt_information.data() + ref.entry * packed_size(pool.type->residual_size())));
+    costs_.push_back(std::make_unique<FactorCost>(graph, position, caught_));
     x.clear();
     for (const std::int32_t v : graph.factor_variables(position))
       x.push_back(state(graph, values, v));

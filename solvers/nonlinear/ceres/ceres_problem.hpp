@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <exception>
 #include <memory>
+#include <mutex>
 #include <vector>
 
 #include <ceres/cost_function.h>
@@ -11,8 +13,34 @@
 
 #include "cairn/graph/gauge.hpp"
 #include "cairn/graph/graph.hpp"
+#include "cairn/runtime/plugin_call.hpp"
 
 namespace cairn {
+
+/// Keeps the first exception of a plugin that is called from within Ceres, whose frames and threads
+/// are not made to be unwound.
+class CaughtException {
+ public:
+  /// work(); false if it threw. `component()` names what threw, as for `call_plugin`.
+  template <class Component, class Work>
+  bool run(const Component& component, const Work& work) noexcept {
+    try {
+      call_plugin(component, work);
+      return true;
+    } catch (...) {
+      const std::lock_guard lock(mutex_);
+      if (!exception_) exception_ = std::current_exception();
+      return false;
+    }
+  }
+  void rethrow() const {
+    if (exception_) std::rethrow_exception(exception_);
+  }
+
+ private:
+  std::mutex mutex_;
+  std::exception_ptr exception_;
+};
 
 /// A graph as a ceres::Problem with cairn's residuals, Jacobians, retractions and loss.
 ///
@@ -30,11 +58,15 @@ class CeresProblem {
                std::unique_ptr<ceres::LossFunction> loss);
 
   ceres::Problem& problem() { return problem_; }
+  /// Throws what a factor, a loss or a type of variables threw while Ceres ran, as `Error` (plugin)
+  /// with its name.
+  void rethrow() const { caught_.rethrow(); }
 
  private:
   void add_variables(const Graph& graph, const Gauge& gauge, Values& values);
   void add_factors(const Graph& graph, Values& values);
 
+  CaughtException caught_;
   // Owned here and only lent to the problem, which therefore is the last to come and the first to
   // go.
   std::vector<std::unique_ptr<ceres::LossFunction>> losses_;  // as Graph::losses(), or Ceres' own
@@ -42,8 +74,5 @@ class CeresProblem {
   std::vector<std::unique_ptr<ceres::CostFunction>> costs_;
   ceres::Problem problem_;
 };
-
-/// The graph's loss in Ceres' terms.
-std::unique_ptr<ceres::LossFunction> wrap_loss(const Loss& loss);
 
 }  // namespace cairn

@@ -8,9 +8,20 @@
 
 #include <fmt/format.h>
 
+#include "cairn/linear/iterative_solver.hpp"
 #include "cairn/runtime/timed.hpp"
 
 namespace cairn {
+
+namespace {
+
+/// A direct solver's step solves its system to this. Rounding leaves 1e-16 times a small power of
+/// the size.
+constexpr double kLargestBackwardError = 1e-6;
+/// What may be left when no step lowers chi2: of chi2, and of the states.
+constexpr double kRounding = 1e-6;
+
+}  // namespace
 
 double dot(std::span<const double> a, std::span<const double> b) {
   return std::inner_product(a.begin(), a.end(), b.begin(), 0.0);
@@ -42,6 +53,9 @@ Descent::Descent(std::string optimizer, std::string linear_solver, LinearSolver&
     trial = estimate;
     chi2 = equations_->linearize(estimate);
   }
+  double squares = 0.0;
+  for (const AlignedVector& pool : estimate.pools) squares += dot(pool, pool);
+  state_norm_ = std::sqrt(squares);
   best_ = estimate;
   best_chi2_ = summary_.initial_chi2 = chi2;
   for (const std::string& sentence : summary_.notes) observer_.on_message(sentence);
@@ -92,15 +106,46 @@ void Descent::record(double step_norm, double lambda, bool accepted) {
   if (!observer_.on_iteration(iteration, graph_, best_) && !ended()) end(Status::interrupted);
 }
 
+bool Descent::solve(std::span<double> out) {
+  equations_->solve(out);
+  if (!std::isfinite(dot(out, out))) return false;
+  if (checked_) return true;
+  checked_ = true;
+  return solves(out);
+}
+
+bool Descent::solves(std::span<const double> out) {
+  if (query<IterativeSolver>(solver_)) return true;
+  const double error = equations_->backward_error(out);
+  if (error <= kLargestBackwardError) return true;
+  note(fmt::format(
+      "linear solver {} returned what does not solve H x = g: ‖Hx − g‖ is {:.1g} of ‖H‖ ‖x‖ + ‖g‖",
+      summary_.linear_solver, error));
+  end(Status::diverged);
+  return false;
+}
+
+void Descent::end_not_finite() {
+  note(fmt::format("linear solver {} returned a step that is not finite", summary_.linear_solver));
+  end(Status::diverged);
+}
+
+void Descent::end_without_descent(double promise, double step_norm) {
+  if (promise <= kRounding * chi2 || step_norm <= kRounding * state_norm_) {
+    end(Status::converged);
+    return;
+  }
+  note(
+      fmt::format("no step lowers chi2, though the model predicts a decrease of {:.3g}: a Jacobian "
+                  "does not fit "
+                  "its residual, or a residual is not continuous or not finite nearby",
+                  promise));
+  end(Status::diverged);
+}
+
 void Descent::end_not_positive_definite(const Factorization& failure) {
   note(equations_->explain(failure));
   end(Status::not_positive_definite);
-}
-
-double Descent::state_norm() const {
-  double sum = 0.0;
-  for (const AlignedVector& pool : estimate.pools) sum += dot(pool, pool);
-  return std::sqrt(sum);
 }
 
 Summary Descent::finish() {

@@ -51,6 +51,21 @@ class Descent {
   /// must stop.
   bool must_stop();
 
+  /// Solves for `out` with what was factorised last. False if the result is no step: it has numbers
+  /// that are not finite, which the caller may try to mend with more damping; or, the first time
+  /// and whenever `claim` says that convergence is to be claimed by it, it does not solve its
+  /// system (`NormalEquations::backward_error`), which ends the run as diverged with a note that
+  /// names the linear solver. Iterative solvers, which meet a tolerance of their own, are only
+  /// asked for finite numbers.
+  bool solve(std::span<double> out);
+  bool solves(std::span<const double> out);
+  /// Ends the run because no step that is finite could be had.
+  void end_not_finite();
+  /// Ends the run because no trial step lowers chi2. Converged if the first of them, from the
+  /// present linearisation, was to lower it by little (`promise`) or was short (`step_norm`):
+  /// what is left is rounding. Otherwise the model is not that of the residuals: diverged.
+  void end_without_descent(double promise, double step_norm);
+
   /// Remembers the estimate if its chi2 is the lowest so far; true if it is.
   bool keep_if_best();
   /// Records the iteration and notifies the observer, which may end the run.
@@ -62,8 +77,8 @@ class Descent {
   /// Ends the run for a factorisation of H that failed, with a note that gives the reason.
   void end_not_positive_definite(const Factorization& failure);
 
-  /// Euclidean norm of all states.
-  double state_norm() const;
+  /// Euclidean norm of all states at the start.
+  double state_norm() const { return state_norm_; }
 
   /// Leaves the best estimate in the graph.
   Summary finish();
@@ -81,6 +96,8 @@ class Descent {
   Values best_;
   double best_chi2_ = 0.0;
   int number_ = 0;
+  bool checked_ = false;     // the first step
+  double state_norm_ = 0.0;  // at the start
   std::optional<Status> status_;
   Summary summary_;
 };

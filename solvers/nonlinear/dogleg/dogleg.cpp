@@ -22,17 +22,23 @@ class Run {
         options_(options),
         convergence_(descent.stop().tolerance, descent.state_norm()),
         path_(descent.step.size()),
-        radius_(options.initial_radius) {}
+        radius_(std::max(options.initial_radius, std::sqrt(descent.chi2))) {}
 
   void iterate() {
     bool arrived = false;
     if (!path_is_current_) {
       if (!factorize() || run_.must_stop()) return;
-      equations_.solve(path_.newton());
+      if (!run_.solve(path_.newton())) {
+        if (!run_.ended()) run_.end_not_finite();
+        return;
+      }
       path_.prepare(equations_.H(), equations_.g(), equations_.diagonal(),
-                    options_.smallest_diagonal);
+                    options_.smallest_diagonal * std::ranges::max(equations_.diagonal()));
       path_is_current_ = true;
-      arrived = convergence_.arrived(dot(equations_.g(), path_.newton()), run_.chi2);
+      newton_promise_ = dot(equations_.g(), path_.newton());
+      newton_norm_ = std::sqrt(dot(path_.newton(), path_.newton()));
+      arrived = convergence_.arrived(newton_promise_, run_.chi2);
+      if (arrived && !run_.solves(path_.newton())) return;
     }
     const double radius = radius_;
     const DoglegPath::Step step = arrived ? path_.end(run_.step) : path_.at(radius, run_.step);
@@ -47,7 +53,12 @@ class Run {
     if (run_.must_stop()) return;
 
     const bool lowered = trial_chi2 < run_.chi2;  // false for what is not a number
-    if (arrived || convergence_.exhausted(lowered, step_norm)) run_.end(Status::converged);
+    const bool exhausted = convergence_.exhausted(lowered, step_norm);
+    if (arrived) {
+      run_.end(Status::converged);
+    } else if (exhausted) {
+      run_.end_without_descent(newton_promise_, newton_norm_);
+    }
     adapt_radius(lowered ? (run_.chi2 - trial_chi2) / step.promise : -1.0, step.length);
     if (lowered) take_step(trial_chi2);
     run_.record(step_norm, 1.0 / radius, lowered);
@@ -91,6 +102,7 @@ class Run {
   const DoglegOptions& options_;
   Convergence convergence_;
   DoglegPath path_;
+  double newton_promise_ = 0.0, newton_norm_ = 0.0;  // of the full step
   double radius_;
   bool path_is_current_ = false;
   bool explained_ = false;

@@ -39,10 +39,14 @@ Summary GaussNewton::optimize(Graph& graph, const Stop& stop, Observer& observer
       break;
     }
     if (run.must_stop()) break;
-    equations.solve(run.step);
+    if (!run.solve(run.step)) {
+      if (!run.ended()) run.end_not_finite();
+      break;
+    }
     const double step_norm = std::sqrt(dot(run.step, run.step));
     const double before = run.chi2;
     const bool arrived = convergence.arrived(dot(equations.g(), run.step), before);
+    if (arrived && !run.solves(run.step)) break;
     equations.retract(run.estimate, run.step, run.trial);
     if (run.must_stop()) break;
 

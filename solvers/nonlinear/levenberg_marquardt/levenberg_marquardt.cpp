@@ -52,18 +52,29 @@ class Run {
       return;
     }
     if (run_.must_stop()) return;
-    equations_.solve(run_.step);
+    if (!run_.solve(run_.step)) {
+      take_no_step(undamped);
+      run_.record(0.0, lambda, false);
+      return;
+    }
     const double step_norm = std::sqrt(dot(run_.step, run_.step));
     const double promise = dot(equations_.g(), run_.step) + damping_energy();
-    const bool arrived =
-        undamped ? convergence_.arrived(promise, run_.chi2) : damped_arrival(promise);
+    if (first_trial_) {
+      first_promise_ = promise;
+      first_norm_ = step_norm;
+      first_trial_ = false;
+    }
+    bool arrived = undamped ? convergence_.arrived(promise, run_.chi2) : damped_arrival(promise);
+    if (arrived) arrived = run_.solves(run_.step);
 
     equations_.retract(run_.estimate, run_.step, run_.trial);
     const double trial_chi2 = equations_.chi2(run_.trial);
     if (run_.must_stop()) return;
     const bool lowered = trial_chi2 < run_.chi2;  // false for what is not a number
     const double gained = run_.chi2 - trial_chi2;
-    if (arrived || convergence_.exhausted(lowered, step_norm)) run_.end(Status::converged);
+    const bool exhausted = convergence_.exhausted(lowered, step_norm);
+    if (!run_.ended() && arrived) run_.end(Status::converged);
+    if (!run_.ended() && exhausted) run_.end_without_descent(first_promise_, first_norm_);
 
     const double before = run_.chi2;
     if (lowered) take_step(trial_chi2);
@@ -79,8 +90,9 @@ class Run {
  private:
   Factorization factorize(double lambda) {
     const std::span<const double> diagonal = equations_.diagonal();
+    const double smallest = options_.smallest_diagonal * std::ranges::max(diagonal);
     for (std::size_t k = 0; k < damped_by_.size(); ++k) {
-      damped_by_[k] = lambda * std::max(diagonal[k], options_.smallest_diagonal);
+      damped_by_[k] = lambda * std::max(diagonal[k], smallest);
     }
     return lambda > 0.0 ? equations_.factorize_damped(damped_by_) : equations_.factorize();
   }
@@ -106,13 +118,25 @@ class Run {
     const bool final = run_.ended() || run_.last_iteration();
     run_.chi2 = final ? trial_chi2 : equations_.linearize(run_.estimate);
     run_.keep_if_best();
+    first_trial_ = true;
+  }
+
+  /// After a step that is none.
+  void take_no_step(bool undamped) {
+    if (run_.ended()) return;
+    if (undamped) {
+      endgame_.fail();
+    } else if (damping_.at_limit()) {
+      run_.end_not_finite();
+    } else {
+      damping_.raise();
+    }
   }
 
   void raise_damping() {
     damping_.raise();
-    if (!damping_.at_limit() || run_.ended() || run_.exact()) return;
-    run_.note("no step lowers chi2, however small: limited by rounding");
-    run_.end(Status::converged);
+    if (damping_.at_limit() && !run_.ended() && !run_.exact())
+      run_.end_without_descent(first_promise_, first_norm_);
   }
 
   void take_failure(const Factorization& failure, bool undamped) {
@@ -136,6 +160,8 @@ class Run {
   Convergence convergence_;
   std::vector<double> damped_by_;  // λ D
   int small_promises_ = 0;
+  bool first_trial_ = true;  // of the present linearisation; it promised:
+  double first_promise_ = 0.0, first_norm_ = 0.0;
   bool explained_ = false;
 };
 

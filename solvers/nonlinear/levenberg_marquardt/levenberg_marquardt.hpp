@@ -17,9 +17,9 @@ struct LevenbergMarquardtOptions {
   /// far from linear that a first step with less may throw points behind their cameras, into
   /// another minimum.
   double initial_lambda = 0.0;
-  double largest_lambda = 1e16;     ///< where the run gives up
-  double smallest_diagonal = 1e-6;  ///< D is at least this [units of H]
-  bool endgame = true;              ///< undamped steps near the minimum
+  double largest_lambda = 1e16;      ///< where the run gives up
+  double smallest_diagonal = 1e-12;  ///< D is at least this, as a fraction of its largest entry
+  bool endgame = true;               ///< undamped steps near the minimum
 
   static auto fields() {
     using O = LevenbergMarquardtOptions;
@@ -29,8 +29,8 @@ struct LevenbergMarquardtOptions {
               "damping of the first step, as a fraction of the diagonal of H; 0: 1e-6, or 1e-4 "
               "where the gauge is left free")
         .real("largest_lambda", &O::largest_lambda, 1.0, 1e30, "damping at which the run gives up")
-        .real("smallest_diagonal", &O::smallest_diagonal, 0.0, 1e30,
-              "lower bound of the diagonal of H in the damping")
+        .real("smallest_diagonal", &O::smallest_diagonal, 0.0, 1.0,
+              "lower bound of the diagonal of H in the damping, as a fraction of its largest entry")
         .boolean("endgame", &O::endgame,
                  "undamped steps near the minimum, which also judge convergence");
   }

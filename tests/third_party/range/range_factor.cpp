@@ -4,10 +4,10 @@
 #include <string_view>
 #include <tuple>
 
-#include "cairn/plugin/registry.hpp"
-#include "cairn/types/define_factor.hpp"
 #include "cairn/lie/point.hpp"
 #include "cairn/lie/se2.hpp"
+#include "cairn/plugin/registry.hpp"
+#include "cairn/types/define_factor.hpp"
 
 namespace {
 

@@ -11,8 +11,8 @@
 #include <Eigen/Dense>
 
 #include "cairn/graph/gauge.hpp"
-#include "cairn/runtime/error.hpp"
 #include "cairn/lie/se3.hpp"
+#include "cairn/runtime/error.hpp"
 #include "cairn/types/loss.hpp"
 #include "cairn/update/marginal_prior.hpp"
 #include "support/dense_system.hpp"

@@ -16,12 +16,12 @@
 
 #include <Eigen/Dense>
 
-#include "cairn/plugin/registry.hpp"
-#include "cairn/runtime/error.hpp"
-#include "cairn/types/define_factor.hpp"
 #include "cairn/lie/point.hpp"
 #include "cairn/lie/se2.hpp"
 #include "cairn/lie/se3.hpp"
+#include "cairn/plugin/registry.hpp"
+#include "cairn/runtime/error.hpp"
+#include "cairn/types/define_factor.hpp"
 #include "support/dense_system.hpp"
 #include "support/planar_graph.hpp"
 #include "support/scaled_pose.hpp"

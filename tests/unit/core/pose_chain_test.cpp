@@ -14,10 +14,10 @@
 
 #include <Eigen/Dense>
 
-#include "cairn/runtime/error.hpp"
-#include "cairn/types/define_factor.hpp"
 #include "cairn/lie/se2.hpp"
 #include "cairn/lie/se3.hpp"
+#include "cairn/runtime/error.hpp"
+#include "cairn/types/define_factor.hpp"
 #include "support/planar_graph.hpp"
 #include "support/scaled_pose.hpp"
 

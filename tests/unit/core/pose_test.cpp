@@ -11,10 +11,10 @@
 #include <Eigen/Geometry>
 
 #include "cairn/geometry/state_group.hpp"
-#include "cairn/types/define_variable.hpp"
 #include "cairn/lie/point.hpp"
 #include "cairn/lie/se2.hpp"
 #include "cairn/lie/se3.hpp"
+#include "cairn/types/define_variable.hpp"
 
 namespace cairn {
 namespace {

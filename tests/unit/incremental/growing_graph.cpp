@@ -5,9 +5,9 @@
 
 #include <fmt/format.h>
 
-#include "cairn/types/define_factor.hpp"
 #include "cairn/lie/point.hpp"
 #include "cairn/lie/se3.hpp"
+#include "cairn/types/define_factor.hpp"
 #include "support/planar_graph.hpp"
 
 namespace cairn::incremental {

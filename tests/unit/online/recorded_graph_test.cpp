@@ -9,9 +9,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "cairn/lie/se3.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
-#include "cairn/lie/se3.hpp"
 #include "support/planar_graph.hpp"
 #include "support/scaled_pose.hpp"
 

@@ -6,9 +6,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "cairn/lie/se2.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/types/define_variable.hpp"
-#include "cairn/lie/se2.hpp"
 #include "support/scaled_pose.hpp"
 #include "unit/policies/pose_world.hpp"
 

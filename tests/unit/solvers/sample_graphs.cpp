@@ -7,10 +7,10 @@
 #include <Eigen/Cholesky>
 
 #include "cairn/graph/gauge.hpp"
-#include "cairn/linear/linearizer.hpp"
-#include "cairn/types/define_factor.hpp"
 #include "cairn/lie/point.hpp"
 #include "cairn/lie/se2.hpp"
+#include "cairn/linear/linearizer.hpp"
+#include "cairn/types/define_factor.hpp"
 #include "sample_matrices.hpp"
 
 namespace cairn::test {

@@ -56,6 +56,11 @@ class CAIRN_API NormalEquations {
   Factorization factorize_damped(std::span<const double> damping);
   /// step = (what was factorised)⁻¹ g.
   void solve(std::span<double> step);
+  /// ‖A step − g‖ / (h ‖step‖ + ‖g‖) in the maximum norm, A being what was factorised last and h
+  /// its largest diagonal entry: how far the step is from solving its system, whichever solver
+  /// computed it. About 1e-16 after a backward stable factorisation, however ill-conditioned A is;
+  /// NaN for a step with NaN.
+  double backward_error(std::span<const double> step);
 
   /// A sentence on why a factorisation of H failed: the variable at which it stopped, the likely
   /// number of gauge freedoms, and why that variable is not determined. Takes about as long as a
@@ -78,7 +83,8 @@ class CAIRN_API NormalEquations {
   BlockMatrix H_;
   std::vector<double> g_;
   std::vector<double> diagonal_;
-  std::vector<double> damped_;  // room for the diagonal with damping
+  std::vector<double> damped_;    // diagonal with damping, of what was factorised last
+  std::vector<double> residual_;  // room for `backward_error`
 
   JacobianSolver* jacobian_solver_ = nullptr;  // the solver, if it works on J
   std::optional<JacobianEvaluator> jacobian_;

@@ -5,9 +5,9 @@
 #include <string_view>
 #include <tuple>
 
+#include "cairn/lie/se2.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/types/define_factor.hpp"
-#include "cairn/lie/se2.hpp"
 
 namespace {
 

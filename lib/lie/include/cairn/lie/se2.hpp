@@ -4,8 +4,8 @@
 #include <string>
 #include <string_view>
 
-#include "cairn/types/define_variable.hpp"
 #include "cairn/lie/so2.hpp"
+#include "cairn/types/define_variable.hpp"
 
 namespace cairn {
 

@@ -5,8 +5,8 @@
 #include <string>
 #include <string_view>
 
-#include "cairn/types/define_variable.hpp"
 #include "cairn/lie/so3.hpp"
+#include "cairn/types/define_variable.hpp"
 
 namespace cairn {
 

@@ -12,11 +12,11 @@
 #include "cairn/graph/elements.hpp"
 #include "cairn/graph/graph.hpp"
 #include "cairn/graph/information.hpp"
-#include "cairn/typed/symbol.hpp"
 #include "cairn/graph/update.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/typed/measurements.hpp"
+#include "cairn/typed/symbol.hpp"
 
 /// Graphs and updates built from values. A type is found by its tag: the graph's own if it has one
 /// of that tag (a graph takes all of its types from one registry), else the registry's.

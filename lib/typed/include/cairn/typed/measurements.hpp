@@ -11,10 +11,10 @@
 #include <vector>
 
 #include "cairn/graph/elements.hpp"
-#include "cairn/types/define_factor.hpp"
 #include "cairn/typed/point.hpp"
 #include "cairn/typed/pose2.hpp"
 #include "cairn/typed/pose3.hpp"
+#include "cairn/types/define_factor.hpp"
 
 namespace cairn {
 

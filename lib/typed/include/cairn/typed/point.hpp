@@ -8,8 +8,8 @@
 #include <string>
 #include <type_traits>
 
-#include "cairn/typed/group_value.hpp"
 #include "cairn/lie/point.hpp"
+#include "cairn/typed/group_value.hpp"
 
 namespace cairn {
 

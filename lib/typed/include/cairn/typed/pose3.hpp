@@ -6,8 +6,8 @@
 
 #include <Eigen/Core>
 
-#include "cairn/typed/group_value.hpp"
 #include "cairn/lie/se3.hpp"
+#include "cairn/typed/group_value.hpp"
 #include "cairn/typed/point.hpp"
 #include "cairn/typed/rot3.hpp"
 

@@ -4,8 +4,8 @@
 #include <string>
 #include <type_traits>
 
-#include "cairn/typed/group_value.hpp"
 #include "cairn/lie/so2.hpp"
+#include "cairn/typed/group_value.hpp"
 #include "cairn/typed/point.hpp"
 
 namespace cairn {

@@ -8,9 +8,9 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
+#include "cairn/lie/so3.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/typed/group_value.hpp"
-#include "cairn/lie/so3.hpp"
 #include "cairn/typed/point.hpp"
 
 namespace cairn {
