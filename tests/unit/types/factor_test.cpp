@@ -8,7 +8,7 @@
 
 #include "cairn/plugin/registry.hpp"
 #include "cairn/types/check_factor.hpp"
-#include "sampling.hpp"
+#include "support/sampling.hpp"
 
 namespace cairn::test {
 namespace {

@@ -6,7 +6,7 @@
 #include <limits>
 
 #include "cairn/plugin/registry.hpp"
-#include "sampling.hpp"
+#include "support/sampling.hpp"
 
 namespace cairn::test {
 namespace {

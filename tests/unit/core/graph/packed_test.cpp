@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "cairn/graph/packed.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include <Eigen/Cholesky>
+
+#include "support/sampling.hpp"
+
+namespace cairn {
+namespace {
+
+using ::testing::ElementsAre;
+
+Eigen::MatrixXd random(test::Sampler& sampler, int rows, int columns) {
+  Eigen::MatrixXd A(rows, columns);
+  for (double& entry : A.reshaped()) entry = sampler.uniform(-1.0, 1.0);
+  return A;
+}
+
+/// U of a packed root, with zeros below the diagonal.
+Eigen::MatrixXd triangle(const std::vector<double>& packed, int n) {
+  return unpack(packed, n).triangularView<Eigen::Upper>();
+}
+
+TEST(Packed, HoldsTheUpperTriangleRowByRow) {
+  Eigen::Matrix3d A;
+  A << 1, 2, 3, 2, 4, 5, 3, 5, 6;
+  EXPECT_EQ(packed_size(3), 6U);
+  EXPECT_EQ(packed_size(0), 0U);
+  EXPECT_THAT(pack(A), ElementsAre(1, 2, 3, 4, 5, 6));
+  EXPECT_EQ(unpack(pack(A), 3), A);
+  EXPECT_EQ(unpack<3>(pack(A).data()), A);
+}
+
+TEST(SquareRoot, IsCholeskysFactorOfAPositiveDefiniteMatrix) {
+  test::Sampler sampler(1);
+  for (const int n : {1, 2, 3, 6, 9, 16, 20}) {
+    const Eigen::MatrixXd B = random(sampler, n, n),
+                          A = B.transpose() * B + 0.1 * Eigen::MatrixXd::Identity(n, n);
+    std::vector<double> U(packed_size(n));
+    ASSERT_TRUE(square_root(pack(A), n, U));
+    const Eigen::MatrixXd expected = Eigen::LLT<Eigen::MatrixXd>(A).matrixU();
+    EXPECT_LT((triangle(U, n) - expected).norm(), 1e-13) << n;
+  }
+}
+
+TEST(SquareRoot, IsTriangularForEveryRankOfASemidefiniteMatrix) {
+  test::Sampler sampler(2);
+  for (const int n : {2, 3, 6, 9, 20}) {
+    for (int rank = 0; rank < n; ++rank) {
+      const Eigen::MatrixXd B = random(sampler, rank, n), A = B.transpose() * B;
+      std::vector<double> U(packed_size(n));
+      ASSERT_TRUE(square_root(pack(A), n, U)) << n << " " << rank;
+      const Eigen::MatrixXd root = triangle(U, n);
+      EXPECT_LT((root.transpose() * root - A).norm(), 1e-10 * (1.0 + A.norm())) << n << " " << rank;
+      EXPECT_GE(root.diagonal().minCoeff(), 0.0);
+    }
+  }
+}
+
+TEST(SquareRoot, KeepsDirectionsThatAreNotMeasuredAtZero) {
+  // Position without heading, in units nine orders of magnitude apart.
+  std::vector<double> U(6);
+  ASSERT_TRUE(square_root(std::vector<double>{4e8, 0, 0, 9e-1, 0, 0}, 3, U));
+  EXPECT_THAT(U,
+              ElementsAre(testing::DoubleEq(2e4), 0, 0, testing::DoubleEq(std::sqrt(0.9)), 0, 0));
+}
+
+TEST(SquareRoot, IsInPlaceToo) {
+  std::vector<double> A{4, 2, 5};
+  ASSERT_TRUE(square_root(A, 2, A));
+  EXPECT_THAT(A, ElementsAre(2, 1, 2));
+}
+
+TEST(SquareRoot, RefusesWhatHasNone) {
+  std::vector<double> U(3);
+  EXPECT_FALSE(square_root(std::vector<double>{1, 2, 1}, 2, U));  // eigenvalues 3 and −1
+  EXPECT_FALSE(square_root(std::vector<double>{1, 0, -1}, 2, U));
+  EXPECT_FALSE(square_root(std::vector<double>{0, 1, 5}, 2, U));
+  EXPECT_FALSE(square_root(std::vector<double>{1, 1.0 + 1e-6, 1}, 2, U));
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_FALSE(square_root(std::vector<double>{1, nan, 1}, 2, U));
+  EXPECT_FALSE(
+      square_root(std::vector<double>{1, 0, std::numeric_limits<double>::infinity()}, 2, U));
+}
+
+}  // namespace
+}  // namespace cairn

@@ -1,0 +1,279 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What every linear solver owes, whoever wrote it.
+#include "cairn/linear/linear_solver.hpp"
+
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include <gtest/gtest.h>
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+
+#include "cairn/linear/jacobian.hpp"
+#include "cairn/plugin/registry.hpp"
+#include "cairn/runtime/error.hpp"
+#include "cairn/runtime/threads.hpp"
+#include "support/block_systems.hpp"
+#include "support/components.hpp"
+#include "support/sample_matrices.hpp"
+
+namespace cairn::test {
+namespace {
+
+Eigen::VectorXd random_vector(std::int64_t size, std::uint64_t seed) {
+  Random random(seed);
+  return Eigen::VectorXd::NullaryExpr(size, [&] { return random(); });
+}
+
+Eigen::VectorXd solve(LinearSolver& solver, const Eigen::VectorXd& g) {
+  Eigen::VectorXd x(g.size());
+  solver.solve({g.data(), static_cast<std::size_t>(g.size())},
+               {x.data(), static_cast<std::size_t>(x.size())});
+  return x;
+}
+
+/// The largest share of its length by which a solution may be off. Direct solvers owe ten digits
+/// whatever the condition number; an iterative one owes its residual, and what that allows.
+double promised_accuracy(const LinearSolver& solver, const BlockMatrix& H) {
+  const LinearSolverStats& stats = solver.stats();
+  if (stats.iterations == 0) return 1e-10;
+  EXPECT_LE(stats.relative_residual, 1e-10) << "of a default tolerance";
+  const Eigen::VectorXd eigenvalues =
+      Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(dense(H), Eigen::EigenvaluesOnly)
+          .eigenvalues();
+  return 1e-10 * eigenvalues.maxCoeff() / eigenvalues.minCoeff();
+}
+
+/// Factorises H and compares a solution with that of a dense LDLᵀ.
+void expect_agreement(LinearSolver& solver, const BlockMatrix& H, std::uint64_t seed) {
+  const Factorization factorization = solver.factorize(H);
+  ASSERT_TRUE(factorization.ok) << "stopped at block " << factorization.failed_block;
+  const Eigen::VectorXd g = random_vector(H.structure().size(), seed);
+  const Eigen::VectorXd expected = dense(H).ldlt().solve(g);
+  const Eigen::VectorXd x = solve(solver, g);
+  EXPECT_LE((x - expected).norm(), promised_accuracy(solver, H) * expected.norm());
+}
+
+/// Makes a block's own diagonal so negative that no neighbour can hide it.
+void spoil(BlockMatrix& H, int block) {
+  const BlockStructure& s = H.structure();
+  double* values = H.block(s.column_begin()[block]);
+  for (int k = 0; k < s.block_size(block); ++k) values[k * s.block_size(block) + k] = -1e3;
+}
+
+/// Whether a solver works on the Jacobian and on nothing else.
+bool refuses_H(LinearSolver& solver) {
+  if (!query<JacobianSolver>(solver)) return false;
+  try {
+    solver.analyze(BlockStructure({1}, {}));
+  } catch (const Error&) {
+    return true;
+  }
+  return false;
+}
+
+/// All but those that refuse H: they owe the same on the Jacobian (JacobianSolverTest).
+std::vector<std::string> solvers_of_H() {
+  Registry registry;
+  std::vector<std::string> specs = every_component("linear_solver");
+  std::erase_if(specs, [&](const std::string& spec) {
+    return refuses_H(*registry.make<LinearSolver>(spec));
+  });
+  return specs;
+}
+
+class LinearSolverTest : public testing::TestWithParam<std::string> {
+ protected:
+  void TearDown() override { set_threads(0); }
+  Registry registry_;
+  std::unique_ptr<LinearSolver> solver_ = registry_.make<LinearSolver>(GetParam());
+};
+GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(LinearSolverTest);
+INSTANTIATE_TEST_SUITE_P(Registered, LinearSolverTest, testing::ValuesIn(solvers_of_H()),
+                         test_name);
+
+TEST_P(LinearSolverTest, AgreesWithDenseLdlt) {
+  for (const NamedStructure& sample : sample_structures()) {
+    SCOPED_TRACE(sample.name);
+    BlockMatrix H(sample.structure);
+    fill_positive_definite(H, 1);
+    solver_->analyze(sample.structure);
+    expect_agreement(*solver_, H, 2);
+  }
+}
+
+TEST_P(LinearSolverTest, FactorizesNewValuesWithoutANewAnalysis) {
+  for (const NamedStructure& sample : sample_structures()) {
+    SCOPED_TRACE(sample.name);
+    BlockMatrix H(sample.structure);
+    solver_->analyze(sample.structure);
+    for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+      fill_positive_definite(H, seed, 0.01 * static_cast<double>(seed));
+      expect_agreement(*solver_, H, seed + 10);
+    }
+  }
+}
+
+TEST_P(LinearSolverTest, SolvesSeveralRightHandSidesInPlace) {
+  const BlockStructure structure = sample_structures().back().structure;
+  BlockMatrix H(structure);
+  fill_positive_definite(H, 5);
+  solver_->analyze(structure);
+  ASSERT_TRUE(solver_->factorize(H).ok);
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    const Eigen::VectorXd g = random_vector(structure.size(), seed);
+    const Eigen::VectorXd apart = solve(*solver_, g);
+    Eigen::VectorXd in_place = g;
+    const std::span<double> both(in_place.data(), static_cast<std::size_t>(in_place.size()));
+    solver_->solve(both, both);
+    EXPECT_EQ(in_place, apart);
+    EXPECT_LE((dense(H) * apart - g).norm(), 1e-9 * g.norm());
+  }
+}
+
+TEST_P(LinearSolverTest, SolvesForManyRightHandSidesIfItCan) {
+  auto* many = query<ManyRightHandSides>(*solver_);
+  if (!many) GTEST_SKIP() << GetParam() << " solves for one at a time";
+  const BlockStructure structure = sample_structures()[10].structure;
+  BlockMatrix H(structure);
+  fill_positive_definite(H, 18);
+  solver_->analyze(structure);
+  ASSERT_TRUE(solver_->factorize(H).ok);
+  many->solve({}, {}, 0);
+  for (const int columns : {1, 5, 8, 11, 2}) {
+    Eigen::MatrixXd X(structure.size(), columns);
+    for (int c = 0; c < columns; ++c)
+      X.col(c) = random_vector(structure.size(), std::uint64_t{19} + static_cast<std::uint64_t>(c));
+    const Eigen::MatrixXd G = X;
+    const std::span<double> values(X.data(), static_cast<std::size_t>(X.size()));
+    many->solve(values, values, columns);
+    EXPECT_LE((dense(H) * X - G).norm(), 1e-9 * G.norm()) << columns;
+    const Eigen::VectorXd one = solve(*solver_, G.col(0));
+    EXPECT_LE((X.col(0) - one).norm(), 1e-9 * one.norm());
+  }
+}
+
+TEST_P(LinearSolverTest, NamesTheBlockAtWhichTheMatrixIsNotPositiveDefinite) {
+  for (const NamedStructure& sample : sample_structures()) {
+    SCOPED_TRACE(sample.name);
+    solver_->analyze(sample.structure);
+    const int blocks = sample.structure.blocks();
+    for (const int spoilt : {0, blocks / 3, blocks / 2, blocks - 1}) {
+      BlockMatrix H(sample.structure);
+      fill_positive_definite(H, 6);
+      spoil(H, spoilt);
+      // Whatever was eliminated before is positive definite by itself, so no order can stop
+      // elsewhere.
+      const Factorization factorization = solver_->factorize(H);
+      EXPECT_FALSE(factorization.ok);
+      EXPECT_EQ(factorization.failed_block, spoilt);
+    }
+  }
+}
+
+TEST_P(LinearSolverTest, RecoversFromAFailure) {
+  for (const NamedStructure& sample : sample_structures()) {
+    SCOPED_TRACE(sample.name);
+    BlockMatrix H(sample.structure);
+    solver_->analyze(sample.structure);
+    fill_positive_definite(H, 7);
+    spoil(H, sample.structure.blocks() / 2);
+    ASSERT_FALSE(solver_->factorize(H).ok);
+    fill_positive_definite(H, 8);
+    expect_agreement(*solver_, H, 9);
+  }
+}
+
+TEST_P(LinearSolverTest, RefusesAZeroMatrixAndValuesThatAreNotFinite) {
+  for (const NamedStructure& sample : sample_structures()) {
+    SCOPED_TRACE(sample.name);
+    const int blocks = sample.structure.blocks();
+    solver_->analyze(sample.structure);
+    BlockMatrix zero(sample.structure);
+    const Factorization of_zero = solver_->factorize(zero);
+    EXPECT_FALSE(of_zero.ok);
+    EXPECT_TRUE(of_zero.failed_block >= 0 && of_zero.failed_block < blocks) << of_zero.failed_block;
+    for (const double value :
+         {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
+      BlockMatrix H(sample.structure);
+      fill_positive_definite(H, 10);
+      H.block(sample.structure.column_begin()[blocks / 2])[0] = value;
+      const Factorization factorization = solver_->factorize(H);
+      EXPECT_FALSE(factorization.ok) << value;
+      EXPECT_LT(factorization.failed_block, blocks);
+    }
+    BlockMatrix H(sample.structure);
+    fill_positive_definite(H, 11);
+    expect_agreement(*solver_, H, 12);
+  }
+}
+
+TEST_P(LinearSolverTest, TellsItsLogDeterminantIfItCan) {
+  auto* ability = query<LogDeterminant>(*solver_);
+  if (!ability) GTEST_SKIP() << GetParam() << " has no log determinant";
+  for (const NamedStructure& sample : sample_structures()) {
+    SCOPED_TRACE(sample.name);
+    BlockMatrix H(sample.structure);
+    fill_positive_definite(H, 13);
+    solver_->analyze(sample.structure);
+    ASSERT_TRUE(solver_->factorize(H).ok);
+    const double expected = dense(H).ldlt().vectorD().array().log().sum();
+    EXPECT_NEAR(ability->log_determinant(), expected, 1e-9 * (1.0 + std::abs(expected)));
+  }
+}
+
+TEST_P(LinearSolverTest, CountsItsFactor) {
+  for (const NamedStructure& sample : sample_structures()) {
+    SCOPED_TRACE(sample.name);
+    BlockMatrix H(sample.structure);
+    fill_positive_definite(H, 14);
+    solver_->analyze(sample.structure);
+    ASSERT_TRUE(solver_->factorize(H).ok);
+    const LinearSolverStats& stats = solver_->stats();
+    EXPECT_FALSE(stats.ordering.empty());
+    const std::int64_t n = sample.structure.size();
+    const std::int64_t own =
+        ScalarPattern(sample.structure, ScalarPattern::Triangle::lower).nonzeros();
+    if (stats.factor_nonzeros == 0) continue;  // not known
+    EXPECT_GE(stats.factor_nonzeros, own);     // fill only adds
+    EXPECT_LE(stats.factor_nonzeros, n * (n + 1) / 2);
+    EXPECT_GE(stats.factor_flops, static_cast<double>(stats.factor_nonzeros));
+  }
+}
+
+TEST_P(LinearSolverTest, GivesTheSameBitsForAnyNumberOfThreads) {
+  const BlockStructure structure = sample_structures()[10].structure;
+  BlockMatrix H(structure);
+  fill_positive_definite(H, 15);
+  const Eigen::VectorXd g = random_vector(structure.size(), 16);
+  Eigen::VectorXd first;
+  for (const int count : {1, 2, 3}) {
+    set_threads(count);
+    const auto solver = registry_.make<LinearSolver>(GetParam());
+    solver->analyze(structure);
+    ASSERT_TRUE(solver->factorize(H).ok);
+    const Eigen::VectorXd x = solve(*solver, g);
+    if (count == 1) first = x;
+    EXPECT_EQ(x, first) << count << " threads";
+  }
+}
+
+TEST_P(LinearSolverTest, RefusesCallsOutOfOrder) {
+  const BlockStructure structure({3, 3}, {{1, 0}});
+  BlockMatrix H(structure);
+  fill_positive_definite(H, 17);
+  std::vector<double> g(6, 1.0), x(6);
+  EXPECT_THROW(solver_->factorize(H), std::logic_error);
+  EXPECT_THROW(solver_->solve(g, x), std::logic_error);
+  solver_->analyze(structure);
+  EXPECT_THROW(solver_->solve(g, x), std::logic_error);
+  ASSERT_TRUE(solver_->factorize(H).ok);
+  const BlockStructure other({3, 3}, {{1, 0}});
+  BlockMatrix H_other(other);
+  fill_positive_definite(H_other, 17);
+  EXPECT_THROW(solver_->factorize(H_other), std::logic_error);
+}
+
+}  // namespace
+}  // namespace cairn::test

@@ -1,0 +1,324 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What every optimizer owes, whoever wrote it.
+#include "cairn/solve/optimizer.hpp"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <functional>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "cairn/graph/gauge.hpp"
+#include "cairn/plugin/registry.hpp"
+#include "cairn/runtime/threads.hpp"
+#include "support/components.hpp"
+#include "support/sample_graphs.hpp"
+
+namespace cairn::test {
+namespace {
+
+using testing::Contains;
+using testing::HasSubstr;
+
+/// Counts what it is told, and does something after each iteration.
+class Recorder final : public Observer {
+ public:
+  std::function<bool(const Iteration&)> after = [](const Iteration&) { return true; };
+
+  void on_start(const Graph&, double chi2) override {
+    EXPECT_TRUE(iterations.empty());
+    ++starts;
+    initial_chi2 = chi2;
+  }
+  bool on_iteration(const Iteration& iteration, const Graph& graph, const Values& values) override {
+    iterations.push_back(iteration);
+    Graph seen = graph.clone();
+    seen.set_values(values);
+    best_chi2.push_back(chi2_of(seen));
+    return after(iteration);
+  }
+  void on_message(std::string_view message) override { messages.emplace_back(message); }
+
+  int starts = 0;
+  double initial_chi2 = 0.0;
+  std::vector<Iteration> iterations;
+  std::vector<double> best_chi2;  // of the states handed over
+  std::vector<std::string> messages;
+};
+
+bool takes_linear_solver(Registry& registry, const std::string& spec) {
+  const OptionSpec* option =
+      registry.options("optimizer", parse_component(spec).name).find("linear_solver");
+  return option && option->type == OptionType::component;
+}
+
+class OptimizerTest : public testing::TestWithParam<std::string> {
+ protected:
+  void SetUp() override {
+    const std::string spec = with_some_linear_solver(GetParam());
+    if (spec.empty()) GTEST_SKIP() << "there is no linear solver";
+    optimizer_ = registry_.make<Optimizer>(spec);
+  }
+  void TearDown() override { set_threads(0); }
+  bool is_ceres() const { return GetParam().rfind("ceres", 0) == 0; }
+
+  Registry registry_;
+  std::unique_ptr<Optimizer> optimizer_;
+};
+GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(OptimizerTest);
+INSTANTIATE_TEST_SUITE_P(Registered, OptimizerTest, testing::ValuesIn(every_component("optimizer")),
+                         test_name);
+
+TEST_P(OptimizerTest, ReachesTheMinimum) {
+  if (GetParam() == "ceres:linear_solver_type=cgnr") GTEST_SKIP() << "its steps are inexact";
+  const Stop stop{.max_iterations = 1000};
+  std::vector<std::pair<const char*, Graph>> samples;
+  samples.emplace_back("ring", ring_of_poses(40, 0.05));
+  samples.emplace_back("noisy ring", ring_of_poses(25, 0.15));
+  samples.emplace_back("poses and points", poses_and_points(30, 0.05));
+  samples.emplace_back("large residuals", large_residuals(0.5));
+  samples.emplace_back("larger residuals", large_residuals(0.9));
+  for (auto& [name, graph] : samples) {
+    SCOPED_TRACE(name);
+    const double expected = dense_minimum(graph);
+    const Summary summary = optimizer_->optimize(graph, stop);
+    EXPECT_EQ(summary.status, Status::converged);
+    EXPECT_NEAR(summary.final_chi2, expected, 1e-8 * expected);
+    EXPECT_NEAR(chi2_of(graph), summary.final_chi2, 1e-13 * expected);
+  }
+}
+
+TEST_P(OptimizerTest, EndsWhereResidualsVanish) {
+  Graph graph = rosenbrock();
+  const Summary summary = optimizer_->optimize(graph, Stop{.max_iterations = 500});
+  EXPECT_EQ(summary.status, Status::converged);
+  EXPECT_LT(summary.final_chi2, 1e-18);
+  EXPECT_LT(summary.iterations.size(), 100U);
+}
+
+TEST_P(OptimizerTest, AgreesWhateverTheLinearSolver) {
+  if (!takes_linear_solver(registry_, GetParam()))
+    GTEST_SKIP() << GetParam() << " takes no linear solver of ours";
+  const double expected = dense_minimum(poses_and_points(20, 0.05));
+  for (const std::string& solver : registry_.names("linear_solver")) {
+    SCOPED_TRACE(solver);
+    ComponentSpec spec = parse_component(GetParam());
+    spec.values["linear_solver"] = solver;
+    Graph graph = poses_and_points(20, 0.05);
+    const Summary summary = registry_.make<Optimizer>(spec)->optimize(graph);
+    EXPECT_EQ(summary.linear_solver, solver);
+    EXPECT_NEAR(summary.final_chi2, expected, 1e-10 * expected);
+    EXPECT_GT(summary.solver.factor_nonzeros + summary.solver.iterations, 0) << "says nothing";
+  }
+}
+
+TEST_P(OptimizerTest, RunsExactlyTheIterationsAskedFor) {
+  for (const int iterations : {1, 3, 20}) {
+    if (is_ceres() && iterations > 3)
+      continue;  // Ceres ends by itself where no step lowers its cost
+    Graph graph = ring_of_poses(20, 0.1);
+    const Summary summary =
+        optimizer_->optimize(graph, Stop{.max_iterations = iterations, .tolerance = 0.0});
+    EXPECT_EQ(summary.iterations.size(), static_cast<std::size_t>(iterations));
+    EXPECT_EQ(summary.status, Status::max_iterations);
+    EXPECT_EQ(summary.final_chi2, chi2_of(graph))
+        << "the estimate in the graph is not the one reported";
+  }
+}
+
+TEST_P(OptimizerTest, DoesNothingInNoIterations) {
+  Graph graph = ring_of_poses(20, 0.1);
+  const double before = chi2_of(graph);
+  const Summary summary = optimizer_->optimize(graph, Stop{.max_iterations = 0});
+  EXPECT_EQ(summary.status, Status::max_iterations);
+  EXPECT_TRUE(summary.iterations.empty());
+  EXPECT_NEAR(summary.initial_chi2, before, 1e-13 * before);
+  EXPECT_EQ(chi2_of(graph), before);
+}
+
+TEST_P(OptimizerTest, TellsTheObserverOfEachIteration) {
+  Graph graph = ring_of_poses(30, 0.1);
+  const double before = chi2_of(graph);
+  Recorder recorder;
+  const Summary summary = optimizer_->optimize(graph, Stop{}, recorder);
+  EXPECT_EQ(recorder.starts, 1);
+  EXPECT_NEAR(recorder.initial_chi2, before, 1e-13 * before);
+  ASSERT_EQ(recorder.iterations.size(), summary.iterations.size());
+  double best = before;
+  for (std::size_t k = 0; k < recorder.iterations.size(); ++k) {
+    EXPECT_EQ(recorder.iterations[k].number, static_cast<int>(k) + 1);
+    EXPECT_EQ(recorder.iterations[k].chi2, summary.iterations[k].chi2);
+    best = std::min(best, recorder.iterations[k].chi2);
+    EXPECT_NEAR(recorder.best_chi2[k], best, 1e-12 * before)
+        << "the states handed over are not the best so far";
+  }
+  EXPECT_NEAR(summary.final_chi2, best, 1e-12 * before);
+}
+
+TEST_P(OptimizerTest, StopsWhenTheObserverSaysSo) {
+  Graph graph = ring_of_poses(30, 0.1);
+  Recorder recorder;
+  recorder.after = [](const Iteration& iteration) { return iteration.number < 2; };
+  const Summary summary = optimizer_->optimize(graph, Stop{.tolerance = 0.0}, recorder);
+  EXPECT_EQ(summary.status, Status::interrupted);
+  EXPECT_EQ(summary.iterations.size(), 2U);
+  EXPECT_LT(summary.final_chi2, summary.initial_chi2);
+  EXPECT_NEAR(chi2_of(graph), recorder.best_chi2.back(), 1e-12 * summary.final_chi2);
+}
+
+TEST_P(OptimizerTest, StopsWithTheBestEstimateWhenInterrupted) {
+  std::atomic<bool> interrupt = false;
+  Graph graph = ring_of_poses(30, 0.1);
+  Recorder recorder;
+  recorder.after = [&](const Iteration& iteration) {
+    interrupt = iteration.number == 2;
+    return true;
+  };
+  const Stop stop{.tolerance = 0.0, .interrupt = &interrupt};
+  const Summary summary = optimizer_->optimize(graph, stop, recorder);
+  EXPECT_EQ(summary.status, Status::interrupted);
+  EXPECT_EQ(summary.iterations.size(), 2U);
+  EXPECT_EQ(summary.final_chi2, chi2_of(graph));
+  EXPECT_LT(summary.final_chi2, summary.initial_chi2);
+}
+
+TEST_P(OptimizerTest, DoesNotBeginWhenAlreadyInterrupted) {
+  const std::atomic<bool> interrupt = true;
+  Graph graph = ring_of_poses(30, 0.1);
+  const double before = chi2_of(graph);
+  const Summary summary = optimizer_->optimize(graph, Stop{.interrupt = &interrupt});
+  EXPECT_EQ(summary.status, Status::interrupted);
+  EXPECT_TRUE(summary.iterations.empty());
+  EXPECT_EQ(chi2_of(graph), before);
+}
+
+TEST_P(OptimizerTest, KeepsToItsTime) {
+  Graph graph = ring_of_poses(30, 0.1);
+  const Summary summary = optimizer_->optimize(graph, Stop{.tolerance = 0.0, .max_seconds = 1e-9});
+  EXPECT_EQ(summary.status, Status::max_iterations);
+  EXPECT_LE(summary.iterations.size(), 1U);
+}
+
+TEST_P(OptimizerTest, AnchorsAFreeGaugeAndSaysSo) {
+  Graph graph = ring_of_poses(20, 0.1);
+  const std::vector<double> first(graph.state(0).begin(), graph.state(0).end());
+  Recorder recorder;
+  const Summary summary = optimizer_->optimize(graph, Stop{}, recorder);
+  EXPECT_THAT(summary.notes, Contains(HasSubstr("VERTEX_SE2 0")));
+  EXPECT_THAT(recorder.messages, Contains(HasSubstr("VERTEX_SE2 0")));
+  EXPECT_THAT(graph.state(0), testing::ElementsAreArray(first));
+  EXPECT_FALSE(graph.fixed(0)) << "an anchor is not the graph's";
+}
+
+TEST_P(OptimizerTest, LeavesFixedVariablesWhereTheyAre) {
+  Graph graph = ring_of_poses(20, 0.1);
+  graph.set_fixed(7);
+  graph.set_fixed(11);
+  const std::vector<double> seventh(graph.state(7).begin(), graph.state(7).end());
+  const std::vector<double> eleventh(graph.state(11).begin(), graph.state(11).end());
+  const double expected = dense_minimum(graph);
+  const Summary summary = optimizer_->optimize(graph);
+  EXPECT_NEAR(summary.final_chi2, expected, 1e-8 * expected);
+  EXPECT_THAT(graph.state(7), testing::ElementsAreArray(seventh));
+  EXPECT_THAT(graph.state(11), testing::ElementsAreArray(eleventh));
+}
+
+TEST_P(OptimizerTest, ConvergesAtOnceWhereEverythingIsHeld) {
+  Graph graph = everything_held();
+  const double before = chi2_of(graph);
+  const Summary summary = optimizer_->optimize(graph);
+  EXPECT_EQ(summary.status, Status::converged);
+  EXPECT_TRUE(summary.iterations.empty());
+  EXPECT_NEAR(summary.initial_chi2, before, 1e-13 * before);
+  EXPECT_NEAR(summary.final_chi2, before, 1e-13 * before);
+  Graph nothing;
+  EXPECT_EQ(optimizer_->optimize(nothing).status, Status::converged);
+}
+
+TEST_P(OptimizerTest, NeverLeavesAWorseEstimate) {
+  for (const double far : {0.5, 3.0, 100.0}) {
+    Graph graph = overshooting(far);
+    const Summary summary = optimizer_->optimize(graph, Stop{.max_iterations = 200});
+    EXPECT_LE(summary.final_chi2, summary.initial_chi2);
+    EXPECT_NEAR(chi2_of(graph), summary.final_chi2, 1e-13 * summary.initial_chi2);
+    if (GetParam() == "gauss_newton") {
+      EXPECT_NE(summary.status, Status::converged) << "whole steps cannot arrive from " << far;
+    } else {
+      EXPECT_LT(summary.final_chi2, 1e-12) << "from " << far;
+    }
+  }
+}
+
+TEST_P(OptimizerTest, GivesTheSameBitsForAnyNumberOfThreads) {
+  if (is_ceres()) GTEST_SKIP() << "Ceres adds up in the order of its threads";
+  Graph first;
+  for (const int count : {1, 2, 3}) {
+    set_threads(count);
+    Graph graph = ring_of_poses(600, 0.05);
+    optimizer_->optimize(graph);
+    if (count == 1) {
+      first = std::move(graph);
+    } else {
+      EXPECT_EQ(graph.values().pools, first.values().pools) << count << " threads";
+    }
+  }
+}
+
+TEST_P(OptimizerTest, OptimizesOneGraphAfterAnother) {
+  for (const int poses : {12, 40, 12}) {
+    Graph graph = ring_of_poses(poses, 0.1);
+    const double expected = dense_minimum(graph);
+    EXPECT_NEAR(optimizer_->optimize(graph).final_chi2, expected, 1e-8 * expected);
+  }
+}
+
+TEST_P(OptimizerTest, ConvergesAtOnceFromItsOwnResult) {
+  Graph graph = ring_of_poses(30, 0.1);
+  const Summary first = optimizer_->optimize(graph);
+  const Summary again = optimizer_->optimize(graph);
+  EXPECT_EQ(again.status, Status::converged);
+  EXPECT_LE(again.iterations.size(), 6U);
+  EXPECT_NEAR(again.final_chi2, first.final_chi2, 1e-10 * first.final_chi2);
+}
+
+TEST_P(OptimizerTest, AccountsForItsTime) {
+  Graph graph = ring_of_poses(60, 0.1);
+  const Seconds seconds = optimizer_->optimize(graph).seconds;
+  double sum = 0.0;
+  for (const double part :
+       {seconds.linearize, seconds.analyze, seconds.factorize, seconds.solve, seconds.update}) {
+    EXPECT_GE(part, 0.0);
+    sum += part;
+  }
+  EXPECT_GT(sum, 0.0);
+  EXPECT_LE(sum, seconds.total * (1.0 + 1e-9));
+}
+
+TEST(GaussNewton, SaysThatItDivergesAndKeepsTheBestEstimate) {
+  Registry registry;
+  if (!registry.has("optimizer", "gauss_newton") || !registry.has("linear_solver", "eigen"))
+    GTEST_SKIP();
+  const auto optimizer = registry.make<Optimizer>("gauss_newton:rises=2,linear_solver=eigen");
+  Graph graph = overshooting(3.0);
+  const Summary summary = optimizer->optimize(graph);
+  EXPECT_EQ(summary.status, Status::diverged);
+  EXPECT_THAT(summary.notes, Contains(HasSubstr("diverged")));
+  double lowest = summary.initial_chi2;
+  for (const Iteration& iteration : summary.iterations) lowest = std::min(lowest, iteration.chi2);
+  EXPECT_LT(lowest, summary.iterations.back().chi2);
+  EXPECT_EQ(summary.final_chi2, lowest);
+  EXPECT_EQ(chi2_of(graph), lowest);
+}
+
+TEST(SummaryStatus, HasTheNamesOfTheCommandLine) {
+  EXPECT_EQ(to_string(Status::converged), "converged");
+  EXPECT_EQ(to_string(Status::max_iterations), "max_iterations");
+  EXPECT_EQ(to_string(Status::diverged), "diverged");
+  EXPECT_EQ(to_string(Status::not_positive_definite), "not_positive_definite");
+  EXPECT_EQ(to_string(Status::interrupted), "interrupted");
+}
+
+}  // namespace
+}  // namespace cairn::test

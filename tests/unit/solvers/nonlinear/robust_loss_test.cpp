@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "cairn/plugin/registry.hpp"
+#include "cairn/solve/optimizer.hpp"
+#include "cairn/types/loss.hpp"
+#include "support/components.hpp"
+#include "support/sample_graphs.hpp"
+
+namespace cairn::test {
+namespace {
+
+std::vector<std::string> registered_losses() { return Registry().names("loss"); }
+
+class RobustLossTest : public testing::TestWithParam<std::string> {
+ protected:
+  Graph graph(const FactorSelector& scope) {
+    Graph graph = ring_of_poses(40, 0.03, 3);
+    graph.set_loss(registry_.make<Loss>(GetParam()), scope);
+    return graph;
+  }
+  Registry registry_;
+};
+GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(RobustLossTest);
+INSTANTIATE_TEST_SUITE_P(Registered, RobustLossTest, testing::ValuesIn(registered_losses()),
+                         test_name);
+
+TEST_P(RobustLossTest, EveryOptimizerReachesTheSameMinimum) {
+  for (const FactorSelector& scope : {FactorSelector::all(), FactorSelector::loops()}) {
+    double expected = -1.0;
+    for (const char* name : {"levenberg_marquardt", "dogleg", "ceres"}) {
+      if (!registry_.has("optimizer", name)) continue;
+      Graph robust = graph(scope);
+      const Summary summary = registry_.make<Optimizer>(with_some_linear_solver(name))
+                                  ->optimize(robust, Stop{.max_iterations = 500});
+      EXPECT_EQ(summary.status, Status::converged) << name;
+      EXPECT_NEAR(chi2_of(robust), summary.final_chi2, 1e-12 * summary.final_chi2) << name;
+      if (expected < 0.0) expected = summary.final_chi2;
+      EXPECT_NEAR(summary.final_chi2, expected, 1e-8 * expected) << name;
+    }
+  }
+}
+
+TEST_P(RobustLossTest, WeighsOutliersDown) {
+  if (!registry_.has("optimizer", "levenberg_marquardt")) GTEST_SKIP();
+  Graph plain = ring_of_poses(40, 0.03, 3), robust = graph(FactorSelector::loops());
+  const auto optimizer = registry_.make<Optimizer>(with_some_linear_solver("levenberg_marquardt"));
+  optimizer->optimize(plain);
+  optimizer->optimize(robust);
+  // What the robust estimate says of the odometry, which is all good: its residuals must be
+  // smaller.
+  const auto odometry = [](const Graph& g) {
+    const std::vector<double> norms = squared_norms(g);
+    const std::vector<bool> closes_loop = loop_closures(g);
+    double sum = 0.0;
+    for (int k = 0; k < g.factor_count(); ++k) sum += closes_loop[k] ? 0.0 : norms[k];
+    return sum;
+  };
+  EXPECT_LT(odometry(robust), odometry(plain));
+}
+
+}  // namespace
+}  // namespace cairn::test
