@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 #include <exception>
+#include <iterator>
 #include <string>
 #include <utility>
 
@@ -100,6 +101,9 @@ class Bridge final : public ceres::IterationCallback {
 /// alike.
 constexpr double kToleranceShare = 1e-2;
 
+/// A step of this fraction of the states may fail to lower chi2 because of rounding.
+constexpr double kRounding = 1e-6;
+
 void set_limits(const Stop& stop, ceres::Solver::Options& options) {
   options.max_num_iterations = stop.max_iterations;
   options.function_tolerance = kToleranceShare * stop.tolerance;
@@ -124,6 +128,20 @@ Status status_of(const ceres::Solver::Summary& ceres, bool interrupted) {
   // Ceres tells failures apart in words only. Before the first step it can only be the residuals.
   const bool took_steps = ceres.num_successful_steps + ceres.num_unsuccessful_steps > 1;
   return took_steps ? Status::not_positive_definite : Status::diverged;
+}
+
+/// Whether Ceres gave up shrinking its trust region, and calls that convergence, although the first
+/// of its last steps that did not lower the cost was longer than rounding explains: its Jacobians
+/// do not fit its residuals.
+bool ended_without_descent(const ceres::Solver::Summary& ceres, const Values& values) {
+  const auto& all = ceres.iterations;
+  auto first = all.end();
+  while (first != all.begin() && !std::prev(first)->step_is_successful) --first;
+  double squares = 0.0;
+  for (const AlignedVector& pool : values.pools) {
+    for (const double x : pool) squares += x * x;
+  }
+  return first != all.end() && first->step_norm > kRounding * std::sqrt(squares);
 }
 
 Seconds seconds_of(const ceres::Solver::Summary& ceres) {
@@ -191,7 +209,8 @@ Summary CeresOptimizer::optimize(Graph& graph, const Stop& stop, Observer& obser
 
   summary.status = status_of(report, bridge.interrupted());
   summary.final_chi2 = loss_.name == "none" ? chi2(graph) : bridge.chi2();
-  if (summary.status == Status::converged && !std::isfinite(summary.final_chi2))
+  if (summary.status == Status::converged &&
+      (!std::isfinite(summary.final_chi2) || ended_without_descent(report, graph.values())))
     summary.status = Status::diverged;
   summary.notes.push_back("Ceres: " + report.message);
   summary.seconds = seconds_of(report);

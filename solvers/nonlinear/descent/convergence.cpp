@@ -20,7 +20,7 @@ bool Convergence::arrived(double promise, double chi2) {
 }
 
 bool Convergence::exhausted(bool lowered, double step_norm) {
-  const bool futile = !lowered && step_norm <= 1e-9 * (state_norm_ + 1e-9);
+  const bool futile = !lowered && negligible(step_norm);
   futile_ = futile ? futile_ + 1 : 0;
   return tolerance_ > 0.0 && futile_ >= 2;
 }

@@ -20,8 +20,11 @@ class Convergence {
   /// an estimate with that chi2; to be called once per linearisation.
   bool arrived(double promise, double chi2);
 
+  /// Whether a step is below 1e-9 of the states.
+  bool negligible(double step_norm) const { return step_norm <= 1e-9 * (state_norm_ + 1e-9); }
+
   /// Whether arithmetic allows no further progress: to be called with each step; true when
-  /// `lowered` has been false twice in a row for steps below 1e-9 of the states. (chi2 = 0 is never
+  /// `lowered` has been false twice in a row for negligible steps. (chi2 = 0 is never
   /// reached to a relative tolerance.)
   bool exhausted(bool lowered, double step_norm);
 

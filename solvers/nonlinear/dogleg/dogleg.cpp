@@ -56,7 +56,7 @@ class Run {
     const bool exhausted = convergence_.exhausted(lowered, step_norm);
     if (arrived) {
       run_.end(Status::converged);
-    } else if (exhausted) {
+    } else if (exhausted && run_.solves(path_.newton())) {
       run_.end_without_descent(newton_promise_, newton_norm_);
     }
     adapt_radius(lowered ? (run_.chi2 - trial_chi2) / step.promise : -1.0, step.length);

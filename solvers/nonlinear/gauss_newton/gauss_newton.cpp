@@ -46,7 +46,8 @@ Summary GaussNewton::optimize(Graph& graph, const Stop& stop, Observer& observer
     const double step_norm = std::sqrt(dot(run.step, run.step));
     const double before = run.chi2;
     const bool arrived = convergence.arrived(dot(equations.g(), run.step), before);
-    if (arrived && !run.solves(run.step)) break;
+    const bool may_end = arrived || convergence.negligible(step_norm);
+    if (may_end && !run.solves(run.step)) break;
     equations.retract(run.estimate, run.step, run.trial);
     if (run.must_stop()) break;
 

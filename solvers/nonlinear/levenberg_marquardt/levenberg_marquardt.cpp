@@ -74,7 +74,8 @@ class Run {
     const double gained = run_.chi2 - trial_chi2;
     const bool exhausted = convergence_.exhausted(lowered, step_norm);
     if (!run_.ended() && arrived) run_.end(Status::converged);
-    if (!run_.ended() && exhausted) run_.end_without_descent(first_promise_, first_norm_);
+    if (!run_.ended() && exhausted && run_.solves(run_.step))
+      run_.end_without_descent(first_promise_, first_norm_);
 
     const double before = run_.chi2;
     if (lowered) take_step(trial_chi2);
@@ -135,7 +136,7 @@ class Run {
 
   void raise_damping() {
     damping_.raise();
-    if (damping_.at_limit() && !run_.ended() && !run_.exact())
+    if (damping_.at_limit() && !run_.ended() && !run_.exact() && run_.solves(run_.step))
       run_.end_without_descent(first_promise_, first_norm_);
   }
 

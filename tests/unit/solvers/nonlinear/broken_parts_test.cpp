@@ -1,0 +1,225 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Optimizers with a linear solver or a factor that is wrong: none of them may claim to have
+// converged.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include "cairn/lie/se2.hpp"
+#include "cairn/plugin/registry.hpp"
+#include "cairn/runtime/error.hpp"
+#include "cairn/solve/optimizer.hpp"
+#include "cairn/types/define_factor.hpp"
+#include "cairn/types/define_variable.hpp"
+#include "support/sample_graphs.hpp"
+
+namespace cairn {
+namespace {
+
+using testing::AnyOf;
+using testing::HasSubstr;
+
+/// What a wrong solver makes of the right step.
+using Spoil = std::function<void(std::span<double>)>;
+
+/// A solver whose answers are right, but for what `spoil` does to them.
+class SpoiltSolver final : public LinearSolver {
+ public:
+  SpoiltSolver(std::unique_ptr<LinearSolver> solver, Spoil spoil)
+      : solver_(std::move(solver)), spoil_(std::move(spoil)) {}
+  void analyze(const BlockStructure& structure) override { solver_->analyze(structure); }
+  Factorization factorize(const BlockMatrix& H) override { return solver_->factorize(H); }
+  void solve(std::span<const double> g, std::span<double> x) override {
+    solver_->solve(g, x);
+    spoil_(x);
+  }
+  const LinearSolverStats& stats() const override { return solver_->stats(); }
+
+ private:
+  std::unique_ptr<LinearSolver> solver_;
+  Spoil spoil_;
+};
+
+Summary optimize_with(const std::string& optimizer, const Spoil& spoil, Graph& graph) {
+  Registry registry;
+  registry.add<LinearSolver>("spoilt", OptionTable{}, [&](const Options&, Registry& all) {
+    return std::make_unique<SpoiltSolver>(all.make<LinearSolver>("eigen"), spoil);
+  });
+  return registry.make<Optimizer>(optimizer + ":linear_solver=spoilt")->optimize(graph);
+}
+
+class Optimizers : public testing::TestWithParam<const char*> {};
+
+TEST_P(Optimizers, ConvergeWithTheSolverAsItIs) {
+  Graph graph = test::ring_of_poses(30, 0.05);
+  EXPECT_EQ(optimize_with(
+                GetParam(), [](std::span<double>) {}, graph)
+                .status,
+            Status::converged);
+}
+
+TEST_P(Optimizers, HaveNotConvergedWithStepsThatAreNotFinite) {
+  for (const double value : {std::nan(""), 1e308, std::numeric_limits<double>::infinity()}) {
+    Graph graph = test::ring_of_poses(30, 0.05);
+    const double before = chi2(graph);
+    const Summary summary = optimize_with(
+        GetParam(), [&](std::span<double> x) { x.back() = value; }, graph);
+    EXPECT_EQ(summary.status, Status::diverged) << value;
+    EXPECT_EQ(chi2(graph), before);
+    EXPECT_THAT(summary.notes, testing::Contains(HasSubstr("linear solver spoilt"))) << value;
+  }
+}
+
+TEST_P(Optimizers, HaveNotConvergedWithStepsThatSolveNothing) {
+  const std::vector<Spoil> wrong{[](std::span<double> x) { std::ranges::fill(x, 0.0); },
+                                 [](std::span<double> x) { x.front() += 1e-3; },
+                                 [](std::span<double> x) {
+                                   for (double& value : x) value = -value;
+                                 }};
+  for (std::size_t k = 0; k < wrong.size(); ++k) {
+    Graph graph = test::ring_of_poses(30, 0.05);
+    const Summary summary = optimize_with(GetParam(), wrong[k], graph);
+    EXPECT_EQ(summary.status, Status::diverged) << k;
+    EXPECT_THAT(summary.notes, testing::Contains(HasSubstr("does not solve"))) << k;
+  }
+}
+
+TEST_P(Optimizers, HaveNotConvergedWithASolverThatBreaksLater) {
+  Graph graph = test::ring_of_poses(30, 0.05);
+  int solved = 0;
+  const Spoil spoil = [&](std::span<double> x) {
+    if (++solved > 2) std::ranges::fill(x, 0.0);
+  };
+  EXPECT_EQ(optimize_with(GetParam(), spoil, graph).status, Status::diverged);
+}
+
+INSTANTIATE_TEST_SUITE_P(BrokenParts, Optimizers,
+                         testing::Values("gauss_newton", "levenberg_marquardt", "dogleg"));
+
+/// A prior on a pose whose Jacobian has the wrong sign.
+struct WrongSign {
+  static constexpr std::string_view kTag = "WRONG_SIGN";
+  static constexpr int kResidual = 3, kMeasurement = 3;
+  using Variables = std::tuple<Se2>;
+  template <class S>
+  static Vector<S, 3> residual(const Vector<S, 3>& x, const Vector<double, 3>& z) {
+    return {x[0] - z[0], x[1] - z[1], x[2] - z[2]};
+  }
+  static Vector<double, 3> evaluate(const Vector<double, 3>& x, const Vector<double, 3>& z,
+                                    Eigen::Matrix3d& J) {
+    J = -Eigen::Matrix3d::Identity();
+    return x - z;
+  }
+};
+
+/// A prior that fails after so many calls.
+struct Failing {
+  enum class How { nan, exception, number };
+  static inline std::atomic<int> calls_left = 0;
+  static inline How how = How::nan;
+  static constexpr std::string_view kTag = "FAILING";
+  static constexpr int kResidual = 3, kMeasurement = 3;
+  using Variables = std::tuple<Se2>;
+  template <class S>
+  static Vector<S, 3> residual(const Vector<S, 3>& x, const Vector<double, 3>& z) {
+    const bool fails = calls_left-- <= 0;
+    if (fails && how == How::exception) throw std::domain_error("out of its range");
+    if (fails && how == How::number) throw 42;
+    // Not linear, so that there are several iterations.
+    using std::sin;
+    const S first = fails ? S(std::nan("")) : S(x[0] - z[0] + 0.5 * sin(x[0]));
+    return {first, x[1] - z[1], x[2] - z[2]};
+  }
+};
+
+template <class F>
+Graph one_pose_with() {
+  Graph graph;
+  const double state[] = {0.3, -0.2, 0.1}, z[] = {3.0, 2.0, 0.5}, unit[] = {1, 0, 0, 1, 0, 1};
+  const int pose[] = {graph.add_variable(define_variable<Se2>(), 7, state)};
+  graph.add_factor(define_factor<F>(), pose, z, unit);
+  return graph;
+}
+
+class Methods : public testing::TestWithParam<const char*> {
+ protected:
+  void SetUp() override {
+    if (!registry_.has(Optimizer::kKind, GetParam())) GTEST_SKIP() << "not built";
+    optimizer_ = registry_.make<Optimizer>(GetParam());
+  }
+  Registry registry_;
+  std::unique_ptr<Optimizer> optimizer_;
+};
+
+TEST_P(Methods, HaveNotConvergedWithAWrongJacobian) {
+  Graph graph = one_pose_with<WrongSign>();
+  const double before = chi2(graph);
+  const Summary summary = optimizer_->optimize(graph);
+  EXPECT_NE(summary.status, Status::converged);
+  EXPECT_LE(chi2(graph), before);
+}
+
+TEST_P(Methods, HaveNotConvergedWhereResidualsBecomeNan) {
+  for (const int calls : {0, 1, 3, 6, 9}) {
+    Failing::how = Failing::How::nan;
+    Failing::calls_left = calls;
+    Graph graph = one_pose_with<Failing>();
+    const Status status = optimizer_->optimize(graph).status;
+    const bool failed = Failing::calls_left < 0;
+    EXPECT_TRUE(!failed || status != Status::converged) << calls;
+  }
+}
+
+TEST_P(Methods, NameTheFactorThatThrows) {
+  for (const auto how : {Failing::How::exception, Failing::How::number}) {
+    for (const int calls : {0, 1, 4}) {
+      Failing::how = how;
+      Failing::calls_left = calls;
+      Graph graph = one_pose_with<Failing>();
+      try {
+        optimizer_->optimize(graph);
+        ADD_FAILURE() << "nothing was thrown after " << calls;
+      } catch (const Error& error) {
+        EXPECT_EQ(error.code(), ErrorCode::plugin);
+        EXPECT_THAT(error.what(), HasSubstr("FAILING"));
+      }
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(BrokenParts, Methods,
+                         testing::Values("gauss_newton", "levenberg_marquardt", "dogleg", "ceres"));
+
+/// chi2 scales with the information, the estimate does not.
+TEST_P(Methods, FindTheSameEstimateAtAnyScaleOfTheInformation) {
+  if (std::string(GetParam()) == "ceres") GTEST_SKIP() << "its bounds are absolute";
+  std::vector<double> wanted;
+  for (const double scale : {1.0, 1e-30, 1e-12, 1e12, 1e30, 1e60}) {
+    Graph graph = test::ring_of_poses(30, 0.05);
+    for (int f = 0; f < graph.factor_count(); ++f) {
+      std::vector<double> information(graph.information(f).begin(), graph.information(f).end());
+      for (double& value : information) value *= scale;
+      graph.set_measurement(f, graph.measurement(f), information);
+    }
+    EXPECT_EQ(optimizer_->optimize(graph).status, Status::converged) << scale;
+    std::vector<double> found;
+    for (int v = 0; v < graph.variable_count(); ++v)
+      found.insert(found.end(), graph.state(v).begin(), graph.state(v).end());
+    if (wanted.empty()) wanted = found;
+    for (std::size_t k = 0; k < wanted.size(); ++k)
+      ASSERT_NEAR(found[k], wanted[k], 1e-6) << "at scale " << scale;
+  }
+}
+
+}  // namespace
+}  // namespace cairn
