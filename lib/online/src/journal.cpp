@@ -3,13 +3,15 @@
 
 #include <fcntl.h>
 #include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 #include <zlib.h>
 
 #include <cerrno>
 #include <charconv>
 #include <cstring>
-#include <optional>
+#include <fstream>
+#include <iterator>
 #include <utility>
 
 #include <fmt/format.h>
@@ -19,34 +21,18 @@
 namespace cairn {
 namespace {
 
-constexpr std::string_view kMagic = "cairn-journal 1 ";
+constexpr std::string_view kMagic = "cairn-journal 2 ", kUnchainedMagic = "cairn-journal 1 ";
 
 std::uint32_t checksum(std::string_view text) {
   return static_cast<std::uint32_t>(
       ::crc32(0, reinterpret_cast<const Bytef*>(text.data()), static_cast<uInt>(text.size())));
 }
 
-/// "crc rest\n"
-std::string sealed(std::string_view rest) {
-  return fmt::format("{:08x} {}\n", checksum(rest), rest);
-}
-
-/// What was sealed, without the line break; none if it does not match its checksum.
-std::optional<std::string_view> unsealed(std::string_view line) {
-  std::uint32_t crc = 0;
-  if (line.size() < 9 || line[8] != ' ') return std::nullopt;
-  const auto [end, problem] = std::from_chars(line.data(), line.data() + 8, crc, 16);
-  if (problem != std::errc{} || end != line.data() + 8) return std::nullopt;
-  const std::string_view rest = line.substr(9);
-  return checksum(rest) == crc ? std::optional(rest) : std::nullopt;
-}
-
-std::optional<Journal::Record> parse_record(std::string_view line) {
-  const auto rest = unsealed(line);
-  if (!rest) return std::nullopt;
+/// "number text"
+std::optional<Journal::Record> parse_record(std::string_view rest) {
   Journal::Record record;
-  const char* const end = rest->data() + rest->size();
-  const auto [text, problem] = std::from_chars(rest->data(), end, record.number);
+  const char* const end = rest.data() + rest.size();
+  const auto [text, problem] = std::from_chars(rest.data(), end, record.number);
   if (problem != std::errc{} || text == end || *text != ' ') return std::nullopt;
   record.text.assign(text + 1, end);
   return record;
@@ -56,7 +42,7 @@ std::optional<Journal::Record> parse_record(std::string_view line) {
 
 Journal::Journal(std::filesystem::path file, std::string identity, Sync sync)
     : file_(std::move(file)), sync_(sync) {
-  descriptor_ = ::open(file_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
+  descriptor_ = ::open(file_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NONBLOCK, 0666);
   if (descriptor_ < 0) fail("cannot be opened");
   try {
     if (::flock(descriptor_, LOCK_EX | LOCK_NB) != 0) {
@@ -73,12 +59,37 @@ Journal::Journal(std::filesystem::path file, std::string identity, Sync sync)
 Journal::~Journal() {
   try {
     commit();
-  } catch (const Error&) {  // who wanted to know has committed
+  } catch (const Error&) {  // a caller that needs to know calls commit
   }
   ::close(descriptor_);
 }
 
+/// "checksum rest\n"
+std::string Journal::sealed(std::string_view rest) {
+  chain_ = checksum(chained_ ? fmt::format("{:08x}{}", chain_, rest) : std::string(rest));
+  return fmt::format("{:08x} {}\n", chain_, rest);
+}
+
+/// What was sealed, without the line break; none if it does not match its checksum.
+std::optional<std::string_view> Journal::unsealed(std::string_view line) {
+  std::uint32_t crc = 0;
+  if (line.size() < 9 || line[8] != ' ') return std::nullopt;
+  const auto [end, problem] = std::from_chars(line.data(), line.data() + 8, crc, 16);
+  if (problem != std::errc{} || end != line.data() + 8) return std::nullopt;
+  const std::string_view rest = line.substr(9);
+  if (checksum(chained_ ? fmt::format("{:08x}{}", chain_, rest) : std::string(rest)) != crc)
+    return std::nullopt;
+  chain_ = crc;
+  return rest;
+}
+
 void Journal::load(const std::string& identity) {
+  struct stat status {};
+  if (::fstat(descriptor_, &status) != 0) fail("cannot be examined");
+  if (!S_ISREG(status.st_mode)) {
+    throw Error(ErrorCode::input,
+                fmt::format("{}: a journal is a regular file, and this is none", file_.string()));
+  }
   std::string bytes;
   char buffer[1 << 16];
   for (ssize_t got; (got = ::read(descriptor_, buffer, sizeof buffer)) != 0;) {
@@ -87,14 +98,17 @@ void Journal::load(const std::string& identity) {
     bytes.append(buffer, static_cast<std::size_t>(got));
   }
   const std::size_t header_end = bytes.find('\n');
+  const std::string_view header = std::string_view(bytes).substr(0, header_end);
+  chained_ = !header.starts_with(kUnchainedMagic);
   if (header_end == std::string::npos) {
     // Nothing, or a first line that was being written.
-    if (kMagic.substr(0, bytes.size()) != std::string_view(bytes).substr(0, kMagic.size()))
+    const std::string_view magic = chained_ ? kMagic : kUnchainedMagic;
+    if (magic.substr(0, bytes.size()) != header.substr(0, magic.size()))
       throw Error(ErrorCode::input, fmt::format("{}: this is no journal", file_.string()));
+    chained_ = true;
     return begin(identity);
   }
-  const std::string_view header = std::string_view(bytes).substr(0, header_end);
-  if (!header.starts_with(kMagic))
+  if (chained_ && !header.starts_with(kMagic))
     throw Error(ErrorCode::input, fmt::format("{}: this is no journal", file_.string()));
   const auto owner = unsealed(header.substr(kMagic.size()));
   if (!owner)
@@ -105,41 +119,48 @@ void Journal::load(const std::string& identity) {
                             "options, or another journal",
                             file_.string(), *owner, identity));
   }
+  load_records(bytes, header_end + 1);
+  if (!chained_ && note_.empty()) {
+    note_ = fmt::format("{}: a journal of format 1, in which a missing record is not noticed",
+                        file_.string());
+  }
+}
 
-  std::size_t good = header_end + 1;  // where the last good record ends
-  std::int64_t line = 1, bad_line = 0;
-  for (std::size_t at = good; at < bytes.size();) {
-    const std::size_t end = bytes.find('\n', at);
+/// Reads whole lines, each of which must fit its place; what follows the last of them is cut off.
+void Journal::load_records(const std::string& bytes, std::size_t begin) {
+  std::int64_t line = 1;
+  for (std::size_t end; (end = bytes.find('\n', begin)) != std::string::npos; begin = end + 1) {
     ++line;
-    auto record = end == std::string::npos
-                      ? std::nullopt
-                      : parse_record(std::string_view(bytes).substr(at, end - at));
-    at = end == std::string::npos ? bytes.size() : end + 1;
+    const auto rest = unsealed(std::string_view(bytes).substr(begin, end - begin));
+    auto record = rest ? parse_record(*rest) : std::nullopt;
+    if (record && !records_.empty() && record->number <= records_.back().number) record.reset();
     if (!record) {
-      if (bad_line == 0) bad_line = line;
-      continue;
-    }
-    if (bad_line > 0) {
       throw Error(ErrorCode::input,
-                  fmt::format("{}:{}: the record is damaged, and good ones follow it; expected its "
-                              "checksum to fit. What stands before it can be saved by cutting the "
-                              "file there",
-                              file_.string(), bad_line));
+                  fmt::format("{}:{}: the record does not fit its checksum and the line before it: "
+                              "one is damaged, missing, doubled or moved. What stands before it "
+                              "can be saved by cutting the file there",
+                              file_.string(), line));
     }
     records_.push_back(std::move(*record));
-    good = at;
   }
-  if (good < bytes.size()) {
-    note_ = fmt::format("{}: {} bytes at the end were no whole record and were cut off",
-                        file_.string(), bytes.size() - good);
-    if (::ftruncate(descriptor_, static_cast<off_t>(good)) != 0) fail("cannot be cut");
-  }
-  if (::lseek(descriptor_, static_cast<off_t>(good), SEEK_SET) < 0) fail("cannot be written");
+  if (begin < bytes.size()) cut(bytes, begin);
+  size_ = static_cast<std::int64_t>(begin);
+  if (::lseek(descriptor_, size_, SEEK_SET) < 0) fail("cannot be written");
+}
+
+/// Keeps what is after the first `size` bytes in FILE.cut, and cuts it off.
+void Journal::cut(const std::string& bytes, std::size_t size) {
+  const std::filesystem::path kept = file_.string() + ".cut";
+  std::ofstream(kept, std::ios::binary | std::ios::app) << bytes.substr(size) << '\n';
+  note_ = fmt::format("{}: the last line was not whole: {} bytes were cut off, and kept in {}",
+                      file_.string(), bytes.size() - size, kept.string());
+  if (::ftruncate(descriptor_, static_cast<off_t>(size)) != 0) fail("cannot be cut");
 }
 
 void Journal::begin(const std::string& identity) {
   if (::ftruncate(descriptor_, 0) != 0 || ::lseek(descriptor_, 0, SEEK_SET) < 0)
     fail("cannot be written");
+  size_ = 0;
   write_all(fmt::format("{}{}", kMagic, sealed(identity)));
   if (sync_ == Sync::none) return;
   synchronise();
@@ -165,12 +186,27 @@ void Journal::commit() {
 }
 
 void Journal::write_all(std::string_view bytes) {
-  while (!bytes.empty()) {
-    const ssize_t written = ::write(descriptor_, bytes.data(), bytes.size());
-    if (written < 0 && errno == EINTR) continue;
-    if (written < 0) fail("cannot be written");
-    bytes.remove_prefix(static_cast<std::size_t>(written));
+  struct stat status {};
+  if (::fstat(descriptor_, &status) != 0) fail("cannot be examined");
+  if (status.st_nlink == 0 || status.st_size != size_) {
+    throw Error(ErrorCode::input,
+                fmt::format("{}: the journal was {} while it was in use", file_.string(),
+                            status.st_nlink == 0 ? "removed" : "changed"));
   }
+  for (std::string_view left = bytes; !left.empty();) {
+    const ssize_t written = ::write(descriptor_, left.data(), left.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) {
+      const int reason = errno;
+      // Or the next record would continue half a line.
+      if (::ftruncate(descriptor_, size_) != 0 || ::lseek(descriptor_, size_, SEEK_SET) < 0)
+        fail("cannot be written, nor cut where its last whole record ends");
+      errno = reason;
+      fail("cannot be written");
+    }
+    left.remove_prefix(static_cast<std::size_t>(written));
+  }
+  size_ += std::ssize(bytes);
 }
 
 void Journal::synchronise() {

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -15,10 +16,15 @@ namespace cairn {
 /// where it is synchronised, the machine lost its power.
 ///
 /// The file is text. Its first line names the format and an identity (what the log belongs to);
-/// every other is a record: the CRC-32 of the rest in hexadecimal, a number, and the text. What
-/// stands behind the last good record (a line that was being written) is cut off when the file is
-/// opened; a bad record with a good one behind it is damage, and refused. The file is locked while
-/// it is open. Records that were not committed may be missing, but none is ever read in part.
+/// every other is a record: a checksum in hexadecimal, a number, and the text. The checksum is the
+/// CRC-32 of the checksum of the line before followed by number and text, so that a record that is
+/// damaged, missing, doubled or moved does not fit its place: that is refused. A last line without
+/// its line break, which was being written, is cut off when the file is opened, and kept in
+/// FILE.cut. The file is locked while it is open. Records that were not committed may be missing,
+/// but none is ever read in part.
+///
+/// Files of format 1, whose checksums were of each line alone, are read and continued as such;
+/// there the numbers must rise, and a record that is missing goes unnoticed.
 class CAIRN_API Journal {
  public:
   struct Record {
@@ -33,7 +39,8 @@ class CAIRN_API Journal {
   };
 
   /// Opens a journal, or begins one. Throws `Error` (usage) if it belongs to another identity or is
-  /// in use, and `Error` (input) if it is damaged, is no journal, or cannot be read or written.
+  /// in use, and `Error` (input) if it is damaged, is no journal or no regular file, or cannot be
+  /// read or written.
   Journal(std::filesystem::path file, std::string identity, Sync sync);
   Journal(const Journal&) = delete;
   Journal& operator=(const Journal&) = delete;
@@ -44,14 +51,20 @@ class CAIRN_API Journal {
   /// What was cut off then, as a sentence; empty if nothing was.
   const std::string& note() const { return note_; }
 
-  /// Adds a record. Throws `Error` (input) where it cannot be written.
+  /// Adds a record; numbers must rise. Throws `Error` (input) where it cannot be written.
   void append(std::int64_t number, std::string_view text);
-  /// Writes what was appended, and waits for the disk if so agreed.
+  /// Writes what was appended, and waits for the disk if so agreed. Throws `Error` (input) where
+  /// that fails, or the file was removed or cut by somebody else; what was written in part is taken
+  /// back.
   void commit();
 
  private:
   void load(const std::string& identity);
+  void load_records(const std::string& bytes, std::size_t begin);
+  void cut(const std::string& bytes, std::size_t size);
   void begin(const std::string& identity);
+  std::string sealed(std::string_view rest);
+  std::optional<std::string_view> unsealed(std::string_view line);
   void write_all(std::string_view bytes);
   void synchronise();
   [[noreturn]] void fail(const std::string& what) const;
@@ -59,6 +72,9 @@ class CAIRN_API Journal {
   std::filesystem::path file_;
   Sync sync_;
   int descriptor_ = -1;
+  bool chained_ = true;      // format 2
+  std::uint32_t chain_ = 0;  // checksum of the line before
+  std::int64_t size_ = 0;    // of what is written, in bytes
   std::vector<Record> records_;
   std::string note_;
   std::string pending_;
