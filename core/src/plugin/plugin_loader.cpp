@@ -35,9 +35,27 @@ std::map<fs::path, boost::dll::shared_library>& loaded_libraries() {
   return *libraries;
 }
 
+/// Sidecar files are some hundred bytes.
+constexpr std::uintmax_t kLargestSidecar = std::uintmax_t{1} << 20;
+
+/// Everybody may write to it.
 bool others_may_write(const fs::path& path) {
   struct stat status {};
   return ::stat(path.c_str(), &status) == 0 && (status.st_mode & S_IWOTH) != 0;
+}
+
+/// Another user may exchange what lies there: everybody may write to the folder or, unless sticky
+/// (as /tmp is), to one above it. Names that folder; empty if none is.
+fs::path open_to_others(const fs::path& folder) {
+  if (others_may_write(folder)) return folder;
+  for (fs::path above = folder; above.has_relative_path();) {
+    above = above.parent_path();
+    struct stat status {};
+    if (::stat(above.c_str(), &status) == 0 && (status.st_mode & S_IWOTH) != 0 &&
+        (status.st_mode & S_ISVTX) == 0)
+      return above;
+  }
+  return {};
 }
 
 /// The folder of one user's plugins, by the XDG base directory specification, in which a relative
@@ -103,12 +121,15 @@ boost::dll::shared_library open_library(const fs::path& library) {
 const char* core_fingerprint() { return CAIRN_ABI_FINGERPRINT; }
 
 Sidecar read_sidecar(const fs::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  const std::string text(std::istreambuf_iterator<char>(stream), {});
   const auto broken = [&](const std::string& why) {
     return plugin_error(
         fmt::format("{}: {}; build the plugin again, or remove the file", file.string(), why));
   };
+  std::error_code unknown;
+  if (!fs::is_regular_file(file, unknown)) throw broken("is no regular file");
+  if (fs::file_size(file, unknown) > kLargestSidecar) throw broken("has more than 1 MB");
+  std::ifstream stream(file, std::ios::binary);
+  const std::string text(std::istreambuf_iterator<char>(stream), {});
   if (!stream) throw broken("cannot be read");
   boost::system::error_code error;
   const boost::json::value root = boost::json::parse(text, error);
@@ -148,11 +169,11 @@ std::vector<fs::path> plugin_folders(const PluginSearch& search,
         problems.push_back({folder, fmt::format("{}: no such folder", folder.string())});
       return;
     }
-    if (others_may_write(canonical)) {
+    if (const fs::path open = open_to_others(canonical); !open.empty()) {
       problems.push_back(
           {folder,
-           fmt::format("{}: refused, since other users may write to this folder; 'chmod o-w' it",
-                       folder.string())});
+           fmt::format("{}: refused, since other users may write to {}; 'chmod o-w' it",
+                       folder.string(), open == canonical ? "this folder" : open.string())});
       return;
     }
     if (std::ranges::find(folders, canonical) == folders.end()) folders.push_back(canonical);
@@ -186,7 +207,7 @@ const PluginManifest& load_plugin(const fs::path& library) {
   auto& libraries = loaded_libraries();
   auto it = libraries.find(path);
   if (it == libraries.end()) {
-    if (others_may_write(path) || others_may_write(path.parent_path())) {
+    if (others_may_write(path) || !open_to_others(path.parent_path()).empty()) {
       throw plugin_error(fmt::format(
           "{}: refused, since other users may write to it or its folder; 'chmod o-w' them",
           library.string()));

@@ -10,6 +10,9 @@
 namespace cairn {
 namespace {
 
+/// Longer words are no slips of the pen; comparing them takes time in proportion to their length.
+constexpr std::size_t kLongestWord = 100;
+
 char lower(char c) { return static_cast<char>(std::tolower(static_cast<unsigned char>(c))); }
 
 /// Optimal string alignment distance: insert, delete, replace, swap of neighbours.
@@ -37,6 +40,7 @@ int edit_distance(std::string_view a, std::string_view b) {
 
 std::string nearest_spelling(std::string_view word, std::span<const std::string> candidates) {
   std::string best;
+  if (word.size() > kLongestWord) return best;
   int best_distance = static_cast<int>(std::max<std::size_t>(2, word.size() / 3)) + 1;
   for (const std::string& candidate : candidates) {
     const int distance = edit_distance(word, candidate);

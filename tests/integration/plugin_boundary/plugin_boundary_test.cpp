@@ -3,6 +3,7 @@
 // built wrong on purpose (see CMakeLists.txt); nothing of it may hurt whoever does not ask for it.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cstdlib>
@@ -228,9 +229,36 @@ TEST_F(PluginBoundary, AFolderThatOthersMayWriteToIsRefused) {
       folder().string() + ": refused, since other users may write to this folder; 'chmod o-w' it";
   EXPECT_THAT(registry.offers(), IsEmpty());
   EXPECT_THAT(messages(registry), ElementsAre(refusal));
-  // Whoever misses a name is told of it.
+  // An error about a name that is missing mentions it.
   EXPECT_THAT(message_of(registry, "plain"),
               AllOf(StartsWith("there is no loss 'plain'"), HasSubstr(refusal)));
+}
+
+TEST_F(PluginBoundary, AFolderBelowOneThatOthersMayWriteToIsRefused) {
+  fs::create_directory(folder() / "below");
+  fs::permissions(folder(), fs::perms::others_write, fs::perm_options::add);
+  cairn::Registry registry(search_in({folder() / "below"}));
+  EXPECT_THAT(messages(registry), ElementsAre((folder() / "below").string() +
+                                              ": refused, since other users may write to " +
+                                              folder().string() + "; 'chmod o-w' it"));
+  // A sticky folder, in which nobody may exchange what is another's, is as good as /tmp.
+  fs::permissions(folder(), fs::perms::sticky_bit, fs::perm_options::add);
+  cairn::Registry sticky(search_in({folder() / "below"}));
+  EXPECT_THAT(sticky.problems(), IsEmpty());
+}
+
+TEST_F(PluginBoundary, ASidecarThatIsNoFileIsAProblemAndNoMore) {
+  copy("nothing_wrong", "plain");
+  fs::create_directory(folder() / "folder.json");
+  ASSERT_EQ(mkfifo((folder() / "fifo.json").c_str(), 0600), 0);
+  fs::create_symlink("/dev/zero", folder() / "zero.json");
+  write("large.json", std::string(2 << 20, ' '));
+  cairn::Registry registry(search_in({folder()}));
+  EXPECT_THAT(messages(registry), ElementsAre(HasSubstr("fifo.json: is no regular file"),
+                                              HasSubstr("folder.json: is no regular file"),
+                                              HasSubstr("large.json: has more than 1 MB"),
+                                              HasSubstr("zero.json: is no regular file")));
+  EXPECT_NE(registry.make<cairn::Loss>("plain"), nullptr);
 }
 
 TEST_F(PluginBoundary, AFileThatOthersMayWriteToIsRefusedByNameToo) {

@@ -18,6 +18,12 @@ TEST(Spelling, FindsTheNearestName) {
 
 TEST(Spelling, DoesNotGuessWildly) { EXPECT_EQ(nearest_spelling("mumps", kNames), ""); }
 
+TEST(Spelling, DoesNotCompareWhatIsLongerThanAnyName) {
+  const std::vector<std::string> names{std::string(100, 'a'), std::string(101, 'a')};
+  EXPECT_EQ(nearest_spelling(std::string(100, 'a'), names), names[0]);
+  EXPECT_EQ(nearest_spelling(std::string(101, 'a'), names), "");
+}
+
 TEST(Spelling, AlwaysNamesWhatIsOnOffer) {
   EXPECT_EQ(what_is_on_offer("mumps", kNames), "; on offer: cholmod, eigen, block_cholesky");
   EXPECT_EQ(what_is_on_offer("eigne", kNames),
