@@ -2,6 +2,7 @@
 #include "cairn/online/online_session.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include <fmt/format.h>
@@ -144,7 +145,7 @@ void OnlineSession::write_results(const UpdateReport& report, Reply& reply) {
   if (settings_.marginals == "diagonal") {
     for (const Id id : known_) write_covariance(id, id, reply.text);
   }
-  acknowledge(reply, owed_, report.ok ? "OK" : "SINGULAR");
+  acknowledge(reply, owed_, !report.ok ? "SINGULAR" : !report.converged ? "UNCONVERGED" : "OK");
 }
 
 // Commands --------------------------------------------------------------------------------------
@@ -243,7 +244,10 @@ void OnlineSession::report_estimate(const Words& words, Reply& reply) {
 
 void OnlineSession::report_chi2(const Words& words, Reply& reply) {
   expect_words(words, 1, "CHI2");
-  reply.text += fmt::format("CHI2 {}\n", estimator_.chi2());
+  const double chi2 = estimator_.chi2();
+  if (!std::isfinite(chi2))
+    throw Error(ErrorCode::numerical, "chi2 is not finite: a residual overflows, or is no number");
+  reply.text += fmt::format("CHI2 {}\n", chi2);
   acknowledge(reply, owed_);
 }
 

@@ -82,6 +82,10 @@ void BatchEstimator::batch_step(const UpdateOptions& options, UpdateReport& repo
   const Summary summary = tools_->optimizer->optimize(graph_, stop);
   for (const std::string& sentence : summary.notes) note(sentence, report);
   report.ok = summary.status != Status::not_positive_definite;
+  report.converged = !options.full || summary.status == Status::converged;
+  if (!report.converged)
+    report.notes.push_back(fmt::format("not converged: {} after {} iterations",
+                                       to_string(summary.status), std::ssize(summary.iterations)));
   report.iterations = static_cast<int>(std::ssize(summary.iterations));
   report.affected_variables = report.iterations * graph_.variable_count();
   if (report.iterations > 0)

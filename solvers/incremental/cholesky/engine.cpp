@@ -7,6 +7,8 @@
 #include <numeric>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/timed.hpp"
 
@@ -121,6 +123,10 @@ void Engine::rescue(UpdateReport& report, double tolerance) {
     const Summary summary =
         rescuer_->optimizer->optimize(graph, {.max_iterations = 100, .tolerance = tolerance});
     report.iterations += static_cast<int>(summary.iterations.size());
+    report.converged = summary.status == Status::converged;
+    if (!report.converged)
+      report.notes.push_back(fmt::format("not converged: {} after {} iterations",
+                                         to_string(summary.status), summary.iterations.size()));
     load(std::move(graph), live_ids());
   }
   broken_ = !bring_factor_up_to_date(report);
@@ -356,6 +362,7 @@ void Engine::solve_fully(UpdateReport& report) {
     }
     if (decrease_ <= 1e-12 * cost_ + kRounding * live_factors_) return;
   }
+  rescue(report, 1e-12);
 }
 
 std::vector<double> Engine::x(int v) const {

@@ -47,6 +47,9 @@ CAIRN_API std::string_view to_string(MarginalsBy by);
 /// What an update did.
 struct UpdateReport {
   bool ok = true;  ///< false: H is not positive definite; the estimate is the best available
+  /// False: everything was to be solved until it has converged (`UpdateOptions::full`), or had to
+  /// be, and it has not; a note gives the reason.
+  bool converged = true;
   FactorId first_factor = 0;  ///< id of the first of the update's new factors; the others follow it
   /// The ids of the priors that marginalisation left, if any.
   std::vector<FactorId> priors;

@@ -11,6 +11,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "cairn/plugin/registry.hpp"
+#include "cairn/solve/optimizer.hpp"
+
 namespace cairn {
 namespace {
 
@@ -133,6 +136,38 @@ TEST_F(OnlineSessionTest, RestoredLinesGiveTheSameEstimateWithoutAnswers) {
   for (const std::string& line : lines) session_->restore(line, ++number_);
   EXPECT_EQ(take("ESTIMATE ALL").text, estimate);
   EXPECT_THROW(session_->restore("NONSENSE", 99), Error);
+}
+
+/// An optimizer that ends before it has converged.
+class Tired final : public Optimizer {
+ public:
+  Summary optimize(Graph& graph, const Stop&, Observer&) override {
+    Summary summary;
+    summary.status = Status::max_iterations;
+    summary.initial_chi2 = summary.final_chi2 = chi2(graph);
+    return summary;
+  }
+};
+
+TEST_F(OnlineSessionTest, FullSaysIfItHasNotConverged) {
+  take_all(two_poses_);
+  EXPECT_THAT(take("FULL").text, StartsWith("OK 5 "));
+  registry_.add<Optimizer>("tired", OptionTable{},
+                           [](const Options&, Registry&) { return std::make_unique<Tired>(); });
+  estimator_ = registry_.make<Estimator>("batch:optimizer=tired");
+  session_ = std::make_unique<OnlineSession>(*estimator_, *format_, registry_,
+                                             OnlineSettings{.read = {}, .output = "none"});
+  number_ = 0;
+  take_all(two_poses_);
+  EXPECT_EQ(take("FULL").text,
+            "NOTE not converged: max_iterations after 0 iterations\n"
+            "UNCONVERGED 5 variables 2 factors 1 owed 0\n");
+}
+
+TEST_F(OnlineSessionTest, AChi2ThatIsNotFiniteIsAnError) {
+  take_all(
+      {"VERTEX_SE2 0 0 0 0", "FIX 0", "VERTEX_SE2 1 1e200 0 0", "FIX 1", "EDGE_SE2 0 1" + kStep});
+  EXPECT_THAT(take("CHI2").text, StartsWith("ERROR line 6: chi2 is not finite"));
 }
 
 TEST_F(OnlineSessionTest, QuitEndsIt) {
