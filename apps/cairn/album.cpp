@@ -13,6 +13,7 @@
 #include <fmt/format.h>
 #include <boost/json/serialize.hpp>
 
+#include "arguments.hpp"
 #include "cairn/report/recording.hpp"
 #include "cairn/report/run_report.hpp"
 #include "cairn/runtime/error.hpp"
@@ -64,23 +65,19 @@ std::string title_of(const AlbumOptions& options) {
 
 }  // namespace
 
-void add_album_options(CLI::App& command, AlbumOptions& options) {
-  command
-      .add_option("files", options.files,
-                  "graphs (.gz too, @KIND to generate), trajectories, recordings, JSON of runs")
-      ->type_name("FILE")
-      ->required();
-  command
-      .add_option("--name", options.names, "what to call the first FILE, the second … [its name]")
-      ->type_name("TEXT")
-      ->allow_extra_args(false);
-  command.add_option("--truth", options.truth, "the ground truth, laid over by id")
-      ->type_name("FILE");
-  command
-      .add_option("--initial", options.initial, "show this guess too: a name of kind initial_guess")
-      ->type_name("NAME");
-  command.add_option("--title", options.title, "title [name of the first FILE]")->type_name("TEXT");
-  add_input_options(command, options.input);
+void add_album_options(ArgumentParser cli, AlbumOptions& options) {
+  cli.add_option("files", options.files,
+                 "graphs (.gz too, @KIND to generate), trajectories, recordings, JSON of runs")
+      .type_name("FILE")
+      .required();
+  cli.add_option("--name", options.names, "what to call the first FILE, the second … [its name]")
+      .type_name("TEXT")
+      .repeatable();
+  cli.add_option("--truth", options.truth, "the ground truth, laid over by id").type_name("FILE");
+  cli.add_option("--initial", options.initial, "show this guess too: a name of kind initial_guess")
+      .type_name("NAME");
+  cli.add_option("--title", options.title, "title [name of the first FILE]").type_name("TEXT");
+  add_input_options(cli, options.input);
 }
 
 Album begin_album(const std::string& title, const std::string& command) {

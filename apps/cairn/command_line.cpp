@@ -19,21 +19,20 @@ namespace {
 constexpr int kMostThreads = 1024;
 
 void add_common_options(CLI::App& program, CommonOptions& common) {
-  program.add_option("--json", common.json, "write a report as JSON; - is standard output")
-      ->type_name("FILE");
-  program
-      .add_option("--threads", common.threads, "threads; 0 is all cores. Never changes a result")
-      ->type_name("N")
-      ->check(within(0, kMostThreads));
-  program.add_option("--plugin", common.plugins, "load this plugin too (may be given repeatedly)")
-      ->type_name("FILE")
-      ->allow_extra_args(false);
-  program
-      .add_option("--types", common.types,
-                  "options of types, such as slam3d:metric=g2o (repeatedly)")
-      ->type_name("NAME:K=V")
-      ->allow_extra_args(false);
-  program.add_flag("--quiet", common.quiet, "no progress and no notes, only results and errors");
+  ArgumentParser cli(program);
+  cli.add_option("--json", common.json, "write a report as JSON; - is standard output")
+      .type_name("FILE");
+  cli.add_option("--threads", common.threads, "threads; 0 is all cores. Never changes a result")
+      .type_name("N")
+      .within(0, kMostThreads);
+  cli.add_option("--plugin", common.plugins, "load this plugin too (may be given repeatedly)")
+      .type_name("FILE")
+      .repeatable();
+  cli.add_option("--types", common.types,
+                 "options of types, such as slam3d:metric=g2o (repeatedly)")
+      .type_name("NAME:K=V")
+      .repeatable();
+  cli.add_flag("--quiet", common.quiet, "no progress and no notes, only results and errors");
   program
       .set_config("--config", "", "TOML: options above at the top, [optimize] for a command's own")
       ->type_name("FILE");
@@ -150,72 +149,77 @@ int print_usage_of_nothing(const CLI::App& program) {
 
 CommandLine::CommandLine(Session& session)
     : session_(session),
-      program_("cairn: optimises factor graphs (graph SLAM); everything in it is chosen by name",
-               "cairn") {
-  program_.formatter(std::make_shared<HelpFormatter>());
-  program_.set_help_flag("-h,--help", "this text, or with a command, that of the command");
-  program_.set_version_flag("--version", "cairn " CAIRN_VERSION, "the version");
-  program_.fallthrough();  // common options may stand before or after the command
-  program_.require_subcommand(0, 1);
-  add_common_options(program_, session.common);
-  program_.footer(
+      program_(std::make_unique<CLI::App>(
+          "cairn: optimises factor graphs (graph SLAM); everything in it is chosen by name",
+          "cairn")),
+      help_(*program_) {
+  program_->formatter(std::make_shared<HelpFormatter>());
+  program_->set_help_flag("-h,--help", "this text, or with a command, that of the command");
+  program_->set_version_flag("--version", "cairn " CAIRN_VERSION, "the version");
+  program_->fallthrough();  // common options may stand before or after the command
+  program_->require_subcommand(0, 1);
+  add_common_options(*program_, session.common);
+  program_->footer(
       "Example:\n"
       "  cairn generate sphere -o sphere.g2o && cairn optimize sphere.g2o -o best.g2o\n"
       "  cairn bench sphere.g2o --linear-solver block_cholesky,cholmod,eigen");
-  commands_ = {add_info(program_),     add_optimize(program_), add_bench(program_),
-               add_replay(program_),   add_online(program_),   add_marginals(program_),
-               add_compact(program_),  add_sparsify(program_), add_evaluate(program_),
-               add_view(program_),     add_plot(program_),     add_convert(program_),
-               add_generate(program_), add_plugins(program_),  add_study(program_)};
-  help_ = program_.add_subcommand("help", "this text, or that of a command");
-  help_->add_option("command", command_to_explain_, "the command that is to be explained")
-      ->type_name("COMMAND");
-  help_->footer(
+  ArgumentParser program(*program_);
+  commands_ = {add_info(program),     add_optimize(program), add_bench(program),
+               add_replay(program),   add_online(program),   add_marginals(program),
+               add_compact(program),  add_sparsify(program), add_evaluate(program),
+               add_view(program),     add_plot(program),     add_convert(program),
+               add_generate(program), add_plugins(program),  add_study(program)};
+  help_ = program.add_command("help", "this text, or that of a command");
+  help_.add_option("command", command_to_explain_, "the command that is to be explained")
+      .type_name("COMMAND");
+  help_.footer(
       "Example:\n"
       "  cairn help bench");
 }
 
+CommandLine::~CommandLine() = default;
+
 std::string CommandLine::help_text() const {
   if (command_to_explain_.empty())  // App::help would be that of the command `help`
-    return program_.get_formatter()->make_help(&program_, "", CLI::AppFormatMode::Normal);
-  for (const CLI::App* command : program_.get_subcommands([](const CLI::App*) { return true; })) {
+    return program_->get_formatter()->make_help(program_.get(), "", CLI::AppFormatMode::Normal);
+  for (const CLI::App* command : program_->get_subcommands([](const CLI::App*) { return true; })) {
     if (command->get_name() == command_to_explain_) return command->help();
   }
-  throw unknown_command(command_to_explain_, program_);
+  throw unknown_command(command_to_explain_, *program_);
 }
 
 std::function<int()> CommandLine::parse(int argc, const char* const* argv) {
   const auto chosen = [&]() -> const CLI::App* {
-    const CLI::App* app = &program_;  // a study is a command of a command
+    const CLI::App* app = program_.get();  // a study is a command of a command
     for (auto used = app->get_subcommands(); !used.empty(); used = app->get_subcommands())
       app = used.front();
-    return app == &program_ ? nullptr : app;
+    return app == program_.get() ? nullptr : app;
   };
   try {
-    program_.parse(argc, argv);
+    program_->parse(argc, argv);
   } catch (const CLI::CallForHelp&) {
-    const CLI::App& app = chosen() ? *chosen() : program_;
+    const CLI::App& app = chosen() ? *chosen() : *program_;
     return [text = app.help()] { return write_stdout(text), 0; };
   } catch (const CLI::CallForVersion&) {
     return [] { return write_stdout("cairn " CAIRN_VERSION "\n"), 0; };
   } catch (const CLI::ConfigError& error) {
-    throw unknown_key(error.what(), program_);
+    throw unknown_key(error.what(), *program_);
   } catch (const CLI::FileError& error) {
     throw Error(ErrorCode::input, fmt::format("--config: {}", error.what()));
   } catch (const CLI::ParseError& error) {
     // A misspelt option leaves its value behind, which then stands where another argument belongs:
     // so unknown words are what went wrong first, whatever the parser complains of.
-    const std::vector<std::string> left = program_.remaining(true);
-    if (!left.empty()) throw unknown_word(left, program_, chosen());
+    const std::vector<std::string> left = program_->remaining(true);
+    if (!left.empty()) throw unknown_word(left, *program_, chosen());
     const auto* required = dynamic_cast<const CLI::RequiredError*>(&error);
     if (required && chosen()) throw missing(*required, *chosen());
-    throw bad_value(error, program_, chosen());
+    throw bad_value(error, *program_, chosen());
   }
-  if (help_->parsed()) return [text = help_text()] { return write_stdout(text), 0; };
+  if (help_.parsed()) return [text = help_text()] { return write_stdout(text), 0; };
   for (const Command& command : commands_) {
-    if (command.app->parsed()) return [&] { return command.run(session_); };
+    if (command.parser.parsed()) return [&] { return command.run(session_); };
   }
-  return [&] { return print_usage_of_nothing(program_); };
+  return [&] { return print_usage_of_nothing(*program_); };
 }
 
 }  // namespace cairn::app

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "arguments.hpp"
 #include "commands.hpp"
 
 namespace cairn::app {
@@ -14,6 +15,7 @@ namespace cairn::app {
 class CommandLine {
  public:
   explicit CommandLine(Session& session);
+  ~CommandLine();
 
   /// Parses, and returns what to run. Help and version are a run too. Throws `Error` (usage) for
   /// what cannot be understood, with the nearest spelling.
@@ -24,9 +26,9 @@ class CommandLine {
   std::string help_text() const;
 
   Session& session_;
-  CLI::App program_;
+  std::unique_ptr<CLI::App> program_;
   std::vector<Command> commands_;
-  CLI::App* help_ = nullptr;  // owned by the program
+  ArgumentParser help_;  // of the command `help`
   std::string command_to_explain_;
 };
 

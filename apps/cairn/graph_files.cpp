@@ -14,6 +14,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "arguments.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/plugin_call.hpp"
@@ -100,13 +101,13 @@ void check_ending(const std::string& file, Registry& registry) {
 
 }  // namespace
 
-void add_input_options(CLI::App& command, InputOptions& options) {
-  command.add_option("--from", options.format, "format of the input, instead of by content")
-      ->type_name("FORMAT");
-  command.add_flag("--skip-unknown", options.read.skip_unknown,
-                   "skip and count lines with unknown tags, instead of refusing the file");
-  command.add_flag("--repair-information", options.read.repair_information,
-                   "repair known mistakes in information matrices");
+void add_input_options(ArgumentParser cli, InputOptions& options) {
+  cli.add_option("--from", options.format, "format of the input, instead of by content")
+      .type_name("FORMAT");
+  cli.add_flag("--skip-unknown", options.read.skip_unknown,
+               "skip and count lines with unknown tags, instead of refusing the file");
+  cli.add_flag("--repair-information", options.read.repair_information,
+               "repair known mistakes in information matrices");
 }
 
 std::string output_format(const std::string& file, const std::string& named) {

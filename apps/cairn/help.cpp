@@ -1,11 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "help.hpp"
 
-#include <algorithm>
-#include <utility>
-
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include "table.hpp"
 
@@ -66,14 +62,6 @@ std::string common_options(const CLI::App& program) {
 std::string command_name(const CLI::App& command) {
   const CLI::App* parent = command.get_parent();
   return parent ? command_name(*parent) + " " + command.get_name() : "cairn";
-}
-
-CLI::Validator one_of(std::vector<std::string> choices) {
-  const auto check = [choices = std::move(choices)](const std::string& text) {
-    const bool good = std::ranges::find(choices, text) != choices.end();
-    return good ? std::string() : fmt::format("'{}' is none of {}", text, fmt::join(choices, ", "));
-  };
-  return {check, ""};
 }
 
 std::string usage_line(const CLI::App& command) {

@@ -2,28 +2,11 @@
 #pragma once
 
 #include <string>
-#include <type_traits>
-#include <vector>
 
-#include <fmt/format.h>
 #include <CLI/App.hpp>
 #include <CLI/Formatter.hpp>
 
 namespace cairn::app {
-
-/// Validators that do not write themselves into the help, whose first column must stay narrow. They
-/// say what is expected: "'many' is no whole number from 0 to 1024".
-template <class Number>
-CLI::Validator within(Number low, Number high) {
-  const auto check = [low, high](const std::string& text) {
-    Number value{};
-    const bool good = CLI::detail::lexical_cast(text, value) && value >= low && value <= high;
-    const char* kind = std::is_integral_v<Number> ? "whole number" : "number";
-    return good ? std::string() : fmt::format("'{}' is no {} from {} to {}", text, kind, low, high);
-  };
-  return {check, ""};
-}
-CLI::Validator one_of(std::vector<std::string> choices);
 
 /// "cairn study compact": a command with those it belongs to.
 std::string command_name(const CLI::App& command);

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "arguments.hpp"
 #include "cairn/evaluation/graph_survey.hpp"
 #include "commands.hpp"
 #include "graph_files.hpp"
@@ -162,15 +163,16 @@ int run(const InfoOptions& options, Session& session) {
 
 }  // namespace
 
-Command add_info(CLI::App& program) {
+Command add_info(ArgumentParser program) {
   auto options = std::make_shared<InfoOptions>();  // lives as long as the parser and the run
-  CLI::App* app = program.add_subcommand("info", "what a graph consists of, and what looks wrong");
-  app->add_option("graph", options->graph, kGraphHelp)->type_name("GRAPH")->required();
-  add_input_options(*app, options->input);
-  app->footer(
+  ArgumentParser cli =
+      program.add_command("info", "what a graph consists of, and what looks wrong");
+  cli.add_option("graph", options->graph, kGraphHelp).type_name("GRAPH").required();
+  add_input_options(cli, options->input);
+  cli.footer(
       "Example:\n"
       "  cairn info sphere2500.g2o --types slam3d:metric=g2o");
-  return {app, [options](Session& session) { return run(*options, session); }};
+  return {cli, [options](Session& session) { return run(*options, session); }};
 }
 
 }  // namespace cairn::app

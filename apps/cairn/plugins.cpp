@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "arguments.hpp"
 #include "cairn/io/format.hpp"
 #include "cairn/io/generator.hpp"
 #include "cairn/linear/iterative_solver.hpp"
@@ -284,17 +285,17 @@ int show(const std::string& name, Session& session) {
 
 }  // namespace
 
-Command add_plugins(CLI::App& program) {
+Command add_plugins(ArgumentParser program) {
   auto name = std::make_shared<std::string>();  // lives as long as the parser and the run
-  CLI::App* app = program.add_subcommand("plugins", "what is on offer, or one name's options");
-  app->add_option("name", *name, "a solver, type, format …: its options, abilities and limits")
-      ->type_name("NAME");
-  app->footer(
+  ArgumentParser cli = program.add_command("plugins", "what is on offer, or one name's options");
+  cli.add_option("name", *name, "a solver, type, format …: its options, abilities and limits")
+      .type_name("NAME");
+  cli.footer(
       "Plugins are found by --plugin, CAIRN_PLUGIN_PATH, and in the folder cairn beside the core "
       "library.\n\n"
       "Example:\n"
       "  cairn plugins cholmod");
-  return {app, [name](Session& session) {
+  return {cli, [name](Session& session) {
             return name->empty() ? list(session) : show(*name, session);
           }};
 }

@@ -7,6 +7,7 @@
 #include <fmt/ranges.h>
 
 #include "album.hpp"
+#include "arguments.hpp"
 #include "cairn/io/format.hpp"
 #include "cairn/runtime/error.hpp"
 #include "commands.hpp"
@@ -86,13 +87,13 @@ int run(const ViewOptions& options, Session& session) {
 
 }  // namespace
 
-Command add_view(CLI::App& program) {
+Command add_view(ArgumentParser program) {
   auto options = std::make_shared<ViewOptions>();  // lives as long as the parser and the run
-  CLI::App* app = program.add_subcommand("view", "an HTML report with interactive graphs");
-  add_album_options(*app, options->album);
-  app->add_option("-o,--output", options->output, "the page [name of the first FILE, .html]")
-      ->type_name("PAGE");
-  app->footer(
+  ArgumentParser cli = program.add_command("view", "an HTML report with interactive graphs");
+  add_album_options(cli, options->album);
+  cli.add_option("-o,--output", options->output, "the page [name of the first FILE, .html]")
+      .type_name("PAGE");
+  cli.footer(
       "Graphs with the same ids are laid over each other: the lowest chi2 is the estimate, the "
       "first\n"
       "FILE else the initial guess. Files without factors are ground truth, by id. The page needs "
@@ -101,7 +102,7 @@ Command add_view(CLI::App& program) {
       "Example:\n"
       "  cairn optimize city.g2o -o best.g2o --json run.json --record run.jsonl\n"
       "  cairn view city.g2o best.g2o run.json run.jsonl -o city.html");
-  return {app, [options](Session& session) { return run(*options, session); }};
+  return {cli, [options](Session& session) { return run(*options, session); }};
 }
 
 }  // namespace cairn::app
