@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "album.hpp"
 
+#include <array>
 #include <ctime>
 #include <filesystem>
 #include <memory>
@@ -9,8 +10,7 @@
 #include <system_error>
 #include <utility>
 
-#include <fmt/chrono.h>
-#include <fmt/format.h>
+#include <fmt/core.h>
 #include <boost/json/serialize.hpp>
 
 #include "arguments.hpp"
@@ -56,6 +56,15 @@ void add_file(const std::string& file, const std::string& name, const AlbumOptio
   }
 }
 
+/// "2026-11-01T12:00:00Z"
+std::string utc_now() {
+  const std::time_t now = std::time(nullptr);
+  std::tm utc{};
+  ::gmtime_r(&now, &utc);
+  std::array<char, 32> text{};
+  return {text.data(), std::strftime(text.data(), text.size(), "%Y-%m-%dT%H:%M:%SZ", &utc)};
+}
+
 std::string title_of(const AlbumOptions& options) {
   if (!options.title.empty()) return options.title;
   const std::string first = short_name(options.files.front());
@@ -84,7 +93,7 @@ Album begin_album(const std::string& title, const std::string& command) {
   Album album;
   album.title = title;
   album.command = command;
-  album.created = fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)));
+  album.created = utc_now();
   json::object context;
   end_report(context);
   album.machine = json::serialize(context.at("machine"));

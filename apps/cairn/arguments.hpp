@@ -2,12 +2,12 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
-// CLI11 is all headers, and takes seconds to compile: only arguments.cpp, command_line.cpp and
-// help.cpp include it.
+// CLI11 is all headers and takes seconds to compile: only arguments.cpp includes it.
 namespace CLI {
 class App;
 class Option;
@@ -15,8 +15,8 @@ class Option;
 
 namespace cairn::app {
 
-/// An argument or option of a command, to be described further: each function returns it again. A
-/// handle, valid as long as the program's parser.
+/// An argument or option of a command. What describes it further returns it again. A handle, valid
+/// as long as the program's parser.
 class Argument {
  public:
   explicit Argument(CLI::Option& option) : option_(&option) {}
@@ -45,6 +45,17 @@ class Argument {
   /// A finite number of seconds.
   Argument& seconds_from(double least);
 
+  // For the help and for errors.
+  std::string name() const;                      ///< "--output", or "graph" of a positional one
+  std::vector<std::string> short_names() const;  ///< "o"
+  std::vector<std::string> long_names() const;   ///< "output"
+  std::string type_name() const;
+  std::string description() const;
+  std::string default_text() const;  ///< empty: none is shown
+  bool is_positional() const;        ///< told from others by where it stands
+  bool is_required() const;
+  int most_values() const;  ///< 0 of a flag
+
  private:
   CLI::Option* option_;
 };
@@ -57,8 +68,8 @@ class ArgumentParser {
 
   ArgumentParser add_command(const std::string& name, const std::string& description);
 
-  /// Adds an option ("-o,--output"), or an argument ("graph"), which is told from others by where
-  /// it stands. Parsing writes to `value`, which must live as long; without the option it stays.
+  /// Adds an option ("-o,--output"), or a positional argument ("graph"). Parsing writes to `value`,
+  /// which must live as long; where it is not given the value stays.
   Argument add_option(const std::string& names, std::string& value, const std::string& help);
   Argument add_option(const std::string& names, std::vector<std::string>& value,
                       const std::string& help);
@@ -80,8 +91,57 @@ class ArgumentParser {
   /// Whether the command was on the command line.
   bool parsed() const;
 
+  // For the help and for errors.
+  std::string name() const;
+  std::string description() const;
+  std::string footer() const;
+  std::optional<ArgumentParser> parent() const;  ///< nothing of the program itself
+  std::vector<ArgumentParser> commands() const;  ///< in the order in which they were added
+  std::vector<Argument> arguments() const;       ///< in the order in which they were added
+  /// Of these, all but those that ask for the help or the version.
+  std::vector<Argument> arguments_but_help() const;
+
  private:
   CLI::App* app_;
+};
+
+/// How a command line was understood, or what kept it from being so.
+struct ParseOutcome {
+  enum class Kind {
+    command,        ///< to be run
+    help,           ///< asked for
+    version,        ///< asked for
+    config_key,     ///< the configuration file says something that nobody takes
+    config_file,    ///< it cannot be read
+    unknown_words,  ///< words of the command line that nobody takes
+    missing,        ///< an argument or option of a command that must be given
+    without_value,  ///< an option that needs a value stands without one
+    bad_value       ///< a value of the wrong type, or refused
+  };
+  Kind kind = Kind::command;
+  std::string message;             ///< CLI11's
+  std::vector<std::string> words;  ///< the unknown ones
+};
+
+/// The parser of the whole command line. Common options may stand before or after the command.
+class ProgramParser {
+ public:
+  ProgramParser(const std::string& name, const std::string& description);
+  ~ProgramParser();
+
+  ArgumentParser root() const { return ArgumentParser(*app_); }
+  /// The flags that ask for the help (also of each command that is added later) and the version.
+  void add_help(const std::string& names, const std::string& help);
+  void add_version(const std::string& names, const std::string& text, const std::string& help);
+  /// The option that names a file of options, in TOML.
+  Argument add_config(const std::string& names, const std::string& help);
+
+  ParseOutcome parse(int argc, const char* const* argv);
+  /// The innermost command that the command line names, if any.
+  std::optional<ArgumentParser> chosen() const;
+
+ private:
+  std::unique_ptr<CLI::App> app_;
 };
 
 }  // namespace cairn::app

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <memory>
 
-#include <fmt/format.h>
-#include <fmt/ranges.h>
+#include <fmt/core.h>
+#include <boost/json/object.hpp>
 
 #include "album.hpp"
 #include "arguments.hpp"
@@ -100,7 +100,7 @@ int run(const BenchOptions& options, Session& session) {
   if (!options.html.empty()) session.print(fmt::format("\npage: {}\n", options.html));
   if (const auto slow = session.registry().unoptimized(); !slow.empty()) {
     session.note(
-        fmt::format("unoptimised build, times mean little: plugin {}", fmt::join(slow, ", ")));
+        fmt::format("unoptimised build, times mean little: plugin {}", joined(slow, ", ")));
   }
   return exit_code(bench);
 }

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <functional>
-#include <memory>
 #include <string>
 #include <vector>
 
@@ -15,7 +14,6 @@ namespace cairn::app {
 class CommandLine {
  public:
   explicit CommandLine(Session& session);
-  ~CommandLine();
 
   /// Parses, and returns what to run. Help and version are a run too. Throws `Error` (usage) for
   /// what cannot be understood, with the nearest spelling.
@@ -23,10 +21,10 @@ class CommandLine {
 
  private:
   /// What `cairn help` and `cairn help COMMAND` print.
-  std::string help_text() const;
+  std::string explanation() const;
 
   Session& session_;
-  std::unique_ptr<CLI::App> program_;
+  ProgramParser program_;
   std::vector<Command> commands_;
   ArgumentParser help_;  // of the command `help`
   std::string command_to_explain_;

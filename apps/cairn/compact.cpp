@@ -6,7 +6,8 @@
 #include <memory>
 #include <utility>
 
-#include <fmt/format.h>
+#include <fmt/core.h>
+#include <boost/json/object.hpp>
 
 #include "arguments.hpp"
 #include "cairn/policy/policy_run.hpp"

@@ -2,7 +2,7 @@
 // cairn convert IN OUT: reads one format and writes another.
 #include <memory>
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include "arguments.hpp"
 #include "commands.hpp"

@@ -11,8 +11,7 @@
 #include <filesystem>
 #include <optional>
 
-#include <fmt/format.h>
-#include <fmt/ranges.h>
+#include <fmt/core.h>
 
 #include "arguments.hpp"
 #include "cairn/plugin/registry.hpp"
@@ -96,7 +95,7 @@ void check_ending(const std::string& file, Registry& registry) {
       ErrorCode::usage,
       fmt::format("{}: no format writes files of that name; endings on offer: .{}; or name a "
                   "format with --to",
-                  file, fmt::join(writable, ", .")));
+                  file, joined(writable, ", .")));
 }
 
 }  // namespace

@@ -3,23 +3,18 @@
 
 #include <string>
 
-#include <CLI/App.hpp>
-#include <CLI/Formatter.hpp>
+#include "arguments.hpp"
 
 namespace cairn::app {
 
 /// "cairn study compact": a command with those it belongs to.
-std::string command_name(const CLI::App& command);
+std::string command_name(const ArgumentParser& command);
 
 /// "cairn generate [OPTIONS] KIND -o OUT": the arguments and options that a command must be given.
-std::string usage_line(const CLI::App& command);
+std::string usage_line(const ArgumentParser& command);
 
 /// Help that fits a screen: at most 40 lines of 100 columns. One line per option, with its default
 /// in brackets; a command's help also names the options that every command takes.
-class HelpFormatter : public CLI::FormatterBase {
- public:
-  std::string make_help(const CLI::App* app, std::string name,
-                        CLI::AppFormatMode mode) const override;
-};
+std::string help_text(const ArgumentParser& command);
 
 }  // namespace cairn::app

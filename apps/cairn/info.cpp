@@ -2,8 +2,7 @@
 // cairn info GRAPH: what a graph consists of, and what looks wrong.
 #include <memory>
 
-#include <fmt/format.h>
-#include <fmt/ranges.h>
+#include <fmt/core.h>
 
 #include "arguments.hpp"
 #include "cairn/evaluation/graph_survey.hpp"
@@ -71,7 +70,7 @@ std::string list_text(const std::string& title, const std::vector<std::string>& 
   if (lines.empty()) return "";
   std::string text = bold(title, colour) + "\n";
   for (const std::string& line : lines) {
-    text += fmt::format("  {}\n", fmt::join(folded(line, output_width() - 4), "\n    "));
+    text += fmt::format("  {}\n", joined(folded(line, output_width() - 4), "\n    "));
   }
   return text;
 }

@@ -3,8 +3,7 @@
 #include <memory>
 #include <optional>
 
-#include <fmt/format.h>
-#include <fmt/ranges.h>
+#include <fmt/core.h>
 
 #include "arguments.hpp"
 #include "cairn/io/format.hpp"
@@ -48,7 +47,7 @@ struct OnlineOptions {
 
 /// What must be the same for a journal to give the same estimate again.
 std::string identity(const OnlineOptions& options, const std::string& who, const Session& session) {
-  const std::string types = fmt::format("{}", fmt::join(session.common.types, " "));
+  const std::string types = joined(session.common.types, " ");
   return fmt::format("{}, types {}, format {}{}, loss {} on {}, solve {}", who,
                      types.empty() ? "as they are" : types, options.input.format,
                      options.input.read.repair_information ? " with repairs" : "",

@@ -6,8 +6,7 @@
 #include <string>
 #include <system_error>
 
-#include <fmt/format.h>
-#include <fmt/ranges.h>
+#include <fmt/core.h>
 
 #include "album.hpp"
 #include "arguments.hpp"
@@ -86,7 +85,7 @@ int run(const PlotOptions& options, Session& session) {
   session.registry().make<Picture>(picture);  // a wrong name is told before files are read
   session.use_threads();
   const Album album = load_album(
-      options.album, fmt::format("cairn plot {}", fmt::join(options.album.files, " ")), session);
+      options.album, fmt::format("cairn plot {}", joined(options.album.files, " ")), session);
   const std::size_t bytes = write_picture(album, picture, output, session);
   boost::json::object report = begin_report("plot");
   report["picture"] = output;

@@ -5,9 +5,12 @@
 #include <cmath>
 #include <filesystem>
 #include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
 
-#include <fmt/format.h>
-#include <fmt/ranges.h>
+#include <fmt/core.h>
 
 #include "arguments.hpp"
 #include "cairn/io/format.hpp"
@@ -120,7 +123,7 @@ std::string type_text(const OptionSpec& spec) {
 }
 
 std::string range_text(const OptionSpec& spec) {
-  if (spec.type == OptionType::choice) return fmt::format("{}", fmt::join(spec.choices, " | "));
+  if (spec.type == OptionType::choice) return joined(spec.choices, " | ");
   const bool low = std::isfinite(spec.minimum), high = std::isfinite(spec.maximum);
   if (low && high) return fmt::format("{:g} … {:g}", spec.minimum, spec.maximum);
   if (low) return fmt::format("from {:g}", spec.minimum);
@@ -186,7 +189,9 @@ std::vector<std::string> variable_abilities(const VariableType& type) {
 }
 
 std::vector<std::string> factor_abilities(const FactorType& type) {
-  std::vector<std::string> all{fmt::format("on {}", fmt::join(type.variable_tags(), " ")),
+  const std::span<const std::string_view> tags = type.variable_tags();
+  const std::vector<std::string> variables(tags.begin(), tags.end());
+  std::vector<std::string> all{fmt::format("on {}", joined(variables, " ")),
                                fmt::format("measurement of {} numbers", type.measurement_size()),
                                fmt::format("{} residuals", type.residual_size())};
   if (type.is_relative()) all.push_back("relative pose");
@@ -220,12 +225,12 @@ std::string details_text(const Offer& offer, bool optimized, const OptionTable& 
                          const std::vector<std::string>& abilities, bool colour) {
   const std::string title = fmt::format("{} ({}): {}", bold(offer.name, colour),
                                         kind_in_words(offer.kind), offer.summary);
-  std::string text = fmt::format("{}\n", fmt::join(folded(title, output_width() - 2), "\n  "));
+  std::string text = joined(folded(title, output_width() - 2), "\n  ") + "\n";
   Table facts({{"", Table::Align::left}, {"", Table::Align::left}}, "  ");
   facts.add({"plugin", fmt::format("{} {}, {}", offer.plugin, offer.version, offer.file.string())});
   facts.add({"licence", offer.licence});
   if (!optimized) facts.add({"build", "unoptimised"});
-  if (!abilities.empty()) facts.add({"abilities", fmt::format("{}", fmt::join(abilities, ", "))});
+  if (!abilities.empty()) facts.add({"abilities", joined(abilities, ", ")});
   if (options.specs().empty()) facts.add({"options", "none"});
   text += facts.text(false);
   if (options.specs().empty()) return text;

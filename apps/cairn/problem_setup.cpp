@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "problem_setup.hpp"
 
-#include <fmt/format.h>
-#include <fmt/ranges.h>
+#include <fmt/core.h>
 
 #include "arguments.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/plugin_call.hpp"
+#include "table.hpp"
 
 namespace cairn::app {
 
@@ -105,14 +105,14 @@ Error linear_solver_refused(Registry& registry, const ComponentSpec& optimizer) 
                     "see cairn plugins {0} for its own options",
                     optimizer.name)};
   }
-  return {ErrorCode::usage,
-          fmt::format(
-              "optimizer '{0}' brings linear solvers of its own; instead of --linear-solver use "
-              "--optimizer {0}:{1}=NAME{2}",
-              optimizer.name, own->name,
-              own->choices.empty()
-                  ? std::string()
-                  : fmt::format(" with NAME one of {}", fmt::join(own->choices, ", ")))};
+  return {
+      ErrorCode::usage,
+      fmt::format(
+          "optimizer '{0}' brings linear solvers of its own; instead of --linear-solver use "
+          "--optimizer {0}:{1}=NAME{2}",
+          optimizer.name, own->name,
+          own->choices.empty() ? std::string()
+                               : fmt::format(" with NAME one of {}", joined(own->choices, ", ")))};
 }
 
 }  // namespace cairn::app

@@ -5,7 +5,8 @@
 #include <cmath>
 #include <memory>
 
-#include <fmt/format.h>
+#include <fmt/core.h>
+#include <boost/json/object.hpp>
 
 #include "arguments.hpp"
 #include "cairn/evaluation/batch_comparison.hpp"

@@ -3,8 +3,7 @@
 #include <filesystem>
 #include <memory>
 
-#include <fmt/format.h>
-#include <fmt/ranges.h>
+#include <fmt/core.h>
 
 #include "album.hpp"
 #include "arguments.hpp"
@@ -77,7 +76,7 @@ int run(const ViewOptions& options, Session& session) {
   check_folder(page);
   session.use_threads();
   const Album album = load_album(
-      options.album, fmt::format("cairn view {}", fmt::join(options.album.files, " ")), session);
+      options.album, fmt::format("cairn view {}", joined(options.album.files, " ")), session);
   const std::size_t bytes = write_picture(album, {"html", {}}, page, session);
   session.write_json(report_json(album, page, bytes));
   session.print(fmt::format("{}: {}; open it in any browser\n", page,
