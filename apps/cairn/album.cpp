@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "album.hpp"
 
+#include <array>
 #include <ctime>
 #include <filesystem>
 #include <memory>
@@ -9,10 +10,10 @@
 #include <system_error>
 #include <utility>
 
-#include <fmt/chrono.h>
-#include <fmt/format.h>
+#include <fmt/core.h>
 #include <boost/json/serialize.hpp>
 
+#include "arguments.hpp"
 #include "cairn/report/recording.hpp"
 #include "cairn/report/run_report.hpp"
 #include "cairn/runtime/error.hpp"
@@ -55,6 +56,15 @@ void add_file(const std::string& file, const std::string& name, const AlbumOptio
   }
 }
 
+/// "2026-11-01T12:00:00Z"
+std::string utc_now() {
+  const std::time_t now = std::time(nullptr);
+  std::tm utc{};
+  ::gmtime_r(&now, &utc);
+  std::array<char, 32> text{};
+  return {text.data(), std::strftime(text.data(), text.size(), "%Y-%m-%dT%H:%M:%SZ", &utc)};
+}
+
 std::string title_of(const AlbumOptions& options) {
   if (!options.title.empty()) return options.title;
   const std::string first = short_name(options.files.front());
@@ -64,30 +74,26 @@ std::string title_of(const AlbumOptions& options) {
 
 }  // namespace
 
-void add_album_options(CLI::App& command, AlbumOptions& options) {
-  command
-      .add_option("files", options.files,
-                  "graphs (.gz too, @KIND to generate), trajectories, recordings, JSON of runs")
-      ->type_name("FILE")
-      ->required();
-  command
-      .add_option("--name", options.names, "what to call the first FILE, the second … [its name]")
-      ->type_name("TEXT")
-      ->allow_extra_args(false);
-  command.add_option("--truth", options.truth, "the ground truth, laid over by id")
-      ->type_name("FILE");
-  command
-      .add_option("--initial", options.initial, "show this guess too: a name of kind initial_guess")
-      ->type_name("NAME");
-  command.add_option("--title", options.title, "title [name of the first FILE]")->type_name("TEXT");
-  add_input_options(command, options.input);
+void add_album_options(ArgumentParser cli, AlbumOptions& options) {
+  cli.add_option("files", options.files,
+                 "graphs (.gz too, @KIND to generate), trajectories, recordings, JSON of runs")
+      .type_name("FILE")
+      .required();
+  cli.add_option("--name", options.names, "what to call the first FILE, the second … [its name]")
+      .type_name("TEXT")
+      .repeatable();
+  cli.add_option("--truth", options.truth, "the ground truth, laid over by id").type_name("FILE");
+  cli.add_option("--initial", options.initial, "show this guess too: a name of kind initial_guess")
+      .type_name("NAME");
+  cli.add_option("--title", options.title, "title [name of the first FILE]").type_name("TEXT");
+  add_input_options(cli, options.input);
 }
 
 Album begin_album(const std::string& title, const std::string& command) {
   Album album;
   album.title = title;
   album.command = command;
-  album.created = fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)));
+  album.created = utc_now();
   json::object context;
   end_report(context);
   album.machine = json::serialize(context.at("machine"));

@@ -4,8 +4,7 @@
 #include <string>
 #include <vector>
 
-#include <CLI/App.hpp>
-
+#include "arguments.hpp"
 #include "cairn/report/album_builder.hpp"
 #include "cairn/report/scene.hpp"
 #include "graph_files.hpp"
@@ -22,7 +21,7 @@ struct AlbumOptions {
   std::string title;
   InputOptions input;
 };
-void add_album_options(CLI::App& command, AlbumOptions& options);
+void add_album_options(ArgumentParser cli, AlbumOptions& options);
 
 /// Reads the files (graphs, trajectories, recordings, the JSON of runs) and lays together what
 /// belongs together, as `AlbumBuilder` does. Throws `Error` for files that cannot be read.

@@ -3,16 +3,16 @@
 #include <algorithm>
 #include <memory>
 
-#include <fmt/format.h>
-#include <fmt/ranges.h>
+#include <fmt/core.h>
+#include <boost/json/object.hpp>
 
 #include "album.hpp"
+#include "arguments.hpp"
 #include "bench_report.hpp"
 #include "bench_run.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/threads.hpp"
 #include "commands.hpp"
-#include "help.hpp"
 #include "interrupt.hpp"
 #include "json_text.hpp"
 #include "picture_files.hpp"
@@ -100,44 +100,44 @@ int run(const BenchOptions& options, Session& session) {
   if (!options.html.empty()) session.print(fmt::format("\npage: {}\n", options.html));
   if (const auto slow = session.registry().unoptimized(); !slow.empty()) {
     session.note(
-        fmt::format("unoptimised build, times mean little: plugin {}", fmt::join(slow, ", ")));
+        fmt::format("unoptimised build, times mean little: plugin {}", joined(slow, ", ")));
   }
   return exit_code(bench);
 }
 
 }  // namespace
 
-Command add_bench(CLI::App& program) {
+Command add_bench(ArgumentParser program) {
   auto options = std::make_shared<BenchOptions>();  // lives as long as the parser and the run
-  CLI::App* app =
-      program.add_subcommand("bench", "solvers side by side: medians, ratios, agreement");
-  app->add_option("graphs", options->graphs, kGraphHelp)->type_name("GRAPH")->required();
-  app->add_option("--name", options->names, "what to call the first GRAPH, the second … [its name]")
-      ->type_name("TEXT")
-      ->allow_extra_args(false);
-  app->add_option("--optimizer", options->optimizers,
-                  "optimizers A,B,… with options as NAME:key=value")
-      ->type_name("NAMES")
-      ->allow_extra_args(false)
-      ->default_str(kDefaultOptimizer);
-  app->add_option("--linear-solver", options->linear_solvers,
-                  "linear solvers A,B,… for each of them")
-      ->type_name("NAMES")
-      ->allow_extra_args(false)
-      ->default_str("all direct ones on offer");
-  add_problem_options(*app, options->problem);
-  add_time_limit(*app, options->problem.stop);
-  app->add_option("--repeat", options->repeat, "rounds; in each, every solver runs once")
-      ->type_name("N")
-      ->check(within(1, 1000000))
-      ->capture_default_str();
-  app->add_flag("--no-memory", options->no_memory, "leave out the extra run for the peak memory");
-  app->add_option("--csv", options->csv, "one line per run (- is standard output)")
-      ->type_name("FILE");
-  app->add_option("--html", options->html, "all of it as an HTML report with the graphs")
-      ->type_name("FILE");
-  add_input_options(*app, options->input);
-  app->footer(
+  ArgumentParser cli =
+      program.add_command("bench", "solvers side by side: medians, ratios, agreement");
+  cli.add_option("graphs", options->graphs, kGraphHelp).type_name("GRAPH").required();
+  cli.add_option("--name", options->names, "what to call the first GRAPH, the second … [its name]")
+      .type_name("TEXT")
+      .repeatable();
+  cli.add_option("--optimizer", options->optimizers,
+                 "optimizers A,B,… with options as NAME:key=value")
+      .type_name("NAMES")
+      .repeatable()
+      .show_default(kDefaultOptimizer);
+  cli.add_option("--linear-solver", options->linear_solvers,
+                 "linear solvers A,B,… for each of them")
+      .type_name("NAMES")
+      .repeatable()
+      .show_default("all direct ones on offer");
+  add_problem_options(cli, options->problem);
+  add_time_limit(cli, options->problem.stop);
+  cli.add_option("--repeat", options->repeat, "rounds; in each, every solver runs once")
+      .type_name("N")
+      .within(1, 1000000)
+      .show_default();
+  cli.add_flag("--no-memory", options->no_memory, "leave out the extra run for the peak memory");
+  cli.add_option("--csv", options->csv, "one line per run (- is standard output)")
+      .type_name("FILE");
+  cli.add_option("--html", options->html, "all of it as an HTML report with the graphs")
+      .type_name("FILE");
+  add_input_options(cli, options->input);
+  cli.footer(
       "Every run starts from the same initial estimate and ends as optimize does; for N equal "
       "steps, "
       "add\n"
@@ -149,7 +149,7 @@ Command add_bench(CLI::App& program) {
       "Example:\n"
       "  cairn bench sphere.g2o @manhattan:poses=3500 --optimizer levenberg_marquardt,ceres --csv "
       "runs.csv");
-  return {app, [options](Session& session) { return run(*options, session); }};
+  return {cli, [options](Session& session) { return run(*options, session); }};
 }
 
 }  // namespace cairn::app

@@ -4,8 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include <fmt/format.h>
-#include <fmt/ranges.h>
+#include <fmt/core.h>
 
 #include "cairn/runtime/threads.hpp"
 #include "json_report.hpp"
@@ -150,7 +149,7 @@ std::string csv_field(const std::string& text) {
 }
 
 std::string csv_line(const std::vector<std::string>& fields) {
-  return fmt::format("{}\r\n", fmt::join(fields, ","));
+  return fmt::format("{}\r\n", joined(fields, ","));
 }
 
 std::vector<std::string> csv_fields(const GraphResult& graph, const ConfigurationResult& result,

@@ -5,8 +5,7 @@
 #include <limits>
 #include <utility>
 
-#include <fmt/format.h>
-#include <fmt/ranges.h>
+#include <fmt/core.h>
 #include <boost/json/parse.hpp>
 
 #include "cairn/linear/iterative_solver.hpp"
@@ -17,6 +16,7 @@
 #include "option_words.hpp"
 #include "peak_memory.hpp"
 #include "progress.hpp"
+#include "table.hpp"
 
 namespace cairn::app {
 namespace {
@@ -263,7 +263,7 @@ Comparison comparison(const BenchOptions& options, Session& session) {
   }
   if (!compared.left_out.empty()) {
     session.note(fmt::format("left out as iterative: {}; --linear-solver compares them too",
-                             fmt::join(compared.left_out, ", ")));
+                             joined(compared.left_out, ", ")));
   }
   return compared;
 }

@@ -3,10 +3,10 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <optional>
 #include <string>
 
-#include <fmt/format.h>
-#include <CLI/Config.hpp>  // the definitions that App.hpp only declares
+#include <fmt/core.h>
 
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/spelling.hpp"
@@ -18,26 +18,23 @@ namespace {
 
 constexpr int kMostThreads = 1024;
 
-void add_common_options(CLI::App& program, CommonOptions& common) {
-  program.add_option("--json", common.json, "write a report as JSON; - is standard output")
-      ->type_name("FILE");
-  program
-      .add_option("--threads", common.threads, "threads; 0 is all cores. Never changes a result")
-      ->type_name("N")
-      ->check(within(0, kMostThreads));
-  program.add_option("--plugin", common.plugins, "load this plugin too (may be given repeatedly)")
-      ->type_name("FILE")
-      ->allow_extra_args(false);
-  program
-      .add_option("--types", common.types,
-                  "options of types, such as slam3d:metric=g2o (repeatedly)")
-      ->type_name("NAME:K=V")
-      ->allow_extra_args(false);
-  program.add_flag("--quiet", common.quiet, "no progress and no notes, only results and errors");
-  program
-      .set_config("--config", "", "TOML: options above at the top, [optimize] for a command's own")
-      ->type_name("FILE");
-  program.allow_config_extras(CLI::config_extras_mode::error);
+void add_common_options(ProgramParser& program, CommonOptions& common) {
+  ArgumentParser cli = program.root();
+  cli.add_option("--json", common.json, "write a report as JSON; - is standard output")
+      .type_name("FILE");
+  cli.add_option("--threads", common.threads, "threads; 0 is all cores. Never changes a result")
+      .type_name("N")
+      .within(0, kMostThreads);
+  cli.add_option("--plugin", common.plugins, "load this plugin too (may be given repeatedly)")
+      .type_name("FILE")
+      .repeatable();
+  cli.add_option("--types", common.types,
+                 "options of types, such as slam3d:metric=g2o (repeatedly)")
+      .type_name("NAME:K=V")
+      .repeatable();
+  cli.add_flag("--quiet", common.quiet, "no progress and no notes, only results and errors");
+  program.add_config("--config", "TOML: options above at the top, [optimize] for a command's own")
+      .type_name("FILE");
 }
 
 /// "--iterations" of "--iterations=5".
@@ -45,14 +42,21 @@ std::string bare_option(const std::string& word) { return word.substr(0, word.fi
 
 bool looks_like_option(const std::string& word) { return word.size() > 1 && word.front() == '-'; }
 
-std::vector<std::string> option_names(const CLI::App& program, const CLI::App* command) {
+/// What may be given to the command, if there is one, and to every command.
+std::vector<Argument> options_of(const ArgumentParser& program,
+                                 const std::optional<ArgumentParser>& command) {
+  std::vector<Argument> all;
+  if (command) all = command->arguments();
+  const std::vector<Argument> common = program.arguments();
+  all.insert(all.end(), common.begin(), common.end());
+  return all;
+}
+
+std::vector<std::string> option_names(const std::vector<Argument>& options) {
   std::vector<std::string> names{"--help"};
-  for (const CLI::App* app : {command, &program}) {
-    if (!app) continue;
-    for (const CLI::Option* option : app->get_options()) {
-      for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
-      for (const std::string& name : option->get_snames()) names.push_back("-" + name);
-    }
+  for (const Argument& option : options) {
+    for (const std::string& name : option.long_names()) names.push_back("--" + name);
+    for (const std::string& name : option.short_names()) names.push_back("-" + name);
   }
   return names;
 }
@@ -63,21 +67,22 @@ std::string suggestion(const std::string& word, const std::vector<std::string>& 
   return nearest.empty() ? "" : fmt::format("; did you mean '{}'?", nearest);
 }
 
-Error unknown_command(const std::string& word, const CLI::App& program) {
+Error unknown_command(const std::string& word, const ArgumentParser& program) {
   std::vector<std::string> commands;
-  for (const CLI::App* known : program.get_subcommands({})) commands.push_back(known->get_name());
+  for (const ArgumentParser& known : program.commands()) commands.push_back(known.name());
   return {ErrorCode::usage,
           fmt::format("there is no command '{}'{}", word, what_is_on_offer(word, commands))};
 }
 
-Error unknown_word(const std::vector<std::string>& words, const CLI::App& program,
-                   const CLI::App* command) {
+Error unknown_word(const std::vector<std::string>& words, const ArgumentParser& program,
+                   const std::optional<ArgumentParser>& command) {
   const std::string name = command ? command_name(*command) : "cairn";
   const auto option = std::find_if(words.begin(), words.end(), looks_like_option);
   if (option != words.end() && (command || option == words.begin())) {
     const std::string word = bare_option(*option);
-    return {ErrorCode::usage, fmt::format("{} has no option '{}'{}; see {} --help", name, word,
-                                          suggestion(word, option_names(program, command)), name)};
+    return {ErrorCode::usage,
+            fmt::format("{} has no option '{}'{}; see {} --help", name, word,
+                        suggestion(word, option_names(options_of(program, command))), name)};
   }
   if (command) {
     return {ErrorCode::usage, fmt::format("{}: '{}' is one argument too many; see {} --help", name,
@@ -86,49 +91,46 @@ Error unknown_word(const std::vector<std::string>& words, const CLI::App& progra
   return unknown_command(words.front(), program);
 }
 
-/// An argument or option that is missing.
-Error missing(const CLI::RequiredError& error, const CLI::App& command) {
-  for (const CLI::Option* option : command.get_options()) {
-    if (error.what() != option->get_name() + " is required") continue;
-    const std::string what = option->get_positional()
-                                 ? option->get_type_name()
-                                 : option->get_name() + " " + option->get_type_name();
+/// An argument or option that is missing; `message` is the parser's.
+Error missing(const std::string& message, const ArgumentParser& command) {
+  for (const Argument& argument : command.arguments()) {
+    if (message != argument.name() + " is required") continue;
+    const std::string what = argument.is_positional()
+                                 ? argument.type_name()
+                                 : argument.name() + " " + argument.type_name();
     return {ErrorCode::usage, fmt::format("{} is missing; usage: {}", what, usage_line(command))};
   }
-  return {ErrorCode::usage, fmt::format("{}; usage: {}", error.what(), usage_line(command))};
+  return {ErrorCode::usage, fmt::format("{}; usage: {}", message, usage_line(command))};
 }
 
 /// A value that is missing, of the wrong type, or refused by the option's own validator, whose
 /// words stand after the option's name.
-Error bad_value(const CLI::ParseError& error, const CLI::App& program, const CLI::App* command) {
-  std::string what = error.what();
-  for (const CLI::App* app : {command, &program}) {
-    if (!app) continue;
-    for (const CLI::Option* option : app->get_options()) {
-      const std::string name = option->get_name();
-      const bool needs_value = dynamic_cast<const CLI::ArgumentMismatch*>(&error) != nullptr;
-      if (needs_value && what.starts_with(name + ":"))
-        what = fmt::format("{} needs a value: {} {}", name, name, option->get_type_name());
-      const std::string unreadable = fmt::format("Could not convert: {} = ", name);
-      if (what.starts_with(unreadable)) {
-        what = fmt::format("{}: '{}' is no {}", name, what.substr(unreadable.size()),
-                           option->get_type_name());
-      }
-    }
+Error bad_value(const ParseOutcome& outcome, const ArgumentParser& program,
+                const std::optional<ArgumentParser>& command) {
+  std::string what = outcome.message;
+  for (const Argument& option : options_of(program, command)) {
+    const std::string name = option.name();
+    const bool needs_value = outcome.kind == ParseOutcome::Kind::without_value;
+    if (needs_value && what.starts_with(name + ":"))
+      what = fmt::format("{} needs a value: {} {}", name, name, option.type_name());
+    const std::string unreadable = fmt::format("Could not convert: {} = ", name);
+    if (what.starts_with(unreadable))
+      what = fmt::format("{}: '{}' is no {}", name, what.substr(unreadable.size()),
+                         option.type_name());
   }
   const std::string where = command ? command_name(*command) : "cairn";
   return {ErrorCode::usage, fmt::format("{}; see {} --help", what, where)};
 }
 
-/// What a configuration file says that nobody takes: CLI11 only tells "section.name".
-Error unknown_key(const std::string& what, const CLI::App& program) {
+/// What a configuration file says that nobody takes: the parser only tells "section.name".
+Error unknown_key(const std::string& what, const ArgumentParser& program) {
   const std::string path = what.substr(what.rfind(' ') + 1);
   const std::size_t dot = path.rfind('.');
   const std::string key = path.substr(dot == std::string::npos ? 0 : dot + 1);
   const std::string section = dot == std::string::npos ? "" : path.substr(0, dot);
-  const CLI::App* command = nullptr;
-  for (const CLI::App* known : program.get_subcommands({})) {
-    if (known->get_name() == section) command = known;
+  std::optional<ArgumentParser> command;
+  for (const ArgumentParser& known : program.commands()) {
+    if (known.name() == section) command = known;
   }
   if (!section.empty() && !command) {
     return {ErrorCode::usage,
@@ -138,11 +140,11 @@ Error unknown_key(const std::string& what, const CLI::App& program) {
           fmt::format("--config: '{}' is no option {}{}", key,
                       command ? "of section [" + section + "]"
                               : "that may stand at the top, before a section such as [optimize]",
-                      suggestion("--" + key, option_names(program, command)))};
+                      suggestion("--" + key, option_names(options_of(program, command))))};
 }
 
-int print_usage_of_nothing(const CLI::App& program) {
-  std::fputs(program.help().c_str(), stderr);
+int print_usage_of_nothing(const ArgumentParser& program) {
+  std::fputs(help_text(program).c_str(), stderr);
   return static_cast<int>(ErrorCode::usage);
 }
 
@@ -150,72 +152,65 @@ int print_usage_of_nothing(const CLI::App& program) {
 
 CommandLine::CommandLine(Session& session)
     : session_(session),
-      program_("cairn: optimises factor graphs (graph SLAM); everything in it is chosen by name",
-               "cairn") {
-  program_.formatter(std::make_shared<HelpFormatter>());
-  program_.set_help_flag("-h,--help", "this text, or with a command, that of the command");
-  program_.set_version_flag("--version", "cairn " CAIRN_VERSION, "the version");
-  program_.fallthrough();  // common options may stand before or after the command
-  program_.require_subcommand(0, 1);
+      program_("cairn",
+               "cairn: optimises factor graphs (graph SLAM); everything in it is chosen by name"),
+      help_(program_.root()) {
+  program_.add_help("-h,--help", "this text, or with a command, that of the command");
+  program_.add_version("--version", "cairn " CAIRN_VERSION, "the version");
   add_common_options(program_, session.common);
-  program_.footer(
+  ArgumentParser cli = program_.root();
+  cli.footer(
       "Example:\n"
       "  cairn generate sphere -o sphere.g2o && cairn optimize sphere.g2o -o best.g2o\n"
       "  cairn bench sphere.g2o --linear-solver block_cholesky,cholmod,eigen");
-  commands_ = {add_info(program_),     add_optimize(program_), add_bench(program_),
-               add_replay(program_),   add_online(program_),   add_marginals(program_),
-               add_compact(program_),  add_sparsify(program_), add_evaluate(program_),
-               add_view(program_),     add_plot(program_),     add_convert(program_),
-               add_generate(program_), add_plugins(program_),  add_study(program_)};
-  help_ = program_.add_subcommand("help", "this text, or that of a command");
-  help_->add_option("command", command_to_explain_, "the command that is to be explained")
-      ->type_name("COMMAND");
-  help_->footer(
+  commands_ = {add_info(cli),     add_optimize(cli),  add_bench(cli),   add_replay(cli),
+               add_online(cli),   add_marginals(cli), add_compact(cli), add_sparsify(cli),
+               add_evaluate(cli), add_view(cli),      add_plot(cli),    add_convert(cli),
+               add_generate(cli), add_plugins(cli),   add_study(cli)};
+  help_ = cli.add_command("help", "this text, or that of a command");
+  help_.add_option("command", command_to_explain_, "the command that is to be explained")
+      .type_name("COMMAND");
+  help_.footer(
       "Example:\n"
       "  cairn help bench");
 }
 
-std::string CommandLine::help_text() const {
-  if (command_to_explain_.empty())  // App::help would be that of the command `help`
-    return program_.get_formatter()->make_help(&program_, "", CLI::AppFormatMode::Normal);
-  for (const CLI::App* command : program_.get_subcommands([](const CLI::App*) { return true; })) {
-    if (command->get_name() == command_to_explain_) return command->help();
+std::string CommandLine::explanation() const {
+  if (command_to_explain_.empty()) return help_text(program_.root());
+  for (const ArgumentParser& command : program_.root().commands()) {
+    if (command.name() == command_to_explain_) return help_text(command);
   }
-  throw unknown_command(command_to_explain_, program_);
+  throw unknown_command(command_to_explain_, program_.root());
 }
 
 std::function<int()> CommandLine::parse(int argc, const char* const* argv) {
-  const auto chosen = [&]() -> const CLI::App* {
-    const CLI::App* app = &program_;  // a study is a command of a command
-    for (auto used = app->get_subcommands(); !used.empty(); used = app->get_subcommands())
-      app = used.front();
-    return app == &program_ ? nullptr : app;
-  };
-  try {
-    program_.parse(argc, argv);
-  } catch (const CLI::CallForHelp&) {
-    const CLI::App& app = chosen() ? *chosen() : program_;
-    return [text = app.help()] { return write_stdout(text), 0; };
-  } catch (const CLI::CallForVersion&) {
-    return [] { return write_stdout("cairn " CAIRN_VERSION "\n"), 0; };
-  } catch (const CLI::ConfigError& error) {
-    throw unknown_key(error.what(), program_);
-  } catch (const CLI::FileError& error) {
-    throw Error(ErrorCode::input, fmt::format("--config: {}", error.what()));
-  } catch (const CLI::ParseError& error) {
-    // A misspelt option leaves its value behind, which then stands where another argument belongs:
-    // so unknown words are what went wrong first, whatever the parser complains of.
-    const std::vector<std::string> left = program_.remaining(true);
-    if (!left.empty()) throw unknown_word(left, program_, chosen());
-    const auto* required = dynamic_cast<const CLI::RequiredError*>(&error);
-    if (required && chosen()) throw missing(*required, *chosen());
-    throw bad_value(error, program_, chosen());
+  const ParseOutcome outcome = program_.parse(argc, argv);
+  const ArgumentParser program = program_.root();
+  const std::optional<ArgumentParser> chosen = program_.chosen();
+  switch (outcome.kind) {
+    case ParseOutcome::Kind::help:
+      return [text = help_text(chosen.value_or(program))] { return write_stdout(text), 0; };
+    case ParseOutcome::Kind::version:
+      return [] { return write_stdout("cairn " CAIRN_VERSION "\n"), 0; };
+    case ParseOutcome::Kind::config_key:
+      throw unknown_key(outcome.message, program);
+    case ParseOutcome::Kind::config_file:
+      throw Error(ErrorCode::input, fmt::format("--config: {}", outcome.message));
+    case ParseOutcome::Kind::unknown_words:
+      throw unknown_word(outcome.words, program, chosen);
+    case ParseOutcome::Kind::missing:
+      throw missing(outcome.message, *chosen);
+    case ParseOutcome::Kind::without_value:
+    case ParseOutcome::Kind::bad_value:
+      throw bad_value(outcome, program, chosen);
+    case ParseOutcome::Kind::command:
+      break;
   }
-  if (help_->parsed()) return [text = help_text()] { return write_stdout(text), 0; };
+  if (help_.parsed()) return [text = explanation()] { return write_stdout(text), 0; };
   for (const Command& command : commands_) {
-    if (command.app->parsed()) return [&] { return command.run(session_); };
+    if (command.parser.parsed()) return [&] { return command.run(session_); };
   }
-  return [&] { return print_usage_of_nothing(program_); };
+  return [program] { return print_usage_of_nothing(program); };
 }
 
 }  // namespace cairn::app

@@ -2,10 +2,10 @@
 #pragma once
 
 #include <functional>
-#include <memory>
 #include <string>
 #include <vector>
 
+#include "arguments.hpp"
 #include "commands.hpp"
 
 namespace cairn::app {
@@ -21,12 +21,12 @@ class CommandLine {
 
  private:
   /// What `cairn help` and `cairn help COMMAND` print.
-  std::string help_text() const;
+  std::string explanation() const;
 
   Session& session_;
-  CLI::App program_;
+  ProgramParser program_;
   std::vector<Command> commands_;
-  CLI::App* help_ = nullptr;  // owned by the program
+  ArgumentParser help_;  // of the command `help`
   std::string command_to_explain_;
 };
 

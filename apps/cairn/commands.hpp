@@ -3,8 +3,7 @@
 
 #include <functional>
 
-#include <CLI/App.hpp>
-
+#include "arguments.hpp"
 #include "session.hpp"
 
 namespace cairn::app {
@@ -12,25 +11,25 @@ namespace cairn::app {
 /// A subcommand: what the command line parser knows of it, and what it does once its options stand.
 /// `run` returns the program's exit code, or throws `Error`.
 struct Command {
-  CLI::App* app = nullptr;
+  ArgumentParser parser;
   std::function<int(Session&)> run;
 };
 
 // One file each. Adds the subcommand with its options to the program.
-Command add_plugins(CLI::App& program);
-Command add_info(CLI::App& program);
-Command add_convert(CLI::App& program);
-Command add_generate(CLI::App& program);
-Command add_optimize(CLI::App& program);
-Command add_bench(CLI::App& program);
-Command add_replay(CLI::App& program);
-Command add_online(CLI::App& program);
-Command add_marginals(CLI::App& program);
-Command add_compact(CLI::App& program);
-Command add_sparsify(CLI::App& program);
-Command add_study(CLI::App& program);
-Command add_evaluate(CLI::App& program);
-Command add_view(CLI::App& program);
-Command add_plot(CLI::App& program);
+Command add_plugins(ArgumentParser program);
+Command add_info(ArgumentParser program);
+Command add_convert(ArgumentParser program);
+Command add_generate(ArgumentParser program);
+Command add_optimize(ArgumentParser program);
+Command add_bench(ArgumentParser program);
+Command add_replay(ArgumentParser program);
+Command add_online(ArgumentParser program);
+Command add_marginals(ArgumentParser program);
+Command add_compact(ArgumentParser program);
+Command add_sparsify(ArgumentParser program);
+Command add_study(ArgumentParser program);
+Command add_evaluate(ArgumentParser program);
+Command add_view(ArgumentParser program);
+Command add_plot(ArgumentParser program);
 
 }  // namespace cairn::app

@@ -6,8 +6,10 @@
 #include <memory>
 #include <utility>
 
-#include <fmt/format.h>
+#include <fmt/core.h>
+#include <boost/json/object.hpp>
 
+#include "arguments.hpp"
 #include "cairn/policy/policy_run.hpp"
 #include "cairn/policy/threshold_search.hpp"
 #include "cairn/policy/uncertainty_comparison.hpp"
@@ -16,7 +18,6 @@
 #include "compact.hpp"
 #include "compact_report.hpp"
 #include "graph_files.hpp"
-#include "help.hpp"
 #include "interrupt.hpp"
 #include "problem_setup.hpp"
 #include "progress.hpp"
@@ -196,77 +197,68 @@ int run_compact(const CompactOptions& options, Session& session) {
   return guard.interrupted() ? kExitInterrupted : 0;
 }
 
-void add_compact_options(CLI::App& command, CompactOptions& options,
+void add_compact_options(ArgumentParser cli, CompactOptions& options,
                          std::vector<std::string> strategies) {
-  command.add_option("graph", options.graph, kGraphHelp)->type_name("GRAPH")->required();
-  command.add_option("-o,--output", options.output, "write the compact graph")->type_name("OUT");
-  command.add_option("--to", options.output_format, "format of OUT")->type_name("FORMAT");
-  command
-      .add_option("--trajectory", options.trajectory, "write all poses, those left out put back")
-      ->type_name("FILE");
-  command
-      .add_option("--recovery", options.recovery,
-                  "v0 evenly, v1 by distance, v2 along odometry, or likely")
-      ->type_name("HOW")
-      ->check(one_of({"v0", "v1", "v2", "likely"}))
-      ->capture_default_str();
-  command
-      .add_option("--strategy", options.strategy, "all or few poses and loops: apal, apfl, fpfl")
-      ->type_name("NAME")
-      ->check(one_of(std::move(strategies)))
-      ->capture_default_str();
-  command.add_option("--policy", options.policy, "the pose policy, with options as NAME:key=value")
-      ->type_name("NAME")
-      ->capture_default_str();
-  command
-      .add_option("--estimator", options.estimator, "the estimator, instead of the policy's own")
-      ->type_name("NAME");
-  command
-      .add_option("--registration", options.registration,
-                  "matcher: recorded, or simulated:range=5,angle=1,false_rate=0.1")
-      ->type_name("NAME")
-      ->capture_default_str();
-  command.add_flag("--auto", options.automatic,
-                   "find thresholds in a sample; so it is if none are given");
-  command.add_option("--sample", options.sample, "part of the poses that is the sample")
-      ->type_name("PART")
-      ->check(within(0.0, 1.0))
-      ->capture_default_str();
-  command.add_option("--thresholds", options.thresholds, "take thresholds from a file")
-      ->type_name("FILE");
-  command.add_option("--save-thresholds", options.save_thresholds, "write those found to a file")
-      ->type_name("FILE");
-  command.add_option("--range", options.range, "how far the sensor matches [m]")->type_name("M");
-  command.add_option("--angle", options.angle, "and between which orientations [rad]")
-      ->type_name("RAD");
-  command
-      .add_option("--loop-gain", options.loop_gain,
-                  "information gain that a loop closure must exceed [nats]")
-      ->type_name("G");
-  command
-      .add_option("--pose-gain", options.pose_gain,
-                  "a pose is kept if the gain of a link to it would exceed this [nats]")
-      ->type_name("G");
-  command
-      .add_option("--gate", options.gate,
-                  "refuse links that do not fit; so large a part of right ones passes (0.99)")
-      ->type_name("P");
-  command.add_option("--truth", options.truth, "true poses, for errors")->type_name("FILE");
-  command.add_option("--steps", options.steps, "a row for each pose, as CSV")->type_name("FILE");
-  add_loss_options(command, options.problem);
-  add_input_options(command, options.input);
+  cli.add_option("graph", options.graph, kGraphHelp).type_name("GRAPH").required();
+  cli.add_option("-o,--output", options.output, "write the compact graph").type_name("OUT");
+  cli.add_option("--to", options.output_format, "format of OUT").type_name("FORMAT");
+  cli.add_option("--trajectory", options.trajectory, "write all poses, those left out put back")
+      .type_name("FILE");
+  cli.add_option("--recovery", options.recovery,
+                 "v0 evenly, v1 by distance, v2 along odometry, or likely")
+      .type_name("HOW")
+      .one_of({"v0", "v1", "v2", "likely"})
+      .show_default();
+  cli.add_option("--strategy", options.strategy, "all or few poses and loops: apal, apfl, fpfl")
+      .type_name("NAME")
+      .one_of(std::move(strategies))
+      .show_default();
+  cli.add_option("--policy", options.policy, "the pose policy, with options as NAME:key=value")
+      .type_name("NAME")
+      .show_default();
+  cli.add_option("--estimator", options.estimator, "the estimator, instead of the policy's own")
+      .type_name("NAME");
+  cli.add_option("--registration", options.registration,
+                 "matcher: recorded, or simulated:range=5,angle=1,false_rate=0.1")
+      .type_name("NAME")
+      .show_default();
+  cli.add_flag("--auto", options.automatic,
+               "find thresholds in a sample; so it is if none are given");
+  cli.add_option("--sample", options.sample, "part of the poses that is the sample")
+      .type_name("PART")
+      .within(0.0, 1.0)
+      .show_default();
+  cli.add_option("--thresholds", options.thresholds, "take thresholds from a file")
+      .type_name("FILE");
+  cli.add_option("--save-thresholds", options.save_thresholds, "write those found to a file")
+      .type_name("FILE");
+  cli.add_option("--range", options.range, "how far the sensor matches [m]").type_name("M");
+  cli.add_option("--angle", options.angle, "and between which orientations [rad]").type_name("RAD");
+  cli.add_option("--loop-gain", options.loop_gain,
+                 "information gain that a loop closure must exceed [nats]")
+      .type_name("G");
+  cli.add_option("--pose-gain", options.pose_gain,
+                 "a pose is kept if the gain of a link to it would exceed this [nats]")
+      .type_name("G");
+  cli.add_option("--gate", options.gate,
+                 "refuse links that do not fit; so large a part of right ones passes (0.99)")
+      .type_name("P");
+  cli.add_option("--truth", options.truth, "true poses, for errors").type_name("FILE");
+  cli.add_option("--steps", options.steps, "a row for each pose, as CSV").type_name("FILE");
+  add_loss_options(cli, options.problem);
+  add_input_options(cli, options.input);
 }
 
-Command add_compact(CLI::App& program) {
+Command add_compact(ArgumentParser program) {
   auto options = std::make_shared<CompactOptions>();  // lives as long as the parser and the run
-  CLI::App* app = program.add_subcommand(
+  ArgumentParser cli = program.add_command(
       "compact", "compact pose SLAM: keep only the most informative poses and loop closures");
-  add_compact_options(*app, *options, {"apal", "apfl", "fpfl"});
-  app->footer(
+  add_compact_options(cli, *options, {"apal", "apfl", "fpfl"});
+  cli.footer(
       "Example:\n"
       "  cairn compact my.g2o -o compact.g2o --trajectory full.g2o --json report.json\n"
       "  cairn compact city.g2o --strategy apal --thresholds city.json --truth truth.g2o");
-  return {app, [options](Session& session) { return run_compact(*options, session); }};
+  return {cli, [options](Session& session) { return run_compact(*options, session); }};
 }
 
 }  // namespace cairn::app

@@ -6,8 +6,7 @@
 #include <string>
 #include <vector>
 
-#include <CLI/App.hpp>
-
+#include "arguments.hpp"
 #include "graph_files.hpp"
 #include "problem_setup.hpp"
 #include "session.hpp"
@@ -38,7 +37,7 @@ struct CompactOptions {
 };
 
 /// The options of `cairn compact`, with the strategies on offer.
-void add_compact_options(CLI::App& command, CompactOptions& options,
+void add_compact_options(ArgumentParser cli, CompactOptions& options,
                          std::vector<std::string> strategies);
 
 /// Returns the exit code.

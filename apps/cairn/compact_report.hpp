@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include <boost/json/object.hpp>
+#include <boost/json/fwd.hpp>
 
 #include "cairn/policy/policy_run.hpp"
 #include "cairn/policy/threshold_search.hpp"

@@ -2,8 +2,9 @@
 // cairn convert IN OUT: reads one format and writes another.
 #include <memory>
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
+#include "arguments.hpp"
 #include "commands.hpp"
 #include "graph_files.hpp"
 #include "json_report.hpp"
@@ -41,23 +42,23 @@ int run(const ConvertOptions& options, Session& session) {
 
 }  // namespace
 
-Command add_convert(CLI::App& program) {
+Command add_convert(ArgumentParser program) {
   auto options = std::make_shared<ConvertOptions>();  // lives as long as the parser and the run
-  CLI::App* app =
-      program.add_subcommand("convert", "write a graph or its trajectory in another format");
-  app->add_option("in", options->input_file, kGraphHelp)->type_name("IN")->required();
-  app->add_option("out", options->output_file,
-                  "file (packed if it ends in .gz; - is standard output)")
-      ->type_name("OUT")
-      ->required();
-  app->add_option("--to", options->output_format, "format of OUT, instead of by the ending")
-      ->type_name("FORMAT");
-  add_input_options(*app, options->input);
-  app->footer(
+  ArgumentParser cli =
+      program.add_command("convert", "write a graph or its trajectory in another format");
+  cli.add_option("in", options->input_file, kGraphHelp).type_name("IN").required();
+  cli.add_option("out", options->output_file,
+                 "file (packed if it ends in .gz; - is standard output)")
+      .type_name("OUT")
+      .required();
+  cli.add_option("--to", options->output_format, "format of OUT, instead of by the ending")
+      .type_name("FORMAT");
+  add_input_options(cli, options->input);
+  cli.footer(
       "Example:\n"
       "  cairn convert manhattan_isam.txt manhattan.g2o.gz\n"
       "  cairn convert best.g2o - --to tum");
-  return {app, [options](Session& session) { return run(*options, session); }};
+  return {cli, [options](Session& session) { return run(*options, session); }};
 }
 
 }  // namespace cairn::app

@@ -3,8 +3,7 @@
 
 #include <chrono>
 
-#include <fmt/format.h>
-#include <fmt/ranges.h>
+#include <fmt/core.h>
 #include <boost/json/object.hpp>
 
 #include "cairn/linear/graph_marginals.hpp"
@@ -12,6 +11,7 @@
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/timed.hpp"
 #include "problem_setup.hpp"
+#include "table.hpp"
 
 namespace cairn::app {
 namespace {
@@ -38,7 +38,7 @@ CovarianceSolver make_covariance_solver(const std::string& name, Registry& regis
   throw Error(ErrorCode::usage,
               fmt::format("linear solver '{}' gives no covariances: it lacks the ability '{}', "
                           "since it does not solve exactly; these have: {}",
-                          name, Marginals::kAbility, fmt::join(solvers_that_can(registry), ", ")));
+                          name, Marginals::kAbility, joined(solvers_that_can(registry), ", ")));
 }
 
 CovarianceSolver covariance_solver_of(const ComponentSpec& optimizer, Registry& registry) {
@@ -49,7 +49,7 @@ CovarianceSolver covariance_solver_of(const ComponentSpec& optimizer, Registry& 
               fmt::format("optimizer '{}' solves with linear solvers of its own, which give no "
                           "covariances; take another optimizer, with one of {}, or write the "
                           "estimate with -o and run cairn marginals on that with --as-given",
-                          optimizer.name, fmt::join(solvers_that_can(registry), ", ")));
+                          optimizer.name, joined(solvers_that_can(registry), ", ")));
 }
 
 DiagonalCovariances diagonal_covariances(const Graph& graph, CovarianceSolver& solver) {

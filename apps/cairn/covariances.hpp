@@ -6,8 +6,7 @@
 #include <string>
 #include <vector>
 
-#include <boost/json/array.hpp>
-#include <boost/json/value.hpp>
+#include <boost/json/fwd.hpp>
 
 #include "cairn/graph/graph.hpp"
 #include "cairn/linear/linear_solver.hpp"

@@ -6,13 +6,13 @@
 #include <optional>
 #include <utility>
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
+#include "arguments.hpp"
 #include "cairn/evaluation/trajectory.hpp"
 #include "cairn/runtime/error.hpp"
 #include "commands.hpp"
 #include "graph_files.hpp"
-#include "help.hpp"
 #include "json_report.hpp"
 #include "table.hpp"
 
@@ -179,61 +179,48 @@ int run(const EvaluateOptions& options, Session& session) {
   return 0;
 }
 
-/// A finite number from `least`.
-CLI::Validator seconds(double least) {
-  const auto check = [least](const std::string& text) {
-    double value = 0.0;
-    const bool good =
-        CLI::detail::lexical_cast(text, value) && std::isfinite(value) && value >= least;
-    return good ? std::string()
-                : fmt::format("'{}' is no number of seconds{}", text,
-                              least == 0.0 ? ", from 0" : "");
-  };
-  return {check, ""};
-}
-
-void add_trajectory_options(CLI::App& app, TrajectoryOptions& options, const std::string& prefix,
-                            const std::string& name) {
-  app.add_option("--" + prefix + "stamps", options.stamps,
+void add_trajectory_options(ArgumentParser cli, TrajectoryOptions& options,
+                            const std::string& prefix, const std::string& name) {
+  cli.add_option("--" + prefix + "stamps", options.stamps,
                  "time stamps of " + name + ", one per line, by rising id")
-      ->type_name("FILE");
-  app.add_option("--" + prefix + "axes", options.axes,
+      .type_name("FILE");
+  cli.add_option("--" + prefix + "axes", options.axes,
                  "of " + name + ": robot (x ahead, z up) or camera (z ahead, y down)")
-      ->type_name("AXES")
-      ->check(one_of({"robot", "camera"}))
-      ->capture_default_str();
+      .type_name("AXES")
+      .one_of({"robot", "camera"})
+      .show_default();
 }
 
 }  // namespace
 
-Command add_evaluate(CLI::App& program) {
+Command add_evaluate(ArgumentParser program) {
   auto options = std::make_shared<EvaluateOptions>();  // lives as long as the parser and the run
-  CLI::App* app =
-      program.add_subcommand("evaluate", "errors of an estimate against the ground truth");
-  app->add_option("estimate", options->estimate.file, "graph or trajectory")
-      ->type_name("ESTIMATE")
-      ->required();
-  app->add_option("truth", options->truth.file, "the same poses, by id or time, where they were")
-      ->type_name("TRUTH")
-      ->required();
-  app->add_option("--match", options->match,
-                  "pair poses by id or stamp; else by stamp where both have times")
-      ->type_name("BY")
-      ->check(one_of({"id", "stamp"}));
-  app->add_option("--max-time-difference", options->max_time_difference,
-                  "how far apart the stamps of a pair may be [s]")
-      ->type_name("S")
-      ->check(seconds(0.0))
-      ->default_str("0.01");
-  app->add_option("--offset", options->offset, "added to the stamps of ESTIMATE [s]")
-      ->type_name("S")
-      ->check(seconds(std::numeric_limits<double>::lowest()))
-      ->default_str("0");
-  add_trajectory_options(*app, options->estimate, "", "ESTIMATE");
-  add_trajectory_options(*app, options->truth, "truth-", "TRUTH");
-  app->add_flag("--planar", options->planar, "compare x, y and yaw only, as seen on a map");
-  add_input_options(*app, options->input);
-  app->footer(
+  ArgumentParser cli =
+      program.add_command("evaluate", "errors of an estimate against the ground truth");
+  cli.add_option("estimate", options->estimate.file, "graph or trajectory")
+      .type_name("ESTIMATE")
+      .required();
+  cli.add_option("truth", options->truth.file, "the same poses, by id or time, where they were")
+      .type_name("TRUTH")
+      .required();
+  cli.add_option("--match", options->match,
+                 "pair poses by id or stamp; else by stamp where both have times")
+      .type_name("BY")
+      .one_of({"id", "stamp"});
+  cli.add_option("--max-time-difference", options->max_time_difference,
+                 "how far apart the stamps of a pair may be [s]")
+      .type_name("S")
+      .seconds_from(0.0)
+      .show_default("0.01");
+  cli.add_option("--offset", options->offset, "added to the stamps of ESTIMATE [s]")
+      .type_name("S")
+      .seconds_from(std::numeric_limits<double>::lowest())
+      .show_default("0");
+  add_trajectory_options(cli, options->estimate, "", "ESTIMATE");
+  add_trajectory_options(cli, options->truth, "truth-", "TRUTH");
+  cli.add_flag("--planar", options->planar, "compare x, y and yaw only, as seen on a map");
+  add_input_options(cli, options->input);
+  cli.footer(
       "Root mean squares: ATE after the rigid motion that brings ESTIMATE nearest to TRUTH, RPE "
       "between\n"
       "consecutive poses, RPE all to all over every pair; translation in metres, rotation in "
@@ -241,7 +228,7 @@ Command add_evaluate(CLI::App& program) {
       "Example:\n"
       "  cairn evaluate best.g2o truth.g2o --json errors.json\n"
       "  cairn evaluate slam.tum poses.txt --truth-stamps times.txt --truth-axes camera");
-  return {app, [options](Session& session) { return run(*options, session); }};
+  return {cli, [options](Session& session) { return run(*options, session); }};
 }
 
 }  // namespace cairn::app

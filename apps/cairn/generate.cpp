@@ -4,11 +4,11 @@
 #include <limits>
 #include <memory>
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
+#include "arguments.hpp"
 #include "commands.hpp"
 #include "graph_files.hpp"
-#include "help.hpp"
 #include "json_report.hpp"
 #include "table.hpp"
 
@@ -50,30 +50,29 @@ int run(const GenerateOptions& options, Session& session) {
 
 }  // namespace
 
-Command add_generate(CLI::App& program) {
+Command add_generate(ArgumentParser program) {
   auto options = std::make_shared<GenerateOptions>();  // lives as long as the parser and the run
-  CLI::App* app =
-      program.add_subcommand("generate", "make a simulated graph, with its ground truth");
-  app->add_option("kind", options->kind,
-                  "generator: manhattan, sphere … (cairn plugins lists them)")
-      ->type_name("KIND[:k=v]")
-      ->required();
-  app->add_option("-o,--output", options->output, "the noisy graph (- is standard output)")
-      ->type_name("OUT")
-      ->required();
-  app->add_option("--ground-truth", options->ground_truth, "the same graph at its true states")
-      ->type_name("FILE");
-  app->add_option("--to", options->output_format, "format, instead of by the ending")
-      ->type_name("FORMAT");
-  app->add_option("--seed", options->seed, "seed of the noise; the same seed gives the same graph")
-      ->type_name("S")
-      ->check(within(std::uint64_t{0}, std::numeric_limits<std::uint64_t>::max()))
-      ->capture_default_str();
-  app->footer(
+  ArgumentParser cli =
+      program.add_command("generate", "make a simulated graph, with its ground truth");
+  cli.add_option("kind", options->kind, "generator: manhattan, sphere … (cairn plugins lists them)")
+      .type_name("KIND[:k=v]")
+      .required();
+  cli.add_option("-o,--output", options->output, "the noisy graph (- is standard output)")
+      .type_name("OUT")
+      .required();
+  cli.add_option("--ground-truth", options->ground_truth, "the same graph at its true states")
+      .type_name("FILE");
+  cli.add_option("--to", options->output_format, "format, instead of by the ending")
+      .type_name("FORMAT");
+  cli.add_option("--seed", options->seed, "seed of the noise; the same seed gives the same graph")
+      .type_name("S")
+      .within(std::uint64_t{0}, std::numeric_limits<std::uint64_t>::max())
+      .show_default();
+  cli.footer(
       "Example:\n"
       "  cairn generate manhattan:poses=3500 -o graph.g2o --ground-truth truth.g2o --seed 7\n"
       "Options of a generator: cairn plugins manhattan");
-  return {app, [options](Session& session) { return run(*options, session); }};
+  return {cli, [options](Session& session) { return run(*options, session); }};
 }
 
 }  // namespace cairn::app

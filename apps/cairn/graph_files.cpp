@@ -11,9 +11,9 @@
 #include <filesystem>
 #include <optional>
 
-#include <fmt/format.h>
-#include <fmt/ranges.h>
+#include <fmt/core.h>
 
+#include "arguments.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/plugin_call.hpp"
@@ -95,18 +95,18 @@ void check_ending(const std::string& file, Registry& registry) {
       ErrorCode::usage,
       fmt::format("{}: no format writes files of that name; endings on offer: .{}; or name a "
                   "format with --to",
-                  file, fmt::join(writable, ", .")));
+                  file, joined(writable, ", .")));
 }
 
 }  // namespace
 
-void add_input_options(CLI::App& command, InputOptions& options) {
-  command.add_option("--from", options.format, "format of the input, instead of by content")
-      ->type_name("FORMAT");
-  command.add_flag("--skip-unknown", options.read.skip_unknown,
-                   "skip and count lines with unknown tags, instead of refusing the file");
-  command.add_flag("--repair-information", options.read.repair_information,
-                   "repair known mistakes in information matrices");
+void add_input_options(ArgumentParser cli, InputOptions& options) {
+  cli.add_option("--from", options.format, "format of the input, instead of by content")
+      .type_name("FORMAT");
+  cli.add_flag("--skip-unknown", options.read.skip_unknown,
+               "skip and count lines with unknown tags, instead of refusing the file");
+  cli.add_flag("--repair-information", options.read.repair_information,
+               "repair known mistakes in information matrices");
 }
 
 std::string output_format(const std::string& file, const std::string& named) {

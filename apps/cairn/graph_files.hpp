@@ -4,8 +4,7 @@
 #include <optional>
 #include <string>
 
-#include <CLI/App.hpp>
-
+#include "arguments.hpp"
 #include "cairn/io/format.hpp"
 #include "cairn/io/generator.hpp"
 #include "session.hpp"
@@ -17,7 +16,7 @@ struct InputOptions {
   std::string format;  ///< empty: by content
   ReadOptions read;
 };
-void add_input_options(CLI::App& command, InputOptions& options);
+void add_input_options(ArgumentParser cli, InputOptions& options);
 
 /// Shown where a graph is asked for.
 inline constexpr const char* kGraphHelp =

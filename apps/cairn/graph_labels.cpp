@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <iterator>
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include "cairn/runtime/error.hpp"
 #include "table.hpp"

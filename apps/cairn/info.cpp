@@ -2,9 +2,9 @@
 // cairn info GRAPH: what a graph consists of, and what looks wrong.
 #include <memory>
 
-#include <fmt/format.h>
-#include <fmt/ranges.h>
+#include <fmt/core.h>
 
+#include "arguments.hpp"
 #include "cairn/evaluation/graph_survey.hpp"
 #include "commands.hpp"
 #include "graph_files.hpp"
@@ -70,7 +70,7 @@ std::string list_text(const std::string& title, const std::vector<std::string>& 
   if (lines.empty()) return "";
   std::string text = bold(title, colour) + "\n";
   for (const std::string& line : lines) {
-    text += fmt::format("  {}\n", fmt::join(folded(line, output_width() - 4), "\n    "));
+    text += fmt::format("  {}\n", joined(folded(line, output_width() - 4), "\n    "));
   }
   return text;
 }
@@ -162,15 +162,16 @@ int run(const InfoOptions& options, Session& session) {
 
 }  // namespace
 
-Command add_info(CLI::App& program) {
+Command add_info(ArgumentParser program) {
   auto options = std::make_shared<InfoOptions>();  // lives as long as the parser and the run
-  CLI::App* app = program.add_subcommand("info", "what a graph consists of, and what looks wrong");
-  app->add_option("graph", options->graph, kGraphHelp)->type_name("GRAPH")->required();
-  add_input_options(*app, options->input);
-  app->footer(
+  ArgumentParser cli =
+      program.add_command("info", "what a graph consists of, and what looks wrong");
+  cli.add_option("graph", options->graph, kGraphHelp).type_name("GRAPH").required();
+  add_input_options(cli, options->input);
+  cli.footer(
       "Example:\n"
       "  cairn info sphere2500.g2o --types slam3d:metric=g2o");
-  return {app, [options](Session& session) { return run(*options, session); }};
+  return {cli, [options](Session& session) { return run(*options, session); }};
 }
 
 }  // namespace cairn::app

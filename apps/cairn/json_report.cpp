@@ -4,7 +4,7 @@
 #include <fstream>
 #include <thread>
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include "cairn/runtime/version.hpp"
 #include "graph_labels.hpp"

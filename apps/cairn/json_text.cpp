@@ -45,24 +45,26 @@ std::string enclose(const std::vector<std::string>& parts, char open, char close
   return text + close;
 }
 
+std::string layout(const json::object& object, std::size_t indent) {
+  std::vector<std::string> parts;
+  for (const auto& [key, item] : object)
+    parts.push_back(json::serialize(json::string(key)) + ": " + layout(item, indent + 1));
+  return enclose(parts, '{', '}', indent);
+}
+
 std::string layout(const json::value& value, std::size_t indent) {
   if (value.is_double()) return number_text(value.get_double());
-  std::vector<std::string> parts;
+  if (value.is_object()) return layout(value.get_object(), indent);
   if (value.is_array()) {
+    std::vector<std::string> parts;
     for (const json::value& item : value.get_array()) parts.push_back(layout(item, indent + 1));
     return enclose(parts, '[', ']', indent);
-  }
-  if (value.is_object()) {
-    for (const auto& [key, item] : value.get_object()) {
-      parts.push_back(json::serialize(json::string(key)) + ": " + layout(item, indent + 1));
-    }
-    return enclose(parts, '{', '}', indent);
   }
   return json::serialize(value);
 }
 
 }  // namespace
 
-std::string json_text(const json::value& value) { return layout(value, 0); }
+std::string json_text(const json::object& object) { return layout(object, 0); }
 
 }  // namespace cairn::app

@@ -3,12 +3,12 @@
 
 #include <string>
 
-#include <boost/json/value.hpp>
+#include <boost/json/fwd.hpp>
 
 namespace cairn::app {
 
 /// JSON laid out for people: what fits a line stays on one. Numbers are the shortest that read back
 /// as the same bits; reals always have a point or an exponent; what is not finite is null.
-std::string json_text(const boost::json::value& value);
+std::string json_text(const boost::json::object& object);
 
 }  // namespace cairn::app

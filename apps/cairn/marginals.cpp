@@ -8,9 +8,9 @@
 #include <string>
 #include <utility>
 
-#include <fmt/format.h>
-#include <fmt/ranges.h>
+#include <fmt/core.h>
 
+#include "arguments.hpp"
 #include "cairn/io/format.hpp"
 #include "cairn/linear/graph_marginals.hpp"
 #include "cairn/runtime/error.hpp"
@@ -20,7 +20,6 @@
 #include "commands.hpp"
 #include "covariances.hpp"
 #include "graph_files.hpp"
-#include "help.hpp"
 #include "interrupt.hpp"
 #include "json_report.hpp"
 #include "problem_setup.hpp"
@@ -405,37 +404,37 @@ int run(const MarginalsOptions& options, Session& session) {
 
 }  // namespace
 
-Command add_marginals(CLI::App& program) {
+Command add_marginals(ArgumentParser program) {
   auto options = std::make_shared<MarginalsOptions>();  // lives as long as the parser and the run
-  CLI::App* app = program.add_subcommand("marginals", "how certain an estimate is: covariances");
-  app->add_option("graph", options->graph, kGraphHelp)->type_name("GRAPH")->required();
-  app->add_flag("--diagonal", options->diagonal,
-                "the block of every variable; what is done if nothing else is asked for");
-  app->add_option("--pairs", options->pairs, "the blocks of these pairs of ids")
-      ->type_name("A:B,…")
-      ->delimiter(',')
-      ->allow_extra_args(false);
-  app->add_option("--column", options->column, "the blocks of all variables with this id, or last")
-      ->type_name("ID");
-  app->add_option("-o,--output", options->output, "write the blocks as text (- is standard output)")
-      ->type_name("FILE");
-  app->add_flag("--as-given", options->as_given,
-                "at the states as they are, or as --initial puts them: do not optimise");
-  app->add_option("--optimizer", options->optimizer, "the optimizer that finds the estimate")
-      ->type_name("NAME")
-      ->capture_default_str();
-  app->add_option("--linear-solver", options->linear_solver,
-                  "solves H x = g, and gives the covariances")
-      ->type_name("NAME")
-      ->capture_default_str();
-  add_problem_options(*app, options->problem);
-  add_input_options(*app, options->input);
-  app->footer(
+  ArgumentParser cli = program.add_command("marginals", "how certain an estimate is: covariances");
+  cli.add_option("graph", options->graph, kGraphHelp).type_name("GRAPH").required();
+  cli.add_flag("--diagonal", options->diagonal,
+               "the block of every variable; what is done if nothing else is asked for");
+  cli.add_option("--pairs", options->pairs, "the blocks of these pairs of ids")
+      .type_name("A:B,…")
+      .separated_by(',')
+      .repeatable();
+  cli.add_option("--column", options->column, "the blocks of all variables with this id, or last")
+      .type_name("ID");
+  cli.add_option("-o,--output", options->output, "write the blocks as text (- is standard output)")
+      .type_name("FILE");
+  cli.add_flag("--as-given", options->as_given,
+               "at the states as they are, or as --initial puts them: do not optimise");
+  cli.add_option("--optimizer", options->optimizer, "the optimizer that finds the estimate")
+      .type_name("NAME")
+      .show_default();
+  cli.add_option("--linear-solver", options->linear_solver,
+                 "solves H x = g, and gives the covariances")
+      .type_name("NAME")
+      .show_default();
+  add_problem_options(cli, options->problem);
+  add_input_options(cli, options->input);
+  cli.footer(
       "Covariances are of the step that moves a state, for a pose x exp(d): metres along its own\n"
       "axes, then radians. Variables that are fixed, or anchored, have zeros.\n"
       "Example:\n"
       "  cairn marginals city.g2o --column last --pairs 17:350,17:351 -o city.cov");
-  return {app, [options](Session& session) { return run(*options, session); }};
+  return {cli, [options](Session& session) { return run(*options, session); }};
 }
 
 }  // namespace cairn::app

@@ -3,9 +3,9 @@
 #include <memory>
 #include <optional>
 
-#include <fmt/format.h>
-#include <fmt/ranges.h>
+#include <fmt/core.h>
 
+#include "arguments.hpp"
 #include "cairn/io/format.hpp"
 #include "cairn/online/conversation.hpp"
 #include "cairn/online/journal.hpp"
@@ -18,7 +18,6 @@
 #include "cairn/solve/estimator.hpp"
 #include "commands.hpp"
 #include "graph_files.hpp"
-#include "help.hpp"
 #include "interrupt.hpp"
 #include "json_report.hpp"
 #include "line_input.hpp"
@@ -48,7 +47,7 @@ struct OnlineOptions {
 
 /// What must be the same for a journal to give the same estimate again.
 std::string identity(const OnlineOptions& options, const std::string& who, const Session& session) {
-  const std::string types = fmt::format("{}", fmt::join(session.common.types, " "));
+  const std::string types = joined(session.common.types, " ");
   return fmt::format("{}, types {}, format {}{}, loss {} on {}, solve {}", who,
                      types.empty() ? "as they are" : types, options.input.format,
                      options.input.read.repair_information ? " with repairs" : "",
@@ -181,55 +180,54 @@ int run(OnlineOptions options, Session& session) {
 
 }  // namespace
 
-Command add_online(CLI::App& program) {
+Command add_online(ArgumentParser program) {
   auto options = std::make_shared<OnlineOptions>();  // lives as long as the parser and the run
   options->input.format = "g2o";
-  CLI::App* app =
-      program.add_subcommand("online", "estimate from standard input while measurements arrive");
-  app->add_option("--estimator", options->estimator,
-                  "the estimator, with options as NAME:key=value")
-      ->type_name("NAME")
-      ->default_str(kDefaultEstimator);
-  app->add_option("--policy", options->policy,
-                  "decides which poses are kept, such as compact_pose; default: all are")
-      ->type_name("NAME");
-  app->add_option("--solve", options->solve, "auto, after every measurement, or explicit: by SOLVE")
-      ->type_name("WHEN")
-      ->check(one_of({"auto", "explicit"}))
-      ->capture_default_str();
-  app->add_option("--output", options->estimates,
-                  "estimates written after a solve: none, last, changed or all")
-      ->type_name("WHICH")
-      ->check(one_of({"none", "last", "changed", "all"}))
-      ->capture_default_str();
-  app->add_option("--marginals", options->marginals,
-                  "covariances kept, and written after a solve: none, last or diagonal")
-      ->type_name("WHICH")
-      ->check(one_of({"none", "last", "diagonal"}))
-      ->capture_default_str();
-  app->add_option("--budget", options->budget, "seconds that an update may take; 0: no limit")
-      ->type_name("S")
-      ->check(within(0.0, 1e9))
-      ->default_str("0");
-  app->add_option("--journal", options->journal,
-                  "log what is taken in, and begin with what the log has")
-      ->type_name("FILE");
-  app->add_option("--sync", options->sync,
-                  "it waits for the disk: every line, batch (before answers) or none")
-      ->type_name("WHEN")
-      ->check(one_of({"every", "batch", "none"}))
-      ->capture_default_str();
-  app->add_option("-o,--save", options->output, "write the last estimate as a graph at the end")
-      ->type_name("OUT");
-  add_loss_options(*app, options->problem);
-  add_input_options(*app, options->input);
-  app->footer(
+  ArgumentParser cli =
+      program.add_command("online", "estimate from standard input while measurements arrive");
+  cli.add_option("--estimator", options->estimator, "the estimator, with options as NAME:key=value")
+      .type_name("NAME")
+      .show_default(kDefaultEstimator);
+  cli.add_option("--policy", options->policy,
+                 "decides which poses are kept, such as compact_pose; default: all are")
+      .type_name("NAME");
+  cli.add_option("--solve", options->solve, "auto, after every measurement, or explicit: by SOLVE")
+      .type_name("WHEN")
+      .one_of({"auto", "explicit"})
+      .show_default();
+  cli.add_option("--output", options->estimates,
+                 "estimates written after a solve: none, last, changed or all")
+      .type_name("WHICH")
+      .one_of({"none", "last", "changed", "all"})
+      .show_default();
+  cli.add_option("--marginals", options->marginals,
+                 "covariances kept, and written after a solve: none, last or diagonal")
+      .type_name("WHICH")
+      .one_of({"none", "last", "diagonal"})
+      .show_default();
+  cli.add_option("--budget", options->budget, "seconds that an update may take; 0: no limit")
+      .type_name("S")
+      .within(0.0, 1e9)
+      .show_default("0");
+  cli.add_option("--journal", options->journal,
+                 "log what is taken in, and begin with what the log has")
+      .type_name("FILE");
+  cli.add_option("--sync", options->sync,
+                 "it waits for the disk: every line, batch (before answers) or none")
+      .type_name("WHEN")
+      .one_of({"every", "batch", "none"})
+      .show_default();
+  cli.add_option("-o,--save", options->output, "write the last estimate as a graph at the end")
+      .type_name("OUT");
+  add_loss_options(cli, options->problem);
+  add_input_options(cli, options->input);
+  cli.footer(
       "Lines are those of g2o files and SOLVE, FULL, NEW, REMOVE, CHANGE, MARGINALIZE, "
       "COVARIANCE,\n"
       "ESTIMATE, CHI2, SAVE and QUIT; with --policy NEXT, NOMATCH and DONE: docs/online.md.\n\n"
       "Example:\n"
       "  robot | cairn online --marginals last --journal today.journal");
-  return {app, [options](Session& session) { return run(*options, session); }};
+  return {cli, [options](Session& session) { return run(*options, session); }};
 }
 
 }  // namespace cairn::app

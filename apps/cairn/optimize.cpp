@@ -4,8 +4,9 @@
 #include <optional>
 #include <string>
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
+#include "arguments.hpp"
 #include "cairn/report/recording.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/plugin_call.hpp"
@@ -13,7 +14,6 @@
 #include "commands.hpp"
 #include "covariances.hpp"
 #include "graph_files.hpp"
-#include "help.hpp"
 #include "interrupt.hpp"
 #include "json_report.hpp"
 #include "problem_setup.hpp"
@@ -182,39 +182,38 @@ int run(const OptimizeOptions& options, Session& session) {
 
 }  // namespace
 
-Command add_optimize(CLI::App& program) {
+Command add_optimize(ArgumentParser program) {
   auto options = std::make_shared<OptimizeOptions>();  // lives as long as the parser and the run
-  CLI::App* app = program.add_subcommand("optimize", "find the best estimate of a graph");
-  app->add_option("graph", options->graph, kGraphHelp)->type_name("GRAPH")->required();
-  app->add_option("-o,--output", options->output, "write the estimate (- is standard output)")
-      ->type_name("OUT");
-  app->add_option("--to", options->output_format, "format of OUT, instead of by the ending")
-      ->type_name("FORMAT");
-  app->add_option("--optimizer", options->optimizer,
-                  "the optimizer, with options as NAME:key=value")
-      ->type_name("NAME")
-      ->capture_default_str();
-  app->add_option("--linear-solver", options->linear_solver, "solves H x = g in each step")
-      ->type_name("NAME")
-      ->default_str(kDefaultLinearSolver);
-  add_problem_options(*app, options->problem);
-  add_time_limit(*app, options->problem.stop);
-  app->add_option("--record", options->record, "every iteration's positions, for cairn view")
-      ->type_name("FILE");
-  app->add_option("--covariance", options->covariance,
-                  "blocks of every variable, in the report, or none")
-      ->type_name("WHICH")
-      ->check(one_of({"blocks", "none"}))
-      ->capture_default_str();
-  add_input_options(*app, options->input);
-  app->footer(
+  ArgumentParser cli = program.add_command("optimize", "find the best estimate of a graph");
+  cli.add_option("graph", options->graph, kGraphHelp).type_name("GRAPH").required();
+  cli.add_option("-o,--output", options->output, "write the estimate (- is standard output)")
+      .type_name("OUT");
+  cli.add_option("--to", options->output_format, "format of OUT, instead of by the ending")
+      .type_name("FORMAT");
+  cli.add_option("--optimizer", options->optimizer, "the optimizer, with options as NAME:key=value")
+      .type_name("NAME")
+      .show_default();
+  cli.add_option("--linear-solver", options->linear_solver, "solves H x = g in each step")
+      .type_name("NAME")
+      .show_default(kDefaultLinearSolver);
+  add_problem_options(cli, options->problem);
+  add_time_limit(cli, options->problem.stop);
+  cli.add_option("--record", options->record, "every iteration's positions, for cairn view")
+      .type_name("FILE");
+  cli.add_option("--covariance", options->covariance,
+                 "blocks of every variable, in the report, or none")
+      .type_name("WHICH")
+      .one_of({"blocks", "none"})
+      .show_default();
+  add_input_options(cli, options->input);
+  cli.footer(
       "Example:\n"
       "  cairn optimize city.g2o -o best.g2o --linear-solver cholmod:ordering=metis --json "
       "run.json\n"
       "  cairn optimize @manhattan:poses=1000 --initial chordal --loss huber --loss-on loops\n"
       "Ctrl-C stops with the best estimate written. Names: cairn plugins; options: cairn plugins "
       "NAME");
-  return {app, [options](Session& session) { return run(*options, session); }};
+  return {cli, [options](Session& session) { return run(*options, session); }};
 }
 
 }  // namespace cairn::app

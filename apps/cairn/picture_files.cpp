@@ -4,13 +4,13 @@
 #include <algorithm>
 #include <filesystem>
 
-#include <fmt/format.h>
-#include <fmt/ranges.h>
+#include <fmt/core.h>
 
 #include "cairn/io/format.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/plugin_call.hpp"
 #include "graph_files.hpp"
+#include "table.hpp"
 
 namespace cairn::app {
 
@@ -33,7 +33,7 @@ std::string picture_format(const std::string& file, Session& session) {
   if (ending.empty() || std::find(names.begin(), names.end(), ending.substr(1)) == names.end()) {
     throw Error(ErrorCode::usage,
                 fmt::format("{}: nothing draws files of that name; endings on offer: .{}", file,
-                            fmt::join(names, ", .")));
+                            joined(names, ", .")));
   }
   check_folder(file);
   return ending.substr(1);

@@ -6,13 +6,12 @@
 #include <string>
 #include <system_error>
 
-#include <fmt/format.h>
-#include <fmt/ranges.h>
+#include <fmt/core.h>
 
 #include "album.hpp"
+#include "arguments.hpp"
 #include "cairn/runtime/error.hpp"
 #include "commands.hpp"
-#include "help.hpp"
 #include "json_report.hpp"
 #include "picture_files.hpp"
 #include "table.hpp"
@@ -86,7 +85,7 @@ int run(const PlotOptions& options, Session& session) {
   session.registry().make<Picture>(picture);  // a wrong name is told before files are read
   session.use_threads();
   const Album album = load_album(
-      options.album, fmt::format("cairn plot {}", fmt::join(options.album.files, " ")), session);
+      options.album, fmt::format("cairn plot {}", joined(options.album.files, " ")), session);
   const std::size_t bytes = write_picture(album, picture, output, session);
   boost::json::object report = begin_report("plot");
   report["picture"] = output;
@@ -99,44 +98,44 @@ int run(const PlotOptions& options, Session& session) {
 
 }  // namespace
 
-Command add_plot(CLI::App& program) {
+Command add_plot(ArgumentParser program) {
   auto options = std::make_shared<PlotOptions>();  // lives as long as the parser and the run
-  CLI::App* app = program.add_subcommand("plot", "a static plot: SVG, PNG or PDF");
-  add_album_options(*app, options->album);
-  app->add_option("-o,--output", options->output,
-                  "the plot: .svg, .png or .pdf [name of the first FILE, .svg]")
-      ->type_name("PICTURE");
-  app->add_option("--what", options->what,
-                  "trajectory, convergence, bars, scaling, sparsity, steps; auto: by FILE")
-      ->type_name("WHAT")
-      ->check(one_of({"auto", "trajectory", "convergence", "bars", "scaling", "sparsity", "steps"}))
-      ->capture_default_str();
-  app->add_option("--size", options->size, "WIDTHxHEIGHT [px; in a PDF 1/96 inch] [900x600]")
-      ->type_name("SIZE");
-  app->add_option("--theme", options->theme, "light or dark")
-      ->type_name("THEME")
-      ->check(one_of({"light", "dark"}))
-      ->capture_default_str();
-  app->add_option("--colour", options->colour, "of edges: by class or by residual")
-      ->type_name("BY")
-      ->check(one_of({"class", "residual"}))
-      ->capture_default_str();
-  app->add_option("--x", options->x, "of a convergence plot: iterations or time")
-      ->type_name("AXIS")
-      ->check(one_of({"iterations", "time"}))
-      ->capture_default_str();
-  app->add_option("--linear-solver", options->linear_solver,
-                  "its elimination order gives the sparsity of L")
-      ->type_name("NAME")
-      ->capture_default_str();
-  app->footer(
+  ArgumentParser cli = program.add_command("plot", "a static plot: SVG, PNG or PDF");
+  add_album_options(cli, options->album);
+  cli.add_option("-o,--output", options->output,
+                 "the plot: .svg, .png or .pdf [name of the first FILE, .svg]")
+      .type_name("PICTURE");
+  cli.add_option("--what", options->what,
+                 "trajectory, convergence, bars, scaling, sparsity, steps; auto: by FILE")
+      .type_name("WHAT")
+      .one_of({"auto", "trajectory", "convergence", "bars", "scaling", "sparsity", "steps"})
+      .show_default();
+  cli.add_option("--size", options->size, "WIDTHxHEIGHT [px; in a PDF 1/96 inch] [900x600]")
+      .type_name("SIZE");
+  cli.add_option("--theme", options->theme, "light or dark")
+      .type_name("THEME")
+      .one_of({"light", "dark"})
+      .show_default();
+  cli.add_option("--colour", options->colour, "of edges: by class or by residual")
+      .type_name("BY")
+      .one_of({"class", "residual"})
+      .show_default();
+  cli.add_option("--x", options->x, "of a convergence plot: iterations or time")
+      .type_name("AXIS")
+      .one_of({"iterations", "time"})
+      .show_default();
+  cli.add_option("--linear-solver", options->linear_solver,
+                 "its elimination order gives the sparsity of L")
+      .type_name("NAME")
+      .show_default();
+  cli.footer(
       "FILEs are laid together as by cairn view.\n\n"
       "Example:\n"
       "  cairn plot city.g2o best.g2o -o city.svg\n"
       "  cairn plot run1.json run2.json --what convergence --x time -o curves.pdf\n"
       "  cairn plot @sphere --what sparsity --linear-solver block_cholesky:ordering=natural -o "
       "L.png");
-  return {app, [options](Session& session) { return run(*options, session); }};
+  return {cli, [options](Session& session) { return run(*options, session); }};
 }
 
 }  // namespace cairn::app

@@ -5,10 +5,14 @@
 #include <cmath>
 #include <filesystem>
 #include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
 
-#include <fmt/format.h>
-#include <fmt/ranges.h>
+#include <fmt/core.h>
 
+#include "arguments.hpp"
 #include "cairn/io/format.hpp"
 #include "cairn/io/generator.hpp"
 #include "cairn/linear/iterative_solver.hpp"
@@ -119,7 +123,7 @@ std::string type_text(const OptionSpec& spec) {
 }
 
 std::string range_text(const OptionSpec& spec) {
-  if (spec.type == OptionType::choice) return fmt::format("{}", fmt::join(spec.choices, " | "));
+  if (spec.type == OptionType::choice) return joined(spec.choices, " | ");
   const bool low = std::isfinite(spec.minimum), high = std::isfinite(spec.maximum);
   if (low && high) return fmt::format("{:g} … {:g}", spec.minimum, spec.maximum);
   if (low) return fmt::format("from {:g}", spec.minimum);
@@ -185,7 +189,9 @@ std::vector<std::string> variable_abilities(const VariableType& type) {
 }
 
 std::vector<std::string> factor_abilities(const FactorType& type) {
-  std::vector<std::string> all{fmt::format("on {}", fmt::join(type.variable_tags(), " ")),
+  const std::span<const std::string_view> tags = type.variable_tags();
+  const std::vector<std::string> variables(tags.begin(), tags.end());
+  std::vector<std::string> all{fmt::format("on {}", joined(variables, " ")),
                                fmt::format("measurement of {} numbers", type.measurement_size()),
                                fmt::format("{} residuals", type.residual_size())};
   if (type.is_relative()) all.push_back("relative pose");
@@ -219,12 +225,12 @@ std::string details_text(const Offer& offer, bool optimized, const OptionTable& 
                          const std::vector<std::string>& abilities, bool colour) {
   const std::string title = fmt::format("{} ({}): {}", bold(offer.name, colour),
                                         kind_in_words(offer.kind), offer.summary);
-  std::string text = fmt::format("{}\n", fmt::join(folded(title, output_width() - 2), "\n  "));
+  std::string text = joined(folded(title, output_width() - 2), "\n  ") + "\n";
   Table facts({{"", Table::Align::left}, {"", Table::Align::left}}, "  ");
   facts.add({"plugin", fmt::format("{} {}, {}", offer.plugin, offer.version, offer.file.string())});
   facts.add({"licence", offer.licence});
   if (!optimized) facts.add({"build", "unoptimised"});
-  if (!abilities.empty()) facts.add({"abilities", fmt::format("{}", fmt::join(abilities, ", "))});
+  if (!abilities.empty()) facts.add({"abilities", joined(abilities, ", ")});
   if (options.specs().empty()) facts.add({"options", "none"});
   text += facts.text(false);
   if (options.specs().empty()) return text;
@@ -284,17 +290,17 @@ int show(const std::string& name, Session& session) {
 
 }  // namespace
 
-Command add_plugins(CLI::App& program) {
+Command add_plugins(ArgumentParser program) {
   auto name = std::make_shared<std::string>();  // lives as long as the parser and the run
-  CLI::App* app = program.add_subcommand("plugins", "what is on offer, or one name's options");
-  app->add_option("name", *name, "a solver, type, format …: its options, abilities and limits")
-      ->type_name("NAME");
-  app->footer(
+  ArgumentParser cli = program.add_command("plugins", "what is on offer, or one name's options");
+  cli.add_option("name", *name, "a solver, type, format …: its options, abilities and limits")
+      .type_name("NAME");
+  cli.footer(
       "Plugins are found by --plugin, CAIRN_PLUGIN_PATH, and in the folder cairn beside the core "
       "library.\n\n"
       "Example:\n"
       "  cairn plugins cholmod");
-  return {app, [name](Session& session) {
+  return {cli, [name](Session& session) {
             return name->empty() ? list(session) : show(*name, session);
           }};
 }

@@ -1,49 +1,45 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "problem_setup.hpp"
 
-#include <fmt/format.h>
-#include <fmt/ranges.h>
+#include <fmt/core.h>
 
+#include "arguments.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/plugin_call.hpp"
-#include "help.hpp"
+#include "table.hpp"
 
 namespace cairn::app {
 
-void add_loss_options(CLI::App& command, ProblemOptions& options) {
-  command.add_option("--loss", options.loss, "robust loss, such as huber:scale=1 [none]")
-      ->type_name("NAME");
-  command
-      .add_option("--loss-on", options.loss_on,
-                  "factors that the loss applies to: all, loops, or those of a type by its tag")
-      ->type_name("WHICH")
-      ->capture_default_str();
+void add_loss_options(ArgumentParser cli, ProblemOptions& options) {
+  cli.add_option("--loss", options.loss, "robust loss, such as huber:scale=1 [none]")
+      .type_name("NAME");
+  cli.add_option("--loss-on", options.loss_on,
+                 "factors that the loss applies to: all, loops, or those of a type by its tag")
+      .type_name("WHICH")
+      .show_default();
 }
 
-void add_problem_options(CLI::App& command, ProblemOptions& options) {
-  command
-      .add_option("--initial", options.initial, "initial estimate: a name of kind initial_guess")
-      ->type_name("NAME")
-      ->capture_default_str();
-  add_loss_options(command, options);
-  command.add_option("--iterations", options.stop.max_iterations, "largest number of iterations")
-      ->type_name("N")
-      ->check(within(0, 1000000000))
-      ->capture_default_str();
-  command
-      .add_option("--tolerance", options.stop.tolerance,
-                  "stop when chi2 falls by less than this part; 0: exactly N times")
-      ->type_name("T")
-      ->check(within(0.0, 1.0))
-      ->default_str("1e-10");
+void add_problem_options(ArgumentParser cli, ProblemOptions& options) {
+  cli.add_option("--initial", options.initial, "initial estimate: a name of kind initial_guess")
+      .type_name("NAME")
+      .show_default();
+  add_loss_options(cli, options);
+  cli.add_option("--iterations", options.stop.max_iterations, "largest number of iterations")
+      .type_name("N")
+      .within(0, 1000000000)
+      .show_default();
+  cli.add_option("--tolerance", options.stop.tolerance,
+                 "stop when chi2 falls by less than this part; 0: exactly N times")
+      .type_name("T")
+      .within(0.0, 1.0)
+      .show_default("1e-10");
 }
 
-void add_time_limit(CLI::App& command, Stop& stop) {
-  command
-      .add_option("--max-seconds", stop.max_seconds,
-                  "stop a run that takes longer, with its best estimate; 0: no limit [0]")
-      ->type_name("S")
-      ->check(within(0.0, 1e9));
+void add_time_limit(ArgumentParser cli, Stop& stop) {
+  cli.add_option("--max-seconds", stop.max_seconds,
+                 "stop a run that takes longer, with its best estimate; 0: no limit [0]")
+      .type_name("S")
+      .within(0.0, 1e9);
 }
 
 ProblemSetup::ProblemSetup(const ProblemOptions& options, Registry& registry)
@@ -109,14 +105,14 @@ Error linear_solver_refused(Registry& registry, const ComponentSpec& optimizer) 
                     "see cairn plugins {0} for its own options",
                     optimizer.name)};
   }
-  return {ErrorCode::usage,
-          fmt::format(
-              "optimizer '{0}' brings linear solvers of its own; instead of --linear-solver use "
-              "--optimizer {0}:{1}=NAME{2}",
-              optimizer.name, own->name,
-              own->choices.empty()
-                  ? std::string()
-                  : fmt::format(" with NAME one of {}", fmt::join(own->choices, ", ")))};
+  return {
+      ErrorCode::usage,
+      fmt::format(
+          "optimizer '{0}' brings linear solvers of its own; instead of --linear-solver use "
+          "--optimizer {0}:{1}=NAME{2}",
+          optimizer.name, own->name,
+          own->choices.empty() ? std::string()
+                               : fmt::format(" with NAME one of {}", joined(own->choices, ", ")))};
 }
 
 }  // namespace cairn::app

@@ -5,8 +5,7 @@
 #include <string>
 #include <vector>
 
-#include <CLI/App.hpp>
-
+#include "arguments.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/solve/initial_guess.hpp"
 #include "cairn/solve/optimizer.hpp"
@@ -27,11 +26,11 @@ struct ProblemOptions {
   std::string loss_on = "all";
   Stop stop;
 };
-void add_problem_options(CLI::App& command, ProblemOptions& options);
+void add_problem_options(ArgumentParser cli, ProblemOptions& options);
 /// --max-seconds, the limit of each run.
-void add_time_limit(CLI::App& command, Stop& stop);
+void add_time_limit(ArgumentParser cli, Stop& stop);
 /// The part of them that is about the loss.
-void add_loss_options(CLI::App& command, ProblemOptions& options);
+void add_loss_options(ArgumentParser cli, ProblemOptions& options);
 
 /// The initial guess and the loss that the options name; made before a graph is read, so that a
 /// wrong name is reported at once.

@@ -5,8 +5,10 @@
 #include <cmath>
 #include <memory>
 
-#include <fmt/format.h>
+#include <fmt/core.h>
+#include <boost/json/object.hpp>
 
+#include "arguments.hpp"
 #include "cairn/evaluation/batch_comparison.hpp"
 #include "cairn/online/recorded_graph.hpp"
 #include "cairn/runtime/error.hpp"
@@ -14,7 +16,6 @@
 #include "cairn/solve/estimator.hpp"
 #include "commands.hpp"
 #include "graph_files.hpp"
-#include "help.hpp"
 #include "interrupt.hpp"
 #include "picture_files.hpp"
 #include "problem_setup.hpp"
@@ -181,58 +182,55 @@ int run(const ReplayOptions& options, Session& session) {
 
 }  // namespace
 
-Command add_replay(CLI::App& program) {
+Command add_replay(ArgumentParser program) {
   auto options = std::make_shared<ReplayOptions>();  // lives as long as the parser and the run
-  CLI::App* app = program.add_subcommand(
+  ArgumentParser cli = program.add_command(
       "replay", "feed a graph to an estimator in the order of its measurements");
-  app->add_option("graph", options->graph, kGraphHelp)->type_name("GRAPH")->required();
-  app->add_option("-o,--output", options->output, "write the last estimate (- is standard output)")
-      ->type_name("OUT");
-  app->add_option("--to", options->output_format, "format of OUT, instead of by the ending")
-      ->type_name("FORMAT");
-  app->add_option("--estimator", options->estimator,
-                  "the estimator, with options as NAME:key=value")
-      ->type_name("NAME")
-      ->capture_default_str();
-  app->add_option("--marginals", options->marginals, "covariances kept: none, last or diagonal")
-      ->type_name("WHICH")
-      ->check(one_of({"none", "last", "diagonal"}))
-      ->capture_default_str();
-  app->add_option("--initial", options->problem.initial,
-                  "new poses: odometry, from the estimate so far, or as_given in the file")
-      ->type_name("HOW")
-      ->check(one_of({"odometry", "as_given"}))
-      ->capture_default_str();
-  app->add_option("--solve-every", options->solve_every, "solve after every so many poses")
-      ->type_name("N")
-      ->check(within(1, 1000000000))
-      ->capture_default_str();
-  app->add_option("--budget", options->budget, "seconds that an update may take; 0: no limit")
-      ->type_name("S")
-      ->check(within(0.0, 1e9))
-      ->default_str("0");
-  app->add_flag("--finish", options->finish, "solve the last step for all digits, in its own time");
-  app->add_flag("--estimate", options->estimate,
-                "count the time of reading all states, every step");
-  app->add_option("--check", options->checks,
-                  "compare chi2 with batch at so many steps (not timed)")
-      ->type_name("N")
-      ->check(within(0, 1000000000))
-      ->capture_default_str();
-  app->add_flag("--covariance-check", options->covariance_check,
-                "there, compare the covariances kept as well");
-  app->add_option("--steps", options->steps, "a row of times and counts for each step, as CSV")
-      ->type_name("FILE");
-  app->add_option("--plot", options->plot, "draw the time of each step: .svg, .png or .pdf")
-      ->type_name("FILE");
-  add_loss_options(*app, options->problem);
-  add_input_options(*app, options->input);
-  app->footer(
+  cli.add_option("graph", options->graph, kGraphHelp).type_name("GRAPH").required();
+  cli.add_option("-o,--output", options->output, "write the last estimate (- is standard output)")
+      .type_name("OUT");
+  cli.add_option("--to", options->output_format, "format of OUT, instead of by the ending")
+      .type_name("FORMAT");
+  cli.add_option("--estimator", options->estimator, "the estimator, with options as NAME:key=value")
+      .type_name("NAME")
+      .show_default();
+  cli.add_option("--marginals", options->marginals, "covariances kept: none, last or diagonal")
+      .type_name("WHICH")
+      .one_of({"none", "last", "diagonal"})
+      .show_default();
+  cli.add_option("--initial", options->problem.initial,
+                 "new poses: odometry, from the estimate so far, or as_given in the file")
+      .type_name("HOW")
+      .one_of({"odometry", "as_given"})
+      .show_default();
+  cli.add_option("--solve-every", options->solve_every, "solve after every so many poses")
+      .type_name("N")
+      .within(1, 1000000000)
+      .show_default();
+  cli.add_option("--budget", options->budget, "seconds that an update may take; 0: no limit")
+      .type_name("S")
+      .within(0.0, 1e9)
+      .show_default("0");
+  cli.add_flag("--finish", options->finish, "solve the last step for all digits, in its own time");
+  cli.add_flag("--estimate", options->estimate, "count the time of reading all states, every step");
+  cli.add_option("--check", options->checks, "compare chi2 with batch at so many steps (not timed)")
+      .type_name("N")
+      .within(0, 1000000000)
+      .show_default();
+  cli.add_flag("--covariance-check", options->covariance_check,
+               "there, compare the covariances kept as well");
+  cli.add_option("--steps", options->steps, "a row of times and counts for each step, as CSV")
+      .type_name("FILE");
+  cli.add_option("--plot", options->plot, "draw the time of each step: .svg, .png or .pdf")
+      .type_name("FILE");
+  add_loss_options(cli, options->problem);
+  add_input_options(cli, options->input);
+  cli.footer(
       "A step is a new pose with what it sees; files in another order are sorted first.\n\n"
       "Example:\n"
       "  cairn replay city.g2o --marginals diagonal --check 50 --steps steps.csv\n"
       "  cairn replay city.g2o --estimator periodic_batch:every=50 --budget 0.005");
-  return {app, [options](Session& session) { return run(*options, session); }};
+  return {cli, [options](Session& session) { return run(*options, session); }};
 }
 
 }  // namespace cairn::app

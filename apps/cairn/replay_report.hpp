@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include <boost/json/object.hpp>
+#include <boost/json/fwd.hpp>
 
 #include "cairn/evaluation/batch_comparison.hpp"
 #include "cairn/solve/estimator.hpp"

@@ -8,7 +8,7 @@
 #include <cstdio>
 #include <cstring>
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include "cairn/io/format.hpp"
 #include "cairn/runtime/error.hpp"
@@ -51,8 +51,7 @@ bool Session::colour() const { return use_colour(stdout_is_file_ ? stderr : stdo
 
 void Session::note(std::string_view text) const {
   if (common.quiet || text.empty()) return;
-  fmt::memory_buffer line;
-  fmt::format_to(std::back_inserter(line), "note: {}\n", in_command_line_words(std::string(text)));
+  const std::string line = fmt::format("note: {}\n", in_command_line_words(std::string(text)));
   std::fwrite(line.data(), 1, line.size(), stderr);
 }
 

@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include <boost/json/object.hpp>
+#include <boost/json/fwd.hpp>
 
 #include "cairn/plugin/registry.hpp"
 

@@ -9,15 +9,15 @@
 #include <utility>
 #include <vector>
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
+#include "arguments.hpp"
 #include "cairn/policy/policy_run.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/threads.hpp"
 #include "cairn/sparsification/sparsify_graph.hpp"
 #include "commands.hpp"
 #include "graph_files.hpp"
-#include "help.hpp"
 #include "interrupt.hpp"
 #include "json_report.hpp"
 #include "problem_setup.hpp"
@@ -250,72 +250,64 @@ int run_sparsify(const SparsifyCommandOptions& options, Session& session) {
   return guard.interrupted() ? kExitInterrupted : 0;
 }
 
-void add_sparsify_options(CLI::App& command, SparsifyCommandOptions& options) {
-  command.add_option("graph", options.graph, kGraphHelp)->type_name("GRAPH")->required();
-  command.add_option("-o,--output", options.output, "write the sparse graph")->type_name("OUT");
-  command.add_option("--to", options.output_format, "format of OUT")->type_name("FORMAT");
-  command.add_option("--keep-every", options.keep_every, "one of so many nodes stays")
-      ->type_name("N")
-      ->check(within(1.0, 1e9));
-  command
-      .add_option(
-          "--select", options.select,
-          "which leave: smallest_blanket, least_loss, oldest, coverage [smallest_blanket:part=0.5]")
-      ->type_name("NAME");
-  command
-      .add_option("--topology", options.topology,
-                  "which are related: clt, mi, dmi, ekld, odd, l1, best [ekld]")
-      ->type_name("NAME");
-  command
-      .add_option("--population", options.population,
-                  "by how many factors: tree:γ, fill:α or loss:KLD [tree:2]")
-      ->type_name("HOW");
-  command
-      .add_option("--recovery", options.recovery,
-                  "factor recovery: ncfd, fd, ip, pqn; closed_form for trees [ncfd]")
-      ->type_name("NAME");
-  command
-      .add_option(
-          "--scheme", options.scheme,
-          "single: one by one; runs: those in a row together; multi: all connected ones [single]")
-      ->type_name("HOW")
-      ->check(one_of({"single", "runs", "multi"}));
-  command.add_option("--sparsifier", options.sparsifier, "the sparsifier, with more options")
-      ->type_name("NAME")
-      ->capture_default_str();
-  command
-      .add_option("--online", options.online,
-                  "feed the graph pose by pose, and take nodes out every N poses")
-      ->type_name("N")
-      ->check(within(1.0, 1e9));
-  command.add_option("--estimator", options.estimator, "online: the estimator")
-      ->type_name("NAME")
-      ->capture_default_str();
-  command.add_option("--optimizer", options.optimizer, "the optimizer, before and after")
-      ->type_name("NAME")
-      ->capture_default_str();
-  command
-      .add_option("--linear-solver", options.linear_solver,
-                  "the linear solver that gives determinants")
-      ->type_name("NAME")
-      ->capture_default_str();
-  command.add_flag("--as-given", options.as_given,
-                   "the graph is at its minimum: do not optimise it");
-  command.add_flag("--no-kld", options.no_kld, "do not measure what was lost");
-  add_problem_options(command, options.problem);
-  add_input_options(command, options.input);
+void add_sparsify_options(ArgumentParser cli, SparsifyCommandOptions& options) {
+  cli.add_option("graph", options.graph, kGraphHelp).type_name("GRAPH").required();
+  cli.add_option("-o,--output", options.output, "write the sparse graph").type_name("OUT");
+  cli.add_option("--to", options.output_format, "format of OUT").type_name("FORMAT");
+  cli.add_option("--keep-every", options.keep_every, "one of so many nodes stays")
+      .type_name("N")
+      .within(1.0, 1e9);
+  cli.add_option(
+         "--select", options.select,
+         "which leave: smallest_blanket, least_loss, oldest, coverage [smallest_blanket:part=0.5]")
+      .type_name("NAME");
+  cli.add_option("--topology", options.topology,
+                 "which are related: clt, mi, dmi, ekld, odd, l1, best [ekld]")
+      .type_name("NAME");
+  cli.add_option("--population", options.population,
+                 "by how many factors: tree:γ, fill:α or loss:KLD [tree:2]")
+      .type_name("HOW");
+  cli.add_option("--recovery", options.recovery,
+                 "factor recovery: ncfd, fd, ip, pqn; closed_form for trees [ncfd]")
+      .type_name("NAME");
+  cli.add_option(
+         "--scheme", options.scheme,
+         "single: one by one; runs: those in a row together; multi: all connected ones [single]")
+      .type_name("HOW")
+      .one_of({"single", "runs", "multi"});
+  cli.add_option("--sparsifier", options.sparsifier, "the sparsifier, with more options")
+      .type_name("NAME")
+      .show_default();
+  cli.add_option("--online", options.online,
+                 "feed the graph pose by pose, and take nodes out every N poses")
+      .type_name("N")
+      .within(1.0, 1e9);
+  cli.add_option("--estimator", options.estimator, "online: the estimator")
+      .type_name("NAME")
+      .show_default();
+  cli.add_option("--optimizer", options.optimizer, "the optimizer, before and after")
+      .type_name("NAME")
+      .show_default();
+  cli.add_option("--linear-solver", options.linear_solver,
+                 "the linear solver that gives determinants")
+      .type_name("NAME")
+      .show_default();
+  cli.add_flag("--as-given", options.as_given, "the graph is at its minimum: do not optimise it");
+  cli.add_flag("--no-kld", options.no_kld, "do not measure what was lost");
+  add_problem_options(cli, options.problem);
+  add_input_options(cli, options.input);
 }
 
-Command add_sparsify(CLI::App& program) {
+Command add_sparsify(ArgumentParser program) {
   auto options = std::make_shared<SparsifyCommandOptions>();
-  CLI::App* app = program.add_subcommand(
+  ArgumentParser cli = program.add_command(
       "sparsify", "take nodes out of a graph and keep their information in a few factors");
-  add_sparsify_options(*app, *options);
-  app->footer(
+  add_sparsify_options(cli, *options);
+  cli.footer(
       "Example:\n"
       "  cairn sparsify my.g2o -o sparse.g2o\n"
       "  cairn sparsify my.g2o --keep-every 5 --scheme runs --population tree:1.5 -o sparse.g2o");
-  return {app, [options](Session& session) { return run_sparsify(*options, session); }};
+  return {cli, [options](Session& session) { return run_sparsify(*options, session); }};
 }
 
 }  // namespace cairn::app

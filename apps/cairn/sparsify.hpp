@@ -3,8 +3,7 @@
 
 #include <string>
 
-#include <CLI/App.hpp>
-
+#include "arguments.hpp"
 #include "graph_files.hpp"
 #include "problem_setup.hpp"
 #include "session.hpp"
@@ -30,7 +29,7 @@ struct SparsifyCommandOptions {
 };
 
 /// The options of `cairn sparsify`.
-void add_sparsify_options(CLI::App& command, SparsifyCommandOptions& options);
+void add_sparsify_options(ArgumentParser cli, SparsifyCommandOptions& options);
 
 /// Returns the exit code.
 int run_sparsify(const SparsifyCommandOptions& options, Session& session);

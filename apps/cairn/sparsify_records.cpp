@@ -10,7 +10,7 @@
 #include <memory>
 #include <stdexcept>
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <boost/json/parse.hpp>

@@ -5,7 +5,8 @@
 #include <cmath>
 #include <utility>
 
-#include <fmt/format.h>
+#include <fmt/core.h>
+#include <boost/json/object.hpp>
 
 #include "table.hpp"
 

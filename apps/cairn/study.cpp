@@ -5,12 +5,12 @@
 #include <utility>
 #include <vector>
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
+#include "arguments.hpp"
 #include "cairn/sparsification/sparsification.hpp"
 #include "commands.hpp"
 #include "compact.hpp"
-#include "help.hpp"
 #include "interrupt.hpp"
 #include "json_report.hpp"
 #include "progress.hpp"
@@ -23,48 +23,48 @@ namespace {
 
 namespace json = boost::json;
 
-Command add_study_compact(CLI::App& study) {
+Command add_study_compact(ArgumentParser study) {
   auto options = std::make_shared<CompactOptions>();  // lives as long as the parser and the run
-  CLI::App* app =
-      study.add_subcommand("compact", "cairn compact with a control, and beside everything");
-  add_compact_options(*app, *options, {"apal", "apfl", "fpfl", "rfpfl"});
-  app->get_option("--strategy")
-      ->description(
+  ArgumentParser cli =
+      study.add_command("compact", "cairn compact with a control, and beside everything");
+  add_compact_options(cli, *options, {"apal", "apfl", "fpfl", "rfpfl"});
+  cli.option("--strategy")
+      .description(
           "all or few poses and loops: apal, apfl, fpfl; rfpfl at random, as many as fpfl");
-  app->add_option("--seed", options->seed, "of rfpfl")->type_name("N")->capture_default_str();
-  app->add_option("--error-ratio", options->error_ratio,
-                  "errors over those with all loops, at most, in the sample; 0: do not try")
-      ->type_name("X")
-      ->check(within(0.0, 1e9))
-      ->capture_default_str();
-  app->add_option("--compare", options->compare,
-                  "covariances beside those with everything, each step (slow), as CSV")
-      ->type_name("FILE");
-  app->footer(
+  cli.add_option("--seed", options->seed, "of rfpfl").type_name("N").show_default();
+  cli.add_option("--error-ratio", options->error_ratio,
+                 "errors over those with all loops, at most, in the sample; 0: do not try")
+      .type_name("X")
+      .within(0.0, 1e9)
+      .show_default();
+  cli.add_option("--compare", options->compare,
+                 "covariances beside those with everything, each step (slow), as CSV")
+      .type_name("FILE");
+  cli.footer(
       "Example:\n"
       "  cairn study compact city.g2o --thresholds city.json --strategy rfpfl --seed 3");
-  return {app, [options](Session& session) { return run_compact(*options, session); }};
+  return {cli, [options](Session& session) { return run_compact(*options, session); }};
 }
 
-Command add_study_sparsify(CLI::App& study) {
+Command add_study_sparsify(ArgumentParser study) {
   auto options = std::make_shared<SparsifyCommandOptions>();
-  CLI::App* app = study.add_subcommand(
+  ArgumentParser cli = study.add_command(
       "sparsify", "cairn sparsify as in the thesis, and with its problems recorded");
-  add_sparsify_options(*app, *options);
-  app->add_option(
+  add_sparsify_options(cli, *options);
+  cli.add_option(
          "--redirect", options->redirect,
          "online: factors to nodes that leave go to the nearest in space once these have left "
          "(late), or at once to the nearest in order (early)")
-      ->type_name("WHEN")
-      ->check(one_of({"late", "early"}))
-      ->capture_default_str();
-  app->add_option("--record", options->record, "write every problem that comes up, as JSON")
-      ->type_name("FILE");
-  app->footer(
+      .type_name("WHEN")
+      .one_of({"late", "early"})
+      .show_default();
+  cli.add_option("--record", options->record, "write every problem that comes up, as JSON")
+      .type_name("FILE");
+  cli.footer(
       "Example:\n"
       "  cairn study sparsify city.g2o --keep-every 5 --online 100 --redirect early "
       "--record problems.json");
-  return {app, [options](Session& session) { return run_sparsify(*options, session); }};
+  return {cli, [options](Session& session) { return run_sparsify(*options, session); }};
 }
 
 // Problems ----------------------------------------------------------------------------------------
@@ -140,43 +140,43 @@ int solve_problems(const ProblemsOptions& options, Session& session) {
   return guard.interrupted() ? kExitInterrupted : 0;
 }
 
-Command add_study_problems(CLI::App& study) {
+Command add_study_problems(ArgumentParser study) {
   auto options = std::make_shared<ProblemsOptions>();
-  CLI::App* app = study.add_subcommand(
+  ArgumentParser cli = study.add_command(
       "problems", "solve recorded sparsification problems by each topology and recovery");
-  app->add_option("problems", options->problems, "what cairn study sparsify --record has written")
-      ->type_name("FILE")
-      ->required();
-  app->add_option("--topology", options->topologies, "which are related (repeatedly) [ekld]")
-      ->type_name("NAME")
-      ->allow_extra_args(false);
-  app->add_option("--population", options->population, "by how many factors: tree:γ or fill:α")
-      ->type_name("HOW")
-      ->capture_default_str();
-  app->add_option("--recovery", options->recoveries,
-                  "what finds their information (repeatedly) [ncfd]")
-      ->type_name("NAME")
-      ->allow_extra_args(false);
-  app->footer(
+  cli.add_option("problems", options->problems, "what cairn study sparsify --record has written")
+      .type_name("FILE")
+      .required();
+  cli.add_option("--topology", options->topologies, "which are related (repeatedly) [ekld]")
+      .type_name("NAME")
+      .repeatable();
+  cli.add_option("--population", options->population, "by how many factors: tree:γ or fill:α")
+      .type_name("HOW")
+      .show_default();
+  cli.add_option("--recovery", options->recoveries,
+                 "what finds their information (repeatedly) [ncfd]")
+      .type_name("NAME")
+      .repeatable();
+  cli.footer(
       "Example:\n"
       "  cairn study problems problems.json --topology mi --recovery fd --recovery ncfd");
-  return {app, [options](Session& session) { return solve_problems(*options, session); }};
+  return {cli, [options](Session& session) { return solve_problems(*options, session); }};
 }
 
 }  // namespace
 
-Command add_study(CLI::App& program) {
-  CLI::App* app = program.add_subcommand("study", "what only the tables of papers need");
-  app->require_subcommand(1);
-  const std::vector<Command> studies = {add_study_compact(*app), add_study_sparsify(*app),
-                                        add_study_problems(*app)};
-  app->footer(
+Command add_study(ArgumentParser program) {
+  ArgumentParser cli = program.add_command("study", "what only the tables of papers need");
+  cli.require_command();
+  const std::vector<Command> studies = {add_study_compact(cli), add_study_sparsify(cli),
+                                        add_study_problems(cli)};
+  cli.footer(
       "Example:\n"
       "  cairn study sparsify @manhattan --keep-every 5 --record problems.json\n"
       "  cairn study problems problems.json --recovery ncfd --recovery ip");
-  return {app, [studies](Session& session) {
+  return {cli, [studies](Session& session) {
             for (const Command& study : studies) {
-              if (study.app->parsed()) return study.run(session);
+              if (study.parser.parsed()) return study.run(session);
             }
             return 0;
           }};

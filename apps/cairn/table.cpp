@@ -11,8 +11,7 @@
 #include <numeric>
 #include <utility>
 
-#include <fmt/format.h>
-#include <fmt/ranges.h>
+#include <fmt/core.h>
 
 namespace cairn::app {
 namespace {
@@ -146,7 +145,7 @@ std::string Table::text(bool colour, std::size_t width) const {
     all += (all.empty() ? "" : "\n") + part_text(layout, part, colour);
   }
   if (!layout.left_out.empty()) {
-    all += fmt::format("{}(no room for: {})\n", indent_, fmt::join(layout.left_out, ", "));
+    all += fmt::format("{}(no room for: {})\n", indent_, joined(layout.left_out, ", "));
   }
   return all;
 }
@@ -237,6 +236,15 @@ std::string chi2_text(double chi2) { return fmt::format("{:.8g}", chi2); }
 
 std::string plural(std::int64_t count, std::string_view noun) {
   return fmt::format("{} {}{}", count, noun, count == 1 ? "" : "s");
+}
+
+std::string joined(std::span<const std::string> parts, std::string_view between) {
+  std::string text;
+  for (const std::string& part : parts) {
+    if (&part != &parts.front()) text += between;
+    text += part;
+  }
+  return text;
 }
 
 }  // namespace cairn::app

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstdio>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -70,7 +71,7 @@ std::size_t terminal_width(std::FILE* stream);
 bool use_colour(std::FILE* stream);
 std::string bold(std::string_view text, bool colour);
 
-// Numbers for people -----------------------------------------------------------------------------
+// Numbers and lists for people --------------------------------------------------------------------
 /// "812 µs", "12.3 ms", "4.56 s"
 std::string seconds_text(double seconds);
 /// "612 B", "46.9 KiB", "17.7 MiB"; "-" for 0, which stands for not known
@@ -81,5 +82,8 @@ std::string count_text(std::int64_t count);
 std::string chi2_text(double chi2);
 /// "1 factor", "2 factors"
 std::string plural(std::int64_t count, std::string_view noun);
+/// The parts, with `between` between each two. What fmt::join does, without its templates, which
+/// take a fifth of a second in each file.
+std::string joined(std::span<const std::string> parts, std::string_view between);
 
 }  // namespace cairn::app

@@ -3,10 +3,10 @@
 #include <filesystem>
 #include <memory>
 
-#include <fmt/format.h>
-#include <fmt/ranges.h>
+#include <fmt/core.h>
 
 #include "album.hpp"
+#include "arguments.hpp"
 #include "cairn/io/format.hpp"
 #include "cairn/runtime/error.hpp"
 #include "commands.hpp"
@@ -76,7 +76,7 @@ int run(const ViewOptions& options, Session& session) {
   check_folder(page);
   session.use_threads();
   const Album album = load_album(
-      options.album, fmt::format("cairn view {}", fmt::join(options.album.files, " ")), session);
+      options.album, fmt::format("cairn view {}", joined(options.album.files, " ")), session);
   const std::size_t bytes = write_picture(album, {"html", {}}, page, session);
   session.write_json(report_json(album, page, bytes));
   session.print(fmt::format("{}: {}; open it in any browser\n", page,
@@ -86,13 +86,13 @@ int run(const ViewOptions& options, Session& session) {
 
 }  // namespace
 
-Command add_view(CLI::App& program) {
+Command add_view(ArgumentParser program) {
   auto options = std::make_shared<ViewOptions>();  // lives as long as the parser and the run
-  CLI::App* app = program.add_subcommand("view", "an HTML report with interactive graphs");
-  add_album_options(*app, options->album);
-  app->add_option("-o,--output", options->output, "the page [name of the first FILE, .html]")
-      ->type_name("PAGE");
-  app->footer(
+  ArgumentParser cli = program.add_command("view", "an HTML report with interactive graphs");
+  add_album_options(cli, options->album);
+  cli.add_option("-o,--output", options->output, "the page [name of the first FILE, .html]")
+      .type_name("PAGE");
+  cli.footer(
       "Graphs with the same ids are laid over each other: the lowest chi2 is the estimate, the "
       "first\n"
       "FILE else the initial guess. Files without factors are ground truth, by id. The page needs "
@@ -101,7 +101,7 @@ Command add_view(CLI::App& program) {
       "Example:\n"
       "  cairn optimize city.g2o -o best.g2o --json run.json --record run.jsonl\n"
       "  cairn view city.g2o best.g2o run.json run.jsonl -o city.html");
-  return {app, [options](Session& session) { return run(*options, session); }};
+  return {cli, [options](Session& session) { return run(*options, session); }};
 }
 
 }  // namespace cairn::app

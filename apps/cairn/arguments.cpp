@@ -1,0 +1,271 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "arguments.hpp"
+#include "table.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <type_traits>
+#include <utility>
+
+#include <fmt/core.h>
+#include <CLI/App.hpp>
+#include <CLI/Config.hpp>     // definitions that App.hpp only declares
+#include <CLI/Formatter.hpp>  // likewise
+
+namespace cairn::app {
+namespace {
+
+template <class Number>
+CLI::Validator number_within(Number low, Number high) {
+  const auto check = [low, high](const std::string& text) {
+    Number value{};
+    const bool good = CLI::detail::lexical_cast(text, value) && value >= low && value <= high;
+    const char* kind = std::is_integral_v<Number> ? "whole number" : "number";
+    return good ? std::string() : fmt::format("'{}' is no {} from {} to {}", text, kind, low, high);
+  };
+  return {check, ""};
+}
+
+CLI::Validator finite_seconds(double least) {
+  const auto check = [least](const std::string& text) {
+    double value = 0.0;
+    const bool good =
+        CLI::detail::lexical_cast(text, value) && std::isfinite(value) && value >= least;
+    return good ? std::string()
+                : fmt::format("'{}' is no number of seconds{}", text,
+                              least == 0.0 ? ", from 0" : "");
+  };
+  return {check, ""};
+}
+
+CLI::Validator one_of_these(std::vector<std::string> choices) {
+  const auto check = [choices = std::move(choices)](const std::string& text) {
+    const bool good = std::ranges::find(choices, text) != choices.end();
+    return good ? std::string() : fmt::format("'{}' is none of {}", text, joined(choices, ", "));
+  };
+  return {check, ""};
+}
+
+}  // namespace
+
+// Argument ----------------------------------------------------------------------------------------
+
+Argument& Argument::type_name(const std::string& name) {
+  option_->type_name(name);
+  return *this;
+}
+
+Argument& Argument::description(const std::string& text) {
+  option_->description(text);
+  return *this;
+}
+
+Argument& Argument::show_default() {
+  option_->capture_default_str();
+  return *this;
+}
+
+Argument& Argument::show_default(const std::string& text) {
+  option_->default_str(text);
+  return *this;
+}
+
+Argument& Argument::required() {
+  option_->required();
+  return *this;
+}
+
+Argument& Argument::repeatable() {
+  option_->allow_extra_args(false);
+  return *this;
+}
+
+Argument& Argument::separated_by(char delimiter) {
+  option_->delimiter(delimiter);
+  return *this;
+}
+
+Argument& Argument::within(int low, int high) {
+  option_->check(number_within(low, high));
+  return *this;
+}
+
+Argument& Argument::within(double low, double high) {
+  option_->check(number_within(low, high));
+  return *this;
+}
+
+Argument& Argument::within(std::uint64_t low, std::uint64_t high) {
+  option_->check(number_within(low, high));
+  return *this;
+}
+
+Argument& Argument::one_of(std::vector<std::string> choices) {
+  option_->check(one_of_these(std::move(choices)));
+  return *this;
+}
+
+Argument& Argument::seconds_from(double least) {
+  option_->check(finite_seconds(least));
+  return *this;
+}
+
+std::string Argument::name() const { return option_->get_name(); }
+
+std::vector<std::string> Argument::short_names() const { return option_->get_snames(); }
+
+std::vector<std::string> Argument::long_names() const { return option_->get_lnames(); }
+
+std::string Argument::type_name() const { return option_->get_type_name(); }
+
+std::string Argument::description() const { return option_->get_description(); }
+
+std::string Argument::default_text() const { return option_->get_default_str(); }
+
+bool Argument::is_positional() const { return option_->get_positional(); }
+
+bool Argument::is_required() const { return option_->get_required(); }
+
+int Argument::most_values() const { return option_->get_items_expected_max(); }
+
+// ArgumentParser ----------------------------------------------------------------------------------
+
+ArgumentParser ArgumentParser::add_command(const std::string& name,
+                                           const std::string& description) {
+  return ArgumentParser(*app_->add_subcommand(name, description));
+}
+
+Argument ArgumentParser::add_option(const std::string& names, std::string& value,
+                                    const std::string& help) {
+  return Argument(*app_->add_option(names, value, help));
+}
+
+Argument ArgumentParser::add_option(const std::string& names, std::vector<std::string>& value,
+                                    const std::string& help) {
+  return Argument(*app_->add_option(names, value, help));
+}
+
+Argument ArgumentParser::add_option(const std::string& names, int& value, const std::string& help) {
+  return Argument(*app_->add_option(names, value, help));
+}
+
+Argument ArgumentParser::add_option(const std::string& names, double& value,
+                                    const std::string& help) {
+  return Argument(*app_->add_option(names, value, help));
+}
+
+Argument ArgumentParser::add_option(const std::string& names, std::uint64_t& value,
+                                    const std::string& help) {
+  return Argument(*app_->add_option(names, value, help));
+}
+
+Argument ArgumentParser::add_option(const std::string& names, std::optional<double>& value,
+                                    const std::string& help) {
+  return Argument(*app_->add_option(names, value, help));
+}
+
+void ArgumentParser::add_flag(const std::string& names, bool& value, const std::string& help) {
+  app_->add_flag(names, value, help);
+}
+
+Argument ArgumentParser::option(const std::string& name) const {
+  return Argument(*app_->get_option(name));
+}
+
+void ArgumentParser::footer(const std::string& text) { app_->footer(text); }
+
+void ArgumentParser::require_command() { app_->require_subcommand(1); }
+
+bool ArgumentParser::parsed() const { return app_->parsed(); }
+
+std::string ArgumentParser::name() const { return app_->get_name(); }
+
+std::string ArgumentParser::description() const { return app_->get_description(); }
+
+std::string ArgumentParser::footer() const { return app_->get_footer(); }
+
+std::optional<ArgumentParser> ArgumentParser::parent() const {
+  if (!app_->get_parent()) return std::nullopt;
+  return ArgumentParser(*app_->get_parent());
+}
+
+std::vector<ArgumentParser> ArgumentParser::commands() const {
+  std::vector<ArgumentParser> all;
+  for (CLI::App* command : app_->get_subcommands([](CLI::App*) { return true; }))
+    all.emplace_back(*command);
+  return all;
+}
+
+std::vector<Argument> ArgumentParser::arguments() const {
+  std::vector<Argument> all;
+  for (CLI::Option* option : app_->get_options()) all.emplace_back(*option);
+  return all;
+}
+
+std::vector<Argument> ArgumentParser::arguments_but_help() const {
+  std::vector<Argument> all;
+  for (CLI::Option* option : app_->get_options()) {
+    if (option != app_->get_help_ptr() && option != app_->get_version_ptr())
+      all.emplace_back(*option);
+  }
+  return all;
+}
+
+// ProgramParser -----------------------------------------------------------------------------------
+
+ProgramParser::ProgramParser(const std::string& name, const std::string& description)
+    : app_(std::make_unique<CLI::App>(description, name)) {
+  app_->fallthrough();
+  app_->require_subcommand(0, 1);
+}
+
+ProgramParser::~ProgramParser() = default;
+
+void ProgramParser::add_help(const std::string& names, const std::string& help) {
+  app_->set_help_flag(names, help);
+}
+
+void ProgramParser::add_version(const std::string& names, const std::string& text,
+                                const std::string& help) {
+  app_->set_version_flag(names, text, help);
+}
+
+Argument ProgramParser::add_config(const std::string& names, const std::string& help) {
+  app_->allow_config_extras(CLI::config_extras_mode::error);
+  return Argument(*app_->set_config(names, "", help));
+}
+
+ParseOutcome ProgramParser::parse(int argc, const char* const* argv) {
+  using Kind = ParseOutcome::Kind;
+  try {
+    app_->parse(argc, argv);
+    return {};
+  } catch (const CLI::CallForHelp&) {
+    return {Kind::help, "", {}};
+  } catch (const CLI::CallForVersion&) {
+    return {Kind::version, "", {}};
+  } catch (const CLI::ConfigError& error) {
+    return {Kind::config_key, error.what(), {}};
+  } catch (const CLI::FileError& error) {
+    return {Kind::config_file, error.what(), {}};
+  } catch (const CLI::ParseError& error) {
+    // A misspelt option leaves its value behind, which then stands where another argument belongs:
+    // so unknown words are what went wrong first, whatever the parser complains of.
+    std::vector<std::string> left = app_->remaining(true);
+    if (!left.empty()) return {Kind::unknown_words, error.what(), std::move(left)};
+    if (dynamic_cast<const CLI::RequiredError*>(&error) && chosen())
+      return {Kind::missing, error.what(), {}};
+    const bool mismatch = dynamic_cast<const CLI::ArgumentMismatch*>(&error) != nullptr;
+    return {mismatch ? Kind::without_value : Kind::bad_value, error.what(), {}};
+  }
+}
+
+std::optional<ArgumentParser> ProgramParser::chosen() const {
+  CLI::App* innermost = nullptr;  // a study is a command of a command
+  for (auto used = app_->get_subcommands(); !used.empty(); used = innermost->get_subcommands())
+    innermost = used.front();
+  if (!innermost) return std::nullopt;
+  return ArgumentParser(*innermost);
+}
+
+}  // namespace cairn::app

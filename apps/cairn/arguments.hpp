@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+// CLI11 is all headers and takes seconds to compile: only arguments.cpp includes it.
+namespace CLI {
+class App;
+class Option;
+}  // namespace CLI
+
+namespace cairn::app {
+
+/// An argument or option of a command. What describes it further returns it again. A handle, valid
+/// as long as the program's parser.
+class Argument {
+ public:
+  explicit Argument(CLI::Option& option) : option_(&option) {}
+
+  /// What stands for its value in the help, such as FILE.
+  Argument& type_name(const std::string& name);
+  /// Replaces the line of help.
+  Argument& description(const std::string& text);
+  /// Shows a default in the help: the value that the variable has now, or a text.
+  Argument& show_default();
+  Argument& show_default(const std::string& text);
+
+  /// It must be given.
+  Argument& required();
+  /// Given repeatedly, with one value each time; else one option takes all words that follow.
+  Argument& repeatable();
+  /// One word may hold several values.
+  Argument& separated_by(char delimiter);
+
+  // What a value must be. A refusal says what is expected: "'many' is no whole number from 0 to
+  // 1024". None of them shows in the help, whose first column must stay narrow.
+  Argument& within(int low, int high);
+  Argument& within(double low, double high);
+  Argument& within(std::uint64_t low, std::uint64_t high);
+  Argument& one_of(std::vector<std::string> choices);
+  /// A finite number of seconds.
+  Argument& seconds_from(double least);
+
+  // For the help and for errors.
+  std::string name() const;                      ///< "--output", or "graph" of a positional one
+  std::vector<std::string> short_names() const;  ///< "o"
+  std::vector<std::string> long_names() const;   ///< "output"
+  std::string type_name() const;
+  std::string description() const;
+  std::string default_text() const;  ///< empty: none is shown
+  bool is_positional() const;        ///< told from others by where it stands
+  bool is_required() const;
+  int most_values() const;  ///< 0 of a flag
+
+ private:
+  CLI::Option* option_;
+};
+
+/// The parser of the program's command line, or of that of one of its commands, to which arguments,
+/// options and commands are added. A handle, valid as long as the program's parser.
+class ArgumentParser {
+ public:
+  explicit ArgumentParser(CLI::App& app) : app_(&app) {}
+
+  ArgumentParser add_command(const std::string& name, const std::string& description);
+
+  /// Adds an option ("-o,--output"), or a positional argument ("graph"). Parsing writes to `value`,
+  /// which must live as long; where it is not given the value stays.
+  Argument add_option(const std::string& names, std::string& value, const std::string& help);
+  Argument add_option(const std::string& names, std::vector<std::string>& value,
+                      const std::string& help);
+  Argument add_option(const std::string& names, int& value, const std::string& help);
+  Argument add_option(const std::string& names, double& value, const std::string& help);
+  Argument add_option(const std::string& names, std::uint64_t& value, const std::string& help);
+  Argument add_option(const std::string& names, std::optional<double>& value,
+                      const std::string& help);
+  /// An option without a value.
+  void add_flag(const std::string& names, bool& value, const std::string& help);
+
+  /// The option of that name. Precondition: it has been added.
+  Argument option(const std::string& name) const;
+
+  /// The text below the options in the help.
+  void footer(const std::string& text);
+  /// One of its commands must be given.
+  void require_command();
+  /// Whether the command was on the command line.
+  bool parsed() const;
+
+  // For the help and for errors.
+  std::string name() const;
+  std::string description() const;
+  std::string footer() const;
+  std::optional<ArgumentParser> parent() const;  ///< nothing of the program itself
+  std::vector<ArgumentParser> commands() const;  ///< in the order in which they were added
+  std::vector<Argument> arguments() const;       ///< in the order in which they were added
+  /// Of these, all but those that ask for the help or the version.
+  std::vector<Argument> arguments_but_help() const;
+
+ private:
+  CLI::App* app_;
+};
+
+/// How a command line was understood, or what kept it from being so.
+struct ParseOutcome {
+  enum class Kind {
+    command,        ///< to be run
+    help,           ///< asked for
+    version,        ///< asked for
+    config_key,     ///< the configuration file says something that nobody takes
+    config_file,    ///< it cannot be read
+    unknown_words,  ///< words of the command line that nobody takes
+    missing,        ///< an argument or option of a command that must be given
+    without_value,  ///< an option that needs a value stands without one
+    bad_value       ///< a value of the wrong type, or refused
+  };
+  Kind kind = Kind::command;
+  std::string message;             ///< CLI11's
+  std::vector<std::string> words;  ///< the unknown ones
+};
+
+/// The parser of the whole command line. Common options may stand before or after the command.
+class ProgramParser {
+ public:
+  ProgramParser(const std::string& name, const std::string& description);
+  ~ProgramParser();
+
+  ArgumentParser root() const { return ArgumentParser(*app_); }
+  /// The flags that ask for the help (also of each command that is added later) and the version.
+  void add_help(const std::string& names, const std::string& help);
+  void add_version(const std::string& names, const std::string& text, const std::string& help);
+  /// The option that names a file of options, in TOML.
+  Argument add_config(const std::string& names, const std::string& help);
+
+  ParseOutcome parse(int argc, const char* const* argv);
+  /// The innermost command that the command line names, if any.
+  std::optional<ArgumentParser> chosen() const;
+
+ private:
+  std::unique_ptr<CLI::App> app_;
+};
+
+}  // namespace cairn::app
