@@ -9,8 +9,6 @@
 
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
-#include "cairn/solve/optimizer.hpp"
-#include "levenberg_marquardt/levenberg_marquardt.hpp"
 
 namespace cairn {
 namespace {
@@ -73,31 +71,6 @@ TEST(ComponentOptions, HaveANameAndALineOfHelpEach) {
       EXPECT_LT(spec.minimum, spec.maximum) << spec.name;
     }
   });
-}
-
-TEST(ComponentOptions, AStructDoesWhatItsTextDoes) {
-  Registry registry;
-  const LevenbergMarquardtOptions options{.linear_solver = "eigen:ordering=natural",
-                                          .largest_lambda = 10.0};
-  EXPECT_EQ(to_text("levenberg_marquardt", options),
-            "levenberg_marquardt:largest_lambda=10,linear_solver=eigen:ordering=natural");
-  EXPECT_NE(registry.make<Optimizer>("levenberg_marquardt", options), nullptr);
-}
-
-TEST(ComponentOptions, AStructIsCheckedLikeText) {
-  Registry registry;
-  const auto refusal = [&](const LevenbergMarquardtOptions& options) -> std::string {
-    try {
-      registry.make<Optimizer>("levenberg_marquardt", options);
-    } catch (const Error& error) {
-      return error.what();
-    }
-    return "";
-  };
-  EXPECT_THAT(refusal({.largest_lambda = 0.5}),
-              HasSubstr("option 'largest_lambda' is '0.5', expected a number, 1 to 1e+30"));
-  EXPECT_THAT(refusal({.linear_solver = "eigen:ordering=netural"}),
-              HasSubstr("option 'ordering' cannot be 'netural'; did you mean 'natural'?"));
 }
 
 }  // namespace

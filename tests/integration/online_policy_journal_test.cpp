@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// cairn online --policy --journal: nothing is lost, and it goes on where the journal ends.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <string>
+
+#include "integration/front_end.hpp"
+#include "integration/process.hpp"
+
+namespace cairn::test {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::SizeIs;
+using testing::StartsWith;
+
+/// Questions that read the estimator, which hands over what had been held back.
+Lines questions(long pose) {
+  if (pose % 9 == 4) return {"ESTIMATE ALL"};
+  if (pose % 9 == 6) return {"COVARIANCE 0 0", "NEXT"};
+  if (pose % 25 == 8) return {"SAVE nowhere/at/all.g2o"};  // fails after it was read
+  return {};
+}
+
+TEST_F(OnlinePolicy, GoesOnWhereTheJournalEnds) {
+  const std::string graph = generate("manhattan:poses=200");
+  const std::string policy = kPolicy + ",gate=0.9";
+  const Dialogue whole = drive(graph, online(policy, {"-o", folder_.file("whole.g2o")}), questions);
+  ASSERT_GT(whole.count("LINKED"), 5);
+  // Stopped after every 37th line, whatever it is.
+  const Arguments arguments =
+      online(policy, {"--journal", folder_.file("log"), "-o", folder_.file("parts.g2o")});
+  std::size_t from = 0, restarts = 0;
+  std::string last_answer;
+  for (; from < whole.told.size(); ++restarts) {
+    const std::size_t end = std::min(from + 37, whole.told.size());
+    const Lines part(whole.told.begin() + static_cast<std::ptrdiff_t>(from),
+                     whole.told.begin() + static_cast<std::ptrdiff_t>(end));
+    const Outcome run = cairn(arguments, {}, joined(part));
+    ASSERT_EQ(run.exit_code, 0) << run.err;
+    const Lines answers = lines(run.out);
+    std::size_t restored = 0;
+    ASSERT_EQ(std::sscanf(answers[0].c_str(), "RESTORED %zu", &restored), 1);
+    // A question that was told last is not in the journal, and its line is used again.
+    ASSERT_LE(restored, from);
+    ASSERT_LE(from - restored, restarts * 2);
+    last_answer = answers.back();
+    from = end;
+  }
+  EXPECT_GT(restarts, 10U);
+  EXPECT_EQ(read_text(folder_.file("parts.g2o")), read_text(folder_.file("whole.g2o")));
+  EXPECT_EQ(last_answer.substr(last_answer.find("variables")),
+            whole.heard.back().substr(whole.heard.back().find("variables")));
+}
+
+TEST_F(OnlinePolicy, WhatAQuestionSettledOrAskedIsInTheJournal) {
+  const auto in_two = [&](const std::string& log, const Lines& first, const Lines& second) {
+    const Arguments arguments =
+        online(kPolicy, {"--output", "none", "--journal", folder_.file(log)});
+    cairn(arguments, {}, joined(first));
+    return lines(cairn(arguments, {}, joined(second)).out);
+  };
+  // A measurement after a question is another one, not part of the one before.
+  Lines told = square();
+  told.insert(told.end(), {"EDGE_SE2 0 4" + kHere, "ESTIMATE 4"});
+  const Lines rest{"EDGE_SE2 0 4" + kHere, "DONE", "ESTIMATE ALL"};
+  const Lines parts = in_two("settled", told, rest);
+  EXPECT_EQ(parts.at(0), "RESTORED 11 variables 5 factors 5");
+  told.insert(told.end(), rest.begin(), rest.end());
+  const Lines whole = lines(cairn(online(kPolicy, {"--output", "none"}), {}, joined(told)).out);
+  const auto done = [](const Lines& answers) {
+    const auto kept = std::ranges::find(answers, "KEPT 4");
+    return kept == answers.begin() || kept == answers.end() ? Lines()
+                                                            : Lines(kept - 1, answers.end());
+  };
+  EXPECT_THAT(done(whole), SizeIs(9)) << joined(whole);
+  EXPECT_EQ(done(parts), done(whole));
+  // The answer to NEXT may have been lost: it can be asked again.
+  Lines asking = square();
+  asking.insert(asking.end(), {"EDGE_SE2 1 4 1 0 1.5 4 0 0 4 0 4", "ESTIMATE 4", "NEXT"});
+  const Lines again = in_two("asked", asking, {"NEXT"});
+  EXPECT_EQ(again.at(0), "RESTORED 12 variables 4 factors 3");
+  EXPECT_THAT(again.at(1), StartsWith("MATCH 0 4 "));
+}
+
+TEST_F(OnlinePolicy, TheEndIsNotInTheJournal) {
+  const Arguments arguments =
+      online(kPolicy, {"--output", "none", "--journal", folder_.file("log")});
+  Lines told = square();
+  told.push_back("QUIT");
+  EXPECT_THAT(lines(cairn(arguments, {}, joined(told)).out).back(),
+              StartsWith("OK 10 variables 5"));
+  EXPECT_THAT(lines(cairn(arguments, {}, "EDGE_SE2 0 4" + kHere + "\nDONE\n").out),
+              ElementsAre("RESTORED 9 variables 4 factors 3", StartsWith("LINKED 0 4 "), "KEPT 4",
+                          "OK 11 variables 5 factors 5 owed 0"));
+}
+
+TEST_F(OnlinePolicy, NothingAcknowledgedIsLost) {
+  const std::string graph = generate("manhattan:poses=150");
+  const Dialogue whole = drive(graph, online(kPolicy, {"-o", folder_.file("whole.g2o")}));
+  const Arguments arguments =
+      online(kPolicy, {"--journal", folder_.file("log"), "-o", folder_.file("parts.g2o")});
+  std::size_t acknowledged = 0, restored = 0;
+  for (int kill = 1; kill <= 6; ++kill) {
+    const Outcome killed = cairn_killed(arguments, joined(whole.told, restored), 40 * kill,
+                                        std::chrono::microseconds(0));
+    for (const std::string& answer : lines(killed.out)) {
+      std::size_t number = 0;
+      // Asked again, NEXT repeats what is in the journal.
+      if (std::sscanf(answer.c_str(), "OK %zu", &number) == 1) acknowledged = number;
+    }
+    const Outcome asked = cairn(arguments);
+    ASSERT_EQ(std::sscanf(asked.out.c_str(), "RESTORED %zu", &restored), 1) << asked.err;
+    // The end is not in the journal.
+    ASSERT_GE(restored, std::min(acknowledged, whole.told.size() - 1)) << "kill " << kill;
+  }
+  cairn(arguments, {}, joined(whole.told, restored));
+  EXPECT_EQ(read_text(folder_.file("parts.g2o")), read_text(folder_.file("whole.g2o")));
+}
+
+TEST_F(OnlinePolicy, RefusesAJournalOfAnotherPolicy) {
+  const std::string journal = folder_.file("log");
+  cairn(online(kPolicy, {"--journal", journal}), {}, "NEW VERTEX_SE2 0\n");
+  const Outcome other = cairn(online(kPolicy + ",gate=0.9", {"--journal", journal}));
+  EXPECT_EQ(other.exit_code, 2);
+  EXPECT_THAT(other.err,
+              HasSubstr("policy compact_pose:angle=0.8,range=3,reuse=false, output last"));
+  EXPECT_THAT(other.out, IsEmpty());
+}
+
+}  // namespace
+}  // namespace cairn::test
