@@ -30,7 +30,7 @@ void check(const BenchOptions& options, Session& session) {
         "no plugin makes reports here: cairn was built without apps/report/dist and without "
         "npm; leave out --html");
   }
-  check_folder(options.html);
+  check_file(options.html, session);
 }
 
 /// A configuration that could not run at all is an error of the command, but not one that keeps the

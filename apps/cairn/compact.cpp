@@ -127,9 +127,9 @@ void check(const CompactOptions& options, Session& session) {
     throw Error(ErrorCode::usage, "only one of -o and --trajectory can go to standard output");
   check_output(options.output, options.output_format, session);
   check_output(options.trajectory, "", session);
-  if (!options.steps.empty()) check_folder(options.steps);
-  if (!options.compare.empty()) check_folder(options.compare);
-  if (!options.save_thresholds.empty()) check_folder(options.save_thresholds);
+  check_file(options.steps, session);
+  check_file(options.compare, session);
+  check_file(options.save_thresholds, session);
   if (options.automatic && !options.thresholds.empty())
     throw Error(ErrorCode::usage, "--auto finds thresholds, --thresholds reads them: give one");
 }

@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "graph_files.hpp"
 
-#include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
 #include <charconv>
 #include <chrono>
-#include <cstring>
 #include <filesystem>
 #include <optional>
 
@@ -115,6 +113,7 @@ std::string output_format(const std::string& file, const std::string& named) {
 
 LoadedGraph load_graph(const std::string& name, const InputOptions& options, Session& session) {
   const auto start = std::chrono::steady_clock::now();
+  session.files.add_input(name);
   LoadedGraph loaded = name.starts_with('@') ? generate_graph(name, session)
                                              : read_named_graph(name, options, session);
   loaded.seconds = seconds_since(start);
@@ -141,17 +140,14 @@ void check_output(const std::string& file, const std::string& format, Session& s
   } else {
     check_named_format(file, chosen, registry);
   }
-  check_folder(file);
+  session.files.add_output(file, true);
+  check_writable(file);
 }
 
-void check_folder(const std::string& file) {
-  if (file == "-") return;
-  std::filesystem::path folder = std::filesystem::path(file).parent_path();
-  if (folder.empty()) folder = ".";
-  if (::access(folder.c_str(), W_OK | X_OK) != 0 && !std::filesystem::exists(file)) {
-    throw Error(ErrorCode::input, fmt::format("{}: cannot be written: folder {}: {}", file,
-                                              folder.string(), std::strerror(errno)));
-  }
+void check_file(const std::string& file, Session& session) {
+  if (file.empty()) return;
+  session.files.add_output(file, false);
+  check_writable(file);
 }
 
 std::vector<std::string> sentences(const ReadReport& report) {

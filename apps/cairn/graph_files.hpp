@@ -43,11 +43,12 @@ Simulation simulate(const std::string& spec, std::uint64_t seed, Session& sessio
 std::string output_format(const std::string& file, const std::string& named);
 
 /// Finds out before the work whether its result can be written: throws `Error` if no format writes
-/// files of that name, or the folder is not there or refuses. `format` is what `--to` names.
+/// files of that name, if it cannot be written there, or another output goes there. `format` is
+/// what `--to` names. A graph may replace the one that it was made of.
 void check_output(const std::string& file, const std::string& format, Session& session);
 
-/// The part of it that is about the folder.
-void check_folder(const std::string& file);
+/// The same for an output of another kind, which replaces no input.
+void check_file(const std::string& file, Session& session);
 
 /// What `ReadReport` says, a sentence each.
 std::vector<std::string> sentences(const ReadReport& report);

@@ -31,10 +31,7 @@ bool LineInput::next(std::string& line) {
       throw Error(ErrorCode::input, "standard input: a line of more than 16 MB; expected text");
     }
     if (!ended_ && fill()) continue;
-    if (interrupt_) break;
-    line.assign(buffer_, begin_);
-    begin_ = searched_ = buffer_.size();
-    return !line.empty();
+    return false;
   }
   return false;
 }

@@ -12,10 +12,11 @@ class LineInput {
   /// `interrupt`: ends the waiting once it is true.
   explicit LineInput(const std::atomic<bool>& interrupt) : interrupt_(interrupt) {}
 
-  /// The next line, without its end; false at the end of the input or when interrupted. A last line
-  /// without an end counts. Throws `Error` (input) for a line of more than 16 MB, or where reading
-  /// fails.
+  /// The next line, without its end; false at the end of the input or when interrupted. Throws
+  /// `Error` (input) for a line of more than 16 MB, or where reading fails.
   bool next(std::string& line);
+  /// After the end: a last line without its end, which may be the half of what was to be said.
+  std::string rest() const { return ended_ ? buffer_.substr(begin_) : std::string(); }
 
  private:
   bool fill();

@@ -1,13 +1,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
 #include <exception>
+#include <functional>
 #include <new>
 #include <string>
 #include <utility>
 
 #include "cairn/runtime/error.hpp"
 #include "command_line.hpp"
+#include "graph_files.hpp"
 #include "option_words.hpp"
 #include "session.hpp"
 
@@ -30,27 +33,40 @@ void print_error(std::string message) {
 int run(int argc, const char* const* argv) {
   cairn::app::Session session;
   cairn::app::CommandLine line(session);
-  return line.parse(argc, argv)();
+  const std::function<int()> command = line.parse(argc, argv);
+  cairn::app::check_file(session.common.json, session);
+  return command();
+}
+
+/// Ends the process without the destructors of static objects: those of plugins and of the
+/// libraries below them may crash or wait for ever, after all work is done.
+[[noreturn]] void leave(int code) {
+  std::fflush(nullptr);
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+  std::exit(code);  // what they found is reported at the end
+#else
+  std::_Exit(code);
+#endif
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
   std::signal(SIGPIPE, SIG_IGN);  // `cairn … | head` is no reason to die before files are written
+  std::signal(SIGXFSZ, SIG_IGN);  // the limit of a file's size is an error of its output
   try {
-    return run(argc, argv);
+    leave(run(argc, argv));
   } catch (const cairn::Error& error) {
-    if (error.code() == cairn::ErrorCode::input && cairn::app::stdout_reader_is_gone()) return 0;
     print_error(error.what());
-    return static_cast<int>(error.code());
+    leave(static_cast<int>(error.code()));
   } catch (const std::bad_alloc&) {
     print_error("out of memory");
-    return static_cast<int>(cairn::ErrorCode::numerical);
+    leave(static_cast<int>(cairn::ErrorCode::numerical));
   } catch (const std::exception& error) {
     print_error(std::string("internal error: ") + error.what() + " (please report it)");
-    return kExitBug;
+    leave(kExitBug);
   } catch (...) {
     print_error("internal error: an exception that is no std::exception (please report it)");
-    return kExitBug;
+    leave(kExitBug);
   }
 }

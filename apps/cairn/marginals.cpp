@@ -366,7 +366,7 @@ std::optional<Summary> optimize(Graph& graph, Optimizer* optimizer, const Margin
 
 int run(const MarginalsOptions& options, Session& session) {
   if (options.output == "-") session.write_file_to_stdout();
-  if (!options.output.empty()) check_folder(options.output);
+  check_file(options.output, session);
   session.use_threads();
   // Everything that is named is made before the file is read: a wrong name is told at once.
   Registry& registry = session.registry();

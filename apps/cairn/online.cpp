@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // cairn online: measurements from standard input as they come, estimates to standard output.
+#include <exception>
 #include <memory>
 #include <optional>
 
@@ -145,7 +146,27 @@ void check(const OnlineOptions& options, Session& session) {
                 "without --policy");
   }
   check_output(options.output, "", session);
-  if (!options.journal.empty()) check_folder(options.journal);
+  session.files.add_output(options.journal, false);  // is tried when it is opened
+}
+
+/// Answers each line. Where nobody reads the answers any more, goes on without them if the map is
+/// `kept`, in a file or a journal.
+void converse(Conversation& conversation, LineInput& input, bool kept, const Session& session) {
+  bool heard = true;
+  for (std::string line; input.next(line);) {
+    const LineSession::Reply reply = conversation.take(line);
+    if (heard && !reply.text.empty()) {
+      write_stdout(reply.text);
+      heard = !stdout_reader_is_gone();
+      if (!heard && !kept) return;
+      if (!heard) session.note("nobody reads the answers any more; the stream is taken to its end");
+    }
+    if (reply.quit) return;
+  }
+  if (!input.rest().empty()) {
+    session.note(fmt::format("the last line has no end, and was not taken: '{}'",
+                             input.rest().substr(0, 40)));
+  }
 }
 
 int run(OnlineOptions options, Session& session) {
@@ -166,14 +187,17 @@ int run(OnlineOptions options, Session& session) {
 
   const InterruptGuard guard;
   LineInput input(guard.flag());
-  for (std::string line; input.next(line);) {
-    const LineSession::Reply reply = conversation.take(line);
-    if (!reply.text.empty()) write_stdout(reply.text);
-    if (reply.quit || (!reply.text.empty() && stdout_reader_is_gone())) break;
+  const bool kept = !options.output.empty() || journal;
+  std::exception_ptr failure;  // which costs the rest of the stream, not the map so far
+  try {
+    converse(conversation, input, kept, session);
+    conversation.finish();
+  } catch (...) {
+    failure = std::current_exception();
   }
-  conversation.finish();
   if (!options.output.empty())
     write_graph(lines.estimator().graph(), options.output, session.registry());
+  if (failure) std::rethrow_exception(failure);
   session.write_json(report_json(options, conversation.counts(), lines));
   return guard.interrupted() ? kExitInterrupted : 0;
 }

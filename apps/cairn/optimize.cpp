@@ -43,7 +43,7 @@ void check(const OptimizeOptions& options, Session& session) {
   if (options.record == "-") {
     throw Error(ErrorCode::usage, "--record writes to a file, not to standard output; name one");
   }
-  if (!options.record.empty()) check_folder(options.record);
+  check_file(options.record, session);
 }
 
 int exit_code(Status status) {
@@ -131,16 +131,16 @@ std::string in_words(const ComponentSpec& optimizer) {
                          : fmt::format(" with linear solver '{}'", solver->second));
 }
 
+/// `recording`: made here if one is asked for, to be finished when the results are written.
 Summary solve(Graph& graph, Optimizer& optimizer, const OptimizeOptions& options,
-              const InterruptGuard& guard, const Session& session) {
+              const InterruptGuard& guard, const Session& session,
+              std::optional<RecordingWriter>& recording) {
   Stop stop = options.problem.stop;
   stop.interrupt = &guard.flag();
   OptimizationProgress progress(session.common.quiet, stop.max_iterations);
   if (options.record.empty()) return optimizer.optimize(graph, stop, progress);
-  RecordingWriter recording(options.record, options.optimizer, options.graph, &progress);
-  Summary summary = optimizer.optimize(graph, stop, recording);
-  recording.finish(graph, summary);
-  return summary;
+  recording.emplace(options.record, options.optimizer, options.graph, &progress);
+  return optimizer.optimize(graph, stop, *recording);
 }
 
 int run(const OptimizeOptions& options, Session& session) {
@@ -159,9 +159,10 @@ int run(const OptimizeOptions& options, Session& session) {
     session.note(fmt::format("initial guess {}: {}", options.problem.initial, note));
   }
   const InterruptGuard guard;  // until the results are written
-  Summary summary =
-      call_plugin([&] { return in_words(spec); },
-                  [&] { return solve(loaded.graph, *optimizer, options, guard, session); });
+  std::optional<RecordingWriter> recording;
+  Summary summary = call_plugin(
+      [&] { return in_words(spec); },
+      [&] { return solve(loaded.graph, *optimizer, options, guard, session, recording); });
   if (!options.output.empty()) {
     write_graph(loaded.graph, options.output, registry,
                 output_format(options.output, options.output_format));
@@ -174,6 +175,7 @@ int run(const OptimizeOptions& options, Session& session) {
     if (!covariances.there) summary.notes.push_back("no covariances: " + covariances.why_not);
   }
   session.write_json(report_json(options, loaded, summary, covariances));
+  if (recording) recording->finish(loaded.graph, summary);  // if it cannot: the rest is written
   session.print(summary_text(options, loaded, summary, covariances));
   if (covariance_solver && !covariances.there && exit_code(summary.status) == 0)
     return static_cast<int>(ErrorCode::numerical);

@@ -35,7 +35,7 @@ std::string picture_format(const std::string& file, Session& session) {
                 fmt::format("{}: nothing draws files of that name; endings on offer: .{}", file,
                             joined(names, ", .")));
   }
-  check_folder(file);
+  check_file(file, session);
   return ending.substr(1);
 }
 

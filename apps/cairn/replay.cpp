@@ -120,7 +120,7 @@ Replay replay_all(const Graph& whole, const std::vector<Arrival>& arrivals, Esti
 void check(const ReplayOptions& options, Session& session) {
   if (options.output == "-") session.write_file_to_stdout();
   check_output(options.output, options.output_format, session);
-  if (!options.steps.empty()) check_folder(options.steps);
+  check_file(options.steps, session);
   if (!options.plot.empty()) picture_format(options.plot, session);
   if (options.covariance_check && (options.checks == 0 || options.marginals != "diagonal")) {
     throw Error(ErrorCode::usage,

@@ -9,6 +9,7 @@
 #include <boost/json/fwd.hpp>
 
 #include "cairn/plugin/registry.hpp"
+#include "file_roles.hpp"
 
 namespace cairn::app {
 
@@ -29,6 +30,7 @@ struct CommonOptions {
 class Session {
  public:
   CommonOptions common;
+  FileRoles files;
 
   /// The registry, made on first use, with the types' options set.
   Registry& registry();
@@ -58,7 +60,7 @@ class Session {
 /// `Error` (input) where the output cannot be written for another reason, such as a full disk.
 void write_stdout(std::string_view text);
 
-/// Standard output is a pipe (or socket) whose reader is gone.
+/// Whether standard output is a pipe (or socket) whose reader is gone.
 bool stdout_reader_is_gone();
 
 }  // namespace cairn::app

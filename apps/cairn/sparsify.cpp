@@ -224,7 +224,7 @@ int run_sparsify(const SparsifyCommandOptions& options, Session& session) {
   session.use_threads();
   if (options.output == "-") session.write_file_to_stdout();
   check_output(options.output, options.output_format, session);
-  if (!options.record.empty()) check_folder(options.record);
+  check_file(options.record, session);
   Registry& registry = session.registry();
   const SparsifyJob job = job_of(options, session);
   // A wrong name is refused before a graph is read.

@@ -73,7 +73,7 @@ int run(const ViewOptions& options, Session& session) {
         "no plugin makes reports here: cairn was built without apps/report/dist and without "
         "npm; cairn plot draws static plots");
   }
-  check_folder(page);
+  check_file(page, session);
   session.use_threads();
   const Album album = load_album(
       options.album, fmt::format("cairn view {}", joined(options.album.files, " ")), session);

@@ -176,6 +176,7 @@ void write_to_standard_output(std::string_view bytes) {
   // Through stdio, so that it comes after what the program has printed itself.
   if (std::fwrite(bytes.data(), 1, bytes.size(), stdout) != bytes.size() ||
       std::fflush(stdout) != 0) {
+    if (errno == EPIPE) return;  // `cairn … | head`: its reader has enough
     throw Error(ErrorCode::input, "standard output cannot be written: " + system_message(errno));
   }
 }
@@ -192,7 +193,7 @@ void write_in_place(const fs::path& file, std::string_view bytes) {
 class TemporaryFile {
  public:
   /// `mode` as for open(2).
-  TemporaryFile(const fs::path& target, mode_t mode) {
+  TemporaryFile(const fs::path& target, mode_t mode) : target_(target) {
     for (int attempt = 0;; ++attempt) {
       path_ = target;
       path_ += fmt::format(".{}-{}.part", ::getpid(), attempt);
@@ -210,9 +211,11 @@ class TemporaryFile {
     if (!path_.empty()) ::unlink(path_.c_str());
   }
 
+  /// On the disk before the name is: a power cut leaves the old file or the new one.
   void write(std::string_view bytes) {
-    if (!write_all(descriptor_, bytes) || ::close(std::exchange(descriptor_, -1)) != 0) {
-      fail(path_, "cannot be written: " + system_message(errno));
+    if (!write_all(descriptor_, bytes) || (::fsync(descriptor_) != 0 && errno != EINVAL) ||
+        ::close(std::exchange(descriptor_, -1)) != 0) {
+      fail(target_, "cannot be written: " + system_message(errno));
     }
   }
   void set_mode(mode_t mode) { ::fchmod(descriptor_, mode); }
@@ -224,7 +227,7 @@ class TemporaryFile {
   }
 
  private:
-  fs::path path_;
+  fs::path target_, path_;
   int descriptor_ = -1;
 };
 
@@ -244,6 +247,21 @@ fs::path follow_links(fs::path file) {
 std::string read_file(const fs::path& file) {
   std::string bytes = read_bytes(file);
   return is_gzip(bytes) ? unpack(file, bytes) : bytes;
+}
+
+void check_writable(const fs::path& file) {
+  if (file == "-") return;
+  const fs::path target = follow_links(file);
+  struct stat status {};
+  const bool exists = ::stat(target.c_str(), &status) == 0;
+  if (exists && S_ISDIR(status.st_mode)) fail(file, "is a folder; expected a file name");
+  if (exists && !S_ISREG(status.st_mode)) return;
+  const fs::path folder = target.has_parent_path() ? target.parent_path() : ".";
+  if (::access(folder.c_str(), W_OK | X_OK) != 0) {
+    fail(file,
+         fmt::format("cannot be written: folder {}: {}", folder.string(), system_message(errno)));
+  }
+  const TemporaryFile attempt(target, 0666);
 }
 
 void write_file(const fs::path& file, std::string_view bytes) {
