@@ -8,7 +8,9 @@
 
 #include <boost/json/fwd.hpp>
 
-#include "cairn/plugin/registry.hpp"
+namespace cairn {
+class Registry;
+}
 
 namespace cairn::app {
 
@@ -28,6 +30,9 @@ struct CommonOptions {
 /// goes there. `quiet` leaves only results and errors.
 class Session {
  public:
+  Session();
+  ~Session();
+
   CommonOptions common;
 
   /// The registry, made on first use, with the types' options set.
