@@ -14,6 +14,7 @@
 #include <boost/json/serialize.hpp>
 
 #include "arguments.hpp"
+#include "cairn/plugin/registry.hpp"
 #include "cairn/report/recording.hpp"
 #include "cairn/report/run_report.hpp"
 #include "cairn/runtime/error.hpp"

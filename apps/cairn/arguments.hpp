@@ -52,7 +52,7 @@ class Argument {
   std::string type_name() const;
   std::string description() const;
   std::string default_text() const;  ///< empty: none is shown
-  bool is_positional() const;        ///< told from others by where it stands
+  bool is_positional() const;        ///< known by where it stands, not by a name
   bool is_required() const;
   int most_values() const;  ///< 0 of a flag
 
@@ -111,9 +111,9 @@ struct ParseOutcome {
     command,        ///< to be run
     help,           ///< asked for
     version,        ///< asked for
-    config_key,     ///< the configuration file says something that nobody takes
+    config_key,     ///< the configuration file has a key that is no option
     config_file,    ///< it cannot be read
-    unknown_words,  ///< words of the command line that nobody takes
+    unknown_words,  ///< of the command line, which belong to nothing
     missing,        ///< an argument or option of a command that must be given
     without_value,  ///< an option that needs a value stands without one
     bad_value       ///< a value of the wrong type, or refused

@@ -10,6 +10,7 @@
 #include "arguments.hpp"
 #include "bench_report.hpp"
 #include "bench_run.hpp"
+#include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/threads.hpp"
 #include "commands.hpp"

@@ -9,6 +9,7 @@
 #include <boost/json/parse.hpp>
 
 #include "cairn/linear/iterative_solver.hpp"
+#include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/plugin_call.hpp"
 #include "graph_labels.hpp"

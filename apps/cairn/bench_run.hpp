@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "cairn/plugin/registry.hpp"
 #include "graph_files.hpp"
 #include "problem_setup.hpp"
 

@@ -10,6 +10,7 @@
 #include <boost/json/object.hpp>
 
 #include "arguments.hpp"
+#include "cairn/plugin/registry.hpp"
 #include "cairn/policy/policy_run.hpp"
 #include "cairn/policy/threshold_search.hpp"
 #include "cairn/policy/uncertainty_comparison.hpp"

@@ -5,6 +5,7 @@
 #include <fmt/core.h>
 
 #include "arguments.hpp"
+#include "cairn/plugin/registry.hpp"
 #include "commands.hpp"
 #include "graph_files.hpp"
 #include "json_report.hpp"

@@ -8,6 +8,7 @@
 
 #include "cairn/linear/graph_marginals.hpp"
 #include "cairn/linear/marginals.hpp"
+#include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/timed.hpp"
 #include "problem_setup.hpp"

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "graph_files.hpp"
 
-
 #include <algorithm>
 #include <cerrno>
 #include <charconv>

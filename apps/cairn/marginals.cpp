@@ -13,6 +13,7 @@
 #include "arguments.hpp"
 #include "cairn/io/format.hpp"
 #include "cairn/linear/graph_marginals.hpp"
+#include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/plugin_call.hpp"
 #include "cairn/runtime/threads.hpp"

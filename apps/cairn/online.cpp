@@ -11,6 +11,7 @@
 #include "cairn/online/conversation.hpp"
 #include "cairn/online/journal.hpp"
 #include "cairn/online/online_session.hpp"
+#include "cairn/plugin/registry.hpp"
 #include "cairn/policy/policy_run.hpp"
 #include "cairn/policy/policy_session.hpp"
 #include "cairn/policy/pose_policy.hpp"

@@ -7,6 +7,7 @@
 #include <fmt/core.h>
 
 #include "arguments.hpp"
+#include "cairn/plugin/registry.hpp"
 #include "cairn/report/recording.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/plugin_call.hpp"

@@ -7,6 +7,7 @@
 #include <fmt/core.h>
 
 #include "cairn/io/format.hpp"
+#include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/plugin_call.hpp"
 #include "graph_files.hpp"

@@ -4,6 +4,7 @@
 #include <string>
 #include <string_view>
 
+#include "cairn/plugin/registry.hpp"
 #include "cairn/report/scene.hpp"
 #include "session.hpp"
 

@@ -10,6 +10,7 @@
 
 #include "album.hpp"
 #include "arguments.hpp"
+#include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
 #include "commands.hpp"
 #include "json_report.hpp"

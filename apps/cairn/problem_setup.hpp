@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "arguments.hpp"
+#include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/solve/initial_guess.hpp"
 #include "cairn/solve/optimizer.hpp"

@@ -11,6 +11,7 @@
 #include "arguments.hpp"
 #include "cairn/evaluation/batch_comparison.hpp"
 #include "cairn/online/recorded_graph.hpp"
+#include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/timed.hpp"
 #include "cairn/solve/estimator.hpp"

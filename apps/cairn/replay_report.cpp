@@ -9,6 +9,7 @@
 #include <fmt/core.h>
 
 #include "album.hpp"
+#include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/threads.hpp"
 #include "json_report.hpp"
 #include "picture_files.hpp"

@@ -11,6 +11,7 @@
 #include <fmt/core.h>
 
 #include "cairn/io/format.hpp"
+#include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/threads.hpp"
 #include "json_text.hpp"
@@ -18,6 +19,9 @@
 #include "table.hpp"
 
 namespace cairn::app {
+
+Session::Session() = default;
+Session::~Session() = default;
 
 Registry& Session::registry() {
   if (!registry_) {

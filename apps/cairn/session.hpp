@@ -8,8 +8,11 @@
 
 #include <boost/json/fwd.hpp>
 
-#include "cairn/plugin/registry.hpp"
 #include "file_roles.hpp"
+
+namespace cairn {
+class Registry;
+}
 
 namespace cairn::app {
 
@@ -29,6 +32,9 @@ struct CommonOptions {
 /// goes there. `quiet` leaves only results and errors.
 class Session {
  public:
+  Session();
+  ~Session();
+
   CommonOptions common;
   FileRoles files;
 

@@ -12,6 +12,7 @@
 #include <fmt/core.h>
 
 #include "arguments.hpp"
+#include "cairn/plugin/registry.hpp"
 #include "cairn/policy/policy_run.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/threads.hpp"

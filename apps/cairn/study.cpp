@@ -8,6 +8,7 @@
 #include <fmt/core.h>
 
 #include "arguments.hpp"
+#include "cairn/plugin/registry.hpp"
 #include "cairn/sparsification/sparsification.hpp"
 #include "commands.hpp"
 #include "compact.hpp"

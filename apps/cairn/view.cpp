@@ -8,6 +8,7 @@
 #include "album.hpp"
 #include "arguments.hpp"
 #include "cairn/io/format.hpp"
+#include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
 #include "commands.hpp"
 #include "json_report.hpp"
