@@ -8,8 +8,9 @@
 #include <random>
 
 #include "cairn/graph/gauge.hpp"
-#include "cairn/types/define_factor.hpp"
 #include "cairn/lie/point.hpp"
+#include "cairn/lie/se2.hpp"
+#include "cairn/types/define_factor.hpp"
 #include "support/planar_graph.hpp"
 #include "support/scaled_pose.hpp"
 
