@@ -1,11 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <cmath>
 #include <cstdint>
-#include <numbers>
 #include <random>
-#include <string>
 #include <vector>
 
 #include "cairn/types/factor_type.hpp"
@@ -21,23 +18,9 @@ struct Regime {
 };
 
 /// Where closed forms break, where series take over, and the general case.
-inline const std::vector<Regime>& regimes() {
-  static const std::vector<Regime> all = {
-      {"identity", 0.0, 0.0},
-      {"tiny", 1e-9, 1e-9},
-      {"small", 1e-5},
-      {"below the switch of a series", 0.0199},
-      {"above the switch of a series", 0.0201},
-      {"below the second switch", 0.0999},
-      {"above the second switch", 0.1001},
-      {"random", -1.0},
-      {"far away", -1.0, 1e3},
-      {"nearly pi", std::numbers::pi - 1e-3},
-      {"almost pi", std::numbers::pi - 1e-6},
-  };
-  return all;
-}
+const std::vector<Regime>& regimes();
 
+/// Reproducible random numbers, and states and measurements of any type made of them.
 class Sampler {
  public:
   explicit Sampler(std::uint64_t seed) : engine_(seed) {}
@@ -45,79 +28,26 @@ class Sampler {
   double uniform(double low, double high) {
     return low + (high - low) * (static_cast<double>(engine_() >> 11) * 0x1p-53);
   }
-  std::vector<double> vector(int size, double range) {
-    std::vector<double> v(size);
-    for (double& x : v) x = uniform(-range, range);
-    return v;
-  }
-
+  /// Within ±range each.
+  std::vector<double> vector(int size, double range);
   /// `count` numbers of that Euclidean norm, in a random direction.
-  std::vector<double> direction(int count, double norm) {
-    std::vector<double> v;
-    double length = 0.0;
-    while (length < 0.1) {
-      v = vector(count, 1.0);
-      length = 0.0;
-      for (const double x : v) length += x * x;
-      length = std::sqrt(length);
-    }
-    for (double& x : v) x *= norm / length;
-    return v;
-  }
-
+  std::vector<double> direction(int count, double norm);
   /// Numbers in the tangent space of `type`, in that regime; the rotation comes last in it.
-  std::vector<double> tangent(const VariableType& type, const Regime& regime) {
-    const Placement* placement = type.placement();
-    const bool turns = placement && placement->has_orientation();
-    const int rotation = !turns ? 0 : placement->dimension() == 2 ? 1 : 3;
-    std::vector<double> delta = vector(type.tangent_size() - rotation, regime.distance);
-    if (rotation > 0) {
-      const double angle = regime.angle < 0 ? uniform(0.0, 3.0) : regime.angle;
-      for (const double x : direction(rotation, angle)) delta.push_back(x);
-    }
-    return delta;
-  }
-
-  std::vector<double> state(const VariableType& type, const Regime& regime) {
-    std::vector<double> x(type.ambient_size());
-    type.identity(x.data());
-    return retracted(type, x, tangent(type, regime));
-  }
-
+  std::vector<double> tangent(const VariableType& type, const Regime& regime);
+  std::vector<double> state(const VariableType& type, const Regime& regime);
   /// A measurement that the factor type takes for good.
-  std::vector<double> measurement(const FactorType& type) {
-    for (;;) {
-      std::vector<double> z = vector(type.measurement_size(), 2.0);
-      if (type.normalize(z.data()).empty()) return z;
-    }
-  }
-
+  std::vector<double> measurement(const FactorType& type);
   /// Upper triangular with a positive diagonal, packed row by row.
-  std::vector<double> sqrt_information(int size) {
-    std::vector<double> packed;
-    for (int row = 0; row < size; ++row) {
-      packed.push_back(uniform(0.5, 3.0));
-      for (int column = row + 1; column < size; ++column) packed.push_back(uniform(-1.0, 1.0));
-    }
-    return packed;
-  }
+  std::vector<double> sqrt_information(int size);
 
   static std::vector<double> retracted(const VariableType& type, const std::vector<double>& x,
-                                       const std::vector<double>& delta) {
-    std::vector<double> out(x.size());
-    const std::int64_t offset = 0;
-    type.retract(1, x.data(), &offset, delta.data(), out.data());
-    return out;
-  }
+                                       const std::vector<double>& delta);
 
  private:
   std::mt19937_64 engine_;
 };
 
-inline double norm(const std::vector<double>& v) {
-  double sum = 0.0;
-  for (const double x : v) sum += x * x;
-  return std::sqrt(sum);
-}
+/// Euclidean.
+double norm(const std::vector<double>& v);
 
 }  // namespace cairn::test

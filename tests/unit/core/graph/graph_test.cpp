@@ -8,6 +8,8 @@
 #include <functional>
 #include <limits>
 
+#include <Eigen/Core>
+
 #include "cairn/runtime/error.hpp"
 #include "support/planar_graph.hpp"
 

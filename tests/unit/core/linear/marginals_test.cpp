@@ -8,7 +8,6 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 
 #include "cairn/linear/graph_marginals.hpp"
@@ -19,6 +18,7 @@
 #include "cairn/solve/optimizer.hpp"
 #include "support/block_systems.hpp"
 #include "support/components.hpp"
+#include "support/dense_algebra.hpp"
 #include "support/sample_graphs.hpp"
 #include "support/sample_jacobians.hpp"
 #include "support/sample_matrices.hpp"
@@ -37,10 +37,6 @@ std::vector<std::string> solvers_with_marginals() {
   return specs;
 }
 
-Eigen::MatrixXd inverse(const Eigen::MatrixXd& H) {
-  return H.ldlt().solve(Eigen::MatrixXd::Identity(H.rows(), H.cols()));
-}
-
 class MarginalsTest : public testing::TestWithParam<std::string> {
  protected:
   void TearDown() override { set_threads(0); }
@@ -54,13 +50,13 @@ class MarginalsTest : public testing::TestWithParam<std::string> {
       of_jacobian->analyze(jacobian_);
       EXPECT_TRUE(of_jacobian->factorize(J, {}).ok);
       const Eigen::MatrixXd D = dense(J);
-      return inverse(D.transpose() * D);
+      return symmetric_inverse(D.transpose() * D);
     }
     BlockMatrix H(structure);
     fill_positive_definite(H, seed);
     solver_->analyze(structure);
     EXPECT_TRUE(solver_->factorize(H).ok);
-    return inverse(dense(H));
+    return symmetric_inverse(dense(H));
   }
   Marginals& marginals() { return *query<Marginals>(*solver_); }
 
@@ -166,7 +162,7 @@ TEST_P(MarginalsTest, AreThoseOfTheLastFactorisation) {
   ASSERT_TRUE(solver_->factorize(H).ok);  // without a new analysis
   std::vector<double> blocks(doubles(structure, pairs));
   marginals().diagonal_blocks(blocks);
-  expect_blocks(structure, pairs, blocks, inverse(dense(H)));
+  expect_blocks(structure, pairs, blocks, symmetric_inverse(dense(H)));
 }
 
 TEST_P(MarginalsTest, GivesTheSameBitsForAnyNumberOfThreads) {
@@ -221,7 +217,7 @@ Eigen::MatrixXd dense_covariance(const Graph& graph) {
   BlockMatrix H(linearizer.structure());
   std::vector<double> g(linearizer.structure().size());
   linearizer.linearize(graph.values(), H, g);
-  const Eigen::MatrixXd of_blocks = inverse(dense(H));
+  const Eigen::MatrixXd of_blocks = symmetric_inverse(dense(H));
   std::vector<std::int64_t> from, to;
   std::int64_t row = 0;
   for (int v = 0; v < graph.variable_count(); ++v) {

@@ -101,7 +101,7 @@ TEST(Registry, MakesComponentsThatTheProgramAdds) {
 TEST(Registry, ListsWhatTheProgramAdds) {
   Registry registry(kNowhere);
   add_scaled(registry, "scaled");
-  registry.add(define_factor<test::RelativePose>(), "relative pose of a test");
+  registry.add(test::PlanarTypes().relative_pose, "relative pose of a test");
   const std::vector<Offer> offers = registry.offers();
   ASSERT_EQ(offers.size(), 2U);
   EXPECT_EQ(offers[0].kind, "factor");
@@ -134,8 +134,8 @@ TEST(Registry, SaysThatAFactoryOfTheProgramMadeNothing) {
 
 TEST(Registry, TakesTypesOfTheProgramOneByOne) {
   Registry registry(kNowhere);
-  const auto pose = define_variable<Se2>();
-  const auto relative = define_factor<test::RelativePose>();
+  const auto pose = test::PlanarTypes().pose;
+  const auto relative = test::PlanarTypes().relative_pose;
   registry.add(pose);
   registry.add(relative);
   EXPECT_EQ(registry.variable_type("VERTEX_SE2"), pose);
@@ -148,9 +148,9 @@ TEST(Registry, TakesASetOfTypesWithOptions) {
   Registry registry(kNowhere);
   registry.add_types("planar", OptionTable{}.boolean("points", true, "landmarks too"),
                      [](const Options& options) {
-                       TypeSet set{{define_variable<Se2>()}, {}};
+                       TypeSet set{{test::PlanarTypes().pose}, {}};
                        if (options.boolean("points"))
-                         set.factors.push_back(define_factor<test::PointSeen>());
+                         set.factors.push_back(test::PlanarTypes().point_seen);
                        return set;
                      });
   EXPECT_TRUE(registry.has("types", "planar"));
@@ -166,8 +166,8 @@ TEST(Registry, RefusesANameThatTheProgramAddsTwice) {
   add_scaled(registry, "scaled");
   EXPECT_THAT(refusal(ErrorCode::usage, [&] { add_scaled(registry, "scaled"); }),
               HasSubstr("this program adds loss 'scaled' twice"));
-  registry.add(define_factor<test::RelativePose>());
-  EXPECT_THAT(refusal(ErrorCode::usage, [&] { registry.add(define_factor<test::RelativePose>()); }),
+  registry.add(test::PlanarTypes().relative_pose);
+  EXPECT_THAT(refusal(ErrorCode::usage, [&] { registry.add(test::PlanarTypes().relative_pose); }),
               HasSubstr("this program adds factor 'EDGE_SE2' twice"));
   EXPECT_DOUBLE_EQ(rho_of_one(*registry.make<Loss>("scaled")), 2.0);
 }
@@ -175,7 +175,7 @@ TEST(Registry, RefusesANameThatTheProgramAddsTwice) {
 TEST(Registry, ANameOfAPluginAndOfTheProgramIsAnErrorForWhoeverAsks) {
   Registry registry;
   const auto before = registry.factor_type("EDGE_SE2");
-  registry.add(define_factor<test::RelativePose>());
+  registry.add(test::PlanarTypes().relative_pose);
   add_scaled(registry, "huber");
   const auto names_both = AllOf(HasSubstr("slam2d.so and by this program"),
                                 HasSubstr("factor 'EDGE_SE2' is offered by"));

@@ -30,7 +30,7 @@ std::vector<double> packed(const MatrixXd& A) {
 
 Graph three_poses() {
   Graph graph;
-  const auto pose = define_variable<Se2>();
+  const auto pose = test::PlanarTypes().pose;
   for (int k = 0; k < 3; ++k)
     graph.add_variable(pose, k, std::vector<double>{0.7 * k, 0.3 * k * k, 0.5 - 0.4 * k});
   return graph;
@@ -41,7 +41,7 @@ const std::vector<double> kBoth{0.9, 0.1, -0.2, 0.5, 1.1, 0.3};
 
 /// Of blocks, a pair is the two factors that it is made of, whichever way these point.
 TEST(CorrelatedPair, WithoutCorrelationIsItsTwoFactors) {
-  const auto relative = define_factor<test::RelativePose>();
+  const auto relative = test::PlanarTypes().relative_pose;
   const MatrixXd A = 2.0 * MatrixXd::Identity(3, 3), B = MatrixXd::Ones(3, 3) + A;
   MatrixXd both = MatrixXd::Zero(6, 6);
   both.topLeftCorner(3, 3) = A;
@@ -69,7 +69,7 @@ TEST(CorrelatedPair, WithCorrelationWeighsAsItsMatrixSays) {
   MatrixXd R(6, 6);
   for (double& x : R.reshaped()) x = normal(engine);
   const MatrixXd information = R * R.transpose() + MatrixXd::Identity(6, 6);
-  const auto relative = define_factor<test::RelativePose>();
+  const auto relative = test::PlanarTypes().relative_pose;
   const CorrelatedPair pair(relative, {0, 1}, {1, 2});
   const Graph graph = three_poses();
   const double* const x[] = {graph.state(0).data(), graph.state(1).data(), graph.state(2).data()};
@@ -91,7 +91,7 @@ TEST(CorrelatedPair, WithCorrelationWeighsAsItsMatrixSays) {
 }
 
 TEST(CorrelatedPair, PlacesAPoseByEither) {
-  const auto relative = define_factor<test::RelativePose>();
+  const auto relative = test::PlanarTypes().relative_pose;
   const CorrelatedPair pair(relative, {0, 1}, {0, 2});
   const Graph graph = three_poses();
   const double* const x[] = {graph.state(0).data(), graph.state(1).data(), graph.state(2).data()};
@@ -105,12 +105,12 @@ TEST(CorrelatedPair, PlacesAPoseByEither) {
 }
 
 TEST(CorrelatedPair, RefusesWhatIsNotBetweenThreePoses) {
-  const auto relative = define_factor<test::RelativePose>();
+  const auto relative = test::PlanarTypes().relative_pose;
   using Ends = std::array<int, 2>;
   EXPECT_THROW(CorrelatedPair(relative, Ends{0, 1}, Ends{1, 0}), Error);
   EXPECT_THROW(CorrelatedPair(relative, Ends{0, 0}, Ends{1, 2}), Error);
   EXPECT_THROW(CorrelatedPair(relative, Ends{0, 1}, Ends{1, 3}), Error);
-  EXPECT_THROW(CorrelatedPair(define_factor<test::PosePrior>(), Ends{0, 1}, Ends{1, 2}), Error);
+  EXPECT_THROW(CorrelatedPair(test::PlanarTypes().prior, Ends{0, 1}, Ends{1, 2}), Error);
 }
 
 }  // namespace

@@ -13,6 +13,7 @@
 #include "cairn/graph/gauge.hpp"
 #include "cairn/lie/se3.hpp"
 #include "cairn/runtime/error.hpp"
+#include "cairn/types/define_factor.hpp"
 #include "cairn/types/loss.hpp"
 #include "cairn/update/marginal_prior.hpp"
 #include "support/dense_system.hpp"

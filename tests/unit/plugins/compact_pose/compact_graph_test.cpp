@@ -8,6 +8,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <Eigen/Dense>
+
 #include "cairn/runtime/error.hpp"
 #include "support/dense_system.hpp"
 #include "support/pose_world.hpp"

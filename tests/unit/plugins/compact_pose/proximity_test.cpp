@@ -10,6 +10,8 @@
 #include <gtest/gtest.h>
 #include <boost/math/distributions/normal.hpp>
 
+#include <Eigen/Dense>
+
 #include "support/pose_world.hpp"
 
 namespace cairn::compact {

@@ -6,6 +6,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <Eigen/Dense>
+
 #include "cairn/lie/se2.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/types/define_variable.hpp"

@@ -2,6 +2,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <string>
+
 #include "unit/plugins/formats/reading.hpp"
 
 namespace cairn::test {
@@ -10,15 +12,12 @@ namespace {
 using ::testing::ElementsAre;
 
 // All three orders make sense of these six numbers: only the format says what they mean.
-constexpr const char* kEdge = " 0 1 1 0 0 9 1 4 16 2 3\n";
+const std::string kEdge = " 0 1 1 0 0 9 1 4 16 2 3\n";
 
 TEST(InformationOrder, DependsOnTheFormat) {
-  EXPECT_THAT(read("g2o", std::string("EDGE_SE2") + kEdge).information(0),
-              ElementsAre(9, 1, 4, 16, 2, 3));
-  EXPECT_THAT(read("toro", std::string("EDGE2") + kEdge).information(0),
-              ElementsAre(9, 1, 2, 4, 3, 16));
-  EXPECT_THAT(read("isam", std::string("EDGE2") + kEdge).information(0),
-              ElementsAre(81, 9, 36, 257, 36, 29));
+  EXPECT_THAT(read("g2o", "EDGE_SE2" + kEdge).information(0), ElementsAre(9, 1, 4, 16, 2, 3));
+  EXPECT_THAT(read("toro", "EDGE2" + kEdge).information(0), ElementsAre(9, 1, 2, 4, 3, 16));
+  EXPECT_THAT(read("isam", "EDGE2" + kEdge).information(0), ElementsAre(81, 9, 36, 257, 36, 29));
 }
 
 TEST(InformationOrder, GivesAHintWhereAnotherOneWouldFit) {

@@ -6,6 +6,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <Eigen/Dense>
+
 #include "cairn/runtime/error.hpp"
 #include "unit/plugins/sparsify/problems.hpp"
 

@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <Eigen/Dense>
+
 #include "blanket_matrices.hpp"
 #include "cairn/runtime/error.hpp"
 #include "recovery.hpp"

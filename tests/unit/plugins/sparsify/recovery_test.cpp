@@ -9,6 +9,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <Eigen/Dense>
+
 #include "cairn/runtime/error.hpp"
 #include "topologies.hpp"
 #include "unit/plugins/sparsify/blankets.hpp"

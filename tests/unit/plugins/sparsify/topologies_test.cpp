@@ -11,6 +11,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <Eigen/Dense>
+
 #include "cairn/runtime/error.hpp"
 #include "recovery.hpp"
 #include "unit/plugins/sparsify/blankets.hpp"

@@ -7,9 +7,12 @@
 #include <numeric>
 #include <string>
 
+#include <Eigen/Core>
+
 #include "block/ordering.hpp"
 #include "cairn/runtime/threads.hpp"
 #include "support/block_systems.hpp"
+#include "support/dense_algebra.hpp"
 #include "support/kernel_sets.hpp"
 
 namespace cairn::block {
@@ -70,7 +73,7 @@ TEST(SelectedInverse, AgreesWithTheDenseInverseForEveryKernelSetAndBlockSize) {
         rng, blocks, static_cast<int>(rng() % (2 * blocks)), mixes[trial % mixes.size()]);
     BlockMatrix H(structure);
     fill_positive_definite(rng, H);
-    const Eigen::MatrixXd Z = dense(H).inverse();
+    const Eigen::MatrixXd Z = test::inverse_of(test::dense(H));
     for (const std::string& kernels : kernel_sets()) {
       for (const char* ordering : {"amd", "natural", "auto"}) {
         SCOPED_TRACE(kernels + ' ' + ordering + ' ' + std::to_string(trial));
@@ -112,8 +115,7 @@ TEST(SelectedInverse, AgreesWhereEverythingIsCorrelated) {
     const BlockStructure structure = random_structure(rng, 90, 60, {size});
     BlockMatrix H(structure);
     fill_like_a_chain(H);
-    const Eigen::MatrixXd Z =
-        dense(H).ldlt().solve(Eigen::MatrixXd::Identity(structure.size(), structure.size()));
+    const Eigen::MatrixXd Z = test::symmetric_inverse(test::dense(H));
     for (const std::string& kernels : kernel_sets()) {
       SupernodalCholesky cholesky(kernels);
       cholesky.analyze(structure, "amd");
@@ -130,7 +132,7 @@ TEST(SelectedInverse, TakesSupernodesOfOneBlockAndOneOfAll) {
   const BlockStructure structure = random_structure(rng, 60, 50, {3, 2});
   BlockMatrix H(structure);
   fill_positive_definite(rng, H);
-  const Eigen::MatrixXd Z = dense(H).inverse();
+  const Eigen::MatrixXd Z = test::inverse_of(test::dense(H));
   const CostModel never{.supernode = 0.0,
                         .panel_entry = 1.0,
                         .panel_flop = 1.0,
@@ -181,7 +183,7 @@ TEST(SelectedInverse, AgreesInWideFronts) {
   const BlockStructure structure = test::solid_grid(6, 6);
   BlockMatrix H(structure);
   fill_positive_definite(rng, H);
-  const Eigen::MatrixXd Z = dense(H).inverse();
+  const Eigen::MatrixXd Z = test::inverse_of(test::dense(H));
   const int before = threads();
   for (const int count : {1, 2}) {
     set_threads(count);
@@ -212,7 +214,7 @@ TEST(SupernodalCholesky, FindsColumnsOfTheInverse) {
   const BlockStructure structure = random_structure(rng, 150, 130, {2, 3, 9});
   BlockMatrix H(structure);
   fill_positive_definite(rng, H);
-  const Eigen::MatrixXd Z = dense(H).inverse();
+  const Eigen::MatrixXd Z = test::inverse_of(test::dense(H));
   const int before = threads();
   for (const int count : {1, 3}) {
     set_threads(count);

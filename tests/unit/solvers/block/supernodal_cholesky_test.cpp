@@ -7,6 +7,8 @@
 #include <optional>
 #include <string>
 
+#include <Eigen/Dense>
+
 #include "block/ordering.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/threads.hpp"

@@ -9,6 +9,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <Eigen/Core>
+
+#include "cairn/lie/se2.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/solve/estimator.hpp"
 #include "support/planar_graph.hpp"

@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 #include <Eigen/Eigenvalues>
 
+#include "cairn/lie/se2.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/update/marginal_prior.hpp"
 #include "support/dense_system.hpp"

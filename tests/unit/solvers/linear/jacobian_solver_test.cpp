@@ -16,6 +16,7 @@
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/threads.hpp"
 #include "support/components.hpp"
+#include "support/dense_algebra.hpp"
 #include "support/sample_jacobians.hpp"
 #include "support/sample_matrices.hpp"
 
@@ -77,8 +78,7 @@ double promised_accuracy(const LinearSolver& solver, const JacobianMatrix& J,
     const auto row = static_cast<Eigen::Index>(k);
     H(row, row) += damping[k];
   }
-  const Eigen::VectorXd eigenvalues =
-      Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(H, Eigen::EigenvaluesOnly).eigenvalues();
+  const Eigen::VectorXd eigenvalues = eigenvalues_of(H);
   return 1e-10 * eigenvalues.maxCoeff() / eigenvalues.minCoeff();
 }
 

@@ -9,6 +9,7 @@
 
 #include "cairn/graph/gauge.hpp"
 #include "cairn/lie/point.hpp"
+#include "cairn/lie/se2.hpp"
 #include "cairn/types/define_factor.hpp"
 #include "support/planar_graph.hpp"
 #include "support/scaled_pose.hpp"
