@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Exit code 0 means that what was asked for is true and written; nothing is lost that was computed.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "cairn/plugin/registry.hpp"
+#include "integration/process.hpp"
+
+namespace cairn::test {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+using ::testing::StartsWith;
+
+using Outputs = WithGraphFile;
+
+/// Runs a command of the shell in which "$C" is the program and "$D" the test's folder.
+Outcome shell(const std::string& command, const TemporaryFolder& folder) {
+  return run_program({"sh", "-c", command}, {{"C", program()}, {"D", folder.path().string()}});
+}
+
+TEST_F(Outputs, AReaderThatIsGoneHidesNoError) {
+  const std::string file = graph();
+  for (const std::string arguments :
+       {"optimize $D/none.g2o", "optimize $D/graph.g2o -o $D/no/x.g2o",
+        "optimize $D/graph.g2o -o /dev/full --to g2o", "convert $D/none.g2o $D/x.g2o"}) {
+    const Outcome outcome =
+        shell("(sleep 0.2; $C " + arguments + "; echo code=$? >&2) | true", folder_);
+    EXPECT_THAT(outcome.err, HasSubstr("code=3")) << arguments;
+    EXPECT_THAT(outcome.err, HasSubstr("cairn: ")) << arguments;
+  }
+  const Outcome good = shell("(sleep 0.2; $C info $D/graph.g2o; echo code=$? >&2) | true", folder_);
+  EXPECT_THAT(good.err, HasSubstr("code=0")) << file;
+}
+
+TEST_F(Outputs, NoneReplacesAnotherOrWhatIsRead) {
+  const std::string file = graph(), before = read_text(file), same = folder_.file("same.g2o");
+  std::filesystem::create_hard_link(file, folder_.file("alias.g2o"));
+  const std::vector<Arguments> refused{
+      {"optimize", file, "--record", file},
+      {"optimize", file, "--json", file},
+      {"optimize", file, "--json", folder_.file("alias.g2o")},
+      {"optimize", file, "-o", same, "--json", same},
+      {"optimize", file, "-o", same, "--record", folder_.file("./same.g2o")},
+      {"convert", file, same, "--json", same}};
+  for (const Arguments& arguments : refused) {
+    const Outcome outcome = cairn(arguments);
+    EXPECT_EQ(outcome.exit_code, 2) << testing::PrintToString(arguments);
+    EXPECT_THAT(outcome.err, HasSubstr("name another")) << testing::PrintToString(arguments);
+    EXPECT_EQ(read_text(file), before);
+    EXPECT_FALSE(std::filesystem::exists(same));
+  }
+  // What is no regular file may be named as often as one likes, and a graph may be replaced.
+  EXPECT_EQ(cairn({"optimize", file, "--json", "/dev/null", "--record", "/dev/null"}).exit_code, 0);
+  EXPECT_EQ(cairn({"optimize", file, "-o", file}).exit_code, 0);
+  EXPECT_NE(read_text(file), before);
+}
+
+TEST_F(Outputs, ARecordingThatCannotBeWrittenCostsNothingElse) {
+  const std::string best = folder_.file("best.g2o"), report = folder_.file("run.json");
+  const Outcome outcome =
+      cairn({"optimize", graph(), "-o", best, "--json", report, "--record", "/dev/full"});
+  EXPECT_EQ(outcome.exit_code, 3);
+  EXPECT_TRUE(std::filesystem::exists(best));
+  EXPECT_EQ(parse_json(read_text(report)).at("status").as_string(), "converged");
+}
+
+TEST_F(Outputs, AreTriedAsTheyWillBeWritten) {
+  const std::string file = graph();
+  const Outcome name =
+      cairn({"optimize", file, "-o", folder_.file(std::string(246, 'x') + ".g2o")});
+  EXPECT_EQ(name.exit_code, 3);
+  EXPECT_THAT(name.err, Not(HasSubstr("iteration")));
+  EXPECT_THAT(name.err, Not(HasSubstr(".part")));
+  const Outcome report = cairn({"optimize", file, "--json", folder_.file("no/run.json")});
+  EXPECT_EQ(report.exit_code, 3);
+  EXPECT_THAT(report.err, HasSubstr("folder"));
+}
+
+TEST_F(Outputs, ALimitOfTheSizeOfFilesIsAnError) {
+  graph();
+  const Outcome outcome =
+      shell("ulimit -f 8; $C optimize $D/graph.g2o -o $D/best.g2o; echo code=$? >&2", folder_);
+  EXPECT_THAT(outcome.err, HasSubstr("code=3"));
+  EXPECT_THAT(outcome.err, HasSubstr("best.g2o: cannot be written"));
+  EXPECT_EQ(folder_.contents(), (std::vector<std::string>{"graph.g2o"}));
+}
+
+class OnlineOutputs : public Outputs {
+ protected:
+  void SetUp() override {
+    if (!Registry().has("estimator", "batch")) GTEST_SKIP() << "there is no estimator batch";
+    std::string stream = "VERTEX_SE2 0 0 0 0\nFIX 0\n";
+    for (int k = 1; k <= 20; ++k) {
+      stream += "NEW VERTEX_SE2 " + std::to_string(k) + "\nEDGE_SE2 " + std::to_string(k - 1) +
+                " " + std::to_string(k) + " 1 0 0 100 0 0 100 0 100\n";
+    }
+    write_text(folder_.file("stream.txt"), stream);
+  }
+  std::int64_t poses(const std::string& file) const {
+    return report_of({"info", file}).at("graph").at("variables").as_int64();
+  }
+};
+
+TEST_F(OnlineOutputs, GoOnWithoutAReaderOfTheAnswers) {
+  const Outcome outcome = shell(
+      "(while read -r line; do echo \"$line\"; sleep 0.01; done < $D/stream.txt) |"
+      " ($C online --estimator batch -o $D/map.g2o; echo code=$? >&2) | head -n 1",
+      folder_);
+  EXPECT_THAT(outcome.err, HasSubstr("nobody reads the answers any more"));
+  EXPECT_THAT(outcome.err, HasSubstr("code=0"));
+  EXPECT_EQ(poses(folder_.file("map.g2o")), 21);
+}
+
+TEST_F(OnlineOutputs, ASessionThatFailsStillWritesItsMap) {
+  const Outcome outcome = shell(
+      "(cat $D/stream.txt; head -c 17000000 /dev/zero | tr '\\0' x) |"
+      " $C online --estimator batch --output none -o $D/map.g2o",
+      folder_);
+  EXPECT_EQ(outcome.exit_code, 3);
+  EXPECT_THAT(outcome.err, HasSubstr("16 MB"));
+  EXPECT_EQ(poses(folder_.file("map.g2o")), 21);
+}
+
+TEST_F(OnlineOutputs, ALastLineWithoutItsEndIsNotTaken) {
+  const Outcome outcome = cairn(
+      {"online", "--estimator", "batch", "--output", "none", "-o", folder_.file("map.g2o")}, {},
+      read_text(folder_.file("stream.txt")) + "VERTEX_SE2 21 1 0 0\nEDGE_SE2 20 21 1 0 0 10");
+  EXPECT_EQ(outcome.exit_code, 0);
+  EXPECT_THAT(outcome.err, HasSubstr("the last line has no end, and was not taken: 'EDGE_SE2 20"));
+  EXPECT_EQ(poses(folder_.file("map.g2o")), 21);
+}
+
+}  // namespace
+}  // namespace cairn::test
