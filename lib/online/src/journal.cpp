@@ -12,7 +12,7 @@
 #include <optional>
 #include <utility>
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include "cairn/runtime/error.hpp"
 
