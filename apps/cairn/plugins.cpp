@@ -19,6 +19,7 @@
 #include "cairn/linear/jacobian.hpp"
 #include "cairn/linear/linear_solver.hpp"
 #include "cairn/linear/marginals.hpp"
+#include "cairn/plugin/plugin_search.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/spelling.hpp"

@@ -11,6 +11,7 @@
 #include <fmt/core.h>
 
 #include "cairn/io/format.hpp"
+#include "cairn/plugin/plugin_search.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/threads.hpp"

@@ -6,7 +6,7 @@
 #include <string>
 #include <utility>
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/timed.hpp"

@@ -6,7 +6,7 @@
 #include <limits>
 #include <utility>
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 #include <Eigen/Cholesky>
 
 #include "cairn/graph/packed.hpp"

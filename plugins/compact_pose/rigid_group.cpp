@@ -7,9 +7,9 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
-#include <Eigen/LU>
 
 #include "cairn/runtime/error.hpp"
+#include "dense/lu.hpp"
 
 namespace cairn::compact {
 namespace {
@@ -133,7 +133,7 @@ Matrix RigidGroup::isotropic(double sigma_translation, double sigma_rotation) co
   weights.head<3>().setConstant(1.0 / (sigma_translation * sigma_translation));
   weights.tail<3>().setConstant(1.0 / (sigma_rotation * sigma_rotation));
   const Matrix information = twist_.transpose() * weights.asDiagonal() * twist_;
-  return information.inverse();
+  return Eigen::MatrixXd(information).inverse();
 }
 
 double mutual_information(const Matrix& S_y, const Matrix& S_d) {

@@ -5,11 +5,11 @@
 #include <cmath>
 #include <string>
 
-#include <fmt/format.h>
-#include <Eigen/LU>
+#include <fmt/core.h>
 
 #include "cairn/graph/packed.hpp"
 #include "cairn/runtime/error.hpp"
+#include "dense/lu.hpp"
 
 namespace cairn::compact {
 
@@ -37,7 +37,7 @@ Matrix ThresholdFinder::sensor() const {
   }
   std::vector<std::pair<double, const Matrix*>> by_size;
   for (const Loop& loop : loops_)
-    by_size.emplace_back(loop.covariance.determinant(), &loop.covariance);
+    by_size.emplace_back(Eigen::MatrixXd(loop.covariance).determinant(), &loop.covariance);
   const auto middle = by_size.begin() + std::ssize(by_size) / 2;
   std::ranges::nth_element(by_size, middle, {}, &std::pair<double, const Matrix*>::first);
   return *middle->second;

@@ -12,7 +12,7 @@
 #include <limits>
 #include <vector>
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include "information.hpp"
 #include "readers.hpp"

@@ -4,7 +4,7 @@
 #include <utility>
 #include <vector>
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include "cairn/io/format.hpp"
 #include "cairn/plugin/registry.hpp"

@@ -2,10 +2,10 @@
 #include <queue>
 #include <tuple>
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
 
 #include "cairn/graph/gauge.hpp"
+#include "dense/cholesky.hpp"
 #include "guesses.hpp"
 #include "placing.hpp"
 #include "relative_poses.hpp"

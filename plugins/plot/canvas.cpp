@@ -7,7 +7,7 @@
 
 #include <cairo-pdf.h>
 #include <cairo-svg.h>
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include "cairn/report/packed_array.hpp"
 #include "cairn/runtime/error.hpp"

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <span>
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include "cairn/linear/block_matrix.hpp"
 #include "cairn/runtime/error.hpp"

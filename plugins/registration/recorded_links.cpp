@@ -5,11 +5,11 @@
 #include <string>
 #include <utility>
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
 
 #include "cairn/geometry/pose_chain.hpp"
 #include "cairn/runtime/error.hpp"
+#include "dense/cholesky.hpp"
 
 namespace cairn::registration {
 namespace {
@@ -20,7 +20,8 @@ Motion measured_motion(const Graph& recording, int factor, const MotionGroup& gr
 }
 
 double log_determinant(const std::vector<double>& covariance, int n) {
-  const Eigen::LLT<Eigen::MatrixXd> llt(Eigen::Map<const Eigen::MatrixXd>(covariance.data(), n, n));
+  const Eigen::LLT<Eigen::MatrixXd> llt(
+      Eigen::MatrixXd(Eigen::Map<const Eigen::MatrixXd>(covariance.data(), n, n)));
   return 2.0 * llt.matrixLLT().diagonal().array().log().sum();
 }
 

@@ -10,10 +10,10 @@
 #include <utility>
 #include <vector>
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
 
 #include "cairn/runtime/error.hpp"
+#include "dense/cholesky.hpp"
 #include "recorded_links.hpp"
 #include "registrations.hpp"
 
@@ -133,7 +133,7 @@ class Simulated final : public Registration, public FalseMatches {
     };
     set(motions_->translations(), sensor_.sigma_translation);
     set(motions_->rotations(), sensor_.sigma_rotation);
-    L_ = Sigma.llt().matrixL();
+    L_ = Eigen::LLT<MatrixXd>(MatrixXd(Sigma)).matrixL();
   }
 
   /// ξ = L n with L Lᵀ = Σ, n ~ N(0, 1).

@@ -6,7 +6,7 @@
 #include <memory>
 #include <string>
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include "cairn/io/format.hpp"
 #include "cairn/plugin/registry.hpp"

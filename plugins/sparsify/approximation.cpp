@@ -5,11 +5,11 @@
 #include <cmath>
 #include <utility>
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
-#include <Eigen/LU>
-
 #include "cairn/runtime/error.hpp"
+#include "dense/cholesky.hpp"
+#include "dense/eigenvalues.hpp"
+#include "dense/lu.hpp"
+#include "dense/products.hpp"
 
 namespace cairn::sparsify {
 namespace {
@@ -57,23 +57,22 @@ bool singular(const Matrix& A, const Eigen::LLT<Matrix>& llt) {
 ScaledProblem::ScaledProblem(const RecoveryProblem& problem) : rank(problem.rank) {
   for (const RecoveryProblem::Factor& factor : problem.factors) {
     const Matrix J = Eigen::Map<const Matrix>(factor.jacobian.data(), factor.size, problem.rank);
-    const Eigen::SelfAdjointEigenSolver<Matrix> eigen(J * J.transpose());
+    const Eigen::SelfAdjointEigenSolver<Matrix> eigen(dense::product_with_transpose(J, J));
     if (!(eigen.eigenvalues()[0] > 1e-14 * eigen.eigenvalues()[factor.size - 1]))
       throw Error(ErrorCode::numerical, "a factor of the topology measures one thing twice");
     Phi_root.push_back(eigen.operatorInverseSqrt());
-    Q.push_back(Phi_root.back() * J);
+    Q.push_back(dense::product(Phi_root.back(), J));
   }
 }
 
 Matrix ScaledProblem::scaled(int k, const Matrix& information) const {
   const Matrix root = Phi_root[k].inverse();
-  return root * information * root;
+  return dense::product(dense::product(root, information), root);
 }
 
 Matrix nearest_positive(const Matrix& A, double floor) {
-  const Eigen::SelfAdjointEigenSolver<Matrix> eigen(0.5 * (A + A.transpose()));
-  return eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(floor).asDiagonal() *
-         eigen.eigenvectors().transpose();
+  const Eigen::SelfAdjointEigenSolver<Matrix> eigen(Matrix(0.5 * (A + A.transpose())));
+  return dense::from_eigenvalues(eigen.eigenvectors(), eigen.eigenvalues().cwiseMax(floor));
 }
 
 Approximation::Approximation(const ScaledProblem& problem)
@@ -89,8 +88,8 @@ bool Approximation::refresh() {
   Matrix L = Matrix::Zero(r, r);
   trace_ = 0.0;
   for (int k = 0; k < problem_->factors(); ++k) {
-    const Matrix WQ = W_[k] * problem_->Q[k];
-    L.noalias() += problem_->Q[k].transpose() * WQ;
+    const Matrix WQ = dense::product(W_[k], problem_->Q[k]);
+    dense::add_product_of_transpose(problem_->Q[k], WQ, L);
     trace_ += W_[k].trace();
   }
   const Eigen::LLT<Matrix> llt(L);
@@ -105,17 +104,19 @@ bool Approximation::refresh() {
 void Approximation::change(int k, const Matrix& W) {
   const Eigen::Index m = W.rows();
   const Matrix D = W - W_[k];
-  const Eigen::PartialPivLU<Matrix> lu(Matrix::Identity(m, m) + D * M_[k]);
+  Matrix sum = Matrix::Identity(m, m);
+  dense::add_product(D, M_[k], sum);
+  const Eigen::PartialPivLU<Matrix> lu(sum);
   Matrix C = lu.solve(D);
   C = (0.5 * (C + C.transpose())).eval();
   trace_ += D.trace();
   log_determinant_ += std::log(std::max(lu.determinant(), 1e-300));
-  SQt_.noalias() = S_ * problem_->Q[k].transpose();
-  QS_.noalias() = C * SQt_.transpose();
-  S_.noalias() -= SQt_ * QS_;
+  dense::set_product_with_transpose(S_, problem_->Q[k], SQt_);
+  dense::set_product_with_transpose(C, SQt_, QS_);
+  dense::subtract_product(SQt_, QS_, S_);
   for (int j = 0; j < problem_->factors(); ++j) {
-    R_.noalias() = problem_->Q[j] * SQt_;
-    M_[j].noalias() -= R_ * C * R_.transpose();
+    dense::set_product(problem_->Q[j], SQt_, R_);
+    dense::subtract_congruent(R_, C, M_[j]);
   }
   W_[k] = W;
 }

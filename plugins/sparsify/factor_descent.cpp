@@ -3,9 +3,9 @@
 #include <cmath>
 #include <utility>
 
-#include <Eigen/Cholesky>
-
 #include "cairn/runtime/error.hpp"
+#include "dense/cholesky.hpp"
+#include "dense/products.hpp"
 #include "recovery.hpp"
 
 namespace cairn::sparsify {
@@ -19,7 +19,7 @@ constexpr double kRounding = 1e-14;
 /// Whether nobody else measures what factor k does: M_k⁻¹ = W_k (proposition 3).
 bool alone(const Approximation& at, int k) {
   const Eigen::Index m = at.W(k).rows();
-  return (at.W(k) * at.M(k) - Matrix::Identity(m, m)).cwiseAbs().maxCoeff() < 1e-9;
+  return (dense::product(at.W(k), at.M(k)) - Matrix::Identity(m, m)).cwiseAbs().maxCoeff() < 1e-9;
 }
 
 /// Symmetric, and positive definite in spite of rounding: where some directions are known a

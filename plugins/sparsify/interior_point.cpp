@@ -3,12 +3,12 @@
 #include <cmath>
 #include <utility>
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
-#include <Eigen/LU>
-
 #include "cairn/graph/packed.hpp"
 #include "cairn/runtime/error.hpp"
+#include "dense/cholesky.hpp"
+#include "dense/eigenvalues.hpp"
+#include "dense/lu.hpp"
+#include "dense/products.hpp"
 #include "recovery.hpp"
 
 namespace cairn::sparsify {
@@ -89,7 +89,7 @@ class Barrier {
       const Eigen::LLT<Matrix> llt(W[k]);
       if (llt.info() != Eigen::Success) return false;
       barrier += 2.0 * llt.matrixLLT().diagonal().array().log().sum();
-      L.noalias() += problem_.Q[k].transpose() * (W[k] * problem_.Q[k]);
+      dense::add_product_of_transpose(problem_.Q[k], dense::product(W[k], problem_.Q[k]), L);
       trace += W[k].trace();
       C.emplace_back(llt.matrixL());
     }
@@ -97,7 +97,7 @@ class Barrier {
     if (llt.info() != Eigen::Success) return false;
     if (conservative_) {
       const Matrix I = Matrix::Identity(L.rows(), L.rows());
-      const Eigen::LLT<Matrix> rest(I - L);
+      const Eigen::LLT<Matrix> rest(Matrix(I - L));
       if (rest.info() != Eigen::Success) return false;
       barrier += 2.0 * rest.matrixLLT().diagonal().array().log().sum();
       T_ = rest.solve(I);
@@ -129,7 +129,7 @@ class Barrier {
     for (int k = 0; k < problem_.factors(); ++k) {
       Matrix A = slope_of(k);
       if (conservative_) A += rho * seen(k, T_);
-      A = (C_[k].transpose() * A * C_[k]).eval();
+      A = dense::congruent_of_transpose(C_[k], A);
       A.diagonal().array() -= rho;
       packing_.traces(A, g.data() + packing_.begin(k));
     }
@@ -139,16 +139,17 @@ class Barrier {
   Matrix hessian(double rho) const {
     Matrix H = Matrix::Zero(size(), size());
     std::vector<Matrix> CQ;
-    for (int k = 0; k < problem_.factors(); ++k) CQ.push_back(C_[k].transpose() * problem_.Q[k]);
+    for (int k = 0; k < problem_.factors(); ++k)
+      CQ.push_back(dense::product_of_transpose(C_[k], problem_.Q[k]));
     for (int k = 0; k < problem_.factors(); ++k) {
-      const Matrix QS = CQ[k] * S_;
-      const Matrix QT = conservative_ ? Matrix(CQ[k] * T_) : Matrix();
+      const Matrix QS = dense::product(CQ[k], S_);
+      const Matrix QT = conservative_ ? dense::product(CQ[k], T_) : Matrix();
       const int m = problem_.size(k), rows = m * (m + 1) / 2;
       for (int l = 0; l <= k; ++l) {
         const int n = problem_.size(l), columns = n * (n + 1) / 2;
         auto block = H.block(packing_.begin(k), packing_.begin(l), rows, columns);
-        add_hessian(QS * CQ[l].transpose(), 1.0, block);
-        if (conservative_) add_hessian(QT * CQ[l].transpose(), rho, block);
+        add_hessian(dense::product_with_transpose(QS, CQ[l]), 1.0, block);
+        if (conservative_) add_hessian(dense::product_with_transpose(QT, CQ[l]), rho, block);
         if (l == k) add_hessian(Matrix::Identity(m, m), rho, block);
       }
     }
@@ -169,7 +170,7 @@ class Barrier {
     std::vector<Matrix> W = W_;
     for (int k = 0; k < problem_.factors(); ++k) {
       const Matrix V = Packing::unpack(step.data() + packing_.begin(k), problem_.size(k));
-      const Matrix change = C_[k] * V * C_[k].transpose();
+      const Matrix change = dense::congruent(C_[k], V);
       W[k] += 0.5 * t * (change + change.transpose());
     }
     return W;
@@ -177,9 +178,7 @@ class Barrier {
 
  private:
   /// Q A Qᵀ
-  Matrix seen(int k, const Matrix& A) const {
-    return problem_.Q[k] * A * problem_.Q[k].transpose();
-  }
+  Matrix seen(int k, const Matrix& A) const { return dense::congruent(problem_.Q[k], A); }
   /// Of 2 KLD, by W_k.
   Matrix slope_of(int k) const {
     return Matrix::Identity(problem_.size(k), problem_.size(k)) - seen(k, S_);

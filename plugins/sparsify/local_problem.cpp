@@ -6,12 +6,13 @@
 #include <numeric>
 #include <utility>
 
-#include <fmt/format.h>
-#include <Eigen/Cholesky>
+#include <fmt/core.h>
 
 #include "cairn/geometry/state_group.hpp"
 #include "cairn/graph/packed.hpp"
 #include "cairn/runtime/error.hpp"
+#include "dense/cholesky.hpp"
+#include "dense/products.hpp"
 
 namespace cairn::sparsify {
 namespace {
@@ -86,8 +87,8 @@ class DenseSystem {
       for (std::size_t a = 0; a < on.size(); ++a) {
         g.segment(begin_[on[a]], J[a].cols()) -= J[a].transpose() * r;
         for (std::size_t b = 0; b < on.size(); ++b) {
-          H.block(begin_[on[a]], begin_[on[b]], J[a].cols(), J[b].cols()).noalias() +=
-              J[a].transpose() * J[b];
+          dense::add_product_of_transpose(
+              J[a], J[b], H.block(begin_[on[a]], begin_[on[b]], J[a].cols(), J[b].cols()));
         }
       }
     }
@@ -110,7 +111,7 @@ class DenseSystem {
     double chi2 = linearize(H, g);
     const int free = begin_[nodes_.size() - 1];
     for (int k = 0; k < kIterations && free > 0; ++k) {
-      const Eigen::LDLT<Matrix> ldlt(H.topLeftCorner(free, free));
+      const Eigen::LDLT<Matrix> ldlt(Matrix(H.topLeftCorner(free, free)));
       if (ldlt.info() != Eigen::Success || !ldlt.isPositive()) return;
       Vector step = Vector::Zero(size());
       step.head(free) = ldlt.solve(g.head(free));
@@ -233,14 +234,14 @@ Marginal marginalize(const WorkGraph& work, const LocalProblem& local, bool reso
     system.linearize(H, g);
   }
   const int r = system.removed_size(), b = system.size() - r;
-  const Eigen::LLT<Matrix> llt(H.topLeftCorner(r, r));
+  const Eigen::LLT<Matrix> llt(Matrix(H.topLeftCorner(r, r)));
   if (llt.info() != Eigen::Success) {
     throw Error(ErrorCode::numerical, fmt::format("the factors on {} leave it open",
                                                   graph.describe_variable(local.removed.front())));
   }
   Matrix L = H.bottomRightCorner(b, b);
   const Matrix half = llt.matrixL().solve(H.topRightCorner(r, b));
-  L.noalias() -= half.transpose() * half;
+  dense::subtract_product_of_transpose(half, half, L);
   L = (0.5 * (L + L.transpose())).eval();
 
   Marginal marginal;

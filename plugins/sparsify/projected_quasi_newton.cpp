@@ -4,9 +4,8 @@
 #include <deque>
 #include <utility>
 
-#include <Eigen/LU>
-
 #include "cairn/runtime/error.hpp"
+#include "dense/lu.hpp"
 #include "recovery.hpp"
 
 namespace cairn::sparsify {

@@ -7,7 +7,7 @@
 #include <limits>
 #include <utility>
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include "cairn/graph/packed.hpp"
 #include "cairn/runtime/error.hpp"

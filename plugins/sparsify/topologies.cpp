@@ -9,15 +9,16 @@
 #include <set>
 #include <utility>
 
-#include <fmt/format.h>
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
-#include <Eigen/LU>
+#include <fmt/core.h>
 #include <boost/graph/adjacency_list.hpp>
 #include <boost/graph/kruskal_min_spanning_tree.hpp>
 
 #include "blanket_matrices.hpp"
 #include "cairn/runtime/error.hpp"
+#include "dense/cholesky.hpp"
+#include "dense/eigenvalues.hpp"
+#include "dense/lu.hpp"
+#include "dense/products.hpp"
 #include "recovery.hpp"
 
 namespace cairn::sparsify {
@@ -37,9 +38,9 @@ double epsilon_of(const DenseBlanket& blanket, double part) {
 
 Matrix regularized_covariance(const DenseBlanket& blanket, double part) {
   const int d = blanket.size();
-  return (Matrix(information(blanket)) + epsilon_of(blanket, part) * Matrix::Identity(d, d))
-      .llt()
-      .solve(Matrix::Identity(d, d));
+  const Matrix sum =
+      Matrix(information(blanket)) + epsilon_of(blanket, part) * Matrix::Identity(d, d);
+  return sum.llt().solve(Matrix::Identity(d, d));
 }
 
 /// The blocks of two nodes.
@@ -165,13 +166,15 @@ Matrix downdated(const DenseBlanket& blanket, const std::vector<FactorChoice>& t
   const BlanketProjection projection(blanket, Projection::node);
   for (const FactorChoice& choice : tree) {
     const auto J = jacobian(blanket.models[choice.front()], d);
-    const Matrix JT = J * coordinates(projection, d);
-    const Matrix spread = JT * JT.transpose();  // Ω⁻¹ by (T 4.4)
+    const Matrix JT = dense::product(J, coordinates(projection, d));
+    const Matrix spread = dense::product_with_transpose(JT, JT);  // Ω⁻¹ by (T 4.4)
     if (how == Downdate::exact) {
-      left -= J.transpose() * spread.inverse() * J;
+      left -= dense::congruent_of_transpose(J, spread.inverse());
     } else {
-      const Matrix SJt = S * J.transpose();
-      grown += SJt * (spread + J * SJt).llt().solve(SJt.transpose());
+      const Matrix SJt = dense::product_with_transpose(S, J);
+      Matrix sum = spread;
+      dense::add_product(J, SJt, sum);
+      grown += SJt * sum.llt().solve(SJt.transpose());
     }
   }
   if (how == Downdate::sum) return grown;
@@ -289,11 +292,11 @@ std::vector<FactorChoice> SparseInverse::choose(const DenseBlanket& blanket, int
   Matrix Z = Matrix::Identity(d, d), U = Matrix::Zero(d, d);
   double rho = 1.0;
   for (int k = 0; k < 500; ++k) {
-    const Eigen::SelfAdjointEigenSolver<Matrix> eigen(rho * (Z - U) - S);
+    const Eigen::SelfAdjointEigenSolver<Matrix> eigen(Matrix(rho * (Z - U) - S));
     const Vector x =
         (eigen.eigenvalues().array() + (eigen.eigenvalues().array().square() + 4.0 * rho).sqrt()) /
         (2.0 * rho);
-    const Matrix X = eigen.eigenvectors() * x.asDiagonal() * eigen.eigenvectors().transpose();
+    const Matrix X = dense::from_eigenvalues(eigen.eigenvectors(), x);
     const Matrix before = Z, sum = X + U;
     Z = sum.array().sign() * (sum.array().abs() - lambda / rho).max(0.0);
     U += X - Z;

@@ -5,10 +5,9 @@
 #include <cmath>
 #include <utility>
 
-#include <Eigen/Cholesky>
-
 #include "cairn/graph/packed.hpp"
 #include "cairn/runtime/error.hpp"
+#include "dense/cholesky.hpp"
 
 namespace cairn::sparsify {
 

@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <set>
 
+#include "cairn/plugin/plugin_search.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "integration/process.hpp"
 

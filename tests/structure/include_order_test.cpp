@@ -28,6 +28,8 @@ const Names kLayers{"runtime", "types", "graph", "linear", "solve", "plugin"};
 /// Libraries beside plugins, which plugins (and libraries) may include.
 const Names kShared{"solvers/block", "solvers/linear/blas", "solvers/linear/iterative",
                     "solvers/nonlinear/descent"};
+/// Eigen's decompositions, compiled once: what everything may include, and includes nothing.
+const std::string kDense = "lib/dense/";
 /// Folders each of whose folders stands for itself: it includes no other.
 const Names kWings{"types", "solvers/linear", "solvers/nonlinear", "solvers/incremental", "plugins",
                    "apps"};
@@ -127,6 +129,7 @@ class Tree {
   std::string public_fault(const std::string& file, const std::string& name) const {
     const std::string part = name.substr(6, name.find('/', 6) - 6);
     const int layer = position(kLayers, part), subject = position(subjects_, part);
+    if (file.starts_with(kDense)) return "what lies below the core includes nothing of it";
     if (layer < 0 && subject < 0) return part + " is neither a layer of the core nor a subject";
     if (file.starts_with("core/")) {
       if (layer < 0) return "the core includes nothing of lib";
@@ -155,6 +158,7 @@ class Tree {
   }
 
   std::string fault_between(const std::string& file, const std::string& other) const {
+    if (other.starts_with(kDense)) return {};
     const std::string from = part_of(file), to = part_of(other);
     if (!from.empty() || !to.empty()) {
       // Within the core, also those of earlier layers.
@@ -220,6 +224,10 @@ TEST_F(FaultyTree, WhatIsAllowedIsNoFault) {
   write("solvers/linear/one/one.cpp", "#include \"block/front.hpp\"\n#include \"one.hpp\"\n");
   write("solvers/linear/one/one.hpp", "#include \"cairn/update/u.hpp\"\n");
   write("solvers/linear/two/one.hpp", "");
+  write("lib/dense/lu.hpp", "#include \"dense/products.hpp\"\n");
+  write("lib/dense/products.hpp", "#include <Eigen/Core>\n");
+  for (const char* file : {"core/src/graph/lu.cpp", "lib/update/src/lu.cpp", "types/one/lu.cpp"})
+    write(file, "#include \"dense/lu.hpp\"\n");
   EXPECT_THAT(faults(), IsEmpty());
 }
 
@@ -228,6 +236,11 @@ TEST_F(FaultyTree, ALaterLayerOrSubjectIsAFault) {
   write("lib/geometry/include/cairn/geometry/g.hpp", "#include \"cairn/update/u.hpp\"\n");
   EXPECT_THAT(faults(), ElementsAre(HasSubstr("graph is a later layer"),
                                     HasSubstr("update is a later subject")));
+}
+
+TEST_F(FaultyTree, ALayerInTheDenseMatricesIsAFault) {
+  write("lib/dense/lu.hpp", "#include \"cairn/runtime/error.hpp\"\n");
+  EXPECT_THAT(faults(), ElementsAre(HasSubstr("below the core")));
 }
 
 TEST_F(FaultyTree, LibInTheCoreIsAFault) {

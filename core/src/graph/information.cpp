@@ -5,11 +5,11 @@
 #include <cmath>
 #include <string_view>
 
-#include <fmt/format.h>
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
+#include <fmt/core.h>
 
 #include "cairn/runtime/error.hpp"
+#include "dense/cholesky.hpp"
+#include "dense/eigenvalues.hpp"
 
 namespace cairn::detail {
 namespace {

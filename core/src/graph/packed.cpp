@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Cholesky>
+#include "dense/cholesky.hpp"
 
 namespace cairn {
 namespace {

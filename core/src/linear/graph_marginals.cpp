@@ -6,6 +6,7 @@
 #include <Eigen/Core>
 
 #include "cairn/runtime/error.hpp"
+#include "dense/products.hpp"
 
 namespace cairn {
 namespace {
@@ -136,7 +137,7 @@ std::vector<double> position_covariance(const VariableType& type, std::span<cons
   const std::vector<double> derivative = position_jacobian(type, x);
   const Eigen::Map<const Eigen::MatrixXd> G(derivative.data(), d, n), Sigma(sigma.data(), n, n);
   std::vector<double> out(d * d);
-  Eigen::Map<Eigen::MatrixXd>(out.data(), d, d) = G * Sigma * G.transpose();
+  Eigen::Map<Eigen::MatrixXd>(out.data(), d, d) = dense::congruent(G, Sigma);
   return out;
 }
 

@@ -4,11 +4,11 @@
 #include <algorithm>
 #include <cmath>
 
-#include <fmt/format.h>
-#include <Eigen/Eigenvalues>
+#include <fmt/core.h>
 #include <Eigen/SparseCholesky>
 
 #include "cairn/runtime/timed.hpp"
+#include "dense/eigenvalues.hpp"
 
 namespace cairn {
 namespace {

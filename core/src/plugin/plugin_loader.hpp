@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "cairn/plugin/plugin.hpp"
-#include "cairn/plugin/registry.hpp"
+#include "cairn/plugin/plugin_search.hpp"
 
 namespace cairn {
 

@@ -9,6 +9,7 @@
 
 #include <fmt/format.h>
 
+#include "cairn/plugin/plugin_search.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/plugin_call.hpp"
 #include "cairn/runtime/spelling.hpp"
@@ -287,6 +288,8 @@ struct Registry::Impl {
     return it->second;
   }
 };
+
+Registry::Registry() : Registry(PluginSearch{}) {}
 
 Registry::Registry(const PluginSearch& search) : impl_(std::make_unique<Impl>()) {
   std::vector<fs::path> seen;

@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "cairn/solve/optimizer.hpp"
 
+#include "cairn/solve/initial_guess.hpp"
+
 namespace cairn {
 
 Optimizer::~Optimizer() = default;
+InitialGuess::~InitialGuess() = default;
 
 std::string_view to_string(Status status) {
   switch (status) {

@@ -6,6 +6,8 @@
 
 #include <Eigen/Core>
 
+#include "dense/products.hpp"
+
 namespace cairn {
 namespace {
 
@@ -74,9 +76,9 @@ void EvaluatedFactorType::linearize(const FactorView& pool, std::size_t begin, s
       for (int b = a; b < n; ++b, ++pair) {
         if (sink.blocks[pair] == LinearizeSink::kNone) continue;
         if (a != b && sink.transposed[pair]) {
-          put(sink, sink.blocks[pair], weight * J[b].transpose() * J[a]);
+          put(sink, sink.blocks[pair], dense::scaled_product_of_transpose(weight, J[b], J[a]));
         } else {
-          put(sink, sink.blocks[pair], weight * J[a].transpose() * J[b]);
+          put(sink, sink.blocks[pair], dense::scaled_product_of_transpose(weight, J[a], J[b]));
         }
       }
       const std::int64_t target = sink.gradients[f * static_cast<std::size_t>(n) + a];

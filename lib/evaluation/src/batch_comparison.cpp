@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include "cairn/linear/graph_marginals.hpp"
 #include "cairn/linear/marginals.hpp"

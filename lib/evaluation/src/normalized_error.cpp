@@ -15,6 +15,7 @@
 #include "cairn/linear/graph_marginals.hpp"
 #include "cairn/linear/linearizer.hpp"
 #include "cairn/runtime/error.hpp"
+#include "dense/products.hpp"
 
 namespace cairn {
 namespace {
@@ -121,13 +122,15 @@ double expected_ate(Estimator& estimator, const Graph& graph, std::span<const Id
   Eigen::MatrixXd Sigma(d * n, d * n);
   for (Eigen::Index k = 0; k < n; ++k) {
     for (Eigen::Index i = 0; i < n; ++i) {
-      Sigma.block(d * i, d * k, d, d) = positions[static_cast<std::size_t>(i)].G *
-                                        all.block(tangent * i, tangent * k, tangent, tangent) *
-                                        positions[static_cast<std::size_t>(k)].G.transpose();
+      Sigma.block(d * i, d * k, d, d) = dense::product_with_transpose(
+          dense::product(positions[static_cast<std::size_t>(i)].G,
+                         all.block(tangent * i, tangent * k, tangent, tangent)),
+          positions[static_cast<std::size_t>(k)].G);
     }
   }
   const Eigen::MatrixXd Q = rigid_directions(positions);
-  const double aligned = Sigma.trace() - (Q.transpose() * Sigma * Q).trace();
+  const Eigen::MatrixXd seen = dense::product_of_transpose(Q, Sigma);
+  const double aligned = Sigma.trace() - (seen * Q).trace();
   return std::sqrt(std::max(0.0, aligned) / static_cast<double>(n));
 }
 

@@ -10,12 +10,13 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
-#include <Eigen/LU>
 
 #include "cairn/graph/packed.hpp"
 #include "cairn/runtime/error.hpp"
+#include "dense/cholesky.hpp"
+#include "dense/lu.hpp"
+#include "dense/products.hpp"
 
 namespace cairn {
 namespace {
@@ -80,20 +81,22 @@ class Moments {
  public:
   /// `ad`: those of all unit vectors, one after the other.
   Moments(const std::vector<double>& ad, const MatrixXd& Sigma)
-      : ad_(ad), n_(Sigma.rows()), weighted_(MatrixMap(ad.data(), n_ * n_, n_) * Sigma) {}
+      : ad_(ad),
+        n_(Sigma.rows()),
+        weighted_(dense::product(MatrixMap(ad.data(), n_ * n_, n_), Sigma)) {}
 
   /// E[ad(ξ) ad(ξ)]
   MatrixXd squared() const {
     MatrixXd P = MatrixXd::Zero(n_, n_);
-    for (Eigen::Index j = 0; j < n_; ++j) P.noalias() += ad(j) * weighted(j);
+    for (Eigen::Index j = 0; j < n_; ++j) dense::add_product(ad(j), weighted(j), P);
     return P;
   }
   /// E[ad(ξ) S ad(ξ)ᵀ]
   MatrixXd around(const MatrixXd& S) const {
     MatrixXd B = MatrixXd::Zero(n_, n_), product(n_, n_);
     for (Eigen::Index j = 0; j < n_; ++j) {
-      product.noalias() = ad(j) * S;
-      B.noalias() += product * weighted(j).transpose();
+      dense::set_product(ad(j), S, product);
+      dense::add_product_with_transpose(product, weighted(j), B);
     }
     return B;
   }
@@ -115,7 +118,8 @@ bool invert(const MatrixXd& S, MatrixXd& inverse) {
   // Scaled to a unit diagonal, so that it does not matter what is in metres and what in radians. A
   // diagonal that is not positive leaves infinities and what is not a number.
   const VectorXd scale = S.diagonal().cwiseSqrt().cwiseInverse();
-  const Eigen::LLT<MatrixXd> llt(scale.asDiagonal() * S * scale.asDiagonal());
+  const MatrixXd scaled = scale.asDiagonal() * S * scale.asDiagonal();
+  const Eigen::LLT<MatrixXd> llt(scaled);
   if (llt.info() != Eigen::Success) return false;
   inverse = scale.asDiagonal() * llt.solve(MatrixXd(scale.asDiagonal()));
   return inverse.allFinite();
@@ -166,14 +170,15 @@ Motion MotionGroup::compose(const Motion& a, const Motion& b, CompositionOrder o
   group_->compose(a.mean.data(), b.mean.data(), ab.mean.data());
   type_->normalize(ab.mean.data());  // or rounding would pile up over many steps
 
-  const MatrixXd Sigma_1 = A * covariance(a, tangent_) * A.transpose();
+  const MatrixXd Sigma_1 = dense::congruent(A, covariance(a, tangent_));
   const MatrixMap Sigma_2 = covariance(b, tangent_);
   MatrixXd Sigma = Sigma_1 + Sigma_2;
   if (order == CompositionOrder::fourth) {
     const Moments first(ad_, Sigma_1), second(ad_, Sigma_2);
     Sigma += 0.25 * first.around(Sigma_2);
     // Twice P Σ stands for P Σ and its transpose: made symmetric below, it is their sum.
-    Sigma += (2.0 / 12.0) * (first.squared() * Sigma_2 + second.squared() * Sigma_1);
+    Sigma += (2.0 / 12.0) *
+             (dense::product(first.squared(), Sigma_2) + dense::product(second.squared(), Sigma_1));
   }
   ab.covariance = symmetric(Sigma);
   return ab;
@@ -185,7 +190,7 @@ Motion MotionGroup::inverse(const Motion& a) const {
   type_->normalize(back.mean.data());
   MatrixXd Ad(tangent_, tangent_);
   group_->adjoint(a.mean.data(), Ad.data());
-  back.covariance = symmetric(Ad * covariance(a, tangent_) * Ad.transpose());
+  back.covariance = symmetric(dense::congruent(Ad, covariance(a, tangent_)));
   return back;
 }
 
@@ -204,8 +209,8 @@ Motion MotionGroup::fuse(const Motion& a, const Motion& b) const {
     for (std::size_t k = 0; k < 2; ++k) {
       type_->local(1, motions[k]->mean.data(), x.data(), r.data());
       type_->retract_jacobian(one.data(), r.data(), J_r.data());
-      const MatrixXd D = J_r.inverse(), weighted = D.transpose() * Omega[k];
-      H.noalias() += weighted * D;
+      const MatrixXd D = J_r.inverse(), weighted = dense::product_of_transpose(D, Omega[k]);
+      dense::add_product(weighted, D, H);
       g.noalias() -= weighted * r;
     }
   };
@@ -270,7 +275,7 @@ Motion MotionGroup::measured(const FactorType& type, std::span<const double> mea
   const std::vector<double> metric = of_error_metric(type, motion.mean);
   const MatrixMap D(metric.data(), rows, tangent_);
   MatrixXd Sigma;
-  if (!invert(D.transpose() * unpack(information, rows) * D, Sigma)) {
+  if (!invert(dense::congruent_of_transpose(D, unpack(information, rows)), Sigma)) {
     throw bad_input(
         fmt::format("{}: the information matrix is not positive definite, and the covariance of a "
                     "relative pose is its inverse; expected one of full rank",
@@ -306,8 +311,8 @@ Factor MotionGroup::to_factor(std::shared_ptr<const FactorType> type, Id from, I
         "them; a factor type with as many of both can",
         type->tag(), type->residual_size(), tangent_));
   }
-  const MatrixXd D_inverse = MatrixMap(metric.data(), tangent_, tangent_).inverse();
-  const MatrixXd Omega = D_inverse.transpose() * information_of(motion, tangent_) * D_inverse;
+  const MatrixXd D = MatrixMap(metric.data(), tangent_, tangent_), D_inverse = D.inverse();
+  const MatrixXd Omega = dense::congruent_of_transpose(D_inverse, information_of(motion, tangent_));
   return {std::move(type), {from, to}, motion.mean, pack(0.5 * (Omega + Omega.transpose()))};
 }
 

@@ -7,13 +7,13 @@
 #include <string>
 #include <utility>
 
-#include <fmt/format.h>
-#include <Eigen/Cholesky>
+#include <fmt/core.h>
 #include <Eigen/Core>
 
 #include "cairn/geometry/pose.hpp"
 #include "cairn/geometry/state_group.hpp"
 #include "cairn/runtime/error.hpp"
+#include "dense/cholesky.hpp"
 
 namespace cairn {
 

@@ -6,7 +6,7 @@
 #include <span>
 #include <utility>
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include "cairn/linear/linear_solver.hpp"
 #include "cairn/linear/linearizer.hpp"

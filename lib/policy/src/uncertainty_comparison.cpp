@@ -6,9 +6,10 @@
 #include <limits>
 #include <utility>
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
-#include <Eigen/Eigenvalues>
+
+#include "dense/cholesky.hpp"
+#include "dense/eigenvalues.hpp"
 
 namespace cairn {
 

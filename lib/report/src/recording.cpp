@@ -8,7 +8,7 @@
 #include <cstdio>
 #include <system_error>
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include "cairn/report/packed_array.hpp"
 #include "cairn/report/scene_json.hpp"

@@ -4,7 +4,7 @@
 #include <initializer_list>
 #include <utility>
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 #include <boost/json/parse.hpp>
 
 #include "cairn/report/scene_json.hpp"

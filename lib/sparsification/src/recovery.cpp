@@ -3,11 +3,11 @@
 
 #include <cmath>
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
-#include <Eigen/LU>
-
 #include "cairn/runtime/error.hpp"
+#include "dense/cholesky.hpp"
+#include "dense/eigenvalues.hpp"
+#include "dense/lu.hpp"
+#include "dense/products.hpp"
 
 namespace cairn {
 namespace {
@@ -25,7 +25,8 @@ Matrix by_eigenvectors(const Matrix& L) {
   Vector scale = L.diagonal();
   for (double& s : scale) s = s > 0.0 ? 1.0 / std::sqrt(s) : 0.0;
   const Matrix scaled = scale.asDiagonal() * L * scale.asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<Matrix> eigen(0.5 * (scaled + scaled.transpose()));
+  const Matrix symmetric = 0.5 * (scaled + scaled.transpose());
+  const Eigen::SelfAdjointEigenSolver<Matrix> eigen(symmetric);
   const Vector& values = eigen.eigenvalues();
   Eigen::Index zeros = 0;
   while (zeros < values.size() && !(values[zeros] > kZero * values[values.size() - 1])) ++zeros;
@@ -38,7 +39,7 @@ Matrix by_eigenvectors(const Matrix& L) {
 Matrix by_first_node(const DenseBlanket& blanket) {
   const Matrix L = MatrixMap(blanket.information.data(), blanket.size(), blanket.size());
   const Eigen::Index first = blanket.node_sizes.front(), r = L.rows() - first;
-  const Eigen::LLT<Matrix> llt(L.bottomRightCorner(r, r));
+  const Eigen::LLT<Matrix> llt(Matrix(L.bottomRightCorner(r, r)));
   // A pivot that is rounding: the factorisation may go on in spite of it.
   const Vector pivots = llt.matrixLLT().diagonal().cwiseAbs2();
   const Vector diagonal = L.diagonal().tail(r);
@@ -76,7 +77,8 @@ RecoveryProblem BlanketProjection::problem(const DenseBlanket& blanket,
     int row = 0;
     for (const int number : choice) {
       const FactorModel& model = blanket.models[number];
-      J.middleRows(row, model.size).noalias() = MatrixMap(model.jacobian.data(), model.size, d) * T;
+      J.middleRows(row, model.size) =
+          dense::product(MatrixMap(model.jacobian.data(), model.size, d), T);
       row += model.size;
     }
     factor.jacobian.assign(J.data(), J.data() + J.size());
@@ -87,7 +89,8 @@ RecoveryProblem BlanketProjection::problem(const DenseBlanket& blanket,
         const MatrixMap of(model.jacobian.data(), m, d);
         const Matrix Ja = of.middleCols(begin[a], m).inverse();
         const Matrix Jb = of.middleCols(begin[b], m).inverse();
-        const Matrix guess = Ja.transpose() * L.block(begin[a], begin[b], m, m) * Jb;
+        const Matrix guess =
+            dense::product(dense::product_of_transpose(Ja, L.block(begin[a], begin[b], m, m)), Jb);
         factor.off_diagonal.assign(guess.data(), guess.data() + guess.size());
       }
     }

@@ -9,7 +9,7 @@
 #include <unordered_set>
 #include <utility>
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include "cairn/geometry/pose_chain.hpp"
 #include "cairn/online/recorded_graph.hpp"

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <string>
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include "cairn/runtime/error.hpp"
 

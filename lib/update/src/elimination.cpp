@@ -10,13 +10,14 @@
 #include <unordered_map>
 #include <utility>
 
-#include <fmt/format.h>
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
+#include <fmt/core.h>
 
 #include "cairn/runtime/error.hpp"
 #include "cairn/types/loss.hpp"
 #include "cairn/update/marginal_prior.hpp"
+#include "dense/cholesky.hpp"
+#include "dense/eigenvalues.hpp"
+#include "dense/products.hpp"
 
 namespace cairn {
 namespace {
@@ -187,7 +188,7 @@ class Eliminator {
         const auto column = columns.place.find(variables[b]);
         if (column == columns.place.end()) continue;
         total.H.block(at, columns.offsets[column->second], J[a].cols(), J[b].cols()) +=
-            weight * J[a].transpose() * J[b];
+            dense::scaled_product_of_transpose(weight, J[a], J[b]);
       }
     }
   }
@@ -217,10 +218,11 @@ class Eliminator {
       const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(mm);
       const VectorXd root = (eigen.eigenvalues().array() > kZeroPivot)
                                 .select(eigen.eigenvalues().cwiseSqrt().cwiseInverse(), 0.0);
-      half = root.asDiagonal() * (eigen.eigenvectors().transpose() * right);
+      half = root.asDiagonal() * dense::product_of_transpose(eigen.eigenvectors(), right);
     }
-    return {all.H.bottomRightCorner(n, n) - half.leftCols(n).transpose() * half.leftCols(n),
-            all.g.tail(n) - half.leftCols(n).transpose() * half.col(n)};
+    MatrixXd H = all.H.bottomRightCorner(n, n);
+    dense::subtract_product_of_transpose(half.leftCols(n), half.leftCols(n), H);
+    return {std::move(H), all.g.tail(n) - half.leftCols(n).transpose() * half.col(n)};
   }
 
   /// What is known of where the group is in the world goes on to its prior: all that can be, if

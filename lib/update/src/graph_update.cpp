@@ -7,7 +7,7 @@
 #include <unordered_map>
 #include <unordered_set>
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include "cairn/graph/gauge.hpp"
 #include "cairn/runtime/error.hpp"

@@ -3,12 +3,13 @@
 
 #include <cmath>
 
-#include <fmt/format.h>
-#include <Eigen/Eigenvalues>
-#include <Eigen/LU>
+#include <fmt/core.h>
 
 #include "cairn/graph/packed.hpp"
 #include "cairn/runtime/error.hpp"
+#include "dense/eigenvalues.hpp"
+#include "dense/lu.hpp"
+#include "dense/products.hpp"
 
 namespace cairn {
 namespace {
@@ -115,7 +116,7 @@ MarginalPrior::Evaluation MarginalPrior::evaluate_at(const double* const* x,
     if (!with_jacobian) continue;
     MatrixXd D(size, size);
     type.retract_jacobian(variables_[k].origin.data(), e.data() + begin, D.data());
-    result.J.middleCols(begin, size).noalias() = A.middleCols(begin, size) * D.inverse();
+    result.J.middleCols(begin, size) = dense::product(A.middleCols(begin, size), D.inverse());
   }
   result.r += A * e;
   whiten(sqrt_information, result.r);

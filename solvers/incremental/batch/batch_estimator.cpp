@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <chrono>
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include "cairn/graph/gauge.hpp"
 #include "cairn/linear/normal_equations.hpp"

@@ -4,11 +4,12 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
-#include <Eigen/Eigenvalues>
-#include <Eigen/LU>
 
+#include "dense/cholesky.hpp"
+#include "dense/eigenvalues.hpp"
+#include "dense/lu.hpp"
+#include "dense/products.hpp"
 #include "inverse.hpp"
 
 namespace cairn::incremental {
@@ -161,7 +162,7 @@ bool Covariances::take_out_fresh(const System& system, const Tree& tree) {
     }
   }
   const Eigen::MatrixXd SV = S.asDiagonal() * V_f;
-  const Eigen::LDLT<Eigen::MatrixXd> inner(V_f.transpose() * SV);
+  const Eigen::LDLT<Eigen::MatrixXd> inner(dense::product_of_transpose(V_f, SV));
   if (!fresh.empty() && (inner.info() != Eigen::Success || !(inner.rcond() > 1e-12))) return false;
   Eigen::MatrixXd M = S.asDiagonal();
   if (!fresh.empty()) M -= SV * inner.solve(SV.transpose());

@@ -5,6 +5,7 @@
 
 #include <Eigen/Core>
 
+#include "dense/products.hpp"
 #include "engine.hpp"
 
 namespace cairn::incremental {
@@ -33,8 +34,8 @@ void Engine::as_seen_from(int a, int b, double* block, std::int64_t stride) cons
     std::copy_n(states_.x(v), x.size(), x.begin());
     return states_.away(v);
   };
-  if (away(a)) sigma = (turn(a, rows) * sigma).eval();
-  if (away(b)) sigma = (sigma * turn(b, columns).transpose()).eval();
+  if (away(a)) sigma = dense::product(turn(a, rows), sigma);
+  if (away(b)) sigma = dense::product_with_transpose(sigma, turn(b, columns));
 }
 
 bool Engine::covariance(int a, int b, double* block) {

@@ -7,7 +7,7 @@
 #include <stdexcept>
 
 #include <dlfcn.h>
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include "cairn/runtime/error.hpp"
 #include "cholmod_ordering.hpp"

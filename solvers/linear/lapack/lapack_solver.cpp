@@ -5,7 +5,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include "blas_threads.hpp"
 #include "cairn/runtime/error.hpp"

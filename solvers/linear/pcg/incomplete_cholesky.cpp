@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include "iterative/small_blocks.hpp"
 #include "iterative/vectors.hpp"

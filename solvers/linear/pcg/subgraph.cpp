@@ -5,7 +5,7 @@
 #include <cmath>
 #include <utility>
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include "iterative/vectors.hpp"
 #include "pcg/spanning_tree.hpp"

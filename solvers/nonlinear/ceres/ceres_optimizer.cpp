@@ -9,7 +9,7 @@
 #include <utility>
 
 #include <dlfcn.h>
-#include <fmt/format.h>
+#include <fmt/core.h>
 #include <glog/logging.h>
 
 #include "cairn/graph/gauge.hpp"

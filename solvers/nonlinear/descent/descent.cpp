@@ -6,7 +6,7 @@
 #include <numeric>
 #include <utility>
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include "cairn/linear/iterative_solver.hpp"
 #include "cairn/runtime/timed.hpp"

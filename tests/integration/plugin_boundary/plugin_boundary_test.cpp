@@ -15,6 +15,7 @@
 
 #include "cairn/plugin/fingerprint.hpp"
 #include "cairn/plugin/plugin.hpp"
+#include "cairn/plugin/plugin_search.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/types/loss.hpp"

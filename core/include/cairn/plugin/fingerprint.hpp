@@ -5,7 +5,15 @@
 
 #include <string>  // the standard library's macros
 
+// Eigen's macros alone: its matrices would be most of the time in which a manifest compiles. Only
+// where these are known to be two headers that stand for themselves.
+#if __has_include(<Eigen/src/Core/util/ConfigureVectorization.h>) && !__has_include(<Eigen/Version>)
+#include <Eigen/src/Core/util/Macros.h>
+
+#include <Eigen/src/Core/util/ConfigureVectorization.h>
+#else
 #include <Eigen/Core>
+#endif
 
 #include "cairn/plugin/abi_tag.hpp"
 #include "cairn/plugin/plugin.hpp"

@@ -2,10 +2,10 @@
 #pragma once
 
 #include <concepts>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <limits>
-#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <type_traits>
@@ -13,9 +13,93 @@
 #include <vector>
 
 #include "cairn/plugin/options.hpp"
+#include "cairn/runtime/api.hpp"
 #include "cairn/runtime/enum_names.hpp"
 
 namespace cairn {
+
+namespace detail {
+
+/// Members of integer type, of any size.
+struct IntegerAccess {
+  double least, largest;
+  std::int64_t (*get)(const void* member);
+  void (*set)(void* member, std::int64_t value);
+};
+template <std::integral Integer>
+constexpr IntegerAccess integer_access() {
+  using Limits = std::numeric_limits<Integer>;
+  return {static_cast<double>(Limits::min()), static_cast<double>(Limits::max()),
+          [](const void* member) {
+            return static_cast<std::int64_t>(*static_cast<const Integer*>(member));
+          },
+          [](void* member, std::int64_t value) {
+            *static_cast<Integer*>(member) = static_cast<Integer>(value);
+          }};
+}
+
+/// Members of an enum.
+struct EnumAccess {
+  std::vector<std::string> (*names)();
+  std::string_view (*get)(const void* member);
+  void (*set)(void* member, std::string_view name);
+};
+template <NamedEnum Enum>
+constexpr EnumAccess enum_access() {
+  return {names_of_enum<Enum>,
+          [](const void* member) { return to_string(*static_cast<const Enum*>(member)); },
+          [](void* member, std::string_view name) {
+            *static_cast<Enum*>(member) = find_enum<Enum>(name).value();
+          }};
+}
+
+/// Members whose text has a form of its own.
+struct TextAccess {
+  std::function<std::string(const void* member)> format;
+  std::function<void(void* member, const std::string& text)> parse;
+};
+
+/// The fields of a struct whose type is not known here: a member is known by its place, the bytes
+/// from the beginning of the struct to it. What each of the functions adds, and what it throws:
+/// `OptionFields`.
+class CAIRN_API OptionFieldList {
+ public:
+  OptionFieldList();
+  OptionFieldList(const OptionFieldList& other);
+  OptionFieldList(OptionFieldList&& other) noexcept;
+  OptionFieldList& operator=(const OptionFieldList& other);
+  OptionFieldList& operator=(OptionFieldList&& other) noexcept;
+  ~OptionFieldList();
+
+  void boolean(std::string_view name, std::ptrdiff_t place, std::string_view help);
+  void integer(std::string_view name, std::ptrdiff_t place, const IntegerAccess& access,
+               double minimum, double maximum, std::string_view help);
+  void real(std::string_view name, std::ptrdiff_t place, double minimum, double maximum,
+            std::string_view help);
+  void text(std::string_view name, std::ptrdiff_t place, std::string_view help);
+  void text(std::string_view name, std::ptrdiff_t place, TextAccess access, std::string_view help);
+  void choice(std::string_view name, std::ptrdiff_t place, const EnumAccess& access,
+              std::string_view help);
+  void choice(std::string_view name, std::ptrdiff_t place, std::vector<std::string> choices,
+              std::string_view help);
+  void component(std::string_view name, std::ptrdiff_t place, std::string_view kind,
+                 std::string_view help);
+  void part(const OptionFieldList& fields, std::ptrdiff_t place);
+
+  OptionTable table(const void* defaults) const;
+  void read(const Options& options, void* result) const;
+  OptionValues values(const void* options) const;
+
+ private:
+  struct Field;
+  Field& add(std::string_view name, OptionType type, std::string_view help, std::ptrdiff_t place);
+  Field& add_text(std::string_view name, OptionType type, std::string_view help,
+                  std::ptrdiff_t place);
+
+  std::vector<Field> fields_;
+};
+
+}  // namespace detail
 
 /// The options of a component, declared once: a struct, whose members have the defaults, and its
 /// function `fields`, which adds to each member its name, its range and a line of help.
@@ -37,174 +121,108 @@ namespace cairn {
 template <class Struct>
 class OptionFields {
  public:
-  OptionFields& boolean(std::string name, bool Struct::*member, std::string help) {
-    return add(
-        make_spec(std::move(name), OptionType::boolean, std::move(help)), member,
-        [](bool value) { return option_text(value); },
-        [](const Options& from, const std::string& of) { return from.boolean(of); });
+  OptionFields& boolean(std::string_view name, bool Struct::*member, std::string_view help) {
+    fields_.boolean(name, place_of(member), help);
+    return *this;
   }
 
   /// A whole number in [minimum, maximum]. Throws `std::logic_error` if the member cannot hold all
   /// of these.
   template <std::integral Integer>
-  OptionFields& integer(std::string name, Integer Struct::*member, double minimum, double maximum,
-                        std::string help) {
-    using Limits = std::numeric_limits<Integer>;
-    if (minimum < static_cast<double>(Limits::min()) ||
-        maximum > static_cast<double>(Limits::max())) {
-      throw std::logic_error("option '" + name + "' has a range that its member cannot hold");
-    }
-    OptionSpec field = make_spec(std::move(name), OptionType::integer, std::move(help));
-    field.minimum = minimum;
-    field.maximum = maximum;
-    return add(
-        std::move(field), member,
-        [](Integer value) { return option_text(static_cast<std::int64_t>(value)); },
-        [](const Options& from, const std::string& of) {
-          return static_cast<Integer>(from.integer(of));
-        });
+  OptionFields& integer(std::string_view name, Integer Struct::*member, double minimum,
+                        double maximum, std::string_view help) {
+    fields_.integer(name, place_of(member), detail::integer_access<Integer>(), minimum, maximum,
+                    help);
+    return *this;
   }
 
   /// A number in [minimum, maximum].
-  OptionFields& real(std::string name, double Struct::*member, double minimum, double maximum,
-                     std::string help) {
-    OptionSpec field = make_spec(std::move(name), OptionType::real, std::move(help));
-    field.minimum = minimum;
-    field.maximum = maximum;
-    return add(
-        std::move(field), member, [](double value) { return option_text(value); },
-        [](const Options& from, const std::string& of) { return from.real(of); });
+  OptionFields& real(std::string_view name, double Struct::*member, double minimum, double maximum,
+                     std::string_view help) {
+    fields_.real(name, place_of(member), minimum, maximum, help);
+    return *this;
   }
 
   /// Any text.
-  OptionFields& text(std::string name, std::string Struct::*member, std::string help) {
-    return add(make_spec(std::move(name), OptionType::text, std::move(help)), member, as_it_is,
-               read_text);
+  OptionFields& text(std::string_view name, std::string Struct::*member, std::string_view help) {
+    fields_.text(name, place_of(member), help);
+    return *this;
   }
 
   /// Text with a form of its own: `parse` throws `Error` (usage) for what it cannot read, and
   /// `format` is its inverse.
   template <class Value>
-  OptionFields& text(std::string name, Value Struct::*member,
+  OptionFields& text(std::string_view name, Value Struct::*member,
                      std::type_identity_t<std::function<Value(const std::string&)>> parse,
                      std::type_identity_t<std::function<std::string(const Value&)>> format,
-                     std::string help) {
-    return add(make_spec(std::move(name), OptionType::text, std::move(help)), member,
-               std::move(format),
-               [parse = std::move(parse)](const Options& from, const std::string& of) {
-                 return parse(from.text(of));
-               });
+                     std::string_view help) {
+    fields_.text(name, place_of(member),
+                 {[format = std::move(format)](const void* value) {
+                    return format(*static_cast<const Value*>(value));
+                  },
+                  [parse = std::move(parse)](void* value, const std::string& text) {
+                    *static_cast<Value*>(value) = parse(text);
+                  }},
+                 help);
+    return *this;
   }
 
   /// One of the names of an enum.
   template <NamedEnum Enum>
-  OptionFields& choice(std::string name, Enum Struct::*member, std::string help) {
-    OptionSpec field = make_spec(std::move(name), OptionType::choice, std::move(help));
-    field.choices = names_of_enum<Enum>();
-    return add(
-        std::move(field), member, [](Enum value) { return std::string(to_string(value)); },
-        [](const Options& from, const std::string& of) {
-          return find_enum<Enum>(from.text(of)).value();
-        });
+  OptionFields& choice(std::string_view name, Enum Struct::*member, std::string_view help) {
+    fields_.choice(name, place_of(member), detail::enum_access<Enum>(), help);
+    return *this;
   }
 
   /// One of some texts.
-  OptionFields& choice(std::string name, std::string Struct::*member,
-                       std::vector<std::string> choices, std::string help) {
-    OptionSpec field = make_spec(std::move(name), OptionType::choice, std::move(help));
-    field.choices = std::move(choices);
-    return add(std::move(field), member, as_it_is, read_text);
+  OptionFields& choice(std::string_view name, std::string Struct::*member,
+                       std::vector<std::string> choices, std::string_view help) {
+    fields_.choice(name, place_of(member), std::move(choices), help);
+    return *this;
   }
 
   /// The name of a component of that interface's kind, with options (`name:key=value`), such as
   /// `to_text` makes of an options struct.
   template <class Interface>
-  OptionFields& component(std::string name, std::string Struct::*member, std::string help) {
-    OptionSpec field = make_spec(std::move(name), OptionType::component, std::move(help));
-    field.choices = {std::string(Interface::kKind)};
-    return add(std::move(field), member, as_it_is, read_text);
+  OptionFields& component(std::string_view name, std::string Struct::*member,
+                          std::string_view help) {
+    fields_.component(name, place_of(member), Interface::kKind, help);
+    return *this;
   }
 
   /// The fields of a member that is a struct, under the names that they have there.
   template <class Part>
   OptionFields& part(Part Struct::*member, const OptionFields<Part>& fields = Part::fields()) {
-    for (const auto& inner : fields.fields_) {
-      Field field;
-      field.spec = inner.spec;
-      field.format = [member, of_part = inner.format](const Struct& options) {
-        return of_part(options.*member);
-      };
-      field.read = [member, of_part = inner.read](const Options& from, Struct& options) {
-        of_part(from, options.*member);
-      };
-      fields_.push_back(std::move(field));
-    }
+    fields_.part(fields.fields_, place_of(member));
     return *this;
   }
 
   /// What users see of the options; the defaults are those of `Struct{}`. Throws
   /// `std::logic_error` if two fields have one name.
-  OptionTable table() const {
-    const Struct defaults = Struct();
-    OptionTable result;
-    for (const Field& field : fields_) {
-      OptionSpec entry = field.spec;
-      entry.default_value = field.format(defaults);
-      result.add(std::move(entry));
-    }
-    return result;
-  }
+  OptionTable table() const { return fields_.table(&defaults_); }
 
   /// The struct of options that were checked against `table()`.
   Struct read(const Options& options) const {
     Struct result = Struct();
-    for (const Field& field : fields_) field.read(options, result);
+    fields_.read(options, &result);
     return result;
   }
 
   /// Every field as text, by name.
-  OptionValues values(const Struct& options) const {
-    OptionValues result;
-    for (const Field& field : fields_) result.emplace(field.spec.name, field.format(options));
-    return result;
-  }
+  OptionValues values(const Struct& options) const { return fields_.values(&options); }
 
  private:
   template <class>
   friend class OptionFields;
 
-  struct Field {
-    OptionSpec spec;  ///< without its default
-    std::function<std::string(const Struct&)> format;
-    std::function<void(const Options&, Struct&)> read;
-  };
-
-  static OptionSpec make_spec(std::string name, OptionType type, std::string help) {
-    OptionSpec result;
-    result.name = std::move(name);
-    result.type = type;
-    result.help = std::move(help);
-    return result;
-  }
-  static std::string as_it_is(const std::string& value) { return value; }
-  static std::string read_text(const Options& from, const std::string& of) { return from.text(of); }
-
-  template <class Value, class Format, class Read>
-  OptionFields& add(OptionSpec entry, Value Struct::*member, Format format_value, Read read_value) {
-    Field field;
-    field.format = [member, format_value = std::move(format_value)](const Struct& options) {
-      return format_value(options.*member);
-    };
-    field.read = [member, read_value = std::move(read_value), name = entry.name](
-                     const Options& from, Struct& options) {
-      options.*member = read_value(from, name);
-    };
-    field.spec = std::move(entry);
-    fields_.push_back(std::move(field));
-    return *this;
+  template <class Value>
+  std::ptrdiff_t place_of(Value Struct::*member) const {
+    return reinterpret_cast<const char*>(&(defaults_.*member)) -
+           reinterpret_cast<const char*>(&defaults_);
   }
 
-  std::vector<Field> fields_;
+  detail::OptionFieldList fields_;
+  Struct defaults_ = Struct();
 };
 
 /// A struct that declares its options.

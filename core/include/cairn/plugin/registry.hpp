@@ -2,7 +2,6 @@
 #pragma once
 
 #include <concepts>
-#include <filesystem>
 #include <functional>
 #include <memory>
 #include <string>
@@ -20,6 +19,9 @@
 namespace cairn {
 
 class Registry;
+struct Offer;  // these three: plugin_search.hpp
+struct PluginProblem;
+struct PluginSearch;
 
 /// Variable and factor types that a types plugin makes, given its options.
 struct TypeSet {
@@ -49,16 +51,18 @@ class CAIRN_API Registrar {
   /// called as `factory(options, registry)`, or `factory(options)` if it takes no registry.
   template <class Interface, OptionStruct Struct, class MakeComponent>
   void add(std::string name, MakeComponent factory) {
-    add<Interface>(std::move(name), Struct::fields().table(),
-                   [factory = std::move(factory)](
-                       const Options& options, Registry& registry) -> std::unique_ptr<Interface> {
-                     const Struct chosen = Struct::fields().read(options);
-                     if constexpr (std::invocable<const MakeComponent&, const Struct&, Registry&>) {
-                       return factory(chosen, registry);
-                     } else {
-                       return factory(chosen);
-                     }
-                   });
+    add_component(Interface::kKind, std::move(name), Struct::fields().table(),
+                  [factory = std::move(factory)](const Options& options,
+                                                 Registry& registry) -> std::unique_ptr<Component> {
+                    const Struct chosen = Struct::fields().read(options);
+                    std::unique_ptr<Interface> made;
+                    if constexpr (std::invocable<const MakeComponent&, const Struct&, Registry&>) {
+                      made = factory(chosen, registry);
+                    } else {
+                      made = factory(chosen);
+                    }
+                    return made;
+                  });
   }
 
   /// Adds a set of types under the name of the plugin (kind "types"); options of it are given with
@@ -83,33 +87,6 @@ class CAIRN_API Registrar {
   Target* target_;
 };
 
-/// A name on offer, as `cairn plugins` lists it; known from the sidecar file, without loading
-/// anything.
-struct Offer {
-  std::string kind;
-  std::string name;
-  std::string summary;
-  std::string plugin;          ///< name of the plugin; "this program" if it was added in-process
-  std::filesystem::path file;  ///< shared object; empty if it was added in-process
-  std::string licence;
-  std::string version;
-};
-
-/// A defect of the plugins found that matters only when the plugin is asked for: a sidecar that
-/// cannot be read, a folder that is refused, two plugins with one name.
-struct PluginProblem {
-  std::filesystem::path where;
-  std::string message;
-};
-
-/// Where plugins are looked for, in this order.
-struct PluginSearch {
-  std::vector<std::filesystem::path> files;  ///< shared objects named by the user (`--plugin FILE`)
-  bool environment = true;                   ///< folders of CAIRN_PLUGIN_PATH, separated by ':'
-  bool user_folder = true;     ///< $XDG_DATA_HOME/cairn/plugins, or ~/.local/share/cairn/plugins
-  bool default_folder = true;  ///< the folder `cairn` beside the core library
-};
-
 /// Finds plugins and makes components by kind and name.
 ///
 /// The constructor reads the small JSON file beside each shared object and opens none of them (only
@@ -124,7 +101,9 @@ struct PluginSearch {
 /// not guarded by the registry any more.
 class CAIRN_API Registry {
  public:
-  explicit Registry(const PluginSearch& search = {});
+  /// Of the plugins that are found where `PluginSearch` looks by default.
+  Registry();
+  explicit Registry(const PluginSearch& search);
   Registry(const Registry&) = delete;
   Registry& operator=(const Registry&) = delete;
   ~Registry();

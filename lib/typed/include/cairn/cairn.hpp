@@ -10,6 +10,7 @@
 #include "cairn/io/format.hpp"
 #include "cairn/io/generator.hpp"
 #include "cairn/linear/graph_marginals.hpp"
+#include "cairn/plugin/plugin_search.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/threads.hpp"

@@ -7,6 +7,7 @@
 #include <set>
 #include <string>
 
+#include "cairn/plugin/plugin_search.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
 

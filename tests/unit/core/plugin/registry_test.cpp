@@ -10,6 +10,7 @@
 #include <thread>
 #include <vector>
 
+#include "cairn/plugin/plugin_search.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/solve/optimizer.hpp"
 #include "cairn/types/loss.hpp"

@@ -72,8 +72,8 @@ CAIRN_API void write_graph(const Graph& graph, const std::filesystem::path& file
 /// The bytes of a file, unpacked if they are gzip. Throws `Error` (input).
 CAIRN_API std::string read_file(const std::filesystem::path& file);
 
-/// Tries what `write_file` needs, and leaves nothing: throws `Error` (input) where its folder is not
-/// there or refuses, the name is too long, or names a folder.
+/// Tries what `write_file` needs, and leaves nothing: throws `Error` (input) where its folder is
+/// not there or refuses, the name is too long, or names a folder.
 CAIRN_API void check_writable(const std::filesystem::path& file);
 
 /// Writes beside and renames. Packs if the name ends in .gz. "-" is standard output, whose reader
