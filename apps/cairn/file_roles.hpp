@@ -7,7 +7,7 @@
 namespace cairn::app {
 
 /// What the files of one run of the program are for, so that no output replaces another, and none
-/// an input by accident. Files are told apart by what they are, not by how they are spelt. "-",
+/// an input by accident. Two names of one file are one file. "-",
 /// generated graphs and what is no regular file (such as /dev/null) are left alone.
 class FileRoles {
  public:

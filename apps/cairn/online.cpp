@@ -150,7 +150,7 @@ void check(const OnlineOptions& options, Session& session) {
   session.files.add_output(options.journal, false);  // is tried when it is opened
 }
 
-/// Answers each line. Where nobody reads the answers any more, goes on without them if the map is
+/// Answers each line. Where the reader of the answers is gone, goes on without them if the map is
 /// `kept`, in a file or a journal.
 void converse(Conversation& conversation, LineInput& input, bool kept, const Session& session) {
   bool heard = true;
@@ -160,7 +160,7 @@ void converse(Conversation& conversation, LineInput& input, bool kept, const Ses
       write_stdout(reply.text);
       heard = !stdout_reader_is_gone();
       if (!heard && !kept) return;
-      if (!heard) session.note("nobody reads the answers any more; the stream is taken to its end");
+      if (!heard) session.note("the reader of the answers is gone; the stream is taken to its end");
     }
     if (reply.quit) return;
   }

@@ -36,8 +36,12 @@ std::string picture_format(const std::string& file, Session& session) {
                 fmt::format("{}: nothing draws files of that name; endings on offer: .{}", file,
                             joined(names, ", .")));
   }
-  check_file(file, session);
   return ending.substr(1);
+}
+
+void check_picture(const std::string& file, Session& session) {
+  picture_format(file, session);
+  check_file(file, session);
 }
 
 std::size_t write_picture(const Album& album, const ComponentSpec& picture, const std::string& file,

@@ -16,8 +16,11 @@ namespace cairn::app {
 std::string default_picture(const std::string& file, const std::string& ending);
 
 /// The name of kind picture that a file's ending asks for. Throws `Error` (usage) with the endings
-/// on offer, and `Error` (input) if its folder is not there or refuses.
+/// on offer.
 std::string picture_format(const std::string& file, Session& session);
+
+/// Finds out before the work whether a plot can be written there: see also `check_file`.
+void check_picture(const std::string& file, Session& session);
 
 /// Draws an `Album` into a file ("-" is standard output), and returns its size in bytes.
 std::size_t write_picture(const Album& album, const ComponentSpec& picture, const std::string& file,

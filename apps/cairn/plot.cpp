@@ -69,6 +69,7 @@ std::string output_of(const PlotOptions& options, Session& session) {
 
 ComponentSpec picture_spec(const PlotOptions& options, const std::string& output,
                            Session& session) {
+  check_picture(output, session);
   ComponentSpec picture{picture_format(output, session), {}};
   if (picture.name == "html") return picture;
   picture.values = {{"what", options.what},

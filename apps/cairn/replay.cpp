@@ -122,7 +122,7 @@ void check(const ReplayOptions& options, Session& session) {
   if (options.output == "-") session.write_file_to_stdout();
   check_output(options.output, options.output_format, session);
   check_file(options.steps, session);
-  if (!options.plot.empty()) picture_format(options.plot, session);
+  if (!options.plot.empty()) check_picture(options.plot, session);
   if (options.covariance_check && (options.checks == 0 || options.marginals != "diagonal")) {
     throw Error(ErrorCode::usage,
                 "--covariance-check compares the kept block diagonal at the steps of --check: give "

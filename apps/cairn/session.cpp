@@ -49,7 +49,7 @@ void Session::write_file_to_stdout() {
 void Session::print(std::string_view text) const {
   if (common.json == "-") return;
   if (!stdout_is_file_) return write_stdout(text);
-  if (!common.quiet) std::fwrite(text.data(), 1, text.size(), stderr);
+  if (!common.quiet && !stdout_reader_is_gone()) std::fwrite(text.data(), 1, text.size(), stderr);
 }
 
 bool Session::colour() const { return use_colour(stdout_is_file_ ? stderr : stdout); }

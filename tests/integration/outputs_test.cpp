@@ -112,7 +112,7 @@ TEST_F(OnlineOutputs, GoOnWithoutAReaderOfTheAnswers) {
       "(while read -r line; do echo \"$line\"; sleep 0.01; done < $D/stream.txt) |"
       " ($C online --estimator batch -o $D/map.g2o; echo code=$? >&2) | head -n 1",
       folder_);
-  EXPECT_THAT(outcome.err, HasSubstr("nobody reads the answers any more"));
+  EXPECT_THAT(outcome.err, HasSubstr("the reader of the answers is gone"));
   EXPECT_THAT(outcome.err, HasSubstr("code=0"));
   EXPECT_EQ(poses(folder_.file("map.g2o")), 21);
 }

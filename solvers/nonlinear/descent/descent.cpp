@@ -23,6 +23,11 @@ constexpr double kRounding = 1e-6;
 
 }  // namespace
 
+double least_diagonal(std::span<const double> diagonal, double fraction) {
+  const double largest = std::ranges::max(diagonal);
+  return fraction * (largest > 0.0 ? largest : 1.0);
+}
+
 double dot(std::span<const double> a, std::span<const double> b) {
   return std::inner_product(a.begin(), a.end(), b.begin(), 0.0);
 }

@@ -12,6 +12,10 @@
 
 namespace cairn {
 
+/// The least that a diagonal entry of H counts as in damping: a fraction of the largest one, or of
+/// 1 where H is zero.
+double least_diagonal(std::span<const double> diagonal, double fraction);
+
 /// Scalar product.
 double dot(std::span<const double> a, std::span<const double> b);
 
@@ -52,7 +56,7 @@ class Descent {
   bool must_stop();
 
   /// Solves for `out` with what was factorised last. False if the result is no step: it has numbers
-  /// that are not finite, which the caller may try to mend with more damping; or, the first time
+  /// that are not finite, which more damping may cure; or, the first time
   /// and whenever `claim` says that convergence is to be claimed by it, it does not solve its
   /// system (`NormalEquations::backward_error`), which ends the run as diverged with a note that
   /// names the linear solver. Iterative solvers, which meet a tolerance of their own, are only

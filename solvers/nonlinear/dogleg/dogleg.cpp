@@ -33,7 +33,7 @@ class Run {
         return;
       }
       path_.prepare(equations_.H(), equations_.g(), equations_.diagonal(),
-                    options_.smallest_diagonal * std::ranges::max(equations_.diagonal()));
+                    least_diagonal(equations_.diagonal(), options_.smallest_diagonal));
       path_is_current_ = true;
       newton_promise_ = dot(equations_.g(), path_.newton());
       newton_norm_ = std::sqrt(dot(path_.newton(), path_.newton()));
@@ -73,9 +73,10 @@ class Run {
     if (!explained_) run_.note(equations_.explain(factorization) + "; steps are regularised");
     explained_ = true;
     std::vector<double> damping(run_.step.size());
+    const double least = least_diagonal(equations_.diagonal(), options_.smallest_diagonal);
     for (double mu = 1e-12; mu < 1.0; mu *= 100.0) {
       for (std::size_t k = 0; k < damping.size(); ++k) {
-        damping[k] = mu * std::max(equations_.diagonal()[k], options_.smallest_diagonal);
+        damping[k] = mu * std::max(equations_.diagonal()[k], least);
       }
       factorization = equations_.factorize_damped(damping);
       if (factorization.ok) return true;

@@ -91,7 +91,7 @@ class Run {
  private:
   Factorization factorize(double lambda) {
     const std::span<const double> diagonal = equations_.diagonal();
-    const double smallest = options_.smallest_diagonal * std::ranges::max(diagonal);
+    const double smallest = least_diagonal(diagonal, options_.smallest_diagonal);
     for (std::size_t k = 0; k < damped_by_.size(); ++k) {
       damped_by_[k] = lambda * std::max(diagonal[k], smallest);
     }

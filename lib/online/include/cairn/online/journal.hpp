@@ -54,7 +54,7 @@ class CAIRN_API Journal {
   /// Adds a record; numbers must rise. Throws `Error` (input) where it cannot be written.
   void append(std::int64_t number, std::string_view text);
   /// Writes what was appended, and waits for the disk if so agreed. Throws `Error` (input) where
-  /// that fails, or the file was removed or cut by somebody else; what was written in part is taken
+  /// that fails, or the file was removed or changed meanwhile; what was written in part is taken
   /// back.
   void commit();
 
