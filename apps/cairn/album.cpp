@@ -84,7 +84,7 @@ void add_album_options(ArgumentParser cli, AlbumOptions& options) {
       .type_name("TEXT")
       .repeatable();
   cli.add_option("--truth", options.truth, "the ground truth, laid over by id").type_name("FILE");
-  cli.add_option("--initial", options.initial, "show this guess too: a name of kind initial_guess")
+  cli.add_option("--initial", options.initial, "initial estimate to show too: kind initial_guess")
       .type_name("NAME");
   cli.add_option("--title", options.title, "title [name of the first FILE]").type_name("TEXT");
   add_input_options(cli, options.input);

@@ -185,7 +185,8 @@ int run_compact(const CompactOptions& options, Session& session) {
     write_graph(shown.compact, options.output, registry,
                 output_format(options.output, options.output_format));
   if (!options.trajectory.empty()) {
-    write_graph(shown.way, options.trajectory, registry, output_format(options.trajectory, ""));
+    write_graph(shown.trajectory, options.trajectory, registry,
+                output_format(options.trajectory, ""));
   }
   if (!options.steps.empty()) write_file(options.steps, steps_csv(shown));
   boost::json::object report = report_json(options, outcome);
@@ -224,7 +225,7 @@ void add_compact_options(ArgumentParser cli, CompactOptions& options,
       .type_name("NAME")
       .show_default();
   cli.add_flag("--auto", options.automatic,
-               "find thresholds in a sample; so it is if none are given");
+               "find thresholds in a sample; the default if none are given");
   cli.add_option("--sample", options.sample, "part of the poses that is the sample")
       .type_name("PART")
       .within(0.0, 1.0)
@@ -242,7 +243,7 @@ void add_compact_options(ArgumentParser cli, CompactOptions& options,
                  "a pose is kept if the gain of a link to it would exceed this [nats]")
       .type_name("G");
   cli.add_option("--gate", options.gate,
-                 "refuse links that do not fit; so large a part of right ones passes (0.99)")
+                 "reject loop closures beyond the chi-square quantile P of their innovation (0.99)")
       .type_name("P");
   cli.add_option("--truth", options.truth, "true poses, for errors").type_name("FILE");
   cli.add_option("--steps", options.steps, "a row for each pose, as CSV").type_name("FILE");

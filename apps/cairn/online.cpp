@@ -235,10 +235,10 @@ Command add_online(ArgumentParser program) {
       .within(0.0, 1e9)
       .show_default("0");
   cli.add_option("--journal", options->journal,
-                 "log what is taken in, and begin with what the log has")
+                 "restore the session from this journal, and append to it")
       .type_name("FILE");
   cli.add_option("--sync", options->sync,
-                 "it waits for the disk: every line, batch (before answers) or none")
+                 "sync of the journal to disk: every line, batch (before answers) or none")
       .type_name("WHEN")
       .one_of({"every", "batch", "none"})
       .show_default();

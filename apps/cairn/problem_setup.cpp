@@ -29,7 +29,7 @@ void add_problem_options(ArgumentParser cli, ProblemOptions& options) {
       .within(0, 1000000000)
       .show_default();
   cli.add_option("--tolerance", options.stop.tolerance,
-                 "stop when chi2 falls by less than this part; 0: exactly N times")
+                 "stop when a step could lower chi2 by less than this fraction; 0: exactly N times")
       .type_name("T")
       .within(0.0, 1.0)
       .show_default("1e-10");

@@ -212,7 +212,7 @@ Command add_replay(ArgumentParser program) {
       .type_name("S")
       .within(0.0, 1e9)
       .show_default("0");
-  cli.add_flag("--finish", options->finish, "solve the last step for all digits, in its own time");
+  cli.add_flag("--finish", options->finish, "relinearise and solve the last step to convergence");
   cli.add_flag("--estimate", options->estimate, "count the time of reading all states, every step");
   cli.add_option("--check", options->checks, "compare chi2 with batch at so many steps (not timed)")
       .type_name("N")

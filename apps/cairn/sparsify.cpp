@@ -263,10 +263,10 @@ void add_sparsify_options(ArgumentParser cli, SparsifyCommandOptions& options) {
          "which leave: smallest_blanket, least_loss, oldest, coverage [smallest_blanket:part=0.5]")
       .type_name("NAME");
   cli.add_option("--topology", options.topology,
-                 "which are related: clt, mi, dmi, ekld, odd, l1, best [ekld]")
+                 "pairs that get a factor: clt, mi, dmi, ekld, odd, l1, best [ekld]")
       .type_name("NAME");
   cli.add_option("--population", options.population,
-                 "by how many factors: tree:γ, fill:α or loss:KLD [tree:2]")
+                 "number of new factors: tree:γ, fill:α or loss:KLD [tree:2]")
       .type_name("HOW");
   cli.add_option("--recovery", options.recovery,
                  "factor recovery: ncfd, fd, ip, pqn; closed_form for trees [ncfd]")
@@ -294,7 +294,7 @@ void add_sparsify_options(ArgumentParser cli, SparsifyCommandOptions& options) {
       .type_name("NAME")
       .show_default();
   cli.add_flag("--as-given", options.as_given, "the graph is at its minimum: do not optimise it");
-  cli.add_flag("--no-kld", options.no_kld, "do not measure what was lost");
+  cli.add_flag("--no-kld", options.no_kld, "do not compute the divergence (KLD)");
   add_problem_options(cli, options.problem);
   add_input_options(cli, options.input);
 }

@@ -148,10 +148,10 @@ Command add_study_problems(ArgumentParser study) {
   cli.add_option("problems", options->problems, "what cairn study sparsify --record has written")
       .type_name("FILE")
       .required();
-  cli.add_option("--topology", options->topologies, "which are related (repeatedly) [ekld]")
+  cli.add_option("--topology", options->topologies, "pairs that get a factor (repeatedly) [ekld]")
       .type_name("NAME")
       .repeatable();
-  cli.add_option("--population", options->population, "by how many factors: tree:γ or fill:α")
+  cli.add_option("--population", options->population, "number of new factors: tree:γ or fill:α")
       .type_name("HOW")
       .show_default();
   cli.add_option("--recovery", options->recoveries,

@@ -96,7 +96,7 @@ Command add_view(ArgumentParser program) {
   cli.footer(
       "Graphs with the same ids are laid over each other: the lowest chi2 is the estimate, the "
       "first\n"
-      "FILE else the initial guess. Files without factors are ground truth, by id. The page needs "
+      "FILE else the initial estimate. Files without factors: ground truth, by id. The page needs "
       "no\n"
       "network.\n\n"
       "Example:\n"

@@ -44,7 +44,6 @@ int main() {
     policy->end_pose();
   }
   policy->finish();
-  std::cout << "poses kept: " << policy->estimator().variable_count()
-            << "\nthe trajectory: " << recovered_way(*policy, Recovery::likely).variable_count()
-            << " poses\n";
+  std::cout << "poses kept: " << policy->estimator().variable_count() << "\nthe trajectory: "
+            << recovered_trajectory(*policy, Recovery::likely).variable_count() << " poses\n";
 }

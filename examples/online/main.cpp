@@ -22,7 +22,7 @@ int main() {
     if (k == 0) {
       update.add(X(0), Pose2());
     } else {
-      update.add<Pose2>(X(k));  // its first measurement places it
+      update.add<Pose2>(X(k));  // initialised from its first measurement
       update.add(Between(X(k - 1), X(k), step), odometry);
     }
     if (k >= kPosesPerLap) update.add(Between(X(k - kPosesPerLap), X(k), Pose2()), closure);

@@ -8,8 +8,11 @@
 
 function print_line(text) {
   if (NR > 1) {
-    split(text, words, " ")
-    print previous " " words[1] " " words[2]
+    next_line = text
+    sub(/^ *\/+ */, "", next_line)  # of a comment that goes on
+    if (next_line ~ /^</) next_line = ""  # it describes another member
+    split(next_line, words, " ")
+    print previous ~ /[a-z]/ ? previous " " words[1] " " words[2] : previous
   }
   previous = text
 }

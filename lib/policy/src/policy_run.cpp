@@ -58,7 +58,8 @@ void count_nonzeros(PolicyResult& result, Registry& registry) {
 void evaluate(PosePolicy& policy, const PolicyData& data, PolicyResult& result) {
   if (!data.truth) return;
   for (const auto& [how, name] : enum_names(Recovery{})) {
-    result.errors[std::string(name)] = compare(trajectory(recovered_way(policy, how)), *data.truth);
+    result.errors[std::string(name)] =
+        compare(trajectory(recovered_trajectory(policy, how)), *data.truth);
   }
   if (data.truth_graph) result.normalized = normalized_error(result.compact, *data.truth_graph);
 }
@@ -126,7 +127,7 @@ void PolicyRun::run(std::size_t count, std::string_view title,
 PolicyResult PolicyRun::finish(Recovery recovery) {
   result_.compact = policy_->estimator().graph();
   result_.chi2 = policy_->estimator().chi2();
-  result_.way = recovered_way(*policy_, recovery);
+  result_.trajectory = recovered_trajectory(*policy_, recovery);
   count_nonzeros(result_, setting_.registry);
   evaluate(*policy_, setting_.data, result_);
   return std::move(result_);

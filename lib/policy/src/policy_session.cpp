@@ -85,7 +85,7 @@ void PolicySession::perform(std::string_view line, const Words& words, Reply& re
 
 void PolicySession::finish() {
   if (finished_) return;
-  finish_way();
+  finish_trajectory();
 }
 
 std::int64_t PolicySession::variable_count() const { return std::ssize(policy_.kept()); }
@@ -285,7 +285,7 @@ void PolicySession::close(Reply& reply) {
 }
 
 /// The newest pose is kept in any case, and everything solved.
-void PolicySession::finish_way() {
+void PolicySession::finish_trajectory() {
   if (!complete()) {
     answer_ +=
         fmt::format("NOTE pose {} is left out: no relative pose between {} and {} was measured\n",
@@ -424,7 +424,7 @@ void PolicySession::save(const Words& words, Reply& reply) {
 void PolicySession::quit(const Words& words, Reply& reply) {
   expect_words(words, 1, "QUIT");
   reply.quit = true;
-  finish_way();
+  finish_trajectory();
   reply.changes = false;
   answer(reply);
 }

@@ -41,24 +41,24 @@ void run_policy(const Graph& recording, std::span<const Arrival> poses, PosePoli
   if (!first) policy.finish();
 }
 
-Graph recovered_way(PosePolicy& policy, Recovery how) {
+Graph recovered_trajectory(PosePolicy& policy, Recovery how) {
   const Graph compact = policy.estimator().graph();
-  Graph way;
-  if (compact.variable_count() == 0) return way;
+  Graph whole;
+  if (compact.variable_count() == 0) return whole;
   const std::shared_ptr<const VariableType>& type = compact.variable_pools().front().type;
   const auto state = [&](Id id) { return compact.state(*compact.find(id)); };
   const std::vector<OdometryChain>& chains = policy.chains();
   const Id first = chains.empty() ? compact.id(0) : chains.front().from;
-  way.add_variable(type, first, state(first));
+  whole.add_variable(type, first, state(first));
   for (const OdometryChain& chain : chains) {
     for (const RecoveredPose& pose :
          recover(*type, chain, state(chain.from), state(chain.to), how)) {
-      if (way.find(pose.id)) continue;  // a way that led back to it
+      if (whole.find(pose.id)) continue;  // the robot came back to it
       const auto kept = compact.find(pose.id);
-      way.add_variable(type, pose.id, kept ? compact.state(*kept) : pose.state);
+      whole.add_variable(type, pose.id, kept ? compact.state(*kept) : pose.state);
     }
   }
-  return way;
+  return whole;
 }
 
 }  // namespace cairn

@@ -52,7 +52,7 @@ std::vector<Id> nearest(const std::vector<Id>& wanted, const std::vector<Id>& th
 
 /// The sample with everything taken in.
 struct Everything {
-  Trajectory way;
+  Trajectory trajectory;
   std::vector<Id> poses;  ///< where errors are looked at
   double expected = 0.0;  ///< [m]
 };
@@ -80,9 +80,9 @@ ThresholdTrial try_thresholds(const Sample& sample, const OptionValues& options,
   const Graph compact = run.policy().estimator().graph();
   result.poses_kept = compact.variable_count();
   result.loops_kept = run.counts().kept_loops;
-  const double apart =
-      compare(trajectory(recovered_way(run.policy(), Recovery::likely)), sample.everything.way)
-          .ate_translation;
+  const double apart = compare(trajectory(recovered_trajectory(run.policy(), Recovery::likely)),
+                               sample.everything.trajectory)
+                           .ate_translation;
   result.expected = expected_error(run.policy(), nearest(sample.everything.poses, ids_of(compact)));
   result.realised = std::hypot(sample.everything.expected, apart);
   return result;
@@ -147,7 +147,7 @@ FoundThresholds find_thresholds(const PolicyJob& job, std::size_t count, double 
   if (error_ratio > 0.0) {
     Sample sample{job, setting, count, {}};
     const Graph all = watch.policy().estimator().graph();
-    sample.everything.way = trajectory(all);
+    sample.everything.trajectory = trajectory(all);
     sample.everything.poses = spread(ids_of(all));
     sample.everything.expected = expected_error(watch.policy(), sample.everything.poses);
     found.expected_ate = sample.everything.expected;

@@ -32,7 +32,7 @@ struct SpqrOptions {
 /// x = −P R⁻¹ Qᵀ r. H = JᵀJ is never formed, so rounding acts on the condition number of J, the
 /// square root of that of H. Damping is appended as rows √D.
 ///
-/// The column ordering is computed on the graph of the blocks, the symbolic analysis once a
+/// The column ordering is computed on the graph of the blocks, the symbolic analysis once per
 /// structure: that of J when analysing, that of [J; √D] at the first damped factorisation. A J
 /// without full column rank is a failed `Factorization` with the first block that depends on those
 /// eliminated before it. J cannot be recovered from H alone: `analyze(BlockStructure)` throws

@@ -81,7 +81,7 @@ class CAIRN_API BlockMatrix {
 };
 
 /// For adapters to scalar solvers: the pattern of one triangle in compressed columns, computed once
-/// a structure, and a scatter of block values into it.
+/// per structure, and a scatter of block values into it.
 class CAIRN_API ScalarPattern {
  public:
   enum class Triangle { lower, upper };

@@ -21,7 +21,7 @@ namespace cairn {
 /// δ with x_true = retract(x, δ), in the units of the tangent space. For a pose, x · exp(δ), the
 /// first numbers of δ are metres along the axes of the pose itself (not of the world) and the
 /// others radians. They are covariances of the estimate if x is a minimum and the factors'
-/// information is true. Held and anchored variables are certain: their blocks are zero, and the
+/// information is true. Fixed and anchored variables have zero blocks, and the
 /// uncertainty of all others is relative to them.
 ///
 /// Blocks are column-major, numbered by variables of the graph. Graph and solver must outlive this

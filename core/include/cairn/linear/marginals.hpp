@@ -33,7 +33,7 @@ class CAIRN_API Marginals {
 /// `Marginals` by solves with columns of the identity, H X = [e_i e_j …]: what any solver can that
 /// solves exactly. n scalars of diagonal blocks take n solves, eight at a time where the solver has
 /// the ability `ManyRightHandSides`. The solver holds one of these and returns it as its ability;
-/// one that knows better overrides what it knows.
+/// one with a better method overrides the function concerned.
 class CAIRN_API SolvedMarginals : public Marginals {
  public:
   /// `solver` must outlive this object.

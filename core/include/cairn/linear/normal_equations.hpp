@@ -24,8 +24,8 @@ namespace cairn {
 ///
 /// The constructor does all that depends on the structure alone (gauge, linearizer, the solver's
 /// analysis); afterwards no call allocates more than the linear solver does. Graph and solver must
-/// outlive this object, and the graph keep its structure. A factorisation that fails is an answer,
-/// which `explain` puts into words.
+/// outlive this object, and the graph keep its structure. A failed factorisation is a status,
+/// whose reason `explain` describes.
 ///
 /// A solver with the ability `JacobianSolver` is given the whitened Jacobian instead of H, which is
 /// then evaluated as well: H itself is available to the optimizer.

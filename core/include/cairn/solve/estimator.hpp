@@ -15,7 +15,7 @@
 
 namespace cairn {
 
-/// How hard to work in one update.
+/// How much is computed in one update.
 struct UpdateOptions {
   /// Take in what is new, and solve later: the estimate of old variables stays.
   bool defer = false;
@@ -116,7 +116,7 @@ class CAIRN_API Estimator : public Component {
   /// as fixed in it.
   virtual Graph graph() = 0;
 
-  // Covariances: of the tangent vector δ at the current estimate, x ⊕ δ ---------------------------
+  // Covariances: of δ with x_true = retract(x, δ), x the current estimate -------------------------
   /// From the next update on, keep these.
   virtual void keep_marginals(KeptMarginals kept) = 0;
   /// Keep the cross block of these two as well.

@@ -67,7 +67,7 @@ struct Summary {
 };
 
 /// Minimises Σ ρ(‖r‖²) over a graph's variables, starting from its states and leaving the best
-/// states found in it. The graph's structure is not changed; a gauge that is left free is anchored
+/// states found in it. The graph's structure is not changed; gauge freedoms are removed by anchors
 /// (`resolve_gauge`). A diverging, interrupted or failed run leaves the best estimate too, and is
 /// reported in `Summary::status`. Throws `Error` only for bad calls.
 class CAIRN_API Optimizer : public Component {

@@ -21,7 +21,7 @@ struct FactorCheck {
   double claimed = 0.0, numeric = 0.0;
 };
 
-/// Proves the Jacobians of a factor type, yours too: compares those of `evaluate` with differences
+/// Verifies the Jacobians of any factor type: compares those of `evaluate` with differences
 /// of its residual along `retract` of its variables, dr/dδ ≈ (8 (r(h) − r(−h)) − (r(2h) − r(−2h)))
 /// / 12h. A right factor deviates by some 1e-9 with the default step; a wrong sign or a missing
 /// term by 1e-2 or more.

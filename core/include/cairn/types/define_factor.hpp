@@ -27,7 +27,7 @@ namespace cairn {
 ///     };
 ///
 /// `residual` returns the error in the metric's units, not whitened; it is called with double and
-/// with dual numbers, so that Jacobians come by themselves. The struct may also have
+/// with dual numbers (automatic differentiation). The struct may also have
 ///  - `static Vector<double, kResidual> evaluate(x…, z, J…)`: the same error and its analytic
 ///    Jacobians with respect to the tangent vectors, a matrix of kResidual × V::kTangent by
 ///    reference for each variable. Tests compare them with the automatic ones.

@@ -16,7 +16,7 @@ namespace cairn {
 ///
 /// Every operation states its value and its partial derivatives; the chain rule is in the two
 /// private constructors. They are plain loops of fixed length, which compilers turn into vector
-/// instructions even where a large file has used up their will to inline.
+/// instructions even where a large file has reached the limits of inlining.
 template <int N>
 class Dual {
  public:

@@ -11,7 +11,7 @@
 
 namespace cairn {
 
-/// What a factor type sees of a pool: plain arrays, one entry a factor.
+/// The view of a pool that a factor type is given: plain arrays, one entry per factor.
 struct FactorView {
   std::size_t size = 0;
   /// size × arity: index of each variable's state within its type's array.
@@ -111,7 +111,7 @@ class CAIRN_API FactorType {
   /// Human-readable name of the error metric where there is a choice, else empty.
   virtual std::string_view metric() const { return {}; }
 
-  /// How many numbers it measures of where its variables are in the world, as `resolve_gauge`
+  /// How many degrees of freedom of its variables' absolute states it measures, as `resolve_gauge`
   /// counts them: all of a factor on one variable, none of a factor between variables.
   virtual int absolute_size() const { return arity() == 1 ? residual_size() : 0; }
 

@@ -24,7 +24,7 @@ class CAIRN_API LieGroup {
   virtual void log(const double* a, double* tangent) const = 0;
 };
 
-/// Ability of a variable type that sits somewhere in metric space: what writers of trajectories,
+/// Ability of a variable type with a position in the plane or in space: what trajectory writers,
 /// viewers, ground-truth comparison and the chordal initial guess need.
 class CAIRN_API Placement {
  public:

@@ -68,7 +68,7 @@ TEST_F(PolicyRunTest, CountsWhatBecameOfEveryPoseAndLoop) {
   EXPECT_EQ(after.back(), 79U);
   EXPECT_THAT(result.poses, SizeIs(80));
   EXPECT_EQ(result.compact.variable_count(), 80);
-  EXPECT_EQ(result.way.variable_count(), 80);
+  EXPECT_EQ(result.trajectory.variable_count(), 80);
   EXPECT_FALSE(result.interrupted);
   EXPECT_GT(result.kept_loops, 0);
   EXPECT_LE(result.kept_loops, result.registered);
@@ -127,7 +127,7 @@ TEST_F(PolicyRunTest, ReportsProgressAndStopsWhenInterrupted) {
   EXPECT_THAT(titles, Each("sample"));
   const PolicyResult result = run.finish(Recovery::distribute);
   EXPECT_TRUE(result.interrupted);
-  EXPECT_EQ(result.way.variable_count(), 10);
+  EXPECT_EQ(result.trajectory.variable_count(), 10);
 }
 
 TEST_F(PolicyRunTest, CountsFalseMatches) {

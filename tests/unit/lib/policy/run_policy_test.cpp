@@ -149,7 +149,7 @@ TEST_F(RunPolicy, TheCompactPolicyStopsAnywhere) {
     const auto policy = registry.make<PosePolicy>("compact_pose:range=5,angle=3.15");
     run_policy(world.graph, pose_chain(world.graph), *policy, *registration,
                [&](const PoseReport& report) { return report.id < poses - 1; });
-    const Graph way = recovered_way(*policy, Recovery::distribute);
+    const Graph way = recovered_trajectory(*policy, Recovery::distribute);
     EXPECT_EQ(way.variable_count(), poses);
     EXPECT_TRUE(policy->estimator().has(poses - 1));
   }
@@ -165,7 +165,7 @@ TEST_F(RunPolicy, TheRecoveredWayHasEveryPoseOnceAndTheKeptOnesWhereTheyAre) {
   EXPECT_LT(few.kept().size(), 150U);
   const Graph compact = few.policy->estimator().graph();
   for (const Recovery how : {Recovery::uniform, Recovery::interpolate, Recovery::distribute}) {
-    const Graph way = recovered_way(*few.policy, how);
+    const Graph way = recovered_trajectory(*few.policy, how);
     EXPECT_EQ(way.variable_count(), static_cast<int>(ids.size()));
     EXPECT_EQ(way.factor_count(), 0);
     for (const Id id : ids) EXPECT_TRUE(way.find(id).has_value()) << id;
@@ -194,7 +194,7 @@ TEST_F(RunPolicy, WithoutNoiseTheRecoveredWayIsTheTruth) {
     EXPECT_LT(few.policy->chains().size(), few.reports.size() / 2);
     const VariableType& type = world.truth.type(0);
     for (const Recovery how : example.exact) {
-      const Graph way = recovered_way(*few.policy, how);
+      const Graph way = recovered_trajectory(*few.policy, how);
       ASSERT_EQ(way.variable_count(), world.truth.variable_count());
       double most = 0.0;
       for (int v = 0; v < way.variable_count(); ++v) {
@@ -211,7 +211,7 @@ TEST_F(RunPolicy, WithoutNoiseTheRecoveredWayIsTheTruth) {
 TEST_F(RunPolicy, AnEmptyPolicyHasAnEmptyWay) {
   for (const char* name : {"compact_pose", "random_poses"}) {
     const auto policy = registry.make<PosePolicy>(name);
-    EXPECT_EQ(recovered_way(*policy, Recovery::distribute).variable_count(), 0);
+    EXPECT_EQ(recovered_trajectory(*policy, Recovery::distribute).variable_count(), 0);
     EXPECT_THAT(policy->chains(), IsEmpty());
     EXPECT_THROW(policy->newest_state(), Error);
     policy->finish();

@@ -100,7 +100,7 @@ TEST(Guide, Building) {
   graph.add(X(0), Pose2());               // x0: a pose
   graph.add(X(1), Pose2(1.0, 0.0, 0.0));  // x1
   graph.add(L(0), Point2(3.0, 1.0));      // l0: a landmark
-  graph.set_fixed(*graph.find(X(0)));     // held; without it x0 would be anchored all the same
+  graph.set_fixed(*graph.find(X(0)));     // otherwise x0 would be anchored, to the same effect
   graph.add(Between(X(0), X(1), Pose2(1.1, 0.0, 0.0)), Information::sigmas(0.1, 0.1, 0.05));
   graph.add(Observation(X(0), L(0), Point2(3.1, 0.9)), Information::isotropic(2, 0.2));
   graph.add(BearingRange(X(1), L(0), 0.45, 2.2), Information::sigmas(0.02, 0.1));
@@ -200,7 +200,7 @@ TEST(Guide, TakingBack) {
 
   GraphUpdate update;
   update.add(Between(X(0), X(2), Pose2(5.0, 0.0, 0.0)), Information::isotropic(3, 0.1));
-  const auto what_if = estimator->clone();  // neither knows of what the other does
+  const auto what_if = estimator->clone();  // the two are independent
   const FactorId closure = what_if->update(update).first_factor;
   if (what_if->chi2() > 10.0) {  // it contradicts the others
     GraphUpdate undo;

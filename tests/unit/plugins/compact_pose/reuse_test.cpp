@@ -61,7 +61,7 @@ TEST_F(Reuse, WithoutNoiseTheMapIsTheTruth) {
   EXPECT_THAT(one.kept().size(), Lt(100U));
   for (const Recovery how : {Recovery::distribute, Recovery::likely}) {
     const TrajectoryError error =
-        compare(trajectory(recovered_way(*one.policy, how)), trajectory(simulation_.truth));
+        compare(trajectory(recovered_trajectory(*one.policy, how)), trajectory(simulation_.truth));
     EXPECT_EQ(error.poses, 240);
     EXPECT_LT(error.ate_translation, 1e-4);
     EXPECT_LT(error.rpe_translation, 1e-4);
@@ -85,7 +85,7 @@ TEST_F(Reuse, EveryPoseComesBackOnce) {
   const PolicyRun one = drive("manhattan:poses=400,streets=4,loop_density=0",
                               "compact_pose:range=3,angle=3.15", "simulated:range=3");
   EXPECT_LT(one.policy->kept().size(), 250U);
-  const Graph way = recovered_way(*one.policy, Recovery::likely);
+  const Graph way = recovered_trajectory(*one.policy, Recovery::likely);
   const std::vector<Id> all = all_ids(simulation_.graph);
   EXPECT_EQ(way.variable_count(), static_cast<int>(all.size()));
   for (const Id id : all) EXPECT_TRUE(way.find(id)) << id;
@@ -114,7 +114,7 @@ TEST_F(Reuse, IsHonestOverManyRuns) {
 
 TEST_F(Reuse, TheEstimateIsNotWorseThanOdometryMakesIt) {
   const PolicyRun with = drive(kLaps + "10", kPolicy + "true", kSensor);
-  const double error = compare(trajectory(recovered_way(*with.policy, Recovery::likely)),
+  const double error = compare(trajectory(recovered_trajectory(*with.policy, Recovery::likely)),
                                trajectory(simulation_.truth))
                            .ate_translation;
   const double odometry =

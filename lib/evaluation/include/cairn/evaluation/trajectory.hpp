@@ -38,7 +38,7 @@ CAIRN_API std::vector<double> read_stamps(const std::filesystem::path& file);
 /// forward, y left, z up): T becomes C⁻¹ T C, where C takes a robot's coordinates to a camera's.
 CAIRN_API Trajectory camera_to_robot_axes(Trajectory poses);
 
-/// The shadow on the plane z = 0: x, y, and for yaw the direction of the body's x axis. A body
+/// The projection on the plane z = 0: x, y, and for yaw the direction of the body's x axis. A body
 /// whose x axis is vertical has none; its yaw is what rounding makes of it.
 CAIRN_API Trajectory projected_to_plane(Trajectory poses);
 

@@ -24,7 +24,7 @@ struct Motion {
 /// To which order in ξ the covariance of a composition is computed.
 enum class CompositionOrder {
   first,   ///< Smith and Cheeseman 1986: Jacobians
-  fourth,  ///< Barfoot and Furgale 2014: all terms of fourth order of Baker, Campbell and Hausdorff
+  fourth,  ///< Barfoot and Furgale 2014: Baker-Campbell-Hausdorff (BCH) to fourth order
 };
 constexpr auto enum_names(CompositionOrder) {
   return std::to_array<EnumName<CompositionOrder>>(

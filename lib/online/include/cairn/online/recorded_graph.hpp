@@ -24,7 +24,7 @@ struct Arrival {
 /// The order in which a graph was recorded. A step is a pose, in the order of ids,
 /// with everything else of which it is the latest: the factors whose other variables are there, and
 /// the landmarks that no earlier pose has seen. Every variable and every factor is in one step. A
-/// pose is what has an orientation, or no place in space; variables that no pose ever meets come
+/// pose is what has an orientation, or no position at all; variables that no pose ever meets come
 /// with the last step (a graph without poses is one step).
 CAIRN_API std::vector<Arrival> arrival_order(const Graph& graph);
 

@@ -44,8 +44,8 @@ struct PolicyJob {
 struct PolicyResult {
   std::string policy;  ///< with its options
   std::vector<PoseReport> poses;
-  Graph compact;  ///< the estimate of what was kept
-  Graph way;      ///< the whole trajectory: what was left out is put back
+  Graph compact;     ///< the estimate of what was kept
+  Graph trajectory;  ///< the whole trajectory: what was left out is put back
   /// By the name of the recovery ("v0", …); empty without the truth.
   std::map<std::string, TrajectoryError> errors;
   std::optional<NormalizedError> normalized;

@@ -86,7 +86,7 @@ class CAIRN_API PolicySession final : public LineSession {
   void check_motion(const Factor& factor, Id from) const;
   void check_kept(Id id) const;
 
-  // The way of a pose
+  // From the arrival of a pose to its end
   std::optional<Id> current() const;
   bool complete() const;
   void expect_complete() const;
@@ -95,7 +95,7 @@ class CAIRN_API PolicySession final : public LineSession {
   void settle(Reply& reply);
   PoseReport end();
   void close(Reply& reply);
-  void finish_way();
+  void finish_trajectory();
 
   // Answers
   void answer(Reply& reply);

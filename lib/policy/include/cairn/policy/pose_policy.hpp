@@ -134,6 +134,6 @@ CAIRN_API void run_policy(const Graph& recording, std::span<const Arrival> poses
 
 /// All poses of a trajectory, the left-out ones recovered between those that are kept; without
 /// factors.
-CAIRN_API Graph recovered_way(PosePolicy& policy, Recovery how);
+CAIRN_API Graph recovered_trajectory(PosePolicy& policy, Recovery how);
 
 }  // namespace cairn

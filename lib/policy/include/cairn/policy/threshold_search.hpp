@@ -17,7 +17,7 @@ namespace cairn {
 /// How a policy fares on a sample with given thresholds.
 struct ThresholdTrial {
   double links = 1.0, poses = 1.0;  ///< factors of the gains that the policy found at first
-  double expected = 0.0;            ///< error that its covariance lets expect [m]
+  double expected = 0.0;            ///< error predicted by its covariance [m]
   double realised = 0.0;            ///< the same, by its distance from the estimate of everything
   std::int64_t poses_kept = 0, loops_kept = 0;
   double error() const { return std::max(expected, realised); }
@@ -35,8 +35,8 @@ struct FoundThresholds {
 /// sample with everything taken in, and chooses (Ila et al. 2017, section 5.2). Then, unless
 /// `error_ratio` is 0, the choice is tried on the sample, and `refine_thresholds` lowers it until
 /// the error is at most `error_ratio` times that of everything, or that of a single link. The error
-/// is the larger of two estimates, neither of which needs the truth: what the covariances let
-/// expect (`expected_ate`), and √(E² + D²) with E the expected error of everything and D the
+/// is the larger of two estimates, neither of which needs the truth: what the covariances
+/// predict (`expected_ate`), and √(E² + D²) with E the expected error of everything and D the
 /// distance between the two trajectories. Throws `Error` (usage) if the policy is no
 /// `OptionFinder`, and (input) if the sample does not determine thresholds.
 CAIRN_API FoundThresholds find_thresholds(const PolicyJob& job, std::size_t count,

@@ -91,7 +91,7 @@ T estimate(Estimator& estimator, Id id) {
   return T::from_state(detail::state_of<T>(estimator, id));
 }
 
-/// Σ of one variable of an estimator, which is a `T`; zero where it is held. Throws `Error`: usage
+/// Σ of one variable of an estimator, which is a `T`; zero if it is constant. Throws `Error`: usage
 /// as `estimate`; numerical if H is singular.
 template <StateValue T>
 auto covariance(Estimator& estimator, Id id) {

@@ -32,7 +32,7 @@ struct LinearResidual {
 CAIRN_API LinearResidual square_root(std::span<const double> H, std::span<const double> g,
                                      std::span<const double> scale);
 
-/// What measurements of variables that have left the graph still say of those that stay: the
+/// The information of marginalised factors about the variables that stay, as a linear prior: the
 /// residual r = A e − b, where e stacks local(origin_k, x_k) of its variables, the tangent vectors
 /// from where they were when the measurements were linearised. A and b stay as they are, whatever
 /// the variables do later (Kaess et al. 2012 and others call it a linear container factor; how it
@@ -56,7 +56,7 @@ class CAIRN_API MarginalPrior final : public EvaluatedFactorType {
 
   const LinearResidual& linear_residual() const { return residual_; }
   const std::vector<Variable>& variables() const { return variables_; }
-  /// The information that a graph wants to see: the identity, packed.
+  /// The information matrix of the factor in a graph: the identity, packed.
   std::vector<double> unit_information() const;
 
   std::string_view tag() const override { return kTag; }
