@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "detect.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cctype>
 
@@ -36,8 +37,9 @@ class BalVotes {
       fitting_ += fields == (line_ - 1 <= observations_ ? 4 : 1);
     }
   }
-  /// How many lines fit; a first line alone proves nothing.
-  int lines() const { return fitting_ > 0 ? 1 + fitting_ : 0; }
+  /// How many lines fit. A first line with others that do not proves nothing; alone it is a file
+  /// that was cut.
+  int lines() const { return fitting_ > 0 || (is_header_ && line_ == 1) ? 1 + fitting_ : 0; }
 
  private:
   bool read_header(Scanner& scanner) {
@@ -142,7 +144,9 @@ Likelihood look_at(std::string_view text) {
   likelihood.bal = score(bal.lines());
   likelihood.tum = score(votes.rows[8]);
   likelihood.kitti = score(votes.rows[12]);
-  likelihood.table = score(votes.rows[3] > votes.rows[4] ? votes.rows[3] : votes.rows[4]);
+  // A single row of counts is no table: it may be the first line of anything.
+  const bool counts_alone = votes.lines == 1 && text.find_first_of(".eE") == std::string_view::npos;
+  likelihood.table = counts_alone ? 0 : score(std::max(votes.rows[3], votes.rows[4]));
   // Words that no format knows may be tags of a third party's types, which g2o's reader asks the
   // registry for; failing that, it says which line it does not understand.
   if (votes.tagged > 0 && likelihood.g2o == 0) likelihood.g2o = 1;

@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <csignal>
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -89,6 +91,17 @@ TEST_F(Outputs, ALimitOfTheSizeOfFilesIsAnError) {
   EXPECT_THAT(outcome.err, HasSubstr("code=3"));
   EXPECT_THAT(outcome.err, HasSubstr("best.g2o: cannot be written"));
   EXPECT_EQ(folder_.contents(), (std::vector<std::string>{"graph.g2o"}));
+}
+
+TEST_F(Outputs, AnInterruptBeforeSparsificationWritesTheEstimate) {
+  if (!Registry().has("sparsifier", "sparsify")) GTEST_SKIP() << "there is no sparsifier";
+  const std::string sparse = folder_.file("sparse.g2o");
+  const Outcome outcome = cairn_interrupted(
+      {"sparsify", graph(), "-o", sparse, "--tolerance", "0", "--iterations", "1000000000"},
+      "iteration   2 ", SIGINT);
+  EXPECT_EQ(outcome.exit_code, 130) << outcome.err;
+  EXPECT_THAT(outcome.err, HasSubstr("nothing was taken out"));
+  EXPECT_EQ(report_of({"info", sparse}).at("graph").at("variables").as_int64(), 200);
 }
 
 class OnlineOutputs : public Outputs {

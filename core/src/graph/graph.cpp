@@ -18,6 +18,18 @@ bool all_finite(std::span<const double> values) {
   return std::ranges::all_of(values, [](double v) { return std::isfinite(v); });
 }
 
+/// What the type says of these numbers, a state's or a measurement's, which it may change; it must
+/// leave them finite.
+template <class Type>
+std::string normalize(const Type& type, std::vector<double>& numbers) {
+  std::string problem = type.normalize(numbers.data());
+  if (problem.empty() && !all_finite(numbers)) {
+    throw Error(ErrorCode::plugin,
+                fmt::format("{}: its normalize() left a number that is not finite", type.tag()));
+  }
+  return problem;
+}
+
 /// U with UᵀU = Ω, packed row by row, and the rank of Ω; rank 0 if Ω is indefinite or zero.
 struct Root {
   std::vector<double> packed;
@@ -109,7 +121,7 @@ int Graph::add_variable(std::shared_ptr<const VariableType> type, Id id,
         fmt::format("{} {}: the id is already that of {}", tag, id, describe_variable(*there)));
   }
   std::vector<double> state(x.begin(), x.end());
-  if (const std::string problem = type->normalize(state.data()); !problem.empty())
+  if (const std::string problem = normalize(*type, state); !problem.empty())
     throw bad_input(fmt::format("{} {}: {}", tag, id, problem));
   const int p = find_pool(type);
   // Nothing is refused from here on.
@@ -199,7 +211,7 @@ int Graph::add_factor(std::shared_ptr<const FactorType> type, std::span<const in
     throw bad_input(fmt::format("{}: has a number that is not finite", name_of(*type, variables)));
   }
   std::vector<double> z(measurement.begin(), measurement.end());
-  std::string problem = type->normalize(z.data());
+  std::string problem = normalize(*type, z);
   const Root root = root_of(information, n);
   if (problem.empty()) problem = problem_of(root, information);
   if (!problem.empty()) throw bad_input(fmt::format("{}: {}", name_of(*type, variables), problem));
@@ -250,7 +262,7 @@ void Graph::set_state(int variable, std::span<const double> x) {
         fmt::format("{}: a state is {} finite numbers", describe_variable(variable), size));
   }
   std::vector<double> state(x.begin(), x.end());
-  if (const std::string problem = t.normalize(state.data()); !problem.empty()) {
+  if (const std::string problem = normalize(t, state); !problem.empty()) {
     throw bad_input(fmt::format("{}: {}", describe_variable(variable), problem));
   }
   std::ranges::copy(state, values_.pools[pool(variable)].begin() +
@@ -331,7 +343,7 @@ void Graph::set_measurement(int position, std::span<const double> measurement,
                                 describe_factor(position), size, packed));
   }
   std::vector<double> z(measurement.begin(), measurement.end());
-  std::string problem = pool.type->normalize(z.data());
+  std::string problem = normalize(*pool.type, z);
   Root root;
   if (!information.empty()) {
     root = root_of(information, pool.type->residual_size());

@@ -3,6 +3,7 @@
 
 #include <fcntl.h>
 #include <sys/stat.h>
+#include <sys/sysmacros.h>
 #include <unistd.h>
 #include <zlib.h>
 
@@ -58,6 +59,10 @@ std::string read_bytes(const fs::path& file) {
     fail(file, "cannot be examined: " + system_message(errno));
   }
   if (S_ISDIR(status.st_mode)) fail(file, "is a folder; expected a file");
+  // Others, such as /dev/zero, may never end.
+  const bool null = status.st_rdev == makedev(1, 3);
+  if (S_ISCHR(status.st_mode) && !null && ::isatty(input.number()) == 0)
+    fail(file, "is a device; expected a file");
 
   // The size is only a hint: pipes have none, and a file may grow while it is read.
   std::string bytes;

@@ -97,7 +97,11 @@ SparsifyResult sparsify_whole(const Graph& graph, const SparsifyJob& job,
   if (setting.initialise) result.notes = setting.initialise(original);
   if (!job.as_given) {
     result.chi2_before = optimize(original, parts, setting, "the graph", result);
-    if (result.interrupted) return result;
+    if (result.interrupted) {
+      result.notes.push_back("interrupted before the graph had converged: nothing was taken out");
+      result.sparse = std::move(original);
+      return result;
+    }
   }
   report(setting, {SparsifyProgress::Phase::select});
   const auto begin = Clock::now();

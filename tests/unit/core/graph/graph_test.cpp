@@ -7,10 +7,14 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <string>
+#include <string_view>
 
 #include <Eigen/Core>
 
+#include "cairn/lie/se2.hpp"
 #include "cairn/runtime/error.hpp"
+#include "cairn/types/define_variable.hpp"
 #include "support/planar_graph.hpp"
 
 namespace cairn {
@@ -284,6 +288,28 @@ TEST_F(GraphTest, TakesVariablesAndFactorsAsValues) {
                 graph_.add(Factor{types_.relative_pose, {10, 30}, {1, 2, 0.5}, kUnit});
               }),
               HasSubstr("EDGE_SE2 10 30: there is no variable 30"));
+}
+
+/// A pose whose normalize() spoils it.
+struct Spoilt : Se2 {
+  static constexpr std::string_view kTag = "SPOILT";
+  static std::string normalize(Vector<double, 3>& x) {
+    x[2] = std::nan("");
+    return {};
+  }
+};
+
+TEST_F(GraphTest, ATypeThatLeavesNanIsWrong) {
+  const double state[] = {0.0, 0.0, 0.0};
+  Graph graph;
+  try {
+    graph.add_variable(define_variable<Spoilt>(), 0, state);
+    ADD_FAILURE() << "NaN was taken";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ErrorCode::plugin);
+    EXPECT_THAT(error.what(), HasSubstr("SPOILT: its normalize() left a number"));
+  }
+  EXPECT_EQ(graph.variable_count(), 0);
 }
 
 TEST_F(GraphTest, ARefusalLeavesNothingBehind) {

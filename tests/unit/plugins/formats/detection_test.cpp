@@ -52,6 +52,12 @@ TEST(Detection, TellsTrajectoriesByTheirColumns) {
   EXPECT_EQ(detected("1\n"), "");
 }
 
+TEST(Detection, ARowOfCountsAloneIsNoTable) {
+  EXPECT_EQ(detected("0 0 0\n"), "");
+  EXPECT_EQ(detected("49 7776 31843\n"), "bal");  // which was cut after its first line
+  EXPECT_EQ(detected("0 0 0\n1 0 0\n"), "table");
+}
+
 TEST(Detection, LeavesUnknownWordsToTheReaderThatAsksTheRegistry) {
   EXPECT_EQ(detected("RANGE 0 1 2\n"), "g2o");
 }

@@ -125,6 +125,12 @@ TEST_F(File, SaysWhyAFileCannotBeRead) {
                         "formats on offer: bal, g2o"));
 }
 
+TEST_F(File, DoesNotReadDevicesThatMayNeverEnd) {
+  for (const char* device : {"/dev/zero", "/dev/full", "/dev/urandom"})
+    EXPECT_THAT(message_of([&] { read_file(device); }), HasSubstr("is a device")) << device;
+  EXPECT_EQ(read_file("/dev/null"), "");
+}
+
 TEST_F(File, ChoosesTheFormatByContentUnlessItIsNamed) {
   ReadReport report;
   const std::string edge2 = "EDGE2 0 1 1 0 0 9 1 4 16 2 3\n";
