@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <concepts>
 #include <cstddef>
 #include <filesystem>
 #include <memory>
@@ -40,23 +39,6 @@ inline Graph read(const std::filesystem::path& file, Registry& registry = defaul
 inline void write(const Graph& graph, const std::filesystem::path& file,
                   Registry& registry = default_registry()) {
   write_graph(graph, file, registry);
-}
-
-/// Σ ρ(‖r‖²) over all factors at the graph's states, without a half.
-template <std::same_as<Graph> G>
-double chi2(const G& graph) {
-  std::vector<double> norms = squared_norms(graph);
-  if (const Loss* loss = graph.loss()) {
-    std::vector<double> rho(norms.size());
-    loss->evaluate(norms, rho, {});
-    const std::vector<bool> robust = under_loss(graph);
-    for (std::size_t f = 0; f < norms.size(); ++f) {
-      if (robust[f]) norms[f] = rho[f];
-    }
-  }
-  double sum = 0.0;
-  for (const double norm : norms) sum += norm;
-  return sum;
 }
 
 }  // namespace cairn
