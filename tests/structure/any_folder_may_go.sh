@@ -23,7 +23,7 @@ git ls-files -z --cached --others --exclude-standard | xargs -0 tar --ignore-fai
   tar -xf - -C "$tree"
 cd "$tree"
 unset CAIRN_PLUGIN_PATH
-export CMAKE_GENERATOR=Ninja
+export CMAKE_GENERATOR=Ninja CCACHE_BASEDIR=$PWD CCACHE_NOHASHDIR=1  # what ccache has of the checkout fits
 XDG_DATA_HOME=$PWD/aside
 export XDG_DATA_HOME
 

@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <cstddef>
 #include <filesystem>
 #include <memory>
 #include <string_view>
-#include <vector>
 
 #include "cairn/graph/graph.hpp"
 #include "cairn/io/format.hpp"
