@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include <Eigen/Geometry>
 #include <boost/math/distributions/normal.hpp>
 
 #include "cairn/geometry/pose_chain.hpp"

@@ -70,7 +70,8 @@ TEST(Bal, IsDetectedByItsCounts) {
             "bal")
       << "one bad line";
   EXPECT_EQ(detected("2 2 3\n1 2 3\n3 2 1\n"), "table");
-  EXPECT_EQ(detected("1 2 3\n"), "table");
+  EXPECT_EQ(detected("1 2 3\n"), "bal") << "cut after its first line; a table has coordinates";
+  EXPECT_EQ(detected("1 2 3.5\n"), "table");
   EXPECT_EQ(detected("0 2 3 1\n1 2 3 1\n"), "table");
   EXPECT_EQ(detected("2 0 3\n" + kObservations), "table") << "a scene has points";
 }
