@@ -9,6 +9,8 @@
 #include <string>
 #include <vector>
 
+#include <Eigen/Core>
+
 #include "cairn/solve/estimator.hpp"
 #include "cairn/update/graph_update.hpp"
 #include "support/planar_graph.hpp"
