@@ -18,8 +18,7 @@ bool all_finite(std::span<const double> values) {
   return std::ranges::all_of(values, [](double v) { return std::isfinite(v); });
 }
 
-/// What the type says of these numbers, a state's or a measurement's, which it may change; it must
-/// leave them finite.
+/// What the type says of a state's or a measurement's numbers, which it must leave finite.
 template <class Type>
 std::string normalize(const Type& type, std::vector<double>& numbers) {
   std::string problem = type.normalize(numbers.data());

@@ -120,8 +120,8 @@ double NormalEquations::backward_error(std::span<const double> step) {
   double error = 0.0, length = 0.0, gradient = 0.0, largest = 0.0;
   for (std::size_t k = 0; k < step.size(); ++k) {
     const double r = std::abs(residual_[k] + (damped_[k] - diagonal_[k]) * step[k] - g_[k]);
-    if (!(r <= error)) error = r;
-    if (std::isnan(error)) return error;
+    if (std::isnan(r)) return r;
+    error = std::max(error, r);
     length = std::max(length, std::abs(step[k]));
     gradient = std::max(gradient, std::abs(g_[k]));
     largest = std::max(largest, damped_[k]);

@@ -35,10 +35,8 @@ std::map<fs::path, boost::dll::shared_library>& loaded_libraries() {
   return *libraries;
 }
 
-/// Sidecar files are some hundred bytes.
-constexpr std::uintmax_t kLargestSidecar = std::uintmax_t{1} << 20;
+constexpr std::uintmax_t kLargestSidecar = std::uintmax_t{1} << 20;  // they have some hundred bytes
 
-/// Everybody may write to it.
 bool others_may_write(const fs::path& path) {
   struct stat status {};
   return ::stat(path.c_str(), &status) == 0 && (status.st_mode & S_IWOTH) != 0;

@@ -24,7 +24,8 @@ constexpr double kRounding = 1e-6;
 }  // namespace
 
 double least_diagonal(std::span<const double> diagonal, double fraction) {
-  const double largest = std::ranges::max(diagonal);
+  double largest = 0.0;
+  for (const double entry : diagonal) largest = std::max(largest, entry);
   return fraction * (largest > 0.0 ? largest : 1.0);
 }
 
@@ -113,10 +114,8 @@ void Descent::record(double step_norm, double lambda, bool accepted) {
 
 bool Descent::solve(std::span<double> out) {
   equations_->solve(out);
-  if (!std::isfinite(dot(out, out))) return false;
-  if (checked_) return true;
-  checked_ = true;
-  return solves(out);
+  step_norm_ = std::sqrt(dot(out, out));
+  return std::isfinite(step_norm_);
 }
 
 bool Descent::solves(std::span<const double> out) {

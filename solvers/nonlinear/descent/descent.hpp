@@ -55,13 +55,14 @@ class Descent {
   /// must stop.
   bool must_stop();
 
-  /// Solves for `out` with what was factorised last. False if the result is no step: it has numbers
-  /// that are not finite, which more damping may cure; or, the first time
-  /// and whenever `claim` says that convergence is to be claimed by it, it does not solve its
-  /// system (`NormalEquations::backward_error`), which ends the run as diverged with a note that
-  /// names the linear solver. Iterative solvers, which meet a tolerance of their own, are only
-  /// asked for finite numbers.
+  /// Solves for `out` with what was factorised last. False if the result has numbers that are not
+  /// finite, which more damping may cure.
   bool solve(std::span<double> out);
+  /// ‖out‖ of the last `solve`.
+  double step_norm() const { return step_norm_; }
+  /// Whether `out` solves its system (`NormalEquations::backward_error`), as a step must by which
+  /// convergence is to be claimed; otherwise the run ends as diverged, with a note that names the
+  /// linear solver. Iterative solvers meet a tolerance of their own, and are not asked.
   bool solves(std::span<const double> out);
   /// Ends the run because no step that is finite could be had.
   void end_not_finite();
@@ -100,8 +101,8 @@ class Descent {
   Values best_;
   double best_chi2_ = 0.0;
   int number_ = 0;
-  bool checked_ = false;     // the first step
   double state_norm_ = 0.0;  // at the start
+  double step_norm_ = 0.0;
   std::optional<Status> status_;
   Summary summary_;
 };

@@ -22,6 +22,7 @@ class Run {
         options_(options),
         convergence_(descent.stop().tolerance, descent.state_norm()),
         path_(descent.step.size()),
+        least_diagonal_(least_diagonal(equations_.diagonal(), options.smallest_diagonal)),
         radius_(std::max(options.initial_radius, std::sqrt(descent.chi2))) {}
 
   void iterate() {
@@ -32,11 +33,10 @@ class Run {
         if (!run_.ended()) run_.end_not_finite();
         return;
       }
-      path_.prepare(equations_.H(), equations_.g(), equations_.diagonal(),
-                    least_diagonal(equations_.diagonal(), options_.smallest_diagonal));
+      path_.prepare(equations_.H(), equations_.g(), equations_.diagonal(), least_diagonal_);
       path_is_current_ = true;
       newton_promise_ = dot(equations_.g(), path_.newton());
-      newton_norm_ = std::sqrt(dot(path_.newton(), path_.newton()));
+      newton_norm_ = run_.step_norm();
       arrived = convergence_.arrived(newton_promise_, run_.chi2);
       if (arrived && !run_.solves(path_.newton())) return;
     }
@@ -73,10 +73,9 @@ class Run {
     if (!explained_) run_.note(equations_.explain(factorization) + "; steps are regularised");
     explained_ = true;
     std::vector<double> damping(run_.step.size());
-    const double least = least_diagonal(equations_.diagonal(), options_.smallest_diagonal);
     for (double mu = 1e-12; mu < 1.0; mu *= 100.0) {
       for (std::size_t k = 0; k < damping.size(); ++k) {
-        damping[k] = mu * std::max(equations_.diagonal()[k], least);
+        damping[k] = mu * std::max(equations_.diagonal()[k], least_diagonal_);
       }
       factorization = equations_.factorize_damped(damping);
       if (factorization.ok) return true;
@@ -103,6 +102,7 @@ class Run {
   const DoglegOptions& options_;
   Convergence convergence_;
   DoglegPath path_;
+  double least_diagonal_;
   double newton_promise_ = 0.0, newton_norm_ = 0.0;  // of the full step
   double radius_;
   bool path_is_current_ = false;

@@ -43,7 +43,7 @@ Summary GaussNewton::optimize(Graph& graph, const Stop& stop, Observer& observer
       if (!run.ended()) run.end_not_finite();
       break;
     }
-    const double step_norm = std::sqrt(dot(run.step, run.step));
+    const double step_norm = run.step_norm();
     const double before = run.chi2;
     const bool arrived = convergence.arrived(dot(equations.g(), run.step), before);
     const bool may_end = arrived || convergence.negligible(step_norm);

@@ -40,7 +40,8 @@ class Run {
         may_go_undamped_(may_go_undamped(options, equations_.gauge())),
         endgame_(may_go_undamped_ ? std::sqrt(descent.stop().tolerance) : 0.0),
         convergence_(descent.stop().tolerance, descent.state_norm()),
-        damped_by_(descent.step.size()) {}
+        damped_by_(descent.step.size()),
+        least_diagonal_(least_diagonal(equations_.diagonal(), options.smallest_diagonal)) {}
 
   void iterate() {
     const bool undamped = endgame_.active();
@@ -57,7 +58,7 @@ class Run {
       run_.record(0.0, lambda, false);
       return;
     }
-    const double step_norm = std::sqrt(dot(run_.step, run_.step));
+    const double step_norm = run_.step_norm();
     const double promise = dot(equations_.g(), run_.step) + damping_energy();
     if (first_trial_) {
       first_promise_ = promise;
@@ -91,9 +92,8 @@ class Run {
  private:
   Factorization factorize(double lambda) {
     const std::span<const double> diagonal = equations_.diagonal();
-    const double smallest = least_diagonal(diagonal, options_.smallest_diagonal);
     for (std::size_t k = 0; k < damped_by_.size(); ++k) {
-      damped_by_[k] = lambda * std::max(diagonal[k], smallest);
+      damped_by_[k] = lambda * std::max(diagonal[k], least_diagonal_);
     }
     return lambda > 0.0 ? equations_.factorize_damped(damped_by_) : equations_.factorize();
   }
@@ -160,6 +160,7 @@ class Run {
   Endgame endgame_;
   Convergence convergence_;
   std::vector<double> damped_by_;  // λ D
+  double least_diagonal_;          // of D
   int small_promises_ = 0;
   bool first_trial_ = true;  // of the present linearisation; it promised:
   double first_promise_ = 0.0, first_norm_ = 0.0;

@@ -57,9 +57,8 @@ class CAIRN_API NormalEquations {
   /// step = (what was factorised)⁻¹ g.
   void solve(std::span<double> step);
   /// ‖A step − g‖ / (h ‖step‖ + ‖g‖) in the maximum norm, A being what was factorised last and h
-  /// its largest diagonal entry: how far the step is from solving its system, whichever solver
-  /// computed it. About 1e-16 after a backward stable factorisation, however ill-conditioned A is;
-  /// NaN for a step with NaN.
+  /// its largest diagonal entry: about 1e-16 for a backward stable solution, however
+  /// ill-conditioned A is.
   double backward_error(std::span<const double> step);
 
   /// A sentence on why a factorisation of H failed: the variable at which it stopped, the likely
