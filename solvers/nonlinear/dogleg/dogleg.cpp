@@ -19,7 +19,6 @@ class Run {
   Run(Descent& descent, const DoglegOptions& options)
       : run_(descent),
         equations_(descent.equations()),
-        options_(options),
         convergence_(descent.stop().tolerance, descent.state_norm()),
         path_(descent.step.size()),
         least_diagonal_(least_diagonal(equations_.diagonal(), options.smallest_diagonal)),
@@ -99,7 +98,6 @@ class Run {
 
   Descent& run_;
   NormalEquations& equations_;
-  const DoglegOptions& options_;
   Convergence convergence_;
   DoglegPath path_;
   double least_diagonal_;

@@ -35,7 +35,6 @@ class Run {
   Run(Descent& descent, const LevenbergMarquardtOptions& options)
       : run_(descent),
         equations_(descent.equations()),
-        options_(options),
         damping_(initial_lambda(options, equations_.gauge()), 1e-20, options.largest_lambda),
         may_go_undamped_(may_go_undamped(options, equations_.gauge())),
         endgame_(may_go_undamped_ ? std::sqrt(descent.stop().tolerance) : 0.0),
@@ -154,7 +153,6 @@ class Run {
 
   Descent& run_;
   NormalEquations& equations_;
-  const LevenbergMarquardtOptions& options_;
   Damping damping_;
   bool may_go_undamped_;
   Endgame endgame_;
