@@ -21,6 +21,7 @@
 #include "cairn/solve/optimizer.hpp"
 #include "cairn/types/define_factor.hpp"
 #include "cairn/types/define_variable.hpp"
+#include "support/components.hpp"
 #include "support/sample_graphs.hpp"
 
 namespace cairn {
@@ -58,7 +59,14 @@ Summary optimize_with(const std::string& optimizer, const Spoil& spoil, Graph& g
   return registry.make<Optimizer>(optimizer + ":linear_solver=spoilt")->optimize(graph);
 }
 
-class Optimizers : public testing::TestWithParam<const char*> {};
+class Optimizers : public testing::TestWithParam<const char*> {
+ protected:
+  void SetUp() override {
+    const Registry registry;
+    if (!registry.has(Optimizer::kKind, GetParam()) || !registry.has(LinearSolver::kKind, "eigen"))
+      GTEST_SKIP() << "not built";
+  }
+};
 
 TEST_P(Optimizers, ConvergeWithTheSolverAsItIs) {
   Graph graph = test::ring_of_poses(30, 0.05);
@@ -155,7 +163,9 @@ class Methods : public testing::TestWithParam<const char*> {
  protected:
   void SetUp() override {
     if (!registry_.has(Optimizer::kKind, GetParam())) GTEST_SKIP() << "not built";
-    optimizer_ = registry_.make<Optimizer>(GetParam());
+    const std::string spec = test::with_some_linear_solver(GetParam());
+    if (spec.empty()) GTEST_SKIP() << "there is no linear solver";
+    optimizer_ = registry_.make<Optimizer>(spec);
   }
   Registry registry_;
   std::unique_ptr<Optimizer> optimizer_;
