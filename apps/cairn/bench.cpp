@@ -24,6 +24,7 @@ namespace {
 
 void check(const BenchOptions& options, Session& session) {
   if (options.csv == "-") session.write_file_to_stdout();
+  check_file(options.csv, session);
   if (options.html.empty()) return;
   if (!session.registry().has(Picture::kKind, "html")) {
     throw Error(

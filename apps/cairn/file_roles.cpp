@@ -14,14 +14,17 @@
 namespace cairn::app {
 namespace {
 
-/// The same for all names of a file; empty for what has no identity.
+/// The same for all names of a file, be it there or not; empty for what has no identity.
 std::string identity_of(const std::string& file) {
   if (file.empty() || file == "-" || file.starts_with('@')) return {};
   struct stat status {};
   if (::stat(file.c_str(), &status) == 0)
     return S_ISREG(status.st_mode) ? fmt::format("{} {}", status.st_dev, status.st_ino) : "";
   std::error_code error;
-  const std::filesystem::path path = std::filesystem::weakly_canonical(file, error);
+  std::filesystem::path path = std::filesystem::absolute(file, error);
+  for (int depth = 0; depth < 40 && std::filesystem::is_symlink(path, error); ++depth)
+    path = path.parent_path() / std::filesystem::read_symlink(path, error);
+  path = std::filesystem::weakly_canonical(path, error);
   return error ? file : path.string();
 }
 
@@ -33,7 +36,7 @@ void FileRoles::refuse(const std::string& input) {
 }
 
 void FileRoles::add_input(const std::string& file) {
-  const std::string identity = identity_of(file);
+  const std::string identity = identity_of(file == "-" ? "/dev/stdin" : file);
   if (identity.empty()) return;
   for (const Output& output : outputs_) {
     if (output.identity == identity && !output.may_replace_an_input) refuse(file);

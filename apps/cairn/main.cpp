@@ -1,4 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <fcntl.h>
+
+#include <cerrno>
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
@@ -49,9 +52,19 @@ int run(int argc, const char* const* argv) {
 #endif
 }
 
+/// Descriptors 0 to 2 that were closed are taken: or the first files that are opened would be them,
+/// and get what is printed. Using them still fails.
+void take_closed_descriptors() {
+  for (const int number : {0, 1, 2}) {
+    if (::fcntl(number, F_GETFD) < 0 && errno == EBADF)
+      static_cast<void>(::open("/dev/null", number == 0 ? O_WRONLY : O_RDONLY));
+  }
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
+  take_closed_descriptors();
   std::signal(SIGPIPE, SIG_IGN);  // `cairn … | head` is no reason to die before files are written
   std::signal(SIGXFSZ, SIG_IGN);  // the limit of a file's size is an error of its output
   try {

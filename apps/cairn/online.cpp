@@ -146,6 +146,7 @@ void check(const OnlineOptions& options, Session& session) {
                 "a policy solves when it has to: --solve explicit and --budget are for runs "
                 "without --policy");
   }
+  session.files.add_input("-");
   check_output(options.output, "", session);
   session.files.add_output(options.journal, false);  // is tried when it is opened
 }

@@ -43,12 +43,15 @@ TEST_F(Outputs, AReaderThatIsGoneHidesNoError) {
 TEST_F(Outputs, NoneReplacesAnotherOrWhatIsRead) {
   const std::string file = graph(), before = read_text(file), same = folder_.file("same.g2o");
   std::filesystem::create_hard_link(file, folder_.file("alias.g2o"));
+  std::filesystem::create_symlink("same.g2o", folder_.file("link.g2o"));  // to what is not there
   const std::vector<Arguments> refused{
       {"optimize", file, "--record", file},
       {"optimize", file, "--json", file},
       {"optimize", file, "--json", folder_.file("alias.g2o")},
       {"optimize", file, "-o", same, "--json", same},
       {"optimize", file, "-o", same, "--record", folder_.file("./same.g2o")},
+      {"optimize", file, "-o", same, "--json", folder_.file("link.g2o")},
+      {"bench", file, "--csv", file, "--linear-solver", "block_cholesky"},
       {"convert", file, same, "--json", same}};
   for (const Arguments& arguments : refused) {
     const Outcome outcome = cairn(arguments);
@@ -61,6 +64,27 @@ TEST_F(Outputs, NoneReplacesAnotherOrWhatIsRead) {
   EXPECT_EQ(cairn({"optimize", file, "--json", "/dev/null", "--record", "/dev/null"}).exit_code, 0);
   EXPECT_EQ(cairn({"optimize", file, "-o", file}).exit_code, 0);
   EXPECT_NE(read_text(file), before);
+}
+
+TEST_F(Outputs, NamesThatAreNotThereYetAreComparedToo) {
+  graph();
+  for (const std::string names : {"-o n.g2o --json ./n.g2o", "-o n.g2o --json $D/n.g2o"}) {
+    const Outcome outcome =
+        shell("cd $D; $C optimize graph.g2o " + names + "; echo code=$? >&2", folder_);
+    EXPECT_THAT(outcome.err, HasSubstr("code=2")) << names;
+  }
+  const Outcome piped =
+      shell("cd $D; $C optimize - --json graph.g2o < graph.g2o; echo code=$? >&2", folder_);
+  EXPECT_THAT(piped.err, HasSubstr("code=2"));
+}
+
+TEST_F(Outputs, NothingThatIsPrintedLandsInAFile) {
+  graph();
+  const Outcome outcome = shell(
+      "$C optimize $D/graph.g2o -o $D/best.g2o --record $D/run.jsonl 2>&- >/dev/null; "
+      "$C view $D/graph.g2o $D/run.jsonl -o $D/page.html",
+      folder_);
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
 }
 
 TEST_F(Outputs, ARecordingThatCannotBeWrittenCostsNothingElse) {

@@ -10,7 +10,6 @@
 #include <cerrno>
 #include <charconv>
 #include <cstring>
-#include <fstream>
 #include <iterator>
 #include <utility>
 
@@ -151,7 +150,20 @@ void Journal::load_records(const std::string& bytes, std::size_t begin) {
 /// Keeps what is after the first `size` bytes in FILE.cut, and cuts it off.
 void Journal::cut(const std::string& bytes, std::size_t size) {
   const std::filesystem::path kept = file_.string() + ".cut";
-  std::ofstream(kept, std::ios::binary | std::ios::app) << bytes.substr(size) << '\n';
+  const int descriptor = ::open(
+      kept.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK, 0666);
+  const std::string tail = bytes.substr(size) + "\n";
+  struct stat status {};
+  const bool saved =
+      descriptor >= 0 && ::fstat(descriptor, &status) == 0 && S_ISREG(status.st_mode) &&
+      ::write(descriptor, tail.data(), tail.size()) == std::ssize(tail) && ::fsync(descriptor) == 0;
+  if (descriptor >= 0) ::close(descriptor);
+  if (!saved) {
+    throw Error(ErrorCode::input,
+                fmt::format("{}: the last line is not whole, and cannot be kept in {}; make room "
+                            "for that file, or cut the journal by hand",
+                            file_.string(), kept.string()));
+  }
   note_ = fmt::format("{}: the last line was not whole: {} bytes were cut off, and kept in {}",
                       file_.string(), bytes.size() - size, kept.string());
   if (::ftruncate(descriptor_, static_cast<off_t>(size)) != 0) fail("cannot be cut");

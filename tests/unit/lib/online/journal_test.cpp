@@ -155,6 +155,15 @@ TEST_F(JournalTest, KeepsWhatItCutsOff) {
   EXPECT_EQ(std::string(std::istreambuf_iterator<char>(in), {}), "1234 half a\n");
 }
 
+TEST_F(JournalTest, CutsNothingThatItCannotKeep) {
+  fill();
+  const std::string torn = bytes() + "1234 half a";
+  write(torn);
+  std::filesystem::create_symlink("/dev/null", cut());
+  EXPECT_THAT(refusal([&] { records(); }, ErrorCode::input), HasSubstr("cannot be kept in"));
+  EXPECT_EQ(bytes(), torn);
+}
+
 TEST_F(JournalTest, GoesOnWithAFileOfFormatOne) {
   // As format 1 had it: each line's checksum is its own.
   write("cairn-journal 1 d82b7ee4 robot\nc0876de4 1 first\n");
