@@ -197,8 +197,13 @@ int run(OnlineOptions options, Session& session) {
   } catch (...) {
     failure = std::current_exception();
   }
-  if (!options.output.empty())
-    write_graph(lines.estimator().graph(), options.output, session.registry());
+  try {
+    if (!options.output.empty())
+      write_graph(lines.estimator().graph(), options.output, session.registry());
+  } catch (const Error& error) {
+    if (!failure) throw;
+    session.note(error.what());  // the reason comes last, as the error
+  }
   if (failure) std::rethrow_exception(failure);
   session.write_json(report_json(options, conversation.counts(), lines));
   return guard.interrupted() ? kExitInterrupted : 0;

@@ -101,7 +101,7 @@ class Bridge final : public ceres::IterationCallback {
 /// alike.
 constexpr double kToleranceShare = 1e-2;
 
-/// A step of this fraction of the states may fail to lower chi2 because of rounding.
+/// A step of this fraction of the states, or of this change of chi2, may fail because of rounding.
 constexpr double kRounding = 1e-6;
 
 void set_limits(const Stop& stop, ceres::Solver::Options& options) {
@@ -131,8 +131,8 @@ Status status_of(const ceres::Solver::Summary& ceres, bool interrupted) {
 }
 
 /// Whether Ceres gave up shrinking its trust region, and calls that convergence, although the first
-/// of its last steps that did not lower the cost was longer than rounding explains: its Jacobians
-/// do not fit its residuals.
+/// of its last steps that did not lower the cost was longer, and raised it by more, than rounding
+/// explains: its Jacobians do not fit its residuals.
 bool ended_without_descent(const ceres::Solver::Summary& ceres, const Values& values) {
   const auto& all = ceres.iterations;
   auto first = all.end();
@@ -141,7 +141,8 @@ bool ended_without_descent(const ceres::Solver::Summary& ceres, const Values& va
   for (const AlignedVector& pool : values.pools) {
     for (const double x : pool) squares += x * x;
   }
-  return first != all.end() && first->step_norm > kRounding * std::sqrt(squares);
+  return first != all.end() && first->step_norm > kRounding * std::sqrt(squares) &&
+         !(std::abs(first->cost_change) <= kRounding * ceres.final_cost);
 }
 
 Seconds seconds_of(const ceres::Solver::Summary& ceres) {

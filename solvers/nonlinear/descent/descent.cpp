@@ -141,8 +141,7 @@ void Descent::end_without_descent(double promise, double step_norm) {
   }
   note(
       fmt::format("no step lowers chi2, though the model predicts a decrease of {:.3g}: a Jacobian "
-                  "does not fit "
-                  "its residual, or a residual is not continuous or not finite nearby",
+                  "does not fit its residual, or a residual is not continuous or not finite nearby",
                   promise));
   end(Status::diverged);
 }
