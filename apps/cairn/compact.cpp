@@ -112,6 +112,7 @@ Job prepare(const CompactOptions& options, const PolicySetting& setting) {
     const auto count =
         std::max<std::size_t>(1, static_cast<std::size_t>(std::llround(options.sample * poses)));
     result.found = find_thresholds(job, count, options.error_ratio, setting);
+    if (setting.interrupted()) return result;
   }
   emplace(result.found.options);
   const OptionTable& table = setting.registry.options(PosePolicy::kKind, job.policy.name);
@@ -155,6 +156,11 @@ int run_compact(const CompactOptions& options, Session& session) {
         progress.show(title, count, counts);
       }};
   const Job job = prepare(options, setting);
+  if (guard.interrupted()) {
+    progress.clear();
+    session.note("interrupted before anything was selected: nothing is written");
+    return kExitInterrupted;
+  }
   const Recovery recovery = parse_enum<Recovery>(options.recovery, "--recovery");
   std::optional<UncertaintyComparison> comparison;
   if (!options.compare.empty())

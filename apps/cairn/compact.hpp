@@ -34,6 +34,8 @@ struct CompactOptions {
   double error_ratio = 2.5;
   std::uint64_t seed = 1;
   std::string compare;
+
+  CompactOptions() { problem.initial.clear(); }
 };
 
 /// The options of `cairn compact`, with the strategies on offer.

@@ -362,10 +362,14 @@ std::optional<Summary> optimize(Graph& graph, Optimizer* optimizer, const Margin
         "the optimisation ended as {}: covariances are of where it stopped, which is no minimum",
         to_string(summary.status)));
   }
+  for (const std::string& note : notes_on_the_end(summary, options.problem.stop, graph))
+    session.note(note);
   return summary;
 }
 
-int run(const MarginalsOptions& options, Session& session) {
+int run(MarginalsOptions options, Session& session) {
+  if (options.as_given && options.problem.initial == ProblemOptions().initial)
+    options.problem.initial.clear();
   if (options.output == "-") session.write_file_to_stdout();
   check_file(options.output, session);
   session.use_threads();

@@ -16,6 +16,7 @@
 #include "cairn/policy/policy_session.hpp"
 #include "cairn/policy/pose_policy.hpp"
 #include "cairn/runtime/error.hpp"
+#include "cairn/runtime/plugin_call.hpp"
 #include "cairn/runtime/threads.hpp"
 #include "cairn/solve/estimator.hpp"
 #include "commands.hpp"
@@ -45,6 +46,8 @@ struct OnlineOptions {
   std::string sync = "batch";
   std::string output;
   ProblemOptions problem;
+
+  OnlineOptions() { problem.initial.clear(); }
 };
 
 /// What must be the same for a journal to give the same estimate again.
@@ -92,6 +95,7 @@ struct Listener {
   std::unique_ptr<StreamFormat> format;
   std::unique_ptr<Estimator> estimator;  ///< null: the policy has one
   std::unique_ptr<PosePolicy> policy;    ///< null: everything is taken in
+  std::string name;                      ///< of the estimator or policy, for messages
   std::string identity;                  ///< of the journal
   std::unique_ptr<LineSession> lines;
 };
@@ -99,6 +103,7 @@ struct Listener {
 Listener follow_graph(const OnlineOptions& options, const ProblemSetup& setup, Session& session) {
   Registry& registry = session.registry();
   Listener listener;
+  listener.name = fmt::format("estimator '{}'", options.estimator);
   listener.identity = identity(options, "estimator " + options.estimator, session);
   listener.format = registry.make<StreamFormat>(options.input.format);
   listener.estimator = registry.make<Estimator>(options.estimator);
@@ -123,6 +128,7 @@ Listener follow_policy(const OnlineOptions& options, const ProblemSetup& setup, 
   if (!options.estimator.empty() && !spec.values.emplace("estimator", options.estimator).second)
     throw Error(ErrorCode::usage, "--estimator, and one among the policy's options: give one");
   Listener listener;
+  listener.name = fmt::format("policy '{}'", options.policy);
   // What is written at the end of a pose is read before, which may cost the last bits their place.
   listener.identity = identity(options,
                                fmt::format("policy {}, output {}, marginals {}", spec_text(spec),
@@ -192,15 +198,18 @@ int run(OnlineOptions options, Session& session) {
   const bool kept = !options.output.empty() || journal;
   std::exception_ptr failure;  // which costs the rest of the stream, not the map so far
   try {
-    converse(conversation, input, kept, session);
-    conversation.finish();
+    call_plugin([&] { return listener.name; },
+                [&] {
+                  converse(conversation, input, kept, session);
+                  conversation.finish();
+                });
   } catch (...) {
     failure = std::current_exception();
   }
   try {
     if (!options.output.empty())
       write_graph(lines.estimator().graph(), options.output, session.registry());
-  } catch (const Error& error) {
+  } catch (const std::exception& error) {
     if (!failure) throw;
     session.note(error.what());  // the reason comes last, as the error
   }

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // cairn optimize GRAPH: one optimisation, its estimate and its report.
+#include <chrono>
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include <fmt/core.h>
 
@@ -12,6 +15,7 @@
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/plugin_call.hpp"
 #include "cairn/runtime/threads.hpp"
+#include "cairn/runtime/timed.hpp"
 #include "commands.hpp"
 #include "covariances.hpp"
 #include "graph_files.hpp"
@@ -47,33 +51,37 @@ void check(const OptimizeOptions& options, Session& session) {
   check_file(options.record, session);
 }
 
-int exit_code(Status status) {
-  switch (status) {
-    case Status::converged:
-    case Status::max_iterations:
-      return 0;
-    case Status::diverged:
-    case Status::not_positive_definite:
-      return static_cast<int>(ErrorCode::numerical);
-    case Status::interrupted:
-      return kExitInterrupted;
-  }
-  return static_cast<int>(ErrorCode::numerical);
+/// What `--initial` did.
+struct InitialEstimate {
+  std::vector<std::string> notes;
+  double seconds = 0.0;
+};
+
+InitialEstimate initialise(Graph& graph, const ProblemSetup& setup, const OptimizeOptions& options,
+                           const Session& session) {
+  const auto begin = std::chrono::steady_clock::now();
+  InitialEstimate result{.notes = setup.apply(graph)};
+  result.seconds = seconds_since(begin);
+  for (const std::string& note : result.notes)
+    session.note(fmt::format("initial guess {}: {}", options.problem.initial, note));
+  return result;
 }
 
 json::object report_json(const OptimizeOptions& options, const LoadedGraph& loaded,
-                         const Summary& summary, const DiagonalCovariances& covariances) {
+                         const InitialEstimate& initial, const Summary& summary,
+                         const DiagonalCovariances& covariances) {
   json::object report = begin_report("optimize");
   report["graph"] = graph_json(loaded.graph, loaded.name, loaded.label);
   report["optimizer"] = summary.optimizer;
   report["linear_solver"] = summary.linear_solver;
   report["threads"] = threads();
   report["initial"] = options.problem.initial;
+  report["initial_notes"] = strings_json(initial.notes);
   report["loss"] = text_json(options.problem.loss);
   report["status"] = to_string(summary.status);
   report["chi2"] = {{"initial", summary.initial_chi2}, {"final", summary.final_chi2}};
   report["iterations"] = iterations_json(summary);
-  json::object seconds{{"read", loaded.seconds}};
+  json::object seconds{{"read", loaded.seconds}, {"initial", initial.seconds}};
   for (const auto& member : seconds_json(summary.seconds)) seconds.insert(member);
   report["seconds"] = std::move(seconds);
   report["solver"] = solver_json(summary.solver);
@@ -156,9 +164,7 @@ int run(const OptimizeOptions& options, Session& session) {
   const ProblemSetup setup(options.problem, registry);
 
   LoadedGraph loaded = load_graph(options.graph, options.input, session);
-  for (const std::string& note : setup.apply(loaded.graph)) {
-    session.note(fmt::format("initial guess {}: {}", options.problem.initial, note));
-  }
+  const InitialEstimate initial = initialise(loaded.graph, setup, options, session);
   const InterruptGuard guard;  // until the results are written
   std::optional<RecordingWriter> recording;
   Summary summary = call_plugin(
@@ -168,19 +174,23 @@ int run(const OptimizeOptions& options, Session& session) {
     write_graph(loaded.graph, options.output, registry,
                 output_format(options.output, options.output_format));
   }
+  const Stop& stop = options.problem.stop;
+  for (std::string& note : notes_on_the_end(summary, stop, loaded.graph))
+    summary.notes.push_back(std::move(note));
   DiagonalCovariances covariances;
-  if (covariance_solver && exit_code(summary.status) == 0) {
+  if (covariance_solver && exit_code(summary, stop) == 0) {
     covariances =
         call_plugin([&] { return "covariances by " + in_words(spec); },
                     [&] { return diagonal_covariances(loaded.graph, *covariance_solver); });
     if (!covariances.there) summary.notes.push_back("no covariances: " + covariances.why_not);
   }
-  session.write_json(report_json(options, loaded, summary, covariances));
+  session.write_json(report_json(options, loaded, initial, summary, covariances));
   if (recording) recording->finish(loaded.graph, summary);  // if it cannot: the rest is written
   session.print(summary_text(options, loaded, summary, covariances));
-  if (covariance_solver && !covariances.there && exit_code(summary.status) == 0)
-    return static_cast<int>(ErrorCode::numerical);
-  return exit_code(summary.status);
+  const int code = exit_code(summary, stop);
+  return code == 0 && covariance_solver && !covariances.there
+             ? static_cast<int>(ErrorCode::numerical)
+             : code;
 }
 
 }  // namespace

@@ -1,11 +1,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "problem_setup.hpp"
 
+#include <iterator>
+#include <utility>
+
 #include <fmt/core.h>
 
 #include "arguments.hpp"
+#include "cairn/evaluation/plausibility.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/plugin_call.hpp"
+#include "interrupt.hpp"
 #include "table.hpp"
 
 namespace cairn::app {
@@ -44,7 +49,7 @@ void add_time_limit(ArgumentParser cli, Stop& stop) {
 
 ProblemSetup::ProblemSetup(const ProblemOptions& options, Registry& registry)
     : initial_name_(options.initial),
-      initial_(registry.make<InitialGuess>(options.initial)),
+      initial_(options.initial.empty() ? nullptr : registry.make<InitialGuess>(options.initial)),
       selector_(FactorSelector::parse(options.loss_on)) {
   if (!options.loss.empty()) loss_ = registry.make<Loss>(options.loss);
   if (options.loss.empty() && options.loss_on != "all") {
@@ -54,8 +59,38 @@ ProblemSetup::ProblemSetup(const ProblemOptions& options, Registry& registry)
 
 std::vector<std::string> ProblemSetup::apply(Graph& graph) const {
   graph.set_loss(loss_, selector_);
+  if (!initial_) return {};
   return call_plugin([&] { return fmt::format("initial guess '{}'", initial_name_); },
                      [&] { return initial_->compute(graph); });
+}
+
+std::vector<std::string> notes_on_the_end(const Summary& summary, const Stop& stop,
+                                          const Graph& graph) {
+  std::vector<std::string> notes;
+  if (summary.status == Status::interrupted) return notes;
+  if (summary.status == Status::max_iterations && stop.tolerance > 0.0 &&
+      std::ssize(summary.iterations) >= stop.max_iterations) {
+    notes.push_back(
+        fmt::format("stopped by --iterations {} before it converged", stop.max_iterations));
+  }
+  std::string implausible = implausible_estimate(graph, summary.final_chi2);
+  if (!implausible.empty()) notes.push_back(std::move(implausible));
+  return notes;
+}
+
+int exit_code(const Summary& summary, const Stop& stop) {
+  switch (summary.status) {
+    case Status::converged:
+      return 0;
+    case Status::max_iterations:
+      return stop.tolerance > 0.0 ? static_cast<int>(ErrorCode::numerical) : 0;
+    case Status::diverged:
+    case Status::not_positive_definite:
+      return static_cast<int>(ErrorCode::numerical);
+    case Status::interrupted:
+      return kExitInterrupted;
+  }
+  return static_cast<int>(ErrorCode::numerical);
 }
 
 namespace {

@@ -20,10 +20,10 @@ inline constexpr const char* kDefaultLinearSolver = "block_cholesky";
 /// Of an optimizer: the option that names a component of kind linear_solver.
 inline constexpr const char* kLinearSolverOption = "linear_solver";
 
-/// Options of `optimize` and `bench` about the problem, besides those of the solvers.
+/// Options of commands that optimise about the problem, besides those of the solvers.
 struct ProblemOptions {
-  std::string initial = "as_given";
-  std::string loss;  ///< empty: none
+  std::string initial = "auto";  ///< empty: the states as they are, with no option for it
+  std::string loss;              ///< empty: none
   std::string loss_on = "all";
   Stop stop;
 };
@@ -46,10 +46,19 @@ class ProblemSetup {
 
  private:
   std::string initial_name_;
-  std::unique_ptr<InitialGuess> initial_;
-  std::shared_ptr<const Loss> loss_;  // shared: graphs and their clones use one loss
+  std::unique_ptr<InitialGuess> initial_;  // null: the states as they are
+  std::shared_ptr<const Loss> loss_;       // shared: graphs and their clones use one loss
   FactorSelector selector_;
 };
+
+/// Sentences on how an optimisation ended: that it stopped before it converged, and what helps;
+/// that chi2 of the estimate is implausible. None for one that was interrupted.
+std::vector<std::string> notes_on_the_end(const Summary& summary, const Stop& stop,
+                                          const Graph& graph);
+
+/// 0 where it converged, or had no tolerance to reach; else that of a numerical failure, or of an
+/// interruption.
+int exit_code(const Summary& summary, const Stop& stop);
 
 /// Whether an optimizer lets its linear solver be chosen: an option `linear_solver` of type
 /// component.

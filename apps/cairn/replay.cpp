@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <exception>
 #include <memory>
 
 #include <fmt/core.h>
@@ -13,6 +14,7 @@
 #include "cairn/online/recorded_graph.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
+#include "cairn/runtime/plugin_call.hpp"
 #include "cairn/runtime/timed.hpp"
 #include "cairn/solve/estimator.hpp"
 #include "commands.hpp"
@@ -84,10 +86,10 @@ std::vector<bool> sampled_steps(int steps, int samples) {
   return sampled;
 }
 
-Replay replay_all(const Graph& whole, const std::vector<Arrival>& arrivals, Estimator& estimator,
-                  BatchChecker* checker, const ReplayOptions& options, const InterruptGuard& guard,
-                  const Session& session) {
-  Replay replay;
+/// Into `replay`, which has the steps so far where something throws.
+void replay_all(const Graph& whole, const std::vector<Arrival>& arrivals, Estimator& estimator,
+                BatchChecker* checker, const ReplayOptions& options, const InterruptGuard& guard,
+                const Session& session, Replay& replay) {
   Feeder feeder(whole, estimator, options);
   StatusLine line(session.common.quiet);
   const int count = static_cast<int>(std::ssize(arrivals));
@@ -115,7 +117,6 @@ Replay replay_all(const Graph& whole, const std::vector<Arrival>& arrivals, Esti
     }
   }
   replay.interrupted = guard.interrupted();
-  return replay;
 }
 
 void check(const ReplayOptions& options, Session& session) {
@@ -164,8 +165,28 @@ int run(const ReplayOptions& options, Session& session) {
   }
 
   const InterruptGuard guard;  // until the results are written
-  const Replay replay = replay_all(loaded.graph, arrivals, *estimator,
-                                   checker ? &*checker : nullptr, options, guard, session);
+  Replay replay;
+  std::exception_ptr failure;  // which costs the rest of the recording, not the estimate so far
+  try {
+    call_plugin([&] { return fmt::format("estimator '{}'", options.estimator); },
+                [&] {
+                  replay_all(loaded.graph, arrivals, *estimator, checker ? &*checker : nullptr,
+                             options, guard, session, replay);
+                });
+  } catch (...) {
+    failure = std::current_exception();
+  }
+  if (failure) {
+    try {
+      if (!options.steps.empty()) write_file(options.steps, steps_csv(replay));
+      if (!options.output.empty())
+        write_graph(estimator->graph(), options.output, registry,
+                    output_format(options.output, options.output_format));
+    } catch (const std::exception& error) {
+      session.note(error.what());  // the reason comes last, as the error
+    }
+    std::rethrow_exception(failure);
+  }
   if (replay.placed_as_given > 1) {
     session.note(fmt::format("{} the states of the file: no measurement determined them at first",
                              plural(replay.placed_as_given, "variable") + " began with"));

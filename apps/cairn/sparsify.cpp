@@ -221,7 +221,9 @@ void note_refused(const Sparsification& change, const Session& session) {
 
 }  // namespace
 
-int run_sparsify(const SparsifyCommandOptions& options, Session& session) {
+int run_sparsify(SparsifyCommandOptions options, Session& session) {
+  if (options.as_given && options.problem.initial == ProblemOptions().initial)
+    options.problem.initial.clear();
   session.use_threads();
   if (options.output == "-") session.write_file_to_stdout();
   check_output(options.output, options.output_format, session);
@@ -248,7 +250,8 @@ int run_sparsify(const SparsifyCommandOptions& options, Session& session) {
   if (!options.record.empty()) write_file(options.record, recorder.text());
   session.write_json(report_json(options, loaded, job, result));
   session.print(summary_text(options, loaded, job, result));
-  return guard.interrupted() ? kExitInterrupted : 0;
+  if (guard.interrupted()) return kExitInterrupted;
+  return result.converged ? 0 : static_cast<int>(ErrorCode::numerical);
 }
 
 void add_sparsify_options(ArgumentParser cli, SparsifyCommandOptions& options) {

@@ -32,6 +32,6 @@ struct SparsifyCommandOptions {
 void add_sparsify_options(ArgumentParser cli, SparsifyCommandOptions& options);
 
 /// Returns the exit code.
-int run_sparsify(const SparsifyCommandOptions& options, Session& session);
+int run_sparsify(SparsifyCommandOptions options, Session& session);
 
 }  // namespace cairn::app

@@ -62,14 +62,15 @@ std::unique_ptr<InitialGuess> make_chordal(const ChordalOptions& options,
                                            std::unique_ptr<LinearSolver> solver);
 
 struct IncrementalOptions {
-  int step = 100;       ///< poses between two optimisations
+  int step = 100;       ///< poses between two optimisations; 0: 2 % of them, at least 100
   int iterations = 10;  ///< of each, at most
   std::string optimizer = "levenberg_marquardt";
 
   static auto fields() {
     using O = IncrementalOptions;
     return OptionFields<O>()
-        .integer("step", &O::step, 1, 1e9, "poses between two optimisations")
+        .integer("step", &O::step, 0, 1e9,
+                 "poses between two optimisations; 0: 2 % of all, at least 100")
         .integer("iterations", &O::iterations, 1, 1e6, "largest number of iterations of each")
         .component<Optimizer>("optimizer", &O::optimizer,
                               "the optimizer of the part of the graph added so far");
@@ -78,5 +79,30 @@ struct IncrementalOptions {
 
 std::unique_ptr<InitialGuess> make_incremental(const IncrementalOptions& options,
                                                std::unique_ptr<Optimizer> optimizer);
+
+struct AutomaticOptions {
+  std::string linear_solver = "block_cholesky";
+  std::string optimizer = "levenberg_marquardt";
+  int iterations = 20;
+
+  static auto fields() {
+    using O = AutomaticOptions;
+    return OptionFields<O>()
+        .component<LinearSolver>("linear_solver", &O::linear_solver, "of the chordal relaxation")
+        .component<Optimizer>("optimizer", &O::optimizer,
+                              "tries a start whose chi2 is implausible, and is that of incremental")
+        .integer("iterations", &O::iterations, 1, 1e6, "largest number of iterations of the trial");
+  }
+};
+
+/// What `auto` chooses from besides the states as given; null: not available.
+struct Candidates {
+  std::unique_ptr<InitialGuess> chordal;
+  std::unique_ptr<Optimizer> optimizer;  ///< for trials
+  std::unique_ptr<InitialGuess> incremental;
+};
+
+std::unique_ptr<InitialGuess> make_automatic(const AutomaticOptions& options,
+                                             Candidates candidates);
 
 }  // namespace cairn::initial

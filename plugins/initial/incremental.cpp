@@ -21,9 +21,11 @@ class Incremental final : public InitialGuess {
   std::vector<std::string> compute(Graph& graph) override {
     Growth growth(graph);
     int since = 0, rounds = 0;
-    for (const int variable : poses_by_id(graph)) {
+    const std::vector<int> poses = poses_by_id(graph);
+    const int step = step_ > 0 ? step_ : std::max(100, static_cast<int>(std::ssize(poses) / 50));
+    for (const int variable : poses) {
       growth.add_pose(variable);
-      if (++since < step_) continue;
+      if (++since < step) continue;
       optimizer_->optimize(growth.grown, stop_);
       since = 0;
       ++rounds;
@@ -112,16 +114,14 @@ class Incremental final : public InitialGuess {
       if (gauge.held[variable]) grown.set_fixed(index[variable]);
     }
 
+    /// With their losses, those whose variables have all been met.
     void add_factors_of(int variable) {
-      std::vector<int> variables;
       for (const int f : factors[variable]) {
         if (used[f]) continue;
-        variables.clear();
-        for (const std::int32_t v : whole.factor_variables(f)) variables.push_back(index[v]);
-        if (std::ranges::find(variables, -1) != variables.end()) continue;
+        const auto on = whole.factor_variables(f);
+        if (std::ranges::any_of(on, [&](std::int32_t v) { return index[v] < 0; })) continue;
         used[f] = true;
-        grown.add_factor(whole.type_of_factor(f), variables, whole.measurement(f),
-                         whole.information(f));
+        grown.add(whole.factor(f));
       }
     }
   };

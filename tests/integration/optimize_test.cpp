@@ -85,7 +85,7 @@ TEST_F(OptimizeCommand, TheEstimateIsTheSameToTheLastByteForAnyNumberOfThreads) 
     std::vector<std::string> estimates;
     for (const std::string threads : {"1", "2", "3"}) {
       const Outcome outcome = cairn({"optimize", kind, "-o", "-", "--to", "g2o", "--iterations",
-                                     "3", "--threads", threads, "--quiet"});
+                                     "3", "--tolerance", "0", "--threads", threads, "--quiet"});
       EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
       EXPECT_THAT(outcome.out, HasSubstr("VERTEX_SE"));
       estimates.push_back(outcome.out);
@@ -131,7 +131,9 @@ TEST_F(OptimizeCommand, ToleranceZeroRunsExactlyThatManyIterations) {
 
 TEST_F(OptimizeCommand, ALossOnLoopsTamesOutliers) {
   const std::string bad = "@manhattan:poses=200,outliers=20,seed=1";
-  const auto plain = report_of({"optimize", bad, "--initial", "odometry"});
+  // 20 iterations, since it converges slowly.
+  const auto plain = report_of(
+      {"optimize", bad, "--initial", "odometry", "--iterations", "20", "--tolerance", "0"});
   const auto robust = report_of(
       {"optimize", bad, "--initial", "odometry", "--loss", "cauchy", "--loss-on", "loops"});
   EXPECT_TRUE(plain.at("loss").is_null());
@@ -196,7 +198,8 @@ TEST_F(OptimizeCommand, ADivergingRunExitsWithFourAndStillWritesItsBest) {
   // The square of such a distance is no number any more.
   const std::string far = folder_.file("far.g2o"), best = folder_.file("best.g2o");
   write_text(far, "VERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 1e200 0 0\nEDGE_SE2 0 1 1 0 0 1 0 0 1 0 1\n");
-  const Outcome outcome = cairn({"optimize", far, "-o", best, "--json", folder_.file("run.json")});
+  const Outcome outcome = cairn(
+      {"optimize", far, "--initial", "as_given", "-o", best, "--json", folder_.file("run.json")});
   EXPECT_EQ(outcome.exit_code, 4) << outcome.err;
   const auto report = parse_json(read_text(folder_.file("run.json")));
   EXPECT_EQ(report.at("status").as_string(), "diverged");
@@ -221,12 +224,45 @@ TEST_F(OptimizeCommand, AnInterruptEndsWithTheBestEstimateWritten) {
 }
 
 TEST_F(OptimizeCommand, StopsAtALimitOfTime) {
-  const auto report = report_of({"optimize", "@manhattan:poses=200", "--max-seconds", "1e-9"});
+  const Outcome outcome =
+      cairn({"optimize", "@manhattan:poses=200", "--max-seconds", "1e-9", "--json", "-"});
+  EXPECT_EQ(outcome.exit_code, 4);
+  const auto report = parse_json(outcome.out);
   EXPECT_EQ(report.at("status").as_string(), "max_iterations");
   EXPECT_TRUE(report.at("iterations").as_array().empty());
   const Outcome text =
       cairn({"optimize", "@manhattan:poses=200", "--max-seconds", "1e-9", "--quiet"});
   EXPECT_THAT(text.out, HasSubstr("stopped by the limit of 1e-09 s"));
+}
+
+TEST_F(OptimizeCommand, WhatHasNotConvergedIsSaidAndIsNoSuccess) {
+  const std::string best = folder_.file("best.g2o");
+  const Outcome outcome = cairn({"optimize", graph(), "--iterations", "1", "-o", best, "--quiet"});
+  EXPECT_EQ(outcome.exit_code, 4);
+  EXPECT_THAT(outcome.out, HasSubstr("stopped by --iterations 1 before it converged"));
+  EXPECT_TRUE(std::filesystem::exists(best));
+}
+
+TEST_F(OptimizeCommand, AnImplausibleEstimateIsSaid) {
+  const std::string bad = "@manhattan:poses=200,outliers=20,seed=1";
+  const Outcome plain = cairn({"optimize", bad, "--quiet"});
+  EXPECT_EQ(plain.exit_code, 0) << plain.err;
+  EXPECT_THAT(plain.out, HasSubstr("degrees of freedom: this estimate is hardly the right one"));
+  const Outcome good = cairn({"optimize", "@manhattan:poses=200", "--quiet"});
+  EXPECT_THAT(good.out, Not(HasSubstr("degrees of freedom")));
+}
+
+TEST_F(OptimizeCommand, TheStartIsChosenByDefaultAndSaid) {
+  const std::string far = "@manhattan:poses=1500,rotation_sigma=0.1";
+  const auto report = report_of({"optimize", far});
+  EXPECT_EQ(report.at("initial").as_string(), "auto");
+  EXPECT_THAT(std::string(report.at("initial_notes").at(0).as_string()),
+              HasSubstr("chordal (chi2"));
+  const auto chordal = report_of({"optimize", far, "--initial", "chordal"});
+  EXPECT_EQ(final_chi2(report), final_chi2(chordal));
+  const auto given = report_of(
+      {"optimize", far, "--initial", "as_given", "--iterations", "50", "--tolerance", "0"});
+  EXPECT_LT(final_chi2(report), 0.7 * final_chi2(given));
 }
 
 TEST_F(OptimizeCommand, NamesTheGraphByItsFile) {

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // What every subcommand has in common: help, errors, common options, streams.
+#include <filesystem>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -284,6 +286,23 @@ TEST(Usage, AnExceptionInAPluginNamesThePluginsPart) {
                       "dogleg:linear_solver=fragile"}),
                kPlugin, "optimizer 'dogleg:linear_solver=fragile' failed: the solver broke");
 
+  // Where estimators, sparsifiers and policies run it, they are named, and what there is is
+  // written.
+  const std::string estimate = folder.file("estimate.g2o");
+  expect_error(cairn({"replay", "@ring:poses=30", "--quiet", "--plugin", solver, "--estimator",
+                      "batch:linear_solver=fragile", "-o", estimate}),
+               kPlugin, "estimator 'batch:linear_solver=fragile' failed: the solver broke");
+  EXPECT_TRUE(std::filesystem::exists(estimate));
+  expect_error(
+      cairn({"online", "--quiet", "--plugin", solver, "--estimator", "batch:linear_solver=fragile",
+             "-o", folder.file("online.g2o")},
+            {}, "VERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 1 0 0\nEDGE_SE2 0 1 1 0 0 1 0 0 1 0 1\n"),
+      kPlugin, "estimator 'batch:linear_solver=fragile' failed: the solver broke");
+  EXPECT_TRUE(std::filesystem::exists(folder.file("online.g2o")));
+  expect_error(cairn({"sparsify", "@ring:poses=30", "--quiet", "--plugin", solver, "--initial",
+                      "chordal", "--optimizer", "dogleg:linear_solver=fragile"}),
+               kPlugin, "optimizer 'dogleg' failed: the solver broke");
+
   write_text(folder.file("brittle.g2o"),
              "VERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 1 0 0\nEDGE_SE2 0 1 1 0 0 1 0 0 1 0 1\n"
              "EDGE_BRITTLE 1 7 1\n");
@@ -303,7 +322,8 @@ TEST(Usage, MessagesOfLibrariesNameTheOptionsOfTheProgram) {
 }
 
 TEST(Usage, ProgressIsOneLineOnATerminalAndPlainLinesElsewhere) {
-  const Arguments run{"optimize", "@ring:poses=60", "--iterations", "4", "--tolerance", "0"};
+  const Arguments run{"optimize", "@ring:poses=60", "--initial", "as_given", "--iterations",
+                      "4",        "--tolerance",    "0"};
   EXPECT_THAT(cairn_on_terminal(run, {{"TERM", "xterm"}}).out, HasSubstr("\r[#"));
   const std::string err = cairn(run).err;
   EXPECT_THAT(err, HasSubstr("iteration   4  chi2 "));

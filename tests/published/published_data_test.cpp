@@ -147,6 +147,22 @@ TEST_P(PublishedData, ReachesThePublishedMinimumWithEverySolver) {
   results().push_back(result);
 }
 
+/// What `cairn optimize FILE` does, with no option.
+TEST_P(PublishedData, ReachesItFromTheStartThatIsChosenByDefault) {
+  CAIRN_NEEDS_DATA();
+  const PublishedGraph& published = GetParam();
+  Registry registry;
+  if (!published.metric.empty())
+    registry.set_type_options({"slam3d", {{"metric", published.metric}}});
+  ReadReport report;
+  Graph graph =
+      read_graph(data_folder() / published.file, registry, {.repair_information = true}, report);
+  registry.make<InitialGuess>("auto")->compute(graph);
+  const Summary summary = registry.make<Optimizer>("levenberg_marquardt")->optimize(graph, Stop());
+  EXPECT_LE(summary.final_chi2,
+            published.absolute > 0.0 ? published.absolute : published.chi2 * (1.0 + 1e-6));
+}
+
 INSTANTIATE_TEST_SUITE_P(
     Graphs, PublishedData, ::testing::ValuesIn(kGraphs), [](const auto& graph) {
       std::string name =

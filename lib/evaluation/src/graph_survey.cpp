@@ -10,6 +10,8 @@
 
 #include <fmt/core.h>
 
+#include "cairn/evaluation/plausibility.hpp"
+
 namespace cairn {
 namespace {
 
@@ -108,11 +110,7 @@ void find_worst(const Graph& graph, const std::vector<double>& norms, GraphSurve
 void count_freedoms(const Graph& graph, GraphSurvey& s) {
   s.gauge = resolve_gauge(graph);
   for (const int v : s.gauge.anchored) s.gauge_freedoms += graph.type(v).tangent_size();
-  std::int64_t free = 0;
-  for (int v = 0; v < graph.variable_count(); ++v) {
-    if (!s.gauge.held[v]) free += graph.type(v).tangent_size();
-  }
-  s.degrees_of_freedom = graph.residual_size() - free;
+  s.degrees_of_freedom = degrees_of_freedom(graph, s.gauge);
 }
 
 void suspect_structure(const Graph& graph, GraphSurvey& s) {

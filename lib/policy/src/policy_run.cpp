@@ -11,6 +11,7 @@
 #include "cairn/linear/linear_solver.hpp"
 #include "cairn/linear/linearizer.hpp"
 #include "cairn/linear/normal_equations.hpp"
+#include "cairn/runtime/plugin_call.hpp"
 #include "cairn/runtime/timed.hpp"
 
 namespace cairn {
@@ -24,12 +25,17 @@ constexpr const char* kCountingSolver = "block_cholesky";
 /// Counts and times what goes through it.
 class WatchedRegistration final : public Registration {
  public:
-  WatchedRegistration(Registration& inner, PolicyResult& result)
-      : inner_(inner), result_(result), false_(query<FalseMatches>(inner)) {}
+  WatchedRegistration(Registration& inner, std::string name, PolicyResult& result)
+      : inner_(inner),
+        name_(std::move(name)),
+        result_(result),
+        false_(query<FalseMatches>(inner)) {}
   void begin(const RegistrationData& data) override { inner_.begin(data); }
   std::vector<Factor> match(Id earlier, Id later) override {
     const auto begin = Clock::now();
-    std::vector<Factor> factors = inner_.match(earlier, later);
+    std::vector<Factor> factors =
+        call_plugin([&] { return fmt::format("registration '{}'", name_); },
+                    [&] { return inner_.match(earlier, later); });
     result_.registration_seconds += seconds_since(begin);
     ++result_.proposed;
     result_.registered += !factors.empty();
@@ -40,6 +46,7 @@ class WatchedRegistration final : public Registration {
 
  private:
   Registration& inner_;
+  std::string name_;
   PolicyResult& result_;
   FalseMatches* false_;
 };
@@ -96,6 +103,7 @@ std::string spec_text(const ComponentSpec& spec) {
 PolicyRun::PolicyRun(const PolicyJob& job, const PolicySetting& setting)
     : setting_(setting),
       policy_(setting.registry.make<PosePolicy>(job.policy)),
+      registration_name_(job.registration),
       registration_(setting.registry.make<Registration>(job.registration)) {
   const PolicyData& data = setting.data;
   policy_->estimator().set_loss(setting.loss, setting.loss_on);
@@ -106,21 +114,25 @@ PolicyRun::PolicyRun(const PolicyJob& job, const PolicySetting& setting)
 
 void PolicyRun::run(std::size_t count, std::string_view title,
                     const std::function<void(std::size_t)>& after) {
-  WatchedRegistration watched(*registration_, result_);
-  run_policy(setting_.data.recording, std::span(setting_.data.poses).first(count), *policy_,
-             watched, [&](const PoseReport& pose) {
-               result_.poses.push_back(pose);
-               result_.seconds += pose.seconds;
-               for (const LinkReport& link : pose.links) {
-                 ++result_.verdicts[std::string(to_string(link.verdict))];
-                 if (link.verdict != LinkVerdict::linked) continue;
-                 ++result_.kept_loops;
-                 result_.false_kept += watched.was_false(link.earlier, link.later);
-               }
-               if (setting_.progress) setting_.progress(title, count, result_);
-               if (after) after(result_.poses.size() - 1);
-               return !setting_.interrupted();
-             });
+  WatchedRegistration watched(*registration_, registration_name_, result_);
+  const auto count_pose = [&](const PoseReport& pose) {
+    result_.poses.push_back(pose);
+    result_.seconds += pose.seconds;
+    for (const LinkReport& link : pose.links) {
+      ++result_.verdicts[std::string(to_string(link.verdict))];
+      if (link.verdict != LinkVerdict::linked) continue;
+      ++result_.kept_loops;
+      result_.false_kept += watched.was_false(link.earlier, link.later);
+    }
+    if (setting_.progress) setting_.progress(title, count, result_);
+    if (after) after(result_.poses.size() - 1);
+    return !setting_.interrupted();
+  };
+  call_plugin([&] { return fmt::format("policy '{}'", result_.policy); },
+              [&] {
+                run_policy(setting_.data.recording, std::span(setting_.data.poses).first(count),
+                           *policy_, watched, count_pose);
+              });
   result_.interrupted = setting_.interrupted();
 }
 

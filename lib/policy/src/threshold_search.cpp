@@ -143,6 +143,7 @@ FoundThresholds find_thresholds(const PolicyJob& job, std::size_t count, double 
   const OptionFinder& finder = finder_of(watch.policy(), job);
 
   FoundThresholds found;
+  if (setting.interrupted()) return found;
   found.options = finder.found();
   if (error_ratio > 0.0) {
     Sample sample{job, setting, count, {}};

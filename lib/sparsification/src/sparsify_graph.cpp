@@ -11,9 +11,11 @@
 
 #include <fmt/core.h>
 
+#include "cairn/evaluation/plausibility.hpp"
 #include "cairn/geometry/pose_chain.hpp"
 #include "cairn/online/recorded_graph.hpp"
 #include "cairn/runtime/error.hpp"
+#include "cairn/runtime/plugin_call.hpp"
 #include "cairn/runtime/timed.hpp"
 #include "cairn/solve/estimator.hpp"
 
@@ -24,13 +26,15 @@ using Clock = std::chrono::steady_clock;
 
 /// The parts that the job names.
 struct Parts {
-  Parts(const SparsifyJob& job, const SparsifySetting& setting)
-      : sparsifier(setting.registry.make<Sparsifier>(job.sparsifier)),
+  Parts(const SparsifyJob& named, const SparsifySetting& setting)
+      : job(named),
+        sparsifier(setting.registry.make<Sparsifier>(job.sparsifier)),
         selection(setting.registry.make<NodeSelection>(job.selection)),
         optimizer(setting.registry.make<Optimizer>(job.optimizer)),
         solver(setting.registry.make<LinearSolver>(job.linear_solver)) {
     if (setting.observer) sparsifier->observe(setting.observer);
   }
+  const SparsifyJob& job;
   std::unique_ptr<Sparsifier> sparsifier;
   std::unique_ptr<NodeSelection> selection;
   std::unique_ptr<Optimizer> optimizer;
@@ -41,14 +45,23 @@ struct Parts {
 double optimize(Graph& graph, Parts& parts, const SparsifySetting& setting, const char* what,
                 SparsifyResult& result) {
   Observer silent;
-  const Summary summary = parts.optimizer->optimize(
-      graph, setting.stop, setting.optimisation ? *setting.optimisation : silent);
+  const Summary summary =
+      call_plugin([&] { return fmt::format("optimizer '{}'", parts.job.optimizer.name); },
+                  [&] {
+                    return parts.optimizer->optimize(
+                        graph, setting.stop, setting.optimisation ? *setting.optimisation : silent);
+                  });
   if (summary.status == Status::interrupted) {
     result.interrupted = true;
   } else if (summary.status != Status::converged) {
+    if (setting.stop.tolerance > 0.0 || summary.status != Status::max_iterations)
+      result.converged = false;
     result.notes.push_back(fmt::format("the optimisation of {} ended as {}: it is not at a minimum",
                                        what, to_string(summary.status)));
   }
+  const std::string implausible = implausible_estimate(graph, summary.final_chi2);
+  if (!result.interrupted && !implausible.empty())
+    result.notes.push_back(fmt::format("{}: {}", what, implausible));
   return summary.final_chi2;
 }
 
@@ -69,10 +82,23 @@ void report(const SparsifySetting& setting, const SparsifyProgress& progress) {
 Sparsification take_out(const Graph& graph, std::span<const int> nodes, Parts& parts,
                         const SparsifySetting& setting) {
   const int total = static_cast<int>(std::ssize(nodes));
-  return parts.sparsifier->remove(graph, nodes, [&](int done) {
+  const auto progress = [&](int done) {
     report(setting, {SparsifyProgress::Phase::remove, done, total});
     return !setting.interrupted();
-  });
+  };
+  return call_plugin([&] { return fmt::format("sparsifier '{}'", parts.job.sparsifier.name); },
+                     [&] { return parts.sparsifier->remove(graph, nodes, progress); });
+}
+
+/// Those of `nodes` that are to leave.
+std::vector<int> select(const Graph& graph, const std::vector<int>& nodes, Parts& parts,
+                        SparsifyResult& result) {
+  const auto begin = Clock::now();
+  std::vector<int> chosen =
+      call_plugin([&] { return fmt::format("node selection '{}'", parts.job.selection.name); },
+                  [&] { return parts.selection->select(graph, nodes, *parts.sparsifier); });
+  result.select_seconds += seconds_since(begin);
+  return chosen;
 }
 
 void measure(const Graph& original, Parts& parts, SparsifyResult& result) {
@@ -104,10 +130,7 @@ SparsifyResult sparsify_whole(const Graph& graph, const SparsifyJob& job,
     }
   }
   report(setting, {SparsifyProgress::Phase::select});
-  const auto begin = Clock::now();
-  const std::vector<int> nodes =
-      parts.selection->select(original, open_nodes(original), *parts.sparsifier);
-  result.select_seconds = seconds_since(begin);
+  const std::vector<int> nodes = select(original, open_nodes(original), parts, result);
   result.change = take_out(original, nodes, parts, setting);
   result.interrupted = setting.interrupted();
   result.sparse = original.clone();
@@ -243,9 +266,7 @@ class OnlineRun {
       }
     }
     pending_ = std::move(later);
-    const auto begin = Clock::now();
-    const std::vector<int> chosen = parts_.selection->select(graph, nodes, *parts_.sparsifier);
-    result_.select_seconds += seconds_since(begin);
+    const std::vector<int> chosen = select(graph, nodes, parts_, result_);
     const Sparsification change = take_out(graph, chosen, parts_, setting_);
     result_.change.add(change);
     result_.change.removed_variables.insert(result_.change.removed_variables.end(),
@@ -319,7 +340,8 @@ class OnlineRun {
 
 SparsifyResult sparsify_online(const Graph& recording, const SparsifyJob& job,
                                const SparsifySetting& setting) {
-  return OnlineRun(recording, job, setting).run();
+  return call_plugin([&] { return fmt::format("estimator '{}'", job.estimator); },
+                     [&] { return OnlineRun(recording, job, setting).run(); });
 }
 
 }  // namespace cairn

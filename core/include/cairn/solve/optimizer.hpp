@@ -15,7 +15,7 @@ namespace cairn {
 
 /// When to stop.
 struct Stop {
-  int max_iterations = 100;
+  int max_iterations = 200;
   /// Stop when a step could lower chi2 by less than this fraction. 0: run exactly `max_iterations`.
   double tolerance = 1e-10;
   double max_seconds = 0.0;  ///< 0: no limit

@@ -57,7 +57,7 @@ double largest_difference(const Graph& a, const Graph& b) {
 
 const std::vector<std::string> kMethods = {
     "odometry", "spanning_tree",       "spanning_tree:weight=information", "incremental",
-    "chordal",  "chordal:weight=unit", "chordal:linear_solver=eigen"};
+    "chordal",  "chordal:weight=unit", "chordal:linear_solver=eigen",      "auto"};
 const std::vector<std::string> kWorlds = {
     "manhattan:poses=300",
     "city:poses=300",

@@ -94,6 +94,7 @@ class CAIRN_API PolicyRun {
  private:
   const PolicySetting& setting_;
   std::unique_ptr<PosePolicy> policy_;
+  std::string registration_name_;
   std::unique_ptr<Registration> registration_;
   PolicyResult result_;
 };

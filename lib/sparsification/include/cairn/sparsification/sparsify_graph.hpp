@@ -50,6 +50,7 @@ struct SparsifyResult {
   std::int64_t redirected = 0, dropped = 0;  ///< factors on nodes that had left
   std::vector<double> steps;                 ///< seconds of each pose, sparsification included
   bool interrupted = false;
+  bool converged = true;  ///< all optimisations of whole graphs
   std::vector<std::string> notes;
 };
 

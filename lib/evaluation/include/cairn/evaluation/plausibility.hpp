@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "cairn/graph/gauge.hpp"
+#include "cairn/graph/graph.hpp"
+#include "cairn/runtime/api.hpp"
+
+namespace cairn {
+
+/// Residuals minus unknowns (the tangent sizes of the variables that are not constant): the mean of
+/// chi2 at the minimum of a good model. Negative: there are fewer measurements than unknowns.
+CAIRN_API std::int64_t degrees_of_freedom(const Graph& graph, const Gauge& gauge);
+
+/// Beyond this chi2 per degree of freedom, an optimised estimate is not plausible: on average,
+/// residuals are more than five times as large as the information of their factors says.
+inline constexpr double kImplausibleChi2 = 25.0;
+
+/// Whether chi2 of an optimised estimate is plausible; without degrees of freedom, any finite chi2
+/// is.
+CAIRN_API bool is_plausible(double chi2, std::int64_t degrees_of_freedom);
+
+/// For an optimised estimate: empty if its chi2 is plausible, else a sentence for the user with the
+/// likely causes and what helps.
+CAIRN_API std::string implausible_estimate(const Graph& graph, double chi2);
+
+}  // namespace cairn
