@@ -52,7 +52,7 @@ class Automatic final : public InitialGuess {
       std::optional<Start> slow;
       if (!is_plausible(reached, dof))
         slow = compute("incremental", candidates_.incremental.get(), graph);
-      if (slow && slow->chi2 < reached) best_ = std::move(*slow);
+      if (slow && !(reached <= slow->chi2)) best_ = std::move(*slow);
     }
     graph.set_values(std::move(best_.states));
     std::vector<std::string> notes;
@@ -82,8 +82,8 @@ class Automatic final : public InitialGuess {
 
   /// Empty where there is no such guess, or it cannot be computed, or chi2 there is not finite.
   std::optional<Start> compute(std::string_view name, InitialGuess* guess, Graph& graph) {
-    if (!guess) return std::nullopt;
     graph.set_values(given_);
+    if (!guess) return std::nullopt;
     try {
       std::vector<std::string> notes = guess->compute(graph);
       Start start{name, chi2(graph), graph.values(), std::move(notes)};

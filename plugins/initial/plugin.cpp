@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "cairn/plugin/registry.hpp"
+#include "cairn/runtime/error.hpp"
 #include "guesses.hpp"
 
 namespace {
@@ -7,19 +8,29 @@ namespace {
 using namespace cairn;
 using namespace cairn::initial;
 
-/// Candidates by default need plugins that a build may lack: they are left out then.
-Candidates candidates(const AutomaticOptions& options, Registry& registry) {
-  const auto there = [&](std::string_view kind, const std::string& spec, const char* by_default) {
-    return spec != by_default || registry.has(kind, spec);
-  };
-  const AutomaticOptions defaults;
-  Candidates result;
-  if (there(LinearSolver::kKind, options.linear_solver, defaults.linear_solver.c_str()))
-    result.chordal = make_chordal({}, registry.make<LinearSolver>(options.linear_solver));
-  if (there(Optimizer::kKind, options.optimizer, defaults.optimizer.c_str())) {
-    result.optimizer = registry.make<Optimizer>(options.optimizer);
-    result.incremental = make_incremental({.step = 0}, registry.make<Optimizer>(options.optimizer));
+/// make(), or null where it needs a plugin that this build lacks and the options did not name it.
+template <class Make>
+auto made_if_there(bool by_default, const Make& make) -> decltype(make()) {
+  try {
+    return make();
+  } catch (const Error& error) {
+    if (!by_default || error.code() != ErrorCode::plugin) throw;
+    return nullptr;
   }
+}
+
+Candidates candidates(const AutomaticOptions& options, Registry& registry) {
+  const AutomaticOptions defaults;
+  const bool same_solver = options.linear_solver == defaults.linear_solver;
+  const bool same_optimizer = options.optimizer == defaults.optimizer;
+  const auto optimizer = [&] { return registry.make<Optimizer>(options.optimizer); };
+  Candidates result;
+  result.chordal = made_if_there(same_solver, [&] {
+    return make_chordal({}, registry.make<LinearSolver>(options.linear_solver));
+  });
+  result.optimizer = made_if_there(same_optimizer, optimizer);
+  result.incremental =
+      made_if_there(same_optimizer, [&] { return make_incremental({.step = 0}, optimizer()); });
   return result;
 }
 

@@ -26,8 +26,19 @@ struct Result {
   std::map<std::string, int> iterations;  ///< by solver
 };
 
+/// What `cairn optimize` does with one graph where no option is given, and what starting from the
+/// states as given leads to.
+struct DefaultResult {
+  PublishedGraph graph;
+  std::string start;  ///< the initial guess that was chosen
+  double chi2 = 0.0;
+  double given = 0.0;        ///< chi2 by Levenberg-Marquardt from the states as given
+  double given_ceres = 0.0;  ///< by Ceres from there
+};
+
 /// Writes docs/results.md.
 void write_results(const std::string& file, const std::vector<Result>& results,
-                   const std::vector<std::string>& solvers);
+                   const std::vector<std::string>& solvers,
+                   const std::vector<DefaultResult>& defaults);
 
 }  // namespace cairn::test
