@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "measure.hpp"
 
+#include <algorithm>
 #include <stdexcept>
 #include <utility>
 
@@ -27,6 +28,13 @@ void append(std::vector<std::string>& words, const std::vector<std::string>& mor
   words.insert(words.end(), more.begin(), more.end());
 }
 
+/// All start from the states that a file gives, where a data set names no start: that is what peers
+/// do.
+void append_start(std::vector<std::string>& words) {
+  if (std::ranges::find(words, "--initial") == words.end())
+    append(words, {"--initial", "as_given"});
+}
+
 }  // namespace
 
 void require_report(const Run& run) {
@@ -47,6 +55,7 @@ json::value Cairn::bench(const DataSet& set, const Contestants& contestants, int
                                  "--repeat",  fmt::format("{}", rounds)};
   append(words, set.arguments);
   append(words, more);
+  append_start(words);
   if (!contestants.linear_solvers.empty()) append(words, {"--optimizer", contestants.optimizer});
   for (const std::string& name : contestants.complete) append(words, {"--optimizer", name});
   for (const std::string& name : contestants.linear_solvers)
@@ -71,7 +80,10 @@ Run Cairn::run(const std::vector<std::string>& command, const DataSet& set,
 
 Run Cairn::optimize(const DataSet& set, const std::vector<std::string>& arguments, int threads,
                     double limit) const {
-  return run({"optimize"}, set, arguments, threads, limit);
+  std::vector<std::string> words = set.arguments;
+  append(words, arguments);
+  append_start(words);
+  return run({"optimize"}, {set.name, set.graph, {}}, words, threads, limit);
 }
 
 Run Cairn::marginals(const DataSet& set, const std::vector<std::string>& arguments, int threads,
