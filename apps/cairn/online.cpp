@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // cairn online: measurements from standard input as they come, estimates to standard output.
 #include <exception>
+#include <filesystem>
 #include <memory>
 #include <optional>
 
@@ -177,6 +178,27 @@ void converse(Conversation& conversation, LineInput& input, bool kept, const Ses
   }
 }
 
+/// Writes the map. Where its format cannot express the graph (what marginalization left is in
+/// none), the poses alone go to a file beside it, unless there is one of that name already.
+void write_map(const Graph& graph, const std::string& file, const Session& session,
+               Registry& registry) {
+  try {
+    write_graph(graph, file, registry);
+  } catch (const Error&) {
+    const std::exception_ptr reason = std::current_exception();
+    const std::string beside = file + ".tum";
+    std::error_code ignored;
+    if (std::filesystem::exists(beside, ignored)) throw;
+    try {
+      write_graph(graph, beside, registry, "tum");
+      session.note(fmt::format("the poses alone are in {}", beside));
+    } catch (const Error& error) {
+      session.note(error.what());
+    }
+    std::rethrow_exception(reason);
+  }
+}
+
 int run(OnlineOptions options, Session& session) {
   check(options, session);
   session.use_threads();
@@ -208,7 +230,7 @@ int run(OnlineOptions options, Session& session) {
   }
   try {
     if (!options.output.empty())
-      write_graph(lines.estimator().graph(), options.output, session.registry());
+      write_map(lines.estimator().graph(), options.output, session, session.registry());
   } catch (const std::exception& error) {
     if (!failure) throw;
     session.note(error.what());  // the reason comes last, as the error

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <csignal>
 #include <cstdint>
 #include <filesystem>
@@ -162,6 +163,17 @@ TEST_F(OnlineOutputs, ASessionThatFailsStillWritesItsMap) {
   EXPECT_EQ(outcome.exit_code, 3);
   EXPECT_THAT(outcome.err, HasSubstr("16 MB"));
   EXPECT_EQ(poses(folder_.file("map.g2o")), 21);
+}
+
+TEST_F(OnlineOutputs, PosesAreWrittenWhereNoFormatExpressesTheGraph) {
+  const Outcome outcome =
+      cairn({"online", "--estimator", "batch", "--output", "none", "-o", folder_.file("map.g2o")},
+            {}, read_text(folder_.file("stream.txt")) + "MARGINALIZE 3 4\n");
+  EXPECT_EQ(outcome.exit_code, 3);
+  EXPECT_THAT(outcome.err, HasSubstr("cannot express MARGINAL_PRIOR"));
+  EXPECT_THAT(outcome.err, HasSubstr("the poses alone are in"));
+  const std::string poses = read_text(folder_.file("map.g2o.tum"));
+  EXPECT_EQ(std::ranges::count(poses, '\n'), 19);
 }
 
 TEST_F(OnlineOutputs, ALastLineWithoutItsEndIsNotTaken) {
