@@ -75,6 +75,9 @@ std::vector<std::string> notes_on_the_end(const Summary& summary, const Stop& st
   }
   std::string implausible = implausible_estimate(graph, summary.final_chi2);
   if (!implausible.empty()) notes.push_back(std::move(implausible));
+  std::string not_finite = residual_not_finite(graph);
+  if (!not_finite.empty()) notes.push_back(std::move(not_finite));
+  for (std::string& wrong : wrong_jacobians(graph)) notes.push_back(std::move(wrong));
   return notes;
 }
 

@@ -16,6 +16,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <fstream>
+#include <iostream>
 #include <sstream>
 #include <stdexcept>
 #include <thread>
@@ -65,6 +66,13 @@ int wait_for(pid_t child) {
   while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {
   }
   return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+}
+
+/// Prints that a plugin is missing, by which a build without it skips the test.
+void show_what_is_missing(const std::string& message) {
+  if (message.find("there is no ") != std::string::npos ||
+      message.find("nothing of the name ") != std::string::npos)
+    std::cout << message << std::flush;
 }
 
 /// A child with its three streams on pipes.
@@ -145,6 +153,7 @@ class Child {
     }
     outcome.exit_code = wait_for(pid_);
     EXPECT_TRUE(sent) << "the program never said '" << cue << "'; it said: " << outcome.err;
+    show_what_is_missing(outcome.err);
     return outcome;
   }
 
@@ -250,6 +259,7 @@ Outcome cairn_on_terminal(const Arguments& arguments, const Environment& environ
   }
   outcome.exit_code = wait_for(child);
   ::close(terminal);
+  show_what_is_missing(outcome.out);
   return outcome;
 }
 

@@ -21,12 +21,22 @@ bool can_be_made(Registry& registry, std::string_view kind, const std::string& s
   }
 }
 
+/// Whether the build has the parts that a component takes by default.
+bool has_its_parts(Registry& registry, std::string_view kind, const std::string& name) {
+  for (const OptionSpec& option : registry.options(kind, name).specs()) {
+    if (option.type != OptionType::component || option.default_value.empty()) continue;
+    if (!registry.has(option.choices[0], parse_component(option.default_value).name)) return false;
+  }
+  return true;
+}
+
 /// A linear solver that leaves work to another: once with each other that is there and takes H (one
 /// that works on the Jacobian cannot solve a part of the system).
 void add_inner_solvers(Registry& registry, const std::string& name, const OptionSpec& option,
                        std::vector<std::string>& specs) {
   for (const std::string& inner : registry.names(option.choices[0])) {
     if (inner == name || inner == option.default_value) continue;
+    if (!has_its_parts(registry, LinearSolver::kKind, inner)) continue;
     if (!can_be_made(registry, LinearSolver::kKind, inner)) continue;
     if (query<JacobianSolver>(*registry.make<LinearSolver>(inner))) continue;
     specs.push_back(name + ":" + option.name + "=" + inner);
@@ -39,11 +49,12 @@ std::vector<std::string> every_component(std::string_view kind) {
   Registry registry;
   std::vector<std::string> specs;
   for (const std::string& name : registry.names(kind)) {
-    specs.push_back(name);
+    const bool by_itself = has_its_parts(registry, kind, name);
+    if (by_itself) specs.push_back(name);
     for (const OptionSpec& option : registry.options(kind, name).specs()) {
       if (kind == LinearSolver::kKind && option.type == OptionType::component)
         add_inner_solvers(registry, name, option, specs);
-      if (option.type != OptionType::choice) continue;
+      if (option.type != OptionType::choice || !by_itself) continue;
       for (const std::string& choice : option.choices) {
         if (choice == option.default_value || option.name == "loss") continue;
         std::string spec = name + ":" + option.name + "=" + choice;

@@ -12,7 +12,8 @@ namespace cairn::test {
 /// Every name of a kind that is registered, and each name again with each choice of each of its
 /// options: "cholmod", "cholmod:mode=simplicial", … A linear solver that leaves work to another
 /// comes with each: "schur:linear_solver=eigen". Suites run over these, so that a plugin of a third
-/// party inherits them. Choices that the plugin refuses in this build are left out.
+/// party inherits them. Choices that the plugin refuses in this build, and components that take by
+/// default what the build lacks, are left out.
 std::vector<std::string> every_component(std::string_view kind);
 
 /// The spec of an optimizer, with another linear solver in place of the default where that is not

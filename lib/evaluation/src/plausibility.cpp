@@ -2,8 +2,11 @@
 #include "cairn/evaluation/plausibility.hpp"
 
 #include <cmath>
+#include <limits>
 
-#include <fmt/core.h>
+#include <fmt/format.h>
+
+#include "cairn/types/check_factor.hpp"
 
 namespace cairn {
 
@@ -31,6 +34,71 @@ std::string implausible_estimate(const Graph& graph, double chi2) {
       "large or in another order, or this is a local minimum (the initial guess incremental is "
       "thorough, and slow)",
       chi2 / static_cast<double>(dof), dof);
+}
+
+namespace {
+
+constexpr double kLargestDeviation = 1e-3;
+
+FactorCheck check(const Graph& graph, int position) {
+  std::vector<const VariableType*> types;
+  std::vector<const double*> states;
+  for (const std::int32_t v : graph.factor_variables(position)) {
+    types.push_back(&graph.type(v));
+    states.push_back(graph.state(v).data());
+  }
+  try {
+    return check_factor(graph.factor_type(position), types, states, graph.measurement(position));
+  } catch (...) {  // beside the states it may not be defined
+    return {.largest_deviation = std::nan("")};
+  }
+}
+
+std::string in_words(const Graph& graph, int position, const FactorCheck& check) {
+  const std::string factor = graph.describe_factor(position);
+  if (check.column < 0) {
+    return fmt::format(
+        "{}: the residual differs with and without Jacobians ({:.6g} and {:.6g} in row {}): the "
+        "type of the factor is wrong",
+        factor, check.claimed, check.numeric, check.row);
+  }
+  return fmt::format(
+      "{}: the Jacobian by its variable {} has {:.6g} in row {}, column {}, where differences of "
+      "the "
+      "residual give {:.6g}: the type of the factor is wrong",
+      factor, check.variable + 1, check.claimed, check.row, check.column, check.numeric);
+}
+
+}  // namespace
+
+std::vector<std::string> wrong_jacobians(const Graph& graph) {
+  std::vector<std::string> sentences;
+  for (const FactorPool& pool : graph.factor_pools()) {
+    const std::size_t count = pool.sequence.size();
+    if (count == 0) continue;
+    // At one factor a residual may cross a cut, as a wrapped angle does.
+    FactorCheck best{.largest_deviation = std::numeric_limits<double>::infinity()};
+    int where = 0;
+    for (const std::size_t entry : {std::size_t{0}, count / 2, count - 1}) {
+      const FactorCheck found = check(graph, pool.sequence[entry]);
+      if (!(found.largest_deviation < best.largest_deviation)) continue;
+      best = found;
+      where = pool.sequence[entry];
+    }
+    if (std::isfinite(best.largest_deviation) && best.largest_deviation > kLargestDeviation)
+      sentences.push_back(in_words(graph, where, best));
+  }
+  return sentences;
+}
+
+std::string residual_not_finite(const Graph& graph) {
+  const std::vector<double> norms = squared_norms(graph);
+  for (int f = 0; f < graph.factor_count(); ++f) {
+    if (std::isfinite(norms[f])) continue;
+    return fmt::format("the residual of {} is not finite; it measures {:.6g}",
+                       graph.describe_factor(f), fmt::join(graph.measurement(f), " "));
+  }
+  return {};
 }
 
 }  // namespace cairn

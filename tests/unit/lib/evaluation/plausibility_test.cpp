@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "cairn/evaluation/plausibility.hpp"
+
+#include <cmath>
+#include <stdexcept>
+#include <tuple>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "cairn/lie/se2.hpp"
+#include "cairn/types/define_factor.hpp"
+#include "cairn/types/define_variable.hpp"
+#include "support/sample_graphs.hpp"
+
+namespace cairn {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+/// A prior on a pose whose Jacobian lacks a term: the row of y does not depend on the heading.
+struct MissingTerm {
+  static constexpr std::string_view kTag = "MISSING_TERM";
+  static constexpr int kResidual = 3, kMeasurement = 3;
+  using Variables = std::tuple<Se2>;
+  template <class S>
+  static Vector<S, 3> residual(const Vector<S, 3>& x, const Vector<double, 3>& z) {
+    return {x[0] - z[0], x[1] - z[1] + 2.0 * x[2], x[2] - z[2]};
+  }
+  static Vector<double, 3> evaluate(const Vector<double, 3>& x, const Vector<double, 3>& z,
+                                    Eigen::Matrix3d& J) {
+    // Steps are in the frame of the pose.
+    const double c = std::cos(x[2]), s = std::sin(x[2]);
+    J << c, -s, 0.0, s, c, 0.0, 0.0, 0.0, 1.0;
+    return residual<double>(x, z);
+  }
+};
+
+/// A prior that is not defined for x at or beyond 1.
+struct Partial {
+  static constexpr std::string_view kTag = "PARTIAL";
+  static constexpr int kResidual = 1, kMeasurement = 1;
+  using Variables = std::tuple<Se2>;
+  template <class S>
+  static Vector<S, 1> residual(const Vector<S, 3>& x, const Vector<double, 1>& z) {
+    if (x[0] >= S(1.0)) throw std::domain_error("beyond");
+    using std::log;
+    return Vector<S, 1>(log(x[0]) - z[0]);
+  }
+};
+
+template <class F>
+void add_one_pose(Graph& graph, Id id, double x) {
+  static const auto pose_type = define_variable<Se2>();
+  const double state[] = {x, -0.2, 0.1}, z[] = {0.25, 2.0, 0.5}, unit[] = {1, 0, 0, 1, 0, 1};
+  const int pose[] = {graph.add_variable(pose_type, id, state)};
+  static const auto type = define_factor<F>();
+  graph.add_factor(type, pose, {z, F::kMeasurement}, {unit, F::kResidual == 3 ? 6U : 1U});
+}
+
+TEST(WrongJacobians, AreNamedWithTheEntry) {
+  Graph graph;
+  add_one_pose<MissingTerm>(graph, 7, 0.3);
+  EXPECT_THAT(
+      wrong_jacobians(graph),
+      ElementsAre(HasSubstr("MISSING_TERM 7: the Jacobian by its variable 1 has 0 in row 1, "
+                            "column 2, where differences of the residual give 2")));
+}
+
+TEST(WrongJacobians, AreNotFoundWhereThereAreNone) {
+  EXPECT_THAT(wrong_jacobians(test::ring_of_poses(30, 0.05)), IsEmpty());
+  EXPECT_THAT(wrong_jacobians(Graph()), IsEmpty());
+}
+
+TEST(WrongJacobians, LeaveOutFactorsThatThrowBesideTheStates) {
+  Graph graph;
+  add_one_pose<Partial>(graph, 1, 1.0 - 1e-5);
+  EXPECT_THAT(wrong_jacobians(graph), IsEmpty());
+}
+
+TEST(ResidualNotFinite, IsNamedWithItsMeasurement) {
+  Graph graph;
+  add_one_pose<Partial>(graph, 1, 0.5);
+  EXPECT_THAT(residual_not_finite(graph), IsEmpty());
+  add_one_pose<Partial>(graph, 2, 0.0);  // log(0)
+  EXPECT_THAT(residual_not_finite(graph),
+              HasSubstr("the residual of PARTIAL 2 is not finite; it measures 0.25"));
+}
+
+}  // namespace
+}  // namespace cairn
