@@ -135,8 +135,10 @@ std::vector<Tally> Campaign::run(std::uint64_t count) {
     return {tally("thread", good.threads, faults_of(What::thread, good.threads, count))};
   std::vector<Tally> all;
   for (const auto& [name, what] :
-       {std::pair("allocation", What::allocation), std::pair("memory", What::memory)})
-    all.push_back(tally(name, good.allocations, faults_of(what, good.allocations, count)));
+       {std::pair("allocation", What::allocation), std::pair("memory", What::memory)}) {
+    if (trial_.memory)
+      all.push_back(tally(name, good.allocations, faults_of(what, good.allocations, count)));
+  }
   for (const std::string kind : {"ENOSPC", "EIO", "FULL", "EINTR", "SHORT"})
     all.push_back(tally("output " + kind, good.outputs, output_faults(good, kind, count)));
   return all;

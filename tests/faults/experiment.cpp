@@ -92,10 +92,11 @@ int run_process(std::vector<std::string> command, std::vector<std::string> envir
 /// What differs from run to run though nothing is wrong: how much memory was used.
 std::string without_memory(std::string text) {
   static constexpr std::string_view kMember = "\"peak_memory_bytes\": ";
-  const std::size_t at = text.find(kMember);
-  if (at == std::string::npos) return text;
-  const std::size_t begin = at + kMember.size();
-  return text.erase(begin, text.find_first_not_of("0123456789", begin) - begin);
+  for (std::size_t at = 0; (at = text.find(kMember, at)) != std::string::npos;) {
+    at += kMember.size();
+    text.erase(at, text.find_first_not_of("0123456789", at) - at);
+  }
+  return text;
 }
 
 std::map<std::string, std::string> files_in(const fs::path& folder) {

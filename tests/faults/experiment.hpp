@@ -40,7 +40,8 @@ struct Trial {
   std::string stream;   ///< of a trial with a journal: all lines, those restored among them
   /// Files that are there before: name → file in the folder of inputs.
   std::map<std::string, std::string> before;
-  bool threads = false;  ///< the starts of threads are made to fail too
+  bool memory = true;    ///< allocations are made to fail
+  bool threads = false;  ///< the starts of threads are made to fail, and nothing else
 };
 
 /// What a run left.
