@@ -123,6 +123,16 @@ Trial plot_trial() {
   return made;
 }
 
+/// Memory that ends in one of several threads; larger, so that they have work.
+Trial parallel_trial() {
+  Trial made = trial(
+      "parallel",
+      {"marginals", "@manhattan:poses=500,seed=3", "-o", "graph.cov", "--json", "marginals.json"},
+      {"graph.cov", "marginals.json"});
+  made.arguments.back() = "3";
+  return made;
+}
+
 /// Several threads, whose starts fail.
 Trial thread_trial() {
   Trial made =
@@ -157,6 +167,7 @@ std::vector<Trial> cairn_trials() {
   std::vector<Trial> all = file_trials();
   for (Trial& online : online_trials()) all.push_back(std::move(online));
   all.push_back(plot_trial());
+  all.push_back(parallel_trial());
   all.push_back(thread_trial());
   return all;
 }

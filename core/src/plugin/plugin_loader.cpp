@@ -142,11 +142,11 @@ Sidecar read_sidecar(const fs::path& file) {
     if (!value || !value->is_string()) throw broken(fmt::format("has no text '{}'", key));
     return std::string(value->get_string());
   };
-  const fs::path library = text_of(object, "file");
-  if (library.has_parent_path()) throw broken("names a file in another folder");
-  Sidecar sidecar{text_of(object, "name"),      text_of(object, "version"),
-                  text_of(object, "licence"),   text_of(object, "description"),
-                  file.parent_path() / library, {}};
+  Sidecar sidecar{text_of(object, "name"),    text_of(object, "version"),
+                  text_of(object, "licence"), text_of(object, "description"),
+                  text_of(object, "file"),    {}};
+  if (sidecar.library.has_parent_path()) throw broken("names a file in another folder");
+  sidecar.library = file.parent_path() / sidecar.library;
   const boost::json::value* offers = object->if_contains("offers");
   if (!offers || !offers->is_array()) throw broken("has no list 'offers'");
   for (const boost::json::value& offer : offers->get_array()) {
