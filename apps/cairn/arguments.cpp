@@ -4,6 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <istream>
+#include <memory>
+#include <sstream>
 #include <type_traits>
 #include <utility>
 
@@ -45,6 +48,21 @@ CLI::Validator one_of_these(std::vector<std::string> choices) {
   };
   return {check, ""};
 }
+
+constexpr std::size_t kLargestConfig = std::size_t{1} << 20;  // bytes; they have some hundred
+
+/// Reads no more than that: a device or a pipe may never end.
+class BoundedConfig : public CLI::ConfigTOML {
+ public:
+  std::vector<CLI::ConfigItem> from_config(std::istream& input) const override {
+    std::string text(kLargestConfig + 1, '\0');
+    input.read(text.data(), static_cast<std::streamsize>(text.size()));
+    text.resize(static_cast<std::size_t>(input.gcount()));
+    if (text.size() > kLargestConfig) throw CLI::FileError("has more than 1 MB");
+    std::istringstream bounded(text);
+    return CLI::ConfigTOML::from_config(bounded);
+  }
+};
 
 }  // namespace
 
@@ -232,6 +250,7 @@ void ProgramParser::add_version(const std::string& names, const std::string& tex
 
 Argument ProgramParser::add_config(const std::string& names, const std::string& help) {
   app_->allow_config_extras(CLI::config_extras_mode::error);
+  app_->config_formatter(std::make_shared<BoundedConfig>());
   return Argument(*app_->set_config(names, "", help));
 }
 

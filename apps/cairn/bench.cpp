@@ -17,6 +17,7 @@
 #include "interrupt.hpp"
 #include "json_text.hpp"
 #include "picture_files.hpp"
+#include "results.hpp"
 #include "table.hpp"
 
 namespace cairn::app {
@@ -87,19 +88,25 @@ void write_page(const BenchOptions& options, const std::vector<GraphResult>& gra
   write_picture(album, {"html", {}}, options.html, session);
 }
 
-int run(const BenchOptions& options, Session& session) {
-  check(options, session);
-  session.use_threads();
-  const BenchResult bench = run_bench(options, session);
-  if (!options.csv.empty()) write_file(options.csv, bench_csv(bench.graphs));
-  const boost::json::object report = bench_json(options, bench);
-  if (!options.html.empty()) write_page(options, bench.graphs, report, session);
-  session.write_json(report);
+void print_tables(const BenchOptions& options, const BenchResult& bench, const Session& session) {
   for (const GraphResult& graph : bench.graphs) {
     session.print((&graph == &bench.graphs.front() ? "" : "\n") +
                   bench_table(graph, options.problem.stop, session.colour()));
   }
   if (!options.html.empty()) session.print(fmt::format("\npage: {}\n", options.html));
+}
+
+int run(const BenchOptions& options, Session& session) {
+  check(options, session);
+  session.use_threads();
+  const BenchResult bench = run_bench(options, session);
+  const boost::json::object report = bench_json(options, bench);
+  Results results(session);
+  results.write(options.csv, [&] { write_file(options.csv, bench_csv(bench.graphs)); });
+  results.write(options.html, [&] { write_page(options, bench.graphs, report, session); });
+  results.add([&] { session.write_json(report); });
+  results.add([&] { print_tables(options, bench, session); });
+  results.finish();
   if (const auto slow = session.registry().unoptimized(); !slow.empty()) {
     session.note(
         fmt::format("unoptimised build, times mean little: plugin {}", joined(slow, ", ")));

@@ -22,6 +22,7 @@
 #include "interrupt.hpp"
 #include "problem_setup.hpp"
 #include "progress.hpp"
+#include "results.hpp"
 #include "table.hpp"
 #include "threshold_files.hpp"
 
@@ -94,7 +95,7 @@ struct Job {
   FoundThresholds found;
 };
 
-Job prepare(const CompactOptions& options, const PolicySetting& setting) {
+Job prepare(const CompactOptions& options, const PolicySetting& setting, Results& results) {
   Job result;
   PolicyJob& job = result.job;
   job.registration = options.registration;
@@ -118,8 +119,9 @@ Job prepare(const CompactOptions& options, const PolicySetting& setting) {
   const OptionTable& table = setting.registry.options(PosePolicy::kKind, job.policy.name);
   if (table.find("strategy"))
     emplace({{"strategy", options.strategy == "rfpfl" ? "fpfl" : options.strategy}});
-  if (!options.save_thresholds.empty())
+  results.write(options.save_thresholds, [&] {
     write_thresholds(options.save_thresholds, job.policy.name, result.found.options);
+  });
   return result;
 }
 
@@ -155,7 +157,8 @@ int run_compact(const CompactOptions& options, Session& session) {
       .progress = [&](std::string_view title, std::size_t count, const PolicyResult& counts) {
         progress.show(title, count, counts);
       }};
-  const Job job = prepare(options, setting);
+  Results results(session);
+  const Job job = prepare(options, setting, results);
   if (guard.interrupted()) {
     progress.clear();
     session.note("interrupted before anything was selected: nothing is written");
@@ -187,21 +190,24 @@ int run_compact(const CompactOptions& options, Session& session) {
     outcome.control = run_job(random, nullptr);
   }
   const PolicyResult& shown = outcome.shown();
-  if (!options.output.empty())
+  results.write(options.output, [&] {
     write_graph(shown.compact, options.output, registry,
                 output_format(options.output, options.output_format));
-  if (!options.trajectory.empty()) {
+  });
+  results.write(options.trajectory, [&] {
     write_graph(shown.trajectory, options.trajectory, registry,
                 output_format(options.trajectory, ""));
-  }
-  if (!options.steps.empty()) write_file(options.steps, steps_csv(shown));
-  boost::json::object report = report_json(options, outcome);
-  if (comparison) {
-    write_file(options.compare, comparison_csv(comparison->steps()));
-    report["compare"] = comparison_json(comparison->steps());
-  }
-  session.write_json(report);
-  session.print(summary_text(options, outcome));
+  });
+  results.write(options.steps, [&] { write_file(options.steps, steps_csv(shown)); });
+  results.write(options.compare,
+                [&] { write_file(options.compare, comparison_csv(comparison->steps())); });
+  results.add([&] {
+    boost::json::object report = report_json(options, outcome);
+    if (comparison) report["compare"] = comparison_json(comparison->steps());
+    session.write_json(report);
+  });
+  results.add([&] { session.print(summary_text(options, outcome)); });
+  results.finish();
   return guard.interrupted() ? kExitInterrupted : 0;
 }
 

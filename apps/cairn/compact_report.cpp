@@ -211,7 +211,7 @@ std::string summary_text(const CompactOptions& options, const CompactOutcome& ou
   if (outcome.result.interrupted) table.add({"status", "interrupted"});
   for (const std::string& file : {options.output, options.trajectory, options.save_thresholds,
                                   options.steps, options.compare}) {
-    if (!file.empty() && file != "-") table.add({"written", file});
+    if (!file.empty() && file != "-") table.add({"output", file});
   }
   return table.text(false);
 }

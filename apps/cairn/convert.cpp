@@ -9,6 +9,7 @@
 #include "commands.hpp"
 #include "graph_files.hpp"
 #include "json_report.hpp"
+#include "results.hpp"
 #include "table.hpp"
 
 namespace cairn::app {
@@ -21,20 +22,27 @@ struct ConvertOptions {
   InputOptions input;
 };
 
-int run(const ConvertOptions& options, Session& session) {
-  if (options.output_file == "-") session.write_file_to_stdout();
-  check_output(options.output_file, options.output_format, session);
-  const LoadedGraph loaded = load_graph(options.input_file, options.input, session);
-  write_graph(loaded.graph, options.output_file, session.registry(),
-              output_format(options.output_file, options.output_format));
-
+boost::json::object report_json(const ConvertOptions& options, const LoadedGraph& loaded) {
   boost::json::object report = begin_report("convert");
   report["graph"] = graph_json(loaded.graph, loaded.name);
   report["format"] = loaded.report.format;
   report["output"] = options.output_file;
   report["read_notes"] = strings_json(sentences(loaded.report));
   report["seconds"] = boost::json::object{{"read", loaded.seconds}};
-  session.write_json(report);
+  return report;
+}
+
+int run(const ConvertOptions& options, Session& session) {
+  if (options.output_file == "-") session.write_file_to_stdout();
+  check_output(options.output_file, options.output_format, session);
+  const LoadedGraph loaded = load_graph(options.input_file, options.input, session);
+  Results results(session);
+  results.write(options.output_file, [&] {
+    write_graph(loaded.graph, options.output_file, session.registry(),
+                output_format(options.output_file, options.output_format));
+  });
+  results.add([&] { session.write_json(report_json(options, loaded)); });
+  results.finish();
   session.print(fmt::format("{} ({}): {}, {} written to {}\n", loaded.name, loaded.report.format,
                             plural(loaded.graph.variable_count(), "variable"),
                             plural(loaded.graph.factor_count(), "factor"), options.output_file));

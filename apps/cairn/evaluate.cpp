@@ -14,6 +14,7 @@
 #include "commands.hpp"
 #include "graph_files.hpp"
 #include "json_report.hpp"
+#include "results.hpp"
 #include "table.hpp"
 
 namespace cairn::app {
@@ -174,8 +175,10 @@ int run(const EvaluateOptions& options, Session& session) {
                   session);
   warn_of_missing(pairs.only_in_truth, options.truth.file, options.estimate.file, by_stamp,
                   session);
-  session.write_json(report_json(options, by_stamp, pairs, error));
-  session.print(table_text(error, by_stamp, session.colour()));
+  Results results(session);
+  results.add([&] { session.write_json(report_json(options, by_stamp, pairs, error)); });
+  results.add([&] { session.print(table_text(error, by_stamp, session.colour())); });
+  results.finish();
   return 0;
 }
 

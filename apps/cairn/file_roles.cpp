@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <new>
 #include <system_error>
 
 #include <fmt/core.h>
@@ -25,6 +26,7 @@ std::string identity_of(const std::string& file) {
   for (int depth = 0; depth < 40 && std::filesystem::is_symlink(path, error); ++depth)
     path = path.parent_path() / std::filesystem::read_symlink(path, error);
   path = std::filesystem::weakly_canonical(path, error);
+  if (error == std::errc::not_enough_memory) throw std::bad_alloc();
   return error ? file : path.string();
 }
 

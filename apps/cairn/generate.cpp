@@ -11,6 +11,7 @@
 #include "commands.hpp"
 #include "graph_files.hpp"
 #include "json_report.hpp"
+#include "results.hpp"
 #include "table.hpp"
 
 namespace cairn::app {
@@ -24,25 +25,32 @@ struct GenerateOptions {
   std::uint64_t seed = 0;
 };
 
+boost::json::object report_json(const GenerateOptions& options, const Simulation& simulation) {
+  boost::json::object report = begin_report("generate");
+  report["kind"] = options.kind;
+  report["seed"] = options.seed;
+  report["graph"] = graph_json(simulation.graph, options.output);
+  report["ground_truth"] = text_json(options.ground_truth);
+  return report;
+}
+
 int run(const GenerateOptions& options, Session& session) {
   if (options.output == "-" || options.ground_truth == "-") session.write_file_to_stdout();
   check_output(options.output, options.output_format, session);
   check_output(options.ground_truth, options.output_format, session);
   const Simulation simulation = simulate(options.kind, options.seed, session);
   Registry& registry = session.registry();
-  write_graph(simulation.graph, options.output, registry,
-              output_format(options.output, options.output_format));
-  if (!options.ground_truth.empty()) {
+  Results results(session);
+  results.write(options.output, [&] {
+    write_graph(simulation.graph, options.output, registry,
+                output_format(options.output, options.output_format));
+  });
+  results.write(options.ground_truth, [&] {
     write_graph(simulation.truth, options.ground_truth, registry,
                 output_format(options.ground_truth, options.output_format));
-  }
-
-  boost::json::object report = begin_report("generate");
-  report["kind"] = options.kind;
-  report["seed"] = options.seed;
-  report["graph"] = graph_json(simulation.graph, options.output);
-  report["ground_truth"] = text_json(options.ground_truth);
-  session.write_json(report);
+  });
+  results.add([&] { session.write_json(report_json(options, simulation)); });
+  results.finish();
   session.print(fmt::format("{}: {}, {} written to {}\n", options.kind,
                             plural(simulation.graph.variable_count(), "variable"),
                             plural(simulation.graph.factor_count(), "factor"), options.output));

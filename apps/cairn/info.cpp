@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // cairn info GRAPH: what a graph consists of, and what looks wrong.
+#include <cmath>
 #include <memory>
 
 #include <fmt/core.h>
@@ -9,6 +10,7 @@
 #include "commands.hpp"
 #include "graph_files.hpp"
 #include "json_report.hpp"
+#include "results.hpp"
 #include "table.hpp"
 
 namespace cairn::app {
@@ -22,9 +24,10 @@ struct InfoOptions {
 };
 
 std::string ratio_text(const GraphSurvey& s) {
-  return s.degrees_of_freedom > 0 ? fmt::format(" ({:.4g} per degree of freedom)",
-                                                s.chi2 / static_cast<double>(s.degrees_of_freedom))
-                                  : "";
+  const bool defined = s.degrees_of_freedom > 0 && std::isfinite(s.chi2);
+  return defined ? fmt::format(" ({:.4g} per degree of freedom)",
+                               s.chi2 / static_cast<double>(s.degrees_of_freedom))
+                 : "";
 }
 
 std::string gauge_text(const Graph& graph, const GraphSurvey& s) {
@@ -82,8 +85,9 @@ std::string worst_text(const GraphSurvey& s, bool colour) {
                {"share", Table::Align::right}},
               "  ");
   for (const GraphSurvey::WorstFactor& factor : s.worst) {
-    table.add(
-        {factor.name, chi2_text(factor.chi2), fmt::format("{:.1f} %", 100 * factor.chi2 / s.chi2)});
+    const double share = factor.chi2 / s.chi2;
+    table.add({factor.name, chi2_text(factor.chi2),
+               std::isfinite(s.chi2) ? fmt::format("{:.1f} %", 100 * share) : "-"});
   }
   return table.text(colour);
 }
@@ -153,10 +157,14 @@ int run(const InfoOptions& options, Session& session) {
   session.use_threads();
   const LoadedGraph loaded = load_graph(options.graph, options.input, session);
   const GraphSurvey s = survey_graph(loaded.graph);
-  session.write_json(report_json(loaded, s));
-  const bool colour = session.colour();
-  session.print(counts_text(loaded, s, colour) + figures_text(loaded.graph, s) +
-                worst_text(s, colour) + list_text("what looks wrong", s.suspicions, colour));
+  Results results(session);
+  results.add([&] { session.write_json(report_json(loaded, s)); });
+  results.add([&] {
+    const bool colour = session.colour();
+    session.print(counts_text(loaded, s, colour) + figures_text(loaded.graph, s) +
+                  worst_text(s, colour) + list_text("what looks wrong", s.suspicions, colour));
+  });
+  results.finish();
   return 0;
 }
 

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "json_report.hpp"
 
-#include <fstream>
+#include <filesystem>
 #include <thread>
 
 #include <fmt/core.h>
 
+#include "cairn/io/format.hpp"
 #include "cairn/runtime/version.hpp"
 #include "graph_labels.hpp"
 #include "peak_memory.hpp"
@@ -96,12 +97,13 @@ json::array strings_json(const std::vector<std::string>& strings) {
 }
 
 std::string cpu_name() {
-  std::ifstream info("/proc/cpuinfo");
-  for (std::string line; std::getline(info, line);) {
-    const std::size_t colon = line.find(": ");
-    if (line.starts_with("model name") && colon != std::string::npos) return line.substr(colon + 2);
-  }
-  return "unknown";
+  // Not by a stream, which takes the lack of memory for the end of the file.
+  const std::filesystem::path file = "/proc/cpuinfo";
+  const std::string info = std::filesystem::exists(file) ? read_file(file) : "";
+  const std::size_t line = info.find("model name");
+  const std::size_t colon = line == std::string::npos ? line : info.find(": ", line);
+  if (colon == std::string::npos) return "unknown";
+  return info.substr(colon + 2, info.find('\n', colon) - colon - 2);
 }
 
 }  // namespace cairn::app

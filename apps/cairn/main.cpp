@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <fcntl.h>
 
+#include <atomic>
 #include <cerrno>
 #include <csignal>
 #include <cstdio>
@@ -9,6 +10,8 @@
 #include <functional>
 #include <new>
 #include <string>
+#include <string_view>
+#include <system_error>
 #include <utility>
 
 #include "cairn/runtime/error.hpp"
@@ -16,10 +19,12 @@
 #include "graph_files.hpp"
 #include "option_words.hpp"
 #include "session.hpp"
+#include "table.hpp"
 
 namespace {
 
 constexpr int kExitBug = 1;
+constexpr const char* kOutOfMemory = "out of memory";
 
 /// One line on standard error, whatever the message looked like; only a table, whose lines are
 /// indented by four columns, keeps its lines.
@@ -30,7 +35,20 @@ void print_error(std::string message) {
     const std::size_t next = message.find_first_not_of(" \n", k);
     message.replace(k, (next == std::string::npos ? message.size() : next) - k, "; ");
   }
-  std::fprintf(stderr, "cairn: %s\n", message.c_str());
+  std::fprintf(stderr, "cairn: %s\n", cairn::app::printable(message, true).c_str());
+}
+
+/// The same where there may be no memory left for it: then the message as it is.
+void print_error(const char* message) noexcept {
+  try {
+    print_error(std::string(message));
+  } catch (...) {
+    std::fprintf(stderr, "cairn: %s\n", message);
+  }
+}
+
+void print_bug(const char* what) noexcept {
+  std::fprintf(stderr, "cairn: internal error: %s (please report it)\n", what);
 }
 
 int run(int argc, const char* const* argv) {
@@ -52,6 +70,37 @@ int run(int argc, const char* const* argv) {
 #endif
 }
 
+/// That memory ran out, for where the exception that said so cannot be seen any more.
+std::atomic<bool> memory_ran_out{false};
+
+[[noreturn]] void note_out_of_memory() {
+  memory_ran_out = true;
+  throw std::bad_alloc();
+}
+
+/// Instead of abort(): memory may end in a thread of a library, or where no exception can pass.
+[[noreturn]] void end_badly() {
+  try {
+    if (std::current_exception()) throw;
+    if (memory_ran_out) throw std::bad_alloc();  // in a function that lets none through
+    print_bug("std::terminate");
+  } catch (const std::bad_alloc&) {
+    print_error(kOutOfMemory);
+    std::_Exit(static_cast<int>(cairn::ErrorCode::numerical));
+  } catch (const std::exception& error) {
+    const std::string_view what = error.what();
+    if (what.find("pthread_create") != what.npos) {  // in a thread of oneTBB, which starts others
+      std::fprintf(stderr, "cairn: a thread cannot be started (%s); give fewer with --threads\n",
+                   error.what());
+      std::_Exit(static_cast<int>(cairn::ErrorCode::numerical));
+    }
+    print_bug(error.what());
+  } catch (...) {
+    print_bug("an exception that is no std::exception");
+  }
+  std::_Exit(kExitBug);
+}
+
 /// Descriptors 0 to 2 that were closed are taken: or the first files that are opened would be them,
 /// and get what is printed. Using them still fails.
 void take_closed_descriptors() {
@@ -65,6 +114,8 @@ void take_closed_descriptors() {
 
 int main(int argc, char** argv) {
   take_closed_descriptors();
+  std::set_new_handler(note_out_of_memory);
+  std::set_terminate(end_badly);
   std::signal(SIGPIPE, SIG_IGN);  // `cairn … | head` is no reason to die before files are written
   std::signal(SIGXFSZ, SIG_IGN);  // the limit of a file's size is an error of its output
   try {
@@ -73,13 +124,18 @@ int main(int argc, char** argv) {
     print_error(error.what());
     leave(static_cast<int>(error.code()));
   } catch (const std::bad_alloc&) {
-    print_error("out of memory");
+    print_error(kOutOfMemory);
     leave(static_cast<int>(cairn::ErrorCode::numerical));
+  } catch (const std::system_error& error) {
+    const bool memory = error.code() == std::errc::not_enough_memory;
+    if (memory) print_error(kOutOfMemory);
+    if (!memory) print_bug(error.what());
+    leave(memory ? static_cast<int>(cairn::ErrorCode::numerical) : kExitBug);
   } catch (const std::exception& error) {
-    print_error(std::string("internal error: ") + error.what() + " (please report it)");
+    print_bug(error.what());
     leave(kExitBug);
   } catch (...) {
-    print_error("internal error: an exception that is no std::exception (please report it)");
+    print_bug("an exception that is no std::exception");
     leave(kExitBug);
   }
 }

@@ -25,6 +25,7 @@
 #include "json_report.hpp"
 #include "problem_setup.hpp"
 #include "progress.hpp"
+#include "results.hpp"
 #include "table.hpp"
 
 namespace cairn::app {
@@ -341,7 +342,7 @@ std::string result_text(const MarginalsOptions& options, const LoadedGraph& load
   facts.add(
       {"time", fmt::format("factorize {}, covariances {} ({})", seconds_text(answer.factorize),
                            seconds_text(answer.marginals), options.linear_solver)});
-  if (!options.output.empty() && options.output != "-") facts.add({"written", options.output});
+  if (!options.output.empty() && options.output != "-") facts.add({"output", options.output});
   return text + "\n" + facts.text(false);
 }
 
@@ -396,14 +397,20 @@ int run(MarginalsOptions options, Session& session) {
   const Answer answer =
       call_plugin([&] { return fmt::format("linear solver '{}'", options.linear_solver); },
                   [&] { return compute(loaded.graph, request, solver); });
-  if (options.output == "-") {
-    write_stdout(file_text(loaded, request, answer));
-  } else if (!options.output.empty()) {
-    write_file(options.output, file_text(loaded, request, answer));
-  }
-  session.write_json(
-      report_json(options, loaded, summary, request, answer, solver.solver->stats()));
-  session.print(result_text(options, loaded, summary, request, answer, session.colour()));
+  Results results(session);
+  results.write(options.output, [&] {
+    const std::string text = file_text(loaded, request, answer);
+    if (options.output == "-") return write_stdout(text);
+    write_file(options.output, text);
+  });
+  results.add([&] {
+    session.write_json(
+        report_json(options, loaded, summary, request, answer, solver.solver->stats()));
+  });
+  results.add([&] {
+    session.print(result_text(options, loaded, summary, request, answer, session.colour()));
+  });
+  results.finish();
   return 0;
 }
 

@@ -219,14 +219,19 @@ int run(OnlineOptions options, Session& session) {
   LineInput input(guard.flag());
   const bool kept = !options.output.empty() || journal;
   std::exception_ptr failure;  // which costs the rest of the stream, not the map so far
+  bool within_a_line = false;
   try {
     call_plugin([&] { return listener.name; },
                 [&] {
                   converse(conversation, input, kept, session);
                   conversation.finish();
                 });
-  } catch (...) {
+  } catch (const Error& error) {
     failure = std::current_exception();
+    within_a_line = error.code() == ErrorCode::plugin;
+  } catch (...) {  // of memory
+    failure = std::current_exception();
+    within_a_line = true;
   }
   try {
     if (!options.output.empty())
@@ -235,6 +240,8 @@ int run(OnlineOptions options, Session& session) {
     if (!failure) throw;
     session.note(error.what());  // the reason comes last, as the error
   }
+  if (within_a_line && !options.output.empty())
+    session.note("the line that failed may be in the map in part, and is not in the journal");
   if (failure) std::rethrow_exception(failure);
   session.write_json(report_json(options, conversation.counts(), lines));
   return guard.interrupted() ? kExitInterrupted : 0;

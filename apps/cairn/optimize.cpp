@@ -23,6 +23,7 @@
 #include "json_report.hpp"
 #include "problem_setup.hpp"
 #include "progress.hpp"
+#include "results.hpp"
 #include "table.hpp"
 
 namespace cairn::app {
@@ -126,8 +127,8 @@ std::string summary_text(const OptimizeOptions& options, const LoadedGraph& load
                            covariances.linear_solver, seconds_text(covariances.seconds()))});
   }
   for (const std::string& note : summary.notes) table.add({"note", note});
-  if (!options.output.empty() && options.output != "-") table.add({"written", options.output});
-  if (!options.record.empty()) table.add({"recorded", options.record});
+  if (!options.output.empty() && options.output != "-") table.add({"output", options.output});
+  if (!options.record.empty()) table.add({"recording", options.record});
   return table.text(false);
 }
 
@@ -170,10 +171,11 @@ int run(const OptimizeOptions& options, Session& session) {
   Summary summary = call_plugin(
       [&] { return in_words(spec); },
       [&] { return solve(loaded.graph, *optimizer, options, guard, session, recording); });
-  if (!options.output.empty()) {
+  Results results(session);
+  results.write(options.output, [&] {
     write_graph(loaded.graph, options.output, registry,
                 output_format(options.output, options.output_format));
-  }
+  });
   const Stop& stop = options.problem.stop;
   for (std::string& note : notes_on_the_end(summary, stop, loaded.graph))
     summary.notes.push_back(std::move(note));
@@ -184,9 +186,11 @@ int run(const OptimizeOptions& options, Session& session) {
                     [&] { return diagonal_covariances(loaded.graph, *covariance_solver); });
     if (!covariances.there) summary.notes.push_back("no covariances: " + covariances.why_not);
   }
-  session.write_json(report_json(options, loaded, initial, summary, covariances));
-  if (recording) recording->finish(loaded.graph, summary);  // if it cannot: the rest is written
-  session.print(summary_text(options, loaded, summary, covariances));
+  results.write(options.record, [&] { recording->finish(loaded.graph, summary); });
+  results.add(
+      [&] { session.write_json(report_json(options, loaded, initial, summary, covariances)); });
+  results.add([&] { session.print(summary_text(options, loaded, summary, covariances)); });
+  results.finish();
   const int code = exit_code(summary, stop);
   return code == 0 && covariance_solver && !covariances.there
              ? static_cast<int>(ErrorCode::numerical)

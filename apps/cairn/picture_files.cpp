@@ -44,11 +44,14 @@ void check_picture(const std::string& file, Session& session) {
   check_file(file, session);
 }
 
+std::string draw_picture(const Album& album, const ComponentSpec& picture, Session& session) {
+  return call_plugin([&] { return fmt::format("picture '{}'", picture.name); },
+                     [&] { return session.registry().make<Picture>(picture)->draw(album); });
+}
+
 std::size_t write_picture(const Album& album, const ComponentSpec& picture, const std::string& file,
                           Session& session) {
-  const std::string bytes =
-      call_plugin([&] { return fmt::format("picture '{}'", picture.name); },
-                  [&] { return session.registry().make<Picture>(picture)->draw(album); });
+  const std::string bytes = draw_picture(album, picture, session);
   write_file(file, bytes);
   return bytes.size();
 }

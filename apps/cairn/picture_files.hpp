@@ -22,6 +22,9 @@ std::string picture_format(const std::string& file, Session& session);
 /// Finds out before the work whether a plot can be written there: see also `check_file`.
 void check_picture(const std::string& file, Session& session);
 
+/// An `Album` as the bytes of a file.
+std::string draw_picture(const Album& album, const ComponentSpec& picture, Session& session);
+
 /// Draws an `Album` into a file ("-" is standard output), and returns its size in bytes.
 std::size_t write_picture(const Album& album, const ComponentSpec& picture, const std::string& file,
                           Session& session);

@@ -10,11 +10,13 @@
 
 #include "album.hpp"
 #include "arguments.hpp"
+#include "cairn/io/format.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
 #include "commands.hpp"
 #include "json_report.hpp"
 #include "picture_files.hpp"
+#include "results.hpp"
 #include "table.hpp"
 
 namespace cairn::app {
@@ -88,13 +90,18 @@ int run(const PlotOptions& options, Session& session) {
   session.use_threads();
   const Album album = load_album(
       options.album, fmt::format("cairn plot {}", joined(options.album.files, " ")), session);
-  const std::size_t bytes = write_picture(album, picture, output, session);
-  boost::json::object report = begin_report("plot");
-  report["picture"] = output;
-  report["bytes"] = bytes;
-  report["what"] = options.what;
-  session.write_json(report);
-  session.print(fmt::format("{}: {}\n", output, bytes_text(static_cast<std::int64_t>(bytes))));
+  const std::string bytes = draw_picture(album, picture, session);
+  Results results(session);
+  results.write(output, [&] { write_file(output, bytes); });
+  results.add([&] {
+    boost::json::object report = begin_report("plot");
+    report["picture"] = output;
+    report["bytes"] = bytes.size();
+    report["what"] = options.what;
+    session.write_json(report);
+  });
+  results.finish();
+  session.print(fmt::format("{}: {}\n", output, bytes_text(std::ssize(bytes))));
   return 0;
 }
 

@@ -64,9 +64,9 @@ std::string problems_text(const Registry& registry, bool colour) {
   for (const PluginProblem& problem : registry.problems()) {
     // Most messages begin with the file themselves.
     const std::string where = problem.where.string();
-    text += problem.message.find(where) != std::string::npos
-                ? fmt::format("  {}\n", problem.message)
-                : fmt::format("  {}: {}\n", where, problem.message);
+    const bool named = problem.message.find(where) != std::string::npos;
+    text += fmt::format("  {}\n",
+                        printable(named ? problem.message : where + ": " + problem.message, true));
   }
   return text;
 }
@@ -225,8 +225,9 @@ bool is_optimized(const Registry& registry, const Offer& offer) {
 
 std::string details_text(const Offer& offer, bool optimized, const OptionTable& options,
                          const std::vector<std::string>& abilities, bool colour) {
-  const std::string title = fmt::format("{} ({}): {}", bold(offer.name, colour),
-                                        kind_in_words(offer.kind), offer.summary);
+  const std::string title =
+      fmt::format("{} ({}): {}", bold(offer.name, colour), printable(kind_in_words(offer.kind)),
+                  printable(offer.summary));
   std::string text = joined(folded(title, output_width() - 2), "\n  ") + "\n";
   Table facts({{"", Table::Align::left}, {"", Table::Align::left}}, "  ");
   facts.add({"plugin", fmt::format("{} {}, {}", offer.plugin, offer.version, offer.file.string())});

@@ -24,6 +24,7 @@
 #include "problem_setup.hpp"
 #include "progress.hpp"
 #include "replay_report.hpp"
+#include "results.hpp"
 #include "table.hpp"
 
 namespace cairn::app {
@@ -192,13 +193,18 @@ int run(const ReplayOptions& options, Session& session) {
                              plural(replay.placed_as_given, "variable") + " began with"));
   }
   const double chi2 = estimator->chi2();
-  if (!options.output.empty())
+  Results results(session);
+  results.write(options.output, [&] {
     write_graph(estimator->graph(), options.output, registry,
                 output_format(options.output, options.output_format));
-  if (!options.steps.empty()) write_file(options.steps, steps_csv(replay));
-  if (!options.plot.empty()) draw_steps(replay, options, loaded, session);
-  session.write_json(report_json(options, loaded, sorted, replay, *estimator, chi2));
-  session.print(summary_text(options, loaded, replay, chi2));
+  });
+  results.write(options.steps, [&] { write_file(options.steps, steps_csv(replay)); });
+  results.add(
+      [&] { session.write_json(report_json(options, loaded, sorted, replay, *estimator, chi2)); });
+  // Last of the files: libraries for fonts may end the process where memory is short.
+  results.write(options.plot, [&] { draw_steps(replay, options, loaded, session); });
+  results.add([&] { session.print(summary_text(options, loaded, replay, chi2)); });
+  results.finish();
   return exit_code(replay);
 }
 

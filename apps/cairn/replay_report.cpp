@@ -195,7 +195,7 @@ std::string summary_text(const ReplayOptions& options, const LoadedGraph& loaded
   if (replay.notes.size() > kMostNotes)
     table.add({"", fmt::format("and {} more: --json", replay.notes.size() - kMostNotes)});
   for (const std::string& file : {options.output, options.steps, options.plot}) {
-    if (!file.empty() && file != "-") table.add({"written", file});
+    if (!file.empty() && file != "-") table.add({"output", file});
   }
   return table.text(false);
 }

@@ -4,9 +4,14 @@
 #include <poll.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
+#include <latch>
+#include <stdexcept>
+#include <thread>
+#include <vector>
 
 #include <fmt/core.h>
 
@@ -20,6 +25,23 @@
 #include "table.hpp"
 
 namespace cairn::app {
+namespace {
+
+/// Starts as many threads as there will be, and ends them: where the system refuses one now, that
+/// is an error, and later the end of the process. Throws `std::system_error`.
+void try_threads(int count) {
+  if (count == 0) count = static_cast<int>(std::thread::hardware_concurrency());
+  std::latch all_started(1);
+  std::vector<std::jthread> threads;
+  threads.reserve(static_cast<std::size_t>(std::max(count, 1)));
+  struct Release {
+    std::latch& latch;
+    ~Release() { latch.count_down(); }
+  } const release{all_started};  // before they are joined, whatever happens
+  for (int k = 1; k < count; ++k) threads.emplace_back([&] { all_started.wait(); });
+}
+
+}  // namespace
 
 Session::Session() = default;
 Session::~Session() = default;
@@ -35,7 +57,16 @@ Registry& Session::registry() {
   return *registry_;
 }
 
-void Session::use_threads() const { set_threads(common.threads); }
+void Session::use_threads() const {
+  try {
+    try_threads(common.threads);
+    set_threads(common.threads);
+  } catch (const std::runtime_error& error) {  // of the standard library, and of oneTBB
+    throw Error(
+        ErrorCode::numerical,
+        fmt::format("the threads cannot be started ({}); give fewer with --threads", error.what()));
+  }
+}
 
 void Session::write_file_to_stdout() {
   if (common.json == "-") {
@@ -56,7 +87,8 @@ bool Session::colour() const { return use_colour(stdout_is_file_ ? stderr : stdo
 
 void Session::note(std::string_view text) const {
   if (common.quiet || text.empty()) return;
-  const std::string line = fmt::format("note: {}\n", in_command_line_words(std::string(text)));
+  const std::string line =
+      fmt::format("note: {}\n", printable(in_command_line_words(std::string(text)), true));
   std::fwrite(line.data(), 1, line.size(), stderr);
 }
 
@@ -70,14 +102,7 @@ void Session::write_json(const boost::json::object& report) const {
   }
 }
 
-void write_stdout(std::string_view text) {
-  errno = 0;
-  const bool ok =
-      std::fwrite(text.data(), 1, text.size(), stdout) == text.size() && std::fflush(stdout) == 0;
-  if (ok || errno == EPIPE) return;
-  throw Error(ErrorCode::input,
-              fmt::format("standard output cannot be written: {}", std::strerror(errno)));
-}
+void write_stdout(std::string_view text) { write_file("-", text); }
 
 bool stdout_reader_is_gone() {
   pollfd descriptor{STDOUT_FILENO, POLLOUT, 0};

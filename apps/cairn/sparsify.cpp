@@ -23,6 +23,7 @@
 #include "json_report.hpp"
 #include "problem_setup.hpp"
 #include "progress.hpp"
+#include "results.hpp"
 #include "sparsify.hpp"
 #include "sparsify_records.hpp"
 #include "step_times.hpp"
@@ -160,7 +161,7 @@ std::string summary_text(const SparsifyCommandOptions& options, const LoadedGrap
   }
   if (result.interrupted) table.add({"status", "interrupted"});
   for (const std::string& file : {options.output, options.record}) {
-    if (!file.empty() && file != "-") table.add({"written", file});
+    if (!file.empty() && file != "-") table.add({"output", file});
   }
   return table.text(false);
 }
@@ -244,12 +245,15 @@ int run_sparsify(SparsifyCommandOptions options, Session& session) {
       sparsify(loaded.graph, job, setup, options.problem.stop, guard, std::move(observer), session);
   for (const std::string& note : result.notes) session.note(note);
   note_refused(result.change, session);
-  if (!options.output.empty())
+  Results results(session);
+  results.write(options.output, [&] {
     write_graph(result.sparse, options.output, registry,
                 output_format(options.output, options.output_format));
-  if (!options.record.empty()) write_file(options.record, recorder.text());
-  session.write_json(report_json(options, loaded, job, result));
-  session.print(summary_text(options, loaded, job, result));
+  });
+  results.write(options.record, [&] { write_file(options.record, recorder.text()); });
+  results.add([&] { session.write_json(report_json(options, loaded, job, result)); });
+  results.add([&] { session.print(summary_text(options, loaded, job, result)); });
+  results.finish();
   if (guard.interrupted()) return kExitInterrupted;
   return result.converged ? 0 : static_cast<int>(ErrorCode::numerical);
 }

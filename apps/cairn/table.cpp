@@ -48,6 +48,7 @@ struct Table::Layout {
 
 void Table::add(std::vector<std::string> cells) {
   cells.resize(columns_.size());
+  for (std::string& cell : cells) cell = printable(cell);
   rows_.push_back(std::move(cells));
 }
 
@@ -150,6 +151,23 @@ std::string Table::text(bool colour, std::size_t width) const {
   return all;
 }
 
+std::string printable(std::string_view text, bool lines) {
+  std::string shown;
+  for (std::size_t k = 0; k < text.size(); ++k) {
+    const auto byte = static_cast<unsigned char>(text[k]);
+    const auto next = static_cast<unsigned char>(k + 1 < text.size() ? text[k + 1] : ' ');
+    if (byte == 0xc2 && next >= 0x80 && next < 0xa0) {  // U+0080 … U+009F, control characters too
+      shown += fmt::format("\\x{:02x}", next);
+      ++k;
+    } else if ((byte < 0x20 || byte == 0x7f) && !(lines && byte == '\n')) {
+      shown += fmt::format("\\x{:02x}", byte);
+    } else {
+      shown += text[k];
+    }
+  }
+  return shown;
+}
+
 std::size_t display_width(std::string_view text) {
   std::size_t width = 0;
   for (std::size_t k = 0; k < text.size(); ++k) {
@@ -209,7 +227,8 @@ bool use_colour(std::FILE* stream) {
 }
 
 std::string bold(std::string_view text, bool colour) {
-  return colour ? fmt::format("\x1b[1m{}\x1b[0m", text) : std::string(text);
+  const std::string shown = printable(text);
+  return colour ? fmt::format("\x1b[1m{}\x1b[0m", shown) : shown;
 }
 
 std::string seconds_text(double seconds) {

@@ -54,6 +54,10 @@ class Table {
   std::string indent_;
 };
 
+/// The text with control characters written as \x1b and the like, so that no file, plugin or name
+/// can command a terminal. Line breaks stay in `lines`.
+std::string printable(std::string_view text, bool lines = false);
+
 /// How many columns of a terminal a text takes: its code points, without escape sequences.
 std::size_t display_width(std::string_view text);
 /// The text if it takes at most `width` columns, else its beginning and "…".

@@ -13,6 +13,7 @@
 #include "commands.hpp"
 #include "json_report.hpp"
 #include "picture_files.hpp"
+#include "results.hpp"
 #include "table.hpp"
 
 namespace cairn::app {
@@ -78,10 +79,13 @@ int run(const ViewOptions& options, Session& session) {
   session.use_threads();
   const Album album = load_album(
       options.album, fmt::format("cairn view {}", joined(options.album.files, " ")), session);
-  const std::size_t bytes = write_picture(album, {"html", {}}, page, session);
-  session.write_json(report_json(album, page, bytes));
-  session.print(fmt::format("{}: {}; open it in any browser\n", page,
-                            bytes_text(static_cast<std::int64_t>(bytes))));
+  const std::string bytes = draw_picture(album, {"html", {}}, session);
+  Results results(session);
+  results.write(page, [&] { write_file(page, bytes); });
+  results.add([&] { session.write_json(report_json(album, page, bytes.size())); });
+  results.finish();
+  session.print(
+      fmt::format("{}: {}; open it in any browser\n", page, bytes_text(std::ssize(bytes))));
   return 0;
 }
 

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <new>
 #include <numbers>
 
 #include <cairo-pdf.h>
@@ -17,8 +18,12 @@ namespace {
 
 constexpr double kPointsAPixel = 0.75;  // 72 points, 96 pixels an inch
 
-cairo_status_t append(void* closure, const unsigned char* data, unsigned length) {
-  static_cast<std::string*>(closure)->append(reinterpret_cast<const char*>(data), length);
+cairo_status_t append(void* closure, const unsigned char* data, unsigned length) noexcept {
+  try {
+    static_cast<std::string*>(closure)->append(reinterpret_cast<const char*>(data), length);
+  } catch (const std::bad_alloc&) {
+    return CAIRO_STATUS_NO_MEMORY;
+  }
   return CAIRO_STATUS_SUCCESS;
 }
 
@@ -182,6 +187,7 @@ void Canvas::check() const {
   cairo_status_t status = cairo_status(context_.get());
   if (status == CAIRO_STATUS_SUCCESS) status = cairo_surface_status(surface_.get());
   if (status == CAIRO_STATUS_SUCCESS) return;
+  if (status == CAIRO_STATUS_NO_MEMORY) throw std::bad_alloc();
   throw Error(ErrorCode::input, fmt::format("the plot of {} x {} pixels could not be drawn: {}",
                                             width_, height_, cairo_status_to_string(status)));
 }
@@ -190,7 +196,9 @@ std::string Canvas::finish() {
   cairo_surface_flush(surface_.get());
   check();
   if (format_ == "png") {
-    cairo_surface_write_to_png_stream(surface_.get(), append, &bytes_);
+    const cairo_status_t written =
+        cairo_surface_write_to_png_stream(surface_.get(), append, &bytes_);
+    if (written != CAIRO_STATUS_SUCCESS) throw std::bad_alloc();  // nothing else can go wrong
   } else {
     cairo_surface_finish(surface_.get());
   }

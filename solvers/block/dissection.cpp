@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <iterator>
+#include <new>
 #include <utility>
 
 #include <metis.h>
@@ -105,8 +106,10 @@ class Dissection {
     auto n = static_cast<idx_t>(piece.size());
     idx_t separator = 0;
     std::vector<idx_t> side(piece.size());
-    if (METIS_ComputeVertexSeparator(&n, begin.data(), neighbours.data(), weights.data(), options_,
-                                     &separator, side.data()) != METIS_OK) {
+    const int status = METIS_ComputeVertexSeparator(
+        &n, begin.data(), neighbours.data(), weights.data(), options_, &separator, side.data());
+    if (status == METIS_ERROR_MEMORY) throw std::bad_alloc();
+    if (status != METIS_OK) {
       throw Error(ErrorCode::usage, "METIS refused the block graph; use ordering=amd");
     }
     Blocks parts[3];  // the halves and what separates them

@@ -5,6 +5,7 @@
 #include <charconv>
 #include <cstdlib>
 #include <limits>
+#include <new>
 #include <numeric>
 
 #include <amd.h>
@@ -75,8 +76,7 @@ Blocks amd(const BlockStructure& structure) {
   amd_defaults(control);
   const int status = amd_order(structure.blocks(), graph.begin.data(), graph.rows.data(),
                                order.data(), control, nullptr);
-  if (status == AMD_OUT_OF_MEMORY)
-    throw bad_order("AMD ran out of memory while ordering the block graph");
+  if (status == AMD_OUT_OF_MEMORY) throw std::bad_alloc();
   if (status != AMD_OK && status != AMD_OK_BUT_JUMBLED)
     throw bad_order("AMD refused the block graph");
   return order;
@@ -92,8 +92,7 @@ Blocks camd(const BlockStructure& structure, Groups groups) {
   const int status =
       camd_order(structure.blocks(), graph.begin.data(), graph.rows.data(), order.data(), control,
                  nullptr, groups.empty() ? nullptr : compacted.data());
-  if (status == CAMD_OUT_OF_MEMORY)
-    throw bad_order("CAMD ran out of memory while ordering the block graph");
+  if (status == CAMD_OUT_OF_MEMORY) throw std::bad_alloc();
   if (status != CAMD_OK && status != CAMD_OK_BUT_JUMBLED)
     throw bad_order("CAMD refused the block graph");
   return order;
@@ -110,6 +109,7 @@ Blocks ccolamd(const BlockStructure& structure, Groups groups) {
   if (!csymamd(structure.blocks(), graph.rows.data(), graph.begin.data(), order.data(), nullptr,
                stats, &std::calloc, &std::free, groups.empty() ? nullptr : compacted.data(),
                kLowerTriangle)) {
+    if (stats[CCOLAMD_STATUS] == CCOLAMD_ERROR_out_of_memory) throw std::bad_alloc();
     throw bad_order("CCOLAMD refused the block graph (status " +
                     std::to_string(stats[CCOLAMD_STATUS]) + ")");
   }
@@ -133,10 +133,10 @@ Blocks metis(const BlockStructure& structure) {
   options[METIS_OPTION_NUMBERING] = 0;
   idx_t n = structure.blocks();
   std::vector<idx_t> permutation(n), inverse(n);
-  if (METIS_NodeND(&n, begin.data(), neighbours.data(), nullptr, options, permutation.data(),
-                   inverse.data()) != METIS_OK) {
-    throw bad_order("METIS refused the block graph; use ordering=amd");
-  }
+  const int status = METIS_NodeND(&n, begin.data(), neighbours.data(), nullptr, options,
+                                  permutation.data(), inverse.data());
+  if (status == METIS_ERROR_MEMORY) throw std::bad_alloc();
+  if (status != METIS_OK) throw bad_order("METIS refused the block graph; use ordering=amd");
   return {permutation.begin(), permutation.end()};
 }
 #endif

@@ -8,6 +8,7 @@ namespace cairn::test {
 namespace {
 
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 class InfoCommand : public ::testing::Test {
  protected:
@@ -35,6 +36,18 @@ const std::string kChain =
     "VERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 1 0 0\nVERTEX_SE2 2 2 0 0\n"
     "EDGE_SE2 0 1 1 0 0" +
     kIdentity + "EDGE_SE2 1 2 1.1 0 0" + kIdentity;
+
+TEST_F(InfoCommand, GivesNoShareOfWhatOverflows) {
+  write_text(folder_.file("graph.g2o"),
+             "VERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 1e308 0 0\nEDGE_SE2 0 1 1 0 0" + kIdentity +
+                 "EDGE_SE2 0 1 2 0 0" + kIdentity);
+  const Outcome outcome = cairn({"info", folder_.file("graph.g2o")});
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("worst factors"));
+  EXPECT_THAT(outcome.out, Not(HasSubstr("nan")));
+  EXPECT_THAT(outcome.out, Not(HasSubstr("inf %")));
+  EXPECT_THAT(outcome.out, Not(HasSubstr("inf per degree")));
+}
 
 TEST_F(InfoCommand, CountsWhatIsThere) {
   const auto report = info_of(kChain + "EDGE_SE2 0 2 2 0 0" + kIdentity);

@@ -97,6 +97,37 @@ TEST_F(Outputs, ARecordingThatCannotBeWrittenCostsNothingElse) {
   EXPECT_EQ(parse_json(read_text(report)).at("status").as_string(), "converged");
 }
 
+TEST_F(Outputs, OneThatFailsCostsNoneOfTheOthers) {
+  const std::string file = graph(), report = folder_.file("run.json");
+  const std::string record = folder_.file("run.jsonl"), steps = folder_.file("steps.csv");
+  const Outcome optimized = cairn(
+      {"optimize", file, "-o", "/dev/full", "--to", "g2o", "--json", report, "--record", record});
+  EXPECT_EQ(optimized.exit_code, 3);
+  EXPECT_THAT(optimized.err, HasSubstr("cairn: /dev/full: cannot be written"));
+  EXPECT_THAT(optimized.out, HasSubstr("converged"));
+  EXPECT_EQ(parse_json(read_text(report)).at("status").as_string(), "converged");
+  EXPECT_THAT(read_text(record), HasSubstr("{\"summary\":"));
+  if (!Registry().has("estimator", "batch")) GTEST_SKIP() << "there is no estimator batch";
+  // The first error is the one that is reported last; the others are notes.
+  const Outcome replayed =
+      cairn({"replay", file, "--estimator", "batch", "-o", "/dev/full", "--to", "g2o", "--steps",
+             steps, "--solve-every", "100", "--json", "/dev/full"});
+  EXPECT_EQ(replayed.exit_code, 3);
+  EXPECT_THAT(replayed.err, HasSubstr("note: /dev/full: cannot be written"));
+  EXPECT_THAT(replayed.err, HasSubstr("\ncairn: /dev/full: cannot be written"));
+  EXPECT_EQ(lines(read_text(steps)).size(), 201U);
+}
+
+TEST_F(Outputs, ARecordingReplacesAnotherOnlyWhenItIsWhole) {
+  graph();
+  write_text(folder_.file("run.jsonl"), "before");
+  const Outcome outcome = shell(
+      "ulimit -f 8; $C optimize $D/graph.g2o --record $D/run.jsonl; echo code=$? >&2", folder_);
+  EXPECT_THAT(outcome.err, HasSubstr("code=3"));
+  EXPECT_EQ(read_text(folder_.file("run.jsonl")), "before");
+  EXPECT_EQ(folder_.contents(), (std::vector<std::string>{"graph.g2o", "run.jsonl"}));
+}
+
 TEST_F(Outputs, AreTriedAsTheyWillBeWritten) {
   const std::string file = graph();
   const Outcome name =
@@ -115,6 +146,19 @@ TEST_F(Outputs, ALimitOfTheSizeOfFilesIsAnError) {
       shell("ulimit -f 8; $C optimize $D/graph.g2o -o $D/best.g2o; echo code=$? >&2", folder_);
   EXPECT_THAT(outcome.err, HasSubstr("code=3"));
   EXPECT_THAT(outcome.err, HasSubstr("best.g2o: cannot be written"));
+  EXPECT_EQ(folder_.contents(), (std::vector<std::string>{"graph.g2o"}));
+}
+
+TEST_F(Outputs, ThreadsThatCannotBeStartedAreAnError) {
+  graph();
+  // 800 stacks of 8 MB do not fit.
+  const Outcome outcome = shell(
+      "ulimit -s 8192; ulimit -v 4000000; $C optimize $D/graph.g2o -o $D/best.g2o --threads 800; "
+      "echo code=$? >&2",
+      folder_);
+  EXPECT_THAT(outcome.err, HasSubstr("code=4"));
+  EXPECT_THAT(outcome.err, HasSubstr("cairn: the threads cannot be started"));
+  EXPECT_THAT(outcome.err, HasSubstr("--threads"));
   EXPECT_EQ(folder_.contents(), (std::vector<std::string>{"graph.g2o"}));
 }
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <filesystem>
 #include <set>
 
 #include "cairn/plugin/plugin_search.hpp"
@@ -36,6 +37,27 @@ TEST(PluginsCommand, ListsEverythingOnOffer) {
     EXPECT_THAT(words, HasSubstr(" " + offer.name + " " + offer.summary + " "));
   }
   EXPECT_EQ(listed.size(), registry.offers().size());
+}
+
+TEST(PluginsCommand, WritesNoControlCharactersOfSidecarFiles) {
+  const TemporaryFolder folder;
+  write_text(folder.file("a.json"),
+             R"({"name": "a", "version": "1", "licence": "x\u0007", "description": "",
+                 "file": "a.so", "offers": [{"kind": "loss\u001b]0;kind\u0007",
+                 "name": "red\u001b[31m", "summary": "one\u009b2J\ntwo"}]})");
+  write_text(folder.file("b.json"), "broken");
+  std::filesystem::rename(folder.file("b.json"), folder.file("b\x1b[2J.json"));
+  const Environment found{{"CAIRN_PLUGIN_PATH", folder.path().string()}};
+  for (const Arguments& arguments :
+       {Arguments{"plugins"}, Arguments{"plugins", "red\x1b[31m"},
+        Arguments{"optimize", "@ring", "--optimizer", "none\x1b[31m"}}) {
+    const Outcome outcome = cairn(arguments, found);
+    for (const char c : {'\x1b', '\x07', '\x9b'})
+      EXPECT_EQ((outcome.out + outcome.err).find(c), std::string::npos) << arguments.front();
+  }
+  const std::string list = cairn({"plugins"}, found).out;
+  EXPECT_THAT(list, HasSubstr("red\\x1b[31m"));
+  EXPECT_THAT(list, HasSubstr("one\\x9b2J\\x0atwo"));
 }
 
 TEST(PluginsCommand, OpensNoPluginForTheList) {

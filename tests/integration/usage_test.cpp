@@ -186,6 +186,7 @@ TEST(Usage, AConfigurationFileWithUnknownKeysIsRefused) {
   expect_error(with("iterations = 2\n"), kUsage, "'iterations'");
   expect_error(with("[optimise]\niterations = 2\n"), kUsage, "'optimise'");
   expect_error(cairn({"info", "@ring", "--config", folder.file("none.toml")}), kInput, "none.toml");
+  expect_error(cairn({"info", "@ring", "--config", "/dev/zero"}), kInput, "more than 1 MB");
 }
 
 TEST(Usage, AReaderThatGoesAwayIsNoError) {

@@ -5,10 +5,12 @@
 #include <sys/stat.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <cstdlib>
 #include <fstream>
 #include <iterator>
 #include <map>
+#include <new>
 #include <sstream>
 #include <system_error>
 
@@ -27,9 +29,8 @@ namespace fs = std::filesystem;
 
 Error plugin_error(const std::string& message) { return {ErrorCode::plugin, message}; }
 
-/// Loaded libraries by path. They stay for the rest of the process: objects that a plugin made, and
-/// exceptions that it threw, may outlive whoever loaded it. That is why this is a singleton that is
-/// never destroyed.
+/// Loaded libraries by path, a singleton that is never destroyed: objects that a plugin made, and
+/// exceptions that it threw, may outlive whoever loaded it.
 std::map<fs::path, boost::dll::shared_library>& loaded_libraries() {
   static auto* libraries = new std::map<fs::path, boost::dll::shared_library>();
   return *libraries;
@@ -104,10 +105,12 @@ std::string remedy(std::string_view core, std::string_view plugin) {
 }
 
 boost::dll::shared_library open_library(const fs::path& library) {
+  errno = 0;
   try {
     return boost::dll::shared_library(
         library, boost::dll::load_mode::rtld_now | boost::dll::load_mode::rtld_local);
   } catch (const std::system_error& error) {
+    if (errno == ENOMEM) throw std::bad_alloc();
     // The dynamic linker's words first: an undefined symbol must not be blamed on anything else.
     throw plugin_error(
         fmt::format("{}\n  while loading plugin {}", error.what(), library.string()));
@@ -128,6 +131,7 @@ Sidecar read_sidecar(const fs::path& file) {
   if (fs::file_size(file, unknown) > kLargestSidecar) throw broken("has more than 1 MB");
   std::ifstream stream(file, std::ios::binary);
   const std::string text(std::istreambuf_iterator<char>(stream), {});
+  if (!stream && errno == ENOMEM) throw std::bad_alloc();
   if (!stream) throw broken("cannot be read");
   boost::system::error_code error;
   const boost::json::value root = boost::json::parse(text, error);
@@ -138,14 +142,11 @@ Sidecar read_sidecar(const fs::path& file) {
     if (!value || !value->is_string()) throw broken(fmt::format("has no text '{}'", key));
     return std::string(value->get_string());
   };
-  Sidecar sidecar;
-  sidecar.name = text_of(object, "name");
-  sidecar.version = text_of(object, "version");
-  sidecar.licence = text_of(object, "licence");
-  sidecar.description = text_of(object, "description");
-  const fs::path library = text_of(object, "file");
-  if (library.has_parent_path()) throw broken("names a file in another folder");
-  sidecar.library = file.parent_path() / library;
+  Sidecar sidecar{text_of(object, "name"),    text_of(object, "version"),
+                  text_of(object, "licence"), text_of(object, "description"),
+                  text_of(object, "file"),    {}};
+  if (sidecar.library.has_parent_path()) throw broken("names a file in another folder");
+  sidecar.library = file.parent_path() / sidecar.library;
   const boost::json::value* offers = object->if_contains("offers");
   if (!offers || !offers->is_array()) throw broken("has no list 'offers'");
   for (const boost::json::value& offer : offers->get_array()) {
@@ -162,6 +163,7 @@ std::vector<fs::path> plugin_folders(const PluginSearch& search,
   const auto add = [&](const fs::path& folder, bool must_exist) {
     std::error_code error;
     const fs::path canonical = fs::canonical(folder, error);
+    if (error == std::errc::not_enough_memory) throw std::bad_alloc();
     if (error || !fs::is_directory(canonical)) {
       if (must_exist)
         problems.push_back({folder, fmt::format("{}: no such folder", folder.string())});
@@ -201,6 +203,7 @@ std::vector<fs::path> plugin_folders(const PluginSearch& search,
 const PluginManifest& load_plugin(const fs::path& library) {
   std::error_code error;
   const fs::path path = fs::canonical(library, error);
+  if (error == std::errc::not_enough_memory) throw std::bad_alloc();
   if (error) throw plugin_error(fmt::format("{}: {}", library.string(), error.message()));
   auto& libraries = loaded_libraries();
   auto it = libraries.find(path);

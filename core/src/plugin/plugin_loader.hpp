@@ -12,10 +12,7 @@ namespace cairn {
 
 /// What a sidecar file says of its plugin, without opening the shared object.
 struct Sidecar {
-  std::string name;
-  std::string version;
-  std::string licence;
-  std::string description;
+  std::string name, version, licence, description;
   std::filesystem::path library;
   struct Offered {
     std::string kind, name, summary;
@@ -33,7 +30,7 @@ std::vector<std::filesystem::path> plugin_folders(const PluginSearch& search,
 
 /// Loads a shared object (now, locally, for the rest of the process) and returns its manifest.
 /// Throws `Error` (plugin): the dynamic linker's own words if it cannot be loaded, no entry point,
-/// another fingerprint.
+/// another fingerprint; `std::bad_alloc` where the linker was short of memory.
 const PluginManifest& load_plugin(const std::filesystem::path& library);
 
 /// The fingerprint of the core itself.

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <map>
 #include <mutex>
+#include <new>
 #include <set>
 #include <tuple>
 
@@ -114,12 +115,10 @@ struct Registry::Impl {
                     fmt::format("this program adds {} twice", in_words(offer.kind, offer.name)));
       }
     }
-    Plugin& plugin = add_plugin({.name = kThisProgram,
-                                 .version = {},
-                                 .licence = {},
-                                 .description = {},
-                                 .library = {},
-                                 .offers = std::move(offers)});
+    Sidecar own;
+    own.name = kThisProgram;
+    own.offers = std::move(offers);
+    Plugin& plugin = add_plugin(std::move(own));
     plugin.target = std::move(target);
     plugin.state = Plugin::State::loaded;
     for (const auto& [kind, tag] : keys) {  // a plugin's of that name is handed out no more
@@ -156,9 +155,8 @@ struct Registry::Impl {
   Plugin& find(std::string_view kind, std::string_view name) {
     const auto it = index.find(Key(kind, name));
     if (it == index.end()) {
-      const std::vector<std::string> offered = names(kind);
-      std::string message =
-          fmt::format("there is no {}{}", in_words(kind, name), what_is_on_offer(name, offered));
+      std::string message = fmt::format("there is no {}{}", in_words(kind, name),
+                                        what_is_on_offer(name, names(kind)));
       for (const PluginProblem& problem : problems)
         message += fmt::format("\n  note: {}", problem.message);
       throw plugin_error(message);
@@ -194,6 +192,8 @@ struct Registry::Impl {
     try {
       Registrar registrar(target);
       manifest.register_plugin(registrar);
+    } catch (const std::bad_alloc&) {
+      throw;
     } catch (const std::exception& error) {
       throw plugin_error(fmt::format("{}: plugin '{}' failed while registering: {}",
                                      library.string(), manifest.name, error.what()));
@@ -296,6 +296,7 @@ Registry::Registry(const PluginSearch& search) : impl_(std::make_unique<Impl>())
   const auto add = [&](const Sidecar& sidecar) {
     std::error_code error;
     const fs::path canonical = fs::weakly_canonical(sidecar.library, error);
+    if (error == std::errc::not_enough_memory) throw std::bad_alloc();
     if (std::ranges::find(seen, canonical) != seen.end()) return;
     seen.push_back(canonical);
     impl_->add_plugin(sidecar);
@@ -303,12 +304,8 @@ Registry::Registry(const PluginSearch& search) : impl_(std::make_unique<Impl>())
   for (const fs::path& file : search.files) {
     // Named by the user: opened at once, so that what is wrong with it is said at once.
     const PluginManifest& manifest = load_plugin(file);
-    Sidecar sidecar{.name = manifest.name,
-                    .version = manifest.version,
-                    .licence = manifest.licence,
-                    .description = manifest.description,
-                    .library = fs::canonical(file),
-                    .offers = {}};
+    Sidecar sidecar{manifest.name,        manifest.version,    manifest.licence,
+                    manifest.description, fs::canonical(file), {}};
     for (int k = 0; k < manifest.offer_count; ++k) {
       sidecar.offers.push_back(
           {manifest.offers[k].kind, manifest.offers[k].name, manifest.offers[k].summary});
@@ -321,6 +318,7 @@ Registry::Registry(const PluginSearch& search) : impl_(std::make_unique<Impl>())
     for (const fs::directory_entry& entry : fs::directory_iterator(folder, error)) {
       if (entry.path().extension() == ".json") files.push_back(entry.path());
     }
+    if (error == std::errc::not_enough_memory) throw std::bad_alloc();
     std::ranges::sort(files);
     for (const fs::path& file : files) {
       try {

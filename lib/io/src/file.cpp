@@ -12,13 +12,14 @@
 #include <cstdio>
 #include <cstring>
 #include <limits>
+#include <new>
 #include <string>
 #include <system_error>
-#include <utility>
 
 #include <fmt/core.h>
 
 #include "cairn/io/format.hpp"
+#include "cairn/io/output_file.hpp"
 #include "cairn/runtime/error.hpp"
 
 namespace cairn {
@@ -27,6 +28,8 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kChunk = std::size_t{1} << 18;
+// Text packs to a tenth, repetitive text to a hundredth. gzip can make a thousandth of zeros.
+constexpr std::size_t kMostUnpacked = std::size_t{1} << 28, kMostExpansion = 200;
 
 [[noreturn]] void fail(const fs::path& file, const std::string& what) {
   throw Error(ErrorCode::input, fmt::format("{}: {}", file.string(), what));
@@ -44,8 +47,6 @@ class Descriptor {
     if (number_ >= 0) ::close(number_);
   }
   int number() const { return number_; }
-  /// Closes now, to learn of errors that show only then (a full disk, a network share).
-  bool close() { return ::close(std::exchange(number_, -1)) == 0; }
 
  private:
   int number_;
@@ -95,9 +96,10 @@ struct Inflater {
   ~Inflater() { inflateEnd(&stream); }
 };
 
-/// Unpacks one gzip member from the front of `packed` onto the end of `out`; returns its packed
-/// size.
-std::size_t unpack_member(const fs::path& file, std::string_view packed, std::string& out) {
+/// Unpacks one gzip member from the front of `packed`, what is left of `whole` bytes, onto the end
+/// of `out`; returns its packed size.
+std::size_t unpack_member(const fs::path& file, std::string_view packed, std::size_t whole,
+                          std::string& out) {
   Inflater inflater;
   z_stream& z = inflater.stream;
   std::size_t taken = 0;
@@ -115,6 +117,13 @@ std::size_t unpack_member(const fs::path& file, std::string_view packed, std::st
     const int status = inflate(&z, Z_NO_FLUSH);
     taken += feed - z.avail_in;
     out.resize(used + (room - z.avail_out));
+    if (out.size() > kMostUnpacked && out.size() / kMostExpansion > whole) {
+      fail(file,
+           fmt::format("is gzip data of {} bytes that unpacks to more than {} MB: graphs do not "
+                       "pack that well; if it is right, unpack it yourself",
+                       whole, out.size() >> 20));
+    }
+    if (status == Z_MEM_ERROR) throw std::bad_alloc();
     if (status == Z_STREAM_END) return taken;
     const bool starved = taken == packed.size() && z.avail_out > 0;
     if (status == Z_BUF_ERROR || (status == Z_OK && starved)) {
@@ -131,6 +140,7 @@ std::size_t unpack_member(const fs::path& file, std::string_view packed, std::st
 }
 
 std::string unpack(const fs::path& file, std::string_view packed) {
+  const std::size_t whole = packed.size();
   std::string out;
   while (!packed.empty()) {
     if (!is_gzip(packed)) {
@@ -138,16 +148,27 @@ std::string unpack(const fs::path& file, std::string_view packed) {
       if (packed.find_first_not_of('\0') == std::string_view::npos) break;
       fail(file, fmt::format("has {} bytes after the end of its gzip data", packed.size()));
     }
-    packed.remove_prefix(unpack_member(file, packed, out));
+    packed.remove_prefix(unpack_member(file, packed, whole, out));
   }
   return out;
 }
 
-std::string pack(const fs::path& file, std::string_view bytes) {
-  z_stream z{};
-  if (deflateInit2(&z, Z_DEFAULT_COMPRESSION, Z_DEFLATED, 15 + 16, 8, Z_DEFAULT_STRATEGY) != Z_OK) {
-    throw std::bad_alloc();
+/// Owns zlib's state for packing.
+struct Deflater {
+  z_stream stream{};
+  Deflater() {
+    const int status =
+        deflateInit2(&stream, Z_DEFAULT_COMPRESSION, Z_DEFLATED, 15 + 16, 8, Z_DEFAULT_STRATEGY);
+    if (status != Z_OK) throw std::bad_alloc();
   }
+  Deflater(const Deflater&) = delete;
+  Deflater& operator=(const Deflater&) = delete;
+  ~Deflater() { deflateEnd(&stream); }
+};
+
+std::string pack(const fs::path& file, std::string_view bytes) {
+  Deflater deflater;
+  z_stream& z = deflater.stream;
   std::string out;
   int status = Z_OK;
   do {
@@ -162,89 +183,20 @@ std::string pack(const fs::path& file, std::string_view bytes) {
     bytes.remove_prefix(feed - z.avail_in);
     out.resize(used + kChunk - z.avail_out);
   } while (status == Z_OK || (status == Z_BUF_ERROR && !bytes.empty()));
-  deflateEnd(&z);
   if (status != Z_STREAM_END) fail(file, "could not be packed");
   return out;
 }
 
-bool write_all(int descriptor, std::string_view bytes) {
+void write_to_standard_output(std::string_view bytes) {
+  std::fflush(stdout);  // what the program has printed itself comes first
   while (!bytes.empty()) {
-    const ssize_t put = ::write(descriptor, bytes.data(), bytes.size());
+    const ssize_t put = ::write(STDOUT_FILENO, bytes.data(), bytes.size());
     if (put < 0 && errno == EINTR) continue;
-    if (put < 0) return false;
+    if (put < 0 && errno == EPIPE) return;  // `cairn … | head`: its reader has enough
+    if (put < 0)
+      throw Error(ErrorCode::input, "standard output cannot be written: " + system_message(errno));
     bytes.remove_prefix(static_cast<std::size_t>(put));
   }
-  return true;
-}
-
-void write_to_standard_output(std::string_view bytes) {
-  // Through stdio, so that it comes after what the program has printed itself.
-  if (std::fwrite(bytes.data(), 1, bytes.size(), stdout) != bytes.size() ||
-      std::fflush(stdout) != 0) {
-    if (errno == EPIPE) return;  // `cairn … | head`: its reader has enough
-    throw Error(ErrorCode::input, "standard output cannot be written: " + system_message(errno));
-  }
-}
-
-/// Pipes, terminals, /dev/null: renaming a file over them would remove them.
-void write_in_place(const fs::path& file, std::string_view bytes) {
-  Descriptor output(::open(file.c_str(), O_WRONLY | O_CLOEXEC));
-  if (output.number() < 0 || !write_all(output.number(), bytes) || !output.close()) {
-    fail(file, "cannot be written: " + system_message(errno));
-  }
-}
-
-/// A file that is removed unless it was moved to its final place.
-class TemporaryFile {
- public:
-  /// `mode` as for open(2).
-  TemporaryFile(const fs::path& target, mode_t mode) : target_(target) {
-    for (int attempt = 0;; ++attempt) {
-      path_ = target;
-      path_ += fmt::format(".{}-{}.part", ::getpid(), attempt);
-      descriptor_ = ::open(path_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, mode);
-      if (descriptor_ >= 0) return;
-      if (errno != EEXIST || attempt == 100) {
-        fail(target, "cannot be written: " + system_message(errno));
-      }
-    }
-  }
-  TemporaryFile(const TemporaryFile&) = delete;
-  TemporaryFile& operator=(const TemporaryFile&) = delete;
-  ~TemporaryFile() {
-    if (descriptor_ >= 0) ::close(descriptor_);
-    if (!path_.empty()) ::unlink(path_.c_str());
-  }
-
-  /// On the disk before the name is: a power cut leaves the old file or the new one.
-  void write(std::string_view bytes) {
-    if (!write_all(descriptor_, bytes) || (::fsync(descriptor_) != 0 && errno != EINVAL) ||
-        ::close(std::exchange(descriptor_, -1)) != 0) {
-      fail(target_, "cannot be written: " + system_message(errno));
-    }
-  }
-  void set_mode(mode_t mode) { ::fchmod(descriptor_, mode); }
-  void move_to(const fs::path& target) {
-    if (::rename(path_.c_str(), target.c_str()) != 0) {
-      fail(target, "cannot be written: " + system_message(errno));
-    }
-    path_.clear();
-  }
-
- private:
-  fs::path target_, path_;
-  int descriptor_ = -1;
-};
-
-/// The file that a chain of symbolic links ends in, so that replacing it keeps the links.
-fs::path follow_links(fs::path file) {
-  std::error_code ignored;
-  for (int depth = 0; depth < 40 && fs::is_symlink(file, ignored); ++depth) {
-    const fs::path next = fs::read_symlink(file, ignored);
-    if (ignored) break;
-    file = next.is_absolute() ? next : file.parent_path() / next;
-  }
-  return file;
 }
 
 }  // namespace
@@ -254,21 +206,6 @@ std::string read_file(const fs::path& file) {
   return is_gzip(bytes) ? unpack(file, bytes) : bytes;
 }
 
-void check_writable(const fs::path& file) {
-  if (file == "-") return;
-  const fs::path target = follow_links(file);
-  struct stat status {};
-  const bool exists = ::stat(target.c_str(), &status) == 0;
-  if (exists && S_ISDIR(status.st_mode)) fail(file, "is a folder; expected a file name");
-  if (exists && !S_ISREG(status.st_mode)) return;
-  const fs::path folder = target.has_parent_path() ? target.parent_path() : ".";
-  if (::access(folder.c_str(), W_OK | X_OK) != 0) {
-    fail(file,
-         fmt::format("cannot be written: folder {}: {}", folder.string(), system_message(errno)));
-  }
-  const TemporaryFile attempt(target, 0666);
-}
-
 void write_file(const fs::path& file, std::string_view bytes) {
   if (file == "-") return write_to_standard_output(bytes);
   std::string packed;
@@ -276,16 +213,9 @@ void write_file(const fs::path& file, std::string_view bytes) {
     packed = pack(file, bytes);
     bytes = packed;
   }
-  const fs::path target = follow_links(file);
-  struct stat status {};
-  const bool exists = ::stat(target.c_str(), &status) == 0;
-  if (exists && S_ISDIR(status.st_mode)) fail(file, "is a folder; expected a file name");
-  if (exists && !S_ISREG(status.st_mode)) return write_in_place(target, bytes);
-
-  TemporaryFile temporary(target, 0666);
-  if (exists) temporary.set_mode(status.st_mode & 07777);
-  temporary.write(bytes);
-  temporary.move_to(target);
+  OutputFile output(file);
+  output.write(bytes);
+  output.finish();
 }
 
 }  // namespace cairn

@@ -27,6 +27,14 @@ std::uint32_t checksum(std::string_view text) {
       ::crc32(0, reinterpret_cast<const Bytef*>(text.data()), static_cast<uInt>(text.size())));
 }
 
+/// Calls again what a signal has interrupted.
+template <class Call>
+auto without_interrupts(const Call& call) {
+  auto result = call();
+  while (result < 0 && errno == EINTR) result = call();
+  return result;
+}
+
 /// "number text"
 std::optional<Journal::Record> parse_record(std::string_view rest) {
   Journal::Record record;
@@ -41,7 +49,8 @@ std::optional<Journal::Record> parse_record(std::string_view rest) {
 
 Journal::Journal(std::filesystem::path file, std::string identity, Sync sync)
     : file_(std::move(file)), sync_(sync) {
-  descriptor_ = ::open(file_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NONBLOCK, 0666);
+  descriptor_ = without_interrupts(
+      [&] { return ::open(file_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NONBLOCK, 0666); });
   if (descriptor_ < 0) fail("cannot be opened");
   try {
     if (::flock(descriptor_, LOCK_EX | LOCK_NB) != 0) {
@@ -166,11 +175,13 @@ void Journal::cut(const std::string& bytes, std::size_t size) {
   }
   note_ = fmt::format("{}: the last line was not whole: {} bytes were cut off, and kept in {}",
                       file_.string(), bytes.size() - size, kept.string());
-  if (::ftruncate(descriptor_, static_cast<off_t>(size)) != 0) fail("cannot be cut");
+  const auto cut_off = [&] { return ::ftruncate(descriptor_, static_cast<off_t>(size)); };
+  if (without_interrupts(cut_off) != 0) fail("cannot be cut");
 }
 
 void Journal::begin(const std::string& identity) {
-  if (::ftruncate(descriptor_, 0) != 0 || ::lseek(descriptor_, 0, SEEK_SET) < 0)
+  if (without_interrupts([&] { return ::ftruncate(descriptor_, 0); }) != 0 ||
+      ::lseek(descriptor_, 0, SEEK_SET) < 0)
     fail("cannot be written");
   size_ = 0;
   write_all(fmt::format("{}{}", kMagic, sealed(identity)));
@@ -211,7 +222,8 @@ void Journal::write_all(std::string_view bytes) {
     if (written < 0) {
       const int reason = errno;
       // Or the next record would continue half a line.
-      if (::ftruncate(descriptor_, size_) != 0 || ::lseek(descriptor_, size_, SEEK_SET) < 0)
+      const auto cut_back = [&] { return ::ftruncate(descriptor_, size_); };
+      if (without_interrupts(cut_back) != 0 || ::lseek(descriptor_, size_, SEEK_SET) < 0)
         fail("cannot be written, nor cut where its last whole record ends");
       errno = reason;
       fail("cannot be written");
@@ -222,7 +234,8 @@ void Journal::write_all(std::string_view bytes) {
 }
 
 void Journal::synchronise() {
-  if (::fdatasync(descriptor_) != 0) fail("cannot be written to the disk");
+  if (without_interrupts([&] { return ::fdatasync(descriptor_); }) != 0)
+    fail("cannot be written to the disk");
 }
 
 void Journal::fail(const std::string& what) const {

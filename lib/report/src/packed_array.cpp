@@ -10,6 +10,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <new>
 
 #include <fmt/core.h>
 
@@ -78,8 +79,10 @@ std::string from_base64(std::string_view text, std::string_view where) {
 std::string deflated(std::string_view bytes) {
   uLongf size = compressBound(bytes.size());
   std::string packed(size, '\0');
-  compress2(reinterpret_cast<Bytef*>(packed.data()), &size,
-            reinterpret_cast<const Bytef*>(bytes.data()), bytes.size(), Z_DEFAULT_COMPRESSION);
+  const int status =
+      compress2(reinterpret_cast<Bytef*>(packed.data()), &size,
+                reinterpret_cast<const Bytef*>(bytes.data()), bytes.size(), Z_DEFAULT_COMPRESSION);
+  if (status != Z_OK) throw std::bad_alloc();  // there is room for the result
   packed.resize(size);
   return packed;
 }
@@ -92,6 +95,7 @@ std::string inflated(std::string_view packed, std::size_t size, std::string_view
   uLongf got = size;
   const int result = uncompress(reinterpret_cast<Bytef*>(bytes.data()), &got,
                                 reinterpret_cast<const Bytef*>(packed.data()), packed.size());
+  if (result == Z_MEM_ERROR) throw std::bad_alloc();
   if (result != Z_OK || got != size) throw damaged(where, "the packed numbers are damaged");
   return bytes;
 }

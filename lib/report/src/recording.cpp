@@ -3,13 +3,11 @@
 
 #include <algorithm>
 #include <bit>
-#include <cerrno>
 #include <cmath>
-#include <cstdio>
-#include <system_error>
 
 #include <fmt/core.h>
 
+#include "cairn/io/output_file.hpp"
 #include "cairn/report/packed_array.hpp"
 #include "cairn/report/scene_json.hpp"
 #include "cairn/runtime/error.hpp"
@@ -23,10 +21,6 @@ constexpr std::string_view kOpening = R"({"format":"cairn-recording")";
 constexpr double kNumbersAtFullRate = 8e6;  // 32 MB as f32
 constexpr int kMostIterations = 1 << 30;
 
-struct CloseFile {
-  void operator()(std::FILE* file) const { std::fclose(file); }
-};
-
 /// Whether the positions of the k-th accepted iteration are kept: all of the first `dense`, then
 /// every second up to 2 dense, every fourth up to 4 dense …
 bool kept(int k, int dense) {
@@ -38,8 +32,9 @@ bool kept(int k, int dense) {
 }  // namespace
 
 struct RecordingWriter::Impl {
-  std::filesystem::path path;
-  std::unique_ptr<std::FILE, CloseFile> file;
+  explicit Impl(const std::filesystem::path& path) : file(path) {}
+
+  OutputFile file;
   std::string name, graph_file;
   Observer* next = nullptr;
 
@@ -53,12 +48,8 @@ struct RecordingWriter::Impl {
   bool last_kept = false;
   std::vector<float> positions;
 
-  void write(const std::string& line) {
-    // Errors are looked at in finish(): a full disk must not end the optimisation.
-    std::fputs(line.c_str(), file.get());
-    std::fputc('\n', file.get());
-    std::fflush(file.get());
-  }
+  /// Errors come up in finish(): a full disk must not end the optimisation.
+  void write(const std::string& line) { file.write(line + '\n'); }
   std::string positions_json(const Graph& graph, const Values& values) {
     copy_positions(graph, values, dimension, origin, positions);
     return packed_json(std::span<const float>(positions), Packing::base64);
@@ -67,16 +58,10 @@ struct RecordingWriter::Impl {
 
 RecordingWriter::RecordingWriter(const std::filesystem::path& file, std::string name,
                                  std::string graph_file, Observer* next)
-    : impl_(std::make_unique<Impl>()) {
-  impl_->path = file;
+    : impl_(std::make_unique<Impl>(file)) {
   impl_->name = std::move(name);
   impl_->graph_file = std::move(graph_file);
   impl_->next = next;
-  impl_->file.reset(std::fopen(file.c_str(), "wbe"));
-  if (!impl_->file) {
-    throw Error(ErrorCode::input, fmt::format("{}: cannot be written: {}", file.string(),
-                                              std::generic_category().message(errno)));
-  }
 }
 
 RecordingWriter::~RecordingWriter() = default;
@@ -132,11 +117,7 @@ void RecordingWriter::finish(const Graph& graph, const Summary& summary) {
   run.summary = summary;
   run.summary.iterations.clear();  // they have lines of their own
   impl_->write(fmt::format(R"({{"summary":{}}})", run_json(run)));
-  const bool failed = std::ferror(impl_->file.get()) != 0;
-  if (std::fclose(impl_->file.release()) != 0 || failed) {
-    throw Error(ErrorCode::input, fmt::format("{}: cannot be written: {}", impl_->path.string(),
-                                              std::generic_category().message(errno)));
-  }
+  impl_->file.finish();
 }
 
 // Reading -----------------------------------------------------------------------------------------

@@ -131,6 +131,18 @@ TEST_F(File, DoesNotReadDevicesThatMayNeverEnd) {
   EXPECT_EQ(read_file("/dev/null"), "");
 }
 
+TEST_F(File, RefusesWhatUnpacksToFarMoreThanGraphsDo) {
+  const std::string megabyte(1 << 20, '0');
+  write_file(path("one.gz"), megabyte);
+  const std::string member = raw(path("one.gz"));
+  std::string members;
+  for (int k = 0; k < 100; ++k) members += member;
+  EXPECT_EQ(read_file(put("good.gz", members)).size(), megabyte.size() * 100);
+  for (int k = 0; k < 200; ++k) members += member;
+  EXPECT_THAT(message_of([&] { read_file(put("bomb.gz", members)); }),
+              HasSubstr("unpacks to more than 256 MB"));
+}
+
 TEST_F(File, ChoosesTheFormatByContentUnlessItIsNamed) {
   ReadReport report;
   const std::string edge2 = "EDGE2 0 1 1 0 0 9 1 4 16 2 3\n";

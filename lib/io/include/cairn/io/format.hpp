@@ -69,7 +69,8 @@ CAIRN_API Graph read_graph(const std::filesystem::path& file, Registry& registry
 CAIRN_API void write_graph(const Graph& graph, const std::filesystem::path& file,
                            Registry& registry, std::string_view format = {});
 
-/// The bytes of a file, unpacked if they are gzip. Throws `Error` (input).
+/// The bytes of a file, unpacked if they are gzip. Throws `Error` (input), also where they unpack
+/// to more than 256 MB and 200 times the file.
 CAIRN_API std::string read_file(const std::filesystem::path& file);
 
 /// Tries what `write_file` needs, and leaves nothing: throws `Error` (input) where its folder is

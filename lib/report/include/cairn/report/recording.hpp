@@ -17,8 +17,9 @@ namespace cairn {
 ///
 /// Every iteration has a line with its numbers. Positions stand in every accepted one up to about
 /// 32 MB, then in every second up to twice as many iterations, every fourth up to four times as
-/// many …; and always in the last. The file is written as the run goes, so that a run that is
-/// killed leaves what it had; a name that ends in .gz is not packed.
+/// many …; and always in the last. The file is written beside its name as the run goes
+/// (`OutputFile`) and gets that name in `finish`; a run that is killed leaves what it had in
+/// FILE.PID-0.part. A name that ends in .gz is not packed.
 class CAIRN_API RecordingWriter : public Observer {
  public:
   /// Opens the file, throwing `Error` (input) if it cannot be written. `next`, unless null, is

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <exception>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "session.hpp"
+
+namespace cairn::app {
+
+/// Writes the results of a command, one after the other. One that fails (a full disk) costs none of
+/// the others: the first error is thrown at the end.
+///
+///     Results results(session);
+///     results.write(options.output, [&] { write_graph(graph, options.output, registry); });
+///     results.print([&] { session.print(…); });
+///     results.finish();
+class Results {
+ public:
+  explicit Results(const Session& session) : session_(session) {}
+
+  /// Runs `write`, which writes `file`; does nothing if that is empty.
+  void write(const std::string& file, const std::function<void()>& write);
+  /// Runs what writes to other places, such as the report or standard output.
+  void add(const std::function<void()>& write);
+  /// Throws the first error again. Those after it have been noted on standard error.
+  void finish() const;
+
+ private:
+  const Session& session_;
+  std::exception_ptr first_;
+};
+
+}  // namespace cairn::app

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+
+#include "cairn/runtime/api.hpp"
+
+namespace cairn {
+
+/// A file that is written from front to back, and replaces what was there only when it is whole:
+/// it is written beside its name, synchronised to the disk and renamed. Until `finish` has returned
+/// the old file stands, and if it never does, nothing is left but that. Pipes, terminals and
+/// devices are written in place. Names of links stay links.
+class CAIRN_API OutputFile {
+ public:
+  /// Throws `Error` (input) where nothing can be written under that name.
+  explicit OutputFile(const std::filesystem::path& file);
+  OutputFile(const OutputFile&) = delete;
+  OutputFile& operator=(const OutputFile&) = delete;
+  ~OutputFile();
+
+  /// Adds bytes. What fails is remembered, and nothing is written after it: a full disk need not
+  /// end what goes on meanwhile.
+  void write(std::string_view bytes) noexcept;
+  /// The file has all its bytes. Throws `Error` (input) if any could not be written.
+  void finish();
+
+ private:
+  void open_beside(int mode);
+  [[noreturn]] void fail(int reason) const;
+
+  std::filesystem::path file_;    // as it was named
+  std::filesystem::path target_;  // that, with links followed
+  std::filesystem::path beside_;  // empty: in place
+  int descriptor_ = -1;
+  int failure_ = 0;  // of the first write that failed
+};
+
+}  // namespace cairn

@@ -1,0 +1,21 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: BSD-3-Clause
+# Every kind of violation is found in a program that does all of them, and in one that is not there an error.
+#
+#   notices_what_is_wrong.sh DRIVER CARELESS LIBRARY FOLDER
+set -euo pipefail
+driver=$1 careless=$2 library=$3 folder=$4
+
+code=0
+found=$("$driver" --program "$careless" --library "$library" --folder "$folder" --careless) || code=$?
+printf '%s\n' "$found"
+[[ $code == 1 ]] || { printf 'exit code %s; expected 1\n' "$code" >&2; exit 1; }
+for violation in 'killed by' 'exit code 0, but result.txt differs' 'left behind: temporary.txt' 'exit code 1' \
+  'result.txt is neither the old file nor the new one' 'one output failed, and second.txt was not written either' \
+  'no message on standard error' 'nothing was lost, and yet'; do
+  [[ $found == *"$violation"* ]] || { printf 'not found: %s\n' "$violation" >&2; exit 1; }
+done
+
+code=0
+"$driver" --program "$folder/none" --library "$library" --folder "$folder" --careless 2>/dev/null || code=$?
+[[ $code == 2 ]] || { printf 'a program that is not there: exit code %s; expected 2\n' "$code" >&2; exit 1; }
