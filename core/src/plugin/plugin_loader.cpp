@@ -143,9 +143,9 @@ Sidecar read_sidecar(const fs::path& file) {
   sidecar.version = text_of(object, "version");
   sidecar.licence = text_of(object, "licence");
   sidecar.description = text_of(object, "description");
-  const fs::path library = text_of(object, "file");
-  if (library.has_parent_path()) throw broken("names a file in another folder");
-  sidecar.library = file.parent_path() / library;
+  sidecar.library = file.parent_path() / text_of(object, "file");
+  if (sidecar.library.parent_path() != file.parent_path() || sidecar.library.extension() != ".so")
+    throw broken("names no file of its own folder");
   const boost::json::value* offers = object->if_contains("offers");
   if (!offers || !offers->is_array()) throw broken("has no list 'offers'");
   for (const boost::json::value& offer : offers->get_array()) {
