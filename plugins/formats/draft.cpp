@@ -95,6 +95,12 @@ void Draft::finish_factor(std::span<const double> as_in_file) {
     ++report_->repaired;
     return;
   }
+  // Semidefinite is fine: it leaves a direction open. But the square of any numbers read as iSAM's
+  // root is semidefinite: there they must not fit another meaning.
+  std::vector<double> root(information.size());
+  const bool zero = std::ranges::all_of(information, [](double x) { return x == 0.0; });
+  const bool semidefinite = !zero && square_root(information, kind.residual, root);
+  if (semidefinite && format_ != "isam") return;
   std::string advice;
   if (kind.residual == 3 && kind.type->is_relative()) {
     if (as_in_file.empty()) as_in_file = information;
@@ -109,10 +115,7 @@ void Draft::finish_factor(std::span<const double> as_in_file) {
           "ReadOptions::repair_information";
     }
   }
-  // Semidefinite is fine, unless the numbers fit another meaning.
-  std::vector<double> root(information.size());
-  const bool zero = std::ranges::all_of(information, [](double x) { return x == 0.0; });
-  if (advice.empty() && !zero && square_root(information, kind.residual, root)) return;
+  if (semidefinite && advice.empty()) return;
   fail(factor.line,
        fmt::format(
            "the information of {} is not positive semidefinite or zero (pivot {} of its Cholesky "

@@ -145,7 +145,8 @@ Sidecar read_sidecar(const fs::path& file) {
   Sidecar sidecar{text_of(object, "name"),    text_of(object, "version"),
                   text_of(object, "licence"), text_of(object, "description"),
                   text_of(object, "file"),    {}};
-  if (sidecar.library.has_parent_path()) throw broken("names a file in another folder");
+  if (sidecar.library.has_parent_path() || sidecar.library.extension() != ".so")
+    throw broken("names no file of its own folder");
   sidecar.library = file.parent_path() / sidecar.library;
   const boost::json::value* offers = object->if_contains("offers");
   if (!offers || !offers->is_array()) throw broken("has no list 'offers'");

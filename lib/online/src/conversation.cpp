@@ -2,6 +2,7 @@
 #include "cairn/online/conversation.hpp"
 
 #include <algorithm>
+#include <limits>
 
 #include <fmt/core.h>
 
@@ -21,6 +22,11 @@ std::string Conversation::restore() {
     }
     number_ = record.number;
     ++counts_.restored;
+  }
+  if (number_ == std::numeric_limits<std::int64_t>::max()) {
+    throw Error(
+        ErrorCode::input,
+        fmt::format("the journal's last line has the number {}: no line can follow it", number_));
   }
   return fmt::format("RESTORED {} variables {} factors {}\n", number_, session_.variable_count(),
                      session_.factor_count());

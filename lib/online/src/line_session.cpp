@@ -64,7 +64,12 @@ void LineSession::restore(std::string_view line, std::int64_t number) {
   const Words words = split(line);
   if (words.empty()) return;
   silent_ = true;
-  perform(line, words, reply);
+  try {
+    perform(line, words, reply);
+  } catch (...) {
+    silent_ = false;
+    throw;
+  }
   silent_ = false;
 }
 

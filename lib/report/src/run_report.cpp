@@ -2,6 +2,7 @@
 #include "cairn/report/run_report.hpp"
 
 #include <initializer_list>
+#include <stdexcept>
 #include <utility>
 
 #include <fmt/core.h>
@@ -38,6 +39,11 @@ BenchReport read_bench(const json::object& report, std::string_view text) {
 
 std::vector<ReportedCovariance> read_covariances(const json::value& covariance,
                                                  const std::string& where) {
+  const auto refuse = [&](const std::string& why) {
+    return Error(
+        ErrorCode::input,
+        fmt::format("{}: member 'covariance' is not as cairn optimize writes it: {}", where, why));
+  };
   std::vector<ReportedCovariance> all;
   try {
     for (const json::value& block : covariance.at("blocks").as_array()) {
@@ -49,9 +55,9 @@ std::vector<ReportedCovariance> read_covariances(const json::value& covariance,
       }
     }
   } catch (const boost::system::system_error& error) {
-    throw Error(ErrorCode::input,
-                fmt::format("{}: member 'covariance' is not as cairn optimize writes it: {}", where,
-                            error.code().message()));
+    throw refuse(error.code().message());
+  } catch (const std::out_of_range&) {  // of Boost 1.81, where a member is not there
+    throw refuse("a member of a block is missing");
   }
   return all;
 }

@@ -384,6 +384,7 @@ TEST_F(PluginBoundary, ABrokenSidecarHurtsNobodyElse) {
   write("not_json.json", "{\"name\": \"x\",");
   write("odd_offer.json", whole + R"("file": "x.so", "offers": [{"kind": "loss", "name": 7}]})");
   write("outside.json", whole + R"("file": "../x.so", "offers": []})");
+  write("parent.json", whole + R"("file": "..", "offers": []})");
   copy("nothing_wrong", "plain");
   cairn::Registry registry(search_in({folder()}));
   EXPECT_NE(registry.make<cairn::Loss>("plain"), nullptr);
@@ -399,7 +400,8 @@ TEST_F(PluginBoundary, ABrokenSidecarHurtsNobodyElse) {
                   about("no_offers.json", "has no list 'offers'"),
                   about("not_json.json", "is not JSON"),
                   about("odd_offer.json", "has no text 'name'"),
-                  about("outside.json", "names a file in another folder")));
+                  about("outside.json", "names no file of its own folder"),
+                  about("parent.json", "names no file of its own folder")));
 }
 
 TEST_F(PluginBoundary, ASidecarOfAnotherBuildIsNoticed) {

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <sstream>
 #include <stdexcept>
 #include <string>
@@ -104,6 +105,17 @@ TEST_F(ConversationTest, WhatIsAcknowledgedIsInTheFile) {
   conversation.take("SET third");
   conversation.finish();
   EXPECT_THAT(written(), HasSubstr("SET third"));
+}
+
+TEST_F(ConversationTest, RefusesAJournalThatLeavesNoNumber) {
+  {
+    Journal log = journal();
+    log.append(std::numeric_limits<std::int64_t>::max(), "SET last");
+  }
+  Notebook notebook;
+  Journal log = journal();
+  Conversation conversation(notebook, &log);
+  EXPECT_THROW(conversation.restore(), Error);
 }
 
 TEST_F(ConversationTest, GoesOnWhereTheJournalEnds) {

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "cairn/online/online_session.hpp"
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <cstdint>
+#include <filesystem>
 #include <memory>
 #include <string>
 #include <utility>
@@ -136,6 +139,18 @@ TEST_F(OnlineSessionTest, RestoredLinesGiveTheSameEstimateWithoutAnswers) {
   for (const std::string& line : lines) session_->restore(line, ++number_);
   EXPECT_EQ(take("ESTIMATE ALL").text, estimate);
   EXPECT_THROW(session_->restore("NONSENSE", 99), Error);
+  EXPECT_THAT(take("CHI2").text, HasSubstr("\nOK "));  // answers are given again
+}
+
+TEST_F(OnlineSessionTest, ASaveThatIsRestoredWritesNothing) {
+  const std::filesystem::path file = std::filesystem::temp_directory_path() /
+                                     ("cairn_save_" + std::to_string(::getpid()) + ".g2o");
+  std::filesystem::remove(file);
+  for (const std::string& line : two_poses_) session_->restore(line, ++number_);
+  session_->restore("SAVE " + file.string(), ++number_);
+  EXPECT_FALSE(std::filesystem::exists(file));
+  EXPECT_THAT(take("SAVE " + file.string()).text, StartsWith("OK 6 "));
+  EXPECT_TRUE(std::filesystem::remove(file));
 }
 
 /// An optimizer that ends before it has converged.

@@ -26,5 +26,15 @@ TEST(InformationOrder, GivesAHintWhereAnotherOneWouldFit) {
       ::testing::EndsWith("; the numbers would fit TORO's order of information (format toro)"));
 }
 
+TEST(InformationOrder, ASemidefiniteMatrixIsReadAgainWhateverElseItsNumbersFit) {
+  // Rank two, and a diagonal that a root of iSAM could have.
+  const Reading line = read("isam", "EDGE2 0 1 1 0 0 50 1 20 0 3 100\n");
+  EXPECT_THAT(line.information(0), ElementsAre(2500, 50, 1000, 1, 20, 10409));
+  for (const char* format : {"g2o", "toro"}) {
+    const Reading back = read(format, write(format, line.graph));
+    EXPECT_EQ(difference(line.graph, back.graph), "") << format;
+  }
+}
+
 }  // namespace
 }  // namespace cairn::test

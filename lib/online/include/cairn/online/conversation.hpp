@@ -31,7 +31,7 @@ class CAIRN_API Conversation {
       : session_(session), journal_(journal) {}
 
   /// Takes in again what the journal has; numbers of lines go on from there. Returns the answer:
-  /// "RESTORED …". Throws `Error` where a line is refused now.
+  /// "RESTORED …". Throws `Error` where a line is refused now, or has the largest of all numbers.
   std::string restore();
   /// Takes the next line, without its end. What changes anything is in the journal, and committed,
   /// before the reply is handed out.

@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "fuzz/targets/sessions.hpp"
+
+#include <algorithm>
+#include <array>
+
+#include <fmt/format.h>
+
+#include "fuzz/targets/target.hpp"
+
+namespace cairn::fuzz {
+
+SessionSettings session_settings(std::uint8_t choice) {
+  static constexpr std::array kEstimators = {"incremental_cholesky",
+                                             "incremental_cholesky:accuracy=0,full_every=5",
+                                             "batch", "periodic_batch:every=4"};
+  static constexpr std::array kOutputs = {"none", "last", "changed", "all"};
+  static constexpr std::array kMarginals = {"none", "last", "diagonal", "none"};
+  return {.estimator = kEstimators[choice & 3],
+          .online = {.read = {},
+                     .automatic = (choice & 64) == 0,
+                     .output = kOutputs[choice >> 2 & 3],
+                     .marginals = kMarginals[choice >> 4 & 3]}};
+}
+
+OwnedSession::OwnedSession(const SessionSettings& settings)
+    : format_(registry().make<StreamFormat>("g2o")),
+      estimator_(registry().make<Estimator>(settings.estimator)),
+      lines_(std::make_unique<OnlineSession>(*estimator_, *format_, registry(), settings.online)) {
+  if (settings.online.marginals == "last") estimator_->keep_marginals(KeptMarginals::last);
+  if (settings.online.marginals == "diagonal") estimator_->keep_marginals(KeptMarginals::diagonal);
+}
+
+std::string difference(Estimator& a, Estimator& b) {
+  if (a.variables() != b.variables()) return "the variables";
+  if (a.factors() != b.factors()) return "the factors";
+  for (const Id id : a.variables()) {
+    const std::span<const double> x = a.state(id);
+    const std::vector<double> copy(x.begin(), x.end());
+    const std::span<const double> y = b.state(id);
+    const auto same = [](double p, double q) { return p == q || (p != p && q != q); };
+    if (!std::ranges::equal(copy, y, same)) {
+      return fmt::format("the estimate of {}: {} and {}", id, fmt::join(copy, " "),
+                         fmt::join(y, " "));
+    }
+  }
+  return {};
+}
+
+bool writes_a_file(std::string_view line) {
+  const std::size_t word = line.find_first_not_of(" \t\r");
+  return word != std::string_view::npos && line.substr(word).starts_with("SAVE");
+}
+
+std::vector<std::string> conversations() {
+  return {
+      "VERTEX_SE2 0 0 0 0\nFIX 0\nNEW VERTEX_SE2 1\nEDGE_SE2 0 1 1 0 0.1 100 0 0 100 0 100\n"
+      "ESTIMATE ALL\nCOVARIANCE 0 1\nCHI2\nQUIT\n",
+      "VERTEX_SE2 0 0 0 0\nNEW VERTEX_SE2 1\nEDGE_SE2 0 1 1 0 0.1 9 0 0 9 0 9\n"
+      "NEW VERTEX_SE2 2\nEDGE_SE2 1 2 1 0 0.1 9 0 0 9 0 9\nEDGE_SE2 0 2 2 0.1 0.2 9 0 0 9 0 9\n"
+      "CHANGE 1 1 0.1 0.1 5 0 0 5 0 5\nMARGINALIZE 0\nREMOVE FACTOR 2\nSOLVE\nFULL\n",
+      "VERTEX_SE2 0 0 0 0\nVERTEX_XY 3 1 1\nEDGE_SE2_XY 0 3 1 1 4 0 4\n"
+      "EDGE_PRIOR_SE2 0 0 0 0 1 0 0 1 0 1\nREMOVE VARIABLE 3\nESTIMATE 0\nCOVARIANCE 0 0\n",
+      "VERTEX_SE3:QUAT 0 0 0 0 0 0 0 1\nNEW VERTEX_SE3:QUAT 1\n"
+      "EDGE_SE3:QUAT 0 1 1 0 0 0 0 0.1 1 9 0 0 0 0 0 9 0 0 0 0 9 0 0 0 9 0 0 9 0 9\n"
+      "PARAMS_SE3OFFSET 0 0 0 0.1 0 0 0 1\nVERTEX_TRACKXYZ 2 1 1 1\n"
+      "EDGE_SE3_TRACKXYZ 1 2 0 0.1 1 1 5 0 0 5 0 5\nESTIMATE ALL\nCOVARIANCE 0 2\nFULL\n"
+      "MARGINALIZE 1\nCHI2\n",
+      "VERTEX_SE2 0 1e200 0 0\nFIX 0\nVERTEX_SE2 1 -1e200 0 0\n"
+      "EDGE_SE2 0 1 1 0 0 1e-30 0 0 1e30 0 1\nSOLVE\nCHI2\nCOVARIANCE 1 1\n",
+      "# a comment\n\nNONSENSE\nEDGE_SE2 7 8 1 0 0 1 0 0 1 0 1\nCHANGE 0 1\nREMOVE VARIABLE 9\n"
+      "MARGINALIZE\nNEW VERTEX_SE9 1\nFIX 3\n"};
+}
+
+std::vector<std::string> protocol_words() {
+  std::vector<std::string> all = {"NEW ",
+                                  "REMOVE FACTOR ",
+                                  "REMOVE VARIABLE ",
+                                  "CHANGE ",
+                                  "MARGINALIZE ",
+                                  "SOLVE\n",
+                                  "FULL\n",
+                                  "COVARIANCE ",
+                                  "ESTIMATE ",
+                                  "ESTIMATE ALL\n",
+                                  "CHI2\n",
+                                  "QUIT\n",
+                                  "FIX ",
+                                  "\n",
+                                  "1e308",
+                                  "-1",
+                                  " 1 0 0 1 0 1\n"};
+  for (const char* kind : {"variable", "factor"}) {
+    for (const std::string& tag : registry().names(kind)) all.push_back(tag + " ");
+  }
+  return all;
+}
+
+}  // namespace cairn::fuzz
