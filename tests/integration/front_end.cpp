@@ -127,7 +127,9 @@ bool FrontEnd::match_one() {
 void OnlinePolicy::SetUp() {
   const Registry registry;
   if (!registry.has("pose_policy", "compact_pose") || !registry.has("registration", "recorded") ||
-      !registry.has("estimator", "incremental_cholesky"))
+      !registry.has("estimator", "incremental_cholesky") || !registry.has("types", "slam2d") ||
+      !registry.has("stream_format", "g2o") || !registry.has("generator", "manhattan") ||
+      !registry.has("linear_solver", "block_cholesky"))
     GTEST_SKIP() << "compact_pose, or what it needs, is missing";
 }
 

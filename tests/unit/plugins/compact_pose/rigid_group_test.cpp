@@ -161,8 +161,9 @@ TEST(RigidGroup, RefusesAGroupOfPosesThatComposeInAnotherWay) {
 TEST(RigidGroup, RefusesWhatHasNoOrientation) {
   Registry registry;
   for (const char* tag : {"VERTEX_XY", "VERTEX_TRACKXYZ"}) {
+    const auto type = registry.variable_type(tag);
     try {
-      const RigidGroup group(registry.variable_type(tag));
+      const RigidGroup group(type);
       FAIL() << "no error for " << tag;
     } catch (const Error& error) {
       EXPECT_EQ(error.code(), ErrorCode::usage);
