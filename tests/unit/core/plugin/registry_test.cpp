@@ -193,7 +193,7 @@ TEST(Registry, ANameOfAPluginAndOfTheProgramIsAnErrorForWhoeverAsks) {
 TEST(Registry, MayBeUsedByManyThreads) {
   Registry registry;
   // What the threads ask for: an exception in one of them would end all tests.
-  registry.factor_type("EDGE_SE2");
+  Registry().factor_type("EDGE_SE2");
   Registry().make<Optimizer>("levenberg_marquardt");
   std::vector<std::jthread> threads;
   std::vector<std::shared_ptr<const FactorType>> types(8);

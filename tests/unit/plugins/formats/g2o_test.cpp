@@ -108,7 +108,9 @@ TEST(G2o, RefusesAnUnknownTagWithTheNearestSpellingAndAllOnOffer) {
               HasSubstr("file:2: unknown tag 'EDGE_S2'; did you mean 'EDGE_SE2'?; on offer: "));
   for (const char* tag : {"VERTEX_SE2", "EDGE_PRIOR_XY", "FIX", "EDGE_SE3_PRIOR"})
     EXPECT_THAT(message, HasSubstr(tag));
-  if (Registry().has("types", "slam3d")) EXPECT_THAT(message, HasSubstr("EDGE_SE3:QUAT"));
+  if (Registry().has("types", "slam3d")) {
+    EXPECT_THAT(message, HasSubstr("EDGE_SE3:QUAT"));
+  }
 }
 
 // Sensor offsets ---------------------------------------------------------------------------------
