@@ -28,8 +28,8 @@ struct Reference {
 /// memory" where memory or threads were refused, 3 where an output was), a message on standard
 /// error, in every file the old content or the new one, no other file; where one call on an output
 /// failed once, all other outputs written; and all that standard output acknowledged in the
-/// journal. A session that memory ends in the midst of a line may leave a map in which a part of that
-/// line is. Everything else is a violation: a crash, a process that does not end, half a file.
+/// journal. A session that memory ends in the midst of a line may leave a map in which a part of
+/// that line is. Everything else is a violation: a crash, a process that does not end, half a file.
 Verdict judge(const Trial& trial, const Fault& fault, const Reference& reference,
               const RunResult& result);
 
