@@ -56,8 +56,8 @@ std::vector<ReportedCovariance> read_covariances(const json::value& covariance,
     }
   } catch (const boost::system::system_error& error) {
     throw refuse(error.code().message());
-  } catch (const std::out_of_range&) {  // of Boost 1.81, where a member is not there
-    throw refuse("a member of a block is missing");
+  } catch (const std::logic_error& error) {  // of Boost 1.81: a member that is missing, or no array
+    throw refuse(error.what());
   }
   return all;
 }

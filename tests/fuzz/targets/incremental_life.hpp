@@ -49,8 +49,7 @@ class IncrementalLife {
   // What must hold.
   void expect_same_graph(const Graph& estimated);
   void expect_chi2();
-  void expect_near_minimum(const UpdateReport& report);
-  void expect_minimum();
+  void expect_minimum(double fraction, double slack);
   void expect_covariances(const Graph& graph, double tolerance);
   void expect_unchanged(const std::map<Id, std::vector<double>>& states);
   /// Throws `Finding` unless `holds`; `what()` is called only then.

@@ -66,8 +66,11 @@ TEST(ReadReport, RefusesWhatIsNoReport) {
   EXPECT_THAT(refusal("{}"), HasSubstr("is no report of cairn optimize"));
   EXPECT_THAT(refusal(R"({"chi2": {}, "iterations": [], "covariance": {"blocks": [{"id": "x"}]}})"),
               HasSubstr("member 'covariance' is not as cairn optimize writes it"));
-  EXPECT_THAT(refusal(R"({"chi2": {}, "iterations": [], "covariance": {"blocks": [{"id": 1}]}})"),
-              HasSubstr("member 'covariance' is not as cairn optimize writes it"));
+  for (const char* blocks : {"[{\"id\": 1}]", "1", "[1]", "[{\"id\": 1, \"covariance\": 2}]"}) {
+    EXPECT_THAT(refusal(R"({"chi2": {}, "iterations": [], "covariance": {"blocks": )" +
+                        std::string(blocks) + "}}"),
+                HasSubstr("member 'covariance' is not as cairn optimize writes it"));
+  }
 }
 
 }  // namespace
