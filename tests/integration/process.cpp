@@ -68,11 +68,12 @@ int wait_for(pid_t child) {
   return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
 }
 
-/// Prints that a plugin is missing, by which a build without it skips the test.
-void show_what_is_missing(const std::string& message) {
-  if (message.find("there is no ") != std::string::npos ||
-      message.find("nothing of the name ") != std::string::npos)
-    std::cout << message << std::flush;
+/// Prints what says that a plugin is missing, by which a build without it skips the test.
+void show_what_is_missing(const std::string& text) {
+  for (const char* sign : {"there is no ", "unknown tag '", "nothing of the name "}) {
+    if (const auto at = text.find(sign); at != std::string::npos)
+      std::cout << text.substr(at, 200) << std::endl;
+  }
 }
 
 /// A child with its three streams on pipes.
@@ -154,6 +155,7 @@ class Child {
     outcome.exit_code = wait_for(pid_);
     EXPECT_TRUE(sent) << "the program never said '" << cue << "'; it said: " << outcome.err;
     show_what_is_missing(outcome.err);
+    show_what_is_missing(outcome.out);
     return outcome;
   }
 

@@ -121,7 +121,7 @@ std::size_t unpack_member(const fs::path& file, std::string_view packed, std::si
       fail(file,
            fmt::format("is gzip data of {} bytes that unpacks to more than {} MB: graphs do not "
                        "pack that well; if it is right, unpack it yourself",
-                       whole, out.size() >> 20));
+                       whole, kMostUnpacked >> 20));
     }
     if (status == Z_MEM_ERROR) throw std::bad_alloc();
     if (status == Z_STREAM_END) return taken;
