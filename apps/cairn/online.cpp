@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // cairn online: measurements from standard input as they come, estimates to standard output.
+#include <algorithm>
 #include <exception>
 #include <filesystem>
 #include <memory>
@@ -20,6 +21,7 @@
 #include "cairn/runtime/plugin_call.hpp"
 #include "cairn/runtime/threads.hpp"
 #include "cairn/solve/estimator.hpp"
+#include "cairn/update/marginal_prior.hpp"
 #include "commands.hpp"
 #include "graph_files.hpp"
 #include "interrupt.hpp"
@@ -178,24 +180,25 @@ void converse(Conversation& conversation, LineInput& input, bool kept, const Ses
   }
 }
 
-/// Writes the map. Where its format cannot express the graph (what marginalization left is in
-/// none), the poses alone go to a file beside it, unless there is one of that name already.
-void write_map(const Graph& graph, const std::string& file, const Session& session,
-               Registry& registry) {
+bool is_marginalized(const Graph& graph) {
+  return std::ranges::any_of(graph.factor_pools(), [](const FactorPool& pool) {
+    return pool.size() > 0 && pool.type->tag() == MarginalPrior::kTag;
+  });
+}
+
+/// What marginalization leaves is in no format of graphs: the poses alone go to a file beside the
+/// map that cannot be written, unless there is one of that name already.
+void write_map(const Graph& graph, const std::string& file, Session& session) {
   try {
-    write_graph(graph, file, registry);
+    write_graph(graph, file, session.registry());
   } catch (const Error&) {
-    const std::exception_ptr reason = std::current_exception();
     const std::string beside = file + ".tum";
     std::error_code ignored;
-    if (std::filesystem::exists(beside, ignored)) throw;
-    try {
-      write_graph(graph, beside, registry, "tum");
+    if (is_marginalized(graph) && !std::filesystem::exists(beside, ignored)) {
+      write_graph(graph, beside, session.registry(), "tum");
       session.note(fmt::format("the poses alone are in {}", beside));
-    } catch (const Error& error) {
-      session.note(error.what());
     }
-    std::rethrow_exception(reason);
+    throw;
   }
 }
 
@@ -234,8 +237,7 @@ int run(OnlineOptions options, Session& session) {
     within_a_line = true;
   }
   try {
-    if (!options.output.empty())
-      write_map(lines.estimator().graph(), options.output, session, session.registry());
+    if (!options.output.empty()) write_map(lines.estimator().graph(), options.output, session);
   } catch (const std::exception& error) {
     if (!failure) throw;
     session.note(error.what());  // the reason comes last, as the error

@@ -174,7 +174,8 @@ int run(const ReplayOptions& options, Session& session) {
                   replay_all(loaded.graph, arrivals, *estimator, checker ? &*checker : nullptr,
                              options, guard, session, replay);
                 });
-  } catch (...) {
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::plugin) throw;
     failure = std::current_exception();
   }
   if (failure) {
