@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "integration/process.hpp"
+#include "support/components.hpp"
 
 namespace cairn::test {
 namespace {
@@ -91,6 +92,7 @@ TEST_F(InfoCommand, SuspectsUnitsWhereChi2IsFarFromTheDegreesOfFreedom) {
 }
 
 TEST_F(InfoCommand, SkippedLinesAreCountedAndToldOnStandardError) {
+  CAIRN_NEEDS("types", "slam2d");
   const std::string text = kChain + "EDGE_UNHEARD_OF 0 1 2 3\n";
   write_text(folder_.file("odd.g2o"), text);
   EXPECT_EQ(cairn({"info", folder_.file("odd.g2o")}).exit_code, 3);

@@ -11,6 +11,7 @@
 
 #include "cairn/plugin/registry.hpp"
 #include "integration/process.hpp"
+#include "support/components.hpp"
 
 namespace cairn::test {
 namespace {
@@ -234,6 +235,7 @@ TEST_F(MarginalsCommand, OptimizeReportsTheSameBlocksAndThePageDrawsThem) {
 }
 
 TEST_F(MarginalsCommand, OptimizeKeepsItsEstimateWhereThereAreNoCovariances) {
+  CAIRN_NEEDS("types", "slam2d");
   const std::string file = folder_.file("loose.g2o"), best = folder_.file("best.g2o");
   write_text(file, "VERTEX_XY 0 0 0\nVERTEX_SE2 1 1 0 0\nFIX 0\nEDGE_SE2_XY 1 0 -1 0.5 1 0 1\n");
   const Outcome outcome =

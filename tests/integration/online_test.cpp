@@ -9,6 +9,7 @@
 
 #include "cairn/plugin/registry.hpp"
 #include "integration/process.hpp"
+#include "support/components.hpp"
 
 namespace cairn::test {
 namespace {
@@ -39,7 +40,9 @@ std::string joined(const std::vector<std::string>& lines) {
 class Online : public testing::Test {
  protected:
   void SetUp() override {
-    if (!Registry().has("estimator", kBatch)) GTEST_SKIP() << "there is no estimator " << kBatch;
+    CAIRN_NEEDS("estimator", kBatch);
+    CAIRN_NEEDS("stream_format", "g2o");
+    CAIRN_NEEDS("types", "slam2d");
   }
   TemporaryFolder folder_;
 };

@@ -12,6 +12,7 @@
 
 #include "cairn/plugin/registry.hpp"
 #include "integration/process.hpp"
+#include "support/components.hpp"
 
 namespace cairn::test {
 namespace {
@@ -176,7 +177,9 @@ TEST_F(Outputs, AnInterruptBeforeSparsificationWritesTheEstimate) {
 class OnlineOutputs : public Outputs {
  protected:
   void SetUp() override {
-    if (!Registry().has("estimator", "batch")) GTEST_SKIP() << "there is no estimator batch";
+    CAIRN_NEEDS("estimator", "batch");
+    CAIRN_NEEDS("stream_format", "g2o");
+    CAIRN_NEEDS("types", "slam2d");
     std::string stream = "VERTEX_SE2 0 0 0 0\nFIX 0\n";
     for (int k = 1; k <= 20; ++k) {
       stream += "NEW VERTEX_SE2 " + std::to_string(k) + "\nEDGE_SE2 " + std::to_string(k - 1) +

@@ -7,6 +7,8 @@
 
 #include <gtest/gtest.h>
 
+#include "cairn/plugin/registry.hpp"
+
 namespace cairn::test {
 
 /// Every name of a kind that is registered, and each name again with each choice of each of its
@@ -24,3 +26,10 @@ std::string with_some_linear_solver(const std::string& optimizer);
 std::string test_name(const testing::TestParamInfo<std::string>& info);
 
 }  // namespace cairn::test
+
+/// Skips the test, visibly, in a build that lacks a plugin: CAIRN_NEEDS("types", "slam2d").
+#define CAIRN_NEEDS(kind, name)                                        \
+  if (!::cairn::Registry().has(kind, name)) {                          \
+    GTEST_SKIP() << "there is no " << (kind) << " '" << (name) << "'"; \
+  }                                                                    \
+  static_assert(true)

@@ -16,6 +16,7 @@
 
 #include "cairn/plugin/registry.hpp"
 #include "cairn/solve/optimizer.hpp"
+#include "support/components.hpp"
 
 namespace cairn {
 namespace {
@@ -35,7 +36,10 @@ class OnlineSessionTest : public ::testing::Test {
     estimator_ = registry_.make<Estimator>("batch");
     session_ = std::make_unique<OnlineSession>(*estimator_, *format_, registry_, settings);
   }
-  void SetUp() override { begin({.read = {}, .output = "none"}); }
+  void SetUp() override {
+    CAIRN_NEEDS("types", "slam2d");
+    begin({.read = {}, .output = "none"});
+  }
   LineSession::Reply take(const std::string& line) { return session_->take(line, ++number_); }
   /// The answers to all of these.
   std::string take_all(const std::vector<std::string>& lines) {

@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "cairn/runtime/error.hpp"
+#include "support/components.hpp"
 
 namespace cairn {
 namespace {
@@ -30,7 +31,10 @@ class PolicySessionTest : public ::testing::Test {
     session_ = std::make_unique<PolicySession>(*policy_, *format_, registry_,
                                                PolicySettings{.read = {}, .output = "none"});
   }
-  void SetUp() override { begin(); }
+  void SetUp() override {
+    CAIRN_NEEDS("types", "slam2d");
+    begin();
+  }
   LineSession::Reply take(const std::string& line) { return session_->take(line, ++number_); }
   static std::vector<std::string> square() {
     std::vector<std::string> lines{"NEW VERTEX_SE2 0"};

@@ -15,6 +15,7 @@
 #include <tuple>
 
 #include "cairn/cairn.hpp"
+#include "support/components.hpp"
 
 namespace {
 
@@ -220,6 +221,7 @@ TEST(Guide, FactorOfOnesOwn) {
 }
 
 TEST(Guide, FilesWithAFactorOfOnesOwn) {
+  CAIRN_NEEDS("format", "g2o");
   std::string folder = (std::filesystem::temp_directory_path() / "cairn-guide-XXXXXX").string();
   ASSERT_NE(mkdtemp(folder.data()), nullptr);
   const auto file = std::filesystem::path(folder) / "beacons.g2o";

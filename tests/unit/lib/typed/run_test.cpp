@@ -9,6 +9,7 @@
 #include <string>
 
 #include "cairn/typed/build.hpp"
+#include "support/components.hpp"
 
 namespace cairn {
 namespace {
@@ -59,6 +60,7 @@ TEST(Chi2, HasTheLossOfTheGraph) {
 }
 
 TEST(ReadAndWrite, KeepTheGraph) {
+  CAIRN_NEEDS("format", "g2o");
   std::string folder = (std::filesystem::temp_directory_path() / "cairn-typed-XXXXXX").string();
   ASSERT_NE(mkdtemp(folder.data()), nullptr);
   const std::filesystem::path file = std::filesystem::path(folder) / "square.g2o";
