@@ -41,6 +41,8 @@ class Online : public testing::Test {
  protected:
   void SetUp() override {
     CAIRN_NEEDS("estimator", kBatch);
+    CAIRN_NEEDS("linear_solver", "block_cholesky");
+    CAIRN_NEEDS("optimizer", "levenberg_marquardt");
     CAIRN_NEEDS("stream_format", "g2o");
     CAIRN_NEEDS("types", "slam2d");
   }

@@ -178,6 +178,8 @@ class OnlineOutputs : public Outputs {
  protected:
   void SetUp() override {
     CAIRN_NEEDS("estimator", "batch");
+    CAIRN_NEEDS("linear_solver", "block_cholesky");
+    CAIRN_NEEDS("optimizer", "levenberg_marquardt");
     CAIRN_NEEDS("stream_format", "g2o");
     CAIRN_NEEDS("types", "slam2d");
     std::string stream = "VERTEX_SE2 0 0 0 0\nFIX 0\n";

@@ -55,7 +55,7 @@ export -f judge
 # program of GoogleTest.
 run_tests() {
   # shellcheck disable=SC2016  # the inner shell expands it
-  find build/release/tests -maxdepth 1 -type f -perm -u+x -print0 |
+  find build/release/tests -maxdepth 1 -type f -perm -u+x \( -name '*_test' -o -name '*_tests' \) -print0 |
     xargs -0 -P "$(nproc)" -I{} bash -c '"$1" >"$1.log" 2>&1 || judge "$1"' _ {} &&
     ctest --test-dir build/release --output-on-failure -j "$(nproc)" -LE googletest
 }

@@ -14,6 +14,7 @@
 #include "cairn/runtime/error.hpp"
 #include "cairn/solve/optimizer.hpp"
 #include "cairn/types/loss.hpp"
+#include "support/components.hpp"
 #include "support/planar_graph.hpp"
 
 namespace cairn {
@@ -71,6 +72,7 @@ std::string refusal(ErrorCode code, const std::function<void()>& call) {
 }
 
 TEST(Registry, NamesWhatIsOnOffer) {
+  CAIRN_NEEDS("types", "slam2d");
   Registry registry;
   EXPECT_THAT(registry.names("types"), Contains("slam2d"));
   EXPECT_TRUE(registry.has("variable", "VERTEX_SE2"));
@@ -211,6 +213,7 @@ TEST(Registry, MayBeUsedByManyThreads) {
 }
 
 TEST(DefaultRegistry, IsOneForTheProcess) {
+  CAIRN_NEEDS("types", "slam2d");
   Registry *first = nullptr, *second = nullptr;
   {
     std::jthread a([&] { first = &default_registry(); }), b([&] { second = &default_registry(); });

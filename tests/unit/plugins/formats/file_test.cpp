@@ -224,8 +224,9 @@ TEST_F(File, DoesNotReplaceDevices) {
 }
 
 TEST_F(File, WritesToStandardOutput) {
+  const Graph graph = read("g2o", kGraph).graph;
   testing::internal::CaptureStdout();
-  write_graph(read("g2o", kGraph).graph, "-", registry(), "g2o");
+  write_graph(graph, "-", registry(), "g2o");
   EXPECT_EQ(testing::internal::GetCapturedStdout(), kGraph);
 }
 
