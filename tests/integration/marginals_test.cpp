@@ -253,6 +253,7 @@ TEST_F(MarginalsCommand, OptimizeReportsNullUnlessAskedFor) {
 }
 
 TEST_F(MarginalsCommand, OptimizeRefusesCovariancesThatNobodyCanGiveBeforeItReadsTheGraph) {
+  CAIRN_NEEDS("linear_solver", "block_cholesky");
   Registry registry;
   if (registry.has("linear_solver", "pcg")) {
     const Outcome pcg =

@@ -10,6 +10,7 @@
 #include "cairn/plugin/plugin_search.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "integration/process.hpp"
+#include "support/components.hpp"
 
 namespace cairn::test {
 namespace {
@@ -126,6 +127,7 @@ TEST(PluginsCommand, TellsAbilities) {
 }
 
 TEST(PluginsCommand, AnUnknownNameIsAnsweredWithTheNearest) {
+  CAIRN_NEEDS("linear_solver", "block_cholesky");
   const Outcome outcome = cairn({"plugins", "block_cholesk"});
   EXPECT_EQ(outcome.exit_code, 5);
   EXPECT_THAT(outcome.err, HasSubstr("did you mean 'block_cholesky'?"));
@@ -167,6 +169,7 @@ TEST(PluginsCommand, ASharedObjectThatIsGoneIsMissedOnlyByWhoAsksForIt) {
 }
 
 TEST(PluginsCommand, APluginThatIsGoneAltogetherIsNotOnOffer) {
+  CAIRN_NEEDS("linear_solver", "block_cholesky");
   const TemporaryFolder folder;
   const Environment environment = installation_without(folder, {"eigen.so", "eigen.json"});
   const Outcome asked =

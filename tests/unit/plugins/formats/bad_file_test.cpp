@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "support/components.hpp"
 #include "unit/plugins/formats/reading.hpp"
 
 namespace cairn::test {
@@ -23,6 +24,7 @@ TEST(BadFile, NothingLeftAfterSkippingIsAnError) {
 }
 
 TEST(BadFile, SkippedVerticesDoNotComeBackByThemselves) {
+  CAIRN_NEEDS("types", "slam2d");
   EXPECT_THAT(
       refusal("g2o", "VERTEX_SE2 0 0 0 0\nVERTEX_SE 1 0 0 0\nEDGE_SE2 0 1 1 0 0 1 0 0 1 0 1\n",
               {.skip_unknown = true}),
