@@ -22,8 +22,6 @@ struct BenchOptions {
   bool no_memory = false;
   std::string csv;
   std::string html;
-
-  BenchOptions() { problem.stop.max_iterations = 100; }  // that slow ones end as well
 };
 
 /// One configuration: an optimizer and, where it takes one, a linear solver; as they were written.

@@ -161,7 +161,7 @@ int run_compact(const CompactOptions& options, Session& session) {
   const Job job = prepare(options, setting, results);
   if (guard.interrupted()) {
     progress.clear();
-    session.note("interrupted before anything was selected: nothing is written");
+    session.note("interrupted before anything was selected");
     return kExitInterrupted;
   }
   const Recovery recovery = parse_enum<Recovery>(options.recovery, "--recovery");

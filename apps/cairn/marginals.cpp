@@ -369,8 +369,7 @@ std::optional<Summary> optimize(Graph& graph, Optimizer* optimizer, const Margin
 }
 
 int run(MarginalsOptions options, Session& session) {
-  if (options.as_given && options.problem.initial == ProblemOptions().initial)
-    options.problem.initial.clear();
+  if (options.as_given) keep_states(options.problem);
   if (options.output == "-") session.write_file_to_stdout();
   check_file(options.output, session);
   session.use_threads();

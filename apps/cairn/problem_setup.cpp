@@ -24,6 +24,10 @@ void add_loss_options(ArgumentParser cli, ProblemOptions& options) {
       .show_default();
 }
 
+void keep_states(ProblemOptions& options) {
+  if (options.initial == ProblemOptions().initial) options.initial.clear();
+}
+
 void add_problem_options(ArgumentParser cli, ProblemOptions& options) {
   cli.add_option("--initial", options.initial, "initial estimate: a name of kind initial_guess")
       .type_name("NAME")

@@ -27,6 +27,8 @@ struct ProblemOptions {
   std::string loss_on = "all";
   Stop stop;
 };
+/// For --as-given: no initial guess, unless one is named.
+void keep_states(ProblemOptions& options);
 void add_problem_options(ArgumentParser cli, ProblemOptions& options);
 /// --max-seconds, the limit of each run.
 void add_time_limit(ArgumentParser cli, Stop& stop);

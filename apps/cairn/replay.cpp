@@ -178,28 +178,19 @@ int run(const ReplayOptions& options, Session& session) {
     if (error.code() != ErrorCode::plugin) throw;
     failure = std::current_exception();
   }
-  if (failure) {
-    try {
-      if (!options.steps.empty()) write_file(options.steps, steps_csv(replay));
-      if (!options.output.empty())
-        write_graph(estimator->graph(), options.output, registry,
-                    output_format(options.output, options.output_format));
-    } catch (const std::exception& error) {
-      session.note(error.what());  // the reason comes last, as the error
-    }
-    std::rethrow_exception(failure);
-  }
-  if (replay.placed_as_given > 1) {
-    session.note(fmt::format("{} the states of the file: no measurement determined them at first",
-                             plural(replay.placed_as_given, "variable") + " began with"));
-  }
-  const double chi2 = estimator->chi2();
   Results results(session);
+  if (failure) results.add([&] { std::rethrow_exception(failure); });
   results.write(options.output, [&] {
     write_graph(estimator->graph(), options.output, registry,
                 output_format(options.output, options.output_format));
   });
   results.write(options.steps, [&] { write_file(options.steps, steps_csv(replay)); });
+  if (failure) results.finish();  // throws
+  if (replay.placed_as_given > 1) {
+    session.note(fmt::format("{} the states of the file: no measurement determined them at first",
+                             plural(replay.placed_as_given, "variable") + " began with"));
+  }
+  const double chi2 = estimator->chi2();
   results.add(
       [&] { session.write_json(report_json(options, loaded, sorted, replay, *estimator, chi2)); });
   // Last of the files: libraries for fonts may end the process where memory is short.

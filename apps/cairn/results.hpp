@@ -15,7 +15,7 @@ namespace cairn::app {
 ///
 ///     Results results(session);
 ///     results.write(options.output, [&] { write_graph(graph, options.output, registry); });
-///     results.print([&] { session.print(…); });
+///     results.add([&] { session.print(…); });
 ///     results.finish();
 class Results {
  public:

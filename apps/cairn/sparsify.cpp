@@ -223,8 +223,7 @@ void note_refused(const Sparsification& change, const Session& session) {
 }  // namespace
 
 int run_sparsify(SparsifyCommandOptions options, Session& session) {
-  if (options.as_given && options.problem.initial == ProblemOptions().initial)
-    options.problem.initial.clear();
+  if (options.as_given) keep_states(options.problem);
   session.use_threads();
   if (options.output == "-") session.write_file_to_stdout();
   check_output(options.output, options.output_format, session);

@@ -116,15 +116,18 @@ class Table : public ::testing::Environment {
 
 class PublishedData : public ::testing::TestWithParam<PublishedGraph> {};
 
+Graph read_published(const PublishedGraph& published, Registry& registry) {
+  if (!published.metric.empty())
+    registry.set_type_options({"slam3d", {{"metric", published.metric}}});
+  ReadReport report;
+  return read_graph(data_folder() / published.file, registry, {.repair_information = true}, report);
+}
+
 TEST_P(PublishedData, ReachesThePublishedMinimumWithEverySolver) {
   CAIRN_NEEDS_DATA();
   const PublishedGraph& published = GetParam();
   Registry registry;
-  if (!published.metric.empty())
-    registry.set_type_options({"slam3d", {{"metric", published.metric}}});
-  ReadReport report;
-  Graph graph =
-      read_graph(data_folder() / published.file, registry, {.repair_information = true}, report);
+  Graph graph = read_published(published, registry);
   registry.make<InitialGuess>(published.guess)->compute(graph);
 
   Result result{.graph = published,
@@ -162,11 +165,7 @@ TEST_P(PublishedData, ReachesItFromTheStartThatIsChosenByDefault) {
   CAIRN_NEEDS_DATA();
   const PublishedGraph& published = GetParam();
   Registry registry;
-  if (!published.metric.empty())
-    registry.set_type_options({"slam3d", {{"metric", published.metric}}});
-  ReadReport report;
-  Graph graph =
-      read_graph(data_folder() / published.file, registry, {.repair_information = true}, report);
+  Graph graph = read_published(published, registry);
   DefaultResult result{.graph = published, .start = {}};
   if (std::getenv("CAIRN_RESULTS")) {  // takes minutes
     result.given = chi2_from_given(graph, registry, "levenberg_marquardt");

@@ -26,6 +26,7 @@ bool is_plausible(double chi2, std::int64_t degrees_of_freedom) {
 std::string implausible_estimate(const Graph& graph, double chi2) {
   const std::int64_t dof = degrees_of_freedom(graph, resolve_gauge(graph));
   if (is_plausible(chi2, dof)) return {};
+  if (!std::isfinite(chi2)) return "chi2 is not finite: the estimate means nothing";
   return fmt::format(
       "chi2 is {:.3g} times the {} degrees of freedom: this estimate is hardly the right one. "
       "Either "
