@@ -26,6 +26,18 @@ target_compile_options(cairn_settings INTERFACE -Wall -Wextra -Wpedantic -Wshado
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 13)
   target_compile_options(cairn_settings INTERFACE -Wno-restrict)  # it warns of its own std::string (GCC bug 105651)
 endif()
+if(CAIRN_HARDEN AND NOT CAIRN_SANITIZE AND NOT CAIRN_COVERAGE)
+  # Against inputs that nobody trusts: SECURITY.md. Executables are position independent by default on Debian.
+  target_compile_options(cairn_settings INTERFACE -fstack-protector-strong
+                         $<$<CXX_COMPILER_ID:GNU>:-fstack-clash-protection>
+                         $<$<NOT:$<CONFIG:Debug>>:-U_FORTIFY_SOURCE> $<$<NOT:$<CONFIG:Debug>>:-D_FORTIFY_SOURCE=2>)
+  target_link_options(cairn_settings INTERFACE -Wl,-z,relro,-z,now,-z,noexecstack)
+endif()
+if(CAIRN_COVERAGE)
+  target_compile_options(cairn_settings INTERFACE --coverage -fprofile-update=atomic)
+  target_compile_definitions(cairn_settings INTERFACE CAIRN_COVERAGE)
+  target_link_options(cairn_settings INTERFACE --coverage)
+endif()
 if(CAIRN_SANITIZE)
   target_compile_options(cairn_settings INTERFACE -fsanitize=${CAIRN_SANITIZE} -fno-omit-frame-pointer)
   target_link_options(cairn_settings INTERFACE -fsanitize=${CAIRN_SANITIZE})

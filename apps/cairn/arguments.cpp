@@ -254,6 +254,11 @@ Argument ProgramParser::add_config(const std::string& names, const std::string& 
   return Argument(*app_->set_config(names, "", help));
 }
 
+std::string ProgramParser::config_file() const {
+  const CLI::Option* option = app_->get_config_ptr();
+  return option && option->count() > 0 ? option->as<std::string>() : "";
+}
+
 ParseOutcome ProgramParser::parse(int argc, const char* const* argv) {
   using Kind = ParseOutcome::Kind;
   try {

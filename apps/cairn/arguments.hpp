@@ -137,6 +137,8 @@ class ProgramParser {
   Argument add_config(const std::string& names, const std::string& help);
 
   ParseOutcome parse(int argc, const char* const* argv);
+  /// The file of options that was read; empty if there was none.
+  std::string config_file() const;
   /// The innermost command that the command line names, if any.
   std::optional<ArgumentParser> chosen() const;
 

@@ -206,6 +206,7 @@ std::function<int()> CommandLine::parse(int argc, const char* const* argv) {
     case ParseOutcome::Kind::command:
       break;
   }
+  session_.files.add_input(program_.config_file());
   if (help_.parsed()) return [text = explanation()] { return write_stdout(text), 0; };
   for (const Command& command : commands_) {
     if (command.parser.parsed()) return [&] { return command.run(session_); };

@@ -39,7 +39,7 @@ struct Recording {
 Recording load_recording(const CompactOptions& options, Session& session) {
   LoadedGraph loaded = load_graph(options.graph, options.input, session);
   if (!options.truth.empty())
-    loaded.truth = load_graph(options.truth, options.input, session).graph;
+    loaded.truth = load_other_graph(options.truth, options.input, session).graph;
   return {loaded.name, policy_data(std::move(loaded.graph), std::move(loaded.truth))};
 }
 
@@ -129,6 +129,7 @@ void check(const CompactOptions& options, Session& session) {
   if (options.output == "-" || options.trajectory == "-") session.write_file_to_stdout();
   if (options.output == "-" && options.trajectory == "-")
     throw Error(ErrorCode::usage, "only one of -o and --trajectory can go to standard output");
+  session.files.add_input(options.thresholds);
   check_output(options.output, options.output_format, session);
   check_output(options.trajectory, "", session);
   check_file(options.steps, session);

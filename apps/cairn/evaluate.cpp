@@ -63,6 +63,7 @@ Trajectory load_trajectory(const TrajectoryOptions& options, const EvaluateOptio
   const LoadedGraph loaded = load_graph(options.file, all.input, session);
   Trajectory poses = trajectory(loaded.graph);
   if (!options.stamps.empty()) {
+    session.files.add_input(options.stamps);
     set_stamps(poses, read_stamps(options.stamps), options);
   } else if (!loaded.report.stamps.empty()) {
     set_stamps(poses, loaded.report.stamps, options);

@@ -30,33 +30,40 @@ std::string identity_of(const std::string& file) {
   return error ? file : path.string();
 }
 
-}  // namespace
-
-void FileRoles::refuse(const std::string& input) {
+[[noreturn]] void refuse(const std::string& input) {
   throw Error(ErrorCode::usage,
               fmt::format("{} is read, and an output would replace it; name another", input));
 }
 
-void FileRoles::add_input(const std::string& file) {
-  const std::string identity = identity_of(file == "-" ? "/dev/stdin" : file);
-  if (identity.empty()) return;
-  for (const Output& output : outputs_) {
-    if (output.identity == identity && !output.may_replace_an_input) refuse(file);
+}  // namespace
+
+void FileRoles::add_graph(const std::string& file) { read(file, true); }
+void FileRoles::add_input(const std::string& file) { read(file, false); }
+void FileRoles::add_result(const std::string& file) { write(file, true); }
+void FileRoles::add_output(const std::string& file) { write(file, false); }
+
+void FileRoles::read(const std::string& file, bool exchangeable) {
+  const File input{file, identity_of(file == "-" ? "/dev/stdin" : file), exchangeable};
+  if (input.identity.empty()) return;
+  for (const File& output : outputs_) {
+    if (output.identity == input.identity && !(exchangeable && output.exchangeable)) refuse(file);
   }
-  inputs_.push_back(identity);
+  inputs_.push_back(input);
 }
 
-void FileRoles::add_output(const std::string& file, bool may_replace_an_input) {
-  const std::string identity = identity_of(file);
-  if (identity.empty()) return;
-  for (const Output& output : outputs_) {
-    if (output.identity != identity) continue;
-    const std::string names = output.name == file ? file : output.name + " and " + file;
+void FileRoles::write(const std::string& file, bool exchangeable) {
+  const File output{file, identity_of(file), exchangeable};
+  if (output.identity.empty()) return;
+  for (const File& other : outputs_) {
+    if (other.identity != output.identity) continue;
+    const std::string names = other.name == file ? file : other.name + " and " + file;
     throw Error(ErrorCode::usage,
                 fmt::format("two outputs go to one file, {}; name another for one of them", names));
   }
-  if (!may_replace_an_input && std::ranges::find(inputs_, identity) != inputs_.end()) refuse(file);
-  outputs_.push_back({file, identity, may_replace_an_input});
+  for (const File& input : inputs_) {
+    if (input.identity == output.identity && !(exchangeable && input.exchangeable)) refuse(file);
+  }
+  outputs_.push_back(output);
 }
 
 }  // namespace cairn::app

@@ -11,20 +11,23 @@ namespace cairn::app {
 /// generated graphs and what is no regular file (such as /dev/null) are left alone.
 class FileRoles {
  public:
-  /// Both throw `Error` (usage): for a file that two outputs would write, and for an input that an
-  /// output would replace, unless that output `may_replace_an_input`, as the -o of
-  /// `cairn optimize` may.
+  /// The graph that is worked on, whose place the `result` may take, as -o of `cairn optimize` may;
+  /// anything else that is read; the result; anything else that is written. All throw `Error`
+  /// (usage): for a file that two outputs would write, and for an input that an output would
+  /// replace.
+  void add_graph(const std::string& file);
   void add_input(const std::string& file);
-  void add_output(const std::string& file, bool may_replace_an_input);
+  void add_result(const std::string& file);
+  void add_output(const std::string& file);
 
  private:
-  struct Output {
+  struct File {
     std::string name, identity;
-    bool may_replace_an_input;
+    bool exchangeable;  // the graph, the result
   };
-  static void refuse(const std::string& input);
-  std::vector<std::string> inputs_;  // identities
-  std::vector<Output> outputs_;
+  void read(const std::string& file, bool exchangeable);
+  void write(const std::string& file, bool exchangeable);
+  std::vector<File> inputs_, outputs_;
 };
 
 }  // namespace cairn::app

@@ -110,9 +110,10 @@ std::string output_format(const std::string& file, const std::string& named) {
   return named.empty() && file == "-" ? kPipeFormat : named;
 }
 
-LoadedGraph load_graph(const std::string& name, const InputOptions& options, Session& session) {
+namespace {
+
+LoadedGraph load(const std::string& name, const InputOptions& options, Session& session) {
   const auto start = std::chrono::steady_clock::now();
-  session.files.add_input(name);
   LoadedGraph loaded = name.starts_with('@') ? generate_graph(name, session)
                                              : read_named_graph(name, options, session);
   loaded.seconds = seconds_since(start);
@@ -122,6 +123,19 @@ LoadedGraph load_graph(const std::string& name, const InputOptions& options, Ses
     session.note(fmt::format("{}: {}", name, sentence));
   }
   return loaded;
+}
+
+}  // namespace
+
+LoadedGraph load_graph(const std::string& name, const InputOptions& options, Session& session) {
+  session.files.add_graph(name);
+  return load(name, options, session);
+}
+
+LoadedGraph load_other_graph(const std::string& name, const InputOptions& options,
+                             Session& session) {
+  session.files.add_input(name);
+  return load(name, options, session);
 }
 
 Simulation simulate(const std::string& spec, std::uint64_t seed, Session& session) {
@@ -139,13 +153,13 @@ void check_output(const std::string& file, const std::string& format, Session& s
   } else {
     check_named_format(file, chosen, registry);
   }
-  session.files.add_output(file, true);
+  session.files.add_result(file);
   check_writable(file);
 }
 
 void check_file(const std::string& file, Session& session) {
   if (file.empty()) return;
-  session.files.add_output(file, false);
+  session.files.add_output(file);
   check_writable(file);
 }
 

@@ -14,6 +14,7 @@
 #include <system_error>
 #include <utility>
 
+#include "cairn/io/output_file.hpp"
 #include "cairn/runtime/error.hpp"
 #include "command_line.hpp"
 #include "graph_files.hpp"
@@ -63,8 +64,8 @@ int run(int argc, const char* const* argv) {
 /// libraries below them may crash or wait for ever, after all work is done.
 [[noreturn]] void leave(int code) {
   std::fflush(nullptr);
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-  std::exit(code);  // what they found is reported at the end
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__) || defined(CAIRN_COVERAGE)
+  std::exit(code);  // what was found or counted is written at the end
 #else
   std::_Exit(code);
 #endif
@@ -80,6 +81,7 @@ std::atomic<bool> memory_ran_out{false};
 
 /// Instead of abort(): memory may end in a thread of a library, or where no exception can pass.
 [[noreturn]] void end_badly() {
+  cairn::remove_unfinished_outputs();  // which another thread may be writing
   try {
     if (std::current_exception()) throw;
     if (memory_ran_out) throw std::bad_alloc();  // in a function that lets none through

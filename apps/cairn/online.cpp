@@ -157,7 +157,7 @@ void check(const OnlineOptions& options, Session& session) {
   }
   session.files.add_input("-");
   check_output(options.output, "", session);
-  session.files.add_output(options.journal, false);  // is tried when it is opened
+  session.files.add_output(options.journal);  // is tried when it is opened
 }
 
 /// Answers each line. Where the reader of the answers is gone, goes on without them if the map is
@@ -214,6 +214,7 @@ int run(OnlineOptions options, Session& session) {
   if (!options.journal.empty()) {
     journal.emplace(options.journal, listener.identity, sync_of(options.sync));
     session.note(journal->note());
+    lines.protect(options.journal);
   }
   Conversation conversation(lines, journal ? &*journal : nullptr);
   if (journal) write_stdout(conversation.restore());

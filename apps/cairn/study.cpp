@@ -101,6 +101,7 @@ json::array rows_json(const std::vector<ReplayRow>& rows) {
 
 int solve_problems(const ProblemsOptions& options, Session& session) {
   session.use_threads();
+  session.files.add_input(options.problems);
   const std::vector<DenseBlanket> problems = read_problems(options.problems);
   const InterruptGuard guard;
   StatusLine line(session.common.quiet);

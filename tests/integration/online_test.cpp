@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cstdlib>
+#include <filesystem>
 #include <random>
 #include <sstream>
 
@@ -124,6 +125,16 @@ TEST_F(Online, ABadLineIsToldAndNothingOfItStays) {
   EXPECT_EQ(answers[1 + bad.size()], "VERTEX_SE2 0 0 0 0");
   EXPECT_EQ(answers[2 + bad.size()], "VERTEX_SE2 1 1 0 0.1");
   EXPECT_THAT(answers[3 + bad.size()], EndsWith("variables 2 factors 1 owed 0"));
+}
+
+TEST_F(Online, ItsJournalIsNotSavedOver) {
+  const std::string journal = folder_.file("today.g2o"), link = folder_.file("link.g2o");
+  std::filesystem::create_symlink("today.g2o", link);
+  const Outcome run = cairn(online({"--journal", journal}), {},
+                            "VERTEX_SE2 0 0 0 0\nFIX 0\nSAVE " + journal + "\nSAVE " + link + "\n");
+  EXPECT_THAT(run.out, HasSubstr("ERROR line 3: SAVE would replace the journal"));
+  EXPECT_THAT(run.out, HasSubstr("ERROR line 4: SAVE would replace the journal"));
+  EXPECT_THAT(cairn(online({"--journal", journal}), {}, "CHI2\n").out, HasSubstr("RESTORED 2"));
 }
 
 TEST_F(Online, ChangesMarginalizesAndTellsCovariances) {

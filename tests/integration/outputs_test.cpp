@@ -68,6 +68,37 @@ TEST_F(Outputs, NoneReplacesAnotherOrWhatIsRead) {
   EXPECT_NE(read_text(file), before);
 }
 
+TEST_F(Outputs, NoneReplacesAFileThatSaysHowToWork) {
+  const std::string file = graph(), settings = folder_.file("settings.g2o");
+  write_text(settings, "quiet = true\n");
+  for (const Arguments& arguments :
+       std::vector<Arguments>{{"optimize", file, "--config", settings, "-o", settings},
+                              {"optimize", file, "--config", settings, "--json", settings},
+                              {"compact", file, "--truth", settings, "-o", settings},
+                              {"compact", file, "--thresholds", settings, "--steps", settings}}) {
+    const Outcome outcome = cairn(arguments);
+    EXPECT_EQ(outcome.exit_code, 2) << testing::PrintToString(arguments);
+    EXPECT_THAT(outcome.err, HasSubstr("name another")) << testing::PrintToString(arguments);
+    EXPECT_EQ(read_text(settings), "quiet = true\n");
+  }
+}
+
+TEST_F(Outputs, DescriptorsAreWrittenWhereTheyStand) {
+  graph();
+  const Outcome outcome = shell(
+      "cd $D; $C convert graph.g2o best.g2o --quiet; { echo first; "
+      "$C convert graph.g2o /dev/stdout --to g2o --quiet; echo last; } > all.txt; "
+      "$C convert graph.g2o /dev/fd/5 --to g2o --quiet 5> five.txt; "
+      "$C convert graph.g2o /dev/stdout --to g2o --quiet | cat > piped.txt; "
+      "$C convert graph.g2o /dev/stdin --to g2o --quiet < graph.g2o; echo code=$? >&2",
+      folder_);
+  EXPECT_THAT(outcome.err, HasSubstr("code=3"));  // open for reading only
+  const std::string written = read_text(folder_.file("best.g2o"));
+  EXPECT_EQ(read_text(folder_.file("all.txt")), "first\n" + written + "last\n");
+  EXPECT_EQ(read_text(folder_.file("five.txt")), written);
+  EXPECT_EQ(read_text(folder_.file("piped.txt")), written);
+}
+
 TEST_F(Outputs, NamesThatAreNotThereYetAreComparedToo) {
   graph();
   for (const std::string names : {"-o n.g2o --json ./n.g2o", "-o n.g2o --json $D/n.g2o"}) {

@@ -3,6 +3,7 @@
 
 #define BOOST_DLL_USE_STD_FS
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
@@ -38,9 +39,18 @@ std::map<fs::path, boost::dll::shared_library>& loaded_libraries() {
 
 constexpr std::uintmax_t kLargestSidecar = std::uintmax_t{1} << 20;  // they have some hundred bytes
 
-bool others_may_write(const fs::path& path) {
-  struct stat status {};
-  return ::stat(path.c_str(), &status) == 0 && (status.st_mode & S_IWOTH) != 0;
+/// All zero where there is no such file.
+struct stat status_of(const fs::path& path) {
+  using Status = struct stat;
+  Status status{};
+  return ::stat(path.c_str(), &status) == 0 ? status : Status{};
+}
+
+bool others_may_write(const fs::path& path) { return (status_of(path).st_mode & S_IWOTH) != 0; }
+
+/// Neither to this user nor to root, as in the HOME that sudo may keep.
+bool belongs_to_another(const fs::path& path) {
+  return status_of(path).st_uid != 0 && status_of(path).st_uid != ::geteuid();
 }
 
 /// Another user may exchange what lies there: everybody may write to the folder or, unless sticky
@@ -49,10 +59,7 @@ fs::path open_to_others(const fs::path& folder) {
   if (others_may_write(folder)) return folder;
   for (fs::path above = folder; above.has_relative_path();) {
     above = above.parent_path();
-    struct stat status {};
-    if (::stat(above.c_str(), &status) == 0 && (status.st_mode & S_IWOTH) != 0 &&
-        (status.st_mode & S_ISVTX) == 0)
-      return above;
+    if (others_may_write(above) && (status_of(above).st_mode & S_ISVTX) == 0) return above;
   }
   return {};
 }
@@ -166,8 +173,7 @@ std::vector<fs::path> plugin_folders(const PluginSearch& search,
     const fs::path canonical = fs::canonical(folder, error);
     if (error == std::errc::not_enough_memory) throw std::bad_alloc();
     if (error || !fs::is_directory(canonical)) {
-      if (must_exist)
-        problems.push_back({folder, fmt::format("{}: no such folder", folder.string())});
+      if (must_exist) problems.push_back({folder, folder.string() + ": no such folder"});
       return;
     }
     if (const fs::path open = open_to_others(canonical); !open.empty()) {
@@ -185,15 +191,17 @@ std::vector<fs::path> plugin_folders(const PluginSearch& search,
       if (folder.empty()) continue;  // an empty part would mean the working directory
       if (fs::path(folder).is_relative()) {
         problems.push_back(
-            {folder,
-             fmt::format("{}: refused, CAIRN_PLUGIN_PATH takes absolute folders only", folder)});
+            {folder, folder + ": refused, CAIRN_PLUGIN_PATH takes absolute folders only"});
         continue;
       }
       add(folder, true);
     }
   }
   if (search.user_folder) {
-    if (const fs::path folder = user_folder(); !folder.empty()) add(folder, false);
+    if (const fs::path folder = user_folder(); belongs_to_another(folder))
+      problems.push_back({folder, folder.string() + ": refused, it belongs to another user"});
+    else
+      add(folder, false);
   }
   if (search.default_folder) {
     add(fs::path(boost::dll::this_line_location().string()).parent_path() / "cairn", false);

@@ -278,6 +278,7 @@ struct Registry::Impl {
   std::shared_ptr<const Type> type_of(
       std::string_view kind, std::string_view tag,
       std::map<std::string, std::shared_ptr<const Type>, std::less<>>& made) {
+    if (const auto it = made.find(tag); it != made.end()) return it->second;
     Plugin& plugin = load(kind, tag);
     make_types(plugin);
     const auto it = made.find(tag);
@@ -286,6 +287,14 @@ struct Registry::Impl {
                                      origin(plugin.sidecar), in_words(kind, tag)));
     }
     return it->second;
+  }
+
+  void add_own_type(std::string_view kind, std::string_view tag, const TypeSet& set,
+                    std::string summary) {
+    const std::lock_guard lock(mutex);
+    Registrar::Target target;
+    target.types.emplace(tag, Registrar::Target::Types{{}, [set](const Options&) { return set; }});
+    add_own({{std::string(kind), std::string(tag), std::move(summary)}}, std::move(target));
   }
 };
 
@@ -413,15 +422,11 @@ void Registry::set_type_options(const ComponentSpec& spec) {
 
 std::shared_ptr<const VariableType> Registry::variable_type(std::string_view tag) {
   const std::lock_guard lock(impl_->mutex);
-  if (const auto it = impl_->variable_types.find(tag); it != impl_->variable_types.end())
-    return it->second;
   return impl_->type_of("variable", tag, impl_->variable_types);
 }
 
 std::shared_ptr<const FactorType> Registry::factor_type(std::string_view tag) {
   const std::lock_guard lock(impl_->mutex);
-  if (const auto it = impl_->factor_types.find(tag); it != impl_->factor_types.end())
-    return it->second;
   return impl_->type_of("factor", tag, impl_->factor_types);
 }
 
@@ -452,24 +457,12 @@ void Registry::add_component(std::string_view kind, std::string name, OptionTabl
 
 void Registry::add(std::shared_ptr<const VariableType> type, std::string summary) {
   if (!type) throw Error(ErrorCode::usage, "there is no variable type to add: it is null");
-  const std::lock_guard lock(impl_->mutex);
-  Registrar::Target target;
-  const std::string tag(type->tag());
-  target.types.emplace(tag, Registrar::Target::Types{{}, [type](const Options&) {
-                                                       return TypeSet{{type}, {}};
-                                                     }});
-  impl_->add_own({{"variable", tag, std::move(summary)}}, std::move(target));
+  impl_->add_own_type("variable", type->tag(), {{type}, {}}, std::move(summary));
 }
 
 void Registry::add(std::shared_ptr<const FactorType> type, std::string summary) {
   if (!type) throw Error(ErrorCode::usage, "there is no factor type to add: it is null");
-  const std::lock_guard lock(impl_->mutex);
-  Registrar::Target target;
-  const std::string tag(type->tag());
-  target.types.emplace(tag, Registrar::Target::Types{{}, [type](const Options&) {
-                                                       return TypeSet{{}, {type}};
-                                                     }});
-  impl_->add_own({{"factor", tag, std::move(summary)}}, std::move(target));
+  impl_->add_own_type("factor", type->tag(), {{}, {type}}, std::move(summary));
 }
 
 void Registry::add_types(std::string name, OptionTable table,

@@ -6,7 +6,12 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <charconv>
+#include <chrono>
+#include <cstdio>
+#include <mutex>
 #include <new>
+#include <optional>
 #include <system_error>
 #include <utility>
 
@@ -37,21 +42,61 @@ auto without_interrupts(const Call& call) {
   return result;
 }
 
-/// The file that a chain of symbolic links ends in, so that replacing it keeps the links.
-fs::path follow_links(fs::path file) {
-  std::error_code ignored;
-  for (int depth = 0; depth < 40 && fs::is_symlink(file, ignored); ++depth) {
-    const fs::path next = fs::read_symlink(file, ignored);
-    if (ignored == std::errc::not_enough_memory) throw std::bad_alloc();
-    if (ignored) break;
+/// Where a chain of symbolic links ends, so that replacing that keeps the links.
+struct Target {
+  fs::path file;
+  std::optional<int> descriptor;  // of this process, which has the file open
+};
+
+void refuse_no_memory(const std::error_code& error) {
+  if (error == std::errc::not_enough_memory) throw std::bad_alloc();
+}
+
+/// 3 of "/proc/self/fd/3", whose link leads to a name that need not be the file's any more.
+std::optional<int> descriptor_of(const fs::path& file) {
+  const std::string name = file.filename().string();
+  int number = 0;
+  const auto [end, error] = std::from_chars(name.data(), name.data() + name.size(), number);
+  if (error != std::errc() || end != name.data() + name.size()) return std::nullopt;
+  std::error_code none;
+  const fs::path folder = fs::canonical(file.parent_path(), none);
+  refuse_no_memory(none);
+  if (none || folder != fs::path(fmt::format("/proc/{}/fd", ::getpid()))) return std::nullopt;
+  return number;
+}
+
+Target follow_links(fs::path file) {
+  std::error_code error;
+  for (int depth = 0; depth < 40 && fs::is_symlink(file, error); ++depth) {
+    if (const std::optional<int> number = descriptor_of(file)) return {file, number};
+    const fs::path next = fs::read_symlink(file, error);
+    refuse_no_memory(error);
+    if (error) break;
     file = next.is_absolute() ? next : file.parent_path() / next;
   }
-  return file;
+  return {file, std::nullopt};
+}
+
+/// Of the outputs that lie beside their names, and of those files.
+std::timed_mutex& unfinished_outputs() {
+  static std::timed_mutex mutex;
+  return mutex;
+}
+
+OutputFile*& first_unfinished() {
+  static OutputFile* first = nullptr;
+  return first;
 }
 
 }  // namespace
 
-OutputFile::OutputFile(const fs::path& file) : file_(file), target_(follow_links(file)) {
+OutputFile::OutputFile(const fs::path& file) : file_(file) {
+  Target target = follow_links(file);
+  if (target.descriptor) {
+    open_descriptor(*target.descriptor);
+    return;
+  }
+  target_ = std::move(target.file);
   struct stat status {};
   const bool exists = ::stat(target_.c_str(), &status) == 0;
   if (exists && S_ISDIR(status.st_mode)) refuse(file_, "is a folder; expected a file name");
@@ -66,7 +111,20 @@ OutputFile::OutputFile(const fs::path& file) : file_(file), target_(follow_links
 
 OutputFile::~OutputFile() {
   if (descriptor_ >= 0) ::close(descriptor_);
-  if (!beside_.empty()) ::unlink(beside_.c_str());
+  if (beside_.empty()) return;
+  const std::lock_guard lock(unfinished_outputs());
+  ::unlink(beside_.c_str());
+  unlist();
+}
+
+/// It goes on where the descriptor stands, after what the program has printed there itself.
+void OutputFile::open_descriptor(int number) {
+  if (number == STDOUT_FILENO) std::fflush(stdout);
+  if (number == STDERR_FILENO) std::fflush(stderr);
+  if (const int flags = ::fcntl(number, F_GETFL); flags >= 0 && (flags & O_ACCMODE) == O_RDONLY)
+    fail(EBADF);
+  descriptor_ = ::fcntl(number, F_DUPFD_CLOEXEC, 0);
+  if (descriptor_ < 0) fail(errno);
 }
 
 /// `mode`: of the file that is to be replaced; negative if there is none.
@@ -74,15 +132,24 @@ void OutputFile::open_beside(int mode) {
   for (int attempt = 0;; ++attempt) {
     fs::path name = target_;
     name += fmt::format(".{}-{}.part", ::getpid(), attempt);
+    const std::lock_guard lock(unfinished_outputs());
     descriptor_ = without_interrupts(
         [&] { return ::open(name.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, kNewFile); });
     if (descriptor_ >= 0) {
       beside_.swap(name);
+      next_ = std::exchange(first_unfinished(), this);
       break;
     }
     if (errno != EEXIST || attempt == kMostAttempts) fail(errno);
   }
   if (mode >= 0) ::fchmod(descriptor_, static_cast<mode_t>(mode));
+}
+
+/// Precondition: the mutex is held.
+void OutputFile::unlist() noexcept {
+  OutputFile** at = &first_unfinished();
+  while (*at != this) at = &(*at)->next_;
+  *at = next_;
 }
 
 void OutputFile::write(std::string_view bytes) noexcept {
@@ -103,17 +170,27 @@ void OutputFile::finish() {
   // Errors may show only now (a network share). After EINTR the file is closed all the same.
   if (::close(std::exchange(descriptor_, -1)) != 0 && errno != EINTR) fail(errno);
   if (beside_.empty()) return;
+  const std::lock_guard lock(unfinished_outputs());
   if (::rename(beside_.c_str(), target_.c_str()) != 0) fail(errno);
   beside_.clear();
+  unlist();
 }
 
 void OutputFile::fail(int reason) const {
   refuse(file_, "cannot be written: " + system_message(reason));
 }
 
+void remove_unfinished_outputs() noexcept {
+  // Who holds it is this thread itself only where no memory is left for an error's message.
+  static_cast<void>(unfinished_outputs().try_lock_for(std::chrono::seconds(1)));
+  for (const OutputFile* output = first_unfinished(); output; output = output->next_)
+    ::unlink(output->beside_.c_str());
+}
+
 void check_writable(const fs::path& file) {
   if (file == "-") return;
-  const fs::path target = follow_links(file);
+  const auto [target, descriptor] = follow_links(file);
+  if (descriptor) return static_cast<void>(OutputFile(file));
   struct stat status {};
   const bool exists = ::stat(target.c_str(), &status) == 0;
   if (exists && S_ISDIR(status.st_mode)) refuse(file, "is a folder; expected a file name");

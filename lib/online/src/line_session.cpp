@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <optional>
+#include <system_error>
 #include <utility>
 
 #include <fmt/format.h>
@@ -107,6 +109,16 @@ void LineSession::expect_words(const Words& words, std::size_t count, std::strin
       fmt::format("{} with {} words after it; expected '{}'", words[0], words.size() - 1, form));
 }
 
+std::string LineSession::file_to_save(const Words& words) const {
+  expect_words(words, 2, "SAVE file");
+  std::string file(words[1]);
+  if (file == "-") throw bad_line("SAVE writes to a file, not to standard output");
+  std::error_code none;  // of these is the journal
+  if (!protected_.empty() && std::filesystem::equivalent(file, protected_, none))
+    throw bad_line(fmt::format("SAVE would replace the journal, {}; name another file", file));
+  return file;
+}
+
 Variable LineSession::declared_variable(const Words& words, Registry& registry) {
   expect_words(words, 3, "NEW TAG id");
   if (!registry.has("variable", words[1])) {
@@ -116,6 +128,13 @@ Variable LineSession::declared_variable(const Words& words, Registry& registry) 
   const Id id = parse_whole(words[2], "id");
   if (id < 0) throw bad_line(fmt::format("'{}' is no id; expected a whole number from 0", id));
   return {registry.variable_type(words[1]), id, {}, false};
+}
+
+std::string LineSession::chi2_line(Estimator& estimator) {
+  const double chi2 = estimator.chi2();
+  if (!std::isfinite(chi2))
+    throw Error(ErrorCode::numerical, "chi2 is not finite: a residual overflows, or is no number");
+  return fmt::format("CHI2 {}\n", chi2);
 }
 
 std::string LineSession::estimate_line(const VariableType& type, Id id,

@@ -2,7 +2,6 @@
 #include "cairn/online/online_session.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
 #include <fmt/format.h>
@@ -244,18 +243,14 @@ void OnlineSession::report_estimate(const Words& words, Reply& reply) {
 
 void OnlineSession::report_chi2(const Words& words, Reply& reply) {
   expect_words(words, 1, "CHI2");
-  const double chi2 = estimator_.chi2();
-  if (!std::isfinite(chi2))
-    throw Error(ErrorCode::numerical, "chi2 is not finite: a residual overflows, or is no number");
-  reply.text += fmt::format("CHI2 {}\n", chi2);
+  reply.text += chi2_line(estimator_);
   acknowledge(reply, owed_);
 }
 
 void OnlineSession::save(const Words& words, Reply& reply) {
-  expect_words(words, 2, "SAVE file");
-  if (words[1] == "-") throw bad_line("SAVE writes to a file, not to standard output");
+  const std::string file = file_to_save(words);
   // No journal has this line, unless it was forged: then it must not replace files.
-  if (!silent()) write_graph(estimator_.graph(), std::string(words[1]), registry_);
+  if (!silent()) write_graph(estimator_.graph(), file, registry_);
   acknowledge(reply, owed_);
 }
 

@@ -407,16 +407,17 @@ void PolicySession::report_estimate(const Words& words, Reply& reply) {
 void PolicySession::report_chi2(const Words& words, Reply& reply) {
   expect_words(words, 1, "CHI2");
   settle(reply);
-  answer_ += fmt::format("CHI2 {}\n", policy_.estimator().chi2());
+  expect_words(words, 1, "CHI2");
+  settle(reply);
+  answer_ += chi2_line(policy_.estimator());
   answer(reply);
 }
 
 void PolicySession::save(const Words& words, Reply& reply) {
-  expect_words(words, 2, "SAVE file");
-  if (words[1] == "-") throw bad_line("SAVE writes to a file, not to standard output");
+  const std::string file = file_to_save(words);
   settle(reply);
   Estimator& estimator = policy_.estimator();
-  if (!silent()) write_graph(estimator.graph(), std::string(words[1]), registry_);
+  if (!silent()) write_graph(estimator.graph(), file, registry_);
   answer(reply);
 }
 

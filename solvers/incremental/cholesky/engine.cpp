@@ -41,6 +41,9 @@ constexpr double kTrusted = 3.0;
 constexpr double kFast = 0.2;
 /// Jacobians of such factors that are off by more than this part are renewed.
 constexpr double kMismatch = 0.05;
+/// What would lower chi2 by nothing that matters is solved for once it comes from so many
+/// variables, or each update would look at all that came since the last step.
+constexpr std::size_t kMostSources = 256;
 /// In graphs of no more factors all are evaluated after each step.
 constexpr int kFew = 200;
 /// If more than this part of the factors were to be renewed, all are.
@@ -79,7 +82,7 @@ void Engine::solve(double max_seconds, UpdateReport& report) {
       step_back();
       return rescue(report, 1e-6);
     }
-    if (round == 0 && negligible()) break;
+    if (round == 0 && sources_.size() < kMostSources && negligible()) break;
     take_step(share(kStepShare), report);
     ++report.iterations;
     if (!check(round > 0, report)) return;

@@ -133,6 +133,9 @@ class Engine : private EngineState {
   bool held(int v) const { return held_[v]; }
   /// Variables that have been anchored to fix the gauge since this was last asked.
   std::vector<std::int32_t> take_anchored() { return std::exchange(anchored_, {}); }
+  /// Variables whose last factor has been removed since this was last asked, and that are still
+  /// there without any.
+  std::vector<std::int32_t> take_left_alone();
   /// Gives the selected factors a loss, and all others none.
   void set_loss(const std::shared_ptr<const Loss>& loss, const FactorSelector& which);
   /// Ids of the factors that are there, rising.
@@ -213,6 +216,7 @@ class Engine : private EngineState {
   double shortfall_ = 0.0;  // by how much more than expected the cost was then
   double limit_ = 0.0;      // seconds that the update at hand may take; 0: any
   std::vector<std::int32_t> anchored_;
+  std::vector<std::int32_t> left_alone_;  // some may have new factors since, or be gone
 
   Graph graph_;
   Tree tree_;  // refers to the state

@@ -36,6 +36,8 @@ void Engine::load(Graph graph, std::vector<FactorId> ids) {
   steps_.clear();
   moving_.clear();
   retiring_.clear();
+  anchored_.clear();
+  left_alone_.clear();
   checked_at_.clear();
   broken_ = gauge_is_old_ = false;
   dead_ = live_factors_ = 0;
@@ -98,11 +100,20 @@ void Engine::remove_factor(int f) {
   live_factor_[f] = 0;
   place_of_id_[static_cast<std::size_t>(ids_[f])] = -1;
   cost_ -= models_.cost(f);
-  for (const std::int32_t v : models_.variables(f)) std::erase(factors_of_[v], f);
+  for (const std::int32_t v : models_.variables(f)) {
+    std::erase(factors_of_[v], f);
+    if (factors_of_[v].empty()) left_alone_.push_back(v);
+  }
   for (const std::int32_t v : models_.variables(f)) sum_anew(v);
   --live_factors_;
   ++dead_;
   gauge_is_old_ = true;
+}
+
+std::vector<std::int32_t> Engine::take_left_alone() {
+  std::vector<std::int32_t> all = std::exchange(left_alone_, {});
+  std::erase_if(all, [&](std::int32_t v) { return !live_variable_[v] || !factors_of_[v].empty(); });
+  return all;
 }
 
 void Engine::remove_variable(int v) {

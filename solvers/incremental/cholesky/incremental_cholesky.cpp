@@ -170,6 +170,11 @@ void IncrementalCholesky::tell_of_anchors(UpdateReport& report) {
         fmt::format("the pose of the component of {0} is not determined: anchored {0}",
                     engine_->graph().describe_variable(v)));
   }
+  for (const std::int32_t v : engine_->take_left_alone()) {
+    if (engine_->graph().fixed(v)) continue;
+    report.notes.push_back(fmt::format("{} has no factor left: it is constant, without covariance",
+                                       engine_->graph().describe_variable(v)));
+  }
 }
 
 void IncrementalCholesky::set_loss(std::shared_ptr<const Loss> loss, const FactorSelector& which) {

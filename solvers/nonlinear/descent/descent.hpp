@@ -56,7 +56,8 @@ class Descent {
   bool must_stop();
 
   /// Solves for `out` with what was factorised last. False if the result has numbers that are not
-  /// finite, which more damping may cure.
+  /// finite, which more damping may cure. In the first iteration and some others a note names a
+  /// linear solver whose result does not solve its system.
   bool solve(std::span<double> out);
   /// ‖out‖ of the last `solve`.
   double step_norm() const { return step_norm_; }
@@ -89,6 +90,8 @@ class Descent {
   Summary finish();
 
  private:
+  bool is_solution(std::span<const double> out);
+
   using Clock = std::chrono::steady_clock;
 
   Graph& graph_;
@@ -103,6 +106,8 @@ class Descent {
   int number_ = 0;
   double state_norm_ = 0.0;  // at the start
   double step_norm_ = 0.0;
+  int sampled_ = 0;      // the last iteration whose step was checked
+  bool blamed_ = false;  // a note names the linear solver
   std::optional<Status> status_;
   Summary summary_;
 };

@@ -248,6 +248,25 @@ TEST_F(PluginBoundary, AFolderBelowOneThatOthersMayWriteToIsRefused) {
   EXPECT_THAT(sticky.problems(), IsEmpty());
 }
 
+TEST_F(PluginBoundary, AFolderOfAnotherUserIsRefused) {
+  if (::geteuid() != 0) GTEST_SKIP() << "only root can give a folder to another user";
+  const fs::path own = folder() / "cairn" / "plugins";
+  fs::create_directories(own);
+  copy("nothing_wrong", "plain");
+  fs::rename(folder() / "plain.so", own / "plain.so");
+  fs::rename(folder() / "plain.json", own / "plain.json");
+  ASSERT_EQ(::setenv("XDG_DATA_HOME", folder().c_str(), 1), 0);
+  cairn::PluginSearch search = search_in({});
+  search.user_folder = true;
+  EXPECT_THAT(messages(cairn::Registry(search)), IsEmpty());
+  ASSERT_EQ(::chown(own.c_str(), 12345, 12345), 0);
+  const cairn::Registry registry(search);
+  EXPECT_THAT(messages(registry),
+              ElementsAre(own.string() + ": refused, it belongs to another user"));
+  EXPECT_THAT(registry.offers(), IsEmpty());
+  ::unsetenv("XDG_DATA_HOME");
+}
+
 TEST_F(PluginBoundary, ASidecarThatIsNoFileIsAProblemAndNoMore) {
   copy("nothing_wrong", "plain");
   fs::create_directory(folder() / "folder.json");

@@ -94,6 +94,21 @@ TEST_P(EveryEstimator, SaysWhatItAnchored) {
   EXPECT_THAT(report.notes, testing::Contains(testing::HasSubstr("anchored VERTEX_SE2 0")));
 }
 
+TEST_P(EveryEstimator, SaysWhatHasNoFactorLeft) {
+  estimator_->update(chain(4));
+  GraphUpdate update;
+  update.removed_factors = {1, 2};
+  update.factors.push_back(between(1, 3));
+  const auto are_left = testing::Contains(testing::HasSubstr("no factor"));
+  const UpdateReport report = estimator_->update(update, {.full = true});
+  EXPECT_THAT(report.notes, are_left);
+  EXPECT_THAT(report.notes, testing::Contains(testing::HasSubstr("VERTEX_SE2 2")));
+  update = {};
+  update.removed_variables = {3};  // with its factor: 1 has another
+  EXPECT_THAT(estimator_->update(update, {.full = true}).notes,
+              testing::Not(testing::Contains(testing::HasSubstr("VERTEX_SE2 1"))));
+}
+
 TEST_P(EveryEstimator, ADeferredUpdateLeavesTheEstimateOfOldVariables) {
   estimator_->update(chain(3));
   const std::vector<double> before(estimator_->state(2).begin(), estimator_->state(2).end());

@@ -102,6 +102,18 @@ TEST_P(Optimizers, HaveNotConvergedWithStepsThatSolveNothing) {
   }
 }
 
+TEST_P(Optimizers, NameASolverWhoseStepsAreTooShort) {
+  Graph graph = test::ring_of_poses(30, 0.05);
+  int solved = 0;
+  const Spoil spoil = [&](std::span<double> x) {
+    if (++solved > 1) return;
+    for (double& value : x) value *= 0.5;
+  };
+  const Summary summary = optimize_with(GetParam(), spoil, graph);
+  EXPECT_EQ(summary.status, Status::converged);  // by the right steps that follow
+  EXPECT_THAT(summary.notes, testing::Contains(HasSubstr("spoilt returned in iteration 1")));
+}
+
 TEST_P(Optimizers, HaveNotConvergedWithASolverThatBreaksLater) {
   Graph graph = test::ring_of_poses(30, 0.05);
   int solved = 0;

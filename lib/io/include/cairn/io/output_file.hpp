@@ -12,7 +12,8 @@ namespace cairn {
 /// A file that is written from front to back, and replaces what was there only when it is whole:
 /// it is written beside its name, synchronised to the disk and renamed. Until `finish` has returned
 /// the old file stands, and if it never does, nothing is left but that. Pipes, terminals and
-/// devices are written in place. Names of links stay links.
+/// devices are written in place. Names of links stay links. A name of a descriptor that the process
+/// has open (/dev/stdout, /dev/fd/3, also of a regular file) is written to that descriptor.
 class CAIRN_API OutputFile {
  public:
   /// Throws `Error` (input) where nothing can be written under that name.
@@ -28,14 +29,22 @@ class CAIRN_API OutputFile {
   void finish();
 
  private:
+  void open_descriptor(int number);
   void open_beside(int mode);
+  void unlist() noexcept;
+  friend void remove_unfinished_outputs() noexcept;
   [[noreturn]] void fail(int reason) const;
 
   std::filesystem::path file_;    // as it was named
   std::filesystem::path target_;  // that, with links followed
   std::filesystem::path beside_;  // empty: in place
   int descriptor_ = -1;
-  int failure_ = 0;  // of the first write that failed
+  int failure_ = 0;             // of the first write that failed
+  OutputFile* next_ = nullptr;  // of those that lie beside their names
 };
+
+/// For a process that must end in any of its threads, without the destructors of what others have:
+/// removes what lies beside its name. None is opened or finished after that: who tries waits.
+CAIRN_API void remove_unfinished_outputs() noexcept;
 
 }  // namespace cairn

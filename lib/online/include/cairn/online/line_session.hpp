@@ -2,9 +2,11 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "cairn/plugin/registry.hpp"
@@ -35,6 +37,8 @@ class CAIRN_API LineSession {
   /// The same without an answer: lines that were taken before, from a journal. Throws `Error` where
   /// one is refused.
   void restore(std::string_view line, std::int64_t number);
+  /// SAVE must not replace this file: the journal.
+  void protect(std::filesystem::path file) { protected_ = std::move(file); }
   /// No line follows. Not for a journal: a restored session goes on from before this.
   virtual void finish();
 
@@ -66,10 +70,14 @@ class CAIRN_API LineSession {
                                              std::string_view what);
   /// Refuses a command with more or fewer words than its form.
   static void expect_words(const Words& words, std::size_t count, std::string_view form);
+  /// The file of "SAVE file". Refuses standard output, and the file that is protected.
+  std::string file_to_save(const Words& words) const;
   /// What "NEW TAG id" declares.
   static Variable declared_variable(const Words& words, Registry& registry);
 
   // Lines of answers.
+  /// "CHI2 value"; throws `Error` (numerical) where that is not finite.
+  static std::string chi2_line(Estimator& estimator);
   /// "VERTEX_SE2 7 x y theta"
   static std::string estimate_line(const VariableType& type, Id id, std::span<const double> state);
   /// "COVARIANCE a b rows columns" and the numbers row by row; empty if there is none.
@@ -79,6 +87,7 @@ class CAIRN_API LineSession {
  private:
   std::int64_t line_ = 0;
   bool silent_ = false;
+  std::filesystem::path protected_;
 };
 
 }  // namespace cairn
