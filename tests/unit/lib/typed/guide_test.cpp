@@ -138,7 +138,7 @@ TEST(Guide, Optimizing) {
 
 TEST(Guide, InitialEstimate) {
   Graph graph = corridor();
-  make<InitialGuess>("chordal")->compute(graph);
+  make<InitialGuess>("auto")->compute(graph);
   EXPECT_LT(chi2(graph), chi2(corridor()));
 }
 
