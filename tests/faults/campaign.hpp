@@ -18,8 +18,9 @@ struct Violation {
 /// How the runs of one kind of fault ended.
 struct Tally {
   std::string fault;        ///< "allocation", "output ENOSPC", …
-  std::uint64_t calls = 0;  ///< that the command makes
+  std::uint64_t calls = 0;  ///< that the command makes; of kills: microseconds that it takes
   int runs = 0, completed = 0, errors = 0;
+  int killed = 0, parts = 0;  ///< processes, and files that they left
   std::vector<Violation> violations;
 };
 
@@ -33,12 +34,16 @@ class Campaign {
   /// Tries at most `count` faults of each kind, spread evenly over the calls that can fail so.
   /// Throws `std::runtime_error` where a run cannot be made, or no fault came to pass.
   std::vector<Tally> run(std::uint64_t count);
+  /// Kills the process at `count` random moments, spread evenly over its life and a tenth more, and
+  /// in every call on an output, or at most `count` of them. Throws as `run` does.
+  std::vector<Tally> kill(std::uint64_t count, std::uint64_t seed);
   /// One run.
   Verdict run(const Fault& fault, RunResult& result);
 
  private:
   Tally tally(const std::string& name, std::uint64_t calls, const std::vector<Fault>& faults);
   void collect_maps();
+  std::vector<Fault> moments(std::uint64_t count, std::uint64_t seed) const;
   std::string continuation_problem(const std::string& journal);
 
   Experiment& experiment_;

@@ -2,92 +2,28 @@
 #include "experiment.hpp"
 
 #include <fcntl.h>
-#include <sys/mman.h>
-#include <sys/personality.h>
-#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
-#include <cstdlib>
-#include <cstring>
-#include <fstream>
+#include <chrono>
+#include <csignal>
 #include <iterator>
 #include <stdexcept>
 #include <string_view>
+#include <thread>
 #include <utility>
+
+#include "process.hpp"
+#include "shared_record.hpp"
 
 namespace cairn::faults {
 namespace {
 
 namespace fs = std::filesystem;
+using Clock = std::chrono::steady_clock;
 
-constexpr unsigned kMostSeconds = 60;  // of a run that does some milliseconds of work
-constexpr const char* kWhat[] = {"nothing", "allocation", "memory", "thread", "output"};
-
-/// A FaultRecord in a file, shared with the process that fills it.
-class SharedRecord {
- public:
-  explicit SharedRecord(const fs::path& file) {
-    const int descriptor = ::open(file.c_str(), O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
-    const bool sized = descriptor >= 0 && ::ftruncate(descriptor, sizeof(FaultRecord)) == 0;
-    memory_ = sized ? ::mmap(nullptr, sizeof(FaultRecord), PROT_READ, MAP_SHARED, descriptor, 0)
-                    : MAP_FAILED;
-    if (descriptor >= 0) ::close(descriptor);
-    if (memory_ == MAP_FAILED) throw std::runtime_error(file.string() + ": " + strerror(errno));
-  }
-  SharedRecord(const SharedRecord&) = delete;
-  SharedRecord& operator=(const SharedRecord&) = delete;
-  ~SharedRecord() { ::munmap(memory_, sizeof(FaultRecord)); }
-  const FaultRecord& operator*() const { return *static_cast<const FaultRecord*>(memory_); }
-
- private:
-  void* memory_;
-};
-
-/// In the child: a descriptor on that file instead of descriptor `number`.
-void redirect(int number, const fs::path& file, int flags) {
-  const int opened = ::open(file.c_str(), flags, 0600);
-  if (opened < 0 || ::dup2(opened, number) < 0) ::_exit(126);
-  ::close(opened);
-}
-
-std::vector<char*> pointers(std::vector<std::string>& words) {
-  std::vector<char*> all;
-  for (std::string& word : words) all.push_back(word.data());
-  all.push_back(nullptr);
-  return all;
-}
-
-struct Streams {
-  fs::path in, out, err;
-};
-
-/// Runs a command to its end; the status of waitpid(2).
-int run_process(std::vector<std::string> command, std::vector<std::string> environment,
-                const fs::path& folder, const Streams& streams) {
-  const std::vector<char*> argv = pointers(command), envp = pointers(environment);
-  const pid_t child = ::fork();
-  if (child < 0) throw std::runtime_error(std::string("fork: ") + strerror(errno));
-  if (child == 0) {
-    if (::chdir(folder.c_str()) != 0) ::_exit(126);
-    redirect(STDIN_FILENO, streams.in, O_RDONLY);
-    redirect(STDOUT_FILENO, streams.out, O_WRONLY | O_CREAT | O_TRUNC);
-    redirect(STDERR_FILENO, streams.err, O_WRONLY | O_CREAT | O_TRUNC | O_APPEND);
-    const rlimit none{0, 0};
-    ::setrlimit(RLIMIT_CORE, &none);
-    ::personality(ADDR_NO_RANDOMIZE);  // the same addresses, and so the same order, in every run
-    ::alarm(kMostSeconds);
-    ::execve(argv[0], argv.data(), envp.data());
-    ::_exit(126);
-  }
-  int status = 0;
-  while (::waitpid(child, &status, 0) < 0) {
-    if (errno != EINTR) throw std::runtime_error(std::string("waitpid: ") + strerror(errno));
-  }
-  return status;
-}
+constexpr const char* kWhat[] = {"nothing", "allocation", "memory", "thread", "output", "kill"};
 
 /// What differs from run to run though nothing is wrong: how much memory was used.
 std::string without_memory(std::string text) {
@@ -117,6 +53,7 @@ const char* variable_of(Fault::What what) {
     case Fault::What::output:
       return kOutputVariable;
     case Fault::What::nothing:
+    case Fault::What::kill:
       break;
   }
   return nullptr;
@@ -150,18 +87,6 @@ Fault parse_fault(const std::string& text) {
   return fault;
 }
 
-std::string read_bytes(const fs::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(stream), {}};
-}
-
-void write_bytes(const fs::path& file, const std::string& bytes) {
-  std::ofstream stream(file, std::ios::binary);
-  stream << bytes;
-  stream.close();
-  if (!stream) throw std::runtime_error(file.string() + ": cannot be written");
-}
-
 std::string old_content(const std::string& name) { return "what was in " + name + " before\n"; }
 
 Experiment::Experiment(const fs::path& program, const fs::path& library, fs::path folder)
@@ -177,11 +102,7 @@ Experiment::Experiment(const fs::path& program, const fs::path& library, fs::pat
 }
 
 std::vector<std::string> Experiment::environment(const Fault& fault, bool injected) const {
-  // Nothing of the caller's: neither plugins nor numbers of threads.
-  std::vector<std::string> all{"PATH=/usr/bin:/bin", "LC_ALL=C.UTF-8", "OPENBLAS_NUM_THREADS=1",
-                               "XDG_DATA_HOME=" + (inputs_ / "none").string()};
-  if (const char* libraries = std::getenv("LD_LIBRARY_PATH"))  // of a program that was moved
-    all.push_back(std::string("LD_LIBRARY_PATH=") + libraries);
+  std::vector<std::string> all = plain_environment(inputs_ / "none");
   if (!injected) return all;
   all.push_back("LD_PRELOAD=" + library_.string());
   all.push_back(std::string(kRecordVariable) + "=" + record_.string());
@@ -198,15 +119,31 @@ void Experiment::prepare(const Trial& trial) const {
   for (const auto& [name, from] : trial.before) fs::copy_file(inputs_ / from, run_ / name);
 }
 
+/// `input`: a file in the folder of inputs, or empty.
+pid_t Experiment::start(const std::vector<std::string>& arguments,
+                        std::vector<std::string> environment, const fs::path& folder,
+                        const std::string& input) const {
+  Launch launch{{program_.string()}, std::move(environment), folder};
+  launch.command.insert(launch.command.end(), arguments.begin(), arguments.end());
+  const Descriptor in(input.empty() ? fs::path("/dev/null") : inputs_ / input, O_RDONLY);
+  const Descriptor out(out_, O_WRONLY | O_CREAT | O_TRUNC);
+  const Descriptor err(err_, O_WRONLY | O_CREAT | O_TRUNC | O_APPEND);
+  return start_process(std::move(launch), {in.number(), out.number(), err.number()});
+}
+
 RunResult Experiment::run(const Trial& trial, const Fault& fault) {
   prepare(trial);
   const SharedRecord shared(record_);
-  std::vector<std::string> command{program_.string()};
-  command.insert(command.end(), trial.arguments.begin(), trial.arguments.end());
-  const fs::path input = trial.input.empty() ? fs::path("/dev/null") : inputs_ / trial.input;
-  const int status =
-      run_process(std::move(command), environment(fault, true), run_, {input, out_, err_});
+  const auto begin = Clock::now();
+  const pid_t process = start(trial.arguments, environment(fault, true), run_, trial.input);
+  if (fault.what == Fault::What::kill) {
+    std::this_thread::sleep_until(begin + std::chrono::microseconds(fault.number));
+    ::kill(process, SIGKILL);
+  }
+  const int status = wait_for(process);
   RunResult result;
+  result.microseconds =
+      std::chrono::duration_cast<std::chrono::microseconds>(Clock::now() - begin).count();
   if (WIFEXITED(status)) result.code = WEXITSTATUS(status);
   if (WIFSIGNALED(status)) result.signal = WTERMSIG(status);
   result.out = without_memory(read_bytes(out_));
@@ -225,11 +162,7 @@ RunResult Experiment::run(const Trial& trial, const Fault& fault) {
 }
 
 void Experiment::make_input(const std::vector<std::string>& arguments, const std::string& input) {
-  std::vector<std::string> command{program_.string()};
-  command.insert(command.end(), arguments.begin(), arguments.end());
-  const fs::path in = input.empty() ? fs::path("/dev/null") : inputs_ / input;
-  const int status =
-      run_process(std::move(command), environment({}, false), inputs_, {in, out_, err_});
+  const int status = wait_for(start(arguments, environment({}, false), inputs_, input));
   if (!WIFEXITED(status) || WEXITSTATUS(status) != 0) {
     throw std::runtime_error(program_.string() + " " + arguments.front() +
                              " made no input: " + read_bytes(err_));

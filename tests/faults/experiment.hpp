@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "fault_record.hpp"
+#include "process.hpp"
 
 namespace cairn::faults {
 
@@ -19,13 +20,14 @@ struct Fault {
     memory,      ///< an allocation and all after it
     thread,      ///< the start of a thread and of all after it
     output,      ///< a call on an output, as `kind` names it (kKindVariable)
+    kill,        ///< none: the process is killed, `number` microseconds after its start
   };
   What what = What::nothing;
   std::uint64_t number = 0;  ///< of the call, from 1
   std::string kind;
 };
 
-/// "allocation:17", "output:3:ENOSPC"
+/// "allocation:17", "output:3:ENOSPC", "kill:12000"
 std::string to_string(const Fault& fault);
 /// The inverse. Throws `std::invalid_argument`.
 Fault parse_fault(const std::string& text);
@@ -40,6 +42,8 @@ struct Trial {
   std::string stream;   ///< of a trial with a journal: all lines, those restored among them
   /// Files that are there before: name → file in the folder of inputs.
   std::map<std::string, std::string> before;
+  /// Outputs that lines of the stream order: name → number of the line.
+  std::map<std::string, long> saved;
   bool memory = true;    ///< allocations are made to fail
   bool threads = false;  ///< the starts of threads are made to fail, and nothing else
 };
@@ -50,6 +54,7 @@ struct RunResult {
   int signal = 0;                            ///< that ended it
   std::string out, err;                      ///< standard output and error
   std::map<std::string, std::string> files;  ///< all files of its folder, by name
+  std::int64_t microseconds = 0;             ///< that it took
   std::uint64_t started = 0, allocations = 0, threads = 0, outputs = 0, failed = 0;
   std::vector<OutputCall> calls;  ///< on outputs
 };
@@ -77,14 +82,12 @@ class Experiment {
 
  private:
   void prepare(const Trial& trial) const;
+  pid_t start(const std::vector<std::string>& arguments, std::vector<std::string> environment,
+              const std::filesystem::path& folder, const std::string& input) const;
   std::vector<std::string> environment(const Fault& fault, bool injected) const;
 
   std::filesystem::path program_, library_, inputs_, run_, record_, out_, err_;
 };
-
-/// The whole content of a file.
-std::string read_bytes(const std::filesystem::path& file);
-void write_bytes(const std::filesystem::path& file, const std::string& bytes);
 
 /// What stands in an output before a run.
 std::string old_content(const std::string& name);

@@ -28,6 +28,10 @@ struct FaultRecord {
   std::atomic<std::uint64_t> outputs{0};  ///< calls on outputs; those beyond kMostCalls unlisted
   std::atomic<std::uint64_t> failed{0};   ///< calls that were made to fail
   std::array<OutputCall, kMostCalls> calls{};
+  // What the driver sets while the process runs:
+  /// 1: the disk is full, until this is 0 again; 2: after half of the next write.
+  std::atomic<std::uint32_t> disk_full{0};
+  std::atomic<std::int64_t> clock_offset{0};  ///< [s] by which a running clock is wrong
 };
 
 /// The environment variables that the injected library reads. Numbers count from 1; absent or 0:
@@ -38,7 +42,10 @@ inline constexpr const char* kMemoryVariable = "CAIRN_FAULT_MEMORY";  ///< N and
 inline constexpr const char* kThreadVariable = "CAIRN_FAULT_THREAD";  ///< N and all after it fail
 inline constexpr const char* kOutputVariable = "CAIRN_FAULT_OUTPUT";  ///< N fails, by KIND
 /// ENOSPC, EIO, EINTR: once. SHORT: half of the bytes are written. FULL: a disk that is full from
-/// there on, after half of the bytes.
+/// there on, after half of the bytes. KILL: the process is killed there, by SIGKILL, in a write
+/// after half of the bytes.
 inline constexpr const char* kKindVariable = "CAIRN_FAULT_KIND";
+/// If it is set, the clock runs, and is wrong by `FaultRecord::clock_offset`; else it stands still.
+inline constexpr const char* kClockVariable = "CAIRN_FAULT_CLOCK";
 
 }  // namespace cairn::faults

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // ./dev faults: makes allocations, outputs and threads of cairn fail, and says where that costs
-// more than it must.
+// more than it must. ./dev kill: the same for processes that are killed.
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
@@ -18,12 +18,14 @@ constexpr std::size_t kMostShown = 8;  // violations of one kind of fault
 
 constexpr const char* kHelp =
     "cairn_faults --program FILE --library FILE --folder FOLDER [--count N] [--fault FAULT]\n"
-    "             [--careless] [COMMAND...]\n"
+    "             [--kill] [--seed N] [--careless] [COMMAND...]\n"
     "\n"
     "  --program    the program; --library the injected library; --folder for its files\n"
     "  --count      at most so many faults of each kind, one per run, spread evenly [10000]\n"
     "  --fault      one run, such as allocation:17 or output:3:ENOSPC; its files stay in "
     "FOLDER/run\n"
+    "  --kill       kill processes instead: at so many random moments, and in calls on outputs\n"
+    "  --seed       of the moments [1]\n"
     "  --careless   the program is the one that does everything wrong\n"
     "  COMMAND      only these\n"
     "\n"
@@ -31,8 +33,8 @@ constexpr const char* kHelp =
 
 struct Options {
   std::string program, library, folder, fault;
-  std::uint64_t count = 10'000;
-  bool careless = false;
+  std::uint64_t count = 10'000, seed = 1;
+  bool kill = false, careless = false;
   std::vector<std::string> commands;
 };
 
@@ -53,6 +55,10 @@ Options parse(const std::vector<std::string>& words) {
       options.fault = value();
     } else if (words[k] == "--count") {
       options.count = std::stoull(value());
+    } else if (words[k] == "--seed") {
+      options.seed = std::stoull(value());
+    } else if (words[k] == "--kill") {
+      options.kill = true;
     } else if (words[k] == "--careless") {
       options.careless = true;
     } else if (words[k].starts_with("-")) {
@@ -67,12 +73,13 @@ Options parse(const std::vector<std::string>& words) {
 }
 
 /// Those that were asked for.
-std::vector<Trial> chosen_trials(const Options& options) {
+std::vector<Trial> chosen_trials(const Options& options, Experiment& experiment) {
   std::vector<Trial> all;
   if (options.careless) {
     all.push_back(careless_trial());
+    if (options.kill) all.push_back(careless_online_trial(experiment));
   } else {
-    all = cairn_trials();
+    all = options.kill ? kill_trials() : cairn_trials();
   }
   if (options.commands.empty()) return all;
   std::vector<Trial> chosen;
@@ -89,6 +96,7 @@ std::vector<Trial> chosen_trials(const Options& options) {
 const char* word_of(Verdict::End end) {
   return end == Verdict::End::completed ? "completed"
          : end == Verdict::End::error   ? "ended with an error"
+         : end == Verdict::End::killed  ? "killed"
                                         : "violation";
 }
 
@@ -104,20 +112,23 @@ int show_one(const Trial& trial, const Fault& fault, Experiment& experiment) {
   return verdict.end == Verdict::End::violation ? 1 : 0;
 }
 
-void print_head() {
-  std::printf("%-16s %-14s %9s %7s %10s %7s %11s\n", "command", "fault", "calls", "runs",
-              "completed", "errors", "violations");
+void print_head(bool kills) {
+  std::printf("%-16s %-14s %9s %7s %10s %7s %11s%s\n", "command", "fault",
+              kills ? "us, calls" : "calls", "runs", "completed", kills ? "killed" : "errors",
+              "violations", kills ? " left .part" : "");
 }
 
-void print(const Trial& trial, const Tally& tally) {
-  std::printf("%-16s %-14s %9llu %7d %10d %7d %11zu\n", trial.name.c_str(), tally.fault.c_str(),
+void print(const Trial& trial, const Tally& tally, bool kills) {
+  std::printf("%-16s %-14s %9llu %7d %10d %7d %11zu", trial.name.c_str(), tally.fault.c_str(),
               static_cast<unsigned long long>(tally.calls), tally.runs, tally.completed,
-              tally.errors, tally.violations.size());
+              kills ? tally.killed : tally.errors, tally.violations.size());
+  std::printf(kills ? " %10d\n" : "\n", tally.parts);
   std::size_t shown = 0;
   for (const Violation& violation : tally.violations) {
     if (++shown > kMostShown) break;
-    std::printf("  %s: %s\n    ./dev faults --fault %s %s\n", violation.fault.c_str(),
-                violation.why.c_str(), violation.fault.c_str(), trial.name.c_str());
+    std::printf("  %s: %s\n    ./dev %s --fault %s %s\n", violation.fault.c_str(),
+                violation.why.c_str(), kills ? "kill" : "faults", violation.fault.c_str(),
+                trial.name.c_str());
   }
   if (shown > kMostShown) std::printf("  and %zu more\n", tally.violations.size() - kMostShown);
   std::fflush(stdout);
@@ -125,17 +136,20 @@ void print(const Trial& trial, const Tally& tally) {
 
 int run(const Options& options) {
   Experiment experiment(options.program, options.library, options.folder);
-  const std::vector<Trial> trials = chosen_trials(options);
-  if (!options.careless) make_inputs(trials, experiment);
+  const std::vector<Trial> trials = chosen_trials(options, experiment);
+  if (!options.careless) make_inputs(trials, options.kill ? kForKills : InputSizes{}, experiment);
   if (!options.fault.empty()) {
     if (trials.size() != 1) throw std::invalid_argument("--fault is for one command");
     return show_one(trials.front(), parse_fault(options.fault), experiment);
   }
-  print_head();
+  print_head(options.kill);
   bool violated = false;
   for (const Trial& trial : trials) {
-    for (const Tally& tally : Campaign(experiment, trial).run(options.count)) {
-      print(trial, tally);
+    Campaign campaign(experiment, trial);
+    const std::vector<Tally> all =
+        options.kill ? campaign.kill(options.count, options.seed) : campaign.run(options.count);
+    for (const Tally& tally : all) {
+      print(trial, tally, options.kill);
       violated = violated || !tally.violations.empty();
     }
   }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // A library for LD_PRELOAD: counts the allocations, the threads and the calls on outputs of a
 // program from the beginning of main() on, makes one of them fail (fault_record.hpp), and holds the
-// clock, so that two runs write the same bytes.
+// clock, so that two runs write the same bytes, or makes it wrong.
 //
 // An output is a regular file that is open for writing; standard error is none. What goes through
 // streams of the C library does not come by here, since that calls nothing that could be replaced.
@@ -20,6 +20,7 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <csignal>
 #include <cstdarg>
 #include <cstdio>
 #include <cstdlib>
@@ -40,13 +41,14 @@ extern "C" void* __libc_memalign(std::size_t alignment, std::size_t bytes);
 namespace cairn::faults {
 namespace {
 
-enum class Kind { none, enospc, eio, eintr, cut_short, full };
+enum class Kind { none, enospc, eio, eintr, cut_short, full, kill };
 
 /// What is asked for, and where it is counted.
 struct Plan {
   FaultRecord* record = nullptr;
   std::uint64_t allocation = 0, memory = 0, thread = 0, output = 0;
   Kind kind = Kind::none;
+  bool clock_runs = false;
   bool armed = false;
 };
 Plan plan;
@@ -62,6 +64,7 @@ Kind kind_of(const char* text) {
   if (name == "EIO") return Kind::eio;
   if (name == "EINTR") return Kind::eintr;
   if (name == "SHORT") return Kind::cut_short;
+  if (name == "KILL") return Kind::kill;
   return name == "FULL" ? Kind::full : Kind::none;
 }
 
@@ -116,13 +119,22 @@ bool is_output(int descriptor) {
   return (::fcntl(descriptor, F_GETFL) & O_ACCMODE) != O_RDONLY;
 }
 
+/// What a full disk refuses.
+bool needs_room(Call call) {
+  return call == Call::open || call == Call::write || call == Call::sync;
+}
+
+[[noreturn]] void kill_this_process() {
+  for (;;) ::syscall(SYS_kill, ::syscall(SYS_getpid), SIGKILL);
+}
+
 /// Counts a call, and lists it with the path that `write_path(buffer, size)` gives.
 template <class WritePath>
 bool counted_call_fails(Call call, const WritePath& write_path) {
   FaultRecord& record = *plan.record;
   const std::uint64_t number = ++record.outputs;
-  const bool full = plan.kind == Kind::full && plan.output > 0 && number > plan.output &&
-                    (call == Call::open || call == Call::write || call == Call::sync);
+  const bool planned = plan.kind == Kind::full && plan.output > 0 && number > plan.output;
+  const bool full = needs_room(call) && (planned || record.disk_full > 0);
   const bool fails = number == plan.output || full;
   if (fails) ++record.failed;
   if (number <= FaultRecord::kMostCalls) {
@@ -131,6 +143,7 @@ bool counted_call_fails(Call call, const WritePath& write_path) {
     listed.failed = fails ? 1 : 0;
     write_path(listed.path.data(), listed.path.size() - 1);
   }
+  if (fails && plan.kind == Kind::kill && call != Call::write) kill_this_process();
   return fails;
 }
 
@@ -166,14 +179,26 @@ int fail() {
 
 bool at_the_planned_call() { return plan.record->outputs == plan.output; }
 
+/// Whether half of this write succeeds, as where a disk becomes full.
+bool half_is_written() {
+  if (plan.record->disk_full == 2) {
+    plan.record->disk_full = 1;
+    return true;
+  }
+  const bool half =
+      plan.kind == Kind::cut_short || plan.kind == Kind::full || plan.kind == Kind::kill;
+  return half && at_the_planned_call();
+}
+
 ssize_t raw_write(int descriptor, const void* bytes, std::size_t count) {
   return ::syscall(SYS_write, descriptor, bytes, count);
 }
 
 /// A write that fails: by the plan in whole, or after half of its bytes.
 ssize_t write_badly(int descriptor, const void* bytes, std::size_t count) {
-  const bool half = plan.kind == Kind::cut_short || plan.kind == Kind::full;
-  if (half && at_the_planned_call() && count > 1) return raw_write(descriptor, bytes, count / 2);
+  const ssize_t half = half_is_written() && count > 1 ? raw_write(descriptor, bytes, count / 2) : 0;
+  if (plan.kind == Kind::kill) kill_this_process();
+  if (half != 0) return half;
   if (plan.kind == Kind::cut_short) return raw_write(descriptor, bytes, count);
   return fail();
 }
@@ -206,6 +231,7 @@ int counted_main(int argc, char** argv, char** environment) {
     plan.thread = number_of(kThreadVariable);
     plan.output = number_of(kOutputVariable);
     plan.kind = kind_of(std::getenv(kKindVariable));
+    plan.clock_runs = std::getenv(kClockVariable) != nullptr;
     FaultRecord& record = *plan.record;
     record.allocations = record.threads = record.outputs = record.failed = 0;  // of a run before
     record.started = 1;
@@ -322,10 +348,11 @@ CAIRN_INJECTED ssize_t write(int descriptor, const void* bytes, std::size_t coun
 CAIRN_INJECTED ssize_t pwrite(int descriptor, const void* bytes, std::size_t count, off_t offset) {
   if (!call_fails(Call::write, descriptor))
     return ::syscall(SYS_pwrite64, descriptor, bytes, count, offset);
-  const bool half = plan.kind == Kind::cut_short || plan.kind == Kind::full;
-  if (half && at_the_planned_call() && count > 1)
-    return ::syscall(SYS_pwrite64, descriptor, bytes, count / 2, offset);
-  return fail();
+  const ssize_t half = half_is_written() && count > 1
+                           ? ::syscall(SYS_pwrite64, descriptor, bytes, count / 2, offset)
+                           : 0;
+  if (plan.kind == Kind::kill) kill_this_process();
+  return half != 0 ? half : fail();
 }
 
 // Where it fails, at most the first of the parts is written.
@@ -361,13 +388,18 @@ CAIRN_INJECTED int close(int descriptor) {
 // The clock. Standing still costs no loop its end: none waits for a time.
 
 CAIRN_INJECTED int clock_gettime(clockid_t clock, timespec* time) noexcept {
-  if (!plan.armed) return static_cast<int>(::syscall(SYS_clock_gettime, clock, time));
-  *time = {1'000'000'000, 0};
-  return 0;
+  if (plan.armed && !plan.clock_runs) {
+    *time = {1'000'000'000, 0};
+    return 0;
+  }
+  const int result = static_cast<int>(::syscall(SYS_clock_gettime, clock, time));
+  if (plan.armed) time->tv_sec += plan.record->clock_offset;
+  return result;
 }
 
 CAIRN_INJECTED std::time_t time(std::time_t* result) noexcept {
-  const std::time_t now = 1'000'000'000;
-  if (result) *result = now;
-  return now;
+  timespec now{};
+  clock_gettime(CLOCK_REALTIME, &now);
+  if (result) *result = now.tv_sec;
+  return now.tv_sec;
 }

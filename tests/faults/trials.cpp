@@ -7,7 +7,7 @@
 namespace cairn::faults {
 namespace {
 
-constexpr int kStreamPoses = 8;  // on a circle: the last sees the first
+constexpr int kLinesBeforeSave = 14;
 
 std::string edge(int from, int to, const std::string& measurement) {
   return "EDGE_SE2 " + std::to_string(from) + " " + std::to_string(to) + " " + measurement +
@@ -16,29 +16,35 @@ std::string edge(int from, int to, const std::string& measurement) {
 
 const std::string kStep = "1 0 0.785";
 
-/// A robot once around, with questions between its measurements.
-std::string stream() {
+/// A robot once around, in as many steps as there are poses (8 make a circle), with questions
+/// between its measurements.
+std::string stream(int poses) {
   std::string text = "VERTEX_SE2 0 0 0 0\nFIX 0\n";
-  for (int k = 1; k < kStreamPoses; ++k) {
+  for (int k = 1; k < poses; ++k) {
     text += "NEW VERTEX_SE2 " + std::to_string(k) + "\n" + edge(k - 1, k, kStep);
     if (k % 3 == 0) text += "CHI2\nESTIMATE ALL\nCOVARIANCE 0 " + std::to_string(k) + "\n";
   }
-  return text + edge(kStreamPoses - 1, 0, kStep) + "FULL\nREMOVE FACTOR 1\nCHI2\n";
+  return text + edge(poses - 1, 0, kStep) + "FULL\nREMOVE FACTOR 1\nCHI2\n";
 }
 
 /// The same for a policy.
-std::string policy_stream() {
+std::string policy_stream(int poses) {
   std::string text = "NEW VERTEX_SE2 0\n";
-  for (int k = 1; k < kStreamPoses; ++k) {
+  for (int k = 1; k < poses; ++k) {
     text += "NEW VERTEX_SE2 " + std::to_string(k) + "\n" + edge(k - 1, k, kStep) + "NEXT\n";
   }
-  return text + edge(kStreamPoses - 1, 0, kStep) + "NEXT\nDONE\nCHI2\n";
+  return text + edge(poses - 1, 0, kStep) + "NEXT\nDONE\nCHI2\n";
 }
 
 std::string first_lines(const std::string& text, int count) {
   std::size_t end = 0;
   for (; count > 0; --count) end = text.find('\n', end) + 1;
   return text.substr(0, end);
+}
+
+/// To the end of a measurement: questions have no number in a journal to go on from.
+std::string first_half(const std::string& text) {
+  return text.substr(0, text.find('\n', text.find("\nEDGE", text.size() / 2) + 1) + 1);
 }
 
 Trial trial(const std::string& name, std::vector<std::string> arguments,
@@ -145,17 +151,22 @@ Trial thread_trial() {
 
 }  // namespace
 
-void make_inputs(const std::vector<Trial>& trials, Experiment& experiment) {
-  experiment.make_input({"generate", "manhattan:poses=40", "-o", "graph.g2o", "--seed", "3"});
+void make_inputs(const std::vector<Trial>& trials, const InputSizes& sizes,
+                 Experiment& experiment) {
+  experiment.make_input({"generate", "manhattan:poses=" + std::to_string(sizes.graph), "-o",
+                         "graph.g2o", "--seed", "3"});
   experiment.make_input({"convert", "graph.g2o", "graph.g2o.gz"});
   experiment.make_input({"optimize", "graph.g2o", "-o", "best.g2o", "--json", "run.json",
                          "--record", "run.jsonl", "--threads", "1"});
-  const std::string all = stream();
-  const std::string half = first_lines(all, 12);
+  const std::string all = stream(sizes.stream);
+  const std::string half = first_half(all);
   write_bytes(experiment.inputs() / "stream.txt", all);
+  const std::string first = first_lines(all, kLinesBeforeSave);
+  write_bytes(experiment.inputs() / "saving.txt",
+              first + "SAVE saved.g2o\n" + all.substr(first.size()));
   write_bytes(experiment.inputs() / "first.txt", half);
   write_bytes(experiment.inputs() / "rest.txt", all.substr(half.size()));
-  write_bytes(experiment.inputs() / "policy.txt", policy_stream());
+  write_bytes(experiment.inputs() / "policy.txt", policy_stream(sizes.stream));
   const auto restores = [](const Trial& made) { return !made.before.empty(); };
   if (std::ranges::none_of(trials, restores)) return;  // nor need there be an estimator
   std::vector<std::string> online{"online", "--journal", "half.journal", "--threads", "1"};
@@ -172,10 +183,38 @@ std::vector<Trial> cairn_trials() {
   return all;
 }
 
+std::vector<Trial> kill_trials() {
+  std::vector<Trial> all = file_trials();
+  for (const char* const sync : {"every", "batch", "none"}) {
+    Trial made = online_trial(std::string("online-") + sync, kOnline, "saving.txt");
+    made.arguments.insert(made.arguments.end(), {"--sync", sync});
+    made.outputs.push_back("saved.g2o");
+    made.saved["saved.g2o"] = kLinesBeforeSave + 1;
+    all.push_back(made);
+  }
+  for (Trial& online : online_trials()) {
+    if (online.name != "online") all.push_back(std::move(online));
+  }
+  all.push_back(parallel_trial());
+  return all;
+}
+
 Trial careless_trial() {
   Trial made;
   made.name = "careless";
   made.outputs = {"result.txt", "second.txt"};
+  return made;
+}
+
+Trial careless_online_trial(Experiment& experiment) {
+  write_bytes(experiment.inputs() / "lines.txt", "one\ntwo\nSAVE saved.txt\nthree\nfour\n");
+  Trial made;
+  made.name = "careless-online";
+  made.arguments = {"online", "--journal"};
+  made.outputs = {"run.journal", "map.g2o", "saved.txt"};
+  made.journal = "run.journal";
+  made.input = made.stream = "lines.txt";
+  made.saved["saved.txt"] = 3;
   return made;
 }
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <csignal>
 #include <cstring>
+#include <regex>
 #include <set>
 #include <sstream>
 #include <string_view>
@@ -79,11 +80,14 @@ bool is_map(const Reference& reference, const Fault& fault, const std::string* m
   return false;
 }
 
+bool is_kill(const Fault& fault) { return fault.what == Fault::What::kill || fault.kind == "KILL"; }
+
 /// Names of files that are no output.
-std::string left_behind(const Trial& trial, const RunResult& result) {
+std::string left_behind(const Trial& trial, const Fault& fault, const RunResult& result) {
   std::string names;
   for (const auto& [name, content] : result.files) {
-    if (std::ranges::find(trial.outputs, name) == trial.outputs.end()) names += " " + name;
+    if (std::ranges::find(trial.outputs, name) != trial.outputs.end()) continue;
+    if (!is_kill(fault) || !is_part(trial, name)) names += " " + name;
   }
   return names;
 }
@@ -115,10 +119,10 @@ long last_acknowledged(const std::string& out) {
   return last;
 }
 
-/// The numbers of the records of a journal: the second word of each line but the first.
+/// The numbers of the whole records of a journal: the second word of each line but the first.
 std::vector<long> record_numbers(const std::string& journal) {
   std::vector<long> numbers;
-  std::istringstream lines(journal);
+  std::istringstream lines(journal.substr(0, journal.rfind('\n') + 1));
   std::string line;
   std::getline(lines, line);
   while (std::getline(lines, line)) {
@@ -132,13 +136,15 @@ std::vector<long> record_numbers(const std::string& journal) {
 }
 
 /// Empty, or what is wrong with the journal.
-std::string journal_problem(const Trial& trial, const RunResult& good, const RunResult& result) {
+std::string journal_problem(const Trial& trial, const Fault& fault, const RunResult& good,
+                            const RunResult& result) {
   const long acknowledged = last_acknowledged(result.out);
   const std::string* journal = file_of(result, trial.journal);
   if (!journal) return acknowledged == 0 ? "" : "lines were acknowledged, and there is no journal";
   const std::string& whole = *file_of(good, trial.journal);
   if (!whole.starts_with(*journal)) return "the journal is no beginning of what it should be";
-  if (!journal->empty() && journal->back() != '\n') return "the journal ends in half a record";
+  if (!is_kill(fault) && !journal->empty() && journal->back() != '\n')
+    return "the journal ends in half a record";
   const std::vector<long> there = record_numbers(*journal);
   for (const long number : record_numbers(whole)) {
     if (number <= acknowledged && std::ranges::find(there, number) == there.end())
@@ -183,7 +189,7 @@ Verdict judge_error(const Trial& trial, const Fault& fault, const Reference& ref
   std::vector<std::string> old;
   for (const std::string& name : trial.outputs) {
     if (name == trial.journal) {
-      if (const std::string problem = journal_problem(trial, good, result); !problem.empty())
+      if (const std::string problem = journal_problem(trial, fault, good, result); !problem.empty())
         return violation(problem);
     } else if (is_old(trial, result, name)) {
       old.push_back(name);
@@ -198,7 +204,39 @@ Verdict judge_error(const Trial& trial, const Fault& fault, const Reference& ref
   return {Verdict::End::error, ""};
 }
 
+// Kills -------------------------------------------------------------------------------------------
+
+Verdict judge_killed(const Trial& trial, const Fault& fault, const RunResult& good,
+                     const RunResult& result) {
+  if (!good.out.starts_with(result.out)) return violation("standard output is no beginning");
+  const long acknowledged = last_acknowledged(result.out);
+  for (const std::string& name : trial.outputs) {
+    if (name == trial.journal) continue;
+    const bool old = is_old(trial, result, name);
+    if (!old && !is_new(good, result, name))
+      return violation(name + " is neither the old file nor the new one");
+    const auto saved = trial.saved.find(name);
+    if (old && saved != trial.saved.end() && saved->second <= acknowledged)
+      return violation(name + " was acknowledged, and is the old file");
+  }
+  if (trial.journal.empty()) return {Verdict::End::killed, ""};
+  const std::string problem = journal_problem(trial, fault, good, result);
+  return problem.empty() ? Verdict{Verdict::End::killed, ""} : violation(problem);
+}
+
 }  // namespace
+
+bool is_part(const Trial& trial, const std::string& name) {
+  static const std::regex kPart("(.+)\\.[0-9]+-[0-9]+\\.part");
+  std::smatch found;
+  return std::regex_match(name, found, kPart) &&
+         std::ranges::find(trial.outputs, found[1].str()) != trial.outputs.end();
+}
+
+std::string last_chi2(const std::string& out) {
+  const std::size_t begin = out.rfind("CHI2 ");
+  return begin == std::string::npos ? "" : out.substr(begin, out.find('\n', begin) - begin);
+}
 
 long last_record(const std::string& journal) {
   const std::vector<long> numbers = record_numbers(journal);
@@ -208,13 +246,15 @@ long last_record(const std::string& journal) {
 Verdict judge(const Trial& trial, const Fault& fault, const Reference& reference,
               const RunResult& result) {
   if (result.signal == SIGALRM) return violation("it did not end");
-  if (result.signal != 0)
+  const bool killed = is_kill(fault) && result.signal == SIGKILL;
+  if (!killed && result.signal != 0)
     return violation(std::string("killed by ") + strsignal(result.signal) + ": " +
                      first_line(result.err));
-  if (const std::string names = left_behind(trial, result); !names.empty())
+  if (const std::string names = left_behind(trial, fault, result); !names.empty())
     return violation("left behind:" + names);
+  if (killed) return judge_killed(trial, fault, reference.good, result);
   if (result.code == 0) return judge_completed(trial, reference.good, result);
-  const bool passes = fault.kind == "SHORT" || fault.kind == "EINTR";
+  const bool passes = is_kill(fault) || fault.kind == "SHORT" || fault.kind == "EINTR";
   if (passes) return violation("nothing was lost, and yet: " + first_line(result.err));
   return judge_error(trial, fault, reference, result);
 }

@@ -10,7 +10,7 @@ namespace cairn::faults {
 
 /// How a run with a fault ended.
 struct Verdict {
-  enum class End { completed, error, violation };
+  enum class End { completed, error, killed, violation };
   End end = End::completed;
   std::string why;  ///< of a violation
 };
@@ -30,8 +30,18 @@ struct Reference {
 /// failed once, all other outputs written; and all that standard output acknowledged in the
 /// journal. A session that memory ends in the midst of a line may leave a map in which a part of
 /// that line is. Everything else is a violation: a crash, a process that does not end, half a file.
+///
+/// A process that is killed may leave what it was writing: a file `NAME.PID-N.part` beside an
+/// output, and half a record at the end of the journal. An output is the old one or the new one,
+/// and the new one where standard output says that it was saved.
 Verdict judge(const Trial& trial, const Fault& fault, const Reference& reference,
               const RunResult& result);
+
+/// Whether a process that was killed has left this file beside one of its outputs.
+bool is_part(const Trial& trial, const std::string& name);
+
+/// The last line of the answers that gives chi2; empty if there is none.
+std::string last_chi2(const std::string& out);
 
 /// The number of the last line that a journal has; 0 if there is none.
 long last_record(const std::string& journal);

@@ -143,11 +143,13 @@ TEST_F(Online, ChangesMarginalizesAndTellsCovariances) {
             "VERTEX_SE2 0 0 0 0\nFIX 0\nNEW VERTEX_SE2 1\nEDGE_SE2 0 1" + kEdge +
                 "\nNEW VERTEX_SE2 2\nEDGE_SE2 1 2" + kEdge +
                 "\nCHANGE 0 2 0 0 25 0 0 25 0 25\nESTIMATE 1\nCOVARIANCE 1 1\n"
-                "MARGINALIZE 0 1\nESTIMATE ALL\nSAVE " +
+                "MARGINALIZE 0 1\nCHANGE 2 1\nCHANGE 1 1 0 0\nESTIMATE ALL\nSAVE " +
                 folder_.file("all.tum") + "\nSAVE " + folder_.file("all.g2o") + "\n");
   EXPECT_THAT(run.out, HasSubstr("VERTEX_SE2 1 2 "));
   EXPECT_THAT(run.out, testing::ContainsRegex("COVARIANCE 1 1 3 3 0.0(4|3999)[^\n]* 0.0(4|3999)"));
   EXPECT_THAT(run.out, HasSubstr("PRIOR 2\n"));
+  EXPECT_THAT(run.out, HasSubstr("there is no factor 2 that can be changed"));  // a prior
+  EXPECT_THAT(run.out, HasSubstr("there is no factor 1 that can be changed"));  // is gone
   EXPECT_THAT(run.out, HasSubstr("VERTEX_SE2 2 3 "));
   EXPECT_THAT(run.out, HasSubstr("variables 1 factors 1"));
   EXPECT_THAT(run.out, HasSubstr("format g2o cannot express MARGINAL_PRIOR 2"));

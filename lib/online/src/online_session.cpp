@@ -10,6 +10,7 @@
 #include "cairn/graph/packed.hpp"
 #include "cairn/io/format.hpp"
 #include "cairn/runtime/error.hpp"
+#include "cairn/update/marginal_prior.hpp"
 
 namespace cairn {
 OnlineSession::OnlineSession(Estimator& estimator, StreamFormat& format, Registry& registry,
@@ -99,7 +100,7 @@ void OnlineSession::take_factor(Factor factor, Reply& reply) {
 UpdateReport OnlineSession::update(GraphUpdate update, bool solve, bool full, Reply& reply) {
   const UpdateOptions how{.defer = !solve, .full = full, .max_seconds = settings_.budget};
   const UpdateReport report = estimator_.update(update, how);
-  follow(update, report);
+  follow(update);
   reply.changes = true;
   reply.solved = solve;
   if (solve) reply.seconds = report.seconds.total;
@@ -109,15 +110,12 @@ UpdateReport OnlineSession::update(GraphUpdate update, bool solve, bool full, Re
 }
 
 /// What the estimator has taken is known, and waits no more.
-void OnlineSession::follow(const GraphUpdate& update, const UpdateReport& report) {
+void OnlineSession::follow(const GraphUpdate& update) {
   for (const Variable& variable : update.variables) {
     known_.push_back(variable.id);
     types_[variable.id] = variable.type;
     std::erase_if(waiting_, [&](const Variable& v) { return v.id == variable.id; });
   }
-  factor_types_.resize(static_cast<std::size_t>(report.first_factor));
-  for (const Factor& factor : update.factors) factor_types_.push_back(factor.type);
-  factor_types_.resize(factor_types_.size() + report.priors.size());
   const auto forget = [&](Id id) {
     std::erase(known_, id);
     types_.erase(id);
@@ -176,9 +174,10 @@ void OnlineSession::remove(const Words& words, Reply& reply) {
 void OnlineSession::change(const Words& words, Reply& reply) {
   if (words.size() < 3) throw bad_line("expected 'CHANGE k measurement… [information…]'");
   ChangedFactor changed{parse_whole(words[1], "number of a factor"), {}, {}};
-  const bool known = changed.factor >= 0 && changed.factor < std::ssize(factor_types_);
-  const FactorType* type = known ? factor_types_[changed.factor].get() : nullptr;
-  if (!type) throw bad_line(fmt::format("there is no factor {} that can be changed", words[1]));
+  const std::shared_ptr<const FactorType> type =
+      estimator_.has_factor(changed.factor) ? estimator_.factor(changed.factor).type : nullptr;
+  if (!type || type->tag() == MarginalPrior::kTag)
+    throw bad_line(fmt::format("there is no factor {} that can be changed", words[1]));
   const std::size_t size = static_cast<std::size_t>(type->measurement_size()),
                     packed = packed_size(type->residual_size());
   const std::span<const std::string_view> numbers = std::span(words).subspan(2);

@@ -78,17 +78,17 @@ struct EngineState {
   bool gauge_is_old_ = false;
   int dead_ = 0;
   int live_factors_ = 0;
-  double cost_ = 0.0;                      // sum over factors
-  double gained_ = 0.0;                    // of the cost, by steps since factors were evaluated
-  bool must_look_ = false;                 // something has been removed or changed: `gained_` is
-                                           // no measure then
-  int others_ = 0;                         // factors of several variables that depend on rigid
-                                           // motions of these
-  double left_share_ = 1.0;                // how much of the shortfall was left to gain
-  double decrease_ = 0.0;                  // of the last solution: gᵀH⁻¹g
-  std::vector<FactorId> ids_;              // by factor
-  std::vector<std::int32_t> place_of_id_;  // by FactorId: factor, -1 if it has been removed
-  std::vector<std::uint8_t> is_source_;    // by variable
+  double cost_ = 0.0;          // sum over factors
+  double gained_ = 0.0;        // of the cost, by steps since factors were evaluated
+  bool must_look_ = false;     // something has been removed or changed: `gained_` is
+                               // no measure then
+  int others_ = 0;             // factors of several variables that depend on rigid
+                               // motions of these
+  double left_share_ = 1.0;    // how much of the shortfall was left to gain
+  double decrease_ = 0.0;      // of the last solution: gᵀH⁻¹g
+  std::vector<FactorId> ids_;  // by factor, rising
+  FactorId next_id_ = 0;
+  std::vector<std::uint8_t> is_source_;  // by variable
 };
 
 /// Solves the nonlinear least-squares problem of a graph that changes: keeps its linear models,
@@ -111,10 +111,12 @@ class Engine : private EngineState {
   Estimate current() const { return tree_.settled(); }
   /// The factor's number in the graph, or -1.
   std::int32_t place_of(FactorId id) const {
-    return id >= 0 && id < std::ssize(place_of_id_) ? place_of_id_[static_cast<std::size_t>(id)]
-                                                    : -1;
+    const auto found = std::ranges::lower_bound(ids_, id);
+    const auto f = found - ids_.begin();
+    return found != ids_.end() && *found == id && live_factor_[f] ? static_cast<std::int32_t>(f)
+                                                                  : -1;
   }
-  FactorId next_id() const { return std::ssize(place_of_id_); }
+  FactorId next_id() const { return next_id_; }
   /// Takes what has been removed out of the graph: everything is numbered anew.
   void compact();
 

@@ -17,8 +17,6 @@ void Engine::load(Graph graph, std::vector<FactorId> ids) {
   covariances_.renumber(now);
   graph_ = std::move(graph);
   ids_ = std::move(ids);
-  for (std::size_t f = 0; f < ids_.size(); ++f)
-    place_of_id_[static_cast<std::size_t>(ids_[f])] = static_cast<std::int32_t>(f);
   system_ = System();
   states_ = States();
   models_.clear();
@@ -70,10 +68,7 @@ void Engine::added_variable() {
 
 void Engine::added_factor() {
   const int f = models_.size();
-  if (f == std::ssize(ids_)) {
-    ids_.push_back(next_id());
-    place_of_id_.push_back(f);
-  }
+  if (f == std::ssize(ids_)) ids_.push_back(next_id_++);
   models_.add(graph_, f);
   live_factor_.push_back(1);
   checked_at_.push_back(-1);
@@ -98,7 +93,6 @@ void Engine::remove_factor(int f) {
   for (const std::int32_t v : models_.variables(f)) follow(v);
   take_out(f);
   live_factor_[f] = 0;
-  place_of_id_[static_cast<std::size_t>(ids_[f])] = -1;
   cost_ -= models_.cost(f);
   for (const std::int32_t v : models_.variables(f)) {
     std::erase(factors_of_[v], f);

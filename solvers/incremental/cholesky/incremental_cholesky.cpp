@@ -165,6 +165,7 @@ void IncrementalCholesky::apply(const GraphUpdate& update, UpdateReport& report)
 void IncrementalCholesky::tell_of_anchors(UpdateReport& report) {
   for (const std::int32_t v : engine_->take_anchored()) {
     if (!engine_->live_variable(v) || engine_->graph().fixed(v)) continue;
+    if (!engine_->held(v)) continue;  // what followed in the same update determines it
     if (!told_.insert(engine_->graph().id(v)).second) continue;
     report.notes.push_back(
         fmt::format("the pose of the component of {0} is not determined: anchored {0}",

@@ -109,6 +109,19 @@ TEST_P(EveryEstimator, SaysWhatHasNoFactorLeft) {
               testing::Not(testing::Contains(testing::HasSubstr("VERTEX_SE2 1"))));
 }
 
+TEST_P(EveryEstimator, AnchorsNothingThatAPriorDetermines) {
+  GraphUpdate update = chain(4);
+  update.variables[0] = pose(0, {0.0, 0.0, 0.0}, true);
+  estimator_->update(update);
+  update = {};
+  update.marginalized = {0};  // leaves a prior on pose 1, after the factors that were there before
+  EXPECT_THAT(estimator_->update(update).notes, testing::IsEmpty());
+  update = {};
+  update.variables = {pose(4)};
+  update.factors = {between(3, 4)};
+  EXPECT_THAT(estimator_->update(update, {.full = true}).notes, testing::IsEmpty());
+}
+
 TEST_P(EveryEstimator, ADeferredUpdateLeavesTheEstimateOfOldVariables) {
   estimator_->update(chain(3));
   const std::vector<double> before(estimator_->state(2).begin(), estimator_->state(2).end());

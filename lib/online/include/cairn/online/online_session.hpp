@@ -62,7 +62,7 @@ class CAIRN_API OnlineSession final : public LineSession {
 
   /// Hands an update over; solves where that is due or asked for.
   UpdateReport update(GraphUpdate update, bool solve, bool full, Reply& reply);
-  void follow(const GraphUpdate& update, const UpdateReport& report);
+  void follow(const GraphUpdate& update);
   void write_results(const UpdateReport& report, Reply& reply);
   void write_estimate(Id id, std::string& text) const;
   bool write_covariance(Id a, Id b, std::string& text);
@@ -78,8 +78,7 @@ class CAIRN_API OnlineSession final : public LineSession {
   std::vector<Variable> waiting_;
   std::vector<Id> known_;  ///< those that the estimator has, in the order of arrival
   std::unordered_map<Id, std::shared_ptr<const VariableType>> types_;
-  std::vector<std::shared_ptr<const FactorType>> factor_types_;  ///< by id; null: of no line
-  std::unordered_map<Id, std::vector<double>> reported_;         ///< estimates, for `changed`
+  std::unordered_map<Id, std::vector<double>> reported_;  ///< estimates, for `changed`
 };
 
 }  // namespace cairn
