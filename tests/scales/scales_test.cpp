@@ -187,6 +187,14 @@ std::vector<double> covariance_of_last(const Graph& graph, Estimator& estimator)
   return block;
 }
 
+/// All changes, after the graph as it is.
+std::vector<Change> changes_after_none() {
+  std::vector<Change> changes = all_changes();
+  std::stable_partition(changes.begin(), changes.end(),
+                        [](const Change& change) { return change.name == "as it is"; });
+  return changes;
+}
+
 /// What an element of a covariance block is multiplied by.
 double unit_of(const Change& change, const VariableType& type, std::size_t row,
                std::size_t column) {
@@ -219,9 +227,7 @@ TEST_P(EveryEstimator, FindsTheSameEstimateAndCovarianceAtAnyScale) {
     const Problem problem = named(name);
     const Reference reference = solve_reference(problem, registry);
     std::vector<double> wanted;
-    std::vector<Change> changes = all_changes();
-    std::ranges::stable_partition(changes, [](const Change& c) { return c.name == "as it is"; });
-    for (const Change& change : changes) {
+    for (const Change& change : changes_after_none()) {
       Graph graph = make_graph(problem, registry);
       apply(change, graph);
       const auto estimator = registry.make<Estimator>(GetParam());
@@ -247,9 +253,7 @@ TEST(Scales, CovariancesScaleWithTheInformation) {
     const auto solver = registry.make<LinearSolver>(name);
     if (!query<Marginals>(*solver)) continue;
     std::vector<double> wanted;
-    std::vector<Change> changes = all_changes();
-    std::ranges::stable_partition(changes, [](const Change& c) { return c.name == "as it is"; });
-    for (const Change& change : changes) {
+    for (const Change& change : changes_after_none()) {
       Graph graph = reference.graph.clone();
       apply(change, graph);
       GraphMarginals marginals(graph, *solver);
