@@ -12,7 +12,7 @@ struct LossOptions {
 
   static auto fields() {
     return OptionFields<LossOptions>().real(
-        "scale", &LossOptions::scale, 1e-6, 1e6,
+        "scale", &LossOptions::scale, 1e-50, 1e50,
         "norm of the whitened residual [sigma] where it turns robust");
   }
 };

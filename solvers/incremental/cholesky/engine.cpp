@@ -17,8 +17,9 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// What a factor's chi2 may be off by rounding.
+/// What a factor's chi2 may be off by rounding, where its information is between one and this.
 constexpr double kRounding = 1e-18;
+constexpr double kOrdinaryInformation = 1e12;
 
 // How the accuracy that is asked for, a fraction of chi2, is shared out. Found by trying on the
 // published graphs: what is left at the end stays well within it.
@@ -87,7 +88,7 @@ void Engine::solve(double max_seconds, UpdateReport& report) {
     ++report.iterations;
     if (!check(round > 0, report)) return;
     // Negated, so that what is not a number is bad too.
-    if (!(cost_ <= 2.0 * before + kRounding * live_factors_)) {
+    if (!(cost_ <= 2.0 * before + rounding())) {
       step_back();
       return rescue(report, 1e-6);
     }
@@ -108,6 +109,14 @@ bool Engine::negligible() {
 /// A share of the accuracy that is asked for, of the mean cost of a factor.
 double Engine::share(double part) const {
   return part * settings_.accuracy * cost() / std::max(live_factors_, 1);
+}
+
+/// Below and above what is ordinary, chi2 and its rounding go with the information.
+double Engine::rounding() const {
+  const double scale = largest_information_ < 1.0
+                           ? largest_information_
+                           : std::max(1.0, largest_information_ / kOrdinaryInformation);
+  return kRounding * live_factors_ * scale;
 }
 
 /// The estimate from before this update.
@@ -244,7 +253,7 @@ bool Engine::check(bool anyway, UpdateReport& report) {
 /// it is; if the former is much larger, H is not that of the current estimate, and what has moved
 /// is relinearised.
 bool Engine::improve(bool enough_time, UpdateReport& report) {
-  const double allowed = settings_.accuracy * cost_ + kRounding * live_factors_;
+  const double allowed = settings_.accuracy * cost_ + rounding();
   report.owed = 0;
   double left = 0.0;
   {
@@ -359,11 +368,11 @@ void Engine::solve_fully(UpdateReport& report) {
       ++report.iterations;
       check(true, report);
     }
-    if (!ok || !(cost_ <= 1.01 * before + kRounding * live_factors_)) {
+    if (!ok || !(cost_ <= 1.01 * before + rounding())) {
       step_back();
       return rescue(report, 1e-12);
     }
-    if (decrease_ <= 1e-12 * cost_ + kRounding * live_factors_) return;
+    if (decrease_ <= 1e-12 * cost_ + rounding()) return;
   }
   rescue(report, 1e-12);
 }

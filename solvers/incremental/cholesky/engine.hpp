@@ -78,15 +78,16 @@ struct EngineState {
   bool gauge_is_old_ = false;
   int dead_ = 0;
   int live_factors_ = 0;
-  double cost_ = 0.0;          // sum over factors
-  double gained_ = 0.0;        // of the cost, by steps since factors were evaluated
-  bool must_look_ = false;     // something has been removed or changed: `gained_` is
-                               // no measure then
-  int others_ = 0;             // factors of several variables that depend on rigid
-                               // motions of these
-  double left_share_ = 1.0;    // how much of the shortfall was left to gain
-  double decrease_ = 0.0;      // of the last solution: gᵀH⁻¹g
-  std::vector<FactorId> ids_;  // by factor, rising
+  double largest_information_ = 0.0;  // of a factor's diagonal, since all was loaded
+  double cost_ = 0.0;                 // sum over factors
+  double gained_ = 0.0;               // of the cost, by steps since factors were evaluated
+  bool must_look_ = false;            // something has been removed or changed: `gained_` is
+                                      // no measure then
+  int others_ = 0;                    // factors of several variables that depend on rigid
+                                      // motions of these
+  double left_share_ = 1.0;           // how much of the shortfall was left to gain
+  double decrease_ = 0.0;             // of the last solution: gᵀH⁻¹g
+  std::vector<FactorId> ids_;         // by factor, rising
   FactorId next_id_ = 0;
   std::vector<std::uint8_t> is_source_;  // by variable
 };
@@ -194,6 +195,9 @@ class Engine : private EngineState {
   /// Σ ρ(‖r‖²), as far as it is known.
   double cost() const { return std::max(cost_ - gained_, 0.0); }
   double share(double part) const;
+  /// What rounding may do to the cost.
+  double rounding() const;
+  void note_information(int f);
   void touch_all();
   void set_right_hand_side();
   void set_aside();

@@ -39,7 +39,7 @@ void Engine::load(Graph graph, std::vector<FactorId> ids) {
   checked_at_.clear();
   broken_ = gauge_is_old_ = false;
   dead_ = live_factors_ = 0;
-  cost_ = decrease_ = gained_ = 0.0;
+  cost_ = decrease_ = gained_ = largest_information_ = 0.0;
   others_ = 0;
   left_share_ = 1.0;
   touched_at_.clear();
@@ -78,12 +78,20 @@ void Engine::added_factor() {
   for (const std::int32_t v : variables) follow(v);
   for (const std::int32_t v : variables) factors_of_[v].push_back(f);
   ++live_factors_;
+  note_information(f);
   models_.linearize(f, graph_, states_);
   cost_ += models_.cost(f);
   put_in(f);
 }
 
+void Engine::note_information(int f) {
+  const double* diagonal = graph_.information(f).data();
+  for (int left = graph_.factor_type(f).residual_size(); left > 0; diagonal += left--)
+    largest_information_ = std::max(largest_information_, *diagonal);
+}
+
 void Engine::changed_factor(int f) {
+  note_information(f);
   must_look_ = true;
   if (graph_.factor_type(f).absolute_size() > 0) gauge_is_old_ = true;  // its rank may be another
   relinearize(f);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "ceres_optimizer.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <exception>
@@ -17,6 +18,7 @@
 #include "cairn/runtime/threads.hpp"
 #include "cairn/runtime/timed.hpp"
 #include "ceres_problem.hpp"
+#include "state_size.hpp"
 
 namespace cairn {
 namespace {
@@ -46,9 +48,15 @@ void keep_blas_to_one_thread() {
 /// Hands Ceres' iterations to the observer, and the reasons to stop to Ceres.
 class Bridge final : public ceres::IterationCallback {
  public:
-  Bridge(const Graph& graph, const Values& values, const Stop& stop, Observer& observer,
-         Summary& summary)
-      : graph_(graph), values_(values), stop_(stop), observer_(observer), summary_(summary) {}
+  /// `cost_scale`: what Ceres' cost is multiplied by (`CeresProblem::cost_scale`).
+  Bridge(const Graph& graph, const Values& values, double cost_scale, const Stop& stop,
+         Observer& observer, Summary& summary)
+      : graph_(graph),
+        values_(values),
+        cost_scale_(cost_scale),
+        stop_(stop),
+        observer_(observer),
+        summary_(summary) {}
 
   ceres::CallbackReturnType operator()(const ceres::IterationSummary& ceres) override {
     try {
@@ -71,7 +79,7 @@ class Bridge final : public ceres::IterationCallback {
  private:
   void tell(const ceres::IterationSummary& ceres) {
     // The cost of a step that was not taken is that of the trial.
-    if (ceres.iteration == 0 || ceres.step_is_successful) chi2_ = 2.0 * ceres.cost;
+    if (ceres.iteration == 0 || ceres.step_is_successful) chi2_ = 2.0 * ceres.cost / cost_scale_;
     if (ceres.iteration == 0) {
       summary_.initial_chi2 = chi2_;
       observer_.on_start(graph_, chi2_);
@@ -89,6 +97,7 @@ class Bridge final : public ceres::IterationCallback {
 
   const Graph& graph_;
   const Values& values_;
+  const double cost_scale_;
   const Stop& stop_;
   Observer& observer_;
   Summary& summary_;
@@ -97,6 +106,14 @@ class Bridge final : public ceres::IterationCallback {
   std::exception_ptr exception_;
 };
 
+double norm_of(const Values& values) {
+  double squares = 0.0;
+  for (const AlignedVector& pool : values.pools) {
+    for (const double x : pool) squares += x * x;
+  }
+  return std::sqrt(squares);
+}
+
 /// Ceres compares what one damped step gains; ours promise what is left. A hundredth makes both end
 /// alike.
 constexpr double kToleranceShare = 1e-2;
@@ -104,11 +121,18 @@ constexpr double kToleranceShare = 1e-2;
 /// A step of this fraction of the states, or of this change of chi2, may fail because of rounding.
 constexpr double kRounding = 1e-6;
 
+/// Ceres' own test of a step is relative to the norm of all states, which is no measure of a map
+/// far from the origin: `size` is what it is to be relative to.
+double parameter_tolerance(const Stop& stop, const Values& values, double size) {
+  const double norm = norm_of(values);
+  if (!(stop.tolerance > 0.0) || !(norm > 0.0)) return 0.0;
+  return 1e-15 * std::min(1.0, size / norm);
+}
+
 void set_limits(const Stop& stop, ceres::Solver::Options& options) {
   options.max_num_iterations = stop.max_iterations;
   options.function_tolerance = kToleranceShare * stop.tolerance;
   options.gradient_tolerance = 0.0;  // has units: no bound fits metres and radians
-  options.parameter_tolerance = stop.tolerance > 0.0 ? 1e-15 : 0.0;
   if (stop.max_seconds > 0.0) options.max_solver_time_in_seconds = stop.max_seconds;
   options.num_threads = threads();
   options.update_state_every_iteration = true;  // observers see the states
@@ -133,15 +157,11 @@ Status status_of(const ceres::Solver::Summary& ceres, bool interrupted) {
 /// Whether Ceres gave up shrinking its trust region, and calls that convergence, although the first
 /// of its last steps that did not lower the cost was longer, and raised it by more, than rounding
 /// explains: its Jacobians do not fit its residuals.
-bool ended_without_descent(const ceres::Solver::Summary& ceres, const Values& values) {
+bool ended_without_descent(const ceres::Solver::Summary& ceres, double size) {
   const auto& all = ceres.iterations;
   auto first = all.end();
   while (first != all.begin() && !std::prev(first)->step_is_successful) --first;
-  double squares = 0.0;
-  for (const AlignedVector& pool : values.pools) {
-    for (const double x : pool) squares += x * x;
-  }
-  return first != all.end() && first->step_norm > kRounding * std::sqrt(squares) &&
+  return first != all.end() && first->step_norm > kRounding * size &&
          !(std::abs(first->cost_change) <= kRounding * ceres.final_cost);
 }
 
@@ -195,9 +215,10 @@ Summary CeresOptimizer::optimize(Graph& graph, const Stop& stop, Observer& obser
 
   Values values = graph.values();
   CeresProblem problem(graph, gauge, values, make_ceres_loss(loss_));
-  Bridge bridge(graph, values, stop, observer, summary);
+  Bridge bridge(graph, values, problem.cost_scale(), stop, observer, summary);
   ceres::Solver::Options options = options_;
   set_limits(stop, options);
+  options.parameter_tolerance = parameter_tolerance(stop, values, state_size(graph, values));
   options.callbacks.push_back(&bridge);
   ceres::Solver::Summary report;
   {
@@ -211,7 +232,8 @@ Summary CeresOptimizer::optimize(Graph& graph, const Stop& stop, Observer& obser
   summary.status = status_of(report, bridge.interrupted());
   summary.final_chi2 = loss_.name == "none" ? chi2(graph) : bridge.chi2();
   if (summary.status == Status::converged &&
-      (!std::isfinite(summary.final_chi2) || ended_without_descent(report, graph.values())))
+      (!std::isfinite(summary.final_chi2) ||
+       ended_without_descent(report, state_size(graph, graph.values()))))
     summary.status = Status::diverged;
   summary.notes.push_back("Ceres: " + report.message);
   summary.seconds = seconds_of(report);

@@ -12,6 +12,29 @@
 namespace cairn {
 namespace {
 
+/// Roots of information from here to there are left as they are.
+constexpr double kSmallest = 0x1p-10, kLargest = 0x1p+20;
+
+/// A power of two that brings the root of the information near one where it is far from that: of
+/// each factor what it measures least exactly, and the median of that over all factors, since the
+/// weight of a few may be chosen to mean "held" or "unknown".
+double residual_scale(const Graph& graph) {
+  std::vector<double> least;
+  least.reserve(static_cast<std::size_t>(graph.factor_count()));
+  for (int f = 0; f < graph.factor_count(); ++f) {
+    const double* diagonal = graph.sqrt_information(f).data();
+    double smallest = std::numeric_limits<double>::infinity();
+    for (int left = graph.factor_type(f).residual_size(); left > 0; diagonal += left--) {
+      if (*diagonal > 0.0) smallest = std::min(smallest, *diagonal);
+    }
+    if (std::isfinite(smallest)) least.push_back(smallest);
+  }
+  if (least.empty()) return 1.0;
+  const auto middle = least.begin() + static_cast<std::ptrdiff_t>(least.size() / 2);
+  std::nth_element(least.begin(), middle, least.end());
+  return *middle >= kSmallest && *middle <= kLargest ? 1.0 : std::ldexp(1.0, -std::ilogb(*middle));
+}
+
 class GraphManifold final : public ceres::Manifold {
  public:
   GraphManifold(const VariableType& type, CaughtException& caught) : type_(type), caught_(caught) {}
@@ -46,15 +69,17 @@ class GraphManifold final : public ceres::Manifold {
   CaughtException& caught_;
 };
 
-/// One factor. Borrows measurement and information from the graph, which names it in errors.
+/// One factor, its residual and Jacobians times `scale`. Borrows measurement and information from
+/// the graph, which names it in errors.
 class FactorCost final : public ceres::CostFunction {
  public:
-  FactorCost(const Graph& graph, int position, CaughtException& caught)
+  FactorCost(const Graph& graph, int position, double scale, CaughtException& caught)
       : graph_(graph),
         position_(position),
         type_(graph.factor_type(position)),
         measurement_(graph.measurement(position).data()),
         sqrt_information_(graph.sqrt_information(position).data()),
+        scale_(scale),
         caught_(caught) {
     const FactorType& type = type_;
     set_num_residuals(type.residual_size());
@@ -70,6 +95,7 @@ class FactorCost final : public ceres::CostFunction {
       } else {
         evaluate_with_jacobians(x, residuals, jacobians);
       }
+      for (int r = 0; r < num_residuals(); ++r) residuals[r] *= scale_;
     });
     return returned && std::all_of(residuals, residuals + num_residuals(),
                                    [](double r) { return std::isfinite(r); });
@@ -99,10 +125,10 @@ class FactorCost final : public ceres::CostFunction {
     }
   }
 
-  /// Column-major rows × tangent to row-major rows × ambient, zeros behind.
-  static void widen(const double* from, int rows, int tangent, int ambient, double* to) {
+  /// Column-major rows × tangent to row-major rows × ambient, zeros behind; scaled.
+  void widen(const double* from, int rows, int tangent, int ambient, double* to) const {
     for (int r = 0; r < rows; ++r) {
-      for (int c = 0; c < tangent; ++c) to[r * ambient + c] = from[c * rows + r];
+      for (int c = 0; c < tangent; ++c) to[r * ambient + c] = scale_ * from[c * rows + r];
       std::fill(to + r * ambient + tangent, to + (r + 1) * ambient, 0.0);
     }
   }
@@ -112,6 +138,7 @@ class FactorCost final : public ceres::CostFunction {
   const FactorType& type_;
   const double* measurement_;
   const double* sqrt_information_;
+  double scale_;
   CaughtException& caught_;
 };
 
@@ -132,6 +159,22 @@ class WrappedLoss final : public ceres::LossFunction {
   CaughtException& caught_;
 };
 
+/// Of residuals that are `scale` times their own: scale² ρ(s / scale²).
+class ScaledLoss final : public ceres::LossFunction {
+ public:
+  ScaledLoss(std::unique_ptr<ceres::LossFunction> loss, double scale)
+      : loss_(std::move(loss)), square_(scale * scale) {}
+  void Evaluate(double s, double out[3]) const override {
+    loss_->Evaluate(s / square_, out);
+    out[0] *= square_;
+    out[2] /= square_;
+  }
+
+ private:
+  std::unique_ptr<ceres::LossFunction> loss_;
+  double square_;
+};
+
 ceres::Problem::Options lend_everything() {
   ceres::Problem::Options options;
   options.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
@@ -150,11 +193,15 @@ double* state(const Graph& graph, Values& values, int variable) {
 
 CeresProblem::CeresProblem(const Graph& graph, const Gauge& gauge, Values& values,
                            std::unique_ptr<ceres::LossFunction> loss)
-    : problem_(lend_everything()) {
+    : residual_scale_(residual_scale(graph)), problem_(lend_everything()) {
   const bool own = loss != nullptr;
   if (own) losses_.push_back(std::move(loss));
   for (const std::shared_ptr<const Loss>& each : graph.losses()) {
     if (!own) losses_.push_back(each ? std::make_unique<WrappedLoss>(*each, caught_) : nullptr);
+  }
+  for (auto& each : losses_) {
+    if (each && residual_scale_ != 1.0)
+      each = std::make_unique<ScaledLoss>(std::move(each), residual_scale_);
   }
   add_variables(graph, gauge, values);
   add_factors(graph, values);
@@ -182,7 +229,7 @@ void CeresProblem::add_factors(const Graph& graph, Values& values) {
   for (int position = 0; position < graph.factor_count(); ++position) {
     const FactorRef ref = graph.ref(position);
     const FactorPool& pool = graph.factor_pools()[ref.pool];
-    costs_.push_back(std::make_unique<FactorCost>(graph, position, caught_));
+    costs_.push_back(std::make_unique<FactorCost>(graph, position, residual_scale_, caught_));
     x.clear();
     for (const std::int32_t v : graph.factor_variables(position))
       x.push_back(state(graph, values, v));

@@ -50,6 +50,11 @@ class CaughtException {
 /// product is ours, exactly.
 ///
 /// Ceres minimises ½ Σ ρ(‖r‖²), cairn states twice that.
+///
+/// Ceres' damping and its test of the gradient have bounds without a scale: where the information
+/// is far below one it would stay where it starts, and call that convergence. There all whitened
+/// residuals are multiplied by a power of two, which rounds nothing, and losses are scaled along:
+/// Ceres' cost is then `cost_scale()` times that of the graph.
 class CeresProblem {
  public:
   /// `values`, which Ceres moves, must outlive this object. `loss`: a loss of Ceres' own for all
@@ -58,6 +63,8 @@ class CeresProblem {
                std::unique_ptr<ceres::LossFunction> loss);
 
   ceres::Problem& problem() { return problem_; }
+  /// 1 unless the information is far from one; a power of four.
+  double cost_scale() const { return residual_scale_ * residual_scale_; }
   /// Throws what a factor, a loss or a type of variables threw while Ceres ran, as `Error` (plugin)
   /// with its name.
   void rethrow() const { caught_.rethrow(); }
@@ -67,6 +74,7 @@ class CeresProblem {
   void add_factors(const Graph& graph, Values& values);
 
   CaughtException caught_;
+  double residual_scale_;  // a power of two
   // Owned here and only lent to the problem, which therefore is the last to come and the first to
   // go.
   std::vector<std::unique_ptr<ceres::LossFunction>> losses_;  // as Graph::losses(), or Ceres' own

@@ -19,6 +19,8 @@ namespace {
 /// A direct solver's step solves its system to this. Rounding leaves 1e-16 times a small power of
 /// the size.
 constexpr double kLargestBackwardError = 1e-6;
+/// A gradient is a sum of products of Jacobians and residuals, and zero up to this share of both.
+constexpr double kGradientRounding = 1e-13;
 /// What may be left when no step lowers chi2: of chi2, and of the states.
 constexpr double kRounding = 1e-6;
 
@@ -28,12 +30,6 @@ bool is_sampled(int iteration) {
 }
 
 }  // namespace
-
-double least_diagonal(std::span<const double> diagonal, double fraction) {
-  double largest = 0.0;
-  for (const double entry : diagonal) largest = std::max(largest, entry);
-  return fraction * (largest > 0.0 ? largest : 1.0);
-}
 
 double dot(std::span<const double> a, std::span<const double> b) {
   return std::inner_product(a.begin(), a.end(), b.begin(), 0.0);
@@ -65,9 +61,7 @@ Descent::Descent(std::string optimizer, std::string linear_solver, LinearSolver&
     trial = estimate;
     chi2 = equations_->linearize(estimate);
   }
-  double squares = 0.0;
-  for (const AlignedVector& pool : estimate.pools) squares += dot(pool, pool);
-  state_norm_ = std::sqrt(squares);
+  state_size_ = cairn::state_size(graph, estimate);
   best_ = estimate;
   best_chi2_ = summary_.initial_chi2 = chi2;
   for (const std::string& sentence : summary_.notes) observer_.on_message(sentence);
@@ -132,7 +126,7 @@ bool Descent::solve(std::span<double> out) {
 bool Descent::is_solution(std::span<const double> out) {
   if (query<IterativeSolver>(solver_)) return true;
   const double error = equations_->backward_error(out);
-  if (error <= kLargestBackwardError) return true;
+  if (error <= kLargestBackwardError || leaves_rounding(out)) return true;
   if (!std::exchange(blamed_, true)) {
     note(
         fmt::format("linear solver {} returned in iteration {} what does not solve H x = g: "
@@ -148,13 +142,51 @@ bool Descent::solves(std::span<const double> out) {
   return false;
 }
 
+bool Descent::leaves_rounding(std::span<const double> out) const {
+  std::vector<double> product(out.size());
+  equations_->H().multiply(out, product);
+  const double residuals = std::sqrt(chi2);
+  for (std::size_t k = 0; k < product.size(); ++k) {
+    const double left = std::abs(product[k] - equations_->g()[k]);
+    if (!(left <= kGradientRounding * std::sqrt(equations_->diagonal()[k]) * residuals))
+      return false;
+  }
+  return true;
+}
+
+std::vector<double> Descent::least_diagonal(double fraction) const {
+  const BlockStructure& s = equations_->linearizer().structure();
+  const std::span<const double> diagonal = equations_->diagonal();
+  std::vector<std::vector<double>> largest(graph_.variable_pools().size());
+  const auto pool_of = [&](int block) {
+    return static_cast<std::size_t>(graph_.pool(equations_->linearizer().variable_of(block)));
+  };
+  double of_all = 0.0;
+  for (int block = 0; block < s.blocks(); ++block) {
+    std::vector<double>& of_pool = largest[pool_of(block)];
+    of_pool.resize(static_cast<std::size_t>(s.block_size(block)));
+    for (std::size_t k = 0; k < of_pool.size(); ++k) {
+      of_pool[k] = std::max(of_pool[k], diagonal[s.offsets()[block] + k]);
+      of_all = std::max(of_all, of_pool[k]);
+    }
+  }
+  std::vector<double> least(diagonal.size(), fraction * (of_all > 0.0 ? of_all : 1.0));
+  for (int block = 0; block < s.blocks(); ++block) {
+    const std::vector<double>& of_pool = largest[pool_of(block)];
+    for (std::size_t k = 0; k < of_pool.size(); ++k) {
+      if (of_pool[k] > 0.0) least[s.offsets()[block] + k] = fraction * of_pool[k];
+    }
+  }
+  return least;
+}
+
 void Descent::end_not_finite() {
   note(fmt::format("linear solver {} returned a step that is not finite", summary_.linear_solver));
   end(Status::diverged);
 }
 
 void Descent::end_without_descent(double promise, double step_norm) {
-  if (promise <= kRounding * chi2 || step_norm <= kRounding * state_norm_) {
+  if (promise <= kRounding * chi2 || step_norm <= kRounding * state_size_) {
     end(Status::converged);
     return;
   }

@@ -9,12 +9,9 @@
 
 #include "cairn/linear/normal_equations.hpp"
 #include "cairn/solve/optimizer.hpp"
+#include "state_size.hpp"
 
 namespace cairn {
-
-/// The least that a diagonal entry of H counts as in damping: a fraction of the largest one, or of
-/// 1 where H is zero.
-double least_diagonal(std::span<const double> diagonal, double fraction);
 
 /// Scalar product.
 double dot(std::span<const double> a, std::span<const double> b);
@@ -83,14 +80,22 @@ class Descent {
   /// Ends the run for a factorisation of H that failed, with a note that gives the reason.
   void end_not_positive_definite(const Factorization& failure);
 
-  /// Euclidean norm of all states at the start.
-  double state_norm() const { return state_norm_; }
+  /// `cairn::state_size` of the states at the start.
+  double state_size() const { return state_size_; }
+
+  /// For each entry of the diagonal of H the least that it counts as in damping: a fraction of the
+  /// largest entry of the same unit, that is, for the same number of the tangent space of the same
+  /// type of variable; of the largest one of all where those are zero, and of 1 where H is zero.
+  std::vector<double> least_diagonal(double fraction) const;
 
   /// Leaves the best estimate in the graph.
   Summary finish();
 
  private:
   bool is_solution(std::span<const double> out);
+  /// Whether all of Hx − g is what rounding leaves of a gradient that is zero, as at a minimum. A
+  /// solver that works on the Jacobian never sees g, and its step is no worse for that.
+  bool leaves_rounding(std::span<const double> out) const;
 
   using Clock = std::chrono::steady_clock;
 
@@ -104,7 +109,7 @@ class Descent {
   Values best_;
   double best_chi2_ = 0.0;
   int number_ = 0;
-  double state_norm_ = 0.0;  // at the start
+  double state_size_ = 0.0;  // at the start
   double step_norm_ = 0.0;
   int sampled_ = 0;      // the last iteration whose step was checked
   bool blamed_ = false;  // a note names the linear solver

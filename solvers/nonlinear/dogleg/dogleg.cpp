@@ -19,9 +19,9 @@ class Run {
   Run(Descent& descent, const DoglegOptions& options)
       : run_(descent),
         equations_(descent.equations()),
-        convergence_(descent.stop().tolerance, descent.state_norm()),
+        convergence_(descent.stop().tolerance, descent.state_size()),
         path_(descent.step.size()),
-        least_diagonal_(least_diagonal(equations_.diagonal(), options.smallest_diagonal)),
+        least_diagonal_(descent.least_diagonal(options.smallest_diagonal)),
         radius_(std::max(options.initial_radius, std::sqrt(descent.chi2))) {}
 
   void iterate() {
@@ -74,7 +74,7 @@ class Run {
     std::vector<double> damping(run_.step.size());
     for (double mu = 1e-12; mu < 1.0; mu *= 100.0) {
       for (std::size_t k = 0; k < damping.size(); ++k) {
-        damping[k] = mu * std::max(equations_.diagonal()[k], least_diagonal_);
+        damping[k] = mu * std::max(equations_.diagonal()[k], least_diagonal_[k]);
       }
       factorization = equations_.factorize_damped(damping);
       if (factorization.ok) return true;
@@ -100,7 +100,7 @@ class Run {
   NormalEquations& equations_;
   Convergence convergence_;
   DoglegPath path_;
-  double least_diagonal_;
+  std::vector<double> least_diagonal_;
   double newton_promise_ = 0.0, newton_norm_ = 0.0;  // of the full step
   double radius_;
   bool path_is_current_ = false;

@@ -9,9 +9,9 @@
 namespace cairn {
 
 void DoglegPath::prepare(const BlockMatrix& H, std::span<const double> g,
-                         std::span<const double> diagonal, double smallest_diagonal) {
+                         std::span<const double> diagonal, std::span<const double> least_diagonal) {
   for (std::size_t k = 0; k < D_.size(); ++k) {
-    D_[k] = std::max(diagonal[k], smallest_diagonal);
+    D_[k] = std::max(diagonal[k], least_diagonal[k]);
     cauchy_[k] = g[k] / D_[k];
   }
   H.multiply(cauchy_, product_);

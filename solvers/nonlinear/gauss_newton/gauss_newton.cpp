@@ -29,7 +29,7 @@ GaussNewton::GaussNewton(std::unique_ptr<LinearSolver> solver, GaussNewtonOption
 
 Summary GaussNewton::optimize(Graph& graph, const Stop& stop, Observer& observer) {
   Descent run("gauss_newton", options_.linear_solver, *solver_, graph, stop, observer);
-  Convergence convergence(stop.tolerance, run.state_norm());
+  Convergence convergence(stop.tolerance, run.state_size());
   NormalEquations& equations = run.equations();
   bool best = true;
   int rises = 0;

@@ -38,9 +38,9 @@ class Run {
         damping_(initial_lambda(options, equations_.gauge()), 1e-20, options.largest_lambda),
         may_go_undamped_(may_go_undamped(options, equations_.gauge())),
         endgame_(may_go_undamped_ ? std::sqrt(descent.stop().tolerance) : 0.0),
-        convergence_(descent.stop().tolerance, descent.state_norm()),
+        convergence_(descent.stop().tolerance, descent.state_size()),
         damped_by_(descent.step.size()),
-        least_diagonal_(least_diagonal(equations_.diagonal(), options.smallest_diagonal)) {}
+        least_diagonal_(descent.least_diagonal(options.smallest_diagonal)) {}
 
   void iterate() {
     const bool undamped = endgame_.active();
@@ -92,7 +92,7 @@ class Run {
   Factorization factorize(double lambda) {
     const std::span<const double> diagonal = equations_.diagonal();
     for (std::size_t k = 0; k < damped_by_.size(); ++k) {
-      damped_by_[k] = lambda * std::max(diagonal[k], least_diagonal_);
+      damped_by_[k] = lambda * std::max(diagonal[k], least_diagonal_[k]);
     }
     return lambda > 0.0 ? equations_.factorize_damped(damped_by_) : equations_.factorize();
   }
@@ -157,8 +157,8 @@ class Run {
   bool may_go_undamped_;
   Endgame endgame_;
   Convergence convergence_;
-  std::vector<double> damped_by_;  // λ D
-  double least_diagonal_;          // of D
+  std::vector<double> damped_by_;       // λ D
+  std::vector<double> least_diagonal_;  // of D
   int small_promises_ = 0;
   bool first_trial_ = true;  // of the present linearisation; it promised:
   double first_promise_ = 0.0, first_norm_ = 0.0;

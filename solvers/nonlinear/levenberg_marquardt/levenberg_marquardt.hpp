@@ -18,7 +18,7 @@ struct LevenbergMarquardtOptions {
   /// another minimum.
   double initial_lambda = 0.0;
   double largest_lambda = 1e16;      ///< where the run gives up
-  double smallest_diagonal = 1e-12;  ///< D is at least this, as a fraction of its largest entry
+  double smallest_diagonal = 1e-12;  ///< D is at least this share of its largest entry of a unit
   bool endgame = true;               ///< undamped steps near the minimum
 
   static auto fields() {
@@ -30,7 +30,9 @@ struct LevenbergMarquardtOptions {
               "where the gauge is left free")
         .real("largest_lambda", &O::largest_lambda, 1.0, 1e30, "damping at which the run gives up")
         .real("smallest_diagonal", &O::smallest_diagonal, 0.0, 1.0,
-              "lower bound of the diagonal of H in the damping, as a fraction of its largest entry")
+              "lower bound of the diagonal of H in the damping, as a fraction of its largest entry "
+              "of "
+              "the same unit")
         .boolean("endgame", &O::endgame,
                  "undamped steps near the minimum, which also judge convergence");
   }

@@ -79,7 +79,7 @@ void for_every_factor(Check check, const std::string& metric = "") {
     Sampler sampler(11);
     for (const Regime& regime :
          {Regime{"identity", 0.0}, Regime{"tiny", 1e-9}, Regime{"random", -1.0},
-          Regime{"almost pi", std::numbers::pi - 1e-6}}) {
+          Regime{"almost pi", std::numbers::pi - 1e-6}, Regime{"half a turn", std::numbers::pi}}) {
       SCOPED_TRACE(tag + " " + metric + ", " + regime.name);
       for (int k = 0; k < 20; ++k) {
         sample.x.clear();

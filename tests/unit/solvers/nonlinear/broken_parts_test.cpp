@@ -191,6 +191,20 @@ TEST_P(Methods, HaveNotConvergedWithAWrongJacobian) {
   EXPECT_LE(chi2(graph), before);
 }
 
+/// Seen from the origin, steps of metres are short in UTM coordinates.
+TEST_P(Methods, HaveNotConvergedWithAWrongJacobianFarFromTheOrigin) {
+  Graph graph;
+  const auto type = define_variable<Se2>();
+  const auto prior = define_factor<WrongSign>();
+  const double east = 4e5, north = 5e6, unit[] = {1, 0, 0, 1, 0, 1};
+  for (int k = 0; k < 2; ++k) {
+    const double state[] = {east + 5.0 * k, north + 3.0 * k, 0.1}, z[] = {east + 2.0, north, 0.1};
+    const int pose[] = {graph.add_variable(type, k, state)};
+    graph.add_factor(prior, pose, z, unit);
+  }
+  EXPECT_NE(optimizer_->optimize(graph).status, Status::converged);
+}
+
 TEST_P(Methods, HaveNotConvergedWhereResidualsBecomeNan) {
   for (const int calls : {0, 1, 3, 6, 9}) {
     Failing::how = Failing::How::nan;
@@ -224,7 +238,6 @@ INSTANTIATE_TEST_SUITE_P(BrokenParts, Methods,
 
 /// chi2 scales with the information, the estimate does not.
 TEST_P(Methods, FindTheSameEstimateAtAnyScaleOfTheInformation) {
-  if (std::string(GetParam()) == "ceres") GTEST_SKIP() << "its bounds are absolute";
   std::vector<double> wanted;
   for (const double scale : {1.0, 1e-30, 1e-12, 1e12, 1e30, 1e60}) {
     Graph graph = test::ring_of_poses(30, 0.05);

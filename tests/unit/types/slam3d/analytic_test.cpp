@@ -26,5 +26,27 @@ TEST(AnalyticJacobian, OfAPriorIsTheAutomaticOneInEachMetric) {
   check_prior<slam3d::LandmarkPrior, PointXYZ>();
 }
 
+/// From the identity, so that rounding does not choose between the two logarithms.
+template <class Metric>
+void check_half_turns() {
+  const Vector<double, 7> none = Se3::identity();
+  for (const Eigen::Vector3d& axis :
+       {Eigen::Vector3d(1, 0, 0), Eigen::Vector3d(0, -1, 0), Eigen::Vector3d(0, 0, 1),
+        Eigen::Vector3d(0.6, 0, -0.8), Eigen::Vector3d(2.0 / 3, -1.0 / 3, 2.0 / 3)}) {
+    Vector<double, 7> x;
+    x << 1.0, -2.0, 3.0, axis, 0.0;
+    expect_agreement<slam3d::RelativePose<Metric>>(none, none, x);
+    expect_agreement<slam3d::RelativePose<Metric>>(x, none, x);
+    expect_agreement<slam3d::PosePrior<Metric>>(none, x);
+    expect_agreement<slam3d::PosePrior<Metric>>(x, x);
+  }
+}
+
+TEST(AnalyticJacobian, OfHalfATurnIsTheAutomaticOneInEachMetric) {
+  check_half_turns<slam3d::Logarithm>();
+  check_half_turns<slam3d::QuaternionVector>();
+  check_half_turns<slam3d::TranslationAndRotationVector>();
+}
+
 }  // namespace
 }  // namespace cairn::test
