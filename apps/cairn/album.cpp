@@ -46,6 +46,7 @@ void add_file(const std::string& file, const std::string& name, const AlbumOptio
               AlbumBuilder& builder, Session& session) {
   const bool named = file == "-" || file.starts_with('@');
   const std::string text = named ? std::string() : read_file(file);
+  if (!named && (is_recording(text) || is_json(text))) session.files.add_input(file);
   if (is_recording(text)) {
     Scene recording = read_recording(text, file);
     if (name != short_name(file)) recording.recordings.front().name = name;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "problem_setup.hpp"
 
+#include <algorithm>
+#include <functional>
 #include <iterator>
 #include <utility>
 
@@ -59,13 +61,26 @@ ProblemSetup::ProblemSetup(const ProblemOptions& options, Registry& registry)
   if (options.loss.empty() && options.loss_on != "all") {
     throw Error(ErrorCode::usage, "--loss-on says where a loss applies, but there is no --loss");
   }
+  if (selector_.kind() == FactorSelector::Kind::tag && !registry.has("factor", selector_.tag())) {
+    throw Error(ErrorCode::usage,
+                fmt::format("--loss-on: '{}' is neither all, loops nor a type of factors, such as "
+                            "{}",
+                            selector_.tag(), registry.names("factor").front()));
+  }
 }
 
 std::vector<std::string> ProblemSetup::apply(Graph& graph) const {
   graph.set_loss(loss_, selector_);
-  if (!initial_) return {};
-  return call_plugin([&] { return fmt::format("initial guess '{}'", initial_name_); },
-                     [&] { return initial_->compute(graph); });
+  std::vector<std::string> notes;
+  if (loss_ && std::ranges::none_of(select(graph, selector_), std::identity())) {
+    notes.push_back("--loss-on selects no factor of this graph: none has the loss");
+  }
+  if (!initial_) return notes;
+  for (std::string& note :
+       call_plugin([&] { return fmt::format("initial guess '{}'", initial_name_); },
+                   [&] { return initial_->compute(graph); }))
+    notes.push_back(std::move(note));
+  return notes;
 }
 
 std::vector<std::string> notes_on_the_end(const Summary& summary, const Stop& stop,

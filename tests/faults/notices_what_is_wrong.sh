@@ -26,8 +26,17 @@ expect_violations 'killed by' 'exit code 0, but result.txt differs' 'left behind
   'no message on standard error' 'nothing was lost, and yet' --
 
 expect_violations 'left behind: temporary.txt' 'result.txt is neither the old file nor the new one' \
-  'line 1 was acknowledged, and is not in the journal' 'its journal leads to another map' \
-  'saved.txt was acknowledged, and is the old file' -- --kill --count 40
+  'line 1 was acknowledged, and is not in the journal' 'saved.txt was acknowledged, and is the old file' \
+  -- --kill --count 40
+
+# Only what is killed after its last record has this wrong: at a random moment of up to 400.
+restored=
+for seed in {1..10}; do
+  restored=$("$driver" --program "$careless" --library "$library" --folder "$folder" --careless --kill --count 40 \
+    --seed "$seed") || true
+  [[ $restored != *'its journal leads to another map'* ]] || break
+done
+[[ $restored == *'its journal leads to another map'* ]] || { printf 'not found: another map\n' >&2; exit 1; }
 
 code=0
 "$driver" --program "$folder/none" --library "$library" --folder "$folder" --careless 2>/dev/null || code=$?

@@ -141,6 +141,11 @@ TEST_F(OptimizeCommand, ALossOnLoopsTamesOutliers) {
   EXPECT_LT(final_chi2(robust), 0.5 * final_chi2(plain));
   const Outcome without = cairn({"optimize", bad, "--loss-on", "loops"});
   EXPECT_EQ(without.exit_code, 2);
+  const Outcome misspelt = cairn({"optimize", bad, "--loss", "cauchy", "--loss-on", "loop"});
+  EXPECT_EQ(misspelt.exit_code, 2);
+  EXPECT_THAT(misspelt.err, HasSubstr("'loop' is neither all, loops nor a type of factors"));
+  const Outcome none = cairn({"optimize", bad, "--loss", "cauchy", "--loss-on", "EDGE_SE3:QUAT"});
+  EXPECT_THAT(none.err, HasSubstr("--loss-on selects no factor of this graph"));
 }
 
 TEST_F(OptimizeCommand, AnOptimizerThatTakesNoLinearSolverSaysWhatToUseInstead) {

@@ -81,7 +81,7 @@ Gauge resolve_gauge(const Graph& graph) {
   for (const Anchoring& c : components) {
     gauge.components_with_fixed += c.fixed;
     if (c.fixed || c.prior_size >= c.largest_tangent || gauge.held[c.first_largest]) continue;
-    if (!graph.type(c.first_largest).lie_group()) {
+    if (!graph.type(c.first_largest).lie_group() || c.prior_size > 0) {
       gauge.left_free.push_back(c.first_largest);
       continue;
     }
@@ -110,7 +110,7 @@ std::string Gauge::describe(const Graph& graph) const {
   }
   if (!left_free.empty()) {
     text += fmt::format(
-        "{}the gauge of {} is left free: anchoring {} would constrain more than its pose",
+        "{}the gauge of {} is left free: anchoring {} would constrain more, or defy its priors",
         text.empty() ? "" : "; ",
         left_free.size() == 1 ? "a component" : fmt::format("{} components", left_free.size()),
         graph.describe_variable(left_free.front()));

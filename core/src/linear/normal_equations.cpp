@@ -119,9 +119,9 @@ double NormalEquations::backward_error(std::span<const double> step) {
   H_.multiply(step, residual_);
   double error = 0.0, length = 0.0, gradient = 0.0, largest = 0.0;
   for (std::size_t k = 0; k < step.size(); ++k) {
-    const double r = std::abs(residual_[k] + (damped_[k] - diagonal_[k]) * step[k] - g_[k]);
-    if (std::isnan(r)) return r;
-    error = std::max(error, r);
+    residual_[k] = std::abs(residual_[k] + (damped_[k] - diagonal_[k]) * step[k] - g_[k]);
+    if (std::isnan(residual_[k])) return residual_[k];
+    error = std::max(error, residual_[k]);
     length = std::max(length, std::abs(step[k]));
     gradient = std::max(gradient, std::abs(g_[k]));
     largest = std::max(largest, damped_[k]);

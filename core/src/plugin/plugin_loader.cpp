@@ -41,9 +41,8 @@ constexpr std::uintmax_t kLargestSidecar = std::uintmax_t{1} << 20;  // they hav
 
 /// All zero where there is no such file.
 struct stat status_of(const fs::path& path) {
-  using Status = struct stat;
-  Status status{};
-  return ::stat(path.c_str(), &status) == 0 ? status : Status{};
+  struct stat status = {};
+  return ::stat(path.c_str(), &status) == 0 ? status : decltype(status){};
 }
 
 bool others_may_write(const fs::path& path) { return (status_of(path).st_mode & S_IWOTH) != 0; }
@@ -53,8 +52,7 @@ bool belongs_to_another(const fs::path& path) {
   return status_of(path).st_uid != 0 && status_of(path).st_uid != ::geteuid();
 }
 
-/// Another user may exchange what lies there: everybody may write to the folder or, unless sticky
-/// (as /tmp is), to one above it. Names that folder; empty if none is.
+/// The folder or, unless sticky (as /tmp is), one above it that all users may write to; or empty.
 fs::path open_to_others(const fs::path& folder) {
   if (others_may_write(folder)) return folder;
   for (fs::path above = folder; above.has_relative_path();) {

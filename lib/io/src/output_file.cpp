@@ -2,12 +2,12 @@
 #include "cairn/io/output_file.hpp"
 
 #include <fcntl.h>
+#include <poll.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
 #include <charconv>
-#include <chrono>
 #include <cstdio>
 #include <mutex>
 #include <new>
@@ -78,8 +78,8 @@ Target follow_links(fs::path file) {
 }
 
 /// Of the outputs that lie beside their names, and of those files.
-std::timed_mutex& unfinished_outputs() {
-  static std::timed_mutex mutex;
+std::mutex& unfinished_outputs() {
+  static std::mutex mutex;
   return mutex;
 }
 
@@ -156,6 +156,11 @@ void OutputFile::write(std::string_view bytes) noexcept {
   while (!bytes.empty() && failure_ == 0) {
     const ssize_t put =
         without_interrupts([&] { return ::write(descriptor_, bytes.data(), bytes.size()); });
+    if (put < 0 && errno == EAGAIN) {  // a pipe that another process has made non-blocking
+      pollfd ready{descriptor_, POLLOUT, 0};
+      static_cast<void>(::poll(&ready, 1, -1));
+      continue;
+    }
     if (put < 0) failure_ = errno;
     if (put > 0) bytes.remove_prefix(static_cast<std::size_t>(put));
   }
@@ -182,7 +187,8 @@ void OutputFile::fail(int reason) const {
 
 void remove_unfinished_outputs() noexcept {
   // Who holds it is this thread itself only where no memory is left for an error's message.
-  static_cast<void>(unfinished_outputs().try_lock_for(std::chrono::seconds(1)));
+  for (int attempt = 0; attempt < 1000 && !unfinished_outputs().try_lock(); ++attempt)
+    ::usleep(1000);
   for (const OutputFile* output = first_unfinished(); output; output = output->next_)
     ::unlink(output->beside_.c_str());
 }

@@ -407,8 +407,6 @@ void PolicySession::report_estimate(const Words& words, Reply& reply) {
 void PolicySession::report_chi2(const Words& words, Reply& reply) {
   expect_words(words, 1, "CHI2");
   settle(reply);
-  expect_words(words, 1, "CHI2");
-  settle(reply);
   answer_ += chi2_line(policy_.estimator());
   answer(reply);
 }

@@ -17,9 +17,8 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// What a factor's chi2 may be off by rounding, where its information is between one and this.
+/// What a factor's chi2 may be off by rounding, where its information is ordinary.
 constexpr double kRounding = 1e-18;
-constexpr double kOrdinaryInformation = 1e12;
 
 // How the accuracy that is asked for, a fraction of chi2, is shared out. Found by trying on the
 // published graphs: what is left at the end stays well within it.
@@ -111,13 +110,7 @@ double Engine::share(double part) const {
   return part * settings_.accuracy * cost() / std::max(live_factors_, 1);
 }
 
-/// Below and above what is ordinary, chi2 and its rounding go with the information.
-double Engine::rounding() const {
-  const double scale = largest_information_ < 1.0
-                           ? largest_information_
-                           : std::max(1.0, largest_information_ / kOrdinaryInformation);
-  return kRounding * live_factors_ * scale;
-}
+double Engine::rounding() const { return kRounding * rounding_scale_; }
 
 /// The estimate from before this update.
 void Engine::step_back() {

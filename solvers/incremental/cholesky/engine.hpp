@@ -78,16 +78,16 @@ struct EngineState {
   bool gauge_is_old_ = false;
   int dead_ = 0;
   int live_factors_ = 0;
-  double largest_information_ = 0.0;  // of a factor's diagonal, since all was loaded
-  double cost_ = 0.0;                 // sum over factors
-  double gained_ = 0.0;               // of the cost, by steps since factors were evaluated
-  bool must_look_ = false;            // something has been removed or changed: `gained_` is
-                                      // no measure then
-  int others_ = 0;                    // factors of several variables that depend on rigid
-                                      // motions of these
-  double left_share_ = 1.0;           // how much of the shortfall was left to gain
-  double decrease_ = 0.0;             // of the last solution: gᵀH⁻¹g
-  std::vector<FactorId> ids_;         // by factor, rising
+  double rounding_scale_ = 0.0;  // of `rounding`: sum over factors
+  double cost_ = 0.0;            // sum over factors
+  double gained_ = 0.0;          // of the cost, by steps since factors were evaluated
+  bool must_look_ = false;       // something has been removed or changed: `gained_` is
+                                 // no measure then
+  int others_ = 0;               // factors of several variables that depend on rigid
+                                 // motions of these
+  double left_share_ = 1.0;      // how much of the shortfall was left to gain
+  double decrease_ = 0.0;        // of the last solution: gᵀH⁻¹g
+  std::vector<FactorId> ids_;    // by factor, rising
   FactorId next_id_ = 0;
   std::vector<std::uint8_t> is_source_;  // by variable
 };
@@ -114,8 +114,9 @@ class Engine : private EngineState {
   std::int32_t place_of(FactorId id) const {
     const auto found = std::ranges::lower_bound(ids_, id);
     const auto f = found - ids_.begin();
-    return found != ids_.end() && *found == id && live_factor_[f] ? static_cast<std::int32_t>(f)
-                                                                  : -1;
+    const bool there = found != ids_.end() && *found == id;
+    return there && f < std::ssize(live_factor_) && live_factor_[f] ? static_cast<std::int32_t>(f)
+                                                                    : -1;
   }
   FactorId next_id() const { return next_id_; }
   /// Takes what has been removed out of the graph: everything is numbered anew.
@@ -138,7 +139,7 @@ class Engine : private EngineState {
   std::vector<std::int32_t> take_anchored() { return std::exchange(anchored_, {}); }
   /// Variables whose last factor has been removed since this was last asked, and that are still
   /// there without any.
-  std::vector<std::int32_t> take_left_alone();
+  std::vector<std::int32_t> take_disconnected();
   /// Gives the selected factors a loss, and all others none.
   void set_loss(const std::shared_ptr<const Loss>& loss, const FactorSelector& which);
   /// Ids of the factors that are there, rising.
@@ -197,7 +198,7 @@ class Engine : private EngineState {
   double share(double part) const;
   /// What rounding may do to the cost.
   double rounding() const;
-  void note_information(int f);
+  double rounding_scale(int f) const;
   void touch_all();
   void set_right_hand_side();
   void set_aside();
@@ -222,7 +223,7 @@ class Engine : private EngineState {
   double shortfall_ = 0.0;  // by how much more than expected the cost was then
   double limit_ = 0.0;      // seconds that the update at hand may take; 0: any
   std::vector<std::int32_t> anchored_;
-  std::vector<std::int32_t> left_alone_;  // some may have new factors since, or be gone
+  std::vector<std::int32_t> disconnected_;  // some may have new factors since, or be gone
 
   Graph graph_;
   Tree tree_;  // refers to the state

@@ -3,9 +3,16 @@
 #include <algorithm>
 #include <utility>
 
+#include "cairn/update/marginal_prior.hpp"
 #include "engine.hpp"
 
 namespace cairn::incremental {
+namespace {
+
+/// Up to here chi2 is rounded as if its residuals were of ordinary size.
+constexpr double kOrdinaryInformation = 1e12;
+
+}  // namespace
 
 /// Starts from a whole graph, at its states.
 void Engine::load(Graph graph, std::vector<FactorId> ids) {
@@ -35,11 +42,11 @@ void Engine::load(Graph graph, std::vector<FactorId> ids) {
   moving_.clear();
   retiring_.clear();
   anchored_.clear();
-  left_alone_.clear();
+  disconnected_.clear();
   checked_at_.clear();
   broken_ = gauge_is_old_ = false;
   dead_ = live_factors_ = 0;
-  cost_ = decrease_ = gained_ = largest_information_ = 0.0;
+  cost_ = decrease_ = gained_ = rounding_scale_ = 0.0;
   others_ = 0;
   left_share_ = 1.0;
   touched_at_.clear();
@@ -78,20 +85,26 @@ void Engine::added_factor() {
   for (const std::int32_t v : variables) follow(v);
   for (const std::int32_t v : variables) factors_of_[v].push_back(f);
   ++live_factors_;
-  note_information(f);
+  rounding_scale_ += rounding_scale(f);
   models_.linearize(f, graph_, states_);
   cost_ += models_.cost(f);
   put_in(f);
 }
 
-void Engine::note_information(int f) {
+/// Below and above what is ordinary, the rounding of a factor's chi2 goes with its information.
+/// What marginalisation leaves has its weight in its Jacobian, and is no larger than what it
+/// replaces.
+double Engine::rounding_scale(int f) const {
+  const FactorType& type = graph_.factor_type(f);
+  if (type.tag() == MarginalPrior::kTag) return 0.0;
+  double largest = 0.0;
   const double* diagonal = graph_.information(f).data();
-  for (int left = graph_.factor_type(f).residual_size(); left > 0; diagonal += left--)
-    largest_information_ = std::max(largest_information_, *diagonal);
+  for (int left = type.residual_size(); left > 0; diagonal += left--)
+    largest = std::max(largest, *diagonal);
+  return largest < 1.0 ? largest : std::max(1.0, largest / kOrdinaryInformation);
 }
 
 void Engine::changed_factor(int f) {
-  note_information(f);
   must_look_ = true;
   if (graph_.factor_type(f).absolute_size() > 0) gauge_is_old_ = true;  // its rank may be another
   relinearize(f);
@@ -101,10 +114,11 @@ void Engine::remove_factor(int f) {
   for (const std::int32_t v : models_.variables(f)) follow(v);
   take_out(f);
   live_factor_[f] = 0;
+  rounding_scale_ = std::max(0.0, rounding_scale_ - rounding_scale(f));
   cost_ -= models_.cost(f);
   for (const std::int32_t v : models_.variables(f)) {
     std::erase(factors_of_[v], f);
-    if (factors_of_[v].empty()) left_alone_.push_back(v);
+    if (factors_of_[v].empty()) disconnected_.push_back(v);
   }
   for (const std::int32_t v : models_.variables(f)) sum_anew(v);
   --live_factors_;
@@ -112,8 +126,10 @@ void Engine::remove_factor(int f) {
   gauge_is_old_ = true;
 }
 
-std::vector<std::int32_t> Engine::take_left_alone() {
-  std::vector<std::int32_t> all = std::exchange(left_alone_, {});
+std::vector<std::int32_t> Engine::take_disconnected() {
+  std::vector<std::int32_t> all = std::exchange(disconnected_, {});
+  std::ranges::sort(all);
+  all.erase(std::ranges::unique(all).begin(), all.end());
   std::erase_if(all, [&](std::int32_t v) { return !live_variable_[v] || !factors_of_[v].empty(); });
   return all;
 }

@@ -24,7 +24,7 @@ class GaugeWatch {
     for (const std::int32_t v : dirty_) settle_one(v, set);
     dirty_.clear();
   }
-  /// Components whose gauge is free, since their first pose is no group.
+  /// Components whose gauge is free, since their first pose is no group or priors determine a part.
   bool left_free(std::int32_t v);
   bool anchored(std::int32_t v) { return components_[root(v)].anchor == v; }
 
@@ -51,7 +51,8 @@ class GaugeWatch {
     Component& c = components_[root(v)];
     if (!c.touched) return set(v, true);
     if (!touched_[v]) touched_[v] = 1, set(v, fixed_[v] != 0);
-    const std::int32_t anchor = floats(c) && anchors_[c.first_largest] ? c.first_largest : -1;
+    const bool whole = c.absolute == 0 && anchors_[c.first_largest];
+    const std::int32_t anchor = floats(c) && whole ? c.first_largest : -1;
     if (anchor == c.anchor) return;
     if (c.anchor >= 0) set(c.anchor, fixed_[c.anchor] != 0);
     c.anchor = anchor;

@@ -171,7 +171,7 @@ void IncrementalCholesky::tell_of_anchors(UpdateReport& report) {
         fmt::format("the pose of the component of {0} is not determined: anchored {0}",
                     engine_->graph().describe_variable(v)));
   }
-  for (const std::int32_t v : engine_->take_left_alone()) {
+  for (const std::int32_t v : engine_->take_disconnected()) {
     if (engine_->graph().fixed(v)) continue;
     report.notes.push_back(fmt::format("{} has no factor left: it is constant, without covariance",
                                        engine_->graph().describe_variable(v)));

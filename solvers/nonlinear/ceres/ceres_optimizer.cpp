@@ -18,7 +18,7 @@
 #include "cairn/runtime/threads.hpp"
 #include "cairn/runtime/timed.hpp"
 #include "ceres_problem.hpp"
-#include "state_size.hpp"
+#include "state_extent.hpp"
 
 namespace cairn {
 namespace {
@@ -218,7 +218,7 @@ Summary CeresOptimizer::optimize(Graph& graph, const Stop& stop, Observer& obser
   Bridge bridge(graph, values, problem.cost_scale(), stop, observer, summary);
   ceres::Solver::Options options = options_;
   set_limits(stop, options);
-  options.parameter_tolerance = parameter_tolerance(stop, values, state_size(graph, values));
+  options.parameter_tolerance = parameter_tolerance(stop, values, state_extent(graph, values));
   options.callbacks.push_back(&bridge);
   ceres::Solver::Summary report;
   {
@@ -233,7 +233,7 @@ Summary CeresOptimizer::optimize(Graph& graph, const Stop& stop, Observer& obser
   summary.final_chi2 = loss_.name == "none" ? chi2(graph) : bridge.chi2();
   if (summary.status == Status::converged &&
       (!std::isfinite(summary.final_chi2) ||
-       ended_without_descent(report, state_size(graph, graph.values()))))
+       ended_without_descent(report, state_extent(graph, graph.values()))))
     summary.status = Status::diverged;
   summary.notes.push_back("Ceres: " + report.message);
   summary.seconds = seconds_of(report);

@@ -19,8 +19,8 @@ bool Convergence::arrived(double promise, double chi2) {
   return tolerance_ > 0.0 && promise <= (1.0 - rate) * tolerance_ * chi2;
 }
 
-bool Convergence::exhausted(bool lowered, double step_norm) {
-  const bool futile = !lowered && negligible(step_norm);
+bool Convergence::exhausted(bool lowered, double step_norm, double extent) {
+  const bool futile = !lowered && negligible(step_norm, extent);
   futile_ = futile ? futile_ + 1 : 0;
   return tolerance_ > 0.0 && futile_ >= 2;
 }

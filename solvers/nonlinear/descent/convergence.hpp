@@ -12,25 +12,25 @@ namespace cairn {
 /// not mistaken for convergence.
 class Convergence {
  public:
-  /// `tolerance`: fraction of chi2; 0 never converges. `state_size`: see `state_size`.
-  Convergence(double tolerance, double state_size)
-      : tolerance_(tolerance), state_size_(state_size) {}
+  /// `tolerance`: fraction of chi2; 0 never converges.
+  explicit Convergence(double tolerance) : tolerance_(tolerance) {}
 
   /// Whether the remaining decrease is below the tolerance. `promise`: gᵀδ of the undamped step at
   /// an estimate with that chi2; to be called once per linearisation.
   bool arrived(double promise, double chi2);
 
-  /// Whether a step is below 1e-9 of the size of the states.
-  bool negligible(double step_norm) const { return step_norm <= 1e-9 * (state_size_ + 1e-9); }
+  /// Whether a step is below 1e-9 of the extent of the states (`Descent::state_extent`).
+  static bool negligible(double step_norm, double extent) {
+    return step_norm <= 1e-9 * (extent + 1e-9);
+  }
 
   /// Whether arithmetic allows no further progress: to be called with each step; true when
   /// `lowered` has been false twice in a row for negligible steps. (chi2 = 0 is never
   /// reached to a relative tolerance.)
-  bool exhausted(bool lowered, double step_norm);
+  bool exhausted(bool lowered, double step_norm, double extent);
 
  private:
   double tolerance_;
-  double state_size_;
   double last_promise_ = 0.0;
   int futile_ = 0;
 };

@@ -24,6 +24,10 @@ constexpr double kGradientRounding = 1e-13;
 /// What may be left when no step lowers chi2: of chi2, and of the states.
 constexpr double kRounding = 1e-6;
 
+/// What is smaller than this part of the largest diagonal entry is no number in another unit but
+/// rounding.
+constexpr double kUnit = 1e-30;
+
 /// The first iteration, and about one in eight of those that follow, by multiplicative hashing.
 bool is_sampled(int iteration) {
   return iteration == 1 || (static_cast<std::uint32_t>(iteration) * 2654435769U) >> 29U == 0;
@@ -61,7 +65,7 @@ Descent::Descent(std::string optimizer, std::string linear_solver, LinearSolver&
     trial = estimate;
     chi2 = equations_->linearize(estimate);
   }
-  state_size_ = cairn::state_size(graph, estimate);
+  state_extent_ = cairn::state_extent(graph, estimate);
   best_ = estimate;
   best_chi2_ = summary_.initial_chi2 = chi2;
   for (const std::string& sentence : summary_.notes) observer_.on_message(sentence);
@@ -98,6 +102,7 @@ bool Descent::keep_if_best() {
   if (!(chi2 < best_chi2_)) return false;
   best_chi2_ = chi2;
   best_ = estimate;  // same sizes: no allocation
+  state_extent_ = std::max(state_extent_, cairn::state_extent(graph_, estimate));
   return true;
 }
 
@@ -126,8 +131,8 @@ bool Descent::solve(std::span<double> out) {
 bool Descent::is_solution(std::span<const double> out) {
   if (query<IterativeSolver>(solver_)) return true;
   const double error = equations_->backward_error(out);
-  if (error <= kLargestBackwardError || leaves_rounding(out)) return true;
-  if (!std::exchange(blamed_, true)) {
+  if (error <= kLargestBackwardError || residual_is_rounding()) return true;
+  if (!std::exchange(reported_wrong_step_, true)) {
     note(
         fmt::format("linear solver {} returned in iteration {} what does not solve H x = g: "
                     "‖Hx − g‖ is {:.1g} of ‖H‖ ‖x‖ + ‖g‖",
@@ -142,19 +147,17 @@ bool Descent::solves(std::span<const double> out) {
   return false;
 }
 
-bool Descent::leaves_rounding(std::span<const double> out) const {
-  std::vector<double> product(out.size());
-  equations_->H().multiply(out, product);
+bool Descent::residual_is_rounding() const {
+  const std::span<const double> residual = equations_->solve_residual();
   const double residuals = std::sqrt(chi2);
-  for (std::size_t k = 0; k < product.size(); ++k) {
-    const double left = std::abs(product[k] - equations_->g()[k]);
-    if (!(left <= kGradientRounding * std::sqrt(equations_->diagonal()[k]) * residuals))
+  for (std::size_t k = 0; k < residual.size(); ++k) {
+    if (!(residual[k] <= kGradientRounding * std::sqrt(equations_->diagonal()[k]) * residuals))
       return false;
   }
   return true;
 }
 
-std::vector<double> Descent::least_diagonal(double fraction) const {
+std::vector<double> Descent::min_diagonal(double fraction) const {
   const BlockStructure& s = equations_->linearizer().structure();
   const std::span<const double> diagonal = equations_->diagonal();
   std::vector<std::vector<double>> largest(graph_.variable_pools().size());
@@ -174,7 +177,7 @@ std::vector<double> Descent::least_diagonal(double fraction) const {
   for (int block = 0; block < s.blocks(); ++block) {
     const std::vector<double>& of_pool = largest[pool_of(block)];
     for (std::size_t k = 0; k < of_pool.size(); ++k) {
-      if (of_pool[k] > 0.0) least[s.offsets()[block] + k] = fraction * of_pool[k];
+      if (of_pool[k] > kUnit * of_all) least[s.offsets()[block] + k] = fraction * of_pool[k];
     }
   }
   return least;
@@ -186,7 +189,7 @@ void Descent::end_not_finite() {
 }
 
 void Descent::end_without_descent(double promise, double step_norm) {
-  if (promise <= kRounding * chi2 || step_norm <= kRounding * state_size_) {
+  if (promise <= kRounding * chi2 || step_norm <= kRounding * state_extent_) {
     end(Status::converged);
     return;
   }

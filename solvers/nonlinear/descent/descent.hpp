@@ -9,7 +9,7 @@
 
 #include "cairn/linear/normal_equations.hpp"
 #include "cairn/solve/optimizer.hpp"
-#include "state_size.hpp"
+#include "state_extent.hpp"
 
 namespace cairn {
 
@@ -80,13 +80,13 @@ class Descent {
   /// Ends the run for a factorisation of H that failed, with a note that gives the reason.
   void end_not_positive_definite(const Factorization& failure);
 
-  /// `cairn::state_size` of the states at the start.
-  double state_size() const { return state_size_; }
+  /// `cairn::state_extent`: the largest of the estimates so far.
+  double state_extent() const { return state_extent_; }
 
   /// For each entry of the diagonal of H the least that it counts as in damping: a fraction of the
   /// largest entry of the same unit, that is, for the same number of the tangent space of the same
   /// type of variable; of the largest one of all where those are zero, and of 1 where H is zero.
-  std::vector<double> least_diagonal(double fraction) const;
+  std::vector<double> min_diagonal(double fraction) const;
 
   /// Leaves the best estimate in the graph.
   Summary finish();
@@ -95,7 +95,7 @@ class Descent {
   bool is_solution(std::span<const double> out);
   /// Whether all of Hx − g is what rounding leaves of a gradient that is zero, as at a minimum. A
   /// solver that works on the Jacobian never sees g, and its step is no worse for that.
-  bool leaves_rounding(std::span<const double> out) const;
+  bool residual_is_rounding() const;
 
   using Clock = std::chrono::steady_clock;
 
@@ -109,10 +109,10 @@ class Descent {
   Values best_;
   double best_chi2_ = 0.0;
   int number_ = 0;
-  double state_size_ = 0.0;  // at the start
+  double state_extent_ = 0.0;
   double step_norm_ = 0.0;
-  int sampled_ = 0;      // the last iteration whose step was checked
-  bool blamed_ = false;  // a note names the linear solver
+  int sampled_ = 0;                   // the last iteration whose step was checked
+  bool reported_wrong_step_ = false;  // a note names the linear solver
   std::optional<Status> status_;
   Summary summary_;
 };

@@ -19,9 +19,9 @@ class Run {
   Run(Descent& descent, const DoglegOptions& options)
       : run_(descent),
         equations_(descent.equations()),
-        convergence_(descent.stop().tolerance, descent.state_size()),
+        convergence_(descent.stop().tolerance),
         path_(descent.step.size()),
-        least_diagonal_(descent.least_diagonal(options.smallest_diagonal)),
+        min_diagonal_(descent.min_diagonal(options.smallest_diagonal)),
         radius_(std::max(options.initial_radius, std::sqrt(descent.chi2))) {}
 
   void iterate() {
@@ -32,7 +32,7 @@ class Run {
         if (!run_.ended()) run_.end_not_finite();
         return;
       }
-      path_.prepare(equations_.H(), equations_.g(), equations_.diagonal(), least_diagonal_);
+      path_.prepare(equations_.H(), equations_.g(), equations_.diagonal(), min_diagonal_);
       path_is_current_ = true;
       newton_promise_ = dot(equations_.g(), path_.newton());
       newton_norm_ = run_.step_norm();
@@ -52,7 +52,7 @@ class Run {
     if (run_.must_stop()) return;
 
     const bool lowered = trial_chi2 < run_.chi2;  // false for what is not a number
-    const bool exhausted = convergence_.exhausted(lowered, step_norm);
+    const bool exhausted = convergence_.exhausted(lowered, step_norm, run_.state_extent());
     if (arrived) {
       run_.end(Status::converged);
     } else if (exhausted && run_.solves(path_.newton())) {
@@ -74,7 +74,7 @@ class Run {
     std::vector<double> damping(run_.step.size());
     for (double mu = 1e-12; mu < 1.0; mu *= 100.0) {
       for (std::size_t k = 0; k < damping.size(); ++k) {
-        damping[k] = mu * std::max(equations_.diagonal()[k], least_diagonal_[k]);
+        damping[k] = mu * std::max(equations_.diagonal()[k], min_diagonal_[k]);
       }
       factorization = equations_.factorize_damped(damping);
       if (factorization.ok) return true;
@@ -100,7 +100,7 @@ class Run {
   NormalEquations& equations_;
   Convergence convergence_;
   DoglegPath path_;
-  std::vector<double> least_diagonal_;
+  std::vector<double> min_diagonal_;
   double newton_promise_ = 0.0, newton_norm_ = 0.0;  // of the full step
   double radius_;
   bool path_is_current_ = false;

@@ -9,9 +9,9 @@
 namespace cairn {
 
 void DoglegPath::prepare(const BlockMatrix& H, std::span<const double> g,
-                         std::span<const double> diagonal, std::span<const double> least_diagonal) {
+                         std::span<const double> diagonal, std::span<const double> min_diagonal) {
   for (std::size_t k = 0; k < D_.size(); ++k) {
-    D_[k] = std::max(diagonal[k], least_diagonal[k]);
+    D_[k] = std::max(diagonal[k], min_diagonal[k]);
     cauchy_[k] = g[k] / D_[k];
   }
   H.multiply(cauchy_, product_);

@@ -18,7 +18,7 @@ class DoglegPath {
   /// Room for the Gauss-Newton step H⁻¹g, to be filled before `prepare`.
   std::span<double> newton() { return newton_; }
   void prepare(const BlockMatrix& H, std::span<const double> g, std::span<const double> diagonal,
-               std::span<const double> least_diagonal);
+               std::span<const double> min_diagonal);
 
   struct Step {
     double length;   ///< in the norm of D

@@ -29,7 +29,7 @@ GaussNewton::GaussNewton(std::unique_ptr<LinearSolver> solver, GaussNewtonOption
 
 Summary GaussNewton::optimize(Graph& graph, const Stop& stop, Observer& observer) {
   Descent run("gauss_newton", options_.linear_solver, *solver_, graph, stop, observer);
-  Convergence convergence(stop.tolerance, run.state_size());
+  Convergence convergence(stop.tolerance);
   NormalEquations& equations = run.equations();
   bool best = true;
   int rises = 0;
@@ -46,7 +46,7 @@ Summary GaussNewton::optimize(Graph& graph, const Stop& stop, Observer& observer
     const double step_norm = run.step_norm();
     const double before = run.chi2;
     const bool arrived = convergence.arrived(dot(equations.g(), run.step), before);
-    const bool may_end = arrived || convergence.negligible(step_norm);
+    const bool may_end = arrived || Convergence::negligible(step_norm, run.state_extent());
     if (may_end && !run.solves(run.step)) break;
     equations.retract(run.estimate, run.step, run.trial);
     if (run.must_stop()) break;
@@ -56,7 +56,7 @@ Summary GaussNewton::optimize(Graph& graph, const Stop& stop, Observer& observer
     run.chi2 = final ? equations.chi2(run.estimate) : equations.linearize(run.estimate);
     best = run.keep_if_best();
     rises = run.chi2 > before ? rises + 1 : 0;
-    const bool exhausted = convergence.exhausted(best, step_norm);
+    const bool exhausted = convergence.exhausted(best, step_norm, run.state_extent());
     if (!std::isfinite(run.chi2) ||
         (!run.exact() && !arrived && !exhausted && rises >= options_.rises)) {
       end_diverged(run);

@@ -38,9 +38,9 @@ class Run {
         damping_(initial_lambda(options, equations_.gauge()), 1e-20, options.largest_lambda),
         may_go_undamped_(may_go_undamped(options, equations_.gauge())),
         endgame_(may_go_undamped_ ? std::sqrt(descent.stop().tolerance) : 0.0),
-        convergence_(descent.stop().tolerance, descent.state_size()),
+        convergence_(descent.stop().tolerance),
         damped_by_(descent.step.size()),
-        least_diagonal_(descent.least_diagonal(options.smallest_diagonal)) {}
+        min_diagonal_(descent.min_diagonal(options.smallest_diagonal)) {}
 
   void iterate() {
     const bool undamped = endgame_.active();
@@ -72,7 +72,7 @@ class Run {
     if (run_.must_stop()) return;
     const bool lowered = trial_chi2 < run_.chi2;  // false for what is not a number
     const double gained = run_.chi2 - trial_chi2;
-    const bool exhausted = convergence_.exhausted(lowered, step_norm);
+    const bool exhausted = convergence_.exhausted(lowered, step_norm, run_.state_extent());
     if (!run_.ended() && arrived) run_.end(Status::converged);
     if (!run_.ended() && exhausted && run_.solves(run_.step))
       run_.end_without_descent(first_promise_, first_norm_);
@@ -92,7 +92,7 @@ class Run {
   Factorization factorize(double lambda) {
     const std::span<const double> diagonal = equations_.diagonal();
     for (std::size_t k = 0; k < damped_by_.size(); ++k) {
-      damped_by_[k] = lambda * std::max(diagonal[k], least_diagonal_[k]);
+      damped_by_[k] = lambda * std::max(diagonal[k], min_diagonal_[k]);
     }
     return lambda > 0.0 ? equations_.factorize_damped(damped_by_) : equations_.factorize();
   }
@@ -157,8 +157,8 @@ class Run {
   bool may_go_undamped_;
   Endgame endgame_;
   Convergence convergence_;
-  std::vector<double> damped_by_;       // λ D
-  std::vector<double> least_diagonal_;  // of D
+  std::vector<double> damped_by_;     // λ D
+  std::vector<double> min_diagonal_;  // of D
   int small_promises_ = 0;
   bool first_trial_ = true;  // of the present linearisation; it promised:
   double first_promise_ = 0.0, first_norm_ = 0.0;

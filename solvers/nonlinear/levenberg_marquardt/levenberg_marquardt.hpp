@@ -31,8 +31,7 @@ struct LevenbergMarquardtOptions {
         .real("largest_lambda", &O::largest_lambda, 1.0, 1e30, "damping at which the run gives up")
         .real("smallest_diagonal", &O::smallest_diagonal, 0.0, 1.0,
               "lower bound of the diagonal of H in the damping, as a fraction of its largest entry "
-              "of "
-              "the same unit")
+              "of the same unit")
         .boolean("endgame", &O::endgame,
                  "undamped steps near the minimum, which also judge convergence");
   }

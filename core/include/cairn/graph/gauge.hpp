@@ -21,7 +21,7 @@ namespace cairn {
 struct CAIRN_API Gauge {
   std::vector<bool> held;      ///< by variable
   std::vector<int> anchored;   ///< variables made constant only to fix the gauge, one per component
-  std::vector<int> left_free;  ///< what would be anchored but is no group, one per component
+  std::vector<int> left_free;  ///< one of each component whose gauge stays free in part
   std::vector<int> component;  ///< by variable: its connected component, 0 … components-1
   int components = 0;
   int components_with_fixed = 0;

@@ -60,6 +60,8 @@ class CAIRN_API NormalEquations {
   /// its largest diagonal entry: about 1e-16 for a backward stable solution, however
   /// ill-conditioned A is.
   double backward_error(std::span<const double> step);
+  /// |A step − g| of the last `backward_error`.
+  std::span<const double> solve_residual() const { return residual_; }
 
   /// A sentence on why a factorisation of H failed: the variable at which it stopped, the likely
   /// number of gauge freedoms, and why that variable is not determined. Takes about as long as a
@@ -82,8 +84,8 @@ class CAIRN_API NormalEquations {
   BlockMatrix H_;
   std::vector<double> g_;
   std::vector<double> diagonal_;
-  std::vector<double> damped_;    // diagonal with damping, of what was factorised last
-  std::vector<double> residual_;  // room for `backward_error`
+  std::vector<double> damped_;  // diagonal with damping, of what was factorised last
+  std::vector<double> residual_;
 
   JacobianSolver* jacobian_solver_ = nullptr;  // the solver, if it works on J
   std::optional<JacobianEvaluator> jacobian_;

@@ -64,15 +64,17 @@ TEST_F(GaugeTest, APriorOnAPoseFixesItsComponent) {
   EXPECT_EQ(gauge.describe(graph_), "");
 }
 
-TEST_F(GaugeTest, PriorsOnPointsFixAComponentOnlyTogether) {
+TEST_F(GaugeTest, PriorsOnPointsFixAComponentOnlyTogetherAndAreNotDefied) {
   const auto add_prior = [&] {
     graph_.add_factor(types_.point_prior, std::array{0}, std::array{0.0, 0.0},
                       std::array{1.0, 0.0, 1.0});
   };
   add_prior();
-  EXPECT_THAT(resolve_gauge(graph_).anchored, ElementsAre(1, 4));
+  EXPECT_THAT(resolve_gauge(graph_).anchored, ElementsAre(4));
+  EXPECT_THAT(resolve_gauge(graph_).left_free, ElementsAre(1));
   add_prior();
   EXPECT_THAT(resolve_gauge(graph_).anchored, ElementsAre(4));
+  EXPECT_THAT(resolve_gauge(graph_).left_free, IsEmpty());
 }
 
 TEST_F(GaugeTest, HoldsAVariableThatNoFactorTouches) {
@@ -112,7 +114,7 @@ TEST_F(GaugeTest, LeavesAComponentFreeWhoseLargestVariableIsNoGroup) {
   EXPECT_THAT(
       gauge.describe(graph_),
       ::testing::EndsWith("; the gauge of a component is left free: anchoring VERTEX_SCALED "
-                          "50 would constrain more than its pose"));
+                          "50 would constrain more, or defy its priors"));
   graph_.set_fixed(b);
   EXPECT_THAT(resolve_gauge(graph_).left_free, IsEmpty());
 }

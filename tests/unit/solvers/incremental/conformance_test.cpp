@@ -122,6 +122,21 @@ TEST_P(EveryEstimator, AnchorsNothingThatAPriorDetermines) {
   EXPECT_THAT(estimator_->update(update, {.full = true}).notes, testing::IsEmpty());
 }
 
+TEST_P(EveryEstimator, APositionFromGpsIsNotTurnedOffByAnAnchor) {
+  GraphUpdate update = chain(3);
+  const auto prior = registry_.factor_type("EDGE_PRIOR_SE2");
+  update.factors.push_back({prior, {0}, {100.0, 50.0, 0.0}, {4, 0, 0, 4, 0, 0}});
+  estimator_->update(update, {.full = true});
+  EXPECT_NEAR(estimator_->state(0)[0], 100.0, 1e-6);
+  EXPECT_NEAR(estimator_->state(0)[1], 50.0, 1e-6);
+  update = {};  // the second position determines the heading
+  update.factors.push_back({prior, {2}, {100.0, 52.0, 0.0}, {4, 0, 0, 4, 0, 0}});
+  const UpdateReport report = estimator_->update(update, {.full = true});
+  EXPECT_TRUE(report.ok);
+  EXPECT_NEAR(estimator_->state(2)[0], 100.0, 0.01);
+  EXPECT_LT(estimator_->chi2(), 0.1);
+}
+
 TEST_P(EveryEstimator, ADeferredUpdateLeavesTheEstimateOfOldVariables) {
   estimator_->update(chain(3));
   const std::vector<double> before(estimator_->state(2).begin(), estimator_->state(2).end());
@@ -142,6 +157,35 @@ TEST_P(EveryEstimator, AFixedVariableStays) {
   ASSERT_TRUE(estimator_->covariance(1, 1, block));
   EXPECT_THAT(block, testing::Each(0.0));
   EXPECT_EQ(estimator_->graph().fixed(1), true);
+}
+
+TEST_P(EveryEstimator, SolvesFullyWhateverTheInformation) {
+  // All of it small or large after a marginalisation, or one factor that weighs far more.
+  std::vector<double> expected;
+  for (const auto& [scale, first] : {std::pair{1.0, 1.0}, {1e-30, 1.0}, {1e30, 1.0}, {1.0, 1e30}}) {
+    const auto estimator = registry_.make<Estimator>(GetParam());
+    GraphUpdate update = chain(7);
+    update.variables[0] = pose(0, {0.0, 0.0, 0.0}, true);
+    for (Factor& factor : update.factors) {
+      for (double& number : factor.information) number *= scale;
+    }
+    for (double& number : update.factors[0].information) number *= first;
+    estimator->update(update, {.full = true});
+    update = {};
+    update.marginalized = {3};
+    estimator->update(update);
+    update = {};
+    update.factors = {between(1, 6, {2.5, 2.0, 0.9})};
+    for (double& number : update.factors[0].information) number *= scale;
+    estimator->update(update, {.full = true});
+    const std::span<const double> x = estimator->state(6);
+    if (first > 1.0) {  // pose 1 is where that factor puts it
+      EXPECT_NEAR(estimator->state(1)[0], 1.0, 1e-12);
+      continue;
+    }
+    if (expected.empty()) expected.assign(x.begin(), x.end());
+    for (int k = 0; k < 3; ++k) EXPECT_NEAR(x[k], expected[k], 1e-9) << scale;
+  }
 }
 
 TEST_P(EveryEstimator, RefusesWhatItDoesNotKnow) {

@@ -9,6 +9,6 @@ namespace cairn {
 /// their distances from the mean of their pool, of a single variable that of its state. Where they
 /// lie far from the origin, as UTM coordinates do, their own norm is no measure of a map. At least
 /// 1e-6 of that norm, though, since states of that size are rounded.
-double state_size(const Graph& graph, const Values& values);
+double state_extent(const Graph& graph, const Values& values);
 
 }  // namespace cairn

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "state_size.hpp"
+#include "state_extent.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -11,8 +11,8 @@ constexpr double kRounded = 1e-6;
 
 }  // namespace
 
-double state_size(const Graph& graph, const Values& values) {
-  double spread = 0.0, squares = 0.0;
+double state_extent(const Graph& graph, const Values& values) {
+  double spread = 0.0, alone = 0.0, squares = 0.0;
   for (std::size_t pool = 0; pool < values.pools.size(); ++pool) {
     const AlignedVector& x = values.pools[pool];
     const auto numbers =
@@ -24,12 +24,12 @@ double state_size(const Graph& graph, const Values& values) {
         mean += x[v * numbers + c] / static_cast<double>(count);
       for (std::size_t v = 0; v < count; ++v) {
         const double number = x[v * numbers + c];
-        spread += (number - mean) * (number - mean);
+        (count > 1 ? spread : alone) += (number - mean) * (number - mean);
         squares += number * number;
       }
     }
   }
-  return std::max(std::sqrt(spread), kRounded * std::sqrt(squares));
+  return std::max(std::sqrt(spread > 0.0 ? spread : alone), kRounded * std::sqrt(squares));
 }
 
 }  // namespace cairn
