@@ -82,6 +82,19 @@ TEST(GraphCovariance, SaysWhyThereIsNone) {
               HasSubstr("there are no covariances"));
 }
 
+TEST(GraphCovariance, IsRefusedForAVariableThatNothingMeasures) {
+  Graph graph;
+  graph.add(0, Pose2());
+  graph.add(1, Pose2());
+  graph.add(7, Pose2());
+  graph.add(Between(0, 1, kMotion), kStep);
+  EXPECT_THAT(refusal(ErrorCode::numerical, [&] { covariance(graph, 7); }),
+              HasSubstr("there is no covariance of VERTEX_SE2 7: it has no factor"));
+  covariance(graph, 1);  // of the others there is
+  graph.set_fixed(2);
+  EXPECT_EQ(covariance(graph, 7).norm(), 0.0);
+}
+
 TEST(EstimatorValues, AreThoseOfTheGraph) {
   const auto estimator = make<Estimator>("incremental_cholesky");
   GraphUpdate update;
