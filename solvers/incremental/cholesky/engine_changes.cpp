@@ -129,7 +129,7 @@ void Engine::remove_factor(int f) {
 std::vector<std::int32_t> Engine::take_disconnected() {
   std::vector<std::int32_t> all = std::exchange(disconnected_, {});
   std::ranges::sort(all);
-  all.erase(std::ranges::unique(all).begin(), all.end());
+  all.erase(std::unique(all.begin(), all.end()), all.end());
   std::erase_if(all, [&](std::int32_t v) { return !live_variable_[v] || !factors_of_[v].empty(); });
   return all;
 }
