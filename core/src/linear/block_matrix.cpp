@@ -90,12 +90,14 @@ void BlockMatrix::multiply(std::span<const double> x, std::span<double> y) const
     for (std::int64_t e = s.column_begin()[j]; e < s.column_begin()[j + 1]; ++e) {
       const std::int32_t i = s.rows()[e], rows = s.block_size(i);
       const std::int64_t y0 = s.offsets()[i];
-      const double* values = block(e);
-      for (std::int32_t c = 0; c < columns; ++c) {
+      const double* v = block(e);
+      for (std::int32_t c = 0; c < columns; ++c, v += rows) {
+        double above = y[x0 + c];
         for (std::int32_t r = 0; r < rows; ++r) {
-          y[y0 + r] += values[c * rows + r] * x[x0 + c];
-          if (i != j) y[x0 + c] += values[c * rows + r] * x[y0 + r];
+          y[y0 + r] += v[r] * x[x0 + c];
+          if (i != j) above += v[r] * x[y0 + r];
         }
+        if (i != j) y[x0 + c] = above;
       }
     }
   }

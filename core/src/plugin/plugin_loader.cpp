@@ -39,8 +39,7 @@ std::map<fs::path, boost::dll::shared_library>& loaded_libraries() {
 
 constexpr std::uintmax_t kLargestSidecar = std::uintmax_t{1} << 20;  // they have some hundred bytes
 
-/// All zero where there is no such file.
-struct stat status_of(const fs::path& path) {
+struct stat status_of(const fs::path& path) {  // zeros where there is no such file
   struct stat status = {};
   return ::stat(path.c_str(), &status) == 0 ? status : decltype(status){};
 }

@@ -24,6 +24,8 @@ constexpr double kGradientRounding = 1e-13;
 /// What may be left when no step lowers chi2: of chi2, and of the states.
 constexpr double kRounding = 1e-6;
 
+/// States that all begin equal show the extent of the map after the first steps.
+constexpr int kIterationsForExtent = 2;
 /// What is smaller than this part of the largest diagonal entry is no number in another unit but
 /// rounding.
 constexpr double kUnit = 1e-30;
@@ -102,7 +104,8 @@ bool Descent::keep_if_best() {
   if (!(chi2 < best_chi2_)) return false;
   best_chi2_ = chi2;
   best_ = estimate;  // same sizes: no allocation
-  state_extent_ = std::max(state_extent_, cairn::state_extent(graph_, estimate));
+  if (number_ <= kIterationsForExtent)
+    state_extent_ = std::max(state_extent_, cairn::state_extent(graph_, estimate));
   return true;
 }
 

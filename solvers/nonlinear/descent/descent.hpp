@@ -80,7 +80,7 @@ class Descent {
   /// Ends the run for a factorisation of H that failed, with a note that gives the reason.
   void end_not_positive_definite(const Factorization& failure);
 
-  /// `cairn::state_extent`: the largest of the estimates so far.
+  /// `cairn::state_extent`: the largest of the initial estimate and those of the first iterations.
   double state_extent() const { return state_extent_; }
 
   /// For each entry of the diagonal of H the least that it counts as in damping: a fraction of the

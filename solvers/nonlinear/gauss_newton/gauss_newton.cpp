@@ -46,7 +46,8 @@ Summary GaussNewton::optimize(Graph& graph, const Stop& stop, Observer& observer
     const double step_norm = run.step_norm();
     const double before = run.chi2;
     const bool arrived = convergence.arrived(dot(equations.g(), run.step), before);
-    const bool may_end = arrived || Convergence::negligible(step_norm, run.state_extent());
+    const bool may_end =
+        arrived || (!run.exact() && Convergence::negligible(step_norm, run.state_extent()));
     if (may_end && !run.solves(run.step)) break;
     equations.retract(run.estimate, run.step, run.trial);
     if (run.must_stop()) break;

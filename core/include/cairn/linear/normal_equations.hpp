@@ -60,8 +60,7 @@ class CAIRN_API NormalEquations {
   /// its largest diagonal entry: about 1e-16 for a backward stable solution, however
   /// ill-conditioned A is.
   double backward_error(std::span<const double> step);
-  /// |A step − g| of the last `backward_error`.
-  std::span<const double> solve_residual() const { return residual_; }
+  std::span<const double> solve_residual() const { return residual_; }  ///< its |A step − g|
 
   /// A sentence on why a factorisation of H failed: the variable at which it stopped, the likely
   /// number of gauge freedoms, and why that variable is not determined. Takes about as long as a
