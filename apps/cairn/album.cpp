@@ -117,7 +117,8 @@ Album load_album(const AlbumOptions& options, const std::string& command, Sessio
     add_file(file, name, options, builder, session);
   }
   if (!options.truth.empty()) {
-    builder.set_truth(options.truth, load_other_graph(options.truth, options.input, session).graph);
+    builder.set_truth(options.truth,
+                      load_ground_truth(options.truth, options.input, session).graph);
   }
   std::unique_ptr<InitialGuess> initial;
   if (!options.initial.empty()) {

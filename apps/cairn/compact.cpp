@@ -39,7 +39,7 @@ struct Recording {
 Recording load_recording(const CompactOptions& options, Session& session) {
   LoadedGraph loaded = load_graph(options.graph, options.input, session);
   if (!options.truth.empty())
-    loaded.truth = load_other_graph(options.truth, options.input, session).graph;
+    loaded.truth = load_ground_truth(options.truth, options.input, session).graph;
   return {loaded.name, policy_data(std::move(loaded.graph), std::move(loaded.truth))};
 }
 

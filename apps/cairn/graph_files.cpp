@@ -132,8 +132,8 @@ LoadedGraph load_graph(const std::string& name, const InputOptions& options, Ses
   return load(name, options, session);
 }
 
-LoadedGraph load_other_graph(const std::string& name, const InputOptions& options,
-                             Session& session) {
+LoadedGraph load_ground_truth(const std::string& name, const InputOptions& options,
+                              Session& session) {
   session.files.add_input(name);
   return load(name, options, session);
 }

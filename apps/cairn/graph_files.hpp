@@ -35,9 +35,9 @@ struct LoadedGraph {
 /// "@manhattan:poses=500,seed=3" is generated: a generator, its options, and the seed.
 LoadedGraph load_graph(const std::string& name, const InputOptions& options, Session& session);
 
-/// The same for a graph that no output may replace: the ground truth.
-LoadedGraph load_other_graph(const std::string& name, const InputOptions& options,
-                             Session& session);
+/// The same for the ground truth, which no output may replace.
+LoadedGraph load_ground_truth(const std::string& name, const InputOptions& options,
+                              Session& session);
 
 /// Runs a generator, given as `KIND:k=v`.
 Simulation simulate(const std::string& spec, std::uint64_t seed, Session& session);

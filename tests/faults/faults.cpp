@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include <CLI/CLI.hpp>
+
 #include "campaign.hpp"
 #include "trials.hpp"
 
@@ -16,21 +18,6 @@ namespace {
 
 constexpr std::size_t kMostShown = 8;  // violations of one kind of fault
 
-constexpr const char* kHelp =
-    "cairn_faults --program FILE --library FILE --folder FOLDER [--count N] [--fault FAULT]\n"
-    "             [--kill] [--seed N] [--careless] [COMMAND...]\n"
-    "\n"
-    "  --program    the program; --library the injected library; --folder for its files\n"
-    "  --count      at most so many faults of each kind, one per run, spread evenly [10000]\n"
-    "  --fault      one run, such as allocation:17 or output:3:ENOSPC; its files stay in "
-    "FOLDER/run\n"
-    "  --kill       kill processes instead: at so many random moments, and in calls on outputs\n"
-    "  --seed       of the moments [1]\n"
-    "  --careless   the program is the one that does everything wrong\n"
-    "  COMMAND      only these\n"
-    "\n"
-    "Ends with 1 where there is a violation, and with 2 where it cannot be said.\n";
-
 struct Options {
   std::string program, library, folder, fault;
   std::uint64_t count = 10'000, seed = 1;
@@ -38,38 +25,21 @@ struct Options {
   std::vector<std::string> commands;
 };
 
-Options parse(const std::vector<std::string>& words) {
-  Options options;
-  for (std::size_t k = 0; k < words.size(); ++k) {
-    const auto value = [&] {
-      if (k + 1 == words.size()) throw std::invalid_argument(words[k] + " needs a value");
-      return words[++k];
-    };
-    if (words[k] == "--program") {
-      options.program = value();
-    } else if (words[k] == "--library") {
-      options.library = value();
-    } else if (words[k] == "--folder") {
-      options.folder = value();
-    } else if (words[k] == "--fault") {
-      options.fault = value();
-    } else if (words[k] == "--count") {
-      options.count = std::stoull(value());
-    } else if (words[k] == "--seed") {
-      options.seed = std::stoull(value());
-    } else if (words[k] == "--kill") {
-      options.kill = true;
-    } else if (words[k] == "--careless") {
-      options.careless = true;
-    } else if (words[k].starts_with("-")) {
-      throw std::invalid_argument("there is no option " + words[k] + "\n" + kHelp);
-    } else {
-      options.commands.push_back(words[k]);
-    }
-  }
-  if (options.program.empty() || options.library.empty() || options.folder.empty())
-    throw std::invalid_argument(kHelp);
-  return options;
+void add_options(CLI::App& app, Options& options) {
+  app.add_option("--program", options.program, "the program")->required();
+  app.add_option("--library", options.library, "the injected library")->required();
+  app.add_option("--folder", options.folder, "for its files")->required();
+  app.add_option("--count", options.count,
+                 "at most so many faults of each kind, one per run, spread evenly")
+      ->capture_default_str();
+  app.add_option("--fault", options.fault,
+                 "one run, such as allocation:17 or output:3:ENOSPC; its files stay in FOLDER/run");
+  app.add_flag("--kill", options.kill,
+               "kill processes instead: at so many random moments, and in calls on outputs");
+  app.add_option("--seed", options.seed, "of the moments")->capture_default_str();
+  app.add_flag("--careless", options.careless, "the program is the one that does everything wrong");
+  app.add_option("command", options.commands, "only these");
+  app.footer("Ends with 1 where there is a violation, and with 2 where it cannot be said.");
 }
 
 /// Those that were asked for.
@@ -160,9 +130,14 @@ int run(const Options& options) {
 }  // namespace cairn::faults
 
 int main(int argc, char** argv) {
+  CLI::App app("Makes calls of cairn's commands fail, and says what that leaves behind.");
+  cairn::faults::Options options;
+  cairn::faults::add_options(app, options);
   try {
-    return cairn::faults::run(
-        cairn::faults::parse(std::vector<std::string>(argv + 1, argv + argc)));
+    app.parse(argc, argv);
+    return cairn::faults::run(options);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
   } catch (const std::exception& error) {
     std::fprintf(stderr, "cairn_faults: %s\n", error.what());
     return 2;

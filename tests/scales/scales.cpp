@@ -11,6 +11,8 @@
 #include <string>
 #include <vector>
 
+#include <CLI/CLI.hpp>
+
 #include "cairn/plugin/options.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/threads.hpp"
@@ -19,47 +21,25 @@
 namespace cairn::scales {
 namespace {
 
-constexpr const char* kHelp =
-    "cairn_scales [--graph NAME] [--change NAME] [--method NAME] [--without NAME]...\n"
-    "             [--few] [--verbose]\n"
-    "\n"
-    "  --graph, --change, --method   only those whose name contains NAME\n"
-    "  --without                     no methods whose name contains NAME\n"
-    "  --few                         optimizers and linear solvers by their defaults only\n"
-    "  --verbose                     every run that is not right, not only those that are wrong\n"
-    "\n"
-    "Ends with 1 where an optimizer converged to another estimate.\n";
-
 struct Options {
   std::string graph, change, method;
   std::vector<std::string> without;
   bool few = false, verbose = false;
 };
 
-Options parse(const std::vector<std::string>& words) {
-  Options options;
-  for (std::size_t k = 0; k < words.size(); ++k) {
-    const auto value = [&] {
-      if (k + 1 == words.size()) throw std::invalid_argument(words[k] + " needs a value");
-      return words[++k];
-    };
-    if (words[k] == "--graph") {
-      options.graph = value();
-    } else if (words[k] == "--change") {
-      options.change = value();
-    } else if (words[k] == "--method") {
-      options.method = value();
-    } else if (words[k] == "--without") {
-      options.without.push_back(value());
-    } else if (words[k] == "--few") {
-      options.few = true;
-    } else if (words[k] == "--verbose") {
-      options.verbose = true;
-    } else {
-      throw std::invalid_argument(kHelp);
-    }
-  }
-  return options;
+void add_options(CLI::App& app, Options& options) {
+  app.add_option("--graph", options.graph, "only graphs whose name contains this");
+  app.add_option("--change", options.change, "only changes whose name contains this");
+  app.add_option("--method", options.method, "only methods whose name contains this");
+  app.add_option("--without", options.without, "no methods whose name contains this; repeatedly")
+      ->expected(1)
+      ->take_all();
+  app.add_flag("--few", options.few, "optimizers and linear solvers by their defaults only");
+  app.add_flag("--verbose", options.verbose,
+               "every run that is not right, not only those that are wrong");
+  app.footer(
+      "Ends with 1 where an optimizer converged to another estimate, and with 2 where it "
+      "cannot be said.");
 }
 
 bool contains(const std::string& name, const std::string& part) {
@@ -158,9 +138,14 @@ int run(const Options& options) {
 }  // namespace cairn::scales
 
 int main(int argc, char** argv) {
+  CLI::App app("Solves graphs in other numbers with every optimizer and linear solver.");
+  cairn::scales::Options options;
+  cairn::scales::add_options(app, options);
   try {
-    return cairn::scales::run(
-        cairn::scales::parse(std::vector<std::string>(argv + 1, argv + argc)));
+    app.parse(argc, argv);
+    return cairn::scales::run(options);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
   } catch (const std::exception& error) {
     std::fprintf(stderr, "cairn_scales: %s\n", error.what());
     return 2;

@@ -12,6 +12,8 @@
 #include <string>
 #include <vector>
 
+#include <CLI/CLI.hpp>
+
 #include "long_session.hpp"
 #include "mission.hpp"
 
@@ -24,17 +26,6 @@ constexpr int kRounds = 12;          // of a mission
 constexpr int kLongPoses = 100;      // of the long session, between two rounds
 constexpr int kMostViolations = 40;  // before it gives up
 
-constexpr const char* kHelp =
-    "cairn_soak --program FILE --library FILE --folder FOLDER [--minutes M | --rounds N]\n"
-    "           [--seed N] [--mission K]\n"
-    "\n"
-    "  --program    the program; --library the injected library; --folder for its files\n"
-    "  --minutes    how long [60]; --rounds: so many disturbances instead\n"
-    "  --seed       of all that is drawn [1]\n"
-    "  --mission    this one alone\n"
-    "\n"
-    "Ends with 1 where something is violated, and with 2 where it cannot be said.\n";
-
 struct Options {
   Place place;
   double minutes = 60.0;
@@ -43,33 +34,15 @@ struct Options {
   std::optional<std::uint64_t> mission;
 };
 
-Options parse(const std::vector<std::string>& words) {
-  Options options;
-  for (std::size_t k = 0; k + 1 < words.size(); k += 2) {
-    const std::string &name = words[k], &value = words[k + 1];
-    if (name == "--program") {
-      options.place.program = std::filesystem::absolute(value);
-    } else if (name == "--library") {
-      options.place.library = std::filesystem::absolute(value);
-    } else if (name == "--folder") {
-      options.place.folder = std::filesystem::absolute(value);
-    } else if (name == "--minutes") {
-      options.minutes = std::stod(value);
-    } else if (name == "--rounds") {
-      options.rounds = std::stol(value);
-    } else if (name == "--seed") {
-      options.seed = std::stoull(value);
-    } else if (name == "--mission") {
-      options.mission = std::stoull(value);
-    } else {
-      throw std::invalid_argument("there is no option " + name + "\n" + kHelp);
-    }
-  }
-  const Place& place = options.place;
-  if (words.size() % 2 != 0 || place.program.empty() || place.library.empty() ||
-      place.folder.empty())
-    throw std::invalid_argument(kHelp);
-  return options;
+void add_options(CLI::App& app, Options& options) {
+  app.add_option("--program", options.place.program, "the program")->required();
+  app.add_option("--library", options.place.library, "the injected library")->required();
+  app.add_option("--folder", options.place.folder, "for its files")->required();
+  app.add_option("--minutes", options.minutes, "how long")->capture_default_str();
+  app.add_option("--rounds", options.rounds, "so many disturbances instead");
+  app.add_option("--seed", options.seed, "of all that is drawn")->capture_default_str();
+  app.add_option("--mission", options.mission, "this one alone");
+  app.footer("Ends with 1 where something is violated, and with 2 where it cannot be said.");
 }
 
 class Soak {
@@ -188,10 +161,18 @@ class Soak {
 }  // namespace cairn::soak
 
 int main(int argc, char** argv) {
+  CLI::App app("Robots that never stop talk to cairn online, while much goes wrong.");
+  cairn::soak::Options options;
+  cairn::soak::add_options(app, options);
   try {
+    app.parse(argc, argv);
+    for (std::filesystem::path* path :
+         {&options.place.program, &options.place.library, &options.place.folder})
+      *path = std::filesystem::absolute(*path);
     std::signal(SIGPIPE, SIG_IGN);  // processes that are written to end
-    const auto options = cairn::soak::parse(std::vector<std::string>(argv + 1, argv + argc));
     return cairn::soak::Soak(options).run() ? 0 : 1;
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
   } catch (const std::exception& error) {
     std::fprintf(stderr, "cairn_soak: %s\n", error.what());
     return 2;

@@ -61,7 +61,7 @@ void GaugeWatch::set_fixed(std::int32_t v) {
 
 bool GaugeWatch::left_free(std::int32_t v) {
   const Component& c = components_[root(v)];
-  return floats(c) && (c.absolute > 0 || !anchors_[c.first_largest]);
+  return floats(c) && !may_be_anchored(c);
 }
 
 }  // namespace cairn::incremental

@@ -42,6 +42,10 @@ class GaugeWatch {
   bool floats(const Component& c) const {
     return c.touched && !c.fixed && c.absolute < c.largest_tangent;
   }
+  /// An anchor changes no minimum where the first pose is a group, and no prior pulls at it.
+  bool may_be_anchored(const Component& c) const {
+    return c.absolute == 0 && anchors_[c.first_largest];
+  }
   template <class Set>
   void settle_one(std::int32_t v, Set& set) {
     if (released_[v]) {
@@ -51,8 +55,7 @@ class GaugeWatch {
     Component& c = components_[root(v)];
     if (!c.touched) return set(v, true);
     if (!touched_[v]) touched_[v] = 1, set(v, fixed_[v] != 0);
-    const bool whole = c.absolute == 0 && anchors_[c.first_largest];
-    const std::int32_t anchor = floats(c) && whole ? c.first_largest : -1;
+    const std::int32_t anchor = floats(c) && may_be_anchored(c) ? c.first_largest : -1;
     if (anchor == c.anchor) return;
     if (c.anchor >= 0) set(c.anchor, fixed_[c.anchor] != 0);
     c.anchor = anchor;

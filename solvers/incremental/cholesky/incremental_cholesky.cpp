@@ -93,7 +93,7 @@ UpdateReport IncrementalCholesky::update(const GraphUpdate& update, const Update
     report.marginals_by = engine_->update_covariances();
     report.seconds.marginals += seconds_since(covariances_begin);
   }
-  tell_of_anchors(report);
+  note_gauge(report);
   report.seconds.total = seconds_since(begin);
   return report;
 }
@@ -162,7 +162,7 @@ void IncrementalCholesky::apply(const GraphUpdate& update, UpdateReport& report)
   report.priors = std::move(applied.priors);
 }
 
-void IncrementalCholesky::tell_of_anchors(UpdateReport& report) {
+void IncrementalCholesky::note_gauge(UpdateReport& report) {
   for (const std::int32_t v : engine_->take_anchored()) {
     if (!engine_->live_variable(v) || engine_->graph().fixed(v)) continue;
     if (!engine_->held(v)) continue;  // what followed in the same update determines it

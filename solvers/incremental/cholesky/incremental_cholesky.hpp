@@ -97,7 +97,7 @@ class IncrementalCholesky final : public Estimator {
     read_.clear();
     all_.reset();
   }
-  void tell_of_anchors(UpdateReport& report);
+  void note_gauge(UpdateReport& report);
 
   IncrementalCholeskyOptions options_;
   std::shared_ptr<Rescuer> rescuer_;
