@@ -11,6 +11,7 @@
 #include <fmt/core.h>
 
 #include "arguments.hpp"
+#include "cairn/geometry/pose.hpp"
 #include "cairn/io/format.hpp"
 #include "cairn/linear/graph_marginals.hpp"
 #include "cairn/plugin/registry.hpp"

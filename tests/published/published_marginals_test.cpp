@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "cairn/geometry/pose.hpp"
 #include "cairn/io/format.hpp"
 #include "cairn/linear/graph_marginals.hpp"
 #include "cairn/plugin/registry.hpp"

@@ -75,6 +75,7 @@ rm "$work/lib/cairn/cholmod.so"
 status=0
 "$cairn" optimize "$graph" --linear-solver cholmod --quiet >"$work/out" 2>&1 || status=$?
 ((status == 5)) || fail "a missing solver ended with $status"
-for text in "linear solver 'cholmod'" "cholmod.so is missing" "block_cholesky" "eigen"; do
+for text in "linear solver 'cholmod'" "cholmod.so is missing" block_cholesky eigen; do
+  [[ $text == *cholmod* || -e $work/lib/cairn/$text.so ]] || continue
   grep -qF "$text" "$work/out" || fail "no '$text' in: $(cat "$work/out")"
 done

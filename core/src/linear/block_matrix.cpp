@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <atomic>
 #include <limits>
+#include <type_traits>
 
 #include "cairn/runtime/error.hpp"
 
@@ -81,23 +82,42 @@ void BlockMatrix::set_diagonal(std::span<const double> diagonal) {
   }
 }
 
+namespace {
+
+/// y_i += B x_j, and y_j += Bᵀ x_i unless B is on the diagonal. Loops of constant size are
+/// unrolled.
+template <class Size>
+void add_products(const double* __restrict B, Size rows, Size columns, bool diagonal,
+                  const double* __restrict x_i, const double* __restrict x_j, double* y_i,
+                  double* y_j) {
+  for (int c = 0; c < columns; ++c) {
+    for (int r = 0; r < rows; ++r) y_i[r] += B[c * rows + r] * x_j[c];
+  }
+  if (diagonal) return;
+  for (int c = 0; c < columns; ++c) {
+    for (int r = 0; r < rows; ++r) y_j[c] += B[c * rows + r] * x_i[r];
+  }
+}
+
+}  // namespace
+
 void BlockMatrix::multiply(std::span<const double> x, std::span<double> y) const {
   const BlockStructure& s = *structure_;
   std::fill(y.begin(), y.end(), 0.0);
   for (int j = 0; j < s.blocks(); ++j) {
-    const std::int32_t columns = s.block_size(j);
-    const std::int64_t x0 = s.offsets()[j];
     for (std::int64_t e = s.column_begin()[j]; e < s.column_begin()[j + 1]; ++e) {
-      const std::int32_t i = s.rows()[e], rows = s.block_size(i);
-      const std::int64_t y0 = s.offsets()[i];
-      const double* v = block(e);
-      for (std::int32_t c = 0; c < columns; ++c, v += rows) {
-        double above = y[x0 + c];
-        for (std::int32_t r = 0; r < rows; ++r) {
-          y[y0 + r] += v[r] * x[x0 + c];
-          if (i != j) above += v[r] * x[y0 + r];
-        }
-        if (i != j) y[x0 + c] = above;
+      const std::int32_t i = s.rows()[e];
+      const std::int64_t at_i = s.offsets()[i], at_j = s.offsets()[j];
+      const auto add = [&](auto rows, auto columns) {
+        add_products(block(e), rows, columns, i == j, &x[at_i], &x[at_j], &y[at_i], &y[at_j]);
+      };
+      const int rows = s.block_size(i), columns = s.block_size(j);
+      if (rows == 3 && columns == 3) {
+        add(std::integral_constant<int, 3>(), std::integral_constant<int, 3>());
+      } else if (rows == 6 && columns == 6) {
+        add(std::integral_constant<int, 6>(), std::integral_constant<int, 6>());
+      } else {
+        add(rows, columns);
       }
     }
   }

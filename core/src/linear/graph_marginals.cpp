@@ -3,10 +3,7 @@
 
 #include <algorithm>
 
-#include <Eigen/Core>
-
 #include "cairn/runtime/error.hpp"
-#include "dense/products.hpp"
 
 namespace cairn {
 namespace {
@@ -104,41 +101,6 @@ std::vector<double> GraphMarginals::column(int variable) {
     }
   }
   return all;
-}
-
-std::vector<double> position_jacobian(const VariableType& type, std::span<const double> x) {
-  const Placement* place = type.placement();
-  if (!place) return {};
-  const int n = type.tangent_size(), d = place->dimension();
-  // Positions are smooth in δ, and a step of 1e-5 leaves ten digits of central differences.
-  constexpr double kStep = 1e-5;
-  std::vector<double> G(static_cast<std::size_t>(d) * static_cast<std::size_t>(n));
-  Eigen::Map<Eigen::MatrixXd> derivative(G.data(), d, n);
-  std::vector<double> delta(n, 0.0), moved(x.size()), R(d * d);
-  const auto position = [&](int k, double step) {
-    delta[k] = step;
-    const std::int64_t offset = 0;
-    type.retract(1, x.data(), &offset, delta.data(), moved.data());
-    delta[k] = 0.0;
-    Eigen::VectorXd t(d);
-    place->split(moved.data(), R.data(), t.data());
-    return t;
-  };
-  for (int k = 0; k < n; ++k)
-    derivative.col(k) = (position(k, kStep) - position(k, -kStep)) / (2.0 * kStep);
-  return G;
-}
-
-std::vector<double> position_covariance(const VariableType& type, std::span<const double> x,
-                                        std::span<const double> sigma) {
-  const Placement* place = type.placement();
-  if (!place) return {};
-  const int n = type.tangent_size(), d = place->dimension();
-  const std::vector<double> derivative = position_jacobian(type, x);
-  const Eigen::Map<const Eigen::MatrixXd> G(derivative.data(), d, n), Sigma(sigma.data(), n, n);
-  std::vector<double> out(d * d);
-  Eigen::Map<Eigen::MatrixXd>(out.data(), d, d) = dense::congruent(G, Sigma);
-  return out;
 }
 
 }  // namespace cairn

@@ -59,7 +59,6 @@ NormalEquations::NormalEquations(const Graph& graph, LinearSolver& solver)
   H_ = BlockMatrix(linearizer_.structure());
   g_.resize(size());
   diagonal_.resize(size());
-  damped_.resize(size());
   const Timed timed(seconds_.analyze);
   jacobian_solver_ = query<JacobianSolver>(solver);
   if (!jacobian_solver_) {
@@ -91,12 +90,13 @@ void NormalEquations::retract(const Values& values, std::span<const double> step
 
 Factorization NormalEquations::factorize() {
   const Timed timed(seconds_.factorize);
-  damped_ = diagonal_;
+  damped_.clear();
   return jacobian_solver_ ? jacobian_solver_->factorize(J_, {}) : solver_->factorize(H_);
 }
 
 Factorization NormalEquations::factorize_damped(std::span<const double> damping) {
   const Timed timed(seconds_.factorize);
+  damped_.resize(diagonal_.size());
   for (std::size_t k = 0; k < damped_.size(); ++k) damped_[k] = diagonal_[k] + damping[k];
   if (jacobian_solver_) return jacobian_solver_->factorize(J_, damping);
   H_.set_diagonal(damped_);
@@ -117,14 +117,15 @@ void NormalEquations::solve(std::span<double> step) {
 double NormalEquations::backward_error(std::span<const double> step) {
   residual_.resize(step.size());
   H_.multiply(step, residual_);
+  const std::vector<double>& diagonal = damped_.empty() ? diagonal_ : damped_;
   double error = 0.0, length = 0.0, gradient = 0.0, largest = 0.0;
   for (std::size_t k = 0; k < step.size(); ++k) {
-    residual_[k] = std::abs(residual_[k] + (damped_[k] - diagonal_[k]) * step[k] - g_[k]);
+    residual_[k] = std::abs(residual_[k] + (diagonal[k] - diagonal_[k]) * step[k] - g_[k]);
     if (std::isnan(residual_[k])) return residual_[k];
     error = std::max(error, residual_[k]);
     length = std::max(length, std::abs(step[k]));
     gradient = std::max(gradient, std::abs(g_[k]));
-    largest = std::max(largest, damped_[k]);
+    largest = std::max(largest, diagonal[k]);
   }
   return error == 0.0 ? 0.0 : error / (largest * length + gradient);
 }

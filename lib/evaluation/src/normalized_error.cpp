@@ -12,7 +12,6 @@
 
 #include "cairn/geometry/pose.hpp"
 #include "cairn/geometry/state_group.hpp"
-#include "cairn/linear/graph_marginals.hpp"
 #include "cairn/linear/linearizer.hpp"
 #include "cairn/runtime/error.hpp"
 #include "dense/products.hpp"

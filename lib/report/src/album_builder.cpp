@@ -12,7 +12,6 @@
 
 #include "cairn/geometry/pose.hpp"
 #include "cairn/graph/packed.hpp"
-#include "cairn/linear/graph_marginals.hpp"
 #include "cairn/runtime/error.hpp"
 
 namespace cairn {

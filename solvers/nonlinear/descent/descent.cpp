@@ -30,9 +30,9 @@ constexpr int kIterationsForExtent = 2;
 /// rounding.
 constexpr double kUnit = 1e-30;
 
-/// The first iteration, and about one in eight of those that follow, by multiplicative hashing.
+/// The first iteration, and about one in sixteen of those that follow, by multiplicative hashing.
 bool is_sampled(int iteration) {
-  return iteration == 1 || (static_cast<std::uint32_t>(iteration) * 2654435769U) >> 29U == 0;
+  return iteration == 1 || (static_cast<std::uint32_t>(iteration) * 2654435769U) >> 28U == 0;
 }
 
 }  // namespace

@@ -55,16 +55,4 @@ class CAIRN_API GraphMarginals {
   Marginals* marginals_;
 };
 
-/// The derivative of where a variable is in the world [m] by δ at `x`, retract(x, δ): dimension ×
-/// tangent, column-major. None for a type without the ability `Placement`.
-CAIRN_API std::vector<double> position_jacobian(const VariableType& type,
-                                                std::span<const double> x);
-
-/// The covariance of where a variable is, in the world frame [m²]: G Σ_vv Gᵀ with G the derivative
-/// of its position by δ at `x`. `sigma`: tangent × tangent doubles. Returns dimension × dimension
-/// doubles; none for a type without the ability `Placement`.
-CAIRN_API std::vector<double> position_covariance(const VariableType& type,
-                                                  std::span<const double> x,
-                                                  std::span<const double> sigma);
-
 }  // namespace cairn

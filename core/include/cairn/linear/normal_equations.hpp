@@ -83,7 +83,7 @@ class CAIRN_API NormalEquations {
   BlockMatrix H_;
   std::vector<double> g_;
   std::vector<double> diagonal_;
-  std::vector<double> damped_;  // diagonal with damping, of what was factorised last
+  std::vector<double> damped_;  // diagonal with damping, if the last factorisation had any
   std::vector<double> residual_;
 
   JacobianSolver* jacobian_solver_ = nullptr;  // the solver, if it works on J

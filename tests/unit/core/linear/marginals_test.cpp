@@ -297,20 +297,5 @@ TEST(GraphMarginals, RefuseASolverThatCannot) {
   EXPECT_THROW(GraphMarginals(graph, *pcg), Error);
 }
 
-TEST(GraphMarginals, TurnThePositionIntoTheWorld) {
-  Registry registry;
-  if (!registry.has("variable", "VERTEX_SE2")) GTEST_SKIP();
-  const auto type = registry.variable_type("VERTEX_SE2");
-  const std::vector<double> x{1.0, 2.0, 0.6};
-  Eigen::Matrix3d Sigma;
-  Sigma << 4, 0.5, 0.1, 0.5, 1, 0.2, 0.1, 0.2, 0.3;
-  const std::vector<double> world =
-      position_covariance(*type, x, {Sigma.data(), static_cast<std::size_t>(Sigma.size())});
-  const Eigen::Matrix2d R = Eigen::Rotation2Dd(0.6).toRotationMatrix();
-  const Eigen::Matrix2d expected = R * Sigma.topLeftCorner<2, 2>() * R.transpose();
-  ASSERT_EQ(world.size(), 4u);
-  EXPECT_LE((Eigen::Map<const Eigen::Matrix2d>(world.data()) - expected).norm(), 1e-8);
-}
-
 }  // namespace
 }  // namespace cairn::test

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstddef>
 #include <numbers>
+#include <vector>
 
 #include <Eigen/Geometry>
 
@@ -28,6 +29,19 @@ TEST(Pose, APointHasAPositionAndNoOrientation) {
   EXPECT_FALSE(is_point(*pose));
   EXPECT_TRUE(is_point(*point) && has_position(*point));
   EXPECT_FALSE(is_pose(*point) || has_orientation(*point));
+}
+
+TEST(Pose, CovarianceOfThePositionIsInTheWorldFrame) {
+  const auto type = define_variable<Se2>();
+  const std::array x{1.0, 2.0, 0.6};
+  Matrix3d Sigma;
+  Sigma << 4, 0.5, 0.1, 0.5, 1, 0.2, 0.1, 0.2, 0.3;
+  const std::vector<double> world =
+      position_covariance(*type, x, {Sigma.data(), static_cast<std::size_t>(Sigma.size())});
+  const Eigen::Matrix2d R = Eigen::Rotation2Dd(0.6).toRotationMatrix();
+  const Eigen::Matrix2d expected = R * Sigma.topLeftCorner<2, 2>() * R.transpose();
+  ASSERT_EQ(world.size(), 4u);
+  EXPECT_LE((Eigen::Map<const Eigen::Matrix2d>(world.data()) - expected).norm(), 1e-8);
 }
 
 TEST(Pose, OfThePlaneTurnsAboutZ) {

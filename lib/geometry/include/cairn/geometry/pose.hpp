@@ -2,6 +2,7 @@
 #pragma once
 
 #include <span>
+#include <vector>
 
 #include <Eigen/Core>
 
@@ -44,6 +45,18 @@ inline Pose pose_of(const VariableType& type, std::span<const double> x) {
 }
 /// The position of a state [m], z = 0 in the plane; NaN for a type without positions.
 CAIRN_API Eigen::Vector3d position(const VariableType& type, std::span<const double> x);
+
+/// The derivative of where a variable is in the world [m] by δ at `x`, retract(x, δ): dimension ×
+/// tangent, column-major. None for a type without the ability `Placement`.
+CAIRN_API std::vector<double> position_jacobian(const VariableType& type,
+                                                std::span<const double> x);
+
+/// The covariance of where a variable is, in the world frame [m²]: G Σ_vv Gᵀ with G the derivative
+/// of its position by δ at `x`. `sigma`: tangent × tangent doubles. Returns dimension × dimension
+/// doubles; none for a type without the ability `Placement`.
+CAIRN_API std::vector<double> position_covariance(const VariableType& type,
+                                                  std::span<const double> x,
+                                                  std::span<const double> sigma);
 
 /// The angle of a rotation, 0 to π [rad], to full precision everywhere: the arc cosine of the trace
 /// loses half of the digits at 0 and at π.
