@@ -23,8 +23,9 @@ CLI::Validator number_within(Number low, Number high) {
   const auto check = [low, high](const std::string& text) {
     Number value{};
     const bool good = CLI::detail::lexical_cast(text, value) && value >= low && value <= high;
-    const char* kind = std::is_integral_v<Number> ? "whole number" : "number";
-    return good ? std::string() : fmt::format("'{}' is no {} from {} to {}", text, kind, low, high);
+    const char* kind = std::is_integral_v<Number> ? "an integer" : "a number";
+    return good ? std::string()
+                : fmt::format("'{}' is not {} from {} to {}", text, kind, low, high);
   };
   return {check, ""};
 }
@@ -35,7 +36,7 @@ CLI::Validator finite_seconds(double least) {
     const bool good =
         CLI::detail::lexical_cast(text, value) && std::isfinite(value) && value >= least;
     return good ? std::string()
-                : fmt::format("'{}' is no number of seconds{}", text,
+                : fmt::format("'{}' is not a number of seconds{}", text,
                               least == 0.0 ? ", from 0" : "");
   };
   return {check, ""};
@@ -44,7 +45,7 @@ CLI::Validator finite_seconds(double least) {
 CLI::Validator one_of_these(std::vector<std::string> choices) {
   const auto check = [choices = std::move(choices)](const std::string& text) {
     const bool good = std::ranges::find(choices, text) != choices.end();
-    return good ? std::string() : fmt::format("'{}' is none of {}", text, joined(choices, ", "));
+    return good ? std::string() : fmt::format("'{}' is not one of {}", text, joined(choices, ", "));
   };
   return {check, ""};
 }

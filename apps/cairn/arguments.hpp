@@ -36,7 +36,7 @@ class Argument {
   /// One word may hold several values.
   Argument& separated_by(char delimiter);
 
-  // What a value must be. A refusal says what is expected: "'many' is no whole number from 0 to
+  // What a value must be. A refusal says what is expected: "'many' is not an integer from 0 to
   // 1024". None of them shows in the help, whose first column must stay narrow.
   Argument& within(int low, int high);
   Argument& within(double low, double high);

@@ -116,7 +116,7 @@ Error bad_value(const ParseOutcome& outcome, const ArgumentParser& program,
       what = fmt::format("{} needs a value: {} {}", name, name, option.type_name());
     const std::string unreadable = fmt::format("Could not convert: {} = ", name);
     if (what.starts_with(unreadable))
-      what = fmt::format("{}: '{}' is no {}", name, what.substr(unreadable.size()),
+      what = fmt::format("{}: '{}' is not a valid {}", name, what.substr(unreadable.size()),
                          option.type_name());
   }
   const std::string where = command ? command_name(*command) : "cairn";
@@ -138,7 +138,7 @@ Error unknown_key(const std::string& what, const ArgumentParser& program) {
             fmt::format("--config: there is no command '{}' for a section", section)};
   }
   return {ErrorCode::usage,
-          fmt::format("--config: '{}' is no option {}{}", key,
+          fmt::format("--config: '{}' is not an option {}{}", key,
                       command ? "of section [" + section + "]"
                               : "that may stand at the top, before a section such as [optimize]",
                       suggestion("--" + key, option_names(options_of(program, command))))};

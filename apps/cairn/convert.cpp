@@ -56,8 +56,8 @@ Command add_convert(ArgumentParser program) {
   ArgumentParser cli =
       program.add_command("convert", "write a graph or its trajectory in another format");
   cli.add_option("in", options->input_file, kGraphHelp).type_name("IN").required();
-  cli.add_option("out", options->output_file,
-                 "file (packed if it ends in .gz; - is standard output)")
+  cli.add_option("-o,--output,out", options->output_file,
+                 "file, also as -o OUT (packed if it ends in .gz; - is standard output)")
       .type_name("OUT")
       .required();
   cli.add_option("--to", options->output_format, "format of OUT, instead of by the ending")

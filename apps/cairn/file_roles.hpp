@@ -8,7 +8,7 @@ namespace cairn::app {
 
 /// What the files of one run of the program are for, so that no output replaces another, and none
 /// an input by accident. Two names of one file are one file. "-",
-/// generated graphs and what is no regular file (such as /dev/null) are left alone.
+/// generated graphs and what is not a regular file (such as /dev/null) are left alone.
 class FileRoles {
  public:
   /// The graph that is worked on, whose place the `result` may take, as -o of `cairn optimize` may;

@@ -32,7 +32,7 @@ std::uint64_t take_seed(ComponentSpec& spec, const OptionTable& table) {
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), seed);
   if (error != std::errc() || end != text.data() + text.size()) {
     throw Error(ErrorCode::usage,
-                fmt::format("{}: seed is '{}', expected a whole number from 0", spec.name, text));
+                fmt::format("{}: seed is '{}', expected an integer from 0", spec.name, text));
   }
   spec.values.erase(given);
   return seed;

@@ -98,7 +98,7 @@ std::atomic<bool> memory_ran_out{false};
     }
     print_bug(error.what());
   } catch (...) {
-    print_bug("an exception that is no std::exception");
+    print_bug("an exception that is not a std::exception");
   }
   std::_Exit(kExitBug);
 }
@@ -137,7 +137,7 @@ int main(int argc, char** argv) {
     print_bug(error.what());
     leave(kExitBug);
   } catch (...) {
-    print_bug("an exception that is no std::exception");
+    print_bug("an exception that is not a std::exception");
     leave(kExitBug);
   }
 }

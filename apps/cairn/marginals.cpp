@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // cairn marginals GRAPH: how certain the estimate is.
-#include <charconv>
 #include <chrono>
 #include <cmath>
 #include <memory>
@@ -19,6 +18,7 @@
 #include "cairn/runtime/plugin_call.hpp"
 #include "cairn/runtime/threads.hpp"
 #include "cairn/runtime/timed.hpp"
+#include "cairn/typed/symbol.hpp"
 #include "commands.hpp"
 #include "covariances.hpp"
 #include "graph_files.hpp"
@@ -71,24 +71,24 @@ struct Answer {
 // What is asked for -----------------------------------------------------------------------------
 
 int variable_of(const std::string& text, const Graph& graph, const char* option) {
-  Id id = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), id);
-  if (error != std::errc() || end != text.data() + text.size()) {
-    throw Error(ErrorCode::usage, fmt::format("{}: '{}' is no id of a variable, which is a whole "
-                                              "number",
-                                              option, text));
+  const std::optional<Id> id = id_from_text(text);
+  if (!id) {
+    throw Error(ErrorCode::usage,
+                fmt::format("{}: '{}' is not an id of a variable; expected an integer, or a symbol "
+                            "such as x3",
+                            option, text));
   }
-  if (const std::optional<int> found = graph.find(id)) return *found;
+  if (const std::optional<int> found = graph.find(*id)) return *found;
   throw Error(
       ErrorCode::input,
-      fmt::format("{}: the graph has no variable {}; cairn info shows its ids", option, id));
+      fmt::format("{}: the graph has no variable {}; cairn info shows its ids", option, text));
 }
 
 std::pair<int, int> pair_of(const std::string& text, const Graph& graph) {
   const std::size_t colon = text.find(':');
   if (colon == std::string::npos) {
     throw Error(ErrorCode::usage,
-                fmt::format("--pairs: '{}' is no pair of ids; expected A:B,C:D", text));
+                fmt::format("--pairs: '{}' is not a pair of ids; expected A:B,C:D", text));
   }
   return {variable_of(text.substr(0, colon), graph, "--pairs"),
           variable_of(text.substr(colon + 1), graph, "--pairs")};
@@ -361,7 +361,7 @@ std::optional<Summary> optimize(Graph& graph, Optimizer* optimizer, const Margin
   if (summary.status == Status::interrupted) return summary;
   if (summary.status != Status::converged) {
     session.note(fmt::format(
-        "the optimisation ended as {}: covariances are of where it stopped, which is no minimum",
+        "the optimisation ended as {}: covariances are of where it stopped, which is not a minimum",
         to_string(summary.status)));
   }
   for (const std::string& note : notes_on_the_end(summary, options.problem.stop, graph))

@@ -35,7 +35,7 @@ void add_problem_options(ArgumentParser cli, ProblemOptions& options) {
       .type_name("NAME")
       .show_default();
   add_loss_options(cli, options);
-  cli.add_option("--iterations", options.stop.max_iterations, "largest number of iterations")
+  cli.add_option("--iterations", options.stop.max_iterations, "maximum number of iterations")
       .type_name("N")
       .within(0, 1000000000)
       .show_default();

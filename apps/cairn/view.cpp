@@ -33,7 +33,7 @@ void check_default(const std::string& page) {
     return;
   }
   throw Error(ErrorCode::usage,
-              fmt::format("{} is there and is no page of cairn; name another with -o", page));
+              fmt::format("{} is there and is not a page of cairn; name another with -o", page));
 }
 
 boost::json::object report_json(const Album& album, const std::string& page, std::size_t bytes) {

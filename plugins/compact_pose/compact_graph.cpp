@@ -63,8 +63,8 @@ Motion CompactGraph::fuse(std::span<const Factor> factors, Id from, Id to) const
     if (!factor.type) refuse("a measurement without a type");
     if (!factor.type->is_relative() ||
         factor.type->variable_tags().front() != motions.type().tag()) {
-      refuse(fmt::format("{} between {} and {} is no relative pose of {}", factor.type->tag(), from,
-                         to, motions.type().tag()));
+      refuse(fmt::format("{} between {} and {} is not a relative pose of {}", factor.type->tag(),
+                         from, to, motions.type().tag()));
     }
     const Motion motion = motions.of_factor(factor, from);
     all = all.mean.empty() ? motion : motions.fuse(all, motion);

@@ -48,7 +48,7 @@ Matrix sensor_covariance(const std::vector<double>& numbers, const RigidGroup& g
                             given, packed_size(n), group.motions().type().tag()));
   }
   if (given != 0 && !(S.allFinite() && Eigen::LLT<Matrix>(S).info() == Eigen::Success))
-    throw Error(ErrorCode::usage, "compact_pose: sensor is no positive definite covariance");
+    throw Error(ErrorCode::usage, "compact_pose: sensor is not a positive definite covariance");
   return S;
 }
 

@@ -18,7 +18,7 @@ std::vector<double> numbers(const std::string& text) {
     if (const auto [at, problem] = std::from_chars(word.data(), end, number);
         problem != std::errc{} || at != end) {
       throw Error(ErrorCode::usage, "compact_pose: sensor: '" + word +
-                                        "' is no number; expected numbers separated by spaces");
+                                        "' is not a number; expected numbers separated by spaces");
     }
     all.push_back(number);
   }

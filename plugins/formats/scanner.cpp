@@ -204,7 +204,7 @@ void Scanner::fail_number(std::string_view field) const {
 void Scanner::fail_whole(std::string_view field, std::string_view what,
                          std::int64_t largest) const {
   if (count_fields() != layout_.total() && layout_.total() > 0) fail_count();
-  fail(fmt::format("field {} of {} is '{}'; expected {}, a whole number from 0 to {}", read_,
+  fail(fmt::format("field {} of {} is '{}'; expected {}, an integer from 0 to {}", read_,
                    shown(subject_), shown(field), what, largest));
 }
 

@@ -46,7 +46,7 @@ class Scanner {
   void expect_row(Layout layout, std::string_view what);
 
   Id read_id();
-  /// How many of something: a whole number from 0 to 2³¹ − 1.
+  /// How many of something: an integer from 0 to 2³¹ − 1.
   std::int64_t read_count();
   double read_number();
   void read_numbers(std::span<double> out);

@@ -21,7 +21,7 @@
 namespace cairn::formats {
 namespace {
 
-/// A stamp that can be an id: a whole number from 0 that a double holds exactly.
+/// A stamp that can be an id: an integer from 0 that a double holds exactly.
 bool is_whole(double stamp) {
   return stamp >= 0.0 && stamp <= 9007199254740992.0 && stamp == std::floor(stamp);
 }
@@ -35,7 +35,7 @@ bool is_rotation(const Eigen::Matrix3d& R) {
          R.determinant() > 0.0;
 }
 
-/// Ids from stamps: the stamps themselves if all are whole numbers, else row numbers. Either way
+/// Ids from stamps: the stamps themselves if all are integers, else row numbers. Either way
 /// the ids rise with the stamps.
 void set_ids_from_stamps(Draft& draft, const std::vector<double>& stamps) {
   bool whole = true;
@@ -49,8 +49,7 @@ void set_ids_from_stamps(Draft& draft, const std::vector<double>& stamps) {
     rows[row].id = whole ? static_cast<Id>(stamps[row]) : static_cast<Id>(row);
   }
   if (!whole) {
-    draft.report().notes.push_back(
-        "the stamps are not whole numbers: ids are the row numbers from 0");
+    draft.report().notes.push_back("the stamps are not integers: ids are the row numbers from 0");
   }
 }
 

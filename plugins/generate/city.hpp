@@ -38,7 +38,7 @@ struct CityOptions {
         .real("loop_density", &O::loop_density, 0.0, 1.0,
               "probability that a place within reach is recognised")
         .integer("loops_per_pose", &O::loops_per_pose, 0, 1000,
-                 "largest number of loops that a pose closes")
+                 "maximum number of loops that a pose closes")
         .part(&O::noise)
         .integer("outliers", &O::outliers, 0, 1e9, kOutlierHelp);
   }

@@ -285,8 +285,8 @@ class Chordal final : public InitialGuess {
     }
     const std::int64_t others = graph.factor_count() - relative;
     if (others > 0) {
-      notes.push_back(counted(others, "factor that is no relative pose was",
-                              "factors that are no relative poses were") +
+      notes.push_back(counted(others, "factor that is not a relative pose was",
+                              "factors that are not relative poses were") +
                       " not used for orientations");
     }
     placing.spread();

@@ -71,7 +71,7 @@ struct IncrementalOptions {
     return OptionFields<O>()
         .integer("step", &O::step, 0, 1e9,
                  "poses between two optimisations; 0: 2 % of all, at least 100")
-        .integer("iterations", &O::iterations, 1, 1e6, "largest number of iterations of each")
+        .integer("iterations", &O::iterations, 1, 1e6, "maximum number of iterations of each")
         .component<Optimizer>("optimizer", &O::optimizer,
                               "the optimizer of the part of the graph added so far");
   }
@@ -91,7 +91,7 @@ struct AutomaticOptions {
         .component<LinearSolver>("linear_solver", &O::linear_solver, "of the chordal relaxation")
         .component<Optimizer>("optimizer", &O::optimizer,
                               "tries a start whose chi2 is implausible, and is that of incremental")
-        .integer("iterations", &O::iterations, 1, 1e6, "largest number of iterations of the trial");
+        .integer("iterations", &O::iterations, 1, 1e6, "maximum number of iterations of the trial");
   }
 };
 

@@ -10,7 +10,7 @@ namespace cairn::plot {
 struct Range {
   double low = 0, high = 1;
   bool logarithmic = false;
-  bool whole = false;  ///< only whole numbers have a meaning, such as those of iterations
+  bool whole = false;  ///< only integers have a meaning, such as those of iterations
 
   /// 0 at low, 1 at high.
   double part(double value) const;

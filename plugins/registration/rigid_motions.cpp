@@ -44,7 +44,7 @@ const VariableType& pose_type(const VariableType& type) {
   throw Error(
       ErrorCode::usage,
       "registration: " + std::string(type.tag()) +
-          " is no pose whose relative poses can be simulated: its type must have the abilities "
+          " is not a pose whose relative poses can be simulated: its type must have the abilities "
           "LieGroup and Placement, with an orientation, as VERTEX_SE2 has");
 }
 

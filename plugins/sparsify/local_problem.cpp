@@ -23,7 +23,7 @@ constexpr double kSettled = 1e-9;
 /// Why a node cannot leave because of itself or a neighbour; empty: it can.
 std::string refuse(const Graph& graph, int leaving, int node) {
   if (!graph.type(leaving).lie_group()) {
-    return fmt::format("{} is no pose of a Lie group, and new factors relate only such",
+    return fmt::format("{} is not a pose of a Lie group, and new factors relate only such",
                        graph.describe_variable(leaving));
   }
   if (graph.type(node).tag() == graph.type(leaving).tag()) return {};

@@ -25,7 +25,7 @@ TEST(ConvertCommand, PacksAndUnpacksByTheEnding) {
   const std::string packed = folder.file("graph.g2o.gz"), plain = folder.file("graph.g2o");
   ASSERT_EQ(cairn({"generate", "ring", "-o", packed}).exit_code, 0);
   EXPECT_EQ(read_text(packed).substr(0, 2), "\x1f\x8b");
-  ASSERT_EQ(cairn({"convert", packed, plain}).exit_code, 0);
+  ASSERT_EQ(cairn({"convert", packed, "-o", plain}).exit_code, 0);
   EXPECT_THAT(read_text(plain), HasSubstr("VERTEX_SE2 0 "));
 }
 

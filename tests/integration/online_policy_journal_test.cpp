@@ -94,8 +94,9 @@ TEST_F(OnlinePolicy, TheEndIsNotInTheJournal) {
       online(kPolicy, {"--output", "none", "--journal", folder_.file("log")});
   Lines told = square();
   told.push_back("QUIT");
-  EXPECT_THAT(lines(cairn(arguments, {}, joined(told)).out).back(),
-              StartsWith("OK 10 variables 5"));
+  const Lines answers = lines(cairn(arguments, {}, joined(told)).out);
+  ASSERT_FALSE(answers.empty());
+  EXPECT_THAT(answers.back(), StartsWith("OK 10 variables 5"));
   EXPECT_THAT(lines(cairn(arguments, {}, "EDGE_SE2 0 4" + kHere + "\nDONE\n").out),
               ElementsAre("RESTORED 9 variables 4 factors 3", StartsWith("LINKED 0 4 "), "KEPT 4",
                           "OK 11 variables 5 factors 5 owed 0"));

@@ -230,7 +230,7 @@ TEST_F(OnlinePolicy, SaysWhatIsWrongAndWhatWasExpected) {
   EXPECT_EQ(error(two, "NEW VERTEX_SE3:QUAT 1"),
             "VERTEX_SE3:QUAT 1: the poses before it are VERTEX_SE2; expected another");
   EXPECT_EQ(error(two, "NEW VERTEX_TRACKXYZ 1"),
-            "VERTEX_TRACKXYZ 1 is no pose; with a policy a robot's poses alone can come");
+            "VERTEX_TRACKXYZ 1 is not a pose; with a policy a robot's poses alone can come");
   EXPECT_EQ(
       error(two, "EDGE_SE2 0 9" + kStep),
       "between 0 and 9; expected a relative pose between pose 1, which is the newest, and another");

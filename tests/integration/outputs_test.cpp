@@ -62,7 +62,7 @@ TEST_F(Outputs, NoneReplacesAnotherOrWhatIsRead) {
     EXPECT_EQ(read_text(file), before);
     EXPECT_FALSE(std::filesystem::exists(same));
   }
-  // What is no regular file may be named as often as one likes, and a graph may be replaced.
+  // What is not a regular file may be named as often as one likes, and a graph may be replaced.
   EXPECT_EQ(cairn({"optimize", file, "--json", "/dev/null", "--record", "/dev/null"}).exit_code, 0);
   EXPECT_EQ(cairn({"optimize", file, "-o", file}).exit_code, 0);
   EXPECT_NE(read_text(file), before);

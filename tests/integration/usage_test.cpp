@@ -92,11 +92,11 @@ TEST(Usage, MissingAndSurplusAndMalformedArgumentsAreRefused) {
                "--output OUT is missing; usage: cairn generate [OPTIONS] KIND[:k=v] -o OUT");
   expect_error(cairn({"info", "a.g2o", "b.g2o"}), kUsage, "'b.g2o' is one argument too many");
   expect_error(cairn({"optimize", "@ring", "--iterations", "many"}), kUsage,
-               "--iterations: 'many' is no whole number from 0 to 1000000000");
+               "--iterations: 'many' is not an integer from 0 to 1000000000");
   expect_error(cairn({"generate", "ring", "-o", "x.g2o", "--seed", "abc"}), kUsage,
-               "--seed: 'abc' is no whole number from 0");
+               "--seed: 'abc' is not an integer from 0");
   expect_error(cairn({"optimize", "@ring", "--covariance", "all"}), kUsage,
-               "--covariance: 'all' is none of blocks, none");
+               "--covariance: 'all' is not one of blocks, none");
   expect_error(cairn({"optimize", "@ring", "--json"}), kUsage, "--json needs a value: --json FILE");
   expect_error(cairn({"optimize", "@ring", "--iterations=-1"}), kUsage, "-1");
   expect_error(cairn({"optimize", "@ring", "--tolerance", "2"}), kUsage, "--tolerance");
@@ -282,7 +282,7 @@ TEST(Usage, AnExceptionInAPluginNamesThePluginsPart) {
     expect_error(outcome, kPlugin, std::string("failed: the solver broke in ") + where);
     EXPECT_THAT(outcome.err, HasSubstr("with linear solver 'fragile:in="));
   }
-  expect_error(with("number"), kPlugin, "threw what is no std::exception");
+  expect_error(with("number"), kPlugin, "threw what is not a std::exception");
   expect_error(cairn({"marginals", "@ring:poses=30", "--quiet", "--plugin", solver, "--optimizer",
                       "dogleg:linear_solver=fragile"}),
                kPlugin, "optimizer 'dogleg:linear_solver=fragile' failed: the solver broke");

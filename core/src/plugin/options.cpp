@@ -27,7 +27,7 @@ std::string expectation(const OptionSpec& spec) {
     case OptionType::boolean:
       return "true or false";
     case OptionType::integer:
-      return "a whole number, " + range_text(spec);
+      return "an integer, " + range_text(spec);
     case OptionType::real:
       return "a number, " + range_text(spec);
     case OptionType::choice:
@@ -247,7 +247,7 @@ ComponentSpec parse_component(std::string_view text) {
 
 std::string to_text(const ComponentSpec& spec) {
   if (spec.name.empty() || spec.name.find(':') != std::string::npos)
-    throw Error(ErrorCode::usage, fmt::format("'{}' is no name of a component", spec.name));
+    throw Error(ErrorCode::usage, fmt::format("'{}' is not a name of a component", spec.name));
   std::string text = spec.name;
   char before = ':';
   for (const auto& [name, value] : spec.values) {

@@ -131,7 +131,7 @@ Sidecar read_sidecar(const fs::path& file) {
         fmt::format("{}: {}; build the plugin again, or remove the file", file.string(), why));
   };
   std::error_code unknown;
-  if (!fs::is_regular_file(file, unknown)) throw broken("is no regular file");
+  if (!fs::is_regular_file(file, unknown)) throw broken("is not a regular file");
   if (fs::file_size(file, unknown) > kLargestSidecar) throw broken("has more than 1 MB");
   std::ifstream stream(file, std::ios::binary);
   const std::string text(std::istreambuf_iterator<char>(stream), {});

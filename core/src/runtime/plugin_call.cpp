@@ -18,7 +18,7 @@ void rethrow_as_plugin_error(const std::string& component) {
   } catch (const std::exception& error) {
     throw Error(ErrorCode::plugin, component + " failed: " + error.what());
   } catch (...) {
-    throw Error(ErrorCode::plugin, component + " failed: it threw what is no std::exception");
+    throw Error(ErrorCode::plugin, component + " failed: it threw what is not a std::exception");
   }
 }
 

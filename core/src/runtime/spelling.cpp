@@ -36,6 +36,20 @@ int edit_distance(std::string_view a, std::string_view b) {
   return last[b.size()];
 }
 
+/// "lm" of levenberg_marquardt, "cholesky" of block_cholesky, "solver" of linear-solver.
+bool abbreviates(std::string_view word, std::string_view candidate) {
+  const auto parts = [](char c) { return c == '_' || c == '-'; };
+  std::string initials;
+  bool begins = true;
+  for (const char c : candidate) {
+    if (begins && !parts(c)) initials += c;
+    begins = parts(c);
+  }
+  while (word.starts_with('-')) word.remove_prefix(1);
+  return word.size() > 1 &&
+         (word == initials || (word.size() > 3 && candidate.find(word) != std::string_view::npos));
+}
+
 }  // namespace
 
 std::string nearest_spelling(std::string_view word, std::span<const std::string> candidates) {
@@ -49,7 +63,10 @@ std::string nearest_spelling(std::string_view word, std::span<const std::string>
       best = candidate;
     }
   }
-  return best;
+  if (!best.empty()) return best;
+  const auto meant = std::ranges::find_if(
+      candidates, [&](const std::string& candidate) { return abbreviates(word, candidate); });
+  return meant == candidates.end() ? "" : *meant;
 }
 
 std::string what_is_on_offer(std::string_view word, std::span<const std::string> candidates) {

@@ -26,8 +26,9 @@ std::vector<std::vector<double>> moved_truth(const Graph& estimate, const Graph&
   for (int v = 0; v < estimate.variable_count(); ++v) {
     const VariableType& type = estimate.type(v);
     if (!is_pose(type) || type.tag() != estimate.type(0).tag()) {
-      throw Error(ErrorCode::usage, "no normalised error: " + estimate.describe_variable(v) +
-                                        " is no pose of a Lie group, or of another than the first");
+      throw Error(ErrorCode::usage,
+                  "no normalised error: " + estimate.describe_variable(v) +
+                      " is not a pose of a Lie group, or of another than the first");
     }
     const auto other = truth.find(estimate.id(v));
     if (!other || truth.type(*other).tag() != type.tag()) {

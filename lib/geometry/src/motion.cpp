@@ -297,7 +297,7 @@ Motion MotionGroup::of_factor(const Factor& factor, Id from) const {
                fmt::format("{} {}", factor.type->tag(), fmt::join(factor.variables, " ")));
   if (from == on[0]) return motion;
   if (from == on[1]) return inverse(motion);
-  throw bad_call(fmt::format("{} {} {} is no motion from variable {}, which is not on it",
+  throw bad_call(fmt::format("{} {} {} is not a motion from variable {}, which is not on it",
                              factor.type->tag(), on[0], on[1], from));
 }
 

@@ -112,12 +112,12 @@ void Journal::load(const std::string& identity) {
     // Nothing, or a first line that was being written.
     const std::string_view magic = chained_ ? kMagic : kUnchainedMagic;
     if (magic.substr(0, bytes.size()) != header.substr(0, magic.size()))
-      throw Error(ErrorCode::input, fmt::format("{}: this is no journal", file_.string()));
+      throw Error(ErrorCode::input, fmt::format("{}: this is not a journal", file_.string()));
     chained_ = true;
     return begin(identity);
   }
   if (chained_ && !header.starts_with(kMagic))
-    throw Error(ErrorCode::input, fmt::format("{}: this is no journal", file_.string()));
+    throw Error(ErrorCode::input, fmt::format("{}: this is not a journal", file_.string()));
   const auto owner = unsealed(header.substr(kMagic.size()));
   if (!owner)
     throw Error(ErrorCode::input, fmt::format("{}: the first line is damaged", file_.string()));

@@ -85,13 +85,13 @@ Error LineSession::bad_line(const std::string& message) { return {ErrorCode::inp
 
 std::int64_t LineSession::parse_whole(std::string_view word, std::string_view what) {
   const std::optional<std::int64_t> number = number_of<std::int64_t>(word);
-  if (!number) throw bad_line(fmt::format("'{}' is no {}", word, what));
+  if (!number) throw bad_line(fmt::format("'{}' is not a valid {}", word, what));
   return *number;
 }
 
 double LineSession::parse_real(std::string_view word, std::string_view what) {
   const std::optional<double> number = number_of<double>(word);
-  if (!number) throw bad_line(fmt::format("'{}' is no {}", word, what));
+  if (!number) throw bad_line(fmt::format("'{}' is not a valid {}", word, what));
   return *number;
 }
 
@@ -126,14 +126,15 @@ Variable LineSession::declared_variable(const Words& words, Registry& registry) 
                                fmt::join(registry.names("variable"), ", ")));
   }
   const Id id = parse_whole(words[2], "id");
-  if (id < 0) throw bad_line(fmt::format("'{}' is no id; expected a whole number from 0", id));
+  if (id < 0) throw bad_line(fmt::format("'{}' is not an id; expected an integer from 0", id));
   return {registry.variable_type(words[1]), id, {}, false};
 }
 
 std::string LineSession::chi2_line(Estimator& estimator) {
   const double chi2 = estimator.chi2();
   if (!std::isfinite(chi2))
-    throw Error(ErrorCode::numerical, "chi2 is not finite: a residual overflows, or is no number");
+    throw Error(ErrorCode::numerical,
+                "chi2 is not finite: a residual overflows, or is not a number");
   return fmt::format("CHI2 {}\n", chi2);
 }
 

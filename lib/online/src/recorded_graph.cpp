@@ -117,7 +117,7 @@ void check_poses(const Graph& graph) {
     const VariableType& type = graph.type(v);
     if (!is_pose(type)) {
       throw bad_input(
-          fmt::format("{} is no pose of a Lie group, and this takes pose graphs only: a robot's "
+          fmt::format("{} is not a pose of a Lie group, and this takes pose graphs only: a robot's "
                       "poses and relative poses between them, without landmarks",
                       graph.describe_variable(v)));
     }

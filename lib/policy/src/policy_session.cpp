@@ -105,7 +105,7 @@ void PolicySession::take_data(std::string_view text, Reply& reply) {
 void PolicySession::take_pose(Variable pose, Reply& reply) {
   const std::string name = fmt::format("{} {}", pose.type->tag(), pose.id);
   if (!is_pose(*pose.type))
-    throw bad_line(name + " is no pose; with a policy a robot's poses alone can come");
+    throw bad_line(name + " is not a pose; with a policy a robot's poses alone can come");
   if (motions_ && motions_->type().tag() != pose.type->tag()) {
     throw bad_line(fmt::format("{}: the poses before it are {}; expected another", name,
                                motions_->type().tag()));
@@ -175,7 +175,7 @@ Id PolicySession::other_end(std::span<const Id> ends) const {
 void PolicySession::check_motion(const Factor& factor, Id from) const {
   const FactorType& type = *factor.type;
   if (!type.is_relative() || type.variable_tags().front() != motions_->type().tag()) {
-    throw bad_line(fmt::format("{} is no relative pose of {}, and a policy takes nothing else",
+    throw bad_line(fmt::format("{} is not a relative pose of {}, and a policy takes nothing else",
                                type.tag(), motions_->type().tag()));
   }
   (void)motions_->of_factor(factor, from);

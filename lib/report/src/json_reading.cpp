@@ -54,8 +54,7 @@ std::int64_t JsonReader::whole(const char* member, std::int64_t otherwise, std::
   const double value = number(member, static_cast<double>(otherwise));
   if (!(value >= static_cast<double>(low) && value <= static_cast<double>(high)) ||
       value != std::floor(value)) {
-    fail(
-        fmt::format("'{}' is {}, expected a whole number from {} to {}", member, value, low, high));
+    fail(fmt::format("'{}' is {}, expected an integer from {} to {}", member, value, low, high));
   }
   return static_cast<std::int64_t>(value);
 }
@@ -135,7 +134,7 @@ std::vector<std::int32_t> JsonReader::indices(const char* member, std::int64_t h
   for (const json::value& item : value->get_array()) {
     const double number = number_of(item);
     if (!(number >= 0 && number <= static_cast<double>(high)) || number != std::floor(number)) {
-      fail(fmt::format("'{}' holds what is not a whole number from 0 to {}", member, high));
+      fail(fmt::format("'{}' holds what is not an integer from 0 to {}", member, high));
     }
     all.push_back(static_cast<std::int32_t>(number));
   }

@@ -34,7 +34,7 @@ class JsonReader {
   /// A list of numbers or a packed array of `count` of them.
   std::vector<double> numbers(const char* member, std::size_t count) const;
 
-  /// A list of whole numbers from 0 to `high`, however many there are.
+  /// A list of integers from 0 to `high`, however many there are.
   std::vector<std::int32_t> indices(const char* member, std::int64_t high) const;
 
   /// The object as JSON text.

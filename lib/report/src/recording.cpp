@@ -216,7 +216,7 @@ bool is_recording(std::string_view head) { return head.starts_with(kOpening); }
 Scene read_recording(std::string_view text, const std::string& name) {
   if (!is_recording(text)) {
     throw Error(ErrorCode::input,
-                fmt::format("{}: is no recording, as RecordingWriter writes it", name));
+                fmt::format("{}: is not a recording, as RecordingWriter writes it", name));
   }
   Scene scene;
   std::unique_ptr<FrameReader> frames;

@@ -84,7 +84,7 @@ std::string notes_json(const std::vector<std::string>& notes) {
 Status status_of(const std::string& name, const JsonReader& json) {
   const auto* const found = std::find_if(kStatuses.begin(), kStatuses.end(),
                                          [&](Status status) { return to_string(status) == name; });
-  if (found == kStatuses.end()) json.fail(fmt::format("'{}' is no status of a run", name));
+  if (found == kStatuses.end()) json.fail(fmt::format("'{}' is not a status of a run", name));
   return *found;
 }
 
@@ -210,7 +210,7 @@ std::string run_json(const SceneRun& run) {
 
 SceneRun read_run(std::string_view text, std::string_view where) {
   const JsonReader json(text, where);
-  if (!json.has("iterations") || !json.has("chi2")) json.fail("is no report of cairn optimize");
+  if (!json.has("iterations") || !json.has("chi2")) json.fail("is not a report of cairn optimize");
   SceneRun run;
   run.name = json.text("name");
   run.threads = static_cast<int>(json.whole("threads", 0, 0, kMost));

@@ -36,7 +36,7 @@ struct BatchOptions {
         .component<LinearSolver>("linear_solver", &O::linear_solver,
                                  "solves the normal equations, and for covariances")
         .integer("iterations", &O::iterations, 1, 1e9,
-                 "largest number of iterations of a batch step")
+                 "maximum number of iterations of a batch step")
         .real("tolerance", &O::tolerance, 0.0, 1.0,
               "a batch step ends when chi2 falls by less than this fraction; 0: exactly that many "
               "iterations");

@@ -52,7 +52,7 @@ struct IncrementalCholeskyOptions {
             "significance", &Settings::significance, 0.0, 1e300,
             "a step that lowers chi2 by less than this, and than the accuracy allows, is deferred")
         .integer("iterations", &Settings::iterations, 1, 1e9,
-                 "largest number of linear systems solved per update")
+                 "maximum number of linear systems solved per update")
         .integer("recent", &Settings::recent, 0, 1e9,
                  "variables touched in so many updates, and near them, are ordered last");
   }

@@ -18,7 +18,7 @@ struct LapackOptions {
   static auto fields() {
     return OptionFields<LapackOptions>().integer(
         "max_size", &LapackOptions::max_size, 1, 46000,
-        "largest number of scalar unknowns: a dense matrix of 8000 takes 0.5 GB");
+        "maximum number of scalar unknowns: a dense matrix of 8000 takes 0.5 GB");
   }
 };
 

@@ -274,10 +274,10 @@ TEST_F(PluginBoundary, ASidecarThatIsNoFileIsAProblemAndNoMore) {
   fs::create_symlink("/dev/zero", folder() / "zero.json");
   write("large.json", std::string(2 << 20, ' '));
   cairn::Registry registry(search_in({folder()}));
-  EXPECT_THAT(messages(registry), ElementsAre(HasSubstr("fifo.json: is no regular file"),
-                                              HasSubstr("folder.json: is no regular file"),
+  EXPECT_THAT(messages(registry), ElementsAre(HasSubstr("fifo.json: is not a regular file"),
+                                              HasSubstr("folder.json: is not a regular file"),
                                               HasSubstr("large.json: has more than 1 MB"),
-                                              HasSubstr("zero.json: is no regular file")));
+                                              HasSubstr("zero.json: is not a regular file")));
   EXPECT_NE(registry.make<cairn::Loss>("plain"), nullptr);
 }
 

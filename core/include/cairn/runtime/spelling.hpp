@@ -9,8 +9,8 @@
 
 namespace cairn {
 
-/// The candidate nearest to `word` by edit distance (insert, delete, replace, swap), or an empty
-/// string if none is near enough to be what was meant.
+/// The candidate nearest to `word` by edit distance (insert, delete, replace, swap), else the
+/// first that `word` is a part of or has the initials of, or an empty string if there is none.
 CAIRN_API std::string nearest_spelling(std::string_view word,
                                        std::span<const std::string> candidates);
 

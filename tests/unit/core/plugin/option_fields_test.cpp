@@ -184,7 +184,7 @@ TEST(OptionFields, AComponentWithTwoOptionsFitsASpecButNotItsText) {
       refusal([&] { to_text("outer", basket); }),
       "outer: option 'crate' is 'basket:grams=3,handles=1'; the form name:key=value,key=value "
       "cannot hold a value with a comma");
-  EXPECT_THAT(refusal([] { to_text("a:b", Basket{}); }), HasSubstr("'a:b' is no name"));
+  EXPECT_THAT(refusal([] { to_text("a:b", Basket{}); }), HasSubstr("'a:b' is not a name"));
 }
 
 TEST(OptionFields, WhatIsWrongIsRefusedAsByATable) {
@@ -192,7 +192,7 @@ TEST(OptionFields, WhatIsWrongIsRefusedAsByATable) {
     return refusal([&] { from_values<Basket>(values, "basket"); });
   };
   EXPECT_EQ(refused({{"handles", "5"}}),
-            "basket: option 'handles' is '5', expected a whole number, -4 to 4");
+            "basket: option 'handles' is '5', expected an integer, -4 to 4");
   EXPECT_EQ(refused({{"tolerance", "-1"}}),
             "basket: option 'tolerance' is '-1', expected a number, 0 to 1");
   EXPECT_EQ(refused({{"lid", "perhaps"}}),
@@ -206,7 +206,7 @@ TEST(OptionFields, WhatIsWrongIsRefusedAsByATable) {
   EXPECT_EQ(refused({{"weights", "nonsense"}}), "basket: weights: no numbers");
   // A struct can hold what its ranges do not allow; the options made of it are checked like others.
   EXPECT_EQ(refused(to_spec("basket", Basket{.handles = 9}).values),
-            "basket: option 'handles' is '9', expected a whole number, -4 to 4");
+            "basket: option 'handles' is '9', expected an integer, -4 to 4");
 }
 
 TEST(OptionFields, DeclarationsThatCannotBeRightAreProgrammingErrors) {

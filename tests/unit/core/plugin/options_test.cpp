@@ -17,7 +17,7 @@ using ::testing::HasSubstr;
 OptionTable table() {
   OptionTable t;
   t.boolean("verbose", false, "say more")
-      .integer("iterations", 100, 1, 1000, "largest number of iterations")
+      .integer("iterations", 100, 1, 1000, "maximum number of iterations")
       .real("lambda", 1e-3, 0.0, std::numeric_limits<double>::infinity(), "first damping")
       .choice("ordering", "amd", {"amd", "natural"}, "fill-reducing ordering")
       .component("linear_solver", "linear_solver", "block_cholesky", "solver of the step");
@@ -83,7 +83,7 @@ TEST(Options, RefuseWhatIsNotOfTheTypeOrOutOfRange) {
   EXPECT_THAT(refusal([] {
                 Options(table(), {{"iterations", "0"}}, "lm");
               }),
-              HasSubstr("a whole number, 1 to 1000"));
+              HasSubstr("an integer, 1 to 1000"));
 }
 
 TEST(Options, AskingForWhatWasNotDeclaredIsAProgrammingError) {
@@ -116,8 +116,8 @@ TEST(ComponentSpec, AListKeepsOptionsWithTheirComponent) {
 
 TEST(OptionTable, HelpNamesEveryOptionAndItsRange) {
   const std::string help = table().help();
-  EXPECT_THAT(
-      help, HasSubstr("iterations=100  largest number of iterations (a whole number, 1 to 1000)"));
+  EXPECT_THAT(help,
+              HasSubstr("iterations=100  maximum number of iterations (an integer, 1 to 1000)"));
   EXPECT_THAT(help, HasSubstr("ordering=amd  fill-reducing ordering (one of amd, natural)"));
 }
 

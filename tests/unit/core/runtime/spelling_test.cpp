@@ -16,6 +16,16 @@ TEST(Spelling, FindsTheNearestName) {
   EXPECT_EQ(nearest_spelling("Block-Cholesky", kNames), "block_cholesky");
 }
 
+TEST(Spelling, KnowsInitialsAndParts) {
+  const std::vector<std::string> optimizers{"ceres", "gauss_newton", "levenberg_marquardt"};
+  EXPECT_EQ(nearest_spelling("lm", optimizers), "levenberg_marquardt");
+  EXPECT_EQ(nearest_spelling("gn", optimizers), "gauss_newton");
+  EXPECT_EQ(nearest_spelling("newton", optimizers), "gauss_newton");
+  EXPECT_EQ(nearest_spelling("cholesky", kNames), "block_cholesky");
+  EXPECT_EQ(nearest_spelling("--solver", std::vector<std::string>{"--to", "--linear-solver"}),
+            "--linear-solver");
+}
+
 TEST(Spelling, DoesNotGuessWildly) { EXPECT_EQ(nearest_spelling("mumps", kNames), ""); }
 
 TEST(Spelling, DoesNotCompareWhatIsLongerThanAnyName) {

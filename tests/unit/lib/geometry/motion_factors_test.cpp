@@ -204,7 +204,7 @@ TEST_F(FactorOfTheCore, IsRefusedUnlessItIsAMotionOfThatGroup) {
                       [&] {
                         group_.of_factor({types_.relative_pose, {4, 7}, z, unit_}, 5);
                       }),
-              HasSubstr("EDGE_SE2 4 7 is no motion from variable 5"));
+              HasSubstr("EDGE_SE2 4 7 is not a motion from variable 5"));
 }
 
 TEST_F(FactorOfTheCore, IsRefusedWithNumbersThatNoGraphWouldTake) {

@@ -203,9 +203,9 @@ TEST_F(JournalTest, RefusesWhatBelongsToAnother) {
   EXPECT_THAT(refusal([&] { Journal(file_, "ship", Journal::Sync::batch); }, ErrorCode::usage),
               HasSubstr("belongs to 'robot', and this is 'ship'"));
   write("VERTEX_SE2 0 0 0 0\n");
-  EXPECT_THAT(refusal([&] { records(); }, ErrorCode::input), HasSubstr("no journal"));
+  EXPECT_THAT(refusal([&] { records(); }, ErrorCode::input), HasSubstr("not a journal"));
   write("VERTEX");
-  EXPECT_THAT(refusal([&] { records(); }, ErrorCode::input), HasSubstr("no journal"));
+  EXPECT_THAT(refusal([&] { records(); }, ErrorCode::input), HasSubstr("not a journal"));
 }
 
 TEST_F(JournalTest, IsForOneAtATime) {

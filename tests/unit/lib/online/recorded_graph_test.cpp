@@ -171,12 +171,13 @@ TEST_F(PoseChain, NamesTheGapInItsOdometry) {
 TEST_F(PoseChain, RefusesLandmarks) {
   pose(1);
   graph_.add_variable(types_.point, 9, std::array{0.0, 0.0});
-  EXPECT_THAT(refusal(), AllOf(HasSubstr("VERTEX_XY 9 is no pose"), HasSubstr("pose graphs only")));
+  EXPECT_THAT(refusal(),
+              AllOf(HasSubstr("VERTEX_XY 9 is not a pose"), HasSubstr("pose graphs only")));
 }
 
 TEST_F(PoseChain, RefusesWhatFormsNoGroup) {
   graph_.add_variable(define_variable<test::ScaledPose>(), 4, std::array{0.0, 0.0, 0.0, 0.0});
-  EXPECT_THAT(refusal(), HasSubstr("VERTEX_SCALED 4 is no pose of a Lie group"));
+  EXPECT_THAT(refusal(), HasSubstr("VERTEX_SCALED 4 is not a pose of a Lie group"));
 }
 
 TEST_F(PoseChain, RefusesPosesOfTwoTypes) {

@@ -63,7 +63,7 @@ TEST(ReadReport, AComparisonKeepsItsTextAndNamesItsGraphs) {
 
 TEST(ReadReport, RefusesWhatIsNoReport) {
   EXPECT_THAT(refusal("{\"command\": "), HasSubstr("r.json: begins like JSON but is not"));
-  EXPECT_THAT(refusal("{}"), HasSubstr("is no report of cairn optimize"));
+  EXPECT_THAT(refusal("{}"), HasSubstr("is not a report of cairn optimize"));
   EXPECT_THAT(refusal(R"({"chi2": {}, "iterations": [], "covariance": {"blocks": [{"id": "x"}]}})"),
               HasSubstr("member 'covariance' is not as cairn optimize writes it"));
   for (const char* blocks : {"[{\"id\": 1}]", "1", "[1]", "[{\"id\": 1, \"covariance\": 2}]"}) {

@@ -36,6 +36,11 @@ TEST(Symbols, PrintAsTheyAreRead) {
   EXPECT_EQ(id_text(X(12)), "x12");
   EXPECT_EQ(id_text(12), "12");
   EXPECT_EQ(id_text(-3), "-3");
+  for (const Id id : {X(12), L(0), X((Id{1} << 45) - 1), Id{12}, Id{0}, Id{-3}})
+    EXPECT_EQ(id_from_text(id_text(id)), id);
+  for (const char* text :
+       {"", "x", "-", "x-1", "12x", "x1.5", "xx1", " 1", "x35184372088832", "9223372036854775808"})
+    EXPECT_EQ(id_from_text(text), std::nullopt) << text;
 }
 
 TEST(Symbols, RefuseOtherLettersAndIndices) {

@@ -41,7 +41,7 @@ TEST_P(BadLineTest, IsRefusedWithWindowsLineEndsAndWithoutAnEnd) {
 
 const std::string kEdgeExpected =
     "expected 11 fields (2 ids, 3 numbers of the measurement, 6 of the information)";
-const std::string kIdExpected = "expected an id, a whole number from 0 to 9223372036854775807";
+const std::string kIdExpected = "expected an id, an integer from 0 to 9223372036854775807";
 
 INSTANTIATE_TEST_SUITE_P(
     G2o, BadLineTest,

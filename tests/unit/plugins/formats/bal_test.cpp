@@ -82,7 +82,7 @@ TEST(Bal, NamesTheLineOfWhatIsWrong) {
             "ids)");
   EXPECT_THAT(refusal("bal", "2 -2 3\n"), HasSubstr("file:1: field 2 of the header"));
   EXPECT_THAT(refusal("bal", "2 4294967296 3\n"),
-              HasSubstr("expected a count, a whole number from 0 to 2147483647"));
+              HasSubstr("expected a count, an integer from 0 to 2147483647"));
   EXPECT_EQ(refusal("bal", kHeader + "2 0 1 1\n"),
             "file:2: an observation of camera 2; expected one of 0 to 1, by the header");
   EXPECT_EQ(refusal("bal", kHeader + "0 2 1 1\n"),

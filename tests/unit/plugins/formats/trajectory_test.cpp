@@ -31,7 +31,7 @@ TEST(Trajectory, OtherTumStampsGiveRowNumbersAsIds) {
   EXPECT_EQ(r.graph.id(0), 0);
   EXPECT_EQ(r.graph.id(1), 1);
   EXPECT_THAT(r.report.notes,
-              ElementsAre("the stamps are not whole numbers: ids are the row numbers from 0"));
+              ElementsAre("the stamps are not integers: ids are the row numbers from 0"));
 }
 
 TEST(Trajectory, TumStampsAreReportedByRisingId) {

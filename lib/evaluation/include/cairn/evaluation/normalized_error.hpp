@@ -20,7 +20,7 @@ struct NormalizedError {
 /// under its loss (Σ = H⁻¹). The truth is moved so that the first pose agrees, which is constant,
 /// as are those that are fixed. Variables are matched by id. A mean over many runs above `dof`
 /// means that the estimate is overconfident, below that it is conservative. Throws `Error` (input)
-/// if a variable has no true state, (usage) if it is no pose of a Lie group.
+/// if a variable has no true state, (usage) if it is not a pose of a Lie group.
 CAIRN_API NormalizedError normalized_error(const Graph& estimate, const Graph& truth);
 
 /// The absolute trajectory error predicted by an estimate's covariance [m]: the root mean square of

@@ -16,7 +16,7 @@ namespace cairn {
 /// Whether a variable of this type has a position in the plane or in space: a pose or a point.
 inline bool has_position(const VariableType& type) { return type.placement() != nullptr; }
 /// Whether it has an orientation as well. A camera whose focal length is a part of its state has
-/// both, and is no pose of a Lie group.
+/// both, and is not a pose of a Lie group.
 inline bool has_orientation(const VariableType& type) {
   const Placement* placement = type.placement();
   return placement && placement->has_orientation();

@@ -39,8 +39,8 @@ class CAIRN_API Journal {
   };
 
   /// Opens a journal, or begins one. Throws `Error` (usage) if it belongs to another identity or is
-  /// in use, and `Error` (input) if it is damaged, is no journal or no regular file, or cannot be
-  /// read or written.
+  /// in use, and `Error` (input) if it is damaged, is not a journal or no regular file, or cannot
+  /// be read or written.
   Journal(std::filesystem::path file, std::string identity, Sync sync);
   Journal(const Journal&) = delete;
   Journal& operator=(const Journal&) = delete;

@@ -32,8 +32,8 @@ CAIRN_API std::vector<Arrival> arrival_order(const Graph& graph);
 CAIRN_API bool in_arrival_order(const std::vector<Arrival>& arrivals);
 
 /// The same for a pose graph with unbroken odometry; none for an empty graph. Throws `Error`
-/// (input), with what would work, for anything else: a variable that is no pose of a Lie group, or
-/// of another type than the first; a factor that is not relative; a pose without a factor to the
+/// (input), with what would work, for anything else: a variable that is not a pose of a Lie group,
+/// or of another type than the first; a factor that is not relative; a pose without a factor to the
 /// one before.
 CAIRN_API std::vector<Arrival> pose_chain(const Graph& graph);
 

@@ -83,7 +83,7 @@ class CAIRN_API PosePolicy : public Component {
   virtual void expect(const Graph& recording, std::span<const Arrival> poses);
   /// The next pose, with its odometry from the previous pose (several factors are fused; none for
   /// the first pose). A pose marked as fixed is kept. Throws `Error` (input) if there is no
-  /// odometry, or a factor that is no relative pose of the two; nothing has changed then.
+  /// odometry, or a factor that is not a relative pose of the two; nothing has changed then.
   virtual void add_pose(const Variable& pose, std::span<const Factor> odometry) = 0;
   /// The pair that is most worth matching with the newest pose; none: no pair is.
   virtual std::optional<MatchProposal> next_match() = 0;

@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <charconv>
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
+#include <system_error>
 
 #include "cairn/graph/elements.hpp"
 #include "cairn/runtime/error.hpp"
@@ -50,6 +53,19 @@ constexpr std::optional<Symbol> as_symbol(Id id) {
 inline std::string id_text(Id id) {
   const std::optional<Symbol> named = as_symbol(id);
   return named ? named->letter + std::to_string(named->index) : std::to_string(id);
+}
+
+/// The inverse of `id_text`: the id that "x3" or "17" stands for, and nothing for any other text.
+inline std::optional<Id> id_from_text(std::string_view text) {
+  const bool named = !text.empty() && detail::is_letter(text.front());
+  const std::string_view digits = text.substr(named ? 1 : 0);
+  Id number = 0;
+  const char* end = digits.data() + digits.size();
+  const auto [stop, error] = std::from_chars(digits.data(), end, number);
+  if (error != std::errc() || stop != end) return std::nullopt;
+  if (!named) return number;
+  if (number < 0 || (number >> detail::kSymbolBits) != 0) return std::nullopt;
+  return symbol(text.front(), number);
 }
 
 /// Short names: `using namespace cairn::symbols;` and then X(3), L(2).
