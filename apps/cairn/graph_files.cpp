@@ -88,6 +88,7 @@ void check_ending(const std::string& file, Registry& registry) {
   }
   if (std::find(writable.begin(), writable.end(), ending(file)) != writable.end()) return;
   if (writable.empty() && broken) throw Error(*broken);
+  if (writable.empty()) throw Error(ErrorCode::usage, file + ": no plugin of formats is on offer");
   throw Error(
       ErrorCode::usage,
       fmt::format("{}: no format writes files of that name; endings on offer: .{}; or name a "

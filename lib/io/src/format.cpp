@@ -74,9 +74,10 @@ Error nothing_fits(ErrorCode code, std::string message, const std::vector<std::s
   return {ErrorCode::plugin, message};
 }
 
-/// "on offer: a, b", or that there is nothing.
-std::string on_offer(const std::vector<std::string>& names) {
-  return names.empty() ? "none is on offer" : fmt::format("on offer: {}", fmt::join(names, ", "));
+/// "formats on offer: a, b", or that there is nothing.
+std::string on_offer(const char* what, const std::vector<std::string>& names) {
+  return names.empty() ? "no plugin of formats is on offer"
+                       : fmt::format("{} on offer: {}", what, fmt::join(names, ", "));
 }
 
 /// Chooses by content; where two are equally sure, the file's ending decides.
@@ -100,11 +101,10 @@ NamedFormat detect(const std::filesystem::path& file, std::string_view text, Reg
     for (const NamedFormat& f : formats) {
       if (f.format->can_read()) readers.push_back(f.name);
     }
-    throw nothing_fits(
-        ErrorCode::input,
-        fmt::format("{}: no format knows this content, which begins with '{}'; formats {}",
-                    file.string(), beginning(text), on_offer(readers)),
-        problems);
+    throw nothing_fits(ErrorCode::input,
+                       fmt::format("{}: no format knows this content, which begins with '{}'; {}",
+                                   file.string(), beginning(text), on_offer("formats", readers)),
+                       problems);
   }
   return std::move(*chosen);
 }
@@ -124,8 +124,8 @@ NamedFormat writer_by_ending(const std::filesystem::path& file, Registry& regist
           : (wanted.empty() ? "the name has no ending that determines the format"
                             : fmt::format("no format that writes has the ending '.{}'", wanted));
   throw nothing_fits(ErrorCode::usage,
-                     fmt::format("{}: {}; endings {}; or name the format", file.string(), found,
-                                 on_offer(endings)),
+                     fmt::format("{}: {}; {}; or name the format", file.string(), found,
+                                 on_offer("endings", endings)),
                      problems);
 }
 
