@@ -117,6 +117,7 @@ TEST_F(Outputs, NothingThatIsPrintedLandsInAFile) {
   CAIRN_NEEDS("linear_solver", "block_cholesky");
   CAIRN_NEEDS("optimizer", "levenberg_marquardt");
   CAIRN_NEEDS("generator", "ring");
+  CAIRN_NEEDS("initial_guess", "auto");
   graph();
   const Outcome outcome = shell(
       "$C optimize $D/graph.g2o -o $D/best.g2o --record $D/run.jsonl 2>&- >/dev/null; "

@@ -274,7 +274,12 @@ Variable Graph::variable(int variable) const {
 }
 
 std::string Graph::describe_variable(int variable) const {
-  return fmt::format("{} {}", type(variable).tag(), id(variable));
+  // What `symbol` of cairn/typed/symbol.hpp made shows as x3: a letter above 45 bits of an index.
+  const Id number = id(variable), letter = number >> 45;
+  const bool symbol = (letter >= 'a' && letter <= 'z') || (letter >= 'A' && letter <= 'Z');
+  const std::string_view tag = type(variable).tag();
+  if (!symbol) return fmt::format("{} {}", tag, number);
+  return fmt::format("{} {:c}{}", tag, static_cast<char>(letter), number & ((Id{1} << 45) - 1));
 }
 
 std::span<const std::int32_t> Graph::factor_variables(int position) const {

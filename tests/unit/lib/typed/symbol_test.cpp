@@ -3,6 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include "cairn/graph/graph.hpp"
+#include "cairn/typed/point.hpp"
+
 namespace cairn {
 namespace {
 
@@ -41,6 +44,14 @@ TEST(Symbols, PrintAsTheyAreRead) {
   for (const char* text :
        {"", "x", "-", "x-1", "12x", "x1.5", "xx1", " 1", "x35184372088832", "9223372036854775808"})
     EXPECT_EQ(id_from_text(text), std::nullopt) << text;
+}
+
+TEST(Symbols, AreWhatMessagesShow) {
+  Graph graph;
+  for (const Id id : {X(12), symbol('Z', (Id{1} << 45) - 1), Id{12}})
+    graph.add(id, Point2(0.0, 0.0));
+  for (int k = 0; k < graph.variable_count(); ++k)
+    EXPECT_EQ(graph.describe_variable(k), "VERTEX_XY " + id_text(graph.id(k)));
 }
 
 TEST(Symbols, RefuseOtherLettersAndIndices) {
