@@ -118,6 +118,7 @@ TEST_F(Outputs, NothingThatIsPrintedLandsInAFile) {
   CAIRN_NEEDS("optimizer", "levenberg_marquardt");
   CAIRN_NEEDS("generator", "ring");
   CAIRN_NEEDS("initial_guess", "auto");
+  CAIRN_NEEDS("picture", "html");
   graph();
   const Outcome outcome = shell(
       "$C optimize $D/graph.g2o -o $D/best.g2o --record $D/run.jsonl 2>&- >/dev/null; "
