@@ -144,7 +144,7 @@ TEST_F(OptimizeCommand, ALossOnLoopsTamesOutliers) {
   const Outcome misspelt = cairn({"optimize", bad, "--loss", "cauchy", "--loss-on", "loop"});
   EXPECT_EQ(misspelt.exit_code, 2);
   EXPECT_THAT(misspelt.err, HasSubstr("'loop' is neither all, loops nor a type of factors"));
-  const Outcome none = cairn({"optimize", bad, "--loss", "cauchy", "--loss-on", "EDGE_SE3:QUAT"});
+  const Outcome none = cairn({"optimize", bad, "--loss", "cauchy", "--loss-on", "EDGE_SE2_XY"});
   EXPECT_THAT(none.err, HasSubstr("--loss-on selects no factor of this graph"));
 }
 
