@@ -106,7 +106,7 @@ TEST_F(InfoCommand, SaysThatTheGaugeOfCamerasIsLeftFree) {
   EXPECT_EQ(outcome.exit_code, 0);
   EXPECT_THAT(unfolded(outcome.out),
               HasSubstr("not known (the gauge of a component is left free: anchoring "
-                        "VERTEX_CAMERA_BAL 0 would constrain more, or defy its priors)"));
+                        "VERTEX_CAMERA_BAL 0 would constrain more, or contradict its priors)"));
 }
 
 TEST_F(InfoCommand, TellsTheMetric) {

@@ -110,7 +110,8 @@ std::string Gauge::describe(const Graph& graph) const {
   }
   if (!left_free.empty()) {
     text += fmt::format(
-        "{}the gauge of {} is left free: anchoring {} would constrain more, or defy its priors",
+        "{}the gauge of {} is left free: anchoring {} would constrain more, or contradict its "
+        "priors",
         text.empty() ? "" : "; ",
         left_free.size() == 1 ? "a component" : fmt::format("{} components", left_free.size()),
         graph.describe_variable(left_free.front()));

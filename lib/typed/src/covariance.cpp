@@ -7,7 +7,6 @@
 
 #include "cairn/graph/gauge.hpp"
 #include "cairn/linear/linear_solver.hpp"
-#include "cairn/typed/symbol.hpp"
 
 namespace cairn::detail {
 
@@ -18,9 +17,8 @@ std::vector<double> covariance_blocks(const Graph& graph, std::span<const std::p
   for (const int v : resolve_gauge(graph).unconstrained) {
     const auto is_wanted = [&](const auto& pair) { return pair.first == v || pair.second == v; };
     if (graph.fixed(v) || std::ranges::none_of(wanted, is_wanted)) continue;
-    throw Error(ErrorCode::numerical,
-                fmt::format("there is no covariance of {} {}: it has no factor",
-                            graph.type(v).tag(), id_text(graph.id(v))));
+    throw Error(ErrorCode::numerical, fmt::format("there is no covariance of {}: it has no factor",
+                                                  graph.describe_variable(v)));
   }
   const auto solver = registry.make<LinearSolver>(linear_solver);
   GraphMarginals marginals(graph, *solver);

@@ -110,7 +110,14 @@ double Engine::share(double part) const {
   return part * settings_.accuracy * cost() / std::max(live_factors_, 1);
 }
 
-double Engine::rounding() const { return kRounding * rounding_scale_; }
+double Engine::rounding() {
+  if (std::exchange(rounding_is_old_, false)) {
+    rounding_scale_ = 0.0;
+    for (int f = 0; f < std::ssize(live_factor_); ++f)
+      if (live_factor_[f]) rounding_scale_ += rounding_scale(f);
+  }
+  return kRounding * rounding_scale_;
+}
 
 /// The estimate from before this update.
 void Engine::step_back() {

@@ -78,16 +78,17 @@ struct EngineState {
   bool gauge_is_old_ = false;
   int dead_ = 0;
   int live_factors_ = 0;
-  double rounding_scale_ = 0.0;  // of `rounding`: sum over factors
-  double cost_ = 0.0;            // sum over factors
-  double gained_ = 0.0;          // of the cost, by steps since factors were evaluated
-  bool must_look_ = false;       // something has been removed or changed: `gained_` is
-                                 // no measure then
-  int others_ = 0;               // factors of several variables that depend on rigid
-                                 // motions of these
-  double left_share_ = 1.0;      // how much of the shortfall was left to gain
-  double decrease_ = 0.0;        // of the last solution: gᵀH⁻¹g
-  std::vector<FactorId> ids_;    // by factor, rising
+  double rounding_scale_ = 0.0;   // of `rounding`: sum over factors
+  bool rounding_is_old_ = false;  // that sum is to be taken anew
+  double cost_ = 0.0;             // sum over factors
+  double gained_ = 0.0;           // of the cost, by steps since factors were evaluated
+  bool must_look_ = false;        // something has been removed or changed: `gained_` is
+                                  // no measure then
+  int others_ = 0;                // factors of several variables that depend on rigid
+                                  // motions of these
+  double left_share_ = 1.0;       // how much of the shortfall was left to gain
+  double decrease_ = 0.0;         // of the last solution: gᵀH⁻¹g
+  std::vector<FactorId> ids_;     // by factor, rising
   FactorId next_id_ = 0;
   std::vector<std::uint8_t> is_source_;  // by variable
 };
@@ -197,7 +198,7 @@ class Engine : private EngineState {
   double cost() const { return std::max(cost_ - gained_, 0.0); }
   double share(double part) const;
   /// What rounding may do to the cost.
-  double rounding() const;
+  double rounding();
   double rounding_scale(int f) const;
   void touch_all();
   void set_right_hand_side();

@@ -44,7 +44,7 @@ void Engine::load(Graph graph, std::vector<FactorId> ids) {
   anchored_.clear();
   disconnected_.clear();
   checked_at_.clear();
-  broken_ = gauge_is_old_ = false;
+  broken_ = gauge_is_old_ = rounding_is_old_ = false;
   dead_ = live_factors_ = 0;
   cost_ = decrease_ = gained_ = rounding_scale_ = 0.0;
   others_ = 0;
@@ -105,7 +105,7 @@ double Engine::rounding_scale(int f) const {
 }
 
 void Engine::changed_factor(int f) {
-  must_look_ = true;
+  must_look_ = rounding_is_old_ = true;
   if (graph_.factor_type(f).absolute_size() > 0) gauge_is_old_ = true;  // its rank may be another
   relinearize(f);
 }
@@ -114,7 +114,7 @@ void Engine::remove_factor(int f) {
   for (const std::int32_t v : models_.variables(f)) follow(v);
   take_out(f);
   live_factor_[f] = 0;
-  rounding_scale_ = std::max(0.0, rounding_scale_ - rounding_scale(f));
+  rounding_is_old_ = true;  // a difference of very unequal numbers would lose the small ones
   cost_ -= models_.cost(f);
   for (const std::int32_t v : models_.variables(f)) {
     std::erase(factors_of_[v], f);

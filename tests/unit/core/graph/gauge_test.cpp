@@ -114,7 +114,7 @@ TEST_F(GaugeTest, LeavesAComponentFreeWhoseLargestVariableIsNoGroup) {
   EXPECT_THAT(
       gauge.describe(graph_),
       ::testing::EndsWith("; the gauge of a component is left free: anchoring VERTEX_SCALED "
-                          "50 would constrain more, or defy its priors"));
+                          "50 would constrain more, or contradict its priors"));
   graph_.set_fixed(b);
   EXPECT_THAT(resolve_gauge(graph_).left_free, IsEmpty());
 }

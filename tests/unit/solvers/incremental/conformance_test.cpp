@@ -188,6 +188,34 @@ TEST_P(EveryEstimator, SolvesFullyWhateverTheInformation) {
   }
 }
 
+TEST_P(EveryEstimator, SolvesFullyAfterAFactorOfVeryLargeInformationIsChangedOrRemoved) {
+  const Factor wrong = between(0, 6, {9.0, 9.0, 1.0});
+  Factor heavy = wrong;
+  for (double& number : heavy.information) number *= 1e40;
+  std::vector<double> expected;
+  for (const Factor& first : {wrong, heavy}) {
+    for (const bool removed : {false, true}) {
+      const auto estimator = registry_.make<Estimator>(GetParam());
+      GraphUpdate update = chain(7);
+      update.variables[0] = pose(0, {0.0, 0.0, 0.0}, true);
+      update.factors.push_back(first);
+      const FactorId id = estimator->update(update, {.full = true}).first_factor +
+                          static_cast<FactorId>(update.factors.size()) - 1;
+      update = {};
+      if (removed) {
+        update.removed_factors = {id};
+        update.factors = {wrong};
+      } else {
+        update.changed = {{id, wrong.measurement, wrong.information}};
+      }
+      estimator->update(update, {.full = true});
+      const std::span<const double> x = estimator->state(6);
+      if (expected.empty()) expected.assign(x.begin(), x.end());
+      for (int k = 0; k < 3; ++k) EXPECT_NEAR(x[k], expected[k], 1e-4) << removed;
+    }
+  }
+}
+
 TEST_P(EveryEstimator, RefusesWhatItDoesNotKnow) {
   estimator_->update(chain(2));
   EXPECT_THROW(estimator_->state(7), Error);
