@@ -71,8 +71,19 @@ SparsifyJob job_of(const SparsifyCommandOptions& options, Session& session) {
                   "node whether it stays");
     }
     job.redirect_early = options.keep_every;
+    job.redirection.to = RedirectionRule::To::order;
   }
+  using To = RedirectionRule::To;
+  for (const auto& [name, to] : {std::pair{"path", To::path},
+                                 {"place", To::place},
+                                 {"order", To::order},
+                                 {"next", To::next}}) {
+    if (options.redirect_to == name) job.redirection.to = to;
+  }
+  job.redirection.newer = options.newer;
+  job.redirection.inflation = options.inflation;
   job.measure = !options.no_kld;
+  if (options.compared_at == "minima") job.compared_at = ComparedAt::minima;
   return job;
 }
 
@@ -88,7 +99,7 @@ json::object report_json(const SparsifyCommandOptions& options, const LoadedGrap
   report["selection"] = spec_text(job.selection);
   report["online"] = job.online;
   report["threads"] = threads();
-  report["status"] = result.interrupted ? "interrupted" : "converged";
+  report["status"] = result.interrupted ? "interrupted" : to_string(result.status);
   report["poses"] = {{"in", result.variables_before}, {"kept", result.sparse.variable_count()}};
   report["factors"] = {{"in", result.factors_before}, {"out", result.sparse.factor_count()}};
   const Sparsification& change = result.change;
@@ -103,6 +114,8 @@ json::object report_json(const SparsifyCommandOptions& options, const LoadedGrap
   report["refused"] = std::move(refused);
   report["kld"] = result.error ? json::value(result.error->kld) : json::value(nullptr);
   report["rmse"] = result.error ? number_json(result.error->rmse) : json::value(nullptr);
+  report["rmse_aligned"] =
+      result.error ? number_json(result.error->rmse_aligned) : json::value(nullptr);
   if (result.error)
     report["kld_parts"] = {{"covariance", result.error->covariance}, {"mean", result.error->mean}};
   report["chi2"] = {{"before", result.chi2_before}, {"after", result.chi2_after}};
@@ -143,7 +156,8 @@ std::string summary_text(const SparsifyCommandOptions& options, const LoadedGrap
   if (result.error) {
     std::string text = fmt::format("KLD {:.4g} nats of the whole", result.error->kld);
     if (std::isfinite(result.error->rmse))
-      text += fmt::format("; the estimate has moved by {:.3g} m (RMS)", result.error->rmse);
+      text += fmt::format("; the estimate has moved by {:.3g} m (RMS), {:.3g} m after alignment",
+                          result.error->rmse, result.error->rmse_aligned);
     if (job.online > 0 && std::isfinite(result.rmse_full))
       text += fmt::format(", from that with all measurements by {:.3g} m", result.rmse_full);
     table.add({"lost", text});
@@ -159,7 +173,8 @@ std::string summary_text(const SparsifyCommandOptions& options, const LoadedGrap
     table.add({"late", fmt::format("{} for nodes that had left redirected, {} dropped",
                                    plural(result.redirected, "factor"), result.dropped)});
   }
-  if (result.interrupted) table.add({"status", "interrupted"});
+  const Status status = result.interrupted ? Status::interrupted : result.status;
+  if (status != Status::converged) table.add({"status", std::string(to_string(status))});
   for (const std::string& file : {options.output, options.record}) {
     if (!file.empty() && file != "-") table.add({"output", file});
   }
@@ -233,6 +248,14 @@ int run_sparsify(SparsifyCommandOptions options, Session& session) {
   // A wrong name is refused before a graph is read.
   registry.make<Sparsifier>(job.sparsifier);
   registry.make<NodeSelection>(job.selection);
+  const auto topology = job.sparsifier.values.find("topology");
+  if (!options.output.empty() && topology != job.sparsifier.values.end() &&
+      topology->second.starts_with("cliquey")) {
+    throw Error(ErrorCode::usage,
+                "--topology cliquey makes pairs of correlated factors (CORRELATED_PAIR), which no "
+                "format of graphs expresses: leave --output away to compare, or choose another "
+                "topology to write");
+  }
   const ProblemSetup setup(options.problem, registry);
   const LoadedGraph loaded = load_graph(options.graph, options.input, session);
   const InterruptGuard guard;

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "arguments.hpp"
+#include "cairn/sparsification/redirection.hpp"
 #include "graph_files.hpp"
 #include "problem_setup.hpp"
 #include "session.hpp"
@@ -24,7 +25,10 @@ struct SparsifyCommandOptions {
   InputOptions input;
   ProblemOptions problem;
   // Of studies:
-  std::string redirect = "late";
+  std::string redirect = "late", redirect_to;
+  bool newer = false;
+  double inflation = RedirectionRule{}.inflation;
+  std::string compared_at = "common";
   std::string record;
 };
 

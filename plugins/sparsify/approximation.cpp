@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <utility>
 
 #include "cairn/runtime/error.hpp"
@@ -63,6 +64,21 @@ ScaledProblem::ScaledProblem(const RecoveryProblem& problem) : rank(problem.rank
     Phi_root.push_back(eigen.operatorInverseSqrt());
     Q.push_back(dense::product(Phi_root.back(), J));
   }
+  if (problem.basis.empty()) {
+    T = Matrix::Identity(rank, rank);
+    A = Q;
+    columns.resize(Q.size(), std::vector<int>(static_cast<std::size_t>(rank)));
+    for (std::vector<int>& all : columns) std::iota(all.begin(), all.end(), 0);
+    return;
+  }
+  T = Eigen::Map<const Matrix>(problem.basis.data(), std::ssize(problem.basis) / rank, rank);
+  for (std::size_t k = 0; k < problem.factors.size(); ++k) {
+    const RecoveryProblem::Factor& factor = problem.factors[k];
+    columns.push_back(factor.columns);
+    A.push_back(dense::product(
+        Phi_root[k], Eigen::Map<const Matrix>(factor.in_columns.data(), factor.size,
+                                              std::ssize(factor.columns))));
+  }
 }
 
 Matrix ScaledProblem::scaled(int k, const Matrix& information) const {
@@ -76,7 +92,9 @@ Matrix nearest_positive(const Matrix& A, double floor) {
 }
 
 Approximation::Approximation(const ScaledProblem& problem)
-    : problem_(&problem), M_(problem.Q.size()) {}
+    : problem_(&problem), M_(problem.Q.size()), followed_(problem.Q.size()) {
+  std::iota(followed_.begin(), followed_.end(), 0);
+}
 
 bool Approximation::set(std::vector<Matrix> W) {
   W_ = std::move(W);
@@ -95,10 +113,22 @@ bool Approximation::refresh() {
   const Eigen::LLT<Matrix> llt(L);
   if (llt.info() != Eigen::Success || singular(L, llt)) return false;
   log_determinant_ = 2.0 * llt.matrixLLT().diagonal().array().log().sum();
-  S_ = llt.solve(Matrix::Identity(r, r));
-  for (int k = 0; k < problem_->factors(); ++k)
-    M_[k] = problem_->Q[k] * S_ * problem_->Q[k].transpose();
+  V_ = dense::congruent(problem_->T, llt.solve(Matrix::Identity(r, r)));
+  follow_all();
   return true;
+}
+
+void Approximation::follow(std::vector<int> factors) { followed_ = std::move(factors); }
+
+void Approximation::follow_all() {
+  followed_.resize(problem_->Q.size());
+  std::iota(followed_.begin(), followed_.end(), 0);
+  for (const int k : followed_) {
+    const std::vector<int>& columns = problem_->columns[k];
+    part_ = V_(columns, columns);
+    dense::set_product(problem_->A[k], part_, R_);
+    dense::set_product_with_transpose(R_, problem_->A[k], M_[k]);
+  }
 }
 
 void Approximation::change(int k, const Matrix& W) {
@@ -111,11 +141,13 @@ void Approximation::change(int k, const Matrix& W) {
   C = (0.5 * (C + C.transpose())).eval();
   trace_ += D.trace();
   log_determinant_ += std::log(std::max(lu.determinant(), 1e-300));
-  dense::set_product_with_transpose(S_, problem_->Q[k], SQt_);
-  dense::set_product_with_transpose(C, SQt_, QS_);
-  dense::subtract_product(SQt_, QS_, S_);
-  for (int j = 0; j < problem_->factors(); ++j) {
-    dense::set_product(problem_->Q[j], SQt_, R_);
+  part_ = V_(Eigen::all, problem_->columns[k]);
+  dense::set_product_with_transpose(part_, problem_->A[k], VAt_);
+  dense::set_product_with_transpose(C, VAt_, CVA_);
+  dense::subtract_product(VAt_, CVA_, V_);
+  for (const int j : followed_) {
+    part_ = VAt_(problem_->columns[j], Eigen::all);
+    dense::set_product(problem_->A[j], part_, R_);
     dense::subtract_congruent(R_, C, M_[j]);
   }
   W_[k] = W;

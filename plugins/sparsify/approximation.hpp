@@ -28,6 +28,10 @@ struct ScaledProblem {
   int rank = 0;
   std::vector<Matrix> Q;         ///< m × r
   std::vector<Matrix> Phi_root;  ///< Φ^½, symmetric
+  /// Q_k = A_k T(columns_k, ·); where the problem has no such form, T is the identity.
+  Matrix T;                            ///< d × r
+  std::vector<Matrix> A;               ///< m × columns
+  std::vector<std::vector<int>> columns;
 
   int factors() const { return static_cast<int>(Q.size()); }
   int size(int k) const { return static_cast<int>(Q[k].rows()); }
@@ -39,7 +43,8 @@ struct ScaledProblem {
 /// least `floor` (Higham 1988).
 Matrix nearest_positive(const Matrix& A, double floor = kFloor);
 
-/// Λ̆ = Σ_k Q_kᵀ W_k Q_k, its inverse S and all M_k, while single W_k change.
+/// Λ̆ = Σ_k Q_kᵀ W_k Q_k, its inverse S as V = T S Tᵀ, and all M_k = A_k V A_kᵀ, while single W_k
+/// change.
 ///
 /// The information of the other factors in the space of factor k is, by the matrix inversion lemma,
 ///
@@ -48,23 +53,27 @@ Matrix nearest_positive(const Matrix& A, double floor = kFloor);
 /// which holds where Υ_k is singular as well (then M_k⁻¹ − W_k is what is left of it once all other
 /// directions are eliminated; zero where no other factor measures the same). So all three
 /// propositions of factor descent (T 4.12, 4.13, 4.15) are one formula in m × m matrices, and a
-/// step changes S by rank m.
+/// step changes V by rank m; what it costs otherwise depends on the columns of A_k alone.
 class Approximation {
  public:
   explicit Approximation(const ScaledProblem& problem);
 
   /// Sets all W anew and factorises. False if Λ̆ is singular.
   bool set(std::vector<Matrix> W);
-  /// Computes S and all M anew from W; false if Λ̆ is singular.
+  /// Computes V and all M anew from W; false if Λ̆ is singular.
   bool refresh();
-  /// Changes one W.
+  /// Changes one W, and V and M with it: of all factors, or, after `follow`, of those alone, which is
+  /// faster where there are many.
   void change(int k, const Matrix& W);
+  void follow(std::vector<int> factors);
+  /// Computes M of all factors anew from V, and follows all again.
+  void follow_all();
 
   const ScaledProblem& problem() const { return *problem_; }
   const Matrix& W(int k) const { return W_[k]; }
   const std::vector<Matrix>& W() const { return W_; }
   const Matrix& M(int k) const { return M_[k]; }
-  const Matrix& S() const { return S_; }
+  const Matrix& V() const { return V_; }
   double kld() const;
 
   /// The W_k that minimises the cost while the others stay, under W_k ⪰ `floor`, and the KLD that
@@ -84,9 +93,10 @@ class Approximation {
  private:
   const ScaledProblem* problem_;
   std::vector<Matrix> W_, M_;
-  Matrix S_;
+  Matrix V_;
   double trace_ = 0.0, log_determinant_ = 0.0;
-  Matrix SQt_, QS_, R_;  // room
+  std::vector<int> followed_;  ///< those whose M is kept
+  Matrix VAt_, CVA_, R_, part_;  // room
 };
 
 }  // namespace cairn::sparsify

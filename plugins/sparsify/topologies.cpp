@@ -30,16 +30,19 @@ double log_determinant(const Matrix& A) {
   return std::log(std::max(std::abs(A.determinant()), 1e-300));
 }
 
+/// Passes of factor descent over the chosen factors after each that is added.
+constexpr int kRelaxations = 2;
+
 /// ε in Λ's units.
-double epsilon_of(const DenseBlanket& blanket, double part) {
-  const double mean = information(blanket).trace() / std::max(1, blanket.size());
-  return part * mean;
+double epsilon_of(const DenseBlanket& blanket, const TopologyOptions& options) {
+  if (options.absolute) return options.epsilon;
+  return options.epsilon * information(blanket).trace() / std::max(1, blanket.size());
 }
 
-Matrix regularized_covariance(const DenseBlanket& blanket, double part) {
+Matrix regularized_covariance(const DenseBlanket& blanket, const TopologyOptions& options) {
   const int d = blanket.size();
   const Matrix sum =
-      Matrix(information(blanket)) + epsilon_of(blanket, part) * Matrix::Identity(d, d);
+      Matrix(information(blanket)) + epsilon_of(blanket, options) * Matrix::Identity(d, d);
   return sum.llt().solve(Matrix::Identity(d, d));
 }
 
@@ -78,9 +81,14 @@ double information_form(const DenseBlanket& blanket, const std::vector<int>& beg
   const auto n = pair.rows() - m;
   const Matrix first = pair.topLeftCorner(m, m), across = pair.topRightCorner(m, n);
   const Matrix I = epsilon * Matrix::Identity(m, m);
-  const Matrix second = pair.bottomRightCorner(n, n) + epsilon * Matrix::Identity(n, n);
-  return 0.5 * (log_determinant(first + I) -
-                log_determinant(first - across * second.llt().solve(across.transpose()) + I));
+  // The inverse has no εI: where i and j determine each other only, nothing but εI is left.
+  const Eigen::SelfAdjointEigenSolver<Matrix> second(pair.bottomRightCorner(n, n));
+  const double least = 1e-12 * std::max(second.eigenvalues()[n - 1], 0.0);
+  const Vector inverse = (second.eigenvalues().array() > least)
+                             .select(second.eigenvalues().cwiseInverse(), Vector::Zero(n));
+  const Matrix known =
+      dense::congruent(across, dense::from_eigenvalues(second.eigenvectors(), inverse));
+  return 0.5 * (log_determinant(first + I) - log_determinant(first - known + I));
 }
 
 struct Pair {
@@ -158,10 +166,10 @@ int tree_size(const DenseBlanket& blanket) {
 }
 
 /// Σ̂ without what the factors of a tree tell: (T 4.23), or exactly.
-Matrix downdated(const DenseBlanket& blanket, const std::vector<FactorChoice>& tree, double epsilon,
-                 Downdate how) {
+Matrix downdated(const DenseBlanket& blanket, const std::vector<FactorChoice>& tree,
+                 const TopologyOptions& options, Downdate how) {
   const int d = blanket.size();
-  const Matrix S = regularized_covariance(blanket, epsilon);
+  const Matrix S = regularized_covariance(blanket, options);
   Matrix grown = S, left = information(blanket);
   const BlanketProjection projection(blanket, Projection::node);
   for (const FactorChoice& choice : tree) {
@@ -179,7 +187,7 @@ Matrix downdated(const DenseBlanket& blanket, const std::vector<FactorChoice>& t
   }
   if (how == Downdate::sum) return grown;
   // A tree alone claims more than all of Λ in some directions, so what is left may be negative.
-  return nearest_positive(left, epsilon_of(blanket, epsilon)).inverse();
+  return nearest_positive(left, epsilon_of(blanket, options)).inverse();
 }
 
 }  // namespace
@@ -189,8 +197,8 @@ Matrix mutual_information(const DenseBlanket& blanket, const TopologyOptions& op
   const std::vector<int> begin = blanket.offsets();
   Matrix result = Matrix::Zero(n, n);
   const bool by_covariance = options.regularization == Regularization::covariance;
-  const Matrix S = by_covariance ? regularized_covariance(blanket, options.epsilon) : Matrix();
-  const double epsilon = epsilon_of(blanket, options.epsilon);
+  const Matrix S = by_covariance ? regularized_covariance(blanket, options) : Matrix();
+  const double epsilon = epsilon_of(blanket, options);
   for (int i = 0; i < n; ++i) {
     for (int j = i + 1; j < n; ++j) {
       result(i, j) = result(j, i) =
@@ -214,7 +222,7 @@ std::vector<FactorChoice> DowndatedInformation::choose(const DenseBlanket& blank
                                                        int population) {
   std::vector<FactorChoice> chosen = ChowLiuTree::choose(blanket, population);
   if (static_cast<int>(std::ssize(chosen)) >= population) return chosen;
-  const Matrix S = downdated(blanket, chosen, options_.epsilon, downdate_);
+  const Matrix S = downdated(blanket, chosen, options_, downdate_);
   const std::vector<int> begin = blanket.offsets();
   const std::vector<Pair> pairs = weighted_pairs(blanket, [&](int i, int j) {
     return information_of(pair_block(S, begin, i, j), blanket.node_sizes[i]);
@@ -238,6 +246,7 @@ std::vector<FactorChoice> ExpectedDivergence::choose(const DenseBlanket& blanket
   for (const int k : pair_models(blanket)) {
     if (!taken[k]) all.push_back({k});
   }
+  if (population >= static_cast<int>(std::ssize(all))) return all;
   const RecoveryProblem problem =
       BlanketProjection(blanket, Projection::node).problem(blanket, all);
   const ScaledProblem scaled(problem);
@@ -248,25 +257,37 @@ std::vector<FactorChoice> ExpectedDivergence::choose(const DenseBlanket& blanket
     W.push_back(k < chosen.size() ? Matrix(Matrix::Identity(m, m)) : Matrix(Matrix::Zero(m, m)));
   }
   if (!at.set(std::move(W))) return chosen;
-  std::vector<bool> open(all.size(), true);
-  std::fill_n(open.begin(), chosen.size(), false);
-  while (static_cast<int>(std::ssize(chosen)) < population) {
+  std::vector<int> in(chosen.size()), open;
+  std::iota(in.begin(), in.end(), 0);
+  for (int k = static_cast<int>(std::ssize(chosen)); k < static_cast<int>(std::ssize(all)); ++k)
+    open.push_back(k);
+  // The factors chosen before are relaxed: each had its optimum with those that were there then, and
+  // together they would claim more and more, so that further gains would be misjudged.
+  const auto relax = [&] {
+    at.follow(in);
+    for (int pass = 0; pass < kRelaxations; ++pass) {
+      for (const int k : in) at.change(k, at.best(k).W);
+    }
+    at.follow_all();
+  };
+  while (true) {
     Approximation::Best best;
-    int which = -1;
-    for (int k = 0; k < static_cast<int>(std::ssize(all)); ++k) {
-      if (!open[k] || (which >= 0 && at.bound(k) <= best.gain)) continue;
-      Approximation::Best tried = at.best(k);
-      if (which < 0 || tried.gain > best.gain) {
+    auto which = open.end();
+    for (auto k = open.begin(); k != open.end(); ++k) {
+      if (which != open.end() && at.bound(*k) <= best.gain) continue;
+      Approximation::Best tried = at.best(*k);
+      if (which == open.end() || tried.gain > best.gain) {
         best = std::move(tried);
         which = k;
       }
     }
-    if (which < 0) break;
-    open[which] = false;
-    chosen.push_back(all[which]);
-    at.change(which, best.W);
+    at.change(*which, best.W);
+    in.push_back(*which);
+    chosen.push_back(all[*which]);
+    open.erase(which);
+    if (static_cast<int>(std::ssize(chosen)) >= population) return chosen;
+    relax();
   }
-  return chosen;
 }
 
 std::vector<FactorChoice> OffDiagonalDeterminant::choose(const DenseBlanket& blanket,
@@ -284,7 +305,7 @@ std::vector<FactorChoice> OffDiagonalDeterminant::choose(const DenseBlanket& bla
 std::vector<FactorChoice> SparseInverse::choose(const DenseBlanket& blanket, int population) {
   const int d = blanket.size();
   // In units in which every variance is 1, or λ would mean another thing for metres and radians.
-  Matrix S = regularized_covariance(blanket, options_.epsilon);
+  Matrix S = regularized_covariance(blanket, options_);
   const Vector scale = S.diagonal().cwiseSqrt().cwiseInverse();
   S = (scale.asDiagonal() * S * scale.asDiagonal()).eval();
   const Matrix off = S - Matrix(S.diagonal().asDiagonal());
@@ -349,6 +370,7 @@ std::vector<FactorChoice> Exhaustive::choose(const DenseBlanket& blanket, int po
   double topologies = 1.0;
   for (int k = 0; k < count; ++k) topologies *= static_cast<double>(all - k) / (k + 1);
   if (topologies > static_cast<double>(most_)) {
+    if (beyond_ == Beyond::ekld) return ExpectedDivergence(options_).choose(blanket, population);
     throw Error(ErrorCode::usage,
                 fmt::format("best: {} nodes have {:.3g} topologies of {} factors; at most {} are "
                             "tried (option most), since it takes every one of them",

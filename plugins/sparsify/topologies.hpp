@@ -26,6 +26,7 @@ constexpr auto enum_names(Regularization) {
 struct TopologyOptions {
   Regularization regularization = Regularization::covariance;
   double epsilon = 0.01;  ///< ε as a part of Λ's mean diagonal
+  bool absolute = false;  ///< ε is in Λ's units, as (T 4.17, 4.18) have it
 
   static auto fields() {
     using O = TopologyOptions;
@@ -33,7 +34,8 @@ struct TopologyOptions {
         .choice("regularization", &O::regularization,
                 "mutual information where Λ is singular: of (Λ + εI)⁻¹, or with εI in each "
                 "determinant of Λ's marginals")
-        .real("epsilon", &O::epsilon, 1e-12, 1e3, "ε, as a fraction of Λ's mean diagonal");
+        .real("epsilon", &O::epsilon, 1e-12, 1e9, "ε, as a fraction of Λ's mean diagonal")
+        .boolean("absolute", &O::absolute, "ε is in Λ's own units instead, as in the thesis");
   }
 };
 
@@ -70,14 +72,24 @@ struct SparseInverseOptions {
   }
 };
 
+/// What becomes of a blanket with more topologies than `best` may try.
+enum class Beyond { ekld, refuse };
+constexpr auto enum_names(Beyond) {
+  return std::to_array<EnumName<Beyond>>({{Beyond::ekld, "ekld"}, {Beyond::refuse, "refuse"}});
+}
+
 struct ExhaustiveOptions {
   TopologyOptions tree{};
   std::int64_t most = 200000;  ///< topologies
+  Beyond beyond = Beyond::ekld;
 
   static auto fields() {
     using O = ExhaustiveOptions;
-    return OptionFields<O>().part(&O::tree).integer(
-        "most", &O::most, 1, 1000000000, "topologies to try; where there are more, it refuses");
+    return OptionFields<O>()
+        .part(&O::tree)
+        .integer("most", &O::most, 1, 1000000000, "topologies to try")
+        .choice("beyond", &O::beyond,
+                "for a blanket that has more: the topology of ekld, or an error");
   }
 };
 
@@ -113,7 +125,8 @@ class DowndatedInformation final : public ChowLiuTree {
   Downdate downdate_;
 };
 
-/// That tree, and one by one the factor that lowers the KLD most by one step of factor descent.
+/// That tree, and one by one the factor that lowers the KLD most by one step of factor descent; after
+/// each the factors chosen so far are relaxed by two passes of it.
 class ExpectedDivergence final : public ChowLiuTree {
  public:
   using ChowLiuTree::ChowLiuTree;
@@ -147,15 +160,17 @@ class Cliquey final : public ChowLiuTree {
   std::vector<FactorChoice> choose(const DenseBlanket& blanket, int population) override;
 };
 
-/// Every topology of that population is tried, and the one with the least KLD taken.
+/// Every topology of that population is tried, and the one with the least KLD taken; where there are
+/// too many, that of `ekld`, or `choose` throws `Error` (usage).
 class Exhaustive final : public ChowLiuTree {
  public:
   explicit Exhaustive(const ExhaustiveOptions& options)
-      : ChowLiuTree(options.tree), most_(options.most) {}
+      : ChowLiuTree(options.tree), most_(options.most), beyond_(options.beyond) {}
   std::vector<FactorChoice> choose(const DenseBlanket& blanket, int population) override;
 
  private:
   std::int64_t most_;
+  Beyond beyond_;
 };
 
 }  // namespace cairn::sparsify

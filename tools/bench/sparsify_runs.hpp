@@ -17,8 +17,9 @@ namespace cairn::performance {
 // What the studies of `cairn sparsify` share.
 
 /// Options of the experiment of section 4.6.4 of the thesis: a node of so many stays, the others
-/// leave every hundred poses.
-std::vector<std::string> thesis_experiment(int keep_every, const std::string& scheme);
+/// leave every hundred poses; its KLD is that of graphs each linearised at its own minimum.
+std::vector<std::string> thesis_experiment(int keep_every, const std::string& scheme,
+                                           const std::string& compared_at = "minima");
 
 /// Interleaved runs with one thread.
 void sparsify_rounds(const Bench& bench, const DataSet& set, std::vector<Contestant>& contestants,

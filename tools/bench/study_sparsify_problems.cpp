@@ -58,7 +58,7 @@ void measure_problems(const Bench& bench, const DataSet& set, const Recording& r
                     "fd:initial=ffd,iterations=0", "fd:initial=scaled,iterations=0", "ncfd"})));
   part("topology", joined({"--population", "fill:0.75", "--recovery", "ncfd"},
                           each("--topology", {"mi", "dmi", "ekld", "odd", "l1",
-                                              fmt::format("best:most={}", recording.most)})));
+                                              fmt::format("best:most={},beyond=refuse", recording.most)})));
 }
 
 }  // namespace

@@ -141,6 +141,26 @@ std::string ratios_table(const json::array& entries) {
   return table.text();
 }
 
+/// The losses at common states: the thesis's tree and pairs, and what there is without options.
+std::string common_table(const json::array& entries) {
+  constexpr std::array kNames{"common clt", "common ncfd", "default"};
+  MarkdownTable table({"graph", "scheme", "N", "`clt`: KLD", "aligned RMSE [m]",
+                       "`mi`, `ncfd`: KLD", "aligned RMSE [m]", "default: KLD", "aligned RMSE [m]",
+                       "RMSE from all measurements [m]"});
+  for (const json::value& entry : entries) {
+    Cells cells{text(entry, "name"), text(entry, "scheme"), fmt::format("{}", keep_every(entry))};
+    bool any = false;
+    for (const char* name : kNames) {
+      const json::value* c = contestant(entry, name);
+      any = any || c;
+      cells = joined(cells, {digits(median_of(c, "kld")), digits(median_of(c, "rmse_aligned"))});
+    }
+    cells.push_back(digits(median_of(contestant(entry, "default"), "rmse_full")));
+    if (any) table.add(cells);
+  }
+  return table.text();
+}
+
 // Table 4.3
 // ------------------------------------------------------------------------------------------------
 
@@ -168,8 +188,9 @@ std::string topology_table(const json::array& entries) {
 
 /// A row a graph and a topology, a column an ε.
 std::string regularization_table(const json::array& entries) {
-  constexpr std::array kEpsilons{"1", "0.1", "0.01", "0.0001"};
-  MarkdownTable table({"graph", "topology", "KLD with ε = 1", "0.1", "0.01", "0.0001", "thesis's"});
+  constexpr std::array kEpsilons{"1,absolute=true", "1", "0.1", "0.01", "0.0001"};
+  MarkdownTable table({"graph", "topology", "KLD with ε = 1 in Λ's units",
+                       "of its mean diagonal: 1", "0.1", "0.01", "0.0001", "thesis's"});
   for (const json::value& entry : entries) {
     if (text(entry, "part") != "regularization") continue;
     const std::string graph = text(entry, "name");
@@ -212,7 +233,7 @@ Cells loss(const json::value* c) {
 
 std::string whole_table(const json::array& entries) {
   MarkdownTable table({"graph", "N", "topology", "poses", "factors", "blanket", "largest", "KLD",
-                       "of that means", "RMSE [m]", "time [s]"});
+                       "of that means", "aligned RMSE [m]", "time [s]"});
   for (const json::value& entry : entries) {
     if (text(entry, "part") != "space") continue;
     Cells cells{text(entry, "name"), fmt::format("{}", keep_every(entry))};
@@ -220,7 +241,7 @@ std::string whole_table(const json::array& entries) {
       const json::value* c = &each;
       cells.push_back(name_of(c) == "clt" ? "`clt`" : "default");
       cells = joined(joined(cells, poses_and_factors(c)), blankets(c));
-      table.add(joined(joined(cells, loss(c)), {digits(median_of(c, "rmse")), total(c)}));
+      table.add(joined(joined(cells, loss(c)), {digits(median_of(c, "rmse_aligned")), total(c)}));
       cells = {"", ""};
     }
   }
@@ -229,7 +250,7 @@ std::string whole_table(const json::array& entries) {
 
 std::string large_table(const json::array& entries) {
   MarkdownTable table({"graph", "removed", "poses", "factors", "blanket", "largest", "KLD",
-                       "of that means", "KLD per node removed", "RMSE [m]", "time [s]",
+                       "of that means", "KLD per node removed", "aligned RMSE [m]", "time [s]",
                        "per node removed [ms]"});
   for (const json::value& entry : entries) {
     if (text(entry, "part") != "large") continue;
@@ -238,30 +259,37 @@ std::string large_table(const json::array& entries) {
       const double removed = median_of(c, "poses.in") - median_of(c, "poses.kept");
       Cells cells{text(entry, "name"), name_of(c) == "late" ? "every 100 poses" : "at the end"};
       cells = joined(joined(joined(cells, poses_and_factors(c)), blankets(c)), loss(c));
-      table.add(joined(cells, {digits(median_of(c, "kld") / removed), digits(median_of(c, "rmse")),
-                               total(c), milliseconds(median_of(c, "seconds.total") / removed)}));
+      table.add(joined(cells, {digits(median_of(c, "kld") / removed),
+                               digits(median_of(c, "rmse_aligned")), total(c), milliseconds(median_of(c, "seconds.total") / removed)}));
     }
   }
   return table.text();
 }
 
+constexpr std::array<std::pair<const char*, const char*>, 4> kRedirections{
+    {{"late", "by the most certain path"},
+     {"place", "to the nearest in space, as exact"},
+     {"order", "to the nearest by id, as exact"},
+     {"early", "early, to the nearest by id, as exact"}}};
+
 std::string online_table(const json::array& entries) {
   MarkdownTable table({"graph", "late factors are redirected", "poses", "factors", "KLD",
-                       "of that means", "RMSE [m]", "RMSE from all measurements [m]",
+                       "of that means", "aligned RMSE [m]", "RMSE from all measurements [m]",
                        "median step [ms]", "99 %", "longest", "removal, all [s]"});
   for (const json::value& entry : entries) {
-    const json::value *late = contestant(entry, "late"), *early = contestant(entry, "early");
+    const json::value* late = contestant(entry, "late");
     const auto step = [&](const char* which) {
       return milliseconds(number(entry, std::string("steps_of_all.") + which));
     };
     table.add({text(entry, "name"), "all nodes stay", whole(median_of(late, "poses.in")),
                whole(median_of(late, "factors.in")), "", "", "", "", step("median"), step("p99"),
                step("max"), ""});
-    for (const json::value* c : {late, early}) {
+    for (const auto& [name, how] : kRedirections) {
+      const json::value* c = contestant(entry, name);
       if (!c) continue;
-      Cells cells{"", c == late ? "to the nearest in space" : "to the nearest by id"};
+      Cells cells{"", how};
       cells = joined(joined(cells, poses_and_factors(c)), loss(c));
-      table.add(joined(cells, {digits(median_of(c, "rmse")), digits(median_of(c, "rmse_full")),
+      table.add(joined(cells, {digits(median_of(c, "rmse_aligned")), digits(median_of(c, "rmse_full")),
                                milliseconds(median_of(c, "steps.median")),
                                milliseconds(median_of(c, "steps.p99")),
                                milliseconds(median_of(c, "steps.max")), total(c)}));
@@ -272,7 +300,7 @@ std::string online_table(const json::array& entries) {
 
 std::string selection_table(const json::array& entries) {
   MarkdownTable table({"graph", "selection", "poses", "factors", "blanket", "largest", "KLD",
-                       "of that means", "RMSE [m]", "selecting [s]", "removal [s]"});
+                       "of that means", "aligned RMSE [m]", "selecting [s]", "removal [s]"});
   for (const json::value& entry : entries) {
     std::string graph = text(entry, "name");
     for (const json::value& each : list(entry, "contestants")) {
@@ -280,7 +308,8 @@ std::string selection_table(const json::array& entries) {
       Cells cells{graph, "`" + name_of(c) + "`"};
       cells = joined(joined(joined(cells, poses_and_factors(c)), blankets(c)), loss(c));
       table.add(joined(
-          cells, {digits(median_of(c, "rmse")), digits(median_of(c, "seconds.select")), total(c)}));
+          cells, {digits(median_of(c, "rmse_aligned")), digits(median_of(c, "seconds.select")),
+                  total(c)}));
       graph.clear();
     }
   }
@@ -292,7 +321,8 @@ std::string selection_table(const json::array& entries) {
 std::vector<Section> sparsify_sets_sections(const json::array& entries) {
   return {{"sparsify-counts", counts_table(entries)},
           {"sparsify-ratios", ratios_table(entries)},
-          {"sparsify-recovery", recovery_table(entries)}};
+          {"sparsify-recovery", recovery_table(entries)},
+          {"sparsify-common", common_table(entries)}};
 }
 
 std::vector<Section> sparsify_topology_sections(const json::array& entries) {

@@ -8,7 +8,7 @@ namespace cairn::performance {
 
 // What Tables 4.1 to 4.3 of J. Vallvé, Information metrics for localization and mapping (thesis,
 // UPC Barcelona 2018) say. Graphs are called M3500, Intel, FR079 and MITb; schemes `single` and
-// `runs`, which is the thesis's multi-node scheme. What it does not say is NaN.
+// `multi`. What it does not say is NaN.
 
 inline constexpr double kNotSaid = std::numeric_limits<double>::quiet_NaN();
 

@@ -118,6 +118,12 @@ Pose align(const Pairs& pairs) {
   return {R, truth_centre - R * estimate_centre};
 }
 
+}  // namespace
+
+Pose align(const TrajectoryPairs& pairs) { return align(pairs_of(pairs)); }
+
+namespace {
+
 // Errors ------------------------------------------------------------------------------------------
 
 /// Sums of squared errors: translations [m²] and rotation angles [rad²].

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "cairn/sparsification/measures.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -9,11 +10,14 @@
 #include <fmt/core.h>
 #include <Eigen/Core>
 
+#include "cairn/evaluation/trajectory.hpp"
 #include "cairn/geometry/pose.hpp"
 #include "cairn/graph/gauge.hpp"
 #include "cairn/linear/graph_marginals.hpp"
 #include "cairn/linear/normal_equations.hpp"
 #include "cairn/runtime/error.hpp"
+#include "dense/lu.hpp"
+#include "dense/products.hpp"
 
 namespace cairn {
 namespace {
@@ -55,37 +59,100 @@ std::vector<int> partners(const Graph& original, const Graph& sparse) {
   return at;
 }
 
-/// δ_v with sparse = original ⊕ δ, a node's tangent after the other's; and the RMS of positions.
-struct Shift {
-  std::vector<Eigen::VectorXd> tangent;
-  double rmse = 0.0;
-};
-
-Shift shift(const Graph& original, const Graph& sparse, const std::vector<int>& at) {
-  Shift result;
-  double squares = 0.0;
-  int positions = 0;
+/// δ_v with sparse = original ⊕ δ, in the tangent of `at`: of the original, or of the sparse graph.
+std::vector<Eigen::VectorXd> tangent_shift(const Graph& original, const Graph& sparse,
+                                           const std::vector<int>& partner, ComparedAt at) {
+  std::vector<Eigen::VectorXd> shift;
   for (int v = 0; v < sparse.variable_count(); ++v) {
     const VariableType& type = sparse.type(v);
     Eigen::VectorXd delta(type.tangent_size());
-    // Both are seen from q, whose H it is multiplied with.
-    type.local(1, sparse.state(v).data(), original.state(at[v]).data(), delta.data());
-    result.tangent.push_back(std::move(delta));
-    if (!has_position(type)) continue;
-    const Eigen::Vector3d p = position(type, original.state(at[v]));
-    const Eigen::Vector3d q = position(type, sparse.state(v));
-    for (int k = 0; k < 3; ++k) squares += (p[k] - q[k]) * (p[k] - q[k]);
-    ++positions;
+    const double* p = original.state(partner[v]).data();
+    const double* q = sparse.state(v).data();
+    // Only its square is needed: from which end it is seen matters, its sign does not.
+    type.local(1, at == ComparedAt::common ? p : q, at == ComparedAt::common ? q : p, delta.data());
+    shift.push_back(std::move(delta));
   }
-  result.rmse =
-      positions > 0 ? std::sqrt(squares / positions) : std::numeric_limits<double>::quiet_NaN();
-  return result;
+  return shift;
+}
+
+void measure_positions(const Graph& original, const Graph& sparse, const std::vector<int>& partner,
+                       SparsificationError& error) {
+  TrajectoryPairs pairs;
+  const auto add = [](Trajectory& to, const Graph& graph, int v) {
+    const Pose pose = pose_of(graph.type(v), graph.state(v));
+    TrajectoryPose& added = to.emplace_back();
+    added.id = graph.id(v);
+    std::ranges::copy(pose.t, added.t.begin());
+    std::ranges::copy(pose.R.reshaped(), added.R.begin());
+  };
+  for (int v = 0; v < sparse.variable_count(); ++v) {
+    if (!has_position(sparse.type(v))) continue;
+    add(pairs.truth, original, partner[v]);
+    add(pairs.estimate, sparse, v);
+  }
+  const std::size_t count = pairs.truth.size();
+  if (count == 0) {
+    error.rmse = error.rmse_aligned = std::numeric_limits<double>::quiet_NaN();
+    return;
+  }
+  const auto rmse = [&](const Pose& motion) {
+    double squares = 0.0;
+    for (std::size_t k = 0; k < count; ++k) {
+      const Eigen::Map<const Eigen::Vector3d> p(pairs.truth[k].t.data());
+      const Eigen::Map<const Eigen::Vector3d> q(pairs.estimate[k].t.data());
+      squares += (p - motion.R * q - motion.t).squaredNorm();
+    }
+    return std::sqrt(squares / static_cast<double>(count));
+  };
+  error.rmse = rmse({});
+  error.rmse_aligned = rmse(align(pairs));
+}
+
+/// The derivative of position and orientation in the world by the tangent at a state; not square
+/// where a type has more or less than these. A pose in the plane turns about z.
+Eigen::MatrixXd world_jacobian(const VariableType& type, std::span<const double> x) {
+  constexpr double kStep = 1e-5;
+  const int n = type.tangent_size(), d = type.placement()->dimension();
+  const int turns = !has_orientation(type) ? 0 : d == 2 ? 1 : 3;
+  Eigen::MatrixXd J(d + turns, n);
+  const Eigen::Matrix3d back = pose_of(type, x).R.transpose();
+  std::vector<double> delta(n, 0.0), moved(x.size());
+  const auto place = [&](int k, double step) {
+    delta[k] = step;
+    const std::int64_t offset = 0;
+    type.retract(1, x.data(), &offset, delta.data(), moved.data());
+    delta[k] = 0.0;
+    return pose_of(type, moved);
+  };
+  for (int k = 0; k < n; ++k) {
+    const Pose ahead = place(k, kStep), behind = place(k, -kStep);
+    J.col(k).head(d) = (ahead.t - behind.t).head(d) / (2.0 * kStep);
+    if (turns == 0) continue;
+    const Eigen::Matrix3d A = (ahead.R - behind.R) * back / (2.0 * kStep);  // antisymmetric
+    const Eigen::Vector3d axis(0.5 * (A(2, 1) - A(1, 2)), 0.5 * (A(0, 2) - A(2, 0)),
+                               0.5 * (A(1, 0) - A(0, 1)));
+    J.col(k).tail(turns) = axis.tail(turns);
+  }
+  return J;
+}
+
+/// What takes a node's tangent in the original graph to that in the sparse one so that both are the
+/// same motion in the world; the identity for types that are more than a position and an
+/// orientation.
+Eigen::MatrixXd turn(const VariableType& type, std::span<const double> original,
+                     std::span<const double> sparse) {
+  const int n = type.tangent_size();
+  if (has_position(type)) {
+    const Eigen::MatrixXd to = world_jacobian(type, sparse);
+    if (to.rows() == n) return Eigen::PartialPivLU<Eigen::MatrixXd>(to).solve(world_jacobian(type, original));
+  }
+  return Eigen::MatrixXd::Identity(n, n);
 }
 
 }  // namespace
 
 SparsificationError sparsification_error(const Graph& original, const Graph& sparse,
-                                         LinearSolver& solver) {
+                                         LinearSolver& solver, ComparedAt compared) {
   const std::vector<int> at = partners(original, sparse);
   Graph p = original.clone(), q = sparse.clone();
   for (const int v : resolve_gauge(sparse).anchored) {
@@ -93,8 +160,15 @@ SparsificationError sparsification_error(const Graph& original, const Graph& spa
     p.set_fixed(at[v]);
   }
   SparsificationError error;
-  const Shift moved = shift(original, sparse, at);
-  error.rmse = moved.rmse;
+  measure_positions(original, sparse, at, error);
+  const std::vector<Eigen::VectorXd> moved = tangent_shift(original, sparse, at, compared);
+  std::vector<Eigen::MatrixXd> turns;  // where each graph is linearised at its own states
+  if (compared == ComparedAt::common) {
+    for (int v = 0; v < q.variable_count(); ++v) q.set_state(v, original.state(at[v]));
+  } else {
+    for (int v = 0; v < q.variable_count(); ++v)
+      turns.push_back(turn(q.type(v), original.state(at[v]), sparse.state(v)));
+  }
 
   // q: Λ̆ and its determinant. Its blocks are kept, since the solver serves three graphs in turn.
   struct Entry {
@@ -139,10 +213,16 @@ SparsificationError sparsification_error(const Graph& original, const Graph& spa
   for (const Entry& entry : entries) {
     const auto rows = entry.value.rows(), columns = entry.value.cols();
     const double twice = entry.row == entry.column ? 1.0 : 2.0;
-    trace += twice * entry.value.cwiseProduct(Block(block, rows, columns)).sum();
-    error.mean +=
-        0.5 * twice * moved.tangent[entry.row].dot(entry.value * moved.tangent[entry.column]);
+    Eigen::MatrixXd S = Block(block, rows, columns);
+    if (!turns.empty())
+      S = dense::product_with_transpose(dense::product(turns[entry.row], S), turns[entry.column]);
+    trace += twice * entry.value.cwiseProduct(S).sum();
+    error.mean += 0.5 * twice * moved[entry.row].dot(entry.value * moved[entry.column]);
     block += rows * columns;
+  }
+  for (int v = 0; v < static_cast<int>(std::ssize(turns)); ++v) {
+    if (!q.fixed(v))
+      log_p -= 2.0 * std::log(std::abs(Eigen::PartialPivLU<Eigen::MatrixXd>(turns[v]).determinant()));
   }
   error.covariance = 0.5 * (trace - log_q + log_p - static_cast<double>(d));
   error.kld = error.covariance + error.mean;

@@ -69,18 +69,29 @@ RecoveryProblem BlanketProjection::problem(const DenseBlanket& blanket,
   const int d = blanket.size();
   const MatrixMap T(T_.data(), d, rank), L(blanket.information.data(), d, d);
   const std::vector<int> begin = blanket.offsets();
-  RecoveryProblem problem{.rank = rank, .factors = {}};
+  RecoveryProblem problem{.rank = rank, .factors = {}, .basis = T_};
   for (const FactorChoice& choice : topology) {
     RecoveryProblem::Factor factor;
-    for (const int model : choice) factor.size += blanket.models[model].size;
+    std::vector<bool> measured(begin.size());
+    for (const int model : choice) {
+      factor.size += blanket.models[model].size;
+      for (const int node : blanket.models[model].nodes) measured[node] = true;
+    }
+    for (std::size_t node = 0; node + 1 < begin.size(); ++node) {
+      for (int k = begin[node]; measured[node] && k < begin[node + 1]; ++k)
+        factor.columns.push_back(k);
+    }
+    Matrix A(factor.size, factor.columns.size());
     Matrix J(factor.size, rank);
     int row = 0;
     for (const int number : choice) {
       const FactorModel& model = blanket.models[number];
-      J.middleRows(row, model.size) =
-          dense::product(MatrixMap(model.jacobian.data(), model.size, d), T);
+      const MatrixMap of(model.jacobian.data(), model.size, d);
+      A.middleRows(row, model.size) = of(Eigen::all, factor.columns);
+      J.middleRows(row, model.size) = dense::product(of, T);
       row += model.size;
     }
+    factor.in_columns.assign(A.data(), A.data() + A.size());
     factor.jacobian.assign(J.data(), J.data() + J.size());
     const FactorModel& model = blanket.models[choice.front()];
     if (choice.size() == 1 && model.nodes.size() == 2) {

@@ -51,6 +51,7 @@ double optimize(Graph& graph, Parts& parts, const SparsifySetting& setting, cons
                     return parts.optimizer->optimize(
                         graph, setting.stop, setting.optimisation ? *setting.optimisation : silent);
                   });
+  if (result.status == Status::converged) result.status = summary.status;
   if (summary.status == Status::interrupted) {
     result.interrupted = true;
   } else if (summary.status != Status::converged) {
@@ -103,7 +104,8 @@ std::vector<int> select(const Graph& graph, const std::vector<int>& nodes, Parts
 
 void measure(const Graph& original, Parts& parts, SparsifyResult& result) {
   try {
-    result.error = sparsification_error(original, result.sparse, *parts.solver);
+    result.error = sparsification_error(original, result.sparse, *parts.solver,
+                                        parts.job.compared_at);
   } catch (const Error& error) {
     if (error.code() != ErrorCode::numerical) throw;
     result.notes.push_back(fmt::format("no KLD: {}", error.what()));
@@ -160,8 +162,7 @@ class OnlineRun {
         setting_(setting),
         parts_(job, setting),
         estimator_(setting.registry.make<Estimator>(job.estimator)),
-        redirection_(job.redirect_early > 0 ? Redirection::Nearest::order
-                                            : Redirection::Nearest::place) {
+        redirection_(job.redirection) {
     estimator_->set_loss(setting.loss, setting.loss_on);
   }
 
@@ -272,7 +273,12 @@ class OnlineRun {
     result_.change.removed_variables.insert(result_.change.removed_variables.end(),
                                             change.removed_variables.begin(),
                                             change.removed_variables.end());
-    redirection_.leave(graph, change.removed_variables);
+    std::vector<int> undecided;
+    for (const Id id : pending_) undecided.push_back(graph.find(id).value());
+    for (int v = 0; v < graph.variable_count(); ++v) {
+      if (early_.contains(graph.id(v))) undecided.push_back(v);
+    }
+    redirection_.leave(graph, change.removed_variables, undecided);
     GraphUpdate update;
     for (const int f : change.removed_factors) update.removed_factors.push_back(live_[f]);
     for (const int v : change.removed_variables) update.removed_variables.push_back(graph.id(v));

@@ -9,6 +9,7 @@
 #include <Eigen/Dense>
 
 #include "cairn/runtime/error.hpp"
+#include "unit/plugins/sparsify/blankets.hpp"
 #include "unit/plugins/sparsify/problems.hpp"
 
 namespace cairn::sparsify {
@@ -117,7 +118,7 @@ TEST(Approximation, SaysWhatTheDefinitionDoes) {
     ASSERT_TRUE(at.set(W));
     const Matrix L = approximated(problem, unscaled(scaled, W));
     EXPECT_THAT(at.kld(), DoubleNear(dense_kld(L), 1e-9 * (1.0 + at.kld())));
-    EXPECT_THAT(apart(at.S(), L.inverse()), Lt(1e-9));
+    EXPECT_THAT(apart(at.V(), scaled.T * L.inverse() * scaled.T.transpose()), Lt(1e-9));
     for (int k = 0; k < scaled.factors(); ++k)
       EXPECT_THAT(apart(at.M(k), scaled.Q[k] * L.inverse() * scaled.Q[k].transpose()), Lt(1e-9));
   });
@@ -134,9 +135,42 @@ TEST(Approximation, ManyChangesAreOneSet) {
     }
     ASSERT_TRUE(fresh.set(at.W()));
     EXPECT_THAT(at.kld(), DoubleNear(fresh.kld(), 1e-9));
-    EXPECT_THAT(apart(at.S(), fresh.S()), Lt(1e-9));
+    EXPECT_THAT(apart(at.V(), fresh.V()), Lt(1e-9));
     for (int k = 0; k < scaled.factors(); ++k) EXPECT_THAT(apart(at.M(k), fresh.M(k)), Lt(1e-9));
   });
+}
+
+// A factor that says which few columns of a basis it measures is the same factor.
+TEST(Approximation, IsTheSameByColumns) {
+  cairn::Registry registry;
+  Draw draw(8);
+  for (const int dimension : {2, 3}) {
+    const DenseBlanket blanket = random_blanket(registry, dimension, 7, draw, 7);
+    for (const Projection how : {Projection::node, Projection::eigen}) {
+      const RecoveryProblem by_columns =
+          BlanketProjection(blanket, how).problem(blanket, every_model(blanket));
+      ASSERT_FALSE(by_columns.basis.empty());
+      RecoveryProblem dense = by_columns;
+      dense.basis.clear();
+      const ScaledProblem scaled_by_columns(by_columns), scaled(dense);
+      Approximation at(scaled_by_columns), reference(scaled), few(scaled_by_columns);
+      const std::vector<Matrix> W = random_weights(draw, scaled);
+      ASSERT_TRUE(at.set(W) && reference.set(W) && few.set(W));
+      few.follow({0, 3});
+      for (int times = 0; times < 50; ++times) {
+        const int k = draw.integer(2) * 3;
+        const Matrix change = draw.uniform(0.3, 1.0) * draw.definite(scaled.size(k));
+        for (Approximation* each : {&at, &reference, &few}) each->change(k, change);
+      }
+      EXPECT_THAT(apart(few.M(3), reference.M(3)), Lt(1e-8));
+      few.follow_all();
+      EXPECT_THAT(at.kld(), DoubleNear(reference.kld(), 1e-8));
+      for (int k = 0; k < scaled.factors(); ++k) {
+        EXPECT_THAT(apart(at.M(k), reference.M(k)), Lt(1e-8));
+        EXPECT_THAT(apart(few.M(k), reference.M(k)), Lt(1e-8));
+      }
+    }
+  }
 }
 
 TEST(Approximation, RefusesToBeSingular) {

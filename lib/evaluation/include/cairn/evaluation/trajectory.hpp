@@ -7,6 +7,7 @@
 #include <optional>
 #include <vector>
 
+#include "cairn/geometry/pose.hpp"
 #include "cairn/graph/graph.hpp"
 #include "cairn/runtime/api.hpp"
 
@@ -86,8 +87,12 @@ struct TrajectoryError {
   double rpe_all_rotation = 0.0;     ///< [deg]
 };
 
-/// Compares poses after the rigid motion (Kabsch, no scale) that brings the estimate nearest to the
-/// truth. All-to-all errors go over all n(n-1)/2 pairs of instants.
+/// The rigid motion (Kabsch, no scale) that brings the positions of the estimate nearest to those of
+/// the truth; about z where both lie in the plane. What positions leave open, the orientations
+/// decide.
+CAIRN_API Pose align(const TrajectoryPairs& pairs);
+
+/// Compares poses after `align`. All-to-all errors go over all n(n-1)/2 pairs of instants.
 CAIRN_API TrajectoryError compare(const TrajectoryPairs& pairs);
 /// The same for poses of equal id.
 CAIRN_API TrajectoryError compare(const Trajectory& estimate, const Trajectory& truth);

@@ -25,12 +25,17 @@ struct RecoveryProblem {
   struct Factor {
     int size = 0;                  ///< m
     std::vector<double> jacobian;  ///< J_k, m × r, of full rank
+    /// Where `basis` is given: J_k = A T(columns, ·), A m × columns. What a factor measures are a
+    /// few columns of T's rows, and with these the steps of factor descent are cheap.
+    std::vector<int> columns{};
+    std::vector<double> in_columns{};  ///< A
     /// J_a⁻ᵀ Λ_ab J_b⁻¹ (T 4.8) with the two nodes' blocks; not symmetric in general. Empty: not
     /// defined.
     std::vector<double> off_diagonal;
   };
   int rank = 0;  ///< r
   std::vector<Factor> factors;
+  std::vector<double> basis{};  ///< T, d × r, column-major; may be empty
 };
 
 /// How coordinates are chosen in which the dense Gaussian has a covariance (T 4.3).

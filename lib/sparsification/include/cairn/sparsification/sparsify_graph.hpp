@@ -27,12 +27,13 @@ struct SparsifyJob {
   std::string linear_solver = "block_cholesky";    ///< for determinants
   std::string estimator = "incremental_cholesky";  ///< online
   int online = 0;                                  ///< online: take nodes out after so many poses
+  RedirectionRule redirection{};  ///< online: of factors on nodes that have left
   /// Online: one of so many nodes is known to stay, and factors to older nodes that are to leave
-  /// are redirected at once, to the nearest by id (Vallvé 2018, section 4.6.4); 0: only once these
-  /// have left, and to the nearest in space.
+  /// are redirected at once (Vallvé 2018, section 4.6.4); 0: only once these have left.
   int redirect_early = 0;
   bool as_given = false;  ///< the graph is at its minimum: it is not optimised before
   bool measure = true;    ///< KLD and RMSE of the whole
+  ComparedAt compared_at = ComparedAt::common;  ///< for the KLD
 };
 
 struct SparsifyResult {
@@ -50,7 +51,10 @@ struct SparsifyResult {
   std::int64_t redirected = 0, dropped = 0;  ///< factors on nodes that had left
   std::vector<double> steps;                 ///< seconds of each pose, sparsification included
   bool interrupted = false;
-  bool converged = true;  ///< all optimisations of whole graphs
+  /// Of the optimisations of whole graphs: the first that is not `converged`. With a tolerance of 0
+  /// `max_iterations` is what was asked for, and no failure.
+  Status status = Status::converged;
+  bool converged = true;  ///< none of them failed
   std::vector<std::string> notes;
 };
 
