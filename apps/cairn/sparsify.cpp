@@ -73,6 +73,12 @@ SparsifyJob job_of(const SparsifyCommandOptions& options, Session& session) {
     job.redirect_early = options.keep_every;
     job.redirection.to = RedirectionRule::To::order;
   }
+  if (options.online == 0 && (!options.redirect_to.empty() || options.newer ||
+                              options.inflation != RedirectionRule{}.inflation)) {
+    throw Error(ErrorCode::usage,
+                "--redirect-to, --newer and --inflation are for factors that come late: they need "
+                "--online");
+  }
   using To = RedirectionRule::To;
   for (const auto& [name, to] : {std::pair{"path", To::path},
                                  {"place", To::place},
@@ -253,7 +259,7 @@ int run_sparsify(SparsifyCommandOptions options, Session& session) {
       topology->second.starts_with("cliquey")) {
     throw Error(ErrorCode::usage,
                 "--topology cliquey makes pairs of correlated factors (CORRELATED_PAIR), which no "
-                "format of graphs expresses: leave --output away to compare, or choose another "
+                "format of graphs expresses: omit --output to compare, or choose another "
                 "topology to write");
   }
   const ProblemSetup setup(options.problem, registry);

@@ -52,28 +52,34 @@ Command add_study_sparsify(ArgumentParser study) {
   ArgumentParser cli = study.add_command(
       "sparsify", "cairn sparsify as in the thesis, and with its problems recorded");
   add_sparsify_options(cli, *options);
-  cli.add_option("--redirect", options->redirect,
-                 "online: factors to nodes that leave are redirected once these have left (late), or "
-                 "as soon as the nodes are measured again (early)")
+  cli.add_option(
+         "--redirect", options->redirect,
+         "online: factors to nodes that leave are redirected once these have left (late), or "
+         "as soon as the nodes are measured again (early)")
       .type_name("WHEN")
       .one_of({"late", "early"})
       .show_default();
-  cli.add_option("--redirect-to", options->redirect_to,
-                 "to the node with the most certain path of measurements, which are added (path), "
-                 "the nearest in space (place) or by id (order), or the next by id (next) [late: "
-                 "path, early: order]")
+  cli.add_option(
+         "--redirect-to", options->redirect_to,
+         "online: to the node with the most certain path of measurements, whose covariances "
+         "are added (path), the nearest in space (place) or by id (order), or the next by id "
+         "(next) [late: "
+         "path, early: order]")
       .type_name("WHICH")
       .one_of({"path", "place", "order", "next"});
-  cli.add_flag("--newer", options->newer, "of two that are equally near, the newer");
+  cli.add_flag("--newer", options->newer,
+               "online: of two that are equally near, the newer (place, order)");
   cli.add_option("--inflation", options->inflation,
-                 "path: its covariance is multiplied by this, since its error is common to all factors "
+                 "online: the covariance of the path is multiplied by this, since its error is "
+                 "common to all factors "
                  "that are redirected along it")
       .type_name("X")
       .within(0.0, 1e6)
       .show_default();
-  cli.add_option("--compared-at", options->compared_at,
-                 "for the KLD both graphs are linearised at the states of the original (common), or "
-                 "each at its own minimum in world coordinates (minima), as in the thesis")
+  cli.add_option(
+         "--compared-at", options->compared_at,
+         "for the KLD both graphs are linearised at the states of the original (common), or "
+         "each at its own minimum in world coordinates (minima), as in the thesis")
       .type_name("WHERE")
       .one_of({"common", "minima"})
       .show_default();

@@ -75,9 +75,9 @@ ScaledProblem::ScaledProblem(const RecoveryProblem& problem) : rank(problem.rank
   for (std::size_t k = 0; k < problem.factors.size(); ++k) {
     const RecoveryProblem::Factor& factor = problem.factors[k];
     columns.push_back(factor.columns);
-    A.push_back(dense::product(
-        Phi_root[k], Eigen::Map<const Matrix>(factor.in_columns.data(), factor.size,
-                                              std::ssize(factor.columns))));
+    A.push_back(
+        dense::product(Phi_root[k], Eigen::Map<const Matrix>(factor.in_columns.data(), factor.size,
+                                                             std::ssize(factor.columns))));
   }
 }
 

@@ -29,8 +29,8 @@ struct ScaledProblem {
   std::vector<Matrix> Q;         ///< m × r
   std::vector<Matrix> Phi_root;  ///< Φ^½, symmetric
   /// Q_k = A_k T(columns_k, ·); where the problem has no such form, T is the identity.
-  Matrix T;                            ///< d × r
-  std::vector<Matrix> A;               ///< m × columns
+  Matrix T;               ///< d × r
+  std::vector<Matrix> A;  ///< m × columns
   std::vector<std::vector<int>> columns;
 
   int factors() const { return static_cast<int>(Q.size()); }
@@ -62,8 +62,8 @@ class Approximation {
   bool set(std::vector<Matrix> W);
   /// Computes V and all M anew from W; false if Λ̆ is singular.
   bool refresh();
-  /// Changes one W, and V and M with it: of all factors, or, after `follow`, of those alone, which is
-  /// faster where there are many.
+  /// Changes one W, and V and M with it: of all factors, or, after `follow`, of those alone, which
+  /// is faster where there are many.
   void change(int k, const Matrix& W);
   void follow(std::vector<int> factors);
   /// Computes M of all factors anew from V, and follows all again.
@@ -95,7 +95,7 @@ class Approximation {
   std::vector<Matrix> W_, M_;
   Matrix V_;
   double trace_ = 0.0, log_determinant_ = 0.0;
-  std::vector<int> followed_;  ///< those whose M is kept
+  std::vector<int> followed_;    ///< those whose M is kept
   Matrix VAt_, CVA_, R_, part_;  // room
 };
 

@@ -30,8 +30,9 @@ double log_determinant(const Matrix& A) {
   return std::log(std::max(std::abs(A.determinant()), 1e-300));
 }
 
-/// Passes of factor descent over the chosen factors after each that is added.
+/// Passes of factor descent over the chosen factors, whenever these have become more by a part.
 constexpr int kRelaxations = 2;
+constexpr double kGrowth = 0.1;
 
 /// ε in Λ's units.
 double epsilon_of(const DenseBlanket& blanket, const TopologyOptions& options) {
@@ -261,8 +262,8 @@ std::vector<FactorChoice> ExpectedDivergence::choose(const DenseBlanket& blanket
   std::iota(in.begin(), in.end(), 0);
   for (int k = static_cast<int>(std::ssize(chosen)); k < static_cast<int>(std::ssize(all)); ++k)
     open.push_back(k);
-  // The factors chosen before are relaxed: each had its optimum with those that were there then, and
-  // together they would claim more and more, so that further gains would be misjudged.
+  // The factors chosen before are relaxed: each had its optimum with those that were there then,
+  // and together they would claim more and more, so that further gains would be misjudged.
   const auto relax = [&] {
     at.follow(in);
     for (int pass = 0; pass < kRelaxations; ++pass) {
@@ -270,6 +271,7 @@ std::vector<FactorChoice> ExpectedDivergence::choose(const DenseBlanket& blanket
     }
     at.follow_all();
   };
+  double relax_at = 0.0;
   while (true) {
     Approximation::Best best;
     auto which = open.end();
@@ -286,7 +288,10 @@ std::vector<FactorChoice> ExpectedDivergence::choose(const DenseBlanket& blanket
     chosen.push_back(all[*which]);
     open.erase(which);
     if (static_cast<int>(std::ssize(chosen)) >= population) return chosen;
-    relax();
+    if (static_cast<double>(std::ssize(in)) >= relax_at) {
+      relax();
+      relax_at = (1.0 + kGrowth) * static_cast<double>(std::ssize(in));
+    }
   }
 }
 

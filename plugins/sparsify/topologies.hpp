@@ -34,7 +34,8 @@ struct TopologyOptions {
         .choice("regularization", &O::regularization,
                 "mutual information where Λ is singular: of (Λ + εI)⁻¹, or with εI in each "
                 "determinant of Λ's marginals")
-        .real("epsilon", &O::epsilon, 1e-12, 1e9, "ε, as a fraction of Λ's mean diagonal")
+        .real("epsilon", &O::epsilon, 1e-12, 1e9,
+              "ε, as a fraction of Λ's mean diagonal unless it is absolute")
         .boolean("absolute", &O::absolute, "ε is in Λ's own units instead, as in the thesis");
   }
 };
@@ -125,8 +126,8 @@ class DowndatedInformation final : public ChowLiuTree {
   Downdate downdate_;
 };
 
-/// That tree, and one by one the factor that lowers the KLD most by one step of factor descent; after
-/// each the factors chosen so far are relaxed by two passes of it.
+/// That tree, and one by one the factor that lowers the KLD most by one step of factor descent;
+/// after each tenth of them the factors chosen so far are relaxed by two passes of it.
 class ExpectedDivergence final : public ChowLiuTree {
  public:
   using ChowLiuTree::ChowLiuTree;
@@ -160,8 +161,8 @@ class Cliquey final : public ChowLiuTree {
   std::vector<FactorChoice> choose(const DenseBlanket& blanket, int population) override;
 };
 
-/// Every topology of that population is tried, and the one with the least KLD taken; where there are
-/// too many, that of `ekld`, or `choose` throws `Error` (usage).
+/// Every topology of that population is tried, and the one with the least KLD taken; where there
+/// are too many, that of `ekld`, or `choose` throws `Error` (usage).
 class Exhaustive final : public ChowLiuTree {
  public:
   explicit Exhaustive(const ExhaustiveOptions& options)

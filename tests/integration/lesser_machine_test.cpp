@@ -32,6 +32,9 @@ class LesserMachine : public ::testing::TestWithParam<Machine> {
 
 TEST_P(LesserMachine, ReachesTheSameChi2WithTheSameBinary) {
   const Arguments emulator{"qemu-x86_64", "-cpu", GetParam().cpu};
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+  GTEST_SKIP() << "an emulated processor has no room for the sanitizer's shadow memory";
+#endif
   if (run_program({"qemu-x86_64", "--version"}).exit_code != 0)
     GTEST_SKIP() << "no qemu-x86_64 here: install the package qemu-user";
   for (const char* graph : {"@manhattan:poses=500", "@sphere:turns=8,poses_per_turn=12"}) {

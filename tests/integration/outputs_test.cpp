@@ -189,6 +189,9 @@ TEST_F(Outputs, ALimitOfTheSizeOfFilesIsAnError) {
 }
 
 TEST_F(Outputs, ThreadsThatCannotBeStartedAreAnError) {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+  GTEST_SKIP() << "the sanitizer needs more address space than the limit leaves";
+#endif
   graph();
   // 800 stacks of 8 MB do not fit.
   const Outcome outcome = shell(

@@ -15,8 +15,9 @@ using Words = std::vector<std::string>;
 /// What the tables want of a run; of `cairn replay` there is less.
 json::object sparsify_summary(const json::value& report) {
   json::object all;
-  for (const char* name : {"poses", "factors", "problems", "kld", "kld_parts", "rmse", "rmse_aligned",
-                           "rmse_full", "seconds", "steps", "redirected", "dropped"}) {
+  for (const char* name :
+       {"poses", "factors", "problems", "kld", "kld_parts", "rmse", "rmse_aligned", "rmse_full",
+        "seconds", "steps", "redirected", "dropped"}) {
     if (const json::value* found = member(report, name)) all[name] = *found;
   }
   return all;
@@ -25,9 +26,9 @@ json::object sparsify_summary(const json::value& report) {
 }  // namespace
 
 Words thesis_experiment(int keep_every, const std::string& scheme, const std::string& compared_at) {
-  return {"--online",      "100",    "--keep-every", fmt::format("{}", keep_every),
-          "--redirect",    "early",  "--redirect-to", "next", "--scheme",
-          scheme,          "--compared-at", compared_at};
+  return {"--online",   "100",   "--keep-every",  fmt::format("{}", keep_every),
+          "--redirect", "early", "--redirect-to", "next",
+          "--scheme",   scheme,  "--compared-at", compared_at};
 }
 
 void sparsify_rounds(const Bench& bench, const DataSet& set, std::vector<Contestant>& contestants,

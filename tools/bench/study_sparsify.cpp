@@ -92,8 +92,8 @@ json::object measure_topologies(const Bench& bench, const DataSet& set) {
   return entry;
 }
 
-/// The regularisation of mutual information, of which the thesis does not say how much it is; ε as a
-/// fraction of Λ's mean diagonal.
+/// The regularisation of mutual information, of which the thesis does not say how much it is; ε as
+/// a fraction of Λ's mean diagonal.
 json::object measure_regularization(const Bench& bench, const DataSet& set) {
   std::vector<Contestant> contestants;
   for (const char* topology : {"clt", "mi"}) {
@@ -138,8 +138,7 @@ json::object measure_growing(const Bench& bench, const DataSet& set) {
 json::object measure_online(const Bench& bench, const DataSet& set) {
   const Words online{"--online", "100", "--keep-every", "5"};
   std::vector<Contestant> contestants{
-      contestant("late", online),
-      contestant("place", joined(online, {"--redirect-to", "place"})),
+      contestant("late", online), contestant("place", joined(online, {"--redirect-to", "place"})),
       contestant("order", joined(online, {"--redirect-to", "order"})),
       contestant("early", joined(online, {"--redirect", "early"}))};
   sparsify_rounds(bench, set, contestants, kFewRounds);

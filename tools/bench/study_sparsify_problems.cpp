@@ -56,9 +56,10 @@ void measure_problems(const Bench& bench, const DataSet& set, const Recording& r
               each("--recovery",
                    {"fd:initial=identity,iterations=0", "fd:initial=odb,iterations=0",
                     "fd:initial=ffd,iterations=0", "fd:initial=scaled,iterations=0", "ncfd"})));
-  part("topology", joined({"--population", "fill:0.75", "--recovery", "ncfd"},
-                          each("--topology", {"mi", "dmi", "ekld", "odd", "l1",
-                                              fmt::format("best:most={},beyond=refuse", recording.most)})));
+  part("topology",
+       joined({"--population", "fill:0.75", "--recovery", "ncfd"},
+              each("--topology", {"mi", "dmi", "ekld", "odd", "l1",
+                                  fmt::format("best:most={},beyond=refuse", recording.most)})));
 }
 
 }  // namespace

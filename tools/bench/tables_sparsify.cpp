@@ -259,8 +259,9 @@ std::string large_table(const json::array& entries) {
       const double removed = median_of(c, "poses.in") - median_of(c, "poses.kept");
       Cells cells{text(entry, "name"), name_of(c) == "late" ? "every 100 poses" : "at the end"};
       cells = joined(joined(joined(cells, poses_and_factors(c)), blankets(c)), loss(c));
-      table.add(joined(cells, {digits(median_of(c, "kld") / removed),
-                               digits(median_of(c, "rmse_aligned")), total(c), milliseconds(median_of(c, "seconds.total") / removed)}));
+      table.add(joined(cells,
+                       {digits(median_of(c, "kld") / removed), digits(median_of(c, "rmse_aligned")),
+                        total(c), milliseconds(median_of(c, "seconds.total") / removed)}));
     }
   }
   return table.text();
@@ -289,10 +290,11 @@ std::string online_table(const json::array& entries) {
       if (!c) continue;
       Cells cells{"", how};
       cells = joined(joined(cells, poses_and_factors(c)), loss(c));
-      table.add(joined(cells, {digits(median_of(c, "rmse_aligned")), digits(median_of(c, "rmse_full")),
-                               milliseconds(median_of(c, "steps.median")),
-                               milliseconds(median_of(c, "steps.p99")),
-                               milliseconds(median_of(c, "steps.max")), total(c)}));
+      table.add(joined(
+          cells,
+          {digits(median_of(c, "rmse_aligned")), digits(median_of(c, "rmse_full")),
+           milliseconds(median_of(c, "steps.median")), milliseconds(median_of(c, "steps.p99")),
+           milliseconds(median_of(c, "steps.max")), total(c)}));
     }
   }
   return table.text();
@@ -307,9 +309,8 @@ std::string selection_table(const json::array& entries) {
       const json::value* c = &each;
       Cells cells{graph, "`" + name_of(c) + "`"};
       cells = joined(joined(joined(cells, poses_and_factors(c)), blankets(c)), loss(c));
-      table.add(joined(
-          cells, {digits(median_of(c, "rmse_aligned")), digits(median_of(c, "seconds.select")),
-                  total(c)}));
+      table.add(joined(cells, {digits(median_of(c, "rmse_aligned")),
+                               digits(median_of(c, "seconds.select")), total(c)}));
       graph.clear();
     }
   }

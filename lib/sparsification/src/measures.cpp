@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <utility>
 #include <vector>
 
@@ -12,6 +13,7 @@
 
 #include "cairn/evaluation/trajectory.hpp"
 #include "cairn/geometry/pose.hpp"
+#include "cairn/geometry/state_group.hpp"
 #include "cairn/graph/gauge.hpp"
 #include "cairn/linear/graph_marginals.hpp"
 #include "cairn/linear/normal_equations.hpp"
@@ -57,6 +59,39 @@ std::vector<int> partners(const Graph& original, const Graph& sparse) {
     at.push_back(*there);
   }
   return at;
+}
+
+/// Moves each component of q whose gauge is free, and which is poses of one kind, so that its
+/// anchor is where it is in the original: how the whole is placed is no difference of the graphs.
+void place_anchors(const Graph& original, const std::vector<int>& partner,
+                   const std::vector<int>& anchored, Graph& q) {
+  if (anchored.empty()) return;
+  std::vector<int> root(q.variable_count());
+  std::iota(root.begin(), root.end(), 0);
+  const auto find = [&](int v) {
+    while (root[v] != v) v = root[v] = root[root[v]];
+    return v;
+  };
+  for (int f = 0; f < q.factor_count(); ++f) {
+    const auto on = q.factor_variables(f);
+    for (const int v : on) root[find(v)] = find(on[0]);
+  }
+  for (const int anchor : anchored) {
+    const VariableType& type = q.type(anchor);
+    if (!is_pose(type)) continue;
+    std::vector<int> component;
+    bool alike = true;
+    for (int v = 0; v < q.variable_count(); ++v) {
+      if (find(v) != find(anchor)) continue;
+      component.push_back(v);
+      alike = alike && q.type(v).tag() == type.tag();
+    }
+    if (!alike) continue;
+    const StateGroup group(type);
+    const std::vector<double> motion =
+        group.compose(original.state(partner[anchor]), group.inverse(q.state(anchor)));
+    for (const int v : component) q.set_state(v, group.compose(motion, q.state(v)));
+  }
 }
 
 /// δ_v with sparse = original ⊕ δ, in the tangent of `at`: of the original, or of the sparse graph.
@@ -144,18 +179,22 @@ Eigen::MatrixXd turn(const VariableType& type, std::span<const double> original,
   const int n = type.tangent_size();
   if (has_position(type)) {
     const Eigen::MatrixXd to = world_jacobian(type, sparse);
-    if (to.rows() == n) return Eigen::PartialPivLU<Eigen::MatrixXd>(to).solve(world_jacobian(type, original));
+    if (to.rows() == n)
+      return Eigen::PartialPivLU<Eigen::MatrixXd>(to).solve(world_jacobian(type, original));
   }
   return Eigen::MatrixXd::Identity(n, n);
 }
 
 }  // namespace
 
-SparsificationError sparsification_error(const Graph& original, const Graph& sparse,
+SparsificationError sparsification_error(const Graph& original, const Graph& as_it_is,
                                          LinearSolver& solver, ComparedAt compared) {
-  const std::vector<int> at = partners(original, sparse);
+  const std::vector<int> at = partners(original, as_it_is);
+  const std::vector<int> anchored = resolve_gauge(as_it_is).anchored;
+  Graph sparse = as_it_is.clone();
+  place_anchors(original, at, anchored, sparse);
   Graph p = original.clone(), q = sparse.clone();
-  for (const int v : resolve_gauge(sparse).anchored) {
+  for (const int v : anchored) {
     q.set_fixed(v);
     p.set_fixed(at[v]);
   }
@@ -222,7 +261,8 @@ SparsificationError sparsification_error(const Graph& original, const Graph& spa
   }
   for (int v = 0; v < static_cast<int>(std::ssize(turns)); ++v) {
     if (!q.fixed(v))
-      log_p -= 2.0 * std::log(std::abs(Eigen::PartialPivLU<Eigen::MatrixXd>(turns[v]).determinant()));
+      log_p -=
+          2.0 * std::log(std::abs(Eigen::PartialPivLU<Eigen::MatrixXd>(turns[v]).determinant()));
   }
   error.covariance = 0.5 * (trace - log_q + log_p - static_cast<double>(d));
   error.kld = error.covariance + error.mean;

@@ -52,8 +52,10 @@ class Anchors {
                                                   : nearest(type, id, x, most);
       if (found.variable >= 0) return found;
     }
+    if (rule_.to != To::path) return {};
     // No path leads anywhere: the nearest, as if its relative pose were exact.
-    return rule_.to == To::path ? nearest(type, id, x, Fate::undecided) : Target{};
+    const Target found = nearest(type, id, x, Fate::stays);
+    return found.variable >= 0 ? found : nearest(type, id, x, Fate::undecided);
   }
 
  private:
@@ -96,7 +98,7 @@ class Anchors {
     for (int v = 0; v < graph_.variable_count(); ++v) {
       if (!open(v, type, most)) continue;
       const auto after = [&](int w) { return graph_.id(w) > id; };
-      const bool better = best < 0                 ? true
+      const bool better = best < 0                  ? true
                           : after(v) != after(best) ? after(v)
                           : after(v)                ? graph_.id(v) < graph_.id(best)
                                                     : graph_.id(v) > graph_.id(best);
@@ -232,7 +234,13 @@ std::optional<Factor> Redirection::redirect(const Factor& factor) const {
   std::vector<Id> ends = factor.variables;
   const Place& any = at_.at(has(ends[0]) ? ends[0] : ends[1]);
   const MotionGroup motions(any.type);
-  Motion z = motions.of_factor(*factor.type, factor.measurement, factor.information);
+  Motion z;
+  try {
+    z = motions.of_factor(*factor.type, factor.measurement, factor.information);
+  } catch (const Error& error) {
+    if (error.code() == ErrorCode::usage) throw;
+    return std::nullopt;  // information that is not definite: no covariance
+  }
   for (int end = 0; end < 2; ++end) {
     if (!has(ends[end])) continue;
     const Place& place = at_.at(ends[end]);

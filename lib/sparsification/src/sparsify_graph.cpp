@@ -104,8 +104,8 @@ std::vector<int> select(const Graph& graph, const std::vector<int>& nodes, Parts
 
 void measure(const Graph& original, Parts& parts, SparsifyResult& result) {
   try {
-    result.error = sparsification_error(original, result.sparse, *parts.solver,
-                                        parts.job.compared_at);
+    result.error =
+        sparsification_error(original, result.sparse, *parts.solver, parts.job.compared_at);
   } catch (const Error& error) {
     if (error.code() != ErrorCode::numerical) throw;
     result.notes.push_back(fmt::format("no KLD: {}", error.what()));
@@ -148,9 +148,14 @@ SparsifyResult sparsify_whole(const Graph& graph, const SparsifyJob& job,
 
 namespace {
 
+/// Not where one of its variables is missing.
 void add(Graph& graph, const Factor& factor) {
   std::vector<int> on;
-  for (const Id id : factor.variables) on.push_back(graph.find(id).value());
+  for (const Id id : factor.variables) {
+    const std::optional<int> v = graph.find(id);
+    if (!v) return;
+    on.push_back(*v);
+  }
   graph.add_factor(factor.type, on, factor.measurement, factor.information);
 }
 
@@ -301,6 +306,7 @@ class OnlineRun {
     Graph redirected, full;
     for (int v = 0; v < recording_.variable_count(); ++v) {
       const Id id = recording_.id(v);
+      if (redirection_.has(id) && redirection_.lost(id)) continue;
       const Id anchor = redirection_.has(id) ? redirection_.anchor(id) : id;
       const auto there = result_.sparse.find(anchor);
       if (!there) continue;

@@ -151,6 +151,9 @@ TEST_F(PluginBoundary, AStandardLibraryWithChecksIsRefusedWithBothFingerprints) 
 }
 
 TEST_F(PluginBoundary, UnoptimisedCodeIsAcceptedAndNamed) {
+#if defined(_GLIBCXX_ASSERTIONS) && defined(__OPTIMIZE__)
+  GTEST_SKIP() << "this core has assertions that unoptimised code does not name in its fingerprint";
+#endif
   cairn::Registry slow(search_in({kBad / "unoptimized"}));
   EXPECT_THAT(slow.unoptimized(), IsEmpty());  // nothing is loaded yet
   EXPECT_NE(slow.make<cairn::Loss>("plain"), nullptr);

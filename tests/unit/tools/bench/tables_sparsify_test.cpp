@@ -78,11 +78,11 @@ TEST(SparsifyTables, PutLossesBesideTheThesiss) {
 TEST(SparsifyTables, CompareLossesAtCommonStates) {
   const std::string more = R"("scheme": "multi", "keep_every": 5)";
   const boost::json::value sets = report(
-      "sparsify_sets", entry("M3500",
-                             contestant("common ncfd", run(4.0, 0.5)) + "," +
-                                 contestant("default", run(3.0, 0.5)),
-                             more) +
-                           "," + entry("city", contestant("clt", run(4.0, 0.5)), more));
+      "sparsify_sets",
+      entry("M3500",
+            contestant("common ncfd", run(4.0, 0.5)) + "," + contestant("default", run(3.0, 0.5)),
+            more) +
+          "," + entry("city", contestant("clt", run(4.0, 0.5)), more));
   const std::string table = section(sets, "sparsify-common");
   EXPECT_THAT(table, HasSubstr("| M3500 | multi | 5 | - | - | 4.00 | 0.0100 | 3.00 | 0.0100 | "
                                "0.400 |\n"));

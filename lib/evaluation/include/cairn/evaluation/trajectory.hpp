@@ -87,8 +87,8 @@ struct TrajectoryError {
   double rpe_all_rotation = 0.0;     ///< [deg]
 };
 
-/// The rigid motion (Kabsch, no scale) that brings the positions of the estimate nearest to those of
-/// the truth; about z where both lie in the plane. What positions leave open, the orientations
+/// The rigid motion (Kabsch, no scale) that brings the positions of the estimate nearest to those
+/// of the truth; about z where both lie in the plane. What positions leave open, the orientations
 /// decide.
 CAIRN_API Pose align(const TrajectoryPairs& pairs);
 

@@ -21,17 +21,18 @@ enum class ComparedAt {
 
 /// The divergence of a sparse graph from the original.
 struct SparsificationError {
-  double kld = 0.0;         ///< D(original ‖ sparse) of the nodes of both [nats] (T 3.4)
-  double covariance = 0.0;  ///< of that, the part of the covariances
-  double mean = 0.0;        ///< and that of the means: ½ (μ̆ − μ)ᵀ Λ̆ (μ̆ − μ)
-  double rmse = 0.0;        ///< of positions, in the common frame [m]; NaN without positions
+  double kld = 0.0;           ///< D(original ‖ sparse) of the nodes of both [nats] (T 3.4)
+  double covariance = 0.0;    ///< of that, the part of the covariances
+  double mean = 0.0;          ///< and that of the means: ½ (μ̆ − μ)ᵀ Λ̆ (μ̆ − μ)
+  double rmse = 0.0;          ///< of positions [m]; NaN without positions
   double rmse_aligned = 0.0;  ///< the same after a rigid motion of the sparse graph [m]
 };
 
 /// D(p‖q) = ½ (tr(Λ̆Σ) − ln |Λ̆Σ| + ‖μ̆ − μ‖²_Λ̆ − d), p the marginal of `original` on the nodes of
 /// `sparse`, q `sparse`; the states of both should be minima. Of p only the blocks of Σ on the
 /// pattern of Λ̆ are computed, so it works on many thousands of nodes. Nodes that are constant in
-/// one graph must be constant in the other; where none is, the first node of `sparse` is. `solver`
+/// one graph must be constant in the other; where the gauge is free, the first node of `sparse` is,
+/// and `sparse` is moved so that this node is where it is in `original`. `solver`
 /// must have the abilities `LogDeterminant` and `Marginals` (`block_cholesky` has). Throws `Error`
 /// (input) if `sparse` has a node that `original` has not, (numerical) where H is singular.
 CAIRN_API SparsificationError sparsification_error(const Graph& original, const Graph& sparse,

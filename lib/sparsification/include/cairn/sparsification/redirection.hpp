@@ -43,15 +43,17 @@ class CAIRN_API Redirection {
   explicit Redirection(RedirectionRule rule = {}) : rule_(rule) {}
 
   /// These nodes of `graph` (by index) are about to leave it. Each, and each that had been
-  /// redirected to one of them, goes to a pose of its type that stays; to one of `others`, which may
-  /// leave later, only where there is no other.
+  /// redirected to one of them, goes to a pose of its type that stays; to one of `others`, which
+  /// may leave later, only where there is no other (that a path leads to).
   void leave(const Graph& graph, std::span<const int> nodes, std::span<const int> others = {});
   bool has(Id node) const { return at_.contains(node); }
   /// Where a node that left would be now: the pose that it goes to, and its state from there.
   Id anchor(Id node) const { return at_.at(node).anchor; }
   std::vector<double> state(Id node, std::span<const double> anchor) const;
-  /// The factor, on nodes that are there. None if that is not defined: it is not relative, or both
-  /// its ends have become one node, or no pose was left.
+  /// Whether there was no pose that a node could be redirected to; it has neither anchor nor state.
+  bool lost(Id node) const { return at_.at(node).lost; }
+  /// The factor, on nodes that are there. None if that is not defined: it is not relative, its
+  /// information is not definite, both its ends have become one node, or no pose was left.
   std::optional<Factor> redirect(const Factor& factor) const;
 
  private:

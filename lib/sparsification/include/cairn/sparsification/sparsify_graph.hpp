@@ -27,7 +27,7 @@ struct SparsifyJob {
   std::string linear_solver = "block_cholesky";    ///< for determinants
   std::string estimator = "incremental_cholesky";  ///< online
   int online = 0;                                  ///< online: take nodes out after so many poses
-  RedirectionRule redirection{};  ///< online: of factors on nodes that have left
+  RedirectionRule redirection{};                   ///< online: of factors on nodes that have left
   /// Online: one of so many nodes is known to stay, and factors to older nodes that are to leave
   /// are redirected at once (Vallvé 2018, section 4.6.4); 0: only once these have left.
   int redirect_early = 0;
