@@ -56,7 +56,8 @@ double number(const boost::json::value& value) { return value.to_number<double>(
 
 TEST_F(Sparsify, WithoutOptionsTakesOutHalfAndSaysWhatItDid) {
   const std::string in = folder_.file("in.g2o"), out = folder_.file("out.g2o");
-  ASSERT_EQ(cairn({"generate", "manhattan:poses=400", "-o", in}).exit_code, 0);
+  const Outcome made = cairn({"generate", "manhattan:poses=400", "-o", in});
+  ASSERT_EQ(made.exit_code, 0) << made.err;
   const Outcome run = cairn({"sparsify", in, "-o", out, "--quiet"});
   ASSERT_EQ(run.exit_code, 0) << run.err;
   EXPECT_THAT(run.out, AllOf(HasSubstr("removed"), HasSubstr("left"), HasSubstr("KLD"),
@@ -378,7 +379,8 @@ TEST_F(Sparsify, NothingIsLostWhereChainsAreMerged) {
 TEST_F(Sparsify, WhichNodeIsAnchoredIsNoLoss) {
   // The first pose may leave, so that the sparse graph is anchored at another one than the whole.
   const std::string in = folder_.file("in.g2o"), fixed = folder_.file("fixed.g2o");
-  ASSERT_EQ(cairn({"generate", "manhattan:poses=300", "--seed", "5", "-o", in}).exit_code, 0);
+  const Outcome made = cairn({"generate", "manhattan:poses=300", "--seed", "5", "-o", in});
+  ASSERT_EQ(made.exit_code, 0) << made.err;
   write_text(fixed, read_text(in) + "FIX 0\n");
   const double free = number(report({in, "--online", "50"}).at("kld"));
   const double held = number(report({fixed, "--online", "50"}).at("kld"));
@@ -387,7 +389,8 @@ TEST_F(Sparsify, WhichNodeIsAnchoredIsNoLoss) {
 
 TEST_F(Sparsify, ALateFactorWithoutACovarianceIsDropped) {
   const std::string in = folder_.file("in.g2o");
-  ASSERT_EQ(cairn({"generate", "manhattan:poses=200", "-o", in}).exit_code, 0);
+  const Outcome made = cairn({"generate", "manhattan:poses=200", "-o", in});
+  ASSERT_EQ(made.exit_code, 0) << made.err;
   const boost::json::value before = report({in, "--online", "50", "--keep-every", "4"});
   write_text(in, read_text(in) + "EDGE_SE2 10 127 1 0 0 2500 0 0 0 0 0\n");
   const boost::json::value told = report({in, "--online", "50", "--keep-every", "4"});
@@ -426,7 +429,7 @@ TEST_F(Sparsify, ATurnOfTheWholeMapIsNoErrorOnceAligned) {
 TEST_F(Sparsify, TheStatusIsThatOfTheOptimizations) {
   const Outcome run = cairn({"sparsify", "@manhattan:poses=200", "--initial", "odometry",
                              "--iterations", "1", "--json", "-", "--quiet"});
-  EXPECT_EQ(run.exit_code, 4);
+  EXPECT_EQ(run.exit_code, 4) << run.err;
   EXPECT_EQ(parse_json(run.out).at("status"), "max_iterations");
 }
 

@@ -120,11 +120,6 @@ class Anchors {
     }
   }
 
-  /// Of edge `edge` from variable `from`.
-  Motion motion(const MotionGroup& motions, int from, const Edge& edge) const {
-    return motions.of_factor(graph_.factor(edge.factor), graph_.id(from));
-  }
-
   static double uncertainty(const Motion& motion, int n) {
     const Eigen::MatrixXd S = Eigen::Map<const Eigen::MatrixXd>(motion.covariance.data(), n, n);
     return std::pow(std::abs(S.partialPivLu().determinant()), 1.0 / n);
@@ -153,16 +148,16 @@ class Anchors {
       const Step at = steps.at(v);
       if (v != start && open(v, type, most)) return {v, at.to_start.covariance};
       for (const Edge& edge : edges_[v]) {
+        const auto known = steps.find(edge.to);
+        if (known != steps.end() && known->second.done) continue;
         Motion there;
         try {
-          there = motion(motions, edge.to, edge);
+          there = motions.of_factor(graph_.factor(edge.factor), graph_.id(edge.to));
         } catch (const Error&) {
           continue;  // information that is not definite measures no relative pose
         }
         const double length = at.length + uncertainty(there, motions.tangent_size());
-        const auto known = steps.find(edge.to);
-        if (known != steps.end() && (known->second.done || known->second.length <= length))
-          continue;
+        if (known != steps.end() && known->second.length <= length) continue;
         steps.insert_or_assign(edge.to, Step{length, motions.compose(there, at.to_start)});
         open_steps.emplace(length, edge.to);
       }
@@ -185,7 +180,7 @@ void Redirection::leave(const Graph& graph, std::span<const int> nodes,
   for (const int v : others) fates[v] = Fate::undecided;
   for (const int v : nodes) fates[v] = Fate::leaves;
   const Anchors anchors(graph, rule_, std::move(fates));
-  // `from`: where the relative pose of `to` begins; it stays if that is the node itself.
+  // Where a node goes whose state is x; `variable`: where its path begins.
   const auto place = [&](Id id, const std::shared_ptr<const VariableType>& type,
                          std::span<const double> x, int variable) {
     const Target target = anchors.choose(*type, id, x, variable);
