@@ -89,16 +89,46 @@ bool names_thresholds(const CompactOptions& options, const ComponentSpec& policy
          policy.values.contains("loop_gain") || policy.values.contains("pose_gain");
 }
 
+/// With fewer loop closures in it, a sample is extended.
+constexpr std::int64_t kLeastLoops = 3;
+/// With more of the poses, a graph is not compact.
+constexpr double kNotCompact = 0.9;
+
 /// What to run, and the thresholds that were found, or read.
 struct Job {
   PolicyJob job;
   FoundThresholds found;
 };
 
-Job prepare(const CompactOptions& options, const PolicySetting& setting, Results& results) {
+/// So many poses from the first on: a sample without loop closures would tell nothing.
+std::size_t sample_size(const CompactOptions& options, const PolicyData& data,
+                        const Session& session) {
+  const auto poses = static_cast<double>(data.poses.size());
+  const auto asked =
+      std::max<std::size_t>(1, static_cast<std::size_t>(std::llround(options.sample * poses)));
+  std::int64_t loops = 0;
+  std::size_t count = 0;
+  while (count < data.poses.size() && (count < asked || loops < kLeastLoops))
+    loops += std::ssize(data.poses[count++].links);
+  if (count == asked || loops == 0) return asked;
+  session.note(
+      fmt::format("the first {} poses have too few loop closures to find thresholds: the sample is "
+                  "{} of {} poses",
+                  asked, count, data.poses.size()));
+  return count;
+}
+
+Job prepare(const CompactOptions& options, const PolicySetting& setting, Results& results,
+            const Session& session) {
   Job result;
   PolicyJob& job = result.job;
   job.registration = options.registration;
+  if (options.strategy == "rfpfl") {
+    // The control draws from what was recorded, so the policy has no more to choose from.
+    ComponentSpec registration = parse_component(options.registration);
+    if (registration.name == "recorded") registration.values.emplace("carry", "0");
+    job.registration = spec_text(registration);
+  }
   job.policy = parse_component(options.policy);
   const auto emplace = [&](const OptionValues& values) {
     for (const auto& [name, value] : values) job.policy.values.emplace(name, value);
@@ -109,10 +139,8 @@ Job prepare(const CompactOptions& options, const PolicySetting& setting, Results
   if (!options.thresholds.empty())
     result.found.options = read_thresholds(options.thresholds, job.policy.name);
   if (automatic) {
-    const auto poses = static_cast<double>(setting.data.poses.size());
-    const auto count =
-        std::max<std::size_t>(1, static_cast<std::size_t>(std::llround(options.sample * poses)));
-    result.found = find_thresholds(job, count, options.error_ratio, setting);
+    result.found = find_thresholds(job, sample_size(options, setting.data, session),
+                                   options.error_ratio, setting);
     if (setting.interrupted()) return result;
   }
   emplace(result.found.options);
@@ -139,6 +167,21 @@ void check(const CompactOptions& options, Session& session) {
     throw Error(ErrorCode::usage, "--auto finds thresholds, --thresholds reads them: give one");
 }
 
+/// A user who asked for few poses and got all of them is told why, and what would help.
+void note_size(const CompactOptions& options, const CompactOutcome& outcome,
+               const Session& session) {
+  const PolicyResult& result = outcome.result;
+  const auto in = static_cast<double>(std::ssize(result.poses));
+  const double kept = result.compact.variable_count() / in;
+  if (options.strategy != "fpfl" || result.interrupted || in < 10.0 || kept < kNotCompact) return;
+  session.note(fmt::format(
+      "{:.0f} % of the poses are kept: each step of odometry tells more than pose_gain. A larger "
+      "--pose-gain keeps fewer, with a larger error; --registration simulated:range=… (with "
+      "--truth) "
+      "shows what a sensor that matches every pair within its range would allow",
+      100.0 * kept));
+}
+
 }  // namespace
 
 int run_compact(const CompactOptions& options, Session& session) {
@@ -159,7 +202,7 @@ int run_compact(const CompactOptions& options, Session& session) {
         progress.show(title, count, counts);
       }};
   Results results(session);
-  const Job job = prepare(options, setting, results);
+  const Job job = prepare(options, setting, results, session);
   if (guard.interrupted()) {
     progress.clear();
     session.note("interrupted before anything was selected");
@@ -207,6 +250,7 @@ int run_compact(const CompactOptions& options, Session& session) {
     if (comparison) report["compare"] = comparison_json(comparison->steps());
     session.write_json(report);
   });
+  note_size(options, outcome, session);
   results.add([&] { session.print(summary_text(options, outcome)); });
   results.finish();
   return guard.interrupted() ? kExitInterrupted : 0;
@@ -253,7 +297,7 @@ void add_compact_options(ArgumentParser cli, CompactOptions& options,
                  "information gain that a loop closure must exceed [nats]")
       .type_name("G");
   cli.add_option("--pose-gain", options.pose_gain,
-                 "a pose is kept if the gain of a link to it would exceed this [nats]")
+                 "a pose is kept if every link to one nearby would gain more [nats]")
       .type_name("G");
   cli.add_option("--gate", options.gate,
                  "reject loop closures beyond the chi-square quantile P of their innovation (0.99)")

@@ -33,11 +33,9 @@ json::object thresholds_json(const FoundThresholds& found) {
                       {"poses", trial.poses_kept},
                       {"loops", trial.loops_kept}});
   }
-  return {{"options", options_json(found.options)},
-          {"trials", std::move(trials)},
-          {"expected_ate", found.expected_ate},
-          {"tolerance", found.tolerance},
-          {"seconds", found.seconds}};
+  return {{"options", options_json(found.options)}, {"trials", std::move(trials)},
+          {"noise_scale", found.noise_scale},       {"expected_ate", found.expected_ate},
+          {"tolerance", found.tolerance},           {"seconds", found.seconds}};
 }
 
 json::object error_json(const TrajectoryError& e) {
@@ -105,7 +103,8 @@ std::string errors_text(const TrajectoryError& e) {
       e.rpe_all_rotation);
 }
 
-void add_result(Table& table, const PolicyResult& result, const PolicyData& data) {
+void add_result(Table& table, const PolicyResult& result, const PolicyData& data,
+                const FoundThresholds& found) {
   const auto in = static_cast<std::int64_t>(std::ssize(result.poses));
   table.add({"poses", fmt::format("{} of {} kept ({})", result.compact.variable_count(), in,
                                   percent(result.compact.variable_count(), in))});
@@ -115,9 +114,12 @@ void add_result(Table& table, const PolicyResult& result, const PolicyData& data
   const StepTimes times(step_seconds(result));
   table.add(
       {"time",
-       fmt::format("{} (estimate {}, covariances {}, search {})",
+       fmt::format("{} (estimate {}, covariances {}, search {}){}",
                    seconds_text(result.seconds.total), seconds_text(result.seconds.estimate),
-                   seconds_text(result.seconds.covariances), seconds_text(result.seconds.search))});
+                   seconds_text(result.seconds.covariances), seconds_text(result.seconds.search),
+                   found.seconds > 0.0
+                       ? fmt::format(", after {} for the thresholds", seconds_text(found.seconds))
+                       : "")});
   table.add({"a pose", times.text()});
   table.add({"chi2", chi2_text(result.chi2)});
   for (const auto& [name, error] : result.errors) table.add({name, errors_text(error)});
@@ -207,7 +209,7 @@ std::string summary_text(const CompactOptions& options, const CompactOutcome& ou
   table.add({"strategy", options.strategy});
   if (!outcome.found.options.empty())
     table.add({"thresholds", thresholds_line(outcome.found.options)});
-  add_result(table, outcome.shown(), outcome.data);
+  add_result(table, outcome.shown(), outcome.data, outcome.found);
   if (outcome.result.interrupted) table.add({"status", "interrupted"});
   for (const std::string& file : {options.output, options.trajectory, options.save_thresholds,
                                   options.steps, options.compare}) {

@@ -84,10 +84,7 @@ void CompactGraph::advance(const Variable& pose, const Motion& motion,
     next.odometry = group_->motions().compose(newest_.odometry, motion, order_);
     next.steps = std::move(newest_.steps);
   }
-  // After a relocation the way begins at another pose than where it ended.
-  const bool relocated = !newest_.kept && next.steps.empty();
-  const Motion& step = relocated ? next.odometry : motion;
-  next.steps.push_back({pose.id, step.mean, step.covariance});
+  next.steps.push_back({pose.id, motion.mean, motion.covariance});
   next.ahead = compose(kept_[next.predecessor].ahead, next.odometry);
   newest_ = std::move(next);
   newest_.placed = group_->place(
@@ -113,9 +110,6 @@ void CompactGraph::keep(PolicySeconds& seconds) {
   pose.variable = newest_.pose;
   pose.odometry =
       group_->motions().to_factor(newest_.type, from, newest_.pose.id, newest_.odometry);
-  if (newest_.steps.empty()) {  // it has just been relocated
-    newest_.steps.push_back({newest_.pose.id, newest_.odometry.mean, newest_.odometry.covariance});
-  }
   chains_.push_back({from, newest_.pose.id, std::move(newest_.steps)});
   number_.emplace(pose.id, size());
   index_->add(newest_.placed.at.t);
@@ -129,7 +123,8 @@ void CompactGraph::link(std::span<const Factor> links, PolicySeconds& seconds) {
   update(links, seconds);
 }
 
-void CompactGraph::relocate(int pose, const Motion& measured, PolicySeconds& seconds) {
+void CompactGraph::relocate(int pose, const Motion& measured, double of_way,
+                            PolicySeconds& seconds) {
   const MotionGroup& motions = group_->motions();
   if (pose == newest_.predecessor) {  // another measurement of the same motion
     newest_.odometry = motions.fuse(newest_.odometry, measured);
@@ -137,11 +132,12 @@ void CompactGraph::relocate(int pose, const Motion& measured, PolicySeconds& sec
     hang_newest();
     return;
   }
-  Motion half = measured;
-  for (double& entry : half.covariance) entry *= 2.0;
+  Motion end = measured, start = measured;
+  for (double& entry : end.covariance) entry /= of_way;
+  for (double& entry : start.covariance) entry /= 1.0 - of_way;
   const int other = newest_.predecessor;
   const std::pair<int, int> ends = std::minmax(pose, other);
-  Motion bridge = motions.compose(half, motions.inverse(newest_.odometry), order_);
+  Motion bridge = motions.compose(end, motions.inverse(newest_.odometry), order_);
   if (pose > other) bridge = motions.inverse(bridge);
   const auto known = bridges_.find(ends);
   if (known != bridges_.end()) bridge = motions.fuse(known->second.motion, bridge);
@@ -154,12 +150,13 @@ void CompactGraph::relocate(int pose, const Motion& measured, PolicySeconds& sec
     update({}, seconds, {{known->second.factor, factor.measurement, factor.information}});
     known->second.motion = bridge;
   }
-  const Motion back = motions.inverse(half);
-  newest_.steps.push_back({kept_[pose].id, back.mean, back.covariance});
+  const Motion back = motions.inverse(end);
+  newest_.steps.push_back({kept_[pose].id, back.mean, back.covariance, true});
   chains_.push_back({kept_[other].id, kept_[pose].id, std::move(newest_.steps)});
-  newest_.steps.clear();
+  // The next way begins at another pose than where this one ended.
+  newest_.steps = {{newest_.pose.id, start.mean, start.covariance, true}};
   newest_.predecessor = pose;
-  newest_.odometry = half;
+  newest_.odometry = start;
   hang_newest();
 }
 

@@ -54,10 +54,11 @@ class CompactGraph {
   void link(std::span<const Factor> links, PolicySeconds& seconds);
   /// The newest pose, which is not kept, has been matched with a kept one, `measured` from there.
   /// Instead of keeping it, the chain between its predecessor and that pose becomes a link of these
-  /// two, and the trajectory continues from that pose. The measurement is used in both, so each
-  /// gets half of its information: two halves that are treated as independent have no more
-  /// information than the one measurement.
-  void relocate(int pose, const Motion& measured, PolicySeconds& seconds);
+  /// two, and the trajectory continues from that pose. The measurement is used in both, so its
+  /// information is divided: the part `of_way` (0 < `of_way` < 1) goes to the chain, the rest
+  /// to what follows. Two parts that are treated as independent have no more information than the
+  /// one measurement.
+  void relocate(int pose, const Motion& measured, double of_way, PolicySeconds& seconds);
   /// Relinearises and solves everything until it has converged.
   void solve_fully();
 

@@ -113,7 +113,15 @@ void CompactPose::add_pose(const Variable& pose, std::span<const Factor> odometr
   dimensions_.clear();
 }
 
-Matrix CompactPose::expected_covariance() const { return sensor_.size() > 0 ? sensor_ : odometry_; }
+/// Σ̄_y of this pose. What the options do not say is learnt; the first match is expected to be like
+/// odometry.
+void CompactPose::expect_matches() {
+  if (sensor_.size() > 0) {
+    expected_ = sensor_;
+  } else {
+    expected_ = typical_.known() ? typical_.covariance() : odometry_;
+  }
+}
 
 /// After a link everything is to be computed anew, and mostly for one pose only: the best of what
 /// is left, which is then used or tells too little for all others. If it is not so, all that are
@@ -137,7 +145,7 @@ Displacement CompactPose::known_displacement(int pose) {
 }
 
 double CompactPose::expected_gain(int pose) {
-  return mutual_information(expected_covariance(), known_displacement(pose).covariance);
+  return mutual_information(expected_, known_displacement(pose).covariance);
 }
 
 /// Lines 14 and 15 of Algorithm 1.
@@ -161,13 +169,13 @@ void CompactPose::search() {
   }
   graph_.prepare(possible, report_.seconds);
   report_.seconds.search -= report_.seconds.covariances - solving;
-  const Matrix expected = expected_covariance();
+  expect_matches();
   for (const int pose : possible) {
     Displacement d = graph_.displacement(pose);
     graph_.set_covariance(pose, d);
     const Dimensions dimensions = test_->dimensions(d);
     if (options_.search != Search::untested && !test_->passes(dimensions)) continue;
-    const double gain = mutual_information(expected, d.covariance);
+    const double gain = mutual_information(expected_, d.covariance);
     ++report_.candidates;
     report_.least_gain = std::min(report_.least_gain, gain);
     if (pose != graph_.predecessor()) {
@@ -241,6 +249,7 @@ LinkReport CompactPose::offer(Id other, std::span<const Factor> measured) {
               .motion = motion,
               .mean = graph_.group().state(motion.mean),
               .covariance = to_matrix(motion.covariance, graph_.group().tangent_size())};
+    typical_.note(link.covariance);
     report.verdict = judge(link, report);
     if (report.verdict == LinkVerdict::linked) {
       if (candidate)
@@ -289,22 +298,31 @@ bool CompactPose::agrees_with_waiting(const Link& link) {
   return false;
 }
 
-/// Relocating gives each of two ways half of the measurement. That must leave little between the
-/// two poses that is worth a pose of its own, and must cost little of what is known of the way that
-/// ends here: where loop closures are not better than odometry, the loss would add up. The more
-/// poses are kept nearby, the less each way matters, and the more is gained by not keeping another.
-bool CompactPose::may_relocate(const Link& link) const {
-  const Matrix half = 2.0 * link.covariance;
-  if (!(mutual_information(expected_covariance(), half) < pose_gain_)) return false;
-  const Matrix way = graph_.newest_odometry();
-  const double lost = mutual_information(way + link.covariance, link.covariance);
-  return lost <= options_.reuse_loss * report_.candidates * graph_.group().tangent_size();
+/// Relocating divides the measurement between two ways. That must leave little between the two
+/// poses that is worth a pose of its own, measured by what a match is worth here, whatever the
+/// options expect; and must cost little of what is known of the way that ends here: where loop
+/// closures are not better than odometry, the loss would add up. The more poses are kept nearby,
+/// the less each way matters, and the more is gained by not keeping another.
+std::optional<Division> CompactPose::relocation(const Link& link) const {
+  if (!options_.reuse || !(pose_gain_ > 0.0)) return std::nullopt;  // or every pose is to be kept
+  const double n = graph_.group().tangent_size();
+  const Division division = divide_match(graph_.newest_odometry(), link.covariance);
+  const Matrix rest = link.covariance / (1.0 - division.way);
+  // Three matches in one are as good as any; a lower g_pose must not keep poses of one place for
+  // ever.
+  const double enough = std::max(pose_gain_, 0.5 * n * std::log(4.0));
+  if (!(mutual_information(typical_.covariance(), rest) < enough)) return std::nullopt;
+  const Matrix end = graph_.newest_odometry() + link.covariance;
+  const double lost = mutual_information(end, link.covariance);
+  if (lost > options_.reuse_loss * report_.candidates * n) return std::nullopt;
+  return division;
 }
 
 void CompactPose::use(const Link& link) {
   const bool of_newest = link.later == graph_.size() && !graph_.newest_kept();
-  if (options_.reuse && of_newest && may_relocate(link)) {
-    graph_.relocate(link.earlier, link.motion, report_.seconds);
+  const std::optional<Division> division = of_newest ? relocation(link) : std::nullopt;
+  if (division) {
+    graph_.relocate(link.earlier, link.motion, division->way, report_.seconds);
   } else {
     graph_.link(link.factors, report_.seconds);
   }

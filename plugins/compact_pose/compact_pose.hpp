@@ -13,6 +13,7 @@
 #include "compact_pose_options.hpp"
 #include "consistency.hpp"
 #include "proximity.hpp"
+#include "relocation.hpp"
 #include "threshold_finder.hpp"
 
 namespace cairn::compact {
@@ -67,12 +68,12 @@ class CompactPose final : public PosePolicy, public OptionFinder {
   };
 
   void start(const Variable& pose);
-  Matrix expected_covariance() const;
+  void expect_matches();
   void search();
   Displacement known_displacement(int pose);
   std::optional<Candidate> take_candidate(int pose);
   double expected_gain(int pose);
-  bool may_relocate(const Link& link) const;
+  std::optional<Division> relocation(const Link& link) const;
   void use(const Link& link);
   LinkVerdict judge(const Link& link, LinkReport& report);
   void judge_waiting();
@@ -84,12 +85,13 @@ class CompactPose final : public PosePolicy, public OptionFinder {
   std::optional<DistanceTest> test_;
   std::optional<ConsistencyCheck> check_;
   double radius_ = 0.0;  ///< no pose farther away can be a candidate [m]
-  Matrix sensor_;        ///< Σ̄_y, if it was given
+  Matrix sensor_;        ///< Σ̄_y, if it was given; else that of `typical_`
   double loop_gain_ = 0.0, pose_gain_ = 0.0;
 
   // The newest pose:
   PoseReport report_;
   Matrix odometry_;  ///< covariance of its odometry from the previous pose, kept or not
+  Matrix expected_;  ///< Σ̄_y
   bool open_ = false, searched_ = false;
   std::vector<Candidate> candidates_;  ///< a heap by gain
   int solved_version_ = -1;            ///< of the graph when candidates were last solved for
@@ -98,6 +100,7 @@ class CompactPose final : public PosePolicy, public OptionFinder {
 
   std::vector<Waiting> waiting_;
   ThresholdFinder finder_;
+  TypicalMatch typical_;
 };
 
 }  // namespace cairn::compact

@@ -59,11 +59,11 @@ OptionFields<CompactPoseOptions> CompactPoseOptions::fields() {
             "information gain that a link must exceed [nats] (g_loop); -1: (n/2 ln 2 + 1)^1.36 - "
             "1, n = 3 or 6")
       .real("pose_gain", &O::pose_gain, -1.0, 1e9,
-            "a pose is kept if the information gain of any link to it would exceed this [nats] "
-            "(g_pose); -1: (n/2 ln 2 + 1)^1.7 - 1")
+            "a pose without a link is kept if the information gain of every link to a pose nearby "
+            "would exceed this [nats] (g_pose); -1: (n/2 ln 2 + 1)^1.7 - 1")
       .text("sensor", &O::sensor, numbers, text_of,
             "expected covariance of a match: standard deviations [m] and [rad], or its upper "
-            "triangle; empty: as the newest odometry")
+            "triangle; empty: the median of the latest matches, at first as odometry")
       .choice("composition", &O::composition,
               "order of the covariance of composed relative poses: Smith and Cheeseman, Barfoot "
               "and Furgale")

@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 #include <string>
+#include <utility>
 
 #include <fmt/core.h>
 
@@ -12,6 +14,39 @@
 #include "dense/lu.hpp"
 
 namespace cairn::compact {
+namespace {
+
+/// So many of the latest matches tell what the next is worth. An odd number, so that as many are
+/// better as are worse.
+constexpr std::size_t kLatest = 31;
+/// Logarithms of determinants that differ by less are the same.
+constexpr double kSameSize = 0.01;
+
+}  // namespace
+
+Matrix median_covariance(std::span<const Matrix> covariances) {
+  if (covariances.empty()) throw std::logic_error("the median of no covariance");
+  // Seen from its other end a motion has another covariance with the same determinant: rounding
+  // must not decide between the two.
+  std::vector<std::pair<double, std::size_t>> by_size;
+  for (const Matrix& S : covariances) {
+    const double size = std::log(Eigen::MatrixXd(S).determinant());
+    by_size.emplace_back(std::round(size / kSameSize), by_size.size());
+  }
+  const auto middle = by_size.begin() + std::ssize(by_size) / 2;
+  std::ranges::nth_element(by_size, middle);
+  return covariances[middle->second];
+}
+
+void TypicalMatch::note(const Matrix& covariance) {
+  if (latest_.size() < kLatest) {
+    latest_.push_back(covariance);
+  } else {
+    latest_[oldest_] = covariance;
+    oldest_ = (oldest_ + 1) % kLatest;
+  }
+  median_ = median_covariance(latest_);
+}
 
 double percentile(std::vector<double> numbers, double part) {
   if (numbers.empty()) return 0.0;
@@ -35,12 +70,9 @@ Matrix ThresholdFinder::sensor() const {
                 "no loop closure in the sample, so the sensor's range is unknown: take a larger "
                 "part of the data, or give the thresholds");
   }
-  std::vector<std::pair<double, const Matrix*>> by_size;
-  for (const Loop& loop : loops_)
-    by_size.emplace_back(Eigen::MatrixXd(loop.covariance).determinant(), &loop.covariance);
-  const auto middle = by_size.begin() + std::ssize(by_size) / 2;
-  std::ranges::nth_element(by_size, middle, {}, &std::pair<double, const Matrix*>::first);
-  return *middle->second;
+  std::vector<Matrix> covariances;
+  for (const Loop& loop : loops_) covariances.push_back(loop.covariance);
+  return median_covariance(covariances);
 }
 
 OptionValues ThresholdFinder::found(double probability) const {

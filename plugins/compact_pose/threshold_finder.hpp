@@ -1,12 +1,29 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include "cairn/plugin/options.hpp"
 #include "proximity.hpp"
 
 namespace cairn::compact {
+
+/// Of some covariances the median by determinant. Throws `std::logic_error` if there is none.
+Matrix median_covariance(std::span<const Matrix> covariances);
+
+/// Σ̄_y as the latest matches have it: the median of their covariances.
+class TypicalMatch {
+ public:
+  void note(const Matrix& covariance);
+  bool known() const { return !latest_.empty(); }
+  const Matrix& covariance() const { return median_; }
+
+ private:
+  std::vector<Matrix> latest_;  ///< a ring
+  std::size_t oldest_ = 0;      ///< once the ring is full
+  Matrix median_;
+};
 
 /// Finds the thresholds of compact pose SLAM from a sample of the data (section 5.2): all
 /// measurements are used, and recorded are the displacement of every loop closure before it was

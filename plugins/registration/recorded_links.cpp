@@ -19,13 +19,13 @@ Motion measured_motion(const Graph& recording, int factor, const MotionGroup& gr
   return group.of_factor(measured, std::min(measured.variables[0], measured.variables[1]));
 }
 
+}  // namespace
+
 double log_determinant(const std::vector<double>& covariance, int n) {
   const Eigen::LLT<Eigen::MatrixXd> llt(
       Eigen::MatrixXd(Eigen::Map<const Eigen::MatrixXd>(covariance.data(), n, n)));
   return 2.0 * llt.matrixLLT().diagonal().array().log().sum();
 }
-
-}  // namespace
 
 RecordedLinks recorded_links(const RegistrationData& data, std::string_view owner) {
   if (!data.recording) {

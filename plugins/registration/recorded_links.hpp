@@ -24,6 +24,9 @@ struct RecordedLinks {
 /// poses of several types.
 RecordedLinks recorded_links(const RegistrationData& data, std::string_view owner);
 
+/// ln |Σ| of the covariance of a motion, n × n.
+double log_determinant(const std::vector<double>& covariance, int n);
+
 /// How uncertain loops are measured: the covariance of the one in the middle of them by the
 /// determinants of their covariances; of the motion from the pose with the lower id to the other.
 std::vector<double> median_covariance(const Graph& recording, const RecordedLinks& links,

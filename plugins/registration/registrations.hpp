@@ -11,12 +11,16 @@
 namespace cairn::registration {
 
 struct RecordedOptions {
+  int carry = 10;  ///< poses over which odometry carries a loop closure; 0: none is carried
   double false_rate = 0.0;  ///< part of the pairs that match whose motion is replaced
   std::uint64_t seed = 1;
 
   static auto fields() {
     using O = RecordedOptions;
     return OptionFields<O>()
+        .integer("carry", &O::carry, 0, 1000000,
+                 "a loop closure of a pose that was not kept is carried over to one that was, by "
+                 "the odometry of at most so many poses; 0: it is lost")
         .real("false_rate", &O::false_rate, 0.0, 1.0,
               "fraction of the matching pairs whose measurement is replaced by a random relative "
               "pose")

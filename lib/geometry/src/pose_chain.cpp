@@ -2,6 +2,7 @@
 #include "cairn/geometry/pose_chain.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <string>
@@ -40,21 +41,20 @@ void check(const VariableType& type, const OdometryChain& chain, std::span<const
   }
 }
 
-/// w_1 … w_q: which share of the way is behind the robot after each step.
-std::vector<double> shares_of_way(const VariableType& type, const OdometryChain& chain,
+/// w_1 … w_q of the steps: which share of the way is behind the robot after each.
+std::vector<double> shares_of_way(const VariableType& type, std::span<const ChainStep> steps,
                                   Recovery how) {
-  const int d = type.placement()->dimension();
   std::vector<double> shares;
   double way = 0.0;
-  for (const ChainStep& step : chain.steps) {
-    const Eigen::VectorXd t = position(type, step.motion).head(d);
-    way += t.stableNorm();
+  for (const ChainStep& step : steps) {
+    const Pose moved = pose_of(type, step.motion);
+    way += std::hypot(moved.t.stableNorm(), rotation_angle(moved.R));
     shares.push_back(way);
   }
-  const double steps = static_cast<double>(shares.size());
+  const double count = static_cast<double>(shares.size());
   const bool uniform = how == Recovery::uniform || !(way > 0.0);
   for (std::size_t m = 0; m < shares.size(); ++m)
-    shares[m] = uniform ? static_cast<double>(m + 1) / steps : shares[m] / way;
+    shares[m] = uniform ? static_cast<double>(m + 1) / count : shares[m] / way;
   return shares;
 }
 
@@ -93,6 +93,55 @@ std::vector<Eigen::VectorXd> likely_corrections(const StateGroup& group, const O
   return corrections;
 }
 
+/// x_from (z_1 ⋯ z_m) of every step.
+std::vector<std::vector<double>> reckoned(const StateGroup& group, std::span<const double> from,
+                                          std::span<const ChainStep> steps) {
+  std::vector<std::vector<double>> states;
+  std::vector<double> x(from.begin(), from.end());
+  for (const ChainStep& step : steps) {
+    x = group.normalized(group.compose(x, step.motion));
+    states.push_back(x);
+  }
+  return states;
+}
+
+void append_corrected(const StateGroup& group, std::span<const ChainStep> steps,
+                      const std::vector<std::vector<double>>& states,
+                      const std::vector<Eigen::VectorXd>& corrections,
+                      std::vector<RecoveredPose>& poses) {
+  for (std::size_t m = 0; m < steps.size(); ++m) {
+    poses.push_back(
+        {steps[m].pose, group.normalized(group.compose(states[m], group.exp(corrections[m])))});
+  }
+}
+
+/// v0 to v2.
+void recover_by_distance(const VariableType& type, const StateGroup& group,
+                         const OdometryChain& chain, std::span<const double> from,
+                         std::span<const double> to, Recovery how,
+                         std::vector<RecoveredPose>& poses) {
+  std::span<const ChainStep> way = chain.steps;
+  std::vector<double> begin(from.begin(), from.end()), end(to.begin(), to.end());
+  // A chain that is nothing but a match has no way.
+  if (way.size() > 1 && way.front().matched) {
+    begin = group.normalized(group.compose(begin, way.front().motion));
+    poses.push_back({way.front().pose, begin});
+    way = way.subspan(1);
+  }
+  const bool to_match = way.size() > 1 && way.back().matched;
+  if (to_match) {
+    end = group.normalized(group.compose(end, group.inverse(way.back().motion)));
+    way = way.first(way.size() - 1);
+  }
+  const bool along = how == Recovery::distribute;
+  const std::vector<std::vector<double>> states =
+      along ? reckoned(group, begin, way) : std::vector(way.size(), begin);
+  const Eigen::VectorXd mismatch = group.log(group.normalized(group.between(states.back(), end)));
+  append_corrected(group, way, states, shared_corrections(shares_of_way(type, way, how), mismatch),
+                   poses);
+  if (to_match) poses.push_back({chain.steps.back().pose, {to.begin(), to.end()}});
+}
+
 }  // namespace
 
 std::vector<RecoveredPose> recover(const VariableType& type, const OdometryChain& chain,
@@ -100,27 +149,16 @@ std::vector<RecoveredPose> recover(const VariableType& type, const OdometryChain
                                    Recovery how) {
   check(type, chain, from, to);
   const StateGroup group(type);
-  const std::vector<double> w = shares_of_way(type, chain, how);
-
-  // x_from (z_1 ⋯ z_m), or x_from alone: what v0 and v1 take for the measured motions.
-  std::vector<std::vector<double>> reckoned;
-  std::vector<double> x(from.begin(), from.end());
-  for (const ChainStep& step : chain.steps) {
-    if (how == Recovery::distribute || how == Recovery::likely)
-      x = group.normalized(group.compose(x, step.motion));
-    reckoned.push_back(x);
-  }
-  const Eigen::VectorXd mismatch = group.log(group.normalized(group.between(x, to)));
-
   std::vector<RecoveredPose> poses;
-  const std::vector<Eigen::VectorXd> corrections = how == Recovery::likely
-                                                       ? likely_corrections(group, chain, mismatch)
-                                                       : shared_corrections(w, mismatch);
-  for (std::size_t m = 0; m < reckoned.size(); ++m) {
-    poses.push_back({chain.steps[m].pose,
-                     group.normalized(group.compose(reckoned[m], group.exp(corrections[m])))});
+  if (chain.steps.empty()) return poses;
+  if (how == Recovery::likely) {
+    const std::vector<std::vector<double>> states = reckoned(group, from, chain.steps);
+    const Eigen::VectorXd mismatch = group.log(group.normalized(group.between(states.back(), to)));
+    append_corrected(group, chain.steps, states, likely_corrections(group, chain, mismatch), poses);
+  } else {
+    recover_by_distance(type, group, chain, from, to, how, poses);
   }
-  if (!poses.empty()) poses.back().state.assign(to.begin(), to.end());  // to the last bit
+  poses.back().state.assign(to.begin(), to.end());  // to the last bit
   return poses;
 }
 

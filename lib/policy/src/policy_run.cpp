@@ -42,6 +42,7 @@ class WatchedRegistration final : public Registration {
     if (!factors.empty() && was_false(earlier, later)) ++result_.false_registered;
     return factors;
   }
+  void pose_ended(Id pose, bool kept) override { inner_.pose_ended(pose, kept); }
   bool was_false(Id earlier, Id later) const { return false_ && false_->was_false(earlier, later); }
 
  private:

@@ -36,6 +36,7 @@ void run_policy(const Graph& recording, std::span<const Arrival> poses, PosePoli
     while (const auto match = policy.next_match())
       policy.offer(match->earlier, registration.match(match->earlier, match->later));
     const PoseReport report = policy.end_pose();
+    registration.pose_ended(report.id, report.kept);
     if (each && !each(report)) break;
   }
   if (!first) policy.finish();

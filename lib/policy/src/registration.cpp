@@ -4,6 +4,7 @@
 namespace cairn {
 
 Registration::~Registration() = default;
+void Registration::pose_ended(Id, bool) {}
 FalseMatches::~FalseMatches() = default;
 
 }  // namespace cairn

@@ -10,6 +10,7 @@
 #include <fmt/core.h>
 
 #include "cairn/evaluation/normalized_error.hpp"
+#include "cairn/evaluation/plausibility.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/timed.hpp"
 
@@ -23,6 +24,8 @@ constexpr int kSpread = 40;
 /// Trials in one direction.
 constexpr int kMostTrials = 10;
 const double kStep = std::sqrt(2.0);
+/// Measurements that agree with one another better than that were computed from a result.
+constexpr double kLeastNoiseScale = 1e-3;
 
 /// Ids spread evenly over a trajectory, from a list that rises.
 std::vector<Id> spread(const std::vector<Id>& ids) {
@@ -54,12 +57,26 @@ std::vector<Id> nearest(const std::vector<Id>& wanted, const std::vector<Id>& th
 struct Everything {
   Trajectory trajectory;
   std::vector<Id> poses;  ///< where errors are looked at
+  double noise = 1.0;     ///< `noise_scale`
   double expected = 0.0;  ///< [m]
 };
 
+/// By the covariances as they are.
 double expected_error(PosePolicy& policy, const std::vector<Id>& poses) {
   Estimator& estimator = policy.estimator();
   return expected_ate(estimator, estimator.graph(), poses);
+}
+
+/// √(chi2 / degrees of freedom): by how much residuals are smaller than the file's covariances say;
+/// many files have round numbers there. At most 1: where residuals are larger, the cause may be
+/// outliers, which nothing should get coarser for.
+double noise_scale(PosePolicy& policy) {
+  Estimator& estimator = policy.estimator();
+  const Graph graph = estimator.graph();
+  const std::int64_t dof = degrees_of_freedom(graph, resolve_gauge(graph));
+  const double chi2 = estimator.chi2();
+  if (dof <= 0 || !std::isfinite(chi2)) return 1.0;
+  return std::clamp(std::sqrt(chi2 / static_cast<double>(dof)), kLeastNoiseScale, 1.0);
 }
 
 /// What all trials share.
@@ -83,7 +100,8 @@ ThresholdTrial try_thresholds(const Sample& sample, const OptionValues& options,
   const double apart = compare(trajectory(recovered_trajectory(run.policy(), Recovery::likely)),
                                sample.everything.trajectory)
                            .ate_translation;
-  result.expected = expected_error(run.policy(), nearest(sample.everything.poses, ids_of(compact)));
+  result.expected = sample.everything.noise *
+                    expected_error(run.policy(), nearest(sample.everything.poses, ids_of(compact)));
   result.realised = std::hypot(sample.everything.expected, apart);
   return result;
 }
@@ -121,7 +139,8 @@ void refine_thresholds(const OptionFinder& finder, const ThresholdTest& test,
   for (int k = 0; k < kMostTrials && !good; ++k) {
     // Where lower gains let no more links through, it is poses that are missing.
     const std::size_t n = found.trials.size();
-    if (n > 2 && found.trials[n - 1].loops_kept == found.trials[n - 3].loops_kept) break;
+    const std::int64_t loops = found.trials.back().loops_kept;
+    if (n > 2 && loops > 0 && loops == found.trials[n - 3].loops_kept) break;
     if (!attempt(factor /= kStep, 1.0)) return;
   }
   factor = 1.0;
@@ -150,9 +169,12 @@ FoundThresholds find_thresholds(const PolicyJob& job, std::size_t count, double 
     const Graph all = watch.policy().estimator().graph();
     sample.everything.trajectory = trajectory(all);
     sample.everything.poses = spread(ids_of(all));
-    sample.everything.expected = expected_error(watch.policy(), sample.everything.poses);
+    const double noise = noise_scale(watch.policy());
+    sample.everything.noise = noise;
+    sample.everything.expected = noise * expected_error(watch.policy(), sample.everything.poses);
+    found.noise_scale = noise;
     found.expected_ate = sample.everything.expected;
-    found.tolerance = std::max(error_ratio * found.expected_ate, finder.accuracy());
+    found.tolerance = std::max(error_ratio * found.expected_ate, noise * finder.accuracy());
     const auto test = [&](const OptionValues& options, double links, double poses) {
       return try_thresholds(sample, options, links, poses);
     };

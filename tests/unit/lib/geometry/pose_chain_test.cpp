@@ -213,25 +213,65 @@ TEST_P(Recover, GoesAlongTheArcBetweenTheEnds) {
               at(2 * std::sin(third), 2 - 2 * std::cos(third), third));
 }
 
-// One metre ahead and to the left, two metres ahead: that ends at (1, 2). It was (1, 5), so three
-// metres further ahead; a third of that after the first metre of three.
+// One metre ahead and a quarter turn to the left, two metres ahead: that ends at (1, 2). It was (1,
+// 5), so three metres further ahead, which is distributed by the norms of both steps.
 TEST_P(Recover, SpreadsTheMismatchOverTheMotions) {
   const OdometryChain turn = chain({at(1, 0, kRight), at(2, 0, 0)});
   const auto poses = states(turn, at(0, 0, 0), at(1, 5, kRight), Recovery::distribute);
-  expect_near(poses[0], at(1, 1, kRight));
+  const double first = std::hypot(1.0, kRight);
+  expect_near(poses[0], at(1, 3 * first / (first + 2), kRight));
 }
 
-TEST_P(Recover, CountsStepsWhereNothingMoves) {
+TEST_P(Recover, CountsTurningOnTheSpotAsMotion) {
   const OdometryChain turning = chain({at(0, 0, 0.4), at(0, 0, 0.0), at(0, 0, 0.2), at(0, 0, 0.2)});
   const State from = at(1, 1, 0), to = at(1, 1, 1.2);
   const auto even = states(turning, from, to, Recovery::uniform);
-  EXPECT_EQ(states(turning, from, to, Recovery::interpolate), even);
   expect_near(even[0], at(1, 1, 0.3));
   expect_near(even[2], at(1, 1, 0.9));
-  const auto spread = states(turning, from, to, Recovery::distribute);  // 0.8 turned, not 1.2
-  expect_near(spread[0], at(1, 1, 0.5));
-  expect_near(spread[1], at(1, 1, 0.6));
-  expect_near(spread[2], at(1, 1, 0.9));
+  // 0.8 turned, not 1.2.
+  for (const Recovery how : {Recovery::interpolate, Recovery::distribute}) {
+    const auto spread = states(turning, from, to, how);
+    expect_near(spread[0], at(1, 1, 0.6));
+    expect_near(spread[1], at(1, 1, 0.6));
+    expect_near(spread[2], at(1, 1, 0.9));
+  }
+}
+
+TEST_P(Recover, CountsStepsWhereNothingMoves) {
+  const OdometryChain still = chain({at(0, 0, 0), at(0, 0, 0), at(0, 0, 0)});
+  const State from = at(1, 1, 0), to = at(4, 1, 0);
+  for (const Recovery how : {Recovery::uniform, Recovery::interpolate, Recovery::distribute}) {
+    const auto spread = states(still, from, to, how);
+    expect_near(spread[0], at(2, 1, 0));
+    expect_near(spread[1], at(3, 1, 0));
+  }
+}
+
+// From a pose that was matched 5 m beside the first, round a square to one that was matched 5 m
+// beside the last: as between these two, whatever lies between the ends.
+TEST_P(Recover, GoesBetweenThePosesThatWereMatched) {
+  OdometryChain matched =
+      chain({at(0, 5, 0), at(1, 0, 0), at(2, 0, 0), at(1, 0, 0), at(3, -4, kRight)});
+  matched.steps.front().matched = true;
+  matched.steps.back().matched = true;
+  const State from = at(0, 0, 0), to = at(11, 1, kRight);  // the way has 8 m instead of 4
+  const auto even = states(matched, from, to, Recovery::uniform);
+  ASSERT_THAT(even, SizeIs(5));
+  expect_near(even[0], at(0, 5, 0));
+  expect_near(even[1], at(8.0 / 3, 5, 0));
+  expect_near(even[3], at(8, 5, 0));
+  EXPECT_EQ(even[4], to);
+  for (const Recovery how : {Recovery::interpolate, Recovery::distribute}) {
+    const auto poses = states(matched, from, to, how);
+    expect_near(poses[0], at(0, 5, 0));
+    expect_near(poses[1], at(2, 5, 0));
+    expect_near(poses[2], at(6, 5, 0));
+    expect_near(poses[3], at(8, 5, 0));
+    EXPECT_EQ(poses[4], to);
+  }
+  OdometryChain nothing_else = chain({at(1, 0, 0)});
+  nothing_else.steps.front().matched = true;
+  EXPECT_THAT(states(nothing_else, from, to, Recovery::interpolate), testing::ElementsAre(to));
 }
 
 // Steps of ξ_k on top of the motions, which are as likely as can be and, to first order, lead to

@@ -78,6 +78,15 @@ TEST_F(RefineThresholds, LowersTheGainOfLinksUntilTheErrorIsSmallEnough) {
   EXPECT_EQ(found.options, chosen(0.25, 1.0));
 }
 
+/// No link at all is no sign that all have been let through.
+TEST_F(RefineThresholds, LowersTheGainOfLinksUntilThereIsOne) {
+  const FoundThresholds found = refine(0.4, [](double links, double) {
+    return links < 0.2 ? std::pair(0.3, 2) : std::pair(1.0, 0);
+  });
+  EXPECT_THAT(found.trials, SizeIs(6));
+  EXPECT_EQ(found.options, chosen(found.trials.back().links, 1.0));
+}
+
 TEST_F(RefineThresholds, LowersTheGainOfPosesWhereNoMoreLinksCome) {
   const FoundThresholds found =
       refine(0.4, [](double, double poses) { return std::pair(poses, 7); });
@@ -150,6 +159,24 @@ TEST_F(FindThresholds, ASmallerErrorIsAllowedFewerOmissions) {
   const FoundThresholds loose = find("compact_pose", 10.0), tight = find("compact_pose", 1.05);
   EXPECT_GE(tight.trials.back().loops_kept, loose.trials.back().loops_kept);
   EXPECT_GE(tight.trials.size(), loose.trials.size());
+}
+
+/// Information that is a hundred times too small, as in many files: the error that is allowed is
+/// that of the residuals, not of the file's covariances.
+TEST_F(FindThresholds, TheToleranceDoesNotDependOnTheScaleOfTheInformation) {
+  const FoundThresholds right = find("compact_pose", 2.5);
+  EXPECT_GT(right.noise_scale, 0.5);
+  Graph& graph = data_.recording;
+  for (int f = 0; f < graph.factor_count(); ++f) {
+    Factor factor = graph.factor(f);
+    for (double& entry : factor.information) entry *= 0.01;
+    graph.set_measurement(f, factor.measurement, factor.information);
+  }
+  const FoundThresholds coarse = find("compact_pose", 2.5);
+  EXPECT_NEAR(coarse.noise_scale, 0.1 * right.noise_scale, 0.02);
+  EXPECT_NEAR(coarse.tolerance, right.tolerance, 0.2 * right.tolerance);
+  // Not the same ones: whether a pose is probably within range does depend on the covariance.
+  EXPECT_NEAR(coarse.trials.back().poses_kept, right.trials.back().poses_kept, 10);
 }
 
 TEST_F(FindThresholds, APolicyThatFindsNothingIsRefused) {

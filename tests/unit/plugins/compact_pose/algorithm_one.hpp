@@ -72,7 +72,9 @@ class AlgorithmOne {
       update.factors.push_back(world_.motions().to_factor(odometry.type, predecessor, id, e));
       estimator_->update(update);
       newest = id;
-      const Eigen::MatrixXd Sigma_y = expected_ ? *expected_ : matrix(u.covariance);
+      // What the policy learns of matches that are all alike, as they are here.
+      const Eigen::MatrixXd Sigma_y =
+          expected_ ? *expected_ : matrix(matched_.empty() ? u.covariance : matched_);
       kept.push_back(id);
       keep_pose = close_loops(newest, predecessor, Sigma_y, registration);
     }
@@ -108,6 +110,7 @@ class AlgorithmOne {
       const std::vector<Factor> measured = registration.match(i.id, newest);
       if (measured.empty()) continue;
       const Motion y = world_.motions().of_factor(measured.front(), i.id);
+      matched_ = y.covariance;
       const double told = gain(i.id, newest, matrix(y.covariance));
       if (!(told > thresholds_.g_loop)) continue;
       GraphUpdate update;
@@ -181,6 +184,7 @@ class AlgorithmOne {
   std::unique_ptr<Estimator> estimator_;
   Thresholds thresholds_;
   std::optional<Eigen::MatrixXd> expected_;
+  std::vector<double> matched_;  ///< covariance of the latest match
 };
 
 }  // namespace cairn::compact

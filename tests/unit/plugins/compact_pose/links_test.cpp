@@ -131,10 +131,10 @@ TEST_F(CompactPoseTest, EdgesMayPointBackwards) {
                          turned.measurement, turned.information);
   }
   const std::string policy = "compact_pose:reuse=false,range=3,angle=3.15";
-  const auto registration = registry.make<Registration>("recorded");
+  const auto registration = registry.make<Registration>("recorded:carry=0");
   registration->begin({.recording = &world.graph});
   const PolicyRun one = run(registry.make<PosePolicy>(policy), *registration, world.graph);
-  const auto turned = registry.make<Registration>("recorded");
+  const auto turned = registry.make<Registration>("recorded:carry=0");
   turned->begin({.recording = &backwards});
   const PolicyRun other = run(registry.make<PosePolicy>(policy), *turned, backwards);
   EXPECT_EQ(one.kept(), other.kept());

@@ -39,7 +39,7 @@ const std::string kPolicy = "compact_pose:range=4,angle=0.4,reuse=";
 
 TEST_F(Reuse, TheMapOfAPlaceStopsGrowing) {
   std::vector<std::size_t> kept, factors;
-  for (const std::string laps : {"3", "12", "40"}) {
+  for (const std::string laps : {"3", "40", "160"}) {
     const PolicyRun some = drive(kLaps + laps, kPolicy + "true", kSensor);
     kept.push_back(some.policy->kept().size());
     factors.push_back(static_cast<std::size_t>(some.policy->factor_count()));
@@ -49,6 +49,29 @@ TEST_F(Reuse, TheMapOfAPlaceStopsGrowing) {
   // A way between the same two poses is one factor, however often it is gone.
   EXPECT_LT(factors[2], 6 * kept[2]);
   EXPECT_GT(drive(kLaps + "12", kPolicy + "false", kSensor).policy->kept().size(), 4 * kept[1]);
+}
+
+/// Whatever a match is worth beside a step of odometry (0.02 m, 0.005 rad), with nothing said of
+/// it: it is learnt from those that come back.
+TEST_F(Reuse, TheMapStopsGrowingWhateverAMatchIsWorth) {
+  for (const double ratio : {0.5, 1.0, 1.5, 2.5, 5.0}) {
+    const std::string sigmas = ",sigma_translation=" + std::to_string(0.02 * ratio) +
+                               ",sigma_rotation=" + std::to_string(0.005 * ratio);
+    std::vector<std::size_t> kept;
+    for (const int laps : {25, 100}) {
+      const PolicyRun some = drive(
+          "ellipse_n:poses_per_lap=40,loop_density=0,translation_error=0,rotation_error=0,"
+          "translation_sigma=0.02,rotation_sigma=0.005,laps=" +
+              std::to_string(laps),
+          "compact_pose:range=5,angle=0.5", "simulated:range=5,angle=0.5" + sigmas);
+      kept.push_back(some.policy->kept().size());
+      std::int64_t asked = 0;
+      for (const PoseReport& report : some.reports) asked += std::ssize(report.links);
+      EXPECT_LT(asked, 2 * 40 * laps) << ratio;
+    }
+    EXPECT_LT(kept[0], 80U) << ratio;
+    EXPECT_LE(kept[1], kept[0] + 15) << ratio;
+  }
 }
 
 TEST_F(Reuse, WithoutNoiseTheMapIsTheTruth) {
@@ -73,7 +96,10 @@ TEST_F(Reuse, WithoutNoiseTheMapIsTheTruth) {
 TEST_F(Reuse, WhereItCostsMuchAPoseIsKept) {
   const auto kept = [&](const std::string& loss, const std::string& sigma) {
     const std::string sensor = ",sigma_translation=" + sigma + ",sigma_rotation=" + sigma;
-    return drive(kLaps + "4", kPolicy + "true,reuse_loss=" + loss, kSensor + sensor).kept().size();
+    return drive(kLaps + "4", kPolicy + "true,sensor=0.05 0.05,reuse_loss=" + loss,
+                 kSensor + sensor)
+        .kept()
+        .size();
   };
   EXPECT_GT(kept("0", "0.05"), kept("10", "0.05"));
   EXPECT_GE(kept("0", "0.05"), kept("0.06", "0.05"));

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numeric>
 #include <sstream>
+#include <stdexcept>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -115,6 +117,39 @@ TEST_F(ThresholdFinderTest, TheSensorIsWrittenByRowsOfItsUpperTriangle) {
   S << 1.0, 0.125, 0.25, 0.125, 2.0, 0.5, 0.25, 0.5, 4.0;
   finder_.note_loop(test_, {.translations = 2, .rotations = 1}, 1.0, S);
   EXPECT_EQ(finder_.found(0.5).at("sensor"), "1 0.125 0.25 2 0.5 4");
+}
+
+TEST(MedianCovariance, IsTheMiddleOneByDeterminant) {
+  const std::vector<Matrix> some{5.0 * MatrixXd::Identity(3, 3), MatrixXd::Identity(3, 3),
+                                 2.0 * MatrixXd::Identity(3, 3)};
+  EXPECT_EQ(median_covariance(some), some[2]);
+  EXPECT_THROW(median_covariance({}), std::logic_error);
+}
+
+/// Of equals the first: a tie that rounding decides would make a map depend on the machine.
+TEST(MedianCovariance, DoesNotDependOnRounding) {
+  Matrix lever = MatrixXd::Identity(3, 3);
+  lever(0, 2) = lever(2, 0) = 3.0;
+  lever(0, 0) = 10.0;  // determinant 1
+  const Matrix one = MatrixXd::Identity(3, 3);
+  for (const double rounding : {1.0 - 1e-12, 1.0 + 1e-12}) {
+    const std::vector<Matrix> two{one, lever * rounding, one};
+    EXPECT_EQ(median_covariance(two), two[1]);
+  }
+}
+
+TEST(TypicalMatch, IsTheMedianOfTheLatest) {
+  TypicalMatch typical;
+  EXPECT_FALSE(typical.known());
+  typical.note(4.0 * MatrixXd::Identity(3, 3));
+  EXPECT_TRUE(typical.known());
+  EXPECT_EQ(typical.covariance()(0, 0), 4.0);
+  for (int k = 0; k < 10; ++k) typical.note(MatrixXd::Identity(3, 3));
+  EXPECT_EQ(typical.covariance()(0, 0), 1.0);
+  typical.note(1e6 * MatrixXd::Identity(3, 3));  // one that failed counts for nothing
+  EXPECT_EQ(typical.covariance()(0, 0), 1.0);
+  for (int k = 0; k < 100; ++k) typical.note(9.0 * MatrixXd::Identity(3, 3));
+  EXPECT_EQ(typical.covariance()(0, 0), 9.0);
 }
 
 }  // namespace

@@ -2,12 +2,14 @@
 #include <algorithm>
 #include <array>
 #include <map>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "cairn/geometry/motion.hpp"
 #include "cairn/geometry/pose_chain.hpp"
 #include "unit/plugins/registration/registrations.hpp"
 
@@ -110,6 +112,92 @@ TEST_F(Recorded, MatchesAPartOfThePairsFalsely) {
     expect_share(wrong, matched, 0.3);
     EXPECT_FALSE(was_false(*mixed, {0, 1'000'000}));
   }
+}
+
+// Carrying ----------------------------------------------------------------------------------------
+
+/// A recording of 30 poses in a line, with one loop closure, from pose 5 to pose 20.
+class CarriedLoop : public Registrations {
+ protected:
+  void SetUp() override {
+    const auto pose = registry.variable_type("VERTEX_SE2");
+    const auto relative = registry.factor_type("EDGE_SE2");
+    const std::array<double, 6> information{400, 0, 0, 400, 0, 2500};
+    Graph& graph = world.graph;
+    for (int k = 0; k < 30; ++k)
+      graph.add_variable(pose, k, std::array{static_cast<double>(k), 0.0, 0.0});
+    for (int k = 0; k + 1 < 30; ++k)
+      graph.add_factor(relative, std::array{k, k + 1}, std::array{1.0, 0.2, 0.1}, information);
+    graph.add_factor(relative, std::array{5, 20}, std::array{0.5, -0.3, 2.0}, information);
+  }
+  std::unique_ptr<Registration> recorded(const std::string& options,
+                                         const std::vector<Id>& left_out) {
+    auto made = registry.make<Registration>("recorded" + options);
+    made->begin({.recording = &world.graph});
+    for (const Id id : left_out) made->pose_ended(id, false);
+    return made;
+  }
+  /// Composed by hand along poses, with the covariance of the sum.
+  Motion along(const std::vector<Id>& poses) const {
+    const MotionGroup group(registry_pose_);
+    Motion all = group.identity();
+    for (std::size_t k = 0; k + 1 < poses.size(); ++k) {
+      for (int f = 0; f < world.graph.factor_count(); ++f) {
+        const Factor factor = world.graph.factor(f);
+        if (std::minmax(factor.variables[0], factor.variables[1]) ==
+            std::minmax(poses[k], poses[k + 1]))
+          all = group.compose(all, group.of_factor(factor, poses[k]));
+      }
+    }
+    return all;
+  }
+  void expect_way(const std::vector<Factor>& answer, const std::vector<Id>& poses) {
+    ASSERT_THAT(answer, SizeIs(1));
+    const MotionGroup group(registry_pose_);
+    const Motion motion = group.of_factor(answer.front(), poses.front()), expected = along(poses);
+    for (std::size_t k = 0; k < expected.mean.size(); ++k)
+      EXPECT_NEAR(motion.mean[k], expected.mean[k], 1e-12);
+    for (std::size_t k = 0; k < expected.covariance.size(); ++k)
+      EXPECT_NEAR(motion.covariance[k], expected.covariance[k], 1e-9);
+  }
+  const std::shared_ptr<const VariableType> registry_pose_ = registry.variable_type("VERTEX_SE2");
+};
+
+TEST_F(CarriedLoop, OfAPoseThatWasNotKeptIsMeasuredByWayOfIt) {
+  expect_way(recorded("", {5})->match(3, 20), {3, 4, 5, 20});
+  expect_way(recorded("", {5})->match(7, 20), {7, 6, 5, 20});
+  expect_way(recorded("", {20, 21})->match(5, 22), {5, 20, 21, 22});
+  expect_way(recorded("", {5, 20, 21})->match(4, 22), {4, 5, 20, 21, 22});
+}
+
+TEST_F(CarriedLoop, IsNotWhereItsOwnPosesCouldBeAskedFor) {
+  EXPECT_THAT(recorded("", {})->match(3, 20), IsEmpty());       // pose 5 is kept
+  EXPECT_THAT(recorded("", {5})->match(3, 22), IsEmpty());      // so is pose 20
+  EXPECT_THAT(recorded("", {5, 20})->match(3, 19), IsEmpty());  // which is still to come
+}
+
+TEST_F(CarriedLoop, IsGivenOnce) {
+  const auto registration = recorded("", {5});
+  EXPECT_THAT(registration->match(4, 20), SizeIs(1));
+  EXPECT_THAT(registration->match(6, 20), IsEmpty());
+  const auto asked = recorded("", {20});
+  EXPECT_THAT(asked->match(5, 20), SizeIs(1));  // itself
+  EXPECT_THAT(asked->match(5, 21), IsEmpty());
+}
+
+TEST_F(CarriedLoop, GoesNoFartherThanTheOptionSays) {
+  EXPECT_THAT(recorded(":carry=2", {5})->match(3, 20), SizeIs(1));
+  EXPECT_THAT(recorded(":carry=1", {5})->match(3, 20), IsEmpty());
+  EXPECT_THAT(recorded(":carry=3", {5, 20, 21})->match(4, 22), SizeIs(1));
+  EXPECT_THAT(recorded(":carry=2", {5, 20, 21})->match(4, 22), IsEmpty());
+  EXPECT_THAT(recorded(":carry=0", {5})->match(4, 20), IsEmpty());
+}
+
+TEST_F(CarriedLoop, MayBeFalseAsAnyOther) {
+  const auto registration = recorded(":false_rate=1", {5});
+  EXPECT_THAT(registration->match(4, 20), SizeIs(1));
+  EXPECT_TRUE(was_false(*registration, {4, 20}));
+  EXPECT_FALSE(was_false(*registration, {3, 20}));
 }
 
 }  // namespace

@@ -19,6 +19,9 @@ struct ChainStep {
   std::vector<double> motion;  ///< measured, from the pose before [ambient_size]
   /// Σ of it, tangent × tangent, column-major; empty: not known.
   std::vector<double> covariance{};
+  /// The robot did not move so: a pose of the chain was matched with the kept pose at its beginning
+  /// (the first step leads from there to it) or at its end (the last step leads from it to there).
+  bool matched = false;
 };
 
 /// Odometry between two poses that follow each other in a compact graph, and the poses that were
@@ -50,11 +53,14 @@ struct RecoveredPose {
 };
 
 /// The states of the poses of a chain but its first, given those of its two ends. With the relative
-/// poses z_1 … z_q, w_m = Σ_{k≤m} ‖z_k‖ / Σ_{k≤q} ‖z_k‖ (norms of translations; m/q where nothing
-/// moves):
+/// poses z_1 … z_q, w_m = Σ_{k≤m} ‖z_k‖ / Σ_{k≤q} ‖z_k‖, the norm being that of translation and
+/// rotation vector together [m, rad] (m/q where nothing moves):
 ///
 ///     v0, v1:  x_from · exp(w_m log(x_from⁻¹ x_to)),  w_m = m/q for v0
 ///     v2:      x_from · (z_1 ⋯ z_m) · exp(w_m log((z_1 ⋯ z_q)⁻¹ x_from⁻¹ x_to))
+///
+/// Steps that are matched are taken as they are: these formulas hold between the poses that were
+/// matched, from which the robot came and to which it drove, in place of `from` and `to`.
 ///
 /// v2 turns the mismatch with the robot, which is wrong where the robot turns. `likely` does not:
 /// given the mismatch d at the end, the expected perturbation at m is K_m d, with P_m the

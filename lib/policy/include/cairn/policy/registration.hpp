@@ -31,6 +31,8 @@ class CAIRN_API Registration : public Component {
   /// The measured relative poses of two poses: relative factors on them, in either order. None if
   /// the two do not match.
   virtual std::vector<Factor> match(Id earlier, Id later) = 0;
+  /// Called after each pose of a run: whether the policy keeps it. Does nothing unless overridden.
+  virtual void pose_ended(Id pose, bool kept);
 };
 
 /// Ability of a registration that knows which of its answers are false: for experiments, which

@@ -26,6 +26,9 @@ struct ThresholdTrial {
 struct FoundThresholds {
   OptionValues options;
   std::vector<ThresholdTrial> trials;
+  /// √(chi2 / degrees of freedom) of the sample with everything, at most 1: errors that the
+  /// covariances predict are multiplied by it.
+  double noise_scale = 1.0;
   double expected_ate = 0.0;  ///< of the sample with everything [m]
   double tolerance = 0.0;     ///< what the error of a trial may be [m]
   double seconds = 0.0;
@@ -36,9 +39,9 @@ struct FoundThresholds {
 /// `error_ratio` is 0, the choice is tried on the sample, and `refine_thresholds` lowers it until
 /// the error is at most `error_ratio` times that of everything, or that of a single link. The error
 /// is the larger of two estimates, neither of which needs the truth: what the covariances
-/// predict (`expected_ate`), and √(E² + D²) with E the expected error of everything and D the
-/// distance between the two trajectories. Throws `Error` (usage) if the policy is no
-/// `OptionFinder`, and (input) if the sample does not determine thresholds.
+/// predict (`expected_ate`, times `noise_scale`), and √(E² + D²) with E the expected error of
+/// everything and D the distance between the two trajectories. Throws `Error` (usage) if the policy
+/// is no `OptionFinder`, and (input) if the sample does not determine thresholds.
 CAIRN_API FoundThresholds find_thresholds(const PolicyJob& job, std::size_t count,
                                           double error_ratio, const PolicySetting& setting);
 
@@ -47,7 +50,8 @@ using ThresholdTest =
     std::function<ThresholdTrial(const OptionValues& options, double links, double poses)>;
 
 /// Lowers thresholds until the error of a trial is within `found.tolerance`: first the gains of
-/// links, by factors of √2 and at most ten times, until lower ones let no more links through; then
+/// links, by factors of √2 and at most ten times, until lower ones let no more links through, if
+/// there are any; then
 /// those of links and poses together, from the beginning. `found.options` are what was found at
 /// first, and become those of the first trial that is good or, if none is, of that with the least
 /// error. Stops early once `interrupted` returns true.
