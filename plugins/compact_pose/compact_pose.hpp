@@ -52,6 +52,7 @@ class CompactPose final : public PosePolicy, public OptionFinder {
   OptionValues found() const override;
   /// `loop_gain` and `pose_gain` times the factors.
   OptionValues scaled(const OptionValues& found, double links, double poses) const override;
+  OptionValues careful() const override { return {{"reuse", "false"}}; }
   double accuracy() const override;
 
  private:

@@ -120,7 +120,7 @@ OptionFinder& finder_of(PosePolicy& policy, const PolicyJob& job) {
 
 void refine_thresholds(const OptionFinder& finder, const ThresholdTest& test,
                        FoundThresholds& found, const std::function<bool()>& interrupted) {
-  const OptionValues first = found.options;
+  OptionValues first = found.options;
   double least = std::numeric_limits<double>::infinity();
   bool good = false;
   const auto attempt = [&](double links, double poses) {
@@ -132,19 +132,27 @@ void refine_thresholds(const OptionFinder& finder, const ThresholdTest& test,
       found.options = options;
       least = trial.error();
     }
-    return !interrupted || !interrupted();
+    return !good && !(interrupted && interrupted());
   };
-  if (!attempt(1.0, 1.0) || good) return;
+  const auto lower_links = [&] {
+    if (!attempt(1.0, 1.0)) return false;
+    double factor = 1.0;
+    const std::size_t before = found.trials.size();
+    for (int k = 0; k < kMostTrials; ++k) {
+      // Where lower gains let no more links through, it is poses that are missing.
+      const std::size_t n = found.trials.size();
+      const std::int64_t loops = found.trials.back().loops_kept;
+      if (n > before + 1 && loops > 0 && loops == found.trials[n - 3].loops_kept) break;
+      if (!attempt(factor /= kStep, 1.0)) return false;
+    }
+    return true;
+  };
+  if (!lower_links()) return;
+  const OptionValues careful = finder.careful();
+  for (const auto& [name, value] : careful) first.insert_or_assign(name, value);
+  if (!careful.empty() && !lower_links()) return;
   double factor = 1.0;
-  for (int k = 0; k < kMostTrials && !good; ++k) {
-    // Where lower gains let no more links through, it is poses that are missing.
-    const std::size_t n = found.trials.size();
-    const std::int64_t loops = found.trials.back().loops_kept;
-    if (n > 2 && loops > 0 && loops == found.trials[n - 3].loops_kept) break;
-    if (!attempt(factor /= kStep, 1.0)) return;
-  }
-  factor = 1.0;
-  for (int k = 0; k < kMostTrials && !good; ++k) {
+  for (int k = 0; k < kMostTrials; ++k) {
     factor /= kStep;
     if (!attempt(factor, factor)) return;
   }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 #include <array>
+#include <cstdlib>
 #include <map>
 #include <memory>
 #include <string>
@@ -137,7 +138,7 @@ class CarriedLoop : public Registrations {
     for (const Id id : left_out) made->pose_ended(id, false);
     return made;
   }
-  /// Composed by hand along poses, with the covariance of the sum.
+  /// Composed by hand along poses, with the covariance of the sum; that of odometry counts twice.
   Motion along(const std::vector<Id>& poses) const {
     const MotionGroup group(registry_pose_);
     Motion all = group.identity();
@@ -146,10 +147,17 @@ class CarriedLoop : public Registrations {
         const Factor factor = world.graph.factor(f);
         if (std::minmax(factor.variables[0], factor.variables[1]) ==
             std::minmax(poses[k], poses[k + 1]))
-          all = group.compose(all, group.of_factor(factor, poses[k]));
+          all = group.compose(all,
+                              doubled(group.of_factor(factor, poses[k]), poses[k], poses[k + 1]));
       }
     }
     return all;
+  }
+  static Motion doubled(Motion motion, Id from, Id to) {
+    if (std::abs(from - to) == 1) {
+      for (double& entry : motion.covariance) entry *= 2.0;
+    }
+    return motion;
   }
   void expect_way(const std::vector<Factor>& answer, const std::vector<Id>& poses) {
     ASSERT_THAT(answer, SizeIs(1));
