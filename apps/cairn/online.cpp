@@ -48,6 +48,7 @@ struct OnlineOptions {
   std::string journal;
   std::string sync = "batch";
   std::string output;
+  std::string trajectory;
   ProblemOptions problem;
 
   OnlineOptions() { problem.initial.clear(); }
@@ -89,6 +90,7 @@ json::object report_json(const OnlineOptions& options, const Conversation::Count
   report["seconds"] = {{"total", counts.solve_seconds}, {"longest", counts.longest}};
   report["journal"] = text_json(options.journal);
   report["output"] = text_json(options.output);
+  report["trajectory"] = text_json(options.trajectory);
   end_report(report);
   return report;
 }
@@ -142,7 +144,8 @@ Listener follow_policy(const OnlineOptions& options, const ProblemSetup& setup, 
   listener.policy->estimator().set_loss(setup.loss(), setup.loss_selector());
   listener.lines = std::make_unique<PolicySession>(
       *listener.policy, *listener.format, registry,
-      PolicySettings{options.input.read, options.estimates, options.marginals});
+      PolicySettings{options.input.read, options.estimates, options.marginals,
+                     !options.trajectory.empty()});
   return listener;
 }
 
@@ -155,8 +158,17 @@ void check(const OnlineOptions& options, Session& session) {
                 "a policy solves when it has to: --solve explicit and --budget are for runs "
                 "without --policy");
   }
+  if (options.trajectory == "-")
+    throw Error(ErrorCode::usage, "--trajectory writes a file; standard output is for answers");
+  if (!options.trajectory.empty() && options.policy.empty()) {
+    throw Error(
+        ErrorCode::usage,
+        "--trajectory puts back poses that a policy has left out: give --policy, or -o, which "
+        "has all poses without one");
+  }
   session.files.add_input("-");
   check_output(options.output, "", session);
+  check_output(options.trajectory, "", session);
   session.files.add_output(options.journal);  // is tried when it is opened
 }
 
@@ -243,6 +255,15 @@ int run(OnlineOptions options, Session& session) {
     if (!failure) throw;
     session.note(error.what());  // the reason comes last, as the error
   }
+  try {
+    if (!options.trajectory.empty()) {
+      write_graph(recovered_trajectory(*listener.policy, Recovery::likely), options.trajectory,
+                  session.registry(), output_format(options.trajectory, ""));
+    }
+  } catch (const std::exception& error) {
+    if (!failure) throw;
+    session.note(error.what());
+  }
   if (within_a_line && !options.output.empty())
     session.note("the line that failed may be in the map in part, and is not in the journal");
   if (failure) std::rethrow_exception(failure);
@@ -291,6 +312,9 @@ Command add_online(ArgumentParser program) {
       .show_default();
   cli.add_option("-o,--save", options->output, "write the last estimate as a graph at the end")
       .type_name("OUT");
+  cli.add_option("--trajectory", options->trajectory,
+                 "with --policy, write all poses at the end, and estimate those left out")
+      .type_name("FILE");
   add_loss_options(cli, options->problem);
   add_input_options(cli, options->input);
   cli.footer(

@@ -84,7 +84,7 @@ void CompactGraph::advance(const Variable& pose, const Motion& motion,
     next.odometry = group_->motions().compose(newest_.odometry, motion, order_);
     next.steps = std::move(newest_.steps);
   }
-  next.steps.push_back({pose.id, motion.mean, motion.covariance});
+  if (keeps_chains_) next.steps.push_back({pose.id, motion.mean, motion.covariance});
   next.ahead = compose(kept_[next.predecessor].ahead, next.odometry);
   newest_ = std::move(next);
   newest_.placed = group_->place(
@@ -110,12 +110,18 @@ void CompactGraph::keep(PolicySeconds& seconds) {
   pose.variable = newest_.pose;
   pose.odometry =
       group_->motions().to_factor(newest_.type, from, newest_.pose.id, newest_.odometry);
-  chains_.push_back({from, newest_.pose.id, std::move(newest_.steps)});
+  end_chain(from, newest_.pose.id);
   number_.emplace(pose.id, size());
   index_->add(newest_.placed.at.t);
   kept_.push_back(std::move(pose));
   newest_.kept = true;
   if (newest_.pose.fixed) update({}, seconds);  // which is more than odometry
+}
+
+/// The steps of the newest pose lead to one that is kept.
+void CompactGraph::end_chain(Id from, Id to) {
+  if (keeps_chains_) chains_.push_back({from, to, std::move(newest_.steps)});
+  newest_.steps.clear();
 }
 
 void CompactGraph::link(std::span<const Factor> links, PolicySeconds& seconds) {
@@ -151,10 +157,12 @@ void CompactGraph::relocate(int pose, const Motion& measured, double of_way,
     known->second.motion = bridge;
   }
   const Motion back = motions.inverse(end);
-  newest_.steps.push_back({kept_[pose].id, back.mean, back.covariance, true});
-  chains_.push_back({kept_[other].id, kept_[pose].id, std::move(newest_.steps)});
-  // The next way begins at another pose than where this one ended.
-  newest_.steps = {{newest_.pose.id, start.mean, start.covariance, true}};
+  if (keeps_chains_) {
+    newest_.steps.push_back({kept_[pose].id, back.mean, back.covariance, true});
+    end_chain(kept_[other].id, kept_[pose].id);
+    // The next way begins at another pose than where this one ended.
+    newest_.steps.push_back({newest_.pose.id, start.mean, start.covariance, true});
+  }
   newest_.predecessor = pose;
   newest_.odometry = start;
   hang_newest();

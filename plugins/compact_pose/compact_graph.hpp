@@ -103,7 +103,9 @@ class CompactGraph {
   /// estimator.
   Displacement between(int a, int b);
 
+  /// From each kept pose to the next one of the trajectory.
   const std::vector<OdometryChain>& chains() const { return chains_; }
+  void keep_chains(bool keep) { keeps_chains_ = keep; }
 
  private:
   /// A motion from the anchor, with its covariance.
@@ -157,7 +159,10 @@ class CompactGraph {
                      ///< update starts
   std::unordered_map<Id, int> number_;
   Newest newest_;
+  void end_chain(Id from, Id to);
+
   std::vector<OdometryChain> chains_;
+  bool keeps_chains_ = true;
   /// Links that replace chains between kept poses, by the two (the smaller number first).
   struct Bridge {
     FactorId factor = 0;

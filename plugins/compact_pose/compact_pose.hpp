@@ -46,6 +46,7 @@ class CompactPose final : public PosePolicy, public OptionFinder {
   int factor_count() const override { return graph_.factor_count(); }
   std::vector<double> newest_state() const override;
   const std::vector<OdometryChain>& chains() const override { return graph_.chains(); }
+  void keep_chains(bool keep) override { graph_.keep_chains(keep); }
 
   void* ability(std::string_view name) override;
   OptionValues watching() const override;

@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "dense/cholesky.hpp"
-
 #include "dense/eigenvalues.hpp"
 
 namespace cairn::compact {

@@ -50,7 +50,9 @@ bool same(const LinkReport& a, const LinkReport& b) {
 
 PolicySession::PolicySession(PosePolicy& policy, StreamFormat& format, Registry& registry,
                              PolicySettings settings)
-    : policy_(policy), format_(format), registry_(registry), settings_(std::move(settings)) {}
+    : policy_(policy), format_(format), registry_(registry), settings_(std::move(settings)) {
+  policy_.keep_chains(settings_.trajectory);
+}
 
 PolicySession::Command PolicySession::find_command(std::string_view word) {
   static constexpr std::pair<std::string_view, Command> kCommands[] = {
@@ -393,11 +395,24 @@ void PolicySession::report_estimate(const Words& words, Reply& reply) {
   }
   const Id id = parse_whole(words[1], "id");
   const std::optional<Id> newest = arriving_ && complete() ? current() : newest_;
-  if (newest != id && !in_graph(id)) {
+  const bool left_out = newest != id && !in_graph(id);
+  if (left_out && !(settings_.trajectory && arrived_.contains(id))) {
     throw bad_line(
-        fmt::format("there is no estimate of {}; expected a pose that was kept, or the "
+        fmt::format("there is no estimate of {}; expected a pose that was kept{}, or the "
                     "newest once its odometry is there",
-                    id));
+                    id, settings_.trajectory ? "" : " (with --trajectory also one that was not)"));
+  }
+  if (left_out) {
+    const auto recovered = [&] {
+      return recovered_state(policy_, motions_->type(), id, Recovery::likely);
+    };
+    if (!recovered()) {
+      throw bad_line(fmt::format(
+          "pose {} was not kept, and is estimated from the next pose that is: ask again then", id));
+    }
+    settle(reply);
+    answer_ += estimate_line(motions_->type(), id, *recovered());
+    return answer(reply);
   }
   settle(reply);
   write_estimate(id, answer_);

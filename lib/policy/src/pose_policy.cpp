@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "cairn/policy/pose_policy.hpp"
 
+#include <algorithm>
 #include <array>
 
 namespace cairn {
@@ -8,6 +9,7 @@ namespace cairn {
 PosePolicy::~PosePolicy() = default;
 OptionFinder::~OptionFinder() = default;
 void PosePolicy::expect(const Graph&, std::span<const Arrival>) {}
+void PosePolicy::keep_chains(bool) {}
 
 std::string_view to_string(LinkVerdict verdict) {
   constexpr std::array<std::string_view, 5> kNames{"linked", "unmatched", "uninformative",
@@ -60,6 +62,21 @@ Graph recovered_trajectory(PosePolicy& policy, Recovery how) {
     }
   }
   return whole;
+}
+
+std::optional<std::vector<double>> recovered_state(PosePolicy& policy, const VariableType& type,
+                                                   Id pose, Recovery how) {
+  const std::vector<OdometryChain>& chains = policy.chains();
+  for (auto chain = chains.rbegin(); chain != chains.rend(); ++chain) {
+    const auto step = std::ranges::find(chain->steps, pose, &ChainStep::pose);
+    // At its end is a pose that is kept; at its beginning may be a match, whose pose ended another.
+    if (step == chain->steps.end() || pose == chain->to || step->matched) continue;
+    Estimator& estimator = policy.estimator();
+    const auto from = estimator.state(chain->from), to = estimator.state(chain->to);
+    const std::vector<RecoveredPose> poses = recover(type, *chain, from, to, how);
+    return poses[static_cast<std::size_t>(step - chain->steps.begin())].state;
+  }
+  return std::nullopt;
 }
 
 }  // namespace cairn

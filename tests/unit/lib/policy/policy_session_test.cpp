@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "cairn/policy/policy_session.hpp"
 
+#include <algorithm>
+#include <array>
 #include <memory>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -140,6 +143,65 @@ TEST_F(PolicySessionTest, RestoredLinesGiveTheSameEstimate) {
   for (const std::string& line : lines) session_->restore(line, ++number_);
   EXPECT_EQ(take("ESTIMATE ALL").text, estimate);
   EXPECT_EQ(session_->counts().linked, 1);
+}
+
+/// Three laps of a square in steps of half a side: every other pose is left out.
+class PolicyTrajectory : public PolicySessionTest {
+ protected:
+  void drive_laps(bool trajectory) {
+    format_ = registry_.make<StreamFormat>("g2o");
+    policy_ = registry_.make<PosePolicy>("compact_pose:range=3,angle=0.8,pose_gain=1.5");
+    session_ = std::make_unique<PolicySession>(
+        *policy_, *format_, registry_,
+        PolicySettings{.read = {}, .output = "none", .trajectory = trajectory});
+    take("NEW VERTEX_SE2 0");
+    for (int k = 1; k <= 24; ++k) {
+      take("NEW VERTEX_SE2 " + std::to_string(k));
+      take("EDGE_SE2 " + std::to_string(k - 1) + " " + std::to_string(k) +
+           (k % 2 == 0 ? " 1 0 1.5707963267948966 400 0 0 400 0 400" : " 1 0 0 400 0 0 400 0 400"));
+      for (std::string text = take("NEXT").text; text.find("MATCH NONE") == std::string::npos;
+           text = take("NEXT").text) {
+        const std::string pair = text.substr(text.find("MATCH ") + 6);
+        const int earlier = std::stoi(pair);
+        const bool same_place = (k - earlier) % 8 == 0;
+        take((same_place ? "EDGE_SE2 " : "NOMATCH ") + std::to_string(earlier) + " " +
+             std::to_string(k) + (same_place ? kHere : ""));
+      }
+    }
+  }
+};
+
+TEST_F(PolicyTrajectory, EstimatesPosesThatWereLeftOut) {
+  drive_laps(true);
+  EXPECT_LT(policy_->kept().size(), 20U);
+  int left_out = 0;
+  for (int k = 0; k < 16; ++k) {
+    const std::vector<Id> kept = policy_->kept();
+    left_out += std::ranges::count(kept, k) == 0;
+    const std::string text = take("ESTIMATE " + std::to_string(k)).text;
+    ASSERT_THAT(text, StartsWith("VERTEX_SE2 " + std::to_string(k) + " "));
+    std::istringstream words(text);
+    std::string tag;
+    double id = 0.0, x = 0.0, y = 0.0;
+    words >> tag >> id >> x >> y;
+    constexpr std::array<double, 8> kX{0, 1, 2, 2, 2, 1, 0, 0}, kY{0, 0, 0, 1, 2, 2, 2, 1};
+    const auto corner = static_cast<std::size_t>(k % 8);
+    EXPECT_NEAR(x, kX[corner], 1e-6) << k;
+    EXPECT_NEAR(y, kY[corner], 1e-6) << k;
+  }
+  EXPECT_GT(left_out, 4);
+  EXPECT_FALSE(policy_->chains().empty());
+  EXPECT_THAT(take("ESTIMATE 99").text, HasSubstr("there is no estimate of 99"));
+}
+
+TEST_F(PolicyTrajectory, TakesNoMemoryWhereNobodyAsksForIt) {
+  drive_laps(false);
+  EXPECT_TRUE(policy_->chains().empty());
+  const std::vector<Id> kept = policy_->kept();
+  for (int k = 0; k < 16; ++k) {
+    if (std::ranges::count(kept, k) > 0) continue;
+    EXPECT_THAT(take("ESTIMATE " + std::to_string(k)).text, HasSubstr("--trajectory"));
+  }
 }
 
 }  // namespace

@@ -22,6 +22,7 @@ struct PolicySettings {
   ReadOptions read;
   std::string output = "last";     ///< estimates at the end of a pose: none, last, changed or all
   std::string marginals = "none";  ///< covariances then: none, last or diagonal
+  bool trajectory = false;  ///< whether poses that were not kept can be asked for; takes memory
 };
 
 /// A policy decides live which poses are kept and which pairs the front end should match.

@@ -81,6 +81,9 @@ class CAIRN_API PosePolicy : public Component {
   /// Called before the first pose if what follows is a recording, for policies that need it as a
   /// whole; does nothing unless a policy overrides it.
   virtual void expect(const Graph& recording, std::span<const Arrival> poses);
+  /// Called before the first pose with false if nobody will ask for `chains`: a policy that keeps
+  /// them needs memory for every pose that ever was. Does nothing unless a policy overrides it.
+  virtual void keep_chains(bool keep);
   /// The next pose, with its odometry from the previous pose (several factors are fused; none for
   /// the first pose). A pose marked as fixed is kept. Throws `Error` (input) if there is no
   /// odometry, or a factor that is not a relative pose of the two; nothing has changed then.
@@ -106,7 +109,7 @@ class CAIRN_API PosePolicy : public Component {
   /// The newest pose as it is estimated, kept or not.
   virtual std::vector<double> newest_state() const = 0;
   /// From each kept pose to the next one of the trajectory, in order. A chain may end at a pose
-  /// that was kept before.
+  /// that was kept before. Empty after `keep_chains(false)`, if the policy forgets them.
   virtual const std::vector<OdometryChain>& chains() const = 0;
 };
 
@@ -138,5 +141,12 @@ CAIRN_API void run_policy(const Graph& recording, std::span<const Arrival> poses
 /// All poses of a trajectory, the left-out ones recovered between those that are kept; without
 /// factors.
 CAIRN_API Graph recovered_trajectory(PosePolicy& policy, Recovery how);
+
+/// The state of one pose that was left out; nothing: it is in no chain, since it is kept, never
+/// came, or the next pose that is kept has not come yet. Where the robot passed several times, of
+/// the last.
+CAIRN_API std::optional<std::vector<double>> recovered_state(PosePolicy& policy,
+                                                             const VariableType& type, Id pose,
+                                                             Recovery how);
 
 }  // namespace cairn
