@@ -19,11 +19,17 @@ namespace {
 
 namespace json = boost::json;
 
-std::vector<std::string> solvers_that_can(Registry& registry) {
+using Ability = bool (*)(LinearSolver&);
+
+bool has_marginals(LinearSolver& solver) { return query<Marginals>(solver); }
+bool has_determinant(LinearSolver& solver) { return query<LogDeterminant>(solver); }
+bool has_both(LinearSolver& solver) { return has_marginals(solver) && has_determinant(solver); }
+
+std::vector<std::string> solvers_that_can(Registry& registry, Ability can = has_marginals) {
   std::vector<std::string> names;
   for (const std::string& name : registry.names(LinearSolver::kKind)) {
     try {
-      if (query<Marginals>(*registry.make<LinearSolver>(name))) names.push_back(name);
+      if (can(*registry.make<LinearSolver>(name))) names.push_back(name);
     } catch (const Error&) {
       // A plugin that cannot be loaded is nothing to recommend.
     }
@@ -40,6 +46,20 @@ CovarianceSolver make_covariance_solver(const std::string& name, Registry& regis
               fmt::format("linear solver '{}' gives no covariances: it lacks the ability '{}', "
                           "since it does not solve exactly; these have: {}",
                           name, Marginals::kAbility, joined(solvers_that_can(registry), ", ")));
+}
+
+CovarianceSolver make_determinant_solver(const std::string& name, Registry& registry,
+                                         bool covariances) {
+  const Ability can = covariances ? has_both : has_determinant;
+  CovarianceSolver made{name, registry.make<LinearSolver>(name)};
+  if (can(*made.solver)) return made;
+  throw Error(
+      ErrorCode::usage,
+      fmt::format("linear solver '{}' gives no {}; these do: {}", name,
+                  covariances ? "determinants and covariances (abilities 'log_determinant' and "
+                                "'marginals')"
+                              : "determinants (ability 'log_determinant')",
+                  joined(solvers_that_can(registry, can), ", ")));
 }
 
 CovarianceSolver covariance_solver_of(const ComponentSpec& optimizer, Registry& registry) {

@@ -14,7 +14,7 @@
 
 namespace cairn::app {
 
-/// A linear solver that can give covariances.
+/// A linear solver that can give covariances, or determinants.
 struct CovarianceSolver {
   std::string name;  ///< as on the command line
   std::unique_ptr<LinearSolver> solver;
@@ -23,6 +23,10 @@ struct CovarianceSolver {
 /// Makes a linear solver, before any work is done. Throws `Error` (usage) if it cannot give
 /// covariances, naming those that can.
 CovarianceSolver make_covariance_solver(const std::string& name, Registry& registry);
+
+/// The same of one that has determinants; with `covariances` it must have both abilities.
+CovarianceSolver make_determinant_solver(const std::string& name, Registry& registry,
+                                         bool covariances);
 
 /// A second one of what an optimizer solves with. Throws `Error` (usage) also for an optimizer that
 /// brings linear solvers of its own.

@@ -1,19 +1,25 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// cairn evaluate ESTIMATE TRUTH: errors of a trajectory.
+// cairn evaluate ESTIMATE TRUTH: errors of a trajectory, and the divergence of two graphs.
 #include <cmath>
 #include <limits>
 #include <memory>
 #include <optional>
 #include <utility>
+#include <vector>
 
 #include <fmt/core.h>
 
 #include "arguments.hpp"
 #include "cairn/evaluation/trajectory.hpp"
+#include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
+#include "cairn/runtime/plugin_call.hpp"
+#include "cairn/sparsification/measures.hpp"
 #include "commands.hpp"
+#include "covariances.hpp"
 #include "graph_files.hpp"
 #include "json_report.hpp"
+#include "problem_setup.hpp"
 #include "results.hpp"
 #include "table.hpp"
 
@@ -35,6 +41,9 @@ struct EvaluateOptions {
   std::string match;  ///< id or stamp; empty: what fits the files
   std::optional<double> offset, max_time_difference;
   bool planar = false;
+  bool kld = false;
+  std::string compared_at = "common";
+  std::string linear_solver = kDefaultLinearSolver;  ///< of the KLD
 
   StampMatching matching() const {
     StampMatching m;
@@ -58,9 +67,8 @@ void set_stamps(Trajectory& poses, const std::vector<double>& stamps,
   for (std::size_t k = 0; k < poses.size(); ++k) poses[k].stamp = stamps[k];
 }
 
-Trajectory load_trajectory(const TrajectoryOptions& options, const EvaluateOptions& all,
-                           Session& session) {
-  const LoadedGraph loaded = load_graph(options.file, all.input, session);
+Trajectory trajectory_of(const LoadedGraph& loaded, const TrajectoryOptions& options,
+                         const EvaluateOptions& all, Session& session) {
   Trajectory poses = trajectory(loaded.graph);
   if (!options.stamps.empty()) {
     session.files.add_input(options.stamps);
@@ -114,7 +122,63 @@ void warn_of_missing(std::int64_t count, const std::string& in, const std::strin
       fmt::format("{} of {} {} in {} and left out", plural(count, "pose"), in, verb, not_in));
 }
 
+// Divergence --------------------------------------------------------------------------------------
+
+/// D(TRUTH‖ESTIMATE) that was asked for. Without an error: it could not be computed.
+struct GraphDivergence {
+  std::optional<SparsificationError> error;
+  std::size_t variables = 0;  ///< compared
+};
+
+void need_factors(const LoadedGraph& loaded) {
+  if (loaded.graph.factor_count() > 0) return;
+  throw Error(
+      ErrorCode::input,
+      fmt::format("{}: has no factors and so no covariance; --kld compares two graphs, such "
+                  "as cairn optimize and cairn sparsify write",
+                  loaded.label));
+}
+
+/// The ids that both graphs have.
+std::vector<Id> common_ids(const Graph& a, const Graph& b) {
+  std::vector<Id> ids;
+  for (int v = 0; v < a.variable_count(); ++v) {
+    if (b.find(a.id(v))) ids.push_back(a.id(v));
+  }
+  return ids;
+}
+
+GraphDivergence divergence_of(const Graph& truth, const Graph& estimate,
+                              const EvaluateOptions& options, CovarianceSolver& solver) {
+  const std::vector<Id> common = common_ids(estimate, truth);
+  const ComparedAt at = options.compared_at == "minima" ? ComparedAt::minima : ComparedAt::common;
+  GraphDivergence result;
+  result.variables = common.size();
+  result.error =
+      call_plugin([&] { return fmt::format("linear solver '{}'", solver.name); },
+                  [&] {
+                    return std::ssize(common) == estimate.variable_count()
+                               ? sparsification_error(truth, estimate, *solver.solver, at)
+                               : marginal_divergence(truth, estimate, common, *solver.solver, at);
+                  });
+  return result;
+}
+
 // Results -----------------------------------------------------------------------------------------
+
+std::string divergence_text(const GraphDivergence& divergence, const EvaluateOptions& options,
+                            bool colour) {
+  if (!divergence.error) return "";
+  Table table({{fmt::format("KLD of {}, at the states of {}",
+                            plural(static_cast<std::int64_t>(divergence.variables), "variable"),
+                            options.compared_at == "minima" ? "each" : "TRUTH"),
+                Table::Align::left},
+               {"nats", Table::Align::right}});
+  table.add({"divergence", fmt::format("{:.6g}", divergence.error->kld)});
+  table.add({"of this, covariances", fmt::format("{:.6g}", divergence.error->covariance)});
+  table.add({"and means", fmt::format("{:.6g}", divergence.error->mean)});
+  return "\n" + table.text(colour);
+}
 
 std::string table_text(const TrajectoryError& error, bool by_stamp, bool colour) {
   Table table({{fmt::format("{} compared{}", plural(error.poses, "pose"),
@@ -145,6 +209,19 @@ json::object association_json(const EvaluateOptions& options, bool by_stamp,
           {"largest_time_difference", pairs.largest_difference}};
 }
 
+/// As cairn sparsify reports it.
+void add_divergence(const GraphDivergence& divergence, const EvaluateOptions& options,
+                    json::object& report) {
+  report["kld"] = nullptr;
+  if (!divergence.error) return;
+  report["kld"] = divergence.error->kld;
+  report["kld_parts"] = {{"covariance", divergence.error->covariance},
+                         {"mean", divergence.error->mean}};
+  report["kld_of"] = {{"variables", divergence.variables},
+                      {"compared_at", options.compared_at},
+                      {"linear_solver", options.linear_solver}};
+}
+
 json::object report_json(const EvaluateOptions& options, bool by_stamp,
                          const TrajectoryPairs& pairs, const TrajectoryError& error) {
   json::object report = begin_report("evaluate");
@@ -166,8 +243,22 @@ json::object report_json(const EvaluateOptions& options, bool by_stamp,
 
 int run(const EvaluateOptions& options, Session& session) {
   session.use_threads();
-  const Trajectory estimate = load_trajectory(options.estimate, options, session);
-  const Trajectory truth = load_trajectory(options.truth, options, session);
+  std::optional<CovarianceSolver> solver;  // a wrong name is reported before a file is read
+  if (options.kld) {
+    solver = make_determinant_solver(options.linear_solver, session.registry(), true);
+    if (const std::string reason = option_about_stamps(options); !reason.empty()) {
+      throw Error(ErrorCode::usage,
+                  fmt::format("--kld compares variables by id; leave out {}", reason));
+    }
+  }
+  const LoadedGraph estimate_graph = load_graph(options.estimate.file, options.input, session);
+  const LoadedGraph truth_graph = load_graph(options.truth.file, options.input, session);
+  if (options.kld) {
+    need_factors(estimate_graph);
+    need_factors(truth_graph);
+  }
+  const Trajectory estimate = trajectory_of(estimate_graph, options.estimate, options, session);
+  const Trajectory truth = trajectory_of(truth_graph, options.truth, options, session);
   const bool by_stamp = match_by_stamp(options, estimate, truth);
   const TrajectoryPairs pairs =
       by_stamp ? pair_by_stamp(estimate, truth, options.matching()) : pair_by_id(estimate, truth);
@@ -177,8 +268,21 @@ int run(const EvaluateOptions& options, Session& session) {
   warn_of_missing(pairs.only_in_truth, options.truth.file, options.estimate.file, by_stamp,
                   session);
   Results results(session);
-  results.add([&] { session.write_json(report_json(options, by_stamp, pairs, error)); });
-  results.add([&] { session.print(table_text(error, by_stamp, session.colour())); });
+  GraphDivergence divergence;
+  if (solver) {
+    results.add([&] {
+      divergence = divergence_of(truth_graph.graph, estimate_graph.graph, options, *solver);
+    });
+  }
+  results.add([&] {
+    json::object report = report_json(options, by_stamp, pairs, error);
+    if (solver) add_divergence(divergence, options, report);
+    session.write_json(report);
+  });
+  results.add([&] {
+    session.print(table_text(error, by_stamp, session.colour()) +
+                  divergence_text(divergence, options, session.colour()));
+  });
   results.finish();
   return 0;
 }
@@ -223,6 +327,18 @@ Command add_evaluate(ArgumentParser program) {
   add_trajectory_options(cli, options->estimate, "", "ESTIMATE");
   add_trajectory_options(cli, options->truth, "truth-", "TRUTH");
   cli.add_flag("--planar", options->planar, "compare x, y and yaw only, as seen on a map");
+  cli.add_flag("--kld", options->kld,
+               "also the divergence D(TRUTH||ESTIMATE) of two graphs on the variables of both, in "
+               "nats");
+  cli.add_option("--compared-at", options->compared_at,
+                 "for --kld both are linearised at the states of TRUTH (common), or each at its "
+                 "own (minima)")
+      .type_name("WHERE")
+      .one_of({"common", "minima"})
+      .show_default();
+  cli.add_option("--linear-solver", options->linear_solver, "gives covariances for --kld")
+      .type_name("NAME")
+      .show_default();
   add_input_options(cli, options->input);
   cli.footer(
       "Root mean squares: ATE after the rigid motion that brings ESTIMATE nearest to TRUTH, RPE "
@@ -231,7 +347,8 @@ Command add_evaluate(ArgumentParser program) {
       "degrees.\n\n"
       "Example:\n"
       "  cairn evaluate best.g2o truth.g2o --json errors.json\n"
-      "  cairn evaluate slam.tum poses.txt --truth-stamps times.txt --truth-axes camera");
+      "  cairn evaluate slam.tum poses.txt --truth-stamps times.txt --truth-axes camera\n"
+      "  cairn evaluate sparse.g2o best.g2o --kld");
   return {cli, [options](Session& session) { return run(*options, session); }};
 }
 

@@ -1,15 +1,23 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // cairn info GRAPH: what a graph consists of, and what looks wrong.
+#include <chrono>
 #include <cmath>
 #include <memory>
+#include <optional>
 
 #include <fmt/core.h>
 
 #include "arguments.hpp"
 #include "cairn/evaluation/graph_survey.hpp"
+#include "cairn/information/graph_information.hpp"
+#include "cairn/plugin/registry.hpp"
+#include "cairn/runtime/plugin_call.hpp"
+#include "cairn/runtime/timed.hpp"
 #include "commands.hpp"
+#include "covariances.hpp"
 #include "graph_files.hpp"
 #include "json_report.hpp"
+#include "problem_setup.hpp"
 #include "results.hpp"
 #include "table.hpp"
 
@@ -21,6 +29,15 @@ namespace json = boost::json;
 struct InfoOptions {
   std::string graph;
   InputOptions input;
+  bool entropy = false;
+  std::string linear_solver = kDefaultLinearSolver;  ///< of the entropy
+};
+
+/// The entropy that was asked for. Without a value: H is singular.
+struct Entropy {
+  std::optional<GraphEntropy> value;
+  std::string linear_solver;
+  double seconds = 0.0;
 };
 
 std::string ratio_text(const GraphSurvey& s) {
@@ -56,7 +73,14 @@ std::string counts_text(const LoadedGraph& loaded, const GraphSurvey& s, bool co
                      types.text(colour));
 }
 
-std::string figures_text(const Graph& graph, const GraphSurvey& s) {
+std::string entropy_text(const Entropy& entropy) {
+  if (!entropy.value) return "none: H is singular";
+  return fmt::format("{:.8g} nats ({} unknowns, ln |H| {:.8g})", entropy.value->entropy,
+                     entropy.value->size, entropy.value->log_determinant);
+}
+
+std::string figures_text(const Graph& graph, const GraphSurvey& s,
+                         const std::optional<Entropy>& entropy) {
   Table table({{"", Table::Align::left}, {"", Table::Align::left}}, "  ");
   table.add({"components", fmt::format("{}", s.gauge.components)});
   table.add({"odometry / loop closures", fmt::format("{} / {}", s.odometry, s.loops)});
@@ -65,6 +89,7 @@ std::string figures_text(const Graph& graph, const GraphSurvey& s) {
              fmt::format("{} / {}", graph.residual_size(), graph.tangent_size())});
   table.add({"degrees of freedom", fmt::format("{}", s.degrees_of_freedom)});
   table.add({"chi2, initial", chi2_text(s.chi2) + ratio_text(s)});
+  if (entropy) table.add({"entropy", entropy_text(*entropy)});
   return table.text(false);
 }
 
@@ -129,7 +154,17 @@ json::array ids_json(const Graph& graph, const std::vector<int>& variables) {
   return ids;
 }
 
-json::object report_json(const LoadedGraph& loaded, const GraphSurvey& s) {
+/// Null where H is singular.
+json::value entropy_json(const Entropy& entropy) {
+  if (!entropy.value) return nullptr;
+  return {{"nats", entropy.value->entropy},
+          {"size", entropy.value->size},
+          {"log_determinant", entropy.value->log_determinant},
+          {"linear_solver", entropy.linear_solver}};
+}
+
+json::object report_json(const LoadedGraph& loaded, const GraphSurvey& s,
+                         const std::optional<Entropy>& entropy) {
   json::object report = begin_report("info");
   report["graph"] = graph_json(loaded.graph, loaded.name);
   report["format"] = loaded.report.format;
@@ -149,19 +184,41 @@ json::object report_json(const LoadedGraph& loaded, const GraphSurvey& s) {
   report["worst"] = worst_json(s);
   report["suspicions"] = strings_json(s.suspicions);
   report["read_notes"] = strings_json(sentences(loaded.report));
-  report["seconds"] = json::object{{"read", loaded.seconds}};
+  json::object& seconds = report["seconds"].emplace_object();
+  seconds["read"] = loaded.seconds;
+  if (entropy) {
+    seconds["entropy"] = entropy->seconds;
+    report["entropy"] = entropy_json(*entropy);
+  }
   return report;
+}
+
+Entropy entropy_of(const Graph& graph, const std::string& name, LinearSolver& solver) {
+  Entropy result{std::nullopt, name, 0.0};
+  const auto begin = std::chrono::steady_clock::now();
+  result.value = call_plugin([&] { return fmt::format("linear solver '{}'", name); },
+                             [&] { return entropy(graph, solver); });
+  result.seconds = seconds_since(begin);
+  return result;
 }
 
 int run(const InfoOptions& options, Session& session) {
   session.use_threads();
+  std::optional<CovarianceSolver> solver;  // a wrong name is reported before the file is read
+  if (options.entropy)
+    solver = make_determinant_solver(options.linear_solver, session.registry(), false);
   const LoadedGraph loaded = load_graph(options.graph, options.input, session);
   const GraphSurvey s = survey_graph(loaded.graph);
   Results results(session);
-  results.add([&] { session.write_json(report_json(loaded, s)); });
+  std::optional<Entropy> entropy;
+  if (solver) {
+    entropy.emplace();
+    results.add([&] { entropy = entropy_of(loaded.graph, solver->name, *solver->solver); });
+  }
+  results.add([&] { session.write_json(report_json(loaded, s, entropy)); });
   results.add([&] {
     const bool colour = session.colour();
-    session.print(counts_text(loaded, s, colour) + figures_text(loaded.graph, s) +
+    session.print(counts_text(loaded, s, colour) + figures_text(loaded.graph, s, entropy) +
                   worst_text(s, colour) + list_text("what looks wrong", s.suspicions, colour));
   });
   results.finish();
@@ -175,10 +232,16 @@ Command add_info(ArgumentParser program) {
   ArgumentParser cli =
       program.add_command("info", "what a graph consists of, and what looks wrong");
   cli.add_option("graph", options->graph, kGraphHelp).type_name("GRAPH").required();
+  cli.add_flag("--entropy", options->entropy,
+               "entropy of the graph at the states of the file, in nats: optimise it first");
+  cli.add_option("--linear-solver", options->linear_solver, "gives the determinant for --entropy")
+      .type_name("NAME")
+      .show_default();
   add_input_options(cli, options->input);
   cli.footer(
       "Example:\n"
-      "  cairn info sphere2500.g2o --types slam3d:metric=g2o");
+      "  cairn info sphere2500.g2o --types slam3d:metric=g2o\n"
+      "  cairn info best.g2o --entropy");
   return {cli, [options](Session& session) { return run(*options, session); }};
 }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // cairn marginals GRAPH: how certain the estimate is.
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <memory>
@@ -11,6 +12,7 @@
 
 #include "arguments.hpp"
 #include "cairn/geometry/pose.hpp"
+#include "cairn/information/graph_information.hpp"
 #include "cairn/io/format.hpp"
 #include "cairn/linear/graph_marginals.hpp"
 #include "cairn/plugin/registry.hpp"
@@ -46,8 +48,9 @@ struct MarginalsOptions {
   std::string linear_solver = kDefaultLinearSolver;
   bool as_given = false;
   bool diagonal = false;
-  std::vector<std::string> pairs;  ///< "A:B"
-  std::string column;              ///< an id, "last", or empty
+  std::vector<std::string> pairs;   ///< "A:B"
+  std::string column;               ///< an id, "last", or empty
+  std::vector<std::string> mutual;  ///< "A:B", each an id or several as "A+B"
 };
 
 /// What is asked for, by variables of the graph.
@@ -55,6 +58,7 @@ struct Request {
   bool diagonal = false;
   std::vector<std::pair<int, int>> pairs;
   std::optional<int> column;
+  std::vector<VariableSets> mutual;
 };
 
 /// One block of Σ.
@@ -65,6 +69,7 @@ struct Block {
 
 struct Answer {
   std::vector<double> diagonal, pairs, column;
+  std::vector<double> mutual;               ///< I(a; b) [nats]
   double factorize = 0.0, marginals = 0.0;  ///< [s]; analysis with the first
 };
 
@@ -94,19 +99,73 @@ std::pair<int, int> pair_of(const std::string& text, const Graph& graph) {
           variable_of(text.substr(colon + 1), graph, "--pairs")};
 }
 
+/// "3", or "3+7+8".
+std::vector<int> set_of(const std::string& text, const Graph& graph) {
+  std::vector<int> variables;
+  std::size_t begin = 0;
+  while (true) {
+    const std::size_t end = text.find('+', begin);
+    variables.push_back(
+        variable_of(text.substr(begin, end - begin), graph, "--mutual-information"));
+    if (end == std::string::npos) return variables;
+    begin = end + 1;
+  }
+}
+
+VariableSets sets_of(const std::string& text, const Graph& graph) {
+  const std::size_t colon = text.find(':');
+  if (colon == std::string::npos) {
+    throw Error(ErrorCode::usage,
+                fmt::format("--mutual-information: '{}' is not a pair of ids, or of sets of them; "
+                            "expected A:B, or A+B:C+D",
+                            text));
+  }
+  VariableSets sets{set_of(text.substr(0, colon), graph), set_of(text.substr(colon + 1), graph)};
+  std::vector<int> all = sets.a;
+  all.insert(all.end(), sets.b.begin(), sets.b.end());
+  std::ranges::sort(all);
+  if (const auto twice = std::ranges::adjacent_find(all); twice != all.end()) {
+    throw Error(ErrorCode::usage,
+                fmt::format("--mutual-information: '{}' names {} twice; the sets must not share a "
+                            "variable",
+                            text, graph.id(*twice)));
+  }
+  return sets;
+}
+
+void note_constant(const Request& request, const Graph& graph, const std::vector<bool>& held,
+                   const Session& session) {
+  std::vector<int> noted;
+  for (const VariableSets& sets : request.mutual) {
+    for (const std::vector<int>* set : {&sets.a, &sets.b}) {
+      for (const int v : *set) {
+        if (held[static_cast<std::size_t>(v)] && std::ranges::find(noted, v) == noted.end())
+          noted.push_back(v);
+      }
+    }
+  }
+  for (const int v : noted) {
+    session.note(fmt::format("{} is constant (fixed, or anchored): it shares no information",
+                             graph.describe_variable(v)));
+  }
+}
+
 Request request_of(const MarginalsOptions& options, const Graph& graph) {
   Request request;
-  request.diagonal = options.diagonal || (options.pairs.empty() && options.column.empty());
+  request.diagonal = options.diagonal ||
+                     (options.pairs.empty() && options.column.empty() && options.mutual.empty());
   for (const std::string& pair : options.pairs) request.pairs.push_back(pair_of(pair, graph));
   if (options.column == "last") {
     request.column = graph.variable_count() - 1;
   } else if (!options.column.empty()) {
     request.column = variable_of(options.column, graph, "--column");
   }
+  for (const std::string& sets : options.mutual) request.mutual.push_back(sets_of(sets, graph));
   return request;
 }
 
-Answer compute(const Graph& graph, const Request& request, CovarianceSolver& solver) {
+Answer compute(const Graph& graph, const Request& request, CovarianceSolver& solver,
+               const Session& session) {
   Answer answer;
   GraphMarginals marginals(graph, *solver.solver);
   if (const Factorization made = marginals.factorize(); !made.ok) {
@@ -117,6 +176,10 @@ Answer compute(const Graph& graph, const Request& request, CovarianceSolver& sol
   if (request.diagonal) answer.diagonal = marginals.diagonal();
   if (!request.pairs.empty()) answer.pairs = marginals.blocks(request.pairs);
   if (request.column) answer.column = marginals.column(*request.column);
+  if (!request.mutual.empty()) {
+    note_constant(request, graph, marginals.gauge().held, session);
+    answer.mutual = mutual_information(graph, marginals, request.mutual);
+  }
   answer.marginals = seconds_since(begin);
   return answer;
 }
@@ -214,6 +277,24 @@ void add_blocks(const Graph& graph, const Request& request, const Answer& answer
   }
 }
 
+json::array ids_json(const Graph& graph, const std::vector<int>& variables) {
+  json::array ids;
+  for (const int v : variables) ids.push_back(graph.id(v));
+  return ids;
+}
+
+/// Null for what is infinite.
+json::array mutual_json(const Graph& graph, const Request& request, const Answer& answer) {
+  json::array all;
+  for (std::size_t k = 0; k < request.mutual.size(); ++k) {
+    const double nats = answer.mutual[k];
+    all.push_back({{"a", ids_json(graph, request.mutual[k].a)},
+                   {"b", ids_json(graph, request.mutual[k].b)},
+                   {"nats", std::isfinite(nats) ? json::value(nats) : json::value(nullptr)}});
+  }
+  return all;
+}
+
 json::object report_json(const MarginalsOptions& options, const LoadedGraph& loaded,
                          const std::optional<Summary>& summary, const Request& request,
                          const Answer& answer, const LinearSolverStats& stats) {
@@ -237,6 +318,8 @@ json::object report_json(const MarginalsOptions& options, const LoadedGraph& loa
   report["read_notes"] = strings_json(sentences(loaded.report));
   report["output"] = text_json(options.output);
   add_blocks(loaded.graph, request, answer, report);
+  if (!request.mutual.empty())
+    report["mutual_information"] = mutual_json(loaded.graph, request, answer);
   end_report(report);
   return report;
 }
@@ -316,6 +399,27 @@ void add_rows(const Graph& graph, const Block& block, Table& table) {
   }
 }
 
+std::string set_text(const Graph& graph, const std::vector<int>& variables) {
+  std::string text;
+  for (const int v : variables) text += fmt::format("{}{}", text.empty() ? "" : "+", graph.id(v));
+  return text;
+}
+
+std::string mutual_text(const Graph& graph, const Request& request, const Answer& answer,
+                        bool colour) {
+  Table table({{"mutual information of", Table::Align::left}, {"nats", Table::Align::right}});
+  for (std::size_t k = 0; k < request.mutual.size(); ++k) {
+    if (k == kMostShown) {
+      table.add({fmt::format("… {} more", request.mutual.size() - kMostShown)});
+      break;
+    }
+    table.add({fmt::format("{}, {}", set_text(graph, request.mutual[k].a),
+                           set_text(graph, request.mutual[k].b)),
+               fmt::format("{:.6g}", answer.mutual[k])});
+  }
+  return table.text(colour);
+}
+
 std::string result_text(const MarginalsOptions& options, const LoadedGraph& loaded,
                         const std::optional<Summary>& summary, const Request& request,
                         const Answer& answer, bool colour) {
@@ -333,6 +437,8 @@ std::string result_text(const MarginalsOptions& options, const LoadedGraph& load
     if (shown > kMostShown) table.add({fmt::format("… {} more", shown - kMostShown)});
     text += (text.empty() ? "" : "\n") + table.text(colour);
   }
+  if (!request.mutual.empty())
+    text += (text.empty() ? "" : "\n") + mutual_text(graph, request, answer, colour);
   Table facts({{"", Table::Align::left}, {"", Table::Align::left}});
   if (summary) {
     facts.add(
@@ -371,6 +477,12 @@ std::optional<Summary> optimize(Graph& graph, Optimizer* optimizer, const Margin
 
 int run(MarginalsOptions options, Session& session) {
   if (options.as_given) keep_states(options.problem);
+  if (!options.output.empty() && !options.mutual.empty() && !options.diagonal &&
+      options.pairs.empty() && options.column.empty()) {
+    throw Error(ErrorCode::usage,
+                "-o writes covariances, and none are asked for beside --mutual-information: add "
+                "--diagonal, --pairs or --column, or write a report with --json");
+  }
   if (options.output == "-") session.write_file_to_stdout();
   check_file(options.output, session);
   session.use_threads();
@@ -396,7 +508,7 @@ int run(MarginalsOptions options, Session& session) {
   if (summary && summary->status == Status::interrupted) return kExitInterrupted;
   const Answer answer =
       call_plugin([&] { return fmt::format("linear solver '{}'", options.linear_solver); },
-                  [&] { return compute(loaded.graph, request, solver); });
+                  [&] { return compute(loaded.graph, request, solver, session); });
   Results results(session);
   results.write(options.output, [&] {
     const std::string text = file_text(loaded, request, answer);
@@ -428,6 +540,11 @@ Command add_marginals(ArgumentParser program) {
       .repeatable();
   cli.add_option("--column", options->column, "the blocks of all variables with this id, or last")
       .type_name("ID");
+  cli.add_option("--mutual-information", options->mutual,
+                 "of these pairs of ids, or of sets of ids as A+B:C+D, in nats")
+      .type_name("A:B,…")
+      .separated_by(',')
+      .repeatable();
   cli.add_option("-o,--output", options->output, "write the blocks as text (- is standard output)")
       .type_name("FILE");
   cli.add_flag("--as-given", options->as_given,
@@ -445,7 +562,8 @@ Command add_marginals(ArgumentParser program) {
       "Covariances are of the step that moves a state, for a pose x exp(d): metres along its own\n"
       "axes, then radians. Variables that are fixed, or anchored, have zeros.\n"
       "Example:\n"
-      "  cairn marginals city.g2o --column last --pairs 17:350,17:351 -o city.cov");
+      "  cairn marginals city.g2o --column last --pairs 17:350,17:351 -o city.cov\n"
+      "  cairn marginals city.g2o --mutual-information 17:350,17+18:350+351");
   return {cli, [options](Session& session) { return run(*options, session); }};
 }
 

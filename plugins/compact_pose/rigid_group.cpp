@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "rigid_group.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <string>
 
-#include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 
+#include "cairn/information/gaussian.hpp"
 #include "cairn/runtime/error.hpp"
 #include "dense/lu.hpp"
 
@@ -35,13 +34,6 @@ void set_covariance_of(const Matrix& S_ii, const Matrix& S_in, const Matrix& S_n
   sum.noalias() = left.lazyProduct(A.transpose());
   sum += fixed<N>(S_nn) - AS - AS.transpose();
   d.covariance = sum;
-}
-
-template <int N>
-double gain_of(const Matrix& S_y, const Matrix& S_d) {
-  const Eigen::LLT<Fixed<N>> prior(fixed<N>(S_y) + fixed<N>(S_d)), measured(fixed<N>(S_y));
-  // |L| of both: a quotient of products, and one logarithm.
-  return std::log(prior.matrixLLT().diagonal().prod() / measured.matrixLLT().diagonal().prod());
 }
 
 [[noreturn]] void refuse(const VariableType& type, const std::string& why) {
@@ -137,8 +129,12 @@ Matrix RigidGroup::isotropic(double sigma_translation, double sigma_rotation) co
 }
 
 double mutual_information(const Matrix& S_y, const Matrix& S_d) {
-  // Rounding may leave Σ_d indefinite by a little where everything is known well.
-  return std::max(0.0, S_y.rows() == 3 ? gain_of<3>(S_y, S_d) : gain_of<6>(S_y, S_d));
+  try {
+    return information_gain(S_d, S_y);
+  } catch (const Error&) {
+    // Where all is known far better than rounding lets the covariances show, Σ_d may be anything.
+    return 0.0;
+  }
 }
 
 Matrix to_matrix(std::span<const double> numbers, int n) {

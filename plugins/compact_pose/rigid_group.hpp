@@ -72,7 +72,8 @@ class RigidGroup : public PoseGroup {
 };
 
 /// ½ ln(|Σ_y + Σ_d| / |Σ_y|): the information gain of a measurement with covariance Σ_y of a
-/// displacement with covariance Σ_d [nats] (equation 22).
+/// displacement with covariance Σ_d [nats] (equation 22); `information_gain`, and 0 where rounding
+/// has left no covariance.
 double mutual_information(const Matrix& S_y, const Matrix& S_d);
 
 Matrix to_matrix(std::span<const double> numbers, int n);

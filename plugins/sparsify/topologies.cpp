@@ -14,6 +14,7 @@
 #include <boost/graph/kruskal_min_spanning_tree.hpp>
 
 #include "blanket_matrices.hpp"
+#include "cairn/information/gaussian.hpp"
 #include "cairn/runtime/error.hpp"
 #include "dense/cholesky.hpp"
 #include "dense/eigenvalues.hpp"
@@ -54,13 +55,6 @@ Matrix pair_block(const Matrix& A, const std::vector<int>& begin, int i, int j) 
   block << A.block(begin[i], begin[i], m, m), A.block(begin[i], begin[j], m, n),
       A.block(begin[j], begin[i], n, m), A.block(begin[j], begin[j], n, n);
   return block;
-}
-
-/// ½ ln(|Σ_ii| |Σ_jj| / |Σ_pair|)
-double information_of(const Matrix& pair, int m) {
-  const auto n = pair.rows() - m;
-  return 0.5 * (log_determinant(pair.topLeftCorner(m, m)) +
-                log_determinant(pair.bottomRightCorner(n, n)) - log_determinant(pair));
 }
 
 /// (T 4.17): what i knows by itself, over what it would know if j were unknown.
@@ -203,8 +197,9 @@ Matrix mutual_information(const DenseBlanket& blanket, const TopologyOptions& op
   for (int i = 0; i < n; ++i) {
     for (int j = i + 1; j < n; ++j) {
       result(i, j) = result(j, i) =
-          by_covariance ? information_of(pair_block(S, begin, i, j), blanket.node_sizes[i])
-                        : information_form(blanket, begin, i, j, epsilon);
+          by_covariance
+              ? cairn::mutual_information(pair_block(S, begin, i, j), blanket.node_sizes[i])
+              : information_form(blanket, begin, i, j, epsilon);
     }
   }
   return result;
@@ -226,7 +221,7 @@ std::vector<FactorChoice> DowndatedInformation::choose(const DenseBlanket& blank
   const Matrix S = downdated(blanket, chosen, options_, downdate_);
   const std::vector<int> begin = blanket.offsets();
   const std::vector<Pair> pairs = weighted_pairs(blanket, [&](int i, int j) {
-    return information_of(pair_block(S, begin, i, j), blanket.node_sizes[i]);
+    return cairn::mutual_information(pair_block(S, begin, i, j), blanket.node_sizes[i]);
   });
   std::vector<bool> taken(blanket.models.size());
   for (const FactorChoice& choice : chosen) taken[choice.front()] = true;

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "integration/process.hpp"
+#include "support/components.hpp"
 
 namespace cairn::test {
 namespace {
@@ -73,6 +74,94 @@ TEST(EvaluateCommand, NothingInCommonIsAnError) {
   write_text(folder.file("a.g2o"), "VERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 1 0 0\n");
   write_text(folder.file("b.g2o"), "VERTEX_SE2 5 0 0 0\nVERTEX_SE2 6 1 0 0\n");
   EXPECT_EQ(cairn({"evaluate", folder.file("a.g2o"), folder.file("b.g2o")}).exit_code, 3);
+}
+
+// Divergence --------------------------------------------------------------------------------------
+
+class EvaluateDivergence : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    CAIRN_NEEDS("sparsifier", "sparsify");
+    report_of({"generate", "manhattan:poses=120", "-o", raw_});
+    report_of({"optimize", raw_, "-o", best_});
+    from_sparsify_ = report_of({"sparsify", best_, "--as-given", "--keep-every", "3",
+                                "--population", "tree:1", "-o", sparse_});
+  }
+  boost::json::value report(const std::string& estimate, const std::string& truth,
+                            Arguments more = {}) {
+    more.insert(more.begin(), {"evaluate", estimate, truth, "--kld"});
+    return report_of(more);
+  }
+  void expect_refusal(const Arguments& arguments, int exit_code, const char* says) {
+    const Outcome outcome = cairn(arguments);
+    EXPECT_EQ(outcome.exit_code, exit_code) << outcome.err;
+    EXPECT_THAT(unfolded(outcome.err), HasSubstr(says));
+  }
+  TemporaryFolder folder_;
+  std::string raw_ = folder_.file("raw.g2o"), best_ = folder_.file("best.g2o"),
+              sparse_ = folder_.file("sparse.g2o");
+  boost::json::value from_sparsify_;
+};
+
+TEST_F(EvaluateDivergence, OfASparseGraphIsWhatSparsifyReports) {
+  const auto found = report(sparse_, best_);
+  const double expected = from_sparsify_.at("kld").as_double();
+  EXPECT_GT(expected, 0.01);
+  EXPECT_NEAR(found.at("kld").as_double(), expected, 1e-4 * expected);
+  EXPECT_NEAR(found.at("kld_parts").at("covariance").as_double() +
+                  found.at("kld_parts").at("mean").as_double(),
+              found.at("kld").as_double(), 1e-9);
+  EXPECT_EQ(found.at("kld_of").at("compared_at").as_string(), "common");
+  EXPECT_EQ(found.at("kld_of").at("linear_solver").as_string(), "block_cholesky");
+  EXPECT_EQ(found.at("kld_of").at("variables").as_int64(),
+            from_sparsify_.at("poses").at("kept").as_int64());
+  EXPECT_TRUE(found.as_object().contains("ate"));
+  // The reverse: the marginal of the larger graph on the nodes of the smaller.
+  const double back = report(best_, sparse_).at("kld").as_double();
+  EXPECT_GT(back, 0.01);
+  EXPECT_NE(back, found.at("kld").as_double());
+  EXPECT_NEAR(report(best_, best_).at("kld").as_double(), 0.0, 1e-6);
+  EXPECT_FALSE(errors(sparse_, best_).as_object().contains("kld"));
+  const Outcome text = cairn({"evaluate", sparse_, best_, "--kld"});
+  EXPECT_THAT(text.out, HasSubstr("at the states of TRUTH"));
+  EXPECT_THAT(text.out, HasSubstr("divergence"));
+}
+
+TEST_F(EvaluateDivergence, AtTheMinimaOfBothIsAnother) {
+  const auto found = report(sparse_, best_, {"--compared-at", "minima"});
+  EXPECT_EQ(found.at("kld_of").at("compared_at").as_string(), "minima");
+  const auto study = report_of({"study", "sparsify", best_, "--as-given", "--keep-every", "3",
+                                "--population", "tree:1", "--compared-at", "minima"});
+  const double expected = study.at("kld").as_double();
+  EXPECT_NEAR(found.at("kld").as_double(), expected, 1e-4 * expected);
+  EXPECT_THAT(cairn({"evaluate", sparse_, best_, "--kld", "--compared-at", "minima"}).out,
+              HasSubstr("at the states of each"));
+}
+
+TEST_F(EvaluateDivergence, OfGraphsWithNodesOfTheirOwnIsOfThoseOfBoth) {
+  const std::string other = folder_.file("other.g2o");
+  report_of({"sparsify", best_, "--as-given", "--keep-every", "2", "-o", other});
+  const auto found = report(sparse_, other);
+  EXPECT_GT(found.at("kld").as_double(), 0.0);
+  EXPECT_LT(found.at("kld_of").at("variables").as_int64(),
+            from_sparsify_.at("poses").at("kept").as_int64());
+}
+
+TEST_F(EvaluateDivergence, SaysWhatCannotBeCompared) {
+  write_text(folder_.file("poses.g2o"), "VERTEX_SE2 0 0 0 0\nVERTEX_SE2 3 1 0 0\n");
+  expect_refusal({"evaluate", folder_.file("poses.g2o"), best_, "--kld"}, 3, "has no factors");
+  expect_refusal({"evaluate", sparse_, best_, "--kld", "--offset", "1"}, 2,
+                 "--kld compares variables by id; leave out --offset");
+  expect_refusal({"evaluate", sparse_, best_, "--kld", "--compared-at", "home"}, 2, "common");
+  write_text(folder_.file("fixed.g2o"), read_text(best_) + "FIX 0\nFIX 60\n");
+  expect_refusal({"evaluate", folder_.file("fixed.g2o"), best_, "--kld"}, 3,
+                 "constant in one of the graphs and free in the other");
+}
+
+TEST_F(EvaluateDivergence, RefusesASolverThatCannotBeforeItReadsAFile) {
+  CAIRN_NEEDS("linear_solver", "pcg");
+  expect_refusal({"evaluate", "no.g2o", "where.g2o", "--kld", "--linear-solver", "pcg"}, 2,
+                 "linear solver 'pcg' gives no determinants and covariances");
 }
 
 // Time --------------------------------------------------------------------------------------------

@@ -1,4 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <cmath>
+#include <numbers>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -113,6 +116,50 @@ TEST_F(InfoCommand, TellsTheMetric) {
   const Outcome outcome = cairn({"info", "@sphere", "--types", "slam3d:metric=g2o"});
   EXPECT_THAT(outcome.out, HasSubstr("metric g2o"));
   EXPECT_THAT(cairn({"info", "@sphere"}).out, HasSubstr("metric logarithm"));
+}
+
+// Two unknown poses in a chain: H = JᵀJ with |det J| = 1 (two rigid motions), so that |H| is the
+// product of the information.
+TEST_F(InfoCommand, TheEntropyOfAChainIsThatOfItsMeasurements) {
+  const std::string chain =
+      "VERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 1 0 0\nVERTEX_SE2 2 2 0 0\n"
+      "EDGE_SE2 0 1 1 0 0 4 0 0 9 0 25\nEDGE_SE2 1 2 1 0 0 100 0 0 400 0 16\n";
+  const auto report = info_of(chain, {"--entropy"});
+  const double log_determinant = std::log(4.0 * 9.0 * 25.0 * 100.0 * 400.0 * 16.0);
+  const auto& entropy = report.at("entropy");
+  EXPECT_EQ(entropy.at("size").as_int64(), 6);
+  EXPECT_EQ(entropy.at("linear_solver").as_string(), "block_cholesky");
+  EXPECT_NEAR(entropy.at("log_determinant").as_double(), log_determinant, 1e-9);
+  const double expected =
+      0.5 * (6.0 * std::log(2.0 * std::numbers::pi * std::numbers::e) - log_determinant);
+  EXPECT_NEAR(entropy.at("nats").as_double(), expected, 1e-9);
+  EXPECT_GE(report.at("seconds").at("entropy").as_double(), 0.0);
+  const auto other = info_of(chain, {"--entropy", "--linear-solver", "eigen"});
+  EXPECT_NEAR(other.at("entropy").at("nats").as_double(), expected, 1e-9);
+  EXPECT_FALSE(info_of(chain).as_object().contains("entropy"));
+  const Outcome text = cairn({"info", folder_.file("graph.g2o"), "--entropy"});
+  EXPECT_THAT(text.out, HasSubstr(" nats (6 unknowns, ln |H| "));
+}
+
+TEST_F(InfoCommand, WithoutAnEntropyAllElseIsThere) {
+  write_text(folder_.file("loose.g2o"),
+             "VERTEX_XY 0 0 0\nVERTEX_SE2 1 1 0 0\nFIX 0\nEDGE_SE2_XY 1 0 -1 0 1 0 1\n");
+  const std::string json = folder_.file("report.json");
+  const Outcome outcome = cairn({"info", folder_.file("loose.g2o"), "--entropy", "--json", json});
+  EXPECT_EQ(outcome.exit_code, 4);
+  EXPECT_THAT(outcome.err, HasSubstr("no entropy: "));
+  EXPECT_THAT(outcome.err, HasSubstr("VERTEX_SE2 1"));
+  EXPECT_THAT(outcome.out, HasSubstr("none: H is singular"));
+  EXPECT_THAT(outcome.out, HasSubstr("EDGE_SE2_XY"));
+  EXPECT_TRUE(parse_json(read_text(json)).at("entropy").is_null());
+}
+
+TEST_F(InfoCommand, RefusesASolverWithoutDeterminantsBeforeItReadsTheGraph) {
+  CAIRN_NEEDS("linear_solver", "pcg");
+  const Outcome outcome = cairn({"info", "nowhere.g2o", "--entropy", "--linear-solver", "pcg"});
+  EXPECT_EQ(outcome.exit_code, 2);
+  EXPECT_THAT(outcome.err, HasSubstr("linear solver 'pcg' gives no determinants"));
+  EXPECT_THAT(outcome.err, HasSubstr("block_cholesky"));
 }
 
 }  // namespace

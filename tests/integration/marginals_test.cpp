@@ -150,6 +150,80 @@ TEST_F(MarginalsCommand, WritesAFileThatHoldsTheSameNumbers) {
   EXPECT_THAT(piped.out, Not(HasSubstr("time")));
 }
 
+/// Of a matrix of rows, of 3 × 3 or 6 × 6 numbers.
+double log_determinant(std::vector<double> A) {
+  const auto n = static_cast<std::size_t>(std::lround(std::sqrt(double(A.size()))));
+  double sum = 0.0;
+  for (std::size_t k = 0; k < n; ++k) {  // Gaussian elimination of a positive definite matrix
+    sum += std::log(A[k * n + k]);
+    for (std::size_t r = k + 1; r < n; ++r) {
+      const double factor = A[r * n + k] / A[k * n + k];
+      for (std::size_t c = k; c < n; ++c) A[r * n + c] -= factor * A[k * n + c];
+    }
+  }
+  return sum;
+}
+
+TEST_F(MarginalsCommand, MutualInformationIsThatOfTheBlocks) {
+  const auto report = report_of({"marginals", graph(), "--mutual-information", "17:150,40+41:120",
+                                 "--pairs", "17:17,150:150,17:150"});
+  EXPECT_FALSE(report.as_object().contains("diagonal"));
+  const auto& all = report.at("mutual_information").as_array();
+  ASSERT_EQ(all.size(), 2u);
+  EXPECT_EQ(all[0].at("a").as_array().at(0).as_int64(), 17);
+  EXPECT_EQ(all[0].at("b").as_array().at(0).as_int64(), 150);
+  EXPECT_EQ(all[1].at("a").as_array().size(), 2u);
+  EXPECT_EQ(all[1].at("a").at(1).as_int64(), 41);
+  const auto block = [&](std::size_t k) {
+    return numbers(report.at("pairs").at(k).at("covariance"));
+  };
+  const std::vector<double> a = block(0), b = block(1), ab = block(2);
+  std::vector<double> joint(36);
+  for (std::size_t r = 0; r < 3; ++r) {
+    for (std::size_t c = 0; c < 3; ++c) {
+      joint[6 * r + c] = a[3 * r + c];
+      joint[6 * (r + 3) + c + 3] = b[3 * r + c];
+      joint[6 * r + c + 3] = joint[6 * (c + 3) + r] = ab[3 * r + c];
+    }
+  }
+  const double expected = 0.5 * (log_determinant(a) + log_determinant(b) - log_determinant(joint));
+  EXPECT_NEAR(all[0].at("nats").as_double(), expected, 1e-6 * (1.0 + expected));
+  EXPECT_GT(expected, 1e-3);
+  EXPECT_GT(all[1].at("nats").as_double(), 1e-3);
+  const Outcome text = cairn({"marginals", graph(), "--mutual-information", "40+41:120"});
+  EXPECT_EQ(text.exit_code, 0) << text.err;
+  EXPECT_THAT(text.out, HasSubstr("mutual information of"));
+  EXPECT_THAT(text.out, HasSubstr("40+41, 120"));
+  EXPECT_THAT(text.out, Not(HasSubstr("standard deviation")));
+}
+
+TEST_F(MarginalsCommand, AnAnchoredPoseSharesNoInformation) {
+  const Outcome outcome =
+      cairn({"marginals", graph(), "--mutual-information", "0:150", "--json", "-"});
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_EQ(parse_json(outcome.out).at("mutual_information").at(0).at("nats").as_double(), 0.0);
+  EXPECT_THAT(unfolded(outcome.err), HasSubstr("VERTEX_SE2 0 is constant"));
+}
+
+TEST_F(MarginalsCommand, SaysWhichSetsAreNone) {
+  const std::string file = graph();
+  const auto refusal = [&](const std::string& sets, int exit_code, const char* says) {
+    const Outcome outcome = cairn({"marginals", file, "--mutual-information", sets});
+    EXPECT_EQ(outcome.exit_code, exit_code) << sets;
+    EXPECT_THAT(unfolded(outcome.err), HasSubstr(says)) << sets;
+  };
+  refusal("3", 2, "expected A:B, or A+B:C+D");
+  refusal("3:", 2, "'' is not an id");
+  refusal("3+:5", 2, "'' is not an id");
+  refusal("3:3", 2, "names 3 twice");
+  refusal("3+4:5+4", 2, "names 4 twice");
+  refusal("3:4711", 3, "no variable 4711");
+  const Outcome file_of_none =
+      cairn({"marginals", file, "--mutual-information", "3:5", "-o", folder_.file("none.cov")});
+  EXPECT_EQ(file_of_none.exit_code, 2);
+  EXPECT_THAT(unfolded(file_of_none.err), HasSubstr("add --diagonal, --pairs or --column"));
+}
+
 TEST_F(MarginalsCommand, RefusesASolverThatCannotBeforeItReadsTheGraph) {
   Registry registry;
   for (const char* solver : {"pcg", "jacobi", "gauss_seidel"}) {

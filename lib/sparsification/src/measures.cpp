@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 #include <utility>
 #include <vector>
 
@@ -15,6 +14,8 @@
 #include "cairn/geometry/pose.hpp"
 #include "cairn/geometry/state_group.hpp"
 #include "cairn/graph/gauge.hpp"
+#include "cairn/information/gaussian.hpp"
+#include "cairn/information/graph_information.hpp"
 #include "cairn/linear/graph_marginals.hpp"
 #include "cairn/linear/normal_equations.hpp"
 #include "cairn/runtime/error.hpp"
@@ -27,9 +28,10 @@ namespace {
 using Block = Eigen::Map<const Eigen::MatrixXd>;
 
 /// H of a graph at its states, factorised.
-class Gaussian {
+class LinearizedGraph {
  public:
-  Gaussian(const Graph& graph, LinearSolver& solver, const char* what) : equations_(graph, solver) {
+  LinearizedGraph(const Graph& graph, LinearSolver& solver, const char* what)
+      : equations_(graph, solver) {
     auto* determinant = query<LogDeterminant>(solver);
     if (!determinant) throw Error(ErrorCode::usage, "the linear solver does not give determinants");
     if (equations_.size() == 0) return;
@@ -48,69 +50,81 @@ class Gaussian {
   double log_determinant_ = 0.0;
 };
 
-/// The nodes of `sparse` in `original`.
-std::vector<int> partners(const Graph& original, const Graph& sparse) {
-  std::vector<int> at;
-  for (int v = 0; v < sparse.variable_count(); ++v) {
-    const auto there = original.find(sparse.id(v));
-    if (!there || original.type(*there).tag() != sparse.type(v).tag())
-      throw Error(ErrorCode::input,
-                  fmt::format("{} is not in the original graph", sparse.describe_variable(v)));
-    at.push_back(*there);
+/// That of `graph` which is variable `v` of `other`.
+int partner(const Graph& graph, const Graph& other, int v, const char* what) {
+  const auto there = graph.find(other.id(v));
+  if (!there || graph.type(*there).tag() != other.type(v).tag()) {
+    throw Error(ErrorCode::input,
+                fmt::format("{} is not in the {} graph", other.describe_variable(v), what));
   }
-  return at;
+  return *there;
+}
+
+/// By variable of `q` its partner in `p`, or -1 where it is not compared.
+using Partners = std::vector<int>;
+
+/// What is anchored in `q`, by number. Only a node that is compared can be anchored in both graphs:
+/// where the first pose of a component is not, the first is that is.
+std::vector<int> anchors(const Graph& q, const Gauge& gauge, const Partners& at) {
+  std::vector<int> all;
+  for (const int first : gauge.anchored) {
+    int anchor = at[first] >= 0 ? first : -1, compared = -1;
+    for (int v = 0; v < q.variable_count() && anchor < 0; ++v) {
+      if (gauge.component[v] != gauge.component[first] || at[v] < 0) continue;
+      compared = v;
+      if (q.type(v).tag() == q.type(first).tag()) anchor = v;
+    }
+    if (anchor < 0 && compared >= 0) {
+      throw Error(ErrorCode::input,
+                  fmt::format("the gauge of {} is free, and no pose of its component is compared: "
+                              "fix a pose in both graphs",
+                              q.describe_variable(compared)));
+    }
+    if (anchor >= 0) all.push_back(anchor);
+  }
+  return all;
 }
 
 /// Moves each component of q whose gauge is free, and which is poses of one kind, so that its
-/// anchor is where it is in the original: how the whole is placed is no difference of the graphs.
-void place_anchors(const Graph& original, const std::vector<int>& partner,
+/// anchor is where it is in p: how the whole is placed is no difference of the graphs.
+void place_anchors(const Graph& p, const Partners& at, const std::vector<int>& component,
                    const std::vector<int>& anchored, Graph& q) {
-  if (anchored.empty()) return;
-  std::vector<int> root(q.variable_count());
-  std::iota(root.begin(), root.end(), 0);
-  const auto find = [&](int v) {
-    while (root[v] != v) v = root[v] = root[root[v]];
-    return v;
-  };
-  for (int f = 0; f < q.factor_count(); ++f) {
-    const auto on = q.factor_variables(f);
-    for (const int v : on) root[find(v)] = find(on[0]);
-  }
   for (const int anchor : anchored) {
     const VariableType& type = q.type(anchor);
     if (!is_pose(type)) continue;
-    std::vector<int> component;
+    std::vector<int> along;
     bool alike = true;
     for (int v = 0; v < q.variable_count(); ++v) {
-      if (find(v) != find(anchor)) continue;
-      component.push_back(v);
+      if (component[v] != component[anchor]) continue;
+      along.push_back(v);
       alike = alike && q.type(v).tag() == type.tag();
     }
     if (!alike) continue;
     const StateGroup group(type);
     const std::vector<double> motion =
-        group.compose(original.state(partner[anchor]), group.inverse(q.state(anchor)));
-    for (const int v : component) q.set_state(v, group.compose(motion, q.state(v)));
+        group.compose(p.state(at[anchor]), group.inverse(q.state(anchor)));
+    for (const int v : along) q.set_state(v, group.compose(motion, q.state(v)));
   }
 }
 
 /// δ_v with sparse = original ⊕ δ, in the tangent of `at`: of the original, or of the sparse graph.
 std::vector<Eigen::VectorXd> tangent_shift(const Graph& original, const Graph& sparse,
-                                           const std::vector<int>& partner, ComparedAt at) {
-  std::vector<Eigen::VectorXd> shift;
+                                           const Partners& partner, ComparedAt at) {
+  std::vector<Eigen::VectorXd> shift(sparse.variable_count());
   for (int v = 0; v < sparse.variable_count(); ++v) {
+    if (partner[v] < 0) continue;
     const VariableType& type = sparse.type(v);
     Eigen::VectorXd delta(type.tangent_size());
     const double* p = original.state(partner[v]).data();
     const double* q = sparse.state(v).data();
     // Only its square is needed: from which end it is seen matters, its sign does not.
     type.local(1, at == ComparedAt::common ? p : q, at == ComparedAt::common ? q : p, delta.data());
-    shift.push_back(std::move(delta));
+    shift[v] = std::move(delta);
   }
   return shift;
 }
 
-void measure_positions(const Graph& original, const Graph& sparse, const std::vector<int>& partner,
+void measure_positions(const Graph& original, const Graph& sparse, const Partners& partner,
                        SparsificationError& error) {
   TrajectoryPairs pairs;
   const auto add = [](Trajectory& to, const Graph& graph, int v) {
@@ -121,7 +135,7 @@ void measure_positions(const Graph& original, const Graph& sparse, const std::ve
     std::ranges::copy(pose.R.reshaped(), added.R.begin());
   };
   for (int v = 0; v < sparse.variable_count(); ++v) {
-    if (!has_position(sparse.type(v))) continue;
+    if (partner[v] < 0 || !has_position(sparse.type(v))) continue;
     add(pairs.truth, original, partner[v]);
     add(pairs.estimate, sparse, v);
   }
@@ -185,29 +199,72 @@ Eigen::MatrixXd turn(const VariableType& type, std::span<const double> original,
   return Eigen::MatrixXd::Identity(n, n);
 }
 
+/// Two graphs with the same variables constant, q moved to where p is.
+struct Comparison {
+  Graph p, q;
+  Partners at;
+  std::vector<Eigen::VectorXd> moved;  ///< by variable of q
+  std::vector<Eigen::MatrixXd> turns;  ///< likewise, where each is linearised at its own states
+  SparsificationError error;           ///< of positions
+};
+
+void check_constant(const Graph& p, const Graph& q, const Partners& at) {
+  const std::vector<bool> held_p = resolve_gauge(p).held, held_q = resolve_gauge(q).held;
+  for (int v = 0; v < q.variable_count(); ++v) {
+    if (at[v] < 0 || held_p[at[v]] == held_q[v]) continue;
+    throw Error(ErrorCode::input,
+                fmt::format("{} is constant in one of the graphs and free in the other: a "
+                            "divergence is defined where the same variables are fixed in both",
+                            q.describe_variable(v)));
+  }
+}
+
+Comparison comparison(const Graph& p, const Graph& q, Partners partners, ComparedAt compared) {
+  Comparison c{p.clone(), q.clone(), std::move(partners), {}, {}, {}};
+  const Gauge gauge = resolve_gauge(q);
+  const std::vector<int> anchored = anchors(q, gauge, c.at);
+  place_anchors(p, c.at, gauge.component, anchored, c.q);
+  for (const int v : anchored) {
+    c.q.set_fixed(v);
+    c.p.set_fixed(c.at[v]);
+  }
+  check_constant(c.p, c.q, c.at);
+  measure_positions(p, c.q, c.at, c.error);
+  c.moved = tangent_shift(p, c.q, c.at, compared);
+  if (compared == ComparedAt::minima) c.turns.resize(q.variable_count());
+  for (int v = 0; v < q.variable_count(); ++v) {
+    if (c.at[v] < 0) continue;
+    if (compared == ComparedAt::common) {
+      c.q.set_state(v, p.state(c.at[v]));
+    } else {
+      c.turns[v] = turn(q.type(v), p.state(c.at[v]), c.q.state(v));
+    }
+  }
+  return c;
+}
+
+/// Σ of these variables, all of which are free.
+Eigen::MatrixXd covariance_of(const Graph& graph, const std::vector<int>& variables,
+                              LinearSolver& solver, const char* what) {
+  GraphMarginals marginals(graph, solver);
+  if (const Factorization f = marginals.factorize(); !f.ok)
+    throw Error(ErrorCode::numerical, fmt::format("{}: {}", what, marginals.explain(f)));
+  return joint_covariance(graph, marginals, variables);
+}
+
 }  // namespace
 
 SparsificationError sparsification_error(const Graph& original, const Graph& as_it_is,
                                          LinearSolver& solver, ComparedAt compared) {
-  const std::vector<int> at = partners(original, as_it_is);
-  const std::vector<int> anchored = resolve_gauge(as_it_is).anchored;
-  Graph sparse = as_it_is.clone();
-  place_anchors(original, at, anchored, sparse);
-  Graph p = original.clone(), q = sparse.clone();
-  for (const int v : anchored) {
-    q.set_fixed(v);
-    p.set_fixed(at[v]);
-  }
-  SparsificationError error;
-  measure_positions(original, sparse, at, error);
-  const std::vector<Eigen::VectorXd> moved = tangent_shift(original, sparse, at, compared);
-  std::vector<Eigen::MatrixXd> turns;  // where each graph is linearised at its own states
-  if (compared == ComparedAt::common) {
-    for (int v = 0; v < q.variable_count(); ++v) q.set_state(v, original.state(at[v]));
-  } else {
-    for (int v = 0; v < q.variable_count(); ++v)
-      turns.push_back(turn(q.type(v), original.state(at[v]), sparse.state(v)));
-  }
+  Partners partners;
+  for (int v = 0; v < as_it_is.variable_count(); ++v)
+    partners.push_back(partner(original, as_it_is, v, "original"));
+  Comparison both = comparison(original, as_it_is, std::move(partners), compared);
+  const Graph &p = both.p, &q = both.q;
+  const Partners& at = both.at;
+  const std::vector<Eigen::VectorXd>& moved = both.moved;
+  const std::vector<Eigen::MatrixXd>& turns = both.turns;
+  SparsificationError& error = both.error;
 
   // q: Λ̆ and its determinant. Its blocks are kept, since the solver serves three graphs in turn.
   struct Entry {
@@ -218,16 +275,16 @@ SparsificationError sparsification_error(const Graph& original, const Graph& as_
   double log_q = 0.0;
   std::int64_t d = 0;
   {
-    const Gaussian sparse_gaussian(q, solver, "the sparse graph");
-    log_q = sparse_gaussian.log_determinant();
-    d = sparse_gaussian.size();
+    const LinearizedGraph of_sparse(q, solver, "the sparse graph");
+    log_q = of_sparse.log_determinant();
+    d = of_sparse.size();
     if (d == 0) return error;
-    const BlockMatrix& H = sparse_gaussian.H();
+    const BlockMatrix& H = of_sparse.H();
     const BlockStructure& structure = H.structure();
     for (int c = 0; c < structure.blocks(); ++c) {
       for (auto k = structure.column_begin()[c]; k < structure.column_begin()[c + 1]; ++k) {
         const int r = structure.rows()[k];
-        entries.push_back({sparse_gaussian.variable_of(r), sparse_gaussian.variable_of(c),
+        entries.push_back({of_sparse.variable_of(r), of_sparse.variable_of(c),
                            Block(H.block(k), structure.block_size(r), structure.block_size(c))});
       }
     }
@@ -237,9 +294,9 @@ SparsificationError sparsification_error(const Graph& original, const Graph& as_
   {
     Graph removed = p.clone();
     for (const int v : at) removed.set_fixed(v);
-    log_p -= Gaussian(removed, solver, "the nodes that were taken out").log_determinant();
+    log_p -= LinearizedGraph(removed, solver, "the nodes that were taken out").log_determinant();
   }
-  log_p += Gaussian(p, solver, "the original graph").log_determinant();
+  log_p += LinearizedGraph(p, solver, "the original graph").log_determinant();
   GraphMarginals marginals(p, solver);
   if (const Factorization f = marginals.factorize(); !f.ok)
     throw Error(ErrorCode::numerical, marginals.explain(f));
@@ -266,6 +323,55 @@ SparsificationError sparsification_error(const Graph& original, const Graph& as_
   }
   error.covariance = 0.5 * (trace - log_q + log_p - static_cast<double>(d));
   error.kld = error.covariance + error.mean;
+  return error;
+}
+
+SparsificationError marginal_divergence(const Graph& p, const Graph& q, std::span<const Id> nodes,
+                                        LinearSolver& solver, ComparedAt compared) {
+  Partners partners(q.variable_count(), -1);
+  for (const Id node : nodes) {
+    const auto v = q.find(node);
+    if (!v) throw Error(ErrorCode::input, fmt::format("{} is not in the second graph", node));
+    partners[*v] = partner(p, q, *v, "first");
+  }
+  const Comparison both = comparison(p, q, std::move(partners), compared);
+  const std::vector<bool> held = resolve_gauge(both.q).held;
+  std::vector<int> in_p, in_q;
+  Eigen::Index size = 0;
+  for (int v = 0; v < both.q.variable_count(); ++v) {
+    if (both.at[v] < 0 || held[v]) continue;
+    in_p.push_back(both.at[v]);
+    in_q.push_back(v);
+    size += both.q.type(v).tangent_size();
+  }
+  if (size > kMostDenseSize) {
+    throw Error(ErrorCode::input,
+                fmt::format("the nodes of both graphs have {} coordinates, and their dense joint "
+                            "covariance may have {}; where one graph has all nodes of the other, "
+                            "none is needed",
+                            size, kMostDenseSize));
+  }
+  if (size == 0) return both.error;
+  Gaussian of_q{Eigen::VectorXd(size), covariance_of(both.q, in_q, solver, "the second graph")};
+  Gaussian of_p{Eigen::VectorXd::Zero(size),
+                covariance_of(both.p, in_p, solver, "the first graph")};
+  Eigen::Index row = 0;
+  for (const int v : in_q) {
+    const auto n = both.q.type(v).tangent_size();
+    of_q.mean.segment(row, n) = both.moved[v];
+    if (!both.turns.empty()) {  // T Σ Tᵀ, by its rows and columns
+      of_p.covariance.middleRows(row, n) =
+          dense::product(both.turns[v], of_p.covariance.middleRows(row, n));
+      of_p.covariance.middleCols(row, n) =
+          dense::product_with_transpose(of_p.covariance.middleCols(row, n), both.turns[v]);
+    }
+    row += n;
+  }
+  const Divergence divergence = kullback_leibler(of_p, of_q);
+  SparsificationError error = both.error;
+  error.covariance = divergence.covariance;
+  error.mean = divergence.mean;
+  error.kld = divergence.total();
   return error;
 }
 

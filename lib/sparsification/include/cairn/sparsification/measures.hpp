@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <span>
+
 #include "cairn/graph/graph.hpp"
 #include "cairn/linear/linear_solver.hpp"
 #include "cairn/runtime/api.hpp"
@@ -34,9 +36,19 @@ struct SparsificationError {
 /// one graph must be constant in the other; where the gauge is free, the first node of `sparse` is,
 /// and `sparse` is moved so that this node is where it is in `original`. `solver`
 /// must have the abilities `LogDeterminant` and `Marginals` (`block_cholesky` has). Throws `Error`
-/// (input) if `sparse` has a node that `original` has not, (numerical) where H is singular.
+/// (input) if `sparse` has a node that `original` has not, or one that is constant in only one of
+/// the two, (numerical) where H is singular.
 CAIRN_API SparsificationError sparsification_error(const Graph& original, const Graph& sparse,
                                                    LinearSolver& solver,
                                                    ComparedAt at = ComparedAt::common);
+
+/// The same of graphs that both have nodes which the other lacks: D(p‖q) of their marginals on
+/// `nodes`, which both have; `common` linearises at the states of `p` as far as it has them. By the
+/// dense joint covariances of these nodes, of at most `kMostDenseSize` coordinates; of more it
+/// throws `Error` (input).
+CAIRN_API SparsificationError marginal_divergence(const Graph& p, const Graph& q,
+                                                  std::span<const Id> nodes, LinearSolver& solver,
+                                                  ComparedAt at = ComparedAt::common);
+inline constexpr int kMostDenseSize = 6000;
 
 }  // namespace cairn
