@@ -131,8 +131,9 @@ Matrix RigidGroup::isotropic(double sigma_translation, double sigma_rotation) co
 double mutual_information(const Matrix& S_y, const Matrix& S_d) {
   try {
     return information_gain(S_d, S_y);
-  } catch (const Error&) {
+  } catch (const Error& error) {
     // Where all is known far better than rounding lets the covariances show, Σ_d may be anything.
+    if (error.code() != ErrorCode::numerical) throw;
     return 0.0;
   }
 }
