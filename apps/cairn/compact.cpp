@@ -230,6 +230,7 @@ int run_compact(const CompactOptions& options, Session& session) {
     random.policy = {"random_poses",
                      {{"poses", fmt::format("{}", outcome.result.compact.variable_count())},
                       {"loops", fmt::format("{}", outcome.result.kept_loops)},
+                      {"draw", options.draw},
                       {"seed", fmt::format("{}", options.seed)}}};
     outcome.control = run_job(random, nullptr);
   }

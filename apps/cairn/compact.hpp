@@ -33,6 +33,7 @@ struct CompactOptions {
   // Of studies, besides the strategy rfpfl:
   double error_ratio = 2.5;
   std::uint64_t seed = 1;
+  std::string draw = "loops";
   std::string compare;
 
   CompactOptions() { problem.initial.clear(); }

@@ -33,6 +33,12 @@ Command add_study_compact(ArgumentParser study) {
       .description(
           "all or few poses and loops: apal, apfl, fpfl; rfpfl at random, as many as fpfl");
   cli.add_option("--seed", options->seed, "of rfpfl").type_name("N").show_default();
+  cli.add_option("--draw", options->draw,
+                 "of rfpfl: loop closures first, with the poses at their ends, or poses first, and "
+                 "then loop closures between those, as the authors do")
+      .type_name("WHAT")
+      .one_of({"loops", "poses"})
+      .show_default();
   cli.add_option("--error-ratio", options->error_ratio,
                  "errors over those with all loops, at most, in the sample; 0: do not try")
       .type_name("X")

@@ -12,7 +12,6 @@ void cairn_register(cairn::Registrar& registrar) {
       });
   registrar.add<PosePolicy, RandomPosesOptions>(
       "random_poses", [](const RandomPosesOptions& options, Registry& registry) {
-        return std::make_unique<RandomPoses>(registry.make<Estimator>(options.estimator),
-                                             options.poses, options.loops, options.seed);
+        return std::make_unique<RandomPoses>(registry.make<Estimator>(options.estimator), options);
       });
 }

@@ -14,7 +14,6 @@ namespace cairn::compact {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-using Pair = std::pair<Id, Id>;
 
 /// The same on every machine, unlike std::shuffle.
 template <class T>
@@ -24,8 +23,9 @@ void shuffle(std::vector<T>& all, std::mt19937_64& engine) {
 }
 
 /// The pairs (earlier, later) that a recording has loop closures of, each once.
-std::vector<Pair> linked_pairs(const Graph& recording, std::span<const Arrival> poses) {
-  std::set<Pair> pairs;
+std::vector<std::pair<Id, Id>> linked_pairs(const Graph& recording,
+                                            std::span<const Arrival> poses) {
+  std::set<std::pair<Id, Id>> pairs;
   for (const Arrival& pose : poses) {
     for (const int f : pose.links) {
       Id earlier = recording.id(pose.pose());
@@ -39,28 +39,35 @@ std::vector<Pair> linked_pairs(const Graph& recording, std::span<const Arrival> 
 
 }  // namespace
 
-RandomPoses::RandomPoses(std::unique_ptr<Estimator> estimator, int poses, int loops,
-                         std::uint64_t seed)
-    : poses_(poses),
-      loops_(loops),
-      seed_(seed),
-      graph_(std::move(estimator), CompositionOrder::first) {}
+RandomPoses::RandomPoses(std::unique_ptr<Estimator> estimator, const RandomPosesOptions& options)
+    : options_(options), graph_(std::move(estimator), CompositionOrder::first) {}
 
 void RandomPoses::expect(const Graph& recording, std::span<const Arrival> poses) {
   kept_.clear();
   linked_.clear();
   if (poses.empty()) return;
-  std::mt19937_64 engine(seed_);
   kept_ = {recording.id(poses.front().pose()), recording.id(poses.back().pose())};
   std::vector<Pair> pairs = linked_pairs(recording, poses);
+  std::erase_if(pairs, [](const Pair& pair) { return pair.first == pair.second; });
+  std::vector<Id> all;
+  for (const Arrival& pose : poses) all.push_back(recording.id(pose.pose()));
+  if (options_.draw == Draw::loops) {
+    draw_loops_first(std::move(pairs), std::move(all));
+  } else {
+    draw_poses_first(std::move(pairs), std::move(all));
+  }
+}
+
+void RandomPoses::draw_loops_first(std::vector<Pair> pairs, std::vector<Id> poses) {
+  std::mt19937_64 engine(options_.seed);
   shuffle(pairs, engine);
   int loops = 0;
-  const auto room = static_cast<std::size_t>(poses_);
+  const auto room = static_cast<std::size_t>(options_.poses);
   const auto draw = [&](bool with_new_poses) {
     for (Pair& pair : pairs) {
       const std::size_t more =
           (kept_.contains(pair.first) ? 0u : 1u) + (kept_.contains(pair.second) ? 0u : 1u);
-      if (loops == loops_ || pair.first == pair.second) continue;
+      if (loops == options_.loops || pair.first == pair.second) continue;
       if (more > 0 && (!with_new_poses || kept_.size() + more > room)) continue;
       kept_.insert({pair.first, pair.second});
       linked_[pair.second].push_back(pair.first);
@@ -69,13 +76,27 @@ void RandomPoses::expect(const Graph& recording, std::span<const Arrival> poses)
     }
   };
   draw(/*with_new_poses=*/true);
-  std::vector<Id> others;
-  for (const Arrival& pose : poses) others.push_back(recording.id(pose.pose()));
-  shuffle(others, engine);
-  for (const Id id : others) {
+  shuffle(poses, engine);
+  for (const Id id : poses) {
     if (kept_.size() < room) kept_.insert(id);
   }
   draw(/*with_new_poses=*/false);
+}
+
+void RandomPoses::draw_poses_first(std::vector<Pair> pairs, std::vector<Id> poses) {
+  std::mt19937_64 engine(options_.seed);
+  shuffle(poses, engine);
+  const auto room = static_cast<std::size_t>(options_.poses);
+  for (const Id id : poses) {
+    if (kept_.size() < room) kept_.insert(id);
+  }
+  std::erase_if(pairs, [&](const Pair& pair) {
+    return !kept_.contains(pair.first) || !kept_.contains(pair.second);
+  });
+  shuffle(pairs, engine);
+  const auto most = static_cast<std::size_t>(options_.loops);
+  if (pairs.size() > most) pairs.resize(most);
+  for (const Pair& pair : pairs) linked_[pair.second].push_back(pair.first);
 }
 
 void RandomPoses::add_pose(const Variable& pose, std::span<const Factor> odometry) {

@@ -99,6 +99,16 @@ TEST_F(Compact, TheControlHasTheSizeOfWhatItIsComparedWith) {
   EXPECT_NE(ate(control, "v2"), ate(control.at("like"), "v2"));
 }
 
+TEST_F(Compact, TheControlDrawsPosesFirstIfAskedTo) {
+  const boost::json::value loops =
+      study({kWorld, "--strategy", "rfpfl", "--range", "5", "--angle", "3", "--seed", "3"});
+  const boost::json::value poses = study({kWorld, "--strategy", "rfpfl", "--range", "5", "--angle",
+                                          "3", "--seed", "3", "--draw", "poses"});
+  EXPECT_EQ(whole(poses, "poses", "kept"), whole(loops, "poses", "kept"));
+  EXPECT_LE(whole(poses, "loops", "kept"), whole(loops, "loops", "kept"));
+  EXPECT_NE(ate(poses, "v2"), ate(loops, "v2"));
+}
+
 TEST_F(Compact, ThresholdsAreFoundSavedAndRead) {
   const std::string file = folder_.file("thresholds.json");
   const boost::json::value found =

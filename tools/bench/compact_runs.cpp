@@ -18,9 +18,6 @@ namespace fs = std::filesystem;
 namespace json = boost::json;
 using Words = std::vector<std::string>;
 
-/// Algorithm 1 of the paper, without relocation.
-const std::string kAsPublished = "compact_pose:reuse=false";
-
 std::string read(const fs::path& file) {
   std::ostringstream text;
   text << std::ifstream(file, std::ios::binary).rdbuf();
@@ -110,7 +107,7 @@ std::vector<Contestant> compact_contestants(const CompactThresholds& thresholds,
         .enough = enough};
   };
   const Words published{"--policy", kAsPublished};
-  return {contestant("apal", "apal", thresholds.refined),
+  return {contestant("tested", "apal", thresholds.refined),
           contestant("fpfl", "fpfl", thresholds.refined),
           contestant("plain", "fpfl", thresholds.plain, published),
           contestant("by_rule", "fpfl", thresholds.by_rule, published)};

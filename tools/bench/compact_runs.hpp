@@ -43,7 +43,14 @@ struct CompactThresholds {
 };
 CompactThresholds find_compact_thresholds(const Bench& bench, const DataSet& set);
 
-/// All poses and loops, then few of both with each of these thresholds.
+/// Algorithm 1 of the paper, without relocation.
+inline constexpr const char* kAsPublished = "compact_pose:reuse=false";
+/// Policy of APAL: no pair of poses is tested for being near (s = 0), so that every loop closure of
+/// a recording is found. It costs a gain for each pair of poses.
+inline constexpr const char* kAllLoops = "compact_pose:search=untested";
+
+/// All poses, and all loops that the distance test finds ("tested"), then few of both with each of
+/// these thresholds.
 std::vector<Contestant> compact_contestants(const CompactThresholds& thresholds, double limit,
                                             double enough);
 

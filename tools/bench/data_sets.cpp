@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <filesystem>
 
+#include <fmt/format.h>
+
 namespace cairn::performance {
 namespace {
 
@@ -75,12 +77,15 @@ const std::vector<DataSet>& replayed_quickly() {
 /// What `cairn compact` is fed with, with the truth.
 const std::vector<TruthfulSet>& compacted() {
   static const std::vector<TruthfulSet> all{
-      {.set = {"ellipse3d", "@ellipse3d", {}}},
-      {.set = {"ellipse_n", "@ellipse_n", {}}},
+      {.set = ellipse3d()},
+      {.set = ellipse_n(10)},
       {.set = {"kitti_00", "pose2d/kitti_00.g2o", {}},
        .truth = Truth::camera,
        .file = "groundtruth/kitti_00_poses.txt"},
-      {.set = {"sphere2500",
+      {.set = {"sphere2500", "pose3d/sphere2500.g2o", {"--types", "slam3d:metric=g2o"}},
+       .truth = Truth::edges,
+       .file = "groundtruth/sphere2500_groundtruth_isam.txt"},
+      {.set = {"sphere2500_isam",
                "pose3d/sphere2500_isam.txt",
                {"--types", "slam3d:metric=rotation_vector"}},
        .truth = Truth::edges,
@@ -218,12 +223,36 @@ std::vector<DataSet> budget_sets(const std::string& data, bool quick) {
   return sets;
 }
 
+DataSet ellipse3d(const std::string& more) {
+  return {"ellipse3d",
+          "@ellipse3d:translation_error=0,rotation_error=0,translation_sigma=0.058,"
+          "rotation_sigma=0.032" +
+              more,
+          {}};
+}
+
+DataSet ellipse_n(int laps, const std::string& more) {
+  return {"ellipse_n",
+          fmt::format("@ellipse_n:laps={},translation_error=0,rotation_error=0,"
+                      "translation_sigma=0.055,rotation_sigma=0.03,loop_radius=1{}",
+                      laps, more),
+          {}};
+}
+
 std::vector<TruthfulSet> compact_sets(const std::string& data, bool quick) {
   if (quick) {
-    return {{.set = {"ellipse3d", "@ellipse3d", {}}},
-            {.set = {"manhattan, 500 poses", "@manhattan:poses=500", {}}}};
+    return {{.set = ellipse3d()}, {.set = {"manhattan, 500 poses", "@manhattan:poses=500", {}}}};
   }
   return located(compacted(), data);
+}
+
+std::vector<TruthfulSet> gain_sets(const std::string& data, bool quick) {
+  std::vector<TruthfulSet> sets = located(compacted(), quick ? "" : data);
+  std::erase_if(sets, [&](const TruthfulSet& set) {
+    const std::string& name = set.set.name;
+    return name != "ellipse3d" && name != "sphere2500" && name != "manhattanOlson3500";
+  });
+  return sets;
 }
 
 std::vector<TruthfulSet> comparison_sets(const std::string& data, bool quick) {
@@ -236,8 +265,7 @@ std::vector<TruthfulSet> comparison_sets(const std::string& data, bool quick) {
 
 std::vector<SimulatedSet> simulated_sets(const std::string& data, bool quick) {
   const std::string planar = "range=3,angle=3.14";
-  const SimulatedSet ellipse{.set = {.set = {"ellipse3d", "@ellipse3d", {}}},
-                             .range = "range=3,angle=0.2"};
+  const SimulatedSet ellipse{.set = {.set = ellipse3d()}, .range = kEllipseSensor};
   if (quick) {
     return {
         ellipse,

@@ -48,6 +48,7 @@ const std::vector<std::pair<std::string, Study>>& all_studies() {
       {"marginals", study_marginals},
       {"online", study_online},
       {"compact_sets", study_compact_sets},
+      {"compact_gain", study_compact_gain},
       {"compact_growth", study_compact_growth},
       {"compact_consistency", study_compact_consistency},
       {"compact_matches", study_compact_matches},

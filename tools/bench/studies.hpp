@@ -53,6 +53,9 @@ void study_online(const Bench& bench, const Keep& keep);
 /// On the graphs of Ila et al. (2017), and others: thresholds, times, errors.
 void study_compact_sets(const Bench& bench, const Keep& keep);
 
+/// Loops kept and errors against the threshold on the gain of a loop.
+void study_compact_gain(const Bench& bench, const Keep& keep);
+
 /// Against the number of laps around the same ellipse.
 void study_compact_growth(const Bench& bench, const Keep& keep);
 

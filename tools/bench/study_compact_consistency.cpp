@@ -17,12 +17,12 @@ constexpr double kFalseRate = 0.1, kGate = 0.99;
 /// The same drive with other noise each time, and thresholds from yet another.
 json::object measure_errors(const Bench& bench, const Thresholds& thresholds,
                             const std::string& strategy) {
+  Words arguments{"--strategy", strategy, "--thresholds", thresholds.file.string()};
+  if (strategy == "apal") arguments.insert(arguments.end(), {"--policy", kAllLoops});
   const int runs = bench.quick ? 10 : 100;
   json::array all;
   for (int seed = 1; seed <= runs; ++seed) {
-    const DataSet set{"ellipse3d", fmt::format("@ellipse3d:seed={}", seed), {}};
-    const Run run =
-        run_compact(bench, set, {"--strategy", strategy, "--thresholds", thresholds.file.string()});
+    const Run run = run_compact(bench, ellipse3d(fmt::format(",seed={}", seed)), arguments);
     all.push_back(*member(run.report, "nees"));
   }
   return {
@@ -70,8 +70,7 @@ json::object measure_matches(const Bench& bench, const SimulatedSet& simulated) 
 
 void study_compact_consistency(const Bench& bench, const Keep& keep) {
   tell("compact, consistency: normalised errors");
-  const Thresholds thresholds =
-      find_thresholds(bench, {"ellipse3d", "@ellipse3d:seed=1000", {}}, "refined");
+  const Thresholds thresholds = find_thresholds(bench, ellipse3d(",seed=1000"), "refined");
   for (const char* strategy : {"fpfl", "apal"}) keep(measure_errors(bench, thresholds, strategy));
   for (const TruthfulSet& set : comparison_sets(bench.data, bench.quick)) {
     attempt("compact, covariances: " + set.set.name, [&] { keep(measure_comparison(bench, set)); });

@@ -19,10 +19,10 @@ namespace json = boost::json;
 /// A strategy that takes longer is not tried on more laps.
 constexpr double kLimit = 120.0, kEnough = 10.0;  // [s]
 
-DataSet ellipse_n(int laps, const std::string& more = {}) {
-  return {fmt::format("ellipse_n, {} lap{}", laps, laps == 1 ? "" : "s"),
-          fmt::format("@ellipse_n:laps={}{}", laps, more),
-          {}};
+DataSet lap_set(int laps, const std::string& more = {}) {
+  DataSet set = ellipse_n(laps, more);
+  set.name += fmt::format(", {} lap{}", laps, laps == 1 ? "" : "s");
+  return set;
 }
 
 void measure_growth(const Bench& bench, const std::vector<Contestant>& all, const Keep& keep) {
@@ -30,7 +30,7 @@ void measure_growth(const Bench& bench, const std::vector<Contestant>& all, cons
   const std::vector<int> laps =
       bench.quick ? std::vector{1, 2, 3} : std::vector{1, 2, 3, 5, 8, 10, 12, 15, 20, 25, 30};
   for (const int n : laps) {
-    const DataSet set = ellipse_n(n);
+    const DataSet set = lap_set(n);
     tell("compact, growth: " + set.name);
     std::vector<Contestant> contestants = left;
     run_rounds(
@@ -84,12 +84,12 @@ json::object times_of_quarter(const std::vector<Step>& steps, std::size_t quarte
 /// A sensor that matches whatever is near, as long as the robot drives.
 json::object measure_laps(const Bench& bench, const Contestant& contestant) {
   const int laps = bench.quick ? 20 : 200;
-  const DataSet set = ellipse_n(laps, ",loop_density=0");
+  const DataSet set = lap_set(laps, ",loop_density=0");
   tell(fmt::format("compact, growth: {}, simulated matches, {}", set.name, contestant.name));
   const std::filesystem::path file = bench.cairn.work() / "steps.csv";
   std::vector<std::string> arguments = contestant.arguments;
-  arguments.insert(arguments.end(),
-                   {"--registration", "simulated:range=3,angle=0.2", "--steps", file.string()});
+  arguments.insert(arguments.end(), {"--registration", std::string("simulated:") + kEllipseNSensor,
+                                     "--steps", file.string()});
   const Run run = run_compact(bench, set, arguments, contestant.limit);
   json::object entry{{"part", "laps"},
                      {"name", contestant.name},
@@ -113,7 +113,7 @@ json::object measure_laps(const Bench& bench, const Contestant& contestant) {
 }  // namespace
 
 void study_compact_growth(const Bench& bench, const Keep& keep) {
-  const DataSet sample = ellipse_n(bench.quick ? 3 : 10);
+  const DataSet sample = lap_set(bench.quick ? 3 : 10);
   const CompactThresholds thresholds = find_compact_thresholds(bench, sample);
   keep({{"part", "thresholds"},
         {"refined", thresholds.refined.found},
@@ -122,7 +122,7 @@ void study_compact_growth(const Bench& bench, const Keep& keep) {
   std::erase_if(all, [](const Contestant& c) { return c.name == "plain"; });
   measure_growth(bench, all, keep);
   for (const Contestant& contestant : all) {
-    if (contestant.name != "apal") keep(measure_laps(bench, contestant));
+    if (contestant.name != "tested") keep(measure_laps(bench, contestant));
   }
 }
 

@@ -22,28 +22,94 @@ namespace json = boost::json;
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
+/// A row of the paper's Table 4: [m] and degrees, of ATE, RPE and RPE all to all.
+using PublishedErrors = std::array<double, 6>;
+constexpr PublishedErrors kNoErrors{kNone, kNone, kNone, kNone, kNone, kNone};
+
 /// Tables 2, 3 and 4 of Ila, Polok, Solony and Svoboda, IJRR 2017.
 struct Published {
   std::string_view name;
   double range, angle, probability;  // [m, rad]; the text's "0.36°" is 0.36 rad
   double pose_gain, loop_gain;
   double apal_seconds, fpfl_seconds;
-  double loops, poses;                    // kept, of all
-  double apal_ate, fpfl_ate, random_ate;  // [m]
+  double loops, poses;  // kept, of all
+  PublishedErrors apal, fpfl, random = kNoErrors;
 };
 
-constexpr std::array kPublished{Published{"ellipse3d", 2.5, 0.4, 0.125, 5.74, 5.50, 0.502, 0.066,
-                                          0.0291, 0.2352, 0.173, 0.338, kNone},
-                                Published{"ellipse_n", 1.1, 0.3, 0.1, 5.70, 5.11, 146.954, 5.387,
-                                          0.0320, 0.3100, 0.138, 0.235, kNone},
-                                Published{"kitti_00", 25.5, 1.1, 0.1, 8.51, 5.13, 203.045, 6.163,
-                                          0.0163, 0.0781, 3.046, 3.093, 12.017},
-                                Published{"sphere2500", 2.9, 0.1, 0.1, 4.33, 9.14, 655.016, 19.558,
-                                          0.1632, 0.3836, 0.203, 0.457, kNone},
-                                Published{"parking-garage", 95.0, 1.1, 0.1, 5.77, 2.45, 102.989,
-                                          30.602, 0.2086, 0.6429, 0.193, 0.661, 6.197},
-                                Published{"10kHog-man", 8.9, 6.3, 0.1, 2.36, 1.94, 3102.154,
-                                          401.587, 0.0711, 0.4676, 0.917, 1.479, kNone}};
+constexpr std::array kPublished{Published{"ellipse3d",
+                                          2.5,
+                                          0.4,
+                                          0.125,
+                                          5.74,
+                                          5.50,
+                                          0.502,
+                                          0.066,
+                                          0.0291,
+                                          0.2352,
+                                          {0.173, 3.666, 0.061, 1.643, 0.521, 3.121},
+                                          {0.338, 5.815, 0.100, 3.156, 0.839, 5.778}},
+                                Published{"ellipse_n",
+                                          1.1,
+                                          0.3,
+                                          0.1,
+                                          5.70,
+                                          5.11,
+                                          146.954,
+                                          5.387,
+                                          0.0320,
+                                          0.3100,
+                                          {0.138, 1.599, 0.039, 1.102, 0.338, 1.535},
+                                          {0.235, 4.820, 0.095, 2.737, 0.841, 4.033}},
+                                Published{"kitti_00",
+                                          25.5,
+                                          1.1,
+                                          0.1,
+                                          8.51,
+                                          5.13,
+                                          203.045,
+                                          6.163,
+                                          0.0163,
+                                          0.0781,
+                                          {3.046, 2.251, 0.037, 0.143, 7.007, 2.188},
+                                          {3.093, 2.250, 0.029, 0.119, 7.297, 2.223},
+                                          {12.017, 3.702, 0.028, 0.118, 17.448, 3.623}},
+                                Published{"sphere2500",
+                                          2.9,
+                                          0.1,
+                                          0.1,
+                                          4.33,
+                                          9.14,
+                                          655.016,
+                                          19.558,
+                                          0.1632,
+                                          0.3836,
+                                          {0.203, 1.397, 0.166, 1.582, 0.905, 1.391},
+                                          {0.457, 2.440, 0.244, 2.179, 1.580, 2.397}},
+                                Published{"parking-garage",
+                                          95.0,
+                                          1.1,
+                                          0.1,
+                                          5.77,
+                                          2.45,
+                                          102.989,
+                                          30.602,
+                                          0.2086,
+                                          0.6429,
+                                          {0.193, 0.787, 0.016, 0.270, 2.563, 0.777},
+                                          {0.661, 0.757, 0.012, 0.109, 1.167, 0.647},
+                                          {6.197, 9.761, 0.247, 1.688, 9.910, 7.264}},
+                                Published{"10kHog-man",
+                                          8.9,
+                                          6.3,
+                                          0.1,
+                                          2.36,
+                                          1.94,
+                                          3102.154,
+                                          401.587,
+                                          0.0711,
+                                          0.4676,
+                                          {0.917, 3.325, 0.081, 1.612, 3.707, 3.318},
+                                          {1.479, 4.902, 0.139, 2.583, 5.754, 4.896}}};
 
 const Published* published(const json::value& entry) {
   const std::string name = text(entry, "name");
@@ -115,7 +181,7 @@ std::string times_table(const json::array& entries) {
   MarkdownTable table({"graph", "poses", "loops", "thresholds", "APAL [s]", "FPFL [s]", "faster",
                        "loops kept", "poses kept", "99 % of APAL's steps [ms]", "of FPFL's"});
   for (const json::value& entry : entries) {
-    const json::value *apal = contestant(entry, "apal"), *fpfl = contestant(entry, "fpfl");
+    const json::value *apal = contestant(entry, "tested"), *fpfl = contestant(entry, "fpfl");
     const auto row = [&](std::vector<std::string> cells, const char* title, const json::value* c) {
       cells.insert(cells.end(),
                    {title, total(apal), total(c), faster(apal, c), percent_of(part_of(c, "loops")),
@@ -151,45 +217,154 @@ struct Estimate {
 };
 
 constexpr std::array kEstimates{Estimate{"APAL", "apal", "v2"},
+                                Estimate{"APAL, distance test", "tested", "v2"},
                                 Estimate{"FPFL", "fpfl", "v2"},
                                 Estimate{"FPFL, `likely`", "fpfl", "likely"},
                                 Estimate{"FPFL without relocation", "plain", "v2"},
                                 Estimate{"FPFL as published", "by_rule", "v2"},
-                                Estimate{"RFPFL", "random", "v2"}};
+                                Estimate{"RFPFL, loops first", "random", "v2"},
+                                Estimate{"RFPFL, poses first", "random_poses", "v2"}};
 
 constexpr double kExact = 1e-4;  // [m]
 
+std::string recovered(const char* recovery, const char* error) {
+  return fmt::format("errors.{}.{}", recovery, error);
+}
+
 double ate(const json::value* c, const char* recovery = "v2") {
-  return median_of(c, fmt::format("errors.{}.ate.translation", recovery));
+  return median_of(c, recovered(recovery, kErrors.front()));
+}
+
+/// Where the truth is what APAL converges to, a ratio to its error has no meaning.
+std::string over(double error, double reference) {
+  if (!std::isfinite(error) || !std::isfinite(reference)) return "";
+  return reference < kExact ? "-" : times(error / reference);
+}
+
+/// The paper divides the sum over the n (n - 1) / 2 pairs of all to all by n², so its root mean
+/// squares are 1/√2 of what they should be.
+std::vector<std::string> published_row(const char* title, const PublishedErrors& errors,
+                                       const Published& paper) {
+  std::vector<std::string> row{"", title};
+  for (std::size_t k = 0; k < errors.size(); ++k)
+    row.push_back(digits(k < 4 ? errors[k] : std::sqrt(2.0) * errors[k]));
+  const bool is_apal = &errors == &paper.apal, is_random = &errors == &paper.random;
+  row.push_back(is_apal ? "" : over(errors[0], paper.apal[0]));
+  row.push_back(is_random ? over(errors[0], paper.fpfl[0]) : "");
+  return row;
 }
 
 std::string errors_table(const json::array& entries) {
   MarkdownTable table({"graph", "strategy", "ATE [m]", "[°]", "RPE [m]", "[°]", "all to all [m]",
-                       "[°]", "ATE over APAL's", "the paper's", "over FPFL's", "the paper's"});
+                       "[°]", "ATE over APAL's", "over FPFL's"});
   for (const json::value& entry : entries) {
     std::string name = text(entry, "name") + (is_true(entry, "de_facto") ? " †" : "");
     const double apal = ate(contestant(entry, "apal")), fpfl = ate(contestant(entry, "fpfl"));
-    const Published* paper = published(entry);
     for (const Estimate& estimate : kEstimates) {
       const json::value* c = contestant(entry, estimate.contestant);
-      const std::string who = estimate.contestant;
+      const std::string_view who = estimate.contestant;
+      const bool control = who.starts_with("random");
       std::vector<std::string> row{name, estimate.title};
       for (const char* error : kErrors)
-        row.push_back(digits(median_of(c, fmt::format("errors.{}.{}", estimate.recovery, error))));
+        row.push_back(digits(median_of(c, recovered(estimate.recovery, error))));
       const double error = ate(c, estimate.recovery);
-      const double published_error = !paper            ? kNone
-                                     : who == "random" ? paper->random_ate
-                                     : who == "apal"   ? kNone
-                                                       : paper->fpfl_ate;
-      // Where the truth is what APAL converges to, a ratio to its error says nothing.
-      row.push_back(who == "apal" ? "" : apal < kExact ? "-" : times(error / apal));
-      row.push_back(
-          paper && std::isfinite(published_error) ? times(published_error / paper->apal_ate) : "");
-      row.push_back(who == "random" ? times(error / fpfl) : "");
-      row.push_back(paper && std::isfinite(published_error) && who == "random"
-                        ? times(published_error / paper->fpfl_ate)
-                        : "");
+      row.push_back(who == "apal" ? "" : over(error, apal));
+      row.push_back(control ? over(error, fpfl) : "");
       table.add(row);
+      name.clear();
+    }
+    if (const Published* paper = published(entry)) {
+      table.add(published_row("the paper's APAL", paper->apal, *paper));
+      table.add(published_row("the paper's FPFL", paper->fpfl, *paper));
+      if (std::isfinite(paper->random[0]))
+        table.add(published_row("the paper's RFPFL", paper->random, *paper));
+    }
+  }
+  return table.text();
+}
+
+/// What the control got, which may be fewer loops than asked for where poses are drawn first.
+std::string control_table(const json::array& entries) {
+  MarkdownTable table({"graph", "drawn first", "poses kept", "loops kept", "FPFL's loops",
+                       "converged", "ATE over FPFL's: least", "median", "most"});
+  for (const json::value& entry : entries) {
+    std::string name = text(entry, "name");
+    const json::value* fpfl = contestant(entry, "fpfl");
+    for (const auto& [who, title] : {std::pair{"random", "loops"}, {"random_poses", "poses"}}) {
+      const json::value* c = contestant(entry, who);
+      if (!c) continue;
+      std::vector<double> ratios;
+      for (const json::value& run : list(*c, "runs"))
+        ratios.push_back(number(run, "errors.v2.ate.translation") / ate(fpfl));
+      if (ratios.empty()) continue;
+      table.add({name, title, whole(median_of(c, "poses.kept")), whole(median_of(c, "loops.kept")),
+                 whole(median_of(fpfl, "loops.kept")),
+                 fmt::format("{:.0f} of {}", number(*c, "converged"), ratios.size()),
+                 times(*std::ranges::min_element(ratios)), times(median(ratios)),
+                 times(*std::ranges::max_element(ratios))});
+      name.clear();
+    }
+  }
+  return table.text();
+}
+
+/// The paper's Table 1, which is of kitti_00.
+std::string recovery_table(const json::array& entries) {
+  struct Row {
+    const char* recovery;
+    PublishedErrors paper;
+  };
+  constexpr std::array kRows{Row{"v0", {3.853, 3.392, 0.076, 0.459, 11.782, 3.374}},
+                             Row{"v1", {3.818, 3.598, 0.064, 0.501, 12.363, 3.581}},
+                             Row{"v2", {3.093, 2.250, 0.029, 0.119, 7.297, 2.223}},
+                             Row{"likely", kNoErrors}};
+  MarkdownTable table({"graph", "recovery", "ATE [m]", "[°]", "RPE [m]", "[°]", "all to all [m]",
+                       "[°]", "with relocation: ATE [m]", "[°]"});
+  for (const json::value& entry : entries) {
+    std::string name = text(entry, "name");
+    for (const Row& recovery : kRows) {
+      std::vector<std::string> row{name, recovery.recovery};
+      for (const char* error : kErrors) {
+        row.push_back(
+            digits(median_of(contestant(entry, "by_rule"), recovered(recovery.recovery, error))));
+      }
+      for (const char* error : {kErrors[0], kErrors[1]}) {
+        row.push_back(
+            digits(median_of(contestant(entry, "fpfl"), recovered(recovery.recovery, error))));
+      }
+      table.add(row);
+      name.clear();
+    }
+    if (text(entry, "name") != "kitti_00") continue;
+    for (const Row& recovery : kRows) {
+      if (!std::isfinite(recovery.paper[0])) continue;
+      std::vector<std::string> row{"", fmt::format("the paper's {}", recovery.recovery)};
+      for (std::size_t k = 0; k < recovery.paper.size(); ++k)
+        row.push_back(digits(k < 4 ? recovery.paper[k] : std::sqrt(2.0) * recovery.paper[k]));
+      row.insert(row.end(), {"", ""});
+      table.add(row);
+    }
+  }
+  return table.text();
+}
+
+// Sensitivity
+// ------------------------------------------------------------------------------------------------
+
+/// The top of the paper's Figure 5.
+std::string gain_table(const json::array& entries) {
+  MarkdownTable table({"graph", "loop gain over the rule's", "loop gain [nats]", "loops kept",
+                       "of all", "ATE [m]", "[°]", "over APAL's"});
+  for (const json::value& entry : entries) {
+    std::string name = text(entry, "name");
+    const double apal = number(entry, "apal.errors.v2.ate.translation");
+    for (const json::value& run : list(entry, "runs")) {
+      const double error = number(run, "run.errors.v2.ate.translation");
+      table.add({name, fmt::format("{:.3g}", number(run, "factor")),
+                 digits(number(run, "loop_gain")), whole(number(run, "run.loops.kept")),
+                 percent_of(number(run, "run.loops.kept") / number(run, "run.loops.in")),
+                 digits(error), digits(number(run, "run.errors.v2.ate.rotation")),
+                 over(error, apal)});
       name.clear();
     }
   }
@@ -199,7 +374,7 @@ std::string errors_table(const json::array& entries) {
 // Growth
 // ------------------------------------------------------------------------------------------------
 
-constexpr std::array kStrategies{std::pair{"apal", "APAL"}, std::pair{"fpfl", "FPFL"},
+constexpr std::array kStrategies{std::pair{"tested", "APAL"}, std::pair{"fpfl", "FPFL"},
                                  std::pair{"by_rule", "FPFL as published"}};
 
 std::string growth_table(const json::array& entries) {
@@ -216,7 +391,7 @@ std::string growth_table(const json::array& entries) {
       loops = median_of(&c, "loops.in");
     }
     std::vector<std::string> row{whole(number(entry, "laps")), whole(poses), whole(loops),
-                                 total(contestant(entry, "apal"))};
+                                 total(contestant(entry, "tested"))};
     for (const json::value* c : {fpfl, by_rule}) {
       row.insert(row.end(),
                  {total(c), whole(median_of(c, "poses.kept")), whole(median_of(c, "loops.kept"))});
@@ -268,7 +443,7 @@ std::string title_of(const std::string& name) {
   for (const auto& [known, title] : kStrategies) {
     if (name == known) return title;
   }
-  return name;
+  return name == "apal" ? "APAL" : name;
 }
 
 std::string laps_table(const json::array& entries) {
@@ -395,7 +570,13 @@ std::string matches_table(const json::array& entries) {
 std::vector<Section> compact_sets_sections(const json::array& entries) {
   return {{"compact-thresholds", thresholds_table(entries)},
           {"compact-times", times_table(entries)},
-          {"compact-errors", errors_table(entries)}};
+          {"compact-errors", errors_table(entries)},
+          {"compact-control", control_table(entries)},
+          {"compact-recovery", recovery_table(entries)}};
+}
+
+std::vector<Section> compact_gain_sections(const json::array& entries) {
+  return {{"compact-gain", gain_table(entries)}};
 }
 
 std::vector<Section> compact_growth_sections(const json::array& entries) {

@@ -8,6 +8,8 @@
 #include <gtest/gtest.h>
 
 #include "cairn/runtime/error.hpp"
+#include "cairn/solve/initial_guess.hpp"
+#include "cairn/solve/optimizer.hpp"
 #include "support/policy_runs.hpp"
 #include "support/pose_world.hpp"
 
@@ -24,11 +26,14 @@ using Pair = std::pair<Id, Id>;
 
 class RandomPosesTest : public testing::Test {
  protected:
-  PolicyRun keep(int poses, int loops, int seed = 1) {
+  PolicyRun keep(int poses, int loops, int seed = 1, const std::string& more = {}) {
     return run(registry, world,
                "random_poses:poses=" + std::to_string(poses) + ",loops=" + std::to_string(loops) +
-                   ",seed=" + std::to_string(seed),
+                   ",seed=" + std::to_string(seed) + more,
                "recorded");
+  }
+  PolicyRun keep_poses_first(int poses, int loops, int seed = 1) {
+    return keep(poses, loops, seed, ",draw=poses");
   }
   /// That the recording has, each once.
   std::set<Pair> loops() const {
@@ -94,7 +99,8 @@ TEST_F(RandomPosesTest, DrawsLoopsEvenly) {
   std::map<Pair, int> drawn;
   constexpr int kSeeds = 150, kLoops = 10;
   for (int seed = 0; seed < kSeeds; ++seed) {
-    RandomPoses policy(registry.make<Estimator>("incremental_cholesky"), 40, kLoops, seed);
+    RandomPoses policy(registry.make<Estimator>("incremental_cholesky"),
+                       {.poses = 40, .loops = kLoops, .seed = static_cast<std::uint64_t>(seed)});
     policy.expect(world.graph, pose_chain(world.graph));
     const auto registration = registry.make<Registration>("recorded");
     registration->begin({.recording = &world.graph});
@@ -118,6 +124,79 @@ TEST_F(RandomPosesTest, DrawsLoopsEvenly) {
   EXPECT_EQ(drawn.size(), all.size());
 }
 
+TEST_F(RandomPosesTest, PosesFirstKeepsSoManyPosesAndOnlyLoopsBetweenThem) {
+  const std::set<Pair> all = loops();
+  for (const int poses : {2, 100, 150, 200}) {
+    const PolicyRun few = keep_poses_first(poses, 12);
+    const std::set<Id> there = kept(few);
+    EXPECT_THAT(there, SizeIs(poses));
+    EXPECT_THAT(there, testing::IsSupersetOf({0, 199}));
+    EXPECT_THAT(few.links(), SizeIs(poses == 2 ? 0 : 12));
+    for (const Pair& link : few.links()) {
+      EXPECT_TRUE(all.contains(link));
+      EXPECT_TRUE(there.contains(link.first) && there.contains(link.second));
+    }
+  }
+}
+
+// Of the loops between poses all of which are as likely as any other, (m/n)² survive.
+TEST_F(RandomPosesTest, PosesFirstLosesTheLoopsOfPosesThatAreNotKept) {
+  constexpr int kSeeds = 40, kPoses = 80;
+  double survived = 0.0;
+  for (int seed = 1; seed <= kSeeds; ++seed) {
+    const PolicyRun few = keep_poses_first(kPoses, 100'000, seed);
+    const std::set<Id> there = kept(few);
+    std::set<Pair> expected;
+    for (const auto& [a, b] : loops()) {
+      if (there.contains(a) && there.contains(b)) expected.emplace(a, b);
+    }
+    const auto links = few.links();
+    EXPECT_EQ(std::set<Pair>(links.begin(), links.end()), expected);
+    survived += static_cast<double>(links.size()) / static_cast<double>(loops().size());
+  }
+  EXPECT_NEAR(survived / kSeeds, (kPoses / 200.0) * (kPoses / 200.0), 0.03);
+}
+
+// The other draw keeps whatever poses its loops need.
+TEST_F(RandomPosesTest, PosesFirstDrawsPosesWithoutRegardToLoops) {
+  std::map<Id, int> ends;
+  for (const auto& [a, b] : loops()) ++ends[a], ++ends[b];
+  const auto loops_per_pose = [&](const PolicyRun& run) {
+    double sum = 0.0;
+    for (const Id id : kept(run)) sum += ends[id];
+    return sum / 40.0;
+  };
+  double poses_first = 0.0, loops_first = 0.0;
+  for (int seed = 1; seed <= 20; ++seed) {
+    poses_first += loops_per_pose(keep_poses_first(40, 25, seed));
+    loops_first += loops_per_pose(keep(40, 25, seed));
+  }
+  EXPECT_NEAR(poses_first / 20.0, 2.0 * static_cast<double>(loops().size()) / 200.0, 0.3);
+  EXPECT_GT(loops_first, 1.1 * poses_first);
+}
+
+TEST_F(RandomPosesTest, PosesFirstDrawsTheSameForASeed) {
+  const PolicyRun one = keep_poses_first(100, 10), same = keep_poses_first(100, 10),
+                  other = keep_poses_first(100, 10, 2);
+  EXPECT_EQ(one.kept(), same.kept());
+  EXPECT_EQ(one.links(), same.links());
+  EXPECT_NE(one.kept(), other.kept());
+  EXPECT_NE(one.links(), other.links());
+}
+
+// The minimum is that of the whole problem, not where the incremental solution happened to be.
+TEST_F(RandomPosesTest, IsSolvedUntilItHasConverged) {
+  for (const char* draw : {",draw=loops", ",draw=poses"}) {
+    const PolicyRun few = keep(100, 30, 1, draw);
+    Graph again = few.policy->estimator().graph();
+    const double chi2 = few.policy->estimator().chi2();
+    registry.make<InitialGuess>("chordal")->compute(again);
+    const Summary summary = registry.make<Optimizer>("levenberg_marquardt")->optimize(again);
+    EXPECT_EQ(summary.status, Status::converged);
+    EXPECT_NEAR(chi2, summary.final_chi2, 1e-6 * chi2);
+  }
+}
+
 TEST_F(RandomPosesTest, TheWayIsInTheChains) {
   const PolicyRun few = keep(40, 10);
   std::vector<Id> ids{0};
@@ -131,6 +210,10 @@ TEST_F(RandomPosesTest, TheWayIsInTheChains) {
 TEST_F(RandomPosesTest, FixedPosesAreKeptBesides) {
   world.graph.set_fixed(*world.graph.find(50));
   for (int seed = 1; seed <= 3; ++seed) EXPECT_THAT(keep(5, 0, seed).kept(), Contains(50));
+}
+
+TEST_F(RandomPosesTest, RefusesAnUnknownDraw) {
+  EXPECT_THROW(registry.make<PosePolicy>("random_poses:draw=both"), Error);
 }
 
 TEST_F(RandomPosesTest, CannotFollowARobotLive) {

@@ -37,6 +37,12 @@ std::string contestant(const std::string& name, const std::string& runs) {
                      !runs.empty(), runs);
 }
 
+std::string control(const std::string& name, int converged, const std::string& runs) {
+  return fmt::format(
+      R"({{"name": "{}", "in_time": true, "limit": 300, "converged": {}, "runs": [{}]}})", name,
+      converged, runs);
+}
+
 std::string thresholds(double loop_gain) {
   return fmt::format(
       R"({{"options": {{"range": "2.5", "angle": "0.25", "probability": "0.1", "pose_gain": "5.75",
@@ -51,12 +57,14 @@ boost::json::value sets_report(const std::string& name, const std::string& apal,
       fmt::format(
           R"({{"name": "{}", "de_facto": {}, "refined": {}, "plain": {}, "by_rule": {}, "contestants": [{}]}})",
           name, de_facto, thresholds(3.5), thresholds(5.0), thresholds(7.0),
-          contestant("apal", apal) + "," +
+          contestant("apal", run(20.0, 100, 200, 0.2)) + "," + contestant("tested", apal) + "," +
               contestant("fpfl", run(0.5, 20, 10, 0.3) + "," + run(1.0, 20, 10, 0.3)) + "," +
               contestant("plain", run(0.5, 15, 10, 0.35)) + "," +
               contestant("by_rule", run(0.25, 10, 5, 0.4)) + "," +
-              contestant("random", run(1.0, 20, 10, 0.6) + "," + run(1.0, 20, 10, 1.2) + "," +
-                                       run(1.0, 20, 10, 9.0))));
+              control("random", 3,
+                      run(1.0, 20, 10, 0.6) + "," + run(1.0, 20, 10, 1.2) + "," +
+                          run(1.0, 20, 10, 9.0)) +
+              "," + control("random_poses", 1, run(1.0, 20, 8, 0.9) + "," + run(1.0, 20, 8, 0.9))));
 }
 
 const std::string kApal = run(4.0, 100, 200, 0.2) + "," + run(12.0, 100, 200, 0.2);
@@ -85,16 +93,60 @@ TEST(CompactTables, SayThatAllPosesAndLoopsTookTooLong) {
 TEST(CompactTables, GiveErrorsOverThoseOfEverythingAndOfTheSameSizeAtRandom) {
   const std::string table = section(sets_report("parking-garage", kApal, true), "compact-errors");
   EXPECT_THAT(table, HasSubstr("| parking-garage † | APAL | 0.200 | 0.400 |"));
+  EXPECT_THAT(table, HasSubstr("|  | APAL, distance test | 0.200 | 0.400 | 0.200 | 0.400 | 0.200 | "
+                               "0.400 | 1.00 × |  |\n"));
   EXPECT_THAT(table, HasSubstr("|  | FPFL | 0.300 | 0.600 | 0.300 | 0.600 | 0.300 | 0.600 | 1.50 × "
-                               "| 3.42 × |  |  |\n"));
-  EXPECT_THAT(table, HasSubstr("|  | RFPFL | 1.20 | 2.40 | 1.20 | 2.40 | 1.20 | 2.40 | 6.00 × | "
-                               "32.1 × | 4.00 × | 9.38 × |\n"));
+                               "|  |\n"));
+  EXPECT_THAT(table, HasSubstr("|  | RFPFL, loops first | 1.20 | 2.40 | 1.20 | 2.40 | 1.20 | 2.40 "
+                               "| 6.00 × | 4.00 × |\n"));
+  EXPECT_THAT(table, HasSubstr("|  | RFPFL, poses first | 0.900 | 1.80 | 0.900 | 1.80 | 0.900 | "
+                               "1.80 | 4.50 × | 3.00 × |\n"));
 }
 
-TEST(CompactTables, LeaveThePapersColumnsEmptyForOtherGraphs) {
+TEST(CompactTables, PutThePapersErrorsBesideWithAllToAllAsItShouldBe) {
+  const std::string table = section(sets_report("parking-garage", kApal, true), "compact-errors");
+  EXPECT_THAT(table,
+              HasSubstr("|  | the paper's APAL | 0.193 | 0.787 | 0.0160 | 0.270 | 3.62 | 1.10 "
+                        "|  |  |\n"));
+  EXPECT_THAT(table, HasSubstr("|  | the paper's FPFL | 0.661 | 0.757 | 0.0120 | 0.109 | 1.65 | "
+                               "0.915 | 3.42 × |  |\n"));
+  EXPECT_THAT(table, HasSubstr("|  | the paper's RFPFL | 6.20 | 9.76 | 0.247 | 1.69 | 14.0 | 10.3 "
+                               "| 32.1 × | 9.38 × |\n"));
+}
+
+TEST(CompactTables, SayHowManyOfTheControlsHaveConverged) {
+  const std::string table = section(sets_report("town", kApal), "compact-control");
+  EXPECT_THAT(table,
+              HasSubstr("| town | loops | 20 | 10 | 10 | 3 of 3 | 2.00 × | 4.00 × | 30.0 × |\n"));
+  EXPECT_THAT(table, HasSubstr("|  | poses | 20 | 8 | 10 | 1 of 2 | 3.00 × | 3.00 × | 3.00 × |\n"));
+}
+
+TEST(CompactTables, CompareWaysOfRecoveryWithThePapersTable) {
+  const std::string table = section(sets_report("kitti_00", kApal), "compact-recovery");
+  EXPECT_THAT(table, HasSubstr("| kitti_00 | v0 | - |"));
+  EXPECT_THAT(table, HasSubstr("|  | v2 | 0.400 | 0.800 | 0.400 | 0.800 | 0.400 | 0.800 | 0.300 | "
+                               "0.600 |\n"));
+  EXPECT_THAT(table,
+              HasSubstr("|  | the paper's v2 | 3.09 | 2.25 | 0.0290 | 0.119 | 10.3 | 3.14 |"));
+  EXPECT_THAT(section(sets_report("town", kApal), "compact-recovery"), Not(HasSubstr("paper's")));
+}
+
+TEST(CompactTables, LeaveOutThePapersRowsForOtherGraphs) {
   const boost::json::value report = sets_report("town", kApal);
-  EXPECT_THAT(section(report, "compact-errors"), HasSubstr("| 6.00 × |  | 4.00 × |  |\n"));
+  EXPECT_THAT(section(report, "compact-errors"), HasSubstr("| 6.00 × | 4.00 × |\n"));
+  EXPECT_THAT(section(report, "compact-errors"), Not(HasSubstr("paper's")));
   EXPECT_THAT(section(report, "compact-times"), Not(HasSubstr("paper's")));
+}
+
+TEST(CompactTables, ShowLoopsAndErrorsAgainstTheThresholdOnTheirGain) {
+  const auto gains =
+      report("compact_gain",
+             fmt::format(R"({{"name": "town", "apal": {}, "runs": [{{"factor": 0, "loop_gain": 0,
+                      "run": {}}}, {{"factor": 0.707, "loop_gain": 3.5, "run": {}}}]}})",
+                         run(9.0, 100, 200, 0.2), run(8.0, 100, 180, 0.2), run(1.0, 100, 20, 0.5)));
+  const std::string table = section(gains, "compact-gain");
+  EXPECT_THAT(table, HasSubstr("| town | 0 | 0.00 | 180 | 90.0 % | 0.200 | 0.400 | 1.00 × |\n"));
+  EXPECT_THAT(table, HasSubstr("|  | 0.707 | 3.50 | 20 | 10.0 % | 0.500 | 1.00 | 2.50 × |\n"));
 }
 
 /// Quadratic for all, linear for few; all were late at the last.
@@ -103,7 +155,7 @@ boost::json::value growth_report() {
   for (const int laps : {1, 5, 10, 20}) {
     const double n = laps;
     entries += fmt::format(R"(, {{"part": "growth", "laps": {}, "contestants": [{}, {}]}})", laps,
-                           contestant("apal", laps == 20 ? "" : run(n * n, 100, 200, 0.1)),
+                           contestant("tested", laps == 20 ? "" : run(n * n, 100, 200, 0.1)),
                            contestant("fpfl", run(n, 30, 10, 0.1)));
   }
   return report("compact_growth", entries);
