@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "camera_world.hpp"
 #include "json_access.hpp"
 #include "planar_truth.hpp"
 
@@ -54,6 +55,13 @@ DataSet with_truth(const Bench& bench, const TruthfulSet& set) {
     case Truth::camera:
       std::ofstream(made) << planar_truth(read(set.file));
       break;
+    case Truth::simulated: {
+      const CameraWorld world = camera_world(read(set.file), {});
+      std::ofstream(made) << world.truth;
+      with.graph = (bench.cairn.work() / (with.name + ".g2o")).string();
+      std::ofstream(with.graph) << world.measurements;
+      break;
+    }
     case Truth::edges:
       optimize(bench, {with.name, set.file, with.arguments}, set.arguments, made);
       break;

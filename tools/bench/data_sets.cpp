@@ -82,6 +82,9 @@ const std::vector<TruthfulSet>& compacted() {
       {.set = {"kitti_00", "pose2d/kitti_00.g2o", {}},
        .truth = Truth::camera,
        .file = "groundtruth/kitti_00_poses.txt"},
+      {.set = {"kitti_00, simulated", "", {"--types", "slam3d:metric=rotation_vector"}},
+       .truth = Truth::simulated,
+       .file = "groundtruth/kitti_00_poses.txt"},
       {.set = {"sphere2500", "pose3d/sphere2500.g2o", {"--types", "slam3d:metric=g2o"}},
        .truth = Truth::edges,
        .file = "groundtruth/sphere2500_groundtruth_isam.txt"},
@@ -250,7 +253,7 @@ std::vector<TruthfulSet> gain_sets(const std::string& data, bool quick) {
   std::vector<TruthfulSet> sets = located(compacted(), quick ? "" : data);
   std::erase_if(sets, [&](const TruthfulSet& set) {
     const std::string& name = set.set.name;
-    return name != "ellipse3d" && name != "sphere2500" && name != "manhattanOlson3500";
+    return name != "ellipse3d" && name != "sphere2500" && name != "kitti_00, simulated";
   });
   return sets;
 }

@@ -20,6 +20,7 @@ enum class Truth {
   file,       ///< a graph or a trajectory
   edges,      ///< measurements without noise, to be optimised
   camera,     ///< poses of a camera in KITTI's axes
+  simulated,  ///< the same, along which the graph is simulated, too (`camera_world`)
   de_facto    ///< nobody knows them: the minimum of all measurements
 };
 
