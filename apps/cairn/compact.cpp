@@ -175,7 +175,7 @@ void note_size(const CompactOptions& options, const CompactOutcome& outcome,
   const double kept = result.compact.variable_count() / in;
   if (options.strategy != "fpfl" || result.interrupted || in < 10.0 || kept < kNotCompact) return;
   session.note(fmt::format(
-      "{:.0f} % of the poses are kept: each step of odometry tells more than pose_gain. A larger "
+      "{:.0f} % of the poses are kept: each step of odometry gains more than pose_gain. A larger "
       "--pose-gain keeps fewer, with a larger error; --registration simulated:range=… (with "
       "--truth) "
       "shows what a sensor that matches every pair within its range would allow",
@@ -254,7 +254,10 @@ int run_compact(const CompactOptions& options, Session& session) {
   note_size(options, outcome, session);
   results.add([&] { session.print(summary_text(options, outcome)); });
   results.finish();
-  return guard.interrupted() ? kExitInterrupted : 0;
+  if (guard.interrupted()) return kExitInterrupted;
+  if (shown.converged) return 0;
+  session.note("the estimate of what was kept has not converged");
+  return static_cast<int>(ErrorCode::numerical);
 }
 
 void add_compact_options(ArgumentParser cli, CompactOptions& options,

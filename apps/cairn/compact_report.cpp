@@ -147,7 +147,9 @@ json::object report_json(const CompactOptions& options, const CompactOutcome& ou
   report["strategy"] = options.strategy;
   report["registration"] = options.registration;
   report["threads"] = threads();
-  report["status"] = outcome.result.interrupted ? "interrupted" : "converged";
+  report["status"] = outcome.result.interrupted  ? "interrupted"
+                     : outcome.shown().converged ? "converged"
+                                                 : "max_iterations";
   report["thresholds"] = thresholds_json(outcome.found);
   for (auto& [name, value] : result_json(outcome.shown(), outcome.data)) report[name] = value;
   if (outcome.control) report["like"] = result_json(outcome.result, outcome.data);

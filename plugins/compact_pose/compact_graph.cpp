@@ -225,11 +225,12 @@ Estimator& CompactGraph::estimator() {
   return *copy_;
 }
 
-void CompactGraph::solve_fully() {
+bool CompactGraph::solve_fully() {
   PolicySeconds unattended;
   update({}, unattended);
-  estimator_->update({}, {.full = true});
+  const UpdateReport report = estimator_->update({}, {.full = true});
   refresh();
+  return report.ok && report.converged;
 }
 
 /// Reads the estimate, which has changed.

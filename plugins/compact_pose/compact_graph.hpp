@@ -59,8 +59,8 @@ class CompactGraph {
   /// to what follows. Two parts that are treated as independent have no more information than the
   /// one measurement.
   void relocate(int pose, const Motion& measured, double of_way, PolicySeconds& seconds);
-  /// Relinearises and solves everything until it has converged.
-  void solve_fully();
+  /// Relinearises and solves everything until it has converged; false if it does not.
+  bool solve_fully();
 
   // The newest pose
   // --------------------------------------------------------------------------------

@@ -369,11 +369,11 @@ PoseReport CompactPose::end_pose() {
   return report_;
 }
 
-void CompactPose::finish() {
+bool CompactPose::finish() {
   if (open_) throw Error(ErrorCode::usage, "finish before the newest pose was ended");
-  if (graph_.empty()) return;
+  if (graph_.empty()) return true;
   if (!graph_.newest_kept()) graph_.keep(report_.seconds);
-  graph_.solve_fully();
+  return graph_.solve_fully();
 }
 
 std::vector<double> CompactPose::newest_state() const {

@@ -39,7 +39,7 @@ class CompactPose final : public PosePolicy, public OptionFinder {
   std::optional<MatchProposal> next_match() override;
   LinkReport offer(Id other, std::span<const Factor> measured) override;
   PoseReport end_pose() override;
-  void finish() override;
+  bool finish() override;
 
   Estimator& estimator() override { return graph_.estimator(); }
   std::vector<Id> kept() const override { return graph_.kept(); }

@@ -147,10 +147,10 @@ PoseReport RandomPoses::end_pose() {
   return report_;
 }
 
-void RandomPoses::finish() {
-  if (graph_.empty()) return;
+bool RandomPoses::finish() {
+  if (graph_.empty()) return true;
   if (!graph_.newest_kept()) graph_.keep(report_.seconds);
-  graph_.solve_fully();
+  return graph_.solve_fully();
 }
 
 std::vector<double> RandomPoses::newest_state() const {

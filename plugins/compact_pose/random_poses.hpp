@@ -68,7 +68,7 @@ class RandomPoses final : public PosePolicy {
   std::optional<MatchProposal> next_match() override;
   LinkReport offer(Id other, std::span<const Factor> measured) override;
   PoseReport end_pose() override;
-  void finish() override;
+  bool finish() override;
 
   Estimator& estimator() override { return graph_.estimator(); }
   std::vector<Id> kept() const override { return graph_.kept(); }

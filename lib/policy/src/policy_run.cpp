@@ -131,8 +131,9 @@ void PolicyRun::run(std::size_t count, std::string_view title,
   };
   call_plugin([&] { return fmt::format("policy '{}'", result_.policy); },
               [&] {
-                run_policy(setting_.data.recording, std::span(setting_.data.poses).first(count),
-                           *policy_, watched, count_pose);
+                result_.converged =
+                    run_policy(setting_.data.recording, std::span(setting_.data.poses).first(count),
+                               *policy_, watched, count_pose);
               });
   result_.interrupted = setting_.interrupted();
 }

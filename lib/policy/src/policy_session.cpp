@@ -295,7 +295,7 @@ void PolicySession::finish_trajectory() {
     arriving_.reset();
   }
   if (current()) end();
-  policy_.finish();
+  if (!policy_.finish()) answer_ += "NOTE the estimate has not converged\n";
   finished_ = true;
   if (!newest_) return;
   arrived_[*newest_] = true;

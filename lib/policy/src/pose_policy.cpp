@@ -25,7 +25,7 @@ PolicySeconds& PolicySeconds::operator+=(const PolicySeconds& other) {
   return *this;
 }
 
-void run_policy(const Graph& recording, std::span<const Arrival> poses, PosePolicy& policy,
+bool run_policy(const Graph& recording, std::span<const Arrival> poses, PosePolicy& policy,
                 Registration& registration, const std::function<bool(const PoseReport&)>& each) {
   policy.expect(recording, poses);
   bool first = true;
@@ -41,7 +41,7 @@ void run_policy(const Graph& recording, std::span<const Arrival> poses, PosePoli
     registration.pose_ended(report.id, report.kept);
     if (each && !each(report)) break;
   }
-  if (!first) policy.finish();
+  return first || policy.finish();
 }
 
 Graph recovered_trajectory(PosePolicy& policy, Recovery how) {

@@ -55,7 +55,11 @@ class Scribe final : public PosePolicy {
     report.id = poses.back().id;
     return report;
   }
-  void finish() override { log.emplace_back("finish"); }
+  bool finish() override {
+    log.emplace_back("finish");
+    return converges;
+  }
+  bool converges = true;
   Estimator& estimator() override { throw std::logic_error("not asked for"); }
   std::vector<Id> kept() const override { return {}; }
   int factor_count() const override { return 0; }
@@ -91,6 +95,16 @@ TEST_F(RunPolicy, TellsThePolicyOfEveryPoseInTurn) {
   EXPECT_THAT(reported, ElementsAre(0, 1, 2, 3, 4));
   for (const auto& [pair, measured] : policy.offers)
     EXPECT_THAT(measured, SizeIs(pair.first == 0 ? 1 : 0));
+}
+
+TEST_F(RunPolicy, SaysWhetherThePolicyHasConverged) {
+  const Simulation world = simulate(registry, "ring:poses=5");
+  FunctionRegistration none([](Id, Id) { return std::vector<Factor>(); });
+  for (const bool converges : {true, false}) {
+    Scribe policy;
+    policy.converges = converges;
+    EXPECT_EQ(run_policy(world.graph, pose_chain(world.graph), policy, none), converges);
+  }
 }
 
 TEST_F(RunPolicy, LeavesItToOdometryWherePosesAreButForTheFirstAndFixedOnes) {
@@ -190,7 +204,7 @@ TEST_F(RunPolicy, WithoutNoiseTheRecoveredWayIsTheTruth) {
     const Simulation world = simulate(registry, example.generator);
     const PolicyRun few =
         run(registry, world, "compact_pose:reuse=false,range=40,angle=3.15,loop_gain=3,pose_gain=5",
-            "recorded");
+            "recorded:carry=0");
     EXPECT_LT(few.policy->chains().size(), few.reports.size() / 2);
     const VariableType& type = world.truth.type(0);
     for (const Recovery how : example.exact) {

@@ -39,7 +39,7 @@ class Scaling final : public PosePolicy {
     report.id = kept_.back();
     return report;
   }
-  void finish() override {}
+  bool finish() override { return true; }
   Estimator& estimator() override { return *estimator_; }
   std::vector<Id> kept() const override { return kept_; }
   int factor_count() const override { return estimator_->factor_count(); }

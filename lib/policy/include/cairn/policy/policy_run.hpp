@@ -57,6 +57,7 @@ struct PolicyResult {
   double registration_seconds = 0.0;
   std::int64_t information_nonzeros = 0, factor_nonzeros = 0;
   bool interrupted = false;
+  bool converged = true;  ///< the estimate at the end
 };
 
 /// What all runs over the same data share. Everything referred to must outlive the runs.

@@ -81,8 +81,8 @@ class CAIRN_API PosePolicy : public Component {
   /// Called before the first pose if what follows is a recording, for policies that need it as a
   /// whole; does nothing unless a policy overrides it.
   virtual void expect(const Graph& recording, std::span<const Arrival> poses);
-  /// Called before the first pose with false if nobody will ask for `chains`: a policy that keeps
-  /// them needs memory for every pose that ever was. Does nothing unless a policy overrides it.
+  /// Called before the first pose with false if `chains` will not be read: a policy that keeps them
+  /// needs memory for every pose that ever was. Does nothing unless a policy overrides it.
   virtual void keep_chains(bool keep);
   /// The next pose, with its odometry from the previous pose (several factors are fused; none for
   /// the first pose). A pose marked as fixed is kept. Throws `Error` (input) if there is no
@@ -96,8 +96,8 @@ class CAIRN_API PosePolicy : public Component {
   /// Ends the pose: decides whether to keep it.
   virtual PoseReport end_pose() = 0;
   /// Ends the trajectory: the newest pose is kept in any case, and everything is solved to
-  /// convergence.
-  virtual void finish() = 0;
+  /// convergence. False if it has not converged.
+  virtual bool finish() = 0;
 
   /// The compact graph's estimate, good until the next call. Only to be read, which changes no
   /// later result, but for `set_loss` before the first pose.
@@ -133,8 +133,9 @@ class CAIRN_API OptionFinder {
 };
 
 /// Feeds the first poses of a recording to a policy, matching by `registration`. `each` is called
-/// for every pose, and stops the run by returning false. The policy is finished at the end.
-CAIRN_API void run_policy(const Graph& recording, std::span<const Arrival> poses,
+/// for every pose, and stops the run by returning false. The policy is finished at the end; false if
+/// it has not converged.
+CAIRN_API bool run_policy(const Graph& recording, std::span<const Arrival> poses,
                           PosePolicy& policy, Registration& registration,
                           const std::function<bool(const PoseReport&)>& each = {});
 
