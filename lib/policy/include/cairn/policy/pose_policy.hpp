@@ -133,8 +133,8 @@ class CAIRN_API OptionFinder {
 };
 
 /// Feeds the first poses of a recording to a policy, matching by `registration`. `each` is called
-/// for every pose, and stops the run by returning false. The policy is finished at the end; false if
-/// it has not converged.
+/// for every pose, and stops the run by returning false. The policy is finished at the end; false
+/// if it has not converged.
 CAIRN_API bool run_policy(const Graph& recording, std::span<const Arrival> poses,
                           PosePolicy& policy, Registration& registration,
                           const std::function<bool(const PoseReport&)>& each = {});
