@@ -303,11 +303,11 @@ bool CompactPose::agrees_with_waiting(const Link& link) {
 /// options expect; and must cost little of what is known of the way that ends here: where loop
 /// closures are not better than odometry, the loss would add up. The more poses are kept nearby,
 /// the less each way matters, and the more is gained by not keeping another.
-std::optional<Division> CompactPose::relocation(const Link& link) const {
+std::optional<double> CompactPose::relocation(const Link& link) const {
   if (!options_.reuse || !(pose_gain_ > 0.0)) return std::nullopt;  // or every pose is to be kept
   const double n = graph_.group().tangent_size();
-  const Division division = divide_match(graph_.newest_odometry(), link.covariance);
-  const Matrix rest = link.covariance / (1.0 - division.way);
+  const double of_way = part_of_way(graph_.newest_odometry(), link.covariance);
+  const Matrix rest = link.covariance / (1.0 - of_way);
   // Three matches in one are as good as any; a lower g_pose must not keep poses of one place for
   // ever.
   const double enough = std::max(pose_gain_, 0.5 * n * std::log(4.0));
@@ -315,14 +315,14 @@ std::optional<Division> CompactPose::relocation(const Link& link) const {
   const Matrix end = graph_.newest_odometry() + link.covariance;
   const double lost = mutual_information(end, link.covariance);
   if (lost > options_.reuse_loss * report_.candidates * n) return std::nullopt;
-  return division;
+  return of_way;
 }
 
 void CompactPose::use(const Link& link) {
   const bool of_newest = link.later == graph_.size() && !graph_.newest_kept();
-  const std::optional<Division> division = of_newest ? relocation(link) : std::nullopt;
-  if (division) {
-    graph_.relocate(link.earlier, link.motion, division->way, report_.seconds);
+  const std::optional<double> of_way = of_newest ? relocation(link) : std::nullopt;
+  if (of_way) {
+    graph_.relocate(link.earlier, link.motion, *of_way, report_.seconds);
   } else {
     graph_.link(link.factors, report_.seconds);
   }

@@ -75,7 +75,8 @@ class CompactPose final : public PosePolicy, public OptionFinder {
   Displacement known_displacement(int pose);
   std::optional<Candidate> take_candidate(int pose);
   double expected_gain(int pose);
-  std::optional<Division> relocation(const Link& link) const;
+  /// The part of the match that ends the way, if the newest pose is to be relocated by this link.
+  std::optional<double> relocation(const Link& link) const;
   void use(const Link& link);
   LinkVerdict judge(const Link& link, LinkReport& report);
   void judge_waiting();

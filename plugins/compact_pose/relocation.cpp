@@ -8,7 +8,7 @@
 
 namespace cairn::compact {
 
-Division divide_match(const Matrix& way, const Matrix& match) {
+double part_of_way(const Matrix& way, const Matrix& match) {
   // In coordinates in which Σ_y is the identity and W diagonal, with entries λ:
   // lost(w) = ½ Σ ln((λ + 1/w) / (λ + 1)) − n/2 ln(1 − w).
   const Eigen::MatrixXd L = Eigen::MatrixXd(match).llt().matrixL();
@@ -28,9 +28,7 @@ Division divide_match(const Matrix& way, const Matrix& match) {
     const double middle = 0.5 * (low + high);
     (slope(middle) < 0.0 ? low : high) = middle;
   }
-  const double w = high;
-  return {.way = w,
-          .lost = 0.5 * (((lambda + 1.0 / w) / (lambda + 1.0)).log().sum() - n * std::log1p(-w))};
+  return high;
 }
 
 }  // namespace cairn::compact

@@ -6,19 +6,15 @@
 namespace cairn::compact {
 
 /// How the information Σ_y⁻¹ of a match is divided between two uses that are treated as
-/// independent: the part w ends the way that led here, 1 − w begins the next.
-struct Division {
-  double way = 0.5;   ///< w, more than 0 and at most ½
-  double lost = 0.0;  ///< by the two together, beside a match that both could use whole [nats]
-};
-
-/// The division that loses least. With the covariance W of the way, a link by way and match has W +
-/// Σ_y / w instead of W + Σ_y, and the next way begins with Σ_y / (1 − w) instead of Σ_y:
+/// independent: the part w, which is returned, ends the way that led here, 1 − w begins the next.
+/// With the covariance W of the way, a link by way and match has W + Σ_y / w instead of W + Σ_y,
+/// and the next way begins with Σ_y / (1 − w) instead of Σ_y. w loses least by the two together
+/// [nats],
 ///
-///     lost(w) = ½ ln(|W + Σ_y / w| / |W + Σ_y|) − n/2 ln(1 − w)
+///     lost(w) = ½ ln(|W + Σ_y / w| / |W + Σ_y|) − n/2 ln(1 − w),
 ///
-/// Where the way is short (W → 0) it is in halves, and n ln 2 is lost. The larger W is beside Σ_y,
-/// the less of the match the way needs: w → 0, and nothing is lost.
-Division divide_match(const Matrix& way, const Matrix& match);
+/// and is more than 0 and at most ½: half where the way is short (W → 0), and the smaller the
+/// larger W is beside Σ_y. `way` and `match` are covariances, n × n, of one tangent space.
+double part_of_way(const Matrix& way, const Matrix& match);
 
 }  // namespace cairn::compact

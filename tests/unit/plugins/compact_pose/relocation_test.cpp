@@ -27,36 +27,34 @@ MatrixXd any_covariance(test::Draw& draw, int n) {
   return root * root.transpose() + 0.01 * MatrixXd::Identity(n, n);
 }
 
-TEST(DivideMatch, LosesLeastOfAllDivisions) {
+TEST(PartOfWay, LosesLeastOfAllDivisions) {
   test::Draw draw(7);
   for (const int n : {3, 6}) {
     for (int trial = 0; trial < 50; ++trial) {
       const MatrixXd way = std::pow(10.0, draw.uniform(-4.0, 4.0)) * any_covariance(draw, n),
                      match = any_covariance(draw, n);
-      const Division division = divide_match(way, match);
-      EXPECT_NEAR(division.lost, lost(division.way, way, match), 1e-9 * n);
+      const double least = lost(part_of_way(way, match), way, match);
       for (double w = 0.001; w < 1.0; w += 0.001)
-        EXPECT_LE(division.lost, lost(w, way, match) + 1e-12) << w;
+        EXPECT_LE(least, lost(w, way, match) + 1e-9 * n) << w;
     }
   }
 }
 
-TEST(DivideMatch, IsInHalvesWhereTheWayIsKnownExactly) {
-  const Division division = divide_match(MatrixXd::Zero(3, 3), MatrixXd::Identity(3, 3));
-  EXPECT_NEAR(division.way, 0.5, 1e-12);
-  EXPECT_NEAR(division.lost, 3.0 * std::log(2.0), 1e-12);
+TEST(PartOfWay, IsInHalvesWhereTheWayIsKnownExactly) {
+  EXPECT_NEAR(part_of_way(MatrixXd::Zero(3, 3), MatrixXd::Identity(3, 3)), 0.5, 1e-12);
 }
 
 /// λ = 1 in every direction: w² + 2 w = 1.
-TEST(DivideMatch, IsKnownWhereTheWayIsAsUncertainAsTheMatch) {
+TEST(PartOfWay, IsKnownWhereTheWayIsAsUncertainAsTheMatch) {
   const MatrixXd same = 0.3 * MatrixXd::Identity(6, 6);
-  EXPECT_NEAR(divide_match(same, same).way, std::sqrt(2.0) - 1.0, 1e-12);
+  EXPECT_NEAR(part_of_way(same, same), std::sqrt(2.0) - 1.0, 1e-12);
 }
 
-TEST(DivideMatch, GivesLittleToAVeryUncertainWay) {
-  const Division division = divide_match(1e8 * MatrixXd::Identity(3, 3), MatrixXd::Identity(3, 3));
-  EXPECT_NEAR(division.way, 1e-4, 1e-6);
-  EXPECT_LT(division.lost, 1e-3);
+TEST(PartOfWay, GivesLittleToAVeryUncertainWay) {
+  const MatrixXd way = 1e8 * MatrixXd::Identity(3, 3), match = MatrixXd::Identity(3, 3);
+  const double w = part_of_way(way, match);
+  EXPECT_NEAR(w, 1e-4, 1e-6);
+  EXPECT_LT(lost(w, way, match), 1e-3);
 }
 
 }  // namespace

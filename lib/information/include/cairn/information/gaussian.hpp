@@ -54,8 +54,8 @@ CAIRN_API double conditional_entropy(const MatrixView& joint, int size_a);
 ///
 /// It is computed as −½ ln |I − W Wᵀ| with W = L_a⁻¹ Σ_ab L_b⁻ᵀ, whose singular values are the
 /// canonical correlations of a and b: a small one keeps its digits. Zero where one of the two has
-/// no coordinates; infinity where the joint matrix is singular to working precision, so that one of
-/// the two determines a part of the other. A marginal that is singular is an `Error` (numerical).
+/// no coordinates; where one of the two determines a part of the other, infinity if rounding shows
+/// it, else a large number. A marginal that is singular is an `Error` (numerical).
 CAIRN_API double mutual_information(const MatrixView& joint, int size_a);
 
 /// ½ ln |I + R⁻¹ S| = ½ ln(|R + S| / |R|): the information gain of measuring, with a noise of
