@@ -74,6 +74,7 @@ Mission::Mission(const Place& place, std::uint64_t seed, Tally& tally)
   ++tally_.missions;
   reference_.start();
   session_.restore();
+  drive(2);  // a graph without a measurement is not written: the session would end with code 3
 }
 
 std::vector<std::string> Mission::poses(std::uint64_t count) {
