@@ -183,6 +183,11 @@ Argument ArgumentParser::add_option(const std::string& names, std::optional<doub
   return Argument(*app_->add_option(names, value, help));
 }
 
+Argument ArgumentParser::add_option(const std::string& names, std::optional<std::int64_t>& value,
+                                    const std::string& help) {
+  return Argument(*app_->add_option(names, value, help));
+}
+
 void ArgumentParser::add_flag(const std::string& names, bool& value, const std::string& help) {
   app_->add_flag(names, value, help);
 }

@@ -78,6 +78,8 @@ class ArgumentParser {
   Argument add_option(const std::string& names, std::uint64_t& value, const std::string& help);
   Argument add_option(const std::string& names, std::optional<double>& value,
                       const std::string& help);
+  Argument add_option(const std::string& names, std::optional<std::int64_t>& value,
+                      const std::string& help);
   /// An option without a value.
   void add_flag(const std::string& names, bool& value, const std::string& help);
 

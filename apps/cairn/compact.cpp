@@ -34,13 +34,17 @@ namespace {
 struct Recording {
   std::string name;
   PolicyData data;
+  std::optional<Graph> map;  ///< that the trajectory continues
 };
 
 Recording load_recording(const CompactOptions& options, Session& session) {
   LoadedGraph loaded = load_graph(options.graph, options.input, session);
   if (!options.truth.empty())
     loaded.truth = load_ground_truth(options.truth, options.input, session).graph;
-  return {loaded.name, policy_data(std::move(loaded.graph), std::move(loaded.truth))};
+  std::optional<Graph> map;
+  if (!options.map.empty()) map = load_graph(options.map, options.input, session).graph;
+  return {loaded.name, policy_data(std::move(loaded.graph), std::move(loaded.truth), options.begin),
+          std::move(map)};
 }
 
 /// Shows how far a run is.
@@ -172,7 +176,7 @@ void note_size(const CompactOptions& options, const CompactOutcome& outcome,
                const Session& session) {
   const PolicyResult& result = outcome.result;
   const auto in = static_cast<double>(std::ssize(result.poses));
-  const double kept = result.compact.variable_count() / in;
+  const double kept = (result.compact.variable_count() - result.map_poses) / in;
   if (options.strategy != "fpfl" || result.interrupted || in < 10.0 || kept < kNotCompact) return;
   session.note(fmt::format(
       "{:.0f} % of the poses are kept: each step of odometry gains more than pose_gain. A larger "
@@ -214,6 +218,7 @@ int run_compact(const CompactOptions& options, Session& session) {
     comparison.emplace(recording.data, registry.make<Estimator>("incremental_cholesky"));
   const auto run_job = [&](const PolicyJob& chosen, UncertaintyComparison* compare) {
     PolicyRun run(chosen, setting);
+    if (recording.map) run.load(*recording.map);
     run.run(recording.data.poses.size(), chosen.policy.name, [&](std::size_t index) {
       if (compare) compare->add(index, run.policy());
     });
@@ -255,6 +260,13 @@ int run_compact(const CompactOptions& options, Session& session) {
   results.add([&] { session.print(summary_text(options, outcome)); });
   results.finish();
   if (guard.interrupted()) return kExitInterrupted;
+  if (!shown.located) {
+    session.note(fmt::format(
+        "no pose was matched with one of {}: the map and the trajectory are not connected, and "
+        "their relative position is unknown",
+        options.map));
+    return static_cast<int>(ErrorCode::numerical);
+  }
   if (shown.converged) return 0;
   session.note("the estimate of what was kept has not converged");
   return static_cast<int>(ErrorCode::numerical);
@@ -267,6 +279,12 @@ void add_compact_options(ArgumentParser cli, CompactOptions& options,
   cli.add_option("--to", options.output_format, "format of OUT").type_name("FORMAT");
   cli.add_option("--trajectory", options.trajectory, "write all poses, those left out put back")
       .type_name("FILE");
+  cli.add_option("--map", options.map,
+                 "continue this map of an earlier session; where on it is unknown at first")
+      .type_name("MAP");
+  cli.add_option("--begin", options.begin,
+                 "begin at the pose with this id; those before are of earlier sessions")
+      .type_name("ID");
   cli.add_option("--recovery", options.recovery,
                  "v0 evenly, v1 by distance, v2 along odometry, or likely")
       .type_name("HOW")
@@ -320,6 +338,7 @@ Command add_compact(ArgumentParser program) {
   cli.footer(
       "Example:\n"
       "  cairn compact my.g2o -o compact.g2o --trajectory full.g2o --json report.json\n"
+      "  cairn compact tuesday.g2o --map monday.g2o -o both.g2o --thresholds robot.json\n"
       "  cairn compact city.g2o --strategy apal --thresholds city.json --truth truth.g2o");
   return {cli, [options](Session& session) { return run_compact(*options, session); }};
 }

@@ -22,6 +22,8 @@ struct CompactOptions {
   std::string strategy = "fpfl";
   std::string estimator;
   std::string registration = "recorded";
+  std::string map;          ///< of an earlier session
+  std::optional<Id> begin;  ///< the pose at which the trajectory begins
   std::string truth;
   bool automatic = false;
   double sample = 0.6;

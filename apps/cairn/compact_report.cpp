@@ -57,7 +57,9 @@ std::vector<double> step_seconds(const PolicyResult& result) {
 json::object result_json(const PolicyResult& result, const PolicyData& data) {
   json::object report;
   report["policy"] = result.policy;
-  report["poses"] = {{"in", result.poses.size()}, {"kept", result.compact.variable_count()}};
+  report["poses"] = {{"in", result.poses.size()},
+                     {"kept", result.compact.variable_count() - result.map_poses},
+                     {"map", result.map_poses}};
   report["loops"] = {{"in", data.loops},
                      {"proposed", result.proposed},
                      {"registered", result.registered},
@@ -106,8 +108,11 @@ std::string errors_text(const TrajectoryError& e) {
 void add_result(Table& table, const PolicyResult& result, const PolicyData& data,
                 const FoundThresholds& found) {
   const auto in = static_cast<std::int64_t>(std::ssize(result.poses));
-  table.add({"poses", fmt::format("{} of {} kept ({})", result.compact.variable_count(), in,
-                                  percent(result.compact.variable_count(), in))});
+  const std::int64_t kept = result.compact.variable_count() - result.map_poses;
+  table.add(
+      {"poses",
+       fmt::format("{} of {} kept ({})", kept, in, percent(kept, in)) +
+           (result.map_poses > 0 ? fmt::format(", beside {} of the map", result.map_poses) : "")});
   table.add({"loops", fmt::format("{} kept ({} of {} recorded); {} pairs matched, {} of them well",
                                   result.kept_loops, percent(result.kept_loops, data.loops),
                                   data.loops, result.proposed, result.registered)});
@@ -154,6 +159,8 @@ json::object report_json(const CompactOptions& options, const CompactOutcome& ou
   for (auto& [name, value] : result_json(outcome.shown(), outcome.data)) report[name] = value;
   if (outcome.control) report["like"] = result_json(outcome.result, outcome.data);
   report["recovery"] = options.recovery;
+  report["map"] = text_json(options.map);
+  report["located"] = outcome.result.located;
   report["truth"] = text_json(options.truth);
   report["output"] = text_json(options.output);
   report["trajectory"] = text_json(options.trajectory);

@@ -5,8 +5,10 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <span>
 
 #include <fmt/core.h>
+#include <boost/crc.hpp>
 
 #include "arguments.hpp"
 #include "cairn/io/format.hpp"
@@ -29,6 +31,7 @@
 #include "line_input.hpp"
 #include "problem_setup.hpp"
 #include "table.hpp"
+#include "threshold_files.hpp"
 
 namespace cairn::app {
 namespace {
@@ -38,8 +41,10 @@ namespace json = boost::json;
 constexpr const char* kDefaultEstimator = "incremental_cholesky";
 
 struct OnlineOptions {
-  std::string estimator;  ///< empty: the default, or the policy's own
-  std::string policy;     ///< empty: everything is taken in
+  std::string estimator;   ///< empty: the default, or the policy's own
+  std::string thresholds;  ///< a file with the policy's options; empty: none
+  std::string map;         ///< that a policy's poses continue; empty: none
+  std::string policy;      ///< empty: everything is taken in
   InputOptions input;
   std::string solve = "auto";
   std::string estimates = "last";
@@ -62,6 +67,26 @@ std::string identity(const OnlineOptions& options, const std::string& who, const
                      options.input.read.repair_information ? " with repairs" : "",
                      options.problem.loss.empty() ? "none" : options.problem.loss,
                      options.problem.loss_on, options.solve);
+}
+
+/// CRC-32 of a map's numbers: a journal is of the session that continued this map.
+std::uint32_t fingerprint(const Graph& map) {
+  boost::crc_32_type crc;
+  const auto add = [&](std::span<const double> numbers) {
+    crc.process_bytes(numbers.data(), numbers.size_bytes());
+  };
+  for (int v = 0; v < map.variable_count(); ++v) {
+    const Id id = map.id(v);
+    crc.process_bytes(&id, sizeof id);
+    add(map.state(v));
+  }
+  for (int f = 0; f < map.factor_count(); ++f) {
+    const auto on = map.factor_variables(f);
+    crc.process_bytes(on.data(), on.size_bytes());
+    add(map.measurement(f));
+    add(map.information(f));
+  }
+  return crc.checksum();
 }
 
 Journal::Sync sync_of(const std::string& name) {
@@ -132,6 +157,10 @@ Listener follow_policy(const OnlineOptions& options, const ProblemSetup& setup, 
   ComponentSpec spec = parse_component(options.policy);
   if (!options.estimator.empty() && !spec.values.emplace("estimator", options.estimator).second)
     throw Error(ErrorCode::usage, "--estimator, and one among the policy's options: give one");
+  if (!options.thresholds.empty()) {
+    for (const auto& [name, value] : read_thresholds(options.thresholds, spec.name))
+      spec.values.emplace(name, value);
+  }
   Listener listener;
   listener.name = fmt::format("policy '{}'", options.policy);
   // What is written at the end of a pose is read before, which may cost the last bits their place.
@@ -142,10 +171,16 @@ Listener follow_policy(const OnlineOptions& options, const ProblemSetup& setup, 
   listener.format = registry.make<StreamFormat>(options.input.format);
   listener.policy = registry.make<PosePolicy>(spec);
   listener.policy->estimator().set_loss(setup.loss(), setup.loss_selector());
-  listener.lines = std::make_unique<PolicySession>(
+  auto lines = std::make_unique<PolicySession>(
       *listener.policy, *listener.format, registry,
       PolicySettings{options.input.read, options.estimates, options.marginals,
                      !options.trajectory.empty()});
+  if (!options.map.empty()) {
+    const Graph map = load_graph(options.map, options.input, session).graph;
+    lines->load(map);
+    listener.identity += fmt::format(", map {:08x}", fingerprint(map));
+  }
+  listener.lines = std::move(lines);
   return listener;
 }
 
@@ -157,6 +192,14 @@ void check(const OnlineOptions& options, Session& session) {
     throw Error(ErrorCode::usage,
                 "a policy solves when it has to: --solve explicit and --budget are for runs "
                 "without --policy");
+  }
+  if (!options.thresholds.empty() && options.policy.empty())
+    throw Error(ErrorCode::usage, "--thresholds are those of a policy: give --policy");
+  session.files.add_input(options.thresholds);
+  if (!options.map.empty() && options.policy.empty()) {
+    throw Error(ErrorCode::usage,
+                "--map is continued by a policy: give --policy; without one, send the lines of the "
+                "map first");
   }
   if (options.trajectory == "-")
     throw Error(ErrorCode::usage, "--trajectory writes a file; standard output is for answers");
@@ -284,6 +327,12 @@ Command add_online(ArgumentParser program) {
   cli.add_option("--policy", options->policy,
                  "decides which poses are kept, such as compact_pose; default: all are")
       .type_name("NAME");
+  cli.add_option("--thresholds", options->thresholds,
+                 "with --policy, take its thresholds from a file (cairn compact --save-thresholds)")
+      .type_name("FILE");
+  cli.add_option("--map", options->map,
+                 "with --policy, continue this map; where on it is unknown at first")
+      .type_name("MAP");
   cli.add_option("--solve", options->solve, "auto, after every measurement, or explicit: by SOLVE")
       .type_name("WHEN")
       .one_of({"auto", "explicit"})

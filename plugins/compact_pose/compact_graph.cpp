@@ -3,11 +3,13 @@
 
 #include <algorithm>
 #include <chrono>
+#include <numeric>
 #include <string>
 #include <utility>
 
 #include <fmt/core.h>
 
+#include "cairn/graph/gauge.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/timed.hpp"
 
@@ -25,10 +27,44 @@ CompactGraph::CompactGraph(std::unique_ptr<Estimator> estimator, CompositionOrde
   estimator_->keep_marginals(KeptMarginals::diagonal);
 }
 
+void CompactGraph::load(const Graph& map) {
+  if (map.variable_count() == 0) refuse("the map is empty: it has no poses to continue from");
+  for (int v = 0; v < map.variable_count(); ++v) {
+    if (map.pool(v) != map.pool(0)) {
+      refuse(fmt::format("the map has {} and {}; a map that is continued has poses of one type",
+                         map.describe_variable(0), map.describe_variable(v)));
+    }
+  }
+  if (const int parts = resolve_gauge(map).components; parts != 1) {
+    refuse(
+        fmt::format("the map has {} parts without a measurement between them; expected one, "
+                    "since nothing is known of their relative position",
+                    parts));
+  }
+  auto group = std::make_unique<RigidGroup>(map.variable_pools().front().type);
+  std::vector<int> order(static_cast<std::size_t>(map.variable_count()));
+  std::iota(order.begin(), order.end(), 0);
+  std::ranges::sort(order, {}, [&](int v) { return map.id(v); });
+  GraphUpdate update;
+  for (const int v : order) update.variables.push_back(map.variable(v));
+  for (int f = 0; f < map.factor_count(); ++f) update.factors.push_back(map.factor(f));
+  estimator_->update(update, {.full = true});
+  group_ = std::move(group);
+  index_ = std::make_unique<PoseIndex>(group_->dimension());
+  for (const int v : order) {
+    number_.emplace(map.id(v), size());
+    kept_.push_back({.id = map.id(v)});
+    index_->add(group_->place(group_->state(estimator_->state(map.id(v)))).at.t);
+  }
+  map_size_ = solved_ = size();
+  located_ = false;
+}
+
 void CompactGraph::start(const Variable& pose, PolicySeconds& seconds) {
   const auto begin = Clock::now();
   auto group = std::make_unique<RigidGroup>(pose.type);
   Variable first = pose;
+  if (!located_) first.fixed = false;  // where it is held is not known
   if (first.state.empty()) {
     first.state.resize(static_cast<std::size_t>(pose.type->ambient_size()));
     pose.type->identity(first.state.data());
@@ -36,15 +72,17 @@ void CompactGraph::start(const Variable& pose, PolicySeconds& seconds) {
   GraphUpdate update;
   update.variables.push_back(first);
   estimator_->update(update);
-  group_ = std::move(group);
-  index_ = std::make_unique<PoseIndex>(group_->dimension());
+  if (!group_) {
+    group_ = std::move(group);
+    index_ = std::make_unique<PoseIndex>(group_->dimension());
+  }
   newest_ = {};
   newest_.pose = first;
   newest_.kept = true;
+  anchor_ = size();
+  number_.emplace(pose.id, size());
   kept_.push_back({.id = pose.id});
-  solved_ = 1;
-  anchor_ = 0;
-  number_.emplace(pose.id, 0);
+  solved_ = size();
   index_->add(group_->place(group_->state(first.state)).at.t);
   refresh();
   seconds.estimate += seconds_since(begin);
@@ -127,6 +165,39 @@ void CompactGraph::end_chain(Id from, Id to) {
 void CompactGraph::link(std::span<const Factor> links, PolicySeconds& seconds) {
   keep(seconds);
   update(links, seconds);
+}
+
+void CompactGraph::locate(int pose, const State& measured, std::span<const Factor> links,
+                          PolicySeconds& seconds) {
+  keep(seconds);
+  update({}, seconds);  // now the estimator has everything
+  const auto begin = Clock::now();
+  const State move = group_->compose(group_->compose(kept_[pose].placed.x, measured),
+                                     group_->inverse(kept_.back().placed.x));
+  GraphUpdate leaving, coming;
+  for (int k = map_size_; k < size(); ++k) {
+    const State moved = group_->compose(move, kept_[k].placed.x);
+    const auto state = group_->view(moved);
+    leaving.removed_variables.push_back(kept_[k].id);
+    coming.variables.push_back({.type = estimator_->type(kept_[k].id),
+                                .id = kept_[k].id,
+                                .state = {state.begin(), state.end()}});
+  }
+  std::unordered_map<FactorId, FactorId> place;  // in `coming`
+  for (const FactorId id : estimator_->factors()) {
+    Factor factor = estimator_->factor(id);
+    if (find(factor.variables.front()) < map_size_) continue;
+    place.emplace(id, std::ssize(coming.factors));
+    coming.factors.push_back(std::move(factor));
+  }
+  coming.factors.insert(coming.factors.end(), links.begin(), links.end());
+  estimator_->update(leaving, {.defer = true});
+  const UpdateReport report = estimator_->update(coming);
+  copy_.reset();
+  for (auto& [ends, bridge] : bridges_) bridge.factor = report.first_factor + place[bridge.factor];
+  located_ = true;
+  refresh();
+  seconds.estimate += seconds_since(begin);
 }
 
 void CompactGraph::relocate(int pose, const Motion& measured, double of_way,
@@ -263,6 +334,7 @@ int CompactGraph::factor_count() const { return estimator_->factor_count() + (si
 std::vector<int> CompactGraph::near(double radius) {
   std::vector<int> found = index_->near(newest_.placed.at.t, radius);
   if (newest_.kept) std::erase(found, size() - 1);
+  if (!located_) std::erase_if(found, [&](int pose) { return pose < map_size_; });
   return found;
 }
 

@@ -37,10 +37,26 @@ class CompactGraph {
   /// With everything that is kept: the estimator, or while it does not have all odometry yet, a
   /// copy that has. Good until the graph changes; reading it changes no later result.
   Estimator& estimator();
-  bool empty() const { return kept_.empty(); }
+  /// Whether the trajectory has not begun.
+  bool empty() const { return size() == map_size_; }
   const RigidGroup& group() const { return *group_; }
 
-  /// The first pose of all.
+  /// Before the first pose: the poses and factors of an earlier session's map. Throws `Error`
+  /// (input) if it is not one connected graph of poses.
+  void load(const Graph& map);
+  /// Whether it is known where the trajectory is on the map; true if there is none. Until then the
+  /// two are separate components, and nothing is known of a displacement between them.
+  bool located() const { return located_; }
+  /// Poses below this number are those of the map.
+  int map_size() const { return map_size_; }
+  /// Whether something is known of the displacement between two kept poses.
+  bool connected(int a, int b) const { return located_ || (a < map_size_) == (b < map_size_); }
+  /// The newest pose, matched with a pose of the map, `measured` from there: moves the whole
+  /// trajectory to its place on the map, x_k ← x_pose z x_n⁻¹ x_k, and adds the links.
+  void locate(int pose, const State& measured, std::span<const Factor> links,
+              PolicySeconds& seconds);
+
+  /// The first pose of the trajectory.
   void start(const Variable& pose, PolicySeconds& seconds);
   /// All measurements of the relative pose of two poses, fused. Throws `Error` (input) if one of
   /// them measures something else.
@@ -83,7 +99,8 @@ class CompactGraph {
   int factor_count() const;
   /// The number of a kept pose; -1: it is not there.
   int find(Id id) const;
-  /// Kept poses within a distance [m] of the newest, itself not among them.
+  /// Kept poses within a distance [m] of the newest, itself not among them, nor the map while the
+  /// trajectory's place on it is unknown.
   std::vector<int> near(double radius);
 
   /// Rises whenever the estimate and its covariances change.
@@ -154,6 +171,8 @@ class CompactGraph {
   std::unique_ptr<RigidGroup> group_;
   std::unique_ptr<PoseIndex> index_;
   std::vector<Kept> kept_;
+  int map_size_ = 0;
+  bool located_ = true;
   int solved_ = 0;   ///< so many of them has the estimator
   int anchor_ = -1;  ///< one of those: where the chain of the newest pose and those since the last
                      ///< update starts

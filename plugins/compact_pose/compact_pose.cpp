@@ -81,6 +81,19 @@ void CompactPose::start(const Variable& pose) {
   pose_gain_ = threshold(options_.strategy != Strategy::fpfl, options_.pose_gain, 1.7);
 }
 
+void CompactPose::load(const Graph& map) {
+  if (!graph_.empty() || graph_.size() > 0)
+    throw Error(ErrorCode::usage, "load after the first pose, or a second map");
+  graph_.load(map);
+}
+
+std::vector<Id> CompactPose::unlocated() const {
+  if (graph_.located()) return {};
+  std::vector<Id> poses = graph_.kept();
+  poses.resize(static_cast<std::size_t>(graph_.map_size()));
+  return poses;
+}
+
 void CompactPose::add_pose(const Variable& pose, std::span<const Factor> odometry) {
   if (open_) throw Error(ErrorCode::usage, "add_pose before the pose before it was ended");
   PoseReport report;
@@ -88,15 +101,16 @@ void CompactPose::add_pose(const Variable& pose, std::span<const Factor> odometr
   if (graph_.empty()) {
     if (!odometry.empty())
       refuse(fmt::format("pose {} is the first, and moved from another", pose.id));
+    if (graph_.size() > 0) check_new(pose);
     std::swap(report_, report);
     start(pose);
   } else {
-    if (pose.type->tag() != graph_.group().motions().type().tag()) {
-      refuse(fmt::format("pose {} is a {}; the poses before it are {}", pose.id, pose.type->tag(),
-                         graph_.group().motions().type().tag()));
+    check_new(pose);
+    if (pose.id == graph_.newest_id()) refuse(fmt::format("pose {} is there already", pose.id));
+    if (pose.fixed && !graph_.located()) {
+      refuse(fmt::format("pose {} is held, while it is unknown where the trajectory is on the map",
+                         pose.id));
     }
-    if (graph_.find(pose.id) >= 0 || pose.id == graph_.newest_id())
-      refuse(fmt::format("pose {} is there already", pose.id));
     if (odometry.empty())
       refuse(
           fmt::format("pose {} comes without odometry from pose {}", pose.id, graph_.newest_id()));
@@ -111,6 +125,14 @@ void CompactPose::add_pose(const Variable& pose, std::span<const Factor> odometr
   searched_ = false;
   candidates_.clear();
   dimensions_.clear();
+}
+
+void CompactPose::check_new(const Variable& pose) const {
+  if (pose.type->tag() != graph_.group().motions().type().tag()) {
+    refuse(fmt::format("pose {} is a {}; the poses before it are {}", pose.id, pose.type->tag(),
+                       graph_.group().motions().type().tag()));
+  }
+  if (graph_.find(pose.id) >= 0) refuse(fmt::format("pose {} is there already", pose.id));
 }
 
 /// Σ̄_y of this pose. What the options do not say is learnt; the first match is expected to be like
@@ -272,6 +294,10 @@ LinkReport CompactPose::offer(Id other, std::span<const Factor> measured) {
 
 /// Lines 22 and 23 of Algorithm 1, and whether the link fits.
 LinkVerdict CompactPose::judge(const Link& link, LinkReport& report) {
+  if (!graph_.connected(link.earlier, link.later)) {  // nothing is known that it could contradict
+    report.gain = kInfinity;
+    return check_->on() && !agrees_with_waiting(link) ? LinkVerdict::waiting : LinkVerdict::linked;
+  }
   const Displacement d = known_displacement(link.earlier);
   report.gain = mutual_information(link.covariance, d.covariance);
   const Fit fit = check_->fit(link, d);
@@ -287,6 +313,7 @@ bool CompactPose::agrees_with_waiting(const Link& link) {
     const Link& other = waiting_[k].link;
     const bool kept = link.later < graph_.size();
     if (other.earlier == link.earlier && other.later == link.later) continue;
+    if (!graph_.connected(other.earlier, link.earlier)) continue;
     // Before it is kept, the newest pose is known by its displacement only.
     const Displacement later =
         kept ? graph_.between(other.later, link.later) : known_displacement(other.later);
@@ -319,6 +346,17 @@ std::optional<double> CompactPose::relocation(const Link& link) const {
 }
 
 void CompactPose::use(const Link& link) {
+  if (!graph_.connected(link.earlier, link.later)) {
+    graph_.locate(link.earlier, link.mean, link.factors, report_.seconds);
+    // The poses of the map are candidates from now on.
+    searched_ = false;
+    candidates_.clear();
+    dimensions_.clear();
+    report_.candidates = 0;
+    report_.least_gain = kInfinity;
+    report_.closed_loop = true;
+    return;
+  }
   const bool of_newest = link.later == graph_.size() && !graph_.newest_kept();
   const std::optional<double> of_way = of_newest ? relocation(link) : std::nullopt;
   if (of_way) {
@@ -334,6 +372,7 @@ void CompactPose::judge_waiting() {
   for (bool again = true; std::exchange(again, false);) {
     for (std::size_t k = 0; k < waiting_.size() && !again; ++k) {
       Waiting& old = waiting_[k];
+      if (!graph_.connected(old.link.earlier, old.link.later)) continue;
       const Displacement d = graph_.between(old.link.earlier, old.link.later);
       const Fit fit = check_->fit(old.link, d);
       old.report.innovation = fit.innovation;

@@ -35,6 +35,8 @@ class CompactPose final : public PosePolicy, public OptionFinder {
  public:
   CompactPose(std::unique_ptr<Estimator> estimator, CompactPoseOptions options);
 
+  void load(const Graph& map) override;
+  std::vector<Id> unlocated() const override;
   void add_pose(const Variable& pose, std::span<const Factor> odometry) override;
   std::optional<MatchProposal> next_match() override;
   LinkReport offer(Id other, std::span<const Factor> measured) override;
@@ -70,6 +72,7 @@ class CompactPose final : public PosePolicy, public OptionFinder {
   };
 
   void start(const Variable& pose);
+  void check_new(const Variable& pose) const;
   void expect_matches();
   void search();
   Displacement known_displacement(int pose);

@@ -135,6 +135,9 @@ class Recorded final : public Registration, public FalseMatches {
     return std::ranges::lower_bound(poses_, pose) - poses_.begin();
   }
 
+  /// A map of an earlier session has poses that this recording does not have.
+  bool was_recorded(Id pose) const { return std::ranges::binary_search(poses_, pose); }
+
   /// Odometry between two poses by their places; nothing where it is interrupted.
   std::optional<Motion> way(std::ptrdiff_t from, std::ptrdiff_t to) const {
     Motion all = group_->identity();
@@ -150,7 +153,7 @@ class Recorded final : public Registration, public FalseMatches {
 
   /// Of the loop closures that may answer, the one that is then known best.
   std::optional<Carried> carry(const Pair& asked) const {
-    if (!carries_) return std::nullopt;
+    if (!carries_ || !was_recorded(asked.first) || !was_recorded(asked.second)) return std::nullopt;
     const std::ptrdiff_t first = place_of(asked.first), second = place_of(asked.second);
     std::optional<Carried> best;
     double least = 0.0;

@@ -182,6 +182,61 @@ TEST_F(Compact, ComparesItsUncertaintyWithThatOfEverything) {
   EXPECT_EQ(static_cast<std::int64_t>(rows.size()) - 1, told.at("compare").at("steps").as_int64());
 }
 
+/// The lines of a g2o file about poses below or from `middle` on; `between` is for measurements
+/// that join the two.
+std::string part_of(const std::string& file, int middle, bool below, bool between) {
+  std::string text;
+  for (const std::string& line : lines(read_text(file))) {
+    std::istringstream words(line);
+    std::string tag;
+    int first = 0, second = 0;
+    words >> tag >> first >> second;
+    const bool edge = tag.starts_with("EDGE");
+    if (!edge) second = first;
+    const bool early = std::max(first, second) < middle, late = std::min(first, second) >= middle;
+    const bool odometry_between = edge && std::abs(first - second) == 1 && !early && !late;
+    if (odometry_between || tag == "FIX") continue;
+    if (early ? below : late ? !below : between) text += line + '\n';
+  }
+  return text;
+}
+
+TEST_F(Compact, ContinuesTheMapOfAnEarlierSession) {
+  const std::string all = folder_.file("all.g2o"), truth = folder_.file("truth.g2o");
+  ASSERT_EQ(cairn({"generate", "manhattan:poses=800,streets=5", "-o", all, "--ground-truth", truth})
+                .exit_code,
+            0);
+  const std::string monday = folder_.file("monday.g2o"), tuesday = folder_.file("tuesday.g2o"),
+                    map = folder_.file("map.g2o"), robot = folder_.file("robot.json"),
+                    both = folder_.file("both.g2o");
+  write_text(monday, part_of(all, 400, true, false));
+  write_text(tuesday, part_of(all, 400, true, true) + part_of(all, 400, false, false));
+  const auto first = report({monday, "-o", map, "--save-thresholds", robot});
+  const auto second = report({tuesday, "--begin", "400", "--map", map, "--thresholds", robot, "-o",
+                              both, "--truth", truth});
+  EXPECT_TRUE(second.at("located").as_bool());
+  EXPECT_EQ(whole(second, "poses", "in"), 400);
+  EXPECT_EQ(whole(second, "poses", "map"), whole(first, "poses", "kept"));
+  const auto one = report({all, "--thresholds", robot, "--truth", truth});
+  EXPECT_LT(ate(second, "likely"), 1.3 * ate(one, "likely") + 0.02);
+  const boost::json::value joint = parse_json(cairn({"info", both, "--json", "-"}).out);
+  EXPECT_EQ(whole(joint, "graph", "variables"),
+            whole(second, "poses", "map") + whole(second, "poses", "kept"));
+  EXPECT_EQ(joint.at("components").as_int64(), 1);
+
+  // Without a measurement between the two.
+  const std::string apart = folder_.file("apart.g2o");
+  write_text(apart, part_of(all, 400, false, false));
+  const Outcome unlocated = cairn({"compact", apart, "--map", map, "--thresholds", robot});
+  EXPECT_EQ(unlocated.exit_code, 4);
+  EXPECT_THAT(unlocated.err, HasSubstr("no pose was matched with one of " + map));
+  const Outcome same = cairn({"compact", monday, "--map", map, "--thresholds", robot});
+  EXPECT_EQ(same.exit_code, 3);
+  EXPECT_THAT(same.err, HasSubstr("is in the map and in the recording"));
+  EXPECT_THAT(cairn({"compact", tuesday, "--begin", "4000", "--range", "3"}).err,
+              HasSubstr("there is no pose 4000"));
+}
+
 TEST_F(Compact, SaysWhatIsWrongAndWhatWouldWork) {
   const auto refused = [](Arguments arguments, int code) {
     arguments.insert(arguments.begin(), "compact");

@@ -28,6 +28,38 @@ Lines questions(long pose) {
   return {};
 }
 
+TEST_F(OnlinePolicy, AJournalIsOfTheMapThatItsSessionContinued) {
+  const std::string map = folder_.file("map.g2o"), other = folder_.file("other.g2o");
+  write_text(map,
+             "VERTEX_SE2 100 5 5 0\nVERTEX_SE2 101 6 5 0\n"
+             "EDGE_SE2 100 101 1 0 0 400 0 0 400 0 400\n");
+  write_text(other,
+             "VERTEX_SE2 100 5 5 0\nVERTEX_SE2 101 6 5 0.1\n"
+             "EDGE_SE2 100 101 1 0 0 400 0 0 400 0 400\n");
+  const auto arguments = [&](const std::string& which) {
+    return online(kPolicy, {"--map", which, "--journal", folder_.file("log")});
+  };
+  const Lines first{"NEW VERTEX_SE2 0", "NEXT", "EDGE_SE2 101 0 0 0 0 400 0 0 400 0 400", "DONE"};
+  const Outcome begun = cairn(arguments(map), {}, joined(first));
+  ASSERT_EQ(begun.exit_code, 0) << begun.err;
+  EXPECT_THAT(begun.out, HasSubstr("LOCATE 0\n"));
+  EXPECT_THAT(begun.out, HasSubstr("LINKED 101 0 inf 0\n"));
+  const Outcome again = cairn(arguments(map), {}, joined({"ESTIMATE 0"}));
+  ASSERT_EQ(again.exit_code, 0) << again.err;
+  EXPECT_THAT(again.out, HasSubstr("VERTEX_SE2 0 6 5 0\n"));
+  EXPECT_EQ(cairn(arguments(other), {}, "").exit_code, 2);
+  EXPECT_EQ(cairn({"online", "--map", map}, {}, "").exit_code, 2);
+}
+
+TEST_F(OnlinePolicy, TakesThresholdsFromAFile) {
+  const std::string robot = folder_.file("robot.json");
+  write_text(robot, R"({"policy": "compact_pose", "options": {"range": "3", "loop_gain": "1e9"}})");
+  const std::string graph = generate("manhattan:poses=100");
+  const Dialogue dialogue = drive(graph, online("compact_pose:angle=1", {"--thresholds", robot}));
+  EXPECT_EQ(dialogue.count("LINKED"), 0);
+  EXPECT_EQ(cairn({"online", "--thresholds", robot}, {}, "").exit_code, 2);
+}
+
 TEST_F(OnlinePolicy, GoesOnWhereTheJournalEnds) {
   const std::string graph = generate("manhattan:poses=200");
   const std::string policy = kPolicy + ",gate=0.9";

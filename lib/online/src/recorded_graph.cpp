@@ -140,11 +140,19 @@ void check_relative(const Graph& graph) {
 
 }  // namespace
 
-std::vector<Arrival> pose_chain(const Graph& graph) {
+std::vector<Arrival> pose_chain(const Graph& graph, std::optional<Id> begin) {
   check_poses(graph);
   check_relative(graph);
   if (graph.variable_count() == 0) return {};
   std::vector<Arrival> chain = arrival_order(graph);
+  if (begin) {
+    const auto first = std::ranges::find(
+        chain, *begin, [&](const Arrival& arrival) { return graph.id(arrival.pose()); });
+    if (first == chain.end())
+      throw bad_input(fmt::format("there is no pose {} at which to begin", *begin));
+    chain.erase(chain.begin(), first);
+    chain.front().odometry.clear();
+  }
   for (std::size_t k = 1; k < chain.size(); ++k) {
     if (!chain[k].odometry.empty()) continue;
     throw bad_input(fmt::format(

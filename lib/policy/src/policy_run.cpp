@@ -42,6 +42,17 @@ class WatchedRegistration final : public Registration {
     if (!factors.empty() && was_false(earlier, later)) ++result_.false_registered;
     return factors;
   }
+  std::optional<RecognisedPlace> recognise(std::span<const Id> places, Id pose) override {
+    const auto begin = Clock::now();
+    std::optional<RecognisedPlace> found =
+        call_plugin([&] { return fmt::format("registration '{}'", name_); },
+                    [&] { return inner_.recognise(places, pose); });
+    result_.registration_seconds += seconds_since(begin);
+    ++result_.proposed;
+    result_.registered += found.has_value();
+    if (found && was_false(found->place, pose)) ++result_.false_registered;
+    return found;
+  }
   void pose_ended(Id pose, bool kept) override { inner_.pose_ended(pose, kept); }
   bool was_false(Id earlier, Id later) const { return false_ && false_->was_false(earlier, later); }
 
@@ -63,15 +74,6 @@ void count_nonzeros(PolicyResult& result, Registry& registry) {
   result.factor_nonzeros = solver->stats().factor_nonzeros;
 }
 
-void evaluate(PosePolicy& policy, const PolicyData& data, PolicyResult& result) {
-  if (!data.truth) return;
-  for (const auto& [how, name] : enum_names(Recovery{})) {
-    result.errors[std::string(name)] =
-        compare(trajectory(recovered_trajectory(policy, how)), *data.truth);
-  }
-  if (data.truth_graph) result.normalized = normalized_error(result.compact, *data.truth_graph);
-}
-
 bool has_all_of(const Graph& truth, const Graph& recording) {
   for (int v = 0; v < recording.variable_count(); ++v) {
     const auto there = truth.find(recording.id(v));
@@ -80,11 +82,21 @@ bool has_all_of(const Graph& truth, const Graph& recording) {
   return true;
 }
 
+void evaluate(PosePolicy& policy, const PolicyData& data, PolicyResult& result) {
+  if (!data.truth) return;
+  for (const auto& [how, name] : enum_names(Recovery{})) {
+    result.errors[std::string(name)] =
+        compare(trajectory(recovered_trajectory(policy, how)), *data.truth);
+  }
+  if (data.truth_graph && has_all_of(*data.truth_graph, result.compact))
+    result.normalized = normalized_error(result.compact, *data.truth_graph);
+}
+
 }  // namespace
 
-PolicyData policy_data(Graph recording, std::optional<Graph> truth) {
+PolicyData policy_data(Graph recording, std::optional<Graph> truth, std::optional<Id> begin) {
   PolicyData data;
-  data.poses = pose_chain(recording);
+  data.poses = pose_chain(recording, begin);
   for (const Arrival& pose : data.poses) data.loops += std::ssize(pose.links);
   if (truth) {
     data.truth = trajectory(*truth);
@@ -111,6 +123,26 @@ PolicyRun::PolicyRun(const PolicyJob& job, const PolicySetting& setting)
   registration_->begin(
       {.recording = &data.recording, .truth = data.truth_graph ? &*data.truth_graph : nullptr});
   result_.policy = spec_text(job.policy);
+}
+
+void PolicyRun::load(const Graph& map) {
+  for (const Arrival& arrival : setting_.data.poses) {
+    const Id pose = setting_.data.recording.id(arrival.pose());
+    if (!map.find(pose)) continue;
+    throw Error(ErrorCode::input,
+                fmt::format("pose {} is in the map and in the recording: where the recording has "
+                            "earlier sessions as well, say at which pose to begin; where it is "
+                            "another pose, give it another id",
+                            pose));
+  }
+  call_plugin([&] { return fmt::format("policy '{}'", result_.policy); },
+              [&] { policy_->load(map); });
+  // Poses of earlier sessions that the map has not kept.
+  const Graph& recording = setting_.data.recording;
+  for (int v = 0; v < setting_.data.poses.front().pose(); ++v) {
+    if (!map.find(recording.id(v))) registration_->pose_ended(recording.id(v), false);
+  }
+  result_.map_poses = map.variable_count();
 }
 
 void PolicyRun::run(std::size_t count, std::string_view title,
@@ -141,6 +173,7 @@ void PolicyRun::run(std::size_t count, std::string_view title,
 PolicyResult PolicyRun::finish(Recovery recovery) {
   result_.compact = policy_->estimator().graph();
   result_.chi2 = policy_->estimator().chi2();
+  result_.located = policy_->unlocated().empty();
   result_.trajectory = recovered_trajectory(*policy_, recovery);
   count_nonzeros(result_, setting_.registry);
   evaluate(*policy_, setting_.data, result_);

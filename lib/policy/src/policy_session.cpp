@@ -85,6 +85,12 @@ void PolicySession::perform(std::string_view line, const Words& words, Reply& re
   }
 }
 
+void PolicySession::load(const Graph& map) {
+  policy_.load(map);
+  for (int v = 0; v < map.variable_count(); ++v) arrived_[map.id(v)] = true;
+  motions_.emplace(map.variable_pools().front().type);
+}
+
 void PolicySession::finish() {
   if (finished_) return;
   finish_trajectory();
@@ -227,6 +233,7 @@ void PolicySession::begin() {
   arriving_.reset();
   open_ = true;
   asked_.clear();
+  asked_place_ = false;
   reported_.clear();
   ++counts_.poses;
 }
@@ -296,6 +303,11 @@ void PolicySession::finish_trajectory() {
   }
   if (current()) end();
   if (!policy_.finish()) answer_ += "NOTE the estimate has not converged\n";
+  if (newest_ && !policy_.unlocated().empty()) {
+    answer_ +=
+        "NOTE no pose was matched with one of the map: the two are not connected, and their "
+        "relative position is unknown\n";
+  }
   finished_ = true;
   if (!newest_) return;
   arrived_[*newest_] = true;
@@ -318,8 +330,13 @@ void PolicySession::propose(const Words& words, Reply& reply) {
   if (asked_.empty()) {
     const std::optional<MatchProposal> match = policy_.next_match();
     reply.changes = true;
-    asked_ = match ? match_line(*match, motions_->tangent_size()) : "MATCH NONE\n";
     counts_.proposed += match.has_value();
+    if (!match && !asked_place_ && !policy_.unlocated().empty()) {
+      asked_place_ = true;  // once: who recognises no place goes on with NEXT
+      answer_ += fmt::format("LOCATE {}\n", *newest_);
+      return answer(reply);
+    }
+    asked_ = match ? match_line(*match, motions_->tangent_size()) : "MATCH NONE\n";
   }
   answer_ += asked_;
   answer(reply);

@@ -4,12 +4,17 @@
 #include <algorithm>
 #include <array>
 
+#include "cairn/runtime/error.hpp"
+
 namespace cairn {
 
 PosePolicy::~PosePolicy() = default;
 OptionFinder::~OptionFinder() = default;
 void PosePolicy::expect(const Graph&, std::span<const Arrival>) {}
 void PosePolicy::keep_chains(bool) {}
+void PosePolicy::load(const Graph&) {
+  throw Error(ErrorCode::usage, "this policy does not continue a map: use compact_pose");
+}
 
 std::string_view to_string(LinkVerdict verdict) {
   constexpr std::array<std::string_view, 5> kNames{"linked", "unmatched", "uninformative",
@@ -25,6 +30,24 @@ PolicySeconds& PolicySeconds::operator+=(const PolicySeconds& other) {
   return *this;
 }
 
+namespace {
+
+void match_newest(PosePolicy& policy, Registration& registration, Id newest) {
+  const auto match_proposed = [&] {
+    while (const auto match = policy.next_match())
+      policy.offer(match->earlier, registration.match(match->earlier, match->later));
+  };
+  match_proposed();
+  const std::vector<Id> map = policy.unlocated();
+  if (map.empty()) return;
+  const std::optional<RecognisedPlace> found = registration.recognise(map, newest);
+  if (!found) return;
+  policy.offer(found->place, found->factors);
+  match_proposed();
+}
+
+}  // namespace
+
 bool run_policy(const Graph& recording, std::span<const Arrival> poses, PosePolicy& policy,
                 Registration& registration, const std::function<bool(const PoseReport&)>& each) {
   policy.expect(recording, poses);
@@ -35,8 +58,7 @@ bool run_policy(const Graph& recording, std::span<const Arrival> poses, PosePoli
     if (!first && !pose.fixed) pose.state.clear();  // where its odometry puts it
     first = false;
     policy.add_pose(pose, std::span(update.factors).first(arrival.odometry.size()));
-    while (const auto match = policy.next_match())
-      policy.offer(match->earlier, registration.match(match->earlier, match->later));
+    match_newest(policy, registration, pose.id);
     const PoseReport report = policy.end_pose();
     registration.pose_ended(report.id, report.kept);
     if (each && !each(report)) break;
@@ -51,7 +73,7 @@ Graph recovered_trajectory(PosePolicy& policy, Recovery how) {
   const std::shared_ptr<const VariableType>& type = compact.variable_pools().front().type;
   const auto state = [&](Id id) { return compact.state(*compact.find(id)); };
   const std::vector<OdometryChain>& chains = policy.chains();
-  const Id first = chains.empty() ? compact.id(0) : chains.front().from;
+  const Id first = chains.empty() ? policy.kept().back() : chains.front().from;
   whole.add_variable(type, first, state(first));
   for (const OdometryChain& chain : chains) {
     for (const RecoveredPose& pose :

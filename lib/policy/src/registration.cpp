@@ -7,4 +7,12 @@ Registration::~Registration() = default;
 void Registration::pose_ended(Id, bool) {}
 FalseMatches::~FalseMatches() = default;
 
+std::optional<RecognisedPlace> Registration::recognise(std::span<const Id> places, Id pose) {
+  for (const Id place : places) {
+    if (std::vector<Factor> factors = match(place, pose); !factors.empty())
+      return RecognisedPlace{place, std::move(factors)};
+  }
+  return std::nullopt;
+}
+
 }  // namespace cairn

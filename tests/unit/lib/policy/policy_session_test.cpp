@@ -82,6 +82,41 @@ TEST_F(PolicySessionTest, ProposesTheSamePairUntilItIsMeasured) {
   EXPECT_EQ(counts.linked, 1);
 }
 
+/// Poses 100 and 101, a metre apart.
+Graph small_map(Registry& registry) {
+  const auto pose = registry.variable_type("VERTEX_SE2");
+  const std::array<double, 3> here{5.0, 5.0, 0.0}, there{6.0, 5.0, 0.0}, apart{1.0, 0.0, 0.0};
+  const std::array<double, 6> information{400.0, 0.0, 0.0, 400.0, 0.0, 400.0};
+  Graph map;
+  const std::array<int, 2> on{map.add_variable(pose, 100, here),
+                              map.add_variable(pose, 101, there)};
+  map.add_factor(registry.factor_type("EDGE_SE2"), on, apart, information);
+  return map;
+}
+
+TEST_F(PolicySessionTest, AMapIsContinuedWhereAPoseIsRecognised) {
+  session_->load(small_map(registry_));
+  EXPECT_THAT(take("NEW VERTEX_SE2 100").text, HasSubstr("the id is already in use"));
+  take("NEW VERTEX_SE2 0");
+  EXPECT_THAT(take("NEXT").text, StartsWith("LOCATE 0\nOK "));
+  EXPECT_THAT(take("NEXT").text, StartsWith("MATCH NONE\n"));  // once for each pose
+  take("NEW VERTEX_SE2 1");
+  take("EDGE_SE2 0 1 1 0 0 400 0 0 400 0 400");
+  EXPECT_THAT(take("NEXT").text, StartsWith("LOCATE 1\n"));
+  take("EDGE_SE2 101 1" + kHere);
+  EXPECT_THAT(take("ESTIMATE 1").text, HasSubstr("VERTEX_SE2 1 6 5 0\n"));
+  EXPECT_THAT(take("ESTIMATE 0").text, HasSubstr("VERTEX_SE2 0 5 5 0\n"));
+  EXPECT_THAT(take("ESTIMATE 100").text, HasSubstr("VERTEX_SE2 100 5 5 0\n"));
+  EXPECT_THAT(take("NEXT").text, ::testing::Not(HasSubstr("LOCATE")));
+  EXPECT_THAT(take("QUIT").text, ::testing::Not(HasSubstr("not connected")));
+}
+
+TEST_F(PolicySessionTest, AMapThatWasNeverMatchedIsReported) {
+  session_->load(small_map(registry_));
+  drive();
+  EXPECT_THAT(take("QUIT").text, HasSubstr("NOTE no pose was matched with one of the map"));
+}
+
 TEST_F(PolicySessionTest, WhatDoesNotMatchIsProposedNoMore) {
   drive();
   EXPECT_THAT(take("NEXT").text, StartsWith("MATCH 0 4 "));

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "cairn/graph/graph.hpp"
@@ -34,8 +35,10 @@ CAIRN_API bool in_arrival_order(const std::vector<Arrival>& arrivals);
 /// The same for a pose graph with unbroken odometry; none for an empty graph. Throws `Error`
 /// (input), with what would work, for anything else: a variable that is not a pose of a Lie group,
 /// or of another type than the first; a factor that is not relative; a pose without a factor to the
-/// one before.
-CAIRN_API std::vector<Arrival> pose_chain(const Graph& graph);
+/// one before. With `begin`, only the poses from this id on, without odometry of the first: those
+/// before it are of earlier sessions, and need no odometry. Throws `Error` (input) if it is not
+/// there.
+CAIRN_API std::vector<Arrival> pose_chain(const Graph& graph, std::optional<Id> begin = {});
 
 /// What a step brings to an estimator: its variables with their recorded states, then its odometry
 /// and its other factors, so that a pose without a state is initialised from its odometry.

@@ -31,8 +31,10 @@ struct PolicyData {
 };
 
 /// Throws `Error` (input) as `pose_chain` does. A `truth` that lacks a pose of the recording, or
-/// has it with another type, gives errors of the trajectory only.
-CAIRN_API PolicyData policy_data(Graph recording, std::optional<Graph> truth = {});
+/// has it with another type, gives errors of the trajectory only. With `begin`, the trajectory
+/// begins at the pose with this id: those before it are of earlier sessions.
+CAIRN_API PolicyData policy_data(Graph recording, std::optional<Graph> truth = {},
+                                 std::optional<Id> begin = {});
 
 /// A policy and a registration by name, with options.
 struct PolicyJob {
@@ -58,6 +60,9 @@ struct PolicyResult {
   std::int64_t information_nonzeros = 0, factor_nonzeros = 0;
   bool interrupted = false;
   bool converged = true;  ///< the estimate at the end
+  int map_poses = 0;      ///< of `compact`, those of the map that was continued
+  /// False: no match was found with that map, so that the two are not connected.
+  bool located = true;
 };
 
 /// What all runs over the same data share. Everything referred to must outlive the runs.
@@ -81,6 +86,8 @@ class CAIRN_API PolicyRun {
   /// where the registration needs a truth that is not known.
   PolicyRun(const PolicyJob& job, const PolicySetting& setting);
 
+  /// Before `run`: the trajectory continues this map (`PosePolicy::load`).
+  void load(const Graph& map);
   /// Runs over `count` poses; once. `title` goes to the progress; `after` is called with the number
   /// of each pose after the policy has ended it.
   void run(std::size_t count, std::string_view title,

@@ -44,6 +44,9 @@ class CAIRN_API PolicySession final : public LineSession {
   PolicySession(PosePolicy& policy, StreamFormat& format, Registry& registry,
                 PolicySettings settings);
 
+  /// Before the first line: a map that the poses continue. Its poses are kept ones; where the robot
+  /// is on it is unknown until a match with one of them comes.
+  void load(const Graph& map);
   void finish() override;
   Estimator& estimator() override { return policy_.estimator(); }
   std::int64_t variable_count() const override;
@@ -115,6 +118,7 @@ class CAIRN_API PolicySession final : public LineSession {
   std::optional<Id> first_, newest_, before_;  ///< that the policy has
   bool open_ = false, finished_ = false;
   std::optional<Measured> measured_;
+  bool asked_place_ = false;              ///< LOCATE, for the open pose
   std::string asked_;                     ///< MATCH …, while nothing came in answer
   std::unordered_map<Id, bool> arrived_;  ///< and whether it was kept
   std::vector<LinkReport> reported_;      ///< links of the open pose

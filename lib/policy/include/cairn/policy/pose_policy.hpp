@@ -84,6 +84,14 @@ class CAIRN_API PosePolicy : public Component {
   /// Called before the first pose with false if `chains` will not be read: a policy that keeps them
   /// needs memory for every pose that ever was. Does nothing unless a policy overrides it.
   virtual void keep_chains(bool keep);
+  /// Called before the first pose: a map that an earlier session, or another robot, has left, which
+  /// this trajectory continues. Its poses are kept ones. Where the trajectory is on it is unknown
+  /// until a match with one of its poses is offered. Throws `Error` (input) for a map that it
+  /// cannot continue; (usage) unless a policy overrides it.
+  virtual void load(const Graph& map);
+  /// The poses of the map while it is unknown where the trajectory is on it: a match of the newest
+  /// pose with any of them is wanted. Empty if that is known, or there is no map.
+  virtual std::vector<Id> unlocated() const { return {}; }
   /// The next pose, with its odometry from the previous pose (several factors are fused; none for
   /// the first pose). A pose marked as fixed is kept. Throws `Error` (input) if there is no
   /// odometry, or a factor that is not a relative pose of the two; nothing has changed then.
@@ -134,7 +142,8 @@ class CAIRN_API OptionFinder {
 
 /// Feeds the first poses of a recording to a policy, matching by `registration`. `each` is called
 /// for every pose, and stops the run by returning false. The policy is finished at the end; false
-/// if it has not converged.
+/// if it has not converged. With a map whose place is unknown, `registration.recognise` is asked
+/// for each pose until it is.
 CAIRN_API bool run_policy(const Graph& recording, std::span<const Arrival> poses,
                           PosePolicy& policy, Registration& registration,
                           const std::function<bool(const PoseReport&)>& each = {});

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <functional>
+#include <optional>
+#include <span>
 #include <string_view>
 #include <utility>
 #include <vector>
@@ -18,6 +20,12 @@ struct RegistrationData {
   const Graph* truth = nullptr;      ///< the true states of the same poses; null: unknown
 };
 
+/// A place that was recognised: a pose of a map, and the measured relative poses to it.
+struct RecognisedPlace {
+  Id place = 0;
+  std::vector<Factor> factors;
+};
+
 /// Measures the relative pose of two poses from their sensor data: a matcher of scans or images, a
 /// recording of one, or a simulation. It is called for the pairs that a policy proposes.
 class CAIRN_API Registration : public Component {
@@ -31,6 +39,9 @@ class CAIRN_API Registration : public Component {
   /// The measured relative poses of two poses: relative factors on them, in either order. None if
   /// the two do not match.
   virtual std::vector<Factor> match(Id earlier, Id later) = 0;
+  /// A match of a pose with any of these, while it is unknown which of them are near: place
+  /// recognition. Unless overridden, `match` is called for one after the other.
+  virtual std::optional<RecognisedPlace> recognise(std::span<const Id> places, Id pose);
   /// Called after each pose of a run: whether the policy keeps it. Does nothing unless overridden.
   virtual void pose_ended(Id pose, bool kept);
 };
