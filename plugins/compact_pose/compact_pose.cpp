@@ -52,8 +52,8 @@ Matrix sensor_covariance(const std::vector<double>& numbers, const RigidGroup& g
   return S;
 }
 
-constexpr auto kByGain = [](const auto& a, const auto& b) {
-  return a.gain < b.gain || (a.gain == b.gain && a.pose < b.pose);
+constexpr auto kByWorth = [](const auto& a, const auto& b) {
+  return a.worth < b.worth || (a.worth == b.worth && a.pose < b.pose);
 };
 
 }  // namespace
@@ -123,6 +123,7 @@ void CompactPose::add_pose(const Variable& pose, std::span<const Factor> odometr
   }
   open_ = true;
   searched_ = false;
+  answered_ = 0;
   candidates_.clear();
   dimensions_.clear();
 }
@@ -170,6 +171,12 @@ double CompactPose::expected_gain(int pose) {
   return mutual_information(expected_, known_displacement(pose).covariance);
 }
 
+/// Where requests are limited, some of them in vain, the gain that is to be expected of one; it
+/// only falls with other links, as the gain does.
+double CompactPose::worth(int pose, double gain) const {
+  return options_.matches > 0 ? gain * record_.probability(pose) : gain;
+}
+
 /// Lines 14 and 15 of Algorithm 1.
 void CompactPose::search() {
   searched_ = true;
@@ -201,22 +208,28 @@ void CompactPose::search() {
     ++report_.candidates;
     report_.least_gain = std::min(report_.least_gain, gain);
     if (pose != graph_.predecessor()) {
-      candidates_.push_back(
-          {pose, graph_.version(), gain, static_cast<int>(std::ssize(dimensions_))});
+      candidates_.push_back({pose, graph_.version(), gain, worth(pose, gain),
+                             static_cast<int>(std::ssize(dimensions_))});
       dimensions_.push_back(dimensions);
     }
   }
   report_.near = static_cast<int>(std::ssize(near));
-  std::ranges::make_heap(candidates_, kByGain);
+  std::ranges::make_heap(candidates_, kByWorth);
 }
 
 std::optional<MatchProposal> CompactPose::next_match() {
   if (!open_) throw Error(ErrorCode::usage, "next_match without a pose");
   const Timed timed(report_.seconds.total);
   if (!searched_) search();
+  if (options_.matches > 0 && answered_ >= options_.matches) return std::nullopt;
   while (!candidates_.empty()) {
     Candidate& best = candidates_.front();
-    if (!(best.gain > loop_gain_)) break;
+    if (!(best.gain > loop_gain_)) {
+      if (options_.matches == 0) break;
+      std::ranges::pop_heap(candidates_, kByWorth);  // one that is worth less may gain more
+      candidates_.pop_back();
+      continue;
+    }
     if (best.version == graph_.version()) {
       const Displacement d = known_displacement(best.pose);
       const auto mean = graph_.group().view(d.mean);
@@ -226,10 +239,12 @@ std::optional<MatchProposal> CompactPose::next_match() {
                            {{mean.begin(), mean.end()},
                             {d.covariance.data(), d.covariance.data() + d.covariance.size()}}};
     }
-    std::ranges::pop_heap(candidates_, kByGain);
-    candidates_.back().gain = expected_gain(candidates_.back().pose);
-    candidates_.back().version = graph_.version();
-    std::ranges::push_heap(candidates_, kByGain);
+    std::ranges::pop_heap(candidates_, kByWorth);
+    Candidate& again = candidates_.back();
+    again.gain = expected_gain(again.pose);
+    again.worth = worth(again.pose, again.gain);
+    again.version = graph_.version();
+    std::ranges::push_heap(candidates_, kByWorth);
   }
   return std::nullopt;
 }
@@ -240,11 +255,11 @@ std::optional<CompactPose::Candidate> CompactPose::take_candidate(int pose) {
   if (place == candidates_.end()) return std::nullopt;
   const Candidate candidate = *place;
   if (place == candidates_.begin()) {
-    std::ranges::pop_heap(candidates_, kByGain);
+    std::ranges::pop_heap(candidates_, kByWorth);
     candidates_.pop_back();
   } else {
     candidates_.erase(place);
-    std::ranges::make_heap(candidates_, kByGain);
+    std::ranges::make_heap(candidates_, kByWorth);
   }
   return candidate;
 }
@@ -264,6 +279,8 @@ LinkReport CompactPose::offer(Id other, std::span<const Factor> measured) {
   LinkReport report{.earlier = other, .later = graph_.newest_id()};
   const std::optional<Candidate> candidate = take_candidate(pose);
   if (candidate) report.expected_gain = candidate->gain;
+  record_.note(pose, !measured.empty());
+  ++answered_;
   if (!measured.empty()) {
     Link link{.earlier = pose,
               .later = graph_.newest_kept() ? graph_.size() - 1 : graph_.size(),

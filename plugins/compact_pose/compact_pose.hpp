@@ -12,6 +12,7 @@
 #include "compact_graph.hpp"
 #include "compact_pose_options.hpp"
 #include "consistency.hpp"
+#include "match_record.hpp"
 #include "proximity.hpp"
 #include "relocation.hpp"
 #include "threshold_finder.hpp"
@@ -63,7 +64,8 @@ class CompactPose final : public PosePolicy, public OptionFinder {
     int pose = 0;
     int version = 0;  ///< of the estimate with which the gain was computed
     double gain = 0.0;
-    int place = 0;  ///< in `dimensions_`
+    double worth = 0.0;  ///< by which candidates are proposed
+    int place = 0;       ///< in `dimensions_`
   };
   /// A link that waits for another one to agree, and the pose that it was measured for.
   struct Waiting {
@@ -78,6 +80,7 @@ class CompactPose final : public PosePolicy, public OptionFinder {
   Displacement known_displacement(int pose);
   std::optional<Candidate> take_candidate(int pose);
   double expected_gain(int pose);
+  double worth(int pose, double gain) const;
   /// The part of the match that ends the way, if the newest pose is to be relocated by this link.
   std::optional<double> relocation(const Link& link) const;
   void use(const Link& link);
@@ -99,7 +102,8 @@ class CompactPose final : public PosePolicy, public OptionFinder {
   Matrix odometry_;  ///< covariance of its odometry from the previous pose, kept or not
   Matrix expected_;  ///< Σ̄_y
   bool open_ = false, searched_ = false;
-  std::vector<Candidate> candidates_;  ///< a heap by gain
+  std::vector<Candidate> candidates_;  ///< a heap by worth
+  int answered_ = 0;                   ///< requests for a match
   int solved_version_ = -1;            ///< of the graph when candidates were last solved for
   int asked_version_ = -1;             ///< of the graph when a single candidate was evaluated again
   std::vector<Dimensions> dimensions_;  ///< of the candidates, before any link of this pose
@@ -107,6 +111,7 @@ class CompactPose final : public PosePolicy, public OptionFinder {
   std::vector<Waiting> waiting_;
   ThresholdFinder finder_;
   TypicalMatch typical_;
+  MatchRecord record_;
 };
 
 }  // namespace cairn::compact

@@ -80,6 +80,11 @@ OptionFields<CompactPoseOptions> CompactPoseOptions::fields() {
       .real("reuse_loss", &O::reuse_loss, 0.0, 10.0,
             "with reuse: largest loss of information about the link, times the poses that are kept "
             "nearby [nats per DoF]")
+      .integer(
+          "matches", &O::matches, 0, 1e9,
+          "most pairs that are proposed per pose, those first whose information gain times the "
+          "probability of a match is largest, which is learnt from earlier answers; 0: any "
+          "number, by information gain alone")
       .component<Estimator>("estimator", &O::estimator, "estimator");
 }
 

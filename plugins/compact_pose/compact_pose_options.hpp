@@ -61,6 +61,7 @@ struct CompactPoseOptions {
   bool reuse = true;    ///< a pose that is found to be at a kept one is not kept itself
   /// … where the link loses at most this information [nats per DoF and kept pose nearby].
   double reuse_loss = 0.06;
+  int matches = 0;  ///< most requests for a match per pose; 0: any number
   std::string estimator = "incremental_cholesky";
 
   /// The range along every axis, `range` where none is given.

@@ -50,7 +50,7 @@ struct Landmarks2dOptions {
         .real("landmark_sigma", &O::landmark_sigma, 1e-9, 1e6,
               "noise of a landmark's position, or of its range [m]")
         .real("bearing_sigma", &O::bearing_sigma, 1e-9, 3.0, "noise of a landmark's bearing [rad]")
-        .part(&O::noise)
+        .part(&O::noise, Noise::odometry_fields())
         .integer("outliers", &O::outliers, 0, 1e9, "observations associated with a wrong landmark");
   }
 };

@@ -83,23 +83,23 @@ SimulationBuilder<Pose>::SimulationBuilder(Registry& types, const Noise& noise, 
 }
 
 template <class Pose>
-Pose SimulationBuilder<Pose>::measure(const Pose& motion) {
+Pose SimulationBuilder<Pose>::measure(const Pose& motion, double noisier) {
   const Sigmas sigma = sigmas_of(noise_, motion);
   std::array<double, Pose::kTangent> n;
   for (int k = 0; k < Pose::kTangent; ++k) {
     const double s = k < Pose::kDimension ? sigma.translation : sigma.rotation;
-    n[k] = noise_.scale * s * random_.gaussian();
+    n[k] = noisier * noise_.scale * s * random_.gaussian();
   }
   if (noise_.scale == 0.0) return motion;  // exactly, not up to rounding
   return compose(motion, inverse(from_vectors(n)));
 }
 
 template <class Pose>
-void SimulationBuilder<Pose>::add_factor(int from, int to, const Pose& measured,
-                                         const Pose& motion) {
+void SimulationBuilder<Pose>::add_factor(int from, int to, const Pose& measured, const Pose& motion,
+                                         double noisier) {
   constexpr int kN = Pose::kTangent;
   const Sigmas sigma = sigmas_of(noise_, motion);
-  const double scale = noise_.scale == 0.0 ? 1.0 : noise_.scale;
+  const double scale = noisier * (noise_.scale == 0.0 ? 1.0 : noise_.scale);
   std::array<double, packed_size(kN)> information{};
   for (int row = 0, place = 0; row < kN; place += kN - row, ++row) {
     const double s = scale * (row < Pose::kDimension ? sigma.translation : sigma.rotation);
@@ -117,23 +117,23 @@ void SimulationBuilder<Pose>::add_pose(const Pose& truth) {
     estimate_.push_back(truth);
   } else {
     motion = between(truth_.back(), truth);
-    measured = measure(motion);
+    measured = measure(motion, 1.0);
     estimate_.push_back(compose(estimate_.back(), measured));
   }
   truth_.push_back(truth);
   variable_of_pose_.push_back(graph_.add_variable(variable_, k, state(estimate_.back())));
-  if (k > 0) add_factor(k - 1, k, measured, motion);
+  if (k > 0) add_factor(k - 1, k, measured, motion, 1.0);
 }
 
 template <class Pose>
 void SimulationBuilder<Pose>::add_loop(const Loop& loop) {
   const Pose motion = between(truth_[loop.earlier], truth_[loop.later]);
-  add_factor(loop.earlier, loop.later, measure(motion), motion);
+  add_factor(loop.earlier, loop.later, measure(motion, noise_.loops), motion, noise_.loops);
 }
 
 template <class Pose>
 void SimulationBuilder<Pose>::add_wrong_loop(const Loop& loop, const Pose& claimed) {
-  add_factor(loop.earlier, loop.later, claimed, claimed);
+  add_factor(loop.earlier, loop.later, claimed, claimed, noise_.loops);
 }
 
 template <class Pose>

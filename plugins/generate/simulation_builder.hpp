@@ -43,8 +43,9 @@ class SimulationBuilder {
   Simulation finish();
 
  private:
-  Pose measure(const Pose& motion);
-  void add_factor(int from, int to, const Pose& measured, const Pose& motion);
+  /// `noisier`: factor on the noise.
+  Pose measure(const Pose& motion, double noisier);
+  void add_factor(int from, int to, const Pose& measured, const Pose& motion, double noisier);
 
   Noise noise_;
   Random random_;

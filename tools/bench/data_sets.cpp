@@ -285,6 +285,33 @@ std::vector<SimulatedSet> simulated_sets(const std::string& data, bool quick) {
   return sets;
 }
 
+std::vector<LiveSet> live_sets(const std::string& data, bool quick) {
+  const auto circle = [](double noisier, int laps) {
+    return LiveSet{
+        .set = {.set = {fmt::format("circle, loop closures × {}", noisier),
+                        fmt::format(
+                            "@ellipse_n:laps={},poses_per_lap=40,loop_radius=5,loop_angle=0.5,"
+                            "loop_density=0.1,translation_error=0,rotation_error=0,"
+                            "translation_sigma=0.02,rotation_sigma=0.005,loop_noise={}",
+                            laps, noisier),
+                        {}}},
+        .sensor = {"--range", "5", "--angle", "0.5"}};
+  };
+  if (quick) return {circle(2.5, 5)};
+  std::vector<LiveSet> sets;
+  for (const double noisier : {0.5, 1.0, 1.5, 2.5, 5.0}) sets.push_back(circle(noisier, 25));
+  for (const TruthfulSet& set : located(compacted(), data)) {
+    const std::string& name = set.set.name;
+    if (name == "kitti_00" || name == "manhattanOlson3500" || name == "parking-garage")
+      sets.push_back({.set = set});
+  }
+  const std::vector<TruthfulSet> more{
+      {.set = {"FR079", "pose2d/FR079.g2o", {}}, .truth = Truth::de_facto},
+      {.set = {"killian5489", "pose2d/killian5489_glc.g2o", {}}, .truth = Truth::de_facto}};
+  for (const TruthfulSet& set : located(more, data)) sets.push_back({.set = set});
+  return sets;
+}
+
 std::vector<DataSet> thesis_sets(const std::string& data, bool quick) {
   return located_or(of_thesis(), data, quick, kSmallPlane, kPlane);
 }

@@ -70,6 +70,13 @@ struct SimulatedSet {
   TruthfulSet set;
   std::string range;  ///< of the simulated sensor, as options of `--registration simulated`
 };
+/// With what a robot knows of its sensor.
+struct LiveSet {
+  TruthfulSet set;
+  std::vector<std::string> sensor{};  ///< its range, as arguments; empty: thresholds are found
+};
+/// Circles whose loop closures are half to five times as noisy as odometry, and recordings.
+std::vector<LiveSet> live_sets(const std::string& data, bool quick);
 std::vector<SimulatedSet> simulated_sets(const std::string& data, bool quick);
 
 }  // namespace cairn::performance

@@ -49,6 +49,7 @@ const std::vector<std::pair<std::string, Study>>& all_studies() {
       {"online", study_online},
       {"compact_sets", study_compact_sets},
       {"compact_gain", study_compact_gain},
+      {"compact_live", study_compact_live},
       {"compact_growth", study_compact_growth},
       {"compact_consistency", study_compact_consistency},
       {"compact_matches", study_compact_matches},

@@ -89,6 +89,40 @@ json::object measure_set(const Bench& bench, const TruthfulSet& truthful) {
           {"contestants", std::move(entries)}};
 }
 
+/// Everything as by default. What has a limit of time may have no run.
+json::object measure_live(const Bench& bench, const LiveSet& live) {
+  const DataSet set = with_truth(bench, live.set);
+  Words sensor = live.sensor;
+  json::object found;
+  if (sensor.empty()) {
+    const Thresholds thresholds = find_thresholds(bench, set, "live");
+    sensor = {"--thresholds", thresholds.file.string()};
+    found = thresholds.found;
+  }
+  const auto contestant = [&](const char* name, Words arguments) {
+    return Contestant{.name = name, .arguments = std::move(arguments), .limit = kLimit};
+  };
+  const auto strategy = [&](const char* name, const char* strategy) {
+    Words arguments = sensor;
+    arguments.insert(arguments.end(), {"--strategy", strategy});
+    return contestant(name, std::move(arguments));
+  };
+  json::array entries;
+  for (const Contestant& one :
+       {strategy("fpfl", "fpfl"), strategy("apal", "apal"),
+        // No loop closure is used: what is left is odometry.
+        contestant("odometry", {"--range", "0.001", "--angle", "0.001", "--loop-gain", "1e9"})})
+    entries.push_back(run_seeds(bench, set, one, 1, [](int) { return Words(); }).entry());
+  entries.push_back(
+      run_seeds(bench, set, strategy("random", "rfpfl"), bench.quick ? 2 : 5, [](int seed) {
+        return Words{"--seed", fmt::format("{}", seed)};
+      }).entry());
+  return {{"name", set.name},
+          {"de_facto", live.set.truth == Truth::de_facto},
+          {"thresholds", std::move(found)},
+          {"contestants", std::move(entries)}};
+}
+
 /// All poses, and loops with a threshold on their gain alone: multiples of the rule's, and none.
 json::object measure_gains(const Bench& bench, const TruthfulSet& truthful) {
   const DataSet set = with_truth(bench, truthful);
@@ -119,6 +153,11 @@ json::object measure_gains(const Bench& bench, const TruthfulSet& truthful) {
 void study_compact_gain(const Bench& bench, const Keep& keep) {
   for (const TruthfulSet& set : gain_sets(bench.data, bench.quick))
     attempt("compact, gains: " + set.set.name, [&] { keep(measure_gains(bench, set)); });
+}
+
+void study_compact_live(const Bench& bench, const Keep& keep) {
+  for (const LiveSet& set : live_sets(bench.data, bench.quick))
+    attempt("compact, live: " + set.set.set.name, [&] { keep(measure_live(bench, set)); });
 }
 
 void study_compact_sets(const Bench& bench, const Keep& keep) {

@@ -24,6 +24,7 @@ std::vector<Section> online_sections(const boost::json::array& entries);
 // The parts of `cairn compact`, in tables_compact.cpp.
 std::vector<Section> compact_sets_sections(const boost::json::array& entries);
 std::vector<Section> compact_gain_sections(const boost::json::array& entries);
+std::vector<Section> compact_live_sections(const boost::json::array& entries);
 std::vector<Section> compact_growth_sections(const boost::json::array& entries);
 std::vector<Section> compact_consistency_sections(const boost::json::array& entries);
 std::vector<Section> compact_matches_sections(const boost::json::array& entries);

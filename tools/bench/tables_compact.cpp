@@ -355,6 +355,30 @@ std::string recovery_table(const json::array& entries) {
 // ------------------------------------------------------------------------------------------------
 
 /// The top of the paper's Figure 5.
+std::string live_table(const json::array& entries) {
+  MarkdownTable table({"graph", "poses kept", "of", "loops kept", "pairs asked for per pose",
+                       "per loop kept", "memory [MB]", "ATE [m]", "[°]", "all loops [m]", "[°]",
+                       "random [m]", "[°]", "odometry [m]", "[°]"});
+  for (const json::value& entry : entries) {
+    const json::value* kept = contestant(entry, "fpfl");
+    const double asked = median_of(kept, "loops.proposed");
+    std::vector<std::string> row{text(entry, "name") + (is_true(entry, "de_facto") ? " †" : ""),
+                                 whole(median_of(kept, "poses.kept")),
+                                 whole(median_of(kept, "poses.in")),
+                                 whole(median_of(kept, "loops.kept")),
+                                 digits(asked / median_of(kept, "poses.in")),
+                                 digits(asked / median_of(kept, "loops.kept")),
+                                 megabytes(median_of(kept, "peak_memory_bytes"))};
+    for (const char* name : {"fpfl", "apal", "random", "odometry"}) {
+      const json::value* c = contestant(entry, name);
+      row.push_back(digits(median_of(c, "errors.likely.ate.translation")));
+      row.push_back(digits(median_of(c, "errors.likely.ate.rotation")));
+    }
+    table.add(row);
+  }
+  return table.text();
+}
+
 std::string gain_table(const json::array& entries) {
   MarkdownTable table({"graph", "loop gain over the rule's", "loop gain [nats]", "loops kept",
                        "of all", "ATE [m]", "[°]", "over APAL's"});
@@ -580,6 +604,10 @@ std::vector<Section> compact_sets_sections(const json::array& entries) {
 
 std::vector<Section> compact_gain_sections(const json::array& entries) {
   return {{"compact-gain", gain_table(entries)}};
+}
+
+std::vector<Section> compact_live_sections(const json::array& entries) {
+  return {{"compact-live", live_table(entries)}};
 }
 
 std::vector<Section> compact_growth_sections(const json::array& entries) {

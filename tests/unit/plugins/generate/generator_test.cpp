@@ -186,6 +186,28 @@ TEST(Generators, TurningUpTheNoiseLeavesTheWorldAsItIs) {
   EXPECT_EQ(quiet.truth.values().pools, loud.truth.values().pools);
 }
 
+TEST(Generators, LoopClosuresAreAsMuchNoisierThanOdometryAsAskedFor) {
+  Registry registry;
+  for (const char* kind : {"manhattan:poses=400", "ellipse_n:laps=2", "torus"}) {
+    const Simulation same = simulate(registry, kind);
+    const Simulation noisy = simulate(
+        registry, std::string(kind) +
+                      (std::string_view(kind).find(':') != std::string_view::npos ? "," : ":") +
+                      "loop_noise=2");
+    const auto n = static_cast<double>(noisy.truth.residual_size());
+    EXPECT_NEAR(chi2(noisy.truth), n, 4.5 * std::sqrt(2.0 * n)) << kind;
+    int loops = 0;
+    for (int f = 0; f < same.graph.factor_count(); ++f) {
+      const auto on = same.graph.factor_variables(f);
+      const bool loop = std::abs(on[0] - on[1]) > 1;
+      loops += loop;
+      EXPECT_DOUBLE_EQ(same.graph.information(f)[0],
+                       noisy.graph.information(f)[0] * (loop ? 4.0 : 1.0));
+    }
+    EXPECT_GT(loops, 20);
+  }
+}
+
 TEST(Generators, ReproduceTheCountsOfWellKnownGraphs) {
   Registry registry;
   const Graph sphere = simulate(registry, "sphere").graph;  // sphere2500 of iSAM

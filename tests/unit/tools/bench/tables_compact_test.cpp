@@ -149,6 +149,21 @@ TEST(CompactTables, ShowLoopsAndErrorsAgainstTheThresholdOnTheirGain) {
   EXPECT_THAT(table, HasSubstr("|  | 0.707 | 3.50 | 20 | 10.0 % | 0.500 | 1.00 | 2.50 × |\n"));
 }
 
+TEST(CompactTables, ShowWhatARobotHasLive) {
+  const std::string asked = R"("verdicts": {}, "peak": 0)";
+  std::string kept = run(1.0, 25, 20, 0.5, asked);
+  kept.replace(kept.find("\"registered\""), 0, "\"proposed\": 300, ");
+  const auto live =
+      report("compact_live",
+             fmt::format(R"({{"name": "town", "de_facto": true, "contestants": [{}, {}, {}]}})",
+                         contestant("fpfl", kept), contestant("apal", ""),
+                         contestant("random", run(1.0, 25, 20, 0.7) + "," + run(1.0, 25, 20, 0.9) +
+                                                  "," + run(1.0, 25, 20, 0.8))));
+  EXPECT_THAT(section(live, "compact-live"),
+              HasSubstr("| town † | 25 | 100 | 20 | 3.00 | 15.0 | 20 | 0.500 | 1.00 | - | - | "
+                        "0.800 | 1.60 | - | - |\n"));
+}
+
 /// Quadratic for all, linear for few; all were late at the last.
 boost::json::value growth_report() {
   std::string entries = R"({"part": "thresholds"})";
