@@ -102,19 +102,19 @@ json::object measure_live(const Bench& bench, const LiveSet& live) {
   const auto contestant = [&](const char* name, Words arguments) {
     return Contestant{.name = name, .arguments = std::move(arguments), .limit = kLimit};
   };
-  const auto strategy = [&](const char* name, const char* strategy) {
+  const auto with = [&](const char* name, const char* strategy) {
     Words arguments = sensor;
     arguments.insert(arguments.end(), {"--strategy", strategy});
     return contestant(name, std::move(arguments));
   };
   json::array entries;
   for (const Contestant& one :
-       {strategy("fpfl", "fpfl"), strategy("apal", "apal"),
+       {with("fpfl", "fpfl"), with("apal", "apal"),
         // No loop closure is used: what is left is odometry.
         contestant("odometry", {"--range", "0.001", "--angle", "0.001", "--loop-gain", "1e9"})})
     entries.push_back(run_seeds(bench, set, one, 1, [](int) { return Words(); }).entry());
   entries.push_back(
-      run_seeds(bench, set, strategy("random", "rfpfl"), bench.quick ? 2 : 5, [](int seed) {
+      run_seeds(bench, set, with("random", "rfpfl"), bench.quick ? 2 : 5, [](int seed) {
         return Words{"--seed", fmt::format("{}", seed)};
       }).entry());
   return {{"name", set.name},
