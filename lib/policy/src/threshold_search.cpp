@@ -24,6 +24,8 @@ constexpr int kSpread = 40;
 /// Trials in one direction.
 constexpr int kMostTrials = 10;
 const double kStep = std::sqrt(2.0);
+/// The careful options are chosen where the error is below this part of that without them.
+constexpr double kClearlyBetter = 0.8;
 /// Measurements that agree with one another better than that were computed from a result.
 constexpr double kLeastNoiseScale = 1e-3;
 
@@ -147,9 +149,17 @@ void refine_thresholds(const OptionFinder& finder, const ThresholdTest& test,
     }
     return true;
   };
-  if (!lower_links()) return;
+  const bool found_some = !lower_links();
   const OptionValues careful = finder.careful();
   for (const auto& [name, value] : careful) first.insert_or_assign(name, value);
+  if (found_some) {
+    if (!good || careful.empty()) return;
+    const OptionValues chosen = found.options;
+    const double links = found.trials.back().links, error = found.trials.back().error();
+    attempt(links, 1.0);
+    if (!(found.trials.back().error() < kClearlyBetter * error)) found.options = chosen;
+    return;
+  }
   if (!careful.empty() && !lower_links()) return;
   double factor = 1.0;
   for (int k = 0; k < kMostTrials; ++k) {

@@ -118,6 +118,24 @@ TEST_F(RefineThresholds, TriesCarefulOptionsBeforeItLowersTheGainOfPoses) {
   EXPECT_EQ(found.options.at("careful"), "yes");
 }
 
+TEST_F(RefineThresholds, PrefersCarefulOptionsWhereTheErrorIsClearlySmaller) {
+  for (const double careful_error : {0.1, 0.9}) {
+    FoundThresholds found;
+    found.options = {{"loop_gain", "first"}};
+    found.tolerance = 1.0;
+    Factors finder;
+    finder.careful_options = {{"careful", "yes"}};
+    const auto test = [&](const OptionValues& options, double links, double poses) {
+      const double error = options.contains("careful") ? careful_error : links > 0.8 ? 2.0 : 1.0;
+      return ThresholdTrial{.links = links, .poses = poses, .expected = error, .loops_kept = 7};
+    };
+    refine_thresholds(finder, test, found);
+    EXPECT_THAT(tried(found), ElementsAre(near(1.0, 1.0), near(root_, 1.0), near(root_, 1.0)));
+    EXPECT_EQ(found.options.contains("careful"), careful_error < 0.5);
+    EXPECT_EQ(found.options.at("loop_gain"), std::to_string(root_));
+  }
+}
+
 TEST_F(RefineThresholds, KeepsTheLeastErrorWhereNothingIsGood) {
   const FoundThresholds found = refine(0.5, [](double links, double poses) {
     return std::pair(1.0 + std::abs(std::log2(links) + 2.0) + 2.0 * std::abs(std::log2(poses)),
