@@ -33,9 +33,13 @@ json::object thresholds_json(const FoundThresholds& found) {
                       {"poses", trial.poses_kept},
                       {"loops", trial.loops_kept}});
   }
-  return {{"options", options_json(found.options)}, {"trials", std::move(trials)},
-          {"noise_scale", found.noise_scale},       {"expected_ate", found.expected_ate},
-          {"tolerance", found.tolerance},           {"seconds", found.seconds}};
+  return {{"options", options_json(found.options)},
+          {"trials", std::move(trials)},
+          {"chosen", found.chosen},
+          {"noise_scale", found.noise_scale},
+          {"expected_ate", found.expected_ate},
+          {"tolerance", found.tolerance},
+          {"seconds", found.seconds}};
 }
 
 json::object error_json(const TrajectoryError& e) {

@@ -132,6 +132,7 @@ void refine_thresholds(const OptionFinder& finder, const ThresholdTest& test,
     good = trial.error() <= found.tolerance;
     if (good || trial.error() < least) {  // if none is good, the one with the least error
       found.options = options;
+      found.chosen = found.trials.size() - 1;
       least = trial.error();
     }
     return !good && !(interrupted && interrupted());
@@ -154,10 +155,13 @@ void refine_thresholds(const OptionFinder& finder, const ThresholdTest& test,
   for (const auto& [name, value] : careful) first.insert_or_assign(name, value);
   if (found_some) {
     if (!good || careful.empty()) return;
-    const OptionValues chosen = found.options;
-    const double links = found.trials.back().links, error = found.trials.back().error();
-    attempt(links, 1.0);
-    if (!(found.trials.back().error() < kClearlyBetter * error)) found.options = chosen;
+    const OptionValues options = found.options;
+    const std::size_t chosen = found.chosen;
+    const double error = found.trials[chosen].error();
+    attempt(found.trials[chosen].links, 1.0);
+    if (found.trials.back().error() < kClearlyBetter * error) return;
+    found.options = options;
+    found.chosen = chosen;
     return;
   }
   if (!careful.empty() && !lower_links()) return;

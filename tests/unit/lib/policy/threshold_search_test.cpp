@@ -177,15 +177,15 @@ TEST_F(FindThresholds, WhatIsFoundKeepsTheErrorWithinTheTolerance) {
   ASSERT_FALSE(found.trials.empty());
   EXPECT_GT(found.expected_ate, 0.0);
   EXPECT_GE(found.tolerance, 2.5 * found.expected_ate);
-  EXPECT_LE(found.trials.back().error(), found.tolerance);
-  EXPECT_GE(found.trials.back().realised, found.expected_ate);
+  EXPECT_LE(found.trials[found.chosen].error(), found.tolerance);
+  EXPECT_GE(found.trials[found.chosen].realised, found.expected_ate);
 
   // A run with these options is what the last trial was.
   PolicyJob job{{"compact_pose", found.options}};
   PolicyRun run(job, setting_);
   run.run(150, "");
-  EXPECT_EQ(run.policy().estimator().variable_count(), found.trials.back().poses_kept);
-  EXPECT_EQ(run.counts().kept_loops, found.trials.back().loops_kept);
+  EXPECT_EQ(run.policy().estimator().variable_count(), found.trials[found.chosen].poses_kept);
+  EXPECT_EQ(run.counts().kept_loops, found.trials[found.chosen].loops_kept);
 }
 
 TEST_F(FindThresholds, TriesNothingAtRatioZero) {

@@ -26,6 +26,7 @@ struct ThresholdTrial {
 struct FoundThresholds {
   OptionValues options;
   std::vector<ThresholdTrial> trials;
+  std::size_t chosen = 0;  ///< the trial with these options, if there is one
   /// √(chi2 / degrees of freedom) of the sample with everything, at most 1: errors that the
   /// covariances predict are multiplied by it.
   double noise_scale = 1.0;
