@@ -244,7 +244,8 @@ TEST_P(EveryEstimator, FindsTheSameEstimateAndCovarianceAtAnyScale) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Scales, EveryEstimator,
-                         testing::Values("incremental_cholesky", "batch", "periodic_batch"));
+                         testing::Values("incremental_cholesky", "batch", "periodic_batch",
+                                         "incremental_qr"));
 
 TEST(Scales, CovariancesScaleWithTheInformation) {
   Registry registry;
