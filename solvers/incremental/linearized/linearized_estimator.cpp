@@ -236,6 +236,7 @@ AppliedUpdate LinearizedEstimator::apply(const GraphUpdate& update) {
     state_ = std::move(state);
     return applied;
   }
+  const FactorIds ids = state_.ids;
   try {
     Target target(state_, !batch_);
     return carry_out(update, state_.losses, target);
@@ -246,11 +247,8 @@ AppliedUpdate LinearizedEstimator::apply(const GraphUpdate& update) {
     std::fill(new_variables.begin() + size, new_variables.end(), true);
     for (int v = size; v < state_.graph.variable_count(); ++v)
       state_.losses.removed_variable(state_.graph, v);
-    while (std::ssize(state_.models) < state_.graph.factor_count()) {  // the one that failed
-      if (std::ssize(state_.models) >= factors) state_.models.emplace_back();
-    }
-    const Renumbering now = state_.graph.remove(new_factors, new_variables);
-    state_.ids.remove(now);
+    state_.graph.remove(new_factors, new_variables);
+    state_.ids = ids;
     state_.models.resize(static_cast<std::size_t>(factors));
     state_.displacements.resize(static_cast<std::size_t>(size));
     state_.origins.resize(static_cast<std::size_t>(size));

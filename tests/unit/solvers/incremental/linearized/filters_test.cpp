@@ -55,6 +55,18 @@ struct Position {
   }
 };
 
+/// Not a number beyond x = 50.
+struct Bounded {
+  static constexpr std::string_view kTag = "BOUNDED";
+  static constexpr int kResidual = 1, kMeasurement = 1;
+  using Variables = std::tuple<PointXY>;
+  template <class S>
+  static Vector<S, 1> residual(const Vector<S, 2>& a, const Vector<double, 1>& z) {
+    using std::sqrt;
+    return Vector<S, 1>(sqrt(50.0 - a[0]) - z[0]);
+  }
+};
+
 const std::vector<double> kCorrelated = {4.0, 1.0, 9.0};
 
 class Filters : public testing::TestWithParam<std::string> {
@@ -276,6 +288,23 @@ TEST_P(Filters, WaitForWhatDeterminesAVariable) {
   EXPECT_NEAR(estimator_->state(0)[0], 1.0, 1e-12);
   EXPECT_NEAR(estimator_->state(1)[0], 3.0, 1e-12);
   EXPECT_NEAR(estimator_->state(1)[1], 4.0, 1e-12);
+}
+
+TEST_P(Filters, AreAsTheyWereWhereAFactorCannotBeLinearised) {
+  GraphUpdate update;
+  update.variables = {point(0), point(1)};
+  update.factors = {position(0, 1.0, 2.0), difference(0, 1, 2.0, 2.0)};
+  estimator_->update(update);
+  update = {};
+  update.variables = {point(2, 60.0, 0.0)};
+  update.factors = {difference(1, 2, 57.0, -4.0), {define_factor<Bounded>(), {2}, {1.0}, {1.0}}};
+  EXPECT_THROW(estimator_->update(update), Error);
+  EXPECT_EQ(estimator_->variable_count(), 2);
+  EXPECT_EQ(estimator_->factor_count(), 2);
+  update.factors.pop_back();
+  EXPECT_EQ(estimator_->update(update).first_factor, 2);
+  EXPECT_NEAR(estimator_->state(2)[0], 60.0, 1e-9);
+  EXPECT_EQ(covariance(*estimator_).rows(), 6);
 }
 
 /// The same random life, in which everything happens that can happen to an estimator.
