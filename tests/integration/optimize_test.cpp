@@ -105,8 +105,8 @@ TEST_F(OptimizeCommand, AllLinearSolversAndOptimizersReachTheSameChi2) {
         << solver;
   }
   for (const std::string& optimizer : registry.names("optimizer")) {
-    EXPECT_NEAR(final_chi2(report_of(
-                    {"optimize", file, "--initial", "chordal", "--optimizer", optimizer})) /
+    EXPECT_NEAR(final_chi2(report_of({"optimize", file, "--initial", "chordal", "--iterations",
+                                      "5000", "--optimizer", optimizer})) /
                     expected,
                 1, 1e-8)
         << optimizer;

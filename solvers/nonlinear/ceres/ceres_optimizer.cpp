@@ -9,41 +9,20 @@
 #include <string>
 #include <utility>
 
-#include <dlfcn.h>
 #include <fmt/core.h>
-#include <glog/logging.h>
 
 #include "cairn/graph/gauge.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/threads.hpp"
 #include "cairn/runtime/timed.hpp"
 #include "ceres_problem.hpp"
+#include "ceres_run.hpp"
 #include "state_extent.hpp"
 
 namespace cairn {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-
-/// Ceres logs failed steps through glog to standard error; libraries do not print.
-class QuietGlog {
- public:
-  QuietGlog() : level_(FLAGS_minloglevel) { FLAGS_minloglevel = google::GLOG_FATAL; }
-  ~QuietGlog() { FLAGS_minloglevel = level_; }
-  QuietGlog(const QuietGlog&) = delete;
-  QuietGlog& operator=(const QuietGlog&) = delete;
-
- private:
-  int level_;
-};
-
-/// Threads inside BLAS make the small dense blocks of a sparse factorisation slower. OpenBLAS is
-/// told so once; others are left alone.
-void keep_blas_to_one_thread() {
-  using SetThreads = void (*)(int);
-  if (auto set = reinterpret_cast<SetThreads>(dlsym(RTLD_DEFAULT, "openblas_set_num_threads")))
-    set(1);
-}
 
 /// Hands Ceres' iterations to the observer, and the reasons to stop to Ceres.
 class Bridge final : public ceres::IterationCallback {
@@ -118,9 +97,6 @@ double norm_of(const Values& values) {
 /// alike.
 constexpr double kToleranceShare = 1e-2;
 
-/// A step of this fraction of the states, or of this change of chi2, may fail because of rounding.
-constexpr double kRounding = 1e-6;
-
 /// Ceres' own test of a step is relative to the norm of all states, which is no measure of a map
 /// far from the origin: `size` is what it is to be relative to.
 double parameter_tolerance(const Stop& stop, const Values& values, double size) {
@@ -161,8 +137,8 @@ bool ended_without_descent(const ceres::Solver::Summary& ceres, double size) {
   const auto& all = ceres.iterations;
   auto first = all.end();
   while (first != all.begin() && !std::prev(first)->step_is_successful) --first;
-  return first != all.end() && first->step_norm > kRounding * size &&
-         !(std::abs(first->cost_change) <= kRounding * ceres.final_cost);
+  return first != all.end() && first->step_norm > kCeresRounding * size &&
+         !(std::abs(first->cost_change) <= kCeresRounding * ceres.final_cost);
 }
 
 Seconds seconds_of(const ceres::Solver::Summary& ceres) {
@@ -173,13 +149,6 @@ Seconds seconds_of(const ceres::Solver::Summary& ceres) {
       ceres.linear_solver_time_in_seconds;  // with its solves, which Ceres does not time apart
   seconds.update = ceres.residual_evaluation_time_in_seconds;
   return seconds;
-}
-
-bool nothing_to_optimise(const Gauge& gauge) {
-  for (const bool held : gauge.held) {
-    if (!held) return false;
-  }
-  return true;
 }
 
 }  // namespace
@@ -196,19 +165,11 @@ Summary CeresOptimizer::optimize(Graph& graph, const Stop& stop, Observer& obser
         "optimizer ceres: the graph has a loss already; leave out the option loss=" + loss_.name);
   }
   const Clock::time_point begin = Clock::now();
-  Summary summary;
-  summary.optimizer = "ceres";
-  summary.linear_solver = ceres::LinearSolverTypeToString(options_.linear_solver_type);
   const Gauge gauge = resolve_gauge(graph);
-  if (std::string sentence = gauge.describe(graph); !sentence.empty())
-    summary.notes.push_back(std::move(sentence));
-  const bool idle = nothing_to_optimise(gauge);
-  if (idle) summary.notes.push_back("nothing to optimise: every variable is constant");
-  for (const std::string& sentence : summary.notes) observer.on_message(sentence);
-  if (idle || stop.max_iterations <= 0) {
-    summary.initial_chi2 = summary.final_chi2 = chi2(graph);
-    summary.status = idle ? Status::converged : Status::max_iterations;
-    observer.on_start(graph, summary.initial_chi2);
+  Summary summary =
+      begin_summary("ceres", ceres::LinearSolverTypeToString(options_.linear_solver_type), graph,
+                    gauge, observer);
+  if (ends_at_once(graph, gauge, stop, observer, summary)) {
     summary.seconds.total = seconds_since(begin);
     return summary;
   }

@@ -7,6 +7,8 @@
 #include <string>
 #include <utility>
 
+#include <Eigen/Core>
+
 #include "cairn/runtime/error.hpp"
 
 namespace cairn {
@@ -14,26 +16,6 @@ namespace {
 
 /// Roots of information from here to there are left as they are.
 constexpr double kSmallest = 0x1p-10, kLargest = 0x1p+20;
-
-/// A power of two that brings the root of the information near one where it is far from that: of
-/// each factor what it measures least exactly, and the median of that over all factors, since the
-/// weight of a few may be chosen to mean "held" or "unknown".
-double residual_scale(const Graph& graph) {
-  std::vector<double> least;
-  least.reserve(static_cast<std::size_t>(graph.factor_count()));
-  for (int f = 0; f < graph.factor_count(); ++f) {
-    const double* diagonal = graph.sqrt_information(f).data();
-    double smallest = std::numeric_limits<double>::infinity();
-    for (int left = graph.factor_type(f).residual_size(); left > 0; diagonal += left--) {
-      if (*diagonal > 0.0) smallest = std::min(smallest, *diagonal);
-    }
-    if (std::isfinite(smallest)) least.push_back(smallest);
-  }
-  if (least.empty()) return 1.0;
-  const auto middle = least.begin() + static_cast<std::ptrdiff_t>(least.size() / 2);
-  std::nth_element(least.begin(), middle, least.end());
-  return *middle >= kSmallest && *middle <= kLargest ? 1.0 : std::ldexp(1.0, -std::ilogb(*middle));
-}
 
 class GraphManifold final : public ceres::Manifold {
  public:
@@ -67,6 +49,47 @@ class GraphManifold final : public ceres::Manifold {
   }
   const VariableType& type_;
   CaughtException& caught_;
+};
+
+/// The manifold of one variable in scaled coordinates.
+class ScaledManifold final : public ceres::Manifold {
+ public:
+  ScaledManifold(const ceres::Manifold& plain, const std::vector<double>& Lt,
+                 const std::vector<double>& Lt_inverse)
+      : plain_(plain),
+        Lt_(Eigen::Map<const Eigen::MatrixXd>(Lt.data(), TangentSize(), TangentSize())),
+        Lt_inverse_(
+            Eigen::Map<const Eigen::MatrixXd>(Lt_inverse.data(), TangentSize(), TangentSize())) {}
+  int AmbientSize() const override { return plain_.AmbientSize(); }
+  int TangentSize() const override { return plain_.TangentSize(); }
+
+  bool Plus(const double* x, const double* u, double* x_plus_delta) const override {
+    const Eigen::VectorXd delta = Lt_inverse_ * Eigen::Map<const Eigen::VectorXd>(u, TangentSize());
+    return plain_.Plus(x, delta.data(), x_plus_delta);
+  }
+  bool PlusJacobian(const double*, double* jacobian) const override {
+    Eigen::Map<RowMajor> J(jacobian, AmbientSize(), TangentSize());
+    J.setZero();
+    J.topRows(TangentSize()) = Lt_inverse_;
+    return true;
+  }
+  bool Minus(const double* y, const double* x, double* u) const override {
+    Eigen::VectorXd delta(TangentSize());
+    if (!plain_.Minus(y, x, delta.data())) return false;
+    Eigen::Map<Eigen::VectorXd>(u, TangentSize()) = Lt_ * delta;
+    return true;
+  }
+  bool MinusJacobian(const double*, double* jacobian) const override {
+    Eigen::Map<RowMajor> J(jacobian, TangentSize(), AmbientSize());
+    J.setZero();
+    J.leftCols(TangentSize()) = Lt_;
+    return true;
+  }
+
+ private:
+  using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+  const ceres::Manifold& plain_;
+  Eigen::MatrixXd Lt_, Lt_inverse_;
 };
 
 /// One factor, its residual and Jacobians times `scale`. Borrows measurement and information from
@@ -191,8 +214,28 @@ double* state(const Graph& graph, Values& values, int variable) {
 
 }  // namespace
 
+/// A power of two that brings the root of the information near one where it is far from that: of
+/// each factor what it measures least exactly, and the median of that over all factors, since the
+/// weight of a few may be chosen to mean "held" or "unknown".
+double residual_scale(const Graph& graph) {
+  std::vector<double> least;
+  least.reserve(static_cast<std::size_t>(graph.factor_count()));
+  for (int f = 0; f < graph.factor_count(); ++f) {
+    const double* diagonal = graph.sqrt_information(f).data();
+    double smallest = std::numeric_limits<double>::infinity();
+    for (int left = graph.factor_type(f).residual_size(); left > 0; diagonal += left--) {
+      if (*diagonal > 0.0) smallest = std::min(smallest, *diagonal);
+    }
+    if (std::isfinite(smallest)) least.push_back(smallest);
+  }
+  if (least.empty()) return 1.0;
+  const auto middle = least.begin() + static_cast<std::ptrdiff_t>(least.size() / 2);
+  std::nth_element(least.begin(), middle, least.end());
+  return *middle >= kSmallest && *middle <= kLargest ? 1.0 : std::ldexp(1.0, -std::ilogb(*middle));
+}
+
 CeresProblem::CeresProblem(const Graph& graph, const Gauge& gauge, Values& values,
-                           std::unique_ptr<ceres::LossFunction> loss)
+                           std::unique_ptr<ceres::LossFunction> loss, const TangentScaling* scaling)
     : residual_scale_(residual_scale(graph)), problem_(lend_everything()) {
   const bool own = loss != nullptr;
   if (own) losses_.push_back(std::move(loss));
@@ -203,11 +246,12 @@ CeresProblem::CeresProblem(const Graph& graph, const Gauge& gauge, Values& value
     if (each && residual_scale_ != 1.0)
       each = std::make_unique<ScaledLoss>(std::move(each), residual_scale_);
   }
-  add_variables(graph, gauge, values);
+  add_variables(graph, gauge, values, scaling);
   add_factors(graph, values);
 }
 
-void CeresProblem::add_variables(const Graph& graph, const Gauge& gauge, Values& values) {
+void CeresProblem::add_variables(const Graph& graph, const Gauge& gauge, Values& values,
+                                 const TangentScaling* scaling) {
   for (const VariablePool& pool : graph.variable_pools()) {
     if (pool.type->tangent_size() > pool.type->ambient_size()) {
       throw Error(ErrorCode::usage,
@@ -218,7 +262,13 @@ void CeresProblem::add_variables(const Graph& graph, const Gauge& gauge, Values&
   }
   for (int v = 0; v < graph.variable_count(); ++v) {
     double* x = state(graph, values, v);
-    problem_.AddParameterBlock(x, graph.type(v).ambient_size(), manifolds_[graph.pool(v)].get());
+    ceres::Manifold* manifold = manifolds_[graph.pool(v)].get();
+    if (scaling && !gauge.held[v]) {
+      manifolds_.push_back(
+          std::make_unique<ScaledManifold>(*manifold, scaling->Lt[v], scaling->Lt_inverse[v]));
+      manifold = manifolds_.back().get();
+    }
+    problem_.AddParameterBlock(x, graph.type(v).ambient_size(), manifold);
     if (gauge.held[v]) problem_.SetParameterBlockConstant(x);
   }
 }

@@ -42,12 +42,23 @@ class CaughtException {
   std::exception_ptr exception_;
 };
 
+/// Coordinates u of each variable's tangent space in which Ceres works: δ = L⁻ᵀ u, with the
+/// Cholesky factor L Lᵀ of a positive definite matrix, as H's diagonal block of the variable.
+struct TangentScaling {
+  /// By variable: Lᵀ and L⁻ᵀ, column-major; empty for constant variables.
+  std::vector<std::vector<double>> Lt, Lt_inverse;
+};
+
+/// What `CeresProblem` multiplies whitened residuals by: a power of two.
+double residual_scale(const Graph& graph);
+
 /// A graph as a ceres::Problem with cairn's residuals, Jacobians, retractions and loss.
 ///
 /// Ceres wants Jacobians with respect to the ambient state and multiplies them by the Jacobian of
 /// its Plus. Ours are with respect to the tangent space at once: so Plus is said to have the
 /// Jacobian [I; 0], and our columns stand first among the ambient ones, followed by zeros. The
-/// product is ours, exactly.
+/// product is ours, exactly. With a `TangentScaling` that Jacobian is [L⁻ᵀ; 0]: Ceres' line search
+/// has no scaling of its own.
 ///
 /// Ceres minimises ½ Σ ρ(‖r‖²), cairn states twice that.
 ///
@@ -58,9 +69,10 @@ class CaughtException {
 class CeresProblem {
  public:
   /// `values`, which Ceres moves, must outlive this object. `loss`: a loss of Ceres' own for all
-  /// factors that take one, or null for each factor's own.
+  /// factors that take one, or null for each factor's own. `scaling`: null for none; not used
+  /// after the constructor.
   CeresProblem(const Graph& graph, const Gauge& gauge, Values& values,
-               std::unique_ptr<ceres::LossFunction> loss);
+               std::unique_ptr<ceres::LossFunction> loss, const TangentScaling* scaling = nullptr);
 
   ceres::Problem& problem() { return problem_; }
   /// 1 unless the information is far from one; a power of four.
@@ -70,7 +82,8 @@ class CeresProblem {
   void rethrow() const { caught_.rethrow(); }
 
  private:
-  void add_variables(const Graph& graph, const Gauge& gauge, Values& values);
+  void add_variables(const Graph& graph, const Gauge& gauge, Values& values,
+                     const TangentScaling* scaling);
   void add_factors(const Graph& graph, Values& values);
 
   CaughtException caught_;
@@ -78,7 +91,7 @@ class CeresProblem {
   // Owned here and only lent to the problem, which therefore is the last to come and the first to
   // go.
   std::vector<std::unique_ptr<ceres::LossFunction>> losses_;  // as Graph::losses(), or Ceres' own
-  std::vector<std::unique_ptr<ceres::Manifold>> manifolds_;   // by variable pool
+  std::vector<std::unique_ptr<ceres::Manifold>> manifolds_;   // by variable pool, then scaled ones
   std::vector<std::unique_ptr<ceres::CostFunction>> costs_;
   ceres::Problem problem_;
 };

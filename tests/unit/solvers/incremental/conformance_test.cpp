@@ -49,6 +49,10 @@ class EveryEstimator : public testing::TestWithParam<std::string> {
     }
     return update;
   }
+  /// Linearises each factor once, when it arrives: its estimate is another than the minimum, which
+  /// is what `UpdateReport::converged` says (filters_test.cpp has what it must be).
+  bool is_filter() const { return GetParam() == "ekf" || GetParam() == "eif"; }
+
   Registry registry_;
   PlanarTypes types_;
   std::unique_ptr<Estimator> estimator_ = registry_.make<Estimator>(GetParam());
@@ -59,7 +63,7 @@ TEST_P(EveryEstimator, AgreesWithAFreshSolveWhateverHappens) {
                  count = from_environment("CAIRN_SEQUENCES", 300);
   for (unsigned seed = first; seed < first + count; ++seed) {
     const auto estimator = registry_.make<Estimator>(GetParam());
-    RandomSequence sequence(*estimator, seed);
+    RandomSequence sequence(*estimator, seed, !is_filter());
     sequence.run(20);
     ASSERT_FALSE(HasFailure()) << "seed " << seed << ":\n" << sequence.log();
   }
@@ -123,6 +127,7 @@ TEST_P(EveryEstimator, AnchorsNothingThatAPriorDetermines) {
 }
 
 TEST_P(EveryEstimator, APositionFromGpsIsNotTurnedOffByAnAnchor) {
+  if (is_filter()) GTEST_SKIP() << "a filter does not linearise again";
   GraphUpdate update = chain(3);
   const auto prior = registry_.factor_type("EDGE_PRIOR_SE2");
   update.factors.push_back({prior, {0}, {100.0, 50.0, 0.0}, {4, 0, 0, 4, 0, 0}});
@@ -189,6 +194,7 @@ TEST_P(EveryEstimator, SolvesFullyWhateverTheInformation) {
 }
 
 TEST_P(EveryEstimator, SolvesFullyAfterAFactorOfVeryLargeInformationIsChangedOrRemoved) {
+  if (is_filter()) GTEST_SKIP() << "a filter does not linearise again";
   const Factor wrong = between(0, 6, {9.0, 9.0, 1.0});
   Factor heavy = wrong;
   for (double& number : heavy.information) number *= 1e40;
@@ -227,6 +233,7 @@ TEST_P(EveryEstimator, RefusesWhatItDoesNotKnow) {
 }
 
 TEST_P(EveryEstimator, ALossHoldsForEverythingThatIsThere) {
+  if (is_filter()) GTEST_SKIP() << "a filter does not linearise again";
   if (!registry_.has("loss", "huber")) GTEST_SKIP() << "there is no loss huber";
   estimator_->update(chain(4));
   GraphUpdate update;

@@ -39,8 +39,8 @@ std::vector<double> copy(std::span<const double> x) { return {x.begin(), x.end()
 
 }  // namespace
 
-RandomSequence::RandomSequence(Estimator& estimator, unsigned seed)
-    : estimator_(estimator), rng_(seed) {
+RandomSequence::RandomSequence(Estimator& estimator, unsigned seed, bool smooths)
+    : estimator_(estimator), rng_(seed), smooths_(smooths) {
   const KeptMarginals kept[] = {KeptMarginals::none, KeptMarginals::last, KeptMarginals::diagonal};
   estimator.keep_marginals(kept[rng_() % 3]);
 }
@@ -48,6 +48,7 @@ RandomSequence::RandomSequence(Estimator& estimator, unsigned seed)
 void RandomSequence::run(int updates) {
   for (int k = 0; k < updates && !testing::Test::HasFailure(); ++k) {
     update_once();
+    if (ended_) return;
     if (chance(0.05)) refuse_bad_update();
     if (chance(0.05)) what_if();
     if (chance(0.02)) {
@@ -81,6 +82,11 @@ void RandomSequence::update_once() {
   EXPECT_EQ(report.first_factor, ids_.next());
   check_update(mirror_, ids_, update);
   const AppliedUpdate applied = apply_update(update, mirror_, ids_);
+  if (!smooths_ && report.priors.size() != applied.priors.size()) {
+    // Jacobians of different points contain information on the gauge, where measurements have none.
+    ended_ = true;
+    return;
+  }
   EXPECT_EQ(report.priors, applied.priors);
   expect_same_graph(estimator_.graph());
   for (int v = 0; v < mirror_.variable_count() && !testing::Test::HasFailure(); ++v)
@@ -313,6 +319,7 @@ void RandomSequence::expect_solved() {
   double chi2 = 0.0;
   for (const double norm : squared_norms(solved)) chi2 += norm;
   EXPECT_NEAR(estimator_.chi2(), chi2, 1e-9 * (1.0 + chi2));
+  if (!smooths_) return;
   solve_densely(solved);
   for (int v = 0; v < solved.variable_count(); ++v) {
     const VariableType& type = solved.type(v);

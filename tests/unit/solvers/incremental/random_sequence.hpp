@@ -26,7 +26,9 @@ namespace cairn::test {
 /// Everything follows from the seed. Graphs are such that H is well conditioned at any time.
 class RandomSequence {
  public:
-  RandomSequence(Estimator& estimator, unsigned seed);
+  /// `smooths`: the estimator linearises again, and so is at the minimum after it solved
+  /// everything.
+  RandomSequence(Estimator& estimator, unsigned seed, bool smooths = true);
   void run(int updates);
   /// What was done, for a failure's message.
   std::string log() const { return log_; }
@@ -62,6 +64,8 @@ class RandomSequence {
 
   Estimator& estimator_;
   std::mt19937 rng_;
+  bool smooths_;
+  bool ended_ = false;  ///< the graph beside it is not the same any more
   PlanarTypes types_;
   std::map<Id, Truth> truth_;  ///< of all variables ever
   Graph mirror_;

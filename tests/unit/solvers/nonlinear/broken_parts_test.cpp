@@ -234,7 +234,8 @@ TEST_P(Methods, NameTheFactorThatThrows) {
 }
 
 INSTANTIATE_TEST_SUITE_P(BrokenParts, Methods,
-                         testing::Values("gauss_newton", "levenberg_marquardt", "dogleg", "ceres"));
+                         testing::Values("gauss_newton", "levenberg_marquardt", "dogleg", "ceres",
+                                         "ceres_line_search"));
 
 /// chi2 scales with the information, the estimate does not.
 TEST_P(Methods, FindTheSameEstimateAtAnyScaleOfTheInformation) {

@@ -43,6 +43,19 @@ TEST_P(RobustLossTest, EveryOptimizerReachesTheSameMinimum) {
   }
 }
 
+/// A loss that is not convex has several minima, and methods that go other ways end in others.
+TEST_P(RobustLossTest, ALineSearchEndsInAMinimum) {
+  CAIRN_NEEDS("optimizer", "ceres_line_search");
+  CAIRN_NEEDS("optimizer", "levenberg_marquardt");
+  Graph robust = graph(FactorSelector::all());
+  const Summary first = registry_.make<Optimizer>("ceres_line_search")
+                            ->optimize(robust, Stop{.max_iterations = 20000});
+  EXPECT_EQ(first.status, Status::converged);
+  const Summary again =
+      registry_.make<Optimizer>(with_some_linear_solver("levenberg_marquardt"))->optimize(robust);
+  EXPECT_NEAR(again.final_chi2, first.final_chi2, 1e-8 * first.final_chi2);
+}
+
 TEST_P(RobustLossTest, WeighsOutliersDown) {
   if (!registry_.has("optimizer", "levenberg_marquardt")) GTEST_SKIP();
   Graph plain = ring_of_poses(40, 0.03, 3), robust = graph(FactorSelector::loops());

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "ceres_run.hpp"
+
+#include <algorithm>
+#include <string>
+#include <utility>
+
+#include <dlfcn.h>
+#include <glog/logging.h>
+
+namespace cairn {
+
+QuietGlog::QuietGlog() : level_(FLAGS_minloglevel) { FLAGS_minloglevel = google::GLOG_FATAL; }
+QuietGlog::~QuietGlog() { FLAGS_minloglevel = level_; }
+
+void keep_blas_to_one_thread() {
+  using SetThreads = void (*)(int);
+  if (auto set = reinterpret_cast<SetThreads>(dlsym(RTLD_DEFAULT, "openblas_set_num_threads")))
+    set(1);
+}
+
+Summary begin_summary(std::string_view optimizer, std::string_view linear_solver,
+                      const Graph& graph, const Gauge& gauge, Observer& observer) {
+  Summary summary;
+  summary.optimizer = optimizer;
+  summary.linear_solver = linear_solver;
+  if (std::string sentence = gauge.describe(graph); !sentence.empty())
+    summary.notes.push_back(std::move(sentence));
+  if (std::ranges::all_of(gauge.held, [](bool held) { return held; }))
+    summary.notes.push_back("nothing to optimise: every variable is constant");
+  for (const std::string& sentence : summary.notes) observer.on_message(sentence);
+  return summary;
+}
+
+bool ends_at_once(const Graph& graph, const Gauge& gauge, const Stop& stop, Observer& observer,
+                  Summary& summary) {
+  const bool idle = std::ranges::all_of(gauge.held, [](bool held) { return held; });
+  if (!idle && stop.max_iterations > 0) return false;
+  summary.initial_chi2 = summary.final_chi2 = chi2(graph);
+  summary.status = idle ? Status::converged : Status::max_iterations;
+  observer.on_start(graph, summary.initial_chi2);
+  return true;
+}
+
+}  // namespace cairn

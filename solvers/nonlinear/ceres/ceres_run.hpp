@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string_view>
+
+#include <ceres/iteration_callback.h>
+
+#include "cairn/graph/gauge.hpp"
+#include "cairn/solve/optimizer.hpp"
+
+namespace cairn {
+
+/// Ceres logs failed steps through glog to standard error; libraries do not print. Quiet while an
+/// object of this class exists.
+class QuietGlog {
+ public:
+  QuietGlog();
+  ~QuietGlog();
+  QuietGlog(const QuietGlog&) = delete;
+  QuietGlog& operator=(const QuietGlog&) = delete;
+
+ private:
+  int level_;
+};
+
+/// Threads inside BLAS make the small dense blocks of a sparse factorisation slower. OpenBLAS is
+/// set to one thread, others are left alone.
+void keep_blas_to_one_thread();
+
+/// A step of this fraction of the states, or of this change of chi2, may fail because of rounding.
+inline constexpr double kCeresRounding = 1e-6;
+
+/// Begins the summary of a run: the names, and the note on the gauge, which the observer gets too.
+Summary begin_summary(std::string_view optimizer, std::string_view linear_solver,
+                      const Graph& graph, const Gauge& gauge, Observer& observer);
+
+/// Whether there is nothing to do, because every variable is constant or no iteration is allowed:
+/// then summary and observer have been completed, but for the total time.
+bool ends_at_once(const Graph& graph, const Gauge& gauge, const Stop& stop, Observer& observer,
+                  Summary& summary);
+
+}  // namespace cairn
