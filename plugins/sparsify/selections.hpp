@@ -79,7 +79,7 @@ class Oldest final : public SelectionByPart {
 struct NearestOptions {
   double part = 0.5;   ///< of the nodes that may leave
   double angle = 0.0;  ///< [m]
-  int neighbours = 10;
+  int neighbours = 14;
 
   static auto fields() {
     using O = NearestOptions;
