@@ -280,6 +280,52 @@ TEST_P(MapSparsifierOf, ALargeLaterCorrectionRelinearisesWhatWasRemoved) {
   EXPECT_GT(rmse(whole, frozen), 10.0 * rmse(whole, sparse));
 }
 
+/// The same in a simulated world: long loops are closed only after two thirds of the poses have
+/// been removed, and move the map by metres.
+TEST_P(MapSparsifierOf, InAManhattanWorldLateLoopsEndNearerToTheWholeMapThanWithPriors) {
+  CAIRN_NEEDS("generator", "manhattan");
+  const Graph recording =
+      manhattan("poses=160,streets=4,block=3,loop_density=0.5,rotation_sigma=0.05");
+  const auto after = [&](const auto& leave) {
+    const auto estimator = registry_.make<Estimator>(GetParam());
+    GraphUpdate late;
+    for (const Arrival& arrival : arrival_order(recording)) {
+      GraphUpdate update = arrival_update(recording, arrival);
+      std::erase_if(update.factors, [&](const Factor& factor) {
+        const bool far = std::abs(factor.variables[0] - factor.variables[1]) > 12;
+        if (far) late.factors.push_back(factor);
+        return far;
+      });
+      leave_states_to_factors(update, *estimator);
+      estimator->update(update, {.defer = true});
+    }
+    estimator->update({}, {.full = true});
+    std::vector<Id> leaving;
+    for (Id k = 1; k + 1 < recording.variable_count(); ++k) {
+      if (k % 3 != 0) leaving.push_back(k);
+    }
+    std::erase_if(late.factors, [&](const Factor& factor) {
+      return std::ranges::any_of(factor.variables,
+                                 [&](Id id) { return std::ranges::count(leaving, id) > 0; });
+    });
+    leave(*estimator, leaving);
+    estimator->update(late);
+    estimator->update({}, {.full = true});
+    return estimator->graph();
+  };
+  const Graph whole = after([](Estimator&, const std::vector<Id>&) {});
+  const Graph sparse = after([&](Estimator& estimator, const std::vector<Id>& leaving) {
+    estimator.update(sparsifier_.remove(estimator, leaving).update);
+  });
+  const Graph frozen = after([&](Estimator& estimator, const std::vector<Id>& leaving) {
+    GraphUpdate update;
+    update.marginalized = leaving;
+    estimator.update(update);
+  });
+  EXPECT_LT(rmse(whole, sparse), 0.05);
+  EXPECT_GT(rmse(whole, frozen), 5.0 * rmse(whole, sparse));
+}
+
 // What cannot be removed --------------------------------------------------------------------------
 
 TEST_P(MapSparsifierOf, RefusesWithTheReasonAndChangesNothing) {
