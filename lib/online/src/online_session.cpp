@@ -139,7 +139,11 @@ void OnlineSession::solve_now(const GraphUpdate& update, bool full, Reply& reply
 
 PoseRemover::Removal OnlineSession::make_room(const GraphUpdate& coming) {
   if (settings_.keep == 0 || !settings_.remover) return {};
-  return settings_.remover->make_room(estimator_, settings_.keep, coming);
+  try {
+    return settings_.remover->make_room(estimator_, settings_.keep, coming);
+  } catch (const Error& error) {  // which must not cost the measurement that has come
+    return {.update = {}, .kld = 0.0, .note = fmt::format("no pose was removed: {}", error.what())};
+  }
 }
 
 /// What the estimator has taken is known, and waits no more.
@@ -293,7 +297,9 @@ void OnlineSession::keep(const Words& words, Reply& reply) {
   reply.changes = true;
   if (!settings_.automatic) return acknowledge(reply, owed_);  // poses leave with SOLVE
   try {
-    const PoseRemover::Removal removal = make_room({});
+    // Here an error is an answer: of a sparsifier that there is not.
+    const PoseRemover::Removal removal =
+        limit > 0 ? settings_.remover->make_room(estimator_, limit, {}) : PoseRemover::Removal();
     if (removal.empty()) {
       write_removal(removal, 0, reply);
     } else {

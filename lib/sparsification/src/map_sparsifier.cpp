@@ -66,7 +66,7 @@ PoseRemover::Removal MapSparsifier::removal_of(const Sparsification& change, con
   const std::vector<FactorId> ids = estimator.factors();  // by position in its graph
   if (std::ssize(ids) != graph.factor_count())
     throw std::logic_error("the graph of an estimator has other factors than it names");
-  Removal removal{.update = {}, .kld = change.kld, .note = {}};
+  Removal removal{.update = {}, .kld = std::max(0.0, change.kld), .note = {}};
   for (const int f : change.removed_factors) removal.update.removed_factors.push_back(ids[f]);
   for (const int v : change.removed_variables)
     removal.update.removed_variables.push_back(graph.id(v));
