@@ -189,6 +189,48 @@ TEST_F(Online, KeepsAFixedNumberOfPosesAndWritesThem) {
   }
 }
 
+TEST_F(Online, SparsifiesAsTheDocumentationSays) {
+  CAIRN_NEEDS("sparsifier", "sparsify");
+  CAIRN_NEEDS("estimator", "incremental_cholesky");
+  const std::string page = read_text(std::string(CAIRN_SOURCE_FOLDER) + "/docs/online.md");
+  const std::string begin = "```text\n";
+  const std::size_t at = page.find(begin + "> SPARSIFY");
+  ASSERT_NE(at, std::string::npos);
+  std::string stream = "VERTEX_SE2 0 0 0 0\nFIX 0\n";
+  const std::string step = " 1 0 0.1 100 0 0 100 0 400\n";
+  for (int k = 1; k < 5; ++k) {
+    stream += "NEW VERTEX_SE2 " + std::to_string(k) + "\nEDGE_SE2 " + std::to_string(k - 1) + " " +
+              std::to_string(k) + step;
+  }
+  stream += "EDGE_SE2 1 4 2.9 0.4 0.3 100 0 0 100 0 400\n";
+  std::vector<std::string> expected;
+  const std::size_t first = at + begin.size();
+  for (const std::string& line : lines(page.substr(first, page.find("```", first) - first))) {
+    if (line.starts_with("> ")) {
+      stream += line.substr(2) + "\n";
+    } else {
+      expected.push_back(line);
+    }
+  }
+  const std::vector<std::string> all =
+      lines(cairn(online({}, "incremental_cholesky"), {}, stream).out);
+  ASSERT_GT(all.size(), expected.size());
+  const std::vector<std::string> answers(all.end() - std::ssize(expected), all.end());
+  for (std::size_t k = 0; k < expected.size(); ++k) {
+    std::istringstream got(answers[k]), wanted(expected[k]);
+    for (std::string a, b; wanted >> b;) {
+      ASSERT_TRUE(got >> a) << answers[k];
+      char* rest = nullptr;
+      const double number = std::strtod(b.c_str(), &rest);
+      if (*rest != 0) {
+        EXPECT_EQ(a, b) << answers[k];
+      } else {
+        EXPECT_NEAR(std::strtod(a.c_str(), nullptr), number, 6e-5) << answers[k];
+      }
+    }
+  }
+}
+
 TEST_F(Online, RefusesOptionsOfSparsificationThatCannotBe) {
   const auto refusal = [&](const Arguments& more, int code) {
     const Outcome run = cairn(online(more), {}, "");
