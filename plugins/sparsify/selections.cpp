@@ -201,6 +201,20 @@ std::vector<int> Nearest::choose(const Graph& graph, std::span<const int> nodes,
     may[v] = true;
     few[v] = static_cast<int>(std::ssize(work.blanket({&v, 1}))) <= neighbours_;
   }
+  // Of two nodes the divergence is computed when they are compared; where many are to leave, that
+  // of all at once, since each call takes time in proportion to the graph.
+  constexpr int kMany = 8;
+  constexpr double kUnknown = std::numeric_limits<double>::infinity();
+  std::vector<double> divergence(graph.variable_count(), kUnknown);
+  const auto evaluate = [&](const std::vector<int>& of) {
+    const std::vector<double> klds = sparsifier.losses(graph, of);
+    for (std::size_t k = 0; k < of.size(); ++k) divergence[of[k]] = klds[k];
+  };
+  if (count > kMany) {
+    std::vector<int> cheap(nodes.begin(), nodes.end());
+    std::erase_if(cheap, [&](int v) { return !few[v]; });
+    evaluate(cheap);
+  }
   NearestPairs pairs(graph, angle_);
   std::vector<int> chosen;
   while (static_cast<int>(std::ssize(chosen)) < count) {
@@ -209,9 +223,9 @@ std::vector<int> Nearest::choose(const Graph& graph, std::span<const int> nodes,
     if (!pair) break;
     auto [leaves, other] = *pair;
     if (may[other] && few[other] == few[leaves]) {
-      const std::array<int, 2> both{std::min(leaves, other), std::max(leaves, other)};
-      const std::vector<double> klds = sparsifier.losses(graph, both);
-      leaves = klds[1] < klds[0] ? both[1] : both[0];
+      const int older = std::min(leaves, other), newer = std::max(leaves, other);
+      if (count <= kMany) evaluate({older, newer});
+      leaves = divergence[newer] < divergence[older] ? newer : older;
     }
     chosen.push_back(leaves);
     may[leaves] = few[leaves] = false;

@@ -265,6 +265,17 @@ TEST_F(Selections, OfTheTwoNearestTheOneThatCostsLessLeaves) {
   EXPECT_THAT(Nearest({.angle = 1.0}).choose(graph, all(graph), priced, 1), ElementsAre(1));
 }
 
+TEST_F(Selections, WhereManyLeaveTheSameOnesDo) {
+  const Graph graph = simulate(registry, "manhattan:poses=40,streets=3");
+  std::map<Id, double> prices;
+  for (Id k = 0; k < 40; ++k) prices[k] = static_cast<double>((k * 17) % 41);
+  Priced priced(prices);
+  const std::vector<int> many = Nearest({}).choose(graph, all(graph), priced, 12),
+                         few = Nearest({}).choose(graph, all(graph), priced, 6);
+  ASSERT_EQ(many.size(), 12U);
+  EXPECT_EQ(few, std::vector<int>(many.begin(), many.begin() + 6));
+}
+
 TEST_F(Selections, NodesWithManyNeighboursStayAsLongAsPossible) {
   Graph graph = graph_of(5, {{0, 1}, {0, 2}, {0, 3}, {3, 4}});
   for (int v = 0; v < 5; ++v) {
