@@ -30,4 +30,4 @@ without(plot svg png pdf)
 without(registration recorded simulated)
 without(report html)
 without(sparsify sparsify clt mi dmi ekld odd l1 cliquey best closed_form fd ncfd ip pqn
-        keep_every least_loss smallest_blanket oldest coverage)
+        keep_every least_loss smallest_blanket oldest nearest coverage)

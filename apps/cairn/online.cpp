@@ -23,6 +23,7 @@
 #include "cairn/runtime/plugin_call.hpp"
 #include "cairn/runtime/threads.hpp"
 #include "cairn/solve/estimator.hpp"
+#include "cairn/sparsification/map_sparsifier.hpp"
 #include "cairn/update/marginal_prior.hpp"
 #include "commands.hpp"
 #include "graph_files.hpp"
@@ -39,6 +40,7 @@ namespace {
 namespace json = boost::json;
 
 constexpr const char* kDefaultEstimator = "incremental_cholesky";
+constexpr const char* kDefaultSparsifier = "sparsify";
 
 struct OnlineOptions {
   std::string estimator;   ///< empty: the default, or the policy's own
@@ -50,6 +52,9 @@ struct OnlineOptions {
   std::string estimates = "last";
   std::string marginals = "none";
   double budget = 0.0;
+  int keep = 0;
+  std::string sparsifier;  ///< empty: the default, and so is `select`
+  std::string select;
   std::string journal;
   std::string sync = "batch";
   std::string output;
@@ -62,11 +67,16 @@ struct OnlineOptions {
 /// What must be the same for a journal to give the same estimate again.
 std::string identity(const OnlineOptions& options, const std::string& who, const Session& session) {
   const std::string types = joined(session.common.types, " ");
-  return fmt::format("{}, types {}, format {}{}, loss {} on {}, solve {}", who,
-                     types.empty() ? "as they are" : types, options.input.format,
-                     options.input.read.repair_information ? " with repairs" : "",
-                     options.problem.loss.empty() ? "none" : options.problem.loss,
-                     options.problem.loss_on, options.solve);
+  std::string text = fmt::format("{}, types {}, format {}{}, loss {} on {}, solve {}", who,
+                                 types.empty() ? "as they are" : types, options.input.format,
+                                 options.input.read.repair_information ? " with repairs" : "",
+                                 options.problem.loss.empty() ? "none" : options.problem.loss,
+                                 options.problem.loss_on, options.solve);
+  // Not where they are not given: journals of before are continued.
+  if (options.keep > 0) text += fmt::format(", keep {}", options.keep);
+  if (!options.sparsifier.empty()) text += ", sparsifier " + options.sparsifier;
+  if (!options.select.empty()) text += ", select " + options.select;
+  return text;
 }
 
 /// CRC-32 of a map's numbers: a journal is of the session that continued this map.
@@ -125,10 +135,29 @@ struct Listener {
   std::unique_ptr<StreamFormat> format;
   std::unique_ptr<Estimator> estimator;  ///< null: the policy has one
   std::unique_ptr<PosePolicy> policy;    ///< null: everything is taken in
+  std::unique_ptr<PoseRemover> remover;  ///< null: with a policy
   std::string name;                      ///< of the estimator or policy, for messages
   std::string identity;                  ///< of the journal
   std::unique_ptr<LineSession> lines;
 };
+
+std::unique_ptr<PoseRemover> pose_remover(const OnlineOptions& options, Registry& registry) {
+  const ComponentSpec sparsifier =
+      parse_component(options.sparsifier.empty() ? kDefaultSparsifier : options.sparsifier);
+  const auto topology = sparsifier.values.find("topology");
+  if (topology != sparsifier.values.end() && topology->second.starts_with("cliquey")) {
+    throw Error(ErrorCode::usage,
+                "topology cliquey makes pairs of correlated factors (CORRELATED_PAIR), which no "
+                "format of graphs expresses: the map could not be saved; choose another topology");
+  }
+  auto remover = std::make_unique<MapSparsifier>(
+      registry, sparsifier,
+      parse_component(options.select.empty() ? MapSparsifier::kDefaultSelection : options.select));
+  // A wrong name is refused at once. Without these options the plugin need not be there.
+  if (options.keep > 0 || !options.sparsifier.empty() || !options.select.empty())
+    remover->prepare();
+  return remover;
+}
 
 Listener follow_graph(const OnlineOptions& options, const ProblemSetup& setup, Session& session) {
   Registry& registry = session.registry();
@@ -142,13 +171,16 @@ Listener follow_graph(const OnlineOptions& options, const ProblemSetup& setup, S
     listener.estimator->keep_marginals(options.marginals == "last" ? KeptMarginals::last
                                                                    : KeptMarginals::diagonal);
   }
+  listener.remover = pose_remover(options, registry);
   listener.lines =
       std::make_unique<OnlineSession>(*listener.estimator, *listener.format, registry,
                                       OnlineSettings{.read = options.input.read,
                                                      .automatic = options.solve == "auto",
                                                      .output = options.estimates,
                                                      .marginals = options.marginals,
-                                                     .budget = options.budget});
+                                                     .budget = options.budget,
+                                                     .remover = listener.remover.get(),
+                                                     .keep = options.keep});
   return listener;
 }
 
@@ -200,6 +232,12 @@ void check(const OnlineOptions& options, Session& session) {
     throw Error(ErrorCode::usage,
                 "--map is continued by a policy: give --policy; without one, send the lines of the "
                 "map first");
+  }
+  if (!options.policy.empty() &&
+      (options.keep > 0 || !options.sparsifier.empty() || !options.select.empty())) {
+    throw Error(ErrorCode::usage,
+                "a policy decides itself which poses are kept: --keep, --sparsifier and --select "
+                "are for runs without --policy");
   }
   if (options.trajectory == "-")
     throw Error(ErrorCode::usage, "--trajectory writes a file; standard output is for answers");
@@ -351,6 +389,17 @@ Command add_online(ArgumentParser program) {
       .type_name("S")
       .within(0.0, 1e9)
       .show_default("0");
+  cli.add_option("--keep", options->keep,
+                 "keep so many poses: others are sparsified as new ones come; 0: all")
+      .type_name("N")
+      .within(2.0, 1e9)
+      .show_default("0");
+  cli.add_option("--select", options->select,
+                 "which poses leave: nearest, oldest, smallest_blanket, least_loss [nearest]")
+      .type_name("NAME");
+  cli.add_option("--sparsifier", options->sparsifier,
+                 "what replaces poses that leave by factors, with options as NAME:key=value")
+      .type_name("NAME");
   cli.add_option("--journal", options->journal,
                  "restore the session from this journal, and append to it")
       .type_name("FILE");
@@ -367,9 +416,9 @@ Command add_online(ArgumentParser program) {
   add_loss_options(cli, options->problem);
   add_input_options(cli, options->input);
   cli.footer(
-      "Lines are those of g2o files and SOLVE, FULL, NEW, REMOVE, CHANGE, MARGINALIZE, "
-      "COVARIANCE,\n"
-      "ESTIMATE, CHI2, SAVE and QUIT; with --policy NEXT, NOMATCH and DONE: docs/online.md.\n\n"
+      "Lines are those of g2o files and SOLVE, FULL, NEW, REMOVE, CHANGE, MARGINALIZE, SPARSIFY,\n"
+      "COVARIANCE, ESTIMATE, CHI2, SAVE and QUIT; with --policy NEXT, NOMATCH and DONE: "
+      "docs/online.md.\n\n"
       "Example:\n"
       "  robot | cairn online --marginals last --journal today.journal");
   return {cli, [options](Session& session) { return run(*options, session); }};

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <exception>
 #include <memory>
+#include <optional>
 
 #include <fmt/core.h>
 #include <boost/json/object.hpp>
@@ -17,6 +18,7 @@
 #include "cairn/runtime/plugin_call.hpp"
 #include "cairn/runtime/timed.hpp"
 #include "cairn/solve/estimator.hpp"
+#include "cairn/sparsification/map_sparsifier.hpp"
 #include "commands.hpp"
 #include "graph_files.hpp"
 #include "interrupt.hpp"
@@ -40,17 +42,21 @@ KeptMarginals kept_marginals(const std::string& name) {
 /// Feeds a graph to an estimator, and takes the time.
 class Feeder {
  public:
-  Feeder(const Graph& whole, Estimator& estimator, const ReplayOptions& options)
-      : whole_(whole), estimator_(estimator), options_(options) {}
+  /// `remover` may be null: all poses stay.
+  Feeder(const Graph& whole, Estimator& estimator, PoseRemover* remover,
+         const ReplayOptions& options)
+      : whole_(whole), estimator_(estimator), remover_(remover), options_(options) {}
 
   ReplayStep feed(const Arrival& arrival, bool solve, bool full, Replay& replay) {
     GraphUpdate update = arrival_update(whole_, arrival);
+    if (remover_) drop_unknown(update, replay);
     if (options_.problem.initial != "as_given")
       replay.placed_as_given += leave_states_to_factors(update, estimator_);
     const UpdateOptions how{.defer = !solve, .full = full, .max_seconds = options_.budget};
     ReplayStep step;
     step.solved = solve;
     const auto begin = Clock::now();
+    if (remover_) make_room(update, replay);
     step.report = estimator_.update(update, how);
     const auto updated = Clock::now();
     if (options_.estimate || options_.marginals != "none") read_estimate();
@@ -63,6 +69,30 @@ class Feeder {
   }
 
  private:
+  /// Drops measurements of poses that have left the map.
+  void drop_unknown(GraphUpdate& update, Replay& replay) const {
+    const auto there = [&](Id id) {
+      return estimator_.has(id) ||
+             std::ranges::any_of(update.variables, [&](const Variable& v) { return v.id == id; });
+    };
+    replay.dropped +=
+        static_cast<std::int64_t>(std::erase_if(update.factors, [&](const Factor& factor) {
+          return !std::ranges::all_of(factor.variables, there);
+        }));
+  }
+
+  void make_room(GraphUpdate& update, Replay& replay) {
+    const PoseRemover::Removal removal = remover_->make_room(estimator_, options_.keep, update);
+    for (const Id id : removal.update.removed_variables) std::erase(known_, id);
+    replay.removed += std::ssize(removal.update.removed_variables);
+    replay.kld += removal.kld;
+    if (!removal.note.empty() && replay.removal_note.empty()) {
+      replay.removal_note = removal.note;
+      replay.notes.push_back(removal.note);
+    }
+    removal.add_to(update);
+  }
+
   void read_estimate() {
     copy_.clear();
     for (const Id id : known_) {
@@ -73,6 +103,7 @@ class Feeder {
 
   const Graph& whole_;
   Estimator& estimator_;
+  PoseRemover* remover_;
   const ReplayOptions& options_;
   std::vector<Id> known_;
   std::vector<double> copy_;  // a reader's copy of the estimate
@@ -89,9 +120,9 @@ std::vector<bool> sampled_steps(int steps, int samples) {
 
 /// Into `replay`, which has the steps so far where something throws.
 void replay_all(const Graph& whole, const std::vector<Arrival>& arrivals, Estimator& estimator,
-                BatchChecker* checker, const ReplayOptions& options, const InterruptGuard& guard,
-                const Session& session, Replay& replay) {
-  Feeder feeder(whole, estimator, options);
+                PoseRemover* remover, BatchChecker* checker, const ReplayOptions& options,
+                const InterruptGuard& guard, const Session& session, Replay& replay) {
+  Feeder feeder(whole, estimator, remover, options);
   StatusLine line(session.common.quiet);
   const int count = static_cast<int>(std::ssize(arrivals));
   const std::vector<bool> sampled = sampled_steps(count, checker ? options.checks : 0);
@@ -125,6 +156,11 @@ void check(const ReplayOptions& options, Session& session) {
   check_output(options.output, options.output_format, session);
   check_file(options.steps, session);
   if (!options.plot.empty()) check_picture(options.plot, session);
+  if (options.keep > 0 && options.checks > 0) {
+    throw Error(ErrorCode::usage,
+                "--check compares chi2 with batch of all measurements, which is not that of a map "
+                "with --keep: omit one of them");
+  }
   if (options.covariance_check && (options.checks == 0 || options.marginals != "diagonal")) {
     throw Error(ErrorCode::usage,
                 "--covariance-check compares the kept block diagonal at the steps of --check: give "
@@ -150,6 +186,12 @@ int run(const ReplayOptions& options, Session& session) {
   keep(*estimator, options.marginals);
   estimator->set_loss(setup.loss(), setup.loss_selector());
 
+  std::optional<MapSparsifier> remover;
+  if (options.keep > 0) {
+    remover.emplace(registry, parse_component(options.sparsifier), parse_component(options.select));
+    remover->prepare();
+  }
+
   const LoadedGraph loaded = load_graph(options.graph, options.input, session);
   const std::vector<Arrival> arrivals = arrival_order(loaded.graph);
   const bool sorted = !in_arrival_order(arrivals);
@@ -171,8 +213,8 @@ int run(const ReplayOptions& options, Session& session) {
   try {
     call_plugin([&] { return fmt::format("estimator '{}'", options.estimator); },
                 [&] {
-                  replay_all(loaded.graph, arrivals, *estimator, checker ? &*checker : nullptr,
-                             options, guard, session, replay);
+                  replay_all(loaded.graph, arrivals, *estimator, remover ? &*remover : nullptr,
+                             checker ? &*checker : nullptr, options, guard, session, replay);
                 });
   } catch (const Error& error) {
     if (error.code() != ErrorCode::plugin) throw;
@@ -231,6 +273,17 @@ Command add_replay(ArgumentParser program) {
       .type_name("S")
       .within(0.0, 1e9)
       .show_default("0");
+  cli.add_option("--keep", options->keep,
+                 "keep so many poses: others are sparsified as new ones come; 0: all")
+      .type_name("N")
+      .within(2, 1000000000)
+      .show_default();
+  cli.add_option("--select", options->select, "which poses leave with --keep")
+      .type_name("NAME")
+      .show_default();
+  cli.add_option("--sparsifier", options->sparsifier, "what replaces them by factors")
+      .type_name("NAME")
+      .show_default();
   cli.add_flag("--finish", options->finish, "relinearise and solve the last step to convergence");
   cli.add_flag("--estimate", options->estimate, "count the time of reading all states, every step");
   cli.add_option("--check", options->checks, "compare chi2 with batch at so many steps (not timed)")

@@ -102,6 +102,16 @@ json::object report_json(const ReplayOptions& options, const LoadedGraph& loaded
   report["solve_every"] = options.solve_every;
   report["budget"] = options.budget;
   report["finish"] = options.finish;
+  if (options.keep > 0) {
+    report["keep"] = {{"poses", options.keep},
+                      {"select", options.select},
+                      {"sparsifier", options.sparsifier},
+                      {"removed", replay.removed},
+                      {"dropped", replay.dropped},
+                      {"kld", replay.kld},
+                      {"variables", estimator.variable_count()},
+                      {"factors", estimator.factor_count()}};
+  }
   report["status"] = status(replay);
   report["steps"] = step_times_json(step_times(replay));
   report["chi2"] = {{"final", chi2}};
@@ -180,6 +190,12 @@ std::string summary_text(const ReplayOptions& options, const LoadedGraph& loaded
                                   plural(loaded.graph.variable_count(), "variable"),
                                   plural(loaded.graph.factor_count(), "factor"))});
   table.add({"estimator", options.estimator});
+  if (options.keep > 0) {
+    table.add({"kept", fmt::format("{} at most ({}): {} removed, divergence {:.4g} nats; {} of "
+                                   "these dropped",
+                                   plural(options.keep, "pose"), options.select, replay.removed,
+                                   replay.kld, plural(replay.dropped, "measurement"))});
+  }
   table.add({"chi2", chi2_text(chi2)});
   table.add({"time", phases_text(replay)});
   table.add({"steps", step_times(replay).text()});

@@ -29,6 +29,9 @@ struct ReplayOptions {
   bool finish = false;
   int solve_every = 1;
   double budget = 0.0;  ///< [s]
+  int keep = 0;         ///< poses of the map at most; 0: all
+  std::string select = "nearest";
+  std::string sparsifier = "sparsify";
   int checks = 0;
   bool covariance_check = false;
   std::string steps;  ///< CSV file, or empty
@@ -54,7 +57,11 @@ struct Replay {
   double estimate = 0.0;  ///< [s] reading estimates
   double total = 0.0;     ///< [s] of all steps
   std::int64_t placed_as_given = 0;
-  int failed = 0;  ///< updates whose H was not positive definite
+  std::int64_t removed = 0;  ///< poses that have left the map
+  std::int64_t dropped = 0;  ///< measurements of these
+  double kld = 0.0;          ///< of the factors that replaced them, summed over the blankets [nats]
+  std::string removal_note;  ///< why more stay than should
+  int failed = 0;            ///< updates whose H was not positive definite
   std::vector<std::string> notes;
   bool interrupted = false;
 };

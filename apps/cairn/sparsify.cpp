@@ -293,9 +293,9 @@ void add_sparsify_options(ArgumentParser cli, SparsifyCommandOptions& options) {
   cli.add_option("--keep-every", options.keep_every, "one of so many nodes stays")
       .type_name("N")
       .within(1.0, 1e9);
-  cli.add_option(
-         "--select", options.select,
-         "which leave: smallest_blanket, least_loss, oldest, coverage [smallest_blanket:part=0.5]")
+  cli.add_option("--select", options.select,
+                 "which leave: smallest_blanket, least_loss, nearest, oldest, coverage "
+                 "[smallest_blanket:part=0.5]")
       .type_name("NAME");
   cli.add_option("--topology", options.topology,
                  "pairs that get a factor: clt, mi, dmi, ekld, odd, l1, best [ekld]")

@@ -58,6 +58,7 @@ void add_selections(Registrar& registrar) {
   add_by_part<LeastLoss>(registrar, "least_loss");
   add_by_part<SmallestBlanket>(registrar, "smallest_blanket");
   add_by_part<Oldest>(registrar, "oldest");
+  add<NodeSelection, NearestOptions, Nearest>(registrar, "nearest");
   registrar.add<NodeSelection, CoverageOptions>("coverage", [](const CoverageOptions& options) {
     return std::make_unique<Coverage>(options.distance, options.angle);
   });

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <optional>
 #include <queue>
 #include <set>
 #include <utility>
@@ -35,9 +36,14 @@ std::vector<int> KeepEvery::select(const Graph& graph, std::span<const int> node
   return chosen;
 }
 
-std::vector<int> LeastLoss::select(const Graph& graph, std::span<const int> nodes,
-                                   Sparsifier& sparsifier) {
-  const std::size_t wanted = share(part_, nodes.size());
+std::vector<int> SelectionByPart::select(const Graph& graph, std::span<const int> nodes,
+                                         Sparsifier& sparsifier) {
+  return choose(graph, nodes, sparsifier, static_cast<int>(share(part_, nodes.size())));
+}
+
+std::vector<int> LeastLoss::choose(const Graph& graph, std::span<const int> nodes,
+                                   Sparsifier& sparsifier, int count) {
+  const auto wanted = static_cast<std::size_t>(count);
   Graph work = graph.clone();
   std::set<Id> left;
   for (const int v : nodes) left.insert(graph.id(v));
@@ -69,8 +75,8 @@ std::vector<int> LeastLoss::select(const Graph& graph, std::span<const int> node
   return chosen;
 }
 
-std::vector<int> SmallestBlanket::select(const Graph& graph, std::span<const int> nodes,
-                                         Sparsifier& /*sparsifier*/) {
+std::vector<int> SmallestBlanket::choose(const Graph& graph, std::span<const int> nodes,
+                                         Sparsifier& /*sparsifier*/, int count) {
   std::vector<std::set<int>> neighbours(graph.variable_count());
   for (int f = 0; f < graph.factor_count(); ++f) {
     for (const int a : graph.factor_variables(f)) {
@@ -85,7 +91,7 @@ std::vector<int> SmallestBlanket::select(const Graph& graph, std::span<const int
     may[v] = true;
     queue.emplace(neighbours[v].size(), v);
   }
-  const std::size_t wanted = share(part_, nodes.size());
+  const auto wanted = static_cast<std::size_t>(count);
   std::vector<int> chosen;
   while (chosen.size() < wanted && !queue.empty()) {
     const int v = queue.begin()->second;
@@ -109,10 +115,123 @@ std::vector<int> SmallestBlanket::select(const Graph& graph, std::span<const int
   return chosen;
 }
 
-std::vector<int> Oldest::select(const Graph& /*graph*/, std::span<const int> nodes,
-                                Sparsifier& /*sparsifier*/) {
-  const auto count = static_cast<std::ptrdiff_t>(share(part_, nodes.size()));
-  return {nodes.begin(), nodes.begin() + count};
+std::vector<int> Oldest::choose(const Graph& /*graph*/, std::span<const int> nodes,
+                                Sparsifier& /*sparsifier*/, int count) {
+  return {nodes.begin(), nodes.begin() + std::min<std::ptrdiff_t>(count, std::ssize(nodes))};
+}
+
+namespace {
+
+/// The nearest other pose of each pose, while they leave one by one.
+class NearestPairs {
+ public:
+  NearestPairs(const Graph& graph, double angle) : angle_(angle) {
+    for (int v = 0; v < graph.variable_count(); ++v) {
+      if (!is_pose(graph.type(v))) continue;
+      nodes_.push_back(v);
+      poses_.push_back(pose_of(graph.type(v), graph.state(v)));
+    }
+    nearest_.resize(nodes_.size());
+    for (std::size_t k = 0; k < nodes_.size(); ++k) search(k);
+  }
+
+  /// The one that is nearest to another of those that `may` leave, and that other one: variables
+  /// of the graph.
+  std::optional<std::pair<int, int>> closest(const std::vector<bool>& may) const {
+    const Neighbour* best = nullptr;
+    std::size_t of = 0;
+    for (std::size_t k = 0; k < nodes_.size(); ++k) {
+      if (!may[nodes_[k]] || nearest_[k].at < 0) continue;
+      if (best && best->distance <= nearest_[k].distance) continue;
+      best = &nearest_[k];
+      of = k;
+    }
+    if (!best) return std::nullopt;
+    return std::pair{nodes_[of], nodes_[static_cast<std::size_t>(best->at)]};
+  }
+
+  void remove(int node) {
+    const auto gone = std::ranges::lower_bound(nodes_, node) - nodes_.begin();
+    nodes_.erase(nodes_.begin() + gone);
+    poses_.erase(poses_.begin() + gone);
+    nearest_.erase(nearest_.begin() + gone);
+    for (std::size_t k = 0; k < nodes_.size(); ++k) {
+      if (nearest_[k].at == gone) {
+        search(k);
+      } else if (nearest_[k].at > gone) {
+        --nearest_[k].at;
+      }
+    }
+  }
+
+ private:
+  struct Neighbour {
+    double distance = 0.0;
+    std::ptrdiff_t at = -1;  ///< in `nodes_`; -1: there is no other
+  };
+
+  double distance(const Pose& a, const Pose& b) const {
+    const double rotation = angle_ > 0.0 ? angle_ * rotation_angle(a.R.transpose() * b.R) : 0.0;
+    return std::hypot((a.t - b.t).norm(), rotation);
+  }
+
+  void search(std::size_t k) {
+    nearest_[k] = {};
+    for (std::size_t j = 0; j < nodes_.size(); ++j) {
+      if (j == k) continue;
+      const double there = distance(poses_[k], poses_[j]);
+      if (nearest_[k].at >= 0 && nearest_[k].distance <= there) continue;
+      nearest_[k] = {there, static_cast<std::ptrdiff_t>(j)};
+    }
+  }
+
+  double angle_;
+  std::vector<int> nodes_;  ///< rising
+  std::vector<Pose> poses_;
+  std::vector<Neighbour> nearest_;
+};
+
+}  // namespace
+
+std::vector<int> Nearest::choose(const Graph& graph, std::span<const int> nodes,
+                                 Sparsifier& sparsifier, int count) {
+  std::vector<bool> few(graph.variable_count()), may(graph.variable_count());
+  const WorkGraph work(graph);
+  for (const int v : nodes) {
+    may[v] = true;
+    few[v] = static_cast<int>(std::ssize(work.blanket({&v, 1}))) <= neighbours_;
+  }
+  // Of two nodes the divergence is computed when they are compared; where many are to leave, that
+  // of all at once, since each call takes time in proportion to the graph.
+  constexpr int kMany = 8;
+  constexpr double kUnknown = std::numeric_limits<double>::infinity();
+  std::vector<double> divergence(graph.variable_count(), kUnknown);
+  const auto evaluate = [&](const std::vector<int>& of) {
+    const std::vector<double> klds = sparsifier.losses(graph, of);
+    for (std::size_t k = 0; k < of.size(); ++k) divergence[of[k]] = klds[k];
+  };
+  if (count > kMany) {
+    std::vector<int> cheap(nodes.begin(), nodes.end());
+    std::erase_if(cheap, [&](int v) { return !few[v]; });
+    evaluate(cheap);
+  }
+  NearestPairs pairs(graph, angle_);
+  std::vector<int> chosen;
+  while (static_cast<int>(std::ssize(chosen)) < count) {
+    auto pair = pairs.closest(few);
+    if (!pair) pair = pairs.closest(may);
+    if (!pair) break;
+    auto [leaves, other] = *pair;
+    if (may[other] && few[other] == few[leaves]) {
+      const int older = std::min(leaves, other), newer = std::max(leaves, other);
+      if (count <= kMany) evaluate({older, newer});
+      leaves = divergence[newer] < divergence[older] ? newer : older;
+    }
+    chosen.push_back(leaves);
+    may[leaves] = few[leaves] = false;
+    pairs.remove(leaves);
+  }
+  return chosen;
 }
 
 std::vector<int> Coverage::select(const Graph& graph, std::span<const int> nodes,

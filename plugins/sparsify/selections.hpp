@@ -38,40 +38,73 @@ struct PartOptions {
   }
 };
 
-/// The part of the nodes whose removal increases the divergence least leaves, round by round: in
-/// each those with the least divergence that are not neighbours, of an eighth of what is still to
-/// leave; then the rest is evaluated again.
-class LeastLoss final : public NodeSelection {
+/// A selection of as many nodes as are wanted: by `select` a part of those that may leave.
+class SelectionByPart : public NodeSelection {
  public:
-  explicit LeastLoss(double part) : part_(part) {}
+  explicit SelectionByPart(double part) : part_(part) {}
   std::vector<int> select(const Graph& graph, std::span<const int> nodes,
-                          Sparsifier& sparsifier) override;
+                          Sparsifier& sparsifier) final;
 
  private:
   double part_;
+};
+
+/// The part of the nodes whose removal increases the divergence least leaves, round by round: in
+/// each those with the least divergence that are not neighbours, of an eighth of what is still to
+/// leave; then the rest is evaluated again.
+class LeastLoss final : public SelectionByPart {
+ public:
+  using SelectionByPart::SelectionByPart;
+  std::vector<int> choose(const Graph& graph, std::span<const int> nodes, Sparsifier& sparsifier,
+                          int count) override;
 };
 
 /// The part of the nodes with the smallest Markov blankets leaves, always the smallest of what is
 /// left. The blanket of a node that leaves is taken to be connected afterwards as a ring.
-class SmallestBlanket final : public NodeSelection {
+class SmallestBlanket final : public SelectionByPart {
  public:
-  explicit SmallestBlanket(double part) : part_(part) {}
-  std::vector<int> select(const Graph& graph, std::span<const int> nodes,
-                          Sparsifier& sparsifier) override;
-
- private:
-  double part_;
+  using SelectionByPart::SelectionByPart;
+  std::vector<int> choose(const Graph& graph, std::span<const int> nodes, Sparsifier& sparsifier,
+                          int count) override;
 };
 
 /// The oldest part of the nodes (those that came first) leaves.
-class Oldest final : public NodeSelection {
+class Oldest final : public SelectionByPart {
  public:
-  explicit Oldest(double part) : part_(part) {}
-  std::vector<int> select(const Graph& graph, std::span<const int> nodes,
-                          Sparsifier& sparsifier) override;
+  using SelectionByPart::SelectionByPart;
+  std::vector<int> choose(const Graph& graph, std::span<const int> nodes, Sparsifier& sparsifier,
+                          int count) override;
+};
+
+struct NearestOptions {
+  double part = 0.5;   ///< of the nodes that may leave
+  double angle = 0.0;  ///< [m]
+  int neighbours = 14;
+
+  static auto fields() {
+    using O = NearestOptions;
+    return OptionFields<O>()
+        .real("part", &O::part, 0.0, 1.0, "of the nodes that may leave")
+        .real("angle", &O::angle, 0.0, 1e9,
+              "the distance that a difference in orientation of a radian counts for [m]")
+        .integer("neighbours", &O::neighbours, 1, 1000000000,
+                 "nodes with more neighbours leave only if none with fewer may");
+  }
+};
+
+/// One by one, of the two nodes nearest to each other the one whose removal increases the
+/// divergence less leaves: so those that stay cover the space where the robot was as evenly as
+/// their number permits. The distance of two nodes is √(‖t_a − t_b‖² + (angle · rotation)²).
+class Nearest final : public SelectionByPart {
+ public:
+  explicit Nearest(const NearestOptions& options)
+      : SelectionByPart(options.part), angle_(options.angle), neighbours_(options.neighbours) {}
+  std::vector<int> choose(const Graph& graph, std::span<const int> nodes, Sparsifier& sparsifier,
+                          int count) override;
 
  private:
-  double part_;
+  double angle_;
+  int neighbours_;
 };
 
 struct CoverageOptions {

@@ -173,6 +173,7 @@ TEST_F(OnlinePolicy, ABadLineIsToldAndNothingOfItStays) {
                   "REMOVE VARIABLE 0",
                   "CHANGE 0 1 0 0",
                   "MARGINALIZE 0",
+                  "SPARSIFY 0",
                   "SOLVE",
                   "FULL",
                   "NEXT pair",

@@ -103,6 +103,11 @@ TEST_F(Online, ABadLineIsToldAndNothingOfItStays) {
                                         "REMOVE VARIABLE 1 1",
                                         "MARGINALIZE",
                                         "MARGINALIZE 8",
+                                        "SPARSIFY",
+                                        "SPARSIFY 0",
+                                        "SPARSIFY 8",
+                                        "SPARSIFY KEEP",
+                                        "SPARSIFY KEEP 1",
                                         "CHANGE 0 1",
                                         "CHANGE 4 1 0 0",
                                         "COVARIANCE 0",
@@ -154,6 +159,94 @@ TEST_F(Online, ChangesMarginalizesAndTellsCovariances) {
   EXPECT_THAT(run.out, HasSubstr("variables 1 factors 1"));
   EXPECT_THAT(run.out, HasSubstr("format g2o cannot express MARGINAL_PRIOR 2"));
   EXPECT_THAT(folder_.contents(), ElementsAre("all.tum"));
+}
+
+TEST_F(Online, KeepsAFixedNumberOfPosesAndWritesThem) {
+  CAIRN_NEEDS("sparsifier", "sparsify");
+  std::string stream = "VERTEX_SE2 0 0 0 0\nFIX 0\n";
+  for (int k = 1; k < 30; ++k) {
+    stream += "NEW VERTEX_SE2 " + std::to_string(k) + "\nEDGE_SE2 " + std::to_string(k - 1) + " " +
+              std::to_string(k) + kEdge + "\n";
+    if (k == 20) stream += "SPARSIFY 19\n";
+  }
+  const std::string out = folder_.file("map.g2o");
+  for (const char* estimator : {"batch", "incremental_cholesky"}) {
+    CAIRN_NEEDS("estimator", estimator);
+    const Outcome run = cairn(online({"--keep", "12", "-o", out}, estimator), {}, stream);
+    EXPECT_EQ(run.exit_code, 0) << run.err;
+    EXPECT_THAT(run.out, HasSubstr("REMOVED 19\nFACTOR "));
+    EXPECT_THAT(lines(run.out).back(), HasSubstr("variables 12 factors 11"));
+    // A chain: the newest pose is where it is in the whole map.
+    const std::string whole = lines(cairn(online({}, estimator), {}, stream).out).end()[-2];
+    const std::string last = lines(run.out).end()[-2];
+    double x[3], y[3];
+    ASSERT_EQ(std::sscanf(last.c_str(), "VERTEX_SE2 29 %lf %lf %lf", x, x + 1, x + 2), 3) << last;
+    ASSERT_EQ(std::sscanf(whole.c_str(), "VERTEX_SE2 29 %lf %lf %lf", y, y + 1, y + 2), 3);
+    for (int k = 0; k < 3; ++k) EXPECT_NEAR(x[k], y[k], 1e-6);
+    const boost::json::value info = parse_json(cairn({"info", out, "--json", "-"}).out);
+    EXPECT_EQ(info.at("graph").at("variables").as_int64(), 12);
+    EXPECT_EQ(info.at("graph").at("factors").as_int64(), 11);
+  }
+}
+
+TEST_F(Online, SparsifiesAsTheDocumentationSays) {
+  CAIRN_NEEDS("sparsifier", "sparsify");
+  CAIRN_NEEDS("estimator", "incremental_cholesky");
+  const std::string page = read_text(std::string(CAIRN_SOURCE_FOLDER) + "/docs/online.md");
+  const std::string begin = "```text\n";
+  const std::size_t at = page.find(begin + "> SPARSIFY");
+  ASSERT_NE(at, std::string::npos);
+  std::string stream = "VERTEX_SE2 0 0 0 0\nFIX 0\n";
+  const std::string step = " 1 0 0.1 100 0 0 100 0 400\n";
+  for (int k = 1; k < 5; ++k) {
+    stream += "NEW VERTEX_SE2 " + std::to_string(k) + "\nEDGE_SE2 " + std::to_string(k - 1) + " " +
+              std::to_string(k) + step;
+  }
+  stream += "EDGE_SE2 1 4 2.9 0.4 0.3 100 0 0 100 0 400\n";
+  std::vector<std::string> expected;
+  const std::size_t first = at + begin.size();
+  for (const std::string& line : lines(page.substr(first, page.find("```", first) - first))) {
+    if (line.starts_with("> ")) {
+      stream += line.substr(2) + "\n";
+    } else {
+      expected.push_back(line);
+    }
+  }
+  const std::vector<std::string> all =
+      lines(cairn(online({}, "incremental_cholesky"), {}, stream).out);
+  ASSERT_GT(all.size(), expected.size());
+  const std::vector<std::string> answers(all.end() - std::ssize(expected), all.end());
+  for (std::size_t k = 0; k < expected.size(); ++k) {
+    std::istringstream got(answers[k]), wanted(expected[k]);
+    for (std::string a, b; wanted >> b;) {
+      ASSERT_TRUE(got >> a) << answers[k];
+      char* rest = nullptr;
+      const double number = std::strtod(b.c_str(), &rest);
+      if (*rest != 0) {
+        EXPECT_EQ(a, b) << answers[k];
+      } else {
+        EXPECT_NEAR(std::strtod(a.c_str(), nullptr), number, 6e-5) << answers[k];
+      }
+    }
+  }
+}
+
+TEST_F(Online, RefusesOptionsOfSparsificationThatCannotBe) {
+  const auto refusal = [&](const Arguments& more, int code) {
+    const Outcome run = cairn(online(more), {}, "");
+    EXPECT_EQ(run.exit_code, code) << run.err;
+    return run.err;
+  };
+  EXPECT_THAT(refusal({"--keep", "1"}, 2), HasSubstr("--keep"));
+  EXPECT_THAT(refusal({"--select", "widest"}, 5), HasSubstr("on offer: coverage"));
+  EXPECT_THAT(refusal({"--sparsifier", "sparsify:topology=cliquey"}, 2),
+              HasSubstr("the map could not be saved"));
+  EXPECT_THAT(refusal({"--keep", "20", "--policy", "compact_pose"}, 2),
+              HasSubstr("a policy decides itself which poses are kept"));
+  // It gives another map, so the journal is another.
+  const std::string journal = folder_.file("log");
+  cairn(online({"--journal", journal}), {}, "VERTEX_SE2 0 0 0 0\n");
+  EXPECT_THAT(refusal({"--keep", "20", "--journal", journal}, 2), HasSubstr(", keep 20"));
 }
 
 TEST_F(Online, EndsWithQuitOrTheInputAndCounts) {
@@ -229,7 +322,9 @@ std::vector<std::string> robots_day(int poses, unsigned seed) {
     if (k % 11 == 0) day.push_back("# a remark");
     if (k % 13 == 0) day.push_back("CHANGE " + std::to_string(factors - 1) + " 1.02 0.01 0.02");
     if (k == 40) day.push_back("REMOVE FACTOR 20");
+    if (k == 35) day.push_back("SPARSIFY 9 21");
     if (k == 45) day.push_back("MARGINALIZE 0 1 2");
+    if (k == 50) day.push_back("SPARSIFY KEEP 36");
     if (k % 10 == 0) day.push_back("COVARIANCE " + std::to_string(k) + " " + std::to_string(k));
   }
   day.push_back("FULL");

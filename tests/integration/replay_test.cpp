@@ -110,6 +110,26 @@ TEST_F(Replay, DrawsTheTimeOfEachStep) {
   EXPECT_THAT(read_text(folder_.file("steps.svg")), HasSubstr("<svg"));
 }
 
+TEST_F(Replay, KeepsAFixedNumberOfPoses) {
+  if (!Registry().has("sparsifier", "sparsify")) GTEST_SKIP() << "no sparsifier sparsify";
+  const std::string out = folder_.file("out.g2o");
+  const Outcome run =
+      cairn({"replay", "@manhattan:poses=120,streets=3,loop_density=1", "--estimator", "batch",
+             "--keep", "30", "--marginals", "last", "-o", out, "--json", "-", "--quiet"});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const boost::json::value report = parse_json(run.out);
+  const boost::json::value& keep = report.at("keep");
+  EXPECT_EQ(keep.at("removed").as_int64(), 90);
+  EXPECT_EQ(keep.at("variables").as_int64(), 30);
+  EXPECT_GT(keep.at("dropped").as_int64(), 0);
+  EXPECT_GT(keep.at("kld").as_double(), 0.0);
+  const boost::json::value info = parse_json(cairn({"info", out, "--json", "-"}).out);
+  EXPECT_EQ(info.at("graph").at("variables").as_int64(), 30);
+  const Outcome check = cairn({"replay", "@manhattan:poses=120", "--keep", "30", "--check", "2"});
+  EXPECT_EQ(check.exit_code, 2);
+  EXPECT_THAT(check.err, HasSubstr("omit one of them"));
+}
+
 TEST_F(Replay, RefusesWhatCannotBe) {
   EXPECT_EQ(cairn({"replay", "@manhattan:poses=20", "--estimator", "no_such"}).exit_code, 5);
   const Outcome check =

@@ -23,6 +23,7 @@ OnlineSession::Command OnlineSession::find_command(std::string_view word) {
       {"REMOVE", &OnlineSession::remove},
       {"CHANGE", &OnlineSession::change},
       {"MARGINALIZE", &OnlineSession::marginalize},
+      {"SPARSIFY", &OnlineSession::sparsify},
       {"SOLVE", &OnlineSession::solve},
       {"FULL", &OnlineSession::solve_fully},
       {"COVARIANCE", &OnlineSession::report_covariance},
@@ -92,21 +93,57 @@ void OnlineSession::take_factor(Factor factor, Reply& reply) {
   }
   with.factors.push_back(std::move(factor));
   const bool dangling = with.variables.size() < waiting_.size();
-  update(std::move(with), settings_.automatic && !dangling, false, reply);
+  const bool solve = settings_.automatic && !dangling;
+  // Before a pose comes, all measurements of the one before it are there.
+  PoseRemover::Removal removal;
+  if (solve && !with.variables.empty()) removal = make_room(with);
+  update(std::move(with), solve, false, reply, removal);
 }
 
 // Updates ---------------------------------------------------------------------------------------
 
-UpdateReport OnlineSession::update(GraphUpdate update, bool solve, bool full, Reply& reply) {
+UpdateReport OnlineSession::update(GraphUpdate update, bool solve, bool full, Reply& reply,
+                                   const PoseRemover::Removal& removal) {
+  removal.add_to(update);
+  UpdateReport report = hand_over(update, solve, full, reply);
+  write_removal(removal, report.first_factor, reply);
+  if (solve && !silent()) write_results(report, reply);
+  return report;
+}
+
+UpdateReport OnlineSession::hand_over(const GraphUpdate& update, bool solve, bool full,
+                                      Reply& reply) {
   const UpdateOptions how{.defer = !solve, .full = full, .max_seconds = settings_.budget};
-  const UpdateReport report = estimator_.update(update, how);
+  UpdateReport report = estimator_.update(update, how);
   follow(update);
   reply.changes = true;
   reply.solved = solve;
-  if (solve) reply.seconds = report.seconds.total;
+  if (solve) reply.seconds += report.seconds.total;
   owed_ = report.owed;
-  if (solve && !silent()) write_results(report, reply);
   return report;
+}
+
+/// Where lines of data are not solved, poses leave here: at the minimum, and are then reported.
+void OnlineSession::solve_now(const GraphUpdate& update, bool full, Reply& reply) {
+  UpdateReport report = hand_over(update, true, full, reply);
+  const PoseRemover::Removal removal = make_room({});
+  if (!removal.empty()) {
+    std::vector<std::string> notes = std::move(report.notes);
+    report = hand_over(removal.update, true, full, reply);
+    notes.insert(notes.end(), report.notes.begin(), report.notes.end());
+    report.notes = std::move(notes);
+  }
+  write_removal(removal, report.first_factor, reply);
+  if (!silent()) write_results(report, reply);
+}
+
+PoseRemover::Removal OnlineSession::make_room(const GraphUpdate& coming) {
+  if (settings_.keep == 0 || !settings_.remover) return {};
+  try {
+    return settings_.remover->make_room(estimator_, settings_.keep, coming);
+  } catch (const Error& error) {  // which must not cost the measurement that has come
+    return {.update = {}, .kld = 0.0, .note = fmt::format("no pose was removed: {}", error.what())};
+  }
 }
 
 /// What the estimator has taken is known, and waits no more.
@@ -123,6 +160,22 @@ void OnlineSession::follow(const GraphUpdate& update) {
   };
   for (const Id id : update.marginalized) forget(id);
   for (const Id id : update.removed_variables) forget(id);
+}
+
+void OnlineSession::write_removal(const PoseRemover::Removal& removal, FactorId first_factor,
+                                  Reply& reply) {
+  if (silent()) return;
+  if (removal.note != noted_ && !removal.note.empty())
+    reply.text += fmt::format("NOTE {}\n", removal.note);
+  if (!removal.note.empty() || !removal.empty()) noted_ = removal.note;
+  if (removal.empty()) return;
+  for (const Id id : removal.update.removed_variables)
+    reply.text += fmt::format("REMOVED {}\n", id);
+  for (std::size_t k = 0; k < removal.update.factors.size(); ++k) {
+    reply.text += fmt::format("FACTOR {} {}\n", first_factor + static_cast<FactorId>(k),
+                              fmt::join(removal.update.factors[k].variables, " "));
+  }
+  reply.text += fmt::format("KLD {}\n", removal.kld);
 }
 
 void OnlineSession::write_results(const UpdateReport& report, Reply& reply) {
@@ -207,18 +260,71 @@ void OnlineSession::marginalize(const Words& words, Reply& reply) {
   if (!reply.solved) acknowledge(reply, owed_);
 }
 
+void OnlineSession::sparsify(const Words& words, Reply& reply) {
+  if (!settings_.remover)
+    throw bad_line("this session has no sparsifier; MARGINALIZE and REMOVE remove variables");
+  if (words.size() < 2) throw bad_line("expected 'SPARSIFY id …' or 'SPARSIFY KEEP n'");
+  if (words[1] == "KEEP") return keep(words, reply);
+  const std::vector<Id> ids = parse_ids(std::span(words).subspan(1), "id");
+  PoseRemover::Removal removal;
+  try {
+    removal = settings_.remover->remove(estimator_, ids);
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::input) throw;
+    throw bad_line(fmt::format(
+        "{}. Nothing has changed; MARGINALIZE leaves a linear prior instead, REMOVE VARIABLE "
+        "nothing",
+        error.what()));
+  }
+  update({}, settings_.automatic, false, reply, removal);
+  if (!reply.solved) acknowledge(reply, owed_);
+}
+
+void OnlineSession::keep(const Words& words, Reply& reply) {
+  expect_words(words, 3, "SPARSIFY KEEP n' or 'SPARSIFY KEEP ALL");
+  constexpr int kFewest = 2, kMost = 1000000000;
+  int limit = 0;
+  if (words[2] != "ALL") {
+    const std::int64_t count = parse_whole(words[2], "number of poses");
+    if (count < kFewest || count > kMost) {
+      throw bad_line(
+          fmt::format("SPARSIFY KEEP {}: expected a number of poses from {} to {}, or ALL", count,
+                      kFewest, kMost));
+    }
+    limit = static_cast<int>(count);
+  }
+  const int before = std::exchange(settings_.keep, limit);
+  reply.changes = true;
+  if (!settings_.automatic) return acknowledge(reply, owed_);  // poses leave with SOLVE
+  try {
+    // Here an error is an answer: of a sparsifier that there is not.
+    const PoseRemover::Removal removal =
+        limit > 0 ? settings_.remover->make_room(estimator_, limit, {}) : PoseRemover::Removal();
+    if (removal.empty()) {
+      write_removal(removal, 0, reply);
+    } else {
+      update({}, true, false, reply, removal);
+    }
+  } catch (const Error&) {
+    settings_.keep = before;
+    reply.changes = false;
+    throw;
+  }
+  if (!reply.solved) acknowledge(reply, owed_);
+}
+
 void OnlineSession::solve(const Words& words, Reply& reply) {
   expect_words(words, 1, "SOLVE");
   GraphUpdate rest;  // what has a place, though no measurement
   for (const Variable& variable : waiting_) {
     if (!variable.state.empty()) rest.variables.push_back(variable);
   }
-  update(std::move(rest), true, false, reply);
+  solve_now(rest, false, reply);
 }
 
 void OnlineSession::solve_fully(const Words& words, Reply& reply) {
   expect_words(words, 1, "FULL");
-  update({}, true, true, reply);
+  solve_now({}, true, reply);
 }
 
 void OnlineSession::report_covariance(const Words& words, Reply& reply) {

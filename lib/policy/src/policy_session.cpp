@@ -70,6 +70,7 @@ PolicySession::Command PolicySession::find_command(std::string_view word) {
       {"FULL", &PolicySession::refuse},
       {"CHANGE", &PolicySession::refuse},
       {"MARGINALIZE", &PolicySession::refuse},
+      {"SPARSIFY", &PolicySession::refuse},
   };
   for (const auto& [name, command] : kCommands) {
     if (name == word) return command;

@@ -10,6 +10,13 @@ namespace cairn {
 Sparsifier::~Sparsifier() = default;
 NodeSelection::~NodeSelection() = default;
 
+std::vector<int> NodeSelection::choose(const Graph& graph, std::span<const int> nodes,
+                                       Sparsifier& sparsifier, int count) {
+  std::vector<int> chosen = select(graph, nodes, sparsifier);
+  chosen.resize(std::min(chosen.size(), static_cast<std::size_t>(std::max(count, 0))));
+  return chosen;
+}
+
 SparsificationSeconds& SparsificationSeconds::operator+=(const SparsificationSeconds& other) {
   total += other.total;
   marginalize += other.marginalize;

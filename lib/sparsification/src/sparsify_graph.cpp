@@ -18,6 +18,7 @@
 #include "cairn/runtime/plugin_call.hpp"
 #include "cairn/runtime/timed.hpp"
 #include "cairn/solve/estimator.hpp"
+#include "plain_loss.hpp"
 
 namespace cairn {
 namespace {
@@ -288,6 +289,7 @@ class OnlineRun {
     for (const int f : change.removed_factors) update.removed_factors.push_back(live_[f]);
     for (const int v : change.removed_variables) update.removed_variables.push_back(graph.id(v));
     update.factors = change.factors;
+    for (Factor& factor : update.factors) factor.loss = plain_loss();
     std::vector<FactorId> stay;
     std::ranges::set_difference(live_, update.removed_factors, std::back_inserter(stay));
     live_ = std::move(stay);

@@ -23,10 +23,21 @@ SessionSettings session_settings(std::uint8_t choice) {
                      .marginals = kMarginals[choice >> 4 & 3]}};
 }
 
+namespace {
+
+OnlineSettings with_remover(OnlineSettings settings, PoseRemover& remover) {
+  settings.remover = &remover;
+  return settings;
+}
+
+}  // namespace
+
 OwnedSession::OwnedSession(const SessionSettings& settings)
-    : format_(registry().make<StreamFormat>("g2o")),
+    : remover_(registry()),
+      format_(registry().make<StreamFormat>("g2o")),
       estimator_(registry().make<Estimator>(settings.estimator)),
-      lines_(std::make_unique<OnlineSession>(*estimator_, *format_, registry(), settings.online)) {
+      lines_(std::make_unique<OnlineSession>(*estimator_, *format_, registry(),
+                                             with_remover(settings.online, remover_))) {
   if (settings.online.marginals == "last") estimator_->keep_marginals(KeptMarginals::last);
   if (settings.online.marginals == "diagonal") estimator_->keep_marginals(KeptMarginals::diagonal);
 }
@@ -75,6 +86,22 @@ SOLVE
 FULL
 )",
           R"(VERTEX_SE2 0 0 0 0
+NEW VERTEX_SE2 1
+EDGE_SE2 0 1 1 0 0.1 9 0 0 9 0 9
+NEW VERTEX_SE2 2
+EDGE_SE2 1 2 1 0 0.1 9 0 0 9 0 9
+NEW VERTEX_SE2 3
+EDGE_SE2 2 3 1 0 0.1 9 0 0 9 0 9
+EDGE_SE2 0 2 2 0.1 0.2 9 0 0 9 0 9
+SPARSIFY 1
+SPARSIFY KEEP 3
+NEW VERTEX_SE2 4
+EDGE_SE2 3 4 1 0 0.1 9 0 0 9 0 9
+SPARSIFY 0 2
+FULL
+SPARSIFY KEEP ALL
+)",
+          R"(VERTEX_SE2 0 0 0 0
 VERTEX_XY 3 1 1
 EDGE_SE2_XY 0 3 1 1 4 0 4
 EDGE_PRIOR_SE2 0 0 0 0 1 0 0 1 0 1
@@ -120,6 +147,8 @@ std::vector<std::string> protocol_words() {
                                   "REMOVE VARIABLE ",
                                   "CHANGE ",
                                   "MARGINALIZE ",
+                                  "SPARSIFY ",
+                                  "SPARSIFY KEEP ",
                                   "SOLVE\n",
                                   "FULL\n",
                                   "COVARIANCE ",

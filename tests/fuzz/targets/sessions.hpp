@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "cairn/online/online_session.hpp"
+#include "cairn/sparsification/map_sparsifier.hpp"
 
 namespace cairn::fuzz {
 
@@ -29,6 +30,7 @@ class OwnedSession {
   Estimator& estimator() { return *estimator_; }
 
  private:
+  MapSparsifier remover_;
   std::unique_ptr<StreamFormat> format_;
   std::unique_ptr<Estimator> estimator_;
   std::unique_ptr<OnlineSession> lines_;

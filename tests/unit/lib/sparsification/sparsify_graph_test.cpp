@@ -14,6 +14,8 @@
 
 #include "cairn/io/generator.hpp"
 #include "cairn/runtime/error.hpp"
+#include "cairn/types/loss.hpp"
+#include "support/components.hpp"
 
 namespace cairn {
 namespace {
@@ -138,6 +140,23 @@ TEST_F(SparsifyGraph, OnlineAChainKeepsAllItsInformation) {
   ASSERT_TRUE(result.error.has_value());
   EXPECT_NEAR(result.error->kld, 0.0, 1e-8);
   EXPECT_NEAR(result.rmse_full, 0.0, 1e-8);
+}
+
+TEST_F(SparsifyGraph, OnlineNewFactorsHaveNoLoss) {
+  CAIRN_NEEDS("loss", "cauchy");
+  setting_.loss = std::shared_ptr<const Loss>(registry_.make<Loss>("cauchy"));
+  SparsifyJob online = job("keep_every:every=2");
+  online.online = 4;
+  const SparsifyResult result = sparsify_online(chain(21), online, setting_);
+  int without = 0;
+  for (int f = 0; f < result.sparse.factor_count(); ++f) {
+    double rho = 0.0;
+    const std::array s{9.0};
+    ASSERT_NE(result.sparse.loss(f), nullptr);
+    result.sparse.loss(f)->evaluate(s, {&rho, 1}, {});
+    without += rho == 9.0;
+  }
+  EXPECT_EQ(without, std::ssize(result.change.removed_variables));  // ρ(s) = s
 }
 
 TEST_F(SparsifyGraph, OnlineRedirectsLoopClosuresOfNodesThatHaveLeft) {

@@ -15,6 +15,7 @@
 #include <tuple>
 
 #include "cairn/cairn.hpp"
+#include "cairn/sparsification/map_sparsifier.hpp"
 #include "support/components.hpp"
 
 namespace {
@@ -189,6 +190,26 @@ TEST(Guide, FixedLag) {
   }
   EXPECT_EQ(estimator->variable_count(), kLag);
   EXPECT_TRUE(estimate<Pose2>(*estimator, X(99)).equals({99.0, 0.0, 0.0}, 1e-6));
+}
+
+TEST(Guide, FixedNumberOfPoses) {
+  CAIRN_NEEDS("sparsifier", "sparsify");
+  const auto estimator = make<Estimator>("incremental_cholesky");
+  MapSparsifier sparsifier(default_registry());
+  for (int k = 0; k < 60; ++k) {
+    GraphUpdate update;
+    if (k == 0) {
+      update.add(X(0), Pose2());
+      update.add(Prior(X(0), Pose2()), Information::sigmas(0.01, 0.01, 0.01));
+    } else {
+      update.add<Pose2>(X(k));
+      update.add(Between(X(k - 1), X(k), Pose2(1.0, 0.0, 0.0)), Information::isotropic(3, 0.05));
+    }
+    sparsifier.make_room(*estimator, 20, update).add_to(update);
+    estimator->update(update);
+  }
+  EXPECT_EQ(estimator->variable_count(), 20);
+  EXPECT_TRUE(estimate<Pose2>(*estimator, X(59)).equals({59.0, 0.0, 0.0}, 1e-6));
 }
 
 TEST(Guide, TakingBack) {

@@ -247,5 +247,56 @@ TEST_F(Selections, LeastLossNeverTakesWhatTheSparsifierCannot) {
   for (const int v : {0, 17, 33}) EXPECT_THAT(chosen, Not(testing::Contains(v)));
 }
 
+TEST_F(Selections, OfTheTwoNearestTheOneThatCostsLessLeaves) {
+  Graph graph = chain(6);
+  for (int v = 0; v < 6; ++v) {
+    constexpr std::array kPlaces{0.0, 1.0, 1.3, 3.0, 3.2, 9.0};
+    graph.set_state(v, std::array{kPlaces[v], 0.0, 0.0});
+  }
+  Priced priced({{0, 1}, {1, 5}, {2, 6}, {3, 8}, {4, 7}, {5, 1}});
+  // 3-4 are the nearest, then 1-2, then 0 and what is left of those.
+  EXPECT_THAT(Nearest({}).choose(graph, all(graph), priced, 3), ElementsAre(4, 1, 0));
+  // A node that must stay has neighbours all the same.
+  EXPECT_THAT(Nearest({}).choose(graph, std::array{0, 3, 5}, priced, 2), ElementsAre(3, 0));
+  EXPECT_THAT(Nearest({}).choose(graph, std::array{3}, nobody, 5), ElementsAre(3));
+  EXPECT_THAT(Nearest({.part = 0.5}).select(graph, all(graph), priced), ElementsAre(4, 1, 0));
+  // Orientation counts as far as it is asked for.
+  graph.set_state(4, std::array{3.2, 0.0, 1.0});
+  EXPECT_THAT(Nearest({.angle = 1.0}).choose(graph, all(graph), priced, 1), ElementsAre(1));
+}
+
+TEST_F(Selections, WhereManyLeaveTheSameOnesDo) {
+  const Graph graph = simulate(registry, "manhattan:poses=40,streets=3");
+  std::map<Id, double> prices;
+  for (Id k = 0; k < 40; ++k) prices[k] = static_cast<double>((k * 17) % 41);
+  Priced priced(prices);
+  const std::vector<int> many = Nearest({}).choose(graph, all(graph), priced, 12),
+                         few = Nearest({}).choose(graph, all(graph), priced, 6);
+  ASSERT_EQ(many.size(), 12U);
+  EXPECT_EQ(few, std::vector<int>(many.begin(), many.begin() + 6));
+}
+
+TEST_F(Selections, NodesWithManyNeighboursStayAsLongAsPossible) {
+  Graph graph = graph_of(5, {{0, 1}, {0, 2}, {0, 3}, {3, 4}});
+  for (int v = 0; v < 5; ++v) {
+    constexpr std::array kPlaces{0.0, 0.1, 4.0, 8.0, 9.0};
+    graph.set_state(v, std::array{kPlaces[v], 0.0, 0.0});
+  }
+  Priced priced({{0, 0}, {1, 9}, {2, 9}, {3, 9}, {4, 9}});
+  EXPECT_THAT(Nearest({.neighbours = 3}).choose(graph, all(graph), priced, 1), ElementsAre(0));
+  EXPECT_THAT(Nearest({.neighbours = 2}).choose(graph, all(graph), priced, 1), ElementsAre(1));
+  EXPECT_THAT(Nearest({.neighbours = 2}).choose(graph, std::array{0}, priced, 1), ElementsAre(0));
+}
+
+TEST_F(Selections, ChooseAsManyAsAreWanted) {
+  const Graph graph = chain(9);
+  Priced priced({{0, 9}, {1, 1}, {2, 8}, {3, 2}, {4, 7}, {5, 3}, {6, 6}, {7, 4}, {8, 5}});
+  EXPECT_THAT(Oldest(1.0).choose(graph, all(graph), nobody, 2), ElementsAre(0, 1));
+  EXPECT_THAT(SmallestBlanket(1.0).choose(graph, all(graph), nobody, 2), testing::SizeIs(2));
+  EXPECT_THAT(LeastLoss(1.0).choose(graph, all(graph), priced, 2), ElementsAre(1, 3));
+  EXPECT_THAT(KeepEvery(2).choose(graph, all(graph), nobody, 2), ElementsAre(1, 3));
+  EXPECT_THAT(KeepEvery(2).choose(graph, all(graph), nobody, 0), IsEmpty());
+}
+
 }  // namespace
 }  // namespace cairn::sparsify

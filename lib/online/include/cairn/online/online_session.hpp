@@ -12,6 +12,7 @@
 
 #include "cairn/io/stream_format.hpp"
 #include "cairn/online/line_session.hpp"
+#include "cairn/online/pose_remover.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/api.hpp"
 #include "cairn/solve/estimator.hpp"
@@ -24,6 +25,8 @@ struct OnlineSettings {
   std::string output = "last";     ///< estimates after a solve: none, last, changed or all
   std::string marginals = "none";  ///< covariances after a solve: none, last or diagonal
   double budget = 0.0;             ///< [s] of an update; 0: no limit
+  PoseRemover* remover = nullptr;  ///< for SPARSIFY; null: that is refused
+  int keep = 0;  ///< poses that the map has at most, until SPARSIFY KEEP changes it; 0: any number
 };
 
 /// Everything that arrives is taken into the graph of an estimator.
@@ -47,6 +50,8 @@ class CAIRN_API OnlineSession final : public LineSession {
   void remove(const Words& words, Reply& reply);
   void change(const Words& words, Reply& reply);
   void marginalize(const Words& words, Reply& reply);
+  void sparsify(const Words& words, Reply& reply);
+  void keep(const Words& words, Reply& reply);
   void solve(const Words& words, Reply& reply);
   void solve_fully(const Words& words, Reply& reply);
   void report_covariance(const Words& words, Reply& reply);
@@ -60,8 +65,14 @@ class CAIRN_API OnlineSession final : public LineSession {
   void take_factor(Factor factor, Reply& reply);
   void hold(Id id);
 
-  /// Hands an update over; solves where that is due or asked for.
-  UpdateReport update(GraphUpdate update, bool solve, bool full, Reply& reply);
+  /// Hands an update over; solves where that is due or asked for. `removal` becomes a part of it.
+  UpdateReport update(GraphUpdate update, bool solve, bool full, Reply& reply,
+                      const PoseRemover::Removal& removal = {});
+  UpdateReport hand_over(const GraphUpdate& update, bool solve, bool full, Reply& reply);
+  void solve_now(const GraphUpdate& update, bool full, Reply& reply);
+  /// The poses that leave if the map has too many with those of `coming`.
+  PoseRemover::Removal make_room(const GraphUpdate& coming);
+  void write_removal(const PoseRemover::Removal& removal, FactorId first_factor, Reply& reply);
   void follow(const GraphUpdate& update);
   void write_results(const UpdateReport& report, Reply& reply);
   void write_estimate(Id id, std::string& text) const;
@@ -73,6 +84,7 @@ class CAIRN_API OnlineSession final : public LineSession {
   Registry& registry_;
   OnlineSettings settings_;
   int owed_ = 0;
+  std::string noted_;  ///< why fewer poses have left than should have, as it was last reported
   /// Variables that no measurement has touched yet: the estimator gets them with the first that
   /// does.
   std::vector<Variable> waiting_;

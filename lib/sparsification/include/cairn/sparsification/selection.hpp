@@ -22,6 +22,10 @@ class CAIRN_API NodeSelection : public Component {
   /// removed, rising. `sparsifier` computes what that would cost, and can be tried on a copy.
   virtual std::vector<int> select(const Graph& graph, std::span<const int> nodes,
                                   Sparsifier& sparsifier) = 0;
+  /// The same, but `count` nodes at most, whatever the selection's own rule of how many: for a map
+  /// whose size is bounded. By default the first of `select`.
+  virtual std::vector<int> choose(const Graph& graph, std::span<const int> nodes,
+                                  Sparsifier& sparsifier, int count);
 };
 
 }  // namespace cairn
