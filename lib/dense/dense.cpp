@@ -23,8 +23,17 @@ MatrixXd from_eigenvalues(const View& V, const Eigen::VectorXd& values) {
   return V * values.asDiagonal() * V.transpose();
 }
 
-void set_product(const View& A, const View& B, MatrixXd& C) { C.noalias() = A * B; }
+void fit(MatrixXd& C, Eigen::Index rows, Eigen::Index columns) {
+  if (C.rows() == rows && C.cols() == columns) return;
+  C.resize(0, 0);
+  C.resize(rows, columns);
+}
+void set_product(const View& A, const View& B, MatrixXd& C) {
+  fit(C, A.rows(), B.cols());
+  C.noalias() = A * B;
+}
 void set_product_with_transpose(const View& A, const View& B, MatrixXd& C) {
+  fit(C, A.rows(), B.rows());
   C.noalias() = A * B.transpose();
 }
 void add_product(const View& A, const View& B, Eigen::Ref<MatrixXd> C) { C.noalias() += A * B; }

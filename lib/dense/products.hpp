@@ -70,6 +70,9 @@ Eigen::MatrixXd congruent_of_transpose(const View& A, const View& S);
 /// V diag(values) Vᵀ: the symmetric matrix of these eigenvectors and eigenvalues.
 Eigen::MatrixXd from_eigenvalues(const View& V, const Eigen::VectorXd& values);
 
+/// Gives C this size; its elements are undefined then. Where there is no memory for it, C is empty:
+/// a matrix that Eigen 3.4 resizes itself keeps a pointer to what it has freed.
+void fit(Eigen::MatrixXd& C, Eigen::Index rows, Eigen::Index columns);
 /// C = A B, C = A Bᵀ; C is neither A nor B.
 void set_product(const View& A, const View& B, Eigen::MatrixXd& C);
 void set_product_with_transpose(const View& A, const View& B, Eigen::MatrixXd& C);

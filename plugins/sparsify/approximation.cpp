@@ -125,6 +125,7 @@ void Approximation::follow_all() {
   std::iota(followed_.begin(), followed_.end(), 0);
   for (const int k : followed_) {
     const std::vector<int>& columns = problem_->columns[k];
+    dense::fit(part_, std::ssize(columns), std::ssize(columns));
     part_ = V_(columns, columns);
     dense::set_product(problem_->A[k], part_, R_);
     dense::set_product_with_transpose(R_, problem_->A[k], M_[k]);
@@ -141,11 +142,13 @@ void Approximation::change(int k, const Matrix& W) {
   C = (0.5 * (C + C.transpose())).eval();
   trace_ += D.trace();
   log_determinant_ += std::log(std::max(lu.determinant(), 1e-300));
+  dense::fit(part_, V_.rows(), std::ssize(problem_->columns[k]));
   part_ = V_(Eigen::all, problem_->columns[k]);
   dense::set_product_with_transpose(part_, problem_->A[k], VAt_);
   dense::set_product_with_transpose(C, VAt_, CVA_);
   dense::subtract_product(VAt_, CVA_, V_);
   for (const int j : followed_) {
+    dense::fit(part_, std::ssize(problem_->columns[j]), VAt_.cols());
     part_ = VAt_(problem_->columns[j], Eigen::all);
     dense::set_product(problem_->A[j], part_, R_);
     dense::subtract_congruent(R_, C, M_[j]);

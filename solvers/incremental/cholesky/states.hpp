@@ -16,8 +16,9 @@ namespace cairn::incremental {
 class Estimate {
  public:
   void add(std::span<const double> state) {
-    places_.push_back(std::ssize(x_));
+    const std::int64_t place = std::ssize(x_);
     x_.insert(x_.end(), state.begin(), state.end());
+    places_.push_back(place);  // last: where memory ends before, there is no such variable
   }
   int size() const { return static_cast<int>(places_.size()); }
   /// x_v, ambient_size doubles.

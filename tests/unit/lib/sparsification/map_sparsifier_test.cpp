@@ -46,6 +46,10 @@ class MapSparsifierOf : public testing::TestWithParam<std::string> {
  protected:
   void SetUp() override {
     CAIRN_NEEDS("types", "slam2d");
+    // Their results depend on where they were linearised, and the minimum is what these tests
+    // compare.
+    if (GetParam() == "ekf" || GetParam() == "eif")
+      GTEST_SKIP() << "a filter does not linearise again";
     estimator_ = registry_.make<Estimator>(GetParam());
   }
   Factor edge(Id a, Id b, const State& z) {
