@@ -167,6 +167,11 @@ void check(const CompactOptions& options, Session& session) {
   check_file(options.steps, session);
   check_file(options.compare, session);
   check_file(options.save_thresholds, session);
+  if (!options.compare.empty() && !options.map.empty()) {
+    throw Error(ErrorCode::usage,
+                "--compare is with all measurements of a recording, which a map of an earlier "
+                "session does not have: give one of --compare and --map");
+  }
   if (options.automatic && !options.thresholds.empty())
     throw Error(ErrorCode::usage, "--auto finds thresholds, --thresholds reads them: give one");
 }

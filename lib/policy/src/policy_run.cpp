@@ -139,8 +139,12 @@ void PolicyRun::load(const Graph& map) {
               [&] { policy_->load(map); });
   // Poses of earlier sessions that the map has not kept.
   const Graph& recording = setting_.data.recording;
-  for (int v = 0; v < setting_.data.poses.front().pose(); ++v) {
-    if (!map.find(recording.id(v))) registration_->pose_ended(recording.id(v), false);
+  if (!setting_.data.poses.empty()) {
+    const Id first = recording.id(setting_.data.poses.front().pose());
+    for (int v = 0; v < recording.variable_count(); ++v) {
+      const Id pose = recording.id(v);
+      if (pose < first && !map.find(pose)) registration_->pose_ended(pose, false);
+    }
   }
   result_.map_poses = map.variable_count();
 }

@@ -286,9 +286,7 @@ Rows LinearizedEstimator::free_rows(const Model& model) const {
 
 void LinearizedEstimator::take_models() {
   gauge_ = resolve_gauge(state_.graph);
-  int free = 0;
   for (int v = 0; v < state_.graph.variable_count(); ++v) {
-    free += !is_held(v);
     state_.rebuild = state_.rebuild || (is_held(v) && form_->has(state_.graph.id(v)));
     // A variable that was constant, and has factors that were taken so.
     state_.rebuild =
@@ -296,7 +294,6 @@ void LinearizedEstimator::take_models() {
                            !state_.displacements[static_cast<std::size_t>(v)].isZero());
   }
   std::vector<Rows> rows;
-  std::vector<std::size_t> taken;
   for (std::size_t f = 0; f < state_.models.size(); ++f) {
     if (state_.models[f].taken && !state_.rebuild) {
       // Whether one of its variables was constant when it was taken.
@@ -486,7 +483,8 @@ bool LinearizedEstimator::covariance_column(Id id, std::span<const Id> variables
   std::vector<double> unit(static_cast<std::size_t>(form_->size()), 0.0), whole(unit.size());
   auto to = out.begin();
   for (int c = 0; c < columns; ++c) {
-    const auto at = static_cast<std::size_t>(form_->offset(id) + c);
+    const std::size_t at =
+        static_cast<std::size_t>(form_->offset(id)) + static_cast<std::size_t>(c);
     unit[at] = 1.0;
     form_->multiply_covariance(unit, whole);
     unit[at] = 0.0;
