@@ -47,6 +47,16 @@ Recording load_recording(const CompactOptions& options, Session& session) {
           std::move(map)};
 }
 
+/// Where a trajectory begins on a map is not known, whatever its first pose says.
+void note_fixed_start(const Recording& recording, const Session& session) {
+  const PolicyData& data = recording.data;
+  if (!recording.map || data.poses.empty()) return;
+  const int first = data.poses.front().pose();
+  if (!data.recording.fixed(first)) return;
+  session.note(fmt::format("{} is not fixed: where it is on the map is found by matches",
+                           data.recording.describe_variable(first)));
+}
+
 /// Shows how far a run is.
 class PolicyProgress {
  public:
@@ -162,8 +172,9 @@ void check(const CompactOptions& options, Session& session) {
   if (options.output == "-" && options.trajectory == "-")
     throw Error(ErrorCode::usage, "only one of -o and --trajectory can go to standard output");
   session.files.add_input(options.thresholds);
+  session.files.add_input(options.map);
   check_output(options.output, options.output_format, session);
-  check_output(options.trajectory, "", session);
+  check_output(options.trajectory, "", session, false);
   check_file(options.steps, session);
   check_file(options.compare, session);
   check_file(options.save_thresholds, session);
@@ -199,6 +210,7 @@ int run_compact(const CompactOptions& options, Session& session) {
   Registry& registry = session.registry();
   const ProblemSetup setup(options.problem, registry);
   const Recording recording = load_recording(options, session);
+  note_fixed_start(recording, session);
   const InterruptGuard guard;  // until the results are written
   PolicyProgress progress(session.common.quiet);
   const PolicySetting setting{

@@ -157,6 +157,7 @@ json::object report_json(const CompactOptions& options, const CompactOutcome& ou
   report["registration"] = options.registration;
   report["threads"] = threads();
   report["status"] = outcome.result.interrupted  ? "interrupted"
+                     : !outcome.shown().located  ? "unlocated"
                      : outcome.shown().converged ? "converged"
                                                  : "max_iterations";
   report["thresholds"] = thresholds_json(outcome.found);

@@ -145,7 +145,8 @@ Simulation simulate(const std::string& spec, std::uint64_t seed, Session& sessio
                      [&] { return registry.make<Generator>(spec)->generate(registry, seed); });
 }
 
-void check_output(const std::string& file, const std::string& format, Session& session) {
+void check_output(const std::string& file, const std::string& format, Session& session,
+                  bool may_replace_graph) {
   if (file.empty()) return;
   Registry& registry = session.registry();
   const std::string chosen = output_format(file, format);
@@ -154,7 +155,7 @@ void check_output(const std::string& file, const std::string& format, Session& s
   } else {
     check_named_format(file, chosen, registry);
   }
-  session.files.add_result(file);
+  may_replace_graph ? session.files.add_result(file) : session.files.add_output(file);
   check_writable(file);
 }
 

@@ -49,7 +49,9 @@ std::string output_format(const std::string& file, const std::string& named);
 /// Finds out before the work whether its result can be written: throws `Error` if no format writes
 /// files of that name, if it cannot be written there, or another output goes there. `format` is
 /// what `--to` names. A graph may replace the one that it was made of.
-void check_output(const std::string& file, const std::string& format, Session& session);
+/// `may_replace_graph`: it may take the place of the graph that is worked on.
+void check_output(const std::string& file, const std::string& format, Session& session,
+                  bool may_replace_graph = true);
 
 /// The same for an output of another kind, which replaces no input.
 void check_file(const std::string& file, Session& session);

@@ -210,6 +210,7 @@ Listener follow_policy(const OnlineOptions& options, const ProblemSetup& setup, 
   if (!options.map.empty()) {
     const Graph map = load_graph(options.map, options.input, session).graph;
     lines->load(map);
+    lines->protect(options.map, "the map that is continued");
     listener.identity += fmt::format(", map {:08x}", fingerprint(map));
   }
   listener.lines = std::move(lines);
@@ -228,6 +229,7 @@ void check(const OnlineOptions& options, Session& session) {
   if (!options.thresholds.empty() && options.policy.empty())
     throw Error(ErrorCode::usage, "--thresholds are those of a policy: give --policy");
   session.files.add_input(options.thresholds);
+  session.files.add_input(options.map);
   if (!options.map.empty() && options.policy.empty()) {
     throw Error(ErrorCode::usage,
                 "--map is continued by a policy: give --policy; without one, send the lines of the "
@@ -249,7 +251,7 @@ void check(const OnlineOptions& options, Session& session) {
   }
   session.files.add_input("-");
   check_output(options.output, "", session);
-  check_output(options.trajectory, "", session);
+  check_output(options.trajectory, "", session, false);
   session.files.add_output(options.journal);  // is tried when it is opened
 }
 
@@ -307,7 +309,7 @@ int run(OnlineOptions options, Session& session) {
   if (!options.journal.empty()) {
     journal.emplace(options.journal, listener.identity, sync_of(options.sync));
     session.note(journal->note());
-    lines.protect(options.journal);
+    lines.protect(options.journal, "the journal");
   }
   Conversation conversation(lines, journal ? &*journal : nullptr);
   if (journal) write_stdout(conversation.restore());
@@ -349,7 +351,11 @@ int run(OnlineOptions options, Session& session) {
     session.note("the line that failed may be in the map in part, and is not in the journal");
   if (failure) std::rethrow_exception(failure);
   session.write_json(report_json(options, conversation.counts(), lines));
-  return guard.interrupted() ? kExitInterrupted : 0;
+  if (guard.interrupted()) return kExitInterrupted;
+  const auto* policy = dynamic_cast<const PolicySession*>(&lines);
+  if (!policy) return 0;
+  for (const std::string& sentence : policy->unread_notes()) session.note(sentence);
+  return policy->located() && policy->converged() ? 0 : static_cast<int>(ErrorCode::numerical);
 }
 
 }  // namespace

@@ -214,7 +214,10 @@ TEST_F(Compact, ContinuesTheMapOfAnEarlierSession) {
   write_text(tuesday, part_of(all, 400, true, true) + part_of(all, 400, false, false));
   const auto first = report({monday, "-o", map, "--save-thresholds", robot});
   const auto second = report({tuesday, "--begin", "400", "--map", map, "--thresholds", robot, "-o",
-                              both, "--truth", truth});
+                              both, "--truth", truth, "--trajectory", folder_.file("new.g2o")});
+  const boost::json::value way =
+      parse_json(cairn({"info", folder_.file("new.g2o"), "--json", "-"}).out);
+  EXPECT_EQ(whole(way, "graph", "variables"), 400);
   EXPECT_TRUE(second.at("located").as_bool());
   EXPECT_EQ(whole(second, "poses", "in"), 400);
   EXPECT_EQ(whole(second, "poses", "map"), whole(first, "poses", "kept"));
@@ -228,7 +231,10 @@ TEST_F(Compact, ContinuesTheMapOfAnEarlierSession) {
   // Without a measurement between the two.
   const std::string apart = folder_.file("apart.g2o");
   write_text(apart, part_of(all, 400, false, false));
-  const Outcome unlocated = cairn({"compact", apart, "--map", map, "--thresholds", robot});
+  const Outcome unlocated = cairn({"compact", apart, "--map", map, "--thresholds", robot, "--json",
+                                   folder_.file("unlocated.json")});
+  EXPECT_EQ(parse_json(read_text(folder_.file("unlocated.json"))).at("status").as_string(),
+            "unlocated");
   EXPECT_EQ(unlocated.exit_code, 4);
   EXPECT_THAT(unlocated.err, HasSubstr("no pose was matched with one of " + map));
   const Outcome same = cairn({"compact", monday, "--map", map, "--thresholds", robot});

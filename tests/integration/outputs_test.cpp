@@ -83,6 +83,27 @@ TEST_F(Outputs, NoneReplacesAFileThatSaysHowToWork) {
   }
 }
 
+TEST_F(Outputs, NoneReplacesAMapOrTheGraphByItsTrajectory) {
+  const std::string file = graph(), map = folder_.file("map.g2o"), text = read_text(file);
+  write_text(map, text);
+  const std::string policy = "compact_pose";
+  for (const Arguments& arguments :
+       std::vector<Arguments>{{"compact", file, "--map", map, "--begin", "9", "--trajectory", map},
+                              {"compact", file, "--map", map, "--begin", "9", "-o", map},
+                              {"compact", file, "--trajectory", file},
+                              {"online", "--policy", policy, "--map", map, "--trajectory", map},
+                              {"online", "--policy", policy, "--map", map, "-o", map}}) {
+    const Outcome outcome = cairn(arguments);
+    EXPECT_EQ(outcome.exit_code, 2) << testing::PrintToString(arguments);
+    EXPECT_THAT(outcome.err, HasSubstr("name another")) << testing::PrintToString(arguments);
+  }
+  const Outcome saved =
+      cairn({"online", "--policy", policy, "--map", map}, {}, "SAVE " + map + "\n");
+  EXPECT_THAT(saved.out, HasSubstr("SAVE would replace the map that is continued"));
+  EXPECT_EQ(read_text(file), text);
+  EXPECT_EQ(read_text(map), text);
+}
+
 TEST_F(Outputs, DescriptorsAreWrittenWhereTheyStand) {
   graph();
   const Outcome outcome = shell(

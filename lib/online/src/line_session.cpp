@@ -113,9 +113,11 @@ std::string LineSession::file_to_save(const Words& words) const {
   expect_words(words, 2, "SAVE file");
   std::string file(words[1]);
   if (file == "-") throw bad_line("SAVE writes to a file, not to standard output");
-  std::error_code none;  // of these is the journal
-  if (!protected_.empty() && std::filesystem::equivalent(file, protected_, none))
-    throw bad_line(fmt::format("SAVE would replace the journal, {}; name another file", file));
+  for (const auto& [other, what] : protected_) {
+    std::error_code none;  // of one that is not there
+    if (std::filesystem::equivalent(file, other, none))
+      throw bad_line(fmt::format("SAVE would replace {}, {}; name another file", what, file));
+  }
   return file;
 }
 

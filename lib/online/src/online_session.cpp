@@ -271,10 +271,7 @@ void OnlineSession::sparsify(const Words& words, Reply& reply) {
     removal = settings_.remover->remove(estimator_, ids);
   } catch (const Error& error) {
     if (error.code() != ErrorCode::input) throw;
-    throw bad_line(fmt::format(
-        "{}. Nothing has changed; MARGINALIZE leaves a linear prior instead, REMOVE VARIABLE "
-        "nothing",
-        error.what()));
+    throw bad_line(fmt::format("{}. Nothing has changed", error.what()));
   }
   update({}, settings_.automatic, false, reply, removal);
   if (!reply.solved) acknowledge(reply, owed_);

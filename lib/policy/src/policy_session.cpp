@@ -2,6 +2,7 @@
 #include "cairn/policy/policy_session.hpp"
 
 #include <algorithm>
+#include <sstream>
 #include <utility>
 
 #include <fmt/format.h>
@@ -142,6 +143,11 @@ void PolicySession::hold(std::span<const Id> ids) {
           id));
     }
   }
+  if (!policy_.unlocated().empty()) {
+    throw bad_line(fmt::format(
+        "FIX {}: it is not known where the pose is on the map, whose poses determine where it is",
+        arriving_->pose.id));
+  }
   arriving_->pose.fixed = true;
 }
 
@@ -230,6 +236,11 @@ void PolicySession::begin() {
   if (newest_ && !pose.fixed) pose.state.clear();  // where its odometry puts it
   policy_.add_pose(pose, arriving_->odometry);
   before_ = std::exchange(newest_, pose.id);
+  if (!first_ && !located()) {
+    answer_ +=
+        "NOTE until a pose is matched with one of the map, the estimates of the new poses are in a "
+        "frame of their own\n";
+  }
   if (!first_) first_ = pose.id;
   arriving_.reset();
   open_ = true;
@@ -303,8 +314,9 @@ void PolicySession::finish_trajectory() {
     arriving_.reset();
   }
   if (current()) end();
-  if (!policy_.finish()) answer_ += "NOTE the estimate has not converged\n";
-  if (newest_ && !policy_.unlocated().empty()) {
+  converged_ = policy_.finish();
+  if (!converged_) answer_ += "NOTE the estimate has not converged\n";
+  if (!located()) {
     answer_ +=
         "NOTE no pose was matched with one of the map: the two are not connected, and their "
         "relative position is unknown\n";
@@ -332,7 +344,7 @@ void PolicySession::propose(const Words& words, Reply& reply) {
     const std::optional<MatchProposal> match = policy_.next_match();
     reply.changes = true;
     counts_.proposed += match.has_value();
-    if (!match && !asked_place_ && !policy_.unlocated().empty()) {
+    if (!match && !asked_place_ && !located()) {
       asked_place_ = true;  // once: who recognises no place goes on with NEXT
       answer_ += fmt::format("LOCATE {}\n", *newest_);
       return answer(reply);
@@ -391,6 +403,10 @@ void PolicySession::report_covariance(const Words& words, Reply& reply) {
     throw bad_line(fmt::format("there is no pose {} in the compact graph", id));
   }
   settle(reply);
+  if (!located() && !(on_map(a) && on_map(b))) {
+    throw Error(ErrorCode::numerical,
+                "there is no covariance: no pose was matched with one of the map yet");
+  }
   Estimator& estimator = policy_.estimator();
   const std::string text = covariance_line(estimator, a, motions_->type(), b, motions_->type());
   if (text.empty() && !silent()) {
@@ -491,7 +507,8 @@ void PolicySession::write_results(bool kept) {
     }
   }
   if (settings_.output == "last") write_estimate(*newest_, answer_);
-  if (!kept || settings_.marginals == "none") return;  // otherwise they are the same as before
+  // Where the pose is not kept they are the same as before.
+  if (!kept || !located() || settings_.marginals == "none") return;
   Estimator& estimator = policy_.estimator();
   const VariableType& type = motions_->type();
   const std::vector<Id> ids =
@@ -505,6 +522,22 @@ bool PolicySession::in_graph(Id id) const {
   if (newest_ != id) return false;
   const std::vector<Id> kept = policy_.kept();
   return !kept.empty() && kept.back() == id;
+}
+
+/// While the robot's place on the map is unknown.
+bool PolicySession::on_map(Id id) const {
+  const std::vector<Id> map = policy_.unlocated();
+  return std::ranges::find(map, id) != map.end();
+}
+
+std::vector<std::string> PolicySession::unread_notes() const {
+  constexpr std::string_view kNote = "NOTE ";
+  std::vector<std::string> notes;
+  std::istringstream lines(answer_);
+  for (std::string line; std::getline(lines, line);) {
+    if (line.starts_with(kNote)) notes.push_back(line.substr(kNote.size()));
+  }
+  return notes;
 }
 
 /// Of a kept pose, for which the estimator must have been read, or of the newest.

@@ -76,9 +76,12 @@ Graph recovered_trajectory(PosePolicy& policy, Recovery how) {
   const Id first = chains.empty() ? policy.kept().back() : chains.front().from;
   whole.add_variable(type, first, state(first));
   for (const OdometryChain& chain : chains) {
-    for (const RecoveredPose& pose :
-         recover(*type, chain, state(chain.from), state(chain.to), how)) {
-      if (whole.find(pose.id)) continue;  // the robot came back to it
+    const std::vector<RecoveredPose> poses =
+        recover(*type, chain, state(chain.from), state(chain.to), how);
+    for (std::size_t k = 0; k < poses.size(); ++k) {
+      const RecoveredPose& pose = poses[k];
+      // A pose that was matched is in another chain, or on the map that was continued.
+      if (chain.steps[k].matched || whole.find(pose.id)) continue;
       const auto kept = compact.find(pose.id);
       whole.add_variable(type, pose.id, kept ? compact.state(*kept) : pose.state);
     }

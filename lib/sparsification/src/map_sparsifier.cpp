@@ -92,7 +92,8 @@ PoseRemover::Removal MapSparsifier::remove(Estimator& estimator, std::span<const
   if (!change.refused.empty()) {
     const RefusedNode& first = change.refused.front();
     throw Error(ErrorCode::input,
-                fmt::format("variable {} cannot be replaced by factors between its neighbours: {}",
+                fmt::format("variable {} cannot be replaced by factors between its neighbours: {}; "
+                            "marginalising it would leave a linear prior on them instead",
                             first.node, first.reason));
   }
   return removal_of(change, graph, estimator);

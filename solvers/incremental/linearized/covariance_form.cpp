@@ -31,13 +31,12 @@ void CovarianceForm::check_size(std::int64_t size) const {
 }
 
 void CovarianceForm::begin(std::span<const Id> variables, std::span<const int> sizes,
-                           std::span<const Rows> rows) {
+                           std::span<const Rows>) {
   offsets_.clear();
   waiting_.clear();
   sizes_.clear();
   pending_.clear();
   for (std::size_t k = 0; k < variables.size(); ++k) add_variable(variables[k], sizes[k]);
-  static_cast<void>(rows);
 }
 
 void CovarianceForm::add_variable(Id id, int size) {

@@ -29,8 +29,6 @@ class CovarianceForm final : public GaussianForm {
   bool settle() override;
   Id undetermined() const override { return waiting_.front(); }
   bool has(Id id) const override { return offsets_.has(id) || sizes_.contains(id); }
-  int offset(Id id) const override { return offsets_.offset(id); }
-  int size() const override { return offsets_.size(); }
   std::span<const double> displacement() override {
     return {d_.data(), static_cast<std::size_t>(offsets_.size())};
   }
@@ -60,7 +58,6 @@ class CovarianceForm final : public GaussianForm {
   Eigen::VectorXd column(int scalar) const;
 
   int max_size_;
-  Offsets offsets_;
   Eigen::MatrixXd P_;  ///< lower triangle, with room to grow
   Eigen::VectorXd d_;  ///< likewise
   std::vector<Id> waiting_;

@@ -10,7 +10,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 void InformationForm::begin(std::span<const Id> variables, std::span<const int> sizes,
-                            std::span<const Rows> rows) {
+                            std::span<const Rows>) {
   offsets_.clear();
   sizes_.clear();
   variables_.clear();
@@ -21,7 +21,6 @@ void InformationForm::begin(std::span<const Id> variables, std::span<const int> 
   structure_.reset();
   factorized_ = false;
   for (std::size_t k = 0; k < variables.size(); ++k) add_variable(variables[k], sizes[k]);
-  static_cast<void>(rows);
 }
 
 void InformationForm::add_variable(Id id, int size) {

@@ -24,9 +24,6 @@ class InformationForm final : public GaussianForm {
   void add(const Rows& rows) override;
   bool settle() override { return factorize(); }
   Id undetermined() const override { return undetermined_; }
-  bool has(Id id) const override { return offsets_.has(id); }
-  int offset(Id id) const override { return offsets_.offset(id); }
-  int size() const override { return offsets_.size(); }
   std::span<const double> displacement() override;
   void multiply_covariance(std::span<const double> g, std::span<double> x) override;
   std::int64_t memory() const override;
@@ -35,7 +32,6 @@ class InformationForm final : public GaussianForm {
  private:
   bool factorize();
 
-  Offsets offsets_;
   std::vector<std::int32_t> sizes_;
   std::vector<Id> variables_;
   std::unordered_map<Id, std::int32_t> block_;

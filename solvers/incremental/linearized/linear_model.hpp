@@ -23,6 +23,23 @@ struct Rows {
   Eigen::VectorXd c;
 };
 
+/// Offsets of variables in the order of their addition: what every form keeps.
+class Offsets {
+ public:
+  void clear() { *this = {}; }
+  void add(Id id, int size);
+  bool has(Id id) const { return place_.contains(id); }
+  int offset(Id id) const { return place_.at(id); }
+  int size() const { return size_; }
+  /// The variable with that scalar unknown.
+  Id variable(int scalar) const;
+
+ private:
+  std::unordered_map<Id, int> place_;
+  std::vector<std::pair<int, Id>> order_;  // by rising offset
+  int size_ = 0;
+};
+
 /// The Gaussian of all displacements d that the rows taken so far define, in some form: minimum and
 /// covariance of Σ ‖J d + c‖². Forms differ in what they store and in what is cheap; in exact
 /// arithmetic they agree.
@@ -47,9 +64,9 @@ class GaussianForm {
   virtual bool settle() = 0;
   virtual Id undetermined() const = 0;
 
-  virtual bool has(Id id) const = 0;
-  virtual int offset(Id id) const = 0;
-  virtual int size() const = 0;  ///< scalar unknowns
+  virtual bool has(Id id) const { return offsets_.has(id); }
+  int offset(Id id) const { return offsets_.offset(id); }
+  int size() const { return offsets_.size(); }  ///< scalar unknowns
   /// The minimum: size() numbers. Asked for once for each change, when the estimate follows.
   virtual std::span<const double> displacement() = 0;
   /// x = Σ g, both of size().
@@ -57,23 +74,9 @@ class GaussianForm {
 
   virtual std::int64_t memory() const = 0;  ///< bytes of the form itself
   virtual std::unique_ptr<GaussianForm> clone() const = 0;
-};
 
-/// Offsets of variables in the order of their addition: what every form keeps.
-class Offsets {
- public:
-  void clear() { *this = {}; }
-  void add(Id id, int size);
-  bool has(Id id) const { return place_.contains(id); }
-  int offset(Id id) const { return place_.at(id); }
-  int size() const { return size_; }
-  /// The variable with that scalar unknown.
-  Id variable(int scalar) const;
-
- private:
-  std::unordered_map<Id, int> place_;
-  std::vector<std::pair<int, Id>> order_;  // by rising offset
-  int size_ = 0;
+ protected:
+  Offsets offsets_;
 };
 
 }  // namespace cairn::linearized

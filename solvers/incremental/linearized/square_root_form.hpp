@@ -24,9 +24,6 @@ class SquareRootForm final : public GaussianForm {
   void add(const Rows& rows) override;
   bool settle() override;
   Id undetermined() const override { return undetermined_; }
-  bool has(Id id) const override { return offsets_.has(id); }
-  int offset(Id id) const override { return offsets_.offset(id); }
-  int size() const override { return offsets_.size(); }
   std::span<const double> displacement() override;
   /// x = R⁻¹ R⁻ᵀ g.
   void multiply_covariance(std::span<const double> g, std::span<double> x) override;
@@ -45,7 +42,6 @@ class SquareRootForm final : public GaussianForm {
   void rotate_in(SparseRow row);
   void substitute_back(std::span<double> x) const;
 
-  Offsets offsets_;
   std::vector<SparseRow> R_;           ///< by column; empty where no row begins
   std::vector<double> squared_norms_;  ///< of the columns of J
   std::vector<double> d_;

@@ -100,6 +100,7 @@ class Run final : public ceres::IterationCallback {
   }
 
  private:
+  void start(double chi2);
   void record(const ceres::IterationSummary& ceres);
   /// Whether the predicted decrease is below the tolerance.
   bool converged();
@@ -121,13 +122,17 @@ class Run final : public ceres::IterationCallback {
   std::exception_ptr exception_;
 };
 
+void Run::start(double chi2) {
+  started_ = true;
+  chi2_ = summary_.initial_chi2 = chi2;
+  observer_.on_start(graph_, chi2);
+}
+
 void Run::record(const ceres::IterationSummary& ceres) {
   const double chi2 = 2.0 * ceres.cost / problem_->cost_scale();
   if (ceres.iteration == 0) {
-    if (!std::exchange(started_, true)) {
-      summary_.initial_chi2 = chi2;
-      observer_.on_start(graph_, chi2);
-      chi2_ = chi2;
+    if (!started_) {
+      start(chi2);
       if (!(stop_.interrupt && stop_.interrupt->load(std::memory_order_relaxed)) &&
           stop_.tolerance > 0.0 && converged())
         status_ = Status::converged;
@@ -192,7 +197,13 @@ Status Run::minimise(ceres::Solver::Options options) {
     if (started_) values_ = before_;  // where Ceres reports a failure, it is back at the start
     if (status_) return *status_;
     rethrow();
-    if (!started_) return Status::diverged;  // the residuals are not finite
+    if (!started_) {
+      // Where the gradient is zero Ceres ends before its first iteration, and where the residuals
+      // are not finite.
+      if (report.termination_type != ceres::CONVERGENCE) return Status::diverged;
+      start(2.0 * report.initial_cost / problem_->cost_scale());
+      return without_descent();
+    }
     if (report.termination_type == ceres::NO_CONVERGENCE) return Status::max_iterations;
     if (stop_.tolerance > 0.0 && converged()) return Status::converged;
     if (iterations() == done || !(chi2_ < before)) return without_descent();
@@ -218,6 +229,14 @@ ceres::Solver::Options line_search_solver_options(const LineSearchOptions& optio
   // Whether it has converged is decided by the Newton decrement.
   ceres.function_tolerance = ceres.gradient_tolerance = ceres.parameter_tolerance = 0.0;
   ceres.update_state_every_iteration = true;  // observers see the states
+  const bool quasi_newton = options.direction == "lbfgs" || options.direction == "bfgs";
+  if (quasi_newton && options.line_search == "armijo") {
+    throw Error(ErrorCode::usage,
+                fmt::format("optimizer ceres_line_search: direction={} needs line_search=wolfe; "
+                            "line_search=armijo is for direction=nonlinear_conjugate_gradient and "
+                            "steepest_descent",
+                            options.direction));
+  }
   if (std::string problem; !ceres.IsValid(&problem)) {
     throw Error(ErrorCode::usage,
                 "optimizer ceres_line_search: Ceres does not accept these options: " + problem);

@@ -46,7 +46,7 @@ struct LineSearchOptions {
 };
 
 /// The same as Ceres' own options. Throws `Error` (usage) for a combination that Ceres does not
-/// accept (L-BFGS and BFGS need the Wolfe conditions), with Ceres' own words.
+/// accept (L-BFGS and BFGS need the Wolfe conditions).
 ceres::Solver::Options line_search_solver_options(const LineSearchOptions& options);
 
 }  // namespace cairn

@@ -98,7 +98,7 @@ TEST_F(PolicySessionTest, AMapIsContinuedWhereAPoseIsRecognised) {
   session_->load(small_map(registry_));
   EXPECT_THAT(take("NEW VERTEX_SE2 100").text, HasSubstr("the id is already in use"));
   take("NEW VERTEX_SE2 0");
-  EXPECT_THAT(take("NEXT").text, StartsWith("LOCATE 0\nOK "));
+  EXPECT_THAT(take("NEXT").text, HasSubstr("LOCATE 0\nOK "));
   EXPECT_THAT(take("NEXT").text, StartsWith("MATCH NONE\n"));  // once for each pose
   take("NEW VERTEX_SE2 1");
   take("EDGE_SE2 0 1 1 0 0 400 0 0 400 0 400");
@@ -111,7 +111,29 @@ TEST_F(PolicySessionTest, AMapIsContinuedWhereAPoseIsRecognised) {
   EXPECT_THAT(take("QUIT").text, ::testing::Not(HasSubstr("not connected")));
 }
 
+TEST_F(PolicySessionTest, BeforeTheRobotIsLocatedThereIsNoCovariance) {
+  session_->load(small_map(registry_));
+  EXPECT_TRUE(session_->located());
+  take("NEW VERTEX_SE2 0");
+  EXPECT_THAT(take("FIX 0").text, HasSubstr("it is not known where the pose is on the map"));
+  EXPECT_THAT(take("ESTIMATE 0").text,
+              HasSubstr("NOTE until a pose is matched with one of the map"));
+  EXPECT_FALSE(session_->located());
+  for (const char* line : {"COVARIANCE 0 0", "COVARIANCE 100 0"})
+    EXPECT_THAT(take(line).text, HasSubstr("no pose was matched with one of the map yet")) << line;
+  EXPECT_THAT(take("COVARIANCE 101 101").text, HasSubstr("COVARIANCE 101 101 "));
+  take("EDGE_SE2 101 0" + kHere);
+  EXPECT_THAT(take("COVARIANCE 0 0").text, HasSubstr("COVARIANCE 0 0 "));
+  EXPECT_TRUE(session_->located());
+}
+
 TEST_F(PolicySessionTest, AMapThatWasNeverMatchedIsReported) {
+  session_->load(small_map(registry_));
+  drive();
+  session_->finish();
+  EXPECT_FALSE(session_->located());
+  EXPECT_THAT(session_->unread_notes(), ::testing::Contains(HasSubstr("not connected")));
+  begin();
   session_->load(small_map(registry_));
   drive();
   EXPECT_THAT(take("QUIT").text, HasSubstr("NOTE no pose was matched with one of the map"));

@@ -134,7 +134,7 @@ TEST_P(SparsifyingSession, RefusesWhatItCannotDoAndChangesNothing) {
       {"SPARSIFY 2 99", "there is no variable 99 to be removed"},
       {"SPARSIFY 60", "there is no variable 60 to be removed"},  // no measurement yet
       {"SPARSIFY 2 2", "variable 2 is to leave twice"},
-      {"SPARSIFY 0", "MARGINALIZE leaves a linear prior instead"},
+      {"SPARSIFY 0", "marginalising it would leave a linear prior on them instead"},
       {"SPARSIFY 3", "VERTEX_XY 50"},
       {"SPARSIFY 5", "EDGE_PRIOR_SE2 on VERTEX_SE2 5"},
       {"SPARSIFY 50", "relate poses of one kind only"},

@@ -375,6 +375,21 @@ TEST_P(CeresLineSearch, HasConvergedOnlyAtTheMinimum) {
   }
 }
 
+TEST_P(CeresLineSearch, HasConvergedWhereTheGradientIsZero) {
+  const auto optimizer = registry_.make<Optimizer>(GetParam());
+  Graph graph;
+  const auto pose = registry_.variable_type("VERTEX_SE2");
+  const std::array<double, 3> here{0.0, 0.0, 0.0}, there{1.0, 0.0, 0.0};
+  const std::array<double, 6> information{1.0, 0.0, 0.0, 1.0, 0.0, 1.0};
+  const std::array<int, 2> on{graph.add_variable(pose, 0, here),
+                              graph.add_variable(pose, 1, there)};
+  graph.add_factor(registry_.factor_type("EDGE_SE2"), on, there, information);
+  const Summary summary = optimizer->optimize(graph);
+  EXPECT_EQ(summary.status, Status::converged);
+  EXPECT_EQ(summary.initial_chi2, 0.0);
+  EXPECT_EQ(summary.final_chi2, 0.0);
+}
+
 TEST(CeresLineSearchOptions, AreRefusedWhereTheyDoNotGoTogether) {
   CAIRN_NEEDS("optimizer", "ceres_line_search");
   Registry registry;

@@ -38,7 +38,9 @@ class CAIRN_API LineSession {
   /// one is refused.
   void restore(std::string_view line, std::int64_t number);
   /// SAVE must not replace this file: the journal.
-  void protect(std::filesystem::path file) { protected_ = std::move(file); }
+  void protect(std::filesystem::path file, std::string what) {
+    protected_.emplace_back(std::move(file), std::move(what));
+  }
   /// No line follows. Not for a journal: a restored session goes on from before this.
   virtual void finish();
 
@@ -70,7 +72,7 @@ class CAIRN_API LineSession {
                                              std::string_view what);
   /// Refuses a command with more or fewer words than its form.
   static void expect_words(const Words& words, std::size_t count, std::string_view form);
-  /// The file of "SAVE file". Refuses standard output, and the file that is protected.
+  /// The file of "SAVE file". Refuses standard output, and files that are protected.
   std::string file_to_save(const Words& words) const;
   /// What "NEW TAG id" declares.
   static Variable declared_variable(const Words& words, Registry& registry);
@@ -87,7 +89,7 @@ class CAIRN_API LineSession {
  private:
   std::int64_t line_ = 0;
   bool silent_ = false;
-  std::filesystem::path protected_;
+  std::vector<std::pair<std::filesystem::path, std::string>> protected_;
 };
 
 }  // namespace cairn

@@ -45,8 +45,16 @@ class CAIRN_API PolicySession final : public LineSession {
                 PolicySettings settings);
 
   /// Before the first line: a map that the poses continue. Its poses are kept ones; where the robot
-  /// is on it is unknown until a match with one of them comes.
+  /// is on it is unknown until a match with one of them comes; until then the estimates of the new
+  /// poses are in a frame of their own, and they have no covariance.
   void load(const Graph& map);
+  /// Whether it is known where the robot is on that map; true without one, and before its first
+  /// pose.
+  bool located() const { return !newest_ || policy_.unlocated().empty(); }
+  /// After the end: whether everything was solved to convergence.
+  bool converged() const { return converged_; }
+  /// After `finish`: notes that no answer has.
+  std::vector<std::string> unread_notes() const;
   void finish() override;
   Estimator& estimator() override { return policy_.estimator(); }
   std::int64_t variable_count() const override;
@@ -106,6 +114,7 @@ class CAIRN_API PolicySession final : public LineSession {
   void note_link(const LinkReport& link);
   void write_results(bool kept);
   bool in_graph(Id id) const;
+  bool on_map(Id id) const;
   void write_estimate(Id id, std::string& text) const;
 
   PosePolicy& policy_;
@@ -116,7 +125,7 @@ class CAIRN_API PolicySession final : public LineSession {
 
   std::optional<ArrivingPose> arriving_;
   std::optional<Id> first_, newest_, before_;  ///< that the policy has
-  bool open_ = false, finished_ = false;
+  bool open_ = false, finished_ = false, converged_ = true;
   std::optional<Measured> measured_;
   bool asked_place_ = false;              ///< LOCATE, for the open pose
   std::string asked_;                     ///< MATCH …, while nothing came in answer
