@@ -116,12 +116,11 @@ void CompactGraph::advance(const Variable& pose, const Motion& motion,
   next.pose = pose;
   next.type = type;
   next.predecessor = newest_.kept ? size() - 1 : newest_.predecessor;
-  if (newest_.kept) {
-    next.odometry = motion;
-  } else {
-    next.odometry = group_->motions().compose(newest_.odometry, motion, order_);
-    next.steps = std::move(newest_.steps);
-  }
+  next.odometry =
+      newest_.kept ? motion : group_->motions().compose(newest_.odometry, motion, order_);
+  // While nothing has changed: whether it can be a factor where the pose is kept.
+  (void)group_->motions().to_factor(type, kept_[next.predecessor].id, pose.id, next.odometry);
+  if (!newest_.kept) next.steps = std::move(newest_.steps);
   if (keeps_chains_) next.steps.push_back({pose.id, motion.mean, motion.covariance});
   next.ahead = compose(kept_[next.predecessor].ahead, next.odometry);
   newest_ = std::move(next);

@@ -68,6 +68,9 @@ void LineSession::restore(std::string_view line, std::int64_t number) {
   silent_ = true;
   try {
     perform(line, words, reply);
+  } catch (const Error&) {
+    silent_ = false;
+    if (!reply.changes) throw;  // or it was answered by an error before, too, after what it changed
   } catch (...) {
     silent_ = false;
     throw;

@@ -193,7 +193,7 @@ void PolicySession::check_motion(const Factor& factor, Id from) const {
     throw bad_line(fmt::format("{} is not a relative pose of {}, and a policy takes nothing else",
                                type.tag(), motions_->type().tag()));
   }
-  (void)motions_->of_factor(factor, from);
+  (void)motions_->to_factor(factor.type, from, *current(), motions_->of_factor(factor, from));
 }
 
 void PolicySession::check_kept(Id id) const {
@@ -234,7 +234,14 @@ void PolicySession::begin() {
   if (!arriving_) return;
   Variable pose = arriving_->pose;
   if (newest_ && !pose.fixed) pose.state.clear();  // where its odometry puts it
-  policy_.add_pose(pose, arriving_->odometry);
+  try {
+    policy_.add_pose(pose, arriving_->odometry);
+  } catch (const Error& error) {
+    if (error.code() == ErrorCode::usage) throw;  // what it refuses is not this pose
+    throw Error(error.code(), fmt::format("pose {} is not taken: {}; expected 'REMOVE VARIABLE "
+                                          "{}', and other odometry",
+                                          pose.id, error.what(), pose.id));
+  }
   before_ = std::exchange(newest_, pose.id);
   if (!first_ && !located()) {
     answer_ +=
@@ -270,9 +277,10 @@ void PolicySession::offer() {
 /// Hands over to the policy what has come.
 void PolicySession::settle(Reply& reply) {
   if (!complete()) return;
-  reply.changes = reply.changes || arriving_ || measured_;
-  begin();
+  const bool coming = arriving_ || measured_;
+  begin();  // or nothing has changed
   offer();
+  reply.changes = reply.changes || coming;
 }
 
 /// Ends the pose of now.
@@ -313,7 +321,13 @@ void PolicySession::finish_trajectory() {
                     arriving_->pose.id, *newest_, arriving_->pose.id);
     arriving_.reset();
   }
-  if (current()) end();
+  try {
+    if (current()) end();
+  } catch (const Error& error) {
+    if (!arriving_ || error.code() == ErrorCode::usage) throw;
+    answer_ += fmt::format("NOTE {}\n", error.what());
+    arriving_.reset();
+  }
   converged_ = policy_.finish();
   if (!converged_) answer_ += "NOTE the estimate has not converged\n";
   if (!located()) {
@@ -409,7 +423,7 @@ void PolicySession::report_covariance(const Words& words, Reply& reply) {
   }
   Estimator& estimator = policy_.estimator();
   const std::string text = covariance_line(estimator, a, motions_->type(), b, motions_->type());
-  if (text.empty() && !silent()) {
+  if (text.empty()) {
     throw Error(ErrorCode::numerical,
                 "there is no covariance: the measurements do not determine everything");
   }

@@ -3,12 +3,7 @@
 // Every line is answered as docs/online.md states, a line that is refused changes nothing, and the
 // lines that count give the same estimate again, to the last bit, as a journal needs it.
 #include <string>
-#include <utility>
 
-#include <fmt/format.h>
-
-#include "cairn/online/conversation.hpp"
-#include "cairn/runtime/error.hpp"
 #include "fuzz/targets/sessions.hpp"
 #include "fuzz/targets/target.hpp"
 
@@ -17,94 +12,15 @@ namespace {
 
 constexpr int kMostLines = 48;
 
-/// The last line of a text that ends in a line break.
-std::string_view last_line(std::string_view text) {
-  text.remove_suffix(1);
-  const std::size_t before = text.rfind('\n');
-  return before == std::string_view::npos ? text : text.substr(before + 1);
-}
-
-bool begins_with_one_of(std::string_view line, std::initializer_list<std::string_view> words) {
-  for (const std::string_view word : words) {
-    if (line.starts_with(word)) return true;
-  }
-  return false;
-}
-
-void expect_well_formed(const LineSession::Reply& reply, std::int64_t number) {
-  if (reply.text.empty()) return;
-  expect(reply.text.back() == '\n', [&] { return "no end of line: " + reply.text; });
-  const std::string_view end = last_line(reply.text);
-  if (reply.refused) {
-    const std::string begin = fmt::format("ERROR line {}: ", number);
-    expect(end.starts_with(begin) && end.size() + 1 == reply.text.size(),
-           [&] { return "a refusal that is not one line: " + reply.text; });
-  } else {
-    expect(begins_with_one_of(end, {"OK ", "SINGULAR ", "UNCONVERGED "}),
-           [&] { return "an answer without its last line: " + reply.text; });
-  }
-}
-
-/// A line that changed something.
-struct Kept {
-  std::int64_t number;
-  std::string line;
-};
-
-/// Takes a stream, and remembers what a journal would have.
-class Stream {
- public:
-  explicit Stream(const SessionSettings& settings) : session_(settings), talk_(session_.lines()) {}
-
-  /// False if this was the last line.
-  bool take(const std::string& line) {
-    const std::int64_t variables = session_.lines().variable_count(),
-                       factors = session_.lines().factor_count();
-    const LineSession::Reply reply = talk_.take(line);
-    expect_well_formed(reply, ++number_);
-    if (reply.changes) kept_.push_back({number_, line});
-    expect(reply.changes || (session_.lines().variable_count() == variables &&
-                             session_.lines().factor_count() == factors),
-           [&] { return fmt::format("'{}' is not in a journal, and changes the graph", line); });
-    return !reply.quit;
-  }
-
-  void expect_the_same_again(const SessionSettings& settings) {
-    talk_.finish();
-    OwnedSession again(settings);
-    for (const Kept& kept : kept_) {
-      try {
-        again.lines().restore(kept.line, kept.number);
-      } catch (const Error& error) {
-        throw Finding(
-            fmt::format("line {}, '{}', was taken, and is refused when it is restored: {}",
-                        kept.number, kept.line, error.what()));
-      }
-    }
-    const std::string where = difference(session_.estimator(), again.estimator());
-    expect(where.empty(), [&] { return "restored, these differ: " + where; });
-  }
-
- private:
-  OwnedSession session_;
-  Conversation talk_;
-  std::int64_t number_ = 0;
-  std::vector<Kept> kept_;
-};
-
 void run(Bytes bytes) {
   Source source(bytes);
   const SessionSettings settings = session_settings(source.byte());
-  std::string_view text = text_of(source.rest());
-  Stream stream(settings);
-  for (int lines = 0; !text.empty() && lines < kMostLines; ++lines) {
-    const std::size_t end = text.find('\n');
-    const std::string line(text.substr(0, end));
-    text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
-    if (writes_a_file(line)) continue;
-    if (!stream.take(line)) break;
-  }
-  stream.expect_the_same_again(settings);
+  OwnedSession session(settings), again(settings);
+  Stream stream(session.lines());
+  stream.take_all(text_of(source.rest()), kMostLines);
+  restore(stream.taken(), again.lines());
+  const std::string where = difference(session.estimator(), again.estimator());
+  expect(where.empty(), [&] { return "restored, these differ: " + where; });
 }
 
 std::vector<std::string> seeds() {

@@ -42,6 +42,72 @@ OwnedSession::OwnedSession(const SessionSettings& settings)
   if (settings.online.marginals == "diagonal") estimator_->keep_marginals(KeptMarginals::diagonal);
 }
 
+namespace {
+
+/// The last line of a text that ends in a line break.
+std::string_view last_line(std::string_view text) {
+  text.remove_suffix(1);
+  const std::size_t before = text.rfind('\n');
+  return before == std::string_view::npos ? text : text.substr(before + 1);
+}
+
+bool begins_with_one_of(std::string_view line, std::initializer_list<std::string_view> words) {
+  for (const std::string_view word : words) {
+    if (line.starts_with(word)) return true;
+  }
+  return false;
+}
+
+void expect_well_formed(const LineSession::Reply& reply, std::int64_t number) {
+  if (reply.text.empty()) return;
+  expect(reply.text.back() == '\n', [&] { return "no end of line: " + reply.text; });
+  const std::string_view end = last_line(reply.text);
+  if (reply.refused) {
+    const std::string begin = fmt::format("ERROR line {}: ", number);
+    expect(end.starts_with(begin) && end.size() + 1 == reply.text.size(),
+           [&] { return "a refusal that is not one line: " + reply.text; });
+  } else {
+    expect(begins_with_one_of(end, {"OK ", "SINGULAR ", "UNCONVERGED "}),
+           [&] { return "an answer without its last line: " + reply.text; });
+  }
+}
+
+}  // namespace
+
+void Stream::take_all(std::string_view text, int most) {
+  for (int lines = 0; !text.empty() && lines < most; ++lines) {
+    const std::size_t end = text.find('\n');
+    const std::string line(text.substr(0, end));
+    text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
+    if (writes_a_file(line)) continue;
+    if (!take(line)) break;
+  }
+  conversation_.finish();
+}
+
+/// False if this was the last line.
+bool Stream::take(const std::string& line) {
+  const std::int64_t variables = session_.variable_count(), factors = session_.factor_count();
+  const LineSession::Reply reply = conversation_.take(line);
+  expect_well_formed(reply, ++number_);
+  if (reply.changes) taken_.push_back({number_, line});
+  expect(reply.changes || reply.quit ||
+             (session_.variable_count() == variables && session_.factor_count() == factors),
+         [&] { return fmt::format("'{}' is not in a journal, and changes the graph", line); });
+  return !reply.quit;
+}
+
+void restore(const std::vector<TakenLine>& lines, LineSession& session) {
+  for (const TakenLine& line : lines) {
+    try {
+      session.restore(line.text, line.number);
+    } catch (const Error& error) {
+      throw Finding(fmt::format("line {}, '{}', was taken, and is refused when it is restored: {}",
+                                line.number, line.text, error.what()));
+    }
+  }
+}
+
 std::string difference(Estimator& a, Estimator& b) {
   if (a.variables() != b.variables()) return "the variables";
   if (a.factors() != b.factors()) return "the factors";

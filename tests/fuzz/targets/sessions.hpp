@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "cairn/online/conversation.hpp"
 #include "cairn/online/online_session.hpp"
 #include "cairn/sparsification/map_sparsifier.hpp"
 
@@ -35,6 +36,35 @@ class OwnedSession {
   std::unique_ptr<Estimator> estimator_;
   std::unique_ptr<OnlineSession> lines_;
 };
+
+/// A line that changed something, as a journal has it.
+struct TakenLine {
+  std::int64_t number;
+  std::string text;
+};
+
+/// Feeds lines to a session, checks the form of each answer and that a line which no journal would
+/// have changes nothing, and remembers the others.
+class Stream {
+ public:
+  explicit Stream(LineSession& session) : session_(session), conversation_(session) {}
+
+  /// At most so many lines of a text, but for SAVE, up to the one that ends the session; then the
+  /// session has come to its end.
+  void take_all(std::string_view text, int most);
+  const std::vector<TakenLine>& taken() const { return taken_; }
+
+ private:
+  bool take(const std::string& line);
+
+  LineSession& session_;
+  Conversation conversation_;
+  std::int64_t number_ = 0;
+  std::vector<TakenLine> taken_;
+};
+
+/// Restores lines in another session; a `Finding` if one is refused.
+void restore(const std::vector<TakenLine>& lines, LineSession& session);
 
 /// Where two estimators differ: variables, factors, or a bit of an estimate. Empty if nowhere.
 std::string difference(Estimator& a, Estimator& b);

@@ -84,6 +84,7 @@ const std::string& scratch_folder();
 // The targets, each in the file of its name.
 Target reader();
 Target line_protocol();
+Target policy_protocol();
 Target journal();
 Target sidecar();
 Target recording();

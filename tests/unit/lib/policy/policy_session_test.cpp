@@ -182,6 +182,69 @@ TEST_F(PolicySessionTest, APoseThatCameByMistakeCanBeTakenBack) {
   EXPECT_EQ(session_->counts().poses, 5);
 }
 
+TEST_F(PolicySessionTest, AMeasurementWithoutInformationIsRefused) {
+  take("NEW VERTEX_SE2 0");
+  take("NEW VERTEX_SE2 1");
+  // From the other end its covariance is not finite.
+  const LineSession::Reply reply = take("EDGE_SE2 1 0 -1e300 0 3 1 0 0 1 0 1");
+  EXPECT_THAT(reply.text, HasSubstr("covariance that is not positive definite"));
+  EXPECT_FALSE(reply.changes);
+  take("EDGE_SE2 0 1" + kQuarter);
+  EXPECT_THAT(take("NEXT").text, StartsWith("MATCH NONE\n"));
+}
+
+/// Pose 1 is where pose 0 was, and dropped; pose 2 is so far from it that the covariance of both
+/// steps together is not finite.
+class FarOdometry : public PolicySessionTest {
+ protected:
+  void SetUp() override {
+    PolicySessionTest::SetUp();
+    if (IsSkipped()) return;
+    take("NEW VERTEX_SE2 0");
+    take("NEW VERTEX_SE2 1");
+    take("EDGE_SE2 0 1" + kHere);
+    EXPECT_THAT(take("NEW VERTEX_SE2 2").text, StartsWith("DROPPED 1\n"));
+    EXPECT_THAT(take("EDGE_SE2 1 2 1e200 0 0 400 0 0 400 0 400").text, IsEmpty());
+  }
+};
+
+TEST_F(FarOdometry, IsRefusedBeforeAnythingChanges) {
+  const LineSession::Reply reply = take("NEXT");
+  EXPECT_FALSE(reply.changes);
+  EXPECT_THAT(reply.text, HasSubstr("pose 2 is not taken: "));
+  EXPECT_THAT(reply.text, HasSubstr("expected 'REMOVE VARIABLE 2', and other odometry"));
+  EXPECT_THAT(take("REMOVE VARIABLE 2").text, StartsWith("OK "));
+  take("NEW VERTEX_SE2 2");
+  take("EDGE_SE2 1 2" + kQuarter);
+  EXPECT_THAT(take("NEXT").text, StartsWith("MATCH NONE\n"));
+}
+
+TEST_F(FarOdometry, AtTheEndItsPoseIsLeftOut) {
+  const std::string text = take("QUIT").text;
+  EXPECT_THAT(text, HasSubstr("NOTE pose 2 is not taken: "));
+  EXPECT_THAT(text, HasSubstr("KEPT 1\n"));
+  EXPECT_FALSE(session_->estimator().has(2));
+}
+
+TEST_F(PolicySessionTest, ALineThatChangesAndIsAnsweredByAnErrorCanBeRestored) {
+  session_->load(small_map(registry_));
+  for (const std::string& line : {std::string("NEW VERTEX_SE2 0"), std::string("NEW VERTEX_SE2 1"),
+                                  "EDGE_SE2 0 1" + kQuarter})
+    take(line);
+  const LineSession::Reply reply = take("COVARIANCE 0 0");  // takes in pose 1
+  EXPECT_TRUE(reply.changes);
+  EXPECT_THAT(reply.text, HasSubstr("no pose was matched with one of the map yet"));
+  const std::string estimate = take("ESTIMATE ALL").text;
+
+  begin();
+  session_->load(small_map(registry_));
+  session_->restore("NEW VERTEX_SE2 0", ++number_);
+  session_->restore("NEW VERTEX_SE2 1", ++number_);
+  session_->restore("EDGE_SE2 0 1" + kQuarter, ++number_);
+  EXPECT_NO_THROW(session_->restore("COVARIANCE 0 0", ++number_));
+  EXPECT_EQ(take("ESTIMATE ALL").text, estimate.substr(estimate.find("VERTEX")));
+}
+
 TEST_F(PolicySessionTest, TheEndKeepsTheNewestPose) {
   drive();
   const LineSession::Reply reply = take("QUIT");

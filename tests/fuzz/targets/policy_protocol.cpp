@@ -1,0 +1,219 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Lines of `cairn online --policy`: the first byte chooses the policy's options, the second the
+// settings and whether there is a map, the rest is the stream. Every line is answered as
+// docs/online.md states, one that is refused changes nothing, and at its end the compact graph is
+// that of the lines which a journal has, and that of these without the questions among them, to the
+// last bit.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <memory>
+#include <string>
+
+#include <fmt/format.h>
+
+#include "cairn/policy/policy_session.hpp"
+#include "cairn/runtime/error.hpp"
+#include "fuzz/targets/sessions.hpp"
+#include "fuzz/targets/target.hpp"
+
+namespace cairn::fuzz {
+namespace {
+
+constexpr int kMostLines = 64;
+
+struct Choice {
+  std::string policy;
+  PolicySettings settings;
+  bool map = false;
+};
+
+Choice choice_of(std::uint8_t options, std::uint8_t settings) {
+  static constexpr std::array kThresholds = {"", ",loop_gain=0.2,pose_gain=0.2",
+                                             ",loop_gain=0,pose_gain=0", ",strategy=apfl"};
+  static constexpr std::array kLinks = {"", ",gate=0.99", ",gate=0.9,trust=0", ",reuse=false"};
+  static constexpr std::array kOutputs = {"none", "last", "changed", "all"};
+  static constexpr std::array kMarginals = {"none", "last", "diagonal", "none"};
+  return {.policy = fmt::format("compact_pose:range=3,angle=1{}{}{},estimator={}",
+                                kThresholds[options & 3], kLinks[options >> 2 & 3],
+                                (options & 16) != 0 ? ",matches=1" : "",
+                                (options & 32) != 0 ? "batch" : "incremental_cholesky"),
+          .settings = {.read = {},
+                       .output = kOutputs[settings & 3],
+                       .marginals = kMarginals[settings >> 2 & 3],
+                       .trajectory = (settings & 16) != 0},
+          .map = (settings & 32) != 0};
+}
+
+/// What an earlier session has left: three poses in the plane, 100 to 102.
+const Graph& map() {
+  static const Graph graph = [] {
+    Graph made;
+    const auto pose = registry().variable_type("VERTEX_SE2");
+    const auto edge = registry().factor_type("EDGE_SE2");
+    for (int k = 0; k < 3; ++k) made.add(Variable{pose, 100 + k, {1.0 * k, 0.5, 0.1 * k}, k == 0});
+    for (Id k = 100; k < 102; ++k) {
+      made.add(Factor{edge, {k, k + 1}, {1.0, 0.0, 0.1}, {9, 0, 0, 9, 0, 9}});
+    }
+    return made;
+  }();
+  return graph;
+}
+
+/// A policy and its session.
+class OwnedPolicy {
+ public:
+  explicit OwnedPolicy(const Choice& choice)
+      : policy_(registry().make<PosePolicy>(choice.policy)),
+        format_(registry().make<StreamFormat>("g2o")),
+        lines_(*policy_, *format_, registry(), choice.settings) {
+    if (choice.map) lines_.load(map());
+  }
+  PolicySession& lines() { return lines_; }
+  PosePolicy& policy() { return *policy_; }
+
+ private:
+  std::unique_ptr<PosePolicy> policy_;
+  std::unique_ptr<StreamFormat> format_;
+  PolicySession lines_;
+};
+
+bool is_question(std::string_view line) {
+  const std::size_t begin = line.find_first_not_of(" \t\r");
+  if (begin != std::string_view::npos) line.remove_prefix(begin);
+  return line.starts_with("ESTIMATE") || line.starts_with("COVARIANCE") || line.starts_with("CHI2");
+}
+
+std::string where_they_differ(PosePolicy& a, PosePolicy& b) {
+  return a.kept() != b.kept() ? "the kept poses" : difference(a.estimator(), b.estimator());
+}
+
+void expect_consistent(PosePolicy& policy) {
+  std::vector<Id> kept = policy.kept(), there = policy.estimator().variables();
+  std::ranges::sort(kept);
+  std::ranges::sort(there);
+  expect(policy.unlocated().empty() ? kept == there : std::ranges::includes(kept, there),
+         [&] { return fmt::format("{} kept poses, {} in the graph", kept.size(), there.size()); });
+  for (const Id id : there) {
+    expect(std::ranges::all_of(policy.estimator().state(id),
+                               [](double number) { return std::isfinite(number); }),
+           [&] { return fmt::format("the estimate of {} is not finite", id); });
+  }
+}
+
+void run(Bytes bytes) {
+  Source source(bytes);
+  const std::uint8_t options = source.byte();
+  const Choice choice = choice_of(options, source.byte());
+  OwnedPolicy live(choice);
+  Stream stream(live.lines());
+  stream.take_all(text_of(source.rest()), kMostLines);
+  expect_consistent(live.policy());
+
+  std::vector<TakenLine> lines = stream.taken();
+  for (const char* which : {"restored", "without questions"}) {
+    OwnedPolicy again(choice);
+    restore(lines, again.lines());
+    again.lines().finish();
+    const std::string where = where_they_differ(live.policy(), again.policy());
+    expect(where.empty(), [&] { return fmt::format("{}, these differ: {}", which, where); });
+    std::erase_if(lines, [](const TakenLine& line) { return is_question(line.text); });
+  }
+}
+
+/// A robot that drives round a square, asks for matches, and gets some.
+std::string square(bool asks) {
+  std::string text = "VERTEX_SE2 0 0 0 0\n";
+  for (int k = 1; k < 10; ++k) {
+    text += fmt::format("NEW VERTEX_SE2 {}\n", k);
+    text += fmt::format("EDGE_SE2 {} {} 1 0 1.5708 25 0 0 25 0 100\n", k - 1, k);
+    if (asks) text += "NEXT\n";
+    if (k >= 4) text += fmt::format("EDGE_SE2 {} {} 0.0{} 0 0 100 0 0 100 0 400\n", k - 4, k, k);
+    if (asks && k % 2 == 0) text += "NEXT\nESTIMATE ALL\n";
+    if (k % 3 == 0) text += fmt::format("DONE\nCOVARIANCE 0 {}\n", k);
+  }
+  return text;
+}
+
+std::vector<std::string> seeds() {
+  const std::vector<std::string> streams = {square(true), square(false),
+                                            R"(VERTEX_SE2 0 0 0 0
+FIX 0
+NEW VERTEX_SE2 1
+EDGE_SE2 1 0 -1 0 0 9 0 0 9 0 9
+EDGE_SE2 0 1 1 0 0 9 0 0 9 0 9
+NEXT
+NOMATCH 0 1
+DONE
+NEW VERTEX_SE2 2
+REMOVE VARIABLE 2
+NEW VERTEX_SE2 3
+EDGE_SE2 1 3 1 0 0 9 0 0 9 0 9
+LOCATE 3
+NEXT
+EDGE_SE2 101 3 0.1 0 0 9 0 0 9 0 9
+NEXT
+ESTIMATE ALL
+COVARIANCE 1 101
+CHI2
+QUIT
+)",
+                                            R"(VERTEX_SE3:QUAT 0 0 0 0 0 0 0 1
+NEW VERTEX_SE3:QUAT 1
+EDGE_SE3:QUAT 0 1 1 0 0 0 0 0.1 1 9 0 0 0 0 0 9 0 0 0 0 9 0 0 0 9 0 0 9 0 9
+NEW VERTEX_SE3:QUAT 2
+EDGE_SE3:QUAT 1 2 1 0 0 0 0 0.1 1 9 0 0 0 0 0 9 0 0 0 0 9 0 0 0 9 0 0 9 0 9
+NEXT
+EDGE_SE3:QUAT 0 2 2 0 0 0 0 0.2 1 9 0 0 0 0 0 9 0 0 0 0 9 0 0 0 9 0 0 9 0 9
+ESTIMATE ALL
+CHI2
+)",
+                                            R"(NEXT
+DONE
+SPARSIFY 1
+VERTEX_XY 1 0 0
+VERTEX_SE2 0 1e200 0 0
+NEW VERTEX_SE2 1
+EDGE_SE2 0 1 1e200 0 0 1e-30 0 0 1e30 0 1
+NEW VERTEX_SE2 2
+EDGE_SE2 1 2 -1e300 0 3 1 0 0 1 0 1
+EDGE_SE2 0 2 0 0 0 1 0 0 1 0 1
+FULL
+CHI2
+)"};
+  std::vector<std::string> all;
+  int k = 0;
+  for (const std::string& stream : streams) {
+    for (int options = 0; options < 64; options += 5) {
+      std::string seed{static_cast<char>(options), static_cast<char>(k++ * 7 & 63)};
+      all.push_back(seed + stream);
+    }
+  }
+  return all;
+}
+
+std::vector<std::string> words() {
+  std::vector<std::string> all = protocol_words();
+  for (const char* word : {"NEXT\n", "DONE\n", "NOMATCH ", "NEXT\nDONE\n"}) all.emplace_back(word);
+  return all;
+}
+
+}  // namespace
+
+Target policy_protocol() {
+  return {"policy_protocol",
+          &run,
+          &seeds,
+          &words,
+          {{"types", "slam2d"},
+           {"types", "slam3d"},
+           {"stream_format", "g2o"},
+           {"optimizer", "levenberg_marquardt"},
+           {"linear_solver", "block_cholesky"},
+           {"pose_policy", "compact_pose"},
+           {"estimator", "incremental_cholesky"},
+           {"estimator", "batch"}},
+          2048};
+}
+
+}  // namespace cairn::fuzz
