@@ -59,13 +59,19 @@ double log_determinant(const Eigen::LLT<Matrix>& llt) {
   return 2.0 * llt.matrixLLT().diagonal().array().log().sum();
 }
 
+/// L⁻¹ X in the place of X, which may be empty: Eigen takes the address of its first number.
+template <class Matrix, class Block>
+void solve_lower(const Eigen::LLT<Matrix>& llt, Block& X) {
+  if (X.size() > 0) llt.matrixL().solveInPlace(X);
+}
+
 /// L⁻¹ A L⁻ᵀ of a symmetric A.
 template <class Matrix>
 Matrix whitened(const Eigen::LLT<Matrix>& llt, const Matrix& A) {
   Matrix X = A;
-  llt.matrixL().solveInPlace(X);
+  solve_lower(llt, X);
   X.transposeInPlace();
-  llt.matrixL().solveInPlace(X);
+  solve_lower(llt, X);
   return X;
 }
 
@@ -145,7 +151,7 @@ double divergence_of(const Eigen::LLT<MatrixXd>& a, const MatrixXd& A, const Mat
   // Far apart, what is lost in 1 + D is of no account, and B may be small beside A.
   const Eigen::LLT<MatrixXd> b = factor(B, function, what);
   MatrixXd root = b.matrixL();
-  a.matrixL().solveInPlace(root);
+  solve_lower(a, root);
   const double log_ratio = log_determinant(b) - log_determinant(a);
   return std::max(0.0, 0.5 * (root.squaredNorm() - log_ratio - static_cast<double>(B.rows())));
 }
@@ -173,7 +179,7 @@ Conditioned condition(const MatrixView& joint, int size_a, const char* function)
   Conditioned result{factor<MatrixXd>(joint.bottomRightCorner(size_b, size_b), function,
                                       "marginal of the second block"),
                      joint.bottomLeftCorner(size_b, size_a)};
-  result.b.matrixL().solveInPlace(result.across);
+  solve_lower(result.b, result.across);
   return result;
 }
 
@@ -206,7 +212,7 @@ double mutual_information(const MatrixView& joint, int size_a) {
   const Conditioned given = condition(joint, size_a, function);
   const MatrixXd first = joint.topLeftCorner(size_a, size_a);
   MatrixXd W = given.across.transpose();  // Σ_ab L_b⁻ᵀ
-  factor(first, function, "marginal of the first block").matrixL().solveInPlace(W);
+  solve_lower(factor(first, function, "marginal of the first block"), W);
   const bool wide = W.cols() > W.rows();
   const MatrixXd D =
       wide ? MatrixXd(-dense::product_with_transpose(W, W)) : -dense::product_of_transpose(W, W);
@@ -258,7 +264,7 @@ Divergence kullback_leibler(const Gaussian& p, const Gaussian& q) {
   result.covariance = checked(
       divergence_of(of_q, q.covariance, p.covariance, function, "first covariance"), function);
   VectorXd shift = q.mean - p.mean;
-  of_q.matrixL().solveInPlace(shift);
+  solve_lower(of_q, shift);
   result.mean = checked(0.5 * shift.squaredNorm(), function);
   return result;
 }

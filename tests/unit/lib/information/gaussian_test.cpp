@@ -143,6 +143,12 @@ TEST_F(GaussianMeasures, MutualInformationWithNothingIsNothing) {
   EXPECT_EQ(mutual_information(MatrixXd(0, 0), 0), 0.0);
 }
 
+TEST_F(GaussianMeasures, TheDivergenceOfNothingIsZero) {
+  const Gaussian nothing{VectorXd(0), MatrixXd(0, 0)};
+  EXPECT_EQ(kullback_leibler(nothing, nothing).total(), 0.0);
+  EXPECT_EQ(entropy(MatrixXd(0, 0)), 0.0);
+}
+
 TEST_F(GaussianMeasures, WhatDeterminesTheOtherSharesInfinitely) {
   EXPECT_EQ(mutual_information(block(1.0, 1.0, 1.0), 1), kInfinity);
   EXPECT_EQ(mutual_information(block(1.0, 3.0, 9.0), 1), kInfinity);
