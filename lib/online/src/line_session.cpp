@@ -65,17 +65,15 @@ void LineSession::restore(std::string_view line, std::int64_t number) {
   Reply reply;
   const Words words = split(line);
   if (words.empty()) return;
-  silent_ = true;
+  struct Silence {
+    bool& silent;
+    ~Silence() { silent = false; }
+  } const silence{silent_ = true};
   try {
     perform(line, words, reply);
   } catch (const Error&) {
-    silent_ = false;
     if (!reply.changes) throw;  // or it was answered by an error before, too, after what it changed
-  } catch (...) {
-    silent_ = false;
-    throw;
   }
-  silent_ = false;
 }
 
 void LineSession::acknowledge(Reply& reply, int owed, std::string_view word) const {

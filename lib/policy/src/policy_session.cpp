@@ -284,9 +284,8 @@ void PolicySession::settle(Reply& reply) {
 }
 
 /// Ends the pose of now.
-PoseReport PolicySession::end() {
-  Reply unread;
-  settle(unread);
+PoseReport PolicySession::end(Reply& reply) {
+  settle(reply);
   PoseReport report = policy_.end_pose();
   open_ = false;
   arrived_[report.id] = report.kept;
@@ -305,7 +304,7 @@ PoseReport PolicySession::end() {
 
 /// Ends the pose, and answers.
 void PolicySession::close(Reply& reply) {
-  const PoseReport report = end();
+  const PoseReport report = end(reply);
   reply.changes = reply.solved = true;
   reply.seconds = report.seconds.total;
   answer_ += fmt::format("{} {}\n", report.kept ? "KEPT" : "DROPPED", report.id);
@@ -322,7 +321,8 @@ void PolicySession::finish_trajectory() {
     arriving_.reset();
   }
   try {
-    if (current()) end();
+    Reply unread;
+    if (current()) end(unread);
   } catch (const Error& error) {
     if (!arriving_ || error.code() == ErrorCode::usage) throw;
     answer_ += fmt::format("NOTE {}\n", error.what());

@@ -286,18 +286,6 @@ std::vector<std::string> words() {
 
 }  // namespace
 
-Target journal() {
-  return {"journal",
-          &run,
-          &seeds,
-          &words,
-          {{"types", "slam2d"},
-           {"types", "slam3d"},
-           {"stream_format", "g2o"},
-           {"optimizer", "levenberg_marquardt"},
-           {"linear_solver", "block_cholesky"},
-           {"estimator", "incremental_cholesky"}},
-          1024};
-}
+Target journal() { return {"journal", &run, &seeds, &words, session_needs({}), 1024}; }
 
 }  // namespace cairn::fuzz

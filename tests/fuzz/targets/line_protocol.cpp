@@ -42,14 +42,7 @@ Target line_protocol() {
           &run,
           &seeds,
           &protocol_words,
-          {{"types", "slam2d"},
-           {"types", "slam3d"},
-           {"stream_format", "g2o"},
-           {"optimizer", "levenberg_marquardt"},
-           {"linear_solver", "block_cholesky"},
-           {"estimator", "incremental_cholesky"},
-           {"estimator", "batch"},
-           {"estimator", "periodic_batch"}},
+          session_needs({{"estimator", "batch"}, {"estimator", "periodic_batch"}}),
           1024};
 }
 

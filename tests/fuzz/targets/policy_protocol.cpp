@@ -78,10 +78,9 @@ class OwnedPolicy {
   PolicySession lines_;
 };
 
-bool is_question(std::string_view line) {
-  const std::size_t begin = line.find_first_not_of(" \t\r");
-  if (begin != std::string_view::npos) line.remove_prefix(begin);
-  return line.starts_with("ESTIMATE") || line.starts_with("COVARIANCE") || line.starts_with("CHI2");
+bool is_question(const TakenLine& line) {
+  const std::string_view word = first_word(line.text);
+  return word == "ESTIMATE" || word == "COVARIANCE" || word == "CHI2";
 }
 
 std::string where_they_differ(PosePolicy& a, PosePolicy& b) {
@@ -117,7 +116,7 @@ void run(Bytes bytes) {
     again.lines().finish();
     const std::string where = where_they_differ(live.policy(), again.policy());
     expect(where.empty(), [&] { return fmt::format("{}, these differ: {}", which, where); });
-    std::erase_if(lines, [](const TakenLine& line) { return is_question(line.text); });
+    std::erase_if(lines, &is_question);
   }
 }
 
@@ -205,14 +204,7 @@ Target policy_protocol() {
           &run,
           &seeds,
           &words,
-          {{"types", "slam2d"},
-           {"types", "slam3d"},
-           {"stream_format", "g2o"},
-           {"optimizer", "levenberg_marquardt"},
-           {"linear_solver", "block_cholesky"},
-           {"pose_policy", "compact_pose"},
-           {"estimator", "incremental_cholesky"},
-           {"estimator", "batch"}},
+          session_needs({{"pose_policy", "compact_pose"}, {"estimator", "batch"}}),
           2048};
 }
 

@@ -6,8 +6,6 @@
 
 #include <fmt/format.h>
 
-#include "fuzz/targets/target.hpp"
-
 namespace cairn::fuzz {
 
 SessionSettings session_settings(std::uint8_t choice) {
@@ -124,9 +122,25 @@ std::string difference(Estimator& a, Estimator& b) {
   return {};
 }
 
-bool writes_a_file(std::string_view line) {
-  const std::size_t word = line.find_first_not_of(" \t\r");
-  return word != std::string_view::npos && line.substr(word).starts_with("SAVE");
+std::string_view first_word(std::string_view line) {
+  constexpr std::string_view kBlanks = " \t\r";
+  const std::size_t begin = line.find_first_not_of(kBlanks);
+  if (begin == std::string_view::npos) return {};
+  line.remove_prefix(begin);
+  return line.substr(0, line.find_first_of(kBlanks));
+}
+
+bool writes_a_file(std::string_view line) { return first_word(line) == "SAVE"; }
+
+std::vector<Needed> session_needs(std::initializer_list<Needed> more) {
+  std::vector<Needed> all = {{"types", "slam2d"},
+                             {"types", "slam3d"},
+                             {"stream_format", "g2o"},
+                             {"optimizer", "levenberg_marquardt"},
+                             {"linear_solver", "block_cholesky"},
+                             {"estimator", "incremental_cholesky"}};
+  all.insert(all.end(), more);
+  return all;
 }
 
 std::vector<std::string> conversations() {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <initializer_list>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -10,6 +11,7 @@
 #include "cairn/online/conversation.hpp"
 #include "cairn/online/online_session.hpp"
 #include "cairn/sparsification/map_sparsifier.hpp"
+#include "fuzz/targets/target.hpp"
 
 namespace cairn::fuzz {
 
@@ -69,8 +71,13 @@ void restore(const std::vector<TakenLine>& lines, LineSession& session);
 /// Where two estimators differ: variables, factors, or a bit of an estimate. Empty if nowhere.
 std::string difference(Estimator& a, Estimator& b);
 
+/// The first word of a line, by which a session knows a command; empty if there is none.
+std::string_view first_word(std::string_view line);
 /// Whether a line is a SAVE: the one command that touches files, which no target may.
 bool writes_a_file(std::string_view line);
+
+/// What every session of poses needs, and what else this one does.
+std::vector<Needed> session_needs(std::initializer_list<Needed> more);
 
 /// Conversations of `cairn online`, without the settings.
 std::vector<std::string> conversations();

@@ -105,7 +105,7 @@ class CAIRN_API PolicySession final : public LineSession {
   void begin();
   void offer();
   void settle(Reply& reply);
-  PoseReport end();
+  PoseReport end(Reply& reply);
   void close(Reply& reply);
   void finish_trajectory();
 
