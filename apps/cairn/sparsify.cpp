@@ -25,6 +25,7 @@
 #include "progress.hpp"
 #include "results.hpp"
 #include "sparsify.hpp"
+#include "sparsify_edges.hpp"
 #include "sparsify_records.hpp"
 #include "step_times.hpp"
 #include "table.hpp"
@@ -249,6 +250,7 @@ int run_sparsify(SparsifyCommandOptions options, Session& session) {
   if (options.output == "-") session.write_file_to_stdout();
   check_output(options.output, options.output_format, session);
   check_file(options.record, session);
+  if (!options.edges.empty()) return run_sparsify_edges(options, session);
   Registry& registry = session.registry();
   const SparsifyJob job = job_of(options, session);
   // A wrong name is refused before a graph is read.
@@ -314,6 +316,10 @@ void add_sparsify_options(ArgumentParser cli, SparsifyCommandOptions& options) {
   cli.add_option("--sparsifier", options.sparsifier, "the sparsifier, with more options")
       .type_name("NAME")
       .show_default();
+  cli.add_option("--edges", options.edges,
+                 "remove loop closures instead, all poses stay: mac, greedy_tree, greedy_gain, l1, "
+                 "random; :part=P of them stays")
+      .type_name("NAME");
   cli.add_option("--online", options.online,
                  "feed the graph pose by pose, and take nodes out every N poses")
       .type_name("N")
@@ -342,7 +348,8 @@ Command add_sparsify(ArgumentParser program) {
   cli.footer(
       "Example:\n"
       "  cairn sparsify my.g2o -o sparse.g2o\n"
-      "  cairn sparsify my.g2o --keep-every 5 --scheme runs --population tree:1.5 -o sparse.g2o");
+      "  cairn sparsify my.g2o --keep-every 5 --scheme runs --population tree:1.5 -o sparse.g2o\n"
+      "  cairn sparsify my.g2o --edges greedy_gain:part=0.25 -o sparse.g2o");
   return {cli, [options](Session& session) { return run_sparsify(*options, session); }};
 }
 

@@ -11,7 +11,6 @@
 
 #include <fmt/core.h>
 
-#include "cairn/evaluation/plausibility.hpp"
 #include "cairn/geometry/pose_chain.hpp"
 #include "cairn/online/recorded_graph.hpp"
 #include "cairn/runtime/error.hpp"
@@ -19,6 +18,7 @@
 #include "cairn/runtime/timed.hpp"
 #include "cairn/solve/estimator.hpp"
 #include "plain_loss.hpp"
+#include "whole_graph.hpp"
 
 namespace cairn {
 namespace {
@@ -45,26 +45,7 @@ struct Parts {
 /// To the minimum; its chi2.
 double optimize(Graph& graph, Parts& parts, const SparsifySetting& setting, const char* what,
                 SparsifyResult& result) {
-  Observer silent;
-  const Summary summary =
-      call_plugin([&] { return fmt::format("optimizer '{}'", parts.job.optimizer.name); },
-                  [&] {
-                    return parts.optimizer->optimize(
-                        graph, setting.stop, setting.optimisation ? *setting.optimisation : silent);
-                  });
-  if (result.status == Status::converged) result.status = summary.status;
-  if (summary.status == Status::interrupted) {
-    result.interrupted = true;
-  } else if (summary.status != Status::converged) {
-    if (setting.stop.tolerance > 0.0 || summary.status != Status::max_iterations)
-      result.converged = false;
-    result.notes.push_back(fmt::format("the optimisation of {} ended as {}: it is not at a minimum",
-                                       what, to_string(summary.status)));
-  }
-  const std::string implausible = implausible_estimate(graph, summary.final_chi2);
-  if (!result.interrupted && !implausible.empty())
-    result.notes.push_back(fmt::format("{}: {}", what, implausible));
-  return summary.final_chi2;
+  return optimize_whole(graph, *parts.optimizer, parts.job.optimizer.name, setting, what, result);
 }
 
 /// Which of the graph's variables may leave: all poses but the newest.
@@ -104,13 +85,7 @@ std::vector<int> select(const Graph& graph, const std::vector<int>& nodes, Parts
 }
 
 void measure(const Graph& original, Parts& parts, SparsifyResult& result) {
-  try {
-    result.error =
-        sparsification_error(original, result.sparse, *parts.solver, parts.job.compared_at);
-  } catch (const Error& error) {
-    if (error.code() != ErrorCode::numerical) throw;
-    result.notes.push_back(fmt::format("no KLD: {}", error.what()));
-  }
+  measure_whole(original, *parts.solver, parts.job.compared_at, result);
 }
 
 }  // namespace

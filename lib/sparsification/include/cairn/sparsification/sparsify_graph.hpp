@@ -64,6 +64,7 @@ struct SparsifyProgress {
     select,  ///< nodes are about to be chosen
     remove,  ///< `done` of `total` chosen nodes are taken out
     feed,    ///< online: `done` of `total` poses are fed, `kept` variables are in the graph
+    edges,   ///< loop closures are chosen (`sparsify_edges`): `done` of `total` steps
   };
   Phase phase = Phase::select;
   int done = 0, total = 0, kept = 0;

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "whole_graph.hpp"
+
+#include <fmt/core.h>
+
+#include "cairn/evaluation/plausibility.hpp"
+#include "cairn/runtime/error.hpp"
+#include "cairn/runtime/plugin_call.hpp"
+
+namespace cairn {
+
+double optimize_whole(Graph& graph, Optimizer& optimizer, const std::string& name,
+                      const SparsifySetting& setting, const char* what, SparsifyResult& result) {
+  Observer silent;
+  const Summary summary = call_plugin([&] { return fmt::format("optimizer '{}'", name); },
+                                      [&] {
+                                        return optimizer.optimize(graph, setting.stop,
+                                                                  setting.optimisation
+                                                                      ? *setting.optimisation
+                                                                      : silent);
+                                      });
+  if (result.status == Status::converged) result.status = summary.status;
+  if (summary.status == Status::interrupted) {
+    result.interrupted = true;
+  } else if (summary.status != Status::converged) {
+    if (setting.stop.tolerance > 0.0 || summary.status != Status::max_iterations)
+      result.converged = false;
+    result.notes.push_back(fmt::format("the optimisation of {} ended as {}: it is not at a minimum",
+                                       what, to_string(summary.status)));
+  }
+  const std::string implausible = implausible_estimate(graph, summary.final_chi2);
+  if (!result.interrupted && !implausible.empty())
+    result.notes.push_back(fmt::format("{}: {}", what, implausible));
+  return summary.final_chi2;
+}
+
+void measure_whole(const Graph& original, LinearSolver& solver, ComparedAt at,
+                   SparsifyResult& result) {
+  try {
+    result.error = sparsification_error(original, result.sparse, solver, at);
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::numerical) throw;
+    result.notes.push_back(fmt::format("no KLD: {}", error.what()));
+  }
+}
+
+}  // namespace cairn

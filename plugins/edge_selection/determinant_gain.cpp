@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "determinant_gain.hpp"
+
+#include <cmath>
+#include <cstddef>
+#include <span>
+#include <utility>
+
+#include "dense/cholesky.hpp"
+
+namespace cairn::edges {
+namespace {
+
+using Eigen::MatrixXd;
+
+/// I + M = L Lᵀ.
+Eigen::LLT<MatrixXd> factor_of(const MatrixXd& M) {
+  return Eigen::LLT<MatrixXd>(MatrixXd(MatrixXd::Identity(M.rows(), M.rows()) + M));
+}
+
+}  // namespace
+
+DeterminantGain::DeterminantGain(LinearModel model, LinearSolver& solver)
+    : model_(std::move(model)),
+      solver_(&solver),
+      Q_(model_.structure->size(), kRank) {
+  check_solver(*solver_);
+  solver_->analyze(*model_.structure);
+  factorize();
+}
+
+void DeterminantGain::factorize() {
+  S_ = candidate_covariances(model_, model_.H, *solver_).S;
+  rank_ = 0;
+}
+
+MatrixXd DeterminantGain::covariance(int k) const {
+  const CandidateRows& rows = model_.candidates[static_cast<std::size_t>(k)];
+  const MatrixXd& S = S_[static_cast<std::size_t>(k)];
+  MatrixXd JQ = MatrixXd::Zero(S.rows(), rank_);
+  for (std::size_t end = 0; end < 2; ++end) {
+    if (rows.blocks[end] < 0) continue;
+    const Eigen::Index first = model_.structure->offsets()[rows.blocks[end]];
+    JQ += rows.J[end].lazyProduct(Q_.block(first, 0, rows.J[end].cols(), rank_));
+  }
+  return S - JQ.lazyProduct(JQ.transpose());
+}
+
+double DeterminantGain::gain(int k) const {
+  const Eigen::LLT<MatrixXd> factor = factor_of(covariance(k));
+  return 2.0 * factor.matrixLLT().diagonal().array().log().sum();
+}
+
+void DeterminantGain::add(int k) {
+  const CandidateRows& rows = model_.candidates[static_cast<std::size_t>(k)];
+  const Eigen::Index m = S_[static_cast<std::size_t>(k)].rows();
+  model_.add(k, 1.0, model_.H);
+  if (rank_ + m > kRank) return factorize();
+  // X = Σ₀ Jᵀ − Q Qᵀ Jᵀ, and Q gets X L⁻ᵀ.
+  MatrixXd X = MatrixXd::Zero(Q_.rows(), m), QJ = MatrixXd::Zero(rank_, m);
+  for (std::size_t end = 0; end < 2; ++end) {
+    if (rows.blocks[end] < 0) continue;
+    const Eigen::Index first = model_.structure->offsets()[rows.blocks[end]],
+                       size = rows.J[end].cols();
+    X.middleRows(first, size) += rows.J[end].transpose();
+    QJ += Q_.block(first, 0, size, rank_).transpose().lazyProduct(rows.J[end].transpose());
+  }
+  for (Eigen::Index c = 0; c < m; ++c) {
+    const std::span<double> column(X.col(c).data(), static_cast<std::size_t>(X.rows()));
+    solver_->solve(column, column);
+  }
+  X -= Q_.leftCols(rank_).lazyProduct(QJ);
+  const Eigen::LLT<MatrixXd> factor = factor_of(covariance(k));
+  for (Eigen::Index c = 0; c < m; ++c) {  // X L⁻ᵀ by columns, L being small
+    Eigen::VectorXd q = X.col(c);
+    for (Eigen::Index j = 0; j < c; ++j)
+      q -= factor.matrixLLT()(c, j) * Q_.col(rank_ + j);
+    Q_.col(rank_ + c) = q / factor.matrixLLT()(c, c);
+  }
+  rank_ += m;
+}
+
+}  // namespace cairn::edges

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <array>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "cairn/graph/graph.hpp"
+#include "cairn/linear/block_matrix.hpp"
+#include "cairn/linear/linear_solver.hpp"
+#include "cairn/sparsification/edge_selection.hpp"
+
+namespace cairn::edges {
+
+/// Rows J_k of a candidate by the blocks of the two variables that it joins, whitened; a constant
+/// variable has the block −1, and its J no columns.
+struct CandidateRows {
+  std::array<int, 2> blocks{-1, -1};
+  std::array<Eigen::MatrixXd, 2> J;
+};
+
+/// Λ(w) = H + Σ_k w_k J_kᵀ J_k: the information of a graph whose candidates have the weights w, H
+/// being that of the factors that stay in any case. Positive definite for all w ≥ 0.
+struct LinearModel {
+  std::unique_ptr<BlockStructure> structure;  ///< with the blocks of all candidates
+  BlockMatrix H;
+  std::vector<CandidateRows> candidates;
+
+  /// Λ(w).
+  BlockMatrix information(std::span<const double> weights) const;
+  /// Adds weight · J_kᵀJ_k to a matrix on this structure.
+  void add(int k, double weight, BlockMatrix& to) const;
+};
+
+/// That of the graph, linearised at its states with the weights of its losses; H has the factors
+/// that are not among `candidates` (positions, rising).
+LinearModel linear_model(const Graph& graph, std::span<const int> candidates);
+
+/// The Laplacian of the relative factors by one weight, grounded at the variables that are
+/// constant, and at one of each component without: J_k = √w_k (e_a − e_b)ᵀ, in blocks of one
+/// number. All other factors are left out. Throws `Error` (input) if no candidate has such a
+/// weight.
+LinearModel laplacian_model(const Graph& graph, std::span<const int> candidates, EdgeWeight weight);
+
+/// J_k Λ⁻¹ J_kᵀ of all candidates, and ln |Λ|, of a matrix on the structure of the model. `solver`
+/// has analysed that structure, and keeps the factorisation; it has the abilities `Marginals` and
+/// `LogDeterminant`. Throws `Error` (numerical) where Λ is singular.
+struct CandidateCovariances {
+  std::vector<Eigen::MatrixXd> S;
+  double log_determinant = 0.0;
+};
+CandidateCovariances candidate_covariances(const LinearModel& model, const BlockMatrix& information,
+                                           LinearSolver& solver);
+
+/// Throws `Error` (usage), with those that would do, if a linear solver lacks an ability that
+/// `candidate_covariances` needs.
+void check_solver(LinearSolver& solver);
+
+}  // namespace cairn::edges
