@@ -60,8 +60,7 @@ SparsifyEdgesJob job_of(const SparsifyCommandOptions& options, Session& session)
           .linear_solver = options.linear_solver,
           .as_given = options.as_given,
           .measure = !options.no_kld,
-          .compared_at =
-              options.compared_at == "minima" ? ComparedAt::minima : ComparedAt::common};
+          .compared_at = options.compared_at == "minima" ? ComparedAt::minima : ComparedAt::common};
 }
 
 json::value number_json(double number) {
@@ -90,8 +89,7 @@ json::object report_json(const SparsifyCommandOptions& options, const LoadedGrap
   report["poses"] = {{"in", whole.variables_before}, {"kept", whole.sparse.variable_count()}};
   report["factors"] = {{"in", whole.factors_before}, {"out", whole.sparse.factor_count()}};
   const auto loops = std::ssize(result.closures.candidates);
-  report["loops"] = {{"in", loops},
-                     {"kept", loops - std::ssize(whole.change.removed_factors)}};
+  report["loops"] = {{"in", loops}, {"kept", loops - std::ssize(whole.change.removed_factors)}};
   report["backbone"] = {{"factors", std::ssize(result.closures.backbone)},
                         {"odometry", result.closures.odometry},
                         {"components", result.closures.components}};
@@ -130,21 +128,21 @@ std::string summary_text(const SparsifyCommandOptions& options, const LoadedGrap
                          const SparsifyEdgesJob& job, const SparsifyEdgesResult& result) {
   const SparsifyResult& whole = result.whole;
   Table table({{"", Table::Align::left}, {"", Table::Align::left}});
-  table.add({"graph", fmt::format("{}: {}, {}", loaded.name,
-                                  plural(whole.variables_before, "variable"),
-                                  plural(whole.factors_before, "factor"))});
+  table.add(
+      {"graph", fmt::format("{}: {}, {}", loaded.name, plural(whole.variables_before, "variable"),
+                            plural(whole.factors_before, "factor"))});
   const auto loops = std::ssize(result.closures.candidates);
-  table.add({"removed", fmt::format("{} of {} ({})",
-                                    std::ssize(whole.change.removed_factors),
+  table.add({"removed", fmt::format("{} of {} ({})", std::ssize(whole.change.removed_factors),
                                     plural(loops, "loop closure"), to_text(job.selection))});
   table.add({"left", fmt::format("{}, {}", plural(whole.sparse.variable_count(), "variable"),
                                  plural(whole.sparse.factor_count(), "factor"))});
   if (whole.error) {
     std::string text = fmt::format("KLD {:.4g} nats of the whole", whole.error->kld);
     if (result.choice.kld_bound) {
-      text += fmt::format(", {:.4g} of them of covariances (no choice of as many has less than "
-                          "{:.4g})",
-                          whole.error->covariance, *result.choice.kld_bound);
+      text += fmt::format(
+          ", {:.4g} of them of covariances (no choice of as many has less than "
+          "{:.4g})",
+          whole.error->covariance, *result.choice.kld_bound);
     }
     if (std::isfinite(whole.error->rmse))
       text += fmt::format("; the estimate has moved by {:.3g} m (RMS), {:.3g} m after alignment",
@@ -168,11 +166,10 @@ class EdgeProgress {
     const auto now = std::chrono::steady_clock::now();
     if (now - shown_ < std::chrono::milliseconds(line_.on_terminal() ? 100 : 5000)) return;
     shown_ = now;
-    line_.show(fmt::format("{} choosing loop closures, {} of {}",
-                           bar(static_cast<double>(progress.done) /
-                                   static_cast<double>(progress.total),
-                               30),
-                           progress.done, progress.total));
+    line_.show(fmt::format(
+        "{} choosing loop closures, {} of {}",
+        bar(static_cast<double>(progress.done) / static_cast<double>(progress.total), 30),
+        progress.done, progress.total));
   }
 
  private:

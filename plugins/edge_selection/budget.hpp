@@ -17,17 +17,19 @@ using ConcaveFunction =
 
 struct Relaxed {
   std::vector<double> weights{};  ///< the best found
-  double value = 0.0;           ///< of the function there
-  /// No weights within the budget have a larger value: the least f(w) + gᵀ(s − w) of all
-  /// iterations, s being the best vertex for the gradient g.
-  double bound = 0.0;
+  double value = 0.0;             ///< of the function there
+  double bound = 0.0;             ///< no weights within the budget have a larger value
   int iterations = 0;
 };
 
 /// Maximises f over {0 ≤ w ≤ 1, Σ w = budget}, the convex hull of the choices of `budget` elements
 /// of `size`, by the method of Frank and Wolfe (1956): each step goes 2/(t + 2) of the way to the
-/// vertex that the gradient leads to, which are the elements with its `budget` largest entries.
-/// Ends after `iterations`, or where bound − value ≤ tolerance · |value|. None if `step` ends it.
+/// vertex with the largest value of a tangent. A tangent f(w_t) + g_tᵀ(w − w_t) is an upper bound
+/// of f, and so is a mean of several: of the tangent at w_t and the mean of all so far (with the
+/// weights of the steps) that with the lower bound is taken. The mean makes the method converge
+/// where f has kinks, as the algebraic connectivity has where eigenvalues meet; elsewhere the last
+/// one is faster. Ends after `iterations`, or where bound − value ≤ tolerance · |value|. None if
+/// `step` ends it.
 std::optional<Relaxed> maximize_within_budget(const ConcaveFunction& f, int size, int budget,
                                               int iterations, double tolerance,
                                               const EdgeSelection::Step& step);
@@ -38,6 +40,19 @@ std::vector<int> largest(std::span<const double> weights, int count);
 /// A random choice, rising, of which element k is a part with the probability w_k: systematic
 /// sampling (Madow 1949). Σ w, which is rounded to a whole number, elements; 0 ≤ w ≤ 1, 0 ≤ u < 1.
 std::vector<int> systematic_sample(std::span<const double> weights, double u);
+
+/// How weights are rounded to choices.
+struct Rounding {
+  int samples = 20;  ///< random ones, besides the nearest
+  std::int64_t seed = 1;
+};
+using ValueOfChoice = std::function<double(const std::vector<int>& numbers)>;
+
+/// The best of the choice of the `count` largest weights and of systematic samples (Doherty, Rosen
+/// and Leonard 2022, section IV). None if `step` ends it.
+std::optional<std::vector<int>> best_rounding(std::span<const double> weights, int count,
+                                              const Rounding& how, const ValueOfChoice& value_of,
+                                              const EdgeSelection::Step& step);
 
 /// A portable generator of numbers in [0, 1) (splitmix64): the same on every machine.
 class Uniform {

@@ -21,16 +21,15 @@ Eigen::LLT<MatrixXd> factor_of(const MatrixXd& M) {
 }  // namespace
 
 DeterminantGain::DeterminantGain(LinearModel model, LinearSolver& solver)
-    : model_(std::move(model)),
-      solver_(&solver),
-      Q_(model_.structure->size(), kRank) {
+    : model_(std::move(model)), solver_(&solver), Q_(model_.structure->size(), kRank) {
   check_solver(*solver_);
   solver_->analyze(*model_.structure);
   factorize();
 }
 
 void DeterminantGain::factorize() {
-  S_ = candidate_covariances(model_, model_.H, *solver_).S;
+  log_determinant(model_.H, *solver_);
+  S_ = candidate_covariances(model_, *solver_);
   rank_ = 0;
 }
 
@@ -73,8 +72,7 @@ void DeterminantGain::add(int k) {
   const Eigen::LLT<MatrixXd> factor = factor_of(covariance(k));
   for (Eigen::Index c = 0; c < m; ++c) {  // X L⁻ᵀ by columns, L being small
     Eigen::VectorXd q = X.col(c);
-    for (Eigen::Index j = 0; j < c; ++j)
-      q -= factor.matrixLLT()(c, j) * Q_.col(rank_ + j);
+    for (Eigen::Index j = 0; j < c; ++j) q -= factor.matrixLLT()(c, j) * Q_.col(rank_ + j);
     Q_.col(rank_ + c) = q / factor.matrixLLT()(c, c);
   }
   rank_ += m;

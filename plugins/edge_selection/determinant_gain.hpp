@@ -16,7 +16,8 @@ namespace cairn::edges {
 /// each candidate added since. After `kRank` columns Λ is factorised again.
 class DeterminantGain {
  public:
-  /// `solver` must outlive this object and serve no other in between. Throws `Error` as that and `check_solver` do.
+  /// `solver` must outlive this object and serve no other in between. Throws `Error` as that and
+  /// `check_solver` do.
   DeterminantGain(LinearModel model, LinearSolver& solver);
 
   /// ln |Λ + J_kᵀJ_k| − ln |Λ|.

@@ -6,40 +6,37 @@
 #include <cstddef>
 #include <optional>
 
-#include "budget.hpp"
 #include "cairn/graph/gauge.hpp"
 #include "cairn/sparsification/loop_closures.hpp"
 #include "determinant_gain.hpp"
 #include "lazy_greedy.hpp"
 #include "linear_model.hpp"
+#include "relaxed_choice.hpp"
 
 namespace cairn::edges {
 namespace {
 
-/// The choice of these of the candidates, by number.
-EdgeChoice choice_of(std::span<const int> candidates, std::vector<int> numbers) {
-  EdgeChoice choice;
-  std::ranges::sort(numbers);
-  for (const int k : numbers) choice.stay.push_back(candidates[static_cast<std::size_t>(k)]);
-  return choice;
-}
-
-EdgeChoice interrupted() { return {.stay = {}, .complete = false}; }
+using Eigen::MatrixXd;
 
 EdgeChoice greedy_choice(std::span<const int> candidates, int count, const Increments& function,
                          const EdgeSelection::Step& step) {
-  std::optional<std::vector<int>> numbers =
+  const std::optional<std::vector<int>> numbers =
       lazy_greedy(static_cast<int>(std::ssize(candidates)), count, function, step);
-  return numbers ? choice_of(candidates, std::move(*numbers)) : interrupted();
+  return numbers ? choice_of(candidates, *numbers) : interrupted_choice();
 }
 
-/// The covariances of the candidates where all stay, and ln |Λ| there.
-CandidateCovariances with_all(const LinearModel& model, LinearSolver& solver) {
-  check_solver(solver);
-  solver.analyze(*model.structure);
-  const std::vector<double> ones(model.candidates.size(), 1.0);
-  return candidate_covariances(model, model.information(ones), solver);
-}
+/// Where all candidates stay: ln |Λ|, and their J_k Λ⁻¹ J_kᵀ.
+struct Whole {
+  Whole(const LinearModel& model, LinearSolver& solver) {
+    check_solver(solver);
+    solver.analyze(*model.structure);
+    const std::vector<double> ones(model.candidates.size(), 1.0);
+    log_determinant = edges::log_determinant(model.information(ones), solver);
+    S = candidate_covariances(model, solver);
+  }
+  double log_determinant;
+  std::vector<MatrixXd> S;
+};
 
 }  // namespace
 
@@ -71,17 +68,17 @@ EdgeChoice GreedyTreeConnectivity::choose(const Graph& graph, std::span<const in
                                      *solvers_[static_cast<std::size_t>(weight)]),
                      static_cast<double>(dimension)});
   }
-  const Increments function{
-      .gain =
-          [&](int k) {
-            double sum = 0.0;
-            for (const Part& part : parts) sum += part.dimension * part.gain.gain(k);
-            return sum;
-          },
-      .add =
-          [&](int k) {
-            for (Part& part : parts) part.gain.add(k);
-          }};
+  const Increments function{.gain =
+                                [&](int k) {
+                                  double sum = 0.0;
+                                  for (const Part& part : parts)
+                                    sum += part.dimension * part.gain.gain(k);
+                                  return sum;
+                                },
+                            .add =
+                                [&](int k) {
+                                  for (Part& part : parts) part.gain.add(k);
+                                }};
   return greedy_choice(candidates, count, function, step);
 }
 
@@ -90,7 +87,7 @@ EdgeChoice GreedyGain::choose(const Graph& graph, std::span<const int> candidate
   LinearModel model = linear_model(graph, candidates);
   std::vector<double> trace(candidates.size(), 0.0);
   if (objective_ == GainObjective::divergence) {
-    const CandidateCovariances whole = with_all(model, *solver_);
+    const Whole whole(model, *solver_);
     for (std::size_t k = 0; k < trace.size(); ++k) trace[k] = whole.S[k].trace();
   }
   DeterminantGain gain(std::move(model), *solver_);
@@ -103,27 +100,25 @@ EdgeChoice GreedyGain::choose(const Graph& graph, std::span<const int> candidate
 EdgeChoice SparseWeights::choose(const Graph& graph, std::span<const int> candidates, int count,
                                  const Step& step) {
   const LinearModel model = linear_model(graph, candidates);
-  const CandidateCovariances whole = with_all(model, *solver_);
+  const Whole whole(model, *solver_);
   // −KLD, ½ (ln |Λ(w)| − ln |Λ| + Σ (1 − w_k) tr S_k), as tr(Λ Σ₁) is d.
+  double traces = 0.0;
+  for (const MatrixXd& S : whole.S) traces += S.trace();
   const ConcaveFunction negative_divergence = [&](std::span<const double> w,
                                                   std::span<double> gradient) {
-    const CandidateCovariances now =
-        candidate_covariances(model, model.information(w), *solver_);
-    double value = now.log_determinant - whole.log_determinant;
-    for (std::size_t k = 0; k < w.size(); ++k) {
-      const double trace = whole.S[k].trace();
-      value += (1.0 - w[k]) * trace;
-      gradient[k] = 0.5 * (now.S[k].trace() - trace);
+    const BlockMatrix information = model.information(w);
+    double value = log_determinant(information, *solver_) - whole.log_determinant + traces;
+    for (std::size_t k = 0; k < w.size(); ++k) value -= w[k] * whole.S[k].trace();
+    if (!gradient.empty()) {
+      const std::vector<MatrixXd> S = candidate_covariances(model, *solver_);
+      for (std::size_t k = 0; k < w.size(); ++k)
+        gradient[k] = 0.5 * (S[k].trace() - whole.S[k].trace());
     }
     return 0.5 * value;
   };
-  const std::optional<Relaxed> relaxed = maximize_within_budget(
-      negative_divergence, static_cast<int>(std::ssize(candidates)), count, options_.iterations,
-      options_.tolerance, step);
-  if (!relaxed) return interrupted();
-  EdgeChoice choice = choice_of(candidates, largest(relaxed->weights, count));
-  choice.kld_bound = std::max(0.0, -relaxed->bound);
-  return choice;
+  RelaxedChoice found = relaxed_choice(candidates, count, options_, negative_divergence, step);
+  if (found.choice.complete) found.choice.kld_bound = std::max(0.0, -found.bound);
+  return std::move(found.choice);
 }
 
 EdgeChoice RandomEdges::choose(const Graph& /*graph*/, std::span<const int> candidates, int count,

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "budget.hpp"
 #include "cairn/linear/linear_solver.hpp"
 #include "cairn/plugin/option_fields.hpp"
 #include "cairn/runtime/enum_names.hpp"
@@ -40,48 +41,65 @@ class SelectionByPart : public EdgeSelection {
   double part_;
 };
 
+/// A selection by a relaxation that is rounded.
+struct RelaxationOptions {
+  PartOptions part{};
+  int iterations = 200;
+  double tolerance = 1e-3;
+  Rounding rounding{};
+  std::string linear_solver = "block_cholesky";
+
+  static auto fields() {
+    using O = RelaxationOptions;
+    const auto rounding =
+        OptionFields<Rounding>()
+            .integer("samples", &Rounding::samples, 0, 1e6, "random roundings besides the nearest")
+            .integer("seed", &Rounding::seed, 0, 9e15, "of these");
+    return OptionFields<O>()
+        .part(&O::part)
+        .integer("iterations", &O::iterations, 1, 1e6, "of the Frank-Wolfe method, at most")
+        .real("tolerance", &O::tolerance, 0.0, 1.0, "ends where the relative gap is below this")
+        .part(&O::rounding, rounding)
+        .component<LinearSolver>("linear_solver", &O::linear_solver, "solves and factorises");
+  }
+};
+
 // Algebraic connectivity --------------------------------------------------------------------------
 
 struct ConnectivityOptions {
-  PartOptions part{};
+  RelaxationOptions relaxation{};
   EdgeWeight weight = EdgeWeight::rotation;
-  int iterations = 100;
-  double tolerance = 1e-3;
-  int samples = 20;
-  std::int64_t seed = 1;
-  std::string linear_solver = "block_cholesky";
 
   static auto fields() {
     using O = ConnectivityOptions;
     return OptionFields<O>()
-        .part(&O::part)
-        .choice("weight", &O::weight, "the information of which part weighs an edge")
-        .integer("iterations", &O::iterations, 1, 1e6, "of the Frank-Wolfe method, at most")
-        .real("tolerance", &O::tolerance, 0.0, 1.0, "ends where the relative gap is below this")
-        .integer("samples", &O::samples, 0, 1e6, "random roundings besides the nearest")
-        .integer("seed", &O::seed, 0, 9e15, "of the random roundings")
-        .component<LinearSolver>("linear_solver", &O::linear_solver, "solves with the Laplacian");
+        .part(&O::relaxation)
+        .choice("weight", &O::weight, "the information of which part weighs an edge");
   }
 };
 
 /// Maximises the algebraic connectivity λ2 of the Laplacian of all relative factors that stay (MAC:
 /// Doherty, Rosen and Leonard, Spectral Measurement Sparsification for Pose-Graph SLAM, IROS 2022).
 /// λ2 is concave in the weights; its relaxation 0 ≤ w ≤ 1 is solved by the method of Frank and
-/// Wolfe, the supergradient being w_k (v_a − v_b)² with the Fiedler vector v. The weights are
+/// Wolfe, the supergradient being κ_k (v_a − v_b)² with the Fiedler vector v. The weights are
 /// rounded to the nearest choice and to random ones (Madow), of which the best stays; the dual
 /// bound of the relaxation is a bound on every choice. Throws `Error` (input) if the relative
 /// factors do not connect all poses.
 class MaximalConnectivity final : public SelectionByPart {
  public:
   MaximalConnectivity(const ConnectivityOptions& options, std::unique_ptr<LinearSolver> solver)
-      : SelectionByPart(options.part), options_(options), solver_(std::move(solver)) {}
+      : SelectionByPart(options.relaxation.part),
+        options_(options.relaxation),
+        weight_(options.weight),
+        solver_(std::move(solver)) {}
 
  protected:
   EdgeChoice choose(const Graph& graph, std::span<const int> candidates, int count,
                     const Step& step) override;
 
  private:
-  ConnectivityOptions options_;
+  RelaxationOptions options_;
+  EdgeWeight weight_;
   std::unique_ptr<LinearSolver> solver_;
 };
 
@@ -93,9 +111,8 @@ struct TreeOptions {
 
   static auto fields() {
     using O = TreeOptions;
-    return OptionFields<O>()
-        .part(&O::part)
-        .component<LinearSolver>("linear_solver", &O::linear_solver, "solves with the Laplacians");
+    return OptionFields<O>().part(&O::part).component<LinearSolver>(
+        "linear_solver", &O::linear_solver, "solves with the Laplacians");
   }
 };
 
@@ -152,9 +169,7 @@ struct GainOptions {
 class GreedyGain final : public SelectionByPart {
  public:
   GreedyGain(const GainOptions& options, std::unique_ptr<LinearSolver> solver)
-      : SelectionByPart(options.part),
-        objective_(options.objective),
-        solver_(std::move(solver)) {}
+      : SelectionByPart(options.part), objective_(options.objective), solver_(std::move(solver)) {}
 
  protected:
   EdgeChoice choose(const Graph& graph, std::span<const int> candidates, int count,
@@ -165,34 +180,18 @@ class GreedyGain final : public SelectionByPart {
   std::unique_ptr<LinearSolver> solver_;
 };
 
-struct SparseWeightsOptions {
-  PartOptions part{};
-  int iterations = 100;
-  double tolerance = 1e-2;
-  std::string linear_solver = "block_cholesky";
-
-  static auto fields() {
-    using O = SparseWeightsOptions;
-    return OptionFields<O>()
-        .part(&O::part)
-        .integer("iterations", &O::iterations, 1, 1e6, "of the Frank-Wolfe method, at most")
-        .real("tolerance", &O::tolerance, 0.0, 1.0, "ends where the relative gap is below this")
-        .component<LinearSolver>("linear_solver", &O::linear_solver,
-                                 "solves with the information matrix");
-  }
-};
-
-/// The factors with the largest weights of the sparse graph with the smallest divergence: w
-/// minimises ½ (tr(Λ(w) Σ₁) − ln |Λ(w) Σ₁| − d), Λ(w) the information with the candidates weighted
-/// by w, Σ₁ the covariance with all of them, under 0 ≤ w ≤ 1 and Σ w = count. That is the
-/// ℓ1-regularised problem of Huang, Kaess and Leonard (Consistent sparsification for graph
-/// optimization, ECMR 2013) with weights of factors for unknowns and the ℓ1 norm as a constraint
-/// instead of a penalty: for each count there is a penalty with the same minimum, the multiplier of
-/// the constraint. w ≤ 1 is their condition of consistency, Λ(w) ⪯ Λ. The minimum is a bound on the
-/// divergence of every choice of as many factors. By the method of Frank and Wolfe.
+/// A rounding of the weights with which a sparse graph has the smallest divergence: w minimises ½
+/// (tr(Λ(w) Σ₁) − ln |Λ(w) Σ₁| − d), Λ(w) the information with the candidates weighted by w, Σ₁ the
+/// covariance with all of them, under 0 ≤ w ≤ 1 and Σ w = count. That is the ℓ1-regularised problem
+/// of Huang, Kaess and Leonard (Consistent sparsification for graph optimization, ECMR 2013) with
+/// weights of factors for unknowns and the ℓ1 norm as a constraint instead of a penalty: for each
+/// count there is a penalty with the same minimum, the multiplier of the constraint. w ≤ 1 is their
+/// condition of consistency, Λ(w) ⪯ Λ. The minimum is a bound on the divergence of every choice of
+/// as many factors. It is found by the method of Frank and Wolfe, and rounded to the nearest choice
+/// and to random ones, of which that with the least divergence stays.
 class SparseWeights final : public SelectionByPart {
  public:
-  SparseWeights(const SparseWeightsOptions& options, std::unique_ptr<LinearSolver> solver)
+  SparseWeights(const RelaxationOptions& options, std::unique_ptr<LinearSolver> solver)
       : SelectionByPart(options.part), options_(options), solver_(std::move(solver)) {}
 
  protected:
@@ -200,7 +199,7 @@ class SparseWeights final : public SelectionByPart {
                     const Step& step) override;
 
  private:
-  SparseWeightsOptions options_;
+  RelaxationOptions options_;
   std::unique_ptr<LinearSolver> solver_;
 };
 

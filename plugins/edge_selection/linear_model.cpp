@@ -146,13 +146,16 @@ void check_solver(LinearSolver& solver) {
               "'log_determinant'; block_cholesky has both");
 }
 
-CandidateCovariances candidate_covariances(const LinearModel& model, const BlockMatrix& information,
-                                           LinearSolver& solver) {
-  if (const Factorization f = solver.factorize(information); !f.ok) {
+double log_determinant(const BlockMatrix& information, LinearSolver& solver) {
+  if (!solver.factorize(information).ok) {
     throw Error(ErrorCode::numerical,
                 "edge selection: without the candidates the graph does not determine all "
                 "variables to working precision");
   }
+  return query<LogDeterminant>(solver)->log_determinant();
+}
+
+std::vector<MatrixXd> candidate_covariances(const LinearModel& model, LinearSolver& solver) {
   std::vector<std::pair<std::int32_t, std::int32_t>> pairs;
   std::size_t size = 0;
   for (const CandidateRows& rows : model.candidates) {
@@ -166,11 +169,10 @@ CandidateCovariances candidate_covariances(const LinearModel& model, const Block
   }
   std::vector<double> sigma(size);
   query<Marginals>(solver)->blocks(pairs, sigma);
-  CandidateCovariances all;
-  all.log_determinant = query<LogDeterminant>(solver)->log_determinant();
+  std::vector<MatrixXd> all;
   const double* next = sigma.data();
   for (const CandidateRows& rows : model.candidates) {
-    MatrixXd& S = all.S.emplace_back(MatrixXd::Zero(rows.J[0].rows(), rows.J[0].rows()));
+    MatrixXd& S = all.emplace_back(MatrixXd::Zero(rows.J[0].rows(), rows.J[0].rows()));
     for (std::size_t a = 0; a < 2; ++a) {
       for (std::size_t b = a; b < 2; ++b) {
         if (rows.blocks[a] < 0 || rows.blocks[b] < 0) continue;

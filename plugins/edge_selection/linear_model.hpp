@@ -45,18 +45,14 @@ LinearModel linear_model(const Graph& graph, std::span<const int> candidates);
 /// weight.
 LinearModel laplacian_model(const Graph& graph, std::span<const int> candidates, EdgeWeight weight);
 
-/// J_k Λ⁻¹ J_kᵀ of all candidates, and ln |Λ|, of a matrix on the structure of the model. `solver`
-/// has analysed that structure, and keeps the factorisation; it has the abilities `Marginals` and
-/// `LogDeterminant`. Throws `Error` (numerical) where Λ is singular.
-struct CandidateCovariances {
-  std::vector<Eigen::MatrixXd> S;
-  double log_determinant = 0.0;
-};
-CandidateCovariances candidate_covariances(const LinearModel& model, const BlockMatrix& information,
-                                           LinearSolver& solver);
+/// Factorises a matrix on the structure of a model, which `solver` has analysed, and returns its
+/// ln |Λ|. Throws `Error` (numerical) where it is singular.
+double log_determinant(const BlockMatrix& information, LinearSolver& solver);
+/// J_k Λ⁻¹ J_kᵀ of all candidates, Λ being what `solver` has factorised last.
+std::vector<Eigen::MatrixXd> candidate_covariances(const LinearModel& model, LinearSolver& solver);
 
 /// Throws `Error` (usage), with those that would do, if a linear solver lacks an ability that
-/// `candidate_covariances` needs.
+/// these two need.
 void check_solver(LinearSolver& solver);
 
 }  // namespace cairn::edges

@@ -14,7 +14,6 @@
 #include "cairn/sparsification/disjoint_sets.hpp"
 #include "dense/cholesky.hpp"
 
-
 namespace cairn {
 namespace {
 
@@ -93,7 +92,8 @@ LoopClosures find_loop_closures(const Graph& graph) {
   }
   std::ranges::sort(found.backbone);
   std::ranges::sort(found.candidates);
-  found.components = static_cast<int>(std::ranges::count(joined, true) - std::ssize(found.backbone));
+  found.components =
+      static_cast<int>(std::ranges::count(joined, true) - std::ssize(found.backbone));
   return found;
 }
 

@@ -82,7 +82,7 @@ void measure(const Graph& original, LinearSolver& solver, const SparsifyEdgesJob
     Connectivity& of = result.connectivity[static_cast<std::size_t>(weight)];
     of = connectivity(edges, stays, weight, solver);
     if (result.choice.connectivity_bound && result.choice.connectivity_weight == weight)
-      of.bound = *result.choice.connectivity_bound;
+      of.bound = std::min(of.full, *result.choice.connectivity_bound);  // λ2 grows with each weight
   }
 }
 

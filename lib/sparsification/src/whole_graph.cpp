@@ -12,13 +12,12 @@ namespace cairn {
 double optimize_whole(Graph& graph, Optimizer& optimizer, const std::string& name,
                       const SparsifySetting& setting, const char* what, SparsifyResult& result) {
   Observer silent;
-  const Summary summary = call_plugin([&] { return fmt::format("optimizer '{}'", name); },
-                                      [&] {
-                                        return optimizer.optimize(graph, setting.stop,
-                                                                  setting.optimisation
-                                                                      ? *setting.optimisation
-                                                                      : silent);
-                                      });
+  const Summary summary =
+      call_plugin([&] { return fmt::format("optimizer '{}'", name); },
+                  [&] {
+                    return optimizer.optimize(
+                        graph, setting.stop, setting.optimisation ? *setting.optimisation : silent);
+                  });
   if (result.status == Status::converged) result.status = summary.status;
   if (summary.status == Status::interrupted) {
     result.interrupted = true;

@@ -11,9 +11,7 @@ namespace cairn {
 /// graph while edges are added.
 class DisjointSets {
  public:
-  explicit DisjointSets(int size) : parent_(size) {
-    std::iota(parent_.begin(), parent_.end(), 0);
-  }
+  explicit DisjointSets(int size) : parent_(size) { std::iota(parent_.begin(), parent_.end(), 0); }
   /// One number of the set, the same for all in it until the next `join`.
   int find(int k) {
     while (parent_[k] != k) k = std::exchange(parent_[k], parent_[parent_[k]]);

@@ -18,7 +18,7 @@ namespace cairn {
 /// Which loop closures stay.
 struct EdgeChoice {
   std::vector<int> stay{};  ///< of the candidates, by position, rising
-  bool complete = true;   ///< false: interrupted, and nothing is chosen
+  bool complete = true;     ///< false: interrupted, and nothing is chosen
   /// No choice of as many has an algebraic connectivity above this, by edges of that weight; none:
   /// not known.
   std::optional<double> connectivity_bound{};

@@ -46,9 +46,7 @@ struct RelativeEdge {
   double rotation = 0.0;     ///< [1/rad²]; types without a position are all rotation
   double translation = 0.0;  ///< [1/m²]
 
-  double weight(EdgeWeight by) const {
-    return by == EdgeWeight::rotation ? rotation : translation;
-  }
+  double weight(EdgeWeight by) const { return by == EdgeWeight::rotation ? rotation : translation; }
 };
 
 /// Those of these relative factors, by position.
