@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "dense/cholesky.hpp"
+#include "dense/products.hpp"
 
 namespace cairn::edges {
 namespace {
@@ -50,6 +51,17 @@ double DeterminantGain::gain(int k) const {
   return 2.0 * factor.matrixLLT().diagonal().array().log().sum();
 }
 
+void DeterminantGain::solve(MatrixXd& X) {
+  const std::span<double> all(X.data(), static_cast<std::size_t>(X.size()));
+  if (auto* many = query<ManyRightHandSides>(*solver_)) {
+    many->solve(all, all, static_cast<int>(X.cols()));
+    return;
+  }
+  const auto rows = static_cast<std::size_t>(X.rows());
+  for (std::size_t begin = 0; begin < all.size(); begin += rows)
+    solver_->solve(all.subspan(begin, rows), all.subspan(begin, rows));
+}
+
 void DeterminantGain::add(int k) {
   const CandidateRows& rows = model_.candidates[static_cast<std::size_t>(k)];
   const Eigen::Index m = S_[static_cast<std::size_t>(k)].rows();
@@ -64,11 +76,8 @@ void DeterminantGain::add(int k) {
     X.middleRows(first, size) += rows.J[end].transpose();
     QJ += Q_.block(first, 0, size, rank_).transpose().lazyProduct(rows.J[end].transpose());
   }
-  for (Eigen::Index c = 0; c < m; ++c) {
-    const std::span<double> column(X.col(c).data(), static_cast<std::size_t>(X.rows()));
-    solver_->solve(column, column);
-  }
-  X -= Q_.leftCols(rank_).lazyProduct(QJ);
+  solve(X);
+  dense::subtract_product(Q_.leftCols(rank_), QJ, X);
   const Eigen::LLT<MatrixXd> factor = factor_of(covariance(k));
   for (Eigen::Index c = 0; c < m; ++c) {  // X L⁻ᵀ by columns, L being small
     Eigen::VectorXd q = X.col(c);

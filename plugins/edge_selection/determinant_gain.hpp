@@ -26,15 +26,15 @@ class DeterminantGain {
 
  private:
   static constexpr Eigen::Index kRank = 96;
-  using ByRows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
   Eigen::MatrixXd covariance(int k) const;
   void factorize();
+  void solve(Eigen::MatrixXd& X);  ///< X becomes Λ₀⁻¹ X, of the last factorisation
 
   LinearModel model_;
   LinearSolver* solver_;
   std::vector<Eigen::MatrixXd> S_;  ///< of the candidates, at the last factorisation
-  ByRows Q_;
+  Eigen::MatrixXd Q_;
   Eigen::Index rank_ = 0;  ///< columns of Q in use
 };
 
