@@ -333,4 +333,13 @@ std::vector<DataSet> sparsify_online_sets(const std::string& data, bool quick) {
                     data, quick, kSmallPlane, kPlane);
 }
 
+std::vector<DataSet> edge_sets(const std::string& data, bool quick) {
+  return located_or({{"M3500", "pose2d/M3500.g2o", {}},
+                     {"intel1728", "pose2d/intel1728.g2o", {}},
+                     {"killian5489", "pose2d/killian5489_glc.g2o", {}},
+                     {"sphere2500", "pose3d/sphere2500.g2o", {}},
+                     {"parking-garage", "pose3d/parking-garage.g2o", {}}},
+                    data, quick, kSmallPlane, kPlane);
+}
+
 }  // namespace cairn::performance

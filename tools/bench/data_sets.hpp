@@ -64,6 +64,7 @@ std::vector<DataSet> thesis_sets(const std::string& data, bool quick);
 std::vector<DataSet> space_sets(const std::string& data, bool quick);
 std::vector<DataSet> large_sets(const std::string& data, bool quick);
 std::vector<DataSet> sparsify_online_sets(const std::string& data, bool quick);
+std::vector<DataSet> edge_sets(const std::string& data, bool quick);
 
 /// With a registration that measures what the truth is.
 struct SimulatedSet {

@@ -58,7 +58,8 @@ const std::vector<std::pair<std::string, Study>>& all_studies() {
       {"sparsify_problems", study_sparsify_problems},
       {"sparsify_whole", study_sparsify_whole},
       {"sparsify_online", study_sparsify_online},
-      {"sparsify_selection", study_sparsify_selection}};
+      {"sparsify_selection", study_sparsify_selection},
+      {"sparsify_edges", study_sparsify_edges}};
   return all;
 }
 

@@ -17,7 +17,7 @@ json::object sparsify_summary(const json::value& report) {
   json::object all;
   for (const char* name :
        {"poses", "factors", "problems", "kld", "kld_parts", "rmse", "rmse_aligned", "rmse_full",
-        "seconds", "steps", "redirected", "dropped"}) {
+        "seconds", "steps", "redirected", "dropped", "loops", "kld_bound", "connectivity"}) {
     if (const json::value* found = member(report, name)) all[name] = *found;
   }
   return all;

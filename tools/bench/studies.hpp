@@ -89,6 +89,9 @@ void study_sparsify_online(const Bench& bench, const Keep& keep);
 /// Half of the nodes, chosen in several ways.
 void study_sparsify_selection(const Bench& bench, const Keep& keep);
 
+/// A part of the loop closures, chosen in several ways, and all nodes.
+void study_sparsify_edges(const Bench& bench, const Keep& keep);
+
 // Progress
 // ------------------------------------------------------------------------------------------------
 /// A line on standard error.

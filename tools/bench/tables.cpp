@@ -273,7 +273,8 @@ constexpr StudySections kSections[] = {{"graphs", graphs_sections},
                                        {"sparsify_problems", sparsify_problems_sections},
                                        {"sparsify_whole", sparsify_whole_sections},
                                        {"sparsify_online", sparsify_online_sections},
-                                       {"sparsify_selection", sparsify_selection_sections}};
+                                       {"sparsify_selection", sparsify_selection_sections},
+                                       {"sparsify_edges", sparsify_edges_sections}};
 
 }  // namespace
 

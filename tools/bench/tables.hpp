@@ -29,13 +29,15 @@ std::vector<Section> compact_growth_sections(const boost::json::array& entries);
 std::vector<Section> compact_consistency_sections(const boost::json::array& entries);
 std::vector<Section> compact_matches_sections(const boost::json::array& entries);
 
-// The parts of `cairn sparsify`, in tables_sparsify.cpp and tables_sparsify_problems.cpp.
+// The parts of `cairn sparsify`, in tables_sparsify.cpp, tables_sparsify_problems.cpp and
+// tables_sparsify_edges.cpp.
 std::vector<Section> sparsify_sets_sections(const boost::json::array& entries);
 std::vector<Section> sparsify_topology_sections(const boost::json::array& entries);
 std::vector<Section> sparsify_problems_sections(const boost::json::array& entries);
 std::vector<Section> sparsify_whole_sections(const boost::json::array& entries);
 std::vector<Section> sparsify_online_sections(const boost::json::array& entries);
 std::vector<Section> sparsify_selection_sections(const boost::json::array& entries);
+std::vector<Section> sparsify_edges_sections(const boost::json::array& entries);
 
 // What `cairn plot` draws, in the words of `cairn bench --json`:
 /// the main comparison, with the best of each family alone, as bars;
