@@ -174,7 +174,7 @@ class EdgeProgress {
 
  private:
   StatusLine line_;
-  std::chrono::steady_clock::time_point shown_ = std::chrono::steady_clock::now();
+  std::chrono::steady_clock::time_point shown_{};
 };
 
 }  // namespace

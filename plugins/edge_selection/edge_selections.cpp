@@ -5,9 +5,9 @@
 #include <cmath>
 #include <cstddef>
 #include <optional>
+#include <utility>
+#include <vector>
 
-#include "cairn/graph/gauge.hpp"
-#include "cairn/sparsification/loop_closures.hpp"
 #include "determinant_gain.hpp"
 #include "lazy_greedy.hpp"
 #include "linear_model.hpp"

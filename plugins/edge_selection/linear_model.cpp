@@ -32,6 +32,30 @@ void add_product(BlockMatrix& to, int row, int column, double weight, const dens
       dense::scaled_product_of_transpose(weight, A, B);
 }
 
+/// Blocks of one number for the variables that edges join, but for those that are constant, and one
+/// of each component without any.
+struct Grounded {
+  Grounded(const Graph& graph, const std::vector<RelativeEdge>& edges)
+      : block(graph.variable_count(), -1) {
+    const std::vector<bool> held = resolve_gauge(graph).held;
+    DisjointSets joined(graph.variable_count());
+    for (const RelativeEdge& edge : edges) joined.join(edge.variables[0], edge.variables[1]);
+    std::vector<bool> has_ground(graph.variable_count());
+    for (int v = 0; v < graph.variable_count(); ++v) {
+      if (held[v]) has_ground[joined.find(v)] = true;
+    }
+    for (int v = 0; v < graph.variable_count(); ++v) {
+      if (!has_ground[joined.find(v)]) {
+        has_ground[joined.find(v)] = true;
+      } else if (!held[v]) {
+        block[v] = blocks++;
+      }
+    }
+  }
+  std::vector<int> block;  ///< by variable; −1: grounded
+  int blocks = 0;
+};
+
 }  // namespace
 
 void LinearModel::add(int k, double weight, BlockMatrix& to) const {
@@ -85,57 +109,49 @@ LinearModel linear_model(const Graph& graph, std::span<const int> candidates) {
   return model;
 }
 
+PoseGraphEdges::PoseGraphEdges(const Graph& graph, std::span<const int> candidates) {
+  const LoopClosures closures = find_loop_closures(graph);
+  std::vector<int> factors = closures.backbone;
+  factors.insert(factors.end(), closures.candidates.begin(), closures.candidates.end());
+  std::erase_if(factors, [&](int f) { return std::ranges::binary_search(candidates, f); });
+  stay = factors.size();
+  factors.insert(factors.end(), candidates.begin(), candidates.end());
+  all = relative_edges(graph, factors);
+}
+
+void PoseGraphEdges::check(EdgeWeight weight) const {
+  const auto has_weight = [&](const RelativeEdge& edge) { return edge.weight(weight) > 0.0; };
+  if (std::ranges::any_of(std::span(all).subspan(stay), has_weight)) return;
+  throw Error(ErrorCode::input, "the relative factors measure no " +
+                                    std::string(to_string(weight)) +
+                                    ": choose by the other weight");
+}
+
 LinearModel laplacian_model(const Graph& graph, std::span<const int> candidates,
                             EdgeWeight weight) {
-  std::vector<int> relative = find_loop_closures(graph).backbone;
-  const std::size_t backbone = relative.size();
-  relative.insert(relative.end(), candidates.begin(), candidates.end());
-  const std::vector<RelativeEdge> edges = relative_edges(graph, relative);
-  const std::vector<bool> held = resolve_gauge(graph).held;
-  // By variable its block; -1: grounded. One of each component is, which `joined` finds.
-  std::vector<int> block(graph.variable_count(), -1);
-  DisjointSets joined(graph.variable_count());
-  std::vector<bool> has_ground(graph.variable_count());
-  for (const RelativeEdge& edge : edges) joined.join(edge.variables[0], edge.variables[1]);
-  for (int v = 0; v < graph.variable_count(); ++v) {
-    if (held[v]) has_ground[joined.find(v)] = true;
-  }
-  int blocks = 0;
-  for (int v = 0; v < graph.variable_count(); ++v) {
-    if (!has_ground[joined.find(v)]) {
-      has_ground[joined.find(v)] = true;
-    } else if (!held[v]) {
-      block[v] = blocks++;
-    }
-  }
+  const PoseGraphEdges edges(graph, candidates);
+  edges.check(weight);
+  const Grounded grounded(graph, edges.all);
   std::vector<std::pair<std::int32_t, std::int32_t>> pairs;
   std::vector<CandidateRows> rows;
-  bool any = false;
-  for (std::size_t k = 0; k < edges.size(); ++k) {
-    const double w = weight == EdgeWeight::rotation ? edges[k].rotation : edges[k].translation;
-    any = any || (k >= backbone && w > 0.0);
+  for (const RelativeEdge& edge : edges.all) {
     CandidateRows& row = rows.emplace_back();
     for (std::size_t end = 0; end < 2; ++end) {
-      row.blocks[end] = block[edges[k].variables[end]];
+      row.blocks[end] = grounded.block[edge.variables[end]];
       row.J[end] = MatrixXd::Constant(1, row.blocks[end] < 0 ? 0 : 1,
-                                      (end == 0 ? 1.0 : -1.0) * std::sqrt(w));
+                                      (end == 0 ? 1.0 : -1.0) * std::sqrt(edge.weight(weight)));
     }
     if (row.blocks[0] >= 0 && row.blocks[1] >= 0) pairs.emplace_back(row.blocks[0], row.blocks[1]);
   }
-  if (!any) {
-    throw Error(ErrorCode::input, "the relative factors measure no " +
-                                      std::string(to_string(weight)) +
-                                      ": choose by the other weight");
-  }
   LinearModel model;
   model.structure = std::make_unique<BlockStructure>(
-      std::vector<std::int32_t>(static_cast<std::size_t>(blocks), 1), std::move(pairs));
+      std::vector<std::int32_t>(static_cast<std::size_t>(grounded.blocks), 1), std::move(pairs));
   model.H = BlockMatrix(*model.structure);
   model.H.set_zero();
   model.candidates = std::move(rows);
-  for (std::size_t k = 0; k < backbone; ++k) model.add(static_cast<int>(k), 1.0, model.H);
+  for (std::size_t k = 0; k < edges.stay; ++k) model.add(static_cast<int>(k), 1.0, model.H);
   model.candidates.erase(model.candidates.begin(),
-                         model.candidates.begin() + static_cast<std::ptrdiff_t>(backbone));
+                         model.candidates.begin() + static_cast<std::ptrdiff_t>(edges.stay));
   return model;
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <memory>
 #include <span>
 #include <vector>
@@ -39,10 +40,19 @@ struct LinearModel {
 /// that are not among `candidates` (positions, rising).
 LinearModel linear_model(const Graph& graph, std::span<const int> candidates);
 
+/// The relative factors of a graph that are no candidates, and behind them the candidates.
+struct PoseGraphEdges {
+  PoseGraphEdges(const Graph& graph, std::span<const int> candidates);
+  /// Throws `Error` (input) if no candidate has such a weight.
+  void check(EdgeWeight weight) const;
+
+  std::vector<RelativeEdge> all;
+  std::size_t stay = 0;  ///< how many are no candidates
+};
+
 /// The Laplacian of the relative factors by one weight, grounded at the variables that are
 /// constant, and at one of each component without: J_k = √w_k (e_a − e_b)ᵀ, in blocks of one
-/// number. All other factors are left out. Throws `Error` (input) if no candidate has such a
-/// weight.
+/// number. All other factors are left out. Throws `Error` as `PoseGraphEdges::check` does.
 LinearModel laplacian_model(const Graph& graph, std::span<const int> candidates, EdgeWeight weight);
 
 /// Factorises a matrix on the structure of a model, which `solver` has analysed, and returns its

@@ -117,45 +117,47 @@ double FiedlerSolver::quotient(std::span<const double> weights, std::span<const 
   return sum;
 }
 
+bool FiedlerSolver::improve(std::vector<double>& v) {
+  const int most = std::min(kBasis, nodes_ - 1);
+  Eigen::Map<VectorXd> best(v.data(), nodes_);
+  MatrixXd basis(nodes_, most), T = MatrixXd::Zero(most, most);
+  basis.col(0) = best.normalized();
+  std::vector<double> image(v.size());
+  Eigen::Map<VectorXd> w(image.data(), nodes_);
+  for (int k = 0;; ++k) {
+    w = basis.col(k);
+    multiply_inverse(image);
+    T(k, k) = basis.col(k).dot(w);
+    for (int twice = 0; twice < 2; ++twice) {
+      for (int j = 0; j <= k; ++j) w -= basis.col(j).dot(w) * basis.col(j);
+    }
+    const double next = w.norm();
+    const Eigen::SelfAdjointEigenSolver<MatrixXd> ritz(MatrixXd(T.topLeftCorner(k + 1, k + 1)));
+    const double residual = next * std::abs(ritz.eigenvectors()(k, k));
+    const bool converged = residual <= kAccuracy * ritz.eigenvalues()[k];
+    if (converged || k + 1 == most) {
+      best.setZero();
+      for (int j = 0; j <= k; ++j) best += ritz.eigenvectors()(j, k) * basis.col(j);
+      best.array() -= best.mean();
+      best.normalize();
+      return converged || most == nodes_ - 1;  // all there is
+    }
+    T(k + 1, k) = T(k, k + 1) = next;
+    basis.col(k + 1) = w / next;
+  }
+}
+
 const FiedlerPair& FiedlerSolver::solve(std::span<const double> weights) {
   factorize(weights);
   VectorXd start = some_vector(nodes_);
   // A little of everything stays, in case the vector before is orthogonal to this one.
   if (!pair_.vector.empty())
     start = 1e-3 * start + Eigen::Map<const VectorXd>(pair_.vector.data(), nodes_);
-  const int most = std::min(kBasis, nodes_ - 1);
-  MatrixXd basis(nodes_, most);
-  std::vector<double> image(static_cast<std::size_t>(nodes_));
-  Eigen::Map<VectorXd> w(image.data(), nodes_);
+  pair_.vector.assign(start.begin(), start.end());
   for (int restart = 0; restart < kRestarts; ++restart) {
-    basis.col(0) = start.normalized();
-    MatrixXd T = MatrixXd::Zero(most, most);
-    for (int k = 0; k < most; ++k) {
-      w = basis.col(k);
-      multiply_inverse(image);
-      T(k, k) = basis.col(k).dot(w);
-      for (int twice = 0; twice < 2; ++twice) {
-        for (int j = 0; j <= k; ++j) w -= basis.col(j).dot(w) * basis.col(j);
-      }
-      const double next = w.norm();
-      const Eigen::SelfAdjointEigenSolver<MatrixXd> ritz(MatrixXd(T.topLeftCorner(k + 1, k + 1)));
-      const double largest = ritz.eigenvalues()[k];
-      const bool converged = next * std::abs(ritz.eigenvectors()(k, k)) <= kAccuracy * largest;
-      if (converged || k + 1 == most) {
-        start.setZero();
-        for (int j = 0; j <= k; ++j) start += ritz.eigenvectors()(j, k) * basis.col(j);
-      }
-      if (converged || (most == nodes_ - 1 && k + 1 == most)) {
-        start.array() -= start.mean();
-        start.normalize();
-        pair_.vector.assign(start.begin(), start.end());
-        pair_.value = quotient(weights, pair_.vector);
-        return pair_;
-      }
-      if (k + 1 == most) break;
-      T(k + 1, k) = T(k, k + 1) = next;
-      basis.col(k + 1) = w / next;
-    }
+    if (!improve(pair_.vector)) continue;
+    pair_.value = quotient(weights, pair_.vector);
+    return pair_;
   }
   throw Error(ErrorCode::numerical, "algebraic connectivity: Lanczos' method does not converge");
 }

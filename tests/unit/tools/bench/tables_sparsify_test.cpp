@@ -138,6 +138,27 @@ TEST(SparsifyTables, TellWhatSelectingTakes) {
                         "0.500 | 0.0100 | 0.125 | 0.500 |\n"));
 }
 
+TEST(SparsifyTables, ShowEveryChoiceOfLoopClosures) {
+  const auto of = [](double kld, double connectivity, const std::string& bounds) {
+    return fmt::format(
+        R"({{"loops": {{"in": 40, "kept": 10}}, "kld": {}, "rmse_aligned": 0.25,
+            "connectivity": {{"rotation": {{"full": 8, "sparse": {}{}}}}},
+            "seconds": {{"select": 1.5}}}})",
+        kld, connectivity, bounds);
+  };
+  const auto made =
+      report("sparsify_edges",
+             entry("M3500", contestant("mac", of(3.0, 2.0, R"(, "bound": 4)")) + "," +
+                                contestant("random", of(5.0, 1.0, "") + "," + of(7.0, 1.0, "") +
+                                                         "," + of(4.0, 1.0, ""))));
+  EXPECT_THAT(section(made, "sparsify-edges-kld"),
+              HasSubstr("| M3500 | 10 of 40 | - | 3.00 | - | - | - | - | 5.00 |\n"));
+  EXPECT_THAT(section(made, "sparsify-edges-connectivity"),
+              HasSubstr("| M3500 | 10 of 40 | 50 % | 25 % | - | - | - | - | 12 % |\n"));
+  EXPECT_THAT(section(made, "sparsify-edges-rmse"), HasSubstr("| 0.250 | - |"));
+  EXPECT_THAT(section(made, "sparsify-edges-time"), HasSubstr("| 1.50 | - |"));
+}
+
 // Single problems
 // ------------------------------------------------------------------------------------------------
 

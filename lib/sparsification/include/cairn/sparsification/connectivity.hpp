@@ -48,6 +48,8 @@ class CAIRN_API FiedlerSolver {
  private:
   void factorize(std::span<const double> weights);
   void multiply_inverse(std::vector<double>& x);
+  /// One run of Lanczos' method from v, which becomes the best vector found; whether it converged.
+  bool improve(std::vector<double>& v);
   double quotient(std::span<const double> weights, std::span<const double> v) const;
 
   int nodes_;
