@@ -49,7 +49,7 @@ struct Rounding {
 using ValueOfChoice = std::function<double(const std::vector<int>& numbers)>;
 
 /// The best of the choice of the `count` largest weights and of systematic samples (Doherty, Rosen
-/// and Leonard 2022, section IV). None if `step` ends it.
+/// and Leonard 2022). None if `step` ends it.
 std::optional<std::vector<int>> best_rounding(std::span<const double> weights, int count,
                                               const Rounding& how, const ValueOfChoice& value_of,
                                               const EdgeSelection::Step& step);

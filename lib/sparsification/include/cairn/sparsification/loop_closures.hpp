@@ -37,8 +37,8 @@ constexpr auto enum_names(EdgeWeight) {
 }
 
 /// A relative factor as an edge of a graph: between which variables, and the isotropic information
-/// of its two parts, n / tr(Ω_part⁻¹) with n coordinates, as Rosen et al. (SE-Sync, IJRR 2019,
-/// equation 20) have it up to a factor. Ω is that of the relative pose in the frame of the second
+/// of its two parts, n / tr(Ω_part⁻¹) with n coordinates, as SE-Sync (Rosen et al.,
+/// IJRR 2019) has it up to a factor. Ω is that of the relative pose in the frame of the second
 /// variable, at the graph's states and with the weight of the factor's loss; 0: there is no such
 /// part.
 struct RelativeEdge {
