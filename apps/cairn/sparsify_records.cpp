@@ -175,11 +175,12 @@ std::vector<ReplayRow> replay_problems(const std::vector<DenseBlanket>& problems
                                        const std::string& population,
                                        const std::vector<std::string>& recoveries,
                                        const std::function<bool(std::size_t)>& step,
-                                       Registry& registry) {
+                                       Registry& registry, RecoveryCurves* curves) {
   std::vector<std::unique_ptr<Topology>> choosers;
   std::vector<std::unique_ptr<FactorRecovery>> methods;
   for (const std::string& name : topologies) choosers.push_back(registry.make<Topology>(name));
   for (const std::string& name : recoveries) methods.push_back(registry.make<FactorRecovery>(name));
+  for (const auto& method : methods) method->trace(curves != nullptr);
   const Population rule = Population::parse(population);
   std::map<std::array<std::size_t, 3>, Tally> tallies;  // topology, recovery, nodes
   const auto both = [&](std::size_t t, std::size_t r, int nodes, const auto& change) {
@@ -213,6 +214,10 @@ std::vector<ReplayRow> replay_problems(const std::vector<DenseBlanket>& problems
         try {
           const RecoveryResult result = methods[r]->recover(problem);
           klds[r] = result.kld;
+          if (curves)
+            curves->add(choosers.size() == 1 ? recoveries[r]
+                                             : fmt::format("{} {}", topologies[t], recoveries[r]),
+                        nodes, result.trace);
           least = std::min(least, result.kld);
           both(t, r, nodes, [&](Tally& tally) {
             tally.add(result, static_cast<double>(chosen.size()), seconds, positive(result));

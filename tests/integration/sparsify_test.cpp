@@ -19,6 +19,7 @@
 #include "cairn/linear/graph_marginals.hpp"
 #include "cairn/linear/linearizer.hpp"
 #include "cairn/plugin/registry.hpp"
+#include "cairn/report/number_table.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/solve/optimizer.hpp"
 #include "cairn/sparsification/sparsification.hpp"
@@ -236,6 +237,30 @@ TEST_F(Sparsify, SaysWhatIsWrongAndWhatWouldWork) {
   write_text(folder_.file("wrong.json"), "{}");
   EXPECT_THAT(refused({folder_.file("wrong.json")}, 3, {"study", "problems"}),
               HasSubstr("--record"));
+}
+
+TEST_F(Sparsify, CurvesEndAtTheMeanOfTheRecoveries) {
+  const std::string problems = folder_.file("problems.json"), curves = folder_.file("curves.csv");
+  study({"@manhattan:poses=150", "--keep-every", "4", "--record", problems});
+  for (const char* against : {"time", "iterations"}) {
+    const boost::json::value told =
+        study({problems, "--topology", "mi", "--recovery", "ncfd", "--recovery",
+               "ip:initial=odb,tolerance=1e-4", "--curves", curves, "--against", against},
+              "problems");
+    const NumberTable table = read_number_table(read_text(curves), curves);
+    int compared = 0;
+    for (const boost::json::value& row : told.at("rows").as_array()) {
+      if (row.at("nodes").is_null()) continue;
+      const std::string name = std::string(row.at("recovery").as_string()) + "@" +
+                               std::to_string(row.at("nodes").as_int64());
+      const NumberTable::Column* column = table.find(name);
+      ASSERT_TRUE(column) << name;
+      EXPECT_NEAR(column->values.back(), row.at("kld").to_number<double>(), 1e-9) << name;
+      EXPECT_GE(column->values.front(), column->values.back() - 1e-9) << name;
+      ++compared;
+    }
+    EXPECT_GE(compared, 4) << against;
+  }
 }
 
 TEST_F(Sparsify, WhatCannotLeaveStaysAndIsNamed) {
