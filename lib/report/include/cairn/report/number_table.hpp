@@ -10,7 +10,7 @@
 namespace cairn {
 
 /// Named columns of numbers, such as the rows of a CSV file: what a plot of columns draws.
-struct NumberTable {
+struct CAIRN_API NumberTable {
   struct Column {
     std::string name;
     std::vector<double> values;  ///< as many in every column; NaN where a field is no number
