@@ -137,6 +137,7 @@ void ProblemRecorder::add(const SparsificationRecord& record) {
                        {"states", std::move(states)},
                        {"sizes", array_of(record.dense->node_sizes)},
                        {"information", array_of(upper(record.dense->information, begin.back()))},
+                       {"absolute", record.dense->absolute},
                        {"models", std::move(models)},
                        {"kld", record.recovery ? record.recovery->kld : 0.0}});
 }
@@ -157,6 +158,8 @@ std::vector<DenseBlanket> read_problems(const std::string& file) {
       const std::vector<int> begin = begins(blanket.node_sizes);
       blanket.information =
           square(json::value_to<std::vector<double>>(from.at("information")), begin.back());
+      if (const json::value* absolute = from.if_contains("absolute"))
+        blanket.absolute = absolute->as_bool();
       for (const json::value& model : from.at("models").as_array())
         blanket.models.push_back(read_model(model.as_object(), begin));
       problems.push_back(std::move(blanket));
