@@ -21,8 +21,9 @@ namespace {
 
 constexpr int kIterations = 20;
 constexpr double kSettled = 1e-9;
-/// Damping of an absolute problem, as a part of H's diagonal: a measurement may leave it singular.
-constexpr double kDamping = 1e-9;
+/// What is left of a diagonal element, as a part of it, where a direction is open, and the damping
+/// that keeps steps in such directions small.
+constexpr double kZeroPivot = 1e-11, kDamping = 1e-8;
 /// Columns of J N, N being orthonormal in units of Λ's diagonal, that are zero but for rounding.
 constexpr double kOpen = 1e-6;
 
@@ -102,8 +103,12 @@ class DenseSystem {
     const std::vector<int> free = free_columns();
     for (int k = 0; k < kIterations && !free.empty(); ++k) {
       Matrix A = H(free, free);
-      if (local_.absolute) A.diagonal() *= 1.0 + kDamping;
-      const Eigen::LDLT<Matrix> ldlt(A);
+      Eigen::LDLT<Matrix> ldlt(A);
+      const Vector diagonal = ldlt.transpositionsP() * Vector(A.diagonal());
+      if ((ldlt.vectorD().array() <= kZeroPivot * diagonal.array()).any()) {
+        A.diagonal() *= 1.0 + kDamping;
+        ldlt.compute(A);
+      }
       if (ldlt.info() != Eigen::Success || !ldlt.isPositive()) return;
       Vector step = Vector::Zero(size());
       const Vector of_free = ldlt.solve(Vector(g(free)));

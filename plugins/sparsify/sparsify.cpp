@@ -10,6 +10,7 @@
 #include <fmt/core.h>
 
 #include "blanket_matrices.hpp"
+#include "cairn/geometry/pose.hpp"
 #include "cairn/graph/packed.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/timed.hpp"
@@ -39,6 +40,18 @@ std::vector<double> whole_information(const Marginal& marginal, const FactorChoi
     column += n;
   }
   return pack(dense::congruent(B, Omega));
+}
+
+/// Throws the reason why nodes stay that leave more open than the pose of the whole.
+[[noreturn]] void refuse_open(const Graph& graph, const LocalProblem& local,
+                              const Marginal& marginal) {
+  const DenseBlanket& dense = marginal.dense;
+  const int all = dense.size() - (dense.absolute ? 0 : dense.node_sizes.front());
+  throw Error(ErrorCode::numerical,
+              fmt::format("{}: its factors do not determine the relative poses of its {} "
+                          "neighbours (their information has rank {} of {})",
+                          graph.describe_variable(local.removed.front()), dense.node_sizes.size(),
+                          all - marginal.open, all));
 }
 
 }  // namespace
@@ -87,6 +100,11 @@ Sparsify::Solved Sparsify::solve(const WorkGraph& work, const LocalProblem& loca
   }
   const DenseBlanket& dense = solved.marginal.dense;
   if (dense.models.empty()) return solved;
+  // After a pose has left, what is open is open for want of measurements. Factors of lower rank
+  // would be as many as poses leave, one made of the other, and soon claim what none of them knew.
+  const bool landmarks =
+      std::ranges::all_of(local.removed, [&](int v) { return is_point(work.graph().type(v)); });
+  if (solved.marginal.open > 0 && !landmarks) refuse_open(work.graph(), local, solved.marginal);
   const BlanketProjection coordinates = project(dense, options_.projection);
   const int nodes = static_cast<int>(std::ssize(dense.node_sizes));
   // One prior of those that there are models of, besides the factors between nodes.
@@ -103,13 +121,8 @@ Sparsify::Solved Sparsify::solve(const WorkGraph& work, const LocalProblem& loca
       }
       recover(coordinates, solved, seconds);
     } catch (const Error&) {
-      const int open = solved.marginal.open;
-      if (open <= 0) throw;
-      throw Error(ErrorCode::numerical,
-                  fmt::format("{}: its factors do not determine the relative poses of its {} "
-                              "neighbours (their information has rank {} of {})",
-                              work.graph().describe_variable(local.removed.front()), nodes,
-                              coordinates.rank, coordinates.rank + open));
+      if (solved.marginal.open > 0) refuse_open(work.graph(), local, solved.marginal);
+      throw;
     }
     // A topology that does not grow any more has done what it can.
     const int size = static_cast<int>(std::ssize(solved.topology));

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstdint>
 #include <functional>
-#include <limits>
+#include <span>
 #include <utility>
 
 #include <Eigen/Core>
@@ -19,70 +19,124 @@ namespace cairn {
 namespace {
 
 using Vector = Eigen::VectorXd;
+using Block = Eigen::Map<Eigen::MatrixXd>;
+using ConstBlock = Eigen::Map<const Eigen::MatrixXd>;
 
-std::span<const double> view(const Vector& x) {
-  return {x.data(), static_cast<std::size_t>(x.size())};
-}
-std::span<double> view(Vector& x) { return {x.data(), static_cast<std::size_t>(x.size())}; }
+/// The first shift, as a part of the largest diagonal entry, and what it grows by.
+constexpr double kShift = 1e-9, kGrowth = 8.0;
+constexpr int kShifts = 14;
+constexpr int kLanczosSteps = 300;
+/// Of the residual, as a part of the eigenvalue.
+constexpr double kAccuracy = 1e-9;
 
-/// H of a graph at its states, and which columns are a variable's.
-class LinearizedAt {
+/// H of a graph at its states.
+struct LinearizedAt {
+  explicit LinearizedAt(const Graph& graph)
+      : linearizer(graph, resolve_gauge(graph).held), H(linearizer.structure()) {
+    std::vector<double> g(static_cast<std::size_t>(linearizer.structure().size()));
+    linearizer.linearize(graph.values(), H, g);
+  }
+  Linearizer linearizer;
+  BlockMatrix H;
+};
+
+/// M = H − Λ̆ of the original graph's H, with Λ̆ in the rows of the nodes that are kept. Its Schur
+/// complement on these is Λ − Λ̆, so (M + sE)⁻¹ has (Λ − Λ̆ + sI)⁻¹ in it, E being the identity on
+/// the kept nodes. Where the others are determined, M + sE is positive definite if and only if Λ −
+/// Λ̆ + sI is.
+class Difference {
  public:
-  LinearizedAt(const Graph& graph, std::vector<bool> held)
-      : linearizer_(graph, std::move(held)), H_(linearizer_.structure()) {
-    Vector g(size());
-    linearizer_.linearize(graph.values(), H_, view(g));
-  }
-  Eigen::Index size() const { return linearizer_.structure().size(); }
-  const BlockMatrix& H() const { return H_; }
-  const BlockStructure& structure() const { return linearizer_.structure(); }
-  Vector times(const Vector& x) const {
-    Vector y(x.size());
-    H_.multiply(view(x), view(y));
-    return y;
-  }
-  /// The columns of variables, one after the other; none of those that are constant.
-  std::vector<Eigen::Index> columns(const std::vector<int>& variables) const {
-    std::vector<Eigen::Index> all;
-    for (const int v : variables) {
-      const int block = linearizer_.block_of(v);
-      for (int k = 0; block >= 0 && k < structure().block_size(block); ++k)
-        all.push_back(structure().offsets()[block] + k);
+  Difference(const Graph& p, const Graph& q, const std::vector<int>& at) {
+    const LinearizedAt original(p), sparse(q);
+    const BlockStructure &of_p = original.linearizer.structure(),
+                         &of_q = sparse.linearizer.structure();
+    std::vector<std::int32_t> partner;  // by block of q
+    for (int block = 0; block < of_q.blocks(); ++block)
+      partner.push_back(original.linearizer.block_of(at[sparse.linearizer.variable_of(block)]));
+    std::vector<std::pair<std::int32_t, std::int32_t>> entries;
+    for_blocks(of_p, [&](int r, int c, std::int64_t) { entries.emplace_back(r, c); });
+    for_blocks(of_q,
+               [&](int r, int c, std::int64_t) { entries.emplace_back(partner[r], partner[c]); });
+    structure_ = BlockStructure({of_p.sizes().begin(), of_p.sizes().end()}, std::move(entries));
+    M_ = BlockMatrix(structure_);
+    for_blocks(of_p, [&](int r, int c, std::int64_t k) { add(1.0, original.H, k, r, c, r, c); });
+    diagonal_.resize(structure_.size());
+    M_.diagonal({diagonal_.data(), static_cast<std::size_t>(diagonal_.size())});
+    for_blocks(of_q, [&](int r, int c, std::int64_t k) {
+      add(-1.0, sparse.H, k, r, c, partner[r], partner[c]);
+    });
+    for (const std::int32_t block : partner) {
+      for (auto k = structure_.offsets()[block]; k < structure_.offsets()[block + 1]; ++k)
+        kept_.push_back(k);
     }
-    return all;
+  }
+
+  /// Coordinates of the kept nodes.
+  const std::vector<Eigen::Index>& kept() const { return kept_; }
+  Eigen::Index size() const { return structure_.size(); }
+  const BlockStructure& structure() const { return structure_; }
+  /// Largest diagonal entry of H.
+  double scale() const { return diagonal_.maxCoeff(); }
+  BlockMatrix shifted(double s) const {
+    BlockMatrix shifted = M_;
+    Vector diagonal(size());
+    const std::span<double> view(diagonal.data(), static_cast<std::size_t>(diagonal.size()));
+    shifted.diagonal(view);
+    for (const Eigen::Index k : kept_) diagonal[k] += s;
+    shifted.set_diagonal(view);
+    return shifted;
   }
 
  private:
-  Linearizer linearizer_;
-  BlockMatrix H_;
+  template <class Visit>
+  static void for_blocks(const BlockStructure& structure, const Visit& visit) {
+    for (int c = 0; c < structure.blocks(); ++c) {
+      for (auto k = structure.column_begin()[c]; k < structure.column_begin()[c + 1]; ++k)
+        visit(structure.rows()[k], c, k);
+    }
+  }
+  /// Adds entry k of H, which is at (r, c) there, at (row, column).
+  void add(double sign, const BlockMatrix& H, std::int64_t k, int r, int c, std::int32_t row,
+           std::int32_t column) {
+    const ConstBlock value(H.block(k), H.structure().block_size(r), H.structure().block_size(c));
+    Block to(M_.block(structure_.find(std::max(row, column), std::min(row, column))),
+             structure_.block_size(std::max(row, column)),
+             structure_.block_size(std::min(row, column)));
+    if (row >= column) {
+      to += sign * value;
+    } else {
+      to += sign * value.transpose();
+    }
+  }
+
+  BlockStructure structure_;
+  BlockMatrix M_;
+  Vector diagonal_;
+  std::vector<Eigen::Index> kept_;
 };
 
-/// By Lanczos' recursion, whose Ritz values approach the ends of the spectrum first; they are never
-/// below it. Vectors are not kept: lost orthogonality repeats eigenvalues, and adds none. Ends
-/// where the residual shows an eigenvalue within a millionth of itself, or within rounding of the
-/// largest.
-double least_eigenvalue(Eigen::Index n, const std::function<Vector(const Vector&)>& multiply) {
-  constexpr int kMost = 600;
+/// The largest eigenvalue of a positive definite matrix by Lanczos' recursion. Vectors are not
+/// kept: lost orthogonality repeats eigenvalues, and adds none.
+double largest_eigenvalue(Eigen::Index n, const std::function<Vector(const Vector&)>& multiply) {
   std::vector<double> diagonal, beside;
   Vector before = Vector::Zero(n), v(n);
   for (Eigen::Index k = 0; k < n; ++k)
     v[k] = 1.0 + 0.5 * std::sin(1.0 + 1.7 * static_cast<double>(k));
   v.normalize();
-  const int most = static_cast<int>(std::min<Eigen::Index>(n, kMost));
   for (int k = 1;; ++k) {
     Vector w = multiply(v);
     diagonal.push_back(v.dot(w));
     w -= diagonal.back() * v;
     if (k > 1) w -= beside.back() * before;
     const double next = w.norm();
-    if (k == most || next == 0.0 || (k & (k - 1)) == 0) {
+    const bool last = k == std::min<Eigen::Index>(n, kLanczosSteps) || next == 0.0;
+    if (last || k % 10 == 0) {
       Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> ritz;
       ritz.computeFromTridiagonal(Eigen::Map<const Vector>(diagonal.data(), k),
                                   Eigen::Map<const Vector>(beside.data(), k - 1));
-      const double least = ritz.eigenvalues()[0];
-      const double norm = ritz.eigenvalues().cwiseAbs().maxCoeff();
-      const double residual = next * std::abs(ritz.eigenvectors()(k - 1, 0));
-      if (k == most || residual <= std::max(1e-6 * std::abs(least), 1e-11 * norm)) return least;
+      const double largest = ritz.eigenvalues()[k - 1];
+      const double residual = next * std::abs(ritz.eigenvectors()(k - 1, k - 1));
+      if (last || residual <= kAccuracy * largest) return largest;
     }
     beside.push_back(next);
     before = std::exchange(v, w / next);
@@ -93,41 +147,26 @@ double least_eigenvalue(Eigen::Index n, const std::function<Vector(const Vector&
 
 double least_eigenvalue_of_difference(const Graph& p, const Graph& q, const std::vector<int>& at,
                                       LinearSolver& solver) {
-  const LinearizedAt of_p(p, resolve_gauge(p).held), of_q(q, resolve_gauge(q).held);
-  std::vector<int> order(q.variable_count()), left;
-  for (int v = 0; v < q.variable_count(); ++v) order[v] = v;
-  std::vector<bool> held = resolve_gauge(p).held, kept(p.variable_count());
-  for (const int v : at) kept[v] = held[v] = true;
-  for (int v = 0; v < p.variable_count(); ++v) {
-    if (!kept[v]) left.push_back(v);
-  }
-  const std::vector<Eigen::Index> columns_q = of_q.columns(order), columns_p = of_p.columns(at);
-  const std::vector<Eigen::Index> removed = of_p.columns(left);
-  if (columns_q.empty()) return 0.0;
-  const LinearizedAt of_removed(p, std::move(held));
-  if (!removed.empty()) {
-    solver.analyze(of_removed.structure());
-    if (!solver.factorize(of_removed.H()).ok)
-      throw Error(ErrorCode::numerical, "the nodes that were taken out are not determined");
-  }
-  // Λ v = H_kk v − H_kr H_rr⁻¹ H_rk v, by two products with H.
-  const auto multiply = [&](const Vector& v) {
-    Vector x = Vector::Zero(of_p.size());
-    x(columns_p) = v;
-    Vector y = of_p.times(x);
-    if (!removed.empty()) {
-      const Vector right = y(removed);
-      Vector solution(right.size());
-      solver.solve(view(right), view(solution));
-      x(removed) = -solution;
-      y = of_p.times(x);
+  const Difference difference(p, q, at);
+  const std::vector<Eigen::Index>& kept = difference.kept();
+  if (kept.empty()) return 0.0;
+  solver.analyze(difference.structure());
+  double s = kShift * difference.scale();
+  for (int tries = 0; !solver.factorize(difference.shifted(s)).ok; ++tries, s *= kGrowth) {
+    if (tries == kShifts) {
+      throw Error(ErrorCode::numerical,
+                  "the nodes that were taken out are not determined by the original graph");
     }
-    Vector z(of_q.size());
-    z(columns_q) = v;
-    const Vector claimed = of_q.times(z);
-    return Vector(y(columns_p) - claimed(columns_q));
-  };
-  return least_eigenvalue(std::ssize(columns_q), multiply);
+  }
+  Vector x(difference.size());
+  const double largest = largest_eigenvalue(std::ssize(kept), [&](const Vector& v) {
+    x.setZero();
+    x(kept) = v;
+    const std::span<double> view(x.data(), static_cast<std::size_t>(x.size()));
+    solver.solve(view, view);
+    return Vector(x(kept));
+  });
+  return 1.0 / largest - s;
 }
 
 }  // namespace cairn

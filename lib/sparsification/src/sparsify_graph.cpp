@@ -144,7 +144,10 @@ SparsifyResult sparsify_whole(const Graph& graph, const SparsifyJob& job,
     }
   }
   report(setting, {SparsifyProgress::Phase::select});
-  const std::vector<int> nodes = select(original, open_nodes(original, job.nodes), parts, result);
+  std::vector<int> nodes = select(original, open_nodes(original, job.nodes), parts, result);
+  // Landmarks last: the poses that have observed one are then held together by other factors.
+  std::stable_partition(nodes.begin(), nodes.end(),
+                        [&](int v) { return !is_point(original.type(v)); });
   result.change = take_out(original, nodes, parts, setting);
   result.interrupted = setting.interrupted();
   result.sparse = original.clone();

@@ -46,9 +46,9 @@ CAIRN_API SparsificationError sparsification_error(const Graph& original, const 
 /// of `sparse`, Λ̆ that of `sparse`, both at the states of `original` [1/m², 1/rad²]. Where it is
 /// not negative, `sparse` is conservative: no direction has a smaller variance than in `original`.
 /// Otherwise it is how much information some direction is claimed to have that it has not, per unit
-/// of its length. By Lanczos' method, which approaches it from above, with products only; the
-/// factorisation is of the nodes that were taken out. Throws as `sparsification_error` does; any
-/// linear solver does.
+/// of its length. By Lanczos' method on the inverse of the shifted matrix, in the sparse form that
+/// has it as a Schur complement; rounding is about 1e-12 of the largest information. `solver` must
+/// be a direct one. Throws as `sparsification_error` does.
 CAIRN_API double overconfidence(const Graph& original, const Graph& sparse, LinearSolver& solver);
 
 /// `sparsification_error` of graphs that both have nodes which the other lacks: D(p‖q) of their
