@@ -20,7 +20,8 @@
 namespace cairn::sparsify {
 namespace {
 
-/// B Ω Bᵀ, packed: the information of a choice's models in the residuals of their types.
+/// B Ω Bᵀ, packed: the information of a choice's models in the residuals of their types. Throws
+/// `Error` (numerical) where rounding has made it indefinite.
 std::vector<double> whole_information(const Marginal& marginal, const FactorChoice& choice,
                                       const std::vector<double>& information) {
   int rows = 0, columns = 0;
@@ -39,7 +40,13 @@ std::vector<double> whole_information(const Marginal& marginal, const FactorChoi
     row += m;
     column += n;
   }
-  return pack(dense::congruent(B, Omega));
+  std::vector<double> packed = pack(dense::congruent(B, Omega)), root(packed.size());
+  if (!square_root(packed, rows, root)) {
+    throw Error(ErrorCode::numerical,
+                "the information of a new factor is indefinite by rounding: its neighbours' states "
+                "are too uncertain");
+  }
+  return packed;
 }
 
 /// Throws the reason why nodes stay that leave more open than the pose of the whole.
@@ -48,10 +55,11 @@ std::vector<double> whole_information(const Marginal& marginal, const FactorChoi
   const DenseBlanket& dense = marginal.dense;
   const int all = dense.size() - (dense.absolute ? 0 : dense.node_sizes.front());
   throw Error(ErrorCode::numerical,
-              fmt::format("{}: its factors do not determine the relative poses of its {} "
-                          "neighbours (their information has rank {} of {})",
-                          graph.describe_variable(local.removed.front()), dense.node_sizes.size(),
-                          all - marginal.open, all));
+              fmt::format("{}: its factors do not determine the {} of its {} neighbours (their "
+                          "information has rank {} of {})",
+                          graph.describe_variable(local.removed.front()),
+                          dense.absolute ? "absolute poses" : "relative poses",
+                          dense.node_sizes.size(), all - marginal.open, all));
 }
 
 }  // namespace
