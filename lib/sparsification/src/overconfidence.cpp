@@ -23,8 +23,8 @@ using Block = Eigen::Map<Eigen::MatrixXd>;
 using ConstBlock = Eigen::Map<const Eigen::MatrixXd>;
 
 /// The first shift, as a part of the largest diagonal entry, and what it grows by.
-constexpr double kShift = 1e-9, kGrowth = 8.0;
-constexpr int kShifts = 14;
+constexpr double kShift = 1e-9, kGrowth = 32.0;
+constexpr int kShifts = 8;
 constexpr int kLanczosSteps = 300;
 /// Of the residual, as a part of the eigenvalue.
 constexpr double kAccuracy = 1e-9;
