@@ -50,7 +50,7 @@ TEST_P(RobustLossTest, ALineSearchEndsInAMinimum) {
   Graph robust = graph(FactorSelector::all());
   const Summary first = registry_.make<Optimizer>("ceres_line_search")
                             ->optimize(robust, Stop{.max_iterations = 20000});
-  EXPECT_EQ(first.status, Status::converged);
+  EXPECT_EQ(first.status, Status::converged) << testing::PrintToString(first.notes);
   const Summary again =
       registry_.make<Optimizer>(with_some_linear_solver("levenberg_marquardt"))->optimize(robust);
   EXPECT_NEAR(again.final_chi2, first.final_chi2, 1e-8 * first.final_chi2);

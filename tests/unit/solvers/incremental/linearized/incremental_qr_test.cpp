@@ -61,8 +61,8 @@ TEST(IncrementalQr, GivesTheCovarianceOfBatchAfterABatchStep) {
   CAIRN_NEEDS("estimator", "batch");
   Registry registry;
   const Graph graph = poses_and_points(30, 0.05);
-  const auto qr = registry.make<Estimator>("incremental_qr:tolerance=1e-16");
-  const auto batch = registry.make<Estimator>("batch:tolerance=1e-16");
+  const auto qr = registry.make<Estimator>("incremental_qr:tolerance=1e-22");
+  const auto batch = registry.make<Estimator>("batch:tolerance=1e-22");
   for (int v = 0; v < graph.variable_count(); ++v) {
     qr->update(arrival(graph, v));
     batch->update(arrival(graph, v), {.defer = true});
