@@ -88,6 +88,8 @@ class CompactGraph {
   /// gain exceeds `least_gain` [nats]. If not, the whole measurement goes to what follows.
   void relocate(int pose, const Motion& measured, double of_way, double least_gain,
                 PolicySeconds& seconds);
+  /// Whether poses have left: there is no room for more than there are.
+  bool full() const { return full_; }
   /// Where more than `limit` poses are kept, makes that many of them: others leave, and are
   /// replaced by factors between their neighbours. Never the newest, the first of the trajectory,
   /// those that are fixed or anchored, and `held`.
@@ -210,7 +212,7 @@ class CompactGraph {
     Motion motion;
   };
   std::map<std::pair<int, int>, Bridge> bridges_;
-  bool full_ = false;  ///< poses have left
+  bool full_ = false;
   int version_ = 0;
 
   int anchored_version_ = -1;

@@ -127,9 +127,10 @@ namespace {
 /// both sides along x, until that alone is farther than the nearest so far.
 class NearestPairs {
  public:
-  NearestPairs(const Graph& graph, double angle) : angle_(angle) {
+  /// Of the poses that are `counted`.
+  NearestPairs(const Graph& graph, double angle, const std::vector<bool>& counted) : angle_(angle) {
     for (int v = 0; v < graph.variable_count(); ++v) {
-      if (!is_pose(graph.type(v))) continue;
+      if (!counted[v] || !is_pose(graph.type(v))) continue;
       nodes_.push_back(v);
       poses_.push_back(pose_of(graph.type(v), graph.state(v)));
     }
@@ -233,7 +234,8 @@ std::vector<int> Nearest::choose(const Graph& graph, std::span<const int> nodes,
     std::erase_if(cheap, [&](int v) { return !few[v]; });
     evaluate(cheap);
   }
-  NearestPairs pairs(graph, angle_);
+  const bool all = !leaving_ || nodes.size() < 2;
+  NearestPairs pairs(graph, angle_, all ? std::vector<bool>(may.size(), true) : may);
   std::vector<int> chosen;
   while (static_cast<int>(std::ssize(chosen)) < count) {
     auto pair = pairs.closest(few);

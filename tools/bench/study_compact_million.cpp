@@ -27,12 +27,13 @@ namespace fs = std::filesystem;
 namespace json = boost::json;
 using Clock = std::chrono::steady_clock;
 
-/// Eleven streets each way, 100 m apart; the noise of odometry and of matches, on each axis.
+/// The noise of odometry and of matches, on each axis.
 constexpr double kTranslation = 0.02, kRotation = 0.005;  // [m, rad]
 constexpr double kRange = 12.0;                           // of the sensor, in any direction [m]
 
 struct Drive {
   int poses = 1000000;
+  int streets = 11;  ///< each way, 100 m apart
   int keep = 2000;
   int sample = 100000;  ///< so many are compared with batch
   std::vector<int> stops{1000, 10000, 100000, 200000, 500000, 1000000};
@@ -40,7 +41,11 @@ struct Drive {
 
 Drive drive_of(bool quick) {
   if (!quick) return {};
-  return {.poses = 20000, .keep = 500, .sample = 10000, .stops = {1000, 5000, 10000, 20000}};
+  return {.poses = 20000,
+          .streets = 5,
+          .keep = 300,
+          .sample = 10000,
+          .stops = {1000, 5000, 10000, 20000}};
 }
 
 /// What the words of a line have after its tag and `ids` ids.
@@ -74,9 +79,9 @@ World generate_world(const Bench& bench, const Drive& drive) {
   const fs::path city = bench.cairn.work() / "city.g2o", truth = bench.cairn.work() / "truth.g2o";
   const Outcome outcome = run_program(
       {bench.cairn.program().string(), "generate",
-       fmt::format("manhattan:poses={},block=100,streets=11,loop_density=0,translation_sigma={},"
+       fmt::format("manhattan:poses={},block=100,streets={},loop_density=0,translation_sigma={},"
                    "rotation_sigma={}",
-                   drive.poses, kTranslation, kRotation),
+                   drive.poses, drive.streets, kTranslation, kRotation),
        "-o", city.string(), "--ground-truth", truth.string(), "--quiet"},
       bench.cairn.work());
   if (outcome.exit_code != 0) throw std::runtime_error(outcome.complaint);
@@ -145,6 +150,7 @@ class Robot {
     ask("ESTIMATE ALL\n", [&](const std::string& line) {
       if (line.starts_with("VERTEX_SE2 ")) map[std::stoi(line.substr(11))] = pose_of(line, 1);
     });
+    if (!newest_kept_) map.erase(at_ - 1);
     return map;
   }
 
@@ -194,7 +200,9 @@ class Robot {
     PlanarPose newest;
     ask("DONE\n", [&](const std::string& line) {
       if (line.starts_with("VERTEX_SE2 ")) newest = pose_of(line, 1);
-      left_ += line.starts_with("REMOVED ");
+      if (line.starts_with("REMOVED ")) ++left_;
+      if (line.starts_with("KEPT ")) newest_kept_ = true;
+      if (line.starts_with("DROPPED ")) newest_kept_ = false;
     });
     seconds_.push_back(std::chrono::duration<double>(Clock::now() - begin).count() - elsewhere);
     if (at_ < sample_) live_.push_back(newest);
@@ -225,6 +233,7 @@ class Robot {
   std::mt19937_64 random_{1};
   std::normal_distribution<double> normal_;
   int at_ = 0, kept_ = 0, factors_ = 0;
+  bool newest_kept_ = true;
   double asked_ = 0.0, left_ = 0.0;
   std::vector<double> seconds_;
   std::vector<PlanarPose> live_;
