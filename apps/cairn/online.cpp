@@ -192,10 +192,12 @@ Listener follow_graph(const OnlineOptions& options, const ProblemSetup& setup, S
 ComponentSpec policy_spec(const OnlineOptions& options) {
   ComponentSpec spec = parse_component(options.policy);
   const auto give = [&](const char* name, const std::string& value) {
-    if (value.empty() || spec.values.emplace(name, value).second) return;
-    throw Error(
-        ErrorCode::usage,
-        fmt::format("--{}, and {}={} among the policy's options: give one", name, name, value));
+    if (value.empty()) return;
+    const auto [given, is_new] = spec.values.emplace(name, value);
+    if (is_new) return;
+    throw Error(ErrorCode::usage,
+                fmt::format("--{}, and {}={} among the policy's options: give one", name, name,
+                            given->second));
   };
   give("estimator", options.estimator);
   give("keep", options.keep > 0 ? fmt::format("{}", options.keep) : "");
