@@ -129,8 +129,9 @@ TEST_F(Keep, WithRoomForAllNothingIsDifferent) {
   }
 }
 
-/// The oracle is the minimum of all poses and all measurements that the robot has made.
-TEST_F(Keep, TheMapIsNearTheBatchSolutionOfAllMeasurements) {
+/// The oracle is the minimum of all poses with odometry and matches of a sample of all pairs, which
+/// are not those that the robot asked for.
+TEST_F(Keep, TheMapIsNearABatchSolutionOfAllPoses) {
   const auto policy = drive(kTown + "1500", ",keep=30", [](PosePolicy&) {});
   const auto sensor = registry.make<Registration>(kSensor);
   sensor->begin({.recording = &simulation_.graph, .truth = &simulation_.truth});
