@@ -4,6 +4,7 @@
 #include <charconv>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <system_error>
 
@@ -32,6 +33,7 @@ struct PlotOptions {
   std::string colour = "class";
   std::string x;
   std::vector<std::string> y;
+  std::optional<double> x_max;
   std::string logarithmic = "none";
   std::string linear_solver = "block_cholesky";
 };
@@ -81,8 +83,8 @@ void check_axes(const PlotOptions& options) {
                             "CSV (.csv)",
                             options.x));
   }
-  if (!options.y.empty() || options.logarithmic != "none")
-    throw Error(ErrorCode::usage, "--y and --log are for columns of CSV files (.csv)");
+  if (!options.y.empty() || options.x_max || options.logarithmic != "none")
+    throw Error(ErrorCode::usage, "--y, --x-max and --log are for columns of CSV files (.csv)");
 }
 
 ComponentSpec picture_spec(const PlotOptions& options, const std::string& output,
@@ -99,6 +101,7 @@ ComponentSpec picture_spec(const PlotOptions& options, const std::string& output
   picture.values["x_column"] = options.x;
   picture.values["y_columns"] = joined(options.y, "\n");
   picture.values["logarithmic"] = options.logarithmic;
+  if (options.x_max) picture.values["x_max"] = fmt::format("{}", *options.x_max);
   put_size(options.size, picture);
   return picture;
 }
@@ -157,6 +160,9 @@ Command add_plot(ArgumentParser program) {
                  "columns of CSV, such as 'chi2' or 'seconds*': each --y is a chart [all in one]")
       .type_name("COLUMNS")
       .repeatable();
+  cli.add_option("--x-max", options->x_max,
+                 "right end of a plot of columns: rows beyond are left out")
+      .type_name("X");
   cli.add_option("--log", options->logarithmic, "logarithmic axes of a plot of columns")
       .type_name("AXES")
       .one_of({"none", "x", "y", "xy"})

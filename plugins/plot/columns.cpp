@@ -2,6 +2,7 @@
 // Columns of tables against one of them.
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -54,6 +55,18 @@ std::vector<const Column*> selected(const NumberTable& table, const Column& x,
   return columns;
 }
 
+/// Without what is beyond the right end.
+void cut(Line& line, double right) {
+  std::size_t left = 0;
+  for (std::size_t i = 0; i < line.x.size(); ++i) {
+    if (line.x[i] > right) continue;
+    line.x[left] = line.x[i];
+    line.y[left++] = line.y[i];
+  }
+  line.x.resize(left);
+  line.y.resize(left);
+}
+
 struct Panel {
   LineChart chart;
   std::vector<Line> lines;
@@ -71,6 +84,7 @@ Panel panel_of(const std::vector<NumberTable>& tables, const PlotOptions& option
       panel.lines.push_back(
           {tables.size() == 1 ? column->name : fmt::format("{}: {}", table.name, column->name),
            x.values, column->values});
+      cut(panel.lines.back(), options.x_max);
       if (std::ranges::find(names, column->name) == names.end()) names.push_back(column->name);
     }
   }
@@ -80,9 +94,10 @@ Panel panel_of(const std::vector<NumberTable>& tables, const PlotOptions& option
                             tables.front().name, column_names(tables.front())));
   }
   panel.chart.y_label = names.size() == 1 ? names.front() : std::string();
-  panel.chart.title = fmt::format(
-      "{} against {}", names.size() <= 3 ? fmt::format("{}", fmt::join(names, ", ")) : "columns",
-      panel.chart.x_label);
+  const std::string what = names.size() <= 3 ? fmt::format("{}", fmt::join(names, ", "))
+                           : pattern == "*"  ? tables.front().name
+                                             : pattern;
+  panel.chart.title = fmt::format("{} against {}", what, panel.chart.x_label);
   const Logarithmic log = options.logarithmic;
   panel.chart.logarithmic_x = log == Logarithmic::x || log == Logarithmic::both;
   panel.chart.logarithmic_y = log == Logarithmic::y || log == Logarithmic::both;

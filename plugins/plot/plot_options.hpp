@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <limits>
 #include <string>
 
 #include "cairn/linear/linear_solver.hpp"
@@ -54,6 +55,7 @@ struct PlotOptions {
   Abscissa x = Abscissa::iterations;
   std::string x_column;   ///< of a plot of columns; empty: the first
   std::string y_columns;  ///< its panels, separated by line ends: each a pattern with * and ?
+  double x_max = std::numeric_limits<double>::infinity();
   Logarithmic logarithmic = Logarithmic::none;
   std::string linear_solver = "block_cholesky";  ///< whose elimination order is drawn
 
@@ -73,6 +75,9 @@ struct PlotOptions {
         .text("y_columns", &O::y_columns,
               "columns to draw: a pattern with * and ? for each panel, separated by line ends; "
               "empty: one panel with all")
+        .real("x_max", &O::x_max, std::numeric_limits<double>::lowest(),
+              std::numeric_limits<double>::infinity(),
+              "right end of columns: rows beyond it are not drawn")
         .choice("logarithmic", &O::logarithmic, "logarithmic axes of columns")
         .component<LinearSolver>("linear_solver", &O::linear_solver,
                                  "whose elimination order the sparsity of L has");

@@ -164,6 +164,8 @@ TEST_F(PlotCommand, DrawsColumnsOfCsv) {
   EXPECT_NE(one, logarithmic);
   EXPECT_EQ(plot({csv, "--what", "columns", "--x", "step", "--y", "seconds*"}, "svg"), one)
       << "the first column is the horizontal axis, and a column without numbers is not drawn";
+  EXPECT_NE(plot({csv, "--y", "seconds_all", "--x-max", "2"}, "svg"),
+            plot({csv, "--y", "seconds_all"}, "svg"));
   const std::string other = folder_.file("other.csv");
   write_text(other, "step,seconds\n1,5\n");
   EXPECT_NE(plot({csv, other, "--y", "seconds"}, "svg"), plot({csv, "--y", "seconds"}, "svg"));
@@ -187,6 +189,7 @@ TEST_F(PlotCommand, SaysWhichColumnsThereAre) {
   EXPECT_THAT(refused({graph_, "--what", "columns"}, 3), HasSubstr("--steps"));
   write_text(csv, "step,seconds\n1,2,3\n");
   EXPECT_THAT(refused({csv}, 3), HasSubstr("steps.csv:2: expected 2 fields"));
+  write_text(csv, "step,seconds\n1,2\n");
   const Outcome page = cairn({"view", csv, "-o", folder_.file("x.html")});
   EXPECT_EQ(page.exit_code, 3);
   EXPECT_THAT(page.err, HasSubstr("cairn plot"));

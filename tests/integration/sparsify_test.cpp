@@ -255,7 +255,8 @@ TEST_F(Sparsify, CurvesEndAtTheMeanOfTheRecoveries) {
                                std::to_string(row.at("nodes").as_int64());
       const NumberTable::Column* column = table.find(name);
       ASSERT_TRUE(column) << name;
-      EXPECT_NEAR(column->values.back(), row.at("kld").to_number<double>(), 1e-9) << name;
+      // While it runs a method keeps the KLD up to date; at its end it is computed anew.
+      EXPECT_NEAR(column->values.back(), row.at("kld").to_number<double>(), 1e-7) << name;
       EXPECT_GE(column->values.front(), column->values.back() - 1e-9) << name;
       ++compared;
     }

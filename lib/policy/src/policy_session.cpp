@@ -325,7 +325,10 @@ void PolicySession::finish_trajectory() {
   }
   try {
     Reply unread;
-    if (current()) end(unread);
+    if (current()) {
+      end(unread);
+      note_removed();
+    }
   } catch (const Error& error) {
     if (!arriving_ || error.code() == ErrorCode::usage) throw;
     answer_ += fmt::format("NOTE {}\n", error.what());
