@@ -47,12 +47,9 @@ void draw_convergence(const Bench& bench, const fs::path& problems) {
                    joined(std::move(words), {"--curves", (bench.cairn.work() / file).string(),
                                              "--against", against}));
   };
-  Words by_iteration{"ip:initial=identity"};
-  for (const char* method : {"pqn", "fd"}) {
-    for (const char* initial : {"identity", "odb", "ffd"})
-      by_iteration.push_back(fmt::format("{}:initial={}", method, initial));
-  }
-  curves("sparsify_iterations.csv", "iterations", by_iteration);
+  curves("sparsify_iterations.csv", "iterations",
+         {"ip:initial=identity", "pqn:initial=identity", "pqn:initial=odb", "fd:initial=identity",
+          "fd:initial=odb", "fd:initial=ffd"});
   curves("sparsify_times.csv", "time", {"ip:initial=odb", "fd", "ncfd"});
 }
 
