@@ -123,6 +123,15 @@ void draw_columns(Canvas& canvas, const Theme& theme, const Album& album,
   std::vector<Panel> all;
   for (const std::string& pattern : patterns(options.y_columns))
     all.push_back(panel_of(album.tables, options, pattern));
+  for (const Panel& panel : all) {
+    if (std::ranges::none_of(panel.lines,
+                             [&](const Line& line) { return can_be_drawn(panel.chart, line); })) {
+      throw Error(ErrorCode::input,
+                  fmt::format("{}: no point can be drawn: logarithmic axes have positive numbers "
+                              "only, and what is beyond the right end is left out",
+                              panel.chart.title));
+    }
+  }
   const std::vector<Box> boxes = panels(canvas, all.size());
   for (std::size_t k = 0; k < all.size(); ++k)
     draw_lines(canvas, theme, boxes[k], all[k].chart, all[k].lines);

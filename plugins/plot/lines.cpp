@@ -22,6 +22,11 @@ bool can_be_shown(double value, bool logarithmic) {
   return std::isfinite(value) && (value > 0 || !logarithmic);
 }
 
+bool can_be_shown(const LineChart& chart, const Line& line, std::size_t i) {
+  return can_be_shown(line.x[i], chart.logarithmic_x) &&
+         can_be_shown(line.y[i], chart.logarithmic_y);
+}
+
 Range range_of_all(const std::vector<Line>& lines, std::vector<double> Line::*numbers,
                    bool logarithmic) {
   std::vector<double> all;
@@ -31,6 +36,13 @@ Range range_of_all(const std::vector<Line>& lines, std::vector<double> Line::*nu
 }
 
 }  // namespace
+
+bool can_be_drawn(const LineChart& chart, const Line& line) {
+  for (std::size_t i = 0; i < line.x.size(); ++i) {
+    if (can_be_shown(chart, line, i)) return true;
+  }
+  return false;
+}
 
 void draw_lines(Canvas& canvas, const Theme& theme, const Box& box, const LineChart& chart,
                 const std::vector<Line>& lines) {
@@ -43,10 +55,7 @@ void draw_lines(Canvas& canvas, const Theme& theme, const Box& box, const LineCh
                    chart.x_label, chart.y_label);
   for (std::size_t k = 0; k < lines.size(); ++k) {
     const Line& line = lines[k];
-    const auto shown = [&](std::size_t i) {
-      return can_be_shown(line.x[i], chart.logarithmic_x) &&
-             can_be_shown(line.y[i], chart.logarithmic_y);
-    };
+    const auto shown = [&](std::size_t i) { return can_be_shown(chart, line, i); };
     bool open = false;
     for (std::size_t i = 0; i < line.x.size(); ++i) {
       if (shown(i) && open) canvas.line_to(axes.x(line.x[i]), axes.y(line.y[i]));

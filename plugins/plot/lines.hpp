@@ -21,6 +21,9 @@ struct LineChart {
   bool whole_x = false;  ///< only integers have a meaning on the horizontal axis
 };
 
+/// Whether the axes can show any point of the line.
+bool can_be_drawn(const LineChart& chart, const Line& line);
+
 /// Draws lines on axes that hold them all, with a dot at each point unless there are many. What an
 /// axis cannot show, such as zero on a logarithmic one, is a gap.
 void draw_lines(Canvas& canvas, const Theme& theme, const Box& box, const LineChart& chart,

@@ -187,6 +187,9 @@ TEST_F(PlotCommand, SaysWhichColumnsThereAre) {
   EXPECT_THAT(refused({graph_, "--x", "step"}, 2), HasSubstr("iterations or time"));
   EXPECT_THAT(refused({graph_, "--y", "step"}, 2), HasSubstr("CSV"));
   EXPECT_THAT(refused({graph_, "--what", "columns"}, 3), HasSubstr("--steps"));
+  EXPECT_THAT(refused({csv, "--x-max", "0"}, 3), HasSubstr("no point can be drawn"));
+  write_text(csv, "step,seconds\n0,1\n1,-2\n");
+  EXPECT_THAT(refused({csv, "--log", "xy"}, 3), HasSubstr("positive"));
   write_text(csv, "step,seconds\n1,2,3\n");
   EXPECT_THAT(refused({csv}, 3), HasSubstr("steps.csv:2: expected 2 fields"));
   write_text(csv, "step,seconds\n1,2\n");

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <set>
 #include <string>
@@ -237,6 +238,14 @@ TEST_F(Sparsify, SaysWhatIsWrongAndWhatWouldWork) {
   write_text(folder_.file("wrong.json"), "{}");
   EXPECT_THAT(refused({folder_.file("wrong.json")}, 3, {"study", "problems"}),
               HasSubstr("--record"));
+}
+
+TEST_F(Sparsify, SaysWhereThereIsNothingToTakeOut) {
+  const boost::json::value told = report({"@manhattan:poses=60", "--nodes", "landmarks"});
+  const boost::json::array& notes = told.at("notes").as_array();
+  EXPECT_TRUE(std::ranges::any_of(notes, [](const boost::json::value& note) {
+    return note.as_string().find("no landmark that may leave") != std::string::npos;
+  }));
 }
 
 TEST_F(Sparsify, CurvesEndAtTheMeanOfTheRecoveries) {

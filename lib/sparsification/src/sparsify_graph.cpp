@@ -144,7 +144,15 @@ SparsifyResult sparsify_whole(const Graph& graph, const SparsifyJob& job,
     }
   }
   report(setting, {SparsifyProgress::Phase::select});
-  std::vector<int> nodes = select(original, open_nodes(original, job.nodes), parts, result);
+  const std::vector<int> open = open_nodes(original, job.nodes);
+  if (open.empty()) {
+    result.notes.push_back(fmt::format("nothing was taken out: the graph has no {} that may leave",
+                                       job.nodes == NodeKind::landmarks ? "landmark"
+                                       : job.nodes == NodeKind::poses
+                                           ? "pose (landmarks: --nodes landmarks or all)"
+                                           : "pose or landmark"));
+  }
+  std::vector<int> nodes = select(original, open, parts, result);
   // Landmarks last: the poses that have observed one are then held together by other factors.
   std::stable_partition(nodes.begin(), nodes.end(),
                         [&](int v) { return !is_point(original.type(v)); });
