@@ -370,8 +370,8 @@ std::optional<double> CompactPose::relocation(const Link& link) const {
   // ever.
   const double enough = std::max(pose_gain_, 0.5 * n * std::log(4.0));
   if (!(mutual_information(typical_.covariance(), rest) < enough)) return std::nullopt;
-  // Where another pose would have to leave, information is lost in any case; and where the bridge is
-  // not informative, nothing is divided.
+  // Where another pose would have to leave, information is lost in any case; and where the bridge
+  // is not informative, nothing is divided.
   if (graph_.full()) return of_way;
   const Matrix end = graph_.newest_odometry() + link.covariance;
   const double lost = mutual_information(end, link.covariance);
