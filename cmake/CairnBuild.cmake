@@ -67,4 +67,14 @@ function(cairn_kernels target)
     set_source_files_properties(kernels_avx512.cpp PROPERTIES COMPILE_OPTIONS
       "-O3;-mavx512f;-mavx512dq;-mavx512vl;-mavx2;-mfma;-mprefer-vector-width=512")
   endif()
+  if(CAIRN_SANITIZE)  # clang warns of loops that it does not unroll as asked, once they are instrumented
+    target_compile_options(${target} PRIVATE $<$<CXX_COMPILER_ID:Clang>:-Wno-pass-failed>)
+  endif()
+endfunction()
+
+# cairn_tell_of_sanitizers(target): defines CAIRN_SANITIZED where one is in use, for what has to differ then.
+function(cairn_tell_of_sanitizers target)
+  if(CAIRN_SANITIZE)
+    target_compile_definitions(${target} PRIVATE CAIRN_SANITIZED)
+  endif()
 endfunction()

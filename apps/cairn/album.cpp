@@ -46,8 +46,11 @@ void add_file(const std::string& file, const std::string& name, const AlbumOptio
               AlbumBuilder& builder, Session& session) {
   const bool named = file == "-" || file.starts_with('@');
   const std::string text = named ? std::string() : read_file(file);
-  if (!named && (is_recording(text) || is_json(text))) session.files.add_input(file);
-  if (is_recording(text)) {
+  if (!named && (is_csv(file) || is_recording(text) || is_json(text)))
+    session.files.add_input(file);
+  if (is_csv(file)) {
+    builder.add_table(read_number_table(text, file), name);
+  } else if (is_recording(text)) {
     Scene recording = read_recording(text, file);
     if (name != short_name(file)) recording.recordings.front().name = name;
     builder.add_recording(std::move(recording));
@@ -76,9 +79,11 @@ std::string title_of(const AlbumOptions& options) {
 
 }  // namespace
 
+bool is_csv(const std::string& file) { return file.ends_with(".csv") || file.ends_with(".csv.gz"); }
+
 void add_album_options(ArgumentParser cli, AlbumOptions& options) {
   cli.add_option("files", options.files,
-                 "graphs (.gz too, @KIND to generate), trajectories, recordings, JSON of runs")
+                 "graphs (.gz too, @KIND to generate), trajectories, recordings, JSON of runs, CSV")
       .type_name("FILE")
       .required();
   cli.add_option("--name", options.names, "what to call the first FILE, the second … [its name]")

@@ -21,9 +21,12 @@ struct AlbumOptions {
   std::string title;
   InputOptions input;
 };
+
+/// Whether a file is read as a table, by its name.
+bool is_csv(const std::string& file);
 void add_album_options(ArgumentParser cli, AlbumOptions& options);
 
-/// Reads the files (graphs, trajectories, recordings, the JSON of runs) and lays together what
+/// Reads the files (graphs, trajectories, recordings, the JSON of runs, CSV) and lays together what
 /// belongs together, as `AlbumBuilder` does. Throws `Error` for files that cannot be read.
 Album load_album(const AlbumOptions& options, const std::string& command, Session& session);
 

@@ -6,6 +6,7 @@
 
 #include <fmt/core.h>
 
+#include "cairn/report/number_table.hpp"
 #include "cairn/runtime/threads.hpp"
 #include "json_report.hpp"
 #include "table.hpp"
@@ -138,14 +139,6 @@ json::object configuration_json(const ConfigurationResult& result, const GraphRe
   all["runs"] = runs_json(result, stop);
   if (!result.runs.empty()) all["history"] = iterations_json(median_run(result));
   return all;
-}
-
-/// Quoted if need be (RFC 4180).
-std::string csv_field(const std::string& text) {
-  if (text.find_first_of(",\"\n\r") == std::string::npos) return text;
-  std::string quoted = "\"";
-  for (const char c : text) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
-  return quoted + "\"";
 }
 
 std::string csv_line(const std::vector<std::string>& fields) {

@@ -159,6 +159,10 @@ Job prepare(const CompactOptions& options, const PolicySetting& setting, Results
   }
   emplace(result.found.options);
   const OptionTable& table = setting.registry.options(PosePolicy::kKind, job.policy.name);
+  // Not while thresholds are found, for which all measurements of the sample are used.
+  if (options.keep > 0 &&
+      !job.policy.values.emplace("keep", fmt::format("{}", options.keep)).second)
+    throw Error(ErrorCode::usage, "--keep, and keep among the policy's options: give one");
   if (table.find("strategy"))
     emplace({{"strategy", options.strategy == "rfpfl" ? "fpfl" : options.strategy}});
   results.write(options.save_thresholds, [&] {
@@ -341,6 +345,11 @@ void add_compact_options(ArgumentParser cli, CompactOptions& options,
   cli.add_option("--gate", options.gate,
                  "reject loop closures beyond the chi-square quantile P of their innovation (0.99)")
       .type_name("P");
+  cli.add_option("--keep", options.keep,
+                 "keep so many poses at most: others leave, and are replaced by factors; 0: all")
+      .type_name("N")
+      .within(2.0, 1e9)
+      .show_default("0");
   cli.add_option("--truth", options.truth, "true poses, for errors").type_name("FILE");
   cli.add_option("--steps", options.steps, "a row for each pose, as CSV").type_name("FILE");
   add_loss_options(cli, options.problem);

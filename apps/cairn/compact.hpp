@@ -28,6 +28,7 @@ struct CompactOptions {
   bool automatic = false;
   double sample = 0.6;
   std::string thresholds, save_thresholds;
+  int keep = 0;  ///< most poses; 0: any number
   std::optional<double> range, angle, loop_gain, pose_gain, gate;
   std::string steps;
   InputOptions input;

@@ -64,7 +64,7 @@ int run(int argc, const char* const* argv) {
 /// libraries below them may crash or wait for ever, after all work is done.
 [[noreturn]] void leave(int code) {
   std::fflush(nullptr);
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__) || defined(CAIRN_COVERAGE)
+#if defined(CAIRN_SANITIZED) || defined(CAIRN_COVERAGE)
   std::exit(code);  // what was found or counted is written at the end
 #else
   std::_Exit(code);

@@ -141,17 +141,21 @@ struct Listener {
   std::unique_ptr<LineSession> lines;
 };
 
-std::unique_ptr<PoseRemover> pose_remover(const OnlineOptions& options, Registry& registry) {
-  const ComponentSpec sparsifier =
-      parse_component(options.sparsifier.empty() ? kDefaultSparsifier : options.sparsifier);
+/// Of which the map can be saved.
+ComponentSpec checked_sparsifier(const std::string& text) {
+  ComponentSpec sparsifier = parse_component(text.empty() ? kDefaultSparsifier : text);
   const auto topology = sparsifier.values.find("topology");
   if (topology != sparsifier.values.end() && topology->second.starts_with("cliquey")) {
     throw Error(ErrorCode::usage,
                 "topology cliquey makes pairs of correlated factors (CORRELATED_PAIR), which no "
                 "format of graphs expresses: the map could not be saved; choose another topology");
   }
+  return sparsifier;
+}
+
+std::unique_ptr<PoseRemover> pose_remover(const OnlineOptions& options, Registry& registry) {
   auto remover = std::make_unique<MapSparsifier>(
-      registry, sparsifier,
+      registry, checked_sparsifier(options.sparsifier),
       parse_component(options.select.empty() ? MapSparsifier::kDefaultSelection : options.select));
   // A wrong name is refused at once. Without these options the plugin need not be there.
   if (options.keep > 0 || !options.sparsifier.empty() || !options.select.empty())
@@ -184,11 +188,37 @@ Listener follow_graph(const OnlineOptions& options, const ProblemSetup& setup, S
   return listener;
 }
 
+/// The policy with the options that the command line gives by themselves.
+ComponentSpec policy_spec(const OnlineOptions& options) {
+  ComponentSpec spec = parse_component(options.policy);
+  const auto give = [&](const char* name, const std::string& value) {
+    if (value.empty()) return;
+    const auto [given, is_new] = spec.values.emplace(name, value);
+    if (is_new) return;
+    throw Error(ErrorCode::usage,
+                fmt::format("--{}, and {}={} among the policy's options: give one", name, name,
+                            given->second));
+  };
+  give("estimator", options.estimator);
+  give("keep", options.keep > 0 ? fmt::format("{}", options.keep) : "");
+  give("select", options.select);
+  give("sparsifier", options.sparsifier);
+  if (const auto given = spec.values.find("sparsifier"); given != spec.values.end())
+    (void)checked_sparsifier(given->second);
+  if (spec.values.contains("keep")) return spec;
+  for (const char* name : {"select", "sparsifier"}) {
+    if (!spec.values.contains(name)) continue;
+    throw Error(ErrorCode::usage,
+                fmt::format("--{} is of poses that leave, and with a policy none do without a "
+                            "number of poses: give --keep N, too",
+                            name));
+  }
+  return spec;
+}
+
 Listener follow_policy(const OnlineOptions& options, const ProblemSetup& setup, Session& session) {
   Registry& registry = session.registry();
-  ComponentSpec spec = parse_component(options.policy);
-  if (!options.estimator.empty() && !spec.values.emplace("estimator", options.estimator).second)
-    throw Error(ErrorCode::usage, "--estimator, and one among the policy's options: give one");
+  ComponentSpec spec = policy_spec(options);
   if (!options.thresholds.empty()) {
     for (const auto& [name, value] : read_thresholds(options.thresholds, spec.name))
       spec.values.emplace(name, value);
@@ -196,7 +226,10 @@ Listener follow_policy(const OnlineOptions& options, const ProblemSetup& setup, 
   Listener listener;
   listener.name = fmt::format("policy '{}'", options.policy);
   // What is written at the end of a pose is read before, which may cost the last bits their place.
-  listener.identity = identity(options,
+  OnlineOptions rest = options;  // what is not among the policy's
+  rest.keep = 0;
+  rest.sparsifier = rest.select = "";
+  listener.identity = identity(rest,
                                fmt::format("policy {}, output {}, marginals {}", spec_text(spec),
                                            options.estimates, options.marginals),
                                session);
@@ -234,12 +267,6 @@ void check(const OnlineOptions& options, Session& session) {
     throw Error(ErrorCode::usage,
                 "--map is continued by a policy: give --policy; without one, send the lines of the "
                 "map first");
-  }
-  if (!options.policy.empty() &&
-      (options.keep > 0 || !options.sparsifier.empty() || !options.select.empty())) {
-    throw Error(ErrorCode::usage,
-                "a policy decides itself which poses are kept: --keep, --sparsifier and --select "
-                "are for runs without --policy");
   }
   if (options.trajectory == "-")
     throw Error(ErrorCode::usage, "--trajectory writes a file; standard output is for answers");
@@ -396,7 +423,8 @@ Command add_online(ArgumentParser program) {
       .within(0.0, 1e9)
       .show_default("0");
   cli.add_option("--keep", options->keep,
-                 "keep so many poses: others are sparsified as new ones come; 0: all")
+                 "keep so many poses: others are sparsified as new ones come; 0: all, or those "
+                 "that --policy keeps")
       .type_name("N")
       .within(2.0, 1e9)
       .show_default("0");

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // cairn plot FILE… -o picture.svg: a static picture, as for a paper.
+#include <algorithm>
 #include <charconv>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <system_error>
 
@@ -29,7 +31,10 @@ struct PlotOptions {
   std::string size;
   std::string theme = "light";
   std::string colour = "class";
-  std::string x = "iterations";
+  std::string x;
+  std::vector<std::string> y;
+  std::optional<double> x_max;
+  std::string logarithmic = "none";
   std::string linear_solver = "block_cholesky";
 };
 
@@ -69,16 +74,34 @@ std::string output_of(const PlotOptions& options, Session& session) {
   return file;
 }
 
+/// --x and --y are of other use with CSV.
+void check_axes(const PlotOptions& options) {
+  if (std::ranges::any_of(options.album.files, is_csv)) return;
+  if (!options.x.empty() && options.x != "iterations" && options.x != "time") {
+    throw Error(ErrorCode::usage,
+                fmt::format("--x is '{}', expected iterations or time; a column only where FILE is "
+                            "CSV (.csv)",
+                            options.x));
+  }
+  if (!options.y.empty() || options.x_max || options.logarithmic != "none")
+    throw Error(ErrorCode::usage, "--y, --x-max and --log are for columns of CSV files (.csv)");
+}
+
 ComponentSpec picture_spec(const PlotOptions& options, const std::string& output,
                            Session& session) {
   check_picture(output, session);
+  check_axes(options);
   ComponentSpec picture{picture_format(output, session), {}};
   if (picture.name == "html") return picture;
   picture.values = {{"what", options.what},
                     {"theme", options.theme},
                     {"colour", options.colour},
-                    {"x", options.x},
                     {"linear_solver", options.linear_solver}};
+  if (options.x == "iterations" || options.x == "time") picture.values["x"] = options.x;
+  picture.values["x_column"] = options.x;
+  picture.values["y_columns"] = joined(options.y, "\n");
+  picture.values["logarithmic"] = options.logarithmic;
+  if (options.x_max) picture.values["x_max"] = fmt::format("{}", *options.x_max);
   put_size(options.size, picture);
   return picture;
 }
@@ -115,9 +138,10 @@ Command add_plot(ArgumentParser program) {
                  "the plot: .svg, .png or .pdf [name of the first FILE, .svg]")
       .type_name("PICTURE");
   cli.add_option("--what", options->what,
-                 "trajectory, convergence, bars, scaling, sparsity, steps; auto: by FILE")
+                 "trajectory, convergence, bars, scaling, sparsity, steps, columns; auto: by FILE")
       .type_name("WHAT")
-      .one_of({"auto", "trajectory", "convergence", "bars", "scaling", "sparsity", "steps"})
+      .one_of(
+          {"auto", "trajectory", "convergence", "bars", "scaling", "sparsity", "steps", "columns"})
       .show_default();
   cli.add_option("--size", options->size, "WIDTHxHEIGHT [px; in a PDF 1/96 inch] [900x600]")
       .type_name("SIZE");
@@ -129,9 +153,19 @@ Command add_plot(ArgumentParser program) {
       .type_name("BY")
       .one_of({"class", "residual"})
       .show_default();
-  cli.add_option("--x", options->x, "of a convergence plot: iterations or time")
-      .type_name("AXIS")
-      .one_of({"iterations", "time"})
+  cli.add_option("--x", options->x,
+                 "of a convergence plot: iterations or time [iterations]; of CSV: a column [first]")
+      .type_name("AXIS");
+  cli.add_option("--y", options->y,
+                 "columns of CSV, such as 'chi2' or 'seconds*': each --y is a chart [all in one]")
+      .type_name("COLUMNS")
+      .repeatable();
+  cli.add_option("--x-max", options->x_max,
+                 "right end of a plot of columns: rows beyond are left out")
+      .type_name("X");
+  cli.add_option("--log", options->logarithmic, "logarithmic axes of a plot of columns")
+      .type_name("AXES")
+      .one_of({"none", "x", "y", "xy"})
       .show_default();
   cli.add_option("--linear-solver", options->linear_solver,
                  "its elimination order gives the sparsity of L")
@@ -142,6 +176,7 @@ Command add_plot(ArgumentParser program) {
       "Example:\n"
       "  cairn plot city.g2o best.g2o -o city.svg\n"
       "  cairn plot run1.json run2.json --what convergence --x time -o curves.pdf\n"
+      "  cairn plot steps.csv --x variables --y seconds --y affected --log y -o steps.svg\n"
       "  cairn plot @sphere --what sparsity --linear-solver block_cholesky:ordering=natural -o "
       "L.png");
   return {cli, [options](Session& session) { return run(*options, session); }};

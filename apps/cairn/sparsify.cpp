@@ -60,6 +60,9 @@ SparsifyJob job_of(const SparsifyCommandOptions& options, Session& session) {
                                       ? fmt::format("keep_every:every={}", options.keep_every)
                                   : options.select.empty() ? kDefaultSelection
                                                            : options.select);
+  for (const auto& [kind, name] : enum_names(NodeKind{})) {
+    if (options.nodes == name) job.nodes = kind;
+  }
   job.optimizer = optimizer_spec(options.optimizer, "", session.registry());
   job.linear_solver = options.linear_solver;
   job.estimator = options.estimator;
@@ -104,6 +107,7 @@ json::object report_json(const SparsifyCommandOptions& options, const LoadedGrap
   report["graph"] = graph_json(loaded.graph, loaded.name);
   report["sparsifier"] = spec_text(job.sparsifier);
   report["selection"] = spec_text(job.selection);
+  report["nodes"] = options.nodes;
   report["online"] = job.online;
   report["threads"] = threads();
   report["status"] = result.interrupted ? "interrupted" : to_string(result.status);
@@ -125,6 +129,7 @@ json::object report_json(const SparsifyCommandOptions& options, const LoadedGrap
       result.error ? number_json(result.error->rmse_aligned) : json::value(nullptr);
   if (result.error)
     report["kld_parts"] = {{"covariance", result.error->covariance}, {"mean", result.error->mean}};
+  report["overconfidence"] = number_json(result.overconfidence);
   report["chi2"] = {{"before", result.chi2_before}, {"after", result.chi2_after}};
   report["seconds"] = {{"total", change.seconds.total},
                        {"marginalize", change.seconds.marginalize},
@@ -168,6 +173,11 @@ std::string summary_text(const SparsifyCommandOptions& options, const LoadedGrap
     if (job.online > 0 && std::isfinite(result.rmse_full))
       text += fmt::format(", from that with all measurements by {:.3g} m", result.rmse_full);
     table.add({"lost", text});
+    if (std::isfinite(result.overconfidence)) {
+      table.add({"overconfidence",
+                 fmt::format("{:.3g}, the least eigenvalue of Λ − Λ̆{}", result.overconfidence,
+                             result.overconfidence < 0.0 ? "" : ": conservative")});
+    }
   }
   table.add(
       {"time",
@@ -299,6 +309,9 @@ void add_sparsify_options(ArgumentParser cli, SparsifyCommandOptions& options) {
                  "which leave: smallest_blanket, least_loss, nearest, oldest, coverage "
                  "[smallest_blanket:part=0.5]")
       .type_name("NAME");
+  cli.add_option("--nodes", options.nodes, "what may leave: poses, landmarks or all [poses]")
+      .type_name("KIND")
+      .one_of({"poses", "landmarks", "all"});
   cli.add_option("--topology", options.topology,
                  "pairs that get a factor: clt, mi, dmi, ekld, odd, l1, best [ekld]")
       .type_name("NAME");

@@ -18,6 +18,7 @@ struct SparsifyCommandOptions {
   std::string select;
   int keep_every = 0;
   std::string edges;
+  std::string nodes = "poses";
   std::string topology, recovery, population, scheme;
   std::string optimizer = kDefaultOptimizer, linear_solver = kDefaultLinearSolver;
   std::string estimator = "incremental_cholesky";

@@ -34,6 +34,7 @@ void check_options(const SparsifyCommandOptions& options) {
   const std::pair<const char*, bool> given[] = {
       {"--keep-every", options.keep_every != none.keep_every},
       {"--select", options.select != none.select},
+      {"--nodes", options.nodes != none.nodes},
       {"--topology", options.topology != none.topology},
       {"--population", options.population != none.population},
       {"--recovery", options.recovery != none.recovery},

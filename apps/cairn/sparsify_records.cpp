@@ -114,6 +114,16 @@ struct Tally {
   }
 };
 
+/// After a landmark has left, there is no node to be relative to.
+BlanketProjection projection_of(const DenseBlanket& blanket) {
+  try {
+    return {blanket, Projection::node};
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::numerical) throw;
+    return {blanket, Projection::eigen};
+  }
+}
+
 bool positive(const RecoveryResult& result) {
   return std::ranges::all_of(result.information, [](const std::vector<double>& numbers) {
     const auto m = static_cast<Eigen::Index>(std::lround(std::sqrt(std::ssize(numbers))));
@@ -137,6 +147,7 @@ void ProblemRecorder::add(const SparsificationRecord& record) {
                        {"states", std::move(states)},
                        {"sizes", array_of(record.dense->node_sizes)},
                        {"information", array_of(upper(record.dense->information, begin.back()))},
+                       {"absolute", record.dense->absolute},
                        {"models", std::move(models)},
                        {"kld", record.recovery ? record.recovery->kld : 0.0}});
 }
@@ -157,6 +168,8 @@ std::vector<DenseBlanket> read_problems(const std::string& file) {
       const std::vector<int> begin = begins(blanket.node_sizes);
       blanket.information =
           square(json::value_to<std::vector<double>>(from.at("information")), begin.back());
+      if (const json::value* absolute = from.if_contains("absolute"))
+        blanket.absolute = absolute->as_bool();
       for (const json::value& model : from.at("models").as_array())
         blanket.models.push_back(read_model(model.as_object(), begin));
       problems.push_back(std::move(blanket));
@@ -175,11 +188,12 @@ std::vector<ReplayRow> replay_problems(const std::vector<DenseBlanket>& problems
                                        const std::string& population,
                                        const std::vector<std::string>& recoveries,
                                        const std::function<bool(std::size_t)>& step,
-                                       Registry& registry) {
+                                       Registry& registry, RecoveryCurves* curves) {
   std::vector<std::unique_ptr<Topology>> choosers;
   std::vector<std::unique_ptr<FactorRecovery>> methods;
   for (const std::string& name : topologies) choosers.push_back(registry.make<Topology>(name));
   for (const std::string& name : recoveries) methods.push_back(registry.make<FactorRecovery>(name));
+  for (const auto& method : methods) method->trace(curves != nullptr);
   const Population rule = Population::parse(population);
   std::map<std::array<std::size_t, 3>, Tally> tallies;  // topology, recovery, nodes
   const auto both = [&](std::size_t t, std::size_t r, int nodes, const auto& change) {
@@ -194,12 +208,13 @@ std::vector<ReplayRow> replay_problems(const std::vector<DenseBlanket>& problems
   for (std::size_t p = 0; p < problems.size(); ++p) {
     const DenseBlanket& blanket = problems[p];
     const int nodes = static_cast<int>(std::ssize(blanket.node_sizes));
-    const BlanketProjection projection(blanket, Projection::node);
+    const BlanketProjection projection = projection_of(blanket);
+    const int count = rule.count(nodes) + (blanket.absolute ? 1 : 0);
     for (std::size_t t = 0; t < choosers.size(); ++t) {
       std::vector<FactorChoice> chosen;
       const auto begin = Clock::now();
       try {
-        chosen = choosers[t]->choose(blanket, rule.count(nodes));
+        chosen = choosers[t]->choose(blanket, count);
       } catch (const Error&) {
         for (std::size_t r = 0; r < methods.size(); ++r)
           both(t, r, nodes, [](Tally& tally) { ++tally.row.refused; });
@@ -213,6 +228,10 @@ std::vector<ReplayRow> replay_problems(const std::vector<DenseBlanket>& problems
         try {
           const RecoveryResult result = methods[r]->recover(problem);
           klds[r] = result.kld;
+          if (curves)
+            curves->add(choosers.size() == 1 ? recoveries[r]
+                                             : fmt::format("{} {}", topologies[t], recoveries[r]),
+                        nodes, result.trace);
           least = std::min(least, result.kld);
           both(t, r, nodes, [&](Tally& tally) {
             tally.add(result, static_cast<double>(chosen.size()), seconds, positive(result));

@@ -9,6 +9,7 @@
 
 #include "cairn/plugin/registry.hpp"
 #include "cairn/sparsification/sparsification.hpp"
+#include "recovery_curves.hpp"
 
 namespace cairn::app {
 
@@ -45,12 +46,13 @@ struct ReplayRow {
 
 /// Solves every problem with every topology and recovery, interleaved: each problem by all in turn.
 /// `population` as the sparsifier takes it, but for loss. `step` is called with the number of
-/// problems solved, and returns whether to go on.
+/// problems solved, and returns whether to go on. `curves`, unless null, gets each recovery's
+/// trace.
 std::vector<ReplayRow> replay_problems(const std::vector<DenseBlanket>& problems,
                                        const std::vector<std::string>& topologies,
                                        const std::string& population,
                                        const std::vector<std::string>& recoveries,
                                        const std::function<bool(std::size_t)>& step,
-                                       Registry& registry);
+                                       Registry& registry, RecoveryCurves* curves = nullptr);
 
 }  // namespace cairn::app

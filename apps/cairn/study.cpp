@@ -8,13 +8,17 @@
 #include <fmt/core.h>
 
 #include "arguments.hpp"
+#include "cairn/io/format.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/sparsification/sparsification.hpp"
 #include "commands.hpp"
 #include "compact.hpp"
+#include "graph_files.hpp"
 #include "interrupt.hpp"
 #include "json_report.hpp"
 #include "progress.hpp"
+#include "recovery_curves.hpp"
+#include "results.hpp"
 #include "sparsify.hpp"
 #include "sparsify_records.hpp"
 #include "table.hpp"
@@ -104,6 +108,7 @@ struct ProblemsOptions {
   std::string problems;
   std::vector<std::string> topologies{"ekld"}, recoveries{"ncfd"};
   std::string population = "tree:2";
+  std::string curves, against = "time";
 };
 
 json::array rows_json(const std::vector<ReplayRow>& rows) {
@@ -132,9 +137,12 @@ json::array rows_json(const std::vector<ReplayRow>& rows) {
 int solve_problems(const ProblemsOptions& options, Session& session) {
   session.use_threads();
   session.files.add_input(options.problems);
+  check_file(options.curves, session);
   const std::vector<DenseBlanket> problems = read_problems(options.problems);
   const InterruptGuard guard;
   StatusLine line(session.common.quiet);
+  RecoveryCurves curves(options.against == "time" ? RecoveryCurves::Against::seconds
+                                                  : RecoveryCurves::Against::iterations);
   const std::vector<ReplayRow> rows = replay_problems(
       problems, options.topologies, options.population, options.recoveries,
       [&](std::size_t done) {
@@ -142,15 +150,17 @@ int solve_problems(const ProblemsOptions& options, Session& session) {
           line.show(fmt::format("{} of {} problems solved", done, problems.size()));
         return !guard.interrupted();
       },
-      session.registry());
+      session.registry(), options.curves.empty() ? nullptr : &curves);
   line.clear();
+  Results results(session);
+  results.write(options.curves, [&] { write_file(options.curves, csv_text(curves.table())); });
   json::object report = begin_report("study");
   report["file"] = options.problems;
   report["problems"] = problems.size();
   report["rows"] = rows_json(rows);
   report["status"] = guard.interrupted() ? "interrupted" : "converged";
   end_report(report);
-  session.write_json(report);
+  results.add([&] { session.write_json(report); });
   Table table({{"topology", Table::Align::left},
                {"recovery", Table::Align::left},
                {"nodes", Table::Align::right},
@@ -168,7 +178,8 @@ int solve_problems(const ProblemsOptions& options, Session& session) {
                fmt::format("{:.1f}", row.iterations), seconds_text(row.topology_seconds),
                seconds_text(row.recovery_seconds)});
   }
-  session.print(table.text(session.colour()));
+  results.add([&] { session.print(table.text(session.colour())); });
+  results.finish();
   return guard.interrupted() ? kExitInterrupted : 0;
 }
 
@@ -189,9 +200,19 @@ Command add_study_problems(ArgumentParser study) {
                  "what finds their information (repeatedly) [ncfd]")
       .type_name("NAME")
       .repeatable();
+  cli.add_option("--curves", options->curves,
+                 "the mean KLD of each recovery and blanket size as it falls, as CSV")
+      .type_name("FILE");
+  cli.add_option("--against", options->against, "of --curves: time or iterations")
+      .type_name("AXIS")
+      .one_of({"time", "iterations"})
+      .show_default();
   cli.footer(
       "Example:\n"
-      "  cairn study problems problems.json --topology mi --recovery fd --recovery ncfd");
+      "  cairn study problems problems.json --topology mi --recovery fd --recovery ncfd\n"
+      "  cairn study problems problems.json --topology mi --recovery ip --recovery ncfd --curves "
+      "kld.csv\n"
+      "  cairn plot kld.csv --y '*@3' --y '*@8' --log xy -o kld.svg");
   return {cli, [options](Session& session) { return solve_problems(*options, session); }};
 }
 

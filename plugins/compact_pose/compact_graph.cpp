@@ -193,13 +193,16 @@ void CompactGraph::locate(int pose, const State& measured, std::span<const Facto
   estimator_->update(leaving, {.defer = true});
   const UpdateReport report = estimator_->update(coming);
   copy_.reset();
-  for (auto& [ends, bridge] : bridges_) bridge.factor = report.first_factor + place[bridge.factor];
+  for (auto& [ends, bridge] : bridges_) {  // those between poses of the map are where they were
+    if (const auto at = place.find(bridge.factor); at != place.end())
+      bridge.factor = report.first_factor + at->second;
+  }
   located_ = true;
   refresh();
   seconds.estimate += seconds_since(begin);
 }
 
-void CompactGraph::relocate(int pose, const Motion& measured, double of_way,
+void CompactGraph::relocate(int pose, const Motion& measured, double of_way, double least_gain,
                             PolicySeconds& seconds) {
   const MotionGroup& motions = group_->motions();
   if (pose == newest_.predecessor) {  // another measurement of the same motion
@@ -215,16 +218,10 @@ void CompactGraph::relocate(int pose, const Motion& measured, double of_way,
   const std::pair<int, int> ends = std::minmax(pose, other);
   Motion bridge = motions.compose(end, motions.inverse(newest_.odometry), order_);
   if (pose > other) bridge = motions.inverse(bridge);
-  const auto known = bridges_.find(ends);
-  if (known != bridges_.end()) bridge = motions.fuse(known->second.motion, bridge);
-  const Factor factor =
-      motions.to_factor(newest_.type, kept_[ends.first].id, kept_[ends.second].id, bridge);
-  if (known == bridges_.end()) {
-    const FactorId id = update({&factor, 1}, seconds);
-    bridges_.emplace(ends, Bridge{id, bridge});
+  if (full_ && !(gain(ends, bridge) > least_gain)) {
+    end = start = measured;
   } else {
-    update({}, seconds, {{known->second.factor, factor.measurement, factor.information}});
-    known->second.motion = bridge;
+    add_bridge(ends, std::move(bridge), seconds);
   }
   const Motion back = motions.inverse(end);
   if (keeps_chains_) {
@@ -236,6 +233,22 @@ void CompactGraph::relocate(int pose, const Motion& measured, double of_way,
   newest_.predecessor = pose;
   newest_.odometry = start;
   hang_newest();
+}
+
+/// One factor between two poses, however often the robot goes from one to the other.
+void CompactGraph::add_bridge(std::pair<int, int> ends, Motion bridge, PolicySeconds& seconds) {
+  const MotionGroup& motions = group_->motions();
+  const auto known = bridges_.find(ends);
+  if (known != bridges_.end()) bridge = motions.fuse(known->second.motion, bridge);
+  const Factor factor =
+      motions.to_factor(newest_.type, kept_[ends.first].id, kept_[ends.second].id, bridge);
+  if (known == bridges_.end()) {
+    const FactorId id = update({&factor, 1}, seconds);
+    bridges_.emplace(ends, Bridge{id, bridge});
+  } else {
+    update({}, seconds, {{known->second.factor, factor.measurement, factor.information}});
+    known->second.motion = bridge;
+  }
 }
 
 /// Puts the newest pose, which is not kept, where its odometry from its predecessor says; that is

@@ -4,12 +4,14 @@
 #include <map>
 #include <memory>
 #include <span>
+#include <string>
 #include <unordered_map>
 #include <utility>
 #include <vector>
 
 #include "cairn/geometry/motion.hpp"
 #include "cairn/geometry/pose_chain.hpp"
+#include "cairn/online/pose_remover.hpp"
 #include "cairn/policy/pose_policy.hpp"
 #include "cairn/solve/estimator.hpp"
 #include "pose_index.hpp"
@@ -32,6 +34,13 @@ namespace cairn::compact {
 /// just as the estimator would have them.
 class CompactGraph {
  public:
+  /// Poses that have left.
+  struct Leaving {
+    std::vector<Id> poses;
+    std::vector<int> now;  ///< the number that each kept pose has now; −1: it has left
+    std::string note;      ///< why more stay than there is room for; empty: they do not
+  };
+
   CompactGraph(std::unique_ptr<Estimator> estimator, CompositionOrder order);
 
   /// With everything that is kept: the estimator, or while it does not have all odometry yet, a
@@ -74,7 +83,18 @@ class CompactGraph {
   /// information is divided: the part `of_way` (0 < `of_way` < 1) goes to the chain, the rest
   /// to what follows. Two parts that are treated as independent have no more information than the
   /// one measurement.
-  void relocate(int pose, const Motion& measured, double of_way, PolicySeconds& seconds);
+  ///
+  /// Once poses have left (`make_room`), that link is used as all others are: if its information
+  /// gain exceeds `least_gain` [nats]. If not, the whole measurement goes to what follows.
+  void relocate(int pose, const Motion& measured, double of_way, double least_gain,
+                PolicySeconds& seconds);
+  /// Whether poses have left: there is no room for more than there are.
+  bool full() const { return full_; }
+  /// Where more than `limit` poses are kept, makes that many of them: others leave, and are
+  /// replaced by factors between their neighbours. Never the newest, the first of the trajectory,
+  /// those that are fixed or anchored, and `held`.
+  Leaving make_room(PoseRemover& remover, int limit, std::span<const int> held,
+                    PolicySeconds& seconds);
   /// Relinearises and solves everything until it has converged; false if it does not.
   bool solve_fully();
 
@@ -90,7 +110,7 @@ class CompactGraph {
     return to_matrix(newest_.odometry.covariance, group_->tangent_size());
   }
 
-  // Kept poses, numbered in the order of arrival
+  // Kept poses, numbered in the order of arrival (anew when poses leave)
   // ---------------------------------------------------
   int size() const { return static_cast<int>(kept_.size()); }
   Id id(int pose) const { return kept_[pose].id; }
@@ -160,6 +180,10 @@ class CompactGraph {
   void refresh();
   void hang_newest();
   void know_newest();
+  void add_bridge(std::pair<int, int> ends, Motion bridge, PolicySeconds& seconds);
+  double gain(std::pair<int, int> ends, const Motion& measured);
+  void renumber(const GraphUpdate& leaving, FactorId first_factor, std::span<const int> now);
+  void join_chains(const GraphUpdate& leaving);
 
   /// Kept poses from this number on, which odometry alone has added, with that.
   GraphUpdate odometry_from(int first) const;
@@ -188,6 +212,7 @@ class CompactGraph {
     Motion motion;
   };
   std::map<std::pair<int, int>, Bridge> bridges_;
+  bool full_ = false;
   int version_ = 0;
 
   int anchored_version_ = -1;

@@ -58,10 +58,24 @@ constexpr auto kByWorth = [](const auto& a, const auto& b) {
 
 }  // namespace
 
-CompactPose::CompactPose(std::unique_ptr<Estimator> estimator, CompactPoseOptions options)
+CompactPose::CompactPose(std::unique_ptr<Estimator> estimator, CompactPoseOptions options,
+                         std::unique_ptr<PoseRemover> remover)
     : options_(std::move(options)),
+      remover_(std::move(remover)),
       range_(options_.sensor_range()),
-      graph_(std::move(estimator), options_.composition) {}
+      graph_(std::move(estimator), options_.composition) {
+  if (options_.keep == 1) {
+    throw Error(ErrorCode::usage,
+                "compact_pose: keep=1: the first pose and the newest one stay in any case; "
+                "expected 2 or more, or 0 for any number");
+  }
+  if (options_.keep > 0 && options_.strategy != Strategy::fpfl) {
+    throw Error(ErrorCode::usage,
+                fmt::format("compact_pose: strategy {} keeps all poses, keep={} does not: give one "
+                            "(cairn online --keep without a policy sparsifies all poses)",
+                            to_string(options_.strategy), options_.keep));
+  }
+}
 
 void CompactPose::start(const Variable& pose) {
   // Before anything has changed: what the options say fits this type of pose.
@@ -291,7 +305,7 @@ LinkReport CompactPose::offer(Id other, std::span<const Factor> measured) {
     typical_.note(link.covariance);
     report.verdict = judge(link, report);
     if (report.verdict == LinkVerdict::linked) {
-      if (candidate)
+      if (candidate && options_.keep == 0)  // what is found takes memory for every loop
         finder_.note_loop(*test_, dimensions_[candidate->place], report.gain, link.covariance);
       use(link);
     } else if (report.verdict == LinkVerdict::waiting) {
@@ -356,6 +370,9 @@ std::optional<double> CompactPose::relocation(const Link& link) const {
   // ever.
   const double enough = std::max(pose_gain_, 0.5 * n * std::log(4.0));
   if (!(mutual_information(typical_.covariance(), rest) < enough)) return std::nullopt;
+  // Where another pose would have to leave, information is lost in any case; and where the bridge
+  // is not informative, nothing is divided.
+  if (graph_.full()) return of_way;
   const Matrix end = graph_.newest_odometry() + link.covariance;
   const double lost = mutual_information(end, link.covariance);
   if (lost > options_.reuse_loss * report_.candidates * n) return std::nullopt;
@@ -377,7 +394,7 @@ void CompactPose::use(const Link& link) {
   const bool of_newest = link.later == graph_.size() && !graph_.newest_kept();
   const std::optional<double> of_way = of_newest ? relocation(link) : std::nullopt;
   if (of_way) {
-    graph_.relocate(link.earlier, link.motion, *of_way, report_.seconds);
+    graph_.relocate(link.earlier, link.motion, *of_way, loop_gain_, report_.seconds);
   } else {
     graph_.link(link.factors, report_.seconds);
   }
@@ -418,7 +435,9 @@ PoseReport CompactPose::end_pose() {
     if (!searched_) search();
     if (!graph_.newest_kept() && !report_.closed_loop && report_.least_gain > pose_gain_)
       graph_.keep(report_.seconds);
-    if (graph_.predecessor() >= 0 && report_.candidates > 0) finder_.note_pose(report_.least_gain);
+    if (graph_.predecessor() >= 0 && report_.candidates > 0 && options_.keep == 0)
+      finder_.note_pose(report_.least_gain);
+    make_room();
   }
   open_ = false;
   report_.kept = graph_.newest_kept();
@@ -429,6 +448,7 @@ bool CompactPose::finish() {
   if (open_) throw Error(ErrorCode::usage, "finish before the newest pose was ended");
   if (graph_.empty()) return true;
   if (!graph_.newest_kept()) graph_.keep(report_.seconds);
+  make_room();
   return graph_.solve_fully();
 }
 
@@ -444,7 +464,7 @@ void* CompactPose::ability(std::string_view name) {
 }
 
 OptionValues CompactPose::watching() const {
-  return {{"strategy", "apal"}, {"search", "untested"}};
+  return {{"strategy", "apal"}, {"search", "untested"}, {"keep", "0"}};
 }
 
 OptionValues CompactPose::found() const { return finder_.found(range_.probability); }

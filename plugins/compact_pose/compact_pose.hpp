@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "cairn/online/pose_remover.hpp"
 #include "cairn/policy/pose_policy.hpp"
 #include "compact_graph.hpp"
 #include "compact_pose_options.hpp"
@@ -32,9 +33,14 @@ namespace cairn::compact {
 ///
 /// With `reuse`, which the paper does not have, a pose that is linked to a kept one is not kept
 /// itself (`CompactGraph::relocate`): so the map of a place does not grow without end.
+///
+/// With `keep`, which the paper does not have either, poses leave where there are more
+/// (`CompactGraph::make_room`): so no map grows without end, however large the place is.
 class CompactPose final : public PosePolicy, public OptionFinder {
  public:
-  CompactPose(std::unique_ptr<Estimator> estimator, CompactPoseOptions options);
+  /// `remover` is null if any number of poses is kept (`CompactPoseOptions::keep`).
+  CompactPose(std::unique_ptr<Estimator> estimator, CompactPoseOptions options,
+              std::unique_ptr<PoseRemover> remover = nullptr);
 
   void load(const Graph& map) override;
   std::vector<Id> unlocated() const override;
@@ -46,6 +52,7 @@ class CompactPose final : public PosePolicy, public OptionFinder {
 
   Estimator& estimator() override { return graph_.estimator(); }
   std::vector<Id> kept() const override { return graph_.kept(); }
+  std::vector<Id> removed() const override { return removed_; }
   int factor_count() const override { return graph_.factor_count(); }
   std::vector<double> newest_state() const override;
   const std::vector<OdometryChain>& chains() const override { return graph_.chains(); }
@@ -87,8 +94,10 @@ class CompactPose final : public PosePolicy, public OptionFinder {
   LinkVerdict judge(const Link& link, LinkReport& report);
   void judge_waiting();
   bool agrees_with_waiting(const Link& link);
+  void make_room();
 
   CompactPoseOptions options_;
+  std::unique_ptr<PoseRemover> remover_;
   SensorRange range_;
   CompactGraph graph_;
   std::optional<DistanceTest> test_;
@@ -112,6 +121,8 @@ class CompactPose final : public PosePolicy, public OptionFinder {
   ThresholdFinder finder_;
   TypicalMatch typical_;
   MatchRecord record_;
+  std::vector<Id> removed_;  ///< with the latest pose
+  std::string noted_;        ///< why poses could not leave, when it was last reported
 };
 
 }  // namespace cairn::compact

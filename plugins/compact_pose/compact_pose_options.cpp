@@ -5,6 +5,8 @@
 #include <sstream>
 
 #include "cairn/runtime/error.hpp"
+#include "cairn/sparsification/selection.hpp"
+#include "cairn/sparsification/sparsifier.hpp"
 
 namespace cairn::compact {
 namespace {
@@ -85,6 +87,12 @@ OptionFields<CompactPoseOptions> CompactPoseOptions::fields() {
           "most pairs that are proposed per pose, those first whose information gain times the "
           "probability of a match is largest, which is learnt from earlier answers; 0: any "
           "number, by information gain alone")
+      .integer("keep", &O::keep, 0, 1e9,
+               "most poses that are kept: of more, some leave and are replaced by factors between "
+               "their neighbours; 0: any number")
+      .component<NodeSelection>("select", &O::select, "with keep: which poses leave")
+      .component<Sparsifier>("sparsifier", &O::sparsifier,
+                             "with keep: what replaces the poses that leave")
       .component<Estimator>("estimator", &O::estimator, "estimator");
 }
 

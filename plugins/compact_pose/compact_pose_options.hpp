@@ -62,6 +62,9 @@ struct CompactPoseOptions {
   /// … where the link loses at most this information [nats per DoF and kept pose nearby].
   double reuse_loss = 0.06;
   int matches = 0;  ///< most requests for a match per pose; 0: any number
+  int keep = 0;     ///< most poses that are kept, as others leave; 0: any number
+  std::string select = "nearest:leaving=true";  ///< which poses leave
+  std::string sparsifier = "sparsify";          ///< what replaces them by factors
   std::string estimator = "incremental_cholesky";
 
   /// The range along every axis, `range` where none is given.

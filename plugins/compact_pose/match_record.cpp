@@ -12,6 +12,14 @@ void MatchRecord::note(int pose, bool matched) {
   }
 }
 
+void MatchRecord::renumber(std::span<const int> now) {
+  std::size_t left = 0;
+  for (std::size_t k = 0; k < poses_.size(); ++k) {
+    if (now[k] >= 0) poses_[left++] = poses_[k];
+  }
+  poses_.resize(left);
+}
+
 double MatchRecord::probability(int pose) const {
   const double mean = (1.0 + all_.matched) / (2.0 + all_.asked);
   const auto at = static_cast<std::size_t>(pose);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <span>
 #include <vector>
 
 namespace cairn::compact {
@@ -16,6 +17,8 @@ class MatchRecord {
   static constexpr double kWeight = 3.0;
 
   void note(int pose, bool matched);
+  /// Poses have left: pose k has the number `now[k]` now, −1 if it has left.
+  void renumber(std::span<const int> now);
   /// Of a match with this kept pose.
   double probability(int pose) const;
 

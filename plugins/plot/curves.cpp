@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Convergence, and time of each step.
-#include <algorithm>
-#include <cmath>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "bench_data.hpp"
 #include "cairn/runtime/error.hpp"
 #include "chart.hpp"
+#include "lines.hpp"
 #include "plots.hpp"
 
 namespace cairn::plot {
@@ -63,56 +65,8 @@ std::vector<CurveGroup> needed_curves(const Album& album) {
   return groups;
 }
 
-Stroke stroke_of(const Theme& theme, std::size_t curve) {
-  return curve == 0 ? theme.estimate : theme.peer(curve - 1);
-}
-
-std::vector<LegendEntry> legend_of(const Theme& theme, const CurveGroup& group) {
-  std::vector<LegendEntry> legend;
-  for (std::size_t k = 0; k < group.curves.size(); ++k) {
-    legend.push_back({group.curves[k].name, stroke_of(theme, k)});
-  }
-  return legend;
-}
-
-struct Points {
-  std::vector<double> x, y;
-};
-
-void draw_lines(Canvas& canvas, const Theme& theme, const Box& box, const CurveGroup& group,
-                const std::vector<Points>& lines, const std::string& title,
-                const std::string& x_label, const std::string& y_label) {
-  std::vector<double> xs, ys;
-  for (const Points& line : lines) {
-    xs.insert(xs.end(), line.x.begin(), line.x.end());
-    ys.insert(ys.end(), line.y.begin(), line.y.end());
-  }
-  const Box rest = draw_heading(canvas, theme, box, title, legend_of(theme, group));
-  Range x = range_of(xs, false);
-  x.whole = x_label == kIteration;
-  const Chart chart(canvas, theme, rest, x, range_of(ys, true), x_label, y_label);
-  for (std::size_t k = 0; k < lines.size(); ++k) {
-    const Points& line = lines[k];
-    bool open = false;
-    for (std::size_t i = 0; i < line.x.size(); ++i) {
-      // What a logarithm does not have is a gap.
-      const bool shown = line.y[i] > 0 && std::isfinite(line.y[i]) && std::isfinite(line.x[i]);
-      if (shown && open) canvas.line_to(chart.x(line.x[i]), chart.y(line.y[i]));
-      if (shown && !open) canvas.move_to(chart.x(line.x[i]), chart.y(line.y[i]));
-      open = shown;
-    }
-    canvas.stroke(stroke_of(theme, k));
-    for (std::size_t i = 0; i < line.x.size(); ++i) {
-      if (line.y[i] > 0 && std::isfinite(line.y[i]) && std::isfinite(line.x[i])) {
-        canvas.dot(chart.x(line.x[i]), chart.y(line.y[i]), 2);
-      }
-    }
-    canvas.fill(stroke_of(theme, k).colour);
-  }
-}
-
-Points convergence(const Curve& curve, bool against_time) {
-  Points points;
+Line convergence(const Curve& curve, bool against_time) {
+  Line points{curve.name, {}, {}};
   double time = 0;
   for (std::size_t i = 0; i < curve.chi2.size(); ++i) {
     if (i > 0) time += curve.seconds[i - 1];
@@ -122,8 +76,8 @@ Points convergence(const Curve& curve, bool against_time) {
   return points;
 }
 
-Points steps(const Curve& curve) {
-  Points points;
+Line steps(const Curve& curve) {
+  Line points{curve.name, {}, {}};
   for (std::size_t i = 0; i < curve.seconds.size(); ++i) {
     points.x.push_back(static_cast<double>(i + 1));
     points.y.push_back(1e3 * curve.seconds[i]);
@@ -137,10 +91,14 @@ void draw_convergence(Canvas& canvas, const Theme& theme, const Album& album, bo
   const std::vector<CurveGroup> groups = needed_curves(album);
   const std::vector<Box> boxes = panels(canvas, groups.size());
   for (std::size_t g = 0; g < groups.size(); ++g) {
-    std::vector<Points> lines;
+    std::vector<Line> lines;
     for (const Curve& curve : groups[g].curves) lines.push_back(convergence(curve, against_time));
-    draw_lines(canvas, theme, boxes[g], groups[g], lines, groups[g].name + ": convergence",
-               against_time ? "time [s]" : kIteration, "χ² (logarithmic)");
+    draw_lines(canvas, theme, boxes[g],
+               {.title = groups[g].name + ": convergence",
+                .x_label = against_time ? "time [s]" : kIteration,
+                .y_label = "χ² (logarithmic)",
+                .whole_x = !against_time},
+               lines);
   }
 }
 
@@ -148,10 +106,14 @@ void draw_steps(Canvas& canvas, const Theme& theme, const Album& album) {
   const std::vector<CurveGroup> groups = needed_curves(album);
   const std::vector<Box> boxes = panels(canvas, groups.size());
   for (std::size_t g = 0; g < groups.size(); ++g) {
-    std::vector<Points> lines;
+    std::vector<Line> lines;
     for (const Curve& curve : groups[g].curves) lines.push_back(steps(curve));
-    draw_lines(canvas, theme, boxes[g], groups[g], lines, groups[g].name + ": time of each step",
-               kIteration, "time [ms] (logarithmic)");
+    draw_lines(canvas, theme, boxes[g],
+               {.title = groups[g].name + ": time of each step",
+                .x_label = kIteration,
+                .y_label = "time [ms] (logarithmic)",
+                .whole_x = true},
+               lines);
   }
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <limits>
 #include <string>
 
 #include "cairn/linear/linear_solver.hpp"
@@ -10,7 +11,7 @@
 namespace cairn::plot {
 
 /// The kinds of plots.
-enum class Subject { automatic, trajectory, convergence, bars, scaling, sparsity, steps };
+enum class Subject { automatic, trajectory, convergence, bars, scaling, sparsity, steps, columns };
 constexpr auto enum_names(Subject) {
   return std::to_array<EnumName<Subject>>({{Subject::automatic, "auto"},
                                            {Subject::trajectory, "trajectory"},
@@ -18,7 +19,8 @@ constexpr auto enum_names(Subject) {
                                            {Subject::bars, "bars"},
                                            {Subject::scaling, "scaling"},
                                            {Subject::sparsity, "sparsity"},
-                                           {Subject::steps, "steps"}});
+                                           {Subject::steps, "steps"},
+                                           {Subject::columns, "columns"}});
 }
 
 /// What the colour of an edge stands for: its class, or its chi2.
@@ -35,6 +37,15 @@ constexpr auto enum_names(Abscissa) {
       {{Abscissa::iterations, "iterations"}, {Abscissa::time, "time"}});
 }
 
+/// The axes of a plot of columns that are logarithmic.
+enum class Logarithmic { none, x, y, both };
+constexpr auto enum_names(Logarithmic) {
+  return std::to_array<EnumName<Logarithmic>>({{Logarithmic::none, "none"},
+                                               {Logarithmic::x, "x"},
+                                               {Logarithmic::y, "y"},
+                                               {Logarithmic::both, "xy"}});
+}
+
 /// Options of the plots `svg`, `png` and `pdf`.
 struct PlotOptions {
   Subject what = Subject::automatic;
@@ -42,18 +53,32 @@ struct PlotOptions {
   std::string theme = "light";    ///< see `theme`
   EdgeColour colour = EdgeColour::by_class;
   Abscissa x = Abscissa::iterations;
+  std::string x_column;   ///< of a plot of columns; empty: the first
+  std::string y_columns;  ///< its panels, separated by line ends: each a pattern with * and ?
+  double x_max = std::numeric_limits<double>::infinity();
+  Logarithmic logarithmic = Logarithmic::none;
   std::string linear_solver = "block_cholesky";  ///< whose elimination order is drawn
 
   static auto fields() {
     using O = PlotOptions;
     return OptionFields<O>()
-        .choice("what", &O::what,
-                "what to draw; auto: bars of a comparison, else the trajectory, else curves")
+        .choice(
+            "what", &O::what,
+            "what to draw; auto: columns of CSV, bars of a comparison, else the trajectory, else "
+            "convergence")
         .integer("width", &O::width, 100, 20000, "width [px; in a PDF 1/96 inch]")
         .integer("height", &O::height, 100, 20000, "height [px; in a PDF 1/96 inch]")
         .choice("theme", &O::theme, {"light", "dark"}, "colours for light or dark paper")
         .choice("colour", &O::colour, "what colours edges")
         .choice("x", &O::x, "axis of convergence")
+        .text("x_column", &O::x_column, "horizontal axis of columns; empty: the first")
+        .text("y_columns", &O::y_columns,
+              "columns to draw: a pattern with * and ? for each panel, separated by line ends; "
+              "empty: one panel with all")
+        .real("x_max", &O::x_max, std::numeric_limits<double>::lowest(),
+              std::numeric_limits<double>::infinity(),
+              "right end of columns: rows beyond it are not drawn")
+        .choice("logarithmic", &O::logarithmic, "logarithmic axes of columns")
         .component<LinearSolver>("linear_solver", &O::linear_solver,
                                  "whose elimination order the sparsity of L has");
   }

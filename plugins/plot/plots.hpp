@@ -6,6 +6,7 @@
 #include "cairn/linear/linear_solver.hpp"
 #include "cairn/report/scene.hpp"
 #include "canvas.hpp"
+#include "plot_options.hpp"
 
 namespace cairn::plot {
 
@@ -22,6 +23,9 @@ void draw_bars(Canvas& canvas, const Theme& theme, const Album& album);
 /// Time and peak memory of each solver of a comparison against the size of its graphs, both axes
 /// logarithmic, so that a power law is a straight line.
 void draw_scaling(Canvas& canvas, const Theme& theme, const Album& album);
+/// Columns of tables against one of them; `options` says which.
+void draw_columns(Canvas& canvas, const Theme& theme, const Album& album,
+                  const PlotOptions& options);
 /// Where H has blocks, and where L has them in the order of a linear solver.
 void draw_sparsity(Canvas& canvas, const Theme& theme, const Album& album, LinearSolver& solver);
 

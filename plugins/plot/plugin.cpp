@@ -45,12 +45,16 @@ class Plot final : public Picture {
       case Subject::steps:
         plot::draw_steps(canvas, theme_, album);
         break;
+      case Subject::columns:
+        plot::draw_columns(canvas, theme_, album, options_);
+        break;
     }
     return canvas.finish();
   }
 
  private:
   static Subject choose(const Album& album) {
+    if (!album.tables.empty()) return Subject::columns;
     if (!album.bench.empty()) return Subject::bars;
     for (const Scene& scene : album.scenes) {
       if (!scene.estimates.empty()) return Subject::trajectory;

@@ -30,6 +30,11 @@ std::filesystem::path page_file() {
 class Html final : public Picture {
  public:
   std::string draw(const Album& album) override {
+    if (!album.tables.empty()) {
+      throw Error(ErrorCode::input,
+                  fmt::format("html: the page has no part for CSV; to draw {}: cairn plot",
+                              album.tables.front().name));
+    }
     const std::filesystem::path file = page_file();
     if (!std::filesystem::exists(file)) {
       throw Error(ErrorCode::plugin,

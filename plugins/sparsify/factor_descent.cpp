@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "cairn/runtime/error.hpp"
+#include "conservative.hpp"
 #include "dense/cholesky.hpp"
 #include "dense/products.hpp"
 #include "recovery.hpp"
@@ -173,6 +174,7 @@ RecoveryResult FactorDescent::recover(const RecoveryProblem& problem) {
   } else {
     descent.cycle();
   }
+  if (conservative_) make_conservative(at);
   return clock.finish(at, descent.iterations(), descent.converged());
 }
 

@@ -3,15 +3,17 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <utility>
 
 #include <fmt/core.h>
 
+#include "blanket_matrices.hpp"
+#include "cairn/geometry/pose.hpp"
 #include "cairn/geometry/state_group.hpp"
 #include "cairn/graph/packed.hpp"
 #include "cairn/runtime/error.hpp"
 #include "dense/cholesky.hpp"
+#include "dense/eigenvalues.hpp"
 #include "dense/products.hpp"
 
 namespace cairn::sparsify {
@@ -19,23 +21,11 @@ namespace {
 
 constexpr int kIterations = 20;
 constexpr double kSettled = 1e-9;
-
-/// Why a node cannot leave because of itself or a neighbour; empty: it can.
-std::string refuse(const Graph& graph, int leaving, int node) {
-  if (!graph.type(leaving).lie_group()) {
-    return fmt::format("{} is not a pose of a Lie group, and new factors relate only such",
-                       graph.describe_variable(leaving));
-  }
-  if (graph.type(node).tag() == graph.type(leaving).tag()) return {};
-  return fmt::format("{} has a factor with {}, and new factors relate poses of one kind only",
-                     graph.describe_variable(leaving), graph.describe_variable(node));
-}
-
-/// Whether a factor type measures a whole relative pose of two variables of that type.
-bool relates(const FactorType& type, const VariableType& pose) {
-  return type.arity() == 2 && type.is_relative() && type.residual_size() == pose.tangent_size() &&
-         type.variable_tags()[0] == pose.tag() && type.variable_tags()[1] == pose.tag();
-}
+/// What is left of a diagonal element, as a part of it, where a direction is open, and the damping
+/// that keeps steps in such directions small.
+constexpr double kZeroPivot = 1e-11, kDamping = 1e-8;
+/// Columns of J N, N being orthonormal in units of Λ's diagonal, that are zero but for rounding.
+constexpr double kOpen = 1e-6;
 
 /// Dense normal equations of the cropped problem, the removed nodes first.
 class DenseSystem {
@@ -105,16 +95,24 @@ class DenseSystem {
     }
   }
 
-  /// To the minimum, the last node of the blanket held. By Gauss and Newton from a minimum of the
-  /// whole graph, which is near; a step that does not lower chi2 is not taken.
+  /// To the minimum, the last pose of the blanket held unless the problem is absolute. By Gauss and
+  /// Newton from a minimum of the whole graph, which is near; a step that does not lower chi2 is
+  /// not taken.
   void solve(Matrix& H, Vector& g) {
     double chi2 = linearize(H, g);
-    const int free = begin_[nodes_.size() - 1];
-    for (int k = 0; k < kIterations && free > 0; ++k) {
-      const Eigen::LDLT<Matrix> ldlt(Matrix(H.topLeftCorner(free, free)));
+    const std::vector<int> free = free_columns();
+    for (int k = 0; k < kIterations && !free.empty(); ++k) {
+      Matrix A = H(free, free);
+      Eigen::LDLT<Matrix> ldlt(A);
+      const Vector diagonal = ldlt.transpositionsP() * Vector(A.diagonal());
+      if ((ldlt.vectorD().array() <= kZeroPivot * diagonal.array()).any()) {
+        A.diagonal() *= 1.0 + kDamping;
+        ldlt.compute(A);
+      }
       if (ldlt.info() != Eigen::Success || !ldlt.isPositive()) return;
       Vector step = Vector::Zero(size());
-      step.head(free) = ldlt.solve(g.head(free));
+      const Vector of_free = ldlt.solve(Vector(g(free)));
+      step(free) = of_free;
       const double expected = step.dot(g);
       if (!(expected > kSettled * (1.0 + chi2))) return;
       const auto before = states_;
@@ -139,6 +137,15 @@ class DenseSystem {
   }
 
  private:
+  std::vector<int> free_columns() const {
+    const std::size_t held = local_.removed.size() + static_cast<std::size_t>(local_.poses) - 1;
+    std::vector<int> free;
+    for (int k = 0; k < size(); ++k) {
+      if (local_.absolute || k < begin_[held] || k >= begin_[held + 1]) free.push_back(k);
+    }
+    return free;
+  }
+
   const WorkGraph& work_;
   const LocalProblem& local_;
   std::vector<int> nodes_, begin_;
@@ -146,82 +153,108 @@ class DenseSystem {
   std::vector<std::vector<double>> states_;
 };
 
-/// A model for each pair of the blanket's nodes, and what it measures.
-void add_models(const Graph& graph, const LocalProblem& local, Marginal& marginal) {
-  const VariableType& variable = graph.type(local.blanket.front());
-  const StateGroup group(variable);
-  const FactorType& type = *local.type;
-  const int m = type.residual_size(), t = variable.tangent_size();
-  const int n = static_cast<int>(std::ssize(local.blanket)), d = n * t;
-  const std::vector<double> unit = pack(Matrix::Identity(m, m));
-  Vector r(m);
-  for (int i = 0; i < n; ++i) {
-    const std::vector<double> back = group.inverse(marginal.states[i]);
-    for (int j = i + 1; j < n; ++j) {
-      std::vector<double> z = group.compose(back, marginal.states[j]);
-      type.normalize(z.data());
-      FactorModel model{.nodes = {i, j}, .size = m, .jacobian = std::vector<double>(m * d)};
-      const double* x[] = {marginal.states[i].data(), marginal.states[j].data()};
-      // Column-major: a node's columns lie together.
-      double* J[] = {model.jacobian.data() + i * t * m, model.jacobian.data() + j * t * m};
-      type.evaluate(x, z.data(), unit.data(), r.data(), J);
-      marginal.dense.models.push_back(std::move(model));
-      marginal.relative.push_back(z);
+/// Adds the models of a blanket, and what they predict.
+class Models {
+ public:
+  Models(const Graph& graph, const LocalProblem& local, Marginal& marginal)
+      : graph_(graph), local_(local), marginal_(marginal), begin_(marginal.dense.offsets()) {}
+
+  /// Of each pair of poses, each pose and landmark, and, in an absolute problem, each pose.
+  void add_all() {
+    const int n = static_cast<int>(std::ssize(local_.blanket)), poses = local_.poses;
+    for (int i = 0; i < poses; ++i) {
+      for (int j = i + 1; j < poses; ++j) add_relative(i, j);
+    }
+    for (int i = 0; i < poses; ++i) {
+      for (int j = poses; j < n; ++j) add_observation(i, j);
+    }
+    for (int i = 0; local_.absolute && i < poses; ++i) {
+      if (!graph_.fixed(local_.blanket[i])) add(local_.types.prior, {i}, marginal_.states[i]);
     }
   }
+
+ private:
+  const VariableType& type(int node) const { return graph_.type(local_.blanket[node]); }
+
+  void add_relative(int i, int j) {
+    const StateGroup group(type(i));
+    add(local_.types.relative, {i, j}, group.between(marginal_.states[i], marginal_.states[j]));
+  }
+
+  void add_observation(int i, int j) {
+    const Pose from = pose_of(type(i), marginal_.states[i]);
+    const Eigen::Vector3d seen =
+        from.R.transpose() * (pose_of(type(j), marginal_.states[j]).t - from.t);
+    add(local_.types.observation, {i, j},
+        {seen.data(), seen.data() + local_.types.observation->measurement_size()});
+  }
+
+  void add(const std::shared_ptr<const FactorType>& type, std::vector<int> nodes,
+           std::vector<double> z) {
+    type->normalize(z.data());
+    const int m = type->residual_size();
+    FactorModel model{.nodes = std::move(nodes),
+                      .size = m,
+                      .jacobian = std::vector<double>(static_cast<std::size_t>(m * begin_.back()))};
+    std::vector<const double*> x;
+    std::vector<double*> J;
+    for (const int node : model.nodes) {
+      x.push_back(marginal_.states[node].data());
+      J.push_back(model.jacobian.data() + m * begin_[node]);  // a node's columns lie together
+    }
+    Vector r(m);
+    type->evaluate(x.data(), z.data(), pack(Matrix::Identity(m, m)).data(), r.data(), J.data());
+    marginal_.dense.models.push_back(std::move(model));
+    marginal_.predictions.push_back({type, std::move(z), {}});
+  }
+
+  const Graph& graph_;
+  const LocalProblem& local_;
+  Marginal& marginal_;
+  std::vector<int> begin_;
+};
+
+/// N: a basis of what Λ leaves open, the gauge included, orthonormal in units of Λ's diagonal.
+Matrix open_directions(const DenseBlanket& dense, int rank, const Vector& unit) {
+  const Matrix scaled = unit.asDiagonal() * Matrix(information(dense)) * unit.asDiagonal();
+  const Eigen::SelfAdjointEigenSolver<Matrix> eigen(scaled);
+  return unit.asDiagonal() * eigen.eigenvectors().leftCols(dense.size() - rank);
+}
+
+/// Reduces the models to what Λ determines, where it leaves more open than the gauge.
+void reduce_models(Marginal& marginal) {
+  DenseBlanket& blanket = marginal.dense;
+  const int d = blanket.size(), gauge = blanket.absolute ? 0 : blanket.node_sizes.front();
+  const int rank = project(blanket, Projection::node).rank;
+  marginal.open = d - gauge - rank;
+  if (marginal.open <= 0) return;
+  Vector unit = information(blanket).diagonal();
+  for (double& u : unit) u = u > 0.0 ? 1.0 / std::sqrt(u) : 1.0;
+  const Matrix N = open_directions(blanket, rank, unit);
+  std::vector<FactorModel> models;
+  std::vector<Marginal::Prediction> predictions;
+  for (std::size_t k = 0; k < blanket.models.size(); ++k) {
+    FactorModel& model = blanket.models[k];
+    const Matrix J = jacobian(model, d);
+    const Matrix JN = dense::product(J, N);
+    const double size = (J * unit.asDiagonal()).norm();
+    const Eigen::SelfAdjointEigenSolver<Matrix> eigen(dense::product_with_transpose(JN, JN));
+    const Eigen::Index left = (eigen.eigenvalues().array() < kOpen * kOpen * size * size).count();
+    if (left == 0) continue;
+    Marginal::Prediction& prediction = predictions.emplace_back(marginal.predictions[k]);
+    if (left < model.size) {
+      prediction.directions = eigen.eigenvectors().leftCols(left);
+      const Matrix reduced = dense::product_of_transpose(prediction.directions, J);
+      model.size = static_cast<int>(left);
+      model.jacobian.assign(reduced.data(), reduced.data() + reduced.size());
+    }
+    models.push_back(std::move(model));
+  }
+  blanket.models = std::move(models);
+  marginal.predictions = std::move(predictions);
 }
 
 }  // namespace
-
-LocalProblem crop(const WorkGraph& work, std::vector<int> removed) {
-  const Graph& graph = work.graph();
-  LocalProblem local{
-      .removed = std::move(removed), .blanket = {}, .factors = {}, .refusal = {}, .type = nullptr};
-  local.blanket = work.blanket(local.removed);
-  for (const std::vector<int>* nodes : {&local.removed, &local.blanket}) {
-    for (const int v : *nodes) {
-      if (local.refusal.empty()) local.refusal = refuse(graph, local.removed.front(), v);
-    }
-  }
-  for (const int v : local.removed) {
-    if (graph.fixed(v)) local.refusal = fmt::format("{} is held", graph.describe_variable(v));
-    for (const int f : work.on(v)) {
-      local.factors.push_back(f);
-      const FactorType& type = *work.factor(f).type;
-      if (type.absolute_size() > 0) {
-        local.refusal = fmt::format("{} on {} says where it is in the world", type.tag(),
-                                    graph.describe_variable(v));
-      }
-      if (!local.type && relates(type, graph.type(v))) local.type = work.factor(f).type;
-    }
-  }
-  // Where only pairs of correlated factors are left, such as others of the graph are.
-  for (const FactorPool& pool : graph.factor_pools()) {
-    if (!local.type && relates(*pool.type, graph.type(local.removed.front())))
-      local.type = pool.type;
-  }
-  if (!local.refusal.empty()) return local;
-  if (!local.type && local.blanket.size() > 1) {
-    local.refusal =
-        fmt::format("{}: no factor of the graph measures a whole relative pose, as new ones do",
-                    graph.describe_variable(local.removed.front()));
-    return local;
-  }
-  // Within the blanket: what only says how its nodes lie to each other.
-  for (const int v : local.blanket) {
-    for (const int f : work.on(v)) {
-      const WorkFactor& factor = work.factor(f);
-      const bool within = std::ranges::all_of(factor.variables, [&](int other) {
-        return std::ranges::binary_search(local.blanket, other);
-      });
-      if (within && factor.variables.size() > 1 && factor.type->absolute_size() == 0)
-        local.factors.push_back(f);
-    }
-  }
-  std::ranges::sort(local.factors);
-  local.factors.erase(std::unique(local.factors.begin(), local.factors.end()), local.factors.end());
-  return local;
-}
 
 Marginal marginalize(const WorkGraph& work, const LocalProblem& local, bool resolve) {
   const Graph& graph = work.graph();
@@ -250,7 +283,9 @@ Marginal marginalize(const WorkGraph& work, const LocalProblem& local, bool reso
     marginal.states.push_back(system.blanket_state(k));
   }
   marginal.dense.information.assign(L.data(), L.data() + L.size());
-  if (local.blanket.size() > 1) add_models(graph, local, marginal);
+  marginal.dense.absolute = local.absolute;
+  Models(graph, local, marginal).add_all();
+  if (!marginal.dense.models.empty()) reduce_models(marginal);
   return marginal;
 }
 

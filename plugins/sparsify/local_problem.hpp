@@ -12,23 +12,47 @@
 
 namespace cairn::sparsify {
 
+/// The types of the factors to come, which are types of factors that the graph has. Null where none
+/// is needed.
+struct BlanketTypes {
+  std::shared_ptr<const FactorType> relative;     ///< a whole relative pose
+  std::shared_ptr<const FactorType> observation;  ///< a landmark's position in the frame of a pose
+  std::shared_ptr<const FactorType> prior;        ///< a whole pose in the world
+};
+
 /// Nodes that leave together, the Markov blanket around them, and the factors that are cropped with
-/// them: all on the nodes that leave, and those within the blanket (T 4.2).
+/// them: all on the nodes that leave, and the relative ones within the blanket (T 4.2). Absolute
+/// factors on nodes of the blanket stay as they are.
 struct LocalProblem {
-  std::vector<int> removed, blanket;       ///< variables of the graph
-  std::vector<int> factors;                ///< of the work graph
-  std::string refusal;                     ///< why these nodes cannot leave; empty: they can
-  std::shared_ptr<const FactorType> type;  ///< of the factors to come
+  std::vector<int> removed;  ///< variables of the graph
+  std::vector<int> blanket;  ///< poses first, then landmarks, each rising
+  int poses = 0;             ///< of the blanket
+  std::vector<int> factors;  ///< of the work graph
+  bool absolute = false;     ///< a factor on `removed` determines absolute states
+  std::string refusal;       ///< why these nodes cannot leave; empty: they can
+  BlanketTypes types;
 };
 
 /// Crops it. `removed` must be connected, or alone.
 LocalProblem crop(const WorkGraph& work, std::vector<int> removed);
 
-/// What is left of it on the blanket.
+/// What is left of it on the blanket. The models are a relative factor for each pair of poses, an
+/// observation for each pose and landmark, and, where the problem is absolute, a prior for each
+/// pose that is not fixed.
 struct Marginal {
-  DenseBlanket dense;                         ///< models: a relative factor for each pair of nodes
-  std::vector<std::vector<double>> states;    ///< of the blanket, where it was linearised
-  std::vector<std::vector<double>> relative;  ///< by model: x_a⁻¹ x_b there
+  DenseBlanket dense;
+  std::vector<std::vector<double>> states;  ///< of the blanket, where it was linearised
+
+  /// By model.
+  struct Prediction {
+    std::shared_ptr<const FactorType> type;
+    std::vector<double> measurement;  ///< that makes its residual zero there
+    /// B, size of the type's residual × size of the model: the model's residual is Bᵀ r. Empty: r.
+    Matrix directions;
+  };
+  std::vector<Prediction> predictions;
+  /// Directions of Λ that are open besides the gauge; models measure none of them.
+  int open = 0;
 };
 
 /// Solves the cropped problem by itself (`resolve`; else the graph's states stand), linearises it
@@ -36,6 +60,11 @@ struct Marginal {
 /// factors do: so the new ones do not repeat what the rest of the graph says, and the minimum of
 /// the whole stays where it is. Throws `Error` (numerical) where its factors leave a removed node
 /// open.
+///
+/// Where Λ leaves more open than the gauge, as after the removal of a landmark, about which each
+/// pose that observed it may turn, a whole relative pose would claim what is not known. Each model
+/// is then reduced to what Λ determines: with N a basis of Λ's null space, to the residual Bᵀ r, B
+/// a basis of the rows for which Bᵀ J N = 0. Its information B Ω Bᵀ is semidefinite.
 Marginal marginalize(const WorkGraph& work, const LocalProblem& local, bool resolve);
 
 }  // namespace cairn::sparsify

@@ -35,12 +35,14 @@ void add_topologies(Registrar& registrar) {
 void add_recoveries(Registrar& registrar) {
   registrar.add<FactorRecovery>(
       "closed_form", {}, [](const Options&, Registry&) { return std::make_unique<ClosedForm>(); });
-  registrar.add<FactorRecovery, RecoveryOptions>("fd", [](const RecoveryOptions& options) {
-    return std::make_unique<FactorDescent>(options, /*greedy=*/false);
+  registrar.add<FactorRecovery, FactorDescentOptions>("fd", [](const FactorDescentOptions& chosen) {
+    return std::make_unique<FactorDescent>(chosen.recovery, /*greedy=*/false, chosen.conservative);
   });
-  registrar.add<FactorRecovery, RecoveryOptions>("ncfd", [](const RecoveryOptions& options) {
-    return std::make_unique<FactorDescent>(options, /*greedy=*/true);
-  });
+  registrar.add<FactorRecovery, FactorDescentOptions>(
+      "ncfd", [](const FactorDescentOptions& chosen) {
+        return std::make_unique<FactorDescent>(chosen.recovery, /*greedy=*/true,
+                                               chosen.conservative);
+      });
   add<FactorRecovery, InteriorPointOptions, InteriorPoint>(registrar, "ip");
   add<FactorRecovery, ProjectedQuasiNewtonOptions, ProjectedQuasiNewton>(registrar, "pqn");
 }

@@ -73,17 +73,30 @@ class ClosedForm final : public FactorRecovery {
   RecoveryResult recover(const RecoveryProblem& problem) override;
 };
 
+struct FactorDescentOptions {
+  RecoveryOptions recovery{};
+  bool conservative = false;
+
+  static auto fields() {
+    using O = FactorDescentOptions;
+    return OptionFields<O>()
+        .part(&O::recovery)
+        .boolean("conservative", &O::conservative,
+                 "then reduce the information to at most Λ: the approximation is conservative");
+  }
+};
+
 /// Factor descent (T 4.3.3): the minimum in one factor while the others stay, factor by factor, in
 /// turn or (`greedy`, non-cyclic) always the one that gains the most. A factor that measures what
-/// no other does is solved once.
+/// no other does is solved once. `conservative`: with `make_conservative` at the end.
 class FactorDescent final : public IterativeRecovery {
  public:
-  FactorDescent(RecoveryOptions options, bool greedy)
-      : IterativeRecovery(options), greedy_(greedy) {}
+  FactorDescent(RecoveryOptions options, bool greedy, bool conservative = false)
+      : IterativeRecovery(options), greedy_(greedy), conservative_(conservative) {}
   RecoveryResult recover(const RecoveryProblem& problem) override;
 
  private:
-  bool greedy_;
+  bool greedy_, conservative_;
 };
 
 struct InteriorPointOptions {

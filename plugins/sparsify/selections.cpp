@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <limits>
 #include <map>
 #include <optional>
@@ -122,17 +123,21 @@ std::vector<int> Oldest::choose(const Graph& /*graph*/, std::span<const int> nod
 
 namespace {
 
-/// The nearest other pose of each pose, while they leave one by one.
+/// The nearest other pose of each pose, while they leave one by one. A search goes from a pose to
+/// both sides along x, until that alone is farther than the nearest so far.
 class NearestPairs {
  public:
-  NearestPairs(const Graph& graph, double angle) : angle_(angle) {
+  /// Of the poses that are `counted`.
+  NearestPairs(const Graph& graph, double angle, const std::vector<bool>& counted) : angle_(angle) {
     for (int v = 0; v < graph.variable_count(); ++v) {
-      if (!is_pose(graph.type(v))) continue;
+      if (!counted[v] || !is_pose(graph.type(v))) continue;
       nodes_.push_back(v);
       poses_.push_back(pose_of(graph.type(v), graph.state(v)));
     }
     nearest_.resize(nodes_.size());
-    for (std::size_t k = 0; k < nodes_.size(); ++k) search(k);
+    for (std::size_t k = 0; k < nodes_.size(); ++k) along_x_.push_back(k);
+    std::ranges::sort(along_x_, {}, [&](std::size_t k) { return poses_[k].t.x(); });
+    for (std::size_t at = 0; at < along_x_.size(); ++at) search(at);
   }
 
   /// The one that is nearest to another of those that `may` leave, and that other one: variables
@@ -155,11 +160,14 @@ class NearestPairs {
     nodes_.erase(nodes_.begin() + gone);
     poses_.erase(poses_.begin() + gone);
     nearest_.erase(nearest_.begin() + gone);
-    for (std::size_t k = 0; k < nodes_.size(); ++k) {
-      if (nearest_[k].at == gone) {
-        search(k);
-      } else if (nearest_[k].at > gone) {
-        --nearest_[k].at;
+    std::erase(along_x_, static_cast<std::size_t>(gone));
+    for (std::size_t& k : along_x_) k -= k > static_cast<std::size_t>(gone);
+    for (std::size_t at = 0; at < along_x_.size(); ++at) {
+      std::ptrdiff_t& other = nearest_[along_x_[at]].at;
+      if (other == gone) {
+        search(at);
+      } else if (other > gone) {
+        --other;
       }
     }
   }
@@ -175,20 +183,31 @@ class NearestPairs {
     return std::hypot((a.t - b.t).norm(), rotation);
   }
 
-  void search(std::size_t k) {
-    nearest_[k] = {};
-    for (std::size_t j = 0; j < nodes_.size(); ++j) {
-      if (j == k) continue;
-      const double there = distance(poses_[k], poses_[j]);
-      if (nearest_[k].at >= 0 && nearest_[k].distance <= there) continue;
-      nearest_[k] = {there, static_cast<std::ptrdiff_t>(j)};
+  /// The nearest pose of the one at this place along x; of equals, the first.
+  void search(std::size_t place) {
+    const std::size_t k = along_x_[place];
+    Neighbour best;
+    const auto try_one = [&](std::size_t j) {
+      // A distance may be rounded to less than its part along x.
+      const double along = (1.0 - 1e-12) * std::abs(poses_[j].t.x() - poses_[k].t.x());
+      if (best.at >= 0 && best.distance < along) return false;
+      const Neighbour one{distance(poses_[k], poses_[j]), static_cast<std::ptrdiff_t>(j)};
+      if (best.at < 0 || std::pair(one.distance, one.at) < std::pair(best.distance, best.at))
+        best = one;
+      return true;
+    };
+    for (std::size_t at = place; at-- > 0 && try_one(along_x_[at]);) {
     }
+    for (std::size_t at = place + 1; at < along_x_.size() && try_one(along_x_[at]); ++at) {
+    }
+    nearest_[k] = best;
   }
 
   double angle_;
   std::vector<int> nodes_;  ///< rising
   std::vector<Pose> poses_;
   std::vector<Neighbour> nearest_;
+  std::vector<std::size_t> along_x_;  ///< places in `nodes_`, by rising x
 };
 
 }  // namespace
@@ -215,7 +234,8 @@ std::vector<int> Nearest::choose(const Graph& graph, std::span<const int> nodes,
     std::erase_if(cheap, [&](int v) { return !few[v]; });
     evaluate(cheap);
   }
-  NearestPairs pairs(graph, angle_);
+  const bool all = !leaving_ || nodes.size() < 2;
+  NearestPairs pairs(graph, angle_, all ? std::vector<bool>(may.size(), true) : may);
   std::vector<int> chosen;
   while (static_cast<int>(std::ssize(chosen)) < count) {
     auto pair = pairs.closest(few);

@@ -80,6 +80,7 @@ struct NearestOptions {
   double part = 0.5;   ///< of the nodes that may leave
   double angle = 0.0;  ///< [m]
   int neighbours = 14;
+  bool leaving = false;  ///< only nodes that may leave count
 
   static auto fields() {
     using O = NearestOptions;
@@ -88,23 +89,33 @@ struct NearestOptions {
         .real("angle", &O::angle, 0.0, 1e9,
               "the distance that a difference in orientation of a radian counts for [m]")
         .integer("neighbours", &O::neighbours, 1, 1000000000,
-                 "nodes with more neighbours leave only if none with fewer may");
+                 "nodes with more neighbours leave only if none with fewer may")
+        .boolean("leaving", &O::leaving,
+                 "only distances between nodes that may both leave count, so that not those beside "
+                 "the newest leave, where the robot is now");
   }
 };
 
 /// One by one, of the two nodes nearest to each other the one whose removal increases the
 /// divergence less leaves: so those that stay cover the space where the robot was as evenly as
-/// their number permits. The distance of two nodes is √(‖t_a − t_b‖² + (angle · rotation)²).
+/// their number permits. With `leaving` both of the two may leave: of a map that grows while the
+/// newest pose stays in any case, those just behind it would leave first otherwise, and a place
+/// that is new would never get a pose that stays. The distance of two nodes is √(‖t_a − t_b‖² +
+/// (angle · rotation)²).
 class Nearest final : public SelectionByPart {
  public:
   explicit Nearest(const NearestOptions& options)
-      : SelectionByPart(options.part), angle_(options.angle), neighbours_(options.neighbours) {}
+      : SelectionByPart(options.part),
+        angle_(options.angle),
+        neighbours_(options.neighbours),
+        leaving_(options.leaving) {}
   std::vector<int> choose(const Graph& graph, std::span<const int> nodes, Sparsifier& sparsifier,
                           int count) override;
 
  private:
   double angle_;
   int neighbours_;
+  bool leaving_;
 };
 
 struct CoverageOptions {

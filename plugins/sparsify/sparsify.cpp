@@ -9,12 +9,61 @@
 
 #include <fmt/core.h>
 
+#include "blanket_matrices.hpp"
+#include "cairn/geometry/pose.hpp"
 #include "cairn/graph/packed.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/timed.hpp"
 #include "cairn/sparsification/correlated_pair.hpp"
+#include "dense/products.hpp"
 
 namespace cairn::sparsify {
+namespace {
+
+/// B Ω Bᵀ, packed: the information of a choice's models in the residuals of their types. Throws
+/// `Error` (numerical) where rounding has made it indefinite.
+std::vector<double> whole_information(const Marginal& marginal, const FactorChoice& choice,
+                                      const std::vector<double>& information) {
+  int rows = 0, columns = 0;
+  for (const int number : choice) {
+    rows += marginal.predictions[number].type->residual_size();
+    columns += marginal.dense.models[number].size;
+  }
+  const Eigen::Map<const Matrix> Omega(information.data(), columns, columns);
+  if (rows == columns) return pack(Omega);
+  Matrix B = Matrix::Zero(rows, columns);
+  int row = 0, column = 0;
+  for (const int number : choice) {
+    const Marginal::Prediction& of = marginal.predictions[number];
+    const int m = of.type->residual_size(), n = marginal.dense.models[number].size;
+    B.block(row, column, m, n) = m == n ? Matrix(Matrix::Identity(m, m)) : of.directions;
+    row += m;
+    column += n;
+  }
+  std::vector<double> packed = pack(dense::congruent(B, Omega)), root(packed.size());
+  if (!square_root(packed, rows, root)) {
+    throw Error(ErrorCode::numerical,
+                "the information of a new factor is indefinite by rounding: its neighbours' states "
+                "are too uncertain");
+  }
+  return packed;
+}
+
+/// Throws the reason why nodes stay that leave more open than the pose of the whole.
+[[noreturn]] void refuse_open(const Graph& graph, const LocalProblem& local,
+                              const Marginal& marginal) {
+  const DenseBlanket& dense = marginal.dense;
+  const int all = dense.size() - (dense.absolute ? 0 : dense.node_sizes.front());
+  throw Error(ErrorCode::numerical,
+              fmt::format("{}: its factors do not determine the {} of its {} neighbours (their "
+                          "information has rank {} of {})",
+                          graph.describe_variable(local.removed.front()),
+                          dense.absolute ? "absolute poses" : "relative poses",
+                          dense.node_sizes.size(), all - marginal.open, all));
+}
+
+}  // namespace
+
 Sparsify::Sparsify(std::unique_ptr<Topology> topology, std::unique_ptr<FactorRecovery> recovery,
                    SparsifyOptions options)
     : topology_(std::move(topology)), recovery_(std::move(recovery)), options_(options) {}
@@ -50,19 +99,6 @@ void Sparsify::recover(const BlanketProjection& coordinates, Solved& solved,
   solved.recovery = recovery_->recover(coordinates.problem(solved.marginal.dense, solved.topology));
 }
 
-/// Where more than one node is open, as where a landmark has been seen too little, there is no
-/// node to be relative to.
-BlanketProjection Sparsify::projected(const DenseBlanket& dense) const {
-  if (options_.projection == Projection::node) {
-    try {
-      return {dense, Projection::node};
-    } catch (const Error& error) {
-      if (error.code() != ErrorCode::numerical) throw;
-    }
-  }
-  return {dense, Projection::eigen};
-}
-
 Sparsify::Solved Sparsify::solve(const WorkGraph& work, const LocalProblem& local,
                                  SparsificationSeconds& seconds) {
   Solved solved;
@@ -71,26 +107,30 @@ Sparsify::Solved Sparsify::solve(const WorkGraph& work, const LocalProblem& loca
     solved.marginal = marginalize(work, local, options_.resolve);
   }
   const DenseBlanket& dense = solved.marginal.dense;
+  if (dense.models.empty()) return solved;
+  // After a pose has left, what is open is open for want of measurements. Factors of lower rank
+  // would be as many as poses leave, one made of the other, and soon claim what none of them knew.
+  const bool landmarks =
+      std::ranges::all_of(local.removed, [&](int v) { return is_point(work.graph().type(v)); });
+  if (solved.marginal.open > 0 && !landmarks) refuse_open(work.graph(), local, solved.marginal);
+  const BlanketProjection coordinates = project(dense, options_.projection);
   const int nodes = static_cast<int>(std::ssize(dense.node_sizes));
-  if (nodes < 2) return solved;
-  const BlanketProjection coordinates = projected(dense);
-  const int all = nodes * (nodes - 1) / 2;
+  // One prior of those that there are models of, besides the factors between nodes.
+  const int prior = dense.absolute ? 1 : 0;
+  const int all =
+      prior + static_cast<int>(std::ranges::count_if(
+                  dense.models, [](const auto& model) { return model.nodes.size() > 1; }));
   const bool bounded = options_.population.kind == Population::Kind::loss;
-  for (int count = options_.population.count(nodes);;) {
-    {
-      const Timed timed(seconds.topology);
-      solved.topology = topology_->choose(dense, count);
-    }
+  for (int count = std::min(all, prior + options_.population.count(nodes));;) {
     try {
+      {
+        const Timed timed(seconds.topology);
+        solved.topology = topology_->choose(dense, count);
+      }
       recover(coordinates, solved, seconds);
-    } catch (const Error& error) {
-      const int open = dense.size() - dense.node_sizes.front();
-      if (error.code() != ErrorCode::numerical || coordinates.rank >= open) throw;
-      throw Error(ErrorCode::numerical,
-                  fmt::format("{}: its factors do not determine the relative poses of its {} "
-                              "neighbours (their information has rank {} of {})",
-                              work.graph().describe_variable(local.removed.front()), nodes,
-                              coordinates.rank, open));
+    } catch (const Error&) {
+      if (solved.marginal.open > 0) refuse_open(work.graph(), local, solved.marginal);
+      throw;
     }
     // A topology that does not grow any more has done what it can.
     const int size = static_cast<int>(std::ssize(solved.topology));
@@ -100,6 +140,9 @@ Sparsify::Solved Sparsify::solve(const WorkGraph& work, const LocalProblem& loca
     }
     count = std::min(all, count + std::max(1, count / 8));
   }
+  for (std::size_t k = 0; k < solved.topology.size(); ++k)
+    solved.information.push_back(
+        whole_information(solved.marginal, solved.topology[k], solved.recovery.information[k]));
   return solved;
 }
 
@@ -110,24 +153,26 @@ void Sparsify::add_factors(WorkGraph& work, const LocalProblem& local, const Sol
     std::vector<int> nodes;
     std::vector<std::array<int, 2>> between;
     std::vector<double> measurement;
-    int size = 0;
     for (const int number : choice) {
       std::array<int, 2> ends{};
-      for (std::size_t end = 0; end < 2; ++end) {
+      for (std::size_t end = 0; end < models[number].nodes.size(); ++end) {
         const int node = local.blanket[models[number].nodes[end]];
         const auto at = std::ranges::find(nodes, node);
         ends[end] = static_cast<int>(at - nodes.begin());
         if (at == nodes.end()) nodes.push_back(node);
       }
       between.push_back(ends);
-      const std::vector<double>& z = solved.marginal.relative[number];
+      const std::vector<double>& z = solved.marginal.predictions[number].measurement;
       measurement.insert(measurement.end(), z.begin(), z.end());
-      size += models[number].size;
     }
-    std::vector<double> information =
-        pack(Eigen::Map<const Matrix>(solved.recovery.information[k].data(), size, size));
-    work.add(choice.size() == 1 ? local.type : pair_type(local.type, between), std::move(nodes),
-             std::move(measurement), std::move(information));
+    const std::shared_ptr<const FactorType>& type =
+        solved.marginal.predictions[choice.front()].type;
+    if (nodes.size() == 1) {
+      work.add_prior(type, nodes.front(), std::move(measurement), solved.information[k]);
+    } else {
+      work.add(choice.size() == 1 ? type : pair_type(type, between), std::move(nodes),
+               std::move(measurement), solved.information[k]);
+    }
   }
 }
 
@@ -151,7 +196,6 @@ void Sparsify::take_out(WorkGraph& work, std::vector<int> group, Sparsification&
   };
   if (!local.refusal.empty()) return refuse(local.refusal);
   Solved solved;
-  const bool related = local.blanket.size() > 1;
   if (!local.blanket.empty()) {
     try {
       solved = solve(work, local, result.seconds);
@@ -160,7 +204,8 @@ void Sparsify::take_out(WorkGraph& work, std::vector<int> group, Sparsification&
       return refuse(error.what());
     }
   }
-  if (related) {
+  const bool replaced = !solved.topology.empty();
+  if (replaced) {
     const auto n = static_cast<int>(std::ssize(local.blanket));
     result.mean_blanket = (result.problems * result.mean_blanket + n) / (result.problems + 1);
     ++result.problems;
@@ -179,8 +224,8 @@ void Sparsify::take_out(WorkGraph& work, std::vector<int> group, Sparsification&
   for (const int v : local.blanket) record.blanket.push_back(graph.id(v));
   record.states = solved.marginal.states;
   record.variable_type = graph.type(local.removed.front()).tag();
-  if (local.type) record.factor_type = local.type->tag();
-  if (related) {
+  if (local.types.relative) record.factor_type = local.types.relative->tag();
+  if (replaced) {
     record.dense = &solved.marginal.dense;
     record.recovery = &solved.recovery;
   }
@@ -228,7 +273,7 @@ std::vector<double> Sparsify::losses(const Graph& graph, std::span<const int> no
     double kld = std::numeric_limits<double>::infinity();
     if (local.refusal.empty()) {
       try {
-        kld = local.blanket.size() > 1 ? solve(work, local, seconds).recovery.kld : 0.0;
+        kld = local.blanket.empty() ? 0.0 : solve(work, local, seconds).recovery.kld;
       } catch (const Error& error) {
         if (error.code() != ErrorCode::numerical) throw;
       }

@@ -74,9 +74,9 @@ class Sparsify final : public Sparsifier {
     Marginal marginal;
     std::vector<FactorChoice> topology;
     RecoveryResult recovery;
+    std::vector<std::vector<double>> information;  ///< of the new factors, packed
   };
   Solved solve(const WorkGraph& work, const LocalProblem& local, SparsificationSeconds& seconds);
-  BlanketProjection projected(const DenseBlanket& dense) const;
   void recover(const BlanketProjection& coordinates, Solved& solved,
                SparsificationSeconds& seconds);
   void add_factors(WorkGraph& work, const LocalProblem& local, const Solved& solved);

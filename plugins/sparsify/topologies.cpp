@@ -6,12 +6,9 @@
 #include <cstdint>
 #include <limits>
 #include <numeric>
-#include <set>
 #include <utility>
 
 #include <fmt/core.h>
-#include <boost/graph/adjacency_list.hpp>
-#include <boost/graph/kruskal_min_spanning_tree.hpp>
 
 #include "blanket_matrices.hpp"
 #include "cairn/information/gaussian.hpp"
@@ -21,15 +18,10 @@
 #include "dense/lu.hpp"
 #include "dense/products.hpp"
 #include "recovery.hpp"
+#include "tree.hpp"
 
 namespace cairn::sparsify {
 namespace {
-
-double log_determinant(const Matrix& A) {
-  const Eigen::LLT<Matrix> llt(A);
-  if (llt.info() == Eigen::Success) return 2.0 * llt.matrixLLT().diagonal().array().log().sum();
-  return std::log(std::max(std::abs(A.determinant()), 1e-300));
-}
 
 /// Passes of factor descent over the chosen factors, whenever these have become more by a part.
 constexpr int kRelaxations = 2;
@@ -86,23 +78,6 @@ double information_form(const DenseBlanket& blanket, const std::vector<int>& beg
   return 0.5 * (log_determinant(first + I) - log_determinant(first - known + I));
 }
 
-struct Pair {
-  int model;
-  double weight;
-};
-
-/// The models of pairs of nodes; of several between the same two nodes the first.
-std::vector<int> pair_models(const DenseBlanket& blanket) {
-  std::vector<int> models;
-  std::set<std::pair<int, int>> seen;
-  for (int k = 0; k < static_cast<int>(std::ssize(blanket.models)); ++k) {
-    const std::vector<int>& nodes = blanket.models[k].nodes;
-    if (nodes.size() == 2 && seen.insert(std::minmax(nodes[0], nodes[1])).second)
-      models.push_back(k);
-  }
-  return models;
-}
-
 /// The models of pairs of nodes, each with a weight.
 template <class Weight>
 std::vector<Pair> weighted_pairs(const DenseBlanket& blanket, const Weight& weight) {
@@ -115,49 +90,8 @@ std::vector<Pair> weighted_pairs(const DenseBlanket& blanket, const Weight& weig
   return pairs;
 }
 
-/// The spanning tree with the largest sum of weights, of pairs that are sorted; the others follow
-/// in their order.
-std::vector<FactorChoice> tree_first(const DenseBlanket& blanket, const std::vector<Pair>& pairs,
-                                     int population) {
-  using Edge =
-      boost::property<boost::edge_index_t, int, boost::property<boost::edge_weight_t, double>>;
-  using Tree =
-      boost::adjacency_list<boost::vecS, boost::vecS, boost::undirectedS, boost::no_property, Edge>;
-  const std::size_t nodes = blanket.node_sizes.size();
-  Tree graph(nodes);
-  for (int k = 0; k < static_cast<int>(std::ssize(pairs)); ++k) {
-    const FactorModel& model = blanket.models[pairs[k].model];
-    // By rank, not by weight: ties are broken in the order of the pairs on every machine.
-    boost::add_edge(static_cast<std::size_t>(model.nodes[0]),
-                    static_cast<std::size_t>(model.nodes[1]), Edge(k, k), graph);
-  }
-  std::vector<boost::graph_traits<Tree>::edge_descriptor> tree;
-  boost::kruskal_minimum_spanning_tree(graph, std::back_inserter(tree));
-  if (tree.size() + 1 < nodes) {
-    throw Error(
-        ErrorCode::usage,
-        fmt::format("the {} nodes of a blanket cannot be connected by relative factors", nodes));
-  }
-  std::vector<bool> taken(pairs.size());
-  std::vector<FactorChoice> chosen;
-  for (const auto& edge : tree) {
-    const int k = boost::get(boost::edge_index, graph, edge);
-    taken[k] = true;
-    chosen.push_back({pairs[k].model});
-  }
-  for (std::size_t k = 0; k < pairs.size() && static_cast<int>(std::ssize(chosen)) < population;
-       ++k) {
-    if (!taken[k]) chosen.push_back({pairs[k].model});
-  }
-  return chosen;
-}
-
 std::vector<Pair> by_matrix(const DenseBlanket& blanket, const Matrix& weights) {
   return weighted_pairs(blanket, [&](int i, int j) { return weights(i, j); });
-}
-
-int tree_size(const DenseBlanket& blanket) {
-  return static_cast<int>(std::ssize(blanket.node_sizes)) - 1;
 }
 
 /// Σ̂ without what the factors of a tree tell: (T 4.23), or exactly.
@@ -166,7 +100,7 @@ Matrix downdated(const DenseBlanket& blanket, const std::vector<FactorChoice>& t
   const int d = blanket.size();
   const Matrix S = regularized_covariance(blanket, options);
   Matrix grown = S, left = information(blanket);
-  const BlanketProjection projection(blanket, Projection::node);
+  const BlanketProjection projection = project(blanket, Projection::node);
   for (const FactorChoice& choice : tree) {
     const auto J = jacobian(blanket.models[choice.front()], d);
     const Matrix JT = dense::product(J, coordinates(projection, d));
@@ -243,8 +177,7 @@ std::vector<FactorChoice> ExpectedDivergence::choose(const DenseBlanket& blanket
     if (!taken[k]) all.push_back({k});
   }
   if (population >= static_cast<int>(std::ssize(all))) return all;
-  const RecoveryProblem problem =
-      BlanketProjection(blanket, Projection::node).problem(blanket, all);
+  const RecoveryProblem problem = project(blanket, Projection::node).problem(blanket, all);
   const ScaledProblem scaled(problem);
   Approximation at(scaled);
   std::vector<Matrix> W;
@@ -341,18 +274,24 @@ std::vector<FactorChoice> SparseInverse::choose(const DenseBlanket& blanket, int
 
 std::vector<FactorChoice> Cliquey::choose(const DenseBlanket& blanket, int population) {
   const std::vector<FactorChoice> tree = ChowLiuTree::choose(blanket, population);
-  // Edges that share a node, in the order of the tree: the strongest is paired first.
+  // Edges that share a node, in the order of the tree: the strongest is paired first. Only whole
+  // relative poses are: priors and what measures landmarks stay as they are.
   std::vector<FactorChoice> chosen;
   std::vector<bool> taken(tree.size());
   const auto nodes = [&](std::size_t k) -> const std::vector<int>& {
     return blanket.models[tree[k].front()].nodes;
   };
+  const auto whole = [&](std::size_t k) {
+    return nodes(k).size() == 2 &&
+           blanket.models[tree[k].front()].size == blanket.node_sizes.front();
+  };
   for (std::size_t i = 0; i < tree.size(); ++i) {
     if (taken[i]) continue;
     taken[i] = true;
     chosen.push_back(tree[i]);
-    for (std::size_t j = i + 1; j < tree.size(); ++j) {
-      if (taken[j] || std::ranges::find_first_of(nodes(i), nodes(j)) == nodes(i).end()) continue;
+    for (std::size_t j = i + 1; whole(i) && j < tree.size(); ++j) {
+      if (taken[j] || !whole(j) || std::ranges::find_first_of(nodes(i), nodes(j)) == nodes(i).end())
+        continue;
       taken[j] = true;
       chosen.back().push_back(tree[j].front());
       break;
@@ -364,9 +303,13 @@ std::vector<FactorChoice> Cliquey::choose(const DenseBlanket& blanket, int popul
 std::vector<FactorChoice> Exhaustive::choose(const DenseBlanket& blanket, int population) {
   const std::vector<Pair> pairs = weighted_pairs(blanket, [](int, int) { return 0.0; });
   const int all = static_cast<int>(std::ssize(pairs));
-  if (all < tree_size(blanket))
-    throw Error(ErrorCode::usage, "the nodes of a blanket cannot be connected by relative factors");
-  const int count = std::clamp(population, tree_size(blanket), all);
+  // The prior is in all of them.
+  std::vector<FactorChoice> prior = tree_first(blanket, pairs, 0);
+  std::erase_if(prior, [&](const FactorChoice& choice) {
+    return blanket.models[choice.front()].nodes.size() > 1;
+  });
+  const int priors = static_cast<int>(std::ssize(prior));
+  const int count = std::clamp(population - priors, tree_size(blanket) - priors, all);
   double topologies = 1.0;
   for (int k = 0; k < count; ++k) topologies *= static_cast<double>(all - k) / (k + 1);
   if (topologies > static_cast<double>(most_)) {
@@ -376,7 +319,7 @@ std::vector<FactorChoice> Exhaustive::choose(const DenseBlanket& blanket, int po
                             "tried (option most), since it takes every one of them",
                             blanket.node_sizes.size(), topologies, count, most_));
   }
-  const BlanketProjection coordinates(blanket, Projection::node);
+  const BlanketProjection coordinates = project(blanket, Projection::node);
   FactorDescent descent({.initial = InitialInformation::scaled, .tolerance = 1e-4},
                         /*greedy=*/true);
   std::vector<int> picked(count);
@@ -384,7 +327,7 @@ std::vector<FactorChoice> Exhaustive::choose(const DenseBlanket& blanket, int po
   std::vector<FactorChoice> best;
   double least = std::numeric_limits<double>::infinity();
   while (true) {
-    std::vector<FactorChoice> topology;
+    std::vector<FactorChoice> topology = prior;
     for (const int k : picked) topology.push_back({pairs[k].model});
     try {
       const double kld = descent.recover(coordinates.problem(blanket, topology)).kld;

@@ -8,21 +8,10 @@
 #include "cairn/graph/packed.hpp"
 #include "cairn/runtime/error.hpp"
 #include "dense/cholesky.hpp"
+#include "dense/lu.hpp"
+#include "dense/products.hpp"
 
 namespace cairn::sparsify {
-
-namespace {
-
-/// U with UᵀU = A. Throws `Error` (numerical) unless A is positive definite.
-std::vector<double> cholesky_factor(std::span<const double> A, int n) {
-  const Eigen::LLT<Eigen::MatrixXd> llt(unpack(A, n));
-  Eigen::MatrixXd U = llt.matrixU();
-  if (llt.info() != Eigen::Success || !U.allFinite())
-    throw Error(ErrorCode::numerical, "an information matrix is not positive definite");
-  return pack(U);
-}
-
-}  // namespace
 
 WorkGraph::WorkGraph(const Graph& graph)
     : graph_(&graph), on_(graph.variable_count()), gone_(graph.variable_count()) {
@@ -76,15 +65,52 @@ void WorkGraph::remove_factor(int f) {
 
 void WorkGraph::add(std::shared_ptr<const FactorType> type, std::vector<int> variables,
                     std::vector<double> measurement, std::vector<double> information) {
-  const int n = type->residual_size();
+  std::vector<double> root(information.size());
+  if (!square_root(information, type->residual_size(), root))
+    throw Error(ErrorCode::numerical, "an information matrix is not positive semidefinite");
   const int f = factor_count();
   for (const int v : variables) on_[v].push_back(f);
-  std::vector<double> root = cholesky_factor(information, n);
   factors_.push_back({.type = std::move(type),
                       .variables = std::move(variables),
                       .measurement = std::move(measurement),
                       .information = std::move(information),
                       .sqrt_information = std::move(root)});
+}
+
+void WorkGraph::add_prior(const std::shared_ptr<const FactorType>& type, int variable,
+                          std::vector<double> measurement, std::vector<double> information) {
+  add(type, {variable}, std::move(measurement), std::move(information));
+  std::vector<int> same;
+  for (const int f : on_[variable]) {
+    if (factors_[f].type->tag() == type->tag()) same.push_back(f);
+  }
+  if (same.size() < 2) return;
+  const VariableType& of = graph_->type(variable);
+  const int n = of.tangent_size();
+  const double* x[] = {graph_->state(variable).data()};
+  Eigen::MatrixXd J(n, n), H = Eigen::MatrixXd::Zero(n, n);
+  Eigen::VectorXd r(n), g = Eigen::VectorXd::Zero(n);
+  double* out[] = {J.data()};
+  for (const int f : same) {
+    const WorkFactor& factor = factors_[f];
+    factor.type->evaluate(x, factor.measurement.data(), factor.sqrt_information.data(), r.data(),
+                          out);
+    dense::add_product_of_transpose(J, J, H);
+    g -= J.transpose() * r;
+  }
+  const Eigen::LLT<Eigen::MatrixXd> llt(H);
+  if (llt.info() != Eigen::Success) return;  // together they leave something open, too
+  const Eigen::VectorXd step = llt.solve(g);
+  const std::int64_t offset = 0;
+  std::vector<double> z(graph_->state(variable).size());
+  of.retract(1, x[0], &offset, step.data(), z.data());
+  type->normalize(z.data());
+  type->evaluate(x, z.data(), pack(Eigen::MatrixXd::Identity(n, n)).data(), r.data(), out);
+  const Eigen::PartialPivLU<Eigen::MatrixXd> lu(J.transpose());
+  const Eigen::MatrixXd half = lu.solve(H);  // J⁻ᵀ H
+  const Eigen::MatrixXd Omega = lu.solve(Eigen::MatrixXd(half.transpose()));
+  for (const int f : same) remove_factor(f);
+  add(type, {variable}, std::move(z), pack(0.5 * (Omega + Omega.transpose())));
 }
 
 }  // namespace cairn::sparsify

@@ -37,8 +37,14 @@ class WorkGraph {
 
   void remove_factor(int f);
   void remove_variable(int v) { gone_[v] = true; }
+  /// Throws `Error` (numerical) unless the information is positive semidefinite.
   void add(std::shared_ptr<const FactorType> type, std::vector<int> variables,
            std::vector<double> measurement, std::vector<double> information);
+  /// Adds a measurement of a whole state. It becomes one with those of its type that the variable
+  /// has already, so that priors do not gather where nodes leave for ever: H = Σ JᵀJ at the graph's
+  /// state is kept, and the minimum to first order.
+  void add_prior(const std::shared_ptr<const FactorType>& type, int variable,
+                 std::vector<double> measurement, std::vector<double> information);
 
  private:
   const Graph* graph_;

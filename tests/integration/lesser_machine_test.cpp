@@ -32,7 +32,7 @@ class LesserMachine : public ::testing::TestWithParam<Machine> {
 
 TEST_P(LesserMachine, ReachesTheSameChi2WithTheSameBinary) {
   const Arguments emulator{"qemu-x86_64", "-cpu", GetParam().cpu};
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#if defined(CAIRN_SANITIZED)
   GTEST_SKIP() << "an emulated processor has no room for the sanitizer's shadow memory";
 #endif
   if (run_program({"qemu-x86_64", "--version"}).exit_code != 0)

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
+#include <set>
 #include <string>
 
 #include "integration/front_end.hpp"
@@ -89,6 +90,69 @@ TEST_F(OnlinePolicy, GoesOnWhereTheJournalEnds) {
   EXPECT_EQ(read_text(folder_.file("parts.g2o")), read_text(folder_.file("whole.g2o")));
   EXPECT_EQ(last_answer.substr(last_answer.find("variables")),
             whole.heard.back().substr(whole.heard.back().find("variables")));
+}
+
+TEST_F(OnlinePolicy, AMapOfAFixedNumberOfPosesIsRestored) {
+  const std::string graph = generate("manhattan:poses=200");
+  const Arguments keep{"--keep", "30", "--output", "changed"};
+  const auto with = [&](Arguments more) {
+    more.insert(more.end(), keep.begin(), keep.end());
+    return online("compact_pose:range=3,angle=0.8,gate=0.9", more);
+  };
+  const Dialogue whole = drive(graph, with({"-o", folder_.file("whole.g2o")}), questions);
+  ASSERT_GT(whole.count("REMOVED"), 5);
+  // The last pose is told as KEPT at the end whether it was before or not: so by the ids.
+  std::set<std::string> there;
+  for (const std::string& line : whole.heard) {
+    if (line.starts_with("KEPT ")) there.insert(line.substr(5));
+    if (line.starts_with("REMOVED ")) {
+      EXPECT_EQ(there.erase(line.substr(8)), 1U) << line;
+    }
+  }
+  std::set<std::string> saved;
+  for (const std::string& line : lines(read_text(folder_.file("whole.g2o")))) {
+    if (line.starts_with("VERTEX_SE2 ")) saved.insert(line.substr(11, line.find(' ', 11) - 11));
+  }
+  EXPECT_EQ(saved.size(), 30U);
+  EXPECT_EQ(there, saved);
+  const Arguments arguments =
+      with({"--journal", folder_.file("log"), "-o", folder_.file("parts.g2o")});
+  for (std::size_t from = 0; from < whole.told.size(); from += 97) {
+    const std::size_t end = std::min(from + 97, whole.told.size());
+    const Lines part(whole.told.begin() + static_cast<std::ptrdiff_t>(from),
+                     whole.told.begin() + static_cast<std::ptrdiff_t>(end));
+    ASSERT_EQ(cairn(arguments, {}, joined(part)).exit_code, 0);
+  }
+  EXPECT_EQ(read_text(folder_.file("parts.g2o")), read_text(folder_.file("whole.g2o")));
+  // Another number of poses would give another map.
+  EXPECT_EQ(cairn(online("compact_pose:range=3,angle=0.8,gate=0.9",
+                         {"--keep", "31", "--output", "changed", "--journal", folder_.file("log")}),
+                  {}, "")
+                .exit_code,
+            2);
+}
+
+TEST_F(OnlinePolicy, APoseThatHasLeftIsRefusedWithAdvice) {
+  Lines told{"NEW VERTEX_SE2 0"};
+  for (int k = 1; k < 8; ++k) {
+    told.push_back("NEW VERTEX_SE2 " + std::to_string(k));
+    told.push_back("EDGE_SE2 " + std::to_string(k - 1) + " " + std::to_string(k) + kStep);
+  }
+  told.push_back("DONE");
+  const Arguments arguments = online("compact_pose:range=3,angle=0.8,pose_gain=0", {"--keep", "4"});
+  const Lines answers = lines(cairn(arguments, {}, joined(told)).out);
+  std::string gone;
+  for (const std::string& line : answers) {
+    if (line.starts_with("REMOVED ") && gone.empty()) gone = line.substr(8);
+  }
+  ASSERT_FALSE(gone.empty()) << joined(answers);
+  told.back() = "EDGE_SE2 " + gone + " 7" + kStep;
+  told.push_back("ESTIMATE " + gone);
+  EXPECT_THAT(cairn(arguments, {}, joined(told)).out,
+              testing::AllOf(HasSubstr("pose " + gone +
+                                       " was not kept, or has left since (DROPPED, REMOVED); "
+                                       "expected a pose that is, such as NEXT proposes"),
+                             HasSubstr("there is no estimate of " + gone)));
 }
 
 TEST_F(OnlinePolicy, WhatAQuestionSettledOrAskedIsInTheJournal) {

@@ -241,8 +241,11 @@ TEST_F(Online, RefusesOptionsOfSparsificationThatCannotBe) {
   EXPECT_THAT(refusal({"--select", "widest"}, 5), HasSubstr("on offer: coverage"));
   EXPECT_THAT(refusal({"--sparsifier", "sparsify:topology=cliquey"}, 2),
               HasSubstr("the map could not be saved"));
-  EXPECT_THAT(refusal({"--keep", "20", "--policy", "compact_pose"}, 2),
-              HasSubstr("a policy decides itself which poses are kept"));
+  EXPECT_THAT(refusal({"--keep", "20", "--policy", "compact_pose:keep=10"}, 2),
+              HasSubstr("--keep, and keep=10 among the policy's options: give one"));
+  EXPECT_THAT(refusal({"--select", "oldest", "--policy", "compact_pose"}, 2),
+              HasSubstr("give --keep N, too"));
+  EXPECT_THAT(refusal({"--keep", "20", "--policy", "random_poses"}, 2), HasSubstr("keep"));
   // It gives another map, so the journal is another.
   const std::string journal = folder_.file("log");
   cairn(online({"--journal", journal}), {}, "VERTEX_SE2 0 0 0 0\n");

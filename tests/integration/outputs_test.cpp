@@ -210,7 +210,7 @@ TEST_F(Outputs, ALimitOfTheSizeOfFilesIsAnError) {
 }
 
 TEST_F(Outputs, ThreadsThatCannotBeStartedAreAnError) {
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#if defined(CAIRN_SANITIZED)
   GTEST_SKIP() << "the sanitizer needs more address space than the limit leaves";
 #endif
   graph();

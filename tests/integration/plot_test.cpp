@@ -154,6 +154,50 @@ TEST_F(PlotCommand, AnyNameCanBeDrawn) {
   EXPECT_THAT(plot({name}, "svg"), Not(HasSubstr("<script")));
 }
 
+TEST_F(PlotCommand, DrawsColumnsOfCsv) {
+  const std::string csv = folder_.file("steps.csv");
+  write_text(csv, "step,seconds,seconds_all,name\n1,0.1,0.2,a\n2,0.01,0.4,b\n3,,0.8,c\n");
+  const std::string one = plot({csv}, "svg");
+  const std::string two = plot({csv, "--y", "seconds", "--y", "*all"}, "svg");
+  const std::string logarithmic = plot({csv, "--log", "y"}, "svg");
+  EXPECT_NE(one, two);
+  EXPECT_NE(one, logarithmic);
+  EXPECT_EQ(plot({csv, "--what", "columns", "--x", "step", "--y", "seconds*"}, "svg"), one)
+      << "the first column is the horizontal axis, and a column without numbers is not drawn";
+  EXPECT_NE(plot({csv, "--y", "seconds_all", "--x-max", "2"}, "svg"),
+            plot({csv, "--y", "seconds_all"}, "svg"));
+  const std::string other = folder_.file("other.csv");
+  write_text(other, "step,seconds\n1,5\n");
+  EXPECT_NE(plot({csv, other, "--y", "seconds"}, "svg"), plot({csv, "--y", "seconds"}, "svg"));
+}
+
+TEST_F(PlotCommand, SaysWhichColumnsThereAre) {
+  const std::string csv = folder_.file("steps.csv");
+  write_text(csv, "step,seconds\n1,2\n");
+  const auto refused = [&](Arguments arguments, int code) {
+    arguments.insert(arguments.begin(), "plot");
+    arguments.insert(arguments.end(), {"-o", folder_.file("x.svg")});
+    const Outcome outcome = cairn(arguments);
+    EXPECT_EQ(outcome.exit_code, code) << outcome.err;
+    EXPECT_FALSE(std::filesystem::exists(folder_.file("x.svg")));
+    return outcome.err;
+  };
+  EXPECT_THAT(refused({csv, "--x", "time"}, 2), HasSubstr("it has step, seconds"));
+  EXPECT_THAT(refused({csv, "--y", "chi2"}, 2), HasSubstr("matches 'chi2'"));
+  EXPECT_THAT(refused({graph_, "--x", "step"}, 2), HasSubstr("iterations or time"));
+  EXPECT_THAT(refused({graph_, "--y", "step"}, 2), HasSubstr("CSV"));
+  EXPECT_THAT(refused({graph_, "--what", "columns"}, 3), HasSubstr("--steps"));
+  EXPECT_THAT(refused({csv, "--x-max", "0"}, 3), HasSubstr("no point can be drawn"));
+  write_text(csv, "step,seconds\n0,1\n1,-2\n");
+  EXPECT_THAT(refused({csv, "--log", "xy"}, 3), HasSubstr("positive"));
+  write_text(csv, "step,seconds\n1,2,3\n");
+  EXPECT_THAT(refused({csv}, 3), HasSubstr("steps.csv:2: expected 2 fields"));
+  write_text(csv, "step,seconds\n1,2\n");
+  const Outcome page = cairn({"view", csv, "-o", folder_.file("x.html")});
+  EXPECT_EQ(page.exit_code, 3);
+  EXPECT_THAT(page.err, HasSubstr("cairn plot"));
+}
+
 TEST_F(PlotCommand, SaysWhatIsMissing) {
   const Outcome outcome = cairn({"plot", graph_, "--what", "bars", "-o", folder_.file("x.svg")});
   EXPECT_EQ(outcome.exit_code, 3);

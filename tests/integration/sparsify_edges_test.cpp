@@ -89,6 +89,7 @@ TEST_F(SparsifyEdges, BoundsAreReportedWhereTheyAreKnown) {
 
 TEST_F(SparsifyEdges, RefusesWhatDoesNotFit) {
   for (const Arguments& node : {Arguments{"--keep-every", "3"},
+                                {"--nodes", "all"},
                                 {"--select", "oldest"},
                                 {"--topology", "clt"},
                                 {"--population", "tree:1"},

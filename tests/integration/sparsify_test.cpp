@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <set>
 #include <string>
@@ -19,6 +20,7 @@
 #include "cairn/linear/graph_marginals.hpp"
 #include "cairn/linear/linearizer.hpp"
 #include "cairn/plugin/registry.hpp"
+#include "cairn/report/number_table.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/solve/optimizer.hpp"
 #include "cairn/sparsification/sparsification.hpp"
@@ -238,15 +240,84 @@ TEST_F(Sparsify, SaysWhatIsWrongAndWhatWouldWork) {
               HasSubstr("--record"));
 }
 
+TEST_F(Sparsify, SaysWhereThereIsNothingToTakeOut) {
+  const boost::json::value told = report({"@manhattan:poses=60", "--nodes", "landmarks"});
+  const boost::json::array& notes = told.at("notes").as_array();
+  EXPECT_TRUE(std::ranges::any_of(notes, [](const boost::json::value& note) {
+    return note.as_string().find("no landmark that may leave") != std::string::npos;
+  }));
+}
+
+TEST_F(Sparsify, CurvesEndAtTheMeanOfTheRecoveries) {
+  const std::string problems = folder_.file("problems.json"), curves = folder_.file("curves.csv");
+  study({"@manhattan:poses=150", "--keep-every", "4", "--record", problems});
+  for (const char* against : {"time", "iterations"}) {
+    const boost::json::value told =
+        study({problems, "--topology", "mi", "--recovery", "ncfd", "--recovery",
+               "ip:initial=odb,tolerance=1e-4", "--curves", curves, "--against", against},
+              "problems");
+    const NumberTable table = read_number_table(read_text(curves), curves);
+    int compared = 0;
+    for (const boost::json::value& row : told.at("rows").as_array()) {
+      if (row.at("nodes").is_null()) continue;
+      const std::string name = std::string(row.at("recovery").as_string()) + "@" +
+                               std::to_string(row.at("nodes").as_int64());
+      const NumberTable::Column* column = table.find(name);
+      ASSERT_TRUE(column) << name;
+      // While it runs a method keeps the KLD up to date; at its end it is computed anew.
+      EXPECT_NEAR(column->values.back(), row.at("kld").to_number<double>(), 1e-7) << name;
+      EXPECT_GE(column->values.front(), column->values.back() - 1e-9) << name;
+      ++compared;
+    }
+    EXPECT_GE(compared, 4) << against;
+  }
+}
+
 TEST_F(Sparsify, WhatCannotLeaveStaysAndIsNamed) {
-  // Poses that have seen a landmark.
-  const boost::json::value told = report({"@landmarks2d:poses=80", "--keep-every", "2"});
+  // Cameras form no Lie group, and neither do points have another neighbour.
+  const boost::json::value told = report({"@bundle", "--nodes", "all", "--keep-every", "2"});
   const boost::json::array& refused = told.at("refused").as_array();
   ASSERT_GT(refused.size(), 0U);
   EXPECT_THAT(std::string(refused.front().at("reason").as_string()),
-              HasSubstr("poses of one kind only"));
-  EXPECT_EQ(told.at("poses").at("kept").as_int64() + told.at("problems").at("count").as_int64(),
-            told.at("poses").at("in").as_int64());
+              HasSubstr("poses of one kind and their landmarks only"));
+  EXPECT_EQ(told.at("poses").at("kept"), told.at("poses").at("in"));
+}
+
+TEST_F(Sparsify, PosesLandmarksOrBothLeave) {
+  const auto told = [&](const char* nodes) {
+    return report({"@landmarks2d:poses=80", "--keep-every", "2", "--nodes", nodes});
+  };
+  const auto left = [](const boost::json::value& of) {
+    EXPECT_TRUE(of.at("refused").as_array().empty());
+    EXPECT_GE(number(of.at("kld")), -1e-6);
+    return of.at("poses").at("in").as_int64() - of.at("poses").at("kept").as_int64();
+  };
+  const boost::json::value poses = told("poses"), landmarks = told("landmarks"), all = told("all");
+  EXPECT_EQ(poses.at("nodes"), "poses");
+  EXPECT_EQ(left(poses), 39);  // the newest stays
+  EXPECT_GT(left(landmarks), 0);
+  EXPECT_GT(left(all), 39);
+  const Outcome online = cairn({"sparsify", "@landmarks2d:poses=80", "--keep-every", "2",
+                                "--online", "20", "--nodes", "all"});
+  EXPECT_EQ(online.exit_code, 2);
+  EXPECT_THAT(online.err, HasSubstr("online only poses can be removed"));
+}
+
+TEST_F(Sparsify, AConservativeGraphClaimsNothingTooMuch) {
+  const auto told = [&](const Arguments& more) {
+    Arguments arguments{"@manhattan:poses=200,streets=4", "--keep-every", "4"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return report(arguments);
+  };
+  const boost::json::value free = told({"--sparsifier", "sparsify:resolve=false"});
+  EXPECT_LT(number(free.at("overconfidence")), -1.0);
+  for (const char* recovery : {"fd:conservative=true", "ncfd:conservative=true"}) {
+    const boost::json::value held =
+        told({"--sparsifier", "sparsify:resolve=false", "--recovery", recovery});
+    EXPECT_GT(number(held.at("overconfidence")), -1e-4) << recovery;
+    EXPECT_GT(number(held.at("kld")), number(free.at("kld")));
+  }
+  EXPECT_TRUE(told({"--no-kld"}).at("overconfidence").is_null());
 }
 
 // The measure, against dense algebra --------------------------------------------------------------

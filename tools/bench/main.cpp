@@ -53,6 +53,7 @@ const std::vector<std::pair<std::string, Study>>& all_studies() {
       {"compact_growth", study_compact_growth},
       {"compact_consistency", study_compact_consistency},
       {"compact_matches", study_compact_matches},
+      {"compact_million", study_compact_million},
       {"sparsify_sets", study_sparsify_sets},
       {"sparsify_topology", study_sparsify_topology},
       {"sparsify_problems", study_sparsify_problems},

@@ -69,6 +69,9 @@ void study_compact_consistency(const Bench& bench, const Keep& keep);
 /// With a registration of which a tenth is wrong.
 void study_compact_matches(const Bench& bench, const Keep& keep);
 
+/// A million poses in a city of 1 km², live, with a map of a fixed number of poses.
+void study_compact_million(const Bench& bench, const Keep& keep);
+
 // `cairn sparsify`, whose studies are called sparsify_…; docs/sparsify_results.md has their tables.
 
 /// The graphs of Vallvé's thesis, with several parts of the nodes left and each recovery.

@@ -37,6 +37,22 @@ std::vector<Recording> recordings(bool quick) {
           {"whole", joined({"--keep-every", "5"}, by_information), 100}};
 }
 
+/// The curves of Figures 4.6 (against iterations, from several beginnings) and 4.7 (against time),
+/// as CSV, which ./dev bench draws.
+void draw_convergence(const Bench& bench, const fs::path& problems) {
+  const auto curves = [&](const char* file, const char* against, const Words& recoveries) {
+    Words words{"--topology", "mi", "--population", "tree:2"};
+    words = joined(std::move(words), each("--recovery", recoveries));
+    solve_problems(bench, problems,
+                   joined(std::move(words), {"--curves", (bench.cairn.work() / file).string(),
+                                             "--against", against}));
+  };
+  curves("sparsify_iterations.csv", "iterations",
+         {"ip:initial=identity", "pqn:initial=identity", "pqn:initial=odb", "fd:initial=identity",
+          "fd:initial=odb", "fd:initial=ffd"});
+  curves("sparsify_times.csv", "time", {"ip:initial=odb", "fd", "ncfd"});
+}
+
 void measure_problems(const Bench& bench, const DataSet& set, const Recording& recording,
                       const Keep& keep) {
   const fs::path problems = record_problems(bench, set, recording.name, recording.arguments);
@@ -56,6 +72,7 @@ void measure_problems(const Bench& bench, const DataSet& set, const Recording& r
               each("--recovery",
                    {"fd:initial=identity,iterations=0", "fd:initial=odb,iterations=0",
                     "fd:initial=ffd,iterations=0", "fd:initial=scaled,iterations=0", "ncfd"})));
+  if (recording.name == "online") draw_convergence(bench, problems);
   part("topology",
        joined({"--population", "fill:0.75", "--recovery", "ncfd"},
               each("--topology", {"mi", "dmi", "ekld", "odd", "l1",

@@ -28,6 +28,8 @@ std::vector<Section> compact_live_sections(const boost::json::array& entries);
 std::vector<Section> compact_growth_sections(const boost::json::array& entries);
 std::vector<Section> compact_consistency_sections(const boost::json::array& entries);
 std::vector<Section> compact_matches_sections(const boost::json::array& entries);
+/// In tables_million.cpp.
+std::vector<Section> compact_million_sections(const boost::json::array& entries);
 
 // The parts of `cairn sparsify`, in tables_sparsify.cpp, tables_sparsify_problems.cpp and
 // tables_sparsify_edges.cpp.

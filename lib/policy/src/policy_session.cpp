@@ -89,7 +89,10 @@ void PolicySession::perform(std::string_view line, const Words& words, Reply& re
 
 void PolicySession::load(const Graph& map) {
   policy_.load(map);
-  for (int v = 0; v < map.variable_count(); ++v) arrived_[map.id(v)] = true;
+  for (int v = 0; v < map.variable_count(); ++v) {
+    arrived_.insert(map.id(v));
+    kept_.insert(map.id(v));
+  }
   motions_.emplace(map.variable_pools().front().type);
 }
 
@@ -197,14 +200,12 @@ void PolicySession::check_motion(const Factor& factor, Id from) const {
 }
 
 void PolicySession::check_kept(Id id) const {
-  const auto there = arrived_.find(id);
-  if (there == arrived_.end()) throw bad_line(fmt::format("there is no pose {}", id));
-  if (!there->second) {
-    throw bad_line(
-        fmt::format("pose {} was not kept; expected a pose that is, such as NEXT "
-                    "proposes",
-                    id));
-  }
+  if (!arrived_.contains(id)) throw bad_line(fmt::format("there is no pose {}", id));
+  if (kept_.contains(id)) return;
+  // Which of the two it was is not remembered: that would take memory for as long as it runs.
+  throw bad_line(
+      fmt::format("pose {} was not kept{}; expected a pose that is, such as NEXT proposes", id,
+                  removes_ ? ", or has left since (DROPPED, REMOVED)" : ""));
 }
 
 // The way of a pose -------------------------------------------------------------------------------
@@ -288,7 +289,8 @@ PoseReport PolicySession::end(Reply& reply) {
   settle(reply);
   PoseReport report = policy_.end_pose();
   open_ = false;
-  arrived_[report.id] = report.kept;
+  arrived_.insert(report.id);
+  if (report.kept) kept_.insert(report.id);
   // The policy lists all links of the pose; those that had been waiting are news.
   auto reported = reported_.begin();
   for (const LinkReport& link : report.links) {
@@ -308,6 +310,7 @@ void PolicySession::close(Reply& reply) {
   reply.changes = reply.solved = true;
   reply.seconds = report.seconds.total;
   answer_ += fmt::format("{} {}\n", report.kept ? "KEPT" : "DROPPED", report.id);
+  note_removed();
   write_results(report.kept);
   answer(reply);
 }
@@ -322,7 +325,10 @@ void PolicySession::finish_trajectory() {
   }
   try {
     Reply unread;
-    if (current()) end(unread);
+    if (current()) {
+      end(unread);
+      note_removed();
+    }
   } catch (const Error& error) {
     if (!arriving_ || error.code() == ErrorCode::usage) throw;
     answer_ += fmt::format("NOTE {}\n", error.what());
@@ -337,8 +343,9 @@ void PolicySession::finish_trajectory() {
   }
   finished_ = true;
   if (!newest_) return;
-  arrived_[*newest_] = true;
+  kept_.insert(*newest_);
   answer_ += fmt::format("KEPT {}\n", *newest_);
+  note_removed();
   write_results(true);
 }
 
@@ -505,6 +512,16 @@ void PolicySession::note_link(const LinkReport& link) {
   counts_.linked += link.verdict == LinkVerdict::linked;
 }
 
+/// Poses that have left the graph with the newest one.
+void PolicySession::note_removed() {
+  for (const Id id : policy_.removed()) {
+    removes_ = true;
+    kept_.erase(id);
+    reported_states_.erase(id);
+    answer_ += fmt::format("REMOVED {}\n", id);
+  }
+}
+
 /// What --output and --marginals ask for at the end of a pose.
 void PolicySession::write_results(bool kept) {
   const bool all = settings_.output == "all", changed = settings_.output == "changed";
@@ -519,6 +536,7 @@ void PolicySession::write_results(bool kept) {
       answer_ += text;
       reported = std::move(text);
     }
+    if (!kept) reported_states_.erase(*newest_);  // its state is never written again
   }
   if (settings_.output == "last") write_estimate(*newest_, answer_);
   // Where the pose is not kept they are the same as before.
@@ -531,8 +549,7 @@ void PolicySession::write_results(bool kept) {
 }
 
 bool PolicySession::in_graph(Id id) const {
-  const auto there = arrived_.find(id);
-  if (there != arrived_.end() && there->second) return true;
+  if (kept_.contains(id)) return true;
   if (newest_ != id) return false;
   const std::vector<Id> kept = policy_.kept();
   return !kept.empty() && kept.back() == id;

@@ -61,6 +61,7 @@ bool run_policy(const Graph& recording, std::span<const Arrival> poses, PosePoli
     match_newest(policy, registration, pose.id);
     const PoseReport report = policy.end_pose();
     registration.pose_ended(report.id, report.kept);
+    for (const Id left : policy.removed()) registration.pose_ended(left, false);
     if (each && !each(report)) break;
   }
   return first || policy.finish();

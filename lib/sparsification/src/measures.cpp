@@ -21,6 +21,7 @@
 #include "cairn/runtime/error.hpp"
 #include "dense/lu.hpp"
 #include "dense/products.hpp"
+#include "overconfidence.hpp"
 
 namespace cairn {
 namespace {
@@ -324,6 +325,14 @@ SparsificationError sparsification_error(const Graph& original, const Graph& as_
   error.covariance = 0.5 * (trace - log_q + log_p - static_cast<double>(d));
   error.kld = error.covariance + error.mean;
   return error;
+}
+
+double overconfidence(const Graph& original, const Graph& sparse, LinearSolver& solver) {
+  Partners partners;
+  for (int v = 0; v < sparse.variable_count(); ++v)
+    partners.push_back(partner(original, sparse, v, "original"));
+  const Comparison both = comparison(original, sparse, std::move(partners), ComparedAt::common);
+  return least_eigenvalue_of_difference(both.p, both.q, both.at, solver);
 }
 
 SparsificationError marginal_divergence(const Graph& p, const Graph& q, std::span<const Id> nodes,

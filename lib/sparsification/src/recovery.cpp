@@ -35,16 +35,17 @@ Matrix by_eigenvectors(const Matrix& L) {
          values.tail(r).cwiseSqrt().cwiseInverse().asDiagonal();
 }
 
-/// With the first node held.
+/// With the first node held, if Λ leaves the whole open.
 Matrix by_first_node(const DenseBlanket& blanket) {
   const Matrix L = MatrixMap(blanket.information.data(), blanket.size(), blanket.size());
-  const Eigen::Index first = blanket.node_sizes.front(), r = L.rows() - first;
+  const Eigen::Index first = blanket.absolute ? 0 : blanket.node_sizes.front();
+  const Eigen::Index r = L.rows() - first;
   const Eigen::LLT<Matrix> llt(Matrix(L.bottomRightCorner(r, r)));
   // A pivot that is rounding: the factorisation may go on in spite of it.
   const Vector pivots = llt.matrixLLT().diagonal().cwiseAbs2();
   const Vector diagonal = L.diagonal().tail(r);
   if (llt.info() != Eigen::Success || (pivots.array() <= kZero * diagonal.array()).any())
-    throw Error(ErrorCode::numerical, "the blanket leaves more open than one node");
+    throw Error(ErrorCode::numerical, "the blanket leaves more open than the pose of the whole");
   Matrix T = Matrix::Zero(L.rows(), r);
   T.bottomRows(r) = llt.matrixU().solve(Matrix::Identity(r, r));
   return T;

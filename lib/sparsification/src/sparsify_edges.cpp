@@ -70,7 +70,10 @@ Connectivity connectivity(const std::vector<RelativeEdge>& edges, const std::vec
 
 void measure(const Graph& original, LinearSolver& solver, const SparsifyEdgesJob& job,
              SparsifyEdgesResult& result) {
-  measure_whole(original, solver, job.compared_at, result.whole);
+  measure_or_note(result.whole, [&] {
+    result.whole.error =
+        sparsification_error(original, result.whole.sparse, solver, job.compared_at);
+  });
   std::vector<int> relative;
   std::ranges::merge(result.closures.backbone, result.closures.candidates,
                      std::back_inserter(relative));

@@ -11,6 +11,7 @@
 
 #include <fmt/core.h>
 
+#include "cairn/geometry/pose.hpp"
 #include "cairn/geometry/pose_chain.hpp"
 #include "cairn/online/recorded_graph.hpp"
 #include "cairn/runtime/error.hpp"
@@ -48,13 +49,22 @@ double optimize(Graph& graph, Parts& parts, const SparsifySetting& setting, cons
   return optimize_whole(graph, *parts.optimizer, parts.job.optimizer.name, setting, what, result);
 }
 
-/// Which of the graph's variables may leave: all poses but the newest.
-std::vector<int> open_nodes(const Graph& graph) {
+/// Whether a variable is free and of that kind. A pose type of a plugin may have no position.
+bool is_open(const Graph& graph, int v, NodeKind kind) {
+  const VariableType& type = graph.type(v);
+  if (graph.fixed(v) || !type.lie_group()) return false;
+  return kind == NodeKind::all || is_point(type) == (kind == NodeKind::landmarks);
+}
+
+/// Which of the graph's variables may leave: all of a kind but the newest pose.
+std::vector<int> open_nodes(const Graph& graph, NodeKind kind) {
   std::vector<int> nodes;
+  int newest = -1;
   for (int v = 0; v < graph.variable_count(); ++v) {
-    if (!graph.fixed(v) && graph.type(v).lie_group()) nodes.push_back(v);
+    if (is_open(graph, v, kind)) nodes.push_back(v);
+    if (is_open(graph, v, NodeKind::poses)) newest = v;
   }
-  if (!nodes.empty()) nodes.pop_back();
+  std::erase(nodes, newest);
   return nodes;
 }
 
@@ -85,7 +95,11 @@ std::vector<int> select(const Graph& graph, const std::vector<int>& nodes, Parts
 }
 
 void measure(const Graph& original, Parts& parts, SparsifyResult& result) {
-  measure_whole(original, *parts.solver, parts.job.compared_at, result);
+  measure_or_note(result, [&] {
+    result.error =
+        sparsification_error(original, result.sparse, *parts.solver, parts.job.compared_at);
+    result.overconfidence = overconfidence(original, result.sparse, *parts.solver);
+  });
 }
 
 }  // namespace
@@ -108,7 +122,18 @@ SparsifyResult sparsify_whole(const Graph& graph, const SparsifyJob& job,
     }
   }
   report(setting, {SparsifyProgress::Phase::select});
-  const std::vector<int> nodes = select(original, open_nodes(original), parts, result);
+  const std::vector<int> open = open_nodes(original, job.nodes);
+  if (open.empty()) {
+    result.notes.push_back(fmt::format("nothing was taken out: the graph has no {} that may leave",
+                                       job.nodes == NodeKind::landmarks ? "landmark"
+                                       : job.nodes == NodeKind::poses
+                                           ? "pose (landmarks: --nodes landmarks or all)"
+                                           : "pose or landmark"));
+  }
+  std::vector<int> nodes = select(original, open, parts, result);
+  // Landmarks last: the poses that have observed one are then held together by other factors.
+  std::stable_partition(nodes.begin(), nodes.end(),
+                        [&](int v) { return !is_point(original.type(v)); });
   result.change = take_out(original, nodes, parts, setting);
   result.interrupted = setting.interrupted();
   result.sparse = original.clone();
@@ -241,9 +266,9 @@ class OnlineRun {
     std::vector<Id> later;
     for (const Id id : pending_) {
       const int v = graph.find(id).value();
-      if (id == graph.id(graph.variable_count() - 1)) {
+      if (id == newest_) {
         later.push_back(id);
-      } else if (!graph.fixed(v) && graph.type(v).lie_group()) {
+      } else if (is_open(graph, v, NodeKind::poses)) {
         nodes.push_back(v);
       }
     }
@@ -329,6 +354,11 @@ class OnlineRun {
 
 SparsifyResult sparsify_online(const Graph& recording, const SparsifyJob& job,
                                const SparsifySetting& setting) {
+  if (job.nodes != NodeKind::poses) {
+    throw Error(ErrorCode::usage,
+                "online only poses can be removed: a landmark that has left may be observed again, "
+                "and there is no other that the observation could be redirected to");
+  }
   return call_plugin([&] { return fmt::format("estimator '{}'", job.estimator); },
                      [&] { return OnlineRun(recording, job, setting).run(); });
 }

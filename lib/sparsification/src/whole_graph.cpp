@@ -33,10 +33,9 @@ double optimize_whole(Graph& graph, Optimizer& optimizer, const std::string& nam
   return summary.final_chi2;
 }
 
-void measure_whole(const Graph& original, LinearSolver& solver, ComparedAt at,
-                   SparsifyResult& result) {
+void measure_or_note(SparsifyResult& result, const std::function<void()>& measure) {
   try {
-    result.error = sparsification_error(original, result.sparse, solver, at);
+    measure();
   } catch (const Error& error) {
     if (error.code() != ErrorCode::numerical) throw;
     result.notes.push_back(fmt::format("no KLD: {}", error.what()));

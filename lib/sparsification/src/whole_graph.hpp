@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <functional>
 #include <string>
 
 #include "cairn/sparsification/sparsify_graph.hpp"
@@ -14,9 +15,8 @@ namespace cairn {
 double optimize_whole(Graph& graph, Optimizer& optimizer, const std::string& name,
                       const SparsifySetting& setting, const char* what, SparsifyResult& result);
 
-/// Sets `result.error`, the distance of `result.sparse` from `original`; a note where there is
-/// none.
-void measure_whole(const Graph& original, LinearSolver& solver, ComparedAt at,
-                   SparsifyResult& result);
+/// Calls `measure`; where a graph is singular (`Error`, numerical), a note in `result` says that
+/// there is no divergence.
+void measure_or_note(SparsifyResult& result, const std::function<void()>& measure);
 
 }  // namespace cairn

@@ -167,6 +167,12 @@ bool Run::converged() {
 /// Ceres has found no step that lowers chi2, not even along the gradient.
 Status Run::without_descent() {
   const NewtonStep step = decrement_.at(values_);
+  if (std::isfinite(chi2_) && std::isnan(step.decrease)) {
+    summary_.notes.emplace_back(
+        "the line search has ended where H is not positive definite: factors that a robust loss "
+        "weighs with zero hold nothing; begin nearer to the minimum, such as at that without loss");
+    return Status::not_positive_definite;
+  }
   const bool rounding = step.decrease <= kCeresRounding * chi2_ ||
                         step.norm <= kCeresRounding * state_extent(graph_, values_);
   if (std::isfinite(chi2_) && rounding) return Status::converged;

@@ -334,22 +334,87 @@ TEST_P(MapSparsifierOf, InAManhattanWorldLateLoopsEndNearerToTheWholeMapThanWith
 
 TEST_P(MapSparsifierOf, RefusesWithTheReasonAndChangesNothing) {
   GraphUpdate update = ring(0.01);
-  update.factors.push_back({registry_.factor_type("EDGE_PRIOR_SE2"), {5}, {3, 3, 1}, kInformation});
   update.variables.push_back({registry_.variable_type("VERTEX_XY"), 20, {1.0, 1.0}});
-  update.factors.push_back({registry_.factor_type("EDGE_SE2_XY"), {3, 20}, {0.5, 0.5}, {9, 0, 9}});
+  update.factors.push_back(
+      {registry_.factor_type("EDGE_BEARING_RANGE_SE2_XY"), {3, 20}, {0.5, 1.5}, {9, 0, 9}});
   estimator_->update(update);
   minimise();
   const double before = estimator_->chi2();
   EXPECT_THAT(refusal({0}), HasSubstr("VERTEX_SE2 0 is"));
-  EXPECT_THAT(refusal({7, 5}), HasSubstr("EDGE_PRIOR_SE2 on VERTEX_SE2 5"));
-  EXPECT_THAT(refusal({3}), HasSubstr("with VERTEX_XY 20"));
-  EXPECT_THAT(refusal({20}), HasSubstr("VERTEX_XY 20"));
+  EXPECT_THAT(refusal({3}), HasSubstr("VERTEX_SE2 3: no factor of the graph measures the position "
+                                      "of a landmark in the frame of a pose"));
+  EXPECT_THAT(refusal({7, 3}), HasSubstr("VERTEX_SE2 3"));
   EXPECT_THAT(refusal({99}), HasSubstr("there is no variable 99"));
   EXPECT_THAT(refusal({7, 7}), HasSubstr("variable 7 is to leave twice"));
   EXPECT_EQ(estimator_->variable_count(), 11);
   EXPECT_EQ(estimator_->chi2(), before);
-  // A neighbour of the pose with a prior can leave.
-  EXPECT_THAT(refusal({6}), IsEmpty());
+  // A neighbour of the pose that observed the landmark can leave.
+  EXPECT_THAT(refusal({4}), IsEmpty());
+}
+
+// Landmarks and absolute measurements -------------------------------------------------------------
+
+TEST_P(MapSparsifierOf, PosesWithLandmarksAndPriorsLeaveThemToTheirNeighbours) {
+  GraphUpdate update = ring(0.0);
+  const auto x = [&](int k) { return update.variables[k].state; };
+  const Factor prior{registry_.factor_type("EDGE_PRIOR_SE2"), {5}, x(5), kInformation};
+  update.factors.push_back(prior);
+  update.variables.push_back({registry_.variable_type("VERTEX_XY"), 20, {1.0, 1.0}});
+  for (const int k : {3, 4}) {
+    const double c = std::cos(x(k)[2]), s = std::sin(x(k)[2]);
+    const double dx = 1.0 - x(k)[0], dy = 1.0 - x(k)[1];
+    update.factors.push_back({registry_.factor_type("EDGE_SE2_XY"),
+                              {k, 20},
+                              {c * dx + s * dy, c * dy - s * dx},
+                              {9, 0, 9}});
+  }
+  estimator_->update(update);
+  minimise();
+  const Graph whole = estimator_->graph();
+  sparsify({3, 5});
+  minimise();
+  const Graph sparse = estimator_->graph();
+  EXPECT_EQ(sparse.variable_count(), 9);
+  EXPECT_TRUE(sparse.find(20).has_value());
+  EXPECT_LT(distance(whole, sparse), 1e-6);
+  int priors = 0, observations = 0;
+  for (int f = 0; f < sparse.factor_count(); ++f) {
+    priors += sparse.factor_type(f).tag() == "EDGE_PRIOR_SE2";
+    observations += sparse.factor_type(f).tag() == "EDGE_SE2_XY";
+  }
+  EXPECT_EQ(priors, 1);
+  EXPECT_GE(observations, 1);
+  // Nearly nothing is lost, by dense algebra.
+  const MatrixXd before = covariance(whole, sparse), after = covariance(sparse, sparse);
+  const MatrixXd ratio = before.ldlt().solve(after);
+  EXPECT_NEAR(ratio.trace() / static_cast<double>(ratio.rows()), 1.0, 0.05);
+  // The landmark may leave, too.
+  sparsify({20});
+  EXPECT_EQ(estimator_->variable_count(), 8);
+}
+
+TEST_P(MapSparsifierOf, PriorsDoNotGatherWherePosesLeave) {
+  GraphUpdate update = ring(0.01);
+  for (Id k = 1; k < 10; ++k) {
+    update.factors.push_back({registry_.factor_type("EDGE_PRIOR_SE2"),
+                              {k},
+                              update.variables[static_cast<std::size_t>(k)].state,
+                              {9, 0, 0, 9, 0, 9}});
+  }
+  estimator_->update(update);
+  minimise();
+  sparsify({1, 2, 3, 5, 6, 8});
+  const Graph sparse = estimator_->graph();
+  std::set<Id> with;
+  int priors = 0;
+  for (int f = 0; f < sparse.factor_count(); ++f) {
+    if (sparse.factor_type(f).tag() != "EDGE_PRIOR_SE2") continue;
+    ++priors;
+    with.insert(sparse.factor(f).variables.front());
+  }
+  EXPECT_EQ(priors, static_cast<int>(with.size()));
+  EXPECT_LE(priors, 3);
+  EXPECT_GE(priors, 1);
 }
 
 TEST_P(MapSparsifierOf, AbsorbsARelativePriorThatMarginalisationLeft) {
@@ -437,15 +502,11 @@ TEST_P(MapSparsifierOf, MakesRoomForWhatComes) {
 
 TEST_P(MapSparsifierOf, SaysWhyTooManyStay) {
   GraphUpdate update = ring(0.01);
-  for (Id k = 1; k < 10; ++k) {
-    if (k == 4) continue;
-    update.factors.push_back(
-        {registry_.factor_type("EDGE_PRIOR_SE2"), {k}, {3, 3, 1}, kInformation});
-  }
+  for (Variable& variable : update.variables) variable.fixed = variable.id != 4;
   estimator_->update(update);
   const PoseRemover::Removal removal = sparsifier_.make_room(*estimator_, 7, {});
   EXPECT_EQ(removal.update.removed_variables, std::vector<Id>{4});
-  EXPECT_THAT(removal.note, HasSubstr("EDGE_PRIOR_SE2 on VERTEX_SE2"));
+  EXPECT_THAT(removal.note, HasSubstr("all are fixed, anchored, or among the newest"));
 }
 
 TEST_P(MapSparsifierOf, SelectionsByNameChoose) {

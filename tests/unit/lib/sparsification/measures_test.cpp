@@ -195,5 +195,66 @@ TEST_F(MarginalDivergence, SaysWhatCannotBeCompared) {
       "6297 coordinates");
 }
 
+// Overconfidence ----------------------------------------------------------------------------------
+
+/// The eigenvalues of Λ − Λ̆ by dense algebra: of the marginals of both graphs at the same states.
+VectorXd dense_difference(const Graph& original, const Graph& sparse) {
+  Graph at_original = sparse.clone();
+  for (int v = 0; v < sparse.variable_count(); ++v)
+    at_original.set_state(v, original.state(*original.find(sparse.id(v))));
+  const auto held = [&](const Graph& graph) {
+    std::vector<bool> all = resolve_gauge(graph).held;
+    for (const int v : resolve_gauge(sparse).anchored) all[*graph.find(sparse.id(v))] = true;
+    return all;
+  };
+  const DenseSystem p = dense_system(original, held(original)),
+                    q = dense_system(at_original, held(at_original));
+  std::vector<Eigen::Index> kept, of_q, left;
+  for (const auto& [id, rows] : p.rows) {
+    const auto at = q.rows.find(id);
+    for (Eigen::Index k = 0; k < rows.size; ++k) {
+      (at == q.rows.end() ? left : kept).push_back(rows.first + k);
+      if (at != q.rows.end()) of_q.push_back(at->second.first + k);
+    }
+  }
+  const MatrixXd across = p.H(left, kept);
+  const MatrixXd marginal =
+      p.H(kept, kept) - across.transpose() * symmetric_inverse(p.H(left, left)) * across;
+  return eigenvalues_of(marginal - q.H(of_q, of_q));
+}
+
+TEST_F(MarginalDivergence, OverconfidenceIsTheLeastEigenvalueOfTheDifference) {
+  for (const std::string kind :
+       {"manhattan:poses=60", "sphere:turns=4,poses_per_turn=8", "landmarks2d:poses=40"}) {
+    for (const std::string options : {"population=tree:1", "population=tree:2",
+                                      "resolve=false,recovery=ncfd:conservative=true"}) {
+      SCOPED_TRACE(kind + ", " + options);
+      const Graph original = optimized(kind);
+      std::vector<int> nodes;
+      for (int v = 1; v + 1 < original.variable_count(); v += 3) {
+        if (original.type(v).tangent_size() >= 3) nodes.push_back(v);
+      }
+      Graph sparse = original.clone();
+      const bool conservative = options.find("conservative") != std::string::npos;
+      ComponentSpec spec{"sparsify", {}};
+      if (conservative) {
+        spec.values = {{"resolve", "false"}, {"recovery", "ncfd:conservative=true"}};
+      } else {
+        spec.values = {{"population", options.substr(options.find('=') + 1)}};
+      }
+      apply(registry_.make<Sparsifier>(spec)->remove(original, nodes), sparse);
+      const VectorXd eigenvalues = dense_difference(original, sparse);
+      const double found = overconfidence(original, sparse, *solver_);
+      const double size = eigenvalues.cwiseAbs().maxCoeff();
+      EXPECT_NEAR(found, eigenvalues[0], 1e-5 * std::abs(eigenvalues[0]) + 1e-9 * size);
+      if (conservative) {
+        EXPECT_GT(found, -1e-8 * size);
+      } else {
+        EXPECT_LT(found, -1e-3 * size);
+      }
+    }
+  }
+}
+
 }  // namespace
 }  // namespace cairn::test

@@ -124,8 +124,8 @@ TEST_P(SparsifyingSession, TheMapCanBeWrittenAfterwards) {
 
 TEST_P(SparsifyingSession, RefusesWhatItCannotDoAndChangesNothing) {
   std::vector<std::string> lines = drive(0, 8);
-  lines.insert(lines.end(), {"VERTEX_XY 50 1 1", "EDGE_SE2_XY 3 50 0.5 0.5 9 0 9",
-                             "EDGE_PRIOR_SE2 5 1 1 0 9 0 0 9 0 9", "NEW VERTEX_SE2 60"});
+  lines.insert(lines.end(), {"VERTEX_XY 50 1 1", "EDGE_BEARING_RANGE_SE2_XY 3 50 0.5 1.5 9 0 9",
+                             "EDGE_PRIOR_XY 50 1 1 9 0 9", "NEW VERTEX_SE2 60"});
   take_all(lines);
   const std::string before = map();
   const std::vector<std::pair<std::string, std::string>> refused = {
@@ -135,9 +135,8 @@ TEST_P(SparsifyingSession, RefusesWhatItCannotDoAndChangesNothing) {
       {"SPARSIFY 60", "there is no variable 60 to be removed"},  // no measurement yet
       {"SPARSIFY 2 2", "variable 2 is to leave twice"},
       {"SPARSIFY 0", "marginalising it would leave a linear prior on them instead"},
-      {"SPARSIFY 3", "VERTEX_XY 50"},
-      {"SPARSIFY 5", "EDGE_PRIOR_SE2 on VERTEX_SE2 5"},
-      {"SPARSIFY 50", "relate poses of one kind only"},
+      {"SPARSIFY 3", "no factor of the graph measures the position of a landmark"},
+      {"SPARSIFY 50", "no factor of the graph measures a whole pose in the world"},
       {"SPARSIFY KEEP", "expected 'SPARSIFY KEEP n' or 'SPARSIFY KEEP ALL'"},
       {"SPARSIFY KEEP 1", "expected a number of poses from 2"},
       {"SPARSIFY KEEP many", "'many' is not a valid number of poses"},
@@ -188,15 +187,18 @@ TEST_P(SparsifyingSession, WhereSolvingIsExplicitPosesLeaveWhenItIsAskedFor) {
 }
 
 TEST_P(SparsifyingSession, SaysOnceWhyMorePosesStay) {
-  std::vector<std::string> lines = drive(0, 10);
-  for (int k = 1; k < 10; ++k)
-    lines.push_back("EDGE_PRIOR_SE2 " + std::to_string(k) + " 1 1 0 9 0 0 9 0 9");
+  std::vector<std::string> lines;
+  for (int k = 0; k < 10; ++k) {
+    const std::string id = std::to_string(k);
+    lines.insert(lines.end(), {"VERTEX_SE2 " + id + " " + id + " 0 0", "FIX " + id});
+    if (k > 0) lines.push_back(edge(k - 1, k, 1.0, 0.0));
+  }
   take_all(lines);
   EXPECT_THAT(take("SPARSIFY KEEP 5").text, StartsWith("NOTE more poses stay than are to be kept"));
   EXPECT_EQ(estimator_->variable_count(), 10);
   EXPECT_THAT(take_all(drive(10, 11)), Not(HasSubstr("NOTE more poses")));
   EXPECT_EQ(estimator_->variable_count(), 11);
-  // The two without priors: one may leave when the next comes.
+  // The two that are not fixed: one may leave when the next comes.
   EXPECT_THAT(take_all(drive(11, 13)), HasSubstr("REMOVED 10\n"));
 }
 

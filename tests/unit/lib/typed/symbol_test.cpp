@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "cairn/graph/graph.hpp"
+#include "cairn/typed/build.hpp"
 #include "cairn/typed/point.hpp"
 
 namespace cairn {

@@ -284,6 +284,34 @@ TEST_F(Recovery, AConservativeOneClaimsNothingThatTheDenseOneDoesNot) {
   EXPECT_THAT(overconfident, Gt(10));
 }
 
+/// Within the constraint, no worse than one scale for all factors, and no better than the optimum
+/// under it.
+TEST_F(Recovery, ConservativeFactorDescentIsBetweenOneScaleAndTheOptimum) {
+  int better = 0;
+  for (std::size_t b = 0; b < blankets_->size(); b += 4) {
+    const DenseBlanket& blanket = (*blankets_)[b];
+    const RecoveryProblem problem = problem_of(blanket, populated(blanket, 1.5));
+    const Matrix I = Matrix::Identity(problem.rank, problem.rank);
+    for (const bool greedy : {false, true}) {
+      const RecoveryOptions options{.tolerance = 1e-5};
+      const RecoveryResult free = FactorDescent(options, greedy).recover(problem);
+      const RecoveryResult held = FactorDescent(options, greedy, true).recover(problem);
+      expect_possible(problem, held);
+      EXPECT_THAT(least_eigenvalue(I - approximated(problem, informations(problem, held))),
+                  Ge(-1e-9));
+      const Matrix L = approximated(problem, informations(problem, free));
+      const double scale = 1.0 / std::max(1.0, -least_eigenvalue(-L));
+      const double scaled = dense_kld(scale * L);
+      EXPECT_THAT(held.kld, Le(scaled + 1e-5 * (1.0 + scaled)));
+      better += held.kld < 0.9 * scaled;
+      const RecoveryResult optimum =
+          InteriorPoint({.recovery = {.tolerance = 1e-6}, .conservative = true}).recover(problem);
+      EXPECT_THAT(held.kld, Ge(optimum.kld - 1e-5));
+    }
+  }
+  EXPECT_THAT(better, Gt(10));
+}
+
 TEST_F(Recovery, EndsEarlyWhereItIsTold) {
   for (std::size_t b = 90; b < blankets_->size(); b += 10) {
     const DenseBlanket& blanket = (*blankets_)[b];

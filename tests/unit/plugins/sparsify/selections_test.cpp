@@ -237,8 +237,7 @@ TEST_F(Selections, LeastLossNeverTakesWhatTheSparsifierCannot) {
   Graph graph = solved(registry, "manhattan:poses=80,loop_density=0.5");
   graph.set_fixed(17);
   graph.set_fixed(0);
-  const auto prior = registry.factor_type("EDGE_PRIOR_SE2");
-  graph.add_factor(prior, std::array{33}, graph.state(33), pack(Matrix::Identity(3, 3)));
+  graph.set_fixed(33);
   const auto sparsifier = registry.make<Sparsifier>("sparsify");
   const std::vector<double> losses = sparsifier->losses(graph, all(graph));
   for (const int v : {0, 17, 33}) EXPECT_EQ(losses[v], std::numeric_limits<double>::infinity());
@@ -263,6 +262,46 @@ TEST_F(Selections, OfTheTwoNearestTheOneThatCostsLessLeaves) {
   // Orientation counts as far as it is asked for.
   graph.set_state(4, std::array{3.2, 0.0, 1.0});
   EXPECT_THAT(Nearest({.angle = 1.0}).choose(graph, all(graph), priced, 1), ElementsAre(1));
+}
+
+TEST_F(Selections, DistancesToNodesThatStayNeedNotCount) {
+  Graph graph = chain(5);
+  for (int v = 0; v < 5; ++v) {
+    constexpr std::array kPlaces{0.0, 2.0, 5.0, 9.0, 10.0};
+    graph.set_state(v, std::array{kPlaces[v], 0.0, 0.0});
+  }
+  Priced priced({{0, 5}, {1, 1}, {2, 9}, {3, 9}});
+  const std::array open{0, 1, 2, 3};  // 4 is the newest
+  EXPECT_THAT(Nearest({}).choose(graph, open, priced, 1), ElementsAre(3));
+  EXPECT_THAT(Nearest({.leaving = true}).choose(graph, open, priced, 2), ElementsAre(1, 2));
+  // Where there are no two such nodes, all count.
+  EXPECT_THAT(Nearest({.leaving = true}).choose(graph, std::array{3}, nobody, 1), ElementsAre(3));
+}
+
+/// The search along x finds what comparing all pairs finds, ties included.
+TEST_F(Selections, TheNearestAreThoseOfAllPairs) {
+  const Graph graph = simulate(registry, "manhattan:poses=120,streets=3,noise=0");
+  std::map<Id, double> prices;
+  for (Id k = 0; k < 120; ++k) prices[k] = 0.0;
+  Priced priced(prices);
+  std::vector<int> left = all(graph), expected;
+  while (expected.size() < 60) {
+    double least = std::numeric_limits<double>::infinity();
+    int leaves = -1;
+    for (std::size_t a = 0; a < left.size(); ++a) {
+      for (std::size_t b = 0; b < left.size(); ++b) {
+        const auto x = graph.state(left[a]), y = graph.state(left[b]);
+        const double there =
+            std::sqrt((x[0] - y[0]) * (x[0] - y[0]) + (x[1] - y[1]) * (x[1] - y[1]));
+        if (a == b || there >= least) continue;
+        least = there;
+        leaves = std::min(left[a], left[b]);
+      }
+    }
+    expected.push_back(leaves);
+    std::erase(left, leaves);
+  }
+  EXPECT_EQ(Nearest({.neighbours = 1000}).choose(graph, all(graph), priced, 60), expected);
 }
 
 TEST_F(Selections, WhereManyLeaveTheSameOnesDo) {

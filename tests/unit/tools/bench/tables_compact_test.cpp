@@ -204,6 +204,18 @@ TEST(CompactTables, ShowHowManyAreKeptAfterManyLapsAndWhetherStepsGrow) {
   EXPECT_THAT(text, HasSubstr("| FPFL as published | 9.00 | 1.00 | 2.00 | 3.00 | 4.00 |\n"));
 }
 
+TEST(CompactTables, OfAMillionPosesHaveARowForEachStop) {
+  const auto million = report("compact_million", R"({"part": "drive", "poses": 100000, "kept": 2000,
+      "factors": 3600, "memory": 6.8e7, "median": 4e-5, "p99": 0.002, "longest": 0.03,
+      "asked": 1.5, "left": 0.0123, "ate": 0.25, "ate_rotation": 0.01},
+      {"part": "errors", "name": "live", "poses": 100000, "ate": 0.5, "ate_rotation": 0.0174533})");
+  EXPECT_THAT(section(million, "compact-million"),
+              HasSubstr("| 100000 | 2000 | 3600 | 68 | 0.0400 | 2.00 | 30.0 | 1.50 | 1.23 % | "
+                        "0.250 |\n"));
+  EXPECT_THAT(section(million, "compact-million-errors"),
+              HasSubstr("| compact, each pose when it was the newest | 100000 | 0.500 | 1.00 |\n"));
+}
+
 TEST(CompactTables, CallCovariancesHonestWithinTheBandOfChi2) {
   const auto entry = [](const std::string& strategy, double squared) {
     return fmt::format(

@@ -7,12 +7,14 @@
 #include <string>
 #include <string_view>
 #include <unordered_map>
+#include <unordered_set>
 #include <vector>
 
 #include "cairn/geometry/motion.hpp"
 #include "cairn/io/stream_format.hpp"
 #include "cairn/online/line_session.hpp"
 #include "cairn/plugin/registry.hpp"
+#include "cairn/policy/id_runs.hpp"
 #include "cairn/policy/pose_policy.hpp"
 #include "cairn/runtime/api.hpp"
 
@@ -112,6 +114,7 @@ class CAIRN_API PolicySession final : public LineSession {
   // Answers
   void answer(Reply& reply);
   void note_link(const LinkReport& link);
+  void note_removed();
   void write_results(bool kept);
   bool in_graph(Id id) const;
   bool on_map(Id id) const;
@@ -127,11 +130,13 @@ class CAIRN_API PolicySession final : public LineSession {
   std::optional<Id> first_, newest_, before_;  ///< that the policy has
   bool open_ = false, finished_ = false, converged_ = true;
   std::optional<Measured> measured_;
-  bool asked_place_ = false;              ///< LOCATE, for the open pose
-  std::string asked_;                     ///< MATCH …, while nothing came in answer
-  std::unordered_map<Id, bool> arrived_;  ///< and whether it was kept
-  std::vector<LinkReport> reported_;      ///< links of the open pose
-  std::string answer_;                    ///< what the next answer begins with
+  bool asked_place_ = false;          ///< LOCATE, for the open pose
+  std::string asked_;                 ///< MATCH …, while nothing came in answer
+  IdRuns arrived_;                    ///< all poses that ever came
+  std::unordered_set<Id> kept_;       ///< those that are in the graph, but for the open pose
+  bool removes_ = false;              ///< poses have left
+  std::vector<LinkReport> reported_;  ///< links of the open pose
+  std::string answer_;                ///< what the next answer begins with
 
   std::unordered_map<Id, std::string> reported_states_;  ///< for `changed`
   Counts counts_;

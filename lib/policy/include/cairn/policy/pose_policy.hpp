@@ -112,6 +112,9 @@ class CAIRN_API PosePolicy : public Component {
   virtual Estimator& estimator() = 0;
   /// The poses that are kept, in the order of arrival.
   virtual std::vector<Id> kept() const = 0;
+  /// Poses that were kept, and have left with the latest `end_pose` or `finish`: factors between
+  /// others have taken their place. None, unless a policy bounds the number of poses that it keeps.
+  virtual std::vector<Id> removed() const { return {}; }
   /// How many factors there are between them; the estimator need not have all of them yet.
   virtual int factor_count() const = 0;
   /// The newest pose as it is estimated, kept or not.

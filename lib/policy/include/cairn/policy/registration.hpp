@@ -42,7 +42,8 @@ class CAIRN_API Registration : public Component {
   /// A match of a pose with any of these, while it is unknown which of them are near: place
   /// recognition. Unless overridden, `match` is called for one after the other.
   virtual std::optional<RecognisedPlace> recognise(std::span<const Id> places, Id pose);
-  /// Called after each pose of a run: whether the policy keeps it. Does nothing unless overridden.
+  /// Called after each pose of a run: whether the policy keeps it; and again with false for a pose
+  /// that was kept when it leaves. Does nothing unless overridden.
   virtual void pose_ended(Id pose, bool kept);
 };
 

@@ -22,7 +22,8 @@ namespace cairn {
 ///   the first otherwise the initial estimate, all others peers;
 /// - graphs without factors (trajectories) over the last graph that has their ids, the first of
 ///   them as ground truth unless that is given;
-/// - recordings and reports of runs with their graph.
+/// - recordings and reports of runs with their graph;
+/// - tables as they are.
 ///
 /// Everything else stands by itself. Add everything, in any order, then `finish`. A file's name
 /// identifies it: reports name the files of their graph and estimate.
@@ -42,6 +43,11 @@ class CAIRN_API AlbumBuilder {
   void add_recording(Scene recording) { recordings_.push_back(std::move(recording)); }
   void add_report(const std::string& file, std::variant<RunReport, BenchReport> report) {
     reports_.emplace_back(file, std::move(report));
+  }
+  /// What `read_number_table` has read, under this name.
+  void add_table(NumberTable table, std::string name) {
+    table.name = std::move(name);
+    tables_.push_back(std::move(table));
   }
   void set_truth(const std::string& file, Graph truth) { truth_.emplace(file, std::move(truth)); }
   /// Shows where this computation of initial estimates puts every graph; it outlives `finish`.
@@ -94,6 +100,7 @@ class CAIRN_API AlbumBuilder {
   InitialGuess* initial_ = nullptr;  // borrowed until `finish`
   std::vector<std::string> notes_;
   std::string bench_;
+  std::vector<NumberTable> tables_;
 };
 
 /// "sphere.g2o" of "maps/sphere.g2o"; a generator's name ("@city") as it is.

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "cairn/graph/graph.hpp"
+#include "cairn/report/number_table.hpp"
 #include "cairn/runtime/api.hpp"
 #include "cairn/runtime/component.hpp"
 #include "cairn/solve/optimizer.hpp"
@@ -133,7 +134,8 @@ struct Album {
   std::string machine, build;      ///< JSON objects as in the program's reports, or empty
   std::vector<std::string> notes;  ///< sentences for the reader
   std::vector<Scene> scenes;
-  std::string bench;  ///< the report of `cairn bench --json`, or empty
+  std::string bench;                ///< the report of `cairn bench --json`, or empty
+  std::vector<NumberTable> tables;  ///< what plots of columns draw; the page has no part for them
 };
 
 /// Draws an `Album`. The names of this kind are those of output formats (html, svg, …); what is

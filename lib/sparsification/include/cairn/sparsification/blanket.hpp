@@ -17,9 +17,16 @@ struct FactorModel {
 /// What marginalising leaves on a Markov blanket: N(0, Λ⁻¹) in the tangent space of its nodes,
 /// whose sizes add up to d. Λ is singular where only relative measurements led to it.
 struct DenseBlanket {
-  std::vector<int> node_sizes;      ///< tangent size of each node
+  /// Tangent size of each node: first the poses, which are all of one size, then the landmarks,
+  /// which are smaller.
+  std::vector<int> node_sizes;
   std::vector<double> information;  ///< Λ, d × d
   std::vector<FactorModel> models;  ///< what a topology can choose from
+  /// An absolute measurement led to it, so Λ does not leave the pose of the whole open; there are
+  /// models on single nodes (priors).
+  bool absolute = false;
+
+  bool is_landmark(int node) const { return node_sizes[node] < node_sizes.front(); }
 
   CAIRN_API int size() const;  ///< d
   /// First tangent coordinate of each node, and d at the end.

@@ -52,8 +52,9 @@ class CAIRN_API MapSparsifier final : public PoseRemover {
   void prepare();
 
   /// Throws `Error` (input) if a pose is not there, is named twice, or cannot be removed: it is
-  /// fixed, has a factor that determines its absolute pose, or has a neighbour of another kind,
-  /// such as a landmark.
+  /// fixed, has a neighbour that is neither a pose of its kind nor a landmark, or has landmarks as
+  /// its only neighbours; or the graph has no factor of a type that the new ones need. A landmark
+  /// may be removed as well.
   Removal remove(Estimator& estimator, std::span<const Id> poses) override;
   /// The selection chooses from all poses but those that are fixed or anchored, the newest one, and
   /// those of the factors of `coming`. Variables that are not poses of a Lie group do not count.

@@ -41,7 +41,8 @@ struct RecoveryProblem {
 /// How coordinates are chosen in which the dense Gaussian has a covariance (T 4.3).
 enum class Projection {
   eigen,  ///< those of the eigenvectors of Λ whose eigenvalues are not zero
-  node,   ///< relative to the blanket's first node, which must be all that Λ leaves open
+  node,   ///< relative to the blanket's first node, which must be all that Λ leaves open; of an
+          ///< absolute blanket, which must leave nothing open, those of the nodes
 };
 constexpr auto enum_names(Projection) {
   return std::to_array<EnumName<Projection>>(
@@ -51,7 +52,7 @@ constexpr auto enum_names(Projection) {
 /// Coordinates z with δ = T z in which the dense Gaussian is N(0, I): TᵀΛT = I.
 class CAIRN_API BlanketProjection {
  public:
-  /// Throws `Error` (numerical) if Λ is zero, or, for `node`, if more than one node is open.
+  /// Throws `Error` (numerical) if Λ is zero, or, for `node`, if it leaves more open than that.
   BlanketProjection(const DenseBlanket& blanket, Projection projection);
 
   int rank = 0;                                        ///< r

@@ -25,7 +25,7 @@ struct SparsificationRecord {
   std::vector<std::vector<double>> states;   ///< of the blanket, where it was linearised
   std::string variable_type, factor_type;    ///< tags
   const DenseBlanket* dense = nullptr;       ///< good during the call
-  const RecoveryResult* recovery = nullptr;  ///< likewise; null: the blanket had one node
+  const RecoveryResult* recovery = nullptr;  ///< likewise; null: nothing had to be recovered
   int factors_before = 0;                    ///< that leave
   int factors_after = 0;                     ///< that come
 };
@@ -54,7 +54,7 @@ struct Sparsification {
   std::vector<Factor> factors;         ///< that take their place
   std::vector<RefusedNode> refused;
 
-  int problems = 0;           ///< blankets of two nodes and more
+  int problems = 0;           ///< blankets that got factors
   double mean_blanket = 0.0;  ///< nodes of a blanket, on average
   int largest_blanket = 0;
   double kld = 0.0;       ///< sum over the problems, each by itself [nats]

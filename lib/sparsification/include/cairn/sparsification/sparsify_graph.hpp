@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <functional>
@@ -13,17 +14,26 @@
 #include "cairn/plugin/options.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/api.hpp"
+#include "cairn/runtime/enum_names.hpp"
 #include "cairn/solve/optimizer.hpp"
 #include "cairn/sparsification/sparsification.hpp"
 #include "cairn/types/loss.hpp"
 
 namespace cairn {
 
+/// Which kind of nodes may leave.
+enum class NodeKind { poses, landmarks, all };
+constexpr auto enum_names(NodeKind) {
+  return std::to_array<EnumName<NodeKind>>(
+      {{NodeKind::poses, "poses"}, {NodeKind::landmarks, "landmarks"}, {NodeKind::all, "all"}});
+}
+
 /// Which components take nodes out of a graph, and which nodes.
 struct SparsifyJob {
   ComponentSpec sparsifier;  ///< with its options
   ComponentSpec selection;
   ComponentSpec optimizer;
+  NodeKind nodes = NodeKind::poses;                ///< that the selection chooses from
   std::string linear_solver = "block_cholesky";    ///< for determinants
   std::string estimator = "incremental_cholesky";  ///< online
   int online = 0;                                  ///< online: take nodes out after so many poses
@@ -32,7 +42,7 @@ struct SparsifyJob {
   /// are redirected at once (Vallvé 2018, section 4.6.4); 0: only once these have left.
   int redirect_early = 0;
   bool as_given = false;  ///< the graph is at its minimum: it is not optimised before
-  bool measure = true;    ///< KLD and RMSE of the whole
+  bool measure = true;    ///< KLD, RMSE and overconfidence of the whole
   ComparedAt compared_at = ComparedAt::common;  ///< for the KLD
 };
 
@@ -42,6 +52,7 @@ struct SparsifyResult {
   std::int64_t variables_before = 0, factors_before = 0;
   /// From the original graph; online, from a graph with the same factors redirected.
   std::optional<SparsificationError> error;
+  double overconfidence = std::nan("");  ///< see `overconfidence`, of the same two; NaN: not known
   /// Online: distance of the estimate from the minimum of all factors as they arrived [m]; NaN: not
   /// known.
   double rmse_full = std::nan("");
@@ -86,14 +97,15 @@ struct SparsifySetting {
 };
 
 /// Optimises a whole graph, takes nodes out of it, optimises what is left, and measures what was
-/// lost. Every free variable that forms a Lie group may leave, but for the newest. Throws `Error`
-/// for names and options that there are not.
+/// lost. Every free pose may leave but the newest, and every free landmark, as far as `job.nodes`
+/// has them. Throws `Error` for names and options that there are not.
 CAIRN_API SparsifyResult sparsify_whole(const Graph& graph, const SparsifyJob& job,
                                         const SparsifySetting& setting);
 
 /// Feeds a recorded graph to an estimator pose by pose, and takes nodes out after every
 /// `job.online` poses. Factors that arrive for nodes that have left are redirected to others, or
-/// dropped (Vallvé 2018, section 4.6.4).
+/// dropped (Vallvé 2018, section 4.6.4); so poses alone may leave. Throws `Error` (usage) for
+/// another `job.nodes`.
 CAIRN_API SparsifyResult sparsify_online(const Graph& recording, const SparsifyJob& job,
                                          const SparsifySetting& setting);
 

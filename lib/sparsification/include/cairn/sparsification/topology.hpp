@@ -20,8 +20,8 @@ class CAIRN_API Topology : public Component {
   ~Topology() override;
 
   /// At most `population` factors that connect all nodes, the most important first; at least as
-  /// many as a spanning tree has. Throws `Error` (usage) for a blanket that it does not know how to
-  /// connect.
+  /// many as a spanning tree has. One of them is a prior where the blanket is absolute. Throws
+  /// `Error` (usage) for a blanket that it does not know how to connect.
   virtual std::vector<FactorChoice> choose(const DenseBlanket& blanket, int population) = 0;
 };
 

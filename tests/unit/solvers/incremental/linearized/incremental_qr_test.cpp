@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
 
+#include "cairn/linear/graph_marginals.hpp"
+#include "cairn/linear/linear_solver.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/solve/estimator.hpp"
 #include "support/components.hpp"
@@ -55,10 +58,13 @@ TEST(IncrementalQr, IsPeriodicBatchWithoutTheSolve) {
   }
 }
 
-/// With linearisation points that stay, the estimate is R⁻¹b: that of one batch linear solve.
+/// Σ = R⁻¹ R⁻ᵀ is that of H at the same states. The states are compared less closely: chi2 is the
+/// same to the last bit within some 1e-8 of its minimum, and which of those states has the lowest
+/// is rounding.
 TEST(IncrementalQr, GivesTheCovarianceOfBatchAfterABatchStep) {
   CAIRN_NEEDS("estimator", "incremental_qr");
   CAIRN_NEEDS("estimator", "batch");
+  CAIRN_NEEDS("linear_solver", "block_cholesky");
   Registry registry;
   const Graph graph = poses_and_points(30, 0.05);
   const auto qr = registry.make<Estimator>("incremental_qr:tolerance=1e-16");
@@ -69,15 +75,35 @@ TEST(IncrementalQr, GivesTheCovarianceOfBatchAfterABatchStep) {
   }
   EXPECT_TRUE(qr->update({}, {.full = true}).converged);
   batch->update({}, {.full = true});
-  expect_same_estimate(*qr, *batch, 1e-9);
+  expect_same_estimate(*qr, *batch, 1e-7);
+  EXPECT_NEAR(qr->chi2(), batch->chi2(), 1e-13 * batch->chi2());
+  Graph there = graph.clone();
+  for (int v = 0; v < there.variable_count(); ++v) there.set_state(v, qr->state(there.id(v)));
+  const auto solver = registry.make<LinearSolver>("block_cholesky");
+  GraphMarginals marginals(there, *solver);
+  ASSERT_TRUE(marginals.factorize().ok);
   const std::vector<Id> all = qr->variables();
-  const auto rows = static_cast<std::size_t>(graph.tangent_size());
   for (const Id id : all) {
+    const int v = *there.find(id);
+    std::vector<std::pair<int, int>> pairs;
+    for (const Id row : all) pairs.emplace_back(*there.find(row), v);
+    std::vector<double> wanted = marginals.blocks(pairs);
+    std::size_t rows = 0;
+    for (const Id row : all) rows += static_cast<std::size_t>(qr->type(row)->tangent_size());
     const auto columns = static_cast<std::size_t>(qr->type(id)->tangent_size());
-    std::vector<double> found(rows * columns), wanted(rows * columns);
+    std::vector<double> found(rows * columns);
     ASSERT_TRUE(qr->covariance_column(id, all, found));
-    ASSERT_TRUE(batch->covariance_column(id, all, wanted));
-    for (std::size_t k = 0; k < wanted.size(); ++k) EXPECT_NEAR(found[k], wanted[k], 1e-9) << id;
+    // One block after the other there, one column after the other here.
+    std::size_t first = 0, block = 0;
+    for (const Id row : all) {
+      const auto height = static_cast<std::size_t>(qr->type(row)->tangent_size());
+      for (std::size_t c = 0; c < columns; ++c) {
+        for (std::size_t r = 0; r < height; ++r)
+          EXPECT_NEAR(found[c * rows + first + r], wanted[block + c * height + r], 1e-9) << id;
+      }
+      first += height;
+      block += height * columns;
+    }
   }
 }
 

@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// A compact graph of at most so many poses: others leave, and factors between their neighbours take
+// their place.
+#include <algorithm>
+#include <unordered_set>
+#include <utility>
+
+#include "cairn/runtime/timed.hpp"
+#include "compact_graph.hpp"
+#include "compact_pose.hpp"
+
+namespace cairn::compact {
+namespace {
+
+/// Appends what follows a pose that has left to what led there. Where the pose was not reached but
+/// matched, the way there from the pose that was matched and back is no part of the trajectory.
+void append(OdometryChain&& next, OdometryChain& chain) {
+  auto first = next.steps.begin();
+  if (!chain.steps.empty() && chain.steps.back().matched && first != next.steps.end() &&
+      first->matched) {
+    chain.steps.pop_back();
+    ++first;
+  }
+  chain.steps.insert(chain.steps.end(), std::make_move_iterator(first),
+                     std::make_move_iterator(next.steps.end()));
+  chain.to = next.to;
+}
+
+}  // namespace
+
+void CompactPose::make_room() {
+  removed_.clear();
+  if (!remover_ || graph_.size() <= options_.keep) return;
+  std::vector<int> held;
+  for (const Waiting& waiting : waiting_)
+    held.insert(held.end(), {waiting.link.earlier, waiting.link.later});
+  CompactGraph::Leaving leaving = graph_.make_room(*remover_, options_.keep, held, report_.seconds);
+  if (leaving.note != noted_ && !leaving.note.empty()) report_.notes.push_back(leaving.note);
+  noted_ = std::move(leaving.note);
+  if (leaving.poses.empty()) return;
+  removed_ = std::move(leaving.poses);
+  record_.renumber(leaving.now);
+  for (Waiting& waiting : waiting_) {
+    waiting.link.earlier = leaving.now[waiting.link.earlier];
+    waiting.link.later = leaving.now[waiting.link.later];
+  }
+}
+
+CompactGraph::Leaving CompactGraph::make_room(PoseRemover& remover, int limit,
+                                              std::span<const int> held, PolicySeconds& seconds) {
+  update({}, seconds);  // now the estimator has everything
+  const Timed timed(seconds.estimate);
+  GraphUpdate staying;  // a remover leaves poses alone that something is about to be measured of
+  Factor& factor = staying.factors.emplace_back();
+  factor.variables = {kept_.back().id, kept_[map_size_].id};
+  if (!newest_.kept) factor.variables.push_back(kept_[newest_.predecessor].id);
+  for (const int pose : held) factor.variables.push_back(kept_[pose].id);
+  PoseRemover::Removal removal = remover.make_room(*estimator_, limit, staying);
+  Leaving leaving{.poses = removal.update.removed_variables, .now = {}, .note = removal.note};
+  if (leaving.poses.empty()) return leaving;
+  const std::unordered_set<Id> gone(leaving.poses.begin(), leaving.poses.end());
+  int left = 0;
+  for (const Kept& pose : kept_) leaving.now.push_back(gone.contains(pose.id) ? -1 : left++);
+  const UpdateReport report = estimator_->update(removal.update);
+  copy_.reset();
+  renumber(removal.update, report.first_factor, leaving.now);
+  join_chains(removal.update);
+  full_ = true;
+  refresh();
+  return leaving;
+}
+
+/// After poses have left, and factors have come in their place.
+void CompactGraph::renumber(const GraphUpdate& leaving, FactorId first_factor,
+                            std::span<const int> now) {
+  const std::unordered_set<FactorId> removed(leaving.removed_factors.begin(),
+                                             leaving.removed_factors.end());
+  std::map<std::pair<int, int>, Bridge> bridges;
+  for (auto& [ends, bridge] : bridges_) {
+    if (removed.contains(bridge.factor)) continue;
+    bridges.emplace(std::pair{now[ends.first], now[ends.second]}, std::move(bridge));
+  }
+  map_size_ -= static_cast<int>(std::ranges::count(now.first(map_size_), -1));
+  std::erase_if(kept_, [&, k = 0](const Kept&) mutable { return now[k++] < 0; });
+  solved_ = size();
+  anchor_ = newest_.kept ? size() - 1 : now[anchor_];
+  if (newest_.predecessor >= 0) newest_.predecessor = now[newest_.predecessor];
+  number_.clear();
+  index_ = std::make_unique<PoseIndex>(group_->dimension());
+  for (int k = 0; k < size(); ++k) {
+    number_.emplace(kept_[k].id, k);
+    index_->add(kept_[k].placed.at.t);
+  }
+  // What the robot measures between the same two poses is fused with what they were given.
+  for (std::size_t k = 0; k < leaving.factors.size(); ++k) {
+    const Factor& factor = leaving.factors[k];
+    if (factor.variables.size() != 2 || !factor.type->is_relative()) continue;
+    const std::pair<int, int> ends =
+        std::minmax(find(factor.variables[0]), find(factor.variables[1]));
+    bridges.insert_or_assign(ends, Bridge{first_factor + static_cast<FactorId>(k),
+                                          group_->motions().of_factor(factor, id(ends.first))});
+  }
+  bridges_ = std::move(bridges);
+}
+
+/// The way from one kept pose to the next leads past those that have left.
+void CompactGraph::join_chains(const GraphUpdate& leaving) {
+  const std::unordered_set<Id> gone(leaving.removed_variables.begin(),
+                                    leaving.removed_variables.end());
+  std::vector<OdometryChain> joined;
+  joined.reserve(chains_.size());
+  for (OdometryChain& chain : chains_) {
+    if (!joined.empty() && gone.contains(chain.from)) {
+      append(std::move(chain), joined.back());
+    } else {
+      joined.push_back(std::move(chain));
+    }
+  }
+  chains_ = std::move(joined);
+}
+
+/// Of a measurement between two kept poses: ½ ln (|Σ_y + Σ_d| / |Σ_y|) [nats].
+double CompactGraph::gain(std::pair<int, int> ends, const Motion& measured) {
+  return mutual_information(to_matrix(measured.covariance, group_->tangent_size()),
+                            between(ends.first, ends.second).covariance);
+}
+
+}  // namespace cairn::compact

@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <utility>
+
+#include <fmt/core.h>
+
+#include "cairn/geometry/pose.hpp"
+#include "local_problem.hpp"
+
+namespace cairn::sparsify {
+namespace {
+
+/// Of the nodes of a problem: poses are of one type, and so are landmarks.
+struct Kinds {
+  const VariableType* pose = nullptr;
+  const VariableType* landmark = nullptr;
+};
+
+/// Takes a node in; why nodes cannot leave because of it, or nothing.
+std::string refuse(const Graph& graph, Kinds& kinds, int leaving, int node) {
+  const VariableType& type = graph.type(node);
+  const VariableType*& kind = is_point(type) ? kinds.landmark : kinds.pose;
+  if (type.lie_group() && (!kind || kind->tag() == type.tag())) {
+    kind = &type;
+    return {};
+  }
+  if (node == leaving) {
+    return fmt::format("{} is not a pose of a Lie group, and new factors relate only such",
+                       graph.describe_variable(leaving));
+  }
+  return fmt::format(
+      "{} has a factor with {}, and new factors relate poses of one kind and their landmarks only",
+      graph.describe_variable(leaving), graph.describe_variable(node));
+}
+
+/// Whether a factor type measures a whole relative pose of two variables of that type.
+bool relates(const FactorType& type, const VariableType& pose) {
+  return type.arity() == 2 && type.is_relative() && type.residual_size() == pose.tangent_size() &&
+         type.variable_tags()[0] == pose.tag() && type.variable_tags()[1] == pose.tag();
+}
+
+/// Whether it measures a whole pose in the world: the measurement is the state itself.
+bool places(const FactorType& type, const VariableType& pose) {
+  if (type.arity() != 1 || type.variable_tags()[0] != pose.tag() ||
+      type.residual_size() != pose.tangent_size() || type.measurement_size() != pose.ambient_size())
+    return false;
+  std::vector<double> z(pose.ambient_size()), x(z.size());
+  pose.identity(z.data());
+  const double* states[] = {z.data()};
+  return type.propagate(0, states, z.data(), x.data()) && x == z;
+}
+
+/// Whether it measures the position of a landmark in the frame of a pose; a bearing and range,
+/// which are as many numbers, would lead elsewhere.
+bool observes(const FactorType& type, const VariableType& pose, const VariableType& landmark) {
+  const int n = landmark.ambient_size();
+  if (type.arity() != 2 || type.variable_tags()[0] != pose.tag() ||
+      type.variable_tags()[1] != landmark.tag() ||
+      type.residual_size() != landmark.tangent_size() || type.measurement_size() != n)
+    return false;
+  std::vector<double> world(pose.ambient_size()), z(n), seen(n);
+  pose.identity(world.data());
+  for (int k = 0; k < n; ++k) z[k] = 0.5 - 0.75 * k;
+  const double* states[] = {world.data(), z.data()};
+  return type.propagate(1, states, z.data(), seen.data()) && seen == z;
+}
+
+/// A type that the factors on the nodes that leave have, or another factor of the graph: these may
+/// have none where only pairs of correlated factors are left, for instance.
+template <class Fits>
+std::shared_ptr<const FactorType> find_type(const WorkGraph& work, const LocalProblem& local,
+                                            const Fits& fits) {
+  for (const int v : local.removed) {
+    for (const int f : work.on(v)) {
+      if (fits(*work.factor(f).type)) return work.factor(f).type;
+    }
+  }
+  for (const FactorPool& pool : work.graph().factor_pools()) {
+    if (fits(*pool.type)) return pool.type;
+  }
+  return nullptr;
+}
+
+/// Finds the types that new factors need; why there is none, or nothing.
+std::string find_types(const WorkGraph& work, const Kinds& kinds, LocalProblem& local) {
+  const Graph& graph = work.graph();
+  const std::string leaving = graph.describe_variable(local.removed.front());
+  const auto landmarks = std::ssize(local.blanket) - local.poses;
+  if (landmarks > 0 && local.poses == 0) {
+    return fmt::format("{} has only landmarks as neighbours, and new factors are on a pose each",
+                       leaving);
+  }
+  if (local.poses > 1) {
+    local.types.relative =
+        find_type(work, local, [&](const FactorType& type) { return relates(type, *kinds.pose); });
+    if (!local.types.relative) {
+      return fmt::format(
+          "{}: no factor of the graph measures a whole relative pose, as new ones do", leaving);
+    }
+  }
+  if (landmarks > 0) {
+    local.types.observation = find_type(work, local, [&](const FactorType& type) {
+      return observes(type, *kinds.pose, *kinds.landmark);
+    });
+    if (!local.types.observation) {
+      return fmt::format(
+          "{}: no factor of the graph measures the position of a landmark in the frame of a pose, "
+          "as new ones do",
+          leaving);
+    }
+  }
+  if (!local.absolute) return {};
+  local.types.prior =
+      find_type(work, local, [&](const FactorType& type) { return places(type, *kinds.pose); });
+  if (local.types.prior) return {};
+  return fmt::format(
+      "{} has an absolute measurement, and no factor of the graph measures a whole pose in the "
+      "world, as a new one does",
+      leaving);
+}
+
+}  // namespace
+
+LocalProblem crop(const WorkGraph& work, std::vector<int> removed) {
+  const Graph& graph = work.graph();
+  LocalProblem local;
+  local.removed = std::move(removed);
+  local.blanket = work.blanket(local.removed);
+  Kinds kinds;
+  for (const std::vector<int>* nodes : {&local.removed, &local.blanket}) {
+    for (const int v : *nodes) {
+      if (local.refusal.empty()) local.refusal = refuse(graph, kinds, local.removed.front(), v);
+    }
+  }
+  const auto landmarks = std::stable_partition(local.blanket.begin(), local.blanket.end(),
+                                               [&](int v) { return !is_point(graph.type(v)); });
+  local.poses = static_cast<int>(landmarks - local.blanket.begin());
+  for (const int v : local.removed) {
+    if (graph.fixed(v)) local.refusal = fmt::format("{} is held", graph.describe_variable(v));
+    for (const int f : work.on(v)) {
+      local.factors.push_back(f);
+      local.absolute = local.absolute || work.factor(f).type->absolute_size() > 0;
+    }
+  }
+  // Where all poses are fixed an absolute measurement has nothing left to determine.
+  local.absolute = local.absolute && std::any_of(local.blanket.begin(), landmarks,
+                                                 [&](int v) { return !graph.fixed(v); });
+  if (local.refusal.empty()) local.refusal = find_types(work, kinds, local);
+  if (!local.refusal.empty()) return local;
+  // Within the blanket: what determines only how its nodes lie to each other.
+  for (const int v : local.blanket) {
+    for (const int f : work.on(v)) {
+      const WorkFactor& factor = work.factor(f);
+      const bool within = std::ranges::all_of(factor.variables, [&](int other) {
+        return std::ranges::find(local.blanket, other) != local.blanket.end();
+      });
+      if (within && factor.variables.size() > 1 && factor.type->absolute_size() == 0)
+        local.factors.push_back(f);
+    }
+  }
+  std::ranges::sort(local.factors);
+  local.factors.erase(std::unique(local.factors.begin(), local.factors.end()), local.factors.end());
+  return local;
+}
+
+}  // namespace cairn::sparsify
