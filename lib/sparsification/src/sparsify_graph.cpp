@@ -117,10 +117,17 @@ void measure(const Graph& original, Parts& parts, SparsifyResult& result) {
   try {
     result.error =
         sparsification_error(original, result.sparse, *parts.solver, parts.job.compared_at);
-    result.overconfidence = overconfidence(original, result.sparse, *parts.solver);
   } catch (const Error& error) {
     if (error.code() != ErrorCode::numerical) throw;
     result.notes.push_back(fmt::format("no KLD: {}", error.what()));
+    return;
+  }
+  try {
+    result.conservative_margin = conservative_margin(original, result.sparse, *parts.solver);
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::numerical) throw;
+    result.notes.push_back(
+        fmt::format("the smallest eigenvalue of Λ − Λ̆ is not known: {}", error.what()));
   }
 }
 
