@@ -109,6 +109,18 @@ Argument& Argument::within(int low, int high) {
   return *this;
 }
 
+Argument& Argument::none_or_within(int low, int high) {
+  const CLI::Validator number = number_within(low, high);
+  option_->check(CLI::Validator(
+      [number](std::string& text) {
+        if (text == "0") return std::string();
+        const std::string problem = number(text);
+        return problem.empty() ? problem : problem + ", or 0";
+      },
+      ""));
+  return *this;
+}
+
 Argument& Argument::within(double low, double high) {
   option_->check(number_within(low, high));
   return *this;

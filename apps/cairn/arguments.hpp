@@ -39,6 +39,8 @@ class Argument {
   // What a value must be. A refusal says what is expected: "'many' is not an integer from 0 to
   // 1024". None of them shows in the help, whose first column must stay narrow.
   Argument& within(int low, int high);
+  /// 0, which stands for no limit, or an integer within.
+  Argument& none_or_within(int low, int high);
   Argument& within(double low, double high);
   Argument& within(std::uint64_t low, std::uint64_t high);
   Argument& one_of(std::vector<std::string> choices);

@@ -348,8 +348,8 @@ void add_compact_options(ArgumentParser cli, CompactOptions& options,
   cli.add_option("--keep", options.keep,
                  "keep so many poses at most: others leave, and are replaced by factors; 0: all")
       .type_name("N")
-      .within(2.0, 1e9)
-      .show_default("0");
+      .none_or_within(2, 1000000000)
+      .show_default();
   cli.add_option("--truth", options.truth, "true poses, for errors").type_name("FILE");
   cli.add_option("--steps", options.steps, "a row for each pose, as CSV").type_name("FILE");
   add_loss_options(cli, options.problem);

@@ -203,7 +203,7 @@ std::string steps_csv(const PolicyResult& result) {
       matched += link.verdict != LinkVerdict::unmatched;
       linked += link.verdict == LinkVerdict::linked;
     }
-    poses += pose.kept;
+    poses += static_cast<int>(pose.kept) - pose.removed;
     loops += linked;
     text +=
         fmt::format("{},{},{},{},{},{},{},{},{},{},{:.9f},{:.9f},{:.9f},{:.9f}\n", pose.id,

@@ -426,8 +426,8 @@ Command add_online(ArgumentParser program) {
                  "keep so many poses: others are sparsified as new ones come; 0: all, or those "
                  "that --policy keeps")
       .type_name("N")
-      .within(2.0, 1e9)
-      .show_default("0");
+      .none_or_within(2, 1000000000)
+      .show_default();
   cli.add_option("--select", options->select,
                  "which poses leave: nearest, oldest, smallest_blanket, least_loss [nearest]")
       .type_name("NAME");

@@ -74,15 +74,8 @@ std::string output_of(const PlotOptions& options, Session& session) {
   return file;
 }
 
-/// --x and --y are of other use with CSV.
-void check_axes(const PlotOptions& options) {
+void check_columns(const PlotOptions& options) {
   if (std::ranges::any_of(options.album.files, is_csv)) return;
-  if (!options.x.empty() && options.x != "iterations" && options.x != "time") {
-    throw Error(ErrorCode::usage,
-                fmt::format("--x is '{}', expected iterations or time; a column only where FILE is "
-                            "CSV (.csv)",
-                            options.x));
-  }
   if (!options.y.empty() || options.x_max || options.logarithmic != "none")
     throw Error(ErrorCode::usage, "--y, --x-max and --log are for columns of CSV files (.csv)");
 }
@@ -90,15 +83,14 @@ void check_axes(const PlotOptions& options) {
 ComponentSpec picture_spec(const PlotOptions& options, const std::string& output,
                            Session& session) {
   check_picture(output, session);
-  check_axes(options);
+  check_columns(options);
   ComponentSpec picture{picture_format(output, session), {}};
   if (picture.name == "html") return picture;
   picture.values = {{"what", options.what},
                     {"theme", options.theme},
                     {"colour", options.colour},
                     {"linear_solver", options.linear_solver}};
-  if (options.x == "iterations" || options.x == "time") picture.values["x"] = options.x;
-  picture.values["x_column"] = options.x;
+  picture.values["x"] = options.x;
   picture.values["y_columns"] = joined(options.y, "\n");
   picture.values["logarithmic"] = options.logarithmic;
   if (options.x_max) picture.values["x_max"] = fmt::format("{}", *options.x_max);

@@ -276,7 +276,7 @@ Command add_replay(ArgumentParser program) {
   cli.add_option("--keep", options->keep,
                  "keep so many poses: others are sparsified as new ones come; 0: all")
       .type_name("N")
-      .within(2, 1000000000)
+      .none_or_within(2, 1000000000)
       .show_default();
   cli.add_option("--select", options->select, "which poses leave with --keep")
       .type_name("NAME")

@@ -60,9 +60,7 @@ SparsifyJob job_of(const SparsifyCommandOptions& options, Session& session) {
                                       ? fmt::format("keep_every:every={}", options.keep_every)
                                   : options.select.empty() ? kDefaultSelection
                                                            : options.select);
-  for (const auto& [kind, name] : enum_names(NodeKind{})) {
-    if (options.nodes == name) job.nodes = kind;
-  }
+  job.nodes = parse_enum<NodeKind>(options.nodes, "--nodes");
   job.optimizer = optimizer_spec(options.optimizer, "", session.registry());
   job.linear_solver = options.linear_solver;
   job.estimator = options.estimator;
@@ -129,7 +127,7 @@ json::object report_json(const SparsifyCommandOptions& options, const LoadedGrap
       result.error ? number_json(result.error->rmse_aligned) : json::value(nullptr);
   if (result.error)
     report["kld_parts"] = {{"covariance", result.error->covariance}, {"mean", result.error->mean}};
-  report["overconfidence"] = number_json(result.overconfidence);
+  report["conservative_margin"] = number_json(result.conservative_margin);
   report["chi2"] = {{"before", result.chi2_before}, {"after", result.chi2_after}};
   report["seconds"] = {{"total", change.seconds.total},
                        {"marginalize", change.seconds.marginalize},
@@ -173,10 +171,10 @@ std::string summary_text(const SparsifyCommandOptions& options, const LoadedGrap
     if (job.online > 0 && std::isfinite(result.rmse_full))
       text += fmt::format(", from that with all measurements by {:.3g} m", result.rmse_full);
     table.add({"lost", text});
-    if (std::isfinite(result.overconfidence)) {
-      table.add({"overconfidence",
-                 fmt::format("{:.3g}, the least eigenvalue of Λ − Λ̆{}", result.overconfidence,
-                             result.overconfidence < 0.0 ? "" : ": conservative")});
+    if (std::isfinite(result.conservative_margin)) {
+      table.add({"margin", fmt::format("{:.3g}, the smallest eigenvalue of Λ − Λ̆ (conservative "
+                                       "from 0 on)",
+                                       result.conservative_margin)});
     }
   }
   table.add(

@@ -114,16 +114,6 @@ struct Tally {
   }
 };
 
-/// After a landmark has left, there is no node to be relative to.
-BlanketProjection projection_of(const DenseBlanket& blanket) {
-  try {
-    return {blanket, Projection::node};
-  } catch (const Error& error) {
-    if (error.code() != ErrorCode::numerical) throw;
-    return {blanket, Projection::eigen};
-  }
-}
-
 bool positive(const RecoveryResult& result) {
   return std::ranges::all_of(result.information, [](const std::vector<double>& numbers) {
     const auto m = static_cast<Eigen::Index>(std::lround(std::sqrt(std::ssize(numbers))));
@@ -208,7 +198,7 @@ std::vector<ReplayRow> replay_problems(const std::vector<DenseBlanket>& problems
   for (std::size_t p = 0; p < problems.size(); ++p) {
     const DenseBlanket& blanket = problems[p];
     const int nodes = static_cast<int>(std::ssize(blanket.node_sizes));
-    const BlanketProjection projection = projection_of(blanket);
+    const BlanketProjection projection = project(blanket, Projection::node);
     const int count = rule.count(nodes) + (blanket.absolute ? 1 : 0);
     for (std::size_t t = 0; t < choosers.size(); ++t) {
       std::vector<FactorChoice> chosen;

@@ -110,8 +110,7 @@ class CompactGraph {
     return to_matrix(newest_.odometry.covariance, group_->tangent_size());
   }
 
-  // Kept poses, numbered in the order of arrival (anew when poses leave)
-  // ---------------------------------------------------
+  // Kept poses, numbered in the order of arrival; anew when poses leave --------------------------
   int size() const { return static_cast<int>(kept_.size()); }
   Id id(int pose) const { return kept_[pose].id; }
   const State& state(int pose) const { return kept_[pose].placed.x; }

@@ -39,6 +39,7 @@ void CompactPose::make_room() {
   noted_ = std::move(leaving.note);
   if (leaving.poses.empty()) return;
   removed_ = std::move(leaving.poses);
+  report_.removed = static_cast<int>(std::ssize(removed_));
   record_.renumber(leaving.now);
   for (Waiting& waiting : waiting_) {
     waiting.link.earlier = leaving.now[waiting.link.earlier];

@@ -22,7 +22,10 @@ struct Bound {
 std::optional<std::vector<int>> lazy_greedy(int size, int count, const Increments& function,
                                             const EdgeSelection::Step& step) {
   std::priority_queue<Bound> queue;
-  for (int k = 0; k < size; ++k) queue.push({function.gain(k), k, 0});
+  for (int k = 0; k < size; ++k) {
+    if (step && !step(0, count)) return std::nullopt;
+    queue.push({function.gain(k), k, 0});
+  }
   std::vector<int> chosen;
   while (static_cast<int>(std::ssize(chosen)) < count && !queue.empty()) {
     const int added = static_cast<int>(std::ssize(chosen));

@@ -78,7 +78,7 @@ Panel panel_of(const std::vector<NumberTable>& tables, const PlotOptions& option
   Panel panel;
   std::vector<std::string> names;  // of the columns, each once
   for (const NumberTable& table : tables) {
-    const Column& x = horizontal(table, options.x_column);
+    const Column& x = horizontal(table, options.x);
     panel.chart.x_label = x.name;
     for (const Column* column : selected(table, x, pattern)) {
       panel.lines.push_back(

@@ -30,13 +30,6 @@ constexpr auto enum_names(EdgeColour) {
       {{EdgeColour::by_class, "class"}, {EdgeColour::by_residual, "residual"}});
 }
 
-/// What convergence is drawn against.
-enum class Abscissa { iterations, time };
-constexpr auto enum_names(Abscissa) {
-  return std::to_array<EnumName<Abscissa>>(
-      {{Abscissa::iterations, "iterations"}, {Abscissa::time, "time"}});
-}
-
 /// The axes of a plot of columns that are logarithmic.
 enum class Logarithmic { none, x, y, both };
 constexpr auto enum_names(Logarithmic) {
@@ -52,8 +45,8 @@ struct PlotOptions {
   int width = 900, height = 600;  ///< [px; in a PDF 1/96 inch]
   std::string theme = "light";    ///< see `theme`
   EdgeColour colour = EdgeColour::by_class;
-  Abscissa x = Abscissa::iterations;
-  std::string x_column;   ///< of a plot of columns; empty: the first
+  /// Of convergence: iterations (empty, too) or time; of columns: the name of one, or the first.
+  std::string x;
   std::string y_columns;  ///< its panels, separated by line ends: each a pattern with * and ?
   double x_max = std::numeric_limits<double>::infinity();
   Logarithmic logarithmic = Logarithmic::none;
@@ -70,8 +63,9 @@ struct PlotOptions {
         .integer("height", &O::height, 100, 20000, "height [px; in a PDF 1/96 inch]")
         .choice("theme", &O::theme, {"light", "dark"}, "colours for light or dark paper")
         .choice("colour", &O::colour, "what colours edges")
-        .choice("x", &O::x, "axis of convergence")
-        .text("x_column", &O::x_column, "horizontal axis of columns; empty: the first")
+        .text("x", &O::x,
+              "horizontal axis: of convergence iterations or time, of columns one of them; empty: "
+              "iterations, or the first column")
         .text("y_columns", &O::y_columns,
               "columns to draw: a pattern with * and ? for each panel, separated by line ends; "
               "empty: one panel with all")

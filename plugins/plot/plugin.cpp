@@ -3,7 +3,10 @@
 #include <memory>
 #include <string>
 
+#include <fmt/core.h>
+
 #include "cairn/plugin/registry.hpp"
+#include "cairn/runtime/error.hpp"
 #include "plot_options.hpp"
 #include "plots.hpp"
 
@@ -23,7 +26,9 @@ class Plot final : public Picture {
 
   std::string draw(const Album& album) override {
     plot::Canvas canvas(format_, options_.width, options_.height, theme_.paper);
-    switch (options_.what == Subject::automatic ? choose(album) : options_.what) {
+    const Subject what = options_.what == Subject::automatic ? choose(album) : options_.what;
+    const bool time = what != Subject::columns && against_time();
+    switch (what) {
       case Subject::automatic:
         break;  // has been chosen
       case Subject::trajectory:
@@ -31,7 +36,7 @@ class Plot final : public Picture {
                                 options_.colour == plot::EdgeColour::by_residual);
         break;
       case Subject::convergence:
-        plot::draw_convergence(canvas, theme_, album, options_.x == plot::Abscissa::time);
+        plot::draw_convergence(canvas, theme_, album, time);
         break;
       case Subject::bars:
         plot::draw_bars(canvas, theme_, album);
@@ -53,6 +58,14 @@ class Plot final : public Picture {
   }
 
  private:
+  bool against_time() const {
+    if (options_.x.empty() || options_.x == "iterations") return false;
+    if (options_.x == "time") return true;
+    throw Error(
+        ErrorCode::usage,
+        fmt::format("x is '{}', expected iterations or time: only CSV has columns", options_.x));
+  }
+
   static Subject choose(const Album& album) {
     if (!album.tables.empty()) return Subject::columns;
     if (!album.bench.empty()) return Subject::bars;

@@ -3,7 +3,6 @@
 
 #include <Eigen/Core>
 
-#include "cairn/runtime/error.hpp"
 #include "cairn/sparsification/blanket.hpp"
 #include "cairn/sparsification/recovery.hpp"
 
@@ -23,19 +22,6 @@ inline Eigen::Map<const Eigen::MatrixXd> jacobian(const FactorModel& model, int 
 inline Eigen::Map<const Eigen::MatrixXd> coordinates(const BlanketProjection& projection,
                                                      int size) {
   return {projection.T().data(), size, projection.rank};
-}
-
-/// The projection asked for; where Λ leaves more open than the pose of the whole, as after the
-/// removal of a landmark, there is no node to be relative to, and it is `eigen`.
-inline BlanketProjection project(const DenseBlanket& blanket, Projection projection) {
-  if (projection == Projection::node) {
-    try {
-      return {blanket, Projection::node};
-    } catch (const Error& error) {
-      if (error.code() != ErrorCode::numerical) throw;
-    }
-  }
-  return {blanket, Projection::eigen};
 }
 
 }  // namespace cairn::sparsify

@@ -157,12 +157,7 @@ std::vector<FactorChoice> DowndatedInformation::choose(const DenseBlanket& blank
   const std::vector<Pair> pairs = weighted_pairs(blanket, [&](int i, int j) {
     return cairn::mutual_information(pair_block(S, begin, i, j), blanket.node_sizes[i]);
   });
-  std::vector<bool> taken(blanket.models.size());
-  for (const FactorChoice& choice : chosen) taken[choice.front()] = true;
-  for (const Pair& pair : pairs) {
-    if (static_cast<int>(std::ssize(chosen)) >= population) break;
-    if (!taken[pair.model]) chosen.push_back({pair.model});
-  }
+  fill_up(blanket, pairs, population, chosen);
   return chosen;
 }
 

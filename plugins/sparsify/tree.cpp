@@ -89,6 +89,16 @@ std::vector<int> pair_models(const DenseBlanket& blanket) {
   return models;
 }
 
+void fill_up(const DenseBlanket& blanket, const std::vector<Pair>& pairs, int population,
+             std::vector<FactorChoice>& chosen) {
+  std::vector<bool> taken(blanket.models.size());
+  for (const FactorChoice& choice : chosen) taken[choice.front()] = true;
+  for (const Pair& pair : pairs) {
+    if (static_cast<int>(std::ssize(chosen)) >= population) break;
+    if (!taken[pair.model]) chosen.push_back({pair.model});
+  }
+}
+
 int tree_size(const DenseBlanket& blanket) {
   return static_cast<int>(std::ssize(blanket.node_sizes)) - (blanket.absolute ? 0 : 1);
 }
@@ -110,12 +120,7 @@ std::vector<FactorChoice> tree_first(const DenseBlanket& blanket, const std::vec
   } else {
     chosen = spanning_tree(blanket, pairs);
   }
-  std::vector<bool> taken(blanket.models.size());
-  for (const FactorChoice& choice : chosen) taken[choice.front()] = true;
-  for (const Pair& pair : pairs) {
-    if (static_cast<int>(std::ssize(chosen)) >= population) break;
-    if (!taken[pair.model]) chosen.push_back({pair.model});
-  }
+  fill_up(blanket, pairs, population, chosen);
   return chosen;
 }
 

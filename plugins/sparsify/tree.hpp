@@ -21,6 +21,10 @@ double log_determinant(const Eigen::MatrixXd& A);
 /// The models of pairs of nodes; of several between the same two nodes the first.
 std::vector<int> pair_models(const DenseBlanket& blanket);
 
+/// Adds pairs that are not chosen yet, in their order, until `population` factors are.
+void fill_up(const DenseBlanket& blanket, const std::vector<Pair>& pairs, int population,
+             std::vector<FactorChoice>& chosen);
+
 /// Of a spanning tree, with the prior that an absolute blanket needs besides.
 int tree_size(const DenseBlanket& blanket);
 

@@ -38,20 +38,13 @@ std::string last_line(std::string text) {
 }
 
 pid_t start(const std::vector<std::string>& words, const fs::path& out, const fs::path& error) {
-  std::vector<std::string> copies = words;
-  std::vector<char*> argv;
-  for (std::string& word : copies) argv.push_back(word.data());
-  argv.push_back(nullptr);
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
   constexpr int kWrite = O_WRONLY | O_CREAT | O_TRUNC;
   posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
   posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, out.c_str(), kWrite, 0644);
   posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, error.c_str(), kWrite, 0644);
-  pid_t child = 0;
-  const int failed = ::posix_spawnp(&child, argv[0], &actions, nullptr, argv.data(), ::environ);
-  posix_spawn_file_actions_destroy(&actions);
-  if (failed) throw std::runtime_error("cannot start " + words.front());
+  const pid_t child = spawn_program(words, actions);
   const auto bytes = static_cast<rlim_t>(allowed_memory());
   const rlimit limit{bytes, bytes};
   ::prlimit(child, RLIMIT_AS, &limit, nullptr);
@@ -75,6 +68,18 @@ void wait_for_ever(pid_t child, int& status) {
 }
 
 }  // namespace
+
+pid_t spawn_program(const std::vector<std::string>& words, posix_spawn_file_actions_t& actions) {
+  std::vector<std::string> copies = words;
+  std::vector<char*> argv;
+  for (std::string& word : copies) argv.push_back(word.data());
+  argv.push_back(nullptr);
+  pid_t child = 0;
+  const int failed = ::posix_spawnp(&child, argv[0], &actions, nullptr, argv.data(), ::environ);
+  posix_spawn_file_actions_destroy(&actions);
+  if (failed) throw std::runtime_error("cannot start " + words.front());
+  return child;
+}
 
 double allowed_memory() {
   return kShareOfMemory * static_cast<double>(::sysconf(_SC_PHYS_PAGES)) *

@@ -2,7 +2,6 @@
 #include "live_program.hpp"
 
 #include <fcntl.h>
-#include <spawn.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -12,6 +11,8 @@
 #include <fstream>
 #include <stdexcept>
 
+#include "child_process.hpp"
+
 namespace cairn::performance {
 
 LiveProgram::LiveProgram(const std::vector<std::string>& words) {
@@ -19,24 +20,20 @@ LiveProgram::LiveProgram(const std::vector<std::string>& words) {
   std::array<int, 2> in{}, out{};
   if (::pipe2(in.data(), O_CLOEXEC) != 0 || ::pipe2(out.data(), O_CLOEXEC) != 0)
     throw std::runtime_error("no pipe to " + words.front());
-  std::vector<std::string> copies = words;
-  std::vector<char*> argv;
-  for (std::string& word : copies) argv.push_back(word.data());
-  argv.push_back(nullptr);
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
   posix_spawn_file_actions_adddup2(&actions, in[0], STDIN_FILENO);
   posix_spawn_file_actions_adddup2(&actions, out[1], STDOUT_FILENO);
-  const int failed = ::posix_spawnp(&child_, argv[0], &actions, nullptr, argv.data(), ::environ);
-  posix_spawn_file_actions_destroy(&actions);
-  ::close(in[0]);
-  ::close(out[1]);
   to_ = in[1];
   from_ = out[0];
-  if (failed) {
-    child_ = -1;
-    throw std::runtime_error("cannot start " + words.front());
+  try {
+    child_ = spawn_program(words, actions);
+  } catch (...) {
+    for (const int end : {in[0], in[1], out[0], out[1]}) ::close(end);
+    throw;
   }
+  ::close(in[0]);
+  ::close(out[1]);
 }
 
 LiveProgram::~LiveProgram() {

@@ -6,9 +6,11 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <sstream>
 #include <system_error>
 
 #include <fmt/core.h>
+#include <boost/tokenizer.hpp>
 
 #include "cairn/runtime/error.hpp"
 
@@ -21,68 +23,12 @@ constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
   throw Error(ErrorCode::input, fmt::format("{}:{}: {}", file, line, why));
 }
 
-/// Takes one record after the other from the text.
-class Records {
- public:
-  Records(std::string_view text, const std::string& file) : rest_(text), file_(file) {
-    constexpr std::string_view kMark = "\xEF\xBB\xBF";  // what spreadsheets put before UTF-8
-    if (rest_.starts_with(kMark)) rest_.remove_prefix(kMark.size());
-  }
-  /// Where the last record begins, from 1.
-  std::size_t line() const { return line_; }
-
-  /// The next record that is not an empty line; false at the end.
-  bool next(std::vector<std::string>& fields) {
-    fields.clear();
-    while (!rest_.empty()) {
-      line_ = next_line_;
-      fields.emplace_back(field());
-      while (!rest_.empty() && rest_.front() == ',') {
-        rest_.remove_prefix(1);
-        fields.emplace_back(field());
-      }
-      end_line();
-      if (fields.size() > 1 || !fields.front().empty()) return true;
-      fields.clear();
-    }
-    return false;
-  }
-
- private:
-  std::string field() {
-    if (!rest_.starts_with('"')) {
-      const std::size_t end = std::min(rest_.find_first_of(",\r\n"), rest_.size());
-      std::string text(rest_.substr(0, end));
-      rest_.remove_prefix(end);
-      return text;
-    }
-    std::string text;
-    rest_.remove_prefix(1);
-    while (true) {
-      const std::size_t end = rest_.find('"');
-      if (end == std::string_view::npos) refuse(file_, line_, "a quote is not closed");
-      text += rest_.substr(0, end);
-      next_line_ += static_cast<std::size_t>(std::ranges::count(rest_.substr(0, end), '\n'));
-      rest_.remove_prefix(end + 1);
-      if (!rest_.starts_with('"')) break;
-      text += '"';
-      rest_.remove_prefix(1);
-    }
-    if (!rest_.empty() && rest_.find_first_of(",\r\n") != 0)
-      refuse(file_, line_, "expected a comma after a quoted field");
-    return text;
-  }
-
-  void end_line() {
-    if (rest_.starts_with('\r')) rest_.remove_prefix(1);
-    if (rest_.starts_with('\n')) rest_.remove_prefix(1);
-    ++next_line_;
-  }
-
-  std::string_view rest_;
-  const std::string& file_;
-  std::size_t line_ = 0, next_line_ = 1;
-};
+/// The fields of a line; within quotes a comma is text.
+std::vector<std::string> fields_of(const std::string& line) {
+  using Separator = boost::escaped_list_separator<char>;
+  const boost::tokenizer<Separator> fields(line, Separator('\0', ',', '"'));
+  return {fields.begin(), fields.end()};
+}
 
 double number_of(std::string_view text) {
   while (!text.empty() && text.front() == ' ') text.remove_prefix(1);
@@ -100,16 +46,25 @@ const NumberTable::Column* NumberTable::find(std::string_view column) const {
 }
 
 NumberTable read_number_table(std::string_view text, const std::string& file) {
+  constexpr std::string_view kMark = "\xEF\xBB\xBF";  // what spreadsheets put before UTF-8
+  if (text.starts_with(kMark)) text.remove_prefix(kMark.size());
   NumberTable table;
   table.name = file;
-  Records records(text, file);
-  std::vector<std::string> fields;
-  if (records.next(fields)) {
-    for (const std::string& name : fields) table.columns.push_back({name, {}});
-  }
-  while (records.next(fields)) {
+  std::istringstream lines{std::string(text)};
+  std::size_t number = 0;
+  for (std::string line; std::getline(lines, line);) {
+    ++number;
+    if (line.ends_with('\r')) line.pop_back();
+    if (line.empty()) continue;
+    if (line.find('\0') != std::string::npos) refuse(file, number, "expected text");
+    if (std::ranges::count(line, '"') % 2 != 0) refuse(file, number, "a quote is not closed");
+    const std::vector<std::string> fields = fields_of(line);
+    if (table.columns.empty()) {
+      for (const std::string& name : fields) table.columns.push_back({name, {}});
+      continue;
+    }
     if (fields.size() != table.columns.size()) {
-      refuse(file, records.line(),
+      refuse(file, number,
              fmt::format("expected {} fields, as many as the first line has, found {}",
                          table.columns.size(), fields.size()));
     }
@@ -117,7 +72,7 @@ NumberTable read_number_table(std::string_view text, const std::string& file) {
       table.columns[k].values.push_back(number_of(fields[k]));
   }
   if (table.columns.empty() || table.columns.front().values.empty())
-    refuse(file, records.line(), "expected CSV: a line with the columns' names, then rows");
+    refuse(file, number, "expected CSV: a line with the columns' names, then rows");
   return table;
 }
 

@@ -19,9 +19,9 @@
 #include "cairn/linear/graph_marginals.hpp"
 #include "cairn/linear/normal_equations.hpp"
 #include "cairn/runtime/error.hpp"
+#include "conservative_margin.hpp"
 #include "dense/lu.hpp"
 #include "dense/products.hpp"
-#include "overconfidence.hpp"
 
 namespace cairn {
 namespace {
@@ -327,7 +327,7 @@ SparsificationError sparsification_error(const Graph& original, const Graph& as_
   return error;
 }
 
-double overconfidence(const Graph& original, const Graph& sparse, LinearSolver& solver) {
+double conservative_margin(const Graph& original, const Graph& sparse, LinearSolver& solver) {
   Partners partners;
   for (int v = 0; v < sparse.variable_count(); ++v)
     partners.push_back(partner(original, sparse, v, "original"));

@@ -65,6 +65,17 @@ BlanketProjection::BlanketProjection(const DenseBlanket& blanket, Projection pro
   T_.assign(T.data(), T.data() + T.size());
 }
 
+BlanketProjection project(const DenseBlanket& blanket, Projection projection) {
+  if (projection == Projection::node) {
+    try {
+      return {blanket, Projection::node};
+    } catch (const Error& error) {
+      if (error.code() != ErrorCode::numerical) throw;
+    }
+  }
+  return {blanket, Projection::eigen};
+}
+
 RecoveryProblem BlanketProjection::problem(const DenseBlanket& blanket,
                                            std::span<const FactorChoice> topology) const {
   const int d = blanket.size();

@@ -70,7 +70,7 @@ Connectivity connectivity(const std::vector<RelativeEdge>& edges, const std::vec
 
 void measure(const Graph& original, LinearSolver& solver, const SparsifyEdgesJob& job,
              SparsifyEdgesResult& result) {
-  measure_or_note(result.whole, [&] {
+  measure_or_note(result.whole, "no KLD", [&] {
     result.whole.error =
         sparsification_error(original, result.whole.sparse, solver, job.compared_at);
   });

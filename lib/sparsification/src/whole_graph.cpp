@@ -33,12 +33,15 @@ double optimize_whole(Graph& graph, Optimizer& optimizer, const std::string& nam
   return summary.final_chi2;
 }
 
-void measure_or_note(SparsifyResult& result, const std::function<void()>& measure) {
+bool measure_or_note(SparsifyResult& result, const char* otherwise,
+                     const std::function<void()>& measure) {
   try {
     measure();
+    return true;
   } catch (const Error& error) {
     if (error.code() != ErrorCode::numerical) throw;
-    result.notes.push_back(fmt::format("no KLD: {}", error.what()));
+    result.notes.push_back(fmt::format("{}: {}", otherwise, error.what()));
+    return false;
   }
 }
 

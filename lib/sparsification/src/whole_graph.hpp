@@ -15,8 +15,9 @@ namespace cairn {
 double optimize_whole(Graph& graph, Optimizer& optimizer, const std::string& name,
                       const SparsifySetting& setting, const char* what, SparsifyResult& result);
 
-/// Calls `measure`; where a graph is singular (`Error`, numerical), a note in `result` says that
-/// there is no divergence.
-void measure_or_note(SparsifyResult& result, const std::function<void()>& measure);
+/// Calls `measure` and returns true; where that ends with an `Error` of code numerical (a singular
+/// graph), returns false, with a note in `result` that begins with `otherwise`.
+bool measure_or_note(SparsifyResult& result, const char* otherwise,
+                     const std::function<void()>& measure);
 
 }  // namespace cairn

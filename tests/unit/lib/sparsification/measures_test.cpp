@@ -244,7 +244,7 @@ TEST_F(MarginalDivergence, OverconfidenceIsTheLeastEigenvalueOfTheDifference) {
       }
       apply(registry_.make<Sparsifier>(spec)->remove(original, nodes), sparse);
       const VectorXd eigenvalues = dense_difference(original, sparse);
-      const double found = overconfidence(original, sparse, *solver_);
+      const double found = conservative_margin(original, sparse, *solver_);
       const double size = eigenvalues.cwiseAbs().maxCoeff();
       EXPECT_NEAR(found, eigenvalues[0], 1e-5 * std::abs(eigenvalues[0]) + 1e-9 * size);
       if (conservative) {

@@ -85,5 +85,12 @@ TEST(LazyGreedy, EndsWhenItIsInterrupted) {
   }));
 }
 
+TEST(LazyGreedy, EndsWhileTheFirstGainsAreComputed) {
+  Coverage function({{1}, {1, 2}, {3}});
+  int calls = 0;
+  EXPECT_FALSE(lazy_greedy(3, 3, function.increments(), [&](int, int) { return ++calls < 2; }));
+  EXPECT_EQ(function.evaluated(), 1);
+}
+
 }  // namespace
 }  // namespace cairn::edges

@@ -64,6 +64,7 @@ struct PoseReport {
   int candidates = 0;                                           ///< those near enough to be matched
   double least_gain = std::numeric_limits<double>::infinity();  ///< among the candidates [nats]
   std::vector<LinkReport> links;  ///< also earlier ones that had been waiting
+  int removed = 0;                ///< poses that left the graph with it: see `PosePolicy::removed`
   PolicySeconds seconds;
   std::vector<std::string> notes;
 };

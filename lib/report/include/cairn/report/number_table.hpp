@@ -24,8 +24,8 @@ struct CAIRN_API NumberTable {
   bool operator==(const NumberTable&) const = default;
 };
 
-/// Reads comma-separated values as RFC 4180 has them, whose first line names the columns; lines may
-/// end in LF alone, and empty ones are skipped. `file` is what messages and the table call it.
+/// Reads comma-separated values, whose first line names the columns; a field in quotes may have
+/// commas, but no line end. Empty lines are skipped. `file` is what messages and the table call it.
 /// Throws `Error` (input), with the line, where a row has not as many fields as the first, a quote
 /// is not closed, or there is no row.
 CAIRN_API NumberTable read_number_table(std::string_view text, const std::string& file);

@@ -49,7 +49,8 @@ CAIRN_API SparsificationError sparsification_error(const Graph& original, const 
 /// of its length. By Lanczos' method on the inverse of the shifted matrix, in the sparse form that
 /// has it as a Schur complement; rounding is about 1e-12 of the largest information. `solver` must
 /// be a direct one. Throws as `sparsification_error` does.
-CAIRN_API double overconfidence(const Graph& original, const Graph& sparse, LinearSolver& solver);
+CAIRN_API double conservative_margin(const Graph& original, const Graph& sparse,
+                                     LinearSolver& solver);
 
 /// `sparsification_error` of graphs that both have nodes which the other lacks: D(p‖q) of their
 /// marginals on `nodes`, which both have; `common` linearises at the states of `p` as far as it has

@@ -65,6 +65,11 @@ class CAIRN_API BlanketProjection {
   std::vector<double> T_;
 };
 
+/// The projection asked for; where Λ leaves more open than `node` can do with, as after the removal
+/// of a landmark, there is no node to be relative to, and it is `eigen`. Throws `Error` (numerical)
+/// if Λ is zero.
+CAIRN_API BlanketProjection project(const DenseBlanket& blanket, Projection projection);
+
 /// Where a recovery stood, for plots of its convergence.
 struct RecoveryPoint {
   double seconds = 0.0;

@@ -42,7 +42,7 @@ struct SparsifyJob {
   /// are redirected at once (Vallvé 2018, section 4.6.4); 0: only once these have left.
   int redirect_early = 0;
   bool as_given = false;  ///< the graph is at its minimum: it is not optimised before
-  bool measure = true;    ///< KLD, RMSE and overconfidence of the whole
+  bool measure = true;    ///< KLD, RMSE and conservative margin of the whole
   ComparedAt compared_at = ComparedAt::common;  ///< for the KLD
 };
 
@@ -52,7 +52,8 @@ struct SparsifyResult {
   std::int64_t variables_before = 0, factors_before = 0;
   /// From the original graph; online, from a graph with the same factors redirected.
   std::optional<SparsificationError> error;
-  double overconfidence = std::nan("");  ///< see `overconfidence`, of the same two; NaN: not known
+  double conservative_margin =
+      std::nan("");  ///< see `conservative_margin`, of the same two; NaN: not known
   /// Online: distance of the estimate from the minimum of all factors as they arrived [m]; NaN: not
   /// known.
   double rmse_full = std::nan("");

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "overconfidence.hpp"
+#include "conservative_margin.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -8,6 +8,7 @@
 #include <span>
 #include <utility>
 
+#include <fmt/core.h>
 #include <Eigen/Core>
 
 #include "cairn/graph/gauge.hpp"
@@ -26,8 +27,8 @@ using ConstBlock = Eigen::Map<const Eigen::MatrixXd>;
 constexpr double kShift = 1e-9, kGrowth = 32.0;
 constexpr int kShifts = 8;
 constexpr int kLanczosSteps = 300;
-/// Of the residual, as a part of the eigenvalue.
-constexpr double kAccuracy = 1e-9;
+/// Of the residual, as a part of the eigenvalue: where the iteration ends, and after the last step.
+constexpr double kAccuracy = 1e-9, kAcceptable = 1e-3;
 
 /// H of a graph at its states.
 struct LinearizedAt {
@@ -136,7 +137,12 @@ double largest_eigenvalue(Eigen::Index n, const std::function<Vector(const Vecto
                                   Eigen::Map<const Vector>(beside.data(), k - 1));
       const double largest = ritz.eigenvalues()[k - 1];
       const double residual = next * std::abs(ritz.eigenvectors()(k - 1, k - 1));
-      if (last || residual <= kAccuracy * largest) return largest;
+      if (residual <= kAccuracy * largest || k == n || next == 0.0) return largest;
+      if (last) {
+        if (residual <= kAcceptable * largest) return largest;
+        throw Error(ErrorCode::numerical,
+                    fmt::format("Lanczos' method has not converged in {} steps", kLanczosSteps));
+      }
     }
     beside.push_back(next);
     before = std::exchange(v, w / next);
