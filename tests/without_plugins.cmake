@@ -32,3 +32,6 @@ without(report html)
 without(sparsify sparsify clt mi dmi ekld odd l1 cliquey best closed_form fd ncfd ip pqn
         keep_every least_loss smallest_blanket oldest nearest coverage)
 without(edge_selection mac greedy_tree greedy_gain)
+without(grid_formats ros image)
+without(floor_plans rooms corridor loop cave)
+without(floor_survey round_body)

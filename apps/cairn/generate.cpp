@@ -8,7 +8,9 @@
 
 #include "arguments.hpp"
 #include "cairn/plugin/registry.hpp"
+#include "cairn/runtime/error.hpp"
 #include "commands.hpp"
+#include "floors.hpp"
 #include "graph_files.hpp"
 #include "json_report.hpp"
 #include "results.hpp"
@@ -35,6 +37,12 @@ boost::json::object report_json(const GenerateOptions& options, const Simulation
 }
 
 int run(const GenerateOptions& options, Session& session) {
+  if (names_floor_plan(options.kind, session)) {
+    if (!options.ground_truth.empty() || !options.output_format.empty())
+      throw Error(ErrorCode::usage, "--ground-truth and --to are of graphs: '" + options.kind +
+                                        "' is a floor, whose format is that of its ending");
+    return run_floor_generate(options.kind, options.seed, options.output, session);
+  }
   if (options.output == "-" || options.ground_truth == "-") session.write_file_to_stdout();
   check_output(options.output, options.output_format, session);
   check_output(options.ground_truth, options.output_format, session);
@@ -62,8 +70,10 @@ int run(const GenerateOptions& options, Session& session) {
 Command add_generate(ArgumentParser program) {
   auto options = std::make_shared<GenerateOptions>();  // lives as long as the parser and the run
   ArgumentParser cli =
-      program.add_command("generate", "make a simulated graph, with its ground truth");
-  cli.add_option("kind", options->kind, "generator: manhattan, sphere … (cairn plugins lists them)")
+      program.add_command("generate", "make a simulated graph, with its ground truth, or a floor");
+  cli.add_option(
+         "kind", options->kind,
+         "generator: manhattan, sphere …, or floor plan: rooms, cave … (cairn plugins lists them)")
       .type_name("KIND[:k=v]")
       .required();
   cli.add_option("-o,--output", options->output, "the noisy graph (- is standard output)")
@@ -80,6 +90,7 @@ Command add_generate(ArgumentParser program) {
   cli.footer(
       "Example:\n"
       "  cairn generate manhattan:poses=3500 -o graph.g2o --ground-truth truth.g2o --seed 7\n"
+      "  cairn generate rooms:width=30 -o floor.yaml --seed 3\n"
       "Options of a generator: cairn plugins manhattan");
   return {cli, [options](Session& session) { return run(*options, session); }};
 }

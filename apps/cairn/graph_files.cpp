@@ -23,21 +23,6 @@ namespace {
 
 constexpr const char* kPipeFormat = "g2o";
 
-/// Takes `seed=N` out of a generator's options, unless the generator has an option of that name.
-std::uint64_t take_seed(ComponentSpec& spec, const OptionTable& table) {
-  const auto given = spec.values.find("seed");
-  if (given == spec.values.end() || table.find("seed")) return 0;
-  const std::string text = given->second;
-  std::uint64_t seed = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), seed);
-  if (error != std::errc() || end != text.data() + text.size()) {
-    throw Error(ErrorCode::usage,
-                fmt::format("{}: seed is '{}', expected an integer from 0", spec.name, text));
-  }
-  spec.values.erase(given);
-  return seed;
-}
-
 LoadedGraph generate_graph(const std::string& name, Session& session) {
   ComponentSpec spec = parse_component(std::string_view(name).substr(1));
   Registry& registry = session.registry();
@@ -73,19 +58,27 @@ void check_named_format(const std::string& file, const std::string& format, Regi
   throw Error(ErrorCode::usage, fmt::format("{}: format '{}' only reads", file, format));
 }
 
-void check_ending(const std::string& file, Registry& registry) {
-  std::vector<std::string> writable;
-  std::optional<Error> broken;
+/// The endings of formats that `use`, by name. A broken plugin is no reason not to use another:
+/// `broken` is what the first one said.
+template <class Use>
+std::vector<std::string> endings(Registry& registry, const Use& use, std::optional<Error>& broken) {
+  std::vector<std::string> all;
   for (const std::string& name : registry.names(Format::kKind)) {
     try {
       const auto format = registry.make<Format>(name);
-      if (!format->can_write()) continue;
-      for (const std::string& known : format->extensions()) writable.push_back(known);
+      if (!use(*format)) continue;
+      for (const std::string& known : format->extensions()) all.push_back(known);
     } catch (const Error& error) {
-      // A broken plugin is no reason not to write what another one writes.
       if (!broken) broken = error;
     }
   }
+  return all;
+}
+
+void check_ending(const std::string& file, Registry& registry) {
+  std::optional<Error> broken;
+  const std::vector<std::string> writable = endings(
+      registry, [](const Format& format) { return format.can_write(); }, broken);
   if (std::find(writable.begin(), writable.end(), ending(file)) != writable.end()) return;
   if (writable.empty() && broken) throw Error(*broken);
   if (writable.empty()) throw Error(ErrorCode::usage, file + ": no plugin of formats is on offer");
@@ -97,6 +90,27 @@ void check_ending(const std::string& file, Registry& registry) {
 }
 
 }  // namespace
+
+std::uint64_t take_seed(ComponentSpec& spec, const OptionTable& table) {
+  const auto given = spec.values.find("seed");
+  if (given == spec.values.end() || table.find("seed")) return 0;
+  const std::string text = given->second;
+  std::uint64_t seed = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), seed);
+  if (error != std::errc() || end != text.data() + text.size()) {
+    throw Error(ErrorCode::usage,
+                fmt::format("{}: seed is '{}', expected an integer from 0", spec.name, text));
+  }
+  spec.values.erase(given);
+  return seed;
+}
+
+bool has_graph_ending(const std::string& file, Registry& registry) {
+  std::optional<Error> broken;
+  const std::vector<std::string> known = endings(
+      registry, [](const Format&) { return true; }, broken);
+  return std::find(known.begin(), known.end(), ending(file)) != known.end();
+}
 
 void add_input_options(ArgumentParser cli, InputOptions& options) {
   cli.add_option("--from", options.format, "format of the input, instead of by content")

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string>
 
 #include "arguments.hpp"
 #include "cairn/io/format.hpp"
 #include "cairn/io/generator.hpp"
+#include "cairn/plugin/options.hpp"
 #include "session.hpp"
 
 namespace cairn::app {
@@ -38,6 +40,12 @@ LoadedGraph load_graph(const std::string& name, const InputOptions& options, Ses
 /// The same for the ground truth, which no output may replace.
 LoadedGraph load_ground_truth(const std::string& name, const InputOptions& options,
                               Session& session);
+
+/// Whether some format of graphs goes by the ending of a file.
+bool has_graph_ending(const std::string& file, Registry& registry);
+
+/// Takes `seed=N` out of the options of what is generated, unless it has an option of that name.
+std::uint64_t take_seed(ComponentSpec& spec, const OptionTable& table);
 
 /// Runs a generator, given as `KIND:k=v`.
 Simulation simulate(const std::string& spec, std::uint64_t seed, Session& session);

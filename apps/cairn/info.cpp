@@ -11,10 +11,12 @@
 #include "cairn/evaluation/graph_survey.hpp"
 #include "cairn/information/graph_information.hpp"
 #include "cairn/plugin/registry.hpp"
+#include "cairn/runtime/error.hpp"
 #include "cairn/runtime/plugin_call.hpp"
 #include "cairn/runtime/timed.hpp"
 #include "commands.hpp"
 #include "covariances.hpp"
+#include "floors.hpp"
 #include "graph_files.hpp"
 #include "json_report.hpp"
 #include "problem_setup.hpp"
@@ -29,6 +31,7 @@ namespace json = boost::json;
 struct InfoOptions {
   std::string graph;
   InputOptions input;
+  FloorInfoOptions floor;
   bool entropy = false;
   std::string linear_solver = kDefaultLinearSolver;  ///< of the entropy
 };
@@ -204,6 +207,11 @@ Entropy entropy_of(const Graph& graph, const std::string& name, LinearSolver& so
 
 int run(const InfoOptions& options, Session& session) {
   session.use_threads();
+  if (names_floor(options.graph, session)) {
+    if (options.entropy)
+      throw Error(ErrorCode::usage, "--entropy is of graphs, and " + options.graph + " is a floor");
+    return run_floor_info(options.graph, options.floor, session);
+  }
   std::optional<CovarianceSolver> solver;  // a wrong name is reported before the file is read
   if (options.entropy)
     solver = make_determinant_solver(options.linear_solver, session.registry(), false);
@@ -230,18 +238,32 @@ int run(const InfoOptions& options, Session& session) {
 Command add_info(ArgumentParser program) {
   auto options = std::make_shared<InfoOptions>();  // lives as long as the parser and the run
   ArgumentParser cli =
-      program.add_command("info", "what a graph consists of, and what looks wrong");
-  cli.add_option("graph", options->graph, kGraphHelp).type_name("GRAPH").required();
+      program.add_command("info", "what a graph consists of, and what looks wrong; or a floor");
+  cli.add_option("graph", options->graph,
+                 std::string(kGraphHelp) + "; or the map of a floor (.yaml, .png:resolution=R)")
+      .type_name("GRAPH")
+      .required();
   cli.add_flag("--entropy", options->entropy,
                "entropy of the graph at the states of the file, in nats: optimise it first");
   cli.add_option("--linear-solver", options->linear_solver, "gives the determinant for --entropy")
       .type_name("NAME")
       .show_default();
+  cli.add_option("--radius", options->floor.radius, "of a robot's body on a floor [m]")
+      .type_name("R")
+      .within(0.0, 1000.0)
+      .show_default();
+  cli.add_option("--start-x", options->floor.start_x,
+                 "where the robot is, instead of the widest place")
+      .type_name("X");
+  cli.add_option("--start-y", options->floor.start_y,
+                 "where the robot is, instead of the widest place")
+      .type_name("Y");
   add_input_options(cli, options->input);
   cli.footer(
       "Example:\n"
       "  cairn info sphere2500.g2o --types slam3d:metric=g2o\n"
-      "  cairn info best.g2o --entropy");
+      "  cairn info best.g2o --entropy\n"
+      "  cairn info floor.yaml --radius 0.3");
   return {cli, [options](Session& session) { return run(*options, session); }};
 }
 
