@@ -30,6 +30,13 @@ std::size_t share(double part, std::size_t all) {
 std::vector<int> KeepEvery::select(const Graph& graph, std::span<const int> nodes,
                                    Sparsifier& /*sparsifier*/) {
   std::vector<int> chosen;
+  if (seen_ == 0 && !nodes.empty()) {
+    // The first of its type, which is not asked about where it stays anyway, is the first to stay.
+    const VariableType& type = graph.type(nodes.front());
+    int first = 0;
+    while (&graph.type(first) != &type) ++first;
+    if (first != nodes.front()) seen_ = 1;
+  }
   for (const int v : nodes) {
     const bool stays = seen_++ % every_ == 0 || v + 1 == graph.variable_count();
     if (!stays) chosen.push_back(v);

@@ -13,6 +13,7 @@
 
 #include "cairn/geometry/pose.hpp"
 #include "cairn/geometry/pose_chain.hpp"
+#include "cairn/graph/gauge.hpp"
 #include "cairn/online/recorded_graph.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/plugin_call.hpp"
@@ -49,22 +50,30 @@ double optimize(Graph& graph, Parts& parts, const SparsifySetting& setting, cons
   return optimize_whole(graph, *parts.optimizer, parts.job.optimizer.name, setting, what, result);
 }
 
-/// Whether a variable is free and of that kind. A pose type of a plugin may have no position.
-bool is_open(const Graph& graph, int v, NodeKind kind) {
+/// A pose type of a plugin may have no position.
+bool is_of_kind(const Graph& graph, int v, NodeKind kind) {
   const VariableType& type = graph.type(v);
-  if (graph.fixed(v) || !type.lie_group()) return false;
+  if (!type.lie_group()) return false;
   return kind == NodeKind::all || is_point(type) == (kind == NodeKind::landmarks);
 }
 
-/// Which of the graph's variables may leave: all of a kind but the newest pose.
+bool is_open(const Graph& graph, int v, NodeKind kind) {
+  return !graph.fixed(v) && is_of_kind(graph, v, kind);
+}
+
+/// Which of the graph's variables may leave: all of a kind but the first pose, those that hold the
+/// gauge, and the newest pose.
 std::vector<int> open_nodes(const Graph& graph, NodeKind kind) {
-  std::vector<int> nodes;
-  int newest = -1;
+  std::vector<int> nodes, stay = resolve_gauge(graph).anchored;
+  int first = -1, newest = -1;
   for (int v = 0; v < graph.variable_count(); ++v) {
     if (is_open(graph, v, kind)) nodes.push_back(v);
-    if (is_open(graph, v, NodeKind::poses)) newest = v;
+    if (!is_of_kind(graph, v, NodeKind::poses)) continue;
+    if (first < 0) first = v;
+    newest = v;
   }
-  std::erase(nodes, newest);
+  stay.insert(stay.end(), {first, newest});
+  std::erase_if(nodes, [&](int v) { return std::ranges::find(stay, v) != stay.end(); });
   return nodes;
 }
 
@@ -230,6 +239,7 @@ class OnlineRun {
     for (const Variable& variable : update.variables) pending_.push_back(variable.id);
     if (!update.variables.empty()) {
       newest_ = update.variables.front().id;
+      if (first_ < 0) first_ = newest_;
       if (job_.redirect_early > 0 && count_++ % job_.redirect_early != 0) early_.insert(newest_);
     }
   }
@@ -271,7 +281,7 @@ class OnlineRun {
       const int v = graph.find(id).value();
       if (id == newest_) {
         later.push_back(id);
-      } else if (is_open(graph, v, NodeKind::poses)) {
+      } else if (id != first_ && is_open(graph, v, NodeKind::poses)) {
         nodes.push_back(v);
       }
     }
@@ -346,7 +356,7 @@ class OnlineRun {
   Redirection redirection_;
   std::vector<FactorId> live_;  ///< by position in the estimator's graph, rising
   std::vector<Id> pending_;     ///< nodes on which nothing has been decided
-  Id newest_ = -1;
+  Id first_ = -1, newest_ = -1;
   std::int64_t count_ = 0;
   std::unordered_set<Id> early_;  ///< with early redirection: nodes that are to leave
   std::vector<Factor> factors_;   ///< all that came, redirected

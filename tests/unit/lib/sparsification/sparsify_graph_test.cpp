@@ -74,6 +74,32 @@ TEST_F(SparsifyGraph, KeepsAllOfAChain) {
   EXPECT_THAT(result.notes, IsEmpty());
 }
 
+TEST_F(SparsifyGraph, TheFirstAndTheNewestPoseStayWhateverIsSelected) {
+  const Graph graph = simulate("manhattan:poses=120,streets=3");
+  for (const char* selection : {"smallest_blanket:part=1", "oldest:part=0.5", "least_loss:part=0.2",
+                                "nearest:part=0.5", "keep_every:every=7", "coverage:distance=3"}) {
+    for (const int online : {0, 20}) {
+      SparsifyJob some = job(selection);
+      some.measure = false;
+      some.online = online;
+      const SparsifyResult result = online > 0 ? sparsify_online(graph, some, setting_)
+                                               : sparsify_whole(graph, some, setting_);
+      EXPECT_TRUE(result.sparse.find(0).has_value()) << selection << " online " << online;
+      EXPECT_TRUE(result.sparse.find(119).has_value()) << selection << " online " << online;
+      EXPECT_LT(result.sparse.variable_count(), 120) << selection << " online " << online;
+    }
+  }
+}
+
+TEST_F(SparsifyGraph, OneOfEveryFewStaysFromTheFirstOnWhetherItIsFixedOrNot) {
+  for (const bool fixed : {false, true}) {
+    Graph graph = chain(16);
+    graph.set_fixed(0, fixed);
+    const SparsifyResult result = sparsify_whole(graph, job("keep_every:every=5"), setting_);
+    EXPECT_EQ(ids(result.sparse), (std::set<Id>{0, 5, 10, 15})) << fixed;
+  }
+}
+
 TEST_F(SparsifyGraph, LosesSomethingWhereLoopsMeet) {
   const Graph graph = simulate("manhattan:poses=120,streets=3");
   const SparsifyResult result = sparsify_whole(graph, job("smallest_blanket:part=0.5"), setting_);
