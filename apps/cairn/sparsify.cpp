@@ -49,10 +49,11 @@ SparsifyJob job_of(const SparsifyCommandOptions& options, Session& session) {
   for (const auto& [name, value] : given) {
     if (!value.empty()) job.sparsifier.values.insert_or_assign(name, value);
   }
-  // A tree is solved in closed form; nothing else is worth its name there.
+  // A tree, or one factor, is solved in closed form; nothing else is worth its name there.
   const auto topology = job.sparsifier.values.find("topology");
   if (topology != job.sparsifier.values.end() &&
-      (topology->second.starts_with("clt") || topology->second.starts_with("cliquey")))
+      (topology->second.starts_with("clt") || topology->second.starts_with("cliquey") ||
+       topology->second.starts_with("glc")))
     job.sparsifier.values.emplace("recovery", "closed_form");
   if (options.keep_every > 0 && !options.select.empty())
     throw Error(ErrorCode::usage, "--keep-every and --select both say which nodes leave: give one");
@@ -93,6 +94,26 @@ SparsifyJob job_of(const SparsifyCommandOptions& options, Session& session) {
   job.measure = !options.no_kld;
   if (options.compared_at == "minima") job.compared_at = ComparedAt::minima;
   return job;
+}
+
+/// Refuses, before a graph is read, what could not be written in the end.
+void check_topology(const SparsifyCommandOptions& options, const SparsifyJob& job,
+                    Registry& registry) {
+  const auto given = job.sparsifier.values.find("topology");
+  if (given == job.sparsifier.values.end()) return;
+  const auto topology = registry.make<Topology>(given->second);
+  if (!options.output.empty() && !topology->unwritable().empty()) {
+    throw Error(ErrorCode::usage,
+                fmt::format("--topology {} makes {}, which no format of graphs expresses: omit "
+                            "--output to compare, or choose another topology to write",
+                            given->second, topology->unwritable()));
+  }
+  if (!options.record.empty() && topology->whole()) {
+    throw Error(ErrorCode::usage,
+                fmt::format("--topology {} has no factors of pairs, which --record is for: choose "
+                            "another topology to record problems",
+                            given->second));
+  }
 }
 
 json::value number_json(double number) {
@@ -264,14 +285,7 @@ int run_sparsify(SparsifyCommandOptions options, Session& session) {
   // A wrong name is refused before a graph is read.
   registry.make<Sparsifier>(job.sparsifier);
   registry.make<NodeSelection>(job.selection);
-  const auto topology = job.sparsifier.values.find("topology");
-  if (!options.output.empty() && topology != job.sparsifier.values.end() &&
-      topology->second.starts_with("cliquey")) {
-    throw Error(ErrorCode::usage,
-                "--topology cliquey makes pairs of correlated factors (CORRELATED_PAIR), which no "
-                "format of graphs expresses: omit --output to compare, or choose another "
-                "topology to write");
-  }
+  check_topology(options, job, registry);
   const ProblemSetup setup(options.problem, registry);
   const LoadedGraph loaded = load_graph(options.graph, options.input, session);
   const InterruptGuard guard;

@@ -30,13 +30,16 @@ std::vector<double> whole_information(const Marginal& marginal, const FactorChoi
     columns += marginal.dense.models[number].size;
   }
   const Eigen::Map<const Matrix> Omega(information.data(), columns, columns);
-  if (rows == columns) return pack(Omega);
+  if (std::ranges::all_of(choice,
+                          [&](int k) { return marginal.predictions[k].directions.size() == 0; }))
+    return pack(Omega);
   Matrix B = Matrix::Zero(rows, columns);
   int row = 0, column = 0;
   for (const int number : choice) {
     const Marginal::Prediction& of = marginal.predictions[number];
     const int m = of.type->residual_size(), n = marginal.dense.models[number].size;
-    B.block(row, column, m, n) = m == n ? Matrix(Matrix::Identity(m, m)) : of.directions;
+    B.block(row, column, m, n) =
+        of.directions.size() == 0 ? Matrix(Matrix::Identity(m, m)) : of.directions;
     row += m;
     column += n;
   }
@@ -104,7 +107,8 @@ Sparsify::Solved Sparsify::solve(const WorkGraph& work, const LocalProblem& loca
   Solved solved;
   {
     const Timed timed(seconds.marginalize);
-    solved.marginal = marginalize(work, local, options_.resolve);
+    solved.marginal =
+        marginalize(work, local, options_.resolve, topology_->whole() ? &constraints_ : nullptr);
   }
   const DenseBlanket& dense = solved.marginal.dense;
   if (dense.models.empty()) return solved;
@@ -154,14 +158,14 @@ void Sparsify::add_factors(WorkGraph& work, const LocalProblem& local, const Sol
     std::vector<std::array<int, 2>> between;
     std::vector<double> measurement;
     for (const int number : choice) {
-      std::array<int, 2> ends{};
-      for (std::size_t end = 0; end < models[number].nodes.size(); ++end) {
-        const int node = local.blanket[models[number].nodes[end]];
+      std::vector<int> ends;
+      for (const int of : models[number].nodes) {
+        const int node = local.blanket[of];
         const auto at = std::ranges::find(nodes, node);
-        ends[end] = static_cast<int>(at - nodes.begin());
+        ends.push_back(static_cast<int>(at - nodes.begin()));
         if (at == nodes.end()) nodes.push_back(node);
       }
-      between.push_back(ends);
+      if (choice.size() > 1) between.push_back({ends.at(0), ends.at(1)});
       const std::vector<double>& z = solved.marginal.predictions[number].measurement;
       measurement.insert(measurement.end(), z.begin(), z.end());
     }
@@ -190,7 +194,7 @@ std::shared_ptr<const FactorType> Sparsify::pair_type(
 
 void Sparsify::take_out(WorkGraph& work, std::vector<int> group, Sparsification& result) {
   const Graph& graph = work.graph();
-  const LocalProblem local = crop(work, std::move(group));
+  const LocalProblem local = crop(work, std::move(group), topology_->whole());
   const auto refuse = [&](const std::string& reason) {
     for (const int v : local.removed) result.refused.push_back({graph.id(v), reason});
   };
@@ -269,7 +273,7 @@ std::vector<double> Sparsify::losses(const Graph& graph, std::span<const int> no
   std::vector<double> klds;
   SparsificationSeconds seconds;
   for (const int v : nodes) {
-    const LocalProblem local = crop(work, {v});
+    const LocalProblem local = crop(work, {v}, topology_->whole());
     double kld = std::numeric_limits<double>::infinity();
     if (local.refusal.empty()) {
       try {

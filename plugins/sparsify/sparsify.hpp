@@ -11,6 +11,7 @@
 #include "cairn/sparsification/recovery.hpp"
 #include "cairn/sparsification/sparsifier.hpp"
 #include "cairn/sparsification/topology.hpp"
+#include "linear_model.hpp"
 #include "local_problem.hpp"
 #include "work_graph.hpp"
 
@@ -95,6 +96,7 @@ class Sparsify final : public Sparsifier {
     std::shared_ptr<const FactorType> type;
   };
   std::vector<PairType> pair_types_;
+  LinearConstraints constraints_;
 };
 
 }  // namespace cairn::sparsify
