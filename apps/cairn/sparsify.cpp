@@ -49,11 +49,10 @@ SparsifyJob job_of(const SparsifyCommandOptions& options, Session& session) {
   for (const auto& [name, value] : given) {
     if (!value.empty()) job.sparsifier.values.insert_or_assign(name, value);
   }
-  // A tree, or one factor, is solved in closed form; nothing else is worth its name there.
+  // A tree is solved in closed form; nothing else is worth its name there.
   const auto topology = job.sparsifier.values.find("topology");
   if (topology != job.sparsifier.values.end() &&
-      (topology->second.starts_with("clt") || topology->second.starts_with("cliquey") ||
-       topology->second.starts_with("glc")))
+      (topology->second.starts_with("clt") || topology->second.starts_with("cliquey")))
     job.sparsifier.values.emplace("recovery", "closed_form");
   if (options.keep_every > 0 && !options.select.empty())
     throw Error(ErrorCode::usage, "--keep-every and --select both say which nodes leave: give one");
@@ -120,6 +119,10 @@ json::value number_json(double number) {
   return std::isfinite(number) ? json::value(number) : json::value(nullptr);
 }
 
+json::object nonzeros_json(const Nonzeros& nonzeros) {
+  return {{"information", nonzeros.information}, {"factor", nonzeros.factor}};
+}
+
 json::object report_json(const SparsifyCommandOptions& options, const LoadedGraph& loaded,
                          const SparsifyJob& job, const SparsifyResult& result) {
   json::object report = begin_report("sparsify");
@@ -148,6 +151,8 @@ json::object report_json(const SparsifyCommandOptions& options, const LoadedGrap
       result.error ? number_json(result.error->rmse_aligned) : json::value(nullptr);
   if (result.error)
     report["kld_parts"] = {{"covariance", result.error->covariance}, {"mean", result.error->mean}};
+  report["nonzeros"] = {{"before", nonzeros_json(result.nonzeros_before)},
+                        {"after", nonzeros_json(result.nonzeros_after)}};
   report["conservative_margin"] = number_json(result.conservative_margin);
   report["chi2"] = {{"before", result.chi2_before}, {"after", result.chi2_after}};
   report["seconds"] = {{"total", change.seconds.total},
@@ -325,7 +330,8 @@ void add_sparsify_options(ArgumentParser cli, SparsifyCommandOptions& options) {
       .type_name("KIND")
       .one_of({"poses", "landmarks", "all"});
   cli.add_option("--topology", options.topology,
-                 "pairs that get a factor: clt, mi, dmi, ekld, odd, l1, best [ekld]")
+                 "pairs that get a factor: clt, mi, dmi, ekld, odd, l1, best; or one factor on all "
+                 "neighbours: glc [ekld]")
       .type_name("NAME");
   cli.add_option("--population", options.population,
                  "number of new factors: tree:γ, fill:α or loss:KLD [tree:2]")

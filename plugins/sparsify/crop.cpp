@@ -113,7 +113,7 @@ std::string find_types(const WorkGraph& work, const Kinds& kinds, bool whole, Lo
   if (!local.absolute) return {};
   local.types.prior =
       find_type(work, local, [&](const FactorType& type) { return places(type, *kinds.pose); });
-  if (local.types.prior || (whole && local.blanket.size() > 1)) return {};
+  if (local.types.prior || whole) return {};
   return fmt::format(
       "{} has an absolute measurement, and no factor of the graph measures a whole pose in the "
       "world, as a new one does",

@@ -9,26 +9,25 @@
 
 namespace cairn::sparsify {
 
-/// The types of linear constraints: one for all on the same kinds of nodes, so that a graph has
-/// them in few pools.
+/// The types of linear constraints: one for all of a rank on the same kinds of nodes, so that a
+/// graph has them in few pools.
 class LinearConstraints {
  public:
-  std::shared_ptr<const LinearConstraint> type(const LinearConstraint::Nodes& nodes);
+  std::shared_ptr<const LinearConstraint> type(const LinearConstraint::Nodes& nodes, int rank);
 
  private:
   std::vector<std::shared_ptr<const LinearConstraint>> types_;
 };
 
-/// Adds the model on all nodes of a blanket, whose states, Λ and gradient are known. With S the
-/// Jacobian of the constraint's coordinates e and TᵀΛT = I its residual is G e,
+/// Adds the model on all nodes of a blanket, whose states, Λ and gradient g are known. With S the
+/// Jacobian of the constraint's coordinates e and TᵀΛT = I its residual is G e − b,
 ///
-///     G = TᵀΛS⁻¹,   GᵀG = S⁻ᵀΛS⁻¹
+///     G = TᵀΛS⁻¹,   GᵀG = S⁻ᵀΛS⁻¹,   b = Tᵀg
 ///
 /// (Carlevaris-Bianco, Kaess and Eustice, T-RO 2014, where G is of Λ's eigenvectors; T is that of
 /// `project`, which is as good a root, and G has as many rows as Λ has rank). What S leaves out,
-/// the pose of the whole where the blanket is relative, Λ leaves open. So the optimum of its
-/// information is the identity, and nothing is lost. The mean is ē = S T Tᵀ g, zero at the
-/// blanket's own minimum.
+/// the pose of the whole where the blanket is relative, Λ leaves open. So with the identity as its
+/// information nothing is lost, wherever the blanket has been linearised.
 void add_linear_model(const Graph& graph, const LocalProblem& local, LinearConstraints& types,
                       Marginal& marginal);
 

@@ -288,13 +288,10 @@ Marginal marginalize(const WorkGraph& work, const LocalProblem& local, bool reso
   marginal.dense.information.assign(L.data(), L.data() + L.size());
   marginal.dense.absolute = local.absolute;
   marginal.gradient = g.tail(b) - half.transpose() * half_gradient;
-  // A measurement says the same of two nodes that are at their own minimum.
-  const bool pair = local.blanket.size() == 2 && !local.absolute && resolve &&
-                    (local.types.relative || local.types.observation);
-  if (whole && local.blanket.size() > 1 && !pair) {
-    add_linear_model(graph, local, *whole, marginal);
-  } else {
+  if (!whole) {
     Models(graph, local, marginal).add_all();
+  } else if (local.absolute || local.blanket.size() > 1) {
+    add_linear_model(graph, local, *whole, marginal);
   }
   if (!marginal.dense.models.empty()) reduce_models(marginal);
   return marginal;

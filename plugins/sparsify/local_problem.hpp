@@ -52,8 +52,7 @@ struct Marginal {
   struct Prediction {
     std::shared_ptr<const FactorType> type;
     std::vector<double> measurement;  ///< that makes its residual zero there
-    /// B, size of the type's residual × size of the model: the model's residual is Bᵀ r, or, of a
-    /// linear model, B⁺ r; the information of the type's is B Ω Bᵀ. Empty: r.
+    /// B, size of the type's residual × size of the model: the model's residual is Bᵀ r. Empty: r.
     Matrix directions;
   };
   std::vector<Prediction> predictions;

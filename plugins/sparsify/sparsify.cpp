@@ -16,6 +16,7 @@
 #include "cairn/runtime/timed.hpp"
 #include "cairn/sparsification/correlated_pair.hpp"
 #include "dense/products.hpp"
+#include "recovery.hpp"
 
 namespace cairn::sparsify {
 namespace {
@@ -30,16 +31,13 @@ std::vector<double> whole_information(const Marginal& marginal, const FactorChoi
     columns += marginal.dense.models[number].size;
   }
   const Eigen::Map<const Matrix> Omega(information.data(), columns, columns);
-  if (std::ranges::all_of(choice,
-                          [&](int k) { return marginal.predictions[k].directions.size() == 0; }))
-    return pack(Omega);
+  if (rows == columns) return pack(Omega);
   Matrix B = Matrix::Zero(rows, columns);
   int row = 0, column = 0;
   for (const int number : choice) {
     const Marginal::Prediction& of = marginal.predictions[number];
     const int m = of.type->residual_size(), n = marginal.dense.models[number].size;
-    B.block(row, column, m, n) =
-        of.directions.size() == 0 ? Matrix(Matrix::Identity(m, m)) : of.directions;
+    B.block(row, column, m, n) = m == n ? Matrix(Matrix::Identity(m, m)) : of.directions;
     row += m;
     column += n;
   }
@@ -99,7 +97,9 @@ std::vector<std::vector<int>> Sparsify::groups(const WorkGraph& work,
 void Sparsify::recover(const BlanketProjection& coordinates, Solved& solved,
                        SparsificationSeconds& seconds) {
   const Timed timed(seconds.recovery);
-  solved.recovery = recovery_->recover(coordinates.problem(solved.marginal.dense, solved.topology));
+  const RecoveryProblem problem = coordinates.problem(solved.marginal.dense, solved.topology);
+  solved.recovery =
+      topology_->whole() ? ClosedForm().recover(problem) : recovery_->recover(problem);
 }
 
 Sparsify::Solved Sparsify::solve(const WorkGraph& work, const LocalProblem& local,
@@ -107,8 +107,10 @@ Sparsify::Solved Sparsify::solve(const WorkGraph& work, const LocalProblem& loca
   Solved solved;
   {
     const Timed timed(seconds.marginalize);
-    solved.marginal =
-        marginalize(work, local, options_.resolve, topology_->whole() ? &constraints_ : nullptr);
+    // A linear constraint has a mean, so that the minimum stays where it is by itself.
+    solved.marginal = topology_->whole()
+                          ? marginalize(work, local, /*resolve=*/false, &constraints_)
+                          : marginalize(work, local, options_.resolve);
   }
   const DenseBlanket& dense = solved.marginal.dense;
   if (dense.models.empty()) return solved;
@@ -171,7 +173,7 @@ void Sparsify::add_factors(WorkGraph& work, const LocalProblem& local, const Sol
     }
     const std::shared_ptr<const FactorType>& type =
         solved.marginal.predictions[choice.front()].type;
-    if (nodes.size() == 1) {
+    if (nodes.size() == 1 && !topology_->whole()) {
       work.add_prior(type, nodes.front(), std::move(measurement), solved.information[k]);
     } else {
       work.add(choice.size() == 1 ? type : pair_type(type, between), std::move(nodes),

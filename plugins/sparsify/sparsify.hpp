@@ -52,7 +52,7 @@ struct SparsifyOptions {
                 "connected together")
         .choice("projection", &O::projection,
                 "coordinates where Λ is singular: relative to a node, or its eigenvectors")
-        .boolean("resolve", &O::resolve, "solve the cropped problem by itself first")
+        .boolean("resolve", &O::resolve, "solve the cropped problem by itself first (not with glc)")
         .integer("largest_group", &O::largest_group, 1, 100000,
                  "nodes that leave together, at most");
   }

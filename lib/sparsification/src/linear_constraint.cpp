@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <utility>
 
+#include <fmt/core.h>
 #include <Eigen/Core>
 
 #include "cairn/geometry/pose.hpp"
@@ -26,7 +27,13 @@ struct LinearConstraint::Coordinates {
   MatrixXd by_root;              ///< all rows × tangent of the root
 };
 
-LinearConstraint::LinearConstraint(Nodes nodes) : nodes_(std::move(nodes)) {
+int LinearConstraint::coordinates_of(const Nodes& nodes) {
+  const int poses = nodes.poses - (nodes.absolute_size > 0 ? 0 : 1);
+  const int landmark = nodes.observation ? nodes.observation->tangent_size(1) : 0;
+  return poses * nodes.pose->tangent_size() + nodes.landmarks * landmark;
+}
+
+LinearConstraint::LinearConstraint(Nodes nodes, int rank) : nodes_(std::move(nodes)), rank_(rank) {
   if (!nodes_.pose || !is_pose(*nodes_.pose) || nodes_.poses < 1)
     throw Error(ErrorCode::usage, "a linear constraint is on one pose at least");
   const FactorType* const of = nodes_.observation.get();
@@ -45,8 +52,13 @@ LinearConstraint::LinearConstraint(Nodes nodes) : nodes_(std::move(nodes)) {
                                           : is_landmark(k) ? of->measurement_size()
                                                            : ambient_size(k)));
   }
-  if (residual_size() == 0)
-    throw Error(ErrorCode::usage, "a relative linear constraint is on two nodes at least");
+  if (rank_ < 1 || rank_ > coordinate_count()) {
+    throw Error(ErrorCode::usage,
+                fmt::format("a linear constraint of rank {} on nodes with {} coordinates{}: "
+                            "expected 1 to as many",
+                            rank_, coordinate_count(),
+                            nodes_.absolute_size > 0 ? "" : " in the frame of the first"));
+  }
   if (of) unit_ = pack(MatrixXd::Identity(of->residual_size(), of->residual_size()));
 }
 
@@ -69,8 +81,12 @@ std::string LinearConstraint::normalize(double* measurement) const {
   return {};
 }
 
-std::vector<double> LinearConstraint::measurement_at(const double* const* x) const {
+std::vector<double> LinearConstraint::measurement_at(const double* const* x,
+                                                     std::span<const double> b,
+                                                     std::span<const double> G) const {
   std::vector<double> z(static_cast<std::size_t>(measurement_size()));
+  std::ranges::copy(b, z.begin() + numbers_.back());
+  std::ranges::copy(G, z.begin() + numbers_.back() + rank_);
   const StateGroup group(*nodes_.pose);
   const auto of = [&](int k) {
     return StateGroup::View(x[k], static_cast<std::size_t>(ambient_size(k)));
@@ -96,8 +112,8 @@ LinearConstraint::Coordinates LinearConstraint::coordinates(const double* const*
   const int p = nodes_.pose->tangent_size();
   const StateGroup group(*nodes_.pose);
   const StateGroup::View root(x[0], static_cast<std::size_t>(ambient_size(0)));
-  Coordinates at{VectorXd(residual_size()), std::vector<MatrixXd>(tags_.size()), {}};
-  if (with_jacobians) at.by_root = MatrixXd::Zero(residual_size(), p);
+  Coordinates at{VectorXd(coordinate_count()), std::vector<MatrixXd>(tags_.size()), {}};
+  if (with_jacobians) at.by_root = MatrixXd::Zero(coordinate_count(), p);
   for (int k = 0; k < arity(); ++k) {
     const double* const z = measurement + numbers_[k];
     double* const e = at.e.data() + rows_[k];
@@ -130,25 +146,18 @@ LinearConstraint::Coordinates LinearConstraint::coordinates(const double* const*
 void LinearConstraint::evaluate(const double* const* x, const double* measurement,
                                 const double* sqrt_information, double* residual,
                                 double* const* jacobians) const {
-  const int m = residual_size();
   const Coordinates at = coordinates(x, measurement, jacobians != nullptr);
-  const MatrixXd root = unpack({sqrt_information, packed_size(m)}, m);
-  const auto U = root.triangularView<Eigen::Upper>();
-  const Eigen::Map<const VectorXd> mean(measurement + numbers_.back(), m);
-  Eigen::Map<VectorXd>(residual, m) = U * VectorXd(at.e - mean);
+  const double* const b = measurement + numbers_.back();
+  const Eigen::Map<const MatrixXd> G(b + rank_, rank_, coordinate_count());
+  const MatrixXd whitening = unpack({sqrt_information, packed_size(rank_)}, rank_);
+  const auto U = whitening.triangularView<Eigen::Upper>();
+  Eigen::Map<VectorXd>(residual, rank_) =
+      U * VectorXd(G * at.e - Eigen::Map<const VectorXd>(b, rank_));
   for (int k = 0; jacobians && k < arity(); ++k) {
     if (!jacobians[k]) continue;
-    Eigen::Map<MatrixXd> J(jacobians[k], m, tangent_size(k));
-    if (k == 0) {
-      J = U * at.by_root;
-      continue;
-    }
-    // The rows of node k alone: what is below them is zero, as U is upper triangular.
-    const int end = rows_[k + 1];
-    MatrixXd columns = root.middleCols(rows_[k], end - rows_[k]).topRows(end);
-    for (int c = 0; c < columns.cols(); ++c) columns.col(c).tail(columns.cols() - 1 - c).setZero();
-    J.setZero();
-    J.topRows(end) = dense::product(columns, at.by_own[k]);
+    const auto own = G.middleCols(rows_[k], rows_[k + 1] - rows_[k]);
+    Eigen::Map<MatrixXd>(jacobians[k], rank_, tangent_size(k)) =
+        U * (k == 0 ? dense::product(G, at.by_root) : dense::product(own, at.by_own[k]));
   }
 }
 

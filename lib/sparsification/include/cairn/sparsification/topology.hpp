@@ -24,7 +24,8 @@ class CAIRN_API Topology : public Component {
   /// `Error` (usage) for a blanket that it does not know how to connect.
   virtual std::vector<FactorChoice> choose(const DenseBlanket& blanket, int population) = 0;
 
-  /// Whether its factor is one on all nodes of a blanket: that is the only model which it gets.
+  /// Whether its factor is one on all nodes of a blanket: that is the only model which it gets, and
+  /// its information is the identity.
   virtual bool whole() const { return false; }
   /// What its factors are that no format of graphs expresses, for messages; empty: none.
   virtual std::string_view unwritable() const { return {}; }
