@@ -12,10 +12,10 @@
 #include "cairn/geometry/state_group.hpp"
 #include "cairn/graph/packed.hpp"
 #include "cairn/runtime/error.hpp"
+#include "constraint_model.hpp"
 #include "dense/cholesky.hpp"
 #include "dense/eigenvalues.hpp"
 #include "dense/products.hpp"
-#include "linear_model.hpp"
 
 namespace cairn::sparsify {
 namespace {
@@ -291,7 +291,7 @@ Marginal marginalize(const WorkGraph& work, const LocalProblem& local, bool reso
   if (!whole) {
     Models(graph, local, marginal).add_all();
   } else if (local.absolute || local.blanket.size() > 1) {
-    add_linear_model(graph, local, *whole, marginal);
+    add_constraint_model(graph, local, *whole, marginal);
   }
   if (!marginal.dense.models.empty()) reduce_models(marginal);
   return marginal;

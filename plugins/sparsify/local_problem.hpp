@@ -42,7 +42,7 @@ LocalProblem crop(const WorkGraph& work, std::vector<int> removed, bool whole = 
 
 /// What is left of it on the blanket. The models are a relative factor for each pair of poses, an
 /// observation for each pose and landmark, and, where the problem is absolute, a prior for each
-/// pose that is not fixed; or one on the whole blanket (`add_linear_model`).
+/// pose that is not fixed; or one on the whole blanket (`add_constraint_model`).
 struct Marginal {
   DenseBlanket dense;
   std::vector<std::vector<double>> states;  ///< of the blanket, where it was linearised

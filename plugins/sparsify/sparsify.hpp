@@ -11,7 +11,7 @@
 #include "cairn/sparsification/recovery.hpp"
 #include "cairn/sparsification/sparsifier.hpp"
 #include "cairn/sparsification/topology.hpp"
-#include "linear_model.hpp"
+#include "constraint_model.hpp"
 #include "local_problem.hpp"
 #include "work_graph.hpp"
 

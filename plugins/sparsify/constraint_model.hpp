@@ -28,7 +28,7 @@ class LinearConstraints {
 /// `project`, which is as good a root, and G has as many rows as Λ has rank). What S leaves out,
 /// the pose of the whole where the blanket is relative, Λ leaves open. So with the identity as its
 /// information nothing is lost, wherever the blanket has been linearised.
-void add_linear_model(const Graph& graph, const LocalProblem& local, LinearConstraints& types,
-                      Marginal& marginal);
+void add_constraint_model(const Graph& graph, const LocalProblem& local, LinearConstraints& types,
+                          Marginal& marginal);
 
 }  // namespace cairn::sparsify

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "linear_model.hpp"
+#include "constraint_model.hpp"
 
 #include <algorithm>
 #include <numeric>
@@ -44,8 +44,8 @@ Matrix root_shift(const LinearConstraint::Nodes& on, const DenseBlanket& blanket
 
 }  // namespace
 
-void add_linear_model(const Graph& graph, const LocalProblem& local, LinearConstraints& types,
-                      Marginal& marginal) {
+void add_constraint_model(const Graph& graph, const LocalProblem& local, LinearConstraints& types,
+                          Marginal& marginal) {
   DenseBlanket& blanket = marginal.dense;
   LinearConstraint::Nodes on{
       .pose = graph.type_of(local.blanket.front()),
