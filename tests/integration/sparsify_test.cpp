@@ -173,10 +173,11 @@ TEST_F(Sparsify, CorrelatedPairsLoseLessThanTheTreeTheyAreMadeOf) {
 
 /// In the plane and in space, with landmarks, and while the graph grows.
 TEST_F(Sparsify, LinearConstraintsLoseNothing) {
-  for (const Arguments& what : {Arguments{"@manhattan:poses=300", "--keep-every", "3"},
-                                {"@sphere:turns=6,poses_per_turn=12", "--keep-every", "2"},
-                                {"@landmarks2d", "--nodes", "all", "--keep-every", "4"},
-                                {"@manhattan:poses=300", "--keep-every", "3", "--online", "50"}}) {
+  for (const Arguments& what :
+       {Arguments{"@manhattan:poses=300", "--keep-every", "3"},
+        {"@sphere:turns=6,poses_per_turn=12", "--keep-every", "2"},
+        {"@landmarks2d:poses=300", "--nodes", "landmarks", "--keep-every", "4"},
+        {"@manhattan:poses=300", "--keep-every", "3", "--online", "50"}}) {
     const auto told = [&](const char* topology) {
       Arguments arguments = what;
       arguments.insert(arguments.end(), {"--topology", topology});
@@ -194,7 +195,9 @@ TEST_F(Sparsify, LinearConstraintsLoseNothing) {
     const bool online = what.size() > 3 && what[what.size() - 2] == "--online";
     EXPECT_LT(std::abs(number(dense.at("kld"))), online ? 0.1 * number(tree.at("kld")) : 1e-5)
         << what.front();
-    EXPECT_EQ(nonzeros(dense, "before") == nonzeros(tree, "before"), !online);
+    if (!online) {
+      EXPECT_EQ(nonzeros(dense, "before"), nonzeros(tree, "before"));
+    }
   }
 }
 
