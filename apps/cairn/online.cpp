@@ -24,6 +24,7 @@
 #include "cairn/runtime/threads.hpp"
 #include "cairn/solve/estimator.hpp"
 #include "cairn/sparsification/map_sparsifier.hpp"
+#include "cairn/sparsification/topology.hpp"
 #include "cairn/update/marginal_prior.hpp"
 #include "commands.hpp"
 #include "graph_files.hpp"
@@ -142,20 +143,23 @@ struct Listener {
 };
 
 /// Of which the map can be saved.
-ComponentSpec checked_sparsifier(const std::string& text) {
+ComponentSpec checked_sparsifier(const std::string& text, Registry& registry) {
   ComponentSpec sparsifier = parse_component(text.empty() ? kDefaultSparsifier : text);
   const auto topology = sparsifier.values.find("topology");
-  if (topology != sparsifier.values.end() && topology->second.starts_with("cliquey")) {
+  if (topology == sparsifier.values.end()) return sparsifier;
+  const auto made = registry.make<Topology>(topology->second);
+  if (!made->unwritable().empty()) {
     throw Error(ErrorCode::usage,
-                "topology cliquey makes pairs of correlated factors (CORRELATED_PAIR), which no "
-                "format of graphs expresses: the map could not be saved; choose another topology");
+                fmt::format("topology {} makes {}, which no format of graphs expresses: the map "
+                            "could not be saved; choose another topology",
+                            topology->second, made->unwritable()));
   }
   return sparsifier;
 }
 
 std::unique_ptr<PoseRemover> pose_remover(const OnlineOptions& options, Registry& registry) {
   auto remover = std::make_unique<MapSparsifier>(
-      registry, checked_sparsifier(options.sparsifier),
+      registry, checked_sparsifier(options.sparsifier, registry),
       parse_component(options.select.empty() ? MapSparsifier::kDefaultSelection : options.select));
   // A wrong name is refused at once. Without these options the plugin need not be there.
   if (options.keep > 0 || !options.sparsifier.empty() || !options.select.empty())
@@ -189,7 +193,7 @@ Listener follow_graph(const OnlineOptions& options, const ProblemSetup& setup, S
 }
 
 /// The policy with the options that the command line gives by themselves.
-ComponentSpec policy_spec(const OnlineOptions& options) {
+ComponentSpec policy_spec(const OnlineOptions& options, Registry& registry) {
   ComponentSpec spec = parse_component(options.policy);
   const auto give = [&](const char* name, const std::string& value) {
     if (value.empty()) return;
@@ -204,7 +208,7 @@ ComponentSpec policy_spec(const OnlineOptions& options) {
   give("select", options.select);
   give("sparsifier", options.sparsifier);
   if (const auto given = spec.values.find("sparsifier"); given != spec.values.end())
-    (void)checked_sparsifier(given->second);
+    (void)checked_sparsifier(given->second, registry);
   if (spec.values.contains("keep")) return spec;
   for (const char* name : {"select", "sparsifier"}) {
     if (!spec.values.contains(name)) continue;
@@ -218,7 +222,7 @@ ComponentSpec policy_spec(const OnlineOptions& options) {
 
 Listener follow_policy(const OnlineOptions& options, const ProblemSetup& setup, Session& session) {
   Registry& registry = session.registry();
-  ComponentSpec spec = policy_spec(options);
+  ComponentSpec spec = policy_spec(options, registry);
   if (!options.thresholds.empty()) {
     for (const auto& [name, value] : read_thresholds(options.thresholds, spec.name))
       spec.values.emplace(name, value);

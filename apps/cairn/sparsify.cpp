@@ -95,8 +95,32 @@ SparsifyJob job_of(const SparsifyCommandOptions& options, Session& session) {
   return job;
 }
 
+/// Refuses, before a graph is read, what could not be written in the end.
+void check_topology(const SparsifyCommandOptions& options, const SparsifyJob& job,
+                    Registry& registry) {
+  const auto given = job.sparsifier.values.find("topology");
+  if (given == job.sparsifier.values.end()) return;
+  const auto topology = registry.make<Topology>(given->second);
+  if (!options.output.empty() && !topology->unwritable().empty()) {
+    throw Error(ErrorCode::usage,
+                fmt::format("--topology {} makes {}, which no format of graphs expresses: omit "
+                            "--output to compare, or choose another topology to write",
+                            given->second, topology->unwritable()));
+  }
+  if (!options.record.empty() && topology->whole()) {
+    throw Error(ErrorCode::usage,
+                fmt::format("--topology {} has no factors of pairs, which --record is for: choose "
+                            "another topology to record problems",
+                            given->second));
+  }
+}
+
 json::value number_json(double number) {
   return std::isfinite(number) ? json::value(number) : json::value(nullptr);
+}
+
+json::object nonzeros_json(const Nonzeros& nonzeros) {
+  return {{"information", nonzeros.information}, {"factor", nonzeros.factor}};
 }
 
 json::object report_json(const SparsifyCommandOptions& options, const LoadedGraph& loaded,
@@ -127,6 +151,8 @@ json::object report_json(const SparsifyCommandOptions& options, const LoadedGrap
       result.error ? number_json(result.error->rmse_aligned) : json::value(nullptr);
   if (result.error)
     report["kld_parts"] = {{"covariance", result.error->covariance}, {"mean", result.error->mean}};
+  report["nonzeros"] = {{"before", nonzeros_json(result.nonzeros_before)},
+                        {"after", nonzeros_json(result.nonzeros_after)}};
   report["conservative_margin"] = number_json(result.conservative_margin);
   report["chi2"] = {{"before", result.chi2_before}, {"after", result.chi2_after}};
   report["seconds"] = {{"total", change.seconds.total},
@@ -264,14 +290,7 @@ int run_sparsify(SparsifyCommandOptions options, Session& session) {
   // A wrong name is refused before a graph is read.
   registry.make<Sparsifier>(job.sparsifier);
   registry.make<NodeSelection>(job.selection);
-  const auto topology = job.sparsifier.values.find("topology");
-  if (!options.output.empty() && topology != job.sparsifier.values.end() &&
-      topology->second.starts_with("cliquey")) {
-    throw Error(ErrorCode::usage,
-                "--topology cliquey makes pairs of correlated factors (CORRELATED_PAIR), which no "
-                "format of graphs expresses: omit --output to compare, or choose another "
-                "topology to write");
-  }
+  check_topology(options, job, registry);
   const ProblemSetup setup(options.problem, registry);
   const LoadedGraph loaded = load_graph(options.graph, options.input, session);
   const InterruptGuard guard;
@@ -311,7 +330,8 @@ void add_sparsify_options(ArgumentParser cli, SparsifyCommandOptions& options) {
       .type_name("KIND")
       .one_of({"poses", "landmarks", "all"});
   cli.add_option("--topology", options.topology,
-                 "pairs that get a factor: clt, mi, dmi, ekld, odd, l1, best [ekld]")
+                 "pairs that get a factor: clt, mi, dmi, ekld, odd, l1, best; or one factor on all "
+                 "neighbours: glc [ekld]")
       .type_name("NAME");
   cli.add_option("--population", options.population,
                  "number of new factors: tree:γ, fill:α or loss:KLD [tree:2]")

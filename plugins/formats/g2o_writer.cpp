@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "cairn/sparsification/correlated_pair.hpp"
+#include "cairn/sparsification/linear_constraint.hpp"
 #include "cairn/update/marginal_prior.hpp"
 #include "line_writer.hpp"
 #include "writer_order.hpp"
@@ -67,6 +68,10 @@ void write_factor(const Graph& graph, int position, LineWriter& out) {
   if (tag == CorrelatedPair::kTag) {
     cannot_express("g2o", graph.describe_factor(position),
                    "a graph without correlated pairs, which exist in memory only");
+  }
+  if (tag == LinearConstraint::kTag) {
+    cannot_express("g2o", graph.describe_factor(position),
+                   "a graph without linear constraints, which exist in memory only");
   }
   check_tag(tag, graph.describe_factor(position));
   const WithOffset* offset = with_offset(tag);

@@ -81,8 +81,9 @@ std::shared_ptr<const FactorType> find_type(const WorkGraph& work, const LocalPr
   return nullptr;
 }
 
-/// Finds the types that new factors need; why there is none, or nothing.
-std::string find_types(const WorkGraph& work, const Kinds& kinds, LocalProblem& local) {
+/// Finds the types that new factors need, of which one on the whole blanket can do without some;
+/// why there is none, or nothing.
+std::string find_types(const WorkGraph& work, const Kinds& kinds, bool whole, LocalProblem& local) {
   const Graph& graph = work.graph();
   const std::string leaving = graph.describe_variable(local.removed.front());
   const auto landmarks = std::ssize(local.blanket) - local.poses;
@@ -93,7 +94,7 @@ std::string find_types(const WorkGraph& work, const Kinds& kinds, LocalProblem& 
   if (local.poses > 1) {
     local.types.relative =
         find_type(work, local, [&](const FactorType& type) { return relates(type, *kinds.pose); });
-    if (!local.types.relative) {
+    if (!local.types.relative && !whole) {
       return fmt::format(
           "{}: no factor of the graph measures a whole relative pose, as new ones do", leaving);
     }
@@ -112,7 +113,7 @@ std::string find_types(const WorkGraph& work, const Kinds& kinds, LocalProblem& 
   if (!local.absolute) return {};
   local.types.prior =
       find_type(work, local, [&](const FactorType& type) { return places(type, *kinds.pose); });
-  if (local.types.prior) return {};
+  if (local.types.prior || whole) return {};
   return fmt::format(
       "{} has an absolute measurement, and no factor of the graph measures a whole pose in the "
       "world, as a new one does",
@@ -121,7 +122,7 @@ std::string find_types(const WorkGraph& work, const Kinds& kinds, LocalProblem& 
 
 }  // namespace
 
-LocalProblem crop(const WorkGraph& work, std::vector<int> removed) {
+LocalProblem crop(const WorkGraph& work, std::vector<int> removed, bool whole) {
   const Graph& graph = work.graph();
   LocalProblem local;
   local.removed = std::move(removed);
@@ -139,13 +140,14 @@ LocalProblem crop(const WorkGraph& work, std::vector<int> removed) {
     if (graph.fixed(v)) local.refusal = fmt::format("{} is held", graph.describe_variable(v));
     for (const int f : work.on(v)) {
       local.factors.push_back(f);
-      local.absolute = local.absolute || work.factor(f).type->absolute_size() > 0;
+      local.absolute_size +=
+          std::min(work.factor(f).type->absolute_size(), graph.type(v).tangent_size());
     }
   }
   // Where all poses are fixed an absolute measurement has nothing left to determine.
-  local.absolute = local.absolute && std::any_of(local.blanket.begin(), landmarks,
-                                                 [&](int v) { return !graph.fixed(v); });
-  if (local.refusal.empty()) local.refusal = find_types(work, kinds, local);
+  local.absolute = local.absolute_size > 0 && std::any_of(local.blanket.begin(), landmarks,
+                                                          [&](int v) { return !graph.fixed(v); });
+  if (local.refusal.empty()) local.refusal = find_types(work, kinds, whole, local);
   if (!local.refusal.empty()) return local;
   // Within the blanket: what determines only how its nodes lie to each other.
   for (const int v : local.blanket) {

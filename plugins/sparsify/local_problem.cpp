@@ -12,6 +12,7 @@
 #include "cairn/geometry/state_group.hpp"
 #include "cairn/graph/packed.hpp"
 #include "cairn/runtime/error.hpp"
+#include "constraint_model.hpp"
 #include "dense/cholesky.hpp"
 #include "dense/eigenvalues.hpp"
 #include "dense/products.hpp"
@@ -256,7 +257,8 @@ void reduce_models(Marginal& marginal) {
 
 }  // namespace
 
-Marginal marginalize(const WorkGraph& work, const LocalProblem& local, bool resolve) {
+Marginal marginalize(const WorkGraph& work, const LocalProblem& local, bool resolve,
+                     LinearConstraints* whole) {
   const Graph& graph = work.graph();
   DenseSystem system(work, local);
   Matrix H;
@@ -274,6 +276,7 @@ Marginal marginalize(const WorkGraph& work, const LocalProblem& local, bool reso
   }
   Matrix L = H.bottomRightCorner(b, b);
   const Matrix half = llt.matrixL().solve(H.topRightCorner(r, b));
+  const Vector half_gradient = llt.matrixL().solve(g.head(r));
   dense::subtract_product_of_transpose(half, half, L);
   L = (0.5 * (L + L.transpose())).eval();
 
@@ -284,7 +287,12 @@ Marginal marginalize(const WorkGraph& work, const LocalProblem& local, bool reso
   }
   marginal.dense.information.assign(L.data(), L.data() + L.size());
   marginal.dense.absolute = local.absolute;
-  Models(graph, local, marginal).add_all();
+  marginal.gradient = g.tail(b) - half.transpose() * half_gradient;
+  if (!whole) {
+    Models(graph, local, marginal).add_all();
+  } else if (local.absolute || local.blanket.size() > 1) {
+    add_constraint_model(graph, local, *whole, marginal);
+  }
   if (!marginal.dense.models.empty()) reduce_models(marginal);
   return marginal;
 }

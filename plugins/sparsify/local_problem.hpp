@@ -12,6 +12,8 @@
 
 namespace cairn::sparsify {
 
+class LinearConstraints;
+
 /// The types of the factors to come, which are types of factors that the graph has. Null where none
 /// is needed.
 struct BlanketTypes {
@@ -29,19 +31,22 @@ struct LocalProblem {
   int poses = 0;             ///< of the blanket
   std::vector<int> factors;  ///< of the work graph
   bool absolute = false;     ///< a factor on `removed` determines absolute states
+  int absolute_size = 0;     ///< how many degrees of freedom of them such factors measure
   std::string refusal;       ///< why these nodes cannot leave; empty: they can
   BlanketTypes types;
 };
 
-/// Crops it. `removed` must be connected, or alone.
-LocalProblem crop(const WorkGraph& work, std::vector<int> removed);
+/// Crops it. `removed` must be connected, or alone. Where the new factor is one on the `whole`
+/// blanket, poses need no types of their own.
+LocalProblem crop(const WorkGraph& work, std::vector<int> removed, bool whole = false);
 
 /// What is left of it on the blanket. The models are a relative factor for each pair of poses, an
 /// observation for each pose and landmark, and, where the problem is absolute, a prior for each
-/// pose that is not fixed.
+/// pose that is not fixed; or one on the whole blanket (`add_constraint_model`).
 struct Marginal {
   DenseBlanket dense;
   std::vector<std::vector<double>> states;  ///< of the blanket, where it was linearised
+  Vector gradient;  ///< g = −Jᵀr there, the removed nodes taken out of it
 
   /// By model.
   struct Prediction {
@@ -65,6 +70,9 @@ struct Marginal {
 /// pose that observed it may turn, a whole relative pose would claim what is not known. Each model
 /// is then reduced to what Λ determines: with N a basis of Λ's null space, to the residual Bᵀ r, B
 /// a basis of the rows for which Bᵀ J N = 0. Its information B Ω Bᵀ is semidefinite.
-Marginal marginalize(const WorkGraph& work, const LocalProblem& local, bool resolve);
+///
+/// `whole` makes the type of the model on the whole blanket; null: models are of pairs.
+Marginal marginalize(const WorkGraph& work, const LocalProblem& local, bool resolve,
+                     LinearConstraints* whole = nullptr);
 
 }  // namespace cairn::sparsify

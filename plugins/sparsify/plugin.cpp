@@ -30,6 +30,8 @@ void add_topologies(Registrar& registrar) {
   registrar.add<Topology>("odd", {}, [](const Options&, Registry&) {
     return std::make_unique<OffDiagonalDeterminant>();
   });
+  registrar.add<Topology>(
+      "glc", {}, [](const Options&, Registry&) { return std::make_unique<DenseConstraint>(); });
 }
 
 void add_recoveries(Registrar& registrar) {

@@ -16,6 +16,7 @@
 #include "cairn/runtime/timed.hpp"
 #include "cairn/sparsification/correlated_pair.hpp"
 #include "dense/products.hpp"
+#include "recovery.hpp"
 
 namespace cairn::sparsify {
 namespace {
@@ -96,7 +97,9 @@ std::vector<std::vector<int>> Sparsify::groups(const WorkGraph& work,
 void Sparsify::recover(const BlanketProjection& coordinates, Solved& solved,
                        SparsificationSeconds& seconds) {
   const Timed timed(seconds.recovery);
-  solved.recovery = recovery_->recover(coordinates.problem(solved.marginal.dense, solved.topology));
+  const RecoveryProblem problem = coordinates.problem(solved.marginal.dense, solved.topology);
+  solved.recovery =
+      topology_->whole() ? ClosedForm().recover(problem) : recovery_->recover(problem);
 }
 
 Sparsify::Solved Sparsify::solve(const WorkGraph& work, const LocalProblem& local,
@@ -104,7 +107,10 @@ Sparsify::Solved Sparsify::solve(const WorkGraph& work, const LocalProblem& loca
   Solved solved;
   {
     const Timed timed(seconds.marginalize);
-    solved.marginal = marginalize(work, local, options_.resolve);
+    // A linear constraint has a mean, so that the minimum stays where it is by itself.
+    solved.marginal = topology_->whole()
+                          ? marginalize(work, local, /*resolve=*/false, &constraints_)
+                          : marginalize(work, local, options_.resolve);
   }
   const DenseBlanket& dense = solved.marginal.dense;
   if (dense.models.empty()) return solved;
@@ -154,20 +160,20 @@ void Sparsify::add_factors(WorkGraph& work, const LocalProblem& local, const Sol
     std::vector<std::array<int, 2>> between;
     std::vector<double> measurement;
     for (const int number : choice) {
-      std::array<int, 2> ends{};
-      for (std::size_t end = 0; end < models[number].nodes.size(); ++end) {
-        const int node = local.blanket[models[number].nodes[end]];
+      std::vector<int> ends;
+      for (const int of : models[number].nodes) {
+        const int node = local.blanket[of];
         const auto at = std::ranges::find(nodes, node);
-        ends[end] = static_cast<int>(at - nodes.begin());
+        ends.push_back(static_cast<int>(at - nodes.begin()));
         if (at == nodes.end()) nodes.push_back(node);
       }
-      between.push_back(ends);
+      if (choice.size() > 1) between.push_back({ends.at(0), ends.at(1)});
       const std::vector<double>& z = solved.marginal.predictions[number].measurement;
       measurement.insert(measurement.end(), z.begin(), z.end());
     }
     const std::shared_ptr<const FactorType>& type =
         solved.marginal.predictions[choice.front()].type;
-    if (nodes.size() == 1) {
+    if (nodes.size() == 1 && !topology_->whole()) {
       work.add_prior(type, nodes.front(), std::move(measurement), solved.information[k]);
     } else {
       work.add(choice.size() == 1 ? type : pair_type(type, between), std::move(nodes),
@@ -190,7 +196,7 @@ std::shared_ptr<const FactorType> Sparsify::pair_type(
 
 void Sparsify::take_out(WorkGraph& work, std::vector<int> group, Sparsification& result) {
   const Graph& graph = work.graph();
-  const LocalProblem local = crop(work, std::move(group));
+  const LocalProblem local = crop(work, std::move(group), topology_->whole());
   const auto refuse = [&](const std::string& reason) {
     for (const int v : local.removed) result.refused.push_back({graph.id(v), reason});
   };
@@ -269,7 +275,7 @@ std::vector<double> Sparsify::losses(const Graph& graph, std::span<const int> no
   std::vector<double> klds;
   SparsificationSeconds seconds;
   for (const int v : nodes) {
-    const LocalProblem local = crop(work, {v});
+    const LocalProblem local = crop(work, {v}, topology_->whole());
     double kld = std::numeric_limits<double>::infinity();
     if (local.refusal.empty()) {
       try {

@@ -11,6 +11,7 @@
 #include "cairn/sparsification/recovery.hpp"
 #include "cairn/sparsification/sparsifier.hpp"
 #include "cairn/sparsification/topology.hpp"
+#include "constraint_model.hpp"
 #include "local_problem.hpp"
 #include "work_graph.hpp"
 
@@ -51,7 +52,7 @@ struct SparsifyOptions {
                 "connected together")
         .choice("projection", &O::projection,
                 "coordinates where Λ is singular: relative to a node, or its eigenvectors")
-        .boolean("resolve", &O::resolve, "solve the cropped problem by itself first")
+        .boolean("resolve", &O::resolve, "solve the cropped problem by itself first (not with glc)")
         .integer("largest_group", &O::largest_group, 1, 100000,
                  "nodes that leave together, at most");
   }
@@ -95,6 +96,7 @@ class Sparsify final : public Sparsifier {
     std::shared_ptr<const FactorType> type;
   };
   std::vector<PairType> pair_types_;
+  LinearConstraints constraints_;
 };
 
 }  // namespace cairn::sparsify

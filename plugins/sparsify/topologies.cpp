@@ -144,6 +144,15 @@ std::vector<FactorChoice> ChowLiuTree::choose(const DenseBlanket& blanket, int /
                     tree_size(blanket));
 }
 
+std::vector<FactorChoice> DenseConstraint::choose(const DenseBlanket& blanket, int /*population*/) {
+  if (blanket.models.size() != 1) {
+    throw Error(ErrorCode::usage,
+                "topology glc has one factor on all nodes of a blanket, and this one has models of "
+                "its pairs only: take another topology");
+  }
+  return {{0}};
+}
+
 std::vector<FactorChoice> MutualInformation::choose(const DenseBlanket& blanket, int population) {
   return tree_first(blanket, by_matrix(blanket, mutual_information(blanket, options_)), population);
 }

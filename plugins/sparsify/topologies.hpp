@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <string_view>
 #include <vector>
 
 #include "approximation.hpp"
@@ -159,6 +160,21 @@ class Cliquey final : public ChowLiuTree {
  public:
   using ChowLiuTree::ChowLiuTree;
   std::vector<FactorChoice> choose(const DenseBlanket& blanket, int population) override;
+  std::string_view unwritable() const override {
+    return "pairs of correlated factors (CORRELATED_PAIR)";
+  }
+};
+
+/// One factor on the whole blanket, which loses nothing: the dense generic linear constraint of
+/// Carlevaris-Bianco, Kaess and Eustice (T-RO 2014); see `LinearConstraint`.
+class DenseConstraint final : public Topology {
+ public:
+  /// Throws `Error` (usage) for a blanket with models of its pairs.
+  std::vector<FactorChoice> choose(const DenseBlanket& blanket, int population) override;
+  bool whole() const override { return true; }
+  std::string_view unwritable() const override {
+    return "one factor on all neighbours of a node (LINEAR_CONSTRAINT)";
+  }
 };
 
 /// Every topology of that population is tried, and the one with the least KLD taken; where there

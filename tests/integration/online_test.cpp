@@ -239,8 +239,10 @@ TEST_F(Online, RefusesOptionsOfSparsificationThatCannotBe) {
   };
   EXPECT_THAT(refusal({"--keep", "1"}, 2), HasSubstr("--keep"));
   EXPECT_THAT(refusal({"--select", "widest"}, 5), HasSubstr("on offer: coverage"));
-  EXPECT_THAT(refusal({"--sparsifier", "sparsify:topology=cliquey"}, 2),
-              HasSubstr("the map could not be saved"));
+  for (const char* topology : {"cliquey", "glc"}) {
+    EXPECT_THAT(refusal({"--sparsifier", std::string("sparsify:topology=") + topology}, 2),
+                HasSubstr("the map could not be saved"));
+  }
   EXPECT_THAT(refusal({"--keep", "20", "--policy", "compact_pose:keep=10"}, 2),
               HasSubstr("--keep, and keep=10 among the policy's options: give one"));
   EXPECT_THAT(refusal({"--select", "oldest", "--policy", "compact_pose"}, 2),

@@ -171,6 +171,36 @@ TEST_F(Sparsify, CorrelatedPairsLoseLessThanTheTreeTheyAreMadeOf) {
   EXPECT_EQ(pairs.at("poses").at("kept").as_int64(), tree.at("poses").at("kept").as_int64());
 }
 
+/// In the plane and in space, with landmarks, and while the graph grows.
+TEST_F(Sparsify, LinearConstraintsLoseNothing) {
+  for (const Arguments& what :
+       {Arguments{"@manhattan:poses=300", "--keep-every", "3"},
+        {"@sphere:turns=6,poses_per_turn=12", "--keep-every", "2"},
+        {"@landmarks2d:poses=300", "--nodes", "landmarks", "--keep-every", "4"},
+        {"@manhattan:poses=300", "--keep-every", "3", "--online", "50"}}) {
+    const auto told = [&](const char* topology) {
+      Arguments arguments = what;
+      arguments.insert(arguments.end(), {"--topology", topology});
+      return report(arguments);
+    };
+    const boost::json::value tree = told("clt"), dense = told("glc");
+    EXPECT_GT(number(tree.at("kld")), 0.1) << what.front();
+    EXPECT_EQ(dense.at("status"), "converged");
+    EXPECT_LT(dense.at("factors").at("out").as_int64(), tree.at("factors").at("out").as_int64());
+    const auto nonzeros = [](const boost::json::value& of, const char* when) {
+      return of.at("nonzeros").at(when).at("information").as_int64();
+    };
+    EXPECT_GT(nonzeros(dense, "after"), nonzeros(tree, "after"));
+    // Online the linearisation point is the estimate of that time, and the map moves later.
+    const bool online = what.size() > 3 && what[what.size() - 2] == "--online";
+    EXPECT_LT(std::abs(number(dense.at("kld"))), online ? 0.1 * number(tree.at("kld")) : 1e-5)
+        << what.front();
+    if (!online) {
+      EXPECT_EQ(nonzeros(dense, "before"), nonzeros(tree, "before"));
+    }
+  }
+}
+
 TEST_F(Sparsify, ReplaysWhatItRecorded) {
   const std::string file = folder_.file("problems.json");
   const boost::json::value told =
@@ -213,6 +243,13 @@ TEST_F(Sparsify, SaysWhatIsWrongAndWhatWouldWork) {
   EXPECT_THAT(
       refused({"@manhattan:poses=60", "--topology", "cliquey", "-o", folder_.file("pairs.g2o")}, 2),
       HasSubstr("CORRELATED_PAIR"));
+  EXPECT_THAT(
+      refused({folder_.file("none.g2o"), "--topology", "glc", "-o", folder_.file("glc.g2o")}, 2),
+      HasSubstr("(LINEAR_CONSTRAINT), which no format of graphs expresses"));
+  EXPECT_THAT(refused({folder_.file("none.g2o"), "--topology", "glc", "--record",
+                       folder_.file("problems.json")},
+                      2, {"study", "sparsify"}),
+              HasSubstr("choose another topology to record problems"));
   EXPECT_THAT(refused({folder_.file("none.json")}, 3, {"study", "problems"}),
               HasSubstr("none.json"));
   write_text(folder_.file("wrong.json"), "{}");

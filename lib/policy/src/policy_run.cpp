@@ -8,9 +8,8 @@
 
 #include <fmt/core.h>
 
+#include "cairn/evaluation/nonzeros.hpp"
 #include "cairn/linear/linear_solver.hpp"
-#include "cairn/linear/linearizer.hpp"
-#include "cairn/linear/normal_equations.hpp"
 #include "cairn/runtime/plugin_call.hpp"
 #include "cairn/runtime/timed.hpp"
 
@@ -62,17 +61,6 @@ class WatchedRegistration final : public Registration {
   PolicyResult& result_;
   FalseMatches* false_;
 };
-
-void count_nonzeros(PolicyResult& result, Registry& registry) {
-  const auto solver = registry.make<LinearSolver>(kCountingSolver);
-  const NormalEquations equations(result.compact, *solver);
-  if (equations.size() == 0) return;
-  // H keeps its lower triangle, with whole blocks on the diagonal.
-  const std::int64_t block = result.compact.type(0).tangent_size();
-  result.information_nonzeros =
-      2 * static_cast<std::int64_t>(equations.H().values().size()) - block * equations.size();
-  result.factor_nonzeros = solver->stats().factor_nonzeros;
-}
 
 bool has_all_of(const Graph& truth, const Graph& recording) {
   for (int v = 0; v < recording.variable_count(); ++v) {
@@ -179,7 +167,10 @@ PolicyResult PolicyRun::finish(Recovery recovery) {
   result_.chi2 = policy_->estimator().chi2();
   result_.located = policy_->unlocated().empty();
   result_.trajectory = recovered_trajectory(*policy_, recovery);
-  count_nonzeros(result_, setting_.registry);
+  const Nonzeros nonzeros =
+      count_nonzeros(result_.compact, *setting_.registry.make<LinearSolver>(kCountingSolver));
+  result_.information_nonzeros = nonzeros.information;
+  result_.factor_nonzeros = nonzeros.factor;
   evaluate(*policy_, setting_.data, result_);
   return std::move(result_);
 }

@@ -109,6 +109,8 @@ void measure(const Graph& original, Parts& parts, SparsifyResult& result) {
         sparsification_error(original, result.sparse, *parts.solver, parts.job.compared_at);
   });
   if (!measured) return;
+  result.nonzeros_before = count_nonzeros(original, *parts.solver);
+  result.nonzeros_after = count_nonzeros(result.sparse, *parts.solver);
   measure_or_note(result, "the smallest eigenvalue of Λ − Λ̆ is not known", [&] {
     result.conservative_margin = conservative_margin(original, result.sparse, *parts.solver);
   });

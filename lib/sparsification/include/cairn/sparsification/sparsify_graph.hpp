@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "cairn/evaluation/nonzeros.hpp"
 #include "cairn/graph/graph.hpp"
 #include "cairn/plugin/options.hpp"
 #include "cairn/plugin/registry.hpp"
@@ -59,6 +60,7 @@ struct SparsifyResult {
   double rmse_full = std::nan("");
   double chi2_before = 0.0, chi2_after = 0.0;
   double select_seconds = 0.0;
+  Nonzeros nonzeros_before, nonzeros_after;  ///< of the same two graphs, if they were measured
   // Online
   std::int64_t redirected = 0, dropped = 0;  ///< factors on nodes that had left
   std::vector<double> steps;                 ///< seconds of each pose, sparsification included

@@ -23,6 +23,12 @@ class CAIRN_API Topology : public Component {
   /// many as a spanning tree has. One of them is a prior where the blanket is absolute. Throws
   /// `Error` (usage) for a blanket that it does not know how to connect.
   virtual std::vector<FactorChoice> choose(const DenseBlanket& blanket, int population) = 0;
+
+  /// Whether its factor is one on all nodes of a blanket: that is the only model which it gets, and
+  /// its information is the identity.
+  virtual bool whole() const { return false; }
+  /// What its factors are that no format of graphs expresses, for messages; empty: none.
+  virtual std::string_view unwritable() const { return {}; }
 };
 
 /// How many factors a topology gets (T 4.4.1).
