@@ -17,7 +17,7 @@ namespace cairn::sparsify {
 ///
 /// Marginalising keeps the order of information matrices, so Λ̆ ⪯ Λ of each blanket makes that of
 /// the whole graph conservative, where all are linearised at the same states
-/// (`sparsify:resolve=false`); with blankets solved by themselves, up to linearisation.
+/// (`sparsify:resolve=false`); with `sparsify:linearize=local`, up to linearisation.
 void make_conservative(Approximation& at);
 
 }  // namespace cairn::sparsify

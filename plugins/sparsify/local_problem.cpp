@@ -31,7 +31,7 @@ constexpr double kOpen = 1e-6;
 /// Dense normal equations of the cropped problem, the removed nodes first.
 class DenseSystem {
  public:
-  DenseSystem(const WorkGraph& work, const LocalProblem& local) : work_(work), local_(local) {
+  DenseSystem(const WorkGraph& work, const LocalProblem& local) : work_(&work), local_(&local) {
     nodes_ = local.removed;
     nodes_.insert(nodes_.end(), local.blanket.begin(), local.blanket.end());
     begin_.push_back(0);
@@ -48,10 +48,10 @@ class DenseSystem {
     }
   }
 
-  int removed_size() const { return begin_[local_.removed.size()]; }
+  int removed_size() const { return begin_[local_->removed.size()]; }
   int size() const { return begin_.back(); }
   const std::vector<double>& blanket_state(std::size_t k) const {
-    return states_[local_.removed.size() + k];
+    return states_[local_->removed.size() + k];
   }
 
   /// H and g = −Jᵀr at the states; returns chi2.
@@ -59,8 +59,8 @@ class DenseSystem {
     H.setZero(size(), size());
     g.setZero(size());
     double chi2 = 0.0;
-    for (std::size_t k = 0; k < local_.factors.size(); ++k) {
-      const WorkFactor& factor = work_.factor(local_.factors[k]);
+    for (std::size_t k = 0; k < local_->factors.size(); ++k) {
+      const WorkFactor& factor = work_->factor(local_->factors[k]);
       const std::vector<int>& on = on_[k];
       const int rows = factor.type->residual_size();
       Vector r(rows);
@@ -91,8 +91,8 @@ class DenseSystem {
   void retract(const Vector& step) {
     for (std::size_t k = 0; k < nodes_.size(); ++k) {
       const std::int64_t at = begin_[k];
-      work_.graph().type(nodes_[k]).retract(1, states_[k].data(), &at, step.data(),
-                                            states_[k].data());
+      work_->graph().type(nodes_[k]).retract(1, states_[k].data(), &at, step.data(),
+                                             states_[k].data());
     }
   }
 
@@ -139,26 +139,31 @@ class DenseSystem {
 
  private:
   std::vector<int> free_columns() const {
-    const std::size_t held = local_.removed.size() + static_cast<std::size_t>(local_.poses) - 1;
+    const std::size_t held = local_->removed.size() + static_cast<std::size_t>(local_->poses) - 1;
     std::vector<int> free;
     for (int k = 0; k < size(); ++k) {
-      if (local_.absolute || k < begin_[held] || k >= begin_[held + 1]) free.push_back(k);
+      if (local_->absolute || k < begin_[held] || k >= begin_[held + 1]) free.push_back(k);
     }
     return free;
   }
 
-  const WorkGraph& work_;
-  const LocalProblem& local_;
+  const WorkGraph* work_;
+  const LocalProblem* local_;
   std::vector<int> nodes_, begin_;
   std::vector<std::vector<int>> on_;
   std::vector<std::vector<double>> states_;
 };
 
-/// Adds the models of a blanket, and what they predict.
+/// Adds the models of a blanket, which measure its nodes where they are `measured`.
 class Models {
  public:
-  Models(const Graph& graph, const LocalProblem& local, Marginal& marginal)
-      : graph_(graph), local_(local), marginal_(marginal), begin_(marginal.dense.offsets()) {}
+  Models(const Graph& graph, const LocalProblem& local,
+         const std::vector<std::vector<double>>& measured, Marginal& marginal)
+      : graph_(graph),
+        local_(local),
+        measured_(measured),
+        marginal_(marginal),
+        begin_(marginal.dense.offsets()) {}
 
   /// Of each pair of poses, each pose and landmark, and, in an absolute problem, each pose.
   void add_all() {
@@ -170,7 +175,7 @@ class Models {
       for (int j = poses; j < n; ++j) add_observation(i, j);
     }
     for (int i = 0; local_.absolute && i < poses; ++i) {
-      if (!graph_.fixed(local_.blanket[i])) add(local_.types.prior, {i}, marginal_.states[i]);
+      if (!graph_.fixed(local_.blanket[i])) add(local_.types.prior, {i}, measured_[i]);
     }
   }
 
@@ -179,13 +184,12 @@ class Models {
 
   void add_relative(int i, int j) {
     const StateGroup group(type(i));
-    add(local_.types.relative, {i, j}, group.between(marginal_.states[i], marginal_.states[j]));
+    add(local_.types.relative, {i, j}, group.between(measured_[i], measured_[j]));
   }
 
   void add_observation(int i, int j) {
-    const Pose from = pose_of(type(i), marginal_.states[i]);
-    const Eigen::Vector3d seen =
-        from.R.transpose() * (pose_of(type(j), marginal_.states[j]).t - from.t);
+    const Pose from = pose_of(type(i), measured_[i]);
+    const Eigen::Vector3d seen = from.R.transpose() * (pose_of(type(j), measured_[j]).t - from.t);
     add(local_.types.observation, {i, j},
         {seen.data(), seen.data() + local_.types.observation->measurement_size()});
   }
@@ -211,6 +215,7 @@ class Models {
 
   const Graph& graph_;
   const LocalProblem& local_;
+  const std::vector<std::vector<double>>& measured_;
   Marginal& marginal_;
   std::vector<int> begin_;
 };
@@ -257,14 +262,15 @@ void reduce_models(Marginal& marginal) {
 
 }  // namespace
 
-Marginal marginalize(const WorkGraph& work, const LocalProblem& local, bool resolve,
+Marginal marginalize(const WorkGraph& work, const LocalProblem& local, LocalMinimum minimum,
                      LinearConstraints* whole) {
   const Graph& graph = work.graph();
-  DenseSystem system(work, local);
+  DenseSystem system(work, local), own = system;
   Matrix H;
   Vector g;
-  if (resolve) {
-    system.solve(H, g);
+  if (minimum != LocalMinimum::ignored) own.solve(H, g);
+  if (minimum == LocalMinimum::linearized) {
+    system = own;
   } else {
     system.linearize(H, g);
   }
@@ -289,7 +295,9 @@ Marginal marginalize(const WorkGraph& work, const LocalProblem& local, bool reso
   marginal.dense.absolute = local.absolute;
   marginal.gradient = g.tail(b) - half.transpose() * half_gradient;
   if (!whole) {
-    Models(graph, local, marginal).add_all();
+    std::vector<std::vector<double>> measured;
+    for (std::size_t k = 0; k < local.blanket.size(); ++k) measured.push_back(own.blanket_state(k));
+    Models(graph, local, measured, marginal).add_all();
   } else if (local.absolute || local.blanket.size() > 1) {
     add_constraint_model(graph, local, *whole, marginal);
   }

@@ -51,7 +51,7 @@ struct Marginal {
   /// By model.
   struct Prediction {
     std::shared_ptr<const FactorType> type;
-    std::vector<double> measurement;  ///< that makes its residual zero there
+    std::vector<double> measurement;  ///< `LocalMinimum`: of the states, or of that minimum
     /// B, size of the type's residual × size of the model: the model's residual is Bᵀ r. Empty: r.
     Matrix directions;
   };
@@ -60,10 +60,17 @@ struct Marginal {
   int open = 0;
 };
 
-/// Solves the cropped problem by itself (`resolve`; else the graph's states stand), linearises it
-/// and takes the removed nodes out by the Schur complement. By itself it says only what its own
-/// factors do: so the new ones do not repeat what the rest of the graph says, and the minimum of
-/// the whole stays where it is. Throws `Error` (numerical) where its factors leave a removed node
+/// What becomes of the minimum that the cropped problem has by itself.
+enum class LocalMinimum {
+  ignored,     ///< new factors measure the graph's states, and repeat what the rest of it says
+  measured,    ///< they measure the minimum; all is linearised at the graph's states
+  linearized,  ///< they measure it, and all is linearised there (T figure 4.2)
+};
+
+/// Linearises the cropped problem and takes the removed nodes out by the Schur complement. What the
+/// new factors measure is its own minimum: so they say only what its own factors do, do not repeat
+/// what the rest of the graph says, and the minimum of the whole stays where it is, to second
+/// order. Throws `Error` (numerical) where its factors leave a removed node
 /// open.
 ///
 /// Where Λ leaves more open than the gauge, as after the removal of a landmark, about which each
@@ -72,7 +79,7 @@ struct Marginal {
 /// a basis of the rows for which Bᵀ J N = 0. Its information B Ω Bᵀ is semidefinite.
 ///
 /// `whole` makes the type of the model on the whole blanket; null: models are of pairs.
-Marginal marginalize(const WorkGraph& work, const LocalProblem& local, bool resolve,
+Marginal marginalize(const WorkGraph& work, const LocalProblem& local, LocalMinimum minimum,
                      LinearConstraints* whole = nullptr);
 
 }  // namespace cairn::sparsify

@@ -63,6 +63,12 @@ std::vector<double> whole_information(const Marginal& marginal, const FactorChoi
                           dense.node_sizes.size(), all - marginal.open, all));
 }
 
+LocalMinimum local_minimum(const SparsifyOptions& options) {
+  if (!options.resolve) return LocalMinimum::ignored;
+  return options.linearize == LinearizeAt::graph ? LocalMinimum::measured
+                                                 : LocalMinimum::linearized;
+}
+
 }  // namespace
 
 Sparsify::Sparsify(std::unique_ptr<Topology> topology, std::unique_ptr<FactorRecovery> recovery,
@@ -109,8 +115,8 @@ Sparsify::Solved Sparsify::solve(const WorkGraph& work, const LocalProblem& loca
     const Timed timed(seconds.marginalize);
     // A linear constraint has a mean, so that the minimum stays where it is by itself.
     solved.marginal = topology_->whole()
-                          ? marginalize(work, local, /*resolve=*/false, &constraints_)
-                          : marginalize(work, local, options_.resolve);
+                          ? marginalize(work, local, LocalMinimum::ignored, &constraints_)
+                          : marginalize(work, local, local_minimum(options_));
   }
   const DenseBlanket& dense = solved.marginal.dense;
   if (dense.models.empty()) return solved;

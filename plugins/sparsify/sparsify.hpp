@@ -28,13 +28,21 @@ constexpr auto enum_names(Scheme) {
       {{Scheme::single, "single"}, {Scheme::runs, "runs"}, {Scheme::multi, "multi"}});
 }
 
+/// Where a cropped problem that was solved by itself is linearised.
+enum class LinearizeAt { graph, local };
+constexpr auto enum_names(LinearizeAt) {
+  return std::to_array<EnumName<LinearizeAt>>(
+      {{LinearizeAt::graph, "graph"}, {LinearizeAt::local, "local"}});
+}
+
 struct SparsifyOptions {
   std::string topology = "ekld";
   Population population{};
   std::string recovery = "ncfd";
   Scheme scheme = Scheme::single;
   Projection projection = Projection::node;
-  bool resolve = true;     ///< the cropped problem is solved by itself
+  bool resolve = true;  ///< the cropped problem is solved by itself
+  LinearizeAt linearize = LinearizeAt::graph;
   int largest_group = 50;  ///< nodes that leave together, at most
 
   static auto fields() {
@@ -53,6 +61,8 @@ struct SparsifyOptions {
         .choice("projection", &O::projection,
                 "coordinates where Λ is singular: relative to a node, or its eigenvectors")
         .boolean("resolve", &O::resolve, "solve the cropped problem by itself first (not with glc)")
+        .choice("linearize", &O::linearize,
+                "then linearise at the states of the graph, or at the minimum found (the thesis)")
         .integer("largest_group", &O::largest_group, 1, 100000,
                  "nodes that leave together, at most");
   }

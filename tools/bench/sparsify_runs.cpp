@@ -26,9 +26,13 @@ json::object sparsify_summary(const json::value& report) {
 }  // namespace
 
 Words thesis_experiment(int keep_every, const std::string& scheme, const std::string& compared_at) {
-  return {"--online",   "100",   "--keep-every",  fmt::format("{}", keep_every),
-          "--redirect", "early", "--redirect-to", "next",
-          "--scheme",   scheme,  "--compared-at", compared_at};
+  return {"--online",      "100",
+          "--keep-every",  fmt::format("{}", keep_every),
+          "--redirect",    "early",
+          "--redirect-to", "next",
+          "--scheme",      scheme,
+          "--compared-at", compared_at,
+          "--sparsifier",  "sparsify:linearize=local"};
 }
 
 void sparsify_rounds(const Bench& bench, const DataSet& set, std::vector<Contestant>& contestants,

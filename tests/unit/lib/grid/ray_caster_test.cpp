@@ -74,9 +74,12 @@ TEST(RayCaster, MeetsWhatAWalkAlongTheRayMeets) {
     ++all;
     same += ray.hit == walked.hit && (!ray.hit || (ray.x == walked.x && ray.y == walked.y));
     // A walk may step across a corner.
-    if (ray.hit) EXPECT_LE(ray.range, walked.range + 1e-9);
-    if (walked.hit && ray.hit && ray.x == walked.x && ray.y == walked.y)
+    if (ray.hit) {
+      EXPECT_LE(ray.range, walked.range + 1e-9);
+    }
+    if (walked.hit && ray.hit && ray.x == walked.x && ray.y == walked.y) {
       EXPECT_NEAR(ray.range, walked.range, 0.0011 * grid.frame.resolution);
+    }
   }
   EXPECT_GE(same, all - 4);
 }

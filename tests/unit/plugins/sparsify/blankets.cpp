@@ -32,7 +32,7 @@ std::vector<DenseBlanket> blankets(const Graph& graph, int group, int step, int 
     const LocalProblem local = crop(work, nodes);
     const int size = static_cast<int>(std::ssize(local.blanket));
     if (local.refusal.empty() && size >= least && size <= most)
-      result.push_back(marginalize(work, local, /*resolve=*/true).dense);
+      result.push_back(marginalize(work, local, LocalMinimum::measured).dense);
   }
   return result;
 }
@@ -63,7 +63,7 @@ DenseBlanket random_blanket(Registry& registry, int dimension, int nodes, Draw& 
     if (a != b) relate(a, b);
   }
   const WorkGraph work(graph);
-  return marginalize(work, crop(work, {0}), /*resolve=*/true).dense;
+  return marginalize(work, crop(work, {0}), LocalMinimum::measured).dense;
 }
 
 void set_information(DenseBlanket& blanket, const std::vector<FactorChoice>& topology,

@@ -65,7 +65,7 @@ DenseBlanket World::blanket(const std::vector<Id>& removed) const {
   const WorkGraph work(graph);
   const LocalProblem local = crop(work, indices(removed));
   EXPECT_THAT(local.refusal, testing::IsEmpty());
-  return marginalize(work, local, /*resolve=*/true).dense;
+  return marginalize(work, local, LocalMinimum::measured).dense;
 }
 
 std::string World::refusal(Id id) const { return crop(WorkGraph(graph), {index(id)}).refusal; }
