@@ -37,6 +37,7 @@ void DeterminantGain::factorize() {
 MatrixXd DeterminantGain::covariance(int k) const {
   const CandidateRows& rows = model_.candidates[static_cast<std::size_t>(k)];
   const MatrixXd& S = S_[static_cast<std::size_t>(k)];
+  if (rank_ == 0) return S;
   MatrixXd JQ = MatrixXd::Zero(S.rows(), rank_);
   for (std::size_t end = 0; end < 2; ++end) {
     if (rows.blocks[end] < 0) continue;
@@ -74,10 +75,11 @@ void DeterminantGain::add(int k) {
     const Eigen::Index first = model_.structure->offsets()[rows.blocks[end]],
                        size = rows.J[end].cols();
     X.middleRows(first, size) += rows.J[end].transpose();
+    if (rank_ == 0) continue;
     QJ += Q_.block(first, 0, size, rank_).transpose().lazyProduct(rows.J[end].transpose());
   }
   solve(X);
-  dense::subtract_product(Q_.leftCols(rank_), QJ, X);
+  if (rank_ > 0) dense::subtract_product(Q_.leftCols(rank_), QJ, X);
   const Eigen::LLT<MatrixXd> factor = factor_of(covariance(k));
   for (Eigen::Index c = 0; c < m; ++c) {  // X L⁻ᵀ by columns, L being small
     Eigen::VectorXd q = X.col(c);
