@@ -108,9 +108,11 @@ std::string state_text(const OccupancyGrid& grid, const CellThresholds& threshol
 Cell start_cell(const OccupancyGrid& grid, const FloorSurveyOptions& options, const cv::Mat& fits,
                 const Parts& parts, const cv::Mat& distance) {
   if (!options.start) return farthest_cell(distance, parts.label == parts.largest());
+  if (!options.start->allFinite())
+    throw Error(ErrorCode::usage, "the start must have finite coordinates");
   const Vector2d point = grid.frame.to_cells(*options.start);
-  const double most = std::numeric_limits<int>::max() / 2;
-  const Vector2d corner = point.array().floor().max(-most).min(most);
+  constexpr double kMost = 1e9;  // farther away no cell is
+  const Vector2d corner = point.array().floor().max(-kMost).min(kMost);
   const Cell cell{static_cast<int>(corner.x()), static_cast<int>(corner.y())};
   if (grid.frame.contains(cell.x, cell.y) && fits.at<std::uint8_t>(cell.y, cell.x) != 0)
     return cell;

@@ -9,7 +9,7 @@ namespace cairn::grids {
 
 OccupancyGrid ImageFormat::read(const std::filesystem::path& file) {
   if (options_.resolution == 0.0) {
-    throw Error(ErrorCode::usage, fmt::format("{0}: a picture does not say how large its pixels "
+    throw Error(ErrorCode::usage, fmt::format("{0}: an image does not say how large its pixels "
                                               "are: {0}:resolution=0.05 for 5 cm",
                                               file.string()));
   }

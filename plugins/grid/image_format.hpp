@@ -16,16 +16,16 @@ struct ImageOptions {
   static auto fields() {
     using O = ImageOptions;
     return OptionFields<O>()
-        .real("resolution", &O::resolution, 0.0, 1e6, "metres per pixel, which a picture lacks")
+        .real("resolution", &O::resolution, 0.0, 1e6, "metres per pixel, which an image lacks")
         .real("x", &O::x, -1e9, 1e9, "of the lower left corner [m]")
         .real("y", &O::y, -1e9, 1e9, "of the lower left corner [m]")
         .real("yaw", &O::yaw, -std::numbers::pi, std::numbers::pi,
-              "by which the picture is turned about that corner [rad]")
+              "by which the image is turned about that corner [rad]")
         .part(&O::meaning);
   }
 };
 
-/// A picture alone. What it lacks are options.
+/// An image alone. What it lacks are options.
 class ImageFormat final : public GridFormat {
  public:
   explicit ImageFormat(const ImageOptions& options) : options_(options) {}

@@ -87,7 +87,7 @@ Picture decode_pgm(std::string_view bytes, const std::string& name) {
   const std::size_t each = white < 256 ? 1 : 2, begin = std::min(head.at() + 1, bytes.size());
   const std::string_view body = bytes.substr(begin);
   if (body.size() < (in_words ? count : each * count)) {
-    refuse(name, fmt::format("the picture is torn: {} bytes for {} × {} pixels", body.size(),
+    refuse(name, fmt::format("the image is torn: {} bytes for {} × {} pixels", body.size(),
                              picture.width, picture.height));
   }
   picture.grey.resize(count);

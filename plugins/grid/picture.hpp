@@ -9,7 +9,7 @@
 
 namespace cairn::grids {
 
-/// A picture in levels of grey, 0 black to 255 white, row by row from the top.
+/// An image in levels of grey, 0 black to 255 white, row by row from the top.
 struct Picture {
   int width = 0, height = 0;
   std::vector<std::uint8_t> grey{};
@@ -17,7 +17,7 @@ struct Picture {
 };
 
 /// PNG or PGM, by its content. Of colours the mean of red, green and blue is taken. Throws `Error`
-/// (input) with the file's name where the picture is torn, too large or of another kind.
+/// (input) with the file's name where the image is torn, too large or of another kind.
 Picture read_picture(const std::filesystem::path& file);
 /// PNG or PGM, by the ending. Throws `Error` (usage) for another ending, and for opacity in a PGM.
 void write_picture(const Picture& picture, const std::filesystem::path& file);

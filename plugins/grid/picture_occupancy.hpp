@@ -38,7 +38,7 @@ struct PictureMeaning {
   }
 };
 
-/// The cells of a picture; `frame` has their resolution and origin, its size is set. Throws `Error`
+/// The cells of an image; `frame` has their resolution and origin, its size is set. Throws `Error`
 /// (input) where `check_frame` does, or if free ≥ occupied.
 OccupancyGrid to_grid(const Picture& picture, const PictureMeaning& meaning, GridFrame frame,
                       const std::string& name);

@@ -64,7 +64,7 @@ std::string encode_png(const Picture& picture) {
   png_alloc_size_t size = PNG_IMAGE_PNG_SIZE_MAX(image);
   std::string bytes(size, '\0');
   if (png_image_write_to_memory(&image, bytes.data(), &size, 0, pixels.data(), 0, nullptr) == 0)
-    fail("the picture", image);
+    fail("the image", image);
   bytes.resize(size);
   return bytes;
 }

@@ -15,7 +15,7 @@ struct RosOptions {
     using O = RosOptions;
     return OptionFields<O>()
         .choice("mode", &O::mode, "of what is written")
-        .choice("picture", &O::picture, {"png", "pgm"}, "of what is written");
+        .choice("image", &O::picture, {"png", "pgm"}, "of what is written");
   }
 };
 

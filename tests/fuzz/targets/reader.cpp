@@ -190,7 +190,7 @@ std::vector<std::string> words() {
 Target reader() {
   std::vector<Needed> needs = {{"types", "slam2d"}, {"types", "slam3d"}, {"types", "bundle"}};
   for (const std::string_view name : kFormats) needs.push_back({Format::kKind, name});
-  return {"reader", &run, &seeds, &words, needs, 1024};
+  return {"reader", &run, &seeds, &words, needs, 512};
 }
 
 }  // namespace cairn::fuzz

@@ -176,6 +176,11 @@ TEST(FloorSurvey, AStartThatDoesNotFitIsRefusedWithTheNearestThatDoes) {
                         "where it fits is (2.500, 3.500)"));
 }
 
+TEST(FloorSurvey, AStartThatIsNoNumberIsRefused) {
+  EXPECT_THAT(refusal(drawn({"###", "#.#", "###"}), {.radius = 0.1, .start = Vector2d(1.5, NAN)}),
+              HasSubstr("finite"));
+}
+
 TEST(FloorSurvey, AFloorWithoutRoomIsRefused) {
   EXPECT_THAT(refusal(drawn({"##", "#?"}), {}), HasSubstr("no free cell"));
   EXPECT_THAT(refusal(drawn({"###", "#.#", "###"}), {.radius = 1.0}),

@@ -86,7 +86,7 @@ TEST_F(GridFormats, EveryOccupancyComesBackFromScaleAndRaw) {
 TEST_F(GridFormats, TrinaryKeepsTheStateOfEachCell) {
   const OccupancyGrid grid = grid_of(3, {0, 100, -1, 20, 80, 50});
   for (const std::string picture : {"png", "pgm"}) {
-    write_grid(grid, file("floor.yaml:picture=" + picture), registry_);
+    write_grid(grid, file("floor.yaml:image=" + picture), registry_);
     EXPECT_TRUE(fs::exists(file("floor." + picture)));
     EXPECT_THAT(read(file("floor.yaml")).occupancy, ElementsAre(0, 100, -1, 0, 100, -1));
   }
@@ -162,9 +162,9 @@ TEST_F(GridFormats, AColonInANameIsNoOption) {
 
 TEST_F(GridFormats, APgmHasNoTransparency) {
   const OccupancyGrid grid = grid_of(1, {50, -1});
-  EXPECT_THROW(write_grid(grid, file("x.yaml:mode=scale,picture=pgm"), registry_), Error);
+  EXPECT_THROW(write_grid(grid, file("x.yaml:mode=scale,image=pgm"), registry_), Error);
   EXPECT_NO_THROW(
-      write_grid(grid_of(1, {50, 3}), file("x.yaml:mode=scale,picture=pgm"), registry_));
+      write_grid(grid_of(1, {50, 3}), file("x.yaml:mode=scale,image=pgm"), registry_));
   EXPECT_THAT(read(file("x.yaml")).occupancy, ElementsAre(50, 3));
 }
 
