@@ -163,8 +163,7 @@ TEST_F(GridFormats, AColonInANameIsNoOption) {
 TEST_F(GridFormats, APgmHasNoTransparency) {
   const OccupancyGrid grid = grid_of(1, {50, -1});
   EXPECT_THROW(write_grid(grid, file("x.yaml:mode=scale,image=pgm"), registry_), Error);
-  EXPECT_NO_THROW(
-      write_grid(grid_of(1, {50, 3}), file("x.yaml:mode=scale,image=pgm"), registry_));
+  EXPECT_NO_THROW(write_grid(grid_of(1, {50, 3}), file("x.yaml:mode=scale,image=pgm"), registry_));
   EXPECT_THAT(read(file("x.yaml")).occupancy, ElementsAre(50, 3));
 }
 
