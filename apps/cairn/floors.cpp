@@ -27,6 +27,7 @@ namespace {
 
 namespace json = boost::json;
 
+constexpr const char* kSurveyor = "round_body";
 constexpr std::size_t kShownLeaks = 5;
 
 OccupancyGrid generate(const ComponentSpec& spec, std::uint64_t seed, Registry& registry) {
@@ -37,7 +38,7 @@ OccupancyGrid generate(const ComponentSpec& spec, std::uint64_t seed, Registry& 
 OccupancyGrid load_floor(const std::string& name, Session& session) {
   Registry& registry = session.registry();
   if (!name.starts_with('@')) {
-    session.files.add_input(name);
+    session.files.add_input(grid_file(name).string());
     return read_grid(name, registry);
   }
   ComponentSpec spec = parse_component(std::string_view(name).substr(1));
@@ -142,10 +143,10 @@ int run_floor_info(const std::string& name, const FloorInfoOptions& options, Ses
   if (options.start_x.has_value() != options.start_y.has_value())
     throw Error(ErrorCode::usage, "--start-x and --start-y go together");
   if (options.start_x) survey_options.start = Eigen::Vector2d(*options.start_x, *options.start_y);
-  const auto surveyor = session.registry().make<FloorSurveyor>(options.surveyor);
+  const auto surveyor = session.registry().make<FloorSurveyor>(kSurveyor);
   const OccupancyGrid grid = load_floor(name, session);
   const FloorSurvey survey =
-      call_plugin([&] { return fmt::format("floor surveyor '{}'", options.surveyor); },
+      call_plugin([&] { return fmt::format("floor surveyor '{}'", kSurveyor); },
                   [&] { return surveyor->survey(grid, survey_options); });
   Results results(session);
   results.add([&] { session.write_json(report_json(name, grid.frame, survey, options)); });
@@ -164,7 +165,7 @@ int run_floor_generate(const std::string& kind, std::uint64_t seed, const std::s
                             "(with floor.png beside it)",
                             output));
   }
-  check_file(output.substr(0, output.rfind(':')), session);
+  check_file(grid_file(output).string(), session);
   const OccupancyGrid grid = generate(parse_component(kind), seed, registry);
   Results results(session);
   results.write(output, [&] { write_grid(grid, output, registry); });

@@ -16,7 +16,6 @@ namespace cairn::app {
 bool names_floor(const std::string& name, Session& session);
 
 struct FloorInfoOptions {
-  std::string surveyor = "round_body";
   double radius = 0.2;                         ///< of a robot's body [m]
   std::optional<double> start_x{}, start_y{};  ///< [m]
 };

@@ -45,14 +45,6 @@ LoadedGraph read_named_graph(const std::string& name, const InputOptions& option
   return loaded;
 }
 
-/// "g2o" of "map.G2O.gz".
-std::string ending(std::filesystem::path file) {
-  if (file.extension() == ".gz") file.replace_extension();
-  std::string text = file.extension().string();
-  for (char& c : text) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  return text.empty() ? text : text.substr(1);
-}
-
 void check_named_format(const std::string& file, const std::string& format, Registry& registry) {
   if (registry.make<Format>(format)->can_write()) return;
   throw Error(ErrorCode::usage, fmt::format("{}: format '{}' only reads", file, format));
@@ -79,7 +71,7 @@ void check_ending(const std::string& file, Registry& registry) {
   std::optional<Error> broken;
   const std::vector<std::string> writable = endings(
       registry, [](const Format& format) { return format.can_write(); }, broken);
-  if (std::find(writable.begin(), writable.end(), ending(file)) != writable.end()) return;
+  if (std::find(writable.begin(), writable.end(), file_ending(file)) != writable.end()) return;
   if (writable.empty() && broken) throw Error(*broken);
   if (writable.empty()) throw Error(ErrorCode::usage, file + ": no plugin of formats is on offer");
   throw Error(
@@ -109,7 +101,7 @@ bool has_graph_ending(const std::string& file, Registry& registry) {
   std::optional<Error> broken;
   const std::vector<std::string> known = endings(
       registry, [](const Format&) { return true; }, broken);
-  return std::find(known.begin(), known.end(), ending(file)) != known.end();
+  return std::find(known.begin(), known.end(), file_ending(file)) != known.end();
 }
 
 void add_input_options(ArgumentParser cli, InputOptions& options) {

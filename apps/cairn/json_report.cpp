@@ -92,6 +92,10 @@ json::value text_json(const std::string& text) {
   return text.empty() ? json::value(nullptr) : json::value(text);
 }
 
+json::value number_json(double number) {
+  return std::isfinite(number) ? json::value(number) : json::value(nullptr);
+}
+
 json::array strings_json(const std::vector<std::string>& strings) {
   return json::array(strings.begin(), strings.end());
 }

@@ -29,6 +29,8 @@ boost::json::object solver_json(const LinearSolverStats& stats);
 boost::json::array iterations_json(const Summary& summary);
 /// The text, or null where there is none.
 boost::json::value text_json(const std::string& text);
+/// The number, or null where it is not finite.
+boost::json::value number_json(double number);
 boost::json::array strings_json(const std::vector<std::string>& strings);
 
 /// The processor's name, from /proc/cpuinfo; "unknown" where that is silent.

@@ -290,7 +290,7 @@ json::array mutual_json(const Graph& graph, const Request& request, const Answer
     const double nats = answer.mutual[k];
     all.push_back({{"a", ids_json(graph, request.mutual[k].a)},
                    {"b", ids_json(graph, request.mutual[k].b)},
-                   {"nats", std::isfinite(nats) ? json::value(nats) : json::value(nullptr)}});
+                   {"nats", number_json(nats)}});
   }
   return all;
 }

@@ -23,20 +23,19 @@ std::string default_picture(const std::string& file, const std::string& ending) 
 }
 
 std::string picture_format(const std::string& file, Session& session) {
-  std::string ending = std::filesystem::path(file).extension().string();
-  for (char& c : ending) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  std::string ending = file_ending(file);
   const std::vector<std::string> names = session.registry().names(Picture::kKind);
   if (names.empty()) {
     throw Error(ErrorCode::plugin,
                 "no plugin draws reports or plots here: cairn was built without Cairo and without "
                 "the page");
   }
-  if (ending.empty() || std::find(names.begin(), names.end(), ending.substr(1)) == names.end()) {
+  if (std::find(names.begin(), names.end(), ending) == names.end()) {
     throw Error(ErrorCode::usage,
                 fmt::format("{}: nothing draws files of that name; endings on offer: .{}", file,
                             joined(names, ", .")));
   }
-  return ending.substr(1);
+  return ending;
 }
 
 void check_picture(const std::string& file, Session& session) {

@@ -139,16 +139,14 @@ std::string value_text(const OptionSpec& spec) {
   return range.empty() ? type_text(spec) : fmt::format("{}, {}", type_text(spec), range);
 }
 
-json::value bound_json(double bound) { return std::isfinite(bound) ? json::value(bound) : nullptr; }
-
 json::array options_json(const OptionTable& table) {
   json::array all;
   for (const OptionSpec& spec : table.specs()) {
     all.push_back({{"name", spec.name},
                    {"type", type_text(spec)},
                    {"default", spec.default_value},
-                   {"minimum", bound_json(spec.minimum)},
-                   {"maximum", bound_json(spec.maximum)},
+                   {"minimum", number_json(spec.minimum)},
+                   {"maximum", number_json(spec.maximum)},
                    {"choices", strings_json(spec.choices)},
                    {"help", spec.help}});
   }

@@ -115,10 +115,6 @@ void check_topology(const SparsifyCommandOptions& options, const SparsifyJob& jo
   }
 }
 
-json::value number_json(double number) {
-  return std::isfinite(number) ? json::value(number) : json::value(nullptr);
-}
-
 json::object nonzeros_json(const Nonzeros& nonzeros) {
   return {{"information", nonzeros.information}, {"factor", nonzeros.factor}};
 }

@@ -64,10 +64,6 @@ SparsifyEdgesJob job_of(const SparsifyCommandOptions& options, Session& session)
           .compared_at = options.compared_at == "minima" ? ComparedAt::minima : ComparedAt::common};
 }
 
-json::value number_json(double number) {
-  return std::isfinite(number) ? json::value(number) : json::value(nullptr);
-}
-
 json::object connectivity_json(const SparsifyEdgesResult& result) {
   json::object all;
   for (const EdgeWeight weight : {EdgeWeight::rotation, EdgeWeight::translation}) {

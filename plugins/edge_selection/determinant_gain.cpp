@@ -34,16 +34,22 @@ void DeterminantGain::factorize() {
   rank_ = 0;
 }
 
-MatrixXd DeterminantGain::covariance(int k) const {
+MatrixXd DeterminantGain::J_times_Q(int k) const {
   const CandidateRows& rows = model_.candidates[static_cast<std::size_t>(k)];
-  const MatrixXd& S = S_[static_cast<std::size_t>(k)];
-  if (rank_ == 0) return S;
-  MatrixXd JQ = MatrixXd::Zero(S.rows(), rank_);
+  MatrixXd JQ = MatrixXd::Zero(rows.J[0].rows(), rank_);
+  if (rank_ == 0) return JQ;  // for Eigen a product without columns begins at a null pointer
   for (std::size_t end = 0; end < 2; ++end) {
     if (rows.blocks[end] < 0) continue;
     const Eigen::Index first = model_.structure->offsets()[rows.blocks[end]];
     JQ += rows.J[end].lazyProduct(Q_.block(first, 0, rows.J[end].cols(), rank_));
   }
+  return JQ;
+}
+
+MatrixXd DeterminantGain::covariance(int k) const {
+  const MatrixXd& S = S_[static_cast<std::size_t>(k)];
+  if (rank_ == 0) return S;
+  const MatrixXd JQ = J_times_Q(k);
   return S - JQ.lazyProduct(JQ.transpose());
 }
 
@@ -68,16 +74,14 @@ void DeterminantGain::add(int k) {
   const Eigen::Index m = S_[static_cast<std::size_t>(k)].rows();
   model_.add(k, 1.0, model_.H);
   if (rank_ + m > kRank) return factorize();
-  // X = Σ₀ Jᵀ − Q Qᵀ Jᵀ, and Q gets X L⁻ᵀ.
-  MatrixXd X = MatrixXd::Zero(Q_.rows(), m), QJ = MatrixXd::Zero(rank_, m);
+  // X = Σ₀ Jᵀ − Q (J Q)ᵀ, and Q gets X L⁻ᵀ.
+  MatrixXd X = MatrixXd::Zero(Q_.rows(), m);
   for (std::size_t end = 0; end < 2; ++end) {
     if (rows.blocks[end] < 0) continue;
-    const Eigen::Index first = model_.structure->offsets()[rows.blocks[end]],
-                       size = rows.J[end].cols();
-    X.middleRows(first, size) += rows.J[end].transpose();
-    if (rank_ == 0) continue;
-    QJ += Q_.block(first, 0, size, rank_).transpose().lazyProduct(rows.J[end].transpose());
+    X.middleRows(model_.structure->offsets()[rows.blocks[end]], rows.J[end].cols()) +=
+        rows.J[end].transpose();
   }
+  const MatrixXd QJ = J_times_Q(k).transpose();
   solve(X);
   if (rank_ > 0) dense::subtract_product(Q_.leftCols(rank_), QJ, X);
   const Eigen::LLT<MatrixXd> factor = factor_of(covariance(k));

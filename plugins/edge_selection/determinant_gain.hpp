@@ -27,6 +27,7 @@ class DeterminantGain {
  private:
   static constexpr Eigen::Index kRank = 96;
 
+  Eigen::MatrixXd J_times_Q(int k) const;  ///< J_k Q, of the columns in use
   Eigen::MatrixXd covariance(int k) const;
   void factorize();
   void solve(Eigen::MatrixXd& X);  ///< X becomes Λ₀⁻¹ X, of the last factorisation

@@ -6,9 +6,10 @@
 
 namespace cairn::floors {
 
-void draw_rooms(Drawing& drawing, const Box& box, int room, const WallOptions& walls,
-                bool doors_below, Random& random) {
-  const int wall = drawing.cells(walls.wall), door = drawing.cells(walls.door);
+void draw_rooms(Drawing& drawing, const Box& box, const RowOptions& options, bool doors_below,
+                Random& random) {
+  const int wall = drawing.cells(options.walls.wall), door = drawing.cells(options.walls.door),
+            room = drawing.cells(options.room);
   const int least = std::max(door, room * 3 / 4), spread = std::max(1, room / 2);
   for (int x = box.x0; x < box.x1;) {
     int end = x + least + random.below(spread);
@@ -26,18 +27,18 @@ void draw_rooms(Drawing& drawing, const Box& box, int room, const WallOptions& w
 OccupancyGrid Corridor::generate(std::uint64_t seed) {
   Drawing drawing(options_.plan);
   Random random(seed);
-  const int wall = drawing.cells(options_.walls.wall), way = drawing.cells(options_.corridor);
+  const int wall = drawing.cells(options_.rows.walls.wall),
+            way = drawing.cells(options_.rows.corridor);
   const int depth = (drawing.height() - way) / 2 - 2 * wall;
-  if (depth < drawing.cells(options_.walls.door)) {
+  if (depth < drawing.cells(options_.rows.walls.door)) {
     throw Error(ErrorCode::usage,
                 "corridor: no room is left beside the corridor: more height, or a narrower one");
   }
   const int low = 2 * wall + depth, right = drawing.width() - wall;
   drawing.fill({wall, low, right, low + way}, true);
-  const int room = drawing.cells(options_.room);
-  draw_rooms(drawing, {wall, wall, right, wall + depth}, room, options_.walls, false, random);
-  draw_rooms(drawing, {wall, low + way + wall, right, low + way + wall + depth}, room,
-             options_.walls, true, random);
+  draw_rooms(drawing, {wall, wall, right, wall + depth}, options_.rows, false, random);
+  draw_rooms(drawing, {wall, low + way + wall, right, low + way + wall + depth}, options_.rows,
+             true, random);
   return drawing.take();
 }
 

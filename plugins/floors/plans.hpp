@@ -39,18 +39,27 @@ class Rooms final : public FloorPlan {
 
 // Corridors ---------------------------------------------------------------------------------------
 
-struct CorridorOptions {
-  PlanOptions plan{.width = 40.0, .height = 12.0};
+/// A corridor with rows of rooms.
+struct RowOptions {
   WallOptions walls{};
   double corridor = 2.0, room = 4.0;
 
   static auto fields() {
-    using O = CorridorOptions;
+    using O = RowOptions;
     return OptionFields<O>()
-        .part(&O::plan)
         .part(&O::walls)
         .real("corridor", &O::corridor, 0.5, 100.0, "width of the corridor [m]")
         .real("room", &O::room, 1.0, 100.0, "width of a room, by up to a quarter more or less [m]");
+  }
+};
+
+struct CorridorOptions {
+  PlanOptions plan{.width = 40.0, .height = 12.0};
+  RowOptions rows{};
+
+  static auto fields() {
+    using O = CorridorOptions;
+    return OptionFields<O>().part(&O::plan).part(&O::rows);
   }
 };
 
@@ -66,16 +75,11 @@ class Corridor final : public FloorPlan {
 
 struct LoopOptions {
   PlanOptions plan{.width = 30.0, .height = 20.0};
-  WallOptions walls{};
-  double corridor = 2.0, room = 4.0;
+  RowOptions rows{};
 
   static auto fields() {
     using O = LoopOptions;
-    return OptionFields<O>()
-        .part(&O::plan)
-        .part(&O::walls)
-        .real("corridor", &O::corridor, 0.5, 100.0, "width of the corridor [m]")
-        .real("room", &O::room, 1.0, 100.0, "width of a room, by up to a quarter more or less [m]");
+    return OptionFields<O>().part(&O::plan).part(&O::rows);
   }
 };
 
@@ -91,8 +95,8 @@ class Loop final : public FloorPlan {
 
 /// A row of rooms in `box`, each with a door through its lower wall (`doors_below`) or its upper
 /// one, which the row shares with what lies there.
-void draw_rooms(Drawing& drawing, const Box& box, int room, const WallOptions& walls,
-                bool doors_below, Random& random);
+void draw_rooms(Drawing& drawing, const Box& box, const RowOptions& options, bool doors_below,
+                Random& random);
 
 // Caves -------------------------------------------------------------------------------------------
 

@@ -58,12 +58,6 @@ std::uint8_t scaled(int value, int white) {
   return static_cast<std::uint8_t>((255 * std::min(value, white) + white / 2) / white);
 }
 
-std::string ending(const std::filesystem::path& file) {
-  std::string text = file.extension().string();
-  std::ranges::transform(text, text.begin(), [](unsigned char c) { return std::tolower(c); });
-  return text;
-}
-
 }  // namespace
 
 void check_size(std::int64_t width, std::int64_t height, const std::string& name) {
@@ -117,9 +111,9 @@ Picture read_picture(const std::filesystem::path& file) {
 }
 
 void write_picture(const Picture& picture, const std::filesystem::path& file) {
-  const std::string kind = ending(file);
-  if (kind == ".png") return write_file(file, encode_png(picture));
-  if (kind != ".pgm") {
+  const std::string kind = file_ending(file);
+  if (kind == "png") return write_file(file, encode_png(picture));
+  if (kind != "pgm") {
     throw Error(ErrorCode::usage,
                 fmt::format("{}: pictures of floors end in .png or .pgm", file.string()));
   }

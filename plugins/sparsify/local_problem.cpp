@@ -98,9 +98,8 @@ class DenseSystem {
 
   /// To the minimum, the last pose of the blanket held unless the problem is absolute. By Gauss and
   /// Newton from a minimum of the whole graph, which is near; a step that does not lower chi2 is
-  /// not taken.
-  void solve(Matrix& H, Vector& g) {
-    double chi2 = linearize(H, g);
+  /// not taken. Given are chi2, H and g where it is; H and g become those of the minimum.
+  void solve(double chi2, Matrix& H, Vector& g) {
     const std::vector<int> free = free_columns();
     for (int k = 0; k < kIterations && !free.empty(); ++k) {
       Matrix A = H(free, free);
@@ -265,14 +264,20 @@ void reduce_models(Marginal& marginal) {
 Marginal marginalize(const WorkGraph& work, const LocalProblem& local, LocalMinimum minimum,
                      LinearConstraints* whole) {
   const Graph& graph = work.graph();
-  DenseSystem system(work, local), own = system;
+  DenseSystem system(work, local);
   Matrix H;
   Vector g;
-  if (minimum != LocalMinimum::ignored) own.solve(H, g);
-  if (minimum == LocalMinimum::linearized) {
-    system = own;
-  } else {
-    system.linearize(H, g);
+  const double chi2 = system.linearize(H, g);
+  DenseSystem own = system;  // at the states that the new factors measure
+  if (minimum != LocalMinimum::ignored) {
+    Matrix H_own = H;
+    Vector g_own = g;
+    own.solve(chi2, H_own, g_own);
+    if (minimum == LocalMinimum::linearized) {
+      system = own;
+      H = std::move(H_own);
+      g = std::move(g_own);
+    }
   }
   const int r = system.removed_size(), b = system.size() - r;
   const Eigen::LLT<Matrix> llt(Matrix(H.topLeftCorner(r, r)));

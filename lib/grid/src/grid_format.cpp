@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "cairn/grid/grid_format.hpp"
 
-#include <algorithm>
-#include <cctype>
 #include <memory>
 #include <optional>
 #include <utility>
 
 #include <fmt/format.h>
 
+#include "cairn/io/format.hpp"
 #include "cairn/plugin/options.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
@@ -40,13 +39,6 @@ NamedGrid parse(std::string_view name) {
   return {fs::path(name.substr(0, colon)), parse_component(options).values};
 }
 
-/// "yaml" of "floor.YAML".
-std::string ending(const fs::path& file) {
-  std::string text = file.extension().string();
-  std::ranges::transform(text, text.begin(), [](unsigned char c) { return std::tolower(c); });
-  return text.empty() ? text : text.substr(1);
-}
-
 struct Found {
   std::string name;  ///< of the format, empty: none
   std::vector<std::string> endings;
@@ -72,7 +64,7 @@ Found find_format(const std::string& wanted, Registry& registry) {
 template <class Use>
 auto with_format(std::string_view name, Registry& registry, const Use& use) {
   NamedGrid named = parse(name);
-  const Found found = find_format(ending(named.file), registry);
+  const Found found = find_format(file_ending(named.file), registry);
   if (found.name.empty() && found.broken) throw Error(*found.broken);
   if (found.endings.empty())
     throw Error(ErrorCode::usage, fmt::format("{}: no plugin of grid formats is on offer", name));
@@ -89,8 +81,10 @@ auto with_format(std::string_view name, Registry& registry, const Use& use) {
 
 }  // namespace
 
+fs::path grid_file(std::string_view name) { return parse(name).file; }
+
 bool names_grid(std::string_view name, Registry& registry) {
-  return !find_format(ending(parse(name).file), registry).name.empty();
+  return !find_format(file_ending(parse(name).file), registry).name.empty();
 }
 
 OccupancyGrid read_grid(std::string_view name, Registry& registry) {

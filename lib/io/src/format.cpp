@@ -37,17 +37,6 @@ std::vector<NamedFormat> all_formats(Registry& registry, std::vector<std::string
   return formats;
 }
 
-/// ".gz" taken off, then the ending without its dot, in lower case.
-std::string ending(std::filesystem::path file) {
-  if (file.extension() == ".gz") file.replace_extension();
-  std::string text = file.extension().string();
-  if (!text.empty()) text.erase(0, 1);
-  std::transform(text.begin(), text.end(), text.begin(), [](char c) {
-    return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  });
-  return text;
-}
-
 bool has_ending(const Format& format, const std::string& wanted) {
   const std::vector<std::string> endings = format.extensions();
   return std::find(endings.begin(), endings.end(), wanted) != endings.end();
@@ -84,7 +73,7 @@ std::string on_offer(const char* what, const std::vector<std::string>& names) {
 NamedFormat detect(const std::filesystem::path& file, std::string_view text, Registry& registry) {
   std::vector<std::string> problems;
   std::vector<NamedFormat> formats = all_formats(registry, problems);
-  const std::string wanted = ending(file);
+  const std::string wanted = file_ending(file);
   std::pair<int, bool> best{0, false};
   NamedFormat* chosen = nullptr;
   for (NamedFormat& candidate : formats) {
@@ -111,7 +100,7 @@ NamedFormat detect(const std::filesystem::path& file, std::string_view text, Reg
 
 NamedFormat writer_by_ending(const std::filesystem::path& file, Registry& registry) {
   std::vector<std::string> problems;
-  const std::string wanted = ending(file);
+  const std::string wanted = file_ending(file);
   std::vector<std::string> endings;
   for (NamedFormat& candidate : all_formats(registry, problems)) {
     if (!candidate.format->can_write()) continue;
@@ -133,6 +122,16 @@ NamedFormat writer_by_ending(const std::filesystem::path& file, Registry& regist
 std::string bare_name(std::string_view spec) { return std::string(spec.substr(0, spec.find(':'))); }
 
 }  // namespace
+
+std::string file_ending(std::filesystem::path file) {
+  if (file.extension() == ".gz") file.replace_extension();
+  std::string text = file.extension().string();
+  if (!text.empty()) text.erase(0, 1);
+  std::transform(text.begin(), text.end(), text.begin(), [](char c) {
+    return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  });
+  return text;
+}
 
 Graph read_graph(const std::filesystem::path& file, Registry& registry, const ReadOptions& options,
                  ReadReport& report, std::string_view format) {

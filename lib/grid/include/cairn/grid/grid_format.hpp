@@ -31,9 +31,13 @@ class CAIRN_API GridFormat : public Component {
 /// Whether some format of grids goes by the ending of `name`, a file or a file with options.
 CAIRN_API bool names_grid(std::string_view name, Registry& registry);
 
+/// The file of a name that may have options behind it: "floor.yaml" of "floor.yaml:mode=raw".
+CAIRN_API std::filesystem::path grid_file(std::string_view name);
+
 /// Reads a grid: `floor.yaml`, or with options of its format `picture.png:resolution=0.05`. The
 /// format is that of the ending. Throws `Error` (usage, input).
 CAIRN_API OccupancyGrid read_grid(std::string_view name, Registry& registry);
+/// Writes a grid, named likewise.
 CAIRN_API void write_grid(const OccupancyGrid& grid, std::string_view name, Registry& registry);
 
 }  // namespace cairn

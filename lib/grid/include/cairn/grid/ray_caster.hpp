@@ -15,7 +15,7 @@ namespace cairn {
 struct RayHit {
   double range = 0.0;  ///< [m] to where it enters the cell, or as far as it was cast
   int x = 0, y = 0;    ///< the cell that stops it: the first one outside, if it leaves the grid
-  bool hit = false;    ///< nothing stops it within the range
+  bool hit = false;    ///< false: nothing stops it within the range
 };
 
 /// Rays over the cells of a grid, as a lidar's. Every cell that is not free stops them, and so does
@@ -28,7 +28,8 @@ class CAIRN_API RayCaster {
   /// Time and 2 bytes per cell. Throws `Error` (input) as `check_frame` does.
   explicit RayCaster(const OccupancyGrid& grid, const CellThresholds& thresholds = {});
 
-  /// From a point of the world [m], at an angle to its x axis [rad], up to `range` [m].
+  /// From a point of the world [m], at an angle to its x axis [rad], up to `range` [m]. Where that
+  /// point is not on the grid, or is no number, the ray is stopped at once.
   RayHit cast(const Eigen::Vector2d& from, double angle, double range) const;
   /// The same, cell by cell: to compare with.
   RayHit cast_plainly(const Eigen::Vector2d& from, double angle, double range) const;

@@ -69,6 +69,10 @@ CAIRN_API Graph read_graph(const std::filesystem::path& file, Registry& registry
 CAIRN_API void write_graph(const Graph& graph, const std::filesystem::path& file,
                            Registry& registry, std::string_view format = {});
 
+/// The ending of a file's name without the dot and in lower case, "g2o" of "map.G2O.gz": .gz is
+/// taken off before. Empty: it has none.
+CAIRN_API std::string file_ending(std::filesystem::path file);
+
 /// The bytes of a file, unpacked if they are gzip. Throws `Error` (input), also where they unpack
 /// to more than 256 MB and 200 times the file.
 CAIRN_API std::string read_file(const std::filesystem::path& file);
