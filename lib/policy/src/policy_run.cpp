@@ -31,15 +31,11 @@ class WatchedRegistration final : public Registration {
         false_(query<FalseMatches>(inner)) {}
   void begin(const RegistrationData& data) override { inner_.begin(data); }
   std::vector<Factor> match(Id earlier, Id later) override {
-    const auto begin = Clock::now();
-    std::vector<Factor> factors =
-        call_plugin([&] { return fmt::format("registration '{}'", name_); },
-                    [&] { return inner_.match(earlier, later); });
-    result_.registration_seconds += seconds_since(begin);
-    ++result_.proposed;
-    result_.registered += !factors.empty();
-    if (!factors.empty() && was_false(earlier, later)) ++result_.false_registered;
-    return factors;
+    return watched(earlier, later, [&] { return inner_.match(earlier, later); });
+  }
+  std::vector<Factor> match_proposed(const MatchProposal& proposal) override {
+    return watched(proposal.earlier, proposal.later,
+                   [&] { return inner_.match_proposed(proposal); });
   }
   std::optional<RecognisedPlace> recognise(std::span<const Id> places, Id pose) override {
     const auto begin = Clock::now();
@@ -56,6 +52,18 @@ class WatchedRegistration final : public Registration {
   bool was_false(Id earlier, Id later) const { return false_ && false_->was_false(earlier, later); }
 
  private:
+  template <class Match>
+  std::vector<Factor> watched(Id earlier, Id later, Match&& match) {
+    const auto begin = Clock::now();
+    std::vector<Factor> factors =
+        call_plugin([&] { return fmt::format("registration '{}'", name_); }, match);
+    result_.registration_seconds += seconds_since(begin);
+    ++result_.proposed;
+    result_.registered += !factors.empty();
+    if (!factors.empty() && was_false(earlier, later)) ++result_.false_registered;
+    return factors;
+  }
+
   Registration& inner_;
   std::string name_;
   PolicyResult& result_;

@@ -35,7 +35,7 @@ namespace {
 void match_newest(PosePolicy& policy, Registration& registration, Id newest) {
   const auto match_proposed = [&] {
     while (const auto match = policy.next_match())
-      policy.offer(match->earlier, registration.match(match->earlier, match->later));
+      policy.offer(match->earlier, registration.match_proposed(*match));
   };
   match_proposed();
   const std::vector<Id> map = policy.unlocated();
@@ -48,6 +48,16 @@ void match_newest(PosePolicy& policy, Registration& registration, Id newest) {
 
 }  // namespace
 
+PoseReport process_pose(const Variable& pose, std::span<const Factor> odometry, PosePolicy& policy,
+                        Registration& registration) {
+  policy.add_pose(pose, odometry);
+  match_newest(policy, registration, pose.id);
+  PoseReport report = policy.end_pose();
+  registration.pose_ended(report.id, report.kept);
+  for (const Id left : policy.removed()) registration.pose_ended(left, false);
+  return report;
+}
+
 bool run_policy(const Graph& recording, std::span<const Arrival> poses, PosePolicy& policy,
                 Registration& registration, const std::function<bool(const PoseReport&)>& each) {
   policy.expect(recording, poses);
@@ -57,11 +67,8 @@ bool run_policy(const Graph& recording, std::span<const Arrival> poses, PosePoli
     Variable& pose = update.variables.front();
     if (!first && !pose.fixed) pose.state.clear();  // where its odometry puts it
     first = false;
-    policy.add_pose(pose, std::span(update.factors).first(arrival.odometry.size()));
-    match_newest(policy, registration, pose.id);
-    const PoseReport report = policy.end_pose();
-    registration.pose_ended(report.id, report.kept);
-    for (const Id left : policy.removed()) registration.pose_ended(left, false);
+    const auto odometry = std::span(update.factors).first(arrival.odometry.size());
+    const PoseReport report = process_pose(pose, odometry, policy, registration);
     if (each && !each(report)) break;
   }
   return first || policy.finish();

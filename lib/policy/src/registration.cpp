@@ -4,6 +4,9 @@
 namespace cairn {
 
 Registration::~Registration() = default;
+std::vector<Factor> Registration::match_proposed(const MatchProposal& proposal) {
+  return match(proposal.earlier, proposal.later);
+}
 void Registration::pose_ended(Id, bool) {}
 FalseMatches::~FalseMatches() = default;
 

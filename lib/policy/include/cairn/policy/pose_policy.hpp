@@ -19,13 +19,6 @@
 
 namespace cairn {
 
-/// Two poses whose sensor data are worth matching.
-struct MatchProposal {
-  Id earlier = 0, later = 0;
-  double gain = 0.0;  ///< expected information gain of a link [nats]
-  Motion expected;    ///< from `earlier` to `later`, by the estimate
-};
-
 /// The outcome of a measured link.
 enum class LinkVerdict {
   linked,         ///< it is in the graph
@@ -143,6 +136,11 @@ class CAIRN_API OptionFinder {
   /// below that are negligible.
   virtual double accuracy() const = 0;
 };
+
+/// One pose, from `add_pose` to `end_pose`: what the policy proposes is matched by `registration`,
+/// which is also asked to recognise a place while it is unknown where the trajectory is on a map.
+CAIRN_API PoseReport process_pose(const Variable& pose, std::span<const Factor> odometry,
+                                  PosePolicy& policy, Registration& registration);
 
 /// Feeds the first poses of a recording to a policy, matching by `registration`. `each` is called
 /// for every pose, and stops the run by returning false. The policy is finished at the end; false

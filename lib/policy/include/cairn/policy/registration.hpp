@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "cairn/geometry/motion.hpp"
 #include "cairn/graph/graph.hpp"
 #include "cairn/graph/update.hpp"
 #include "cairn/runtime/component.hpp"
@@ -18,6 +19,13 @@ namespace cairn {
 struct RegistrationData {
   const Graph* recording = nullptr;  ///< poses with all measurements that were made
   const Graph* truth = nullptr;      ///< the true states of the same poses; null: unknown
+};
+
+/// Two poses whose sensor data are worth matching.
+struct MatchProposal {
+  Id earlier = 0, later = 0;
+  double gain = 0.0;  ///< expected information gain of a link [nats]
+  Motion expected;    ///< from `earlier` to `later`, by the estimate
 };
 
 /// A place that was recognised: a pose of a map, and the measured relative poses to it.
@@ -39,6 +47,9 @@ class CAIRN_API Registration : public Component {
   /// The measured relative poses of two poses: relative factors on them, in either order. None if
   /// the two do not match.
   virtual std::vector<Factor> match(Id earlier, Id later) = 0;
+  /// The same for a pair that a policy has proposed, with where it expects the later pose: for
+  /// matchers that need an initial estimate. Unless overridden, `match` is called.
+  virtual std::vector<Factor> match_proposed(const MatchProposal& proposal);
   /// A match of a pose with any of these, while it is unknown which of them are near: place
   /// recognition. Unless overridden, `match` is called for one after the other.
   virtual std::optional<RecognisedPlace> recognise(std::span<const Id> places, Id pose);
