@@ -35,17 +35,6 @@ OccupancyGrid generate(const ComponentSpec& spec, std::uint64_t seed, Registry& 
                      [&] { return registry.make<FloorPlan>(spec)->generate(seed); });
 }
 
-OccupancyGrid load_floor(const std::string& name, Session& session) {
-  Registry& registry = session.registry();
-  if (!name.starts_with('@')) {
-    session.files.add_input(grid_file(name).string());
-    return read_grid(name, registry);
-  }
-  ComponentSpec spec = parse_component(std::string_view(name).substr(1));
-  const std::uint64_t seed = take_seed(spec, registry.options(FloorPlan::kKind, spec.name));
-  return generate(spec, seed, registry);
-}
-
 std::string point_text(const Eigen::Vector2d& point) {
   return fmt::format("({:.2f}, {:.2f})", point.x(), point.y());
 }
@@ -65,11 +54,6 @@ void add_leaks(const std::vector<FloorLeak>& leaks, Table& table) {
     table.add({"", leak_text(leaks[k])});
   if (leaks.size() > kShownLeaks)
     table.add({"", fmt::format("{} shorter ones", leaks.size() - kShownLeaks)});
-}
-
-std::string size_text(const GridFrame& frame) {
-  return fmt::format("{:.4g} m × {:.4g} m, {} × {} cells of {:g} m", frame.width * frame.resolution,
-                     frame.height * frame.resolution, frame.width, frame.height, frame.resolution);
 }
 
 std::string survey_text(const std::string& name, const GridFrame& frame, const FloorSurvey& survey,
@@ -97,13 +81,6 @@ std::string survey_text(const std::string& name, const GridFrame& frame, const F
 
 json::array point_json(const Eigen::Vector2d& point) { return {point.x(), point.y()}; }
 
-json::object frame_json(const std::string& name, const GridFrame& frame) {
-  return {{"file", name},
-          {"cells", {frame.width, frame.height}},
-          {"resolution", frame.resolution},
-          {"origin", {frame.origin.x(), frame.origin.y(), frame.yaw}}};
-}
-
 json::object report_json(const std::string& name, const GridFrame& frame, const FloorSurvey& survey,
                          const FloorInfoOptions& options) {
   json::object report = begin_report("info");
@@ -125,6 +102,29 @@ json::object report_json(const std::string& name, const GridFrame& frame, const 
 }
 
 }  // namespace
+
+OccupancyGrid load_floor(const std::string& name, Session& session) {
+  Registry& registry = session.registry();
+  if (!name.starts_with('@')) {
+    session.files.add_input(grid_file(name).string());
+    return read_grid(name, registry);
+  }
+  ComponentSpec spec = parse_component(std::string_view(name).substr(1));
+  const std::uint64_t seed = take_seed(spec, registry.options(FloorPlan::kKind, spec.name));
+  return generate(spec, seed, registry);
+}
+
+std::string size_text(const GridFrame& frame) {
+  return fmt::format("{:.4g} m × {:.4g} m, {} × {} cells of {:g} m", frame.width * frame.resolution,
+                     frame.height * frame.resolution, frame.width, frame.height, frame.resolution);
+}
+
+json::object frame_json(const std::string& name, const GridFrame& frame) {
+  return {{"file", name},
+          {"cells", {frame.width, frame.height}},
+          {"resolution", frame.resolution},
+          {"origin", {frame.origin.x(), frame.origin.y(), frame.yaw}}};
+}
 
 bool names_floor_plan(const std::string& kind, Session& session) {
   const std::string name = kind.substr(0, kind.find(':'));

@@ -5,6 +5,9 @@
 #include <optional>
 #include <string>
 
+#include <boost/json/object.hpp>
+
+#include "cairn/grid/grid.hpp"
 #include "session.hpp"
 
 namespace cairn::app {
@@ -14,6 +17,12 @@ namespace cairn::app {
 /// Whether a name is that of a floor: a file with the ending of a grid format and not of a format
 /// of graphs, or @KIND of a floor plan.
 bool names_floor(const std::string& name, Session& session);
+
+/// A floor from a file or, as "@rooms:seed=3", generated.
+OccupancyGrid load_floor(const std::string& name, Session& session);
+/// "10 m × 8 m, 200 × 160 cells of 0.05 m"
+std::string size_text(const GridFrame& frame);
+boost::json::object frame_json(const std::string& name, const GridFrame& frame);
 
 struct FloorInfoOptions {
   double radius = 0.2;                         ///< of a robot's body [m]

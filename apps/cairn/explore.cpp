@@ -1,0 +1,305 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// cairn explore FLOOR: a robot that explores a floor.
+#include <algorithm>
+#include <chrono>
+#include <cstdint>
+#include <cstdio>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <fmt/core.h>
+
+#include "arguments.hpp"
+#include "cairn/grid/grid_format.hpp"
+#include "cairn/plugin/registry.hpp"
+#include "cairn/policy/policy_run.hpp"
+#include "cairn/runtime/error.hpp"
+#include "commands.hpp"
+#include "explore_report.hpp"
+#include "floor_drawing.hpp"
+#include "floors.hpp"
+#include "graph_files.hpp"
+#include "interrupt.hpp"
+#include "progress.hpp"
+#include "results.hpp"
+#include "table.hpp"
+
+namespace cairn::app {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+struct ExploreOptions {
+  std::string floor;
+  std::string world = "lidar_building", lidar, odometry;
+  std::string policy = "compact_pose:range=1,angle=0.35,reuse=false";
+  std::string registration = "icp", mapper = "log_odds", explorer = "frontier";
+  std::string until;
+  std::uint64_t seed = 1;
+  std::optional<double> start_x, start_y, start_theta;
+  std::string output, trajectory, truth, map, steps;
+  bool live = false;
+};
+
+/// "range=8,fov=180" among the options of a component.
+void merge(const std::string& words, const char* option, ComponentSpec& spec) {
+  if (words.empty()) return;
+  for (const auto& [key, value] : parse_component(fmt::format("{}:{}", spec.name, words)).values) {
+    if (!spec.values.emplace(key, value).second)
+      throw Error(ErrorCode::usage,
+                  fmt::format("{}: '{}' is among the options of --world too: give one", option, key));
+  }
+}
+
+ComponentSpec world_spec(const ExploreOptions& options) {
+  ComponentSpec spec = parse_component(options.world);
+  merge(options.lidar, "--lidar", spec);
+  merge(options.odometry, "--odometry", spec);
+  return spec;
+}
+
+double positive(const std::string& key, const std::string& text) {
+  std::size_t read = 0;
+  double value = 0.0;
+  try {
+    value = std::stod(text, &read);
+  } catch (const std::exception&) {
+    read = 0;
+  }
+  if (read == 0 || read != text.size() || !(value > 0.0)) {
+    throw Error(ErrorCode::usage,
+                fmt::format("--until: '{}' is no number above zero for {}", text, key));
+  }
+  return value;
+}
+
+ExplorationLimits limits_of(const std::string& words) {
+  ExplorationLimits limits;
+  if (words.empty()) return limits;
+  constexpr double kMost = 1e9;
+  for (const auto& [key, text] : parse_component("until:" + words).values) {
+    const double value = positive(key, text);
+    const int count = static_cast<int>(std::min(value, kMost));
+    if (key == "distance") {
+      limits.distance = value;
+    } else if (key == "steps") {
+      limits.steps = count;
+    } else if (key == "decisions") {
+      limits.decisions = count;
+    } else {
+      throw Error(ErrorCode::usage,
+                  fmt::format("--until: there is no limit '{}'; there are distance [m], steps and "
+                              "decisions",
+                              key));
+    }
+  }
+  return limits;
+}
+
+std::optional<Pose2> start_of(const ExploreOptions& options) {
+  if (options.start_x.has_value() != options.start_y.has_value())
+    throw Error(ErrorCode::usage, "--start-x and --start-y go together");
+  if (!options.start_x) {
+    if (options.start_theta)
+      throw Error(ErrorCode::usage, "--start-theta needs --start-x and --start-y");
+    return std::nullopt;
+  }
+  return Pose2(*options.start_x, *options.start_y, options.start_theta.value_or(0.0));
+}
+
+std::vector<Eigen::Vector2d> positions(const std::vector<ExplorationStep>& steps) {
+  std::vector<Eigen::Vector2d> points;
+  for (const ExplorationStep& step : steps) points.emplace_back(step.estimate.translation());
+  return points;
+}
+
+/// Shows the run on standard error while it goes on: a line, or with --live a drawing.
+class ExploreProgress {
+ public:
+  ExploreProgress(const ExploreOptions& options, const Session& session)
+      : options_(options),
+        line_(session.common.quiet),
+        live_(options.live && line_.on_terminal()),
+        colour_(use_colour(stderr)) {
+    if (options.live && !live_) session.note("--live: standard error is not a terminal");
+  }
+
+  void decided(const Decision& decision) {
+    path_.clear();
+    if (decision.kind == Decision::Kind::drive)
+      path_ = decision.candidates.at(decision.chosen).path.points;
+    why_ = decision.why;
+  }
+
+  void moved(const ExplorationStep& step, const FloorMap& map) {
+    trajectory_.emplace_back(step.estimate.translation());
+    const auto now = Clock::now();
+    const auto pause = live_ ? 100 : line_.on_terminal() ? 50 : 5000;
+    if (now - shown_ < std::chrono::milliseconds(pause)) return;
+    shown_ = now;
+    if (live_) return draw(step, map);
+    line_.show(fmt::format("{} {:.1f} m driven, {:.1f} m² known, {}: {}", options_.explorer,
+                           step.distance, step.coverage, plural(step.loops, "loop closure"), why_));
+  }
+
+  void clear() { line_.clear(); }
+
+ private:
+  void draw(const ExplorationStep& step, const FloorMap& map) {
+    const std::size_t width = terminal_width(stderr);
+    const std::string drawing = floor_text({.map = map,
+                                            .trajectory = trajectory_,
+                                            .robot = step.estimate.translation(),
+                                            .path = path_},
+                                           width, 2 * width / 5, colour_);
+    // Over the drawing before: home, and what is left below is wiped.
+    fmt::print(stderr, "\x1b[H{}\x1b[J{:.1f} m driven, {:.1f} m² known, {}\n{}\n", drawing,
+               step.distance, step.coverage, plural(step.loops, "loop closure"),
+               shortened(why_, width));
+  }
+
+  const ExploreOptions& options_;
+  StatusLine line_;
+  bool live_, colour_;
+  std::vector<Eigen::Vector2d> trajectory_, path_;
+  std::string why_;
+  Clock::time_point shown_ = Clock::now();
+};
+
+void check(const ExploreOptions& options, Session& session) {
+  if (!options.map.empty() && !names_grid(options.map, session.registry())) {
+    throw Error(ErrorCode::usage,
+                fmt::format("--map: {}: a map is written to a file with its ending: map.yaml (with "
+                            "map.png beside it)",
+                            options.map));
+  }
+  for (const std::string& graph : {options.output, options.trajectory, options.truth})
+    check_output(graph, "", session, false);
+  if (!options.map.empty()) check_file(grid_file(options.map).string(), session);
+  check_file(options.steps, session);
+}
+
+void write_outputs(const ExploreOptions& options, const ExploreOutcome& outcome, Results& results,
+                   Session& session) {
+  const ExplorationResult& result = outcome.result;
+  Registry& registry = session.registry();
+  const auto write = [&](const Graph& graph, const std::string& file) {
+    results.write(file, [&] { write_graph(graph, file, registry, output_format(file, "")); });
+  };
+  write(result.graph, options.output);
+  write(result.trajectory, options.trajectory);
+  write(result.truth_trajectory, options.truth);
+  results.write(options.map, [&] { write_grid(result.map.occupancy(), options.map, registry); });
+  results.write(options.steps, [&] { write_file(options.steps, steps_csv(result)); });
+  results.add([&] { session.write_json(report_json(outcome)); });
+  results.add([&] {
+    if (is_terminal(stdout)) {
+      const auto points = positions(result.steps);
+      session.print(floor_text(
+          {.map = result.map, .trajectory = points, .robot = points.back(), .path = {}},
+          output_width(), output_width() / 3, session.colour()));
+    }
+    session.print(summary_text(outcome));
+  });
+}
+
+int run_explore(const ExploreOptions& options, Session& session) {
+  check(options, session);
+  session.use_threads();
+  Registry& registry = session.registry();
+  const ExplorationLimits limits = limits_of(options.until);
+  const std::optional<Pose2> start = start_of(options);
+  const ComponentSpec world_name = world_spec(options);
+  const auto world = registry.make<World>(world_name);
+  const auto policy = registry.make<PosePolicy>(parse_component(options.policy));
+  const auto registration = registry.make<Registration>(parse_component(options.registration));
+  const auto mapper = registry.make<Mapper>(parse_component(options.mapper));
+  const auto explorer = registry.make<Explorer>(parse_component(options.explorer));
+  const OccupancyGrid floor = load_floor(options.floor, session);
+  const InterruptGuard guard;  // until the results are written
+  ExploreProgress progress(options, session);
+  const Exploration exploration{
+      .world = *world,
+      .policy = *policy,
+      .registration = *registration,
+      .mapper = *mapper,
+      .explorer = *explorer,
+      .registry = registry,
+      .start = {.floor = &floor, .pose = start, .seed = options.seed},
+      .limits = limits,
+      .interrupt = &guard.flag(),
+      .decided = [&](const Decision& decision, const Situation&) { progress.decided(decision); },
+      .moved = [&](const ExplorationStep& step, const FloorMap& map) { progress.moved(step, map); }};
+  const ExploreOutcome outcome{.floor = options.floor,
+                               .frame = floor.frame,
+                               .parts = {.world = spec_text(world_name),
+                                         .policy = options.policy,
+                                         .registration = options.registration,
+                                         .mapper = options.mapper,
+                                         .explorer = options.explorer,
+                                         .seed = options.seed},
+                               .result = run_exploration(exploration)};
+  progress.clear();
+  for (const std::string& note : outcome.result.notes) session.note(note);
+  Results results(session);
+  write_outputs(options, outcome, results, session);
+  results.finish();
+  if (guard.interrupted()) return kExitInterrupted;
+  if (outcome.result.converged) return 0;
+  session.note("the estimate has not converged");
+  return static_cast<int>(ErrorCode::numerical);
+}
+
+}  // namespace
+
+Command add_explore(ArgumentParser program) {
+  auto options = std::make_shared<ExploreOptions>();  // lives as long as the parser and the run
+  ArgumentParser cli = program.add_command(
+      "explore", "a simulated robot explores a floor, and decides by itself where to drive");
+  cli.add_option("floor", options->floor, "the floor: floor.yaml, or @KIND[:k=v] to generate")
+      .type_name("FLOOR")
+      .required();
+  cli.add_option("-o,--output", options->output, "write the graph of the poses that are kept")
+      .type_name("OUT");
+  cli.add_option("--map", options->map, "write the map that was built").type_name("FILE");
+  cli.add_option("--trajectory", options->trajectory, "write all poses, those left out put back")
+      .type_name("FILE");
+  cli.add_option("--truth", options->truth, "write where the robot truly was").type_name("FILE");
+  cli.add_option("--steps", options->steps, "a row for each motion, as CSV").type_name("FILE");
+  cli.add_option("--explorer", options->explorer, "decides where to drive; options as NAME:k=v")
+      .type_name("NAME")
+      .show_default();
+  cli.add_option("--until", options->until, "limits: distance=250 [m], steps=N, decisions=N")
+      .type_name("K=V,…");
+  cli.add_option("--lidar", options->lidar, "options of the lidar: fov=180,range=8,beams=181")
+      .type_name("K=V,…");
+  cli.add_option("--odometry", options->odometry, "its noise: relative=0.15,sigma_xy=0.01")
+      .type_name("K=V,…");
+  cli.add_option("--start-x", options->start_x, "where the robot starts [m]; default: the widest place").type_name("M");
+  cli.add_option("--start-y", options->start_y, "goes with --start-x").type_name("M");
+  cli.add_option("--start-theta", options->start_theta, "its heading there [rad]").type_name("RAD");
+  cli.add_option("--seed", options->seed, "of all noise and random choices")
+      .type_name("N")
+      .show_default();
+  cli.add_option("--world", options->world, "the robot; its options: cairn plugins lidar_building")
+      .type_name("NAME")
+      .show_default();
+  cli.add_option("--mapper", options->mapper, "builds the map").type_name("NAME").show_default();
+  cli.add_option("--policy", options->policy, "decides which poses and loop closures are kept")
+      .type_name("NAME")
+      .show_default();
+  cli.add_option("--registration", options->registration, "matches the scans of two poses")
+      .type_name("NAME")
+      .show_default();
+  cli.add_flag("--live", options->live, "draw map, trajectory and path in the terminal on the way");
+  cli.footer(
+      "Example:\n"
+      "  cairn explore @rooms:seed=3\n"
+      "  cairn explore floor.yaml --until distance=250 --odometry relative=0.15 -o run.g2o --map "
+      "map.yaml");
+  return {cli, [options](Session& session) { return run_explore(*options, session); }};
+}
+
+}  // namespace cairn::app

@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "explore_report.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "cairn/evaluation/trajectory.hpp"
+#include "floors.hpp"
+#include "json_report.hpp"
+#include "table.hpp"
+
+namespace cairn::app {
+namespace {
+
+namespace json = boost::json;
+
+std::optional<TrajectoryError> error_of(const ExplorationResult& result) {
+  if (result.truth_trajectory.variable_count() < 3) return std::nullopt;
+  return compare(trajectory(result.trajectory), trajectory(result.truth_trajectory));
+}
+
+/// How long decisions took at most, but for this part of them [s].
+double quantile(std::vector<double> seconds, double part) {
+  if (seconds.empty()) return 0.0;
+  std::ranges::sort(seconds);
+  const auto last = static_cast<double>(seconds.size() - 1);
+  return seconds[static_cast<std::size_t>(std::ceil(part * last))];
+}
+
+json::object decisions_json(const ExplorationResult& result) {
+  return {{"count", result.decision_seconds.size()},
+          {"median_seconds", quantile(result.decision_seconds, 0.5)},
+          {"p95_seconds", quantile(result.decision_seconds, 0.95)},
+          {"max_seconds", quantile(result.decision_seconds, 1.0)}};
+}
+
+json::object map_json(const ExplorationResult& result) {
+  json::object map{{"cells", {result.map.frame.width, result.map.frame.height}},
+                   {"resolution", result.map.frame.resolution},
+                   {"coverage", result.map.coverage()},
+                   {"entropy", result.map.entropy()},
+                   {"error", result.map_error},
+                   {"rebuilt", result.rebuilt}};
+  if (result.against) {
+    map["truth"] = {{"floor", result.against->floor},
+                    {"seen", result.against->seen},
+                    {"free_wrong", result.against->free_wrong},
+                    {"occupied_wrong", result.against->occupied_wrong}};
+  }
+  return map;
+}
+
+json::array steps_json(const ExplorationResult& result) {
+  json::array steps;
+  for (const ExplorationStep& step : result.steps) {
+    steps.push_back({{"distance", step.distance},
+                     {"coverage", step.coverage},
+                     {"map_entropy", step.map_entropy},
+                     {"trajectory_entropy", number_json(step.trajectory_entropy)},
+                     {"loops", step.loops}});
+  }
+  return steps;
+}
+
+}  // namespace
+
+json::object report_json(const ExploreOutcome& outcome) {
+  const ExplorationResult& result = outcome.result;
+  const ExplorationStep& last = result.steps.back();
+  json::object report = begin_report("explore");
+  report["floor"] = frame_json(outcome.floor, outcome.frame);
+  report["world"] = outcome.parts.world;
+  report["policy"] = outcome.parts.policy;
+  report["registration"] = outcome.parts.registration;
+  report["mapper"] = outcome.parts.mapper;
+  report["explorer"] = outcome.parts.explorer;
+  report["seed"] = outcome.parts.seed;
+  report["end"] = std::string(to_string(result.end));
+  report["why"] = result.why;
+  report["motions"] = last.step;
+  report["distance"] = last.distance;
+  report["collisions"] = result.collisions;
+  report["poses"] = result.trajectory.variable_count();
+  report["kept"] = result.graph.variable_count();
+  report["loops"] = {{"proposed", result.proposed},
+                     {"matched", result.registered},
+                     {"linked", result.loops}};
+  report["converged"] = result.converged;
+  report["trajectory_entropy"] = number_json(last.trajectory_entropy);
+  report["map"] = map_json(result);
+  report["decisions"] = decisions_json(result);
+  if (const auto error = error_of(result)) {
+    report["error"] = {{"ate_translation", error->ate_translation},
+                       {"ate_rotation", error->ate_rotation}};
+  }
+  report["seconds"] = {{"decide", result.decide_seconds},
+                       {"map", result.map_seconds},
+                       {"policy", result.policy_seconds},
+                       {"registration", result.registration_seconds}};
+  report["notes"] = strings_json(result.notes);
+  report["steps"] = steps_json(result);
+  return report;
+}
+
+std::string steps_csv(const ExplorationResult& result) {
+  std::string text =
+      "step,decision,distance,x,y,theta,true_x,true_y,true_theta,coverage,map_entropy,"
+      "trajectory_entropy,kept,loops,collisions\n";
+  for (const ExplorationStep& step : result.steps) {
+    const std::string truth =
+        step.truth ? fmt::format("{:.9g},{:.9g},{:.9g}", step.truth->x(), step.truth->y(),
+                                 step.truth->theta())
+                   : ",,";
+    text += fmt::format("{},{},{:.9g},{:.9g},{:.9g},{:.9g},{},{:.9g},{:.9g},{:.9g},{},{},{}\n",
+                        step.step, step.decision, step.distance, step.estimate.x(),
+                        step.estimate.y(), step.estimate.theta(), truth, step.coverage,
+                        step.map_entropy, step.trajectory_entropy, step.kept, step.loops,
+                        step.collisions);
+  }
+  return text;
+}
+
+std::string summary_text(const ExploreOutcome& outcome) {
+  const ExplorationResult& result = outcome.result;
+  const ExplorationStep& last = result.steps.back();
+  Table table({{"", Table::Align::left}, {"", Table::Align::left}});
+  table.add({"end", fmt::format("{}: {}", to_string(result.end), result.why)});
+  table.add({"drive", fmt::format("{:.1f} m in {}, {}, {}", last.distance,
+                                  plural(last.step, "motion"),
+                                  plural(std::ssize(result.decision_seconds), "decision"),
+                                  plural(result.collisions, "collision"))});
+  std::string map = fmt::format("{:.1f} m² known", result.map.coverage());
+  if (result.against) {
+    map += fmt::format(", {:.1f} % of the {:.1f} m² that hang together with the start; wrong: {:.2f} "
+                       "m² free, {:.2f} m² occupied",
+                       100.0 * result.against->seen / result.against->floor, result.against->floor,
+                       result.against->free_wrong, result.against->occupied_wrong);
+  }
+  table.add({"map", map});
+  std::string poses = fmt::format("{} of {} kept, {}", result.graph.variable_count(),
+                                  plural(result.trajectory.variable_count(), "pose"),
+                                  plural(result.loops, "loop closure"));
+  if (const auto error = error_of(result))
+    poses += fmt::format("; error {:.3f} m, {:.2f}° (ATE)", error->ate_translation,
+                         error->ate_rotation);
+  table.add({"graph", poses});
+  table.add({"time", fmt::format("{} deciding, {} mapping, {} estimating, {} matching scans",
+                                 seconds_text(result.decide_seconds),
+                                 seconds_text(result.map_seconds),
+                                 seconds_text(result.policy_seconds),
+                                 seconds_text(result.registration_seconds))});
+  return table.text(false);
+}
+
+}  // namespace cairn::app

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+
+#include <boost/json/object.hpp>
+
+#include "cairn/exploration/exploration.hpp"
+
+namespace cairn::app {
+
+/// The components of a run, as they are named on the command line.
+struct ExploreParts {
+  std::string world, policy, registration, mapper, explorer;
+  std::uint64_t seed = 1;
+};
+
+/// What `cairn explore` prints and writes.
+struct ExploreOutcome {
+  std::string floor;
+  GridFrame frame;
+  ExploreParts parts;
+  ExplorationResult result;
+};
+
+boost::json::object report_json(const ExploreOutcome& outcome);
+/// A row for each motion.
+std::string steps_csv(const ExplorationResult& result);
+/// Five lines.
+std::string summary_text(const ExploreOutcome& outcome);
+
+}  // namespace cairn::app

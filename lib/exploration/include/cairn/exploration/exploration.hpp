@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "cairn/exploration/explorer.hpp"
+#include "cairn/exploration/floor_map.hpp"
+#include "cairn/exploration/map_truth.hpp"
+#include "cairn/exploration/world.hpp"
+#include "cairn/plugin/registry.hpp"
+#include "cairn/policy/pose_policy.hpp"
+#include "cairn/policy/registration.hpp"
+#include "cairn/runtime/api.hpp"
+
+namespace cairn {
+
+/// When a run ends, besides for want of anything to explore.
+struct ExplorationLimits {
+  double distance = std::numeric_limits<double>::infinity();  ///< driven [m]
+  int steps = std::numeric_limits<int>::max();                ///< motions
+  int decisions = std::numeric_limits<int>::max();
+  /// Driven without the known floor growing, by 0.2 % at least [m]: then it is stuck.
+  double idle_distance = 50.0;
+};
+
+enum class ExplorationEnd { finished, limit, stuck, interrupted };
+/// "finished", "limit", "stuck", "interrupted".
+CAIRN_API std::string_view to_string(ExplorationEnd end);
+
+/// A run after one motion; the first is of its start.
+struct ExplorationStep {
+  int step = 0, decision = 0;
+  double distance = 0.0;  ///< driven so far, as odometry has it [m]
+  Pose2 estimate;
+  std::optional<Pose2> truth;
+  double coverage = 0.0;            ///< `FloorMap::coverage` [m²]
+  double map_entropy = 0.0;         ///< `FloorMap::entropy` [nats·m²]
+  double trajectory_entropy = 0.0;  ///< (5.13): see `trajectory_entropy` [nats]
+  int kept = 0, loops = 0, collisions = 0;
+};
+
+struct ExplorationResult {
+  ExplorationEnd end = ExplorationEnd::finished;
+  std::string why;  ///< a sentence
+  std::vector<ExplorationStep> steps;
+  std::vector<double> decision_seconds;
+  std::vector<std::string> notes;
+  Graph graph;             ///< of the poses that are kept
+  Graph trajectory;        ///< of all poses, without factors
+  Graph truth_trajectory;  ///< of all poses; without variables if it is not known
+  FloorMap map;
+  double map_error = 0.0;           ///< `contradicted_area` [m²]
+  std::optional<MapTruth> against;  ///< beside the floor, where that is known
+  bool converged = true;
+  int collisions = 0, loops = 0, proposed = 0, registered = 0, rebuilt = 0;
+  /// Of the parts of the run [s].
+  double decide_seconds = 0.0, map_seconds = 0.0, policy_seconds = 0.0, registration_seconds = 0.0;
+};
+
+/// What a run consists of. Everything referred to must outlive it.
+struct Exploration {
+  World& world;
+  PosePolicy& policy;
+  Registration& registration;
+  Mapper& mapper;
+  Explorer& explorer;
+  Registry& registry;
+  WorldStart start;
+  ExplorationLimits limits;
+  /// Standard deviations of the first pose [m, m, rad], for `trajectory_entropy`.
+  Eigen::Vector3d first_sigma = Eigen::Vector3d(0.05, 0.05, 0.0017);
+  const std::atomic<bool>* interrupt = nullptr;
+  /// Called after each decision, with the map and where the robot is.
+  std::function<void(const Decision&, const Situation&)> decided = {};
+  /// Called after each motion.
+  std::function<void(const ExplorationStep&, const FloorMap&)> moved = {};
+};
+
+/// Explores: decides, drives along the path that was chosen, and maps, until nothing is left to
+/// explore or a limit is reached. A path is given up, and the explorer asked again, when an obstacle
+/// is seen on it, when the robot collides, or when a loop closure moves the estimate by more than a
+/// cell of the map.
+///
+/// Each motion is a pose of the graph with a relative factor from odometry; the policy decides
+/// which are kept and which are registered with each other (thesis, 5.1). Throws `Error` as its
+/// parts do.
+CAIRN_API ExplorationResult run_exploration(const Exploration& parts);
+
+/// (1/n) Σ ln((2πe)^{3/2} |Σ_ii|) over these poses in the plane (thesis, 5.13, with the entropy of
+/// a pose as in 5.5, without the root of the determinant), if the first of them, which is fixed,
+/// had a prior with the standard deviations `first_sigma` [m, m, rad] instead. NaN where H is
+/// singular.
+CAIRN_API double trajectory_entropy(Estimator& estimator, std::span<const Id> poses,
+                                    const Eigen::Vector3d& first_sigma);
+
+}  // namespace cairn

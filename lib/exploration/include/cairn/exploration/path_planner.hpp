@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <string_view>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "cairn/exploration/floor_map.hpp"
+#include "cairn/exploration/world.hpp"
+#include "cairn/runtime/api.hpp"
+#include "cairn/runtime/component.hpp"
+#include "cairn/typed/pose2.hpp"
+
+namespace cairn {
+
+/// A path over known free floor.
+struct PlannedPath {
+  std::vector<Eigen::Vector2d> points;     ///< of a polyline, from where the robot is [m]
+  double length = 0.0;                     ///< [m]
+  std::optional<Eigen::Vector2d> look_at;  ///< towards which the robot turns at its end [m]
+};
+
+/// How near an obstacle, or an unknown cell, the centre of a round body may come: its radius and
+/// half a cell [m], compared with `FloorMap::clearance`.
+inline double needed_clearance(double radius, const GridFrame& frame) {
+  return radius + 0.5 * frame.resolution;
+}
+
+/// Finds paths for a robot with a round body.
+class CAIRN_API PathPlanner : public Component {
+ public:
+  static constexpr std::string_view kKind = "path_planner";
+  ~PathPlanner() override;
+
+  /// From here on paths begin at `from` [m]. The map must outlive the last `path_to`.
+  virtual void start(const FloorMap& map, const Eigen::Vector2d& from, double radius) = 0;
+  /// A path as near to `goal` as the body can come, with only free cells in between, at whose end
+  /// the robot looks at it; none: there is no such place within `tolerance` [m]. Its cells have
+  /// `needed_clearance`, but for those in which a robot that begins too near to an obstacle leaves
+  /// it.
+  virtual std::optional<PlannedPath> path_to(const Eigen::Vector2d& goal, double tolerance) = 0;
+};
+
+/// The next motion along a path: the robot turns first and then drives straight, both in one step
+/// as far as `robot.step` and `robot.turn` allow. `passed` counts the points of the path that are
+/// behind the robot, and is advanced. None: it is there, and looks where it shall.
+CAIRN_API std::optional<Pose2> next_motion(const Pose2& at, const PlannedPath& path,
+                                           const RobotModel& robot, std::size_t& passed);
+
+}  // namespace cairn

@@ -1,0 +1,320 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "cairn/exploration/exploration.hpp"
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <utility>
+
+#include <fmt/core.h>
+
+#include "cairn/evaluation/trajectory.hpp"
+#include "cairn/grid/cell_traversal.hpp"
+#include "cairn/runtime/plugin_call.hpp"
+#include "cairn/runtime/timed.hpp"
+#include "cairn/typed/build.hpp"
+#include "scan_poses.hpp"
+
+namespace cairn {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+/// So many motions in a row that move the robot by less than these, and so many decisions in a row
+/// that lead to no motion: then it is stuck.
+constexpr int kMostIdle = 20;
+constexpr double kNoMotion = 0.005;  // [m], [rad]
+constexpr int kMostEmptyDecisions = 3;
+/// The known floor must grow by this factor to be progress.
+constexpr double kProgress = 1.002;
+
+/// Whether a body can still go along what is left of a path, which may begin too near to an
+/// obstacle.
+bool is_open(const FloorMap& map, const Pose2& at, const PlannedPath& path, std::size_t passed,
+             double radius) {
+  const GridFrame& frame = map.frame;
+  Eigen::Vector2d from = at.translation();
+  bool leaving = true;
+  for (std::size_t k = passed; k < path.points.size(); ++k) {
+    const bool open = traverse_cells(
+        frame.to_cells(from), frame.to_cells(path.points[k]), [&](int x, int y) {
+          if (!frame.contains(x, y)) return false;
+          const std::size_t index = frame.index(x, y);
+          if (map.clearance[index] >= radius) leaving = false;
+          else if (!leaving) return false;
+          return map.cells[index] != CellState::occupied;
+        });
+    if (!open) return false;
+    from = path.points[k];
+  }
+  return true;
+}
+
+class Run {
+ public:
+  explicit Run(const Exploration& parts) : parts_(parts), robot_(parts.world.robot()) {}
+
+  ExplorationResult run() {
+    begin();
+    while (!ended_) {
+      if (!check_limits()) break;
+      const Decision decision = decide();
+      if (decision.kind == Decision::Kind::drive)
+        drive(decision.candidates.at(decision.chosen).path);
+      else
+        end(decision.kind == Decision::Kind::finished ? ExplorationEnd::finished
+                                                      : ExplorationEnd::stuck,
+            decision.why);
+    }
+    finish();
+    return std::move(result_);
+  }
+
+ private:
+  // Poses and maps --------------------------------------------------------------------------------
+
+  void begin() {
+    LaserScan scan = parts_.world.begin(parts_.start);
+    const std::optional<Pose2> truth = parts_.world.truth();
+    estimate_ = truth.value_or(parts_.start.pose.value_or(Pose2()));
+    start_ = estimate_;
+    begin_registration();
+    Variable first = make_variable(0, estimate_, parts_.registry);
+    first.fixed = true;
+    take(first, {}, std::move(scan));
+    parts_.explorer.begin(parts_.start.seed);
+    record(0.0);
+  }
+
+  /// A registration learns from two poses which types there are, and how accurate odometry is.
+  void begin_registration() {
+    const Pose2 motion(robot_.step, 0.0, 0.0);
+    sample_.add(make_variable(0, Pose2(), parts_.registry));
+    sample_.add(make_variable(1, motion, parts_.registry));
+    sample_.add(odometry_factor(0, 1, motion, robot_.odometry.covariance(motion)));
+    parts_.registration.begin(
+        {.recording = &sample_, .truth = parts_.world.truth() ? &result_.truth_trajectory : nullptr});
+    scans_to_ = query<ScanRegistration>(parts_.registration);
+  }
+
+  Factor odometry_factor(Id from, Id to, const Pose2& motion, const Eigen::Matrix3d& covariance) {
+    return make_factor(Between(from, to, motion), Information::covariance(covariance), nullptr,
+                       parts_.registry);
+  }
+
+  /// A pose with its scan, through the policy and into the map.
+  void take(const Variable& pose, std::span<const Factor> odometry, LaserScan scan) {
+    if (const std::optional<Pose2> truth = parts_.world.truth())
+      result_.truth_trajectory.add(make_variable(pose.id, *truth, parts_.registry));
+    if (scans_to_) scans_to_->take(pose.id, scan);
+    scans_.push_back(scan);
+    const auto began = Clock::now();
+    const PoseReport report =
+        process_pose(pose, odometry, parts_.policy, parts_.registration);
+    result_.policy_seconds += report.seconds.total;
+    result_.registration_seconds += seconds_since(began) - report.seconds.total;
+    const int linked = count_links(report);
+    result_.loops += linked;
+    for (const std::string& note : report.notes) note_once(note);
+    where_.add(report, parts_.policy);
+    Timed timed(result_.map_seconds);
+    parts_.mapper.add(where_.all().back(), std::move(scan));
+    if (linked > 0) follow_estimate();
+    estimate_ = where_.all().back();
+  }
+
+  int count_links(const PoseReport& report) {
+    int linked = 0;
+    for (const LinkReport& link : report.links) {
+      ++result_.proposed;
+      result_.registered += link.verdict != LinkVerdict::unmatched;
+      linked += link.verdict == LinkVerdict::linked;
+    }
+    return linked;
+  }
+
+  void follow_estimate() {
+    where_.update(parts_.policy);
+    result_.rebuilt += parts_.mapper.move(where_.all());
+  }
+
+  void note_once(const std::string& note) {
+    if (std::ranges::find(result_.notes, note) == result_.notes.end()) result_.notes.push_back(note);
+  }
+
+  const FloorMap& map() {
+    Timed timed(result_.map_seconds);
+    return parts_.mapper.map();
+  }
+
+  void record(double driven) {
+    const FloorMap& map = this->map();
+    const std::vector<Id> kept = parts_.policy.kept();
+    ExplorationStep step{.step = static_cast<int>(result_.steps.size()),
+                         .decision = decisions_,
+                         .distance = driven,
+                         .estimate = estimate_,
+                         .truth = parts_.world.truth(),
+                         .coverage = map.coverage(),
+                         .map_entropy = map.entropy(),
+                         .trajectory_entropy = trajectory_entropy(parts_.policy.estimator(), kept,
+                                                                  parts_.first_sigma),
+                         .kept = static_cast<int>(kept.size()),
+                         .loops = result_.loops,
+                         .collisions = result_.collisions};
+    if (!result_.steps.empty()) step.distance += result_.steps.back().distance;
+    watch_progress(step);
+    result_.steps.push_back(step);
+    if (parts_.moved) parts_.moved(step, map);
+  }
+
+  // Deciding and driving --------------------------------------------------------------------------
+
+  void end(ExplorationEnd how, std::string why) {
+    ended_ = true;
+    result_.end = how;
+    result_.why = std::move(why);
+  }
+
+  /// False: the run is over.
+  bool check_limits() {
+    const ExplorationLimits& limits = parts_.limits;
+    if (parts_.interrupt && *parts_.interrupt) {
+      end(ExplorationEnd::interrupted, "it was interrupted");
+    } else if (result_.steps.back().distance >= limits.distance) {
+      end(ExplorationEnd::limit, fmt::format("{:g} m are driven", limits.distance));
+    } else if (result_.steps.back().step >= limits.steps) {
+      end(ExplorationEnd::limit, fmt::format("{} motions are made", limits.steps));
+    } else if (decisions_ >= limits.decisions) {
+      end(ExplorationEnd::limit, fmt::format("{} decisions are made", limits.decisions));
+    } else if (result_.steps.back().distance - useful_distance_ > limits.idle_distance) {
+      end(ExplorationEnd::stuck,
+          fmt::format("{:g} m were driven without finding more floor", limits.idle_distance));
+    } else if (idle_ >= kMostIdle) {
+      end(ExplorationEnd::stuck, fmt::format("{} motions in a row were stopped", kMostIdle));
+    } else if (empty_decisions_ >= kMostEmptyDecisions) {
+      end(ExplorationEnd::stuck,
+          fmt::format("{} decisions in a row led to no motion", kMostEmptyDecisions));
+    }
+    return !ended_;
+  }
+
+  Decision decide() {
+    const FloorMap& map = this->map();
+    const std::vector<Id> kept = parts_.policy.kept();
+    double seconds = 0.0;
+    Decision decision = [&] {
+      Timed timed(seconds);
+      return call_plugin([] { return std::string("explorer"); },
+                         [&] { return parts_.explorer.decide(situation(map, kept)); });
+    }();
+    ++decisions_;
+    result_.decide_seconds += seconds;
+    result_.decision_seconds.push_back(seconds);
+    for (const std::string& note : decision.notes) note_once(note);
+    if (parts_.decided) parts_.decided(decision, situation(map, kept));
+    return decision;
+  }
+
+  Situation situation(const FloorMap& map, std::span<const Id> kept) {
+    return {.estimator = parts_.policy.estimator(),
+            .poses = kept,
+            .pose = estimate_,
+            .map = map,
+            .robot = robot_,
+            .decision = decisions_};
+  }
+
+  void drive(const PlannedPath& path) {
+    std::size_t passed = 0;
+    bool moved = false;
+    while (check_limits()) {
+      const std::optional<Pose2> motion = next_motion(estimate_, path, robot_, passed);
+      if (!motion) break;
+      moved = true;
+      if (!move(*motion) || !goes_on(path, passed)) break;
+    }
+    empty_decisions_ = moved ? 0 : empty_decisions_ + 1;
+  }
+
+  /// Whether the rest of a path can be driven, and is worth it.
+  bool goes_on(const PlannedPath& path, std::size_t passed) {
+    const FloorMap& map = this->map();
+    if (!is_open(map, estimate_, path, passed, robot_.radius)) return false;
+    const std::vector<Id> kept = parts_.policy.kept();
+    Timed timed(result_.decide_seconds);
+    return call_plugin([] { return std::string("explorer"); },
+                       [&] { return parts_.explorer.is_worthwhile(situation(map, kept), path); });
+  }
+
+  /// False: a new decision is needed.
+  bool move(const Pose2& motion) {
+    WorldStep step = parts_.world.move(motion);
+    result_.collisions += step.collided;
+    const double driven = step.odometry.translation().norm();
+    const bool idle = std::max(std::hypot(driven, 0.0), std::abs(step.odometry.theta())) < kNoMotion;
+    idle_ = idle ? idle_ + 1 : 0;
+    const Pose2 expected = estimate_ * step.odometry;
+    const auto id = static_cast<Id>(scans_.size());
+    const std::array odometry{odometry_factor(id - 1, id, step.odometry, step.covariance)};
+    const Variable pose{make_variable<Pose2>(id, parts_.registry)};
+    take(pose, odometry, std::move(step.scan));
+    record(driven);
+    const double jump = (estimate_.translation() - expected.translation()).norm();
+    return !step.collided && jump <= map().frame.resolution;
+  }
+
+  void watch_progress(const ExplorationStep& step) {
+    // A map that is made anew, blurred a little more or less, is no progress.
+    if (step.coverage <= kProgress * most_coverage_) return;
+    useful_distance_ = step.distance;
+    most_coverage_ = step.coverage;
+  }
+
+  // The end ---------------------------------------------------------------------------------------
+
+  void finish() {
+    result_.converged = parts_.policy.finish();
+    follow_estimate();
+    result_.map = map();
+    result_.graph = parts_.policy.estimator().graph();
+    result_.trajectory = recovered_trajectory(parts_.policy, Recovery::distribute);
+    result_.map_error = contradicted_area(result_.map, scans_, where_.all());
+    if (parts_.start.floor && parts_.world.truth())
+      result_.against = compare_with_floor(result_.map, *parts_.start.floor, alignment(),
+                                           start_.translation());
+  }
+
+  /// From the world of the estimate to that of the floor.
+  Pose2 alignment() const {
+    constexpr int kFewest = 3;  // poses that determine one
+    if (result_.trajectory.variable_count() < kFewest) return {};
+    const Pose pose = align(
+        pair_by_id(trajectory(result_.trajectory), trajectory(result_.truth_trajectory)));
+    return {pose.t.x(), pose.t.y(), std::atan2(pose.R(1, 0), pose.R(0, 0))};
+  }
+
+  const Exploration& parts_;
+  RobotModel robot_;
+  ExplorationResult result_;
+  Graph sample_;  ///< what the registration begins with
+  ScanRegistration* scans_to_ = nullptr;
+  std::vector<LaserScan> scans_;
+  ScanPoses where_;
+  Pose2 start_, estimate_;
+  bool ended_ = false;
+  int decisions_ = 0, empty_decisions_ = 0, idle_ = 0;
+  double most_coverage_ = 0.0, useful_distance_ = 0.0;
+};
+
+}  // namespace
+
+std::string_view to_string(ExplorationEnd end) {
+  constexpr std::array<std::string_view, 4> kNames{"finished", "limit", "stuck", "interrupted"};
+  return kNames[static_cast<std::size_t>(end)];
+}
+
+ExplorationResult run_exploration(const Exploration& parts) { return Run(parts).run(); }
+
+}  // namespace cairn

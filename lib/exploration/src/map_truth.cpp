@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "cairn/exploration/map_truth.hpp"
+
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+namespace cairn {
+namespace {
+
+struct Cell {
+  int x, y;
+};
+
+Cell cell_at(const GridFrame& frame, const Eigen::Vector2d& point) {
+  const Eigen::Vector2d cells = frame.to_cells(point).array().floor();
+  if (!(cells.cwiseAbs().maxCoeff() < 1e9)) return {-1, -1};
+  return {static_cast<int>(cells.x()), static_cast<int>(cells.y())};
+}
+
+CellState state_of(const OccupancyGrid& floor, const Cell& cell) {
+  if (!floor.frame.contains(cell.x, cell.y)) return CellState::unknown;
+  return CellThresholds{}.state(floor.occupancy[floor.frame.index(cell.x, cell.y)]);
+}
+
+/// Free cells that hang together with the one at the start, over sides.
+std::vector<std::uint8_t> connected_free(const OccupancyGrid& floor, const Cell& start) {
+  std::vector<std::uint8_t> connected(floor.occupancy.size());
+  std::vector<Cell> open;
+  const auto reach = [&](const Cell& cell) {
+    if (state_of(floor, cell) != CellState::free) return;
+    std::uint8_t& seen = connected[floor.frame.index(cell.x, cell.y)];
+    if (seen == 0) open.push_back(cell);
+    seen = 1;
+  };
+  reach(start);
+  while (!open.empty()) {
+    const Cell cell = open.back();
+    open.pop_back();
+    reach({cell.x - 1, cell.y});
+    reach({cell.x + 1, cell.y});
+    reach({cell.x, cell.y - 1});
+    reach({cell.x, cell.y + 1});
+  }
+  return connected;
+}
+
+/// Whether a cell within `distance` of the point is not free.
+bool near_obstacle(const OccupancyGrid& floor, const Eigen::Vector2d& point, double distance) {
+  const Cell middle = cell_at(floor.frame, point);
+  const int reach = static_cast<int>(std::ceil(distance / floor.frame.resolution));
+  for (int y = middle.y - reach; y <= middle.y + reach; ++y) {
+    for (int x = middle.x - reach; x <= middle.x + reach; ++x) {
+      if (state_of(floor, {x, y}) == CellState::free) continue;
+      if ((floor.frame.centre(x, y) - point).norm() <= distance) return true;
+    }
+  }
+  return false;
+}
+
+}  // namespace
+
+MapTruth compare_with_floor(const FloorMap& map, const OccupancyGrid& floor,
+                            const Pose2& alignment, const Eigen::Vector2d& start) {
+  MapTruth result;
+  const std::vector<std::uint8_t> connected = connected_free(floor, cell_at(floor.frame, start));
+  // Of the floor, by its own cells: what of it the map knows.
+  std::size_t all = 0, seen = 0;
+  for (int y = 0; y < floor.frame.height; ++y) {
+    for (int x = 0; x < floor.frame.width; ++x) {
+      if (connected[floor.frame.index(x, y)] == 0) continue;
+      ++all;
+      const Cell cell = cell_at(map.frame, alignment.transform_to(floor.frame.centre(x, y)));
+      seen += map.frame.contains(cell.x, cell.y) &&
+              map.cells[map.frame.index(cell.x, cell.y)] != CellState::unknown;
+    }
+  }
+  result.floor = static_cast<double>(all) * floor.frame.cell_area();
+  result.seen = static_cast<double>(seen) * floor.frame.cell_area();
+  // Of the map, by its cells: what is otherwise on the floor.
+  std::size_t free_wrong = 0, occupied_wrong = 0;
+  for (int y = 0; y < map.frame.height; ++y) {
+    for (int x = 0; x < map.frame.width; ++x) {
+      const CellState state = map.cells[map.frame.index(x, y)];
+      if (state == CellState::unknown) continue;
+      const Eigen::Vector2d point = alignment * Point2(map.frame.centre(x, y));
+      const bool free = state_of(floor, cell_at(floor.frame, point)) == CellState::free;
+      if (state == CellState::free && !free) ++free_wrong;
+      if (state == CellState::occupied && free && !near_obstacle(floor, point, map.frame.resolution))
+        ++occupied_wrong;
+    }
+  }
+  result.free_wrong = static_cast<double>(free_wrong) * map.frame.cell_area();
+  result.occupied_wrong = static_cast<double>(occupied_wrong) * map.frame.cell_area();
+  return result;
+}
+
+double contradicted_area(const FloorMap& map, std::span<const LaserScan> scans,
+                         std::span<const Pose2> poses) {
+  std::vector<std::uint8_t> hit(map.cells.size());
+  std::size_t count = 0;
+  for (std::size_t k = 0; k < scans.size(); ++k) {
+    const LaserScan& scan = scans[k];
+    for (std::size_t beam = 0; beam < scan.ranges.size(); ++beam) {
+      double range = scan.ranges[beam];
+      if (!(range > 0.0) || range >= scan.max_range) continue;
+      range += kSurfaceInset * map.frame.resolution;
+      const double angle = scan.angle(beam);
+      const Cell cell = cell_at(
+          map.frame, poses[k] * Point2(range * std::cos(angle), range * std::sin(angle)));
+      if (!map.frame.contains(cell.x, cell.y)) continue;
+      const std::size_t index = map.frame.index(cell.x, cell.y);
+      count += map.cells[index] == CellState::free && hit[index] == 0;
+      hit[index] = 1;
+    }
+  }
+  return static_cast<double>(count) * map.frame.cell_area();
+}
+
+}  // namespace cairn

@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "frontier_goals.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+namespace cairn::exploration {
+namespace {
+
+using Eigen::Vector2d;
+
+/// A robot that comes no nearer to a frontier has no path to it [m].
+constexpr double kNear = 2.0;
+/// A frontier is there still if a cell of one is so near to where its middle was [m].
+constexpr double kStillThere = 0.5;
+/// The map around a frontier [m], which must change before it is tried again.
+constexpr double kAround = 1.0;
+
+}  // namespace
+
+void FrontierGoals::start(const Situation& situation) {
+  situation_ = &situation;
+  planner_->start(situation.map, situation.pose.translation(), situation.robot.radius);
+}
+
+std::vector<Candidate> FrontierGoals::candidates(double least) {
+  std::vector<Candidate> found;
+  unreachable_ = 0;
+  longest_unreachable_ = 0.0;
+  for (const Frontier& frontier : situation_->map.frontiers) {
+    if (frontier.length < least) break;  // longest first
+    std::optional<PlannedPath> path;
+    if (!is_given_up(frontier)) path = path_to(frontier);
+    if (path) {
+      const double length = path->length;
+      found.push_back(
+          {std::move(*path), length, fmt::format("a frontier of {:.1f} m", frontier.length)});
+    } else {
+      ++unreachable_;
+      longest_unreachable_ = std::max(longest_unreachable_, frontier.length);
+    }
+  }
+  return found;
+}
+
+std::optional<PlannedPath> FrontierGoals::path_to(const Frontier& frontier) {
+  std::optional<PlannedPath> path = planner_->path_to(frontier.middle, kNear);
+  if (!path || moves(*path)) return path;
+  given_up_.push_back({frontier.middle, known_around(frontier.middle)});
+  return std::nullopt;
+}
+
+bool FrontierGoals::is_there(const FloorMap& map, const Vector2d& middle) {
+  const auto near = [&](std::int32_t cell) {
+    const Vector2d point = map.frame.centre(cell % map.frame.width, cell / map.frame.width);
+    return (point - middle).norm() < kStillThere;
+  };
+  return std::ranges::any_of(map.frontiers, [&](const Frontier& frontier) {
+    return std::ranges::any_of(frontier.cells, near);
+  });
+}
+
+bool FrontierGoals::moves(const PlannedPath& path) const {
+  std::size_t passed = 0;
+  return next_motion(situation_->pose, path, situation_->robot, passed).has_value();
+}
+
+bool FrontierGoals::is_given_up(const Frontier& frontier) const {
+  const double near = 3.0 * situation_->map.frame.resolution;
+  return std::ranges::any_of(given_up_, [&](const GivenUp& other) {
+    return (other.middle - frontier.middle).norm() < near &&
+           other.known == known_around(other.middle);
+  });
+}
+
+std::size_t FrontierGoals::known_around(const Vector2d& point) const {
+  const FloorMap& map = situation_->map;
+  const Vector2d cell = map.frame.to_cells(point).array().floor();
+  const int reach = static_cast<int>(kAround / map.frame.resolution);
+  const int middle_x = static_cast<int>(cell.x()), middle_y = static_cast<int>(cell.y());
+  std::size_t known = 0;
+  for (int y = middle_y - reach; y <= middle_y + reach; ++y) {
+    for (int x = middle_x - reach; x <= middle_x + reach; ++x) {
+      known += map.frame.contains(x, y) &&
+               map.cells[map.frame.index(x, y)] != CellState::unknown;
+    }
+  }
+  return known;
+}
+
+}  // namespace cairn::exploration

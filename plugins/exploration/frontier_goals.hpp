@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "cairn/exploration/explorer.hpp"
+#include "cairn/exploration/path_planner.hpp"
+
+namespace cairn::exploration {
+
+/// Paths to frontiers, for the explorers that drive there.
+///
+/// A frontier at which the robot is, at which it looks, and which is there still, is given up until
+/// the map around it changes: it would drive there for ever.
+class FrontierGoals {
+ public:
+  explicit FrontierGoals(std::unique_ptr<PathPlanner> planner) : planner_(std::move(planner)) {}
+
+  void begin() { given_up_.clear(); }
+  /// Looks at the frontiers of a situation, for those that follow.
+  void start(const Situation& situation);
+  /// Paths to the frontiers of at least this length [m].
+  std::vector<Candidate> candidates(double least);
+
+  /// Whether there is a frontier yet where the middle of one was.
+  static bool is_there(const FloorMap& map, const Eigen::Vector2d& middle);
+
+  /// Of the frontiers that the last `candidates` has seen, those without a path, and their longest.
+  std::size_t unreachable() const { return unreachable_; }
+  double longest_unreachable() const { return longest_unreachable_; }
+
+ private:
+  struct GivenUp {
+    Eigen::Vector2d middle;
+    std::size_t known;  ///< cells around it
+  };
+
+  std::optional<PlannedPath> path_to(const Frontier& frontier);
+  bool is_given_up(const Frontier& frontier) const;
+  std::size_t known_around(const Eigen::Vector2d& point) const;
+  bool moves(const PlannedPath& path) const;
+
+  std::unique_ptr<PathPlanner> planner_;
+  const Situation* situation_ = nullptr;
+  std::vector<GivenUp> given_up_;
+  std::size_t unreachable_ = 0;
+  double longest_unreachable_ = 0.0;
+};
+
+}  // namespace cairn::exploration

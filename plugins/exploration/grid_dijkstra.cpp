@@ -1,0 +1,187 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Paths over the cells of a map by Dijkstra's algorithm: once from where the robot is, for any
+// number of goals.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <queue>
+#include <utility>
+#include <vector>
+
+#include "cairn/exploration/path_planner.hpp"
+#include "cairn/grid/cell_traversal.hpp"
+#include "cairn/plugin/option_fields.hpp"
+#include "cairn/plugin/registry.hpp"
+
+namespace cairn::exploration {
+namespace {
+
+using Eigen::Vector2d;
+
+struct GridDijkstraOptions {
+  double margin = 0.2, weight = 2.0;
+
+  static auto fields() {
+    using O = GridDijkstraOptions;
+    return OptionFields<O>()
+        .real("margin", &O::margin, 0.0, 100.0,
+              "paths keep so much farther from obstacles where that is no great detour [m]")
+        .real("weight", &O::weight, 0.0, 1000.0,
+              "of a metre with none of that margin, in metres; 0: the shortest paths");
+  }
+};
+
+class GridDijkstra final : public PathPlanner {
+ public:
+  explicit GridDijkstra(const GridDijkstraOptions& options) : options_(options) {}
+
+  void start(const FloorMap& map, const Vector2d& from, double radius) override {
+    map_ = &map;
+    from_ = from;
+    needed_ = needed_clearance(radius, map.frame);
+    cost_.assign(map.cells.size(), kFar);
+    before_.assign(map.cells.size(), -1);
+    const Vector2d cell = map.frame.to_cells(from).array().floor();
+    const int x = static_cast<int>(cell.x()), y = static_cast<int>(cell.y());
+    if (map.frame.contains(x, y)) spread(static_cast<std::int32_t>(map.frame.index(x, y)));
+  }
+
+  std::optional<PlannedPath> path_to(const Vector2d& goal, double tolerance) override {
+    const std::int32_t last = nearest_view(goal, tolerance);
+    if (last < 0) return std::nullopt;
+    std::vector<std::int32_t> cells;
+    for (std::int32_t cell = last; cell >= 0; cell = before_[at(cell)]) cells.push_back(cell);
+    std::ranges::reverse(cells);
+    PlannedPath path{.points = straightened(cells), .length = 0.0, .look_at = goal};
+    for (std::size_t k = 1; k < path.points.size(); ++k)
+      path.length += (path.points[k] - path.points[k - 1]).norm();
+    return path;
+  }
+
+ private:
+  static constexpr float kFar = std::numeric_limits<float>::infinity();
+
+  static std::size_t at(std::int32_t cell) { return static_cast<std::size_t>(cell); }
+  int x_of(std::int32_t cell) const { return cell % map_->frame.width; }
+  int y_of(std::int32_t cell) const { return cell / map_->frame.width; }
+  Vector2d middle(std::int32_t cell) const { return map_->frame.centre(x_of(cell), y_of(cell)); }
+  bool stands(std::int32_t cell) const { return map_->clearance[at(cell)] >= needed_; }
+
+  /// Whether the body may go from one cell to the next: where it fits; and out of where it does
+  /// not, away from what is there.
+  bool passable(std::int32_t from, std::int32_t to) const {
+    if (stands(to)) return true;
+    return !stands(from) && map_->cells[at(to)] != CellState::occupied &&
+           map_->clearance[at(to)] >= map_->clearance[at(from)];
+  }
+
+  /// The cost of a metre at a cell.
+  double cost_at(std::int32_t cell) const {
+    if (options_.margin == 0.0) return 1.0;
+    const double lacking = needed_ + options_.margin - map_->clearance[at(cell)];
+    return 1.0 + options_.weight * std::clamp(lacking / options_.margin, 0.0, 1.0);
+  }
+
+  void spread(std::int32_t start) {
+    using Entry = std::pair<float, std::int32_t>;
+    std::priority_queue<Entry, std::vector<Entry>, std::greater<>> open;
+    cost_[at(start)] = 0.0F;
+    open.emplace(0.0F, start);
+    while (!open.empty()) {
+      const auto [cost, cell] = open.top();
+      open.pop();
+      if (cost > cost_[at(cell)]) continue;
+      for (int dy = -1; dy <= 1; ++dy) {
+        for (int dx = -1; dx <= 1; ++dx) {
+          if ((dx != 0 || dy != 0) && map_->frame.contains(x_of(cell) + dx, y_of(cell) + dy)) {
+            const std::int32_t next = cell + dy * map_->frame.width + dx;
+            if (lowers(cell, next, dx != 0 && dy != 0)) open.emplace(cost_[at(next)], next);
+          }
+        }
+      }
+    }
+  }
+
+  bool lowers(std::int32_t cell, std::int32_t next, bool diagonal) {
+    if (!passable(cell, next)) return false;
+    const double length = map_->frame.resolution * (diagonal ? std::sqrt(2.0) : 1.0);
+    const auto cost = static_cast<float>(cost_[at(cell)] + length * cost_at(next));
+    if (cost >= cost_[at(next)]) return false;
+    cost_[at(next)] = cost;
+    before_[at(next)] = cell;
+    return true;
+  }
+
+  bool all_free(const Vector2d& from, const Vector2d& to) const {
+    const GridFrame& frame = map_->frame;
+    return traverse_cells(frame.to_cells(from), frame.to_cells(to), [&](int x, int y) {
+      return frame.contains(x, y) && map_->cells[frame.index(x, y)] == CellState::free;
+    });
+  }
+
+  /// The cell nearest to the goal of those that can be reached and from which it can be seen.
+  std::int32_t nearest_view(const Vector2d& goal, double tolerance) const {
+    const GridFrame& frame = map_->frame;
+    const Vector2d cell = frame.to_cells(goal).array().floor();
+    const int reach = static_cast<int>(tolerance / frame.resolution);
+    const int middle_x = static_cast<int>(cell.x()), middle_y = static_cast<int>(cell.y());
+    std::int32_t best = -1;
+    double least = tolerance;
+    for (int y = middle_y - reach; y <= middle_y + reach; ++y) {
+      for (int x = middle_x - reach; x <= middle_x + reach; ++x) {
+        if (!frame.contains(x, y)) continue;
+        const auto index = static_cast<std::int32_t>(frame.index(x, y));
+        const double apart = (middle(index) - goal).norm();
+        if (apart < least && cost_[at(index)] < kFar && all_free(middle(index), goal)) {
+          best = index;
+          least = apart;
+        }
+      }
+    }
+    return best;
+  }
+
+  /// The corners of a polyline that comes no nearer to obstacles than the cells do, up to the
+  /// margin.
+  std::vector<Vector2d> straightened(const std::vector<std::int32_t>& cells) const {
+    std::vector<Vector2d> points{from_};
+    float least = kFar;  // clearance since the last corner
+    for (std::size_t k = 1; k < cells.size(); ++k) {
+      least = std::min(least, map_->clearance[at(cells[k])]);
+      const auto enough = std::min(least, static_cast<float>(needed_ + options_.margin));
+      if (k == 1 || clear(points.back(), middle(cells[k]), enough)) continue;
+      points.push_back(middle(cells[k - 1]));
+      least = std::min(map_->clearance[at(cells[k - 1])], map_->clearance[at(cells[k])]);
+    }
+    if (cells.size() > 1) points.push_back(middle(cells.back()));
+    return points;
+  }
+
+  bool clear(const Vector2d& from, const Vector2d& to, float enough) const {
+    const GridFrame& frame = map_->frame;
+    return traverse_cells(frame.to_cells(from), frame.to_cells(to), [&](int x, int y) {
+      return frame.contains(x, y) && map_->clearance[frame.index(x, y)] >= enough;
+    });
+  }
+
+  GridDijkstraOptions options_;
+  const FloorMap* map_ = nullptr;
+  Vector2d from_ = Vector2d::Zero();
+  double needed_ = 0.0;
+  std::vector<float> cost_;           ///< by cell, from the start [m, weighted]
+  std::vector<std::int32_t> before_;  ///< by cell, the one before it on the path; -1: none
+};
+
+}  // namespace
+}  // namespace cairn::exploration
+
+void cairn_register(cairn::Registrar& registrar) {
+  using namespace cairn;
+  using namespace cairn::exploration;
+  registrar.add<PathPlanner, GridDijkstraOptions>(
+      "grid_dijkstra",
+      [](const GridDijkstraOptions& options) { return std::make_unique<GridDijkstra>(options); });
+}
