@@ -63,6 +63,8 @@ class GridDijkstra final : public PathPlanner {
 
  private:
   static constexpr float kFar = std::numeric_limits<float>::infinity();
+  /// The cost of a metre where the body does not fit, which it leaves soon.
+  static constexpr double kTooNear = 10.0;
 
   static std::size_t at(std::int32_t cell) { return static_cast<std::size_t>(cell); }
   int x_of(std::int32_t cell) const { return cell % map_->frame.width; }
@@ -78,8 +80,19 @@ class GridDijkstra final : public PathPlanner {
            map_->clearance[at(to)] >= map_->clearance[at(from)];
   }
 
+  /// The same for a neighbour, between whose corners the body goes only where it may be on both
+  /// sides.
+  bool passable(std::int32_t from, int dx, int dy) const {
+    const GridFrame& frame = map_->frame;
+    if (!frame.contains(x_of(from) + dx, y_of(from) + dy)) return false;
+    const std::int32_t up = dy * frame.width;
+    return passable(from, from + dx + up) &&
+           (dx == 0 || dy == 0 || (passable(from, from + dx) && passable(from, from + up)));
+  }
+
   /// The cost of a metre at a cell.
   double cost_at(std::int32_t cell) const {
+    if (!stands(cell)) return kTooNear;
     if (options_.margin == 0.0) return 1.0;
     const double lacking = needed_ + options_.margin - map_->clearance[at(cell)];
     return 1.0 + options_.weight * std::clamp(lacking / options_.margin, 0.0, 1.0);
@@ -96,17 +109,15 @@ class GridDijkstra final : public PathPlanner {
       if (cost > cost_[at(cell)]) continue;
       for (int dy = -1; dy <= 1; ++dy) {
         for (int dx = -1; dx <= 1; ++dx) {
-          if ((dx != 0 || dy != 0) && map_->frame.contains(x_of(cell) + dx, y_of(cell) + dy)) {
-            const std::int32_t next = cell + dy * map_->frame.width + dx;
-            if (lowers(cell, next, dx != 0 && dy != 0)) open.emplace(cost_[at(next)], next);
-          }
+          if ((dx == 0 && dy == 0) || !passable(cell, dx, dy)) continue;
+          const std::int32_t next = cell + dy * map_->frame.width + dx;
+          if (lowers(cell, next, dx != 0 && dy != 0)) open.emplace(cost_[at(next)], next);
         }
       }
     }
   }
 
   bool lowers(std::int32_t cell, std::int32_t next, bool diagonal) {
-    if (!passable(cell, next)) return false;
     const double length = map_->frame.resolution * (diagonal ? std::sqrt(2.0) : 1.0);
     const auto cost = static_cast<float>(cost_[at(cell)] + length * cost_at(next));
     if (cost >= cost_[at(next)]) return false;
@@ -135,7 +146,8 @@ class GridDijkstra final : public PathPlanner {
         if (!frame.contains(x, y)) continue;
         const auto index = static_cast<std::int32_t>(frame.index(x, y));
         const double apart = (middle(index) - goal).norm();
-        if (apart < least && cost_[at(index)] < kFar && all_free(middle(index), goal)) {
+        if (apart < least && cost_[at(index)] < kFar && stands(index) &&
+            all_free(middle(index), goal)) {
           best = index;
           least = apart;
         }

@@ -20,7 +20,7 @@ namespace cairn {
 struct PlannedPath {
   std::vector<Eigen::Vector2d> points;     ///< of a polyline, from where the robot is [m]
   double length = 0.0;                     ///< [m]
-  std::optional<Eigen::Vector2d> look_at;  ///< towards which the robot turns at its end [m]
+  std::optional<Eigen::Vector2d> look_at = {};  ///< towards which the robot turns at its end [m]
 };
 
 /// How near an obstacle, or an unknown cell, the centre of a round body may come: its radius and

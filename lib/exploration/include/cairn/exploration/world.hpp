@@ -43,7 +43,7 @@ struct RobotModel {
 /// Where a run begins.
 struct WorldStart {
   const OccupancyGrid* floor = nullptr;  ///< to drive on; a robot that is not simulated has its own
-  std::optional<Pose2> pose;             ///< in the frame of the floor; none: the world chooses
+  std::optional<Pose2> pose = {};        ///< in the frame of the floor; none: the world chooses
   std::uint64_t seed = 1;                ///< of all noise
 };
 

@@ -1,0 +1,199 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <atomic>
+#include <cmath>
+#include <memory>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "cairn/exploration/exploration.hpp"
+#include "cairn/grid/floor_plan.hpp"
+#include "cairn/plugin/registry.hpp"
+#include "unit/lib/exploration/drawn_map.hpp"
+
+namespace cairn {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr const char* kExact =
+    "lidar_building:relative=0,sigma_xy=1e-6,sigma_theta=1e-6,range_sigma=0";
+constexpr const char* kNoisy = "lidar_building:relative=0.05";
+constexpr const char* kMatcher =
+    "simulated:range=1.4,angle=0.35,sigma_translation=0.02,sigma_rotation=0.002";
+
+/// The parts of a run, by name.
+struct Parts {
+  explicit Parts(const std::string& world_name, const std::string& explorer_name = "frontier")
+      : world(make<World>(world_name)),
+        policy(make<PosePolicy>("compact_pose:range=1,angle=0.35,reuse=false")),
+        registration(make<Registration>(kMatcher)),
+        mapper(make<Mapper>("log_odds")),
+        explorer(make<Explorer>(explorer_name)) {}
+
+  template <class Interface>
+  std::unique_ptr<Interface> make(const std::string& name) {
+    return registry.make<Interface>(parse_component(name));
+  }
+
+  Exploration on(const OccupancyGrid& floor, std::uint64_t seed = 1) {
+    return {.world = *world,
+            .policy = *policy,
+            .registration = *registration,
+            .mapper = *mapper,
+            .explorer = *explorer,
+            .registry = registry,
+            .start = {.floor = &floor, .pose = {}, .seed = seed},
+            .limits = {}};
+  }
+
+  Registry registry;
+  std::unique_ptr<World> world;
+  std::unique_ptr<PosePolicy> policy;
+  std::unique_ptr<Registration> registration;
+  std::unique_ptr<Mapper> mapper;
+  std::unique_ptr<Explorer> explorer;
+};
+
+OccupancyGrid floor_named(const std::string& name, std::uint64_t seed) {
+  return Registry().make<FloorPlan>(parse_component(name))->generate(seed);
+}
+
+class GeneratedFloors : public testing::TestWithParam<const char*> {};
+
+TEST_P(GeneratedFloors, WithoutNoiseAllIsSeenAndNothingIsTouched) {
+  const OccupancyGrid floor = floor_named(GetParam(), 3);
+  Parts parts(kExact);
+  const ExplorationResult result = run_exploration(parts.on(floor));
+  EXPECT_EQ(result.end, ExplorationEnd::finished) << result.why;
+  EXPECT_EQ(result.collisions, 0);
+  ASSERT_TRUE(result.against);
+  EXPECT_GE(result.against->seen, 0.99 * result.against->floor);
+  EXPECT_LE(result.against->occupied_wrong, 0.001 * result.against->floor);
+  EXPECT_TRUE(result.converged);
+  EXPECT_EQ(result.trajectory.variable_count(), result.truth_trajectory.variable_count());
+  EXPECT_EQ(result.steps.size(), static_cast<std::size_t>(result.trajectory.variable_count()));
+}
+
+INSTANTIATE_TEST_SUITE_P(Plans, GeneratedFloors,
+                         testing::Values("rooms:width=14,height=10", "corridor:width=20,height=10",
+                                         "loop:width=16,height=12", "cave:width=12,height=12"));
+
+/// Everything but times.
+void expect_equal(const ExplorationResult& a, const ExplorationResult& b) {
+  ASSERT_EQ(a.steps.size(), b.steps.size());
+  for (std::size_t k = 0; k < a.steps.size(); ++k) {
+    ASSERT_EQ(a.steps[k].estimate.x(), b.steps[k].estimate.x());
+    ASSERT_EQ(a.steps[k].map_entropy, b.steps[k].map_entropy);
+    ASSERT_EQ(a.steps[k].trajectory_entropy, b.steps[k].trajectory_entropy);
+  }
+  EXPECT_EQ(a.why, b.why);
+  EXPECT_EQ(a.loops, b.loops);
+  EXPECT_EQ(a.map.log_odds, b.map.log_odds);
+}
+
+TEST(Exploration, TheSameSeedGivesTheSameRun) {
+  const OccupancyGrid floor = floor_named("rooms:width=12,height=9", 5);
+  for (const char* explorer : {"frontier", "random"}) {
+    Parts first(kNoisy, explorer), second(kNoisy, explorer), other(kNoisy, explorer);
+    Exploration a = first.on(floor, 7), b = second.on(floor, 7), c = other.on(floor, 8);
+    a.limits.distance = b.limits.distance = c.limits.distance = 15.0;
+    const ExplorationResult run = run_exploration(a);
+    expect_equal(run, run_exploration(b));
+    EXPECT_NE(run.steps.back().estimate.x(), run_exploration(c).steps.back().estimate.x());
+  }
+}
+
+TEST(Exploration, LimitsEndARun) {
+  const OccupancyGrid floor = floor_named("rooms:width=12,height=9", 5);
+  const auto run = [&](const ExplorationLimits& limits) {
+    Parts parts(kNoisy);
+    Exploration exploration = parts.on(floor);
+    exploration.limits = limits;
+    return run_exploration(exploration);
+  };
+  const ExplorationResult far = run({.distance = 5.0});
+  EXPECT_EQ(far.end, ExplorationEnd::limit);
+  EXPECT_GE(far.steps.back().distance, 5.0);
+  EXPECT_LT(far.steps.back().distance, 6.0);
+  EXPECT_THAT(far.why, HasSubstr("5 m"));
+  EXPECT_EQ(run({.steps = 7}).steps.size(), 8U);
+  EXPECT_EQ(run({.decisions = 2}).decision_seconds.size(), 2U);
+}
+
+TEST(Exploration, AnInterruptEndsItWithItsResults) {
+  const OccupancyGrid floor = floor_named("rooms:width=12,height=9", 5);
+  Parts parts(kNoisy);
+  Exploration exploration = parts.on(floor);
+  std::atomic<bool> interrupt{false};
+  exploration.interrupt = &interrupt;
+  exploration.moved = [&](const ExplorationStep& step, const FloorMap&) {
+    interrupt = step.step == 10;
+  };
+  const ExplorationResult result = run_exploration(exploration);
+  EXPECT_EQ(result.end, ExplorationEnd::interrupted);
+  EXPECT_EQ(result.steps.size(), 11U);
+  EXPECT_EQ(result.trajectory.variable_count(), 11);
+  EXPECT_GT(result.map.coverage(), 0.0);
+}
+
+/// Drives back and forth between two places.
+class Pendulum final : public Explorer {
+ public:
+  void begin(std::uint64_t) override {}
+  Decision decide(const Situation& situation) override {
+    Decision decision;
+    const double side = situation.decision % 2 == 0 ? 1.0 : -1.0;
+    const Eigen::Vector2d at = situation.pose.translation();
+    decision.candidates.push_back({{.points = {at, at + Eigen::Vector2d(side, 0.0)}}, 0.0, ""});
+    return decision;
+  }
+};
+
+/// Stays where it is.
+class Idler final : public Explorer {
+ public:
+  void begin(std::uint64_t) override {}
+  Decision decide(const Situation& situation) override {
+    Decision decision;
+    decision.candidates.push_back({{.points = {situation.pose.translation()}}, 0.0, ""});
+    return decision;
+  }
+};
+
+TEST(Exploration, ARunWithoutProgressIsStuckAndSaysWhy) {
+  const OccupancyGrid floor = floor_named("rooms:width=12,height=9", 5);
+  {
+    Parts parts(kExact);
+    parts.explorer = std::make_unique<Pendulum>();
+    const ExplorationResult result = run_exploration(parts.on(floor));
+    EXPECT_EQ(result.end, ExplorationEnd::stuck);
+    EXPECT_THAT(result.why, HasSubstr("50 m were driven"));
+    EXPECT_LT(result.steps.back().distance, 60.0);
+  }
+  Parts parts(kExact);
+  parts.explorer = std::make_unique<Idler>();
+  const ExplorationResult result = run_exploration(parts.on(floor));
+  EXPECT_EQ(result.end, ExplorationEnd::stuck);
+  EXPECT_THAT(result.why, HasSubstr("led to no motion"));
+}
+
+TEST(Exploration, LoopsKeepAnUncertainRobotNearTheTruth) {
+  const OccupancyGrid floor = floor_named("loop:width=16,height=12", 3);
+  const auto error = [&](const char* registration) {
+    Parts parts("lidar_building:relative=0.1,sigma_theta=0.02");
+    parts.registration = parts.make<Registration>(registration);
+    Exploration exploration = parts.on(floor, 4);
+    exploration.limits.distance = 60.0;
+    const ExplorationResult result = run_exploration(exploration);
+    double sum = 0.0;
+    for (const ExplorationStep& step : result.steps)
+      sum += (step.estimate.translation() - step.truth->translation()).norm();
+    return sum / static_cast<double>(result.steps.size());
+  };
+  EXPECT_LT(error(kMatcher), 0.5 * error("simulated:range=0.001"));
+}
+
+}  // namespace
+}  // namespace cairn
