@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "cairn/plugin/registry.hpp"
+#include "integration/process.hpp"
+
+namespace cairn::test {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+constexpr const char* kFloor = "@rooms:width=10,height=8,seed=2";
+constexpr const char* kMatcher =
+    "simulated:range=1.4,angle=0.35,sigma_translation=0.01,sigma_rotation=0.002";
+
+class Explore : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    const Registry registry;
+    for (const auto& [kind, name] :
+         {std::pair{"world", "lidar_building"}, {"mapper", "log_odds"}, {"explorer", "frontier"},
+          {"path_planner", "grid_dijkstra"}, {"floor_plan", "rooms"},
+          {"floor_surveyor", "round_body"}, {"pose_policy", "compact_pose"},
+          {"registration", "simulated"}, {"grid_format", "ros"}, {"format", "g2o"}}) {
+      if (!registry.has(kind, name)) GTEST_SKIP() << "built without " << name;
+    }
+  }
+  static Outcome explore(std::vector<std::string> more) {
+    std::vector<std::string> words{"explore", kFloor, "--registration", kMatcher};
+    words.insert(words.end(), more.begin(), more.end());
+    return cairn(words);
+  }
+  TemporaryFolder folder_;
+};
+
+TEST_F(Explore, SaysInFiveLinesWhatHappenedAndWritesAllOfIt) {
+  const std::string graph = folder_.file("run.g2o"), map = folder_.file("map.yaml"),
+                    all = folder_.file("all.g2o"), truth = folder_.file("truth.g2o"),
+                    steps = folder_.file("run.csv"), report = folder_.file("run.json");
+  const Outcome run = explore({"-o", graph, "--map", map, "--trajectory", all, "--truth", truth,
+                               "--steps", steps, "--json", report});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  for (const char* line : {"end ", "drive ", "map ", "graph ", "time "})
+    EXPECT_THAT(run.out, HasSubstr(line));
+  const auto said = parse_json(read_text(report)).as_object();
+  EXPECT_EQ(said.at("command"), "explore");
+  EXPECT_EQ(said.at("end"), "finished");
+  const auto& truth_of_map = said.at("map").at("truth");
+  EXPECT_GT(truth_of_map.at("seen").to_number<double>(),
+            0.98 * truth_of_map.at("floor").to_number<double>());
+  // The steps' last row is what the report says, and the files are what other commands read.
+  std::istringstream rows(read_text(steps));
+  std::string row, last;
+  int count = -2;  // the title and the start
+  while (std::getline(rows, row)) ++count, last = row;
+  EXPECT_EQ(count, said.at("motions").to_number<int>());
+  const Outcome errors = cairn({"evaluate", all, truth, "--json", "-"});
+  ASSERT_EQ(errors.exit_code, 0) << errors.err;
+  EXPECT_EQ(cairn({"optimize", graph}).exit_code, 0);
+  const Outcome floor = cairn({"info", map});
+  EXPECT_EQ(floor.exit_code, 0) << floor.err;
+}
+
+TEST_F(Explore, TheSameCommandGivesTheSameRun) {
+  const std::string first = folder_.file("a.csv"), second = folder_.file("b.csv"),
+                    other = folder_.file("c.csv");
+  for (const auto& [file, seed, threads] : {std::tuple{first, "3", "1"}, {second, "3", "2"},
+                                            {other, "4", "1"}}) {
+    ASSERT_EQ(explore({"--steps", file, "--seed", seed, "--threads", threads, "--until",
+                       "distance=12"})
+                  .exit_code,
+              0);
+  }
+  EXPECT_EQ(read_text(first), read_text(second));
+  EXPECT_NE(read_text(first), read_text(other));
+}
+
+TEST_F(Explore, OptionsOfRobotAndLimitsAreTaken) {
+  const std::string report = folder_.file("run.json");
+  const Outcome run = explore({"--until", "steps=5", "--lidar", "fov=90,range=3,beams=31",
+                               "--odometry", "relative=0.2", "--start-x", "2", "--start-y", "2",
+                               "--start-theta", "1.5", "--explorer", "random", "--json", report});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_THAT(run.out, HasSubstr("limit: 5 motions are made"));
+  const auto said = parse_json(read_text(report)).as_object();
+  EXPECT_EQ(said.at("motions"), 5);
+  EXPECT_THAT(std::string(said.at("world").as_string()),
+              AllOf(HasSubstr("fov=90"), HasSubstr("relative=0.2")));
+}
+
+TEST_F(Explore, WhatCannotWorkIsRefusedBeforeTheWork) {
+  const auto refusal = [&](std::vector<std::string> more, int code) {
+    const Outcome run = explore(std::move(more));
+    EXPECT_EQ(run.exit_code, code) << run.err;
+    return run.err;
+  };
+  EXPECT_THAT(refusal({"--until", "distance=-3"}, 2), HasSubstr("above zero"));
+  EXPECT_THAT(refusal({"--until", "hours=3"}, 2), HasSubstr("distance"));
+  EXPECT_THAT(refusal({"--explorer", "frontir"}, 5), HasSubstr("frontier"));
+  EXPECT_THAT(refusal({"--lidar", "beams=0"}, 2), HasSubstr("beams"));
+  EXPECT_THAT(refusal({"--lidar", "fov=90", "--world", "lidar_building:fov=100"}, 2),
+              HasSubstr("give one"));
+  EXPECT_THAT(refusal({"--map", folder_.file("map.g2o")}, 2), HasSubstr("map.yaml"));
+  EXPECT_THAT(refusal({"--start-x", "0", "--start-y", "0"}, 3), HasSubstr("in a wall"));
+  EXPECT_THAT(refusal({"--start-x", "1"}, 2), HasSubstr("go together"));
+  EXPECT_THAT(refusal({"--world", "lidar_building:radius=5"}, 3), HasSubstr("radius"));
+  EXPECT_EQ(cairn({"explore", folder_.file("none.yaml"), "--registration", kMatcher}).exit_code, 3);
+  EXPECT_TRUE(folder_.contents().empty());
+}
+
+}  // namespace
+}  // namespace cairn::test
