@@ -29,7 +29,7 @@ struct LidarBuildingOptions {
   int beams = 181;
   double range = 8.0, range_sigma = 0.01, dropouts = 0.0;
   double sigma_xy = 0.01, sigma_theta = 0.005, relative = 0.05;
-  double radius = 0.2, step = 0.5, turn = 0.35;
+  double radius = 0.2, step = 0.5, turn = 0.3;
   std::string surveyor = "round_body";
 
   static auto fields() {

@@ -28,6 +28,9 @@ constexpr double kConverged = 1e-6;
 /// Of covariances at a new linearisation, as a fraction of the largest variance: rounding, times
 /// the condition of H.
 constexpr double kCovarianceRounding = 1e-4;
+/// Relative change of a covariance per unit of a step [1/m, 1/rad], generously: what is measured is
+/// about a metre away.
+constexpr double kLargestChange = 10.0;
 
 std::vector<double> copy(std::span<const double> x) { return {x.begin(), x.end()}; }
 
@@ -410,7 +413,11 @@ void IncrementalLife::expect_minimum(double fraction, double slack) {
 void IncrementalLife::expect_covariances(const Graph& graph, double tolerance) {
   const test::DenseSystem system = test::dense_system(graph);
   const MatrixXd Sigma = system.rows.empty() ? MatrixXd() : system.Sigma();
-  const double allowed = tolerance * (Sigma.size() > 0 ? Sigma.diagonal().maxCoeff() : 1.0);
+  // It is that of the last linearisation, a step before the estimate: where Gauss-Newton converges
+  // slowly, in large residuals, that step is no rounding, and blocks change with it in proportion.
+  const double step = Sigma.size() > 0 ? (Sigma * system.g).norm() : 0.0;
+  const double allowed = (tolerance + kLargestChange * step) *
+                         (Sigma.size() > 0 ? Sigma.diagonal().maxCoeff() : 1.0);
   for (int a = 0; a < graph.variable_count(); ++a) {
     for (int b = 0; b < graph.variable_count(); ++b) {
       MatrixXd wanted = MatrixXd::Zero(graph.type(a).tangent_size(), graph.type(b).tangent_size());
