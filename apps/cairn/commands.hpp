@@ -28,6 +28,7 @@ Command add_marginals(ArgumentParser program);
 Command add_compact(ArgumentParser program);
 Command add_sparsify(ArgumentParser program);
 Command add_explore(ArgumentParser program);
+Command add_map(ArgumentParser program);
 Command add_study(ArgumentParser program);
 Command add_evaluate(ArgumentParser program);
 Command add_view(ArgumentParser program);

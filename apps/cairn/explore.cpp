@@ -169,15 +169,9 @@ class ExploreProgress {
 };
 
 void check(const ExploreOptions& options, Session& session) {
-  if (!options.map.empty() && !names_grid(options.map, session.registry())) {
-    throw Error(ErrorCode::usage,
-                fmt::format("--map: {}: a map is written to a file with its ending: map.yaml (with "
-                            "map.png beside it)",
-                            options.map));
-  }
+  if (!options.map.empty()) check_map_file(options.map, "--map", session);
   for (const std::string& graph : {options.output, options.trajectory, options.truth})
     check_output(graph, "", session, false);
-  if (!options.map.empty()) check_file(grid_file(options.map).string(), session);
   check_file(options.steps, session);
 }
 
@@ -195,12 +189,8 @@ void write_outputs(const ExploreOptions& options, const ExploreOutcome& outcome,
   results.write(options.steps, [&] { write_file(options.steps, steps_csv(result)); });
   results.add([&] { session.write_json(report_json(outcome)); });
   results.add([&] {
-    if (is_terminal(stdout)) {
-      const auto points = positions(result.steps);
-      session.print(floor_text(
-          {.map = result.map, .trajectory = points, .robot = points.back(), .path = {}},
-          output_width(), output_width() / 3, session.colour()));
-    }
+    const auto points = positions(result.steps);
+    print_floor({.map = result.map, .trajectory = points, .robot = points.back()}, session);
     session.print(summary_text(outcome));
   });
 }

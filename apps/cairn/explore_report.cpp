@@ -44,7 +44,7 @@ json::object map_json(const ExplorationResult& result) {
                    {"coverage", result.map.coverage()},
                    {"entropy", result.map.entropy()},
                    {"error", result.map_error},
-                   {"rebuilt", result.rebuilt}};
+                   {"rebuilt", result.slam.rebuilt}};
   if (result.against) {
     map["truth"] = {{"floor", result.against->floor},
                     {"seen", result.against->seen},
@@ -86,9 +86,9 @@ json::object report_json(const ExploreOutcome& outcome) {
   report["collisions"] = result.collisions;
   report["poses"] = result.trajectory.variable_count();
   report["kept"] = result.graph.variable_count();
-  report["loops"] = {{"proposed", result.proposed},
-                     {"matched", result.registered},
-                     {"linked", result.loops}};
+  report["loops"] = {{"proposed", result.slam.proposed},
+                     {"matched", result.slam.registered},
+                     {"linked", result.slam.loops}};
   report["converged"] = result.converged;
   report["trajectory_entropy"] = number_json(last.trajectory_entropy);
   report["map"] = map_json(result);
@@ -98,9 +98,9 @@ json::object report_json(const ExploreOutcome& outcome) {
                        {"ate_rotation", error->ate_rotation}};
   }
   report["seconds"] = {{"decide", result.decide_seconds},
-                       {"map", result.map_seconds},
-                       {"policy", result.policy_seconds},
-                       {"registration", result.registration_seconds}};
+                       {"map", result.slam.map_seconds},
+                       {"policy", result.slam.policy_seconds},
+                       {"registration", result.slam.registration_seconds}};
   report["notes"] = strings_json(result.notes);
   report["steps"] = steps_json(result);
   return report;
@@ -143,16 +143,16 @@ std::string summary_text(const ExploreOutcome& outcome) {
   table.add({"map", map});
   std::string poses = fmt::format("{} of {} kept, {}", result.graph.variable_count(),
                                   plural(result.trajectory.variable_count(), "pose"),
-                                  plural(result.loops, "loop closure"));
+                                  plural(result.slam.loops, "loop closure"));
   if (const auto error = error_of(result))
     poses += fmt::format("; error {:.3f} m, {:.2f}° (ATE)", error->ate_translation,
                          error->ate_rotation);
   table.add({"graph", poses});
   table.add({"time", fmt::format("{} deciding, {} mapping, {} estimating, {} matching scans",
                                  seconds_text(result.decide_seconds),
-                                 seconds_text(result.map_seconds),
-                                 seconds_text(result.policy_seconds),
-                                 seconds_text(result.registration_seconds))});
+                                 seconds_text(result.slam.map_seconds),
+                                 seconds_text(result.slam.policy_seconds),
+                                 seconds_text(result.slam.registration_seconds))});
   return table.text(false);
 }
 

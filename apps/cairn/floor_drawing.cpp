@@ -4,11 +4,13 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <cstdio>
 #include <vector>
 
 #include <fmt/format.h>
 
 #include "cairn/grid/cell_traversal.hpp"
+#include "table.hpp"
 
 namespace cairn::app {
 namespace {
@@ -147,6 +149,11 @@ std::string floor_text(const FloorDrawing& drawing, std::size_t width, std::size
                 std::max<std::size_t>(height, 1) * (colour ? 2 : 1), colour ? 1.0 : 2.0);
   draw(drawing, canvas);
   return colour ? in_half_blocks(canvas) : in_letters(canvas);
+}
+
+void print_floor(const FloorDrawing& drawing, const Session& session) {
+  if (!is_terminal(stdout)) return;
+  session.print(floor_text(drawing, output_width(), output_width() / 3, session.colour()));
 }
 
 }  // namespace cairn::app

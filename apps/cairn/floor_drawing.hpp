@@ -9,6 +9,7 @@
 #include <Eigen/Core>
 
 #include "cairn/exploration/floor_map.hpp"
+#include "session.hpp"
 
 namespace cairn::app {
 
@@ -25,5 +26,8 @@ struct FloorDrawing {
 /// where the robot was, '@' where it is, and a character is as high as two are wide.
 std::string floor_text(const FloorDrawing& drawing, std::size_t width, std::size_t height,
                        bool colour);
+
+/// Prints it where standard output is a terminal.
+void print_floor(const FloorDrawing& drawing, const Session& session);
 
 }  // namespace cairn::app

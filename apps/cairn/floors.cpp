@@ -126,6 +126,16 @@ json::object frame_json(const std::string& name, const GridFrame& frame) {
           {"origin", {frame.origin.x(), frame.origin.y(), frame.yaw}}};
 }
 
+void check_map_file(const std::string& file, const char* option, Session& session) {
+  if (file == "-" || !names_grid(file, session.registry())) {
+    throw Error(ErrorCode::usage,
+                fmt::format("{} {}: a map is written to a file with its ending: map.yaml (with "
+                            "map.png beside it)",
+                            option, file));
+  }
+  check_file(grid_file(file).string(), session);
+}
+
 bool names_floor_plan(const std::string& kind, Session& session) {
   const std::string name = kind.substr(0, kind.find(':'));
   const Registry& registry = session.registry();

@@ -24,6 +24,9 @@ OccupancyGrid load_floor(const std::string& name, Session& session);
 std::string size_text(const GridFrame& frame);
 boost::json::object frame_json(const std::string& name, const GridFrame& frame);
 
+/// Throws `Error` (usage, input) where a map cannot be written to that file, which `option` names.
+void check_map_file(const std::string& file, const char* option, Session& session);
+
 struct FloorInfoOptions {
   double radius = 0.2;                         ///< of a robot's body [m]
   std::optional<double> start_x{}, start_y{};  ///< [m]

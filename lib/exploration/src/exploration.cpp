@@ -3,23 +3,19 @@
 
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <cmath>
 #include <utility>
 
 #include <fmt/core.h>
 
 #include "cairn/evaluation/trajectory.hpp"
+#include "cairn/exploration/scan_slam.hpp"
 #include "cairn/grid/cell_traversal.hpp"
 #include "cairn/runtime/plugin_call.hpp"
 #include "cairn/runtime/timed.hpp"
-#include "cairn/typed/build.hpp"
-#include "scan_poses.hpp"
 
 namespace cairn {
 namespace {
-
-using Clock = std::chrono::steady_clock;
 
 /// So many motions in a row that move the robot by less than these, and so many decisions in a row
 /// that lead to no motion: then it is stuck.
@@ -53,7 +49,10 @@ bool is_open(const FloorMap& map, const Pose2& at, const PlannedPath& path, std:
 
 class Run {
  public:
-  explicit Run(const Exploration& parts) : parts_(parts), robot_(parts.world.robot()) {}
+  explicit Run(const Exploration& parts)
+      : parts_(parts),
+        robot_(parts.world.robot()),
+        slam_({parts.policy, parts.registration, parts.mapper, parts.registry}) {}
 
   ExplorationResult run() {
     begin();
@@ -72,96 +71,33 @@ class Run {
   }
 
  private:
-  // Poses and maps --------------------------------------------------------------------------------
-
   void begin() {
     LaserScan scan = parts_.world.begin(parts_.start);
     const std::optional<Pose2> truth = parts_.world.truth();
-    estimate_ = truth.value_or(parts_.start.pose.value_or(Pose2()));
-    start_ = estimate_;
-    begin_registration();
-    Variable first = make_variable(0, estimate_, parts_.registry);
-    first.fixed = true;
-    take(first, {}, std::move(scan));
+    start_ = truth.value_or(parts_.start.pose.value_or(Pose2()));
+    slam_.begin(start_, std::move(scan), robot_.odometry, Pose2(robot_.step, 0.0, 0.0), truth);
     parts_.explorer.begin(parts_.start.seed);
     record(0.0);
-  }
-
-  /// A registration learns from two poses which types there are, and how accurate odometry is.
-  void begin_registration() {
-    const Pose2 motion(robot_.step, 0.0, 0.0);
-    sample_.add(make_variable(0, Pose2(), parts_.registry));
-    sample_.add(make_variable(1, motion, parts_.registry));
-    sample_.add(odometry_factor(0, 1, motion, robot_.odometry.covariance(motion)));
-    parts_.registration.begin(
-        {.recording = &sample_, .truth = parts_.world.truth() ? &result_.truth_trajectory : nullptr});
-    scans_to_ = query<ScanRegistration>(parts_.registration);
-  }
-
-  Factor odometry_factor(Id from, Id to, const Pose2& motion, const Eigen::Matrix3d& covariance) {
-    return make_factor(Between(from, to, motion), Information::covariance(covariance), nullptr,
-                       parts_.registry);
-  }
-
-  /// A pose with its scan, through the policy and into the map.
-  void take(const Variable& pose, std::span<const Factor> odometry, LaserScan scan) {
-    if (const std::optional<Pose2> truth = parts_.world.truth())
-      result_.truth_trajectory.add(make_variable(pose.id, *truth, parts_.registry));
-    if (scans_to_) scans_to_->take(pose.id, scan);
-    scans_.push_back(scan);
-    const auto began = Clock::now();
-    const PoseReport report =
-        process_pose(pose, odometry, parts_.policy, parts_.registration);
-    result_.policy_seconds += report.seconds.total;
-    result_.registration_seconds += seconds_since(began) - report.seconds.total;
-    const int linked = count_links(report);
-    result_.loops += linked;
-    for (const std::string& note : report.notes) note_once(note);
-    where_.add(report, parts_.policy);
-    Timed timed(result_.map_seconds);
-    parts_.mapper.add(where_.all().back(), std::move(scan));
-    if (linked > 0) follow_estimate();
-    estimate_ = where_.all().back();
-  }
-
-  int count_links(const PoseReport& report) {
-    int linked = 0;
-    for (const LinkReport& link : report.links) {
-      ++result_.proposed;
-      result_.registered += link.verdict != LinkVerdict::unmatched;
-      linked += link.verdict == LinkVerdict::linked;
-    }
-    return linked;
-  }
-
-  void follow_estimate() {
-    where_.update(parts_.policy);
-    result_.rebuilt += parts_.mapper.move(where_.all());
   }
 
   void note_once(const std::string& note) {
     if (std::ranges::find(result_.notes, note) == result_.notes.end()) result_.notes.push_back(note);
   }
 
-  const FloorMap& map() {
-    Timed timed(result_.map_seconds);
-    return parts_.mapper.map();
-  }
-
   void record(double driven) {
-    const FloorMap& map = this->map();
+    const FloorMap& map = slam_.map();
     const std::vector<Id> kept = parts_.policy.kept();
     ExplorationStep step{.step = static_cast<int>(result_.steps.size()),
                          .decision = decisions_,
                          .distance = driven,
-                         .estimate = estimate_,
+                         .estimate = slam_.pose(),
                          .truth = parts_.world.truth(),
                          .coverage = map.coverage(),
                          .map_entropy = map.entropy(),
                          .trajectory_entropy = trajectory_entropy(parts_.policy.estimator(), kept,
                                                                   parts_.first_sigma),
                          .kept = static_cast<int>(kept.size()),
-                         .loops = result_.loops,
+                         .loops = slam_.counts().loops,
                          .collisions = result_.collisions};
     if (!result_.steps.empty()) step.distance += result_.steps.back().distance;
     watch_progress(step);
@@ -201,7 +137,7 @@ class Run {
   }
 
   Decision decide() {
-    const FloorMap& map = this->map();
+    const FloorMap& map = slam_.map();
     const std::vector<Id> kept = parts_.policy.kept();
     double seconds = 0.0;
     Decision decision = [&] {
@@ -220,7 +156,7 @@ class Run {
   Situation situation(const FloorMap& map, std::span<const Id> kept) {
     return {.estimator = parts_.policy.estimator(),
             .poses = kept,
-            .pose = estimate_,
+            .pose = slam_.pose(),
             .map = map,
             .robot = robot_,
             .decision = decisions_};
@@ -230,7 +166,7 @@ class Run {
     std::size_t passed = 0;
     bool moved = false;
     while (check_limits()) {
-      const std::optional<Pose2> motion = next_motion(estimate_, path, robot_, passed);
+      const std::optional<Pose2> motion = next_motion(slam_.pose(), path, robot_, passed);
       if (!motion) break;
       moved = true;
       if (!move(*motion) || !goes_on(path, passed)) break;
@@ -240,8 +176,8 @@ class Run {
 
   /// Whether the rest of a path can be driven, and is worth it.
   bool goes_on(const PlannedPath& path, std::size_t passed) {
-    const FloorMap& map = this->map();
-    if (!is_open(map, estimate_, path, passed, robot_.radius)) return false;
+    const FloorMap& map = slam_.map();
+    if (!is_open(map, slam_.pose(), path, passed, robot_.radius)) return false;
     const std::vector<Id> kept = parts_.policy.kept();
     Timed timed(result_.decide_seconds);
     return call_plugin([] { return std::string("explorer"); },
@@ -253,16 +189,13 @@ class Run {
     WorldStep step = parts_.world.move(motion);
     result_.collisions += step.collided;
     const double driven = step.odometry.translation().norm();
-    const bool idle = std::max(std::hypot(driven, 0.0), std::abs(step.odometry.theta())) < kNoMotion;
+    const bool idle = std::max(driven, std::abs(step.odometry.theta())) < kNoMotion;
     idle_ = idle ? idle_ + 1 : 0;
-    const Pose2 expected = estimate_ * step.odometry;
-    const auto id = static_cast<Id>(scans_.size());
-    const std::array odometry{odometry_factor(id - 1, id, step.odometry, step.covariance)};
-    const Variable pose{make_variable<Pose2>(id, parts_.registry)};
-    take(pose, odometry, std::move(step.scan));
+    const Pose2 expected = slam_.pose() * step.odometry;
+    slam_.add(step.odometry, step.covariance, std::move(step.scan), parts_.world.truth());
     record(driven);
-    const double jump = (estimate_.translation() - expected.translation()).norm();
-    return !step.collided && jump <= map().frame.resolution;
+    const double jump = (slam_.pose().translation() - expected.translation()).norm();
+    return !step.collided && jump <= slam_.map().frame.resolution;
   }
 
   void watch_progress(const ExplorationStep& step) {
@@ -275,12 +208,14 @@ class Run {
   // The end ---------------------------------------------------------------------------------------
 
   void finish() {
-    result_.converged = parts_.policy.finish();
-    follow_estimate();
-    result_.map = map();
+    result_.converged = slam_.finish();
+    for (const std::string& note : slam_.counts().notes) note_once(note);
+    result_.map = slam_.map();
+    result_.slam = slam_.counts();
     result_.graph = parts_.policy.estimator().graph();
     result_.trajectory = recovered_trajectory(parts_.policy, Recovery::distribute);
-    result_.map_error = contradicted_area(result_.map, scans_, where_.all());
+    result_.truth_trajectory = slam_.truth().clone();
+    result_.map_error = contradicted_area(result_.map, slam_.scans(), slam_.poses());
     if (parts_.start.floor && parts_.world.truth())
       result_.against = compare_with_floor(result_.map, *parts_.start.floor, alignment(),
                                            start_.translation());
@@ -297,12 +232,9 @@ class Run {
 
   const Exploration& parts_;
   RobotModel robot_;
+  ScanSlam slam_;
   ExplorationResult result_;
-  Graph sample_;  ///< what the registration begins with
-  ScanRegistration* scans_to_ = nullptr;
-  std::vector<LaserScan> scans_;
-  ScanPoses where_;
-  Pose2 start_, estimate_;
+  Pose2 start_;
   bool ended_ = false;
   int decisions_ = 0, empty_decisions_ = 0, idle_ = 0;
   double most_coverage_ = 0.0, useful_distance_ = 0.0;

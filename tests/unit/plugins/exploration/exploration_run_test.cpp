@@ -89,7 +89,7 @@ void expect_equal(const ExplorationResult& a, const ExplorationResult& b) {
     ASSERT_EQ(a.steps[k].trajectory_entropy, b.steps[k].trajectory_entropy);
   }
   EXPECT_EQ(a.why, b.why);
-  EXPECT_EQ(a.loops, b.loops);
+  EXPECT_EQ(a.slam.loops, b.slam.loops);
   EXPECT_EQ(a.map.log_odds, b.map.log_odds);
 }
 

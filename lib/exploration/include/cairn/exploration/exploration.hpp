@@ -13,6 +13,7 @@
 #include "cairn/exploration/explorer.hpp"
 #include "cairn/exploration/floor_map.hpp"
 #include "cairn/exploration/map_truth.hpp"
+#include "cairn/exploration/scan_slam.hpp"
 #include "cairn/exploration/world.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/policy/pose_policy.hpp"
@@ -59,9 +60,9 @@ struct ExplorationResult {
   double map_error = 0.0;           ///< `contradicted_area` [m²]
   std::optional<MapTruth> against;  ///< beside the floor, where that is known
   bool converged = true;
-  int collisions = 0, loops = 0, proposed = 0, registered = 0, rebuilt = 0;
-  /// Of the parts of the run [s].
-  double decide_seconds = 0.0, map_seconds = 0.0, policy_seconds = 0.0, registration_seconds = 0.0;
+  int collisions = 0;
+  double decide_seconds = 0.0;
+  ScanSlamCounts slam;
 };
 
 /// What a run consists of. Everything referred to must outlive it.

@@ -1,0 +1,221 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// cairn map LOG: the map of a floor from recorded scans.
+#include <chrono>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <fmt/core.h>
+#include <boost/json/object.hpp>
+
+#include "arguments.hpp"
+#include "cairn/exploration/map_log.hpp"
+#include "cairn/grid/grid_format.hpp"
+#include "cairn/plugin/registry.hpp"
+#include "cairn/runtime/error.hpp"
+#include "cairn/runtime/timed.hpp"
+#include "commands.hpp"
+#include "floor_drawing.hpp"
+#include "floors.hpp"
+#include "graph_files.hpp"
+#include "interrupt.hpp"
+#include "json_report.hpp"
+#include "progress.hpp"
+#include "results.hpp"
+#include "table.hpp"
+
+namespace cairn::app {
+namespace {
+
+struct MapOptions {
+  std::string log, output, graph, trajectory;
+  std::string policy = "compact_pose:range=1,angle=0.35,reuse=false";
+  std::string registration = "icp", mapper = "log_odds";
+  MapLogOptions run;
+};
+
+struct MapOutcome {
+  std::size_t logged = 0;
+  MappedLog run;
+  FloorMap map;
+  ScanSlamCounts counts;
+  Graph graph, trajectory;
+  std::vector<Eigen::Vector2d> positions;
+  double width = 0.0, height = 0.0;  ///< of the trajectory, along its axes [m]
+  double seconds = 0.0;
+};
+
+void check(const MapOptions& options, Session& session) {
+  if (!options.output.empty()) check_map_file(options.output, "-o", session);
+  check_output(options.graph, "", session, false);
+  check_output(options.trajectory, "", session, false);
+}
+
+boost::json::object report_json(const MapOptions& options, const MapOutcome& outcome) {
+  boost::json::object report = begin_report("map");
+  report["log"] = options.log;
+  report["policy"] = options.policy;
+  report["registration"] = options.registration;
+  report["mapper"] = options.mapper;
+  report["scans"] = {{"logged", outcome.logged}, {"used", outcome.run.scans}};
+  report["duration"] = outcome.run.duration;
+  report["distance"] = outcome.run.distance;
+  report["extent"] = {outcome.width, outcome.height};
+  report["kept"] = outcome.graph.variable_count();
+  report["loops"] = {{"proposed", outcome.counts.proposed},
+                     {"matched", outcome.counts.registered},
+                     {"linked", outcome.counts.loops}};
+  report["converged"] = outcome.run.converged;
+  report["map"] = {{"cells", {outcome.map.frame.width, outcome.map.frame.height}},
+                   {"resolution", outcome.map.frame.resolution},
+                   {"coverage", outcome.map.coverage()},
+                   {"entropy", outcome.map.entropy()},
+                   {"rebuilt", outcome.counts.rebuilt}};
+  report["seconds"] = {{"total", outcome.seconds},
+                       {"map", outcome.counts.map_seconds},
+                       {"policy", outcome.counts.policy_seconds},
+                       {"registration", outcome.counts.registration_seconds}};
+  report["notes"] = strings_json(outcome.counts.notes);
+  return report;
+}
+
+std::string summary_text(const MapOutcome& outcome) {
+  Table table({{"", Table::Align::left}, {"", Table::Align::left}});
+  table.add({"log", fmt::format("{} of {}, {:.1f} m driven in {}", outcome.run.scans,
+                                plural(static_cast<std::int64_t>(outcome.logged), "scan"),
+                                outcome.run.distance, seconds_text(outcome.run.duration))});
+  table.add({"map", fmt::format("{:.1f} m² known; the trajectory spans {:.1f} m × {:.1f} m",
+                                outcome.map.coverage(), outcome.width, outcome.height)});
+  table.add({"graph", fmt::format("{} of {} kept, {}", outcome.graph.variable_count(),
+                                  plural(static_cast<std::int64_t>(outcome.run.scans), "pose"),
+                                  plural(outcome.counts.loops, "loop closure"))});
+  table.add({"time", fmt::format("{}: {} mapping, {} estimating, {} matching scans",
+                                 seconds_text(outcome.seconds),
+                                 seconds_text(outcome.counts.map_seconds),
+                                 seconds_text(outcome.counts.policy_seconds),
+                                 seconds_text(outcome.counts.registration_seconds))});
+  return table.text(false);
+}
+
+/// The extent of points along their principal axes [m], the larger one first.
+void measure(MapOutcome& outcome) {
+  Eigen::Matrix2Xd points(2, static_cast<Eigen::Index>(outcome.positions.size()));
+  for (Eigen::Index k = 0; k < points.cols(); ++k)
+    points.col(k) = outcome.positions[static_cast<std::size_t>(k)];
+  points.colwise() -= Eigen::Vector2d(points.rowwise().mean());
+  const Eigen::Matrix2d spread = points * points.transpose();
+  const double angle = 0.5 * std::atan2(2.0 * spread(0, 1), spread(0, 0) - spread(1, 1));
+  const Eigen::Vector2d along(std::cos(angle), std::sin(angle)), across(-along.y(), along.x());
+  const auto extent = [&](const Eigen::Vector2d& axis) {
+    const Eigen::RowVectorXd values = axis.transpose() * points;
+    return values.maxCoeff() - values.minCoeff();
+  };
+  outcome.width = extent(along);
+  outcome.height = extent(across);
+}
+
+MapOutcome map_of_log(const MapOptions& options, const InterruptGuard& guard, Session& session) {
+  Registry& registry = session.registry();
+  const auto policy = registry.make<PosePolicy>(parse_component(options.policy));
+  const auto registration = registry.make<Registration>(parse_component(options.registration));
+  const auto mapper = registry.make<Mapper>(parse_component(options.mapper));
+  session.files.add_input(grid_file(options.log).string());
+  const ScanLog log = read_scan_log(options.log, registry);
+  for (const std::string& note : log.notes) session.note(note);
+  MapOutcome outcome;
+  outcome.logged = log.scans.size();
+  ScanSlam slam({*policy, *registration, *mapper, registry});
+  StatusLine line(session.common.quiet);
+  auto shown = std::chrono::steady_clock::now();
+  MapLogOptions run = options.run;
+  run.interrupt = &guard.flag();
+  run.progress = [&](std::size_t read) {
+    const auto now = std::chrono::steady_clock::now();
+    if (now - shown < std::chrono::milliseconds(line.on_terminal() ? 50 : 5000)) return;
+    shown = now;
+    const auto part = static_cast<double>(read) / static_cast<double>(log.scans.size());
+    line.show(fmt::format("{} scan {} of {}: {}", bar(part, 20), read, log.scans.size(),
+                          plural(slam.counts().loops, "loop closure")));
+  };
+  {
+    const Timed timed(outcome.seconds);
+    outcome.run = map_log(log, slam, run);
+    outcome.map = slam.map();
+  }
+  outcome.counts = slam.counts();
+  outcome.graph = policy->estimator().graph();
+  outcome.trajectory = recovered_trajectory(*policy, Recovery::distribute);
+  for (const Pose2& pose : slam.poses()) outcome.positions.emplace_back(pose.translation());
+  measure(outcome);
+  return outcome;
+}
+
+int run_map(const MapOptions& options, Session& session) {
+  check(options, session);
+  session.use_threads();
+  const InterruptGuard guard;  // until the results are written
+  const MapOutcome outcome = map_of_log(options, guard, session);
+  for (const std::string& note : outcome.counts.notes) session.note(note);
+  Registry& registry = session.registry();
+  Results results(session);
+  const auto write = [&](const Graph& graph, const std::string& file) {
+    results.write(file, [&] { write_graph(graph, file, registry, output_format(file, "")); });
+  };
+  results.write(options.output,
+                [&] { write_grid(outcome.map.occupancy(), options.output, registry); });
+  write(outcome.graph, options.graph);
+  write(outcome.trajectory, options.trajectory);
+  results.add([&] { session.write_json(report_json(options, outcome)); });
+  results.add([&] {
+    print_floor({.map = outcome.map, .trajectory = outcome.positions}, session);
+    session.print(summary_text(outcome));
+  });
+  results.finish();
+  if (guard.interrupted()) return kExitInterrupted;
+  if (outcome.run.converged) return 0;
+  session.note("the estimate has not converged");
+  return static_cast<int>(ErrorCode::numerical);
+}
+
+}  // namespace
+
+Command add_map(ArgumentParser program) {
+  auto options = std::make_shared<MapOptions>();  // lives as long as the parser and the run
+  ArgumentParser cli =
+      program.add_command("map", "the map of a floor from a log of laser scans and odometry");
+  cli.add_option("log", options->log, "a log of CARMEN: robot.clf, robot.clf.gz:range=15")
+      .type_name("LOG")
+      .required();
+  cli.add_option("-o,--output", options->output, "write the map: map.yaml").type_name("OUT");
+  cli.add_option("--graph", options->graph, "write the graph of the poses that are kept")
+      .type_name("FILE");
+  cli.add_option("--trajectory", options->trajectory, "write all poses, those left out put back")
+      .type_name("FILE");
+  cli.add_option("--step", options->run.step, "take a scan after so many metres")
+      .type_name("M")
+      .within(0.0, 1000.0)
+      .show_default();
+  cli.add_option("--turn", options->run.turn, "or after such a turn [rad]")
+      .type_name("RAD")
+      .within(0.0, 3.0)
+      .show_default();
+  cli.add_option("--odometry-error", options->run.odometry.relative,
+                 "standard deviation of odometry, as a part of the motion")
+      .type_name("PART")
+      .within(0.0, 1.0)
+      .show_default();
+  cli.add_option("--mapper", options->mapper, "builds the map").type_name("NAME").show_default();
+  cli.add_option("--policy", options->policy, "decides which poses and loop closures are kept")
+      .type_name("NAME")
+      .show_default();
+  cli.add_option("--registration", options->registration, "matches the scans of two poses")
+      .type_name("NAME")
+      .show_default();
+  cli.footer(
+      "Example:\n"
+      "  cairn map robot.clf.gz -o map.yaml --graph robot.g2o");
+  return {cli, [options](Session& session) { return run_map(*options, session); }};
+}
+
+}  // namespace cairn::app
