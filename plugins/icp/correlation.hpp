@@ -21,7 +21,7 @@ struct CorrelationOptions {
   double angle_step = 0.026;  ///< of orientations [rad]
   double blur = 0.12;         ///< standard deviation of the likelihood about a surface [m]
   double least_score = 0.7;   ///< of a candidate, as a part of the best one's
-  int candidates = 6;         ///< at most
+  int candidates = 10;        ///< at most
 };
 
 /// A local maximum of the correlation.

@@ -95,7 +95,9 @@ MatchCovariance match_covariance(const SurfaceScan& reference, const SurfaceScan
     }
   }
   Matrix3d sigma = inflation * gain.asDiagonal() * G * gain.asDiagonal();
-  for (int k = 0; k < 3; ++k) sigma(k, k) += gain[k] > 0.0 ? least : unknown;
+  const double across = result.unobserved > 0 ? unknown * options.tilt * options.tilt : 0.0;
+  for (int k = 0; k < 3; ++k) sigma(k, k) += gain[k] > 0.0 ? least + across : unknown;
+  result.weakest = V.col(0);
   result.covariance = V * sigma * V.transpose();
   result.covariance = 0.5 * (result.covariance + result.covariance.transpose()).eval();
   return result;

@@ -15,12 +15,14 @@ struct CovarianceOptions {
   double observed = 4.0;    ///< least information of one that is, in that of the normals' noise
   double most = 0.3;        ///< largest standard deviation of a direction that is observed [m]
   double inflation = 1.0;   ///< of standard deviations, for what surfaces have in common
+  double tilt = 0.02;       ///< standard deviation of an unobserved direction [rad]
   double floor = 0.001;     ///< least standard deviation of any direction [m]
 };
 
 struct MatchCovariance {
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< of ξ in T exp(ξ)
   int unobserved = 0;  ///< directions that the scans do not determine
+  Eigen::Vector3d weakest = Eigen::Vector3d::UnitX();  ///< the ξ with the least information [1 m]
   double scale = 1.0;  ///< of residuals, against their expected standard deviations
 };
 
@@ -38,7 +40,8 @@ struct MatchCovariance {
 /// Directions are the eigenvectors of H, with angles times the root mean square distance of the
 /// points as lengths. One is observed if its information is well above that of the noise of the
 /// normals (S of `PointToLine`); what is left when that is subtracted is what counts. The others
-/// have the standard deviation `unobserved`.
+/// have the standard deviation `unobserved`; how far that is across them, since their direction is
+/// not known to better than `tilt`, is added to what is observed.
 MatchCovariance match_covariance(const SurfaceScan& reference, const SurfaceScan& moving,
                                  const std::vector<PointMatch>& matches,
                                  const CovarianceOptions& options);

@@ -20,6 +20,8 @@ constexpr std::ptrdiff_t kFewest = 6;
 constexpr double kConverged = 1e-4;
 /// Beyond the outermost point of a line by at most this part of its length, if it has few points.
 constexpr double kBeyond = 0.1;
+/// The last distance is at least so many standard deviations of residuals.
+constexpr double kNoise = 3.5;
 /// Longest step [m, rad].
 constexpr double kLongest = 0.3;
 
@@ -64,7 +66,10 @@ void trim(std::vector<PointMatch>& matches, double part) {
 
 PointToLine::PointToLine(const SurfaceScan& reference, const SurfaceScan& moving,
                          const PointToLineOptions& options)
-    : reference_(reference), moving_(moving), options_(options) {}
+    : reference_(reference), moving_(moving), options_(options) {
+  const double noise = std::sqrt(reference.typical_variance() + moving.typical_variance());
+  options_.last_distance = std::max(options_.last_distance, kNoise * noise);
+}
 
 std::vector<PointMatch> PointToLine::match(const Pose2& pose, double distance) const {
   const Matrix2d R = pose.rotation().matrix();

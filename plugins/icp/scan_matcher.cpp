@@ -16,10 +16,22 @@ namespace {
 /// compared with others.
 constexpr int kShort = 6;
 constexpr double kCandidateDistance = 0.3;
+/// The direction of the least information is explored in such steps, this far, or all of the window
+/// where it is not observed [m]; again, at most so often, from a pose whose quality is better by this.
+constexpr double kExploring = 0.1, kExplored = 0.3;
+constexpr int kRounds = 3;
+constexpr double kBetter = 0.01;
 /// Poses that differ by no more than this are one [m, rad] …
 constexpr double kSamePosition = 0.1, kSameAngle = 0.05;
 /// … or by as much as the covariance explains, in squared standard deviations.
 constexpr double kExplained = 16.0;
+/// Ranges agree within so many standard deviations.
+constexpr double kNoise = 3.5;
+
+/// Ranges that differ by no more agree [m].
+double tolerance(const SurfaceScan& earlier, const SurfaceScan& later, double least) {
+  return std::max(least, kNoise * std::max(earlier.sigma(), later.sigma()));
+}
 
 double quality(const Visibility& seen) {
   if (seen.seen() == 0) return 0.0;
@@ -63,8 +75,10 @@ ScanMatch ScanMatcher::finish(const SurfaceScan& earlier, const SurfaceScan& lat
       match_covariance(earlier, later, refined.matches, options_.covariance);
   match.covariance = uncertain.covariance;
   match.unobserved = uncertain.unobserved;
+  match.weakest = uncertain.weakest;
   match.visibility =
-      mutual_visibility(earlier, later, match.pose, options_.acceptance.tolerance);
+      mutual_visibility(earlier, later, match.pose,
+                        tolerance(earlier, later, options_.acceptance.tolerance));
   match.quality = quality(match.visibility);
   return match;
 }
@@ -87,24 +101,70 @@ ScanMatch ScanMatcher::refine(const SurfaceScan& earlier, const SurfaceScan& lat
   return match;
 }
 
+/// Candidates that are refined a little and compared.
+class ScanMatcher::Search {
+ public:
+  Search(const ScanMatcher& matcher, const SurfaceScan& earlier, const SurfaceScan& later)
+      : matcher_(matcher),
+        earlier_(earlier),
+        later_(later),
+        point_to_line_(earlier, later, matcher.options_.refinement),
+        tolerance_(tolerance(earlier, later, matcher.options_.acceptance.tolerance)) {}
+
+  void add(const Pose2& start) {
+    const Pose2 pose = point_to_line_.refine(start, kCandidateDistance, kShort).pose;
+    refined_.push_back({pose, quality(mutual_visibility(earlier_, later_, pose, tolerance_))});
+  }
+  bool empty() const { return refined_.empty(); }
+  const Refined& best() const {
+    return *std::ranges::max_element(refined_, {}, &Refined::quality);  // the first of equals
+  }
+
+  /// The best, refined to the end. From there the direction of the least information is explored,
+  /// as local optima follow each other along it; if one of them is better it is refined instead.
+  ScanMatch finish(const Pose2& guess, const SearchWindow& window) {
+    ScanMatch match;
+    for (int round = 0; round < kRounds; ++round) {
+      const Refined start = best();
+      match = matcher_.finish(earlier_, later_, start.pose,
+                              matcher_.options_.refinement.last_distance);
+      const double reach = match.unobserved > 0 ? std::hypot(window.x, window.y) : kExplored;
+      for (double offset = kExploring; offset <= reach; offset += kExploring) {
+        for (const double side : {-offset, offset}) {
+          const Pose2 pose = match.pose.retract(side * match.weakest);
+          if (within(window, guess, pose)) add(pose);
+        }
+      }
+      if (best().quality <= std::max(start.quality, match.quality) + kBetter) break;
+    }
+    for (const Refined& other : refined_) {
+      if (!same(match, other.pose)) match.runner_up = std::max(match.runner_up, other.quality);
+    }
+    return match;
+  }
+
+ private:
+  static bool within(const SearchWindow& window, const Pose2& guess, const Pose2& pose) {
+    return std::abs(pose.x() - guess.x()) <= window.x + kExploring &&
+           std::abs(pose.y() - guess.y()) <= window.y + kExploring;
+  }
+
+  const ScanMatcher& matcher_;
+  const SurfaceScan& earlier_;
+  const SurfaceScan& later_;
+  PointToLine point_to_line_;
+  double tolerance_;
+  std::vector<Refined> refined_;
+};
+
 ScanMatch ScanMatcher::search(const SurfaceScan& earlier, const SurfaceScan& later,
                               const Pose2& guess, const SearchWindow& window) const {
-  const PointToLine point_to_line(earlier, later, options_.refinement);
-  std::vector<Refined> refined;
+  Search search(*this, earlier, later);
   for (const Candidate& candidate :
-       Correlation(earlier, window, options_.correlation).search(later, guess)) {
-    const Pose2 pose = point_to_line.refine(candidate.pose, kCandidateDistance, kShort).pose;
-    refined.push_back({pose, quality(mutual_visibility(earlier, later, pose,
-                                                       options_.acceptance.tolerance))});
-  }
-  if (refined.empty()) return {};
-  std::ranges::stable_sort(refined, std::greater{}, &Refined::quality);
-  ScanMatch match = finish(earlier, later, refined.front().pose, options_.refinement.last_distance);
-  for (const Refined& other : refined) {
-    if (same(match, other.pose)) continue;
-    match.runner_up = other.quality;
-    break;
-  }
+       Correlation(earlier, window, options_.correlation).search(later, guess))
+    search.add(candidate.pose);
+  if (search.empty()) return {};
+  ScanMatch match = search.finish(guess, window);
   match.verdict = judge(match);
   return match;
 }

@@ -45,6 +45,7 @@ struct ScanMatch {
   Visibility visibility;  ///< of both scans' points
   double quality = 0.0;   ///< see `ScanMatcher`
   double runner_up = -1.0;  ///< quality of the best pose that differs; −1: there was no other
+  Eigen::Vector3d weakest = Eigen::Vector3d::UnitX();  ///< ξ of the least information [1 m]
   int iterations = 0;
 
   bool accepted() const { return verdict == Verdict::accepted; }
@@ -75,6 +76,7 @@ class ScanMatcher {
                    const SearchWindow& window) const;
 
  private:
+  class Search;
   ScanMatch finish(const SurfaceScan& earlier, const SurfaceScan& later, const Pose2& start,
                    double distance) const;
   Verdict judge(const ScanMatch& match) const;

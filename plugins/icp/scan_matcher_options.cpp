@@ -65,6 +65,8 @@ OptionFields<CovarianceOptions> covariance_fields() {
       .real("observed_sigma", &O::most, 1e-3, 10.0, "and its largest standard deviation [m]")
       .real("inflation", &O::inflation, 0.1, 100.0,
             "factor on standard deviations, for errors that neighbouring points share")
+      .real("tilt", &O::tilt, 0.0, 1.0,
+            "standard deviation of an undetermined direction's own direction [rad]")
       .real("least_sigma", &O::floor, 1e-6, 1.0, "least standard deviation in any direction [m]");
 }
 

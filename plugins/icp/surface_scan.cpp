@@ -20,6 +20,9 @@ constexpr double kShrinkage = 4.0;
 /// The line through both sides is taken unless one of a single side has a variance so much smaller.
 constexpr double kBothSides = 2.0;
 constexpr int kFewestPoints = 4;
+/// A neighbourhood's radius is at least so many standard deviations of ranges, and at most so many
+/// times what the options have.
+constexpr double kNoiseRadius = 12.0, kLongest = 3.0;
 
 /// Neighbouring points: [first, last].
 struct Window {
@@ -86,6 +89,14 @@ SurfaceScan::SurfaceScan(const LaserScan& scan, const SurfaceOptions& options) :
   find_points();
   fit_lines(options);
   settle_variances(options);
+  const double radius = kNoiseRadius * sigma();
+  if (radius > options.radius) {  // ranges are so noisy that lines must be longer
+    SurfaceOptions longer = options;
+    longer.sigma = std::max(options.sigma, 0.5 * sigma());
+    longer.radius = std::min(radius, kLongest * options.radius);
+    fit_lines(longer);
+    settle_variances(longer);
+  }
   std::vector<Vector2d> kept;
   for (int k = 0; k < size(); ++k) {
     if (!line(k).exists()) continue;
@@ -120,7 +131,7 @@ void SurfaceScan::find_points() {
 
 void SurfaceScan::fit_lines(const SurfaceOptions& options) {
   const Moments moments(points_);
-  lines_.resize(points_.size());
+  lines_.assign(points_.size(), {});
   const double most = options.roughness * options.roughness;
   const double noise = options.sigma * options.sigma;
   for (int k = 0; k < size(); ++k) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cmath>
 #include <span>
 #include <vector>
 
@@ -56,6 +57,8 @@ class SurfaceScan {
   bool continues(int k) const { return continues_[static_cast<std::size_t>(k)]; }
   /// Of a point without a line: the median of the lines' [m²].
   double typical_variance() const { return typical_variance_; }
+  /// Estimated standard deviation of ranges [m].
+  double sigma() const { return std::sqrt(typical_variance_); }
   double point_variance(int k) const {
     return line(k).exists() ? line(k).variance : typical_variance_;
   }
