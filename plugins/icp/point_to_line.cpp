@@ -67,7 +67,7 @@ void trim(std::vector<PointMatch>& matches, double part) {
 PointToLine::PointToLine(const SurfaceScan& reference, const SurfaceScan& moving,
                          const PointToLineOptions& options)
     : reference_(reference), moving_(moving), options_(options) {
-  const double noise = std::sqrt(reference.typical_variance() + moving.typical_variance());
+  const double noise = std::sqrt(reference.range_variance() + moving.range_variance());
   options_.last_distance = std::max(options_.last_distance, kNoise * noise);
 }
 

@@ -20,9 +20,14 @@ constexpr double kShrinkage = 4.0;
 /// The line through both sides is taken unless one of a single side has a variance so much smaller.
 constexpr double kBothSides = 2.0;
 constexpr int kFewestPoints = 4;
+/// Least of what `slope` says: grazing beams are no more precise across a surface.
+constexpr double kGrazing = 0.1;
+/// Surfaces with a larger slope determine the noise of ranges, if there are enough of them.
+constexpr double kFrontal = 0.5;
+constexpr std::ptrdiff_t kEnough = 20;
 /// A neighbourhood's radius is at least so many standard deviations of ranges, and at most so many
 /// times what the options have.
-constexpr double kNoiseRadius = 12.0, kLongest = 3.0;
+constexpr double kNoiseRadius = 8.0, kLongest = 2.0;
 
 /// Neighbouring points: [first, last].
 struct Window {
@@ -83,20 +88,29 @@ SurfaceLine line_through(const Moments& moments, const Window& window,
   return line;
 }
 
+/// The part of a range's variance that is across a surface: (n · d)², d along the beam.
+double slope(const Vector2d& normal, const Vector2d& point) {
+  const double across = normal.dot(point);
+  return std::max(kGrazing, across * across / point.squaredNorm());
+}
+
+/// The line's variance, such that the median over many is the true one (Wilson and Hilferty).
+double unbiased_median(const SurfaceLine& line) {
+  return line.variance / std::pow(1.0 - 2.0 / (9.0 * (line.count - 2)), 3);
+}
+
 }  // namespace
 
 SurfaceScan::SurfaceScan(const LaserScan& scan, const SurfaceOptions& options) : scan_(scan) {
   find_points();
   fit_lines(options);
   settle_variances(options);
-  const double radius = kNoiseRadius * sigma();
-  if (radius > options.radius) {  // ranges are so noisy that lines must be longer
-    SurfaceOptions longer = options;
-    longer.sigma = std::max(options.sigma, 0.5 * sigma());
-    longer.radius = std::min(radius, kLongest * options.radius);
-    fit_lines(longer);
-    settle_variances(longer);
-  }
+  // Again, with the noise that was found: with more of it lines are longer.
+  SurfaceOptions refined = options;
+  refined.sigma = sigma();
+  refined.radius = std::clamp(kNoiseRadius * sigma(), options.radius, kLongest * options.radius);
+  fit_lines(refined);
+  settle_variances(options);
   std::vector<Vector2d> kept;
   for (int k = 0; k < size(); ++k) {
     if (!line(k).exists()) continue;
@@ -150,9 +164,10 @@ void SurfaceScan::fit_lines(const SurfaceOptions& options) {
     Window best{reach(-1, few), reach(1, few)};
     const bool one_sided = k - best.first < 2 || best.last - k < 2;
     double least = one_sided ? std::numeric_limits<double>::infinity()
-                             : (moments.variance(best) + noise) / kBothSides;
+                             : moments.variance(best) / kBothSides;
+    if (least < noise) least = 0.0;  // as good as can be expected
     for (const Window& side : {Window{reach(-1, few + 1), k}, Window{k, reach(1, few + 1)}}) {
-      const double variance = moments.variance(side) + noise;
+      const double variance = moments.variance(side);
       if (variance < least) {
         least = variance;
         best = side;
@@ -164,21 +179,27 @@ void SurfaceScan::fit_lines(const SurfaceOptions& options) {
 }
 
 void SurfaceScan::settle_variances(const SurfaceOptions& options) {
-  std::vector<double> variances;
-  for (const SurfaceLine& line : lines_) {
-    if (line.exists()) variances.push_back(line.variance);
+  std::vector<double> of_range, frontal;
+  for (int k = 0; k < size(); ++k) {
+    if (!line(k).exists()) continue;
+    const double across = slope(line(k).normal, point(k));
+    of_range.push_back(unbiased_median(line(k)) / across);
+    if (across > kFrontal) frontal.push_back(of_range.back());
   }
+  if (std::ssize(frontal) >= kEnough) of_range = std::move(frontal);
   const double noise = options.sigma * options.sigma;
-  typical_variance_ = noise;
-  if (variances.empty()) return;
-  const auto middle = variances.begin() + std::ssize(variances) / 2;
-  std::nth_element(variances.begin(), middle, variances.end());
-  typical_variance_ = std::max(noise, *middle);
-  for (SurfaceLine& line : lines_) {
+  range_variance_ = noise;
+  if (of_range.empty()) return;
+  const auto middle = of_range.begin() + std::ssize(of_range) / 2;
+  std::nth_element(of_range.begin(), middle, of_range.end());
+  range_variance_ = std::max(noise, *middle);
+  for (int k = 0; k < size(); ++k) {
+    SurfaceLine& line = lines_[static_cast<std::size_t>(k)];
     if (!line.exists()) continue;
-    const double own = line.count - 2;
-    line.variance = std::max(
-        noise, (own * line.variance + kShrinkage * typical_variance_) / (own + kShrinkage));
+    const double own = line.count - 2, across = slope(line.normal, point(k));
+    line.variance =
+        std::max(noise * across, (own * line.variance + kShrinkage * range_variance_ * across) /
+                                     (own + kShrinkage));
   }
 }
 

@@ -55,12 +55,13 @@ class SurfaceScan {
   int line_count() const { return static_cast<int>(with_line_.size()); }
   /// Whether point k + 1 is on the same surface as point k.
   bool continues(int k) const { return continues_[static_cast<std::size_t>(k)]; }
-  /// Of a point without a line: the median of the lines' [m²].
-  double typical_variance() const { return typical_variance_; }
+  /// Of a range, estimated from the points' distances from their lines [m²].
+  double range_variance() const { return range_variance_; }
   /// Estimated standard deviation of ranges [m].
-  double sigma() const { return std::sqrt(typical_variance_); }
+  double sigma() const { return std::sqrt(range_variance_); }
+  /// Of a point's position across its surface [m²]; along the beam if it has no line.
   double point_variance(int k) const {
-    return line(k).exists() ? line(k).variance : typical_variance_;
+    return line(k).exists() ? line(k).variance : range_variance_;
   }
   /// The point with a line nearest to `at`, nearer than `radius` [m]; −1: none.
   int nearest_line(const Eigen::Vector2d& at, double radius) const {
@@ -81,7 +82,7 @@ class SurfaceScan {
   std::vector<bool> continues_;
   std::vector<SurfaceLine> lines_;
   std::vector<int> with_line_;
-  double typical_variance_ = 0.0;
+  double range_variance_ = 0.0;
   NearestPoints tree_;
 };
 

@@ -33,7 +33,7 @@ struct Outcome {
   double nees = 0.0;
   double milliseconds = 0.0;
   double sigma = 0.0;
-  ScanMatch ideal; Eigen::Vector3d ideal_error; //TMP
+  ScanMatch ideal; Eigen::Vector3d ideal_error; double es; //TMP
 
   bool right() const {
     return error.head<2>().norm() <= 0.05 && std::abs(error[2]) <= 0.5 * std::numbers::pi / 180.0;
@@ -51,6 +51,7 @@ Outcome outcome_of(const test::ScanPair& pair, const ScanMatcher& matcher) {
   outcome.milliseconds = time.count();
   outcome.error = outcome.match.pose.local(pair.truth);
   outcome.ideal = matcher.refine(earlier, later, pair.truth);//TMP
+  outcome.es = earlier.sigma();//TMP
   outcome.ideal_error = outcome.ideal.pose.local(pair.truth);//TMP
   if (outcome.match.accepted())
     outcome.nees = outcome.error.dot(outcome.match.covariance.inverse() * outcome.error);
@@ -76,7 +77,7 @@ std::vector<Outcome> study(const std::string& floor, int pairs) {
 void write_table(const std::vector<Outcome>& all, const std::string& file) {
   std::ofstream out(file);
   out << "verdict,sigma,ex,ey,et,nees,ms,matches,share,rms,agree,front,behind,outside,quality,runner,"
-         "unobserved,iterations,sx,sy,st,ix,iy,it,iq,inees\n";
+         "unobserved,iterations,sx,sy,st,ix,iy,it,iq,inees,es\n";
   for (const Outcome& one : all) {
     const ScanMatch& m = one.match;
     out << static_cast<int>(m.verdict) << ',' << one.sigma << ',' << one.error[0] << ','
@@ -85,7 +86,7 @@ void write_table(const std::vector<Outcome>& all, const std::string& file) {
         << m.visibility.in_front << ',' << m.visibility.behind << ',' << m.visibility.outside << ','
         << m.quality << ',' << m.runner_up << ',' << m.unobserved << ',' << m.iterations << ','
         << std::sqrt(m.covariance(0, 0)) << ',' << std::sqrt(m.covariance(1, 1)) << ','
-        << std::sqrt(m.covariance(2, 2)) << ',' << one.ideal_error[0] << ',' << one.ideal_error[1] << ',' << one.ideal_error[2] << ',' << one.ideal.quality << ',' << one.ideal_error.dot(one.ideal.covariance.inverse() * one.ideal_error) << '\n';//TMP
+        << std::sqrt(m.covariance(2, 2)) << ',' << one.ideal_error[0] << ',' << one.ideal_error[1] << ',' << one.ideal_error[2] << ',' << one.ideal.quality << ',' << one.ideal_error.dot(one.ideal.covariance.inverse() * one.ideal_error) << ',' << one.es << '\n';//TMP
   }
 }
 
