@@ -18,7 +18,10 @@ constexpr double kMedian = 0.6745;
 /// The distance by which an angle is multiplied to be a length [m].
 double lever(const SurfaceScan& moving, const std::vector<PointMatch>& matches) {
   double sum = 0.0;
-  for (const PointMatch& match : matches) sum += moving.point(match.point).squaredNorm();
+  for (const PointMatch& match : matches) {
+    sum += match.inverse ? moving.line(match.line).centre.squaredNorm()
+                         : moving.point(match.point).squaredNorm();
+  }
   return std::sqrt(sum / static_cast<double>(matches.size()));
 }
 
@@ -36,21 +39,29 @@ double residual_scale(const std::vector<PointMatch>& matches) {
 /// Σ a aᵀ σ² over the points of both scans.
 Matrix3d gradient_covariance(const SurfaceScan& reference, const SurfaceScan& moving,
                              const std::vector<PointMatch>& matches) {
-  Matrix3d sum = Matrix3d::Zero();
-  std::vector<Vector3d> parts(static_cast<std::size_t>(reference.size()), Vector3d::Zero());
+  std::vector<Vector3d> of_reference(static_cast<std::size_t>(reference.size()), Vector3d::Zero());
+  std::vector<Vector3d> of_moving(static_cast<std::size_t>(moving.size()), Vector3d::Zero());
   for (const PointMatch& match : matches) {
     const Vector3d a = match.J / match.variance;
-    sum += moving.point_variance(match.point) * a * a.transpose();
-    const SurfaceLine& line = reference.line(match.line);
+    auto& points = match.inverse ? of_reference : of_moving;
+    auto& others = match.inverse ? of_moving : of_reference;
+    const SurfaceScan& scan = match.inverse ? moving : reference;
+    points[static_cast<std::size_t>(match.point)] += a;
+    const SurfaceLine& line = scan.line(match.line);
     for (int k = line.first; k < line.first + line.count; ++k) {
-      const double along = line.tangent.dot(reference.point(k) - line.centre);
-      parts[static_cast<std::size_t>(k)] += line.leverage(match.along, along) * a;
+      const double along = line.tangent.dot(scan.point(k) - line.centre);
+      others[static_cast<std::size_t>(k)] -= line.leverage(match.along, along) * a;
     }
   }
-  for (int k = 0; k < reference.size(); ++k) {
-    const Vector3d& a = parts[static_cast<std::size_t>(k)];
-    sum += reference.point_variance(k) * a * a.transpose();
-  }
+  Matrix3d sum = Matrix3d::Zero();
+  const auto add = [&](const SurfaceScan& scan, const std::vector<Vector3d>& parts) {
+    for (int k = 0; k < scan.size(); ++k) {
+      const Vector3d& a = parts[static_cast<std::size_t>(k)];
+      sum += scan.point_variance(k) * a * a.transpose();
+    }
+  };
+  add(reference, of_reference);
+  add(moving, of_moving);
   return sum;
 }
 
@@ -70,7 +81,8 @@ MatchCovariance match_covariance(const SurfaceScan& reference, const SurfaceScan
   Matrix3d H = Matrix3d::Zero(), S = Matrix3d::Zero();
   for (const PointMatch& match : matches) {
     H += match.J * match.J.transpose() / match.variance;
-    S += reference.line(match.line).angle_variance() / match.variance * match.J_turn *
+    const SurfaceScan& lines = match.inverse ? moving : reference;
+    S += lines.line(match.line).angle_variance() / match.variance * match.J_turn *
          match.J_turn.transpose();
   }
   result.scale = residual_scale(matches);
@@ -88,7 +100,7 @@ MatchCovariance match_covariance(const SurfaceScan& reference, const SurfaceScan
     const double noise = V.col(k).dot(S * V.col(k));
     const double information = eigen.eigenvalues()[k];
     if (information > options.observed * noise &&
-        information * options.most * options.most > inflation) {
+        inflation * G(k, k) < std::pow(options.most * (information - noise), 2)) {
       gain[k] = 1.0 / (information - noise);
     } else {
       ++result.unobserved;

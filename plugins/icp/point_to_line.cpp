@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 
 #include <Eigen/LU>
 
@@ -35,13 +36,15 @@ double square_of(const PointMatch& match) {
 }
 
 /// One step of Gauss-Newton; zero if the matches do not determine one.
-Vector3d step(const std::vector<PointMatch>& matches, const SurfaceScan& reference) {
+Vector3d step(const std::vector<PointMatch>& matches, const SurfaceScan& reference,
+              const SurfaceScan& moving) {
   Matrix3d H = Matrix3d::Zero();
   Vector3d g = Vector3d::Zero();
   for (const PointMatch& match : matches) {
     const double weight = 1.0 / match.variance;
     H += weight * match.J * match.J.transpose();
-    H += weight * reference.line(match.line).angle_variance() * match.J_turn *
+    const SurfaceScan& lines = match.inverse ? moving : reference;
+    H += weight * lines.line(match.line).angle_variance() * match.J_turn *
          match.J_turn.transpose();
     g += weight * match.residual * match.J;
   }
@@ -59,7 +62,7 @@ void trim(std::vector<PointMatch>& matches, double part) {
   const auto kept = static_cast<std::ptrdiff_t>(std::ceil(part * std::ssize(matches)));
   if (kept >= std::ssize(matches)) return;
   std::ranges::nth_element(matches, matches.begin() + kept, {}, [](const PointMatch& match) {
-    return std::pair(square_of(match), match.point);
+    return std::tuple(square_of(match), match.inverse, match.point);
   });
   matches.erase(matches.begin() + kept, matches.end());
 }
@@ -72,33 +75,48 @@ PointToLine::PointToLine(const SurfaceScan& reference, const SurfaceScan& moving
 }
 
 std::vector<PointMatch> PointToLine::match(const Pose2& pose, double distance) const {
+  std::vector<PointMatch> matches;
+  matches.reserve(static_cast<std::size_t>(moving_.size()) +
+                  static_cast<std::size_t>(reference_.size()));
+  match(reference_, moving_, pose, distance, false, matches);
+  match(moving_, reference_, pose.inverse(), distance, true, matches);
+  return matches;
+}
+
+void PointToLine::match(const SurfaceScan& lines, const SurfaceScan& points, const Pose2& pose,
+                        double distance, bool inverse, std::vector<PointMatch>& matches) const {
   const Matrix2d R = pose.rotation().matrix();
   const Vector2d t = pose.translation();
   const double facing = std::cos(options_.normal);
-  std::vector<PointMatch> matches;
-  matches.reserve(static_cast<std::size_t>(moving_.size()));
-  for (int k = 0; k < moving_.size(); ++k) {
-    const SurfaceLine& own = moving_.line(k);
+  for (int k = 0; k < points.size(); ++k) {
+    const SurfaceLine& own = points.line(k);
     if (!own.exists()) continue;
-    const Vector2d at = R * moving_.point(k) + t;
-    const int found = reference_.nearest_line(at, distance);
+    const Vector2d at = R * points.point(k) + t;
+    const int found = lines.nearest_line(at, distance);
     if (found < 0) continue;
-    const SurfaceLine& line = reference_.line(found);
+    const SurfaceLine& line = lines.line(found);
     if (line.normal.dot(R * own.normal) < facing) continue;
     const Vector2d from_centre = at - line.centre;
     const double along = line.tangent.dot(from_centre);
     const double beyond = kBeyond * (line.end - line.begin);
     if (along < line.begin - beyond || along > line.end + beyond) continue;
-    const Vector2d normal = R.transpose() * line.normal, tangent = R.transpose() * line.tangent;
-    matches.push_back({.point = k,
-                       .line = found,
-                       .along = along,
-                       .residual = line.normal.dot(from_centre),
-                       .variance = own.variance + line.variance * line.leverage(along, along),
-                       .J = derivative(normal, moving_.point(k)),
-                       .J_turn = derivative(tangent, moving_.point(k))});
+    PointMatch match{.inverse = inverse,
+                     .point = k,
+                     .line = found,
+                     .along = along,
+                     .residual = line.normal.dot(from_centre),
+                     .variance = own.variance + line.variance * line.leverage(along, along),
+                     .J = {},
+                     .J_turn = {}};
+    if (inverse) {  // T⁻¹ q moves by exp(−ξ)
+      match.J = -derivative(line.normal, at);
+      match.J_turn = -derivative(line.tangent, at);
+    } else {
+      match.J = derivative(R.transpose() * line.normal, points.point(k));
+      match.J_turn = derivative(R.transpose() * line.tangent, points.point(k));
+    }
+    matches.push_back(match);
   }
-  return matches;
 }
 
 Refinement PointToLine::refine(const Pose2& start, double distance, int iterations) const {
@@ -108,7 +126,7 @@ Refinement PointToLine::refine(const Pose2& start, double distance, int iteratio
     std::vector<PointMatch> matches = match(result.pose, distance);
     if (std::ssize(matches) < kFewest) break;
     trim(matches, options_.trim);
-    const Vector3d xi = step(matches, reference_);
+    const Vector3d xi = step(matches, reference_, moving_);
     result.pose = result.pose.retract(xi);
     result.converged =
         distance <= options_.last_distance && xi.cwiseAbs().maxCoeff() < kConverged;

@@ -10,8 +10,9 @@
 
 namespace cairn::icp {
 
-/// A point of the moving scan that lies on a line of the reference.
+/// A point of one scan that lies on a line of the other.
 struct PointMatch {
+  bool inverse = false;    ///< the point is of the reference and the line of the moving scan
   int point = 0;           ///< of the moving scan
   int line = 0;            ///< of the reference
   double along = 0.0;      ///< where on the line, from its centre [m]
@@ -43,7 +44,8 @@ struct Refinement {
 ///
 ///     Σ r² / σ_r²,    r = n · (T p − c),    T ← T exp(ξ),
 ///
-/// where c and n are the centre and the normal of the line nearest to T p. A match counts if the
+/// where c and n are the centre and the normal of the reference's line nearest to T p; and likewise
+/// for the reference's points q on lines of the moving scan, with r = n · (T⁻¹ q − c). A match counts if the
 /// point is beside the line's own points, the surfaces face one way, and the distance is below one
 /// that shrinks from iteration to iteration; of these the largest residuals are trimmed.
 ///
@@ -61,6 +63,10 @@ class PointToLine {
   std::vector<PointMatch> match(const Pose2& pose, double distance) const;
 
  private:
+  /// The points of one scan on lines of the other, with `pose` from it.
+  void match(const SurfaceScan& lines, const SurfaceScan& points, const Pose2& pose,
+             double distance, bool inverse, std::vector<PointMatch>& matches) const;
+
   const SurfaceScan& reference_;
   const SurfaceScan& moving_;
   PointToLineOptions options_;

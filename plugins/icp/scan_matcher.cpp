@@ -67,7 +67,8 @@ ScanMatch ScanMatcher::finish(const SurfaceScan& earlier, const SurfaceScan& lat
   ScanMatch match;
   match.pose = refined.pose;
   match.iterations = refined.iterations;
-  match.matches = static_cast<int>(std::ssize(refined.matches));
+  match.matches = 
+      static_cast<int>(std::ranges::count(refined.matches, false, &PointMatch::inverse));
   match.share = match.matches == 0 ? 0.0 : static_cast<double>(match.matches) / later.line_count();
   trim(refined.matches, options_.refinement.trim);
   match.rms = rms(refined.matches);
