@@ -26,7 +26,7 @@ struct PointToLineOptions {
   double distance = 0.5;       ///< largest from a point to its line in the first iteration [m]
   double last_distance = 0.1;  ///< and in the last ones [m]
   double shrink = 0.7;         ///< of that distance in each iteration
-  double trim = 0.9;           ///< part of the matches that is used, those with the least residuals
+  double trim = 0.95;          ///< part of the matches that is used, those with the least residuals
   double normal = 0.7;         ///< largest angle between the surfaces at a point and its line [rad]
   int iterations = 30;         ///< at most
 };

@@ -16,9 +16,10 @@ namespace {
 /// compared with others.
 constexpr int kShort = 6;
 constexpr double kCandidateDistance = 0.3;
-/// The direction of the least information is explored in such steps, this far, or all of the window
-/// where it is not observed [m]; again, at most so often, from a pose whose quality is better by this.
-constexpr double kExploring = 0.1, kExplored = 0.3;
+/// The direction of the least information is explored in such steps, this far [m]; where it is not
+/// observed through all of the window, in steps that are larger …
+constexpr double kExploring = 0.1, kExplored = 0.3, kCoarse = 0.2;
+/// … and again, at most so often, from a pose whose quality is better by this.
 constexpr int kRounds = 3;
 constexpr double kBetter = 0.01;
 /// Poses that differ by no more than this are one [m, rad] …
@@ -129,8 +130,10 @@ class ScanMatcher::Search {
       const Refined start = best();
       match = matcher_.finish(earlier_, later_, start.pose,
                               matcher_.options_.refinement.last_distance);
-      const double reach = match.unobserved > 0 ? std::hypot(window.x, window.y) : kExplored;
-      for (double offset = kExploring; offset <= reach; offset += kExploring) {
+      const bool all = match.unobserved > 0;
+      const double reach = all ? std::hypot(window.x, window.y) : kExplored;
+      const double spacing = all ? kCoarse : kExploring;
+      for (double offset = spacing; offset <= reach; offset += spacing) {
         for (const double side : {-offset, offset}) {
           const Pose2 pose = match.pose.retract(side * match.weakest);
           if (within(window, guess, pose)) add(pose);

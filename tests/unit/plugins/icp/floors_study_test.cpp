@@ -53,7 +53,7 @@ Outcome outcome_of(const test::ScanPair& pair, const ScanMatcher& matcher) {
   outcome.ideal = matcher.refine(earlier, later, pair.truth);//TMP
   outcome.es = earlier.sigma();//TMP
   outcome.ideal_error = outcome.ideal.pose.local(pair.truth);//TMP
-  if (outcome.match.accepted())
+  if (outcome.match.matches > 0)
     outcome.nees = outcome.error.dot(outcome.match.covariance.inverse() * outcome.error);
   return outcome;
 }
