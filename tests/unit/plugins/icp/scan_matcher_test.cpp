@@ -111,6 +111,7 @@ TEST(ScanMatcher, TheCovarianceIsThatOfTheErrors) {
 
 TEST(ScanMatcher, AlongACorridorTheCovarianceIsLarge) {
   const test::Walls corridor = test::corridor();
+  int accepted = 0;
   for (unsigned seed = 1; seed <= 30; ++seed) {
     const double heading = 0.2 * seed;
     const Pose2 first(0, 0.1, heading), truth(0.5, 0.1, 0.1);
@@ -119,6 +120,7 @@ TEST(ScanMatcher, AlongACorridorTheCovarianceIsLarge) {
     const LaserScan later = test::with_noise(corridor.scan(first * truth), sigma, seed + 100);
     const ScanMatch found = search(earlier, later, truth * Pose2(0.4, 0.4, 0.2));
     if (!found.accepted()) continue;
+    ++accepted;
     EXPECT_GE(found.unobserved, 1) << "seed " << seed;
     // ξ is in the frame of the later scan.
     const double along = -(first * truth).theta();
@@ -128,6 +130,7 @@ TEST(ScanMatcher, AlongACorridorTheCovarianceIsLarge) {
     const Eigen::Vector3d error = found.pose.local(truth);
     EXPECT_LT(error.dot(found.covariance.inverse() * error), 20.0) << "seed " << seed;
   }
+  EXPECT_GE(accepted, 20);
 }
 
 TEST(ScanMatcher, ACorridorWithoutNoiseIsAcceptedAcross) {
