@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "scan_pairs.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+namespace cairn::test {
+namespace {
+
+using Eigen::Vector2d;
+
+constexpr double kClearance = 0.25;  // [m]
+
+std::vector<bool> clear_cells(const OccupancyGrid& floor) {
+  const GridFrame& frame = floor.frame;
+  const CellThresholds thresholds;
+  const int reach = static_cast<int>(std::ceil(kClearance / frame.resolution));
+  const auto is_free = [&](int x, int y) {
+    return frame.contains(x, y) &&
+           thresholds.state(floor.occupancy[frame.index(x, y)]) == CellState::free;
+  };
+  std::vector<bool> clear(static_cast<std::size_t>(frame.size()));
+  for (int y = 0; y < frame.height; ++y) {
+    for (int x = 0; x < frame.width; ++x) {
+      bool all = is_free(x, y);
+      for (int v = -reach; all && v <= reach; ++v) {
+        for (int u = -reach; all && u <= reach; ++u) all = is_free(x + u, y + v);
+      }
+      clear[frame.index(x, y)] = all;
+    }
+  }
+  return clear;
+}
+
+}  // namespace
+
+ScanPairs::ScanPairs(const OccupancyGrid& floor, std::uint64_t seed)
+    : frame_(floor.frame), caster_(floor), clear_(clear_cells(floor)), random_(seed) {
+  for (std::size_t k = 0; k < clear_.size(); ++k) {
+    if (clear_[k]) standing_.push_back(k);
+  }
+}
+
+bool ScanPairs::is_clear(const Vector2d& at) const {
+  const Vector2d cell = frame_.to_cells(at);
+  const int x = static_cast<int>(std::floor(cell.x())), y = static_cast<int>(std::floor(cell.y()));
+  return frame_.contains(x, y) && clear_[frame_.index(x, y)];
+}
+
+double ScanPairs::gaussian() {
+  const double u = random_.uniform(1e-12, 1.0), v = random_.uniform(0.0, 1.0);
+  return std::sqrt(-2.0 * std::log(u)) * std::cos(2.0 * std::numbers::pi * v);
+}
+
+LaserScan ScanPairs::scan(const Pose2& from, const LidarModel& lidar) {
+  LaserScan scan{lidar.first_angle(), lidar.step(), lidar.range, {}};
+  for (int beam = 0; beam < lidar.beams; ++beam) {
+    const RayHit hit =
+        caster_.cast(from.translation(),
+                     from.theta() + scan.angle(static_cast<std::size_t>(beam)), lidar.range);
+    const double range = hit.hit ? hit.range + lidar.sigma * gaussian() : lidar.range;
+    scan.ranges.push_back(static_cast<float>(range));
+  }
+  return scan;
+}
+
+ScanPair ScanPairs::draw(const LidarModel& lidar, const PairRange& range) {
+  const auto nearby = [&] {
+    const double x = random_.uniform(-range.position, range.position);
+    const double y = random_.uniform(-range.position, range.position);
+    return Pose2(x, y, random_.uniform(-range.angle, range.angle));
+  };
+  for (;;) {
+    const std::size_t cell = standing_[static_cast<std::size_t>(
+        random_.uniform(0.0, static_cast<double>(standing_.size())))];
+    const int width = frame_.width, index = static_cast<int>(cell);
+    const Vector2d at = frame_.centre(index % width, index / width);
+    const Pose2 first(at.x(), at.y(), random_.uniform(-std::numbers::pi, std::numbers::pi));
+    const Pose2 truth = nearby(), second = first * truth;
+    if (!is_clear(second.translation())) continue;
+    const Vector2d way = second.translation() - at;
+    if (caster_.cast(at, std::atan2(way.y(), way.x()), way.norm()).hit) continue;
+    const Pose2 off = nearby();
+    return {.earlier = scan(first, lidar),
+            .later = scan(second, lidar),
+            .truth = truth,
+            .guess = Pose2(truth.x() + off.x(), truth.y() + off.y(), truth.theta() + off.theta())};
+  }
+}
+
+}  // namespace cairn::test
