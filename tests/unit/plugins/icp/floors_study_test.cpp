@@ -54,11 +54,18 @@ struct Outcome {
   bool all_observed() const { return accepted() && match.unobserved == 0; }
 };
 
-Outcome outcome_of(const test::ScanPair& pair, const ScanMatcher& matcher) {
+/// Errors of a poor guess, which is searched around, and of a good one, which is refined.
+constexpr test::PairRange kPoor{.position = 1.0, .angle = 0.35};
+constexpr test::PairRange kGood{.position = 0.2, .angle = 10.0 * kDegree};
+
+Outcome outcome_of(const test::ScanPair& pair, const ScanMatcher& matcher, bool good_guess) {
   Outcome outcome;
   const auto begin = std::chrono::steady_clock::now();
-  outcome.match = matcher.search(matcher.prepare(pair.earlier), matcher.prepare(pair.later),
-                                 pair.guess, matcher.options().window);
+  const icp::SurfaceScan earlier = matcher.prepare(pair.earlier);
+  const icp::SurfaceScan later = matcher.prepare(pair.later);
+  outcome.match = good_guess
+                      ? matcher.refine(earlier, later, pair.guess)
+                      : matcher.search(earlier, later, pair.guess, matcher.options().window);
   const std::chrono::duration<double, std::milli> time = std::chrono::steady_clock::now() - begin;
   outcome.milliseconds = time.count();
   outcome.error = outcome.match.pose.local(pair.truth);
@@ -67,7 +74,16 @@ Outcome outcome_of(const test::ScanPair& pair, const ScanMatcher& matcher) {
   return outcome;
 }
 
-std::vector<Outcome> study(const std::string& floor, int pairs, std::uint64_t seed) {
+/// The environment variable as a number, or what is given.
+int asked(const char* variable, int otherwise) {
+  const char* const text = std::getenv(variable);
+  return text ? std::atoi(text) : otherwise;
+}
+
+/// CAIRN_ICP_PAIRS: so many pairs instead of 200; CAIRN_ICP_SEED.
+std::vector<Outcome> study(const std::string& floor, bool good_guess) {
+  const int pairs = asked("CAIRN_ICP_PAIRS", 200);
+  const auto seed = static_cast<std::uint64_t>(asked("CAIRN_ICP_SEED", 11));
   Registry registry;
   const OccupancyGrid grid =
       read_grid((test::data_folder() / "maps" / (floor + ".yaml")).string(), registry);
@@ -77,7 +93,9 @@ std::vector<Outcome> study(const std::string& floor, int pairs, std::uint64_t se
   std::vector<Outcome> all;
   for (int k = 0; k < pairs; ++k) {
     const double sigma = random.uniform(0.01, 0.05);
-    all.push_back(outcome_of(drawn.draw({.sigma = sigma}), matcher));
+    const test::ScanPair pair =
+        drawn.draw({.sigma = sigma}, kPoor, good_guess ? kGood : kPoor);
+    all.push_back(outcome_of(pair, matcher, good_guess));
     all.back().sigma = sigma;
   }
   return all;
@@ -157,23 +175,14 @@ void print(const std::string& floor, const Summary& sum) {
             << sum.slow_milliseconds << " ms\n";
 }
 
-/// The environment variable as a number, or what is given.
-int asked(const char* variable, int otherwise) {
-  const char* const text = std::getenv(variable);
-  return text ? std::atoi(text) : otherwise;
-}
-
 class FloorsStudy : public testing::TestWithParam<const char*> {};
 
-/// CAIRN_ICP_PAIRS: so many pairs instead of 200; CAIRN_ICP_SEED; CAIRN_ICP_TABLE: a folder for a
-/// table of all pairs by floor.
+/// CAIRN_ICP_TABLE: a folder for a table of all pairs by floor.
 TEST_P(FloorsStudy, MatchesAreRightAdmittedlyImpreciseOrRejected) {
   CAIRN_NEEDS_DATA();
   CAIRN_NEEDS("grid_format", "ros");
   const std::string floor = GetParam();
-  const std::vector<Outcome> all =
-      study(floor, asked("CAIRN_ICP_PAIRS", 200),
-            static_cast<std::uint64_t>(asked("CAIRN_ICP_SEED", 11)));
+  const std::vector<Outcome> all = study(floor, false);
   if (const char* const folder = std::getenv("CAIRN_ICP_TABLE"))
     write_table(all, std::string(folder) + "/" + floor + ".csv");
   const Summary sum = summary_of(all);
@@ -184,6 +193,16 @@ TEST_P(FloorsStudy, MatchesAreRightAdmittedlyImpreciseOrRejected) {
   EXPECT_LT(sum.rejected, 0.15);
   EXPECT_GT(sum.nees, 2.0);
   EXPECT_LT(sum.nees, 4.0);
+}
+
+TEST_P(FloorsStudy, AGoodGuessNeedsNoSearch) {
+  CAIRN_NEEDS_DATA();
+  CAIRN_NEEDS("grid_format", "ros");
+  const Summary sum = summary_of(study(GetParam(), true));
+  print(std::string(GetParam()) + ", good guess", sum);
+  EXPECT_GT(sum.right, 0.75);
+  EXPECT_LE(sum.wrong, 0.015);
+  EXPECT_LE(sum.far_off, 0.005);
 }
 
 INSTANTIATE_TEST_SUITE_P(Floors, FloorsStudy,
