@@ -12,8 +12,8 @@
 #include <utility>
 #include <vector>
 
-#include <Eigen/LU>
 #include <gtest/gtest.h>
+#include <Eigen/LU>
 
 #include "cairn/grid/grid_format.hpp"
 #include "cairn/plugin/registry.hpp"
@@ -63,9 +63,8 @@ Outcome outcome_of(const test::ScanPair& pair, const ScanMatcher& matcher, bool 
   const auto begin = std::chrono::steady_clock::now();
   const icp::SurfaceScan earlier = matcher.prepare(pair.earlier);
   const icp::SurfaceScan later = matcher.prepare(pair.later);
-  outcome.match = good_guess
-                      ? matcher.refine(earlier, later, pair.guess)
-                      : matcher.search(earlier, later, pair.guess, matcher.options().window);
+  outcome.match = good_guess ? matcher.refine(earlier, later, pair.guess)
+                             : matcher.search(earlier, later, pair.guess, matcher.options().window);
   const std::chrono::duration<double, std::milli> time = std::chrono::steady_clock::now() - begin;
   outcome.milliseconds = time.count();
   outcome.error = outcome.match.pose.local(pair.truth);
@@ -93,8 +92,7 @@ std::vector<Outcome> study(const std::string& floor, bool good_guess) {
   std::vector<Outcome> all;
   for (int k = 0; k < pairs; ++k) {
     const double sigma = random.uniform(0.01, 0.05);
-    const test::ScanPair pair =
-        drawn.draw({.sigma = sigma}, kPoor, good_guess ? kGood : kPoor);
+    const test::ScanPair pair = drawn.draw({.sigma = sigma}, kPoor, good_guess ? kGood : kPoor);
     all.push_back(outcome_of(pair, matcher, good_guess));
     all.back().sigma = sigma;
   }
@@ -110,8 +108,8 @@ void write_table(const std::vector<Outcome>& all, const std::string& file) {
     out << to_string(match.verdict) << ',' << one.sigma << ',' << one.error[0] << ','
         << one.error[1] << ',' << one.error[2] << ',' << one.nees << ',' << match.unobserved << ','
         << match.matches << ',' << match.share << ',' << match.rms << ','
-        << match.visibility.overlap() << ',' << match.visibility.conflict() << ','
-        << match.quality << ',' << match.runner_up << ',' << one.milliseconds << '\n';
+        << match.visibility.overlap() << ',' << match.visibility.conflict() << ',' << match.quality
+        << ',' << match.runner_up << ',' << one.milliseconds << '\n';
   }
 }
 
@@ -158,8 +156,8 @@ Summary summary_of(const std::vector<Outcome>& all) {
       .unobserved = part_of(all, &Outcome::accepted) - part_of(all, &Outcome::all_observed),
       .nees = mean(plausible),
       .median_nees = quantile(every, 0.5),
-      .beyond = static_cast<double>(std::ranges::count_if(
-                    every, [](double nees) { return nees > kLikely; })) /
+      .beyond = static_cast<double>(
+                    std::ranges::count_if(every, [](double nees) { return nees > kLikely; })) /
                 static_cast<double>(every.size()),
       .milliseconds = quantile(milliseconds, 0.5),
       .slow_milliseconds = quantile(milliseconds, 0.95),
@@ -170,9 +168,9 @@ void print(const std::string& floor, const Summary& sum) {
   std::cout << floor << " [%]: right " << 100 * sum.right << ", imprecise " << 100 * sum.imprecise
             << ", wrong " << 100 * sum.wrong << " (far off " << 100 * sum.far_off << "), rejected "
             << 100 * sum.rejected << "; a direction not observed " << 100 * sum.unobserved
-            << "; NEES " << sum.nees << ", median " << sum.median_nees << ", beyond 95 %: "
-            << 100 * sum.beyond << "; " << sum.milliseconds << " ms, 95 % below "
-            << sum.slow_milliseconds << " ms\n";
+            << "; NEES " << sum.nees << ", median " << sum.median_nees
+            << ", beyond 95 %: " << 100 * sum.beyond << "; " << sum.milliseconds
+            << " ms, 95 % below " << sum.slow_milliseconds << " ms\n";
 }
 
 class FloorsStudy : public testing::TestWithParam<const char*> {};

@@ -110,8 +110,8 @@ TEST(PointToLine, TheDerivativesAreThoseOfTheResiduals) {
   const Pose2 pose = truth * Pose2(0.01, -0.02, 0.005);
   const auto residual = [&](const PointMatch& match, const Pose2& at) {
     const SurfaceLine& line = (match.inverse ? later : earlier).line(match.line);
-    const Vector2d point = match.inverse ? at.inverse() * earlier.point(match.point)
-                                         : at * later.point(match.point);
+    const Vector2d point =
+        match.inverse ? at.inverse() * earlier.point(match.point) : at * later.point(match.point);
     return line.normal.dot(point - line.centre);
   };
   const std::vector<PointMatch> matches = point_to_line.match(pose, 0.2);

@@ -57,9 +57,8 @@ double ScanPairs::gaussian() {
 LaserScan ScanPairs::scan(const Pose2& from, const LidarModel& lidar) {
   LaserScan scan{lidar.first_angle(), lidar.step(), lidar.range, {}};
   for (int beam = 0; beam < lidar.beams; ++beam) {
-    const RayHit hit =
-        caster_.cast(from.translation(),
-                     from.theta() + scan.angle(static_cast<std::size_t>(beam)), lidar.range);
+    const RayHit hit = caster_.cast(
+        from.translation(), from.theta() + scan.angle(static_cast<std::size_t>(beam)), lidar.range);
     const double range = hit.hit ? hit.range + lidar.sigma * gaussian() : lidar.range;
     scan.ranges.push_back(static_cast<float>(range));
   }
@@ -86,7 +85,8 @@ ScanPair ScanPairs::draw(const LidarModel& lidar, const PairRange& range, const 
     return {.earlier = scan(first, lidar),
             .later = scan(second, lidar),
             .truth = truth,
-            .guess = Pose2(truth.x() + error.x(), truth.y() + error.y(), truth.theta() + error.theta())};
+            .guess =
+                Pose2(truth.x() + error.x(), truth.y() + error.y(), truth.theta() + error.theta())};
   }
 }
 
