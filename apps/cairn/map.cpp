@@ -30,7 +30,7 @@ namespace {
 
 struct MapOptions {
   std::string log, output, graph, trajectory;
-  std::string policy = "compact_pose:range=1,angle=0.35,reuse=false";
+  std::string policy = "compact_pose:range=3,angle=3.14,reuse=false";
   std::string registration = "icp", mapper = "log_odds";
   MapLogOptions run;
 };

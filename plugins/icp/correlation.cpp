@@ -159,12 +159,15 @@ void Correlation::add_scores(std::span<const Vector2d> points, const Vector2d& p
   const Vector2d from = (position - origin_) / options_.cell;
   const int rows = 2 * reach_y_ + 1;
   for (const Vector2d& point : points) {
-    const int x = static_cast<int>(std::floor(from.x() + c * point.x() - s * point.y())) - reach_x_;
-    const int y = static_cast<int>(std::floor(from.y() + s * point.x() + c * point.y())) - reach_y_;
-    if (x < 0 || y < 0 || x + row_ > width_ || y + rows > height_) continue;
-    const std::uint8_t* likelihood = table_.data() +
-                                     static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) +
-                                     static_cast<std::size_t>(x);
+    // The first of the window's cells, as numbers that need not fit into integers.
+    const double first_x = std::floor(from.x() + c * point.x() - s * point.y()) - reach_x_;
+    const double first_y = std::floor(from.y() + s * point.x() + c * point.y()) - reach_y_;
+    if (!(first_x >= 0.0 && first_y >= 0.0 && first_x + row_ <= width_ &&
+          first_y + rows <= height_)) {
+      continue;
+    }
+    const auto x = static_cast<std::size_t>(first_x), y = static_cast<std::size_t>(first_y);
+    const std::uint8_t* likelihood = table_.data() + y * static_cast<std::size_t>(width_) + x;
     std::uint16_t* sum = scores;
     for (int v = 0; v < rows; ++v, likelihood += width_, sum += row_) {
       for (int u = 0; u < row_; u += kLane) {

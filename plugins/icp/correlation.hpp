@@ -45,7 +45,7 @@ class Correlation {
 
  private:
   void rasterise(const SurfaceScan& reference);
-  void stamp(const Eigen::Vector2d& at, const std::vector<double>& squares);
+  void stamp(const Eigen::Vector2d& at, const std::vector<double>& likelihood);
   /// Adds the likelihood of all positions of the window for the points turned by `angle`.
   void add_scores(std::span<const Eigen::Vector2d> points, const Eigen::Vector2d& position,
                   double angle, std::uint16_t* scores) const;

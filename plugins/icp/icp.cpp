@@ -65,7 +65,8 @@ class Icp final : public Registration, public ScanRegistration {
   /// As wide as the expected covariance, but no wider than the options allow.
   SearchWindow window_of(const Motion& expected) const {
     const Eigen::Map<const Eigen::Matrix3d> covariance(expected.covariance.data());
-    const Eigen::Matrix2d R = Se2::rotation(Eigen::Map<const Eigen::Vector3d>(expected.mean.data()));
+    const Eigen::Matrix2d R =
+        Se2::rotation(Eigen::Map<const Eigen::Vector3d>(expected.mean.data()));
     const Eigen::Matrix2d position = R * covariance.topLeftCorner<2, 2>() * R.transpose();
     // A variance that is no number or infinite leaves the whole window.
     const auto reach = [](double variance, double most) {
@@ -88,13 +89,13 @@ class Icp final : public Registration, public ScanRegistration {
                               const SearchWindow& window) const {
     const auto from = scans_.find(earlier), to = scans_.find(later);
     if (earlier == later || from == scans_.end() || to == scans_.end()) return {};
-    const ScanMatch found = poor(window)
-                                ? matcher_.search(from->second, to->second, guess, window)
-                                : matcher_.refine(from->second, to->second, guess);
+    const ScanMatch found = poor(window) ? matcher_.search(from->second, to->second, guess, window)
+                                         : matcher_.refine(from->second, to->second, guess);
     if (!found.accepted()) return {};
     const std::span<const double> z = found.pose, sigma(found.covariance.data(), 9);
-    return {group_.to_factor(edge_, earlier, later,
-                             {.mean = {z.begin(), z.end()}, .covariance = {sigma.begin(), sigma.end()}})};
+    return {group_.to_factor(
+        edge_, earlier, later,
+        {.mean = {z.begin(), z.end()}, .covariance = {sigma.begin(), sigma.end()}})};
   }
 
   ScanMatcher matcher_;

@@ -28,8 +28,8 @@ struct MatchCovariance {
 
 /// The covariance of a point-to-line match, from its matches after trimming.
 ///
-/// The pose is that with Σ J r / σ_r² = 0, so its error is H⁻¹ Σ J r / σ_r², H = Σ J Jᵀ / σ_r². In r
-/// are the noise of one point of the moving scan and that of all points of a line, and many
+/// The pose is that with Σ J r / σ_r² = 0, so its error is H⁻¹ Σ J r / σ_r², H = Σ J Jᵀ / σ_r². In
+/// r are the noise of one point of the moving scan and that of all points of a line, and many
 /// matches share the same ones: each point's total weight is summed before it is squared,
 ///
 ///     Σ = H⁻¹ (Σ_points a aᵀ σ²) H⁻¹,

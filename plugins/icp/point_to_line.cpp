@@ -44,8 +44,7 @@ Vector3d step(const std::vector<PointMatch>& matches, const SurfaceScan& referen
     const double weight = 1.0 / match.variance;
     H += weight * match.J * match.J.transpose();
     const SurfaceScan& lines = match.inverse ? moving : reference;
-    H += weight * lines.line(match.line).angle_variance() * match.J_turn *
-         match.J_turn.transpose();
+    H += weight * lines.line(match.line).angle_variance() * match.J_turn * match.J_turn.transpose();
     g += weight * match.residual * match.J;
   }
   H += 1e-9 * H.trace() * Matrix3d::Identity();
@@ -128,8 +127,7 @@ Refinement PointToLine::refine(const Pose2& start, double distance, int iteratio
     trim(matches, options_.trim);
     const Vector3d xi = step(matches, reference_, moving_);
     result.pose = result.pose.retract(xi);
-    result.converged =
-        distance <= options_.last_distance && xi.cwiseAbs().maxCoeff() < kConverged;
+    result.converged = distance <= options_.last_distance && xi.cwiseAbs().maxCoeff() < kConverged;
     distance = std::max(options_.last_distance, distance * options_.shrink);
   }
   result.matches = match(result.pose, options_.last_distance);

@@ -45,9 +45,10 @@ struct Refinement {
 ///     Σ r² / σ_r²,    r = n · (T p − c),    T ← T exp(ξ),
 ///
 /// where c and n are the centre and the normal of the reference's line nearest to T p; and likewise
-/// for the reference's points q on lines of the moving scan, with r = n · (T⁻¹ q − c). A match counts if the
-/// point is beside the line's own points, the surfaces face one way, and the distance is below one
-/// that shrinks from iteration to iteration; of these the largest residuals are trimmed.
+/// for the reference's points q on lines of the moving scan, with r = n · (T⁻¹ q − c). A match
+/// counts if the point is beside the line's own points, the surfaces face one way, and the distance
+/// is below one that shrinks from iteration to iteration; of these the largest residuals are
+/// trimmed.
 ///
 /// Normals are noisy, so that even along a bare corridor the normal equations H have some
 /// information, S = Σ J_turn J_turnᵀ σ_n²/σ_r² on average. A step solves (H + S) ξ = −g, which
@@ -57,7 +58,9 @@ class PointToLine {
   PointToLine(const SurfaceScan& reference, const SurfaceScan& moving,
               const PointToLineOptions& options = {});
 
-  Refinement refine(const Pose2& start) const { return refine(start, options_.distance, options_.iterations); }
+  Refinement refine(const Pose2& start) const {
+    return refine(start, options_.distance, options_.iterations);
+  }
   /// From another distance, with fewer iterations.
   Refinement refine(const Pose2& start, double distance, int iterations) const;
   std::vector<PointMatch> match(const Pose2& pose, double distance) const;

@@ -68,7 +68,7 @@ ScanMatch ScanMatcher::finish(const SurfaceScan& earlier, const SurfaceScan& lat
   ScanMatch match;
   match.pose = refined.pose;
   match.iterations = refined.iterations;
-  match.matches = 
+  match.matches =
       static_cast<int>(std::ranges::count(refined.matches, false, &PointMatch::inverse));
   match.share = match.matches == 0 ? 0.0 : static_cast<double>(match.matches) / later.line_count();
   trim(refined.matches, options_.refinement.trim);
@@ -78,9 +78,8 @@ ScanMatch ScanMatcher::finish(const SurfaceScan& earlier, const SurfaceScan& lat
   match.covariance = uncertain.covariance;
   match.unobserved = uncertain.unobserved;
   match.weakest = uncertain.weakest;
-  match.visibility =
-      mutual_visibility(earlier, later, match.pose,
-                        tolerance(earlier, later, options_.acceptance.tolerance));
+  match.visibility = mutual_visibility(earlier, later, match.pose,
+                                       tolerance(earlier, later, options_.acceptance.tolerance));
   match.quality = quality(match.visibility);
   return match;
 }
@@ -128,8 +127,8 @@ class ScanMatcher::Search {
     ScanMatch match;
     for (int round = 0; round < kRounds; ++round) {
       const Refined start = best();
-      match = matcher_.finish(earlier_, later_, start.pose,
-                              matcher_.options_.refinement.last_distance);
+      match =
+          matcher_.finish(earlier_, later_, start.pose, matcher_.options_.refinement.last_distance);
       const bool all = match.unobserved > 0;
       const double reach = all ? std::hypot(window.x, window.y) : kExplored;
       const double spacing = all ? kCoarse : kExploring;

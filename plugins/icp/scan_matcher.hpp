@@ -17,12 +17,12 @@ namespace cairn::icp {
 /// Whether a match is accepted, or else why not.
 enum class Verdict {
   accepted,
-  no_candidate,   ///< the search found none, or refining it came to nothing
-  few_matches,    ///< too few points on lines
-  little_overlap, ///< too few of the points in each other's view agree
-  contradiction,  ///< one lidar looked through what the other saw
+  no_candidate,    ///< the search found none, or refining it came to nothing
+  few_matches,     ///< too few points on lines
+  little_overlap,  ///< too few of the points in each other's view agree
+  contradiction,   ///< one lidar looked through what the other saw
   large_residuals,
-  ambiguous,      ///< another pose fits nearly as well
+  ambiguous,  ///< another pose fits nearly as well
 };
 constexpr auto enum_names(Verdict) {
   return std::to_array<EnumName<Verdict>>({{Verdict::accepted, "accepted"},
@@ -38,12 +38,12 @@ struct ScanMatch {
   Verdict verdict = Verdict::no_candidate;
   Pose2 pose;  ///< z, of the later scan in the frame of the earlier one
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< of ξ in z exp(ξ) [m², m rad, rad²]
-  int unobserved = 0;     ///< directions that the scans do not determine
-  int matches = 0;        ///< points on lines, before trimming
-  double share = 0.0;     ///< of the later scan's points with a line
-  double rms = 0.0;       ///< of their residuals after trimming [m]
-  Visibility visibility;  ///< of both scans' points
-  double quality = 0.0;   ///< see `ScanMatcher`
+  int unobserved = 0;       ///< directions that the scans do not determine
+  int matches = 0;          ///< points on lines, before trimming
+  double share = 0.0;       ///< of the later scan's points with a line
+  double rms = 0.0;         ///< of their residuals after trimming [m]
+  Visibility visibility;    ///< of both scans' points
+  double quality = 0.0;     ///< see `ScanMatcher`
   double runner_up = -1.0;  ///< quality of the best pose that differs; −1: there was no other
   Eigen::Vector3d weakest = Eigen::Vector3d::UnitX();  ///< ξ of the least information [1 m]
   int iterations = 0;

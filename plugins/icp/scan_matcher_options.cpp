@@ -30,8 +30,8 @@ OptionFields<SurfaceOptions> surface_fields() {
 OptionFields<CorrelationOptions> correlation_fields() {
   using O = CorrelationOptions;
   return OptionFields<O>()
-      .real("search_step", &O::cell, 0.02, 1.0, "of positions in the correlative search [m]")
-      .real("search_angle_step", &O::angle_step, 0.002, 1.0, "and of orientations [rad]")
+      .real("search_step", &O::cell, 0.05, 1.0, "of positions in the correlative search [m]")
+      .real("search_angle_step", &O::angle_step, 0.005, 1.0, "and of orientations [rad]")
       .real("search_blur", &O::blur, 0.01, 1.0,
             "standard deviation of the likelihood about a surface [m]")
       .real("search_least", &O::least_score, 0.0, 1.0,
@@ -95,8 +95,7 @@ OptionFields<ScanMatcherOptions> ScanMatcherOptions::fields() {
       .real("poor_distance", &O::poor_distance, 0.0, 100.0,
             "an expected position that may be further off is searched for first [m] (three "
             "standard deviations)")
-      .real("poor_angle", &O::poor_angle, 0.0, 3.15,
-            "likewise an expected orientation [rad]")
+      .real("poor_angle", &O::poor_angle, 0.0, 3.15, "likewise an expected orientation [rad]")
       .part(&O::surface, surface_fields())
       .part(&O::correlation, correlation_fields())
       .part(&O::refinement, refinement_fields())

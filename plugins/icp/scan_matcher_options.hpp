@@ -11,12 +11,12 @@ namespace cairn::icp {
 
 /// What a match must be to be accepted.
 struct AcceptanceOptions {
-  int least_matches = 20;       ///< points on lines
-  double least_overlap = 0.6;   ///< part of the points in each other's view that agree
-  double most_conflict = 0.1;   ///< part of the points not hidden that are in front of surfaces
-  double largest_rms = 0.06;    ///< of the residuals after trimming [m]
-  double margin = 0.06;         ///< by which the quality exceeds that of any other pose
-  double tolerance = 0.1;       ///< of ranges where points are compared with the other scan [m]
+  int least_matches = 20;        ///< points on lines
+  double least_overlap = 0.6;    ///< part of the points in each other's view that agree
+  double most_conflict = 0.055;  ///< part of the points not hidden that are in front of surfaces
+  double largest_rms = 0.06;     ///< of the residuals after trimming [m]
+  double margin = 0.06;          ///< by which the quality exceeds that of any other pose
+  double tolerance = 0.1;        ///< of ranges where points are compared with the other scan [m]
 };
 
 /// Options of the registration `icp` and of `ScanMatcher`.

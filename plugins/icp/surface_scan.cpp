@@ -20,6 +20,10 @@ constexpr double kShrinkage = 4.0;
 /// The line through both sides is taken unless one of a single side has a variance so much smaller.
 constexpr double kBothSides = 2.0;
 constexpr int kFewestPoints = 4;
+/// Of a line's points, Σ s² at least [m²].
+constexpr double kLeastSpread = 1e-6;
+/// Ranges beyond this are as if nothing had been hit [m].
+constexpr double kFarthest = 200.0;
 /// Least of what `slope` says: grazing beams are no more precise across a surface.
 constexpr double kGrazing = 0.1;
 /// Surfaces with a larger slope determine the noise of ranges, if there are enough of them.
@@ -121,6 +125,8 @@ SurfaceScan::SurfaceScan(const LaserScan& scan, const SurfaceOptions& options) :
 }
 
 void SurfaceScan::find_points() {
+  if (!std::isfinite(scan_.first_angle) || !std::isfinite(scan_.angle_step)) scan_.ranges.clear();
+  scan_.max_range = std::min(scan_.max_range, kFarthest);
   const float most = static_cast<float>(scan_.max_range);
   bool before = false;
   for (std::size_t beam = 0; beam < scan_.ranges.size(); ++beam) {
@@ -163,8 +169,8 @@ void SurfaceScan::fit_lines(const SurfaceOptions& options) {
     const int few = options.neighbours;
     Window best{reach(-1, few), reach(1, few)};
     const bool one_sided = k - best.first < 2 || best.last - k < 2;
-    double least = one_sided ? std::numeric_limits<double>::infinity()
-                             : moments.variance(best) / kBothSides;
+    double least =
+        one_sided ? std::numeric_limits<double>::infinity() : moments.variance(best) / kBothSides;
     if (least < noise) least = 0.0;  // as good as can be expected
     for (const Window& side : {Window{reach(-1, few + 1), k}, Window{k, reach(1, few + 1)}}) {
       const double variance = moments.variance(side);
@@ -173,8 +179,8 @@ void SurfaceScan::fit_lines(const SurfaceOptions& options) {
         best = side;
       }
     }
-    if (moments.variance(best) < most) lines_[static_cast<std::size_t>(k)] =
-        line_through(moments, best, points_);
+    if (moments.variance(best) < most && moments.of(best).along() > kLeastSpread)
+      lines_[static_cast<std::size_t>(k)] = line_through(moments, best, points_);
   }
 }
 

@@ -14,13 +14,13 @@ namespace cairn::icp {
 
 /// A straight piece of surface: the line through neighbouring points of a scan, by least squares.
 struct SurfaceLine {
-  Eigen::Vector2d centre = Eigen::Vector2d::Zero();   ///< of its points [m]
+  Eigen::Vector2d centre = Eigen::Vector2d::Zero();  ///< of its points [m]
   Eigen::Vector2d tangent = Eigen::Vector2d::UnitX();
   Eigen::Vector2d normal = Eigen::Vector2d::UnitY();  ///< towards the lidar
   double begin = 0.0, end = 0.0;  ///< its outermost points, along the tangent from the centre [m]
-  double spread = 0.0;            ///< Σ s² of its points, s along the tangent from the centre [m²]
-  double variance = 0.0;          ///< of a point's distance from the line [m²]
-  int first = 0, count = 0;       ///< its points; none: there is no line
+  double spread = 0.0;       ///< Σ s² of its points, s along the tangent from the centre [m²]
+  double variance = 0.0;     ///< of a point's distance from the line [m²]
+  int first = 0, count = 0;  ///< its points; none: there is no line
 
   bool exists() const { return count > 0; }
   /// Of the angle of the normal [rad²].
@@ -31,14 +31,16 @@ struct SurfaceLine {
 
 /// How surfaces are found in a scan.
 struct SurfaceOptions {
-  double sigma = 0.01;       ///< least standard deviation of a range [m]
-  double radius = 0.25;      ///< of the neighbourhood that a line is fitted to [m]
-  int neighbours = 3;        ///< on each side at least
-  double roughness = 0.08;   ///< largest standard deviation of points from a line [m]
+  double sigma = 0.01;      ///< least standard deviation of a range [m]
+  double radius = 0.25;     ///< of the neighbourhood that a line is fitted to [m]
+  int neighbours = 3;       ///< on each side at least
+  double roughness = 0.08;  ///< largest standard deviation of points from a line [m]
 };
 
 /// A laser scan prepared for matching: its points in the robot's frame, for each the line through
 /// its neighbours, and a search tree.
+///
+/// Ranges beyond 200 m count as that: nothing was hit.
 ///
 /// A line never reaches over a gap in the scan. For each point three are fitted, to the neighbours
 /// on both sides and on either side alone; the one with the least variance is taken, so that lines

@@ -25,8 +25,7 @@ struct Visibility {
   double overlap() const { return seen() == 0 ? 0.0 : static_cast<double>(agreeing) / seen(); }
   /// Part of the points that are not hidden and are in front; 1 if there are none.
   double conflict() const {
-    return agreeing + in_front == 0 ? 1.0
-                                    : static_cast<double>(in_front) / (agreeing + in_front);
+    return agreeing + in_front == 0 ? 1.0 : static_cast<double>(in_front) / (agreeing + in_front);
   }
 };
 

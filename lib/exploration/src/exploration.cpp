@@ -22,6 +22,8 @@ namespace {
 constexpr int kMostIdle = 20;
 constexpr double kNoMotion = 0.005;  // [m], [rad]
 constexpr int kMostEmptyDecisions = 3;
+/// Collisions without a free motion in between.
+constexpr int kMostCollisions = 10;
 /// The known floor must grow by this factor to be progress.
 constexpr double kProgress = 1.002;
 
@@ -127,6 +129,8 @@ class Run {
     } else if (result_.steps.back().distance - useful_distance_ > limits.idle_distance) {
       end(ExplorationEnd::stuck,
           fmt::format("{:g} m were driven without finding more floor", limits.idle_distance));
+    } else if (collisions_in_row_ >= kMostCollisions) {
+      end(ExplorationEnd::stuck, fmt::format("{} collisions in a row", kMostCollisions));
     } else if (idle_ >= kMostIdle) {
       end(ExplorationEnd::stuck, fmt::format("{} motions in a row were stopped", kMostIdle));
     } else if (empty_decisions_ >= kMostEmptyDecisions) {
@@ -191,11 +195,21 @@ class Run {
     const double driven = step.odometry.translation().norm();
     const bool idle = std::max(driven, std::abs(step.odometry.theta())) < kNoMotion;
     idle_ = idle ? idle_ + 1 : 0;
+    if (!step.collided && !backing_off_ && driven > robot_.radius) collisions_in_row_ = 0;
     const Pose2 expected = slam_.pose() * step.odometry;
     slam_.add(step.odometry, step.covariance, std::move(step.scan), parts_.world.truth());
     record(driven);
     const double jump = (slam_.pose().translation() - expected.translation()).norm();
+    if (step.collided) back_off();
     return !step.collided && jump <= slam_.map().frame.resolution;
+  }
+
+  /// After a collision: the same motion from the same place would end like it.
+  void back_off() {
+    if (std::exchange(backing_off_, true)) return;
+    ++collisions_in_row_;
+    move(Pose2(-robot_.radius, 0.0, 0.0));
+    backing_off_ = false;
   }
 
   void watch_progress(const ExplorationStep& step) {
@@ -235,8 +249,8 @@ class Run {
   ScanSlam slam_;
   ExplorationResult result_;
   Pose2 start_;
-  bool ended_ = false;
-  int decisions_ = 0, empty_decisions_ = 0, idle_ = 0;
+  bool ended_ = false, backing_off_ = false;
+  int decisions_ = 0, empty_decisions_ = 0, idle_ = 0, collisions_in_row_ = 0;
   double most_coverage_ = 0.0, useful_distance_ = 0.0;
 };
 

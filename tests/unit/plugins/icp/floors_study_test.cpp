@@ -12,8 +12,8 @@
 #include <utility>
 #include <vector>
 
-#include <Eigen/LU>
 #include <gtest/gtest.h>
+#include <Eigen/LU>
 
 #include "cairn/grid/grid_format.hpp"
 #include "cairn/plugin/registry.hpp"
@@ -54,11 +54,17 @@ struct Outcome {
   bool all_observed() const { return accepted() && match.unobserved == 0; }
 };
 
-Outcome outcome_of(const test::ScanPair& pair, const ScanMatcher& matcher) {
+/// Errors of a poor guess, which is searched around, and of a good one, which is refined.
+constexpr test::PairRange kPoor{.position = 1.0, .angle = 0.35};
+constexpr test::PairRange kGood{.position = 0.2, .angle = 10.0 * kDegree};
+
+Outcome outcome_of(const test::ScanPair& pair, const ScanMatcher& matcher, bool good_guess) {
   Outcome outcome;
   const auto begin = std::chrono::steady_clock::now();
-  outcome.match = matcher.search(matcher.prepare(pair.earlier), matcher.prepare(pair.later),
-                                 pair.guess, matcher.options().window);
+  const icp::SurfaceScan earlier = matcher.prepare(pair.earlier);
+  const icp::SurfaceScan later = matcher.prepare(pair.later);
+  outcome.match = good_guess ? matcher.refine(earlier, later, pair.guess)
+                             : matcher.search(earlier, later, pair.guess, matcher.options().window);
   const std::chrono::duration<double, std::milli> time = std::chrono::steady_clock::now() - begin;
   outcome.milliseconds = time.count();
   outcome.error = outcome.match.pose.local(pair.truth);
@@ -67,7 +73,16 @@ Outcome outcome_of(const test::ScanPair& pair, const ScanMatcher& matcher) {
   return outcome;
 }
 
-std::vector<Outcome> study(const std::string& floor, int pairs, std::uint64_t seed) {
+/// The environment variable as a number, or what is given.
+int asked(const char* variable, int otherwise) {
+  const char* const text = std::getenv(variable);
+  return text ? std::atoi(text) : otherwise;
+}
+
+/// CAIRN_ICP_PAIRS: so many pairs instead of 200; CAIRN_ICP_SEED.
+std::vector<Outcome> study(const std::string& floor, bool good_guess) {
+  const int pairs = asked("CAIRN_ICP_PAIRS", 200);
+  const auto seed = static_cast<std::uint64_t>(asked("CAIRN_ICP_SEED", 11));
   Registry registry;
   const OccupancyGrid grid =
       read_grid((test::data_folder() / "maps" / (floor + ".yaml")).string(), registry);
@@ -77,7 +92,8 @@ std::vector<Outcome> study(const std::string& floor, int pairs, std::uint64_t se
   std::vector<Outcome> all;
   for (int k = 0; k < pairs; ++k) {
     const double sigma = random.uniform(0.01, 0.05);
-    all.push_back(outcome_of(drawn.draw({.sigma = sigma}), matcher));
+    const test::ScanPair pair = drawn.draw({.sigma = sigma}, kPoor, good_guess ? kGood : kPoor);
+    all.push_back(outcome_of(pair, matcher, good_guess));
     all.back().sigma = sigma;
   }
   return all;
@@ -92,8 +108,8 @@ void write_table(const std::vector<Outcome>& all, const std::string& file) {
     out << to_string(match.verdict) << ',' << one.sigma << ',' << one.error[0] << ','
         << one.error[1] << ',' << one.error[2] << ',' << one.nees << ',' << match.unobserved << ','
         << match.matches << ',' << match.share << ',' << match.rms << ','
-        << match.visibility.overlap() << ',' << match.visibility.conflict() << ','
-        << match.quality << ',' << match.runner_up << ',' << one.milliseconds << '\n';
+        << match.visibility.overlap() << ',' << match.visibility.conflict() << ',' << match.quality
+        << ',' << match.runner_up << ',' << one.milliseconds << '\n';
   }
 }
 
@@ -140,8 +156,8 @@ Summary summary_of(const std::vector<Outcome>& all) {
       .unobserved = part_of(all, &Outcome::accepted) - part_of(all, &Outcome::all_observed),
       .nees = mean(plausible),
       .median_nees = quantile(every, 0.5),
-      .beyond = static_cast<double>(std::ranges::count_if(
-                    every, [](double nees) { return nees > kLikely; })) /
+      .beyond = static_cast<double>(
+                    std::ranges::count_if(every, [](double nees) { return nees > kLikely; })) /
                 static_cast<double>(every.size()),
       .milliseconds = quantile(milliseconds, 0.5),
       .slow_milliseconds = quantile(milliseconds, 0.95),
@@ -152,28 +168,19 @@ void print(const std::string& floor, const Summary& sum) {
   std::cout << floor << " [%]: right " << 100 * sum.right << ", imprecise " << 100 * sum.imprecise
             << ", wrong " << 100 * sum.wrong << " (far off " << 100 * sum.far_off << "), rejected "
             << 100 * sum.rejected << "; a direction not observed " << 100 * sum.unobserved
-            << "; NEES " << sum.nees << ", median " << sum.median_nees << ", beyond 95 %: "
-            << 100 * sum.beyond << "; " << sum.milliseconds << " ms, 95 % below "
-            << sum.slow_milliseconds << " ms\n";
-}
-
-/// The environment variable as a number, or what is given.
-int asked(const char* variable, int otherwise) {
-  const char* const text = std::getenv(variable);
-  return text ? std::atoi(text) : otherwise;
+            << "; NEES " << sum.nees << ", median " << sum.median_nees
+            << ", beyond 95 %: " << 100 * sum.beyond << "; " << sum.milliseconds
+            << " ms, 95 % below " << sum.slow_milliseconds << " ms\n";
 }
 
 class FloorsStudy : public testing::TestWithParam<const char*> {};
 
-/// CAIRN_ICP_PAIRS: so many pairs instead of 200; CAIRN_ICP_SEED; CAIRN_ICP_TABLE: a folder for a
-/// table of all pairs by floor.
+/// CAIRN_ICP_TABLE: a folder for a table of all pairs by floor.
 TEST_P(FloorsStudy, MatchesAreRightAdmittedlyImpreciseOrRejected) {
   CAIRN_NEEDS_DATA();
   CAIRN_NEEDS("grid_format", "ros");
   const std::string floor = GetParam();
-  const std::vector<Outcome> all =
-      study(floor, asked("CAIRN_ICP_PAIRS", 200),
-            static_cast<std::uint64_t>(asked("CAIRN_ICP_SEED", 11)));
+  const std::vector<Outcome> all = study(floor, false);
   if (const char* const folder = std::getenv("CAIRN_ICP_TABLE"))
     write_table(all, std::string(folder) + "/" + floor + ".csv");
   const Summary sum = summary_of(all);
@@ -184,6 +191,16 @@ TEST_P(FloorsStudy, MatchesAreRightAdmittedlyImpreciseOrRejected) {
   EXPECT_LT(sum.rejected, 0.15);
   EXPECT_GT(sum.nees, 2.0);
   EXPECT_LT(sum.nees, 4.0);
+}
+
+TEST_P(FloorsStudy, AGoodGuessNeedsNoSearch) {
+  CAIRN_NEEDS_DATA();
+  CAIRN_NEEDS("grid_format", "ros");
+  const Summary sum = summary_of(study(GetParam(), true));
+  print(std::string(GetParam()) + ", good guess", sum);
+  EXPECT_GT(sum.right, 0.75);
+  EXPECT_LE(sum.wrong, 0.015);
+  EXPECT_LE(sum.far_off, 0.005);
 }
 
 INSTANTIATE_TEST_SUITE_P(Floors, FloorsStudy,

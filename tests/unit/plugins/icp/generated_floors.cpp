@@ -47,7 +47,8 @@ LaserScan Walls::scan(const Pose2& from, const LidarModel& lidar) const {
 
 Walls furnished_room() {
   Walls walls;
-  walls.polygon({{0, 0}, {6, 0}, {6, 2.5}, {5, 4}, {3.2, 4}, {3.2, 4.6}, {2.2, 4.6}, {2.2, 4}, {0, 4}});
+  walls.polygon(
+      {{0, 0}, {6, 0}, {6, 2.5}, {5, 4}, {3.2, 4}, {3.2, 4.6}, {2.2, 4.6}, {2.2, 4}, {0, 4}});
   walls.polygon({{4.2, 1.5}, {4.6, 1.5}, {4.6, 1.9}, {4.2, 1.9}});
   return walls;
 }

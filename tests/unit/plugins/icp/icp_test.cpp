@@ -64,7 +64,9 @@ TEST_F(IcpTest, SearchesWhereAPoorGuessSaysAndRefinesAGoodOne) {
   expect_truth(registration_->match_proposed(
       {.earlier = 7, .later = 3, .expected = expected(Pose2(1.3, -0.2, 0.1), 0.5, 0.1)}));
   expect_truth(registration_->match_proposed(
-      {.earlier = 7, .later = 3, .expected = expected(truth_ * Pose2(0.1, 0.1, 0.05), 0.05, 0.02)}));
+      {.earlier = 7,
+       .later = 3,
+       .expected = expected(truth_ * Pose2(0.1, 0.1, 0.05), 0.05, 0.02)}));
   expect_truth(registration_->match_proposed(
       {.earlier = 3, .later = 7, .expected = expected(truth_.inverse(), 1e6, 1e6)}));
 }

@@ -6,10 +6,10 @@
 #include <utility>
 #include <vector>
 
-#include <Eigen/Eigenvalues>
-#include <Eigen/LU>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
 
 #include "generated_floors.hpp"
 #include "scan_matcher.hpp"
@@ -146,8 +146,8 @@ TEST(ScanMatcher, ACorridorWithoutNoiseIsAcceptedAcross) {
 TEST(ScanMatcher, ScansOfDifferentRoomsAreRejected) {
   test::Walls other;
   other.polygon({{0, 0}, {3, 0}, {3, 1}, {4.5, 2}, {3, 5}, {0.5, 4.5}, {1, 2.5}});
-  const ScanMatch match = search(test::furnished_room().scan(Pose2(1.5, 1.8, 0.2)),
-                                 other.scan(Pose2(2.0, 2.2, 1.0)));
+  const ScanMatch match =
+      search(test::furnished_room().scan(Pose2(1.5, 1.8, 0.2)), other.scan(Pose2(2.0, 2.2, 1.0)));
   EXPECT_FALSE(match.accepted()) << match.pose;
 }
 
@@ -162,8 +162,7 @@ TEST(ScanMatcher, RepeatedFeaturesAreAmbiguous) {
       corners.emplace_back(x + dx, y);
   test::Walls walls;
   walls.polygon(corners);
-  const ScanMatch match =
-      search(walls.scan(Pose2(0.1, 0, 0)), walls.scan(Pose2(0.4, 0.1, 0.05)));
+  const ScanMatch match = search(walls.scan(Pose2(0.1, 0, 0)), walls.scan(Pose2(0.4, 0.1, 0.05)));
   EXPECT_EQ(match.verdict, Verdict::ambiguous);
 }
 
@@ -192,6 +191,32 @@ TEST(ScanMatcher, ScansWithHardlyAnythingInThemAreRejected) {
       EXPECT_FALSE(search(a, b).accepted());
       EXPECT_FALSE(refine(a, b, Pose2()).accepted());
     }
+  }
+}
+
+TEST(ScanMatcher, ScansThatMakeNoSenseAreRejected) {
+  const LaserScan room = test::furnished_room().scan(Pose2(1.5, 1.8, 0.2));
+  LaserScan nowhere = room, one_beam = room, endless = room, backwards = room, fan = room;
+  nowhere.first_angle = std::numeric_limits<double>::quiet_NaN();
+  one_beam.angle_step = 0.0;
+  one_beam.ranges.assign(181, 2.0F);
+  endless.max_range = std::numeric_limits<double>::infinity();
+  endless.ranges.assign(181, 1e30F);
+  backwards.max_range = -1.0;
+  fan.angle_step = 1e-300;
+  for (const LaserScan& scan : {nowhere, one_beam, endless, backwards, fan}) {
+    for (const auto& [a, b] : {std::pair{scan, room}, {room, scan}, {scan, scan}}) {
+      EXPECT_FALSE(search(a, b).accepted());
+      EXPECT_FALSE(refine(a, b, Pose2(0.1, 0.0, 0.0)).accepted());
+    }
+  }
+}
+
+TEST(ScanMatcher, AGuessFarFromEverythingOrNoNumberIsRejected) {
+  const LaserScan room = test::furnished_room().scan(Pose2(1.5, 1.8, 0.2));
+  for (const double x : {30.0, 1e12, std::numeric_limits<double>::quiet_NaN()}) {
+    EXPECT_FALSE(search(room, room, Pose2(x, 0.0, 0.0)).accepted());
+    EXPECT_FALSE(refine(room, room, Pose2(x, 0.0, 0.0)).accepted());
   }
 }
 

@@ -57,20 +57,19 @@ double ScanPairs::gaussian() {
 LaserScan ScanPairs::scan(const Pose2& from, const LidarModel& lidar) {
   LaserScan scan{lidar.first_angle(), lidar.step(), lidar.range, {}};
   for (int beam = 0; beam < lidar.beams; ++beam) {
-    const RayHit hit =
-        caster_.cast(from.translation(),
-                     from.theta() + scan.angle(static_cast<std::size_t>(beam)), lidar.range);
+    const RayHit hit = caster_.cast(
+        from.translation(), from.theta() + scan.angle(static_cast<std::size_t>(beam)), lidar.range);
     const double range = hit.hit ? hit.range + lidar.sigma * gaussian() : lidar.range;
     scan.ranges.push_back(static_cast<float>(range));
   }
   return scan;
 }
 
-ScanPair ScanPairs::draw(const LidarModel& lidar, const PairRange& range) {
-  const auto nearby = [&] {
-    const double x = random_.uniform(-range.position, range.position);
-    const double y = random_.uniform(-range.position, range.position);
-    return Pose2(x, y, random_.uniform(-range.angle, range.angle));
+ScanPair ScanPairs::draw(const LidarModel& lidar, const PairRange& range, const PairRange& off) {
+  const auto within = [&](const PairRange& box) {
+    const double x = random_.uniform(-box.position, box.position);
+    const double y = random_.uniform(-box.position, box.position);
+    return Pose2(x, y, random_.uniform(-box.angle, box.angle));
   };
   for (;;) {
     const std::size_t cell = standing_[static_cast<std::size_t>(
@@ -78,15 +77,16 @@ ScanPair ScanPairs::draw(const LidarModel& lidar, const PairRange& range) {
     const int width = frame_.width, index = static_cast<int>(cell);
     const Vector2d at = frame_.centre(index % width, index / width);
     const Pose2 first(at.x(), at.y(), random_.uniform(-std::numbers::pi, std::numbers::pi));
-    const Pose2 truth = nearby(), second = first * truth;
+    const Pose2 truth = within(range), second = first * truth;
     if (!is_clear(second.translation())) continue;
     const Vector2d way = second.translation() - at;
     if (caster_.cast(at, std::atan2(way.y(), way.x()), way.norm()).hit) continue;
-    const Pose2 off = nearby();
+    const Pose2 error = within(off);
     return {.earlier = scan(first, lidar),
             .later = scan(second, lidar),
             .truth = truth,
-            .guess = Pose2(truth.x() + off.x(), truth.y() + off.y(), truth.theta() + off.theta())};
+            .guess =
+                Pose2(truth.x() + error.x(), truth.y() + error.y(), truth.theta() + error.theta())};
   }
 }
 

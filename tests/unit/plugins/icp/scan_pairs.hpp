@@ -32,8 +32,8 @@ class ScanPairs {
  public:
   ScanPairs(const OccupancyGrid& floor, std::uint64_t seed);
 
-  /// Standard deviation of all ranges of the pair [m].
-  ScanPair draw(const LidarModel& lidar, const PairRange& range = {});
+  /// `range` is that of the relative poses, `off` that of the guesses' errors.
+  ScanPair draw(const LidarModel& lidar, const PairRange& range, const PairRange& off);
   LaserScan scan(const Pose2& from, const LidarModel& lidar);
 
  private:
