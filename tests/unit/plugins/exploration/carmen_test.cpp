@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <cmath>
+#include <numbers>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "cairn/exploration/map_log.hpp"
+#include "cairn/exploration/map_truth.hpp"
+#include "cairn/exploration/scan_log.hpp"
+#include "cairn/grid/ray_caster.hpp"
+#include "cairn/plugin/registry.hpp"
+#include "cairn/runtime/error.hpp"
+#include "unit/lib/exploration/drawn_map.hpp"
+
+namespace cairn {
+namespace {
+
+using std::numbers::pi;
+using testing::HasSubstr;
+
+ScanLog read(const std::string& text, const std::string& options = "range=20") {
+  return Registry().make<ScanLogFormat>(parse_component("carmen:" + options))->read(text, "a.clf");
+}
+
+std::string refusal(const std::string& text) {
+  try {
+    read(text);
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ErrorCode::input);
+    return error.what();
+  }
+  return "taken";
+}
+
+TEST(Carmen, ScansAreReadWithTheLasersPose) {
+  const ScanLog log = read(
+      "# a comment\nPARAM robot_length 0.47 1.0 host 1.0\nODOM 1 2 0.5 0 0 0 9.5 host 0.1\n"
+      "FLASER 4 1.5 25.25 81.91 3 1 2 0.5 1.1 2.1 0.6 10.25 host 0.2\r\n\n"
+      "FLASER 3 1 2 3 -1 -2 -0.5 0 0 0 11 host 0.3");
+  ASSERT_EQ(log.scans.size(), 2U);
+  const LoggedScan& first = log.scans.front();
+  EXPECT_EQ(first.stamp, 10.25);
+  EXPECT_EQ(first.odometry.x(), 1.0);
+  EXPECT_EQ(first.odometry.theta(), 0.5);
+  ASSERT_EQ(first.scan.ranges.size(), 4U);
+  EXPECT_EQ(first.scan.ranges[0], 1.5F);
+  EXPECT_EQ(first.scan.ranges[1], 20.0F);  // free as far as it is trusted
+  EXPECT_TRUE(std::isnan(first.scan.ranges[2]));
+  // An even number of beams ends a step before the left, an odd one there.
+  EXPECT_DOUBLE_EQ(first.scan.angle(0), -0.5 * pi);
+  EXPECT_DOUBLE_EQ(first.scan.angle(3), 0.25 * pi);
+  EXPECT_DOUBLE_EQ(log.scans[1].scan.angle(2), 0.5 * pi);
+}
+
+TEST(Carmen, WhatCannotBeReadIsNamedWithItsLine) {
+  EXPECT_THAT(refusal("ODOM 1 2 3\n"), HasSubstr("no line begins with FLASER"));
+  EXPECT_THAT(refusal("\nFLASER 3 1 2 3 0 0\n"), HasSubstr("a.clf:2: theta is missing"));
+  EXPECT_THAT(refusal("FLASER 2 1 x 0 0 0 0 0 0 1 h 1"), HasSubstr("'x' is no finite number"));
+  EXPECT_THAT(refusal("FLASER 2 1 nan 0 0 0 0 0 0 1 h 1"), HasSubstr("no finite number"));
+  EXPECT_THAT(refusal("FLASER 1e9 1 2 0 0 0 0 0 0 1 h 1"), HasSubstr("no number of readings"));
+  EXPECT_THAT(refusal("FLASER 2.5 1 2 0 0 0 0 0 0 1 h 1"), HasSubstr("no number of readings"));
+  EXPECT_THAT(refusal("FLASER -1"), HasSubstr("no number of readings"));
+  EXPECT_THAT(refusal("FLASER"), HasSubstr("no line begins"));
+}
+
+/// A drive around a hall, with exact scans and odometry that is wrong by a constant turn.
+TEST(MapLog, AMapIsBuiltAndOdometryCorrected) {
+  Registry registry;
+  if (!registry.has("registration", "icp")) GTEST_SKIP() << "without icp";
+  const OccupancyGrid floor = test::drawn_floor(
+      {"##############", "#............#", "#..##........#", "#..##....##..#", "#........##..#",
+       "#............#", "#...##.......#", "#............#", "##############"});
+  const RayCaster rays(floor);
+  ScanLog log;
+  Pose2 truth(2.0, 3.5, 0.0), odometry = truth;
+  constexpr int kScans = 90;
+  for (int k = 0; k < kScans; ++k) {
+    LoggedScan logged{.stamp = 0.1 * k,
+                      .odometry = odometry,
+                      .scan = {.first_angle = -0.5 * pi,
+                               .angle_step = pi / 180,
+                               .max_range = 8.0,
+                               .ranges = {}}};
+    for (int beam = 0; beam <= 180; ++beam) {
+      const double angle = truth.theta() + logged.scan.angle(static_cast<std::size_t>(beam));
+      const RayHit hit = rays.cast(truth.translation(), angle, 8.0);
+      logged.scan.ranges.push_back(static_cast<float>(hit.range));
+    }
+    log.scans.push_back(std::move(logged));
+    // There, a turn on the spot, and back.
+    const bool turns = k >= 40 && k < 50;
+    const Pose2 motion = turns ? Pose2(0.0, 0.0, 0.1 * pi) : Pose2(0.22, 0.0, 0.0);
+    if (k + 1 == kScans) break;
+    truth = truth * motion;
+    odometry = odometry * Pose2(motion.x(), 0.0, motion.theta() + 0.01);
+  }
+  const auto policy = registry.make<PosePolicy>(
+      parse_component("compact_pose:range=2,angle=3.14,reuse=false"));
+  const auto icp = registry.make<Registration>("icp");
+  const auto mapper = registry.make<Mapper>("log_odds");
+  ScanSlam slam({*policy, *icp, *mapper, registry});
+  const MappedLog result = map_log(log, slam, {.step = 0.2, .turn = 0.2});
+  EXPECT_TRUE(result.converged);
+  EXPECT_EQ(result.scans, static_cast<std::size_t>(kScans));  // each is a step further
+  EXPECT_GT(slam.counts().loops, 30);
+  const auto error = [&](const Pose2& pose) {
+    return (pose.translation() - truth.translation()).norm();
+  };
+  EXPECT_GT(error(odometry), 1.0);
+  EXPECT_LT(error(slam.poses().back()), 0.1);
+  // Free floor is free.
+  const MapTruth against = compare_with_floor(slam.map(), floor, {}, {2.0, 3.5});
+  EXPECT_GT(against.seen, 0.9 * against.floor);
+  EXPECT_LT(against.occupied_wrong, 0.5);
+}
+
+}  // namespace
+}  // namespace cairn
