@@ -101,15 +101,17 @@ std::vector<Outcome> study(const std::string& floor, bool good_guess) {
 
 void write_table(const std::vector<Outcome>& all, const std::string& file) {
   std::ofstream out(file);
-  out << "verdict,sigma,error_x,error_y,error_angle,nees,unobserved,matches,share,rms,overlap,"
+  out << "verdict,sigma,error_x,error_y,error_angle,sigma_x,sigma_y,sigma_angle,nees,unobserved,"
+         "matches,share,rms,overlap,"
          "conflict,quality,runner_up,milliseconds\n";
   for (const Outcome& one : all) {
     const ScanMatch& match = one.match;
     out << to_string(match.verdict) << ',' << one.sigma << ',' << one.error[0] << ','
-        << one.error[1] << ',' << one.error[2] << ',' << one.nees << ',' << match.unobserved << ','
-        << match.matches << ',' << match.share << ',' << match.rms << ','
-        << match.visibility.overlap() << ',' << match.visibility.conflict() << ',' << match.quality
-        << ',' << match.runner_up << ',' << one.milliseconds << '\n';
+        << one.error[1] << ',' << one.error[2] << ',' << std::sqrt(match.covariance(0, 0)) << ','
+        << std::sqrt(match.covariance(1, 1)) << ',' << std::sqrt(match.covariance(2, 2)) << ','
+        << one.nees << ',' << match.unobserved << ',' << match.matches << ',' << match.share << ','
+        << match.rms << ',' << match.visibility.overlap() << ',' << match.visibility.conflict()
+        << ',' << match.quality << ',' << match.runner_up << ',' << one.milliseconds << '\n';
   }
 }
 
