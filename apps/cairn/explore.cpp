@@ -48,8 +48,9 @@ void merge(const std::string& words, const char* option, ComponentSpec& spec) {
   if (words.empty()) return;
   for (const auto& [key, value] : parse_component(fmt::format("{}:{}", spec.name, words)).values) {
     if (!spec.values.emplace(key, value).second)
-      throw Error(ErrorCode::usage,
-                  fmt::format("{}: '{}' is among the options of --world too: give one", option, key));
+      throw Error(
+          ErrorCode::usage,
+          fmt::format("{}: '{}' is among the options of --world too: give one", option, key));
   }
 }
 
@@ -221,7 +222,8 @@ int run_explore(const ExploreOptions& options, Session& session) {
       .limits = limits,
       .interrupt = &guard.flag(),
       .decided = [&](const Decision& decision, const Situation&) { progress.decided(decision); },
-      .moved = [&](const ExplorationStep& step, const FloorMap& map) { progress.moved(step, map); }};
+      .moved = [&](const ExplorationStep& step,
+                   const FloorMap& map) { progress.moved(step, map); }};
   const ExploreOutcome outcome{.floor = options.floor,
                                .frame = floor.frame,
                                .parts = {.world = spec_text(world_name),
@@ -267,7 +269,9 @@ Command add_explore(ArgumentParser program) {
       .type_name("K=V,…");
   cli.add_option("--odometry", options->odometry, "its noise: relative=0.15,sigma_xy=0.01")
       .type_name("K=V,…");
-  cli.add_option("--start-x", options->start_x, "where the robot starts [m]; default: the widest place").type_name("M");
+  cli.add_option("--start-x", options->start_x,
+                 "where the robot starts [m]; default: the widest place")
+      .type_name("M");
   cli.add_option("--start-y", options->start_y, "goes with --start-x").type_name("M");
   cli.add_option("--start-theta", options->start_theta, "its heading there [rad]").type_name("RAD");
   cli.add_option("--seed", options->seed, "of all noise and random choices")

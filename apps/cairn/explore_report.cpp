@@ -111,15 +111,14 @@ std::string steps_csv(const ExplorationResult& result) {
       "step,decision,distance,x,y,theta,true_x,true_y,true_theta,coverage,map_entropy,"
       "trajectory_entropy,kept,loops,collisions\n";
   for (const ExplorationStep& step : result.steps) {
-    const std::string truth =
-        step.truth ? fmt::format("{:.9g},{:.9g},{:.9g}", step.truth->x(), step.truth->y(),
-                                 step.truth->theta())
-                   : ",,";
-    text += fmt::format("{},{},{:.9g},{:.9g},{:.9g},{:.9g},{},{:.9g},{:.9g},{:.9g},{},{},{}\n",
-                        step.step, step.decision, step.distance, step.estimate.x(),
-                        step.estimate.y(), step.estimate.theta(), truth, step.coverage,
-                        step.map_entropy, step.trajectory_entropy, step.kept, step.loops,
-                        step.collisions);
+    const std::string truth = step.truth ? fmt::format("{:.9g},{:.9g},{:.9g}", step.truth->x(),
+                                                       step.truth->y(), step.truth->theta())
+                                         : ",,";
+    text +=
+        fmt::format("{},{},{:.9g},{:.9g},{:.9g},{:.9g},{},{:.9g},{:.9g},{:.9g},{},{},{}\n",
+                    step.step, step.decision, step.distance, step.estimate.x(), step.estimate.y(),
+                    step.estimate.theta(), truth, step.coverage, step.map_entropy,
+                    step.trajectory_entropy, step.kept, step.loops, step.collisions);
   }
   return text;
 }
@@ -129,30 +128,31 @@ std::string summary_text(const ExploreOutcome& outcome) {
   const ExplorationStep& last = result.steps.back();
   Table table({{"", Table::Align::left}, {"", Table::Align::left}});
   table.add({"end", fmt::format("{}: {}", to_string(result.end), result.why)});
-  table.add({"drive", fmt::format("{:.1f} m in {}, {}, {}", last.distance,
-                                  plural(last.step, "motion"),
-                                  plural(std::ssize(result.decision_seconds), "decision"),
-                                  plural(result.collisions, "collision"))});
+  table.add(
+      {"drive", fmt::format("{:.1f} m in {}, {}, {}", last.distance, plural(last.step, "motion"),
+                            plural(std::ssize(result.decision_seconds), "decision"),
+                            plural(result.collisions, "collision"))});
   std::string map = fmt::format("{:.1f} m² known", result.map.coverage());
   if (result.against) {
-    map += fmt::format(", {:.1f} % of the {:.1f} m² that hang together with the start; wrong: {:.2f} "
-                       "m² free, {:.2f} m² occupied",
-                       100.0 * result.against->seen / result.against->floor, result.against->floor,
-                       result.against->free_wrong, result.against->occupied_wrong);
+    map += fmt::format(
+        ", {:.1f} % of the {:.1f} m² that hang together with the start; wrong: {:.2f} "
+        "m² free, {:.2f} m² occupied",
+        100.0 * result.against->seen / result.against->floor, result.against->floor,
+        result.against->free_wrong, result.against->occupied_wrong);
   }
   table.add({"map", map});
   std::string poses = fmt::format("{} of {} kept, {}", result.graph.variable_count(),
                                   plural(result.trajectory.variable_count(), "pose"),
                                   plural(result.slam.loops, "loop closure"));
   if (const auto error = error_of(result))
-    poses += fmt::format("; error {:.3f} m, {:.2f}° (ATE)", error->ate_translation,
-                         error->ate_rotation);
+    poses +=
+        fmt::format("; error {:.3f} m, {:.2f}° (ATE)", error->ate_translation, error->ate_rotation);
   table.add({"graph", poses});
-  table.add({"time", fmt::format("{} deciding, {} mapping, {} estimating, {} matching scans",
-                                 seconds_text(result.decide_seconds),
-                                 seconds_text(result.slam.map_seconds),
-                                 seconds_text(result.slam.policy_seconds),
-                                 seconds_text(result.slam.registration_seconds))});
+  table.add({"time",
+             fmt::format("{} deciding, {} mapping, {} estimating, {} matching scans",
+                         seconds_text(result.decide_seconds), seconds_text(result.slam.map_seconds),
+                         seconds_text(result.slam.policy_seconds),
+                         seconds_text(result.slam.registration_seconds))});
   return table.text(false);
 }
 

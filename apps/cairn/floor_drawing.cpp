@@ -37,8 +37,8 @@ class Canvas {
   Canvas(const FloorMap& map, std::size_t width, std::size_t height, double tall) : map_(map) {
     find_known();
     const double columns = last_x_ - first_x_ + 1, rows = last_y_ - first_y_ + 1;
-    side_ = std::max({columns / static_cast<double>(width),
-                      rows / (tall * static_cast<double>(height)), 1.0});
+    side_ = std::max(
+        {columns / static_cast<double>(width), rows / (tall * static_cast<double>(height)), 1.0});
     tall_ = side_ * tall;
     width_ = static_cast<int>(std::ceil(columns / side_));
     height_ = static_cast<int>(std::ceil(rows / tall_));

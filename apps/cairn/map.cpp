@@ -90,11 +90,11 @@ std::string summary_text(const MapOutcome& outcome) {
   table.add({"graph", fmt::format("{} of {} kept, {}", outcome.graph.variable_count(),
                                   plural(static_cast<std::int64_t>(outcome.run.scans), "pose"),
                                   plural(outcome.counts.loops, "loop closure"))});
-  table.add({"time", fmt::format("{}: {} mapping, {} estimating, {} matching scans",
-                                 seconds_text(outcome.seconds),
-                                 seconds_text(outcome.counts.map_seconds),
-                                 seconds_text(outcome.counts.policy_seconds),
-                                 seconds_text(outcome.counts.registration_seconds))});
+  table.add(
+      {"time", fmt::format("{}: {} mapping, {} estimating, {} matching scans",
+                           seconds_text(outcome.seconds), seconds_text(outcome.counts.map_seconds),
+                           seconds_text(outcome.counts.policy_seconds),
+                           seconds_text(outcome.counts.registration_seconds))});
   return table.text(false);
 }
 

@@ -35,8 +35,7 @@ class HallRobot final : public cairn::World {
       const double angle = at_.theta() + scan.angle(static_cast<std::size_t>(beam));
       const double along_x = to_wall(at_.x(), std::cos(angle), 8.0);
       const double along_y = to_wall(at_.y(), std::sin(angle), 6.0);
-      scan.ranges.push_back(
-          static_cast<float>(std::min({along_x, along_y, lidar.range})));
+      scan.ranges.push_back(static_cast<float>(std::min({along_x, along_y, lidar.range})));
     }
     return scan;
   }

@@ -25,7 +25,8 @@ struct FrontierOptions {
         .real("length", &O::length, 0.0, 1000.0,
               "frontiers shorter than this count only when there are no longer ones, half as long "
               "at a time [m]")
-        .real("smallest", &O::smallest, 0.0, 1000.0, "shorter ones are left unexplored [m]; 0: shorter than the robot is wide")
+        .real("smallest", &O::smallest, 0.0, 1000.0,
+              "shorter ones are left unexplored [m]; 0: shorter than the robot is wide")
         .real("keep", &O::keep, 0.0, 1.0,
               "the frontier that it was on the way to counts as nearer, by this factor")
         .component<PathPlanner>("planner", &O::planner, "finds the paths");
@@ -39,9 +40,10 @@ constexpr double kSameGoal = 1.0;
 std::string end_text(const FrontierGoals& goals, double smallest) {
   if (goals.unreachable() == 0)
     return fmt::format("no frontier of {:g} m or more is left", smallest);
-  return fmt::format("no frontier of {:g} m or more is left that can be reached; {} without a path, "
-                     "the longest {:.1f} m",
-                     smallest, goals.unreachable(), goals.longest_unreachable());
+  return fmt::format(
+      "no frontier of {:g} m or more is left that can be reached; {} without a path, "
+      "the longest {:.1f} m",
+      smallest, goals.unreachable(), goals.longest_unreachable());
 }
 
 /// Drives to frontiers; which of them, the derived class decides.

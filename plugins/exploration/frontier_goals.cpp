@@ -83,8 +83,7 @@ std::size_t FrontierGoals::known_around(const Vector2d& point) const {
   std::size_t known = 0;
   for (int y = middle_y - reach; y <= middle_y + reach; ++y) {
     for (int x = middle_x - reach; x <= middle_x + reach; ++x) {
-      known += map.frame.contains(x, y) &&
-               map.cells[map.frame.index(x, y)] != CellState::unknown;
+      known += map.frame.contains(x, y) && map.cells[map.frame.index(x, y)] != CellState::unknown;
     }
   }
   return known;

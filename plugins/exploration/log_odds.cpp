@@ -36,9 +36,10 @@ struct LogOddsOptions {
         .real("limit", &O::limit, 0.1, 50.0, "most log odds of a cell, either way")
         .real("free", &O::free, 0.0, 0.5, "free below this probability of being occupied")
         .real("occupied", &O::occupied, 0.5, 1.0, "occupied above this probability")
-        .real("tolerance", &O::tolerance, 0.0, 10.0,
-              "a scan is drawn again when what it shows has moved by more than this part of a cell, "
-              "on average")
+        .real(
+            "tolerance", &O::tolerance, 0.0, 10.0,
+            "a scan is drawn again when what it shows has moved by more than this part of a cell, "
+            "on average")
         .boolean("smooth", &O::smooth,
                  "unknown cells that a square of 3 × 3 does not fit into are free, if most known "
                  "ones around are (morphological opening)");
@@ -76,8 +77,7 @@ class EvidenceGrid {
     Eigen::Vector2i last = (high / side).array().floor().cast<int>();
     const Eigen::Vector2i size(frame_.width, frame_.height);
     if (frame_.width > 0) {
-      if ((first.array() >= first_.array()).all() &&
-          (last.array() < (first_ + size).array()).all())
+      if ((first.array() >= first_.array()).all() && (last.array() < (first_ + size).array()).all())
         return;
       first = first.cwiseMin(first_);
       last = last.cwiseMax(first_ + size - Eigen::Vector2i::Ones());
@@ -251,12 +251,10 @@ class LogOdds final : public Mapper {
     map_.frame = grid_.frame();
     const auto limit = static_cast<float>(options_.limit);
     map_.log_odds.resize(grid_.evidence().size());
-    std::ranges::transform(grid_.evidence(), map_.log_odds.begin(),
-                           [&](const Evidence& cell) {
-                             const double sum =
-                                 options_.hit * cell.hits - options_.miss * cell.misses;
-                             return std::clamp(static_cast<float>(sum), -limit, limit);
-                           });
+    std::ranges::transform(grid_.evidence(), map_.log_odds.begin(), [&](const Evidence& cell) {
+      const double sum = options_.hit * cell.hits - options_.miss * cell.misses;
+      return std::clamp(static_cast<float>(sum), -limit, limit);
+    });
     map_.cells.resize(map_.log_odds.size());
     std::ranges::transform(map_.log_odds, map_.cells.begin(), [&](float value) {
       if (value < free_below_) return CellState::free;
@@ -285,7 +283,8 @@ class LogOdds final : public Mapper {
     for (int y = 0; y < map_.frame.height; ++y) {
       for (int x = 0; x < map_.frame.width; ++x) {
         const bool speck = unknown.at<std::uint8_t>(y, x) != 0 && kept.at<std::uint8_t>(y, x) == 0;
-        if (speck && mostly_free(before, x, y)) map_.cells[map_.frame.index(x, y)] = CellState::free;
+        if (speck && mostly_free(before, x, y))
+          map_.cells[map_.frame.index(x, y)] = CellState::free;
       }
     }
   }
@@ -330,8 +329,7 @@ class LogOdds final : public Mapper {
     constexpr std::array<std::array<int, 2>, 4> kSides{{{-1, 0}, {1, 0}, {0, -1}, {0, 1}}};
     return std::ranges::any_of(kSides, [&](const std::array<int, 2>& side) {
       const int u = x + side[0], v = y + side[1];
-      return !map_.frame.contains(u, v) ||
-             map_.cells[map_.frame.index(u, v)] == CellState::unknown;
+      return !map_.frame.contains(u, v) || map_.cells[map_.frame.index(u, v)] == CellState::unknown;
     });
   }
 
@@ -384,7 +382,6 @@ class LogOdds final : public Mapper {
 void cairn_register(cairn::Registrar& registrar) {
   using namespace cairn;
   using namespace cairn::exploration;
-  registrar.add<Mapper, LogOddsOptions>("log_odds", [](const LogOddsOptions& options) {
-    return std::make_unique<LogOdds>(options);
-  });
+  registrar.add<Mapper, LogOddsOptions>(
+      "log_odds", [](const LogOddsOptions& options) { return std::make_unique<LogOdds>(options); });
 }

@@ -24,11 +24,16 @@ class Explore : public ::testing::Test {
  protected:
   void SetUp() override {
     const Registry registry;
-    for (const auto& [kind, name] :
-         {std::pair{"world", "lidar_building"}, {"mapper", "log_odds"}, {"explorer", "frontier"},
-          {"path_planner", "grid_dijkstra"}, {"floor_plan", "rooms"},
-          {"floor_surveyor", "round_body"}, {"pose_policy", "compact_pose"},
-          {"registration", "simulated"}, {"grid_format", "ros"}, {"format", "g2o"}}) {
+    for (const auto& [kind, name] : {std::pair{"world", "lidar_building"},
+                                     {"mapper", "log_odds"},
+                                     {"explorer", "frontier"},
+                                     {"path_planner", "grid_dijkstra"},
+                                     {"floor_plan", "rooms"},
+                                     {"floor_surveyor", "round_body"},
+                                     {"pose_policy", "compact_pose"},
+                                     {"registration", "simulated"},
+                                     {"grid_format", "ros"},
+                                     {"format", "g2o"}}) {
       if (!registry.has(kind, name)) GTEST_SKIP() << "built without " << name;
     }
   }
@@ -71,12 +76,12 @@ TEST_F(Explore, SaysInFiveLinesWhatHappenedAndWritesAllOfIt) {
 TEST_F(Explore, TheSameCommandGivesTheSameRun) {
   const std::string first = folder_.file("a.csv"), second = folder_.file("b.csv"),
                     other = folder_.file("c.csv");
-  for (const auto& [file, seed, threads] : {std::tuple{first, "3", "1"}, {second, "3", "2"},
-                                            {other, "4", "1"}}) {
-    ASSERT_EQ(explore({"--steps", file, "--seed", seed, "--threads", threads, "--until",
-                       "distance=12"})
-                  .exit_code,
-              0);
+  for (const auto& [file, seed, threads] :
+       {std::tuple{first, "3", "1"}, {second, "3", "2"}, {other, "4", "1"}}) {
+    ASSERT_EQ(
+        explore({"--steps", file, "--seed", seed, "--threads", threads, "--until", "distance=12"})
+            .exit_code,
+        0);
   }
   EXPECT_EQ(read_text(first), read_text(second));
   EXPECT_NE(read_text(first), read_text(other));

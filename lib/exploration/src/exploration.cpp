@@ -35,12 +35,14 @@ bool is_open(const FloorMap& map, const Pose2& at, const PlannedPath& path, std:
   Eigen::Vector2d from = at.translation();
   bool leaving = true;
   for (std::size_t k = passed; k < path.points.size(); ++k) {
-    const bool open = traverse_cells(
-        frame.to_cells(from), frame.to_cells(path.points[k]), [&](int x, int y) {
+    const bool open =
+        traverse_cells(frame.to_cells(from), frame.to_cells(path.points[k]), [&](int x, int y) {
           if (!frame.contains(x, y)) return false;
           const std::size_t index = frame.index(x, y);
-          if (map.clearance[index] >= radius) leaving = false;
-          else if (!leaving) return false;
+          if (map.clearance[index] >= radius)
+            leaving = false;
+          else if (!leaving)
+            return false;
           return map.cells[index] != CellState::occupied;
         });
     if (!open) return false;
@@ -83,7 +85,8 @@ class Run {
   }
 
   void note_once(const std::string& note) {
-    if (std::ranges::find(result_.notes, note) == result_.notes.end()) result_.notes.push_back(note);
+    if (std::ranges::find(result_.notes, note) == result_.notes.end())
+      result_.notes.push_back(note);
   }
 
   void record(double driven) {
@@ -231,16 +234,16 @@ class Run {
     result_.truth_trajectory = slam_.truth().clone();
     result_.map_error = contradicted_area(result_.map, slam_.scans(), slam_.poses());
     if (parts_.start.floor && parts_.world.truth())
-      result_.against = compare_with_floor(result_.map, *parts_.start.floor, alignment(),
-                                           start_.translation());
+      result_.against =
+          compare_with_floor(result_.map, *parts_.start.floor, alignment(), start_.translation());
   }
 
   /// From the world of the estimate to that of the floor.
   Pose2 alignment() const {
     constexpr int kFewest = 3;  // poses that determine one
     if (result_.trajectory.variable_count() < kFewest) return {};
-    const Pose pose = align(
-        pair_by_id(trajectory(result_.trajectory), trajectory(result_.truth_trajectory)));
+    const Pose pose =
+        align(pair_by_id(trajectory(result_.trajectory), trajectory(result_.truth_trajectory)));
     return {pose.t.x(), pose.t.y(), std::atan2(pose.R(1, 0), pose.R(0, 0))};
   }
 

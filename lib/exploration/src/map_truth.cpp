@@ -60,8 +60,8 @@ bool near_obstacle(const OccupancyGrid& floor, const Eigen::Vector2d& point, dou
 
 }  // namespace
 
-MapTruth compare_with_floor(const FloorMap& map, const OccupancyGrid& floor,
-                            const Pose2& alignment, const Eigen::Vector2d& start) {
+MapTruth compare_with_floor(const FloorMap& map, const OccupancyGrid& floor, const Pose2& alignment,
+                            const Eigen::Vector2d& start) {
   MapTruth result;
   const std::vector<std::uint8_t> connected = connected_free(floor, cell_at(floor.frame, start));
   // Of the floor, by its own cells: what of it the map knows.
@@ -86,7 +86,8 @@ MapTruth compare_with_floor(const FloorMap& map, const OccupancyGrid& floor,
       const Eigen::Vector2d point = alignment * Point2(map.frame.centre(x, y));
       const bool free = state_of(floor, cell_at(floor.frame, point)) == CellState::free;
       if (state == CellState::free && !free) ++free_wrong;
-      if (state == CellState::occupied && free && !near_obstacle(floor, point, map.frame.resolution))
+      if (state == CellState::occupied && free &&
+          !near_obstacle(floor, point, map.frame.resolution))
         ++occupied_wrong;
     }
   }
@@ -106,8 +107,8 @@ double contradicted_area(const FloorMap& map, std::span<const LaserScan> scans,
       if (!(range > 0.0) || range >= scan.max_range) continue;
       range += kSurfaceInset * map.frame.resolution;
       const double angle = scan.angle(beam);
-      const Cell cell = cell_at(
-          map.frame, poses[k] * Point2(range * std::cos(angle), range * std::sin(angle)));
+      const Cell cell =
+          cell_at(map.frame, poses[k] * Point2(range * std::cos(angle), range * std::sin(angle)));
       if (!map.frame.contains(cell.x, cell.y)) continue;
       const std::size_t index = map.frame.index(cell.x, cell.y);
       count += map.cells[index] == CellState::free && hit[index] == 0;

@@ -8,11 +8,10 @@ namespace cairn {
 ScanLogFormat::~ScanLogFormat() = default;
 
 ScanLog read_scan_log(std::string_view name, Registry& registry) {
-  return with_format<ScanLogFormat>(
-      name, "scan logs", registry,
-      [](ScanLogFormat& format, const std::filesystem::path& file) {
-        return format.read(read_file(file), file.string());
-      });
+  return with_format<ScanLogFormat>(name, "scan logs", registry,
+                                    [](ScanLogFormat& format, const std::filesystem::path& file) {
+                                      return format.read(read_file(file), file.string());
+                                    });
 }
 
 }  // namespace cairn

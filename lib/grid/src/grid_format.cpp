@@ -27,9 +27,9 @@ OccupancyGrid read_grid(std::string_view name, Registry& registry) {
 }
 
 void write_grid(const OccupancyGrid& grid, std::string_view name, Registry& registry) {
-  with_format<GridFormat>(
-      name, kWhat, registry,
-      [&](GridFormat& format, const fs::path& file) { format.write(grid, file); });
+  with_format<GridFormat>(name, kWhat, registry, [&](GridFormat& format, const fs::path& file) {
+    format.write(grid, file);
+  });
 }
 
 }  // namespace cairn

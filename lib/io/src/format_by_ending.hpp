@@ -62,8 +62,7 @@ FormatOfEnding format_of_ending(const std::string& wanted, Registry& registry) {
 
 /// Calls `use` with the format of a named file and the file. `what` is in such a file ("grids").
 template <class Format, class Use>
-auto with_format(std::string_view name, std::string_view what, Registry& registry,
-                 const Use& use) {
+auto with_format(std::string_view name, std::string_view what, Registry& registry, const Use& use) {
   NamedFile named = parse_named_file(name);
   const auto found = format_of_ending<Format>(file_ending(named.file), registry);
   if (found.name.empty() && found.broken) throw Error(*found.broken);

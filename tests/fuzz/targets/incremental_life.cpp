@@ -416,8 +416,8 @@ void IncrementalLife::expect_covariances(const Graph& graph, double tolerance) {
   // It is that of the last linearisation, a step before the estimate: where Gauss-Newton converges
   // slowly, in large residuals, that step is no rounding, and blocks change with it in proportion.
   const double step = Sigma.size() > 0 ? (Sigma * system.g).norm() : 0.0;
-  const double allowed = (tolerance + kLargestChange * step) *
-                         (Sigma.size() > 0 ? Sigma.diagonal().maxCoeff() : 1.0);
+  const double allowed =
+      (tolerance + kLargestChange * step) * (Sigma.size() > 0 ? Sigma.diagonal().maxCoeff() : 1.0);
   for (int a = 0; a < graph.variable_count(); ++a) {
     for (int b = 0; b < graph.variable_count(); ++b) {
       MatrixXd wanted = MatrixXd::Zero(graph.type(a).tangent_size(), graph.type(b).tangent_size());

@@ -14,8 +14,8 @@ namespace {
 struct LongestOptions {
   double smallest = 0.5;
   static auto fields() {
-    return cairn::OptionFields<LongestOptions>().real(
-        "smallest", &LongestOptions::smallest, 0.0, 100.0, "shorter frontiers are left [m]");
+    return cairn::OptionFields<LongestOptions>().real("smallest", &LongestOptions::smallest, 0.0,
+                                                      100.0, "shorter frontiers are left [m]");
   }
 };
 
@@ -51,9 +51,8 @@ class Longest final : public cairn::Explorer {
 }  // namespace
 
 void cairn_register(cairn::Registrar& registrar) {
-  registrar.add<cairn::Explorer, LongestOptions>(
-      "longest", [](const LongestOptions& options, cairn::Registry& registry) {
-        return std::make_unique<Longest>(options,
-                                         registry.make<cairn::PathPlanner>("grid_dijkstra"));
-      });
+  registrar.add<cairn::Explorer, LongestOptions>("longest", [](const LongestOptions& options,
+                                                               cairn::Registry& registry) {
+    return std::make_unique<Longest>(options, registry.make<cairn::PathPlanner>("grid_dijkstra"));
+  });
 }

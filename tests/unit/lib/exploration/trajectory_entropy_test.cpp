@@ -2,8 +2,8 @@
 #include <cmath>
 #include <numbers>
 
-#include <Eigen/Dense>
 #include <gtest/gtest.h>
+#include <Eigen/Dense>
 
 #include "cairn/exploration/exploration.hpp"
 #include "cairn/typed/build.hpp"
@@ -49,8 +49,8 @@ TEST(TrajectoryEntropy, IsThatOfAGraphWithAPriorOnTheFirstPose) {
   for (const Id id : poses) {
     Eigen::Matrix3d block;
     ASSERT_TRUE(with_prior->covariance(id, id, {block.data(), 9}));
-    expected += 1.5 * std::log(2.0 * std::numbers::pi * std::numbers::e) +
-                std::log(block.determinant());
+    expected +=
+        1.5 * std::log(2.0 * std::numbers::pi * std::numbers::e) + std::log(block.determinant());
   }
   expected /= static_cast<double>(poses.size());
   EXPECT_NEAR(trajectory_entropy(*fixed, poses, sigma), expected, 1e-6);

@@ -114,8 +114,8 @@ TEST(GridDijkstra, DoesNotSeeAGoalThroughAWall) {
 }
 
 TEST(GridDijkstra, LeavesWhereTheBodyDoesNotFitAwayFromObstaclesOnly) {
-  const FloorMap map = drawn_map({"#########", "#.......#", "#.......#", "#.......#", "#.......#",
-                                  "#.......#", "#########"});
+  const FloorMap map = drawn_map(
+      {"#########", "#.......#", "#.......#", "#.......#", "#.......#", "#.......#", "#########"});
   const auto planner = shortest();
   // Beside the wall, with a body that needs two cells.
   planner->start(map, map.frame.centre(1, 3), 1.5);

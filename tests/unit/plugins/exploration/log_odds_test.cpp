@@ -146,7 +146,8 @@ TEST(LogOdds, FrontiersAreFreeCellsBesideUnknownOnes) {
   for (int y = 0; y < frame.height; ++y) {
     for (int x = 0; x < frame.width; ++x) {
       const bool free = map.cells[frame.index(x, y)] == CellState::free;
-      if (free && (unknown(x - 1, y) || unknown(x + 1, y) || unknown(x, y - 1) || unknown(x, y + 1)))
+      if (free &&
+          (unknown(x - 1, y) || unknown(x + 1, y) || unknown(x, y - 1) || unknown(x, y + 1)))
         expected.insert(static_cast<std::int32_t>(frame.index(x, y)));
     }
   }
@@ -162,8 +163,7 @@ TEST(LogOdds, FrontiersAreFreeCellsBesideUnknownOnes) {
   ASSERT_FALSE(expected.empty());
   // Where nothing of the newest scan ends, clearance is to what is not free; it is never more.
   const std::vector<float> literal = test::literal_clearance(frame, map.cells);
-  for (std::size_t k = 0; k < literal.size(); ++k)
-    EXPECT_LE(map.clearance[k], literal[k] + 1e-4F);
+  for (std::size_t k = 0; k < literal.size(); ++k) EXPECT_LE(map.clearance[k], literal[k] + 1e-4F);
 }
 
 TEST(LogOdds, TheNewestScanStandsInTheWayOfABody) {

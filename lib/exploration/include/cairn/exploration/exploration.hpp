@@ -85,9 +85,9 @@ struct Exploration {
 };
 
 /// Explores: decides, drives along the path that was chosen, and maps, until nothing is left to
-/// explore or a limit is reached. A path is given up, and the explorer asked again, when an obstacle
-/// is seen on it, when the robot collides, or when a loop closure moves the estimate by more than a
-/// cell of the map.
+/// explore or a limit is reached. A path is given up, and the explorer asked again, when an
+/// obstacle is seen on it, when the robot collides, or when a loop closure moves the estimate by
+/// more than a cell of the map.
 ///
 /// Each motion is a pose of the graph with a relative factor from odometry; the policy decides
 /// which are kept and which are registered with each other (thesis, 5.1). Throws `Error` as its

@@ -15,7 +15,8 @@ namespace cairn {
 struct MapLogOptions {
   double step = 0.3;  ///< a scan is taken once the robot has moved so far [m]
   double turn = 0.3;  ///< or has turned so far [rad]
-  OdometryModel odometry{.absolute = {0.01, 0.01, 0.005}, .relative = 0.2};  ///< wheels on real floors slip
+  OdometryModel odometry{.absolute = {0.01, 0.01, 0.005},
+                         .relative = 0.2};  ///< wheels on real floors slip
   const std::atomic<bool>* interrupt = nullptr;
   /// Called after each scan that was taken, with how many of the log are behind it.
   std::function<void(std::size_t read)> progress = {};

@@ -14,9 +14,9 @@ namespace cairn {
 /// A map beside the floor that it is of [m²]. Cells of the map are compared with the cell of the
 /// floor in which their middle lies.
 struct MapTruth {
-  double floor = 0.0;  ///< free floor that hangs together with the start, over sides of cells
-  double seen = 0.0;   ///< of that, what the map knows
-  double free_wrong = 0.0;      ///< free in the map, an obstacle of the floor
+  double floor = 0.0;       ///< free floor that hangs together with the start, over sides of cells
+  double seen = 0.0;        ///< of that, what the map knows
+  double free_wrong = 0.0;  ///< free in the map, an obstacle of the floor
   double occupied_wrong = 0.0;  ///< occupied in the map; free on the floor, and not beside a wall
 };
 

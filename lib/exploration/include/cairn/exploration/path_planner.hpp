@@ -18,8 +18,8 @@ namespace cairn {
 
 /// A path over known free floor.
 struct PlannedPath {
-  std::vector<Eigen::Vector2d> points;     ///< of a polyline, from where the robot is [m]
-  double length = 0.0;                     ///< [m]
+  std::vector<Eigen::Vector2d> points;          ///< of a polyline, from where the robot is [m]
+  double length = 0.0;                          ///< [m]
   std::optional<Eigen::Vector2d> look_at = {};  ///< towards which the robot turns at its end [m]
 };
 

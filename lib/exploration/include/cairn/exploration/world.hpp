@@ -35,7 +35,7 @@ struct OdometryModel {
 struct RobotModel {
   double radius = 0.2;  ///< of its round body [m]
   double step = 0.5;    ///< farthest that it drives between two scans [m]
-  double turn = 0.3;   ///< most that it turns between two scans [rad]
+  double turn = 0.3;    ///< most that it turns between two scans [rad]
   LidarModel lidar;
   OdometryModel odometry;
 };
