@@ -31,7 +31,7 @@ void Relaxation::analyze(const BlockStructure& structure) {
   factorized_ = false;
   H_.analyze(structure);
   diagonal_.analyze(structure);
-  for (std::vector<double>* vector : {&g_, &x_, &r_, &best_})
+  for (std::vector<double>* vector : {&g_, &x_, &r_, &scaled_, &best_})
     vector->assign(static_cast<std::size_t>(structure.size()), 0.0);
   version_ = structure.version();
   stats_ = {};
@@ -56,8 +56,12 @@ Factorization Relaxation::factorize(const BlockMatrix& H) {
 double Relaxation::look(std::span<const double> x, double& norm) {
   H_.multiply(x, r_);
   for (std::size_t k = 0; k < r_.size(); ++k) r_[k] = g_[k] - r_[k];
-  norm = std::sqrt(dot(r_, r_));
+  norm = scaled_norm(r_);
   return -0.5 * (dot(x, g_) + dot(x, r_));  // Hx = g − r
+}
+
+double Relaxation::scaled_norm(std::span<const double> r) {
+  return std::sqrt(diagonal_.solve(r, scaled_));
 }
 
 std::int64_t Relaxation::limit() const {
@@ -68,7 +72,7 @@ std::int64_t Relaxation::limit() const {
 double Relaxation::iterate(double goal, std::int64_t& iterations, Ending& ending) {
   std::fill(x_.begin(), x_.end(), 0.0);
   std::fill(best_.begin(), best_.end(), 0.0);
-  double best_model = 0.0, best_norm = std::sqrt(dot(g_, g_));
+  double best_model = 0.0, best_norm = scaled_norm(g_);
   const std::int64_t most = limit();
   for (std::int64_t done = 0; done < most;) {
     const std::int64_t until = std::min(done + kSweepsBetweenLooks, most);
@@ -97,7 +101,7 @@ void Relaxation::solve(std::span<const double> g, std::span<double> x) {
     throw std::logic_error(fmt::format("linear_solver {}: solve without a factorisation", name_));
   }
   std::copy(g.begin(), g.end(), g_.begin());  // x may be g
-  const double length = std::sqrt(dot(g_, g_));
+  const double length = scaled_norm(g_);
   std::int64_t iterations = 0;
   Ending ending = Ending::reached;
   double norm = 0.0;
