@@ -34,7 +34,7 @@ using Clock = std::chrono::steady_clock;
 struct ExploreOptions {
   std::string floor;
   std::string world = "lidar_building", lidar, odometry;
-  std::string policy = "compact_pose:range=2,angle=3.14,reuse=false";
+  std::string policy = "compact_pose:range=2,angle=3.14,reuse=false,gate=0.9999";
   std::string registration = "icp", mapper = "log_odds", explorer = "frontier";
   std::string until;
   std::uint64_t seed = 1;

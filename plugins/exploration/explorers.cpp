@@ -59,14 +59,16 @@ class FrontierExplorer : public Explorer {
 
   Decision decide(const Situation& situation) override {
     Decision decision;
-    goals_.start(situation);
     const double smallest =
         options_.smallest > 0.0 ? options_.smallest : 2.0 * situation.robot.radius;
-    double least = std::max(options_.length, smallest);
-    while (true) {
-      decision.candidates = goals_.candidates(least);
-      if (!decision.candidates.empty() || least <= smallest) break;
-      least = std::max(0.5 * least, smallest);
+    double least = 0.0;
+    for (const bool tight : {false, true}) {
+      goals_.start(situation, tight);
+      for (least = std::max(options_.length, smallest);; least = std::max(0.5 * least, smallest)) {
+        decision.candidates = goals_.candidates(least);
+        if (!decision.candidates.empty() || least <= smallest) break;
+      }
+      if (!decision.candidates.empty()) break;
     }
     if (decision.candidates.empty()) {
       decision.kind = Decision::Kind::finished;

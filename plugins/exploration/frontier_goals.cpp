@@ -17,12 +17,16 @@ constexpr double kNear = 2.0;
 constexpr double kStillThere = 0.5;
 /// The map around a frontier [m], which must change before it is tried again.
 constexpr double kAround = 1.0;
+/// Between the cells of a frontier that are tried as goals [m].
+constexpr double kSpacing = 0.5;
 
 }  // namespace
 
-void FrontierGoals::start(const Situation& situation) {
+void FrontierGoals::start(const Situation& situation, bool tight) {
   situation_ = &situation;
-  planner_->start(situation.map, situation.pose.translation(), situation.robot.radius);
+  const double cell = situation.map.frame.resolution, radius = situation.robot.radius;
+  planner_->start(situation.map, situation.pose.translation(),
+                  tight ? std::max(radius - cell, 0.5 * radius) : radius);
 }
 
 std::vector<Candidate> FrontierGoals::candidates(double least) {
@@ -31,8 +35,7 @@ std::vector<Candidate> FrontierGoals::candidates(double least) {
   longest_unreachable_ = 0.0;
   for (const Frontier& frontier : situation_->map.frontiers) {
     if (frontier.length < least) break;  // longest first
-    std::optional<PlannedPath> path;
-    if (!is_given_up(frontier)) path = path_to(frontier);
+    std::optional<PlannedPath> path = path_to(frontier);
     if (path) {
       const double length = path->length;
       found.push_back(
@@ -46,9 +49,24 @@ std::vector<Candidate> FrontierGoals::candidates(double least) {
 }
 
 std::optional<PlannedPath> FrontierGoals::path_to(const Frontier& frontier) {
-  std::optional<PlannedPath> path = planner_->path_to(frontier.middle, kNear);
+  std::optional<PlannedPath> best = path_to(frontier.middle);
+  if (best) return best;
+  // A long one may be reached elsewhere.
+  const GridFrame& frame = situation_->map.frame;
+  const auto stride = static_cast<std::size_t>(std::max(1.0, kSpacing / frame.resolution));
+  for (std::size_t k = stride / 2; k < frontier.cells.size(); k += stride) {
+    const std::int32_t cell = frontier.cells[k];
+    auto path = path_to(frame.centre(cell % frame.width, cell / frame.width));
+    if (path && (!best || path->length < best->length)) best = std::move(path);
+  }
+  return best;
+}
+
+std::optional<PlannedPath> FrontierGoals::path_to(const Vector2d& goal) {
+  if (is_given_up(goal)) return std::nullopt;
+  std::optional<PlannedPath> path = planner_->path_to(goal, kNear);
   if (!path || moves(*path)) return path;
-  given_up_.push_back({frontier.middle, known_around(frontier.middle)});
+  given_up_.push_back({goal, known_around(goal)});
   return std::nullopt;
 }
 
@@ -67,11 +85,10 @@ bool FrontierGoals::moves(const PlannedPath& path) const {
   return next_motion(situation_->pose, path, situation_->robot, passed).has_value();
 }
 
-bool FrontierGoals::is_given_up(const Frontier& frontier) const {
+bool FrontierGoals::is_given_up(const Vector2d& goal) const {
   const double near = 3.0 * situation_->map.frame.resolution;
   return std::ranges::any_of(given_up_, [&](const GivenUp& other) {
-    return (other.middle - frontier.middle).norm() < near &&
-           other.known == known_around(other.middle);
+    return (other.goal - goal).norm() < near && other.known == known_around(other.goal);
   });
 }
 

@@ -20,8 +20,10 @@ class FrontierGoals {
   explicit FrontierGoals(std::unique_ptr<PathPlanner> planner) : planner_(std::move(planner)) {}
 
   void begin() { given_up_.clear(); }
-  /// Looks at the frontiers of a situation, for those that follow.
-  void start(const Situation& situation);
+  /// Looks at the frontiers of a situation, for those that follow. `tight`: through gaps, too, that
+  /// may be a cell narrower than the body: on a map, whose cells are occupied as a whole, it may
+  /// seem not to fit through a door through which it has come.
+  void start(const Situation& situation, bool tight);
   /// Paths to the frontiers of at least this length [m].
   std::vector<Candidate> candidates(double least);
 
@@ -34,12 +36,13 @@ class FrontierGoals {
 
  private:
   struct GivenUp {
-    Eigen::Vector2d middle;
+    Eigen::Vector2d goal;
     std::size_t known;  ///< cells around it
   };
 
   std::optional<PlannedPath> path_to(const Frontier& frontier);
-  bool is_given_up(const Frontier& frontier) const;
+  std::optional<PlannedPath> path_to(const Eigen::Vector2d& goal);
+  bool is_given_up(const Eigen::Vector2d& goal) const;
   std::size_t known_around(const Eigen::Vector2d& point) const;
   bool moves(const PlannedPath& path) const;
 

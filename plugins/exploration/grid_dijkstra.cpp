@@ -73,11 +73,10 @@ class GridDijkstra final : public PathPlanner {
   bool stands(std::int32_t cell) const { return map_->clearance[at(cell)] >= needed_; }
 
   /// Whether the body may go from one cell to the next: where it fits; and out of where it does
-  /// not, away from what is there.
+  /// not, no nearer to anything than it is at the start.
   bool passable(std::int32_t from, std::int32_t to) const {
     if (stands(to)) return true;
-    return !stands(from) && map_->cells[at(to)] != CellState::occupied &&
-           map_->clearance[at(to)] >= map_->clearance[at(from)];
+    return !stands(from) && map_->clearance[at(to)] > 0.0F && map_->clearance[at(to)] >= least_;
   }
 
   /// The same for a neighbour, between whose corners the body goes only where it may be on both
@@ -99,6 +98,7 @@ class GridDijkstra final : public PathPlanner {
   }
 
   void spread(std::int32_t start) {
+    least_ = map_->clearance[at(start)];
     using Entry = std::pair<float, std::int32_t>;
     std::priority_queue<Entry, std::vector<Entry>, std::greater<>> open;
     cost_[at(start)] = 0.0F;
@@ -183,6 +183,7 @@ class GridDijkstra final : public PathPlanner {
   const FloorMap* map_ = nullptr;
   Vector2d from_ = Vector2d::Zero();
   double needed_ = 0.0;
+  float least_ = 0.0F;                ///< clearance at the start [m]
   std::vector<float> cost_;           ///< by cell, from the start [m, weighted]
   std::vector<std::int32_t> before_;  ///< by cell, the one before it on the path; -1: none
 };
