@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "cairn/exploration/scan_log.hpp"
 
-#include "format_by_ending.hpp"
+#include "cairn/io/format_by_ending.hpp"
 
 namespace cairn {
 

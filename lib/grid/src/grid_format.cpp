@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "cairn/grid/grid_format.hpp"
 
-#include "format_by_ending.hpp"
+#include "cairn/io/format_by_ending.hpp"
 
 namespace cairn {
 namespace {

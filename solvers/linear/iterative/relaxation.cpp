@@ -53,15 +53,15 @@ Factorization Relaxation::factorize(const BlockMatrix& H) {
   return {};
 }
 
-double Relaxation::look(std::span<const double> x, double& norm) {
-  H_.multiply(x, r_);
-  for (std::size_t k = 0; k < r_.size(); ++k) r_[k] = g_[k] - r_[k];
-  norm = scaled_norm(r_);
-  return -0.5 * (dot(x, g_) + dot(x, r_));  // Hx = g − r
+Relaxation::Norms Relaxation::norms(std::span<const double> r) {
+  return {std::sqrt(dot(r, r)), std::sqrt(diagonal_.solve(r, scaled_))};
 }
 
-double Relaxation::scaled_norm(std::span<const double> r) {
-  return std::sqrt(diagonal_.solve(r, scaled_));
+double Relaxation::look(std::span<const double> x, Norms& norm) {
+  H_.multiply(x, r_);
+  for (std::size_t k = 0; k < r_.size(); ++k) r_[k] = g_[k] - r_[k];
+  norm = norms(r_);
+  return -0.5 * (dot(x, g_) + dot(x, r_));  // Hx = g − r
 }
 
 std::int64_t Relaxation::limit() const {
@@ -69,15 +69,15 @@ std::int64_t Relaxation::limit() const {
   return std::max<std::int64_t>(kWork / (H_.values() * products_per_sweep()), 1);
 }
 
-double Relaxation::iterate(double goal, std::int64_t& iterations, Ending& ending) {
+double Relaxation::iterate(const Norms& whole, std::int64_t& iterations, Ending& ending) {
   std::fill(x_.begin(), x_.end(), 0.0);
   std::fill(best_.begin(), best_.end(), 0.0);
-  double best_model = 0.0, best_norm = scaled_norm(g_);
+  double best_model = 0.0, best_norm = whole.plain;
   const std::int64_t most = limit();
   for (std::int64_t done = 0; done < most;) {
     const std::int64_t until = std::min(done + kSweepsBetweenLooks, most);
     for (; done < until; ++done, ++iterations) sweep(g_, x_);
-    double norm = 0.0;
+    Norms norm;
     const double model = look(x_, norm);
     // Where φ no longer falls by more than rounding, rising is no sign of divergence.
     if (!(model <= best_model + 1e-12 * std::abs(best_model))) {
@@ -85,11 +85,12 @@ double Relaxation::iterate(double goal, std::int64_t& iterations, Ending& ending
       return best_norm;
     }
     best_model = std::min(model, best_model);
-    best_norm = norm;
+    best_norm = norm.plain;
     best_ = x_;
-    if (norm <= goal) {
+    if (norm.plain <= options_.tolerance * whole.plain &&
+        norm.scaled <= options_.tolerance * whole.scaled) {
       ending = Ending::reached;
-      return norm;
+      return best_norm;
     }
   }
   ending = Ending::limit;
@@ -101,20 +102,20 @@ void Relaxation::solve(std::span<const double> g, std::span<double> x) {
     throw std::logic_error(fmt::format("linear_solver {}: solve without a factorisation", name_));
   }
   std::copy(g.begin(), g.end(), g_.begin());  // x may be g
-  const double length = scaled_norm(g_);
+  const Norms whole = norms(g_);
   std::int64_t iterations = 0;
   Ending ending = Ending::reached;
   double norm = 0.0;
-  if (length > 0.0) {
+  if (whole.plain > 0.0) {
     do {
-      norm = iterate(options_.tolerance * length, iterations, ending);
+      norm = iterate(whole, iterations, ending);
     } while (ending == Ending::diverged && damp_more());
   } else {
     std::fill(best_.begin(), best_.end(), 0.0);
   }
   std::copy(best_.begin(), best_.end(), x.begin());
   progress_.describe(stats_, note());
-  progress_.add(stats_, iterations, length > 0.0 ? norm / length : 0.0, ending);
+  progress_.add(stats_, iterations, whole.plain > 0.0 ? norm / whole.plain : 0.0, ending);
 }
 
 }  // namespace cairn::iterative

@@ -19,7 +19,7 @@
 namespace cairn::iterative {
 
 struct RelaxationOptions {
-  double tolerance = 1e-10;  ///< on ‖Hx − g‖/‖g‖, in the norm of D⁻¹
+  double tolerance = 1e-10;  ///< on ‖Hx − g‖/‖g‖, also in the norm of D⁻¹
   /// Sweeps of one solve; 0: as many as 3·10⁸ multiplications allow, some tenths of a second.
   std::int64_t max_iterations = 0;
 
@@ -28,9 +28,8 @@ struct RelaxationOptions {
     using O = RelaxationOptions;
     return OptionFields<O>()
         .real("tolerance", &O::tolerance, 1e-15, 1.0,
-              "on the relative residual |Hx - g| / |g|, in the norm of D⁻¹, the inverse of the "
-              "diagonal "
-              "blocks, which is the same in all units")
+              "on the relative residual |Hx - g| / |g|, also with each block scaled by that of the "
+              "diagonal, which is the same in all units")
         .integer("max_iterations", &O::max_iterations, 0, 1e12, std::move(sweeps));
   }
 };
@@ -39,7 +38,7 @@ struct RelaxationOptions {
 /// x = 0 until the residual is small or the sweeps are used up (Saad 2003, chapter 4).
 ///
 /// Every so many sweeps the residual r and the quadratic model φ(x) = ½ xᵀHx − gᵀx are evaluated. A
-/// convergent iteration lowers φ always, while ‖r‖ may rise for a while; so φ
+/// convergent iteration lowers φ always, while ‖r‖, which mixes units, may rise for a while; so φ
 /// detects divergence. The best x is returned in any case, and the note reports how the solves
 /// ended. A failed factorisation is a diagonal block that is not positive definite; an H that is
 /// indefinite beyond that shows as divergence.
@@ -71,14 +70,17 @@ class Relaxation : public LinearSolver, public IterativeSolver {
   std::span<double> residual() { return r_; }
 
  private:
-  /// r = g − H x; returns φ(x), and ‖r‖ in `norm`, as `scaled_norm`.
-  double look(std::span<const double> x, double& norm);
-  /// √(rᵀ D⁻¹ r) with the diagonal blocks D of H: in nanometres a plain norm would be that of the
-  /// translations' part of r alone.
-  double scaled_norm(std::span<const double> r);
+  /// ‖r‖, and √(rᵀ D⁻¹ r) with the diagonal blocks D of H: in nanometres the first is that of the
+  /// rotations' part alone, in kilometres that of the translations'.
+  struct Norms {
+    double plain = 0.0, scaled = 0.0;
+  };
+  Norms norms(std::span<const double> r);
+  /// r = g − H x; returns φ(x), and the norms of r.
+  double look(std::span<const double> x, Norms& norm);
   std::int64_t limit() const;
-  /// Sweeps from zero into best_; returns ‖r‖ of it.
-  double iterate(double goal, std::int64_t& iterations, Ending& ending);
+  /// Sweeps from zero into best_, until r is small beside g, whose norms are `whole`; returns ‖r‖.
+  double iterate(const Norms& whole, std::int64_t& iterations, Ending& ending);
 
   const std::string name_;
   const RelaxationOptions options_;

@@ -27,7 +27,7 @@ struct Frontier {
   Eigen::Vector2d middle = Eigen::Vector2d::Zero();
 };
 
-/// What is known of a floor.
+/// The map of a floor, as far as it has been seen.
 struct CAIRN_API FloorMap {
   GridFrame frame;
   /// ln(p / (1 − p)), p the probability of being occupied; 0: unknown (thesis, 5.1 and 5.2).

@@ -49,7 +49,7 @@ struct WorldStart {
 
 /// What follows a motion.
 struct WorldStep {
-  Pose2 odometry;  ///< measured motion, in the frame of the pose before
+  Pose2 odometry;  ///< the motion as odometry has it, in the frame of the pose before
   /// Of ξ in odometry · exp(ξ).
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
   LaserScan scan;

@@ -8,8 +8,6 @@
 #include <utility>
 #include <vector>
 
-#include <fmt/format.h>
-
 #include "cairn/io/format.hpp"
 #include "cairn/plugin/options.hpp"
 #include "cairn/plugin/registry.hpp"
@@ -60,23 +58,28 @@ FormatOfEnding format_of_ending(const std::string& wanted, Registry& registry) {
   return found;
 }
 
+/// What is wrong with a file that no format goes by.
+inline std::string no_format_text(std::string_view name, const std::filesystem::path& file,
+                                  std::string_view what, const std::vector<std::string>& endings) {
+  if (endings.empty())
+    return std::string(name) + ": no plugin of formats of " + std::string(what) + " is on offer";
+  std::string text =
+      file.string() + ": no format of " + std::string(what) + " goes by that ending; on offer: ";
+  for (const std::string& ending : endings)
+    text += (&ending == &endings.front() ? "." : ", .") + ending;
+  return text;
+}
+
 /// Calls `use` with the format of a named file and the file. `what` is in such a file ("grids").
 template <class Format, class Use>
 auto with_format(std::string_view name, std::string_view what, Registry& registry, const Use& use) {
   NamedFile named = parse_named_file(name);
   const auto found = format_of_ending<Format>(file_ending(named.file), registry);
   if (found.name.empty() && found.broken) throw Error(*found.broken);
-  if (found.endings.empty()) {
-    throw Error(ErrorCode::usage,
-                fmt::format("{}: no plugin of formats of {} is on offer", name, what));
-  }
-  if (found.name.empty()) {
-    throw Error(ErrorCode::usage,
-                fmt::format("{}: no format of {} goes by that ending; on offer: .{}",
-                            named.file.string(), what, fmt::join(found.endings, ", .")));
-  }
+  if (found.name.empty())
+    throw Error(ErrorCode::usage, no_format_text(name, named.file, what, found.endings));
   const auto format = registry.make<Format>(ComponentSpec{found.name, std::move(named.options)});
-  return call_plugin([&] { return fmt::format("format '{}' of {}", found.name, what); },
+  return call_plugin([&] { return "format '" + found.name + "' of " + std::string(what); },
                      [&] { return use(*format, named.file); });
 }
 
