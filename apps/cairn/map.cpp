@@ -31,8 +31,9 @@ namespace {
 struct MapOptions {
   std::string log, output, graph, trajectory;
   std::string policy = "compact_pose:range=3,angle=3.14,reuse=false";
-  std::string registration = "icp", mapper = "log_odds";
-  MapLogOptions run;
+  // People walk through real scans, and wheels slip.
+  std::string registration = "icp:most_conflict=0.1", mapper = "log_odds";
+  MapLogOptions run{.odometry = {.relative = 0.4}};
 };
 
 struct MapOutcome {
@@ -173,6 +174,9 @@ int run_map(const MapOptions& options, Session& session) {
   });
   results.finish();
   if (guard.interrupted()) return kExitInterrupted;
+  session.note(
+      "look at the map: one wrong match of scans bends it, and nothing here would find that; "
+      "other values of --odometry-error may help");
   if (outcome.run.converged) return 0;
   session.note("the estimate has not converged");
   return static_cast<int>(ErrorCode::numerical);
