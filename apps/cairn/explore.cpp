@@ -24,6 +24,7 @@
 #include "interrupt.hpp"
 #include "progress.hpp"
 #include "results.hpp"
+#include "slam_names.hpp"
 #include "table.hpp"
 
 namespace cairn::app {
@@ -34,8 +35,8 @@ using Clock = std::chrono::steady_clock;
 struct ExploreOptions {
   std::string floor;
   std::string world = "lidar_building", lidar, odometry;
-  std::string policy = "compact_pose:range=2,angle=3.14,reuse=false,gate=0.9999";
-  std::string registration = "icp", mapper = "log_odds", explorer = "frontier";
+  SlamNames slam{.policy = "compact_pose:range=2,angle=3.14,reuse=false,gate=0.9999"};
+  std::string explorer = "frontier";
   std::string until;
   std::uint64_t seed = 1;
   std::optional<double> start_x, start_y, start_theta;
@@ -204,9 +205,9 @@ int run_explore(const ExploreOptions& options, Session& session) {
   const std::optional<Pose2> start = start_of(options);
   const ComponentSpec world_name = world_spec(options);
   const auto world = registry.make<World>(world_name);
-  const auto policy = registry.make<PosePolicy>(parse_component(options.policy));
-  const auto registration = registry.make<Registration>(parse_component(options.registration));
-  const auto mapper = registry.make<Mapper>(parse_component(options.mapper));
+  const auto policy = registry.make<PosePolicy>(parse_component(options.slam.policy));
+  const auto registration = registry.make<Registration>(parse_component(options.slam.registration));
+  const auto mapper = registry.make<Mapper>(parse_component(options.slam.mapper));
   const auto explorer = registry.make<Explorer>(parse_component(options.explorer));
   const OccupancyGrid floor = load_floor(options.floor, session);
   const InterruptGuard guard;  // until the results are written
@@ -227,9 +228,9 @@ int run_explore(const ExploreOptions& options, Session& session) {
   const ExploreOutcome outcome{.floor = options.floor,
                                .frame = floor.frame,
                                .parts = {.world = spec_text(world_name),
-                                         .policy = options.policy,
-                                         .registration = options.registration,
-                                         .mapper = options.mapper,
+                                         .policy = options.slam.policy,
+                                         .registration = options.slam.registration,
+                                         .mapper = options.slam.mapper,
                                          .explorer = options.explorer,
                                          .seed = options.seed},
                                .result = run_exploration(exploration)};
@@ -280,13 +281,7 @@ Command add_explore(ArgumentParser program) {
   cli.add_option("--world", options->world, "the robot; its options: cairn plugins lidar_building")
       .type_name("NAME")
       .show_default();
-  cli.add_option("--mapper", options->mapper, "builds the map").type_name("NAME").show_default();
-  cli.add_option("--policy", options->policy, "decides which poses and loop closures are kept")
-      .type_name("NAME")
-      .show_default();
-  cli.add_option("--registration", options->registration, "matches the scans of two poses")
-      .type_name("NAME")
-      .show_default();
+  add_slam_options(cli, options->slam);
   cli.add_flag("--live", options->live, "draw map, trajectory and path in the terminal on the way");
   cli.footer(
       "Example:\n"

@@ -23,6 +23,7 @@
 #include "json_report.hpp"
 #include "progress.hpp"
 #include "results.hpp"
+#include "slam_names.hpp"
 #include "table.hpp"
 
 namespace cairn::app {
@@ -30,9 +31,9 @@ namespace {
 
 struct MapOptions {
   std::string log, output, graph, trajectory;
-  std::string policy = "compact_pose:range=3,angle=3.14,reuse=false";
   // People walk through real scans, and wheels slip.
-  std::string registration = "icp:most_conflict=0.1", mapper = "log_odds";
+  SlamNames slam{.policy = "compact_pose:range=3,angle=3.14,reuse=false",
+                 .registration = "icp:most_conflict=0.1"};
   MapLogOptions run{.odometry = {.relative = 0.4}};
 };
 
@@ -56,9 +57,9 @@ void check(const MapOptions& options, Session& session) {
 boost::json::object report_json(const MapOptions& options, const MapOutcome& outcome) {
   boost::json::object report = begin_report("map");
   report["log"] = options.log;
-  report["policy"] = options.policy;
-  report["registration"] = options.registration;
-  report["mapper"] = options.mapper;
+  report["policy"] = options.slam.policy;
+  report["registration"] = options.slam.registration;
+  report["mapper"] = options.slam.mapper;
   report["scans"] = {{"logged", outcome.logged}, {"used", outcome.run.scans}};
   report["duration"] = outcome.run.duration;
   report["distance"] = outcome.run.distance;
@@ -118,12 +119,11 @@ void measure(MapOutcome& outcome) {
 
 MapOutcome map_of_log(const MapOptions& options, const InterruptGuard& guard, Session& session) {
   Registry& registry = session.registry();
-  const auto policy = registry.make<PosePolicy>(parse_component(options.policy));
-  const auto registration = registry.make<Registration>(parse_component(options.registration));
-  const auto mapper = registry.make<Mapper>(parse_component(options.mapper));
+  const auto policy = registry.make<PosePolicy>(parse_component(options.slam.policy));
+  const auto registration = registry.make<Registration>(parse_component(options.slam.registration));
+  const auto mapper = registry.make<Mapper>(parse_component(options.slam.mapper));
   session.files.add_input(grid_file(options.log).string());
   const ScanLog log = read_scan_log(options.log, registry);
-  for (const std::string& note : log.notes) session.note(note);
   MapOutcome outcome;
   outcome.logged = log.scans.size();
   ScanSlam slam({*policy, *registration, *mapper, registry});
@@ -209,13 +209,7 @@ Command add_map(ArgumentParser program) {
       .type_name("PART")
       .within(0.0, 1.0)
       .show_default();
-  cli.add_option("--mapper", options->mapper, "builds the map").type_name("NAME").show_default();
-  cli.add_option("--policy", options->policy, "decides which poses and loop closures are kept")
-      .type_name("NAME")
-      .show_default();
-  cli.add_option("--registration", options->registration, "matches the scans of two poses")
-      .type_name("NAME")
-      .show_default();
+  add_slam_options(cli, options->slam);
   cli.footer(
       "Example:\n"
       "  cairn map robot.clf.gz -o map.yaml --graph robot.g2o");

@@ -12,10 +12,8 @@
 
 namespace cairn {
 
-class ScanSlam::Places : public ScanPoses {};
-
 ScanSlam::ScanSlam(const ScanSlamParts& parts)
-    : parts_(parts), places_(std::make_unique<Places>()) {}
+    : parts_(parts), places_(std::make_unique<ScanPoses>()) {}
 ScanSlam::~ScanSlam() = default;
 
 std::span<const Pose2> ScanSlam::poses() const { return places_->all(); }

@@ -23,8 +23,7 @@ struct LoggedScan {
 };
 
 struct ScanLog {
-  std::vector<LoggedScan> scans;   ///< in the order of the file
-  std::vector<std::string> notes;  ///< what was left out, and why
+  std::vector<LoggedScan> scans;  ///< in the order of the file
 };
 
 /// A format of recorded scans.

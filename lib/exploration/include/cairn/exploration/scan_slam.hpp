@@ -18,6 +18,8 @@
 
 namespace cairn {
 
+class ScanPoses;
+
 /// The parts of `ScanSlam`, which must outlive it.
 struct ScanSlamParts {
   PosePolicy& policy;
@@ -65,7 +67,6 @@ class CAIRN_API ScanSlam {
   const Graph& truth() const { return truth_; }
 
  private:
-  class Places;
   void take(const Variable& pose, std::span<const Factor> odometry, LaserScan scan,
             const std::optional<Pose2>& truth);
   void count(const PoseReport& report);
@@ -76,7 +77,7 @@ class CAIRN_API ScanSlam {
   Graph sample_, truth_;
   ScanRegistration* scans_to_ = nullptr;
   std::vector<LaserScan> scans_;
-  std::unique_ptr<Places> places_;
+  std::unique_ptr<ScanPoses> places_;
   Pose2 estimate_;
 };
 
