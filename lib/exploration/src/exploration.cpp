@@ -166,7 +166,10 @@ class Run {
             .pose = slam_.pose(),
             .map = map,
             .robot = robot_,
-            .decision = decisions_};
+            .decision = decisions_,
+            .match = parts_.match,
+            .first_sigma = parts_.first_sigma,
+            .budget = parts_.decision_budget};
   }
 
   void drive(const PlannedPath& path) {

@@ -75,8 +75,12 @@ struct Exploration {
   Registry& registry;
   WorldStart start;
   ExplorationLimits limits;
-  /// Standard deviations of the first pose [m, m, rad], for `trajectory_entropy`.
+  /// Standard deviations of the first pose [m, m, rad], for `trajectory_entropy` and the explorer.
   Eigen::Vector3d first_sigma = Eigen::Vector3d(0.05, 0.05, 0.0017);
+  MatchModel match = {};  ///< what the explorer expects of loop closures
+  /// Within which an explorer that can stop early should decide [s]. A run with a budget depends
+  /// on the clock, and cannot be repeated exactly.
+  double decision_budget = std::numeric_limits<double>::infinity();
   const std::atomic<bool>* interrupt = nullptr;
   /// Called after each decision, with the map and where the robot is.
   std::function<void(const Decision&, const Situation&)> decided = {};

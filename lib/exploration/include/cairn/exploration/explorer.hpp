@@ -2,10 +2,14 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
 #include <vector>
+
+#include <Eigen/Core>
 
 #include "cairn/exploration/floor_map.hpp"
 #include "cairn/exploration/path_planner.hpp"
@@ -16,6 +20,17 @@
 
 namespace cairn {
 
+/// Which pairs of poses can be matched, and how well: what an explorer expects of loop closures.
+struct MatchModel {
+  /// Largest offset forward, and to the left, in the frame of the older pose [m].
+  double range = 1.0;
+  double angle = 0.35;  ///< largest difference of the headings [rad]
+  /// Standard deviations of a match [m, m, rad].
+  Eigen::Vector3d sigma = Eigen::Vector3d(0.05, 0.05, 0.0017);
+
+  Eigen::Matrix3d covariance() const { return sigma.array().square().matrix().asDiagonal(); }
+};
+
 /// What an explorer decides upon.
 struct Situation {
   Estimator& estimator;       ///< only to be read, which changes no later result
@@ -24,6 +39,19 @@ struct Situation {
   const FloorMap& map;
   const RobotModel& robot;
   int decision = 0;  ///< how many came before
+  MatchModel match = {};
+  /// Standard deviations of the first pose [m, m, rad], which the graph holds: with those it would
+  /// have a prior.
+  Eigen::Vector3d first_sigma = Eigen::Vector3d(0.05, 0.05, 0.0017);
+  /// Within which an explorer that can stop early should decide [s].
+  double budget = std::numeric_limits<double>::infinity();
+};
+
+/// What a path is expected to do to the entropies of trajectory and map; a decrease is negative.
+struct InformationChange {
+  double trajectory = 0.0;  ///< [nats]
+  double map = 0.0;         ///< [nats·m²]
+  double alpha = 1.0;       ///< factor of the map's, from the uncertainty of the robot's pose
 };
 
 /// A path that was considered.
@@ -31,6 +59,15 @@ struct Candidate {
   PlannedPath path;
   double value = 0.0;  ///< by which they are compared: the least is best
   std::string what;    ///< "frontier of 3.2 m"
+  /// What the path is expected to do; none: it was not evaluated.
+  std::optional<InformationChange> change = {};
+};
+
+/// A pose of a tree of paths, as an explorer has searched it: for pictures.
+struct TreePose {
+  Pose2 pose;
+  int parent = -1;     ///< the pose before, of an earlier index or not; -1: the root
+  double value = 0.0;  ///< of the path up to here, as `Candidate::value`
 };
 
 struct Decision {
@@ -44,6 +81,7 @@ struct Decision {
   std::vector<Candidate> candidates;
   std::size_t chosen = 0;
   std::vector<std::string> notes;
+  std::vector<TreePose> tree = {};  ///< of an explorer that grows one
 };
 
 /// Chooses where a robot drives next to explore a floor.
