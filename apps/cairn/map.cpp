@@ -7,10 +7,12 @@
 #include <vector>
 
 #include <fmt/core.h>
+#include <boost/json/array.hpp>
 #include <boost/json/object.hpp>
 
 #include "arguments.hpp"
 #include "cairn/exploration/map_log.hpp"
+#include "cairn/exploration/map_truth.hpp"
 #include "cairn/grid/grid_format.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
@@ -31,10 +33,13 @@ namespace {
 
 struct MapOptions {
   std::string log, output, graph, trajectory;
-  // People walk through real scans, and wheels slip.
-  SlamNames slam{.policy = "compact_pose:range=3,angle=3.14,reuse=false",
-                 .registration = "icp:most_conflict=0.1"};
-  MapLogOptions run{.odometry = {.relative = 0.4}};
+  // All poses, and more loop closures than information asks for, since they check each other.
+  // People walk through real scans.
+  SlamNames slam{
+      .policy = "compact_pose:strategy=apfl,range=3,angle=3.14,loop_gain=0.8,reuse=false",
+      .registration = "icp:most_conflict=0.1"};
+  std::string loss = "cauchy:scale=2";
+  MapLogOptions run;
 };
 
 struct MapOutcome {
@@ -44,6 +49,9 @@ struct MapOutcome {
   ScanSlamCounts counts;
   Graph graph, trajectory;
   std::vector<Eigen::Vector2d> positions;
+  double map_error = 0.0;          ///< `contradicted_area` [m²]
+  std::vector<double> agreements;  ///< by scan: `scan_agreement`
+  MapAgreement agreement;
   double width = 0.0, height = 0.0;  ///< of the trajectory, along its axes [m]
   double seconds = 0.0;
 };
@@ -65,6 +73,8 @@ boost::json::object report_json(const MapOptions& options, const MapOutcome& out
   report["distance"] = outcome.run.distance;
   report["extent"] = {outcome.width, outcome.height};
   report["kept"] = outcome.graph.variable_count();
+  report["consecutive"] = {{"matched", outcome.counts.consecutive},
+                           {"contradicted", outcome.counts.contradicted}};
   report["loops"] = {{"proposed", outcome.counts.proposed},
                      {"matched", outcome.counts.registered},
                      {"linked", outcome.counts.loops}};
@@ -73,11 +83,18 @@ boost::json::object report_json(const MapOptions& options, const MapOutcome& out
                    {"resolution", outcome.map.frame.resolution},
                    {"coverage", outcome.map.coverage()},
                    {"entropy", outcome.map.entropy()},
+                   {"error", outcome.map_error},
                    {"rebuilt", outcome.counts.rebuilt}};
   report["seconds"] = {{"total", outcome.seconds},
                        {"map", outcome.counts.map_seconds},
                        {"policy", outcome.counts.policy_seconds},
                        {"registration", outcome.counts.registration_seconds}};
+  boost::json::array by_scan;
+  for (const double part : outcome.agreements) by_scan.push_back(number_json(part));
+  report["agreement"] = {{"mean", outcome.agreement.mean},
+                         {"least", outcome.agreement.least},
+                         {"least_from_scan", outcome.agreement.first},
+                         {"scans", std::move(by_scan)}};
   report["notes"] = strings_json(outcome.counts.notes);
   return report;
 }
@@ -92,6 +109,11 @@ std::string summary_text(const MapOutcome& outcome) {
   table.add({"graph", fmt::format("{} of {} kept, {}", outcome.graph.variable_count(),
                                   plural(static_cast<std::int64_t>(outcome.run.scans), "pose"),
                                   plural(outcome.counts.loops, "loop closure"))});
+  table.add(
+      {"agreement", fmt::format("{:.1f} % of the ranges end at obstacles of the map; of the {} "
+                                "scans in a row with the least, {:.0f} %",
+                                100.0 * outcome.agreement.mean, kAgreementScans,
+                                100.0 * outcome.agreement.least)});
   table.add(
       {"time", fmt::format("{}: {} mapping, {} estimating, {} matching scans",
                            seconds_text(outcome.seconds), seconds_text(outcome.counts.map_seconds),
@@ -117,6 +139,17 @@ void measure(MapOutcome& outcome) {
   outcome.height = extent(across);
 }
 
+/// What to say of a map that does not explain its own scans.
+std::string doubt(const MapOutcome& outcome) {
+  const Eigen::Vector2d& at = outcome.positions[outcome.agreement.first];
+  return fmt::format(
+      "the map seems wrong around x {:.1f} m, y {:.1f} m: it explains {:.0f} % of the ranges of "
+      "scans {} to {}; a wrong match may bend it there (other values of --loss, or a larger range "
+      "or smaller loop_gain of --policy, may help), or the floor has changed",
+      at.x(), at.y(), 100.0 * outcome.agreement.least, outcome.agreement.first,
+      outcome.agreement.first + kAgreementScans - 1);
+}
+
 MapOutcome map_of_log(const MapOptions& options, const InterruptGuard& guard, Session& session) {
   Registry& registry = session.registry();
   const auto policy = registry.make<PosePolicy>(parse_component(options.slam.policy));
@@ -126,7 +159,13 @@ MapOutcome map_of_log(const MapOptions& options, const InterruptGuard& guard, Se
   const ScanLog log = read_scan_log(options.log, registry);
   MapOutcome outcome;
   outcome.logged = log.scans.size();
-  ScanSlam slam({*policy, *registration, *mapper, registry});
+  ScanSlam slam(
+      {.policy = *policy,
+       .registration = *registration,
+       .mapper = *mapper,
+       .registry = registry,
+       .match_consecutive = true,
+       .loop_loss = options.loss == "none" ? nullptr : registry.make<Loss>(options.loss)});
   StatusLine line(session.common.quiet);
   auto shown = std::chrono::steady_clock::now();
   MapLogOptions run = options.run;
@@ -144,6 +183,9 @@ MapOutcome map_of_log(const MapOptions& options, const InterruptGuard& guard, Se
     outcome.run = map_log(log, slam, run);
     outcome.map = slam.map();
   }
+  outcome.map_error = contradicted_area(outcome.map, slam.scans(), slam.poses());
+  outcome.agreements = scan_agreement(outcome.map, slam.scans(), slam.poses());
+  outcome.agreement = map_agreement(outcome.agreements);
   outcome.counts = slam.counts();
   outcome.graph = policy->estimator().graph();
   outcome.trajectory = recovered_trajectory(*policy, Recovery::distribute);
@@ -174,9 +216,7 @@ int run_map(const MapOptions& options, Session& session) {
   });
   results.finish();
   if (guard.interrupted()) return kExitInterrupted;
-  session.note(
-      "look at the map: one wrong match of scans bends it, and nothing here would find that; "
-      "other values of --odometry-error may help");
+  if (outcome.agreement.least < kPlausibleAgreement) session.note(doubt(outcome));
   if (outcome.run.converged) return 0;
   session.note("the estimate has not converged");
   return static_cast<int>(ErrorCode::numerical);
@@ -205,9 +245,13 @@ Command add_map(ArgumentParser program) {
       .within(0.0, 3.0)
       .show_default();
   cli.add_option("--odometry-error", options->run.odometry.relative,
-                 "standard deviation of odometry, as a part of the motion")
+                 "standard deviation of odometry, as a part of the motion; corrected by matches")
       .type_name("PART")
       .within(0.0, 1.0)
+      .show_default();
+  cli.add_option("--loss", options->loss,
+                 "robust loss of loop closures, such as cauchy:scale=2, or none")
+      .type_name("NAME")
       .show_default();
   add_slam_options(cli, options->slam);
   cli.footer(

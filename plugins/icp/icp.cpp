@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -34,10 +35,15 @@ class Icp final : public Registration, public ScanRegistration {
 
   void take(Id pose, LaserScan scan) override {
     scans_.insert_or_assign(pose, matcher_.prepare(scan));
+    newest_ = pose;
   }
 
   void pose_ended(Id pose, bool kept) override {
-    if (!kept) scans_.erase(pose);
+    if (dropped_ && *dropped_ != pose) scans_.erase(*dropped_);
+    dropped_.reset();
+    if (!kept && pose != newest_) scans_.erase(pose);
+    if (!kept && pose == newest_) dropped_ = pose;  // the next may be matched with it
+    newest_.reset();
   }
 
   std::vector<Factor> match(Id earlier, Id later) override {
@@ -102,6 +108,7 @@ class Icp final : public Registration, public ScanRegistration {
   MotionGroup group_;
   std::shared_ptr<const FactorType> edge_;
   std::map<Id, SurfaceScan> scans_;
+  std::optional<Id> newest_, dropped_;
 };
 
 }  // namespace

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "cairn/exploration/map_truth.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 namespace cairn {
@@ -96,26 +98,83 @@ MapTruth compare_with_floor(const FloorMap& map, const OccupancyGrid& floor, con
   return result;
 }
 
+namespace {
+
+/// Calls `visit` with each cell of the map in which a beam of a scan ends.
+template <class Visit>
+void for_each_end(const FloorMap& map, const LaserScan& scan, const Pose2& pose, Visit&& visit) {
+  for (std::size_t beam = 0; beam < scan.ranges.size(); ++beam) {
+    double range = scan.ranges[beam];
+    if (!(range > 0.0) || range >= scan.max_range) continue;
+    range += kSurfaceInset * map.frame.resolution;
+    const double angle = scan.angle(beam);
+    const Cell cell =
+        cell_at(map.frame, pose * Point2(range * std::cos(angle), range * std::sin(angle)));
+    if (map.frame.contains(cell.x, cell.y)) visit(cell);
+  }
+}
+
+bool beside_occupied(const FloorMap& map, const Cell& cell) {
+  for (int y = cell.y - 1; y <= cell.y + 1; ++y) {
+    for (int x = cell.x - 1; x <= cell.x + 1; ++x) {
+      if (map.frame.contains(x, y) && map.cells[map.frame.index(x, y)] == CellState::occupied)
+        return true;
+    }
+  }
+  return false;
+}
+
+}  // namespace
+
 double contradicted_area(const FloorMap& map, std::span<const LaserScan> scans,
                          std::span<const Pose2> poses) {
   std::vector<std::uint8_t> hit(map.cells.size());
   std::size_t count = 0;
   for (std::size_t k = 0; k < scans.size(); ++k) {
-    const LaserScan& scan = scans[k];
-    for (std::size_t beam = 0; beam < scan.ranges.size(); ++beam) {
-      double range = scan.ranges[beam];
-      if (!(range > 0.0) || range >= scan.max_range) continue;
-      range += kSurfaceInset * map.frame.resolution;
-      const double angle = scan.angle(beam);
-      const Cell cell =
-          cell_at(map.frame, poses[k] * Point2(range * std::cos(angle), range * std::sin(angle)));
-      if (!map.frame.contains(cell.x, cell.y)) continue;
+    for_each_end(map, scans[k], poses[k], [&](const Cell& cell) {
       const std::size_t index = map.frame.index(cell.x, cell.y);
       count += map.cells[index] == CellState::free && hit[index] == 0;
       hit[index] = 1;
-    }
+    });
   }
   return static_cast<double>(count) * map.frame.cell_area();
+}
+
+std::vector<double> scan_agreement(const FloorMap& map, std::span<const LaserScan> scans,
+                                   std::span<const Pose2> poses) {
+  std::vector<double> parts;
+  parts.reserve(scans.size());
+  for (std::size_t k = 0; k < scans.size(); ++k) {
+    int ends = 0, agreeing = 0;
+    for_each_end(map, scans[k], poses[k], [&](const Cell& cell) {
+      ++ends;
+      agreeing += beside_occupied(map, cell);
+    });
+    parts.push_back(ends > 0 ? static_cast<double>(agreeing) / ends
+                             : std::numeric_limits<double>::quiet_NaN());
+  }
+  return parts;
+}
+
+MapAgreement map_agreement(std::span<const double> scans) {
+  MapAgreement result;
+  std::vector<std::size_t> measured;
+  for (std::size_t k = 0; k < scans.size(); ++k)
+    if (!std::isnan(scans[k])) measured.push_back(k);
+  if (measured.empty()) return result;
+  const std::size_t row = std::min(kAgreementScans, measured.size());
+  double sum = 0.0, all = 0.0;
+  for (std::size_t k = 0; k < measured.size(); ++k) {
+    all += scans[measured[k]];
+    sum += scans[measured[k]];
+    if (k >= row) sum -= scans[measured[k - row]];
+    const double mean = sum / static_cast<double>(row);
+    if (k + 1 < row || mean >= result.least) continue;
+    result.least = mean;
+    result.first = measured[k + 1 - row];
+  }
+  result.mean = all / static_cast<double>(measured.size());
+  return result;
 }
 
 }  // namespace cairn

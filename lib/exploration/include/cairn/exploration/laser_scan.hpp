@@ -44,8 +44,9 @@ class CAIRN_API ScanRegistration {
  public:
   static constexpr std::string_view kAbility = "scan_registration";
   virtual ~ScanRegistration();
-  /// The scan that was taken at a pose; called before the first match with it. It may be forgotten
-  /// after `Registration::pose_ended` with false.
+  /// The scan that was taken at a pose; called before the first match with it. After
+  /// `Registration::pose_ended` with false it may be forgotten, that of the newest pose once the
+  /// next pose has ended.
   virtual void take(Id pose, LaserScan scan) = 0;
 };
 

@@ -15,9 +15,11 @@
 #include "cairn/policy/registration.hpp"
 #include "cairn/runtime/api.hpp"
 #include "cairn/typed/pose2.hpp"
+#include "cairn/types/loss.hpp"
 
 namespace cairn {
 
+class OdometryScale;
 class ScanPoses;
 
 /// The parts of `ScanSlam`, which must outlive it.
@@ -26,12 +28,24 @@ struct ScanSlamParts {
   Registration& registration;
   Mapper& mapper;
   Registry& registry;  ///< of the types of poses and odometry
+  /// Each scan is matched with the one before as well, which corrects odometry. How much odometry
+  /// errs is learnt from these matches: the standard deviation of each component is scaled so
+  /// that nine tenths of the differences are where they should be, since wheels slip. Where the two
+  /// contradict each other nevertheless (beyond the quantile 0.999 of χ²), the motion is that of
+  /// the match, with a covariance that admits odometry's.
+  bool match_consecutive = false;
+  /// Of loop closures: with a robust one a wrong match that others contradict does not bend the
+  /// map. None: none.
+  std::shared_ptr<const Loss> loop_loss = nullptr;
 };
 
 /// What `ScanSlam` counts, and the notes of its parts, each once.
 struct ScanSlamCounts {
   int loops = 0, proposed = 0, registered = 0;
   int rebuilt = 0;  ///< times that scans were drawn again
+  /// With `match_consecutive`: scans that matched the one before, and those of them that
+  /// contradicted odometry.
+  int consecutive = 0, contradicted = 0;
   double policy_seconds = 0.0, registration_seconds = 0.0, map_seconds = 0.0;
   std::vector<std::string> notes;
 };
@@ -69,6 +83,8 @@ class CAIRN_API ScanSlam {
  private:
   void take(const Variable& pose, std::span<const Factor> odometry, LaserScan scan,
             const std::optional<Pose2>& truth);
+  std::vector<Factor> matched_odometry(Id id, const Pose2& odometry,
+                                       const Eigen::Matrix3d& covariance);
   void count(const PoseReport& report);
   void follow_estimate();
 
@@ -78,6 +94,7 @@ class CAIRN_API ScanSlam {
   ScanRegistration* scans_to_ = nullptr;
   std::vector<LaserScan> scans_;
   std::unique_ptr<ScanPoses> places_;
+  std::unique_ptr<OdometryScale> scale_;
   Pose2 estimate_;
 };
 
