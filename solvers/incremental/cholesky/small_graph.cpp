@@ -20,9 +20,19 @@ void for_each_bit(const std::uint64_t* words, int count, Visit visit) {
   }
 }
 
+/// As std::popcount, which is a call into a library where the processor need not have the
+/// instruction.
+std::int32_t count_bits(std::uint64_t word) {
+  constexpr std::uint64_t kTwo = 0x3333333333333333, kFour = 0x0F0F0F0F0F0F0F0F;
+  word -= (word >> 1) & 0x5555555555555555;
+  word = (word & kTwo) + ((word >> 2) & kTwo);
+  word = (word + (word >> 4)) & kFour;
+  return static_cast<std::int32_t>((word * 0x0101010101010101) >> 56);
+}
+
 std::int32_t count_bits(const std::uint64_t* words, int count) {
   std::int32_t sum = 0;
-  for (int w = 0; w < count; ++w) sum += std::popcount(words[w]);
+  for (int w = 0; w < count; ++w) sum += count_bits(words[w]);
   return sum;
 }
 
@@ -67,10 +77,9 @@ void SmallGraph::order(std::span<const std::uint8_t> group, std::vector<std::int
     const std::uint64_t gone = ~(std::uint64_t{1} << (pivot & 63));
     for_each_bit(clique_.data(), words_, [&](int node) {
       std::uint64_t* to = row(node);
-      std::int32_t degree = -1;  // without the node itself
       for (int w = 0; w < words_; ++w) to[w] |= clique_[w];
       to[pivot >> 6] &= gone;
-      for (int w = 0; w < words_; ++w) degree += std::popcount(to[w]);
+      const std::int32_t degree = count_bits(to, words_) - 1;  // without the node itself
       to[node >> 6] &= ~(std::uint64_t{1} << (node & 63));
       key_[node] = group[node] * kGroupStep + degree;
     });

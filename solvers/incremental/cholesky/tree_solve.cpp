@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Substitution, up and down the tree, and what is moved without being solved for.
 #include <algorithm>
+#include <cstdint>
+#include <type_traits>
 
 #include "tree.hpp"
 
@@ -25,6 +27,18 @@ void scatter_own(const System& system, const Node& node, const double* own, std:
     own += system.size(v) * width;
   }
 }
+
+/// out = M v with a square matrix; `size` may be a constant, which unrolls the loops.
+template <class Size>
+void multiply_square(Size size, const double* matrix, const double* vector, double* out) {
+  for (std::int32_t r = 0; r < size; ++r) {
+    double sum = 0.0;
+    for (std::int32_t c = 0; c < size; ++c) sum += matrix[c * size + r] * vector[c];
+    out[r] = sum;
+  }
+}
+template <std::int32_t n>
+using Constant = std::integral_constant<std::int32_t, n>;
 
 }  // namespace
 
@@ -86,11 +100,12 @@ bool Tree::move_as_a_whole(Node& node, double tolerance) {
   double* const twist = twist_.data();
   double* const element = twist + size;
   const auto multiply = [&](const double* matrix, const double* vector, double* out) {
-    for (std::int32_t r = 0; r < size; ++r) {
-      double sum = 0.0;
-      for (std::int32_t c = 0; c < size; ++c) sum += matrix[c * size + r] * vector[c];
-      out[r] = sum;
-    }
+    if (size == 3)
+      multiply_square(Constant<3>{}, matrix, vector, out);
+    else if (size == 6)
+      multiply_square(Constant<6>{}, matrix, vector, out);
+    else
+      multiply_square(size, matrix, vector, out);
   };
   // The motion is that of the separator's first variable: η = Ad(F_0) δ_0 …
   group.adjoint(states_->frame(separator.front()), matrix_.data());

@@ -174,28 +174,32 @@ class DefinedFactor<F, std::index_sequence<I...>> final : public FactorType {
 
   void squared_norms(const FactorView& pool, std::size_t begin, std::size_t end,
                      double* out) const override {
-    for (std::size_t f = begin; f < end; ++f) {
-      R r = error(load_states(pool, f), load<kZ>(pool.measurements + f * kZ));
-      whiten(pool.sqrt_information + f * kU, r);
-      out[f - begin] = r.squaredNorm();
-    }
+    run([&] {
+      for (std::size_t f = begin; f < end; ++f) {
+        R r = error(load_states(pool, f), load<kZ>(pool.measurements + f * kZ));
+        whiten(pool.sqrt_information + f * kU, r);
+        out[f - begin] = r.squaredNorm();
+      }
+    });
   }
 
   void linearize(const FactorView& pool, std::size_t begin, std::size_t end, const double* weights,
                  const LinearizeSink& sink, double* out_squared_norms) const override {
-#if defined(CAIRN_WIDE)
-    if (detail::has_wide())
-      return linearize_wide(pool, begin, end, weights, sink, out_squared_norms);
-#endif
-    linearize_range(pool, begin, end, weights, sink, out_squared_norms);
+    run([&] { linearize_range(pool, begin, end, weights, sink, out_squared_norms); });
   }
 
  private:
+  template <class Loop>
+  static void run(const Loop& loop) {
 #if defined(CAIRN_WIDE)
-  CAIRN_WIDE static void linearize_wide(const FactorView& pool, std::size_t begin, std::size_t end,
-                                        const double* weights, const LinearizeSink& sink,
-                                        double* out_squared_norms) {
-    linearize_range(pool, begin, end, weights, sink, out_squared_norms);
+    if (detail::has_wide()) return run_wide(loop);
+#endif
+    loop();
+  }
+#if defined(CAIRN_WIDE)
+  template <class Loop>
+  CAIRN_WIDE static void run_wide(const Loop& loop) {
+    loop();
   }
 #endif
   static void linearize_range(const FactorView& pool, std::size_t begin, std::size_t end,
