@@ -415,6 +415,29 @@ void update(const double* panel, std::int64_t stride, int columns, int m, double
 
 // --- extend_add ---
 
+#if defined(__AVX2__) && !defined(__AVX512F__)
+/// For each set of four rows, as bits: the halves of packed doubles that go to each of them.
+struct Expansion {
+  int halves[16][8];
+};
+constexpr Expansion expansion() {
+  Expansion table{};
+  for (int bits = 0; bits < 16; ++bits) {
+    int next = 0;
+    for (int row = 0; row < 4; ++row) {
+      const int from = (bits >> row & 1) != 0 ? next++ : 3;
+      table.halves[bits][2 * row] = 2 * from;
+      table.halves[bits][2 * row + 1] = 2 * from + 1;
+    }
+  }
+  return table;
+}
+alignas(32) constexpr Expansion kExpansion = expansion();
+/// The first so many of four lanes.
+alignas(32) constexpr long long kFirst[5][4] = {
+    {0, 0, 0, 0}, {-1, 0, 0, 0}, {-1, -1, 0, 0}, {-1, -1, -1, 0}, {-1, -1, -1, -1}};
+#endif
+
 /// target[k] += the next of source, for each bit k of mask: eight rows.
 inline __attribute__((always_inline)) void add_spread(double* target, const double* source,
                                                       unsigned mask,
@@ -423,6 +446,20 @@ inline __attribute__((always_inline)) void add_spread(double* target, const doub
   __m512d packed = _mm512_maskz_loadu_pd(static_cast<__mmask8>(packed_mask), source);
   asm("" : "+v"(packed));  // to expand from memory is many times slower on some machines
   store(target, load(target) + _mm512_maskz_expand_pd(static_cast<__mmask8>(mask), packed));
+#elif defined(__AVX2__)
+  for (int half = 0; half < 8; half += kWidth, mask >>= kWidth) {
+    const unsigned bits = mask & 15u;
+    if (bits == 0) continue;
+    const int next = __builtin_popcount(bits);
+    // Lanes that are not loaded are zero; a row without a source takes the last of them.
+    const __m256i rows =
+        _mm256_load_si256(reinterpret_cast<const __m256i*>(kExpansion.halves[bits]));
+    const __m256i loaded = _mm256_load_si256(reinterpret_cast<const __m256i*>(kFirst[next]));
+    const __m256 packed = _mm256_castpd_ps(_mm256_maskload_pd(source, loaded));
+    const __m256d spread = _mm256_castps_pd(_mm256_permutevar8x32_ps(packed, rows));
+    store(target + half, load(target + half) + spread);
+    source += next;
+  }
 #else
   for (int half = 0; half < 8; half += kWidth, mask >>= kWidth) {
     unsigned bits = mask & ((1u << kWidth) - 1u);
