@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <cstddef>
+#include <deque>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "pose_covariances.hpp"
+
+namespace cairn {
+
+/// The marginals of the graph's poses after a loop closure on a path, stored as the columns of
+/// `PoseCovariances` are.
+struct UpdatedMarginals {
+  /// Z_i = L⁻¹ cov(y, ε_i) of this closure, by which Σ_ii has become less: Σ'_ii = Σ_ii − Z_iᵀ Z_i.
+  /// Entry (r, c) of pose i at [(3 c + r) · padded + i].
+  std::vector<double> Z;
+  /// Σ'_ii with the prior after all closures so far, its lower triangle by columns.
+  std::vector<double> diagonal;
+};
+
+/// A loop closure on a path: the measurement y = ε_k − ε_l + ν of a pose k of the path and l of the
+/// graph. The closures of a path are a list from the last one back. Their innovations are whitened
+/// one after another: with S = L Lᵀ the joint covariance of all y, Z = L⁻¹ cov(y, ·) of any pose
+/// has the posterior covariance cov(a, b) − Z_aᵀ Z_b.
+struct PathClosure {
+  std::shared_ptr<const PathClosure> before;
+  int count = 1;       ///< with those before
+  int pose = 0;        ///< l, of the graph
+  int step = 0;        ///< k, of the path
+  double ratio = 1.0;  ///< |Σ'_kk| / |Σ_kk|
+  /// The row of L: a block for each closure before, and the inverse of the one on the diagonal.
+  std::vector<Eigen::Matrix3d> coupling;
+  Eigen::Matrix3d inverse;
+  /// Z of all poses of the path from k on.
+  Eigen::Matrix3d end;
+  /// As long as they are kept.
+  mutable std::weak_ptr<const UpdatedMarginals> marginals;
+};
+
+/// The closures of a path in their order.
+std::vector<const PathClosure*> in_order(const PathClosure* last);
+
+/// The marginals of the graph's poses after the closures of a path.
+class MarginalUpdates {
+ public:
+  /// `memory`: for those that are kept [bytes].
+  MarginalUpdates(PoseCovariances& covariances, double memory);
+
+  /// Σ ln|Σ_ii| now, with the prior.
+  double sum() const { return sum_; }
+  /// Σ ln(|Σ'_ii| / |Σ_ii|) after this closure and those before it.
+  double change(const PathClosure& closure);
+  /// Z of the closures for one pose of the graph.
+  void whiten(std::span<const PathClosure* const> closures, int pose,
+              std::vector<Eigen::Matrix3d>& Z);
+
+ private:
+  using Marginals = std::shared_ptr<const UpdatedMarginals>;
+  /// Those after the last of the closures, computed unless they are kept.
+  Marginals marginals(std::span<const PathClosure* const> closures, double* change);
+  std::shared_ptr<UpdatedMarginals> unused();
+
+  PoseCovariances& covariances_;
+  std::vector<double> diagonal_, inverse_determinants_;  ///< with the prior, now
+  double sum_ = 0.0;
+  std::size_t most_kept_ = 0;
+  std::deque<std::shared_ptr<UpdatedMarginals>> kept_;  ///< oldest first
+};
+
+}  // namespace cairn

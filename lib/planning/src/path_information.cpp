@@ -1,0 +1,340 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "cairn/planning/path_information.hpp"
+
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <utility>
+#include <vector>
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+
+#include "cairn/lie/so2.hpp"
+#include "path_closure.hpp"
+#include "pose_covariances.hpp"
+
+namespace cairn {
+
+using Eigen::Matrix3d;
+
+struct PathInformation::Node {
+  std::shared_ptr<const Node> before;
+  const PoseCovariances* frame = nullptr;
+  Pose2 pose;
+  int steps = 0;
+  double length = 0.0;
+  Matrix3d walk = Matrix3d::Zero();            ///< of ε_k − ε_t, without loop closures
+  Matrix3d posterior = Matrix3d::Zero();       ///< of ε_k, without the prior
+  double graph_change = 0.0;                   ///< Σ ln(|Σ'_ii| / |Σ_ii|) of the graph's poses
+  double path_sum = 0.0;                       ///< Σ ln|Σ_jj| of those of the path
+  double odometry = 0.0, loop = 0.0;           ///< changes of ln|Λ|
+  double change = 0.0;                         ///< of the trajectory's entropy
+  std::shared_ptr<const PathClosure> closure;  ///< the last one
+};
+
+namespace {
+
+/// Of a variable, Z of all closures from the first on, given cov(y_c, ·) of each.
+template <class Covariance>
+void whiten(std::span<const PathClosure* const> closures, std::size_t first, Covariance covariance,
+            std::vector<Matrix3d>& Z) {
+  Z.resize(closures.size());
+  for (std::size_t c = 0; c < first; ++c) Z[c] = closures[c]->end;
+  for (std::size_t c = first; c < closures.size(); ++c) {
+    Matrix3d y = covariance(*closures[c]);
+    for (std::size_t b = 0; b < c; ++b) y -= closures[c]->coupling[b] * Z[b];
+    Z[c] = closures[c]->inverse * y;
+  }
+}
+
+Matrix3d symmetric(const Matrix3d& M) { return 0.5 * (M + M.transpose()); }
+
+}  // namespace
+
+/// The algorithm: one object per decision.
+class PathInformation::Model {
+ public:
+  Model(const Situation& situation, const PathInformationOptions& options, CanMatch can_match,
+        Measures measures)
+      : covariances_(situation, situation.pose),
+        updates_(covariances_, options.memory * 1e6),
+        options_(options),
+        can_match_(std::move(can_match)),
+        measures_(measures),
+        match_(situation.match),
+        odometry_(situation.robot.odometry),
+        newest_(covariances_.size() - 1),
+        factor_(options.entropy == EntropyForm::standard ? 0.5 : 1.0),
+        log_match_(std::log(match_.covariance().determinant())) {
+    for (int i = 0; i < covariances_.size(); ++i) {
+      const Pose2 pose = covariances_.pose(i);
+      older_.push_back({pose.x(), pose.y(), std::cos(pose.theta()), std::sin(pose.theta()),
+                        pose.theta(), i == newest_ || in_area(pose, situation.pose)});
+    }
+    start_ = std::make_shared<Node>();
+    start_->frame = &covariances_;
+    start_->pose = situation.pose;
+    // A robot whose newest pose is not kept has driven on from the one before.
+    const Pose2 since = covariances_.pose(newest_).between(situation.pose);
+    constexpr double kRounding = 1e-9;
+    if (since.state().cwiseAbs().maxCoeff() > kRounding)
+      start_->walk = covariances_.moved(situation.pose, odometry_.covariance(since));
+    start_->posterior = covariances_.diagonal(newest_) + start_->walk;
+  }
+
+  const std::shared_ptr<Node>& start() const { return start_; }
+  std::shared_ptr<const Node> extended(const std::shared_ptr<const Node>& path,
+                                       const Pose2& motion) {
+    auto next = std::make_shared<Node>();
+    next->before = path;
+    next->frame = &covariances_;
+    next->pose = path->pose * motion;
+    next->steps = path->steps + 1;
+    next->length = path->length + motion.translation().norm();
+    const Matrix3d Q = odometry_.covariance(motion);
+    const Matrix3d noise = covariances_.moved(next->pose, Q);
+    next->walk = path->walk + noise;
+    next->posterior = path->posterior + noise;
+    next->graph_change = path->graph_change;
+    next->path_sum = path->path_sum + log_determinant(next->posterior);
+    next->odometry = path->odometry - std::log(Q.determinant());
+    next->loop = path->loop;
+    next->closure = path->closure;
+    if (options_.loops == LoopForm::exact)
+      close_exactly(*next);
+    else
+      close_as_thesis(*next);
+    if (measures_ == Measures::all) {
+      const double sum = updates_.sum() + next->graph_change + next->path_sum;
+      next->change = factor_ * (sum / (covariances_.size() + next->steps) - mean());
+    } else {
+      next->change = std::numeric_limits<double>::quiet_NaN();
+    }
+    return next;
+  }
+
+  double mean() const { return updates_.sum() / covariances_.size(); }
+  double factor() const { return factor_; }
+  int poses() const { return covariances_.size(); }
+
+ private:
+  /// A pose of the graph, for matches with it.
+  struct Older {
+    double x, y, cos, sin, theta;
+    bool left_out;
+  };
+
+  bool in_area(const Pose2& older, const Pose2& newer) const {
+    const Pose2 seen = older.between(newer);
+    return std::abs(seen.x()) <= match_.range && std::abs(seen.y()) <= match_.range &&
+           std::abs(seen.theta()) <= match_.angle;
+  }
+
+  /// Calls for each pose of the graph that one of a path may close a loop with.
+  template <class Each>
+  void for_matches(const Pose2& newer, Each each) const {
+    const double x = newer.x(), y = newer.y(), theta = newer.theta(), range = match_.range;
+    for (std::size_t i = 0; i < older_.size(); ++i) {
+      const Older& older = older_[i];
+      const double dx = x - older.x, dy = y - older.y;
+      if (std::abs(older.cos * dx + older.sin * dy) > range ||
+          std::abs(older.cos * dy - older.sin * dx) > range)
+        continue;
+      if (older.left_out || std::abs(wrap_angle(theta - older.theta)) > match_.angle) continue;
+      const int pose = static_cast<int>(i);
+      if (!can_match_ || can_match_(covariances_.pose(pose), newer)) each(pose);
+    }
+  }
+
+  double log_determinant(const Matrix3d& without_prior) const {
+    return std::log((without_prior + covariances_.prior()).determinant());
+  }
+
+  // Exact -----------------------------------------------------------------------------------------
+
+  /// A loop closure that could be made.
+  struct Choice {
+    int pose = -1;
+    double determinant = std::numeric_limits<double>::infinity();  ///< |Σ'_kk|
+    double gain = 0.0;                                             ///< ln(|S| / |R|)
+    Matrix3d S, K;                                                 ///< cov(y, y), cov(ε_k, y)
+    std::vector<Matrix3d> difference;  ///< Z_k − Z_l of each closure before
+  };
+
+  Choice best_choice(const Node& node, std::span<const PathClosure* const> closures) {
+    Choice best;
+    const Matrix3d R = covariances_.moved(node.pose, match_.covariance());
+    const Matrix3d end = covariances_.diagonal(newest_) + node.walk;
+    std::vector<Matrix3d> difference;
+    for_matches(node.pose, [&](int l) {
+      updates_.whiten(closures, l, difference);
+      const Matrix3d cross = covariances_.block(l, newest_).transpose();  // of ε_k and ε_l
+      Matrix3d S = end + covariances_.diagonal(l) - cross - cross.transpose() + R;
+      Matrix3d K = end - cross;
+      for (std::size_t c = 0; c < closures.size(); ++c) {
+        difference[c] = closures[c]->end - difference[c];
+        S.noalias() -= difference[c].transpose() * difference[c];
+        K.noalias() -= closures[c]->end.transpose() * difference[c];
+      }
+      S = symmetric(S);
+      const double gain = std::log(S.determinant()) - log_match_;
+      if (!(gain > 2.0 * options_.loop_gain)) return;
+      const Matrix3d after =
+          node.posterior + covariances_.prior() - K * S.inverse() * K.transpose();
+      const double determinant = after.determinant();
+      if (!(determinant < best.determinant)) return;
+      best = {l, determinant, gain, S, K, difference};
+    });
+    return best;
+  }
+
+  void close_exactly(Node& node) {
+    const std::vector<const PathClosure*> closures = in_order(node.closure.get());
+    const Choice choice = best_choice(node, closures);
+    if (choice.pose < 0) return;
+    auto closure = std::make_shared<PathClosure>();
+    closure->before = node.closure;
+    closure->count = static_cast<int>(closures.size()) + 1;
+    closure->pose = choice.pose;
+    closure->step = node.steps;
+    closure->ratio = choice.determinant / (node.posterior + covariances_.prior()).determinant();
+    for (const Matrix3d& difference : choice.difference)
+      closure->coupling.emplace_back(difference.transpose());
+    const Matrix3d L = Eigen::LLT<Matrix3d>(choice.S).matrixL();
+    closure->inverse = L.triangularView<Eigen::Lower>().solve(Matrix3d::Identity());
+    closure->end = closure->inverse * choice.K.transpose();
+    node.posterior = symmetric(node.posterior - closure->end.transpose() * closure->end);
+    node.loop += choice.gain;
+    node.closure = closure;
+    if (measures_ == Measures::log_determinants) return;
+    node.graph_change = updates_.change(*closure);
+    node.path_sum = path_sum(node);
+  }
+
+  /// Σ ln|Σ_jj| of the poses of a path, after all its closures.
+  double path_sum(const Node& last) {
+    const std::vector<const PathClosure*> closures = in_order(last.closure.get());
+    std::vector<Matrix3d> from_pose;  // Σ_{l,t} of each
+    for (const PathClosure* closure : closures)
+      from_pose.push_back(covariances_.block(closure->pose, newest_));
+    std::vector<Matrix3d> Z;
+    double sum = log_determinant(last.posterior);
+    for (const Node* node = last.before.get(); node->steps > 0; node = node->before.get()) {
+      const auto first = static_cast<std::size_t>(node->closure ? node->closure->count : 0);
+      const Matrix3d end = covariances_.diagonal(newest_) + node->walk;
+      std::size_t c = first;
+      whiten(
+          closures, first, [&](const PathClosure&) { return end - from_pose[c++]; }, Z);
+      Matrix3d posterior = node->posterior;
+      for (std::size_t b = first; b < closures.size(); ++b)
+        posterior.noalias() -= Z[b].transpose() * Z[b];
+      sum += log_determinant(posterior);
+    }
+    return sum;
+  }
+
+  // As in the thesis ------------------------------------------------------------------------------
+
+  /// |Σ'_ll| / |Σ_ll| of a pose of the graph by the closures of a path (5.16): 1 up to the pose
+  /// with which the loop is closed, and from there in a straight line to that at its end.
+  double ratio(const PathClosure* closure, int pose) const {
+    double ratio = 1.0;
+    for (; closure; closure = closure->before.get()) {
+      if (pose <= closure->pose) continue;
+      const int length = covariances_.size() - 1 + closure->step - closure->pose;
+      ratio *= 1.0 + (pose - closure->pose) * (closure->ratio - 1.0) / length;
+    }
+    return ratio;
+  }
+
+  void close_as_thesis(Node& node) {
+    const Matrix3d R = covariances_.moved(node.pose, match_.covariance());
+    const Matrix3d now = node.posterior + covariances_.prior();
+    Matrix3d after;
+    int best = -1;
+    double least = now.determinant() * std::exp(-2.0 * options_.loop_gain);
+    for_matches(node.pose, [&](int l) {
+      const Matrix3d older = std::cbrt(ratio(node.closure.get(), l)) *
+                             (covariances_.diagonal(l) + covariances_.prior());
+      const double determinant = (older + R).determinant();
+      if (!(determinant < least)) return;
+      least = determinant;
+      best = l;
+      after = older + R;
+    });
+    if (best < 0) return;
+    auto closure = std::make_shared<PathClosure>();
+    closure->before = node.closure;
+    closure->count = node.closure ? node.closure->count + 1 : 1;
+    closure->pose = best;
+    closure->step = node.steps;
+    closure->ratio = least / now.determinant();
+    const int length = covariances_.size() - 1 + node.steps - best;
+    const double slope = (closure->ratio - 1.0) / length;
+    for (int j = 1; j <= length; ++j) node.path_sum += std::log(1.0 + j * slope);
+    node.loop -= std::log(closure->ratio);
+    node.posterior = after - covariances_.prior();
+    node.closure = std::move(closure);
+  }
+
+  PoseCovariances covariances_;
+  MarginalUpdates updates_;
+  PathInformationOptions options_;
+  CanMatch can_match_;
+  Measures measures_;
+  MatchModel match_;
+  OdometryModel odometry_;
+  int newest_;
+  double factor_, log_match_;
+  std::vector<Older> older_;
+  std::shared_ptr<Node> start_;
+};
+
+const Pose2& PathInformation::State::pose() const { return node_->pose; }
+int PathInformation::State::steps() const { return node_->steps; }
+double PathInformation::State::length() const { return node_->length; }
+double PathInformation::State::trajectory_change() const { return node_->change; }
+double PathInformation::State::odometry_log_determinant() const { return node_->odometry; }
+double PathInformation::State::loop_log_determinant() const { return node_->loop; }
+int PathInformation::State::loops() const { return node_->closure ? node_->closure->count : 0; }
+
+Matrix3d PathInformation::State::covariance() const {
+  return symmetric(node_->frame->moved_back(node_->pose, node_->posterior + node_->frame->prior()));
+}
+
+std::optional<Id> PathInformation::State::closes_with() const {
+  if (!node_->closure || node_->closure->step != node_->steps) return std::nullopt;
+  return node_->frame->id(node_->closure->pose);
+}
+
+PathInformation::State PathInformation::State::before() const {
+  return State(node_->before ? node_->before : node_);
+}
+
+PathInformation::PathInformation(const Situation& situation, const PathInformationOptions& options,
+                                 CanMatch can_match, Measures measures)
+    : model_(std::make_unique<Model>(situation, options, std::move(can_match), measures)) {}
+PathInformation::PathInformation(PathInformation&&) noexcept = default;
+PathInformation& PathInformation::operator=(PathInformation&&) noexcept = default;
+PathInformation::~PathInformation() = default;
+
+PathInformation::State PathInformation::start() const { return State(model_->start()); }
+
+PathInformation::State PathInformation::extended(const State& path, const Pose2& motion) {
+  return State(model_->extended(path.node_, motion));
+}
+
+PathInformation::State PathInformation::extended(State path, std::span<const Pose2> motions) {
+  for (const Pose2& motion : motions) path = extended(path, motion);
+  return path;
+}
+
+double PathInformation::trajectory_entropy() const {
+  const double constant = 1.5 * std::log(2.0 * std::numbers::pi * std::numbers::e);
+  return constant + model_->factor() * model_->mean();
+}
+
+int PathInformation::poses() const { return model_->poses(); }
+
+}  // namespace cairn
