@@ -13,6 +13,7 @@
 
 #include "cairn/exploration/path_planner.hpp"
 #include "cairn/grid/cell_traversal.hpp"
+#include "cairn/planning/free_space.hpp"
 #include "cairn/plugin/option_fields.hpp"
 #include "cairn/plugin/registry.hpp"
 
@@ -50,7 +51,7 @@ class GridDijkstra final : public PathPlanner {
   }
 
   std::optional<PlannedPath> path_to(const Vector2d& goal, double tolerance) override {
-    const std::int32_t last = nearest_view(goal, tolerance);
+    const std::int32_t last = nearest_cell(goal, tolerance);
     if (last < 0) return std::nullopt;
     std::vector<std::int32_t> cells;
     for (std::int32_t cell = last; cell >= 0; cell = before_[at(cell)]) cells.push_back(cell);
@@ -126,34 +127,9 @@ class GridDijkstra final : public PathPlanner {
     return true;
   }
 
-  bool all_free(const Vector2d& from, const Vector2d& to) const {
-    const GridFrame& frame = map_->frame;
-    return traverse_cells(frame.to_cells(from), frame.to_cells(to), [&](int x, int y) {
-      return frame.contains(x, y) && map_->cells[frame.index(x, y)] == CellState::free;
-    });
-  }
-
-  /// The cell nearest to the goal of those that can be reached and from which it can be seen.
-  std::int32_t nearest_view(const Vector2d& goal, double tolerance) const {
-    const GridFrame& frame = map_->frame;
-    const Vector2d cell = frame.to_cells(goal).array().floor();
-    const int reach = static_cast<int>(tolerance / frame.resolution);
-    const int middle_x = static_cast<int>(cell.x()), middle_y = static_cast<int>(cell.y());
-    std::int32_t best = -1;
-    double least = tolerance;
-    for (int y = middle_y - reach; y <= middle_y + reach; ++y) {
-      for (int x = middle_x - reach; x <= middle_x + reach; ++x) {
-        if (!frame.contains(x, y)) continue;
-        const auto index = static_cast<std::int32_t>(frame.index(x, y));
-        const double apart = (middle(index) - goal).norm();
-        if (apart < least && cost_[at(index)] < kFar && stands(index) &&
-            all_free(middle(index), goal)) {
-          best = index;
-          least = apart;
-        }
-      }
-    }
-    return best;
+  std::int32_t nearest_cell(const Vector2d& goal, double tolerance) const {
+    return nearest_view(*map_, goal, tolerance,
+                        [&](std::int32_t cell) { return cost_[at(cell)] < kFar && stands(cell); });
   }
 
   /// The corners of a polyline that comes no nearer to obstacles than the cells do, up to the

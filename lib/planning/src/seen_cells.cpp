@@ -1,0 +1,155 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "cairn/planning/seen_cells.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+namespace cairn {
+namespace {
+
+using Eigen::Vector2d;
+
+constexpr int kWordBits = 64;
+
+std::size_t word_at(int words_per_row, int row, int word) {
+  return static_cast<std::size_t>(row) * static_cast<std::size_t>(words_per_row) +
+         static_cast<std::size_t>(word);
+}
+
+std::uint64_t bit_of(int x) { return std::uint64_t{1} << (static_cast<unsigned>(x) % kWordBits); }
+
+/// Where a ray crosses the borders of cells along one axis, in cells from its start. The borders
+/// are computed as `RayCaster` does, so that both enter the same cells.
+struct Crossings {
+  Crossings(double from, double direction)
+      : cell(static_cast<int>(std::floor(from))),
+        step(direction < 0.0 ? -1 : 1),
+        border(direction > 0.0 ? std::floor(from) + 1.0 : std::floor(from)),
+        inverse(1.0 / direction),
+        start(from),
+        next(direction == 0.0 ? std::numeric_limits<double>::infinity()
+                              : (border - from) * inverse) {}
+  void advance() {
+    cell += step;
+    border += step;
+    next = (border - start) * inverse;
+  }
+
+  int cell, step;
+  double border, inverse, start, next;
+};
+
+}  // namespace
+
+CellSet::CellSet(int rows, int words_per_row)
+    : words_per_row_(words_per_row),
+      bits_(static_cast<std::size_t>(rows) * static_cast<std::size_t>(words_per_row), 0) {}
+
+bool CellSet::contains(int x, int y) const {
+  return (bits_[word_at(words_per_row_, y, x / kWordBits)] & bit_of(x)) != 0;
+}
+
+template <class Visit>
+void CellSet::for_each_word(const CellWindow& window, Visit&& visit) const {
+  if (window.empty()) return;
+  const std::uint64_t* bits = window.bits.data();
+  for (int row = 0; row < window.rows; ++row) {
+    std::size_t at = word_at(words_per_row_, window.first_row + row, window.first_word);
+    for (int word = 0; word < window.words; ++word) visit(at++, *bits++);
+  }
+}
+
+std::size_t CellSet::missing(const CellWindow& window) const {
+  std::size_t count = 0;
+  for_each_word(window, [&](std::size_t at, std::uint64_t bits) {
+    count += static_cast<std::size_t>(std::popcount(bits & ~bits_[at]));
+  });
+  return count;
+}
+
+void CellSet::add(const CellWindow& window) {
+  for_each_word(window, [&](std::size_t at, std::uint64_t bits) {
+    count_ += static_cast<std::size_t>(std::popcount(bits & ~bits_[at]));
+    bits_[at] |= bits;
+  });
+}
+
+SeenCells::SeenCells(const FloorMap& map, const LidarModel& lidar, double range)
+    : range_(range / map.frame.resolution) {
+  const int margin = static_cast<int>(std::ceil(range_)) + 1;
+  frame_ = map.frame;
+  frame_.width += 2 * margin;
+  frame_.height += 2 * margin;
+  frame_.origin = map.frame.to_world(Vector2d::Constant(-margin));
+  words_ = (frame_.width + kWordBits - 1) / kWordBits;
+  const auto size = static_cast<std::size_t>(frame_.height) * static_cast<std::size_t>(words_);
+  unknown_.assign(size, ~std::uint64_t{0});
+  obstacles_.assign(size, 0);
+  for (int y = 0; y < map.frame.height; ++y) {
+    for (int x = 0; x < map.frame.width; ++x) {
+      const CellState state = map.cells[map.frame.index(x, y)];
+      const std::size_t at = word_at(words_, y + margin, (x + margin) / kWordBits);
+      if (state != CellState::unknown) unknown_[at] &= ~bit_of(x + margin);
+      if (state == CellState::occupied) obstacles_[at] |= bit_of(x + margin);
+    }
+  }
+  for (int beam = 0; beam < lidar.beams; ++beam) {
+    const double angle = lidar.first_angle() + lidar.step() * beam - frame_.yaw;
+    beams_.emplace_back(std::cos(angle), std::sin(angle));
+  }
+}
+
+CellWindow SeenCells::look(std::span<const Pose2> poses) const {
+  CellWindow seen = window_around(poses);
+  for (const Pose2& pose : poses) cast(pose, seen);
+  if (std::ranges::all_of(seen.bits, [](std::uint64_t word) { return word == 0; })) return {};
+  return seen;
+}
+
+CellWindow SeenCells::window_around(std::span<const Pose2> poses) const {
+  Vector2d low = Vector2d::Constant(std::numeric_limits<double>::infinity()), high = -low;
+  for (const Pose2& pose : poses) {
+    const Vector2d at = frame_.to_cells(pose.translation());
+    low = low.cwiseMin(at);
+    high = high.cwiseMax(at);
+  }
+  const auto within = [](double value, int size) {
+    return static_cast<int>(std::clamp(std::floor(value), 0.0, size - 1.0));
+  };
+  CellWindow window;
+  window.first_row = within(low.y() - range_, frame_.height);
+  window.rows = within(high.y() + range_, frame_.height) - window.first_row + 1;
+  window.first_word = within(low.x() - range_, frame_.width) / kWordBits;
+  window.words = within(high.x() + range_, frame_.width) / kWordBits - window.first_word + 1;
+  window.bits.assign(word_at(window.words, window.rows, 0), 0);
+  return window;
+}
+
+void SeenCells::cast(const Pose2& at, CellWindow& seen) const {
+  const Vector2d from = frame_.to_cells(at.translation());
+  const double c = std::cos(at.theta()), s = std::sin(at.theta());
+  for (const Vector2d& beam : beams_) {
+    Crossings along_x(from.x(), c * beam.x() - s * beam.y());
+    Crossings along_y(from.y(), s * beam.x() + c * beam.y());
+    while (true) {
+      const int x = along_x.cell, y = along_y.cell;
+      const std::size_t word = word_at(words_, y, x / kWordBits);
+      const std::uint64_t bit = bit_of(x);
+      if ((obstacles_[word] & bit) != 0) break;
+      seen.bits[word_at(seen.words, y - seen.first_row, x / kWordBits - seen.first_word)] |=
+          unknown_[word] & bit;
+      const bool crosses_x = along_x.next <= along_y.next;
+      if (!((crosses_x ? along_x.next : along_y.next) <= range_)) break;
+      (crosses_x ? along_x : along_y).advance();
+    }
+  }
+}
+
+double SeenCells::entropy_change(std::size_t cells) const {
+  return -frame_.cell_area() * std::numbers::ln2 * static_cast<double>(cells);
+}
+
+}  // namespace cairn
