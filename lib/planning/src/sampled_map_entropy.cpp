@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 
 #include <fmt/core.h>
 #include <Eigen/Cholesky>
@@ -60,6 +61,18 @@ double entropy_beside_unknown(const FloorMap& map) {
          std::numbers::ln2 * map.frame.cell_area() * static_cast<double>(map.log_odds.size());
 }
 
+double mean(std::span<const double> values) {
+  return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
+}
+
+double standard_error(std::span<const double> values) {
+  const auto count = static_cast<double>(values.size());
+  const double centre = mean(values);
+  double squares = 0.0;
+  for (const double value : values) squares += (value - centre) * (value - centre);
+  return std::sqrt(squares / (count * (count - 1.0)));
+}
+
 }  // namespace
 
 SampledMapEntropy sampled_map_entropy(const PoseGaussian& poses,
@@ -77,25 +90,22 @@ SampledMapEntropy sampled_map_entropy(const PoseGaussian& poses,
   result.at_mean = entropy_beside_unknown(mapper.map());
   Eigen::VectorXd normal(root.rows());
   std::vector<Pose2> sampled(poses.mean.size()), places(scans.size());
-  double sum = 0.0, squares = 0.0;  // of differences from that at the mean
   for (int k = 0; k < samples; ++k) {
     RandomNumbers random(
         RandomNumbers::mixed(RandomNumbers::mixed(seed) + static_cast<std::uint64_t>(k)));
     for (double& number : normal) number = random.gaussian();
     const Eigen::VectorXd step = root * normal;
-    for (std::size_t i = 0; i < sampled.size(); ++i)
-      sampled[i] = poses.mean[i] * Pose2::exp(step.segment<3>(3 * static_cast<Eigen::Index>(i)));
+    for (std::size_t i = 0; i < sampled.size(); ++i) {
+      const auto row = 3 * static_cast<Eigen::Index>(i);
+      sampled[i] = poses.mean[i] * Pose2::exp(step.segment<3>(row));
+    }
     std::ranges::transform(scans, places.begin(),
                            [&](const AttachedScan& scan) { return taken_at(sampled, scan); });
     mapper.move(places);
-    const double difference = entropy_beside_unknown(mapper.map()) - result.at_mean;
-    sum += difference;
-    squares += difference * difference;
+    result.samples.push_back(entropy_beside_unknown(mapper.map()));
   }
-  const double mean = sum / samples;
-  const double variance = std::max(0.0, squares - samples * mean * mean) / (samples - 1);
-  result.mean = result.at_mean + mean;
-  result.standard_error = std::sqrt(variance / samples);
+  result.mean = mean(result.samples);
+  result.standard_error = standard_error(result.samples);
   return result;
 }
 

@@ -32,6 +32,7 @@ struct SampledMapEntropy {
   double mean = 0.0;            ///< estimate of ∫ p(x) H(m|x) dx [nats·m²]
   double standard_error = 0.0;  ///< of that estimate
   double at_mean = 0.0;         ///< H(m|x) at the mean of p(x)
+  std::vector<double> samples;  ///< H(m|x) of each
 };
 
 /// ∫ p(x) H(m|x) dx, the second term of the joint entropy of trajectory and map (thesis, 5.3), by
