@@ -14,6 +14,7 @@
 #include <boost/json/serialize.hpp>
 
 #include "arguments.hpp"
+#include "cairn/exploration/recording.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/report/recording.hpp"
 #include "cairn/report/run_report.hpp"
@@ -42,6 +43,23 @@ std::optional<Graph> load_named(const std::string& file, const AlbumOptions& opt
   return load_graph(file, options.input, session).graph;
 }
 
+/// Adds a recording of an exploration: to the page whole, to a plot its curves.
+void add_exploration(const std::string& file, const std::string& name, std::string_view text,
+                     const AlbumOptions& options, AlbumBuilder& builder) {
+  ExplorationRecording recording = read_exploration_recording(text, file);
+  std::vector<std::string> notes;
+  if (recording.torn) notes.push_back(fmt::format("{}: the last line was cut short", file));
+  if (!recording.ended)
+    notes.push_back(
+        fmt::format("{}: the run was killed: there is no last line on how it ended", file));
+  if (options.curves) {
+    builder.add_table(std::move(recording.steps), name);
+  } else {
+    builder.add_exploration(exploration_json(recording, name, kMostOfAPage, notes));
+  }
+  for (const std::string& note : notes) builder.add_note(note);
+}
+
 void add_file(const std::string& file, const std::string& name, const AlbumOptions& options,
               AlbumBuilder& builder, Session& session) {
   const bool named = file == "-" || file.starts_with('@');
@@ -50,6 +68,8 @@ void add_file(const std::string& file, const std::string& name, const AlbumOptio
     session.files.add_input(file);
   if (is_csv(file)) {
     builder.add_table(read_number_table(text, file), name);
+  } else if (is_exploration_recording(text)) {
+    add_exploration(file, name, text, options, builder);
   } else if (is_recording(text)) {
     Scene recording = read_recording(text, file);
     if (name != short_name(file)) recording.recordings.front().name = name;
@@ -80,6 +100,12 @@ std::string title_of(const AlbumOptions& options) {
 }  // namespace
 
 bool is_csv(const std::string& file) { return file.ends_with(".csv") || file.ends_with(".csv.gz"); }
+
+bool has_columns(const std::string& file) {
+  if (is_csv(file)) return true;
+  std::error_code error;
+  return std::filesystem::is_regular_file(file, error) && is_exploration_recording(read_file(file));
+}
 
 void add_album_options(ArgumentParser cli, AlbumOptions& options) {
   cli.add_option("files", options.files,

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstddef>
 #include <string>
 #include <vector>
 
@@ -20,10 +21,16 @@ struct AlbumOptions {
   std::string initial;  ///< a name of kind initial_guess, or empty
   std::string title;
   InputOptions input;
+  bool curves = false;  ///< of recordings of explorations the curves alone, as tables
 };
+
+/// Of a recording of an exploration [bytes], so that a page is below 15 MB.
+inline constexpr std::size_t kMostOfAPage = 13'000'000;
 
 /// Whether a file is read as a table, by its name.
 bool is_csv(const std::string& file);
+/// Whether it has columns to plot: as `is_csv`, or a recording of an exploration.
+bool has_columns(const std::string& file);
 void add_album_options(ArgumentParser cli, AlbumOptions& options);
 
 /// Reads the files (graphs, trajectories, recordings, the JSON of runs, CSV) and lays together what

@@ -17,6 +17,7 @@
 #include "cairn/policy/policy_run.hpp"
 #include "cairn/runtime/error.hpp"
 #include "commands.hpp"
+#include "explore_recording.hpp"
 #include "explore_report.hpp"
 #include "floor_drawing.hpp"
 #include "floors.hpp"
@@ -41,6 +42,7 @@ struct ExploreOptions {
   std::uint64_t seed = 1;
   std::optional<double> start_x, start_y, start_theta;
   std::string output, trajectory, truth, map, steps;
+  RunRecordingOptions recording;
   bool live = false;
 };
 
@@ -175,6 +177,20 @@ void check(const ExploreOptions& options, Session& session) {
   for (const std::string& graph : {options.output, options.trajectory, options.truth})
     check_output(graph, "", session, false);
   check_file(options.steps, session);
+  check_recording(options.recording, session);
+}
+
+RecordedRun recorded_run(const ExploreOptions& options, const ExploreParts& parts,
+                         const World& world) {
+  return {.name = options.explorer,
+          .floor = options.floor,
+          .parts = {{"world", parts.world},
+                    {"policy", parts.policy},
+                    {"registration", parts.registration},
+                    {"mapper", parts.mapper},
+                    {"explorer", parts.explorer}},
+          .seed = parts.seed,
+          .robot = world.robot()};
 }
 
 void write_outputs(const ExploreOptions& options, const ExploreOutcome& outcome, Results& results,
@@ -212,7 +228,14 @@ int run_explore(const ExploreOptions& options, Session& session) {
   const OccupancyGrid floor = load_floor(options.floor, session);
   const InterruptGuard guard;  // until the results are written
   ExploreProgress progress(options, session);
-  const Exploration exploration{
+  const ExploreParts parts{.world = spec_text(world_name),
+                           .policy = options.slam.policy,
+                           .registration = options.slam.registration,
+                           .mapper = options.slam.mapper,
+                           .explorer = options.explorer,
+                           .seed = options.seed};
+  RunRecording recording(options.recording, recorded_run(options, parts, *world));
+  Exploration exploration{
       .world = *world,
       .policy = *policy,
       .registration = *registration,
@@ -225,18 +248,15 @@ int run_explore(const ExploreOptions& options, Session& session) {
       .decided = [&](const Decision& decision, const Situation&) { progress.decided(decision); },
       .moved = [&](const ExplorationStep& step,
                    const FloorMap& map) { progress.moved(step, map); }};
+  recording.follow(exploration);
   const ExploreOutcome outcome{.floor = options.floor,
                                .frame = floor.frame,
-                               .parts = {.world = spec_text(world_name),
-                                         .policy = options.slam.policy,
-                                         .registration = options.slam.registration,
-                                         .mapper = options.slam.mapper,
-                                         .explorer = options.explorer,
-                                         .seed = options.seed},
+                               .parts = parts,
                                .result = run_exploration(exploration)};
   progress.clear();
   for (const std::string& note : outcome.result.notes) session.note(note);
   Results results(session);
+  recording.write(outcome.result, results, session);
   write_outputs(options, outcome, results, session);
   results.finish();
   if (guard.interrupted()) return kExitInterrupted;
@@ -261,6 +281,7 @@ Command add_explore(ArgumentParser program) {
       .type_name("FILE");
   cli.add_option("--truth", options->truth, "write where the robot truly was").type_name("FILE");
   cli.add_option("--steps", options->steps, "a row for each motion, as CSV").type_name("FILE");
+  add_recording_options(cli, options->recording);
   cli.add_option("--explorer", options->explorer, "decides where to drive; options as NAME:k=v")
       .type_name("NAME")
       .show_default();
@@ -287,7 +308,8 @@ Command add_explore(ArgumentParser program) {
       "Example:\n"
       "  cairn explore @rooms:seed=3\n"
       "  cairn explore floor.yaml --until distance=250 --odometry relative=0.15 -o run.g2o --map "
-      "map.yaml");
+      "map.yaml\n"
+      "  cairn explore floor.yaml --record run.jsonl && cairn view run.jsonl -o run.html");
   return {cli, [options](Session& session) { return run_explore(*options, session); }};
 }
 

@@ -75,9 +75,11 @@ std::string output_of(const PlotOptions& options, Session& session) {
 }
 
 void check_columns(const PlotOptions& options) {
-  if (std::ranges::any_of(options.album.files, is_csv)) return;
+  if (std::ranges::any_of(options.album.files, has_columns)) return;
   if (!options.y.empty() || options.x_max || options.logarithmic != "none")
-    throw Error(ErrorCode::usage, "--y, --x-max and --log are for columns of CSV files (.csv)");
+    throw Error(ErrorCode::usage,
+                "--y, --x-max and --log are for columns of CSV files (.csv) and of recordings of "
+                "explorations");
 }
 
 ComponentSpec picture_spec(const PlotOptions& options, const std::string& output,
@@ -103,8 +105,10 @@ int run(const PlotOptions& options, Session& session) {
   const ComponentSpec picture = picture_spec(options, output, session);
   session.registry().make<Picture>(picture);  // a wrong name is told before files are read
   session.use_threads();
-  const Album album = load_album(
-      options.album, fmt::format("cairn plot {}", joined(options.album.files, " ")), session);
+  AlbumOptions files = options.album;
+  files.curves = picture.name != "html";
+  const Album album =
+      load_album(files, fmt::format("cairn plot {}", joined(options.album.files, " ")), session);
   const std::string bytes = draw_picture(album, picture, session);
   Results results(session);
   results.write(output, [&] { write_file(output, bytes); });
@@ -149,7 +153,8 @@ Command add_plot(ArgumentParser program) {
                  "of a convergence plot: iterations or time [iterations]; of CSV: a column [first]")
       .type_name("AXIS");
   cli.add_option("--y", options->y,
-                 "columns of CSV, such as 'chi2' or 'seconds*': each --y is a chart [all in one]")
+                 "columns of CSV or of an exploration, such as 'chi2' or 'seconds*': each --y is a "
+                 "chart [all in one]")
       .type_name("COLUMNS")
       .repeatable();
   cli.add_option("--x-max", options->x_max,
@@ -169,6 +174,7 @@ Command add_plot(ArgumentParser program) {
       "  cairn plot city.g2o best.g2o -o city.svg\n"
       "  cairn plot run1.json run2.json --what convergence --x time -o curves.pdf\n"
       "  cairn plot steps.csv --x variables --y seconds --y affected --log y -o steps.svg\n"
+      "  cairn plot run.jsonl --y map_entropy --y trajectory_entropy -o curves.svg\n"
       "  cairn plot @sphere --what sparsity --linear-solver block_cholesky:ordering=natural -o "
       "L.png");
   return {cli, [options](Session& session) { return run(*options, session); }};

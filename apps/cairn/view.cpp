@@ -57,6 +57,7 @@ boost::json::object report_json(const Album& album, const std::string& page, std
                       {"recordings", scene.recordings.size()}});
   }
   report["graphs"] = std::move(graphs);
+  report["explorations"] = album.explorations.size();
   report["bench"] = !album.bench.empty();
   report["notes"] = strings_json(album.notes);
   return report;
@@ -105,7 +106,8 @@ Command add_view(ArgumentParser program) {
       "network.\n\n"
       "Example:\n"
       "  cairn optimize city.g2o -o best.g2o --json run.json --record run.jsonl\n"
-      "  cairn view city.g2o best.g2o run.json run.jsonl -o city.html");
+      "  cairn view city.g2o best.g2o run.json run.jsonl -o city.html\n"
+      "  cairn explore floor.yaml --record robot.jsonl && cairn view robot.jsonl");
   return {cli, [options](Session& session) { return run(*options, session); }};
 }
 

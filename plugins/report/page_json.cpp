@@ -149,6 +149,11 @@ std::string page_json(const Album& album) {
     if (k > 0) text += ',';
     text += scene_json(album.scenes[k]);
   }
+  text += R"(],"explorations":[)";
+  for (std::size_t k = 0; k < album.explorations.size(); ++k) {
+    if (k > 0) text += ',';
+    text += embeddable_json(album.explorations[k]);
+  }
   return text + "]}";
 }
 

@@ -3,6 +3,7 @@ import "uplot/dist/uPlot.min.css";
 import "./style.css";
 import type { ReportJson } from "./data/contract";
 import { DataError } from "./data/decode";
+import { Exploration } from "./data/exploration";
 import { decodeGraph, type Graph } from "./data/graph";
 import { App } from "./ui/app";
 import { el } from "./ui/dom";
@@ -32,9 +33,11 @@ async function start(): Promise<void> {
     const report = read();
     const graphs: Graph[] = [];
     for (const [k, graph] of (report.graphs ?? []).entries()) graphs.push(await decodeGraph(graph, k));
-    if (graphs.length === 0 && !report.bench) throw new DataError("There is neither a graph nor a comparison in this page.");
+    const explorations: Exploration[] = [];
+    for (const [k, exploration] of (report.explorations ?? []).entries()) explorations.push(await Exploration.decode(exploration, k));
+    if (graphs.length + explorations.length === 0 && !report.bench) throw new DataError("There is neither a graph nor a comparison in this page.");
     document.getElementById("cairn-data")?.replaceChildren();  // decoded: no need to hold it twice
-    root.replaceChildren(new App(report, graphs).build());
+    root.replaceChildren(new App(report, graphs, explorations).build());
     document.documentElement.dataset.ready = "true";
   } catch (error) {
     if (!(error instanceof DataError)) console.error(error);

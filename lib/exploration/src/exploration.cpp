@@ -108,6 +108,7 @@ class Run {
     watch_progress(step);
     result_.steps.push_back(step);
     if (parts_.moved) parts_.moved(step, map);
+    if (parts_.scanned) parts_.scanned(step, situation(map, kept), slam_.scans().back());
   }
 
   // Deciding and driving --------------------------------------------------------------------------

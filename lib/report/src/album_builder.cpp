@@ -128,6 +128,7 @@ void AlbumBuilder::finish(Album& album) {
   album.notes.insert(album.notes.end(), notes_.begin(), notes_.end());
   album.bench = std::move(bench_);
   album.tables = std::move(tables_);
+  album.explorations = std::move(explorations_);
 }
 
 // Graphs and trajectories -------------------------------------------------------------------------

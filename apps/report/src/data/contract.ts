@@ -164,6 +164,71 @@ export interface BenchJson {
   }[];
 }
 
+/** Lines of a recording of an exploration: docs/recording.md. */
+export interface ExplorationHeaderJson {
+  name?: string;
+  floor?: string;
+  parts?: Record<string, string>;
+  seed?: number;
+  robot?: { radius?: number; lidar?: { range?: number } };
+}
+
+export interface MapChangeJson {
+  resolution?: number;
+  origin?: number[];
+  yaw?: number;
+  x: number;
+  y: number;
+  width: number;
+  height: number;
+  cells: NumberArray;
+}
+
+export interface CandidateJson {
+  value?: number | null;
+  what?: string;
+  length?: number | null;
+  change?: { trajectory?: number | null; map?: number | null; alpha?: number | null };
+  points?: number[][];
+  look_at?: number[];
+}
+
+export interface ExplorationLineJson {
+  step?: number;
+  decision?: number;
+  end?: string;
+  time?: number;
+  distance?: number | null;
+  estimate?: number[];
+  truth?: number[];
+  covariance?: number[] | null;
+  coverage?: number | null;
+  map_entropy?: number | null;
+  trajectory_entropy?: number | null;
+  kept?: number;
+  loops?: number;
+  collisions?: number;
+  scan?: { first_angle?: number; angle_step?: number; max_range?: number; ranges: PackedPositions };
+  poses?: number[][];
+  removed_poses?: number[];
+  edges?: number[][];
+  removed_edges?: number[];
+  map?: MapChangeJson;
+  kind?: string;
+  why?: string;
+  candidates?: CandidateJson[];
+  chosen?: number;
+  notes?: string[];
+  tree?: { count: number; positions: Positions; parents: NumberArray; values: Positions };
+}
+
+export interface ExplorationJson {
+  name?: string;
+  complete?: boolean;
+  header?: ExplorationHeaderJson;
+  lines: ExplorationLineJson[];
+}
+
 export interface ReportJson {
   format: string;
   version: number;
@@ -176,5 +241,6 @@ export interface ReportJson {
   build?: Build;
   notes?: string[];
   graphs?: GraphJson[];
+  explorations?: ExplorationJson[];
   bench?: BenchJson | null;
 }

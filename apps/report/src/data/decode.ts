@@ -94,9 +94,9 @@ export async function decodeBytes(array: NumberArray, where: string, expected?: 
 
 const kMissing16 = 65535;
 
-/** x y z of `count` variables (relative to the graph's origin), whatever the dimension. */
+/** x y z of `count` variables (relative to the graph's origin), whatever the dimension; of one dimension x alone is set. */
 export async function decodePositions(
-  positions: Positions, dimension: 2 | 3, count: number, where: string,
+  positions: Positions, dimension: 1 | 2 | 3, count: number, where: string,
 ): Promise<Float32Array> {
   const raw = await decodeNumbers(positions, where, dimension * count);
   const scale = [1, 1, 1];

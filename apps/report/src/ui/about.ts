@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 import type { ReportJson } from "../data/contract";
+import type { Exploration } from "../data/exploration";
 import type { Graph } from "../data/graph";
 import { el } from "./dom";
 import { count } from "./format";
@@ -14,7 +15,7 @@ function facts(rows: [string, string | undefined | null][]): HTMLElement {
   return el("dl", { class: "facts" }, ...rows.flatMap(([name, text]) => (text ? [el("dt", {}, name), el("dd", {}, text)] : [])));
 }
 
-export function aboutView(report: ReportJson, graphs: Graph[], renderer: string): HTMLElement {
+export function aboutView(report: ReportJson, graphs: Graph[], explorations: Exploration[], renderer: string): HTMLElement {
   const { machine, build } = report;
   return el("div", { class: "page narrow" },
     el("h1", {}, report.title || "cairn"),
@@ -33,7 +34,14 @@ export function aboutView(report: ReportJson, graphs: Graph[], renderer: string)
         ["edges", graph.edges.types.map((type, k) => `${type.name} ${count(countOf(graph.edges.type, k))}`).join(", ")],
         ...graph.estimates.map((estimate): [string, string] => [estimate.name, estimate.file]),
       ]))),
-    graphs.length > 0 ? el("section", {}, el("h2", {}, "Keys and pointer"), facts(kKeys)) : null);
+    ...explorations.map(({ name, header, notes }) => el("section", {},
+      el("h2", {}, name),
+      facts([
+        ["floor", header.floor], ["seed", header.seed === undefined ? null : String(header.seed)],
+        ...Object.entries(header.parts ?? {}).map(([kind, part]): [string, string] => [kind, String(part)]),
+      ]),
+      notes.length > 0 ? el("ul", { class: "notes" }, ...notes.map((note) => el("li", {}, note))) : null)),
+    graphs.length + explorations.length > 0 ? el("section", {}, el("h2", {}, "Keys and pointer"), facts(kKeys)) : null);
 }
 
 function countOf(types: Uint8Array, type: number): number {

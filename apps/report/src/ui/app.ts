@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The page: what it holds, in tabs.
 import type { ReportJson } from "../data/contract";
+import type { Exploration } from "../data/exploration";
 import type { Graph } from "../data/graph";
 import { aboutView } from "./about";
 import { benchView } from "./bench";
 import { choice, el, freshId, iconButton, svg } from "./dom";
+import { ExplorationView } from "./exploration";
+import { curvesView, decisionsView } from "./exploration_pages";
 import { plural } from "./format";
 import { MapView } from "./map";
 import { runsView } from "./runs";
@@ -15,6 +18,8 @@ interface Tab {
   button: HTMLButtonElement;
   panel: HTMLElement;
 }
+
+const kExplorationTabs = ["Exploration", "Curves", "Decisions"];
 
 /** Three stones on each other. */
 function mark(): SVGSVGElement {
@@ -32,8 +37,12 @@ export class App {
   private readonly runs = el("div", { class: "scroll" });
   private title: HTMLElement = el("span", {});
   private readonly counts = el("span", { class: "counts" });
+  private readonly explored = new ExplorationView();
+  private readonly curves = el("div", { class: "scroll" });
+  private readonly decisions = el("div", { class: "scroll" });
+  private explorationTitle: HTMLElement = el("span", {});
 
-  constructor(private readonly report: ReportJson, private readonly graphs: Graph[]) {}
+  constructor(private readonly report: ReportJson, private readonly graphs: Graph[], private readonly explorations: Exploration[]) {}
 
   build(): HTMLElement {
     const { report, graphs } = this;
@@ -48,20 +57,43 @@ export class App {
       }
       if (graphs.some((graph) => runsView(graph) !== null)) this.add("Runs", this.runs);
     }
+    this.addExplorations();
     if (report.bench) this.add("Comparison", el("div", { class: "scroll" }, benchView(report.bench)));
-    this.add("About", el("div", { class: "scroll" }, aboutView(report, graphs, renderer)));
+    this.add("About", el("div", { class: "scroll" }, aboutView(report, graphs, this.explorations, renderer)));
     const names = graphs.map((graph, k) => [k, graph.name] as [number, string]);
     this.title = graphs.length > 1
       ? choice("Graph", names, 0, (k) => this.show(graphs[k]))
-      : el("span", { class: "title" }, graphs[0]?.name ?? report.title ?? "");
+      : el("span", { class: "title" }, graphs[0]?.name ?? "");
     const header = el("header", {},
-      el("span", { class: "brand" }, mark(), "cairn"), this.title, this.counts, this.tabList,
+      el("span", { class: "brand" }, mark(), "cairn"), this.title, this.explorationTitle, this.counts, this.tabList,
       iconButton("moon", "Light or dark", toggleTheme));
     if (graphs.length > 0) this.show(graphs[0]);
     this.open(report.kind === "bench" ? "Comparison" : this.tabs[0].name);
     document.title = [report.title, "cairn"].filter(Boolean).join(" – ");
     const page = el("div", { class: "app" }, header, this.main);
     return page;
+  }
+
+  private addExplorations(): void {
+    const { explorations } = this;
+    if (explorations.length === 0) return;
+    this.add(kExplorationTabs[0], this.explored.element);
+    this.add(kExplorationTabs[1], this.curves);
+    this.add(kExplorationTabs[2], this.decisions);
+    const names = explorations.map((exploration, k) => [k, exploration.name] as [number, string]);
+    this.explorationTitle = explorations.length > 1
+      ? choice("Run of a robot", names, 0, (k) => this.explore(explorations[k]))
+      : el("span", { class: "title" }, explorations[0].name);
+    this.explore(explorations[0]);
+  }
+
+  private explore(exploration: Exploration): void {
+    this.explored.show(exploration);
+    this.curves.replaceChildren(curvesView(exploration));
+    this.decisions.replaceChildren(decisionsView(exploration, (decision) => {
+      this.open(kExplorationTabs[0]);
+      this.explored.open(decision);
+    }));
   }
 
   private add(name: string, content: HTMLElement): void {
@@ -91,6 +123,7 @@ export class App {
     // Which graph it is says nothing about a comparison of many.
     const ofOneGraph = wanted === "Map" || wanted === "Runs";
     this.title.hidden = this.counts.hidden = !ofOneGraph;
+    this.explorationTitle.hidden = !kExplorationTabs.includes(wanted);
   }
 
   private show(graph: Graph): void {

@@ -22,6 +22,8 @@ export interface ChartSpec {
   xLabel: string;
   yLabel: string;
   logarithmic: boolean;
+  /** A linear axis of y that need not begin at zero. */
+  tight?: boolean;
   lines: Line[];
   xText?: (x: number) => string;
   height?: number;
@@ -51,6 +53,13 @@ export function logRange(low: number, high: number): [number, number] {
   const room = Math.max(0.04 * Math.log10(high / low), 0.04);
   const missing = Math.max(0, 0.5 - Math.log10(high / low)) / 2;
   return [low / 10 ** (room + missing), high * 10 ** (room + missing)];
+}
+
+/** A linear axis that leaves some room, also round a constant. */
+export function tightRange(low: number, high: number): [number, number] {
+  if (!Number.isFinite(low) || !Number.isFinite(high)) return [0, 1];
+  const room = high > low ? 0.05 * (high - low) : Math.max(0.5, 0.05 * Math.abs(high));
+  return [low - room, high + room];
 }
 
 export function lineChart(spec: ChartSpec): HTMLElement {
@@ -91,7 +100,7 @@ export function lineChart(spec: ChartSpec): HTMLElement {
       scales: {
         x: { time: false },
         y: spec.logarithmic ? { distr: 3, range: (_, low, high) => logRange(low, high) }
-          : { range: (_, low, high) => [Math.min(0, low), high > 0 ? high * 1.05 : 1] },
+          : { range: (_, low, high) => (spec.tight ? tightRange(low, high) : [Math.min(0, low), high > 0 ? high * 1.05 : 1]) },
       },
       axes: [
         { ...axis(spec.xLabel), size: 30 },

@@ -61,6 +61,12 @@ export async function settled(page) {
   }, null, { polling: 220, timeout: 60000 });
 }
 
+/** Waits until the map of an exploration is drawn: it is at the next frame. */
+async function drawn(page) {
+  if ((await page.locator("canvas.floor:visible").count()) === 0) return;
+  await page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
+}
+
 /** The pixels of a PNG of 8 bits a channel, as Chromium writes them. */
 export function decodePng(png) {
   let at = 8, width = 0, height = 0, channels = 3;
@@ -100,7 +106,8 @@ export function decodePng(png) {
 /** A screenshot of the map's canvas with what lies over it, decoded. */
 export async function picture(page, file) {
   await settled(page);
-  return decodePng(await page.locator(".canvas-host").screenshot(file ? { path: file } : {}));
+  await drawn(page);
+  return decodePng(await page.locator(".canvas-host:visible").screenshot(file ? { path: file } : {}));
 }
 
 /** Share of pixels that are not the most frequent colour. */

@@ -105,6 +105,52 @@ const tests = {
     await guard.close();
   },
 
+  async "an exploration: every control works, and every switch and motion changes the picture"(browser) {
+    const file = write("exploration", made.report({ explorations: [made.exploration(), { ...made.exploration(20, 40, 5), name: "other.jsonl" }] }));
+    const { page, guard } = await open(browser, file);
+    const used = await tour(page, guard);
+    assert(used > 25, `only ${used} controls`);
+    const slider = page.getByLabel("Motion of the run");
+    await slider.focus();
+    await page.keyboard.press("Home");
+    await page.keyboard.press("End");  // where no candidate is marked
+    const end = await picture(page, `${kOut}/exploration.png`);
+    for (const [key, words] of [["Home", /^start · 0\.0 m/], ["ArrowRight", /^motion 1 ·/], ["End", /^end · 12\.6 m/]]) {
+      await page.keyboard.press(key);
+      assert.match(await page.locator(".frame-text").innerText(), words);
+    }
+    assert.equal(differing(end, await picture(page)), 0, "the end again");
+    await page.getByRole("button", { name: "Decision before" }).click();
+    assert.match(await page.locator(".panel").innerText(), /to the frontier of 56 m/);
+    const then = await picture(page, `${kOut}/exploration-decision.png`);
+    assert(differing(end, then) > 0.001, "another motion is another picture");
+    for (const name of [/^Map/, /Scan/, /Graph/, /estimated/, /True/, /ellipse/, /Candidates/, /Tree/]) {
+      const box = page.getByRole("checkbox", { name });
+      await box.click();
+      assert(differing(then, await picture(page)) > 0, `${name} changes the picture`);
+      await box.click();
+      assert.equal(differing(then, await picture(page)), 0, `${name} and back`);
+    }
+    await page.getByRole("button", { name: /^frontier 3/ }).click();
+    assert(differing(then, await picture(page)) > 0, "a candidate is marked");
+    const canvas = page.locator("canvas.floor");
+    for (const key of ["ArrowLeft", "+", "-", "f", "["]) {
+      const was = await picture(page);
+      await canvas.focus();
+      await page.keyboard.press(key);
+      assert(differing(was, await picture(page)) > 0.001, `${key} changes the picture`);
+    }
+    await page.getByRole("tab", { name: "Decisions" }).click();
+    await page.getByRole("row", { name: /to the frontier of 16 m/ }).click();
+    assert.match(await page.locator(".frame-text").innerText(), /^motion 16 ·/);
+    await page.getByLabel("Run of a robot").selectOption({ index: 1 });
+    assert.match(await page.locator(".panel").innerText(), /motion|end/);
+    await page.getByRole("button", { name: "Play" }).click();
+    await page.waitForFunction(() => /^motion [2-9]/.test(document.querySelector(".frame-text").textContent));
+    await guard.check();
+    await guard.close();
+  },
+
   async "ids are found, and what is under the pointer is named"(browser) {
     const { page, guard } = await open(browser, write("find", made.report({ graphs: [made.manhattan().graph] })));
     const find = async (text) => {
@@ -183,7 +229,13 @@ const tests = {
     bench.graphs[0].graph.file = evil;
     Object.assign(bench.graphs[0].configurations[0], { optimizer: evil, linear_solver: evil, error: evil, notes: [evil] });
     Object.assign(bench.machine, { cpu: evil });
-    const file = write("hostile", made.report({ graphs: [graph], bench, title: evil, command: evil, notes: [evil] }));
+    const explored = made.exploration(9, 20);
+    Object.assign(explored, { name: evil, header: { floor: evil, parts: { [evil]: evil } } });
+    for (const line of explored.lines) {
+      if (line.why) Object.assign(line, { why: evil, notes: [evil], kind: line.kind ? evil : undefined });
+      for (const candidate of line.candidates ?? []) candidate.what = evil;
+    }
+    const file = write("hostile", made.report({ graphs: [graph], explorations: [explored], bench, title: evil, command: evil, notes: [evil] }));
     const { page, guard } = await open(browser, file);
     await tour(page, guard);
     assert.equal(await page.evaluate(() => window.hacked), undefined);
@@ -219,7 +271,7 @@ const tests = {
   },
 
   async "a phone's screen holds it"(browser) {
-    const file = write("narrow", made.report({ graphs: [made.sphere(20, 20)], bench: made.bench() }));
+    const file = write("narrow", made.report({ graphs: [made.sphere(20, 20)], explorations: [made.exploration(12)], bench: made.bench() }));
     const { page, guard } = await open(browser, file, { viewport: { width: 390, height: 780 } });
     await settled(page);
     for (const tab of await page.getByRole("tab").all()) {

@@ -316,6 +316,38 @@ export function bench(seed = 11) {
   };
 }
 
+/** A robot in a square room of `size` cells a side, with a tree and candidates at every eighth motion. */
+export function exploration(motions = 60, size = 60, seed = 17) {
+  const random = randomNumbers(seed);
+  const lines = [];
+  for (let k = 0; k <= motions; ++k) {
+    const angle = (2 * Math.PI * k) / motions;
+    const [x, y] = [2 * Math.cos(angle), 2 * Math.sin(angle)];
+    const cells = Uint8Array.from({ length: size * 4 }, (_, i) => (i % size === 0 || i % size === size - 1 ? 97 : Math.round(12 * random.uniform())));
+    lines.push({
+      step: k, decision: Math.ceil(k / 8), distance: (12.6 * k) / motions, estimate: [x, y, angle + Math.PI / 2], truth: [x + 0.02 * random.normal(), y - 0.05, angle + 1.6],
+      covariance: [0.02, 0.005, 0.01], coverage: 2 * k + 1, map_entropy: 40 - k / 3, trajectory_entropy: -12 + k / 30, kept: k + 1, loops: Math.floor(k / 10), collisions: 0,
+      scan: { first_angle: -1.5, angle_step: 0.1, max_range: 4, ranges: quantized(Float32Array.from({ length: 31 }, () => 1 + random.uniform()), 1) },
+      poses: [[k, x, y, angle]], edges: k > 0 ? [[k, k - 1, k, 0], ...(k % 10 === 0 ? [[1000 + k, 0, k, 1]] : [])] : [],
+      map: { ...(k === 0 ? { resolution: 0.1, origin: [-3, -3], yaw: 0 } : {}), x: 0, y: Math.min(k, size - 4), width: size, height: 4, cells: pack(cells) }, time: k,
+    });
+    if (k % 8 !== 0) continue;
+    const nodes = 200;
+    const positions = new Float32Array(2 * nodes);
+    for (let i = 0; i < 2 * nodes; ++i) positions[i] = (i % 2 === 0 ? x : y) + (i < 2 ? 0 : random.normal());
+    lines.push({
+      decision: k / 8, kind: "drive", why: `to the frontier of ${k} m`, chosen: 1,
+      candidates: [3, 1, 2].map((value) => ({ value, what: `frontier ${value}`, length: value, change: { trajectory: 0.1, map: -value, alpha: 0.9 }, points: [[x, y], [x + value / 2, y + 0.5], [x + value / 2, y - 1]] })),
+      tree: {
+        count: nodes, positions: quantized(positions, 2), parents: pack(Int32Array.from({ length: nodes }, (_, i) => Math.floor((i + 1) / 2) - 1)),
+        values: quantized(Float32Array.from({ length: nodes }, (_, i) => i / 50), 1),
+      },
+    });
+  }
+  lines.push({ end: "limit", why: "12 m are driven", converged: true, notes: ["A note."], time: motions });
+  return { name: "robot.jsonl", complete: true, header: { floor: "room.yaml", seed: 3, parts: { explorer: "frontier", mapper: "log_odds" }, robot: { radius: 0.2 } }, lines };
+}
+
 export function report(members) {
   return {
     format: "cairn-report", version: 1, kind: "view", cairn: "0.1.0", title: "demo", command: "cairn view manhattan.g2o sphere.g2o", created: "2026-11-01T12:00:00Z",

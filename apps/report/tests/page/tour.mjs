@@ -135,6 +135,7 @@ export async function tour(page, guard) {
     assert(differing(first, await picture(page)) > 0, "the edge under the pointer is marked");
     await page.mouse.move(2, 2);
   }
+  if ((await page.locator("canvas.floor:visible").count()) > 0) assert(inkShare(await picture(page)) > 0.005, "the map is not blank");
   const used = await useEveryControl(page);
   await reachByKeyboard(page);
   await guard.check();

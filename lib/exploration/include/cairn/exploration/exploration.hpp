@@ -86,6 +86,9 @@ struct Exploration {
   std::function<void(const Decision&, const Situation&)> decided = {};
   /// Called after each motion.
   std::function<void(const ExplorationStep&, const FloorMap&)> moved = {};
+  /// The same with all that a recording holds: graph and map as the explorer would be given them,
+  /// and the scan that was taken at the end of the motion.
+  std::function<void(const ExplorationStep&, const Situation&, const LaserScan&)> scanned = {};
 };
 
 /// Explores: decides, drives along the path that was chosen, and maps, until nothing is left to

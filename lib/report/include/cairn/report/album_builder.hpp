@@ -23,7 +23,7 @@ namespace cairn {
 /// - graphs without factors (trajectories) over the last graph that has their ids, the first of
 ///   them as ground truth unless that is given;
 /// - recordings and reports of runs with their graph;
-/// - tables as they are.
+/// - tables and explorations as they are.
 ///
 /// Everything else stands by itself. Add everything, in any order, then `finish`. A file's name
 /// identifies it: reports name the files of their graph and estimate.
@@ -49,6 +49,10 @@ class CAIRN_API AlbumBuilder {
     table.name = std::move(name);
     tables_.push_back(std::move(table));
   }
+  /// An EXPLORATION of docs/report.md.
+  void add_exploration(std::string json) { explorations_.push_back(std::move(json)); }
+  /// A sentence on what is shown, for the report and for `Note`.
+  void add_note(const std::string& sentence) { note(sentence); }
   void set_truth(const std::string& file, Graph truth) { truth_.emplace(file, std::move(truth)); }
   /// Shows where this computation of initial estimates puts every graph; it outlives `finish`.
   void show_initial(const std::string& name, InitialGuess& initial) {
@@ -101,6 +105,7 @@ class CAIRN_API AlbumBuilder {
   std::vector<std::string> notes_;
   std::string bench_;
   std::vector<NumberTable> tables_;
+  std::vector<std::string> explorations_;
 };
 
 /// "sphere.g2o" of "maps/sphere.g2o"; a generator's name ("@city") as it is.

@@ -134,7 +134,8 @@ struct Album {
   std::string machine, build;      ///< JSON objects as in the program's reports, or empty
   std::vector<std::string> notes;  ///< sentences for the reader
   std::vector<Scene> scenes;
-  std::string bench;                ///< the report of `cairn bench --json`, or empty
+  std::vector<std::string> explorations;  ///< EXPLORATIONs of docs/report.md, JSON objects
+  std::string bench;                      ///< the report of `cairn bench --json`, or empty
   std::vector<NumberTable> tables;  ///< what plots of columns draw; the page has no part for them
 };
 

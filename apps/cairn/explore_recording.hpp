@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "arguments.hpp"
+#include "cairn/exploration/exploration.hpp"
+#include "cairn/exploration/recorder.hpp"
+#include "results.hpp"
+#include "session.hpp"
+
+namespace cairn::app {
+
+/// `--record` and `--html` of `cairn explore`.
+struct RunRecordingOptions {
+  std::string record, page;
+};
+void add_recording_options(ArgumentParser cli, RunRecordingOptions& options);
+/// Finds out before the run whether both can be written. Throws `Error`.
+void check_recording(const RunRecordingOptions& options, Session& session);
+
+/// The recording of a run, and its page, where they are asked for.
+class RunRecording {
+ public:
+  RunRecording(const RunRecordingOptions& options, const RecordedRun& run);
+  RunRecording(const RunRecording&) = delete;
+  RunRecording& operator=(const RunRecording&) = delete;
+
+  /// Follows a run that has not begun; `exploration` calls what it has called before as well.
+  void follow(Exploration& exploration);
+  /// Writes what is asked for with the other results.
+  void write(const ExplorationResult& result, Results& results, Session& session);
+
+ private:
+  void write_page(Session& session) const;
+
+  const RunRecordingOptions& options_;
+  std::string name_;
+  std::string text_;  // for the page
+  std::optional<ExplorationRecorder> recorder_;
+};
+
+}  // namespace cairn::app

@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// cairn explore --record and --html, and what cairn view and cairn plot make of recordings.
+#include <regex>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "cairn/plugin/registry.hpp"
+#include "integration/process.hpp"
+
+namespace cairn::test {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+class ExploreRecording : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    const Registry registry;
+    for (const auto& [kind, name] : {std::pair{"world", "lidar_building"},
+                                     {"mapper", "log_odds"},
+                                     {"explorer", "frontier"},
+                                     {"path_planner", "grid_dijkstra"},
+                                     {"floor_plan", "rooms"},
+                                     {"pose_policy", "compact_pose"},
+                                     {"registration", "simulated"},
+                                     {"picture", "html"}}) {
+      if (!registry.has(kind, name)) GTEST_SKIP() << "built without " << name;
+    }
+  }
+  static Outcome explore(std::vector<std::string> more) {
+    std::vector<std::string> words{"explore",        "@rooms:width=10,height=8,seed=2",
+                                   "--registration", "simulated:range=1.4,angle=0.35",
+                                   "--until",        "distance=10"};
+    words.insert(words.end(), more.begin(), more.end());
+    return cairn(words);
+  }
+  static std::string without_times(const std::string& file) {
+    return std::regex_replace(read_text(file), std::regex(",\"time\":[0-9.]+"), "");
+  }
+  TemporaryFolder folder_;
+};
+
+TEST_F(ExploreRecording, IsALineForEachMotionAndDecisionAndThePageHasThemAll) {
+  const std::string record = folder_.file("run.jsonl"), page = folder_.file("run.html"),
+                    direct = folder_.file("direct.html"), report = folder_.file("run.json");
+  const Outcome run = explore({"--record", record, "--html", direct, "--json", report});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const auto said = parse_json(read_text(report)).as_object();
+  const std::vector<std::string> written = lines(read_text(record));
+  EXPECT_EQ(static_cast<std::int64_t>(written.size()),
+            said.at("motions").as_int64() + said.at("decisions").at("count").as_int64() + 3);
+  EXPECT_EQ(parse_json(written.back()).at("why"), said.at("why"));
+  const auto view = report_of({"view", record, "-o", page}).as_object();
+  EXPECT_EQ(view.at("explorations").to_number<int>(), 1);
+  EXPECT_TRUE(view.at("notes").as_array().empty());
+  // Every line is in both pages, character by character.
+  for (const std::string& file : {page, direct}) {
+    const std::string html = read_text(file);
+    for (const std::string& line : written) ASSERT_THAT(html, HasSubstr(line));
+  }
+}
+
+TEST_F(ExploreRecording, DiffersInTimesAloneWhateverTheNumberOfThreads) {
+  const std::string first = folder_.file("a.jsonl"), second = folder_.file("b.jsonl");
+  ASSERT_EQ(explore({"--record", first, "--threads", "1"}).exit_code, 0);
+  ASSERT_EQ(explore({"--record", second, "--threads", "3"}).exit_code, 0);
+  EXPECT_EQ(without_times(first), without_times(second));
+}
+
+TEST_F(ExploreRecording, ThatWasCutShortIsShownAndSaid) {
+  const std::string record = folder_.file("run.jsonl"), page = folder_.file("run.html");
+  ASSERT_EQ(explore({"--record", record}).exit_code, 0);
+  const std::string whole = read_text(record);
+  write_text(record, whole.substr(0, whole.size() / 2));
+  const Outcome view = cairn({"view", record, "-o", page});
+  ASSERT_EQ(view.exit_code, 0) << view.err;
+  EXPECT_THAT(unfolded(view.err), AllOf(HasSubstr("cut short"), HasSubstr("was killed")));
+  EXPECT_THAT(read_text(page), HasSubstr("\"complete\":false"));
+  write_text(record, whole.substr(0, whole.find('\n') + 1));
+  const Outcome empty = cairn({"view", record, "-o", page});
+  EXPECT_EQ(empty.exit_code, 3);
+  EXPECT_THAT(unfolded(empty.err), HasSubstr("not even the start was recorded"));
+  write_text(record, whole + "{\"step\":1}\n");
+  const Outcome more = cairn({"view", record, "-o", page});
+  EXPECT_EQ(more.exit_code, 3);
+  EXPECT_THAT(unfolded(more.err), HasSubstr("follows the end"));
+}
+
+TEST_F(ExploreRecording, HasCurvesToPlot) {
+  if (!Registry().has("picture", "svg")) GTEST_SKIP() << "built without plots";
+  const std::string record = folder_.file("run.jsonl"), plot = folder_.file("run.svg");
+  ASSERT_EQ(explore({"--record", record}).exit_code, 0);
+  const Outcome run = cairn({"plot", record, "--y", "map_entropy", "--y", "trajectory_entropy",
+                             "--x", "distance", "-o", plot});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_THAT(read_text(plot), HasSubstr("<svg"));
+  const Outcome wrong = cairn({"plot", record, "--x", "metres", "-o", plot});
+  EXPECT_EQ(wrong.exit_code, 2);
+  EXPECT_THAT(unfolded(wrong.err), HasSubstr("trajectory_entropy"));
+}
+
+TEST_F(ExploreRecording, IsRefusedBeforeTheRunWhereItCannotBeWritten) {
+  EXPECT_EQ(explore({"--record", "-"}).exit_code, 2);
+  EXPECT_EQ(explore({"--record", folder_.file("none/run.jsonl")}).exit_code, 3);
+  EXPECT_EQ(explore({"--html", folder_.file("none/run.html")}).exit_code, 3);
+  const std::string both = folder_.file("run");
+  EXPECT_EQ(explore({"--record", both, "--html", both}).exit_code, 2);
+  EXPECT_TRUE(folder_.contents().empty());
+}
+
+}  // namespace
+}  // namespace cairn::test
