@@ -9,6 +9,7 @@
 
 #include <Eigen/Core>
 
+#include "marginal_kernels.hpp"
 #include "pose_covariances.hpp"
 
 namespace cairn {
@@ -66,7 +67,9 @@ class MarginalUpdates {
   std::shared_ptr<UpdatedMarginals> unused();
 
   PoseCovariances& covariances_;
+  UpdateMarginals kernel_;
   std::vector<double> diagonal_, inverse_determinants_;  ///< with the prior, now
+  std::vector<double> ratios_;
   double sum_ = 0.0;
   std::size_t most_kept_ = 0;
   std::deque<std::shared_ptr<UpdatedMarginals>> kept_;  ///< oldest first

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "cairn/planning/path_information.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -11,6 +13,7 @@
 #include <Eigen/LU>
 
 #include "cairn/lie/so2.hpp"
+#include "cairn/planning/point_buckets.hpp"
 #include "path_closure.hpp"
 #include "pose_covariances.hpp"
 
@@ -67,11 +70,7 @@ class PathInformation::Model {
         newest_(covariances_.size() - 1),
         factor_(options.entropy == EntropyForm::standard ? 0.5 : 1.0),
         log_match_(std::log(match_.covariance().determinant())) {
-    for (int i = 0; i < covariances_.size(); ++i) {
-      const Pose2 pose = covariances_.pose(i);
-      older_.push_back({pose.x(), pose.y(), std::cos(pose.theta()), std::sin(pose.theta()),
-                        pose.theta(), i == newest_ || in_area(pose, situation.pose)});
-    }
+    index_poses(situation.pose);
     start_ = std::make_shared<Node>();
     start_->frame = &covariances_;
     start_->pose = situation.pose;
@@ -121,9 +120,26 @@ class PathInformation::Model {
  private:
   /// A pose of the graph, for matches with it.
   struct Older {
+    int number;
     double x, y, cos, sin, theta;
-    bool left_out;
   };
+
+  void index_poses(const Pose2& robot) {
+    Eigen::Vector2d low = robot.translation(), high = low;
+    for (int i = 0; i < covariances_.size(); ++i) {
+      low = low.cwiseMin(covariances_.pose(i).translation());
+      high = high.cwiseMax(covariances_.pose(i).translation());
+    }
+    constexpr double kSmallest = 0.1;  // side of a bucket [m]
+    index_.emplace(low, high, std::max(match_.range, kSmallest));
+    for (int i = 0; i < newest_; ++i) {
+      const Pose2 pose = covariances_.pose(i);
+      if (in_area(pose, robot)) continue;
+      older_.push_back(
+          {i, pose.x(), pose.y(), std::cos(pose.theta()), std::sin(pose.theta()), pose.theta()});
+      index_->add(pose.translation());
+    }
+  }
 
   bool in_area(const Pose2& older, const Pose2& newer) const {
     const Pose2 seen = older.between(newer);
@@ -131,19 +147,19 @@ class PathInformation::Model {
            std::abs(seen.theta()) <= match_.angle;
   }
 
-  /// Calls for each pose of the graph that one of a path may close a loop with.
+  /// Calls for each pose of the graph that one of a path may close a loop with, in their order.
   template <class Each>
-  void for_matches(const Pose2& newer, Each each) const {
+  void for_matches(const Pose2& newer, Each each) {
     const double x = newer.x(), y = newer.y(), theta = newer.theta(), range = match_.range;
-    for (std::size_t i = 0; i < older_.size(); ++i) {
-      const Older& older = older_[i];
+    index_->within(newer.translation(), std::numbers::sqrt2 * range, near_);
+    for (const int number : near_) {
+      const Older& older = older_[static_cast<std::size_t>(number)];
       const double dx = x - older.x, dy = y - older.y;
       if (std::abs(older.cos * dx + older.sin * dy) > range ||
-          std::abs(older.cos * dy - older.sin * dx) > range)
+          std::abs(older.cos * dy - older.sin * dx) > range ||
+          std::abs(wrap_angle(theta - older.theta)) > match_.angle)
         continue;
-      if (older.left_out || std::abs(wrap_angle(theta - older.theta)) > match_.angle) continue;
-      const int pose = static_cast<int>(i);
-      if (!can_match_ || can_match_(covariances_.pose(pose), newer)) each(pose);
+      if (!can_match_ || can_match_(covariances_.pose(older.number), newer)) each(older.number);
     }
   }
 
@@ -288,6 +304,8 @@ class PathInformation::Model {
   int newest_;
   double factor_, log_match_;
   std::vector<Older> older_;
+  std::optional<PointBuckets> index_;
+  std::vector<int> near_;
   std::shared_ptr<Node> start_;
 };
 

@@ -67,7 +67,7 @@ PathGraph wandering(int poses, double side, std::uint64_t seed) {
                                          information_of(graph.robot.odometry.covariance(motion))));
     for (Id other = 0; other + kLag < id; ++other) {
       const Pose2& older = truth[static_cast<std::size_t>(other)];
-      if (!matches(older, truth.back(), graph.match) || !random.chance(0.1)) continue;
+      if (!matches(older, truth.back(), graph.match) || !random.chance(0.4)) continue;
       update.factors.push_back(make_factor(
           Between(other, id, noisy(older.between(truth.back()), graph.match.sigma, random)),
           information_of(graph.match.covariance())));

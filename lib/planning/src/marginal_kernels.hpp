@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+namespace cairn {
+
+/// What one update of the marginals of all poses by a loop closure reads and writes. Arrays hold a
+/// number for each of `padded` poses, a multiple of eight, by entry: (r, c) of a 3×3 block at
+/// [(3 c + r) · padded + i], the lower triangle of a symmetric one at [entry · padded + i].
+struct MarginalUpdate {
+  int padded;
+  const double *newest, *other;           ///< Σ_it and Σ_il, 9 entries
+  int closures;                           ///< before this one
+  const double* const* Z_before;          ///< of each, 9 entries
+  const double* coupling;                 ///< of each, a 3×3 matrix L_b by columns
+  const double* inverse;                  ///< L⁻¹, by columns; its upper triangle is not read
+  const double *diagonal, *determinants;  ///< Σ_ii before, 6 entries, and 1 / |Σ_ii| now
+  double *Z, *updated;                    ///< 9 and 6 entries
+  double* ratios;                         ///< |Σ'_ii| / |Σ_ii now|
+};
+
+/// Z_i = L⁻¹ (cov(y, ε_i) − Σ_b L_b Z_b,i) with cov(ε_i, y) = Σ_it − Σ_il, and
+/// Σ'_ii = Σ_ii − Z_iᵀ Z_i, of all poses.
+using UpdateMarginals = void (*)(const MarginalUpdate&);
+
+/// The fastest that this machine can run: compiled for AVX-512, for AVX2 with FMA, or portable.
+UpdateMarginals choose_marginal_kernel();
+
+}  // namespace cairn

@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: BSD-3-Clause
+//
+// The kernel of marginal_kernels.hpp, compiled once for each instruction set: the including file
+// sets CAIRN_KERNEL_SET (a name) and CAIRN_KERNEL_WIDTH (doubles in a vector register), and is
+// compiled with that set's flags. Nothing but raw pointers may stand here (an inline function of
+// the standard library, compiled here for a newer machine, could be the copy that the linker keeps
+// for all).
+
+#include "marginal_kernels.hpp"
+
+namespace cairn::CAIRN_KERNEL_SET {
+namespace {
+
+constexpr int kWidth = CAIRN_KERNEL_WIDTH;
+typedef double Vec __attribute__((vector_size(kWidth * sizeof(double))));
+typedef double LooseVec __attribute__((vector_size(kWidth * sizeof(double)), aligned(8)));
+
+inline __attribute__((always_inline)) Vec load(const double* p) {
+  return *reinterpret_cast<const LooseVec*>(p);
+}
+inline __attribute__((always_inline)) void store(double* p, Vec value) {
+  *reinterpret_cast<LooseVec*>(p) = value;
+}
+
+/// Of symmetric matrices by the entries of their lower triangles, column by column.
+inline __attribute__((always_inline)) Vec determinant(const Vec* D) {
+  return D[0] * (D[3] * D[5] - D[4] * D[4]) - D[1] * (D[1] * D[5] - D[4] * D[2]) +
+         D[2] * (D[1] * D[4] - D[3] * D[2]);
+}
+
+/// As many poses as a register has numbers, from `i` on.
+inline __attribute__((always_inline)) void update_poses(const MarginalUpdate& u, long i) {
+  const long padded = u.padded;
+  const double* inverse = u.inverse;
+  Vec Z[9];
+  for (int r = 0; r < 3; ++r) {  // a coordinate of ε_i
+    Vec y[3];
+    for (int c = 0; c < 3; ++c) {
+      const long entry = (3 * c + r) * padded + i;
+      y[c] = load(u.newest + entry) - load(u.other + entry);
+    }
+    for (int b = 0; b < u.closures; ++b) {
+      const double* L = u.coupling + 9 * b;
+      const double* before = u.Z_before[b] + 3 * r * padded + i;
+      const Vec z0 = load(before), z1 = load(before + padded), z2 = load(before + 2 * padded);
+      for (int c = 0; c < 3; ++c) y[c] -= L[c] * z0 + L[3 + c] * z1 + L[6 + c] * z2;
+    }
+    Z[3 * r] = inverse[0] * y[0];
+    Z[3 * r + 1] = inverse[1] * y[0] + inverse[4] * y[1];
+    Z[3 * r + 2] = inverse[2] * y[0] + inverse[5] * y[1] + inverse[8] * y[2];
+    for (int c = 0; c < 3; ++c) store(u.Z + (3 * r + c) * padded + i, Z[3 * r + c]);
+  }
+  Vec D[6];
+  int entry = 0;
+  for (int c = 0; c < 3; ++c) {
+    for (int r = c; r < 3; ++r, ++entry) {
+      D[entry] = load(u.diagonal + entry * padded + i) - Z[3 * r] * Z[3 * c] -
+                 Z[3 * r + 1] * Z[3 * c + 1] - Z[3 * r + 2] * Z[3 * c + 2];
+      store(u.updated + entry * padded + i, D[entry]);
+    }
+  }
+  store(u.ratios + i, determinant(D) * load(u.determinants + i));
+}
+
+}  // namespace
+
+void update_marginals(const MarginalUpdate& u);
+void update_marginals(const MarginalUpdate& u) {
+  for (long i = 0; i < u.padded; i += kWidth) update_poses(u, i);
+}
+
+}  // namespace cairn::CAIRN_KERNEL_SET
