@@ -103,11 +103,39 @@ std::string Campaign::continuation_problem(const std::string& journal) {
              : "its journal leads to another chi2";
 }
 
+/// What was left of a recording must be its beginning, byte by byte, and `cairn view` must show it
+/// once the start was recorded (in the second line). Empty, or what is wrong.
+std::string Campaign::recording_problem(const RunResult& left) {
+  const std::string& whole = reference_.good.files.at(trial_.recording);
+  std::string part;
+  for (const auto& [name, content] : left.files) {
+    if (name.starts_with(trial_.recording + ".") && is_part(trial_, name)) part = content;
+  }
+  if (!whole.starts_with(part)) return "its recording is no beginning of the whole one";
+  if (std::ranges::count(part, '\n') < 2) return "";
+  write_bytes(experiment_.inputs() / "left.jsonl", part);
+  Trial view;
+  view.name = "view";
+  view.arguments = {"view", "../inputs/left.jsonl", "-o", "page.html", "--threads", "1"};
+  const RunResult result = experiment_.run(view, {});
+  const auto page = result.files.find("page.html");
+  if (result.code != 0 || page == result.files.end())
+    return "its recording cannot be shown: " + result.err;
+  const std::size_t end = part.rfind('\n'), begin = part.rfind('\n', end - 1) + 1;
+  return page->second.find(part.substr(begin, end - begin)) == std::string::npos
+             ? "the page lacks the last line of its recording"
+             : "";
+}
+
 Verdict Campaign::run(const Fault& fault, RunResult& result) {
   const bool kills = fault.what == What::kill || fault.kind == "KILL";
   if (!trial_.journal.empty() && !kills && reference_.maps.empty()) collect_maps();
   result = experiment_.run(trial_, fault);
   Verdict verdict = judge(trial_, fault, reference_, result);
+  if (verdict.end == Verdict::End::killed && !trial_.recording.empty()) {
+    if (std::string problem = recording_problem(result); !problem.empty())
+      return {Verdict::End::violation, problem};
+  }
   const auto journal = result.files.find(trial_.journal);
   const bool stopped = verdict.end == Verdict::End::error || verdict.end == Verdict::End::killed;
   if (!stopped || journal == result.files.end()) return verdict;

@@ -45,6 +45,7 @@ class Campaign {
   void collect_maps();
   std::vector<Fault> moments(std::uint64_t count, std::uint64_t seed) const;
   std::string continuation_problem(const std::string& journal);
+  std::string recording_problem(const RunResult& left);
 
   Experiment& experiment_;
   const Trial& trial_;

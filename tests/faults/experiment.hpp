@@ -38,8 +38,11 @@ struct Trial {
   std::vector<std::string> arguments;  ///< in the run's folder; inputs are in ../inputs
   std::vector<std::string> outputs;    ///< names of the files that it writes there
   std::string journal;  ///< one of them that grows with what standard output acknowledges, or empty
-  std::string input;    ///< file for standard input, in the folder of inputs, or empty
-  std::string stream;   ///< of a trial with a journal: all lines, those restored among them
+  /// One of them that is written line by line, so that a process that is killed leaves its
+  /// beginning, which `cairn view` shows; or empty.
+  std::string recording;
+  std::string input;   ///< file for standard input, in the folder of inputs, or empty
+  std::string stream;  ///< of a trial with a journal: all lines, those restored among them
   /// Files that are there before: name → file in the folder of inputs.
   std::map<std::string, std::string> before;
   /// Outputs that lines of the stream order: name → number of the line.

@@ -119,6 +119,18 @@ std::vector<Trial> file_trials() {
   };
 }
 
+/// A robot that records its run as it goes.
+Trial explore_trial() {
+  Trial made =
+      trial("explore",
+            {"explore", "@rooms:width=10,height=8,seed=2", "--registration",
+             "simulated:range=1.4,angle=0.35", "--until", "distance=12", "--record", "run.jsonl",
+             "--html", "run.html", "-o", "run.g2o", "--json", "run.json", "--quiet"},
+            {"run.jsonl", "run.html", "run.g2o", "run.json"});
+  made.recording = "run.jsonl";
+  return made;
+}
+
 /// Where memory is short, Fontconfig ends the process by a signal, or tries again for ever.
 Trial plot_trial() {
   Trial made = trial("plot",
@@ -196,6 +208,7 @@ std::vector<Trial> kill_trials() {
     if (online.name != "online") all.push_back(std::move(online));
   }
   all.push_back(parallel_trial());
+  all.push_back(explore_trial());
   return all;
 }
 

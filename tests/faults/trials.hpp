@@ -23,8 +23,8 @@ void make_inputs(const std::vector<Trial>& trials, const InputSizes& sizes, Expe
 /// same calls, except where threads are what fails.
 std::vector<Trial> cairn_trials();
 
-/// The same, and `cairn online` with all ways to synchronise its journal, for processes that are
-/// killed.
+/// The same, `cairn online` with all ways to synchronise its journal, and `cairn explore` with a
+/// recording, for processes that are killed.
 std::vector<Trial> kill_trials();
 
 /// A program that does everything wrong (careless.cpp), to see that it is noticed.

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// What reports are made of: run logs, the structure of a graph as JSON, and the reports of
-// `cairn optimize --json`. The first byte chooses. What is read fits together, and is read from
-// what is written of it as the same.
+// What reports are made of: run logs, the structure of a graph as JSON, the reports of
+// `cairn optimize --json`, and recordings of explorations. The first byte chooses. What is read
+// fits together, and is read from what is written of it as the same.
 #include <algorithm>
 #include <variant>
 
 #include <fmt/format.h>
 
+#include "cairn/exploration/recording.hpp"
 #include "cairn/report/packed_array.hpp"
 #include "cairn/report/recording.hpp"
 #include "cairn/report/run_report.hpp"
@@ -75,6 +76,22 @@ void expect_same_again(const SceneRun& first) {
          [&] { return "not the same again: " + run_json(run); });
 }
 
+/// Also with as little as a page may have.
+void expect_same_again(const ExplorationRecording& recording) {
+  std::string text = recording.header + "\n";
+  for (const std::string& line : recording.lines) text += line + "\n";
+  const ExplorationRecording again = read_exploration_recording(text, kName);
+  expect(again.lines == recording.lines && again.ended == recording.ended &&
+             again.decisions == recording.decisions && !again.torn,
+         [&] { return "not the same again: " + text; });
+  for (const NumberTable::Column& column : recording.steps.columns) {
+    expect(column.values.size() == recording.steps.columns.front().values.size(),
+           [] { return "columns of different sizes"; });
+  }
+  std::vector<std::string> notes;
+  exploration_json(recording, kName, 0, notes);
+}
+
 void read(int what, std::string_view text) {
   switch (what) {
     case 0: {
@@ -93,6 +110,9 @@ void read(int what, std::string_view text) {
     case 2:
       expect_same_again(read_run(text, kName));
       break;
+    case 4:
+      expect_same_again(read_exploration_recording(text, kName));
+      break;
     default:
       if (const auto report = read_report(text, kName); std::holds_alternative<RunReport>(report))
         expect_same_again(std::get<RunReport>(report).run);
@@ -101,9 +121,10 @@ void read(int what, std::string_view text) {
 
 void run(Bytes bytes) {
   Source source(bytes);
-  const int what = source.byte() % 4;
+  const int what = source.byte() % 5;
   const std::string_view text = text_of(source.rest());
   is_recording(text);
+  is_exploration_recording(text);
   try {
     read(what, text);
   } catch (const Error& error) {
@@ -134,6 +155,20 @@ std::vector<std::string> seeds() {
                     deflated = packed_json(positions, Packing::deflate);
   const std::string header =
       R"({"format":"cairn-recording","version":1,"name":"r",)" + graph + "}\n";
+  const std::vector<std::uint8_t> cells = {3, 254, 255, 97};
+  const std::string explored =
+      R"({"format":"cairn-recording","version":1,"kind":"exploration","name":"r"})"
+      "\n"
+      R"({"step":0,"distance":0,"estimate":[0,0,0],"poses":[[0,0,0,0]],"map":{"resolution":0.1,)"
+      R"("origin":[0,0],"yaw":0,"x":-2,"y":1,"width":2,"height":2,"cells":)" +
+      packed_json(cells, Packing::deflate) + R"(},"scan":{"ranges":)" +
+      packed_points_json(positions, 1) + "}}\n";
+  const std::string tree = R"({"decision":0,"kind":"drive","why":"w","chosen":0,"candidates":[],)"
+                           R"("tree":{"count":2,"positions":)" +
+                           packed_points_json(positions, 2) + R"(,"parents":)" +
+                           packed_json(std::vector<std::int32_t>{-1, 0}, Packing::deflate) +
+                           R"(,"values":)" + packed_points_json(std::vector<float>{1.0F, 2.0F}, 1) +
+                           "}}\n";
   std::string sequence = graph;
   sequence.replace(sequence.find("[3,7]"), 5, R"("sequence")");
   return {as_text(0, header + R"({"iteration":0,"time":0,"chi2":2,"positions":[0,1,2,3]})" + "\n" +
@@ -141,6 +176,9 @@ std::vector<std::string> seeds() {
                          R"({"summary":)" + run + "}\n"),
           as_text(0, header + R"({"iteration":0,"chi2":2,"positions":)" + deflated + "}\n"),
           as_text(0, header),
+          as_text(4, explored),
+          as_text(4, explored + tree + R"({"end":"limit","why":"so"})" + "\n"),
+          as_text(4, explored + tree + tree.substr(0, 40)),
           as_text(1, "{" + graph + "}"),
           as_text(1, "{" + sequence + "}"),
           as_text(2, run),
@@ -169,6 +207,15 @@ std::vector<std::string> words() {
           R"("iteration":)",
           R"("positions":)",
           R"("summary":)",
+          R"("kind":"exploration")",
+          R"("step":)",
+          R"("decision":)",
+          R"("end":)",
+          R"("map":{"resolution":)",
+          R"("width":)",
+          R"("cells":)",
+          R"("scan":{"ranges":)",
+          R"("tree":{"count":)",
           R"("base64":")",
           R"("deflate":")",
           R"("u16")",
