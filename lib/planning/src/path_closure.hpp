@@ -39,6 +39,9 @@ struct PathClosure {
   Eigen::Matrix3d inverse;
   /// Z of all poses of the path from k on.
   Eigen::Matrix3d end;
+  /// Of the poses 1 … k − 1 of the path: Z, and Σ'_jj without the prior after all closures so far.
+  /// With these stored, a further closure takes time as there are closures, not as their square.
+  std::vector<Eigen::Matrix3d> path_Z, path_posterior;
   /// As long as they are kept.
   mutable std::weak_ptr<const UpdatedMarginals> marginals;
 };

@@ -38,19 +38,6 @@ struct PathInformation::Node {
 
 namespace {
 
-/// Of a variable, Z of all closures from the first on, given cov(y_c, ·) of each.
-template <class Covariance>
-void whiten(std::span<const PathClosure* const> closures, std::size_t first, Covariance covariance,
-            std::vector<Matrix3d>& Z) {
-  Z.resize(closures.size());
-  for (std::size_t c = 0; c < first; ++c) Z[c] = closures[c]->end;
-  for (std::size_t c = first; c < closures.size(); ++c) {
-    Matrix3d y = covariance(*closures[c]);
-    for (std::size_t b = 0; b < c; ++b) y -= closures[c]->coupling[b] * Z[b];
-    Z[c] = closures[c]->inverse * y;
-  }
-}
-
 Matrix3d symmetric(const Matrix3d& M) { return 0.5 * (M + M.transpose()); }
 
 }  // namespace
@@ -225,27 +212,29 @@ class PathInformation::Model {
     node.closure = closure;
     if (measures_ == Measures::log_determinants) return;
     node.graph_change = updates_.change(*closure);
-    node.path_sum = path_sum(node);
+    node.path_sum = path_sum(node, closures, *closure);
   }
 
-  /// Σ ln|Σ_jj| of the poses of a path, after all its closures.
-  double path_sum(const Node& last) {
-    const std::vector<const PathClosure*> closures = in_order(last.closure.get());
-    std::vector<Matrix3d> from_pose;  // Σ_{l,t} of each
-    for (const PathClosure* closure : closures)
-      from_pose.push_back(covariances_.block(closure->pose, newest_));
-    std::vector<Matrix3d> Z;
+  /// Σ ln|Σ_jj| of the poses of a path after its newest closure, which is made to know them.
+  double path_sum(const Node& last, std::span<const PathClosure* const> before,
+                  PathClosure& newest) {
+    const auto count = static_cast<std::size_t>(last.steps - 1);
+    newest.path_Z.resize(count);
+    newest.path_posterior.resize(count);
+    const Matrix3d from_pose = covariances_.block(newest.pose, newest_);  // Σ_lt
     double sum = log_determinant(last.posterior);
     for (const Node* node = last.before.get(); node->steps > 0; node = node->before.get()) {
+      const auto j = static_cast<std::size_t>(node->steps - 1);
       const auto first = static_cast<std::size_t>(node->closure ? node->closure->count : 0);
-      const Matrix3d end = covariances_.diagonal(newest_) + node->walk;
-      std::size_t c = first;
-      whiten(
-          closures, first, [&](const PathClosure&) { return end - from_pose[c++]; }, Z);
-      Matrix3d posterior = node->posterior;
-      for (std::size_t b = first; b < closures.size(); ++b)
-        posterior.noalias() -= Z[b].transpose() * Z[b];
-      sum += log_determinant(posterior);
+      Matrix3d y = covariances_.diagonal(newest_) + node->walk - from_pose;
+      for (std::size_t b = 0; b < before.size(); ++b)
+        y.noalias() -= newest.coupling[b] * (b < first ? before[b]->end : before[b]->path_Z[j]);
+      newest.path_Z[j].noalias() = newest.inverse * y;
+      const Matrix3d& posterior =
+          first == before.size() ? node->posterior : before.back()->path_posterior[j];
+      newest.path_posterior[j] = posterior;
+      newest.path_posterior[j].noalias() -= newest.path_Z[j].transpose() * newest.path_Z[j];
+      sum += log_determinant(newest.path_posterior[j]);
     }
     return sum;
   }

@@ -102,6 +102,25 @@ SeenCells::SeenCells(const FloorMap& map, const LidarModel& lidar, double range)
   }
 }
 
+void SeenCells::leave_out(std::span<const Vector2d> points) {
+  for (const Vector2d& point : points) {
+    const Vector2d cell = frame_.to_cells(point).array().floor();
+    const int x = static_cast<int>(cell.x()), y = static_cast<int>(cell.y());
+    if (frame_.contains(x, y)) unknown_[word_at(words_, y, x / kWordBits)] &= ~bit_of(x);
+  }
+}
+
+std::vector<Vector2d> SeenCells::middles(const CellSet& cells) const {
+  std::vector<Vector2d> points;
+  points.reserve(cells.count());
+  for (int y = 0; y < frame_.height; ++y) {
+    for (int x = 0; x < frame_.width; ++x) {
+      if (cells.contains(x, y)) points.push_back(frame_.centre(x, y));
+    }
+  }
+  return points;
+}
+
 CellWindow SeenCells::look(std::span<const Pose2> poses) const {
   CellWindow seen = window_around(poses);
   for (const Pose2& pose : poses) cast(pose, seen);
@@ -130,6 +149,9 @@ CellWindow SeenCells::window_around(std::span<const Pose2> poses) const {
 
 void SeenCells::cast(const Pose2& at, CellWindow& seen) const {
   const Vector2d from = frame_.to_cells(at.translation());
+  const bool on_map = from.x() > range_ && from.y() > range_ && from.x() < frame_.width - range_ &&
+                      from.y() < frame_.height - range_;
+  if (!on_map) return;
   const double c = std::cos(at.theta()), s = std::sin(at.theta());
   for (const Vector2d& beam : beams_) {
     Crossings along_x(from.x(), c * beam.x() - s * beam.y());

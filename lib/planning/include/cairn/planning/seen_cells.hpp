@@ -63,10 +63,14 @@ class CAIRN_API SeenCells {
   /// `range` [m]; time and bits as the map has cells, and a margin of the range around it.
   SeenCells(const FloorMap& map, const LidarModel& lidar, double range);
 
+  /// From here on the cells of these points [m] do not count as unknown.
+  void leave_out(std::span<const Eigen::Vector2d> points);
   /// No cell.
   CellSet none() const { return {frame_.height, words_}; }
-  /// The unknown cells that are seen from any of these poses, which must be on the map.
+  /// The unknown cells that are seen from any of these poses; none from those beside the map.
   CellWindow look(std::span<const Pose2> poses) const;
+  /// The middles of cells of a set [m].
+  std::vector<Eigen::Vector2d> middles(const CellSet& cells) const;
   /// What discovering so many cells does to the map's entropy, −l² ln 2 for each, with l the
   /// cell's side [nats·m²] (thesis, 5.6).
   double entropy_change(std::size_t cells) const;

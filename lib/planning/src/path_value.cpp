@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "cairn/planning/path_value.hpp"
+
+#include <cmath>
+#include <utility>
+
+#include "cairn/grid/cell_traversal.hpp"
+#include "cairn/planning/path_motions.hpp"
+
+namespace cairn {
+namespace {
+
+using Eigen::Vector2d;
+
+PathInformationOptions with_entropy(PathInformationOptions options, EntropyForm entropy) {
+  options.entropy = entropy;
+  return options;
+}
+
+/// Whether no known obstacle stands between two poses.
+bool in_sight(const FloorMap& map, const Pose2& older, const Pose2& newer) {
+  const GridFrame& frame = map.frame;
+  return traverse_cells(
+      frame.to_cells(older.translation()), frame.to_cells(newer.translation()), [&](int x, int y) {
+        return !frame.contains(x, y) || map.cells[frame.index(x, y)] != CellState::occupied;
+      });
+}
+
+bool is_same(const Pose2& a, const Pose2& b) {
+  constexpr double kRounding = 1e-9;  // of the sum of turns
+  return std::abs(a.x() - b.x()) < kRounding && std::abs(a.y() - b.y()) < kRounding &&
+         std::abs(std::remainder(a.theta() - b.theta(), 2.0 * std::numbers::pi)) < kRounding;
+}
+
+}  // namespace
+
+PathValue::PathValue(const Situation& situation, const PathValueOptions& options,
+                     std::span<const Vector2d> left_out)
+    : situation_(situation),
+      objective_(options.objective, situation.map.frame.resolution, situation.robot.lidar.range),
+      information_(situation, with_entropy(options.information, options.objective.entropy),
+                   [&map = situation.map](const Pose2& older, const Pose2& newer) {
+                     return in_sight(map, older, newer);
+                   }),
+      seen_(situation.map, situation.robot.lidar,
+            std::min(options.simulated_range, situation.robot.lidar.range)),
+      now_(information_.start().covariance()),
+      map_now_(options.objective.alpha == AlphaForm::both ? situation.map.entropy() : 0.0) {
+  seen_.leave_out(left_out);
+}
+
+PathValue::State PathValue::root(const Vector2d&) const {
+  return {.information = information_.start(),
+          .seen = std::make_shared<const CellSet>(seen_.none())};
+}
+
+PathValue::State PathValue::extended(const State& path, const Vector2d&, const Vector2d& to,
+                                     const State* before) {
+  State next{.information = path.information};
+  next.segment = segment(path.information.pose(), to, before);
+  next.information = information_.extended(path.information, next.segment->motions);
+  next.cells = path.cells + path.seen->missing(next.segment->seen);
+  evaluate(next);
+  return next;
+}
+
+PathValue::State PathValue::adopted(State path, const State& parent) const {
+  path.seen = parent.seen;
+  if (path.cells == parent.cells) return path;
+  auto seen = std::make_shared<CellSet>(*parent.seen);
+  seen->add(path.segment->seen);
+  path.seen = std::move(seen);
+  return path;
+}
+
+std::shared_ptr<const PathValue::Segment> PathValue::segment(const Pose2& start, const Vector2d& to,
+                                                             const State* before) const {
+  if (before && before->segment && is_same(before->segment->start, start)) return before->segment;
+  auto segment = std::make_shared<Segment>();
+  segment->start = start;
+  const PlannedPath path{.points = {to}, .length = (to - start.translation()).norm()};
+  segment->motions = motions_along(start, path, situation_.robot);
+  std::vector<Pose2> poses;
+  for (const Pose2& motion : segment->motions)
+    poses.push_back((poses.empty() ? start : poses.back()) * motion);
+  if (!poses.empty()) segment->seen = seen_.look(poses);
+  return segment;
+}
+
+void PathValue::evaluate(State& path) const {
+  path.change =
+      objective_.change(path.information.trajectory_change(), seen_.entropy_change(path.cells),
+                        now_, path.information.covariance());
+  if (path.information.steps() == 0) return;
+  path.value = objective_.value(path.change, map_now_, now_) /
+               std::max(path.information.length(), situation_.robot.step);
+}
+
+}  // namespace cairn

@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "cairn/exploration/exploration.hpp"
+#include "cairn/grid/floor_plan.hpp"
+#include "cairn/planning/free_space.hpp"
+#include "cairn/plugin/registry.hpp"
+#include "unit/plugins/tree_explorers/known_floor.hpp"
+
+namespace cairn {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr const char* kExact =
+    "lidar_building:relative=0,sigma_xy=1e-6,sigma_theta=1e-6,range_sigma=0";
+constexpr const char* kNoisy = "lidar_building:relative=0.05";
+constexpr const char* kMatcher =
+    "simulated:range=1.4,angle=0.35,sigma_translation=0.02,sigma_rotation=0.002";
+
+/// The parts of a run, by name.
+struct Parts {
+  Parts(const std::string& world_name, const std::string& explorer_name)
+      : world(make<World>(world_name)),
+        policy(make<PosePolicy>("compact_pose:range=1,angle=0.35,reuse=false")),
+        registration(make<Registration>(kMatcher)),
+        mapper(make<Mapper>("log_odds")),
+        explorer(make<Explorer>(explorer_name)) {}
+
+  template <class Interface>
+  std::unique_ptr<Interface> make(const std::string& name) {
+    return registry.make<Interface>(parse_component(name));
+  }
+
+  Exploration on(const OccupancyGrid& floor, std::uint64_t seed = 1) {
+    return {.world = *world,
+            .policy = *policy,
+            .registration = *registration,
+            .mapper = *mapper,
+            .explorer = *explorer,
+            .registry = registry,
+            .start = {.floor = &floor, .pose = {}, .seed = seed},
+            .limits = {}};
+  }
+
+  Registry registry;
+  std::unique_ptr<World> world;
+  std::unique_ptr<PosePolicy> policy;
+  std::unique_ptr<Registration> registration;
+  std::unique_ptr<Mapper> mapper;
+  std::unique_ptr<Explorer> explorer;
+};
+
+class TreeExplorers : public testing::TestWithParam<const char*> {};
+
+TEST_P(TreeExplorers, DriveAlongTheBestPathOfTheirTree) {
+  const OccupancyGrid floor = test::known_floor("rooms:width=12,height=9", 3).floor;
+  Parts parts(kNoisy, std::string(GetParam()) + ":density=2");
+  Exploration exploration = parts.on(floor);
+  exploration.limits.decisions = 5;
+  int driven = 0;
+  exploration.decided = [&](const Decision& decision, const Situation& situation) {
+    ASSERT_FALSE(decision.tree.empty()) << decision.why;
+    EXPECT_EQ(decision.tree.front().parent, -1);
+    double least = 0.0;
+    for (const TreePose& node : decision.tree) least = std::min(least, node.value);
+    for (std::size_t k = 1; k < decision.tree.size(); ++k) EXPECT_GE(decision.tree[k].parent, 0);
+    if (least == 0.0) return;
+    ++driven;
+    ASSERT_EQ(decision.kind, Decision::Kind::drive);
+    const Candidate& chosen = decision.candidates.at(decision.chosen);
+    EXPECT_EQ(chosen.value, least);
+    ASSERT_TRUE(chosen.change);
+    EXPECT_LE(chosen.change->map, 0.0);
+    EXPECT_EQ(chosen.path.points.front(), situation.pose.translation());
+    const FreeSpace space(situation.map, situation.pose.translation(), situation.robot.radius);
+    for (std::size_t k = space.entry().size(); k < chosen.path.points.size(); ++k)
+      EXPECT_TRUE(space.is_clear(chosen.path.points[k - 1], chosen.path.points[k]));
+    for (const Candidate& other : decision.candidates) EXPECT_GE(other.value, chosen.value);
+  };
+  run_exploration(exploration);
+  EXPECT_GT(driven, 2);
+}
+
+TEST_P(TreeExplorers, TheSameSeedGivesTheSameRun) {
+  const OccupancyGrid floor = test::known_floor("rooms:width=12,height=9", 5).floor;
+  const auto run = [&](std::uint64_t seed) {
+    Parts parts(kNoisy, std::string(GetParam()) + ":density=2");
+    Exploration exploration = parts.on(floor, seed);
+    exploration.limits.distance = 5.0;
+    return run_exploration(exploration);
+  };
+  const ExplorationResult a = run(7), b = run(7), other = run(8);
+  ASSERT_EQ(a.steps.size(), b.steps.size());
+  for (std::size_t k = 0; k < a.steps.size(); ++k) {
+    ASSERT_EQ(a.steps[k].estimate.x(), b.steps[k].estimate.x());
+    ASSERT_EQ(a.steps[k].map_entropy, b.steps[k].map_entropy);
+    ASSERT_EQ(a.steps[k].trajectory_entropy, b.steps[k].trajectory_entropy);
+  }
+  EXPECT_EQ(a.map.log_odds, b.map.log_odds);
+  EXPECT_NE(a.steps.back().estimate.x(), other.steps.back().estimate.x());
+}
+
+TEST_P(TreeExplorers, EndWithAReasonWhereNothingIsToBeGained) {
+  const OccupancyGrid floor = test::known_floor("rooms:width=12,height=9", 5).floor;
+  Parts parts(kExact, std::string(GetParam()) + ":fallback=none,density=1,least_gain=1e6");
+  const ExplorationResult result = run_exploration(parts.on(floor));
+  EXPECT_EQ(result.end, ExplorationEnd::finished);
+  EXPECT_THAT(result.why, HasSubstr("lowers the entropy by 1e+06 nats/m"));
+  EXPECT_THAT(result.why, HasSubstr("frontiers are left"));
+  // With another explorer to fall back on it is that explorer that drives.
+  Parts falling(kExact, std::string(GetParam()) + ":density=1,least_gain=1e6");
+  Exploration exploration = falling.on(floor);
+  exploration.limits.decisions = 8;
+  exploration.decided = [](const Decision& decision, const Situation&) {
+    EXPECT_THAT(decision.why, HasSubstr("; frontier: to a frontier"));
+    EXPECT_FALSE(decision.tree.empty());
+  };
+  EXPECT_GT(run_exploration(exploration).steps.back().distance, 0.5);
+}
+
+TEST_P(TreeExplorers, SayThatTheClockHasCutTheirTree) {
+  const OccupancyGrid floor = test::known_floor("rooms:width=12,height=9", 5).floor;
+  Parts parts(kExact, std::string(GetParam()) + ":density=200");
+  Exploration exploration = parts.on(floor);
+  exploration.limits.decisions = 2;
+  exploration.decision_budget = 0.05;
+  const ExplorationResult result = run_exploration(exploration);
+  EXPECT_THAT(result.notes, testing::Contains(HasSubstr("time budget")));
+  EXPECT_GT(result.steps.back().distance, 0.0);
+}
+
+INSTANTIATE_TEST_SUITE_P(Both, TreeExplorers, testing::Values("drrt_star", "errt_star"));
+
+class TreeExplorersOnFloors : public testing::TestWithParam<std::tuple<const char*, const char*>> {
+};
+
+TEST_P(TreeExplorersOnFloors, WithoutNoiseAllIsSeenAndNothingIsTouched) {
+  const auto [explorer, plan] = GetParam();
+  const OccupancyGrid floor = test::known_floor(plan, 3).floor;
+  Parts parts(kExact, std::string(explorer) + ":density=2");
+  const ExplorationResult result = run_exploration(parts.on(floor));
+  EXPECT_EQ(result.end, ExplorationEnd::finished) << result.why;
+  EXPECT_EQ(result.collisions, 0);
+  ASSERT_TRUE(result.against);
+  EXPECT_GE(result.against->seen, 0.99 * result.against->floor);
+}
+
+INSTANTIATE_TEST_SUITE_P(Plans, TreeExplorersOnFloors,
+                         testing::Combine(testing::Values("drrt_star", "errt_star"),
+                                          testing::Values("rooms:width=9,height=7",
+                                                          "cave:width=8,height=8")));
+
+}  // namespace
+}  // namespace cairn
