@@ -2,11 +2,15 @@
 // cairn explore FLOOR: a robot that explores a floor.
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstdint>
 #include <cstdio>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 #include <fmt/core.h>
@@ -17,8 +21,10 @@
 #include "cairn/policy/policy_run.hpp"
 #include "cairn/runtime/error.hpp"
 #include "commands.hpp"
+#include "explore_comparison.hpp"
 #include "explore_recording.hpp"
 #include "explore_report.hpp"
+#include "explore_words.hpp"
 #include "floor_drawing.hpp"
 #include "floors.hpp"
 #include "graph_files.hpp"
@@ -38,7 +44,9 @@ struct ExploreOptions {
   std::string world = "lidar_building", lidar, odometry;
   SlamNames slam{.policy = "compact_pose:range=2,angle=3.14,reuse=false,gate=0.9999"};
   std::string explorer = "frontier";
-  std::string until;
+  std::string until, match;
+  double decision_budget = std::numeric_limits<double>::infinity();  // [s]
+  ComparisonOptions comparison;
   std::uint64_t seed = 1;
   std::optional<double> start_x, start_y, start_theta;
   std::string output, trajectory, truth, map, steps;
@@ -62,44 +70,6 @@ ComponentSpec world_spec(const ExploreOptions& options) {
   merge(options.lidar, "--lidar", spec);
   merge(options.odometry, "--odometry", spec);
   return spec;
-}
-
-double positive(const std::string& key, const std::string& text) {
-  std::size_t read = 0;
-  double value = 0.0;
-  try {
-    value = std::stod(text, &read);
-  } catch (const std::exception&) {
-    read = 0;
-  }
-  if (read == 0 || read != text.size() || !(value > 0.0)) {
-    throw Error(ErrorCode::usage,
-                fmt::format("--until: '{}' is no number above zero for {}", text, key));
-  }
-  return value;
-}
-
-ExplorationLimits limits_of(const std::string& words) {
-  ExplorationLimits limits;
-  if (words.empty()) return limits;
-  constexpr double kMost = 1e9;
-  for (const auto& [key, text] : parse_component("until:" + words).values) {
-    const double value = positive(key, text);
-    const int count = static_cast<int>(std::min(value, kMost));
-    if (key == "distance") {
-      limits.distance = value;
-    } else if (key == "steps") {
-      limits.steps = count;
-    } else if (key == "decisions") {
-      limits.decisions = count;
-    } else {
-      throw Error(ErrorCode::usage,
-                  fmt::format("--until: there is no limit '{}'; there are distance [m], steps and "
-                              "decisions",
-                              key));
-    }
-  }
-  return limits;
 }
 
 std::optional<Pose2> start_of(const ExploreOptions& options) {
@@ -172,7 +142,34 @@ class ExploreProgress {
   Clock::time_point shown_ = Clock::now();
 };
 
+bool compares(const ExploreOptions& options) {
+  return options.comparison.asked_for(split_components(options.explorer));
+}
+
+/// What belongs to one run alone.
+void check_single(const ExploreOptions& options) {
+  const std::pair<const char*, bool> single[]{{"--output", !options.output.empty()},
+                                              {"--trajectory", !options.trajectory.empty()},
+                                              {"--truth", !options.truth.empty()},
+                                              {"--map", !options.map.empty()},
+                                              {"--steps", !options.steps.empty()},
+                                              {"--record", !options.recording.record.empty()},
+                                              {"--live", options.live}};
+  for (const auto& [option, given] : single) {
+    if (given) {
+      throw Error(ErrorCode::usage,
+                  fmt::format("{} is of one run: it goes with one explorer, and without --runs, "
+                              "--csv and --curves",
+                              option));
+    }
+  }
+}
+
 void check(const ExploreOptions& options, Session& session) {
+  if (compares(options)) {
+    check_single(options);
+    return check_comparison(options.comparison, options.recording.page, session);
+  }
   if (!options.map.empty()) check_map_file(options.map, "--map", session);
   for (const std::string& graph : {options.output, options.trajectory, options.truth})
     check_output(graph, "", session, false);
@@ -213,27 +210,62 @@ void write_outputs(const ExploreOptions& options, const ExploreOutcome& outcome,
   });
 }
 
+/// The parts as they were named.
+ExploreParts parts_of(const ExploreOptions& options) {
+  return {.world = spec_text(world_spec(options)),
+          .policy = options.slam.policy,
+          .registration = options.slam.registration,
+          .mapper = options.slam.mapper,
+          .explorer = options.explorer,
+          .seed = options.seed};
+}
+
+int compare_explorers(const ExploreOptions& options, Session& session) {
+  Registry& registry = session.registry();
+  const ComponentSpec world = world_spec(options);
+  registry.make<World>(world);  // what is wrong with its options is reported before the work
+  const MatchModel match = match_of(options.match);
+  const ExplorationLimits limits = limits_of(options.until);
+  const std::optional<Pose2> start = start_of(options);
+  const OccupancyGrid floor = load_floor(options.floor, session);
+  const ExplorationSetup setup{.registry = registry,
+                               .world = world,
+                               .policy = parse_component(options.slam.policy),
+                               .registration = parse_component(options.slam.registration),
+                               .mapper = parse_component(options.slam.mapper),
+                               .floor = floor,
+                               .start = start,
+                               .limits = limits,
+                               .match = match,
+                               .decision_budget = options.decision_budget};
+  return run_comparison(options.comparison, options.recording.page, setup, options.floor,
+                        parts_of(options), session);
+}
+
 int run_explore(const ExploreOptions& options, Session& session) {
   check(options, session);
   session.use_threads();
+  if (std::isfinite(options.decision_budget))
+    session.note("with --decision-budget the clock decides: this run can't be repeated exactly");
+  if (compares(options)) return compare_explorers(options, session);
   Registry& registry = session.registry();
   const ExplorationLimits limits = limits_of(options.until);
+  const MatchModel match = match_of(options.match);
   const std::optional<Pose2> start = start_of(options);
   const ComponentSpec world_name = world_spec(options);
+  const auto seeded = [&](std::string_view kind, const std::string& name) {
+    return with_seed(registry, kind, parse_component(name), options.seed);
+  };
   const auto world = registry.make<World>(world_name);
-  const auto policy = registry.make<PosePolicy>(parse_component(options.slam.policy));
-  const auto registration = registry.make<Registration>(parse_component(options.slam.registration));
+  const auto policy = registry.make<PosePolicy>(seeded(PosePolicy::kKind, options.slam.policy));
+  const auto registration =
+      registry.make<Registration>(seeded(Registration::kKind, options.slam.registration));
   const auto mapper = registry.make<Mapper>(parse_component(options.slam.mapper));
   const auto explorer = registry.make<Explorer>(parse_component(options.explorer));
   const OccupancyGrid floor = load_floor(options.floor, session);
   const InterruptGuard guard;  // until the results are written
   ExploreProgress progress(options, session);
-  const ExploreParts parts{.world = spec_text(world_name),
-                           .policy = options.slam.policy,
-                           .registration = options.slam.registration,
-                           .mapper = options.slam.mapper,
-                           .explorer = options.explorer,
-                           .seed = options.seed};
+  const ExploreParts parts = parts_of(options);
   RunRecording recording(options.recording, recorded_run(options, parts, *world));
   Exploration exploration{
       .world = *world,
@@ -244,6 +276,9 @@ int run_explore(const ExploreOptions& options, Session& session) {
       .registry = registry,
       .start = {.floor = &floor, .pose = start, .seed = options.seed},
       .limits = limits,
+      .match = match,
+      .decision_budget = options.decision_budget,
+      .sample_distance = ExplorationSetup::kSampleDistance,
       .interrupt = &guard.flag(),
       .decided = [&](const Decision& decision, const Situation&) { progress.decided(decision); },
       .moved = [&](const ExplorationStep& step,
@@ -252,6 +287,7 @@ int run_explore(const ExploreOptions& options, Session& session) {
   const ExploreOutcome outcome{.floor = options.floor,
                                .frame = floor.frame,
                                .parts = parts,
+                               .repeatable = !std::isfinite(options.decision_budget),
                                .result = run_exploration(exploration)};
   progress.clear();
   for (const std::string& note : outcome.result.notes) session.note(note);
@@ -282,10 +318,19 @@ Command add_explore(ArgumentParser program) {
   cli.add_option("--truth", options->truth, "write where the robot truly was").type_name("FILE");
   cli.add_option("--steps", options->steps, "a row for each motion, as CSV").type_name("FILE");
   add_recording_options(cli, options->recording);
-  cli.add_option("--explorer", options->explorer, "decides where to drive; options as NAME:k=v")
-      .type_name("NAME")
+  cli.add_option("--explorer", options->explorer,
+                 "decides where to drive; options as NAME:k=v; several, A,B, are compared")
+      .type_name("NAMES")
       .show_default();
   cli.add_option("--until", options->until, "limits: distance=250 [m], steps=N, decisions=N")
+      .type_name("K=V,…");
+  add_comparison_options(cli, options->comparison);
+  cli.add_option("--decision-budget", options->decision_budget,
+                 "ends searches for a path after so long [s]: then no run is like the other")
+      .type_name("S")
+      .seconds_from(1e-3);
+  cli.add_option("--match", options->match,
+                 "loop closures as explorers expect them: range=1,angle=0.35,sigma_xy=0.05")
       .type_name("K=V,…");
   cli.add_option("--lidar", options->lidar, "options of the lidar: fov=180,range=8,beams=181")
       .type_name("K=V,…");
@@ -309,7 +354,9 @@ Command add_explore(ArgumentParser program) {
       "  cairn explore @rooms:seed=3\n"
       "  cairn explore floor.yaml --until distance=250 --odometry relative=0.15 -o run.g2o --map "
       "map.yaml\n"
-      "  cairn explore floor.yaml --record run.jsonl && cairn view run.jsonl -o run.html");
+      "  cairn explore floor.yaml --record run.jsonl && cairn view run.jsonl -o run.html\n"
+      "  cairn explore floor.yaml --explorer frontier,random --runs 20 --csv runs.csv --html "
+      "compare.html");
   return {cli, [options](Session& session) { return run_explore(*options, session); }};
 }
 

@@ -18,7 +18,8 @@ void add_recording_options(ArgumentParser cli, RunRecordingOptions& options) {
   cli.add_option("--record", options.record,
                  "map, graph, scans and decisions as the run goes on, for cairn view")
       .type_name("FILE");
-  cli.add_option("--html", options.page, "the same as a page for the browser, at the end")
+  cli.add_option("--html", options.page,
+                 "the same as a page for the browser, or of a comparison its tables and curves")
       .type_name("PAGE");
 }
 

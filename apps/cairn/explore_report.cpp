@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "explore_report.hpp"
 
-#include <algorithm>
-#include <cmath>
 #include <optional>
-#include <vector>
+#include <string>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -21,14 +20,6 @@ namespace json = boost::json;
 std::optional<TrajectoryError> error_of(const ExplorationResult& result) {
   if (result.truth_trajectory.variable_count() < 3) return std::nullopt;
   return compare(trajectory(result.trajectory), trajectory(result.truth_trajectory));
-}
-
-/// How long decisions took at most, but for this part of them [s].
-double quantile(std::vector<double> seconds, double part) {
-  if (seconds.empty()) return 0.0;
-  std::ranges::sort(seconds);
-  const auto last = static_cast<double>(seconds.size() - 1);
-  return seconds[static_cast<std::size_t>(std::ceil(part * last))];
 }
 
 json::object decisions_json(const ExplorationResult& result) {
@@ -68,6 +59,15 @@ json::array steps_json(const ExplorationResult& result) {
 
 }  // namespace
 
+void put_measures(json::object& report, const ExplorationMeasures& measures) {
+  json::object numbers, seconds;
+  for (const ExplorationMeasure& measure : exploration_measures()) {
+    (measure.is_time ? seconds : numbers)[measure.name] = number_json(measures.*measure.member);
+  }
+  report["measures"] = std::move(numbers);
+  report["measured_seconds"] = std::move(seconds);
+}
+
 json::object report_json(const ExploreOutcome& outcome) {
   const ExplorationResult& result = outcome.result;
   const ExplorationStep& last = result.steps.back();
@@ -79,6 +79,7 @@ json::object report_json(const ExploreOutcome& outcome) {
   report["mapper"] = outcome.parts.mapper;
   report["explorer"] = outcome.parts.explorer;
   report["seed"] = outcome.parts.seed;
+  report["repeatable"] = outcome.repeatable;
   report["end"] = std::string(to_string(result.end));
   report["why"] = result.why;
   report["motions"] = last.step;
@@ -101,6 +102,8 @@ json::object report_json(const ExploreOutcome& outcome) {
                        {"map", result.slam.map_seconds},
                        {"policy", result.slam.policy_seconds},
                        {"registration", result.slam.registration_seconds}};
+  put_measures(report, measures_of(result, static_cast<double>(outcome.frame.size()) *
+                                               outcome.frame.cell_area()));
   report["notes"] = strings_json(result.notes);
   report["steps"] = steps_json(result);
   return report;
@@ -109,15 +112,15 @@ json::object report_json(const ExploreOutcome& outcome) {
 std::string steps_csv(const ExplorationResult& result) {
   std::string text =
       "step,decision,distance,x,y,theta,true_x,true_y,true_theta,coverage,map_entropy,"
-      "trajectory_entropy,kept,loops,collisions\n";
+      "grid_area,trajectory_entropy,kept,loops,collisions\n";
   for (const ExplorationStep& step : result.steps) {
     const std::string truth = step.truth ? fmt::format("{:.9g},{:.9g},{:.9g}", step.truth->x(),
                                                        step.truth->y(), step.truth->theta())
                                          : ",,";
     text +=
-        fmt::format("{},{},{:.9g},{:.9g},{:.9g},{:.9g},{},{:.9g},{:.9g},{:.9g},{},{},{}\n",
+        fmt::format("{},{},{:.9g},{:.9g},{:.9g},{:.9g},{},{:.9g},{:.9g},{:.9g},{:.9g},{},{},{}\n",
                     step.step, step.decision, step.distance, step.estimate.x(), step.estimate.y(),
-                    step.estimate.theta(), truth, step.coverage, step.map_entropy,
+                    step.estimate.theta(), truth, step.coverage, step.map_entropy, step.grid_area,
                     step.trajectory_entropy, step.kept, step.loops, step.collisions);
   }
   return text;

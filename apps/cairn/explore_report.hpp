@@ -6,6 +6,7 @@
 #include <boost/json/object.hpp>
 
 #include "cairn/exploration/exploration.hpp"
+#include "cairn/exploration/exploration_measures.hpp"
 
 namespace cairn::app {
 
@@ -20,9 +21,12 @@ struct ExploreOutcome {
   std::string floor;
   GridFrame frame;
   ExploreParts parts;
+  bool repeatable = true;  ///< no clock decides
   ExplorationResult result;
 };
 
+/// Adds "measures", {name: number}, and "measured_seconds", those of them that are times.
+void put_measures(boost::json::object& report, const ExplorationMeasures& measures);
 boost::json::object report_json(const ExploreOutcome& outcome);
 /// A row for each motion.
 std::string steps_csv(const ExplorationResult& result);

@@ -100,6 +100,87 @@ TEST_F(Explore, OptionsOfRobotAndLimitsAreTaken) {
               AllOf(HasSubstr("fov=90"), HasSubstr("relative=0.2")));
 }
 
+/// What the clock has no part in.
+void remove_times(boost::json::value& report) {
+  if (auto* list = report.if_array()) {
+    for (auto& item : *list) remove_times(item);
+  } else if (auto* object = report.if_object()) {
+    for (const char* name : {"seconds", "measured_seconds", "peak_memory_bytes"})
+      object->erase(name);
+    for (auto& [name, value] : *object) remove_times(value);
+  }
+}
+
+TEST_F(Explore, ComparesExplorersAtTheSameSeedsWhateverTheNumberOfThreads) {
+  std::vector<boost::json::value> reports;
+  for (const char* threads : {"1", "3"}) {
+    const std::string report = folder_.file("compare.json");
+    const Outcome run =
+        explore({"--explorer", "frontier:length=0.5,keep=0.6,random", "--runs", "3", "--seed", "5",
+                 "--until", "distance=10", "--threads", threads, "--json", report});
+    ASSERT_EQ(run.exit_code, 0) << run.err;
+    EXPECT_THAT(run.out, HasSubstr("Difference from frontier:length=0.5,keep=0.6"));
+    reports.push_back(parse_json(read_text(report)));
+    remove_times(reports.back());
+  }
+  EXPECT_EQ(reports[0], reports[1]);
+  EXPECT_EQ(reports[0].at("runs").as_array().size(), 6U);
+  EXPECT_EQ(reports[0].at("explorers").as_array().size(), 2U);
+  // A run of a comparison is the run that the same seed gives alone.
+  const std::string alone = folder_.file("alone.json");
+  ASSERT_EQ(
+      explore({"--explorer", "random", "--seed", "6", "--until", "distance=10", "--json", alone})
+          .exit_code,
+      0);
+  const auto& compared = reports[0].at("runs").as_array().at(3);
+  EXPECT_EQ(compared.at("explorer"), "random");
+  EXPECT_EQ(compared.at("seed"), 6);
+  EXPECT_EQ(compared.at("measures"), parse_json(read_text(alone)).at("measures"));
+  EXPECT_NE(compared.at("measures"), reports[0].at("runs").as_array().at(1).at("measures"));
+}
+
+TEST_F(Explore, AComparisonIsWrittenAsRowsCurvesAndAPage) {
+  const std::string runs = folder_.file("runs.csv"), curves = folder_.file("curves.csv"),
+                    page = folder_.file("compare.html"), report = folder_.file("compare.json");
+  ASSERT_EQ(explore({"--explorer", "frontier,random", "--runs", "2", "--until", "distance=10",
+                     "--csv", runs, "--curves", curves, "--html", page, "--json", report})
+                .exit_code,
+            0);
+  const auto rows = lines(read_text(runs));
+  ASSERT_EQ(rows.size(), 5U);
+  EXPECT_TRUE(rows[0].starts_with("explorer,seed,end,why,distance,"));
+  EXPECT_TRUE(rows[4].starts_with("random,2,"));
+  EXPECT_THAT(read_text(page), AllOf(HasSubstr("<!doctype html>"), HasSubstr("data:image/svg"),
+                                     ::testing::Not(HasSubstr("src=\"http"))));
+  EXPECT_EQ(cairn({"plot", curves, "--x", "distance", "--y", "map_entropy *", "--y",
+                   "trajectory_entropy *", "-o", folder_.file("curves.svg")})
+                .exit_code,
+            0);
+  EXPECT_EQ(cairn({"plot", curves, "--x", "known", "--y", "map_error *", "-o",
+                   folder_.file("errors.svg")})
+                .exit_code,
+            0);
+  // The mean in the report is that of the rows.
+  const auto said = parse_json(read_text(report)).as_object();
+  const auto& mean = said.at("explorers").as_array().at(1).at("measures").at("coverage");
+  double sum = 0.0;
+  for (const auto& run : said.at("runs").as_array()) {
+    if (run.at("explorer") == "random")
+      sum += run.at("measures").at("coverage").to_number<double>();
+  }
+  EXPECT_NEAR(mean.at("mean").to_number<double>(), 0.5 * sum, 1e-12);
+  EXPECT_EQ(mean.at("count"), 2);
+}
+
+TEST_F(Explore, ARunWithABudgetSaysThatItCannotBeRepeated) {
+  const std::string report = folder_.file("run.json");
+  const Outcome run = explore({"--until", "steps=5", "--decision-budget", "10", "--match",
+                               "range=1.4,angle=0.35,sigma_xy=0.01", "--json", report});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_THAT(run.err, HasSubstr("can't be repeated"));
+  EXPECT_EQ(parse_json(read_text(report)).at("repeatable"), false);
+}
+
 TEST_F(Explore, WhatCannotWorkIsRefusedBeforeTheWork) {
   const auto refusal = [&](std::vector<std::string> more, int code) {
     const Outcome run = explore(std::move(more));
@@ -115,6 +196,9 @@ TEST_F(Explore, WhatCannotWorkIsRefusedBeforeTheWork) {
   EXPECT_THAT(refusal({"--map", folder_.file("map.g2o")}, 2), HasSubstr("map.yaml"));
   EXPECT_THAT(refusal({"--start-x", "0", "--start-y", "0"}, 3), HasSubstr("in a wall"));
   EXPECT_THAT(refusal({"--start-x", "1"}, 2), HasSubstr("go together"));
+  EXPECT_THAT(refusal({"--match", "reach=3"}, 2), HasSubstr("sigma_theta"));
+  EXPECT_THAT(refusal({"--runs", "2", "--map", folder_.file("map.yaml")}, 2), HasSubstr("--map"));
+  EXPECT_THAT(refusal({"--explorer", "frontier,frontir", "--runs", "2"}, 5), HasSubstr("frontir"));
   EXPECT_THAT(refusal({"--world", "lidar_building:radius=5"}, 3), HasSubstr("radius"));
   EXPECT_EQ(cairn({"explore", folder_.file("none.yaml"), "--registration", kMatcher}).exit_code, 3);
   EXPECT_TRUE(folder_.contents().empty());

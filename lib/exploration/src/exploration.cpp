@@ -99,6 +99,7 @@ class Run {
                          .truth = parts_.world.truth(),
                          .coverage = map.coverage(),
                          .map_entropy = map.entropy(),
+                         .grid_area = static_cast<double>(map.frame.size()) * map.frame.cell_area(),
                          .trajectory_entropy = trajectory_entropy(parts_.policy.estimator(), kept,
                                                                   parts_.first_sigma),
                          .kept = static_cast<int>(kept.size()),
@@ -107,8 +108,30 @@ class Run {
     if (!result_.steps.empty()) step.distance += result_.steps.back().distance;
     watch_progress(step);
     result_.steps.push_back(step);
+    sample_map();
     if (parts_.moved) parts_.moved(step, map);
     if (parts_.scanned) parts_.scanned(step, situation(map, kept), slam_.scans().back());
+  }
+
+  /// Every so many metres.
+  void sample_map() {
+    const double driven = result_.steps.back().distance;
+    const double next = static_cast<double>(result_.samples.size()) * parts_.sample_distance;
+    if (!std::isfinite(next) || driven < next) return;
+    result_.samples.push_back(
+        map_sample(recovered_trajectory(parts_.policy, Recovery::distribute)));
+  }
+
+  MapSample map_sample(const Graph& estimate) {
+    const FloorMap& map = slam_.map();
+    MapSample sample{.distance = result_.steps.back().distance,
+                     .coverage = map.coverage(),
+                     .error = contradicted_area(map, slam_.scans(), slam_.poses()),
+                     .against = {}};
+    if (parts_.start.floor && parts_.world.truth())
+      sample.against =
+          compare_with_floor(map, *parts_.start.floor, alignment(estimate), start_.translation());
+    return sample;
   }
 
   // Deciding and driving --------------------------------------------------------------------------
@@ -236,18 +259,16 @@ class Run {
     result_.graph = parts_.policy.estimator().graph();
     result_.trajectory = recovered_trajectory(parts_.policy, Recovery::distribute);
     result_.truth_trajectory = slam_.truth().clone();
-    result_.map_error = contradicted_area(result_.map, slam_.scans(), slam_.poses());
-    if (parts_.start.floor && parts_.world.truth())
-      result_.against =
-          compare_with_floor(result_.map, *parts_.start.floor, alignment(), start_.translation());
+    result_.samples.push_back(map_sample(result_.trajectory));
+    result_.map_error = result_.samples.back().error;
+    result_.against = result_.samples.back().against;
   }
 
   /// From the world of the estimate to that of the floor.
-  Pose2 alignment() const {
+  Pose2 alignment(const Graph& estimate) const {
     constexpr int kFewest = 3;  // poses that determine one
-    if (result_.trajectory.variable_count() < kFewest) return {};
-    const Pose pose =
-        align(pair_by_id(trajectory(result_.trajectory), trajectory(result_.truth_trajectory)));
+    if (estimate.variable_count() < kFewest) return {};
+    const Pose pose = align(pair_by_id(trajectory(estimate), trajectory(slam_.truth())));
     return {pose.t.x(), pose.t.y(), std::atan2(pose.R(1, 0), pose.R(0, 0))};
   }
 

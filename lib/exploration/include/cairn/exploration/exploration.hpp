@@ -43,14 +43,24 @@ struct ExplorationStep {
   std::optional<Pose2> truth;
   double coverage = 0.0;            ///< `FloorMap::coverage` [m²]
   double map_entropy = 0.0;         ///< `FloorMap::entropy` [nats·m²]
+  double grid_area = 0.0;           ///< of the map's grid, known or not [m²]
   double trajectory_entropy = 0.0;  ///< (5.13): see `trajectory_entropy` [nats]
   int kept = 0, loops = 0, collisions = 0;
+};
+
+/// How good the map is at some point of a run.
+struct MapSample {
+  double distance = 0.0;            ///< driven by then [m]
+  double coverage = 0.0;            ///< `FloorMap::coverage` [m²]
+  double error = 0.0;               ///< `contradicted_area` [m²]
+  std::optional<MapTruth> against;  ///< beside the floor, where that is known
 };
 
 struct ExplorationResult {
   ExplorationEnd end = ExplorationEnd::finished;
   std::string why;  ///< a sentence
   std::vector<ExplorationStep> steps;
+  std::vector<MapSample> samples;  ///< as `Exploration::sample_distance` asks for, and of the end
   std::vector<double> decision_seconds;
   std::vector<std::string> notes;
   Graph graph;             ///< of the poses that are kept
@@ -81,6 +91,8 @@ struct Exploration {
   /// Within which an explorer that can stop early should decide [s]. A run with a budget depends
   /// on the clock, and cannot be repeated exactly.
   double decision_budget = std::numeric_limits<double>::infinity();
+  /// How far the robot drives between two samples of its map [m].
+  double sample_distance = std::numeric_limits<double>::infinity();
   const std::atomic<bool>* interrupt = nullptr;
   /// Called after each decision, with the map and where the robot is.
   std::function<void(const Decision&, const Situation&)> decided = {};

@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "cairn/exploration/exploration_measures.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <vector>
+
+#include "cairn/evaluation/trajectory.hpp"
+
+namespace cairn {
+
+std::span<const ExplorationMeasure> exploration_measures() {
+  using M = ExplorationMeasures;
+  static constexpr std::array kAll = std::to_array<ExplorationMeasure>(
+      {{"distance", "m", "driven", &M::distance},
+       {"motions", "", "motions", &M::motions},
+       {"decisions", "", "decisions", &M::decisions},
+       {"coverage", "m²", "area of the cells that are known", &M::coverage},
+       {"seen", "m²", "of the true floor around the start, what is known", &M::seen},
+       {"map_entropy", "nats·m²", "(5.6) over the floor's grid", &M::map_entropy},
+       {"trajectory_entropy", "nats", "(5.13)", &M::trajectory_entropy},
+       {"map_error", "m²", "cells that contradict a scan", &M::map_error},
+       {"wrong", "m²", "cells that are wrong beside the floor", &M::wrong},
+       {"loops", "", "loop closures", &M::loops},
+       {"poses", "", "poses that are kept", &M::poses},
+       {"collisions", "", "collisions", &M::collisions},
+       {"ate", "m", "absolute trajectory error", &M::ate},
+       {"ate_rotation", "deg", "its rotation", &M::ate_rotation},
+       {"seconds", "s", "of the run, without mapping and simulation", &M::seconds, true},
+       {"map_seconds", "s", "of mapping", &M::map_seconds, true},
+       {"decide_seconds", "s", "of all decisions", &M::decide_seconds, true},
+       {"decision_median", "s", "of a decision, median", &M::decision_median, true},
+       {"decision_p95", "s", "that 95 % of the decisions do not exceed", &M::decision_p95, true},
+       {"decision_max", "s", "of the longest decision", &M::decision_max, true}});
+  return kAll;
+}
+
+double entropy_of_area(double entropy, double grid_area, double area) {
+  return entropy + std::numbers::ln2 * (area - grid_area);
+}
+
+double quantile(std::span<const double> values, double part) {
+  if (values.empty()) return 0.0;
+  std::vector<double> sorted(values.begin(), values.end());
+  std::ranges::sort(sorted);
+  const double rank = std::ceil(part * static_cast<double>(sorted.size()));
+  return sorted[static_cast<std::size_t>(std::max(rank, 1.0)) - 1];
+}
+
+ExplorationMeasures measures_of(const ExplorationResult& result, double floor_area) {
+  constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+  const ExplorationStep& last = result.steps.back();
+  const GridFrame& frame = result.map.frame;
+  const double grid_area = static_cast<double>(frame.size()) * frame.cell_area();
+  ExplorationMeasures m;
+  m.distance = last.distance;
+  m.motions = last.step;
+  m.decisions = static_cast<double>(result.decision_seconds.size());
+  m.coverage = result.map.coverage();
+  m.map_entropy =
+      entropy_of_area(result.map.entropy(), grid_area, floor_area > 0.0 ? floor_area : grid_area);
+  m.trajectory_entropy = last.trajectory_entropy;
+  m.map_error = result.map_error;
+  m.seen = result.against ? result.against->seen : kUnknown;
+  m.wrong = result.against ? result.against->free_wrong + result.against->occupied_wrong : kUnknown;
+  m.loops = result.slam.loops;
+  m.poses = result.graph.variable_count();
+  m.collisions = result.collisions;
+  constexpr int kFewest = 3;  // poses that an alignment needs
+  m.ate = m.ate_rotation = kUnknown;
+  if (result.truth_trajectory.variable_count() >= kFewest) {
+    const TrajectoryError error =
+        compare(trajectory(result.trajectory), trajectory(result.truth_trajectory));
+    m.ate = error.ate_translation;
+    m.ate_rotation = error.ate_rotation;
+  }
+  m.map_seconds = result.slam.map_seconds;
+  m.decide_seconds = result.decide_seconds;
+  m.seconds = result.decide_seconds + result.slam.policy_seconds + result.slam.registration_seconds;
+  m.decision_median = quantile(result.decision_seconds, 0.5);
+  m.decision_p95 = quantile(result.decision_seconds, 0.95);
+  m.decision_max = quantile(result.decision_seconds, 1.0);
+  return m;
+}
+
+}  // namespace cairn
