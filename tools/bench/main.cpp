@@ -60,7 +60,13 @@ const std::vector<std::pair<std::string, Study>>& all_studies() {
       {"sparsify_whole", study_sparsify_whole},
       {"sparsify_online", study_sparsify_online},
       {"sparsify_selection", study_sparsify_selection},
-      {"sparsify_edges", study_sparsify_edges}};
+      {"sparsify_edges", study_sparsify_edges},
+      {"explore_cave", study_explore_cave},
+      {"explore_freiburg", study_explore_freiburg},
+      {"explore_action", study_explore_action},
+      {"explore_scale", study_explore_scale},
+      {"explore_floors", study_explore_floors},
+      {"explore_sensitivity", study_explore_sensitivity}};
   return all;
 }
 
@@ -164,7 +170,7 @@ int run(int argc, char** argv) {
   CLI::App app("Measures the program cairn, one JSON file a study, and turns those into tables.");
   app.add_option("studies", arguments.studies,
                  "all, or some of: graphs rates threads scaling "
-                 "solvers marginals online compact sparsify")
+                 "solvers marginals online compact sparsify explore")
       ->check(CLI::IsMember(study_names()));
   app.add_option("--cairn", arguments.cairn, "the program to measure");
   app.add_option("--folder", arguments.folder, "where the JSON is")->required();

@@ -118,6 +118,11 @@ Run Cairn::solve_problems(const std::filesystem::path& problems,
   return run;
 }
 
+Run Cairn::explore(const std::string& floor, const std::vector<std::string>& arguments, int threads,
+                   double limit) const {
+  return run({"explore"}, {floor, floor, {}}, arguments, threads, limit);
+}
+
 std::vector<std::string> Cairn::names(const std::string& kind) const {
   const json::value report =
       parsed(run_program({program_, "plugins", "--json", "-", "--quiet"}, work_).output);

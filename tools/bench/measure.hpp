@@ -63,6 +63,10 @@ class Cairn {
   Run solve_problems(const std::filesystem::path& problems,
                      const std::vector<std::string>& arguments, double limit) const;
 
+  /// `cairn explore`, likewise.
+  Run explore(const std::string& floor, const std::vector<std::string>& arguments, int threads,
+              double limit) const;
+
   const std::filesystem::path& program() const { return program_; }
   /// A folder for files of the runs.
   const std::filesystem::path& work() const { return work_; }

@@ -95,6 +95,22 @@ void study_sparsify_selection(const Bench& bench, const Keep& keep);
 /// A part of the loop closures, chosen in several ways, and all nodes.
 void study_sparsify_edges(const Bench& bench, const Keep& keep);
 
+// `cairn explore`, whose studies are called explore_…; docs/explore_results.md has their tables.
+
+/// Tables 5.4 and 5.5 of the thesis: search in configuration space.
+void study_explore_cave(const Bench& bench, const Keep& keep);
+void study_explore_freiburg(const Bench& bench, const Keep& keep);
+
+/// Table 5.6: search in action space; and the same at the scale that the thesis's floor likely had.
+void study_explore_action(const Bench& bench, const Keep& keep);
+void study_explore_scale(const Bench& bench, const Keep& keep);
+
+/// Every explorer on every floor.
+void study_explore_floors(const Bench& bench, const Keep& keep);
+
+/// What the thesis is silent about, changed one by one.
+void study_explore_sensitivity(const Bench& bench, const Keep& keep);
+
 // Progress
 // ------------------------------------------------------------------------------------------------
 /// A line on standard error.

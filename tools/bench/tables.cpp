@@ -275,7 +275,13 @@ constexpr StudySections kSections[] = {{"graphs", graphs_sections},
                                        {"sparsify_whole", sparsify_whole_sections},
                                        {"sparsify_online", sparsify_online_sections},
                                        {"sparsify_selection", sparsify_selection_sections},
-                                       {"sparsify_edges", sparsify_edges_sections}};
+                                       {"sparsify_edges", sparsify_edges_sections},
+                                       {"explore_cave", explore_part_sections},
+                                       {"explore_freiburg", explore_part_sections},
+                                       {"explore_action", explore_part_sections},
+                                       {"explore_scale", explore_part_sections},
+                                       {"explore_floors", explore_floors_sections},
+                                       {"explore_sensitivity", explore_sensitivity_sections}};
 
 }  // namespace
 

@@ -11,8 +11,8 @@
 
 namespace cairn::performance {
 
-/// The sections of docs/performance.md, docs/compact_results.md and docs/sparsify_results.md that
-/// the report of a study fills. Throws `std::runtime_error` for a study that it does not know.
+/// The sections of docs/performance.md, docs/compact_results.md, docs/sparsify_results.md and
+/// docs/explore_results.md that the report of a study fills. Throws `std::runtime_error` for a study that it does not know.
 std::vector<Section> sections(const boost::json::value& report);
 
 /// The main comparison's part of it, in tables_graphs.cpp.
@@ -40,6 +40,11 @@ std::vector<Section> sparsify_whole_sections(const boost::json::array& entries);
 std::vector<Section> sparsify_online_sections(const boost::json::array& entries);
 std::vector<Section> sparsify_selection_sections(const boost::json::array& entries);
 std::vector<Section> sparsify_edges_sections(const boost::json::array& entries);
+
+// The parts of `cairn explore`, in tables_explore.cpp.
+std::vector<Section> explore_part_sections(const boost::json::array& entries);
+std::vector<Section> explore_floors_sections(const boost::json::array& entries);
+std::vector<Section> explore_sensitivity_sections(const boost::json::array& entries);
 
 // What `cairn plot` draws, in the words of `cairn bench --json`:
 /// the main comparison, with the best of each family alone, as bars;
