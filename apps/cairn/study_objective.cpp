@@ -1,0 +1,367 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "study_objective.hpp"
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <map>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <fmt/core.h>
+
+#include "cairn/evaluation/mean_interval.hpp"
+#include "cairn/evaluation/rank_correlation.hpp"
+#include "cairn/exploration/exploration.hpp"
+#include "cairn/exploration/random_stream.hpp"
+#include "cairn/planning/joint_objective.hpp"
+#include "cairn/planning/path_sampler.hpp"
+#include "cairn/plugin/options.hpp"
+#include "cairn/runtime/error.hpp"
+#include "cairn/runtime/plugin_call.hpp"
+#include "floors.hpp"
+#include "interrupt.hpp"
+#include "json_report.hpp"
+#include "progress.hpp"
+#include "results.hpp"
+#include "session.hpp"
+#include "slam_names.hpp"
+#include "table.hpp"
+
+namespace cairn::app {
+namespace {
+
+namespace json = boost::json;
+
+struct ObjectiveStudyOptions {
+  std::string floor;
+  std::string explorer = "frontier", world = "lidar_building", planner = "grid_dijkstra";
+  SlamNames slam{.policy = "compact_pose:range=2,angle=3.14,reuse=false,gate=0.9999"};
+  double distance = 60.0, range = 4.0;
+  int runs = 1, decisions = 4, candidates = 12, samples = 200;
+  std::uint64_t seed = 1;
+  std::string paths;
+};
+
+/// A form of the objective, as options of `JointObjective`.
+struct Form {
+  std::string name;
+  JointObjectiveOptions options;
+};
+
+std::vector<Form> forms() {
+  constexpr double kThird = 1.0 / 3.0;
+  std::vector<Form> all{{"alpha=none", {.alpha = AlphaForm::none}}};
+  for (const AlphaForm alpha : {AlphaForm::end, AlphaForm::now, AlphaForm::both}) {
+    for (const double reference : {0.0, 1.0}) {
+      for (const double power : {1.0, kThird}) {
+        const std::string name =
+            fmt::format("alpha={},reference={},power={}", enum_name(alpha),
+                        reference == 0.0 ? "cell" : "1", power == 1.0 ? "1" : "1/3");
+        all.push_back({name, {.alpha = alpha, .reference = reference, .power = power}});
+      }
+    }
+  }
+  return all;
+}
+
+/// Hands all on to a mapper, and keeps what it was given.
+class RecordingMapper final : public Mapper {
+ public:
+  explicit RecordingMapper(Mapper& mapper) : mapper_(mapper) {}
+
+  void add(const Pose2& at, LaserScan scan) override {
+    poses_.push_back(at);
+    scans_.push_back(scan);
+    mapper_.add(at, std::move(scan));
+  }
+  bool move(std::span<const Pose2> poses) override {
+    poses_.assign(poses.begin(), poses.end());
+    return mapper_.move(poses);
+  }
+  const FloorMap& map() override { return mapper_.map(); }
+  void reset() override {
+    poses_.clear();
+    scans_.clear();
+    mapper_.reset();
+  }
+
+  std::span<const Pose2> poses() const { return poses_; }
+  std::span<const LaserScan> scans() const { return scans_; }
+
+ private:
+  Mapper& mapper_;
+  std::vector<Pose2> poses_;
+  std::vector<LaserScan> scans_;
+};
+
+/// The paths that were compared at one decision.
+struct PathSet {
+  std::uint64_t seed = 0;
+  int decision = 0;
+  double map_entropy = 0.0, resolution = 0.0, lidar_range = 0.0;
+  std::vector<SampledPath> paths;
+};
+
+/// Paths to random cells of the known floor, each at least a step away, on different cells.
+std::vector<PlannedPath> random_paths(const Situation& situation, PathPlanner& planner, int count,
+                                      RandomNumbers& random) {
+  const FloorMap& map = situation.map;
+  std::vector<std::size_t> cells;
+  for (std::size_t k = 0; k < map.cells.size(); ++k) {
+    if (map.clearance[k] >= needed_clearance(situation.robot.radius, map.frame)) cells.push_back(k);
+  }
+  planner.start(map, situation.pose.translation(), situation.robot.radius);
+  std::vector<PlannedPath> paths;
+  while (!cells.empty() && std::ssize(paths) < count) {
+    const std::size_t chosen = random.below(cells.size());
+    const auto cell = static_cast<int>(cells[chosen]);
+    cells[chosen] = cells.back();
+    cells.pop_back();
+    const auto goal = map.frame.centre(cell % map.frame.width, cell / map.frame.width);
+    std::optional<PlannedPath> path = planner.path_to(goal, 2.0 * map.frame.resolution);
+    if (path && path->length > situation.robot.step) paths.push_back(std::move(*path));
+  }
+  return paths;
+}
+
+class Study {
+ public:
+  Study(const ObjectiveStudyOptions& options, Session& session)
+      : options_(options),
+        session_(session),
+        floor_(load_floor(options.floor, session)),
+        line_(session.common.quiet) {}
+
+  std::vector<PathSet> run() {
+    for (int run = 0; run < options_.runs && !guard_.interrupted(); ++run)
+      explore(options_.seed + static_cast<std::uint64_t>(run));
+    line_.clear();
+    return std::move(sets_);
+  }
+  bool interrupted() const { return guard_.interrupted(); }
+
+ private:
+  void explore(std::uint64_t seed) {
+    Registry& registry = session_.registry();
+    const auto make = [&]<class Part>(std::type_identity<Part>, const std::string& name) {
+      return registry.make<Part>(parse_component(name));
+    };
+    const auto world = make(std::type_identity<World>{}, options_.world);
+    const auto policy = make(std::type_identity<PosePolicy>{}, options_.slam.policy);
+    const auto registration = make(std::type_identity<Registration>{}, options_.slam.registration);
+    const auto mapper = make(std::type_identity<Mapper>{}, options_.slam.mapper);
+    const auto explorer = make(std::type_identity<Explorer>{}, options_.explorer);
+    RecordingMapper recorder(*mapper);
+    RandomStream random(seed, RandomStream::Purpose::explorer);
+    double next = 0.0, driven = 0.0;
+    const double apart = options_.distance / options_.decisions;
+    run_exploration(
+        {.world = *world,
+         .policy = *policy,
+         .registration = *registration,
+         .mapper = recorder,
+         .explorer = *explorer,
+         .registry = registry,
+         .start = {.floor = &floor_, .pose = {}, .seed = seed},
+         .limits = {.distance = options_.distance},
+         .interrupt = &guard_.flag(),
+         .decided =
+             [&](const Decision&, const Situation& situation) {
+               if (driven < next || situation.poses.size() < 2) return;
+               next = driven + apart;
+               compare(situation, recorder, seed, random);
+             },
+         .moved = [&](const ExplorationStep& step, const FloorMap&) { driven = step.distance; }});
+  }
+
+  void compare(const Situation& situation, const RecordingMapper& recorder, std::uint64_t seed,
+               RandomNumbers& random) {
+    Registry& registry = session_.registry();
+    const auto planner = registry.make<PathPlanner>(parse_component(options_.planner));
+    ComponentSpec every_move = parse_component(options_.slam.mapper);
+    every_move.values.emplace_back("tolerance", "0");
+    const auto mapper = registry.make<Mapper>(every_move);
+    PathSampler sampler(situation, recorder.scans(), recorder.poses(), *mapper, registry,
+                        {.samples = options_.samples, .range = options_.range}, seed);
+    PathSet set{.seed = seed,
+                .decision = situation.decision,
+                .map_entropy = situation.map.entropy(),
+                .resolution = situation.map.frame.resolution,
+                .lidar_range = situation.robot.lidar.range};
+    for (const PlannedPath& path : random_paths(situation, *planner, options_.candidates, random)) {
+      if (guard_.interrupted()) return;
+      set.paths.push_back(sampler.sample(path));
+      line_.show(fmt::format("seed {}, decision {}: {} of {} paths sampled", seed,
+                             situation.decision, set.paths.size(), options_.candidates));
+    }
+    if (set.paths.size() > 1) sets_.push_back(std::move(set));
+  }
+
+  const ObjectiveStudyOptions& options_;
+  Session& session_;
+  OccupancyGrid floor_;
+  InterruptGuard guard_;
+  StatusLine line_;
+  std::vector<PathSet> sets_;
+};
+
+// What is written ---------------------------------------------------------------------------------
+
+/// Kendall's τ of one form with the sampled values, over the sets of paths.
+struct Agreement {
+  std::string form;
+  MeanInterval value, per_metre;
+};
+
+double form_value(const JointObjective& objective, const PathSet& set, const SampledPath& path) {
+  return objective.value(objective.change(path.trajectory, path.map, path.now, path.end),
+                         set.map_entropy, path.now);
+}
+
+Agreement agreement(const Form& form, const std::vector<PathSet>& sets) {
+  std::vector<double> by_value, by_metre;
+  for (const PathSet& set : sets) {
+    const JointObjective objective(form.options, set.resolution, set.lidar_range);
+    std::vector<double> formed, formed_per_metre, sampled, sampled_per_metre;
+    for (const SampledPath& path : set.paths) {
+      const double value = form_value(objective, set, path);
+      const double truth = path.trajectory + path.sampled_map;
+      formed.push_back(value);
+      formed_per_metre.push_back(value / path.length);
+      sampled.push_back(truth);
+      sampled_per_metre.push_back(truth / path.length);
+    }
+    by_value.push_back(kendall_tau(formed, sampled));
+    by_metre.push_back(kendall_tau(formed_per_metre, sampled_per_metre));
+  }
+  return {form.name, mean_interval(by_value), mean_interval(by_metre)};
+}
+
+json::object interval_json(const MeanInterval& interval) {
+  return {{"mean", number_json(interval.mean)},
+          {"low", number_json(interval.low())},
+          {"high", number_json(interval.high())},
+          {"sets", interval.count}};
+}
+
+std::string interval_text(const MeanInterval& interval) {
+  return fmt::format("{:.3f} ± {:.3f}", interval.mean, interval.half_width);
+}
+
+std::string paths_csv(const std::vector<PathSet>& sets) {
+  std::string text =
+      "seed,decision,path,length,loops,trajectory,map,sampled_map,standard_error,"
+      "determinant_now,determinant_end\n";
+  for (const PathSet& set : sets) {
+    for (std::size_t k = 0; k < set.paths.size(); ++k) {
+      const SampledPath& path = set.paths[k];
+      text += fmt::format("{},{},{},{},{},{},{},{},{},{},{}\n", set.seed, set.decision, k,
+                          path.length, path.loops, path.trajectory, path.map, path.sampled_map,
+                          path.standard_error, path.now.determinant(), path.end.determinant());
+    }
+  }
+  return text;
+}
+
+int run_study(const ObjectiveStudyOptions& options, Session& session) {
+  check_file(options.paths, session);
+  session.use_threads();
+  Study study(options, session);
+  const std::vector<PathSet> sets = study.run();
+  std::vector<Agreement> rows;
+  for (const Form& form : forms()) rows.push_back(agreement(form, sets));
+  std::ranges::stable_sort(rows, std::ranges::greater{},
+                           [](const Agreement& row) { return row.per_metre.mean; });
+
+  Results results(session);
+  results.write(options.paths, [&] { write_file(options.paths, paths_csv(sets)); });
+  json::array rows_json;
+  Table table({{"objective", Table::Align::left},
+               {"τ, value per metre", Table::Align::right},
+               {"τ, value", Table::Align::right}});
+  for (const Agreement& row : rows) {
+    rows_json.push_back({{"form", row.form},
+                         {"tau_per_metre", interval_json(row.per_metre)},
+                         {"tau", interval_json(row.value)}});
+    table.add({row.form, interval_text(row.per_metre), interval_text(row.value)});
+  }
+  json::object report = begin_report("study");
+  report["floor"] = options.floor;
+  report["sets"] = sets.size();
+  report["samples"] = options.samples;
+  report["rows"] = std::move(rows_json);
+  report["status"] = study.interrupted() ? "interrupted" : "finished";
+  end_report(report);
+  results.add([&] { session.write_json(report); });
+  results.add([&] {
+    session.print(table.text(session.colour()));
+    session.print(
+        fmt::format("Kendall's τ with H(x) + ∫ p(x) H(m|x) dx by {} samples, {} sets of "
+                    "paths, mean and 95 % interval\n",
+                    options.samples, sets.size()));
+  });
+  results.finish();
+  return study.interrupted() ? kExitInterrupted : 0;
+}
+
+}  // namespace
+
+Command add_study_objective(ArgumentParser study) {
+  auto options = std::make_shared<ObjectiveStudyOptions>();
+  ArgumentParser cli = study.add_command(
+      "objective", "which weight of the map's entropy orders paths as its expectation does");
+  cli.add_option("floor", options->floor, "the floor: floor.yaml, or @KIND[:k=v] to generate")
+      .type_name("FLOOR")
+      .required();
+  cli.add_option("--runs", options->runs, "explorations, with the seeds that follow --seed")
+      .type_name("N")
+      .within(1, 1000000)
+      .show_default();
+  cli.add_option("--distance", options->distance, "that each drives [m]")
+      .type_name("M")
+      .within(1.0, 1e6)
+      .show_default();
+  cli.add_option("--decisions", options->decisions, "per run at which paths are compared, at most")
+      .type_name("N")
+      .within(1, 1000000)
+      .show_default();
+  cli.add_option("--candidates", options->candidates, "paths to random places at each of these")
+      .type_name("N")
+      .within(2, 1000000)
+      .show_default();
+  cli.add_option("--samples", options->samples, "of the trajectory, for each path")
+      .type_name("N")
+      .within(2, 1000000)
+      .show_default();
+  cli.add_option("--range", options->range, "of the scans that are expected on a path [m]")
+      .type_name("M")
+      .within(0.1, 1000.0)
+      .show_default();
+  cli.add_option("--explorer", options->explorer, "decides where to drive")
+      .type_name("NAME")
+      .show_default();
+  cli.add_option("--planner", options->planner, "finds the paths that are compared")
+      .type_name("NAME")
+      .show_default();
+  cli.add_option("--world", options->world, "the robot, as of cairn explore")
+      .type_name("NAME")
+      .show_default();
+  cli.add_option("--seed", options->seed, "of the first run").type_name("N").show_default();
+  cli.add_option("--paths", options->paths, "a row for each path that was sampled, as CSV")
+      .type_name("FILE");
+  add_slam_options(cli, options->slam);
+  cli.footer(
+      "Example:\n"
+      "  cairn study objective @rooms --runs 2 --samples 50 --paths paths.csv");
+  return {cli, [options](Session& session) { return run_study(*options, session); }};
+}
+
+}  // namespace cairn::app
