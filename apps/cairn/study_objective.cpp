@@ -16,17 +16,20 @@
 #include <vector>
 
 #include <fmt/core.h>
+#include <Eigen/LU>
 
 #include "cairn/evaluation/mean_interval.hpp"
 #include "cairn/evaluation/rank_correlation.hpp"
 #include "cairn/exploration/exploration.hpp"
 #include "cairn/exploration/random_stream.hpp"
+#include "cairn/io/format.hpp"
 #include "cairn/planning/joint_objective.hpp"
 #include "cairn/planning/path_sampler.hpp"
 #include "cairn/plugin/options.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/plugin_call.hpp"
 #include "floors.hpp"
+#include "graph_files.hpp"
 #include "interrupt.hpp"
 #include "json_report.hpp"
 #include "progress.hpp"
@@ -63,7 +66,7 @@ std::vector<Form> forms() {
     for (const double reference : {0.0, 1.0}) {
       for (const double power : {1.0, kThird}) {
         const std::string name =
-            fmt::format("alpha={},reference={},power={}", enum_name(alpha),
+            fmt::format("alpha={},reference={},power={}", to_string(alpha),
                         reference == 0.0 ? "cell" : "1", power == 1.0 ? "1" : "1/3");
         all.push_back({name, {.alpha = alpha, .reference = reference, .power = power}});
       }
@@ -187,7 +190,7 @@ class Study {
     Registry& registry = session_.registry();
     const auto planner = registry.make<PathPlanner>(parse_component(options_.planner));
     ComponentSpec every_move = parse_component(options_.slam.mapper);
-    every_move.values.emplace_back("tolerance", "0");
+    every_move.values["tolerance"] = "0";
     const auto mapper = registry.make<Mapper>(every_move);
     PathSampler sampler(situation, recorder.scans(), recorder.poses(), *mapper, registry,
                         {.samples = options_.samples, .range = options_.range}, seed);
@@ -195,12 +198,14 @@ class Study {
                 .decision = situation.decision,
                 .map_entropy = situation.map.entropy(),
                 .resolution = situation.map.frame.resolution,
-                .lidar_range = situation.robot.lidar.range};
+                .lidar_range = situation.robot.lidar.range,
+                .paths = {}};
     for (const PlannedPath& path : random_paths(situation, *planner, options_.candidates, random)) {
       if (guard_.interrupted()) return;
       set.paths.push_back(sampler.sample(path));
-      line_.show(fmt::format("seed {}, decision {}: {} of {} paths sampled", seed,
-                             situation.decision, set.paths.size(), options_.candidates));
+      if (line_.on_terminal() || std::ssize(set.paths) == options_.candidates)
+        line_.show(fmt::format("seed {}, decision {}: {} of {} paths sampled", seed,
+                               situation.decision, set.paths.size(), options_.candidates));
     }
     if (set.paths.size() > 1) sets_.push_back(std::move(set));
   }
@@ -250,10 +255,6 @@ json::object interval_json(const MeanInterval& interval) {
           {"low", number_json(interval.low())},
           {"high", number_json(interval.high())},
           {"sets", interval.count}};
-}
-
-std::string interval_text(const MeanInterval& interval) {
-  return fmt::format("{:.3f} ± {:.3f}", interval.mean, interval.half_width);
 }
 
 std::string paths_csv(const std::vector<PathSet>& sets) {
