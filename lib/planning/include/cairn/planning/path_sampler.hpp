@@ -41,7 +41,7 @@ struct PathSamplerOptions {
 /// range. Both integrals, before and after, are by the same samples.
 class CAIRN_API PathSampler {
  public:
-  /// `scans` and `poses`: all that the map was made of, and where each was taken; scan k hangs on
+  /// `scans` and `poses`: all that the map was made of, and where each was taken; scan k belongs to
   /// the last pose of the graph with an id up to k. `registry`: of the types of poses and factors.
   /// `mapper` is used for every sample; it should draw scans again however little they move
   /// (`log_odds:tolerance=0`). All that is referred to must outlive it. Throws `Error` (usage) if
