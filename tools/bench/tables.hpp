@@ -12,7 +12,8 @@
 namespace cairn::performance {
 
 /// The sections of docs/performance.md, docs/compact_results.md, docs/sparsify_results.md and
-/// docs/explore_results.md that the report of a study fills. Throws `std::runtime_error` for a study that it does not know.
+/// docs/explore_results.md that the report of a study fills. Throws `std::runtime_error` for a
+/// study that it does not know.
 std::vector<Section> sections(const boost::json::value& report);
 
 /// The main comparison's part of it, in tables_graphs.cpp.
