@@ -30,7 +30,7 @@ struct TreeExplorerOptions {
   double density = 5.0, step = 0.5, reach = 1.0;
   double least_gain = 0.0, replan = 0.9;
   std::string fallback = "frontier";
-  PathValueOptions value;
+  PathValueOptions value = {};
 
   static auto fields() {
     using O = TreeExplorerOptions;
@@ -49,6 +49,14 @@ struct TreeExplorerOptions {
               "explorer that decides where no path counts, frontier:length=2 for instance; none: "
               "the run ends there");
   }
+};
+
+/// A tree whose nodes are joined by what whole paths are worth takes time with the square of this
+/// distance.
+struct ErrtStarOptions {
+  TreeExplorerOptions tree = {.reach = 0.5};
+
+  static auto fields() { return OptionFields<ErrtStarOptions>().part(&ErrtStarOptions::tree); }
 };
 
 /// Part of the time budget of a decision for the growth of a tree whose paths are evaluated
@@ -262,8 +270,8 @@ void cairn_register(cairn::Registrar& registrar) {
       "drrt_star", [](const TreeExplorerOptions& options, Registry& registry) {
         return std::make_unique<DrrtStar>(options, registry);
       });
-  registrar.add<Explorer, TreeExplorerOptions>(
-      "errt_star", [](const TreeExplorerOptions& options, Registry& registry) {
-        return std::make_unique<ErrtStar>(options, registry);
+  registrar.add<Explorer, ErrtStarOptions>(
+      "errt_star", [](const ErrtStarOptions& options, Registry& registry) {
+        return std::make_unique<ErrtStar>(options.tree, registry);
       });
 }

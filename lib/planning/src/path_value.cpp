@@ -32,6 +32,28 @@ bool is_same(const Pose2& a, const Pose2& b) {
          std::abs(std::remainder(a.theta() - b.theta(), 2.0 * std::numbers::pi)) < kRounding;
 }
 
+/// The poses whose scans matter. While it turns on the spot, a scan is left out if the one before
+/// and the one after it overlap.
+std::vector<Pose2> scanning_poses(const Pose2& start, const std::vector<Pose2>& motions,
+                                  double aperture) {
+  std::vector<Pose2> poses;
+  Pose2 pose = start;
+  double turned = 0.0;  // since the last scan that counts
+  for (std::size_t k = 0; k < motions.size(); ++k) {
+    pose = pose * motions[k];
+    turned += std::abs(motions[k].theta());
+    const auto turns_only = [&](std::size_t i) {
+      return i < motions.size() && motions[i].translation() == Vector2d::Zero();
+    };
+    const bool left_out =
+        turns_only(k) && turns_only(k + 1) && turned + std::abs(motions[k + 1].theta()) <= aperture;
+    if (left_out) continue;
+    poses.push_back(pose);
+    turned = 0.0;
+  }
+  return poses;
+}
+
 }  // namespace
 
 PathValue::PathValue(const Situation& situation, const PathValueOptions& options,
@@ -80,9 +102,8 @@ std::shared_ptr<const PathValue::Segment> PathValue::segment(const Pose2& start,
   segment->start = start;
   const PlannedPath path{.points = {to}, .length = (to - start.translation()).norm()};
   segment->motions = motions_along(start, path, situation_.robot);
-  std::vector<Pose2> poses;
-  for (const Pose2& motion : segment->motions)
-    poses.push_back((poses.empty() ? start : poses.back()) * motion);
+  const std::vector<Pose2> poses =
+      scanning_poses(start, segment->motions, situation_.robot.lidar.aperture);
   if (!poses.empty()) segment->seen = seen_.look(poses);
   return segment;
 }

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <utility>
 
 namespace cairn {
 namespace {
@@ -100,6 +101,36 @@ SeenCells::SeenCells(const FloorMap& map, const LidarModel& lidar, double range)
     const double angle = lidar.first_angle() + lidar.step() * beam - frame_.yaw;
     beams_.emplace_back(std::cos(angle), std::sin(angle));
   }
+  find_viewpoints();
+}
+
+/// A beam enters cells by their sides, at most √2 range + 2 of them: no cell that is farther from
+/// all unknown ones, over cells that are no obstacles, sees any. (Most known floor does not.)
+void SeenCells::find_viewpoints() {
+  const int most = static_cast<int>(std::numbers::sqrt2 * range_) + 2;
+  viewpoints_ = unknown_;
+  std::vector<std::pair<int, int>> border, next;
+  for (int y = 0; y < frame_.height; ++y) {
+    for (int x = 0; x < frame_.width; ++x) {
+      if ((unknown_[word_at(words_, y, x / kWordBits)] & bit_of(x)) != 0) border.emplace_back(x, y);
+    }
+  }
+  for (int steps = 0; steps < most && !border.empty(); ++steps, std::swap(border, next)) {
+    next.clear();
+    const auto enter = [&](int x, int y) {
+      if (!frame_.contains(x, y)) return;
+      const std::size_t word = word_at(words_, y, x / kWordBits);
+      if (((obstacles_[word] | viewpoints_[word]) & bit_of(x)) != 0) return;
+      viewpoints_[word] |= bit_of(x);
+      next.emplace_back(x, y);
+    };
+    for (const auto& [x, y] : border) {
+      enter(x - 1, y);
+      enter(x + 1, y);
+      enter(x, y - 1);
+      enter(x, y + 1);
+    }
+  }
 }
 
 void SeenCells::leave_out(std::span<const Vector2d> points) {
@@ -108,6 +139,7 @@ void SeenCells::leave_out(std::span<const Vector2d> points) {
     const int x = static_cast<int>(cell.x()), y = static_cast<int>(cell.y());
     if (frame_.contains(x, y)) unknown_[word_at(words_, y, x / kWordBits)] &= ~bit_of(x);
   }
+  if (!points.empty()) find_viewpoints();
 }
 
 std::vector<Vector2d> SeenCells::middles(const CellSet& cells) const {
@@ -122,6 +154,13 @@ std::vector<Vector2d> SeenCells::middles(const CellSet& cells) const {
 }
 
 CellWindow SeenCells::look(std::span<const Pose2> poses) const {
+  const auto sees_nothing = [&](const Pose2& pose) {
+    const Vector2d cell = frame_.to_cells(pose.translation()).array().floor();
+    const int x = static_cast<int>(cell.x()), y = static_cast<int>(cell.y());
+    return !frame_.contains(x, y) ||
+           (viewpoints_[word_at(words_, y, x / kWordBits)] & bit_of(x)) == 0;
+  };
+  if (std::ranges::all_of(poses, sees_nothing)) return {};
   CellWindow seen = window_around(poses);
   for (const Pose2& pose : poses) cast(pose, seen);
   if (std::ranges::all_of(seen.bits, [](std::uint64_t word) { return word == 0; })) return {};
@@ -152,6 +191,9 @@ void SeenCells::cast(const Pose2& at, CellWindow& seen) const {
   const bool on_map = from.x() > range_ && from.y() > range_ && from.x() < frame_.width - range_ &&
                       from.y() < frame_.height - range_;
   if (!on_map) return;
+  const int start_x = static_cast<int>(from.x()), start_y = static_cast<int>(from.y());
+  const std::size_t start = word_at(words_, start_y, start_x / kWordBits);
+  if ((viewpoints_[start] & bit_of(start_x)) == 0) return;
   const double c = std::cos(at.theta()), s = std::sin(at.theta());
   for (const Vector2d& beam : beams_) {
     Crossings along_x(from.x(), c * beam.x() - s * beam.y());

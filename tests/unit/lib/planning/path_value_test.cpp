@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <set>
 #include <string>
 #include <utility>
@@ -36,6 +37,7 @@ test::PathGraph partly_explored(std::uint64_t seed) {
   graph.map = test::drawn_map(rows, 0.25);
   graph.map.frame.origin = graph.pose.translation() - Vector2d(8.0, 8.0);
   graph.robot.lidar.beams = 61;
+  if (seed % 2 == 1) graph.robot.lidar.aperture = 0.7;  // less than a turn on the spot may be
   return graph;
 }
 
@@ -65,8 +67,18 @@ double literal_value(const test::PathGraph& graph, const PathValueOptions& optio
   for (std::size_t k = 1; k < points.size(); ++k) {
     const PlannedPath segment{.points = {points[k]},
                               .length = (points[k] - path.pose().translation()).norm()};
-    for (const Pose2& motion : motions_along(path.pose(), segment, graph.robot)) {
-      path = information.extended(path, motion);
+    const std::vector<Pose2> motions = motions_along(path.pose(), segment, graph.robot);
+    double heading = path.pose().theta();  // of the last scan that counts
+    for (std::size_t i = 0; i < motions.size(); ++i) {
+      path = information.extended(path, motions[i]);
+      // Scans between two that overlap, on a turn on the spot, do not count.
+      if (i + 1 < motions.size() && motions[i].translation().norm() == 0.0 &&
+          motions[i + 1].translation().norm() == 0.0) {
+        const double next = path.pose().theta() + motions[i + 1].theta();
+        const double apart = std::abs(std::remainder(next - heading, 2.0 * std::numbers::pi));
+        if (apart <= graph.robot.lidar.aperture) continue;
+      }
+      heading = path.pose().theta();
       CellSet set = seen.none();
       set.add(seen.look({&path.pose(), 1}));
       for (int y = 0; y < seen.frame().height; ++y) {

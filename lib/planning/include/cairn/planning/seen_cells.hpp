@@ -78,6 +78,7 @@ class CAIRN_API SeenCells {
   const GridFrame& frame() const { return frame_; }
 
  private:
+  void find_viewpoints();
   void cast(const Pose2& at, CellWindow& seen) const;
   CellWindow window_around(std::span<const Pose2> poses) const;
 
@@ -85,7 +86,9 @@ class CAIRN_API SeenCells {
   int words_ = 0;                                   ///< per row
   double range_ = 0.0;                              ///< [cells]
   std::vector<std::uint64_t> unknown_, obstacles_;  ///< bits by cell
-  std::vector<Eigen::Vector2d> beams_;              ///< directions in the robot's frame
+  /// Cells from which an unknown one may be seen, by the number of cells on the way; bits by cell.
+  std::vector<std::uint64_t> viewpoints_;
+  std::vector<Eigen::Vector2d> beams_;  ///< directions in the robot's frame
 };
 
 }  // namespace cairn
