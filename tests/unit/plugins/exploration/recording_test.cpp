@@ -3,6 +3,7 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -13,6 +14,7 @@
 #include <set>
 #include <sstream>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -298,6 +300,36 @@ TEST_F(Recorded, ARunIsTheSameWithARecordingAndTheRecordingAgain) {
   EXPECT_EQ(plain.map.log_odds, result.map.log_odds);
   record();
   EXPECT_EQ(without_times(), first);
+}
+
+/// Nothing is held back that a kill would take along.
+TEST_F(Recorded, EachLineIsInTheFileAsSoonAsItIsComplete) {
+  const std::string part = file_.string() + "." + std::to_string(::getpid()) + "-0.part";
+  std::string lines;
+  const auto expect_all_written = [&] {
+    std::ifstream in(part, std::ios::binary);
+    ASSERT_EQ(std::string(std::istreambuf_iterator<char>(in), {}), lines);
+  };
+  run([&](Exploration& parts) {
+    parts.limits.steps = 12;
+    ExplorationRecorder recorder(file_, {.name = "frontier", .robot = robot_},
+                                 [&](std::string_view line) { lines += line; });
+    expect_all_written();
+    parts.scanned = [&](const auto& step, const auto& at, const auto& scan) {
+      recorder.moved(step, at, scan);
+      expect_all_written();
+    };
+    parts.decided = [&](const auto& decision, const auto& at) {
+      recorder.decided(decision, at);
+      expect_all_written();
+    };
+    ExplorationResult result = run_exploration(parts);
+    recorder.finish(result);
+    return result;
+  });
+  EXPECT_EQ(text(), lines);
+  EXPECT_FALSE(std::filesystem::exists(part));
+  EXPECT_GT(std::ranges::count(lines, '\n'), 14);
 }
 
 TEST_F(Recorded, WhatWasWrittenUpToAnyByteOpens) {
