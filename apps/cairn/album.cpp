@@ -50,8 +50,7 @@ void add_exploration(const std::string& file, const std::string& name, std::stri
   std::vector<std::string> notes;
   if (recording.torn) notes.push_back(fmt::format("{}: the last line was cut short", file));
   if (!recording.ended)
-    notes.push_back(
-        fmt::format("{}: the run was killed: there is no last line on how it ended", file));
+    notes.push_back(fmt::format("{}: the run was killed, or goes on: it has no last line", file));
   if (options.curves) {
     builder.add_table(std::move(recording.steps), name);
   } else {

@@ -261,7 +261,8 @@ export class ExplorationView {
       const candidate = decision.candidates[i];
       const colour = css(ramp(theme(), scale ? merit(scale, candidate.value) : 1));
       const { change } = candidate;
-      const about = change ? `trajectory ${number(change.trajectory, 4)} nats, map ${number(change.map, 4)} nats·m², α ${number(change.alpha, 4)}` : "";
+      const expected = change ? `: trajectory ${number(change.trajectory, 4)} nats, map ${number(change.map, 4)} nats·m², α ${number(change.alpha, 4)}` : "";
+      const about = `${candidate.what}${expected}`;
       const button = el("button", {
         type: "button", class: "worst", title: about, "aria-pressed": String(i === this.marked),
         onclick: () => {
