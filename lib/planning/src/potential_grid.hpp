@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace cairn {
+
+/// The cells of a potential over x, y and θ, and which are beside each other. Values are by
+/// orientation first.
+struct PotentialGrid {
+  int orientations = 1;
+  std::vector<std::array<std::int32_t, 2>> cells;  ///< x, y
+  std::vector<std::array<std::int32_t, 4>>
+      neighbours;           ///< −x, +x, −y, +y; −1: the body does not fit
+  std::vector<char> fixed;  ///< by orientation and cell: keeps its value
+  std::vector<double> values;
+
+  /// Finds the neighbours of `cells`, which are in the order of rising y and x.
+  void connect();
+  std::size_t layer() const { return cells.size(); }
+  /// Cells from which no value that is fixed can be reached stay at zero: relative to what they
+  /// are they would never stand.
+  void keep_unconnected();
+
+  /// Half as many cells each way and, where their number is even, orientations. Each takes the
+  /// largest of its fixed values. `parents`: by cell of this one, that of the coarser one.
+  PotentialGrid coarser(std::vector<std::int32_t>& parents) const;
+
+  /// One sweep of successive over-relaxation over (5.9); `weight`: of a neighbour that is not
+  /// there, as a divisor. Returns the largest relative change.
+  double sweep(double weight, double relaxation, bool forward);
+};
+
+struct SweepCount {
+  int sweeps = 0;
+  double change = 0.0;
+};
+
+/// Sweeps until nothing changes by more than the tolerance, from the solution of coarser grids.
+SweepCount solve(PotentialGrid& grid, double weight, double relaxation, double tolerance, int most);
+
+}  // namespace cairn
