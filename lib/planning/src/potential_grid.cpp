@@ -32,6 +32,8 @@ void PotentialGrid::connect() {
   neighbours.clear();
   for (const auto& [x, y] : cells)
     neighbours.push_back({number(x - 1, y), number(x + 1, y), number(x, y - 1), number(x, y + 1)});
+  for (std::size_t k = 0; k < cells.size(); ++k)
+    colours[at((cells[k][0] + cells[k][1]) % 2)].push_back(static_cast<std::int32_t>(k));
 }
 
 void PotentialGrid::keep_unconnected() {
@@ -86,36 +88,37 @@ PotentialGrid PotentialGrid::coarser(std::vector<std::int32_t>& parents) const {
   return half;
 }
 
-double PotentialGrid::sweep(double weight, double relaxation, bool forward) {
+double PotentialGrid::sweep(double weight, double relaxation) {
   std::array<double, 5> factor{};  // by neighbours that are not there
-  for (std::size_t k = 0; k < factor.size(); ++k) {
-    const double diagonal = 6.0 - static_cast<double>(k) / weight;
-    factor[k] = relaxation / diagonal;
-  }
+  for (std::size_t k = 0; k < factor.size(); ++k)
+    factor[k] = relaxation / (6.0 - static_cast<double>(k) / weight);
   double largest = 0.0;
   const std::size_t size = layer();
-  for (int i = 0; i < orientations; ++i) {
-    const int k = forward ? i : orientations - 1 - i;
-    double* const here = &values[at(k) * size];
-    const double* const before = &values[at((k + orientations - 1) % orientations) * size];
-    const double* const after = &values[at((k + 1) % orientations) * size];
-    const char* const keeps = &fixed[at(k) * size];
-    for (std::size_t j = 0; j < size; ++j) {
-      const std::size_t n = forward ? j : size - 1 - j;
-      if (keeps[n] != 0) continue;
-      double sum = before[n] + after[n];
-      std::size_t missing = 0;
-      for (const std::int32_t other : neighbours[n]) {
-        if (other >= 0)
-          sum += here[at(other)];
-        else
-          ++missing;
+  for (int colour = 0; colour < 2; ++colour) {
+    for (int k = 0; k < orientations; ++k) {
+      double* const here = &values[at(k) * size];
+      const double* const before = &values[at((k + orientations - 1) % orientations) * size];
+      const double* const after = &values[at((k + 1) % orientations) * size];
+      const char* const keeps = &fixed[at(k) * size];
+      for (const std::int32_t cell : colours[at((k + colour) % 2)]) {
+        const std::size_t n = at(cell);
+        if (keeps[n] != 0) continue;
+        double sum = before[n] + after[n];
+        std::size_t missing = 0;
+        for (const std::int32_t other : neighbours[n]) {
+          if (other >= 0)
+            sum += here[at(other)];
+          else
+            ++missing;
+        }
+        const double old = here[n];
+        const double value = (1.0 - relaxation) * old + factor[missing] * sum;
+        // Only where it is more than the largest so far is there something to divide.
+        const double change = std::abs(value - old);
+        const double own = std::max(std::abs(value), std::numeric_limits<double>::min());
+        if (change > largest * own) largest = change / own;
+        here[n] = value;
       }
-      const double value = (1.0 - relaxation) * here[n] + factor[missing] * sum;
-      const double change = std::abs(value - here[n]);
-      const double size_of_it = std::max(std::abs(value), std::numeric_limits<double>::min());
-      largest = std::max(largest, change / size_of_it);
-      here[n] = value;
     }
   }
   return largest;
@@ -138,7 +141,7 @@ SweepCount solve(PotentialGrid& grid, double weight, double relaxation, double t
   }
   SweepCount count;
   do {
-    count.change = grid.sweep(weight, relaxation, count.sweeps % 2 == 0);
+    count.change = grid.sweep(weight, relaxation);
     ++count.sweeps;
   } while (count.sweeps < most && count.change > tolerance);
   return count;

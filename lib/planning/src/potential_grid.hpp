@@ -18,6 +18,7 @@ struct PotentialGrid {
       neighbours;           ///< −x, +x, −y, +y; −1: the body does not fit
   std::vector<char> fixed;  ///< by orientation and cell: keeps its value
   std::vector<double> values;
+  std::array<std::vector<std::int32_t>, 2> colours;  ///< cells whose x + y is even, and odd
 
   /// Finds the neighbours of `cells`, which are in the order of rising y and x.
   void connect();
@@ -30,9 +31,9 @@ struct PotentialGrid {
   /// largest of its fixed values. `parents`: by cell of this one, that of the coarser one.
   PotentialGrid coarser(std::vector<std::int32_t>& parents) const;
 
-  /// One sweep of successive over-relaxation over (5.9); `weight`: of a neighbour that is not
-  /// there, as a divisor. Returns the largest relative change.
-  double sweep(double weight, double relaxation, bool forward);
+  /// One sweep of successive over-relaxation over (5.9), in two colours like those of a chessboard;
+  /// `weight`: of a neighbour that is not there, as a divisor. Returns the largest relative change.
+  double sweep(double weight, double relaxation);
 };
 
 struct SweepCount {

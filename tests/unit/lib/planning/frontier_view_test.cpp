@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 #include <numeric>
+#include <ostream>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -123,6 +124,10 @@ double cast(const FloorMap& map, const std::vector<BeamCell>& cells, int x, int 
 struct Case {
   double aperture, yaw;
   int orientations, directions;
+
+  friend void PrintTo(const Case& one, std::ostream* out) {
+    *out << one.aperture << " " << one.yaw << " " << one.orientations << " " << one.directions;
+  }
 };
 
 class Apertures : public testing::TestWithParam<Case> {};

@@ -2,6 +2,7 @@
 // Explorers by the entropy decrease, on generated floors.
 #include <algorithm>
 #include <memory>
+#include <ostream>
 #include <string>
 #include <vector>
 
@@ -61,6 +62,10 @@ Drive run(const std::string& floor_plan, const std::string& world, const std::st
 struct Floor {
   const char* plan;
   const char* explorer;
+
+  friend void PrintTo(const Floor& floor, std::ostream* out) {
+    *out << floor.plan << " " << floor.explorer;
+  }
 };
 
 class EdeFloors : public testing::TestWithParam<Floor> {};

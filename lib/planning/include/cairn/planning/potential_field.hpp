@@ -14,7 +14,7 @@
 namespace cairn {
 
 struct PotentialFieldOptions {
-  double attractor = 0.6, tolerance = 1e-3, relaxation = 1.7;
+  double attractor = 0.6, tolerance = 1e-3, relaxation = 1.8;
   int sweeps = 5000;
 
   static auto fields() {
@@ -43,7 +43,7 @@ struct PotentialFieldOptions {
 /// zero, for every w. Multiplying φ ≥ 0 by w instead makes values at obstacles grow with each
 /// sweep, and has no limit on most floors (a test shows it for a corridor).
 ///
-/// It is solved by successive over-relaxation, in alternating order, from the solution on a grid of
+/// It is solved by successive over-relaxation, in two colours, from the solution on a grid of
 /// half as many cells and orientations, that on half as many again, and so forth.
 class CAIRN_API PotentialField {
  public:
