@@ -80,6 +80,12 @@ std::optional<Pose2> start_of(const ExploreOptions& options) {
       throw Error(ErrorCode::usage, "--start-theta needs --start-x and --start-y");
     return std::nullopt;
   }
+  for (const auto& [name, value] : {std::pair{"--start-x", *options.start_x},
+                                    {"--start-y", *options.start_y},
+                                    {"--start-theta", options.start_theta.value_or(0.0)}}) {
+    if (!std::isfinite(value))
+      throw Error(ErrorCode::usage, fmt::format("{}: {} is no finite number", name, value));
+  }
   return Pose2(*options.start_x, *options.start_y, options.start_theta.value_or(0.0));
 }
 
@@ -263,6 +269,7 @@ int run_explore(const ExploreOptions& options, Session& session) {
   const auto mapper = registry.make<Mapper>(parse_component(options.slam.mapper));
   const auto explorer = registry.make<Explorer>(parse_component(options.explorer));
   const OccupancyGrid floor = load_floor(options.floor, session);
+  note_narrow_ways(options.floor, floor, world->robot().radius, start, session);
   const InterruptGuard guard;  // until the results are written
   ExploreProgress progress(options, session);
   const ExploreParts parts = parts_of(options);

@@ -2,6 +2,7 @@
 #include "explore_words.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <exception>
 
@@ -28,21 +29,38 @@ double positive(const char* option, const std::string& key, const std::string& t
   return value;
 }
 
+int count(const char* option, const std::string& key, const std::string& text) {
+  constexpr double kMost = 1e9;
+  const double value = std::min(positive(option, key, text), kMost);
+  if (value != std::floor(value)) {
+    throw Error(ErrorCode::usage,
+                fmt::format("{}: '{}' is no whole number for {}", option, text, key));
+  }
+  return static_cast<int>(value);
+}
+
+OptionValues limit_words(const std::string& words) {
+  try {
+    return parse_component("until:" + words).values;
+  } catch (const Error&) {
+    throw Error(
+        ErrorCode::usage,
+        fmt::format("--until: '{}' is not of the form distance=250,steps=N,decisions=N", words));
+  }
+}
+
 }  // namespace
 
 ExplorationLimits limits_of(const std::string& words) {
   ExplorationLimits limits;
   if (words.empty()) return limits;
-  constexpr double kMost = 1e9;
-  for (const auto& [key, text] : parse_component("until:" + words).values) {
-    const double value = positive("--until", key, text);
-    const int count = static_cast<int>(std::min(value, kMost));
+  for (const auto& [key, text] : limit_words(words)) {
     if (key == "distance") {
-      limits.distance = value;
+      limits.distance = positive("--until", key, text);
     } else if (key == "steps") {
-      limits.steps = count;
+      limits.steps = count("--until", key, text);
     } else if (key == "decisions") {
-      limits.decisions = count;
+      limits.decisions = count("--until", key, text);
     } else {
       throw Error(ErrorCode::usage,
                   fmt::format("--until: there is no limit '{}'; there are distance [m], steps and "

@@ -35,6 +35,17 @@ OccupancyGrid generate(const ComponentSpec& spec, std::uint64_t seed, Registry& 
                      [&] { return registry.make<FloorPlan>(spec)->generate(seed); });
 }
 
+FloorSurvey survey_floor(const std::string& name, const OccupancyGrid& grid,
+                         const FloorSurveyOptions& options, FloorSurveyor& surveyor) {
+  try {
+    return call_plugin([&] { return fmt::format("floor surveyor '{}'", kSurveyor); },
+                       [&] { return surveyor.survey(grid, options); });
+  } catch (const Error& error) {
+    if (error.code() != ErrorCode::input) throw;
+    throw Error(error.code(), fmt::format("{}: {}", name, error.what()));
+  }
+}
+
 std::string point_text(const Eigen::Vector2d& point) {
   return fmt::format("({:.2f}, {:.2f})", point.x(), point.y());
 }
@@ -75,6 +86,10 @@ std::string survey_text(const std::string& name, const GridFrame& frame, const F
                fmt::format("{}, {:.3g} m² for its centre", plural(survey.unreachable_parts, "part"),
                            survey.unreachable_area)});
   }
+  if (survey.larger_part) {
+    table.add({"", fmt::format("the largest has {:.4g} m² for it, nearest to the start at {}",
+                               survey.larger_area, point_text(*survey.larger_part))});
+  }
   add_leaks(survey.leaks, table);
   return bold(name, colour) + "\n" + table.text(colour);
 }
@@ -95,6 +110,10 @@ json::object report_json(const std::string& name, const GridFrame& frame, const 
                     {"covered_area", survey.covered_area},
                     {"unreachable_parts", survey.unreachable_parts},
                     {"unreachable_area", survey.unreachable_area}};
+  if (survey.larger_part) {
+    report["larger_part"] = {{"nearest", point_json(*survey.larger_part)},
+                             {"standing_area", survey.larger_area}};
+  }
   json::array& leaks = report["leaks"].emplace_array();
   for (const FloorLeak& leak : survey.leaks)
     leaks.push_back({{"at", point_json(leak.at)}, {"length", leak.length}, {"edge", leak.at_edge}});
@@ -106,12 +125,40 @@ json::object report_json(const std::string& name, const GridFrame& frame, const 
 OccupancyGrid load_floor(const std::string& name, Session& session) {
   Registry& registry = session.registry();
   if (!name.starts_with('@')) {
-    session.files.add_input(grid_file(name).string());
+    for (const auto& file : grid_files_read(name, registry)) session.files.add_input(file.string());
     return read_grid(name, registry);
   }
   ComponentSpec spec = parse_component(std::string_view(name).substr(1));
   const std::uint64_t seed = take_seed(spec, registry.options(FloorPlan::kKind, spec.name));
   return generate(spec, seed, registry);
+}
+
+void note_narrow_ways(const std::string& name, const OccupancyGrid& floor, double radius,
+                      const std::optional<Pose2>& start, Session& session) {
+  Registry& registry = session.registry();
+  if (!registry.has(FloorSurveyor::kKind, kSurveyor)) return;
+  FloorSurveyOptions options{.radius = radius};
+  if (start) options.start = start->translation();
+  const auto surveyor = registry.make<FloorSurveyor>(kSurveyor);
+  const FloorSurvey survey = survey_floor(name, floor, options, *surveyor);
+  if (survey.larger_part) {
+    session.note(
+        fmt::format("the start {} is in a pocket that a body with a radius of {:g} m cannot leave, "
+                    "{:.3g} m² for its middle; the largest part of the floor has {:.4g} m², "
+                    "nearest at {}",
+                    point_text(survey.start), radius, survey.standing_area, survey.larger_area,
+                    point_text(*survey.larger_part)));
+    return;
+  }
+  // Less is the corners behind furniture.
+  constexpr double kMuch = 0.05;
+  if (survey.unreachable_area > kMuch * survey.standing_area) {
+    session.note(
+        fmt::format("{} of the floor, {:.3g} m² for the middle of a body with a radius of {:g} m, "
+                    "cannot be reached from {}: the ways there are too narrow for it",
+                    plural(survey.unreachable_parts, "part"), survey.unreachable_area, radius,
+                    point_text(survey.start)));
+  }
 }
 
 std::string size_text(const GridFrame& frame) {
@@ -133,7 +180,8 @@ void check_map_file(const std::string& file, const char* option, Session& sessio
                             "map.png beside it)",
                             option, file));
   }
-  check_file(grid_file(file).string(), session);
+  for (const auto& each : grid_files_written(file, session.registry()))
+    check_file(each.string(), session);
 }
 
 bool names_floor_plan(const std::string& kind, Session& session) {
@@ -155,9 +203,7 @@ int run_floor_info(const std::string& name, const FloorInfoOptions& options, Ses
   if (options.start_x) survey_options.start = Eigen::Vector2d(*options.start_x, *options.start_y);
   const auto surveyor = session.registry().make<FloorSurveyor>(kSurveyor);
   const OccupancyGrid grid = load_floor(name, session);
-  const FloorSurvey survey =
-      call_plugin([&] { return fmt::format("floor surveyor '{}'", kSurveyor); },
-                  [&] { return surveyor->survey(grid, survey_options); });
+  const FloorSurvey survey = survey_floor(name, grid, survey_options, *surveyor);
   Results results(session);
   results.add([&] { session.write_json(report_json(name, grid.frame, survey, options)); });
   results.add(
@@ -175,7 +221,7 @@ int run_floor_generate(const std::string& kind, std::uint64_t seed, const std::s
                             "(with floor.png beside it)",
                             output));
   }
-  check_file(grid_file(output).string(), session);
+  for (const auto& file : grid_files_written(output, registry)) check_file(file.string(), session);
   const OccupancyGrid grid = generate(parse_component(kind), seed, registry);
   Results results(session);
   results.write(output, [&] { write_grid(grid, output, registry); });

@@ -14,6 +14,7 @@
 #include "cairn/exploration/map_log.hpp"
 #include "cairn/exploration/map_truth.hpp"
 #include "cairn/grid/grid_format.hpp"
+#include "cairn/io/format_by_ending.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/timed.hpp"
@@ -155,7 +156,7 @@ MapOutcome map_of_log(const MapOptions& options, const InterruptGuard& guard, Se
   const auto policy = registry.make<PosePolicy>(parse_component(options.slam.policy));
   const auto registration = registry.make<Registration>(parse_component(options.slam.registration));
   const auto mapper = registry.make<Mapper>(parse_component(options.slam.mapper));
-  session.files.add_input(grid_file(options.log).string());
+  session.files.add_input(parse_named_file(options.log).file.string());
   const ScanLog log = read_scan_log(options.log, registry);
   MapOutcome outcome;
   outcome.logged = log.scans.size();

@@ -62,6 +62,15 @@ class Words {
     return value;
   }
 
+  /// Of a pose: a number that leaves distances exact to a millimetre.
+  double coordinate(std::string_view what) {
+    constexpr double kFarthest = 1e9;
+    const double value = number(what);
+    if (std::abs(value) > kFarthest)
+      fail(fmt::format("{} is {:g}, expected at most {:g}", what, value, kFarthest));
+    return value;
+  }
+
   [[noreturn]] void fail(const std::string& message) const {
     throw Error(ErrorCode::input, where_ + ": " + message);
   }
@@ -90,8 +99,12 @@ class Carmen final : public ScanLogFormat {
       }
       text.remove_prefix(std::min(end + 1, text.size()));
     }
-    if (log.scans.empty())
-      throw Error(ErrorCode::input, name + ": no scan in it: no line begins with FLASER");
+    if (log.scans.empty()) {
+      throw Error(ErrorCode::input,
+                  name +
+                      ": no scan in it: no line begins with FLASER, which are what is read of "
+                      "logs of CARMEN (ROBOTLASER1 lines are not)");
+    }
     return log;
   }
 
@@ -114,7 +127,8 @@ class Carmen final : public ScanLogFormat {
                                        ? std::numeric_limits<float>::quiet_NaN()
                                        : static_cast<float>(std::min(range, options_.range)));
     }
-    const double x = words.number("x"), y = words.number("y"), theta = words.number("theta");
+    const double x = words.coordinate("x"), y = words.coordinate("y"),
+                 theta = words.coordinate("theta");
     logged.odometry = Pose2(x, y, theta);
     for (const char* what : {"odom_x", "odom_y", "odom_theta"}) words.number(what);
     logged.stamp = words.number("the time");

@@ -72,8 +72,11 @@ Cell farthest_cell(const cv::Mat& distance, const cv::Mat& among) {
   return {at.x, at.y};
 }
 
-/// The cell of a mask, which has some, that is nearest to a point [cells].
-Cell nearest_cell(const cv::Mat& mask, const Vector2d& point) {
+/// The cell of a mask, which has some, that is nearest to a point [cells], or where that is far
+/// away to the place beside the mask that is nearest to it.
+Cell nearest_cell(const cv::Mat& mask, const Vector2d& far_point) {
+  const Vector2d size(mask.cols, mask.rows);
+  const Vector2d point = far_point.cwiseMax(-size).cwiseMin(2.0 * size);
   Cell best{0, 0};
   double least = std::numeric_limits<double>::infinity();
   for (int y = 0; y < mask.rows; ++y) {
@@ -135,10 +138,11 @@ Cell start_cell(const OccupancyGrid& grid, const FloorSurveyOptions& options, co
     throw Error(ErrorCode::input,
                 "the map has no free cell: is it inverted (negate), or are its thresholds wrong?");
   }
-  throw Error(ErrorCode::input,
-              fmt::format("a body with a radius of {:g} m fits nowhere: the widest place has room "
-                          "for one of {:.3g} m; is the resolution right?",
-                          options.radius, (most - 0.5) * grid.frame.resolution));
+  throw Error(
+      ErrorCode::input,
+      fmt::format("a body with a radius of {:g} m fits nowhere: the widest place has room "
+                  "for one of {:.3g} m; is the resolution right? Else it takes a smaller body",
+                  options.radius, (most - 0.5) * grid.frame.resolution));
 }
 
 /// Free cells of `floor` from which one step leads to an unknown cell or off the grid.
@@ -192,6 +196,11 @@ FloorSurvey survey_floor(const OccupancyGrid& grid, const FloorSurveyOptions& op
   survey.covered_area = cell_area * cv::countNonZero(covered);
   survey.unreachable_parts = parts.count - 1;
   survey.unreachable_area = cell_area * cv::countNonZero(fits) - survey.standing_area;
+  if (const int largest = parts.largest(); parts.cells(largest) > parts.cells(part)) {
+    const Cell cell = nearest_cell(parts.label == largest, frame.to_cells(survey.start));
+    survey.larger_part = frame.centre(cell.x, cell.y);
+    survey.larger_area = cell_area * parts.cells(largest);
+  }
   survey.leaks = find_leaks(frame, covered, unknown);
   return survey;
 }

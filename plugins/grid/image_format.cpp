@@ -3,6 +3,7 @@
 
 #include <fmt/core.h>
 
+#include "cairn/io/format.hpp"
 #include "cairn/runtime/error.hpp"
 
 namespace cairn::grids {
@@ -16,6 +17,13 @@ OccupancyGrid ImageFormat::read(const std::filesystem::path& file) {
   const GridFrame frame{
       .resolution = options_.resolution, .origin = {options_.x, options_.y}, .yaw = options_.yaw};
   return to_grid(read_picture(file), options_.meaning, frame, file.string());
+}
+
+std::vector<std::filesystem::path> ImageFormat::files_written(
+    const std::filesystem::path& file) const {
+  if (options_.meaning.mode == PictureMode::scale && file_ending(file) == "pgm")
+    refuse_opacity(file);
+  return {file};
 }
 
 void ImageFormat::write(const OccupancyGrid& grid, const std::filesystem::path& file) {

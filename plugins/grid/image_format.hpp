@@ -30,6 +30,8 @@ class ImageFormat final : public GridFormat {
  public:
   explicit ImageFormat(const ImageOptions& options) : options_(options) {}
   std::vector<std::string> extensions() const override { return {"png", "pgm"}; }
+  std::vector<std::filesystem::path> files_written(
+      const std::filesystem::path& file) const override;
   OccupancyGrid read(const std::filesystem::path& file) override;
   void write(const OccupancyGrid& grid, const std::filesystem::path& file) override;
 

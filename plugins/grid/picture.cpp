@@ -81,8 +81,8 @@ Picture decode_pgm(std::string_view bytes, const std::string& name) {
   const std::size_t each = white < 256 ? 1 : 2, begin = std::min(head.at() + 1, bytes.size());
   const std::string_view body = bytes.substr(begin);
   if (body.size() < (in_words ? count : each * count)) {
-    refuse(name, fmt::format("the image is torn: {} bytes for {} × {} pixels", body.size(),
-                             picture.width, picture.height));
+    refuse(name, fmt::format("the image is torn: {} bytes for {} × {} pixels; get or make it again",
+                             body.size(), picture.width, picture.height));
   }
   picture.grey.resize(count);
   for (std::size_t k = 0; k < count; ++k) {
@@ -107,7 +107,14 @@ Picture read_picture(const std::filesystem::path& file) {
   const std::string bytes = read_file(file), name = file.string();
   if (bytes.starts_with("\x89PNG")) return decode_png(bytes, name);
   if (bytes.starts_with("P5") || bytes.starts_with("P2")) return decode_pgm(bytes, name);
-  refuse(name, "neither a PNG nor a PGM");
+  refuse(name, "neither a PNG nor a PGM (P5, P2), which floors are read from: convert it");
+}
+
+void refuse_opacity(const std::filesystem::path& file) {
+  throw Error(ErrorCode::usage,
+              fmt::format("{}: a PGM has no transparency for cells that are unknown (mode scale): "
+                          "write a PNG, or mode=trinary",
+                          file.string()));
 }
 
 void write_picture(const Picture& picture, const std::filesystem::path& file) {
@@ -117,13 +124,7 @@ void write_picture(const Picture& picture, const std::filesystem::path& file) {
     throw Error(ErrorCode::usage,
                 fmt::format("{}: pictures of floors end in .png or .pgm", file.string()));
   }
-  if (!picture.opacity.empty()) {
-    throw Error(
-        ErrorCode::usage,
-        fmt::format("{}: a PGM has no transparency for cells that are unknown (mode scale): "
-                    "write a PNG, or mode=trinary",
-                    file.string()));
-  }
+  if (!picture.opacity.empty()) refuse_opacity(file);
   write_file(file, encode_pgm(picture));
 }
 

@@ -22,6 +22,9 @@ Picture read_picture(const std::filesystem::path& file);
 /// PNG or PGM, by the ending. Throws `Error` (usage) for another ending, and for opacity in a PGM.
 void write_picture(const Picture& picture, const std::filesystem::path& file);
 
+/// Throws the latter.
+[[noreturn]] void refuse_opacity(const std::filesystem::path& file);
+
 // The parts of these two.
 Picture decode_pgm(std::string_view bytes, const std::string& name);
 std::string encode_pgm(const Picture& picture);

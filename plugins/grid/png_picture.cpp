@@ -4,6 +4,8 @@
 #include <cstddef>
 #include <memory>
 
+#include <fmt/core.h>
+
 #include "cairn/runtime/error.hpp"
 #include "picture.hpp"
 
@@ -15,7 +17,19 @@ struct Release {
 };
 
 [[noreturn]] void fail(const std::string& name, const png_image& image) {
-  throw Error(ErrorCode::input, name + ": not a whole PNG: " + image.message);
+  throw Error(ErrorCode::input,
+              fmt::format("{}: not a whole PNG: {}; get or make it again", name, image.message));
+}
+
+/// Deflate makes at most 1032 bytes of one, with eight pixels in each: more pixels than that are
+/// not there, and take no memory.
+void check_bytes(std::string_view bytes, const png_image& image, const std::string& name) {
+  constexpr std::size_t kMostPixelsPerByte = 8 * 1032;
+  const std::size_t pixels = std::size_t{image.width} * image.height;
+  if (pixels / kMostPixelsPerByte <= bytes.size()) return;
+  throw Error(ErrorCode::input,
+              fmt::format("{}: not a whole PNG: {} bytes for {} × {} pixels; get or make it again",
+                          name, bytes.size(), image.width, image.height));
 }
 
 }  // namespace
@@ -26,6 +40,7 @@ Picture decode_png(std::string_view bytes, const std::string& name) {
   const std::unique_ptr<png_image, Release> released(&image);
   if (png_image_begin_read_from_memory(&image, bytes.data(), bytes.size()) == 0) fail(name, image);
   check_size(image.width, image.height, name);
+  check_bytes(bytes, image, name);
   image.format = PNG_FORMAT_RGBA;
   image.flags |= PNG_IMAGE_FLAG_16BIT_sRGB;  // levels are taken as they are
   Picture picture{.width = static_cast<int>(image.width), .height = static_cast<int>(image.height)};

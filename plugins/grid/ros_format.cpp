@@ -82,6 +82,10 @@ bool negated(const MapKeys& keys) {
   keys.fail(fmt::format("negate is '{}', expected 0 or 1", text));
 }
 
+fs::path picture_of(const MapKeys& keys, const fs::path& file) {
+  return file.parent_path() / keys.get<std::string>("image", "the name of a PNG or PGM");
+}
+
 PictureMeaning meaning_of(const MapKeys& keys) {
   const auto mode = keys.get_or<std::string>("mode", "trinary", "trinary, scale or raw");
   const auto known = find_enum<PictureMode>(mode);
@@ -95,23 +99,44 @@ PictureMeaning meaning_of(const MapKeys& keys) {
 
 }  // namespace
 
+std::vector<fs::path> RosFormat::files_read(const fs::path& file) const {
+  return {file, picture_of(MapKeys(file), file)};
+}
+
+std::vector<fs::path> RosFormat::files_written(const fs::path& file) const {
+  if (options_.mode == PictureMode::scale && options_.picture == "pgm") refuse_opacity(file);
+  return {file, written_picture(file)};
+}
+
+fs::path RosFormat::written_picture(const fs::path& file) const {
+  fs::path picture = file;
+  return picture.replace_extension(options_.picture);
+}
+
 OccupancyGrid RosFormat::read(const fs::path& file) {
   const MapKeys keys(file);
-  const fs::path picture = keys.get<std::string>("image", "the name of a PNG or PGM");
+  const fs::path picture = picture_of(keys, file);
   const auto [x, y, yaw] = keys.origin();
   const GridFrame frame{.resolution = keys.get<double>("resolution", "metres per pixel"),
                         .origin = {x, y},
                         .yaw = yaw};
   const PictureMeaning meaning = meaning_of(keys);
-  return to_grid(read_picture(file.parent_path() / picture), meaning, frame, file.string());
+  try {
+    return to_grid(read_picture(picture), meaning, frame, file.string());
+  } catch (const Error& error) {
+    if (!std::string_view(error.what()).starts_with(picture.string())) throw;
+    throw Error(error.code(),
+                fmt::format("{} (the image that {} names by its key 'image', as seen from its "
+                            "folder)",
+                            error.what(), file.string()));
+  }
 }
 
 void RosFormat::write(const OccupancyGrid& grid, const fs::path& file) {
   // Between 0.1 and 0.9 there are two levels of grey for each per cent.
   PictureMeaning meaning{.mode = options_.mode};
   if (options_.mode == PictureMode::scale) meaning = {PictureMode::scale, false, 0.9, 0.1};
-  fs::path picture = file;
-  picture.replace_extension(options_.picture);
+  const fs::path picture = written_picture(file);
   write_picture(to_picture(grid, meaning), picture);
   YAML::Emitter keys;
   const GridFrame& frame = grid.frame;

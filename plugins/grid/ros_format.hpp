@@ -26,10 +26,14 @@ class RosFormat final : public GridFormat {
  public:
   explicit RosFormat(const RosOptions& options) : options_(options) {}
   std::vector<std::string> extensions() const override { return {"yaml", "yml"}; }
+  std::vector<std::filesystem::path> files_read(const std::filesystem::path& file) const override;
+  std::vector<std::filesystem::path> files_written(
+      const std::filesystem::path& file) const override;
   OccupancyGrid read(const std::filesystem::path& file) override;
   void write(const OccupancyGrid& grid, const std::filesystem::path& file) override;
 
  private:
+  std::filesystem::path written_picture(const std::filesystem::path& file) const;
   RosOptions options_;
 };
 

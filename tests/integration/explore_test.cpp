@@ -15,6 +15,7 @@ namespace {
 
 using ::testing::AllOf;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 constexpr const char* kFloor = "@rooms:width=10,height=8,seed=2";
 constexpr const char* kMatcher =
@@ -189,6 +190,8 @@ TEST_F(Explore, WhatCannotWorkIsRefusedBeforeTheWork) {
   };
   EXPECT_THAT(refusal({"--until", "distance=-3"}, 2), HasSubstr("above zero"));
   EXPECT_THAT(refusal({"--until", "hours=3"}, 2), HasSubstr("distance"));
+  EXPECT_THAT(refusal({"--until", "steps=0.5"}, 2), HasSubstr("no whole number for steps"));
+  EXPECT_THAT(refusal({"--until", "distance"}, 2), HasSubstr("is not of the form distance=250"));
   EXPECT_THAT(refusal({"--explorer", "frontir"}, 5), HasSubstr("frontier"));
   EXPECT_THAT(refusal({"--lidar", "beams=0"}, 2), HasSubstr("beams"));
   EXPECT_THAT(refusal({"--lidar", "fov=90", "--world", "lidar_building:fov=100"}, 2),
@@ -199,9 +202,77 @@ TEST_F(Explore, WhatCannotWorkIsRefusedBeforeTheWork) {
   EXPECT_THAT(refusal({"--match", "reach=3"}, 2), HasSubstr("sigma_theta"));
   EXPECT_THAT(refusal({"--runs", "2", "--map", folder_.file("map.yaml")}, 2), HasSubstr("--map"));
   EXPECT_THAT(refusal({"--explorer", "frontier,frontir", "--runs", "2"}, 5), HasSubstr("frontir"));
+  EXPECT_THAT(refusal({"--start-x", "2", "--start-y", "2", "--start-theta", "nan"}, 2),
+              HasSubstr("--start-theta: nan is no finite number"));
+  EXPECT_THAT(refusal({"--lidar", "range=nan"}, 2), HasSubstr("range"));
+  EXPECT_THAT(refusal({"--explorer", "frontier:lenght=2"}, 2), HasSubstr("did you mean 'length'"));
+  EXPECT_THAT(refusal({"--mapper", "log_odds:resolution=0"}, 2), HasSubstr("resolution"));
   EXPECT_THAT(refusal({"--world", "lidar_building:radius=5"}, 3), HasSubstr("radius"));
+  EXPECT_THAT(refusal({"--steps", folder_.file("none/a.csv")}, 3), HasSubstr("cannot be written"));
+  EXPECT_THAT(refusal({"--map", folder_.file("m.yaml:mode=raaw")}, 2), HasSubstr("'raw'"));
+  EXPECT_THAT(refusal({"--map", folder_.file("m.yaml:mode=scale,image=pgm")}, 2),
+              HasSubstr("write a PNG"));
   EXPECT_EQ(cairn({"explore", folder_.file("none.yaml"), "--registration", kMatcher}).exit_code, 3);
   EXPECT_TRUE(folder_.contents().empty());
+}
+
+/// A YAML stands for its picture, too.
+TEST_F(Explore, NoOutputReplacesAnotherOrAPartOfTheFloor) {
+  const std::string floor = folder_.file("floor.yaml"), picture = folder_.file("floor.png"),
+                    map = folder_.file("map.yaml");
+  ASSERT_EQ(cairn({"generate", "rooms:width=6,height=5", "-o", floor}).exit_code, 0);
+  const std::string before = read_text(picture);
+  const auto refusal = [&](std::vector<std::string> more) {
+    std::vector<std::string> words{"explore", floor,     "--registration",
+                                   kMatcher,  "--until", "steps=1"};
+    words.insert(words.end(), more.begin(), more.end());
+    const Outcome run = cairn(words);
+    EXPECT_EQ(run.exit_code, 2) << run.err;
+    return run.err;
+  };
+  EXPECT_THAT(refusal({"--map", floor}), HasSubstr("floor.yaml is read"));
+  EXPECT_THAT(refusal({"--steps", picture}), HasSubstr("floor.png is read"));
+  EXPECT_THAT(refusal({"--map", picture}), HasSubstr("floor.png is read"));
+  EXPECT_THAT(refusal({"--map", map, "--json", folder_.file("map.png")}),
+              HasSubstr("two outputs go to one file"));
+  EXPECT_THAT(refusal({"--map", map, "--steps", map}), HasSubstr("two outputs go to one file"));
+  EXPECT_EQ(read_text(picture), before);
+  EXPECT_THAT(folder_.contents(), ::testing::ElementsAre("floor.png", "floor.yaml"));
+}
+
+TEST_F(Explore, NarrowDoorsAndPocketsAreNoted) {
+  // Two rooms, with a door of 0.2 m.
+  std::string picture = "P2\n50 30\n255\n";
+  for (int y = 0; y < 30; ++y) {
+    for (int x = 0; x < 50; ++x) {
+      const bool wall = x == 0 || y == 0 || x == 49 || y == 29 || (x == 20 && y != 9 && y != 10);
+      picture += wall ? "0 " : "254 ";
+    }
+  }
+  write_text(folder_.file("doors.pgm"), picture);
+  const std::string floor = folder_.file("doors.yaml");
+  write_text(floor, "image: doors.pgm\nresolution: 0.1\norigin: [0, 0, 0]\n");
+  const auto note = [&](std::vector<std::string> more) {
+    std::vector<std::string> words{"explore", floor,     "--registration",
+                                   kMatcher,  "--until", "steps=1"};
+    words.insert(words.end(), more.begin(), more.end());
+    const Outcome run = cairn(words);
+    EXPECT_EQ(run.exit_code, 0) << run.err;
+    return run.err;
+  };
+  EXPECT_THAT(note({}), AllOf(HasSubstr("1 part of the floor"), HasSubstr("too narrow")));
+  EXPECT_THAT(note({"--world", "lidar_building:radius=0.05"}), Not(HasSubstr("too narrow")));
+  EXPECT_THAT(
+      note({"--start-x", "1", "--start-y", "1"}),
+      AllOf(HasSubstr("the start (1.00, 1.00) is in a pocket"), HasSubstr("nearest at (2.")));
+  EXPECT_THAT(cairn({"info", floor, "--start-x", "1", "--start-y", "1"}).out,
+              HasSubstr("nearest to the start at (2."));
+}
+
+TEST_F(Explore, ARobotThatSeesNothingIsStuckAndSaysWhy) {
+  const Outcome run = explore({"--lidar", "dropouts=1"});
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_THAT(run.out, HasSubstr("stuck: no beam of the first scan has measured anything"));
 }
 
 }  // namespace

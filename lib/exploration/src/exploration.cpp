@@ -82,6 +82,10 @@ class Run {
     slam_.begin(start_, std::move(scan), robot_.odometry, Pose2(robot_.step, 0.0, 0.0), truth);
     parts_.explorer.begin(parts_.start.seed);
     record(0.0);
+    if (slam_.map().known_cells() == 0) {
+      end(ExplorationEnd::stuck,
+          "no beam of the first scan has measured anything, so that no floor is known");
+    }
   }
 
   void note_once(const std::string& note) {

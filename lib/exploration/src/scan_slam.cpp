@@ -7,6 +7,7 @@
 #include <cmath>
 #include <utility>
 
+#include <fmt/core.h>
 #include <Eigen/LU>
 
 #include "cairn/geometry/motion.hpp"
@@ -48,6 +49,7 @@ std::span<const Pose2> ScanSlam::poses() const { return places_->all(); }
 
 void ScanSlam::begin(const Pose2& at, LaserScan scan, const OdometryModel& odometry,
                      const Pose2& typical, const std::optional<Pose2>& truth) {
+  check_scan(scan, "scan 0");
   sample_.add(make_variable(0, Pose2(), parts_.registry));
   sample_.add(make_variable(1, typical, parts_.registry));
   sample_.add(make_factor(Between(0, 1, typical),
@@ -66,6 +68,7 @@ void ScanSlam::begin(const Pose2& at, LaserScan scan, const OdometryModel& odome
 void ScanSlam::add(const Pose2& odometry, const Eigen::Matrix3d& covariance, LaserScan scan,
                    const std::optional<Pose2>& truth) {
   const auto id = static_cast<Id>(scans_.size());
+  check_scan(scan, fmt::format("scan {}", id));
   if (scans_to_) scans_to_->take(id, scan);
   take(make_variable<Pose2>(id, parts_.registry), matched_odometry(id, odometry, covariance),
        std::move(scan), truth);

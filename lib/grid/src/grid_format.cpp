@@ -13,11 +13,21 @@ constexpr std::string_view kWhat = "grids";
 
 GridFormat::~GridFormat() = default;
 
-fs::path grid_file(std::string_view name) { return parse_named_file(name).file; }
-
 bool names_grid(std::string_view name, Registry& registry) {
   const std::string ending = file_ending(parse_named_file(name).file);
   return !format_of_ending<GridFormat>(ending, registry).name.empty();
+}
+
+std::vector<fs::path> grid_files_read(std::string_view name, Registry& registry) {
+  return with_format<GridFormat>(
+      name, kWhat, registry,
+      [](const GridFormat& format, const fs::path& file) { return format.files_read(file); });
+}
+
+std::vector<fs::path> grid_files_written(std::string_view name, Registry& registry) {
+  return with_format<GridFormat>(
+      name, kWhat, registry,
+      [](const GridFormat& format, const fs::path& file) { return format.files_written(file); });
 }
 
 OccupancyGrid read_grid(std::string_view name, Registry& registry) {

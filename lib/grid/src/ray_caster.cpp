@@ -78,7 +78,7 @@ RayHit RayCaster::traverse(const Eigen::Vector2d& from, double angle, double ran
   const double length = range / frame_.resolution;
   // Farther away there are no cells, and numbers of cells are no integers any more.
   constexpr double kFar = 1e9;
-  if (!(start.cwiseAbs().maxCoeff() < kFar) || !std::isfinite(angle))
+  if (!(start.array().abs() < kFar).all() || !std::isfinite(angle))
     return {.range = 0.0, .x = -1, .y = -1, .hit = true};
   const Crossings along_x(start.x(), std::cos(angle - frame_.yaw)),
       along_y(start.y(), std::sin(angle - frame_.yaw));

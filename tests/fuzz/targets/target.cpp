@@ -31,9 +31,9 @@ struct ScratchFolder {
 }  // namespace
 
 const std::vector<Target>& targets() {
-  static const std::vector<Target> all = {reader(),      line_protocol(), policy_protocol(),
-                                          journal(),     sidecar(),       recording(),
-                                          option_text(), incremental()};
+  static const std::vector<Target> all = {
+      reader(),    line_protocol(), policy_protocol(), journal(), sidecar(),
+      recording(), option_text(),   incremental(),     grid(),    scan_log()};
   return all;
 }
 

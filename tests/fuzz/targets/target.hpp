@@ -90,5 +90,7 @@ Target sidecar();
 Target recording();
 Target option_text();
 Target incremental();
+Target grid();
+Target scan_log();
 
 }  // namespace cairn::fuzz

@@ -65,6 +65,9 @@ TEST(GridFrame, WhatIsNoGridIsRefused) {
       [](GridFrame& f) { f.width = f.height = 20000; },
       [](GridFrame& f) { f.resolution = 0.0; },
       [&](GridFrame& f) { f.resolution = inf; },
+      [](GridFrame& f) { f.resolution = 1e-7; },
+      [](GridFrame& f) { f.origin.y() = 1e10; },
+      [](GridFrame& f) { f.origin.y() = std::nan(""); },
       [](GridFrame& f) { f.origin.x() = std::nan(""); },
       [&](GridFrame& f) { f.yaw = inf; }};
   for (std::size_t k = 0; k < faults.size(); ++k) {

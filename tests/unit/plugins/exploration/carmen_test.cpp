@@ -63,6 +63,36 @@ TEST(Carmen, WhatCannotBeReadIsNamedWithItsLine) {
   EXPECT_THAT(refusal("FLASER 2.5 1 2 0 0 0 0 0 0 1 h 1"), HasSubstr("no number of readings"));
   EXPECT_THAT(refusal("FLASER -1"), HasSubstr("no number of readings"));
   EXPECT_THAT(refusal("FLASER"), HasSubstr("no line begins"));
+  EXPECT_THAT(refusal("ROBOTLASER1 0 -1.57 3.14"), HasSubstr("ROBOTLASER1 lines are not"));
+  EXPECT_THAT(refusal("\nFLASER 1 2 1e300 0 0 0 0 0 1 h 1"), HasSubstr("a.clf:2: x is 1e+300"));
+  EXPECT_THAT(refusal("FLASER 1 2 0 0 -1e300 0 0 0 1 h 1"), HasSubstr("theta is -1e+300"));
+}
+
+ScanSlam slam_of(Registry& registry, PosePolicy& policy, Registration& matcher, Mapper& mapper) {
+  return ScanSlam({policy, matcher, mapper, registry});
+}
+
+TEST(MapLog, ALogWithoutAMeasurementIsRefusedAndTimesMayRunBackwards) {
+  Registry registry;
+  const auto policy = registry.make<PosePolicy>("compact_pose");
+  const auto matcher = registry.make<Registration>("icp");
+  const auto mapper = registry.make<Mapper>("log_odds");
+  const auto refusal = [&](const std::string& text) -> std::string {
+    ScanSlam slam = slam_of(registry, *policy, *matcher, *mapper);
+    try {
+      map_log(read(text), slam, {});
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ErrorCode::input);
+      return error.what();
+    }
+    return "mapped";
+  };
+  EXPECT_THAT(refusal("FLASER 3 81.9 0 -1 0 0 0 0 0 0 1 h 1\nFLASER 1 90 1 0 0 0 0 0 2 h 2\n"),
+              HasSubstr("no range of the 2 scans"));
+  ScanSlam slam = slam_of(registry, *policy, *matcher, *mapper);
+  const MappedLog mapped =
+      map_log(read("FLASER 1 5 0 0 0 0 0 0 9 h 9\nFLASER 1 5 0 0 0 0 0 0 2 h 2\n"), slam, {});
+  EXPECT_EQ(mapped.duration, 7.0);
 }
 
 /// A drive around a hall, with exact scans and odometry that is wrong by a constant turn.

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <map>
 #include <set>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "cairn/exploration/floor_map.hpp"
@@ -185,6 +187,40 @@ TEST(LogOdds, TheNewestScanStandsInTheWayOfABody) {
   const FloorMap& map = map_of->map();
   EXPECT_EQ(map.cells[at(map, 2.05)], CellState::free);  // by the majority of scans
   EXPECT_EQ(map.clearance[at(map, 2.05)], 0.0F);
+}
+
+TEST(LogOdds, WhatIsNoScanAndWhatIsTooFarAwayIsRefusedAndLeavesTheMap) {
+  test::Draw draw(19);
+  const auto map_of = mapper("resolution=0.1");
+  map_of->add(Pose2(), random_scan(draw));
+  const auto refusal = [&](const Pose2& at, const LaserScan& scan) -> std::string {
+    try {
+      map_of->add(at, scan);
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ErrorCode::input);
+      return error.what();
+    }
+    return "taken";
+  };
+  const std::vector<float> before = map_of->map().log_odds;
+  LaserScan empty = random_scan(draw), turning = empty, endless = empty;
+  empty.ranges.clear();
+  turning.angle_step = NAN;
+  endless.max_range = INFINITY;
+  EXPECT_THAT(refusal(Pose2(), empty), testing::HasSubstr("scan 1: a scan without beams"));
+  EXPECT_THAT(refusal(Pose2(), turning), testing::HasSubstr("finite angles"));
+  EXPECT_THAT(refusal(Pose2(), endless), testing::HasSubstr("largest range of inf m"));
+  EXPECT_THAT(refusal(Pose2(9000.0, 9000.0, 0.0), random_scan(draw)),
+              testing::HasSubstr("a scan at (9000, 9000): with it the map has"));
+  EXPECT_THAT(refusal(Pose2(1e200, 0.0, 0.0), random_scan(draw)), testing::HasSubstr("1e+200"));
+  EXPECT_THAT(refusal(Pose2(0.0, NAN, 0.0), random_scan(draw)), testing::HasSubstr("not finite"));
+  EXPECT_THAT(refusal(Pose2(0.0, 0.0, NAN), random_scan(draw)), testing::HasSubstr("not finite"));
+  // Scans without a measurement show nothing.
+  LaserScan blind = random_scan(draw);
+  for (std::size_t k = 0; k < blind.ranges.size(); ++k)
+    blind.ranges[k] = std::array{NAN, 0.0F, -1.0F, -INFINITY}[k % 4];
+  EXPECT_EQ(refusal(Pose2(1.0, 0.0, 0.0), blind), "taken");
+  EXPECT_EQ(map_of->map().log_odds, before);
 }
 
 TEST(LogOdds, GrowsWithWhatItSeesAndRefusesWhatIsNowhere) {

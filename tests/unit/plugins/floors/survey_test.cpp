@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include <fmt/core.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -125,6 +126,42 @@ TEST(FloorSurvey, IsWhatItsDefinitionsSayOnRandomFloors) {
       EXPECT_DOUBLE_EQ(found.occupied_area, cell * std::ranges::count(grid.occupancy, 100));
     }
   }
+}
+
+TEST(FloorSurvey, FromAPocketTheLargestPartIsNamedAndFromThereNothingIs) {
+  const OccupancyGrid floor = drawn({"############",  //
+                                     "#..#.......#",  //
+                                     "#..#.......#",  //
+                                     "#..#.......#",  //
+                                     "############"});
+  const double side = floor.frame.resolution;
+  const auto from = [&](int x, int y) {
+    return survey(floor, {.radius = 0.0, .start = floor.frame.centre(x, y)});
+  };
+  const FloorSurvey pocket = from(1, 2);
+  ASSERT_TRUE(pocket.larger_part.has_value());
+  EXPECT_EQ(*pocket.larger_part, floor.frame.centre(4, 2));
+  EXPECT_DOUBLE_EQ(pocket.larger_area, 21 * side * side);
+  EXPECT_DOUBLE_EQ(pocket.standing_area, 6 * side * side);
+  EXPECT_FALSE(from(8, 2).larger_part.has_value());
+  EXPECT_FALSE(survey(floor, {.radius = 0.0}).larger_part.has_value());
+}
+
+TEST(FloorSurvey, TheNearestPlaceIsNamedFromFarAwayToo) {
+  const OccupancyGrid floor = drawn({"#####",  //
+                                     "#...#",  //
+                                     "#...#",  //
+                                     "#####"});
+  const auto from = [&](double x, double y) {
+    return refusal(floor, {.radius = 0.0, .start = Vector2d(x, y)});
+  };
+  const Vector2d right = floor.frame.centre(3, 1), left = floor.frame.centre(1, 1);
+  const auto place = [](const Vector2d& at) {
+    return fmt::format("({:.3f}, {:.3f})", at.x(), at.y());
+  };
+  EXPECT_THAT(from(1e300, -1e300), HasSubstr(place(right)));
+  EXPECT_THAT(from(-1e300, -1e300), HasSubstr(place(left)));
+  EXPECT_THAT(from(-5.0, -7.0), HasSubstr(place(left)));
 }
 
 TEST(FloorSurvey, ALeakIsWhereFreeFloorBordersOnUnknownOrTheEdge) {

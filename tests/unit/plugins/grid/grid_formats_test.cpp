@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include <fmt/core.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -150,6 +151,58 @@ TEST_F(GridFormats, BadFilesAreRefusedWithWhatIsWrong) {
   EXPECT_THAT(refusal(file("good.pgm")), HasSubstr("resolution=0.05"));
   EXPECT_THAT(refusal(file("floor.tiff")), HasSubstr(".yaml"));
   EXPECT_THAT(refusal(file("good.pgm") + ":resolutio=1"), HasSubstr("resolution"));
+}
+
+TEST_F(GridFormats, APictureThatIsMissingOrTornIsNamedWithItsYaml) {
+  const std::string keys = "resolution: 0.05\norigin: [0, 0, 0]\nimage: ";
+  text("torn.pgm", "P5\n9 9\n255\nabc");
+  for (const char* picture : {"none.png", "torn.pgm"}) {
+    const std::string said = refusal(text("floor.yaml", keys + picture + "\n"));
+    EXPECT_THAT(said, testing::StartsWith(file(picture) + ": "));
+    EXPECT_THAT(said, HasSubstr(file("floor.yaml") + " names by its key 'image'"));
+  }
+  EXPECT_THAT(refusal(text("floor.yaml", keys + "/nowhere/x.png\n")), HasSubstr("/nowhere/x.png"));
+}
+
+TEST_F(GridFormats, AFrameWithoutAreaOrFarAwayIsRefused) {
+  text("good.pgm", "P2 1 1 255 254\n");
+  for (const char* resolution : {"0", "-0.05", ".nan", ".inf", "1e300", "1e-300"}) {
+    EXPECT_THAT(refusal(text("bad.yaml", fmt::format("image: good.pgm\nresolution: {}\n"
+                                                     "origin: [0, 0, 0]\n",
+                                                     resolution))),
+                HasSubstr("bad.yaml: a resolution of"))
+        << resolution;
+  }
+  EXPECT_THAT(refusal(text("bad.yaml", "image: good.pgm\nresolution: 1\norigin: [1e300, 0, 0]\n")),
+              HasSubstr("the origin is (1e+300, 0, 0)"));
+}
+
+/// A PNG's head may claim any size: what its bytes cannot hold takes no memory.
+TEST_F(GridFormats, APngOfMorePixelsThanItsBytesHoldIsRefusedByItsHead) {
+  std::string bytes(std::begin(kColours), std::end(kColours));
+  // 10,000 × 10,000 pixels, and the checksum of that head.
+  bytes.replace(16, 8, std::string("\0\0\x27\x10\0\0\x27\x10", 8));
+  bytes.replace(29, 4, std::string("\xba\x4e\x62\x27", 4));
+  EXPECT_THAT(refusal(text("vast.png", bytes) + ":resolution=1"),
+              HasSubstr("72 bytes for 10000 × 10000 pixels"));
+}
+
+TEST_F(GridFormats, AllFilesOfAMapAreKnown) {
+  text("good.pgm", "P2 1 1 255 254\n");
+  const std::string yaml =
+      text("floor.yaml", "image: good.pgm\nresolution: 1\norigin: [0, 0, 0]\n");
+  EXPECT_THAT(grid_files_read(yaml, registry_), ElementsAre(yaml, file("good.pgm")));
+  EXPECT_THAT(grid_files_read(file("good.pgm:resolution=1"), registry_),
+              ElementsAre(file("good.pgm")));
+  EXPECT_THAT(grid_files_written(file("x.yaml"), registry_),
+              ElementsAre(file("x.yaml"), file("x.png")));
+  EXPECT_THAT(grid_files_written(file("x.yaml:image=pgm"), registry_),
+              ElementsAre(file("x.yaml"), file("x.pgm")));
+  EXPECT_THROW(grid_files_read(file("none.yaml"), registry_), Error);
+  // Known before anything is written: no unknown cells in a PGM of that mode.
+  EXPECT_THROW(grid_files_written(file("x.yaml:mode=scale,image=pgm"), registry_), Error);
+  EXPECT_THROW(grid_files_written(file("x.pgm:mode=scale"), registry_), Error);
+  EXPECT_THROW(grid_files_written(file("x.yaml:mode=raaw"), registry_), Error);
 }
 
 TEST_F(GridFormats, AColonInANameIsNoOption) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstddef>
 #include <numbers>
 #include <string_view>
 #include <vector>
@@ -38,6 +39,13 @@ struct LaserScan {
     return first_angle + angle_step * static_cast<double>(beam);
   }
 };
+
+/// Throws `Error` (input), beginning with `name`, for a scan without beams, one whose angles are
+/// not finite or turn by more than 2π (and a millionth), or one whose `max_range` is not above
+/// zero. Ranges may be anything.
+CAIRN_API void check_scan(const LaserScan& scan, std::string_view name);
+/// Of the beams, how many have measured something: an obstacle, or that there is none in range.
+CAIRN_API std::size_t measured_beams(const LaserScan& scan);
 
 /// Ability of a registration that matches laser scans: it is given them as they are taken.
 class CAIRN_API ScanRegistration {

@@ -32,7 +32,11 @@ struct FloorSurvey {
   /// Parts of the floor where the body fits as well, and that it cannot reach.
   int unreachable_parts = 0;
   double unreachable_area = 0.0;  ///< of the cells that a body's centre could be in there [m²]
-  std::vector<FloorLeak> leaks;   ///< of the reachable floor, longest first
+  /// The largest of these, if it is larger than the one with the start: where in it a body's centre
+  /// is nearest to the start, and the area of such places.
+  std::optional<Eigen::Vector2d> larger_part{};
+  double larger_area = 0.0;      ///< [m²]
+  std::vector<FloorLeak> leaks;  ///< of the reachable floor, longest first
 };
 
 struct FloorSurveyOptions {

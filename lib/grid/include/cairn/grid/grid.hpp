@@ -68,7 +68,7 @@ struct CellThresholds {
 };
 
 /// Throws `Error` (input), beginning with `name`, for a frame without cells or with more than 10⁸,
-/// a resolution that is not above zero, or a number that is not finite.
+/// a resolution that is not between 10⁻⁶ and 10⁶ m, or an origin that is not within ±10⁹ m.
 CAIRN_API void check_frame(const GridFrame& frame, std::string_view name);
 
 }  // namespace cairn
