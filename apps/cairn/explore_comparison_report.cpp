@@ -99,13 +99,13 @@ std::string differences_text(const ExploreComparison& comparison, bool colour) {
       return difference_text(difference_of(comparison, e, measure_named(shown.measure)));
     });
   }
-  for (const auto& [title, quality] :
-       {std::pair{"map error at equal coverage [m²]", MapQuality::contradicted},
-        std::pair{"wrong cells, as much floor seen [m²]", MapQuality::wrong}}) {
+  const auto add_map_error = [&](const char* title, MapQuality quality) {
     add_row(table, comparison, 1, title, [&](std::size_t e) {
       return difference_text(difference_at_equal_coverage(comparison.outcomes, e, 0, quality));
     });
-  }
+  };
+  add_map_error("map error at equal coverage [m²]", MapQuality::contradicted);
+  add_map_error("wrong cells, as much floor seen [m²]", MapQuality::wrong);
   return table.text(colour);
 }
 

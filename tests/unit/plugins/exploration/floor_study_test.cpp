@@ -54,8 +54,9 @@ class FloorStudy : public testing::Test {
   Pose2 free_pose() {
     const std::size_t k = free_[static_cast<std::size_t>(draw_.integer(1 << 30)) % free_.size()];
     const auto width = static_cast<std::size_t>(floor_.frame.width);
+    const std::size_t row = k / width;
     const Vector2d at = floor_.frame.to_world(
-        {double(k % width) + draw_.uniform(0.0, 1.0), double(k / width) + draw_.uniform(0.0, 1.0)});
+        {double(k % width) + draw_.uniform(0.0, 1.0), double(row) + draw_.uniform(0.0, 1.0)});
     return {at.x(), at.y(), draw_.uniform(-std::numbers::pi, std::numbers::pi)};
   }
   LaserScan scan_at(const Pose2& pose) const {
