@@ -92,11 +92,8 @@ std::vector<std::string> notes_on_the_end(const Summary& summary, const Stop& st
     notes.push_back(
         fmt::format("stopped by --iterations {} before it converged", stop.max_iterations));
   }
-  std::string implausible = implausible_estimate(graph, summary.final_chi2);
-  if (!implausible.empty()) notes.push_back(std::move(implausible));
-  std::string not_finite = residual_not_finite(graph);
-  if (!not_finite.empty()) notes.push_back(std::move(not_finite));
-  for (std::string& wrong : wrong_jacobians(graph)) notes.push_back(std::move(wrong));
+  for (std::string& doubt : reasons_for_doubt(graph, summary.final_chi2))
+    notes.push_back(std::move(doubt));
   return notes;
 }
 

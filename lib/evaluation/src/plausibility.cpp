@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -100,6 +101,16 @@ std::string residual_not_finite(const Graph& graph) {
                        graph.describe_factor(f), fmt::join(graph.measurement(f), " "));
   }
   return {};
+}
+
+std::vector<std::string> reasons_for_doubt(const Graph& graph, double chi2) {
+  std::vector<std::string> sentences;
+  for (const std::string& sentence :
+       {implausible_estimate(graph, chi2), residual_not_finite(graph)}) {
+    if (!sentence.empty()) sentences.push_back(sentence);
+  }
+  for (std::string& wrong : wrong_jacobians(graph)) sentences.push_back(std::move(wrong));
+  return sentences;
 }
 
 }  // namespace cairn

@@ -53,7 +53,7 @@ TEST(Print, IsShortForLargeGraphsUnlessAskedForAll) {
 TEST(Print, SumsUpAnOptimisation) {
   Graph graph = small();
   std::ostringstream text;
-  text << optimize(graph);
+  text << optimize_from_states(graph);
   EXPECT_THAT(text.str(), StartsWith("converged: chi2 0.202069 -> "));
 }
 

@@ -37,4 +37,8 @@ CAIRN_API std::vector<std::string> wrong_jacobians(const Graph& graph);
 /// empty if there is none.
 CAIRN_API std::string residual_not_finite(const Graph& graph);
 
+/// What speaks against an optimised estimate of this chi2, a sentence each: `implausible_estimate`,
+/// `residual_not_finite` and `wrong_jacobians`. Empty if nothing does.
+CAIRN_API std::vector<std::string> reasons_for_doubt(const Graph& graph, double chi2);
+
 }  // namespace cairn

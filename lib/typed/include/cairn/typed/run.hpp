@@ -8,6 +8,7 @@
 #include "cairn/graph/graph.hpp"
 #include "cairn/io/format.hpp"
 #include "cairn/plugin/registry.hpp"
+#include "cairn/runtime/api.hpp"
 #include "cairn/solve/optimizer.hpp"
 
 /// Short forms for one's own program: what comes from plugins comes from `default_registry()`
@@ -21,12 +22,22 @@ std::unique_ptr<Interface> make(std::string_view spec, Registry& registry = defa
   return registry.make<Interface>(spec);
 }
 
-/// Minimises chi2 from the graph's states, and leaves the best states found in it. How it ended is
-/// `Summary::status`; not converging is no exception.
-inline Summary optimize(Graph& graph, std::string_view optimizer = "levenberg_marquardt",
-                        const Stop& stop = {}, Registry& registry = default_registry()) {
-  return registry.make<Optimizer>(optimizer)->optimize(graph, stop);
-}
+/// Minimises chi2, and leaves the best states found in the graph. The start is chosen by the
+/// initial guess `auto`, as `cairn optimize` does: the graph's states if they are good, else the
+/// best of others by chi2; a note says what was chosen where it is not the graph's states. Notes
+/// say as well if chi2 of the result is implausible (`reasons_for_doubt`). How it ended is
+/// `Summary::status`; not converging is no exception. Without the plugin of initial guesses it
+/// starts from the graph's states.
+CAIRN_API Summary optimize(Graph& graph, std::string_view optimizer = "levenberg_marquardt",
+                           const Stop& stop = {}, Registry& registry = default_registry());
+
+/// The same from the graph's states, without a choice: for states that are known to be good, as
+/// those of a graph that was optimised and has a few new factors. Takes less time, and ends in a
+/// local minimum where the states lie near one.
+CAIRN_API Summary optimize_from_states(Graph& graph,
+                                       std::string_view optimizer = "levenberg_marquardt",
+                                       const Stop& stop = {},
+                                       Registry& registry = default_registry());
 
 /// Reads a graph, as `read_graph`: the format is known by content.
 inline Graph read(const std::filesystem::path& file, Registry& registry = default_registry()) {
