@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <utility>
 
 #include "cairn/runtime/error.hpp"
@@ -34,10 +35,13 @@ Matrix positive(const Matrix& A) {
 
 class Descent {
  public:
-  Descent(Approximation& at, const RecoveryOptions& options, RecoveryClock& clock)
+  /// `has_time`: asked before each step.
+  Descent(Approximation& at, const RecoveryOptions& options, RecoveryClock& clock,
+          const std::function<bool()>& has_time)
       : at_(at),
         options_(options),
         clock_(clock),
+        has_time_(has_time),
         // A step that changes W by E gains about ¼ ‖E‖².
         least_(std::max(0.25 * options.tolerance * options.tolerance, kRounding)) {
     for (int k = 0; k < at.problem().factors(); ++k) {
@@ -96,7 +100,7 @@ class Descent {
  private:
   bool go_on() {
     if (left_.empty()) converged_ = true;
-    return !converged_ && iterations_ < options_.iterations && !clock_.up();
+    return !converged_ && iterations_ < options_.iterations && has_time_();
   }
   void step(int k, const Matrix& W) {
     at_.change(k, W);
@@ -121,6 +125,7 @@ class Descent {
   Approximation& at_;
   const RecoveryOptions& options_;
   RecoveryClock& clock_;
+  const std::function<bool()>& has_time_;
   double least_;
   std::vector<int> left_;
   int iterations_ = 0, since_ = 0;
@@ -168,7 +173,8 @@ RecoveryResult FactorDescent::recover(const RecoveryProblem& problem) {
   Approximation at(scaled);
   begin(problem, options_.initial, at);
   clock.record(at.kld());
-  Descent descent(at, options_, clock);
+  const std::function<bool()> has_time = [&] { return this->has_time(clock); };
+  Descent descent(at, options_, clock, has_time);
   if (greedy_) {
     descent.greedy();
   } else {

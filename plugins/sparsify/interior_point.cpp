@@ -227,7 +227,7 @@ RecoveryResult InteriorPoint::recover(const RecoveryProblem& problem) {
   bool converged = false;
   // At the end the barrier holds the KLD off its minimum by at most ½ ρ for each freedom.
   const double last = std::max(1e-2 * options_.tolerance * options_.tolerance, kRounding);
-  while (iterations < options_.iterations && !clock.up()) {
+  while (iterations < options_.iterations && has_time(clock)) {
     const Vector slope = barrier.slope(rho);
     const Vector step = -factorized(barrier.hessian(rho)).solve(slope);
     const double decrement = -slope.dot(step);

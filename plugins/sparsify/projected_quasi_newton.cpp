@@ -128,7 +128,7 @@ RecoveryResult ProjectedQuasiNewton::recover(const RecoveryProblem& problem) {
   model.scale(std::max(1.0, g.norm()));
   int iterations = 0;
   bool converged = at.gradient() <= options_.tolerance;
-  while (!converged && iterations < options_.iterations && !clock.up()) {
+  while (!converged && iterations < options_.iterations && has_time(clock)) {
     ++iterations;
     const Vector direction = minimize(model, stack, x, g) - x;
     const double slope = g.dot(direction), cost = at.kld();

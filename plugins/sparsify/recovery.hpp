@@ -62,6 +62,12 @@ class IterativeRecovery : public FactorRecovery {
   void trace(bool on) override { trace_ = on; }
 
  protected:
+  /// Whether there is time for another iteration. Throws `Interruption` if the work is to end.
+  bool has_time(const RecoveryClock& clock) const {
+    check_interruption();
+    return !clock.up();
+  }
+
   RecoveryOptions options_;
   bool trace_ = false;
 };

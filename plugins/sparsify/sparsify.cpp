@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cstdlib>
+#include <functional>
 #include <limits>
 #include <utility>
 
@@ -20,6 +22,10 @@
 
 namespace cairn::sparsify {
 namespace {
+
+using Clock = std::chrono::steady_clock;
+/// So often it is asked whether to go on with a blanket.
+constexpr std::chrono::milliseconds kAskEvery(10);
 
 /// B Ω Bᵀ, packed: the information of a choice's models in the residuals of their types. Throws
 /// `Error` (numerical) where rounding has made it indefinite.
@@ -62,6 +68,26 @@ std::vector<double> whole_information(const Marginal& marginal, const FactorChoi
                           dense.absolute ? "absolute poses" : "relative poses",
                           dense.node_sizes.size(), all - marginal.open, all));
 }
+
+/// Both are watched as long as it lives.
+class Watched {
+ public:
+  Watched(Topology& topology, FactorRecovery& recovery, const std::function<bool()>& go_on)
+      : topology_(topology), recovery_(recovery) {
+    topology.watch(go_on);
+    recovery.watch(go_on);
+  }
+  ~Watched() {
+    topology_.watch({});
+    recovery_.watch({});
+  }
+  Watched(const Watched&) = delete;
+  Watched& operator=(const Watched&) = delete;
+
+ private:
+  Topology& topology_;
+  FactorRecovery& recovery_;
+};
 
 LocalMinimum local_minimum(const SparsifyOptions& options) {
   if (!options.resolve) return LocalMinimum::ignored;
@@ -252,10 +278,21 @@ Sparsification Sparsify::remove(const Graph& graph, std::span<const int> nodes,
   const Timed timed(result.seconds.total);
   WorkGraph work(graph);
   int done = 0;
-  for (std::vector<int>& group : groups(work, nodes)) {
-    done += static_cast<int>(std::ssize(group));
-    take_out(work, std::move(group), result);
-    if (step && !step(done)) break;
+  Clock::time_point asked = Clock::now();
+  const Watched watched(*topology_, *recovery_, [&] {
+    if (!step || Clock::now() - asked < kAskEvery) return true;
+    const bool go_on = step(done);
+    asked = Clock::now();
+    return go_on;
+  });
+  try {
+    for (std::vector<int>& group : groups(work, nodes)) {
+      const int size = static_cast<int>(std::ssize(group));
+      take_out(work, std::move(group), result);
+      done += size;
+      if (step && !step(done)) break;
+    }
+  } catch (const Interruption&) {  // in a blanket, which stays as it is
   }
   for (int v = 0; v < graph.variable_count(); ++v) {
     if (work.gone(v)) result.removed_variables.push_back(v);

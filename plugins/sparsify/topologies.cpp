@@ -199,7 +199,10 @@ std::vector<FactorChoice> ExpectedDivergence::choose(const DenseBlanket& blanket
   const auto relax = [&] {
     at.follow(in);
     for (int pass = 0; pass < kRelaxations; ++pass) {
-      for (const int k : in) at.change(k, at.best(k).W);
+      for (const int k : in) {
+        check_interruption();
+        at.change(k, at.best(k).W);
+      }
     }
     at.follow_all();
   };
@@ -208,6 +211,7 @@ std::vector<FactorChoice> ExpectedDivergence::choose(const DenseBlanket& blanket
     Approximation::Best best;
     auto which = open.end();
     for (auto k = open.begin(); k != open.end(); ++k) {
+      check_interruption();
       if (which != open.end() && at.bound(*k) <= best.gain) continue;
       Approximation::Best tried = at.best(*k);
       if (which == open.end() || tried.gain > best.gain) {
@@ -250,6 +254,7 @@ std::vector<FactorChoice> SparseInverse::choose(const DenseBlanket& blanket, int
   Matrix Z = Matrix::Identity(d, d), U = Matrix::Zero(d, d);
   double rho = 1.0;
   for (int k = 0; k < 500; ++k) {
+    check_interruption();
     const Eigen::SelfAdjointEigenSolver<Matrix> eigen(Matrix(rho * (Z - U) - S));
     const Vector x =
         (eigen.eigenvalues().array() + (eigen.eigenvalues().array().square() + 4.0 * rho).sqrt()) /
@@ -317,7 +322,14 @@ std::vector<FactorChoice> Exhaustive::choose(const DenseBlanket& blanket, int po
   double topologies = 1.0;
   for (int k = 0; k < count; ++k) topologies *= static_cast<double>(all - k) / (k + 1);
   if (topologies > static_cast<double>(most_)) {
-    if (beyond_ == Beyond::ekld) return ExpectedDivergence(options_).choose(blanket, population);
+    if (beyond_ == Beyond::ekld) {
+      ExpectedDivergence instead(options_);
+      instead.watch([this] {
+        check_interruption();
+        return true;
+      });
+      return instead.choose(blanket, population);
+    }
     throw Error(ErrorCode::usage,
                 fmt::format("best: {} nodes have {:.3g} topologies of {} factors; at most {} are "
                             "tried (option most), since it takes every one of them",
@@ -331,6 +343,7 @@ std::vector<FactorChoice> Exhaustive::choose(const DenseBlanket& blanket, int po
   std::vector<FactorChoice> best;
   double least = std::numeric_limits<double>::infinity();
   while (true) {
+    check_interruption();
     std::vector<FactorChoice> topology = prior;
     for (const int k : picked) topology.push_back({pairs[k].model});
     try {

@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "cairn/runtime/api.hpp"
-#include "cairn/runtime/component.hpp"
 #include "cairn/runtime/enum_names.hpp"
 #include "cairn/sparsification/blanket.hpp"
+#include "cairn/sparsification/interruptible.hpp"
 
 // (T n) is equation or section n of the thesis that sparsification.hpp names.
 
@@ -89,7 +89,7 @@ struct RecoveryResult {
 };
 
 /// Finds the information of a topology's factors (T 4.3).
-class CAIRN_API FactorRecovery : public Component {
+class CAIRN_API FactorRecovery : public Interruptible {
  public:
   static constexpr std::string_view kKind = "factor_recovery";
   ~FactorRecovery() override;

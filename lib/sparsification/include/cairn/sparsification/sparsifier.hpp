@@ -72,8 +72,9 @@ class CAIRN_API Sparsifier : public Component {
   ~Sparsifier() override;
 
   /// Removes `nodes` (by index), in that order; the graph should be at its minimum. `step`, if
-  /// there is one, is called after each blanket with the number of nodes removed; it returns
-  /// whether to go on.
+  /// there is one, is called after each blanket, and now and then within one, with the number of
+  /// nodes removed; it returns whether to go on. A blanket that is not finished then stays as it
+  /// was.
   virtual Sparsification remove(const Graph& graph, std::span<const int> nodes,
                                 const std::function<bool(int)>& step = {}) = 0;
   /// Is called for every problem from now on (empty: none).

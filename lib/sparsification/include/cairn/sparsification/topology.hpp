@@ -6,15 +6,15 @@
 #include <vector>
 
 #include "cairn/runtime/api.hpp"
-#include "cairn/runtime/component.hpp"
 #include "cairn/sparsification/blanket.hpp"
+#include "cairn/sparsification/interruptible.hpp"
 
 // (T n) is equation or section n of the thesis that sparsification.hpp names.
 
 namespace cairn {
 
 /// Chooses which models become factors (T 4.4).
-class CAIRN_API Topology : public Component {
+class CAIRN_API Topology : public Interruptible {
  public:
   static constexpr std::string_view kKind = "topology";
   ~Topology() override;
