@@ -3,11 +3,13 @@
 #include "table.hpp"
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <istream>
+#include <limits>
 #include <memory>
 #include <sstream>
-#include <type_traits>
+#include <system_error>
 #include <utility>
 
 #include <fmt/core.h>
@@ -18,14 +20,33 @@
 namespace cairn::app {
 namespace {
 
-template <class Number>
-CLI::Validator number_within(Number low, Number high) {
+/// Decimal, in range: the parser would take 010 for eight, -1 for 2⁶⁴ - 1 and 10²⁰ for the largest.
+template <class Integer>
+CLI::Validator integer_within(Integer low, Integer high) {
+  const auto check = [low, high](std::string& text) {
+    Integer value{};
+    const char* const end = text.data() + text.size();
+    const auto [read, error] = std::from_chars(text.data(), end, value);
+    if (error != std::errc{} || read != end || value < low || value > high)
+      return fmt::format("'{}' is not an integer from {} to {}", text, low, high);
+    text = fmt::format("{}", value);  // which the parser reads in the same way
+    return std::string();
+  };
+  return {check, ""};
+}
+
+/// Any one that the type has.
+template <class Integer>
+CLI::Validator integer() {
+  return integer_within(std::numeric_limits<Integer>::min(), std::numeric_limits<Integer>::max());
+}
+
+CLI::Validator number_within(double low, double high) {
   const auto check = [low, high](const std::string& text) {
-    Number value{};
+    double value = 0.0;
     const bool good = CLI::detail::lexical_cast(text, value) && value >= low && value <= high;
-    const char* kind = std::is_integral_v<Number> ? "an integer" : "a number";
     return good ? std::string()
-                : fmt::format("'{}' is not {} from {} to {}", text, kind, low, high);
+                : fmt::format("'{}' is not a number from {} to {}", text, low, high);
   };
   return {check, ""};
 }
@@ -37,7 +58,7 @@ CLI::Validator finite_seconds(double least) {
         CLI::detail::lexical_cast(text, value) && std::isfinite(value) && value >= least;
     return good ? std::string()
                 : fmt::format("'{}' is not a number of seconds{}", text,
-                              least == 0.0 ? ", from 0" : "");
+                              least < 0.0 ? "" : fmt::format(", from {}", least));
   };
   return {check, ""};
 }
@@ -105,13 +126,13 @@ Argument& Argument::separated_by(char delimiter) {
 }
 
 Argument& Argument::within(int low, int high) {
-  option_->check(number_within(low, high));
+  option_->transform(integer_within(low, high));
   return *this;
 }
 
 Argument& Argument::none_or_within(int low, int high) {
-  const CLI::Validator number = number_within(low, high);
-  option_->check(CLI::Validator(
+  const CLI::Validator number = integer_within(low, high);
+  option_->transform(CLI::Validator(
       [number](std::string& text) {
         if (text == "0") return std::string();
         const std::string problem = number(text);
@@ -122,11 +143,6 @@ Argument& Argument::none_or_within(int low, int high) {
 }
 
 Argument& Argument::within(double low, double high) {
-  option_->check(number_within(low, high));
-  return *this;
-}
-
-Argument& Argument::within(std::uint64_t low, std::uint64_t high) {
   option_->check(number_within(low, high));
   return *this;
 }
@@ -187,7 +203,7 @@ Argument ArgumentParser::add_option(const std::string& names, double& value,
 
 Argument ArgumentParser::add_option(const std::string& names, std::uint64_t& value,
                                     const std::string& help) {
-  return Argument(*app_->add_option(names, value, help));
+  return Argument(*app_->add_option(names, value, help)->transform(integer<std::uint64_t>()));
 }
 
 Argument ArgumentParser::add_option(const std::string& names, std::optional<double>& value,
@@ -197,7 +213,7 @@ Argument ArgumentParser::add_option(const std::string& names, std::optional<doub
 
 Argument ArgumentParser::add_option(const std::string& names, std::optional<std::int64_t>& value,
                                     const std::string& help) {
-  return Argument(*app_->add_option(names, value, help));
+  return Argument(*app_->add_option(names, value, help)->transform(integer<std::int64_t>()));
 }
 
 void ArgumentParser::add_flag(const std::string& names, bool& value, const std::string& help) {

@@ -42,7 +42,6 @@ class Argument {
   /// 0, which stands for no limit, or an integer within.
   Argument& none_or_within(int low, int high);
   Argument& within(double low, double high);
-  Argument& within(std::uint64_t low, std::uint64_t high);
   Argument& one_of(std::vector<std::string> choices);
   /// A finite number of seconds.
   Argument& seconds_from(double least);

@@ -24,7 +24,6 @@ namespace cairn::app {
 namespace {
 
 void check(const BenchOptions& options, Session& session) {
-  if (options.csv == "-") session.write_file_to_stdout();
   check_file(options.csv, session);
   if (options.html.empty()) return;
   if (!session.registry().has(Picture::kKind, "html")) {

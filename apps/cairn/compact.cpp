@@ -172,9 +172,6 @@ Job prepare(const CompactOptions& options, const PolicySetting& setting, Results
 }
 
 void check(const CompactOptions& options, Session& session) {
-  if (options.output == "-" || options.trajectory == "-") session.write_file_to_stdout();
-  if (options.output == "-" && options.trajectory == "-")
-    throw Error(ErrorCode::usage, "only one of -o and --trajectory can go to standard output");
   session.files.add_input(options.thresholds);
   session.files.add_input(options.map);
   check_output(options.output, options.output_format, session);

@@ -33,7 +33,6 @@ boost::json::object report_json(const ConvertOptions& options, const LoadedGraph
 }
 
 int run(const ConvertOptions& options, Session& session) {
-  if (options.output_file == "-") session.write_file_to_stdout();
   check_output(options.output_file, options.output_format, session);
   const LoadedGraph loaded = load_graph(options.input_file, options.input, session);
   Results results(session);

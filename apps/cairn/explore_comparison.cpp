@@ -100,10 +100,7 @@ void add_comparison_options(ArgumentParser cli, ComparisonOptions& options) {
 }
 
 void check_comparison(const ComparisonOptions& options, const std::string& page, Session& session) {
-  for (const std::string& file : {options.csv, options.curves, page}) {
-    if (file == "-") session.write_file_to_stdout();
-    check_file(file, session);
-  }
+  for (const std::string& file : {options.csv, options.curves, page}) check_file(file, session);
 }
 
 int run_comparison(const ComparisonOptions& options, const std::string& page,

@@ -161,12 +161,14 @@ void check_output(const std::string& file, const std::string& format, Session& s
   } else {
     check_named_format(file, chosen, registry);
   }
+  if (file == "-") session.write_file_to_stdout();
   may_replace_graph ? session.files.add_result(file) : session.files.add_output(file);
   check_writable(file);
 }
 
 void check_file(const std::string& file, Session& session) {
   if (file.empty()) return;
+  if (file == "-") session.write_file_to_stdout();
   session.files.add_output(file);
   check_writable(file);
 }

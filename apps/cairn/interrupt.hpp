@@ -5,8 +5,14 @@
 
 namespace cairn::app {
 
+inline constexpr int kExitInterrupted = 130;
+
+/// From here on Ctrl-C (SIGINT) and SIGTERM end the program with `kExitInterrupted` at once, where
+/// no `InterruptGuard` exists; outputs that are not whole are removed. For the start of `main`.
+void end_on_interrupts();
+
 /// While one exists, Ctrl-C (SIGINT) and SIGTERM only set a flag, so that work can end with its
-/// best result; a second one ends the program as usual. One at a time.
+/// best result; a second one ends the program as without one. One at a time.
 class InterruptGuard {
  public:
   InterruptGuard();
@@ -17,7 +23,5 @@ class InterruptGuard {
   const std::atomic<bool>& flag() const;
   bool interrupted() const { return flag().load(); }
 };
-
-inline constexpr int kExitInterrupted = 130;
 
 }  // namespace cairn::app

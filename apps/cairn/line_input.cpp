@@ -15,6 +15,7 @@ namespace cairn::app {
 namespace {
 
 constexpr std::size_t kLongestLine = 16u << 20;
+constexpr int kLookAtInterrupt = 100;  // [ms]: a signal may arrive just before the wait begins
 
 }  // namespace
 
@@ -42,7 +43,8 @@ bool LineInput::fill() {
   searched_ -= begin_;
   begin_ = 0;
   pollfd waiting{STDIN_FILENO, POLLIN, 0};
-  if (::poll(&waiting, 1, -1) < 0 && errno == EINTR) return !interrupt_;
+  const int ready = ::poll(&waiting, 1, kLookAtInterrupt);
+  if (ready == 0 || (ready < 0 && errno == EINTR)) return !interrupt_;
   char more[1 << 16];
   const ssize_t got = ::read(STDIN_FILENO, more, sizeof more);
   if (got < 0 && errno == EINTR) return !interrupt_;

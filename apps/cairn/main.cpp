@@ -12,12 +12,14 @@
 #include <string>
 #include <string_view>
 #include <system_error>
+#include <thread>
 #include <utility>
 
 #include "cairn/io/output_file.hpp"
 #include "cairn/runtime/error.hpp"
 #include "command_line.hpp"
 #include "graph_files.hpp"
+#include "interrupt.hpp"
 #include "option_words.hpp"
 #include "session.hpp"
 #include "table.hpp"
@@ -52,17 +54,25 @@ void print_bug(const char* what) noexcept {
   std::fprintf(stderr, "cairn: internal error: %s (please report it)\n", what);
 }
 
+void print_no_thread(const char* why) noexcept {
+  std::fprintf(stderr, "cairn: a thread cannot be started (%s); give fewer with --threads\n", why);
+}
+
 int run(int argc, const char* const* argv) {
   cairn::app::Session session;
   cairn::app::CommandLine line(session);
   const std::function<int()> command = line.parse(argc, argv);
-  cairn::app::check_file(session.common.json, session);
+  if (session.common.json != "-") cairn::app::check_file(session.common.json, session);
   return command();
 }
+
+/// That the program ends by its own decision.
+std::atomic<bool> leaving{false};
 
 /// Ends the process without the destructors of static objects: those of plugins and of the
 /// libraries below them may crash or wait for ever, after all work is done.
 [[noreturn]] void leave(int code) {
+  leaving = true;
   std::fflush(nullptr);
 #if defined(CAIRN_SANITIZED) || defined(CAIRN_COVERAGE)
   std::exit(code);  // what was found or counted is written at the end
@@ -92,8 +102,7 @@ std::atomic<bool> memory_ran_out{false};
   } catch (const std::exception& error) {
     const std::string_view what = error.what();
     if (what.find("pthread_create") != what.npos) {  // in a thread of oneTBB, which starts others
-      std::fprintf(stderr, "cairn: a thread cannot be started (%s); give fewer with --threads\n",
-                   error.what());
+      print_no_thread(error.what());
       std::_Exit(static_cast<int>(cairn::ErrorCode::numerical));
     }
     print_bug(error.what());
@@ -101,6 +110,28 @@ std::atomic<bool> memory_ran_out{false};
     print_bug("an exception that is not a std::exception");
   }
   std::_Exit(kExitBug);
+}
+
+bool thread_can_be_started() {
+  try {
+    std::thread([] {}).join();
+    return true;
+  } catch (const std::system_error&) {
+    return false;
+  }
+}
+
+/// A plugin, or a library below it, called exit() (libgomp does where it cannot start a thread):
+/// not all is done, whatever code it gave, and the destructors that come next may wait for ever.
+void end_after_foreign_exit() {
+  if (leaving) return;
+  cairn::remove_unfinished_outputs();
+  if (!thread_can_be_started()) {
+    print_no_thread("a library has ended the program");
+    std::_Exit(static_cast<int>(cairn::ErrorCode::numerical));
+  }
+  std::fputs("cairn: a plugin, or a library below it, has ended the program\n", stderr);
+  std::_Exit(static_cast<int>(cairn::ErrorCode::plugin));
 }
 
 /// Descriptors 0 to 2 that were closed are taken: or the first files that are opened would be them,
@@ -118,6 +149,8 @@ int main(int argc, char** argv) {
   take_closed_descriptors();
   std::set_new_handler(note_out_of_memory);
   std::set_terminate(end_badly);
+  static_cast<void>(std::atexit(end_after_foreign_exit));
+  cairn::app::end_on_interrupts();
   std::signal(SIGPIPE, SIG_IGN);  // `cairn … | head` is no reason to die before files are written
   std::signal(SIGXFSZ, SIG_IGN);  // the limit of a file's size is an error of its output
   try {

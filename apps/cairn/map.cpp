@@ -151,13 +151,16 @@ std::string doubt(const MapOutcome& outcome) {
       outcome.agreement.first + kAgreementScans - 1);
 }
 
-MapOutcome map_of_log(const MapOptions& options, const InterruptGuard& guard, Session& session) {
+/// `guard`: made once the log is read, which may be a pipe.
+MapOutcome map_of_log(const MapOptions& options, std::optional<InterruptGuard>& guard,
+                      Session& session) {
   Registry& registry = session.registry();
   const auto policy = registry.make<PosePolicy>(parse_component(options.slam.policy));
   const auto registration = registry.make<Registration>(parse_component(options.slam.registration));
   const auto mapper = registry.make<Mapper>(parse_component(options.slam.mapper));
   session.files.add_input(parse_named_file(options.log).file.string());
   const ScanLog log = read_scan_log(options.log, registry);
+  guard.emplace();
   MapOutcome outcome;
   outcome.logged = log.scans.size();
   ScanSlam slam(
@@ -170,7 +173,7 @@ MapOutcome map_of_log(const MapOptions& options, const InterruptGuard& guard, Se
   StatusLine line(session.common.quiet);
   auto shown = std::chrono::steady_clock::now();
   MapLogOptions run = options.run;
-  run.interrupt = &guard.flag();
+  run.interrupt = &guard->flag();
   run.progress = [&](std::size_t read) {
     const auto now = std::chrono::steady_clock::now();
     if (now - shown < std::chrono::milliseconds(line.on_terminal() ? 50 : 5000)) return;
@@ -198,7 +201,7 @@ MapOutcome map_of_log(const MapOptions& options, const InterruptGuard& guard, Se
 int run_map(const MapOptions& options, Session& session) {
   check(options, session);
   session.use_threads();
-  const InterruptGuard guard;  // until the results are written
+  std::optional<InterruptGuard> guard;  // until the results are written
   const MapOutcome outcome = map_of_log(options, guard, session);
   for (const std::string& note : outcome.counts.notes) session.note(note);
   Registry& registry = session.registry();
@@ -216,7 +219,7 @@ int run_map(const MapOptions& options, Session& session) {
     session.print(summary_text(outcome));
   });
   results.finish();
-  if (guard.interrupted()) return kExitInterrupted;
+  if (guard->interrupted()) return kExitInterrupted;
   if (outcome.agreement.least < kPlausibleAgreement) session.note(doubt(outcome));
   if (outcome.run.converged) return 0;
   session.note("the estimate has not converged");

@@ -483,7 +483,6 @@ int run(MarginalsOptions options, Session& session) {
                 "-o writes covariances, and none are asked for beside --mutual-information: add "
                 "--diagonal, --pairs or --column, or write a report with --json");
   }
-  if (options.output == "-") session.write_file_to_stdout();
   check_file(options.output, session);
   session.use_threads();
   // Everything that is named is made before the file is read: a wrong name is told at once.

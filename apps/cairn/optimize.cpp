@@ -44,7 +44,6 @@ struct OptimizeOptions {
 };
 
 void check(const OptimizeOptions& options, Session& session) {
-  if (options.output == "-") session.write_file_to_stdout();
   check_output(options.output, options.output_format, session);
   if (options.record == "-") {
     throw Error(ErrorCode::usage, "--record writes to a file, not to standard output; name one");

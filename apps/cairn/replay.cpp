@@ -152,7 +152,6 @@ void replay_all(const Graph& whole, const std::vector<Arrival>& arrivals, Estima
 }
 
 void check(const ReplayOptions& options, Session& session) {
-  if (options.output == "-") session.write_file_to_stdout();
   check_output(options.output, options.output_format, session);
   check_file(options.steps, session);
   if (!options.plot.empty()) check_picture(options.plot, session);

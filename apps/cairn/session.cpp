@@ -74,6 +74,11 @@ void Session::write_file_to_stdout() {
                 "both --json and an output file are '-', but there is one standard output; name a "
                 "file for one of them");
   }
+  if (stdout_is_file_) {
+    throw Error(ErrorCode::usage,
+                "two output files are '-', but there is one standard output; name a file for one "
+                "of them");
+  }
   stdout_is_file_ = true;
 }
 

@@ -43,8 +43,8 @@ class Session {
   /// Applies `--threads`.
   void use_threads() const;
 
-  /// Says that a file named "-" (a graph) will be written to standard output. Throws `Error`
-  /// (usage) if the JSON report goes there too.
+  /// Says that a file named "-" will be written to standard output. Throws `Error` (usage) if the
+  /// JSON report or another file goes there too.
   void write_file_to_stdout();
   /// A part of the result, for people.
   void print(std::string_view text) const;

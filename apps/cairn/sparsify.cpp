@@ -277,7 +277,6 @@ void note_refused(const Sparsification& change, const Session& session) {
 int run_sparsify(SparsifyCommandOptions options, Session& session) {
   if (options.as_given) keep_states(options.problem);
   session.use_threads();
-  if (options.output == "-") session.write_file_to_stdout();
   check_output(options.output, options.output_format, session);
   check_file(options.record, session);
   if (!options.edges.empty()) return run_sparsify_edges(options, session);

@@ -69,7 +69,6 @@ int run(const ViewOptions& options, Session& session) {
     page = default_picture(options.album.files.front(), "html");
     check_default(page);
   }
-  if (page == "-") session.write_file_to_stdout();
   if (!session.registry().has(Picture::kKind, "html")) {
     throw Error(
         ErrorCode::plugin,

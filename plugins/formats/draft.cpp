@@ -9,6 +9,7 @@
 #include <fmt/core.h>
 
 #include "cairn/graph/packed.hpp"
+#include "cairn/plugin/plugin_search.hpp"
 #include "cairn/runtime/error.hpp"
 #include "information.hpp"
 #include "propagate.hpp"
@@ -23,6 +24,12 @@ Draft::Draft(std::string file, std::string format, Registry& types, const ReadOp
       types_(&types),
       options_(options),
       report_(&report) {}
+
+std::string Draft::plugin_problems() const {
+  std::string text;
+  for (const PluginProblem& problem : types_->problems()) text += "; note: " + problem.message;
+  return text;
+}
 
 std::int32_t Draft::variable_kind(std::string_view tag) {
   for (std::size_t k = 0; k < variable_kinds_.size(); ++k) {

@@ -82,6 +82,9 @@ class Draft {
   /// A number of a state or measurement by its place.
   double number(std::size_t place) const { return numbers_[place]; }
   ReadReport& report() { return *report_; }
+  /// What is wrong with the plugins that were found, for the end of a message about a name that is
+  /// not on offer: "; note: …" for each, empty if nothing is.
+  std::string plugin_problems() const;
   const std::string& file() const { return file_; }
 
   /// The graph: variables by rising id, factors as in the file. If the file has no vertices at all,

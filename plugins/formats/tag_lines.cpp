@@ -24,9 +24,9 @@ void unknown_tag(const Scanner& scanner, Draft& draft, const ReadOptions& option
   for (const std::string& tag : on_offer) offered += (offered.empty() ? "" : ", ") + tag;
   const std::string nearest = nearest_spelling(scanner.tag(), on_offer);
   scanner.fail(fmt::format(
-      "unknown tag '{}'{}; on offer: {} (ReadOptions::skip_unknown leaves such lines out)",
+      "unknown tag '{}'{}; on offer: {} (ReadOptions::skip_unknown leaves such lines out){}",
       shown(scanner.tag()), nearest.empty() ? "" : fmt::format("; did you mean '{}'?", nearest),
-      offered));
+      offered, draft.plugin_problems()));
 }
 
 Draft::FactorSlots read_factor(Scanner& scanner, Draft& draft, std::int32_t kind) {

@@ -74,6 +74,15 @@ TEST_F(Explore, SaysInFiveLinesWhatHappenedAndWritesAllOfIt) {
   EXPECT_EQ(floor.exit_code, 0) << floor.err;
 }
 
+TEST_F(Explore, AGraphOnStandardOutputIsAloneThere) {
+  const std::string file = folder_.file("run.g2o");
+  ASSERT_EQ(explore({"--until", "steps=5", "-o", file}).exit_code, 0);
+  const Outcome run = explore({"--until", "steps=5", "-o", "-"});
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_EQ(run.out, read_text(file));
+  EXPECT_THAT(run.err, HasSubstr("limit: 5 motions are made"));
+}
+
 TEST_F(Explore, TheSameCommandGivesTheSameRun) {
   const std::string first = folder_.file("a.csv"), second = folder_.file("b.csv"),
                     other = folder_.file("c.csv");

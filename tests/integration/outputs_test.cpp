@@ -68,6 +68,26 @@ TEST_F(Outputs, NoneReplacesAnotherOrWhatIsRead) {
   EXPECT_NE(read_text(file), before);
 }
 
+TEST_F(Outputs, OnlyOneGoesToStandardOutput) {
+  const std::string file = graph();
+  for (const Arguments& arguments :
+       std::vector<Arguments>{{"optimize", file, "-o", "-", "--json", "-"},
+                              {"compact", file, "-o", "-", "--trajectory", "-"},
+                              {"compact", file, "-o", "-", "--steps", "-"},
+                              {"replay", file, "-o", "-", "--steps", "-"},
+                              {"generate", "ring:poses=9", "-o", "-", "--ground-truth", "-"},
+                              {"bench", file, "--csv", "-", "--html", "-"},
+                              {"explore", "@rooms", "--trajectory", "-", "--truth", "-"},
+                              {"explore", "@rooms", "-o", "-", "--json", "-"},
+                              {"explore", "@rooms", "--runs", "2", "--csv", "-", "--curves", "-"},
+                              {"map", "robot.clf", "--graph", "-", "--trajectory", "-"}}) {
+    const Outcome outcome = cairn(arguments);
+    EXPECT_EQ(outcome.exit_code, 2) << testing::PrintToString(arguments) << outcome.err;
+    EXPECT_THAT(outcome.err, HasSubstr("one standard output")) << testing::PrintToString(arguments);
+    EXPECT_EQ(outcome.out, "") << testing::PrintToString(arguments);
+  }
+}
+
 TEST_F(Outputs, NoneReplacesAFileThatSaysHowToWork) {
   const std::string file = graph(), settings = folder_.file("settings.g2o");
   write_text(settings, "quiet = true\n");

@@ -126,6 +126,19 @@ TEST(PluginsCommand, TellsAbilities) {
   EXPECT_THAT(cairn({"plugins", "g2o"}).out, HasSubstr("reads, writes, .g2o"));
 }
 
+TEST(PluginsCommand, AnUnknownTagIsAnsweredWithWhatIsWrongWithPlugins) {
+  const TemporaryFolder folder;
+  write_text(folder.file("broken.json"), "{");
+  write_text(folder.file("odd.g2o"), "VERTEX_SE2 0 0 0 0\nEDGE_OF_ANOTHER 0 1\n");
+  const Outcome outcome = cairn({"info", folder.file("odd.g2o")},
+                                {{"CAIRN_PLUGIN_PATH", folder.path().string() + ":/no/such"}});
+  EXPECT_EQ(outcome.exit_code, 3);
+  EXPECT_THAT(outcome.err, HasSubstr("unknown tag 'EDGE_OF_ANOTHER'"));
+  EXPECT_THAT(outcome.err, HasSubstr("note: " + folder.file("broken.json")));
+  EXPECT_THAT(outcome.err, HasSubstr("note: /no/such: no such folder"));
+  EXPECT_EQ(lines(outcome.err).size(), 1);
+}
+
 TEST(PluginsCommand, AnUnknownNameIsAnsweredWithTheNearest) {
   CAIRN_NEEDS("linear_solver", "block_cholesky");
   const Outcome outcome = cairn({"plugins", "block_cholesk"});

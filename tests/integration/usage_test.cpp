@@ -312,6 +312,35 @@ TEST(Usage, AnExceptionInAPluginNamesThePluginsPart) {
     expect_error(cairn({command, folder.file("brittle.g2o"), "--plugin", factor, "--quiet"}),
                  kPlugin, "factor 'EDGE_BRITTLE' failed: the measurement is out of my range");
   }
+  expect_error(cairn({"info", folder.file("brittle.g2o"), "--plugin", factor, "--types",
+                      "brittle:sound=false"}),
+               kPlugin, "brittle.so: types 'brittle' failed: no types of mine");
+  write_text(folder.file("below.g2o"), "VERTEX_SE2 0 0 0 0\nEDGE_BRITTLE 0 -1 1\n");
+  expect_error(cairn({"info", folder.file("below.g2o"), "--plugin", factor}), kPlugin,
+               "below.g2o:2: EDGE_BRITTLE: its normalize() failed: below my range");
+}
+
+TEST(Usage, IntegersAreDecimalAndInRange) {
+  for (const char* seed : {"-1", "18446744073709551616", "1.5", "0x10", ""}) {
+    expect_error(
+        cairn({"generate", "ring:poses=9", "-o", "/dev/null", "--to", "g2o", "--seed", seed}),
+        kUsage, "is not an integer from 0 to 18446744073709551615");
+  }
+  expect_error(cairn({"compact", "@ring:poses=9", "--begin", "99999999999999999999"}), kUsage,
+               "is not an integer from -9223372036854775808");
+  const Outcome zero = cairn({"optimize", "@ring:poses=9", "--tolerance", "0", "--iterations",
+                              "010", "--json", "-", "--quiet"});
+  EXPECT_EQ(parse_json(zero.out).at("iterations").as_array().size(), 10);
+}
+
+TEST(Usage, APluginThatEndsTheProgramIsAnError) {
+  const TemporaryFolder folder;
+  const std::string solver = CAIRN_BAD_PLUGINS "/solver_throws/fragile.so";
+  expect_error(
+      cairn({"optimize", "@ring:poses=30", "--quiet", "--plugin", solver, "--linear-solver",
+             "fragile:in=exit", "-o", folder.file("best.g2o"), "--record", folder.file("run")}),
+      kPlugin, "a plugin, or a library below it, has ended the program");
+  EXPECT_TRUE(folder.contents().empty());
 }
 
 TEST(Usage, MessagesOfLibrariesNameTheOptionsOfTheProgram) {

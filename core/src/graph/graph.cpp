@@ -8,6 +8,7 @@
 
 #include "cairn/graph/packed.hpp"
 #include "cairn/runtime/error.hpp"
+#include "cairn/runtime/plugin_call.hpp"
 
 namespace cairn {
 namespace {
@@ -21,11 +22,11 @@ bool all_finite(std::span<const double> values) {
 /// What the type says of a state's or a measurement's numbers, which it must leave finite.
 template <class Type>
 std::string normalize(const Type& type, std::vector<double>& numbers) {
-  std::string problem = type.normalize(numbers.data());
-  if (problem.empty() && !all_finite(numbers)) {
+  std::string problem = call_plugin([&] { return fmt::format("{}: its normalize()", type.tag()); },
+                                    [&] { return type.normalize(numbers.data()); });
+  if (problem.empty() && !all_finite(numbers))
     throw Error(ErrorCode::plugin,
                 fmt::format("{}: its normalize() left a number that is not finite", type.tag()));
-  }
   return problem;
 }
 

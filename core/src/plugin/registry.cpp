@@ -243,16 +243,18 @@ struct Registry::Impl {
   /// Makes all types of a plugin at once, so that they share their options.
   void make_types(Plugin& plugin) {
     if (plugin.types_made) return;
-    const std::string file = origin(plugin.sidecar);
     for (const auto& [name, types] : plugin.target.types) {
-      TypeSet set = types.factory(Options(types.table, plugin.type_options, name));
+      const std::string component = fmt::format("{}: types '{}'", origin(plugin.sidecar), name);
+      const Options options(types.table, plugin.type_options, name);
+      TypeSet set = call_plugin([&] { return component; },
+                                [&, &make = types.factory] { return make(options); });
       for (auto& type : set.variables) {
-        check_type_offered(plugin, "variable", type->tag(), file);
+        check_type_offered(plugin, "variable", type->tag());
         if (!contested("variable", type->tag()))
           variable_types.emplace(type->tag(), std::move(type));
       }
       for (auto& type : set.factors) {
-        check_type_offered(plugin, "factor", type->tag(), file);
+        check_type_offered(plugin, "factor", type->tag());
         if (!contested("factor", type->tag())) factor_types.emplace(type->tag(), std::move(type));
       }
     }
@@ -265,12 +267,11 @@ struct Registry::Impl {
     return it != index.end() && it->second.size() > 1;
   }
 
-  void check_type_offered(const Plugin& plugin, std::string_view kind, std::string_view tag,
-                          const std::string& file) {
+  void check_type_offered(const Plugin& plugin, std::string_view kind, std::string_view tag) {
     const auto it = index.find(Key(kind, tag));
     if (it == index.end() || std::ranges::find(it->second, &plugin) == it->second.end()) {
       throw plugin_error(fmt::format("{}: the plugin makes {}, which its manifest does not offer",
-                                     file, in_words(kind, tag)));
+                                     origin(plugin.sidecar), in_words(kind, tag)));
     }
   }
 

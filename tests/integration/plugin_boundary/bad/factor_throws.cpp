@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A factor whose residual throws.
+// A factor whose residual throws, or its normalize for measurements below zero, or what makes its
+// type where an option says so.
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -24,13 +25,18 @@ struct BrittleFactor {
     if (measured[0] > 1.0) throw std::domain_error("the measurement is out of my range");
     return Vector<S, 1>(pose[0] - measured[0]);
   }
-  static std::string normalize(Vector<double, 1>&) { return {}; }
+  static std::string normalize(Vector<double, 1>& measured) {
+    if (measured[0] < 0.0) throw std::domain_error("below my range");
+    return {};
+  }
 };
 
 }  // namespace
 
 void cairn_register(cairn::Registrar& registrar) {
-  registrar.add_types("brittle", {}, [](const cairn::Options&) {
+  const auto table = cairn::OptionTable{}.boolean("sound", true, "whether the types can be made");
+  registrar.add_types("brittle", table, [](const cairn::Options& options) {
+    if (!options.boolean("sound")) throw std::domain_error("no types of mine");
     return cairn::TypeSet{.variables = {}, .factors = {cairn::define_factor<BrittleFactor>()}};
   });
 }

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A linear solver whose exceptions are not cairn's, thrown where its option says.
+// A linear solver whose exceptions are not cairn's, thrown where its option says; or it ends the
+// program.
+#include <cstdlib>
 #include <stdexcept>
 #include <string>
 
@@ -24,6 +26,7 @@ class FragileSolver final : public cairn::LinearSolver {
   void fail_in(const std::string& place) const {
     if (where_ == place) throw std::runtime_error("the solver broke in " + place);
     if (where_ == "number" && place == "factorize") throw 7;
+    if (where_ == "exit" && place == "factorize") std::exit(0);
   }
 
   std::string where_;
@@ -36,8 +39,9 @@ void cairn_register(cairn::Registrar& registrar) {
   registrar.add<cairn::LinearSolver>(
       "fragile",
       cairn::OptionTable{}.choice("in", "factorize",
-                                  {"construction", "analyze", "factorize", "number"},
-                                  "where it throws; number: no exception but a number"),
+                                  {"construction", "analyze", "factorize", "number", "exit"},
+                                  "where it throws; number: no exception but a number; exit: it "
+                                  "ends the program as if all were well"),
       [](const cairn::Options& options, cairn::Registry&) {
         return std::make_unique<FragileSolver>(options.text("in"));
       });

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// SIGINT and SIGTERM end every command with code 130, in every phase of its work.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "cairn/plugin/registry.hpp"
+#include "integration/process.hpp"
+#include "support/components.hpp"
+
+namespace cairn::test {
+namespace {
+
+using ::testing::Contains;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+using Interrupts = WithGraphFile;
+
+/// Runs a command of the shell in the test's folder; "$C" is the program.
+Outcome shell(const std::string& command, const TemporaryFolder& folder) {
+  return run_program({"sh", "-c", "cd \"$D\" || exit; " + command},
+                     {{"C", program()}, {"D", folder.path().string()}});
+}
+
+TEST_F(Interrupts, BeforeTheWorkEndTheProgramAtOnce) {
+  graph();
+  for (const std::string command : {"info pipe", "convert pipe out.g2o", "optimize pipe -o out.g2o",
+                                    "evaluate pipe graph.g2o", "sparsify pipe", "replay pipe"}) {
+    for (const std::string signal : {"INT", "TERM"}) {
+      // Opening the pipe waits until the program reads it.
+      const Outcome outcome = shell("mkfifo pipe; $C " + command + " & exec 3>pipe; kill -" +
+                                        signal + " $!; wait $!; echo code=$? >&2; rm pipe",
+                                    folder_);
+      EXPECT_THAT(outcome.err, HasSubstr("cairn: interrupted\n")) << command << signal;
+      EXPECT_THAT(outcome.err, HasSubstr("code=130")) << command << signal;
+      EXPECT_EQ(folder_.contents(), (std::vector<std::string>{"graph.g2o"})) << command;
+    }
+  }
+}
+
+TEST_F(Interrupts, ASecondOneEndsTheProgramAndLeavesNothingUnfinished) {
+  CAIRN_NEEDS("optimizer", "levenberg_marquardt");
+  CAIRN_NEEDS("linear_solver", "block_cholesky");
+  graph();
+  // Stopped, it gets both at the same moment.
+  const Outcome outcome = shell(
+      "$C optimize graph.g2o --record run.jsonl -o best.g2o --quiet --tolerance 0 --iterations "
+      "1000000000 & until ls *.part; do sleep 0.01; done >/dev/null 2>&1; sleep 0.1; kill -STOP "
+      "$!; "
+      "kill -INT $!; kill -TERM $!; kill -CONT $!; wait $!; echo code=$? >&2",
+      folder_);
+  EXPECT_THAT(outcome.err, HasSubstr("cairn: interrupted\n"));
+  EXPECT_THAT(outcome.err, HasSubstr("code=130"));
+  EXPECT_EQ(folder_.contents(), (std::vector<std::string>{"graph.g2o"}));
+}
+
+TEST_F(Interrupts, EndAPageThatIsBeingMade) {
+  if (!Registry().has("picture", "html")) GTEST_SKIP() << "built without the page";
+  graph();
+  const Outcome outcome = shell(
+      "mkfifo pipe; $C view graph.g2o pipe -o page.html & exec 3>pipe; kill -TERM $!; "
+      "wait $!; echo code=$? >&2",
+      folder_);
+  EXPECT_THAT(outcome.err, HasSubstr("code=130"));
+  EXPECT_THAT(folder_.contents(), Not(Contains(HasSubstr("page"))));
+}
+
+}  // namespace
+}  // namespace cairn::test
