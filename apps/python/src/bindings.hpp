@@ -19,6 +19,7 @@ void bind_graph(py::module_& module);
 void bind_files(py::module_& module);
 void bind_optimize(py::module_& module);
 void bind_covariances(py::module_& module);
+void bind_estimator(py::module_& module);
 void bind_evaluation(py::module_& module);
 void bind_components(py::module_& module);
 

@@ -13,6 +13,7 @@ PYBIND11_MODULE(_cairn, module) {
   python::bind_files(module);
   python::bind_optimize(module);
   python::bind_covariances(module);
+  python::bind_estimator(module);
   python::bind_evaluation(module);
   python::bind_components(module);
 }
