@@ -30,7 +30,7 @@ awk '/^## /{in_table = /^## Words to avoid/}
 # The texts, each at its line, in a copy of the tree.
 cd "$searched"
 mkdir "$work/texts"
-for place in docs README.md CHANGELOG.md CONTRIBUTING.md SECURITY.md examples apps/cairn core lib types solvers plugins; do
+for place in docs README.md CHANGELOG.md CONTRIBUTING.md SECURITY.md examples apps/cairn apps/python core lib types solvers plugins; do
   [ ! -e "$place" ] || find "$place" -type f \( -name '*.md' -o -name '*.hpp' -o -name '*.cpp' -o -name CMakeLists.txt \)
 done | grep -v '^docs/glossary\.md$' > "$work/files"
 [ -s "$work/files" ] || { echo "no files to search in $searched" >&2; exit 1; }

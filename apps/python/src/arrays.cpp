@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "arrays.hpp"
+
+#include <algorithm>
+
+#include <fmt/core.h>
+
+#include "cairn/runtime/error.hpp"
+
+namespace cairn::python {
+
+Ids ids_of(const py::object& sequence, const std::string& what, int dimensions) {
+  const py::array numbers = py::array::ensure(sequence);
+  if (!numbers) {
+    PyErr_Clear();
+    throw Error(ErrorCode::usage, fmt::format("{}: expected integers", what));
+  }
+  const char kind = numbers.dtype().kind();
+  if (numbers.size() > 0 && kind != 'i' && kind != 'u') {
+    throw Error(ErrorCode::usage, fmt::format("{}: expected integers, not numbers of type {}", what,
+                                              std::string(py::str(numbers.dtype()))));
+  }
+  if (numbers.ndim() != dimensions && numbers.size() > 0) {
+    throw Error(ErrorCode::usage,
+                fmt::format("{}: the shape is {}, expected {} dimension{}", what,
+                            shape_text(numbers), dimensions, dimensions == 1 ? "" : "s"));
+  }
+  return Ids::ensure(numbers);
+}
+
+Doubles doubles_of(const py::object& sequence, const std::string& what) {
+  Doubles numbers = Doubles::ensure(sequence);
+  if (!numbers) {
+    PyErr_Clear();
+    throw Error(ErrorCode::usage, fmt::format("{}: expected numbers", what));
+  }
+  return numbers;
+}
+
+py::array_t<double> array_of(std::span<const double> numbers,
+                             std::initializer_list<std::size_t> shape) {
+  py::array_t<double> array(std::vector<py::ssize_t>(shape.begin(), shape.end()));
+  std::ranges::copy(numbers, array.mutable_data());
+  return array;
+}
+
+py::array_t<double> blocks_of(std::span<const double> blocks, std::size_t rows,
+                              std::size_t columns) {
+  const std::size_t size = rows * columns;
+  const std::size_t count = size == 0 ? 0 : blocks.size() / size;
+  py::array_t<double> array(std::vector<py::ssize_t>{static_cast<py::ssize_t>(count),
+                                                     static_cast<py::ssize_t>(rows),
+                                                     static_cast<py::ssize_t>(columns)});
+  double* out = array.mutable_data();
+  for (std::size_t k = 0; k < count; ++k) {
+    for (std::size_t row = 0; row < rows; ++row) {
+      for (std::size_t column = 0; column < columns; ++column)
+        *out++ = blocks[k * size + column * rows + row];
+    }
+  }
+  return array;
+}
+
+std::string shape_text(const py::array& array) {
+  return std::string(py::str(py::tuple(array.attr("shape"))));
+}
+
+}  // namespace cairn::python

@@ -1,0 +1,359 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// cairn.Estimator: follows a graph while it grows and changes.
+#include "cairn/solve/estimator.hpp"
+
+#include <array>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <fmt/core.h>
+#include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
+
+#include "arrays.hpp"
+#include "bindings.hpp"
+#include "bound_estimator.hpp"
+#include "bound_graph.hpp"
+#include "cairn/plugin/registry.hpp"
+#include "cairn/runtime/error.hpp"
+#include "cairn/typed/symbol.hpp"
+#include "component_names.hpp"
+#include "measured.hpp"
+#include "types_of.hpp"
+
+namespace cairn::python {
+namespace {
+
+const char* const kDoc =
+    R"(Keeps the estimate of a graph, with covariances, up to date while the graph grows and changes.
+
+    estimator = cairn.Estimator("incremental_cholesky")
+    estimator.add(0, cairn.Pose2())
+    estimator.add(1, cairn.Pose2)  # its first measurement says where
+    estimator.add(cairn.Between(0, 1, cairn.Pose2(1, 0, 0)), sigmas=[0.1, 0.1, 0.05])
+    report = estimator.update()
+
+What is added, marginalised and removed is carried out by the next `update`, all or nothing. Factors are numbered in the
+order of their addition, from 0; no number is used twice.
+
+name: one of `cairn.components("estimator")`; its options are further keyword arguments.
+keep: which covariances are kept up to date after every update: "none", "last" (of the variable that was added last) or
+    "diagonal" (of every variable). All others are solved for when they are asked for.)";
+
+KeptMarginals kept_of(const std::string& keep) {
+  const std::array<std::pair<const char*, KeptMarginals>, 3> choices{
+      {{"none", KeptMarginals::none},
+       {"last", KeptMarginals::last},
+       {"diagonal", KeptMarginals::diagonal}}};
+  for (const auto& [name, kept] : choices) {
+    if (keep == name) return kept;
+  }
+  throw Error(ErrorCode::usage,
+              fmt::format("keep='{}': expected 'none', 'last' or 'diagonal'", keep));
+}
+
+std::unique_ptr<BoundEstimator> make(const std::string& name, const std::string& keep,
+                                     const py::kwargs& options) {
+  const KeptMarginals kept = kept_of(keep);
+  auto estimator = default_registry().make<Estimator>(component_spec(name, options));
+  estimator->keep_marginals(kept);
+  return std::make_unique<BoundEstimator>(std::move(estimator));
+}
+
+// What the next update does -----------------------------------------------------------------------
+
+void add_variable(BoundEstimator& bound, Id id, const py::object& value, bool fixed,
+                  const py::object& type) {
+  const bool placed_later = value.is_none() || py::isinstance<py::type>(value);
+  const py::object which = !type.is_none() ? type : value;
+  Variable variable{default_registry().variable_type(tag_of(which)), id, {}, fixed};
+  if (!placed_later) {
+    const Doubles state = doubles_of(value, "value");
+    variable.state.assign(span_of(state).begin(), span_of(state).end());
+  }
+  bound.pending().variables.push_back(std::move(variable));
+}
+
+void add_measurement(BoundEstimator& bound, const Measured& measured, const py::object& sigmas,
+                     const py::object& information, const py::object& covariance,
+                     const py::object& loss) {
+  auto type = measured.own ? measured.own : default_registry().factor_type(measured.tag);
+  const Noise noise{sigmas, information, covariance};
+  std::vector<double> packed = noise.packed(type->residual_size());
+  bound.pending().factors.push_back(
+      Factor{std::move(type), measured.ids, measured.numbers, std::move(packed), loss_of(loss)});
+}
+
+void append_ids(std::vector<std::int64_t>& list, const py::object& ids, const char* what) {
+  const Ids numbers =
+      py::isinstance<py::int_>(ids) ? ids_of(py::make_tuple(ids), what) : ids_of(ids, what);
+  list.insert(list.end(), span_of(numbers).begin(), span_of(numbers).end());
+}
+
+void change(BoundEstimator& bound, FactorId factor, const py::object& values,
+            const py::object& sigmas, const py::object& information, const py::object& covariance) {
+  const Doubles numbers = doubles_of(values, "values");
+  ChangedFactor changed{factor, {span_of(numbers).begin(), span_of(numbers).end()}, {}};
+  if (!sigmas.is_none() || !information.is_none() || !covariance.is_none()) {
+    const int n = bound.get().factor(factor).type->residual_size();
+    changed.information = Noise{sigmas, information, covariance}.packed(n);
+  }
+  bound.pending().changed.push_back(std::move(changed));
+}
+
+UpdateReport update(BoundEstimator& bound, bool full, bool defer, double max_seconds) {
+  if (!(max_seconds >= 0.0))
+    throw Error(ErrorCode::usage, "max_seconds: expected 0 (no limit) or more");
+  const GraphUpdate what = std::exchange(bound.pending(), {});
+  const EstimatorUse use(bound);
+  const py::gil_scoped_release unlocked;
+  return use.estimator().update(what, {.defer = defer, .full = full, .max_seconds = max_seconds});
+}
+
+// What it holds -----------------------------------------------------------------------------------
+
+py::array_t<Id> ids_of_type(BoundEstimator& bound, const py::object& type) {
+  Estimator& estimator = bound.get();
+  std::vector<Id> ids = estimator.variables();
+  if (!type.is_none()) {
+    const std::string tag = tag_of(type);
+    std::erase_if(ids, [&](Id id) { return estimator.type(id)->tag() != tag; });
+  }
+  return py::array_t<Id>(static_cast<py::ssize_t>(ids.size()), ids.data());
+}
+
+py::array_t<double> states_of_type(BoundEstimator& bound, const py::object& type) {
+  const py::array_t<Id> ids = ids_of_type(bound, type);
+  Estimator& estimator = bound.get();
+  if (ids.size() == 0)
+    throw Error(ErrorCode::usage, "there is no " + tag_of(type) + " in the estimator");
+  std::vector<double> states;
+  for (py::ssize_t k = 0; k < ids.size(); ++k) {
+    const std::span<const double> state = estimator.state(ids.data()[k]);
+    states.insert(states.end(), state.begin(), state.end());
+  }
+  const auto rows = static_cast<std::size_t>(ids.size());
+  return array_of(states, {rows, states.size() / rows});
+}
+
+double chi2_of(BoundEstimator& bound) {
+  const EstimatorUse use(bound);
+  const py::gil_scoped_release unlocked;
+  return use.estimator().chi2();
+}
+
+std::unique_ptr<BoundGraph> graph_of(BoundEstimator& bound) {
+  const EstimatorUse use(bound);
+  const py::gil_scoped_release unlocked;
+  return std::make_unique<BoundGraph>(use.estimator().graph());
+}
+
+std::unique_ptr<BoundEstimator> copy(BoundEstimator& bound) {
+  auto result = std::make_unique<BoundEstimator>(bound.get().clone());
+  result->pending() = bound.pending();
+  return result;
+}
+
+// Covariances -------------------------------------------------------------------------------------
+
+/// Blocks of one size, of pairs of ids one after the other.
+py::array_t<double> blocks(BoundEstimator& bound, std::span<const Id> first,
+                           std::span<const Id> second) {
+  const EstimatorUse use(bound);
+  Estimator& estimator = use.estimator();
+  if (first.empty()) return blocks_of({}, 0, 0);
+  const int rows = estimator.type(first[0])->tangent_size();
+  const int columns = estimator.type(second[0])->tangent_size();
+  const std::size_t size = static_cast<std::size_t>(rows) * static_cast<std::size_t>(columns);
+  std::vector<double> numbers(first.size() * size);
+  {
+    const py::gil_scoped_release unlocked;
+    for (std::size_t k = 0; k < first.size(); ++k) {
+      if (estimator.type(first[k])->tangent_size() != rows ||
+          estimator.type(second[k])->tangent_size() != columns) {
+        throw Error(ErrorCode::usage,
+                    fmt::format("an array has blocks of one size, and that of {} is another than "
+                                "that of {}: ask for each type by itself",
+                                id_text(first[k]), id_text(first[0])));
+      }
+      if (!estimator.covariance(first[k], second[k], {numbers.data() + k * size, size})) {
+        throw Error(ErrorCode::numerical,
+                    "the measurements so far do not determine variable " + id_text(first[k]));
+      }
+    }
+  }
+  return blocks_of(numbers, static_cast<std::size_t>(rows), static_cast<std::size_t>(columns));
+}
+
+py::object covariance(BoundEstimator& bound, const py::object& ids) {
+  const bool one = py::isinstance<py::int_>(ids);
+  const Ids names = one ? ids_of(py::make_tuple(ids), "ids") : ids_of(ids, "ids");
+  py::object all = blocks(bound, span_of(names), span_of(names));
+  return one ? all[py::int_(0)] : all;
+}
+
+py::array_t<double> cross_covariances(BoundEstimator& bound, const py::object& pairs) {
+  const Ids names = ids_of(pairs, "pairs", 2);
+  if (names.size() > 0 && names.shape(1) != 2) {
+    throw Error(ErrorCode::usage,
+                fmt::format("pairs: the shape is {}, expected (n, 2)", shape_text(names)));
+  }
+  std::vector<Id> first, second;
+  for (std::size_t k = 0; k < span_of(names).size(); k += 2) {
+    first.push_back(span_of(names)[k]);
+    second.push_back(span_of(names)[k + 1]);
+  }
+  return blocks(bound, first, second);
+}
+
+// Classes -----------------------------------------------------------------------------------------
+
+py::dict seconds_of(const UpdateReport& report) {
+  py::dict result;
+  result["total"] = report.seconds.total;
+  result["linearize"] = report.seconds.linearize;
+  result["order"] = report.seconds.order;
+  result["factorize"] = report.seconds.factorize;
+  result["solve"] = report.seconds.solve;
+  result["check"] = report.seconds.check;
+  result["marginals"] = report.seconds.marginals;
+  return result;
+}
+
+void bind_report(py::module_& module) {
+  py::class_<UpdateReport>(module, "UpdateReport", "What an update did.")
+      .def_readonly("ok", &UpdateReport::ok,
+                    "False: the measurements do not determine every variable; the estimate is the "
+                    "best available.")
+      .def_readonly("converged", &UpdateReport::converged)
+      .def_readonly("first_factor", &UpdateReport::first_factor,
+                    "Number of the first of its new factors; the others follow it.")
+      .def_readonly("priors", &UpdateReport::priors,
+                    "Numbers of the priors that marginalisation left.")
+      .def_readonly("iterations", &UpdateReport::iterations, "Linear systems solved.")
+      .def_readonly("affected_variables", &UpdateReport::affected_variables,
+                    "Variables whose part of the factorisation was computed again.")
+      .def_readonly("relinearized_factors", &UpdateReport::relinearized_factors,
+                    "Besides the new ones.")
+      .def_readonly("owed", &UpdateReport::owed,
+                    "Factors whose relinearisation was deferred to later updates.")
+      .def_property_readonly("seconds", &seconds_of,
+                             "Of each part: linearize, order, factorize, solve, check, marginals; "
+                             "total.")
+      .def_readonly("notes", &UpdateReport::notes, "Sentences for the user.")
+      .def("__repr__", [](const UpdateReport& report) {
+        return fmt::format("<cairn.UpdateReport {}: {} affected, {} relinearized, {:.3g} s>",
+                           report.ok ? "ok" : "not ok", report.affected_variables,
+                           report.relinearized_factors, report.seconds.total);
+      });
+}
+
+void bind_changes(py::class_<BoundEstimator>& estimator) {
+  estimator
+      .def("add", &add_variable, py::arg("id"), py::arg("value") = py::none(),
+           py::arg("fixed") = false, py::arg("type") = py::none(),
+           R"(Adds a variable with the next update.
+
+value: a Pose2, Pose3, Point2 or Point3, or the numbers of a state of the variable type `type`, given by its tag. A class,
+such as cairn.Pose2, or None with `type`: the first measurement of the update that can places it.)")
+      .def("add", &add_measurement, py::arg("measurement"), py::kw_only(),
+           py::arg("sigmas") = py::none(), py::arg("information") = py::none(),
+           py::arg("covariance") = py::none(), py::arg("loss") = py::none(),
+           "Adds a measurement with the next update; see `Graph.add`.")
+      .def("change", &change, py::arg("factor"), py::arg("values"), py::kw_only(),
+           py::arg("sigmas") = py::none(), py::arg("information") = py::none(),
+           py::arg("covariance") = py::none(),
+           "Replaces what a factor measured and, where it is given, how certain that is.")
+      .def(
+          "marginalize",
+          [](BoundEstimator& bound, const py::object& ids) {
+            append_ids(bound.pending().marginalized, ids, "ids");
+          },
+          py::arg("ids"),
+          "Variables that leave with the next update, one id or several; their information stays "
+          "as a prior on their neighbours.")
+      .def(
+          "remove",
+          [](BoundEstimator& bound, const py::object& variables, const py::object& factors) {
+            append_ids(bound.pending().removed_variables, variables, "variables");
+            append_ids(bound.pending().removed_factors, factors, "factors");
+          },
+          py::kw_only(), py::arg("variables") = py::tuple(), py::arg("factors") = py::tuple(),
+          "Takes out variables (ids) with all factors on them, and factors (numbers), with the "
+          "next "
+          "update.")
+      .def("update", &update, py::kw_only(), py::arg("full") = false, py::arg("defer") = false,
+           py::arg("max_seconds") = 0.0,
+           R"(Carries out what was asked for since the last update; returns an UpdateReport.
+
+full: relinearise, reorder and solve everything, until it has converged.
+defer: take in what is new and solve later.
+max_seconds: relinearisation that would take longer is deferred to later updates; 0: no limit.
+
+With an Error the estimator is as it was after the last update, and what was asked for is forgotten.)")
+      .def(
+          "set_loss",
+          [](BoundEstimator& bound, const py::object& loss, const std::string& on) {
+            bound.get().set_loss(loss_of(loss), selector_of(on));
+          },
+          py::arg("loss"), py::arg("on") = "all",
+          "As `Graph.set_loss`, also for factors to come that have no loss of their own.");
+}
+
+void bind_estimate(py::class_<BoundEstimator>& estimator) {
+  estimator
+      .def(
+          "estimate",
+          [](BoundEstimator& bound, Id id) {
+            Estimator& e = bound.get();
+            return value_of(*e.type(id), e.state(id));
+          },
+          py::arg("id"),
+          "The estimate of a variable: a Pose2, Pose3, Point2 or Point3; of other types its "
+          "numbers.")
+      .def("ids", &ids_of_type, py::arg("type") = py::none(),
+           "Ids of all variables, or of those of a type, in the order of addition: (n,) integers.")
+      .def("states", &states_of_type, py::arg("type"),
+           "The estimates of all variables of a type, in the order of `ids(type)`: (n, m) numbers.")
+      .def(
+          "covariance", &covariance, py::arg("ids"),
+          R"(Covariances of variables of one tangent size d: (d, d) of one id, (n, d, d) of several.
+
+Of the step delta with x_true = x.retract(delta), at the present linearisation; see `cairn.marginals`.)")
+      .def("cross_covariances", &cross_covariances, py::arg("pairs"),
+           "Covariances of pairs of variables: (n, d_a, d_b) for pairs (n, 2) of ids (a, b).")
+      .def("chi2", &chi2_of, "The sum of rho(||r||^2) at the present estimate.")
+      .def("graph", &graph_of, "Everything at the present estimate, as a Graph of its own.")
+      .def("copy", &copy,
+           "A copy, for questions of the kind 'what if': neither is affected by changes of the "
+           "other.")
+      .def("__copy__", &copy)
+      .def("__deepcopy__", [](BoundEstimator& bound, const py::dict&) { return copy(bound); })
+      .def("__contains__", [](BoundEstimator& bound, Id id) { return bound.get().has(id); })
+      .def_property_readonly("variable_count",
+                             [](BoundEstimator& bound) { return bound.get().variable_count(); })
+      .def_property_readonly("factor_count",
+                             [](BoundEstimator& bound) { return bound.get().factor_count(); })
+      .def_property_readonly(
+          "factors", [](BoundEstimator& bound) { return bound.get().factors(); },
+          "Numbers of all factors, rising.")
+      .def("__repr__", [](BoundEstimator& bound) {
+        return fmt::format("<cairn.Estimator: {} variables, {} factors>",
+                           bound.get().variable_count(), bound.get().factor_count());
+      });
+}
+
+}  // namespace
+
+void bind_estimator(py::module_& module) {
+  bind_report(module);
+  py::class_<BoundEstimator> estimator(module, "Estimator", kDoc);
+  estimator.def(py::init(&make), py::arg("name") = "incremental_cholesky", py::kw_only(),
+                py::arg("keep") = "none");
+  bind_changes(estimator);
+  bind_estimate(estimator);
+}
+
+}  // namespace cairn::python

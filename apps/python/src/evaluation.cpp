@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Errors of trajectories.
+#include <string>
+#include <vector>
+
+#include <fmt/core.h>
+#include <pybind11/pybind11.h>
+
+#include "bindings.hpp"
+#include "bound_graph.hpp"
+#include "cairn/evaluation/trajectory.hpp"
+#include "cairn/runtime/error.hpp"
+
+namespace cairn::python {
+namespace {
+
+Trajectory trajectory_of(const Graph& graph, const std::vector<double>& stamps) {
+  Trajectory poses = trajectory(graph);
+  if (stamps.size() != poses.size()) return poses;  // of a graph that has changed since
+  for (std::size_t k = 0; k < poses.size(); ++k) poses[k].stamp = stamps[k];
+  return poses;
+}
+
+/// How poses are paired: "id", "stamp", or "auto" for what fits both.
+bool by_stamp(const std::string& match, const Trajectory& estimate, const Trajectory& truth) {
+  if (match == "id") return false;
+  if (match == "auto") return stamps_tell_more(estimate, truth);
+  if (match != "stamp") {
+    throw Error(ErrorCode::usage,
+                fmt::format("match='{}': expected 'auto', 'id' or 'stamp'", match));
+  }
+  for (const Trajectory* poses : {&estimate, &truth}) {
+    if (poses->empty() || poses->front().stamp) continue;
+    throw Error(ErrorCode::usage, fmt::format("the {} has no time stamps; read it from a file that "
+                                              "has them, or match='id'",
+                                              poses == &estimate ? "estimate" : "truth"));
+  }
+  return true;
+}
+
+TrajectoryError evaluate(BoundGraph& estimate, BoundGraph& truth, const std::string& match) {
+  const Trajectory poses = trajectory_of(estimate.get(), estimate.stamps);
+  const Trajectory true_poses = trajectory_of(truth.get(), truth.stamps);
+  const bool stamps = by_stamp(match, poses, true_poses);
+  const py::gil_scoped_release unlocked;
+  return compare(stamps ? pair_by_stamp(poses, true_poses) : pair_by_id(poses, true_poses));
+}
+
+}  // namespace
+
+void bind_evaluation(py::module_& module) {
+  py::class_<TrajectoryError>(module, "TrajectoryError",
+                              "Root mean squares of errors of an estimate against the truth.")
+      .def_readonly("poses", &TrajectoryError::poses, "How many were compared.")
+      .def_readonly("ate_translation", &TrajectoryError::ate_translation,
+                    "Absolute, after rigid alignment [m].")
+      .def_readonly("ate_rotation", &TrajectoryError::ate_rotation, "[deg]")
+      .def_readonly("rpe_translation", &TrajectoryError::rpe_translation,
+                    "Relative, between consecutive poses [m].")
+      .def_readonly("rpe_rotation", &TrajectoryError::rpe_rotation, "[deg]")
+      .def_readonly("rpe_all_translation", &TrajectoryError::rpe_all_translation,
+                    "Relative, over all pairs [m].")
+      .def_readonly("rpe_all_rotation", &TrajectoryError::rpe_all_rotation, "[deg]")
+      .def("__repr__", [](const TrajectoryError& error) {
+        return fmt::format(
+            "<cairn.TrajectoryError of {} poses: ATE {:.6g} m, {:.6g} deg; RPE {:.6g} "
+            "m, {:.6g} deg>",
+            error.poses, error.ate_translation, error.ate_rotation, error.rpe_translation,
+            error.rpe_rotation);
+      });
+  module.def(
+      "evaluate", &evaluate, py::arg("estimate"), py::arg("truth"), py::kw_only(),
+      py::arg("match") = "auto",
+      R"(Errors of the poses of a graph against those of another, after rigid alignment: a TrajectoryError.
+
+match: "id" pairs poses of equal id, "stamp" by the time stamps of the files that both were read from, "auto" does what
+fits them.)");
+}
+
+}  // namespace cairn::python

@@ -1,0 +1,208 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "graph_arrays.hpp"
+
+#include <algorithm>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <fmt/core.h>
+#include <pybind11/pybind11.h>
+
+#include "arrays.hpp"
+#include "bulk.hpp"
+#include "cairn/graph/packed.hpp"
+#include "cairn/plugin/registry.hpp"
+#include "cairn/runtime/error.hpp"
+#include "component_names.hpp"
+#include "measured.hpp"
+#include "types_of.hpp"
+
+namespace cairn::python {
+namespace {
+
+std::size_t size_of(int n) { return static_cast<std::size_t>(n); }
+
+/// An array of `rows` rows of `columns` numbers; one column may come without its dimension.
+Doubles rows_of(const py::object& numbers, const char* what, std::size_t rows, int columns) {
+  Doubles array = doubles_of(numbers, what);
+  const bool fits =
+      array.ndim() == 2
+          ? array.shape(0) == static_cast<py::ssize_t>(rows) && array.shape(1) == columns
+          : array.ndim() == 1 && columns == 1 && array.shape(0) == static_cast<py::ssize_t>(rows);
+  if (!fits) {
+    throw Error(ErrorCode::usage, fmt::format("{}: the shape is {}, expected ({}, {})", what,
+                                              shape_text(array), rows, columns));
+  }
+  return array;
+}
+
+void add_variables_of(BoundGraph& bound, const py::object& type, const py::object& ids,
+                      const py::object& states) {
+  const GraphUse use(bound);
+  const auto variable_type = variable_type_of(use.graph(), tag_of(type));
+  const Ids names = ids_of(ids, "ids");
+  const Doubles rows =
+      rows_of(states, "states", span_of(names).size(), variable_type->ambient_size());
+  const py::gil_scoped_release unlocked;
+  add_variables(use.graph(), variable_type, span_of(names), span_of(rows));
+}
+
+void add_factors_of(BoundGraph& bound, const std::string& tag, const py::object& ids,
+                    const py::object& measurements, const py::object& information,
+                    const py::object& sigmas, const py::object& loss) {
+  const GraphUse use(bound);
+  const auto type = factor_type_of(use.graph(), tag);
+  const Ids names = ids_of(ids, "ids", 2);
+  const std::size_t arity = size_of(type->arity());
+  if (names.size() > 0 && names.shape(1) != type->arity()) {
+    throw Error(ErrorCode::usage, fmt::format("ids: the shape is {}, and {} joins {} variables",
+                                              shape_text(names), tag, arity));
+  }
+  const std::size_t count = span_of(names).size() / arity;
+  const Doubles rows = rows_of(measurements, "measurements", count, type->measurement_size());
+  const std::vector<double> packed =
+      Noise{sigmas, information, py::none()}.packed(type->residual_size(), count);
+  const std::shared_ptr<const Loss> robust = loss_of(loss);
+  const py::gil_scoped_release unlocked;
+  add_factors(use.graph(), type, span_of(names), span_of(rows), packed, robust);
+}
+
+/// The pool of a type. Throws `Error` (usage) if the graph has none.
+template <class Pools>
+std::size_t pool_of(const Pools& pools, const std::string& tag) {
+  const auto at =
+      std::ranges::find_if(pools, [&](const auto& pool) { return pool.type->tag() == tag; });
+  if (at == pools.end()) throw Error(ErrorCode::usage, "there is no " + tag + " in the graph");
+  return static_cast<std::size_t>(at - pools.begin());
+}
+
+py::array_t<Id> ids_of_type(BoundGraph& bound, const py::object& type) {
+  const Graph& graph = bound.get();
+  std::vector<Id> ids;
+  if (type.is_none()) {
+    for (int v = 0; v < graph.variable_count(); ++v) ids.push_back(graph.id(v));
+  } else {
+    const VariablePool& pool =
+        graph.variable_pools()[pool_of(graph.variable_pools(), tag_of(type))];
+    for (const int v : pool.variables) ids.push_back(graph.id(v));
+  }
+  return py::array_t<Id>(static_cast<py::ssize_t>(ids.size()), ids.data());
+}
+
+void set_states(BoundGraph& bound, const py::object& type, const py::object& states,
+                const py::object& ids) {
+  Graph& graph = bound.get();
+  const VariablePool& pool = graph.variable_pools()[pool_of(graph.variable_pools(), tag_of(type))];
+  std::vector<int> variables(pool.variables.begin(), pool.variables.end());
+  if (!ids.is_none()) {
+    variables.clear();
+    const Ids names = ids_of(ids, "ids");
+    for (const Id id : span_of(names)) {
+      const auto v = graph.find(id);
+      if (!v || graph.type_of(*v) != pool.type) {
+        throw Error(ErrorCode::usage,
+                    fmt::format("there is no {} {} in the graph", pool.type->tag(), id));
+      }
+      variables.push_back(*v);
+    }
+  }
+  const std::size_t size = size_of(pool.type->ambient_size());
+  const Doubles rows = rows_of(states, "states", variables.size(), pool.type->ambient_size());
+  const Values before = graph.values();
+  try {
+    for (std::size_t k = 0; k < variables.size(); ++k)
+      graph.set_state(variables[k], span_of(rows).subspan(k * size, size));
+  } catch (const Error&) {
+    graph.set_values(before);
+    throw;
+  }
+}
+
+const FactorPool& factor_pool_of(BoundGraph& bound, const std::string& tag) {
+  const std::vector<FactorPool>& pools = bound.get().factor_pools();
+  return pools[pool_of(pools, tag)];
+}
+
+py::array_t<Id> factor_ids(BoundGraph& bound, const std::string& tag) {
+  const FactorPool& pool = factor_pool_of(bound, tag);
+  py::array_t<Id> ids(
+      {static_cast<py::ssize_t>(pool.size()), static_cast<py::ssize_t>(pool.type->arity())});
+  std::ranges::transform(pool.variables, ids.mutable_data(),
+                         [&](int v) { return bound.get().id(v); });
+  return ids;
+}
+
+py::array_t<double> measurements_of(BoundGraph& bound, const std::string& tag) {
+  const FactorPool& pool = factor_pool_of(bound, tag);
+  return array_of(pool.measurements, {pool.size(), size_of(pool.type->measurement_size())});
+}
+
+py::array_t<double> information_of(BoundGraph& bound, const std::string& tag) {
+  const FactorPool& pool = factor_pool_of(bound, tag);
+  const int n = pool.type->residual_size();
+  std::vector<double> dense;
+  for (std::size_t k = 0; k < pool.size(); ++k) {
+    const Eigen::MatrixXd A =
+        unpack({pool.information.data() + k * packed_size(n), packed_size(n)}, n);
+    dense.insert(dense.end(), A.data(), A.data() + A.size());
+  }
+  return array_of(dense, {pool.size(), size_of(n), size_of(n)});
+}
+
+py::array_t<std::int32_t> positions_of(BoundGraph& bound, const std::string& tag) {
+  const std::vector<std::int32_t>& sequence = factor_pool_of(bound, tag).sequence;
+  return py::array_t<std::int32_t>(static_cast<py::ssize_t>(sequence.size()), sequence.data());
+}
+
+}  // namespace
+
+py::array_t<double> states_of(const Graph& graph, const Values& values, const py::object& type) {
+  const std::size_t p = pool_of(graph.variable_pools(), tag_of(type));
+  const VariablePool& pool = graph.variable_pools()[p];
+  return array_of(values.pools[p], {pool.variables.size(), size_of(pool.type->ambient_size())});
+}
+
+void bind_graph_arrays(py::class_<BoundGraph>& graph) {
+  graph
+      .def("add_variables", &add_variables_of, py::arg("type"), py::arg("ids"), py::arg("states"),
+           R"(Adds n variables of one type at once; all or, with an Error, none.
+
+type: its tag, such as "VERTEX_SE2", or a class, such as cairn.Pose2.
+ids: (n,) integers.
+states: (n, m) numbers as files have them: x y theta of a Pose2, x y z qx qy qz qw of a Pose3, coordinates of points.)")
+      .def("add_factors", &add_factors_of, py::arg("type"), py::arg("ids"), py::arg("measurements"),
+           py::arg("information") = py::none(), py::kw_only(), py::arg("sigmas") = py::none(),
+           py::arg("loss") = py::none(),
+           R"(Adds n factors of one type at once; all or, with an Error, none.
+
+type: its tag, such as "EDGE_SE2".
+ids: (n, arity) integers, the variables of each factor.
+measurements: (n, m) numbers.
+information: (n, r, r), or (r, r) for all, or (n, r(r+1)/2) upper triangles row by row; or
+sigmas: (n, r) standard deviations, or (r,) or one number for all.
+loss: a robust loss for each of them, such as "huber:scale=1".)")
+      .def("ids", &ids_of_type, py::arg("type") = py::none(),
+           "Ids of all variables, or of those of a type, in the order of addition: (n,) integers.")
+      .def(
+          "states",
+          [](BoundGraph& bound, const py::object& type) {
+            return states_of(bound.get(), bound.get().values(), type);
+          },
+          py::arg("type"),
+          "The estimates of all variables of a type, in the order of `ids(type)`: (n, m) numbers.")
+      .def("set_states", &set_states, py::arg("type"), py::arg("states"),
+           py::arg("ids") = py::none(),
+           "Replaces the estimates of all variables of a type, or of those with the given ids, in "
+           "that order.")
+      .def("factor_ids", &factor_ids, py::arg("type"),
+           "The variables of all factors of a type, by id: (n, arity) integers.")
+      .def("measurements", &measurements_of, py::arg("type"),
+           "The measurements of all factors of a type: (n, m) numbers.")
+      .def("information", &information_of, py::arg("type"),
+           "The information matrices of all factors of a type: (n, r, r) numbers.")
+      .def("positions", &positions_of, py::arg("type"),
+           "The positions of all factors of a type among all factors: (n,) integers.");
+}
+
+}  // namespace cairn::python

@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Measurements as Python values.
+#include <string>
+#include <utility>
+
+#include <fmt/core.h>
+#include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
+
+#include "arrays.hpp"
+#include "bindings.hpp"
+#include "cairn/runtime/error.hpp"
+#include "cairn/typed/measurements.hpp"
+#include "cairn/typed/symbol.hpp"
+#include "measured.hpp"
+
+namespace cairn::python {
+namespace {
+
+/// A measurement of the typed layer, as `Kind` (one of those of `measured.hpp`).
+template <class Kind, class M>
+Kind measured_as(const M& measurement) {
+  return Kind{{std::string(M::kTag), measurement.variables(), measurement.numbers()}};
+}
+
+template <class Pose>
+MeasuredBetween between(Id from, Id to, const Pose& pose) {
+  return measured_as<MeasuredBetween>(Between<Pose>(from, to, pose));
+}
+template <class T>
+MeasuredPrior prior(Id id, const T& value) {
+  return measured_as<MeasuredPrior>(Prior<T>(id, value));
+}
+template <class Point>
+MeasuredObservation observation(Id pose, Id landmark, const Point& point) {
+  return measured_as<MeasuredObservation>(Observation<Point>(pose, landmark, point));
+}
+
+std::string text_of(const Measured& measured) {
+  std::string text = measured.tag;
+  for (const Id id : measured.ids) text += " " + id_text(id);
+  text += ":";
+  for (const double number : measured.numbers) text += fmt::format(" {:.6g}", number);
+  return "<" + text + ">";
+}
+
+void bind_measurement(py::module_& module) {
+  py::class_<Measured>(
+      module, "Measurement",
+      R"(A measurement of any factor type: on which variables it is, and what was measured.
+
+tag: name of the factor type, as in files (`cairn.components("factor")` lists them).
+ids: the variables, in the order of the type.
+values: the numbers measured, in the order and the units of the type.)")
+      .def(py::init([](std::string tag, const py::object& ids, const py::object& values) {
+             const Ids variables = ids_of(ids, "ids");
+             const Doubles numbers = doubles_of(values, "values");
+             return Measured{std::move(tag),
+                             {span_of(variables).begin(), span_of(variables).end()},
+                             {span_of(numbers).begin(), span_of(numbers).end()}};
+           }),
+           py::arg("tag"), py::arg("ids"), py::arg("values"))
+      .def_readonly("tag", &Measured::tag, "Name of the factor type.")
+      .def_readonly("ids", &Measured::ids, "The variables, by id.")
+      .def_property_readonly(
+          "values", [](const Measured& measured) { return array_of(measured.numbers); },
+          "The numbers measured.")
+      .def("__repr__", &text_of);
+}
+
+void bind_kinds(py::module_& module) {
+  py::class_<MeasuredBetween, Measured>(
+      module, "Between",
+      R"(Odometry or a loop closure: pose `to_id` as seen from pose `from_id`.
+
+measured = pose(from_id).inverse() * pose(to_id). The error has three numbers (x y [m], theta [rad]) for a `Pose2`, six
+(translation [m], rotation [rad]) for a `Pose3`.)")
+      .def(py::init(&between<Pose2>), py::arg("from_id"), py::arg("to_id"), py::arg("measured"))
+      .def(py::init(&between<Pose3>), py::arg("from_id"), py::arg("to_id"), py::arg("measured"));
+  py::class_<MeasuredPrior, Measured>(module, "Prior",
+                                      R"(Where a pose or a landmark is in the world.
+
+What is not known has an infinite sigma: a position alone, as from GPS, is
+`Prior(id, Pose2(x, y, 0))` with sigmas=(s, s, inf).)")
+      .def(py::init(&prior<Pose2>), py::arg("id"), py::arg("measured"))
+      .def(py::init(&prior<Pose3>), py::arg("id"), py::arg("measured"))
+      .def(py::init(&prior<Point2>), py::arg("id"), py::arg("measured"))
+      .def(py::init(&prior<Point3>), py::arg("id"), py::arg("measured"));
+  py::class_<MeasuredObservation, Measured>(
+      module, "Observation",
+      "A landmark seen from a pose: its position [m] in the frame of the pose.")
+      .def(py::init(&observation<Point2>), py::arg("pose"), py::arg("landmark"),
+           py::arg("measured"))
+      .def(py::init(&observation<Point3>), py::arg("pose"), py::arg("landmark"),
+           py::arg("measured"));
+  py::class_<MeasuredBearingRange, Measured>(
+      module, "BearingRange",
+      "A landmark of the plane seen from a pose: direction [rad], anticlockwise from straight "
+      "ahead, and distance [m].")
+      .def(py::init([](Id pose, Id landmark, double bearing, double range) {
+             return measured_as<MeasuredBearingRange>(BearingRange(pose, landmark, bearing, range));
+           }),
+           py::arg("pose"), py::arg("landmark"), py::arg("bearing"), py::arg("range"));
+}
+
+void bind_symbols(py::module_& module) {
+  module.def(
+      "symbol",
+      [](const std::string& letter, std::int64_t index) {
+        if (letter.size() != 1)
+          throw Error(ErrorCode::usage,
+                      "a symbol is one letter and an index, not '" + letter + "'");
+        return symbol(letter[0], index);
+      },
+      py::arg("letter"), py::arg("index"),
+      "The id of variable `index` of the kind that a letter stands for: symbol('x', 3).");
+  module.def("X", &symbols::X, py::arg("index"), "The id of pose `index`: symbol('x', index).");
+  module.def("L", &symbols::L, py::arg("index"), "The id of landmark `index`: symbol('l', index).");
+  module.def("id_text", &id_text, py::arg("id"),
+             "'x3' for an id of `symbol`, the number of any other.");
+}
+
+}  // namespace
+
+void bind_measurements(py::module_& module) {
+  bind_measurement(module);
+  bind_kinds(module);
+  bind_symbols(module);
+}
+
+}  // namespace cairn::python

@@ -1,0 +1,260 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// cairn.optimize and its summary.
+#include <cmath>
+#include <cstdint>
+#include <exception>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <fmt/core.h>
+#include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
+
+#include "arrays.hpp"
+#include "bindings.hpp"
+#include "bound_graph.hpp"
+#include "cairn/evaluation/plausibility.hpp"
+#include "cairn/plugin/registry.hpp"
+#include "cairn/runtime/error.hpp"
+#include "cairn/runtime/plugin_call.hpp"
+#include "cairn/runtime/threads.hpp"
+#include "cairn/solve/initial_guess.hpp"
+#include "cairn/solve/optimizer.hpp"
+#include "cairn/typed/print.hpp"
+#include "component_names.hpp"
+#include "graph_arrays.hpp"
+#include "interrupt.hpp"
+
+namespace cairn::python {
+namespace {
+
+/// What a callback is given; the states are there while it runs.
+struct BoundIteration {
+  Iteration iteration;
+  const Graph* graph = nullptr;
+  const Values* values = nullptr;
+};
+
+py::array_t<double> states_at(const BoundIteration& bound, const py::object& type) {
+  if (!bound.graph) {
+    throw Error(ErrorCode::usage,
+                "the states of an iteration are there while the callback runs; ask for them in it");
+  }
+  return states_of(*bound.graph, *bound.values, type);
+}
+
+/// Calls a function written in Python after each iteration.
+class Callback final : public Observer {
+ public:
+  Callback(py::object function, const std::atomic<bool>& interrupt)
+      : function_(std::move(function)), interrupt_(&interrupt) {}
+
+  bool on_iteration(const Iteration& iteration, const Graph& graph, const Values& values) override {
+    if (function_.is_none()) return true;
+    const py::gil_scoped_acquire locked;
+    try {
+      const auto bound =
+          std::make_shared<BoundIteration>(BoundIteration{iteration, &graph, &values});
+      const py::object answer = function_(bound);
+      bound->graph = nullptr;
+      return !answer.is(py::bool_(false));
+    } catch (py::error_already_set& error) {
+      const bool obeyed = error.matches(PyExc_KeyboardInterrupt) && interrupt_->load();
+      if (!obeyed) raised_ = std::current_exception();
+      return false;
+    }
+  }
+
+  /// What the function raised, if it did.
+  void rethrow() const {
+    if (raised_) std::rethrow_exception(raised_);
+  }
+
+ private:
+  py::object function_;
+  const std::atomic<bool>* interrupt_;
+  std::exception_ptr raised_;
+};
+
+/// The components that an optimisation is made of, and when it stops.
+struct Plan {
+  ComponentSpec optimizer_spec;
+  std::unique_ptr<Optimizer> optimizer;
+  std::string initial_name;
+  std::unique_ptr<InitialGuess> initial;  // null: the states as they are
+  Stop stop;
+
+  Plan(ComponentSpec spec, const py::object& guess)
+      : optimizer_spec(std::move(spec)),
+        optimizer(default_registry().make<Optimizer>(optimizer_spec)) {
+    if (guess.is_none()) return;
+    initial_name = guess.cast<std::string>();
+    initial = default_registry().make<InitialGuess>(initial_name);
+  }
+};
+
+/// Without the interpreter's lock.
+Summary run(Graph& graph, const Plan& plan, Observer& observer) {
+  std::vector<std::string> notes;
+  if (plan.initial) {
+    for (const std::string& note :
+         call_plugin([&] { return fmt::format("initial guess '{}'", plan.initial_name); },
+                     [&] { return plan.initial->compute(graph); }))
+      notes.push_back(fmt::format("initial guess {}: {}", plan.initial_name, note));
+  }
+  Summary summary =
+      call_plugin([&] { return fmt::format("optimizer '{}'", plan.optimizer_spec.name); },
+                  [&] { return plan.optimizer->optimize(graph, plan.stop, observer); });
+  if (summary.status != Status::interrupted) {
+    for (std::string note :
+         {implausible_estimate(graph, summary.final_chi2), residual_not_finite(graph)}) {
+      if (!note.empty()) summary.notes.push_back(std::move(note));
+    }
+    for (std::string& wrong : wrong_jacobians(graph)) summary.notes.push_back(std::move(wrong));
+  }
+  summary.notes.insert(summary.notes.begin(), notes.begin(), notes.end());
+  return summary;
+}
+
+void check_stop(const Stop& stop) {
+  const auto refuse = [](const char* name, double value, const char* what) {
+    throw Error(ErrorCode::usage, fmt::format("{}={}: expected {}", name, value, what));
+  };
+  if (stop.max_iterations < 0) refuse("max_iterations", stop.max_iterations, "0 or more");
+  if (!(stop.tolerance >= 0.0 && stop.tolerance <= 1.0))
+    refuse("tolerance", stop.tolerance, "a fraction from 0 to 1");
+  if (!(stop.max_seconds >= 0.0)) refuse("max_seconds", stop.max_seconds, "0 (no limit) or more");
+}
+
+Summary optimize(BoundGraph& bound, const std::string& optimizer, const py::object& initial,
+                 const py::object& loss, const std::string& loss_on, int max_iterations,
+                 double tolerance, double max_seconds, const py::object& callback,
+                 const py::kwargs& options) {
+  Plan plan(component_spec(optimizer, options), initial);
+  plan.stop.max_iterations = max_iterations;
+  plan.stop.tolerance = tolerance;
+  plan.stop.max_seconds = max_seconds;
+  check_stop(plan.stop);
+  if (loss.is_none() && loss_on != "all")
+    throw Error(ErrorCode::usage, "loss_on says where a loss applies, but there is no loss");
+  const GraphUse use(bound);
+  if (!loss.is_none()) use.graph().set_loss(loss_of(loss), selector_of(loss_on));
+  const InterruptGuard guard;
+  plan.stop.interrupt = &guard.flag();
+  Callback observer(callback, guard.flag());
+  Summary summary;
+  {
+    const py::gil_scoped_release unlocked;
+    summary = run(use.graph(), plan, observer);
+  }
+  guard.absorb();
+  observer.rethrow();
+  return summary;
+}
+
+py::dict seconds_of(const Summary& summary) {
+  const Seconds& seconds = summary.seconds;
+  py::dict result;
+  result["total"] = seconds.total;
+  result["linearize"] = seconds.linearize;
+  result["analyze"] = seconds.analyze;
+  result["factorize"] = seconds.factorize;
+  result["solve"] = seconds.solve;
+  result["update"] = seconds.update;
+  return result;
+}
+
+void bind_iteration(py::module_& module) {
+  py::class_<BoundIteration, std::shared_ptr<BoundIteration>>(module, "Iteration",
+                                                              "One iteration of an optimisation.")
+      .def_property_readonly(
+          "number", [](const BoundIteration& it) { return it.iteration.number; }, "From 1.")
+      .def_property_readonly(
+          "chi2", [](const BoundIteration& it) { return it.iteration.chi2; },
+          "Of the estimate after it.")
+      .def_property_readonly(
+          "step_norm", [](const BoundIteration& it) { return it.iteration.step_norm; },
+          "Euclidean norm of the step in the tangent space.")
+      .def_property_readonly(
+          "damping", [](const BoundIteration& it) { return it.iteration.lambda; },
+          "lambda, or the inverse of the radius of the trust region; 0 where there is none.")
+      .def_property_readonly(
+          "accepted", [](const BoundIteration& it) { return it.iteration.accepted; },
+          "Whether the step was taken.")
+      .def_property_readonly(
+          "seconds", [](const BoundIteration& it) { return it.iteration.seconds; },
+          "Of this iteration.")
+      .def("states", &states_at, py::arg("type"),
+           "In a callback: the best estimates so far of all variables of a type, (n, m), in the "
+           "order of `Graph.ids(type)`.")
+      .def("__repr__", [](const BoundIteration& it) {
+        return fmt::format("<cairn.Iteration {}: chi2 {:.6g}>", it.iteration.number,
+                           it.iteration.chi2);
+      });
+}
+
+void bind_summary(py::module_& module) {
+  py::class_<Summary>(module, "Summary", "How an optimisation ended.")
+      .def_readonly("optimizer", &Summary::optimizer)
+      .def_readonly("linear_solver", &Summary::linear_solver)
+      .def_property_readonly(
+          "status", [](const Summary& summary) { return std::string(to_string(summary.status)); },
+          "'converged', 'max_iterations', 'diverged', 'not_positive_definite' or 'interrupted'. "
+          "Whatever it is, the graph has the best estimate found.")
+      .def_property_readonly(
+          "converged", [](const Summary& summary) { return summary.status == Status::converged; })
+      .def_readonly("initial_chi2", &Summary::initial_chi2)
+      .def_readonly("chi2", &Summary::final_chi2, "At the end.")
+      .def_property_readonly(
+          "iterations",
+          [](const Summary& summary) {
+            std::vector<BoundIteration> all;
+            for (const Iteration& iteration : summary.iterations) all.push_back({iteration});
+            return all;
+          },
+          "A list of Iteration.")
+      .def_property_readonly("seconds", &seconds_of,
+                             "Of each part: linearize, analyze, factorize, solve, update; total.")
+      .def_readonly("notes", &Summary::notes, "Sentences for the user, such as what was anchored.")
+      .def("__repr__",
+           [](const Summary& summary) {
+             const std::string text = to_string(summary);
+             return "<cairn.Summary " + text.substr(0, text.find('\n')) + ">";
+           })
+      .def("__str__", [](const Summary& summary) { return to_string(summary); });
+}
+
+}  // namespace
+
+void bind_optimize(py::module_& module) {
+  bind_iteration(module);
+  bind_summary(module);
+  module.def(
+      "optimize", &optimize, py::arg("graph"), py::arg("optimizer") = "levenberg_marquardt",
+      py::kw_only(), py::arg("initial") = "auto", py::arg("loss") = py::none(),
+      py::arg("loss_on") = "all", py::arg("max_iterations") = Stop().max_iterations,
+      py::arg("tolerance") = Stop().tolerance, py::arg("max_seconds") = 0.0,
+      py::arg("callback") = py::none(),
+      R"(Minimises chi2 over the variables of a graph, and leaves the best estimate found in it.
+
+optimizer: a name of `cairn.components("optimizer")`. Its options are further keyword arguments, such as
+    linear_solver="cholmod" or linear_solver="cholmod:ordering=metis", or follow its name: "dogleg:linear_solver=cholmod".
+initial: the initial estimate, a name of `cairn.components("initial_guess")`. "auto" takes the best by chi2 of the states
+    as given and of the chordal relaxation, and where neither is plausible the incremental estimate too; None: the states
+    as given.
+loss, loss_on: as of `Graph.set_loss`, which is called beforehand; None: each factor keeps the loss that it has.
+max_iterations: largest number of iterations.
+tolerance: stop when a step could lower chi2 by less than this fraction; 0: exactly max_iterations.
+max_seconds: limit of the time; 0: none.
+callback: called with an Iteration after each; when it returns False, the optimisation ends.
+
+Not converging is no exception: see `Summary.status`. Ctrl-C ends it too, with the status "interrupted" and the best
+estimate, and without a KeyboardInterrupt. The interpreter's lock is released meanwhile.)");
+  module.def("set_threads", &set_threads, py::arg("count"),
+             "The number of threads that cairn computes with; 0: all cores. Results do not depend "
+             "on it.");
+}
+
+}  // namespace cairn::python

@@ -1,0 +1,15 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Runs a file of tests with pytest; ends with 77, which is "skipped", where a module is missing."""
+import importlib
+import sys
+
+for module in ["numpy", "pytest"]:
+    try:
+        importlib.import_module(module)
+    except ImportError:
+        print(f"skipped: there is no module {module} (python3-{module}) for {sys.executable}")
+        sys.exit(77)
+
+import pytest
+
+sys.exit(pytest.main(["-q", "-p", "no:cacheprovider", "-W", "error", "-rs", *sys.argv[1:]]))

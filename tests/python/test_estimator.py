@@ -1,0 +1,180 @@
+# SPDX-License-Identifier: BSD-3-Clause
+import copy
+import threading
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+import cairn
+import dense
+from graphs import from_dense
+
+
+def feed(estimator, walk, until=None):
+    """Pose by pose, each placed by its first measurement; returns the reports."""
+    reports = []
+    for k in range(len(walk.poses)):
+        if until is not None and k >= until:
+            break
+        if k == 0:
+            estimator.add(0, cairn.Pose2(), fixed=True)
+        else:
+            estimator.add(k, cairn.Pose2)
+        for i, j, z, information in walk.edges:
+            if max(i, j) == k:
+                estimator.add(cairn.Between(i, j, cairn.Pose2(*z)), information=information)
+        reports.append(estimator.update())
+    return reports
+
+
+@pytest.mark.parametrize("name", ["incremental_cholesky", "batch", "periodic_batch:every=5", "incremental_qr"])
+def test_the_estimate_is_that_of_dense_gauss_newton(name):
+    walk = dense.loop()
+    estimator = cairn.Estimator(name)
+    reports = feed(estimator, walk)
+    reports.append(estimator.update(full=True))
+    assert all(report.ok for report in reports) and reports[-1].converged
+    least = walk.optimize()
+    assert_allclose(estimator.chi2(), least, rtol=1e-8)
+    assert_array_equal(estimator.ids(), np.arange(len(walk.poses)))
+    assert_allclose(estimator.states(cairn.Pose2), walk.poses, atol=1e-5)
+    assert_allclose(estimator.estimate(7).state, walk.poses[7], atol=1e-5)
+
+
+@pytest.mark.parametrize("keep", ["none", "last", "diagonal"])
+def test_covariances_are_those_of_the_dense_inverse(keep):
+    walk = dense.loop()
+    estimator = cairn.Estimator("incremental_cholesky", keep=keep)
+    feed(estimator, walk)
+    estimator.update(full=True)
+    walk.optimize()
+    ids = [24, 3, 11]
+    for k, sigma in zip(ids, estimator.covariance(ids)):
+        assert_allclose(sigma, walk.covariance(k, k), rtol=1e-5, atol=1e-8)
+    assert estimator.covariance(24).shape == (3, 3) and estimator.covariance([24]).shape == (1, 3, 3)
+    assert_allclose(estimator.cross_covariances([[24, 3]])[0], walk.covariance(24, 3), rtol=1e-5, atol=1e-8)
+    assert not estimator.covariance(0).any()  # fixed
+
+
+def test_a_marginalised_variable_leaves_its_information():
+    walk = dense.loop()
+    estimator = cairn.Estimator()
+    feed(estimator, walk)
+    estimator.update(full=True)
+    before = estimator.covariance([20, 24])
+    estimator.marginalize([5, 6])
+    estimator.marginalize(7)
+    report = estimator.update()
+    assert 5 not in estimator and 6 not in estimator and 7 not in estimator and 8 in estimator
+    assert len(report.priors) >= 1
+    assert_allclose(estimator.covariance([20, 24]), before, rtol=1e-4)
+
+
+def test_factors_are_changed_and_removed_by_number():
+    walk = dense.loop()
+    estimator = cairn.Estimator()
+    reports = feed(estimator, walk)
+    assert estimator.factors == list(range(len(walk.edges)))
+    first = reports[-1].first_factor  # of pose 24: its odometry, then the loop closure
+    i, j, z, information = walk.edges[first + 1]
+    estimator.change(first + 1, z + [0.1, 0, 0], information=2 * information)
+    estimator.remove(factors=first - 1)
+    estimator.update(full=True)
+    walk.edges[first + 1] = (i, j, z + [0.1, 0, 0], 2 * information)
+    del walk.edges[first - 1]
+    assert_allclose(estimator.chi2(), walk.optimize(), rtol=1e-8)
+    estimator.remove(variables=[24])
+    estimator.update()
+    assert estimator.variable_count == 24 and estimator.factor_count == len(walk.edges) - 2
+
+
+def test_a_copy_is_independent_and_takes_along_what_is_pending():
+    walk = dense.loop()
+    estimator = cairn.Estimator()
+    feed(estimator, walk)
+    chi2 = estimator.chi2()
+    estimator.add(99, cairn.Pose2(1, 1, 1))
+    for other in [estimator.copy(), copy.copy(estimator), copy.deepcopy(estimator)]:
+        other.add(cairn.Between(24, 99, cairn.Pose2(1, 0, 0)), sigmas=0.1)
+        other.add(cairn.Between(99, 3, cairn.Pose2(5, 0, 0)), sigmas=0.1)
+        other.update()
+        assert 99 in other and other.chi2() > chi2 + 1
+    assert 99 not in estimator and estimator.chi2() == chi2
+
+
+def test_its_graph_is_an_ordinary_one():
+    walk = dense.loop()
+    estimator = cairn.Estimator()
+    feed(estimator, walk)
+    graph = estimator.graph()
+    assert_allclose(graph.chi2(), estimator.chi2(), rtol=1e-12)
+    graph.fix(0)
+    assert_allclose(cairn.optimize(graph, initial=None).chi2, cairn.optimize(from_dense(walk), initial=None).chi2, rtol=1e-9)
+
+
+def test_an_error_leaves_it_as_it_was_and_forgets_the_update():
+    walk = dense.loop()
+    estimator = cairn.Estimator()
+    feed(estimator, walk)
+    chi2 = estimator.chi2()
+    estimator.add(50, cairn.Pose2)
+    estimator.add(cairn.Between(24, 51, cairn.Pose2()), sigmas=0.1)
+    with pytest.raises(cairn.Error, match="51") as raised:
+        estimator.update()
+    assert raised.value.kind == "input"
+    assert estimator.chi2() == chi2 and 50 not in estimator
+    assert estimator.update().ok and estimator.chi2() == chi2  # nothing is left of it
+    for call, message in [
+        (lambda: estimator.estimate(77), "77"),
+        (lambda: estimator.covariance([77]), "77"),
+        (lambda: estimator.states("VERTEX_XY"), "there is no VERTEX_XY in the estimator"),
+        (lambda: estimator.update(max_seconds=-1), "max_seconds"),
+        (lambda: cairn.Estimator("incremental_cholesky", keep="all"), "expected 'none', 'last' or 'diagonal'"),
+        (lambda: cairn.Estimator("isam2"), "incremental_cholesky"),
+        (lambda: cairn.Estimator("periodic_batch", evry=3), "every"),
+        (lambda: estimator.add(52), "a type is given by its tag"),
+    ]:
+        with pytest.raises(cairn.Error, match=message):
+            call()
+
+
+def test_a_loss_holds_a_wrong_loop_closure_off():
+    walk = dense.loop()
+    estimators = [cairn.Estimator(), cairn.Estimator()]
+    estimators[1].set_loss("cauchy:scale=1", on="loops")
+    for estimator in estimators:
+        feed(estimator, walk)
+        estimator.add(cairn.Between(3, 9, cairn.Pose2(9, 9, 0)), sigmas=0.1)
+        estimator.update(full=True)
+    walk.optimize()
+    errors = [np.abs(estimator.states(cairn.Pose2) - walk.poses)[:, :2].max() for estimator in estimators]
+    assert errors[1] < 0.3 and errors[0] > 2
+
+
+def test_other_threads_run_during_an_update():
+    graph, _ = cairn.generate("manhattan", seed=1, poses=3000)
+    estimator = cairn.Estimator("batch")
+    ids, states = graph.ids(cairn.Pose2), graph.states(cairn.Pose2)
+    for id, state in zip(ids, states):
+        estimator.add(id, state, type=cairn.Pose2)
+    for pair, z, omega in zip(graph.factor_ids("EDGE_SE2"), graph.measurements("EDGE_SE2"), graph.information("EDGE_SE2")):
+        estimator.add(cairn.Measurement("EDGE_SE2", pair, z), information=omega)
+    done, refused, ticks = threading.Event(), [], [0]
+
+    def work():
+        estimator.update(full=True)
+        done.set()
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    while not done.is_set():
+        ticks[0] += 1
+        try:
+            estimator.variable_count
+        except cairn.Error as error:
+            refused.append(str(error))
+        done.wait(1e-4)
+    thread.join()
+    assert ticks[0] > 1 and any("in use by a call in another thread" in message for message in refused)
+    assert estimator.variable_count == 3000

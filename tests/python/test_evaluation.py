@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: BSD-3-Clause
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import cairn
+import dense
+
+
+def trajectory(poses):
+    graph = cairn.Graph()
+    graph.add_variables(cairn.Pose2, np.arange(len(poses)), poses)
+    return graph
+
+
+def test_a_rigid_motion_is_no_error():
+    poses = dense.loop().poses
+    moved = np.array([dense.compose(np.array([3.0, -2.0, 1.0]), pose) for pose in poses])
+    error = cairn.evaluate(trajectory(moved), trajectory(poses))
+    assert error.poses == len(poses)
+    assert_allclose([error.ate_translation, error.rpe_translation, error.rpe_all_translation], 0, atol=1e-12)
+
+
+def test_errors_are_root_mean_squares():
+    # A straight line; the middle pose is 0.3 m beside it. By hand, after the best rigid motion:
+    truth = np.array([[-1.0, 0, 0], [0, 0, 0], [1, 0, 0]])
+    estimate = truth + [[0, 0, 0], [0, 0.3, 0], [0, 0, 0]]
+    error = cairn.evaluate(trajectory(estimate), trajectory(truth))
+    assert_allclose(error.ate_translation, np.sqrt((0.1**2 + 0.2**2 + 0.1**2) / 3), rtol=1e-9)
+    # From a to the middle and from there to b the way is 0.3 m off, of two pairs.
+    assert_allclose(error.rpe_translation, 0.3, rtol=1e-9)
+    assert_allclose(error.rpe_all_translation, np.sqrt(2 * 0.3**2 / 3), rtol=1e-9)
+    assert_allclose(error.ate_rotation, 0, atol=1e-9)
+
+
+def test_optimising_brings_the_estimate_nearer_to_the_truth():
+    graph, truth = cairn.generate("manhattan", seed=2, poses=400)
+    before = cairn.evaluate(graph, truth).ate_translation
+    cairn.optimize(graph)
+    assert cairn.evaluate(graph, truth).ate_translation < 0.5 * before
+
+
+def test_files_with_time_stamps_are_paired_by_time(tmp_path):
+    (tmp_path / "truth.tum").write_text("".join(f"{0.5 * k} {k} 0 0 0 0 0 1\n" for k in range(6)))
+    (tmp_path / "estimate.tum").write_text("".join(f"{0.5 * k + 0.001} {k} {0.1 * (k == 3)} 0 0 0 0 1\n" for k in range(1, 6)))
+    estimate, truth = (cairn.read(tmp_path / f"{name}.tum") for name in ["estimate", "truth"])
+    assert_allclose(truth.stamps, 0.5 * np.arange(6))
+    assert cairn.evaluate(estimate, truth, match="stamp").poses == 5
+    assert cairn.evaluate(estimate, truth).rpe_translation < 0.2  # pose k beside pose k
+    assert_allclose(cairn.evaluate(estimate, truth, match="id").ate_translation, cairn.evaluate(estimate, truth, match="stamp").ate_translation, rtol=0.5)
+    with pytest.raises(cairn.Error, match="the truth has no time stamps"):
+        cairn.evaluate(estimate, trajectory(dense.loop().poses), match="stamp")
+    with pytest.raises(cairn.Error, match="expected 'auto', 'id' or 'stamp'"):
+        cairn.evaluate(estimate, truth, match="time")
+
+
+def test_less_than_two_common_poses_are_an_error():
+    with pytest.raises(cairn.Error):
+        cairn.evaluate(trajectory(np.zeros((1, 3))), trajectory(np.zeros((5, 3))))

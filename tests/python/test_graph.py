@@ -1,0 +1,127 @@
+# SPDX-License-Identifier: BSD-3-Clause
+import copy
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import cairn
+import dense
+from graphs import from_dense
+
+
+def small():
+    graph = cairn.Graph()
+    graph.add(cairn.X(0), cairn.Pose2(), fixed=True)
+    graph.add(cairn.X(1), cairn.Pose2(1, 0, 0))
+    graph.add(cairn.L(0), cairn.Point2(3, 1))
+    graph.add(cairn.Between(cairn.X(0), cairn.X(1), cairn.Pose2(1.1, 0, 0)), sigmas=[0.1, 0.1, 0.05])
+    graph.add(cairn.Observation(cairn.X(0), cairn.L(0), cairn.Point2(3.1, 0.9)), sigmas=0.2)
+    graph.add(cairn.BearingRange(cairn.X(1), cairn.L(0), 0.45, 2.2), sigmas=[0.02, 0.1])
+    return graph
+
+
+def test_what_was_added_is_there():
+    graph = small()
+    assert graph.variable_types == {"VERTEX_SE2": 2, "VERTEX_XY": 1}
+    assert graph.factor_types == {"EDGE_SE2": 1, "EDGE_SE2_XY": 1, "EDGE_BEARING_RANGE_SE2_XY": 1}
+    assert graph.at(cairn.X(1)).equals(cairn.Pose2(1, 0, 0))
+    assert isinstance(graph.at(cairn.L(0)), cairn.Point2)
+    assert graph.fixed == [cairn.X(0)]
+    assert cairn.X(1) in graph and cairn.X(2) not in graph
+    assert graph.factor(0).ids == [cairn.X(0), cairn.X(1)]
+    assert repr(graph.factor(0)) == "<EDGE_SE2 x0 x1: 1.1 0 0>"
+    assert repr(graph).startswith("<cairn.Graph: 3 variables (2 VERTEX_SE2, 1 VERTEX_XY), 3 factors")
+
+
+def test_chi2_is_that_of_the_definition():
+    graph = small()
+    bearing, distance = np.arctan2(1, 2), np.hypot(1, 2)
+    by_hand = [(0.1 / 0.1) ** 2, 2 * (0.1 / 0.2) ** 2, ((bearing - 0.45) / 0.02) ** 2 + ((distance - 2.2) / 0.1) ** 2]
+    assert_allclose(graph.squared_norms(), by_hand, rtol=1e-12)
+    assert_allclose(graph.chi2(), sum(by_hand), rtol=1e-12)
+    walk = dense.loop()
+    walk.poses[1:] += 0.1
+    assert_allclose(from_dense(walk).chi2(), walk.chi2(), rtol=1e-12)
+
+
+def test_information_is_given_in_three_ways():
+    sigmas = np.array([0.1, 0.2, 0.05])
+    ways = [{"sigmas": sigmas}, {"information": np.diag(sigmas**-2)}, {"covariance": np.diag(sigmas**2)}]
+    for way in ways:
+        graph = small()
+        graph.add(cairn.Prior(cairn.X(1), cairn.Pose2(0, 0, 0.3)), **way)
+        assert_allclose(graph.squared_norms()[-1], (np.cos(0.3) / 0.1) ** 2 + (np.sin(0.3) / 0.2) ** 2 + (0.3 / 0.05) ** 2, rtol=1e-12)
+    for way, message in [
+        ({}, "how certain is the measurement"),
+        ({"sigmas": 1, "information": np.eye(3)}, "not several"),
+        ({"sigmas": [1, 2]}, r"sigmas: the shape is \(2,\)"),
+        ({"information": np.eye(2)}, r"information: the shape is \(2, 2\), expected \(3, 3\)"),
+        ({"information": -np.eye(3)}, "not positive"),
+        ({"information": np.triu(np.ones((3, 3)))}, "symmetric"),
+        ({"sigmas": "wide"}, "sigmas: expected numbers"),
+    ]:
+        with pytest.raises(cairn.Error, match=message):
+            small().add(cairn.Prior(cairn.X(1), cairn.Pose2()), **way)
+
+
+def test_what_is_not_measured_has_an_infinite_sigma():
+    graph = small()
+    graph.add(cairn.Prior(cairn.X(1), cairn.Pose2(0, 0, 2.5)), sigmas=[0.5, 0.5, np.inf])
+    assert_allclose(graph.squared_norms()[-1], 4)
+
+
+def test_any_type_goes_by_its_tag():
+    graph = cairn.Graph()
+    graph.add(0, [0, 0, 0], type="VERTEX_SE2")
+    graph.add(1, [1, 0, 0], type=cairn.Pose2)
+    graph.add(cairn.Measurement("EDGE_SE2", [0, 1], [1, 0, 0.5]), sigmas=1)
+    assert_allclose(graph.chi2(), 0.25)
+    with pytest.raises(cairn.Error, match="EDGE_SE2"):
+        graph.add(cairn.Measurement("EDGE_SE22", [0, 1], [1, 0, 0.5]), sigmas=1)
+
+
+def test_a_loss_is_of_its_factor():
+    graph = small()
+    graph.add(cairn.Between(cairn.X(0), cairn.X(1), cairn.Pose2(3, 0, 0)), sigmas=1, loss="huber:scale=1")
+    without = graph.squared_norms().sum()
+    assert_allclose(graph.chi2(), without - 4 + (2 * 2 - 1))  # rho(s) = 2 sqrt(s) - 1 beyond 1
+    graph.set_loss(None)
+    assert_allclose(graph.chi2(), without)
+    graph.set_loss("cauchy:scale=2", on="EDGE_SE2_XY")
+    assert_allclose(graph.chi2(), without - 0.5 + 4 * np.log1p(0.5 / 4))
+    with pytest.raises(cairn.Error, match="neither 'all', 'loops' nor a type of factors"):
+        graph.set_loss("cauchy", on="EDGE")
+
+
+def test_removal_takes_the_factors_along():
+    graph = small()
+    graph.remove(variables=[cairn.L(0)])
+    assert graph.factor_types == {"EDGE_SE2": 1}
+    graph.remove(factors=[0])
+    assert graph.factor_count == 0 and graph.variable_count == 2
+    for call in [dict(factors=[7]), dict(variables=[7])]:
+        with pytest.raises(cairn.Error, match="there is no"):
+            graph.remove(**call)
+
+
+def test_copies_are_independent():
+    graph = small()
+    for other in [graph.copy(), copy.copy(graph), copy.deepcopy(graph)]:
+        other.fix(cairn.X(1))
+        other.remove(factors=[0])
+        assert graph.factor_count == 3 and graph.fixed == [cairn.X(0)]
+    graph.fix([cairn.X(0), cairn.X(1)], False)
+    assert graph.fixed == []
+
+
+def test_errors_carry_the_message_and_the_kind():
+    graph = small()
+    with pytest.raises(cairn.Error, match="VERTEX_SE2 .*: the id is already that of VERTEX_SE2 x1") as raised:
+        graph.add(cairn.X(1), cairn.Pose2())
+    assert raised.value.kind == "input" and isinstance(raised.value, RuntimeError)
+    with pytest.raises(cairn.Error, match="there is no variable x7 in the graph") as raised:
+        graph.at(cairn.X(7))
+    assert raised.value.kind == "usage"
+    with pytest.raises(cairn.Error, match="there is no factor 12"):
+        graph.factor(12)
