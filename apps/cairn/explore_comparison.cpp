@@ -28,7 +28,7 @@ class ComparisonProgress {
       : explorers_(explorers),
         all_(static_cast<int>(explorers.size()) * runs),
         line_(session.common.quiet) {
-    if (line_.on_terminal()) line_.show(fmt::format("0 of {} runs", all_));
+    line_.show(fmt::format("0 of {} runs", all_));
   }
 
   void ended(const ComparedRun& run) {

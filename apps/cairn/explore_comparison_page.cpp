@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The page of `cairn explore --html`: tables, and curves as images within it.
 #include <algorithm>
+#include <cmath>
 #include <string_view>
 
 #include <fmt/format.h>
@@ -48,16 +49,28 @@ std::string base64(std::string_view bytes) {
   return text;
 }
 
-/// Columns against one of them, drawn by `cairn plot`.
-std::string chart(const NumberTable& table, const std::string& x, const std::string& columns,
-                  const std::string& title, Session& session) {
-  Album album = begin_album(title, "");
+bool has_numbers(const NumberTable& table, std::string_view quantity) {
+  return std::ranges::any_of(table.columns, [&](const NumberTable::Column& column) {
+    return column.name.starts_with(quantity) &&
+           std::ranges::any_of(column.values, [](double value) { return std::isfinite(value); });
+  });
+}
+
+/// A quantity of all explorers against `x`, drawn by `cairn plot`; nothing where it is of no run,
+/// since none was finished.
+std::string chart(const NumberTable& table, const std::string& x, const std::string& quantity,
+                  Session& session) {
+  if (!has_numbers(table, quantity + " ")) return "";
+  Album album = begin_album(quantity, "");
   album.tables.push_back(table);
-  const ComponentSpec picture{
-      "svg",
-      {{"what", "columns"}, {"x", x}, {"y_columns", columns}, {"width", "760"}, {"height", "380"}}};
+  const ComponentSpec picture{"svg",
+                              {{"what", "columns"},
+                               {"x", x},
+                               {"y_columns", quantity + " *"},
+                               {"width", "760"},
+                               {"height", "380"}}};
   return fmt::format("<figure><img alt=\"{}\" src=\"data:image/svg+xml;base64,{}\"></figure>\n",
-                     escaped(title), base64(draw_picture(album, picture, session)));
+                     escaped(quantity), base64(draw_picture(album, picture, session)));
 }
 
 std::string charts(const ExploreComparison& comparison, Session& session) {
@@ -66,14 +79,14 @@ std::string charts(const ExploreComparison& comparison, Session& session) {
   std::string text;
   const NumberTable distance = curves_over_distance(comparison);
   for (const char* quantity : {"map_entropy", "trajectory_entropy", "coverage"})
-    text += chart(distance, "distance", fmt::format("{} *", quantity), quantity, session);
+    text += chart(distance, "distance", quantity, session);
   const NumberTable coverage = curves_over_coverage(comparison);
-  text += chart(coverage, "known", "map_error *", "map_error", session);
+  text += chart(coverage, "known", "map_error", session);
   const bool against = std::ranges::any_of(comparison.outcomes, [](const ComparedRun& run) {
     return run.done && !run.samples.empty() && run.samples.front().against.has_value();
   });
-  if (against) text += chart(coverage, "seen", "wrong *", "wrong", session);
-  return text;
+  if (against) text += chart(coverage, "seen", "wrong", session);
+  return text.empty() ? "<p>No run was finished.</p>\n" : text;
 }
 
 std::string means_table(const ExploreComparison& comparison) {

@@ -3,14 +3,17 @@
 
 #include <yaml-cpp/yaml.h>
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <string>
+#include <vector>
 
 #include <fmt/core.h>
 
 #include "cairn/io/format.hpp"
 #include "cairn/runtime/error.hpp"
+#include "cairn/runtime/spelling.hpp"
 
 namespace cairn::grids {
 namespace {
@@ -31,6 +34,7 @@ class MapKeys {
       fail(fmt::format("line {}: no YAML: {}", error.mark.line + 1, error.msg));
     }
     if (!keys_.IsMap()) fail("expected the keys image, resolution and origin");
+    check_names();
   }
 
   bool has(const char* key) const { return keys_[key].IsDefined(); }
@@ -63,6 +67,25 @@ class MapKeys {
   }
 
  private:
+  /// Each key once: which of two counts is not known. Others have keys of their own, which are left
+  /// alone, unless one is nearly one of these.
+  void check_names() const {
+    const std::vector<std::string> known{"image",           "resolution",  "origin", "negate",
+                                         "occupied_thresh", "free_thresh", "mode"};
+    std::vector<std::string> met;
+    for (const auto& entry : keys_) {
+      if (!entry.first.IsScalar()) continue;
+      const std::string& name = entry.first.Scalar();
+      const int line = entry.first.Mark().line + 1;
+      if (std::ranges::find(met, name) != met.end())
+        fail(fmt::format("line {}: {} is given twice", line, name));
+      met.push_back(name);
+      if (std::ranges::find(known, name) != known.end()) continue;
+      if (const std::string nearest = nearest_spelling(name, known); !nearest.empty())
+        fail(fmt::format("line {}: there is no key '{}'; did you mean '{}'?", line, name, nearest));
+    }
+  }
+
   template <class T>
   T convert(const YAML::Node& node, const char* key, const char* expected) const {
     T value{};

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
+#include <csignal>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -180,6 +181,17 @@ TEST_F(Explore, AComparisonIsWrittenAsRowsCurvesAndAPage) {
   }
   EXPECT_NEAR(mean.at("mean").to_number<double>(), 0.5 * sum, 1e-12);
   EXPECT_EQ(mean.at("count"), 2);
+}
+
+TEST_F(Explore, AComparisonThatIsInterruptedIsWrittenAsFarAsItIs) {
+  const std::string page = folder_.file("compare.html"), report = folder_.file("compare.json");
+  const Outcome run = cairn_interrupted(
+      {"explore", "@rooms:width=100,height=100", "--registration", kMatcher, "--runs", "2", "--csv",
+       folder_.file("runs.csv"), "--html", page, "--json", report, "--threads", "2"},
+      "0 of 2 runs", SIGTERM);
+  EXPECT_EQ(run.exit_code, 130) << run.err;
+  EXPECT_THAT(read_text(page), HasSubstr("No run was finished."));
+  EXPECT_EQ(parse_json(read_text(report)).at("runs").as_array().size(), 2);
 }
 
 TEST_F(Explore, ARunWithABudgetSaysThatItCannotBeRepeated) {

@@ -67,7 +67,7 @@ Journal::Journal(std::filesystem::path file, std::string identity, Sync sync)
 Journal::~Journal() {
   try {
     commit();
-  } catch (const Error&) {  // a caller that needs to know calls commit
+  } catch (...) {  // a caller that needs to know calls commit
   }
   ::close(descriptor_);
 }
