@@ -21,8 +21,7 @@ class AbsoluteMeasurement {
     Eigen::MatrixXd J;
   };
 
-  /// Throws `Error` (input) for a factor that is not on this one pose, or whose numbers a graph
-  /// would not take either.
+  /// Throws `Error` (input) for a factor that is not on this pose alone, or that is not valid.
   AbsoluteMeasurement(const Factor& factor, Id pose, const VariableType& type);
 
   const Factor& factor() const { return factor_; }
@@ -35,7 +34,7 @@ class AbsoluteMeasurement {
   std::vector<double> root_;  ///< of its information
 };
 
-/// How a measurement compares with what is known of its pose: its residual e ~ N(0, V), whitened,
+/// How a measurement compares with the estimate of its pose: its residual e ~ N(0, V), whitened,
 /// V = I + J Σ Jᵀ.
 struct AbsoluteFit {
   double gain = 0.0;        ///< ½ ln |V|: the entropy that the state loses by it [nats]

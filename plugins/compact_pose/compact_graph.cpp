@@ -169,7 +169,7 @@ void CompactGraph::end_chain(Id from, Id to) {
   newest_.steps.clear();
 }
 
-/// A way that is too long ago to be told apart is a part of the bridge that it belongs to.
+/// A way that is too long ago to be remembered is a part of the bridge that it belongs to.
 void CompactGraph::close_way(Id to, Way::Became became) {
   ways_.close(to, became);
   if (ways_.all().size() <= Ways::kMost) return;

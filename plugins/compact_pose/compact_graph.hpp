@@ -101,7 +101,7 @@ class CompactGraph {
   /// Takes the link, or links, between two poses out, of which one is kept: what is left is as if
   /// there had never been one, except that the same poses are kept and that the information of
   /// other matches is divided as it was. False if there is none (any more). Throws `Error` (input),
-  /// and changes nothing, where it cannot be told apart from other measurements any more, or is all
+  /// and changes nothing, where it cannot be separated from other measurements any more, or is all
   /// that connects a trajectory to its map.
   bool revoke(Id a, Id b, PolicySeconds& seconds);
   /// Whether poses have left: there is no room for more than there are.

@@ -62,7 +62,7 @@ bool CompactGraph::revoke(Id a, Id b, PolicySeconds& seconds) {
       if (ways_.all()[change->first + k].became != Way::Became::merged) continue;
       refuse(a, b,
              "is part of factors that have taken the place of poses which left the map, and cannot "
-             "be told apart from them");
+             "be separated from them");
     }
     bridges = replace_ways(*change, leaving);
   }

@@ -49,7 +49,8 @@ void TypicalMatch::note(const Matrix& covariance) {
 }
 
 void TypicalMatch::forget(const Matrix& covariance) {
-  std::ranges::rotate(latest_, latest_.begin() + static_cast<std::ptrdiff_t>(oldest_));
+  std::rotate(latest_.begin(), latest_.begin() + static_cast<std::ptrdiff_t>(oldest_),
+              latest_.end());
   oldest_ = 0;  // the ring has room again, or begins there
   const auto found = std::ranges::find(latest_, covariance);
   if (found == latest_.end()) return;

@@ -38,7 +38,7 @@ struct Way {
     odometry,  ///< the factor between the two poses
     bridge,    ///< a part of the factor between the two
     nothing,   ///< it was not informative enough
-    merged     ///< what cannot be told apart any more
+    merged     ///< its factors cannot be separated any more
   };
 
   Id from = 0, to = 0;
@@ -53,7 +53,7 @@ struct Way {
 
 /// `of_way`, or all, of the information of a match.
 Motion part_of(const Motion& match, double of_way);
-/// From `from` to the pose where the way ends, without the match there.
+/// From `from` to the last pose of the way, without the match there.
 Motion motion_of(const Way& way, const MotionGroup& group, CompositionOrder order);
 
 /// The latest ways, in their order, whose links can be revoked: those that begin or end with a

@@ -143,10 +143,11 @@ void check_factors(const Graph& graph) {
 /// Moves factors on one pose from the links to the priors.
 void separate_priors(const Graph& graph, std::vector<Arrival>& chain) {
   for (Arrival& arrival : chain) {
-    const auto priors = std::ranges::stable_partition(
-        arrival.links, [&](int f) { return graph.factor_variables(f).size() > 1; });
-    arrival.priors.assign(priors.begin(), priors.end());
-    arrival.links.erase(priors.begin(), priors.end());
+    const auto priors =
+        std::stable_partition(arrival.links.begin(), arrival.links.end(),
+                              [&](int f) { return graph.factor_variables(f).size() > 1; });
+    arrival.priors.assign(priors, arrival.links.end());
+    arrival.links.erase(priors, arrival.links.end());
   }
 }
 

@@ -368,7 +368,7 @@ TEST(RevokingWherePosesLeave, IsRefusedWhereItCannotBeToldApart) {
         (policy->revoke(links[k].first, links[k].second) ? revoked : gone) += 1;
       } catch (const Error& error) {
         EXPECT_EQ(error.code(), ErrorCode::input);
-        EXPECT_THAT(error.what(), HasSubstr("cannot be told apart"));
+        EXPECT_THAT(error.what(), HasSubstr("cannot be separated"));
         EXPECT_EQ(policy->factor_count(), factors);
         ++refused;
       }

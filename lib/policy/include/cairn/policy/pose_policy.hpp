@@ -116,7 +116,7 @@ class CAIRN_API PosePolicy : public Component {
   /// Takes a link back that was false: the graph is as if there had never been one between these
   /// two poses, and so is what was learnt from it; which poses are kept stays as it was decided. At
   /// any time; one that waits waits no more. False if there is no such link. Throws `Error`
-  /// (input), and changes nothing, if it cannot be told apart from other measurements any more;
+  /// (input), and changes nothing, if it cannot be separated from other measurements any more;
   /// (usage) unless a policy overrides it.
   virtual bool revoke(Id a, Id b);
   /// Ends the pose: decides whether to keep it.
