@@ -16,15 +16,18 @@ import sys
 
 
 class Recording:
-    """A g2o file with poses (VERTEX_SE2, VERTEX_SE3:QUAT) and motions between them."""
+    """A g2o file with poses (VERTEX_SE2, VERTEX_SE3:QUAT), motions between them, and absolute
+    measurements of them (EDGE_PRIOR_SE2, EDGE_PRIOR_SE3:QUAT)."""
 
     def __init__(self, file):
-        self.poses, self.fixed, self.measured = {}, set(), {}
+        self.poses, self.fixed, self.measured, self.priors = {}, set(), {}, {}
         with open(file, encoding="utf-8") as lines:
             for line in lines:
                 words = line.split()
                 if line.startswith("VERTEX"):
                     self.poses[int(words[1])] = line
+                elif line.startswith("EDGE_PRIOR"):
+                    self.priors.setdefault(int(words[1]), []).append(line)
                 elif line.startswith("EDGE"):
                     pair = frozenset((int(words[1]), int(words[2])))
                     self.measured.setdefault(pair, []).append(line)
@@ -95,6 +98,7 @@ def main():
             asked += 1
             measured = recording.match(int(match[1]), int(match[2]))
             cairn.tell(measured or [f"NOMATCH {match[1]} {match[2]}\n"])
+        cairn.tell(recording.priors.get(pose, []))
         for words in cairn.ask("DONE"):
             linked += words[0] == "LINKED"
             if words[0] == "KEPT":

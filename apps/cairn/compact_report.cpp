@@ -70,6 +70,7 @@ json::object result_json(const PolicyResult& result, const PolicyData& data) {
                      {"kept", result.kept_loops},
                      {"false_registered", result.false_registered},
                      {"false_kept", result.false_kept}};
+  report["priors"] = {{"in", data.priors}, {"kept", result.kept_priors}};
   json::object verdicts;
   for (const auto& [name, count] : result.verdicts) verdicts[name] = count;
   report["verdicts"] = std::move(verdicts);
@@ -120,6 +121,10 @@ void add_result(Table& table, const PolicyResult& result, const PolicyData& data
   table.add({"loops", fmt::format("{} kept ({} of {} recorded); {} pairs matched, {} of them well",
                                   result.kept_loops, percent(result.kept_loops, data.loops),
                                   data.loops, result.proposed, result.registered)});
+  if (data.priors > 0) {
+    table.add({"priors", fmt::format("{} of {} kept ({})", result.kept_priors, data.priors,
+                                     percent(result.kept_priors, data.priors))});
+  }
   const StepTimes times(step_seconds(result));
   table.add(
       {"time",

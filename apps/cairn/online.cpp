@@ -117,6 +117,7 @@ json::object report_json(const OnlineOptions& options, const Conversation::Count
     report["poses"] = {{"in", kept.poses}, {"kept", lines.variable_count()}};
     report["loops"] = {
         {"proposed", kept.proposed}, {"registered", kept.registered}, {"kept", kept.linked}};
+    report["priors"] = {{"kept", kept.priors}};
   }
   report["lines"] = {{"read", counts.lines},
                      {"taken", counts.taken},

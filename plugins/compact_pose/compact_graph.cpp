@@ -35,11 +35,12 @@ void CompactGraph::load(const Graph& map) {
                          map.describe_variable(0), map.describe_variable(v)));
     }
   }
-  if (const int parts = resolve_gauge(map).components; parts != 1) {
+  const Gauge gauge = resolve_gauge(map);
+  if (gauge.components != 1) {
     refuse(
         fmt::format("the map has {} parts without a measurement between them; expected one, "
                     "since nothing is known of their relative position",
-                    parts));
+                    gauge.components));
   }
   auto group = std::make_unique<RigidGroup>(map.variable_pools().front().type);
   std::vector<int> order(static_cast<std::size_t>(map.variable_count()));
@@ -58,6 +59,7 @@ void CompactGraph::load(const Graph& map) {
   }
   map_size_ = solved_ = size();
   located_ = false;
+  referenced_ = gauge.anchored.empty() && gauge.left_free.empty();
 }
 
 void CompactGraph::start(const Variable& pose, PolicySeconds& seconds) {
@@ -65,6 +67,7 @@ void CompactGraph::start(const Variable& pose, PolicySeconds& seconds) {
   auto group = std::make_unique<RigidGroup>(pose.type);
   Variable first = pose;
   if (!located_) first.fixed = false;  // where it is held is not known
+  referenced_ = referenced_ || first.fixed;
   if (first.state.empty()) {
     first.state.resize(static_cast<std::size_t>(pose.type->ambient_size()));
     pose.type->identity(first.state.data());
@@ -123,6 +126,8 @@ void CompactGraph::advance(const Variable& pose, const Motion& motion,
   if (!newest_.kept) next.steps = std::move(newest_.steps);
   if (keeps_chains_) next.steps.push_back({pose.id, motion.mean, motion.covariance});
   next.ahead = compose(kept_[next.predecessor].ahead, next.odometry);
+  if (newest_.kept) ways_.begin(newest_.pose.id);
+  ways_.add_odometry(motion, group_->motions(), order_);
   newest_ = std::move(next);
   newest_.placed = group_->place(
       group_->compose(kept_[newest_.predecessor].placed.x, group_->state(newest_.odometry.mean)));
@@ -148,11 +153,14 @@ void CompactGraph::keep(PolicySeconds& seconds) {
   pose.odometry =
       group_->motions().to_factor(newest_.type, from, newest_.pose.id, newest_.odometry);
   end_chain(from, newest_.pose.id);
+  close_way(newest_.pose.id, Way::Became::odometry);
   number_.emplace(pose.id, size());
   index_->add(newest_.placed.at.t);
   kept_.push_back(std::move(pose));
   newest_.kept = true;
-  if (newest_.pose.fixed) update({}, seconds);  // which is more than odometry
+  if (!newest_.pose.fixed) return;
+  referenced_ = true;
+  update({}, seconds);  // which is more than odometry
 }
 
 /// The steps of the newest pose lead to one that is kept.
@@ -161,9 +169,32 @@ void CompactGraph::end_chain(Id from, Id to) {
   newest_.steps.clear();
 }
 
+/// A way that is too long ago to be remembered is a part of the bridge that it belongs to.
+void CompactGraph::close_way(Id to, Way::Became became) {
+  ways_.close(to, became);
+  if (ways_.all().size() <= Ways::kMost) return;
+  const Way& oldest = ways_.all().front();
+  const auto known = oldest.became == Way::Became::bridge
+                         ? bridges_.find(std::minmax(find(oldest.from), find(oldest.to)))
+                         : bridges_.end();
+  if (known != bridges_.end()) {
+    std::optional<Motion>& rest = known->second.rest;
+    rest = rest ? group_->motions().fuse(*rest, oldest.bridge) : oldest.bridge;
+  }
+  ways_.all().pop_front();
+}
+
 void CompactGraph::link(std::span<const Factor> links, PolicySeconds& seconds) {
   keep(seconds);
-  update(links, seconds);
+  note_links(links, update(links, seconds));
+}
+
+void CompactGraph::note_links(std::span<const Factor> links, FactorId first) {
+  for (const Factor& link : links) {
+    const FactorId id = first++;
+    if (link.variables.size() != 2) continue;
+    links_[std::minmax(link.variables[0], link.variables[1])].push_back(id);
+  }
 }
 
 void CompactGraph::locate(int pose, const State& measured, std::span<const Factor> links,
@@ -173,8 +204,29 @@ void CompactGraph::locate(int pose, const State& measured, std::span<const Facto
   const auto begin = Clock::now();
   const State move = group_->compose(group_->compose(kept_[pose].placed.x, measured),
                                      group_->inverse(kept_.back().placed.x));
+  move_poses(map_size_, move, links);
+  located_ = true;
+  refresh();
+  seconds.estimate += seconds_since(begin);
+}
+
+void CompactGraph::refer(const State& move, std::span<const Factor> priors,
+                         PolicySeconds& seconds) {
+  keep(seconds);
+  update({}, seconds);
+  const auto begin = Clock::now();
+  move_poses(0, move, priors);
+  estimator_->update({}, {.full = true});
+  referenced_ = true;
+  refresh();
+  seconds.estimate += seconds_since(begin);
+}
+
+/// Moves the poses from this number on, which have no factors with those before, and adds factors.
+/// The estimator must have all of them.
+void CompactGraph::move_poses(int first, const State& move, std::span<const Factor> factors) {
   GraphUpdate leaving, coming;
-  for (int k = map_size_; k < size(); ++k) {
+  for (int k = first; k < size(); ++k) {
     const State moved = group_->compose(move, kept_[k].placed.x);
     const auto state = group_->view(moved);
     leaving.removed_variables.push_back(kept_[k].id);
@@ -185,27 +237,37 @@ void CompactGraph::locate(int pose, const State& measured, std::span<const Facto
   std::unordered_map<FactorId, FactorId> place;  // in `coming`
   for (const FactorId id : estimator_->factors()) {
     Factor factor = estimator_->factor(id);
-    if (find(factor.variables.front()) < map_size_) continue;
+    if (find(factor.variables.front()) < first) continue;
     place.emplace(id, std::ssize(coming.factors));
     coming.factors.push_back(std::move(factor));
   }
-  coming.factors.insert(coming.factors.end(), links.begin(), links.end());
+  const auto old_factors = std::ssize(coming.factors);
+  coming.factors.insert(coming.factors.end(), factors.begin(), factors.end());
   estimator_->update(leaving, {.defer = true});
   const UpdateReport report = estimator_->update(coming);
   copy_.reset();
+  for (auto& [ends, ids] : links_) {
+    for (FactorId& id : ids) {
+      if (const auto at = place.find(id); at != place.end()) id = report.first_factor + at->second;
+    }
+  }
+  note_links(factors, report.first_factor + old_factors);
   for (auto& [ends, bridge] : bridges_) {  // those between poses of the map are where they were
     if (const auto at = place.find(bridge.factor); at != place.end())
       bridge.factor = report.first_factor + at->second;
   }
-  located_ = true;
-  refresh();
-  seconds.estimate += seconds_since(begin);
 }
 
 void CompactGraph::relocate(int pose, const Motion& measured, double of_way, double least_gain,
                             PolicySeconds& seconds) {
   const MotionGroup& motions = group_->motions();
+  WayPart match{.motion = measured,
+                .pose = newest_.pose.id,
+                .kept = kept_[pose].id,
+                .matched = true,
+                .of_way = of_way};
   if (pose == newest_.predecessor) {  // another measurement of the same motion
+    ways_.open().parts.push_back(std::move(match));
     newest_.odometry = motions.fuse(newest_.odometry, measured);
     update({}, seconds);
     hang_newest();
@@ -220,9 +282,14 @@ void CompactGraph::relocate(int pose, const Motion& measured, double of_way, dou
   if (pose > other) bridge = motions.inverse(bridge);
   if (full_ && !(gain(ends, bridge) > least_gain)) {
     end = start = measured;
+    match.divided = false;
   } else {
+    ways_.open().bridge = bridge;
     add_bridge(ends, std::move(bridge), seconds);
   }
+  ways_.open().end = match;
+  close_way(kept_[pose].id, match.divided ? Way::Became::bridge : Way::Became::nothing);
+  ways_.begin(kept_[pose].id, match);
   const Motion back = motions.inverse(end);
   if (keeps_chains_) {
     newest_.steps.push_back({kept_[pose].id, back.mean, back.covariance, true});
@@ -362,13 +429,8 @@ void CompactGraph::prepare(std::span<const int> poses, PolicySeconds& seconds) {
     ids.push_back(kept_[pose].id);
   }
   const Id anchor_id = kept_[anchor_].id;
-  if (!ids.empty() && anchored_version_ != version_) {
-    anchored_version_ = version_;
-    S_aa_.resize(n, n);
-    estimator_->covariance(anchor_id, anchor_id, {S_aa_.data(), doubles});
-    known_ = false;
-  }
   if (!ids.empty()) {
+    know_anchor();
     Eigen::MatrixXd column(std::ssize(ids) * n, n);
     estimator_->covariance_column(anchor_id, ids,
                                   {column.data(), static_cast<std::size_t>(column.size())});
@@ -386,6 +448,20 @@ void CompactGraph::prepare(std::span<const int> poses, PolicySeconds& seconds) {
 
 bool CompactGraph::prepared(int pose) const {
   return ahead(pose) || kept_[pose].version == version_;
+}
+
+void CompactGraph::know_anchor() {
+  if (anchored_version_ == version_) return;
+  anchored_version_ = version_;
+  S_aa_ = block(anchor_, anchor_);
+  known_ = false;
+}
+
+Matrix CompactGraph::newest_covariance(PolicySeconds& seconds) {
+  const Timed timed(seconds.covariances);
+  know_anchor();
+  if (!known_) know_newest();
+  return S_nn_;
 }
 
 /// A and Σ_nn of the newest pose, from the anchor's Σ_aa.
@@ -419,16 +495,39 @@ void CompactGraph::set_covariance(int pose, Displacement& d) const {
   }
 }
 
+/// Σ_ik of two poses that the estimator has.
+Matrix CompactGraph::block(int i, int k) {
+  Matrix S(group_->tangent_size(), group_->tangent_size());
+  estimator_->covariance(kept_[i].id, kept_[k].id, {S.data(), static_cast<std::size_t>(S.size())});
+  return S;
+}
+
+/// The newest is Σ_ia Aᵀ away from those that the estimator has.
+Eigen::MatrixXd CompactGraph::joint_covariance(std::span<const int> poses, PolicySeconds& seconds) {
+  update({}, seconds);
+  const int n = group_->tangent_size();
+  const Eigen::Index last = n * std::ssize(poses);
+  Eigen::MatrixXd joint(last + n, last + n);
+  joint.bottomRightCorner(n, n) = newest_covariance(seconds);
+  for (std::size_t k = 0; k < poses.size(); ++k) {
+    const Eigen::Index row = n * static_cast<Eigen::Index>(k);
+    for (std::size_t other = 0; other < poses.size(); ++other)
+      joint.block(row, n * static_cast<Eigen::Index>(other), n, n) = block(poses[k], poses[other]);
+    joint.block(row, last, n, n) = block(poses[k], anchor_) * A_.transpose();
+    joint.block(last, row, n, n) = joint.block(row, last, n, n).transpose();
+  }
+  return joint;
+}
+
+Matrix CompactGraph::covariance(int pose) {
+  PolicySeconds unattended;
+  update({}, unattended);
+  return block(pose, pose);
+}
+
 Displacement CompactGraph::between(int a, int b) {
   PolicySeconds unattended;
   update({}, unattended);
-  const int n = group_->tangent_size();
-  const auto block = [&](int i, int k) {
-    Matrix S(n, n);
-    estimator_->covariance(kept_[i].id, kept_[k].id,
-                           {S.data(), static_cast<std::size_t>(S.size())});
-    return S;
-  };
   Displacement d = group_->displacement(kept_[a].placed, kept_[b].placed);
   group_->set_covariance(block(a, a), block(a, b), block(b, b), d);
   return d;

@@ -3,6 +3,7 @@
 
 #include <map>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <unordered_map>
@@ -16,6 +17,7 @@
 #include "cairn/solve/estimator.hpp"
 #include "pose_index.hpp"
 #include "rigid_group.hpp"
+#include "ways.hpp"
 
 namespace cairn::compact {
 
@@ -53,6 +55,12 @@ class CompactGraph {
   /// Before the first pose: the poses and factors of an earlier session's map. Throws `Error`
   /// (input) if it is not one connected graph of poses.
   void load(const Graph& map);
+  /// Whether something absolute determines where the graph is: a fixed pose, or measurements.
+  /// Otherwise its first pose holds it, and covariances are relative to that.
+  bool referenced() const { return referenced_; }
+  /// Keeps the newest pose; moves the whole graph, x_k ← move x_k, to where these absolute
+  /// measurements of kept poses say together, and takes them in.
+  void refer(const State& move, std::span<const Factor> priors, PolicySeconds& seconds);
   /// Whether it is known where the trajectory is on the map; true if there is none. Until then the
   /// two are separate components, and nothing is known of a displacement between them.
   bool located() const { return located_; }
@@ -77,6 +85,8 @@ class CompactGraph {
   void keep(PolicySeconds& seconds);
   /// Keeps the newest pose, and takes these links in.
   void link(std::span<const Factor> links, PolicySeconds& seconds);
+  /// Takes factors of kept poses in, and leaves the newest as it is.
+  void add(std::span<const Factor> factors, PolicySeconds& seconds) { update(factors, seconds); }
   /// The newest pose, which is not kept, has been matched with a kept one, `measured` from there.
   /// Instead of keeping it, the chain between its predecessor and that pose becomes a link of these
   /// two, and the trajectory continues from that pose. The measurement is used in both, so its
@@ -88,6 +98,12 @@ class CompactGraph {
   /// gain exceeds `least_gain` [nats]. If not, the whole measurement goes to what follows.
   void relocate(int pose, const Motion& measured, double of_way, double least_gain,
                 PolicySeconds& seconds);
+  /// Takes the link, or links, between two poses out, of which one is kept: what is left is as if
+  /// there had never been one, except that the same poses are kept and that the information of
+  /// other matches is divided as it was. False if there is none (any more). Throws `Error` (input),
+  /// and changes nothing, where it cannot be separated from other measurements any more, or is all
+  /// that connects a trajectory to its map.
+  bool revoke(Id a, Id b, PolicySeconds& seconds);
   /// Whether poses have left: there is no room for more than there are.
   bool full() const { return full_; }
   /// Where more than `limit` poses are kept, makes that many of them: others leave, and are
@@ -109,6 +125,8 @@ class CompactGraph {
   Matrix newest_odometry() const {
     return to_matrix(newest_.odometry.covariance, group_->tangent_size());
   }
+  /// Covariance of the newest pose itself, Σ_nn.
+  Matrix newest_covariance(PolicySeconds& seconds);
 
   // Kept poses, numbered in the order of arrival; anew when poses leave --------------------------
   int size() const { return static_cast<int>(kept_.size()); }
@@ -138,6 +156,10 @@ class CompactGraph {
   /// Between two kept poses, with its covariance; by solving, for which all of them must reach the
   /// estimator.
   Displacement between(int a, int b);
+  /// Of kept poses and, after them, the newest; likewise.
+  Eigen::MatrixXd joint_covariance(std::span<const int> poses, PolicySeconds& seconds);
+  /// Covariance of a kept pose itself; likewise.
+  Matrix covariance(int pose);
 
   /// From each kept pose to the next one of the trajectory.
   const std::vector<OdometryChain>& chains() const { return chains_; }
@@ -177,9 +199,15 @@ class CompactGraph {
   FactorId update(std::span<const Factor> links, PolicySeconds& seconds,
                   std::vector<ChangedFactor> changed = {});
   void refresh();
+  void move_poses(int first, const State& move, std::span<const Factor> factors);
+  Matrix block(int i, int k);
   void hang_newest();
+  void know_anchor();
   void know_newest();
   void add_bridge(std::pair<int, int> ends, Motion bridge, PolicySeconds& seconds);
+  void note_links(std::span<const Factor> links, FactorId first);
+  void close_way(Id to, Way::Became became);
+  void merge_ways(const GraphUpdate& leaving, std::span<const Factor> removed);
   double gain(std::pair<int, int> ends, const Motion& measured);
   void renumber(const GraphUpdate& leaving, FactorId first_factor, std::span<const int> now);
   void join_chains(const GraphUpdate& leaving);
@@ -195,7 +223,7 @@ class CompactGraph {
   std::unique_ptr<PoseIndex> index_;
   std::vector<Kept> kept_;
   int map_size_ = 0;
-  bool located_ = true;
+  bool located_ = true, referenced_ = false;
   int solved_ = 0;   ///< so many of them has the estimator
   int anchor_ = -1;  ///< one of those: where the chain of the newest pose and those since the last
                      ///< update starts
@@ -209,8 +237,17 @@ class CompactGraph {
   struct Bridge {
     FactorId factor = 0;
     Motion motion;
+    std::optional<Motion> rest{};  ///< of it, what is in none of `ways_`
   };
   std::map<std::pair<int, int>, Bridge> bridges_;
+  std::map<std::pair<int, int>, Bridge> replace_ways(const Ways::Change& change,
+                                                     GraphUpdate& update);
+  FactorId odometry_factor(Id from, Id to) const;
+  void check_connected(Id a, Id b, const GraphUpdate& leaving) const;
+  void replace_chains(const Ways::Change& change);
+  /// The factors of links whose two poses are kept, by the smaller id and the larger.
+  std::map<std::pair<Id, Id>, std::vector<FactorId>> links_;
+  Ways ways_;  ///< with the links of poses that are not kept
   bool full_ = false;
   int version_ = 0;
 

@@ -93,6 +93,9 @@ void CompactPose::start(const Variable& pose) {
   };
   loop_gain_ = threshold(options_.strategy == Strategy::apal, options_.loop_gain, 1.36);
   pose_gain_ = threshold(options_.strategy != Strategy::fpfl, options_.pose_gain, 1.7);
+  prior_gain_ = loop_gain_;
+  if (options_.prior_gain >= 0.0 && options_.strategy != Strategy::apal)
+    prior_gain_ = options_.prior_gain;
 }
 
 void CompactPose::load(const Graph& map) {
@@ -191,6 +194,13 @@ double CompactPose::worth(int pose, double gain) const {
   return options_.matches > 0 ? gain * record_.probability(pose) : gain;
 }
 
+/// Whether the newest pose was matched with this one already, for where it is searched again.
+bool CompactPose::answered(int pose) const {
+  return std::ranges::any_of(report_.links, [&](const LinkReport& link) {
+    return link.later == report_.id && link.earlier == graph_.id(pose);
+  });
+}
+
 /// Lines 14 and 15 of Algorithm 1.
 void CompactPose::search() {
   searched_ = true;
@@ -221,7 +231,7 @@ void CompactPose::search() {
     const double gain = mutual_information(expected_, d.covariance);
     ++report_.candidates;
     report_.least_gain = std::min(report_.least_gain, gain);
-    if (pose != graph_.predecessor()) {
+    if (pose != graph_.predecessor() && !answered(pose)) {
       candidates_.push_back({pose, graph_.version(), gain, worth(pose, gain),
                              static_cast<int>(std::ssize(dimensions_))});
       dimensions_.push_back(dimensions);
@@ -305,11 +315,14 @@ LinkReport CompactPose::offer(Id other, std::span<const Factor> measured) {
     typical_.note(link.covariance);
     report.verdict = judge(link, report);
     if (report.verdict == LinkVerdict::linked) {
-      if (candidate && options_.keep == 0)  // what is found takes memory for every loop
+      const bool noted = candidate && options_.keep == 0;  // it takes memory for every loop
+      if (noted)
         finder_.note_loop(*test_, dimensions_[candidate->place], report.gain, link.covariance);
+      learnt_.push_back({other, graph_.newest_id(), link.covariance, report.gain, noted});
       use(link);
     } else if (report.verdict == LinkVerdict::waiting) {
       if (!graph_.newest_kept()) graph_.keep(report_.seconds);
+      learnt_.push_back({other, graph_.newest_id(), link.covariance, report.gain, false});
       waiting_.push_back({std::move(link), report});
       if (waiting_.size() > kMostWaiting) {  // nothing has agreed with it for so long
         waiting_.front().report.verdict = LinkVerdict::inconsistent;
@@ -318,6 +331,7 @@ LinkReport CompactPose::offer(Id other, std::span<const Factor> measured) {
       }
     }
   }
+  if (learnt_.size() > Ways::kMost) learnt_.pop_front();
   report_.links.push_back(report);
   if (report.verdict == LinkVerdict::linked) judge_waiting();
   return report;
@@ -433,6 +447,7 @@ PoseReport CompactPose::end_pose() {
   {
     const Timed timed(report_.seconds.total);
     if (!searched_) search();
+    settle_priors();
     if (!graph_.newest_kept() && !report_.closed_loop && report_.least_gain > pose_gain_)
       graph_.keep(report_.seconds);
     if (graph_.predecessor() >= 0 && report_.candidates > 0 && options_.keep == 0)

@@ -2,12 +2,14 @@
 #pragma once
 
 #include <chrono>
+#include <deque>
 #include <memory>
 #include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "absolute.hpp"
 #include "cairn/online/pose_remover.hpp"
 #include "cairn/policy/pose_policy.hpp"
 #include "compact_graph.hpp"
@@ -47,6 +49,8 @@ class CompactPose final : public PosePolicy, public OptionFinder {
   void add_pose(const Variable& pose, std::span<const Factor> odometry) override;
   std::optional<MatchProposal> next_match() override;
   LinkReport offer(Id other, std::span<const Factor> measured) override;
+  PriorReport offer_prior(const Factor& measured) override;
+  bool revoke(Id a, Id b) override;
   PoseReport end_pose() override;
   bool finish() override;
 
@@ -80,9 +84,23 @@ class CompactPose final : public PosePolicy, public OptionFinder {
     LinkReport report;
   };
 
+  /// What was learnt from a link that may be revoked.
+  struct Learnt {
+    Id earlier = 0, later = 0;
+    Matrix covariance;
+    double gain = 0.0;
+    bool noted = false;  ///< by `finder_`
+  };
+  /// An absolute measurement that waits for others, and the report of it.
+  struct WaitingPrior {
+    AbsoluteMeasurement measurement;
+    PriorReport report;
+  };
+
   void start(const Variable& pose);
   void check_new(const Variable& pose) const;
   void expect_matches();
+  bool answered(int pose) const;
   void search();
   Displacement known_displacement(int pose);
   std::optional<Candidate> take_candidate(int pose);
@@ -94,6 +112,11 @@ class CompactPose final : public PosePolicy, public OptionFinder {
   LinkVerdict judge(const Link& link, LinkReport& report);
   void judge_waiting();
   bool agrees_with_waiting(const Link& link);
+  LinkVerdict judge_prior(const AbsoluteFit& fit, PriorReport& report) const;
+  FrameEstimate frame();
+  bool find_frame();
+  void settle_priors();
+  void forget(Id a, Id b);
   void make_room();
 
   CompactPoseOptions options_;
@@ -104,7 +127,7 @@ class CompactPose final : public PosePolicy, public OptionFinder {
   std::optional<ConsistencyCheck> check_;
   double radius_ = 0.0;  ///< no pose farther away can be a candidate [m]
   Matrix sensor_;        ///< Σ̄_y, if it was given; else that of `typical_`
-  double loop_gain_ = 0.0, pose_gain_ = 0.0;
+  double loop_gain_ = 0.0, pose_gain_ = 0.0, prior_gain_ = 0.0;
 
   // The newest pose:
   PoseReport report_;
@@ -118,11 +141,13 @@ class CompactPose final : public PosePolicy, public OptionFinder {
   std::vector<Dimensions> dimensions_;  ///< of the candidates, before any link of this pose
 
   std::vector<Waiting> waiting_;
+  std::vector<WaitingPrior> waiting_priors_;
   ThresholdFinder finder_;
   TypicalMatch typical_;
   MatchRecord record_;
-  std::vector<Id> removed_;  ///< with the latest pose
-  std::string noted_;        ///< why poses could not leave, when it was last reported
+  std::deque<Learnt> learnt_;  ///< of the latest links
+  std::vector<Id> removed_;    ///< with the latest pose
+  std::string noted_;          ///< why poses could not leave, when it was last reported
 };
 
 }  // namespace cairn::compact

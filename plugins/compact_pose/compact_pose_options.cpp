@@ -63,6 +63,9 @@ OptionFields<CompactPoseOptions> CompactPoseOptions::fields() {
       .real("pose_gain", &O::pose_gain, -1.0, 1e9,
             "a pose without a link is kept if the information gain of every link to a pose nearby "
             "would exceed this [nats] (g_pose); -1: (n/2 ln 2 + 1)^1.7 - 1")
+      .real("prior_gain", &O::prior_gain, -1.0, 1e9,
+            "information gain that an absolute measurement of a pose must exceed [nats]; -1: as "
+            "loop_gain")
       .text("sensor", &O::sensor, numbers, text_of,
             "expected covariance of a match: standard deviations [m] and [rad], or its upper "
             "triangle; empty: the median of the latest matches, at first as odometry")

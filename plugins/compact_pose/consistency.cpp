@@ -12,7 +12,7 @@ namespace cairn::compact {
 
 ConsistencyCheck::ConsistencyCheck(const RigidGroup& group, const SensorRange& range, double gate,
                                    double trust)
-    : group_(group), trust_(trust) {
+    : group_(group), gate_(gate), trust_(trust) {
   if (gate <= 0.0) return;
   const int n = group.tangent_size();
   limit_ = boost::math::quantile(boost::math::chi_squared(n), gate);
@@ -37,6 +37,11 @@ Fit ConsistencyCheck::judge(const Vector& e, const Matrix& S) const {
 Fit ConsistencyCheck::fit(const Link& link, const Displacement& expected) const {
   const Vector e = group_.log(group_.between(expected.mean, link.mean));
   return judge(e, expected.covariance + link.covariance);
+}
+
+bool ConsistencyCheck::passes(double innovation, int dof) const {
+  if (!on() || dof == 0) return true;
+  return innovation < boost::math::quantile(boost::math::chi_squared(dof), gate_);
 }
 
 /// With u = x_i⁻¹x_k and w = x_n⁻¹x_m between the ends of the links (i, n) and (k, m), the cycle

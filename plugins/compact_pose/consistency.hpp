@@ -49,6 +49,9 @@ class ConsistencyCheck {
   /// to the second's, `later` likewise.
   Fit agreement(const Link& first, const Link& second, const Displacement& earlier,
                 const Displacement& later) const;
+  /// Whether an absolute measurement's innovation is below the bound for so many degrees of
+  /// freedom; true if the check is off.
+  bool passes(double innovation, int dof) const;
   bool needs_another(const Fit& fit) const { return on() && fit.chance > trust_; }
 
  private:
@@ -57,7 +60,7 @@ class ConsistencyCheck {
   const RigidGroup& group_;
   double limit_ = 0.0;       ///< χ² quantile of the gate
   double log_volume_ = 0.0;  ///< ln of the ellipsoid's volume for S = I over the range's
-  double trust_;
+  double gate_, trust_;
 };
 
 }  // namespace cairn::compact

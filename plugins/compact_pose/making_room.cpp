@@ -2,6 +2,7 @@
 // A compact graph of at most so many poses: others leave, and factors between their neighbours take
 // their place.
 #include <algorithm>
+#include <set>
 #include <unordered_set>
 #include <utility>
 
@@ -34,6 +35,8 @@ void CompactPose::make_room() {
   std::vector<int> held;
   for (const Waiting& waiting : waiting_)
     held.insert(held.end(), {waiting.link.earlier, waiting.link.later});
+  for (const WaitingPrior& waiting : waiting_priors_)
+    held.push_back(graph_.find(waiting.measurement.pose()));
   CompactGraph::Leaving leaving = graph_.make_room(*remover_, options_.keep, held, report_.seconds);
   if (leaving.note != noted_ && !leaving.note.empty()) report_.notes.push_back(leaving.note);
   noted_ = std::move(leaving.note);
@@ -62,8 +65,12 @@ CompactGraph::Leaving CompactGraph::make_room(PoseRemover& remover, int limit,
   const std::unordered_set<Id> gone(leaving.poses.begin(), leaving.poses.end());
   int left = 0;
   for (const Kept& pose : kept_) leaving.now.push_back(gone.contains(pose.id) ? -1 : left++);
+  std::vector<Factor> removed;
+  for (const FactorId id : removal.update.removed_factors)
+    removed.push_back(estimator_->factor(id));
   const UpdateReport report = estimator_->update(removal.update);
   copy_.reset();
+  merge_ways(removal.update, removed);
   renumber(removal.update, report.first_factor, leaving.now);
   join_chains(removal.update);
   full_ = true;
@@ -98,10 +105,33 @@ void CompactGraph::renumber(const GraphUpdate& leaving, FactorId first_factor,
     if (factor.variables.size() != 2 || !factor.type->is_relative()) continue;
     const std::pair<int, int> ends =
         std::minmax(find(factor.variables[0]), find(factor.variables[1]));
-    bridges.insert_or_assign(ends, Bridge{first_factor + static_cast<FactorId>(k),
-                                          group_->motions().of_factor(factor, id(ends.first))});
+    const Motion motion = group_->motions().of_factor(factor, id(ends.first));
+    bridges.insert_or_assign(ends, Bridge{first_factor + static_cast<FactorId>(k), motion, motion});
   }
   bridges_ = std::move(bridges);
+}
+
+/// Links that became a part of the factors between the neighbours of poses that have left.
+void CompactGraph::merge_ways(const GraphUpdate& leaving, std::span<const Factor> removed) {
+  const std::unordered_set<Id> gone(leaving.removed_variables.begin(),
+                                    leaving.removed_variables.end());
+  const std::unordered_set<FactorId> factors(leaving.removed_factors.begin(),
+                                             leaving.removed_factors.end());
+  std::set<std::pair<Id, Id>> pairs;
+  for (const std::span<const Factor> some : {removed, std::span<const Factor>(leaving.factors)}) {
+    for (const Factor& factor : some) {
+      if (factor.variables.size() == 2)
+        pairs.insert(std::minmax(factor.variables[0], factor.variables[1]));
+    }
+  }
+  for (Way& way : ways_.all()) {
+    if (gone.contains(way.from) || gone.contains(way.to) ||
+        (way.became != Way::Became::nothing && pairs.contains(std::minmax(way.from, way.to))))
+      way.became = Way::Became::merged;
+  }
+  for (auto& [ends, ids] : links_)
+    std::erase_if(ids, [&](FactorId id) { return factors.contains(id); });
+  std::erase_if(links_, [](const auto& link) { return link.second.empty(); });
 }
 
 /// The way from one kept pose to the next leads past those that have left.

@@ -12,6 +12,13 @@ void MatchRecord::note(int pose, bool matched) {
   }
 }
 
+void MatchRecord::revoke(int pose) {
+  const auto at = static_cast<std::size_t>(pose);
+  if (at >= poses_.size() || poses_[at].matched < 1.0) return;
+  poses_[at].matched -= 1.0;
+  all_.matched -= 1.0;
+}
+
 void MatchRecord::renumber(std::span<const int> now) {
   std::size_t left = 0;
   for (std::size_t k = 0; k < poses_.size(); ++k) {

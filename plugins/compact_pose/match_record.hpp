@@ -17,6 +17,8 @@ class MatchRecord {
   static constexpr double kWeight = 3.0;
 
   void note(int pose, bool matched);
+  /// A match with it, which was noted, was a false one: the request was in vain.
+  void revoke(int pose);
   /// Poses have left: pose k has the number `now[k]` now, −1 if it has left.
   void renumber(std::span<const int> now);
   /// Of a match with this kept pose.

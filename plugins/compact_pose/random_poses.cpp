@@ -7,6 +7,7 @@
 #include <string>
 #include <utility>
 
+#include "absolute.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/timed.hpp"
 
@@ -140,6 +141,25 @@ LinkReport RandomPoses::offer(Id other, std::span<const Factor> measured) {
   }
   report_.links.push_back(link);
   return link;
+}
+
+PriorReport RandomPoses::offer_prior(const Factor& measured) {
+  PriorReport prior{.pose = report_.id};
+  if (graph_.newest_kept() && graph_.referenced()) {
+    graph_.link({&measured, 1}, report_.seconds);
+    prior.verdict = LinkVerdict::linked;
+  } else if (graph_.newest_kept()) {
+    const State& x = graph_.newest_state();
+    const AbsoluteMeasurement first(measured, report_.id, graph_.group().motions().type());
+    const FrameEstimate frame(graph_.group(), {{&first, x}}, x,
+                              graph_.joint_covariance({}, report_.seconds).replicate(2, 2));
+    if (frame.determined()) {
+      graph_.refer(frame.best_move(), {&measured, 1}, report_.seconds);
+      prior.verdict = LinkVerdict::linked;
+    }
+  }
+  report_.priors.push_back(prior);
+  return prior;
 }
 
 PoseReport RandomPoses::end_pose() {

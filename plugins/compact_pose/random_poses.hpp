@@ -67,6 +67,8 @@ class RandomPoses final : public PosePolicy {
   void add_pose(const Variable& pose, std::span<const Factor> odometry) override;
   std::optional<MatchProposal> next_match() override;
   LinkReport offer(Id other, std::span<const Factor> measured) override;
+  /// In the graph if the pose is kept; the first one only if it determines where the graph is.
+  PriorReport offer_prior(const Factor& measured) override;
   PoseReport end_pose() override;
   bool finish() override;
 

@@ -48,6 +48,16 @@ void TypicalMatch::note(const Matrix& covariance) {
   median_ = median_covariance(latest_);
 }
 
+void TypicalMatch::forget(const Matrix& covariance) {
+  std::rotate(latest_.begin(), latest_.begin() + static_cast<std::ptrdiff_t>(oldest_),
+              latest_.end());
+  oldest_ = 0;  // the ring has room again, or begins there
+  const auto found = std::ranges::find(latest_, covariance);
+  if (found == latest_.end()) return;
+  latest_.erase(found);
+  median_ = latest_.empty() ? Matrix() : median_covariance(latest_);
+}
+
 double percentile(std::vector<double> numbers, double part) {
   if (numbers.empty()) return 0.0;
   const auto rank = static_cast<std::size_t>(std::ceil(part * static_cast<double>(numbers.size())));
@@ -62,6 +72,12 @@ void ThresholdFinder::note_loop(const DistanceTest& test, const Dimensions& dime
   const SensorRange least = test.least_range(dimensions);
   loops_.push_back(
       {*std::ranges::max_element(least.translation), least.rotation, gain, covariance});
+}
+
+void ThresholdFinder::forget_loop(double gain, const Matrix& covariance) {
+  const auto found = std::ranges::find_if(
+      loops_, [&](const Loop& loop) { return loop.gain == gain && loop.covariance == covariance; });
+  if (found != loops_.end()) loops_.erase(found);
 }
 
 Matrix ThresholdFinder::sensor() const {

@@ -16,6 +16,8 @@ Matrix median_covariance(std::span<const Matrix> covariances);
 class TypicalMatch {
  public:
   void note(const Matrix& covariance);
+  /// It was a false match. Does nothing if it is not among the latest any more.
+  void forget(const Matrix& covariance);
   bool known() const { return !latest_.empty(); }
   const Matrix& covariance() const { return median_; }
 
@@ -32,6 +34,8 @@ class ThresholdFinder {
  public:
   void note_loop(const DistanceTest& test, const Dimensions& dimensions, double gain,
                  const Matrix& covariance);
+  /// It was a false one.
+  void forget_loop(double gain, const Matrix& covariance);
   void note_pose(double gain) { pose_gains_.push_back(gain); }
 
   /// Options of compact_pose: `range` and `angle`, so that every recorded loop closure passes the

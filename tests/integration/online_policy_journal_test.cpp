@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
+#include <map>
 #include <set>
 #include <string>
 
@@ -183,6 +184,84 @@ TEST_F(OnlinePolicy, WhatAQuestionSettledOrAskedIsInTheJournal) {
   const Lines again = in_two("asked", asking, {"NEXT"});
   EXPECT_EQ(again.at(0), "RESTORED 12 variables 4 factors 3");
   EXPECT_THAT(again.at(1), StartsWith("MATCH 0 4 "));
+}
+
+TEST_F(OnlinePolicy, LinksThatWereTakenBackStaySo) {
+  const std::string graph = generate("manhattan:poses=150");
+  const Dialogue driven = drive(graph, online("compact_pose:range=3,angle=0.8"));
+  ASSERT_GT(driven.count("LINKED"), 5);
+  // The same again, in which every third link is taken back twenty lines later.
+  std::multimap<std::size_t, std::string> revoked;
+  int links = 0;
+  for (std::size_t k = 0; k < driven.told.size(); ++k) {
+    const Lines fields = words(driven.told[k]);
+    if (fields[0] == "NEXT" || fields[0] == "DONE") continue;
+    if (fields[0] != "EDGE_SE2" || std::stol(fields[2]) - std::stol(fields[1]) == 1) continue;
+    if (++links % 3 == 0) revoked.emplace(k + 20, "REMOVE LINK " + fields[1] + " " + fields[2]);
+  }
+  Lines told;
+  for (std::size_t k = 0; k < driven.told.size(); ++k) {
+    told.push_back(driven.told[k]);
+    for (auto [at, end] = revoked.equal_range(k); at != end; ++at) told.push_back(at->second);
+  }
+  const auto with = [&](Arguments more) { return online("compact_pose:range=3,angle=0.8", more); };
+  const Outcome whole = cairn(with({"-o", folder_.file("whole.g2o")}), {}, joined(told));
+  ASSERT_EQ(whole.exit_code, 0) << whole.err;
+  const Lines answers = lines(whole.out);
+  EXPECT_GT(std::ranges::count_if(
+                answers, [](const std::string& line) { return line.starts_with("UNLINKED "); }),
+            2);
+  const Arguments arguments =
+      with({"--journal", folder_.file("log"), "-o", folder_.file("parts.g2o")});
+  for (std::size_t from = 0; from < told.size(); from += 67) {
+    const std::size_t end = std::min(from + 67, told.size());
+    const Lines part(told.begin() + static_cast<std::ptrdiff_t>(from),
+                     told.begin() + static_cast<std::ptrdiff_t>(end));
+    ASSERT_EQ(cairn(arguments, {}, joined(part)).exit_code, 0);
+  }
+  EXPECT_EQ(read_text(folder_.file("parts.g2o")), read_text(folder_.file("whole.g2o")));
+}
+
+TEST_F(OnlinePolicy, AbsoluteMeasurementsAreRestoredAndTheSameAsRecorded) {
+  Lines told{"NEW VERTEX_SE2 0"};
+  for (int k = 1; k <= 60; ++k) {
+    told.push_back("NEW VERTEX_SE2 " + std::to_string(k));
+    told.push_back("EDGE_SE2 " + std::to_string(k - 1) + " " + std::to_string(k) +
+                   (k % 10 == 0 ? " 1 0 0.7" : " 1 0 0.02") + " 400 0 0 400 0 2500");
+    if (k % 6 == 0) {
+      told.push_back("EDGE_PRIOR_SE2 " + std::to_string(k) + " " + std::to_string(100 + k) + " " +
+                     std::to_string(k * k % 7) + " 0 4 0 0 4 0 0");
+    }
+    told.push_back("DONE");
+  }
+  const std::string policy = "compact_pose:range=3,angle=0.8";
+  const Outcome whole = cairn(online(policy, {"-o", folder_.file("whole.g2o")}), {}, joined(told));
+  ASSERT_EQ(whole.exit_code, 0) << whole.err;
+  EXPECT_THAT(whole.out, HasSubstr(" WAITING "));
+  EXPECT_THAT(whole.out, HasSubstr(" TAKEN "));
+  EXPECT_THAT(whole.out, HasSubstr(" UNINFORMATIVE "));
+  const Arguments arguments =
+      online(policy, {"--journal", folder_.file("log"), "-o", folder_.file("parts.g2o")});
+  for (std::size_t from = 0; from < told.size(); from += 41) {
+    const std::size_t end = std::min(from + 41, told.size());
+    const Lines part(told.begin() + static_cast<std::ptrdiff_t>(from),
+                     told.begin() + static_cast<std::ptrdiff_t>(end));
+    ASSERT_EQ(cairn(arguments, {}, joined(part)).exit_code, 0);
+  }
+  EXPECT_EQ(read_text(folder_.file("parts.g2o")), read_text(folder_.file("whole.g2o")));
+  // A recording of it is a graph: poses with a state, and no commands.
+  Lines recorded;
+  for (const std::string& line : told) {
+    if (line.starts_with("NEW VERTEX_SE2 ")) recorded.push_back(line.substr(4) + " 0 0 0");
+    if (line.starts_with("EDGE")) recorded.push_back(line);
+  }
+  write_text(folder_.file("recorded.g2o"), joined(recorded));
+  const Outcome again =
+      cairn({"compact", folder_.file("recorded.g2o"), "--policy", policy, "--registration",
+             "recorded:carry=0", "-o", folder_.file("compact.g2o")});
+  ASSERT_EQ(again.exit_code, 0) << again.err;
+  EXPECT_THAT(again.out, HasSubstr("of 10 kept"));
+  EXPECT_EQ(read_text(folder_.file("compact.g2o")), read_text(folder_.file("whole.g2o")));
 }
 
 TEST_F(OnlinePolicy, TheEndIsNotInTheJournal) {

@@ -118,7 +118,8 @@ void check_poses(const Graph& graph) {
     if (!is_pose(type)) {
       throw bad_input(
           fmt::format("{} is not a pose of a Lie group, and this takes pose graphs only: a robot's "
-                      "poses and relative poses between them, without landmarks",
+                      "poses, relative poses between them and absolute measurements of them, "
+                      "without landmarks",
                       graph.describe_variable(v)));
     }
     if (graph.pool(v) != graph.pool(0)) {
@@ -128,13 +129,25 @@ void check_poses(const Graph& graph) {
   }
 }
 
-void check_relative(const Graph& graph) {
+void check_factors(const Graph& graph) {
   for (int f = 0; f < graph.factor_count(); ++f) {
-    if (graph.factor_type(f).is_relative()) continue;
+    const FactorType& type = graph.factor_type(f);
+    if (type.is_relative() || type.arity() == 1) continue;
     throw bad_input(
-        fmt::format("{} is not the motion from one pose to another, and this takes pose graphs "
-                    "only: leave it out, and mark poses that are known as FIX",
+        fmt::format("{} is neither the motion from one pose to another nor a measurement of a "
+                    "single pose, and this takes pose graphs only: leave it out",
                     graph.describe_factor(f)));
+  }
+}
+
+/// Moves factors on one pose from the links to the priors.
+void separate_priors(const Graph& graph, std::vector<Arrival>& chain) {
+  for (Arrival& arrival : chain) {
+    const auto priors =
+        std::stable_partition(arrival.links.begin(), arrival.links.end(),
+                              [&](int f) { return graph.factor_variables(f).size() > 1; });
+    arrival.priors.assign(priors, arrival.links.end());
+    arrival.links.erase(priors, arrival.links.end());
   }
 }
 
@@ -142,9 +155,10 @@ void check_relative(const Graph& graph) {
 
 std::vector<Arrival> pose_chain(const Graph& graph, std::optional<Id> begin) {
   check_poses(graph);
-  check_relative(graph);
+  check_factors(graph);
   if (graph.variable_count() == 0) return {};
   std::vector<Arrival> chain = arrival_order(graph);
+  separate_priors(graph, chain);
   if (begin) {
     const auto first = std::ranges::find(
         chain, *begin, [&](const Arrival& arrival) { return graph.id(arrival.pose()); });
@@ -168,7 +182,7 @@ std::vector<Arrival> pose_chain(const Graph& graph, std::optional<Id> begin) {
 GraphUpdate arrival_update(const Graph& graph, const Arrival& arrival) {
   GraphUpdate update;
   for (const int v : arrival.variables) update.variables.push_back(graph.variable(v));
-  for (const auto* factors : {&arrival.odometry, &arrival.links}) {
+  for (const auto* factors : {&arrival.odometry, &arrival.links, &arrival.priors}) {
     for (const int f : *factors) update.factors.push_back(graph.factor(f));
   }
   return update;

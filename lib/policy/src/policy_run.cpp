@@ -93,7 +93,10 @@ void evaluate(PosePolicy& policy, const PolicyData& data, PolicyResult& result) 
 PolicyData policy_data(Graph recording, std::optional<Graph> truth, std::optional<Id> begin) {
   PolicyData data;
   data.poses = pose_chain(recording, begin);
-  for (const Arrival& pose : data.poses) data.loops += std::ssize(pose.links);
+  for (const Arrival& pose : data.poses) {
+    data.loops += std::ssize(pose.links);
+    data.priors += std::ssize(pose.priors);
+  }
   if (truth) {
     data.truth = trajectory(*truth);
     if (has_all_of(*truth, recording)) data.truth_graph = std::move(truth);
@@ -157,6 +160,8 @@ void PolicyRun::run(std::size_t count, std::string_view title,
       ++result_.kept_loops;
       result_.false_kept += watched.was_false(link.earlier, link.later);
     }
+    result_.kept_priors +=
+        std::ranges::count(pose.priors, LinkVerdict::linked, &PriorReport::verdict);
     if (setting_.progress) setting_.progress(title, count, result_);
     if (after) after(result_.poses.size() - 1);
     return !setting_.interrupted();

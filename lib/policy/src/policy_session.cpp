@@ -110,7 +110,8 @@ std::int64_t PolicySession::factor_count() const { return policy_.factor_count()
 void PolicySession::take_data(std::string_view text, Reply& reply) {
   StreamLine said = format_.read(text, kStreamName, line(), registry_, settings_.read);
   for (Variable& pose : said.variables) take_pose(std::move(pose), reply);
-  for (Factor& factor : said.factors) take_edge(std::move(factor));
+  for (Factor& factor : said.factors)
+    factor.variables.size() == 1 ? take_prior(std::move(factor)) : take_edge(std::move(factor));
   if (!said.held.empty()) hold(said.held);
   reply.changes = !said.skipped;
 }
@@ -287,6 +288,7 @@ void PolicySession::settle(Reply& reply) {
 /// Ends the pose of now.
 PoseReport PolicySession::end(Reply& reply) {
   settle(reply);
+  offer_priors();
   PoseReport report = policy_.end_pose();
   open_ = false;
   arrived_.insert(report.id);
@@ -300,6 +302,7 @@ PoseReport PolicySession::end(Reply& reply) {
       note_link(link);
     }
   }
+  for (const PriorReport& prior : report.priors) note_prior(prior);
   for (const std::string& note : report.notes) answer_ += fmt::format("NOTE {}\n", note);
   return report;
 }
@@ -396,15 +399,35 @@ void PolicySession::finish_pose(const Words& words, Reply& reply) {
 }
 
 void PolicySession::take_back(const Words& words, Reply& reply) {
+  if (words.size() > 1 && words[1] == "LINK") return revoke(words, reply);
   if (words.size() != 3 || words[1] != "VARIABLE" || !arriving_ ||
       parse_whole(words[2], "id") != arriving_->pose.id) {
     throw bad_line(
-        "the policy decides what stays: only a pose that has just come, and has no lines but its "
-        "odometry, can be removed; expected 'REMOVE VARIABLE id' with its id");
+        "the policy decides what stays: only links can be removed, and a pose that has just come, "
+        "and has no lines but its odometry; expected 'REMOVE LINK id id', or 'REMOVE VARIABLE id' "
+        "with its id");
   }
   arriving_.reset();
   if (!newest_) motions_.reset();
   reply.changes = true;
+  answer(reply);
+}
+
+/// Links that are in the graph, or wait.
+void PolicySession::revoke(const Words& words, Reply& reply) {
+  expect_words(words, 4, "REMOVE LINK id id");
+  const Id a = parse_whole(words[2], "id"), b = parse_whole(words[3], "id");
+  for (const Id id : {a, b}) {
+    if (!arrived_.contains(id) && current() != id)
+      throw bad_line(fmt::format("there is no pose {}", id));
+  }
+  settle(reply);
+  if (!policy_.revoke(a, b))
+    throw bad_line(fmt::format("there is no link of poses {} and {}", a, b));
+  reply.changes = true;
+  asked_.clear();
+  ++counts_.revoked;
+  answer_ += fmt::format("UNLINKED {} {}\n", a, b);
   answer(reply);
 }
 

@@ -16,6 +16,14 @@ void PosePolicy::load(const Graph&) {
   throw Error(ErrorCode::usage, "this policy does not continue a map: use compact_pose");
 }
 
+PriorReport PosePolicy::offer_prior(const Factor&) {
+  throw Error(ErrorCode::usage, "this policy takes no absolute measurements: use compact_pose");
+}
+
+bool PosePolicy::revoke(Id, Id) {
+  throw Error(ErrorCode::usage, "this policy does not revoke links: use compact_pose");
+}
+
 std::string_view to_string(LinkVerdict verdict) {
   constexpr std::array<std::string_view, 5> kNames{"linked", "unmatched", "uninformative",
                                                    "inconsistent", "waiting"};
@@ -49,9 +57,12 @@ void match_newest(PosePolicy& policy, Registration& registration, Id newest) {
 }  // namespace
 
 PoseReport process_pose(const Variable& pose, std::span<const Factor> odometry, PosePolicy& policy,
-                        Registration& registration) {
+                        Registration& registration, std::span<const Factor> priors) {
   policy.add_pose(pose, odometry);
   match_newest(policy, registration, pose.id);
+  if (!priors.empty() && policy.unlocated().empty()) {
+    for (const Factor& prior : priors) policy.offer_prior(prior);
+  }
   PoseReport report = policy.end_pose();
   registration.pose_ended(report.id, report.kept);
   for (const Id left : policy.removed()) registration.pose_ended(left, false);
@@ -67,8 +78,9 @@ bool run_policy(const Graph& recording, std::span<const Arrival> poses, PosePoli
     Variable& pose = update.variables.front();
     if (!first && !pose.fixed) pose.state.clear();  // where its odometry puts it
     first = false;
-    const auto odometry = std::span(update.factors).first(arrival.odometry.size());
-    const PoseReport report = process_pose(pose, odometry, policy, registration);
+    const std::span<const Factor> factors = update.factors;
+    const PoseReport report = process_pose(pose, factors.first(arrival.odometry.size()), policy,
+                                           registration, factors.last(arrival.priors.size()));
     if (each && !each(report)) break;
   }
   return first || policy.finish();

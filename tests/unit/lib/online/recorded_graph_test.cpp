@@ -2,16 +2,21 @@
 #include "cairn/online/recorded_graph.hpp"
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <string>
+#include <string_view>
+#include <tuple>
 #include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "cairn/lie/se2.hpp"
 #include "cairn/lie/se3.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
+#include "cairn/types/define_factor.hpp"
 #include "support/planar_graph.hpp"
 #include "support/scaled_pose.hpp"
 
@@ -168,6 +173,19 @@ TEST_F(PoseChain, NamesTheGapInItsOdometry) {
                                HasSubstr("ids increase along the trajectory")));
 }
 
+TEST_F(PoseChain, HasTheAbsoluteMeasurementsOfEachPose) {
+  for (const Id id : {1, 2, 3}) pose(id);
+  join(1, 2), join(2, 3), join(1, 3);
+  const std::array<int, 1> on{1};
+  graph_.add_factor(types_.prior, on, std::array{0.0, 0.0, 0.0}, kUnit3);
+  const std::vector<Arrival> chain = pose_chain(graph_);
+  EXPECT_THAT(chain[1].priors, ElementsAre(3));
+  EXPECT_THAT(chain[1].links, IsEmpty());
+  EXPECT_THAT(chain[2].priors, IsEmpty());
+  EXPECT_THAT(chain[2].links, ElementsAre(2));
+  EXPECT_EQ(arrival_update(graph_, chain[1]).factors.back().type->tag(), "EDGE_PRIOR_SE2");
+}
+
 TEST_F(PoseChain, RefusesLandmarks) {
   pose(1);
   graph_.add_variable(types_.point, 9, std::array{0.0, 0.0});
@@ -187,12 +205,26 @@ TEST_F(PoseChain, RefusesPosesOfTwoTypes) {
               HasSubstr("VERTEX_SE2 1 and VERTEX_SE3:QUAT 2 are poses of different types"));
 }
 
+/// How far apart two poses are [m]: on poses alone, and no motion.
+struct Distance {
+  static constexpr std::string_view kTag = "EDGE_DISTANCE";
+  static constexpr int kResidual = 1, kMeasurement = 1;
+  using Variables = std::tuple<Se2, Se2>;
+  template <class S>
+  static Vector<S, 1> residual(const Vector<S, 3>& a, const Vector<S, 3>& b,
+                               const Vector<double, 1>& z) {
+    using std::sqrt;
+    const S dx = a[0] - b[0], dy = a[1] - b[1];
+    return Vector<S, 1>{sqrt(dx * dx + dy * dy) - z[0]};
+  }
+};
+
 TEST_F(PoseChain, RefusesFactorsThatAreNoMotions) {
   pose(1), pose(2);
   join(1, 2);
-  graph_.add_factor(types_.prior, std::array{1}, std::array{0.0, 0.0, 0.0},
-                    std::array{1.0, 0.0, 0.0, 1.0, 0.0, 1.0});
-  EXPECT_THAT(refusal(), AllOf(HasSubstr("EDGE_PRIOR_SE2 2 is not the motion"), HasSubstr("FIX")));
+  graph_.add_factor(define_factor<Distance>(), std::array{0, 1}, std::array{1.0}, std::array{1.0});
+  EXPECT_THAT(refusal(), AllOf(HasSubstr("EDGE_DISTANCE 1 2 is neither the motion"),
+                               HasSubstr("leave it out")));
 }
 
 // Updates -----------------------------------------------------------------------------------------

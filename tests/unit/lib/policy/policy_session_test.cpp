@@ -172,6 +172,67 @@ TEST_F(PolicySessionTest, RefusesWhatDoesNotGoWithAPolicy) {
   EXPECT_THAT(take("NEXT").text, StartsWith("MATCH 0 4 "));
 }
 
+TEST_F(PolicySessionTest, ALinkCanBeTakenBack) {
+  drive();
+  EXPECT_THAT(take("REMOVE LINK 0 4").text, HasSubstr("there is no link of poses 0 and 4"));
+  EXPECT_THAT(take("REMOVE LINK 0 9").text, HasSubstr("there is no pose 9"));
+  EXPECT_THAT(take("REMOVE LINK 0").text, HasSubstr("expected 'REMOVE LINK id id'"));
+  const std::string before = take("ESTIMATE ALL").text;
+  const auto states = [](const std::string& text) {
+    return text.substr(text.find("VERTEX"), text.find("OK ") - text.find("VERTEX"));
+  };
+  take("EDGE_SE2 0 4 0.3 0.2 0.1 400 0 0 400 0 400");
+  const LineSession::Reply reply = take("REMOVE LINK 4 0");  // which settles it first
+  EXPECT_TRUE(reply.changes);
+  EXPECT_THAT(reply.text, StartsWith("LINKED 0 4 "));
+  EXPECT_THAT(reply.text, HasSubstr("\nUNLINKED 4 0\nOK "));
+  EXPECT_THAT(take("REMOVE LINK 4 0").text, HasSubstr("there is no link"));
+  std::istringstream now(states(take("ESTIMATE ALL").text)), then(states(before));
+  for (std::string word, other; now >> word && then >> other;) {
+    if (word == other) continue;
+    EXPECT_NEAR(std::stod(word), std::stod(other), 1e-6);
+  }
+  EXPECT_EQ(session_->counts().revoked, 1);
+  EXPECT_THAT(take("NEXT").text, StartsWith("MATCH NONE"));  // it is not asked for again
+}
+
+TEST_F(PolicySessionTest, AnAbsoluteMeasurementIsJudgedWhereItsPoseEnds) {
+  const std::string position = " 0 0 0 10000 0 0 10000 0 0";
+  take("VERTEX_SE2 0 0 0 0");
+  take("FIX 0");
+  for (int k = 1; k <= 3; ++k) {
+    take("NEW VERTEX_SE2 " + std::to_string(k));
+    take("EDGE_SE2 " + std::to_string(k - 1) + " " + std::to_string(k) + kQuarter);
+  }
+  EXPECT_THAT(take("EDGE_PRIOR_SE2 2 1 1 0 1 0 0 1 0 0").text, HasSubstr("of the newest pose"));
+  EXPECT_THAT(take("EDGE_PRIOR_XY 3 1 1 1 0 1").text, HasSubstr("takes no landmarks"));
+  EXPECT_THAT(take("EDGE_PRIOR_SE2 3 0 1 0 10000 0 0 10000 0 0").text, IsEmpty());
+  EXPECT_THAT(take("EDGE_SE2 2 3" + kQuarter).text, HasSubstr("after other lines"));
+  EXPECT_EQ(take("NEXT").text, "MATCH NONE\nOK 13 variables 3 factors 2 owed 0\n");
+  const std::string done = take("DONE").text;
+  EXPECT_THAT(done, StartsWith("PRIOR 3 TAKEN "));
+  EXPECT_THAT(done, HasSubstr("KEPT 3\nOK 14 variables 4 factors 4 owed 0\n"));
+  EXPECT_EQ(session_->counts().priors, 1);
+  EXPECT_THAT(take("EDGE_PRIOR_SE2 3" + position).text, HasSubstr("before it ends (DONE)"));
+  take("NEW VERTEX_SE2 4");
+  take("EDGE_SE2 3 4" + kHere);
+  take("EDGE_PRIOR_SE2 4 0 1 0 1 0 0 1 0 0");
+  EXPECT_THAT(take("DONE").text, StartsWith("PRIOR 4 UNINFORMATIVE "));
+}
+
+TEST_F(PolicySessionTest, AbsoluteMeasurementsWaitForThePlaceOnTheMap) {
+  session_->load(small_map(registry_));
+  take("NEW VERTEX_SE2 0");
+  const LineSession::Reply reply = take("EDGE_PRIOR_SE2 0 5 5 0 100 0 0 100 0 100");
+  EXPECT_THAT(reply.text, HasSubstr("expected a match with it (LOCATE) first"));
+  EXPECT_FALSE(reply.changes);
+  take("EDGE_SE2 101 0" + kHere);
+  take("NEXT");
+  take("EDGE_PRIOR_SE2 0 7 6 0.5 100 0 0 100 0 100");
+  EXPECT_THAT(take("DONE").text, StartsWith("PRIOR 0 TAKEN "));
+  EXPECT_THAT(take("ESTIMATE 0").text, HasSubstr("VERTEX_SE2 0 7 6 0.5\n"));
+}
+
 TEST_F(PolicySessionTest, APoseThatCameByMistakeCanBeTakenBack) {
   drive();
   take("DONE");

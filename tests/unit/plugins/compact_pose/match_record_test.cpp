@@ -59,5 +59,17 @@ TEST_F(CompactPoseTest, AsksForNoMoreMatchesThanAllowedAndLearnsWhereTheySucceed
   EXPECT_LT(free.links, 0.55 * (free.even + free.odd));
 }
 
+TEST(MatchRecord, ARevokedMatchWasARequestInVain) {
+  MatchRecord revoked, vain;
+  for (const int pose : {0, 1, 1, 2}) {
+    revoked.note(pose, true);
+    vain.note(pose, pose != 2);
+  }
+  revoked.revoke(2);
+  revoked.revoke(2);  // it never had another
+  revoked.revoke(9);
+  for (const int pose : {0, 1, 2, 3}) EXPECT_EQ(revoked.probability(pose), vain.probability(pose));
+}
+
 }  // namespace
 }  // namespace cairn::compact

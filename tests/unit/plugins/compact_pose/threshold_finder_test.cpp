@@ -152,5 +152,28 @@ TEST(TypicalMatch, IsTheMedianOfTheLatest) {
   EXPECT_EQ(typical.covariance()(0, 0), 9.0);
 }
 
+TEST(TypicalMatch, ForgetsAFalseOne) {
+  const auto match = [](int k) { return Matrix((1.0 + k) * MatrixXd::Identity(3, 3)); };
+  for (const int count : {5, 31, 80}) {  // the ring is not full, full, and has gone round
+    TypicalMatch all, without;
+    for (int k = 0; k < count; ++k) all.note(match(k));
+    // 30 and the one that is forgotten are left of those that came.
+    for (int k = std::max(0, count - 31); k < count; ++k) {
+      if (k != count - 4) without.note(match(k));
+    }
+    all.forget(match(count - 4));
+    all.forget(match(count + 7));  // which never came
+    for (int k = count; k < count + 40; ++k) {
+      EXPECT_EQ(all.covariance(), without.covariance()) << count << " " << k;
+      all.note(match(k));
+      without.note(match(k));
+    }
+  }
+  TypicalMatch one;
+  one.note(match(1));
+  one.forget(match(1));
+  EXPECT_FALSE(one.known());
+}
+
 }  // namespace
 }  // namespace cairn::compact

@@ -18,6 +18,8 @@ struct Arrival {
   /// Factors between this pose and the one before, in either direction; by position in the graph.
   std::vector<int> odometry;
   std::vector<int> links;  ///< all other factors, by position: loop closures, landmarks, priors
+  /// In a `pose_chain`, where `links` are between poses: factors on this pose alone, by position.
+  std::vector<int> priors;
 
   int pose() const { return variables.front(); }
 };
@@ -34,14 +36,14 @@ CAIRN_API bool in_arrival_order(const std::vector<Arrival>& arrivals);
 
 /// The same for a pose graph with unbroken odometry; none for an empty graph. Throws `Error`
 /// (input), with what would work, for anything else: a variable that is not a pose of a Lie group,
-/// or of another type than the first; a factor that is not relative; a pose without a factor to the
-/// one before. With `begin`, only the poses from this id on, without odometry of the first: those
-/// before it are of earlier sessions, and need no odometry. Throws `Error` (input) if it is not
-/// there.
+/// or of another type than the first; a factor that is neither relative nor on one pose; a pose
+/// without a factor to the one before. With `begin`, only the poses from this id on, without
+/// odometry of the first: those before it are of earlier sessions, and need no odometry. Throws
+/// `Error` (input) if it is not there.
 CAIRN_API std::vector<Arrival> pose_chain(const Graph& graph, std::optional<Id> begin = {});
 
-/// What a step brings to an estimator: its variables with their recorded states, then its odometry
-/// and its other factors, so that a pose without a state is initialised from its odometry.
+/// What a step brings to an estimator: its variables with their recorded states, then its odometry,
+/// its links and its priors, so that a pose without a state is initialised from its odometry.
 CAIRN_API GraphUpdate arrival_update(const Graph& graph, const Arrival& arrival);
 
 /// Leaves the initial states to the estimator: empties those of new variables that are not fixed

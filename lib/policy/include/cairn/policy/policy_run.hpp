@@ -27,7 +27,8 @@ struct PolicyData {
   std::optional<Graph> truth_graph;  ///< true states of the same variables, of the same types
   std::optional<Trajectory> truth;   ///< true poses, perhaps of other types
   std::vector<Arrival> poses;
-  std::int64_t loops = 0;  ///< factors besides odometry
+  std::int64_t loops = 0;   ///< factors between poses besides odometry
+  std::int64_t priors = 0;  ///< factors on one pose
 };
 
 /// Throws `Error` (input) as `pose_chain` does. A `truth` that lacks a pose of the recording, or
@@ -55,6 +56,7 @@ struct PolicyResult {
   std::int64_t proposed = 0, registered = 0, kept_loops = 0;
   std::int64_t false_registered = 0, false_kept = 0;  ///< as far as the registration knows
   std::map<std::string, std::int64_t> verdicts;
+  std::int64_t kept_priors = 0;  ///< absolute measurements that are in the graph
   PolicySeconds seconds;
   double registration_seconds = 0.0;
   std::int64_t information_nonzeros = 0, factor_nonzeros = 0;

@@ -32,14 +32,17 @@ struct PolicySettings {
 /// A pose *arrives* with its line and its odometry, is *open* from the first line on that is
 /// neither (then the policy has it), and ends with DONE, the line of the next pose or the input.
 /// Lines of data only collect; every command first *settles* what came before it, and reports the
-/// outcome in its answer. What a command refuses is found before it settles anything.
+/// outcome in its answer; only absolute measurements of the pose wait for its end, when all its
+/// links are there. What a command refuses is found before it settles anything.
 class CAIRN_API PolicySession final : public LineSession {
  public:
   struct Counts {
     std::int64_t poses = 0;       ///< that came
     std::int64_t proposed = 0;    ///< pairs to be matched
     std::int64_t registered = 0;  ///< pairs that were measured
-    std::int64_t linked = 0;      ///< links that are in the graph
+    std::int64_t linked = 0;      ///< links that were used
+    std::int64_t revoked = 0;     ///< REMOVE LINK
+    std::int64_t priors = 0;      ///< absolute measurements that are in the graph
   };
 
   /// What is referred to must outlive the session.
@@ -84,6 +87,7 @@ class CAIRN_API PolicySession final : public LineSession {
   void note_unmatched(const Words& words, Reply& reply);
   void finish_pose(const Words& words, Reply& reply);
   void take_back(const Words& words, Reply& reply);
+  void revoke(const Words& words, Reply& reply);
   void report_covariance(const Words& words, Reply& reply);
   void report_estimate(const Words& words, Reply& reply);
   void report_chi2(const Words& words, Reply& reply);
@@ -95,6 +99,7 @@ class CAIRN_API PolicySession final : public LineSession {
   void take_data(std::string_view text, Reply& reply);
   void take_pose(Variable pose, Reply& reply);
   void take_edge(Factor factor);
+  void take_prior(Factor prior);
   void hold(std::span<const Id> ids);
   Id other_end(std::span<const Id> ends) const;
   void check_motion(const Factor& factor, Id from) const;
@@ -106,6 +111,7 @@ class CAIRN_API PolicySession final : public LineSession {
   void expect_complete() const;
   void begin();
   void offer();
+  void offer_priors();
   void settle(Reply& reply);
   PoseReport end(Reply& reply);
   void close(Reply& reply);
@@ -114,6 +120,7 @@ class CAIRN_API PolicySession final : public LineSession {
   // Answers
   void answer(Reply& reply);
   void note_link(const LinkReport& link);
+  void note_prior(const PriorReport& prior);
   void note_removed();
   void write_results(bool kept);
   bool in_graph(Id id) const;
@@ -130,6 +137,7 @@ class CAIRN_API PolicySession final : public LineSession {
   std::optional<Id> first_, newest_, before_;  ///< that the policy has
   bool open_ = false, finished_ = false, converged_ = true;
   std::optional<Measured> measured_;
+  std::vector<Factor> priors_;        ///< of the open pose
   bool asked_place_ = false;          ///< LOCATE, for the open pose
   std::string asked_;                 ///< MATCH …, while nothing came in answer
   IdRuns arrived_;                    ///< all poses that ever came

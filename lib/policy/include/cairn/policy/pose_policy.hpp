@@ -38,6 +38,15 @@ struct LinkReport {
   LinkVerdict verdict = LinkVerdict::unmatched;
 };
 
+/// The outcome of an absolute measurement of a pose.
+struct PriorReport {
+  Id pose = 0;
+  double gain = 0.0;        ///< ½ ln |I + Σ_r⁻¹ J Σ Jᵀ| of the pose's covariance Σ [nats]
+  double innovation = 0.0;  ///< squared Mahalanobis distance from what was expected
+  /// `linked`: it is in the graph. `waiting`: until enough of them are there (see `offer_prior`).
+  LinkVerdict verdict = LinkVerdict::uninformative;
+};
+
 /// Seconds that a pose took, without the matching itself.
 struct PolicySeconds {
   double total = 0.0;
@@ -56,8 +65,9 @@ struct PoseReport {
   int near = 0;                                                 ///< poses that the index found
   int candidates = 0;                                           ///< those near enough to be matched
   double least_gain = std::numeric_limits<double>::infinity();  ///< among the candidates [nats]
-  std::vector<LinkReport> links;  ///< also earlier ones that had been waiting
-  int removed = 0;                ///< poses that left the graph with it: see `PosePolicy::removed`
+  std::vector<LinkReport> links;    ///< also earlier ones that had been waiting
+  std::vector<PriorReport> priors;  ///< likewise
+  int removed = 0;  ///< poses that left the graph with it: see `PosePolicy::removed`
   PolicySeconds seconds;
   std::vector<std::string> notes;
 };
@@ -95,6 +105,20 @@ class CAIRN_API PosePolicy : public Component {
   /// What was measured between the newest pose and a pose that is kept, proposed or not; nothing:
   /// they do not match. Throws `Error` (input) if the other pose is not there (any more).
   virtual LinkReport offer(Id other, std::span<const Factor> measured) = 0;
+  /// An absolute measurement of the newest pose, such as a position from GPS: a factor on it alone.
+  /// It is judged as a link is: in the graph if its information gain exceeds a threshold; its pose
+  /// is kept then. Offer it after the links of the pose, which leave less for it to add. Where
+  /// nothing absolute is in the graph yet, neither a fixed pose nor a measurement, it waits until
+  /// the measurements that do determine together where the graph is; then all are used. Throws
+  /// `Error` (input) for a factor that is not on the newest pose alone, or while it is unknown
+  /// where the trajectory is on a map; (usage) unless a policy overrides it.
+  virtual PriorReport offer_prior(const Factor& measured);
+  /// Takes a link back that was false: the graph is as if there had never been one between these
+  /// two poses, and so is what was learnt from it; which poses are kept stays as it was decided. At
+  /// any time; one that waits waits no more. False if there is no such link. Throws `Error`
+  /// (input), and changes nothing, if it cannot be separated from other measurements any more;
+  /// (usage) unless a policy overrides it.
+  virtual bool revoke(Id a, Id b);
   /// Ends the pose: decides whether to keep it.
   virtual PoseReport end_pose() = 0;
   /// Ends the trajectory: the newest pose is kept in any case, and everything is solved to
@@ -139,8 +163,10 @@ class CAIRN_API OptionFinder {
 
 /// One pose, from `add_pose` to `end_pose`: what the policy proposes is matched by `registration`,
 /// which is also asked to recognise a place while it is unknown where the trajectory is on a map.
+/// `priors` are absolute measurements of the pose; they are not used while that is unknown.
 CAIRN_API PoseReport process_pose(const Variable& pose, std::span<const Factor> odometry,
-                                  PosePolicy& policy, Registration& registration);
+                                  PosePolicy& policy, Registration& registration,
+                                  std::span<const Factor> priors = {});
 
 /// Feeds the first poses of a recording to a policy, matching by `registration`. `each` is called
 /// for every pose, and stops the run by returning false. The policy is finished at the end; false
