@@ -78,6 +78,11 @@ CompactPose::CompactPose(std::unique_ptr<Estimator> estimator, CompactPoseOption
 }
 
 void CompactPose::start(const Variable& pose) {
+  if (options_.search == Search::recorded && !recorded_) {
+    throw Error(ErrorCode::usage,
+                "compact_pose: search=recorded is for a recording, whose measurements are known "
+                "before: give search=index");
+  }
   // Before anything has changed: what the options say fits this type of pose.
   const Matrix sensor = sensor_covariance(options_.sensor, RigidGroup(pose.type));
   graph_.start(pose, report_.seconds);
@@ -93,6 +98,34 @@ void CompactPose::start(const Variable& pose) {
   };
   loop_gain_ = threshold(options_.strategy == Strategy::apal, options_.loop_gain, 1.36);
   pose_gain_ = threshold(options_.strategy != Strategy::fpfl, options_.pose_gain, 1.7);
+}
+
+void CompactPose::expect(const Graph& recording, std::span<const Arrival> poses) {
+  if (options_.search != Search::recorded) return;
+  recorded_.emplace();
+  for (const Arrival& arrival : poses) {
+    const Id pose = recording.id(arrival.pose());
+    for (const int f : arrival.links) {
+      for (const int v : recording.factor_variables(f)) {
+        if (recording.id(v) != pose) (*recorded_)[pose].push_back(recording.id(v));
+      }
+    }
+  }
+}
+
+/// What `Search::untested` comes to where only these match, without the square of the number of
+/// poses. The pose before is among them: the newest depends on all others by its odometry from
+/// there alone, so that no other has a smaller information gain (Σ_in ⪰ Σ of that odometry).
+std::vector<int> CompactPose::recorded_pairs() const {
+  std::vector<int> poses{graph_.predecessor()};
+  if (const auto others = recorded_->find(graph_.newest_id()); others != recorded_->end()) {
+    for (const Id other : others->second) {
+      if (const int pose = graph_.find(other); pose >= 0) poses.push_back(pose);
+    }
+  }
+  std::ranges::sort(poses);
+  poses.erase(std::unique(poses.begin(), poses.end()), poses.end());
+  return poses;
 }
 
 void CompactPose::load(const Graph& map) {
@@ -196,7 +229,8 @@ void CompactPose::search() {
   searched_ = true;
   if (graph_.predecessor() < 0) return;
   const Timed timed(report_.seconds.search);
-  const std::vector<int> near = graph_.near(radius_);
+  const bool recorded = options_.search == Search::recorded;
+  const std::vector<int> near = recorded ? recorded_pairs() : graph_.near(radius_);
   std::vector<int> possible;
   for (const int pose : near) {
     if (options_.search == Search::index && !test_->possible(graph_.newest_seen_from(pose)))
@@ -204,7 +238,8 @@ void CompactPose::search() {
     possible.push_back(pose);
   }
   const double solving = report_.seconds.covariances;
-  if (!std::ranges::all_of(possible, [&](int pose) { return graph_.prepared(pose); })) {
+  if (!recorded &&
+      !std::ranges::all_of(possible, [&](int pose) { return graph_.prepared(pose); })) {
     // Where nothing has changed for more than one pose, those that the next will need as well.
     if (solved_version_ == graph_.version())
       graph_.prepare(graph_.near(kAhead * radius_), report_.seconds);
@@ -217,7 +252,8 @@ void CompactPose::search() {
     Displacement d = graph_.displacement(pose);
     graph_.set_covariance(pose, d);
     const Dimensions dimensions = test_->dimensions(d);
-    if (options_.search != Search::untested && !test_->passes(dimensions)) continue;
+    const bool tested = options_.search == Search::index || options_.search == Search::all;
+    if (tested && !test_->passes(dimensions)) continue;
     const double gain = mutual_information(expected_, d.covariance);
     ++report_.candidates;
     report_.least_gain = std::min(report_.least_gain, gain);
@@ -437,6 +473,8 @@ PoseReport CompactPose::end_pose() {
       graph_.keep(report_.seconds);
     if (graph_.predecessor() >= 0 && report_.candidates > 0 && options_.keep == 0)
       finder_.note_pose(report_.least_gain);
+    for (const Candidate& left : candidates_)
+      report_.most_gain = std::max(report_.most_gain, left.gain);
     make_room();
   }
   open_ = false;
@@ -463,8 +501,8 @@ void* CompactPose::ability(std::string_view name) {
   return PosePolicy::ability(name);
 }
 
-OptionValues CompactPose::watching() const {
-  return {{"strategy", "apal"}, {"search", "untested"}, {"keep", "0"}};
+OptionValues CompactPose::watching(bool recorded_only) const {
+  return {{"strategy", "apal"}, {"search", recorded_only ? "recorded" : "untested"}, {"keep", "0"}};
 }
 
 OptionValues CompactPose::found() const { return finder_.found(range_.probability); }
