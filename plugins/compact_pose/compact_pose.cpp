@@ -63,7 +63,8 @@ CompactPose::CompactPose(std::unique_ptr<Estimator> estimator, CompactPoseOption
     : options_(std::move(options)),
       remover_(std::move(remover)),
       range_(options_.sensor_range()),
-      graph_(std::move(estimator), options_.composition) {
+      graph_(std::move(estimator), options_.composition,
+             options_.search == Search::recorded ? KeptMarginals::none : KeptMarginals::diagonal) {
   if (options_.keep == 1) {
     throw Error(ErrorCode::usage,
                 "compact_pose: keep=1: the first pose and the newest one stay in any case; "
