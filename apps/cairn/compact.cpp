@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // cairn compact GRAPH: compact pose SLAM, which keeps the poses and loop closures that tell most.
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <memory>
+#include <string_view>
 #include <utility>
 
 #include <fmt/core.h>
@@ -12,6 +14,7 @@
 #include "arguments.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/policy/policy_run.hpp"
+#include "cairn/policy/selection_check.hpp"
 #include "cairn/policy/threshold_search.hpp"
 #include "cairn/policy/uncertainty_comparison.hpp"
 #include "cairn/runtime/error.hpp"
@@ -105,8 +108,6 @@ bool names_thresholds(const CompactOptions& options, const ComponentSpec& policy
 
 /// With fewer loop closures in it, a sample is extended.
 constexpr std::int64_t kLeastLoops = 3;
-/// With more of the poses, a graph is not compact.
-constexpr double kNotCompact = 0.9;
 
 /// What to run, and the thresholds that were found, or read.
 struct Job {
@@ -188,19 +189,47 @@ void check(const CompactOptions& options, Session& session) {
     throw Error(ErrorCode::usage, "--auto finds thresholds, --thresholds reads them: give one");
 }
 
-/// A user who asked for few poses and got all of them is told why, and what would help.
-void note_size(const CompactOptions& options, const CompactOutcome& outcome,
-               const Session& session) {
+/// The options by their names on the command line. One that is given stops the search of the others
+/// unless `--auto` asks for it.
+std::string option_words(const OptionValues& options, const std::string& policy, bool automatic) {
+  constexpr std::array<std::pair<std::string_view, std::string_view>, 5> kNames{
+      {{"range", "--range"},
+       {"angle", "--angle"},
+       {"loop_gain", "--loop-gain"},
+       {"pose_gain", "--pose-gain"},
+       {"gate", "--gate"}}};
+  std::string words;
+  for (const auto& [option, value] : options) {
+    const auto* const known =
+        std::ranges::find(kNames, option, [](const auto& n) { return n.first; });
+    if (!words.empty()) words += value.empty() ? " and " : " ";
+    if (known == kNames.end()) {
+      words += fmt::format("--policy {}:{}={}", policy, option, value);
+    } else if (value.empty()) {
+      words += fmt::format("a larger {}", known->second);
+    } else {
+      words += fmt::format("{} {}", known->second, value);
+    }
+  }
+  return automatic && !words.starts_with("a ") ? "--auto " + words : words;
+}
+
+/// A user who asked for few poses and got all of them, or no loop closure, learns why, and what
+/// would help.
+void note_selection(const CompactOptions& options, const CompactOutcome& outcome,
+                    const Session& session) {
   const PolicyResult& result = outcome.result;
-  const auto in = static_cast<double>(std::ssize(result.poses));
-  const double kept = (result.compact.variable_count() - result.map_poses) / in;
-  if (options.strategy != "fpfl" || result.interrupted || in < 10.0 || kept < kNotCompact) return;
-  session.note(fmt::format(
-      "{:.0f} % of the poses are kept: each step of odometry gains more than pose_gain. A larger "
-      "--pose-gain keeps fewer, with a larger error; --registration simulated:range=… (with "
-      "--truth) "
-      "shows what a sensor that matches every pair within its range would allow",
-      100.0 * kept));
+  if (options.strategy != "fpfl" || result.interrupted || !result.located) return;
+  SelectionCheck check;
+  for (const PoseReport& pose : result.poses) check.add(pose);
+  const bool automatic = outcome.found.seconds > 0.0;
+  for (const SelectionCheck::Advice& advice :
+       check.advice(automatic ? &outcome.found : nullptr, outcome.data.loops)) {
+    session.note(
+        fmt::format("{}; {} {}", advice.finding,
+                    option_words(advice.options, parse_component(options.policy).name, automatic),
+                    advice.effect));
+  }
 }
 
 }  // namespace
@@ -274,7 +303,7 @@ int run_compact(const CompactOptions& options, Session& session) {
     if (comparison) report["compare"] = comparison_json(comparison->steps());
     session.write_json(report);
   });
-  note_size(options, outcome, session);
+  note_selection(options, outcome, session);
   results.add([&] { session.print(summary_text(options, outcome)); });
   results.finish();
   if (guard.interrupted()) return kExitInterrupted;

@@ -22,9 +22,10 @@ using Clock = std::chrono::steady_clock;
 
 }  // namespace
 
-CompactGraph::CompactGraph(std::unique_ptr<Estimator> estimator, CompositionOrder order)
+CompactGraph::CompactGraph(std::unique_ptr<Estimator> estimator, CompositionOrder order,
+                           KeptMarginals marginals)
     : estimator_(std::move(estimator)), order_(order) {
-  estimator_->keep_marginals(KeptMarginals::diagonal);
+  estimator_->keep_marginals(marginals);
 }
 
 void CompactGraph::load(const Graph& map) {

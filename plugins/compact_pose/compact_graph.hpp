@@ -43,7 +43,10 @@ class CompactGraph {
     std::string note;      ///< why more stay than there is room for; empty: they do not
   };
 
-  CompactGraph(std::unique_ptr<Estimator> estimator, CompositionOrder order);
+  /// `marginals`: what the estimator keeps, which costs time with each link; the diagonal if many
+  /// poses are candidates at a time, nothing if few are.
+  CompactGraph(std::unique_ptr<Estimator> estimator, CompositionOrder order,
+               KeptMarginals marginals = KeptMarginals::diagonal);
 
   /// With everything that is kept: the estimator, or while it does not have all odometry yet, a
   /// copy that has. Good until the graph changes; reading it changes no later result.

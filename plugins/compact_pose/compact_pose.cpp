@@ -63,7 +63,8 @@ CompactPose::CompactPose(std::unique_ptr<Estimator> estimator, CompactPoseOption
     : options_(std::move(options)),
       remover_(std::move(remover)),
       range_(options_.sensor_range()),
-      graph_(std::move(estimator), options_.composition) {
+      graph_(std::move(estimator), options_.composition,
+             options_.search == Search::recorded ? KeptMarginals::none : KeptMarginals::diagonal) {
   if (options_.keep == 1) {
     throw Error(ErrorCode::usage,
                 "compact_pose: keep=1: the first pose and the newest one stay in any case; "
@@ -78,6 +79,11 @@ CompactPose::CompactPose(std::unique_ptr<Estimator> estimator, CompactPoseOption
 }
 
 void CompactPose::start(const Variable& pose) {
+  if (options_.search == Search::recorded && !recorded_) {
+    throw Error(ErrorCode::usage,
+                "compact_pose: search=recorded is for a recording, whose measurements are known "
+                "before: give search=index");
+  }
   // Before anything has changed: what the options say fits this type of pose.
   const Matrix sensor = sensor_covariance(options_.sensor, RigidGroup(pose.type));
   graph_.start(pose, report_.seconds);
@@ -96,6 +102,34 @@ void CompactPose::start(const Variable& pose) {
   prior_gain_ = loop_gain_;
   if (options_.prior_gain >= 0.0 && options_.strategy != Strategy::apal)
     prior_gain_ = options_.prior_gain;
+}
+
+void CompactPose::expect(const Graph& recording, std::span<const Arrival> poses) {
+  if (options_.search != Search::recorded) return;
+  recorded_.emplace();
+  for (const Arrival& arrival : poses) {
+    const Id pose = recording.id(arrival.pose());
+    for (const int f : arrival.links) {
+      for (const int v : recording.factor_variables(f)) {
+        if (recording.id(v) != pose) (*recorded_)[pose].push_back(recording.id(v));
+      }
+    }
+  }
+}
+
+/// What `Search::untested` comes to where only these match, without the square of the number of
+/// poses. The pose before is among them: the newest depends on all others by its odometry from
+/// there alone, so that no other has a smaller information gain (Σ_in ⪰ Σ of that odometry).
+std::vector<int> CompactPose::recorded_pairs() const {
+  std::vector<int> poses{graph_.predecessor()};
+  if (const auto others = recorded_->find(graph_.newest_id()); others != recorded_->end()) {
+    for (const Id other : others->second) {
+      if (const int pose = graph_.find(other); pose >= 0) poses.push_back(pose);
+    }
+  }
+  std::ranges::sort(poses);
+  poses.erase(std::unique(poses.begin(), poses.end()), poses.end());
+  return poses;
 }
 
 void CompactPose::load(const Graph& map) {
@@ -206,7 +240,8 @@ void CompactPose::search() {
   searched_ = true;
   if (graph_.predecessor() < 0) return;
   const Timed timed(report_.seconds.search);
-  const std::vector<int> near = graph_.near(radius_);
+  const bool recorded = options_.search == Search::recorded;
+  const std::vector<int> near = recorded ? recorded_pairs() : graph_.near(radius_);
   std::vector<int> possible;
   for (const int pose : near) {
     if (options_.search == Search::index && !test_->possible(graph_.newest_seen_from(pose)))
@@ -214,7 +249,8 @@ void CompactPose::search() {
     possible.push_back(pose);
   }
   const double solving = report_.seconds.covariances;
-  if (!std::ranges::all_of(possible, [&](int pose) { return graph_.prepared(pose); })) {
+  if (!recorded &&
+      !std::ranges::all_of(possible, [&](int pose) { return graph_.prepared(pose); })) {
     // Where nothing has changed for more than one pose, those that the next will need as well.
     if (solved_version_ == graph_.version())
       graph_.prepare(graph_.near(kAhead * radius_), report_.seconds);
@@ -227,7 +263,8 @@ void CompactPose::search() {
     Displacement d = graph_.displacement(pose);
     graph_.set_covariance(pose, d);
     const Dimensions dimensions = test_->dimensions(d);
-    if (options_.search != Search::untested && !test_->passes(dimensions)) continue;
+    const bool tested = options_.search == Search::index || options_.search == Search::all;
+    if (tested && !test_->passes(dimensions)) continue;
     const double gain = mutual_information(expected_, d.covariance);
     ++report_.candidates;
     report_.least_gain = std::min(report_.least_gain, gain);
@@ -452,6 +489,8 @@ PoseReport CompactPose::end_pose() {
       graph_.keep(report_.seconds);
     if (graph_.predecessor() >= 0 && report_.candidates > 0 && options_.keep == 0)
       finder_.note_pose(report_.least_gain);
+    for (const Candidate& left : candidates_)
+      report_.most_gain = std::max(report_.most_gain, left.gain);
     make_room();
   }
   open_ = false;
@@ -478,8 +517,8 @@ void* CompactPose::ability(std::string_view name) {
   return PosePolicy::ability(name);
 }
 
-OptionValues CompactPose::watching() const {
-  return {{"strategy", "apal"}, {"search", "untested"}, {"keep", "0"}};
+OptionValues CompactPose::watching(bool recorded_only) const {
+  return {{"strategy", "apal"}, {"search", recorded_only ? "recorded" : "untested"}, {"keep", "0"}};
 }
 
 OptionValues CompactPose::found() const { return finder_.found(range_.probability); }

@@ -7,6 +7,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <unordered_map>
 #include <vector>
 
 #include "absolute.hpp"
@@ -44,6 +45,7 @@ class CompactPose final : public PosePolicy, public OptionFinder {
   CompactPose(std::unique_ptr<Estimator> estimator, CompactPoseOptions options,
               std::unique_ptr<PoseRemover> remover = nullptr);
 
+  void expect(const Graph& recording, std::span<const Arrival> poses) override;
   void load(const Graph& map) override;
   std::vector<Id> unlocated() const override;
   void add_pose(const Variable& pose, std::span<const Factor> odometry) override;
@@ -63,7 +65,7 @@ class CompactPose final : public PosePolicy, public OptionFinder {
   void keep_chains(bool keep) override { graph_.keep_chains(keep); }
 
   void* ability(std::string_view name) override;
-  OptionValues watching() const override;
+  OptionValues watching(bool recorded_only) const override;
   OptionValues found() const override;
   /// `loop_gain` and `pose_gain` times the factors.
   OptionValues scaled(const OptionValues& found, double links, double poses) const override;
@@ -102,6 +104,7 @@ class CompactPose final : public PosePolicy, public OptionFinder {
   void expect_matches();
   bool answered(int pose) const;
   void search();
+  std::vector<int> recorded_pairs() const;
   Displacement known_displacement(int pose);
   std::optional<Candidate> take_candidate(int pose);
   double expected_gain(int pose);
@@ -125,6 +128,9 @@ class CompactPose final : public PosePolicy, public OptionFinder {
   CompactGraph graph_;
   std::optional<DistanceTest> test_;
   std::optional<ConsistencyCheck> check_;
+  /// With `Search::recorded`, by pose: the others of which the recording has a measurement; none
+  /// without a recording.
+  std::optional<std::unordered_map<Id, std::vector<Id>>> recorded_;
   double radius_ = 0.0;  ///< no pose farther away can be a candidate [m]
   Matrix sensor_;        ///< Σ̄_y, if it was given; else that of `typical_`
   double loop_gain_ = 0.0, pose_gain_ = 0.0, prior_gain_ = 0.0;

@@ -73,7 +73,8 @@ OptionFields<CompactPoseOptions> CompactPoseOptions::fields() {
               "order of the covariance of composed relative poses: Smith and Cheeseman, Barfoot "
               "and Furgale")
       .choice("search", &O::search,
-              "candidates from a spatial index, by testing all poses, or all poses without a test")
+              "candidates from a spatial index, by testing all poses, all poses without a test, or "
+              "of a recording those of which it has a measurement")
       .real("gate", &O::gate, 0.0, 0.999999,
             "fraction of the correct links that pass the consistency check; 0: no check")
       .real("trust", &O::trust, 0.0, 1.0,

@@ -34,10 +34,13 @@ enum class Search {
   index,     ///< those that the spatial index finds
   all,       ///< all of them, which finds the same
   untested,  ///< all count as near
+  recorded,  ///< those of which the recording has a measurement count as near
 };
 constexpr auto enum_names(Search) {
-  return std::to_array<EnumName<Search>>(
-      {{Search::index, "index"}, {Search::all, "all"}, {Search::untested, "untested"}});
+  return std::to_array<EnumName<Search>>({{Search::index, "index"},
+                                          {Search::all, "all"},
+                                          {Search::untested, "untested"},
+                                          {Search::recorded, "recorded"}});
 }
 
 /// Options of the pose policy `compact_pose`.

@@ -88,6 +88,8 @@ class Recorded final : public Registration, public FalseMatches {
     if (!kept) left_out_.insert(pose);
   }
 
+  bool matches_recorded_only() const override { return true; }
+
   bool was_false(Id earlier, Id later) const override {
     const Pair pair = pair_of(earlier, later);
     return (factors_.contains(pair) || carried_.contains(pair)) &&

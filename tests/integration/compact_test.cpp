@@ -17,6 +17,7 @@ namespace {
 
 using testing::AllOf;
 using testing::HasSubstr;
+using testing::Not;
 using testing::SizeIs;
 using testing::StartsWith;
 
@@ -262,6 +263,36 @@ TEST_F(Compact, SaysWhatIsWrongAndWhatWouldWork) {
               HasSubstr("does not find its options"));
   EXPECT_THAT(refused({kWorld, "--range", "3", "-o", "-", "--trajectory", "-"}, 2),
               HasSubstr("standard output"));
+}
+
+TEST_F(Compact, SaysWhatWouldHelpWhereTheSelectionIsOfNoUse) {
+  const Arguments sensor{"compact", kWorld, "--range", "4", "--angle", "3.15"};
+  const auto run = [&](Arguments more) {
+    more.insert(more.begin(), sensor.begin(), sensor.end());
+    return cairn(more).err;
+  };
+  const std::string all = run({"--pose-gain", "0.5", "--loop-gain", "8"});
+  EXPECT_THAT(all, HasSubstr("% of the poses are kept: "));
+  const std::string option = "; --pose-gain ";
+  const std::size_t at = all.find(option);
+  ASSERT_NE(at, std::string::npos) << all;
+  std::string gain;
+  std::istringstream(all.substr(at + option.size())) >> gain;
+  EXPECT_THAT(run({"--pose-gain", gain, "--loop-gain", "8"}),
+              Not(HasSubstr("of the poses are kept")));
+  EXPECT_THAT(run({"--loop-gain", "1000"}),
+              AllOf(HasSubstr("no loop closure is used: "), HasSubstr("; --loop-gain ")));
+}
+
+TEST_F(Compact, AdviceThatFollowsASearchAsksForItAgain) {
+  const std::string world = "@manhattan:poses=120,streets=3";
+  const Outcome strict = cairn({"study", "compact", world, "--error-ratio", "0.01"});
+  EXPECT_THAT(strict.err,
+              AllOf(HasSubstr("100 % of the poses are kept"), HasSubstr("; --auto --")));
+  std::istringstream advice(strict.err.substr(strict.err.find("; --auto") + 2));
+  Arguments options{world};
+  for (std::string word; advice >> word && word != "keep";) options.push_back(word);
+  EXPECT_LT(whole(report(options), "poses", "kept"), 100);
 }
 
 TEST_F(Compact, RefusesAnEdgeThatLeavesADirectionUnknown) {

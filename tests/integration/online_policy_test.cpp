@@ -132,6 +132,21 @@ TEST_F(OnlinePolicy, ReportsWhatWasKept) {
   EXPECT_EQ(report.at("loops").at("proposed").as_int64(), dialogue.count("MATCH") - 200);
 }
 
+TEST_F(OnlinePolicy, EndsWithWhatWouldHelpWhereEveryPoseIsKept) {
+  const std::string graph = generate("manhattan:poses=100");
+  const std::string all = kPolicy + ",loop_gain=8,pose_gain=0.5";
+  const Dialogue dialogue = drive(graph, online(all));
+  EXPECT_GT(dialogue.kept().size(), 90U);
+  const std::string heard = joined(dialogue.heard), advice = "; pose_gain=";
+  const std::size_t at = heard.find(advice);
+  ASSERT_NE(at, std::string::npos) << heard;
+  EXPECT_THAT(heard, HasSubstr("NOTE 100 % of the poses are kept: "));
+  const std::string gain = words(heard.substr(at + advice.size())).front();
+  const Dialogue fewer = drive(graph, online(kPolicy + ",loop_gain=8,pose_gain=" + gain));
+  EXPECT_LT(fewer.kept().size(), 60U);
+  EXPECT_EQ(joined(fewer.heard).find("of the poses are kept"), std::string::npos);
+}
+
 TEST(OnlineHelp, FitsAScreen) {
   const Lines help = lines(cairn({"online", "--help"}).out);
   EXPECT_LE(help.size(), 40U);

@@ -46,8 +46,8 @@ CompactThresholds find_compact_thresholds(const Bench& bench, const DataSet& set
 /// Algorithm 1 of the paper, without relocation.
 inline constexpr const char* kAsPublished = "compact_pose:reuse=false";
 /// Policy of APAL: no pair of poses is tested for being near (s = 0), so that every loop closure of
-/// a recording is found. It costs a gain for each pair of poses.
-inline constexpr const char* kAllLoops = "compact_pose:search=untested";
+/// a recording is found.
+inline constexpr const char* kAllLoops = "compact_pose:search=recorded";
 
 /// All poses, and all loops that the distance test finds ("tested"), then few of both with each of
 /// these thresholds.

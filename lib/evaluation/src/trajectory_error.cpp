@@ -306,4 +306,9 @@ TrajectoryError compare(const Trajectory& estimate, const Trajectory& truth) {
   return compare(pair_by_id(estimate, truth));
 }
 
+double absolute_error(const Trajectory& estimate, const Trajectory& truth) {
+  const Pairs pairs = pairs_of(pair_by_id(estimate, truth));
+  return std::sqrt(absolute_errors(pairs).translation / static_cast<double>(pairs.size()));
+}
+
 }  // namespace cairn

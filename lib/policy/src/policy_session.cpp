@@ -290,6 +290,7 @@ PoseReport PolicySession::end(Reply& reply) {
   settle(reply);
   offer_priors();
   PoseReport report = policy_.end_pose();
+  selection_.add(report);
   open_ = false;
   arrived_.insert(report.id);
   if (report.kept) kept_.insert(report.id);
@@ -344,12 +345,21 @@ void PolicySession::finish_trajectory() {
         "NOTE no pose was matched with one of the map: the two are not connected, and their "
         "relative position is unknown\n";
   }
+  note_selection();
   finished_ = true;
   if (!newest_) return;
   kept_.insert(*newest_);
   answer_ += fmt::format("KEPT {}\n", *newest_);
   note_removed();
   write_results(true);
+}
+
+/// Whether everything was kept, or nothing matched, and what would change it: of a policy that has
+/// thresholds.
+void PolicySession::note_selection() {
+  if (!query<OptionFinder>(policy_) || !located()) return;
+  for (const SelectionCheck::Advice& advice : selection_.advice())
+    answer_ += fmt::format("NOTE {}\n", to_string(advice));
 }
 
 // Commands ----------------------------------------------------------------------------------------

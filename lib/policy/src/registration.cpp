@@ -8,6 +8,7 @@ std::vector<Factor> Registration::match_proposed(const MatchProposal& proposal) 
   return match(proposal.earlier, proposal.later);
 }
 void Registration::pose_ended(Id, bool) {}
+bool Registration::matches_recorded_only() const { return false; }
 FalseMatches::~FalseMatches() = default;
 
 std::optional<RecognisedPlace> Registration::recognise(std::span<const Id> places, Id pose) {

@@ -99,9 +99,9 @@ ThresholdTrial try_thresholds(const Sample& sample, const OptionValues& options,
   const Graph compact = run.policy().estimator().graph();
   result.poses_kept = compact.variable_count();
   result.loops_kept = run.counts().kept_loops;
-  const double apart = compare(trajectory(recovered_trajectory(run.policy(), Recovery::likely)),
-                               sample.everything.trajectory)
-                           .ate_translation;
+  const double apart =
+      absolute_error(trajectory(recovered_trajectory(run.policy(), Recovery::likely)),
+                     sample.everything.trajectory);
   result.expected = sample.everything.noise *
                     expected_error(run.policy(), nearest(sample.everything.poses, ids_of(compact)));
   result.realised = std::hypot(sample.everything.expected, apart);
@@ -128,7 +128,8 @@ void refine_thresholds(const OptionFinder& finder, const ThresholdTest& test,
   const auto attempt = [&](double links, double poses) {
     const OptionValues options = finder.scaled(first, links, poses);
     found.trials.push_back(test(options, links, poses));
-    const ThresholdTrial& trial = found.trials.back();
+    ThresholdTrial& trial = found.trials.back();
+    trial.options = options;
     good = trial.error() <= found.tolerance;
     if (good || trial.error() < least) {  // if none is good, the one with the least error
       found.options = options;
@@ -177,7 +178,9 @@ FoundThresholds find_thresholds(const PolicyJob& job, std::size_t count, double 
   const auto begin = Clock::now();
   PolicyJob watching = job;
   const auto chosen = setting.registry.make<PosePolicy>(job.policy);
-  for (const auto& [name, value] : finder_of(*chosen, job).watching())
+  const bool recorded_only =
+      setting.registry.make<Registration>(job.registration)->matches_recorded_only();
+  for (const auto& [name, value] : finder_of(*chosen, job).watching(recorded_only))
     watching.policy.values.insert_or_assign(name, value);
   PolicyRun watch(watching, setting);
   watch.run(count, "sample");

@@ -112,9 +112,11 @@ void expect_errors(const std::array<Change, 4>& changes, const Six& expected, Wh
   for (const bool in_space : {true, false}) {
     if (!in_space && where == Where::in_space) continue;
     SCOPED_TRACE(in_space ? "in space" : "in the plane");
-    const TrajectoryError error =
-        compare(square(changes, in_space ? askew : here), square({}, in_space ? elsewhere : here));
+    const Trajectory estimate = square(changes, in_space ? askew : here),
+                     truth = square({}, in_space ? elsewhere : here);
+    const TrajectoryError error = compare(estimate, truth);
     EXPECT_EQ(error.poses, 4);
+    EXPECT_EQ(absolute_error(estimate, truth), error.ate_translation);
     EXPECT_NEAR(error.ate_translation, expected.ate_translation, 1e-12);
     EXPECT_NEAR(error.ate_rotation, expected.ate_rotation, 1e-6);
     EXPECT_NEAR(error.rpe_translation, expected.rpe_translation, 1e-12);

@@ -24,7 +24,7 @@ using ::testing::SizeIs;
 /// Writes the factors into the options, so that it is seen which were chosen.
 class Factors final : public OptionFinder {
  public:
-  OptionValues watching() const override { return {}; }
+  OptionValues watching(bool) const override { return {}; }
   OptionValues found() const override { return {{"loop_gain", "1"}}; }
   OptionValues scaled(const OptionValues& found, double links, double poses) const override {
     EXPECT_EQ(found.at("loop_gain"), "first");

@@ -194,7 +194,7 @@ TEST_F(CompactPoseTest, FindsThresholdsThatLoseNoLoopOfTheSample) {
   auto* finder = query<OptionFinder>(*policy);
   ASSERT_NE(finder, nullptr);
   EXPECT_THAT(message_of([&] { finder->found(); }, ErrorCode::input), HasSubstr("no loop"));
-  OptionValues watching = finder->watching();
+  OptionValues watching = finder->watching(false);
   watching["probability"] = "0.1";
   const auto registration = registry.make<Registration>("simulated:range=2.5,angle=1");
   registration->begin({.recording = &world.graph, .truth = &world.truth});
@@ -220,6 +220,39 @@ TEST_F(CompactPoseTest, FindsThresholdsThatLoseNoLoopOfTheSample) {
   EXPECT_GT(found_again.size(), 50U);
   EXPECT_EQ(std::set<Pair>(linked.begin(), linked.end()),
             std::set<Pair>(found_again.begin(), found_again.end()));
+}
+
+/// Of a recording, where the others do not match: the same, without the gain of every pair.
+TEST_F(CompactPoseTest, OnlyThePairsOfARecordingNeedToBeAskedFor) {
+  for (const char* generator :
+       {"manhattan:poses=250,streets=5", "sphere:turns=6,poses_per_turn=16,radius=6"}) {
+    const Simulation world = simulate(registry, generator);
+    const PolicyRun all =
+        run(registry, world, "compact_pose:strategy=apal,search=untested", "recorded");
+    const PolicyRun recorded =
+        run(registry, world, "compact_pose:strategy=apal,search=recorded", "recorded");
+    EXPECT_GT(recorded.links().size(), 50U);
+    EXPECT_EQ(recorded.links(), all.links());
+    EXPECT_THAT(recorded.links(LinkVerdict::unmatched), IsEmpty());
+    ASSERT_EQ(recorded.reports.size(), all.reports.size());
+    for (std::size_t k = 1; k < all.reports.size(); ++k) {
+      const PoseReport &a = all.reports[k], &b = recorded.reports[k];
+      ASSERT_NEAR(a.least_gain, b.least_gain, 1e-9 * (1.0 + a.least_gain)) << k;
+      ASSERT_LE(b.candidates, a.candidates);
+    }
+    const OptionValues expected = query<OptionFinder>(*all.policy)->found();
+    const OptionValues found = query<OptionFinder>(*recorded.policy)->found();
+    for (const char* name : {"range", "angle", "loop_gain", "pose_gain"}) {
+      const double value = std::stod(expected.at(name));
+      EXPECT_NEAR(std::stod(found.at(name)), value, 1e-6 * value) << name;
+    }
+    EXPECT_EQ(found.at("sensor"), expected.at("sensor"));
+  }
+}
+
+TEST_F(CompactPoseTest, PairsOfARecordingNeedOne) {
+  EXPECT_THAT(message_of([&] { Robot(registry, "search=recorded"); }, ErrorCode::usage),
+              HasSubstr("is for a recording"));
 }
 
 }  // namespace

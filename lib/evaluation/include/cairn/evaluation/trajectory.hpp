@@ -96,5 +96,7 @@ CAIRN_API Pose align(const TrajectoryPairs& pairs);
 CAIRN_API TrajectoryError compare(const TrajectoryPairs& pairs);
 /// The same for poses of equal id.
 CAIRN_API TrajectoryError compare(const Trajectory& estimate, const Trajectory& truth);
+/// `ate_translation` of that alone [m], in linear time.
+CAIRN_API double absolute_error(const Trajectory& estimate, const Trajectory& truth);
 
 }  // namespace cairn

@@ -16,6 +16,7 @@
 #include "cairn/plugin/registry.hpp"
 #include "cairn/policy/id_runs.hpp"
 #include "cairn/policy/pose_policy.hpp"
+#include "cairn/policy/selection_check.hpp"
 #include "cairn/runtime/api.hpp"
 
 namespace cairn {
@@ -116,6 +117,7 @@ class CAIRN_API PolicySession final : public LineSession {
   PoseReport end(Reply& reply);
   void close(Reply& reply);
   void finish_trajectory();
+  void note_selection();
 
   // Answers
   void answer(Reply& reply);
@@ -148,6 +150,7 @@ class CAIRN_API PolicySession final : public LineSession {
 
   std::unordered_map<Id, std::string> reported_states_;  ///< for `changed`
   Counts counts_;
+  SelectionCheck selection_;
 };
 
 }  // namespace cairn

@@ -65,6 +65,7 @@ struct PoseReport {
   int near = 0;                                                 ///< poses that the index found
   int candidates = 0;                                           ///< those near enough to be matched
   double least_gain = std::numeric_limits<double>::infinity();  ///< among the candidates [nats]
+  double most_gain = 0.0;           ///< expected of those that were not proposed, at most [nats]
   std::vector<LinkReport> links;    ///< also earlier ones that had been waiting
   std::vector<PriorReport> priors;  ///< likewise
   int removed = 0;  ///< poses that left the graph with it: see `PosePolicy::removed`
@@ -148,7 +149,8 @@ class CAIRN_API OptionFinder {
   static constexpr std::string_view kAbility = "option_finder";
   virtual ~OptionFinder();
   /// The options with which to process a sample of the data: all measurements are used.
-  virtual OptionValues watching() const = 0;
+  /// `recorded_only`: as `Registration::matches_recorded_only` has it.
+  virtual OptionValues watching(bool recorded_only) const = 0;
   /// What it would choose after that. Throws `Error` (input) if the sample does not determine it.
   virtual OptionValues found() const = 0;
   /// A choice that accepts more than `found` (factors < 1) or less (> 1): of links, and of poses.

@@ -56,6 +56,9 @@ class CAIRN_API Registration : public Component {
   /// Called after each pose of a run: whether the policy keeps it; and again with false for a pose
   /// that was kept when it leaves. Does nothing unless overridden.
   virtual void pose_ended(Id pose, bool kept);
+  /// Whether, while every pose is kept, only pairs match of which the recording has a measurement:
+  /// a policy that has to find all of them need not ask for others. False unless overridden.
+  virtual bool matches_recorded_only() const;
 };
 
 /// Ability of a registration that knows which of its answers are false: for experiments, which

@@ -20,6 +20,7 @@ struct ThresholdTrial {
   double expected = 0.0;            ///< error predicted by its covariance [m]
   double realised = 0.0;            ///< the same, by its distance from the estimate of everything
   std::int64_t poses_kept = 0, loops_kept = 0;
+  OptionValues options{};  ///< with which it was run
   double error() const { return std::max(expected, realised); }
 };
 
