@@ -12,8 +12,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 
-#include "cairn/lie/so2.hpp"
-#include "cairn/planning/point_buckets.hpp"
+#include "match_index.hpp"
 #include "path_closure.hpp"
 #include "pose_covariances.hpp"
 
@@ -54,10 +53,10 @@ class PathInformation::Model {
         measures_(measures),
         match_(situation.match),
         odometry_(situation.robot.odometry),
+        index_(covariances_.poses(), situation.pose, situation.match),
         newest_(covariances_.size() - 1),
         factor_(options.entropy == EntropyForm::standard ? 0.5 : 1.0),
         log_match_(std::log(match_.covariance().determinant())) {
-    index_poses(situation.pose);
     start_ = std::make_shared<Node>();
     start_->frame = &covariances_;
     start_->pose = situation.pose;
@@ -105,49 +104,12 @@ class PathInformation::Model {
   int poses() const { return covariances_.size(); }
 
  private:
-  /// A pose of the graph, for matches with it.
-  struct Older {
-    int number;
-    double x, y, cos, sin, theta;
-  };
-
-  void index_poses(const Pose2& robot) {
-    Eigen::Vector2d low = robot.translation(), high = low;
-    for (int i = 0; i < covariances_.size(); ++i) {
-      low = low.cwiseMin(covariances_.pose(i).translation());
-      high = high.cwiseMax(covariances_.pose(i).translation());
-    }
-    constexpr double kSmallest = 0.1;  // side of a bucket [m]
-    index_.emplace(low, high, std::max(match_.range, kSmallest));
-    for (int i = 0; i < newest_; ++i) {
-      const Pose2 pose = covariances_.pose(i);
-      if (in_area(pose, robot)) continue;
-      older_.push_back(
-          {i, pose.x(), pose.y(), std::cos(pose.theta()), std::sin(pose.theta()), pose.theta()});
-      index_->add(pose.translation());
-    }
-  }
-
-  bool in_area(const Pose2& older, const Pose2& newer) const {
-    const Pose2 seen = older.between(newer);
-    return std::abs(seen.x()) <= match_.range && std::abs(seen.y()) <= match_.range &&
-           std::abs(seen.theta()) <= match_.angle;
-  }
-
   /// Calls for each pose of the graph that one of a path may close a loop with, in their order.
   template <class Each>
   void for_matches(const Pose2& newer, Each each) {
-    const double x = newer.x(), y = newer.y(), theta = newer.theta(), range = match_.range;
-    index_->within(newer.translation(), std::numbers::sqrt2 * range, near_);
-    for (const int number : near_) {
-      const Older& older = older_[static_cast<std::size_t>(number)];
-      const double dx = x - older.x, dy = y - older.y;
-      if (std::abs(older.cos * dx + older.sin * dy) > range ||
-          std::abs(older.cos * dy - older.sin * dx) > range ||
-          std::abs(wrap_angle(theta - older.theta)) > match_.angle)
-        continue;
-      if (!can_match_ || can_match_(covariances_.pose(older.number), newer)) each(older.number);
-    }
+    index_.for_each(newer, [&](int number) {
+      if (!can_match_ || can_match_(covariances_.pose(number), newer)) each(number);
+    });
   }
 
   double log_determinant(const Matrix3d& without_prior) const {
@@ -290,11 +252,9 @@ class PathInformation::Model {
   Measures measures_;
   MatchModel match_;
   OdometryModel odometry_;
+  MatchIndex index_;
   int newest_;
   double factor_, log_match_;
-  std::vector<Older> older_;
-  std::optional<PointBuckets> index_;
-  std::vector<int> near_;
   std::shared_ptr<Node> start_;
 };
 

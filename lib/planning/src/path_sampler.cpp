@@ -9,8 +9,8 @@
 #include "cairn/grid/ray_caster.hpp"
 #include "cairn/planning/path_motions.hpp"
 #include "cairn/planning/seen_cells.hpp"
+#include "cairn/planning/simulated_graph.hpp"
 #include "cairn/runtime/error.hpp"
-#include "cairn/typed/build.hpp"
 
 namespace cairn {
 namespace {
@@ -40,12 +40,6 @@ PoseGaussian gaussian_of(Estimator& estimator, std::span<const Id> poses) {
   gaussian.covariance = Eigen::Map<const Eigen::MatrixXd>(covariance.data(), size, size);
   return gaussian;
 }
-
-/// The poses of a graph, and those that follow on a path.
-struct ExtendedGraph {
-  std::unique_ptr<Estimator> estimator;
-  std::vector<Id> poses;
-};
 
 /// The mean of differences, and its standard error.
 std::pair<double, double> paired(std::span<const double> before, std::span<const double> after) {
@@ -116,12 +110,12 @@ class PathSampler::Model {
   }
 
   std::pair<double, double> sampled_change(std::span<const PathInformation::State> states) {
-    const ExtendedGraph graph = extended(states);
+    SimulatedGraph graph = extended(states);
     std::vector<AttachedScan> scans = scans_;
-    const std::size_t first = graph.poses.size() - states.size();
+    const std::size_t first = graph.poses().size() - states.size();
     for (std::size_t k = 0; k < states.size(); ++k)
       scans.push_back({first + k, Pose2(), expected_scan(states[k].pose())});
-    const PoseGaussian poses = gaussian_of(*graph.estimator, graph.poses);
+    const PoseGaussian poses = gaussian_of(graph.estimator(), graph.poses());
     return paired(before_,
                   sampled_map_entropy(poses, scans, mapper_, options_.samples, seed_).samples);
   }
@@ -140,36 +134,14 @@ class PathSampler::Model {
     return scan;
   }
 
-  /// The graph with the poses and loop closures of a path, all measured as they are expected.
-  ExtendedGraph extended(std::span<const PathInformation::State> states) const {
-    ExtendedGraph graph{situation_.estimator.clone(),
-                        {situation_.poses.begin(), situation_.poses.end()}};
-    GraphUpdate update;
-    Id last = graph.poses.back(), next = std::ranges::max(graph.estimator->variables()) + 1;
-    Pose2 at = Pose2::from_state(situation_.estimator.state(last));
-    const auto follow = [&](const Pose2& pose) {
-      const Pose2 motion = at.between(pose);
-      const Eigen::Matrix3d noise = situation_.robot.odometry.covariance(motion);
-      update.variables.push_back(make_variable(next, pose, registry_));
-      update.factors.push_back(make_factor(Between(last, next, motion),
-                                           Information::covariance(noise), nullptr, registry_));
-      graph.poses.push_back(next);
-      last = next++;
-      at = pose;
-    };
-    constexpr double kRounding = 1e-9;
-    if (at.between(situation_.pose).state().cwiseAbs().maxCoeff() > kRounding)
-      follow(situation_.pose);
+  /// The graph with the poses and loop closures of a path.
+  SimulatedGraph extended(std::span<const PathInformation::State> states) const {
+    SimulatedGraph graph(situation_, registry_);
     for (const PathInformation::State& state : states) {
-      follow(state.pose());
-      const std::optional<Id> other = state.closes_with();
-      if (!other) continue;
-      const Pose2 older = Pose2::from_state(situation_.estimator.state(*other));
-      update.factors.push_back(make_factor(Between(*other, last, older.between(state.pose())),
-                                           Information::covariance(situation_.match.covariance()),
-                                           nullptr, registry_));
+      graph.add(state.pose());
+      if (const std::optional<Id> other = state.closes_with()) graph.close(*other);
     }
-    graph.estimator->update(update);
+    graph.update();
     return graph;
   }
 

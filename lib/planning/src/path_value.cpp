@@ -4,8 +4,8 @@
 #include <cmath>
 #include <utility>
 
-#include "cairn/grid/cell_traversal.hpp"
 #include "cairn/planning/path_motions.hpp"
+#include "in_sight.hpp"
 
 namespace cairn {
 namespace {
@@ -15,15 +15,6 @@ using Eigen::Vector2d;
 PathInformationOptions with_entropy(PathInformationOptions options, EntropyForm entropy) {
   options.entropy = entropy;
   return options;
-}
-
-/// Whether no known obstacle stands between two poses.
-bool in_sight(const FloorMap& map, const Pose2& older, const Pose2& newer) {
-  const GridFrame& frame = map.frame;
-  return traverse_cells(
-      frame.to_cells(older.translation()), frame.to_cells(newer.translation()), [&](int x, int y) {
-        return !frame.contains(x, y) || map.cells[frame.index(x, y)] != CellState::occupied;
-      });
 }
 
 bool is_same(const Pose2& a, const Pose2& b) {

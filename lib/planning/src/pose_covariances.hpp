@@ -33,6 +33,7 @@ class PoseCovariances {
   int padded() const { return padded_; }
   Id id(int pose) const { return ids_[static_cast<std::size_t>(pose)]; }
   const Pose2& pose(int pose) const { return poses_[static_cast<std::size_t>(pose)]; }
+  std::span<const Pose2> poses() const { return poses_; }
   const Pose2& origin() const { return origin_; }
 
   /// Σ_ii without the prior.

@@ -5,10 +5,12 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <string>
 
 #include <Eigen/Dense>
 
 #include "cairn/exploration/exploration.hpp"
+#include "unit/lib/exploration/drawn_map.hpp"
 
 namespace cairn::test {
 namespace {
@@ -96,6 +98,26 @@ PathGraph straight(int poses, const Pose2& motion) {
     at = at * motion;
   }
   graph.estimator->update(update, {.full = true});
+  return graph;
+}
+
+PathGraph partly_explored(std::uint64_t seed) {
+  test::PathGraph graph = wandering(60, 8.0, seed);
+  constexpr int kSide = 64;
+  RandomNumbers random(seed);
+  std::vector<std::string> rows(kSide, std::string(kSide, '.'));
+  for (int y = 0; y < kSide; ++y) {
+    for (int x = 0; x < kSide; ++x) {
+      char& cell = rows[static_cast<std::size_t>(y)][static_cast<std::size_t>(x)];
+      if (std::max(std::abs(x - 32), std::abs(y - 32)) > 15) cell = '?';
+      const bool near = std::max(std::abs(x - 32), std::abs(y - 32)) < 4;
+      if (random.chance(0.01) && !near) cell = '#';
+    }
+  }
+  graph.map = drawn_map(rows, 0.25);
+  graph.map.frame.origin = graph.pose.translation() - Eigen::Vector2d(8.0, 8.0);
+  graph.robot.lidar.beams = 61;
+  if (seed % 2 == 1) graph.robot.lidar.aperture = 0.7;  // less than a turn on the spot may be
   return graph;
 }
 

@@ -42,6 +42,9 @@ PathGraph wandering(int poses, double side, std::uint64_t seed);
 /// A chain of odometry along a straight line, a motion each.
 PathGraph straight(int poses, const Pose2& motion);
 
+/// A robot that has wandered about a square of 8 m, and knows what is around it.
+PathGraph partly_explored(std::uint64_t seed);
+
 /// The motions of a random walk from `at` that keeps to the square.
 std::vector<Pose2> random_motions(Pose2 at, int count, double side, RandomNumbers& random);
 

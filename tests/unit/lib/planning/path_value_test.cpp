@@ -20,27 +20,6 @@ namespace {
 
 using Eigen::Vector2d;
 
-/// A robot that has wandered about a square of 8 m, and knows what is around it.
-test::PathGraph partly_explored(std::uint64_t seed) {
-  test::PathGraph graph = test::wandering(60, 8.0, seed);
-  constexpr int kSide = 64;
-  RandomNumbers random(seed);
-  std::vector<std::string> rows(kSide, std::string(kSide, '.'));
-  for (int y = 0; y < kSide; ++y) {
-    for (int x = 0; x < kSide; ++x) {
-      char& cell = rows[static_cast<std::size_t>(y)][static_cast<std::size_t>(x)];
-      if (std::max(std::abs(x - 32), std::abs(y - 32)) > 15) cell = '?';
-      const bool near = std::max(std::abs(x - 32), std::abs(y - 32)) < 4;
-      if (random.chance(0.01) && !near) cell = '#';
-    }
-  }
-  graph.map = test::drawn_map(rows, 0.25);
-  graph.map.frame.origin = graph.pose.translation() - Vector2d(8.0, 8.0);
-  graph.robot.lidar.beams = 61;
-  if (seed % 2 == 1) graph.robot.lidar.aperture = 0.7;  // less than a turn on the spot may be
-  return graph;
-}
-
 /// (5.10) of a polyline, all from its definition: motion by motion, pose by pose.
 double literal_value(const test::PathGraph& graph, const PathValueOptions& options,
                      const std::vector<Vector2d>& points) {
@@ -118,7 +97,7 @@ TEST(PathValue, OfATreeGrownForItIsThatOfEachPathAnew) {
   int loops = 0, rewired = 0;
   std::size_t cells = 0;
   for (const PathValueOptions& options : several_options()) {
-    const test::PathGraph graph = partly_explored(++seed);
+    const test::PathGraph graph = test::partly_explored(++seed);
     const Situation situation = graph.situation();
     const FreeSpace space(graph.map, graph.pose.translation(), graph.robot.radius);
     ASSERT_FALSE(space.empty());
@@ -145,7 +124,7 @@ TEST(PathValue, OfATreeGrownForItIsThatOfEachPathAnew) {
 TEST(PathValue, OfATreeOfShortPathsIsThatOfEachPathAnew) {
   std::uint64_t seed = 5;
   for (const PathValueOptions& options : several_options()) {
-    const test::PathGraph graph = partly_explored(++seed);
+    const test::PathGraph graph = test::partly_explored(++seed);
     const Situation situation = graph.situation();
     const FreeSpace space(graph.map, graph.pose.translation(), graph.robot.radius);
     ASSERT_FALSE(space.empty());
@@ -168,7 +147,7 @@ TEST(PathValue, OfATreeOfShortPathsIsThatOfEachPathAnew) {
 }
 
 TEST(PathValue, CellsThatAreLeftOutDoNotCount) {
-  const test::PathGraph graph = partly_explored(3);
+  const test::PathGraph graph = test::partly_explored(3);
   const Situation situation = graph.situation();
   PathValue all(situation);
   const auto path = [&](PathValue& value) {
