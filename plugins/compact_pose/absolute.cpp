@@ -64,6 +64,7 @@ namespace {
 AbsoluteFit compare(const Eigen::VectorXd& e, const Eigen::MatrixXd& S, const Eigen::MatrixXd& J) {
   const Eigen::MatrixXd noise = Eigen::MatrixXd::Identity(e.size(), e.size());
   AbsoluteFit result;
+  if (!S.allFinite()) return result;  // of numbers near the largest: nothing is gained
   result.gain = information_gain(S, noise);
   result.innovation = e.dot(Eigen::LLT<Eigen::MatrixXd>(Eigen::MatrixXd(noise + S)).solve(e));
   const Eigen::VectorXd sizes = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(

@@ -186,11 +186,11 @@ TEST_F(OnlinePolicy, WhatAQuestionSettledOrAskedIsInTheJournal) {
   EXPECT_THAT(again.at(1), StartsWith("MATCH 0 4 "));
 }
 
-TEST_F(OnlinePolicy, LinksThatWereTakenBackStaySo) {
+TEST_F(OnlinePolicy, LinksThatWereRevokedStaySo) {
   const std::string graph = generate("manhattan:poses=150");
   const Dialogue driven = drive(graph, online("compact_pose:range=3,angle=0.8"));
   ASSERT_GT(driven.count("LINKED"), 5);
-  // The same again, in which every third link is taken back twenty lines later.
+  // The same again, in which every third link is revoked twenty lines later.
   std::multimap<std::size_t, std::string> revoked;
   int links = 0;
   for (std::size_t k = 0; k < driven.told.size(); ++k) {

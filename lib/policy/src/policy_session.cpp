@@ -432,8 +432,14 @@ void PolicySession::revoke(const Words& words, Reply& reply) {
       throw bad_line(fmt::format("there is no pose {}", id));
   }
   settle(reply);
-  if (!policy_.revoke(a, b))
-    throw bad_line(fmt::format("there is no link of poses {} and {}", a, b));
+  bool there = false;
+  try {
+    there = policy_.revoke(a, b);
+  } catch (const Error&) {
+    reply.changes = true;  // odometry that waited for the next link may have reached the estimator
+    throw;
+  }
+  if (!there) throw bad_line(fmt::format("there is no link of poses {} and {}", a, b));
   reply.changes = true;
   asked_.clear();
   ++counts_.revoked;

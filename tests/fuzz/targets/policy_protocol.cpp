@@ -129,13 +129,16 @@ std::string square(bool asks) {
     if (asks) text += "NEXT\n";
     if (k >= 4) text += fmt::format("EDGE_SE2 {} {} 0.0{} 0 0 100 0 0 100 0 400\n", k - 4, k, k);
     if (asks && k % 2 == 0) text += "NEXT\nESTIMATE ALL\n";
+    if (k % 5 == 0) text += fmt::format("EDGE_PRIOR_SE2 {} 0.5 {} 0 4 0 0 4 0 0\n", k, k % 4);
     if (k % 3 == 0) text += fmt::format("DONE\nCOVARIANCE 0 {}\n", k);
+    if (k % 4 == 2) text += fmt::format("REMOVE LINK {} {}\n", k, k - 4);
   }
   return text;
 }
 
 std::vector<std::string> seeds() {
-  const std::vector<std::string> streams = {square(true), square(false),
+  const std::vector<std::string> streams = {square(true),
+                                            square(false),
                                             R"(VERTEX_SE2 0 0 0 0
 FIX 0
 NEW VERTEX_SE2 1
@@ -167,6 +170,26 @@ EDGE_SE3:QUAT 0 2 2 0 0 0 0 0.2 1 9 0 0 0 0 0 9 0 0 0 0 9 0 0 0 9 0 0 9 0 9
 ESTIMATE ALL
 CHI2
 )",
+                                            R"(VERTEX_SE2 0 0 0 0
+EDGE_PRIOR_SE2 0 5 5 1 4 0 0 4 0 0
+NEW VERTEX_SE2 1
+EDGE_SE2 0 1 1 0 0 9 0 0 9 0 9
+EDGE_PRIOR_SE2 1 5 6 1 4 0 0 4 0 0
+NEXT
+DONE
+NEW VERTEX_SE2 2
+EDGE_SE2 1 2 1 0 0 9 0 0 9 0 9
+EDGE_PRIOR_SE2 2 5 7 1 1e300 0 0 4 0 100
+REMOVE LINK 0 2
+EDGE_SE2 0 2 0 0 0 100 0 0 100 0 100
+EDGE_SE2 101 2 0 0 0 100 0 0 100 0 100
+REMOVE LINK 2 101
+REMOVE LINK 2 0
+DONE
+NEW VERTEX_SE2 3
+EDGE_SE2 2 3 1 0 0 9 0 0 9 0 9
+EDGE_PRIOR_SE2 3 1e200 7 1 1 0 0 1 0 1
+)",
                                             R"(NEXT
 DONE
 SPARSIFY 1
@@ -193,7 +216,9 @@ CHI2
 
 std::vector<std::string> words() {
   std::vector<std::string> all = protocol_words();
-  for (const char* word : {"NEXT\n", "DONE\n", "NOMATCH ", "NEXT\nDONE\n"}) all.emplace_back(word);
+  for (const char* word :
+       {"NEXT\n", "DONE\n", "NOMATCH ", "NEXT\nDONE\n", "REMOVE LINK ", "EDGE_PRIOR_SE2 "})
+    all.emplace_back(word);
   return all;
 }
 

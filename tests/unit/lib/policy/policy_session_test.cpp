@@ -172,7 +172,7 @@ TEST_F(PolicySessionTest, RefusesWhatDoesNotGoWithAPolicy) {
   EXPECT_THAT(take("NEXT").text, StartsWith("MATCH 0 4 "));
 }
 
-TEST_F(PolicySessionTest, ALinkCanBeTakenBack) {
+TEST_F(PolicySessionTest, ALinkCanBeRevoked) {
   drive();
   EXPECT_THAT(take("REMOVE LINK 0 4").text, HasSubstr("there is no link of poses 0 and 4"));
   EXPECT_THAT(take("REMOVE LINK 0 9").text, HasSubstr("there is no pose 9"));
