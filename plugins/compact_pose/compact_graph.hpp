@@ -243,8 +243,7 @@ class CompactGraph {
     std::optional<Motion> rest{};  ///< of it, what is in none of `ways_`
   };
   std::map<std::pair<int, int>, Bridge> bridges_;
-  std::map<std::pair<int, int>, Bridge> replace_ways(const Ways::Change& change,
-                                                     GraphUpdate& update);
+  std::map<std::pair<int, int>, Bridge> replace_ways(Ways::Change& change, GraphUpdate& update);
   FactorId odometry_factor(Id from, Id to) const;
   void check_connected(Id a, Id b, const GraphUpdate& leaving) const;
   void replace_chains(const Ways::Change& change);

@@ -2,6 +2,7 @@
 // A compact graph as it would be without a link that it has.
 #include <algorithm>
 #include <limits>
+#include <span>
 #include <string>
 #include <unordered_map>
 #include <unordered_set>
@@ -45,7 +46,7 @@ bool is_match_step(const ChainStep& step) { return step.matched; }
 bool CompactGraph::revoke(Id a, Id b, PolicySeconds& seconds) {
   if (!group_) return false;
   const auto direct = links_.find(pair_of(a, b));
-  const std::optional<Ways::Change> change =
+  std::optional<Ways::Change> change =
       ways_.without(a, b, group_->motions(), order_, [&](const Way& way, const Motion& match) {
         const int n = group_->tangent_size();
         return part_of_way(to_matrix(motion_of(way, group_->motions(), order_).covariance, n),
@@ -100,23 +101,22 @@ bool CompactGraph::revoke(Id a, Id b, PolicySeconds& seconds) {
 }
 
 /// What the estimator has of the old ways goes, and what the new ones are takes its place; new
-/// factors of bridges come first. Returns the bridges that change; an empty one is none any more.
+/// factors of bridges come first. Computes what each of the new ways adds to its bridge. Returns
+/// the bridges that change; an empty one is none any more.
 std::map<std::pair<int, int>, CompactGraph::Bridge> CompactGraph::replace_ways(
-    const Ways::Change& change, GraphUpdate& update) {
+    Ways::Change& change, GraphUpdate& update) {
   const MotionGroup& motions = group_->motions();
   std::vector<Way> all(ways_.all().begin(), ways_.all().end());
   const auto first = all.begin() + static_cast<std::ptrdiff_t>(change.first);
   const auto last = first + static_cast<std::ptrdiff_t>(change.count);
   const std::vector<Way> old(first, last);
-  std::vector<Way> now = change.now;
-  if (change.open) now.pop_back();
+  const std::span<Way> now(change.now.data(), change.now.size() - (change.open ? 1 : 0));
   for (Way& way : now) {
     if (way.became != Way::Became::bridge) continue;
     const Motion end = part_of(way.end->motion, way.end->of_way);
     way.bridge = motions.compose(end, motions.inverse(motion_of(way, motions, order_)), order_);
     if (find(way.to) > find(way.from)) way.bridge = motions.inverse(way.bridge);
   }
-  // Continued in the caller's copy, which knows the ways.
   std::map<std::pair<int, int>, Bridge> bridges;
   const auto touch = [&](const Way& way) {
     if (way.became == Way::Became::bridge) bridges[std::minmax(find(way.from), find(way.to))] = {};

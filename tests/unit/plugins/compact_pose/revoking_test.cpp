@@ -96,7 +96,7 @@ class Revoking : public testing::TestWithParam<int> {
   }
 
   /// Everything that can be read of the two.
-  void expect_same(PosePolicy& one, PosePolicy& other) {
+  void expect_same(PosePolicy& one, PosePolicy& other, double covariances = 1e-6) {
     ASSERT_EQ(one.kept(), other.kept());
     EXPECT_EQ(one.factor_count(), other.factor_count());
     const auto apart = [&](std::span<const double> a, std::span<const double> b) {
@@ -111,7 +111,7 @@ class Revoking : public testing::TestWithParam<int> {
         one.estimator().covariance(id, with, {S.data(), static_cast<std::size_t>(S.size())});
         other.estimator().covariance(id, with,
                                      {S_other.data(), static_cast<std::size_t>(S.size())});
-        EXPECT_LT((S - S_other).norm(), 1e-6 * (1e-6 + S_other.norm())) << id << " " << with;
+        EXPECT_LT((S - S_other).norm(), covariances * (1e-6 + S_other.norm())) << id << " " << with;
       }
     }
     const Graph way = recovered_trajectory(one, Recovery::likely),
@@ -271,8 +271,10 @@ TEST_P(Revoking, AnEarlierLinkThanTheLatest) {
 /// Whatever was linked, in whatever order it is taken back.
 TEST_P(Revoking, AllLinksInAnyOrder) {
   for (int trial = 0; trial < 12; ++trial) {
+    // Covariances of the fourth order depend a little on which are composed first.
+    const bool fourth = trial % 3 == 2;
     const std::string options =
-        std::string("pose_gain=1e9,reuse_loss=10") + (trial % 3 == 2 ? ",composition=fourth" : "");
+        std::string("pose_gain=1e9,reuse_loss=10") + (fourth ? ",composition=fourth" : "");
     const auto with = policy(options), without = policy(options);
     std::vector<std::pair<Id, Id>> links;
     std::vector<Id> to{0, kMap + 4, kMap + 5, kMap + 9};
@@ -299,7 +301,7 @@ TEST_P(Revoking, AllLinksInAnyOrder) {
     while (!links.empty())
       take_back(static_cast<std::size_t>(draw_.integer(static_cast<int>(links.size()))));
     for (PosePolicy* one : {with.get(), without.get()}) one->finish();
-    expect_same(*with, *without);
+    expect_same(*with, *without, fourth ? 1e-4 : 1e-6);
     EXPECT_EQ(with->kept().size(), kPlaces + 2U);
   }
 }
