@@ -141,6 +141,7 @@ Album load_album(const AlbumOptions& options, const std::string& command, Sessio
   }
   AlbumBuilder builder([&](const std::string& file) { return load_named(file, options, session); },
                        [&](const std::string& sentence) { session.note(sentence); });
+  if (options.apart) builder.keep_apart();
   for (std::size_t k = 0; k < options.files.size(); ++k) {
     const std::string& file = options.files[k];
     const std::string name = k < options.names.size() ? options.names[k] : short_name(file);

@@ -21,6 +21,7 @@ struct AlbumOptions {
   std::string initial;  ///< a name of kind initial_guess, or empty
   std::string title;
   InputOptions input;
+  bool apart = false;   ///< each graph by itself, also one with the ids of another
   bool curves = false;  ///< of recordings of explorations the curves alone, as tables
 };
 

@@ -31,6 +31,8 @@ struct PlotOptions {
   std::string size;
   std::string theme = "light";
   std::string colour = "class";
+  bool poses = false;
+  double ellipses = 0.0;
   std::string x;
   std::vector<std::string> y;
   std::optional<double> x_max;
@@ -91,6 +93,8 @@ ComponentSpec picture_spec(const PlotOptions& options, const std::string& output
   picture.values = {{"what", options.what},
                     {"theme", options.theme},
                     {"colour", options.colour},
+                    {"poses", options.poses ? "true" : "false"},
+                    {"ellipses", fmt::format("{}", options.ellipses)},
                     {"linear_solver", options.linear_solver}};
   picture.values["x"] = options.x;
   picture.values["y_columns"] = joined(options.y, "\n");
@@ -149,8 +153,15 @@ Command add_plot(ArgumentParser program) {
       .type_name("BY")
       .one_of({"class", "residual"})
       .show_default();
+  cli.add_flag("--poses", options->poses, "mark each pose of a trajectory");
+  cli.add_option("--ellipses", options->ellipses,
+                 "covariances [σ], of the JSON of optimize --covariance blocks")
+      .type_name("SIGMAS")
+      .within(0.0, 1000.0);
+  cli.add_flag("--apart", options->album.apart,
+               "each graph beside the others, not one over the other");
   cli.add_option("--x", options->x,
-                 "of a convergence plot: iterations or time [iterations]; of CSV: a column [first]")
+                 "of convergence: iterations or time [iterations]; of CSV: a column [first]")
       .type_name("AXIS");
   cli.add_option("--y", options->y,
                  "columns of CSV or of an exploration, such as 'chi2' or 'seconds*': each --y is a "
@@ -172,9 +183,9 @@ Command add_plot(ArgumentParser program) {
       "FILEs are laid together as by cairn view.\n\n"
       "Example:\n"
       "  cairn plot city.g2o best.g2o -o city.svg\n"
+      "  cairn plot city.g2o compact.g2o --apart --poses -o maps.svg\n"
       "  cairn plot run1.json run2.json --what convergence --x time -o curves.pdf\n"
       "  cairn plot steps.csv --x variables --y seconds --y affected --log y -o steps.svg\n"
-      "  cairn plot run.jsonl --y map_entropy --y trajectory_entropy -o curves.svg\n"
       "  cairn plot @sphere --what sparsity --linear-solver block_cholesky:ordering=natural -o "
       "L.png");
   return {cli, [options](Session& session) { return run(*options, session); }};

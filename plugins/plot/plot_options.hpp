@@ -45,6 +45,8 @@ struct PlotOptions {
   int width = 900, height = 600;  ///< [px; in a PDF 1/96 inch]
   std::string theme = "light";    ///< see `theme`
   EdgeColour colour = EdgeColour::by_class;
+  bool poses = false;     ///< of trajectories: a mark at each pose
+  double ellipses = 0.0;  ///< of trajectories: covariances of positions [σ]; 0: none
   /// Of convergence: iterations (empty, too) or time; of columns: the name of one, or the first.
   std::string x;
   std::string y_columns;  ///< its panels, separated by line ends: each a pattern with * and ?
@@ -63,6 +65,9 @@ struct PlotOptions {
         .integer("height", &O::height, 100, 20000, "height [px; in a PDF 1/96 inch]")
         .choice("theme", &O::theme, {"light", "dark"}, "colours for light or dark paper")
         .choice("colour", &O::colour, "what colours edges")
+        .boolean("poses", &O::poses, "marks each pose of a trajectory")
+        .real("ellipses", &O::ellipses, 0.0, 1000.0,
+              "standard deviations of the ellipses of a trajectory's covariances; 0: none")
         .text("x", &O::x,
               "horizontal axis: of convergence iterations or time, of columns one of them; empty: "
               "iterations, or the first column")

@@ -12,8 +12,9 @@ namespace cairn::plot {
 
 // Each draws one kind of plot, and throws `Error` (input) where `album` has no data for it.
 
-/// Poses and edges of each graph; `by_residual`: edges coloured by chi2.
-void draw_trajectories(Canvas& canvas, const Theme& theme, const Album& album, bool by_residual);
+/// Poses and edges of each graph, with marks and ellipses as `options` says.
+void draw_trajectories(Canvas& canvas, const Theme& theme, const Album& album,
+                       const PlotOptions& options);
 /// chi2 of each run against iterations or time, logarithmic.
 void draw_convergence(Canvas& canvas, const Theme& theme, const Album& album, bool against_time);
 /// Seconds of each iteration of each run.

@@ -32,8 +32,7 @@ class Plot final : public Picture {
       case Subject::automatic:
         break;  // has been chosen
       case Subject::trajectory:
-        plot::draw_trajectories(canvas, theme_, album,
-                                options_.colour == plot::EdgeColour::by_residual);
+        plot::draw_trajectories(canvas, theme_, album, options_);
         break;
       case Subject::convergence:
         plot::draw_convergence(canvas, theme_, album, time);

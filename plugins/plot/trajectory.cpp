@@ -11,6 +11,7 @@
 
 #include "cairn/runtime/error.hpp"
 #include "chart.hpp"
+#include "ellipse.hpp"
 #include "plots.hpp"
 
 namespace cairn::plot {
@@ -22,13 +23,24 @@ constexpr double kElevation = 28 * std::numbers::pi / 180;
 // An initial guess that is further out than this many times the rest is cut off, not shrunk to.
 constexpr double kGuessMayExceed = 2.5;
 constexpr int kShades = 48;
+// Side of the mark of a pose [px]; smaller where there are more poses than this.
+constexpr double kMark = 3.4, kLeastMark = 1.2, kLargeMarks = 400;
 
 struct Point {
   double x = 0, y = 0;
   bool there() const { return std::isfinite(x) && std::isfinite(y); }
 };
 
-/// Parallel projection, upwards being up; a planar graph as it is.
+/// Parallel projection, upwards being up.
+const std::array<std::array<double, 3>, 2>& projection() {
+  static const std::array<std::array<double, 3>, 2> P{
+      {{std::cos(kAzimuth), std::sin(kAzimuth), 0},
+       {-std::sin(kElevation) * std::sin(kAzimuth), std::sin(kElevation) * std::cos(kAzimuth),
+        std::cos(kElevation)}}};
+  return P;
+}
+
+/// A planar graph as it is.
 std::vector<Point> project(const Scene& scene, const SceneEstimate& estimate) {
   std::vector<Point> points(scene.ids.size());
   for (std::size_t v = 0; v < points.size(); ++v) {
@@ -37,9 +49,10 @@ std::vector<Point> project(const Scene& scene, const SceneEstimate& estimate) {
       continue;
     }
     const double* p = &estimate.positions[3 * v];
-    const double depth = std::cos(kAzimuth) * p[1] - std::sin(kAzimuth) * p[0];
-    points[v] = {std::cos(kAzimuth) * p[0] + std::sin(kAzimuth) * p[1],
-                 std::cos(kElevation) * p[2] + std::sin(kElevation) * depth};
+    const auto row = [&](const std::array<double, 3>& r) {
+      return r[0] * p[0] + r[1] * p[1] + r[2] * p[2];
+    };
+    points[v] = {row(projection()[0]), row(projection()[1])};
   }
   return points;
 }
@@ -122,6 +135,9 @@ void equalise(Bounds& bounds, const Box& box) {
             y + metres * box.height / 2};
 }
 
+Stroke mark(const Theme& theme) { return {theme.residual(0.8), kMark, {}}; }
+Stroke outline(const Theme& theme) { return {theme.muted, 0.7, {}}; }
+
 bool is_line(EdgeClass edge_class) {
   return edge_class == EdgeClass::odometry || edge_class == EdgeClass::path;
 }
@@ -132,17 +148,19 @@ class Drawing {
           const Bounds& bounds)
       : canvas_(canvas), theme_(theme), scene_(scene), area_(area), bounds_(bounds) {}
 
-  void draw(const std::vector<Layer>& layers, bool by_residual) {
+  void draw(const std::vector<Layer>& layers, const PlotOptions& options) {
     canvas_.clip(area_);
     for (const Layer& layer : layers) {
       const bool main = &layer == &layers.back();
-      if (main && by_residual) {
+      if (main && options.colour == EdgeColour::by_residual) {
         draw_residuals(layer);
       } else {
         if (main) draw_classes(layer);
         draw_path(layer);
       }
       if (main) draw_landmarks(layer);
+      if (options.ellipses > 0) draw_ellipses(layer, options.ellipses);
+      if (main && options.poses) draw_poses(layer);
     }
     canvas_.unclip();
   }
@@ -199,6 +217,38 @@ class Drawing {
         Colour{theme_.landmark.colour.r, theme_.landmark.colour.g, theme_.landmark.colour.b, 1});
   }
 
+  void draw_poses(const Layer& layer) {
+    const double poses = std::max(kLargeMarks, double(layer.points.size()));
+    const double side = std::max(kLeastMark, kMark * std::sqrt(kLargeMarks / poses));
+    for (std::size_t v = 0; v < layer.points.size(); ++v) {
+      const Point& p = layer.points[v];
+      if (!scene_.variable_types[scene_.variable_type[v]].pose || !p.there()) continue;
+      canvas_.rectangle({x(p) - side / 2, y(p) - side / 2, side, side});
+    }
+    canvas_.fill(mark(theme_).colour);
+  }
+
+  void draw_ellipses(const Layer& layer, double sigmas) {
+    const SceneEstimate& estimate = *layer.estimate;
+    const std::size_t numbers = scene_.dimension == 2 ? 3 : 6;
+    for (std::size_t k = 0; k < estimate.covariance_variables.size(); ++k) {
+      const Point& at = layer.points[std::size_t(estimate.covariance_variables[k])];
+      const float* upper = &estimate.covariance_upper[numbers * k];
+      const PlanarCovariance S = scene_.dimension == 2
+                                     ? PlanarCovariance{upper[0], upper[1], upper[2]}
+                                     : projected(projection(), upper);
+      const auto corners = ellipse(S, sigmas);
+      if (!at.there() || corners.empty()) continue;
+      for (std::size_t c = 0; c <= corners.size(); ++c) {
+        const auto& corner = corners[c % corners.size()];
+        const Point p{at.x + corner[0], at.y + corner[1]};
+        if (c == 0) canvas_.move_to(x(p), y(p));
+        if (c > 0) canvas_.line_to(x(p), y(p));
+      }
+    }
+    canvas_.stroke(outline(theme_));
+  }
+
   /// From the least to the worst, which lies on top and is wider.
   void draw_residuals(const Layer& layer) {
     const std::vector<float>& chi2 = layer.estimate->edge_chi2;
@@ -243,7 +293,8 @@ void draw_scale(Canvas& canvas, const Theme& theme, const Box& area, const Bound
 }
 
 std::vector<LegendEntry> legend_of(const Scene& scene, const Theme& theme,
-                                   const std::vector<Layer>& layers, bool by_residual) {
+                                   const std::vector<Layer>& layers, const PlotOptions& options) {
+  const bool by_residual = options.colour == EdgeColour::by_residual;
   std::vector<LegendEntry> legend;
   for (auto layer = layers.rbegin(); layer != layers.rend(); ++layer) {
     if (by_residual && layer == layers.rbegin()) {
@@ -259,20 +310,32 @@ std::vector<LegendEntry> legend_of(const Scene& scene, const Theme& theme,
   };
   if (!by_residual && has(EdgeClass::loop)) legend.push_back({"loop closure", theme.loop});
   if (!by_residual && has(EdgeClass::landmark)) legend.push_back({"landmark", theme.landmark});
+  if (options.poses) legend.push_back({"pose", mark(theme)});
+  if (options.ellipses > 0) {
+    legend.push_back({fmt::format("covariance, {:.3g} σ", options.ellipses), outline(theme)});
+  }
   return legend;
 }
 
 void draw_scene(Canvas& canvas, const Theme& theme, const Scene& scene, const Box& box,
-                bool by_residual) {
+                const PlotOptions& options) {
   const std::vector<Layer> layers = layers_of(scene, theme);
+  if (options.ellipses > 0 && std::ranges::all_of(layers, [](const Layer& layer) {
+        return layer.estimate->covariance_variables.empty();
+      })) {
+    throw Error(ErrorCode::input,
+                scene.name +
+                    ": there are no covariances to draw: add the report of cairn optimize "
+                    "GRAPH --covariance blocks --json RUN.json -o OUT");
+  }
   Bounds bounds = bounds_of(layers);
   if (bounds.empty())
     throw Error(ErrorCode::input, scene.name + ": none of its variables has a position");
   const Box rest =
-      draw_heading(canvas, theme, box, scene.name, legend_of(scene, theme, layers, by_residual));
+      draw_heading(canvas, theme, box, scene.name, legend_of(scene, theme, layers, options));
   if (scene.dimension == 3) {
     equalise(bounds, rest);
-    Drawing(canvas, theme, scene, rest, bounds).draw(layers, by_residual);
+    Drawing(canvas, theme, scene, rest, bounds).draw(layers, options);
     return draw_scale(canvas, theme, rest, bounds);
   }
   // Room for the axes' texts, which depend little on the numbers.
@@ -280,12 +343,13 @@ void draw_scene(Canvas& canvas, const Theme& theme, const Scene& scene, const Bo
   const Chart chart(canvas, theme, rest, {bounds.x0, bounds.x1, false},
                     {bounds.y0, bounds.y1, false}, "x [m]", "y [m]");
   Bounds fitted = bounds;
-  Drawing(canvas, theme, scene, chart.area(), fitted).draw(layers, by_residual);
+  Drawing(canvas, theme, scene, chart.area(), fitted).draw(layers, options);
 }
 
 }  // namespace
 
-void draw_trajectories(Canvas& canvas, const Theme& theme, const Album& album, bool by_residual) {
+void draw_trajectories(Canvas& canvas, const Theme& theme, const Album& album,
+                       const PlotOptions& options) {
   std::vector<const Scene*> scenes;
   for (const Scene& scene : album.scenes) {
     if (!scene.estimates.empty() && scene.variable_count() > 0) scenes.push_back(&scene);
@@ -295,7 +359,7 @@ void draw_trajectories(Canvas& canvas, const Theme& theme, const Album& album, b
   }
   const std::vector<Box> boxes = panels(canvas, scenes.size());
   for (std::size_t k = 0; k < scenes.size(); ++k) {
-    draw_scene(canvas, theme, *scenes[k], boxes[k], by_residual);
+    draw_scene(canvas, theme, *scenes[k], boxes[k], options);
   }
 }
 

@@ -2,6 +2,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cstdint>
 #include <filesystem>
 #include <set>
 
@@ -61,6 +63,43 @@ TEST_F(PlotCommand, DrawsEveryKind) {
     pictures.insert(plot(arguments, "svg"));
   }
   EXPECT_EQ(pictures.size(), 9U) << "each is another picture";
+}
+
+std::int64_t count(const std::string& text, const std::string& part) {
+  std::int64_t found = 0;
+  for (std::size_t at = text.find(part); at != std::string::npos; at = text.find(part, at + 1))
+    ++found;
+  return found;
+}
+
+/// Corners of all paths: each mark has four, each ellipse 24 and the first again.
+std::int64_t corners(const std::string& picture) { return count(picture, " L "); }
+
+TEST_F(PlotCommand, MarksEachPose) {
+  const std::string plain = plot({graph_}, "svg"), marked = plot({graph_, "--poses"}, "svg");
+  EXPECT_EQ(corners(marked) - corners(plain), 120 * 3 + 1);  // 1: the legend's sample
+}
+
+TEST_F(PlotCommand, DrawsCovariancesAsEllipses) {
+  const std::string best = folder_.file("best.g2o");
+  run({"optimize", graph_, "--covariance", "blocks", "-o", best, "--json", report_, "--quiet"});
+  const std::string picture = plot({graph_, report_, "--ellipses", "3"}, "svg");
+  std::int64_t ellipses = 0;  // in the thin stroke; the other one is the legend's sample
+  for (std::size_t at = picture.find("stroke-width:0.7;"); at != std::string::npos;
+       at = picture.find("stroke-width:0.7;", at + 1))
+    ellipses = std::max(ellipses, count(picture.substr(at, picture.find("/>", at) - at), "M "));
+  EXPECT_EQ(ellipses, 119);  // the pose that is anchored has no covariance
+  const Outcome none = cairn({"plot", graph_, "--ellipses", "3", "-o", folder_.file("x.svg")});
+  EXPECT_EQ(none.exit_code, 3);
+  EXPECT_THAT(none.err, HasSubstr("--covariance blocks"));
+}
+
+TEST_F(PlotCommand, GraphsWithTheSamePosesAreDrawnBesideEachOther) {
+  const std::string best = folder_.file("best.g2o");
+  run({"optimize", graph_, "-o", best, "--quiet"});
+  const std::string estimate = "stroke:rgb(0%,44.705882%,69.803922%)";  // and the legend's sample
+  EXPECT_EQ(count(plot({graph_, best}, "svg"), estimate), 2);
+  EXPECT_EQ(count(plot({graph_, best, "--apart"}, "svg"), estimate), 4);
 }
 
 TEST_F(PlotCommand, TheWrongLoopClosureIsTheOneInTheWorstColour) {

@@ -266,6 +266,17 @@ std::vector<TruthfulSet> comparison_sets(const std::string& data, bool quick) {
   return sets;
 }
 
+std::vector<FigureSet> figure_sets(const std::string& data, bool quick) {
+  std::vector<FigureSet> sets;
+  for (const TruthfulSet& set : located(compacted(), quick ? "" : data)) {
+    const std::string& name = set.set.name;
+    const bool drawn =
+        name == "ellipse3d" || name == "parking-garage" || name == "manhattanOlson3500";
+    if (drawn) sets.push_back({set, name == "ellipse3d"});
+  }
+  return sets;
+}
+
 std::vector<SimulatedSet> simulated_sets(const std::string& data, bool quick) {
   const std::string planar = "range=3,angle=3.14";
   const SimulatedSet ellipse{.set = {.set = ellipse3d()}, .range = kEllipseSensor};

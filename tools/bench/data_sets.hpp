@@ -71,6 +71,13 @@ struct SimulatedSet {
   TruthfulSet set;
   std::string range;  ///< of the simulated sensor, as options of `--registration simulated`
 };
+/// Whose maps are drawn.
+struct FigureSet {
+  TruthfulSet set;
+  bool norms = false;  ///< and the norms of covariances, which takes longer
+};
+std::vector<FigureSet> figure_sets(const std::string& data, bool quick);
+
 /// With what a robot knows of its sensor.
 struct LiveSet {
   TruthfulSet set;

@@ -49,6 +49,7 @@ const std::vector<std::pair<std::string, Study>>& all_studies() {
       {"online", study_online},
       {"compact_sets", study_compact_sets},
       {"compact_gain", study_compact_gain},
+      {"compact_figures", study_compact_figures},
       {"compact_live", study_compact_live},
       {"compact_growth", study_compact_growth},
       {"compact_consistency", study_compact_consistency},
@@ -157,6 +158,8 @@ void write_tables(const Arguments& arguments) {
     if (name == "graphs") write(picture, json::serialize(graphs_picture(entries)));
     if (name == "scaling") write(picture, json::serialize(scaling_picture(entries)));
     if (name == "online") write(picture, json::serialize(online_picture(entries)));
+    if (name == "compact_gain")
+      write(fs::path(arguments.folder) / "compact_gain.csv", gain_curves(entries));
     if (name == "compact_growth") write(picture, json::serialize(compact_picture(entries)));
   }
   for (std::size_t k = 0; k < pages.size(); ++k) {

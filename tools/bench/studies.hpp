@@ -56,6 +56,9 @@ void study_compact_sets(const Bench& bench, const Keep& keep);
 /// Loops kept and errors against the threshold on the gain of a loop.
 void study_compact_gain(const Bench& bench, const Keep& keep);
 
+/// Maps with all poses and loop closures, few of the latter, and few of both; covariances.
+void study_compact_figures(const Bench& bench, const Keep& keep);
+
 /// With everything as by default, as a robot has it: how much is kept and asked for, and the error
 /// beside those of all loop closures, of a random choice and of odometry.
 void study_compact_live(const Bench& bench, const Keep& keep);

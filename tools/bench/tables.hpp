@@ -29,6 +29,10 @@ std::vector<Section> compact_live_sections(const boost::json::array& entries);
 std::vector<Section> compact_growth_sections(const boost::json::array& entries);
 std::vector<Section> compact_consistency_sections(const boost::json::array& entries);
 std::vector<Section> compact_matches_sections(const boost::json::array& entries);
+/// In tables_compact_figures.cpp.
+std::vector<Section> compact_figures_sections(const boost::json::array& entries);
+/// Loop closures kept and errors of the study compact_gain against the threshold, as CSV.
+std::string gain_curves(const boost::json::array& entries);
 /// In tables_million.cpp.
 std::vector<Section> compact_million_sections(const boost::json::array& entries);
 

@@ -104,9 +104,11 @@ void AlbumBuilder::add_graph(const std::string& file, const std::string& name, G
     return;
   }
   for (Entry& entry : entries_) {
-    if (entry.graph && same_ids(entry.scene, graph)) return lay_over(entry, file, name, graph);
+    if (!apart_ && entry.graph && same_ids(entry.scene, graph))
+      return lay_over(entry, file, name, graph);
   }
-  add_entry(file, name, std::move(graph));
+  Entry& entry = add_entry(file, name, std::move(graph));
+  if (apart_) entry.scene.name = name;
 }
 
 void AlbumBuilder::finish(Album& album) {

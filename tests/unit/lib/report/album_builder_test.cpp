@@ -80,6 +80,17 @@ TEST_F(AlbumBuilderTest, GraphsWithTheSameIdsAreLaidOverTheFirst) {
   EXPECT_THAT(notes_, IsEmpty());
 }
 
+TEST_F(AlbumBuilderTest, GraphsThatAreKeptApartStandByThemselves) {
+  builder_.keep_apart();
+  builder_.add_graph("a.g2o", "a", line(0, 5, 1.5));
+  builder_.add_graph("b.g2o", "b", line(0, 5, 1.0));
+  const Album made = album();
+  ASSERT_THAT(made.scenes, SizeIs(2));
+  EXPECT_THAT(names(made.scenes[0]), ElementsAre("estimate a"));
+  EXPECT_THAT(names(made.scenes[1]), ElementsAre("estimate b"));
+  EXPECT_EQ(made.scenes[1].name, "b");
+}
+
 TEST_F(AlbumBuilderTest, TheFirstTrajectoryIsTheTruth) {
   builder_.add_graph("t.tum", "t", line(0, 4, 1.1, false));  // comes after graphs all the same
   builder_.add_graph("u.tum", "u", line(0, 3, 1.2, false));

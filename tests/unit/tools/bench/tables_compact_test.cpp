@@ -149,6 +149,29 @@ TEST(CompactTables, ShowLoopsAndErrorsAgainstTheThresholdOnTheirGain) {
   EXPECT_THAT(table, HasSubstr("|  | 0.707 | 3.50 | 20 | 10.0 % | 0.500 | 1.00 | 2.50 × |\n"));
 }
 
+TEST(CompactTables, TheCurvesOfSensitivityAreThoseOfTheTable) {
+  const auto gains = report(
+      "compact_gain",
+      fmt::format(R"({{"name": "town", "apal": {}, "runs": [{{"factor": 0, "loop_gain": 0,
+                      "run": {}}}, {{"factor": 0.707, "loop_gain": 3.5, "run": {}}}]}})",
+                  run(9.0, 100, 200, 0.25), run(8.0, 100, 180, 0.25), run(1.0, 100, 20, 0.5)));
+  EXPECT_EQ(gain_curves(list(gains, "entries")),
+            "threshold over the rule's,\"loop closures kept [%], town\",\"ATE over that of APAL, "
+            "town\"\n0,90,1\n0.707,10,2\n");
+}
+
+TEST(CompactTables, StandBesideTheFigures) {
+  const auto figures =
+      report("compact_figures",
+             fmt::format(R"({{"name": "town", "apal": {}, "apfl": {}, "fpfl": {}}})",
+                         run(9.0, 100, 200, 0.25), run(8.0, 100, 20, 0.5), run(1.0, 30, 10, 0.75)));
+  const std::string table = section(figures, "compact-figures");
+  EXPECT_THAT(table, HasSubstr("| town | (a) all poses, all loop closures | 100 | 100.0 % | 200 | "
+                               "100.0 % | 0.250 | 0.500 |\n"));
+  EXPECT_THAT(table,
+              HasSubstr("|  | (c) few of both | 30 | 30.0 % | 10 | 5.0 % | 0.750 | 1.50 |\n"));
+}
+
 TEST(CompactTables, ShowWhatARobotHasLive) {
   const std::string asked = R"("verdicts": {}, "peak": 0)";
   std::string kept = run(1.0, 25, 20, 0.5, asked);

@@ -37,6 +37,8 @@ class CAIRN_API AlbumBuilder {
   explicit AlbumBuilder(Load load, Note note = {})
       : load_(std::move(load)), note_(std::move(note)) {}
 
+  /// Before any graph: each stands by itself under its name, also one with the ids of another.
+  void keep_apart() { apart_ = true; }
   /// A graph or, without factors, a trajectory. `name`: what to call its estimate.
   void add_graph(const std::string& file, const std::string& name, Graph graph);
   /// What `read_recording` has read.
@@ -99,7 +101,7 @@ class CAIRN_API AlbumBuilder {
   std::vector<Scene> recordings_;
   std::vector<std::pair<std::string, std::variant<RunReport, BenchReport>>> reports_;
   std::optional<std::pair<std::string, Graph>> truth_;
-  bool truth_known_ = false;
+  bool truth_known_ = false, apart_ = false;
   std::string initial_name_;
   InitialGuess* initial_ = nullptr;  // borrowed until `finish`
   std::vector<std::string> notes_;
