@@ -13,6 +13,8 @@ using Eigen::Vector2d;
 
 /// A robot that comes no nearer to a frontier has no path to it [m].
 constexpr double kNear = 2.0;
+/// A path to a pose may end so far from it [m].
+constexpr double kNearPose = 0.5;
 /// A frontier is there still if a cell of one is so near to where its middle was [m].
 constexpr double kStillThere = 0.5;
 /// The map around a frontier [m], which must change before it is tried again.
@@ -46,6 +48,15 @@ std::vector<Candidate> FrontierGoals::candidates(double least) {
     }
   }
   return found;
+}
+
+std::optional<PlannedPath> FrontierGoals::path_to(const Pose2& pose) {
+  std::optional<PlannedPath> path = planner_->path_to(pose.translation(), kNearPose);
+  if (!path) return path;
+  const Vector2d end = path->points.empty() ? pose.translation() : path->points.back();
+  path->look_at = end + Vector2d(std::cos(pose.theta()), std::sin(pose.theta()));
+  if (!moves(*path)) return std::nullopt;
+  return path;
 }
 
 std::optional<PlannedPath> FrontierGoals::path_to(const Frontier& frontier) {

@@ -26,6 +26,9 @@ class FrontierGoals {
   void start(const Situation& situation, bool tight);
   /// Paths to the frontiers of at least this length [m].
   std::vector<Candidate> candidates(double least);
+  /// A path to where the robot can stand as at a pose, with its heading at the end; none: there is
+  /// no path, or it is there already.
+  std::optional<PlannedPath> path_to(const Pose2& pose);
 
   /// Whether there is a frontier yet where the middle of one was.
   static bool is_there(const FloorMap& map, const Eigen::Vector2d& middle);

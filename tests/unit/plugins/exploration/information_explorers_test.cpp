@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Explorers that compare a few paths by the information that they bring, on generated floors.
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "cairn/exploration/exploration.hpp"
+#include "cairn/grid/floor_plan.hpp"
+#include "cairn/plugin/registry.hpp"
+#include "cairn/runtime/error.hpp"
+
+namespace cairn {
+namespace {
+
+using testing::AnyOf;
+using testing::HasSubstr;
+
+constexpr const char* kExact =
+    "lidar_building:relative=0,sigma_xy=1e-6,sigma_theta=1e-6,range_sigma=0";
+constexpr const char* kNoisy = "lidar_building:relative=0.1,sigma_theta=0.01";
+constexpr const char* kMatcher =
+    "simulated:range=1.4,angle=0.35,sigma_translation=0.02,sigma_rotation=0.002";
+
+struct Drive {
+  ExplorationResult result;
+  std::vector<Decision> decisions;
+};
+
+Drive run(const std::string& floor_plan, const std::string& world, const std::string& explorer,
+          const ExplorationLimits& limits, std::uint64_t seed = 3) {
+  Registry registry;
+  const OccupancyGrid floor = registry.make<FloorPlan>(parse_component(floor_plan))->generate(seed);
+  const auto robot = registry.make<World>(parse_component(world));
+  const auto policy =
+      registry.make<PosePolicy>(parse_component("compact_pose:range=1,angle=0.35,reuse=false"));
+  const auto registration = registry.make<Registration>(parse_component(kMatcher));
+  const auto mapper = registry.make<Mapper>("log_odds");
+  const auto explores = registry.make<Explorer>(parse_component(explorer));
+  Drive drive;
+  drive.result = run_exploration({.world = *robot,
+                                  .policy = *policy,
+                                  .registration = *registration,
+                                  .mapper = *mapper,
+                                  .explorer = *explores,
+                                  .registry = registry,
+                                  .start = {.floor = &floor, .pose = {}, .seed = seed},
+                                  .limits = limits,
+                                  .decided = [&](const Decision& decision, const Situation&) {
+                                    drive.decisions.push_back(decision);
+                                  }});
+  return drive;
+}
+
+/// The longest that it has driven without more of the floor being known, by 0.2 % [m].
+double longest_without_progress(const ExplorationResult& result) {
+  double most = 0.0, since = 0.0, longest = 0.0;
+  for (const ExplorationStep& step : result.steps) {
+    if (step.coverage > 1.002 * most) {
+      most = step.coverage;
+      since = step.distance;
+    }
+    longest = std::max(longest, step.distance - since);
+  }
+  return longest;
+}
+
+class InformationExplorers : public testing::TestWithParam<std::tuple<const char*, const char*>> {};
+
+TEST_P(InformationExplorers, WithoutNoiseAllIsSeen) {
+  const auto [explorer, plan] = GetParam();
+  const Drive found = run(plan, kExact, explorer, {});
+  EXPECT_EQ(found.result.end, ExplorationEnd::finished) << found.result.why;
+  EXPECT_THAT(found.result.why, HasSubstr("is left"));
+  // On the way to a far frontier it may touch the frame of a door that it has not seen whole.
+  EXPECT_LE(found.result.collisions, 2);
+  ASSERT_TRUE(found.result.against);
+  EXPECT_GE(found.result.against->seen, 0.99 * found.result.against->floor);
+}
+
+TEST_P(InformationExplorers, WithNoiseEachRunEndsWithAReasonAndMakesProgress) {
+  const auto [explorer, plan] = GetParam();
+  for (const std::uint64_t seed : {4, 5}) {
+    const Drive found = run(plan, kNoisy, explorer, {.distance = 80.0}, seed);
+    EXPECT_THAT(found.result.why,
+                AnyOf(HasSubstr("is left"), HasSubstr("80 m are driven"), HasSubstr("50 m were")));
+    EXPECT_LT(longest_without_progress(found.result), 51.0);
+    ASSERT_TRUE(found.result.against);
+    const double seen = found.result.against->seen / found.result.against->floor;
+    // What it is stuck with are gaps that errors of the map have left.
+    EXPECT_GE(seen, found.result.end == ExplorationEnd::stuck ? 0.98 : 0.8) << found.result.why;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Floors, InformationExplorers,
+    testing::Combine(testing::Values("heuristic"),
+                     testing::Values("rooms:width=12,height=9", "corridor:width=20,height=10",
+                                     "loop:width=16,height=12", "cave:width=12,height=12")));
+
+void expect_the_same_run_twice(const char* explorer) {
+  const Drive a = run("loop:width=16,height=12", kNoisy, explorer, {.distance = 20.0});
+  const Drive b = run("loop:width=16,height=12", kNoisy, explorer, {.distance = 20.0});
+  ASSERT_EQ(a.result.steps.size(), b.result.steps.size());
+  for (std::size_t k = 0; k < a.result.steps.size(); ++k) {
+    ASSERT_EQ(a.result.steps[k].estimate.x(), b.result.steps[k].estimate.x());
+    ASSERT_EQ(a.result.steps[k].trajectory_entropy, b.result.steps[k].trajectory_entropy);
+  }
+  ASSERT_EQ(a.decisions.size(), b.decisions.size());
+  for (std::size_t k = 0; k < a.decisions.size(); ++k)
+    EXPECT_EQ(a.decisions[k].why, b.decisions[k].why);
+}
+
+TEST(Heuristic, TheSameSeedGivesTheSameRun) { expect_the_same_run_twice("heuristic"); }
+
+TEST(Heuristic, DrivesWhatLowersBothEntropiesMostAndSaysTheValues) {
+  const Drive found =
+      run("loop:width=16,height=12", kNoisy, "heuristic:loop_gain=0.5", {.distance = 50.0});
+  ASSERT_GE(found.decisions.size(), 5U);
+  std::size_t revisits = 0;
+  for (const Decision& decision : found.decisions) {
+    if (decision.kind != Decision::Kind::drive) continue;
+    ASSERT_LE(decision.candidates.size(), 3U);
+    const Candidate& chosen = decision.candidates.at(decision.chosen);
+    for (const Candidate& candidate : decision.candidates) {
+      ASSERT_TRUE(candidate.change);
+      EXPECT_EQ(candidate.change->alpha, 1.0);
+      EXPECT_DOUBLE_EQ(candidate.value, candidate.change->trajectory + candidate.change->map);
+      EXPECT_LE(chosen.value, candidate.value);
+      EXPECT_LE(candidate.change->map, 0.0);
+      EXPECT_THAT(decision.why, HasSubstr(candidate.what));
+      revisits += candidate.what.starts_with("pose ");
+    }
+    EXPECT_THAT(decision.why, HasSubstr("trajectory"));
+  }
+  EXPECT_GT(revisits, 0U);
+}
+
+/// With so much noise, and no worth of the map, a revisit is best whenever there is one.
+TEST(Heuristic, GivesUpRevisitsThatDiscoverNothing) {
+  const std::string lost = "lidar_building:relative=0.3,sigma_theta=0.03";
+  const std::string home = "heuristic:simulated_range=0.1,loop_gain=0.1,homing=true";
+  const auto longest_row = [](const Drive& drive) {
+    int row = 0, longest = 0;
+    for (const Decision& decision : drive.decisions) {
+      if (decision.kind != Decision::Kind::drive) continue;
+      const bool revisits = !decision.candidates[decision.chosen].what.starts_with("a frontier");
+      row = revisits ? row + 1 : 0;
+      longest = std::max(longest, row);
+    }
+    return longest;
+  };
+  const ExplorationLimits limits{.distance = 60.0, .decisions = 150};
+  const Drive any = run("loop:width=16,height=12", lost, home + ",revisits=0", limits);
+  const Drive one = run("loop:width=16,height=12", lost, home + ",revisits=1", limits);
+  EXPECT_GT(longest_row(any), 2);
+  EXPECT_NE(one.result.end, ExplorationEnd::stuck) << one.result.why;
+  EXPECT_GT(one.result.steps.back().coverage, any.result.steps.back().coverage);
+  const bool went_home = std::ranges::any_of(any.decisions, [](const Decision& decision) {
+    return std::ranges::any_of(decision.candidates, [](const Candidate& candidate) {
+      return candidate.what == "the first pose";
+    });
+  });
+  EXPECT_TRUE(went_home);
+}
+
+}  // namespace
+}  // namespace cairn
