@@ -14,6 +14,7 @@ namespace py = pybind11;
 // uses the classes of those before it.
 void bind_errors(py::module_& module);
 void bind_values(py::module_& module);
+void bind_factor_types(py::module_& module);
 void bind_measurements(py::module_& module);
 void bind_graph(py::module_& module);
 void bind_files(py::module_& module);

@@ -48,16 +48,16 @@ void add_variables_of(BoundGraph& bound, const py::object& type, const py::objec
   add_variables(use.graph(), variable_type, span_of(names), span_of(rows));
 }
 
-void add_factors_of(BoundGraph& bound, const std::string& tag, const py::object& ids,
+void add_factors_of(BoundGraph& bound, const py::object& given_type, const py::object& ids,
                     const py::object& measurements, const py::object& information,
                     const py::object& sigmas, const py::object& loss) {
   const GraphUse use(bound);
-  const auto type = factor_type_of(use.graph(), tag);
+  const auto type = factor_type_of(use.graph(), given_type);
   const Ids names = ids_of(ids, "ids", 2);
   const std::size_t arity = size_of(type->arity());
   if (names.size() > 0 && names.shape(1) != type->arity()) {
     throw Error(ErrorCode::usage, fmt::format("ids: the shape is {}, and {} joins {} variables",
-                                              shape_text(names), tag, arity));
+                                              shape_text(names), type->tag(), arity));
   }
   const std::size_t count = span_of(names).size() / arity;
   const Doubles rows = rows_of(measurements, "measurements", count, type->measurement_size());
@@ -119,13 +119,13 @@ void set_states(BoundGraph& bound, const py::object& type, const py::object& sta
   }
 }
 
-const FactorPool& factor_pool_of(BoundGraph& bound, const std::string& tag) {
+const FactorPool& factor_pool_of(BoundGraph& bound, const py::object& type) {
   const std::vector<FactorPool>& pools = bound.get().factor_pools();
-  return pools[pool_of(pools, tag)];
+  return pools[pool_of(pools, tag_of(type))];
 }
 
-py::array_t<Id> factor_ids(BoundGraph& bound, const std::string& tag) {
-  const FactorPool& pool = factor_pool_of(bound, tag);
+py::array_t<Id> factor_ids(BoundGraph& bound, const py::object& type) {
+  const FactorPool& pool = factor_pool_of(bound, type);
   py::array_t<Id> ids(
       {static_cast<py::ssize_t>(pool.size()), static_cast<py::ssize_t>(pool.type->arity())});
   std::ranges::transform(pool.variables, ids.mutable_data(),
@@ -133,13 +133,13 @@ py::array_t<Id> factor_ids(BoundGraph& bound, const std::string& tag) {
   return ids;
 }
 
-py::array_t<double> measurements_of(BoundGraph& bound, const std::string& tag) {
-  const FactorPool& pool = factor_pool_of(bound, tag);
+py::array_t<double> measurements_of(BoundGraph& bound, const py::object& type) {
+  const FactorPool& pool = factor_pool_of(bound, type);
   return array_of(pool.measurements, {pool.size(), size_of(pool.type->measurement_size())});
 }
 
-py::array_t<double> information_of(BoundGraph& bound, const std::string& tag) {
-  const FactorPool& pool = factor_pool_of(bound, tag);
+py::array_t<double> information_of(BoundGraph& bound, const py::object& type) {
+  const FactorPool& pool = factor_pool_of(bound, type);
   const int n = pool.type->residual_size();
   std::vector<double> dense;
   for (std::size_t k = 0; k < pool.size(); ++k) {
@@ -150,8 +150,8 @@ py::array_t<double> information_of(BoundGraph& bound, const std::string& tag) {
   return array_of(dense, {pool.size(), size_of(n), size_of(n)});
 }
 
-py::array_t<std::int32_t> positions_of(BoundGraph& bound, const std::string& tag) {
-  const std::vector<std::int32_t>& sequence = factor_pool_of(bound, tag).sequence;
+py::array_t<std::int32_t> positions_of(BoundGraph& bound, const py::object& type) {
+  const std::vector<std::int32_t>& sequence = factor_pool_of(bound, type).sequence;
   return py::array_t<std::int32_t>(static_cast<py::ssize_t>(sequence.size()), sequence.data());
 }
 
@@ -176,7 +176,7 @@ states: (n, m) numbers as files have them: x y theta of a Pose2, x y z qx qy qz 
            py::arg("loss") = py::none(),
            R"(Adds n factors of one type at once; all or, with an Error, none.
 
-type: its tag, such as "EDGE_SE2".
+type: its tag, such as "EDGE_SE2", or a FactorType.
 ids: (n, arity) integers, the variables of each factor.
 measurements: (n, m) numbers.
 information: (n, r, r), or (r, r) for all, or (n, r(r+1)/2) upper triangles row by row; or

@@ -29,6 +29,8 @@ bool is_function(const struct sigaction& action) {
 
 }  // namespace
 
+bool interrupted() { return guards > 0 && interrupt_flag.load(); }
+
 InterruptGuard::InterruptGuard() {
   if (guards++ > 0) return;
   interrupt_flag.store(false);

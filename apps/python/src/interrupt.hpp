@@ -5,6 +5,9 @@
 
 namespace cairn::python {
 
+/// Whether Ctrl-C was pressed while an `InterruptGuard` exists.
+bool interrupted();
+
 /// While one exists, Ctrl-C (SIGINT) sets a flag besides what Python does with it, so that an
 /// optimisation ends with its best estimate although the interpreter does not run. Several may
 /// exist, in several threads. To be made and destroyed under the interpreter's lock.

@@ -12,7 +12,9 @@
 #include "cairn/runtime/error.hpp"
 #include "cairn/typed/measurements.hpp"
 #include "cairn/typed/symbol.hpp"
+#include "component_names.hpp"
 #include "measured.hpp"
+#include "python_factor.hpp"
 
 namespace cairn::python {
 namespace {
@@ -49,17 +51,18 @@ void bind_measurement(py::module_& module) {
       module, "Measurement",
       R"(A measurement of any factor type: on which variables it is, and what was measured.
 
-tag: name of the factor type, as in files (`cairn.components("factor")` lists them).
+type: tag of the factor type, as in files (`cairn.components("factor")` lists them), or a FactorType.
 ids: the variables, in the order of the type.
 values: the numbers measured, in the order and the units of the type.)")
-      .def(py::init([](std::string tag, const py::object& ids, const py::object& values) {
+      .def(py::init([](const py::object& type, const py::object& ids, const py::object& values) {
              const Ids variables = ids_of(ids, "ids");
              const Doubles numbers = doubles_of(values, "values");
-             return Measured{std::move(tag),
+             return Measured{tag_of(type),
                              {span_of(variables).begin(), span_of(variables).end()},
-                             {span_of(numbers).begin(), span_of(numbers).end()}};
+                             {span_of(numbers).begin(), span_of(numbers).end()},
+                             python_factor(type)};
            }),
-           py::arg("tag"), py::arg("ids"), py::arg("values"))
+           py::arg("type"), py::arg("ids"), py::arg("values"))
       .def_readonly("tag", &Measured::tag, "Name of the factor type.")
       .def_readonly("ids", &Measured::ids, "The variables, by id.")
       .def_property_readonly(

@@ -8,6 +8,7 @@ PYBIND11_MODULE(_cairn, module) {
   module.attr("__version__") = CAIRN_VERSION;
   python::bind_errors(module);
   python::bind_values(module);
+  python::bind_factor_types(module);
   python::bind_measurements(module);
   python::bind_graph(module);
   python::bind_files(module);

@@ -108,11 +108,8 @@ Summary run(Graph& graph, const Plan& plan, Observer& observer) {
       call_plugin([&] { return fmt::format("optimizer '{}'", plan.optimizer_spec.name); },
                   [&] { return plan.optimizer->optimize(graph, plan.stop, observer); });
   if (summary.status != Status::interrupted) {
-    for (std::string note :
-         {implausible_estimate(graph, summary.final_chi2), residual_not_finite(graph)}) {
-      if (!note.empty()) summary.notes.push_back(std::move(note));
-    }
-    for (std::string& wrong : wrong_jacobians(graph)) summary.notes.push_back(std::move(wrong));
+    for (std::string& doubt : reasons_for_doubt(graph, summary.final_chi2))
+      summary.notes.push_back(std::move(doubt));
   }
   summary.notes.insert(summary.notes.begin(), notes.begin(), notes.end());
   return summary;

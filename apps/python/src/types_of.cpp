@@ -4,6 +4,8 @@
 #include "arrays.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/typed/build.hpp"
+#include "component_names.hpp"
+#include "python_factor.hpp"
 
 namespace cairn::python {
 namespace {
@@ -26,6 +28,11 @@ std::shared_ptr<const VariableType> variable_type_of(const Graph& graph, std::st
 std::shared_ptr<const FactorType> factor_type_of(const Graph& graph, std::string_view tag) {
   auto type = cairn::detail::type_in(graph.factor_pools(), tag);
   return type ? type : default_registry().factor_type(tag);
+}
+
+std::shared_ptr<const FactorType> factor_type_of(const Graph& graph, const py::object& type) {
+  if (std::shared_ptr<const FactorType> own = python_factor(type)) return own;
+  return factor_type_of(graph, std::string_view(tag_of(type)));
 }
 
 py::object value_of(const VariableType& type, std::span<const double> state) {

@@ -19,6 +19,9 @@ namespace py = pybind11;
 std::shared_ptr<const VariableType> variable_type_of(const Graph& graph, std::string_view tag);
 std::shared_ptr<const FactorType> factor_type_of(const Graph& graph, std::string_view tag);
 
+/// The same of a tag or of a `cairn.FactorType`, as it is.
+std::shared_ptr<const FactorType> factor_type_of(const Graph& graph, const py::object& type);
+
 /// A Pose2, Pose3, Point2 or Point3 where the type is stored as one; else an array of its numbers.
 py::object value_of(const VariableType& type, std::span<const double> state);
 
