@@ -2,6 +2,7 @@
 #include "bench_run.hpp"
 
 #include <algorithm>
+#include <functional>
 #include <limits>
 #include <utility>
 
@@ -197,10 +198,11 @@ class GraphBench {
 };
 
 GraphResult prepare(const std::string& name, const BenchOptions& options, const ProblemSetup& setup,
-                    const Comparison& compared, Session& session) {
+                    const Comparison& compared, const InterruptGuard& guard, Session& session) {
   GraphResult result;
   result.loaded = load_graph(name, options.input, session);
-  for (const std::string& note : setup.apply(result.loaded.graph)) {
+  GuessProgress progress(session.common.quiet, guard.flag());
+  for (const std::string& note : setup.apply(result.loaded.graph, std::ref(progress))) {
     session.note(fmt::format("{}: initial guess {}: {}", name, options.problem.initial, note));
   }
   for (const Configuration& configuration : compared.configurations) {
@@ -276,7 +278,7 @@ BenchResult run_bench(const BenchOptions& options, Session& session) {
   const InterruptGuard guard;
   BenchResult result{.graphs = {}, .left_out = compared.left_out};
   for (std::size_t k = 0; k < options.graphs.size() && !guard.interrupted(); ++k) {
-    result.graphs.push_back(prepare(options.graphs[k], options, setup, compared, session));
+    result.graphs.push_back(prepare(options.graphs[k], options, setup, compared, guard, session));
     result.graphs.back().loaded.label = labels[k];
     GraphBench(options, result.graphs.back(), session, guard).run();
   }

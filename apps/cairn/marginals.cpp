@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -456,9 +457,8 @@ std::string result_text(const MarginalsOptions& options, const LoadedGraph& load
 // The command -------------------------------------------------------------------------------------
 
 std::optional<Summary> optimize(Graph& graph, Optimizer* optimizer, const MarginalsOptions& options,
-                                const Session& session) {
+                                const InterruptGuard& guard, const Session& session) {
   if (!optimizer) return std::nullopt;
-  const InterruptGuard guard;
   Stop stop = options.problem.stop;
   stop.interrupt = &guard.flag();
   OptimizationProgress progress(session.common.quiet, stop.max_iterations);
@@ -500,11 +500,15 @@ int run(MarginalsOptions options, Session& session) {
 
   LoadedGraph loaded = load_graph(options.graph, options.input, session);
   const Request request = request_of(options, loaded.graph);
-  for (const std::string& note : setup.apply(loaded.graph)) {
+  std::optional<InterruptGuard> guard(std::in_place);
+  GuessProgress progress(session.common.quiet, guard->flag());
+  for (const std::string& note : setup.apply(loaded.graph, std::ref(progress))) {
     session.note(fmt::format("initial guess {}: {}", options.problem.initial, note));
   }
-  const std::optional<Summary> summary = optimize(loaded.graph, optimizer.get(), options, session);
-  if (summary && summary->status == Status::interrupted) return kExitInterrupted;
+  const std::optional<Summary> summary =
+      optimize(loaded.graph, optimizer.get(), options, *guard, session);
+  if (guard->interrupted()) return kExitInterrupted;
+  guard.reset();  // what follows has nothing to write before its end
   const Answer answer =
       call_plugin([&] { return fmt::format("linear solver '{}'", options.linear_solver); },
                   [&] { return compute(loaded.graph, request, solver, session); });

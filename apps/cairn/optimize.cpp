@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // cairn optimize GRAPH: one optimisation, its estimate and its report.
 #include <chrono>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -58,9 +59,10 @@ struct InitialEstimate {
 };
 
 InitialEstimate initialise(Graph& graph, const ProblemSetup& setup, const OptimizeOptions& options,
-                           const Session& session) {
+                           const InterruptGuard& guard, const Session& session) {
   const auto begin = std::chrono::steady_clock::now();
-  InitialEstimate result{.notes = setup.apply(graph)};
+  GuessProgress progress(session.common.quiet, guard.flag());
+  InitialEstimate result{.notes = setup.apply(graph, std::ref(progress))};
   result.seconds = seconds_since(begin);
   for (const std::string& note : result.notes)
     session.note(fmt::format("initial guess {}: {}", options.problem.initial, note));
@@ -164,8 +166,8 @@ int run(const OptimizeOptions& options, Session& session) {
   const ProblemSetup setup(options.problem, registry);
 
   LoadedGraph loaded = load_graph(options.graph, options.input, session);
-  const InitialEstimate initial = initialise(loaded.graph, setup, options, session);
   const InterruptGuard guard;  // until the results are written
+  const InitialEstimate initial = initialise(loaded.graph, setup, options, guard, session);
   std::optional<RecordingWriter> recording;
   Summary summary = call_plugin(
       [&] { return in_words(spec); },

@@ -69,13 +69,14 @@ ProblemSetup::ProblemSetup(const ProblemOptions& options, Registry& registry)
   }
 }
 
-std::vector<std::string> ProblemSetup::apply(Graph& graph) const {
+std::vector<std::string> ProblemSetup::apply(Graph& graph, WatchedGuess::GoOn go_on) const {
   graph.set_loss(loss_, selector_);
   std::vector<std::string> notes;
   if (loss_ && std::ranges::none_of(select(graph, selector_), std::identity())) {
     notes.push_back("--loss-on selects no factor of this graph: none has the loss");
   }
   if (!initial_) return notes;
+  if (auto* watched = query<WatchedGuess>(*initial_)) watched->watch(std::move(go_on));
   for (std::string& note :
        call_plugin([&] { return fmt::format("initial guess '{}'", initial_name_); },
                    [&] { return initial_->compute(graph); }))

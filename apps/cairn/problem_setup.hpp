@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "arguments.hpp"
+#include "cairn/evaluation/watched_guess.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/solve/initial_guess.hpp"
@@ -40,8 +41,9 @@ void add_loss_options(ArgumentParser cli, ProblemOptions& options);
 class ProblemSetup {
  public:
   ProblemSetup(const ProblemOptions& options, Registry& registry);
-  /// Gives the graph its loss and its initial estimate. Returns notes for the user.
-  std::vector<std::string> apply(Graph& graph) const;
+  /// Gives the graph its loss and its initial estimate. Returns notes for the user. `go_on`: shows
+  /// the progress of a guess that takes long, and may end it.
+  std::vector<std::string> apply(Graph& graph, WatchedGuess::GoOn go_on = {}) const;
 
   const std::shared_ptr<const Loss>& loss() const { return loss_; }
   const FactorSelector& loss_selector() const { return selector_; }

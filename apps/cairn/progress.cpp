@@ -83,4 +83,15 @@ bool OptimizationProgress::due(int iteration) {
   return true;
 }
 
+bool GuessProgress::operator()(std::string_view what, double part) {
+  const auto now = std::chrono::steady_clock::now();
+  const auto pause = line_.on_terminal() ? 4 * kRedraw : std::chrono::milliseconds(5000);
+  if (now - last_shown_ >= pause) {
+    last_shown_ = now;
+    const std::string text = fmt::format("initial estimate: {}, {:.0f} %", what, 100.0 * part);
+    line_.show(line_.on_terminal() ? bar(part, kBarWidth) + " " + text : text);
+  }
+  return !interrupt_;
+}
+
 }  // namespace cairn::app

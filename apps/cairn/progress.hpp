@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <string>
 #include <string_view>
@@ -47,6 +48,20 @@ class OptimizationProgress : public Observer {
   StatusLine line_;
   int max_iterations_;
   std::chrono::steady_clock::time_point last_shown_{};
+};
+
+/// Shows what an initial guess does that takes long, and ends it when the user interrupts. Called
+/// as `WatchedGuess` does.
+class GuessProgress {
+ public:
+  GuessProgress(bool quiet, const std::atomic<bool>& interrupt)
+      : line_(quiet), interrupt_(interrupt) {}
+  bool operator()(std::string_view what, double part);
+
+ private:
+  StatusLine line_;
+  const std::atomic<bool>& interrupt_;
+  std::chrono::steady_clock::time_point last_shown_ = std::chrono::steady_clock::now();
 };
 
 }  // namespace cairn::app

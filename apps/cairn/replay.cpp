@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 #include <exception>
+#include <functional>
 #include <memory>
 #include <optional>
 
@@ -196,17 +197,19 @@ int run(const ReplayOptions& options, Session& session) {
   const bool sorted = !in_arrival_order(arrivals);
   if (sorted)
     session.note("the file is not in the order of arrival: sorted by the ids of its poses");
+  const InterruptGuard guard;  // until the results are written
+  GuessProgress guess(session.common.quiet, guard.flag());
   std::optional<BatchChecker> checker;
   if (options.checks > 0) {
-    checker.emplace(loaded.graph,
-                    BatchProblem{.loss = setup.loss(),
-                                 .loss_on = setup.loss_selector(),
-                                 .initialise = [&](Graph& graph) { setup.apply(graph); },
-                                 .covariances = options.covariance_check},
-                    registry);
+    checker.emplace(
+        loaded.graph,
+        BatchProblem{.loss = setup.loss(),
+                     .loss_on = setup.loss_selector(),
+                     .initialise = [&](Graph& graph) { setup.apply(graph, std::ref(guess)); },
+                     .covariances = options.covariance_check},
+        registry);
   }
 
-  const InterruptGuard guard;  // until the results are written
   Replay replay;
   std::exception_ptr failure;  // which costs the rest of the recording, not the estimate so far
   try {

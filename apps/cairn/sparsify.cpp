@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -249,13 +250,14 @@ SparsifyResult sparsify(const Graph& graph, const SparsifyJob& job, const Proble
                         Session& session) {
   stop.interrupt = &guard.flag();
   NodeProgress nodes(session.common.quiet);
+  GuessProgress guess(session.common.quiet, guard.flag());
   OptimizationProgress iterations(session.common.quiet, stop.max_iterations);
   const SparsifySetting setting{
       .registry = session.registry(),
       .stop = stop,
       .loss = setup.loss(),
       .loss_on = setup.loss_selector(),
-      .initialise = [&](Graph& whole) { return setup.apply(whole); },
+      .initialise = [&](Graph& whole) { return setup.apply(whole, std::ref(guess)); },
       .observer = std::move(observer),
       .optimisation = &iterations,
       .progress = [&](const SparsifyProgress& progress) { nodes.show(progress); }};

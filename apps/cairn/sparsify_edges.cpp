@@ -4,6 +4,7 @@
 
 #include <chrono>
 #include <cmath>
+#include <functional>
 #include <string>
 #include <utility>
 
@@ -185,6 +186,7 @@ int run_sparsify_edges(const SparsifyCommandOptions& options, Session& session) 
   const LoadedGraph loaded = load_graph(options.graph, options.input, session);
   const InterruptGuard guard;
   EdgeProgress edges(session.common.quiet);
+  GuessProgress guess(session.common.quiet, guard.flag());
   Stop stop = options.problem.stop;
   stop.interrupt = &guard.flag();
   OptimizationProgress iterations(session.common.quiet, stop.max_iterations);
@@ -193,7 +195,7 @@ int run_sparsify_edges(const SparsifyCommandOptions& options, Session& session) 
       .stop = stop,
       .loss = setup.loss(),
       .loss_on = setup.loss_selector(),
-      .initialise = [&](Graph& whole) { return setup.apply(whole); },
+      .initialise = [&](Graph& whole) { return setup.apply(whole, std::ref(guess)); },
       .optimisation = &iterations,
       .progress = [&](const SparsifyProgress& progress) { edges.show(progress); }};
   const SparsifyEdgesResult result = sparsify_edges(loaded.graph, job, setting);

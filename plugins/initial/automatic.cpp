@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <cmath>
+#include <functional>
 #include <optional>
 #include <string_view>
 #include <utility>
@@ -7,6 +8,7 @@
 #include <fmt/core.h>
 
 #include "cairn/evaluation/plausibility.hpp"
+#include "cairn/evaluation/watched_guess.hpp"
 #include "cairn/graph/gauge.hpp"
 #include "cairn/runtime/error.hpp"
 #include "guesses.hpp"
@@ -14,17 +16,17 @@
 namespace cairn::initial {
 namespace {
 
-/// Ends an optimisation as soon as chi2 is plausible.
-class UntilPlausible final : public Observer {
+/// Ends an optimisation as soon as this is true of an iteration.
+class Until final : public Observer {
  public:
-  explicit UntilPlausible(std::int64_t degrees_of_freedom)
-      : degrees_of_freedom_(degrees_of_freedom) {}
+  using Enough = std::function<bool(const Iteration&)>;
+  explicit Until(Enough enough) : enough_(std::move(enough)) {}
   bool on_iteration(const Iteration& iteration, const Graph&, const Values&) override {
-    return !is_plausible(iteration.chi2, degrees_of_freedom_);
+    return !enough_(iteration);
   }
 
  private:
-  std::int64_t degrees_of_freedom_;
+  Enough enough_;
 };
 
 /// The best start of several by its chi2.
@@ -33,12 +35,23 @@ class UntilPlausible final : public Observer {
 /// given, it is the better start. If not, these may be optimised already, perhaps in a local
 /// minimum: a few iterations from both decide. Where chi2 of the better start is not plausible, not
 /// even after some iterations from it, the slow and thorough incremental estimate is compared too.
-class Automatic final : public InitialGuess {
+class Automatic final : public InitialGuess, public WatchedGuess {
  public:
   Automatic(int iterations, Candidates candidates)
       : stop_{.max_iterations = iterations}, candidates_(std::move(candidates)) {}
 
+  void watch(GoOn go_on) override {
+    go_on_ = go_on;
+    if (!candidates_.incremental) return;
+    if (auto* incremental = query<WatchedGuess>(*candidates_.incremental))
+      incremental->watch(std::move(go_on));
+  }
+  void* ability(std::string_view name) override {
+    return name == WatchedGuess::kAbility ? static_cast<WatchedGuess*>(this) : nullptr;
+  }
+
   std::vector<std::string> compute(Graph& graph) override {
+    wanted_ = true;
     given_ = graph.values();
     best_ = {"as_given", chi2(graph), graph.values(), {}};
     tried_ = {best_name()};
@@ -47,8 +60,9 @@ class Automatic final : public InitialGuess {
     }
     const std::int64_t dof = degrees_of_freedom(graph, resolve_gauge(graph));
     if (!is_plausible(best_.chi2, dof) && candidates_.optimizer) {
-      UntilPlausible observer(dof);
-      const double reached = optimized(best_, stop_, observer, graph);
+      const double reached = optimized(best_, stop_, graph, [&](const Iteration& iteration) {
+        return is_plausible(iteration.chi2, dof);
+      });
       std::optional<Start> slow;
       if (!is_plausible(reached, dof))
         slow = compute("incremental", candidates_.incremental.get(), graph);
@@ -58,6 +72,7 @@ class Automatic final : public InitialGuess {
     std::vector<std::string> notes;
     if (tried_.size() > 1) notes.push_back(best_name() + rejected());
     for (std::string& note : best_.notes) notes.push_back(std::move(note));
+    if (!wanted_) notes.push_back("interrupted: not all starts were tried");
     return notes;
   }
 
@@ -83,9 +98,10 @@ class Automatic final : public InitialGuess {
   /// Empty where there is no such guess, or it cannot be computed, or chi2 there is not finite.
   std::optional<Start> compute(std::string_view name, InitialGuess* guess, Graph& graph) {
     graph.set_values(given_);
-    if (!guess) return std::nullopt;
+    if (!guess || !wanted(name, 0.0)) return std::nullopt;
     try {
       std::vector<std::string> notes = guess->compute(graph);
+      static_cast<void>(wanted(name, 1.0));
       Start start{name, chi2(graph), graph.values(), std::move(notes)};
       tried_.push_back(fmt::format("{} (chi2 {:.4g})", name, start.chi2));
       if (std::isfinite(start.chi2)) return start;
@@ -101,15 +117,26 @@ class Automatic final : public InitialGuess {
   bool is_better(const Start& start, Graph& graph) {
     if (!(best_.chi2 <= start.chi2)) return true;
     if (!candidates_.optimizer || start.states.pools == best_.states.pools) return false;
-    Observer silent;
     const Stop few{.max_iterations = kFewIterations};
-    const double reached = optimized(best_, few, silent, graph);
-    return optimized(start, few, silent, graph) < 0.999 * reached;
+    const auto never = [](const Iteration&) { return false; };
+    const double reached = optimized(best_, few, graph, never);
+    return optimized(start, few, graph, never) < 0.999 * reached && wanted_;
   }
 
-  double optimized(const Start& start, const Stop& stop, Observer& observer, Graph& graph) {
+  /// chi2 after some iterations from `start`, until one of them is enough.
+  double optimized(const Start& start, const Stop& stop, Graph& graph,
+                   const Until::Enough& enough) {
     graph.set_values(start.states);
+    Until observer([&](const Iteration& iteration) {
+      return enough(iteration) ||
+             !wanted(start.name, static_cast<double>(iteration.number) / stop.max_iterations);
+    });
     return candidates_.optimizer->optimize(graph, stop, observer).final_chi2;
+  }
+
+  /// Whether to go on; once it is not, it never is.
+  bool wanted(std::string_view what, double part) {
+    return wanted_ = wanted_ && (!go_on_ || go_on_(what, part));
   }
 
   static constexpr int kFewIterations = 5;
@@ -119,6 +146,8 @@ class Automatic final : public InitialGuess {
   Values given_;
   Start best_;
   std::vector<std::string> tried_;
+  GoOn go_on_;
+  bool wanted_ = true;
 };
 
 }  // namespace

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 #include <numeric>
+#include <string>
+#include <utility>
 
+#include "cairn/evaluation/watched_guess.hpp"
 #include "cairn/geometry/pose.hpp"
 #include "cairn/graph/gauge.hpp"
 #include "guesses.hpp"
@@ -10,29 +13,56 @@
 namespace cairn::initial {
 namespace {
 
+/// Ends an optimisation as soon as the guess is not to go on.
+class WhileWanted final : public Observer {
+ public:
+  WhileWanted(const WatchedGuess::GoOn& go_on, double part) : go_on_(go_on), part_(part) {}
+  bool on_iteration(const Iteration&, const Graph&, const Values&) override {
+    return wanted_ = !go_on_ || go_on_("incremental", part_);
+  }
+  bool wanted() const { return wanted_; }
+
+ private:
+  const WatchedGuess::GoOn& go_on_;
+  double part_;
+  bool wanted_ = true;
+};
+
 /// A graph that grows along the robot's way and is optimised now and then: every new pose is placed
 /// from an estimate that has already been corrected, so that errors of odometry never pile up to
 /// where an optimizer goes astray.
-class Incremental final : public InitialGuess {
+class Incremental final : public InitialGuess, public WatchedGuess {
  public:
   Incremental(int step, Stop stop, std::unique_ptr<Optimizer> optimizer)
       : step_(step), stop_(stop), optimizer_(std::move(optimizer)) {}
 
+  void watch(GoOn go_on) override { go_on_ = std::move(go_on); }
+  void* ability(std::string_view name) override {
+    return name == WatchedGuess::kAbility ? static_cast<WatchedGuess*>(this) : nullptr;
+  }
+
   std::vector<std::string> compute(Graph& graph) override {
     Growth growth(graph);
-    int since = 0, rounds = 0;
     const std::vector<int> poses = poses_by_id(graph);
     const int step = step_ > 0 ? step_ : std::max(100, static_cast<int>(std::ssize(poses) / 50));
-    for (const int variable : poses) {
-      growth.add_pose(variable);
+    int since = 0, rounds = 0;
+    std::size_t added = 0;
+    bool wanted = true;
+    for (; wanted && added < poses.size(); ++added) {
+      growth.add_pose(poses[added]);
       if (++since < step) continue;
-      optimizer_->optimize(growth.grown, stop_);
+      wanted = optimize(growth.grown, added + 1, poses.size());
       since = 0;
       ++rounds;
     }
-    if (growth.grown.factor_count() > 0) optimizer_->optimize(growth.grown, stop_);
+    if (wanted && growth.grown.factor_count() > 0)
+      wanted = optimize(growth.grown, added, poses.size());
     std::vector<std::string> notes = {"optimised " + counted(rounds + 1, "time", "times") +
                                       " on the way"};
+    if (!wanted) {
+      notes = {"interrupted after " + counted(static_cast<std::int64_t>(added), "pose", "poses") +
+               " of " + std::to_string(poses.size()) + ": the others are not optimised"};
+    }
     growth.copy_back(notes);
     return notes;
   }
@@ -126,6 +156,15 @@ class Incremental final : public InitialGuess {
     }
   };
 
+  /// False if the guess is not to go on.
+  bool optimize(Graph& grown, std::size_t added, std::size_t all) {
+    const double part = static_cast<double>(added) / static_cast<double>(all);
+    if (go_on_ && !go_on_("incremental", part)) return false;
+    WhileWanted observer(go_on_, part);
+    optimizer_->optimize(grown, stop_, observer);
+    return observer.wanted();
+  }
+
   static std::vector<int> poses_by_id(const Graph& graph) {
     std::vector<int> order;
     for (int v = 0; v < graph.variable_count(); ++v) {
@@ -138,6 +177,7 @@ class Incremental final : public InitialGuess {
   int step_;
   Stop stop_;
   std::unique_ptr<Optimizer> optimizer_;
+  GoOn go_on_;
 };
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <csignal>
 #include <string>
 
 #include "cairn/plugin/registry.hpp"
@@ -54,6 +55,20 @@ TEST_F(Interrupts, ASecondOneEndsTheProgramAndLeavesNothingUnfinished) {
   EXPECT_THAT(outcome.err, HasSubstr("cairn: interrupted\n"));
   EXPECT_THAT(outcome.err, HasSubstr("code=130"));
   EXPECT_EQ(folder_.contents(), (std::vector<std::string>{"graph.g2o"}));
+}
+
+TEST_F(Interrupts, EndAnInitialGuessWithWhatItHas) {
+  CAIRN_NEEDS("optimizer", "levenberg_marquardt");
+  CAIRN_NEEDS("linear_solver", "block_cholesky");
+  const std::string best = folder_.file("best.g2o"), json = folder_.file("run.json");
+  // Optimised at each pose, which takes far longer than until the first line of progress.
+  const Outcome outcome = cairn_interrupted({"optimize", "@manhattan:poses=6000", "--initial",
+                                             "incremental:step=1", "-o", best, "--json", json},
+                                            "initial estimate: incremental", SIGINT);
+  EXPECT_EQ(outcome.exit_code, 130) << outcome.err;
+  EXPECT_THAT(outcome.err, HasSubstr("of 6000: the others are not optimised"));
+  EXPECT_EQ(parse_json(read_text(json)).at("status").as_string(), "interrupted");
+  EXPECT_EQ(report_of({"info", best}).at("graph").at("variables").as_int64(), 6000);
 }
 
 TEST_F(Interrupts, EndAPageThatIsBeingMade) {
