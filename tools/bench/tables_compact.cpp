@@ -289,7 +289,7 @@ std::string live_table(const json::array& entries) {
 }
 
 std::string gain_table(const json::array& entries) {
-  MarkdownTable table({"graph", "loop gain over the rule's", "loop gain [nats]", "loops kept",
+  MarkdownTable table({"graph", "threshold over the rule's", "gain threshold [nats]", "loops kept",
                        "of all", "ATE [m]", "[°]", "over APAL's"});
   for (const json::value& entry : entries) {
     std::string name = text(entry, "name");

@@ -26,8 +26,8 @@ std::vector<Section> compact_figures_sections(const json::array& entries) {
     for (const auto& [key, title] : {std::pair{"apal", "(a) all poses, all loop closures"},
                                      {"apfl", "(b) all poses, few loop closures"},
                                      {"fpfl", "(c) few of both"}}) {
-      const auto of = [&](const char* path) {
-        return number(entry, fmt::format("{}.{}", key, path));
+      const auto of = [&entry, strategy = key](const char* path) {
+        return number(entry, fmt::format("{}.{}", strategy, path));
       };
       table.add({name, title, whole(of("poses.kept")), part(of("poses.kept"), of("poses.in")),
                  whole(of("loops.kept")), part(of("loops.kept"), of("loops.in")),
