@@ -22,6 +22,7 @@
 #include "sparsify.hpp"
 #include "sparsify_records.hpp"
 #include "study_objective.hpp"
+#include "study_optimality.hpp"
 #include "table.hpp"
 
 namespace cairn::app {
@@ -223,7 +224,8 @@ Command add_study(ArgumentParser program) {
   ArgumentParser cli = program.add_command("study", "what only the tables of papers need");
   cli.require_command();
   const std::vector<Command> studies = {add_study_compact(cli), add_study_sparsify(cli),
-                                        add_study_problems(cli), add_study_objective(cli)};
+                                        add_study_problems(cli), add_study_objective(cli),
+                                        add_study_optimality(cli)};
   cli.footer(
       "Example:\n"
       "  cairn study sparsify @manhattan --keep-every 5 --record problems.json\n"

@@ -36,6 +36,7 @@
 #include "results.hpp"
 #include "session.hpp"
 #include "slam_names.hpp"
+#include "study_paths.hpp"
 #include "table.hpp"
 
 namespace cairn::app {
@@ -112,28 +113,6 @@ struct PathSet {
   double map_entropy = 0.0, resolution = 0.0, lidar_range = 0.0;
   std::vector<SampledPath> paths;
 };
-
-/// Paths to random cells of the known floor, each at least a step away, on different cells.
-std::vector<PlannedPath> random_paths(const Situation& situation, PathPlanner& planner, int count,
-                                      RandomNumbers& random) {
-  const FloorMap& map = situation.map;
-  std::vector<std::size_t> cells;
-  for (std::size_t k = 0; k < map.cells.size(); ++k) {
-    if (map.clearance[k] >= needed_clearance(situation.robot.radius, map.frame)) cells.push_back(k);
-  }
-  planner.start(map, situation.pose.translation(), situation.robot.radius);
-  std::vector<PlannedPath> paths;
-  while (!cells.empty() && std::ssize(paths) < count) {
-    const std::size_t chosen = random.below(cells.size());
-    const auto cell = static_cast<int>(cells[chosen]);
-    cells[chosen] = cells.back();
-    cells.pop_back();
-    const auto goal = map.frame.centre(cell % map.frame.width, cell / map.frame.width);
-    std::optional<PlannedPath> path = planner.path_to(goal, 2.0 * map.frame.resolution);
-    if (path && path->length > situation.robot.step) paths.push_back(std::move(*path));
-  }
-  return paths;
-}
 
 class Study {
  public:

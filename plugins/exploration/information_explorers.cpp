@@ -2,6 +2,7 @@
 #include <memory>
 
 #include "cairn/plugin/registry.hpp"
+#include "dopt.hpp"
 #include "heuristic.hpp"
 
 void cairn_register(cairn::Registrar& registrar) {
@@ -11,4 +12,7 @@ void cairn_register(cairn::Registrar& registrar) {
       "heuristic", [](const HeuristicOptions& options, Registry& registry) {
         return std::make_unique<Heuristic>(options, registry);
       });
+  registrar.add<Explorer, DoptOptions>("dopt", [](const DoptOptions& options, Registry& registry) {
+    return std::make_unique<Dopt>(options, registry);
+  });
 }

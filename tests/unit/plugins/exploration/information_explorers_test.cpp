@@ -100,7 +100,7 @@ TEST_P(InformationExplorers, WithNoiseEachRunEndsWithAReasonAndMakesProgress) {
 
 INSTANTIATE_TEST_SUITE_P(
     Floors, InformationExplorers,
-    testing::Combine(testing::Values("heuristic"),
+    testing::Combine(testing::Values("heuristic", "dopt", "dopt:by=laplacian"),
                      testing::Values("rooms:width=12,height=9", "corridor:width=20,height=10",
                                      "loop:width=16,height=12", "cave:width=12,height=12")));
 
@@ -168,6 +168,45 @@ TEST(Heuristic, GivesUpRevisitsThatDiscoverNothing) {
     });
   });
   EXPECT_TRUE(went_home);
+}
+
+TEST(Dopt, TheSameSeedGivesTheSameRun) {
+  expect_the_same_run_twice("dopt");
+  expect_the_same_run_twice("dopt:by=laplacian");
+}
+
+TEST(Dopt, DrivesToTheFrontierWithTheLargestOneAndSaysSo) {
+  for (const std::string by : {"exact", "laplacian"}) {
+    const Drive found = run("loop:width=16,height=12", kNoisy, "dopt:by=" + by, {.distance = 50.0});
+    ASSERT_GE(found.decisions.size(), 5U);
+    std::size_t not_nearest = 0;
+    for (const Decision& decision : found.decisions) {
+      if (decision.kind != Decision::Kind::drive) continue;
+      const Candidate& chosen = decision.candidates.at(decision.chosen);
+      for (const Candidate& candidate : decision.candidates) {
+        EXPECT_LE(chosen.value, candidate.value);
+        not_nearest += candidate.path.length < chosen.path.length;
+        EXPECT_THAT(candidate.what, HasSubstr("a frontier of"));
+      }
+      EXPECT_THAT(decision.why, HasSubstr("D-optimality (" + by + ")"));
+    }
+    EXPECT_GT(not_nearest, 0U);
+  }
+}
+
+/// With a margin that everything is within it drives as `frontier` does, but for what that keeps.
+TEST(Dopt, WithinTheMarginTheNearestIsChosen) {
+  const Drive wide =
+      run("rooms:width=12,height=9", kNoisy, "dopt:margin=1000,keep=1", {.distance = 20.0});
+  const Drive nearest =
+      run("rooms:width=12,height=9", kNoisy, "frontier:keep=1", {.distance = 20.0});
+  ASSERT_EQ(wide.result.steps.size(), nearest.result.steps.size());
+  EXPECT_EQ(wide.result.steps.back().estimate.x(), nearest.result.steps.back().estimate.x());
+}
+
+TEST(Dopt, NeedsALinearSolverWithDeterminants) {
+  Registry registry;
+  EXPECT_THROW(registry.make<Explorer>(parse_component("dopt:solver=none")), Error);
 }
 
 }  // namespace

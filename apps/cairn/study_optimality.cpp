@@ -1,0 +1,265 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "study_optimality.hpp"
+
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <fmt/core.h>
+#include <boost/json/array.hpp>
+#include <boost/json/object.hpp>
+
+#include "cairn/evaluation/mean_interval.hpp"
+#include "cairn/evaluation/rank_correlation.hpp"
+#include "cairn/exploration/exploration.hpp"
+#include "cairn/exploration/random_stream.hpp"
+#include "cairn/planning/path_motions.hpp"
+#include "cairn/planning/path_optimality.hpp"
+#include "cairn/runtime/timed.hpp"
+#include "floors.hpp"
+#include "interrupt.hpp"
+#include "json_report.hpp"
+#include "progress.hpp"
+#include "results.hpp"
+#include "session.hpp"
+#include "slam_names.hpp"
+#include "study_paths.hpp"
+#include "table.hpp"
+
+namespace cairn::app {
+namespace {
+
+namespace json = boost::json;
+
+struct OptimalityStudyOptions {
+  std::string floor;
+  std::string explorer = "frontier", world = "lidar_building", planner = "grid_dijkstra";
+  std::string solver = "block_cholesky";
+  SlamNames slam{.policy = "compact_pose:strategy=apfl,range=2,angle=3.14,reuse=false,gate=0.9999"};
+  int runs = 1, poses = 1000, paths = 1000;
+  double loop_gain = PathOptimalityOptions{}.loop_gain;
+  std::uint64_t seed = 1;
+};
+
+/// What one form of the criterion has of the paths of a set.
+struct Evaluated {
+  double prepare = 0.0, seconds = 0.0;  ///< once, and for all paths [s]
+  double loops = 0.0;                   ///< mean per path
+  std::vector<double> values;           ///< ln D-opt
+};
+
+/// The paths that were compared at the end of one run.
+struct Comparison {
+  int poses = 0, paths = 0;
+  double motions = 0.0;  ///< mean per path
+  Evaluated exact, laplacian;
+  double tau = 0.0;
+};
+
+Evaluated evaluate(const Situation& situation, OptimalityForm by, double loop_gain,
+                   LinearSolver& solver, const std::vector<std::vector<Pose2>>& paths) {
+  Evaluated result;
+  std::unique_ptr<PathOptimalities> optimalities;
+  {
+    const Timed timed(result.prepare);
+    optimalities = std::make_unique<PathOptimalities>(
+        situation, PathOptimalityOptions{.by = by, .loop_gain = loop_gain}, solver);
+  }
+  const Timed timed(result.seconds);
+  for (const std::vector<Pose2>& motions : paths) {
+    const PathOptimality path = optimalities->along(motions);
+    result.values.push_back(path.log_optimality);
+    result.loops += static_cast<double>(path.loops) / static_cast<double>(paths.size());
+  }
+  return result;
+}
+
+class Study {
+ public:
+  Study(const OptimalityStudyOptions& options, Session& session)
+      : options_(options),
+        session_(session),
+        floor_(load_floor(options.floor, session)),
+        line_(session.common.quiet) {}
+
+  std::vector<Comparison> run() {
+    for (int run = 0; run < options_.runs && !guard_.interrupted(); ++run)
+      explore(options_.seed + static_cast<std::uint64_t>(run));
+    line_.clear();
+    return std::move(comparisons_);
+  }
+  bool interrupted() const { return guard_.interrupted(); }
+
+ private:
+  template <class Part>
+  std::unique_ptr<Part> make(const std::string& name) {
+    return session_.registry().make<Part>(parse_component(name));
+  }
+
+  /// Until the graph has as many poses as wanted, or nothing is left to explore.
+  void explore(std::uint64_t seed) {
+    const auto world = make<World>(options_.world);
+    const auto policy = make<PosePolicy>(options_.slam.policy);
+    const auto registration = make<Registration>(options_.slam.registration);
+    const auto mapper = make<Mapper>(options_.slam.mapper);
+    const auto explorer = make<Explorer>(options_.explorer);
+    std::atomic<bool> stop{false};
+    run_exploration(
+        {.world = *world,
+         .policy = *policy,
+         .registration = *registration,
+         .mapper = *mapper,
+         .explorer = *explorer,
+         .registry = session_.registry(),
+         .start = {.floor = &floor_, .pose = {}, .seed = seed},
+         .limits = {},
+         .interrupt = &stop,
+         .scanned = [&](const ExplorationStep&, const Situation& situation, const LaserScan&) {
+           const auto poses = static_cast<int>(situation.poses.size());
+           if (line_.on_terminal()) line_.show(fmt::format("seed {}: {} poses", seed, poses));
+           if (stop) return;
+           stop = guard_.interrupted() || poses >= options_.poses;
+           if (poses >= options_.poses) compare(situation, seed);
+         }});
+    if (!stop) {
+      session_.note(fmt::format("seed {}: the floor was explored before the graph had {} poses",
+                                seed, options_.poses));
+    }
+  }
+
+  void compare(const Situation& situation, std::uint64_t seed) {
+    const auto planner = make<PathPlanner>(options_.planner);
+    RandomStream random(seed, RandomStream::Purpose::explorer);
+    std::vector<std::vector<Pose2>> paths;
+    Comparison comparison;
+    comparison.poses = static_cast<int>(situation.poses.size());
+    for (const PlannedPath& path : random_paths(situation, *planner, options_.paths, random)) {
+      paths.push_back(motions_along(situation.pose, path, situation.robot));
+      comparison.motions += static_cast<double>(paths.back().size());
+    }
+    if (paths.size() < 2) return;
+    comparison.paths = static_cast<int>(paths.size());
+    comparison.motions /= static_cast<double>(paths.size());
+    for (const OptimalityForm by : {OptimalityForm::exact, OptimalityForm::laplacian}) {
+      const auto solver = make<LinearSolver>(options_.solver);
+      (by == OptimalityForm::exact ? comparison.exact : comparison.laplacian) =
+          evaluate(situation, by, options_.loop_gain, *solver, paths);
+    }
+    comparison.tau = kendall_tau(comparison.exact.values, comparison.laplacian.values);
+    comparisons_.push_back(std::move(comparison));
+  }
+
+  const OptimalityStudyOptions& options_;
+  Session& session_;
+  OccupancyGrid floor_;
+  InterruptGuard guard_;
+  StatusLine line_;
+  std::vector<Comparison> comparisons_;
+};
+
+json::object evaluated_json(const Evaluated& of) {
+  return {{"prepare_seconds", of.prepare}, {"seconds", of.seconds}, {"loops", of.loops}};
+}
+
+int run_study(const OptimalityStudyOptions& options, Session& session) {
+  session.use_threads();
+  Study study(options, session);
+  const std::vector<Comparison> comparisons = study.run();
+  Table table({{"poses", Table::Align::right},
+               {"paths", Table::Align::right},
+               {"motions", Table::Align::right},
+               {"loops", Table::Align::right},
+               {"exact [s]", Table::Align::right},
+               {"Laplacian: loops", Table::Align::right},
+               {"[s]", Table::Align::right},
+               {"τ", Table::Align::right}});
+  std::vector<double> taus;
+  json::array rows;
+  const auto times = [](const Evaluated& of) {
+    return fmt::format("{:.3f} + {:.3f}", of.prepare, of.seconds);
+  };
+  for (const Comparison& of : comparisons) {
+    taus.push_back(of.tau);
+    rows.push_back({{"poses", of.poses},
+                    {"paths", of.paths},
+                    {"motions", of.motions},
+                    {"exact", evaluated_json(of.exact)},
+                    {"laplacian", evaluated_json(of.laplacian)},
+                    {"tau", number_json(of.tau)}});
+    table.add({fmt::format("{}", of.poses), fmt::format("{}", of.paths),
+               fmt::format("{:.1f}", of.motions), fmt::format("{:.2f}", of.exact.loops),
+               times(of.exact), fmt::format("{:.2f}", of.laplacian.loops), times(of.laplacian),
+               fmt::format("{:.3f}", of.tau)});
+  }
+  const MeanInterval tau = mean_interval(taus);
+  json::object report = begin_report("study");
+  report["floor"] = options.floor;
+  report["sets"] = std::move(rows);
+  report["tau"] = {{"mean", number_json(tau.mean)},
+                   {"low", number_json(tau.low())},
+                   {"high", number_json(tau.high())}};
+  report["status"] = study.interrupted() ? "interrupted" : "finished";
+  end_report(report);
+  Results results(session);
+  results.add([&] { session.write_json(report); });
+  results.add([&] {
+    session.print(table.text(session.colour()));
+    session.print(
+        fmt::format("τ of exact D-optimality and that of the Laplacian: {}; times: once, and for "
+                    "all paths; loops and motions per path\n",
+                    interval_text(tau)));
+  });
+  results.finish();
+  return study.interrupted() ? kExitInterrupted : 0;
+}
+
+}  // namespace
+
+Command add_study_optimality(ArgumentParser study) {
+  auto options = std::make_shared<OptimalityStudyOptions>();
+  ArgumentParser cli = study.add_command(
+      "optimality", "D-optimality of many paths, exactly and by the Laplacian of the graph");
+  cli.add_option("floor", options->floor, "the floor: floor.yaml, or @KIND[:k=v] to generate")
+      .type_name("FLOOR")
+      .required();
+  cli.add_option("--runs", options->runs, "explorations, with the seeds that follow --seed")
+      .type_name("N")
+      .within(1, 1000000)
+      .show_default();
+  cli.add_option("--poses", options->poses, "of the graph at which paths are compared")
+      .type_name("N")
+      .within(2, 1000000)
+      .show_default();
+  cli.add_option("--paths", options->paths, "to random places on the known floor")
+      .type_name("N")
+      .within(2, 1000000)
+      .show_default();
+  cli.add_option("--loop-gain", options->loop_gain,
+                 "information that a loop closure on a path must exceed [nats]")
+      .type_name("X")
+      .within(0.0, 1e9)
+      .show_default();
+  cli.add_option("--explorer", options->explorer, "decides where to drive")
+      .type_name("NAME")
+      .show_default();
+  cli.add_option("--planner", options->planner, "finds the paths that are compared")
+      .type_name("NAME")
+      .show_default();
+  cli.add_option("--linear-solver", options->solver, "factorises the matrix of the graph")
+      .type_name("NAME")
+      .show_default();
+  cli.add_option("--world", options->world, "the robot, as of cairn explore")
+      .type_name("NAME")
+      .show_default();
+  cli.add_option("--seed", options->seed, "of the first run").type_name("N").show_default();
+  add_slam_options(cli, options->slam);
+  cli.footer(
+      "Example:\n"
+      "  cairn study optimality @rooms --poses 200 --paths 100");
+  return {cli, [options](Session& session) { return run_study(*options, session); }};
+}
+
+}  // namespace cairn::app
