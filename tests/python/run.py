@@ -3,7 +3,7 @@
 import importlib
 import sys
 
-for module in ["numpy", "pytest"]:
+for module in ["numpy", "pytest", *(["matplotlib"] if "test_docs" in sys.argv[1] else [])]:
     try:
         importlib.import_module(module)
     except ImportError:

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import cairn
 
+# Plots are drawn without a screen.
+os.environ.setdefault("MPLBACKEND", "Agg")
 SOURCE = Path(__file__).resolve().parents[2]
 
 
@@ -40,6 +42,12 @@ def run(page, folder):
 
 def test_every_block_of_the_guide_runs(tmp_path):
     assert run(SOURCE / "docs" / "python.md", tmp_path) >= 20
+
+
+def test_the_block_of_the_readme_runs(tmp_path, capsys):
+    assert run(SOURCE / "README.md", tmp_path) == 1
+    printed = capsys.readouterr().out
+    assert printed.count("converged: chi2") == 3 and "ATE" in printed and (tmp_path / "solved.g2o").exists()
 
 
 def test_a_wrong_block_is_found(tmp_path):

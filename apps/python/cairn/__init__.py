@@ -36,6 +36,7 @@ from ._cairn import (
     __version__,
     components,
     cross_covariances,
+    draw,
     evaluate,
     generate,
     id_text,
@@ -49,6 +50,7 @@ from ._cairn import (
     symbol,
     write,
 )
+from . import _plot  # noqa: E402,F401  plots are methods of Graph
 
 __all__ = [
     "BearingRange",
@@ -76,6 +78,7 @@ __all__ = [
     "__version__",
     "components",
     "cross_covariances",
+    "draw",
     "evaluate",
     "generate",
     "id_text",

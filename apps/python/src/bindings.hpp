@@ -22,6 +22,7 @@ void bind_optimize(py::module_& module);
 void bind_covariances(py::module_& module);
 void bind_estimator(py::module_& module);
 void bind_evaluation(py::module_& module);
+void bind_pictures(py::module_& module);
 void bind_components(py::module_& module);
 
 }  // namespace cairn::python

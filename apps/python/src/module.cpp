@@ -16,5 +16,6 @@ PYBIND11_MODULE(_cairn, module) {
   python::bind_covariances(module);
   python::bind_estimator(module);
   python::bind_evaluation(module);
+  python::bind_pictures(module);
   python::bind_components(module);
 }
