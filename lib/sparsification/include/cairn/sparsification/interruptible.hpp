@@ -8,15 +8,16 @@
 
 namespace cairn {
 
-/// Thrown out of long work that is to end: whoever set `Interruptible::watch` catches it. What the
-/// work had found is lost, and nothing else.
+/// Thrown out of long work that is to end, for the caller that set `Interruptible::watch` to catch.
+/// What the work had found is lost, and nothing else.
 struct Interruption {};
 
 /// A component whose work may take long. It asks now and then whether to go on.
 class Interruptible : public Component {
  public:
   /// `go_on` is asked from now on in the thread that works, every few milliseconds or less often;
-  /// where it says no, the work ends with an `Interruption`. Empty: nobody is asked.
+  /// where it returns false, the work ends with an `Interruption`. Empty: the work goes on to its
+  /// end.
   void watch(std::function<bool()> go_on) { go_on_ = std::move(go_on); }
 
  protected:
