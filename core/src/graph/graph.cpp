@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include <fmt/core.h>
+#include <boost/container/small_vector.hpp>
 
 #include "cairn/graph/packed.hpp"
 #include "cairn/runtime/error.hpp"
@@ -12,6 +13,8 @@
 
 namespace cairn {
 namespace {
+
+using Numbers = boost::container::small_vector<double, 32>;  // of a state or measurement
 
 Error bad_input(const std::string& message) { return {ErrorCode::input, message}; }
 
@@ -21,7 +24,7 @@ bool all_finite(std::span<const double> values) {
 
 /// What the type says of a state's or a measurement's numbers, which it must leave finite.
 template <class Type>
-std::string normalize(const Type& type, std::vector<double>& numbers) {
+std::string normalize(const Type& type, Numbers& numbers) {
   std::string problem = call_plugin([&] { return fmt::format("{}: its normalize()", type.tag()); },
                                     [&] { return type.normalize(numbers.data()); });
   if (problem.empty() && !all_finite(numbers))
@@ -32,12 +35,12 @@ std::string normalize(const Type& type, std::vector<double>& numbers) {
 
 /// U with UᵀU = Ω, packed row by row, and the rank of Ω; rank 0 if Ω is indefinite or zero.
 struct Root {
-  std::vector<double> packed;
+  Numbers packed;
   int rank = 0;
 };
 
 Root root_of(std::span<const double> information, int n) {
-  Root root{std::vector<double>(information.size()), 0};
+  Root root{Numbers(information.size()), 0};
   if (!square_root(information, n, root.packed)) return root;
   for (std::size_t k = 0; n > 0; k += static_cast<std::size_t>(n--))
     root.rank += root.packed[k] > 0.0;
@@ -120,7 +123,7 @@ int Graph::add_variable(std::shared_ptr<const VariableType> type, Id id,
     throw bad_input(
         fmt::format("{} {}: the id is already that of {}", tag, id, describe_variable(*there)));
   }
-  std::vector<double> state(x.begin(), x.end());
+  Numbers state(x.begin(), x.end());
   if (const std::string problem = normalize(*type, state); !problem.empty())
     throw bad_input(fmt::format("{} {}: {}", tag, id, problem));
   const int p = find_pool(type);
@@ -185,10 +188,9 @@ void Graph::check_ends(const FactorType& type, std::span<const int> variables) c
 
 std::string Graph::name_of(const FactorType& type, std::span<const int> variables) const {
   std::string text(type.tag());
-  for (const int v : variables) {
+  for (const int v : variables)
     text +=
         v >= 0 && v < variable_count() ? fmt::format(" {}", id(v)) : fmt::format(" (index {})", v);
-  }
   return text;
 }
 
@@ -210,7 +212,7 @@ int Graph::add_factor(std::shared_ptr<const FactorType> type, std::span<const in
   if (!all_finite(measurement) || !all_finite(information)) {
     throw bad_input(fmt::format("{}: has a number that is not finite", name_of(*type, variables)));
   }
-  std::vector<double> z(measurement.begin(), measurement.end());
+  Numbers z(measurement.begin(), measurement.end());
   std::string problem = normalize(*type, z);
   const Root root = root_of(information, n);
   if (problem.empty()) problem = problem_of(root, information);
@@ -261,7 +263,7 @@ void Graph::set_state(int variable, std::span<const double> x) {
     throw bad_input(
         fmt::format("{}: a state is {} finite numbers", describe_variable(variable), size));
   }
-  std::vector<double> state(x.begin(), x.end());
+  Numbers state(x.begin(), x.end());
   if (const std::string problem = normalize(t, state); !problem.empty()) {
     throw bad_input(fmt::format("{}: {}", describe_variable(variable), problem));
   }
@@ -329,10 +331,8 @@ Factor Graph::factor(int position) const {
 
 std::vector<int> Graph::factors_of(int variable) const {
   std::vector<int> result;
-  for (int f = 0; f < factor_count(); ++f) {
-    const auto on = factor_variables(f);
-    if (std::ranges::find(on, variable) != on.end()) result.push_back(f);
-  }
+  for (int f = 0; f < factor_count(); ++f)
+    if (std::ranges::count(factor_variables(f), variable) > 0) result.push_back(f);
   return result;
 }
 
@@ -347,7 +347,7 @@ void Graph::set_measurement(int position, std::span<const double> measurement,
     throw bad_input(fmt::format("{}: a measurement is {} finite numbers and its information {}",
                                 describe_factor(position), size, packed));
   }
-  std::vector<double> z(measurement.begin(), measurement.end());
+  Numbers z(measurement.begin(), measurement.end());
   std::string problem = normalize(*pool.type, z);
   Root root;
   if (!information.empty()) {
