@@ -218,7 +218,7 @@ TEST(PathOptimalities, SayWhatTheyLack) {
   {
     const Situation situation = graph.situation();
     try {
-      PathOptimalities(situation, {}, plain);
+      const PathOptimalities none(situation, {}, plain);
       FAIL() << "a solver without determinants was taken";
     } catch (const Error& error) {
       EXPECT_NE(std::string(error.what()).find("log_determinant"), std::string::npos);
