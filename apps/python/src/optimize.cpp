@@ -5,6 +5,7 @@
 #include <exception>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -16,6 +17,7 @@
 #include "bindings.hpp"
 #include "bound_graph.hpp"
 #include "cairn/evaluation/plausibility.hpp"
+#include "cairn/evaluation/watched_guess.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/plugin_call.hpp"
@@ -99,6 +101,8 @@ struct Plan {
 Summary run(Graph& graph, const Plan& plan, Observer& observer) {
   std::vector<std::string> notes;
   if (plan.initial) {
+    if (auto* watched = query<WatchedGuess>(*plan.initial))
+      watched->watch([&](std::string_view, double) { return !plan.stop.interrupt->load(); });
     for (const std::string& note :
          call_plugin([&] { return fmt::format("initial guess '{}'", plan.initial_name); },
                      [&] { return plan.initial->compute(graph); }))

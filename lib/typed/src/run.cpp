@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "cairn/evaluation/plausibility.hpp"
+#include "cairn/evaluation/watched_guess.hpp"
 #include "cairn/runtime/plugin_call.hpp"
 #include "cairn/solve/initial_guess.hpp"
 
@@ -17,35 +18,43 @@ constexpr std::string_view kInitialGuess = "auto";
 bool is_interrupted(const Stop& stop) { return stop.interrupt && *stop.interrupt; }
 
 /// Lets `auto` replace the states. Returns its notes, or none where it leaves them as they are.
-std::vector<std::string> choose_start(Graph& graph, Registry& registry) {
+std::vector<std::string> choose_start(Graph& graph, const Stop& stop, Registry& registry) {
   if (!registry.has(InitialGuess::kKind, kInitialGuess)) return {};
+  const auto guess = registry.make<InitialGuess>(kInitialGuess);
+  if (auto* watched = query<WatchedGuess>(*guess))
+    watched->watch([&](std::string_view, double) { return !is_interrupted(stop); });
   const Values given = graph.values();
   std::vector<std::string> notes =
       call_plugin([] { return "initial guess '" + std::string(kInitialGuess) + "'"; },
-                  [&] { return registry.make<InitialGuess>(kInitialGuess)->compute(graph); });
+                  [&] { return guess->compute(graph); });
   if (graph.values().pools == given.pools) return {};
   for (std::string& note : notes) note = "initial guess auto: " + note;
   return notes;
 }
 
-}  // namespace
-
-Summary optimize_from_states(Graph& graph, std::string_view optimizer, const Stop& stop,
-                             Registry& registry) {
-  const auto made = registry.make<Optimizer>(optimizer);
-  Summary summary = call_plugin([&] { return "optimizer '" + std::string(optimizer) + "'"; },
-                                [&] { return made->optimize(graph, stop); });
+/// From the graph's states.
+Summary run(Graph& graph, Optimizer& optimizer, std::string_view name, const Stop& stop) {
+  Summary summary = call_plugin([&] { return "optimizer '" + std::string(name) + "'"; },
+                                [&] { return optimizer.optimize(graph, stop); });
   if (summary.status == Status::interrupted) return summary;
   for (std::string& doubt : reasons_for_doubt(graph, summary.final_chi2))
     summary.notes.push_back(std::move(doubt));
   return summary;
 }
 
+}  // namespace
+
+Summary optimize_from_states(Graph& graph, std::string_view optimizer, const Stop& stop,
+                             Registry& registry) {
+  return run(graph, *registry.make<Optimizer>(optimizer), optimizer, stop);
+}
+
 Summary optimize(Graph& graph, std::string_view optimizer, const Stop& stop, Registry& registry) {
-  registry.make<Optimizer>(optimizer);  // a wrong name is an error before the work
+  const auto made =
+      registry.make<Optimizer>(optimizer);  // a wrong name is an error before the work
   std::vector<std::string> notes;
-  if (!is_interrupted(stop)) notes = choose_start(graph, registry);
-  Summary summary = optimize_from_states(graph, optimizer, stop, registry);
+  if (!is_interrupted(stop)) notes = choose_start(graph, stop, registry);
+  Summary summary = run(graph, *made, optimizer, stop);
   summary.notes.insert(summary.notes.begin(), notes.begin(), notes.end());
   return summary;
 }
