@@ -11,9 +11,9 @@
 
 #include "arrays.hpp"
 #include "bindings.hpp"
+#include "cairn/evaluation/check_factor.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
-#include "cairn/types/check_factor.hpp"
 #include "component_names.hpp"
 #include "measured.hpp"
 #include "python_factor.hpp"

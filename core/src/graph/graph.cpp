@@ -98,8 +98,7 @@ int Graph::find_pool(const std::shared_ptr<const VariableType>& type) const {
 }
 
 int Graph::find_pool(const std::shared_ptr<const FactorType>& type) const {
-  const auto at =
-      std::ranges::find(factor_pools_, type, [](const FactorPool& pool) { return pool.type; });
+  const auto at = std::ranges::find(factor_pools_, type, &FactorPool::type);
   return static_cast<int>(at - factor_pools_.begin());
 }
 
@@ -144,7 +143,7 @@ int Graph::add_variable(std::shared_ptr<const VariableType> type, Id id,
 
 int Graph::add(const Factor& factor) {
   if (!factor.type) throw bad_input("a factor has no type");
-  std::vector<int> variables;
+  boost::container::small_vector<int, 8> variables;
   for (const Id id : factor.variables) {
     const std::optional<int> v = find(id);
     if (!v) {

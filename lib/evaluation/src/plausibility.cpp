@@ -7,7 +7,7 @@
 
 #include <fmt/format.h>
 
-#include "cairn/types/check_factor.hpp"
+#include "cairn/evaluation/check_factor.hpp"
 
 namespace cairn {
 

@@ -2,7 +2,6 @@
 #include "states.hpp"
 
 #include <algorithm>
-#include <array>
 #include <utility>
 #include <vector>
 
@@ -85,17 +84,7 @@ const double* States::frame_to_body(std::int32_t v) const {
 }
 
 void States::frame_to_body(std::int32_t v, const double* x, double* T) const {
-  const LieGroup& group = *records_[v].type->lie_group();
-  std::array<double, 8> few;  // a pose's numbers
-  std::vector<double> many;
-  double* element = few.data();
-  if (const auto size = static_cast<std::size_t>(records_[v].ambient); size > few.size()) {
-    many.resize(size);
-    element = many.data();
-  }
-  group.inverse(x, element);
-  group.compose(element, frame(v), element);
-  group.adjoint(element, T);
+  records_[v].type->lie_group()->adjoint_between(x, frame(v), T);
 }
 
 }  // namespace cairn::incremental

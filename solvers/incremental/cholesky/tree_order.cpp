@@ -20,14 +20,16 @@ constexpr int kNear = 5;
 
 std::int32_t round_up(std::int32_t value) { return (value + 7) / 8 * 8; }
 
-/// Sets the size without keeping what was there.
+/// Sets the size without keeping what was there. Small arrays get a little more than they need, so
+/// that the next node of that place need not ask for memory.
 void make_room(UninitializedVector& buffer, std::int64_t doubles) {
+  constexpr std::size_t kLittle = 64;
   const std::size_t size = static_cast<std::size_t>(doubles);
-  if (buffer.capacity() < size || buffer.capacity() > 2 * size + 64) {
-    buffer = UninitializedVector(size);
-  } else {
-    buffer.resize(size);
+  if (buffer.capacity() < size || buffer.capacity() > 2 * size + 4 * kLittle) {
+    buffer = UninitializedVector();
+    buffer.reserve(size < 16 * kLittle ? size + kLittle : size);
   }
+  buffer.resize(size);
 }
 
 }  // namespace

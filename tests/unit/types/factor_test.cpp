@@ -6,8 +6,8 @@
 #include <memory>
 #include <set>
 
+#include "cairn/evaluation/check_factor.hpp"
 #include "cairn/plugin/registry.hpp"
-#include "cairn/types/check_factor.hpp"
 #include "support/sampling.hpp"
 
 namespace cairn::test {

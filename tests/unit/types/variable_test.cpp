@@ -234,6 +234,19 @@ TEST(EveryGroup, CarriesTangentVectorsWithItsAdjoint) {
   });
 }
 
+TEST(EveryGroup, TakesTheAdjointBetweenTwoElements) {
+  for_every_variable([](const VariableType& type, const Regime& regime, Sampler& sampler) {
+    if (!type.lie_group()) return;
+    const int size = type.tangent_size();
+    const State a = sampler.state(type, regime);
+    const State step = exponential(type, sampler.vector(size, 0.1)), b = compose(type, a, step);
+    Eigen::MatrixXd between(size, size), of_step(size, size);
+    type.lie_group()->adjoint_between(a.data(), b.data(), between.data());
+    type.lie_group()->adjoint(step.data(), of_step.data());
+    EXPECT_LT((between - of_step).cwiseAbs().maxCoeff(), 1e-15 * (10.0 + 2.0 * regime.distance));
+  });
+}
+
 TEST(Se3Variable, RefusesAQuaternionThatIsZeroAndMakesOthersUnit) {
   Registry registry;
   const auto type = registry.variable_type("VERTEX_SE3:QUAT");

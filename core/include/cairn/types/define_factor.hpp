@@ -91,16 +91,15 @@ class DefinedFactor<F, std::index_sequence<I...>> final : public FactorType {
     return F::template residual<double>(std::get<I>(x)..., z);
   }
   static R error_and_jacobians(const States& x, const Z& z, Jacobians& jacobians) {
-    if constexpr (kAnalytic) {
+    if constexpr (kAnalytic)
       return F::evaluate(std::get<I>(x)..., z, std::get<I>(jacobians)...);
-    } else {
+    else
       return autodiff::evaluate<F>(x, z, jacobians);
-    }
   }
 
   /// U M with U upper triangular, packed row by row.
   template <class M>
-  static void whiten(const double* u, M& m) {
+  [[gnu::always_inline]] static void whiten(const double* u, M& m) {
     for (int row = 0; row < kR; ++row) {
       m.row(row) *= u[0];
       for (int k = row + 1; k < kR; ++k) m.row(row) += u[k - row] * m.row(k);
@@ -167,9 +166,8 @@ class DefinedFactor<F, std::index_sequence<I...>> final : public FactorType {
       std::string problem = F::normalize(z);
       store<kZ>(z, measurement);
       return problem;
-    } else {
-      return {};
     }
+    return {};
   }
 
   void squared_norms(const FactorView& pool, std::size_t begin, std::size_t end,
@@ -242,25 +240,17 @@ class DefinedFactor<F, std::index_sequence<I...>> final : public FactorType {
   }
 
   bool propagate(int target, const double* const* x, const double* z, double* out) const override {
-    if constexpr (requires { F::propagate(target, x, z, out); }) {
+    if constexpr (requires { F::propagate(target, x, z, out); })
       return F::propagate(target, x, z, out);
-    } else {
-      return false;
-    }
+    return false;
   }
   bool is_relative() const override {
-    if constexpr (requires { F::kRelative; }) {
-      return F::kRelative;
-    } else {
-      return false;
-    }
+    if constexpr (requires { F::kRelative; }) return F::kRelative;
+    return false;
   }
   std::string_view metric() const override {
-    if constexpr (requires { F::kMetric; }) {
-      return F::kMetric;
-    } else {
-      return {};
-    }
+    if constexpr (requires { F::kMetric; }) return F::kMetric;
+    return {};
   }
 };
 

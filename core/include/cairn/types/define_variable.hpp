@@ -87,6 +87,14 @@ class GroupOf final : public LieGroup {
   void adjoint(const double* a, double* Ad) const override {
     Eigen::Map<Eigen::Matrix<double, kT, kT>>{Ad} = V::adjoint(load<kA>(a));
   }
+  void adjoint_between(const double* a, const double* b, double* Ad) const override {
+    const Vector<double, kA> x = load<kA>(a), y = load<kA>(b);
+    Eigen::Map<Eigen::Matrix<double, kT, kT>> out{Ad};
+    if constexpr (requires { V::template between<double>(x, y); })
+      out = V::adjoint(V::template between<double>(x, y));
+    else
+      out = V::adjoint(V::template compose<double>(V::template inverse<double>(x), y));
+  }
   void exp(const double* delta, double* a) const override {
     store<kA>(V::template exp<double>(load<kT>(delta)), a);
   }
@@ -130,9 +138,8 @@ class DefinedVariable final : public VariableType {
       std::string problem = V::normalize(state);
       store<kA>(state, x);
       return problem;
-    } else {
-      return {};
     }
+    return {};
   }
   void retract(std::size_t count, const double* x, const std::int64_t* delta_offsets,
                const double* delta, double* out) const override {
@@ -174,17 +181,15 @@ class DefinedVariable final : public VariableType {
     if constexpr (HasGroup<V>) {
       static const GroupOf<V> group;
       return &group;
-    } else {
-      return nullptr;
     }
+    return nullptr;
   }
   const Placement* placement() const override {
     if constexpr (HasPlacement<V>) {
       static const PlacementOf<V> placement;
       return &placement;
-    } else {
-      return nullptr;
     }
+    return nullptr;
   }
 };
 

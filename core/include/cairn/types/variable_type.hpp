@@ -19,6 +19,8 @@ class CAIRN_API LieGroup {
   virtual void inverse(const double* a, double* a_inverse) const = 0;
   /// Ad(a), tangent × tangent, column-major: a exp(δ) a⁻¹ = exp(Ad(a) δ).
   virtual void adjoint(const double* a, double* Ad) const = 0;
+  /// Ad(a⁻¹ b), without loss of digits where both are far from the origin.
+  virtual void adjoint_between(const double* a, const double* b, double* Ad) const = 0;
   /// exp: tangent vector to group element; log: its inverse.
   virtual void exp(const double* tangent, double* a) const = 0;
   virtual void log(const double* a, double* tangent) const = 0;

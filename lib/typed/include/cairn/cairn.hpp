@@ -4,6 +4,7 @@
 /// has headers of its own.
 #pragma once
 
+#include "cairn/evaluation/check_factor.hpp"
 #include "cairn/graph/graph.hpp"
 #include "cairn/graph/information.hpp"
 #include "cairn/graph/update.hpp"
@@ -29,7 +30,6 @@
 #include "cairn/typed/rot3.hpp"
 #include "cairn/typed/run.hpp"
 #include "cairn/typed/symbol.hpp"
-#include "cairn/types/check_factor.hpp"
 #include "cairn/types/define_factor.hpp"
 #include "cairn/types/define_variable.hpp"
 #include "cairn/types/loss.hpp"

@@ -10,10 +10,10 @@
 #include <memory>
 #include <vector>
 
+#include "cairn/evaluation/check_factor.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/typed/build.hpp"
 #include "cairn/typed/run.hpp"
-#include "cairn/types/check_factor.hpp"
 
 namespace cairn {
 namespace {

@@ -8,8 +8,8 @@
 #include <Eigen/Geometry>
 
 #include "bundle/reprojection.hpp"
+#include "cairn/evaluation/check_factor.hpp"
 #include "cairn/types/autodiff.hpp"
-#include "cairn/types/check_factor.hpp"
 #include "cairn/types/define_factor.hpp"
 #include "support/sampling.hpp"
 

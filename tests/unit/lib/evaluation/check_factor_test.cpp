@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "cairn/types/check_factor.hpp"
+#include "cairn/evaluation/check_factor.hpp"
 
 #include <gtest/gtest.h>
 
