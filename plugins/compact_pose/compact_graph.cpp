@@ -308,15 +308,26 @@ void CompactGraph::add_bridge(std::pair<int, int> ends, Motion bridge, PolicySec
   const MotionGroup& motions = group_->motions();
   const auto known = bridges_.find(ends);
   if (known != bridges_.end()) bridge = motions.fuse(known->second.motion, bridge);
-  const Factor factor =
-      motions.to_factor(newest_.type, kept_[ends.first].id, kept_[ends.second].id, bridge);
   if (known == bridges_.end()) {
-    const FactorId id = update({&factor, 1}, seconds);
-    bridges_.emplace(ends, Bridge{id, bridge});
+    const Factor factor = motions.to_factor(newest_.type, id(ends.first), id(ends.second), bridge);
+    const FactorId added = update({&factor, 1}, seconds);
+    bridges_.emplace(ends, Bridge{added, bridge});
   } else {
-    update({}, seconds, {{known->second.factor, factor.measurement, factor.information}});
+    update({}, seconds, {replaced(known->second.factor, id(ends.first), bridge)});
     known->second.motion = bridge;
   }
+}
+
+/// The change that makes a factor measure `motion`, from pose `from` to the other of its two poses.
+/// What took the place of poses that have left may go from the later to the earlier, and be of
+/// another type than odometry.
+ChangedFactor CompactGraph::replaced(FactorId factor, Id from, const Motion& motion) const {
+  const MotionGroup& motions = group_->motions();
+  const Factor old = estimator_->factor(factor);
+  const bool backwards = old.variables.front() != from;
+  Factor now = motions.to_factor(old.type, old.variables.front(), old.variables.back(),
+                                 backwards ? motions.inverse(motion) : motion);
+  return {factor, std::move(now.measurement), std::move(now.information)};
 }
 
 /// Puts the newest pose, which is not kept, where its odometry from its predecessor says; that is

@@ -208,6 +208,7 @@ class CompactGraph {
   void know_anchor();
   void know_newest();
   void add_bridge(std::pair<int, int> ends, Motion bridge, PolicySeconds& seconds);
+  ChangedFactor replaced(FactorId factor, Id from, const Motion& motion) const;
   void note_links(std::span<const Factor> links, FactorId first);
   void close_way(Id to, Way::Became became);
   void merge_ways(const GraphUpdate& leaving, std::span<const Factor> removed);

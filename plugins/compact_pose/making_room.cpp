@@ -99,14 +99,15 @@ void CompactGraph::renumber(const GraphUpdate& leaving, FactorId first_factor,
     number_.emplace(kept_[k].id, k);
     index_->add(kept_[k].placed.at.t);
   }
-  // What the robot measures between the same two poses is fused with what they were given.
+  // What the robot measures between the same two poses is fused with what they were given; where
+  // there is a factor for that already, with that one.
   for (std::size_t k = 0; k < leaving.factors.size(); ++k) {
     const Factor& factor = leaving.factors[k];
     if (factor.variables.size() != 2 || !factor.type->is_relative()) continue;
     const std::pair<int, int> ends =
         std::minmax(find(factor.variables[0]), find(factor.variables[1]));
     const Motion motion = group_->motions().of_factor(factor, id(ends.first));
-    bridges.insert_or_assign(ends, Bridge{first_factor + static_cast<FactorId>(k), motion, motion});
+    bridges.emplace(ends, Bridge{first_factor + static_cast<FactorId>(k), motion, motion});
   }
   bridges_ = std::move(bridges);
 }

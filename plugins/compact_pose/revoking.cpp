@@ -140,13 +140,13 @@ std::map<std::pair<int, int>, CompactGraph::Bridge> CompactGraph::replace_ways(
       if (known != bridges_.end()) update.removed_factors.push_back(known->second.factor);
       continue;
     }
-    const Factor factor =
-        motions.to_factor(newest_.type, id(ends.first), id(ends.second), bridge.motion);
-    bridge.factor = known == bridges_.end() ? -1 : known->second.factor;
     if (known == bridges_.end()) {
-      update.factors.push_back(factor);
+      bridge.factor = -1;
+      update.factors.push_back(
+          motions.to_factor(newest_.type, id(ends.first), id(ends.second), bridge.motion));
     } else {
-      update.changed.push_back({bridge.factor, factor.measurement, factor.information});
+      bridge.factor = known->second.factor;
+      update.changed.push_back(replaced(bridge.factor, id(ends.first), bridge.motion));
     }
   }
   for (const Way& way : old) {

@@ -361,6 +361,63 @@ TEST_P(CompactGraphIn, FusesSeveralMeasurementsEitherWayRound) {
   EXPECT_THROW(graph.fuse(both, 3, 5), Error);
 }
 
+/// Takes one pose out of a chain, of which `before` and `after` are the factors; the factor in its
+/// place goes from the later pose to the earlier.
+class Backwards final : public PoseRemover {
+ public:
+  Backwards(const PoseWorld& world, FactorId before, FactorId after)
+      : world_(world), before_(before), after_(after) {}
+  Removal remove(Estimator&, std::span<const Id>) override { return {}; }
+  Removal make_room(Estimator& estimator, int, const GraphUpdate&) override {
+    const MotionGroup& motions = world_.motions();
+    const Factor before = estimator.factor(before_), after = estimator.factor(after_);
+    const Id from = before.variables[0], gone = before.variables[1], to = after.variables[1];
+    const Motion way =
+        motions.compose(motions.of_factor(before, from), motions.of_factor(after, gone));
+    Removal removal;
+    removal.update.removed_variables = {gone};
+    removal.update.removed_factors = {before_, after_};
+    removal.update.factors = {motions.to_factor(before.type, to, from, motions.inverse(way))};
+    return removal;
+  }
+
+ private:
+  const PoseWorld& world_;
+  FactorId before_, after_;
+};
+
+TEST_P(CompactGraphIn, FusesWithAFactorThatGoesTheOtherWayWherePosesHaveLeft) {
+  const Setting& setting = GetParam();
+  Registry registry;
+  const PoseWorld world(setting.dimension == 2 ? planar_types(registry)
+                                               : spatial_types(registry, setting.metric));
+  Draw draw(11);
+  const MatrixXd Sigma = draw.covariance(world.tangent(), 0.05);
+  CompactGraph graph(registry.make<Estimator>("batch"), setting.order);
+  PolicySeconds seconds;
+  std::vector<Pose> truth{world.random(draw, 1.0, 1.0)};
+  graph.start(world.variable(0, truth[0]), seconds);
+  for (Id id = 1; id <= 4; ++id) {
+    const Pose step = world.random(draw, 1.0, 0.7);
+    truth.push_back(world.compose(truth.back(), step));
+    graph.advance(world.variable(id), world.motion(step, Sigma), world.types().edge);
+    if (id < 4) graph.keep(seconds);
+  }
+  graph.estimator();  // takes all in: factor k leads from pose k to the next
+  Backwards remover(world, 1, 2);
+  ASSERT_THAT(graph.make_room(remover, 3, {}, seconds).poses, ElementsAre(2));
+  graph.relocate(1, world.motion(world.between(truth[1], truth[4]), Sigma), 0.5, 0.0, seconds);
+  Estimator& estimator = graph.estimator();
+  const Factor bridge = estimator.factor(3);
+  EXPECT_THAT(bridge.variables, ElementsAre(3, 1));
+  const Motion fused = world.motions().of_factor(bridge, 1);
+  EXPECT_LT(world.log(world.between(fused.mean, world.between(truth[1], truth[3]))).norm(), 1e-9);
+  for (const Id id : {1, 3}) {
+    const auto x = estimator.state(id);
+    EXPECT_LT(world.log(world.between(x, truth[static_cast<std::size_t>(id)])).norm(), 1e-6) << id;
+  }
+}
+
 TEST(CompactGraph, RefusesMeasurementsOfSomethingElse) {
   Registry registry;
   const PoseWorld plane(planar_types(registry)), space(spatial_types(registry));
