@@ -28,14 +28,11 @@
 #include "cairn/plugin/options.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/plugin_call.hpp"
-#include "floors.hpp"
 #include "graph_files.hpp"
-#include "interrupt.hpp"
 #include "json_report.hpp"
-#include "progress.hpp"
 #include "results.hpp"
 #include "session.hpp"
-#include "slam_names.hpp"
+#include "study_drives.hpp"
 #include "study_paths.hpp"
 #include "table.hpp"
 
@@ -45,12 +42,10 @@ namespace {
 namespace json = boost::json;
 
 struct ObjectiveStudyOptions {
-  std::string floor;
-  std::string explorer = "frontier", world = "lidar_building", planner = "grid_dijkstra";
-  SlamNames slam{.policy = "compact_pose:range=2,angle=3.14,reuse=false,gate=0.9999"};
+  DriveOptions drives{
+      .slam = {.policy = "compact_pose:range=2,angle=3.14,reuse=false,gate=0.9999"}};
   double distance = 60.0, range = 4.0;
-  int runs = 1, decisions = 4, candidates = 12, samples = 200;
-  std::uint64_t seed = 1;
+  int decisions = 4, candidates = 12, samples = 200;
   std::string paths;
 };
 
@@ -79,29 +74,29 @@ std::vector<Form> forms() {
 /// Hands all on to a mapper, and keeps what it was given.
 class RecordingMapper final : public Mapper {
  public:
-  explicit RecordingMapper(Mapper& mapper) : mapper_(mapper) {}
+  explicit RecordingMapper(std::unique_ptr<Mapper> mapper) : mapper_(std::move(mapper)) {}
 
   void add(const Pose2& at, LaserScan scan) override {
     poses_.push_back(at);
     scans_.push_back(scan);
-    mapper_.add(at, std::move(scan));
+    mapper_->add(at, std::move(scan));
   }
   bool move(std::span<const Pose2> poses) override {
     poses_.assign(poses.begin(), poses.end());
-    return mapper_.move(poses);
+    return mapper_->move(poses);
   }
-  const FloorMap& map() override { return mapper_.map(); }
+  const FloorMap& map() override { return mapper_->map(); }
   void reset() override {
     poses_.clear();
     scans_.clear();
-    mapper_.reset();
+    mapper_->reset();
   }
 
   std::span<const Pose2> poses() const { return poses_; }
   std::span<const LaserScan> scans() const { return scans_; }
 
  private:
-  Mapper& mapper_;
+  std::unique_ptr<Mapper> mapper_;
   std::vector<Pose2> poses_;
   std::vector<LaserScan> scans_;
 };
@@ -117,58 +112,41 @@ struct PathSet {
 class Study {
  public:
   Study(const ObjectiveStudyOptions& options, Session& session)
-      : options_(options),
-        session_(session),
-        floor_(load_floor(options.floor, session)),
-        line_(session.common.quiet) {}
+      : options_(options), drives_(options.drives, session) {}
 
   std::vector<PathSet> run() {
-    for (int run = 0; run < options_.runs && !guard_.interrupted(); ++run)
-      explore(options_.seed + static_cast<std::uint64_t>(run));
-    line_.clear();
+    drives_.each([this](std::uint64_t seed) { explore(seed); });
     return std::move(sets_);
   }
-  bool interrupted() const { return guard_.interrupted(); }
+  bool interrupted() const { return drives_.interrupted(); }
 
  private:
   void explore(std::uint64_t seed) {
-    Registry& registry = session_.registry();
-    const auto make = [&]<class Part>(std::type_identity<Part>, const std::string& name) {
-      return registry.make<Part>(parse_component(name));
-    };
-    const auto world = make(std::type_identity<World>{}, options_.world);
-    const auto policy = make(std::type_identity<PosePolicy>{}, options_.slam.policy);
-    const auto registration = make(std::type_identity<Registration>{}, options_.slam.registration);
-    const auto mapper = make(std::type_identity<Mapper>{}, options_.slam.mapper);
-    const auto explorer = make(std::type_identity<Explorer>{}, options_.explorer);
-    RecordingMapper recorder(*mapper);
+    StudyDrives::Parts parts = drives_.parts();
+    auto recording = std::make_unique<RecordingMapper>(std::move(parts.mapper));
+    const RecordingMapper& recorder = *recording;
+    parts.mapper = std::move(recording);
     RandomStream random(seed, RandomStream::Purpose::explorer);
     double next = 0.0, driven = 0.0;
     const double apart = options_.distance / options_.decisions;
-    run_exploration(
-        {.world = *world,
-         .policy = *policy,
-         .registration = *registration,
-         .mapper = recorder,
-         .explorer = *explorer,
-         .registry = registry,
-         .start = {.floor = &floor_, .pose = {}, .seed = seed},
-         .limits = {.distance = options_.distance},
-         .interrupt = &guard_.flag(),
-         .decided =
-             [&](const Decision&, const Situation& situation) {
-               if (driven < next || situation.poses.size() < 2) return;
-               next = driven + apart;
-               compare(situation, recorder, seed, random);
-             },
-         .moved = [&](const ExplorationStep& step, const FloorMap&) { driven = step.distance; }});
+    Exploration exploration = drives_.exploration(parts, seed);
+    exploration.limits.distance = options_.distance;
+    exploration.decided = [&](const Decision&, const Situation& situation) {
+      if (driven < next || situation.poses.size() < 2) return;
+      next = driven + apart;
+      compare(situation, recorder, seed, random);
+    };
+    exploration.moved = [&](const ExplorationStep& step, const FloorMap&) {
+      driven = step.distance;
+    };
+    run_exploration(exploration);
   }
 
   void compare(const Situation& situation, const RecordingMapper& recorder, std::uint64_t seed,
                RandomNumbers& random) {
-    Registry& registry = session_.registry();
-    const auto planner = registry.make<PathPlanner>(parse_component(options_.planner));
-    ComponentSpec every_move = parse_component(options_.slam.mapper);
+    Registry& registry = drives_.session().registry();
+    const auto planner = drives_.make<PathPlanner>(options_.drives.planner);
+    ComponentSpec every_move = parse_component(options_.drives.slam.mapper);
     every_move.values["tolerance"] = "0";
     const auto mapper = registry.make<Mapper>(every_move);
     PathSampler sampler(situation, recorder.scans(), recorder.poses(), *mapper, registry,
@@ -180,20 +158,17 @@ class Study {
                 .lidar_range = situation.robot.lidar.range,
                 .paths = {}};
     for (const PlannedPath& path : random_paths(situation, *planner, options_.candidates, random)) {
-      if (guard_.interrupted()) return;
+      if (interrupted()) return;
       set.paths.push_back(sampler.sample(path));
-      if (line_.on_terminal() || std::ssize(set.paths) == options_.candidates)
-        line_.show(fmt::format("seed {}, decision {}: {} of {} paths sampled", seed,
-                               situation.decision, set.paths.size(), options_.candidates));
+      if (drives_.line().on_terminal() || std::ssize(set.paths) == options_.candidates)
+        drives_.line().show(fmt::format("seed {}, decision {}: {} of {} paths sampled", seed,
+                                        situation.decision, set.paths.size(), options_.candidates));
     }
     if (set.paths.size() > 1) sets_.push_back(std::move(set));
   }
 
   const ObjectiveStudyOptions& options_;
-  Session& session_;
-  OccupancyGrid floor_;
-  InterruptGuard guard_;
-  StatusLine line_;
+  StudyDrives drives_;
   std::vector<PathSet> sets_;
 };
 
@@ -274,7 +249,7 @@ int run_study(const ObjectiveStudyOptions& options, Session& session) {
     table.add({row.form, interval_text(row.per_metre), interval_text(row.value)});
   }
   json::object report = begin_report("study");
-  report["floor"] = options.floor;
+  report["floor"] = options.drives.floor;
   report["sets"] = sets.size();
   report["samples"] = options.samples;
   report["rows"] = std::move(rows_json);
@@ -298,13 +273,7 @@ Command add_study_objective(ArgumentParser study) {
   auto options = std::make_shared<ObjectiveStudyOptions>();
   ArgumentParser cli = study.add_command(
       "objective", "which weight of the map's entropy orders paths as its expectation does");
-  cli.add_option("floor", options->floor, "the floor: floor.yaml, or @KIND[:k=v] to generate")
-      .type_name("FLOOR")
-      .required();
-  cli.add_option("--runs", options->runs, "explorations, with the seeds that follow --seed")
-      .type_name("N")
-      .within(1, 1000000)
-      .show_default();
+  add_drive_options(cli, options->drives);
   cli.add_option("--distance", options->distance, "that each drives [m]")
       .type_name("M")
       .within(1.0, 1e6)
@@ -325,19 +294,8 @@ Command add_study_objective(ArgumentParser study) {
       .type_name("M")
       .within(0.1, 1000.0)
       .show_default();
-  cli.add_option("--explorer", options->explorer, "decides where to drive")
-      .type_name("NAME")
-      .show_default();
-  cli.add_option("--planner", options->planner, "finds the paths that are compared")
-      .type_name("NAME")
-      .show_default();
-  cli.add_option("--world", options->world, "the robot, as of cairn explore")
-      .type_name("NAME")
-      .show_default();
-  cli.add_option("--seed", options->seed, "of the first run").type_name("N").show_default();
   cli.add_option("--paths", options->paths, "a row for each path that was sampled, as CSV")
       .type_name("FILE");
-  add_slam_options(cli, options->slam);
   cli.footer(
       "Example:\n"
       "  cairn study objective @rooms --runs 2 --samples 50 --paths paths.csv");

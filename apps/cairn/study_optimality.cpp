@@ -19,13 +19,10 @@
 #include "cairn/planning/path_motions.hpp"
 #include "cairn/planning/path_optimality.hpp"
 #include "cairn/runtime/timed.hpp"
-#include "floors.hpp"
-#include "interrupt.hpp"
 #include "json_report.hpp"
-#include "progress.hpp"
 #include "results.hpp"
 #include "session.hpp"
-#include "slam_names.hpp"
+#include "study_drives.hpp"
 #include "study_paths.hpp"
 #include "table.hpp"
 
@@ -35,13 +32,11 @@ namespace {
 namespace json = boost::json;
 
 struct OptimalityStudyOptions {
-  std::string floor;
-  std::string explorer = "frontier", world = "lidar_building", planner = "grid_dijkstra";
+  DriveOptions drives{
+      .slam = {.policy = "compact_pose:strategy=apfl,range=2,angle=3.14,reuse=false,gate=0.9999"}};
   std::string solver = "block_cholesky";
-  SlamNames slam{.policy = "compact_pose:strategy=apfl,range=2,angle=3.14,reuse=false,gate=0.9999"};
-  int runs = 1, poses = 1000, paths = 1000;
+  int poses = 1000, paths = 1000;
   double loop_gain = PathOptimalityOptions{}.loop_gain;
-  std::uint64_t seed = 1;
 };
 
 /// What one form of the criterion has of the paths of a set.
@@ -80,58 +75,39 @@ Evaluated evaluate(const Situation& situation, OptimalityForm by, double loop_ga
 class Study {
  public:
   Study(const OptimalityStudyOptions& options, Session& session)
-      : options_(options),
-        session_(session),
-        floor_(load_floor(options.floor, session)),
-        line_(session.common.quiet) {}
+      : options_(options), drives_(options.drives, session) {}
 
   std::vector<Comparison> run() {
-    for (int run = 0; run < options_.runs && !guard_.interrupted(); ++run)
-      explore(options_.seed + static_cast<std::uint64_t>(run));
-    line_.clear();
+    drives_.each([this](std::uint64_t seed) { explore(seed); });
     return std::move(comparisons_);
   }
-  bool interrupted() const { return guard_.interrupted(); }
+  bool interrupted() const { return drives_.interrupted(); }
 
  private:
-  template <class Part>
-  std::unique_ptr<Part> make(const std::string& name) {
-    return session_.registry().make<Part>(parse_component(name));
-  }
-
   /// Until the graph has as many poses as wanted, or nothing is left to explore.
   void explore(std::uint64_t seed) {
-    const auto world = make<World>(options_.world);
-    const auto policy = make<PosePolicy>(options_.slam.policy);
-    const auto registration = make<Registration>(options_.slam.registration);
-    const auto mapper = make<Mapper>(options_.slam.mapper);
-    const auto explorer = make<Explorer>(options_.explorer);
+    StudyDrives::Parts parts = drives_.parts();
     std::atomic<bool> stop{false};
-    run_exploration(
-        {.world = *world,
-         .policy = *policy,
-         .registration = *registration,
-         .mapper = *mapper,
-         .explorer = *explorer,
-         .registry = session_.registry(),
-         .start = {.floor = &floor_, .pose = {}, .seed = seed},
-         .limits = {},
-         .interrupt = &stop,
-         .scanned = [&](const ExplorationStep&, const Situation& situation, const LaserScan&) {
-           const auto poses = static_cast<int>(situation.poses.size());
-           if (line_.on_terminal()) line_.show(fmt::format("seed {}: {} poses", seed, poses));
-           if (stop) return;
-           stop = guard_.interrupted() || poses >= options_.poses;
-           if (poses >= options_.poses) compare(situation, seed);
-         }});
+    Exploration exploration = drives_.exploration(parts, seed);
+    exploration.interrupt = &stop;
+    exploration.scanned = [&](const ExplorationStep&, const Situation& situation,
+                              const LaserScan&) {
+      const auto poses = static_cast<int>(situation.poses.size());
+      if (drives_.line().on_terminal())
+        drives_.line().show(fmt::format("seed {}: {} poses", seed, poses));
+      if (stop) return;
+      stop = interrupted() || poses >= options_.poses;
+      if (poses >= options_.poses) compare(situation, seed);
+    };
+    run_exploration(exploration);
     if (!stop) {
-      session_.note(fmt::format("seed {}: the floor was explored before the graph had {} poses",
-                                seed, options_.poses));
+      drives_.session().note(fmt::format(
+          "seed {}: the floor was explored before the graph had {} poses", seed, options_.poses));
     }
   }
 
   void compare(const Situation& situation, std::uint64_t seed) {
-    const auto planner = make<PathPlanner>(options_.planner);
+    const auto planner = drives_.make<PathPlanner>(options_.drives.planner);
     RandomStream random(seed, RandomStream::Purpose::explorer);
     std::vector<std::vector<Pose2>> paths;
     Comparison comparison;
@@ -144,7 +120,7 @@ class Study {
     comparison.paths = static_cast<int>(paths.size());
     comparison.motions /= static_cast<double>(paths.size());
     for (const OptimalityForm by : {OptimalityForm::exact, OptimalityForm::laplacian}) {
-      const auto solver = make<LinearSolver>(options_.solver);
+      const auto solver = drives_.make<LinearSolver>(options_.solver);
       (by == OptimalityForm::exact ? comparison.exact : comparison.laplacian) =
           evaluate(situation, by, options_.loop_gain, *solver, paths);
     }
@@ -153,10 +129,7 @@ class Study {
   }
 
   const OptimalityStudyOptions& options_;
-  Session& session_;
-  OccupancyGrid floor_;
-  InterruptGuard guard_;
-  StatusLine line_;
+  StudyDrives drives_;
   std::vector<Comparison> comparisons_;
 };
 
@@ -196,7 +169,7 @@ int run_study(const OptimalityStudyOptions& options, Session& session) {
   }
   const MeanInterval tau = mean_interval(taus);
   json::object report = begin_report("study");
-  report["floor"] = options.floor;
+  report["floor"] = options.drives.floor;
   report["sets"] = std::move(rows);
   report["tau"] = {{"mean", number_json(tau.mean)},
                    {"low", number_json(tau.low())},
@@ -222,13 +195,7 @@ Command add_study_optimality(ArgumentParser study) {
   auto options = std::make_shared<OptimalityStudyOptions>();
   ArgumentParser cli = study.add_command(
       "optimality", "D-optimality of many paths, exactly and by the Laplacian of the graph");
-  cli.add_option("floor", options->floor, "the floor: floor.yaml, or @KIND[:k=v] to generate")
-      .type_name("FLOOR")
-      .required();
-  cli.add_option("--runs", options->runs, "explorations, with the seeds that follow --seed")
-      .type_name("N")
-      .within(1, 1000000)
-      .show_default();
+  add_drive_options(cli, options->drives);
   cli.add_option("--poses", options->poses, "of the graph at which paths are compared")
       .type_name("N")
       .within(2, 1000000)
@@ -242,20 +209,9 @@ Command add_study_optimality(ArgumentParser study) {
       .type_name("X")
       .within(0.0, 1e9)
       .show_default();
-  cli.add_option("--explorer", options->explorer, "decides where to drive")
-      .type_name("NAME")
-      .show_default();
-  cli.add_option("--planner", options->planner, "finds the paths that are compared")
-      .type_name("NAME")
-      .show_default();
   cli.add_option("--linear-solver", options->solver, "factorises the matrix of the graph")
       .type_name("NAME")
       .show_default();
-  cli.add_option("--world", options->world, "the robot, as of cairn explore")
-      .type_name("NAME")
-      .show_default();
-  cli.add_option("--seed", options->seed, "of the first run").type_name("N").show_default();
-  add_slam_options(cli, options->slam);
   cli.footer(
       "Example:\n"
       "  cairn study optimality @rooms --poses 200 --paths 100");

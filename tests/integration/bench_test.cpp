@@ -147,7 +147,7 @@ TEST(BenchCommand, ARunThatTakesTooLongIsStoppedAndItsRowSaysSo) {
 
 TEST(BenchCommand, ABrokenPluginLeavesARowThatSaysSo) {
   const TemporaryFolder folder;
-  const std::string fragile = CAIRN_BAD_PLUGINS "/solver_throws/fragile.so";
+  const std::string fragile = bad_plugins() + "/solver_throws/fragile.so";
   for (const std::string where : {"construction", "analyze", "factorize", "number"}) {
     SCOPED_TRACE(where);
     const Outcome outcome =

@@ -21,8 +21,7 @@ class LesserMachine : public ::testing::TestWithParam<Machine> {
  protected:
   static boost::json::value optimized(const std::string& graph, const Arguments& emulator) {
     Arguments command = emulator;
-    const Arguments rest{CAIRN_PROGRAM, "optimize", graph,    "--threads",
-                         "1",           "--quiet",  "--json", "-"};
+    const Arguments rest{program(), "optimize", graph, "--threads", "1", "--quiet", "--json", "-"};
     command.insert(command.end(), rest.begin(), rest.end());
     const Outcome outcome = run_program(command);
     EXPECT_EQ(outcome.exit_code, 0) << outcome.err;

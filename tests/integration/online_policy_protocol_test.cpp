@@ -18,8 +18,6 @@ using testing::HasSubstr;
 using testing::SizeIs;
 using testing::StartsWith;
 
-const std::string kSource = CAIRN_SOURCE_FOLDER;
-
 /// Two numbers that differ in their last digits count as the same word.
 void expect_alike(const std::string& said, const std::string& expected) {
   const Lines a = words(said), b = words(expected);
@@ -36,7 +34,7 @@ void expect_alike(const std::string& said, const std::string& expected) {
 }
 
 TEST_F(OnlinePolicy, SaysWhatTheDocumentationSays) {
-  const std::string page = read_text(kSource + "/docs/online.md");
+  const std::string page = read_text(source_folder() + "/docs/online.md");
   const std::string begin = "```text\n> ";
   const std::size_t at = page.find(begin, page.find("## Compact pose SLAM, live"));
   ASSERT_NE(at, std::string::npos);

@@ -24,7 +24,6 @@ namespace {
 using testing::HasSubstr;
 using testing::StartsWith;
 
-const std::string kSource = CAIRN_SOURCE_FOLDER;
 /// As the front end that answers here: it has no other pair that would do.
 const std::string kRecorded = "recorded:carry=0";
 
@@ -111,7 +110,7 @@ TEST_F(OnlinePolicy, TheExampleInPythonDoesTheSame) {
       report_of({"compact", graph, "--policy", kPolicy, "--registration", kRecorded, "-o",
                  folder_.file("recorded.g2o"), "--quiet"});
   const Outcome run =
-      run_program({"python3", kSource + "/examples/live_front_end.py", graph, "-o",
+      run_program({"python3", source_folder() + "/examples/live_front_end.py", graph, "-o",
                    folder_.file("live.g2o"), "--policy", kPolicy, "--cairn", program()});
   EXPECT_EQ(run.exit_code, 0) << run.err;
   EXPECT_EQ(read_text(folder_.file("live.g2o")), read_text(folder_.file("recorded.g2o")));

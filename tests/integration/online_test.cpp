@@ -192,7 +192,7 @@ TEST_F(Online, KeepsAFixedNumberOfPosesAndWritesThem) {
 TEST_F(Online, SparsifiesAsTheDocumentationSays) {
   CAIRN_NEEDS("sparsifier", "sparsify");
   CAIRN_NEEDS("estimator", "incremental_cholesky");
-  const std::string page = read_text(std::string(CAIRN_SOURCE_FOLDER) + "/docs/online.md");
+  const std::string page = read_text(source_folder() + "/docs/online.md");
   const std::string begin = "```text\n";
   const std::size_t at = page.find(begin + "> SPARSIFY");
   ASSERT_NE(at, std::string::npos);

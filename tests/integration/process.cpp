@@ -181,6 +181,8 @@ Arguments with_program(const Arguments& arguments) {
 }  // namespace
 
 std::string program() { return CAIRN_PROGRAM; }
+std::string source_folder() { return CAIRN_SOURCE_FOLDER; }
+std::string bad_plugins() { return CAIRN_BAD_PLUGINS; }
 
 Outcome run_program(const Arguments& command, const Environment& environment,
                     const std::string& input) {

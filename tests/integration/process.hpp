@@ -107,5 +107,9 @@ std::size_t columns(const std::string& line);
 
 /// The path of the program under test.
 std::string program();
+/// The folder of the project's sources.
+std::string source_folder();
+/// The folder of the plugins that are wrong on purpose.
+std::string bad_plugins();
 
 }  // namespace cairn::test

@@ -271,7 +271,7 @@ TEST(Usage, PipesNeedNoNameOfAFormat) {
 
 TEST(Usage, AnExceptionInAPluginNamesThePluginsPart) {
   const TemporaryFolder folder;
-  const std::string solver = CAIRN_BAD_PLUGINS "/solver_throws/fragile.so";
+  const std::string solver = bad_plugins() + "/solver_throws/fragile.so";
   const auto with = [&](const std::string& where) {
     return cairn({"optimize", "@ring:poses=30", "--quiet", "--plugin", solver, "--linear-solver",
                   "fragile:in=" + where});
@@ -307,7 +307,7 @@ TEST(Usage, AnExceptionInAPluginNamesThePluginsPart) {
   write_text(folder.file("brittle.g2o"),
              "VERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 1 0 0\nEDGE_SE2 0 1 1 0 0 1 0 0 1 0 1\n"
              "EDGE_BRITTLE 1 7 1\n");
-  const std::string factor = CAIRN_BAD_PLUGINS "/factor_throws/brittle.so";
+  const std::string factor = bad_plugins() + "/factor_throws/brittle.so";
   for (const char* command : {"info", "optimize"}) {
     expect_error(cairn({command, folder.file("brittle.g2o"), "--plugin", factor, "--quiet"}),
                  kPlugin, "factor 'EDGE_BRITTLE' failed: the measurement is out of my range");
@@ -335,7 +335,7 @@ TEST(Usage, IntegersAreDecimalAndInRange) {
 
 TEST(Usage, APluginThatEndsTheProgramIsAnError) {
   const TemporaryFolder folder;
-  const std::string solver = CAIRN_BAD_PLUGINS "/solver_throws/fragile.so";
+  const std::string solver = bad_plugins() + "/solver_throws/fragile.so";
   expect_error(
       cairn({"optimize", "@ring:poses=30", "--quiet", "--plugin", solver, "--linear-solver",
              "fragile:in=exit", "-o", folder.file("best.g2o"), "--record", folder.file("run")}),
