@@ -113,14 +113,15 @@ const std::vector<Method> kConfigurationSpace{
     {"ede_rrt_star", "ede_rrt_star"},
     {"ours: frontier", "frontier"},
     {"ours: dopt", "dopt"}};
-const std::vector<Method> kActionSpace{{"frontier", "frontier:length=0.9,keep=1,planner=rrt_star"},
-                                       {"heuristic", "heuristic"},
-                                       {"ede_rrt_star", "ede_rrt_star"},
-                                       {"drrt_star", "drrt_star"},
-                                       {"errt_star", "errt_star"},
-                                       {"ours: frontier", "frontier"},
-                                       {"ours: dopt", "dopt"},
-                                       {"ours: random", "random"}};
+const std::vector<Method> kActionSpace{
+    {"frontier", "frontier:length=0.9,keep=1,planner=rrt_star"},
+    {"heuristic", "heuristic:keep=1,planner=rrt_star,entropy=thesis,revisits=0"},
+    {"ede_rrt_star", "ede_rrt_star"},
+    {"drrt_star", "drrt_star"},
+    {"errt_star", "errt_star"},
+    {"ours: frontier", "frontier"},
+    {"ours: dopt", "dopt"},
+    {"ours: random", "random"}};
 
 void study_part(const Bench& bench, const Keep& keep, const std::string& part, const Floor& floor,
                 const std::vector<Method>& methods, const Words& settings) {
