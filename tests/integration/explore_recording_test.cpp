@@ -7,8 +7,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "cairn/plugin/registry.hpp"
-#include "integration/process.hpp"
+#include "integration/exploration_commands.hpp"
 
 namespace cairn::test {
 namespace {
@@ -17,32 +16,20 @@ using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-class ExploreRecording : public ::testing::Test {
+class ExploreRecording : public ExplorationCommands {
  protected:
   void SetUp() override {
-    const Registry registry;
-    for (const auto& [kind, name] : {std::pair{"world", "lidar_building"},
-                                     {"mapper", "log_odds"},
-                                     {"explorer", "frontier"},
-                                     {"path_planner", "grid_dijkstra"},
-                                     {"floor_plan", "rooms"},
-                                     {"pose_policy", "compact_pose"},
-                                     {"registration", "simulated"},
-                                     {"picture", "html"}}) {
-      if (!registry.has(kind, name)) GTEST_SKIP() << "built without " << name;
-    }
+    ExplorationCommands::SetUp();
+    need({{"registration", "simulated"}, {"picture", "html"}});
   }
-  static Outcome explore(std::vector<std::string> more) {
-    std::vector<std::string> words{"explore",        "@rooms:width=10,height=8,seed=2",
-                                   "--registration", "simulated:range=1.4,angle=0.35",
-                                   "--until",        "distance=10"};
-    words.insert(words.end(), more.begin(), more.end());
-    return cairn(words);
+  static Outcome explore(const Arguments& more) {
+    return run({"explore", "@rooms:width=10,height=8,seed=2", "--registration",
+                "simulated:range=1.4,angle=0.35", "--until", "distance=10"},
+               more);
   }
   static std::string without_times(const std::string& file) {
     return std::regex_replace(read_text(file), std::regex(",\"time\":[0-9.]+"), "");
   }
-  TemporaryFolder folder_;
 };
 
 TEST_F(ExploreRecording, IsALineForEachMotionAndDecisionAndThePageHasThemAll) {

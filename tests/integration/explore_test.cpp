@@ -8,8 +8,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "cairn/plugin/registry.hpp"
-#include "integration/process.hpp"
+#include "integration/exploration_commands.hpp"
 
 namespace cairn::test {
 namespace {
@@ -19,32 +18,19 @@ using ::testing::HasSubstr;
 using ::testing::Not;
 
 constexpr const char* kFloor = "@rooms:width=10,height=8,seed=2";
-constexpr const char* kMatcher =
-    "simulated:range=1.4,angle=0.35,sigma_translation=0.01,sigma_rotation=0.002";
 
-class Explore : public ::testing::Test {
+class Explore : public ExplorationCommands {
  protected:
   void SetUp() override {
-    const Registry registry;
-    for (const auto& [kind, name] : {std::pair{"world", "lidar_building"},
-                                     {"mapper", "log_odds"},
-                                     {"explorer", "frontier"},
-                                     {"path_planner", "grid_dijkstra"},
-                                     {"floor_plan", "rooms"},
-                                     {"floor_surveyor", "round_body"},
-                                     {"pose_policy", "compact_pose"},
-                                     {"registration", "simulated"},
-                                     {"grid_format", "ros"},
-                                     {"format", "g2o"}}) {
-      if (!registry.has(kind, name)) GTEST_SKIP() << "built without " << name;
-    }
+    ExplorationCommands::SetUp();
+    need({{"floor_surveyor", "round_body"},
+          {"registration", "simulated"},
+          {"grid_format", "ros"},
+          {"format", "g2o"}});
   }
-  static Outcome explore(std::vector<std::string> more) {
-    std::vector<std::string> words{"explore", kFloor, "--registration", kMatcher};
-    words.insert(words.end(), more.begin(), more.end());
-    return cairn(words);
+  static Outcome explore(const Arguments& more) {
+    return run({"explore", kFloor, "--registration", kTrueMatcher}, more);
   }
-  TemporaryFolder folder_;
 };
 
 TEST_F(Explore, SaysInFiveLinesWhatHappenedAndWritesAllOfIt) {
@@ -186,8 +172,8 @@ TEST_F(Explore, AComparisonIsWrittenAsRowsCurvesAndAPage) {
 TEST_F(Explore, AComparisonThatIsInterruptedIsWrittenAsFarAsItIs) {
   const std::string page = folder_.file("compare.html"), report = folder_.file("compare.json");
   const Outcome run = cairn_interrupted(
-      {"explore", "@rooms:width=100,height=100", "--registration", kMatcher, "--runs", "2", "--csv",
-       folder_.file("runs.csv"), "--html", page, "--json", report, "--threads", "2"},
+      {"explore", "@rooms:width=100,height=100", "--registration", kTrueMatcher, "--runs", "2",
+       "--csv", folder_.file("runs.csv"), "--html", page, "--json", report, "--threads", "2"},
       "0 of 2 runs", SIGTERM);
   EXPECT_EQ(run.exit_code, 130) << run.err;
   EXPECT_THAT(read_text(page), HasSubstr("No run was finished."));
@@ -233,7 +219,8 @@ TEST_F(Explore, WhatCannotWorkIsRefusedBeforeTheWork) {
   EXPECT_THAT(refusal({"--map", folder_.file("m.yaml:mode=raaw")}, 2), HasSubstr("'raw'"));
   EXPECT_THAT(refusal({"--map", folder_.file("m.yaml:mode=scale,image=pgm")}, 2),
               HasSubstr("write a PNG"));
-  EXPECT_EQ(cairn({"explore", folder_.file("none.yaml"), "--registration", kMatcher}).exit_code, 3);
+  EXPECT_EQ(cairn({"explore", folder_.file("none.yaml"), "--registration", kTrueMatcher}).exit_code,
+            3);
   EXPECT_TRUE(folder_.contents().empty());
 }
 
@@ -244,8 +231,8 @@ TEST_F(Explore, NoOutputReplacesAnotherOrAPartOfTheFloor) {
   ASSERT_EQ(cairn({"generate", "rooms:width=6,height=5", "-o", floor}).exit_code, 0);
   const std::string before = read_text(picture);
   const auto refusal = [&](std::vector<std::string> more) {
-    std::vector<std::string> words{"explore", floor,     "--registration",
-                                   kMatcher,  "--until", "steps=1"};
+    std::vector<std::string> words{"explore",    floor,     "--registration",
+                                   kTrueMatcher, "--until", "steps=1"};
     words.insert(words.end(), more.begin(), more.end());
     const Outcome run = cairn(words);
     EXPECT_EQ(run.exit_code, 2) << run.err;
@@ -274,8 +261,8 @@ TEST_F(Explore, NarrowDoorsAndPocketsAreNoted) {
   const std::string floor = folder_.file("doors.yaml");
   write_text(floor, "image: doors.pgm\nresolution: 0.1\norigin: [0, 0, 0]\n");
   const auto note = [&](std::vector<std::string> more) {
-    std::vector<std::string> words{"explore", floor,     "--registration",
-                                   kMatcher,  "--until", "steps=1"};
+    std::vector<std::string> words{"explore",    floor,     "--registration",
+                                   kTrueMatcher, "--until", "steps=1"};
     words.insert(words.end(), more.begin(), more.end());
     const Outcome run = cairn(words);
     EXPECT_EQ(run.exit_code, 0) << run.err;

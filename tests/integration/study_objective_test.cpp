@@ -5,29 +5,19 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "cairn/plugin/registry.hpp"
-#include "integration/process.hpp"
+#include "integration/exploration_commands.hpp"
 
 namespace cairn::test {
 namespace {
 
 using ::testing::HasSubstr;
 
-class StudyObjective : public ::testing::Test {
+class StudyObjective : public ExplorationCommands {
  protected:
   void SetUp() override {
-    const Registry registry;
-    for (const auto& [kind, name] : {std::pair{"world", "lidar_building"},
-                                     {"mapper", "log_odds"},
-                                     {"explorer", "frontier"},
-                                     {"path_planner", "grid_dijkstra"},
-                                     {"floor_plan", "rooms"},
-                                     {"pose_policy", "compact_pose"},
-                                     {"registration", "icp"}}) {
-      if (!registry.has(kind, name)) GTEST_SKIP() << "built without " << name;
-    }
+    ExplorationCommands::SetUp();
+    need({{"registration", "icp"}});
   }
-  TemporaryFolder folder_;
 };
 
 TEST_F(StudyObjective, ComparesEachFormOnTheSamePathsAndCanBeRepeated) {

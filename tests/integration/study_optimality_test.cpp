@@ -5,39 +5,24 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "cairn/plugin/registry.hpp"
-#include "integration/process.hpp"
+#include "integration/exploration_commands.hpp"
 
 namespace cairn::test {
 namespace {
 
 using ::testing::HasSubstr;
 
-constexpr const char* kMatcher =
-    "simulated:range=1.4,angle=0.35,sigma_translation=0.01,sigma_rotation=0.002";
-
-class StudyOptimality : public ::testing::Test {
+class StudyOptimality : public ExplorationCommands {
  protected:
   void SetUp() override {
-    const Registry registry;
-    for (const auto& [kind, name] : {std::pair{"world", "lidar_building"},
-                                     {"mapper", "log_odds"},
-                                     {"explorer", "frontier"},
-                                     {"path_planner", "grid_dijkstra"},
-                                     {"floor_plan", "rooms"},
-                                     {"pose_policy", "compact_pose"},
-                                     {"registration", "simulated"},
-                                     {"linear_solver", "block_cholesky"}}) {
-      if (!registry.has(kind, name)) GTEST_SKIP() << "built without " << name;
-    }
+    ExplorationCommands::SetUp();
+    need({{"registration", "simulated"}, {"linear_solver", "block_cholesky"}});
   }
-  static Outcome study(std::vector<std::string> more) {
-    std::vector<std::string> words{"study", "optimality", "@rooms:width=12,height=9,seed=2",
-                                   "--registration", kMatcher};
-    words.insert(words.end(), more.begin(), more.end());
-    return cairn(words);
+  static Outcome study(const Arguments& more) {
+    return run(
+        {"study", "optimality", "@rooms:width=12,height=9,seed=2", "--registration", kTrueMatcher},
+        more);
   }
-  TemporaryFolder folder_;
 };
 
 TEST_F(StudyOptimality, RanksTheSamePathsByBothAndCanBeRepeated) {

@@ -13,51 +13,19 @@
 #include "cairn/grid/floor_plan.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
+#include "support/exploration_runs.hpp"
 
 namespace cairn {
 namespace {
 
 using testing::HasSubstr;
 
-constexpr const char* kExact =
-    "lidar_building:relative=0,sigma_xy=1e-6,sigma_theta=1e-6,range_sigma=0";
-constexpr const char* kNoisy = "lidar_building:relative=0.05";
-constexpr const char* kMatcher =
-    "simulated:range=1.4,angle=0.35,sigma_translation=0.02,sigma_rotation=0.002";
+using test::DecidedRun;
+using test::kExactRobot;
+using test::kNoisyRobot;
+
 /// With few orientations, for a test.
 constexpr const char* kGradient = "ede_gradient:orientations=16,directions=120";
-
-struct Drive {
-  ExplorationResult result;
-  std::vector<Decision> decisions;
-};
-
-Drive run(const std::string& floor_plan, const std::string& world, const std::string& explorer,
-          double distance, std::uint64_t seed = 3) {
-  Registry registry;
-  const OccupancyGrid floor = registry.make<FloorPlan>(parse_component(floor_plan))->generate(seed);
-  const auto robot = registry.make<World>(parse_component(world));
-  const auto policy =
-      registry.make<PosePolicy>(parse_component("compact_pose:range=1,angle=0.35,reuse=false"));
-  const auto registration = registry.make<Registration>(parse_component(kMatcher));
-  const auto mapper = registry.make<Mapper>("log_odds");
-  const auto explores = registry.make<Explorer>(parse_component(explorer));
-  ExplorationLimits limits;
-  limits.distance = distance;
-  Drive drive;
-  drive.result = run_exploration({.world = *robot,
-                                  .policy = *policy,
-                                  .registration = *registration,
-                                  .mapper = *mapper,
-                                  .explorer = *explores,
-                                  .registry = registry,
-                                  .start = {.floor = &floor, .pose = {}, .seed = seed},
-                                  .limits = limits,
-                                  .decided = [&](const Decision& decision, const Situation&) {
-                                    drive.decisions.push_back(decision);
-                                  }});
-  return drive;
-}
 
 struct Floor {
   const char* plan;
@@ -71,7 +39,8 @@ struct Floor {
 class EdeFloors : public testing::TestWithParam<Floor> {};
 
 TEST_P(EdeFloors, WithoutNoiseAllIsSeenAndNothingIsTouched) {
-  const Drive found = run(GetParam().plan, kExact, GetParam().explorer, 150.0);
+  const DecidedRun found =
+      test::explore(GetParam().plan, kExactRobot, GetParam().explorer, {.distance = 150.0});
   EXPECT_EQ(found.result.end, ExplorationEnd::finished) << found.result.why;
   EXPECT_EQ(found.result.collisions, 0);
   ASSERT_TRUE(found.result.against);
@@ -86,7 +55,8 @@ INSTANTIATE_TEST_SUITE_P(Plans, EdeFloors,
                                          Floor{"rooms:width=9,height=7", kGradient}));
 
 TEST(EdeExplorers, DecideForTheLeastEntropy) {
-  const Drive found = run("rooms:width=12,height=9", kNoisy, "ede_rrt_star", 25.0);
+  const DecidedRun found =
+      test::explore("rooms:width=12,height=9", kNoisyRobot, "ede_rrt_star", {.distance = 25.0});
   ASSERT_GE(found.decisions.size(), 3U);
   for (const Decision& decision : found.decisions) {
     if (decision.kind != Decision::Kind::drive) continue;
@@ -104,8 +74,9 @@ TEST(EdeExplorers, DecideForTheLeastEntropy) {
 }
 
 TEST(EdeExplorers, PerMetreDividesByTheLengthOfThePath) {
-  const Drive found = run("rooms:width=12,height=9", kNoisy,
-                          "ede_rrt_star:per_metre=true,planner=grid_dijkstra", 10.0);
+  const DecidedRun found =
+      test::explore("rooms:width=12,height=9", kNoisyRobot,
+                    "ede_rrt_star:per_metre=true,planner=grid_dijkstra", {.distance = 10.0});
   int compared = 0;
   for (const Decision& decision : found.decisions) {
     for (const Candidate& candidate : decision.candidates) {
@@ -122,8 +93,10 @@ TEST(EdeExplorers, PerMetreDividesByTheLengthOfThePath) {
 
 TEST(EdeExplorers, TheSameSeedGivesTheSameRun) {
   for (const char* explorer : {"ede_rrt_star", kGradient}) {
-    const Drive a = run("rooms:width=9,height=7", kNoisy, explorer, 12.0);
-    const Drive b = run("rooms:width=9,height=7", kNoisy, explorer, 12.0);
+    const DecidedRun a =
+        test::explore("rooms:width=9,height=7", kNoisyRobot, explorer, {.distance = 12.0});
+    const DecidedRun b =
+        test::explore("rooms:width=9,height=7", kNoisyRobot, explorer, {.distance = 12.0});
     ASSERT_EQ(a.result.steps.size(), b.result.steps.size());
     for (std::size_t k = 0; k < a.result.steps.size(); ++k) {
       EXPECT_EQ(a.result.steps[k].estimate.x(), b.result.steps[k].estimate.x());
@@ -139,9 +112,11 @@ TEST(EdeExplorers, TheSameSeedGivesTheSameRun) {
 /// A potential of one sweep is flat but for where a single configuration attracts.
 TEST(EdeExplorers, AGradientThatLeadsNowhereIsStuckOrGoesOnByItsFallback) {
   const std::string unsolved = "ede_gradient:orientations=8,directions=120,sweeps=1,weight=3";
-  const Drive alone =
-      run("rooms:width=12,height=9", kNoisy, unsolved + ",attractor=1,fallback=none", 60.0);
-  const Drive with = run("rooms:width=12,height=9", kNoisy, unsolved + ",attractor=1", 15.0);
+  const DecidedRun alone =
+      test::explore("rooms:width=12,height=9", kNoisyRobot, unsolved + ",attractor=1,fallback=none",
+                    {.distance = 60.0});
+  const DecidedRun with = test::explore("rooms:width=12,height=9", kNoisyRobot,
+                                        unsolved + ",attractor=1", {.distance = 15.0});
   ASSERT_EQ(alone.result.end, ExplorationEnd::stuck) << alone.result.why;
   EXPECT_THAT(alone.result.why, HasSubstr("the gradient leads nowhere (1 of "));
   EXPECT_GT(with.result.steps.size(), 10U);
@@ -152,12 +127,14 @@ TEST(EdeExplorers, AGradientThatLeadsNowhereIsStuckOrGoesOnByItsFallback) {
 
 TEST(EdeExplorers, WhereNothingIsLeftTheFallbackGoesOn) {
   // Frontiers of 100 m alone count: there are none from the beginning.
-  const Drive ends = run("rooms:width=12,height=9", kNoisy, "ede_rrt_star:smallest=100", 20.0);
+  const DecidedRun ends = test::explore("rooms:width=12,height=9", kNoisyRobot,
+                                        "ede_rrt_star:smallest=100", {.distance = 20.0});
   EXPECT_EQ(ends.result.end, ExplorationEnd::finished);
   EXPECT_EQ(ends.result.why, "no frontier of 100 m or more is in sight of where it can drive");
   EXPECT_EQ(ends.decisions.size(), 1U);
-  const Drive goes_on =
-      run("rooms:width=12,height=9", kNoisy, "ede_rrt_star:smallest=100,fallback=frontier", 20.0);
+  const DecidedRun goes_on =
+      test::explore("rooms:width=12,height=9", kNoisyRobot,
+                    "ede_rrt_star:smallest=100,fallback=frontier", {.distance = 20.0});
   EXPECT_EQ(goes_on.result.end, ExplorationEnd::limit);
   EXPECT_THAT(goes_on.decisions.front().why, HasSubstr("a frontier of"));
 }

@@ -10,6 +10,7 @@
 #include "cairn/exploration/exploration.hpp"
 #include "cairn/grid/floor_plan.hpp"
 #include "cairn/plugin/registry.hpp"
+#include "support/exploration_runs.hpp"
 #include "unit/lib/exploration/drawn_map.hpp"
 
 namespace cairn {
@@ -17,54 +18,17 @@ namespace {
 
 using testing::HasSubstr;
 
-constexpr const char* kExact =
-    "lidar_building:relative=0,sigma_xy=1e-6,sigma_theta=1e-6,range_sigma=0";
-constexpr const char* kNoisy = "lidar_building:relative=0.05";
-constexpr const char* kMatcher =
-    "simulated:range=1.4,angle=0.35,sigma_translation=0.02,sigma_rotation=0.002";
-
-/// The parts of a run, by name.
-struct Parts {
-  explicit Parts(const std::string& world_name, const std::string& explorer_name = "frontier")
-      : world(make<World>(world_name)),
-        policy(make<PosePolicy>("compact_pose:range=1,angle=0.35,reuse=false")),
-        registration(make<Registration>(kMatcher)),
-        mapper(make<Mapper>("log_odds")),
-        explorer(make<Explorer>(explorer_name)) {}
-
-  template <class Interface>
-  std::unique_ptr<Interface> make(const std::string& name) {
-    return registry.make<Interface>(parse_component(name));
-  }
-
-  Exploration on(const OccupancyGrid& floor, std::uint64_t seed = 1) {
-    return {.world = *world,
-            .policy = *policy,
-            .registration = *registration,
-            .mapper = *mapper,
-            .explorer = *explorer,
-            .registry = registry,
-            .start = {.floor = &floor, .pose = {}, .seed = seed},
-            .limits = {}};
-  }
-
-  Registry registry;
-  std::unique_ptr<World> world;
-  std::unique_ptr<PosePolicy> policy;
-  std::unique_ptr<Registration> registration;
-  std::unique_ptr<Mapper> mapper;
-  std::unique_ptr<Explorer> explorer;
-};
-
-OccupancyGrid floor_named(const std::string& name, std::uint64_t seed) {
-  return Registry().make<FloorPlan>(parse_component(name))->generate(seed);
-}
+using test::ExplorationParts;
+using test::floor_named;
+using test::kExactRobot;
+using test::kNoisyRobot;
+using test::kTrueMatcher;
 
 class GeneratedFloors : public testing::TestWithParam<const char*> {};
 
 TEST_P(GeneratedFloors, WithoutNoiseAllIsSeenAndNothingIsTouched) {
   const OccupancyGrid floor = floor_named(GetParam(), 3);
-  Parts parts(kExact);
+  ExplorationParts parts(kExactRobot);
   const ExplorationResult result = run_exploration(parts.on(floor));
   EXPECT_EQ(result.end, ExplorationEnd::finished) << result.why;
   EXPECT_EQ(result.collisions, 0);
@@ -96,7 +60,8 @@ void expect_equal(const ExplorationResult& a, const ExplorationResult& b) {
 TEST(Exploration, TheSameSeedGivesTheSameRun) {
   const OccupancyGrid floor = floor_named("rooms:width=12,height=9", 5);
   for (const char* explorer : {"frontier", "random"}) {
-    Parts first(kNoisy, explorer), second(kNoisy, explorer), other(kNoisy, explorer);
+    ExplorationParts first(kNoisyRobot, explorer), second(kNoisyRobot, explorer),
+        other(kNoisyRobot, explorer);
     Exploration a = first.on(floor, 7), b = second.on(floor, 7), c = other.on(floor, 8);
     a.limits.distance = b.limits.distance = c.limits.distance = 15.0;
     const ExplorationResult run = run_exploration(a);
@@ -108,7 +73,7 @@ TEST(Exploration, TheSameSeedGivesTheSameRun) {
 TEST(Exploration, LimitsEndARun) {
   const OccupancyGrid floor = floor_named("rooms:width=12,height=9", 5);
   const auto run = [&](const ExplorationLimits& limits) {
-    Parts parts(kNoisy);
+    ExplorationParts parts(kNoisyRobot);
     Exploration exploration = parts.on(floor);
     exploration.limits = limits;
     return run_exploration(exploration);
@@ -124,7 +89,7 @@ TEST(Exploration, LimitsEndARun) {
 
 TEST(Exploration, AnInterruptEndsItWithItsResults) {
   const OccupancyGrid floor = floor_named("rooms:width=12,height=9", 5);
-  Parts parts(kNoisy);
+  ExplorationParts parts(kNoisyRobot);
   Exploration exploration = parts.on(floor);
   std::atomic<bool> interrupt{false};
   exploration.interrupt = &interrupt;
@@ -165,14 +130,14 @@ class Idler final : public Explorer {
 TEST(Exploration, ARunWithoutProgressIsStuckAndSaysWhy) {
   const OccupancyGrid floor = floor_named("rooms:width=12,height=9", 5);
   {
-    Parts parts(kExact);
+    ExplorationParts parts(kExactRobot);
     parts.explorer = std::make_unique<Pendulum>();
     const ExplorationResult result = run_exploration(parts.on(floor));
     EXPECT_EQ(result.end, ExplorationEnd::stuck);
     EXPECT_THAT(result.why, HasSubstr("50 m were driven"));
     EXPECT_LT(result.steps.back().distance, 60.0);
   }
-  Parts parts(kExact);
+  ExplorationParts parts(kExactRobot);
   parts.explorer = std::make_unique<Idler>();
   const ExplorationResult result = run_exploration(parts.on(floor));
   EXPECT_EQ(result.end, ExplorationEnd::stuck);
@@ -182,7 +147,7 @@ TEST(Exploration, ARunWithoutProgressIsStuckAndSaysWhy) {
 TEST(Exploration, LoopsKeepAnUncertainRobotNearTheTruth) {
   const OccupancyGrid floor = floor_named("loop:width=16,height=12", 3);
   const auto error = [&](const char* registration) {
-    Parts parts("lidar_building:relative=0.1,sigma_theta=0.02");
+    ExplorationParts parts("lidar_building:relative=0.1,sigma_theta=0.02");
     parts.registration = parts.make<Registration>(registration);
     Exploration exploration = parts.on(floor, 4);
     exploration.limits.distance = 60.0;
@@ -192,7 +157,7 @@ TEST(Exploration, LoopsKeepAnUncertainRobotNearTheTruth) {
       sum += (step.estimate.translation() - step.truth->translation()).norm();
     return sum / static_cast<double>(result.steps.size());
   };
-  EXPECT_LT(error(kMatcher), 0.5 * error("simulated:range=0.001"));
+  EXPECT_LT(error(kTrueMatcher), 0.5 * error("simulated:range=0.001"));
 }
 
 }  // namespace

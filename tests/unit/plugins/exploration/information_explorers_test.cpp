@@ -15,6 +15,7 @@
 #include "cairn/grid/floor_plan.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
+#include "support/exploration_runs.hpp"
 
 namespace cairn {
 namespace {
@@ -22,41 +23,10 @@ namespace {
 using testing::AnyOf;
 using testing::HasSubstr;
 
-constexpr const char* kExact =
-    "lidar_building:relative=0,sigma_xy=1e-6,sigma_theta=1e-6,range_sigma=0";
+using test::DecidedRun;
+using test::kExactRobot;
+
 constexpr const char* kNoisy = "lidar_building:relative=0.1,sigma_theta=0.01";
-constexpr const char* kMatcher =
-    "simulated:range=1.4,angle=0.35,sigma_translation=0.02,sigma_rotation=0.002";
-
-struct Drive {
-  ExplorationResult result;
-  std::vector<Decision> decisions;
-};
-
-Drive run(const std::string& floor_plan, const std::string& world, const std::string& explorer,
-          const ExplorationLimits& limits, std::uint64_t seed = 3) {
-  Registry registry;
-  const OccupancyGrid floor = registry.make<FloorPlan>(parse_component(floor_plan))->generate(seed);
-  const auto robot = registry.make<World>(parse_component(world));
-  const auto policy =
-      registry.make<PosePolicy>(parse_component("compact_pose:range=1,angle=0.35,reuse=false"));
-  const auto registration = registry.make<Registration>(parse_component(kMatcher));
-  const auto mapper = registry.make<Mapper>("log_odds");
-  const auto explores = registry.make<Explorer>(parse_component(explorer));
-  Drive drive;
-  drive.result = run_exploration({.world = *robot,
-                                  .policy = *policy,
-                                  .registration = *registration,
-                                  .mapper = *mapper,
-                                  .explorer = *explores,
-                                  .registry = registry,
-                                  .start = {.floor = &floor, .pose = {}, .seed = seed},
-                                  .limits = limits,
-                                  .decided = [&](const Decision& decision, const Situation&) {
-                                    drive.decisions.push_back(decision);
-                                  }});
-  return drive;
-}
 
 /// The longest that it has driven without more of the floor being known, by 0.2 % [m].
 double longest_without_progress(const ExplorationResult& result) {
@@ -75,7 +45,7 @@ class InformationExplorers : public testing::TestWithParam<std::tuple<const char
 
 TEST_P(InformationExplorers, WithoutNoiseAllIsSeen) {
   const auto [explorer, plan] = GetParam();
-  const Drive found = run(plan, kExact, explorer, {});
+  const DecidedRun found = test::explore(plan, kExactRobot, explorer, {});
   EXPECT_EQ(found.result.end, ExplorationEnd::finished) << found.result.why;
   EXPECT_THAT(found.result.why, HasSubstr("is left"));
   // On the way to a far frontier it may touch the frame of a door that it has not seen whole.
@@ -87,7 +57,7 @@ TEST_P(InformationExplorers, WithoutNoiseAllIsSeen) {
 TEST_P(InformationExplorers, WithNoiseEachRunEndsWithAReasonAndMakesProgress) {
   const auto [explorer, plan] = GetParam();
   for (const std::uint64_t seed : {4, 5}) {
-    const Drive found = run(plan, kNoisy, explorer, {.distance = 80.0}, seed);
+    const DecidedRun found = test::explore(plan, kNoisy, explorer, {.distance = 80.0}, seed);
     EXPECT_THAT(found.result.why,
                 AnyOf(HasSubstr("is left"), HasSubstr("80 m are driven"), HasSubstr("50 m were")));
     EXPECT_LT(longest_without_progress(found.result), 51.0);
@@ -105,8 +75,10 @@ INSTANTIATE_TEST_SUITE_P(
                                      "loop:width=16,height=12", "cave:width=12,height=12")));
 
 void expect_the_same_run_twice(const char* explorer) {
-  const Drive a = run("loop:width=16,height=12", kNoisy, explorer, {.distance = 20.0});
-  const Drive b = run("loop:width=16,height=12", kNoisy, explorer, {.distance = 20.0});
+  const DecidedRun a =
+      test::explore("loop:width=16,height=12", kNoisy, explorer, {.distance = 20.0});
+  const DecidedRun b =
+      test::explore("loop:width=16,height=12", kNoisy, explorer, {.distance = 20.0});
   ASSERT_EQ(a.result.steps.size(), b.result.steps.size());
   for (std::size_t k = 0; k < a.result.steps.size(); ++k) {
     ASSERT_EQ(a.result.steps[k].estimate.x(), b.result.steps[k].estimate.x());
@@ -120,8 +92,8 @@ void expect_the_same_run_twice(const char* explorer) {
 TEST(Heuristic, TheSameSeedGivesTheSameRun) { expect_the_same_run_twice("heuristic"); }
 
 TEST(Heuristic, DrivesWhatLowersBothEntropiesMostAndSaysTheValues) {
-  const Drive found =
-      run("loop:width=16,height=12", kNoisy, "heuristic:loop_gain=0.5", {.distance = 50.0});
+  const DecidedRun found = test::explore("loop:width=16,height=12", kNoisy,
+                                         "heuristic:loop_gain=0.5", {.distance = 50.0});
   ASSERT_GE(found.decisions.size(), 5U);
   std::size_t revisits = 0;
   for (const Decision& decision : found.decisions) {
@@ -146,7 +118,7 @@ TEST(Heuristic, DrivesWhatLowersBothEntropiesMostAndSaysTheValues) {
 TEST(Heuristic, GivesUpRevisitsThatDiscoverNothing) {
   const std::string lost = "lidar_building:relative=0.3,sigma_theta=0.03";
   const std::string home = "heuristic:simulated_range=0.1,loop_gain=0.1,homing=true";
-  const auto longest_row = [](const Drive& drive) {
+  const auto longest_row = [](const DecidedRun& drive) {
     int row = 0, longest = 0;
     for (const Decision& decision : drive.decisions) {
       if (decision.kind != Decision::Kind::drive) continue;
@@ -157,8 +129,10 @@ TEST(Heuristic, GivesUpRevisitsThatDiscoverNothing) {
     return longest;
   };
   const ExplorationLimits limits{.distance = 60.0, .decisions = 150};
-  const Drive any = run("loop:width=16,height=12", lost, home + ",revisits=0", limits);
-  const Drive one = run("loop:width=16,height=12", lost, home + ",revisits=1", limits);
+  const DecidedRun any =
+      test::explore("loop:width=16,height=12", lost, home + ",revisits=0", limits);
+  const DecidedRun one =
+      test::explore("loop:width=16,height=12", lost, home + ",revisits=1", limits);
   EXPECT_GT(longest_row(any), 2);
   EXPECT_NE(one.result.end, ExplorationEnd::stuck) << one.result.why;
   EXPECT_GT(one.result.steps.back().coverage, any.result.steps.back().coverage);
@@ -177,7 +151,8 @@ TEST(Dopt, TheSameSeedGivesTheSameRun) {
 
 TEST(Dopt, DrivesToTheFrontierWithTheLargestOneAndSaysSo) {
   for (const std::string by : {"exact", "laplacian"}) {
-    const Drive found = run("loop:width=16,height=12", kNoisy, "dopt:by=" + by, {.distance = 50.0});
+    const DecidedRun found =
+        test::explore("loop:width=16,height=12", kNoisy, "dopt:by=" + by, {.distance = 50.0});
     ASSERT_GE(found.decisions.size(), 5U);
     std::size_t not_nearest = 0;
     for (const Decision& decision : found.decisions) {
@@ -196,10 +171,10 @@ TEST(Dopt, DrivesToTheFrontierWithTheLargestOneAndSaysSo) {
 
 /// With a margin that everything is within it drives as `frontier` does, but for what that keeps.
 TEST(Dopt, WithinTheMarginTheNearestIsChosen) {
-  const Drive wide =
-      run("rooms:width=12,height=9", kNoisy, "dopt:margin=1000,keep=1", {.distance = 20.0});
-  const Drive nearest =
-      run("rooms:width=12,height=9", kNoisy, "frontier:keep=1", {.distance = 20.0});
+  const DecidedRun wide = test::explore("rooms:width=12,height=9", kNoisy,
+                                        "dopt:margin=1000,keep=1", {.distance = 20.0});
+  const DecidedRun nearest =
+      test::explore("rooms:width=12,height=9", kNoisy, "frontier:keep=1", {.distance = 20.0});
   ASSERT_EQ(wide.result.steps.size(), nearest.result.steps.size());
   EXPECT_EQ(wide.result.steps.back().estimate.x(), nearest.result.steps.back().estimate.x());
 }

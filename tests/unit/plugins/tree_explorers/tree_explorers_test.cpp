@@ -12,6 +12,7 @@
 #include "cairn/grid/floor_plan.hpp"
 #include "cairn/planning/free_space.hpp"
 #include "cairn/plugin/registry.hpp"
+#include "support/exploration_runs.hpp"
 #include "unit/plugins/tree_explorers/known_floor.hpp"
 
 namespace cairn {
@@ -19,50 +20,15 @@ namespace {
 
 using testing::HasSubstr;
 
-constexpr const char* kExact =
-    "lidar_building:relative=0,sigma_xy=1e-6,sigma_theta=1e-6,range_sigma=0";
-constexpr const char* kNoisy = "lidar_building:relative=0.05";
-constexpr const char* kMatcher =
-    "simulated:range=1.4,angle=0.35,sigma_translation=0.02,sigma_rotation=0.002";
-
-/// The parts of a run, by name.
-struct Parts {
-  Parts(const std::string& world_name, const std::string& explorer_name)
-      : world(make<World>(world_name)),
-        policy(make<PosePolicy>("compact_pose:range=1,angle=0.35,reuse=false")),
-        registration(make<Registration>(kMatcher)),
-        mapper(make<Mapper>("log_odds")),
-        explorer(make<Explorer>(explorer_name)) {}
-
-  template <class Interface>
-  std::unique_ptr<Interface> make(const std::string& name) {
-    return registry.make<Interface>(parse_component(name));
-  }
-
-  Exploration on(const OccupancyGrid& floor, std::uint64_t seed = 1) {
-    return {.world = *world,
-            .policy = *policy,
-            .registration = *registration,
-            .mapper = *mapper,
-            .explorer = *explorer,
-            .registry = registry,
-            .start = {.floor = &floor, .pose = {}, .seed = seed},
-            .limits = {}};
-  }
-
-  Registry registry;
-  std::unique_ptr<World> world;
-  std::unique_ptr<PosePolicy> policy;
-  std::unique_ptr<Registration> registration;
-  std::unique_ptr<Mapper> mapper;
-  std::unique_ptr<Explorer> explorer;
-};
+using test::ExplorationParts;
+using test::kExactRobot;
+using test::kNoisyRobot;
 
 class TreeExplorers : public testing::TestWithParam<const char*> {};
 
 TEST_P(TreeExplorers, DriveAlongTheBestPathOfTheirTree) {
   const OccupancyGrid floor = test::known_floor("rooms:width=12,height=9", 3).floor;
-  Parts parts(kNoisy, std::string(GetParam()) + ":density=2");
+  ExplorationParts parts(kNoisyRobot, std::string(GetParam()) + ":density=2");
   Exploration exploration = parts.on(floor);
   exploration.limits.decisions = 5;
   int driven = 0;
@@ -92,7 +58,7 @@ TEST_P(TreeExplorers, DriveAlongTheBestPathOfTheirTree) {
 TEST_P(TreeExplorers, TheSameSeedGivesTheSameRun) {
   const OccupancyGrid floor = test::known_floor("rooms:width=12,height=9", 5).floor;
   const auto run = [&](std::uint64_t seed) {
-    Parts parts(kNoisy, std::string(GetParam()) + ":density=2");
+    ExplorationParts parts(kNoisyRobot, std::string(GetParam()) + ":density=2");
     Exploration exploration = parts.on(floor, seed);
     exploration.limits.distance = 5.0;
     return run_exploration(exploration);
@@ -110,13 +76,14 @@ TEST_P(TreeExplorers, TheSameSeedGivesTheSameRun) {
 
 TEST_P(TreeExplorers, EndWithAReasonWhereNothingIsToBeGained) {
   const OccupancyGrid floor = test::known_floor("rooms:width=12,height=9", 5).floor;
-  Parts parts(kExact, std::string(GetParam()) + ":fallback=none,density=1,least_gain=1e6");
+  ExplorationParts parts(kExactRobot,
+                         std::string(GetParam()) + ":fallback=none,density=1,least_gain=1e6");
   const ExplorationResult result = run_exploration(parts.on(floor));
   EXPECT_EQ(result.end, ExplorationEnd::finished);
   EXPECT_THAT(result.why, HasSubstr("lowers the entropy by 1e+06 nats/m"));
   EXPECT_THAT(result.why, HasSubstr("frontiers are left"));
   // With another explorer to fall back on it is that explorer that drives.
-  Parts falling(kExact, std::string(GetParam()) + ":density=1,least_gain=1e6");
+  ExplorationParts falling(kExactRobot, std::string(GetParam()) + ":density=1,least_gain=1e6");
   Exploration exploration = falling.on(floor);
   exploration.limits.decisions = 8;
   exploration.decided = [](const Decision& decision, const Situation&) {
@@ -128,7 +95,7 @@ TEST_P(TreeExplorers, EndWithAReasonWhereNothingIsToBeGained) {
 
 TEST_P(TreeExplorers, SayThatTheClockHasCutTheirTree) {
   const OccupancyGrid floor = test::known_floor("rooms:width=12,height=9", 5).floor;
-  Parts parts(kExact, std::string(GetParam()) + ":density=200");
+  ExplorationParts parts(kExactRobot, std::string(GetParam()) + ":density=200");
   Exploration exploration = parts.on(floor);
   exploration.limits.decisions = 2;
   exploration.decision_budget = 0.05;
@@ -145,7 +112,7 @@ class TreeExplorersOnFloors : public testing::TestWithParam<std::tuple<const cha
 TEST_P(TreeExplorersOnFloors, WithoutNoiseAllIsSeenAndNothingIsTouched) {
   const auto [explorer, plan] = GetParam();
   const OccupancyGrid floor = test::known_floor(plan, 3).floor;
-  Parts parts(kExact, std::string(explorer) + ":density=2");
+  ExplorationParts parts(kExactRobot, std::string(explorer) + ":density=2");
   const ExplorationResult result = run_exploration(parts.on(floor));
   EXPECT_EQ(result.end, ExplorationEnd::finished) << result.why;
   EXPECT_EQ(result.collisions, 0);
