@@ -63,6 +63,15 @@ CLI::Validator finite_seconds(double least) {
   return {check, ""};
 }
 
+/// What a script passes where a variable of its is not set.
+CLI::Validator not_empty() {
+  const auto check = [](const std::string& text) {
+    return text.empty() ? std::string("an empty word is no value; leave the option out")
+                        : std::string();
+  };
+  return {check, ""};
+}
+
 CLI::Validator one_of_these(std::vector<std::string> choices) {
   const auto check = [choices = std::move(choices)](const std::string& text) {
     const bool good = std::ranges::find(choices, text) != choices.end();
@@ -184,12 +193,12 @@ ArgumentParser ArgumentParser::add_command(const std::string& name,
 
 Argument ArgumentParser::add_option(const std::string& names, std::string& value,
                                     const std::string& help) {
-  return Argument(*app_->add_option(names, value, help));
+  return Argument(*app_->add_option(names, value, help)->check(not_empty()));
 }
 
 Argument ArgumentParser::add_option(const std::string& names, std::vector<std::string>& value,
                                     const std::string& help) {
-  return Argument(*app_->add_option(names, value, help));
+  return Argument(*app_->add_option(names, value, help)->check(not_empty()));
 }
 
 Argument ArgumentParser::add_option(const std::string& names, int& value, const std::string& help) {

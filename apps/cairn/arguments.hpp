@@ -70,7 +70,7 @@ class ArgumentParser {
   ArgumentParser add_command(const std::string& name, const std::string& description);
 
   /// Adds an option ("-o,--output"), or a positional argument ("graph"). Parsing writes to `value`,
-  /// which must live as long; where it is not given the value stays.
+  /// which must live as long; where it is not given the value stays. An empty word is refused.
   Argument add_option(const std::string& names, std::string& value, const std::string& help);
   Argument add_option(const std::string& names, std::vector<std::string>& value,
                       const std::string& help);

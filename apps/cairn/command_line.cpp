@@ -10,13 +10,12 @@
 
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/spelling.hpp"
+#include "cairn/runtime/threads.hpp"
 #include "cairn/runtime/version.hpp"
 #include "help.hpp"
 
 namespace cairn::app {
 namespace {
-
-constexpr int kMostThreads = 1024;
 
 void add_common_options(ProgramParser& program, CommonOptions& common) {
   ArgumentParser cli = program.root();

@@ -6,6 +6,8 @@
 
 #include <boost/json/serialize.hpp>
 
+#include "cairn/report/packed_array.hpp"
+
 namespace cairn::app {
 namespace {
 
@@ -65,6 +67,6 @@ std::string layout(const json::value& value, std::size_t indent) {
 
 }  // namespace
 
-std::string json_text(const json::object& object) { return layout(object, 0); }
+std::string json_text(const json::object& object) { return valid_utf8(layout(object, 0)); }
 
 }  // namespace cairn::app

@@ -181,7 +181,7 @@ Answer compute(const Graph& graph, const Request& request, CovarianceSolver& sol
     note_constant(request, graph, marginals.gauge().held, session);
     answer.mutual = mutual_information(graph, marginals, request.mutual);
   }
-  answer.marginals = seconds_since(begin);
+  answer.marginals = marginals.diagonal_seconds() + seconds_since(begin);
   return answer;
 }
 

@@ -13,6 +13,7 @@
 
 #include "arguments.hpp"
 #include "cairn/evaluation/batch_comparison.hpp"
+#include "cairn/evaluation/plausibility.hpp"
 #include "cairn/online/recorded_graph.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
@@ -235,6 +236,10 @@ int run(const ReplayOptions& options, Session& session) {
                              plural(replay.placed_as_given, "variable") + " began with"));
   }
   const double chi2 = estimator->chi2();
+  if (!replay.interrupted) {
+    for (std::string& doubt : reasons_for_doubt(estimator->graph(), chi2))
+      replay.notes.push_back(std::move(doubt));
+  }
   results.add(
       [&] { session.write_json(report_json(options, loaded, sorted, replay, *estimator, chi2)); });
   // Last of the files: libraries for fonts may end the process where memory is short.

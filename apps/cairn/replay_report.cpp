@@ -85,8 +85,9 @@ std::string checks_text(const Replay& replay) {
 
 std::string_view status(const Replay& replay) {
   if (replay.interrupted) return "interrupted";
-  return !replay.steps.empty() && !replay.steps.back().report.ok ? "not_positive_definite"
-                                                                 : "converged";
+  if (replay.steps.empty()) return "converged";
+  const UpdateReport& last = replay.steps.back().report;
+  return !last.ok ? "not_positive_definite" : !last.converged ? "max_iterations" : "converged";
 }
 
 json::object report_json(const ReplayOptions& options, const LoadedGraph& loaded, bool sorted,

@@ -66,7 +66,8 @@ struct Replay {
   bool interrupted = false;
 };
 
-/// "converged", "interrupted" or, of the last update, "not_positive_definite".
+/// "converged", "interrupted" or, of the last update, "not_positive_definite" and, where it was to
+/// solve everything and could not, "max_iterations".
 std::string_view status(const Replay& replay);
 
 boost::json::object report_json(const ReplayOptions& options, const LoadedGraph& loaded,

@@ -21,7 +21,9 @@ namespace cairn::sparsify {
 namespace {
 
 constexpr int kIterations = 20;
-constexpr double kSettled = 1e-9;
+/// A step is taken if it could lower chi2 by more than this part of it, and moves something by more
+/// than this part of the largest coordinate: neither depends on the scale of the information.
+constexpr double kSettled = 1e-9, kRounding = 1e-12;
 /// What is left of a diagonal element, as a part of it, where a direction is open, and the damping
 /// that keeps steps in such directions small.
 constexpr double kZeroPivot = 1e-11, kDamping = 1e-8;
@@ -96,6 +98,14 @@ class DenseSystem {
     }
   }
 
+  bool is_rounding(const Vector& step) const {
+    double largest = 1.0;  // an angle
+    for (const std::vector<double>& state : states_) {
+      for (const double x : state) largest = std::max(largest, std::abs(x));
+    }
+    return step.cwiseAbs().maxCoeff() <= kRounding * largest;
+  }
+
   /// To the minimum, the last pose of the blanket held unless the problem is absolute. By Gauss and
   /// Newton from a minimum of the whole graph, which is near; a step that does not lower chi2 is
   /// not taken. Given are chi2, H and g where it is; H and g become those of the minimum.
@@ -114,7 +124,7 @@ class DenseSystem {
       const Vector of_free = ldlt.solve(Vector(g(free)));
       step(free) = of_free;
       const double expected = step.dot(g);
-      if (!(expected > kSettled * (1.0 + chi2))) return;
+      if (!(expected > kSettled * chi2) || is_rounding(step)) return;
       const auto before = states_;
       bool lower = false;
       for (int tries = 0; tries < 10 && !lower; ++tries, step *= 0.5) {

@@ -5,8 +5,10 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <numbers>
 #include <sstream>
 
+#include <fmt/core.h>
 #include <boost/json/serialize.hpp>
 
 #include "cairn/plugin/registry.hpp"
@@ -274,6 +276,29 @@ TEST_F(MarginalsCommand, SaysWhichVariableMakesHSingular) {
   EXPECT_EQ(outcome.exit_code, 4);
   EXPECT_THAT(outcome.err, HasSubstr("no covariances"));
   EXPECT_THAT(outcome.err, HasSubstr("VERTEX_SE2 1"));
+}
+
+/// A closed trajectory whose only prior is one of a position: it may be turned about that, which
+/// the factorisation need not notice.
+TEST_F(MarginalsCommand, SaysWhereHIsSingularToRoundingWhateverTheSolver) {
+  std::string text;
+  constexpr int kPoses = 30;
+  constexpr double kTurn = 2.0 * std::numbers::pi / kPoses;
+  for (int k = 0; k < kPoses; ++k) {
+    text += fmt::format("VERTEX_SE2 {} {} {} {}\n", k, 5.0 * std::sin(k * kTurn),
+                        5.0 - 5.0 * std::cos(k * kTurn), k * kTurn);
+    text += fmt::format("EDGE_SE2 {} {} {} {} {} 100 0 0 100 0 400\n", k, (k + 1) % kPoses,
+                        5.0 * std::sin(kTurn), 5.0 - 5.0 * std::cos(kTurn), kTurn);
+  }
+  text += "EDGE_PRIOR_SE2 3 7 9 0 1 0 0 1 0 0\n";
+  const std::string file = folder_.file("turns.g2o");
+  write_text(file, text);
+  for (const char* solver : {"block_cholesky", "cholmod", "eigen", "lapack", "spqr", "schur"}) {
+    if (!Registry().has("linear_solver", solver)) continue;
+    const Outcome outcome = cairn({"marginals", file, "--linear-solver", solver});
+    EXPECT_EQ(outcome.exit_code, 4) << solver;
+    EXPECT_THAT(outcome.err, HasSubstr("1 gauge freedom is likely")) << solver;
+  }
 }
 
 // cairn optimize --covariance

@@ -130,6 +130,30 @@ TEST_F(Replay, KeepsAFixedNumberOfPoses) {
   EXPECT_THAT(check.err, HasSubstr("omit one of them"));
 }
 
+TEST_F(Replay, EndsWithACodeWhereTheLastStepHasNotConverged) {
+  const std::string json = folder_.file("run.json");
+  const Arguments words{"replay", "@manhattan:poses=80", "--finish", "--json", json};
+  const auto with = [&](const std::string& estimator) {
+    Arguments all = words;
+    all.insert(all.end(), {"--estimator", estimator});
+    return cairn(all).exit_code;
+  };
+  EXPECT_EQ(with("batch"), 0);
+  EXPECT_EQ(parse_json(read_text(json)).at("status"), "converged");
+  EXPECT_EQ(with("batch:iterations=1"), 4);
+  EXPECT_EQ(parse_json(read_text(json)).at("status"), "max_iterations");
+}
+
+TEST_F(Replay, SaysThatItsEstimateIsImplausible) {
+  const std::string file = folder_.file("wrong.g2o");
+  write_text(file,
+             "VERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 1 0 0\nVERTEX_SE2 2 2 0 0\n"
+             "EDGE_SE2 0 1 1 0 0 1e4 0 0 1e4 0 1e4\nEDGE_SE2 1 2 1 0 0 1e4 0 0 1e4 0 1e4\n"
+             "EDGE_SE2 0 2 9 0 0 1e4 0 0 1e4 0 1e4\n");
+  const Outcome run = cairn({"replay", file, "--estimator", "batch"});
+  EXPECT_THAT(run.out, HasSubstr("times the 3 degrees of freedom"));
+}
+
 TEST_F(Replay, RefusesWhatCannotBe) {
   EXPECT_EQ(cairn({"replay", "@manhattan:poses=20", "--estimator", "no_such"}).exit_code, 5);
   const Outcome check =

@@ -8,11 +8,14 @@
 #include <algorithm>
 #include <utility>
 
+#include <boost/json/parse.hpp>
+
 #include "integration/process.hpp"
 
 namespace cairn::test {
 namespace {
 
+using ::testing::EndsWith;
 using ::testing::HasSubstr;
 using ::testing::Not;
 using ::testing::SizeIs;
@@ -98,6 +101,9 @@ TEST(Usage, MissingAndSurplusAndMalformedArgumentsAreRefused) {
   expect_error(cairn({"optimize", "@ring", "--covariance", "all"}), kUsage,
                "--covariance: 'all' is not one of blocks, none");
   expect_error(cairn({"optimize", "@ring", "--json"}), kUsage, "--json needs a value: --json FILE");
+  expect_error(cairn({"optimize", "@ring", "--output", ""}), kUsage,
+               "--output: an empty word is no value; leave the option out");
+  expect_error(cairn({"optimize", ""}), kUsage, "an empty word is no value");
   expect_error(cairn({"optimize", "@ring", "--iterations=-1"}), kUsage, "-1");
   expect_error(cairn({"optimize", "@ring", "--tolerance", "2"}), kUsage, "--tolerance");
   expect_error(cairn({"optimize", "@ring", "--threads", "100000"}), kUsage, "--threads");
@@ -141,6 +147,18 @@ TEST(Usage, JsonOnStandardOutputIsAlone) {
     EXPECT_TRUE(report.at("cairn").is_string());
     EXPECT_EQ(report.at("command").as_string(), run.front());
   }
+}
+
+TEST(Usage, JsonIsUtf8WhateverTheNameOfAFile) {
+  TemporaryFolder folder;
+  const std::string graph = folder.file("r\xff.g2o"), json = folder.file("run.json");
+  ASSERT_EQ(cairn({"generate", "ring:poses=12", "-o", graph}).exit_code, 0);
+  ASSERT_EQ(cairn({"optimize", graph, "--json", json}).exit_code, 0);
+  boost::system::error_code invalid;
+  const auto report = boost::json::parse(read_text(json), invalid);
+  ASSERT_FALSE(invalid) << invalid.message();
+  EXPECT_THAT(std::string(report.at("graph").at("file").as_string()),
+              EndsWith("r\xEF\xBF\xBD.g2o"));
 }
 
 TEST(Usage, CommonOptionsMayStandBeforeTheCommand) {

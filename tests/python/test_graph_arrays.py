@@ -116,6 +116,14 @@ def test_ids_may_be_far_apart():
         graph.add_factors("EDGE_SE2_XY", [pairs[0], [-5, cairn.L(8)]], [[0, 2], [3, 3]], sigmas=1)
 
 
+def test_an_unsigned_id_that_is_no_id_is_refused():
+    graph = cairn.Graph()
+    graph.add_variables(cairn.Pose2, np.array([3, 2**63 - 1], dtype=np.uint64), np.zeros((2, 3)))
+    assert list(graph.ids(cairn.Pose2)) == [3, 2**63 - 1]
+    with pytest.raises(cairn.Error, match="9223372036854775808 is larger than any id"):
+        graph.add_variables(cairn.Pose2, np.array([2**63], dtype=np.uint64), np.zeros((1, 3)))
+
+
 def test_arrays_are_copies():
     graph = bulk(dense.loop())
     graph.states(cairn.Pose2)[:] = 0

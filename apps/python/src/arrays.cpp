@@ -2,6 +2,9 @@
 #include "arrays.hpp"
 
 #include <algorithm>
+#include <cstdint>
+#include <limits>
+#include <span>
 
 #include <fmt/core.h>
 
@@ -19,6 +22,15 @@ Ids ids_of(const py::object& sequence, const std::string& what, int dimensions) 
   if (numbers.size() > 0 && kind != 'i' && kind != 'u') {
     throw Error(ErrorCode::usage, fmt::format("{}: expected integers, not numbers of type {}", what,
                                               std::string(py::str(numbers.dtype()))));
+  }
+  if (kind == 'u' && numbers.itemsize() == sizeof(std::uint64_t)) {
+    const auto whole = py::array_t<std::uint64_t, py::array::c_style>::ensure(numbers);
+    const std::span<const std::uint64_t> all(whole.data(), static_cast<std::size_t>(whole.size()));
+    const auto large = std::ranges::find_if(all, [](std::uint64_t id) {
+      return id > static_cast<std::uint64_t>(std::numeric_limits<Id>::max());
+    });
+    if (large != all.end())
+      throw Error(ErrorCode::usage, fmt::format("{}: {} is larger than any id", what, *large));
   }
   if (numbers.ndim() != dimensions && numbers.size() > 0) {
     throw Error(ErrorCode::usage,

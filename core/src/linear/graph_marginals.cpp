@@ -2,8 +2,12 @@
 #include "cairn/linear/graph_marginals.hpp"
 
 #include <algorithm>
+#include <cstddef>
+
+#include <fmt/core.h>
 
 #include "cairn/runtime/error.hpp"
+#include "cairn/runtime/timed.hpp"
 
 namespace cairn {
 namespace {
@@ -14,6 +18,9 @@ Marginals& marginals_of(LinearSolver& solver) {
               "this linear solver cannot give covariances (it lacks the ability 'marginals'); "
               "block_cholesky can");
 }
+
+/// Σ_kk H_kk at most: times the rounding of doubles, 2⁻⁵³, it is half of a percent.
+constexpr double kFewestDigits = 4.5e13;
 
 std::int64_t tangent(const Graph& graph, int variable) {
   return graph.type(variable).tangent_size();
@@ -27,17 +34,53 @@ GraphMarginals::GraphMarginals(const Graph& graph, LinearSolver& solver)
 Factorization GraphMarginals::factorize() {
   if (size() == 0) return {};
   equations_.linearize(graph_->values());
-  return equations_.factorize();
+  Factorization factorization = equations_.factorize();
+  singular_ = false;
+  if (!factorization.ok) return factorization;
+  const BlockStructure& structure = equations_.linearizer().structure();
+  std::int64_t entries = 0;
+  for (int b = 0; b < structure.blocks(); ++b)
+    entries += std::int64_t{structure.block_size(b)} * structure.block_size(b);
+  diagonal_.resize(static_cast<std::size_t>(entries));
+  {
+    const Timed timed(diagonal_seconds_);
+    marginals_->diagonal_blocks(diagonal_);
+  }
+  const double* variance = diagonal_.data();
+  const double* information = equations_.diagonal().data();
+  double worst = kFewestDigits;
+  for (int b = 0; b < structure.blocks(); ++b) {
+    const int n = structure.block_size(b);
+    for (int k = 0; k < n; ++k) {
+      const double product = variance[k * (n + 1)] * information[k];
+      if (product <= worst) continue;
+      worst = product;
+      factorization = {.ok = false, .failed_block = b};
+    }
+    variance += std::ptrdiff_t{n} * n;
+    information += n;
+  }
+  singular_ = !factorization.ok;
+  return factorization;
+}
+
+std::string GraphMarginals::explain(const Factorization& failure) const {
+  if (!singular_) return equations_.explain(failure);
+  const int free = equations_.free_directions();
+  return fmt::format(
+      "H is singular to rounding: the covariance of {} has fewer than two digits{}",
+      graph_->describe_variable(equations_.linearizer().variable_of(failure.failed_block)),
+      free > 0 ? fmt::format("; {} gauge freedom{} likely", free, free == 1 ? " is" : "s are")
+               : "");
 }
 
 std::vector<double> GraphMarginals::diagonal() {
   const Linearizer& linearizer = equations_.linearizer();
-  std::int64_t held = 0, free = 0;
+  std::int64_t entries = 0;
   for (int v = 0; v < graph_->variable_count(); ++v)
-    (linearizer.block_of(v) < 0 ? held : free) += tangent(*graph_, v) * tangent(*graph_, v);
-  std::vector<double> of_blocks(free), all(free + held);
-  if (size() > 0) marginals_->diagonal_blocks(of_blocks);
-  auto from = of_blocks.begin();  // blocks are in the order of the variables
+    entries += tangent(*graph_, v) * tangent(*graph_, v);
+  std::vector<double> all(entries);
+  auto from = diagonal_.begin();  // blocks are in the order of the variables
   auto to = all.begin();
   for (int v = 0; v < graph_->variable_count(); ++v) {
     const std::int64_t count = tangent(*graph_, v) * tangent(*graph_, v);

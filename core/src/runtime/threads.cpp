@@ -6,10 +6,13 @@
 #include <mutex>
 #include <thread>
 
+#include <fmt/core.h>
 #include <tbb/blocked_range.h>
 #include <tbb/global_control.h>
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
+
+#include "cairn/runtime/error.hpp"
 
 // The thread sanitizer does not see into oneTBB, which is not built with it. These two calls tell
 // it what the fork and the join of a parallel loop order.
@@ -60,6 +63,10 @@ Arena& arena() {
 }  // namespace
 
 void set_threads(int count) {
+  if (count < 0 || count > kMostThreads) {
+    throw Error(ErrorCode::usage,
+                fmt::format("{} threads: expected 0 (all cores) to {}", count, kMostThreads));
+  }
   Arena& a = arena();
   const std::lock_guard lock(a.mutex);
   const int wanted =

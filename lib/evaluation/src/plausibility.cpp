@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "cairn/evaluation/plausibility.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -41,6 +42,7 @@ std::string implausible_estimate(const Graph& graph, double chi2) {
 namespace {
 
 constexpr double kLargestDeviation = 1e-3;
+constexpr double kNoWeight = 1e-9;  // of a factor, where 1 is that of one without loss
 
 FactorCheck check(const Graph& graph, int position) {
   std::vector<const VariableType*> types;
@@ -103,10 +105,27 @@ std::string residual_not_finite(const Graph& graph) {
   return {};
 }
 
+std::string losses_weigh_nothing(const Graph& graph) {
+  if (!graph.has_losses() || graph.factor_count() == 0) return {};
+  const std::vector<double> norms = squared_norms(graph);
+  double heaviest = 0.0;
+  for (std::size_t p = 0; p < graph.factor_pools().size(); ++p) {
+    const std::vector<std::int32_t>& positions = graph.factor_pools()[p].sequence;
+    std::vector<double> of_pool, weights(positions.size());
+    for (const std::int32_t position : positions) of_pool.push_back(norms[position]);
+    graph.weigh(static_cast<int>(p), 0, of_pool, {}, weights);
+    for (const double weight : weights) heaviest = std::max(heaviest, weight);
+  }
+  if (heaviest >= kNoWeight) return {};
+  return "the loss leaves no factor any weight at this estimate, so that nothing was optimised: "
+         "give "
+         "it a larger scale, or begin without it";
+}
+
 std::vector<std::string> reasons_for_doubt(const Graph& graph, double chi2) {
   std::vector<std::string> sentences;
-  for (const std::string& sentence :
-       {implausible_estimate(graph, chi2), residual_not_finite(graph)}) {
+  for (const std::string& sentence : {implausible_estimate(graph, chi2), residual_not_finite(graph),
+                                      losses_weigh_nothing(graph)}) {
     if (!sentence.empty()) sentences.push_back(sentence);
   }
   for (std::string& wrong : wrong_jacobians(graph)) sentences.push_back(std::move(wrong));

@@ -39,7 +39,8 @@ bool measure_or_note(SparsifyResult& result, const char* otherwise,
     measure();
     return true;
   } catch (const Error& error) {
-    if (error.code() != ErrorCode::numerical) throw;
+    // Graphs that cannot be compared cost the measure, not what was computed.
+    if (error.code() != ErrorCode::numerical && error.code() != ErrorCode::input) throw;
     result.notes.push_back(fmt::format("{}: {}", otherwise, error.what()));
     return false;
   }

@@ -31,7 +31,7 @@ void PcgSolver::analyze(const BlockStructure& structure) {
   H_.analyze(structure);
   diagonal_.analyze(structure);
   preconditioner_->analyze(structure);
-  for (std::vector<double>* vector : {&g_, &r_, &z_, &p_, &q_})
+  for (std::vector<double>* vector : {&g_, &r_, &z_, &p_, &q_, &scaled_})
     vector->assign(static_cast<std::size_t>(structure.size()), 0.0);
   version_ = structure.version();
   stats_ = {};
@@ -83,11 +83,13 @@ void* PcgSolver::ability(std::string_view name) {
   return wanted ? static_cast<JacobianSolver*>(this) : nullptr;
 }
 
-double PcgSolver::true_residual(std::span<const double> x) {
+PcgSolver::Norms PcgSolver::true_residual(std::span<const double> x) {
   H_.multiply(x, q_);
   for (std::size_t k = 0; k < r_.size(); ++k) r_[k] = g_[k] - q_[k];
-  return std::sqrt(dot(r_, r_));
+  return {std::sqrt(dot(r_, r_)), scaled_norm()};
 }
+
+double PcgSolver::scaled_norm() { return std::sqrt(diagonal_.solve(r_, scaled_)); }
 
 double PcgSolver::step(double alpha, std::span<double> x) {
   return iterative::sum_over_ranges(r_.size(), [&](std::size_t begin, std::size_t end) {
@@ -101,14 +103,15 @@ double PcgSolver::step(double alpha, std::span<double> x) {
   });
 }
 
-Ending PcgSolver::iterate(double goal, std::span<double> x, std::int64_t& iterations) {
+Ending PcgSolver::iterate(const Norms& goal, std::span<double> x, std::int64_t& iterations) {
   double rz = preconditioner_->apply(r_, z_);
   p_ = z_;
   while (iterations < options_.max_iterations) {
     const double curvature = H_.multiply_dot(p_, q_);
     if (!(curvature > 0.0)) return Ending::indefinite;
     ++iterations;
-    if (std::sqrt(step(rz / curvature, x)) <= goal) return Ending::reached;
+    if (std::sqrt(step(rz / curvature, x)) <= goal.plain && scaled_norm() <= goal.scaled)
+      return Ending::reached;
     const double next = preconditioner_->apply(r_, z_);
     if (!(next > 0.0)) return Ending::indefinite;
     const double beta = next / rz;
@@ -126,21 +129,21 @@ void PcgSolver::solve(std::span<const double> g, std::span<double> x) {
   std::copy(g.begin(), g.end(), g_.begin());  // x may be g
   r_ = g_;
   std::fill(x.begin(), x.end(), 0.0);
-  const double length = std::sqrt(dot(g_, g_));
-  const double goal = options_.tolerance * length;
-  double residual = length;
+  const Norms whole{std::sqrt(dot(g_, g_)), scaled_norm()};
+  const Norms goal{options_.tolerance * whole.plain, options_.tolerance * whole.scaled};
+  Norms residual = whole;
   std::int64_t iterations = 0;
   Ending ending = Ending::reached;
-  for (int restart = 0; residual > goal && restart <= kRestarts; ++restart) {
-    const double before = residual;
+  for (int restart = 0; !residual.within(goal) && restart <= kRestarts; ++restart) {
+    const Norms before = residual;
     ending = iterate(goal, x, iterations);
     residual = true_residual(x);
     if (ending != Ending::reached) break;
-    if (residual > goal) ending = Ending::stagnated;  // unless another round mends it
-    if (residual > 0.5 * before) break;
+    if (!residual.within(goal)) ending = Ending::stagnated;  // unless another round mends it
+    if (residual.plain > 0.5 * before.plain && residual.scaled > 0.5 * before.scaled) break;
   }
-  if (residual <= goal) ending = Ending::reached;
-  progress_.add(stats_, iterations, length > 0.0 ? residual / length : 0.0, ending);
+  if (residual.within(goal)) ending = Ending::reached;
+  progress_.add(stats_, iterations, whole.plain > 0.0 ? residual.plain / whole.plain : 0.0, ending);
 }
 
 }  // namespace cairn

@@ -33,7 +33,7 @@ constexpr auto enum_names(Preconditioning) {
 
 struct PcgOptions {
   Preconditioning preconditioner = Preconditioning::incomplete_cholesky;
-  double tolerance = 1e-10;             ///< on ‖Hx − g‖/‖g‖
+  double tolerance = 1e-10;             ///< on ‖Hx − g‖/‖g‖, and with blocks scaled
   std::int64_t max_iterations = 20000;  ///< of one solve
   double loops = 0.3;                   ///< of `Subgraph`
 
@@ -41,7 +41,9 @@ struct PcgOptions {
     using O = PcgOptions;
     return OptionFields<O>()
         .choice("preconditioner", &O::preconditioner, "what is solved exactly in each iteration")
-        .real("tolerance", &O::tolerance, 1e-15, 1.0, "on the relative residual |Hx - g| / |g|")
+        .real("tolerance", &O::tolerance, 1e-15, 1.0,
+              "on the relative residual |Hx - g| / |g|, also with each block scaled by that of the "
+              "diagonal of H")
         .integer("max_iterations", &O::max_iterations, 1, 1e9,
                  "of one solve; a step that has not converged by then is used, and reported")
         .real("loops", &O::loops, 0.0, 1e3,
@@ -54,12 +56,13 @@ struct PcgOptions {
 /// 2003, algorithm 9.1). H is never factorised: memory is that of H and of the preconditioner, and
 /// time goes with the square root of the condition number.
 ///
-/// A solve ends when ‖Hx − g‖ ≤ tolerance · ‖g‖, by the true residual, or at max_iterations with
-/// the x that it has; either way x is used, since each iterate of conjugate gradients lowers the
-/// quadratic model (Steihaug 1983), and the note of `stats` says how often. That H is not positive
-/// definite is a failed factorisation where a diagonal block, or the preconditioner, shows it;
-/// where only a direction p with pᵀHp ≤ 0 does, in a solve, the x so far is returned and reported.
-/// An H that is only semidefinite, as under a free gauge, is solved all the same.
+/// A solve ends when ‖Hx − g‖ ≤ tolerance · ‖g‖, in both of the norms below, by the true residual,
+/// or at max_iterations with the x that it has; either way x is used, since each iterate of
+/// conjugate gradients lowers the quadratic model (Steihaug 1983), and the note of `stats` says how
+/// often. That H is not positive definite is a failed factorisation where a diagonal block, or the
+/// preconditioner, shows it; where only a direction p with pᵀHp ≤ 0 does, in a solve, the x so far
+/// is returned and reported. An H that is only semidefinite, as under a free gauge, is solved all
+/// the same.
 ///
 /// Sums are taken in a fixed order: results do not depend on the number of threads.
 ///
@@ -82,9 +85,16 @@ class PcgSolver final : public LinearSolver, public IterativeSolver, public Jaco
 
  private:
   Factorization factorize(const BlockMatrix& H, const NormalBlocks* factors);
+  /// ‖r‖, and √(rᵀ D⁻¹ r) with the diagonal blocks D of H: the first is that of what has the
+  /// largest numbers alone, such as the most certain of the measurements.
+  struct Norms {
+    double plain = 0.0, scaled = 0.0;
+    bool within(const Norms& goal) const { return plain <= goal.plain && scaled <= goal.scaled; }
+  };
   /// Improves x until its residual r is small; both are kept up to date. Adds to `iterations`.
-  iterative::Ending iterate(double goal, std::span<double> x, std::int64_t& iterations);
-  double true_residual(std::span<const double> x);
+  iterative::Ending iterate(const Norms& goal, std::span<double> x, std::int64_t& iterations);
+  Norms true_residual(std::span<const double> x);
+  double scaled_norm();  ///< of r
   /// r = r − α q, x = x + α p; returns ‖r‖².
   double step(double alpha, std::span<double> x);
 
@@ -96,7 +106,7 @@ class PcgSolver final : public LinearSolver, public IterativeSolver, public Jaco
   BlockMatrix normal_;  // JᵀJ + D
   iterative::BlockRows H_;
   iterative::DiagonalBlocks diagonal_;
-  std::vector<double> g_, r_, z_, p_, q_;
+  std::vector<double> g_, r_, z_, p_, q_, scaled_;
   iterative::Progress progress_;
   LinearSolverStats stats_;
   bool factorized_ = false;

@@ -17,6 +17,7 @@
 #include "cairn/runtime/timed.hpp"
 #include "ceres_problem.hpp"
 #include "ceres_run.hpp"
+#include "newton_decrement.hpp"
 #include "state_extent.hpp"
 
 namespace cairn {
@@ -196,6 +197,18 @@ Summary CeresOptimizer::optimize(Graph& graph, const Stop& stop, Observer& obser
       (!std::isfinite(summary.final_chi2) ||
        ended_without_descent(report, state_extent(graph, graph.values()))))
     summary.status = Status::diverged;
+  if (summary.status == Status::converged && stop.tolerance > 0.0 && loss_.name == "none") {
+    // A step may be short because the trust region is, or beside states far from the origin.
+    const NewtonStep left = NewtonDecrement(graph, gauge).at(graph.values());
+    if (left.decrease > kCeresRounding * summary.final_chi2 &&
+        left.norm > kCeresRounding * state_extent(graph, graph.values())) {
+      summary.status = Status::diverged;
+      summary.notes.push_back(
+          fmt::format("Ceres took a short step for convergence, but the model predicts a decrease "
+                      "of {:.3g}",
+                      left.decrease));
+    }
+  }
   summary.notes.push_back("Ceres: " + report.message);
   summary.seconds = seconds_of(report);
   summary.seconds.total = seconds_since(begin);

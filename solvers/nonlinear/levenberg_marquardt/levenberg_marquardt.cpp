@@ -62,6 +62,7 @@ class Run {
     if (first_trial_) {
       first_promise_ = promise;
       first_norm_ = step_norm;
+      first_lambda_ = lambda;
       first_trial_ = false;
     }
     bool arrived = undamped ? convergence_.arrived(promise, run_.chi2) : damped_arrival(promise);
@@ -74,8 +75,7 @@ class Run {
     const double gained = run_.chi2 - trial_chi2;
     const bool exhausted = convergence_.exhausted(lowered, step_norm, run_.state_extent());
     if (!run_.ended() && arrived) run_.end(Status::converged);
-    if (!run_.ended() && exhausted && run_.solves(run_.step))
-      run_.end_without_descent(first_promise_, first_norm_);
+    if (!run_.ended() && exhausted && run_.solves(run_.step)) end_without_descent();
 
     const double before = run_.chi2;
     if (lowered) take_step(trial_chi2);
@@ -136,7 +136,21 @@ class Run {
   void raise_damping() {
     damping_.raise();
     if (damping_.at_limit() && !run_.ended() && !run_.exact() && run_.solves(run_.step))
-      run_.end_without_descent(first_promise_, first_norm_);
+      end_without_descent();
+  }
+
+  /// No step helps. Whether that is the minimum is asked of what H promises with as little damping
+  /// as it can be factorised with: under a heavy one every promise is small.
+  void end_without_descent() {
+    for (const double lambda : {0.0, kLightDamping, 1e-6, 1e-4}) {
+      if (lambda >= first_lambda_) break;
+      if (lambda == 0.0 && !may_go_undamped_) continue;
+      if (!factorize(lambda).ok || !run_.solve(run_.step)) continue;
+      first_promise_ = dot(equations_.g(), run_.step) + damping_energy();
+      first_norm_ = run_.step_norm();
+      break;
+    }
+    run_.end_without_descent(first_promise_, first_norm_);
   }
 
   void take_failure(const Factorization& failure, bool undamped) {
@@ -161,7 +175,7 @@ class Run {
   std::vector<double> min_diagonal_;  // of D
   int small_promises_ = 0;
   bool first_trial_ = true;  // of the present linearisation; it promised:
-  double first_promise_ = 0.0, first_norm_ = 0.0;
+  double first_promise_ = 0.0, first_norm_ = 0.0, first_lambda_ = 0.0;
   bool explained_ = false;
 };
 

@@ -31,16 +31,19 @@ class CAIRN_API GraphMarginals {
   /// Throws `Error` (usage) if the solver lacks the ability `Marginals`.
   GraphMarginals(const Graph& graph, LinearSolver& solver);
 
-  /// Linearises at the graph's states and factorises H. If that fails, `explain` says why, and
-  /// nothing below may be called.
+  /// Linearises at the graph's states, factorises H and computes the block diagonal of Σ. It fails,
+  /// too, where H is singular to rounding and its factorisation succeeds: where Σ_kk H_kk,
+  /// which is 1 / (1 − R²) of unknown k given all others, leaves fewer than two digits. If it
+  /// fails, `explain` says why, and nothing below may be called.
   Factorization factorize();
-  std::string explain(const Factorization& failure) const { return equations_.explain(failure); }
+  std::string explain(const Factorization& failure) const;
 
   const Gauge& gauge() const { return equations_.gauge(); }
   /// Scalar unknowns: rows of Σ.
   std::int64_t size() const { return equations_.size(); }
-  /// Time of each part so far; `solve` is that of covariances.
+  /// Time of each part of `factorize`; without that of the block diagonal of Σ, which is the other.
   const Seconds& seconds() const { return equations_.seconds(); }
+  double diagonal_seconds() const { return diagonal_seconds_; }
 
   /// Σ_vv of every variable, one after the other.
   std::vector<double> diagonal();
@@ -53,6 +56,9 @@ class CAIRN_API GraphMarginals {
   const Graph* graph_;
   NormalEquations equations_;
   Marginals* marginals_;
+  std::vector<double> diagonal_;  ///< blocks of Σ, of the variables that are not constant
+  bool singular_ = false;         ///< to rounding
+  double diagonal_seconds_ = 0.0;
 };
 
 }  // namespace cairn

@@ -8,9 +8,13 @@
 
 namespace cairn {
 
+/// The largest number of threads.
+inline constexpr int kMostThreads = 1024;
+
 /// Sets the number of threads of cairn's one arena (oneTBB), for this process; 0 means all cores.
 /// Results never depend on it, to the last bit. Starts the threads, so that the first parallel work
-/// need not. Not to be called while work runs.
+/// need not. Not to be called while work runs. Throws `Error` (usage) beyond `kMostThreads`, and
+/// for less than 0.
 CAIRN_API void set_threads(int count);
 
 /// The number of threads of the arena.

@@ -6,6 +6,8 @@
 #include <stdexcept>
 #include <vector>
 
+#include "cairn/runtime/error.hpp"
+
 namespace cairn {
 namespace {
 
@@ -53,6 +55,13 @@ TEST_P(Threads, WhatAChunkWroteIsSeenAfterTheLoop) {
     for (const double v : values) sum += v;
   }
   EXPECT_EQ(sum, 4096.0 * 210.0);
+}
+
+TEST(ThreadCount, IsRefusedWhereNoMachineHasSoMany) {
+  const int before = threads();
+  for (const int count : {-1, kMostThreads + 1, 1000000000})
+    EXPECT_THROW(set_threads(count), Error) << count;
+  EXPECT_EQ(threads(), before);
 }
 
 INSTANTIATE_TEST_SUITE_P(OneTwoThree, Threads, ::testing::Values(1, 2, 3));

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "cairn/evaluation/plausibility.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <memory>
+#include <span>
 #include <stdexcept>
 #include <tuple>
 
@@ -11,6 +14,7 @@
 #include "cairn/lie/se2.hpp"
 #include "cairn/types/define_factor.hpp"
 #include "cairn/types/define_variable.hpp"
+#include "cairn/types/loss.hpp"
 #include "support/sample_graphs.hpp"
 
 namespace cairn {
@@ -78,6 +82,33 @@ TEST(WrongJacobians, LeaveOutFactorsThatThrowBesideTheStates) {
   Graph graph;
   add_one_pose<Partial>(graph, 1, 1.0 - 1e-5);
   EXPECT_THAT(wrong_jacobians(graph), IsEmpty());
+}
+
+/// Of weight 1 within one standard deviation, and none beyond.
+class OneSigma final : public Loss {
+ public:
+  void evaluate(std::span<const double> s, std::span<double> rho,
+                std::span<double> weights) const override {
+    for (std::size_t k = 0; k < s.size(); ++k) {
+      if (!rho.empty()) rho[k] = std::min(s[k], 1.0);
+      if (!weights.empty()) weights[k] = s[k] < 1.0 ? 1.0 : 0.0;
+    }
+  }
+  double second_derivative(double) const override { return 0.0; }
+};
+
+TEST(LossesWeighNothing, OnlyWhereNoFactorHasAnyWeight) {
+  Graph graph = test::ring_of_poses(30, 0.05);
+  EXPECT_THAT(losses_weigh_nothing(graph), IsEmpty());
+  graph.set_loss(std::make_shared<OneSigma>());
+  const std::vector<double> norms = squared_norms(graph);
+  ASSERT_LT(std::ranges::min(norms), 1.0);
+  EXPECT_THAT(losses_weigh_nothing(graph), IsEmpty());
+  Graph apart;
+  add_one_pose<MissingTerm>(apart, 1, 50.0);
+  apart.set_loss(std::make_shared<OneSigma>());
+  ASSERT_GT(squared_norms(apart).front(), 1.0);
+  EXPECT_THAT(losses_weigh_nothing(apart), HasSubstr("no factor any weight"));
 }
 
 TEST(ResidualNotFinite, IsNamedWithItsMeasurement) {

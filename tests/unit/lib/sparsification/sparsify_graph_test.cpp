@@ -100,6 +100,38 @@ TEST_F(SparsifyGraph, OneOfEveryFewStaysFromTheFirstOnWhetherItIsFixedOrNot) {
   }
 }
 
+/// The estimate does not depend on the scale of the information, and nor does what is left of it.
+TEST_F(SparsifyGraph, IsTheSameAtAnyScaleOfTheInformation) {
+  const Graph graph = simulate("manhattan:poses=120,streets=3");
+  const SparsifyResult as_it_is = sparsify_whole(graph, job("smallest_blanket:part=0.5"), setting_);
+  ASSERT_TRUE(as_it_is.error.has_value());
+  for (const double scale : {1e-12, 1e-6, 1e6, 1e12}) {
+    Graph scaled = graph.clone();
+    for (int f = 0; f < graph.factor_count(); ++f) {
+      std::vector<double> information(graph.information(f).begin(), graph.information(f).end());
+      for (double& entry : information) entry *= scale;
+      scaled.set_measurement(f, graph.measurement(f), information);
+    }
+    const SparsifyResult result =
+        sparsify_whole(scaled, job("smallest_blanket:part=0.5"), setting_);
+    ASSERT_EQ(ids(result.sparse), ids(as_it_is.sparse)) << scale;
+    ASSERT_TRUE(result.error.has_value()) << scale;
+    // The divergence of the means is in units of the information; that of the covariances has none.
+    const double of_covariances = as_it_is.error->kld - as_it_is.error->mean;
+    EXPECT_NEAR(result.error->mean, scale * as_it_is.error->mean, 1e-4 * result.error->mean)
+        << scale;
+    if (scale <= 1.0) {
+      EXPECT_NEAR(result.error->kld - result.error->mean, of_covariances, 1e-4 * of_covariances)
+          << scale;
+    }
+    EXPECT_NEAR(result.error->rmse, as_it_is.error->rmse, 1e-5) << scale;
+    for (int v = 0; v < result.sparse.variable_count(); ++v) {
+      const auto x = result.sparse.state(v), expected = as_it_is.sparse.state(v);
+      for (std::size_t k = 0; k < x.size(); ++k) EXPECT_NEAR(x[k], expected[k], 1e-5) << scale;
+    }
+  }
+}
+
 TEST_F(SparsifyGraph, LosesSomethingWhereLoopsMeet) {
   const Graph graph = simulate("manhattan:poses=120,streets=3");
   const SparsifyResult result = sparsify_whole(graph, job("smallest_blanket:part=0.5"), setting_);
