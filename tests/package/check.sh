@@ -92,7 +92,7 @@ fi
 
 # Debian's own rules, where its checker is there.
 if command -v lintian >/dev/null; then
-  lintian --allow-root --fail-on error,warning --suppress-tags initial-upload-closes-no-bugs,no-manual-page "${debs[@]}" >"$work/lintian" 2>&1 ||
+  lintian --allow-root --fail-on error,warning --suppress-tags initial-upload-closes-no-bugs "${debs[@]}" >"$work/lintian" 2>&1 ||
     fail "lintian: $(cat "$work/lintian")"
 else
   printf 'without lintian, Debian'\''s own rules are not checked\n' >&2
