@@ -26,6 +26,13 @@ write_basic_package_version_file(${CMAKE_CURRENT_BINARY_DIR}/cairnConfigVersion.
 install(FILES ${CMAKE_CURRENT_BINARY_DIR}/cairnConfig.cmake ${CMAKE_CURRENT_BINARY_DIR}/cairnConfigVersion.cmake
               cmake/CairnAddPlugin.cmake cmake/plugin_manifest.cpp.in cmake/plugin_sidecar.json.in
         DESTINATION ${CAIRN_PACKAGE_FOLDER} COMPONENT development)
+
+# The same for pkg-config. Its prefix is found from where the file is.
+file(RELATIVE_PATH CAIRN_PREFIX_FROM_PC /${CMAKE_INSTALL_LIBDIR}/pkgconfig /)
+string(REGEX REPLACE "/$" "" CAIRN_PREFIX_FROM_PC ${CAIRN_PREFIX_FROM_PC})
+configure_file(cmake/cairn.pc.in ${CMAKE_CURRENT_BINARY_DIR}/cairn.pc @ONLY)
+install(FILES ${CMAKE_CURRENT_BINARY_DIR}/cairn.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig COMPONENT development)
+
 if(NOT CAIRN_PACKAGES)  # which have it in the form that Debian asks for
   install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT program)
 endif()
