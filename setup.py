@@ -53,8 +53,9 @@ class CMakeBuild(build_ext):
         for file in installed.iterdir():
             if file.is_file():
                 shutil.copy(file, package)
-        for library in (installed / "lib").glob("lib*.so.[0-9]"):
-            shutil.copy(library, package / "lib")
+        for library in (installed / "lib").glob("lib*.so.*"):  # a link, lib*.so.0.1, and the file that it names
+            if library.is_symlink():
+                shutil.copy(library, package / "lib")
         shutil.copytree(installed / "lib" / "cairn", package / "lib" / "cairn", dirs_exist_ok=True)
 
 

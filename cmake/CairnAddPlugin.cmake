@@ -4,7 +4,7 @@
 #                  DESCRIPTION "one line"
 #                  OFFERS "kind|name|one line" …
 #                  SOURCES file.cpp …
-#                  [VERSION 1.0.0] [LICENCE MIT] [LIBRARIES target …] [FOLDER folder])
+#                  [VERSION 1.0.0] [LICENCE MIT] [LIBRARIES target …] [FOLDER folder] [PACKAGE package])
 #
 # Builds a plugin: the shared object name.so with cairn's entry point, and beside it name.json, which repeats
 # the manifest so that listing plugins opens none of them. One of the sources defines
@@ -12,7 +12,9 @@
 #     void cairn_register(cairn::Registrar& registrar);   // in the global namespace
 #
 # which adds exactly what OFFERS names. The target is cairn_plugin_<name>. In cairn's own build the plugin goes
-# to lib/cairn and is installed there. In another project
+# to lib/cairn and is installed there, and PACKAGE says that it needs large libraries, or some under the GPL: then it is
+# in the Debian package cairn-plugin-PACKAGE instead of in that of the program (CairnPackages.cmake), and in the
+# component plugin_PACKAGE of `cmake --install`. In another project
 # - it is built in the folder of the target, or in FOLDER (which CAIRN_PLUGIN_PATH may name);
 # - `cmake --install` puts it in CAIRN_PLUGIN_INSTALL_FOLDER, by default the folder of the user's plugins, which cairn
 #   searches: $XDG_DATA_HOME/cairn/plugins, or ~/.local/share/cairn/plugins;
@@ -40,7 +42,7 @@ macro(cairn_third_party_defaults)
 endmacro()
 
 function(cairn_add_plugin)
-  cmake_parse_arguments(PARSE_ARGV 0 arg "" "NAME;DESCRIPTION;VERSION;LICENCE;FOLDER" "OFFERS;SOURCES;LIBRARIES")
+  cmake_parse_arguments(PARSE_ARGV 0 arg "" "NAME;DESCRIPTION;VERSION;LICENCE;FOLDER;PACKAGE" "OFFERS;SOURCES;LIBRARIES")
   if(arg_UNPARSED_ARGUMENTS)
     message(FATAL_ERROR "cairn_add_plugin: unknown argument ${arg_UNPARSED_ARGUMENTS}")
   endif()
@@ -113,7 +115,17 @@ function(cairn_add_plugin)
     CXX_VISIBILITY_PRESET hidden VISIBILITY_INLINES_HIDDEN ON)
   configure_file(${CAIRN_PLUGIN_TEMPLATE_FOLDER}/plugin_sidecar.json.in ${folder}/${arg_NAME}.json @ONLY)
   if(NOT (arg_FOLDER AND COMMAND cairn_settings))  # that is one of cairn's tests
-    install(TARGETS ${target} LIBRARY DESTINATION ${install_folder})
-    install(FILES ${folder}/${arg_NAME}.json DESTINATION ${install_folder})
+    set(component Unspecified)
+    if(COMMAND cairn_settings AND NOT arg_PACKAGE)
+      set(component program)
+    elseif(arg_PACKAGE)
+      set(component plugin_${arg_PACKAGE})
+      set_property(GLOBAL APPEND PROPERTY CAIRN_PLUGIN_PACKAGES ${arg_PACKAGE})
+      set_property(GLOBAL APPEND PROPERTY CAIRN_PLUGINS_OF_${arg_PACKAGE} ${target})
+      set_target_properties(${target} PROPERTIES
+        CAIRN_PLUGIN_DESCRIPTION "${arg_DESCRIPTION}" CAIRN_PLUGIN_LICENCE "${arg_LICENCE}")
+    endif()
+    install(TARGETS ${target} LIBRARY DESTINATION ${install_folder} COMPONENT ${component})
+    install(FILES ${folder}/${arg_NAME}.json DESTINATION ${install_folder} COMPONENT ${component})
   endif()
 endfunction()

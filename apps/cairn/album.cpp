@@ -110,13 +110,14 @@ void add_album_options(ArgumentParser cli, AlbumOptions& options) {
   cli.add_option("files", options.files,
                  "graphs (.gz too, @KIND to generate), trajectories, recordings, JSON of runs, CSV")
       .type_name("FILE")
+      .file_or_generated({"generator"})
       .required();
   cli.add_option("--name", options.names, "what to call the first FILE, the second … [its name]")
       .type_name("TEXT")
       .repeatable();
   cli.add_option("--truth", options.truth, "the ground truth, laid over by id").type_name("FILE");
   cli.add_option("--initial", options.initial, "initial estimate to show too: kind initial_guess")
-      .type_name("NAME");
+      .component({"initial_guess"});
   cli.add_option("--title", options.title, "title [name of the first FILE]").type_name("TEXT");
   add_input_options(cli, options.input);
 }

@@ -157,7 +157,30 @@ Argument& Argument::within(double low, double high) {
 }
 
 Argument& Argument::one_of(std::vector<std::string> choices) {
+  words_->choices = choices;
   option_->check(one_of_these(std::move(choices)));
+  return *this;
+}
+
+Argument& Argument::suggest(std::vector<std::string> choices) {
+  words_->choices = std::move(choices);
+  return *this;
+}
+
+Argument& Argument::component(std::vector<std::string> kinds) {
+  words_->component = true;
+  words_->kinds = std::move(kinds);
+  return type_name("NAME");
+}
+
+Argument& Argument::components(std::vector<std::string> kinds) {
+  component(std::move(kinds));
+  words_->list = true;
+  return type_name("NAMES");
+}
+
+Argument& Argument::file_or_generated(std::vector<std::string> kinds) {
+  words_->generators = std::move(kinds);
   return *this;
 }
 
@@ -188,41 +211,51 @@ int Argument::most_values() const { return option_->get_items_expected_max(); }
 
 ArgumentParser ArgumentParser::add_command(const std::string& name,
                                            const std::string& description) {
-  return ArgumentParser(*app_->add_subcommand(name, description));
+  return {*app_->add_subcommand(name, description), *words_};
+}
+
+Argument ArgumentParser::argument(CLI::Option& option) const {
+  return {option, (*words_)[&option]};
+}
+
+Argument ArgumentParser::number(CLI::Option& option) const {
+  const Argument number = argument(option);
+  (*words_)[&option].any_text = true;
+  return number;
 }
 
 Argument ArgumentParser::add_option(const std::string& names, std::string& value,
                                     const std::string& help) {
-  return Argument(*app_->add_option(names, value, help)->check(not_empty()));
+  return argument(*app_->add_option(names, value, help)->check(not_empty()));
 }
 
 Argument ArgumentParser::add_option(const std::string& names, std::vector<std::string>& value,
                                     const std::string& help) {
-  return Argument(*app_->add_option(names, value, help)->check(not_empty()));
+  return argument(*app_->add_option(names, value, help)->check(not_empty()));
 }
 
 Argument ArgumentParser::add_option(const std::string& names, int& value, const std::string& help) {
-  return Argument(*app_->add_option(names, value, help));
+  return number(*app_->add_option(names, value, help));
 }
 
 Argument ArgumentParser::add_option(const std::string& names, double& value,
                                     const std::string& help) {
-  return Argument(*app_->add_option(names, value, help));
+  return number(*app_->add_option(names, value, help));
 }
 
 Argument ArgumentParser::add_option(const std::string& names, std::uint64_t& value,
                                     const std::string& help) {
-  return Argument(*app_->add_option(names, value, help)->transform(integer<std::uint64_t>()));
+  return number(*app_->add_option(names, value, help)->transform(integer<std::uint64_t>()));
 }
 
 Argument ArgumentParser::add_option(const std::string& names, std::optional<double>& value,
                                     const std::string& help) {
-  return Argument(*app_->add_option(names, value, help));
+  return number(*app_->add_option(names, value, help));
 }
 
 Argument ArgumentParser::add_option(const std::string& names, std::optional<std::int64_t>& value,
                                     const std::string& help) {
-  return Argument(*app_->add_option(names, value, help)->transform(integer<std::int64_t>()));
+  return number(*app_->add_option(names, value, help)->transform(integer<std::int64_t>()));
 }
 
 void ArgumentParser::add_flag(const std::string& names, bool& value, const std::string& help) {
@@ -230,7 +263,7 @@ void ArgumentParser::add_flag(const std::string& names, bool& value, const std::
 }
 
 Argument ArgumentParser::option(const std::string& name) const {
-  return Argument(*app_->get_option(name));
+  return argument(*app_->get_option(name));
 }
 
 void ArgumentParser::footer(const std::string& text) { app_->footer(text); }
@@ -247,19 +280,19 @@ std::string ArgumentParser::footer() const { return app_->get_footer(); }
 
 std::optional<ArgumentParser> ArgumentParser::parent() const {
   if (!app_->get_parent()) return std::nullopt;
-  return ArgumentParser(*app_->get_parent());
+  return ArgumentParser(*app_->get_parent(), *words_);
 }
 
 std::vector<ArgumentParser> ArgumentParser::commands() const {
   std::vector<ArgumentParser> all;
   for (CLI::App* command : app_->get_subcommands([](CLI::App*) { return true; }))
-    all.emplace_back(*command);
+    all.emplace_back(*command, *words_);
   return all;
 }
 
 std::vector<Argument> ArgumentParser::arguments() const {
   std::vector<Argument> all;
-  for (CLI::Option* option : app_->get_options()) all.emplace_back(*option);
+  for (CLI::Option* option : app_->get_options()) all.push_back(argument(*option));
   return all;
 }
 
@@ -267,7 +300,7 @@ std::vector<Argument> ArgumentParser::arguments_but_help() const {
   std::vector<Argument> all;
   for (CLI::Option* option : app_->get_options()) {
     if (option != app_->get_help_ptr() && option != app_->get_version_ptr())
-      all.emplace_back(*option);
+      all.push_back(argument(*option));
   }
   return all;
 }
@@ -275,7 +308,7 @@ std::vector<Argument> ArgumentParser::arguments_but_help() const {
 // ProgramParser -----------------------------------------------------------------------------------
 
 ProgramParser::ProgramParser(const std::string& name, const std::string& description)
-    : app_(std::make_unique<CLI::App>(description, name)) {
+    : app_(std::make_unique<CLI::App>(description, name)), words_(std::make_unique<OptionWords>()) {
   app_->fallthrough();
   app_->require_subcommand(0, 1);
 }
@@ -294,7 +327,8 @@ void ProgramParser::add_version(const std::string& names, const std::string& tex
 Argument ProgramParser::add_config(const std::string& names, const std::string& help) {
   app_->allow_config_extras(CLI::config_extras_mode::error);
   app_->config_formatter(std::make_shared<BoundedConfig>());
-  return Argument(*app_->set_config(names, "", help));
+  CLI::Option* const option = app_->set_config(names, "", help);
+  return {*option, (*words_)[option]};
 }
 
 std::string ProgramParser::config_file() const {
@@ -327,12 +361,12 @@ ParseOutcome ProgramParser::parse(int argc, const char* const* argv) {
   }
 }
 
-std::optional<ArgumentParser> ProgramParser::chosen() const {
+std::optional<ArgumentParser> ProgramParser::chosen() {
   CLI::App* innermost = nullptr;  // a study is a command of a command
   for (auto used = app_->get_subcommands(); !used.empty(); used = innermost->get_subcommands())
     innermost = used.front();
   if (!innermost) return std::nullopt;
-  return ArgumentParser(*innermost);
+  return ArgumentParser(*innermost, *words_);
 }
 
 }  // namespace cairn::app

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -15,11 +16,24 @@ class Option;
 
 namespace cairn::app {
 
+/// What may stand for the value of an argument, for those who complete it.
+struct ValueWords {
+  bool any_text = false;                ///< a number or a text: nothing is known of it
+  std::vector<std::string> choices;     ///< one of these
+  bool component = false;               ///< the name of a component…
+  std::vector<std::string> kinds;       ///< …of one of these kinds; empty: of any
+  bool list = false;                    ///< several of them, A,B
+  std::vector<std::string> generators;  ///< @NAME of one of these kinds stands for a file
+};
+
+/// Of all options: what CLI11 does not know of them.
+using OptionWords = std::map<const CLI::Option*, ValueWords>;
+
 /// An argument or option of a command. What describes it further returns it again. A handle, valid
 /// as long as the program's parser.
 class Argument {
  public:
-  explicit Argument(CLI::Option& option) : option_(&option) {}
+  Argument(CLI::Option& option, ValueWords& words) : option_(&option), words_(&words) {}
 
   /// What stands for its value in the help, such as FILE.
   Argument& type_name(const std::string& name);
@@ -43,6 +57,15 @@ class Argument {
   Argument& none_or_within(int low, int high);
   Argument& within(double low, double high);
   Argument& one_of(std::vector<std::string> choices);
+  /// Not checked: what is offered where the value is completed.
+  Argument& suggest(std::vector<std::string> choices);
+  /// The name of a component of one of these kinds, which may have options: NAME:key=value. Not
+  /// checked. Sets the type name to NAME.
+  Argument& component(std::vector<std::string> kinds);
+  /// Of several components, A,B. Sets the type name to NAMES.
+  Argument& components(std::vector<std::string> kinds);
+  /// A file, or @NAME of a component of one of these kinds.
+  Argument& file_or_generated(std::vector<std::string> kinds);
   /// A finite number of seconds.
   Argument& seconds_from(double least);
 
@@ -56,16 +79,18 @@ class Argument {
   bool is_positional() const;        ///< known by where it stands, not by a name
   bool is_required() const;
   int most_values() const;  ///< 0 of a flag
+  const ValueWords& words() const { return *words_; }
 
  private:
   CLI::Option* option_;
+  ValueWords* words_;
 };
 
 /// The parser of the program's command line, or of that of one of its commands, to which arguments,
 /// options and commands are added. A handle, valid as long as the program's parser.
 class ArgumentParser {
  public:
-  explicit ArgumentParser(CLI::App& app) : app_(&app) {}
+  ArgumentParser(CLI::App& app, OptionWords& words) : app_(&app), words_(&words) {}
 
   ArgumentParser add_command(const std::string& name, const std::string& description);
 
@@ -105,7 +130,11 @@ class ArgumentParser {
   std::vector<Argument> arguments_but_help() const;
 
  private:
+  Argument argument(CLI::Option& option) const;
+  Argument number(CLI::Option& option) const;
+
   CLI::App* app_;
+  OptionWords* words_;
 };
 
 /// How a command line was understood, or what kept it from being so.
@@ -132,7 +161,7 @@ class ProgramParser {
   ProgramParser(const std::string& name, const std::string& description);
   ~ProgramParser();
 
-  ArgumentParser root() const { return ArgumentParser(*app_); }
+  ArgumentParser root() { return {*app_, *words_}; }
   /// The flags that ask for the help (also of each command that is added later) and the version.
   void add_help(const std::string& names, const std::string& help);
   void add_version(const std::string& names, const std::string& text, const std::string& help);
@@ -143,10 +172,11 @@ class ProgramParser {
   /// The file of options that was read; empty if there was none.
   std::string config_file() const;
   /// The innermost command that the command line names, if any.
-  std::optional<ArgumentParser> chosen() const;
+  std::optional<ArgumentParser> chosen();
 
  private:
   std::unique_ptr<CLI::App> app_;
+  std::unique_ptr<OptionWords> words_;
 };
 
 }  // namespace cairn::app

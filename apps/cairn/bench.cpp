@@ -119,18 +119,21 @@ Command add_bench(ArgumentParser program) {
   auto options = std::make_shared<BenchOptions>();  // lives as long as the parser and the run
   ArgumentParser cli =
       program.add_command("bench", "solvers side by side: medians, ratios, agreement");
-  cli.add_option("graphs", options->graphs, kGraphHelp).type_name("GRAPH").required();
+  cli.add_option("graphs", options->graphs, kGraphHelp)
+      .type_name("GRAPH")
+      .file_or_generated({"generator"})
+      .required();
   cli.add_option("--name", options->names, "what to call the first GRAPH, the second … [its name]")
       .type_name("TEXT")
       .repeatable();
   cli.add_option("--optimizer", options->optimizers,
                  "optimizers A,B,… with options as NAME:key=value")
-      .type_name("NAMES")
+      .components({"optimizer"})
       .repeatable()
       .show_default(kDefaultOptimizer);
   cli.add_option("--linear-solver", options->linear_solvers,
                  "linear solvers A,B,… for each of them")
-      .type_name("NAMES")
+      .components({"linear_solver"})
       .repeatable()
       .show_default("all direct ones on offer");
   add_problem_options(cli, options->problem);

@@ -3,16 +3,23 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <filesystem>
 #include <optional>
 #include <string>
+#include <string_view>
+#include <system_error>
 
 #include <fmt/core.h>
 
+#include "cairn/io/output_file.hpp"
+#include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/spelling.hpp"
 #include "cairn/runtime/threads.hpp"
 #include "cairn/runtime/version.hpp"
+#include "completion.hpp"
 #include "help.hpp"
+#include "manual_page.hpp"
 
 namespace cairn::app {
 namespace {
@@ -29,6 +36,7 @@ void add_common_options(ProgramParser& program, CommonOptions& common) {
       .repeatable();
   cli.add_option("--types", common.types,
                  "options of types, such as slam3d:metric=g2o (repeatedly)")
+      .component({"types"})
       .type_name("NAME:K=V")
       .repeatable();
   cli.add_flag("--quiet", common.quiet, "no progress and no notes, only results and errors");
@@ -67,11 +75,30 @@ std::string suggestion(const std::string& word, const std::vector<std::string>& 
   return nearest.empty() ? "" : fmt::format("; did you mean '{}'?", nearest);
 }
 
+std::vector<std::string> command_names(const ArgumentParser& parser) {
+  std::vector<std::string> names;
+  for (const ArgumentParser& command : parser.commands()) names.push_back(command.name());
+  return names;
+}
+
+std::optional<ArgumentParser> command_of(const ArgumentParser& parser, const std::string& name) {
+  for (const ArgumentParser& command : parser.commands()) {
+    if (command.name() == name) return command;
+  }
+  return std::nullopt;
+}
+
 Error unknown_command(const std::string& word, const ArgumentParser& program) {
-  std::vector<std::string> commands;
-  for (const ArgumentParser& known : program.commands()) commands.push_back(known.name());
-  return {ErrorCode::usage,
-          fmt::format("there is no command '{}'{}", word, what_is_on_offer(word, commands))};
+  return {ErrorCode::usage, fmt::format("there is no command '{}'{}", word,
+                                        what_is_on_offer(word, command_names(program)))};
+}
+
+/// Those of the command, and of all below it.
+void write_manual_pages(const ArgumentParser& command, const std::string& folder) {
+  OutputFile file(std::filesystem::path(folder) / (manual_page_name(command) + ".1"));
+  file.write(manual_page(command));
+  file.finish();
+  for (const ArgumentParser& each : command.commands()) write_manual_pages(each, folder);
 }
 
 Error unknown_word(const std::vector<std::string>& words, const ArgumentParser& program,
@@ -154,7 +181,8 @@ CommandLine::CommandLine(Session& session)
     : session_(session),
       program_("cairn",
                "cairn: optimises factor graphs (graph SLAM); everything in it is chosen by name"),
-      help_(program_.root()) {
+      help_(program_.root()),
+      complete_(program_.root()) {
   program_.add_help("-h,--help", "this text, or with a command, that of the command");
   program_.add_version("--version", "cairn " CAIRN_VERSION, "the version");
   add_common_options(program_, session.common);
@@ -169,24 +197,67 @@ CommandLine::CommandLine(Session& session)
                add_generate(cli), add_explore(cli),   add_map(cli),     add_plugins(cli),
                add_study(cli)};
   help_ = cli.add_command("help", "this text, or that of a command");
-  help_.add_option("command", command_to_explain_, "the command that is to be explained")
-      .type_name("COMMAND");
+  help_.add_option("command", help_options_.command, "the command that is to be explained")
+      .type_name("COMMAND")
+      .suggest(command_names(cli));
+  help_.add_flag("--man", help_options_.man, "as a manual page, in the language of man");
+  help_
+      .add_option("--man-pages", help_options_.man_pages,
+                  "write the manual pages of all commands to this folder")
+      .type_name("FOLDER");
   help_.footer(
       "Example:\n"
-      "  cairn help bench");
+      "  cairn help bench\n"
+      "  cairn help study problems --man | man -l -");
+  complete_ = cli.add_command("complete", "what may come next on a command line, for shells");
+  complete_
+      .add_option("words", words_to_complete_,
+                  "what follows cairn on the command line; the last is being typed")
+      .type_name("WORD");
+  complete_.footer(
+      "A line for each: word, tab, description; a line without a word: the name of a file.\n\n"
+      "Example:\n"
+      "  cairn complete -- optimize --linear-solver block");
 }
 
-std::string CommandLine::explanation() const {
-  if (command_to_explain_.empty()) return help_text(program_.root());
-  for (const ArgumentParser& command : program_.root().commands()) {
-    if (command.name() == command_to_explain_) return help_text(command);
+ArgumentParser CommandLine::explained_command() {
+  ArgumentParser command = program_.root();
+  for (const std::string& word : help_options_.command) {
+    const std::optional<ArgumentParser> next = command_of(command, word);
+    if (!next) throw unknown_command(word, command);
+    command = *next;
   }
-  throw unknown_command(command_to_explain_, program_.root());
+  return command;
+}
+
+int CommandLine::explain() {
+  const std::string& folder = help_options_.man_pages;
+  if (!folder.empty()) {
+    std::error_code error;
+    std::filesystem::create_directories(folder, error);
+    write_manual_pages(explained_command(), folder);
+    return 0;
+  }
+  const ArgumentParser command = explained_command();
+  write_stdout(help_options_.man ? manual_page(command) : help_text(command));
+  return 0;
+}
+
+int CommandLine::complete(const std::vector<std::string>& words) {
+  const Completion completion =
+      app::complete(program_.root(), words, [&]() -> Registry& { return session_.registry(); });
+  write_stdout(completion_text(completion));
+  return 0;
 }
 
 std::function<int()> CommandLine::parse(int argc, const char* const* argv) {
+  // Words that are being typed are not parsed: they may be options, or empty.
+  if (argc > 2 && argv[1] == std::string_view("complete") && argv[2] == std::string_view("--")) {
+    return
+        [this, words = std::vector<std::string>(argv + 3, argv + argc)] { return complete(words); };
+  }
   const ParseOutcome outcome = program_.parse(argc, argv);
-  const ArgumentParser program = program_.root();
+  ArgumentParser program = program_.root();
   const std::optional<ArgumentParser> chosen = program_.chosen();
   switch (outcome.kind) {
     case ParseOutcome::Kind::help:
@@ -208,7 +279,8 @@ std::function<int()> CommandLine::parse(int argc, const char* const* argv) {
       break;
   }
   session_.files.add_input(program_.config_file());
-  if (help_.parsed()) return [text = explanation()] { return write_stdout(text), 0; };
+  if (help_.parsed()) return [this] { return explain(); };
+  if (complete_.parsed()) return [this] { return complete(words_to_complete_); };
   for (const Command& command : commands_) {
     if (command.parser.parsed()) return [&] { return command.run(session_); };
   }

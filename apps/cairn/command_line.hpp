@@ -10,6 +10,13 @@
 
 namespace cairn::app {
 
+/// What `cairn help` is to show.
+struct HelpOptions {
+  std::vector<std::string> command;  ///< names of a command, and of the command in it
+  bool man = false;
+  std::string man_pages;  ///< folder, or empty
+};
+
 /// The whole command line: the program, its subcommands and their options.
 class CommandLine {
  public:
@@ -20,14 +27,20 @@ class CommandLine {
   std::function<int()> parse(int argc, const char* const* argv);
 
  private:
-  /// What `cairn help` and `cairn help COMMAND` print.
-  std::string explanation() const;
+  /// What `cairn help` and `cairn help COMMAND` do.
+  int explain();
+  /// The command that `cairn help COMMAND…` names.
+  ArgumentParser explained_command();
+  /// What `cairn complete -- WORD…` does.
+  int complete(const std::vector<std::string>& words);
 
   Session& session_;
   ProgramParser program_;
   std::vector<Command> commands_;
   ArgumentParser help_;  // of the command `help`
-  std::string command_to_explain_;
+  HelpOptions help_options_;
+  ArgumentParser complete_;  // of the command `complete`
+  std::vector<std::string> words_to_complete_;
 };
 
 }  // namespace cairn::app

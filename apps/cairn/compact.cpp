@@ -321,9 +321,14 @@ int run_compact(const CompactOptions& options, Session& session) {
 
 void add_compact_options(ArgumentParser cli, CompactOptions& options,
                          std::vector<std::string> strategies) {
-  cli.add_option("graph", options.graph, kGraphHelp).type_name("GRAPH").required();
+  cli.add_option("graph", options.graph, kGraphHelp)
+      .type_name("GRAPH")
+      .file_or_generated({"generator"})
+      .required();
   cli.add_option("-o,--output", options.output, "write the compact graph").type_name("OUT");
-  cli.add_option("--to", options.output_format, "format of OUT").type_name("FORMAT");
+  cli.add_option("--to", options.output_format, "format of OUT")
+      .component({"format"})
+      .type_name("FORMAT");
   cli.add_option("--trajectory", options.trajectory, "write all poses, those left out put back")
       .type_name("FILE");
   cli.add_option("--map", options.map,
@@ -342,13 +347,13 @@ void add_compact_options(ArgumentParser cli, CompactOptions& options,
       .one_of(std::move(strategies))
       .show_default();
   cli.add_option("--policy", options.policy, "the pose policy, with options as NAME:key=value")
-      .type_name("NAME")
+      .component({"pose_policy"})
       .show_default();
   cli.add_option("--estimator", options.estimator, "the estimator, instead of the policy's own")
-      .type_name("NAME");
+      .component({"estimator"});
   cli.add_option("--registration", options.registration,
                  "matcher: recorded, or simulated:range=5,angle=1,false_rate=0.1")
-      .type_name("NAME")
+      .component({"registration"})
       .show_default();
   cli.add_flag("--auto", options.automatic,
                "find thresholds in a sample; the default if none are given");

@@ -54,12 +54,16 @@ Command add_convert(ArgumentParser program) {
   auto options = std::make_shared<ConvertOptions>();  // lives as long as the parser and the run
   ArgumentParser cli =
       program.add_command("convert", "write a graph or its trajectory in another format");
-  cli.add_option("in", options->input_file, kGraphHelp).type_name("IN").required();
+  cli.add_option("in", options->input_file, kGraphHelp)
+      .type_name("IN")
+      .file_or_generated({"generator"})
+      .required();
   cli.add_option("-o,--output,out", options->output_file,
                  "file, also as -o OUT (packed if it ends in .gz; - is standard output)")
       .type_name("OUT")
       .required();
   cli.add_option("--to", options->output_format, "format of OUT, instead of by the ending")
+      .component({"format"})
       .type_name("FORMAT");
   add_input_options(cli, options->input);
   cli.footer(

@@ -337,7 +337,7 @@ Command add_evaluate(ArgumentParser program) {
       .one_of({"common", "minima"})
       .show_default();
   cli.add_option("--linear-solver", options->linear_solver, "gives covariances for --kld")
-      .type_name("NAME")
+      .component({"linear_solver"})
       .show_default();
   add_input_options(cli, options->input);
   cli.footer(

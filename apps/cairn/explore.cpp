@@ -316,6 +316,7 @@ Command add_explore(ArgumentParser program) {
       "explore", "a simulated robot explores a floor, and decides by itself where to drive");
   cli.add_option("floor", options->floor, "the floor: floor.yaml, or @KIND[:k=v] to generate")
       .type_name("FLOOR")
+      .file_or_generated({"floor_plan"})
       .required();
   cli.add_option("-o,--output", options->output, "write the graph of the poses that are kept")
       .type_name("OUT");
@@ -327,7 +328,7 @@ Command add_explore(ArgumentParser program) {
   add_recording_options(cli, options->recording);
   cli.add_option("--explorer", options->explorer,
                  "decides where to drive; options as NAME:k=v; several, A,B, are compared")
-      .type_name("NAMES")
+      .components({"explorer"})
       .show_default();
   cli.add_option("--until", options->until, "limits: distance=250 [m], steps=N, decisions=N")
       .type_name("K=V,…");
@@ -352,7 +353,7 @@ Command add_explore(ArgumentParser program) {
       .type_name("N")
       .show_default();
   cli.add_option("--world", options->world, "the robot; its options: cairn plugins lidar_building")
-      .type_name("NAME")
+      .component({"world"})
       .show_default();
   add_slam_options(cli, options->slam);
   cli.add_flag("--live", options->live, "draw map, trajectory and path in the terminal on the way");

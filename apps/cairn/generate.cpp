@@ -72,6 +72,7 @@ Command add_generate(ArgumentParser program) {
   cli.add_option(
          "kind", options->kind,
          "generator: manhattan, sphere …, or floor plan: rooms, cave … (cairn plugins lists them)")
+      .component({"generator", "floor_plan"})
       .type_name("KIND[:k=v]")
       .required();
   cli.add_option("-o,--output", options->output, "the noisy graph (- is standard output)")
@@ -80,6 +81,7 @@ Command add_generate(ArgumentParser program) {
   cli.add_option("--ground-truth", options->ground_truth, "the same graph at its true states")
       .type_name("FILE");
   cli.add_option("--to", options->output_format, "format, instead of by the ending")
+      .component({"format"})
       .type_name("FORMAT");
   cli.add_option("--seed", options->seed, "seed of the noise; the same seed gives the same graph")
       .type_name("S")

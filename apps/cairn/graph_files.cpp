@@ -106,6 +106,7 @@ bool has_graph_ending(const std::string& file, Registry& registry) {
 
 void add_input_options(ArgumentParser cli, InputOptions& options) {
   cli.add_option("--from", options.format, "format of the input, instead of by content")
+      .component({"format"})
       .type_name("FORMAT");
   cli.add_flag("--skip-unknown", options.read.skip_unknown,
                "skip and count lines with unknown tags, instead of refusing the file");

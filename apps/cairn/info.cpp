@@ -242,11 +242,12 @@ Command add_info(ArgumentParser program) {
   cli.add_option("graph", options->graph,
                  std::string(kGraphHelp) + "; or the map of a floor (.yaml, .png:resolution=R)")
       .type_name("GRAPH")
+      .file_or_generated({"generator"})
       .required();
   cli.add_flag("--entropy", options->entropy,
                "entropy of the graph at the states of the file, in nats: optimise it first");
   cli.add_option("--linear-solver", options->linear_solver, "gives the determinant for --entropy")
-      .type_name("NAME")
+      .component({"linear_solver"})
       .show_default();
   cli.add_option("--radius", options->floor.radius, "of a robot's body on a floor [m]")
       .type_name("R")

@@ -255,7 +255,7 @@ Command add_map(ArgumentParser program) {
       .show_default();
   cli.add_option("--loss", options->loss,
                  "robust loss of loop closures, such as cauchy:scale=2, or none")
-      .type_name("NAME")
+      .component({"loss"})
       .show_default();
   add_slam_options(cli, options->slam);
   cli.footer(

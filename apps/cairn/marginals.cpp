@@ -534,7 +534,10 @@ int run(MarginalsOptions options, Session& session) {
 Command add_marginals(ArgumentParser program) {
   auto options = std::make_shared<MarginalsOptions>();  // lives as long as the parser and the run
   ArgumentParser cli = program.add_command("marginals", "how certain an estimate is: covariances");
-  cli.add_option("graph", options->graph, kGraphHelp).type_name("GRAPH").required();
+  cli.add_option("graph", options->graph, kGraphHelp)
+      .type_name("GRAPH")
+      .file_or_generated({"generator"})
+      .required();
   cli.add_flag("--diagonal", options->diagonal,
                "the block of every variable; what is done if nothing else is asked for");
   cli.add_option("--pairs", options->pairs, "the blocks of these pairs of ids")
@@ -553,11 +556,11 @@ Command add_marginals(ArgumentParser program) {
   cli.add_flag("--as-given", options->as_given,
                "at the states as they are, or as --initial puts them: do not optimise");
   cli.add_option("--optimizer", options->optimizer, "the optimizer that finds the estimate")
-      .type_name("NAME")
+      .component({"optimizer"})
       .show_default();
   cli.add_option("--linear-solver", options->linear_solver,
                  "solves H x = g, and gives the covariances")
-      .type_name("NAME")
+      .component({"linear_solver"})
       .show_default();
   add_problem_options(cli, options->problem);
   add_input_options(cli, options->input);

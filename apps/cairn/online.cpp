@@ -398,11 +398,11 @@ Command add_online(ArgumentParser program) {
   ArgumentParser cli =
       program.add_command("online", "estimate from standard input while measurements arrive");
   cli.add_option("--estimator", options->estimator, "the estimator, with options as NAME:key=value")
-      .type_name("NAME")
+      .component({"estimator"})
       .show_default(kDefaultEstimator);
   cli.add_option("--policy", options->policy,
                  "decides which poses are kept, such as compact_pose; default: all are")
-      .type_name("NAME");
+      .component({"pose_policy"});
   cli.add_option("--thresholds", options->thresholds,
                  "with --policy, take its thresholds from a file (cairn compact --save-thresholds)")
       .type_name("FILE");
@@ -435,10 +435,10 @@ Command add_online(ArgumentParser program) {
       .show_default();
   cli.add_option("--select", options->select,
                  "which poses leave: nearest, oldest, smallest_blanket, least_loss [nearest]")
-      .type_name("NAME");
+      .component({"node_selection"});
   cli.add_option("--sparsifier", options->sparsifier,
                  "what replaces poses that leave by factors, with options as NAME:key=value")
-      .type_name("NAME");
+      .component({"sparsifier"});
   cli.add_option("--journal", options->journal,
                  "restore the session from this journal, and append to it")
       .type_name("FILE");

@@ -203,16 +203,20 @@ int run(const OptimizeOptions& options, Session& session) {
 Command add_optimize(ArgumentParser program) {
   auto options = std::make_shared<OptimizeOptions>();  // lives as long as the parser and the run
   ArgumentParser cli = program.add_command("optimize", "find the best estimate of a graph");
-  cli.add_option("graph", options->graph, kGraphHelp).type_name("GRAPH").required();
+  cli.add_option("graph", options->graph, kGraphHelp)
+      .type_name("GRAPH")
+      .file_or_generated({"generator"})
+      .required();
   cli.add_option("-o,--output", options->output, "write the estimate (- is standard output)")
       .type_name("OUT");
   cli.add_option("--to", options->output_format, "format of OUT, instead of by the ending")
+      .component({"format"})
       .type_name("FORMAT");
   cli.add_option("--optimizer", options->optimizer, "the optimizer, with options as NAME:key=value")
-      .type_name("NAME")
+      .component({"optimizer"})
       .show_default();
   cli.add_option("--linear-solver", options->linear_solver, "solves H x = g in each step")
-      .type_name("NAME")
+      .component({"linear_solver"})
       .show_default(kDefaultLinearSolver);
   add_problem_options(cli, options->problem);
   add_time_limit(cli, options->problem.stop);

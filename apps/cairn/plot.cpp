@@ -177,7 +177,7 @@ Command add_plot(ArgumentParser program) {
       .show_default();
   cli.add_option("--linear-solver", options->linear_solver,
                  "its elimination order gives the sparsity of L")
-      .type_name("NAME")
+      .component({"linear_solver"})
       .show_default();
   cli.footer(
       "FILEs are laid together as by cairn view.\n\n"

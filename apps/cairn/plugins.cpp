@@ -295,7 +295,7 @@ Command add_plugins(ArgumentParser program) {
   auto name = std::make_shared<std::string>();  // lives as long as the parser and the run
   ArgumentParser cli = program.add_command("plugins", "what is on offer, or one name's options");
   cli.add_option("name", *name, "a solver, type, format …: its options, abilities and limits")
-      .type_name("NAME");
+      .component({});
   cli.footer(
       "Plugins are found by --plugin, CAIRN_PLUGIN_PATH, and in the folder cairn beside the core "
       "library.\n\n"

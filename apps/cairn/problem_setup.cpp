@@ -19,10 +19,11 @@ namespace cairn::app {
 
 void add_loss_options(ArgumentParser cli, ProblemOptions& options) {
   cli.add_option("--loss", options.loss, "robust loss, such as huber:scale=1 [none]")
-      .type_name("NAME");
+      .component({"loss"});
   cli.add_option("--loss-on", options.loss_on,
                  "factors that the loss applies to: all, loops, or those of a type by its tag")
       .type_name("WHICH")
+      .suggest({"all", "loops"})
       .show_default();
 }
 
@@ -32,7 +33,7 @@ void keep_states(ProblemOptions& options) {
 
 void add_problem_options(ArgumentParser cli, ProblemOptions& options) {
   cli.add_option("--initial", options.initial, "initial estimate: a name of kind initial_guess")
-      .type_name("NAME")
+      .component({"initial_guess"})
       .show_default();
   add_loss_options(cli, options);
   cli.add_option("--iterations", options.stop.max_iterations, "maximum number of iterations")

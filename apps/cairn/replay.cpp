@@ -255,13 +255,17 @@ Command add_replay(ArgumentParser program) {
   auto options = std::make_shared<ReplayOptions>();  // lives as long as the parser and the run
   ArgumentParser cli = program.add_command(
       "replay", "feed a graph to an estimator in the order of its measurements");
-  cli.add_option("graph", options->graph, kGraphHelp).type_name("GRAPH").required();
+  cli.add_option("graph", options->graph, kGraphHelp)
+      .type_name("GRAPH")
+      .file_or_generated({"generator"})
+      .required();
   cli.add_option("-o,--output", options->output, "write the last estimate (- is standard output)")
       .type_name("OUT");
   cli.add_option("--to", options->output_format, "format of OUT, instead of by the ending")
+      .component({"format"})
       .type_name("FORMAT");
   cli.add_option("--estimator", options->estimator, "the estimator, with options as NAME:key=value")
-      .type_name("NAME")
+      .component({"estimator"})
       .show_default();
   cli.add_option("--marginals", options->marginals, "covariances kept: none, last or diagonal")
       .type_name("WHICH")
@@ -286,10 +290,10 @@ Command add_replay(ArgumentParser program) {
       .none_or_within(2, 1000000000)
       .show_default();
   cli.add_option("--select", options->select, "which poses leave with --keep")
-      .type_name("NAME")
+      .component({"node_selection"})
       .show_default();
   cli.add_option("--sparsifier", options->sparsifier, "what replaces them by factors")
-      .type_name("NAME")
+      .component({"sparsifier"})
       .show_default();
   cli.add_flag("--finish", options->finish, "relinearise and solve the last step to convergence");
   cli.add_flag("--estimate", options->estimate, "count the time of reading all states, every step");

@@ -313,54 +313,59 @@ int run_sparsify(SparsifyCommandOptions options, Session& session) {
 }
 
 void add_sparsify_options(ArgumentParser cli, SparsifyCommandOptions& options) {
-  cli.add_option("graph", options.graph, kGraphHelp).type_name("GRAPH").required();
+  cli.add_option("graph", options.graph, kGraphHelp)
+      .type_name("GRAPH")
+      .file_or_generated({"generator"})
+      .required();
   cli.add_option("-o,--output", options.output, "write the sparse graph").type_name("OUT");
-  cli.add_option("--to", options.output_format, "format of OUT").type_name("FORMAT");
+  cli.add_option("--to", options.output_format, "format of OUT")
+      .component({"format"})
+      .type_name("FORMAT");
   cli.add_option("--keep-every", options.keep_every, "one of so many nodes stays")
       .type_name("N")
       .within(1.0, 1e9);
   cli.add_option("--select", options.select,
                  "which leave: smallest_blanket, least_loss, nearest, oldest, coverage "
                  "[smallest_blanket:part=0.5]")
-      .type_name("NAME");
+      .component({"node_selection"});
   cli.add_option("--nodes", options.nodes, "what may leave: poses, landmarks or all [poses]")
       .type_name("KIND")
       .one_of({"poses", "landmarks", "all"});
   cli.add_option("--topology", options.topology,
                  "pairs that get a factor: clt, mi, dmi, ekld, odd, l1, best; or one factor on all "
                  "neighbours: glc [ekld]")
-      .type_name("NAME");
+      .component({"topology"});
   cli.add_option("--population", options.population,
                  "number of new factors: tree:γ, fill:α or loss:KLD [tree:2]")
       .type_name("HOW");
   cli.add_option("--recovery", options.recovery,
                  "factor recovery: ncfd, fd, ip, pqn; closed_form for trees [ncfd]")
-      .type_name("NAME");
+      .component({"factor_recovery"});
   cli.add_option(
          "--scheme", options.scheme,
          "single: one by one; runs: those in a row together; multi: all connected ones [single]")
       .type_name("HOW")
       .one_of({"single", "runs", "multi"});
   cli.add_option("--sparsifier", options.sparsifier, "the sparsifier, with more options")
-      .type_name("NAME")
+      .component({"sparsifier"})
       .show_default();
   cli.add_option("--edges", options.edges,
                  "remove loop closures instead, all poses stay: mac, greedy_tree, greedy_gain, l1, "
                  "random; :part=P of them stays")
-      .type_name("NAME");
+      .component({"edge_selection"});
   cli.add_option("--online", options.online,
                  "feed the graph pose by pose, and take nodes out every N poses")
       .type_name("N")
       .within(1.0, 1e9);
   cli.add_option("--estimator", options.estimator, "online: the estimator")
-      .type_name("NAME")
+      .component({"estimator"})
       .show_default();
   cli.add_option("--optimizer", options.optimizer, "the optimizer, before and after")
-      .type_name("NAME")
+      .component({"optimizer"})
       .show_default();
   cli.add_option("--linear-solver", options.linear_solver,
                  "the linear solver that gives determinants")
-      .type_name("NAME")
+      .component({"linear_solver"})
       .show_default();
   cli.add_flag("--as-given", options.as_given, "the graph is at its minimum: do not optimise it");
   cli.add_flag("--no-kld", options.no_kld, "do not compute the divergence (KLD)");

@@ -193,14 +193,14 @@ Command add_study_problems(ArgumentParser study) {
       .type_name("FILE")
       .required();
   cli.add_option("--topology", options->topologies, "pairs that get a factor (repeatedly) [ekld]")
-      .type_name("NAME")
+      .component({"topology"})
       .repeatable();
   cli.add_option("--population", options->population, "number of new factors: tree:γ or fill:α")
       .type_name("HOW")
       .show_default();
   cli.add_option("--recovery", options->recoveries,
                  "what finds their information (repeatedly) [ncfd]")
-      .type_name("NAME")
+      .component({"factor_recovery"})
       .repeatable();
   cli.add_option("--curves", options->curves,
                  "the mean KLD of each recovery and blanket size as it falls, as CSV")

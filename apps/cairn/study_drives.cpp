@@ -8,6 +8,7 @@ namespace cairn::app {
 void add_drive_options(ArgumentParser cli, DriveOptions& options) {
   cli.add_option("floor", options.floor, "the floor: floor.yaml, or @KIND[:k=v] to generate")
       .type_name("FLOOR")
+      .file_or_generated({"floor_plan"})
       .required();
   cli.add_option("--runs", options.runs, "explorations, with the seeds that follow --seed")
       .type_name("N")
@@ -15,13 +16,13 @@ void add_drive_options(ArgumentParser cli, DriveOptions& options) {
       .show_default();
   cli.add_option("--seed", options.seed, "of the first run").type_name("N").show_default();
   cli.add_option("--explorer", options.explorer, "decides where to drive")
-      .type_name("NAME")
+      .component({"explorer"})
       .show_default();
   cli.add_option("--planner", options.planner, "finds the paths that are compared")
-      .type_name("NAME")
+      .component({"path_planner"})
       .show_default();
   cli.add_option("--world", options.world, "the robot, as of cairn explore")
-      .type_name("NAME")
+      .component({"world"})
       .show_default();
   add_slam_options(cli, options.slam);
 }

@@ -210,7 +210,7 @@ Command add_study_optimality(ArgumentParser study) {
       .within(0.0, 1e9)
       .show_default();
   cli.add_option("--linear-solver", options->solver, "factorises the matrix of the graph")
-      .type_name("NAME")
+      .component({"linear_solver"})
       .show_default();
   cli.footer(
       "Example:\n"

@@ -1,0 +1,253 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "manual_page.hpp"
+
+#include <algorithm>
+#include <cctype>
+#include <cstdint>
+#include <optional>
+#include <sstream>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include <fmt/core.h>
+
+#include "cairn/runtime/version.hpp"
+#include "help.hpp"
+#include "table.hpp"
+
+namespace cairn::app {
+namespace {
+
+/// The code point that begins at `k`, which is moved to its last byte. Precondition: valid UTF-8.
+std::uint32_t code_point(std::string_view text, std::size_t& k) {
+  const auto lead = static_cast<unsigned char>(text[k]);
+  const int more = lead >= 0xf0 ? 3 : lead >= 0xe0 ? 2 : 1;
+  std::uint32_t point = lead & (0x3fU >> more);
+  for (int n = 0; n < more && k + 1 < text.size(); ++n)
+    point = point << 6U | (static_cast<unsigned char>(text[++k]) & 0x3fU);
+  return point;
+}
+
+/// The text as roff prints it: no character stands for anything but itself, and what is copied from
+/// the page can be typed.
+std::string roff(std::string_view text) {
+  std::string out;
+  for (std::size_t k = 0; k < text.size(); ++k) {
+    const char c = text[k];
+    switch (c) {
+      case '\\':
+        out += "\\(rs";
+        break;
+      case '-':
+        out += "\\-";
+        break;
+      case '\'':
+        out += "\\(aq";
+        break;
+      case '`':
+        out += "\\(ga";
+        break;
+      case '^':
+        out += "\\(ha";
+        break;
+      case '~':
+        out += "\\(ti";
+        break;
+      case '"':
+        out += "\\(dq";
+        break;
+      case ',':  // a line may end there: what is typed is long and has no blanks
+        out += ",\\:";
+        break;
+      default:
+        if (static_cast<unsigned char>(c) < 0x80U)
+          out += c;
+        else
+          out += fmt::format("\\[u{:04X}]", code_point(text, k));
+    }
+  }
+  return out.starts_with('.') ? "\\&" + out : out;
+}
+
+std::string strong(std::string_view text) { return "\\fB" + roff(text) + "\\fR"; }
+std::string slanted(std::string_view text) { return "\\fI" + roff(text) + "\\fR"; }
+
+/// "-o, --output OUT", or "GRAPH" of a positional argument.
+std::string head(const Argument& argument) {
+  if (argument.is_positional()) return slanted(argument.type_name());
+  std::vector<std::string> names;
+  for (const std::string& name : argument.short_names()) names.push_back(strong("-" + name));
+  for (const std::string& name : argument.long_names()) names.push_back(strong("--" + name));
+  const std::string text = joined(names, ", ");
+  return argument.most_values() > 0 ? text + " " + slanted(argument.type_name()) : text;
+}
+
+/// The line of a table as a sentence.
+std::string sentence(std::string text) {
+  if (text.empty()) return text;
+  const bool is_name = text.starts_with("cairn ");
+  if (!is_name) text.front() = static_cast<char>(std::toupper(text.front()));
+  return std::string_view(".!?").find(text.back()) != std::string_view::npos ? text : text + ".";
+}
+
+/// What is known of its value besides: the default, the choices, the kinds of component.
+std::string about_value(const Argument& argument) {
+  std::string text;
+  if (const std::string value = argument.default_text(); !value.empty())
+    text += "Default: " + strong(value) + ".\n";
+  const ValueWords& words = argument.words();
+  if (!words.choices.empty()) {
+    std::vector<std::string> choices;
+    for (const std::string& choice : words.choices) choices.push_back(strong(choice));
+    text += "One of " + joined(choices, ", ") + ".\n";
+  }
+  for (const std::string& kind : words.kinds) {
+    std::string in_words = kind;
+    std::ranges::replace(in_words, '_', ' ');
+    text += "Names of kind " + roff(in_words) + ": " + strong("cairn plugins") + ".\n";
+  }
+  return text;
+}
+
+std::string items(const std::vector<Argument>& arguments, bool positional) {
+  std::string text;
+  for (const Argument& argument : arguments) {
+    if (argument.is_positional() != positional) continue;
+    text += ".TP\n" + head(argument) + "\n" + roff(sentence(argument.description())) + "\n" +
+            about_value(argument);
+  }
+  return text;
+}
+
+std::string section(const std::string& title, const std::string& text) {
+  return text.empty() ? "" : ".SH " + title + "\n" + text;
+}
+
+/// The footer of the help: paragraphs, and below "Example:" commands, indented, with remarks.
+struct Footer {
+  std::string remarks;
+  std::string examples;
+};
+
+Footer parts_of(const std::string& footer) {
+  Footer parts;
+  bool in_example = false;
+  bool was_code = false;
+  std::istringstream lines(footer);
+  for (std::string line; std::getline(lines, line);) {
+    if (line == "Example:") {
+      in_example = true;
+      continue;
+    }
+    std::string& text = in_example ? parts.examples : parts.remarks;
+    const bool is_code = line.starts_with("  ");
+    if (is_code && !was_code) text += ".PP\n.nf\n.RS 4\n";
+    if (!is_code && was_code) text += ".RE\n.fi\n.PP\n";
+    was_code = is_code;
+    if (line.empty())
+      text += ".PP\n";
+    else
+      text += roff(line.substr(is_code ? 2 : 0)) + "\n";
+  }
+  if (was_code) (in_example ? parts.examples : parts.remarks) += ".RE\n.fi\n";
+  while (parts.remarks.ends_with(".PP\n")) parts.remarks.resize(parts.remarks.size() - 4);
+  return parts;
+}
+
+std::string synopsis(const ArgumentParser& command) {
+  const std::string name = command_name(command);
+  if (!command.commands().empty())
+    return strong(name) + " " + slanted("COMMAND") + " [" + slanted("OPTIONS") + "]\n";
+  return strong(name) + roff(usage_line(command).substr(name.size())) + "\n";
+}
+
+/// The summary that `whatis` and `apropos` search.
+std::string summary(const ArgumentParser& command) {
+  const std::string text = command.description();
+  return command.parent() || !text.starts_with("cairn: ") ? text : text.substr(7);
+}
+
+std::string command_list(const ArgumentParser& command) {
+  std::string text;
+  for (const ArgumentParser& each : command.commands()) {
+    text += ".TP\n.BR " + roff(manual_page_name(each)) + " (1)\n" +
+            roff(sentence(each.description())) + "\n";
+  }
+  return text;
+}
+
+ArgumentParser program_of(const ArgumentParser& command) {
+  const std::optional<ArgumentParser> parent = command.parent();
+  return parent ? program_of(*parent) : command;
+}
+
+std::string exit_codes() {
+  std::string text;
+  const std::pair<const char*, const char*> codes[] = {
+      {"0", "success"},
+      {"2", "usage: the command line cannot be understood"},
+      {"3", "input: a file cannot be read or written, or is wrong"},
+      {"4", "numerical: not converged, among others"},
+      {"5", "plugin: one is missing, unknown or wrong"},
+      {"130", "interrupted; the best estimate so far is written, if there is one"}};
+  for (const auto& [code, meaning] : codes)
+    text += ".TP\n" + strong(code) + "\n" + roff(sentence(meaning)) + "\n";
+  return text;
+}
+
+std::string environment() {
+  return ".TP\n.B CAIRN_PLUGIN_PATH\nFolders of plugins, with colons between them.\n"
+         ".TP\n.B XDG_DATA_HOME\nThe user\\(aqs plugins are in the folder cairn/plugins of it; "
+         "where it is not set, in \\(ti/.local/share/cairn/plugins.\n"
+         ".TP\n.B NO_COLOR\nIf set and not empty, nothing is coloured.\n";
+}
+
+std::string see_also(const ArgumentParser& command) {
+  std::vector<std::string> names;
+  for (std::optional<ArgumentParser> above = command.parent(); above; above = above->parent())
+    names.push_back(manual_page_name(*above));
+  const std::string own = manual_page_name(command);
+  for (const char* name : {"cairn-plugins", "cairn-optimize"}) {
+    if (own != name) names.emplace_back(name);
+  }
+  std::string text;
+  for (const std::string& name : names)
+    text += ".BR " + roff(name) + " (1)" + (&name == &names.back() ? "" : ",") + "\n";
+  return text;
+}
+
+}  // namespace
+
+std::string manual_page_name(const ArgumentParser& command) {
+  std::string name = command_name(command);
+  std::ranges::replace(name, ' ', '-');
+  return name;
+}
+
+std::string manual_page(const ArgumentParser& command) {
+  const std::string name = manual_page_name(command);
+  std::string title = name;
+  std::ranges::transform(title, title.begin(),
+                         [](unsigned char c) { return static_cast<char>(std::toupper(c)); });
+  const ArgumentParser program = program_of(command);
+  const bool is_program = !command.parent();
+  const std::vector<Argument> arguments = command.arguments();
+  const Footer footer = parts_of(command.footer());
+  return ".\\\" Written by cairn help --man.\n.TH " + roff(title) +
+         " 1 \"\" \"cairn " CAIRN_VERSION "\" \"User Commands\"\n.ad l\n.nh\n" +
+         section("NAME", roff(name) + " \\- " + roff(summary(command)) + "\n") +
+         section("SYNOPSIS", synopsis(command)) +
+         section("DESCRIPTION", roff(sentence(summary(command))) + "\n" +
+                                    (footer.remarks.empty() ? "" : ".PP\n" + footer.remarks)) +
+         section("COMMANDS", command_list(command)) + section("ARGUMENTS", items(arguments, true)) +
+         section(is_program ? "OPTIONS OF EVERY COMMAND" : "OPTIONS", items(arguments, false)) +
+         (is_program
+              ? ""
+              : section("OPTIONS OF EVERY COMMAND", items(program.arguments_but_help(), false))) +
+         section("EXIT STATUS", exit_codes()) + section("ENVIRONMENT", environment()) +
+         section("EXAMPLES", footer.examples) + section("SEE ALSO", see_also(command));
+}
+
+}  // namespace cairn::app

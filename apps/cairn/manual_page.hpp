@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+
+#include "arguments.hpp"
+
+namespace cairn::app {
+
+/// "cairn-study-compact": the name of a command's page.
+std::string manual_page_name(const ArgumentParser& command);
+
+/// The manual page of a command, or of the program: its help with what every command takes, exit
+/// codes and environment, in the language of man (roff).
+std::string manual_page(const ArgumentParser& command);
+
+}  // namespace cairn::app
