@@ -30,6 +30,8 @@ const Names kShared{"solvers/block", "solvers/linear/blas", "solvers/linear/iter
                     "solvers/nonlinear/descent"};
 /// Eigen's decompositions, compiled once: what everything may include, and includes nothing.
 const std::string kDense = "lib/dense/";
+/// Several numbers at a time, below the core too; its headers are public.
+const std::string kPack = "lib/pack/";
 /// Folders each of whose folders stands for itself: it includes no other.
 const Names kWings{"types", "solvers/linear", "solvers/nonlinear", "solvers/incremental", "plugins",
                    "apps"};
@@ -129,7 +131,9 @@ class Tree {
   std::string public_fault(const std::string& file, const std::string& name) const {
     const std::string part = name.substr(6, name.find('/', 6) - 6);
     const int layer = position(kLayers, part), subject = position(subjects_, part);
-    if (file.starts_with(kDense)) return "what lies below the core includes nothing of it";
+    if (part == "pack") return file.starts_with(kDense) ? "each stands for itself" : "";
+    if (file.starts_with(kDense) || file.starts_with(kPack))
+      return "what lies below the core includes nothing of it";
     if (layer < 0 && subject < 0) return part + " is neither a layer of the core nor a subject";
     if (file.starts_with("core/")) {
       if (layer < 0) return "the core includes nothing of lib";
@@ -240,6 +244,14 @@ TEST_F(FaultyTree, ALaterLayerOrSubjectIsAFault) {
 
 TEST_F(FaultyTree, ALayerInTheDenseMatricesIsAFault) {
   write("lib/dense/lu.hpp", "#include \"cairn/runtime/error.hpp\"\n");
+  EXPECT_THAT(faults(), ElementsAre(HasSubstr("below the core")));
+}
+
+TEST_F(FaultyTree, PacksMayBeIncludedEverywhereAndIncludeNothingElse) {
+  write("core/include/cairn/types/t.hpp", "#include \"cairn/pack/pack.hpp\"\n");
+  write("lib/pack/include/cairn/pack/p.hpp", "#include \"cairn/pack/pack.hpp\"\n");
+  EXPECT_THAT(faults(), IsEmpty());
+  write("lib/pack/include/cairn/pack/p.hpp", "#include \"cairn/types/t.hpp\"\n");
   EXPECT_THAT(faults(), ElementsAre(HasSubstr("below the core")));
 }
 

@@ -34,17 +34,16 @@ struct Reprojection {
   /// −1 / P_z, and 0 for a point in the centre.
   template <class S>
   static S inverse_depth(const Vector<S, 3>& P) {
-    const S x = P[0] < 0.0 ? -P[0] : P[0], y = P[1] < 0.0 ? -P[1] : P[1];
-    const S z = P[2] < 0.0 ? -P[2] : P[2];
-    const S least = (x + y) * kLeastDepth;
-    const S depth = z > least ? z : least;
-    if (!(depth > kCentre)) return S(0.0);
-    return (P[2] > 0.0 ? -1.0 : 1.0) / depth;
+    using lanes::if_less;
+    using std::abs;
+    const S z = abs(P[2]), least = (abs(P[0]) + abs(P[1])) * kLeastDepth;
+    const S depth = if_less(least, z, z, least);
+    return if_less(S(kCentre), depth, if_less(S(0.0), P[2], -1.0, 1.0) / depth, S(0.0));
   }
 
   template <class S>
   static Vector<S, 2> residual(const Vector<S, 10>& camera, const Vector<S, 3>& point,
-                               const Vector<double, 2>& z) {
+                               const Measured<S, 2>& z) {
     const Vector<S, 7> pose = Camera::pose<S>(camera);
     const Vector<S, 3> apart = point - Se3::translation<S>(pose);
     const Vector<S, 3> P = so3::rotate_back<S>(Se3::quaternion<S>(pose), apart);
@@ -57,30 +56,33 @@ struct Reprojection {
 
   /// With d = −1/P_z, n = ‖p‖² and s = 1 + k1 n + k2 n²: d error/dp = f (s I + 2 (k1 + 2 k2 n) p
   /// pᵀ), dp/dP = d [I | p], and moving the camera by (v, ω) moves P by −v + [P]ₓ ω.
-  static Vector<double, 2> evaluate(const Vector<double, 10>& camera,
-                                    const Vector<double, 3>& point, const Vector<double, 2>& z,
-                                    Eigen::Matrix<double, 2, 9>& J_camera,
-                                    Eigen::Matrix<double, 2, 3>& J_point) {
-    const Eigen::Matrix3d R = Camera::rotation(camera);
-    const Vector<double, 3> apart = point - Camera::position(camera);
-    Vector<double, 3> P;
-    P.noalias() = R.transpose().lazyProduct(apart);
-    const double d = inverse_depth<double>(P);
-    const double x = P[0] * d, y = P[1] * d;
-    const double f = camera[0], k1 = camera[1], k2 = camera[2];
-    const double n = x * x + y * y;
-    const double s = 1.0 + n * (k1 + n * k2);
+  template <class S>
+  static Vector<S, 2> evaluate(const Vector<S, 10>& camera, const Vector<S, 3>& point,
+                               const Vector<S, 2>& z, Eigen::Matrix<S, 2, 9>& J_camera,
+                               Eigen::Matrix<S, 2, 3>& J_point) {
+    const Vector<S, 7> pose = Camera::pose<S>(camera);
+    const so3::Matrix3<S> R = so3::matrix<S>(Se3::quaternion<S>(pose));  // from camera to world
+    const Vector<S, 3> apart = point - Se3::translation<S>(pose);
+    const Vector<S, 3> P = so3::times<S>(so3::Matrix3<S>(R.transpose()), apart);
+    const S d = inverse_depth<S>(P);
+    const S x = P[0] * d, y = P[1] * d;
+    const S f = camera[0], k1 = camera[1], k2 = camera[2];
+    const S n = x * x + y * y;
+    const S s = 1.0 + n * (k1 + n * k2);
 
-    const double slope = 2.0 * (k1 + 2.0 * n * k2);
-    const double along = f * d * (s + slope * n);  // d error / d P_z = along · p
-    Eigen::Matrix<double, 2, 3> D;                 // d error / dP
+    const S slope = 2.0 * (k1 + 2.0 * n * k2);
+    const S along = f * d * (s + slope * n);  // d error / d P_z = along · p
+    Eigen::Matrix<S, 2, 3> D;                 // d error / dP
     D << f * d * (s + slope * x * x), f * d * slope * x * y, along * x,  //
         f * d * slope * x * y, f * d * (s + slope * y * y), along * y;
-    J_point.noalias() = D.lazyProduct(R.transpose());
-
-    const double fn = f * n, fnn = fn * n;
     for (int row = 0; row < 2; ++row) {
-      const double p = row == 0 ? x : y;
+      for (int c = 0; c < 3; ++c)  // D Rᵀ
+        J_point(row, c) = D(row, 0) * R(c, 0) + D(row, 1) * R(c, 1) + D(row, 2) * R(c, 2);
+    }
+
+    const S fn = f * n, fnn = fn * n;
+    for (int row = 0; row < 2; ++row) {
+      const S p = row == 0 ? x : y;
       J_camera(row, 0) = s * p;
       J_camera(row, 1) = fn * p;
       J_camera(row, 2) = fnn * p;

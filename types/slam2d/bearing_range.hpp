@@ -18,7 +18,7 @@ struct BearingRange {
 
   template <class S>
   static Vector<S, 2> residual(const Vector<S, 3>& pose, const Vector<S, 2>& landmark,
-                               const Vector<double, 2>& z) {
+                               const Measured<S, 2>& z) {
     using std::atan2;
     using std::sqrt;
     const so2::Rotation<S> R(pose[2]);
@@ -27,22 +27,25 @@ struct BearingRange {
     return {wrap_angle<S>(atan2(py, px) - z[0]), sqrt(px * px + py * py) - z[1]};
   }
 
-  static Vector<double, 2> evaluate(const Vector<double, 3>& pose,
-                                    const Vector<double, 2>& landmark, const Vector<double, 2>& z,
-                                    Eigen::Matrix<double, 2, 3>& J_pose,
-                                    Eigen::Matrix2d& J_landmark) {
-    const so2::Rotation<double> R(pose[2]);
-    const double dx = landmark[0] - pose[0], dy = landmark[1] - pose[1];
-    const double px = R.c * dx + R.s * dy, py = R.c * dy - R.s * dx;
-    const double range = std::sqrt(px * px + py * py);
+  template <class S>
+  static Vector<S, 2> evaluate(const Vector<S, 3>& pose, const Vector<S, 2>& landmark,
+                               const Vector<S, 2>& z, Eigen::Matrix<S, 2, 3>& J_pose,
+                               Eigen::Matrix<S, 2, 2>& J_landmark) {
+    using lanes::if_less;
+    using std::atan2;
+    using std::sqrt;
+    const so2::Rotation<S> R(pose[2]);
+    const S dx = landmark[0] - pose[0], dy = landmark[1] - pose[1];
+    const S px = R.c * dx + R.s * dy, py = R.c * dy - R.s * dx;
+    const S range = sqrt(px * px + py * py);
     // A pose on top of its landmark sees no direction: no derivative, rather than an infinite one.
-    const double inverse = range > 0.0 ? 1.0 / range : 0.0;
-    const double ux = px * inverse, uy = py * inverse;
-    const double bx = -uy * inverse, by = ux * inverse;  // d bearing / dp
-    J_pose << -bx, -by, range > 0.0 ? -1.0 : 0.0, -ux, -uy, 0;
+    const S inverse = if_less(S(0.0), range, 1.0 / range, 0.0);
+    const S ux = px * inverse, uy = py * inverse;
+    const S bx = -uy * inverse, by = ux * inverse;  // d bearing / dp
+    J_pose << -bx, -by, if_less(S(0.0), range, -1.0, 0.0), -ux, -uy, S(0.0);
     J_landmark << bx * R.c - by * R.s, bx * R.s + by * R.c,  //
         ux * R.c - uy * R.s, ux * R.s + uy * R.c;
-    return {wrap_angle(std::atan2(py, px) - z[0]), range - z[1]};
+    return {wrap_angle<S>(atan2(py, px) - z[0]), range - z[1]};
   }
 
   static std::string normalize(Vector<double, 2>& z) {

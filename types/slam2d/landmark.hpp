@@ -15,20 +15,20 @@ struct Landmark {
 
   template <class S>
   static Vector<S, 2> residual(const Vector<S, 3>& pose, const Vector<S, 2>& landmark,
-                               const Vector<double, 2>& z) {
+                               const Measured<S, 2>& z) {
     const so2::Rotation<S> R(pose[2]);
     const S dx = landmark[0] - pose[0], dy = landmark[1] - pose[1];
     return {R.c * dx + R.s * dy - z[0], R.c * dy - R.s * dx - z[1]};
   }
 
-  static Vector<double, 2> evaluate(const Vector<double, 3>& pose,
-                                    const Vector<double, 2>& landmark, const Vector<double, 2>& z,
-                                    Eigen::Matrix<double, 2, 3>& J_pose,
-                                    Eigen::Matrix2d& J_landmark) {
-    const so2::Rotation<double> R(pose[2]);
-    const double dx = landmark[0] - pose[0], dy = landmark[1] - pose[1];
-    const double px = R.c * dx + R.s * dy, py = R.c * dy - R.s * dx;
-    J_pose << -1, 0, py, 0, -1, -px;
+  template <class S>
+  static Vector<S, 2> evaluate(const Vector<S, 3>& pose, const Vector<S, 2>& landmark,
+                               const Vector<S, 2>& z, Eigen::Matrix<S, 2, 3>& J_pose,
+                               Eigen::Matrix<S, 2, 2>& J_landmark) {
+    const so2::Rotation<S> R(pose[2]);
+    const S dx = landmark[0] - pose[0], dy = landmark[1] - pose[1];
+    const S px = R.c * dx + R.s * dy, py = R.c * dy - R.s * dx;
+    J_pose << S(-1), S(0), py, S(0), S(-1), -px;
     J_landmark << R.c, R.s, -R.s, R.c;
     return {px - z[0], py - z[1]};
   }

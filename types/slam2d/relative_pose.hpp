@@ -16,27 +16,27 @@ struct RelativePose {
 
   template <class S>
   static Vector<S, 3> residual(const Vector<S, 3>& a, const Vector<S, 3>& b,
-                               const Vector<double, 3>& z) {
+                               const Measured<S, 3>& z) {
     const so2::Rotation<S> R_a(a[2]);
-    const so2::Rotation<double> R_z(z[2]);
+    const so2::Rotation<ValueOf<S>> R_z(z[2]);
     const S dx = b[0] - a[0], dy = b[1] - a[1];
     const S px = R_a.c * dx + R_a.s * dy - z[0], py = R_a.c * dy - R_a.s * dx - z[1];
     return {px * R_z.c + py * R_z.s, py * R_z.c - px * R_z.s, wrap_angle<S>(b[2] - a[2] - z[2])};
   }
 
-  static Vector<double, 3> evaluate(const Vector<double, 3>& a, const Vector<double, 3>& b,
-                                    const Vector<double, 3>& z, Eigen::Matrix3d& J_a,
-                                    Eigen::Matrix3d& J_b) {
-    const so2::Rotation<double> R_a(a[2]), R_z(z[2]);
-    const double dx = b[0] - a[0], dy = b[1] - a[1];
-    const double px = R_a.c * dx + R_a.s * dy, py = R_a.c * dy - R_a.s * dx;  // b seen from a
-    const double ex = px - z[0], ey = py - z[1];
-    const double angle = wrap_angle(b[2] - a[2] - z[2]);
-    const so2::Rotation<double> R_e(angle);
+  template <class S>
+  static Vector<S, 3> evaluate(const Vector<S, 3>& a, const Vector<S, 3>& b, const Vector<S, 3>& z,
+                               Eigen::Matrix<S, 3, 3>& J_a, Eigen::Matrix<S, 3, 3>& J_b) {
+    const so2::Rotation<S> R_a(a[2]), R_z(z[2]);
+    const S dx = b[0] - a[0], dy = b[1] - a[1];
+    const S px = R_a.c * dx + R_a.s * dy, py = R_a.c * dy - R_a.s * dx;  // b seen from a
+    const S ex = px - z[0], ey = py - z[1];
+    const S angle = wrap_angle<S>(b[2] - a[2] - z[2]);
+    const so2::Rotation<S> R_e(angle);
     J_a << -R_z.c, -R_z.s, R_z.c * py - R_z.s * px,  //
         R_z.s, -R_z.c, -R_z.s * py - R_z.c * px,     //
-        0, 0, -1;
-    J_b << R_e.c, -R_e.s, 0, R_e.s, R_e.c, 0, 0, 0, 1;
+        S(0), S(0), S(-1);
+    J_b << R_e.c, -R_e.s, S(0), R_e.s, R_e.c, S(0), S(0), S(0), S(1);
     return {R_z.c * ex + R_z.s * ey, R_z.c * ey - R_z.s * ex, angle};
   }
 

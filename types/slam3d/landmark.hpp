@@ -15,21 +15,24 @@ struct Landmark {
 
   template <class S>
   static Vector<S, 3> residual(const Vector<S, 7>& pose, const Vector<S, 3>& landmark,
-                               const Vector<double, 3>& z) {
+                               const Measured<S, 3>& z) {
     const Vector<S, 3> apart = landmark - Se3::translation<S>(pose);
     const Vector<S, 3> seen = so3::rotate_back<S>(Se3::quaternion<S>(pose), apart);
     return {seen[0] - z[0], seen[1] - z[1], seen[2] - z[2]};
   }
 
-  static Vector<double, 3> evaluate(const Vector<double, 7>& pose,
-                                    const Vector<double, 3>& landmark, const Vector<double, 3>& z,
-                                    Eigen::Matrix<double, 3, 6>& J_pose,
-                                    Eigen::Matrix3d& J_landmark) {
-    J_landmark = Se3::rotation(pose).transpose();
-    Vector<double, 3> seen;
-    seen.noalias() = J_landmark.lazyProduct(landmark - Se3::position(pose));
-    J_pose.leftCols<3>() = -Eigen::Matrix3d::Identity();
-    J_pose.rightCols<3>() = so3::hat<double>(seen);
+  template <class S>
+  static Vector<S, 3> evaluate(const Vector<S, 7>& pose, const Vector<S, 3>& landmark,
+                               const Vector<S, 3>& z, Eigen::Matrix<S, 3, 6>& J_pose,
+                               so3::Matrix3<S>& J_landmark) {
+    J_landmark = so3::matrix<S>(Se3::quaternion<S>(pose)).transpose();
+    const Vector<S, 3> apart = landmark - Se3::translation<S>(pose);
+    const Vector<S, 3> seen = so3::times<S>(J_landmark, apart);
+    const so3::Matrix3<S> turning = so3::hat<S>(seen);
+    for (int k = 0; k < 9; ++k) {
+      J_pose.data()[k] = k % 4 == 0 ? -1.0 : 0.0;
+      J_pose.data()[9 + k] = turning.data()[k];
+    }
     return seen - z;
   }
 

@@ -11,6 +11,7 @@
 
 namespace {
 
+using cairn::Measured;
 using cairn::Vector;
 
 /// The distance from a robot to a radio beacon: r = |l - t| - z, with t the position of the pose.
@@ -22,7 +23,7 @@ struct RangeFactor {
 
   template <class S>
   static Vector<S, 1> residual(const Vector<S, 3>& pose, const Vector<S, 2>& beacon,
-                               const Vector<double, 1>& measured) {
+                               const Measured<S, 1>& measured) {
     using std::sqrt;  // that of double; dual numbers bring their own
     const S dx = beacon[0] - pose[0];
     const S dy = beacon[1] - pose[1];

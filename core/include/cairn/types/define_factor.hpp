@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <memory>
 #include <string>
@@ -9,6 +10,7 @@
 
 #include <Eigen/Core>
 
+#include "cairn/pack/products.hpp"
 #include "cairn/types/autodiff.hpp"
 #include "cairn/types/define_variable.hpp"
 #include "cairn/types/factor_type.hpp"
@@ -23,14 +25,17 @@ namespace cairn {
 ///       using Variables = std::tuple<PointXY, PointXY>;
 ///       template <class S>
 ///       static Vector<S, 1> residual(const Vector<S, 2>& a, const Vector<S, 2>& b,
-///                                    const Vector<double, 1>& measured);
+///                                    const Measured<S, 1>& measured);
 ///     };
 ///
 /// `residual` returns the error in the metric's units, not whitened; it is called with double and
-/// with dual numbers (automatic differentiation). The struct may also have
-///  - `static Vector<double, kResidual> evaluate(x…, z, J…)`: the same error and its analytic
+/// with dual numbers (automatic differentiation), and both with packs of several factors instead of
+/// doubles (`cairn/pack/pack.hpp`). One that takes its measurement as `Vector<double, 1>` is called
+/// for one factor at a time: right as well, but slower. The struct may also have
+///  - `static Vector<S, kResidual> evaluate(x…, z, J…)`: the same error and its analytic
 ///    Jacobians with respect to the tangent vectors, a matrix of kResidual × V::kTangent by
-///    reference for each variable. Tests compare them with the automatic ones.
+///    reference for each variable. A template over the scalar S, or for S = double alone. Tests
+///    compare them with the automatic ones.
 ///  - `static std::string normalize(Vector<double, kMeasurement>& z)`: makes it canonical, or says
 ///    what is wrong;
 ///  - `static bool propagate(int target, const double* const* x, const double* z, double* out)`;
@@ -46,21 +51,7 @@ concept FactorTraits = requires {
   std::tuple_size<typename F::Variables>::value;
 };
 
-// The loop over a pool is compiled twice where that pays: for the machine that everything is
-// compiled for, and for one with AVX2, which is asked for when the program runs. Without fused
-// multiplication and addition: the two then agree to the last bit.
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__AVX2__)
-#define CAIRN_WIDE __attribute__((target("avx2"), flatten))
-#endif
-
 namespace detail {
-
-#if defined(CAIRN_WIDE)
-inline bool has_wide() {
-  static const bool has = __builtin_cpu_supports("avx2");
-  return has;
-}
-#endif
 
 template <class F,
           class Indices = std::make_index_sequence<std::tuple_size_v<typename F::Variables>>>
@@ -74,73 +65,119 @@ class DefinedFactor<F, std::index_sequence<I...>> final : public FactorType {
   static constexpr int kPairs = kArity * (kArity + 1) / 2;
   template <std::size_t K>
   using V = std::tuple_element_t<K, typename F::Variables>;
+  // S is double, or a pack with one lane for each of several factors.
+  template <class S, std::size_t K>
+  using X = Vector<S, V<K>::kAmbient>;
+  template <class S, std::size_t K>
+  using J = Eigen::Matrix<S, kR, V<K>::kTangent>;
+  template <class S>
+  using States = std::tuple<X<S, I>...>;
+  template <class S>
+  using Jacobians = std::tuple<J<S, I>...>;
+  using Places = lanes::Contribution<V<I>::kTangent...>;
   using R = Vector<double, kR>;
   using Z = Vector<double, kZ>;
-  template <std::size_t K>
-  using X = Vector<double, V<K>::kAmbient>;
-  template <std::size_t K>
-  using J = Eigen::Matrix<double, kR, V<K>::kTangent>;
-  using States = std::tuple<X<I>...>;
-  using Jacobians = std::tuple<J<I>...>;
 
-  static constexpr bool kAnalytic = requires(const X<I>&... x, const Z& z, J<I>&... jacobians) {
+  template <class S>
+  static constexpr bool kAnalytic = requires(const X<S, I>&... x, const Vector<S, kZ>& z,
+                                             J<S, I>&... jacobians) {
     F::evaluate(x..., z, jacobians...);
   };
+  template <class S, class D = S>
+  static constexpr bool kComputes = requires(const X<D, I>&... x,
+                                             const lanes::Only<Vector<S, kZ>>& z) {
+    F::template residual<D>(x..., z);
+  };
+  template <class S>
+  static constexpr bool kDifferentiates =
+      kAnalytic<double> ? kAnalytic<S> : kComputes<S, Dual<(V<I>::kTangent + ...), S>>;
 
-  static R error(const States& x, const Z& z) {
-    return F::template residual<double>(std::get<I>(x)..., z);
+  template <class S>
+  static Vector<S, kR> error(const States<S>& x, const Vector<S, kZ>& z) {
+    return F::template residual<S>(std::get<I>(x)..., z);
   }
-  static R error_and_jacobians(const States& x, const Z& z, Jacobians& jacobians) {
-    if constexpr (kAnalytic)
+  template <class S>
+  static Vector<S, kR> error_and_jacobians(const States<S>& x, const Vector<S, kZ>& z,
+                                           Jacobians<S>& jacobians) {
+    if constexpr (kAnalytic<double>)
       return F::evaluate(std::get<I>(x)..., z, std::get<I>(jacobians)...);
     else
       return autodiff::evaluate<F>(x, z, jacobians);
   }
 
-  /// U M with U upper triangular, packed row by row.
-  template <class M>
-  [[gnu::always_inline]] static void whiten(const double* u, M& m) {
-    for (int row = 0; row < kR; ++row) {
-      m.row(row) *= u[0];
-      for (int k = row + 1; k < kR; ++k) m.row(row) += u[k - row] * m.row(k);
-      u += kR - row;
+  /// Factors of a pool, one for each lane: their errors, whitened, and if asked for their
+  /// Jacobians. The last factor stands in where there are too few.
+  template <class S, bool kWithJacobians>
+  struct Group {
+    static constexpr int kWidth = lanes::kWidth<S>;
+    Vector<S, kR> r;
+    Jacobians<S> jacobians;
+
+    Group(const FactorView& pool, std::size_t first, std::size_t end) {
+      std::size_t factors[kWidth];
+      for (int l = 0; l < kWidth; ++l) factors[l] = std::min(first + l, end - 1);
+      if constexpr (kWidth == 1) {
+        r = evaluate(pool, factors, jacobians);
+      } else {
+        // All lanes at once; where a branch divides them, then each by itself, in all lanes.
+        for (int lane = -1; lane < kWidth; ++lane) {
+          std::size_t chosen[kWidth];
+          for (int l = 0; l < kWidth; ++l) chosen[l] = factors[lane < 0 ? l : lane];
+          S::diverged = false;
+          Jacobians<S> J_now;
+          const Vector<S, kR> r_now = evaluate(pool, chosen, J_now);
+          if (lane < 0) {
+            r = r_now;
+            if constexpr (kWithJacobians) jacobians = J_now;
+            if (!S::diverged) [[likely]]
+              break;
+          } else {
+            lanes::merge_lane(lane, r_now, r);
+            if constexpr (kWithJacobians)
+              (lanes::merge_lane(lane, std::get<I>(J_now), std::get<I>(jacobians)), ...);
+          }
+        }
+      }
+      const Vector<S, kU> u = lanes::load_entries<S, kU>(pool.sqrt_information, factors);
+      lanes::whiten(u.data(), r);
+      if constexpr (kWithJacobians) (lanes::whiten(u.data(), std::get<I>(jacobians)), ...);
     }
-  }
-  static States load_states(const FactorView& pool, std::size_t f) {
-    const std::int32_t* slots = pool.slots + f * kArity;
-    return {load<V<I>::kAmbient>(pool.states[I] +
-                                 static_cast<std::size_t>(slots[I]) * V<I>::kAmbient)...};
-  }
+
+   private:
+    static Vector<S, kR> evaluate(const FactorView& pool, const std::size_t* factors,
+                                  Jacobians<S>& j) {
+      std::int32_t slots[kArity][kWidth];
+      for (int k = 0; k < kArity; ++k) {
+        for (int l = 0; l < kWidth; ++l) slots[k][l] = pool.slots[factors[l] * kArity + k];
+      }
+      const States<S> x{lanes::load_entries<S, V<I>::kAmbient>(pool.states[I], slots[I])...};
+      const Vector<S, kZ> z = lanes::load_entries<S, kZ>(pool.measurements, factors);
+      if constexpr (kWithJacobians)
+        return error_and_jacobians<S>(x, z, j);
+      else
+        return error<S>(x, z);
+    }
+  };
 
   template <std::size_t A, std::size_t B>
-  static void write_block(const Jacobians& j, double weight, const LinearizeSink& sink,
-                          std::size_t pair_begin) {
-    constexpr std::size_t kPair = A * kArity - A * (A - 1) / 2 + (B - A);
-    const std::int64_t offset = sink.blocks[pair_begin + kPair];
-    if (offset == LinearizeSink::kNone) return;
-    const J<A>& a = std::get<A>(j);
-    const J<B>& b = std::get<B>(j);
+  static void put_block(const double* values, bool transposed, const LinearizeSink& sink,
+                        std::size_t f) {
     constexpr int kTa = V<A>::kTangent, kTb = V<B>::kTangent;
-    if (A != B && sink.transposed[pair_begin + kPair]) {
-      const Eigen::Matrix<double, kTb, kTa> block = (weight * b.transpose()).lazyProduct(a);
-      sink.put(offset, block);
-    } else {
-      const Eigen::Matrix<double, kTa, kTb> block = (weight * a.transpose()).lazyProduct(b);
-      sink.put(offset, block);
-    }
-  }
-  template <std::size_t A, std::size_t... B>
-  static void write_row(const Jacobians& j, double weight, const LinearizeSink& sink,
-                        std::size_t pair_begin, std::index_sequence<B...>) {
-    (write_block<A, A + B>(j, weight, sink, pair_begin), ...);
+    const std::size_t pair = f * kPairs + Places::pair(A, B);
+    const std::int64_t offset = sink.blocks[pair];
+    if (offset == LinearizeSink::kNone) return;
+    const double* block = values + Places::block(A, B);
+    if (A == B || (sink.transposed[pair] != 0) == transposed)
+      sink.put(offset, Eigen::Map<const Vector<double, kTa * kTb>>(block));
+    else
+      sink.put(offset, lanes::turn_block<kTa, kTb>(block, transposed));
   }
   template <std::size_t A>
-  static void write_gradient(const Jacobians& j, const R& r, double weight,
-                             const LinearizeSink& sink, std::size_t f) {
+  static void put_gradient(const double* values, const LinearizeSink& sink, std::size_t f) {
     const std::int64_t offset = sink.gradients[f * kArity + A];
     if (offset == LinearizeSink::kNone) return;
-    Eigen::Map<Vector<double, V<A>::kTangent>>{sink.scratch + offset}.noalias() +=
-        (-weight * std::get<A>(j).transpose()).lazyProduct(r);
+    for (int k = 0; k < V<A>::kTangent; ++k)
+      sink.scratch[offset + k] += values[Places::gradient(A) + k];
   }
 
  public:
@@ -172,70 +209,77 @@ class DefinedFactor<F, std::index_sequence<I...>> final : public FactorType {
 
   void squared_norms(const FactorView& pool, std::size_t begin, std::size_t end,
                      double* out) const override {
-    run([&] {
-      for (std::size_t f = begin; f < end; ++f) {
-        R r = error(load_states(pool, f), load<kZ>(pool.measurements + f * kZ));
-        whiten(pool.sqrt_information + f * kU, r);
-        out[f - begin] = r.squaredNorm();
+    lanes::for_machine<kComputes<lanes::Widest>>([&]<class S>() {
+      for (std::size_t f = begin; f < end; f += lanes::kWidth<S>) {
+        lanes::store(lanes::squared_norm(Group<S, false>(pool, f, end).r), end - f,
+                     out + (f - begin));
       }
     });
   }
 
   void linearize(const FactorView& pool, std::size_t begin, std::size_t end, const double* weights,
                  const LinearizeSink& sink, double* out_squared_norms) const override {
-    run([&] { linearize_range(pool, begin, end, weights, sink, out_squared_norms); });
+    lanes::for_machine<kDifferentiates<lanes::Widest>>([&]<class S>() {
+      for (std::size_t f = begin; f < end; f += lanes::kWidth<S>) {
+        const std::size_t count = std::min<std::size_t>(end - f, lanes::kWidth<S>);
+        linearize_group<S>(pool, f, count, weights ? weights + (f - begin) : nullptr, sink,
+                           out_squared_norms ? out_squared_norms + (f - begin) : nullptr);
+      }
+    });
   }
 
  private:
-  template <class Loop>
-  static void run(const Loop& loop) {
-#if defined(CAIRN_WIDE)
-    if (detail::has_wide()) return run_wide(loop);
-#endif
-    loop();
-  }
-#if defined(CAIRN_WIDE)
-  template <class Loop>
-  CAIRN_WIDE static void run_wide(const Loop& loop) {
-    loop();
-  }
-#endif
-  static void linearize_range(const FactorView& pool, std::size_t begin, std::size_t end,
+  template <class S>
+  static void linearize_group(const FactorView& pool, std::size_t first, std::size_t count,
                               const double* weights, const LinearizeSink& sink,
                               double* out_squared_norms) {
-    Jacobians jacobians;
-    for (std::size_t f = begin; f < end; ++f) {
-      R r = error_and_jacobians(load_states(pool, f), load<kZ>(pool.measurements + f * kZ),
-                                jacobians);
-      const double* u = pool.sqrt_information + f * kU;
-      whiten(u, r);
-      (whiten(u, std::get<I>(jacobians)), ...);
-      if (out_squared_norms) out_squared_norms[f - begin] = r.squaredNorm();
-      const double weight = weights ? weights[f - begin] : 1.0;
-      (write_row<I>(jacobians, weight, sink, f * kPairs, std::make_index_sequence<kArity - I>{}),
-       ...);
-      (write_gradient<I>(jacobians, r, weight, sink, f), ...);
+    constexpr int kWidth = lanes::kWidth<S>,
+                  kPadded = (Places::kNumbers + kWidth - 1) / kWidth * kWidth;
+    const Group<S, true> group(pool, first, first + count);
+    S weight = 1.0;
+    if (weights) weight = lanes::load<S>(weights, count);
+    const std::uint8_t* transposed = sink.transposed + first * kPairs;  // of the first lane
+
+    S numbers[kPadded];
+    lanes::for_pairs<kArity>([&]<std::size_t A, std::size_t B>() {
+      lanes::multiply<A == B>(std::get<A>(group.jacobians), std::get<B>(group.jacobians), weight,
+                              transposed[Places::pair(A, B)] != 0, numbers + Places::block(A, B));
+    });
+    (lanes::multiply_gradient(std::get<I>(group.jacobians), group.r, weight,
+                              numbers + Places::gradient(I)),
+     ...);
+    numbers[Places::kNorm] = lanes::squared_norm(group.r);
+    for (int k = Places::kNumbers; k < kPadded; ++k) numbers[k] = 0.0;
+
+    const lanes::Separate<S, kPadded> separate(numbers);
+    for (std::size_t l = 0; l < count; ++l) {
+      const double* values = separate.lane(l);
+      lanes::for_pairs<kArity>([&]<std::size_t A, std::size_t B>() {
+        put_block<A, B>(values, transposed[Places::pair(A, B)] != 0, sink, first + l);
+      });
+      (put_gradient<I>(values, sink, first + l), ...);
+      if (out_squared_norms) out_squared_norms[l] = values[Places::kNorm];
     }
   }
 
  public:
   void evaluate(const double* const* x, const double* measurement, const double* sqrt_information,
                 double* residual, double* const* jacobians) const override {
-    const States states{load<V<I>::kAmbient>(x[I])...};
+    const States<double> states{load<V<I>::kAmbient>(x[I])...};
     R r;
     if (jacobians) {
-      Jacobians j;
-      r = error_and_jacobians(states, load<kZ>(measurement), j);
+      Jacobians<double> j;
+      r = error_and_jacobians<double>(states, load<kZ>(measurement), j);
       const auto write = [&]<std::size_t K>(std::integral_constant<std::size_t, K>) {
         if (!jacobians[K]) return;
-        whiten(sqrt_information, std::get<K>(j));
-        Eigen::Map<J<K>>{jacobians[K]} = std::get<K>(j);
+        lanes::whiten(sqrt_information, std::get<K>(j));
+        Eigen::Map<J<double, K>>{jacobians[K]} = std::get<K>(j);
       };
       (write(std::integral_constant<std::size_t, I>{}), ...);
     } else {
-      r = error(states, load<kZ>(measurement));
+      r = error<double>(states, load<kZ>(measurement));
     }
-    whiten(sqrt_information, r);
+    lanes::whiten(sqrt_information, r);
     store<kR>(r, residual);
   }
 

@@ -14,6 +14,10 @@ namespace cairn {
 template <class S, int N>
 using Vector = Eigen::Matrix<S, N, 1>;
 
+/// The measurement of a factor whose residual is computed with scalars S: plain numbers, or packs.
+template <class S, int N>
+using Measured = Vector<ValueOf<S>, N>;
+
 /// What a struct must have to describe a variable (all functions static):
 ///
 ///     struct PointXY {

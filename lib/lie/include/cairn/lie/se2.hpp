@@ -74,12 +74,12 @@ struct Se2 {
     const S phi = wrap_angle<S>(x[2]);
     const S h = phi * 0.5;
     const S square = phi * phi;
-    S a;
-    if (square < 1e-4) {
-      a = 1.0 - square * ((1.0 / 12) + square * ((1.0 / 720) + square * (1.0 / 30240)));
-    } else {
-      a = h * cos(h) / sin(h);
-    }
+    const S a = lanes::by_bound(
+        square, 1e-4,
+        [&] {
+          return 1.0 - square * ((1.0 / 12) + square * ((1.0 / 720) + square * (1.0 / 30240)));
+        },
+        [&] { return h * cos(h) / sin(h); });
     return {a * x[0] + h * x[1], a * x[1] - h * x[0], phi};
   }
 

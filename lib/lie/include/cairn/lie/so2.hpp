@@ -7,7 +7,9 @@
 
 #include <Eigen/Core>
 
-/// Plane rotations, held as an angle [rad]. S is double or a dual number.
+#include "cairn/pack/pack.hpp"
+
+/// Plane rotations, held as an angle [rad]. S is double, a pack of them or a dual number of either.
 namespace cairn::so2 {
 
 template <class S>
@@ -19,37 +21,60 @@ using Matrix2 = Eigen::Matrix<S, 2, 2>;
 /// angle: the remainder is exact, so no error grows with the number of turns.
 template <class S>
 S wrap_angle(const S& angle) {
-  if (angle <= std::numbers::pi && angle >= -std::numbers::pi) return angle;
   if constexpr (std::is_same_v<S, double>) {
+    if (angle <= std::numbers::pi && angle >= -std::numbers::pi) return angle;
     return std::remainder(angle, 2.0 * std::numbers::pi);
+  } else if constexpr (lanes::kWidth<S> > 1) {
+    if (lanes::all_within(angle, std::numbers::pi)) return angle;
+    return map(angle, wrap_angle<double>);
   } else {
-    return angle + (wrap_angle(angle.value) - angle.value);
+    if (lanes::all_within(angle.value, std::numbers::pi)) return angle;
+    S wrapped = angle;
+    wrapped.value = lanes::map(angle.value, [](double lane) {
+      return std::abs(lane) <= std::numbers::pi ? lane : lane + (wrap_angle<double>(lane) - lane);
+    });
+    return wrapped;
   }
 }
 
 /// Cosine and sine together, to 1e-16: reduction to [−π/4, π/4] with π/2 in three parts, then their
 /// series. Inlined into loops about many angles, it takes a third of the time of the C library's,
-/// to which it leaves angles beyond 1000.
-[[gnu::always_inline]] inline void cos_sin(double angle, double& c, double& s) {
-  if (!(std::abs(angle) <= 1000.0)) {
-    c = std::cos(angle);
-    s = std::sin(angle);
+/// to which it leaves angles beyond 1000. T is double or a pack of them.
+template <class T>
+[[gnu::always_inline]] inline void cos_sin(const T& angle, T& c, T& s) {
+  if (!lanes::all_within(angle, 1000.0)) {
+    if constexpr (std::is_same_v<T, double>) {
+      c = std::cos(angle);
+      s = std::sin(angle);
+    } else {
+      c = map(angle, [](double lane) {
+        double cosine, sine;
+        cos_sin<double>(lane, cosine, sine);
+        return cosine;
+      });
+      s = map(angle, [](double lane) {
+        double cosine, sine;
+        cos_sin<double>(lane, cosine, sine);
+        return sine;
+      });
+    }
     return;
   }
   constexpr double kRound = 0x1.8p52;  // adding and subtracting it rounds to an integer
-  const double turns = (angle * (2.0 / std::numbers::pi) + kRound) - kRound;
+  const T rounded = angle * (2.0 / std::numbers::pi) + kRound;
+  const T turns = rounded - kRound;
   // The first two parts have so few bits that their products with `turns` are exact.
-  const double r = ((angle - turns * 0x1.921fb544p+0) - turns * 0x1.0b4611a6p-34) -
-                   turns * 0x1.3198a2e037073p-69;
-  const double q = r * r;
-  const double sine =
+  const T r = ((angle - turns * 0x1.921fb544p+0) - turns * 0x1.0b4611a6p-34) -
+              turns * 0x1.3198a2e037073p-69;
+  const T q = r * r;
+  const T sine =
       r + r * q *
               (-1.0 / 6 +
                q * (1.0 / 120 + q * (-1.0 / 5040 +
                                      q * (1.0 / 362880 + q * (-1.0 / 39916800 +
                                                               q * (1.0 / 6227020800 +
                                                                    q * (-1.0 / 1307674368000)))))));
-  const double cosine =
+  const T cosine =
       (1.0 - 0.5 * q) +
       q * q *
           (1.0 / 24 +
@@ -57,10 +82,16 @@ S wrap_angle(const S& angle) {
                 q * (1.0 / 40320 + q * (-1.0 / 3628800 + q * (1.0 / 479001600 +
                                                               q * (-1.0 / 87178291200 +
                                                                    q * (1.0 / 20922789888000)))))));
-  const int quarter = static_cast<int>(turns) & 3;
-  const double even = quarter & 1 ? sine : cosine, odd = quarter & 1 ? cosine : sine;
-  c = quarter == 1 || quarter == 2 ? -even : even;
-  s = quarter >= 2 ? -odd : odd;
+  if constexpr (std::is_same_v<T, double>) {
+    const int quarter = static_cast<int>(turns) & 3;
+    const double even = quarter & 1 ? sine : cosine, odd = quarter & 1 ? cosine : sine;
+    c = quarter == 1 || quarter == 2 ? -even : even;
+    s = quarter >= 2 ? -odd : odd;
+  } else {
+    c = cosine;
+    s = sine;
+    turn_quarters(rounded, c, s);
+  }
 }
 
 /// Cosine and sine of an angle: a rotation ready for use.
@@ -69,11 +100,11 @@ struct Rotation {
   S c, s;
 
   [[gnu::always_inline]] explicit Rotation(const S& angle) {
-    if constexpr (std::is_same_v<S, double>) {
+    if constexpr (std::is_same_v<S, double> || lanes::kWidth < S >> 1) {
       cos_sin(angle, c, s);
     } else {
       // A dual number: the same values to the last bit, and their derivatives.
-      double cosine, sine;
+      decltype(S::value) cosine, sine;
       cos_sin(angle.value, cosine, sine);
       const S change = angle - angle.value;
       c = cosine - sine * change;

@@ -6,10 +6,13 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
+#include "cairn/pack/pack.hpp"
+
 /// Rotations of space as unit quaternions (x, y, z, w) and rotation vectors ω [rad], ‖ω‖ ≤ π.
-/// S is double or a dual number. Closed forms lose digits or divide by zero at small angles; there
-/// the Taylor series stand in, long enough to be exact to the last bit where they take over.
-/// Formulas: Solà, Deray, Atchuthan, "A micro Lie theory for state estimation in robotics", 2018.
+/// S is double, a pack of them or a dual number of either. Closed forms lose digits or divide by
+/// zero at small angles; there the Taylor series stand in, long enough to be exact to the last bit
+/// where they take over. Formulas: Solà, Deray, Atchuthan, "A micro Lie theory for state estimation
+/// in robotics", 2018.
 namespace cairn::so3 {
 
 template <class S>
@@ -31,6 +34,17 @@ Matrix3<S> hat(const Vector3<S>& a) {
 template <class S>
 Vector3<S> cross(const Vector3<S>& a, const Vector3<S>& b) {
   return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+}
+
+/// A B and A v, every sum from its first term to its last. Eigen's order depends on the scalar.
+template <class S, int N>
+Eigen::Matrix<S, 3, N> times(const Matrix3<S>& A, const Eigen::Matrix<S, 3, N>& B) {
+  Eigen::Matrix<S, 3, N> product;
+  for (int c = 0; c < N; ++c) {
+    for (int row = 0; row < 3; ++row)
+      product(row, c) = A(row, 0) * B(0, c) + A(row, 1) * B(1, c) + A(row, 2) * B(2, c);
+  }
+  return product;
 }
 
 template <class S>
@@ -130,18 +144,24 @@ template <class S>
 S log_factor(const S& square, const S& w) {
   using std::atan2;
   using std::sqrt;
-  if (square < 1e-4) {  // 2 atan(n/w)/n
-    const S t = square / (w * w);
-    return (1.0 - t * ((1.0 / 3) - t * ((1.0 / 5) - t * ((1.0 / 7) - t * (1.0 / 9))))) * (2.0 / w);
-  }
-  const S n = sqrt(square);
-  return atan2(n, w) * 2.0 / n;
+  return lanes::by_bound(
+      square, 1e-4,
+      [&] {  // 2 atan(n/w)/n
+        const S t = square / (w * w);
+        return (1.0 - t * ((1.0 / 3) - t * ((1.0 / 5) - t * ((1.0 / 7) - t * (1.0 / 9))))) *
+               (2.0 / w);
+      },
+      [&] {
+        const S n = sqrt(square);
+        return atan2(n, w) * 2.0 / n;
+      });
 }
 
 /// The shortest rotation vector of a unit quaternion: ‖ω‖ ≤ π, the same for q and −q.
 template <class S>
 Vector3<S> log(const Quaternion<S>& q) {
-  const S sign = q[3] < 0.0 ? S(-1) : S(1);
+  using lanes::if_less;
+  const S sign = if_less(q[3], 0.0, -1.0, 1.0);
   const S square = q[0] * q[0] + q[1] * q[1] + q[2] * q[2];
   const S factor = log_factor<S>(square, q[3] * sign) * sign;
   return {q[0] * factor, q[1] * factor, q[2] * factor};
@@ -186,13 +206,18 @@ S inverse_jacobian_factor(const S& square) {
   using std::cos;
   using std::sin;
   using std::sqrt;
-  if (square < 1e-2) {
-    return (1.0 / 12) +
-           square * ((1.0 / 720) + square * ((1.0 / 30240) + square * ((1.0 / 1209600) +
-                                                                       square * (1.0 / 47900160))));
-  }
-  const S half = sqrt(square) * 0.5;
-  return (1.0 - half * cos(half) / sin(half)) / square;
+  return lanes::by_bound(
+      square, 1e-2,
+      [&] {
+        return (1.0 / 12) +
+               square * ((1.0 / 720) +
+                         square * ((1.0 / 30240) +
+                                   square * ((1.0 / 1209600) + square * (1.0 / 47900160))));
+      },
+      [&] {
+        const S half = sqrt(square) * 0.5;
+        return (1.0 - half * cos(half) / sin(half)) / square;
+      });
 }
 
 /// J_l⁻¹(ω) v; J_l⁻¹ = I − ½ [ω]ₓ + d [ω]ₓ².
