@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // cairn plugins [NAME]: what is on offer. The list opens no plugin; one name's options load that
-// plugin.
+// plugin. With --check FILE: plugin_check.cpp.
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
@@ -28,6 +28,7 @@
 #include "cairn/types/loss.hpp"
 #include "commands.hpp"
 #include "json_report.hpp"
+#include "plugin_check.hpp"
 #include "table.hpp"
 
 namespace cairn::app {
@@ -292,17 +293,45 @@ int show(const std::string& name, Session& session) {
 }  // namespace
 
 Command add_plugins(ArgumentParser program) {
-  auto name = std::make_shared<std::string>();  // lives as long as the parser and the run
-  ArgumentParser cli = program.add_command("plugins", "what is on offer, or one name's options");
-  cli.add_option("name", *name, "a solver, type, format …: its options, abilities and limits")
+  struct Chosen {
+    std::string name;
+    PluginCheckOptions check;
+  };
+  auto chosen = std::make_shared<Chosen>();  // lives as long as the parser and the run
+  ArgumentParser cli =
+      program.add_command("plugins", "what is on offer, one name's options, or checks of a plugin");
+  cli.add_option("name", chosen->name,
+                 "a solver, type, format …: its options, abilities and limits")
       .component({});
+  cli.add_option("--check", chosen->check.files,
+                 "run the conformance suite over these plugins, in child processes")
+      .type_name("FILE...");
+  cli.add_option("--seconds", chosen->check.seconds,
+                 "with --check, how long a group of checks may take")
+      .type_name("S")
+      .seconds_from(0.1)
+      .show_default();
+  cli.add_option("--seed", chosen->check.seed, "with --check, the seed of the random inputs")
+      .type_name("N")
+      .show_default();
   cli.footer(
       "Plugins are found by --plugin, CAIRN_PLUGIN_PATH, and in the folder cairn beside the core "
-      "library.\n\n"
+      "library.\nA checked plugin finds others by --plugin and in that folder alone. Exit code: 0 "
+      "if "
+      "every check holds,\n5 if one does not.\n\n"
       "Example:\n"
-      "  cairn plugins cholmod");
-  return {cli, [name](Session& session) {
-            return name->empty() ? list(session) : show(*name, session);
+      "  cairn plugins cholmod\n"
+      "  cairn plugins --check build/range.so");
+  return {cli, [chosen](Session& session) {
+            if (!chosen->check.files.empty()) {
+              if (!chosen->name.empty()) {
+                throw Error(ErrorCode::usage,
+                            fmt::format("'{}' and --check are two questions; ask one at a time",
+                                        chosen->name));
+              }
+              return check_plugins(chosen->check, session);
+            }
+            return chosen->name.empty() ? list(session) : show(chosen->name, session);
           }};
 }
 

@@ -1,0 +1,205 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Formats, which read what they write, and generators, which give the same graph for the same seed.
+#include <array>
+#include <cmath>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "cairn/io/format.hpp"
+#include "cairn/io/generator.hpp"
+#include "cairn/runtime/error.hpp"
+#include "checker.hpp"
+#include "sample_graph.hpp"
+#include "samples.hpp"
+
+namespace cairn::conformance {
+namespace {
+
+struct NamedGraph {
+  std::string name;
+  Graph graph;
+};
+
+/// Graphs of what is on offer: poses in the plane, in space, cameras with points.
+std::vector<NamedGraph> graphs_to_write(Registry& registry, std::uint64_t seed) {
+  std::vector<NamedGraph> graphs;
+  if (registry.has("variable", "VERTEX_SE2") && registry.has("factor", "EDGE_SE2")) {
+    graphs.push_back({"40 poses in the plane", two_laps(40, seed,
+                                                        {registry.variable_type("VERTEX_SE2"),
+                                                         registry.factor_type("EDGE_SE2")})});
+  }
+  for (const char* name : {"ellipse3d", "bundle"}) {
+    if (!registry.has(Generator::kKind, name)) continue;
+    graphs.push_back({fmt::format("what generator '{}' makes", name),
+                      registry.make<Generator>(name)->generate(registry, seed).graph});
+  }
+  return graphs;
+}
+
+/// The text of a graph; none where the format cannot express it.
+std::optional<std::string> written(Format& format, const Graph& graph, Checker& check) {
+  return check.call("write", [&]() -> std::optional<std::string> {
+    try {
+      return format.write(graph);
+    } catch (const Error& error) {
+      if (error.code() == ErrorCode::input) return {};
+      throw;
+    }
+  });
+}
+
+/// How many variables are poses, which is all that a format of trajectories holds.
+int poses_of(const Graph& graph) {
+  int count = 0;
+  for (int v = 0; v < graph.variable_count(); ++v) {
+    const Placement* placement = graph.type(v).placement();
+    if (placement && placement->has_orientation()) ++count;
+  }
+  return count;
+}
+
+void compare(const Graph& before, const Graph& after, Checker& check) {
+  if (after.factor_count() == 0 && after.variable_count() != before.variable_count()) {
+    check.expect(after.variable_count() == poses_of(before),
+                 "read finds as many poses as were written",
+                 [&] { return fmt::format("{} of {}", after.variable_count(), poses_of(before)); });
+    return;
+  }
+  check.expect(after.variable_count() == before.variable_count(),
+               "read finds as many variables as were written", [&] {
+                 return fmt::format("{} of {}", after.variable_count(), before.variable_count());
+               });
+  if (after.variable_count() != before.variable_count()) return;
+  for (int v = 0; v < before.variable_count(); ++v) {
+    if (after.type(v).tag() != before.type(v).tag()) continue;  // a trajectory in space
+    State delta(static_cast<std::size_t>(before.type(v).tangent_size()));
+    before.type(v).local(1, before.state(v).data(), after.state(v).data(), delta.data());
+    check.within(norm(delta), 1e-5 * (1.0 + norm(before.state(v))),
+                 "read finds the states that were written");
+  }
+  if (after.factor_count() == 0) return;  // a format of trajectories
+  check.expect(
+      after.factor_count() == before.factor_count(), "read finds as many factors as were written",
+      [&] { return fmt::format("{} of {}", after.factor_count(), before.factor_count()); });
+  const double here = chi2(before), there = chi2(after);
+  check.within(std::abs(here - there), 1e-4 * (1.0 + here),
+               "chi2 is that of the graph that was written");
+}
+
+void check_round_trip(const Subject& subject, Checker& check) {
+  const auto format = subject.registry.make<Format>(subject.name);
+  const bool reads = check.call("can_read", [&] { return format->can_read(); }),
+             writes = check.call("can_write", [&] { return format->can_write(); });
+  check.expect(reads || writes, "it reads or writes", [] { return std::string("neither"); });
+  check.expect(!check.call("extensions", [&] { return format->extensions(); }).empty(),
+               "extensions has an ending for new files", [] { return std::string("it is empty"); });
+  if (!writes) return check.note("it writes nothing, so there is nothing to compare");
+  bool some = false;
+  for (const NamedGraph& sample : graphs_to_write(subject.registry, check.options().seed)) {
+    check.sample(sample.name, [&] {
+      const std::optional<std::string> text = written(*format, sample.graph, check);
+      if (!text) return;
+      some = true;
+      if (!reads) return;
+      const int confidence = check.call("detect", [&] { return format->detect(*text); });
+      check.expect(confidence > 0 && confidence <= 100, "detect knows what it wrote",
+                   [&] { return fmt::format("its confidence is {}", confidence); });
+      ReadReport report;
+      const Graph again = check.call(
+          "read", [&] { return format->read(*text, "conformance", subject.registry, {}, report); });
+      compare(sample.graph, again, check);
+    });
+  }
+  check.describe("");
+  if (!some) check.note("it expresses none of the graphs that could be made here");
+}
+
+/// What is no graph is refused with an `Error`, and half a file is read or refused.
+void check_bad_texts(const Subject& subject, Checker& check) {
+  const auto format = subject.registry.make<Format>(subject.name);
+  if (!format->can_read()) return check.note("it reads nothing");
+  const auto reads = [&](std::string_view text) {
+    return check.call("read", [&] {
+      try {
+        ReadReport report;
+        static_cast<void>(format->read(text, "conformance", subject.registry, {}, report));
+        return true;
+      } catch (const Error& error) {
+        if (error.code() == ErrorCode::input) return false;
+        throw;
+      }
+    });
+  };
+  for (const std::string_view text :
+       {std::string_view("this is no graph\n"), std::string_view("\x00\xff\x01\n\x00", 5),
+        std::string_view("VERTEX_SE2 0 zero zero zero\n"), std::string_view("0 1 2 x\n")}) {
+    check.sample(fmt::format("a text of {} bytes: {}", text.size(), text.substr(0, 16)), [&] {
+      check.expect(!reads(text), "read refuses what is no graph with an Error (input)",
+                   [] { return std::string("it was read"); });
+    });
+  }
+  if (!format->can_write()) return;
+  for (const NamedGraph& sample : graphs_to_write(subject.registry, check.options().seed)) {
+    check.sample("the beginning of " + sample.name, [&] {
+      const std::optional<std::string> text = written(*format, sample.graph, check);
+      if (!text) return;
+      for (std::size_t k = 1; k < 12; ++k)
+        static_cast<void>(reads(std::string_view(*text).substr(0, k * text->size() / 12)));
+    });
+  }
+}
+
+bool same(const Graph& a, const Graph& b) {
+  if (a.variable_count() != b.variable_count() || a.factor_count() != b.factor_count())
+    return false;
+  for (int v = 0; v < a.variable_count(); ++v) {
+    if (!std::ranges::equal(a.state(v), b.state(v))) return false;
+  }
+  for (int f = 0; f < a.factor_count(); ++f) {
+    if (!std::ranges::equal(a.measurement(f), b.measurement(f))) return false;
+  }
+  return true;
+}
+
+void check_simulation(const Subject& subject, Checker& check) {
+  const auto generate = [&](std::uint64_t seed) {
+    const auto generator = subject.registry.make<Generator>(subject.name);
+    return check.call("generate", [&] { return generator->generate(subject.registry, seed); });
+  };
+  check.sample(fmt::format("seed {}", check.options().seed), [&] {
+    const Simulation one = generate(check.options().seed), two = generate(check.options().seed);
+    check.expect(one.graph.variable_count() > 0, "the graph has variables",
+                 [] { return std::string("it is empty"); });
+    check.expect(same(one.graph, two.graph) && same(one.truth, two.truth),
+                 "the same seed gives the same graph", [] { return std::string("they differ"); });
+    check.expect(one.truth.variable_count() == one.graph.variable_count() &&
+                     one.truth.factor_count() == one.graph.factor_count(),
+                 "the truth has the variables and factors of the graph", [&] {
+                   return fmt::format("{} and {} variables, {} and {} factors",
+                                      one.truth.variable_count(), one.graph.variable_count(),
+                                      one.truth.factor_count(), one.graph.factor_count());
+                 });
+    check.expect(
+        std::isfinite(chi2(one.graph)) && std::isfinite(chi2(one.truth)), "chi2 is finite",
+        [&] { return fmt::format("{}, of the truth {}", chi2(one.graph), chi2(one.truth)); });
+  });
+}
+
+}  // namespace
+
+std::span<const Group> format_groups() {
+  static constexpr std::array<Group, 2> groups{
+      {{"round trip", check_round_trip}, {"texts that are no graph", check_bad_texts}}};
+  return groups;
+}
+
+std::span<const Group> generator_groups() {
+  static constexpr std::array<Group, 1> groups{{{"simulation", check_simulation}}};
+  return groups;
+}
+
+}  // namespace cairn::conformance

@@ -1,0 +1,160 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What holds of every component: its table of options is complete, and it can be made with each
+// choice.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "cairn/exploration/explorer.hpp"
+#include "cairn/exploration/floor_map.hpp"
+#include "cairn/exploration/path_planner.hpp"
+#include "cairn/exploration/scan_log.hpp"
+#include "cairn/exploration/world.hpp"
+#include "cairn/grid/floor_plan.hpp"
+#include "cairn/grid/floor_survey.hpp"
+#include "cairn/grid/grid_format.hpp"
+#include "cairn/io/format.hpp"
+#include "cairn/io/generator.hpp"
+#include "cairn/io/stream_format.hpp"
+#include "cairn/linear/linear_solver.hpp"
+#include "cairn/plugin/options.hpp"
+#include "cairn/policy/pose_policy.hpp"
+#include "cairn/policy/registration.hpp"
+#include "cairn/report/scene.hpp"
+#include "cairn/runtime/error.hpp"
+#include "cairn/solve/estimator.hpp"
+#include "cairn/solve/initial_guess.hpp"
+#include "cairn/solve/optimizer.hpp"
+#include "cairn/sparsification/edge_selection.hpp"
+#include "cairn/sparsification/recovery.hpp"
+#include "cairn/sparsification/selection.hpp"
+#include "cairn/sparsification/sparsifier.hpp"
+#include "cairn/sparsification/topology.hpp"
+#include "cairn/types/loss.hpp"
+#include "checker.hpp"
+
+namespace cairn::conformance {
+namespace {
+
+using Make = void (*)(Registry&, const ComponentSpec&);
+struct Maker {
+  std::string_view kind;
+  Make make;
+};
+
+template <class Interface>
+constexpr Maker maker() {
+  return {Interface::kKind, [](Registry& registry, const ComponentSpec& spec) {
+            static_cast<void>(registry.make<Interface>(spec));
+          }};
+}
+
+/// Of every kind that cairn has an interface for.
+constexpr auto kMakers = std::to_array<Maker>(
+    {maker<EdgeSelection>(), maker<Estimator>(),     maker<Explorer>(),     maker<FactorRecovery>(),
+     maker<FloorPlan>(),     maker<FloorSurveyor>(), maker<Format>(),       maker<Generator>(),
+     maker<GridFormat>(),    maker<InitialGuess>(),  maker<LinearSolver>(), maker<Loss>(),
+     maker<Mapper>(),        maker<NodeSelection>(), maker<Optimizer>(),    maker<PathPlanner>(),
+     maker<Picture>(),       maker<PosePolicy>(),    maker<Registration>(), maker<ScanLogFormat>(),
+     maker<Sparsifier>(),    maker<StreamFormat>(),  maker<Topology>(),     maker<World>()});
+
+bool plain_name(std::string_view name) {
+  return !name.empty() && std::ranges::all_of(name, [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '_';
+  });
+}
+
+/// What an option's value reads as, whatever its type.
+std::string read_back(const Options& options, const OptionSpec& spec) {
+  switch (spec.type) {
+    case OptionType::boolean:
+      return option_text(options.boolean(spec.name));
+    case OptionType::integer:
+      return option_text(options.integer(spec.name));
+    case OptionType::real:
+      return option_text(options.real(spec.name));
+    case OptionType::text:
+    case OptionType::choice:
+    case OptionType::component:
+      return options.text(spec.name);
+  }
+  return {};
+}
+
+void check_spec(const OptionSpec& spec, const OptionTable& table, const Subject& subject,
+                Checker& check) {
+  const std::string name = spec.name;
+  check.describe(fmt::format("option '{}'", name));
+  check.expect(plain_name(name), "names of options are of a-z, 0-9 and _",
+               [&] { return fmt::format("'{}'", name); });
+  check.expect(!spec.help.empty() && spec.help.find('\n') == std::string::npos,
+               "every option has a line of help", [&] { return fmt::format("'{}'", spec.help); });
+  if (spec.type == OptionType::choice) {
+    check.expect(std::ranges::find(spec.choices, spec.default_value) != spec.choices.end(),
+                 "the default is one of the choices",
+                 [&] { return fmt::format("it is '{}'", spec.default_value); });
+  }
+  if (spec.type == OptionType::component) {
+    check.expect(spec.choices.size() == 1, "an option for a component names its kind",
+                 [&] { return fmt::format("it names {}", spec.choices.size()); });
+  }
+  // The default, written down, is the default.
+  const auto values_with = [&](const std::string& value) {
+    return Options(table, {{name, value}}, subject.name);
+  };
+  check.call("Options", [&] {
+    const std::string implied = read_back(Options(table, {}, subject.name), spec),
+                      given = read_back(values_with(spec.default_value), spec),
+                      again = read_back(values_with(given), spec);
+    check.expect(implied == given && given == again, "values of options round-trip as text",
+                 [&] { return fmt::format("'{}', '{}', '{}'", implied, given, again); });
+    for (const double bound : {spec.minimum, spec.maximum}) {
+      if (!std::isfinite(bound)) continue;
+      if (spec.type == OptionType::real) static_cast<void>(values_with(option_text(bound)));
+    }
+  });
+}
+
+}  // namespace
+
+void check_options(const Subject& subject, std::string_view kind, Checker& check) {
+  const OptionTable& table = subject.registry.options(kind, subject.name);
+  for (const OptionSpec& spec : table.specs()) {
+    check.sample("", [&] { check_spec(spec, table, subject, check); });
+  }
+  if (kind == "types") return;
+  const auto known =
+      std::ranges::find_if(kMakers, [&](const Maker& one) { return one.kind == kind; });
+  if (known == kMakers.end()) return check.note("a kind of its own: it is not made here");
+  const auto make = [&](const OptionValues& values, std::string_view law) {
+    check.expect(true, law, [] { return std::string(); });
+    try {
+      known->make(subject.registry, {subject.name, values});
+    } catch (const Error& error) {
+      // A choice may be one that this build or machine refuses, as long as it says so.
+      if (values.empty() || error.code() == ErrorCode::plugin) check.fail(law, error.what());
+    }
+  };
+  check.sample("no options", [&] {
+    check.call("the factory", [&] { make({}, "it can be made with its defaults"); });
+  });
+  for (const OptionSpec& spec : table.specs()) {
+    std::vector<std::string> values{spec.default_value};
+    if (spec.type == OptionType::choice) values = spec.choices;
+    if (spec.type == OptionType::boolean) values = {"true", "false"};
+    for (const std::string& value : values) {
+      if (spec.type == OptionType::component || value.find(',') != std::string::npos) continue;
+      check.sample(fmt::format("{}:{}={}", subject.name, spec.name, value), [&] {
+        check.call("the factory", [&] {
+          make({{spec.name, value}}, "it can be made with every choice of its options");
+        });
+      });
+    }
+  }
+}
+
+}  // namespace cairn::conformance
