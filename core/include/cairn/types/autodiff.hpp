@@ -6,7 +6,7 @@
 
 #include <Eigen/Core>
 
-#include "cairn/types/dual.hpp"
+#include "cairn/pack/dual.hpp"
 
 /// Jacobians of a factor without writing them: forward differentiation with dual numbers.
 namespace cairn::autodiff {

@@ -6,7 +6,7 @@
 
 #include <Eigen/Core>
 
-#include "cairn/types/dual.hpp"
+#include "cairn/pack/dual.hpp"
 #include "cairn/types/variable_type.hpp"
 
 namespace cairn {

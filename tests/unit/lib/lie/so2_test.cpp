@@ -9,7 +9,7 @@
 #include <numbers>
 #include <random>
 
-#include "cairn/types/dual.hpp"
+#include "cairn/pack/dual.hpp"
 
 namespace cairn::so2 {
 namespace {

@@ -8,11 +8,11 @@
 #include <sstream>
 #include <unsupported/Eigen/MatrixFunctions>
 
+#include "cairn/pack/dual.hpp"
 #include "cairn/typed/pose2.hpp"
 #include "cairn/typed/pose3.hpp"
 #include "cairn/typed/rot2.hpp"
 #include "cairn/typed/rot3.hpp"
-#include "cairn/types/dual.hpp"
 #include "support/sampling.hpp"
 
 namespace cairn::test {

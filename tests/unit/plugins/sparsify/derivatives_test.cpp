@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "approximation.hpp"
-#include "cairn/types/dual.hpp"
+#include "cairn/pack/dual.hpp"
 #include "recovery.hpp"
 #include "unit/plugins/sparsify/problems.hpp"
 

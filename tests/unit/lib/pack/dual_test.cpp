@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "cairn/types/dual.hpp"
+#include "cairn/pack/dual.hpp"
 
 #include <gtest/gtest.h>
 
