@@ -191,11 +191,11 @@ CommandLine::CommandLine(Session& session)
       "Example:\n"
       "  cairn generate sphere -o sphere.g2o && cairn optimize sphere.g2o -o best.g2o\n"
       "  cairn bench sphere.g2o --linear-solver block_cholesky,cholmod,eigen");
-  commands_ = {add_info(cli),     add_optimize(cli),  add_bench(cli),   add_replay(cli),
-               add_online(cli),   add_marginals(cli), add_compact(cli), add_sparsify(cli),
-               add_evaluate(cli), add_view(cli),      add_plot(cli),    add_convert(cli),
-               add_generate(cli), add_explore(cli),   add_map(cli),     add_plugins(cli),
-               add_study(cli)};
+  commands_ = {add_info(cli),       add_optimize(cli),  add_bench(cli),   add_replay(cli),
+               add_online(cli),     add_marginals(cli), add_compact(cli), add_sparsify(cli),
+               add_evaluate(cli),   add_view(cli),      add_plot(cli),    add_convert(cli),
+               add_generate(cli),   add_explore(cli),   add_map(cli),     add_plugins(cli),
+               add_new_plugin(cli), add_study(cli)};
   help_ = cli.add_command("help", "this text, or that of a command");
   help_.add_option("command", help_options_.command, "the command that is to be explained")
       .type_name("COMMAND")

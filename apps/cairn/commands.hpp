@@ -17,6 +17,7 @@ struct Command {
 
 // One file each. Adds the subcommand with its options to the program.
 Command add_plugins(ArgumentParser program);
+Command add_new_plugin(ArgumentParser program);
 Command add_info(ArgumentParser program);
 Command add_convert(ArgumentParser program);
 Command add_generate(ArgumentParser program);

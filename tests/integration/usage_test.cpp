@@ -23,8 +23,9 @@ using ::testing::StartsWith;
 
 constexpr int kUsage = 2, kInput = 3, kPlugin = 5;
 
-const std::vector<std::string> kCommands{"info",     "optimize", "bench", "evaluate", "convert",
-                                         "generate", "plugins",  "view",  "plot",     "study"};
+const std::vector<std::string> kCommands{"info",    "optimize", "bench",   "evaluate",
+                                         "convert", "generate", "plugins", "new-plugin",
+                                         "view",    "plot",     "study"};
 
 void expect_fits_a_screen(const Outcome& help) {
   EXPECT_EQ(help.exit_code, 0) << help.err;

@@ -1,0 +1,241 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// cairn new-plugin NAME --factor|…: a project to begin a plugin with, from the templates that are
+// installed with the program.
+#include <stdlib.h>
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include <fmt/core.h>
+#include <boost/json/array.hpp>
+#include <boost/json/object.hpp>
+
+#include "arguments.hpp"
+#include "cairn/io/format.hpp"
+#include "cairn/runtime/error.hpp"
+#include "cairn/runtime/version.hpp"
+#include "commands.hpp"
+#include "json_report.hpp"
+#include "table.hpp"
+
+namespace cairn::app {
+namespace {
+
+namespace fs = std::filesystem;
+namespace json = boost::json;
+
+/// One kind of plugin: a folder of templates, and what its manifest offers.
+struct Kind {
+  const char* option;  // without --
+  const char* folder;
+  const char* description;
+  const char* offers;
+  const char* tag;  // of types; empty for a component
+  const char* use;  // a first command
+  bool example;     // a graph comes with it
+};
+constexpr std::array<Kind, 4> kKinds{
+    {{"factor", "factor", "A factor of its own",
+      "\"types|@NAME@|measurements of @NAME@\"\n"
+      "         \"factor|@TAG@|distance from a pose to a landmark\"",
+      "EDGE_@UPPER@", "cairn optimize example.g2o --plugin build/@NAME@.so", true},
+     {"variable", "variable", "A variable of its own",
+      "\"types|@NAME@|variables of @NAME@\"\n"
+      "         \"variable|@TAG@|a heading\"\n"
+      "         \"factor|EDGE_PRIOR_@UPPER@|a measured heading\"",
+      "VERTEX_@UPPER@", "cairn optimize example.g2o --plugin build/@NAME@.so", true},
+     {"loss", "loss", "A robust loss of its own", "\"loss|@NAME@|a robust loss\"", "",
+      "cairn optimize @manhattan --loss @NAME@:scale=2 --plugin build/@NAME@.so", false},
+     {"linear-solver", "linear_solver", "A linear solver of its own",
+      "\"linear_solver|@NAME@|a dense factorisation\"", "",
+      "cairn optimize @ring --linear-solver @NAME@ --plugin build/@NAME@.so", false}}};
+
+/// Where the templates are, from the program's own place: PREFIX/bin/cairn.
+fs::path template_folder() {
+  std::error_code error;
+  const fs::path program = fs::read_symlink("/proc/self/exe", error);
+  fs::path folder = program.parent_path().parent_path() / CAIRN_TEMPLATE_FOLDER;
+  if (error || !fs::is_directory(folder)) {
+    throw Error(ErrorCode::input,
+                fmt::format("{}: the templates of new plugins are not there; install cairn with "
+                            "'cmake --install'",
+                            folder.string()));
+  }
+  return folder;
+}
+
+/// "laser_range" as "LaserRange" and as "LASER_RANGE".
+std::string class_name(const std::string& name) {
+  std::string result;
+  bool first = true;
+  for (const char c : name) {
+    if (c != '_') result += first ? static_cast<char>(std::toupper(c)) : c;
+    first = c == '_';
+  }
+  return result;
+}
+std::string upper_case(std::string name) {
+  std::ranges::transform(name, name.begin(),
+                         [](unsigned char c) { return static_cast<char>(std::toupper(c)); });
+  return name;
+}
+
+void check_name(const std::string& name) {
+  const bool good = !name.empty() && name.front() >= 'a' && name.front() <= 'z' &&
+                    std::ranges::all_of(name, [](char c) {
+                      return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '_';
+                    });
+  if (good) return;
+  throw Error(ErrorCode::usage,
+              fmt::format("'{}' cannot be the name of a plugin: a letter from a to z, then a-z, "
+                          "0-9 and _, such as laser_range",
+                          name));
+}
+
+using Words = std::vector<std::pair<std::string, std::string>>;
+
+/// What stands for each @WORD@ of the templates. Values may hold words that come after them.
+Words words_for(const Kind& kind, const std::string& name) {
+  return {{"@DESCRIPTION@", kind.description},
+          {"@OFFERS@", kind.offers},
+          {"@USE@", kind.use},
+          {"@TAG@", kind.tag},
+          {"@VERSION@", CAIRN_VERSION},
+          {"@CLASS@", class_name(name)},
+          {"@UPPER@", upper_case(name)},
+          {"@NAME@", name}};
+}
+
+std::string filled_in(std::string text, const Words& words) {
+  for (const auto& [word, value] : words) {
+    for (std::size_t at = 0; (at = text.find(word, at)) != std::string::npos; at += value.size())
+      text.replace(at, word.size(), value);
+  }
+  return text;
+}
+
+/// A folder beside the final one, which it becomes once it is whole.
+class UnfinishedFolder {
+ public:
+  explicit UnfinishedFolder(fs::path folder) : final_(std::move(folder)) {
+    if (fs::exists(fs::symlink_status(final_)))
+      throw Error(ErrorCode::input,
+                  fmt::format("{}: there already; choose another name or folder", final_.string()));
+    std::string name = final_.string() + ".XXXXXX";
+    if (!::mkdtemp(name.data()))
+      throw Error(ErrorCode::input, fmt::format("{}: {}", final_.string(), std::strerror(errno)));
+    path_ = name;
+  }
+  UnfinishedFolder(const UnfinishedFolder&) = delete;
+  UnfinishedFolder& operator=(const UnfinishedFolder&) = delete;
+  ~UnfinishedFolder() {
+    std::error_code ignored;
+    if (!path_.empty()) fs::remove_all(path_, ignored);
+  }
+
+  const fs::path& path() const { return path_; }
+  void finish() {
+    std::error_code error;
+    fs::permissions(path_, fs::perms::owner_all | fs::perms::group_read | fs::perms::group_exec |
+                               fs::perms::others_read | fs::perms::others_exec);
+    fs::rename(path_, final_, error);
+    if (error)
+      throw Error(ErrorCode::input, fmt::format("{}: {}", final_.string(), error.message()));
+    path_.clear();
+  }
+
+ private:
+  fs::path final_, path_;
+};
+
+struct Chosen {
+  std::string name;
+  std::string folder;
+  std::array<bool, kKinds.size()> kinds{};
+};
+
+const Kind& kind_of(const Chosen& chosen) {
+  if (std::ranges::count(chosen.kinds, true) != 1) {
+    std::string all;
+    for (const Kind& kind : kKinds)
+      all += fmt::format("{}--{}", all.empty() ? "" : ", ", kind.option);
+    throw Error(ErrorCode::usage, fmt::format("one kind of plugin must be given: {}", all));
+  }
+  return kKinds[static_cast<std::size_t>(std::ranges::find(chosen.kinds, true) -
+                                         chosen.kinds.begin())];
+}
+
+int make_project(const Chosen& chosen, Session& session) {
+  check_name(chosen.name);
+  const Kind& kind = kind_of(chosen);
+  const fs::path templates = template_folder();
+  const fs::path folder = chosen.folder.empty() ? chosen.name : chosen.folder;
+  const Words words = words_for(kind, chosen.name);
+  struct File {
+    fs::path from, to;
+  };
+  const fs::path own = templates / kind.folder;
+  std::vector<File> files{
+      {templates / "common" / "CMakeLists.txt", "CMakeLists.txt"},
+      {templates / "common" / "README.md", "README.md"},
+      {own / "plugin.cpp", chosen.name + ".cpp"},
+      {own / "tests" / "plugin_test.cpp", fs::path("tests") / (chosen.name + "_test.cpp")}};
+  if (kind.example) files.push_back({own / "example.g2o", "example.g2o"});
+
+  UnfinishedFolder unfinished(folder);
+  fs::create_directory(unfinished.path() / "tests");
+  std::vector<std::string> written;
+  for (const File& file : files) {
+    write_file(unfinished.path() / file.to,
+               filled_in(read_file(file.from.string() + ".in"), words));
+    written.push_back((folder / file.to).string());
+  }
+  unfinished.finish();
+
+  json::object report = begin_report("new-plugin");
+  report["folder"] = folder.string();
+  report["files"] = strings_json(written);
+  session.write_json(report);
+  session.print(fmt::format(
+      "{}\n\nNext:\n  cd {}\n  cmake -B build -DCMAKE_PREFIX_PATH={} && cmake --build build\n"
+      "  ctest --test-dir build --output-on-failure\n  {}\n",
+      printable(joined(written, "\n"), true), printable(folder.string()),
+      printable(templates.parent_path().parent_path().parent_path().string()),
+      filled_in(kind.use, words)));
+  return 0;
+}
+
+}  // namespace
+
+Command add_new_plugin(ArgumentParser program) {
+  auto chosen = std::make_shared<Chosen>();  // lives as long as the parser and the run
+  ArgumentParser cli = program.add_command("new-plugin", "a project to begin a plugin with");
+  cli.add_option("name", chosen->name, "of the plugin and its files: a-z, 0-9 and _")
+      .type_name("NAME")
+      .required();
+  constexpr std::array<const char*, kKinds.size()> help{
+      "a measurement between variables", "a type of states, with a factor on it",
+      "a robust loss, with an option", "a solver of H x = g"};
+  for (std::size_t k = 0; k < kKinds.size(); ++k)
+    cli.add_flag(fmt::format("--{}", kKinds[k].option), chosen->kinds[k], help[k]);
+  cli.add_option("--folder", chosen->folder, "where it is written; must not exist [NAME]")
+      .type_name("FOLDER");
+  cli.footer(
+      "It builds against the installed cairn, works as it is, and passes its own tests, which run "
+      "the\nconformance suite (cairn plugins --check).\n\n"
+      "Example:\n"
+      "  cairn new-plugin laser_range --factor");
+  return {cli, [chosen](Session& session) { return make_project(*chosen, session); }};
+}
+
+}  // namespace cairn::app
