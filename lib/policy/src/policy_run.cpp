@@ -80,9 +80,13 @@ bool has_all_of(const Graph& truth, const Graph& recording) {
 
 void evaluate(PosePolicy& policy, const PolicyData& data, PolicyResult& result) {
   if (!data.truth) return;
-  for (const auto& [how, name] : enum_names(Recovery{})) {
-    result.errors[std::string(name)] =
-        compare(trajectory(recovered_trajectory(policy, how)), *data.truth);
+  try {
+    for (const auto& [how, name] : enum_names(Recovery{})) {
+      result.errors[std::string(name)] =
+          compare(trajectory(recovered_trajectory(policy, how)), *data.truth);
+    }
+  } catch (const Error& error) {  // too few poses to compare, when it was interrupted
+    if (!result.interrupted || error.code() != ErrorCode::input) throw;
   }
   if (data.truth_graph && has_all_of(*data.truth_graph, result.compact))
     result.normalized = normalized_error(result.compact, *data.truth_graph);
