@@ -174,7 +174,7 @@ TEST(Completion, KnowsTheOptionsOfAComponent) {
 /// What bash puts in place of the last word of the line.
 Words in_bash(const std::string& line) {
   const std::filesystem::path script =
-      std::filesystem::path(CAIRN_SOURCE_FOLDER) / "apps/cairn/completion/cairn.bash";
+      std::filesystem::path(source_folder()) / "apps/cairn/completion/cairn.bash";
   const Outcome outcome = run_program({"bash", "-c",
                                        "set -u; source " + script.string() +
                                            "\nCOMP_LINE=$1 COMP_POINT=${#1}\n_cairn \"$2\"\nprintf "
@@ -200,7 +200,7 @@ TEST(Completion, IsWhatBashShows) {
 }
 
 TEST(Completion, ScriptsAreShellsOwnLanguage) {
-  const std::string folder = CAIRN_SOURCE_FOLDER "/apps/cairn/completion/";
+  const std::string folder = source_folder() + "/apps/cairn/completion/";
   const Outcome bash = run_program({"bash", "-n", folder + "cairn.bash"});
   EXPECT_EQ(bash.exit_code, 0) << bash.err;
   if (run_program({"zsh", "--version"}).exit_code != 0) GTEST_SKIP() << "without zsh";
