@@ -318,7 +318,7 @@ Command add_plugins(ArgumentParser program) {
       "Plugins are found by --plugin, CAIRN_PLUGIN_PATH, and in the folder cairn beside the core "
       "library.\nA checked plugin finds others by --plugin and in that folder alone. Exit code: 0 "
       "if "
-      "every check holds,\n5 if one does not.\n\n"
+      "every check\nholds, 5 if one does not.\n\n"
       "Example:\n"
       "  cairn plugins cholmod\n"
       "  cairn plugins --check build/range.so");
