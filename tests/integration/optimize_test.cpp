@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <csignal>
+#include <string>
+#include <utility>
 
 #include "cairn/plugin/registry.hpp"
 #include "integration/process.hpp"
@@ -281,6 +283,23 @@ TEST_F(OptimizeCommand, NamesTheGraphByItsFile) {
     const auto graph = report_of({command, file}).at("graph");
     EXPECT_EQ(graph.at("name").as_string(), "ring.g2o");
     EXPECT_EQ(graph.at("file").as_string(), file);
+  }
+}
+
+/// A step that a heavy damping or a small trust region makes short is no convergence.
+TEST(ShortSteps, AreNotTakenForConvergence) {
+  const Registry registry;
+  for (const auto& [name, option] : {std::pair{"levenberg_marquardt", ":initial_lambda=1e16"},
+                                     {"ceres", ":initial_radius=1e-30"}}) {
+    if (!registry.has("optimizer", name)) continue;
+    const Outcome run = cairn({"optimize", "@manhattan:poses=60", "--initial", "as_given",
+                               "--optimizer", std::string(name) + option});
+    EXPECT_EQ(run.exit_code, 4) << name << ": " << run.out;
+    EXPECT_EQ(
+        cairn({"optimize", "@manhattan:poses=60", "--initial", "as_given", "--optimizer", name})
+            .exit_code,
+        0)
+        << name;
   }
 }
 
