@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <stdexcept>
 
 #include <fmt/core.h>
 
@@ -32,10 +33,11 @@ GraphMarginals::GraphMarginals(const Graph& graph, LinearSolver& solver)
     : graph_(&graph), equations_(graph, solver), marginals_(&marginals_of(solver)) {}
 
 Factorization GraphMarginals::factorize() {
+  singular_ = false;
+  diagonal_.clear();
   if (size() == 0) return {};
   equations_.linearize(graph_->values());
   Factorization factorization = equations_.factorize();
-  singular_ = false;
   if (!factorization.ok) return factorization;
   const BlockStructure& structure = equations_.linearizer().structure();
   std::int64_t entries = 0;
@@ -75,6 +77,8 @@ std::string GraphMarginals::explain(const Factorization& failure) const {
 }
 
 std::vector<double> GraphMarginals::diagonal() {
+  if (size() > 0 && diagonal_.empty())
+    throw std::logic_error("GraphMarginals: diagonal without a factorisation");
   const Linearizer& linearizer = equations_.linearizer();
   std::int64_t entries = 0;
   for (int v = 0; v < graph_->variable_count(); ++v)

@@ -197,6 +197,9 @@ Summary CeresOptimizer::optimize(Graph& graph, const Stop& stop, Observer& obser
       (!std::isfinite(summary.final_chi2) ||
        ended_without_descent(report, state_extent(graph, graph.values()))))
     summary.status = Status::diverged;
+  summary.notes.push_back("Ceres: " + report.message);
+  summary.seconds = seconds_of(report);
+  summary.seconds.total = seconds_since(begin);  // without the question that is cairn's own
   if (summary.status == Status::converged && stop.tolerance > 0.0 && loss_.name == "none") {
     // A step may be short because the trust region is, or beside states far from the origin.
     const NewtonStep left = NewtonDecrement(graph, gauge).at(graph.values());
@@ -209,9 +212,6 @@ Summary CeresOptimizer::optimize(Graph& graph, const Stop& stop, Observer& obser
                       left.decrease));
     }
   }
-  summary.notes.push_back("Ceres: " + report.message);
-  summary.seconds = seconds_of(report);
-  summary.seconds.total = seconds_since(begin);
   summary.solver.note = fmt::format(
       "{}, {}", ceres::LinearSolverTypeToString(report.linear_solver_type_used),
       ceres::SparseLinearAlgebraLibraryTypeToString(report.sparse_linear_algebra_library_type));

@@ -289,6 +289,14 @@ TEST_P(MarginalsTest, AreZeroWhereEverythingIsHeld) {
   EXPECT_THAT(marginals.column(1), testing::Each(0.0));
 }
 
+TEST_P(MarginalsTest, OfAGraphNeedAFactorisation) {
+  const Graph graph = ring_of_poses(5, 0.1);
+  GraphMarginals marginals(graph, *solver_);
+  EXPECT_THROW(marginals.diagonal(), std::logic_error);
+  ASSERT_TRUE(marginals.factorize().ok);
+  EXPECT_FALSE(marginals.diagonal().empty());
+}
+
 TEST(GraphMarginals, RefuseASolverThatCannot) {
   Registry registry;
   if (!registry.has("linear_solver", "pcg")) GTEST_SKIP();
