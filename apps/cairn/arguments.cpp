@@ -356,8 +356,10 @@ ParseOutcome ProgramParser::parse(int argc, const char* const* argv) {
     if (!left.empty()) return {Kind::unknown_words, error.what(), std::move(left)};
     if (dynamic_cast<const CLI::RequiredError*>(&error) && chosen())
       return {Kind::missing, error.what(), {}};
-    const bool mismatch = dynamic_cast<const CLI::ArgumentMismatch*>(&error) != nullptr;
-    return {mismatch ? Kind::without_value : Kind::bad_value, error.what(), {}};
+    const std::string message = error.what();
+    if (!dynamic_cast<const CLI::ArgumentMismatch*>(&error)) return {Kind::bad_value, message, {}};
+    const bool repeated = message.find(": At Most ") != std::string::npos;  // CLI11's words
+    return {repeated ? Kind::repeated : Kind::without_value, message, {}};
   }
 }
 

@@ -148,6 +148,7 @@ struct ParseOutcome {
     unknown_words,  ///< of the command line, which belong to nothing
     missing,        ///< an argument or option of a command that must be given
     without_value,  ///< an option that needs a value stands without one
+    repeated,       ///< an option has more values than it takes
     bad_value       ///< a value of the wrong type, or refused
   };
   Kind kind = Kind::command;

@@ -137,9 +137,12 @@ Error bad_value(const ParseOutcome& outcome, const ArgumentParser& program,
   std::string what = outcome.message;
   for (const Argument& option : options_of(program, command)) {
     const std::string name = option.name();
-    const bool needs_value = outcome.kind == ParseOutcome::Kind::without_value;
-    if (needs_value && what.starts_with(name + ":"))
-      what = fmt::format("{} needs a value: {} {}", name, name, option.type_name());
+    if (outcome.message.starts_with(name + ":")) {
+      if (outcome.kind == ParseOutcome::Kind::without_value)
+        what = fmt::format("{} needs a value: {} {}", name, name, option.type_name());
+      if (outcome.kind == ParseOutcome::Kind::repeated)
+        what = fmt::format("{} is given more than once", name);
+    }
     const std::string unreadable = fmt::format("Could not convert: {} = ", name);
     if (what.starts_with(unreadable))
       what = fmt::format("{}: '{}' is not a valid {}", name, what.substr(unreadable.size()),
@@ -273,6 +276,7 @@ std::function<int()> CommandLine::parse(int argc, const char* const* argv) {
     case ParseOutcome::Kind::missing:
       throw missing(outcome.message, *chosen);
     case ParseOutcome::Kind::without_value:
+    case ParseOutcome::Kind::repeated:
     case ParseOutcome::Kind::bad_value:
       throw bad_value(outcome, program, chosen);
     case ParseOutcome::Kind::command:

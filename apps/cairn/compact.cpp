@@ -304,7 +304,7 @@ int run_compact(const CompactOptions& options, Session& session) {
     session.write_json(report);
   });
   note_selection(options, outcome, session);
-  results.add([&] { session.print(summary_text(options, outcome)); });
+  results.add([&] { session.print(summary_text(options, outcome, results)); });
   results.finish();
   if (guard.interrupted()) return kExitInterrupted;
   if (!shown.located) {

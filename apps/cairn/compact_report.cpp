@@ -220,7 +220,8 @@ std::string steps_csv(const PolicyResult& result) {
   return text;
 }
 
-std::string summary_text(const CompactOptions& options, const CompactOutcome& outcome) {
+std::string summary_text(const CompactOptions& options, const CompactOutcome& outcome,
+                         const Results& results) {
   Table table({{"", Table::Align::left}, {"", Table::Align::left}});
   table.add({"graph", fmt::format("{}: {}, {}", outcome.name,
                                   plural(outcome.data.recording.variable_count(), "pose"),
@@ -230,9 +231,10 @@ std::string summary_text(const CompactOptions& options, const CompactOutcome& ou
     table.add({"thresholds", thresholds_line(outcome.found.options)});
   add_result(table, outcome.shown(), outcome.data, outcome.found);
   if (outcome.result.interrupted) table.add({"status", "interrupted"});
-  for (const std::string& file : {options.output, options.trajectory, options.save_thresholds,
-                                  options.steps, options.compare}) {
-    if (!file.empty() && file != "-") table.add({"output", file});
+  for (const std::string& file :
+       results.written({options.output, options.trajectory, options.save_thresholds, options.steps,
+                        options.compare})) {
+    table.add({"output", file});
   }
   return table.text(false);
 }

@@ -11,6 +11,7 @@
 #include "cairn/policy/threshold_search.hpp"
 #include "cairn/policy/uncertainty_comparison.hpp"
 #include "compact.hpp"
+#include "results.hpp"
 
 namespace cairn::app {
 
@@ -27,7 +28,8 @@ struct CompactOutcome {
 };
 
 boost::json::object report_json(const CompactOptions& options, const CompactOutcome& outcome);
-std::string summary_text(const CompactOptions& options, const CompactOutcome& outcome);
+std::string summary_text(const CompactOptions& options, const CompactOutcome& outcome,
+                         const Results& results);
 
 /// A row for each pose.
 std::string steps_csv(const PolicyResult& result);

@@ -423,7 +423,7 @@ std::string mutual_text(const Graph& graph, const Request& request, const Answer
 
 std::string result_text(const MarginalsOptions& options, const LoadedGraph& loaded,
                         const std::optional<Summary>& summary, const Request& request,
-                        const Answer& answer, bool colour) {
+                        const Answer& answer, const Results& results, bool colour) {
   const Graph& graph = loaded.graph;
   std::string text;
   if (request.diagonal) text += diagonal_text(graph, answer.diagonal, colour);
@@ -450,7 +450,7 @@ std::string result_text(const MarginalsOptions& options, const LoadedGraph& load
   facts.add(
       {"time", fmt::format("factorize {}, covariances {} ({})", seconds_text(answer.factorize),
                            seconds_text(answer.marginals), options.linear_solver)});
-  if (!options.output.empty() && options.output != "-") facts.add({"output", options.output});
+  for (const std::string& file : results.written({options.output})) facts.add({"output", file});
   return text + "\n" + facts.text(false);
 }
 
@@ -523,7 +523,8 @@ int run(MarginalsOptions options, Session& session) {
         report_json(options, loaded, summary, request, answer, solver.solver->stats()));
   });
   results.add([&] {
-    session.print(result_text(options, loaded, summary, request, answer, session.colour()));
+    session.print(
+        result_text(options, loaded, summary, request, answer, results, session.colour()));
   });
   results.finish();
   return 0;

@@ -104,7 +104,8 @@ std::string times_text(const Seconds& seconds) {
 }
 
 std::string summary_text(const OptimizeOptions& options, const LoadedGraph& loaded,
-                         const Summary& summary, const DiagonalCovariances& covariances) {
+                         const Summary& summary, const DiagonalCovariances& covariances,
+                         const Results& results) {
   Table table({{"", Table::Align::left}, {"", Table::Align::left}});
   table.add({"graph", fmt::format("{}: {}, {}", loaded.label,
                                   plural(loaded.graph.variable_count(), "variable"),
@@ -128,8 +129,8 @@ std::string summary_text(const OptimizeOptions& options, const LoadedGraph& load
                            covariances.linear_solver, seconds_text(covariances.seconds()))});
   }
   for (const std::string& note : summary.notes) table.add({"note", note});
-  if (!options.output.empty() && options.output != "-") table.add({"output", options.output});
-  if (!options.record.empty()) table.add({"recording", options.record});
+  for (const std::string& file : results.written({options.output})) table.add({"output", file});
+  for (const std::string& file : results.written({options.record})) table.add({"recording", file});
   return table.text(false);
 }
 
@@ -190,7 +191,7 @@ int run(const OptimizeOptions& options, Session& session) {
   results.write(options.record, [&] { recording->finish(loaded.graph, summary); });
   results.add(
       [&] { session.write_json(report_json(options, loaded, initial, summary, covariances)); });
-  results.add([&] { session.print(summary_text(options, loaded, summary, covariances)); });
+  results.add([&] { session.print(summary_text(options, loaded, summary, covariances, results)); });
   results.finish();
   const int code = exit_code(summary, stop);
   return code == 0 && covariance_solver && !covariances.there

@@ -185,7 +185,7 @@ void draw_steps(const Replay& replay, const ReplayOptions& options, const Loaded
 }
 
 std::string summary_text(const ReplayOptions& options, const LoadedGraph& loaded,
-                         const Replay& replay, double chi2) {
+                         const Replay& replay, double chi2, const Results& results) {
   Table table({{"", Table::Align::left}, {"", Table::Align::left}});
   table.add({"graph", fmt::format("{}: {}, {}", loaded.name,
                                   plural(loaded.graph.variable_count(), "variable"),
@@ -211,9 +211,8 @@ std::string summary_text(const ReplayOptions& options, const LoadedGraph& loaded
     table.add({"note", replay.notes[k]});
   if (replay.notes.size() > kMostNotes)
     table.add({"", fmt::format("and {} more: --json", replay.notes.size() - kMostNotes)});
-  for (const std::string& file : {options.output, options.steps, options.plot}) {
-    if (!file.empty() && file != "-") table.add({"output", file});
-  }
+  for (const std::string& file : results.written({options.output, options.steps, options.plot}))
+    table.add({"output", file});
   return table.text(false);
 }
 

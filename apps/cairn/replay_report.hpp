@@ -13,6 +13,7 @@
 #include "cairn/solve/estimator.hpp"
 #include "graph_files.hpp"
 #include "problem_setup.hpp"
+#include "results.hpp"
 #include "session.hpp"
 
 namespace cairn::app {
@@ -74,7 +75,7 @@ boost::json::object report_json(const ReplayOptions& options, const LoadedGraph&
                                 bool sorted, const Replay& replay, const Estimator& estimator,
                                 double chi2);
 std::string summary_text(const ReplayOptions& options, const LoadedGraph& loaded,
-                         const Replay& replay, double chi2);
+                         const Replay& replay, double chi2, const Results& results);
 
 /// A row for each step.
 std::string steps_csv(const Replay& replay);

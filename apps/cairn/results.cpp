@@ -1,23 +1,35 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "results.hpp"
 
+#include <algorithm>
+
 #include "cairn/runtime/error.hpp"
 
 namespace cairn::app {
 
-void Results::add(const std::function<void()>& write) {
+bool Results::add(const std::function<void()>& write) {
   try {
     write();
+    return true;
   } catch (const Error& error) {
     if (first_) session_.note(error.what());
     if (!first_) first_ = std::current_exception();
   } catch (...) {  // of memory above all: the others may need less
     if (!first_) first_ = std::current_exception();
   }
+  return false;
 }
 
 void Results::write(const std::string& file, const std::function<void()>& write) {
-  if (!file.empty()) add(write);
+  if (!file.empty() && add(write)) written_.push_back(file);
+}
+
+std::vector<std::string> Results::written(std::initializer_list<std::string> files) const {
+  std::vector<std::string> found;
+  for (const std::string& file : files) {
+    if (file != "-" && std::ranges::count(written_, file) > 0) found.push_back(file);
+  }
+  return found;
 }
 
 void Results::finish() const {

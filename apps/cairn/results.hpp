@@ -3,6 +3,7 @@
 
 #include <exception>
 #include <functional>
+#include <initializer_list>
 #include <string>
 #include <vector>
 
@@ -23,14 +24,17 @@ class Results {
 
   /// Runs `write`, which writes `file`; does nothing if that is empty.
   void write(const std::string& file, const std::function<void()>& write);
-  /// Runs what writes to other places, such as the report or standard output.
-  void add(const std::function<void()>& write);
+  /// Runs what writes to other places, such as the report or standard output. False if it failed.
+  bool add(const std::function<void()>& write);
+  /// Those of the files that have been written, without standard output.
+  std::vector<std::string> written(std::initializer_list<std::string> files) const;
   /// Throws the first error again. Those after it have been noted on standard error.
   void finish() const;
 
  private:
   const Session& session_;
   std::exception_ptr first_;
+  std::vector<std::string> written_;
 };
 
 }  // namespace cairn::app

@@ -170,7 +170,8 @@ json::object report_json(const SparsifyCommandOptions& options, const LoadedGrap
 }
 
 std::string summary_text(const SparsifyCommandOptions& options, const LoadedGraph& loaded,
-                         const SparsifyJob& job, const SparsifyResult& result) {
+                         const SparsifyJob& job, const SparsifyResult& result,
+                         const Results& results) {
   const Sparsification& change = result.change;
   Table table({{"", Table::Align::left}, {"", Table::Align::left}});
   table.add(
@@ -213,9 +214,8 @@ std::string summary_text(const SparsifyCommandOptions& options, const LoadedGrap
   }
   const Status status = result.interrupted ? Status::interrupted : result.status;
   if (status != Status::converged) table.add({"status", std::string(to_string(status))});
-  for (const std::string& file : {options.output, options.record}) {
-    if (!file.empty() && file != "-") table.add({"output", file});
-  }
+  for (const std::string& file : results.written({options.output, options.record}))
+    table.add({"output", file});
   return table.text(false);
 }
 
@@ -306,7 +306,7 @@ int run_sparsify(SparsifyCommandOptions options, Session& session) {
   });
   results.write(options.record, [&] { write_file(options.record, recorder.text()); });
   results.add([&] { session.write_json(report_json(options, loaded, job, result)); });
-  results.add([&] { session.print(summary_text(options, loaded, job, result)); });
+  results.add([&] { session.print(summary_text(options, loaded, job, result, results)); });
   results.finish();
   if (guard.interrupted()) return kExitInterrupted;
   return result.converged ? 0 : static_cast<int>(ErrorCode::numerical);

@@ -123,7 +123,8 @@ std::string connectivity_text(const SparsifyEdgesResult& result) {
 }
 
 std::string summary_text(const SparsifyCommandOptions& options, const LoadedGraph& loaded,
-                         const SparsifyEdgesJob& job, const SparsifyEdgesResult& result) {
+                         const SparsifyEdgesJob& job, const SparsifyEdgesResult& result,
+                         const Results& results) {
   const SparsifyResult& whole = result.whole;
   Table table({{"", Table::Align::left}, {"", Table::Align::left}});
   table.add(
@@ -152,7 +153,7 @@ std::string summary_text(const SparsifyCommandOptions& options, const LoadedGrap
   table.add({"time", fmt::format("select {}", seconds_text(whole.select_seconds))});
   const Status status = whole.interrupted ? Status::interrupted : whole.status;
   if (status != Status::converged) table.add({"status", std::string(to_string(status))});
-  if (!options.output.empty() && options.output != "-") table.add({"output", options.output});
+  for (const std::string& file : results.written({options.output})) table.add({"output", file});
   return table.text(false);
 }
 
@@ -206,7 +207,7 @@ int run_sparsify_edges(const SparsifyCommandOptions& options, Session& session) 
                 output_format(options.output, options.output_format));
   });
   results.add([&] { session.write_json(report_json(options, loaded, job, result)); });
-  results.add([&] { session.print(summary_text(options, loaded, job, result)); });
+  results.add([&] { session.print(summary_text(options, loaded, job, result, results)); });
   results.finish();
   if (guard.interrupted()) return kExitInterrupted;
   return result.whole.converged ? 0 : static_cast<int>(ErrorCode::numerical);

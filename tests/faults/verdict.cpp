@@ -180,12 +180,28 @@ std::string code_problem(const Fault& fault, const RunResult& result) {
   return contains(result.err, "out of memory") ? "" : "no message of memory" + said;
 }
 
+/// A summary without the lines that name one of these files, and with single spaces: how wide its
+/// columns are depends on its lines.
+std::string summary_without(const std::vector<std::string>& files, const std::string& out) {
+  static const std::regex kSpaces(" +");
+  std::string text;
+  std::istringstream lines(out);
+  for (std::string line; std::getline(lines, line);) {
+    const bool names_one =
+        (line.starts_with("output ") || line.starts_with("recording ")) &&
+        std::ranges::any_of(files, [&](const std::string& file) { return line.ends_with(file); });
+    if (names_one) continue;
+    text += std::regex_replace(line, kSpaces, " ");
+    if (!lines.eof()) text += '\n';
+  }
+  return text;
+}
+
 Verdict judge_error(const Trial& trial, const Fault& fault, const Reference& reference,
                     const RunResult& result) {
   const RunResult& good = reference.good;
   if (const std::string problem = code_problem(fault, result); !problem.empty())
     return violation(problem);
-  if (!good.out.starts_with(result.out)) return violation("standard output is no beginning");
   std::vector<std::string> old;
   for (const std::string& name : trial.outputs) {
     if (name == trial.journal) {
@@ -197,6 +213,8 @@ Verdict judge_error(const Trial& trial, const Fault& fault, const Reference& ref
       return violation(name + " is neither the old file nor the new one");
     }
   }
+  if (!summary_without(old, good.out).starts_with(summary_without({}, result.out)))
+    return violation("standard output is no beginning, or names what was not written");
   const bool one_failed = fault.what == Fault::What::output && fault.kind != "FULL" &&
                           trial.journal.empty() && !was_a_trial(result, fault.number);
   if (one_failed && old.size() > 1)

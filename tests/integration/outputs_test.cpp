@@ -185,6 +185,8 @@ TEST_F(Outputs, OneThatFailsCostsNoneOfTheOthers) {
   EXPECT_EQ(optimized.exit_code, 3);
   EXPECT_THAT(optimized.err, HasSubstr("cairn: /dev/full: cannot be written"));
   EXPECT_THAT(optimized.out, HasSubstr("converged"));
+  EXPECT_THAT(optimized.out, testing::Not(HasSubstr("/dev/full")));
+  EXPECT_THAT(optimized.out, HasSubstr(record));
   EXPECT_EQ(parse_json(read_text(report)).at("status").as_string(), "converged");
   EXPECT_THAT(read_text(record), HasSubstr("{\"summary\":"));
   if (!Registry().has("estimator", "batch")) GTEST_SKIP() << "there is no estimator batch";

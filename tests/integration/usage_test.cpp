@@ -102,6 +102,8 @@ TEST(Usage, MissingAndSurplusAndMalformedArgumentsAreRefused) {
   expect_error(cairn({"optimize", "@ring", "--covariance", "all"}), kUsage,
                "--covariance: 'all' is not one of blocks, none");
   expect_error(cairn({"optimize", "@ring", "--json"}), kUsage, "--json needs a value: --json FILE");
+  expect_error(cairn({"optimize", "@ring", "--loss", "huber", "--loss", "cauchy"}), kUsage,
+               "--loss is given more than once");
   expect_error(cairn({"optimize", "@ring", "--output", ""}), kUsage,
                "--output: an empty word is no value; leave the option out");
   expect_error(cairn({"optimize", ""}), kUsage, "an empty word is no value");

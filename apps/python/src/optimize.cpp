@@ -119,16 +119,6 @@ Summary run(Graph& graph, const Plan& plan, Observer& observer) {
   return summary;
 }
 
-void check_stop(const Stop& stop) {
-  const auto refuse = [](const char* name, double value, const char* what) {
-    throw Error(ErrorCode::usage, fmt::format("{}={}: expected {}", name, value, what));
-  };
-  if (stop.max_iterations < 0) refuse("max_iterations", stop.max_iterations, "0 or more");
-  if (!(stop.tolerance >= 0.0 && stop.tolerance <= 1.0))
-    refuse("tolerance", stop.tolerance, "a fraction from 0 to 1");
-  if (!(stop.max_seconds >= 0.0)) refuse("max_seconds", stop.max_seconds, "0 (no limit) or more");
-}
-
 Summary optimize(BoundGraph& bound, const std::string& optimizer, const py::object& initial,
                  const py::object& loss, const std::string& loss_on, int max_iterations,
                  double tolerance, double max_seconds, const py::object& callback,
@@ -137,7 +127,7 @@ Summary optimize(BoundGraph& bound, const std::string& optimizer, const py::obje
   plan.stop.max_iterations = max_iterations;
   plan.stop.tolerance = tolerance;
   plan.stop.max_seconds = max_seconds;
-  check_stop(plan.stop);
+  check(plan.stop);
   if (loss.is_none() && loss_on != "all")
     throw Error(ErrorCode::usage, "loss_on says where a loss applies, but there is no loss");
   const GraphUse use(bound);

@@ -20,9 +20,6 @@ Marginals& marginals_of(LinearSolver& solver) {
               "block_cholesky can");
 }
 
-/// Σ_kk H_kk at most: times the rounding of doubles, 2⁻⁵³, it is half of a percent.
-constexpr double kFewestDigits = 4.5e13;
-
 std::int64_t tangent(const Graph& graph, int variable) {
   return graph.type(variable).tangent_size();
 }

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "cairn/solve/optimizer.hpp"
 
+#include <fmt/core.h>
+
+#include "cairn/runtime/error.hpp"
 #include "cairn/solve/initial_guess.hpp"
 
 namespace cairn {
@@ -22,6 +25,17 @@ std::string_view to_string(Status status) {
       return "interrupted";
   }
   return "unknown";  // only a value that is no Status gets here
+}
+
+void check(const Stop& stop) {
+  const auto refuse = [](const char* name, double value, const char* what) {
+    throw Error(ErrorCode::usage, fmt::format("{}={}: expected {}", name, value, what));
+  };
+  if (stop.max_iterations < 0) refuse("max_iterations", stop.max_iterations, "0 or more");
+  // Negated, so that what is not a number is refused too.
+  if (!(stop.tolerance >= 0.0 && stop.tolerance <= 1.0))
+    refuse("tolerance", stop.tolerance, "a fraction from 0 to 1");
+  if (!(stop.max_seconds >= 0.0)) refuse("max_seconds", stop.max_seconds, "0 (no limit) or more");
 }
 
 Observer::~Observer() = default;

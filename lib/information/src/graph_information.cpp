@@ -83,13 +83,23 @@ GraphEntropy entropy(const Graph& graph, LinearSolver& solver) {
                 "entropy: this linear solver lacks the ability 'log_determinant'; block_cholesky "
                 "has it");
   }
-  NormalEquations equations(graph, solver);
   GraphEntropy result;
-  result.size = equations.size();
+  const auto check = [](const auto& system, const Factorization& f) {
+    if (!f.ok) throw Error(ErrorCode::numerical, fmt::format("no entropy: {}", system.explain(f)));
+  };
+  if (query<Marginals>(solver)) {  // which tell a matrix that is singular to rounding
+    GraphMarginals marginals(graph, solver);
+    result.size = marginals.size();
+    check(marginals, marginals.factorize());
+  } else {
+    NormalEquations equations(graph, solver);
+    result.size = equations.size();
+    if (result.size > 0) {
+      equations.linearize(graph.values());
+      check(equations, equations.factorize());
+    }
+  }
   if (result.size == 0) return result;
-  equations.linearize(graph.values());
-  if (const Factorization f = equations.factorize(); !f.ok)
-    throw Error(ErrorCode::numerical, fmt::format("no entropy: {}", equations.explain(f)));
   result.log_determinant = determinant->log_determinant();
   result.entropy = entropy_of_information(result.size, result.log_determinant);
   return result;

@@ -28,28 +28,25 @@ namespace {
 
 using Block = Eigen::Map<const Eigen::MatrixXd>;
 
-/// H of a graph at its states, factorised.
-class LinearizedGraph {
- public:
-  LinearizedGraph(const Graph& graph, LinearSolver& solver, const char* what)
-      : equations_(graph, solver) {
-    auto* determinant = query<LogDeterminant>(solver);
-    if (!determinant) throw Error(ErrorCode::usage, "the linear solver does not give determinants");
-    if (equations_.size() == 0) return;
-    equations_.linearize(graph.values());
-    if (const Factorization f = equations_.factorize(); !f.ok)
-      throw Error(ErrorCode::numerical, fmt::format("{}: {}", what, equations_.explain(f)));
-    log_determinant_ = determinant->log_determinant();
-  }
-  double log_determinant() const { return log_determinant_; }
-  std::int64_t size() const { return equations_.size(); }
-  const BlockMatrix& H() const { return equations_.H(); }
-  int variable_of(int block) const { return equations_.linearizer().variable_of(block); }
+LogDeterminant& determinant_of(LinearSolver& solver) {
+  if (auto* determinant = query<LogDeterminant>(solver)) return *determinant;
+  throw Error(ErrorCode::usage, "the linear solver does not give determinants");
+}
 
- private:
-  NormalEquations equations_;
-  double log_determinant_ = 0.0;
-};
+void factorize(GraphMarginals& marginals, const char* what) {
+  if (const Factorization f = marginals.factorize(); !f.ok)
+    throw Error(ErrorCode::numerical, fmt::format("{}: {}", what, marginals.explain(f)));
+}
+
+/// ln |H| of a graph at its states.
+double log_determinant(const Graph& graph, LinearSolver& solver, const char* what) {
+  NormalEquations equations(graph, solver);
+  if (equations.size() == 0) return 0.0;
+  equations.linearize(graph.values());
+  if (const Factorization f = equations.factorize(); !f.ok)
+    throw Error(ErrorCode::numerical, fmt::format("{}: {}", what, equations.explain(f)));
+  return determinant_of(solver).log_determinant();
+}
 
 /// That of `graph` which is variable `v` of `other`.
 int partner(const Graph& graph, const Graph& other, int v, const char* what) {
@@ -248,8 +245,7 @@ Comparison comparison(const Graph& p, const Graph& q, Partners partners, Compare
 Eigen::MatrixXd covariance_of(const Graph& graph, const std::vector<int>& variables,
                               LinearSolver& solver, const char* what) {
   GraphMarginals marginals(graph, solver);
-  if (const Factorization f = marginals.factorize(); !f.ok)
-    throw Error(ErrorCode::numerical, fmt::format("{}: {}", what, marginals.explain(f)));
+  factorize(marginals, what);
   return joint_covariance(graph, marginals, variables);
 }
 
@@ -276,16 +272,19 @@ SparsificationError sparsification_error(const Graph& original, const Graph& as_
   double log_q = 0.0;
   std::int64_t d = 0;
   {
-    const LinearizedGraph of_sparse(q, solver, "the sparse graph");
-    log_q = of_sparse.log_determinant();
+    GraphMarginals of_sparse(q, solver);
     d = of_sparse.size();
     if (d == 0) return error;
-    const BlockMatrix& H = of_sparse.H();
+    factorize(of_sparse, "the sparse graph");
+    log_q = determinant_of(solver).log_determinant();
+    const NormalEquations& equations = of_sparse.equations();
+    const Linearizer& linearizer = equations.linearizer();
+    const BlockMatrix& H = equations.H();
     const BlockStructure& structure = H.structure();
     for (int c = 0; c < structure.blocks(); ++c) {
       for (auto k = structure.column_begin()[c]; k < structure.column_begin()[c + 1]; ++k) {
         const int r = structure.rows()[k];
-        entries.push_back({of_sparse.variable_of(r), of_sparse.variable_of(c),
+        entries.push_back({linearizer.variable_of(r), linearizer.variable_of(c),
                            Block(H.block(k), structure.block_size(r), structure.block_size(c))});
       }
     }
@@ -295,12 +294,11 @@ SparsificationError sparsification_error(const Graph& original, const Graph& as_
   {
     Graph removed = p.clone();
     for (const int v : at) removed.set_fixed(v);
-    log_p -= LinearizedGraph(removed, solver, "the nodes that were taken out").log_determinant();
+    log_p -= log_determinant(removed, solver, "the nodes that were taken out");
   }
-  log_p += LinearizedGraph(p, solver, "the original graph").log_determinant();
   GraphMarginals marginals(p, solver);
-  if (const Factorization f = marginals.factorize(); !f.ok)
-    throw Error(ErrorCode::numerical, marginals.explain(f));
+  factorize(marginals, "the original graph");
+  if (marginals.size() > 0) log_p += determinant_of(solver).log_determinant();
   std::vector<std::pair<int, int>> pairs;
   pairs.reserve(entries.size());
   for (const Entry& entry : entries) pairs.emplace_back(at[entry.row], at[entry.column]);

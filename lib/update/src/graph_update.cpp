@@ -223,8 +223,9 @@ class Checker {
     if (id >= first && id < behind) return update_.factors[id - first];
     const std::optional<int> position = factors_.position(id);
     if (!position) {
-      throw bad_input(fmt::format("there is no factor {} to be {}; ids so far go up to {}", id,
-                                  wanted, behind - 1));
+      throw bad_input(fmt::format("there is no factor {} to be {}; {}", id, wanted,
+                                  behind > 0 ? fmt::format("ids so far go up to {}", behind - 1)
+                                             : "there are none so far"));
     }
     return graph_.factor(*position);
   }

@@ -99,8 +99,9 @@ class Tree {
   bool worn_out() const;
   /// About how long it would take to order and factorise all of it.
   double seconds_to_order_anew() const;
-  /// Computes the affected nodes. Returns -1, or a variable whose pivots are not positive; then the
-  /// tree is invalid until everything has been touched and factorised.
+  /// Computes the affected nodes. Returns -1, or a variable whose pivots are not positive, or
+  /// nothing but rounding (`kFewestDigits`); then the tree is invalid until everything has been
+  /// touched and factorised.
   std::int32_t factorize();
   /// Solves H δ = g, where g is zero but at `sources` and leaves as zero. `steps`, all zero before,
   /// gets δ of the variables that `changed` then lists. Returns gᵀ H⁻¹ g.
@@ -176,6 +177,7 @@ class Tree {
   void assemble(Node& node);
   void add_scattered(const Node& child, Node& parent);
   bool factorize_node(Node& node);
+  std::int32_t undetermined(const Node& node) const;
   double forward(std::vector<double>& g);
   void solve_node(Node& node, const double* y, std::vector<double>& steps,
                   std::vector<std::int32_t>& changed);

@@ -160,6 +160,7 @@ CeresOptimizer::CeresOptimizer(ceres::Solver::Options options, CeresLoss loss)
 }
 
 Summary CeresOptimizer::optimize(Graph& graph, const Stop& stop, Observer& observer) {
+  check(stop);
   if (graph.has_losses() && loss_.name != "none") {
     throw Error(
         ErrorCode::usage,

@@ -256,6 +256,7 @@ LineSearchOptimizer::LineSearchOptimizer(const LineSearchOptions& options)
 }
 
 Summary LineSearchOptimizer::optimize(Graph& graph, const Stop& stop, Observer& observer) {
+  check(stop);
   const Clock::time_point begin = Clock::now();
   const Gauge gauge = resolve_gauge(graph);
   Summary summary = begin_summary("ceres_line_search", "none", graph, gauge, observer);

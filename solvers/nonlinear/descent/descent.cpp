@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <numeric>
 #include <utility>
 
@@ -19,6 +20,10 @@ namespace {
 /// A direct solver's step solves its system to this. Rounding leaves 1e-16 times a small power of
 /// the size.
 constexpr double kLargestBackwardError = 1e-6;
+/// An iterative solver's step lowers its residual at least to this part of the gradient, in the
+/// solver's own units and in those of the unknowns: the decrease that it predicts is then that of
+/// the system, and not merely of as much of it as the solver has come to.
+constexpr double kLargestResidual = 0.1;
 /// A gradient is a sum of products of Jacobians and residuals, and zero up to this share of both.
 constexpr double kGradientRounding = 1e-13;
 /// What may be left when no step lowers chi2: of chi2, and of the states.
@@ -50,6 +55,7 @@ Descent::Descent(std::string optimizer, std::string linear_solver, LinearSolver&
       solver_(solver),
       begin_(Clock::now()),
       iteration_begin_(begin_) {
+  check(stop);
   summary_.optimizer = std::move(optimizer);
   summary_.linear_solver = std::move(linear_solver);
   summary_.iterations.reserve(static_cast<std::size_t>(std::clamp(stop.max_iterations, 0, 1000)));
@@ -124,7 +130,7 @@ bool Descent::solve(std::span<double> out) {
   equations_->solve(out);
   step_norm_ = std::sqrt(dot(out, out));
   if (!std::isfinite(step_norm_)) return false;
-  if (number_ != sampled_ && is_sampled(number_)) {
+  if (number_ != sampled_ && is_sampled(number_) && !query<IterativeSolver>(solver_)) {
     sampled_ = number_;
     static_cast<void>(is_solution(out));  // chi2 decides whether the step is taken
   }
@@ -132,22 +138,45 @@ bool Descent::solve(std::span<double> out) {
 }
 
 bool Descent::is_solution(std::span<const double> out) {
-  if (query<IterativeSolver>(solver_)) return true;
   const double error = equations_->backward_error(out);
-  if (error <= kLargestBackwardError || residual_is_rounding()) return true;
-  if (!std::exchange(reported_wrong_step_, true)) {
-    note(
-        fmt::format("linear solver {} returned in iteration {} what does not solve H x = g: "
-                    "‖Hx − g‖ is {:.1g} of ‖H‖ ‖x‖ + ‖g‖",
-                    summary_.linear_solver, number_, error));
+  if (query<IterativeSolver>(solver_)) {
+    const double left = relative_residual();
+    if (left <= kLargestResidual || residual_is_rounding()) return true;
+    note_wrong_step(fmt::format("{:.1g} of ‖g‖", left));
+  } else {
+    if (error <= kLargestBackwardError || residual_is_rounding()) return true;
+    note_wrong_step(fmt::format("{:.1g} of ‖H‖ ‖x‖ + ‖g‖", error));
   }
   return false;
+}
+
+void Descent::note_wrong_step(const std::string& residual) {
+  if (std::exchange(reported_wrong_step_, true)) return;
+  note(
+      fmt::format("linear solver {} returned in iteration {} what does not solve H x = g: "
+                  "‖Hx − g‖ is {}",
+                  summary_.linear_solver, number_, residual));
 }
 
 bool Descent::solves(std::span<const double> out) {
   if (is_solution(out)) return true;
   end(Status::diverged);
   return false;
+}
+
+double Descent::relative_residual() const {
+  const std::span<const double> residual = equations_->solve_residual(), g = equations_->g();
+  double left = 0.0, all = 0.0, scaled_left = 0.0, scaled_all = 0.0;
+  for (std::size_t k = 0; k < g.size(); ++k) {
+    const double entry = equations_->diagonal()[k], weight = entry > 0.0 ? 1.0 / entry : 0.0;
+    left += residual[k] * residual[k];
+    all += g[k] * g[k];
+    scaled_left += weight * residual[k] * residual[k];
+    scaled_all += weight * g[k] * g[k];
+  }
+  // Negated, so that what is not a number is bad too.
+  if (!(all > 0.0)) return left > 0.0 ? std::numeric_limits<double>::infinity() : 0.0;
+  return std::sqrt(std::max(left / all, scaled_left / scaled_all));
 }
 
 bool Descent::residual_is_rounding() const {

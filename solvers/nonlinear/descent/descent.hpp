@@ -60,7 +60,8 @@ class Descent {
   double step_norm() const { return step_norm_; }
   /// Whether `out` solves its system (`NormalEquations::backward_error`), as a step must by which
   /// convergence is to be claimed; otherwise the run ends as diverged, with a note that names the
-  /// linear solver. Iterative solvers meet a tolerance of their own, and are not asked.
+  /// linear solver. That of an iterative solver must have lowered the residual well below g, in the
+  /// Euclidean norm and in that of the diagonal of H.
   bool solves(std::span<const double> out);
   /// Ends the run because no step that is finite could be had.
   void end_not_finite();
@@ -93,6 +94,9 @@ class Descent {
 
  private:
   bool is_solution(std::span<const double> out);
+  void note_wrong_step(const std::string& residual);
+  /// ‖Hx − g‖ / ‖g‖ of the last step, in the worse of the two norms.
+  double relative_residual() const;
   /// Whether all of Hx − g is what rounding leaves of a gradient that is zero, as at a minimum. A
   /// solver that works on the Jacobian never sees g, and its step is no worse for that.
   bool residual_is_rounding() const;

@@ -15,6 +15,11 @@
 
 namespace cairn {
 
+/// H is singular to rounding where Σ_kk H_kk, which is 1 / (1 − R²) of unknown k given all others,
+/// is larger than this: times the rounding of doubles, 2⁻⁵³, it is half of a percent, so that less
+/// than two digits are left of Σ_kk. Of a Cholesky factor, L_kk² is not smaller than 1 / Σ_kk.
+inline constexpr double kFewestDigits = 4.5e13;
+
 /// Marginal covariances of a graph's variables at its present estimate x.
 ///
 /// They are blocks of Σ = H⁻¹, H = Σ ρ′ JᵀJ at x, without any damping: the covariance of the vector
@@ -32,12 +37,12 @@ class CAIRN_API GraphMarginals {
   GraphMarginals(const Graph& graph, LinearSolver& solver);
 
   /// Linearises at the graph's states, factorises H and computes the block diagonal of Σ. It fails,
-  /// too, where H is singular to rounding and its factorisation succeeds: where Σ_kk H_kk,
-  /// which is 1 / (1 − R²) of unknown k given all others, leaves fewer than two digits. If it
+  /// too, where its factorisation succeeds and H is singular to rounding (`kFewestDigits`). If it
   /// fails, `explain` says why, and nothing below may be called.
   Factorization factorize();
   std::string explain(const Factorization& failure) const;
 
+  const NormalEquations& equations() const { return equations_; }
   const Gauge& gauge() const { return equations_.gauge(); }
   /// Scalar unknowns: rows of Σ.
   std::int64_t size() const { return equations_.size(); }

@@ -23,6 +23,10 @@ struct Stop {
       nullptr;  ///< stop with the best estimate when it becomes true
 };
 
+/// Throws `Error` (usage) for limits that are negative or not a number, and for a tolerance that is
+/// no fraction; every optimizer of cairn's own begins with it.
+CAIRN_API void check(const Stop& stop);
+
 enum class Status { converged, max_iterations, diverged, not_positive_definite, interrupted };
 
 /// "converged", "max_iterations", … as in the JSON of the command line.

@@ -184,22 +184,19 @@ TEST_P(GraphInformation, RefusesAVariableThatIsNamedTwice) {
   EXPECT_THROW(mutual_information(graph, marginals, sets), Error);
 }
 
-INSTANTIATE_TEST_SUITE_P(Solvers, GraphInformation, testing::ValuesIn(solvers()), test_name);
-
-// H is singular up to rounding, which some solvers do not see.
-TEST(GraphInformationRefusal, SaysWhyThereIsNone) {
-  Registry registry;
-  if (!registry.has("linear_solver", "block_cholesky"))
-    GTEST_SKIP() << "there is no 'block_cholesky'";
-  const auto solver = registry.make<LinearSolver>("block_cholesky");
+// H is singular, but its factorisation may succeed by rounding.
+TEST_P(GraphInformation, RefusesAMatrixThatIsSingularToRounding) {
+  const auto solver = Registry().make<LinearSolver>(GetParam());
   try {
     entropy(held_by_a_point(), *solver);
     ADD_FAILURE() << "of a singular H";
   } catch (const Error& error) {
     EXPECT_EQ(error.code(), ErrorCode::numerical);
-    EXPECT_THAT(error.what(), HasSubstr("no entropy: "));
+    EXPECT_THAT(error.what(), HasSubstr("no entropy: H is "));
   }
 }
+
+INSTANTIATE_TEST_SUITE_P(Solvers, GraphInformation, testing::ValuesIn(solvers()), test_name);
 
 TEST(GraphInformationRefusal, NamesASolverWithDeterminants) {
   Registry registry;

@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "cairn/lie/se2.hpp"
+#include "cairn/linear/iterative_solver.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/solve/optimizer.hpp"
@@ -34,7 +35,7 @@ using testing::HasSubstr;
 using Spoil = std::function<void(std::span<double>)>;
 
 /// A solver whose answers are right, but for what `spoil` does to them.
-class SpoiltSolver final : public LinearSolver {
+class SpoiltSolver : public LinearSolver {
  public:
   SpoiltSolver(std::unique_ptr<LinearSolver> solver, Spoil spoil)
       : solver_(std::move(solver)), spoil_(std::move(spoil)) {}
@@ -51,10 +52,22 @@ class SpoiltSolver final : public LinearSolver {
   Spoil spoil_;
 };
 
+/// One that answers for its residual, as an iterative solver does.
+class LooseSolver final : public SpoiltSolver, public IterativeSolver {
+ public:
+  using SpoiltSolver::SpoiltSolver;
+  double tolerance() const override { return 1e-6; }
+
+  void* ability(std::string_view name) override {
+    return name == IterativeSolver::kAbility ? static_cast<IterativeSolver*>(this) : nullptr;
+  }
+};
+
+template <class Solver = SpoiltSolver>
 Summary optimize_with(const std::string& optimizer, const Spoil& spoil, Graph& graph) {
   Registry registry;
   registry.add<LinearSolver>("spoilt", OptionTable{}, [&](const Options&, Registry& all) {
-    return std::make_unique<SpoiltSolver>(all.make<LinearSolver>("eigen"), spoil);
+    return std::make_unique<Solver>(all.make<LinearSolver>("eigen"), spoil);
   });
   return registry.make<Optimizer>(optimizer + ":linear_solver=spoilt")->optimize(graph);
 }
@@ -121,6 +134,25 @@ TEST_P(Optimizers, HaveNotConvergedWithASolverThatBreaksLater) {
     if (++solved > 2) std::ranges::fill(x, 0.0);
   };
   EXPECT_EQ(optimize_with(GetParam(), spoil, graph).status, Status::diverged);
+}
+
+// A step of a hundredth of the way promises a hundredth of the decrease.
+TEST_P(Optimizers, HaveNotConvergedWithAnIterativeSolverThatEndsEarly) {
+  for (const double part : {0.95, 0.01}) {
+    Graph graph = test::ring_of_poses(30, 0.05);
+    const Summary summary = optimize_with<LooseSolver>(
+        GetParam(),
+        [part](std::span<double> x) {
+          for (double& value : x) value *= part;
+        },
+        graph);
+    if (part > 0.9) {
+      EXPECT_EQ(summary.status, Status::converged);
+      EXPECT_THAT(summary.notes, testing::Not(testing::Contains(HasSubstr("spoilt"))));
+    } else {
+      EXPECT_NE(summary.status, Status::converged);
+    }
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(BrokenParts, Optimizers,

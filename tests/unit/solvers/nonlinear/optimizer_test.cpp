@@ -7,6 +7,7 @@
 #include <atomic>
 #include <cmath>
 #include <functional>
+#include <limits>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -211,6 +212,22 @@ TEST_P(OptimizerTest, KeepsToItsTime) {
   const Summary summary = optimizer_->optimize(graph, Stop{.tolerance = 0.0, .max_seconds = 1e-9});
   EXPECT_EQ(summary.status, Status::max_iterations);
   EXPECT_LE(summary.iterations.size(), 1U);
+}
+
+TEST_P(OptimizerTest, RefusesLimitsThatAreNone) {
+  Graph graph = ring_of_poses(30, 0.1);
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  for (const Stop& stop :
+       {Stop{.max_iterations = -5}, Stop{.tolerance = nan}, Stop{.tolerance = -1.0},
+        Stop{.tolerance = 2.0}, Stop{.max_seconds = nan}, Stop{.max_seconds = -1.0}}) {
+    try {
+      optimizer_->optimize(graph, stop);
+      ADD_FAILURE() << stop.max_iterations << ' ' << stop.tolerance << ' ' << stop.max_seconds;
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ErrorCode::usage);
+      EXPECT_THAT(error.what(), HasSubstr(": expected "));
+    }
+  }
 }
 
 TEST_P(OptimizerTest, AnchorsAFreeGaugeAndSaysSo) {

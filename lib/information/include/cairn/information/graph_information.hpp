@@ -28,8 +28,10 @@ struct GraphEntropy {
   double entropy = 0.0;          ///< ½ (size ln 2πe − ln |H|) [nats] (T 3.2)
 };
 
-/// Of all variables, linearised at the graph's states: one factorisation. Throws `Error` (usage) if
-/// the solver lacks the ability `LogDeterminant`, (numerical) where H is singular, with the reason.
+/// Of all variables, linearised at the graph's states: one factorisation and, where the solver has
+/// the ability `Marginals`, the block diagonal of Σ, which shows whether H is singular to
+/// rounding. Throws `Error` (usage) if the solver lacks the ability `LogDeterminant`, (numerical)
+/// where H is singular, with the reason.
 CAIRN_API GraphEntropy entropy(const Graph& graph, LinearSolver& solver);
 
 // Of some of the variables, by number. `marginals` are those of the graph, after `factorize`; a set
