@@ -102,7 +102,10 @@ OutputFile::OutputFile(const fs::path& file) : file_(file) {
   if (exists && S_ISDIR(status.st_mode)) refuse(file_, "is a folder; expected a file name");
   if (exists && !S_ISREG(status.st_mode)) {
     // Renaming a file over these would remove them.
-    descriptor_ = without_interrupts([&] { return ::open(target_.c_str(), O_WRONLY | O_CLOEXEC); });
+    const auto open = [&] { return ::open(target_.c_str(), O_WRONLY | O_CLOEXEC); };
+    // A FIFO is waited for until somebody reads it, for ever if need be: a signal ends that.
+    descriptor_ = S_ISFIFO(status.st_mode) ? open() : without_interrupts(open);
+    if (descriptor_ < 0 && errno == EINTR) refuse(file_, "interrupted before anything reads it");
     if (descriptor_ < 0) fail(errno);
     return;
   }

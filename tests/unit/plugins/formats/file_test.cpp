@@ -1,15 +1,20 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <pthread.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
+#include <csignal>
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
 #include <functional>
 #include <iterator>
+#include <string>
+#include <thread>
 
 #include "cairn/runtime/error.hpp"
 #include "unit/plugins/formats/reading.hpp"
@@ -228,6 +233,28 @@ TEST_F(File, WritesToStandardOutput) {
   testing::internal::CaptureStdout();
   write_graph(graph, "-", registry(), "g2o");
   EXPECT_EQ(testing::internal::GetCapturedStdout(), kGraph);
+}
+
+TEST_F(File, WaitsForTheReaderOfAFifoUntilASignal) {
+  const std::string fifo = path("fifo");
+  ASSERT_EQ(::mkfifo(fifo.c_str(), 0600), 0);
+  struct sigaction quiet {};
+  struct sigaction before {};
+  quiet.sa_handler = [](int) {};
+  ASSERT_EQ(::sigaction(SIGUSR1, &quiet, &before), 0);
+  std::atomic<bool> ended{false};
+  std::string message;
+  std::thread writer([&] {
+    message = message_of([&] { write_file(fifo, "a graph"); });
+    ended = true;
+  });
+  while (!ended) {
+    ::pthread_kill(writer.native_handle(), SIGUSR1);
+    std::this_thread::yield();
+  }
+  writer.join();
+  ::sigaction(SIGUSR1, &before, nullptr);
+  EXPECT_THAT(message, EndsWith("fifo: interrupted before anything reads it"));
 }
 
 }  // namespace
