@@ -115,6 +115,9 @@ function(cairn_add_plugin)
     CXX_VISIBILITY_PRESET hidden VISIBILITY_INLINES_HIDDEN ON)
   configure_file(${CAIRN_PLUGIN_TEMPLATE_FOLDER}/plugin_sidecar.json.in ${folder}/${arg_NAME}.json @ONLY)
   if(NOT (arg_FOLDER AND COMMAND cairn_settings))  # that is one of cairn's tests
+    if(TARGET cairn_plugins)  # all of cairn's own
+      add_dependencies(cairn_plugins ${target})
+    endif()
     set(component Unspecified)
     if(COMMAND cairn_settings AND NOT arg_PACKAGE)
       set(component program)
