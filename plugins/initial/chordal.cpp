@@ -64,12 +64,13 @@ class ChordalPool {
   std::pair<Matrix, Vector> measured(const Link& link) const {
     return split(graph_.measurement(link.factor).data());
   }
+  /// Relative to the origin of the linear system.
   Vector position(int variable) const {
     Vector t;
     Matrix unused;
     graph_.type(variable).placement()->split(graph_.state(variable).data(), unused.data(),
                                              t.data());
-    return t;
+    return t - origin_;
   }
 
   /// Each piece that relative factors connect needs one pose whose place is known: held, or by a
@@ -106,10 +107,13 @@ class ChordalPool {
       reach(v);
       spread();
     }
+    bool origin_is_set = false;
     for (int v = 0; v < graph_.variable_count(); ++v) {
       if (!linked[v]) continue;
       if (placing_.placed(v)) {
         rotation(v) = split(graph_.state(v).data()).first;
+        if (!origin_is_set) origin_ = position(v);
+        origin_is_set = true;
       } else {
         unknown_[v] = count_++;
         variables_.push_back(v);
@@ -204,7 +208,7 @@ class ChordalPool {
       add_difference(problem, link, R_i * W * R_i.transpose(), R_i * z);
     }
     check(problem.solve(solver));
-    for (int k = 0; k < count_; ++k) set_state(variables_[k], problem.solution(k));
+    for (int k = 0; k < count_; ++k) set_state(variables_[k], problem.solution(k) + origin_);
   }
 
   /// ‖t_j - t_i - d‖²_W.
@@ -263,7 +267,8 @@ class ChordalPool {
   std::vector<int> unknown_;    // by variable: its place among the unknowns
   std::vector<int> variables_;  // and back
   int count_ = 0;
-  std::vector<Matrix> R_;  // by slot of the pool
+  std::vector<Matrix> R_;           // by slot of the pool
+  Vector origin_ = Vector::Zero();  // of the linear system: the position of a pose that is placed
 };
 
 class Chordal final : public InitialGuess {

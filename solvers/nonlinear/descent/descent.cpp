@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <limits>
 #include <numeric>
+#include <span>
 #include <utility>
 
 #include <fmt/core.h>
@@ -28,6 +29,8 @@ constexpr double kLargestResidual = 0.1;
 constexpr double kGradientRounding = 1e-13;
 /// What may be left when no step lowers chi2: of chi2, and of the states.
 constexpr double kRounding = 1e-6;
+/// What rounding of the coordinates makes of chi2 is worth a note above this.
+constexpr double kNoticeable = 1e-3;
 
 /// States that all begin equal show the extent of the map after the first steps.
 constexpr int kIterationsForExtent = 2;
@@ -220,8 +223,28 @@ void Descent::end_not_finite() {
   end(Status::diverged);
 }
 
+double Descent::coordinate_rounding() const {
+  const Linearizer& linearizer = equations_->linearizer();
+  const BlockStructure& structure = linearizer.structure();
+  const double* diagonal = equations_->diagonal().data();
+  double sum = 0.0;
+  for (int block = 0; block < structure.blocks(); ++block) {
+    const int variable = linearizer.variable_of(block);
+    const std::int64_t numbers = graph_.type(variable).ambient_size();
+    const auto x = std::span(estimate.pools[static_cast<std::size_t>(graph_.pool(variable))])
+                       .subspan(static_cast<std::size_t>(graph_.slot(variable) * numbers),
+                                static_cast<std::size_t>(numbers));
+    double largest = 0.0;
+    for (const double number : x) largest = std::max(largest, std::abs(number));
+    const double rounding = std::numeric_limits<double>::epsilon() * largest;
+    for (int k = 0; k < structure.block_size(block); ++k) sum += *diagonal++ * rounding * rounding;
+  }
+  return sum / 12.0;  // the variance of what is spread evenly over one unit
+}
+
 void Descent::end_without_descent(double promise, double step_norm) {
-  if (promise <= kRounding * chi2 || step_norm <= kRounding * state_extent_) {
+  if (promise <= std::max(kRounding * chi2, coordinate_rounding()) ||
+      step_norm <= kRounding * state_extent_) {
     end(Status::converged);
     return;
   }
@@ -243,6 +266,15 @@ Summary Descent::finish() {
   if (summary_.status == Status::converged && chi2 > best_chi2_ * (1.0 + 1e-6)) {
     note(fmt::format("converged at chi2 {:.9g}; kept a better estimate of an earlier iteration",
                      chi2));
+  }
+  if (summary_.status == Status::converged && equations_->size() > 0) {
+    const double rounding = coordinate_rounding();
+    if (rounding > std::max(kRounding * best_chi2_, kNoticeable)) {
+      note(
+          fmt::format("the coordinates are so large that their rounding alone makes chi2 uncertain "
+                      "by {:.1g}: an origin nearer to the map keeps more digits",
+                      rounding));
+    }
   }
   summary_.solver = solver_.stats();
   graph_.set_values(std::move(best_));

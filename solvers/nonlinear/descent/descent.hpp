@@ -67,7 +67,8 @@ class Descent {
   void end_not_finite();
   /// Ends the run because no trial step lowers chi2. Converged if the first of them, from the
   /// present linearisation, was to lower it by little (`promise`) or was short (`step_norm`):
-  /// what is left is rounding. Otherwise the model is not that of the residuals: diverged.
+  /// what is left is rounding, of chi2 or of the coordinates. Otherwise the model is not that of
+  /// the residuals: diverged.
   void end_without_descent(double promise, double step_norm);
 
   /// Remembers the estimate if its chi2 is the lowest so far; true if it is.
@@ -93,6 +94,9 @@ class Descent {
   Summary finish();
 
  private:
+  /// What rounding of the estimate's numbers adds to chi2, as expected: Σ H_kk (2⁻⁵² |x|)² / 12,
+  /// |x| the largest number of the state that unknown k belongs to.
+  double coordinate_rounding() const;
   bool is_solution(std::span<const double> out);
   void note_wrong_step(const std::string& residual);
   /// ‖Hx − g‖ / ‖g‖ of the last step, in the worse of the two norms.

@@ -346,6 +346,28 @@ TEST(Chordal, DoesNotDependOnTheStatesItReplaces) {
   EXPECT_EQ(graph.values().pools, scrambled.values().pools);
 }
 
+// The world's origin may be far away (UTM): a long chain keeps its digits.
+TEST(Chordal, DoesNotDependOnWhereTheWorldsOriginIs) {
+  Registry registry;
+  for (const char* world : {"manhattan:poses=1000", "sphere:turns=20,poses_per_turn=20"}) {
+    Graph graph = std::move(registry.make<Generator>(world)->generate(registry, 1).graph);
+    Graph far = graph.clone();
+    const double offset = 0x1p22;
+    for (int v = 0; v < far.variable_count(); ++v) {
+      std::vector<double> x(far.state(v).begin(), far.state(v).end());
+      x[0] += offset;
+      x[1] -= offset;
+      far.set_state(v, x);
+    }
+    guess(registry, "chordal", graph);
+    guess(registry, "chordal", far);
+    for (int v = 0; v < graph.variable_count(); ++v) {
+      EXPECT_NEAR(far.state(v)[0] - offset, graph.state(v)[0], 1e-8) << world << ' ' << v;
+      EXPECT_NEAR(far.state(v)[1] + offset, graph.state(v)[1], 1e-8) << world << ' ' << v;
+    }
+  }
+}
+
 // M3500a: extra noise of 0.1 rad on every orientation; from odometry optimizers stop in local
 // minima.
 TEST(Chordal, StartsNearTheOptimumOfM3500a) {

@@ -269,6 +269,32 @@ INSTANTIATE_TEST_SUITE_P(BrokenParts, Methods,
                          testing::Values("gauss_newton", "levenberg_marquardt", "dogleg", "ceres",
                                          "ceres_line_search"));
 
+/// At 1e9 m numbers are rounded to 1e-7 m, which a large information makes a part of chi2.
+TEST_P(Optimizers, EndWhereCoordinatesAreRounded) {
+  for (const double offset : {0.0, 1e9}) {
+    Graph graph = test::ring_of_poses(30, 0.05);
+    for (int f = 0; f < graph.factor_count(); ++f) {
+      std::vector<double> information(graph.information(f).begin(), graph.information(f).end());
+      for (double& value : information) value *= f % 5 == 0 ? 1e12 : 100.0;
+      graph.set_measurement(f, graph.measurement(f), information);
+    }
+    for (int v = 0; v < graph.variable_count(); ++v) {
+      std::vector<double> x(graph.state(v).begin(), graph.state(v).end());
+      x[0] += offset;
+      x[1] -= offset;
+      graph.set_state(v, x);
+    }
+    const Summary summary = Registry().make<Optimizer>(GetParam())->optimize(graph);
+    EXPECT_EQ(summary.status, Status::converged) << offset << ": " << summary.final_chi2;
+    const auto are_rounded = testing::Contains(HasSubstr("their rounding alone"));
+    if (offset > 0.0) {
+      EXPECT_THAT(summary.notes, are_rounded);
+    } else {
+      EXPECT_THAT(summary.notes, testing::Not(are_rounded));
+    }
+  }
+}
+
 /// chi2 scales with the information, the estimate does not.
 TEST_P(Methods, FindTheSameEstimateAtAnyScaleOfTheInformation) {
   std::vector<double> wanted;
