@@ -95,6 +95,20 @@ void print_tables(const BenchOptions& options, const BenchResult& bench, const S
   if (!options.html.empty()) session.print(fmt::format("\npage: {}\n", options.html));
 }
 
+/// What speaks against the best estimate of each graph.
+void note_doubts(const BenchResult& bench, const Session& session) {
+  for (const GraphResult& graph : bench.graphs) {
+    const ConfigurationResult* best = nullptr;
+    for (const ConfigurationResult& result : graph.results) {
+      if (result.runs.empty()) continue;
+      if (!best || result.runs.front().final_chi2 < best->runs.front().final_chi2) best = &result;
+    }
+    if (!best) continue;
+    for (const std::string& doubt : best->doubts)
+      session.note(fmt::format("{}: {}", graph.loaded.label, doubt));
+  }
+}
+
 int run(const BenchOptions& options, Session& session) {
   check(options, session);
   session.use_threads();
@@ -106,6 +120,7 @@ int run(const BenchOptions& options, Session& session) {
   results.add([&] { session.write_json(report); });
   results.add([&] { print_tables(options, bench, session); });
   results.finish();
+  note_doubts(bench, session);
   if (const auto slow = session.registry().unoptimized(); !slow.empty()) {
     session.note(
         fmt::format("unoptimised build, times mean little: plugin {}", joined(slow, ", ")));

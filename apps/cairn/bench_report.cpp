@@ -132,7 +132,9 @@ json::object configuration_json(const ConfigurationResult& result, const GraphRe
     all["seconds"] = times_json(result);
     all["ratio"] = paired_ratio(result, graph);
     all["solver"] = solver_json(first.solver);
-    all["notes"] = strings_json(first.notes);
+    std::vector<std::string> notes = first.notes;
+    notes.insert(notes.end(), result.doubts.begin(), result.doubts.end());
+    all["notes"] = strings_json(notes);
   }
   all["peak_memory_bytes"] =
       result.peak_memory > 0 ? json::value(result.peak_memory) : json::value(nullptr);

@@ -9,6 +9,7 @@
 #include <fmt/core.h>
 #include <boost/json/parse.hpp>
 
+#include "cairn/evaluation/plausibility.hpp"
 #include "cairn/linear/iterative_solver.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
@@ -186,7 +187,10 @@ class GraphBench {
     stop.interrupt = &guard_.flag();
     Summary summary = optimizer->optimize(graph, stop);
     if (summary.status == Status::interrupted) return;
-    if (result.runs.empty() && !options_.html.empty()) result.states = graph.values();
+    if (result.runs.empty()) {
+      result.doubts = reasons_for_doubt(graph, summary.final_chi2);
+      if (!options_.html.empty()) result.states = graph.values();
+    }
     result.runs.push_back(std::move(summary));
   }
 

@@ -49,10 +49,11 @@ Comparison comparison(const BenchOptions& options, Session& session);
 struct ConfigurationResult {
   Configuration configuration;
   std::vector<Summary> runs;
-  std::int64_t peak_memory = 0;  ///< [bytes], 0: not measured
-  std::string error;             ///< why it could not run, else empty
-  bool plugin_fault = false;     ///< whether the error is that of a plugin
-  Values states;                 ///< of the first run, if a page is to show them
+  std::int64_t peak_memory = 0;     ///< [bytes], 0: not measured
+  std::string error;                ///< why it could not run, else empty
+  std::vector<std::string> doubts;  ///< what speaks against its estimate (`reasons_for_doubt`)
+  bool plugin_fault = false;        ///< whether the error is that of a plugin
+  Values states;                    ///< of the first run, if a page is to show them
 };
 
 struct GraphResult {

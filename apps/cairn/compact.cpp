@@ -12,6 +12,7 @@
 #include <boost/json/object.hpp>
 
 #include "arguments.hpp"
+#include "cairn/evaluation/plausibility.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/policy/policy_run.hpp"
 #include "cairn/policy/selection_check.hpp"
@@ -304,6 +305,8 @@ int run_compact(const CompactOptions& options, Session& session) {
     session.write_json(report);
   });
   note_selection(options, outcome, session);
+  for (const std::string& doubt : reasons_for_doubt(shown.compact, chi2(shown.compact)))
+    session.note(doubt);
   results.add([&] { session.print(summary_text(options, outcome, results)); });
   results.finish();
   if (guard.interrupted()) return kExitInterrupted;

@@ -46,9 +46,13 @@ void end_on_interrupts() { handle(&cairn_app_end); }
 InterruptGuard::InterruptGuard() {
   interrupt_flag.store(false);
   handle(&cairn_app_on_signal);
+  end_waiting_for_readers_on(&interrupt_flag);
 }
 
-InterruptGuard::~InterruptGuard() { end_on_interrupts(); }
+InterruptGuard::~InterruptGuard() {
+  end_waiting_for_readers_on(nullptr);
+  end_on_interrupts();
+}
 
 const std::atomic<bool>& InterruptGuard::flag() const { return interrupt_flag; }
 

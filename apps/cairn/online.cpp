@@ -11,6 +11,7 @@
 #include <boost/crc.hpp>
 
 #include "arguments.hpp"
+#include "cairn/evaluation/plausibility.hpp"
 #include "cairn/io/format.hpp"
 #include "cairn/online/conversation.hpp"
 #include "cairn/online/journal.hpp"
@@ -321,12 +322,17 @@ void write_map(const Graph& graph, const std::string& file, Session& session) {
   } catch (const Error&) {
     const std::string beside = file + ".tum";
     std::error_code ignored;
-    if (is_marginalized(graph) && !std::filesystem::exists(beside, ignored)) {
-      write_graph(graph, beside, session.registry(), "tum");
-      session.note(fmt::format("the poses alone are in {}", beside));
+    if (is_marginalized(graph)) {
+      if (std::filesystem::exists(beside, ignored)) {
+        session.note(fmt::format("{} is there already: the poses are not written", beside));
+      } else {
+        write_graph(graph, beside, session.registry(), "tum");
+        session.note(fmt::format("the poses alone are in {}", beside));
+      }
     }
     throw;
   }
+  for (const std::string& doubt : reasons_for_doubt(graph, chi2(graph))) session.note(doubt);
 }
 
 int run(OnlineOptions options, Session& session) {

@@ -30,7 +30,7 @@ class ChordalPool {
   using Vector = Eigen::Matrix<double, D, 1>;
 
  public:
-  ChordalPool(Graph& graph, Placing& placing, int pool, bool unit_weights)
+  ChordalPool(Graph& graph, Placing& placing, const Gauge& gauge, int pool, bool unit_weights)
       : graph_(graph),
         placing_(placing),
         type_(*graph.variable_pools()[pool].type),
@@ -39,7 +39,9 @@ class ChordalPool {
         links_(relative_links(graph, pool)),
         points_(cartesian_links(graph, pool)),
         unknown_(static_cast<std::size_t>(graph.variable_count()), kNone),
-        R_(graph.variable_pools()[pool].variables.size(), Matrix::Zero()) {}
+        R_(graph.variable_pools()[pool].variables.size(), Matrix::Zero()),
+        component_(gauge.component),
+        origins_(static_cast<std::size_t>(gauge.components), Vector::Zero()) {}
 
   /// Places all poses that relative factors reach, and points seen from them.
   void compute(LinearSolver& solver, std::vector<std::string>& notes) {
@@ -64,13 +66,16 @@ class ChordalPool {
   std::pair<Matrix, Vector> measured(const Link& link) const {
     return split(graph_.measurement(link.factor).data());
   }
-  /// Relative to the origin of the linear system.
+  const Vector& origin(int variable) const {
+    return origins_[static_cast<std::size_t>(component_[static_cast<std::size_t>(variable)])];
+  }
+  /// Relative to that.
   Vector position(int variable) const {
     Vector t;
     Matrix unused;
     graph_.type(variable).placement()->split(graph_.state(variable).data(), unused.data(),
                                              t.data());
-    return t - origin_;
+    return t - origin(variable);
   }
 
   /// Each piece that relative factors connect needs one pose whose place is known: held, or by a
@@ -107,13 +112,12 @@ class ChordalPool {
       reach(v);
       spread();
     }
-    bool origin_is_set = false;
     for (int v = 0; v < graph_.variable_count(); ++v) {
       if (!linked[v]) continue;
       if (placing_.placed(v)) {
         rotation(v) = split(graph_.state(v).data()).first;
-        if (!origin_is_set) origin_ = position(v);
-        origin_is_set = true;
+        const auto component = static_cast<std::size_t>(component_[v]);
+        if (origins_[component].isZero(0.0)) origins_[component] = position(v);
       } else {
         unknown_[v] = count_++;
         variables_.push_back(v);
@@ -208,7 +212,8 @@ class ChordalPool {
       add_difference(problem, link, R_i * W * R_i.transpose(), R_i * z);
     }
     check(problem.solve(solver));
-    for (int k = 0; k < count_; ++k) set_state(variables_[k], problem.solution(k) + origin_);
+    for (int k = 0; k < count_; ++k)
+      set_state(variables_[k], problem.solution(k) + origin(variables_[k]));
   }
 
   /// ‖t_j - t_i - d‖²_W.
@@ -267,8 +272,10 @@ class ChordalPool {
   std::vector<int> unknown_;    // by variable: its place among the unknowns
   std::vector<int> variables_;  // and back
   int count_ = 0;
-  std::vector<Matrix> R_;           // by slot of the pool
-  Vector origin_ = Vector::Zero();  // of the linear system: the position of a pose that is placed
+  std::vector<Matrix> R_;  // by slot of the pool
+  // The linear system is that of positions relative to a pose that is placed, of each component.
+  std::vector<int> component_;  // by variable
+  std::vector<Vector> origins_;
 };
 
 class Chordal final : public InitialGuess {
@@ -279,14 +286,15 @@ class Chordal final : public InitialGuess {
   std::vector<std::string> compute(Graph& graph) override {
     std::vector<std::string> notes;
     Placing placing(graph);
-    placing.place_roots(resolve_gauge(graph));
+    const Gauge gauge = resolve_gauge(graph);
+    placing.place_roots(gauge);
     std::int64_t relative = 0;
     for (std::size_t pool = 0; pool < graph.variable_pools().size(); ++pool) {
       const VariableType& type = *graph.variable_pools()[pool].type;
       if (!has_orientation(type)) continue;
       relative += type.placement()->dimension() == 2
-                      ? compute_pool<2>(graph, placing, static_cast<int>(pool), notes)
-                      : compute_pool<3>(graph, placing, static_cast<int>(pool), notes);
+                      ? compute_pool<2>(graph, placing, gauge, static_cast<int>(pool), notes)
+                      : compute_pool<3>(graph, placing, gauge, static_cast<int>(pool), notes);
     }
     const std::int64_t others = graph.factor_count() - relative;
     if (others > 0) {
@@ -301,9 +309,9 @@ class Chordal final : public InitialGuess {
 
  private:
   template <int D>
-  std::int64_t compute_pool(Graph& graph, Placing& placing, int pool,
+  std::int64_t compute_pool(Graph& graph, Placing& placing, const Gauge& gauge, int pool,
                             std::vector<std::string>& notes) {
-    ChordalPool<D> poses(graph, placing, pool, unit_weights_);
+    ChordalPool<D> poses(graph, placing, gauge, pool, unit_weights_);
     poses.compute(*solver_, notes);
     return poses.relative_factors();
   }

@@ -259,6 +259,24 @@ TEST_F(OptimizeCommand, AnImplausibleEstimateIsSaid) {
   EXPECT_THAT(good.out, Not(HasSubstr("degrees of freedom")));
 }
 
+TEST_F(OptimizeCommand, AnImplausibleEstimateIsSaidByOtherCommandsToo) {
+  const std::string bad = folder_.file("bad.g2o"), map = folder_.file("map.g2o");
+  ASSERT_EQ(cairn({"generate", "manhattan:poses=200,outliers=20", "-o", bad}).exit_code, 0);
+  const std::vector<Arguments> commands{
+      {"bench", bad, "--repeat", "1", "--linear-solver", "block_cholesky", "--no-memory"},
+      {"sparsify", bad, "-o", map},
+      {"replay", bad, "-o", map, "--finish"},
+      {"marginals", bad}};
+  for (const Arguments& arguments : commands) {
+    const Outcome outcome = cairn(arguments);
+    EXPECT_THAT(outcome.out + outcome.err,
+                HasSubstr("degrees of freedom: this estimate is hardly the right one"))
+        << arguments.front();
+  }
+  const Outcome online = cairn({"online", "-o", map}, {}, read_text(bad));
+  EXPECT_THAT(online.err, HasSubstr("degrees of freedom: this estimate is hardly the right one"));
+}
+
 TEST_F(OptimizeCommand, TheStartIsChosenByDefaultAndSaid) {
   const std::string far = "@manhattan:poses=1500,rotation_sigma=0.1";
   const auto report = report_of({"optimize", far});

@@ -222,6 +222,19 @@ TEST_F(Outputs, AreTriedAsTheyWillBeWritten) {
   EXPECT_THAT(report.err, HasSubstr("folder"));
 }
 
+// Whenever the signal comes: before the work it ends the program, later the waiting.
+TEST_F(Outputs, AFifoThatNothingReadsIsNotWaitedForAfterASignal) {
+  graph();
+  for (const char* seconds : {"0.05", "2"}) {
+    const Outcome outcome =
+        shell("mkfifo $D/fifo; timeout --preserve-status -s INT -k 60 " + std::string(seconds) +
+                  " $C optimize $D/graph.g2o -o $D/fifo --to g2o; "
+                  "echo code=$? >&2; rm $D/fifo",
+              folder_);
+    EXPECT_THAT(outcome.err, testing::AnyOf(HasSubstr("code=3"), HasSubstr("code=130")));
+  }
+}
+
 TEST_F(Outputs, ALimitOfTheSizeOfFilesIsAnError) {
   graph();
   const Outcome outcome =

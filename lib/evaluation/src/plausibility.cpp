@@ -42,17 +42,25 @@ std::string implausible_estimate(const Graph& graph, double chi2) {
 namespace {
 
 constexpr double kLargestDeviation = 1e-3;
+constexpr double kStep = 1e-4, kLargestStep = 0.1;  // of differences
 constexpr double kNoWeight = 1e-9;  // of a factor, where 1 is that of one without loss
 
 FactorCheck check(const Graph& graph, int position) {
   std::vector<const VariableType*> types;
   std::vector<const double*> states;
+  double largest = 0.0;
   for (const std::int32_t v : graph.factor_variables(position)) {
     types.push_back(&graph.type(v));
     states.push_back(graph.state(v).data());
+    for (const double number : graph.state(v)) largest = std::max(largest, std::abs(number));
   }
+  // Differences of states that are rounded to `rounding` are off by a part of that in the step.
+  const double rounding = std::numeric_limits<double>::epsilon() * largest;
+  const double step = std::max(kStep, 100.0 * rounding / kLargestDeviation);
+  if (!(step <= kLargestStep)) return {.largest_deviation = std::nan("")};
   try {
-    return check_factor(graph.factor_type(position), types, states, graph.measurement(position));
+    return check_factor(graph.factor_type(position), types, states, graph.measurement(position), {},
+                        step);
   } catch (...) {  // beside the states it may not be defined
     return {.largest_deviation = std::nan("")};
   }

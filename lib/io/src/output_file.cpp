@@ -83,6 +83,11 @@ std::mutex& unfinished_outputs() {
   return mutex;
 }
 
+std::atomic<const std::atomic<bool>*>& reader_interrupt() {
+  static std::atomic<const std::atomic<bool>*> flag{nullptr};
+  return flag;
+}
+
 OutputFile*& first_unfinished() {
   static OutputFile* first = nullptr;
   return first;
@@ -102,10 +107,11 @@ OutputFile::OutputFile(const fs::path& file) : file_(file) {
   if (exists && S_ISDIR(status.st_mode)) refuse(file_, "is a folder; expected a file name");
   if (exists && !S_ISREG(status.st_mode)) {
     // Renaming a file over these would remove them.
-    const auto open = [&] { return ::open(target_.c_str(), O_WRONLY | O_CLOEXEC); };
-    // A FIFO is waited for until somebody reads it, for ever if need be: a signal ends that.
-    descriptor_ = S_ISFIFO(status.st_mode) ? open() : without_interrupts(open);
-    if (descriptor_ < 0 && errno == EINTR) refuse(file_, "interrupted before anything reads it");
+    if (S_ISFIFO(status.st_mode)) {
+      open_fifo();
+      return;
+    }
+    descriptor_ = without_interrupts([&] { return ::open(target_.c_str(), O_WRONLY | O_CLOEXEC); });
     if (descriptor_ < 0) fail(errno);
     return;
   }
@@ -128,6 +134,20 @@ void OutputFile::open_descriptor(int number) {
     fail(EBADF);
   descriptor_ = ::fcntl(number, F_DUPFD_CLOEXEC, 0);
   if (descriptor_ < 0) fail(errno);
+}
+
+/// Waits for somebody to read it, for ever if need be. The system's own waiting goes on after a
+/// signal, so that the flag would never be seen.
+void OutputFile::open_fifo() {
+  constexpr int kPause = 20;  // [ms]
+  const auto open = [&] { return ::open(target_.c_str(), O_WRONLY | O_CLOEXEC | O_NONBLOCK); };
+  while ((descriptor_ = without_interrupts(open)) < 0) {
+    if (errno != ENXIO) fail(errno);
+    const std::atomic<bool>* interrupt = reader_interrupt().load();
+    if (interrupt && interrupt->load()) refuse(file_, "interrupted before anything reads it");
+    static_cast<void>(::poll(nullptr, 0, kPause));
+  }
+  ::fcntl(descriptor_, F_SETFL, ::fcntl(descriptor_, F_GETFL) & ~O_NONBLOCK);
 }
 
 /// `mode`: of the file that is to be replaced; negative if there is none.
@@ -186,6 +206,10 @@ void OutputFile::finish() {
 
 void OutputFile::fail(int reason) const {
   refuse(file_, "cannot be written: " + system_message(reason));
+}
+
+void end_waiting_for_readers_on(const std::atomic<bool>* interrupt) noexcept {
+  reader_interrupt().store(interrupt);
 }
 
 void remove_unfinished_outputs() noexcept {

@@ -27,9 +27,10 @@ double optimize_whole(Graph& graph, Optimizer& optimizer, const std::string& nam
     result.notes.push_back(fmt::format("the optimisation of {} ended as {}: it is not at a minimum",
                                        what, to_string(summary.status)));
   }
-  const std::string implausible = implausible_estimate(graph, summary.final_chi2);
-  if (!result.interrupted && !implausible.empty())
-    result.notes.push_back(fmt::format("{}: {}", what, implausible));
+  if (!result.interrupted) {
+    for (const std::string& doubt : reasons_for_doubt(graph, summary.final_chi2))
+      result.notes.push_back(fmt::format("{}: {}", what, doubt));
+  }
   return summary.final_chi2;
 }
 

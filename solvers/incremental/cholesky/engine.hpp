@@ -166,10 +166,11 @@ class Engine : private EngineState {
   Covariances& covariances() { return covariances_; }
   MarginalsBy update_covariances() { return covariances_.update(system_, tree_, held_); }
   /// Σ_ab of steps as seen from the poses (x ⊕ δ), size_a × size_b, column-major: a kept block or
-  /// by solving. False if H is singular.
+  /// by solving. False if H is singular, if only to rounding.
   bool covariance(int a, int b, double* block);
   /// The rows of Σ_vb for all of `rows`, one below the other, by solving.
   bool covariance_column(std::span<const std::int32_t> rows, int b, double* column);
+  bool has_covariances() const { return !broken_ && !tree_.is_singular_to_rounding(); }
 
   const Tree& tree() const { return tree_; }
   const System& system() const { return system_; }

@@ -40,7 +40,7 @@ void Engine::as_seen_from(int a, int b, double* block, std::int64_t stride) cons
 
 bool Engine::covariance(int a, int b, double* block) {
   const std::int32_t rows = system_.size(a), columns = system_.size(b);
-  if (const double* kept = covariances_.kept(a, b); kept && !broken_) {
+  if (const double* kept = covariances_.kept(a, b); kept && has_covariances()) {
     std::copy_n(kept, rows * columns, block);
     as_seen_from(a, b, block, rows);
     return true;
@@ -55,7 +55,7 @@ bool Engine::covariance_column(std::span<const std::int32_t> rows, int b, double
   const std::int32_t columns = system_.size(b);
   std::fill_n(column, height * columns, 0.0);
   if (held_[b]) return true;
-  if (broken_ || tree_.node_of(b) < 0) return false;
+  if (!has_covariances() || tree_.node_of(b) < 0) return false;
   AlignedVector X(static_cast<std::size_t>(system_.scalars()) * 8);
   // Few rows are solved for along their paths alone.
   const bool few = std::ssize(rows) * kFewRows <= system_.variables();

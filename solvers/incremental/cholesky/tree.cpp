@@ -65,27 +65,32 @@ std::int32_t Tree::factorize() {
   std::ranges::sort(affected_, {}, [&](std::int32_t n) { return nodes_[n].sequence; });
   for (const std::int32_t n : affected_) {
     if (factorize_node(nodes_[n])) continue;
-    const std::int32_t failed = undetermined(nodes_[n]);
-    return failed >= 0 ? failed : nodes_[n].variables.front();
+    const Node& node = nodes_[n];
+    for (const std::int32_t v : node.own_variables()) {
+      const std::int32_t row = front_row(node, v);
+      for (std::int32_t c = row; c < row + system_->size(v); ++c) {
+        const double pivot = node.panel[std::int64_t{c} * node.stride + c];
+        if (!(pivot > 0.0) || !std::isfinite(pivot)) return v;
+      }
+    }
+    return node.variables.front();
   }
   return -1;
 }
 
-/// The first variable of its own with a pivot that is not positive, or that is what rounding leaves
-/// of its entry of H; -1 if there is none.
-std::int32_t Tree::undetermined(const Node& node) const {
+/// Whether a pivot is what rounding leaves of its entry of H.
+bool Tree::is_singular_to_rounding(const Node& node) const {
   const double* pivot = node.panel.data();
   for (const std::int32_t v : node.own_variables()) {
     const std::int32_t size = system_->size(v);
     const double* entry = system_->diagonal(v);
     for (std::int32_t k = 0; k < size; ++k) {
-      // Negated, so that what is not a number is bad too.
-      if (!(*pivot * *pivot * kFewestDigits > *entry) || !std::isfinite(*pivot)) return v;
+      if (*pivot * *pivot * kFewestDigits < *entry) return true;
       pivot += node.stride + 1;
       entry += size + 1;
     }
   }
-  return -1;
+  return false;
 }
 
 /// H's entries into the panel.
@@ -187,7 +192,9 @@ bool Tree::factorize_node(Node& node) {
   for (const std::int32_t v : node.variables) front_row_[v] = -1;
 
   if (block::factor_front(*kernels_, panel, stride, node.columns, node.m) >= 0) return false;
-  if (undetermined(node) >= 0) return false;
+  const bool singular = is_singular_to_rounding(node);
+  singular_nodes_ += static_cast<int>(singular) - static_cast<int>(node.singular);
+  node.singular = singular;
   if (!inner) return true;
   kernels_->update(panel, stride, node.columns, node.m, update, node.columns / 8 * 8, node.stride);
   for (std::size_t k = 0; k < children_part.size(); ++k) update[k] += children_part[k];

@@ -2,6 +2,7 @@
 #include "descent.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -22,8 +23,8 @@ namespace {
 /// the size.
 constexpr double kLargestBackwardError = 1e-6;
 /// An iterative solver's step lowers its residual at least to this part of the gradient, in the
-/// solver's own units and in those of the unknowns: the decrease that it predicts is then that of
-/// the system, and not merely of as much of it as the solver has come to.
+/// solver's own units and in those of the unknowns. Otherwise the decrease that it predicts is
+/// that of as much of the system as the solver has come to, and no sign of a minimum.
 constexpr double kLargestResidual = 0.1;
 /// A gradient is a sum of products of Jacobians and residuals, and zero up to this share of both.
 constexpr double kGradientRounding = 1e-13;
@@ -169,17 +170,20 @@ bool Descent::solves(std::span<const double> out) {
 
 double Descent::relative_residual() const {
   const std::span<const double> residual = equations_->solve_residual(), g = equations_->g();
+  double largest = 0.0;  // squares of numbers as small as an information of 1e-200 would vanish
+  for (const double value : g) largest = std::max(largest, std::abs(value));
+  if (!(largest > 0.0)) return std::ranges::any_of(residual, [](double r) { return r != 0.0; });
   double left = 0.0, all = 0.0, scaled_left = 0.0, scaled_all = 0.0;
   for (std::size_t k = 0; k < g.size(); ++k) {
-    const double entry = equations_->diagonal()[k], weight = entry > 0.0 ? 1.0 / entry : 0.0;
-    left += residual[k] * residual[k];
-    all += g[k] * g[k];
-    scaled_left += weight * residual[k] * residual[k];
-    scaled_all += weight * g[k] * g[k];
+    const double entry = equations_->diagonal()[k], weight = entry > 0.0 ? largest / entry : 0.0;
+    const double r = residual[k] / largest, right = g[k] / largest;
+    left += r * r;
+    all += right * right;
+    scaled_left += weight * r * r;
+    scaled_all += weight * right * right;
   }
-  // Negated, so that what is not a number is bad too.
-  if (!(all > 0.0)) return left > 0.0 ? std::numeric_limits<double>::infinity() : 0.0;
-  return std::sqrt(std::max(left / all, scaled_left / scaled_all));
+  const double plain = left / all, scaled = scaled_left / scaled_all;
+  return std::sqrt(std::isnan(plain) || scaled > plain ? scaled : plain);
 }
 
 bool Descent::residual_is_rounding() const {
@@ -224,20 +228,32 @@ void Descent::end_not_finite() {
 }
 
 double Descent::coordinate_rounding() const {
+  constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
   const Linearizer& linearizer = equations_->linearizer();
   const BlockStructure& structure = linearizer.structure();
-  const double* diagonal = equations_->diagonal().data();
+  const double* information = equations_->diagonal().data();
   double sum = 0.0;
   for (int block = 0; block < structure.blocks(); ++block) {
     const int variable = linearizer.variable_of(block);
-    const std::int64_t numbers = graph_.type(variable).ambient_size();
-    const auto x = std::span(estimate.pools[static_cast<std::size_t>(graph_.pool(variable))])
-                       .subspan(static_cast<std::size_t>(graph_.slot(variable) * numbers),
-                                static_cast<std::size_t>(numbers));
+    const VariableType& type = graph_.type(variable);
+    const double* x = estimate.pools[static_cast<std::size_t>(graph_.pool(variable))].data() +
+                      std::int64_t{graph_.slot(variable)} * type.ambient_size();
+    // Positions come first in the tangent space, and what else a pose has is of the size of one.
+    std::array<double, 9> R{};
+    std::array<double, 3> t{};
+    int positions = type.tangent_size();
     double largest = 0.0;
-    for (const double number : x) largest = std::max(largest, std::abs(number));
-    const double rounding = std::numeric_limits<double>::epsilon() * largest;
-    for (int k = 0; k < structure.block_size(block); ++k) sum += *diagonal++ * rounding * rounding;
+    if (const Placement* placement = type.placement()) {
+      placement->split(x, R.data(), t.data());
+      positions = placement->dimension();
+      for (const double number : t) largest = std::max(largest, std::abs(number));
+    } else {
+      for (int k = 0; k < type.ambient_size(); ++k) largest = std::max(largest, std::abs(x[k]));
+    }
+    for (int k = 0; k < structure.block_size(block); ++k) {
+      const double rounding = kEpsilon * (k < positions ? largest : 1.0);
+      sum += *information++ * rounding * rounding;
+    }
   }
   return sum / 12.0;  // the variance of what is spread evenly over one unit
 }

@@ -95,7 +95,8 @@ class Descent {
 
  private:
   /// What rounding of the estimate's numbers adds to chi2, as expected: Σ H_kk (2⁻⁵² |x|)² / 12,
-  /// |x| the largest number of the state that unknown k belongs to.
+  /// |x| the largest coordinate of a pose or point, 1 for orientations, else the largest number of
+  /// the state.
   double coordinate_rounding() const;
   bool is_solution(std::span<const double> out);
   void note_wrong_step(const std::string& residual);

@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <pthread.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
-#include <csignal>
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
@@ -16,6 +14,7 @@
 #include <string>
 #include <thread>
 
+#include "cairn/io/output_file.hpp"
 #include "cairn/runtime/error.hpp"
 #include "unit/plugins/formats/reading.hpp"
 
@@ -235,26 +234,23 @@ TEST_F(File, WritesToStandardOutput) {
   EXPECT_EQ(testing::internal::GetCapturedStdout(), kGraph);
 }
 
-TEST_F(File, WaitsForTheReaderOfAFifoUntilASignal) {
+TEST_F(File, WaitsForTheReaderOfAFifoUntilItIsInterrupted) {
   const std::string fifo = path("fifo");
   ASSERT_EQ(::mkfifo(fifo.c_str(), 0600), 0);
-  struct sigaction quiet {};
-  struct sigaction before {};
-  quiet.sa_handler = [](int) {};
-  ASSERT_EQ(::sigaction(SIGUSR1, &quiet, &before), 0);
-  std::atomic<bool> ended{false};
-  std::string message;
-  std::thread writer([&] {
-    message = message_of([&] { write_file(fifo, "a graph"); });
-    ended = true;
+  const std::atomic<bool> interrupt{true};
+  end_waiting_for_readers_on(&interrupt);
+  EXPECT_THAT(message_of([&] { write_file(fifo, "a graph"); }),
+              EndsWith("fifo: interrupted before anything reads it"));
+  end_waiting_for_readers_on(nullptr);
+  std::string read;
+  std::thread reader([&] {
+    std::ifstream file(fifo);
+    read.assign(std::istreambuf_iterator<char>(file), {});
   });
-  while (!ended) {
-    ::pthread_kill(writer.native_handle(), SIGUSR1);
-    std::this_thread::yield();
-  }
-  writer.join();
-  ::sigaction(SIGUSR1, &before, nullptr);
-  EXPECT_THAT(message, EndsWith("fifo: interrupted before anything reads it"));
+  const std::string megabyte(1 << 20, 'x');  // more than a pipe holds
+  write_file(fifo, megabyte);
+  reader.join();
+  EXPECT_EQ(read, megabyte);
 }
 
 }  // namespace

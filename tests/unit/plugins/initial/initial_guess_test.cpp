@@ -368,6 +368,43 @@ TEST(Chordal, DoesNotDependOnWhereTheWorldsOriginIs) {
   }
 }
 
+// Each piece of a graph has an origin of its own.
+TEST(Chordal, DoesNotDependOnWhereOtherPiecesAre) {
+  Registry registry;
+  const Graph chain =
+      std::move(registry.make<Generator>("manhattan:poses=300")->generate(registry, 1).graph);
+  const double far = 1e9;
+  for (const bool pair_first : {false, true}) {
+    Graph graph;
+    const auto type = chain.variable_pools()[0].type;
+    const auto add_pair = [&] {
+      const double a[] = {far, far, 0.0}, b[] = {far + 1.0, far, 0.0}, z[] = {1.0, 0.0, 0.0};
+      const int poses[] = {graph.add_variable(type, 10'000, a),
+                           graph.add_variable(type, 10'001, b)};
+      graph.add_factor(chain.factor_pools()[0].type, poses, z,
+                       std::vector{1.0, 0.0, 0.0, 1.0, 0.0, 1.0});
+    };
+    if (pair_first) add_pair();
+    std::vector<int> number;
+    for (int v = 0; v < chain.variable_count(); ++v)
+      number.push_back(graph.add_variable(type, chain.id(v), chain.state(v)));
+    for (int f = 0; f < chain.factor_count(); ++f) {
+      std::vector<int> variables;
+      for (const int v : chain.factor_variables(f)) variables.push_back(number[v]);
+      graph.add_factor(chain.factor_pools()[0].type, variables, chain.measurement(f),
+                       chain.information(f));
+    }
+    if (!pair_first) add_pair();
+    Graph alone = chain.clone();
+    guess(registry, "chordal", graph);
+    guess(registry, "chordal", alone);
+    for (int v = 0; v < chain.variable_count(); ++v) {
+      EXPECT_NEAR(graph.state(number[v])[0], alone.state(v)[0], 1e-9) << pair_first << ' ' << v;
+      EXPECT_NEAR(graph.state(number[v])[1], alone.state(v)[1], 1e-9) << pair_first << ' ' << v;
+    }
+  }
+}
+
 // M3500a: extra noise of 0.1 rad on every orientation; from odometry optimizers stop in local
 // minima.
 TEST(Chordal, StartsNearTheOptimumOfM3500a) {

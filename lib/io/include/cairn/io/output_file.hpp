@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <atomic>
 #include <filesystem>
 #include <string>
 #include <string_view>
@@ -30,6 +31,7 @@ class CAIRN_API OutputFile {
 
  private:
   void open_descriptor(int number);
+  void open_fifo();
   void open_beside(int mode);
   void unlist() noexcept;
   friend void remove_unfinished_outputs() noexcept;
@@ -42,6 +44,10 @@ class CAIRN_API OutputFile {
   int failure_ = 0;             // of the first write that failed
   OutputFile* next_ = nullptr;  // of those that lie beside their names
 };
+
+/// Outputs that are FIFOs are not waited for any longer once this is true; null: for ever. It must
+/// live until another is set.
+CAIRN_API void end_waiting_for_readers_on(const std::atomic<bool>* interrupt) noexcept;
 
 /// For a process that must end in any of its threads, without the destructors of what others have:
 /// removes what lies beside its name. None is opened or finished after that: who tries waits.
