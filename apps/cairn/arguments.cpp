@@ -327,7 +327,7 @@ void ProgramParser::add_version(const std::string& names, const std::string& tex
 Argument ProgramParser::add_config(const std::string& names, const std::string& help) {
   app_->allow_config_extras(CLI::config_extras_mode::error);
   app_->config_formatter(std::make_shared<BoundedConfig>());
-  CLI::Option* const option = app_->set_config(names, "", help);
+  CLI::Option* const option = app_->set_config(names, "", help)->check(not_empty());
   return {*option, (*words_)[option]};
 }
 

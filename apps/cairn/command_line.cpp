@@ -145,8 +145,9 @@ Error bad_value(const ParseOutcome& outcome, const ArgumentParser& program,
     }
     const std::string unreadable = fmt::format("Could not convert: {} = ", name);
     if (what.starts_with(unreadable))
-      what = fmt::format("{}: '{}' is not a valid {}", name, what.substr(unreadable.size()),
-                         option.type_name());
+      what =
+          fmt::format("{}: '{}' is not {}", name, what.substr(unreadable.size()),
+                      option.most_values() > 0 ? "a valid " + option.type_name() : "true or false");
   }
   const std::string where = command ? command_name(*command) : "cairn";
   return {ErrorCode::usage, fmt::format("{}; see {} --help", what, where)};

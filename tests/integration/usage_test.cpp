@@ -107,6 +107,7 @@ TEST(Usage, MissingAndSurplusAndMalformedArgumentsAreRefused) {
   expect_error(cairn({"optimize", "@ring", "--output", ""}), kUsage,
                "--output: an empty word is no value; leave the option out");
   expect_error(cairn({"optimize", ""}), kUsage, "an empty word is no value");
+  expect_error(cairn({"optimize", "@ring", "--config", ""}), kUsage, "an empty word is no value");
   expect_error(cairn({"optimize", "@ring", "--iterations=-1"}), kUsage, "-1");
   expect_error(cairn({"optimize", "@ring", "--tolerance", "2"}), kUsage, "--tolerance");
   expect_error(cairn({"optimize", "@ring", "--threads", "100000"}), kUsage, "--threads");

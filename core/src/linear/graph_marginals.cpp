@@ -27,7 +27,10 @@ std::int64_t tangent(const Graph& graph, int variable) {
 }  // namespace
 
 GraphMarginals::GraphMarginals(const Graph& graph, LinearSolver& solver)
-    : graph_(&graph), equations_(graph, solver), marginals_(&marginals_of(solver)) {}
+    : graph_(&graph),
+      equations_(graph, solver),
+      marginals_(&marginals_of(solver)),
+      of_jacobian_(query<JacobianSolver>(solver) != nullptr) {}
 
 Factorization GraphMarginals::factorize() {
   singular_ = false;
@@ -47,7 +50,7 @@ Factorization GraphMarginals::factorize() {
   }
   const double* variance = diagonal_.data();
   const double* information = equations_.diagonal().data();
-  double worst = kFewestDigits;
+  double worst = of_jacobian_ ? kFewestDigits * kFewestDigits : kFewestDigits;
   for (int b = 0; b < structure.blocks(); ++b) {
     const int n = structure.block_size(b);
     for (int k = 0; k < n; ++k) {
@@ -67,9 +70,11 @@ std::string GraphMarginals::explain(const Factorization& failure) const {
   if (!singular_) return equations_.explain(failure);
   const int free = equations_.free_directions();
   return fmt::format(
-      "H is singular to rounding: the covariance of {} has fewer than two digits{}",
+      "H is singular to rounding: the covariance of {} may have fewer than two digits{}",
       graph_->describe_variable(equations_.linearizer().variable_of(failure.failed_block)),
-      free > 0 ? fmt::format("; {} gauge freedom{} likely", free, free == 1 ? " is" : "s are")
+      free > 0 ? fmt::format("; {} direction{} hardly determined, by a gauge freedom or by "
+                             "information that differs too much in size",
+                             free, free == 1 ? " is" : "s are")
                : "");
 }
 

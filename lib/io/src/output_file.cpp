@@ -27,6 +27,7 @@ namespace fs = std::filesystem;
 
 constexpr mode_t kNewFile = 0666;
 constexpr int kMostAttempts = 100;  // to find a name that is free
+constexpr int kPause = 20;  // [ms] between looks for an interrupt, while a reader is waited for
 
 std::string system_message(int number) { return std::generic_category().message(number); }
 
@@ -88,6 +89,11 @@ std::atomic<const std::atomic<bool>*>& reader_interrupt() {
   return flag;
 }
 
+bool is_interrupted() {
+  const std::atomic<bool>* interrupt = reader_interrupt().load();
+  return interrupt && interrupt->load();
+}
+
 OutputFile*& first_unfinished() {
   static OutputFile* first = nullptr;
   return first;
@@ -139,15 +145,13 @@ void OutputFile::open_descriptor(int number) {
 /// Waits for somebody to read it, for ever if need be. The system's own waiting goes on after a
 /// signal, so that the flag would never be seen.
 void OutputFile::open_fifo() {
-  constexpr int kPause = 20;  // [ms]
+  is_fifo_ = true;
   const auto open = [&] { return ::open(target_.c_str(), O_WRONLY | O_CLOEXEC | O_NONBLOCK); };
   while ((descriptor_ = without_interrupts(open)) < 0) {
     if (errno != ENXIO) fail(errno);
-    const std::atomic<bool>* interrupt = reader_interrupt().load();
-    if (interrupt && interrupt->load()) refuse(file_, "interrupted before anything reads it");
+    if (is_interrupted()) refuse(file_, "interrupted before anything reads it");
     static_cast<void>(::poll(nullptr, 0, kPause));
   }
-  ::fcntl(descriptor_, F_SETFL, ::fcntl(descriptor_, F_GETFL) & ~O_NONBLOCK);
 }
 
 /// `mode`: of the file that is to be replaced; negative if there is none.
@@ -179,9 +183,10 @@ void OutputFile::write(std::string_view bytes) noexcept {
   while (!bytes.empty() && failure_ == 0) {
     const ssize_t put =
         without_interrupts([&] { return ::write(descriptor_, bytes.data(), bytes.size()); });
-    if (put < 0 && errno == EAGAIN) {  // a pipe that another process has made non-blocking
+    if (put < 0 && errno == EAGAIN) {  // a FIFO, or what another process has made non-blocking
       pollfd ready{descriptor_, POLLOUT, 0};
-      static_cast<void>(::poll(&ready, 1, -1));
+      static_cast<void>(::poll(&ready, 1, kPause));
+      if (is_fifo_ && is_interrupted()) failure_ = EINTR;
       continue;
     }
     if (put < 0) failure_ = errno;

@@ -28,6 +28,9 @@ namespace {
 
 using Block = Eigen::Map<const Eigen::MatrixXd>;
 
+/// A divergence is not negative; by rounding it may be, by so much of each unknown [nats].
+constexpr double kRounding = 1e-6;
+
 LogDeterminant& determinant_of(LinearSolver& solver) {
   if (auto* determinant = query<LogDeterminant>(solver)) return *determinant;
   throw Error(ErrorCode::usage, "the linear solver does not give determinants");
@@ -322,6 +325,12 @@ SparsificationError sparsification_error(const Graph& original, const Graph& as_
   }
   error.covariance = 0.5 * (trace - log_q + log_p - static_cast<double>(d));
   error.kld = error.covariance + error.mean;
+  if (error.covariance < -kRounding * static_cast<double>(d)) {
+    throw Error(ErrorCode::numerical,
+                fmt::format("the divergence is {:.3g}, which is rounding: information differs too "
+                            "much in size",
+                            error.covariance));
+  }
   return error;
 }
 

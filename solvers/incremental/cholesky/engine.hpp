@@ -170,14 +170,14 @@ class Engine : private EngineState {
   bool covariance(int a, int b, double* block);
   /// The rows of Σ_vb for all of `rows`, one below the other, by solving.
   bool covariance_column(std::span<const std::int32_t> rows, int b, double* column);
-  bool has_covariances() const { return !broken_ && !tree_.is_singular_to_rounding(); }
-
   const Tree& tree() const { return tree_; }
   const System& system() const { return system_; }
   const Models& models() const { return models_; }
   const States& states() const { return states_; }
 
  private:
+  /// Whether Σ_vv, in the frame of v, has digits (`kFewestDigits`).
+  bool has_digits(int v, const double* sigma, std::int64_t stride) const;
   void load(Graph graph, std::vector<FactorId> ids);
   void settle_gauge();
   void watch_gauge_anew();

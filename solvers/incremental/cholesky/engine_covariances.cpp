@@ -5,6 +5,7 @@
 
 #include <Eigen/Core>
 
+#include "cairn/linear/graph_marginals.hpp"
 #include "dense/products.hpp"
 #include "engine.hpp"
 
@@ -38,9 +39,20 @@ void Engine::as_seen_from(int a, int b, double* block, std::int64_t stride) cons
   if (away(b)) sigma = dense::product_with_transpose(sigma, turn(b, columns));
 }
 
+bool Engine::has_digits(int v, const double* sigma, std::int64_t stride) const {
+  const std::int32_t size = system_.size(v);
+  const double* H = system_.diagonal(v);
+  for (std::int32_t k = 0; k < size; ++k) {
+    if (sigma[k * (stride + 1)] * H[k * (size + 1)] > kFewestDigits) return false;
+  }
+  return true;
+}
+
 bool Engine::covariance(int a, int b, double* block) {
   const std::int32_t rows = system_.size(a), columns = system_.size(b);
-  if (const double* kept = covariances_.kept(a, b); kept && has_covariances()) {
+  if (const double* kept = covariances_.kept(a, b); kept && !broken_) {
+    const double* own = a == b ? kept : covariances_.kept(b, b);
+    if (own && !has_digits(b, own, columns)) return false;
     std::copy_n(kept, rows * columns, block);
     as_seen_from(a, b, block, rows);
     return true;
@@ -55,7 +67,7 @@ bool Engine::covariance_column(std::span<const std::int32_t> rows, int b, double
   const std::int32_t columns = system_.size(b);
   std::fill_n(column, height * columns, 0.0);
   if (held_[b]) return true;
-  if (!has_covariances() || tree_.node_of(b) < 0) return false;
+  if (broken_ || tree_.node_of(b) < 0) return false;
   AlignedVector X(static_cast<std::size_t>(system_.scalars()) * 8);
   // Few rows are solved for along their paths alone.
   const bool few = std::ssize(rows) * kFewRows <= system_.variables();
@@ -72,6 +84,11 @@ bool Engine::covariance_column(std::span<const std::int32_t> rows, int b, double
       tree_.solve_many_above(sources, X);
     } else {
       tree_.solve_many(sources, X);
+    }
+    const double* own = X.data() + static_cast<std::size_t>(system_.offset(b)) * 8;
+    for (std::int32_t k = 0; k < width; ++k) {
+      const double information = system_.diagonal(b)[(first + k) * (columns + 1)];
+      if (own[(first + k) * 8 + k] * information > kFewestDigits) return false;
     }
     double* out = column + std::int64_t{first} * height;
     for (std::int32_t k = 0; k < width; ++k) {

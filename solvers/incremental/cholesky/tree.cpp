@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "block/front.hpp"
-#include "cairn/linear/graph_marginals.hpp"
 
 namespace cairn::incremental {
 Tree::Tree(const Tree& other, const System& system, States& states,
@@ -76,21 +75,6 @@ std::int32_t Tree::factorize() {
     return node.variables.front();
   }
   return -1;
-}
-
-/// Whether a pivot is what rounding leaves of its entry of H.
-bool Tree::is_singular_to_rounding(const Node& node) const {
-  const double* pivot = node.panel.data();
-  for (const std::int32_t v : node.own_variables()) {
-    const std::int32_t size = system_->size(v);
-    const double* entry = system_->diagonal(v);
-    for (std::int32_t k = 0; k < size; ++k) {
-      if (*pivot * *pivot * kFewestDigits < *entry) return true;
-      pivot += node.stride + 1;
-      entry += size + 1;
-    }
-  }
-  return false;
 }
 
 /// H's entries into the panel.
@@ -192,9 +176,6 @@ bool Tree::factorize_node(Node& node) {
   for (const std::int32_t v : node.variables) front_row_[v] = -1;
 
   if (block::factor_front(*kernels_, panel, stride, node.columns, node.m) >= 0) return false;
-  const bool singular = is_singular_to_rounding(node);
-  singular_nodes_ += static_cast<int>(singular) - static_cast<int>(node.singular);
-  node.singular = singular;
   if (!inner) return true;
   kernels_->update(panel, stride, node.columns, node.m, update, node.columns / 8 * 8, node.stride);
   for (std::size_t k = 0; k < children_part.size(); ++k) update[k] += children_part[k];

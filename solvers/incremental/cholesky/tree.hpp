@@ -46,7 +46,6 @@ struct Node {
   std::int64_t settled_at = -1;  ///< nothing above has had a lead since that many (see `Tree`)
   bool live = false;
   bool affected = false;
-  bool singular = false;  ///< to rounding: a pivot without digits
 
   std::int32_t below() const { return m - columns; }
   std::int32_t update_stride() const { return stride - columns / 8 * 8; }
@@ -155,9 +154,6 @@ class Tree {
   int affected_variables() const { return affected_variables_; }
   std::int64_t doubles() const { return doubles_; }
   double log_determinant() const;
-  /// Whether H, though its pivots are positive, is singular to rounding (`kFewestDigits`): it can
-  /// be solved with, but its inverse has no digits.
-  bool is_singular_to_rounding() const { return singular_nodes_ > 0; }
   /// Nodes with parents before their children.
   void top_down(std::vector<std::int32_t>& nodes) const;
   /// Where the scalars of a variable start among the rows of a node's front.
@@ -180,7 +176,6 @@ class Tree {
   void assemble(Node& node);
   void add_scattered(const Node& child, Node& parent);
   bool factorize_node(Node& node);
-  bool is_singular_to_rounding(const Node& node) const;
   double forward(std::vector<double>& g);
   void solve_node(Node& node, const double* y, std::vector<double>& steps,
                   std::vector<std::int32_t>& changed);
@@ -208,7 +203,6 @@ class Tree {
   std::int64_t doubles_ = 0;
   double cost_ = 0.0;  // of factorising everything, by the cost model [ns]
   int variables_ = 0;  // in the tree
-  int singular_nodes_ = 0;
   double cost_when_ordered_ = 0.0;
   int variables_when_ordered_ = 0;
 

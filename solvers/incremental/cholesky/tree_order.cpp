@@ -305,8 +305,6 @@ void Tree::free_node(std::int32_t n) {
   node.owes = false;
   node.lead.clear();
   node.own = 0;
-  singular_nodes_ -= static_cast<int>(node.singular);
-  node.singular = false;
   node.parent = -1;
   node.live = node.affected = false;
   node.panel.resize(0);

@@ -181,7 +181,8 @@ Summary CeresOptimizer::optimize(Graph& graph, const Stop& stop, Observer& obser
   Bridge bridge(graph, values, problem.cost_scale(), stop, observer, summary);
   ceres::Solver::Options options = options_;
   set_limits(stop, options);
-  options.parameter_tolerance = parameter_tolerance(stop, values, state_extent(graph, values));
+  options.parameter_tolerance =
+      parameter_tolerance(stop, values, state_extent(graph, gauge, values));
   options.callbacks.push_back(&bridge);
   ceres::Solver::Summary report;
   {
@@ -196,7 +197,7 @@ Summary CeresOptimizer::optimize(Graph& graph, const Stop& stop, Observer& obser
   summary.final_chi2 = loss_.name == "none" ? chi2(graph) : bridge.chi2();
   if (summary.status == Status::converged &&
       (!std::isfinite(summary.final_chi2) ||
-       ended_without_descent(report, state_extent(graph, graph.values()))))
+       ended_without_descent(report, state_extent(graph, gauge, graph.values()))))
     summary.status = Status::diverged;
   summary.notes.push_back("Ceres: " + report.message);
   summary.seconds = seconds_of(report);
@@ -205,7 +206,7 @@ Summary CeresOptimizer::optimize(Graph& graph, const Stop& stop, Observer& obser
     // A step may be short because the trust region is, or beside states far from the origin.
     const NewtonStep left = NewtonDecrement(graph, gauge).at(graph.values());
     if (left.decrease > kCeresRounding * summary.final_chi2 &&
-        left.norm > kCeresRounding * state_extent(graph, graph.values())) {
+        left.norm > kCeresRounding * state_extent(graph, gauge, graph.values())) {
       summary.status = Status::diverged;
       summary.notes.push_back(
           fmt::format("Ceres took a short step for convergence, but the model predicts a decrease "

@@ -60,6 +60,7 @@ class Run final : public ceres::IterationCallback {
       Observer& observer, Summary& summary)
       : values_(graph.values()),
         graph_(graph),
+        gauge_(gauge),
         stop_(stop),
         observer_(observer),
         summary_(summary),
@@ -109,6 +110,7 @@ class Run final : public ceres::IterationCallback {
 
   Values values_;
   const Graph& graph_;
+  const Gauge& gauge_;
   const Stop& stop_;
   Observer& observer_;
   Summary& summary_;
@@ -174,7 +176,7 @@ Status Run::without_descent() {
     return Status::not_positive_definite;
   }
   const bool rounding = step.decrease <= kCeresRounding * chi2_ ||
-                        step.norm <= kCeresRounding * state_extent(graph_, values_);
+                        step.norm <= kCeresRounding * state_extent(graph_, gauge_, values_);
   if (std::isfinite(chi2_) && rounding) return Status::converged;
   summary_.notes.push_back(
       fmt::format("the line search finds no step that lowers chi2, though the model predicts a "

@@ -77,7 +77,7 @@ Descent::Descent(std::string optimizer, std::string linear_solver, LinearSolver&
     trial = estimate;
     chi2 = equations_->linearize(estimate);
   }
-  state_extent_ = cairn::state_extent(graph, estimate);
+  state_extent_ = cairn::state_extent(graph, equations_->gauge(), estimate);
   best_ = estimate;
   best_chi2_ = summary_.initial_chi2 = chi2;
   for (const std::string& sentence : summary_.notes) observer_.on_message(sentence);
@@ -115,7 +115,8 @@ bool Descent::keep_if_best() {
   best_chi2_ = chi2;
   best_ = estimate;  // same sizes: no allocation
   if (number_ <= kIterationsForExtent)
-    state_extent_ = std::max(state_extent_, cairn::state_extent(graph_, estimate));
+    state_extent_ =
+        std::max(state_extent_, cairn::state_extent(graph_, equations_->gauge(), estimate));
   return true;
 }
 

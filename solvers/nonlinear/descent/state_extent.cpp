@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <vector>
 
 namespace cairn {
 namespace {
@@ -11,20 +13,34 @@ constexpr double kRounded = 1e-6;
 
 }  // namespace
 
-double state_extent(const Graph& graph, const Values& values) {
+double state_extent(const Graph& graph, const Gauge& gauge, const Values& values) {
   double spread = 0.0, alone = 0.0, squares = 0.0;
+  std::vector<int> count;
+  std::vector<double> mean;
   for (std::size_t pool = 0; pool < values.pools.size(); ++pool) {
-    const AlignedVector& x = values.pools[pool];
-    const auto numbers =
-        static_cast<std::size_t>(graph.variable_pools()[pool].type->ambient_size());
-    const std::size_t count = graph.variable_pools()[pool].variables.size();
-    for (std::size_t c = 0; c < numbers; ++c) {
-      double mean = 0.0;
-      for (std::size_t v = 0; count > 1 && v < count; ++v)
-        mean += x[v * numbers + c] / static_cast<double>(count);
-      for (std::size_t v = 0; v < count; ++v) {
-        const double number = x[v * numbers + c];
-        (count > 1 ? spread : alone) += (number - mean) * (number - mean);
+    const VariablePool& variables = graph.variable_pools()[pool];
+    const auto numbers = static_cast<std::size_t>(variables.type->ambient_size());
+    const auto component = [&](std::size_t slot) {
+      return static_cast<std::size_t>(
+          gauge.component[static_cast<std::size_t>(variables.variables[slot])]);
+    };
+    const double* x = values.pools[pool].data();
+    const std::size_t slots = variables.variables.size();
+    count.assign(static_cast<std::size_t>(gauge.components), 0);
+    mean.assign(count.size() * numbers, 0.0);
+    for (std::size_t v = 0; v < slots; ++v) ++count[component(v)];
+    for (std::size_t v = 0; v < slots; ++v) {
+      const std::size_t c = component(v);
+      for (std::size_t k = 0; k < numbers; ++k)
+        mean[c * numbers + k] += x[v * numbers + k] / count[c];
+    }
+    for (std::size_t v = 0; v < slots; ++v) {
+      const std::size_t c = component(v);
+      const bool one_of_many = count[c] > 1;
+      for (std::size_t k = 0; k < numbers; ++k) {
+        const double number = x[v * numbers + k];
+        const double apart = one_of_many ? number - mean[c * numbers + k] : number;
+        (one_of_many ? spread : alone) += apart * apart;
         squares += number * number;
       }
     }

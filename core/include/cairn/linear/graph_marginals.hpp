@@ -16,9 +16,10 @@
 namespace cairn {
 
 /// H is singular to rounding where Σ_kk H_kk, which is 1 / (1 − R²) of unknown k given all others,
-/// is larger than this: times the rounding of doubles, 2⁻⁵³, it is half of a percent, so that less
-/// than two digits are left of Σ_kk. Of a Cholesky factor, L_kk² is not smaller than 1 / Σ_kk.
-inline constexpr double kFewestDigits = 4.5e13;
+/// is larger than this: times the rounding of doubles, 2⁻⁵³, it is half of one per thousand, and
+/// as a factorisation of a thousand unknowns adds up, two digits of Σ_kk may be all that is left.
+/// Solvers that work on the Jacobian lose digits by the root of it, and have its square.
+inline constexpr double kFewestDigits = 4.5e12;
 
 /// Marginal covariances of a graph's variables at its present estimate x.
 ///
@@ -62,6 +63,7 @@ class CAIRN_API GraphMarginals {
   NormalEquations equations_;
   Marginals* marginals_;
   std::vector<double> diagonal_;  ///< blocks of Σ, of the variables that are not constant
+  bool of_jacobian_;              ///< the solver works on J, not on H
   bool singular_ = false;         ///< to rounding
   double diagonal_seconds_ = 0.0;
 };

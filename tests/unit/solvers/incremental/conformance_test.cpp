@@ -99,6 +99,30 @@ TEST_P(EveryEstimator, HasNoCovarianceOfAMatrixThatIsSingularToRounding) {
   }
 }
 
+// A long chain of strong factors on a weak prior: where rounding takes the digits of a covariance,
+// there is none. The headings' variances of a straight chain add up.
+TEST_P(EveryEstimator, HasACovarianceWithDigitsOrNone) {
+  for (const double strong : {1e4, 1e6, 1e8, 1e10}) {
+    const auto estimator = registry_.make<Estimator>(GetParam());
+    constexpr int kPoses = 100;
+    GraphUpdate update;
+    for (int k = 0; k < kPoses; ++k) update.variables.push_back(pose(k, {100.0 * k, 0.0, 0.0}));
+    update.factors.push_back({types_.prior, {0}, {0.0, 0.0, 0.0}, {1, 0, 0, 1, 0, 1}});
+    for (int k = 1; k < kPoses; ++k) {
+      update.factors.push_back(between(k - 1, k, {100.0, 0.0, 0.0}));
+      update.factors.back().information = {strong, 0, 0, strong, 0, strong};
+    }
+    estimator->update(update, {.full = true});
+    std::array<double, 9> block{};
+    const bool there = estimator->covariance(kPoses - 1, kPoses - 1, block);
+    EXPECT_TRUE(there || strong > 1e5) << strong;
+    if (there) {
+      const double heading = 1.0 + (kPoses - 1) / strong;
+      EXPECT_NEAR(block[8], heading, 0.01 * heading) << strong;
+    }
+  }
+}
+
 TEST_P(EveryEstimator, NumbersFactorsInTheOrderOfTheirAddition) {
   EXPECT_EQ(estimator_->update(chain(4)).first_factor, 0);
   GraphUpdate update;

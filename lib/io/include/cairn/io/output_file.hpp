@@ -41,6 +41,7 @@ class CAIRN_API OutputFile {
   std::filesystem::path target_;  // that, with links followed
   std::filesystem::path beside_;  // empty: in place
   int descriptor_ = -1;
+  bool is_fifo_ = false;        // its reader is not waited for after an interrupt
   int failure_ = 0;             // of the first write that failed
   OutputFile* next_ = nullptr;  // of those that lie beside their names
 };
