@@ -296,37 +296,6 @@ TEST_P(Optimizers, EndWhereCoordinatesAreRounded) {
   }
 }
 
-/// How far a map is from another says nothing of how long its steps are.
-TEST_P(Methods, FindTheMinimumOfEachOfTwoMapsFarApart) {
-  std::vector<double> lowest;
-  for (const double apart : {1e3, 1e10}) {
-    const Graph ring = test::ring_of_poses(30, 0.3);
-    Graph graph;
-    for (const double offset : {0.0, apart}) {
-      const int first = graph.variable_count();
-      for (int v = 0; v < ring.variable_count(); ++v) {
-        std::vector<double> x(ring.state(v).begin(), ring.state(v).end());
-        x[0] += offset;
-        graph.add_variable(ring.variable_pools()[0].type, graph.variable_count(), x);
-      }
-      for (int f = 0; f < ring.factor_count(); ++f) {
-        std::vector<int> variables;
-        for (const int v : ring.factor_variables(f)) variables.push_back(first + v);
-        graph.add_factor(ring.factor_pools()[0].type, variables, ring.measurement(f),
-                         ring.information(f));
-      }
-    }
-    const Summary summary = optimizer_->optimize(graph, {.max_iterations = 2000});
-    if (std::string_view(GetParam()) != "ceres_line_search") {  // which may say that it has not
-      EXPECT_EQ(summary.status, Status::converged) << apart;
-    }
-    if (summary.status == Status::converged) lowest.push_back(summary.final_chi2);
-  }
-  if (lowest.size() == 2) {
-    EXPECT_NEAR(lowest[1], lowest[0], 1e-3 * lowest[0]);
-  }
-}
-
 /// chi2 scales with the information, the estimate does not.
 TEST_P(Methods, FindTheSameEstimateAtAnyScaleOfTheInformation) {
   std::vector<double> wanted;
