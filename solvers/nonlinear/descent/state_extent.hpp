@@ -7,10 +7,11 @@
 namespace cairn {
 
 /// What the length of a step is compared with: how far the states are spread, the Euclidean norm of
-/// their distances from the mean of their pool in their connected component, of a single variable
-/// that of its state. Where they lie far from the origin, as UTM coordinates do, or components far
-/// from each other, their own norm is no measure of a map. At least 1e-6 of that norm, though,
-/// since states of that size are rounded.
+/// their distances from the mean of their pool in their connected component; where components are
+/// single variables, from that of the pool, and of a single variable from the origin. Where states
+/// lie far from the origin, as UTM coordinates do, or components far from each other, their own
+/// norm is no measure of a map. At least 1e-6 of that norm, though, since states of that size are
+/// rounded.
 double state_extent(const Graph& graph, const Gauge& gauge, const Values& values);
 
 }  // namespace cairn
