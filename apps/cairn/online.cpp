@@ -332,7 +332,6 @@ void write_map(const Graph& graph, const std::string& file, Session& session) {
     }
     throw;
   }
-  for (const std::string& doubt : reasons_for_doubt(graph, chi2(graph))) session.note(doubt);
 }
 
 int run(OnlineOptions options, Session& session) {
@@ -371,7 +370,13 @@ int run(OnlineOptions options, Session& session) {
     within_a_line = true;
   }
   try {
-    if (!options.output.empty()) write_map(lines.estimator().graph(), options.output, session);
+    if (!options.output.empty()) {
+      const Graph graph = lines.estimator().graph();
+      write_map(graph, options.output, session);
+      if (!failure) {  // within an update it may have been left in part
+        for (const std::string& doubt : reasons_for_doubt(graph, chi2(graph))) session.note(doubt);
+      }
+    }
   } catch (const std::exception& error) {
     if (!failure) throw;
     session.note(error.what());  // the reason comes last, as the error
