@@ -305,11 +305,11 @@ int run_compact(const CompactOptions& options, Session& session) {
     session.write_json(report);
   });
   note_selection(options, outcome, session);
-  for (const std::string& doubt : reasons_for_doubt(shown.compact, chi2(shown.compact)))
-    session.note(doubt);
   results.add([&] { session.print(summary_text(options, outcome, results)); });
   results.finish();
   if (guard.interrupted()) return kExitInterrupted;
+  for (const std::string& doubt : reasons_for_doubt(shown.compact, chi2(shown.compact)))
+    session.note(doubt);
   if (!shown.located) {
     session.note(fmt::format(
         "no pose was matched with one of {}: the map and the trajectory are not connected, and "

@@ -176,8 +176,10 @@ class Engine : private EngineState {
   const States& states() const { return states_; }
 
  private:
-  /// Whether Σ_vv, in the frame of v, has digits (`kFewestDigits`).
-  bool has_digits(int v, const double* sigma, std::int64_t stride) const;
+  /// Whether variances of v, in its frame, have digits (`kFewestDigits`): those of its unknowns
+  /// from `first` on, `step` doubles apart.
+  bool have_digits(int v, std::int32_t first, std::int32_t count, const double* variances,
+                   std::int64_t step) const;
   void load(Graph graph, std::vector<FactorId> ids);
   void settle_gauge();
   void watch_gauge_anew();

@@ -39,11 +39,12 @@ void Engine::as_seen_from(int a, int b, double* block, std::int64_t stride) cons
   if (away(b)) sigma = dense::product_with_transpose(sigma, turn(b, columns));
 }
 
-bool Engine::has_digits(int v, const double* sigma, std::int64_t stride) const {
-  const std::int32_t size = system_.size(v);
+bool Engine::have_digits(int v, std::int32_t first, std::int32_t count, const double* variances,
+                         std::int64_t step) const {
   const double* H = system_.diagonal(v);
-  for (std::int32_t k = 0; k < size; ++k) {
-    if (sigma[k * (stride + 1)] * H[k * (size + 1)] > kFewestDigits) return false;
+  const std::int32_t next = system_.size(v) + 1;
+  for (std::int32_t k = 0; k < count; ++k) {
+    if (variances[k * step] * H[(first + k) * next] > kFewestDigits) return false;
   }
   return true;
 }
@@ -52,7 +53,7 @@ bool Engine::covariance(int a, int b, double* block) {
   const std::int32_t rows = system_.size(a), columns = system_.size(b);
   if (const double* kept = covariances_.kept(a, b); kept && !broken_) {
     const double* own = a == b ? kept : covariances_.kept(b, b);
-    if (own && !has_digits(b, own, columns)) return false;
+    if (own && !have_digits(b, 0, columns, own, columns + 1)) return false;
     std::copy_n(kept, rows * columns, block);
     as_seen_from(a, b, block, rows);
     return true;
@@ -85,11 +86,8 @@ bool Engine::covariance_column(std::span<const std::int32_t> rows, int b, double
     } else {
       tree_.solve_many(sources, X);
     }
-    const double* own = X.data() + static_cast<std::size_t>(system_.offset(b)) * 8;
-    for (std::int32_t k = 0; k < width; ++k) {
-      const double information = system_.diagonal(b)[(first + k) * (columns + 1)];
-      if (own[(first + k) * 8 + k] * information > kFewestDigits) return false;
-    }
+    const double* own = X.data() + static_cast<std::size_t>(system_.offset(b) + first) * 8;
+    if (!have_digits(b, first, width, own, 8 + 1)) return false;
     double* out = column + std::int64_t{first} * height;
     for (std::int32_t k = 0; k < width; ++k) {
       for (const std::int32_t v : rows) {
