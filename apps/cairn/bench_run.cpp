@@ -121,14 +121,6 @@ std::string fault_of_plugin(const Work& work) {
   return {};
 }
 
-/// Whether the linear solvers of the command line are for that optimizer. One that cannot be asked,
-/// since its plugin is broken, stands there once.
-bool chooses_linear_solver(Registry& registry, const ComponentSpec& optimizer) {
-  bool takes = false;
-  fault_of_plugin([&] { takes = takes_linear_solver(registry, optimizer); });
-  return takes && !optimizer.values.contains(kLinearSolverOption);
-}
-
 /// One graph's runs, and the progress that is shown meanwhile.
 class GraphBench {
  public:
@@ -255,7 +247,12 @@ Comparison comparison(const BenchOptions& options, Session& session) {
   for (const std::string& optimizer : split_all(options.optimizers)) {
     const ComponentSpec spec = parse_component(optimizer);
     check_on_offer(Optimizer::kKind, spec.name, registry);
-    if (chooses_linear_solver(registry, spec)) {
+    bool takes = false;
+    const std::string fault = fault_of_plugin([&] { takes = takes_linear_solver(registry, spec); });
+    if (!fault.empty()) {  // its plugin cannot be asked, and stands there once
+      all.push_back({optimizer, "", fault});
+      solvers_used = true;
+    } else if (takes && !spec.values.contains(kLinearSolverOption)) {
       for (const std::string& solver : solvers) all.push_back({optimizer, solver, {}});
       solvers_used = true;
     } else {
@@ -266,6 +263,7 @@ Comparison comparison(const BenchOptions& options, Session& session) {
   if (!given.empty() && !solvers_used) throw linear_solver_refused(registry, refusing);
   if (!solvers_used) compared.left_out.clear();
   for (Configuration& configuration : all) {
+    if (!configuration.broken.empty()) continue;
     configuration.broken = fault_of_plugin([&] { registry.make<Optimizer>(configuration.spec()); });
   }
   if (!compared.left_out.empty()) {

@@ -32,6 +32,7 @@
 #include "interrupt.hpp"
 #include "json_report.hpp"
 #include "line_input.hpp"
+#include "option_words.hpp"
 #include "problem_setup.hpp"
 #include "table.hpp"
 #include "threshold_files.hpp"
@@ -295,7 +296,7 @@ void converse(Conversation& conversation, LineInput& input, bool kept, const Ses
   for (std::string line; input.next(line);) {
     const LineSession::Reply reply = conversation.take(line);
     if (heard && !reply.text.empty()) {
-      write_stdout(reply.text);
+      write_stdout(reply.refused ? in_command_line_words(reply.text) : reply.text);
       heard = !stdout_reader_is_gone();
       if (!heard && !kept) return;
       if (!heard) session.note("the reader of the answers is gone; the stream is taken to its end");

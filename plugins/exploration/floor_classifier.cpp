@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <cstring>
+#include <new>
 #include <numeric>
 #include <utility>
 
@@ -66,9 +67,14 @@ void FloorClassifier::update(const EvidenceGrid& grid, const CellBox& changed,
   const CellBox weighed = changed.moved(-first_).within(whole());
   weigh(grid, weighed);
   const CellBox classes = model_.smooth ? weighed.grown(kOpeningReach).within(whole()) : weighed;
-  classify(classes);
-  find_borders(classes.grown(1).within(whole()));
-  find_clearance(classes.with(obstructed.moved(-first_)).within(whole()));
+  try {
+    classify(classes);
+    find_borders(classes.grown(1).within(whole()));
+    find_clearance(classes.with(obstructed.moved(-first_)).within(whole()));
+  } catch (const cv::Exception& error) {
+    if (error.code == cv::Error::StsNoMem) throw std::bad_alloc();
+    throw;
+  }
   find_frontiers();
 }
 

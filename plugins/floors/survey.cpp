@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <limits>
 #include <memory>
+#include <new>
 #include <string>
 
 #include <fmt/format.h>
@@ -208,7 +209,12 @@ FloorSurvey survey_floor(const OccupancyGrid& grid, const FloorSurveyOptions& op
 class RoundBodySurveyor final : public FloorSurveyor {
  public:
   FloorSurvey survey(const OccupancyGrid& grid, const FloorSurveyOptions& options) override {
-    return survey_floor(grid, options);
+    try {
+      return survey_floor(grid, options);
+    } catch (const cv::Exception& error) {
+      if (error.code == cv::Error::StsNoMem) throw std::bad_alloc();
+      throw;
+    }
   }
 };
 

@@ -37,6 +37,8 @@ struct Trial {
   std::string name;
   std::vector<std::string> arguments;  ///< in the run's folder; inputs are in ../inputs
   std::vector<std::string> outputs;    ///< names of the files that it writes there
+  /// Those of two files of one output, such as a map and its picture: the second → the first.
+  std::map<std::string, std::string> parts;
   std::string journal;  ///< one of them that grows with what standard output acknowledges, or empty
   /// One of them that is written line by line, so that a process that is killed leaves its
   /// beginning, which `cairn view` shows; or empty.

@@ -2,12 +2,16 @@
 #include "trials.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <numbers>
 #include <string>
 
 namespace cairn::faults {
 namespace {
 
 constexpr int kLinesBeforeSave = 14;
+constexpr int kMetresWithFaults = 1, kMetresForKills = 12;
+constexpr int kBeams = 90;
 
 std::string edge(int from, int to, const std::string& measurement) {
   return "EDGE_SE2 " + std::to_string(from) + " " + std::to_string(to) + " " + measurement +
@@ -34,6 +38,25 @@ std::string policy_stream(int poses) {
     text += "NEW VERTEX_SE2 " + std::to_string(k) + "\n" + edge(k - 1, k, kStep) + "NEXT\n";
   }
   return text + edge(poses - 1, 0, kStep) + "NEXT\nDONE\nCHI2\n";
+}
+
+/// The log of a robot that drives along the middle of a room of 8 m by 6 m and looks ahead, in
+/// steps of 0.4 m.
+std::string laser_log(int scans) {
+  std::string text;
+  for (int k = 0; k < scans; ++k) {
+    const double x = 0.4 * k - 2;
+    text += "FLASER " + std::to_string(kBeams);
+    for (int beam = 0; beam < kBeams; ++beam) {
+      const double angle = std::numbers::pi * (beam / (kBeams - 1.0) - 0.5);
+      const double ahead = (4 - x) / std::max(std::cos(angle), 1e-9);
+      const double aside = 3 / std::max(std::abs(std::sin(angle)), 1e-9);
+      text += " " + std::to_string(std::min(ahead, aside));
+    }
+    const std::string pose = " " + std::to_string(x) + " 0 0";
+    text += pose + pose + " " + std::to_string(k) + " robot " + std::to_string(k) + "\n";
+  }
+  return text;
 }
 
 std::string first_lines(const std::string& text, int count) {
@@ -112,6 +135,9 @@ std::vector<Trial> file_trials() {
             {"bench", "../inputs/graph.g2o", "--linear-solver", "block_cholesky", "--repeat", "1",
              "--no-memory", "--csv", "bench.csv", "--json", "bench.json"},
             {"bench.csv", "bench.json"}),
+      trial("evaluate",
+            {"evaluate", "../inputs/graph.g2o", "../inputs/best.g2o", "--json", "errors.json"},
+            {"errors.json"}),
       trial("view",
             {"view", "../inputs/graph.g2o", "../inputs/best.g2o", "../inputs/run.json",
              "../inputs/run.jsonl", "-o", "page.html", "--json", "view.json"},
@@ -119,15 +145,26 @@ std::vector<Trial> file_trials() {
   };
 }
 
-/// A robot that records its run as it goes.
-Trial explore_trial() {
+/// A robot that records its run as it goes, for so many metres.
+Trial explore_trial(int metres) {
   Trial made =
       trial("explore",
             {"explore", "@rooms:width=10,height=8,seed=2", "--registration",
-             "simulated:range=1.4,angle=0.35", "--until", "distance=12", "--record", "run.jsonl",
-             "--html", "run.html", "-o", "run.g2o", "--json", "run.json", "--quiet"},
-            {"run.jsonl", "run.html", "run.g2o", "run.json"});
+             "simulated:range=1.4,angle=0.35", "--until", "distance=" + std::to_string(metres),
+             "--record", "run.jsonl", "--html", "run.html", "-o", "run.g2o", "--map", "run.yaml",
+             "--json", "run.json", "--quiet"},
+            {"run.jsonl", "run.html", "run.g2o", "run.yaml", "run.png", "run.json"});
   made.recording = "run.jsonl";
+  made.parts["run.png"] = "run.yaml";
+  return made;
+}
+
+Trial map_trial() {
+  Trial made = trial("map",
+                     {"map", "../inputs/robot.clf", "-o", "floor.yaml", "--graph", "poses.g2o",
+                      "--trajectory", "all.g2o", "--json", "map.json", "--quiet"},
+                     {"floor.yaml", "floor.png", "poses.g2o", "all.g2o", "map.json"});
+  made.parts["floor.png"] = "floor.yaml";
   return made;
 }
 
@@ -179,6 +216,7 @@ void make_inputs(const std::vector<Trial>& trials, const InputSizes& sizes,
   write_bytes(experiment.inputs() / "first.txt", half);
   write_bytes(experiment.inputs() / "rest.txt", all.substr(half.size()));
   write_bytes(experiment.inputs() / "policy.txt", policy_stream(sizes.stream));
+  write_bytes(experiment.inputs() / "robot.clf", laser_log(sizes.stream));
   const auto restores = [](const Trial& made) { return !made.before.empty(); };
   if (std::ranges::none_of(trials, restores)) return;  // nor need there be an estimator
   std::vector<std::string> online{"online", "--journal", "half.journal", "--threads", "1"};
@@ -188,6 +226,8 @@ void make_inputs(const std::vector<Trial>& trials, const InputSizes& sizes,
 
 std::vector<Trial> cairn_trials() {
   std::vector<Trial> all = file_trials();
+  all.push_back(map_trial());
+  all.push_back(explore_trial(kMetresWithFaults));
   for (Trial& online : online_trials()) all.push_back(std::move(online));
   all.push_back(plot_trial());
   all.push_back(parallel_trial());
@@ -208,7 +248,8 @@ std::vector<Trial> kill_trials() {
     if (online.name != "online") all.push_back(std::move(online));
   }
   all.push_back(parallel_trial());
-  all.push_back(explore_trial());
+  all.push_back(map_trial());
+  all.push_back(explore_trial(kMetresForKills));
   return all;
 }
 

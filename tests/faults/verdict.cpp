@@ -217,7 +217,12 @@ Verdict judge_error(const Trial& trial, const Fault& fault, const Reference& ref
     return violation("standard output is no beginning, or names what was not written");
   const bool one_failed = fault.what == Fault::What::output && fault.kind != "FULL" &&
                           trial.journal.empty() && !was_a_trial(result, fault.number);
-  if (one_failed && old.size() > 1)
+  std::set<std::string> unwritten;
+  for (const std::string& name : old) {
+    const auto whole = trial.parts.find(name);
+    unwritten.insert(whole == trial.parts.end() ? name : whole->second);
+  }
+  if (one_failed && unwritten.size() > 1)
     return violation("one output failed, and " + old.back() + " was not written either");
   return {Verdict::End::error, ""};
 }

@@ -168,6 +168,26 @@ TEST(BenchCommand, ABrokenPluginLeavesARowThatSaysSo) {
   }
 }
 
+TEST(BenchCommand, AnOptimizerWhosePluginCannotBeOpenedHasOneRow) {
+  const TemporaryFolder folder;
+  write_text(folder.file("hollow.so"), "no shared object");
+  write_text(folder.file("hollow.json"),
+             R"({"name": "hollow", "version": "1", "licence": "", "description": "",
+                 "file": "hollow.so",
+                 "offers": [{"kind": "optimizer", "name": "hollow", "summary": ""}]})");
+  const Outcome outcome = cairn({"bench", "@ring:poses=40", "--repeat", "1", "--no-memory",
+                                 "--optimizer", "hollow,levenberg_marquardt", "--linear-solver",
+                                 "block_cholesky,eigen", "--json", folder.file("b.json")},
+                                {{"CAIRN_PLUGIN_PATH", folder.path().string()}});
+  EXPECT_EQ(outcome.exit_code, 5) << outcome.err;
+  const auto report = parse_json(read_text(folder.file("b.json")));
+  const auto& rows = report.at("graphs").at(0).at("configurations").as_array();
+  ASSERT_EQ(rows.size(), 3u);
+  EXPECT_THAT(std::string(rows[0].at("error").as_string()), HasSubstr("hollow.so"));
+  EXPECT_EQ(rows[1].at("runs").as_array().size(), 1u);
+  EXPECT_EQ(rows[2].at("runs").as_array().size(), 1u);
+}
+
 TEST(BenchCommand, NamesGraphsByTheirFiles) {
   const TemporaryFolder folder;
   for (const char* name : {"a", "b"}) {

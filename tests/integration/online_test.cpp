@@ -115,6 +115,7 @@ TEST_F(Online, ABadLineIsToldAndNothingOfItStays) {
                                         "ESTIMATE one",
                                         "SAVE nowhere/at/all.g2o",
                                         "SOLVE now",
+                                        "EDGE_SE4 0 1" + kEdge,
                                         "WHAT 1"};
   const Outcome run =
       cairn(online({"--output", "none"}), {}, good + joined(bad) + "ESTIMATE ALL\nCHI2\n");
@@ -127,6 +128,7 @@ TEST_F(Online, ABadLineIsToldAndNothingOfItStays) {
   EXPECT_THAT(answers[1], HasSubstr("EDGE_SE2 with 4 fields; expected 11 fields"));
   EXPECT_THAT(answers[2], HasSubstr("there is no variable 9"));
   EXPECT_THAT(answers[3], HasSubstr("not positive semidefinite"));
+  EXPECT_THAT(answers[bad.size()], HasSubstr("(--skip-unknown leaves such lines out)"));
   EXPECT_EQ(answers[1 + bad.size()], "VERTEX_SE2 0 0 0 0");
   EXPECT_EQ(answers[2 + bad.size()], "VERTEX_SE2 1 1 0 0.1");
   EXPECT_THAT(answers[3 + bad.size()], EndsWith("variables 2 factors 1 owed 0"));

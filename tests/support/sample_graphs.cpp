@@ -41,6 +41,16 @@ struct SeenPoint {
   }
 };
 
+struct AbsolutePose {
+  static constexpr std::string_view kTag = "TEST_ABSOLUTE_POSE";
+  static constexpr int kResidual = 3, kMeasurement = 3;
+  using Variables = std::tuple<Se2>;
+  template <class S>
+  static Vector<S, 3> residual(const Vector<S, 3>& pose, const Vector<double, 3>& z) {
+    return Se2::between<S>(z.cast<S>(), pose);
+  }
+};
+
 struct Arctangent {
   static constexpr std::string_view kTag = "TEST_ARCTANGENT";
   static constexpr int kResidual = 2, kMeasurement = 1;
@@ -177,6 +187,21 @@ Graph poses_and_points(int poses, double noise) {
                        information<2>(1.0 / (noise * noise)));
     }
   }
+  return graph;
+}
+
+Graph stiff_chain(int poses, double strong) {
+  Graph graph;
+  const auto type = define_variable<Se2>();
+  const auto odometry = define_factor<RelativePose>();
+  const Pose step(100.0, 0.0, 0.0);
+  const auto diagonal = [](double x) { return std::vector{x, 0.0, 0.0, x, 0.0, x}; };
+  for (int k = 0; k < poses; ++k) {
+    graph.add_variable(type, k, numbers(Pose(100.0 * k, 0.0, 0.0)));
+    if (k > 0) graph.add_factor(odometry, std::vector{k - 1, k}, numbers(step), diagonal(strong));
+  }
+  graph.add_factor(define_factor<AbsolutePose>(), std::vector{0}, numbers(Pose(0.0, 0.0, 0.0)),
+                   diagonal(1.0));
   return graph;
 }
 

@@ -21,6 +21,10 @@ Graph poses_and_points(int poses, double noise);
 /// As `poses_and_points`, but held by one point alone: the whole may turn about it.
 Graph held_by_a_point();
 
+/// Poses in steps of 100 m along x, with relative poses of so much information between neighbours,
+/// and an absolute pose of information 1 of the first.
+Graph stiff_chain(int poses, double strong);
+
 /// One point with r = (atan(10 x), y) and x far out: Gauss-Newton overshoots farther at every step.
 Graph overshooting(double x);
 

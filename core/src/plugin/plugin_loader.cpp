@@ -108,13 +108,21 @@ std::string remedy(std::string_view core, std::string_view plugin) {
          "-mavx… and -D_GLIBCXX_DEBUG)";
 }
 
+/// Whether the dynamic linker failed for lack of memory. That of glibc may also say then that it
+/// cannot open the library, which is there and can be read.
+bool lacked_memory(int code, const std::string& words, const fs::path& library) {
+  return code == ENOMEM || (words.find(library.string() + ": cannot open") != std::string::npos &&
+                            ::access(library.c_str(), R_OK) == 0);
+}
+
 boost::dll::shared_library open_library(const fs::path& library) {
   errno = 0;
   try {
     return boost::dll::shared_library(
         library, boost::dll::load_mode::rtld_now | boost::dll::load_mode::rtld_local);
   } catch (const std::system_error& error) {
-    if (errno == ENOMEM) throw std::bad_alloc();
+    const int code = errno;
+    if (lacked_memory(code, error.what(), library)) throw std::bad_alloc();
     // The dynamic linker's words first: an undefined symbol must not be blamed on anything else.
     throw plugin_error(
         fmt::format("{}\n  while loading plugin {}", error.what(), library.string()));

@@ -27,7 +27,7 @@ struct RelaxationOptions {
   static OptionFields<RelaxationOptions> fields(std::string sweeps) {
     using O = RelaxationOptions;
     return OptionFields<O>()
-        .real("tolerance", &O::tolerance, 1e-15, 1.0,
+        .real("tolerance", &O::tolerance, 1e-15, 0.1,
               "on the relative residual |Hx - g| / |g|, also with each block scaled by that of the "
               "diagonal, which is the same in all units")
         .integer("max_iterations", &O::max_iterations, 0, 1e12, std::move(sweeps));

@@ -41,7 +41,7 @@ struct PcgOptions {
     using O = PcgOptions;
     return OptionFields<O>()
         .choice("preconditioner", &O::preconditioner, "what is solved exactly in each iteration")
-        .real("tolerance", &O::tolerance, 1e-15, 1.0,
+        .real("tolerance", &O::tolerance, 1e-15, 0.1,
               "on the relative residual |Hx - g| / |g|, also with each block scaled by that of the "
               "diagonal of H")
         .integer("max_iterations", &O::max_iterations, 1, 1e9,

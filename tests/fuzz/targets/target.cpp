@@ -32,8 +32,9 @@ struct ScratchFolder {
 
 const std::vector<Target>& targets() {
   static const std::vector<Target> all = {
-      reader(),    line_protocol(), policy_protocol(), journal(), sidecar(),
-      recording(), option_text(),   incremental(),     grid(),    scan_log()};
+      reader(),      packed_file(), line_protocol(), policy_protocol(),
+      journal(),     sidecar(),     recording(),     option_text(),
+      incremental(), grid(),        scan_log()};
   return all;
 }
 

@@ -86,6 +86,7 @@ Target reader();
 Target line_protocol();
 Target policy_protocol();
 Target journal();
+Target packed_file();
 Target sidecar();
 Target recording();
 Target option_text();

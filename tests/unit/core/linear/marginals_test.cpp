@@ -297,6 +297,24 @@ TEST_P(MarginalsTest, OfAGraphNeedAFactorisation) {
   EXPECT_FALSE(marginals.diagonal().empty());
 }
 
+// Where rounding takes the digits of a covariance there is none; those that work on the Jacobian
+// have digits for longer. The headings' variances of a straight chain add up.
+TEST_P(MarginalsTest, OfALongStiffChainHaveDigitsOrAreRefused) {
+  constexpr int kPoses = 100;
+  for (const double strong : {1e4, 1e6, 1e8, 1e10, 1e24}) {
+    const Graph graph = stiff_chain(kPoses, strong);
+    GraphMarginals marginals(graph, *solver_);
+    const bool there = marginals.factorize().ok;
+    EXPECT_TRUE(there || strong > (query<JacobianSolver>(*solver_) ? 1e12 : 1e5)) << strong;
+    if (there) {
+      const double heading = 1.0 + (kPoses - 1) / strong;
+      EXPECT_NEAR(marginals.diagonal().back(), heading, 0.01 * heading) << strong;
+    } else {
+      EXPECT_GE(strong, 1e6);
+    }
+  }
+}
+
 TEST(GraphMarginals, RefuseASolverThatCannot) {
   Registry registry;
   if (!registry.has("linear_solver", "pcg")) GTEST_SKIP();
