@@ -149,7 +149,13 @@ Job prepare(const CompactOptions& options, const PolicySetting& setting, Results
   const auto emplace = [&](const OptionValues& values) {
     for (const auto& [name, value] : values) job.policy.values.emplace(name, value);
   };
-  const bool automatic = options.automatic || !names_thresholds(options, job.policy);
+  bool automatic = options.automatic || !names_thresholds(options, job.policy);
+  if (automatic && !options.automatic && setting.data.loops == 0 && setting.data.observations > 0) {
+    automatic = false;
+    session.note(
+        "there are landmarks and no loop closures between poses, in which to find thresholds: "
+        "those of the policy's defaults are used");
+  }
   emplace(given_thresholds(options));
   if (!options.estimator.empty()) emplace({{"estimator", options.estimator}});
   if (!options.thresholds.empty())
@@ -281,7 +287,7 @@ int run_compact(const CompactOptions& options, Session& session) {
   if (options.strategy == "rfpfl") {
     PolicyJob random = job.job;
     random.policy = {"random_poses",
-                     {{"poses", fmt::format("{}", outcome.result.compact.variable_count())},
+                     {{"poses", fmt::format("{}", outcome.result.kept_poses)},
                       {"loops", fmt::format("{}", outcome.result.kept_loops)},
                       {"draw", options.draw},
                       {"seed", fmt::format("{}", options.seed)}}};

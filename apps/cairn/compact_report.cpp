@@ -62,7 +62,7 @@ json::object result_json(const PolicyResult& result, const PolicyData& data) {
   json::object report;
   report["policy"] = result.policy;
   report["poses"] = {{"in", result.poses.size()},
-                     {"kept", result.compact.variable_count() - result.map_poses},
+                     {"kept", result.kept_poses - result.map_poses},
                      {"map", result.map_poses}};
   report["loops"] = {{"in", data.loops},
                      {"proposed", result.proposed},
@@ -71,6 +71,8 @@ json::object result_json(const PolicyResult& result, const PolicyData& data) {
                      {"false_registered", result.false_registered},
                      {"false_kept", result.false_kept}};
   report["priors"] = {{"in", data.priors}, {"kept", result.kept_priors}};
+  report["landmarks"] = {{"in", data.landmarks}, {"kept", result.kept_landmarks}};
+  report["observations"] = {{"in", data.observations}, {"kept", result.kept_observations}};
   json::object verdicts;
   for (const auto& [name, count] : result.verdicts) verdicts[name] = count;
   report["verdicts"] = std::move(verdicts);
@@ -113,17 +115,25 @@ std::string errors_text(const TrajectoryError& e) {
 void add_result(Table& table, const PolicyResult& result, const PolicyData& data,
                 const FoundThresholds& found) {
   const auto in = static_cast<std::int64_t>(std::ssize(result.poses));
-  const std::int64_t kept = result.compact.variable_count() - result.map_poses;
+  const std::int64_t kept = result.kept_poses - result.map_poses;
   table.add(
       {"poses",
        fmt::format("{} of {} kept ({})", kept, in, percent(kept, in)) +
            (result.map_poses > 0 ? fmt::format(", beside {} of the map", result.map_poses) : "")});
-  table.add({"loops", fmt::format("{} kept ({} of {} recorded); {} pairs matched, {} of them well",
-                                  result.kept_loops, percent(result.kept_loops, data.loops),
-                                  data.loops, result.proposed, result.registered)});
+  if (data.loops > 0 || result.registered > 0)
+    table.add(
+        {"loops", fmt::format("{} kept ({} of {} recorded); {} pairs matched, {} of them well",
+                              result.kept_loops, percent(result.kept_loops, data.loops), data.loops,
+                              result.proposed, result.registered)});
   if (data.priors > 0) {
     table.add({"priors", fmt::format("{} of {} kept ({})", result.kept_priors, data.priors,
                                      percent(result.kept_priors, data.priors))});
+  }
+  if (data.observations > 0) {
+    table.add({"landmarks", fmt::format("{} of {} kept, {} of {} measurements of them ({})",
+                                        result.kept_landmarks, data.landmarks,
+                                        result.kept_observations, data.observations,
+                                        percent(result.kept_observations, data.observations))});
   }
   const StepTimes times(step_seconds(result));
   table.add(
@@ -223,9 +233,12 @@ std::string steps_csv(const PolicyResult& result) {
 std::string summary_text(const CompactOptions& options, const CompactOutcome& outcome,
                          const Results& results) {
   Table table({{"", Table::Align::left}, {"", Table::Align::left}});
-  table.add({"graph", fmt::format("{}: {}, {}", outcome.name,
-                                  plural(outcome.data.recording.variable_count(), "pose"),
-                                  plural(outcome.data.loops, "loop closure"))});
+  const PolicyData& data = outcome.data;
+  const std::string landmarks =
+      data.landmarks > 0 ? ", " + plural(data.landmarks, "landmark") : std::string();
+  table.add({"graph", fmt::format("{}: {}{}, {}", outcome.name,
+                                  plural(data.recording.variable_count() - data.landmarks, "pose"),
+                                  landmarks, plural(data.loops, "loop closure"))});
   table.add({"strategy", options.strategy});
   if (!outcome.found.options.empty())
     table.add({"thresholds", thresholds_line(outcome.found.options)});

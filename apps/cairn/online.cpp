@@ -116,10 +116,12 @@ json::object report_json(const OnlineOptions& options, const Conversation::Count
   report["graph"] = {{"variables", lines.variable_count()}, {"factors", lines.factor_count()}};
   if (const auto* policy = dynamic_cast<const PolicySession*>(&lines)) {
     const PolicySession::Counts& kept = policy->counts();
-    report["poses"] = {{"in", kept.poses}, {"kept", lines.variable_count()}};
+    report["poses"] = {{"in", kept.poses}, {"kept", policy->pose_count()}};
     report["loops"] = {
         {"proposed", kept.proposed}, {"registered", kept.registered}, {"kept", kept.linked}};
     report["priors"] = {{"kept", kept.priors}};
+    report["landmarks"] = {{"kept", kept.landmarks}};
+    report["observations"] = {{"kept", kept.observations}};
   }
   report["lines"] = {{"read", counts.lines},
                      {"taken", counts.taken},

@@ -9,11 +9,9 @@
 
 #include <fmt/core.h>
 
-#include "cairn/graph/packed.hpp"
-#include "cairn/information/gaussian.hpp"
 #include "cairn/runtime/error.hpp"
 #include "dense/cholesky.hpp"
-#include "dense/eigenvalues.hpp"
+#include "dense/lu.hpp"
 
 namespace cairn::compact {
 namespace {
@@ -21,62 +19,34 @@ namespace {
 constexpr double kAnywhere = 1e6;   // [m]
 constexpr double kSomewhere = 1e4;  // where the heading, below, is known, the position is
 constexpr double kHeading = 0.2;    // [rad]
-constexpr double kNothing = 1e-12;  // of the largest eigenvalue
 
 [[noreturn]] void refuse(const std::string& message) { throw Error(ErrorCode::input, message); }
 
 }  // namespace
 
-AbsoluteMeasurement::AbsoluteMeasurement(const Factor& factor, Id pose, const VariableType& type)
-    : factor_(factor), tangent_(type.tangent_size()) {
-  if (!factor.type) refuse("an absolute measurement without a type");
-  const FactorType& kind = *factor.type;
-  const std::string name = fmt::format("{} of pose {}", kind.tag(), pose);
-  if (kind.arity() != 1 || factor.variables != std::vector<Id>{pose} ||
-      kind.variable_tags().front() != type.tag())
-    refuse(fmt::format("{} is not a measurement of this {} alone", name, type.tag()));
-  const int n = kind.residual_size();
-  if (factor.measurement.size() != static_cast<std::size_t>(kind.measurement_size()) ||
-      factor.information.size() != packed_size(n)) {
-    refuse(fmt::format("{} has {} numbers and information of {}; expected {} and {}", name,
-                       factor.measurement.size(), factor.information.size(),
-                       kind.measurement_size(), packed_size(n)));
-  }
-  if (const std::string problem = kind.normalize(factor_.measurement.data()); !problem.empty())
-    refuse(fmt::format("{}: {}", name, problem));
-  root_.resize(packed_size(n));
-  if (!square_root(factor.information, n, root_))
-    refuse(fmt::format("the information of {} is not positive semidefinite", name));
-}
-
-AbsoluteMeasurement::Linear AbsoluteMeasurement::at(const State& x) const {
-  const int n = factor_.type->residual_size();
-  Linear linear{Eigen::VectorXd(n), Eigen::MatrixXd(n, tangent_)};
-  const double* const states[] = {x.data()};
-  double* const jacobians[] = {linear.J.data()};
-  factor_.type->evaluate(states, factor_.measurement.data(), root_.data(), linear.residual.data(),
-                         jacobians);
-  return linear;
-}
-
 namespace {
 
-AbsoluteFit compare(const Eigen::VectorXd& e, const Eigen::MatrixXd& S, const Eigen::MatrixXd& J) {
-  const Eigen::MatrixXd noise = Eigen::MatrixXd::Identity(e.size(), e.size());
-  AbsoluteFit result;
-  if (!S.allFinite()) return result;  // of numbers near the largest: nothing is gained
-  result.gain = information_gain(S, noise);
-  result.innovation = e.dot(Eigen::LLT<Eigen::MatrixXd>(Eigen::MatrixXd(noise + S)).solve(e));
-  const Eigen::VectorXd sizes = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(
-                                    Eigen::MatrixXd(J * J.transpose()), Eigen::EigenvaluesOnly)
-                                    .eigenvalues();
-  result.dof = static_cast<int>((sizes.array() > kNothing * sizes.maxCoeff()).count());
-  return result;
+Measured checked(const Factor& factor, Id pose, const VariableType& type) {
+  if (!factor.type) refuse("an absolute measurement without a type");
+  const std::string name = fmt::format("{} of pose {}", factor.type->tag(), pose);
+  if (factor.variables != std::vector<Id>{pose})
+    refuse(fmt::format("{} is not a measurement of this {} alone", name, type.tag()));
+  const VariableType* const types[] = {&type};
+  return {factor, types, name};
 }
 
 }  // namespace
 
-AbsoluteFit fit(const AbsoluteMeasurement::Linear& measurement, const Matrix& covariance) {
+AbsoluteMeasurement::AbsoluteMeasurement(const Factor& factor, Id pose, const VariableType& type)
+    : measured_(checked(factor, pose, type)) {}
+
+AbsoluteMeasurement::Linear AbsoluteMeasurement::at(const State& x) const {
+  const double* const states[] = {x.data()};
+  Measured::Linear linear = measured_.at(states);
+  return {std::move(linear.residual), std::move(linear.J.front())};
+}
+
+MeasuredFit fit(const AbsoluteMeasurement::Linear& measurement, const Matrix& covariance) {
   const Eigen::MatrixXd& J = measurement.J;
   return compare(measurement.residual, J * covariance * J.transpose(), J);
 }
@@ -120,7 +90,7 @@ AbsoluteMeasurement::Linear FrameEstimate::rows(const State& move) const {
   return all;
 }
 
-AbsoluteFit FrameEstimate::fit(const AbsoluteMeasurement::Linear& measurement) const {
+MeasuredFit FrameEstimate::fit(const AbsoluteMeasurement::Linear& measurement) const {
   const int n = group_.tangent_size();
   const Eigen::Index others = H_.cols();
   const Eigen::MatrixXd& J = measurement.J;

@@ -8,6 +8,7 @@
 #include <Eigen/Core>
 
 #include "cairn/graph/elements.hpp"
+#include "measured.hpp"
 #include "rigid_group.hpp"
 
 namespace cairn::compact {
@@ -24,24 +25,16 @@ class AbsoluteMeasurement {
   /// Throws `Error` (input) for a factor that is not on this pose alone, or that is not valid.
   AbsoluteMeasurement(const Factor& factor, Id pose, const VariableType& type);
 
-  const Factor& factor() const { return factor_; }
-  Id pose() const { return factor_.variables.front(); }
+  const Factor& factor() const { return measured_.factor(); }
+  Id pose() const { return factor().variables.front(); }
   Linear at(const State& x) const;
 
  private:
-  Factor factor_;  ///< with a measurement in canonical form
-  int tangent_;
-  std::vector<double> root_;  ///< of its information
+  Measured measured_;
 };
 
-/// How a measurement compares with the estimate of its pose: its residual e ~ N(0, V), whitened,
-/// V = I + J Σ Jᵀ.
-struct AbsoluteFit {
-  double gain = 0.0;        ///< ½ ln |V|: the entropy that the state loses by it [nats]
-  double innovation = 0.0;  ///< eᵀ V⁻¹ e
-  int dof = 0;              ///< directions in which it measures anything
-};
-AbsoluteFit fit(const AbsoluteMeasurement::Linear& measurement, const Matrix& covariance);
+/// How it compares with the estimate of its pose.
+MeasuredFit fit(const AbsoluteMeasurement::Linear& measurement, const Matrix& covariance);
 
 /// A measurement, and the state of its pose.
 struct PlacedMeasurement {
@@ -68,7 +61,7 @@ class FrameEstimate {
 
   /// Of a measurement of that pose, given the others: with C = J Σ_x· Hᵀ, Q = J − C R⁻¹ G,
   /// V = I + J Σ_xx Jᵀ − C R⁻¹ Cᵀ + Q P Qᵀ.
-  AbsoluteFit fit(const AbsoluteMeasurement::Linear& measurement) const;
+  MeasuredFit fit(const AbsoluteMeasurement::Linear& measurement) const;
   /// Whether the measurements determine δ: the standard deviations of its rotation are below
   /// 0.2 rad, where J, which depends on the heading, is right.
   bool determined() const;

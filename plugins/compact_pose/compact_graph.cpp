@@ -3,7 +3,7 @@
 
 #include <algorithm>
 #include <chrono>
-#include <numeric>
+#include <iterator>
 #include <string>
 #include <utility>
 
@@ -29,12 +29,18 @@ CompactGraph::CompactGraph(std::unique_ptr<Estimator> estimator, CompositionOrde
 }
 
 void CompactGraph::load(const Graph& map) {
-  if (map.variable_count() == 0) refuse("the map is empty: it has no poses to continue from");
+  std::vector<int> order;  // poses first
   for (int v = 0; v < map.variable_count(); ++v) {
-    if (map.pool(v) != map.pool(0)) {
+    if (is_point(map.type(v))) continue;
+    order.push_back(v);
+    if (map.pool(v) != map.pool(order.front())) {
       refuse(fmt::format("the map has {} and {}; a map that is continued has poses of one type",
-                         map.describe_variable(0), map.describe_variable(v)));
+                         map.describe_variable(order.front()), map.describe_variable(v)));
     }
+  }
+  if (order.empty()) {
+    refuse(map.variable_count() == 0 ? "the map is empty: it has no poses to continue from"
+                                     : "the map has landmarks alone: no poses to continue from");
   }
   const Gauge gauge = resolve_gauge(map);
   if (gauge.components != 1) {
@@ -43,12 +49,13 @@ void CompactGraph::load(const Graph& map) {
                     "since nothing is known of their relative position",
                     gauge.components));
   }
-  auto group = std::make_unique<RigidGroup>(map.variable_pools().front().type);
-  std::vector<int> order(static_cast<std::size_t>(map.variable_count()));
-  std::iota(order.begin(), order.end(), 0);
+  auto group = std::make_unique<RigidGroup>(map.variable(order.front()).type);
   std::ranges::sort(order, {}, [&](int v) { return map.id(v); });
   GraphUpdate update;
   for (const int v : order) update.variables.push_back(map.variable(v));
+  for (int v = 0; v < map.variable_count(); ++v) {
+    if (is_point(map.type(v))) update.variables.push_back(map.variable(v));
+  }
   for (int f = 0; f < map.factor_count(); ++f) update.factors.push_back(map.factor(f));
   estimator_->update(update, {.full = true});
   group_ = std::move(group);
@@ -58,6 +65,8 @@ void CompactGraph::load(const Graph& map) {
     kept_.push_back({.id = map.id(v)});
     index_->add(group_->place(group_->state(estimator_->state(map.id(v)))).at.t);
   }
+  for (std::size_t k = order.size(); k < update.variables.size(); ++k)
+    note_landmark(update.variables[k].id, update.variables[k].type);
   map_size_ = solved_ = size();
   located_ = false;
   referenced_ = gauge.anchored.empty() && gauge.left_free.empty();
@@ -235,10 +244,11 @@ void CompactGraph::move_poses(int first, const State& move, std::span<const Fact
                                 .id = kept_[k].id,
                                 .state = {state.begin(), state.end()}});
   }
+  if (first == 0) move_landmarks(move, leaving, coming);
   std::unordered_map<FactorId, FactorId> place;  // in `coming`
   for (const FactorId id : estimator_->factors()) {
     Factor factor = estimator_->factor(id);
-    if (find(factor.variables.front()) < first) continue;
+    if (first > 0 && find(factor.variables.front()) < first) continue;
     place.emplace(id, std::ssize(coming.factors));
     coming.factors.push_back(std::move(factor));
   }
@@ -342,10 +352,11 @@ void CompactGraph::hang_newest() {
 }
 
 FactorId CompactGraph::update(std::span<const Factor> links, PolicySeconds& seconds,
-                              std::vector<ChangedFactor> changed) {
+                              std::vector<ChangedFactor> changed, std::vector<Variable> added) {
   if (links.empty() && changed.empty() && solved_ == size()) return 0;
   const auto begin = Clock::now();
   GraphUpdate update = odometry_from(solved_);
+  std::ranges::move(added, std::back_inserter(update.variables));
   update.factors.insert(update.factors.end(), links.begin(), links.end());
   update.changed = std::move(changed);
   const UpdateReport report = estimator_->update(update);  // throws before anything has changed

@@ -55,8 +55,8 @@ class CompactGraph {
   bool empty() const { return size() == map_size_; }
   const RigidGroup& group() const { return *group_; }
 
-  /// Before the first pose: the poses and factors of an earlier session's map. Throws `Error`
-  /// (input) if it is not one connected graph of poses.
+  /// Before the first pose: the poses, landmarks and factors of an earlier session's map. Throws
+  /// `Error` (input) if it is not one connected graph of these.
   void load(const Graph& map);
   /// Whether something absolute determines where the graph is: a fixed pose, or measurements.
   /// Otherwise its first pose holds it, and covariances are relative to that.
@@ -164,6 +164,18 @@ class CompactGraph {
   /// Covariance of a kept pose itself; likewise.
   Matrix covariance(int pose);
 
+  // Landmarks ------------------------------------------------------------------------------------
+  /// In the order in which they were added.
+  const std::vector<Id>& landmarks() const { return landmarks_; }
+  /// The type of one; null: it is not in the graph.
+  const VariableType* landmark(Id id) const;
+  std::span<const double> landmark_state(Id id) const { return estimator_->state(id); }
+  /// Joint covariance of landmarks of the graph and, after them, the newest pose; without passing
+  /// anything to the estimator.
+  Eigen::MatrixXd landmark_covariance(std::span<const Id> landmarks, PolicySeconds& seconds);
+  /// Keeps the newest pose; adds landmarks, and factors on it and landmarks.
+  void see(std::vector<Variable> added, std::span<const Factor> factors, PolicySeconds& seconds);
+
   /// From each kept pose to the next one of the trajectory.
   const std::vector<OdometryChain>& chains() const { return chains_; }
   void keep_chains(bool keep) { keeps_chains_ = keep; }
@@ -200,9 +212,11 @@ class CompactGraph {
   /// Passes to the estimator what it does not have yet, and links. Returns the number of the first
   /// of these.
   FactorId update(std::span<const Factor> links, PolicySeconds& seconds,
-                  std::vector<ChangedFactor> changed = {});
+                  std::vector<ChangedFactor> changed = {}, std::vector<Variable> added = {});
   void refresh();
   void move_poses(int first, const State& move, std::span<const Factor> factors);
+  void move_landmarks(const State& move, GraphUpdate& leaving, GraphUpdate& coming) const;
+  void note_landmark(Id id, std::shared_ptr<const VariableType> type);
   Matrix block(int i, int k);
   void hang_newest();
   void know_anchor();
@@ -232,6 +246,8 @@ class CompactGraph {
   int anchor_ = -1;  ///< one of those: where the chain of the newest pose and those since the last
                      ///< update starts
   std::unordered_map<Id, int> number_;
+  std::vector<Id> landmarks_;
+  std::unordered_map<Id, std::shared_ptr<const VariableType>> landmark_types_;
   Newest newest_;
   void end_chain(Id from, Id to);
 

@@ -25,10 +25,11 @@ constexpr std::size_t kMostWaiting = 32;
 
 [[noreturn]] void refuse(const std::string& message) { throw Error(ErrorCode::input, message); }
 
-/// (I + 1)^power − 1 of the gain I of a link as good as the odometry between two poses, which is
-/// n/2 ln 2: what the thresholds of section 5.2 come to for such data.
-double default_gain(int tangent_size, double power) {
-  return std::pow(0.5 * tangent_size * std::log(2.0) + 1.0, power) - 1.0;
+/// (I + 1)^power − 1 of the gain I of a measurement of n numbers as good as what is known of them,
+/// such as odometry between two poses, which is n/2 ln 2: what the thresholds of section 5.2 come
+/// to for such data.
+double default_gain(int n, double power) {
+  return std::pow(0.5 * n * std::log(2.0) + 1.0, power) - 1.0;
 }
 
 /// Σ̄_y as the options give it; empty: not given.
@@ -102,6 +103,9 @@ void CompactPose::start(const Variable& pose) {
   prior_gain_ = loop_gain_;
   if (options_.prior_gain >= 0.0 && options_.strategy != Strategy::apal)
     prior_gain_ = options_.prior_gain;
+  landmark_gain_ = options_.strategy == Strategy::apal ? -kInfinity
+                   : options_.landmark_gain >= 0.0     ? options_.landmark_gain
+                                                       : default_gain(group.dimension(), 1.36);
 }
 
 void CompactPose::expect(const Graph& recording, std::span<const Arrival> poses) {
@@ -177,6 +181,7 @@ void CompactPose::add_pose(const Variable& pose, std::span<const Factor> odometr
   answered_ = 0;
   candidates_.clear();
   dimensions_.clear();
+  seen_.clear();
 }
 
 void CompactPose::check_new(const Variable& pose) const {
@@ -185,6 +190,7 @@ void CompactPose::check_new(const Variable& pose) const {
                        graph_.group().motions().type().tag()));
   }
   if (graph_.find(pose.id) >= 0) refuse(fmt::format("pose {} is there already", pose.id));
+  if (graph_.landmark(pose.id)) refuse(fmt::format("pose {} has the id of a landmark", pose.id));
 }
 
 /// Σ̄_y of this pose. What the options do not say is learnt; the first match is expected to be like
@@ -485,8 +491,10 @@ PoseReport CompactPose::end_pose() {
     const Timed timed(report_.seconds.total);
     if (!searched_) search();
     settle_priors();
+    use_landmarks();
     if (!graph_.newest_kept() && !report_.closed_loop && report_.least_gain > pose_gain_)
       graph_.keep(report_.seconds);
+    add_landmarks();
     if (graph_.predecessor() >= 0 && report_.candidates > 0 && options_.keep == 0)
       finder_.note_pose(report_.least_gain);
     for (const Candidate& left : candidates_)

@@ -17,6 +17,7 @@
 #include "compact_pose_options.hpp"
 #include "consistency.hpp"
 #include "match_record.hpp"
+#include "measured.hpp"
 #include "proximity.hpp"
 #include "relocation.hpp"
 #include "threshold_finder.hpp"
@@ -52,6 +53,7 @@ class CompactPose final : public PosePolicy, public OptionFinder {
   std::optional<MatchProposal> next_match() override;
   LinkReport offer(Id other, std::span<const Factor> measured) override;
   PriorReport offer_prior(const Factor& measured) override;
+  void offer_landmark(const LandmarkObservation& observation) override;
   bool revoke(Id a, Id b) override;
   PoseReport end_pose() override;
   bool finish() override;
@@ -59,6 +61,7 @@ class CompactPose final : public PosePolicy, public OptionFinder {
   Estimator& estimator() override { return graph_.estimator(); }
   std::vector<Id> kept() const override { return graph_.kept(); }
   std::vector<Id> removed() const override { return removed_; }
+  std::vector<Id> landmarks() const override { return graph_.landmarks(); }
   int factor_count() const override { return graph_.factor_count(); }
   std::vector<double> newest_state() const override;
   const std::vector<OdometryChain>& chains() const override { return graph_.chains(); }
@@ -99,6 +102,12 @@ class CompactPose final : public PosePolicy, public OptionFinder {
     PriorReport report;
   };
 
+  /// What was measured of a landmark.
+  struct Seen {
+    Variable landmark;
+    std::vector<Measured> factors;
+  };
+
   void start(const Variable& pose);
   void check_new(const Variable& pose) const;
   void expect_matches();
@@ -115,10 +124,13 @@ class CompactPose final : public PosePolicy, public OptionFinder {
   LinkVerdict judge(const Link& link, LinkReport& report);
   void judge_waiting();
   bool agrees_with_waiting(const Link& link);
-  LinkVerdict judge_prior(const AbsoluteFit& fit, PriorReport& report) const;
+  LinkVerdict judge_prior(const MeasuredFit& fit, PriorReport& report) const;
   FrameEstimate frame();
   bool find_frame();
   void settle_priors();
+  void use_landmarks();
+  std::optional<std::vector<double>> place(const Seen& seen) const;
+  void add_landmarks();
   void forget(Id a, Id b);
   void make_room();
 
@@ -133,12 +145,13 @@ class CompactPose final : public PosePolicy, public OptionFinder {
   std::optional<std::unordered_map<Id, std::vector<Id>>> recorded_;
   double radius_ = 0.0;  ///< no pose farther away can be a candidate [m]
   Matrix sensor_;        ///< Σ̄_y, if it was given; else that of `typical_`
-  double loop_gain_ = 0.0, pose_gain_ = 0.0, prior_gain_ = 0.0;
+  double loop_gain_ = 0.0, pose_gain_ = 0.0, prior_gain_ = 0.0, landmark_gain_ = 0.0;  // [nats]
 
   // The newest pose:
   PoseReport report_;
   Matrix odometry_;  ///< covariance of its odometry from the previous pose, kept or not
   Matrix expected_;  ///< Σ̄_y
+  std::vector<Seen> seen_;
   bool open_ = false, searched_ = false;
   std::vector<Candidate> candidates_;  ///< a heap by worth
   int answered_ = 0;                   ///< requests for a match

@@ -66,6 +66,9 @@ OptionFields<CompactPoseOptions> CompactPoseOptions::fields() {
       .real("prior_gain", &O::prior_gain, -1.0, 1e9,
             "information gain that an absolute measurement of a pose must exceed [nats]; -1: as "
             "loop_gain")
+      .real("landmark_gain", &O::landmark_gain, -1.0, 1e9,
+            "information gain that a measurement of a landmark in the graph must exceed [nats]; "
+            "-1: (n/2 ln 2 + 1)^1.36 - 1, n = 2 or 3")
       .text("sensor", &O::sensor, numbers, text_of,
             "expected covariance of a match: standard deviations [m] and [rad], or its upper "
             "triangle; empty: the median of the latest matches, at first as odometry")

@@ -52,9 +52,10 @@ struct CompactPoseOptions {
   RotationTest rotation = RotationTest::magnitude;  ///< what `angle` is of
   Axis view_axis = Axis::z;                         ///< along which the sensor looks
   double probability = 0.1;                         ///< s, of being within, in each dimension
-  double loop_gain = -1.0;   ///< g_loop [nats]; negative: by the size of a pose
-  double pose_gain = -1.0;   ///< g_pose [nats]; negative: likewise
-  double prior_gain = -1.0;  ///< of an absolute measurement [nats]; negative: as `loop_gain`
+  double loop_gain = -1.0;      ///< g_loop [nats]; negative: by the size of a pose
+  double pose_gain = -1.0;      ///< g_pose [nats]; negative: likewise
+  double prior_gain = -1.0;     ///< of an absolute measurement [nats]; negative: as `loop_gain`
+  double landmark_gain = -1.0;  ///< of a measurement of a landmark [nats]; negative: by its size
   /// Σ̄_y, what a registration is expected to be worth, upper triangle by rows, or the standard
   /// deviations of translation [m] and rotation [rad]. Empty: like the newest odometry.
   std::vector<double> sensor{};

@@ -8,7 +8,7 @@
 
 namespace cairn::compact {
 
-LinkVerdict CompactPose::judge_prior(const AbsoluteFit& fit, PriorReport& report) const {
+LinkVerdict CompactPose::judge_prior(const MeasuredFit& fit, PriorReport& report) const {
   report.gain = fit.gain;
   report.innovation = fit.innovation;
   if (!(fit.gain > prior_gain_)) return LinkVerdict::uninformative;

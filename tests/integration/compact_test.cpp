@@ -245,6 +245,44 @@ TEST_F(Compact, ContinuesTheMapOfAnEarlierSession) {
               HasSubstr("there is no pose 4000"));
 }
 
+TEST_F(Compact, KeepsTheMeasurementsOfLandmarksThatAreInformative) {
+  const std::string world = "@landmarks2d:poses=400", truth = folder_.file("truth.g2o");
+  ASSERT_EQ(
+      cairn({"generate", world.substr(1), "-o", folder_.file("world.g2o"), "--ground-truth", truth})
+          .exit_code,
+      0);
+  const auto run = [&](const Arguments& more) {
+    Arguments arguments{"compact", folder_.file("world.g2o"), "--truth", truth, "--quiet"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return report_of(arguments);
+  };
+  const auto all = run({"--strategy", "apal"});
+  const auto few = run({"-o", folder_.file("map.g2o")});
+  const auto many = run({"--policy", "compact_pose:landmark_gain=0.3"});
+  EXPECT_EQ(all.at("observations").at("kept"), all.at("observations").at("in"));
+  EXPECT_EQ(all.at("landmarks").at("kept"), all.at("landmarks").at("in"));
+  const auto count = [](const auto& report, const char* what) {
+    return report.at(what).at("kept").as_int64();
+  };
+  EXPECT_LT(count(few, "observations"), count(many, "observations"));
+  EXPECT_LT(count(many, "observations"), count(all, "observations"));
+  EXPECT_LT(count(few, "poses"), 250);
+  for (const auto* report : {&all, &few, &many}) {
+    const auto& nees = report->at("nees");
+    const double ratio =
+        nees.at("squared").to_number<double>() / nees.at("dof").to_number<double>();
+    EXPECT_GT(ratio, 0.7);
+    EXPECT_LT(ratio, 1.4);
+  }
+  EXPECT_LT(few.at("rmse").to_number<double>(), 3.0 * all.at("rmse").to_number<double>());
+  EXPECT_THAT(read_text(folder_.file("map.g2o")), HasSubstr("EDGE_SE2_XY"));
+  // It can be continued.
+  const Outcome again =
+      cairn({"compact", "@landmarks2d:poses=40", "--map", folder_.file("map.g2o")});
+  EXPECT_EQ(again.exit_code, 3);
+  EXPECT_THAT(again.err, HasSubstr("is in the map and in the recording"));
+}
+
 TEST_F(Compact, SaysWhatIsWrongAndWhatWouldWork) {
   const auto refused = [](Arguments arguments, int code) {
     arguments.insert(arguments.begin(), "compact");
@@ -252,7 +290,7 @@ TEST_F(Compact, SaysWhatIsWrongAndWhatWouldWork) {
     EXPECT_EQ(run.exit_code, code) << run.err;
     return run.err;
   };
-  EXPECT_THAT(refused({"@landmarks2d:poses=20"}, 3), HasSubstr("landmark"));
+  EXPECT_THAT(refused({"@bundle"}, 3), HasSubstr("not a pose of a Lie group"));
   EXPECT_THAT(refused({kWorld, "--auto", "--thresholds", "x.json"}, 2), HasSubstr("give one"));
   const std::string junk = folder_.file("junk.json");
   write_text(junk, "{\"policy\": 3}");

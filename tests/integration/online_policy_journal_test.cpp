@@ -6,8 +6,10 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
+#include <iterator>
 #include <map>
 #include <set>
+#include <sstream>
 #include <string>
 
 #include "integration/front_end.hpp"
@@ -220,6 +222,61 @@ TEST_F(OnlinePolicy, LinksThatWereRevokedStaySo) {
     ASSERT_EQ(cairn(arguments, {}, joined(part)).exit_code, 0);
   }
   EXPECT_EQ(read_text(folder_.file("parts.g2o")), read_text(folder_.file("whole.g2o")));
+}
+
+TEST_F(OnlinePolicy, LandmarksAreRestoredAndTheSameAsRecorded) {
+  const std::string graph = folder_.file("landmarks.g2o");
+  ASSERT_EQ(cairn({"generate", "landmarks2d:poses=150", "-o", graph}).exit_code, 0);
+  // The lines of the file, each pose with what it measures.
+  std::map<long, Lines> of_pose;
+  std::set<long> poses;
+  const Lines recorded = lines(read_text(graph));
+  for (const std::string& line : recorded) {
+    if (line.starts_with("VERTEX_SE2")) poses.insert(std::stol(line.substr(11)));
+  }
+  std::set<long> seen;
+  for (const char* tag : {"EDGE_SE2 ", "EDGE_SE2_XY "}) {  // odometry first
+    for (const std::string& line : recorded) {
+      if (!line.starts_with(tag)) continue;
+      std::istringstream words(line);
+      std::string word;
+      long a = 0, b = 0;
+      words >> word >> a >> b;
+      const bool observation = !poses.contains(b);
+      Lines& told = of_pose[observation ? a : std::max(a, b)];
+      if (observation && seen.insert(b).second)
+        told.push_back("NEW VERTEX_XY " + std::to_string(b));
+      told.push_back(line);
+    }
+  }
+  Lines told;
+  for (const long pose : poses) {
+    const bool first = pose == *poses.begin();
+    const std::string line = "VERTEX_SE2 " + std::to_string(pose);
+    told.push_back(first ? *std::ranges::find_if(
+                               recorded, [&](const auto& r) { return r.starts_with(line + " "); })
+                         : "NEW " + line);
+    std::ranges::copy(of_pose[pose], std::back_inserter(told));
+    told.emplace_back("DONE");
+  }
+  const std::string policy = "compact_pose:range=3,angle=0.8,landmark_gain=0.8";
+  const Outcome whole = cairn(online(policy, {"-o", folder_.file("whole.g2o")}), {}, joined(told));
+  ASSERT_EQ(whole.exit_code, 0) << whole.err;
+  for (const char* word : {" ADDED ", " TAKEN ", " UNINFORMATIVE "})
+    EXPECT_THAT(whole.out, HasSubstr(word));
+  const Arguments arguments =
+      online(policy, {"--journal", folder_.file("log"), "-o", folder_.file("parts.g2o")});
+  for (std::size_t from = 0; from < told.size(); from += 211) {
+    const std::size_t end = std::min(from + 211, told.size());
+    const Lines part(told.begin() + static_cast<std::ptrdiff_t>(from),
+                     told.begin() + static_cast<std::ptrdiff_t>(end));
+    ASSERT_EQ(cairn(arguments, {}, joined(part)).exit_code, 0);
+  }
+  EXPECT_EQ(read_text(folder_.file("parts.g2o")), read_text(folder_.file("whole.g2o")));
+  const Outcome again = cairn({"compact", graph, "--policy", policy, "--quiet", "-o",
+                               folder_.file("recorded.g2o"), "--json", "-"});
+  ASSERT_EQ(again.exit_code, 0) << again.err;
+  EXPECT_TRUE(read_text(folder_.file("recorded.g2o")) == read_text(folder_.file("whole.g2o")));
 }
 
 TEST_F(OnlinePolicy, AbsoluteMeasurementsAreRestoredAndTheSameAsRecorded) {

@@ -106,18 +106,19 @@ TEST_F(OnlinePolicy, ADroppedPoseIsKnownUntilTheNextComes) {
   const Outcome run = cairn(online(policy, {"--output", "none"}), {}, joined(told));
   EXPECT_THAT(
       lines(run.out),
-      ElementsAre(
-          "KEPT 0", StartsWith("OK 2 variables 1 "), "KEPT 1", StartsWith("OK 4 variables 2 "),
-          "DROPPED 2", StartsWith("OK 6 variables 2 "), StartsWith("VERTEX_SE2 2 1.00707"),
-          StartsWith("OK 7 variables 2 "), "ERROR line 8: there is no pose 2 in the compact graph",
-          StartsWith("VERTEX_SE2 2 1.00707"), StartsWith("OK 10 variables 2 "),
-          StartsWith("ERROR line 12: there is no estimate of 2; expected a pose that was "
-                     "kept"),
-          "KEPT 3", StartsWith("OK 13 variables 3 "),
-          StartsWith("ERROR line 16: pose 2 was not kept"),
-          StartsWith("ERROR line 17: VERTEX_SE2 2: the id is already in use"),
-          StartsWith("VERTEX_SE2 0 "), StartsWith("VERTEX_SE2 1 "), StartsWith("VERTEX_SE2 3 "),
-          StartsWith("VERTEX_SE2 4 "), StartsWith("OK 18 variables 3 factors 2 ")))
+      ElementsAre("KEPT 0", StartsWith("OK 2 variables 1 "), "KEPT 1",
+                  StartsWith("OK 4 variables 2 "), "DROPPED 2", StartsWith("OK 6 variables 2 "),
+                  StartsWith("VERTEX_SE2 2 1.00707"), StartsWith("OK 7 variables 2 "),
+                  "ERROR line 8: there is no pose or landmark 2 in the compact graph",
+                  StartsWith("VERTEX_SE2 2 1.00707"), StartsWith("OK 10 variables 2 "),
+                  StartsWith("ERROR line 12: there is no estimate of 2; expected a pose that was "
+                             "kept"),
+                  "KEPT 3", StartsWith("OK 13 variables 3 "),
+                  StartsWith("ERROR line 16: pose 2 was not kept"),
+                  StartsWith("ERROR line 17: VERTEX_SE2 2: the id is already in use"),
+                  StartsWith("VERTEX_SE2 0 "), StartsWith("VERTEX_SE2 1 "),
+                  StartsWith("VERTEX_SE2 3 "), StartsWith("VERTEX_SE2 4 "),
+                  StartsWith("OK 18 variables 3 factors 2 ")))
       << run.out;
 }
 
@@ -190,7 +191,7 @@ TEST_F(OnlinePolicy, ABadLineIsToldAndNothingOfItStays) {
                   "REMOVE LINK 0 0",
                   "REMOVE LINK 0 77777",
                   "VERTEX_SE2 0 0 0 0",
-                  "VERTEX_XY 88888 0 0",
+                  "VERTEX_TRACKXYZ 88888 0 0 0",
                   "NEW VERTEX_SE3:QUAT 88888",
                   "NEW VERTEX_SE9 88888",
                   "FIX 0",
@@ -231,8 +232,17 @@ TEST_F(OnlinePolicy, SaysWhatIsWrongAndWhatWasExpected) {
   EXPECT_EQ(error(two, "NEW VERTEX_SE2 2"), error(two, "DONE"));
   EXPECT_EQ(error(two, "NEW VERTEX_SE3:QUAT 1"),
             "VERTEX_SE3:QUAT 1: the poses before it are VERTEX_SE2; expected another");
-  EXPECT_EQ(error(two, "NEW VERTEX_TRACKXYZ 1"),
-            "VERTEX_TRACKXYZ 1 is not a pose; with a policy a robot's poses alone can come");
+  EXPECT_EQ(error(two, "NEW VERTEX_TRACKXYZ 7"),
+            "VERTEX_TRACKXYZ 7: the poses are VERTEX_SE2; expected a landmark where they are");
+  EXPECT_EQ(error(two, "NEW VERTEX_XY 1"), "VERTEX_XY 1: the id is already in use");
+  EXPECT_EQ(error({"NEW VERTEX_XY 7"}, "NEW VERTEX_SE2 7"),
+            "VERTEX_SE2 7: the id is already in use");
+  EXPECT_EQ(
+      error({"NEW VERTEX_SE2 0"}, "EDGE_SE2_XY 0 7 1 0 1 0 1"),
+      "EDGE_SE2_XY 0 7: there is no landmark 7; expected its line, such as 'NEW VERTEX_XY 7', "
+      "first");
+  EXPECT_EQ(error({"NEW VERTEX_TRACKXYZ 7", "NEW VERTEX_SE2 0"}, "EDGE_SE2_XY 0 7 1 0 1 0 1"),
+            "EDGE_SE2_XY 0 7: not a measurement of VERTEX_TRACKXYZ 7 from a VERTEX_SE2");
   EXPECT_EQ(
       error(two, "EDGE_SE2 0 9" + kStep),
       "between 0 and 9; expected a relative pose between pose 1, which is the newest, and another");
@@ -246,6 +256,40 @@ TEST_F(OnlinePolicy, SaysWhatIsWrongAndWhatWasExpected) {
             "FULL is not for a run with a policy, which solves by itself when a loop closes, and "
             "everything at the end");
   EXPECT_THAT(error(square(), "MARGINALIZE 2"), StartsWith("MARGINALIZE is not for a run with a "));
+}
+
+TEST_F(OnlinePolicy, ReportsWhatBecomesOfLandmarks) {
+  const Lines told{"NEW VERTEX_SE2 0",
+                   "NEW VERTEX_XY 100",
+                   "EDGE_SE2_XY 0 100 2 1 100 0 100",
+                   "NEW VERTEX_SE2 1",
+                   "EDGE_SE2 0 1 1 0 0 100 0 0 100 0 400",
+                   "EDGE_SE2_XY 1 100 1.05 0.95 100 0 100",
+                   "NEW VERTEX_SE2 2",
+                   "EDGE_SE2 1 2 1 0 0 1e8 0 0 1e8 0 1e8",
+                   "NEW VERTEX_XY 101",
+                   "EDGE_SE2_XY 2 100 0.05 0.95 100 0 100",
+                   "EDGE_SE2_XY 2 101 4 1 100 0 100",
+                   "DONE",
+                   "ESTIMATE 100",
+                   "COVARIANCE 100 1",
+                   "ESTIMATE 101",
+                   "ESTIMATE ALL"};
+  const std::string policy =
+      "compact_pose:range=3,angle=3,landmark_gain=0.6,pose_gain=5,sensor=0.1 0.1";
+  const Outcome run = cairn(online(policy, {"--output", "none"}), {}, joined(told));
+  EXPECT_THAT(
+      lines(run.out),
+      ElementsAre("LANDMARK 0 100 ADDED inf 0", "KEPT 0", "OK 4 variables 2 factors 1 owed 0",
+                  StartsWith("LANDMARK 1 100 TAKEN 1."), "KEPT 1",
+                  "OK 7 variables 3 factors 3 owed 0",
+                  StartsWith("LANDMARK 2 100 UNINFORMATIVE 0."), "LANDMARK 2 101 NOTADDED inf 0",
+                  "DROPPED 2", StartsWith("OK 12 "), StartsWith("VERTEX_XY 100 "),
+                  StartsWith("OK 13 "), StartsWith("COVARIANCE 100 1 2 3 0.00"),
+                  StartsWith("OK 14 "), StartsWith("ERROR line 15: there is no estimate of 101"),
+                  StartsWith("VERTEX_SE2 0 "), StartsWith("VERTEX_SE2 1 "),
+                  StartsWith("VERTEX_SE2 2 "), StartsWith("VERTEX_XY 100 "), StartsWith("OK 16 ")))
+      << run.out;
 }
 
 TEST_F(OnlinePolicy, APoseThatCameByMistakeCanBeTakenBack) {

@@ -19,24 +19,29 @@
 namespace cairn {
 namespace {
 
-/// x_0 t_0⁻¹ t_v of each variable: the truth as seen from the estimate's first pose.
+/// x_0 t_0⁻¹ t_v of each variable: the truth as seen from the estimate's first variable, a pose.
 std::vector<std::vector<double>> moved_truth(const Graph& estimate, const Graph& truth) {
   std::vector<std::vector<double>> moved;
   std::vector<double> motion;
   for (int v = 0; v < estimate.variable_count(); ++v) {
     const VariableType& type = estimate.type(v);
-    if (!is_pose(type) || type.tag() != estimate.type(0).tag()) {
+    const bool landmark = v > 0 && is_point(type);
+    if (!landmark && !(is_pose(type) && type.tag() == estimate.type(0).tag())) {
       throw Error(ErrorCode::usage,
                   "no normalised error: " + estimate.describe_variable(v) +
-                      " is not a pose of a Lie group, or of another than the first");
+                      " is neither a pose of the first one's Lie group nor a landmark");
     }
     const auto other = truth.find(estimate.id(v));
     if (!other || truth.type(*other).tag() != type.tag()) {
       throw Error(ErrorCode::input,
                   "no normalised error: the truth has no " + estimate.describe_variable(v));
     }
-    const StateGroup group(type);
     const auto true_state = truth.state(*other);
+    if (landmark) {
+      moved.push_back(moved_point(type, true_state, pose_of(estimate.type(0), motion)));
+      continue;
+    }
+    const StateGroup group(type);
     if (v == 0) motion = group.compose(estimate.state(0), group.inverse(true_state));
     moved.push_back(group.compose(motion, true_state));
   }

@@ -33,6 +33,15 @@ Eigen::Vector3d position(const VariableType& type, std::span<const double> x) {
   return t;
 }
 
+std::vector<double> moved_point(const VariableType& type, std::span<const double> x,
+                                const Pose& motion) {
+  const Pose at = pose_of(type, x);
+  const Eigen::Vector3d t = motion.R * at.t + motion.t;
+  std::vector<double> moved(x.begin(), x.end());
+  type.placement()->join(at.R.data(), t.data(), moved.data());
+  return moved;
+}
+
 std::vector<double> position_jacobian(const VariableType& type, std::span<const double> x) {
   const Placement* place = type.placement();
   if (!place) return {};

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <span>
 #include <string>
@@ -111,44 +112,61 @@ namespace {
 
 Error bad_input(const std::string& message) { return {ErrorCode::input, message}; }
 
-/// Whether all variables are poses of one type.
+/// Whether all variables are landmarks, or poses of one type.
 void check_poses(const Graph& graph) {
+  int first = -1;
   for (int v = 0; v < graph.variable_count(); ++v) {
     const VariableType& type = graph.type(v);
+    if (is_point(type)) continue;
     if (!is_pose(type)) {
       throw bad_input(
-          fmt::format("{} is not a pose of a Lie group, and this takes pose graphs only: a robot's "
-                      "poses, relative poses between them and absolute measurements of them, "
-                      "without landmarks",
+          fmt::format("{} is not a pose of a Lie group, and this takes trajectories only: a "
+                      "robot's poses, relative poses between them, absolute measurements of them, "
+                      "and landmarks that are seen from them",
                       graph.describe_variable(v)));
     }
-    if (graph.pool(v) != graph.pool(0)) {
+    if (first < 0) first = v;
+    if (graph.pool(v) != graph.pool(first)) {
       throw bad_input(fmt::format("{} and {} are poses of different types; a trajectory has one",
-                                  graph.describe_variable(0), graph.describe_variable(v)));
+                                  graph.describe_variable(first), graph.describe_variable(v)));
     }
   }
+  if (first < 0 && graph.variable_count() > 0)
+    throw bad_input(
+        fmt::format("{} and all others are points, and this takes a trajectory: poses with "
+                    "odometry between them",
+                    graph.describe_variable(0)));
+}
+
+/// How many of the variables of a factor are landmarks.
+int landmarks_of(const Graph& graph, int factor) {
+  return static_cast<int>(std::ranges::count_if(
+      graph.factor_variables(factor), [&](std::int32_t v) { return is_point(graph.type(v)); }));
+}
+
+bool is_observation(const Graph& graph, int factor) {
+  return graph.factor_variables(factor).size() == 2 && landmarks_of(graph, factor) == 1;
 }
 
 void check_factors(const Graph& graph) {
   for (int f = 0; f < graph.factor_count(); ++f) {
     const FactorType& type = graph.factor_type(f);
-    if (type.is_relative() || type.arity() == 1) continue;
+    const int landmarks = landmarks_of(graph, f);
+    if (landmarks == 0 && (type.is_relative() || type.arity() == 1)) continue;
+    if (is_observation(graph, f)) continue;
     throw bad_input(
-        fmt::format("{} is neither the motion from one pose to another nor a measurement of a "
-                    "single pose, and this takes pose graphs only: leave it out",
+        fmt::format("{} is neither the motion from one pose to another, nor a measurement of a "
+                    "single pose, nor of a landmark from a pose: leave it out",
                     graph.describe_factor(f)));
   }
 }
 
-/// Moves factors on one pose from the links to the priors.
-void separate_priors(const Graph& graph, std::vector<Arrival>& chain) {
-  for (Arrival& arrival : chain) {
-    const auto priors =
-        std::stable_partition(arrival.links.begin(), arrival.links.end(),
-                              [&](int f) { return graph.factor_variables(f).size() > 1; });
-    arrival.priors.assign(priors, arrival.links.end());
-    arrival.links.erase(priors, arrival.links.end());
-  }
+/// Moves the links for which `chosen` is true to `others`.
+template <class Chosen>
+void separate(std::vector<int>& links, std::vector<int>& others, const Chosen& chosen) {
+  const auto first = std::stable_partition(links.begin(), links.end(), std::not_fn(chosen));
+  others.assign(first, links.end());
+  links.erase(first, links.end());
 }
 
 }  // namespace
@@ -158,7 +176,11 @@ std::vector<Arrival> pose_chain(const Graph& graph, std::optional<Id> begin) {
   check_factors(graph);
   if (graph.variable_count() == 0) return {};
   std::vector<Arrival> chain = arrival_order(graph);
-  separate_priors(graph, chain);
+  for (Arrival& arrival : chain) {
+    separate(arrival.links, arrival.priors,
+             [&](int f) { return graph.factor_variables(f).size() == 1; });
+    separate(arrival.links, arrival.observations, [&](int f) { return is_observation(graph, f); });
+  }
   if (begin) {
     const auto first = std::ranges::find(
         chain, *begin, [&](const Arrival& arrival) { return graph.id(arrival.pose()); });
@@ -182,7 +204,8 @@ std::vector<Arrival> pose_chain(const Graph& graph, std::optional<Id> begin) {
 GraphUpdate arrival_update(const Graph& graph, const Arrival& arrival) {
   GraphUpdate update;
   for (const int v : arrival.variables) update.variables.push_back(graph.variable(v));
-  for (const auto* factors : {&arrival.odometry, &arrival.links, &arrival.priors}) {
+  for (const auto* factors :
+       {&arrival.odometry, &arrival.links, &arrival.priors, &arrival.observations}) {
     for (const int f : *factors) update.factors.push_back(graph.factor(f));
   }
   return update;

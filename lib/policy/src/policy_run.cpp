@@ -9,6 +9,7 @@
 #include <fmt/core.h>
 
 #include "cairn/evaluation/nonzeros.hpp"
+#include "cairn/geometry/pose.hpp"
 #include "cairn/linear/linear_solver.hpp"
 #include "cairn/runtime/plugin_call.hpp"
 #include "cairn/runtime/timed.hpp"
@@ -100,6 +101,8 @@ PolicyData policy_data(Graph recording, std::optional<Graph> truth, std::optiona
   for (const Arrival& pose : data.poses) {
     data.loops += std::ssize(pose.links);
     data.priors += std::ssize(pose.priors);
+    data.observations += std::ssize(pose.observations);
+    data.landmarks += std::ssize(pose.variables) - 1;
   }
   if (truth) {
     data.truth = trajectory(*truth);
@@ -146,10 +149,11 @@ void PolicyRun::load(const Graph& map) {
     const Id first = recording.id(setting_.data.poses.front().pose());
     for (int v = 0; v < recording.variable_count(); ++v) {
       const Id pose = recording.id(v);
-      if (pose < first && !map.find(pose)) registration_->pose_ended(pose, false);
+      if (!is_point(recording.type(v)) && pose < first && !map.find(pose))
+        registration_->pose_ended(pose, false);
     }
   }
-  result_.map_poses = map.variable_count();
+  for (int v = 0; v < map.variable_count(); ++v) result_.map_poses += !is_point(map.type(v));
 }
 
 void PolicyRun::run(std::size_t count, std::string_view title,
@@ -166,6 +170,10 @@ void PolicyRun::run(std::size_t count, std::string_view title,
     }
     result_.kept_priors +=
         std::ranges::count(pose.priors, LinkVerdict::linked, &PriorReport::verdict);
+    for (const LandmarkReport& landmark : pose.landmarks) {
+      result_.kept_landmarks += landmark.added;
+      result_.kept_observations += landmark.verdict == LinkVerdict::linked;
+    }
     if (setting_.progress) setting_.progress(title, count, result_);
     if (after) after(result_.poses.size() - 1);
     return !setting_.interrupted();
@@ -181,6 +189,7 @@ void PolicyRun::run(std::size_t count, std::string_view title,
 
 PolicyResult PolicyRun::finish(Recovery recovery) {
   result_.compact = policy_->estimator().graph();
+  result_.kept_poses = static_cast<int>(std::ssize(policy_->kept()));
   result_.chi2 = policy_->estimator().chi2();
   result_.located = policy_->unlocated().empty();
   result_.trajectory = recovered_trajectory(*policy_, recovery);

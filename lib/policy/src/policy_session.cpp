@@ -90,10 +90,14 @@ void PolicySession::perform(std::string_view line, const Words& words, Reply& re
 void PolicySession::load(const Graph& map) {
   policy_.load(map);
   for (int v = 0; v < map.variable_count(); ++v) {
+    if (is_point(map.type(v))) {
+      landmarks_.emplace(map.id(v), map.variable(v).type);
+      continue;
+    }
     arrived_.insert(map.id(v));
     kept_.insert(map.id(v));
+    if (!motions_) motions_.emplace(map.variable(v).type);
   }
-  motions_.emplace(map.variable_pools().front().type);
 }
 
 void PolicySession::finish() {
@@ -101,7 +105,11 @@ void PolicySession::finish() {
   finish_trajectory();
 }
 
-std::int64_t PolicySession::variable_count() const { return std::ssize(policy_.kept()); }
+std::int64_t PolicySession::variable_count() const {
+  return pose_count() + std::ssize(policy_.landmarks());
+}
+
+std::int64_t PolicySession::pose_count() const { return std::ssize(policy_.kept()); }
 
 std::int64_t PolicySession::factor_count() const { return policy_.factor_count(); }
 
@@ -109,22 +117,36 @@ std::int64_t PolicySession::factor_count() const { return policy_.factor_count()
 
 void PolicySession::take_data(std::string_view text, Reply& reply) {
   StreamLine said = format_.read(text, kStreamName, line(), registry_, settings_.read);
-  for (Variable& pose : said.variables) take_pose(std::move(pose), reply);
-  for (Factor& factor : said.factors)
-    factor.variables.size() == 1 ? take_prior(std::move(factor)) : take_edge(std::move(factor));
+  for (Variable& variable : said.variables) take_variable(std::move(variable), reply);
+  for (Factor& factor : said.factors) {
+    if (factor.variables.size() == 1) {
+      take_prior(std::move(factor));
+    } else if (is_observation(factor)) {
+      take_observation(std::move(factor));
+    } else {
+      take_edge(std::move(factor));
+    }
+  }
   if (!said.held.empty()) hold(said.held);
   reply.changes = !said.skipped;
 }
 
+void PolicySession::take_variable(Variable variable, Reply& reply) {
+  is_point(*variable.type) ? take_landmark(variable) : take_pose(std::move(variable), reply);
+}
+
 void PolicySession::take_pose(Variable pose, Reply& reply) {
   const std::string name = fmt::format("{} {}", pose.type->tag(), pose.id);
-  if (!is_pose(*pose.type))
-    throw bad_line(name + " is not a pose; with a policy a robot's poses alone can come");
+  if (!is_pose(*pose.type)) {
+    throw bad_line(name +
+                   " is neither a pose nor a landmark; with a policy a robot's poses and the "
+                   "landmarks that it sees can come");
+  }
   if (motions_ && motions_->type().tag() != pose.type->tag()) {
     throw bad_line(fmt::format("{}: the poses before it are {}; expected another", name,
                                motions_->type().tag()));
   }
-  if (arrived_.contains(pose.id) || current() == pose.id)
+  if (arrived_.contains(pose.id) || current() == pose.id || landmarks_.contains(pose.id))
     throw bad_line(name + ": the id is already in use");
   if (!pose.state.empty()) {
     if (const std::string problem = pose.type->normalize(pose.state.data()); !problem.empty())
@@ -289,6 +311,7 @@ void PolicySession::settle(Reply& reply) {
 PoseReport PolicySession::end(Reply& reply) {
   settle(reply);
   offer_priors();
+  offer_landmarks();
   PoseReport report = policy_.end_pose();
   selection_.add(report);
   open_ = false;
@@ -304,6 +327,7 @@ PoseReport PolicySession::end(Reply& reply) {
     }
   }
   for (const PriorReport& prior : report.priors) note_prior(prior);
+  for (const LandmarkReport& landmark : report.landmarks) note_landmark(landmark);
   for (const std::string& note : report.notes) answer_ += fmt::format("NOTE {}\n", note);
   return report;
 }
@@ -365,7 +389,7 @@ void PolicySession::note_selection() {
 // Commands ----------------------------------------------------------------------------------------
 
 void PolicySession::declare(const Words& words, Reply& reply) {
-  take_pose(declared_variable(words, registry_), reply);
+  take_variable(declared_variable(words, registry_), reply);
   reply.changes = true;
 }
 
@@ -455,71 +479,6 @@ void PolicySession::refuse(const Words& words, Reply& /*reply*/) {
               : "goes on deciding from what it has taken, and could not take that into account"));
 }
 
-void PolicySession::report_covariance(const Words& words, Reply& reply) {
-  expect_words(words, 3, "COVARIANCE id id");
-  const Id a = parse_whole(words[1], "id"), b = parse_whole(words[2], "id");
-  for (const Id id : {a, b}) {
-    if (in_graph(id)) continue;
-    throw bad_line(fmt::format("there is no pose {} in the compact graph", id));
-  }
-  settle(reply);
-  if (!located() && !(on_map(a) && on_map(b))) {
-    throw Error(ErrorCode::numerical,
-                "there is no covariance: no pose was matched with one of the map yet");
-  }
-  Estimator& estimator = policy_.estimator();
-  const std::string text = covariance_line(estimator, a, motions_->type(), b, motions_->type());
-  if (text.empty()) {
-    throw Error(ErrorCode::numerical,
-                "there is no covariance: the measurements do not determine everything");
-  }
-  answer_ += text;
-  answer(reply);
-}
-
-void PolicySession::report_estimate(const Words& words, Reply& reply) {
-  expect_words(words, 2, "ESTIMATE id' or 'ESTIMATE ALL");
-  if (words[1] == "ALL") {
-    settle(reply);
-    if (newest_) {
-      for (const Id id : policy_.kept()) write_estimate(id, answer_);
-      if (!in_graph(*newest_)) write_estimate(*newest_, answer_);
-    }
-    return answer(reply);
-  }
-  const Id id = parse_whole(words[1], "id");
-  const std::optional<Id> newest = arriving_ && complete() ? current() : newest_;
-  const bool left_out = newest != id && !in_graph(id);
-  if (left_out && !(settings_.trajectory && arrived_.contains(id))) {
-    throw bad_line(
-        fmt::format("there is no estimate of {}; expected a pose that was kept{}, or the "
-                    "newest once its odometry is there",
-                    id, settings_.trajectory ? "" : " (with --trajectory also one that was not)"));
-  }
-  if (left_out) {
-    const auto recovered = [&] {
-      return recovered_state(policy_, motions_->type(), id, Recovery::likely);
-    };
-    if (!recovered()) {
-      throw bad_line(fmt::format(
-          "pose {} was not kept, and is estimated from the next pose that is: ask again then", id));
-    }
-    settle(reply);
-    answer_ += estimate_line(motions_->type(), id, *recovered());
-    return answer(reply);
-  }
-  settle(reply);
-  write_estimate(id, answer_);
-  answer(reply);
-}
-
-void PolicySession::report_chi2(const Words& words, Reply& reply) {
-  expect_words(words, 1, "CHI2");
-  settle(reply);
-  answer_ += chi2_line(policy_.estimator());
-  answer(reply);
-}
-
 void PolicySession::save(const Words& words, Reply& reply) {
   const std::string file = file_to_save(words);
   settle(reply);
@@ -561,45 +520,6 @@ void PolicySession::note_removed() {
   }
 }
 
-/// What --output and --marginals ask for at the end of a pose.
-void PolicySession::write_results(bool kept) {
-  const bool all = settings_.output == "all", changed = settings_.output == "changed";
-  if (all || changed) {
-    std::vector<Id> poses = policy_.kept();
-    if (!kept) poses.push_back(*newest_);
-    for (const Id id : poses) {
-      std::string text;
-      write_estimate(id, text);
-      std::string& reported = reported_states_[id];
-      if (changed && reported == text) continue;
-      answer_ += text;
-      reported = std::move(text);
-    }
-    if (!kept) reported_states_.erase(*newest_);  // its state is never written again
-  }
-  if (settings_.output == "last") write_estimate(*newest_, answer_);
-  // Where the pose is not kept they are the same as before.
-  if (!kept || !located() || settings_.marginals == "none") return;
-  Estimator& estimator = policy_.estimator();
-  const VariableType& type = motions_->type();
-  const std::vector<Id> ids =
-      settings_.marginals == "last" ? std::vector<Id>{*newest_} : policy_.kept();
-  for (const Id id : ids) answer_ += covariance_line(estimator, id, type, id, type);
-}
-
-bool PolicySession::in_graph(Id id) const {
-  if (kept_.contains(id)) return true;
-  if (newest_ != id) return false;
-  const std::vector<Id> kept = policy_.kept();
-  return !kept.empty() && kept.back() == id;
-}
-
-/// While the robot's place on the map is unknown.
-bool PolicySession::on_map(Id id) const {
-  const std::vector<Id> map = policy_.unlocated();
-  return std::ranges::find(map, id) != map.end();
-}
-
 std::vector<std::string> PolicySession::unread_notes() const {
   constexpr std::string_view kNote = "NOTE ";
   std::vector<std::string> notes;
@@ -608,15 +528,6 @@ std::vector<std::string> PolicySession::unread_notes() const {
     if (line.starts_with(kNote)) notes.push_back(line.substr(kNote.size()));
   }
   return notes;
-}
-
-/// Of a kept pose, for which the estimator must have been read, or of the newest.
-void PolicySession::write_estimate(Id id, std::string& text) const {
-  if (id == newest_) {
-    text += estimate_line(motions_->type(), id, policy_.newest_state());
-  } else {
-    text += estimate_line(motions_->type(), id, policy_.estimator().state(id));
-  }
 }
 
 }  // namespace cairn

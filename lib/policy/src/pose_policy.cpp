@@ -20,6 +20,10 @@ PriorReport PosePolicy::offer_prior(const Factor&) {
   throw Error(ErrorCode::usage, "this policy takes no absolute measurements: use compact_pose");
 }
 
+void PosePolicy::offer_landmark(const LandmarkObservation&) {
+  throw Error(ErrorCode::usage, "this policy takes no landmarks: use compact_pose");
+}
+
 bool PosePolicy::revoke(Id, Id) {
   throw Error(ErrorCode::usage, "this policy does not revoke links: use compact_pose");
 }
@@ -57,16 +61,35 @@ void match_newest(PosePolicy& policy, Registration& registration, Id newest) {
 }  // namespace
 
 PoseReport process_pose(const Variable& pose, std::span<const Factor> odometry, PosePolicy& policy,
-                        Registration& registration, std::span<const Factor> priors) {
+                        Registration& registration, std::span<const Factor> priors,
+                        std::span<const LandmarkObservation> observations) {
   policy.add_pose(pose, odometry);
   match_newest(policy, registration, pose.id);
-  if (!priors.empty() && policy.unlocated().empty()) {
+  if (!(priors.empty() && observations.empty()) && policy.unlocated().empty()) {
     for (const Factor& prior : priors) policy.offer_prior(prior);
+    for (const LandmarkObservation& observation : observations) policy.offer_landmark(observation);
   }
   PoseReport report = policy.end_pose();
   registration.pose_ended(report.id, report.kept);
   for (const Id left : policy.removed()) registration.pose_ended(left, false);
   return report;
+}
+
+std::vector<LandmarkObservation> observations_of(const Graph& recording, const Arrival& arrival) {
+  std::vector<LandmarkObservation> observations;
+  for (const int f : arrival.observations) {
+    const auto on = recording.factor_variables(f);
+    const int landmark = on[0] == arrival.pose() ? on[1] : on[0];
+    const Id id = recording.id(landmark);
+    auto there = std::ranges::find(observations, id,
+                                   [](const LandmarkObservation& s) { return s.landmark.id; });
+    if (there == observations.end()) {
+      there = observations.insert(there, {recording.variable(landmark), {}});
+      if (!there->landmark.fixed) there->landmark.state.clear();
+    }
+    there->factors.push_back(recording.factor(f));
+  }
+  return observations;
 }
 
 bool run_policy(const Graph& recording, std::span<const Arrival> poses, PosePolicy& policy,
@@ -79,8 +102,10 @@ bool run_policy(const Graph& recording, std::span<const Arrival> poses, PosePoli
     if (!first && !pose.fixed) pose.state.clear();  // where its odometry puts it
     first = false;
     const std::span<const Factor> factors = update.factors;
-    const PoseReport report = process_pose(pose, factors.first(arrival.odometry.size()), policy,
-                                           registration, factors.last(arrival.priors.size()));
+    const PoseReport report = process_pose(
+        pose, factors.first(arrival.odometry.size()), policy, registration,
+        factors.subspan(arrival.odometry.size() + arrival.links.size(), arrival.priors.size()),
+        observations_of(recording, arrival));
     if (each && !each(report)) break;
   }
   return first || policy.finish();

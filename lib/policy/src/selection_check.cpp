@@ -35,6 +35,17 @@ const ThresholdTrial* smaller_trial(const FoundThresholds& found) {
   return best;
 }
 
+/// The largest information gain among those of landmarks of the graph that were used [nats]; 0:
+/// there is none.
+double most_informative(const std::vector<LandmarkReport>& landmarks) {
+  double most = 0.0;
+  for (const LandmarkReport& landmark : landmarks) {
+    if (landmark.verdict == LinkVerdict::linked && !landmark.added)
+      most = std::max(most, landmark.gain);
+  }
+  return most;
+}
+
 /// What a trial has otherwise.
 OptionValues changed(const ThresholdTrial& trial, const OptionValues& from) {
   OptionValues others;
@@ -73,6 +84,9 @@ void SelectionCheck::add(const PoseReport& pose) {
   if (!pose.kept || poses_ == 1) return;
   if (pose.closed_loop) {
     ++kept_by_loop_;
+  } else if (const double gain = most_informative(pose.landmarks); gain > 0.0) {
+    ++kept_by_landmark_;
+    gain_of_landmarks_ += gain;
   } else if (!std::isfinite(pose.least_gain)) {
     ++kept_alone_;
   } else {
@@ -112,6 +126,12 @@ std::optional<SelectionCheck::Advice> SelectionCheck::too_many_poses(
       advice.effect += ", and uses about half of the loop closures";
     }
     return advice;
+  }
+  if (kept_by_landmark_ > std::max(kept_alone_, steps_)) {
+    return Advice{
+        begin + "most of them have an informative measurement of a landmark",
+        {{"landmark_gain", nats(gain_of_landmarks_ / static_cast<double>(kept_by_landmark_))}},
+        "uses about half of these, with a larger error"};
   }
   if (kept_alone_ > steps_) {
     return Advice{begin +

@@ -37,9 +37,8 @@ std::vector<Id> spread(const std::vector<Id>& ids) {
   return some;
 }
 
-std::vector<Id> ids_of(const Graph& graph) {
-  std::vector<Id> ids;
-  for (int v = 0; v < graph.variable_count(); ++v) ids.push_back(graph.id(v));
+std::vector<Id> kept_poses(const PosePolicy& policy) {
+  std::vector<Id> ids = policy.kept();
   std::ranges::sort(ids);
   return ids;
 }
@@ -96,14 +95,14 @@ ThresholdTrial try_thresholds(const Sample& sample, const OptionValues& options,
   PolicyRun run(trial, sample.setting);
   run.run(sample.count, fmt::format("sample, gains × {:.2g} {:.2g}", links, poses));
   ThresholdTrial result{.links = links, .poses = poses};
-  const Graph compact = run.policy().estimator().graph();
-  result.poses_kept = compact.variable_count();
+  const std::vector<Id> kept = kept_poses(run.policy());
+  result.poses_kept = static_cast<int>(std::ssize(kept));
   result.loops_kept = run.counts().kept_loops;
   const double apart =
       absolute_error(trajectory(recovered_trajectory(run.policy(), Recovery::likely)),
                      sample.everything.trajectory);
   result.expected = sample.everything.noise *
-                    expected_error(run.policy(), nearest(sample.everything.poses, ids_of(compact)));
+                    expected_error(run.policy(), nearest(sample.everything.poses, kept));
   result.realised = std::hypot(sample.everything.expected, apart);
   return result;
 }
@@ -193,7 +192,7 @@ FoundThresholds find_thresholds(const PolicyJob& job, std::size_t count, double 
     Sample sample{job, setting, count, {}};
     const Graph all = watch.policy().estimator().graph();
     sample.everything.trajectory = trajectory(all);
-    sample.everything.poses = spread(ids_of(all));
+    sample.everything.poses = spread(kept_poses(watch.policy()));
     const double noise = noise_scale(watch.policy());
     sample.everything.noise = noise;
     sample.everything.expected = noise * expected_error(watch.policy(), sample.everything.poses);

@@ -89,6 +89,7 @@ std::string where_they_differ(PosePolicy& a, PosePolicy& b) {
 
 void expect_consistent(PosePolicy& policy) {
   std::vector<Id> kept = policy.kept(), there = policy.estimator().variables();
+  std::ranges::copy(policy.landmarks(), std::back_inserter(kept));
   std::ranges::sort(kept);
   std::ranges::sort(there);
   expect(policy.unlocated().empty() ? kept == there : std::ranges::includes(kept, there),
@@ -129,6 +130,8 @@ std::string square(bool asks) {
     if (asks) text += "NEXT\n";
     if (k >= 4) text += fmt::format("EDGE_SE2 {} {} 0.0{} 0 0 100 0 0 100 0 400\n", k - 4, k, k);
     if (asks && k % 2 == 0) text += "NEXT\nESTIMATE ALL\n";
+    if (k % 3 == 1) text += fmt::format("NEW VERTEX_XY {}\n", 50 + k % 2);
+    if (k % 2 == 1) text += fmt::format("EDGE_SE2_XY {} {} 1 0.{} 9 0 9\n", k, 50 + k % 2, k);
     if (k % 5 == 0) text += fmt::format("EDGE_PRIOR_SE2 {} 0.5 {} 0 4 0 0 4 0 0\n", k, k % 4);
     if (k % 3 == 0) text += fmt::format("DONE\nCOVARIANCE 0 {}\n", k);
     if (k % 4 == 2) text += fmt::format("REMOVE LINK {} {}\n", k, k - 4);
@@ -216,8 +219,8 @@ CHI2
 
 std::vector<std::string> words() {
   std::vector<std::string> all = protocol_words();
-  for (const char* word :
-       {"NEXT\n", "DONE\n", "NOMATCH ", "NEXT\nDONE\n", "REMOVE LINK ", "EDGE_PRIOR_SE2 "})
+  for (const char* word : {"NEXT\n", "DONE\n", "NOMATCH ", "NEXT\nDONE\n", "REMOVE LINK ",
+                           "EDGE_PRIOR_SE2 ", "NEW VERTEX_XY ", "EDGE_SE2_XY "})
     all.emplace_back(word);
   return all;
 }

@@ -43,6 +43,50 @@ class NormalizedErrorIn : public testing::TestWithParam<int> {
 };
 INSTANTIATE_TEST_SUITE_P(PlaneAndSpace, NormalizedErrorIn, testing::Values(2, 3));
 
+TEST(NormalizedError, CountsLandmarks) {
+  Registry registry;
+  Simulation sim = simulate(registry, "landmarks2d:poses=60", 3);
+  registry.make<Optimizer>("levenberg_marquardt")->optimize(sim.graph);
+  const PoseWorld world{planar_types(registry)};
+  // The truth of another frame, in another order.
+  const PoseWorld::Pose by{3.0, -2.0, 1.1};
+  const auto [R, t] = world.split(by);
+  Graph truth;
+  for (int v = sim.truth.variable_count() - 1; v >= 0; --v) {
+    const auto x = sim.truth.state(v);
+    if (x.size() == 3) {
+      truth.add_variable(sim.truth.variable(v).type, sim.truth.id(v), world.compose(by, x));
+    } else {
+      const Eigen::Vector3d p = R * Eigen::Vector3d(x[0], x[1], 0.0) + t;
+      truth.add_variable(sim.truth.variable(v).type, sim.truth.id(v), std::vector{p.x(), p.y()});
+    }
+  }
+  const Graph& graph = sim.graph;
+  std::vector<bool> held(static_cast<std::size_t>(graph.variable_count()));
+  held[0] = true;
+  const DenseSystem system = dense_system(graph, held);
+  VectorXd e(system.H.rows());
+  const auto back = world.compose(graph.state(0), world.inverse(sim.truth.state(0)));
+  const auto [R_back, t_back] = world.split(back);
+  int landmarks = 0;
+  for (int v = 1; v < graph.variable_count(); ++v) {
+    const auto rows = system.rows.at(graph.id(v));
+    const auto x = graph.state(v), true_x = sim.truth.state(*sim.truth.find(graph.id(v)));
+    if (x.size() == 3) {
+      e.segment(rows.first, 3) = world.log(world.between(x, world.compose(back, true_x)));
+      continue;
+    }
+    const Eigen::Vector3d p = R_back * Eigen::Vector3d(true_x[0], true_x[1], 0.0) + t_back;
+    e.segment(rows.first, 2) = p.head<2>() - Eigen::Vector2d(x[0], x[1]);
+    ++landmarks;
+  }
+  const NormalizedError error = normalized_error(graph, truth);
+  EXPECT_GT(landmarks, 3);
+  EXPECT_EQ(error.dof, static_cast<int>(e.size()));
+  EXPECT_NEAR(error.squared, e.dot(system.H * e), 1e-6 * error.squared);
+  EXPECT_LT(error.squared, 2.0 * error.dof);
+}
+
 TEST_P(NormalizedErrorIn, IsTheErrorsMahalanobisNorm) {
   const Simulation sim = estimated(3);
   const Graph& graph = sim.graph;
@@ -124,20 +168,21 @@ TEST_P(NormalizedErrorIn, SaysWhatTheTruthLacks) {
   EXPECT_THROW(normalized_error(sim.graph, other), Error);
 }
 
-TEST(NormalizedError, IsForPosesOnly) {
+TEST(NormalizedError, IsForPosesAndWhatTheySee) {
   Registry registry;
   Graph point;
   point.add_variable(registry.variable_type("VERTEX_XY"), 0, std::vector<double>{1.0, 2.0});
-  Graph seen;
-  seen.add_variable(registry.variable_type("VERTEX_SE2"), 1, std::vector<double>{1.0, 2.0, 0.0});
-  seen.add_variable(registry.variable_type("VERTEX_XY"), 0, std::vector<double>{1.0, 2.0});
-  for (const Graph* graph : {&point, &seen}) {
+  Graph mixed;
+  mixed.add_variable(registry.variable_type("VERTEX_SE2"), 1, std::vector<double>{1.0, 2.0, 0.0});
+  mixed.add_variable(registry.variable_type("VERTEX_SE3:QUAT"), 0,
+                     std::vector<double>{1.0, 2.0, 0.0, 0.0, 0.0, 0.0, 1.0});
+  for (const Graph* graph : {&point, &mixed}) {
     try {
       normalized_error(*graph, *graph);
       FAIL() << "no error";
     } catch (const Error& error) {
       EXPECT_EQ(error.code(), ErrorCode::usage);
-      EXPECT_THAT(error.what(), HasSubstr("VERTEX_XY 0"));
+      EXPECT_THAT(error.what(), HasSubstr(graph->describe_variable(graph->variable_count() - 1)));
     }
   }
   EXPECT_EQ(normalized_error(Graph(), Graph()).dof, 0);

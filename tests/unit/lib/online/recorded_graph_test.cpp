@@ -186,11 +186,31 @@ TEST_F(PoseChain, HasTheAbsoluteMeasurementsOfEachPose) {
   EXPECT_EQ(arrival_update(graph_, chain[1]).factors.back().type->tag(), "EDGE_PRIOR_SE2");
 }
 
-TEST_F(PoseChain, RefusesLandmarks) {
+TEST_F(PoseChain, HasWhatEachPoseSeesOfLandmarks) {
+  const int point = graph_.add_variable(types_.point, 0, std::array{0.0, 0.0});
+  for (const Id id : {1, 2, 3}) pose(id);
+  join(1, 2), join(2, 3), join(1, 3);
+  const auto see = [&](Id id) {
+    return graph_.add_factor(types_.point_seen, std::array{*graph_.find(id), point},
+                             std::array{1.0, 2.0}, std::array{1.0, 0.0, 1.0});
+  };
+  const int third = see(3), second = see(2);
+  const std::vector<Arrival> chain = pose_chain(graph_);
+  ASSERT_THAT(chain, SizeIs(3));
+  EXPECT_THAT(chain[0].observations, IsEmpty());
+  EXPECT_THAT(chain[1].observations, ElementsAre(second));
+  EXPECT_THAT(chain[1].variables, ElementsAre(*graph_.find(2), point));
+  EXPECT_THAT(chain[2].observations, ElementsAre(third));
+  EXPECT_THAT(chain[2].links, SizeIs(1));
+}
+
+TEST_F(PoseChain, RefusesPointsAloneAndMeasurementsOfALandmarkAlone) {
+  const int point = graph_.add_variable(types_.point, 9, std::array{0.0, 0.0});
+  EXPECT_THAT(refusal(), HasSubstr("VERTEX_XY 9 and all others are points"));
   pose(1);
-  graph_.add_variable(types_.point, 9, std::array{0.0, 0.0});
-  EXPECT_THAT(refusal(),
-              AllOf(HasSubstr("VERTEX_XY 9 is not a pose"), HasSubstr("pose graphs only")));
+  const std::array<int, 1> on{point};
+  graph_.add_factor(types_.point_prior, on, std::array{0.0, 0.0}, std::array{1.0, 0.0, 1.0});
+  EXPECT_THAT(refusal(), HasSubstr("is neither the motion from one pose to another, nor"));
 }
 
 TEST_F(PoseChain, RefusesWhatFormsNoGroup) {

@@ -52,8 +52,8 @@ TEST_F(PolicyRunTest, ATruthThatLacksPosesIsGoodForTheTrajectoryOnly) {
   EXPECT_THAT(*data.truth, SizeIs(12));
 }
 
-TEST_F(PolicyRunTest, RefusesWhatIsNoPoseGraph) {
-  Simulation made = simulate("landmarks2d");
+TEST_F(PolicyRunTest, RefusesWhatIsNoTrajectory) {
+  Simulation made = simulate("bundle");
   EXPECT_THROW(policy_data(std::move(made.graph)), Error);
 }
 

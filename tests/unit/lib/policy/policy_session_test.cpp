@@ -156,7 +156,7 @@ TEST_F(PolicySessionTest, RefusesWhatDoesNotGoWithAPolicy) {
                                           "REMOVE VARIABLE 0",
                                           "FIX 0",
                                           "VERTEX_SE2 0 0 0 0",
-                                          "NEW VERTEX_XY 9",
+                                          "NEW VERTEX_XY 3",
                                           "EDGE_SE2 1 2" + kHere,
                                           "EDGE_SE2 9 4" + kHere,
                                           "NEXT pair",
@@ -205,7 +205,8 @@ TEST_F(PolicySessionTest, AnAbsoluteMeasurementIsJudgedWhereItsPoseEnds) {
     take("EDGE_SE2 " + std::to_string(k - 1) + " " + std::to_string(k) + kQuarter);
   }
   EXPECT_THAT(take("EDGE_PRIOR_SE2 2 1 1 0 1 0 0 1 0 0").text, HasSubstr("of the newest pose"));
-  EXPECT_THAT(take("EDGE_PRIOR_XY 3 1 1 1 0 1").text, HasSubstr("takes no landmarks"));
+  EXPECT_THAT(take("EDGE_PRIOR_XY 3 1 1 1 0 1").text,
+              HasSubstr("of landmarks a policy takes those from poses"));
   EXPECT_THAT(take("EDGE_PRIOR_SE2 3 0 1 0 10000 0 0 10000 0 0").text, IsEmpty());
   EXPECT_THAT(take("EDGE_SE2 2 3" + kQuarter).text, HasSubstr("after other lines"));
   EXPECT_EQ(take("NEXT").text, "MATCH NONE\nOK 13 variables 3 factors 2 owed 0\n");

@@ -15,12 +15,13 @@ struct NormalizedError {
   int dof = 0;           ///< its mean if the covariance is right
 };
 
-/// The normalised estimation error squared (NEES) of a graph's poses against their true states, all
-/// of them together: eᵀ H e with e_v = local(x_v, truth_v), and H of the factors at the estimate,
-/// under its loss (Σ = H⁻¹). The truth is moved so that the first pose agrees, which is constant,
-/// as are those that are fixed. Variables are matched by id. A mean over many runs above `dof`
-/// means that the estimate is overconfident, below that it is conservative. Throws `Error` (input)
-/// if a variable has no true state, (usage) if it is not a pose of a Lie group.
+/// The normalised estimation error squared (NEES) of a graph's poses and landmarks against their
+/// true states, all of them together: eᵀ H e with e_v = local(x_v, truth_v), and H of the factors
+/// at the estimate, under its loss (Σ = H⁻¹). The truth is moved so that the first pose agrees,
+/// which is constant, as are those that are fixed. Variables are matched by id. A mean over many
+/// runs above `dof` means that the estimate is overconfident, below that it is conservative. Throws
+/// `Error` (input) if a variable has no true state, (usage) if it is neither a landmark
+/// (`is_point`) nor a pose of the first variable's type, a Lie group.
 CAIRN_API NormalizedError normalized_error(const Graph& estimate, const Graph& truth);
 
 /// The absolute trajectory error predicted by an estimate's covariance [m]: the root mean square of

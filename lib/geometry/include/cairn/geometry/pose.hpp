@@ -46,6 +46,10 @@ inline Pose pose_of(const VariableType& type, std::span<const double> x) {
 /// The position of a state [m], z = 0 in the plane; NaN for a type without positions.
 CAIRN_API Eigen::Vector3d position(const VariableType& type, std::span<const double> x);
 
+/// The state of a point (`is_point`) after a rigid motion, p ← R p + t.
+CAIRN_API std::vector<double> moved_point(const VariableType& type, std::span<const double> x,
+                                          const Pose& motion);
+
 /// The derivative of where a variable is in the world [m] by δ at `x`, retract(x, δ): dimension ×
 /// tangent, column-major. None for a type without the ability `Placement`.
 CAIRN_API std::vector<double> position_jacobian(const VariableType& type,

@@ -18,8 +18,9 @@ struct Arrival {
   /// Factors between this pose and the one before, in either direction; by position in the graph.
   std::vector<int> odometry;
   std::vector<int> links;  ///< all other factors, by position: loop closures, landmarks, priors
-  /// In a `pose_chain`, where `links` are between poses: factors on this pose alone, by position.
-  std::vector<int> priors;
+  /// In a `pose_chain`, where `links` are between poses: factors on this pose alone, and those on
+  /// this pose and a landmark; by position.
+  std::vector<int> priors, observations;
 
   int pose() const { return variables.front(); }
 };
@@ -34,16 +35,18 @@ CAIRN_API std::vector<Arrival> arrival_order(const Graph& graph);
 /// Whether a graph lists its poses and factors in the order in which they arrived.
 CAIRN_API bool in_arrival_order(const std::vector<Arrival>& arrivals);
 
-/// The same for a pose graph with unbroken odometry; none for an empty graph. Throws `Error`
-/// (input), with what would work, for anything else: a variable that is not a pose of a Lie group,
-/// or of another type than the first; a factor that is neither relative nor on one pose; a pose
-/// without a factor to the one before. With `begin`, only the poses from this id on, without
+/// The same for a trajectory with unbroken odometry, which may see landmarks; none for an empty
+/// graph. Throws `Error` (input), with what would work, for anything else: a variable that is
+/// neither a point nor a pose of a Lie group, or a pose of another type than the first; a factor
+/// that is neither relative, nor on one pose, nor on a pose and a landmark; a pose without a factor
+/// to the one before. With `begin`, only the poses from this id on, without
 /// odometry of the first: those before it are of earlier sessions, and need no odometry. Throws
 /// `Error` (input) if it is not there.
 CAIRN_API std::vector<Arrival> pose_chain(const Graph& graph, std::optional<Id> begin = {});
 
 /// What a step brings to an estimator: its variables with their recorded states, then its odometry,
-/// its links and its priors, so that a pose without a state is initialised from its odometry.
+/// its links, its priors and its observations, so that a pose without a state is initialised from
+/// its odometry.
 CAIRN_API GraphUpdate arrival_update(const Graph& graph, const Arrival& arrival);
 
 /// Leaves the initial states to the estimator: empties those of new variables that are not fixed

@@ -27,8 +27,9 @@ struct PolicyData {
   std::optional<Graph> truth_graph;  ///< true states of the same variables, of the same types
   std::optional<Trajectory> truth;   ///< true poses, perhaps of other types
   std::vector<Arrival> poses;
-  std::int64_t loops = 0;   ///< factors between poses besides odometry
-  std::int64_t priors = 0;  ///< factors on one pose
+  std::int64_t loops = 0;                        ///< factors between poses besides odometry
+  std::int64_t priors = 0;                       ///< factors on one pose
+  std::int64_t landmarks = 0, observations = 0;  ///< landmarks; factors on a pose and a landmark
 };
 
 /// Throws `Error` (input) as `pose_chain` does. A `truth` that lacks a pose of the recording, or
@@ -57,12 +58,14 @@ struct PolicyResult {
   std::int64_t false_registered = 0, false_kept = 0;  ///< as far as the registration knows
   std::map<std::string, std::int64_t> verdicts;
   std::int64_t kept_priors = 0;  ///< absolute measurements that are in the graph
+  std::int64_t kept_landmarks = 0, kept_observations = 0;  ///< likewise; measurements of landmarks
   PolicySeconds seconds;
   double registration_seconds = 0.0;
   std::int64_t information_nonzeros = 0, factor_nonzeros = 0;
   bool interrupted = false;
   bool converged = true;  ///< the estimate at the end
-  int map_poses = 0;      ///< of `compact`, those of the map that was continued
+  int kept_poses = 0;     ///< in `compact`, those of the map among them
+  int map_poses = 0;      ///< of these, those of the map that was continued
   /// False: no match was found with that map, so that the two are not connected.
   bool located = true;
 };

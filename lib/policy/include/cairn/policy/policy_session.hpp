@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -33,17 +34,19 @@ struct PolicySettings {
 /// A pose *arrives* with its line and its odometry, is *open* from the first line on that is
 /// neither (then the policy has it), and ends with DONE, the line of the next pose or the input.
 /// Lines of data only collect; every command first *settles* what came before it, and reports the
-/// outcome in its answer; only absolute measurements of the pose wait for its end, when all its
-/// links are there. What a command refuses is found before it settles anything.
+/// outcome in its answer; only absolute measurements of the pose, and those of landmarks, wait for
+/// its end, when all its links are there. What a command refuses is found before it settles
+/// anything.
 class CAIRN_API PolicySession final : public LineSession {
  public:
   struct Counts {
-    std::int64_t poses = 0;       ///< that came
-    std::int64_t proposed = 0;    ///< pairs to be matched
-    std::int64_t registered = 0;  ///< pairs that were measured
-    std::int64_t linked = 0;      ///< links that were used
-    std::int64_t revoked = 0;     ///< REMOVE LINK
-    std::int64_t priors = 0;      ///< absolute measurements that are in the graph
+    std::int64_t poses = 0;                        ///< that came
+    std::int64_t proposed = 0;                     ///< pairs to be matched
+    std::int64_t registered = 0;                   ///< pairs that were measured
+    std::int64_t linked = 0;                       ///< links that were used
+    std::int64_t revoked = 0;                      ///< REMOVE LINK
+    std::int64_t priors = 0;                       ///< absolute measurements that are in the graph
+    std::int64_t landmarks = 0, observations = 0;  ///< likewise; measurements of landmarks
   };
 
   /// What is referred to must outlive the session.
@@ -63,7 +66,9 @@ class CAIRN_API PolicySession final : public LineSession {
   std::vector<std::string> unread_notes() const;
   void finish() override;
   Estimator& estimator() override { return policy_.estimator(); }
+  /// Poses and landmarks that are in the graph.
   std::int64_t variable_count() const override;
+  std::int64_t pose_count() const;
   std::int64_t factor_count() const override;
   const Counts& counts() const { return counts_; }
 
@@ -98,9 +103,13 @@ class CAIRN_API PolicySession final : public LineSession {
 
   // Data
   void take_data(std::string_view text, Reply& reply);
+  void take_variable(Variable variable, Reply& reply);
   void take_pose(Variable pose, Reply& reply);
   void take_edge(Factor factor);
   void take_prior(Factor prior);
+  void take_landmark(const Variable& landmark);
+  void take_observation(Factor factor);
+  bool is_observation(const Factor& factor) const;
   void hold(std::span<const Id> ids);
   Id other_end(std::span<const Id> ends) const;
   void check_motion(const Factor& factor, Id from) const;
@@ -113,6 +122,7 @@ class CAIRN_API PolicySession final : public LineSession {
   void begin();
   void offer();
   void offer_priors();
+  void offer_landmarks();
   void settle(Reply& reply);
   PoseReport end(Reply& reply);
   void close(Reply& reply);
@@ -123,6 +133,7 @@ class CAIRN_API PolicySession final : public LineSession {
   void answer(Reply& reply);
   void note_link(const LinkReport& link);
   void note_prior(const PriorReport& prior);
+  void note_landmark(const LandmarkReport& landmark);
   void note_removed();
   void write_results(bool kept);
   bool in_graph(Id id) const;
@@ -139,7 +150,10 @@ class CAIRN_API PolicySession final : public LineSession {
   std::optional<Id> first_, newest_, before_;  ///< that the policy has
   bool open_ = false, finished_ = false, converged_ = true;
   std::optional<Measured> measured_;
-  std::vector<Factor> priors_;        ///< of the open pose
+  std::vector<Factor> priors_;                     ///< of the open pose
+  std::vector<LandmarkObservation> observations_;  ///< likewise
+  /// Those that were declared, or are on the map.
+  std::unordered_map<Id, std::shared_ptr<const VariableType>> landmarks_;
   bool asked_place_ = false;          ///< LOCATE, for the open pose
   std::string asked_;                 ///< MATCH …, while nothing came in answer
   IdRuns arrived_;                    ///< all poses that ever came

@@ -47,6 +47,25 @@ struct PriorReport {
   LinkVerdict verdict = LinkVerdict::uninformative;
 };
 
+/// The outcome of what a pose has measured of a landmark.
+struct LandmarkReport {
+  Id pose = 0, landmark = 0;
+  bool added = false;  ///< the landmark is in the graph with it, and was not before
+  /// ½ ln |I + J Σ Jᵀ| with the joint covariance Σ of pose and landmark, given what was used before
+  /// it [nats]; of a landmark that is not in the graph infinite.
+  double gain = 0.0;
+  double innovation = 0.0;  ///< squared Mahalanobis distance from what was expected
+  /// `linked`: it is in the graph. `unmatched`: the landmark is not in the graph, since the pose
+  /// was not kept, or since this alone does not determine where the landmark is.
+  LinkVerdict verdict = LinkVerdict::unmatched;
+};
+
+/// What is measured of a landmark from one pose: factors on the two.
+struct LandmarkObservation {
+  Variable landmark;  ///< without a state: where the first factor that is used puts it
+  std::vector<Factor> factors;
+};
+
 /// Seconds that a pose took, without the matching itself.
 struct PolicySeconds {
   double total = 0.0;
@@ -68,6 +87,7 @@ struct PoseReport {
   double most_gain = 0.0;           ///< expected of those that were not proposed, at most [nats]
   std::vector<LinkReport> links;    ///< also earlier ones that had been waiting
   std::vector<PriorReport> priors;  ///< likewise
+  std::vector<LandmarkReport> landmarks;
   int removed = 0;  ///< poses that left the graph with it: see `PosePolicy::removed`
   PolicySeconds seconds;
   std::vector<std::string> notes;
@@ -114,6 +134,15 @@ class CAIRN_API PosePolicy : public Component {
   /// `Error` (input) for a factor that is not on the newest pose alone, or while it is unknown
   /// where the trajectory is on a map; (usage) unless a policy overrides it.
   virtual PriorReport offer_prior(const Factor& measured);
+  /// What the newest pose measures of a landmark, a point of any type that is placed in the plane
+  /// or in space as the poses are. It is judged when the pose ends, with all others of the pose and
+  /// after its links: those of landmarks that are in the graph are used, the most informative
+  /// first, as long as the information gain of one exceeds a threshold, and the pose is kept then.
+  /// If the pose is kept, for whatever reason, landmarks that it sees for the first time are added.
+  /// Throws `Error` (input) for a factor that is not on the newest pose and this landmark, for a
+  /// landmark that is fixed, or of another type than before, or while it is unknown where the
+  /// trajectory is on a map; (usage) unless a policy overrides it.
+  virtual void offer_landmark(const LandmarkObservation& observation);
   /// Takes a link back that was false: the graph is as if there had never been one between these
   /// two poses, and so is what was learnt from it; which poses are kept stays as it was decided. At
   /// any time; one that waits waits no more. False if there is no such link. Throws `Error`
@@ -134,7 +163,9 @@ class CAIRN_API PosePolicy : public Component {
   /// Poses that were kept, and have left with the latest `end_pose` or `finish`: factors between
   /// others have taken their place. None, unless a policy bounds the number of poses that it keeps.
   virtual std::vector<Id> removed() const { return {}; }
-  /// How many factors there are between them; the estimator need not have all of them yet.
+  /// The landmarks that are in the graph, in the order in which they were added.
+  virtual std::vector<Id> landmarks() const { return {}; }
+  /// How many factors there are between all of these; the estimator need not have all of them yet.
   virtual int factor_count() const = 0;
   /// The newest pose as it is estimated, kept or not.
   virtual std::vector<double> newest_state() const = 0;
@@ -165,10 +196,17 @@ class CAIRN_API OptionFinder {
 
 /// One pose, from `add_pose` to `end_pose`: what the policy proposes is matched by `registration`,
 /// which is also asked to recognise a place while it is unknown where the trajectory is on a map.
-/// `priors` are absolute measurements of the pose; they are not used while that is unknown.
+/// `priors` are absolute measurements of the pose, `observations` what it measures of landmarks;
+/// they are not used while that is unknown.
 CAIRN_API PoseReport process_pose(const Variable& pose, std::span<const Factor> odometry,
                                   PosePolicy& policy, Registration& registration,
-                                  std::span<const Factor> priors = {});
+                                  std::span<const Factor> priors = {},
+                                  std::span<const LandmarkObservation> observations = {});
+
+/// What a pose of a recorded trajectory (`pose_chain`) measures of landmarks, one after the other;
+/// without their recorded states, but for those that are fixed.
+CAIRN_API std::vector<LandmarkObservation> observations_of(const Graph& recording,
+                                                           const Arrival& arrival);
 
 /// Feeds the first poses of a recording to a policy, matching by `registration`. `each` is called
 /// for every pose, and stops the run by returning false. The policy is finished at the end; false

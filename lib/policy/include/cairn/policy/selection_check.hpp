@@ -48,10 +48,12 @@ class CAIRN_API SelectionCheck {
 
   std::int64_t poses_ = 0, kept_ = 0;
   std::int64_t kept_by_loop_ = 0, kept_alone_ = 0;  ///< of those kept
-  std::int64_t steps_ = 0;                          ///< poses kept for their information gain
-  double gain_of_steps_ = 0.0;                      ///< sum over these [nats]
-  std::int64_t candidates_ = 0;                     ///< besides the pose before
-  double most_gain_ = 0.0;  ///< expected of a pair that was not proposed [nats]
+  std::int64_t kept_by_landmark_ = 0;               ///< likewise
+  double gain_of_landmarks_ = 0.0;  ///< sum over the most informative of each [nats]
+  std::int64_t steps_ = 0;          ///< poses kept for their information gain
+  double gain_of_steps_ = 0.0;      ///< sum over these [nats]
+  std::int64_t candidates_ = 0;     ///< besides the pose before
+  double most_gain_ = 0.0;          ///< expected of a pair that was not proposed [nats]
   std::int64_t proposed_ = 0, matched_ = 0, linked_ = 0;
   std::int64_t uninformative_ = 0, inconsistent_ = 0;
   double most_uninformative_ = 0.0;  ///< [nats]

@@ -1,0 +1,312 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Landmarks that are seen from the poses of a compact graph.
+#include "landmarks.hpp"
+
+#include <algorithm>
+#include <cstddef>
+#include <limits>
+#include <memory>
+#include <string>
+#include <unordered_map>
+#include <utility>
+
+#include <fmt/core.h>
+
+#include "cairn/geometry/pose.hpp"
+#include "cairn/runtime/error.hpp"
+#include "cairn/runtime/timed.hpp"
+#include "cairn/update/graph_update.hpp"
+#include "compact_graph.hpp"
+#include "compact_pose.hpp"
+#include "dense/cholesky.hpp"
+
+namespace cairn::compact {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+[[noreturn]] void refuse(const std::string& message) { throw Error(ErrorCode::input, message); }
+
+/// The state of the landmarks and the pose as a Kalman filter has it: N(mean, covariance) of what
+/// they are away from where the observations were linearised.
+class LocalFilter {
+ public:
+  LocalFilter(std::span<const int> landmark_sizes, MatrixXd covariance)
+      : covariance_(std::move(covariance)), mean_(VectorXd::Zero(covariance_.rows())) {
+    Eigen::Index at = 0;
+    for (const int size : landmark_sizes) {
+      offset_.push_back(at);
+      at += size;
+    }
+    pose_ = at;
+  }
+
+  MeasuredFit fit(const ObservationRows& observation) const {
+    const MatrixXd SJ = cross(observation);
+    MatrixXd J(observation.e.size(), observation.J_pose.cols() + observation.J_landmark.cols());
+    J << observation.J_pose, observation.J_landmark;
+    return compare(residual(observation), rows_of(observation, SJ), J);
+  }
+
+  void use(const ObservationRows& observation) {
+    const MatrixXd SJ = cross(observation);
+    MatrixXd V = rows_of(observation, SJ);
+    V.diagonal().array() += 1.0;
+    const Eigen::LLT<MatrixXd> llt(V);
+    mean_ -= SJ * llt.solve(residual(observation));
+    covariance_ -= SJ * llt.solve(MatrixXd(SJ.transpose()));
+  }
+
+ private:
+  /// Σ Jᵀ
+  MatrixXd cross(const ObservationRows& s) const {
+    return covariance_.middleCols(pose_, s.J_pose.cols()) * s.J_pose.transpose() +
+           covariance_.middleCols(offset_[s.landmark], s.J_landmark.cols()) *
+               s.J_landmark.transpose();
+  }
+  /// J times that.
+  MatrixXd rows_of(const ObservationRows& s, const MatrixXd& SJ) const {
+    return s.J_pose * SJ.middleRows(pose_, s.J_pose.cols()) +
+           s.J_landmark * SJ.middleRows(offset_[s.landmark], s.J_landmark.cols());
+  }
+  VectorXd residual(const ObservationRows& s) const {
+    return s.e + s.J_pose * mean_.segment(pose_, s.J_pose.cols()) +
+           s.J_landmark * mean_.segment(offset_[s.landmark], s.J_landmark.cols());
+  }
+
+  std::vector<Eigen::Index> offset_;
+  Eigen::Index pose_ = 0;
+  MatrixXd covariance_;
+  VectorXd mean_;
+};
+
+}  // namespace
+
+std::vector<ObservationFit> choose_observations(
+    std::span<const ObservationRows> observations, std::span<const int> landmark_sizes,
+    MatrixXd covariance, double least_gain, const std::function<bool(const MeasuredFit&)>& passes) {
+  LocalFilter filter(landmark_sizes, std::move(covariance));
+  std::vector<ObservationFit> chosen(observations.size());
+  for (;;) {
+    std::size_t best = observations.size();
+    for (std::size_t k = 0; k < observations.size(); ++k) {
+      ObservationFit& one = chosen[k];
+      if (one.used) continue;
+      one.fit = filter.fit(observations[k]);
+      one.informative = one.fit.gain > least_gain;
+      const bool better = best == observations.size() || one.fit.gain > chosen[best].fit.gain;
+      if (one.informative && better && passes(one.fit)) best = k;
+    }
+    if (best == observations.size()) return chosen;
+    filter.use(observations[best]);
+    chosen[best].used = true;
+  }
+}
+
+// The graph ---------------------------------------------------------------------------------------
+
+const VariableType* CompactGraph::landmark(Id id) const {
+  const auto found = landmark_types_.find(id);
+  return found == landmark_types_.end() ? nullptr : found->second.get();
+}
+
+void CompactGraph::note_landmark(Id id, std::shared_ptr<const VariableType> type) {
+  landmarks_.push_back(id);
+  landmark_types_.emplace(id, std::move(type));
+}
+
+MatrixXd CompactGraph::landmark_covariance(std::span<const Id> landmarks, PolicySeconds& seconds) {
+  const MatrixXd S_nn = newest_covariance(seconds);
+  const Timed timed(seconds.covariances);
+  std::vector<Id> ids(landmarks.begin(), landmarks.end());
+  ids.push_back(kept_[anchor_].id);
+  Eigen::Index last = 0;
+  for (const Id id : landmarks) last += landmark(id)->tangent_size();
+  const Eigen::Index n = group_->tangent_size();
+  MatrixXd joint(last + n, last + n);
+  Eigen::Index column = 0;
+  for (const Id id : landmarks) {
+    const Eigen::Index size = landmark(id)->tangent_size();
+    MatrixXd block(last + n, size);
+    estimator_->covariance_column(id, ids, {block.data(), static_cast<std::size_t>(block.size())});
+    joint.block(0, column, last, size) = block.topRows(last);
+    joint.block(last, column, n, size) = A_ * block.bottomRows(n);
+    joint.block(column, last, size, n) = joint.block(last, column, n, size).transpose();
+    column += size;
+  }
+  joint.bottomRightCorner(n, n) = S_nn;
+  return joint;
+}
+
+void CompactGraph::see(std::vector<Variable> added, std::span<const Factor> factors,
+                       PolicySeconds& seconds) {
+  keep(seconds);
+  std::vector<std::pair<Id, std::shared_ptr<const VariableType>>> landmarks;
+  for (const Variable& landmark : added) landmarks.emplace_back(landmark.id, landmark.type);
+  update(factors, seconds, {}, std::move(added));
+  for (auto& [id, type] : landmarks) note_landmark(id, std::move(type));
+}
+
+void CompactGraph::move_landmarks(const State& move, GraphUpdate& leaving,
+                                  GraphUpdate& coming) const {
+  const Pose by = group_->place(move).at;
+  for (const Id id : landmarks_) {
+    const std::shared_ptr<const VariableType>& type = landmark_types_.at(id);
+    leaving.removed_variables.push_back(id);
+    coming.variables.push_back(
+        {.type = type, .id = id, .state = moved_point(*type, estimator_->state(id), by)});
+  }
+}
+
+// The policy --------------------------------------------------------------------------------------
+
+namespace {
+
+Measured checked(const Factor& factor, Id pose, const VariableType& pose_type,
+                 const Variable& landmark) {
+  if (!factor.type) refuse("a measurement of a landmark without a type");
+  const std::string name =
+      fmt::format("{} of landmark {} from pose {}", factor.type->tag(), landmark.id, pose);
+  const bool from_pose = factor.variables == std::vector<Id>{pose, landmark.id};
+  if (!from_pose && factor.variables != std::vector<Id>{landmark.id, pose})
+    refuse(name + " is not on these two");
+  const VariableType* types[] = {&pose_type, landmark.type.get()};
+  if (!from_pose) std::swap(types[0], types[1]);
+  return {factor, types, name};
+}
+
+/// At the states of pose and landmark: all factors of an observation, one below the other.
+ObservationRows linearized(std::span<const Measured> factors, Id pose, const State& x,
+                           const double* landmark) {
+  ObservationRows all;
+  for (const Measured& factor : factors) {
+    const bool from_pose = factor.factor().variables.front() == pose;
+    const double* const states[] = {from_pose ? x.data() : landmark,
+                                    from_pose ? landmark : x.data()};
+    const Measured::Linear one = factor.at(states);
+    const MatrixXd &J_pose = one.J[from_pose ? 0 : 1], &J_landmark = one.J[from_pose ? 1 : 0];
+    const Eigen::Index old = all.e.size(), rows = old + one.residual.size();
+    all.e.conservativeResize(rows);
+    all.J_pose.conservativeResize(rows, J_pose.cols());
+    all.J_landmark.conservativeResize(rows, J_landmark.cols());
+    all.e.tail(rows - old) = one.residual;
+    all.J_pose.bottomRows(rows - old) = J_pose;
+    all.J_landmark.bottomRows(rows - old) = J_landmark;
+  }
+  return all;
+}
+
+}  // namespace
+
+void CompactPose::offer_landmark(const LandmarkObservation& observation) {
+  if (!open_) throw Error(ErrorCode::usage, "offer_landmark without a pose");
+  const Variable& landmark = observation.landmark;
+  if (!landmark.type) refuse(fmt::format("landmark {} has no type", landmark.id));
+  const std::string name = fmt::format("{} {}", landmark.type->tag(), landmark.id);
+  if (!graph_.located()) {
+    refuse(
+        "it is not known where the pose is on the map: landmarks are used from the first match "
+        "with it on");
+  }
+  const Placement* placement = landmark.type->placement();
+  if (!is_point(*landmark.type) || placement->dimension() != graph_.group().dimension())
+    refuse(name + " is not a point where the poses are: not a landmark");
+  if (landmark.fixed) refuse(name + " is fixed, and a policy estimates all landmarks");
+  const VariableType* known = graph_.landmark(landmark.id);
+  if (graph_.find(landmark.id) >= 0 || landmark.id == graph_.newest_id() ||
+      (known && known->tag() != landmark.type->tag()))
+    refuse(name + " has the id of something else");
+  Seen seen{.landmark = landmark, .factors = {}};
+  for (const Factor& factor : observation.factors) {
+    seen.factors.push_back(
+        checked(factor, graph_.newest_id(), graph_.group().motions().type(), landmark));
+  }
+  if (!seen.factors.empty()) seen_.push_back(std::move(seen));
+}
+
+/// Those of landmarks in the graph.
+void CompactPose::use_landmarks() {
+  std::vector<std::size_t> known;
+  std::vector<Id> ids;
+  std::vector<int> sizes;
+  std::vector<ObservationRows> rows;
+  for (std::size_t k = 0; k < seen_.size(); ++k) {
+    const Id id = seen_[k].landmark.id;
+    const VariableType* type = graph_.landmark(id);
+    if (!type) continue;
+    auto at = std::ranges::find(ids, id) - ids.begin();
+    if (at == std::ssize(ids)) {
+      ids.push_back(id);
+      sizes.push_back(type->tangent_size());
+    }
+    known.push_back(k);
+    rows.push_back(linearized(seen_[k].factors, graph_.newest_id(), graph_.newest_state(),
+                              graph_.landmark_state(id).data()));
+    rows.back().landmark = static_cast<int>(at);
+  }
+  if (known.empty()) return;
+  const std::vector<ObservationFit> fits = choose_observations(
+      rows, sizes, graph_.landmark_covariance(ids, report_.seconds), landmark_gain_,
+      [&](const MeasuredFit& fit) { return check_->passes(fit.innovation, fit.dof); });
+  std::vector<Factor> used;
+  for (std::size_t k = 0; k < known.size(); ++k) {
+    const Seen& seen = seen_[known[k]];
+    const ObservationFit& fit = fits[k];
+    report_.landmarks.push_back({.pose = report_.id,
+                                 .landmark = seen.landmark.id,
+                                 .gain = fit.fit.gain,
+                                 .innovation = fit.fit.innovation,
+                                 .verdict = fit.used          ? LinkVerdict::linked
+                                            : fit.informative ? LinkVerdict::inconsistent
+                                                              : LinkVerdict::uninformative});
+    if (!fit.used) continue;
+    for (const Measured& factor : seen.factors) used.push_back(factor.factor());
+  }
+  if (!used.empty()) graph_.see({}, used, report_.seconds);
+}
+
+/// Where the factors of an observation put a landmark that is new, or it was given; nothing: they
+/// do not determine it.
+std::optional<std::vector<double>> CompactPose::place(const Seen& seen) const {
+  GraphUpdate trial;
+  trial.variables.push_back(seen.landmark);
+  for (const Measured& factor : seen.factors) trial.factors.push_back(factor.factor());
+  const auto pose = graph_.group().view(graph_.newest_state());
+  const std::vector<int> unplaced =
+      place_variables(trial, [&](Id) { return std::span<const double>(pose); });
+  if (!unplaced.empty()) return std::nullopt;
+  std::vector<double>& state = trial.variables.front().state;
+  const ObservationRows rows =
+      linearized(seen.factors, graph_.newest_id(), graph_.newest_state(), state.data());
+  if (rank(rows.J_landmark) < seen.landmark.type->tangent_size()) return std::nullopt;
+  return std::move(state);
+}
+
+/// Those that the newest pose, which is kept, sees first.
+void CompactPose::add_landmarks() {
+  std::vector<Variable> added;
+  std::vector<Factor> factors;
+  for (const Seen& seen : std::exchange(seen_, {})) {
+    const Id id = seen.landmark.id;
+    const bool twice = std::ranges::find(added, id, &Variable::id) != added.end();
+    if (!twice && graph_.landmark(id)) continue;
+    LandmarkReport report{
+        .pose = report_.id, .landmark = id, .gain = std::numeric_limits<double>::infinity()};
+    std::optional<std::vector<double>> state;
+    if (graph_.newest_kept() && !twice) state = place(seen);
+    if (state || twice) {
+      report.verdict = LinkVerdict::linked;
+      report.added = !twice;
+      for (const Measured& factor : seen.factors) factors.push_back(factor.factor());
+    }
+    if (state) {
+      added.push_back(seen.landmark);
+      added.back().state = *std::move(state);
+    }
+    report_.landmarks.push_back(report);
+  }
+  if (!factors.empty()) graph_.see(std::move(added), factors, report_.seconds);
+}
+
+}  // namespace cairn::compact

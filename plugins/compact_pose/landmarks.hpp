@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <functional>
+#include <span>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "measured.hpp"
+
+namespace cairn::compact {
+
+/// What a pose measures of a landmark in the graph, linearised: e + J_p δ_pose + J_l δ_landmark.
+struct ObservationRows {
+  Eigen::VectorXd e;
+  Eigen::MatrixXd J_pose, J_landmark;
+  int landmark = 0;  ///< in the joint covariance
+};
+
+/// What came of it.
+struct ObservationFit {
+  MeasuredFit fit;
+  bool informative = false;  ///< its information gain exceeds the threshold
+  bool used = false;
+};
+
+/// Chooses among the observations of a pose, with the joint covariance Σ of the landmarks, in order
+/// and of so many numbers each, and after them the pose: the one whose information gain
+/// ½ ln |I + J Σ Jᵀ| is largest, then, with the mean and Σ that it leaves (as of a Kalman filter),
+/// the next, until none of those that `passes` allows gains more than `least_gain` [nats]. The
+/// gain of one is never increased by another.
+std::vector<ObservationFit> choose_observations(
+    std::span<const ObservationRows> observations, std::span<const int> landmark_sizes,
+    Eigen::MatrixXd covariance, double least_gain,
+    const std::function<bool(const MeasuredFit&)>& passes);
+
+}  // namespace cairn::compact
