@@ -238,14 +238,10 @@ Command add_new_plugin(ArgumentParser program) {
       .type_name("NAME")
       .required();
   constexpr std::array<const char*, kKinds.size()> help{
-      "a measurement between variables",
-      "a type of states, with a factor on it",
-      "a robust loss, with an option",
-      "a solver of H x = g",
-      "minimises chi2",
-      "keeps an estimate up to date",
-      "reads and writes graphs",
-      "a choice of the poses and links that are kept"};
+      "a measurement between variables", "a type of states, with a factor on it",
+      "a robust loss, with an option",   "a solver of H x = g",
+      "a way to the minimum of chi2",    "an estimate that follows a growing graph",
+      "a text format, read and written", "a choice of the poses and links that are kept"};
   for (std::size_t k = 0; k < kKinds.size(); ++k)
     cli.add_flag(fmt::format("--{}", kKinds[k].option), chosen->kinds[k], help[k]);
   cli.add_option("--folder", chosen->folder, "where it is written; must not exist [NAME]")
