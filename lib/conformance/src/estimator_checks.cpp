@@ -107,11 +107,10 @@ class DenseBlocks {
 
 void compare_covariances(Estimator& estimator, const DenseBlocks& dense, Id newest,
                          Checker& check) {
-  for (const auto& [a, b] : {std::pair<Id, Id>{1, 1},
-                             {newest / 2, newest / 2},
-                             {newest, newest},
-                             {newest / 2, newest},
-                             {newest, 1}}) {
+  const std::array<std::pair<Id, Id>, 5> pairs{
+      {{1, 1}, {newest / 2, newest / 2}, {newest, newest}, {newest / 2, newest}, {newest, 1}}};
+  for (const auto& pair : pairs) {
+    const Id a = pair.first, b = pair.second;
     Guarded block("block", 9);
     const bool known = check.call("covariance", {&block},
                                   [&] { return estimator.covariance(a, b, block.span()); });

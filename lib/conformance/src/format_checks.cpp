@@ -22,6 +22,8 @@
 namespace cairn::conformance {
 namespace {
 
+using std::literals::operator""sv;
+
 struct NamedGraph {
   std::string name;
   Graph graph;
@@ -142,7 +144,7 @@ void check_round_trip(const Subject& subject, Checker& check) {
 
 /// What stands in place of others: what numbers, lines and words are made of, and what they are
 /// not.
-constexpr std::string_view kBytes("0123456789.-+e \t\n\r#n:abXYZ\"\xff\x01\0", 33);
+constexpr std::string_view kBytes = "0123456789.-+e \t\n\r#n:abXYZ\"\xff\x01\0"sv;
 
 /// What is no graph is refused with an `Error`, and half a file is read or refused.
 void check_bad_texts(const Subject& subject, Checker& check) {
