@@ -107,6 +107,11 @@ bool names_thresholds(const CompactOptions& options, const ComponentSpec& policy
          policy.values.contains("loop_gain") || policy.values.contains("pose_gain");
 }
 
+/// Other policies are run with the options that are given.
+bool finds_thresholds(const ComponentSpec& policy, Registry& registry) {
+  return query<OptionFinder>(*registry.make<PosePolicy>(policy.name)) != nullptr;
+}
+
 /// With fewer loop closures in it, a sample is extended.
 constexpr std::int64_t kLeastLoops = 3;
 
@@ -149,7 +154,8 @@ Job prepare(const CompactOptions& options, const PolicySetting& setting, Results
   const auto emplace = [&](const OptionValues& values) {
     for (const auto& [name, value] : values) job.policy.values.emplace(name, value);
   };
-  bool automatic = options.automatic || !names_thresholds(options, job.policy);
+  bool automatic = options.automatic || (!names_thresholds(options, job.policy) &&
+                                         finds_thresholds(job.policy, setting.registry));
   if (automatic && !options.automatic && setting.data.loops == 0 && setting.data.observations > 0) {
     automatic = false;
     session.note(
@@ -224,9 +230,10 @@ std::string option_words(const OptionValues& options, const std::string& policy,
 /// A user who asked for few poses and got all of them, or no loop closure, learns why, and what
 /// would help.
 void note_selection(const CompactOptions& options, const CompactOutcome& outcome,
-                    const Session& session) {
+                    Session& session) {
   const PolicyResult& result = outcome.result;
   if (options.strategy != "fpfl" || result.interrupted || !result.located) return;
+  if (!finds_thresholds(parse_component(options.policy), session.registry())) return;
   SelectionCheck check;
   for (const PoseReport& pose : result.poses) check.add(pose);
   const bool automatic = outcome.found.seconds > 0.0;

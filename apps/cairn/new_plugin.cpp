@@ -40,25 +40,38 @@ struct Kind {
   const char* folder;
   const char* description;
   const char* offers;
-  const char* tag;  // of types; empty for a component
-  const char* use;  // a first command
-  bool example;     // a graph comes with it
+  const char* tag;        // of types; empty for a component
+  const char* use;        // a first command
+  const char* libraries;  // that it needs besides the core; "" for none
+  bool example = false;   // a graph comes with it
 };
-constexpr std::array<Kind, 4> kKinds{
+constexpr const char* kSlam = "\n  LIBRARIES cairn::slam";  // lib: updates, motions, formats
+constexpr std::array<Kind, 8> kKinds{
     {{"factor", "factor", "A factor of its own",
       "\"types|@NAME@|measurements of @NAME@\"\n"
       "         \"factor|@TAG@|distance from a pose to a landmark\"",
-      "EDGE_@UPPER@", "cairn optimize example.g2o --plugin build/@NAME@.so", true},
+      "EDGE_@UPPER@", "cairn optimize example.g2o --plugin build/@NAME@.so", "", true},
      {"variable", "variable", "A variable of its own",
       "\"types|@NAME@|variables of @NAME@\"\n"
       "         \"variable|@TAG@|a heading\"\n"
       "         \"factor|EDGE_PRIOR_@UPPER@|a measured heading\"",
-      "VERTEX_@UPPER@", "cairn optimize example.g2o --plugin build/@NAME@.so", true},
+      "VERTEX_@UPPER@", "cairn optimize example.g2o --plugin build/@NAME@.so", "", true},
      {"loss", "loss", "A robust loss of its own", "\"loss|@NAME@|a robust loss\"", "",
-      "cairn optimize @manhattan --loss @NAME@:scale=2 --plugin build/@NAME@.so", false},
+      "cairn optimize @manhattan --loss @NAME@:scale=2 --plugin build/@NAME@.so", ""},
      {"linear-solver", "linear_solver", "A linear solver of its own",
       "\"linear_solver|@NAME@|a dense factorisation\"", "",
-      "cairn optimize @ring --linear-solver @NAME@ --plugin build/@NAME@.so", false}}};
+      "cairn optimize @ring --linear-solver @NAME@ --plugin build/@NAME@.so", ""},
+     {"optimizer", "optimizer", "An optimizer of its own",
+      "\"optimizer|@NAME@|Gauss-Newton with limited steps\"", "",
+      "cairn optimize @ring --optimizer @NAME@ --plugin build/@NAME@.so", ""},
+     {"estimator", "estimator", "An online estimator of its own",
+      "\"estimator|@NAME@|optimises everything again\"", "",
+      "cairn replay @ring --estimator @NAME@ --plugin build/@NAME@.so", kSlam},
+     {"format", "format", "A file format of its own", "\"format|@NAME@|one record a line\"", "",
+      "cairn convert @ring ring.@NAME@ --plugin build/@NAME@.so", kSlam},
+     {"policy", "policy", "A pose policy of its own",
+      "\"pose_policy|@NAME@|a pose every so many metres\"", "",
+      "cairn compact @ring --policy @NAME@:distance=2 --plugin build/@NAME@.so", kSlam}}};
 
 /// Where the templates are, from the program's own place: PREFIX/bin/cairn.
 fs::path template_folder() {
@@ -108,6 +121,7 @@ using Words = std::vector<std::pair<std::string, std::string>>;
 Words words_for(const Kind& kind, const std::string& name) {
   return {{"@DESCRIPTION@", kind.description},
           {"@OFFERS@", kind.offers},
+          {"@LIBRARIES@", kind.libraries},
           {"@USE@", kind.use},
           {"@TAG@", kind.tag},
           {"@VERSION@", CAIRN_VERSION},
@@ -225,7 +239,9 @@ Command add_new_plugin(ArgumentParser program) {
       .required();
   constexpr std::array<const char*, kKinds.size()> help{
       "a measurement between variables", "a type of states, with a factor on it",
-      "a robust loss, with an option", "a solver of H x = g"};
+      "a robust loss, with an option",   "a solver of H x = g",
+      "a way to the minimum of chi2",    "an estimate that follows a growing graph",
+      "a text format, read and written", "a choice of the poses and links that are kept"};
   for (std::size_t k = 0; k < kKinds.size(); ++k)
     cli.add_flag(fmt::format("--{}", kKinds[k].option), chosen->kinds[k], help[k]);
   cli.add_option("--folder", chosen->folder, "where it is written; must not exist [NAME]")

@@ -5,7 +5,9 @@
 #include "plugin_check.hpp"
 
 #include <algorithm>
+#include <chrono>
 #include <cstddef>
+#include <cstdlib>
 #include <filesystem>
 #include <optional>
 #include <string_view>
@@ -19,6 +21,7 @@
 #include "cairn/plugin/plugin_search.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
+#include "cairn/runtime/timed.hpp"
 #include "isolated_work.hpp"
 #include "json_report.hpp"
 #include "table.hpp"
@@ -28,8 +31,13 @@ namespace {
 
 namespace fs = std::filesystem;
 namespace json = boost::json;
+using Clock = std::chrono::steady_clock;
 
 constexpr const char* kRegistration = "registration";
+constexpr const char* kEnd = "end";
+/// Seconds that loading a plugin and registering what it offers may take: those of cairn's own need
+/// milliseconds, of which a busy machine makes no second.
+constexpr double kLoadingSeconds = 2.0;
 
 // Results between the processes
 // -------------------------------------------------------------------------
@@ -98,9 +106,20 @@ std::vector<Offer> offers_of(const Registry& registry, const fs::path& file) {
   return own;
 }
 
-/// That everything on offer is registered, and that listings find the plugin.
+/// Has the plugin register the name.
+void ask_for(const Offer& offer, Registry& registry) {
+  if (offer.kind == "variable")
+    registry.variable_type(offer.name);
+  else if (offer.kind == "factor")
+    registry.factor_type(offer.name);
+  else
+    registry.options(offer.kind, offer.name);
+}
+
+/// That everything on offer is registered, and that listings find the plugin. It is being loaded
+/// since `begin`.
 ConformanceResult check_registration(const fs::path& file, const std::vector<Offer>& offers,
-                                     Registry& registry) {
+                                     Registry& registry, Clock::time_point begin) {
   ConformanceResult result;
   result.checked = {"plugin", offers.empty() ? file.stem().string() : offers.front().plugin,
                     kRegistration};
@@ -122,18 +141,48 @@ ConformanceResult check_registration(const fs::path& file, const std::vector<Off
   });
   for (const Offer& offer : offers) {
     check("what the manifest declares is registered", fmt::format("{} {}", offer.kind, offer.name),
-          [&] {
-            if (offer.kind == "variable")
-              registry.variable_type(offer.name);
-            else if (offer.kind == "factor")
-              registry.factor_type(offer.name);
-            else
-              registry.options(offer.kind, offer.name);
-          });
+          [&] { ask_for(offer, registry); });
   }
+  check("it is loaded quickly", "", [&] {
+    const double seconds = seconds_since(begin);
+    if (seconds <= kLoadingSeconds) return;
+    throw Error(ErrorCode::plugin,
+                fmt::format("that takes {:.2g} s, and every command that asks for one of its names "
+                            "waits for it",
+                            seconds));
+  });
   if (!registry.unoptimized().empty())
     result.notes.emplace_back("compiled without optimisation: right, but many times slower");
   return result;
+}
+
+PluginSearch search_of(const fs::path& file, const CommonOptions& common) {
+  PluginSearch search{{file}, false, false, true};
+  search.files.insert(search.files.end(), common.plugins.begin(), common.plugins.end());
+  return search;
+}
+
+/// Loads the plugin, has everything registered, and ends the process as programs do: by `exit`,
+/// which destroys what is static in the plugin.
+void load_and_exit(const fs::path& file, const CommonOptions& common,
+                   const IsolatedWork::Sender& sender) {
+  static const IsolatedWork::Sender* last = nullptr;
+  last = &sender;
+  // What is registered first is called last: what was static in the plugin is gone then, and what
+  // is static in this program, which the child has only a copy of, stays.
+  const auto finished = [] {
+    last->send("");
+    std::_Exit(0);
+  };
+  if (std::atexit(finished) != 0) std::_Exit(0);
+  {
+    sender.calling("loading", "");
+    Registry registry(search_of(file, common));
+    for (const Offer& offer : offers_of(registry, file)) ask_for(offer, registry);
+    sender.calling("the destructor of its types", "");
+  }
+  sender.calling("exit", "");
+  std::exit(0);
 }
 
 struct Child {
@@ -144,8 +193,8 @@ struct Child {
 
   void run(const IsolatedWork::Sender& sender) const {
     sender.calling("loading", "");
-    PluginSearch search{{file}, false, false, true};
-    search.files.insert(search.files.end(), common.plugins.begin(), common.plugins.end());
+    const Clock::time_point begin = Clock::now();
+    const PluginSearch search = search_of(file, common);
     std::optional<Registry> registry;
     ConformanceResult registration;
     std::vector<Offer> offers;
@@ -155,7 +204,7 @@ struct Child {
       for (const std::string& types : common.types)
         registry->set_type_options(parse_component(types));
       offers = offers_of(*registry, file);
-      registration = check_registration(file, offers, *registry);
+      registration = check_registration(file, offers, *registry, begin);
     } catch (const Error& error) {
       registration.checked = {"plugin", file.stem().string(), kRegistration};
       registration.checks = 1;
@@ -192,6 +241,7 @@ class FileCheck {
     session_.print(printable(file_) + "\n");
     while (run_child()) {
     }
+    if (results_.front().ok()) run_end();
     std::int64_t checks = 0, bad = 0;
     for (const ConformanceResult& result : results_) {
       checks += result.checks;
@@ -261,6 +311,21 @@ class FileCheck {
       add(std::move(skipped));
     }
     return next_ < cases_.size();
+  }
+
+  /// That the process can end as it should, once the plugin is loaded.
+  void run_end() {
+    const fs::path path(file_);
+    IsolatedWork work(
+        [&](const IsolatedWork::Sender& sender) { load_and_exit(path, session_.common, sender); });
+    while (work.next_line(options_.seconds)) {
+    }
+    ConformanceResult result;
+    const std::string failure = work.failure();
+    if (!failure.empty()) result = failed(work, failure, false);
+    result.checked = {"plugin", results_.front().checked.name, kEnd};
+    result.checks = 1;
+    add(std::move(result));
   }
 
   /// The finding of a child that ended early.

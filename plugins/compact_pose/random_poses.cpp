@@ -130,6 +130,10 @@ std::optional<MatchProposal> RandomPoses::next_match() {
 }
 
 LinkReport RandomPoses::offer(Id other, std::span<const Factor> measured) {
+  if (graph_.empty() || graph_.find(other) < 0 || other == graph_.newest_id()) {
+    throw Error(ErrorCode::input,
+                "pose " + std::to_string(other) + " is not another pose of the compact graph");
+  }
   std::erase(to_match_, other);
   LinkReport link{.earlier = other, .later = report_.id};
   if (!measured.empty()) {

@@ -303,6 +303,12 @@ TEST_F(Compact, SaysWhatIsWrongAndWhatWouldWork) {
               HasSubstr("standard output"));
 }
 
+TEST_F(Compact, RunsAPolicyThatFindsNoOptionsWithThoseThatAreGiven) {
+  const boost::json::value report =
+      report_of({"compact", kWorld, "--policy", "random_poses:poses=10,loops=2"});
+  EXPECT_EQ(report.at("poses").at("kept").as_int64(), 10);
+}
+
 TEST_F(Compact, SaysWhatWouldHelpWhereTheSelectionIsOfNoUse) {
   const Arguments sensor{"compact", kWorld, "--range", "4", "--angle", "3.15"};
   const auto run = [&](Arguments more) {

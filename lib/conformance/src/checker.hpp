@@ -74,13 +74,18 @@ class Checker {
   /// Replaces the description of the input.
   void describe(std::string input) { input_ = std::move(input); }
 
+  /// Before code of the plugin runs that is called otherwise than by `call`, such as a destructor.
+  void announce(std::string_view callback) const {
+    if (observer_) observer_->on_call(callback, input_);
+  }
+
   /// Calls the plugin's function `callback`, and returns what it returns. What it throws, and what
   /// it writes outside of the arrays that it is given, are findings; after an exception the sample
   /// is abandoned.
   template <class Work>
   decltype(auto) call(std::string_view callback, std::initializer_list<const Guarded*> arrays,
                       const Work& work) {
-    if (observer_) observer_->on_call(callback, input_);
+    announce(callback);
     const auto examine = [&] {
       for (const Guarded* array : arrays) examine_array(callback, *array);
     };

@@ -2,21 +2,19 @@
 // Laws of factor types.
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <chrono>
 #include <cmath>
 #include <cstdint>
-#include <exception>
 #include <limits>
 #include <map>
 #include <memory>
 #include <optional>
-#include <thread>
 #include <utility>
 
 #include <Eigen/Core>
 
 #include "cairn/evaluation/check_factor.hpp"
+#include "repetition.hpp"
 #include "samples.hpp"
 
 namespace cairn::conformance {
@@ -533,71 +531,35 @@ void check_propagate(const Subject& subject, Checker& check) {
   if (!some) check.note("it determines no variable from the others");
 }
 
-/// Evaluates every factor `rounds` times; the bits of the last round, and whether all were equal.
-struct Repeated {
-  std::vector<double> values;
-  bool equal = true;
-  std::exception_ptr thrown;
-
-  void run(const FactorSamples& type, const std::vector<FactorSample>& factors, int rounds) {
-    try {
-      for (int round = 0; round < rounds; ++round) {
-        std::vector<double> now;
-        for (const FactorSample& s : factors) {
-          std::vector<const double*> x;
-          std::vector<std::vector<double>> J;
-          std::vector<double*> J_pointers;
-          for (const State& state : s.x) x.push_back(state.data());
-          for (std::size_t v = 0; v < type.arity(); ++v)
-            J.emplace_back(type.residual_size() * type.tangent(v));
-          for (auto& one : J) J_pointers.push_back(one.data());
-          std::vector<double> r(type.residual_size());
-          type.type().evaluate(x.data(), s.z.data(), s.U.data(), r.data(), J_pointers.data());
-          now.insert(now.end(), r.begin(), r.end());
-          for (const auto& one : J) now.insert(now.end(), one.begin(), one.end());
-        }
-        if (round > 0) equal = equal && same(now, values);
-        values = std::move(now);
-      }
-    } catch (...) {
-      thrown = std::current_exception();
-    }
+/// Residual and Jacobians of every factor, as they come.
+State evaluate_all(const FactorSamples& samples, const std::vector<FactorSample>& factors) {
+  State all;
+  for (const FactorSample& s : factors) {
+    std::vector<const double*> x;
+    State r(samples.residual_size());
+    std::vector<State> J;
+    std::vector<double*> J_pointers;
+    for (const State& state : s.x) x.push_back(state.data());
+    for (std::size_t v = 0; v < samples.arity(); ++v)
+      J.emplace_back(samples.residual_size() * samples.tangent(v));
+    for (State& one : J) J_pointers.push_back(one.data());
+    samples.type().evaluate(x.data(), s.z.data(), s.U.data(), r.data(), J_pointers.data());
+    all.insert(all.end(), r.begin(), r.end());
+    for (const State& one : J) all.insert(all.end(), one.begin(), one.end());
   }
-  static bool same(const std::vector<double>& a, const std::vector<double>& b) {
-    return std::ranges::equal(a, b, [](double x, double y) {
-      return std::bit_cast<std::uint64_t>(x) == std::bit_cast<std::uint64_t>(y);
-    });
-  }
-};
+  return all;
+}
 
-void check_threads(const Subject& subject, Checker& check) {
-  FactorSamples samples(subject, check);
-  if (!samples.fits()) return check.note("its sizes do not fit its variables (see sizes)");
-  check.sample("", [&] {
-    const std::vector<FactorSample> factors =
-        some_factors(samples, static_cast<std::size_t>(check.options().samples));
-    check.describe(fmt::format("{} factors at a time", factors.size()));
-    std::array<Repeated, 3> runs;  // alone, and two beside each other
-    check.call("evaluate", [&] {
-      runs[0].run(samples, factors, 2);
-      if (runs[0].thrown) std::rethrow_exception(runs[0].thrown);
-    });
-    check.call("evaluate", [&] {
-      {
-        std::jthread first([&] { runs[1].run(samples, factors, 50); });
-        std::jthread second([&] { runs[2].run(samples, factors, 50); });
-      }
-      for (const Repeated& run : runs) {
-        if (run.thrown) std::rethrow_exception(run.thrown);
-      }
-    });
-    check.expect(runs[0].equal, "evaluate gives the same bits when it is repeated",
-                 [] { return std::string("they differ, on one thread"); });
-    check.expect(runs[1].equal && runs[2].equal && Repeated::same(runs[1].values, runs[0].values) &&
-                     Repeated::same(runs[2].values, runs[0].values),
-                 "evaluate gives the same bits on two threads",
-                 [] { return std::string("they differ from those of one thread"); });
-  });
+Repetition factor_uses(const Subject& subject, Checker& check) {
+  const auto samples = std::make_shared<FactorSamples>(subject, check);
+  if (!samples->fits() || !samples->sample(false)) return {};
+  // All threads use the type's one object, each with factors of its own.
+  return {"evaluate", 100, [samples, &check](std::uint64_t) {
+            return [samples, factors = some_factors(
+                                 *samples, static_cast<std::size_t>(check.options().samples))] {
+              return evaluate_all(*samples, factors);
+            };
+          }};
 }
 
 // Time
@@ -648,13 +610,14 @@ void note_time(const Subject& subject, Checker& check) {
 }  // namespace
 
 std::span<const Group> factor_groups() {
-  static constexpr std::array<Group, 8> groups{{{"sizes", check_sizes},
+  static constexpr std::array<Group, 9> groups{{{"sizes", check_sizes},
                                                 {"measurement", check_measurements},
                                                 {"residual", check_residual},
                                                 {"Jacobians", check_jacobians},
                                                 {"pool", check_pools},
                                                 {"propagate", check_propagate},
-                                                {"threads", check_threads},
+                                                {"memory", memory_group<factor_uses>},
+                                                {"threads", threads_group<factor_uses>},
                                                 {"time", note_time}}};
   return groups;
 }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Formats, which read what they write, and generators, which give the same graph for the same seed.
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <memory>
@@ -11,13 +12,17 @@
 
 #include "cairn/io/format.hpp"
 #include "cairn/io/generator.hpp"
+#include "cairn/io/random_numbers.hpp"
 #include "cairn/runtime/error.hpp"
 #include "checker.hpp"
+#include "repetition.hpp"
 #include "sample_graph.hpp"
 #include "samples.hpp"
 
 namespace cairn::conformance {
 namespace {
+
+using std::literals::operator""sv;
 
 struct NamedGraph {
   std::string name;
@@ -62,6 +67,24 @@ int poses_of(const Graph& graph) {
   return count;
 }
 
+/// Where a format keeps ids: the same variables have them, and the same factors are on them.
+void compare_by_id(const Graph& before, const Graph& after, Checker& check) {
+  bool same = before.factor_count() == after.factor_count();
+  for (int f = 0; same && f < before.factor_count(); ++f) {
+    const Factor a = before.factor(f), b = after.factor(f);
+    const bool ends = a.variables == b.variables && a.type->tag() == b.type->tag();
+    double off = 0.0;
+    for (std::size_t k = 0; ends && k < a.measurement.size(); ++k)
+      off = std::max(off, std::abs(a.measurement[k] - b.measurement[k]));
+    same = check.expect(ends && off <= 1e-5 * (1.0 + norm(a.measurement)),
+                        "read finds the factors that were written", [&] {
+                          return fmt::format("{} with {} instead of {} with {}",
+                                             after.describe_factor(f), text_of(b.measurement),
+                                             before.describe_factor(f), text_of(a.measurement));
+                        });
+  }
+}
+
 void compare(const Graph& before, const Graph& after, Checker& check) {
   if (after.factor_count() == 0 && after.variable_count() != before.variable_count()) {
     check.expect(after.variable_count() == poses_of(before),
@@ -85,13 +108,14 @@ void compare(const Graph& before, const Graph& after, Checker& check) {
   check.expect(
       after.factor_count() == before.factor_count(), "read finds as many factors as were written",
       [&] { return fmt::format("{} of {}", after.factor_count(), before.factor_count()); });
+  compare_by_id(before, after, check);
   const double here = chi2(before), there = chi2(after);
   check.within(std::abs(here - there), 1e-4 * (1.0 + here),
                "chi2 is that of the graph that was written");
 }
 
 void check_round_trip(const Subject& subject, Checker& check) {
-  const auto format = subject.registry.make<Format>(subject.name);
+  const auto format = made<Format>(subject, check);
   const bool reads = check.call("can_read", [&] { return format->can_read(); }),
              writes = check.call("can_write", [&] { return format->can_write(); });
   check.expect(reads || writes, "it reads or writes", [] { return std::string("neither"); });
@@ -118,9 +142,13 @@ void check_round_trip(const Subject& subject, Checker& check) {
   if (!some) check.note("it expresses none of the graphs that could be made here");
 }
 
+/// What stands in place of others: what numbers, lines and words are made of, and what they are
+/// not.
+constexpr std::string_view kBytes = "0123456789.-+e \t\n\r#n:abXYZ\"\xff\x01\0"sv;
+
 /// What is no graph is refused with an `Error`, and half a file is read or refused.
 void check_bad_texts(const Subject& subject, Checker& check) {
-  const auto format = subject.registry.make<Format>(subject.name);
+  const auto format = made<Format>(subject, check);
   if (!format->can_read()) return check.note("it reads nothing");
   const auto reads = [&](std::string_view text) {
     return check.call("read", [&] {
@@ -143,6 +171,7 @@ void check_bad_texts(const Subject& subject, Checker& check) {
     });
   }
   if (!format->can_write()) return;
+  RandomNumbers random(RandomNumbers::mixed(check.options().seed + 71));
   for (const NamedGraph& sample : graphs_to_write(subject.registry, check.options().seed)) {
     check.sample("the beginning of " + sample.name, [&] {
       const std::optional<std::string> text = written(*format, sample.graph, check);
@@ -150,7 +179,44 @@ void check_bad_texts(const Subject& subject, Checker& check) {
       for (std::size_t k = 1; k < 12; ++k)
         static_cast<void>(reads(std::string_view(*text).substr(0, k * text->size() / 12)));
     });
+    check.sample(sample.name + ", bytes of it changed", [&] {
+      const std::optional<std::string> text = written(*format, sample.graph, check);
+      if (!text || text->empty()) return;
+      // A few kilobytes are enough to meet every kind of line, and quick.
+      const std::string beginning =
+          text->substr(0, text->find('\n', std::min<std::size_t>(text->size() - 1, 4000)));
+      for (int k = 0; k < 10 * check.options().samples; ++k) {
+        std::string changed = beginning;
+        for (std::size_t bytes = 1 + random.below(3); bytes-- > 0;)
+          changed[random.below(changed.size())] = kBytes[random.below(kBytes.size())];
+        static_cast<void>(reads(changed));
+      }
+    });
   }
+}
+
+/// Written and read again, the first graph that it expresses.
+Repetition format_uses(const Subject& subject, Checker& check) {
+  const Made<Format> first = made<Format>(subject, check);
+  if (!first->can_read() || !first->can_write()) return {};
+  const auto expressed = [&](std::uint64_t seed) -> std::shared_ptr<const Graph> {
+    for (NamedGraph& sample : graphs_to_write(subject.registry, seed)) {
+      if (sample.graph.factor_count() <= 1000 && written(*first, sample.graph, check))
+        return std::make_shared<const Graph>(std::move(sample.graph));
+    }
+    return nullptr;
+  };
+  std::vector<std::shared_ptr<const Graph>> graphs;
+  for (std::uint64_t k = 0; k < 3; ++k) graphs.push_back(expressed(check.options().seed + k));
+  if (!graphs.front()) return {};
+  return {"write and read", 4, [&subject, &check, graphs](std::uint64_t input) {
+            const std::shared_ptr<Format> format = made<Format>(subject, check);
+            return [format, graph = graphs[input % graphs.size()], &registry = subject.registry] {
+              ReadReport report;
+              return states_of(
+                  format->read(format->write(*graph), "conformance", registry, {}, report));
+            };
+          }};
 }
 
 bool same(const Graph& a, const Graph& b) {
@@ -167,7 +233,7 @@ bool same(const Graph& a, const Graph& b) {
 
 void check_simulation(const Subject& subject, Checker& check) {
   const auto generate = [&](std::uint64_t seed) {
-    const auto generator = subject.registry.make<Generator>(subject.name);
+    const auto generator = made<Generator>(subject, check);
     return check.call("generate", [&] { return generator->generate(subject.registry, seed); });
   };
   check.sample(fmt::format("seed {}", check.options().seed), [&] {
@@ -189,16 +255,29 @@ void check_simulation(const Subject& subject, Checker& check) {
   });
 }
 
+Repetition generator_uses(const Subject& subject, Checker& check) {
+  return {"generate", 1, [&subject, &check](std::uint64_t input) {
+            const std::shared_ptr<Generator> generator = made<Generator>(subject, check);
+            return [generator, &registry = subject.registry, seed = check.options().seed + input] {
+              return states_of(generator->generate(registry, seed).graph);
+            };
+          }};
+}
+
 }  // namespace
 
 std::span<const Group> format_groups() {
-  static constexpr std::array<Group, 2> groups{
-      {{"round trip", check_round_trip}, {"texts that are no graph", check_bad_texts}}};
+  static constexpr std::array<Group, 4> groups{{{"round trip", check_round_trip},
+                                                {"texts that are no graph", check_bad_texts},
+                                                {"memory", memory_group<format_uses>},
+                                                {"threads", threads_group<format_uses>}}};
   return groups;
 }
 
 std::span<const Group> generator_groups() {
-  static constexpr std::array<Group, 1> groups{{{"simulation", check_simulation}}};
+  static constexpr std::array<Group, 3> groups{{{"simulation", check_simulation},
+                                                {"memory", memory_group<generator_uses>},
+                                                {"threads", threads_group<generator_uses>}}};
   return groups;
 }
 

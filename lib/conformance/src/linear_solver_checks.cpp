@@ -20,6 +20,7 @@
 #include "dense/cholesky.hpp"
 #include "dense/eigenvalues.hpp"
 #include "dense/products.hpp"
+#include "repetition.hpp"
 #include "samples.hpp"
 
 namespace cairn::conformance {
@@ -134,7 +135,7 @@ VectorXd dense_solution(const MatrixXd& H, const VectorXd& g) {
 class Solver {
  public:
   Solver(const Subject& subject, Checker& check)
-      : check_(check), solver_(subject.registry.make<LinearSolver>(subject.name)) {
+      : check_(check), solver_(made<LinearSolver>(subject, check)) {
     jacobian_ = query<JacobianSolver>(*solver_);
     if (!jacobian_) return;
     try {
@@ -178,6 +179,20 @@ class Solver {
     return Map<const VectorXd>(values.data(), g.size());
   }
 
+  /// All of it, without guards and from any thread.
+  State solve_all(const System& system) {
+    const VectorXd g = system.gradient();
+    State x(static_cast<std::size_t>(g.size()));
+    if (by_jacobian_) {
+      jacobian_->analyze(system.J_structure);
+      if (jacobian_->factorize(system.J, {}).ok) jacobian_->minimize(system.J.residual(), x);
+    } else {
+      solver_->analyze(system.H_structure);
+      if (solver_->factorize(system.H).ok) solver_->solve({g.data(), x.size()}, x);
+    }
+    return x;
+  }
+
   /// How far a solution may be off: an iterative solver answers for its residual, and that allows
   /// an error of the solution by the condition number.
   double accuracy(const System& system) const {
@@ -191,7 +206,7 @@ class Solver {
 
  private:
   Checker& check_;
-  std::unique_ptr<LinearSolver> solver_;
+  Made<LinearSolver> solver_;
   JacobianSolver* jacobian_ = nullptr;
   bool by_jacobian_ = false;
 };
@@ -334,12 +349,24 @@ void check_abilities(const Subject& subject, Checker& check) {
   if (!some) check.note("it has none of log_determinant, many_right_hand_sides, marginals");
 }
 
+/// Analysed, factorised and solved again each time.
+Repetition linear_solver_uses(const Subject& subject, Checker& check) {
+  return {"analyze, factorize and solve", 10, [&subject, &check](std::uint64_t input) {
+            RandomNumbers random(RandomNumbers::mixed(check.options().seed + 31 + input));
+            const auto system = std::make_shared<System>(random, 20, 10);
+            const auto solver = std::make_shared<Solver>(subject, check);
+            return [solver, system] { return solver->solve_all(*system); };
+          }};
+}
+
 }  // namespace
 
 std::span<const Group> linear_solver_groups() {
-  static constexpr std::array<Group, 3> groups{{{"solutions", check_solutions},
+  static constexpr std::array<Group, 5> groups{{{"solutions", check_solutions},
                                                 {"systems without a solution", check_failures},
-                                                {"abilities", check_abilities}}};
+                                                {"abilities", check_abilities},
+                                                {"memory", memory_group<linear_solver_uses>},
+                                                {"threads", threads_group<linear_solver_uses>}}};
   return groups;
 }
 

@@ -7,6 +7,7 @@
 
 #include "cairn/types/loss.hpp"
 #include "checker.hpp"
+#include "repetition.hpp"
 #include "samples.hpp"
 
 namespace cairn::conformance {
@@ -33,7 +34,7 @@ Values evaluate(const Loss& loss, const std::vector<double>& s, Checker& check) 
 std::string at(double s) { return fmt::format("s = {}", s); }
 
 void check_shape(const Subject& subject, Checker& check) {
-  const auto loss = subject.registry.make<Loss>(subject.name);
+  const auto loss = made<Loss>(subject, check);
   check.sample(at(0.0), [&] {
     const Values zero = evaluate(*loss, {0.0}, check);
     check.within(std::abs(zero.rho[0]), 0.0, "ρ(0) = 0");
@@ -55,7 +56,7 @@ void check_shape(const Subject& subject, Checker& check) {
 
 /// ρ′ against differences of ρ, and ρ″ against those of ρ′, except where they jump.
 void check_derivatives(const Subject& subject, Checker& check) {
-  const auto loss = subject.registry.make<Loss>(subject.name);
+  const auto loss = made<Loss>(subject, check);
   for (const double s : arguments()) {
     check.sample(at(s), [&] {
       const double h = 1e-4 * s;
@@ -83,7 +84,7 @@ void check_derivatives(const Subject& subject, Checker& check) {
 }
 
 void check_arrays(const Subject& subject, Checker& check) {
-  const auto loss = subject.registry.make<Loss>(subject.name);
+  const auto loss = made<Loss>(subject, check);
   check.sample("several arguments at once", [&] {
     const std::vector<double> s = arguments();
     const Values all = evaluate(*loss, s, check);
@@ -104,11 +105,32 @@ void check_arrays(const Subject& subject, Checker& check) {
   });
 }
 
+Repetition loss_uses(const Subject& subject, Checker& check) {
+  // One object serves all factors and threads: other inputs are for the last one made.
+  const auto last = std::make_shared<std::shared_ptr<const Loss>>();
+  return {"evaluate", 200, [&subject, &check, last](std::uint64_t input) {
+            if (input == 0) *last = made<Loss>(subject, check);
+            const std::shared_ptr<const Loss> loss = *last;
+            std::vector<double> s = arguments();
+            for (double& one : s) one *= 1.0 + 0.1 * static_cast<double>(input);
+            return [loss, s] {
+              State result(2 * s.size());
+              const std::span<double> both(result);
+              loss->evaluate(s, both.first(s.size()), both.last(s.size()));
+              for (const double one : s) result.push_back(loss->second_derivative(one));
+              return result;
+            };
+          }};
+}
+
 }  // namespace
 
 std::span<const Group> loss_groups() {
-  static constexpr std::array<Group, 3> groups{
-      {{"shape", check_shape}, {"derivatives", check_derivatives}, {"arrays", check_arrays}}};
+  static constexpr std::array<Group, 5> groups{{{"shape", check_shape},
+                                                {"derivatives", check_derivatives},
+                                                {"arrays", check_arrays},
+                                                {"memory", memory_group<loss_uses>},
+                                                {"threads", threads_group<loss_uses>}}};
   return groups;
 }
 

@@ -3,7 +3,9 @@
 // choice.
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cmath>
+#include <limits>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -26,6 +28,7 @@
 #include "cairn/policy/registration.hpp"
 #include "cairn/report/scene.hpp"
 #include "cairn/runtime/error.hpp"
+#include "cairn/runtime/timed.hpp"
 #include "cairn/solve/estimator.hpp"
 #include "cairn/solve/initial_guess.hpp"
 #include "cairn/solve/optimizer.hpp"
@@ -40,7 +43,7 @@
 namespace cairn::conformance {
 namespace {
 
-using Make = void (*)(Registry&, const ComponentSpec&);
+using Make = std::unique_ptr<Component> (*)(Registry&, const ComponentSpec&);
 struct Maker {
   std::string_view kind;
   Make make;
@@ -48,8 +51,9 @@ struct Maker {
 
 template <class Interface>
 constexpr Maker maker() {
-  return {Interface::kKind, [](Registry& registry, const ComponentSpec& spec) {
-            static_cast<void>(registry.make<Interface>(spec));
+  return {Interface::kKind,
+          [](Registry& registry, const ComponentSpec& spec) -> std::unique_ptr<Component> {
+            return registry.make<Interface>(spec);
           }};
 }
 
@@ -119,6 +123,30 @@ void check_spec(const OptionSpec& spec, const OptionTable& table, const Subject&
   });
 }
 
+/// Seconds that making a component may take: far more than any of cairn's own needs, and little
+/// enough for a user not to notice.
+constexpr double kMakingSeconds = 0.5;
+
+/// The least of several times, so that a busy machine is no finding; one quick time is enough.
+void check_time(const Maker& maker, const Subject& subject, Checker& check) {
+  check.sample("no options", [&] {
+    double least = std::numeric_limits<double>::infinity();
+    check.call("the factory", [&] {
+      for (int k = 0; k < 3 && least > kMakingSeconds; ++k) {
+        const auto begin = std::chrono::steady_clock::now();
+        try {
+          static_cast<void>(maker.make(subject.registry, {subject.name, {}}));
+        } catch (const Error&) {  // a finding of its own
+        }
+        least = std::min(least, seconds_since(begin));
+      }
+    });
+    check.expect(least <= kMakingSeconds, "it is made quickly", [&] {
+      return fmt::format("it takes {:.2g} s, and every run that uses it waits for that", least);
+    });
+  });
+}
+
 }  // namespace
 
 void check_options(const Subject& subject, std::string_view kind, Checker& check) {
@@ -133,7 +161,9 @@ void check_options(const Subject& subject, std::string_view kind, Checker& check
   const auto make = [&](const OptionValues& values, std::string_view law) {
     check.expect(true, law, [] { return std::string(); });
     try {
-      known->make(subject.registry, {subject.name, values});
+      std::unique_ptr<Component> component = known->make(subject.registry, {subject.name, values});
+      check.announce("the destructor");
+      component.reset();
     } catch (const Error& error) {
       // A choice may be one that this build or machine refuses, as long as it says so.
       if (values.empty() || error.code() == ErrorCode::plugin) check.fail(law, error.what());
@@ -142,6 +172,7 @@ void check_options(const Subject& subject, std::string_view kind, Checker& check
   check.sample("no options", [&] {
     check.call("the factory", [&] { make({}, "it can be made with its defaults"); });
   });
+  check_time(*known, subject, check);
   for (const OptionSpec& spec : table.specs()) {
     std::vector<std::string> values{spec.default_value};
     if (spec.type == OptionType::choice) values = spec.choices;

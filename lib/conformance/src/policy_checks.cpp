@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <set>
 #include <utility>
 #include <vector>
@@ -14,8 +16,10 @@
 #include "cairn/policy/policy_run.hpp"
 #include "cairn/policy/pose_policy.hpp"
 #include "cairn/policy/registration.hpp"
+#include "cairn/runtime/error.hpp"
 #include "cairn/sparsification/sparsifier.hpp"
 #include "checker.hpp"
+#include "repetition.hpp"
 #include "sample_graph.hpp"
 #include "samples.hpp"
 
@@ -66,7 +70,7 @@ void check_policy(const Subject& subject, Checker& check) {
   check.sample(fmt::format("{} poses on two laps, matched as recorded", kPoses), [&] {
     const PolicyData data = policy_data(two_laps(kPoses, check.options().seed));
     FunctionRegistration registration{Recorded(data.recording)};
-    const auto policy = subject.registry.make<PosePolicy>(subject.name);
+    const auto policy = made<PosePolicy>(subject, check);
     std::size_t ended = 0;
     check.call("the policy", [&] {
       policy->expect(data.recording, data.poses);
@@ -98,13 +102,134 @@ void check_policy(const Subject& subject, Checker& check) {
   });
 }
 
+/// What is wrong is refused, and changes nothing.
+void check_bad_calls(PosePolicy& policy, const PolicyData& data, Checker& check) {
+  const auto held = [&] {
+    State all = policy.newest_state();
+    for (const Id id : policy.kept()) all.push_back(static_cast<double>(id));
+    all.push_back(policy.factor_count());
+    return all;
+  };
+  const Graph& recording = data.recording;
+  const Arrival& last = data.poses.back();
+  const Factor odometry = recording.factor(last.odometry.front());
+  const Variable pose = recording.variable(last.pose());
+  Variable next = pose;
+  next.id = pose.id + 1;
+  Factor onwards = odometry, elsewhere = odometry;
+  onwards.variables = {pose.id, next.id};
+  elsewhere.variables = {recording.id(data.poses.front().pose()), next.id};
+  const std::vector<std::pair<const char*, std::function<void()>>> calls{
+      {"a pose that is there already",
+       [&] {
+         policy.add_pose(pose, {&onwards, 1});
+       }},
+      {"a pose without odometry", [&] { policy.add_pose(next, {}); }},
+      {"odometry from another pose",
+       [&] {
+         policy.add_pose(next, {&elsewhere, 1});
+       }},
+      {"a match with a pose that never came", [&] {
+         policy.offer(1000000, {&odometry, 1});
+       }}};
+  for (const auto& [what, call] : calls) {
+    check.describe(what);
+    const State before = held();
+    const bool refused = check.call("the policy", [&, &call = call] {
+      try {
+        call();
+        return false;
+      } catch (const Error&) {
+        return true;
+      }
+    });
+    if (!check.expect(refused, "what is wrong is refused with an Error",
+                      [] { return std::string("it was accepted"); }))
+      return;
+    check.expect(held() == before, "a refused call changes nothing",
+                 [] { return std::string("it does"); });
+  }
+}
+
+/// Pose by pose, each decision against what the policy had said before.
+void check_decisions(const Subject& subject, Checker& check) {
+  const Graph whole = two_laps(kPoses, check.options().seed);
+  check.sample(fmt::format("{} poses on two laps, one by one", kPoses), [&] {
+    const PolicyData data = policy_data(whole.clone());
+    const Recorded recorded(data.recording);
+    const auto policy = made<PosePolicy>(subject, check);
+    check.call("expect", [&] { policy->expect(data.recording, data.poses); });
+    std::set<Id> kept;
+    for (const Arrival& arrival : data.poses) {
+      const Variable pose = data.recording.variable(arrival.pose());
+      std::vector<Factor> odometry;
+      for (const int f : arrival.odometry) odometry.push_back(data.recording.factor(f));
+      check.describe(fmt::format("pose {}", pose.id));
+      check.call("add_pose", [&] { policy->add_pose(pose, odometry); });
+      std::size_t offered = 0;
+      // Each pair once: there are no more than poses that are kept.
+      for (; offered <= kept.size(); ++offered) {
+        const std::optional<MatchProposal> proposal =
+            check.call("next_match", [&] { return policy->next_match(); });
+        if (!proposal) break;
+        check.describe(fmt::format("poses {} and {} proposed", proposal->earlier, proposal->later));
+        if (!check.expect(kept.contains(proposal->earlier) && proposal->later == pose.id,
+                          "a proposal is of a kept pose and the newest",
+                          [] { return std::string("it is not"); }))
+          return;
+        const LinkReport link = check.call("offer", [&] {
+          return policy->offer(proposal->earlier, recorded(proposal->earlier, proposal->later));
+        });
+        check.expect(std::min(link.earlier, link.later) == proposal->earlier &&
+                         std::max(link.earlier, link.later) == proposal->later,
+                     "the report of an offer is of its poses",
+                     [&] { return fmt::format("of {} and {}", link.earlier, link.later); });
+      }
+      check.describe(fmt::format("pose {}", pose.id));
+      if (!check.expect(offered <= kept.size(), "next_match comes to an end",
+                        [&] { return fmt::format("{} proposals for one pose", offered); }))
+        return;
+      const PoseReport report = check.call("end_pose", [&] { return policy->end_pose(); });
+      check.expect(report.id == pose.id, "the report is of the pose that has ended",
+                   [&] { return fmt::format("it is of {}", report.id); });
+      const State newest = check.call("newest_state", [&] { return policy->newest_state(); });
+      check.expect(newest.size() == 3 &&
+                       std::ranges::all_of(newest, [](double x) { return std::isfinite(x); }),
+                   "newest_state is a state", [&] { return text_of(newest); });
+      const std::vector<Id> now = check.call("kept", [&] { return policy->kept(); }),
+                            gone = check.call("removed", [&] { return policy->removed(); });
+      for (const Id id : gone) {
+        check.expect(kept.contains(id) || id == pose.id, "removed names poses that were kept",
+                     [&] { return fmt::format("{} was not", id); });
+        kept.erase(id);
+      }
+      if (report.kept) kept.insert(pose.id);
+      check.expect(
+          std::set<Id>(now.begin(), now.end()) == kept, "kept is what the reports say that is kept",
+          [&] { return fmt::format("{} poses, by the reports {}", now.size(), kept.size()); });
+      kept = {now.begin(), now.end()};
+    }
+    check_bad_calls(*policy, data, check);
+    check.describe("after the last pose");
+    check.call("finish", [&] { return policy->finish(); });
+    const std::vector<Id> now = check.call("kept", [&] { return policy->kept(); });
+    check.expect(std::ranges::count(now, data.recording.id(data.poses.back().pose())) == 1,
+                 "finish keeps the newest pose", [] { return std::string("it is not kept"); });
+  });
+}
+
+std::vector<int> some_nodes() {
+  std::vector<int> nodes;
+  for (int v = 1; v < kPoses; v += 3) nodes.push_back(v);
+  return nodes;
+}
+
 void check_sparsifier(const Subject& subject, Checker& check) {
   Graph minimum = two_laps(kPoses, check.options().seed);
   minimize_densely(minimum);
-  std::vector<int> nodes;
-  for (int v = 1; v < kPoses; v += 3) nodes.push_back(v);
+  const std::vector<int> nodes = some_nodes();
   check.sample(fmt::format("{} of {} poses removed", nodes.size(), kPoses), [&] {
-    const auto sparsifier = subject.registry.make<Sparsifier>(subject.name);
+    const auto sparsifier = made<Sparsifier>(subject, check);
     const Sparsification change =
         check.call("remove", [&] { return sparsifier->remove(minimum, nodes); });
     check.expect(change.removed_variables.size() + change.refused.size() == nodes.size(),
@@ -128,15 +253,53 @@ void check_sparsifier(const Subject& subject, Checker& check) {
   });
 }
 
+/// A whole run, each with a new policy: none can be begun again.
+Repetition policy_uses(const Subject& subject, Checker& check) {
+  return {"a run", 3, [&subject, seed = check.options().seed](std::uint64_t input) {
+            const auto data =
+                std::make_shared<const PolicyData>(policy_data(two_laps(kPoses, seed + input)));
+            return [&subject, data] {
+              const auto policy = subject.registry.make<PosePolicy>(subject.name);
+              FunctionRegistration registration{Recorded(data->recording)};
+              policy->expect(data->recording, data->poses);
+              run_policy(data->recording, data->poses, *policy, registration);
+              State result = states_of(policy->estimator().graph());
+              for (const Id id : policy->kept()) result.push_back(static_cast<double>(id));
+              return result;
+            };
+          }};
+}
+
+Repetition sparsifier_uses(const Subject& subject, Checker& check) {
+  return {"remove", 3, [&subject, &check](std::uint64_t input) {
+            Graph minimum = two_laps(kPoses, check.options().seed + input);
+            minimize_densely(minimum);
+            const auto graph = std::make_shared<const Graph>(std::move(minimum));
+            const std::shared_ptr<Sparsifier> sparsifier = made<Sparsifier>(subject, check);
+            return [sparsifier, graph, nodes = some_nodes()] {
+              const Sparsification change = sparsifier->remove(*graph, nodes);
+              State result{change.kld};
+              for (const Factor& factor : change.factors)
+                result.insert(result.end(), factor.measurement.begin(), factor.measurement.end());
+              return result;
+            };
+          }};
+}
+
 }  // namespace
 
 std::span<const Group> pose_policy_groups() {
-  static constexpr std::array<Group, 1> groups{{{"run", check_policy}}};
+  static constexpr std::array<Group, 4> groups{{{"run", check_policy},
+                                                {"decisions", check_decisions},
+                                                {"memory", memory_group<policy_uses>},
+                                                {"threads", threads_group<policy_uses>}}};
   return groups;
 }
 
 std::span<const Group> sparsifier_groups() {
-  static constexpr std::array<Group, 1> groups{{{"removal", check_sparsifier}}};
+  static constexpr std::array<Group, 3> groups{{{"removal", check_sparsifier},
+                                                {"memory", memory_group<sparsifier_uses>},
+                                                {"threads", threads_group<sparsifier_uses>}}};
   return groups;
 }
 

@@ -1,12 +1,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "sample_graph.hpp"
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <numbers>
 #include <span>
 #include <string_view>
 #include <tuple>
 #include <utility>
+
+#include <fmt/core.h>
 
 #include "cairn/graph/gauge.hpp"
 #include "cairn/io/random_numbers.hpp"
@@ -15,6 +19,7 @@
 #include "cairn/linear/linearizer.hpp"
 #include "cairn/types/define_factor.hpp"
 #include "cairn/types/define_variable.hpp"
+#include "cairn/types/loss.hpp"
 #include "dense/cholesky.hpp"
 
 namespace cairn::conformance {
@@ -45,6 +50,16 @@ struct RelativePose {
                     : Se2::compose<double>(Map<const Pose>(x[1]), Se2::inverse<double>(measured));
     return true;
   }
+};
+
+class Logarithm final : public Loss {
+ public:
+  void evaluate(std::span<const double> s, std::span<double> rho,
+                std::span<double> weight) const override {
+    for (std::size_t k = 0; k < rho.size(); ++k) rho[k] = std::log1p(s[k]);
+    for (std::size_t k = 0; k < weight.size(); ++k) weight[k] = 1.0 / (1.0 + s[k]);
+  }
+  double second_derivative(double s) const override { return -1.0 / ((1.0 + s) * (1.0 + s)); }
 };
 
 std::span<const double> numbers(const Pose& pose) { return {pose.data(), 3}; }
@@ -110,6 +125,24 @@ Graph two_laps(int poses, std::uint64_t seed, const PlanarTypes& types) {
     }
   }
   return graph;
+}
+
+std::shared_ptr<const Loss> own_loss() { return std::make_shared<const Logarithm>(); }
+
+std::string described(const Graph& graph) {
+  return fmt::format("{} poses on two laps, {} relative poses", graph.variable_count(),
+                     graph.factor_count());
+}
+
+std::vector<double> states_of(const Graph& graph) {
+  std::vector<double> all;
+  for (int v = 0; v < graph.variable_count(); ++v)
+    all.insert(all.end(), graph.state(v).begin(), graph.state(v).end());
+  return all;
+}
+
+bool all_finite(const Graph& graph) {
+  return std::ranges::all_of(states_of(graph), [](double x) { return std::isfinite(x); });
 }
 
 double minimize_densely(Graph& graph) {

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include <Eigen/Core>
@@ -23,6 +24,15 @@ PlanarTypes own_planar_types();
 /// of the second lap to that of the first. Measurements have a standard deviation of 2 cm and
 /// 0.01 rad, and the initial estimate is composed of the odometry.
 Graph two_laps(int poses, std::uint64_t seed, const PlanarTypes& types = own_planar_types());
+
+/// ρ(s) = ln(1 + s).
+std::shared_ptr<const Loss> own_loss();
+
+std::string described(const Graph& graph);
+
+/// The numbers of all states, in the order of the variables.
+std::vector<double> states_of(const Graph& graph);
+bool all_finite(const Graph& graph);
 
 /// Moves the graph to the minimum next to its states by Gauss-Newton with dense algebra, which no
 /// plugin is part of; chi2 there.

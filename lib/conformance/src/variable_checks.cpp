@@ -5,9 +5,11 @@
 #include <cstdint>
 #include <limits>
 #include <utility>
+#include <vector>
 
 #include <Eigen/Core>
 
+#include "repetition.hpp"
 #include "samples.hpp"
 
 namespace cairn::conformance {
@@ -276,15 +278,40 @@ void check_placement(const Subject& subject, Checker& check) {
       });
 }
 
+Repetition variable_uses(const Subject& subject, Checker& check) {
+  return {"retract and local", 200, [&subject, &check](std::uint64_t input) {
+            const auto type = subject.registry.variable_type(subject.name);
+            VariableSamples samples(*type, check, check.options().seed + input);
+            State x, deltas;
+            std::vector<std::int64_t> offsets;
+            for (int k = 0; k < 20; ++k) {
+              const State state = samples.state(), step = samples.step(0.3);
+              offsets.push_back(std::ssize(deltas));
+              x.insert(x.end(), state.begin(), state.end());
+              deltas.insert(deltas.end(), step.begin(), step.end());
+            }
+            return [type, x, deltas, offsets] {
+              State result(x), back(deltas.size());
+              type->retract(offsets.size(), x.data(), offsets.data(), deltas.data(), result.data());
+              type->local(offsets.size(), x.data(), result.data(), back.data());
+              static_cast<void>(type->normalize(result.data()));
+              result.insert(result.end(), back.begin(), back.end());
+              return result;
+            };
+          }};
+}
+
 }  // namespace
 
 std::span<const Group> variable_groups() {
-  static constexpr std::array<Group, 6> groups{{{"retract and local", check_retract_and_local},
+  static constexpr std::array<Group, 8> groups{{{"retract and local", check_retract_and_local},
                                                 {"several at once", check_pools},
                                                 {"retract_jacobian", check_retract_jacobian},
                                                 {"normalize", check_normalize},
                                                 {"Lie group", check_group},
-                                                {"position", check_placement}}};
+                                                {"position", check_placement},
+                                                {"memory", memory_group<variable_uses>},
+                                                {"threads", threads_group<variable_uses>}}};
   return groups;
 }
 

@@ -148,7 +148,7 @@ TEST(WrongFactor, ThatNeverReturnsIsNamedOnce) {
 
 TEST(WrongFactor, ThatDependsOnEarlierCallsIsNamed) {
   EXPECT_THAT(wrong_factors().laws_of("EDGE_REMEMBERS"),
-              Contains("evaluate gives the same bits when it is repeated"));
+              Contains("the same input gives the same bits when it is repeated"));
 }
 
 TEST(WrongFactor, DoesNotSpoilTheRightOneBesideIt) {
@@ -181,10 +181,76 @@ TEST(WrongLinearSolver, IsNamedWithWhatItReturned) {
 TEST(WrongLoss, IsNamed) {
   const Checked checked = check(wrong("wrong_losses"));
   EXPECT_THAT(checked.laws_of("wrong_weight"), Contains("ρ′ is the derivative of ρ"));
-  EXPECT_THAT(checked.laws_of("overrun"), ElementsAre("evaluate writes to its output alone"));
+  // What it has overwritten may crash it later on.
+  EXPECT_THAT(checked.laws_of("overrun"), Contains("evaluate writes to its output alone"));
   EXPECT_THAT(checked.laws_of("misnamed"), Contains("the default is one of the choices"));
   EXPECT_THAT(checked.findings,
               Contains(AllOf(HasSubstr("unmakeable"), HasSubstr("no licence was found"))));
+}
+
+TEST(WrongOptimizer, IsNamed) {
+  const Checked checked = check(wrong("wrong_optimizers"));
+  EXPECT_THAT(checked.laws_of("stops_short"), Contains("what has converged is at a minimum"));
+  EXPECT_THAT(checked.laws_of("ignores_interrupts"), ElementsAre("an interrupt ends it"));
+  EXPECT_THAT(checked.laws_of("leaves_nan"), Contains("the states are finite"));
+  EXPECT_THAT(checked.laws_of("moves_fixed"), Contains("a fixed variable stays"));
+  EXPECT_THAT(checked.laws_of("remembers"),
+              ElementsAre("memory does not grow with the calls of one object"));
+}
+
+TEST(WrongEstimator, IsNamed) {
+  const Checked checked = check(wrong("wrong_estimators"));
+  EXPECT_THAT(checked.laws_of("stale_covariances"),
+              ElementsAre("covariance is the block of H⁻¹ at the minimum"));
+  EXPECT_THAT(checked.laws_of("half_refuses"), ElementsAre("a refused update changes nothing"));
+  EXPECT_THAT(checked.laws_of("shares_copies"),
+              Contains("a change of the copy is none of the original"));
+  EXPECT_THAT(checked.laws_of("keeps_what_leaves"),
+              ElementsAre("a change is carried out", "update refuses what is wrong with an Error"));
+}
+
+TEST(WrongFormat, IsNamed) {
+  const Checked checked = check(wrong("wrong_formats"));
+  EXPECT_THAT(checked.laws_of("loses_the_last"),
+              Contains("read finds as many factors as were written"));
+  EXPECT_THAT(checked.laws_of("accepts_anything"),
+              ElementsAre("read refuses what is no graph with an Error (input)"));
+  EXPECT_THAT(checked.laws_of("crashes_on_half"), ElementsAre("read returns"));
+}
+
+TEST(WrongPolicy, IsNamed) {
+  const Checked checked = check(wrong("wrong_policies"), {"--seconds", "20"});
+  EXPECT_THAT(checked.laws_of("never_satisfied"), ElementsAre("the policy returns"));
+  EXPECT_THAT(checked.laws_of("boasts"), ElementsAre("kept is what the reports say that is kept"));
+  EXPECT_THAT(checked.laws_of("forgets_steps"), ElementsAre("all poses can be recovered"));
+  EXPECT_THAT(checked.laws_of("accepts_any_offer"),
+              ElementsAre("what is wrong is refused with an Error"));
+}
+
+TEST(WrongUseOfResources, IsNamed) {
+  const Checked checked = check(wrong("wrong_resources"));
+  EXPECT_THAT(checked.laws_of("leaks"),
+              ElementsAre("memory does not grow with new objects",
+                          "memory does not grow with the calls of one object"));
+  EXPECT_THAT(checked.laws_of("opens_files"), ElementsAre("open files are closed"));
+  EXPECT_THAT(checked.laws_of("leaves_threads"), Contains("threads are ended"));
+  EXPECT_THAT(checked.laws_of("crashes_at_its_end"), ElementsAre("the destructor returns"));
+  EXPECT_THAT(checked.laws_of("is_made_slowly"), ElementsAre("it is made quickly"));
+  EXPECT_THAT(checked.laws_of("races"),
+              ElementsAre("uses at the same time on several threads give the same bits"));
+}
+
+TEST(PluginCheck, NamesAPluginThatIsLoadedSlowly) {
+  const Checked checked = check(wrong("wrong_slow_start"));
+  EXPECT_THAT(checked.findings, ElementsAre(AllOf(HasSubstr("registration / it is loaded quickly"),
+                                                  HasSubstr("that takes 2."))));
+}
+
+TEST(PluginCheck, NamesAPluginThatCrashesWhenTheProcessEnds) {
+  const Checked checked = check(wrong("wrong_at_exit"));
+  EXPECT_THAT(checked.findings,
+              ElementsAre(AllOf(HasSubstr("end / exit returns"), HasSubstr("crashed (Aborted)"))));
+  EXPECT_EQ(checked.exit_code, kFindings);
 }
 
 TEST(PluginCheck, NamesAPluginThatCrashesWhenItIsLoaded) {
