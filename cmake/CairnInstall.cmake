@@ -32,6 +32,10 @@ file(RELATIVE_PATH CAIRN_PREFIX_FROM_PC /${CMAKE_INSTALL_LIBDIR}/pkgconfig /)
 string(REGEX REPLACE "/$" "" CAIRN_PREFIX_FROM_PC ${CAIRN_PREFIX_FROM_PC})
 configure_file(cmake/cairn.pc.in ${CMAKE_CURRENT_BINARY_DIR}/cairn.pc @ONLY)
 install(FILES ${CMAKE_CURRENT_BINARY_DIR}/cairn.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig COMPONENT development)
+if(TARGET cairn_c)
+  configure_file(cmake/cairn_c.pc.in ${CMAKE_CURRENT_BINARY_DIR}/cairn_c.pc @ONLY)
+  install(FILES ${CMAKE_CURRENT_BINARY_DIR}/cairn_c.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig COMPONENT development)
+endif()
 
 if(NOT CAIRN_PACKAGES)  # which have it in the form that Debian asks for
   install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT program)

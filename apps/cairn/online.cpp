@@ -15,6 +15,7 @@
 #include "cairn/io/format.hpp"
 #include "cairn/online/conversation.hpp"
 #include "cairn/online/journal.hpp"
+#include "cairn/online/line_server.hpp"
 #include "cairn/online/online_session.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/policy/policy_run.hpp"
@@ -58,6 +59,7 @@ struct OnlineOptions {
   int keep = 0;
   std::string sparsifier;  ///< empty: the default, and so is `select`
   std::string select;
+  std::string listen;  ///< a socket; empty: standard input and output
   std::string journal;
   std::string sync = "batch";
   std::string output;
@@ -107,6 +109,13 @@ Journal::Sync sync_of(const std::string& name) {
   return name == "none" ? Journal::Sync::none : Journal::Sync::batch;
 }
 
+json::object clients_json(const LineServer::Counts& counts) {
+  return {{"connected", counts.clients},
+          {"most", counts.most_clients},
+          {"writers", counts.writers},
+          {"updates", {{"sent", counts.updates}, {"dropped", counts.dropped}}}};
+}
+
 json::object report_json(const OnlineOptions& options, const Conversation::Counts& counts,
                          const LineSession& lines) {
   json::object report = begin_report("online");
@@ -126,6 +135,7 @@ json::object report_json(const OnlineOptions& options, const Conversation::Count
   report["lines"] = {{"read", counts.lines},
                      {"taken", counts.taken},
                      {"refused", counts.refused},
+                     {"questions", counts.questions},
                      {"restored", counts.restored}};
   report["solves"] = counts.solves;
   report["seconds"] = {{"total", counts.solve_seconds}, {"longest", counts.longest}};
@@ -260,7 +270,8 @@ Listener follow_policy(const OnlineOptions& options, const ProblemSetup& setup, 
 }
 
 void check(const OnlineOptions& options, Session& session) {
-  session.write_file_to_stdout();  // standard output is the conversation's
+  if (options.listen.empty())
+    session.write_file_to_stdout();  // standard output is the conversation's
   if (options.output == "-")
     throw Error(ErrorCode::usage, "-o writes a file; standard output is for answers");
   if (!options.policy.empty() && (options.solve != "auto" || options.budget > 0.0)) {
@@ -289,6 +300,7 @@ void check(const OnlineOptions& options, Session& session) {
   check_output(options.output, "", session);
   check_output(options.trajectory, "", session, false);
   session.files.add_output(options.journal);  // is tried when it is opened
+  session.files.add_output(options.listen);   // too
 }
 
 /// Answers each line. Where the reader of the answers is gone, goes on without them if the map is
@@ -309,6 +321,13 @@ void converse(Conversation& conversation, LineInput& input, bool kept, const Ses
     session.note(fmt::format("the last line has no end, and was not taken: '{}'",
                              input.rest().substr(0, 40)));
   }
+}
+
+/// What a journal has given, as a sentence.
+std::string restored(Conversation& conversation) {
+  std::string answer = conversation.restore();
+  answer.pop_back();  // the end of its line
+  return answer;
 }
 
 bool is_marginalized(const Graph& graph) {
@@ -352,7 +371,13 @@ int run(OnlineOptions options, Session& session) {
     lines.protect(options.journal, "the journal");
   }
   Conversation conversation(lines, journal ? &*journal : nullptr);
-  if (journal) write_stdout(conversation.restore());
+  std::optional<LineServer> server;  // who connects from here on waits until all is restored
+  if (!options.listen.empty()) {
+    server.emplace(options.listen, conversation,
+                   LineServerSettings{.rephrase = in_command_line_words});
+    lines.protect(options.listen, "the socket");
+  }
+  if (journal) server ? session.note(restored(conversation)) : write_stdout(conversation.restore());
 
   const InterruptGuard guard;
   LineInput input(guard.flag());
@@ -362,7 +387,8 @@ int run(OnlineOptions options, Session& session) {
   try {
     call_plugin([&] { return listener.name; },
                 [&] {
-                  converse(conversation, input, kept, session);
+                  server ? server->serve(guard.flag())
+                         : converse(conversation, input, kept, session);
                   conversation.finish();
                 });
   } catch (const Error& error) {
@@ -396,8 +422,10 @@ int run(OnlineOptions options, Session& session) {
   if (within_a_line && !options.output.empty())
     session.note("the line that failed may be in the map in part, and is not in the journal");
   if (failure) std::rethrow_exception(failure);
-  session.write_json(report_json(options, conversation.counts(), lines));
-  if (guard.interrupted()) return kExitInterrupted;
+  json::object report = report_json(options, conversation.counts(), lines);
+  if (server) report["clients"] = clients_json(server->counts());
+  session.write_json(report);
+  if (guard.interrupted() && !server) return kExitInterrupted;  // a service ends in no other way
   const auto* policy = dynamic_cast<const PolicySession*>(&lines);
   if (!policy) return 0;
   for (const std::string& sentence : policy->unread_notes()) session.note(sentence);
@@ -453,6 +481,9 @@ Command add_online(ArgumentParser program) {
   cli.add_option("--sparsifier", options->sparsifier,
                  "what replaces poses that leave by factors, with options as NAME:key=value")
       .component({"sparsifier"});
+  cli.add_option("--listen", options->listen,
+                 "serve many clients at this Unix domain socket, of which one writes")
+      .type_name("SOCKET");
   cli.add_option("--journal", options->journal,
                  "restore the session from this journal, and append to it")
       .type_name("FILE");
@@ -470,10 +501,11 @@ Command add_online(ArgumentParser program) {
   add_input_options(cli, options->input);
   cli.footer(
       "Lines are those of g2o files and SOLVE, FULL, NEW, REMOVE, CHANGE, MARGINALIZE, SPARSIFY,\n"
-      "COVARIANCE, ESTIMATE, CHI2, SAVE and QUIT; with --policy NEXT, NOMATCH and DONE: "
-      "docs/online.md.\n\n"
+      "COVARIANCE, ESTIMATE, CHI2, SAVE and QUIT; with --policy NEXT, NOMATCH and DONE; with\n"
+      "--listen WRITE and FOLLOW: docs/online.md.\n\n"
       "Example:\n"
-      "  robot | cairn online --marginals last --journal today.journal");
+      "  robot | cairn online --marginals last --journal today.journal\n"
+      "  cairn online --listen /run/cairn/robot.socket --journal today.journal -o map.g2o");
   return {cli, [options](Session& session) { return run(*options, session); }};
 }
 

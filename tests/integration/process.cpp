@@ -109,8 +109,10 @@ class Child {
   /// More of standard output; false at its end.
   bool read_out(std::string& text) { return read_some(out_.read_end, text); }
 
+  void send_signal(int number) { ::kill(pid_, number); }
+
   void kill() {
-    ::kill(pid_, SIGKILL);
+    send_signal(SIGKILL);
     wait_for(pid_);
   }
 
@@ -240,6 +242,8 @@ std::optional<std::string> Partner::hear() {
   unheard.erase(0, end + 1);
   return line;
 }
+
+void Partner::send_signal(int number) { process_->child.send_signal(number); }
 
 Outcome Partner::end() {
   process_->child.feed("");

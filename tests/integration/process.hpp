@@ -58,6 +58,7 @@ class Partner {
   std::optional<std::string> hear();
   /// Ends the input, and waits for the end; what had not been heard yet.
   Outcome end();
+  void send_signal(int number);
 
  private:
   struct Process;

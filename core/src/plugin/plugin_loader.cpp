@@ -190,6 +190,7 @@ std::vector<fs::path> plugin_folders(const PluginSearch& search,
     }
     if (std::ranges::find(folders, canonical) == folders.end()) folders.push_back(canonical);
   };
+  for (const fs::path& folder : search.folders) add(folder, true);
   if (const char* list = search.environment ? std::getenv("CAIRN_PLUGIN_PATH") : nullptr) {
     std::istringstream stream(list);
     for (std::string folder; std::getline(stream, folder, ':');) {

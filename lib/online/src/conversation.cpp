@@ -28,7 +28,11 @@ std::string Conversation::restore() {
         ErrorCode::input,
         fmt::format("the journal's last line has the number {}: no line can follow it", number_));
   }
-  return fmt::format("RESTORED {} variables {} factors {}\n", number_, session_.variable_count(),
+  return standing("RESTORED");
+}
+
+std::string Conversation::standing(std::string_view word) const {
+  return fmt::format("{} {} variables {} factors {}\n", word, number_, session_.variable_count(),
                      session_.factor_count());
 }
 
@@ -45,6 +49,19 @@ LineSession::Reply Conversation::take(const std::string& line) {
   if (journal_ && reply.changes) journal_->append(number_, line);
   if (journal_ && !reply.text.empty()) journal_->commit();  // what is acknowledged is not lost
   return reply;
+}
+
+LineSession::Reply Conversation::take_if_it_changes(const std::string& line) {
+  LineSession::Reply reply = take(line);
+  if (reply.changes) return reply;
+  --counts_.lines;
+  --number_;
+  return reply;
+}
+
+LineSession::Reply Conversation::ask(const std::string& line, std::int64_t number) {
+  ++counts_.questions;
+  return session_.ask(line, number);
 }
 
 void Conversation::finish() {

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "cairn/online/line_session.hpp"
 
+#include <sys/stat.h>
+
 #include <algorithm>
 #include <charconv>
 #include <cmath>
@@ -14,11 +16,13 @@
 namespace cairn {
 namespace {
 
+constexpr std::string_view kBlanks = " \t\r";
+
 std::vector<std::string_view> split(std::string_view line) {
   std::vector<std::string_view> words;
-  for (std::size_t at = 0; (at = line.find_first_not_of(" \t\r", at)) != std::string_view::npos;) {
+  for (std::size_t at = 0; (at = line.find_first_not_of(kBlanks, at)) != std::string_view::npos;) {
     if (line[at] == '#') break;
-    const std::size_t end = std::min(line.find_first_of(" \t\r", at), line.size());
+    const std::size_t end = std::min(line.find_first_of(kBlanks, at), line.size());
     words.push_back(line.substr(at, end - at));
     at = end;
   }
@@ -32,6 +36,26 @@ std::string error_line(std::int64_t number, std::string message, std::string_vie
   std::ranges::replace(message, '\n', ' ');
   return fmt::format("ERROR line {}: {}\n", number, message);
 }
+
+/// Also of sockets, which std::filesystem::equivalent leaves open. False where one is not there.
+bool is_same_file(const std::string& a, const std::filesystem::path& b) {
+  struct stat of_a {};
+  struct stat of_b {};
+  return ::stat(a.c_str(), &of_a) == 0 && ::stat(b.c_str(), &of_b) == 0 &&
+         of_a.st_dev == of_b.st_dev && of_a.st_ino == of_b.st_ino;
+}
+
+/// True as long as this object lives.
+class SetWhile {
+ public:
+  explicit SetWhile(bool& flag) : flag_(flag) { flag = true; }
+  SetWhile(const SetWhile&) = delete;
+  SetWhile& operator=(const SetWhile&) = delete;
+  ~SetWhile() { flag_ = false; }
+
+ private:
+  bool& flag_;
+};
 
 template <class Number>
 std::optional<Number> number_of(std::string_view word) {
@@ -60,15 +84,33 @@ LineSession::Reply LineSession::take(std::string_view line, std::int64_t number)
   return reply;
 }
 
+LineSession::Reply LineSession::ask(std::string_view line, std::int64_t number) {
+  if (const std::string_view word = first_word(line); !word.empty() && !is_question(word)) {
+    Reply reply;
+    reply.refused = true;
+    reply.text = error_line(number, fmt::format("{} is not a question", word), kStreamName);
+    return reply;
+  }
+  const SetWhile asking(asking_);
+  return take(line, number);
+}
+
+std::string_view LineSession::first_word(std::string_view line) {
+  const std::size_t begin = line.find_first_not_of(kBlanks);
+  if (begin == std::string_view::npos || line[begin] == '#') return {};
+  return line.substr(begin, line.find_first_of(kBlanks, begin) - begin);
+}
+
+bool LineSession::is_question(std::string_view word) {
+  return word == "ESTIMATE" || word == "COVARIANCE" || word == "CHI2";
+}
+
 void LineSession::restore(std::string_view line, std::int64_t number) {
   line_ = number;
   Reply reply;
   const Words words = split(line);
   if (words.empty()) return;
-  struct Silence {
-    bool& silent;
-    ~Silence() { silent = false; }
-  } const silence{silent_ = true};
+  const SetWhile silence(silent_);
   try {
     perform(line, words, reply);
   } catch (const Error&) {
@@ -115,8 +157,7 @@ std::string LineSession::file_to_save(const Words& words) const {
   std::string file(words[1]);
   if (file == "-") throw bad_line("SAVE writes to a file, not to standard output");
   for (const auto& [other, what] : protected_) {
-    std::error_code none;  // of one that is not there
-    if (std::filesystem::equivalent(file, other, none))
+    if (is_same_file(file, other))
       throw bad_line(fmt::format("SAVE would replace {}, {}; name another file", what, file));
   }
   return file;

@@ -80,11 +80,23 @@ PolicySession::Command PolicySession::find_command(std::string_view word) {
 }
 
 void PolicySession::perform(std::string_view line, const Words& words, Reply& reply) {
+  if (asking()) return perform_question(words, reply);
   if (const Command command = find_command(words[0])) {
     (this->*command)(words, reply);
   } else {
     take_data(line, reply);
   }
+}
+
+/// What has come since the last answer is neither handed over nor reported here: it is for the
+/// sender of the poses.
+void PolicySession::perform_question(const Words& words, Reply& reply) {
+  struct SetAside {
+    std::string& place;
+    std::string text = std::exchange(place, {});
+    ~SetAside() { place = std::move(text); }
+  } const results{answer_};
+  (this->*find_command(words[0]))(words, reply);
 }
 
 void PolicySession::load(const Graph& map) {
@@ -300,7 +312,7 @@ void PolicySession::offer() {
 
 /// Hands over to the policy what has come.
 void PolicySession::settle(Reply& reply) {
-  if (!complete()) return;
+  if (asking() || !complete()) return;
   const bool coming = arriving_ || measured_;
   begin();  // or nothing has changed
   offer();

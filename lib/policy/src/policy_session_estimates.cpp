@@ -45,7 +45,7 @@ void PolicySession::report_estimate(const Words& words, Reply& reply) {
     return answer(reply);
   }
   const Id id = parse_whole(words[1], "id");
-  const std::optional<Id> newest = arriving_ && complete() ? current() : newest_;
+  const std::optional<Id> newest = !asking() && arriving_ && complete() ? current() : newest_;
   const bool left_out = newest != id && !in_graph(id);
   if (left_out && !(settings_.trajectory && arrived_.contains(id))) {
     throw bad_line(

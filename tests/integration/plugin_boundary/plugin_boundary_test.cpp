@@ -310,6 +310,18 @@ TEST_F(PluginBoundary, TheWorkingDirectoryIsNeverSearched) {
   fs::current_path("/");
 }
 
+TEST_F(PluginBoundary, FoldersThatTheProgramNamesAreSearched) {
+  copy("nothing_wrong", "plain");
+  cairn::PluginSearch search{
+      .files = {}, .environment = false, .user_folder = false, .default_folder = false};
+  EXPECT_FALSE(cairn::Registry(search).has("loss", "plain"));
+  search.folders = {folder(), folder() / "none"};
+  cairn::Registry registry(search);
+  EXPECT_TRUE(registry.make<cairn::Loss>("plain"));
+  ASSERT_THAT(registry.problems(), testing::SizeIs(1));
+  EXPECT_EQ(registry.problems()[0].where, folder() / "none");
+}
+
 TEST_F(PluginBoundary, TheUsersOwnFolderIsSearched) {
   const cairn::PluginSearch users_only{
       .files = {}, .environment = false, .user_folder = true, .default_folder = false};

@@ -35,6 +35,7 @@ struct PluginSearch {
   bool environment = true;                   ///< folders of CAIRN_PLUGIN_PATH, separated by ':'
   bool user_folder = true;     ///< $XDG_DATA_HOME/cairn/plugins, or ~/.local/share/cairn/plugins
   bool default_folder = true;  ///< the folder `cairn` beside the core library
+  std::vector<std::filesystem::path> folders = {};  ///< named by the program; after `files`
 };
 
 }  // namespace cairn

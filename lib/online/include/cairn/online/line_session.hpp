@@ -34,9 +34,17 @@ class CAIRN_API LineSession {
 
   /// Takes line `number` of the input. One that cannot be taken is answered by "ERROR line N: …".
   Reply take(std::string_view line, std::int64_t number);
+  /// Answers a question (`is_question`) without any effect: neither on the estimate nor on what
+  /// `take` answers later. For clients that do not send the measurements; `number` is of their
+  /// lines.
+  Reply ask(std::string_view line, std::int64_t number);
   /// The same without an answer: lines that were taken before, from a journal. Throws `Error` where
   /// one is refused.
   void restore(std::string_view line, std::int64_t number);
+  /// The first word of a line; empty if there is none, or a comment.
+  static std::string_view first_word(std::string_view line);
+  /// Of a first word: ESTIMATE, COVARIANCE and CHI2.
+  static bool is_question(std::string_view word);
   /// SAVE must not replace this file: the journal.
   void protect(std::filesystem::path file, std::string what) {
     protected_.emplace_back(std::move(file), std::move(what));
@@ -59,6 +67,8 @@ class CAIRN_API LineSession {
   virtual void perform(std::string_view line, const Words& words, Reply& reply) = 0;
 
   std::int64_t line() const { return line_; }
+  /// Within `ask`: nothing may change.
+  bool asking() const { return asking_; }
   /// Restoring: answers are not read.
   bool silent() const { return silent_; }
   /// The line that ends an answer.
@@ -88,6 +98,7 @@ class CAIRN_API LineSession {
 
  private:
   std::int64_t line_ = 0;
+  bool asking_ = false;
   bool silent_ = false;
   std::vector<std::pair<std::filesystem::path, std::string>> protected_;
 };

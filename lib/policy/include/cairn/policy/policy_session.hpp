@@ -86,6 +86,7 @@ class CAIRN_API PolicySession final : public LineSession {
   using Command = void (PolicySession::*)(const Words&, Reply&);
   static Command find_command(std::string_view word);
   void perform(std::string_view line, const Words& words, Reply& reply) override;
+  void perform_question(const Words& words, Reply& reply);
 
   // A command each; the words are those of its line.
   void declare(const Words& words, Reply& reply);

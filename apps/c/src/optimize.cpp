@@ -1,0 +1,146 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <array>
+#include <string>
+
+#include <fmt/format.h>
+
+#include "cairn/evaluation/plausibility.hpp"
+#include "cairn/runtime/plugin_call.hpp"
+#include "cairn/solve/initial_guess.hpp"
+#include "cairn/solve/optimizer.hpp"
+#include "cairn/typed/covariance.hpp"
+#include "calls.hpp"
+#include "objects.hpp"
+
+using namespace cairn::c;
+
+namespace {
+
+using cairn::Status;
+
+static_assert(static_cast<int>(Status::converged) == CAIRN_CONVERGED);
+static_assert(static_cast<int>(Status::max_iterations) == CAIRN_MAX_ITERATIONS);
+static_assert(static_cast<int>(Status::diverged) == CAIRN_DIVERGED);
+static_assert(static_cast<int>(Status::not_positive_definite) == CAIRN_NOT_POSITIVE_DEFINITE);
+static_assert(static_cast<int>(Status::interrupted) == CAIRN_INTERRUPTED);
+
+constexpr const char* kOptimizer = "levenberg_marquardt";
+constexpr const char* kInitialGuess = "auto";
+constexpr const char* kLinearSolver = "block_cholesky";
+
+/// Calls a function of C after each iteration.
+class Interrupt final : public cairn::Observer {
+ public:
+  explicit Interrupt(const cairn_stop& stop) : stop_(stop) {}
+
+  bool on_iteration(const cairn::Iteration& iteration, const cairn::Graph& /*graph*/,
+                    const cairn::Values& /*values*/) override {
+    if (!stop_.interrupt) return true;
+    const cairn_iteration passed{iteration.number, iteration.accepted ? 1 : 0,
+                                 iteration.chi2,   iteration.step_norm,
+                                 iteration.lambda, iteration.seconds};
+    return stop_.interrupt(&passed, stop_.data) == 0;
+  }
+
+ private:
+  const cairn_stop& stop_;
+};
+
+cairn::Stop stop_of(const cairn_stop& from) {
+  cairn::Stop stop;
+  stop.max_iterations = from.max_iterations;
+  stop.tolerance = from.tolerance;
+  stop.max_seconds = from.max_seconds;
+  cairn::check(stop);
+  return stop;
+}
+
+/// The notes of the initial guess, and then those of the summary.
+cairn::Summary optimize(cairn::Graph& graph, cairn::Registry& registry, std::string_view optimizer,
+                        std::string_view initial, const cairn_stop& given_stop) {
+  const cairn::Stop stop = stop_of(given_stop);
+  const auto solver = registry.make<cairn::Optimizer>(optimizer);  // both before any work
+  const auto guess = registry.make<cairn::InitialGuess>(initial);
+  std::vector<std::string> notes =
+      cairn::call_plugin([&] { return fmt::format("initial guess '{}'", initial); },
+                         [&] { return guess->compute(graph); });
+  for (std::string& note : notes) note = fmt::format("initial guess {}: {}", initial, note);
+  Interrupt observer(given_stop);
+  cairn::Summary summary =
+      cairn::call_plugin([&] { return fmt::format("optimizer '{}'", optimizer); },
+                         [&] { return solver->optimize(graph, stop, observer); });
+  if (summary.status != Status::interrupted) {
+    for (std::string& doubt : cairn::reasons_for_doubt(graph, summary.final_chi2))
+      summary.notes.push_back(std::move(doubt));
+  }
+  summary.notes.insert(summary.notes.begin(), notes.begin(), notes.end());
+  return summary;
+}
+
+std::vector<double> blocks_of(cairn_graph& from,
+                              std::span<const std::pair<cairn::Id, cairn::Id>> pairs,
+                              const char* linear_solver) {
+  const std::string_view name = name_or(linear_solver, kLinearSolver);
+  return cairn::call_plugin(
+      [&] { return fmt::format("linear solver '{}'", name); },
+      [&] { return cairn::detail::covariance_blocks(from.graph, pairs, name, *from.registry); });
+}
+
+}  // namespace
+
+const char* cairn_status_name(int status) {
+  const bool known = status >= CAIRN_CONVERGED && status <= CAIRN_INTERRUPTED;
+  return known ? to_string(static_cast<Status>(status)).data() : "";
+}
+
+void cairn_stop_init(cairn_stop* stop) {
+  if (!stop) return;
+  const cairn::Stop defaults;
+  *stop = {defaults.max_iterations, defaults.tolerance, defaults.max_seconds, nullptr, nullptr};
+}
+
+cairn_code cairn_graph_optimize(cairn_graph* graph, const char* optimizer, const char* initial,
+                                const cairn_stop* stop, cairn_summary* summary) {
+  return guarded([&] {
+    cairn_graph& of = given(graph, "graph");
+    cairn_stop defaults;
+    cairn_stop_init(&defaults);
+    const cairn::Summary result =
+        optimize(of.graph, *of.registry, name_or(optimizer, kOptimizer),
+                 name_or(initial, kInitialGuess), stop ? *stop : defaults);
+    of.notes = joined(result.notes);
+    if (!summary) return;
+    *summary = {static_cast<cairn_status>(result.status),
+                static_cast<int>(result.iterations.size()), result.initial_chi2, result.final_chi2,
+                result.seconds.total};
+  });
+}
+
+cairn_code cairn_graph_marginals(cairn_graph* graph, const int64_t* ids, size_t id_count,
+                                 const char* linear_solver, double* blocks, size_t size) {
+  return guarded([&] {
+    cairn_graph& of = given(graph, "graph");
+    std::vector<std::pair<cairn::Id, cairn::Id>> pairs;
+    for (const int v : variables_of(of.graph, ids, id_count))
+      pairs.emplace_back(of.graph.id(v), of.graph.id(v));
+    size_t expected = 0;
+    cairn_graph_sizes(graph, ids, id_count, nullptr, &expected);
+    expect_size(size, expected, "the marginals");
+    const std::span<double> out = array(blocks, size, "blocks");
+    std::ranges::copy(blocks_of(of, pairs, linear_solver), out.begin());  // symmetric, each
+  });
+}
+
+cairn_code cairn_graph_covariance(cairn_graph* graph, int64_t a, int64_t b,
+                                  const char* linear_solver, double* block, size_t size) {
+  return guarded([&] {
+    cairn_graph& of = given(graph, "graph");
+    const std::array<int64_t, 2> ids{a, b};
+    const std::vector<int> ends = variables_of(of.graph, ids.data(), ids.size());
+    const auto rows = static_cast<size_t>(of.graph.type(ends[0]).tangent_size());
+    const auto columns = static_cast<size_t>(of.graph.type(ends[1]).tangent_size());
+    expect_size(size, rows * columns, "the covariance");
+    const std::pair<cairn::Id, cairn::Id> pair(a, b);
+    copy_by_rows(blocks_of(of, {&pair, 1}, linear_solver), rows, array(block, size, "block"));
+  });
+}
