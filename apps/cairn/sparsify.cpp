@@ -120,6 +120,13 @@ json::object nonzeros_json(const Nonzeros& nonzeros) {
   return {{"information", nonzeros.information}, {"factor", nonzeros.factor}};
 }
 
+json::array notes_json(const Sparsification& change) {
+  json::array notes;
+  for (const SparsificationNote& note : change.notes)
+    notes.push_back({{"text", note.text}, {"problems", note.problems}});
+  return notes;
+}
+
 json::object report_json(const SparsifyCommandOptions& options, const LoadedGraph& loaded,
                          const SparsifyJob& job, const SparsifyResult& result) {
   json::object report = begin_report("sparsify");
@@ -137,7 +144,8 @@ json::object report_json(const SparsifyCommandOptions& options, const LoadedGrap
                         {"mean_blanket", change.mean_blanket},
                         {"largest_blanket", change.largest_blanket},
                         {"kld", change.kld},
-                        {"not_converged", change.not_converged}};
+                        {"not_converged", change.not_converged},
+                        {"notes", notes_json(change)}};
   json::array refused;
   for (const RefusedNode& node : change.refused)
     refused.push_back({{"node", node.node}, {"reason", node.reason}});

@@ -164,6 +164,7 @@ Sparsify::Solved Sparsify::solve(const WorkGraph& work, const LocalProblem& loca
       {
         const Timed timed(seconds.topology);
         solved.topology = topology_->choose(dense, count);
+        solved.note = topology_->note();
       }
       recover(coordinates, solved, seconds);
     } catch (const Error&) {
@@ -250,6 +251,7 @@ void Sparsify::take_out(WorkGraph& work, std::vector<int> group, Sparsification&
     result.largest_blanket = std::max(result.largest_blanket, n);
     result.kld += solved.recovery.kld;
     result.not_converged += !solved.recovery.converged;
+    result.note(solved.note);
   }
   // With a blanket of one node nothing that the factors say is about anything else; those within
   // the blanket stay then.

@@ -86,6 +86,7 @@ class Sparsify final : public Sparsifier {
     std::vector<FactorChoice> topology;
     RecoveryResult recovery;
     std::vector<std::vector<double>> information;  ///< of the new factors, packed
+    std::string note;                              ///< of the topology
   };
   Solved solve(const WorkGraph& work, const LocalProblem& local, SparsificationSeconds& seconds);
   void recover(const BlanketProjection& coordinates, Solved& solved,

@@ -321,7 +321,8 @@ std::vector<FactorChoice> Exhaustive::choose(const DenseBlanket& blanket, int po
   const int count = std::clamp(population - priors, tree_size(blanket) - priors, all);
   double topologies = 1.0;
   for (int k = 0; k < count; ++k) topologies *= static_cast<double>(all - k) / (k + 1);
-  if (topologies > static_cast<double>(most_)) {
+  instead_ = topologies > static_cast<double>(most_);
+  if (instead_) {
     if (beyond_ == Beyond::ekld) {
       ExpectedDivergence instead(options_);
       instead.watch([this] {
@@ -363,6 +364,14 @@ std::vector<FactorChoice> Exhaustive::choose(const DenseBlanket& blanket, int po
   if (best.empty())
     throw Error(ErrorCode::usage, "the nodes of a blanket cannot be connected by relative factors");
   return best;
+}
+
+std::string Exhaustive::note() const {
+  if (!instead_) return {};
+  return fmt::format(
+      "the topology is that of ekld instead of best, since there are more than {} to try (its "
+      "options most and beyond)",
+      most_);
 }
 
 }  // namespace cairn::sparsify

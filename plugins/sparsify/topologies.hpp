@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -178,16 +179,18 @@ class DenseConstraint final : public Topology {
 };
 
 /// Every topology of that population is tried, and the one with the least KLD taken; where there
-/// are too many, that of `ekld`, or `choose` throws `Error` (usage).
+/// are too many, that of `ekld`, with a note, or `choose` throws `Error` (usage).
 class Exhaustive final : public ChowLiuTree {
  public:
   explicit Exhaustive(const ExhaustiveOptions& options)
       : ChowLiuTree(options.tree), most_(options.most), beyond_(options.beyond) {}
   std::vector<FactorChoice> choose(const DenseBlanket& blanket, int population) override;
+  std::string note() const override;
 
  private:
   std::int64_t most_;
   Beyond beyond_;
+  bool instead_ = false;  ///< the last blanket got the topology of ekld
 };
 
 }  // namespace cairn::sparsify

@@ -27,6 +27,10 @@ class CAIRN_API Topology : public Interruptible {
   /// Whether its factor is one on all nodes of a blanket: that is the only model which it gets, and
   /// its information is the identity.
   virtual bool whole() const { return false; }
+  /// Whether the last `choose` did something else than was asked for, and what: a sentence that is
+  /// the same for every blanket to which it happens, so that these can be counted. Empty: it did
+  /// not.
+  virtual std::string note() const { return {}; }
   /// What its factors are that no format of graphs expresses, for messages; empty: none.
   virtual std::string_view unwritable() const { return {}; }
 };
