@@ -30,7 +30,7 @@ without(initial_guess auto as_given odometry spanning_tree incremental chordal)
 without(plot svg png pdf)
 without(registration recorded simulated)
 without(report html)
-without(sparsify sparsify clt mi dmi ekld odd l1 cliquey best closed_form fd ncfd ip pqn
+without(sparsify sparsify clt mi dmi ekld mixed odd l1 cliquey best closed_form fd ncfd ip pqn
         keep_every least_loss smallest_blanket oldest nearest coverage)
 without(edge_selection mac greedy_tree greedy_gain)
 without(grid_formats ros image)

@@ -92,6 +92,7 @@ class Feeder {
       replay.removal_note = removal.note;
       replay.notes.push_back(removal.note);
     }
+    replay.notes.insert(replay.notes.end(), removal.notes.begin(), removal.notes.end());
     removal.add_to(update);
   }
 

@@ -120,6 +120,13 @@ json::object nonzeros_json(const Nonzeros& nonzeros) {
   return {{"information", nonzeros.information}, {"factor", nonzeros.factor}};
 }
 
+json::array notes_json(const Sparsification& change) {
+  json::array notes;
+  for (const SparsificationNote& note : change.notes)
+    notes.push_back({{"text", note.text}, {"problems", note.problems}});
+  return notes;
+}
+
 json::object report_json(const SparsifyCommandOptions& options, const LoadedGraph& loaded,
                          const SparsifyJob& job, const SparsifyResult& result) {
   json::object report = begin_report("sparsify");
@@ -137,7 +144,8 @@ json::object report_json(const SparsifyCommandOptions& options, const LoadedGrap
                         {"mean_blanket", change.mean_blanket},
                         {"largest_blanket", change.largest_blanket},
                         {"kld", change.kld},
-                        {"not_converged", change.not_converged}};
+                        {"not_converged", change.not_converged},
+                        {"notes", notes_json(change)}};
   json::array refused;
   for (const RefusedNode& node : change.refused)
     refused.push_back({{"node", node.node}, {"reason", node.reason}});
@@ -331,9 +339,10 @@ void add_sparsify_options(ArgumentParser cli, SparsifyCommandOptions& options) {
   cli.add_option("--nodes", options.nodes, "what may leave: poses, landmarks or all [poses]")
       .type_name("KIND")
       .one_of({"poses", "landmarks", "all"});
-  cli.add_option("--topology", options.topology,
-                 "pairs that get a factor: clt, mi, dmi, ekld, odd, l1, best; or one factor on all "
-                 "neighbours: glc [ekld]")
+  cli.add_option(
+         "--topology", options.topology,
+         "pairs that get a factor: clt, mi, dmi, ekld, mixed, odd, l1, best; or one factor on all "
+         "neighbours: glc [ekld]")
       .component({"topology"});
   cli.add_option("--population", options.population,
                  "number of new factors: tree:γ, fill:α or loss:KLD [tree:2]")

@@ -86,6 +86,9 @@ struct Tally {
   double squares = 0.0;
   std::vector<double> times;
 
+  void note(const std::string& text) {
+    if (!text.empty()) ++row.notes[text];
+  }
   void add(const RecoveryResult& result, double factors, double topology_seconds, bool positive) {
     ++row.problems;
     row.kld += result.kld;
@@ -211,6 +214,7 @@ std::vector<ReplayRow> replay_problems(const std::vector<DenseBlanket>& problems
         continue;
       }
       const double seconds = seconds_since(begin);
+      const std::string note = choosers[t]->note();
       const RecoveryProblem problem = projection.problem(blanket, chosen);
       double least = std::numeric_limits<double>::infinity();
       std::vector<double> klds(methods.size(), least);
@@ -224,6 +228,7 @@ std::vector<ReplayRow> replay_problems(const std::vector<DenseBlanket>& problems
                         nodes, result.trace);
           least = std::min(least, result.kld);
           both(t, r, nodes, [&](Tally& tally) {
+            tally.note(note);
             tally.add(result, static_cast<double>(chosen.size()), seconds, positive(result));
           });
         } catch (const Error&) {

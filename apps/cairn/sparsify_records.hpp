@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -41,6 +42,7 @@ struct ReplayRow {
   double recovery_median = 0.0;                           ///< [s]
   double iterations = 0.0;
   int not_converged = 0, not_positive = 0;
+  std::map<std::string, int> notes;  ///< of the topology, with the number of problems
   double largest_excess = 0.0;  ///< KLD above the lowest of all recoveries of that topology [nats]
 };
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // cairn study NAME: what the tables of the papers need and a robot does not.
 #include <memory>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -113,6 +114,24 @@ struct ProblemsOptions {
   std::string curves, against = "time";
 };
 
+json::array notes_json(const ReplayRow& row) {
+  json::array all;
+  for (const auto& [text, problems] : row.notes)
+    all.push_back({{"text", text}, {"problems", problems}});
+  return all;
+}
+
+/// Of the rows of all sizes, each text once.
+void show_notes(const std::vector<ReplayRow>& rows, const Session& session) {
+  std::set<std::string> shown;
+  for (const ReplayRow& row : rows) {
+    for (const auto& [text, problems] : row.notes) {
+      if (row.nodes == 0 && shown.insert(text).second)
+        session.note(fmt::format("{} of {} blankets: {}", problems, row.problems, text));
+    }
+  }
+}
+
 json::array rows_json(const std::vector<ReplayRow>& rows) {
   json::array all;
   for (const ReplayRow& row : rows) {
@@ -128,6 +147,7 @@ json::array rows_json(const std::vector<ReplayRow>& rows) {
                    {"iterations", row.iterations},
                    {"not_converged", row.not_converged},
                    {"not_positive", row.not_positive},
+                   {"notes", notes_json(row)},
                    {"seconds",
                     {{"topology", row.topology_seconds},
                      {"recovery", row.recovery_seconds},
@@ -154,6 +174,7 @@ int solve_problems(const ProblemsOptions& options, Session& session) {
       },
       session.registry(), options.curves.empty() ? nullptr : &curves);
   line.clear();
+  show_notes(rows, session);
   Results results(session);
   results.write(options.curves, [&] { write_file(options.curves, csv_text(curves.table())); });
   json::object report = begin_report("study");

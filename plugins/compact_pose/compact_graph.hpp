@@ -41,6 +41,7 @@ class CompactGraph {
     std::vector<Id> poses;
     std::vector<int> now;  ///< the number that each kept pose has now; −1: it has left
     std::string note;      ///< why more stay than there is room for; empty: they do not
+    std::vector<std::string> notes{};  ///< of the remover, each said once
   };
 
   /// `marginals`: what the estimator keeps, which costs time with each link; the diagonal if many

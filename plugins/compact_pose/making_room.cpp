@@ -40,6 +40,7 @@ void CompactPose::make_room() {
   CompactGraph::Leaving leaving = graph_.make_room(*remover_, options_.keep, held, report_.seconds);
   if (leaving.note != noted_ && !leaving.note.empty()) report_.notes.push_back(leaving.note);
   noted_ = std::move(leaving.note);
+  report_.notes.insert(report_.notes.end(), leaving.notes.begin(), leaving.notes.end());
   if (leaving.poses.empty()) return;
   removed_ = std::move(leaving.poses);
   report_.removed = static_cast<int>(std::ssize(removed_));
@@ -60,7 +61,10 @@ CompactGraph::Leaving CompactGraph::make_room(PoseRemover& remover, int limit,
   if (!newest_.kept) factor.variables.push_back(kept_[newest_.predecessor].id);
   for (const int pose : held) factor.variables.push_back(kept_[pose].id);
   PoseRemover::Removal removal = remover.make_room(*estimator_, limit, staying);
-  Leaving leaving{.poses = removal.update.removed_variables, .now = {}, .note = removal.note};
+  Leaving leaving{.poses = removal.update.removed_variables,
+                  .now = {},
+                  .note = removal.note,
+                  .notes = removal.notes};
   if (leaving.poses.empty()) return leaving;
   const std::unordered_set<Id> gone(leaving.poses.begin(), leaving.poses.end());
   int left = 0;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include <fmt/core.h>
@@ -50,19 +51,35 @@ bool places(const FactorType& type, const VariableType& pose) {
   return type.propagate(0, states, z.data(), x.data()) && x == z;
 }
 
-/// Whether it measures the position of a landmark in the frame of a pose; a bearing and range,
-/// which are as many numbers, would lead elsewhere.
-bool observes(const FactorType& type, const VariableType& pose, const VariableType& landmark) {
+/// Where a factor type has a landmark that is seen from the origin with the measurement z; empty
+/// unless it measures as many numbers as a landmark has.
+std::vector<double> seen_at(const FactorType& type, const VariableType& pose,
+                            const VariableType& landmark, const std::vector<double>& z) {
   const int n = landmark.ambient_size();
   if (type.arity() != 2 || type.variable_tags()[0] != pose.tag() ||
       type.variable_tags()[1] != landmark.tag() ||
       type.residual_size() != landmark.tangent_size() || type.measurement_size() != n)
-    return false;
-  std::vector<double> world(pose.ambient_size()), z(n), seen(n);
+    return {};
+  std::vector<double> world(pose.ambient_size()), seen(n);
   pose.identity(world.data());
-  for (int k = 0; k < n; ++k) z[k] = 0.5 - 0.75 * k;
   const double* states[] = {world.data(), z.data()};
-  return type.propagate(1, states, z.data(), seen.data()) && seen == z;
+  return type.propagate(1, states, z.data(), seen.data()) ? seen : std::vector<double>();
+}
+
+/// Whether it measures the position of a landmark in the frame of a pose.
+bool observes(const FactorType& type, const VariableType& pose, const VariableType& landmark) {
+  std::vector<double> z(landmark.ambient_size());
+  for (std::size_t k = 0; k < z.size(); ++k) z[k] = 0.5 - 0.75 * static_cast<double>(k);
+  return seen_at(type, pose, landmark, z) == z;
+}
+
+/// Whether it measures a bearing [rad] and a range in the plane.
+bool measures_bearing_and_range(const FactorType& type, const VariableType& pose,
+                                const VariableType& landmark) {
+  if (landmark.ambient_size() != 2) return false;
+  const std::vector<double> z{0.5, 2.0}, seen = seen_at(type, pose, landmark, z);
+  return !seen.empty() && std::abs(seen[0] - z[1] * std::cos(z[0])) < 1e-12 &&
+         std::abs(seen[1] - z[1] * std::sin(z[0])) < 1e-12;
 }
 
 /// A type that the factors on the nodes that leave have, or another factor of the graph: these may
@@ -104,9 +121,15 @@ std::string find_types(const WorkGraph& work, const Kinds& kinds, bool whole, Lo
       return observes(type, *kinds.pose, *kinds.landmark);
     });
     if (!local.types.observation) {
+      local.types.observation = find_type(work, local, [&](const FactorType& type) {
+        return measures_bearing_and_range(type, *kinds.pose, *kinds.landmark);
+      });
+      local.types.bearing_range = local.types.observation != nullptr;
+    }
+    if (!local.types.observation) {
       return fmt::format(
           "{}: no factor of the graph measures the position of a landmark in the frame of a pose, "
-          "as new ones do",
+          "or its bearing and range, as new ones do",
           leaving);
     }
   }

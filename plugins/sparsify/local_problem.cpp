@@ -29,6 +29,8 @@ constexpr double kSettled = 1e-9, kRounding = 1e-12;
 constexpr double kZeroPivot = 1e-11, kDamping = 1e-8;
 /// Columns of J N, N being orthonormal in units of Λ's diagonal, that are zero but for rounding.
 constexpr double kOpen = 1e-6;
+/// Diagonal elements of Λ that are squares of rounding, as a part of the largest.
+constexpr double kNothing = 1e-26;
 
 /// Dense normal equations of the cropped problem, the removed nodes first.
 class DenseSystem {
@@ -184,7 +186,8 @@ class Models {
       for (int j = poses; j < n; ++j) add_observation(i, j);
     }
     for (int i = 0; local_.absolute && i < poses; ++i) {
-      if (!graph_.fixed(local_.blanket[i])) add(local_.types.prior, {i}, measured_[i]);
+      if (!graph_.fixed(local_.blanket[i]))
+        add(local_.types.prior, {i}, measured_[i], position_rows(i));
     }
   }
 
@@ -193,18 +196,25 @@ class Models {
 
   void add_relative(int i, int j) {
     const StateGroup group(type(i));
-    add(local_.types.relative, {i, j}, group.between(measured_[i], measured_[j]));
+    add(local_.types.relative, {i, j}, group.between(measured_[i], measured_[j]), position_rows(i));
   }
 
   void add_observation(int i, int j) {
     const Pose from = pose_of(type(i), measured_[i]);
     const Eigen::Vector3d seen = from.R.transpose() * (pose_of(type(j), measured_[j]).t - from.t);
-    add(local_.types.observation, {i, j},
-        {seen.data(), seen.data() + local_.types.observation->measurement_size()});
+    std::vector<double> z(seen.data(), seen.data() + local_.types.observation->measurement_size());
+    if (local_.types.bearing_range) z = {std::atan2(z[1], z[0]), std::hypot(z[0], z[1])};
+    add(local_.types.observation, {i, j}, std::move(z), local_.types.bearing_range ? 1 : 0);
   }
 
+  /// How many rows of a pose's residual are of the position.
+  int position_rows(int node) const {
+    return has_position(type(node)) ? type(node).placement()->dimension() : 0;
+  }
+
+  /// The model of the whole measurement, and those of its first rows and of the others.
   void add(const std::shared_ptr<const FactorType>& type, std::vector<int> nodes,
-           std::vector<double> z) {
+           std::vector<double> z, int first) {
     type->normalize(z.data());
     const int m = type->residual_size();
     FactorModel model{.nodes = std::move(nodes),
@@ -220,6 +230,26 @@ class Models {
     type->evaluate(x.data(), z.data(), pack(Matrix::Identity(m, m)).data(), r.data(), J.data());
     marginal_.dense.models.push_back(std::move(model));
     marginal_.predictions.push_back({type, std::move(z), {}});
+    if (!local_.parts || first <= 0 || first >= m) return;
+    add_part(0, first);
+    add_part(first, m);
+  }
+
+  /// Rows [begin, end) of the last whole model.
+  void add_part(int begin, int end) {
+    const auto whole = std::ranges::find_if(
+        marginal_.predictions.rbegin(), marginal_.predictions.rend(),
+        [](const Marginal::Prediction& prediction) { return prediction.directions.size() == 0; });
+    const FactorModel& of =
+        marginal_.dense.models[whole.base() - marginal_.predictions.begin() - 1];
+    const int d = begin_.back();
+    FactorModel part{.nodes = of.nodes, .size = end - begin, .jacobian = {}};
+    const Matrix J = jacobian(of, d).middleRows(begin, part.size);
+    part.jacobian.assign(J.data(), J.data() + J.size());
+    Marginal::Prediction prediction = *whole;
+    prediction.directions = Matrix::Identity(of.size, of.size).middleCols(begin, part.size);
+    marginal_.dense.models.push_back(std::move(part));
+    marginal_.predictions.push_back(std::move(prediction));
   }
 
   const Graph& graph_;
@@ -244,7 +274,8 @@ void reduce_models(Marginal& marginal) {
   marginal.open = d - gauge - rank;
   if (marginal.open <= 0) return;
   Vector unit = information(blanket).diagonal();
-  for (double& u : unit) u = u > 0.0 ? 1.0 / std::sqrt(u) : 1.0;
+  const double least = kNothing * unit.maxCoeff();
+  for (double& u : unit) u = u > least ? 1.0 / std::sqrt(u) : 1.0;
   const Matrix N = open_directions(blanket, rank, unit);
   std::vector<FactorModel> models;
   std::vector<Marginal::Prediction> predictions;
@@ -258,8 +289,10 @@ void reduce_models(Marginal& marginal) {
     if (left == 0) continue;
     Marginal::Prediction& prediction = predictions.emplace_back(marginal.predictions[k]);
     if (left < model.size) {
-      prediction.directions = eigen.eigenvectors().leftCols(left);
-      const Matrix reduced = dense::product_of_transpose(prediction.directions, J);
+      const Matrix B = eigen.eigenvectors().leftCols(left);
+      const Matrix reduced = dense::product_of_transpose(B, J);
+      prediction.directions =
+          prediction.directions.size() == 0 ? B : dense::product(prediction.directions, B);
       model.size = static_cast<int>(left);
       model.jacobian.assign(reduced.data(), reduced.data() + reduced.size());
     }

@@ -19,6 +19,7 @@ class LinearConstraints;
 struct BlanketTypes {
   std::shared_ptr<const FactorType> relative;     ///< a whole relative pose
   std::shared_ptr<const FactorType> observation;  ///< a landmark's position in the frame of a pose
+  bool bearing_range = false;                     ///< or that by bearing and range, in the plane
   std::shared_ptr<const FactorType> prior;        ///< a whole pose in the world
 };
 
@@ -32,6 +33,7 @@ struct LocalProblem {
   std::vector<int> factors;  ///< of the work graph
   bool absolute = false;     ///< a factor on `removed` determines absolute states
   int absolute_size = 0;     ///< how many degrees of freedom of them such factors measure
+  bool parts = false;        ///< models of a part of a measurement are wanted, too
   std::string refusal;       ///< why these nodes cannot leave; empty: they can
   BlanketTypes types;
 };
@@ -42,7 +44,9 @@ LocalProblem crop(const WorkGraph& work, std::vector<int> removed, bool whole = 
 
 /// What is left of it on the blanket. The models are a relative factor for each pair of poses, an
 /// observation for each pose and landmark, and, where the problem is absolute, a prior for each
-/// pose that is not fixed; or one on the whole blanket (`add_constraint_model`).
+/// pose that is not fixed; or one on the whole blanket (`add_constraint_model`). With
+/// `LocalProblem::parts` each of a pose is followed by that of its position and that of its
+/// orientation alone, and one by bearing and range by those of the bearing and of the range.
 struct Marginal {
   DenseBlanket dense;
   std::vector<std::vector<double>> states;  ///< of the blanket, where it was linearised

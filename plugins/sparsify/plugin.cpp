@@ -23,6 +23,7 @@ void add_topologies(Registrar& registrar) {
   add<Topology, TopologyOptions, ChowLiuTree>(registrar, "clt");
   add<Topology, TopologyOptions, MutualInformation>(registrar, "mi");
   add<Topology, TopologyOptions, ExpectedDivergence>(registrar, "ekld");
+  add<Topology, TopologyOptions, MixedParts>(registrar, "mixed");
   add<Topology, TopologyOptions, Cliquey>(registrar, "cliquey");
   add<Topology, DowndatedInformationOptions, DowndatedInformation>(registrar, "dmi");
   add<Topology, SparseInverseOptions, SparseInverse>(registrar, "l1");

@@ -19,6 +19,7 @@
 #include "cairn/sparsification/correlated_pair.hpp"
 #include "dense/products.hpp"
 #include "recovery.hpp"
+#include "tree.hpp"
 
 namespace cairn::sparsify {
 namespace {
@@ -58,15 +59,18 @@ std::vector<double> whole_information(const Marginal& marginal, const FactorChoi
 
 /// Throws the reason why nodes stay that leave more open than the pose of the whole.
 [[noreturn]] void refuse_open(const Graph& graph, const LocalProblem& local,
-                              const Marginal& marginal) {
+                              const Marginal& marginal, Open open) {
   const DenseBlanket& dense = marginal.dense;
   const int all = dense.size() - (dense.absolute ? 0 : dense.node_sizes.front());
   throw Error(ErrorCode::numerical,
               fmt::format("{}: its factors do not determine the {} of its {} neighbours (their "
-                          "information has rank {} of {})",
+                          "information has rank {} of {}){}",
                           graph.describe_variable(local.removed.front()),
                           dense.absolute ? "absolute poses" : "relative poses",
-                          dense.node_sizes.size(), all - marginal.open, all));
+                          dense.node_sizes.size(), all - marginal.open, all,
+                          open == Open::refuse
+                              ? "; sparsify:open=reduce replaces them by factors of lower rank"
+                              : ""));
 }
 
 /// Both are watched as long as it lives.
@@ -147,33 +151,36 @@ Sparsify::Solved Sparsify::solve(const WorkGraph& work, const LocalProblem& loca
   const DenseBlanket& dense = solved.marginal.dense;
   if (dense.models.empty()) return solved;
   // After a pose has left, what is open is open for want of measurements. Factors of lower rank
-  // would be as many as poses leave, one made of the other, and soon claim what none of them knew.
+  // leave it open at the states where they were made, and no longer where the map has moved far.
   const bool landmarks =
       std::ranges::all_of(local.removed, [&](int v) { return is_point(work.graph().type(v)); });
-  if (solved.marginal.open > 0 && !landmarks) refuse_open(work.graph(), local, solved.marginal);
+  if (solved.marginal.open > 0 && !landmarks && options_.open == Open::refuse)
+    refuse_open(work.graph(), local, solved.marginal, options_.open);
   const BlanketProjection coordinates = project(dense, options_.projection);
   const int nodes = static_cast<int>(std::ssize(dense.node_sizes));
   // One prior of those that there are models of, besides the factors between nodes.
   const int prior = dense.absolute ? 1 : 0;
+  const int pairs = static_cast<int>(std::ssize(pair_models(dense)));
   const int all =
-      prior + static_cast<int>(std::ranges::count_if(
-                  dense.models, [](const auto& model) { return model.nodes.size() > 1; }));
+      pairs + (topology_->parts() ? static_cast<int>(std::ssize(prior_models(dense))) : prior);
   const bool bounded = options_.population.kind == Population::Kind::loss;
   for (int count = std::min(all, prior + options_.population.count(nodes));;) {
     try {
       {
         const Timed timed(seconds.topology);
         solved.topology = topology_->choose(dense, count);
+        solved.note = topology_->note();
       }
       recover(coordinates, solved, seconds);
     } catch (const Error&) {
-      if (solved.marginal.open > 0) refuse_open(work.graph(), local, solved.marginal);
+      if (solved.marginal.open > 0)
+        refuse_open(work.graph(), local, solved.marginal, options_.open);
       throw;
     }
     // A topology that does not grow any more has done what it can.
     const int size = static_cast<int>(std::ssize(solved.topology));
     if (!bounded || solved.recovery.kld <= options_.population.value || count >= all ||
-        size < count) {
+        (size < count && !topology_->parts())) {
       break;
     }
     count = std::min(all, count + std::max(1, count / 8));
@@ -226,9 +233,15 @@ std::shared_ptr<const FactorType> Sparsify::pair_type(
   return pair_types_.back().type;
 }
 
+LocalProblem Sparsify::cropped(const WorkGraph& work, std::vector<int> group) const {
+  LocalProblem local = crop(work, std::move(group), topology_->whole());
+  local.parts = topology_->parts();
+  return local;
+}
+
 void Sparsify::take_out(WorkGraph& work, std::vector<int> group, Sparsification& result) {
   const Graph& graph = work.graph();
-  const LocalProblem local = crop(work, std::move(group), topology_->whole());
+  const LocalProblem local = cropped(work, std::move(group));
   const auto refuse = [&](const std::string& reason) {
     for (const int v : local.removed) result.refused.push_back({graph.id(v), reason});
   };
@@ -250,6 +263,7 @@ void Sparsify::take_out(WorkGraph& work, std::vector<int> group, Sparsification&
     result.largest_blanket = std::max(result.largest_blanket, n);
     result.kld += solved.recovery.kld;
     result.not_converged += !solved.recovery.converged;
+    result.note(solved.note);
   }
   // With a blanket of one node nothing that the factors say is about anything else; those within
   // the blanket stay then.
@@ -318,7 +332,7 @@ std::vector<double> Sparsify::losses(const Graph& graph, std::span<const int> no
   std::vector<double> klds;
   SparsificationSeconds seconds;
   for (const int v : nodes) {
-    const LocalProblem local = crop(work, {v}, topology_->whole());
+    const LocalProblem local = cropped(work, {v});
     double kld = std::numeric_limits<double>::infinity();
     if (local.refusal.empty()) {
       try {

@@ -35,6 +35,13 @@ constexpr auto enum_names(LinearizeAt) {
       {{LinearizeAt::graph, "graph"}, {LinearizeAt::local, "local"}});
 }
 
+/// What becomes of a pose whose neighbours would be left open by the factors that leave with it, as
+/// where its position in the world is measured and its orientation is not.
+enum class Open { refuse, reduce };
+constexpr auto enum_names(Open) {
+  return std::to_array<EnumName<Open>>({{Open::refuse, "refuse"}, {Open::reduce, "reduce"}});
+}
+
 struct SparsifyOptions {
   std::string topology = "ekld";
   Population population{};
@@ -43,6 +50,7 @@ struct SparsifyOptions {
   Projection projection = Projection::node;
   bool resolve = true;  ///< the cropped problem is solved by itself
   LinearizeAt linearize = LinearizeAt::graph;
+  Open open = Open::refuse;
   int largest_group = 50;  ///< nodes that leave together, at most
 
   static auto fields() {
@@ -63,6 +71,9 @@ struct SparsifyOptions {
         .boolean("resolve", &O::resolve, "solve the cropped problem by itself first (not with glc)")
         .choice("linearize", &O::linearize,
                 "then linearise at the states of the graph, or at the minimum found (the thesis)")
+        .choice("open", &O::open,
+                "a pose without which its neighbours are not determined, as by a measured position "
+                "alone, stays, or leaves factors of lower rank")
         .integer("largest_group", &O::largest_group, 1, 100000,
                  "nodes that leave together, at most");
   }
@@ -86,7 +97,9 @@ class Sparsify final : public Sparsifier {
     std::vector<FactorChoice> topology;
     RecoveryResult recovery;
     std::vector<std::vector<double>> information;  ///< of the new factors, packed
+    std::string note;                              ///< of the topology
   };
+  LocalProblem cropped(const WorkGraph& work, std::vector<int> group) const;
   Solved solve(const WorkGraph& work, const LocalProblem& local, SparsificationSeconds& seconds);
   void recover(const BlanketProjection& coordinates, Solved& solved,
                SparsificationSeconds& seconds);

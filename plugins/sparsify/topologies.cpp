@@ -173,27 +173,43 @@ std::vector<FactorChoice> DowndatedInformation::choose(const DenseBlanket& blank
 std::vector<FactorChoice> ExpectedDivergence::choose(const DenseBlanket& blanket, int population) {
   std::vector<FactorChoice> chosen = ChowLiuTree::choose(blanket, population);
   if (static_cast<int>(std::ssize(chosen)) >= population) return chosen;
-  // All models at once: those that are not chosen weigh nothing yet.
-  std::vector<FactorChoice> all = chosen;
   std::vector<bool> taken(blanket.models.size());
   for (const FactorChoice& choice : chosen) taken[choice.front()] = true;
+  std::vector<Candidate> candidates;
   for (const int k : pair_models(blanket)) {
-    if (!taken[k]) all.push_back({k});
+    if (!taken[k]) candidates.push_back({k, 1});
   }
-  if (population >= static_cast<int>(std::ssize(all))) return all;
+  const int budget = population - static_cast<int>(std::ssize(chosen));
+  return grow(blanket, std::move(chosen), candidates, budget, {});
+}
+
+std::vector<FactorChoice> ExpectedDivergence::grow(const DenseBlanket& blanket,
+                                                   std::vector<FactorChoice> chosen,
+                                                   const std::vector<Candidate>& candidates,
+                                                   int budget,
+                                                   const std::function<bool(int, int)>& excludes) {
+  // All models at once: those that are not chosen weigh nothing yet.
+  const int begun = static_cast<int>(std::ssize(chosen));
+  std::vector<FactorChoice> all = chosen;
+  int sum = 0;
+  for (const Candidate& candidate : candidates) {
+    all.push_back({candidate.model});
+    sum += candidate.cost;
+  }
+  if (sum <= budget && !excludes) return all;
   const RecoveryProblem problem = project(blanket, Projection::node).problem(blanket, all);
   const ScaledProblem scaled(problem);
   Approximation at(scaled);
   std::vector<Matrix> W;
-  for (std::size_t k = 0; k < all.size(); ++k) {
-    const int m = scaled.size(static_cast<int>(k));
-    W.push_back(k < chosen.size() ? Matrix(Matrix::Identity(m, m)) : Matrix(Matrix::Zero(m, m)));
+  for (int k = 0; k < scaled.factors(); ++k) {
+    const int m = scaled.size(k);
+    W.push_back(k < begun ? Matrix(Matrix::Identity(m, m)) : Matrix(Matrix::Zero(m, m)));
   }
   if (!at.set(std::move(W))) return chosen;
-  std::vector<int> in(chosen.size()), open;
+  std::vector<int> in(chosen.size()), open(candidates.size());
   std::iota(in.begin(), in.end(), 0);
-  for (int k = static_cast<int>(std::ssize(chosen)); k < static_cast<int>(std::ssize(all)); ++k)
-    open.push_back(k);
+  std::iota(open.begin(), open.end(), begun);
+  const auto cost = [&](int k) { return candidates[k - begun].cost; };
   // The factors chosen before are relaxed: each had its optimum with those that were there then,
   // and together they would claim more and more, so that further gains would be misjudged.
   const auto relax = [&] {
@@ -208,22 +224,31 @@ std::vector<FactorChoice> ExpectedDivergence::choose(const DenseBlanket& blanket
   };
   double relax_at = 0.0;
   while (true) {
+    std::erase_if(open, [&](int k) { return cost(k) > budget; });
+    if (open.empty()) return chosen;
     Approximation::Best best;
+    double most = 0.0;  // per cost
     auto which = open.end();
     for (auto k = open.begin(); k != open.end(); ++k) {
       check_interruption();
-      if (which != open.end() && at.bound(*k) <= best.gain) continue;
+      if (which != open.end() && at.bound(*k) <= most * cost(*k)) continue;
       Approximation::Best tried = at.best(*k);
-      if (which == open.end() || tried.gain > best.gain) {
+      if (which == open.end() || tried.gain > most * cost(*k)) {
+        most = tried.gain / cost(*k);
         best = std::move(tried);
         which = k;
       }
     }
-    at.change(*which, best.W);
-    in.push_back(*which);
-    chosen.push_back(all[*which]);
+    const int added = *which;
+    at.change(added, best.W);
+    in.push_back(added);
+    chosen.push_back(all[added]);
+    budget -= cost(added);
+    if (budget <= 0) return chosen;
     open.erase(which);
-    if (static_cast<int>(std::ssize(chosen)) >= population) return chosen;
+    if (excludes) {
+      std::erase_if(open, [&](int k) { return excludes(all[added].front(), all[k].front()); });
+    }
     if (static_cast<double>(std::ssize(in)) >= relax_at) {
       relax();
       relax_at = (1.0 + kGrowth) * static_cast<double>(std::ssize(in));
@@ -321,7 +346,8 @@ std::vector<FactorChoice> Exhaustive::choose(const DenseBlanket& blanket, int po
   const int count = std::clamp(population - priors, tree_size(blanket) - priors, all);
   double topologies = 1.0;
   for (int k = 0; k < count; ++k) topologies *= static_cast<double>(all - k) / (k + 1);
-  if (topologies > static_cast<double>(most_)) {
+  instead_ = topologies > static_cast<double>(most_);
+  if (instead_) {
     if (beyond_ == Beyond::ekld) {
       ExpectedDivergence instead(options_);
       instead.watch([this] {
@@ -363,6 +389,14 @@ std::vector<FactorChoice> Exhaustive::choose(const DenseBlanket& blanket, int po
   if (best.empty())
     throw Error(ErrorCode::usage, "the nodes of a blanket cannot be connected by relative factors");
   return best;
+}
+
+std::string Exhaustive::note() const {
+  if (!instead_) return {};
+  return fmt::format(
+      "the topology is that of ekld instead of best, since there are more than {} to try (its "
+      "options most and beyond)",
+      most_);
 }
 
 }  // namespace cairn::sparsify

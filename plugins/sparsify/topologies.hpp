@@ -3,7 +3,9 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <memory>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -129,10 +131,33 @@ class DowndatedInformation final : public ChowLiuTree {
 
 /// That tree, and one by one the factor that lowers the KLD most by one step of factor descent;
 /// after each tenth of them the factors chosen so far are relaxed by two passes of it.
-class ExpectedDivergence final : public ChowLiuTree {
+class ExpectedDivergence : public ChowLiuTree {
  public:
   using ChowLiuTree::ChowLiuTree;
   std::vector<FactorChoice> choose(const DenseBlanket& blanket, int population) override;
+
+ protected:
+  /// What a factor could be, and what it takes of the budget.
+  struct Candidate {
+    int model;
+    int cost;
+  };
+  /// Adds candidates to a topology that connects all nodes, as long as the budget lasts: always the
+  /// one with the largest gain for its cost of those left, whereupon those that it excludes go.
+  std::vector<FactorChoice> grow(const DenseBlanket& blanket, std::vector<FactorChoice> chosen,
+                                 const std::vector<Candidate>& candidates, int budget,
+                                 const std::function<bool(int, int)>& excludes);
+};
+
+/// The same with factors of fewer rows as well: of a position, an orientation, a bearing or a range
+/// alone, and, in an absolute blanket, more priors. The population is one of rows: as many as that
+/// many whole factors have, and each candidate's gain is divided by its rows. The information of a
+/// factor of a part is semidefinite.
+class MixedParts final : public ExpectedDivergence {
+ public:
+  using ExpectedDivergence::ExpectedDivergence;
+  std::vector<FactorChoice> choose(const DenseBlanket& blanket, int population) override;
+  bool parts() const override { return true; }
 };
 
 /// Pairs by |det Λ_ij|, a spanning tree first.
@@ -178,16 +203,18 @@ class DenseConstraint final : public Topology {
 };
 
 /// Every topology of that population is tried, and the one with the least KLD taken; where there
-/// are too many, that of `ekld`, or `choose` throws `Error` (usage).
+/// are too many, that of `ekld`, with a note, or `choose` throws `Error` (usage).
 class Exhaustive final : public ChowLiuTree {
  public:
   explicit Exhaustive(const ExhaustiveOptions& options)
       : ChowLiuTree(options.tree), most_(options.most), beyond_(options.beyond) {}
   std::vector<FactorChoice> choose(const DenseBlanket& blanket, int population) override;
+  std::string note() const override;
 
  private:
   std::int64_t most_;
   Beyond beyond_;
+  bool instead_ = false;  ///< the last blanket got the topology of ekld
 };
 
 }  // namespace cairn::sparsify

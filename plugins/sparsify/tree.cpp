@@ -89,6 +89,16 @@ std::vector<int> pair_models(const DenseBlanket& blanket) {
   return models;
 }
 
+std::vector<int> prior_models(const DenseBlanket& blanket) {
+  std::vector<int> models;
+  std::set<int> seen;
+  for (int k = 0; k < static_cast<int>(std::ssize(blanket.models)); ++k) {
+    const std::vector<int>& nodes = blanket.models[k].nodes;
+    if (nodes.size() == 1 && seen.insert(nodes.front()).second) models.push_back(k);
+  }
+  return models;
+}
+
 void fill_up(const DenseBlanket& blanket, const std::vector<Pair>& pairs, int population,
              std::vector<FactorChoice>& chosen) {
   std::vector<bool> taken(blanket.models.size());
@@ -112,11 +122,9 @@ std::vector<FactorChoice> tree_first(const DenseBlanket& blanket, const std::vec
     std::vector<Pair> ranked = pairs;
     std::ranges::stable_sort(ranked, {}, [&](const Pair& pair) { return costs[pair.model]; });
     chosen = spanning_tree(blanket, ranked);
-    int prior = -1;
-    for (int k = 0; blanket.absolute && k < static_cast<int>(costs.size()); ++k) {
-      if (blanket.models[k].nodes.size() == 1 && (prior < 0 || costs[k] < costs[prior])) prior = k;
-    }
-    if (prior >= 0) chosen.push_back({prior});
+    const std::vector<int> priors = blanket.absolute ? prior_models(blanket) : std::vector<int>();
+    const auto prior = std::ranges::min_element(priors, {}, [&](int k) { return costs[k]; });
+    if (prior != priors.end()) chosen.push_back({*prior});
   } else {
     chosen = spanning_tree(blanket, pairs);
   }

@@ -21,6 +21,9 @@ double log_determinant(const Eigen::MatrixXd& A);
 /// The models of pairs of nodes; of several between the same two nodes the first.
 std::vector<int> pair_models(const DenseBlanket& blanket);
 
+/// The models of single nodes, the first of each: priors.
+std::vector<int> prior_models(const DenseBlanket& blanket);
+
 /// Adds pairs that are not chosen yet, in their order, until `population` factors are.
 void fill_up(const DenseBlanket& blanket, const std::vector<Pair>& pairs, int population,
              std::vector<FactorChoice>& chosen);

@@ -221,6 +221,54 @@ TEST_F(Sparsify, ReplaysWhatItRecorded) {
   EXPECT_NEAR(all, number(told.at("problems").at("kld")), 1e-3 * (1.0 + all));
 }
 
+TEST_F(Sparsify, SaysForHowManyBlanketsBestHadTooManyToTry) {
+  const std::string file = folder_.file("problems.json");
+  for (const Arguments& how : {Arguments{}, Arguments{"--online", "50"}}) {
+    Arguments arguments{"@manhattan:poses=150,streets=4",
+                        "--keep-every",
+                        "3",
+                        "--topology",
+                        "best:most=100",
+                        "--record",
+                        file};
+    arguments.insert(arguments.end(), how.begin(), how.end());
+    const boost::json::value told = study(arguments);
+    // As many as have more than 100 topologies of that population.
+    const boost::json::value recorded = parse_json(read_text(file));
+    std::int64_t large = 0;
+    for (const boost::json::value& problem : recorded.at("problems").as_array()) {
+      const double nodes = static_cast<double>(problem.at("blanket").as_array().size());
+      const double pairs = nodes * (nodes - 1.0) / 2.0, count = std::min(pairs, 2.0 * (nodes - 1));
+      large += std::round(std::exp(std::lgamma(pairs + 1) - std::lgamma(count + 1) -
+                                   std::lgamma(pairs - count + 1))) > 100.0;
+    }
+    ASSERT_GT(large, 0);
+    ASSERT_LT(large, told.at("problems").at("count").as_int64());
+    const boost::json::array& notes = told.at("problems").at("notes").as_array();
+    ASSERT_THAT(notes, SizeIs(1));
+    EXPECT_EQ(notes[0].at("problems").as_int64(), large);
+    // On the screen once.
+    const std::string line = std::to_string(large) + " of " +
+                             std::to_string(told.at("problems").at("count").as_int64()) +
+                             " blankets: ";
+    std::int64_t lines = 0;
+    for (const boost::json::value& note : told.at("notes").as_array())
+      lines += note.as_string().starts_with(line);
+    EXPECT_EQ(lines, 1);
+  }
+  const boost::json::value again = study({file, "--topology", "best:most=100"}, "problems");
+  std::int64_t all = 0, by_size = 0;
+  for (const boost::json::value& row : again.at("rows").as_array()) {
+    for (const boost::json::value& note : row.at("notes").as_array())
+      (row.at("nodes").is_null() ? all : by_size) += note.at("problems").as_int64();
+  }
+  EXPECT_GT(all, 0);
+  EXPECT_EQ(all, by_size);
+  EXPECT_THAT(
+      report({"@manhattan:poses=60", "--topology", "best"}).at("problems").at("notes").as_array(),
+      SizeIs(0));
+}
+
 TEST_F(Sparsify, SaysWhatIsWrongAndWhatWouldWork) {
   const auto refused = [](Arguments arguments, int code, const Arguments& command = {"sparsify"}) {
     arguments.insert(arguments.begin(), command.begin(), command.end());

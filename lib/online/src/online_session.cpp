@@ -168,6 +168,7 @@ void OnlineSession::write_removal(const PoseRemover::Removal& removal, FactorId 
   if (removal.note != noted_ && !removal.note.empty())
     reply.text += fmt::format("NOTE {}\n", removal.note);
   if (!removal.note.empty() || !removal.empty()) noted_ = removal.note;
+  for (const std::string& note : removal.notes) reply.text += fmt::format("NOTE {}\n", note);
   if (removal.empty()) return;
   for (const Id id : removal.update.removed_variables)
     reply.text += fmt::format("REMOVED {}\n", id);

@@ -62,7 +62,7 @@ void MapSparsifier::prepare() {
 }
 
 PoseRemover::Removal MapSparsifier::removal_of(const Sparsification& change, const Graph& graph,
-                                               Estimator& estimator) const {
+                                               Estimator& estimator) {
   const std::vector<FactorId> ids = estimator.factors();  // by position in its graph
   if (std::ssize(ids) != graph.factor_count())
     throw std::logic_error("the graph of an estimator has other factors than it names");
@@ -72,6 +72,9 @@ PoseRemover::Removal MapSparsifier::removal_of(const Sparsification& change, con
     removal.update.removed_variables.push_back(graph.id(v));
   removal.update.factors = change.factors;
   for (Factor& factor : removal.update.factors) factor.loss = plain_loss();
+  for (const SparsificationNote& note : change.notes) {
+    if (said_.insert(note.text).second) removal.notes.push_back(note.text);
+  }
   return removal;
 }
 

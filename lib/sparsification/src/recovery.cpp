@@ -18,12 +18,16 @@ using MatrixMap = Eigen::Map<const Matrix>;
 
 /// Eigenvalues below this part of the largest are taken for zero, after scaling to unit diagonal.
 constexpr double kZero = 1e-12;
+/// Diagonal elements of Λ that are squares of rounding, as a part of the largest: nothing is known
+/// of that coordinate, and scaling would make rounding of it information.
+constexpr double kRounding = 1e-26;
 
 /// By a rank-revealing eigendecomposition. Λ is scaled to a unit diagonal first, since metres and
 /// radians do not compare.
 Matrix by_eigenvectors(const Matrix& L) {
   Vector scale = L.diagonal();
-  for (double& s : scale) s = s > 0.0 ? 1.0 / std::sqrt(s) : 0.0;
+  const double least = kRounding * scale.maxCoeff();
+  for (double& s : scale) s = s > least ? 1.0 / std::sqrt(s) : 0.0;
   const Matrix scaled = scale.asDiagonal() * L * scale.asDiagonal();
   const Matrix symmetric = 0.5 * (scaled + scaled.transpose());
   const Eigen::SelfAdjointEigenSolver<Matrix> eigen(symmetric);

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include <fmt/core.h>
+
 #include "cairn/sparsification/selection.hpp"
 
 namespace cairn {
@@ -25,6 +27,23 @@ SparsificationSeconds& SparsificationSeconds::operator+=(const SparsificationSec
   return *this;
 }
 
+void Sparsification::note(const std::string& text, int applies) {
+  if (text.empty()) return;
+  const auto at = std::ranges::find(notes, text, &SparsificationNote::text);
+  if (at == notes.end()) {
+    notes.push_back({text, applies});
+  } else {
+    at->problems += applies;
+  }
+}
+
+std::vector<std::string> Sparsification::note_lines() const {
+  std::vector<std::string> lines;
+  for (const SparsificationNote& note : notes)
+    lines.push_back(fmt::format("{} of {} blankets: {}", note.problems, problems, note.text));
+  return lines;
+}
+
 void Sparsification::add(const Sparsification& later) {
   const int all = problems + later.problems;
   if (all > 0) mean_blanket = (problems * mean_blanket + later.problems * later.mean_blanket) / all;
@@ -33,6 +52,8 @@ void Sparsification::add(const Sparsification& later) {
   refused.insert(refused.end(), later.refused.begin(), later.refused.end());
   kld += later.kld;
   not_converged += later.not_converged;
+  for (const SparsificationNote& later_note : later.notes)
+    note(later_note.text, later_note.problems);
   seconds += later.seconds;
 }
 

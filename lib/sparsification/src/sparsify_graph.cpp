@@ -103,6 +103,12 @@ std::vector<int> select(const Graph& graph, const std::vector<int>& nodes, Parts
   return chosen;
 }
 
+/// Of the sparsification, once all nodes have left.
+void add_notes(SparsifyResult& result) {
+  const std::vector<std::string> lines = result.change.note_lines();
+  result.notes.insert(result.notes.end(), lines.begin(), lines.end());
+}
+
 void measure(const Graph& original, Parts& parts, SparsifyResult& result) {
   const bool measured = measure_or_note(result, "no KLD", [&] {
     result.error =
@@ -149,6 +155,7 @@ SparsifyResult sparsify_whole(const Graph& graph, const SparsifyJob& job,
   std::stable_partition(nodes.begin(), nodes.end(),
                         [&](int v) { return !is_point(original.type(v)); });
   result.change = take_out(original, nodes, parts, setting);
+  add_notes(result);
   result.interrupted = setting.interrupted();
   result.sparse = original.clone();
   apply(result.change, result.sparse);
@@ -315,6 +322,7 @@ class OnlineRun {
     estimator_->update({}, {.full = true});
     result_.sparse = estimator_->graph();
     result_.chi2_after = estimator_->chi2();
+    add_notes(result_);
     if (failed_ > 0)
       result_.notes.push_back(fmt::format("{} updates were not positive definite", failed_));
     if (!job_.measure || result_.interrupted) return;

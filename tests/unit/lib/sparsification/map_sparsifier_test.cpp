@@ -509,6 +509,22 @@ TEST_P(MapSparsifierOf, SaysWhyTooManyStay) {
   EXPECT_THAT(removal.note, HasSubstr("all are fixed, anchored, or among the newest"));
 }
 
+TEST_P(MapSparsifierOf, SaysOnceWhatTheSparsifierNotes) {
+  estimator_->update(ring(0.01));
+  minimise();
+  MapSparsifier sparsifier(registry_,
+                           {"sparsify", {{"topology", "best:most=1"}, {"population", "tree:1"}}},
+                           {"oldest", {}});
+  std::size_t said = 0;
+  for (const int limit : {9, 8, 7, 6, 5, 4}) {
+    const PoseRemover::Removal removal = sparsifier.make_room(*estimator_, limit, {});
+    for (const std::string& note : removal.notes) EXPECT_THAT(note, HasSubstr("ekld"));
+    said += removal.notes.size();
+    estimator_->update(removal.update);
+  }
+  EXPECT_EQ(said, 1U);
+}
+
 TEST_P(MapSparsifierOf, SelectionsByNameChoose) {
   estimator_->update(ring(0.01));
   minimise();

@@ -135,7 +135,6 @@ TEST_P(SparsifyingSession, RefusesWhatItCannotDoAndChangesNothing) {
       {"SPARSIFY 60", "there is no variable 60 to be removed"},  // no measurement yet
       {"SPARSIFY 2 2", "variable 2 is to leave twice"},
       {"SPARSIFY 0", "marginalising it would leave a linear prior on them instead"},
-      {"SPARSIFY 3", "no factor of the graph measures the position of a landmark"},
       {"SPARSIFY 50", "no factor of the graph measures a whole pose in the world"},
       {"SPARSIFY KEEP", "expected 'SPARSIFY KEEP n' or 'SPARSIFY KEEP ALL'"},
       {"SPARSIFY KEEP 1", "expected a number of poses from 2"},

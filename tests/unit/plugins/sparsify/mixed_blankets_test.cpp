@@ -310,16 +310,6 @@ TEST(MixedBlanketRefusals, NameTheNodeAndTheReason) {
   EXPECT_THAT(world.refusal(10), IsEmpty());
   world.graph.set_fixed(world.index(1));
   EXPECT_THAT(world.refusal(1), HasSubstr("VERTEX_SE2 1 is held"));
-
-  World bearings(2, 71);
-  bearings.pose(0);
-  bearings.pose(1);
-  bearings.landmark(10);
-  bearings.relate(0, 1);
-  bearings.bearing_range(0, 10);
-  EXPECT_THAT(bearings.refusal(0), HasSubstr("position of a landmark in the frame of a pose"));
-  bearings.observe(1, 10);
-  EXPECT_THAT(bearings.refusal(0), IsEmpty());
 }
 
 INSTANTIATE_TEST_SUITE_P(InThePlaneAndInSpace, MixedBlankets, testing::Values(2, 3));

@@ -263,6 +263,23 @@ TEST_F(Topologies, BestIsThatOfEkldWhereThereAreMoreThanItMayTry) {
   EXPECT_THAT(other, Gt(0));
 }
 
+TEST_F(Topologies, BestSaysOfEachBlanketWhetherItWasTooLarge) {
+  Draw draw(6);
+  const DenseBlanket small = random_blanket(registry, 2, 4, draw, 3);
+  const DenseBlanket large = random_blanket(registry, 2, 5, draw, 3);
+  Exhaustive best(ExhaustiveOptions{.most = 20});
+  EXPECT_EQ(best.note(), "");
+  best.choose(small, 3);  // 6 over 3 are 20
+  EXPECT_EQ(best.note(), "");
+  best.choose(large, 4);
+  const std::string note = best.note();
+  EXPECT_THAT(note, testing::AllOf(HasSubstr("ekld"), HasSubstr("20"), HasSubstr("most")));
+  best.choose(large, 5);  // the same words, so that they can be counted
+  EXPECT_EQ(best.note(), note);
+  best.choose(small, 3);
+  EXPECT_EQ(best.note(), "");
+}
+
 TEST_F(Topologies, BestMayRefuseMoreThanItMayTry) {
   Draw draw(6);
   const DenseBlanket blanket = random_blanket(registry, 2, 5, draw, 3);

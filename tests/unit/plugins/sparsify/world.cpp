@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "unit/plugins/sparsify/world.hpp"
 
+#include <cmath>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <Eigen/Dense>
@@ -44,7 +46,11 @@ void World::observe(Id pose, Id landmark) {
 }
 
 void World::bearing_range(Id pose, Id landmark) {
-  add("EDGE_BEARING_RANGE_SE2_XY", {index(pose), index(landmark)}, {0.3, 2.0});
+  const Pose from = pose_of(graph.type(index(pose)), graph.state(index(pose)));
+  const Eigen::Vector3d to = position(graph.type(index(landmark)), graph.state(index(landmark)));
+  const Eigen::Vector3d seen = from.R.transpose() * (to - from.t);
+  add("EDGE_BEARING_RANGE_SE2_XY", {index(pose), index(landmark)},
+      {std::atan2(seen.y(), seen.x()), seen.norm()});
 }
 
 void World::place(Id id) {
@@ -55,15 +61,24 @@ void World::place(Id id) {
       {index(id)}, {x.begin(), x.end()});
 }
 
+void World::locate(Id id) {
+  const auto type = registry_.factor_type(plane() ? "EDGE_PRIOR_SE2" : "EDGE_PRIOR_SE3:QUAT");
+  const auto x = graph.state(index(id));
+  Matrix information = Matrix::Zero(type->residual_size(), type->residual_size());
+  information.topLeftCorner(dimension_, dimension_) = 20.0 * draw_.definite(dimension_);
+  graph.add_factor(type, std::vector<int>{index(id)}, {x.begin(), x.end()}, pack(information));
+}
+
 std::vector<int> World::indices(const std::vector<Id>& ids) const {
   std::vector<int> all;
   for (const Id id : ids) all.push_back(index(id));
   return all;
 }
 
-DenseBlanket World::blanket(const std::vector<Id>& removed) const {
+DenseBlanket World::blanket(const std::vector<Id>& removed, bool parts) const {
   const WorkGraph work(graph);
-  const LocalProblem local = crop(work, indices(removed));
+  LocalProblem local = crop(work, indices(removed));
+  local.parts = parts;
   EXPECT_THAT(local.refusal, testing::IsEmpty());
   return marginalize(work, local, LocalMinimum::measured).dense;
 }

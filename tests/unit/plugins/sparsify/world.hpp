@@ -23,9 +23,11 @@ class World {
   void bearing_range(Id pose, Id landmark);
   /// A pose or a landmark in the world.
   void place(Id id);
+  /// A pose's position in the world, and not its orientation.
+  void locate(Id id);
   int index(Id id) const { return graph.find(id).value(); }
   std::vector<int> indices(const std::vector<Id>& ids) const;
-  DenseBlanket blanket(const std::vector<Id>& removed) const;
+  DenseBlanket blanket(const std::vector<Id>& removed, bool parts = false) const;
   std::string refusal(Id id) const;
   Sparsification removal(const std::vector<Id>& ids, const std::string& sparsifier = "sparsify");
   Graph without(const std::vector<Id>& ids, const std::string& sparsifier = "sparsify");

@@ -3,6 +3,7 @@
 
 #include <span>
 #include <string>
+#include <vector>
 
 #include "cairn/graph/update.hpp"
 #include "cairn/runtime/api.hpp"
@@ -22,6 +23,8 @@ class CAIRN_API PoseRemover {
     /// Markov blankets [nats].
     double kld = 0.0;
     std::string note;  ///< why fewer poses leave than were asked for; empty: they do
+    /// What else should be known. Each is said once by a remover, when it first applies.
+    std::vector<std::string> notes{};
 
     bool empty() const { return update.empty(); }
     /// Makes it a part of another update: the new factors are the first of that.

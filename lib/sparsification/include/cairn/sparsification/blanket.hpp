@@ -21,7 +21,9 @@ struct DenseBlanket {
   /// which are smaller.
   std::vector<int> node_sizes;
   std::vector<double> information;  ///< Λ, d × d
-  std::vector<FactorModel> models;  ///< what a topology can choose from
+  /// What a topology can choose from: a whole measurement for each pair of nodes, and for single
+  /// nodes where it is absolute, each followed by its parts if the topology asks for them.
+  std::vector<FactorModel> models;
   /// An absolute measurement led to it, so Λ does not leave the pose of the whole open; there are
   /// models on single nodes (priors).
   bool absolute = false;

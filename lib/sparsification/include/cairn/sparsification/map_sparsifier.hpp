@@ -2,7 +2,9 @@
 #pragma once
 
 #include <memory>
+#include <set>
 #include <span>
+#include <string>
 
 #include "cairn/graph/graph.hpp"
 #include "cairn/online/pose_remover.hpp"
@@ -61,12 +63,13 @@ class CAIRN_API MapSparsifier final : public PoseRemover {
   Removal make_room(Estimator& estimator, int limit, const GraphUpdate& coming) override;
 
  private:
-  Removal removal_of(const Sparsification& change, const Graph& graph, Estimator& estimator) const;
+  Removal removal_of(const Sparsification& change, const Graph& graph, Estimator& estimator);
 
   Registry& registry_;
   ComponentSpec sparsifier_spec_, selection_spec_;
   std::unique_ptr<Sparsifier> sparsifier_;
   std::unique_ptr<NodeSelection> selection_;
+  std::set<std::string> said_;  ///< notes of the sparsifier that a removal has had
 };
 
 }  // namespace cairn

@@ -47,6 +47,12 @@ struct RefusedNode {
   std::string reason;
 };
 
+/// What should be known of some of the problems.
+struct SparsificationNote {
+  std::string text;
+  int problems = 0;  ///< to which it applies
+};
+
 /// The result of removing nodes from a graph. Nothing has changed yet: see `apply`.
 struct Sparsification {
   std::vector<int> removed_variables;  ///< by index, rising
@@ -57,10 +63,15 @@ struct Sparsification {
   int problems = 0;           ///< blankets that got factors
   double mean_blanket = 0.0;  ///< nodes of a blanket, on average
   int largest_blanket = 0;
-  double kld = 0.0;       ///< sum over the problems, each by itself [nats]
-  int not_converged = 0;  ///< recoveries that ended before
+  double kld = 0.0;                       ///< sum over the problems, each by itself [nats]
+  int not_converged = 0;                  ///< recoveries that ended before
+  std::vector<SparsificationNote> notes;  ///< each text once
   SparsificationSeconds seconds;
 
+  /// Counts `problems` more to which a text applies. An empty text is none.
+  CAIRN_API void note(const std::string& text, int problems = 1);
+  /// Each note in one line, with its count.
+  CAIRN_API std::vector<std::string> note_lines() const;
   /// Adds what was done after this, on the graph that this led to.
   CAIRN_API void add(const Sparsification& later);
 };

@@ -20,13 +20,21 @@ class CAIRN_API Topology : public Interruptible {
   ~Topology() override;
 
   /// At most `population` factors that connect all nodes, the most important first; at least as
-  /// many as a spanning tree has. One of them is a prior where the blanket is absolute. Throws
-  /// `Error` (usage) for a blanket that it does not know how to connect.
+  /// many as a spanning tree has; with `parts` more, of as many rows. One of them is a prior where
+  /// the blanket is absolute. Throws `Error` (usage) for a blanket that it does not know how to
+  /// connect.
   virtual std::vector<FactorChoice> choose(const DenseBlanket& blanket, int population) = 0;
 
   /// Whether its factor is one on all nodes of a blanket: that is the only model which it gets, and
   /// its information is the identity.
   virtual bool whole() const { return false; }
+  /// Whether it also chooses from models of a part of what a factor measures, as of a position
+  /// without the orientation. These then come after the whole one on the same nodes.
+  virtual bool parts() const { return false; }
+  /// Whether the last `choose` did something else than was asked for, and what: a sentence that is
+  /// the same for every blanket to which it happens, so that these can be counted. Empty: it did
+  /// not.
+  virtual std::string note() const { return {}; }
   /// What its factors are that no format of graphs expresses, for messages; empty: none.
   virtual std::string_view unwritable() const { return {}; }
 };
