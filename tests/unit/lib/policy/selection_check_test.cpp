@@ -158,6 +158,27 @@ TEST(SelectionCheck, AFewPosesShowNothing) {
   EXPECT_THAT(everything_kept(10).advice(), SizeIs(1));
 }
 
+TEST(SelectionCheck, PosesThatStayForTheirLandmarksRaiseTheThresholdOfThese) {
+  SelectionCheck check;
+  for (int k = 0; k < 40; ++k) {
+    PoseReport pose;
+    pose.kept = k % 10 != 9;
+    pose.landmarks = {{.added = true, .gain = 1e9, .verdict = LinkVerdict::linked},
+                      {.gain = 0.5, .verdict = LinkVerdict::uninformative}};
+    if (pose.kept) {
+      pose.landmarks.push_back({.gain = 1.0 + 0.1 * (k % 10), .verdict = LinkVerdict::linked});
+      pose.landmarks.push_back({.gain = 0.9, .verdict = LinkVerdict::linked});
+    }
+    check.add(pose);
+  }
+  const auto advice = check.advice(nullptr, 0);
+  ASSERT_THAT(advice, SizeIs(1));
+  EXPECT_THAT(advice.front().finding, HasSubstr("measurement of a landmark"));
+  // The mean of the largest of each but the first pose, which is kept in any case.
+  const double mean = (4 * (9 + 0.1 * 36) - 1.0) / 35;
+  EXPECT_NEAR(std::stod(advice.front().options.at("landmark_gain")), mean, 0.006);
+}
+
 TEST(SelectionCheck, WhereASearchKeptAllTheSmallerTrialWithTheLeastErrorIsAdvised) {
   FoundThresholds found;
   found.tolerance = 2.0;

@@ -30,10 +30,11 @@ class CAIRN_API SelectionCheck {
 
   /// Where the policy has kept at least nine of ten poses, or has used no loop closure: for that
   /// reason of several which the reports show. Of poses kept: thresholds that a search has lowered
-  /// to reach its tolerance, poses that stay since they close a loop, steps longer than the
-  /// sensor's range, and steps of odometry whose information gain exceeds the threshold of poses.
-  /// Of loop closures: no pose within range of another, information gains below the threshold
-  /// before or after the match, pairs that do not match, and matches that contradict the estimate.
+  /// to reach its tolerance, poses that stay since they close a loop or measure a landmark, steps
+  /// longer than the sensor's range, and steps of odometry whose information gain exceeds the
+  /// threshold of poses. Of loop closures: no pose within range of another, information gains below
+  /// the threshold before or after the match, pairs that do not match, and matches that contradict
+  /// the estimate.
   ///
   /// `found` are the thresholds that were found for the run, if they were; `loops` is how many loop
   /// closures a recording has, if it is one. Nothing where the selection is as it should be, or of
