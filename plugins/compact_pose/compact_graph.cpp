@@ -22,6 +22,16 @@ using Clock = std::chrono::steady_clock;
 
 }  // namespace
 
+void need_covariance(bool there, Id id) {
+  if (there) return;
+  throw Error(
+      ErrorCode::numerical,
+      fmt::format("there is no covariance of {} to judge measurements by: the measurements do not "
+                  "determine it, or rounding takes its digits, as on a long trajectory without "
+                  "loop closures whose steps are far more accurate than its headings",
+                  id));
+}
+
 CompactGraph::CompactGraph(std::unique_ptr<Estimator> estimator, CompositionOrder order,
                            KeptMarginals marginals)
     : estimator_(std::move(estimator)), order_(order) {
@@ -455,13 +465,15 @@ void CompactGraph::prepare(std::span<const int> poses, PolicySeconds& seconds) {
   if (!ids.empty()) {
     know_anchor();
     Eigen::MatrixXd column(std::ssize(ids) * n, n);
-    estimator_->covariance_column(anchor_id, ids,
-                                  {column.data(), static_cast<std::size_t>(column.size())});
+    need_covariance(estimator_->covariance_column(
+                        anchor_id, ids, {column.data(), static_cast<std::size_t>(column.size())}),
+                    anchor_id);
     for (std::size_t k = 0; k < missing.size(); ++k) {
       Kept& pose = kept_[missing[k]];
       pose.cross = column.middleRows(static_cast<Eigen::Index>(k) * n, n);
       pose.own.resize(n, n);
-      estimator_->covariance(pose.id, pose.id, {pose.own.data(), doubles});
+      need_covariance(estimator_->covariance(pose.id, pose.id, {pose.own.data(), doubles}),
+                      pose.id);
       pose.version = version_;
     }
   }
@@ -521,7 +533,9 @@ void CompactGraph::set_covariance(int pose, Displacement& d) const {
 /// Σ_ik of two poses that the estimator has.
 Matrix CompactGraph::block(int i, int k) {
   Matrix S(group_->tangent_size(), group_->tangent_size());
-  estimator_->covariance(kept_[i].id, kept_[k].id, {S.data(), static_cast<std::size_t>(S.size())});
+  need_covariance(estimator_->covariance(kept_[i].id, kept_[k].id,
+                                         {S.data(), static_cast<std::size_t>(S.size())}),
+                  kept_[k].id);
   return S;
 }
 

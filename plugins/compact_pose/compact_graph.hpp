@@ -21,6 +21,9 @@
 
 namespace cairn::compact {
 
+/// Throws `Error` (numerical) where an estimator has no covariance of a variable.
+void need_covariance(bool there, Id id);
+
 /// A compact pose graph while it grows: the poses that are kept, in an estimator, and the newest
 /// pose, which may not be kept.
 ///

@@ -129,7 +129,9 @@ MatrixXd CompactGraph::landmark_covariance(std::span<const Id> landmarks, Policy
   for (const Id id : landmarks) {
     const Eigen::Index size = landmark(id)->tangent_size();
     MatrixXd block(last + n, size);
-    estimator_->covariance_column(id, ids, {block.data(), static_cast<std::size_t>(block.size())});
+    need_covariance(estimator_->covariance_column(
+                        id, ids, {block.data(), static_cast<std::size_t>(block.size())}),
+                    id);
     joint.block(0, column, last, size) = block.topRows(last);
     joint.block(last, column, n, size) = A_ * block.bottomRows(n);
     joint.block(column, last, size, n) = joint.block(last, column, n, size).transpose();

@@ -133,5 +133,30 @@ TEST_F(CompactPoseTest, ATypeThatIsNoRigidMotionIsRefused) {
   EXPECT_TRUE(policy->end_pose().kept);
 }
 
+// Rounding takes the digits of the last poses' covariances: no decision is made of what is left.
+TEST_F(CompactPoseTest, DecidesNothingByACovarianceWithoutDigits) {
+  const PoseWorld world{planar_types(registry)};
+  const auto policy = registry.make<PosePolicy>("compact_pose:range=1000,angle=3.15,pose_gain=0");
+  const MatrixXd S = Eigen::Vector3d(1e-8, 1e-8, 1e-2).asDiagonal();
+  const auto step = [&](Id from, Id to) {
+    return world.edge(from, to, {100.0 * static_cast<double>(to - from), 0.0, 0.0}, S);
+  };
+  policy->add_pose(world.variable(0, world.identity(), true), {});
+  const auto drive_and_match = [&] {
+    for (Id k = 1; k <= 100; ++k) {
+      policy->end_pose();
+      const Factor odometry = step(k - 1, k);
+      policy->add_pose(world.variable(k), {&odometry, 1});
+    }
+    // Between neighbours, so that the poses before are as uncertain as they were.
+    for (const Id other : {98, 97}) {
+      const Factor link = step(other, 100);
+      policy->offer(other, {&link, 1});
+    }
+  };
+  EXPECT_THAT(message_of(drive_and_match, ErrorCode::numerical),
+              HasSubstr("there is no covariance of "));
+}
+
 }  // namespace
 }  // namespace cairn::compact
