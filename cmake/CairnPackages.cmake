@@ -155,6 +155,10 @@ foreach(package IN LISTS plugin_packages)
 ${what_it_is}${summaries}"
     DEPENDS libraries program COMMENT "${licences}")
 endforeach()
+# What each of them offers, for the message where it is not installed (core/src/plugin/plugin_loader.hpp).
+get_property(packaged_names GLOBAL PROPERTY CAIRN_PACKAGED_NAMES)
+file(WRITE ${control_folder}/packages.txt "${packaged_names}")
+install(FILES ${control_folder}/packages.txt DESTINATION ${CMAKE_INSTALL_LIBDIR}/cairn COMPONENT program)
 list(TRANSFORM plugin_packages PREPEND cairn-plugin-)
 set(recommended ${plugin_packages})  # what commands need: cairn plot, cairn explore
 list(FILTER recommended INCLUDE REGEX "-(plot|exploration)$")

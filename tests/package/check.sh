@@ -79,6 +79,15 @@ cairn=$root/usr/bin/cairn
 [[ $(grep -o '"file": *"[^"]*"' "$work/plugins.json" | sort -u | wc -l) == $(find "$root" -path '*/cairn/*.json' | wc -l) ]] ||
   fail "not all plugins are found, or others"
 grep -o '"file": *"[^"]*"' "$work/plugins.json" | grep -vF "\"$root/" && fail "plugins are found elsewhere"
+# Where a package is not installed, its name is known all the same.
+names=$(find "$root" -path '*/cairn/packages.txt')
+while read -r kind name package; do
+  find "$work/apart/$package" -name '*.json' -exec grep -hF "\"kind\": \"$kind\", \"name\": \"$name\"" {} + >"$work/out" ||
+    fail "$package has no $kind $name"
+done <"$names"
+for package in "$work"/apart/cairn-plugin-*; do
+  grep -q " $(basename "$package")\$" "$names" || fail "nothing of $(basename "$package") is in $names"
+done
 "$cairn" generate manhattan:poses=300 -o "$work/graph.g2o" --quiet --seed 7 >"$work/out" || fail "cairn generate: $(cat "$work/out")"
 "$cairn" optimize "$work/graph.g2o" -o "$work/best.g2o" --quiet >"$work/out" || fail "cairn optimize ends with $?"
 grep -q 'status *converged' "$work/out" || fail "cairn optimize: $(cat "$work/out")"

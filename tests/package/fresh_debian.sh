@@ -51,6 +51,7 @@ done
 status=0
 cairn optimize graph.g2o --linear-solver cholmod >out 2>&1 || status=$?
 ((status == 5)) || fail "cholmod without its package: $status"
+grep -q 'it is in the Debian package cairn-plugin-cholmod' out || fail "its package is not named: $(cat out)"
 cat out
 zcat /usr/share/man/man1/cairn-optimize.1.gz | grep -q 'linear' || fail "no manual page of cairn optimize"
 cairn complete -- optimize --linear-solver b | grep -q '^block_cholesky' || fail "no completion"

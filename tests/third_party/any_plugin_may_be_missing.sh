@@ -79,3 +79,11 @@ for text in "linear solver 'cholmod'" "cholmod.so is missing" block_cholesky eig
   [[ $text == *cholmod* || -e $work/lib/cairn/$text.so ]] || continue
   grep -qF "$text" "$work/out" || fail "no '$text' in: $(cat "$work/out")"
 done
+
+# Where Debian packages are installed, and not that of this plugin.
+rm "$work/lib/cairn/cholmod.json"
+"$cairn" optimize "$graph" --linear-solver cholmod --quiet >"$work/out" 2>&1 && fail "a missing solver was found"
+grep -q 'Debian package' "$work/out" && fail "a package is named that nobody knows: $(cat "$work/out")"
+printf 'linear_solver spqr cairn-plugin-spqr\nlinear_solver cholmod cairn-plugin-cholmod\n' >"$work/lib/cairn/packages.txt"
+"$cairn" optimize "$graph" --linear-solver cholmod --quiet >"$work/out" 2>&1 && fail "a missing solver was found"
+grep -q 'it is in the Debian package cairn-plugin-cholmod$' "$work/out" || fail "its package is not named: $(cat "$work/out")"

@@ -129,6 +129,11 @@ boost::dll::shared_library open_library(const fs::path& library) {
   }
 }
 
+/// The folder of plugins beside the core library.
+fs::path default_folder() {
+  return fs::path(boost::dll::this_line_location().string()).parent_path() / "cairn";
+}
+
 }  // namespace
 
 const char* core_fingerprint() { return CAIRN_ABI_FINGERPRINT; }
@@ -170,6 +175,15 @@ Sidecar read_sidecar(const fs::path& file) {
   return sidecar;
 }
 
+std::string debian_package_with(std::string_view kind, std::string_view name) {
+  std::ifstream lines(default_folder() / "packages.txt");
+  std::string of_kind, of_name, package;
+  while (lines >> of_kind >> of_name >> package) {
+    if (of_kind == kind && of_name == name) return package;
+  }
+  return {};
+}
+
 std::vector<fs::path> plugin_folders(const PluginSearch& search,
                                      std::vector<PluginProblem>& problems) {
   std::vector<fs::path> folders;
@@ -209,9 +223,7 @@ std::vector<fs::path> plugin_folders(const PluginSearch& search,
     else
       add(folder, false);
   }
-  if (search.default_folder) {
-    add(fs::path(boost::dll::this_line_location().string()).parent_path() / "cairn", false);
-  }
+  if (search.default_folder) add(default_folder(), false);
   return folders;
 }
 

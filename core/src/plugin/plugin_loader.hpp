@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "cairn/plugin/plugin.hpp"
@@ -27,6 +28,10 @@ Sidecar read_sidecar(const std::filesystem::path& file);
 /// to, one named in the environment that does not exist) is added to `problems`.
 std::vector<std::filesystem::path> plugin_folders(const PluginSearch& search,
                                                   std::vector<PluginProblem>& problems);
+
+/// The Debian package of cairn's with the plugin that offers this name; empty: none is known.
+/// Debian packages list them in `packages.txt` beside their plugins (cmake/CairnPackages.cmake).
+std::string debian_package_with(std::string_view kind, std::string_view name);
 
 /// Loads a shared object (now, locally, for the rest of the process) and returns its manifest.
 /// Throws `Error` (plugin): the dynamic linker's own words if it cannot be loaded, no entry point,

@@ -157,6 +157,8 @@ struct Registry::Impl {
     if (it == index.end()) {
       std::string message = fmt::format("there is no {}{}", in_words(kind, name),
                                         what_is_on_offer(name, names(kind)));
+      if (const std::string package = debian_package_with(kind, name); !package.empty())
+        message += fmt::format("\n  it is in the Debian package {}", package);
       for (const PluginProblem& problem : problems)
         message += fmt::format("\n  note: {}", problem.message);
       throw plugin_error(message);

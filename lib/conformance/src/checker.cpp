@@ -89,7 +89,12 @@ void Checker::fail(std::string_view law, std::string problem) {
     ++finding.times;
     return;
   }
-  result_.findings.push_back({std::string(law), std::move(problem), input_, 1});
+  result_.findings.push_back({std::string(law), std::move(problem), input(), 1});
+}
+
+std::string Checker::input() const {
+  if (component_.empty() || input_.empty()) return component_ + input_;
+  return component_ + ", " + input_;
 }
 
 void Checker::examine_array(std::string_view callback, const Guarded& array) {

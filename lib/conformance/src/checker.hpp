@@ -62,6 +62,11 @@ class Checker {
 
   const ConformanceOptions& options() const { return options_; }
 
+  /// With which options the component is made from now on, for the descriptions of inputs; empty:
+  /// with its defaults.
+  void set_component(std::string spec) { component_ = std::move(spec); }
+  bool of_defaults() const { return component_.empty(); }
+
   /// Runs `work`, the checks on one input, described by `input`.
   template <class Work>
   void sample(std::string input, const Work& work) {
@@ -76,7 +81,7 @@ class Checker {
 
   /// Before code of the plugin runs that is called otherwise than by `call`, such as a destructor.
   void announce(std::string_view callback) const {
-    if (observer_) observer_->on_call(callback, input_);
+    if (observer_) observer_->on_call(callback, input());
   }
 
   /// Calls the plugin's function `callback`, and returns what it returns. What it throws, and what
@@ -138,13 +143,15 @@ class Checker {
   void note(std::string text) { result_.notes.push_back(std::move(text)); }
 
  private:
+  /// The input, after the component if that is not with its defaults.
+  std::string input() const;
   void examine_array(std::string_view callback, const Guarded& array);
   [[noreturn]] void threw(std::string_view callback, std::string_view what);
 
   ConformanceResult& result_;
   ConformanceOptions options_;
   ConformanceObserver* observer_;
-  std::string input_;
+  std::string component_, input_;
 };
 
 /// What the checks of one group are run on.
@@ -158,6 +165,7 @@ using Checks = void (*)(const Subject&, Checker&);
 struct Group {
   std::string_view name;
   Checks run;
+  bool of_defaults = false;  ///< with default options alone, since it takes its time
 };
 
 // The groups of each kind, one file each.

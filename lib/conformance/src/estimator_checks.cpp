@@ -371,8 +371,8 @@ std::span<const Group> estimator_groups() {
                                                 {"bad updates", check_bad_updates},
                                                 {"changes", check_changes},
                                                 {"copies", check_copies},
-                                                {"memory", memory_group<estimator_uses>},
-                                                {"threads", threads_group<estimator_uses>}}};
+                                                {"memory", memory_group<estimator_uses>, true},
+                                                {"threads", threads_group<estimator_uses>, true}}};
   return groups;
 }
 

@@ -616,8 +616,8 @@ std::span<const Group> factor_groups() {
                                                 {"Jacobians", check_jacobians},
                                                 {"pool", check_pools},
                                                 {"propagate", check_propagate},
-                                                {"memory", memory_group<factor_uses>},
-                                                {"threads", threads_group<factor_uses>},
+                                                {"memory", memory_group<factor_uses>, true},
+                                                {"threads", threads_group<factor_uses>, true},
                                                 {"time", note_time}}};
   return groups;
 }

@@ -269,15 +269,15 @@ Repetition generator_uses(const Subject& subject, Checker& check) {
 std::span<const Group> format_groups() {
   static constexpr std::array<Group, 4> groups{{{"round trip", check_round_trip},
                                                 {"texts that are no graph", check_bad_texts},
-                                                {"memory", memory_group<format_uses>},
-                                                {"threads", threads_group<format_uses>}}};
+                                                {"memory", memory_group<format_uses>, true},
+                                                {"threads", threads_group<format_uses>, true}}};
   return groups;
 }
 
 std::span<const Group> generator_groups() {
   static constexpr std::array<Group, 3> groups{{{"simulation", check_simulation},
-                                                {"memory", memory_group<generator_uses>},
-                                                {"threads", threads_group<generator_uses>}}};
+                                                {"memory", memory_group<generator_uses>, true},
+                                                {"threads", threads_group<generator_uses>, true}}};
   return groups;
 }
 

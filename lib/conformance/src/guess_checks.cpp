@@ -57,8 +57,8 @@ Repetition guess_uses(const Subject& subject, Checker& check) {
 
 std::span<const Group> initial_guess_groups() {
   static constexpr std::array<Group, 3> groups{{{"estimate", check_guess},
-                                                {"memory", memory_group<guess_uses>},
-                                                {"threads", threads_group<guess_uses>}}};
+                                                {"memory", memory_group<guess_uses>, true},
+                                                {"threads", threads_group<guess_uses>, true}}};
   return groups;
 }
 

@@ -362,11 +362,12 @@ Repetition linear_solver_uses(const Subject& subject, Checker& check) {
 }  // namespace
 
 std::span<const Group> linear_solver_groups() {
-  static constexpr std::array<Group, 5> groups{{{"solutions", check_solutions},
-                                                {"systems without a solution", check_failures},
-                                                {"abilities", check_abilities},
-                                                {"memory", memory_group<linear_solver_uses>},
-                                                {"threads", threads_group<linear_solver_uses>}}};
+  static constexpr std::array<Group, 5> groups{
+      {{"solutions", check_solutions},
+       {"systems without a solution", check_failures},
+       {"abilities", check_abilities},
+       {"memory", memory_group<linear_solver_uses>, true},
+       {"threads", threads_group<linear_solver_uses>, true}}};
   return groups;
 }
 

@@ -129,8 +129,8 @@ std::span<const Group> loss_groups() {
   static constexpr std::array<Group, 5> groups{{{"shape", check_shape},
                                                 {"derivatives", check_derivatives},
                                                 {"arrays", check_arrays},
-                                                {"memory", memory_group<loss_uses>},
-                                                {"threads", threads_group<loss_uses>}}};
+                                                {"memory", memory_group<loss_uses>, true},
+                                                {"threads", threads_group<loss_uses>, true}}};
   return groups;
 }
 

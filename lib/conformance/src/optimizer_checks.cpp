@@ -103,10 +103,13 @@ void find_minimum(Graph graph, const std::string& input, const Subject& subject,
     const Graph original = graph.clone();
     const Summary summary = check.call(
         "optimize", [&] { return optimizer->optimize(graph, {.max_iterations = 2000}); });
-    check.expect(chi2(graph) <= least * (1.0 + kMinimum), "chi2 reaches the minimum", [&] {
-      return fmt::format("{} ({}), where dense Gauss-Newton reaches {}", chi2(graph),
-                         to_string(summary.status), least);
-    });
+    // With other options than the defaults it may be slow, as steepest descent is, if it says so.
+    const bool must_arrive = check.of_defaults() || summary.status == Status::converged;
+    check.expect(!must_arrive || chi2(graph) <= least * (1.0 + kMinimum),
+                 "chi2 reaches the minimum", [&] {
+                   return fmt::format("{} ({}), where dense Gauss-Newton reaches {}", chi2(graph),
+                                      to_string(summary.status), least);
+                 });
     check_outcome(graph, before, summary, least, check);
     check.expect(graph.variable_count() == original.variable_count() &&
                      graph.factor_count() == original.factor_count(),
@@ -122,7 +125,8 @@ void find_minimum(Graph graph, const std::string& input, const Subject& subject,
     Graph other = two_laps(8, check.options().seed), again = original.clone();
     check.call("optimize", [&] { return optimizer->optimize(other, {.max_iterations = 5}); });
     check.call("optimize", [&] { return optimizer->optimize(again, {.max_iterations = 2000}); });
-    check.expect(chi2(again) <= least * (1.0 + kMinimum), "an optimizer may be used again",
+    check.expect(!must_arrive || chi2(again) <= least * (1.0 + kMinimum),
+                 "an optimizer may be used again",
                  [&] { return fmt::format("chi2 {} instead of {}", chi2(again), least); });
   });
 }
@@ -320,8 +324,8 @@ std::span<const Group> optimizer_groups() {
   static constexpr std::array<Group, 5> groups{{{"minimum", check_minimum},
                                                 {"stopping", check_stopping},
                                                 {"numbers that are not finite", check_not_finite},
-                                                {"memory", memory_group<optimizer_uses>},
-                                                {"threads", threads_group<optimizer_uses>}}};
+                                                {"memory", memory_group<optimizer_uses>, true},
+                                                {"threads", threads_group<optimizer_uses>, true}}};
   return groups;
 }
 

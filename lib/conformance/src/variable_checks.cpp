@@ -310,8 +310,8 @@ std::span<const Group> variable_groups() {
                                                 {"normalize", check_normalize},
                                                 {"Lie group", check_group},
                                                 {"position", check_placement},
-                                                {"memory", memory_group<variable_uses>},
-                                                {"threads", threads_group<variable_uses>}}};
+                                                {"memory", memory_group<variable_uses>, true},
+                                                {"threads", threads_group<variable_uses>, true}}};
   return groups;
 }
 

@@ -186,6 +186,19 @@ TEST(WrongLoss, IsNamed) {
   EXPECT_THAT(checked.laws_of("misnamed"), Contains("the default is one of the choices"));
   EXPECT_THAT(checked.findings,
               Contains(AllOf(HasSubstr("unmakeable"), HasSubstr("no licence was found"))));
+  EXPECT_THAT(checked.findings,
+              Contains(AllOf(HasSubstr("wrong_choice / derivatives / ρ′ is the derivative of ρ"),
+                             HasSubstr("wrong_choice:weight=wrong, s = "))));
+}
+
+TEST(WrongComponent, ThatThrowsIsNamedWithTheCall) {
+  const Checked checked = check(wrong("wrong_calls"));
+  EXPECT_THAT(checked.laws_of("VERTEX_THROWS"), Contains("local throws nothing"));
+  EXPECT_THAT(
+      checked.laws_of("throws"),
+      IsSupersetOf({"analyze throws nothing", "optimize throws nothing", "compute throws nothing",
+                    "read throws nothing", "generate throws nothing", "evaluate throws nothing"}));
+  EXPECT_THAT(checked.findings, Contains(HasSubstr("it threw: in generate")));
 }
 
 TEST(WrongOptimizer, IsNamed) {

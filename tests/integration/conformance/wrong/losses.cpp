@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Losses that are wrong: a weight that is no derivative, one that writes beyond its outputs, one
-// whose factory throws, and one with an option whose default is none of its choices.
+// whose factory throws, one with an option whose default is none of its choices, and one that is
+// wrong with a choice that is not the default.
 #include <cmath>
 #include <memory>
 #include <span>
@@ -52,4 +53,9 @@ void cairn_register(cairn::Registrar& registrar) {
   registrar.add<Loss>(
       "misnamed", cairn::OptionTable{}.choice("shape", "flat", {"round", "square"}, "its shape"),
       [](const Options&, Registry&) { return std::make_unique<Logarithm>(-1.0); });
+  registrar.add<Loss>(
+      "wrong_choice", cairn::OptionTable{}.choice("weight", "right", {"right", "wrong"}, "which"),
+      [](const Options& options, Registry&) {
+        return std::make_unique<Logarithm>(options.text("weight") == "right" ? -1.0 : -2.0);
+      });
 }
