@@ -502,7 +502,7 @@ Command add_online(ArgumentParser program) {
   cli.footer(
       "Lines are those of g2o files and SOLVE, FULL, NEW, REMOVE, CHANGE, MARGINALIZE, SPARSIFY,\n"
       "COVARIANCE, ESTIMATE, CHI2, SAVE and QUIT; with --policy NEXT, NOMATCH and DONE; with\n"
-      "--listen WRITE and FOLLOW: docs/online.md.\n\n"
+      "--listen WRITE, FOLLOW and JSON: docs/online.md.\n\n"
       "Example:\n"
       "  robot | cairn online --marginals last --journal today.journal\n"
       "  cairn online --listen /run/cairn/robot.socket --journal today.journal -o map.g2o");

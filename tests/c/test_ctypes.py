@@ -166,6 +166,23 @@ def test_a_function_in_python_stops_an_optimisation(graph):
     assert seen[0] == (1, summary.final_chi2)
 
 
+def test_an_initial_guess_is_stopped_too(graph):
+    numbers = []
+
+    def interrupt(iteration, _data):
+        numbers.append(iteration.contents.number)
+        return 1
+
+    stop = Stop()
+    lib.cairn_stop_init(c.byref(stop))
+    stop.interrupt = INTERRUPT(interrupt)
+    summary = Summary()
+    call("cairn_graph_optimize", graph, None, b"incremental", c.byref(stop), c.byref(summary))
+    assert numbers == [0]
+    assert summary.status == INTERRUPTED and summary.iterations == 0
+    assert b"initial guess incremental: " in lib.cairn_graph_notes(graph)
+
+
 def test_an_error_is_a_code_with_its_reason(registry):
     handle = c.c_void_p()
     assert lib.cairn_graph_read(registry, b"/nowhere.g2o", None, c.byref(handle)) == 3

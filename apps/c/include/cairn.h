@@ -131,7 +131,7 @@ CAIRN_C_API const char* cairn_status_name(int status);
 
 /* One iteration: `chi2` is that of the estimate after it. */
 typedef struct cairn_iteration {
-  int number;       /* from 1 */
+  int number;       /* from 1; 0: the initial guess is being computed, and all members are 0 */
   int accepted;     /* whether the step was taken */
   double chi2;
   double step_norm; /* Euclidean, in the tangent space */
@@ -139,13 +139,14 @@ typedef struct cairn_iteration {
   double seconds;
 } cairn_iteration;
 
-/* When to stop, and who is asked after each iteration. */
+/* When to stop, and a function that is called after each iteration. */
 typedef struct cairn_stop {
   int max_iterations; /* 200 */
   double tolerance;   /* stop when a step could lower chi2 by less than this fraction: 1e-10 */
   double max_seconds; /* 0: no limit */
-  /* Called after each iteration, in the thread of the call; another value than 0 stops the optimisation with the best
-   * estimate. It must not use the graph, or throw. NULL: is not called. */
+  /* Called after each iteration, and now and then during an initial guess that takes long, in the thread of the call;
+   * another value than 0 stops the optimisation with the best estimate. It must not use the graph, or throw. NULL: is not
+   * called. */
   int (*interrupt)(const cairn_iteration* iteration, void* data);
   void* data; /* for `interrupt` */
 } cairn_stop;

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <array>
+#include <atomic>
 #include <string>
 
 #include <fmt/format.h>
 
 #include "cairn/evaluation/plausibility.hpp"
+#include "cairn/evaluation/watched_guess.hpp"
 #include "cairn/runtime/plugin_call.hpp"
 #include "cairn/solve/initial_guess.hpp"
 #include "cairn/solve/optimizer.hpp"
@@ -28,22 +30,32 @@ constexpr const char* kOptimizer = "levenberg_marquardt";
 constexpr const char* kInitialGuess = "auto";
 constexpr const char* kLinearSolver = "block_cholesky";
 
-/// Calls a function of C after each iteration.
+/// Calls a function of C after each iteration, and while the initial guess is computed.
 class Interrupt final : public cairn::Observer {
  public:
   explicit Interrupt(const cairn_stop& stop) : stop_(stop) {}
 
   bool on_iteration(const cairn::Iteration& iteration, const cairn::Graph& /*graph*/,
                     const cairn::Values& /*values*/) override {
-    if (!stop_.interrupt) return true;
-    const cairn_iteration passed{iteration.number, iteration.accepted ? 1 : 0,
-                                 iteration.chi2,   iteration.step_norm,
-                                 iteration.lambda, iteration.seconds};
-    return stop_.interrupt(&passed, stop_.data) == 0;
+    return go_on({iteration.number, iteration.accepted ? 1 : 0, iteration.chi2, iteration.step_norm,
+                  iteration.lambda, iteration.seconds});
   }
+  void watch(cairn::InitialGuess& guess) {
+    if (auto* watched = cairn::query<cairn::WatchedGuess>(guess))
+      watched->watch([this](std::string_view, double) { return go_on({}); });
+  }
+  /// Set for good by the first answer that is not 0.
+  const std::atomic<bool>& flag() const { return interrupted_; }
 
  private:
+  bool go_on(const cairn_iteration& iteration) {
+    if (stop_.interrupt && !interrupted_ && stop_.interrupt(&iteration, stop_.data) != 0)
+      interrupted_ = true;
+    return !interrupted_;
+  }
+
   const cairn_stop& stop_;
+  std::atomic<bool> interrupted_{false};
 };
 
 cairn::Stop stop_of(const cairn_stop& from) {
@@ -58,14 +70,16 @@ cairn::Stop stop_of(const cairn_stop& from) {
 /// The notes of the initial guess, and then those of the summary.
 cairn::Summary optimize(cairn::Graph& graph, cairn::Registry& registry, std::string_view optimizer,
                         std::string_view initial, const cairn_stop& given_stop) {
-  const cairn::Stop stop = stop_of(given_stop);
+  cairn::Stop stop = stop_of(given_stop);
   const auto solver = registry.make<cairn::Optimizer>(optimizer);  // both before any work
   const auto guess = registry.make<cairn::InitialGuess>(initial);
+  Interrupt observer(given_stop);
+  stop.interrupt = &observer.flag();
+  observer.watch(*guess);
   std::vector<std::string> notes =
       cairn::call_plugin([&] { return fmt::format("initial guess '{}'", initial); },
                          [&] { return guess->compute(graph); });
   for (std::string& note : notes) note = fmt::format("initial guess {}: {}", initial, note);
-  Interrupt observer(given_stop);
   cairn::Summary summary =
       cairn::call_plugin([&] { return fmt::format("optimizer '{}'", optimizer); },
                          [&] { return solver->optimize(graph, stop, observer); });

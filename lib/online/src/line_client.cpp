@@ -9,6 +9,8 @@
 
 #include <boost/asio/buffer.hpp>
 
+#include "cairn/online/json_answer.hpp"
+
 namespace cairn {
 namespace {
 
@@ -85,11 +87,16 @@ void LineClient::go_on() {
 
 // Answers out -------------------------------------------------------------------------------------
 
-void LineClient::send(std::string text) {
-  if (!is_open() || text.empty()) return;
-  unread_ += text.size();
-  output_.push_back(std::make_shared<const std::string>(std::move(text)));
+void LineClient::send(std::string answer) {
+  if (!is_open() || answer.empty()) return;
+  add(std::move(answer));
   flush();
+}
+
+void LineClient::add(std::string answer) {
+  const auto& text = output_.emplace_back(
+      std::make_shared<const std::string>(wants_json ? json_answer(answer) : std::move(answer)));
+  unread_ += text->size();
 }
 
 bool LineClient::enqueue(const Text& text) {
@@ -134,12 +141,10 @@ bool LineClient::send_some() {
 
 void LineClient::note_dropped() {
   const std::int64_t count = std::exchange(dropped_, 0);
-  auto note = std::make_shared<const std::string>(
+  add(
       fmt::format("NOTE {} updates were dropped, since as many were not read; ESTIMATE ALL answers "
                   "with the newest estimate\n",
                   count));
-  unread_ += note->size();
-  output_.push_back(std::move(note));
 }
 
 void LineClient::wait_for_room() {

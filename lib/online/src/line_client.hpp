@@ -40,8 +40,8 @@ class LineClient : public std::enable_shared_from_this<LineClient> {
   /// After the answer to a line: goes on to the next, or reads more.
   void go_on();
 
-  /// Sends a text, or as much as the socket takes, and the rest as the client reads.
-  void send(std::string text);
+  /// Sends an answer, or as much as the socket takes, and the rest as the client reads.
+  void send(std::string answer);
   /// Sends it with the next `flush`. Drops it if the client has not read enough; then, once it has,
   /// a NOTE says how many were dropped. Returns whether it was taken.
   bool enqueue(const Text& text);
@@ -55,6 +55,7 @@ class LineClient : public std::enable_shared_from_this<LineClient> {
 
   std::int64_t lines = 0;  // of a client that does not write: those answered
   bool follows = false;
+  bool wants_json = false;    // each answer as one JSON object
   bool is_scheduled = false;  // the server will come back to it
 
  private:
@@ -66,6 +67,7 @@ class LineClient : public std::enable_shared_from_this<LineClient> {
   void wait_for_room();
   /// Sends what the socket takes now; false if the connection is broken.
   bool send_some();
+  void add(std::string answer);
   void note_dropped();
 
   Socket socket_;

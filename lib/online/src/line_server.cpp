@@ -16,6 +16,7 @@
 #include <boost/asio/post.hpp>
 #include <boost/asio/steady_timer.hpp>
 
+#include "cairn/online/json_answer.hpp"
 #include "line_client.hpp"
 #include "socket_file.hpp"
 
@@ -75,7 +76,7 @@ class LineServer::Service {
   void answer_line(LineClient& client);
   std::string answer(LineClient& client, const std::string& line);
   std::string answer_write(LineClient& client);
-  std::string answer_follow(LineClient& client, std::string_view line);
+  std::string answer_switch(LineClient& client, std::string_view word, std::string_view line);
   std::string answer_change(LineClient& client, const std::string& line);
   std::string text_of(LineSession::Reply reply) const;
   std::string refusal(LineClient& client, std::string_view what);
@@ -211,7 +212,7 @@ std::string LineServer::Service::answer(LineClient& client, const std::string& l
   const std::string_view word = LineSession::first_word(line);
   const bool writes = writer_ == &client;
   if (word == "WRITE") return answer_write(client);
-  if (word == "FOLLOW") return answer_follow(client, line);
+  if (word == "FOLLOW" || word == "JSON") return answer_switch(client, word, line);
   if (word == "QUIT") {
     std::string text = acknowledgement(client, "CLOSED");
     client.send(std::move(text));
@@ -229,7 +230,7 @@ std::string LineServer::Service::answer(LineClient& client, const std::string& l
   if (writer_) {
     return refusal(client,
                    fmt::format("{} is for the client that writes, which is another until it "
-                               "disconnects; expected ESTIMATE, COVARIANCE, CHI2, FOLLOW or "
+                               "disconnects; expected ESTIMATE, COVARIANCE, CHI2, FOLLOW, JSON or "
                                "QUIT",
                                word));
   }
@@ -243,13 +244,15 @@ std::string LineServer::Service::answer_write(LineClient& client) {
   return acknowledgement(client, "WRITER");
 }
 
-std::string LineServer::Service::answer_follow(LineClient& client, std::string_view line) {
-  const std::size_t end = line.find("FOLLOW") + std::string_view("FOLLOW").size();
-  const std::string_view more = LineSession::first_word(line.substr(end));
-  if (!more.empty() && more != "OFF")
-    return refusal(client, fmt::format("FOLLOW {}; expected 'FOLLOW' or 'FOLLOW OFF'", more));
-  client.follows = more.empty();
-  return acknowledgement(client, client.follows ? "FOLLOWS" : "OFF");
+/// "FOLLOW", "JSON", or one of them with "OFF".
+std::string LineServer::Service::answer_switch(LineClient& client, std::string_view word,
+                                               std::string_view line) {
+  const std::string_view more = LineSession::first_word(line.substr(line.find(word) + word.size()));
+  if (!more.empty() && more != "OFF") {
+    return refusal(client, fmt::format("{0} {1}; expected '{0}' or '{0} OFF'", word, more));
+  }
+  (word == "FOLLOW" ? client.follows : client.wants_json) = more.empty();
+  return acknowledgement(client, !more.empty() ? "OFF" : word == "FOLLOW" ? "FOLLOWS" : "JSON");
 }
 
 /// A line of the stream, or the first that a client may become the writer by.
@@ -267,14 +270,17 @@ std::string LineServer::Service::answer_change(LineClient& client, const std::st
 
 /// To all who follow: sent when it is their turn, so that the writer need not wait for that.
 void LineServer::Service::publish(const std::string& text, const LineClient& writer) {
-  LineClient::Text update;
+  LineClient::Text update, update_in_json;  // each for all that want it so
   for (const ClientPtr& client : clients_) {
     if (!client->follows || client.get() == &writer) continue;
     if (!update) {
       update = std::make_shared<const std::string>(
           fmt::format("UPDATE {}\n{}", conversation_.line_number(), text));
     }
-    ++(client->enqueue(update) ? counts_.updates : counts_.dropped);
+    if (client->wants_json && !update_in_json)
+      update_in_json = std::make_shared<const std::string>(json_answer(*update));
+    const bool taken = client->enqueue(client->wants_json ? update_in_json : update);
+    ++(taken ? counts_.updates : counts_.dropped);
     schedule(client);
   }
 }

@@ -3,11 +3,13 @@
 // settings and whether there is a map, the rest is the stream. Every line is answered as
 // docs/online.md states, one that is refused changes nothing, and at its end the compact graph is
 // that of the lines which a journal has, and that of these without the questions among them, to the
-// last bit.
+// last bit. Questions of other clients, if the second byte asks for them, change neither answers
+// nor graph.
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <memory>
+#include <sstream>
 #include <string>
 
 #include <fmt/format.h>
@@ -21,6 +23,7 @@ namespace cairn::fuzz {
 namespace {
 
 constexpr int kMostLines = 64;
+constexpr unsigned kQuestions = 0x80;
 
 struct Choice {
   std::string policy;
@@ -101,13 +104,25 @@ void expect_consistent(PosePolicy& policy) {
   }
 }
 
+/// The first word of each line, and how many words it has: the last bits of what is read depend on
+/// what was read before, since the policy copies its estimator for that.
+std::string forms_of(const std::string& answers) {
+  std::string forms;
+  std::istringstream lines(answers);
+  for (std::string line; std::getline(lines, line);)
+    forms += fmt::format("{} {}\n", first_word(line), std::ranges::count(line, ' '));
+  return forms;
+}
+
 void run(Bytes bytes) {
   Source source(bytes);
   const std::uint8_t options = source.byte();
-  const Choice choice = choice_of(options, source.byte());
+  const std::uint8_t settings = source.byte();
+  const Choice choice = choice_of(options, settings);
   OwnedPolicy live(choice);
   Stream stream(live.lines());
-  stream.take_all(text_of(source.rest()), kMostLines);
+  const std::string text(text_of(source.rest()));
+  stream.take_all(text, kMostLines);
   expect_consistent(live.policy());
 
   std::vector<TakenLine> lines = stream.taken();
@@ -119,6 +134,18 @@ void run(Bytes bytes) {
     expect(where.empty(), [&] { return fmt::format("{}, these differ: {}", which, where); });
     std::erase_if(lines, &is_question);
   }
+  if ((settings & kQuestions) == 0) return;
+  OwnedPolicy asked(choice);
+  Stream with_questions(asked.lines());
+  with_questions.ask_between();
+  with_questions.take_all(text, kMostLines);
+  const std::string where = where_they_differ(live.policy(), asked.policy());
+  expect(where.empty(), [&] { return "with questions of others, these differ: " + where; });
+  const std::string before = forms_of(stream.answers());
+  const std::string after = forms_of(with_questions.answers());
+  expect(before == after, [&] {
+    return "with questions of others the answers differ: " + first_difference(before, after);
+  });
 }
 
 /// A robot that drives round a square, asks for matches, and gets some.
@@ -210,7 +237,8 @@ CHI2
   int k = 0;
   for (const std::string& stream : streams) {
     for (int options = 0; options < 64; options += 5) {
-      std::string seed{static_cast<char>(options), static_cast<char>(k++ * 7 & 63)};
+      const unsigned questions = k % 2 == 0 ? kQuestions : 0;
+      std::string seed{static_cast<char>(options), static_cast<char>((k++ * 7 & 63) | questions)};
       all.push_back(seed + stream);
     }
   }

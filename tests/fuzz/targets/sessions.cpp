@@ -89,10 +89,23 @@ bool Stream::take(const std::string& line) {
   const LineSession::Reply reply = conversation_.take(line);
   expect_well_formed(reply, ++number_);
   if (reply.changes) taken_.push_back({number_, line});
+  answers_ += reply.text;
   expect(reply.changes || reply.quit ||
              (session_.variable_count() == variables && session_.factor_count() == factors),
          [&] { return fmt::format("'{}' is not in a journal, and changes the graph", line); });
+  if (asks_ && !reply.quit) ask();
   return !reply.quit;
+}
+
+void Stream::ask() {
+  for (const char* question : {"ESTIMATE ALL", "ESTIMATE 1", "COVARIANCE 0 1", "CHI2", "QUIT"}) {
+    const std::int64_t variables = session_.variable_count(), factors = session_.factor_count();
+    const LineSession::Reply reply = conversation_.ask(question, number_);
+    expect_well_formed(reply, number_);
+    expect(!reply.changes && !reply.quit && session_.variable_count() == variables &&
+               session_.factor_count() == factors,
+           [&] { return fmt::format("the question {} changes the session", question); });
+  }
 }
 
 void restore(const std::vector<TakenLine>& lines, LineSession& session) {
@@ -104,6 +117,15 @@ void restore(const std::vector<TakenLine>& lines, LineSession& session) {
                                 line.number, line.text, error.what()));
     }
   }
+}
+
+std::string first_difference(std::string_view a, std::string_view b) {
+  const auto at = static_cast<std::size_t>(std::ranges::mismatch(a, b).in1 - a.begin());
+  const std::size_t begin = at == 0 ? 0 : a.rfind('\n', at - 1) + 1;
+  const auto line = [&](std::string_view text) {
+    return text.substr(begin, text.find('\n', begin) - begin);
+  };
+  return fmt::format("'{}' and '{}'", line(a), line(b));
 }
 
 std::string difference(Estimator& a, Estimator& b) {

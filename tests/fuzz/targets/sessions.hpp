@@ -50,19 +50,26 @@ struct TakenLine {
 class Stream {
  public:
   explicit Stream(LineSession& session) : session_(session), conversation_(session) {}
+  /// After each line other clients ask, as those of `cairn online --listen` do.
+  void ask_between() { asks_ = true; }
 
   /// At most so many lines of a text, but for SAVE, up to the one that ends the session; then the
   /// session has come to its end.
   void take_all(std::string_view text, int most);
   const std::vector<TakenLine>& taken() const { return taken_; }
+  /// All answers to these lines.
+  const std::string& answers() const { return answers_; }
 
  private:
   bool take(const std::string& line);
+  void ask();
 
   LineSession& session_;
   Conversation conversation_;
   std::int64_t number_ = 0;
   std::vector<TakenLine> taken_;
+  std::string answers_;
+  bool asks_ = false;
 };
 
 /// Restores lines in another session; a `Finding` if one is refused.
@@ -70,6 +77,9 @@ void restore(const std::vector<TakenLine>& lines, LineSession& session);
 
 /// Where two estimators differ: variables, factors, or a bit of an estimate. Empty if nowhere.
 std::string difference(Estimator& a, Estimator& b);
+
+/// Where two texts differ, as their first lines that do.
+std::string first_difference(std::string_view a, std::string_view b);
 
 /// The first word of a line, by which a session knows a command; empty if there is none.
 std::string_view first_word(std::string_view line);

@@ -247,6 +247,23 @@ TEST_F(LineServerTest, WhoAsksWithoutReadingIsReadNoMore) {
   asks.join();
 }
 
+TEST_F(LineServerTest, AnswersInJsonWhereAClientWantsIt) {
+  serve();
+  SocketClient robot = writer(), reader = client(), plain = client();
+  plain.ask("FOLLOW");
+  reader.tell("JSON");
+  EXPECT_EQ(reader.hear(), R"({"answer":"JSON","line":0,"variables":0,"factors":0})");
+  reader.tell("FOLLOW");
+  EXPECT_EQ(reader.hear(), R"({"answer":"FOLLOWS","line":0,"variables":0,"factors":0})");
+  robot.ask("SET a");
+  EXPECT_EQ(reader.hear(),
+            R"({"update":1,"answer":"OK","line":1,"variables":1,"factors":0,"owed":0})");
+  EXPECT_THAT(plain.hear_answer(), ElementsAre("UPDATE 1", "OK 1 variables 1 factors 0 owed 0"));
+  reader.tell("SET b");
+  EXPECT_THAT(reader.hear().value(), StartsWith(R"({"answer":"ERROR","line":3,"message":"SET is)"));
+  EXPECT_THAT(reader.ask("JSON OFF"), ElementsAre("OFF 1 variables 1 factors 0"));
+}
+
 TEST_F(LineServerTest, AnswersWhatCameBeforeTheEndOfInput) {
   serve();
   SocketClient robot = client();
