@@ -7,6 +7,7 @@
 #include "covariance_form.hpp"
 #include "information_form.hpp"
 #include "linearized_estimator.hpp"
+#include "sparsified_form.hpp"
 
 namespace {
 
@@ -23,6 +24,24 @@ struct EkfOptions {
   }
 };
 
+/// Options of the estimator `seif`.
+struct SeifOptions {
+  int active = 6;  ///< links
+  linearized::MeanRecovery mean = linearized::MeanRecovery::exact;
+  int steps = 50;  ///< blocks
+
+  static auto fields() {
+    using O = SeifOptions;
+    return OptionFields<O>()
+        .integer("active", &O::active, 1, 1e9,
+                 "poses and landmarks that stay linked with the newest pose")
+        .choice("mean", &O::mean,
+                "recovered by a factorisation, or approached by coordinate descent")
+        .integer("steps", &O::steps, 1, 1e9,
+                 "variables that coordinate descent changes in an update");
+  }
+};
+
 }  // namespace
 
 void cairn_register(Registrar& registrar) {
@@ -33,5 +52,10 @@ void cairn_register(Registrar& registrar) {
   });
   registrar.add<Estimator>("eif", {}, [](const Options&, Registry&) {
     return std::make_unique<LinearizedEstimator>(std::make_unique<InformationForm>(), std::nullopt);
+  });
+  registrar.add<Estimator, SeifOptions>("seif", [](const SeifOptions& options) {
+    return std::make_unique<LinearizedEstimator>(
+        std::make_unique<SparsifiedForm>(options.active, options.mean, options.steps),
+        std::nullopt);
   });
 }

@@ -96,16 +96,25 @@ void InformationForm::multiply_covariance(std::span<const double> g, std::span<d
 
 std::int64_t InformationForm::memory() const { return cholesky_ ? 8 * cholesky_->doubles() : 0; }
 
+void InformationForm::changed(bool blocks) {
+  factorized_ = false;
+  if (blocks) structure_.reset();
+}
+
+void InformationForm::copy_to(InformationForm& copy) const {
+  copy.offsets_ = offsets_;
+  copy.sizes_ = sizes_;
+  copy.variables_ = variables_;
+  copy.block_ = block_;
+  copy.Lambda_ = Lambda_;
+  copy.eta_ = eta_;
+  copy.d_ = d_;
+  copy.undetermined_ = undetermined_;
+}
+
 std::unique_ptr<GaussianForm> InformationForm::clone() const {
   auto copy = std::make_unique<InformationForm>();
-  copy->offsets_ = offsets_;
-  copy->sizes_ = sizes_;
-  copy->variables_ = variables_;
-  copy->block_ = block_;
-  copy->Lambda_ = Lambda_;
-  copy->eta_ = eta_;
-  copy->d_ = d_;
-  copy->undetermined_ = undetermined_;
+  copy_to(*copy);
   return copy;
 }
 

@@ -17,7 +17,7 @@ namespace cairn::linearized {
 /// has them (Thrun, Liu, Koller, Ng, Ghahramani, Durrant-Whyte 2004). A row changes the blocks of
 /// its variables alone; Λ is as sparse as the graph. The mean is recovered by solving Λ d = η with
 /// a sparse Cholesky factorisation after every update.
-class InformationForm final : public GaussianForm {
+class InformationForm : public GaussianForm {
  public:
   void begin(std::span<const Id>, std::span<const int>, std::span<const Rows>) override;
   void add_variable(Id id, int size) override;
@@ -29,19 +29,24 @@ class InformationForm final : public GaussianForm {
   std::int64_t memory() const override;
   std::unique_ptr<GaussianForm> clone() const override;
 
- private:
+ protected:
   bool factorize();
+  void copy_to(InformationForm& copy) const;
+  /// Λ has changed; `blocks`: and which of its blocks there are.
+  void changed(bool blocks);
 
   std::vector<std::int32_t> sizes_;
   std::vector<Id> variables_;
   std::unordered_map<Id, std::int32_t> block_;
   std::map<std::pair<std::int32_t, std::int32_t>, Eigen::MatrixXd> Lambda_;  ///< lower blocks
   std::vector<double> eta_, d_;
+  Id undetermined_ = 0;
+
+ private:
   std::unique_ptr<BlockStructure> structure_;  ///< null: there are new blocks
   BlockMatrix H_;
   std::unique_ptr<block::SupernodalCholesky> cholesky_;
   bool factorized_ = false;
-  Id undetermined_ = 0;
 };
 
 }  // namespace cairn::linearized

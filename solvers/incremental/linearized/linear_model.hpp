@@ -59,6 +59,10 @@ class GaussianForm {
   virtual void add_variable(Id id, int size) = 0;
   /// Takes these rows; all their variables are there.
   virtual void add(const Rows& rows) = 0;
+  /// The newest pose, for a form that treats it differently; before each `settle`.
+  virtual void set_newest(Id) {}
+  /// The next displacement is to be the minimum itself, where a form only approaches it.
+  virtual void recover_fully() {}
   /// Completes what was begun: afterwards the functions below may be called. False if the rows do
   /// not determine every variable; then `undetermined()` is one that they do not.
   virtual bool settle() = 0;

@@ -9,6 +9,7 @@
 
 #include <fmt/core.h>
 
+#include "cairn/geometry/pose.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/timed.hpp"
 #include "cairn/types/loss.hpp"
@@ -214,6 +215,7 @@ UpdateReport LinearizedEstimator::update(const GraphUpdate& update, const Update
     if (batch_ && (options.full || must_batch_ || since_batch_ >= batch_->every)) {
       batch_step(options, report);
     } else {
+      if (options.full) form_->recover_fully();
       solve(report);
     }
     if (options.full && !batch_) check_converged(report);
@@ -322,6 +324,11 @@ void LinearizedEstimator::take_models() {
   for (const Rows& each : rows) form_->add(each);
   for (Model& model : state_.models) model.taken = true;
   state_.rebuild = false;
+  for (int v = state_.graph.variable_count(); v-- > 0;) {
+    if (is_point(state_.graph.type(v)) && v > 0) continue;
+    form_->set_newest(state_.graph.id(v));
+    break;
+  }
   determined_ = form_->settle();
 }
 

@@ -52,7 +52,9 @@ class EveryEstimator : public testing::TestWithParam<std::string> {
   }
   /// Linearises each factor once, when it arrives: its estimate is another than the minimum, which
   /// is what `UpdateReport::converged` says (filters_test.cpp has what it must be).
-  bool is_filter() const { return GetParam() == "ekf" || GetParam() == "eif"; }
+  bool is_filter() const {
+    return GetParam() == "ekf" || GetParam() == "eif" || GetParam() == "seif";
+  }
 
   Registry registry_;
   PlanarTypes types_;
