@@ -93,8 +93,11 @@ class Watched {
   FactorRecovery& recovery_;
 };
 
-LocalMinimum local_minimum(const SparsifyOptions& options) {
-  if (!options.resolve) return LocalMinimum::ignored;
+/// Alone, a blanket with one or two measured positions has a minimum far from that of the graph,
+/// whose orientations all of them determine.
+LocalMinimum local_minimum(const SparsifyOptions& options, const LocalProblem& local) {
+  if (!options.resolve || (options.open == Open::reduce && local.absolute))
+    return LocalMinimum::ignored;
   return options.linearize == LinearizeAt::graph ? LocalMinimum::measured
                                                  : LocalMinimum::linearized;
 }
@@ -146,7 +149,7 @@ Sparsify::Solved Sparsify::solve(const WorkGraph& work, const LocalProblem& loca
     // A linear constraint has a mean, so that the minimum stays where it is by itself.
     solved.marginal = topology_->whole()
                           ? marginalize(work, local, LocalMinimum::ignored, &constraints_)
-                          : marginalize(work, local, local_minimum(options_));
+                          : marginalize(work, local, local_minimum(options_, local));
   }
   const DenseBlanket& dense = solved.marginal.dense;
   if (dense.models.empty()) return solved;
