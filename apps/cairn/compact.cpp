@@ -119,6 +119,7 @@ constexpr std::int64_t kLeastLoops = 3;
 struct Job {
   PolicyJob job;
   FoundThresholds found;
+  std::string strategy = {};  ///< empty: the policy has none
 };
 
 /// So many poses from the first on: a sample without loop closures would tell nothing.
@@ -177,8 +178,15 @@ Job prepare(const CompactOptions& options, const PolicySetting& setting, Results
   if (options.keep > 0 &&
       !job.policy.values.emplace("keep", fmt::format("{}", options.keep)).second)
     throw Error(ErrorCode::usage, "--keep, and keep among the policy's options: give one");
-  if (table.find("strategy"))
-    emplace({{"strategy", options.strategy == "rfpfl" ? "fpfl" : options.strategy}});
+  if (table.find("strategy")) {
+    const std::string wanted = options.strategy == "rfpfl" ? "fpfl" : options.strategy;
+    const std::string& chosen = job.policy.values.emplace("strategy", wanted).first->second;
+    if (chosen != wanted && options.strategy != CompactOptions().strategy) {
+      throw Error(ErrorCode::usage,
+                  "--strategy, and strategy among the policy's options: give one");
+    }
+    result.strategy = options.strategy == "rfpfl" ? options.strategy : chosen;
+  }
   results.write(options.save_thresholds, [&] {
     write_thresholds(options.save_thresholds, job.policy.name, result.found.options);
   });
@@ -232,7 +240,7 @@ std::string option_words(const OptionValues& options, const std::string& policy,
 void note_selection(const CompactOptions& options, const CompactOutcome& outcome,
                     Session& session) {
   const PolicyResult& result = outcome.result;
-  if (options.strategy != "fpfl" || result.interrupted || !result.located) return;
+  if (outcome.strategy != "fpfl" || result.interrupted || !result.located) return;
   if (!finds_thresholds(parse_component(options.policy), session.registry())) return;
   SelectionCheck check;
   for (const PoseReport& pose : result.poses) check.add(pose);
@@ -287,6 +295,7 @@ int run_compact(const CompactOptions& options, Session& session) {
     return run.finish(recovery);
   };
   CompactOutcome outcome{.name = recording.name,
+                         .strategy = job.strategy,
                          .data = recording.data,
                          .found = job.found,
                          .result = run_job(job.job, comparison ? &*comparison : nullptr),

@@ -168,7 +168,7 @@ std::string thresholds_line(const OptionValues& values) {
 json::object report_json(const CompactOptions& options, const CompactOutcome& outcome) {
   json::object report = begin_report("compact");
   report["graph"] = graph_json(outcome.data.recording, outcome.name);
-  report["strategy"] = options.strategy;
+  report["strategy"] = text_json(outcome.strategy);
   report["registration"] = options.registration;
   report["threads"] = threads();
   report["status"] = outcome.result.interrupted  ? "interrupted"
@@ -239,7 +239,7 @@ std::string summary_text(const CompactOptions& options, const CompactOutcome& ou
   table.add({"graph", fmt::format("{}: {}{}, {}", outcome.name,
                                   plural(data.recording.variable_count() - data.landmarks, "pose"),
                                   landmarks, plural(data.loops, "loop closure"))});
-  table.add({"strategy", options.strategy});
+  if (!outcome.strategy.empty()) table.add({"strategy", outcome.strategy});
   if (!outcome.found.options.empty())
     table.add({"thresholds", thresholds_line(outcome.found.options)});
   add_result(table, outcome.shown(), outcome.data, outcome.found);

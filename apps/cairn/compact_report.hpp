@@ -17,7 +17,8 @@ namespace cairn::app {
 
 /// What a run of `cairn compact` came to.
 struct CompactOutcome {
-  const std::string& name;  ///< of the graph
+  const std::string& name;      ///< of the graph
+  const std::string& strategy;  ///< empty: the policy has none
   const PolicyData& data;
   const FoundThresholds& found;
   PolicyResult result;

@@ -22,6 +22,7 @@
 
 #include "arguments.hpp"
 #include "cairn/io/format.hpp"
+#include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/version.hpp"
 #include "commands.hpp"
@@ -103,11 +104,18 @@ std::string upper_case(std::string name) {
   return name;
 }
 
+constexpr std::size_t kLongestName = 64;
+
 void check_name(const std::string& name) {
   const bool good = !name.empty() && name.front() >= 'a' && name.front() <= 'z' &&
                     std::ranges::all_of(name, [](char c) {
                       return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '_';
                     });
+  if (good && name.size() > kLongestName) {
+    throw Error(ErrorCode::usage,
+                fmt::format("the name of a plugin has at most {} characters, and this has {}",
+                            kLongestName, name.size()));
+  }
   if (good) return;
   throw Error(ErrorCode::usage,
               fmt::format("'{}' cannot be the name of a plugin: a letter from a to z, then a-z, "
@@ -142,7 +150,8 @@ std::string filled_in(std::string text, const Words& words) {
 class UnfinishedFolder {
  public:
   explicit UnfinishedFolder(fs::path folder) : final_(std::move(folder)) {
-    if (fs::exists(fs::symlink_status(final_)))
+    std::error_code unknown;
+    if (fs::exists(fs::symlink_status(final_, unknown)))
       throw Error(ErrorCode::input,
                   fmt::format("{}: there already; choose another name or folder", final_.string()));
     std::string name = final_.string() + ".XXXXXX";
@@ -189,9 +198,21 @@ const Kind& kind_of(const Chosen& chosen) {
                                          chosen.kinds.begin())];
 }
 
+/// Of two components of one name neither could be used.
+void check_not_on_offer(const Kind& kind, const std::string& name, const Registry& registry) {
+  const std::string_view offers = kind.offers;
+  const std::string_view of = offers.substr(1, offers.find('|') - 1);
+  if (!registry.has(of, name)) return;
+  std::string words(of);
+  std::ranges::replace(words, '_', ' ');
+  throw Error(ErrorCode::usage,
+              fmt::format("{} '{}' is on offer already; choose another name", words, name));
+}
+
 int make_project(const Chosen& chosen, Session& session) {
   check_name(chosen.name);
   const Kind& kind = kind_of(chosen);
+  check_not_on_offer(kind, chosen.name, session.registry());
   const fs::path templates = template_folder();
   const fs::path folder = chosen.folder.empty() ? chosen.name : chosen.folder;
   const Words words = words_for(kind, chosen.name);

@@ -399,7 +399,10 @@ int run(OnlineOptions options, Session& session) {
     within_a_line = true;
   }
   try {
-    if (!options.output.empty()) {
+    const bool nothing_came = server && lines.variable_count() == 0;
+    if (nothing_came && !options.output.empty())
+      session.note(fmt::format("nothing was sent: {} is not written", options.output));
+    if (!options.output.empty() && !nothing_came) {
       const Graph graph = lines.estimator().graph();
       write_map(graph, options.output, session);
       if (!failure) {  // within an update it may have been left in part

@@ -27,6 +27,7 @@ Fit ConsistencyCheck::judge(const Vector& e, const Matrix& S) const {
   Fit fit;
   const Eigen::LLT<Matrix> factor(S);
   fit.innovation = e.dot(factor.solve(e));
+  fit.consistent = std::isfinite(fit.innovation);  // else numbers overflow
   if (!on()) return fit;
   fit.consistent = fit.innovation < limit_;
   const double log_root = factor.matrixLLT().diagonal().array().log().sum();  // ½ ln|S|
@@ -40,6 +41,7 @@ Fit ConsistencyCheck::fit(const Link& link, const Displacement& expected) const 
 }
 
 bool ConsistencyCheck::passes(double innovation, int dof) const {
+  if (!std::isfinite(innovation)) return false;
   if (!on() || dof == 0) return true;
   return innovation < boost::math::quantile(boost::math::chi_squared(dof), gate_);
 }

@@ -50,7 +50,7 @@ class ConsistencyCheck {
   Fit agreement(const Link& first, const Link& second, const Displacement& earlier,
                 const Displacement& later) const;
   /// Whether an absolute measurement's innovation is below the bound for so many degrees of
-  /// freedom; true if the check is off.
+  /// freedom; if the check is off, whether it is finite.
   bool passes(double innovation, int dof) const;
   bool needs_another(const Fit& fit) const { return on() && fit.chance > trust_; }
 

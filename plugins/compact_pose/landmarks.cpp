@@ -257,6 +257,7 @@ void CompactPose::use_landmarks() {
     const ObservationFit& fit = fits[k];
     report_.landmarks.push_back({.pose = report_.id,
                                  .landmark = seen.landmark.id,
+                                 .factors = static_cast<int>(std::ssize(seen.factors)),
                                  .gain = fit.fit.gain,
                                  .innovation = fit.fit.innovation,
                                  .verdict = fit.used          ? LinkVerdict::linked

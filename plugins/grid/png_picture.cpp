@@ -17,6 +17,8 @@ struct Release {
 };
 
 [[noreturn]] void fail(const std::string& name, const png_image& image) {
+  if (std::string_view(image.message).find("insufficient memory") != std::string_view::npos)
+    throw std::bad_alloc();
   throw Error(ErrorCode::input,
               fmt::format("{}: not a whole PNG: {}; get or make it again", name, image.message));
 }

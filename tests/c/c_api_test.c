@@ -134,11 +134,11 @@ static void names_what_is_wrong(cairn_registry* registry) {
   fails(cairn_graph_add_variable(graph, "VERTEX_SE9", 2, origin, 3, 0), CAIRN_PLUGIN, "VERTEX_SE9");
   fails(cairn_graph_add_variable(graph, NULL, 2, origin, 3, 0), CAIRN_USAGE, "tag is NULL");
   fails(cairn_graph_add_variable(graph, "VERTEX_SE2", 1, origin, 3, 0), CAIRN_INPUT, "1");
-  fails(cairn_graph_add_variable(graph, "VERTEX_SE2", 2, origin, 2, 0), CAIRN_INPUT, "VERTEX_SE2");
+  fails(cairn_graph_add_variable(graph, "VERTEX_SE2", 2, origin, 2, 0), CAIRN_USAGE, "the state");
   fails(cairn_graph_add_variable(graph, "VERTEX_SE2", 2, origin, (size_t)-1, 0), CAIRN_USAGE, "state");
-  fails(cairn_graph_add_factor(graph, "EDGE_SE2", strangers, 2, origin, 3, unit_information, 6), CAIRN_INPUT, "9");
+  fails(cairn_graph_add_factor(graph, "EDGE_SE2", strangers, 2, origin, 3, unit_information, 6), CAIRN_USAGE, "9");
   fails(cairn_graph_add_factor(graph, "EDGE_SE2", ends, 2, origin, 3, NULL, 6), CAIRN_USAGE, "information is NULL");
-  fails(cairn_graph_add_factor(graph, "EDGE_SE2", ends, 2, origin, 3, unit_information, 5), CAIRN_INPUT, "EDGE_SE2");
+  fails(cairn_graph_add_factor(graph, "EDGE_SE2", ends, 2, origin, 3, unit_information, 5), CAIRN_USAGE, "the information");
   fails(cairn_graph_set_fixed(graph, 9, 1), CAIRN_USAGE, "9");
   fails(cairn_graph_set_loss(graph, "hubble"), CAIRN_PLUGIN, "hubble");
   fails(cairn_graph_states(graph, NULL, 0, nine, 9), CAIRN_USAGE, "expected 6");

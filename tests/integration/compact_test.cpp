@@ -283,6 +283,18 @@ TEST_F(Compact, KeepsTheMeasurementsOfLandmarksThatAreInformative) {
   EXPECT_THAT(again.err, HasSubstr("is in the map and in the recording"));
 }
 
+TEST_F(Compact, ReportsTheStrategyThatRan) {
+  const Arguments all{"compact", kWorld, "--range", "3", "--policy", "compact_pose:strategy=apal"};
+  const auto report = report_of(all);
+  EXPECT_EQ(report.at("strategy").as_string(), "apal");
+  EXPECT_EQ(report.at("poses").at("kept"), report.at("poses").at("in"));
+  Arguments both = all;
+  both.insert(both.end(), {"--strategy", "apfl"});
+  const Outcome refused = cairn(both);
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_THAT(refused.err, HasSubstr("give one"));
+}
+
 TEST_F(Compact, SaysWhatIsWrongAndWhatWouldWork) {
   const auto refused = [](Arguments arguments, int code) {
     arguments.insert(arguments.begin(), "compact");

@@ -257,6 +257,17 @@ TEST_F(OnlineService, StopsWithItsMapAndItsReportWritten) {
   }
 }
 
+TEST_F(OnlineService, StopsWithoutAMapWhereNothingCame) {
+  Partner process({"online", "--listen", socket(), "-o", folder_.file("map.g2o")});
+  SocketClient robot(socket());
+  EXPECT_THAT(robot.ask("WRITE"), ElementsAre(StartsWith("WRITER ")));
+  process.send_signal(SIGTERM);
+  const Outcome outcome = process.end();
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_THAT(outcome.err, HasSubstr("nothing was sent"));
+  EXPECT_THAT(folder_.contents(), IsEmpty());
+}
+
 TEST_F(OnlineService, RefusesASocketThatIsInUse) {
   const Partner process(service());
   SocketClient robot(socket());

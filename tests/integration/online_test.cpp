@@ -86,6 +86,16 @@ TEST_F(Online, WritesOnlyWhatChanged) {
   EXPECT_THAT(run.out, Not(HasSubstr("VERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 1 0 0.1\nVERTEX")));
 }
 
+TEST_F(Online, SaysWhereThereIsNoCovarianceThatWasAskedFor) {
+  const std::string stiff =
+      "VERTEX_SE2 0 0 0 0\nFIX 0\nNEW VERTEX_XY 100\nEDGE_SE2_XY 0 100 1 1 1e18 0 1e18\n"
+      "NEW VERTEX_SE2 1\nEDGE_SE2 0 1 1 0 0 100 0 0 100 0 400\n"
+      "EDGE_SE2_XY 1 100 0 1 1e18 0 1e18\n";
+  const Outcome run = cairn(online({"--output", "none", "--marginals", "diagonal"}), {}, stiff);
+  EXPECT_THAT(run.out, HasSubstr("NOTE there is no covariance of 1: "));
+  EXPECT_THAT(run.out, HasSubstr("rounding takes its digits"));
+}
+
 TEST_F(Online, ABadLineIsToldAndNothingOfItStays) {
   const std::string good =
       "VERTEX_SE2 0 0 0 0\nFIX 0\nNEW VERTEX_SE2 1\nEDGE_SE2 0 1" + kEdge + "\n";

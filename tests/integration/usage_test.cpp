@@ -342,6 +342,21 @@ TEST(Usage, AnExceptionInAPluginNamesThePluginsPart) {
                "below.g2o:2: EDGE_BRITTLE: its normalize() failed: below my range");
 }
 
+TEST(Usage, ANewPluginHasANameOfItsOwn) {
+  const TemporaryFolder folder;
+  const auto refused = [&](const Arguments& more, int code) {
+    Arguments arguments{"new-plugin"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const Outcome outcome = cairn(arguments);
+    EXPECT_EQ(outcome.exit_code, code) << outcome.err;
+    return outcome.err;
+  };
+  EXPECT_THAT(refused({std::string(260, 'x'), "--loss"}, kUsage), HasSubstr("at most 64"));
+  EXPECT_THAT(refused({"g2o", "--format", "--folder", folder.file("a")}, kUsage),
+              HasSubstr("format 'g2o' is on offer already"));
+  EXPECT_EQ(folder.contents().size(), 0U);
+}
+
 TEST(Usage, IntegersAreDecimalAndInRange) {
   for (const char* seed : {"-1", "18446744073709551616", "1.5", "0x10", ""}) {
     expect_error(

@@ -148,7 +148,8 @@ cairn_code cairn_estimator_covariance(cairn_estimator* estimator, int64_t a, int
     std::vector<double> Sigma(rows * columns);
     if (!call(of, [&] { return of.estimator->covariance(a, b, Sigma); })) {
       throw cairn::Error(cairn::ErrorCode::numerical,
-                         "there is no covariance: the measurements do not determine everything");
+                         "there is no covariance: the measurements do not determine everything, or "
+                         "rounding takes its digits");
     }
     copy_by_rows(Sigma, rows, out);
   });

@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include "cairn/graph/packed.hpp"
 #include "cairn/io/format.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/types/loss.hpp"
@@ -16,12 +17,20 @@ namespace cairn::c {
 
 Variable variable_of(Registry& registry, const char* tag, Id id, std::span<const double> state,
                      bool fixed) {
-  return {registry.variable_type(&given(tag, "tag")), id, {state.begin(), state.end()}, fixed};
+  auto type = registry.variable_type(&given(tag, "tag"));
+  if (!state.empty())
+    expect_size(state.size(), static_cast<std::size_t>(type->ambient_size()), "the state");
+  return {std::move(type), id, {state.begin(), state.end()}, fixed};
 }
 
 Factor factor_of(Registry& registry, const char* tag, std::span<const Id> ids,
                  std::span<const double> measurement, std::span<const double> information) {
-  return {registry.factor_type(&given(tag, "tag")),
+  auto type = registry.factor_type(&given(tag, "tag"));
+  expect_size(ids.size(), static_cast<std::size_t>(type->arity()), "the ids");
+  expect_size(measurement.size(), static_cast<std::size_t>(type->measurement_size()),
+              "the measurement");
+  expect_size(information.size(), packed_size(type->residual_size()), "the information");
+  return {std::move(type),
           {ids.begin(), ids.end()},
           {measurement.begin(), measurement.end()},
           {information.begin(), information.end()}};
@@ -136,7 +145,9 @@ cairn_code cairn_graph_add_factor(cairn_graph* graph, const char* tag, const int
                                   size_t information_size) {
   return guarded([&] {
     cairn_graph& to = given(graph, "graph");
-    to.graph.add(factor_of(*to.registry, tag, array(ids, id_count, "ids"),
+    const auto on = array(ids, id_count, "ids");
+    for (const cairn::Id id : on) (void)variable_by_id(to.graph, id);
+    to.graph.add(factor_of(*to.registry, tag, on,
                            array(measurement, measurement_size, "measurement"),
                            array(information, information_size, "information")));
   });

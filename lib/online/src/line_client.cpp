@@ -51,8 +51,7 @@ void LineClient::receive() {
   error_code error;
   const std::size_t count = socket_.read_some(asio::buffer(more), error);
   if (error && !would_block(error)) {
-    if (error != asio::error::eof) return close();
-    ended_ = true;
+    ended_ = true;  // or broken off: what has come is taken
   }
   if (begin_ > 0) input_.erase(0, std::exchange(begin_, 0));
   const std::size_t searched = input_.size();
@@ -88,7 +87,7 @@ void LineClient::go_on() {
 // Answers out -------------------------------------------------------------------------------------
 
 void LineClient::send(std::string answer) {
-  if (!is_open() || answer.empty()) return;
+  if (!is_open() || unheard_ || answer.empty()) return;
   add(std::move(answer));
   flush();
 }
@@ -100,7 +99,7 @@ void LineClient::add(std::string answer) {
 }
 
 bool LineClient::enqueue(const Text& text) {
-  if (!is_open() || closing_) return false;
+  if (!is_open() || closing_ || unheard_) return false;
   if (is_full() || dropped_ > 0) {
     ++dropped_;
     return false;
@@ -125,8 +124,12 @@ bool LineClient::send_some() {
     std::size_t count = socket_.write_some(texts, error);
     if (would_block(error)) return true;
     if (error) {
-      close();
-      return false;
+      // Nobody reads the answers any more. What the client has sent is taken to its end.
+      unheard_ = true;
+      output_.clear();
+      sent_ = unread_ = 0;
+      dropped_ = 0;
+      return true;
     }
     unread_ -= count;
     for (count += sent_; !output_.empty() && count >= output_.front()->size();) {

@@ -82,6 +82,7 @@ class LineClient : public std::enable_shared_from_this<LineClient> {
   std::int64_t dropped_ = 0;
   bool reading_ = false, writing_ = false;  // waits for the socket
   bool ended_ = false;                      // the client sends no more
+  bool unheard_ = false;                    // and reads no more
   bool closing_ = false;
 };
 

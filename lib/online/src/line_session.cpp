@@ -201,4 +201,10 @@ std::string LineSession::covariance_line(Estimator& estimator, Id a, const Varia
   return text + '\n';
 }
 
+std::string LineSession::covariance_or_note(Estimator& estimator, Id id, const VariableType& type) {
+  std::string line = covariance_line(estimator, id, type, id, type);
+  if (!line.empty()) return line;
+  return fmt::format("NOTE there is no covariance of {}: {}\n", id, kNoCovariance);
+}
+
 }  // namespace cairn

@@ -191,10 +191,13 @@ void OnlineSession::write_results(const UpdateReport& report, Reply& reply) {
       write_estimate(id, reply.text);
     }
   }
-  if (settings_.marginals == "last" && !known_.empty())
-    write_covariance(known_.back(), known_.back(), reply.text);
-  if (settings_.marginals == "diagonal") {
-    for (const Id id : known_) write_covariance(id, id, reply.text);
+  std::span<const Id> asked;
+  if (settings_.marginals == "last" && !known_.empty()) asked = {&known_.back(), 1};
+  if (settings_.marginals == "diagonal") asked = known_;
+  for (const Id id : asked) {
+    // A map that is singular has none; the answer's last line says that.
+    reply.text += report.ok ? covariance_or_note(estimator_, id, type_of(id))
+                            : covariance_line(estimator_, id, type_of(id), id, type_of(id));
   }
   acknowledge(reply, owed_, !report.ok ? "SINGULAR" : !report.converged ? "UNCONVERGED" : "OK");
 }
@@ -328,8 +331,7 @@ void OnlineSession::solve_fully(const Words& words, Reply& reply) {
 void OnlineSession::report_covariance(const Words& words, Reply& reply) {
   expect_words(words, 3, "COVARIANCE id id");
   if (!write_covariance(parse_whole(words[1], "id"), parse_whole(words[2], "id"), reply.text)) {
-    throw Error(ErrorCode::numerical,
-                "there is no covariance: the measurements do not determine everything");
+    throw Error(ErrorCode::numerical, fmt::format("there is no covariance: {}", kNoCovariance));
   }
   acknowledge(reply, owed_);
 }

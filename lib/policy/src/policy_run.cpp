@@ -171,8 +171,7 @@ void PolicyRun::run(std::size_t count, std::string_view title,
     result_.kept_priors +=
         std::ranges::count(pose.priors, LinkVerdict::linked, &PriorReport::verdict);
     for (const LandmarkReport& landmark : pose.landmarks) {
-      result_.kept_landmarks += landmark.added;
-      result_.kept_observations += landmark.verdict == LinkVerdict::linked;
+      if (landmark.verdict == LinkVerdict::linked) result_.kept_observations += landmark.factors;
     }
     if (setting_.progress) setting_.progress(title, count, result_);
     if (after) after(result_.poses.size() - 1);
@@ -190,6 +189,11 @@ void PolicyRun::run(std::size_t count, std::string_view title,
 PolicyResult PolicyRun::finish(Recovery recovery) {
   result_.compact = policy_->estimator().graph();
   result_.kept_poses = static_cast<int>(std::ssize(policy_->kept()));
+  const Graph& recording = setting_.data.recording;
+  for (const Id id : policy_->landmarks()) {
+    const auto there = recording.find(id);
+    result_.kept_landmarks += there && is_point(recording.type(*there));
+  }
   result_.chi2 = policy_->estimator().chi2();
   result_.located = policy_->unlocated().empty();
   result_.trajectory = recovered_trajectory(*policy_, recovery);

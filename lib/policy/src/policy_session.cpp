@@ -450,7 +450,8 @@ void PolicySession::take_back(const Words& words, Reply& reply) {
       parse_whole(words[2], "id") != arriving_->pose.id) {
     throw bad_line(
         "the policy decides what stays: only links can be removed, and a pose that has just come, "
-        "and has no lines but its odometry; expected 'REMOVE LINK id id', or 'REMOVE VARIABLE id' "
+        "and has no lines but its odometry, and no question; expected 'REMOVE LINK id id', or "
+        "'REMOVE VARIABLE id' "
         "with its id");
   }
   arriving_.reset();

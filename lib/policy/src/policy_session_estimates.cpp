@@ -26,8 +26,7 @@ void PolicySession::report_covariance(const Words& words, Reply& reply) {
   Estimator& estimator = policy_.estimator();
   const std::string text = covariance_line(estimator, a, *estimator.type(a), b, *estimator.type(b));
   if (text.empty()) {
-    throw Error(ErrorCode::numerical,
-                "there is no covariance: the measurements do not determine everything");
+    throw Error(ErrorCode::numerical, fmt::format("there is no covariance: {}", kNoCovariance));
   }
   answer_ += text;
   answer(reply);
@@ -104,8 +103,7 @@ void PolicySession::write_results(bool kept) {
     std::ranges::copy(policy_.landmarks(), std::back_inserter(ids));
   }
   for (const Id id : ids) {
-    const VariableType& type = *estimator.type(id);
-    answer_ += covariance_line(estimator, id, type, id, type);
+    answer_ += covariance_or_note(estimator, id, *estimator.type(id));
   }
 }
 

@@ -149,7 +149,7 @@ void PolicySession::note_landmark(const LandmarkReport& landmark) {
   answer_ += fmt::format("LANDMARK {} {} {} {} {}\n", landmark.pose, landmark.landmark, word,
                          landmark.gain, landmark.innovation);
   counts_.landmarks += landmark.added;
-  counts_.observations += landmark.verdict == LinkVerdict::linked;
+  if (landmark.verdict == LinkVerdict::linked) counts_.observations += landmark.factors;
 }
 
 }  // namespace cairn

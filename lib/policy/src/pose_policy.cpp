@@ -3,6 +3,9 @@
 
 #include <algorithm>
 #include <array>
+#include <unordered_set>
+
+#include <fmt/core.h>
 
 #include "cairn/runtime/error.hpp"
 
@@ -45,9 +48,17 @@ PolicySeconds& PolicySeconds::operator+=(const PolicySeconds& other) {
 namespace {
 
 void match_newest(PosePolicy& policy, Registration& registration, Id newest) {
+  std::unordered_set<Id> matched;
   const auto match_proposed = [&] {
-    while (const auto match = policy.next_match())
+    while (const auto match = policy.next_match()) {
+      if (!matched.insert(match->earlier).second) {
+        throw Error(ErrorCode::plugin,
+                    fmt::format("the pose policy proposes poses {} and {} again, though offer() "
+                                "was called for them: it would never end",
+                                match->earlier, match->later));
+      }
       policy.offer(match->earlier, registration.match_proposed(*match));
+    }
   };
   match_proposed();
   const std::vector<Id> map = policy.unlocated();

@@ -350,8 +350,15 @@ void IncrementalLife::finish_update(Solve how) {
   if (!only_well_posed_) return;
   require(report.ok, [&] { return "a system that is well conditioned is called singular"; });
   expect_chi2();
-  if (how == Solve::full) {
-    require(report.converged, [&] { return "not converged"; });
+  if (how == Solve::full && !report.converged) {
+    // Steps of Gauss-Newton that converge too slowly for the limit of iterations, in large
+    // residuals: it says so, and what they would still change is as little as after any update.
+    require(std::ranges::any_of(
+                report.notes,
+                [](const std::string& note) { return note.starts_with("not converged"); }),
+            [&] { return "not converged, without a word"; });
+    expect_minimum(10.0 * accuracy_, 0.01);
+  } else if (how == Solve::full) {
     expect_minimum(kConverged, kConverged);
     expect_covariances(estimated, kCovarianceRounding);
   } else if (how == Solve::ordinary && report.owed == 0) {

@@ -107,6 +107,19 @@ class LineServerTest : public ::testing::Test {
   std::exception_ptr failure_;
 };
 
+TEST_F(LineServerTest, AWriterThatGoesWithoutReadingIsTakenToItsLastLine) {
+  serve();
+  constexpr int kLines = 3000;
+  {
+    SocketClient gone = writer();
+    std::string all;
+    for (int k = 0; k < kLines; ++k) all += "SET " + std::to_string(k) + " 20\n";
+    ASSERT_TRUE(gone.tell_bytes(all));
+  }  // no answer was read
+  SocketClient next = writer();
+  EXPECT_THAT(next.ask("ESTIMATE ALL"), SizeIs(kLines + 1));
+}
+
 TEST_F(LineServerTest, OneClientWritesAndOthersAsk) {
   serve();
   SocketClient robot = client(), reader = client();

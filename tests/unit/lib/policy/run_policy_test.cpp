@@ -46,7 +46,7 @@ class Scribe final : public PosePolicy {
   LinkReport offer(Id other, std::span<const Factor> measured) override {
     log.push_back("offer " + std::to_string(other));
     offers.push_back({{other, poses.back().id}, {measured.begin(), measured.end()}});
-    std::erase(wanted_, other);
+    if (!forgets) std::erase(wanted_, other);
     return {};
   }
   PoseReport end_pose() override {
@@ -60,6 +60,7 @@ class Scribe final : public PosePolicy {
     return converges;
   }
   bool converges = true;
+  bool forgets = false;  ///< that it was answered
   Estimator& estimator() override { throw std::logic_error("not asked for"); }
   std::vector<Id> kept() const override { return {}; }
   int factor_count() const override { return 0; }
@@ -95,6 +96,20 @@ TEST_F(RunPolicy, TellsThePolicyOfEveryPoseInTurn) {
   EXPECT_THAT(reported, ElementsAre(0, 1, 2, 3, 4));
   for (const auto& [pair, measured] : policy.offers)
     EXPECT_THAT(measured, SizeIs(pair.first == 0 ? 1 : 0));
+}
+
+TEST_F(RunPolicy, APolicyThatProposesAPairAgainIsWrong) {
+  const Simulation world = simulate(registry, "ring:poses=5");
+  FunctionRegistration none([](Id, Id) { return std::vector<Factor>(); });
+  Scribe policy;
+  policy.forgets = true;
+  try {
+    run_policy(world.graph, pose_chain(world.graph), policy, none);
+    ADD_FAILURE() << "it ended";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ErrorCode::plugin);
+    EXPECT_THAT(error.what(), testing::HasSubstr("proposes poses 0 and 2 again"));
+  }
 }
 
 TEST_F(RunPolicy, SaysWhetherThePolicyHasConverged) {

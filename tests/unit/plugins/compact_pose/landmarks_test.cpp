@@ -364,6 +364,18 @@ TEST_P(Landmarks, ThatContradictAreNotUsedWithAGate) {
   EXPECT_GT(report.landmarks.front().innovation, 100.0);
 }
 
+TEST_P(Landmarks, ThatOverflowAreNotUsed) {
+  begin("");
+  drive(kLap);
+  LandmarkObservation far = see(visible().front(), 1e-3);
+  far.factors.front().measurement[0] = 1e160;
+  policy_->offer_landmark(far);
+  const PoseReport report = advance();
+  ASSERT_THAT(report.landmarks, SizeIs(1));
+  EXPECT_EQ(report.landmarks.front().verdict, LinkVerdict::inconsistent);
+  EXPECT_TRUE(std::isfinite(policy_->estimator().chi2()));
+}
+
 TEST_P(Landmarks, MoveWithAGraphThatAbsoluteMeasurementsPutInItsPlace) {
   // Nothing is fixed: the first pose is at the origin of a frame of its own.
   const Pose start = world_.exp(VectorXd::Constant(world_.tangent(), 0.9));

@@ -95,6 +95,10 @@ class CAIRN_API LineSession {
   /// "COVARIANCE a b rows columns" and the numbers row by row; empty if there is none.
   static std::string covariance_line(Estimator& estimator, Id a, const VariableType& type_a, Id b,
                                      const VariableType& type_b);
+  static constexpr const char* kNoCovariance =
+      "the measurements do not determine everything, or rounding takes its digits";
+  /// The same of one variable; "NOTE there is no covariance of 7: …" if there is none.
+  static std::string covariance_or_note(Estimator& estimator, Id id, const VariableType& type);
 
  private:
   std::int64_t line_ = 0;

@@ -58,7 +58,8 @@ struct PolicyResult {
   std::int64_t false_registered = 0, false_kept = 0;  ///< as far as the registration knows
   std::map<std::string, std::int64_t> verdicts;
   std::int64_t kept_priors = 0;  ///< absolute measurements that are in the graph
-  std::int64_t kept_landmarks = 0, kept_observations = 0;  ///< likewise; measurements of landmarks
+  /// Landmarks of the recording, and factors on these, that are in the graph.
+  std::int64_t kept_landmarks = 0, kept_observations = 0;
   PolicySeconds seconds;
   double registration_seconds = 0.0;
   std::int64_t information_nonzeros = 0, factor_nonzeros = 0;

@@ -50,6 +50,7 @@ struct PriorReport {
 /// The outcome of what a pose has measured of a landmark.
 struct LandmarkReport {
   Id pose = 0, landmark = 0;
+  int factors = 0;     ///< of the observation
   bool added = false;  ///< the landmark is in the graph with it, and was not before
   /// ½ ln |I + J Σ Jᵀ| with the joint covariance Σ of pose and landmark, given what was used before
   /// it [nats]; of a landmark that is not in the graph infinite.
