@@ -294,8 +294,10 @@ void CompactPose::add_landmarks() {
     const Id id = seen.landmark.id;
     const bool twice = std::ranges::find(added, id, &Variable::id) != added.end();
     if (!twice && graph_.landmark(id)) continue;
-    LandmarkReport report{
-        .pose = report_.id, .landmark = id, .gain = std::numeric_limits<double>::infinity()};
+    LandmarkReport report{.pose = report_.id,
+                          .landmark = id,
+                          .factors = static_cast<int>(std::ssize(seen.factors)),
+                          .gain = std::numeric_limits<double>::infinity()};
     std::optional<std::vector<double>> state;
     if (graph_.newest_kept() && !twice) state = place(seen);
     if (state || twice) {

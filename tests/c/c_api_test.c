@@ -170,12 +170,12 @@ static void says_when_a_number_does_not_exist(cairn_registry* registry) {
 #if !defined(__SANITIZE_ADDRESS__) && !defined(CAIRN_SANITIZED)
 /* More than any process can have; nothing is read. */
 static void reports_that_memory_ends(cairn_registry* registry) {
-  const int64_t ends[] = {0, 1};
-  cairn_graph* graph = two_measurements(registry);
-  fails(cairn_graph_add_factor(graph, "EDGE_SE2", ends, 2, origin, (size_t)1 << 46, unit_information, 6),
-        CAIRN_NUMERICAL, "out of memory");
-  EXPECT(cairn_graph_factor_count(graph) == 2);
-  cairn_graph_free(graph);
+  cairn_estimator* estimator = NULL;
+  EXPECT_OK(cairn_estimator_new(registry, NULL, &estimator));
+  fails(cairn_estimator_change_factor(estimator, 0, origin, (size_t)1 << 46, unit_information, 6), CAIRN_NUMERICAL,
+        "out of memory");
+  EXPECT(cairn_estimator_factor_count(estimator) == 0);
+  cairn_estimator_free(estimator);
 }
 #else
 static void reports_that_memory_ends(cairn_registry* registry) { (void)registry; }

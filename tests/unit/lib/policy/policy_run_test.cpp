@@ -57,6 +57,29 @@ TEST_F(PolicyRunTest, RefusesWhatIsNoTrajectory) {
   EXPECT_THROW(policy_data(std::move(made.graph)), Error);
 }
 
+TEST_F(PolicyRunTest, CountsLandmarksAndEachMeasurementOfThem) {
+  Simulation made = simulate("landmarks2d:poses=60");
+  Graph& graph = made.graph;
+  const int factors = graph.factor_count();
+  int doubled = 0;
+  for (int f = 0; f < factors && doubled < 5; ++f) {  // another measurement of the same
+    const Factor factor = graph.factor(f);
+    if (factor.type->is_relative()) continue;
+    graph.add(factor);
+    ++doubled;
+  }
+  const PolicyData data = policy_data(std::move(made.graph));
+  EXPECT_EQ(doubled, 5);
+  const PolicySetting setting{.data = data, .registry = registry_};
+  PolicyRun run(kEverything, setting);
+  run.run(60, "all");
+  const PolicyResult result = run.finish(Recovery::distribute);
+  EXPECT_EQ(result.kept_observations, data.observations);
+  EXPECT_EQ(result.kept_landmarks, data.landmarks);
+  EXPECT_EQ(result.compact.factor_count(), data.recording.factor_count());
+  EXPECT_EQ(result.kept_poses, 60);
+}
+
 TEST_F(PolicyRunTest, CountsWhatBecameOfEveryPoseAndLoop) {
   const PolicyData data = world("manhattan:poses=80,streets=3");
   const PolicySetting setting{.data = data, .registry = registry_};
