@@ -219,7 +219,8 @@ typedef struct cairn_report {
 } cairn_report;
 
 /* Carries out what was collected, or solves again if nothing was. After an error the estimator is as before, and what was
- * collected is discarded. `options` (NULL: none of them) and `report` may be NULL. */
+ * collected is discarded; CAIRN_INPUT where it names what is not in the estimator, or does not fit it. `options` (NULL: none
+ * of them) and `report` may be NULL. */
 CAIRN_C_API cairn_code cairn_estimator_update(cairn_estimator* estimator, const cairn_update_options* options,
                                               cairn_report* report);
 /* Notes on the last update, one sentence per line. */
