@@ -108,11 +108,13 @@ std::string remedy(std::string_view core, std::string_view plugin) {
          "-mavx… and -D_GLIBCXX_DEBUG)";
 }
 
-/// Whether the dynamic linker failed for lack of memory. That of glibc may also say then that it
-/// cannot open the library, which is there and can be read.
+/// Whether the dynamic linker failed for lack of memory. That of glibc may also say then that there
+/// is no such library, which is there and can be read.
 bool lacked_memory(int code, const std::string& words, const fs::path& library) {
-  return code == ENOMEM || (words.find(library.string() + ": cannot open") != std::string::npos &&
-                            ::access(library.c_str(), R_OK) == 0);
+  return code == ENOMEM ||
+         (words.find(library.string() + ": cannot open shared object file: No such file") !=
+              std::string::npos &&
+          ::access(library.c_str(), R_OK) == 0);
 }
 
 boost::dll::shared_library open_library(const fs::path& library) {

@@ -18,6 +18,7 @@
 
 #include <fmt/core.h>
 
+#include "cairn/io/descriptor.hpp"
 #include "cairn/io/format.hpp"
 #include "cairn/io/output_file.hpp"
 #include "cairn/runtime/error.hpp"
@@ -36,21 +37,6 @@ constexpr std::size_t kMostUnpacked = std::size_t{1} << 28, kMostExpansion = 200
 }
 
 std::string system_message(int number) { return std::generic_category().message(number); }
-
-/// Owns a file descriptor.
-class Descriptor {
- public:
-  explicit Descriptor(int number) : number_(number) {}
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-  ~Descriptor() {
-    if (number_ >= 0) ::close(number_);
-  }
-  int number() const { return number_; }
-
- private:
-  int number_;
-};
 
 std::string read_bytes(const fs::path& file) {
   Descriptor input(::open(file.c_str(), O_RDONLY | O_CLOEXEC));

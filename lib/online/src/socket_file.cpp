@@ -18,6 +18,7 @@
 
 #include <fmt/core.h>
 
+#include "cairn/io/descriptor.hpp"
 #include "cairn/runtime/error.hpp"
 
 namespace cairn {
@@ -46,20 +47,6 @@ sockaddr_un address_of(const fs::path& file) {
   std::memcpy(address.sun_path, name.c_str(), name.size() + 1);
   return address;
 }
-
-class Descriptor {
- public:
-  explicit Descriptor(int number) : number_(number) {}
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-  ~Descriptor() {
-    if (number_ >= 0) ::close(number_);
-  }
-  int number() const { return number_; }
-
- private:
-  int number_;
-};
 
 /// One process at a time looks at the names of a folder and replaces one: the lock is that of the
 /// folder itself, so that no file is left.

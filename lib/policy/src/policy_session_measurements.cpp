@@ -41,7 +41,15 @@ void PolicySession::take_prior(Factor prior) {
     throw bad_line(
         fmt::format("{}: expected a measurement of the newest pose before it ends (DONE)", name));
   }
-  if (const std::string problem = type.normalize(prior.measurement.data()); !problem.empty())
+  begin_measured(prior, name);
+  priors_.push_back(std::move(prior));
+}
+
+/// For each measurement of the open pose but its links: brings it into canonical form, and hands
+/// the pose over. `name` begins the message where it is refused.
+void PolicySession::begin_measured(Factor& measured, const std::string& name) {
+  if (const std::string problem = measured.type->normalize(measured.measurement.data());
+      !problem.empty())
     throw bad_line(fmt::format("{}: {}", name, problem));
   expect_complete();
   if (!policy_.unlocated().empty()) {
@@ -50,7 +58,6 @@ void PolicySession::take_prior(Factor prior) {
         ": it is not known where the robot is on the map; expected a match with it (LOCATE) first");
   }
   begin();
-  priors_.push_back(std::move(prior));
 }
 
 void PolicySession::offer_priors() {
@@ -111,15 +118,7 @@ void PolicySession::take_observation(Factor factor) {
                                landmark->second->tag(), id, motions_->type().tag()));
   if (landmark->second->placement()->dimension() != motions_->type().placement()->dimension())
     throw bad_line(name + ": the poses are not where the landmark is");
-  if (const std::string problem = type.normalize(factor.measurement.data()); !problem.empty())
-    throw bad_line(fmt::format("{}: {}", name, problem));
-  expect_complete();
-  if (!policy_.unlocated().empty()) {
-    throw bad_line(
-        name +
-        ": it is not known where the robot is on the map; expected a match with it (LOCATE) first");
-  }
-  begin();
+  begin_measured(factor, name);
   auto there = std::ranges::find(observations_, id, [](const LandmarkObservation& observation) {
     return observation.landmark.id;
   });

@@ -108,6 +108,7 @@ class CAIRN_API PolicySession final : public LineSession {
   void take_pose(Variable pose, Reply& reply);
   void take_edge(Factor factor);
   void take_prior(Factor prior);
+  void begin_measured(Factor& measured, const std::string& name);
   void take_landmark(const Variable& landmark);
   void take_observation(Factor factor);
   bool is_observation(const Factor& factor) const;
