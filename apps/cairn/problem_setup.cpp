@@ -9,9 +9,9 @@
 #include <fmt/core.h>
 
 #include "arguments.hpp"
+#include "cairn/evaluation/optimization.hpp"
 #include "cairn/evaluation/plausibility.hpp"
 #include "cairn/plugin/registry.hpp"
-#include "cairn/runtime/plugin_call.hpp"
 #include "interrupt.hpp"
 #include "table.hpp"
 
@@ -77,10 +77,7 @@ std::vector<std::string> ProblemSetup::apply(Graph& graph, WatchedGuess::GoOn go
     notes.push_back("--loss-on selects no factor of this graph: none has the loss");
   }
   if (!initial_) return notes;
-  if (auto* watched = query<WatchedGuess>(*initial_)) watched->watch(std::move(go_on));
-  for (std::string& note :
-       call_plugin([&] { return fmt::format("initial guess '{}'", initial_name_); },
-                   [&] { return initial_->compute(graph); }))
+  for (std::string& note : compute_guess(graph, *initial_, initial_name_, std::move(go_on)))
     notes.push_back(std::move(note));
   return notes;
 }

@@ -5,8 +5,7 @@
 
 #include <fmt/format.h>
 
-#include "cairn/evaluation/plausibility.hpp"
-#include "cairn/evaluation/watched_guess.hpp"
+#include "cairn/evaluation/optimization.hpp"
 #include "cairn/runtime/plugin_call.hpp"
 #include "cairn/solve/initial_guess.hpp"
 #include "cairn/solve/optimizer.hpp"
@@ -40,20 +39,16 @@ class Interrupt final : public cairn::Observer {
     return go_on({iteration.number, iteration.accepted ? 1 : 0, iteration.chi2, iteration.step_norm,
                   iteration.lambda, iteration.seconds});
   }
-  void watch(cairn::InitialGuess& guess) {
-    if (auto* watched = cairn::query<cairn::WatchedGuess>(guess))
-      watched->watch([this](std::string_view, double) { return go_on({}); });
-  }
-  /// Set for good by the first answer that is not 0.
-  const std::atomic<bool>& flag() const { return interrupted_; }
-
- private:
+  /// Asks it. `iteration`: zeros where there is none.
   bool go_on(const cairn_iteration& iteration) {
     if (stop_.interrupt && !interrupted_ && stop_.interrupt(&iteration, stop_.data) != 0)
       interrupted_ = true;
     return !interrupted_;
   }
+  /// Set for good by the first answer that is not 0.
+  const std::atomic<bool>& flag() const { return interrupted_; }
 
+ private:
   const cairn_stop& stop_;
   std::atomic<bool> interrupted_{false};
 };
@@ -75,20 +70,8 @@ cairn::Summary optimize(cairn::Graph& graph, cairn::Registry& registry, std::str
   const auto guess = registry.make<cairn::InitialGuess>(initial);
   Interrupt observer(given_stop);
   stop.interrupt = &observer.flag();
-  observer.watch(*guess);
-  std::vector<std::string> notes =
-      cairn::call_plugin([&] { return fmt::format("initial guess '{}'", initial); },
-                         [&] { return guess->compute(graph); });
-  for (std::string& note : notes) note = fmt::format("initial guess {}: {}", initial, note);
-  cairn::Summary summary =
-      cairn::call_plugin([&] { return fmt::format("optimizer '{}'", optimizer); },
-                         [&] { return solver->optimize(graph, stop, observer); });
-  if (summary.status != Status::interrupted) {
-    for (std::string& doubt : cairn::reasons_for_doubt(graph, summary.final_chi2))
-      summary.notes.push_back(std::move(doubt));
-  }
-  summary.notes.insert(summary.notes.begin(), notes.begin(), notes.end());
-  return summary;
+  return cairn::optimize(graph, {*solver, optimizer, guess.get(), initial}, stop, observer,
+                         [&](std::string_view, double) { return observer.go_on({}); });
 }
 
 std::vector<double> blocks_of(cairn_graph& from,

@@ -16,11 +16,9 @@
 #include "arrays.hpp"
 #include "bindings.hpp"
 #include "bound_graph.hpp"
-#include "cairn/evaluation/plausibility.hpp"
-#include "cairn/evaluation/watched_guess.hpp"
+#include "cairn/evaluation/optimization.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
-#include "cairn/runtime/plugin_call.hpp"
 #include "cairn/runtime/threads.hpp"
 #include "cairn/solve/initial_guess.hpp"
 #include "cairn/solve/optimizer.hpp"
@@ -82,42 +80,19 @@ class Callback final : public Observer {
 
 /// The components that an optimisation is made of, and when it stops.
 struct Plan {
-  ComponentSpec optimizer_spec;
+  std::string optimizer_name;
   std::unique_ptr<Optimizer> optimizer;
   std::string initial_name;
   std::unique_ptr<InitialGuess> initial;  // null: the states as they are
   Stop stop;
 
-  Plan(ComponentSpec spec, const py::object& guess)
-      : optimizer_spec(std::move(spec)),
-        optimizer(default_registry().make<Optimizer>(optimizer_spec)) {
+  Plan(const ComponentSpec& spec, const py::object& guess)
+      : optimizer_name(spec.name), optimizer(default_registry().make<Optimizer>(spec)) {
     if (guess.is_none()) return;
     initial_name = guess.cast<std::string>();
     initial = default_registry().make<InitialGuess>(initial_name);
   }
 };
-
-/// Without the interpreter's lock.
-Summary run(Graph& graph, const Plan& plan, Observer& observer) {
-  std::vector<std::string> notes;
-  if (plan.initial) {
-    if (auto* watched = query<WatchedGuess>(*plan.initial))
-      watched->watch([&](std::string_view, double) { return !plan.stop.interrupt->load(); });
-    for (const std::string& note :
-         call_plugin([&] { return fmt::format("initial guess '{}'", plan.initial_name); },
-                     [&] { return plan.initial->compute(graph); }))
-      notes.push_back(fmt::format("initial guess {}: {}", plan.initial_name, note));
-  }
-  Summary summary =
-      call_plugin([&] { return fmt::format("optimizer '{}'", plan.optimizer_spec.name); },
-                  [&] { return plan.optimizer->optimize(graph, plan.stop, observer); });
-  if (summary.status != Status::interrupted) {
-    for (std::string& doubt : reasons_for_doubt(graph, summary.final_chi2))
-      summary.notes.push_back(std::move(doubt));
-  }
-  summary.notes.insert(summary.notes.begin(), notes.begin(), notes.end());
-  return summary;
-}
 
 Summary optimize(BoundGraph& bound, const std::string& optimizer, const py::object& initial,
                  const py::object& loss, const std::string& loss_on, int max_iterations,
@@ -138,7 +113,9 @@ Summary optimize(BoundGraph& bound, const std::string& optimizer, const py::obje
   Summary summary;
   {
     const py::gil_scoped_release unlocked;
-    summary = run(use.graph(), plan, observer);
+    summary = optimize(
+        use.graph(), {*plan.optimizer, plan.optimizer_name, plan.initial.get(), plan.initial_name},
+        plan.stop, observer);
   }
   guard.absorb();
   observer.rethrow();

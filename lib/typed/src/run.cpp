@@ -5,9 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "cairn/evaluation/plausibility.hpp"
-#include "cairn/evaluation/watched_guess.hpp"
-#include "cairn/runtime/plugin_call.hpp"
+#include "cairn/evaluation/optimization.hpp"
 #include "cairn/solve/initial_guess.hpp"
 
 namespace cairn {
@@ -21,12 +19,10 @@ bool is_interrupted(const Stop& stop) { return stop.interrupt && *stop.interrupt
 std::vector<std::string> choose_start(Graph& graph, const Stop& stop, Registry& registry) {
   if (!registry.has(InitialGuess::kKind, kInitialGuess)) return {};
   const auto guess = registry.make<InitialGuess>(kInitialGuess);
-  if (auto* watched = query<WatchedGuess>(*guess))
-    watched->watch([&](std::string_view, double) { return !is_interrupted(stop); });
   const Values given = graph.values();
   std::vector<std::string> notes =
-      call_plugin([] { return "initial guess '" + std::string(kInitialGuess) + "'"; },
-                  [&] { return guess->compute(graph); });
+      compute_guess(graph, *guess, kInitialGuess,
+                    [&](std::string_view, double) { return !is_interrupted(stop); });
   if (graph.values().pools == given.pools) return {};
   for (std::string& note : notes) note = "initial guess auto: " + note;
   return notes;
@@ -34,12 +30,8 @@ std::vector<std::string> choose_start(Graph& graph, const Stop& stop, Registry& 
 
 /// From the graph's states.
 Summary run(Graph& graph, Optimizer& optimizer, std::string_view name, const Stop& stop) {
-  Summary summary = call_plugin([&] { return "optimizer '" + std::string(name) + "'"; },
-                                [&] { return optimizer.optimize(graph, stop); });
-  if (summary.status == Status::interrupted) return summary;
-  for (std::string& doubt : reasons_for_doubt(graph, summary.final_chi2))
-    summary.notes.push_back(std::move(doubt));
-  return summary;
+  Observer silent;
+  return optimize(graph, Optimization{optimizer, name, nullptr, {}}, stop, silent);
 }
 
 }  // namespace

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "cairn/evaluation/watched_guess.hpp"
+#include "cairn/graph/graph.hpp"
+#include "cairn/runtime/api.hpp"
+#include "cairn/solve/initial_guess.hpp"
+#include "cairn/solve/optimizer.hpp"
+
+namespace cairn {
+
+/// The components of an optimisation, each with the name by which errors and notes call it.
+struct Optimization {
+  Optimizer& optimizer;
+  std::string_view optimizer_name;
+  InitialGuess* guess = nullptr;  ///< null: from the graph's own states
+  std::string_view guess_name;
+};
+
+/// Lets a guess replace the graph's states. `go_on` is asked, if the guess can be watched, whether
+/// it may go on. Returns the guess's notes. What it throws names it (`call_plugin`).
+CAIRN_API std::vector<std::string> compute_guess(Graph& graph, InitialGuess& guess,
+                                                 std::string_view name,
+                                                 WatchedGuess::GoOn go_on = {});
+
+/// The initial guess, then the optimizer. The summary's notes are those of the guess, each after
+/// "initial guess NAME: ", those of the optimizer, and, unless it was interrupted, what speaks
+/// against the estimate (`reasons_for_doubt`). `go_on`: as above; none: what `stop.interrupt` says.
+/// What a component throws names it.
+CAIRN_API Summary optimize(Graph& graph, const Optimization& of, const Stop& stop,
+                           Observer& observer, WatchedGuess::GoOn go_on = {});
+
+}  // namespace cairn

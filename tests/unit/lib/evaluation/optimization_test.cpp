@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "cairn/evaluation/optimization.hpp"
+
+#include <algorithm>
+#include <atomic>
+#include <memory>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "cairn/runtime/error.hpp"
+#include "cairn/types/loss.hpp"
+#include "support/sample_graphs.hpp"
+
+namespace cairn {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+/// Moves the point of `overshooting` to (x, 1), unless it may not go on.
+class MovesTo final : public InitialGuess, public WatchedGuess {
+ public:
+  explicit MovesTo(double x) : x_(x) {}
+  void* ability(std::string_view name) override {
+    return name == kAbility ? static_cast<WatchedGuess*>(this) : nullptr;
+  }
+  void watch(GoOn go_on) override { go_on_ = std::move(go_on); }
+  std::vector<std::string> compute(Graph& graph) override {
+    if (go_on_ && !go_on_("moves", 0.5)) return {"ended"};
+    const double state[] = {x_, 1.0};
+    graph.set_state(0, state);
+    return {"moved"};
+  }
+
+ private:
+  double x_;
+  GoOn go_on_;
+};
+
+/// Changes nothing; ends with the status that it is given.
+class Stays final : public Optimizer {
+ public:
+  explicit Stays(Status status) : status_(status) {}
+  Summary optimize(Graph& graph, const Stop&, Observer&) override {
+    Summary summary;
+    summary.status = status_;
+    summary.initial_chi2 = summary.final_chi2 = test::chi2_of(graph);
+    summary.notes = {"stayed"};
+    return summary;
+  }
+
+ private:
+  Status status_;
+};
+
+class Fails final : public Optimizer {
+ public:
+  Summary optimize(Graph&, const Stop&, Observer&) override { throw std::runtime_error("no"); }
+};
+
+/// Of no weight anywhere.
+class Weightless final : public Loss {
+ public:
+  void evaluate(std::span<const double>, std::span<double> rho,
+                std::span<double> weights) const override {
+    std::ranges::fill(rho, 0.0);
+    std::ranges::fill(weights, 0.0);
+  }
+  double second_derivative(double) const override { return 0.0; }
+};
+
+class Optimizations : public testing::Test {
+ protected:
+  Summary run(Optimizer& optimizer, InitialGuess* guess, const WatchedGuess::GoOn& go_on = {}) {
+    return optimize(graph_, {optimizer, "stays", guess, "moves"}, stop_, silent_, go_on);
+  }
+  double x() const { return graph_.state(0)[0]; }
+
+  Graph graph_ = test::overshooting(3.0);
+  Stop stop_;
+  Observer silent_;
+};
+
+TEST_F(Optimizations, BeginWithTheGuessAndEndWithWhatSpeaksAgainstTheEstimate) {
+  graph_.set_loss(std::make_shared<Weightless>());
+  MovesTo near(0.1);
+  Stays optimizer(Status::converged);
+  EXPECT_THAT(run(optimizer, &near).notes, ElementsAre("initial guess moves: moved", "stayed",
+                                                       HasSubstr("no factor any weight")));
+}
+
+TEST_F(Optimizations, DoNotDoubtWhatWasInterrupted) {
+  graph_.set_loss(std::make_shared<Weightless>());
+  MovesTo near(0.1);
+  Stays optimizer(Status::interrupted);
+  EXPECT_THAT(run(optimizer, &near).notes, ElementsAre("initial guess moves: moved", "stayed"));
+}
+
+TEST_F(Optimizations, WithoutAGuessStartFromTheStates) {
+  Stays optimizer(Status::converged);
+  EXPECT_THAT(run(optimizer, nullptr).notes, ElementsAre("stayed"));
+  EXPECT_EQ(x(), 3.0);
+}
+
+TEST_F(Optimizations, EndAGuessByTheInterruptOrByWhatIsAsked) {
+  MovesTo near(0.1);
+  Stays optimizer(Status::interrupted);
+  std::atomic<bool> interrupt{true};
+  stop_.interrupt = &interrupt;
+  EXPECT_THAT(run(optimizer, &near).notes, ElementsAre("initial guess moves: ended", "stayed"));
+  EXPECT_EQ(x(), 3.0);
+  interrupt = false;
+  run(optimizer, &near, [](std::string_view, double) { return false; });
+  EXPECT_EQ(x(), 3.0);
+  run(optimizer, &near);
+  EXPECT_EQ(x(), 0.1);
+}
+
+TEST_F(Optimizations, NameTheComponentThatThrows) {
+  Fails optimizer;
+  try {
+    run(optimizer, nullptr);
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ErrorCode::plugin);
+    EXPECT_THAT(error.what(), HasSubstr("optimizer 'stays' failed: no"));
+  }
+}
+
+}  // namespace
+}  // namespace cairn
