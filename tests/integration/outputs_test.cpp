@@ -223,6 +223,36 @@ TEST_F(Outputs, AreTriedAsTheyWillBeWritten) {
 }
 
 // Whenever the signal comes: before the work it ends the program, later the waiting.
+TEST_F(Outputs, AFileThatCannotBeReplacedIsRefusedBeforeTheWork) {
+  const std::string file = graph();
+  if (shell("unshare -rm true", folder_).exit_code != 0)
+    GTEST_SKIP() << "this system does not let its users mount anything";
+  const Outcome mounted = shell(
+      "cd $D; echo old > mounted.g2o; unshare -rm sh -c 'mount --bind mounted.g2o mounted.g2o && "
+      "$C optimize graph.g2o -o mounted.g2o; echo code=$? >&2'",
+      folder_);
+  EXPECT_THAT(mounted.err, HasSubstr("code=3"));
+  EXPECT_THAT(mounted.err, HasSubstr("mount its folder instead"));
+  EXPECT_THAT(mounted.out, Not(HasSubstr("chi2")));
+  EXPECT_EQ(read_text(folder_.file("mounted.g2o")), "old\n");
+}
+
+TEST_F(Outputs, AFileOfAnotherUserInAStickyFolderIsRefusedBeforeTheWork) {
+  graph();
+  // The program as somebody else, who may write to the file and to its folder.
+  const std::string other = "setpriv --reuid=65534 --clear-groups ";
+  if (shell(other + "$C --version", folder_).exit_code != 0)
+    GTEST_SKIP() << "only root can run the program as another user, in a folder that he may read";
+  const Outcome sticky = shell(
+      "cd $D; chmod 755 .; mkdir sticky; chmod 1777 sticky; echo old > sticky/x.g2o; "
+      "chmod 666 sticky/x.g2o; " +
+          other + "$C optimize graph.g2o -o sticky/x.g2o; echo code=$? >&2",
+      folder_);
+  EXPECT_THAT(sticky.err, HasSubstr("code=3"));
+  EXPECT_THAT(sticky.err, HasSubstr("folder sticky is sticky"));
+  EXPECT_EQ(read_text(folder_.file("sticky/x.g2o")), "old\n");
+}
+
 TEST_F(Outputs, AFifoThatNothingReadsIsNotWaitedForAfterASignal) {
   graph();
   for (const char* seconds : {"0.05", "2"}) {

@@ -94,6 +94,27 @@ bool is_interrupted() {
   return interrupt && interrupt->load();
 }
 
+/// Why no other file can be renamed over this one, and what helps; empty if one can, as far as can
+/// be told beforehand.
+std::string why_not_replaced(const fs::path& file, const fs::path& folder) {
+  struct statx found {
+  }, holder{};
+  const auto look = [](const fs::path& name, struct statx& into) {
+    return ::statx(AT_FDCWD, name.c_str(), 0, STATX_BASIC_STATS, &into) == 0;
+  };
+  if (!look(file, found) || !look(folder, holder)) return {};
+  if ((found.stx_attributes & STATX_ATTR_MOUNT_ROOT) != 0)
+    return "is mounted by itself, so that it cannot be replaced; mount its folder instead";
+  if ((found.stx_attributes & (STATX_ATTR_IMMUTABLE | STATX_ATTR_APPEND)) != 0)
+    return "cannot be replaced: it is immutable or append-only (chattr -i -a)";
+  const uid_t user = ::geteuid();
+  if ((holder.stx_mode & S_ISVTX) != 0 && user != 0 && user != found.stx_uid &&
+      user != holder.stx_uid)
+    return fmt::format("cannot be replaced: it belongs to another user, and folder {} is sticky",
+                       folder.string());
+  return {};
+}
+
 OutputFile*& first_unfinished() {
   static OutputFile* first = nullptr;
   return first;
@@ -237,6 +258,9 @@ void check_writable(const fs::path& file) {
   if (::access(folder.c_str(), W_OK | X_OK) != 0) {
     refuse(file,
            fmt::format("cannot be written: folder {}: {}", folder.string(), system_message(errno)));
+  }
+  if (exists) {
+    if (const std::string why = why_not_replaced(target, folder); !why.empty()) refuse(file, why);
   }
   const OutputFile attempt(file);
 }

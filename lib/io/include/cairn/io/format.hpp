@@ -78,7 +78,8 @@ CAIRN_API std::string file_ending(std::filesystem::path file);
 CAIRN_API std::string read_file(const std::filesystem::path& file);
 
 /// Tries what `write_file` needs, and leaves nothing: throws `Error` (input) where its folder is
-/// not there or refuses, the name is too long, or names a folder.
+/// not there or refuses, the name is too long, or names a folder or a file that no other can
+/// replace (mounted by itself, immutable, another user's in a sticky folder).
 CAIRN_API void check_writable(const std::filesystem::path& file);
 
 /// Writes beside and renames. Packs if the name ends in .gz. "-" is standard output, whose reader
