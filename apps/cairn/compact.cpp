@@ -103,17 +103,8 @@ OptionValues given_thresholds(const CompactOptions& options) {
 
 bool names_thresholds(const CompactOptions& options, const ComponentSpec& policy) {
   return options.range || options.angle || options.loop_gain || options.pose_gain ||
-         !options.thresholds.empty() || policy.values.contains("range") ||
-         policy.values.contains("loop_gain") || policy.values.contains("pose_gain");
+         !options.thresholds.empty() || gives_thresholds(policy);
 }
-
-/// Other policies are run with the options that are given.
-bool finds_thresholds(const ComponentSpec& policy, Registry& registry) {
-  return query<OptionFinder>(*registry.make<PosePolicy>(policy.name)) != nullptr;
-}
-
-/// With fewer loop closures in it, a sample is extended.
-constexpr std::int64_t kLeastLoops = 3;
 
 /// What to run, and the thresholds that were found, or read.
 struct Job {
@@ -125,18 +116,13 @@ struct Job {
 /// So many poses from the first on: a sample without loop closures would tell nothing.
 std::size_t sample_size(const CompactOptions& options, const PolicyData& data,
                         const Session& session) {
-  const auto poses = static_cast<double>(data.poses.size());
-  const auto asked =
-      std::max<std::size_t>(1, static_cast<std::size_t>(std::llround(options.sample * poses)));
-  std::int64_t loops = 0;
-  std::size_t count = 0;
-  while (count < data.poses.size() && (count < asked || loops < kLeastLoops))
-    loops += std::ssize(data.poses[count++].links);
-  if (count == asked || loops == 0) return asked;
-  session.note(
-      fmt::format("the first {} poses have too few loop closures to find thresholds: the sample is "
-                  "{} of {} poses",
-                  asked, count, data.poses.size()));
+  const auto [asked, count] = threshold_sample(data, options.sample);
+  if (count != asked) {
+    session.note(
+        fmt::format("the first {} poses have too few loop closures to find thresholds: the sample "
+                    "is {} of {} poses",
+                    asked, count, data.poses.size()));
+  }
   return count;
 }
 

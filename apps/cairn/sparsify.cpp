@@ -36,7 +36,6 @@ namespace {
 
 namespace json = boost::json;
 
-constexpr const char* kDefaultSelection = "smallest_blanket:part=0.5";
 constexpr std::size_t kRefusedShown = 5;
 
 /// The component with its options given, one by one, besides those in its name.
@@ -50,16 +49,12 @@ SparsifyJob job_of(const SparsifyCommandOptions& options, Session& session) {
   for (const auto& [name, value] : given) {
     if (!value.empty()) job.sparsifier.values.insert_or_assign(name, value);
   }
-  // A tree is solved in closed form; nothing else is worth its name there.
-  const auto topology = job.sparsifier.values.find("topology");
-  if (topology != job.sparsifier.values.end() &&
-      (topology->second.starts_with("clt") || topology->second.starts_with("cliquey")))
-    job.sparsifier.values.emplace("recovery", "closed_form");
+  choose_recovery(job.sparsifier);
   if (options.keep_every > 0 && !options.select.empty())
     throw Error(ErrorCode::usage, "--keep-every and --select both say which nodes leave: give one");
   job.selection = parse_component(options.keep_every > 0
                                       ? fmt::format("keep_every:every={}", options.keep_every)
-                                  : options.select.empty() ? kDefaultSelection
+                                  : options.select.empty() ? SparsifyJob::kDefaultSelection
                                                            : options.select);
   job.nodes = parse_enum<NodeKind>(options.nodes, "--nodes");
   job.optimizer = optimizer_spec(options.optimizer, "", session.registry());

@@ -42,6 +42,11 @@ inline py::array_t<double> array_of(std::span<const double> numbers) {
   return array_of(numbers, {numbers.size()});
 }
 
+/// Ids: (n,) integers.
+inline py::array_t<Id> array_of_ids(std::span<const Id> ids) {
+  return py::array_t<Id>(static_cast<py::ssize_t>(ids.size()), ids.data());
+}
+
 /// count blocks of rows × columns, one after the other and column-major each (as cairn has them),
 /// as an array (count, rows, columns).
 py::array_t<double> blocks_of(std::span<const double> blocks, std::size_t rows,

@@ -16,12 +16,17 @@ void bind_errors(py::module_& module);
 void bind_values(py::module_& module);
 void bind_factor_types(py::module_& module);
 void bind_measurements(py::module_& module);
+void bind_factors(py::module_& module);
 void bind_graph(py::module_& module);
 void bind_files(py::module_& module);
 void bind_optimize(py::module_& module);
 void bind_covariances(py::module_& module);
+void bind_estimates(py::module_& module);
 void bind_estimator(py::module_& module);
 void bind_evaluation(py::module_& module);
+void bind_policy(py::module_& module);
+void bind_compact(py::module_& module);
+void bind_sparsify(py::module_& module);
 void bind_pictures(py::module_& module);
 void bind_components(py::module_& module);
 

@@ -15,11 +15,11 @@
 #include "arrays.hpp"
 #include "bindings.hpp"
 #include "bound_estimator.hpp"
-#include "bound_graph.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/typed/symbol.hpp"
 #include "component_names.hpp"
+#include "factors.hpp"
 #include "measured.hpp"
 #include "types_of.hpp"
 
@@ -79,11 +79,8 @@ void add_variable(BoundEstimator& bound, Id id, const py::object& value, bool fi
 void add_measurement(BoundEstimator& bound, const Measured& measured, const py::object& sigmas,
                      const py::object& information, const py::object& covariance,
                      const py::object& loss) {
-  auto type = measured.own ? measured.own : default_registry().factor_type(measured.tag);
-  const Noise noise{sigmas, information, covariance};
-  std::vector<double> packed = noise.packed(type->residual_size());
   bound.pending().factors.push_back(
-      Factor{std::move(type), measured.ids, measured.numbers, std::move(packed), loss_of(loss)});
+      factor_of(measured, Noise{sigmas, information, covariance}, loss));
 }
 
 void append_ids(std::vector<std::int64_t>& list, const py::object& ids, const char* what) {
@@ -112,100 +109,13 @@ UpdateReport update(BoundEstimator& bound, bool full, bool defer, double max_sec
   return use.estimator().update(what, {.defer = defer, .full = full, .max_seconds = max_seconds});
 }
 
-// What it holds -----------------------------------------------------------------------------------
-
-py::array_t<Id> ids_of_type(BoundEstimator& bound, const py::object& type) {
-  Estimator& estimator = bound.get();
-  std::vector<Id> ids = estimator.variables();
-  if (!type.is_none()) {
-    const std::string tag = tag_of(type);
-    std::erase_if(ids, [&](Id id) { return estimator.type(id)->tag() != tag; });
-  }
-  return py::array_t<Id>(static_cast<py::ssize_t>(ids.size()), ids.data());
-}
-
-py::array_t<double> states_of_type(BoundEstimator& bound, const py::object& type) {
-  const py::array_t<Id> ids = ids_of_type(bound, type);
-  Estimator& estimator = bound.get();
-  if (ids.size() == 0)
-    throw Error(ErrorCode::usage, "there is no " + tag_of(type) + " in the estimator");
-  std::vector<double> states;
-  for (py::ssize_t k = 0; k < ids.size(); ++k) {
-    const std::span<const double> state = estimator.state(ids.data()[k]);
-    states.insert(states.end(), state.begin(), state.end());
-  }
-  const auto rows = static_cast<std::size_t>(ids.size());
-  return array_of(states, {rows, states.size() / rows});
-}
-
-double chi2_of(BoundEstimator& bound) {
-  const EstimatorUse use(bound);
-  const py::gil_scoped_release unlocked;
-  return use.estimator().chi2();
-}
-
-std::unique_ptr<BoundGraph> graph_of(BoundEstimator& bound) {
-  const EstimatorUse use(bound);
-  const py::gil_scoped_release unlocked;
-  return std::make_unique<BoundGraph>(use.estimator().graph());
-}
+// Copies
+// -------------------------------------------------------------------------------------------
 
 std::unique_ptr<BoundEstimator> copy(BoundEstimator& bound) {
   auto result = std::make_unique<BoundEstimator>(bound.get().clone());
   result->pending() = bound.pending();
   return result;
-}
-
-// Covariances -------------------------------------------------------------------------------------
-
-/// Blocks of one size, of pairs of ids one after the other.
-py::array_t<double> blocks(BoundEstimator& bound, std::span<const Id> first,
-                           std::span<const Id> second) {
-  const EstimatorUse use(bound);
-  Estimator& estimator = use.estimator();
-  if (first.empty()) return blocks_of({}, 0, 0);
-  const int rows = estimator.type(first[0])->tangent_size();
-  const int columns = estimator.type(second[0])->tangent_size();
-  const std::size_t size = static_cast<std::size_t>(rows) * static_cast<std::size_t>(columns);
-  std::vector<double> numbers(first.size() * size);
-  {
-    const py::gil_scoped_release unlocked;
-    for (std::size_t k = 0; k < first.size(); ++k) {
-      if (estimator.type(first[k])->tangent_size() != rows ||
-          estimator.type(second[k])->tangent_size() != columns) {
-        throw Error(ErrorCode::usage,
-                    fmt::format("an array has blocks of one size, and that of {} is another than "
-                                "that of {}: ask for each type by itself",
-                                id_text(first[k]), id_text(first[0])));
-      }
-      if (!estimator.covariance(first[k], second[k], {numbers.data() + k * size, size})) {
-        throw Error(ErrorCode::numerical,
-                    "the measurements so far do not determine variable " + id_text(first[k]));
-      }
-    }
-  }
-  return blocks_of(numbers, static_cast<std::size_t>(rows), static_cast<std::size_t>(columns));
-}
-
-py::object covariance(BoundEstimator& bound, const py::object& ids) {
-  const bool one = py::isinstance<py::int_>(ids);
-  const Ids names = one ? ids_of(py::make_tuple(ids), "ids") : ids_of(ids, "ids");
-  py::object all = blocks(bound, span_of(names), span_of(names));
-  return one ? all[py::int_(0)] : all;
-}
-
-py::array_t<double> cross_covariances(BoundEstimator& bound, const py::object& pairs) {
-  const Ids names = ids_of(pairs, "pairs", 2);
-  if (names.size() > 0 && names.shape(1) != 2) {
-    throw Error(ErrorCode::usage,
-                fmt::format("pairs: the shape is {}, expected (n, 2)", shape_text(names)));
-  }
-  std::vector<Id> first, second;
-  for (std::size_t k = 0; k < span_of(names).size(); k += 2) {
-    first.push_back(span_of(names)[k]);
-    second.push_back(span_of(names)[k + 1]);
-  }
-  return blocks(bound, first, second);
 }
 
 // Classes -----------------------------------------------------------------------------------------
@@ -250,7 +160,7 @@ void bind_report(py::module_& module) {
       });
 }
 
-void bind_changes(py::class_<BoundEstimator>& estimator) {
+void bind_changes(py::class_<BoundEstimator, HasEstimator>& estimator) {
   estimator
       .def("add", &add_variable, py::arg("id"), py::arg("value") = py::none(),
            py::arg("fixed") = false, py::arg("type") = py::none(),
@@ -262,6 +172,12 @@ such as cairn.Pose2, or None with `type`: the first measurement of the update th
            py::arg("sigmas") = py::none(), py::arg("information") = py::none(),
            py::arg("covariance") = py::none(), py::arg("loss") = py::none(),
            "Adds a measurement with the next update; see `Graph.add`.")
+      .def(
+          "add",
+          [](BoundEstimator& bound, const Factor& factor) {
+            bound.pending().factors.push_back(factor);
+          },
+          py::arg("factor"), "Adds a measurement with its noise with the next update.")
       .def("change", &change, py::arg("factor"), py::arg("values"), py::kw_only(),
            py::arg("sigmas") = py::none(), py::arg("information") = py::none(),
            py::arg("covariance") = py::none(),
@@ -302,38 +218,13 @@ With an Error the estimator is as it was after the last update, and what was ask
           "As `Graph.set_loss`, also for factors to come that have no loss of their own.");
 }
 
-void bind_estimate(py::class_<BoundEstimator>& estimator) {
+void bind_copies(py::class_<BoundEstimator, HasEstimator>& estimator) {
   estimator
-      .def(
-          "estimate",
-          [](BoundEstimator& bound, Id id) {
-            Estimator& e = bound.get();
-            return value_of(*e.type(id), e.state(id));
-          },
-          py::arg("id"),
-          "The estimate of a variable: a Pose2, Pose3, Point2 or Point3; of other types its "
-          "numbers.")
-      .def("ids", &ids_of_type, py::arg("type") = py::none(),
-           "Ids of all variables, or of those of a type, in the order of addition: (n,) integers.")
-      .def("states", &states_of_type, py::arg("type"),
-           "The estimates of all variables of a type, in the order of `ids(type)`: (n, m) numbers.")
-      .def(
-          "covariance", &covariance, py::arg("ids"),
-          R"(Covariances of variables of one tangent size d: (d, d) of one id, (n, d, d) of several.
-
-Of the step delta with x_true = x.retract(delta), at the present linearisation; see `cairn.marginals`.)")
-      .def("cross_covariances", &cross_covariances, py::arg("pairs"),
-           "Covariances of pairs of variables: (n, d_a, d_b) for pairs (n, 2) of ids (a, b).")
-      .def("chi2", &chi2_of, "The sum of rho(||r||^2) at the present estimate.")
-      .def("graph", &graph_of, "Everything at the present estimate, as a Graph of its own.")
       .def("copy", &copy,
            "A copy, for questions of the kind 'what if': neither is affected by changes of the "
            "other.")
       .def("__copy__", &copy)
       .def("__deepcopy__", [](BoundEstimator& bound, const py::dict&) { return copy(bound); })
-      .def("__contains__", [](BoundEstimator& bound, Id id) { return bound.get().has(id); })
-      .def_property_readonly("variable_count",
-                             [](BoundEstimator& bound) { return bound.get().variable_count(); })
       .def_property_readonly("factor_count",
                              [](BoundEstimator& bound) { return bound.get().factor_count(); })
       .def_property_readonly(
@@ -349,11 +240,11 @@ Of the step delta with x_true = x.retract(delta), at the present linearisation; 
 
 void bind_estimator(py::module_& module) {
   bind_report(module);
-  py::class_<BoundEstimator> estimator(module, "Estimator", kDoc);
+  py::class_<BoundEstimator, HasEstimator> estimator(module, "Estimator", kDoc);
   estimator.def(py::init(&make), py::arg("name") = "incremental_cholesky", py::kw_only(),
                 py::arg("keep") = "none");
   bind_changes(estimator);
-  bind_estimate(estimator);
+  bind_copies(estimator);
 }
 
 }  // namespace cairn::python

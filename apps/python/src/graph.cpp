@@ -172,6 +172,9 @@ sigmas: n standard deviations, or one for all; infinity for what is not measured
 information: the n x n information matrix, positive semidefinite;
 covariance: its inverse, positive definite.
 loss: a robust loss of its own, such as "cauchy:scale=2".)")
+      .def(
+          "add", [](BoundGraph& bound, const Factor& factor) { return bound.get().add(factor); },
+          py::arg("factor"), "Adds a measurement with its noise; returns its position.")
       .def("fix", &fix, py::arg("ids"), py::arg("fixed") = true,
            "Holds variables at their present estimates, or releases them: one id, or several.")
       .def("remove", &remove, py::kw_only(), py::arg("variables") = py::tuple(),

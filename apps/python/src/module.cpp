@@ -10,12 +10,17 @@ PYBIND11_MODULE(_cairn, module) {
   python::bind_values(module);
   python::bind_factor_types(module);
   python::bind_measurements(module);
+  python::bind_factors(module);
   python::bind_graph(module);
   python::bind_files(module);
   python::bind_optimize(module);
   python::bind_covariances(module);
+  python::bind_estimates(module);
   python::bind_estimator(module);
   python::bind_evaluation(module);
+  python::bind_policy(module);
+  python::bind_compact(module);
+  python::bind_sparsify(module);
   python::bind_pictures(module);
   python::bind_components(module);
 }

@@ -20,12 +20,12 @@
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/threads.hpp"
-#include "cairn/solve/initial_guess.hpp"
 #include "cairn/solve/optimizer.hpp"
 #include "cairn/typed/print.hpp"
 #include "component_names.hpp"
 #include "graph_arrays.hpp"
 #include "interrupt.hpp"
+#include "named_guess.hpp"
 
 namespace cairn::python {
 namespace {
@@ -82,16 +82,13 @@ class Callback final : public Observer {
 struct Plan {
   std::string optimizer_name;
   std::unique_ptr<Optimizer> optimizer;
-  std::string initial_name;
-  std::unique_ptr<InitialGuess> initial;  // null: the states as they are
+  NamedGuess initial;
   Stop stop;
 
   Plan(const ComponentSpec& spec, const py::object& guess)
-      : optimizer_name(spec.name), optimizer(default_registry().make<Optimizer>(spec)) {
-    if (guess.is_none()) return;
-    initial_name = guess.cast<std::string>();
-    initial = default_registry().make<InitialGuess>(initial_name);
-  }
+      : optimizer_name(spec.name),
+        optimizer(default_registry().make<Optimizer>(spec)),
+        initial(guess) {}
 };
 
 Summary optimize(BoundGraph& bound, const std::string& optimizer, const py::object& initial,
@@ -114,7 +111,7 @@ Summary optimize(BoundGraph& bound, const std::string& optimizer, const py::obje
   {
     const py::gil_scoped_release unlocked;
     summary = optimize(
-        use.graph(), {*plan.optimizer, plan.optimizer_name, plan.initial.get(), plan.initial_name},
+        use.graph(), {*plan.optimizer, plan.optimizer_name, plan.initial.guess(), plan.initial.name()},
         plan.stop, observer);
   }
   guard.absorb();

@@ -122,8 +122,9 @@ std::string spec_text(const ComponentSpec& spec) {
 PolicyRun::PolicyRun(const PolicyJob& job, const PolicySetting& setting)
     : setting_(setting),
       policy_(setting.registry.make<PosePolicy>(job.policy)),
-      registration_name_(job.registration),
-      registration_(setting.registry.make<Registration>(job.registration)) {
+      registration_name_(job.own ? "of the caller" : job.registration),
+      made_(job.own ? nullptr : setting.registry.make<Registration>(job.registration)),
+      registration_(job.own ? job.own : made_.get()) {
   const PolicyData& data = setting.data;
   policy_->estimator().set_loss(setting.loss, setting.loss_on);
   registration_->begin(

@@ -117,7 +117,29 @@ OptionFinder& finder_of(PosePolicy& policy, const PolicyJob& job) {
   return *finder;
 }
 
+/// With fewer loop closures in it, a sample is extended.
+constexpr std::int64_t kLeastLoops = 3;
+
 }  // namespace
+
+bool finds_thresholds(const ComponentSpec& policy, Registry& registry) {
+  return query<OptionFinder>(*registry.make<PosePolicy>(policy.name)) != nullptr;
+}
+
+bool gives_thresholds(const ComponentSpec& policy) {
+  return policy.values.contains("range") || policy.values.contains("loop_gain") ||
+         policy.values.contains("pose_gain");
+}
+
+ThresholdSample threshold_sample(const PolicyData& data, double part) {
+  const auto poses = static_cast<double>(data.poses.size());
+  const auto asked = std::max<std::size_t>(1, static_cast<std::size_t>(std::llround(part * poses)));
+  std::int64_t loops = 0;
+  std::size_t count = 0;
+  while (count < data.poses.size() && (count < asked || loops < kLeastLoops))
+    loops += std::ssize(data.poses[count++].links);
+  return {asked, loops == 0 ? asked : count};
+}
 
 void refine_thresholds(const OptionFinder& finder, const ThresholdTest& test,
                        FoundThresholds& found, const std::function<bool()>& interrupted) {
@@ -178,7 +200,8 @@ FoundThresholds find_thresholds(const PolicyJob& job, std::size_t count, double 
   PolicyJob watching = job;
   const auto chosen = setting.registry.make<PosePolicy>(job.policy);
   const bool recorded_only =
-      setting.registry.make<Registration>(job.registration)->matches_recorded_only();
+      job.own ? job.own->matches_recorded_only()
+              : setting.registry.make<Registration>(job.registration)->matches_recorded_only();
   for (const auto& [name, value] : finder_of(*chosen, job).watching(recorded_only))
     watching.policy.values.insert_or_assign(name, value);
   PolicyRun watch(watching, setting);

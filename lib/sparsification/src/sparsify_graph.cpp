@@ -124,6 +124,13 @@ void measure(const Graph& original, Parts& parts, SparsifyResult& result) {
 
 }  // namespace
 
+void choose_recovery(ComponentSpec& sparsifier) {
+  const auto topology = sparsifier.values.find("topology");
+  if (topology == sparsifier.values.end()) return;
+  if (topology->second.starts_with("clt") || topology->second.starts_with("cliquey"))
+    sparsifier.values.emplace("recovery", "closed_form");
+}
+
 SparsifyResult sparsify_whole(const Graph& graph, const SparsifyJob& job,
                               const SparsifySetting& setting) {
   SparsifyResult result;

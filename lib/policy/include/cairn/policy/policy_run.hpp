@@ -42,6 +42,8 @@ CAIRN_API PolicyData policy_data(Graph recording, std::optional<Graph> truth = {
 struct PolicyJob {
   ComponentSpec policy;
   std::string registration = "recorded";
+  /// A registration that is not registered by a name, instead; it must outlive the runs.
+  Registration* own = nullptr;
 };
 
 /// How one policy fared.
@@ -109,7 +111,8 @@ class CAIRN_API PolicyRun {
   const PolicySetting& setting_;
   std::unique_ptr<PosePolicy> policy_;
   std::string registration_name_;
-  std::unique_ptr<Registration> registration_;
+  std::unique_ptr<Registration> made_;  ///< null: it is the caller's own
+  Registration* registration_;
   PolicyResult result_;
 };
 

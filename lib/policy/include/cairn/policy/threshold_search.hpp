@@ -47,6 +47,18 @@ struct FoundThresholds {
 CAIRN_API FoundThresholds find_thresholds(const PolicyJob& job, std::size_t count,
                                           double error_ratio, const PolicySetting& setting);
 
+/// Whether a policy finds its thresholds by itself: others are run with the options that are given.
+CAIRN_API bool finds_thresholds(const ComponentSpec& policy, Registry& registry);
+/// Whether thresholds are among its options, so that none are to be found.
+CAIRN_API bool gives_thresholds(const ComponentSpec& policy);
+
+/// So many poses of a recording, from the first on, in which thresholds are found.
+struct ThresholdSample {
+  std::size_t asked = 0;  ///< as the part says
+  std::size_t count = 0;  ///< more, where those have too few loop closures
+};
+CAIRN_API ThresholdSample threshold_sample(const PolicyData& data, double part);
+
 /// Runs a sample with the options; the factors of the gains are for the record.
 using ThresholdTest =
     std::function<ThresholdTrial(const OptionValues& options, double links, double poses)>;

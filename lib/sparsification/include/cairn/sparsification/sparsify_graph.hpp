@@ -31,6 +31,9 @@ constexpr auto enum_names(NodeKind) {
 
 /// Which components take nodes out of a graph, and which nodes.
 struct SparsifyJob {
+  /// Half of the nodes, those with the fewest neighbours first.
+  static constexpr const char* kDefaultSelection = "smallest_blanket:part=0.5";
+
   ComponentSpec sparsifier;  ///< with its options
   ComponentSpec selection;
   ComponentSpec optimizer;
@@ -46,6 +49,10 @@ struct SparsifyJob {
   bool measure = true;    ///< KLD, RMSE and conservative margin of the whole
   ComparedAt compared_at = ComparedAt::common;  ///< for the KLD
 };
+
+/// Where the sparsifier's topology is a tree and its options name no factor recovery: the closed
+/// form, which is exact there.
+CAIRN_API void choose_recovery(ComponentSpec& sparsifier);
 
 struct SparsifyResult {
   Graph sparse;  ///< at its minimum

@@ -1,0 +1,315 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// cairn.compact: a policy over a recorded graph.
+#include <algorithm>
+#include <atomic>
+#include <exception>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include <fmt/core.h>
+#include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
+
+#include "arrays.hpp"
+#include "bindings.hpp"
+#include "bound_graph.hpp"
+#include "cairn/evaluation/plausibility.hpp"
+#include "cairn/plugin/registry.hpp"
+#include "cairn/policy/policy_run.hpp"
+#include "cairn/policy/selection_check.hpp"
+#include "cairn/policy/threshold_search.hpp"
+#include "cairn/runtime/enum_names.hpp"
+#include "cairn/runtime/error.hpp"
+#include "component_names.hpp"
+#include "interrupt.hpp"
+#include "python_registration.hpp"
+
+namespace cairn::python {
+namespace {
+
+/// A run, as Python reads it.
+struct BoundResult {
+  PolicyResult result;
+  FoundThresholds found;
+  PolicyData data;  ///< counts of the recording; its graphs are moved away
+  std::unique_ptr<BoundGraph> compact, trajectory;
+  std::vector<std::string> notes;
+
+  std::string status() const {
+    if (result.interrupted) return "interrupted";
+    if (!result.located) return "unlocated";
+    return result.converged ? "converged" : "max_iterations";
+  }
+};
+
+/// Called after each pose; says when the run shall end. Runs that find thresholds are not followed.
+class Follower {
+ public:
+  bool selecting = false;
+
+  Follower(py::object function, const std::atomic<bool>& interrupt)
+      : function_(std::move(function)), interrupt_(&interrupt) {}
+
+  void operator()(const PolicyResult& counts) {
+    if (interrupt_->load()) stop_ = true;
+    if (!selecting || function_.is_none() || stop_) return;
+    const py::gil_scoped_acquire locked;
+    try {
+      if (function_(counts.poses.back()).is(py::bool_(false))) stop_ = true;
+    } catch (const py::error_already_set& error) {
+      if (!error.matches(PyExc_KeyboardInterrupt) || !interrupt_->load())
+        raised_ = std::current_exception();
+      stop_ = true;
+    }
+  }
+  const std::atomic<bool>& stop() const { return stop_; }
+  void rethrow() const {
+    if (raised_) std::rethrow_exception(raised_);
+  }
+
+ private:
+  py::object function_;
+  const std::atomic<bool>* interrupt_;
+  std::atomic<bool> stop_ = false;
+  std::exception_ptr raised_;
+};
+
+/// What is run, and how.
+struct Plan {
+  PolicyJob job;
+  std::optional<PythonRegistration> own{};
+  std::optional<bool> automatic;  ///< whether thresholds are found; none: unless some are given
+  double sample = 0.6;
+  double error_ratio = 2.5;
+  int keep = 0;
+  Recovery recovery = Recovery::distribute;
+  std::optional<Graph> map{};
+  std::shared_ptr<const Loss> loss;
+  FactorSelector loss_on{};
+};
+
+/// Gives the policy its thresholds, and the strategy of few poses and few loop closures unless it
+/// has another. False: interrupted.
+bool complete(Plan& plan, const PolicySetting& setting, BoundResult& out) {
+  Registry& registry = setting.registry;
+  OptionValues& options = plan.job.policy.values;
+  const bool automatic = plan.automatic.value_or(
+      !gives_thresholds(plan.job.policy) && finds_thresholds(plan.job.policy, registry) &&
+      (setting.data.loops > 0 || setting.data.observations == 0));
+  if (automatic) {
+    const ThresholdSample sample = threshold_sample(setting.data, plan.sample);
+    out.found = find_thresholds(plan.job, sample.count, plan.error_ratio, setting);
+    if (setting.interrupted()) return false;
+    for (const auto& [name, value] : out.found.options) options.emplace(name, value);
+  }
+  if (plan.keep > 0 && !options.emplace("keep", fmt::format("{}", plan.keep)).second)
+    throw Error(ErrorCode::usage, "keep= is given, and among the policy's options: give one");
+  if (registry.options(PosePolicy::kKind, plan.job.policy.name).find("strategy"))
+    options.emplace("strategy", "fpfl");
+  return true;
+}
+
+/// Without the interpreter's lock.
+void run(Plan& plan, const PolicySetting& setting, Follower& follower, BoundResult& out) {
+  if (!complete(plan, setting, out)) {
+    out.result.interrupted = true;
+    out.notes.emplace_back("interrupted before anything was selected");
+    return;
+  }
+  follower.selecting = true;
+  PolicyRun policy(plan.job, setting);
+  if (plan.map) policy.load(*plan.map);
+  policy.run(setting.data.poses.size(), plan.job.policy.name);
+  out.result = policy.finish(plan.recovery);
+  SelectionCheck check;
+  for (const PoseReport& pose : out.result.poses) check.add(pose);
+  const FoundThresholds* found = out.found.seconds > 0.0 ? &out.found : nullptr;
+  if (!out.result.interrupted && out.result.located &&
+      finds_thresholds(plan.job.policy, setting.registry)) {
+    for (const auto& advice : check.advice(found, setting.data.loops))
+      out.notes.push_back(to_string(advice));
+  }
+  for (std::string& doubt : reasons_for_doubt(out.result.compact, chi2(out.result.compact)))
+    out.notes.push_back(std::move(doubt));
+}
+
+std::unique_ptr<BoundResult> compact(BoundGraph& recording, const std::string& policy,
+                                     const py::object& registration, const py::object& truth,
+                                     const py::object& map, std::optional<Id> begin,
+                                     std::optional<bool> automatic, double sample, int keep,
+                                     const std::string& recovery, const py::object& loss,
+                                     const std::string& loss_on, const py::object& callback,
+                                     const py::kwargs& options) {
+  Plan plan{.job = {component_spec(policy, options)},
+            .automatic = automatic,
+            .sample = sample,
+            .keep = keep,
+            .recovery = parse_enum<Recovery>(recovery, "recovery"),
+            .loss = loss_of(loss)};
+  if (!(sample > 0.0 && sample <= 1.0))
+    throw Error(ErrorCode::usage, "sample: expected a part of the poses, above 0 and at most 1");
+  if (!loss.is_none()) plan.loss_on = selector_of(loss_on);
+  if (py::isinstance<py::str>(registration)) {
+    plan.job.registration = registration.cast<std::string>();
+  } else {
+    plan.job.own = &plan.own.emplace(registration);
+  }
+  std::optional<Graph> true_graph;
+  if (!truth.is_none()) true_graph = truth.cast<BoundGraph&>().get().clone();
+  if (!map.is_none()) plan.map = map.cast<BoundGraph&>().get().clone();
+  auto out = std::make_unique<BoundResult>();
+  out->data = policy_data(recording.get().clone(), std::move(true_graph), begin);
+  const InterruptGuard guard;
+  Follower follower(callback, guard.flag());
+  const PolicySetting setting{.data = out->data,
+                              .registry = default_registry(),
+                              .loss = plan.loss,
+                              .loss_on = plan.loss_on,
+                              .interrupt = &follower.stop(),
+                              .progress = [&](std::string_view, std::size_t,
+                                              const PolicyResult& counts) { follower(counts); }};
+  try {
+    const py::gil_scoped_release unlocked;
+    run(plan, setting, follower, *out);
+  } catch (const Error&) {
+    if (plan.own) plan.own->rethrow();
+    follower.rethrow();
+    throw;
+  }
+  guard.absorb();
+  follower.rethrow();
+  if (plan.own) plan.own->rethrow();
+  out->compact = std::make_unique<BoundGraph>(std::move(out->result.compact));
+  out->trajectory = std::make_unique<BoundGraph>(std::move(out->result.trajectory));
+  return out;
+}
+
+py::dict counts_of(const BoundResult& bound) {
+  const PolicyResult& result = bound.result;
+  py::dict counts;
+  counts["poses"] = result.poses.size();
+  counts["kept"] = result.kept_poses - result.map_poses;
+  counts["map"] = result.map_poses;
+  counts["loops"] = bound.data.loops;
+  counts["proposed"] = result.proposed;
+  counts["registered"] = result.registered;
+  counts["kept_loops"] = result.kept_loops;
+  counts["false_registered"] = result.false_registered;
+  counts["false_kept"] = result.false_kept;
+  counts["priors"] = bound.data.priors;
+  counts["kept_priors"] = result.kept_priors;
+  counts["landmarks"] = bound.data.landmarks;
+  counts["kept_landmarks"] = result.kept_landmarks;
+  counts["observations"] = bound.data.observations;
+  counts["kept_observations"] = result.kept_observations;
+  counts["information_nonzeros"] = result.information_nonzeros;
+  counts["factor_nonzeros"] = result.factor_nonzeros;
+  return counts;
+}
+
+py::dict seconds_of(const BoundResult& bound) {
+  py::dict seconds;
+  seconds["total"] = bound.result.seconds.total;
+  seconds["estimate"] = bound.result.seconds.estimate;
+  seconds["covariances"] = bound.result.seconds.covariances;
+  seconds["search"] = bound.result.seconds.search;
+  seconds["registration"] = bound.result.registration_seconds;
+  seconds["thresholds"] = bound.found.seconds;
+  return seconds;
+}
+
+py::object nees_of(const BoundResult& bound) {
+  const auto& normalized = bound.result.normalized;
+  if (!normalized) return py::none();
+  return py::make_tuple(normalized->squared, normalized->dof);
+}
+
+void bind_result(py::module_& module) {
+  py::class_<BoundResult>(module, "CompactResult", "What a policy has kept of a recorded graph.")
+      .def_property_readonly("status", &BoundResult::status,
+                             "'converged', 'max_iterations', 'interrupted', or 'unlocated': no "
+                             "match with the map that was to be continued.")
+      .def_property_readonly(
+          "policy", [](const BoundResult& bound) { return bound.result.policy; },
+          "The policy with all its options, those that were found among them.")
+      .def_property_readonly(
+          "graph", [](const BoundResult& bound) { return bound.compact.get(); },
+          py::return_value_policy::reference_internal, "What was kept, at its estimate.")
+      .def_property_readonly(
+          "trajectory", [](const BoundResult& bound) { return bound.trajectory.get(); },
+          py::return_value_policy::reference_internal,
+          "All poses, those left out put back; without factors.")
+      .def_property_readonly(
+          "poses", [](const BoundResult& bound) { return bound.result.poses; },
+          "A PoseReport for each pose, in the order of arrival.")
+      .def_property_readonly("counts", &counts_of,
+                             "How many poses, loops, priors, landmarks and observations there were "
+                             "and how many of them were kept; pairs proposed and registered; "
+                             "nonzeros of the information matrix and of its factor.")
+      .def_property_readonly(
+          "verdicts", [](const BoundResult& bound) { return bound.result.verdicts; },
+          "How many links there were of each verdict.")
+      .def_property_readonly(
+          "chi2", [](const BoundResult& bound) { return bound.result.chi2; }, "Of what was kept.")
+      .def_property_readonly(
+          "errors", [](const BoundResult& bound) { return bound.result.errors; },
+          "With the truth: a TrajectoryError of all poses, by the name of each recovery.")
+      .def_property_readonly("nees", &nees_of,
+                             "With the truth of all poses: (e^T Sigma^-1 e, degrees of freedom), "
+                             "the mean of the first being the second where the covariance is "
+                             "right; else None.")
+      .def_property_readonly(
+          "thresholds", [](const BoundResult& bound) { return bound.found.options; },
+          "Options of the policy that were found, as texts.")
+      .def_property_readonly("seconds", &seconds_of,
+                             "Of each part: estimate, covariances, search, registration, "
+                             "thresholds; total without the last two.")
+      .def_readonly("notes", &BoundResult::notes, "Sentences for the user.")
+      .def("__repr__", [](const BoundResult& bound) {
+        return fmt::format(
+            "<cairn.CompactResult {}: {} of {} poses, {} loop closures, chi2 {:.6g}>",
+            bound.status(), bound.result.kept_poses - bound.result.map_poses,
+            bound.result.poses.size(), bound.result.kept_loops, bound.result.chi2);
+      });
+}
+
+}  // namespace
+
+void bind_compact(py::module_& module) {
+  bind_result(module);
+  module.def(
+      "compact", &compact, py::arg("graph"), py::arg("policy") = "compact_pose", py::kw_only(),
+      py::arg("registration") = "recorded", py::arg("truth") = py::none(),
+      py::arg("map") = py::none(), py::arg("begin") = py::none(),
+      py::arg("find_thresholds") = py::none(), py::arg("sample") = 0.6, py::arg("keep") = 0,
+      py::arg("recovery") = "v2", py::arg("loss") = py::none(), py::arg("loss_on") = "all",
+      py::arg("callback") = py::none(),
+      R"(Runs a policy over a recorded graph: which poses and which loop closures are worth keeping (docs/compact.md).
+
+graph: poses with unbroken odometry by rising id, loop closures, absolute measurements, landmarks; it stays as it is.
+policy: a name of `cairn.components("pose_policy")`; its options are further keyword arguments.
+registration: measures the pairs that the policy proposes: a name of `cairn.components("registration")`, of which
+    "recorded" answers by the graph; or written in Python, a function match(proposal) that is given a MatchProposal and
+    returns a Factor, several, or None for no match. An object with such a method may have two more:
+    recognise(places, pose), which returns a pose of a map and the factors measured, and pose_ended(pose, kept).
+truth: a Graph of the true poses, for `CompactResult.errors`.
+map: a Graph that an earlier session has left, which this trajectory continues.
+begin: the id of the first pose; those before it are of earlier sessions.
+find_thresholds: whether the policy finds its thresholds in a sample; None: unless some are given.
+sample: the part of the poses that is the sample.
+keep: the largest number of poses; 0: any.
+recovery: how poses that were left out are put back: "v0", "v1", "v2" or "likely".
+loss, loss_on: as of `Graph.set_loss`.
+callback: called with the PoseReport of each; when it returns False, the run ends.
+
+Ctrl-C ends the run too, with what was kept so far. An exception in the registration or the callback is raised here. The
+interpreter's lock is released meanwhile, and taken for calls into Python.)");
+}
+
+}  // namespace cairn::python

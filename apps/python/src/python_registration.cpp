@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "python_registration.hpp"
+
+#include <cstddef>
+#include <utility>
+
+#include <pybind11/stl.h>
+
+#include "arrays.hpp"
+#include "cairn/runtime/error.hpp"
+#include "cairn/typed/symbol.hpp"
+#include "factors.hpp"
+#include "interrupt.hpp"
+#include "types_of.hpp"
+
+namespace cairn::python {
+namespace {
+
+py::object method(const py::object& object, const char* name) {
+  if (!py::hasattr(object, name)) return py::none();
+  return object.attr(name);
+}
+
+}  // namespace
+
+BoundProposal proposal_of(const MatchProposal& proposal, const VariableType& type) {
+  BoundProposal bound{proposal.earlier, proposal.later, proposal.gain, py::none(), py::none()};
+  if (proposal.expected.mean.empty()) return bound;
+  const auto d = static_cast<std::size_t>(type.tangent_size());
+  bound.expected = value_of(type, proposal.expected.mean);
+  bound.covariance = blocks_of(proposal.expected.covariance, d, d)[py::int_(0)];
+  return bound;
+}
+
+PythonRegistration::PythonRegistration(const py::object& matcher)
+    : match_(method(matcher, "match")),
+      recognise_(method(matcher, "recognise")),
+      pose_ended_(method(matcher, "pose_ended")) {
+  if (match_.is_none()) match_ = matcher;
+  if (PyCallable_Check(match_.ptr()) == 0) {
+    throw Error(ErrorCode::usage,
+                "registration: expected the name of one, a function match(proposal) that returns "
+                "factors or None, or an object with such a method");
+  }
+}
+
+template <class Work, class Result>
+Result PythonRegistration::call(const Work& work, Result otherwise) {
+  const py::gil_scoped_acquire locked;
+  try {
+    return work();
+  } catch (const py::error_already_set& error) {
+    if (error.matches(PyExc_KeyboardInterrupt) && interrupted()) return otherwise;
+    raised_ = std::current_exception();
+    throw Error(ErrorCode::plugin, "the registration, written in Python, has raised an exception");
+  } catch (const Error&) {
+    raised_ = std::current_exception();
+    throw;
+  }
+}
+
+std::vector<Factor> PythonRegistration::match(Id earlier, Id later) {
+  return match_proposed({.earlier = earlier, .later = later, .gain = 0.0, .expected = {}});
+}
+
+std::vector<Factor> PythonRegistration::match_proposed(const MatchProposal& proposal) {
+  const auto work = [&] {
+    const auto at = recording_->find(proposal.later);
+    if (!at)
+      throw Error(ErrorCode::plugin,
+                  "there is no pose " + id_text(proposal.later) + " in the recording");
+    return factors_of(match_(proposal_of(proposal, recording_->type(*at))),
+                      "what the registration returned");
+  };
+  return call(work, std::vector<Factor>());
+}
+
+std::optional<RecognisedPlace> PythonRegistration::recognise(std::span<const Id> places, Id pose) {
+  if (recognise_.is_none()) return Registration::recognise(places, pose);
+  const auto work = [&]() -> std::optional<RecognisedPlace> {
+    const py::object found = recognise_(array_of_ids(places), pose);
+    if (found.is_none()) return std::nullopt;
+    if (!py::isinstance<py::tuple>(found) || py::len(found) != 2) {
+      throw Error(ErrorCode::usage,
+                  "what recognise returned: expected None, or the id of a place and the factors "
+                  "measured between it and the pose");
+    }
+    return RecognisedPlace{found[py::int_(0)].cast<Id>(),
+                           factors_of(found[py::int_(1)], "the second of what recognise returned")};
+  };
+  return call(work, std::optional<RecognisedPlace>());
+}
+
+void PythonRegistration::pose_ended(Id pose, bool kept) {
+  if (pose_ended_.is_none()) return;
+  call([&] { return pose_ended_(pose, kept), true; }, true);
+}
+
+}  // namespace cairn::python

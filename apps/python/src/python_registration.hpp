@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <exception>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include <pybind11/pybind11.h>
+
+#include "cairn/policy/registration.hpp"
+
+namespace cairn::python {
+
+namespace py = pybind11;
+
+/// A pair that a policy proposes, as Python sees it.
+struct BoundProposal {
+  Id earlier = 0, later = 0;
+  double gain = 0.0;
+  py::object expected;    ///< Pose2 or Pose3 from `earlier` to `later`; None: not known
+  py::object covariance;  ///< (d, d), or None
+};
+BoundProposal proposal_of(const MatchProposal& proposal, const VariableType& type);
+
+/// A registration written in Python: a function match(proposal), or an object with a method `match`
+/// and, if it has them, `recognise(places, pose)` and `pose_ended(pose, kept)`. It lives under the
+/// interpreter's lock, and is called by a thread without it.
+class PythonRegistration final : public Registration {
+ public:
+  explicit PythonRegistration(const py::object& matcher);
+
+  void begin(const RegistrationData& data) override { recording_ = data.recording; }
+  std::vector<Factor> match(Id earlier, Id later) override;
+  std::vector<Factor> match_proposed(const MatchProposal& proposal) override;
+  std::optional<RecognisedPlace> recognise(std::span<const Id> places, Id pose) override;
+  void pose_ended(Id pose, bool kept) override;
+
+  /// Throws what its Python code has raised, if it has.
+  void rethrow() const {
+    if (raised_) std::rethrow_exception(raised_);
+  }
+
+ private:
+  /// `work` under the lock. What it raises is kept for `rethrow`, and ends the run as an `Error`;
+  /// Ctrl-C ends it as well, after `otherwise` is returned.
+  template <class Work, class Result>
+  Result call(const Work& work, Result otherwise);
+
+  py::object match_, recognise_, pose_ended_;  ///< None: it has no such method
+  const Graph* recording_ = nullptr;
+  std::exception_ptr raised_;
+};
+
+}  // namespace cairn::python
