@@ -7,32 +7,40 @@ namespace cairn {
 
 namespace portable {
 void update_marginals(const MarginalUpdate& update);
+void update_partners(const PartnerUpdate& update);
 }  // namespace portable
 #if defined(CAIRN_X86_KERNELS)
 namespace avx2 {
 void update_marginals(const MarginalUpdate& update);
+void update_partners(const PartnerUpdate& update);
 }  // namespace avx2
 namespace avx512 {
 void update_marginals(const MarginalUpdate& update);
+void update_partners(const PartnerUpdate& update);
 }  // namespace avx512
 #endif
 
 namespace {
 
 struct Kernels {
-  UpdateMarginals update;
+  UpdateMarginals marginals;
+  UpdatePartners partners;
 };
+
+const Kernels& choose() {
+  static constexpr Kernels kPortable{&portable::update_marginals, &portable::update_partners};
+#if defined(CAIRN_X86_KERNELS)
+  static constexpr Kernels kAvx2{&avx2::update_marginals, &avx2::update_partners},
+      kAvx512{&avx512::update_marginals, &avx512::update_partners};
+  return *choose_kernels<Kernels>("auto", &kPortable, &kAvx2, &kAvx512);
+#else
+  return *choose_kernels<Kernels>("auto", &kPortable, nullptr, nullptr);
+#endif
+}
 
 }  // namespace
 
-UpdateMarginals choose_marginal_kernel() {
-  static constexpr Kernels kPortable{&portable::update_marginals};
-#if defined(CAIRN_X86_KERNELS)
-  static constexpr Kernels kAvx2{&avx2::update_marginals}, kAvx512{&avx512::update_marginals};
-  return choose_kernels<Kernels>("auto", &kPortable, &kAvx2, &kAvx512)->update;
-#else
-  return choose_kernels<Kernels>("auto", &kPortable, nullptr, nullptr)->update;
-#endif
-}
+UpdateMarginals choose_marginal_kernel() { return choose().marginals; }
+UpdatePartners choose_partner_kernel() { return choose().partners; }
 
 }  // namespace cairn

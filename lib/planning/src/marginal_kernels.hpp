@@ -22,7 +22,26 @@ struct MarginalUpdate {
 /// Σ'_ii = Σ_ii − Z_iᵀ Z_i, of all poses.
 using UpdateMarginals = void (*)(const MarginalUpdate&);
 
+/// What a loop closure on a path does to the partners of poses ahead (see `PathDeterminants`).
+/// Arrays hold a number for each partner, by entry, as above with `stride` in place of `padded`.
+struct PartnerUpdate {
+  int count;  ///< partners, a multiple of eight
+  int stride;
+  int closures;              ///< before this one
+  const double* innovation;  ///< cov(y, ε_k − ε_l) without those before, 9 entries
+  const double* D_before;    ///< of each, 9 entries; one behind the other
+  const double* coupling;    ///< of each, a 3×3 matrix L_b by columns
+  const double* inverse;     ///< L⁻¹, by columns; its upper triangle is not read
+  const double* end;         ///< Z_k, by columns
+  double* D;                 ///< 9 entries
+  double *S, *K;             ///< 6 and 9 entries, which change
+};
+
+/// D = L⁻¹ (innovation − Σ_b L_b D_b), S −= Dᵀ D, K −= Z_kᵀ D, of all partners.
+using UpdatePartners = void (*)(const PartnerUpdate&);
+
 /// The fastest that this machine can run: compiled for AVX-512, for AVX2 with FMA, or portable.
 UpdateMarginals choose_marginal_kernel();
+UpdatePartners choose_partner_kernel();
 
 }  // namespace cairn

@@ -62,11 +62,57 @@ inline __attribute__((always_inline)) void update_poses(const MarginalUpdate& u,
   store(u.ratios + i, determinant(D) * load(u.determinants + i));
 }
 
+/// As many partners as a register has numbers, from `p` on.
+inline __attribute__((always_inline)) void update_some_partners(const PartnerUpdate& u, long p) {
+  const long stride = u.stride;
+  const double *inverse = u.inverse, *end = u.end;
+  Vec y[9];
+  for (int e = 0; e < 9; ++e) y[e] = load(u.innovation + e * stride + p);
+  const double* before = u.D_before + p;
+  const double* L = u.coupling;
+  for (int b = 0; b < u.closures; ++b, before += 9 * stride, L += 9) {
+    for (int m = 0; m < 3; ++m) {
+      const Vec d0 = load(before + m * stride), d1 = load(before + (3 + m) * stride),
+                d2 = load(before + (6 + m) * stride);
+      for (int r = 0; r < 3; ++r) {
+        y[r] -= L[3 * m + r] * d0;
+        y[3 + r] -= L[3 * m + r] * d1;
+        y[6 + r] -= L[3 * m + r] * d2;
+      }
+    }
+  }
+  Vec D[9];
+  for (int c = 0; c < 9; c += 3) {
+    D[c] = inverse[0] * y[c];
+    D[c + 1] = inverse[1] * y[c] + inverse[4] * y[c + 1];
+    D[c + 2] = inverse[2] * y[c] + inverse[5] * y[c + 1] + inverse[8] * y[c + 2];
+  }
+  for (int e = 0; e < 9; ++e) store(u.D + e * stride + p, D[e]);
+  int entry = 0;
+  for (int c = 0; c < 3; ++c) {
+    for (int r = c; r < 3; ++r, ++entry) {
+      double* S = u.S + entry * stride + p;
+      store(S, load(S) - D[3 * r] * D[3 * c] - D[3 * r + 1] * D[3 * c + 1] -
+                   D[3 * r + 2] * D[3 * c + 2]);
+    }
+    for (int r = 0; r < 3; ++r) {
+      double* K = u.K + (3 * c + r) * stride + p;
+      store(K, load(K) - end[3 * r] * D[3 * c] - end[3 * r + 1] * D[3 * c + 1] -
+                   end[3 * r + 2] * D[3 * c + 2]);
+    }
+  }
+}
+
 }  // namespace
 
 void update_marginals(const MarginalUpdate& u);
 void update_marginals(const MarginalUpdate& u) {
   for (long i = 0; i < u.padded; i += kWidth) update_poses(u, i);
+}
+
+void update_partners(const PartnerUpdate& u);
+void update_partners(const PartnerUpdate& u) {
+  for (long p = 0; p < u.count; p += kWidth) update_some_partners(u, p);
 }
 
 }  // namespace cairn::CAIRN_KERNEL_SET

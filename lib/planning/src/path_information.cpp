@@ -44,13 +44,11 @@ Matrix3d symmetric(const Matrix3d& M) { return 0.5 * (M + M.transpose()); }
 /// The algorithm: one object per decision.
 class PathInformation::Model {
  public:
-  Model(const Situation& situation, const PathInformationOptions& options, CanMatch can_match,
-        Measures measures)
+  Model(const Situation& situation, const PathInformationOptions& options, CanMatch can_match)
       : covariances_(situation, situation.pose),
         updates_(covariances_, options.memory * 1e6),
         options_(options),
         can_match_(std::move(can_match)),
-        measures_(measures),
         match_(situation.match),
         odometry_(situation.robot.odometry),
         index_(covariances_.poses(), situation.pose, situation.match),
@@ -61,10 +59,8 @@ class PathInformation::Model {
     start_->frame = &covariances_;
     start_->pose = situation.pose;
     // A robot whose newest pose is not kept has driven on from the one before.
-    const Pose2 since = covariances_.pose(newest_).between(situation.pose);
-    constexpr double kRounding = 1e-9;
-    if (since.state().cwiseAbs().maxCoeff() > kRounding)
-      start_->walk = covariances_.moved(situation.pose, odometry_.covariance(since));
+    if (const auto since = motion_since_newest(situation))
+      start_->walk = covariances_.moved(situation.pose, odometry_.covariance(*since));
     start_->posterior = covariances_.diagonal(newest_) + start_->walk;
   }
 
@@ -90,12 +86,8 @@ class PathInformation::Model {
       close_exactly(*next);
     else
       close_as_thesis(*next);
-    if (measures_ == Measures::all) {
-      const double sum = updates_.sum() + next->graph_change + next->path_sum;
-      next->change = factor_ * (sum / (covariances_.size() + next->steps) - mean());
-    } else {
-      next->change = std::numeric_limits<double>::quiet_NaN();
-    }
+    const double sum = updates_.sum() + next->graph_change + next->path_sum;
+    next->change = factor_ * (sum / (covariances_.size() + next->steps) - mean());
     return next;
   }
 
@@ -172,7 +164,6 @@ class PathInformation::Model {
     node.posterior = symmetric(node.posterior - closure->end.transpose() * closure->end);
     node.loop += choice.gain;
     node.closure = closure;
-    if (measures_ == Measures::log_determinants) return;
     node.graph_change = updates_.change(*closure);
     node.path_sum = path_sum(node, closures, *closure);
   }
@@ -249,7 +240,6 @@ class PathInformation::Model {
   MarginalUpdates updates_;
   PathInformationOptions options_;
   CanMatch can_match_;
-  Measures measures_;
   MatchModel match_;
   OdometryModel odometry_;
   MatchIndex index_;
@@ -280,8 +270,8 @@ PathInformation::State PathInformation::State::before() const {
 }
 
 PathInformation::PathInformation(const Situation& situation, const PathInformationOptions& options,
-                                 CanMatch can_match, Measures measures)
-    : model_(std::make_unique<Model>(situation, options, std::move(can_match), measures)) {}
+                                 CanMatch can_match)
+    : model_(std::make_unique<Model>(situation, options, std::move(can_match))) {}
 PathInformation::PathInformation(PathInformation&&) noexcept = default;
 PathInformation& PathInformation::operator=(PathInformation&&) noexcept = default;
 PathInformation::~PathInformation() = default;

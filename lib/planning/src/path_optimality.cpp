@@ -3,32 +3,19 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 #include <vector>
 
 #include <Eigen/LU>
 
 #include "cairn/information/graph_information.hpp"
-#include "cairn/planning/path_information.hpp"
 #include "cairn/runtime/error.hpp"
 #include "in_sight.hpp"
 #include "match_index.hpp"
+#include "path_determinants.hpp"
+#include "pose_covariances.hpp"
 #include "pose_laplacian.hpp"
 
 namespace cairn {
-namespace {
-
-/// The motion from the last pose that is kept to where the robot is, if there is one.
-std::optional<Pose2> motion_since(const Situation& situation) {
-  const Pose2 last = Pose2::from_state(situation.estimator.state(situation.poses.back()));
-  const Pose2 motion = last.between(situation.pose);
-  constexpr double kRounding = 1e-9;
-  if (motion.state().cwiseAbs().maxCoeff() > kRounding) return motion;
-  return std::nullopt;
-}
-
-}  // namespace
-
 class PathOptimalities::Model {
  public:
   virtual ~Model() = default;
@@ -46,16 +33,14 @@ class ExactOptimalities final : public PathOptimalities::Model {
  public:
   ExactOptimalities(const Situation& situation, const PathOptimalityOptions& options,
                     LinearSolver& solver)
-      : information_(
-            situation, {.loop_gain = options.loop_gain},
-            [&map = situation.map](const Pose2& older, const Pose2& newer) {
-              return in_sight(map, older, newer);
-            },
-            PathInformation::Measures::log_determinants) {
+      : determinants_(situation, options.loop_gain,
+                      [&map = situation.map](const Pose2& older, const Pose2& newer) {
+                        return in_sight(map, older, newer);
+                      }) {
     const GraphEntropy graph = entropy(situation.estimator.graph(), solver);
     now_.size = static_cast<int>(graph.size);
     now_.log_determinant = graph.log_determinant;
-    if (const auto since = motion_since(situation)) {
+    if (const auto since = motion_since_newest(situation)) {
       now_.size += 3;
       now_.log_determinant -= std::log(situation.robot.odometry.covariance(*since).determinant());
     }
@@ -63,12 +48,12 @@ class ExactOptimalities final : public PathOptimalities::Model {
   }
 
   PathOptimality along(std::span<const Pose2> motions) override {
-    const PathInformation::State end = information_.extended(information_.start(), motions);
+    const PathDeterminants::Path added = determinants_.along(motions);
     PathOptimality path = now_;
-    path.size += 3 * end.steps();
-    path.log_determinant += end.odometry_log_determinant() + end.loop_log_determinant();
-    path.loops = end.loops();
-    path.length = end.length();
+    path.size += 3 * static_cast<int>(motions.size());
+    path.log_determinant += added.log_determinant;
+    path.loops = added.loops;
+    path.length = added.length;
     finish(path);
     return path;
   }
@@ -78,7 +63,7 @@ class ExactOptimalities final : public PathOptimalities::Model {
     of.log_optimality = of.size == 0 ? 0.0 : of.log_determinant / of.size;
   }
 
-  PathInformation information_;
+  PathDeterminants determinants_;
 };
 
 /// By |L|: as `PathInformation`, with one number for each pose.
@@ -95,7 +80,7 @@ class LaplacianOptimalities final : public PathOptimalities::Model {
         newest_(static_cast<int>(poses_.size()) - 1) {
     now_.size = laplacian_.free() + 1;
     now_.log_determinant = laplacian_.log_determinant();
-    if (const auto since = motion_since(situation)) {
+    if (const auto since = motion_since_newest(situation)) {
       const double weight = edge_weight(situation.robot.odometry.covariance(*since));
       now_.size += 1;
       now_.log_determinant += std::log(weight);

@@ -76,4 +76,12 @@ Matrix3d PoseCovariances::moved_back(const Pose2& at, const Matrix3d& covariance
   return Ad * covariance * Ad.transpose();
 }
 
+std::optional<Pose2> motion_since_newest(const Situation& situation) {
+  const Pose2 newest = Pose2::from_state(situation.estimator.state(situation.poses.back()));
+  const Pose2 motion = newest.between(situation.pose);
+  constexpr double kRounding = 1e-9;
+  if (motion.state().cwiseAbs().maxCoeff() > kRounding) return motion;
+  return std::nullopt;
+}
+
 }  // namespace cairn

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -61,5 +62,8 @@ class PoseCovariances {
   std::vector<std::vector<double>> columns_;
   std::vector<double> taken_;  ///< a column as the estimator returns it
 };
+
+/// The motion from the last pose that is kept to where the robot is: none if it is there.
+std::optional<Pose2> motion_since_newest(const Situation& situation);
 
 }  // namespace cairn

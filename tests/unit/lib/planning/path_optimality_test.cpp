@@ -61,6 +61,31 @@ TEST(PathOptimalities, ExactLogDeterminantsAreTheDenseOnes) {
   EXPECT_GT(loops, 50);
 }
 
+/// Nothing of a path is left for those that are asked for after it.
+TEST(PathOptimalities, DoNotDependOnThePathsBefore) {
+  CAIRN_NEEDS("linear_solver", "block_cholesky");
+  const PathGraph graph = test::wandering(60, 5.0, 3);
+  const Situation situation = graph.situation();
+  for (const OptimalityForm by : {OptimalityForm::exact, OptimalityForm::laplacian}) {
+    const auto sparse = solver();
+    PathOptimalities together(situation, {.by = by, .loop_gain = 0.1}, *sparse);
+    RandomNumbers random(5);
+    int loops = 0;
+    for (const int count : {40, 3, 1, 70, 40, 12}) {
+      const auto motions = test::random_motions(graph.pose, count, 5.0, random);
+      const PathOptimality path = together.along(motions);
+      const auto own = solver();
+      PathOptimalities alone(situation, {.by = by, .loop_gain = 0.1}, *own);
+      const PathOptimality expected = alone.along(motions);
+      EXPECT_EQ(path.log_determinant, expected.log_determinant);
+      EXPECT_EQ(path.loops, expected.loops);
+      loops += path.loops;
+    }
+    EXPECT_GT(loops, 20);
+    EXPECT_EQ(together.along({}).log_determinant, together.now().log_determinant);
+  }
+}
+
 /// The Laplacian of a graph by its definition, with all poses, the first of which is grounded.
 class DenseLaplacian {
  public:

@@ -89,7 +89,6 @@ class CAIRN_API PathInformation {
     Eigen::Matrix3d covariance() const;
     /// The change of the trajectory's entropy, the mean of that of its poses (thesis, 5.13):
     /// (1/k) Σ_{i≤k} h(Σ'_ii) − (1/n) Σ_{i≤n} h(Σ_ii), n poses now and k with the path [nats].
-    /// NaN if only log-determinants are computed.
     double trajectory_change() const;
     /// ln |Λ'| − ln |Λ| of the graph's information matrix [twice nats]: of odometry Σ ln |Q⁻¹|,
     /// the units of which depend on those of the poses, and of loop closures Σ ln(|S| / |R|).
@@ -108,15 +107,11 @@ class CAIRN_API PathInformation {
     std::shared_ptr<const Node> node_;
   };
 
-  /// Of what is computed: `all`, or only the log-determinants (and covariances at the ends of
-  /// paths), which takes less time.
-  enum class Measures { all, log_determinants };
-
   /// Throws `Error` (usage) without poses, (numerical) where the covariances do not exist. The
   /// robot may be at some distance from the last of the poses that are kept: then its motion from
   /// there has the covariance of odometry.
   explicit PathInformation(const Situation& situation, const PathInformationOptions& options = {},
-                           CanMatch can_match = {}, Measures measures = Measures::all);
+                           CanMatch can_match = {});
   PathInformation(PathInformation&&) noexcept;
   PathInformation& operator=(PathInformation&&) noexcept;
   ~PathInformation();
