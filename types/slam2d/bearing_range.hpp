@@ -19,12 +19,11 @@ struct BearingRange {
   template <class S>
   static Vector<S, 2> residual(const Vector<S, 3>& pose, const Vector<S, 2>& landmark,
                                const Measured<S, 2>& z) {
-    using std::atan2;
     using std::sqrt;
     const so2::Rotation<S> R(pose[2]);
     const S dx = landmark[0] - pose[0], dy = landmark[1] - pose[1];
     const S px = R.c * dx + R.s * dy, py = R.c * dy - R.s * dx;
-    return {wrap_angle<S>(atan2(py, px) - z[0]), sqrt(px * px + py * py) - z[1]};
+    return {wrap_angle<S>(so2::polar_angle<S>(py, px) - z[0]), sqrt(px * px + py * py) - z[1]};
   }
 
   template <class S>
@@ -32,7 +31,6 @@ struct BearingRange {
                                const Vector<S, 2>& z, Eigen::Matrix<S, 2, 3>& J_pose,
                                Eigen::Matrix<S, 2, 2>& J_landmark) {
     using lanes::if_less;
-    using std::atan2;
     using std::sqrt;
     const so2::Rotation<S> R(pose[2]);
     const S dx = landmark[0] - pose[0], dy = landmark[1] - pose[1];
@@ -45,7 +43,7 @@ struct BearingRange {
     J_pose << -bx, -by, if_less(S(0.0), range, -1.0, 0.0), -ux, -uy, S(0.0);
     J_landmark << bx * R.c - by * R.s, bx * R.s + by * R.c,  //
         ux * R.c - uy * R.s, ux * R.s + uy * R.c;
-    return {wrap_angle<S>(atan2(py, px) - z[0]), range - z[1]};
+    return {wrap_angle<S>(so2::polar_angle<S>(py, px) - z[0]), range - z[1]};
   }
 
   static std::string normalize(Vector<double, 2>& z) {

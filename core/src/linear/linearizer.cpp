@@ -17,58 +17,47 @@ constexpr std::size_t kFactorChunk = 256;
 /// Block columns gathered by one task, and variables retracted by one.
 constexpr std::size_t kColumnChunk = 512;
 
-/// Several factors write one block: what each chunk of factors adds to it has a place of its own in
-/// scratch, and the places are added up in the order of the chunks.
-struct Gather {
-  std::int64_t target;  // in the values of H, or in g
+using Target = LinearizeTarget;
+
+/// A block of H or a part of g to which factors of several runs contribute: what each adds has a
+/// place of its own in scratch, and the places are added up in the order of the factors.
+struct Sum {
+  Target::Array array;
   std::int32_t size;    // doubles
+  std::int64_t offset;  // in the array
+  std::int64_t begin;   // of its places
 };
 
-void gather(const Gather& sum, std::span<const std::int64_t> places, const double* scratch,
-            double* target) {
-  double* out = target + sum.target;
-  if (places.empty()) {
-    std::fill_n(out, sum.size, 0.0);
-    return;
-  }
-  std::copy_n(scratch + places[0], sum.size, out);
+template <class Size>
+void gather(std::span<const std::int64_t> places, const double* scratch, Size size, double* out) {
+  for (int k = 0; k < size; ++k) out[k] = scratch[places[0] + k];
   for (const std::int64_t place : places.subspan(1)) {
-    for (std::int32_t k = 0; k < sum.size; ++k) out[k] += scratch[place + k];
+    for (int k = 0; k < size; ++k) out[k] += scratch[place + k];
   }
 }
 
-/// Sums of the same kind with the places of each, in compressed rows.
-struct Gathers {
-  std::vector<Gather> sums;
-  std::vector<std::int64_t> places;
-  std::vector<std::int64_t> begin{0};
-
-  /// To be called sum by sum; `contributions` are (sum, place), in the order of the chunks.
-  void sort_in(std::span<const std::pair<std::int64_t, std::int64_t>> contributions) {
-    begin.assign(sums.size() + 1, 0);
-    for (const auto& [sum, place] : contributions) ++begin[sum + 1];
-    std::partial_sum(begin.begin(), begin.end(), begin.begin());
-    places.resize(contributions.size());
-    std::vector<std::int64_t> next(begin.begin(), begin.end() - 1);
-    for (const auto& [sum, place] : contributions) places[next[sum]++] = place;
-  }
-  void add_up(std::size_t k, const double* scratch, double* target) const {
-    gather(sums[k], std::span(places).subspan(begin[k], begin[k + 1] - begin[k]), scratch, target);
-  }
-};
+/// The same with loops of constant size, which are unrolled, for the sizes of poses and points.
+void gather_any(std::span<const std::int64_t> places, const double* scratch, int size,
+                double* out) {
+  const auto with = [&](auto constant) { gather(places, scratch, constant, out); };
+  if (size == 2) return with(std::integral_constant<int, 2>());
+  if (size == 3) return with(std::integral_constant<int, 3>());
+  if (size == 4) return with(std::integral_constant<int, 4>());
+  if (size == 6) return with(std::integral_constant<int, 6>());
+  if (size == 9) return with(std::integral_constant<int, 9>());
+  if (size == 36) return with(std::integral_constant<int, 36>());
+  gather(places, scratch, size, out);
+}
 
 }  // namespace
 
 struct Linearizer::Plan {
   struct PoolTargets {
-    std::vector<std::int64_t> blocks;
-    std::vector<std::uint8_t> transposed;
-    std::vector<std::int64_t> gradients;
+    std::vector<Target> blocks, gradients;
   };
   struct Chunk {
     std::int32_t pool;
     std::size_t begin, end;
-    std::int64_t scratch_begin = 0, scratch_end = 0;  // what its factors add to
   };
 
   const Graph* graph;
@@ -79,8 +68,10 @@ struct Linearizer::Plan {
   BlockStructure structure;
   std::vector<PoolTargets> targets;  // by factor pool
   std::vector<Chunk> chunks;
-  Gathers block_sums;     // by target
-  Gathers gradient_sums;  // by block
+  std::size_t runs = 0;  // of chunks, each worked off by one thread
+  std::vector<Sum> sums;
+  std::vector<std::int64_t> places;     // of all sums, in scratch
+  std::vector<std::int32_t> untouched;  // blocks of variables without factors
   AlignedVector scratch;
   std::vector<double> partial;                     // chi2 by chunk
   std::vector<FactorView> views;                   // by factor pool, at the states at hand
@@ -102,6 +93,15 @@ struct Linearizer::Plan {
     states.resize(views.size());
     assign_targets();
   }
+
+  /// One thread works off all chunks in one run. Of several, each takes the next run in turn.
+  std::size_t wanted_runs() const {
+    constexpr std::size_t kRunsPerThread = 8;
+    const auto count = static_cast<std::size_t>(threads());
+    return std::min(std::max<std::size_t>(chunks.size(), 1),
+                    count == 1 ? 1 : count * kRunsPerThread);
+  }
+  std::size_t run_begin(std::size_t run) const { return run * chunks.size() / runs; }
 
   void number_blocks(const std::vector<bool>& held) {
     block_of.assign(graph->variable_count(), -1);
@@ -148,79 +148,137 @@ struct Linearizer::Plan {
     }
   }
 
-  /// A block with one contributor is written in place. To the others each chunk of factors adds in
-  /// a place of its own, and so it does to the gradients.
-  void assign_targets() {
-    targets.resize(graph->factor_pools().size());
-    std::vector<std::int32_t> contributors(structure.entries(), 0);
-    for (std::size_t p = 0; p < targets.size(); ++p) {
-      const FactorPool& pool = graph->factor_pools()[p];
-      const std::size_t arity = static_cast<std::size_t>(pool.type->arity()),
-                        pairs = arity * (arity + 1) / 2;
-      targets[p].blocks.assign(pool.size() * pairs, LinearizeSink::kNone);
-      targets[p].transposed.assign(pool.size() * pairs, 0);
-      targets[p].gradients.assign(pool.size() * arity, LinearizeSink::kNone);
-      for (std::size_t f = 0; f < pool.size(); ++f) {
-        for_each_pair(pool, f, [&](std::size_t pair, std::int32_t a, std::int32_t b) {
-          const std::int64_t entry = structure.find(std::max(a, b), std::min(a, b));
-          ++contributors[entry];
-          targets[p].blocks[pair] = entry;  // until its target is known
-          targets[p].transposed[pair] = a < b;
-        });
-      }
-    }
-
-    std::vector<std::int64_t> sum_of(structure.entries(), -1);
-    for (std::int32_t j = 0; j < structure.blocks(); ++j) {
-      const std::int32_t size = structure.block_size(j);
-      gradient_sums.sums.push_back({structure.offsets()[j], size});
-      for (std::int64_t e = structure.column_begin()[j]; e < structure.column_begin()[j + 1]; ++e) {
-        if (contributors[e] == 1) continue;
-        sum_of[e] = std::ssize(block_sums.sums);
-        block_sums.sums.push_back(
-            {structure.value_begin()[e], structure.block_size(structure.rows()[e]) * size});
-      }
-    }
-
-    std::int64_t used = 0;
-    std::vector<std::pair<std::int64_t, std::int64_t>> to_blocks, to_gradients;
-    std::vector<std::int64_t> block_place(block_sums.sums.size(), -1),
-        gradient_place(structure.blocks(), -1);
-    // The place of a sum in the chunk at hand: a new one if the last is an earlier chunk's.
-    const auto place_of = [&](Chunk& chunk, const Gathers& gathers, std::int64_t sum,
-                              std::vector<std::int64_t>& place, auto& contributions) {
-      if (place[sum] < chunk.scratch_begin) {
-        place[sum] = used;
-        used += gathers.sums[sum].size;
-        contributions.emplace_back(sum, place[sum]);
-      }
-      return place[sum];
-    };
-    for (Chunk& chunk : chunks) {
-      const FactorPool& pool = graph->factor_pools()[chunk.pool];
-      PoolTargets& target = targets[chunk.pool];
+  /// Calls on_pair(target, entry of H, transposed) and on_slot(target, block) for what all factors
+  /// of a run contribute, in their order.
+  template <class OnPair, class OnSlot>
+  void for_each_target(std::size_t run, const OnPair& on_pair, const OnSlot& on_slot) {
+    for (std::size_t c = run_begin(run); c < run_begin(run + 1); ++c) {
+      const FactorPool& pool = graph->factor_pools()[chunks[c].pool];
+      PoolTargets& pool_targets = targets[chunks[c].pool];
       const std::size_t arity = static_cast<std::size_t>(pool.type->arity());
-      chunk.scratch_begin = used;
-      for (std::size_t f = chunk.begin; f < chunk.end; ++f) {
-        for_each_pair(pool, f, [&](std::size_t pair, std::int32_t, std::int32_t) {
-          const std::int64_t entry = target.blocks[pair], sum = sum_of[entry];
-          target.blocks[pair] = sum < 0 ? structure.value_begin()[entry]
-                                        : ~place_of(chunk, block_sums, sum, block_place, to_blocks);
+      for (std::size_t f = chunks[c].begin; f < chunks[c].end; ++f) {
+        for_each_pair(pool, f, [&](std::size_t pair, std::int32_t a, std::int32_t b) {
+          const std::int64_t entry =
+              a == b ? structure.column_begin()[a] : structure.find(std::max(a, b), std::min(a, b));
+          on_pair(pool_targets.blocks[pair], entry, a < b);
         });
         for (std::size_t k = f * arity; k < (f + 1) * arity; ++k) {
           const std::int32_t block = block_of[pool.variables[k]];
-          if (block >= 0) {
-            target.gradients[k] =
-                place_of(chunk, gradient_sums, block, gradient_place, to_gradients);
-          }
+          if (block >= 0) on_slot(pool_targets.gradients[k], block);
         }
       }
-      used = (used + 7) / 8 * 8;  // two threads never write one cache line
-      chunk.scratch_end = used;
     }
-    scratch.resize(used);
-    block_sums.sort_in(to_blocks);
-    gradient_sums.sort_in(to_gradients);
+  }
+
+  /// Every sum is that of its contributions in the order of the factors, however many runs there
+  /// are. Where all of them come from one run, the first is written in place and the others are
+  /// added to it; else each has a place in scratch. So one run needs no scratch.
+  void assign_targets() {
+    runs = wanted_runs();
+    targets.assign(graph->factor_pools().size(), {});
+    for (std::size_t p = 0; p < targets.size(); ++p) {
+      const FactorPool& pool = graph->factor_pools()[p];
+      const std::size_t arity = static_cast<std::size_t>(pool.type->arity());
+      targets[p].blocks.resize(pool.size() * (arity * (arity + 1) / 2));
+      targets[p].gradients.resize(pool.size() * arity);
+    }
+    const std::vector<std::int64_t> sum_of = find_sums();
+    std::vector<std::pair<std::int64_t, std::int64_t>> contributions;  // sum, place
+    std::int64_t used = 0;
+    std::vector<bool> begun(structure.entries(), false), begun_gradient(structure.blocks(), false);
+    const auto put = [&](Target& target, const Sum& what, std::int64_t sum, bool transposed,
+                         std::vector<bool>::reference started) {
+      if (sum >= 0) {
+        target = Target(Target::Array::scratch, used, Target::How::write, transposed);
+        contributions.emplace_back(sum, used);
+        used += what.size;
+      } else {
+        target = Target(what.array, what.offset, started ? Target::How::add : Target::How::write,
+                        transposed);
+      }
+      started = true;
+    };
+    for (std::size_t run = 0; run < runs; ++run) {
+      used = (used + 7) / 8 * 8;  // two threads never write one cache line
+      for_each_target(
+          run,
+          [&](Target& target, std::int64_t entry, bool transposed) {
+            put(target, block_sum(entry), sum_of[entry], transposed, begun[entry]);
+          },
+          [&](Target& target, std::int32_t block) {
+            const std::int64_t sum = sum_of[structure.column_begin()[block]];
+            put(target, gradient_sum(block), sum < 0 ? -1 : sum + 1, false, begun_gradient[block]);
+          });
+    }
+    scratch = AlignedVector(used);
+    sort_places(contributions);
+    untouched.clear();
+    for (std::int32_t j = 0; j < structure.blocks(); ++j) {
+      if (!begun[structure.column_begin()[j]]) untouched.push_back(j);
+    }
+  }
+
+  Sum block_sum(std::int64_t entry) const {
+    const std::int64_t begin = structure.value_begin()[entry];
+    return {Target::Array::H, static_cast<std::int32_t>(structure.value_begin()[entry + 1] - begin),
+            begin, 0};
+  }
+  Sum gradient_sum(std::int32_t block) const {
+    return {Target::Array::gradient, structure.block_size(block), structure.offsets()[block], 0};
+  }
+
+  /// Lists the sums to which several runs contribute. By entry of H the number of its own, or -1;
+  /// that of a gradient follows that of the block on the diagonal.
+  std::vector<std::int64_t> find_sums() {
+    sums.clear();
+    std::vector<std::int64_t> sum_of(structure.entries(), -1);
+    if (runs == 1) return sum_of;
+    constexpr std::int64_t kNobody = -1, kSeveral = -2;
+    std::vector<std::int64_t> owner(structure.entries(), kNobody);
+    for (std::size_t run = 0; run < runs; ++run) {
+      const auto mine = static_cast<std::int64_t>(run);
+      for_each_target(
+          run,
+          [&](Target&, std::int64_t entry, bool) {
+            owner[entry] = owner[entry] == kNobody || owner[entry] == mine ? mine : kSeveral;
+          },
+          [](Target&, std::int32_t) {});
+    }
+    for (std::int32_t j = 0; j < structure.blocks(); ++j) {
+      const std::int64_t diagonal = structure.column_begin()[j];
+      for (std::int64_t e = diagonal; e < structure.column_begin()[j + 1]; ++e) {
+        if (owner[e] != kSeveral) continue;
+        sum_of[e] = std::ssize(sums);
+        sums.push_back(block_sum(e));
+        if (e == diagonal) sums.push_back(gradient_sum(j));
+      }
+    }
+    return sum_of;
+  }
+
+  /// `contributions`: (sum, place), in the order of the factors.
+  void sort_places(std::span<const std::pair<std::int64_t, std::int64_t>> contributions) {
+    std::vector<std::int64_t> next(sums.size() + 1, 0);
+    for (const auto& [sum, place] : contributions) ++next[sum + 1];
+    std::partial_sum(next.begin(), next.end(), next.begin());
+    for (std::size_t k = 0; k < sums.size(); ++k) sums[k].begin = next[k];
+    places.resize(contributions.size());
+    for (const auto& [sum, place] : contributions) places[next[sum]++] = place;
+  }
+
+  /// Adds up what runs contributed, and sets to zero what nobody contributes to.
+  void add_up(const LinearizeSink& sink) const {
+    for_each_range(sums.size(), kColumnChunk, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t k = begin; k < end; ++k) {
+        const auto last = k + 1 < sums.size() ? sums[k + 1].begin : std::ssize(places);
+        gather_any(std::span(places).subspan(sums[k].begin, last - sums[k].begin), scratch.data(),
+                   sums[k].size, sink.arrays[static_cast<int>(sums[k].array)] + sums[k].offset);
+      }
+    });
+    for (const std::int32_t j : untouched) {
+      for (const Sum& sum : {block_sum(structure.column_begin()[j]), gradient_sum(j)})
+        std::fill_n(sink.arrays[static_cast<int>(sum.array)] + sum.offset, sum.size, 0.0);
+    }
   }
 
   void check_graph() const {
@@ -241,6 +299,27 @@ struct Linearizer::Plan {
     const std::span<double> rhos(rho, norms.size());
     graph->weigh(chunk.pool, chunk.begin, norms, rhos, weights);
     return std::accumulate(rhos.begin(), rhos.end(), 0.0);
+  }
+
+  /// Adds what the factors of a chunk contribute, and sets its part of chi2.
+  void linearize_chunk(std::size_t c, LinearizeSink sink) {
+    const Chunk& chunk = chunks[c];
+    const FactorType& type = *graph->factor_pools()[chunk.pool].type;
+    const FactorView& view = views[chunk.pool];
+    sink.blocks = targets[chunk.pool].blocks.data();
+    sink.gradients = targets[chunk.pool].gradients.data();
+    double norms[kFactorChunk], weights[kFactorChunk];
+    const std::size_t count = chunk.end - chunk.begin;
+    if (has_loss(chunk)) {
+      call_factor(type, [&] { type.squared_norms(view, chunk.begin, chunk.end, norms); });
+      partial[c] = apply_loss(chunk, {norms, count}, {weights, count});
+      call_factor(type,
+                  [&] { type.linearize(view, chunk.begin, chunk.end, weights, sink, nullptr); });
+    } else {
+      call_factor(type,
+                  [&] { type.linearize(view, chunk.begin, chunk.end, nullptr, sink, norms); });
+      partial[c] = std::accumulate(norms, norms + count, 0.0);
+    }
   }
 
   /// Sets `views` to these states.
@@ -287,39 +366,13 @@ double Linearizer::linearize(const Values& values, BlockMatrix& H, std::span<dou
     throw std::logic_error("Linearizer::linearize: H or g was not made for this structure");
   }
   plan.look_at(values);
-  double* H_values = H.values().data();
-  double* scratch = plan.scratch.data();
-  for_each_chunk(plan.chunks.size(), [&](std::size_t c) {
-    const Plan::Chunk& chunk = plan.chunks[c];
-    const Plan::PoolTargets& targets = plan.targets[chunk.pool];
-    const FactorType& type = *plan.graph->factor_pools()[chunk.pool].type;
-    const LinearizeSink sink{.H = H_values,
-                             .scratch = scratch,
-                             .blocks = targets.blocks.data(),
-                             .transposed = targets.transposed.data(),
-                             .gradients = targets.gradients.data()};
-    const FactorView& view = plan.views[chunk.pool];
-    std::fill(scratch + chunk.scratch_begin, scratch + chunk.scratch_end, 0.0);
-    double norms[kFactorChunk], weights[kFactorChunk];
-    const std::size_t count = chunk.end - chunk.begin;
-    if (plan.has_loss(chunk)) {
-      call_factor(type, [&] { type.squared_norms(view, chunk.begin, chunk.end, norms); });
-      plan.partial[c] = plan.apply_loss(chunk, {norms, count}, {weights, count});
-      call_factor(type,
-                  [&] { type.linearize(view, chunk.begin, chunk.end, weights, sink, nullptr); });
-    } else {
-      call_factor(type,
-                  [&] { type.linearize(view, chunk.begin, chunk.end, nullptr, sink, norms); });
-      plan.partial[c] = std::accumulate(norms, norms + count, 0.0);
-    }
+  if (plan.runs != plan.wanted_runs()) plan.assign_targets();
+  const LinearizeSink all{.arrays = {H.values().data(), g.data(), plan.scratch.data()}};
+  for_each_chunk(plan.runs, [&](std::size_t run) {
+    for (std::size_t c = plan.run_begin(run); c < plan.run_begin(run + 1); ++c)
+      plan.linearize_chunk(c, all);
   });
-  const auto add_up = [&](const Gathers& gathers, std::size_t grain, double* target) {
-    for_each_range(gathers.sums.size(), grain, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t k = begin; k < end; ++k) gathers.add_up(k, scratch, target);
-    });
-  };
-  add_up(plan.block_sums, kColumnChunk, H_values);
-  add_up(plan.gradient_sums, 4 * kColumnChunk, g.data());
+  plan.add_up(all);
   return std::accumulate(plan.partial.begin(), plan.partial.end(), 0.0);
 }
 

@@ -14,15 +14,6 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// Writes or adds a block, as `LinearizeSink::put` does for one of fixed size.
-void put(const LinearizeSink& sink, std::int64_t offset, const MatrixXd& block) {
-  if (offset >= 0) {
-    Eigen::Map<VectorXd>(sink.H + offset, block.size()) = block.reshaped();
-  } else {
-    Eigen::Map<VectorXd>(sink.scratch + ~offset, block.size()) += block.reshaped();
-  }
-}
-
 /// Where the states of one factor of a pool are.
 std::vector<const double*> states_of(const FactorType& type, const FactorView& pool,
                                      std::size_t factor) {
@@ -74,16 +65,16 @@ void EvaluatedFactorType::linearize(const FactorView& pool, std::size_t begin, s
     std::size_t pair = f * pairs;
     for (int a = 0; a < n; ++a) {
       for (int b = a; b < n; ++b, ++pair) {
-        if (sink.blocks[pair] == LinearizeSink::kNone) continue;
-        if (a != b && sink.transposed[pair]) {
-          put(sink, sink.blocks[pair], dense::scaled_product_of_transpose(weight, J[b], J[a]));
-        } else {
-          put(sink, sink.blocks[pair], dense::scaled_product_of_transpose(weight, J[a], J[b]));
-        }
+        const LinearizeTarget target = sink.blocks[pair];
+        if (target.is_none()) continue;
+        const bool turned = a != b && target.transposed();
+        const MatrixXd block =
+            dense::scaled_product_of_transpose(weight, J[turned ? b : a], J[turned ? a : b]);
+        sink.put(target, block.data(), static_cast<std::size_t>(block.size()));
       }
-      const std::int64_t target = sink.gradients[f * static_cast<std::size_t>(n) + a];
-      if (target != LinearizeSink::kNone)
-        Eigen::Map<VectorXd>(sink.scratch + target, J[a].cols()) -= weight * J[a].transpose() * r;
+      const VectorXd gradient = -weight * J[a].transpose() * r;
+      sink.put(sink.gradients[f * static_cast<std::size_t>(n) + a], gradient.data(),
+               static_cast<std::size_t>(gradient.size()));
     }
   }
 }

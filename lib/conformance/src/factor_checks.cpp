@@ -376,8 +376,7 @@ class Pool {
 /// Where the blocks of the factors of a pool go: each to a place of its own, by turns in H and in
 /// the scratch.
 struct Places {
-  std::vector<std::int64_t> blocks, gradients;
-  std::vector<std::uint8_t> transposed;
+  std::vector<LinearizeTarget> blocks, gradients;
   std::size_t H = 0, scratch = 0;
 
   Places(const FactorSamples& type, std::size_t factors) {
@@ -386,15 +385,26 @@ struct Places {
         for (std::size_t b = a; b < type.arity(); ++b) {
           const bool adds = blocks.size() % 2 == 1;
           std::size_t& used = adds ? scratch : H;
-          const auto at = static_cast<std::int64_t>(used);
-          blocks.push_back(adds ? ~at : at);
-          transposed.push_back(a != b && blocks.size() % 3 == 0 ? 1 : 0);
+          const bool transposed = a != b && (blocks.size() + 1) % 3 == 0;
+          blocks.push_back(adds ? summand(used, transposed)
+                                : LinearizeTarget(LinearizeTarget::Array::H,
+                                                  static_cast<std::int64_t>(used),
+                                                  LinearizeTarget::How::write, transposed));
           used += type.tangent(a) * type.tangent(b);
         }
-        gradients.push_back(static_cast<std::int64_t>(scratch));
+        gradients.push_back(summand(scratch, false));
         scratch += type.tangent(a);
       }
     }
+  }
+  LinearizeSink sink(double* of_H, double* of_scratch) const {
+    return {{of_H, nullptr, of_scratch}, blocks.data(), gradients.data()};
+  }
+
+ private:
+  static LinearizeTarget summand(std::size_t at, bool transposed) {
+    return {LinearizeTarget::Array::scratch, static_cast<std::int64_t>(at),
+            LinearizeTarget::How::add, transposed};
   }
 };
 
@@ -419,8 +429,7 @@ void check_pool(FactorSamples& type, const std::vector<FactorSample>& factors, b
       scratch = Guarded::sum("scratch", places.scratch);
   check.call("squared_norms", {&norms},
              [&] { type.type().squared_norms(pool.view(), begin, end, norms.data()); });
-  const LinearizeSink sink{H.data(), scratch.data(), places.blocks.data(), places.transposed.data(),
-                           places.gradients.data()};
+  const LinearizeSink sink = places.sink(H.data(), scratch.data());
   check.call("linearize", {&norms_too, &H, &scratch}, [&] {
     type.type().linearize(pool.view(), begin, end, weighted ? weights.data() : nullptr, sink,
                           norms_too.data());
@@ -442,20 +451,20 @@ void check_pool(FactorSamples& type, const std::vector<FactorSample>& factors, b
     for (std::size_t a = 0; a < type.arity(); ++a) {
       for (std::size_t b = a; b < type.arity(); ++b, ++pair) {
         MatrixXd block = w * e.J[a].transpose() * e.J[b];
-        if (places.transposed[pair]) block.transposeInPlace();
-        const std::int64_t at = places.blocks[pair];
-        const double* data = at >= 0 ? H_found.data() + at : scratch_found.data() + ~at;
+        const LinearizeTarget at = places.blocks[pair];
+        if (at.transposed()) block.transposeInPlace();
+        const double* data = (at.adds() ? scratch_found : H_found).data() + at.offset();
         const double off = (Map<const MatrixXd>(data, block.rows(), block.cols()) - block).norm() /
                            (1.0 + block.norm());
         if (!(off <= worst_block)) worst_block = off;
       }
       const VectorXd gradient = -w * e.J[a].transpose() * r;
-      const double off =
-          (Map<const VectorXd>(scratch_found.data() + places.gradients[f * type.arity() + a],
-                               gradient.size()) -
-           gradient)
-              .norm() /
-          (1.0 + gradient.norm());
+      const double off = (Map<const VectorXd>(scratch_found.data() +
+                                                  places.gradients[f * type.arity() + a].offset(),
+                                              gradient.size()) -
+                          gradient)
+                             .norm() /
+                         (1.0 + gradient.norm());
       if (!(off <= worst_gradient)) worst_gradient = off;
     }
   }
@@ -466,10 +475,10 @@ void check_pool(FactorSamples& type, const std::vector<FactorSample>& factors, b
   bool outside = false;
   for (const std::size_t f : {std::size_t{0}, factors.size() - 1}) {
     for (std::size_t k = f * per_factor; k < (f + 1) * per_factor; ++k) {
-      const std::int64_t at = places.blocks[k];
-      const double now = at >= 0 ? H_found[static_cast<std::size_t>(at)]
-                                 : scratch_found[static_cast<std::size_t>(~at)];
-      const double before = at >= 0 ? H_before[static_cast<std::size_t>(at)] : 0.0;
+      const LinearizeTarget at = places.blocks[k];
+      const auto offset = static_cast<std::size_t>(at.offset());
+      const double now = (at.adds() ? scratch_found : H_found)[offset];
+      const double before = at.adds() ? 0.0 : H_before[offset];
       outside =
           outside || std::bit_cast<std::uint64_t>(now) != std::bit_cast<std::uint64_t>(before);
     }
@@ -478,9 +487,8 @@ void check_pool(FactorSamples& type, const std::vector<FactorSample>& factors, b
                [] { return std::string("a block of another factor changed"); });
 
   // All variables constant: a write would go to a null pointer.
-  const std::vector<std::int64_t> nowhere(places.blocks.size(), LinearizeSink::kNone);
-  const LinearizeSink none{nullptr, nullptr, nowhere.data(), places.transposed.data(),
-                           nowhere.data()};
+  const std::vector<LinearizeTarget> nowhere(places.blocks.size());
+  const LinearizeSink none{.blocks = nowhere.data(), .gradients = nowhere.data()};
   check.call("linearize", {}, [&] {
     type.type().linearize(pool.view(), begin, end, nullptr, none, norms_too.data());
   });
@@ -574,8 +582,7 @@ double seconds_per_factor(FactorSamples& samples, Checker& check) {
   const Pool pool(samples, factors);
   const Places places(samples, factors.size());
   std::vector<double> H(places.H), scratch(places.scratch), norms(factors.size());
-  const LinearizeSink sink{H.data(), scratch.data(), places.blocks.data(), places.transposed.data(),
-                           places.gradients.data()};
+  const LinearizeSink sink = places.sink(H.data(), scratch.data());
   double least = std::numeric_limits<double>::infinity();
   check.call("linearize", [&] {
     for (int round = 0; round < 10; ++round) {

@@ -177,24 +177,23 @@ TEST(EveryFactor, PropagatesToWhereItsErrorIsZero) {
 
 /// A pool of one factor seen through the interface of a pool, against `evaluate`.
 void expect_linearized_as_evaluated(const Sample& s, double weight, bool transpose) {
-  const int arity = s.type->arity(), pairs = arity * (arity + 1) / 2;
+  const int arity = s.type->arity();
   const std::vector<std::int32_t> slots(arity, 0);
   const auto states = s.states();
   const FactorView pool{1, slots.data(), s.z.data(), s.U.data(), states.data()};
 
-  std::vector<double> H, scratch;
-  std::vector<std::int64_t> blocks, gradients;
+  std::vector<double> H, g;
+  std::vector<LinearizeTarget> blocks, gradients;
   for (int a = 0; a < arity; ++a) {
     for (int b = a; b < arity; ++b) {
-      blocks.push_back(static_cast<std::int64_t>(H.size()));
+      blocks.emplace_back(LinearizeTarget::Array::H, H.size(), LinearizeTarget::How::write,
+                          transpose && a != b);
       H.resize(H.size() + s.type->tangent_size(a) * s.type->tangent_size(b), NAN);
     }
-    gradients.push_back(static_cast<std::int64_t>(scratch.size()));
-    scratch.resize(scratch.size() + s.type->tangent_size(a), 0.0);  // is added to
+    gradients.emplace_back(LinearizeTarget::Array::gradient, g.size(), LinearizeTarget::How::add);
+    g.resize(g.size() + s.type->tangent_size(a), 0.0);
   }
-  const std::vector<std::uint8_t> transposed(pairs, transpose ? 1 : 0);
-  const LinearizeSink sink{H.data(), scratch.data(), blocks.data(), transposed.data(),
-                           gradients.data()};
+  const LinearizeSink sink{{H.data(), g.data()}, blocks.data(), gradients.data()};
   double squared = 0.0, squared_alone = 0.0;
   s.type->linearize(pool, 0, 1, &weight, sink, &squared);
   s.type->squared_norms(pool, 0, 1, &squared_alone);
@@ -207,7 +206,8 @@ void expect_linearized_as_evaluated(const Sample& s, double weight, bool transpo
   for (int a = 0; a < arity; ++a) {
     const Eigen::VectorXd expected = -weight * J[a].transpose() * r;
     EXPECT_LT(
-        (Eigen::Map<Eigen::VectorXd>(scratch.data() + gradients[a], J[a].cols()) - expected).norm(),
+        (Eigen::Map<Eigen::VectorXd>(g.data() + gradients[a].offset(), J[a].cols()) - expected)
+            .norm(),
         1e-12 * (1.0 + expected.norm()));
     for (int b = a; b < arity; ++b) {
       Eigen::MatrixXd block = weight * J[a].transpose() * J[b];
@@ -234,12 +234,11 @@ TEST(EveryFactor, WritesNothingForVariablesThatAreHeld) {
   for_every_factor([](const Sample& s, const Regime&) {
     const int arity = s.type->arity();
     const std::vector<std::int32_t> slots(arity, 0);
-    const std::vector<std::int64_t> nowhere(arity * (arity + 1) / 2, LinearizeSink::kNone);
-    const std::vector<std::uint8_t> transposed(nowhere.size(), 0);
+    const std::vector<LinearizeTarget> nowhere(arity * (arity + 1) / 2);
     const auto states = s.states();
     const FactorView pool{1, slots.data(), s.z.data(), s.U.data(), states.data()};
     // A write would go to a null pointer.
-    const LinearizeSink sink{nullptr, nullptr, nowhere.data(), transposed.data(), nowhere.data()};
+    const LinearizeSink sink{.blocks = nowhere.data(), .gradients = nowhere.data()};
     double squared = -1.0;
     s.type->linearize(pool, 0, 1, nullptr, sink, &squared);
     EXPECT_NEAR(squared, s.residual(s.U).squaredNorm(), 1e-12 * (1.0 + squared));

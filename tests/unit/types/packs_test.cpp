@@ -52,8 +52,7 @@ struct Pool {
   std::vector<std::vector<double>> states;
   std::vector<double> measurements, sqrt_information, weights;
   std::vector<std::int32_t> slots;
-  std::vector<std::int64_t> blocks, gradients;
-  std::vector<std::uint8_t> transposed;
+  std::vector<LinearizeTarget> blocks, gradients;
   std::int64_t numbers = 0;
 
   Pool(const FactorType& of, const std::vector<const VariableType*>& variables, std::size_t count,
@@ -74,17 +73,16 @@ struct Pool {
     for (const auto& x : states) of_variables.push_back(x.data());
     const FactorView view{size, slots.data(), measurements.data(), sqrt_information.data(),
                           of_variables.data()};
-    std::vector<double> norms(2 * size), H(numbers, 0.25), scratch(numbers, 0.5);
-    const LinearizeSink sink{H.data(), scratch.data(), blocks.data(), transposed.data(),
-                             gradients.data()};
+    std::vector<double> norms(2 * size), H(numbers, 0.25), g(numbers, 0.75), scratch(numbers, 0.5);
+    const LinearizeSink sink{{H.data(), g.data(), scratch.data()}, blocks.data(), gradients.data()};
     for (const auto& [begin, end] : {std::pair(std::size_t{0}, split), std::pair(split, size)}) {
       if (begin == end) continue;
       type.squared_norms(view, begin, end, norms.data() + begin);
       type.linearize(view, begin, end, weighted ? weights.data() + begin : nullptr, sink,
                      norms.data() + size + begin);
     }
-    norms.insert(norms.end(), H.begin(), H.end());
-    norms.insert(norms.end(), scratch.begin(), scratch.end());
+    for (const auto* array : {&H, &g, &scratch})
+      norms.insert(norms.end(), array->begin(), array->end());
     return norms;
   }
 
@@ -126,22 +124,22 @@ struct Pool {
     measurements.insert(measurements.end(), z.begin(), z.end());
   }
   void add_targets(Sampler& sampler) {
-    const auto place = [&](int count) {
+    // Anywhere, written or added, or nowhere.
+    const auto target = [&](int count, bool may_turn) {
+      const double kind = sampler.uniform(0.0, 10.0);
       numbers += count;
-      return numbers - count;
+      if (kind < 1.0) return LinearizeTarget();
+      const auto array = static_cast<LinearizeTarget::Array>(static_cast<int>(kind) % 3);
+      return LinearizeTarget(
+          array, numbers - count,
+          sampler.uniform(0.0, 1.0) < 0.5 ? LinearizeTarget::How::write : LinearizeTarget::How::add,
+          may_turn && sampler.uniform(0.0, 1.0) < 0.5);
     };
     for (int a = 0; a < type.arity(); ++a) {
-      for (int b = a; b < type.arity(); ++b) {
-        const double kind = sampler.uniform(0.0, 10.0);
-        const std::int64_t offset = place(type.tangent_size(a) * type.tangent_size(b));
-        blocks.push_back(kind < 1.0 ? LinearizeSink::kNone : kind < 5.0 ? offset : ~offset);
-        transposed.push_back(a != b && sampler.uniform(0.0, 1.0) < 0.5);
-      }
+      for (int b = a; b < type.arity(); ++b)
+        blocks.push_back(target(type.tangent_size(a) * type.tangent_size(b), a != b));
     }
-    for (int a = 0; a < type.arity(); ++a) {
-      const std::int64_t offset = place(type.tangent_size(a));
-      gradients.push_back(sampler.uniform(0.0, 10.0) < 1.0 ? LinearizeSink::kNone : offset);
-    }
+    for (int a = 0; a < type.arity(); ++a) gradients.push_back(target(type.tangent_size(a), false));
   }
 };
 

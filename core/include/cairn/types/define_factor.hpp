@@ -159,25 +159,26 @@ class DefinedFactor<F, std::index_sequence<I...>> final : public FactorType {
     }
   };
 
-  template <std::size_t A, std::size_t B>
+  /// `transposed`: how the block of the group's first lane lies, and with it those of all.
+  template <class S, std::size_t A, std::size_t B>
   static void put_block(const double* values, bool transposed, const LinearizeSink& sink,
                         std::size_t f) {
-    constexpr int kTa = V<A>::kTangent, kTb = V<B>::kTangent;
-    const std::size_t pair = f * kPairs + Places::pair(A, B);
-    const std::int64_t offset = sink.blocks[pair];
-    if (offset == LinearizeSink::kNone) return;
-    const double* block = values + Places::block(A, B);
-    if (A == B || (sink.transposed[pair] != 0) == transposed)
-      sink.put(offset, Eigen::Map<const Vector<double, kTa * kTb>>(block));
+    constexpr int kPair = Places::pair(A, B), kTa = V<A>::kTangent, kTb = V<B>::kTangent;
+    const LinearizeTarget target = sink.blocks[f * kPairs + kPair];
+    if (target.is_none()) return;
+    double* to = sink.at(target);
+    if (A == B || target.transposed() == transposed) [[likely]]
+      lanes::put_part<S, Places, kPair>(values, target.adds(), to);
+    else if (transposed)
+      lanes::put_turned<S, Places, kPair, kTb, kTa>(values, target.adds(), to);
     else
-      sink.put(offset, lanes::turn_block<kTa, kTb>(block, transposed));
+      lanes::put_turned<S, Places, kPair, kTa, kTb>(values, target.adds(), to);
   }
-  template <std::size_t A>
+  template <class S, std::size_t A>
   static void put_gradient(const double* values, const LinearizeSink& sink, std::size_t f) {
-    const std::int64_t offset = sink.gradients[f * kArity + A];
-    if (offset == LinearizeSink::kNone) return;
-    for (int k = 0; k < V<A>::kTangent; ++k)
-      sink.scratch[offset + k] += values[Places::gradient(A) + k];
+    const LinearizeTarget target = sink.gradients[f * kArity + A];
+    if (target.is_none()) return;
+    lanes::put_part<S, Places, kPairs + A>(values, target.adds(), sink.at(target));
   }
 
  public:
@@ -238,27 +239,34 @@ class DefinedFactor<F, std::index_sequence<I...>> final : public FactorType {
     const Group<S, true> group(pool, first, first + count);
     S weight = 1.0;
     if (weights) weight = lanes::load<S>(weights, count);
-    const std::uint8_t* transposed = sink.transposed + first * kPairs;  // of the first lane
+    const LinearizeTarget* targets = sink.blocks + first * kPairs;  // of the first lane
 
     S numbers[kPadded];
     lanes::for_pairs<kArity>([&]<std::size_t A, std::size_t B>() {
-      lanes::multiply<A == B>(std::get<A>(group.jacobians), std::get<B>(group.jacobians), weight,
-                              transposed[Places::pair(A, B)] != 0, numbers + Places::block(A, B));
+      constexpr int kPair = Places::pair(A, B);
+      const auto out = [&](int k) -> S& { return numbers[Places::place(kPair, k)]; };
+      const auto& J_a = std::get<A>(group.jacobians);
+      const auto& J_b = std::get<B>(group.jacobians);
+      if (A != B && targets[kPair].transposed())
+        lanes::multiply<A == B, A != B>(J_a, J_b, weight, out);
+      else
+        lanes::multiply<A == B, false>(J_a, J_b, weight, out);
     });
     (lanes::multiply_gradient(std::get<I>(group.jacobians), group.r, weight,
-                              numbers + Places::gradient(I)),
+                              [&](int k) -> S& { return numbers[Places::place(kPairs + I, k)]; }),
      ...);
-    numbers[Places::kNorm] = lanes::squared_norm(group.r);
+    constexpr int kNorm = Places::place(kPairs + kArity, 0);
+    numbers[kNorm] = lanes::squared_norm(group.r);
     for (int k = Places::kNumbers; k < kPadded; ++k) numbers[k] = 0.0;
 
     const lanes::Separate<S, kPadded> separate(numbers);
     for (std::size_t l = 0; l < count; ++l) {
       const double* values = separate.lane(l);
       lanes::for_pairs<kArity>([&]<std::size_t A, std::size_t B>() {
-        put_block<A, B>(values, transposed[Places::pair(A, B)] != 0, sink, first + l);
+        put_block<S, A, B>(values, targets[Places::pair(A, B)].transposed(), sink, first + l);
       });
-      (put_gradient<I>(values, sink, first + l), ...);
-      if (out_squared_norms) out_squared_norms[l] = values[Places::kNorm];
+      (put_gradient<S, I>(values, sink, first + l), ...);
+      if (out_squared_norms) out_squared_norms[l] = values[kNorm];
     }
   }
 

@@ -8,6 +8,7 @@
 #include <string_view>
 
 #include "cairn/runtime/api.hpp"
+#include "cairn/types/linearize_sink.hpp"
 
 namespace cairn {
 
@@ -23,39 +24,6 @@ struct FactorView {
   /// arity arrays of states, one for each of the factor's variables in order (the same array twice
   /// if two variables are of one type).
   const double* const* states = nullptr;
-};
-
-/// Where the contribution of a factor to H or to the gradient goes.
-///
-/// A target is an offset in doubles. Where a factor is the only one that writes a block, the offset
-/// points into the values of H, and the block is written. Otherwise it points into `scratch`, is
-/// stored as its bitwise complement (negative), and the block is added to what is there: the
-/// linearizer gives each run of factors that one task works off places of its own, and adds these
-/// up in a fixed order afterwards. So no sum depends on the number of threads.
-struct LinearizeSink {
-  static constexpr std::int64_t kNone =
-      INT64_MIN;  ///< one of the variables is constant: nothing to write
-
-  double* H = nullptr;
-  double* scratch = nullptr;
-  /// size × arity(arity+1)/2, pairs (a, b) with a ≤ b in the order (0,0) (0,1) … (1,1) (1,2) …
-  /// The block is J_aᵀ J_b (tangent_a × tangent_b, column-major), or its transpose where
-  /// `transposed` says so.
-  const std::int64_t* blocks = nullptr;
-  const std::uint8_t* transposed = nullptr;  ///< size × arity(arity+1)/2
-  /// size × arity: where −J_aᵀ r is added; always in scratch, stored without complement.
-  const std::int64_t* gradients = nullptr;
-
-  /// Writes or adds a block.
-  template <class Block>
-  void put(std::int64_t offset, const Block& block) const {
-    constexpr int kSize = Block::SizeAtCompileTime;
-    if (offset >= 0) {
-      for (int k = 0; k < kSize; ++k) H[offset + k] = block.data()[k];
-    } else {
-      for (int k = 0; k < kSize; ++k) scratch[~offset + k] += block.data()[k];
-    }
-  }
 };
 
 /// A kind of factor (relative pose, landmark seen, prior, …). One object serves all graphs; it has

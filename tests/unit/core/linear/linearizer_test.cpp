@@ -186,5 +186,30 @@ TEST(LinearizerDeterminism, GivesTheSameBitsForAnyNumberOfThreads) {
   }
 }
 
+TEST(LinearizerDeterminism, FollowsAChangeOfTheNumberOfThreadsAndClearsWhatNoFactorTouches) {
+  const test::PlanarTypes types;
+  Graph graph = test::random_graph(types, 2000, 300, 5);
+  const int alone = graph.add_variable(types.pose, 1 << 20, std::vector{1.0, 2.0, 3.0});
+  const int before = threads();
+  set_threads(1);
+  Linearizer linearizer(graph, std::vector<bool>(graph.variable_count(), false));
+  const std::size_t size = linearizer.structure().size();
+  BlockMatrix H(linearizer.structure()), again(linearizer.structure());
+  std::vector<double> g(size, 7.0), g_again(size, 9.0);
+  std::ranges::fill(H.values(), 7.0);
+  linearizer.linearize(graph.values(), H, g);
+  const double* diagonal =
+      H.block(linearizer.structure().column_begin()[linearizer.block_of(alone)]);
+  EXPECT_EQ(std::vector<double>(diagonal, diagonal + 9), std::vector<double>(9, 0.0));
+  for (const int count : {3, 2, 1}) {
+    set_threads(count);
+    std::ranges::fill(again.values(), 9.0);
+    linearizer.linearize(graph.values(), again, g_again);
+    EXPECT_TRUE(std::ranges::equal(H.values(), again.values())) << count;
+    EXPECT_EQ(g, g_again) << count;
+  }
+  set_threads(before);
+}
+
 }  // namespace
 }  // namespace cairn

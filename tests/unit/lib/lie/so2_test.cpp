@@ -44,6 +44,41 @@ TEST(CosSin, IsExactAtZeroAndNeverAnswersForWhatIsNoAngle) {
   }
 }
 
+TEST(PolarAngle, AgreesWithTheCLibraryToThreeUnitsInTheLastPlace) {
+  std::mt19937_64 rng(23);
+  double worst = 0.0;
+  const auto compare = [&](double y, double x) {
+    const double right = std::atan2(y, x);
+    const double unit = std::nextafter(std::abs(right), 4.0) - std::abs(right);
+    worst = std::max(worst, std::abs(polar_angle(y, x) - right) / unit);
+  };
+  std::uniform_real_distribution<double> side(-1.0, 1.0), power(-300.0, 300.0);
+  for (int k = 0; k < 300000; ++k) {
+    compare(side(rng), side(rng));
+    compare(side(rng) * std::pow(10.0, power(rng)), side(rng));
+    compare(side(rng), side(rng) * std::pow(10.0, power(rng)));
+    const double scale = std::pow(10.0, power(rng));
+    compare(side(rng) * scale, side(rng) * scale);
+  }
+  for (int sixteenth = -16; sixteenth <= 16; ++sixteenth) {
+    const double angle = sixteenth * (std::numbers::pi / 16);
+    compare(std::sin(angle), std::cos(angle));
+  }
+  EXPECT_LE(worst, 4.0);  // the library's own unit included
+  EXPECT_EQ(polar_angle(0.0, 0.0), 0.0);
+  EXPECT_EQ(polar_angle(0.0, -1.0), std::numbers::pi);
+  EXPECT_TRUE(std::isnan(polar_angle(std::nan(""), 1.0)));
+  EXPECT_TRUE(std::isnan(polar_angle(1.0, std::nan(""))));
+}
+
+TEST(PolarAngle, OfADualNumberHasTheSameValueAndTheRightDerivative) {
+  const double y = -0.7, x = 0.3;
+  const Dual<2> angle = polar_angle(Dual<2>::variable(y, 0), Dual<2>::variable(x, 1));
+  EXPECT_EQ(angle.value, polar_angle(y, x));
+  EXPECT_NEAR(angle.gradient[0], x / (x * x + y * y), 1e-15);
+  EXPECT_NEAR(angle.gradient[1], -y / (x * x + y * y), 1e-15);
+}
+
 TEST(Rotation, OfADualNumberHasTheSameValueAndTheRightDerivative) {
   for (const double angle : {0.0, 0.3, -2.9, 17.0}) {
     const Rotation<double> plain(angle);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <type_traits>
 
@@ -91,6 +92,51 @@ template <class T>
     c = cosine;
     s = sine;
     turn_quarters(rounded, c, s);
+  }
+}
+
+/// The angle of (x, y), as atan2(y, x), to three units in the last place; 0 where both are zero.
+/// Inlined into loops about many points, it takes a fifth of the time of the C library's.
+///
+/// The vector is reflected to an angle in [0, π/4] and turned back by 0, π/8 or π/4, so that its
+/// tangent is at most tan π/16; there (atan q − q)/q³ is a polynomial in q², by Chebyshev
+/// interpolation, to 1e-17.
+template <class S>
+[[gnu::always_inline]] inline S polar_angle(const S& y, const S& x) {
+  if constexpr (std::is_same_v<S, double> || lanes::kWidth < S >> 1) {
+    using lanes::abs, lanes::if_less;
+    const S zero(0.0), a = abs(x), b = abs(y);
+    const S large = if_less(a, b, b, a), small = if_less(a, b, a, b);
+    // Which part of π/8 the vector is turned by: its tangent, and the angle in two parts.
+    const S low = large * 0.19891236737965798, high = large * 0.668178637919299;
+    const auto choose = [&](double at_eighth, double at_quarter) {
+      return if_less(high, small, S(at_quarter), if_less(low, small, S(at_eighth), zero));
+    };
+    const S tangent = choose(0x1.a827999fcef32p-2, 1.0);
+    const S turned = choose(0x1.921fb54442d18p-2, 0x1.921fb54442d18p-1);
+    const S rest = choose(0x1.c398861b78b55p-59, 0x1.1a62633145c07p-55);
+    const S below = large + small * tangent;
+    constexpr double kLeast = std::numeric_limits<double>::min();
+    const S q = (small - large * tangent) / if_less(below, S(kLeast), S(kLeast), below);
+    const S z = q * q;
+    const S series =
+        -0.3333333333333333 +
+        z * (0.19999999999997287 +
+             z * (-0.14285714284272708 +
+                  z * (0.11111110818855931 +
+                       z * (-0.0909087994065675 +
+                            z * (0.0769072401685326 +
+                                 z * (-0.06618723421715132 + z * 0.051156755232583236))))));
+    S angle = turned + (rest + (q + q * z * series));
+    constexpr double kHalf = 0x1.921fb54442d18p+0, kHalfRest = 0x1.1a62633145c07p-54;
+    angle = if_less(a, b, (kHalf - angle) + kHalfRest, angle);
+    angle = if_less(x, zero, (2.0 * kHalf - angle) + 2.0 * kHalfRest, angle);
+    return if_less(y, zero, -angle, angle);
+  } else {
+    // A dual number: the same value to the last bit, and its derivatives.
+    S angle = atan2(y, x);
+    angle.value = polar_angle(y.value, x.value);
+    return angle;
   }
 }
 

@@ -48,6 +48,10 @@ typedef double Raw4 __attribute__((vector_size(32)));
 typedef double Raw8 __attribute__((vector_size(64)));
 typedef long long Bits4 __attribute__((vector_size(32)));
 typedef long long Bits8 __attribute__((vector_size(64)));
+// Doubles anywhere in an array.
+typedef double Loose2 __attribute__((vector_size(16), aligned(8), may_alias));
+typedef double Loose4 __attribute__((vector_size(32), aligned(8), may_alias));
+typedef double Loose8 __attribute__((vector_size(64), aligned(8), may_alias));
 
 // Each instruction is a function for its own machine, which takes vectors by reference: so it means
 // the same to callers that are compiled for any machine. Loops over factors are `flatten`, and all
@@ -89,6 +93,53 @@ CAIRN_FOR_8 void collect(const double* const* row, int k, Raw8& r) {
   r = Raw8{row[0][k], row[1][k], row[2][k], row[3][k], row[4][k], row[5][k], row[6][k], row[7][k]};
 }
 // clang-format on
+/// Two doubles of each of two rows, or of four, side by side.
+CAIRN_FOR_4 void join(const double* a, const double* b, Raw4& r) {
+  r = __builtin_ia32_vinsertf128_pd256(__builtin_ia32_pd256_pd(*(const Loose2*)a),
+                                       *(const Loose2*)b, 1);
+}
+CAIRN_FOR_8 void join(const double* a, const double* b, const double* c, const double* d, Raw8& r) {
+  Raw4 low, high;
+  join(a, b, low);
+  join(c, d, high);
+  r = __builtin_ia32_insertf64x4_mask(__builtin_ia32_pd512_256pd(low), high, 1, r, -1);
+}
+/// The k-th double of each row and the one after it.
+CAIRN_FOR_4 void collect_two(const double* const* row, int k, Raw4& r, Raw4& next) {
+  Raw4 even, odd;
+  join(row[0] + k, row[2] + k, even);
+  join(row[1] + k, row[3] + k, odd);
+  r = __builtin_shuffle(even, odd, Bits4{0, 4, 2, 6});
+  next = __builtin_shuffle(even, odd, Bits4{1, 5, 3, 7});
+}
+CAIRN_FOR_8 void collect_two(const double* const* row, int k, Raw8& r, Raw8& next) {
+  Raw8 even{}, odd{};
+  join(row[0] + k, row[2] + k, row[4] + k, row[6] + k, even);
+  join(row[1] + k, row[3] + k, row[5] + k, row[7] + k, odd);
+  r = __builtin_shuffle(even, odd, Bits8{0, 8, 2, 10, 4, 12, 6, 14});
+  next = __builtin_shuffle(even, odd, Bits8{1, 9, 3, 11, 5, 13, 7, 15});
+}
+/// N doubles, a power of two: to = from, or to += from.
+template <int N>
+CAIRN_FOR_4 void put_for_4(const double* from, bool adds, double* to) {
+  if constexpr (N == 8) {
+    put_for_4<4>(from, adds, to);
+    put_for_4<4>(from + 4, adds, to + 4);
+  } else if constexpr (N == 4) {
+    *(Loose4*)to = adds ? *(Loose4*)to + *(const Loose4*)from : *(const Loose4*)from;
+  } else if constexpr (N == 2) {
+    *(Loose2*)to = adds ? *(Loose2*)to + *(const Loose2*)from : *(const Loose2*)from;
+  } else {
+    *to = adds ? *to + *from : *from;
+  }
+}
+template <int N>
+CAIRN_FOR_8 void put_for_8(const double* from, bool adds, double* to) {
+  if constexpr (N == 8)
+    *(Loose8*)to = adds ? *(Loose8*)to + *(const Loose8*)from : *(const Loose8*)from;
+  else
+    put_for_4<N>(from, adds, to);
+}
 /// c + i s times i to the power of the integer that `rounded` holds in its last bits.
 #define CAIRN_TURN(RAW, BITS)                         \
   const BITS turns = (BITS)rounded;                   \
@@ -178,6 +229,10 @@ class Pack {
   }
   /// The k-th double of each of W rows.
   Pack(const double* const* rows, int k) { collect(rows, k, raw); }
+  /// The k-th and the next, in less time.
+  static void load_two(const double* const* rows, int k, Pack& one, Pack& next) {
+    collect_two(rows, k, one.raw, next.raw);
+  }
 
   friend Pack operator+(const Pack& a) { return a; }
   friend Pack operator-(const Pack& a) {
@@ -370,6 +425,16 @@ void store(const S& x, std::size_t count, double* to) {
     __builtin_memcpy(all, &x.raw, sizeof all);
     for (std::size_t k = 0; k < std::min<std::size_t>(count, kWidth<S>); ++k) to[k] = all[k];
   }
+}
+
+/// N doubles, a power of two, of one lane: to = from, or to += from.
+template <class S, int N>
+[[gnu::always_inline]] inline void put(const double* from, bool adds, double* to) {
+#if CAIRN_PACKS
+  if constexpr (kWidth<S> == 8) return put_for_8<N>(from, adds, to);
+  if constexpr (kWidth<S> == 4) return put_for_4<N>(from, adds, to);
+#endif
+  for (int k = 0; k < N; ++k) to[k] = adds ? to[k] + from[k] : from[k];
 }
 
 /// N packs by lanes: N doubles for each. N is a multiple of the number of lanes.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <type_traits>
 #include <utility>
@@ -22,11 +23,14 @@ struct Only {
 template <class S, int N>
 Eigen::Matrix<S, N, 1> load_lanes(const double* const* places) {
   Eigen::Matrix<S, N, 1> x;
-  for (int k = 0; k < N; ++k) {
-    if constexpr (kWidth<S> == 1)
-      x[k] = places[0][k];
-    else
-      x[k] = S(places, k);
+  if constexpr (kWidth<S> == 1) {
+    for (int k = 0; k < N; ++k) x[k] = places[0][k];
+  } else if constexpr (N == 1) {
+    x[0] = S(places, 0);
+  } else {
+    for (int k = 0; k + 1 < N; k += 2) S::load_two(places, k, x[k], x[k + 1]);
+    S again;
+    if (N % 2 == 1) S::load_two(places, N - 2, again, x[N - 1]);
   }
   return x;
 }
@@ -67,69 +71,114 @@ S squared_norm(const Eigen::Matrix<S, R, 1>& r) {
   return sum;
 }
 
-/// out = w AᵀB, column-major, or if `transposed` its transpose. With kSame, B is A, and half of
-/// the symmetric product is computed.
-template <bool kSame, class S, int R, int Ta, int Tb>
+/// out(k) = the k-th number of w AᵀB, column-major, or with kTransposed of its transpose. With
+/// kSame, B is A, and half of the symmetric product is computed.
+template <bool kSame, bool kTransposed, class S, int R, int Ta, int Tb, class Out>
 void multiply(const Eigen::Matrix<S, R, Ta>& A, const Eigen::Matrix<S, R, Tb>& B, const S& weight,
-              bool transposed, S* out) {
+              const Out& out) {
   for (int row = 0; row < Ta; ++row) {
     S a[R];
     for (int k = 0; k < R; ++k) a[k] = weight * A(k, row);
     for (int c = kSame ? row : 0; c < Tb; ++c) {
       S sum = a[0] * B(0, c);
       for (int k = 1; k < R; ++k) sum += a[k] * B(k, c);
-      out[transposed ? row * Tb + c : c * Ta + row] = sum;
-      if (kSame) out[transposed ? c * Ta + row : row * Tb + c] = sum;
+      out(kTransposed ? row * Tb + c : c * Ta + row) = sum;
+      if (kSame) out(kTransposed ? c * Ta + row : row * Tb + c) = sum;
     }
   }
 }
 
-/// out = −w Aᵀr
-template <class S, int R, int T>
+/// out(k) = the k-th number of −w Aᵀr.
+template <class S, int R, int T, class Out>
 void multiply_gradient(const Eigen::Matrix<S, R, T>& A, const Eigen::Matrix<S, R, 1>& r,
-                       const S& weight, S* out) {
+                       const S& weight, const Out& out) {
   for (int row = 0; row < T; ++row) {
     S sum = weight * A(0, row) * r[0];
     for (int k = 1; k < R; ++k) sum += weight * A(k, row) * r[k];
-    out[row] = -sum;
+    out(row) = -sum;
   }
 }
 
-/// What `multiply` writes if `transposed`, from what it writes otherwise, and the converse.
-template <int Ta, int Tb>
-Eigen::Matrix<double, Ta * Tb, 1> turn_block(const double* block, bool transposed) {
-  Eigen::Matrix<double, Ta * Tb, 1> turned;
-  for (int row = 0; row < Ta; ++row) {
-    for (int c = 0; c < Tb; ++c) {
-      const int there = row * Tb + c, here = c * Ta + row;
-      turned[transposed ? here : there] = block[transposed ? there : here];
-    }
-  }
-  return turned;
-}
+/// How long a stretch begins where so many numbers of a part are left: see `Contribution`.
+constexpr int stretch(int left) { return left >= 8 ? 8 : left >= 4 ? 4 : left >= 2 ? 2 : 1; }
 
-/// Places of what a factor on variables with tangent spaces of these sizes contributes: its blocks
-/// of pairs (a, b), a ≤ b, row by row of pairs, then its gradients, then its squared norm.
+/// What a factor on variables with tangent spaces of these sizes contributes: its blocks of pairs
+/// (a, b), a ≤ b, row by row of pairs, then its gradients, then its squared norm.
+///
+/// Its numbers do not lie in that order. Each block and gradient is cut into stretches of 8, 4, 2
+/// and 1 numbers; first come all of 8, then all of 4, and so on. So each stretch lies where one
+/// vector was stored, and is read back without waiting for two.
 template <int... kSizes>
 struct Contribution {
   static constexpr int kArity = sizeof...(kSizes);
+  static constexpr int kPairs = kArity * (kArity + 1) / 2;
   static constexpr int kSize[kArity] = {kSizes...};
 
-  static constexpr int block(int a, int b) {
-    int sum = 0;
-    for (int c = 0; c <= a && c < kArity; ++c) {
-      for (int d = c; d < (c == a ? b : kArity); ++d) sum += kSize[c] * kSize[d];
-    }
-    return sum;
-  }
-  static constexpr int gradient(int a) {
-    int sum = block(kArity, kArity);
-    for (int c = 0; c < a; ++c) sum += kSize[c];
-    return sum;
-  }
   static constexpr int pair(int a, int b) { return a * kArity - a * (a - 1) / 2 + (b - a); }
-  static constexpr int kNorm = gradient(kArity), kNumbers = kNorm + 1;
+
+  /// Its parts by number: kPairs blocks, kArity gradients, the norm.
+  static constexpr int kParts = kPairs + kArity + 1;
+  static constexpr std::array<int, kParts + 1> kFirst = [] {
+    std::array<int, kParts + 1> first{};
+    int part = 0;
+    const auto next = [&](int size) {
+      first[part + 1] = first[part] + size;
+      ++part;
+    };
+    for (int a = 0; a < kArity; ++a) {
+      for (int b = a; b < kArity; ++b) next(kSize[a] * kSize[b]);
+    }
+    for (int a = 0; a < kArity; ++a) next(kSize[a]);
+    next(1);
+    return first;
+  }();
+  static constexpr int kNumbers = kFirst[kParts];
+  static constexpr int size(int part) { return kFirst[part + 1] - kFirst[part]; }
+
+  /// Where the k-th number of a part lies.
+  static constexpr int place(int part, int k) { return kPlaces[kFirst[part] + k]; }
+
+ private:
+  static constexpr std::array<int, kNumbers> kPlaces = [] {
+    std::array<int, kNumbers> places{};
+    int next = 0;
+    for (const int length : {8, 4, 2, 1}) {
+      for (int part = 0; part < kParts; ++part) {
+        const int begin = kFirst[part], end = kFirst[part + 1];
+        for (int k = begin; k < end;) {
+          const int now = stretch(end - k);
+          for (int i = 0; now == length && i < now; ++i) places[k + i] = next++;
+          k += now;
+        }
+      }
+    }
+    return places;
+  }();
 };
+
+/// Writes or adds a part of what one factor contributes, whose numbers are `values`.
+template <class S, class Places, int kPart, int kBegin = 0>
+[[gnu::always_inline]] inline void put_part(const double* values, bool adds, double* to) {
+  if constexpr (kBegin < Places::size(kPart)) {
+    constexpr int kLength = stretch(Places::size(kPart) - kBegin);
+    put<S, kLength>(values + Places::place(kPart, kBegin), adds, to + kBegin);
+    put_part<S, Places, kPart, kBegin + kLength>(values, adds, to);
+  }
+}
+/// The same of a block of kRows × kColumns, transposed.
+template <class S, class Places, int kPart, int kRows, int kColumns>
+void put_turned(const double* values, bool adds, double* to) {
+  static constexpr auto kPlaces = [] {
+    std::array<int, kRows * kColumns> places{};
+    for (int row = 0; row < kRows; ++row) {
+      for (int c = 0; c < kColumns; ++c)
+        places[row * kColumns + c] = Places::place(kPart, c * kRows + row);
+    }
+    return places;
+  }();
+  for (int k = 0; k < kRows * kColumns; ++k)
+    to[k] = adds ? to[k] + values[kPlaces[k]] : values[kPlaces[k]];
+}
 
 namespace detail {
 template <std::size_t A, class Visit, std::size_t... B>
