@@ -110,9 +110,10 @@ Summary optimize(BoundGraph& bound, const std::string& optimizer, const py::obje
   Summary summary;
   {
     const py::gil_scoped_release unlocked;
-    summary = optimize(
-        use.graph(), {*plan.optimizer, plan.optimizer_name, plan.initial.guess(), plan.initial.name()},
-        plan.stop, observer);
+    summary =
+        optimize(use.graph(),
+                 {*plan.optimizer, plan.optimizer_name, plan.initial.guess(), plan.initial.name()},
+                 plan.stop, observer);
   }
   guard.absorb();
   observer.rethrow();
