@@ -32,6 +32,37 @@ struct Assembly {
   bool transpose;
 };
 
+/// Chains of equal length side by side, one in each lane of a vector (see `Chains`). Node k of a
+/// chain lies between nodes k-1 and k+1, the first one after the first separator, the last one
+/// before the last.
+struct ChainGroup {
+  static constexpr std::int64_t kZero = -1,  ///< there is no such block, or no such row
+      kIdentity = -2;                        ///< a diagonal block of a lane without a chain
+  int length = 0;                            ///< nodes of each chain
+  const std::int64_t* diagonal = nullptr;    ///< length × lanes: H_kk, in the values of H
+  const std::int64_t* coupling = nullptr;    ///< (length + 1) × lanes: the block of k-1 and k
+  const std::int64_t* turned = nullptr;      ///< as coupling: -1 where its rows are those of k-1
+  const std::int64_t* row = nullptr;         ///< length × lanes: first scalar row of each node
+};
+
+/// Elimination of chains of blocks of one size, d. For each node, with L Lᵀ its diagonal block as
+/// eliminating the nodes before has left it, V = L⁻¹ H_k,k+1 and W = L⁻¹ C, C being its block with
+/// the first separator. `panel` holds for each node L below its diagonal, the reciprocals of that,
+/// V and W, both row by row: d(d+1)/2 + 2d² numbers of all lanes, on a 64-byte boundary.
+struct ChainKernels {
+  /// Writes what eliminating the chains adds to the blocks of the first and of the last separator
+  /// and to their common one (rows of the last): 3d² numbers for each lane. Returns a bit for each
+  /// lane in which a pivot is not positive.
+  unsigned (*eliminate)(const ChainGroup& group, const double* values, double* panel, double* ends);
+  /// y = L⁻¹ g along the chains, d numbers of all lanes for each node; writes what that adds to g
+  /// of the first and of the last separator: 2d numbers for each lane.
+  void (*forward)(const ChainGroup& group, const double* panel, const double* g, double* y,
+                  double* ends);
+  /// x = L⁻ᵀ y, given x of the separators.
+  void (*backward)(const ChainGroup& group, const double* panel, const double* y,
+                   const double* ends, double* x);
+};
+
 /// The dense work on one supernode, for one instruction set.
 ///
 /// The *front* of a supernode has m rows: its own `columns` (scalar) columns first, then the rows
@@ -44,6 +75,8 @@ struct Assembly {
 /// zero in a factored panel's diagonal blocks of one vector, else not defined.
 struct Kernels {
   const char* name;
+  int lanes;               ///< doubles in a vector: chains that are eliminated side by side
+  ChainKernels chains[2];  ///< of blocks of size 3 and of size 6
 
   /// Sets a panel of `size` doubles (a multiple of 8) to zero and writes `count` entries of H into
   /// it.

@@ -883,10 +883,14 @@ void mirror(double* U, std::int64_t child_stride, int lead, int from, int first,
   }
 }
 
+#include "chain_kernels_body.hpp"
+
 }  // namespace
 
 extern const Kernels kernels;
 const Kernels kernels{.name = CAIRN_KERNEL_NAME,
+                      .lanes = kWidth,
+                      .chains = {chain_kernels<3>(), chain_kernels<6>()},
                       .assemble = &assemble,
                       .factor_panel = &factor_panel,
                       .factor_rows = &factor_rows,

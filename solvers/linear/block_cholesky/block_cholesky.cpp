@@ -6,8 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "block/selected_inverse.hpp"
-#include "block/supernodal_cholesky.hpp"
+#include "block/chain_cholesky.hpp"
 #include "block_cholesky_options.hpp"
 #include "cairn/linear/linear_solver.hpp"
 #include "cairn/linear/marginals.hpp"
@@ -21,7 +20,7 @@ namespace {
 /// requests so small that a few solves are less than the whole recursion, are solved for.
 class BlockMarginals final : public SolvedMarginals {
  public:
-  BlockMarginals(LinearSolver& solver, block::SupernodalCholesky& cholesky)
+  BlockMarginals(LinearSolver& solver, block::ChainCholesky& cholesky)
       : SolvedMarginals(solver), cholesky_(cholesky), inverse_(cholesky) {}
 
   /// What was computed belongs to a factorisation that is no more.
@@ -47,18 +46,17 @@ class BlockMarginals final : public SolvedMarginals {
     computed_ = true;
   }
 
-  block::SupernodalCholesky& cholesky_;
-  block::SelectedInverse inverse_;
+  block::ChainCholesky& cholesky_;
+  block::ChainInverse inverse_;
   bool computed_ = false;
 };
 
 void BlockMarginals::blocks(std::span<const std::pair<std::int32_t, std::int32_t>> pairs,
                             std::span<double> out) {
-  const block::Symbolic& symbolic = cholesky_.symbolic();
   const std::int64_t together = (columns_of(pairs) + 7) / 8;
   const auto solves = static_cast<double>(together);
-  const double nonzeros = static_cast<double>(symbolic.factor_nonzeros);
-  if (!computed_ && solves * kSolveFlops * nonzeros < symbolic.factor_flops)
+  const double nonzeros = static_cast<double>(cholesky_.factor_nonzeros());
+  if (!computed_ && solves * kSolveFlops * nonzeros < cholesky_.factor_flops())
     return SolvedMarginals::blocks(pairs, out);
   compute();
   std::vector<std::pair<std::int32_t, std::int32_t>> missing;
@@ -84,7 +82,7 @@ void BlockMarginals::blocks(std::span<const std::pair<std::int32_t, std::int32_t
   }
 }
 
-/// cairn's own linear solver: a thin coat over `block::SupernodalCholesky`.
+/// cairn's own linear solver: a thin coat over `block::ChainCholesky`.
 class BlockCholesky final : public LinearSolver,
                             public LogDeterminant,
                             public EliminationOrder,
@@ -97,12 +95,10 @@ class BlockCholesky final : public LinearSolver,
     cholesky_.analyze(structure, ordering_);
     marginals_.analyze(structure.sizes());
     marginals_.forget();
-    const block::Symbolic& symbolic = cholesky_.symbolic();
     stats_.ordering = cholesky_.ordering();
-    stats_.factor_nonzeros = symbolic.factor_nonzeros;
-    stats_.factor_flops = symbolic.factor_flops;
-    stats_.note = std::to_string(symbolic.supernodes().size()) + " supernodes, " +
-                  std::string(cholesky_.kernel_set()) + " kernels";
+    stats_.factor_nonzeros = cholesky_.factor_nonzeros();
+    stats_.factor_flops = cholesky_.factor_flops();
+    stats_.note = cholesky_.description();
   }
   Factorization factorize(const BlockMatrix& H) override {
     marginals_.forget();
@@ -115,9 +111,7 @@ class BlockCholesky final : public LinearSolver,
   const LinearSolverStats& stats() const override { return stats_; }
 
   double log_determinant() const override { return cholesky_.log_determinant(); }
-  std::span<const std::int32_t> elimination_order() const override {
-    return cholesky_.symbolic().order();
-  }
+  std::span<const std::int32_t> elimination_order() const override { return cholesky_.order(); }
   void* ability(std::string_view name) override {
     if (name == LogDeterminant::kAbility) return static_cast<LogDeterminant*>(this);
     if (name == EliminationOrder::kAbility) return static_cast<EliminationOrder*>(this);
@@ -128,7 +122,7 @@ class BlockCholesky final : public LinearSolver,
 
  private:
   std::string ordering_;
-  block::SupernodalCholesky cholesky_;
+  block::ChainCholesky cholesky_;
   BlockMarginals marginals_{*this, cholesky_};
   LinearSolverStats stats_;
 };

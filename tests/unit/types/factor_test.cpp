@@ -212,7 +212,7 @@ void expect_linearized_as_evaluated(const Sample& s, double weight, bool transpo
     for (int b = a; b < arity; ++b) {
       Eigen::MatrixXd block = weight * J[a].transpose() * J[b];
       if (transpose && a != b) block.transposeInPlace();
-      const Eigen::Map<Eigen::MatrixXd> written(H.data() + blocks[pair++], block.rows(),
+      const Eigen::Map<Eigen::MatrixXd> written(H.data() + blocks[pair++].offset(), block.rows(),
                                                 block.cols());
       EXPECT_LT((written - block).norm(), 1e-12 * (1.0 + block.norm()));
     }
