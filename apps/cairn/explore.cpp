@@ -16,6 +16,7 @@
 #include <fmt/core.h>
 
 #include "arguments.hpp"
+#include "cairn/exploration/explorer_comparison.hpp"
 #include "cairn/grid/grid_format.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/policy/policy_run.hpp"
@@ -41,8 +42,8 @@ using Clock = std::chrono::steady_clock;
 
 struct ExploreOptions {
   std::string floor;
-  std::string world = "lidar_building", lidar, odometry;
-  SlamNames slam{.policy = "compact_pose:range=2,angle=3.14,reuse=false,gate=0.9999"};
+  std::string world = ExplorationSetup::kWorld, lidar, odometry;
+  SlamNames slam{.policy = ExplorationSetup::kPolicy};
   std::string explorer = "frontier";
   std::string until, match;
   double decision_budget = std::numeric_limits<double>::infinity();  // [s]

@@ -27,6 +27,8 @@ void bind_evaluation(py::module_& module);
 void bind_policy(py::module_& module);
 void bind_compact(py::module_& module);
 void bind_sparsify(py::module_& module);
+void bind_floors(py::module_& module);
+void bind_exploration(py::module_& module);
 void bind_pictures(py::module_& module);
 void bind_components(py::module_& module);
 

@@ -27,6 +27,7 @@
 #include "cairn/runtime/enum_names.hpp"
 #include "cairn/runtime/error.hpp"
 #include "component_names.hpp"
+#include "follower.hpp"
 #include "interrupt.hpp"
 #include "python_registration.hpp"
 
@@ -46,38 +47,6 @@ struct BoundResult {
     if (!result.located) return "unlocated";
     return result.converged ? "converged" : "max_iterations";
   }
-};
-
-/// Called after each pose; says when the run shall end. Runs that find thresholds are not followed.
-class Follower {
- public:
-  bool selecting = false;
-
-  Follower(py::object function, const std::atomic<bool>& interrupt)
-      : function_(std::move(function)), interrupt_(&interrupt) {}
-
-  void operator()(const PolicyResult& counts) {
-    if (interrupt_->load()) stop_ = true;
-    if (!selecting || function_.is_none() || stop_) return;
-    const py::gil_scoped_acquire locked;
-    try {
-      if (function_(counts.poses.back()).is(py::bool_(false))) stop_ = true;
-    } catch (const py::error_already_set& error) {
-      if (!error.matches(PyExc_KeyboardInterrupt) || !interrupt_->load())
-        raised_ = std::current_exception();
-      stop_ = true;
-    }
-  }
-  const std::atomic<bool>& stop() const { return stop_; }
-  void rethrow() const {
-    if (raised_) std::rethrow_exception(raised_);
-  }
-
- private:
-  py::object function_;
-  const std::atomic<bool>* interrupt_;
-  std::atomic<bool> stop_ = false;
-  std::exception_ptr raised_;
 };
 
 /// What is run, and how.
@@ -122,7 +91,7 @@ void run(Plan& plan, const PolicySetting& setting, Follower& follower, BoundResu
     out.notes.emplace_back("interrupted before anything was selected");
     return;
   }
-  follower.selecting = true;
+  follower.follow();
   PolicyRun policy(plan.job, setting);
   if (plan.map) policy.load(*plan.map);
   policy.run(setting.data.poses.size(), plan.job.policy.name);

@@ -1,0 +1,246 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// cairn.explore: a robot that explores a floor.
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <fmt/core.h>
+#include <pybind11/numpy.h>
+#include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
+
+#include "arrays.hpp"
+#include "bindings.hpp"
+#include "bound_graph.hpp"
+#include "cairn/exploration/exploration_measures.hpp"
+#include "cairn/exploration/explorer_comparison.hpp"
+#include "cairn/grid/grid.hpp"
+#include "cairn/plugin/registry.hpp"
+#include "cairn/runtime/error.hpp"
+#include "component_names.hpp"
+#include "follower.hpp"
+#include "interrupt.hpp"
+
+namespace cairn::python {
+namespace {
+
+/// A run, as Python reads it.
+struct BoundExploration {
+  ExplorationResult result;
+  ExplorationMeasures measures;
+  std::unique_ptr<BoundGraph> graph, trajectory, truth;
+};
+
+void set_positive(const char* name, const std::optional<double>& value, double& out) {
+  if (!value) return;
+  if (!(*value > 0.0))
+    throw Error(ErrorCode::usage, fmt::format("{}: expected a number above zero", name));
+  out = *value;
+}
+
+void set_positive(const char* name, const std::optional<int>& value, int& out) {
+  if (!value) return;
+  if (*value <= 0)
+    throw Error(ErrorCode::usage, fmt::format("{}: expected a whole number above zero", name));
+  out = *value;
+}
+
+struct Limits {
+  std::optional<double> distance;
+  std::optional<int> steps, decisions;
+};
+
+ExplorationLimits limits_of(const Limits& given) {
+  ExplorationLimits limits;
+  set_positive("max_distance", given.distance, limits.distance);
+  set_positive("max_steps", given.steps, limits.steps);
+  set_positive("max_decisions", given.decisions, limits.decisions);
+  return limits;
+}
+
+std::unique_ptr<BoundExploration> explore(
+    const OccupancyGrid& floor, const std::string& explorer, std::uint64_t seed,
+    const std::optional<Pose2>& start, std::optional<double> max_distance,
+    std::optional<int> max_steps, std::optional<int> max_decisions, const std::string& world,
+    const std::string& policy, const std::string& registration, const std::string& mapper,
+    std::optional<double> match_range, std::optional<double> match_angle,
+    std::optional<double> decision_budget, const py::object& callback, const py::kwargs& options) {
+  const InterruptGuard guard;
+  Follower follower(callback, guard.flag());
+  follower.follow();
+  const ComponentSpec explorer_spec = component_spec(explorer, options);
+  ExplorationSetup setup{.registry = default_registry(),
+                         .world = parse_component(world),
+                         .policy = parse_component(policy),
+                         .registration = parse_component(registration),
+                         .mapper = parse_component(mapper),
+                         .floor = floor,
+                         .start = start,
+                         .limits = limits_of({max_distance, max_steps, max_decisions}),
+                         .interrupt = &follower.stop()};
+  set_positive("match_range", match_range, setup.match.range);
+  set_positive("match_angle", match_angle, setup.match.angle);
+  set_positive("decision_budget", decision_budget, setup.decision_budget);
+  auto out = std::make_unique<BoundExploration>();
+  {
+    const py::gil_scoped_release unlocked;
+    out->result = run_exploration(
+        setup, explorer_spec, seed,
+        {.moved = [&](const ExplorationStep& step, const FloorMap&) { follower.after(step); }});
+  }
+  guard.absorb();
+  follower.rethrow();
+  ExplorationResult& result = out->result;
+  out->measures =
+      measures_of(result, static_cast<double>(floor.frame.size()) * floor.frame.cell_area());
+  out->graph = std::make_unique<BoundGraph>(std::move(result.graph));
+  out->trajectory = std::make_unique<BoundGraph>(std::move(result.trajectory));
+  out->truth = std::make_unique<BoundGraph>(std::move(result.truth_trajectory));
+  return out;
+}
+
+// Arrays ------------------------------------------------------------------------------------------
+
+template <class Get>
+py::array column(const std::vector<ExplorationStep>& steps, const Get& get) {
+  using Number = decltype(get(steps.front()));
+  py::array_t<Number> numbers(static_cast<py::ssize_t>(steps.size()));
+  for (std::size_t k = 0; k < steps.size(); ++k) numbers.mutable_data()[k] = get(steps[k]);
+  return numbers;
+}
+
+template <class Get>
+py::array_t<double> poses(const std::vector<ExplorationStep>& steps, const Get& get) {
+  std::vector<double> numbers;
+  for (const ExplorationStep& step : steps) {
+    const Pose2 pose = get(step);
+    numbers.insert(numbers.end(), {pose.x(), pose.y(), pose.theta()});
+  }
+  return array_of(numbers, {steps.size(), 3});
+}
+
+/// A column for each member of a step.
+py::dict steps_of(const BoundExploration& bound) {
+  using Step = ExplorationStep;
+  const std::vector<Step>& steps = bound.result.steps;
+  const double nan = std::nan("");
+  py::dict all;
+  all["step"] = column(steps, [](const Step& s) { return s.step; });
+  all["decision"] = column(steps, [](const Step& s) { return s.decision; });
+  all["distance"] = column(steps, [](const Step& s) { return s.distance; });
+  all["estimate"] = poses(steps, [](const Step& s) { return s.estimate; });
+  all["truth"] =
+      poses(steps, [&](const Step& s) { return s.truth.value_or(Pose2(nan, nan, nan)); });
+  all["coverage"] = column(steps, [](const Step& s) { return s.coverage; });
+  all["map_entropy"] = column(steps, [](const Step& s) { return s.map_entropy; });
+  all["trajectory_entropy"] = column(steps, [](const Step& s) { return s.trajectory_entropy; });
+  all["kept"] = column(steps, [](const Step& s) { return s.kept; });
+  all["loops"] = column(steps, [](const Step& s) { return s.loops; });
+  all["collisions"] = column(steps, [](const Step& s) { return s.collisions; });
+  return all;
+}
+
+py::dict measures(const BoundExploration& bound) {
+  py::dict all;
+  for (const ExplorationMeasure& measure : exploration_measures())
+    all[py::str(std::string(measure.name))] = bound.measures.*measure.member;
+  return all;
+}
+
+void bind_step(py::module_& module) {
+  using Step = ExplorationStep;
+  py::class_<Step>(module, "ExplorationStep", "A run after one motion.")
+      .def_readonly("step", &Step::step, "How many motions there were.")
+      .def_readonly("decision", &Step::decision, "How many decisions there were.")
+      .def_readonly("distance", &Step::distance, "Driven so far, as odometry has it [m].")
+      .def_readonly("estimate", &Step::estimate, "Where the robot is, as estimated: a Pose2.")
+      .def_readonly("truth", &Step::truth, "Where it truly is: a Pose2; None: that is not known.")
+      .def_readonly("coverage", &Step::coverage, "Of the cells that are known [m^2].")
+      .def_readonly("map_entropy", &Step::map_entropy, "[nats m^2]")
+      .def_readonly("trajectory_entropy", &Step::trajectory_entropy, "[nats]")
+      .def_readonly("kept", &Step::kept, "Poses that are kept.")
+      .def_readonly("loops", &Step::loops, "Loop closures in the graph.")
+      .def_readonly("collisions", &Step::collisions)
+      .def("__repr__", [](const Step& step) {
+        return fmt::format("<cairn.ExplorationStep {}: {:.1f} m driven, {:.1f} m^2 known>",
+                           step.step, step.distance, step.coverage);
+      });
+}
+
+void bind_result(py::module_& module) {
+  using Bound = BoundExploration;
+  const auto inside = py::return_value_policy::reference_internal;
+  py::class_<Bound>(module, "ExplorationResult", "How a robot has explored a floor.")
+      .def_property_readonly(
+          "end", [](const Bound& b) { return std::string(to_string(b.result.end)); },
+          "'finished', 'limit', 'stuck' or 'interrupted'.")
+      .def_property_readonly(
+          "why", [](const Bound& b) { return b.result.why; }, "A sentence.")
+      .def_property_readonly("steps", &steps_of,
+                             "An array for each quantity of ExplorationStep, of all steps: (n,), "
+                             "and (n, 3) x y [m] theta [rad] for 'estimate' and 'truth' (NaN: not "
+                             "known). The first is of the start.")
+      .def_property_readonly(
+          "graph", [](const Bound& b) { return b.graph.get(); }, inside,
+          "The poses that are kept, and their factors.")
+      .def_property_readonly(
+          "trajectory", [](const Bound& b) { return b.trajectory.get(); }, inside,
+          "All poses, without factors.")
+      .def_property_readonly(
+          "truth", [](const Bound& b) { return b.truth.get(); }, inside,
+          "Where they truly were; without variables if that is not known.")
+      .def_property_readonly(
+          "map", [](const Bound& b) { return b.result.map.occupancy(); }, "The map: a Floor.")
+      .def_property_readonly("measures", &measures,
+                             "The numbers by which runs are compared (docs/explore.md), by name: "
+                             "coverage [m^2], map_error [m^2], ate [m], seconds [s], …; NaN: not "
+                             "known.")
+      .def_property_readonly(
+          "decision_seconds", [](const Bound& b) { return array_of(b.result.decision_seconds); },
+          "Of each decision [s]: (n,).")
+      .def_property_readonly("converged", [](const Bound& b) { return b.result.converged; })
+      .def_property_readonly(
+          "notes", [](const Bound& b) { return b.result.notes; }, "Sentences for the user.")
+      .def("__repr__", [](const Bound& b) {
+        return fmt::format("<cairn.ExplorationResult {}: {:.1f} m driven, {:.1f} m^2 known>",
+                           to_string(b.result.end), b.result.steps.back().distance,
+                           b.result.map.coverage());
+      });
+}
+
+}  // namespace
+
+void bind_exploration(py::module_& module) {
+  bind_step(module);
+  bind_result(module);
+  module.def(
+      "explore", &explore, py::arg("floor"), py::arg("explorer") = "frontier", py::kw_only(),
+      py::arg("seed") = 1, py::arg("start") = py::none(), py::arg("max_distance") = py::none(),
+      py::arg("max_steps") = py::none(), py::arg("max_decisions") = py::none(),
+      py::arg("world") = ExplorationSetup::kWorld, py::arg("policy") = ExplorationSetup::kPolicy,
+      py::arg("registration") = "icp", py::arg("mapper") = "log_odds",
+      py::arg("match_range") = py::none(), py::arg("match_angle") = py::none(),
+      py::arg("decision_budget") = py::none(), py::arg("callback") = py::none(),
+      R"(A simulated robot with a lidar explores a floor, and decides by itself where to drive (docs/explore.md).
+
+floor: a Floor to drive on.
+explorer: a name of `cairn.components("explorer")`; its options are further keyword arguments.
+seed: of all noise and random choices: the same seed gives the same run.
+start: the Pose2 at which it begins; None: the widest place.
+max_distance [m], max_steps, max_decisions: it ends there; None: when nothing is left to explore.
+world, policy, registration, mapper: the robot, and what makes a graph and a map of its scans, with options:
+    world="lidar_building:range=8,fov=180".
+match_range [m], match_angle [rad]: within which the explorer expects loop closures.
+decision_budget: searches for a path end after so long [s]; then no run is like the other.
+callback: called with an ExplorationStep after each motion; when it returns False, the run ends.
+
+Ctrl-C ends the run too, with the map so far. The interpreter's lock is released meanwhile.)");
+}
+
+}  // namespace cairn::python

@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// cairn.Floor: occupancy grids, from files, generated, or from an array.
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include <fmt/core.h>
+#include <pybind11/numpy.h>
+#include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
+
+#include "arrays.hpp"
+#include "bindings.hpp"
+#include "cairn/grid/floor_plan.hpp"
+#include "cairn/grid/grid.hpp"
+#include "cairn/grid/grid_format.hpp"
+#include "cairn/plugin/registry.hpp"
+#include "cairn/runtime/error.hpp"
+#include "component_names.hpp"
+
+namespace cairn::python {
+namespace {
+
+using Cells = py::array_t<std::int64_t, py::array::c_style | py::array::forcecast>;
+
+const char* const kDoc =
+    R"(The map of a floor: square cells with the probability of being occupied in per cent, or -1 where that is unknown.
+
+cells: (rows, columns) integers; row 0 is the lowest, x counts columns to the right and y rows upwards.
+resolution: the side of a cell [m].
+origin: x y [m] of the lower left corner of cell (0, 0), and the angle [rad] by which the grid is turned about it.)";
+
+OccupancyGrid make(const Cells& cells, double resolution, const std::vector<double>& origin) {
+  if (cells.ndim() != 2)
+    throw Error(ErrorCode::usage,
+                fmt::format("cells: the shape is {}, expected (rows, columns)", shape_text(cells)));
+  if (origin.size() != 3)
+    throw Error(ErrorCode::usage, "origin: expected x y [m] and an angle [rad]");
+  OccupancyGrid floor;
+  floor.frame.height = static_cast<int>(cells.shape(0));
+  floor.frame.width = static_cast<int>(cells.shape(1));
+  floor.frame.resolution = resolution;
+  floor.frame.origin = {origin[0], origin[1]};
+  floor.frame.yaw = origin[2];
+  check_frame(floor.frame, "Floor");
+  floor.occupancy.reserve(static_cast<std::size_t>(cells.size()));
+  for (py::ssize_t k = 0; k < cells.size(); ++k) {
+    const std::int64_t value = cells.data()[k];
+    if (value < kUnknownCell || value > 100) {
+      throw Error(
+          ErrorCode::usage,
+          fmt::format("cells: {} is neither per cent, 0 to 100, nor -1 for unknown", value));
+    }
+    floor.occupancy.push_back(static_cast<std::int8_t>(value));
+  }
+  return floor;
+}
+
+py::array_t<std::int8_t> cells_of(const OccupancyGrid& floor) {
+  py::array_t<std::int8_t> cells({floor.frame.height, floor.frame.width});
+  std::ranges::copy(floor.occupancy, cells.mutable_data());
+  return cells;
+}
+
+OccupancyGrid read(const std::filesystem::path& path) {
+  const py::gil_scoped_release unlocked;
+  return read_grid(path.string(), default_registry());
+}
+
+OccupancyGrid generate(const std::string& plan, std::uint64_t seed, const py::kwargs& options) {
+  const ComponentSpec spec = component_spec(plan, options);
+  const py::gil_scoped_release unlocked;
+  return default_registry().make<FloorPlan>(spec)->generate(seed);
+}
+
+}  // namespace
+
+void bind_floors(py::module_& module) {
+  py::class_<OccupancyGrid>(module, "Floor", kDoc)
+      .def(py::init(&make), py::arg("cells"), py::arg("resolution"),
+           py::arg("origin") = std::vector<double>{0.0, 0.0, 0.0})
+      .def_property_readonly("cells", &cells_of,
+                             "(rows, columns) integers of 8 bits: per cent, or -1; row 0 is the "
+                             "lowest.")
+      .def_property_readonly(
+          "resolution", [](const OccupancyGrid& floor) { return floor.frame.resolution; },
+          "The side of a cell [m].")
+      .def_property_readonly(
+          "origin",
+          [](const OccupancyGrid& floor) {
+            return py::make_tuple(floor.frame.origin.x(), floor.frame.origin.y(), floor.frame.yaw);
+          },
+          "x y [m] of the lower left corner of cell (0, 0), and the angle [rad] of the grid.")
+      .def(
+          "write",
+          [](const OccupancyGrid& floor, const std::filesystem::path& path) {
+            const py::gil_scoped_release unlocked;
+            write_grid(floor, path.string(), default_registry());
+          },
+          py::arg("path"), "Writes it: floor.yaml, with floor.png beside it, as ROS' map server.")
+      .def("__repr__", [](const OccupancyGrid& floor) {
+        return fmt::format("<cairn.Floor: {} x {} cells of {:g} m>", floor.frame.width,
+                           floor.frame.height, floor.frame.resolution);
+      });
+  module.def("read_floor", &read, py::arg("path"),
+             "Reads a Floor: floor.yaml as ROS' map server has it, or an image as "
+             "'picture.png:resolution=0.05'.");
+  module.def("generate_floor", &generate, py::arg("plan"), py::arg("seed") = 1,
+             R"(Makes the Floor of a building, the same on every machine.
+
+plan: a name of `cairn.components("floor_plan")`, whose options are the other keyword arguments.)");
+}
+
+}  // namespace cairn::python
