@@ -273,6 +273,7 @@ void CompactGraph::move_poses(int first, const State& move, std::span<const Fact
     }
   }
   note_links(factors, report.first_factor + old_factors);
+  for (Temporary& pose : temporary_) pose.since = 0;
   for (auto& [ends, bridge] : bridges_) {  // those between poses of the map are where they were
     if (const auto at = place.find(bridge.factor); at != place.end())
       bridge.factor = report.first_factor + at->second;
@@ -301,10 +302,11 @@ void CompactGraph::relocate(int pose, const Motion& measured, double of_way, dou
   const std::pair<int, int> ends = std::minmax(pose, other);
   Motion bridge = motions.compose(end, motions.inverse(newest_.odometry), order_);
   if (pose > other) bridge = motions.inverse(bridge);
-  if (full_ && !(gain(ends, bridge) > least_gain)) {
+  if ((full_ || temporary(other)) && !(gain(ends, bridge) > least_gain)) {
     end = start = measured;
     match.divided = false;
   } else {
+    make_permanent(other);
     ways_.open().bridge = bridge;
     add_bridge(ends, std::move(bridge), seconds);
   }
@@ -372,6 +374,8 @@ FactorId CompactGraph::update(std::span<const Factor> links, PolicySeconds& seco
   const UpdateReport report = estimator_->update(update);  // throws before anything has changed
   copy_.reset();
   const FactorId first_link = report.first_factor + (size() - solved_);
+  if (!update.factors.empty()) latest_factors_ = report.first_factor;
+  for (Temporary& pose : temporary_) pose.since = std::min(pose.since, latest_factors_);
   for (; solved_ < size(); ++solved_) {
     kept_[solved_].ahead = {};
     kept_[solved_].variable = {};

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <functional>
+#include <limits>
 #include <map>
 #include <memory>
 #include <optional>
@@ -17,6 +19,7 @@
 #include "cairn/solve/estimator.hpp"
 #include "pose_index.hpp"
 #include "rigid_group.hpp"
+#include "temporary_poses.hpp"
 #include "ways.hpp"
 
 namespace cairn::compact {
@@ -101,8 +104,9 @@ class CompactGraph {
   /// to what follows. Two parts that are treated as independent have no more information than the
   /// one measurement.
   ///
-  /// Once poses have left (`make_room`), that link is used as all others are: if its information
-  /// gain exceeds `least_gain` [nats]. If not, the whole measurement goes to what follows.
+  /// Once poses have left (`make_room`), or if the predecessor is temporary, that link is used as
+  /// all others are: if its information gain exceeds `least_gain` [nats]. If not, the whole
+  /// measurement goes to what follows.
   void relocate(int pose, const Motion& measured, double of_way, double least_gain,
                 PolicySeconds& seconds);
   /// Takes the link, or links, between two poses out, of which one is kept: what is left is as if
@@ -180,6 +184,22 @@ class CompactGraph {
   /// Keeps the newest pose; adds landmarks, and factors on it and landmarks.
   void see(std::vector<Variable> added, std::span<const Factor> factors, PolicySeconds& seconds);
 
+  // Temporary poses ------------------------------------------------------------------------------
+  /// Whether a kept pose is one.
+  bool temporary(int pose) const;
+  /// The newest, which is kept and may leave.
+  void make_temporary();
+  void make_permanent(int pose);
+  /// Removes one of them, if a pose that stays is at its place (`cover`; nothing: there is none)
+  /// and no more than this is lost about the map: the oldest with all that it measured, or if too
+  /// much is lost by that, with what it measured of landmarks alone, while its odometry becomes a
+  /// part of that to the next pose. Where no pose covers it, or more is lost, it is permanent from
+  /// now on. Nothing: none has left. It waits while it is the newest pose that would lose too much;
+  /// if too many wait, the first whose odometry can be joined is judged all the same.
+  std::optional<Leaving> drop_temporary(const InformationLoss& most,
+                                        const std::function<std::optional<Id>(int)>& cover,
+                                        PolicySeconds& seconds);
+
   /// From each kept pose to the next one of the trajectory.
   const std::vector<OdometryChain>& chains() const { return chains_; }
   void keep_chains(bool keep) { keeps_chains_ = keep; }
@@ -234,6 +254,24 @@ class CompactGraph {
   void renumber(const GraphUpdate& leaving, FactorId first_factor, std::span<const int> now);
   void join_chains(const GraphUpdate& leaving);
 
+  struct Temporary {
+    Id id = 0;
+    FactorId since = 0;  ///< no older factor is on it
+  };
+  /// The estimator does not have the pose yet.
+  static constexpr FactorId kComing = std::numeric_limits<FactorId>::max();
+  struct IncidentFactor {
+    FactorId id = 0;
+    Factor factor;
+    std::vector<Eigen::MatrixXd> J{};  ///< whitened, by each variable
+  };
+  std::vector<IncidentFactor> factors_of_temporary();
+  InformationLoss loss_without(std::size_t k, bool all, std::span<const IncidentFactor> incident);
+  void recast_chains(Id leaving, Id cover);
+  bool joins(std::size_t k, std::span<const IncidentFactor> incident) const;
+  Leaving remove_temporary(std::size_t k, bool joined, Id cover,
+                           std::span<const IncidentFactor> incident);
+
   /// Kept poses from this number on, which odometry alone has added, with that.
   GraphUpdate odometry_from(int first) const;
 
@@ -270,7 +308,9 @@ class CompactGraph {
   void replace_chains(const Ways::Change& change);
   /// The factors of links whose two poses are kept, by the smaller id and the larger.
   std::map<std::pair<Id, Id>, std::vector<FactorId>> links_;
-  Ways ways_;  ///< with the links of poses that are not kept
+  std::vector<Temporary> temporary_;  ///< in the order of arrival
+  FactorId latest_factors_ = 0;       ///< the first of those that came last
+  Ways ways_;                         ///< with the links of poses that are not kept
   bool full_ = false;
   int version_ = 0;
 

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <utility>
 
@@ -22,6 +23,10 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kAhead = 2.0;
 /// Links that wait: older ones are given up when there are more.
 constexpr std::size_t kMostWaiting = 32;
+
+/// What a measurement of a landmark must add to be used, and what may be lost where a pose leaves
+/// that landmarks locate, by default [nats per DoF of a pose].
+constexpr double kLittle = 0.1, kLoss = 0.06;
 
 [[noreturn]] void refuse(const std::string& message) { throw Error(ErrorCode::input, message); }
 
@@ -105,7 +110,8 @@ void CompactPose::start(const Variable& pose) {
     prior_gain_ = options_.prior_gain;
   landmark_gain_ = options_.strategy == Strategy::apal ? -kInfinity
                    : options_.landmark_gain >= 0.0     ? options_.landmark_gain
-                                                       : default_gain(group.dimension(), 1.36);
+                                                       : kLittle * n;
+  landmark_loss_ = options_.landmark_loss >= 0.0 ? options_.landmark_loss : kLoss * n;
 }
 
 void CompactPose::expect(const Graph& recording, std::span<const Arrival> poses) {
@@ -281,6 +287,9 @@ void CompactPose::search() {
     }
   }
   report_.near = static_cast<int>(std::ssize(near));
+  // One that may leave is matched only where no other can be.
+  const auto lasts = [&](const Candidate& one) { return !graph_.temporary(one.pose); };
+  if (std::ranges::any_of(candidates_, lasts)) std::erase_if(candidates_, std::not_fn(lasts));
   std::ranges::make_heap(candidates_, kByWorth);
 }
 
@@ -342,6 +351,7 @@ LinkReport CompactPose::offer(Id other, std::span<const Factor> measured) {
   if (other == graph_.newest_id()) refuse(fmt::format("a link from pose {} to itself", other));
   const Motion motion =
       measured.empty() ? Motion() : graph_.fuse(measured, other, graph_.newest_id());
+  if (!measured.empty()) graph_.make_permanent(pose);
   if (!searched_) search();
   LinkReport report{.earlier = other, .later = graph_.newest_id()};
   const std::optional<Candidate> candidate = take_candidate(pose);
@@ -490,11 +500,16 @@ PoseReport CompactPose::end_pose() {
   {
     const Timed timed(report_.seconds.total);
     if (!searched_) search();
+    removed_.clear();
     settle_priors();
+    const bool kept = graph_.newest_kept();
     use_landmarks();
+    const bool by_landmarks = !kept && graph_.newest_kept();
     if (!graph_.newest_kept() && !report_.closed_loop && report_.least_gain > pose_gain_)
       graph_.keep(report_.seconds);
-    add_landmarks();
+    if (!add_landmarks() && !kept && graph_.newest_kept() && pose_gain_ > 0.0 &&
+        !graph_.landmarks().empty())
+      limit_poses_of_landmarks(by_landmarks);
     if (graph_.predecessor() >= 0 && report_.candidates > 0 && options_.keep == 0)
       finder_.note_pose(report_.least_gain);
     for (const Candidate& left : candidates_)
@@ -509,6 +524,7 @@ PoseReport CompactPose::end_pose() {
 bool CompactPose::finish() {
   if (open_) throw Error(ErrorCode::usage, "finish before the newest pose was ended");
   if (graph_.empty()) return true;
+  removed_.clear();
   if (!graph_.newest_kept()) graph_.keep(report_.seconds);
   make_room();
   return graph_.solve_fully();

@@ -130,8 +130,11 @@ class CompactPose final : public PosePolicy, public OptionFinder {
   void settle_priors();
   void use_landmarks();
   std::optional<std::vector<double>> place(const Seen& seen) const;
-  void add_landmarks();
+  bool add_landmarks();
   void forget(Id a, Id b);
+  std::optional<Id> cover(int pose);
+  void limit_poses_of_landmarks(bool located);
+  void note_leaving(const CompactGraph::Leaving& leaving);
   void make_room();
 
   CompactPoseOptions options_;
@@ -145,7 +148,8 @@ class CompactPose final : public PosePolicy, public OptionFinder {
   std::optional<std::unordered_map<Id, std::vector<Id>>> recorded_;
   double radius_ = 0.0;  ///< no pose farther away can be a candidate [m]
   Matrix sensor_;        ///< Σ̄_y, if it was given; else that of `typical_`
-  double loop_gain_ = 0.0, pose_gain_ = 0.0, prior_gain_ = 0.0, landmark_gain_ = 0.0;  // [nats]
+  double loop_gain_ = 0.0, pose_gain_ = 0.0, prior_gain_ = 0.0;  // [nats]
+  double landmark_gain_ = 0.0, landmark_loss_ = 0.0;             // [nats]
 
   // The newest pose:
   PoseReport report_;

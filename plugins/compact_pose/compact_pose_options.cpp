@@ -68,7 +68,10 @@ OptionFields<CompactPoseOptions> CompactPoseOptions::fields() {
             "loop_gain")
       .real("landmark_gain", &O::landmark_gain, -1.0, 1e9,
             "information gain that a measurement of a landmark in the graph must exceed [nats]; "
-            "-1: (n/2 ln 2 + 1)^1.36 - 1, n = 2 or 3")
+            "-1: 0.1 per DoF of a pose")
+      .real("landmark_loss", &O::landmark_loss, -1.0, 10.0,
+            "largest information about the map that is lost by removing a pose which landmarks "
+            "locate, where another one stays [nats]; -1: 0.06 per DoF of a pose")
       .text("sensor", &O::sensor, numbers, text_of,
             "expected covariance of a match: standard deviations [m] and [rad], or its upper "
             "triangle; empty: the median of the latest matches, at first as odometry")

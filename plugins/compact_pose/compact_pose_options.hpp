@@ -56,6 +56,9 @@ struct CompactPoseOptions {
   double pose_gain = -1.0;      ///< g_pose [nats]; negative: likewise
   double prior_gain = -1.0;     ///< of an absolute measurement [nats]; negative: as `loop_gain`
   double landmark_gain = -1.0;  ///< of a measurement of a landmark [nats]; negative: by its size
+  /// What may be lost about the map where a pose leaves that landmarks locate [nats]; negative:
+  /// likewise.
+  double landmark_loss = -1.0;
   /// Σ̄_y, what a registration is expected to be worth, upper triangle by rows, or the standard
   /// deviations of translation [m] and rotation [rad]. Empty: like the newest odometry.
   std::vector<double> sensor{};

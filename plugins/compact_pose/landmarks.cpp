@@ -286,8 +286,8 @@ std::optional<std::vector<double>> CompactPose::place(const Seen& seen) const {
   return std::move(state);
 }
 
-/// Those that the newest pose, which is kept, sees first.
-void CompactPose::add_landmarks() {
+/// Those that the newest pose, which is kept, sees first. Whether there are any.
+bool CompactPose::add_landmarks() {
   std::vector<Variable> added;
   std::vector<Factor> factors;
   for (const Seen& seen : std::exchange(seen_, {})) {
@@ -312,6 +312,7 @@ void CompactPose::add_landmarks() {
     report_.landmarks.push_back(report);
   }
   if (!factors.empty()) graph_.see(std::move(added), factors, report_.seconds);
+  return !factors.empty();
 }
 
 }  // namespace cairn::compact

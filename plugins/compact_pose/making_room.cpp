@@ -29,8 +29,18 @@ void append(OdometryChain&& next, OdometryChain& chain) {
 
 }  // namespace
 
+/// Poses have new numbers.
+void CompactPose::note_leaving(const CompactGraph::Leaving& leaving) {
+  removed_.insert(removed_.end(), leaving.poses.begin(), leaving.poses.end());
+  report_.removed = static_cast<int>(std::ssize(removed_));
+  record_.renumber(leaving.now);
+  for (Waiting& waiting : waiting_) {
+    waiting.link.earlier = leaving.now[waiting.link.earlier];
+    waiting.link.later = leaving.now[waiting.link.later];
+  }
+}
+
 void CompactPose::make_room() {
-  removed_.clear();
   if (!remover_ || graph_.size() <= options_.keep) return;
   std::vector<int> held;
   for (const Waiting& waiting : waiting_)
@@ -41,14 +51,7 @@ void CompactPose::make_room() {
   if (leaving.note != noted_ && !leaving.note.empty()) report_.notes.push_back(leaving.note);
   noted_ = std::move(leaving.note);
   report_.notes.insert(report_.notes.end(), leaving.notes.begin(), leaving.notes.end());
-  if (leaving.poses.empty()) return;
-  removed_ = std::move(leaving.poses);
-  report_.removed = static_cast<int>(std::ssize(removed_));
-  record_.renumber(leaving.now);
-  for (Waiting& waiting : waiting_) {
-    waiting.link.earlier = leaving.now[waiting.link.earlier];
-    waiting.link.later = leaving.now[waiting.link.later];
-  }
+  if (!leaving.poses.empty()) note_leaving(leaving);
 }
 
 CompactGraph::Leaving CompactGraph::make_room(PoseRemover& remover, int limit,

@@ -95,7 +95,24 @@ void evaluate(PosePolicy& policy, const PolicyData& data, PolicyResult& result) 
 
 }  // namespace
 
+namespace {
+
+/// Before any work: a policy would refuse it when a pose sees it.
+void check_landmarks(const Graph& recording) {
+  for (int v = 0; v < recording.variable_count(); ++v) {
+    if (!recording.fixed(v) || !is_point(recording.type(v))) continue;
+    throw Error(ErrorCode::input,
+                fmt::format("{} is fixed (FIX), and a policy estimates all landmarks: remove its "
+                            "FIX; where the map is follows from a pose that is fixed, or from "
+                            "absolute measurements of poses, such as EDGE_PRIOR_SE2",
+                            recording.describe_variable(v)));
+  }
+}
+
+}  // namespace
+
 PolicyData policy_data(Graph recording, std::optional<Graph> truth, std::optional<Id> begin) {
+  check_landmarks(recording);
   PolicyData data;
   data.poses = pose_chain(recording, begin);
   for (const Arrival& pose : data.poses) {

@@ -3,6 +3,7 @@
 
 #include <atomic>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -55,6 +56,23 @@ TEST_F(PolicyRunTest, ATruthThatLacksPosesIsGoodForTheTrajectoryOnly) {
 TEST_F(PolicyRunTest, RefusesWhatIsNoTrajectory) {
   Simulation made = simulate("bundle");
   EXPECT_THROW(policy_data(std::move(made.graph)), Error);
+}
+
+TEST_F(PolicyRunTest, RefusesAFixedLandmarkBeforeTheWork) {
+  Simulation made = simulate("landmarks2d:poses=60");
+  Graph& graph = made.graph;
+  int landmark = 0;
+  while (!is_point(graph.type(landmark))) ++landmark;
+  graph.set_fixed(landmark);
+  const std::string name = graph.describe_variable(landmark);
+  try {
+    policy_data(std::move(made.graph));
+    FAIL() << "it was taken";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ErrorCode::input);
+    EXPECT_THAT(error.what(), testing::HasSubstr(name));
+    EXPECT_THAT(error.what(), testing::HasSubstr("remove its FIX"));
+  }
 }
 
 TEST_F(PolicyRunTest, CountsLandmarksAndEachMeasurementOfThem) {

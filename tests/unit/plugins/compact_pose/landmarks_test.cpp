@@ -314,7 +314,7 @@ TEST_P(Landmarks, TheGainIsTheEntropyThatTheGraphLoses) {
 }
 
 TEST_P(Landmarks, FewOfThemBoundTheErrorOfOdometry) {
-  begin("");
+  begin("landmark_gain=1.5");
   int offered = 0, used = 0, dropped = 0;
   for (const PoseReport& report : drive(6 * kLap)) {
     dropped += !report.kept;

@@ -32,9 +32,10 @@ struct PolicyData {
   std::int64_t landmarks = 0, observations = 0;  ///< landmarks; factors on a pose and a landmark
 };
 
-/// Throws `Error` (input) as `pose_chain` does. A `truth` that lacks a pose of the recording, or
-/// has it with another type, gives errors of the trajectory only. With `begin`, the trajectory
-/// begins at the pose with this id: those before it are of earlier sessions.
+/// Throws `Error` (input) as `pose_chain` does, and for a landmark that is fixed. A `truth` that
+/// lacks a pose of the recording, or has it with another type, gives errors of the trajectory only.
+/// With `begin`, the trajectory begins at the pose with this id: those before it are of earlier
+/// sessions.
 CAIRN_API PolicyData policy_data(Graph recording, std::optional<Graph> truth = {},
                                  std::optional<Id> begin = {});
 

@@ -162,7 +162,8 @@ class CAIRN_API PosePolicy : public Component {
   /// The poses that are kept, in the order of arrival.
   virtual std::vector<Id> kept() const = 0;
   /// Poses that were kept, and have left with the latest `end_pose` or `finish`: factors between
-  /// others have taken their place. None, unless a policy bounds the number of poses that it keeps.
+  /// others have taken their place, or what they measured adds little to what others did. None,
+  /// unless a policy bounds the number of poses that it keeps.
   virtual std::vector<Id> removed() const { return {}; }
   /// The landmarks that are in the graph, in the order in which they were added.
   virtual std::vector<Id> landmarks() const { return {}; }
