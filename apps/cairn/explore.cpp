@@ -17,6 +17,8 @@
 
 #include "arguments.hpp"
 #include "cairn/exploration/explorer_comparison.hpp"
+#include "cairn/exploration/recorded_world.hpp"
+#include "cairn/exploration/scan_log.hpp"
 #include "cairn/grid/grid_format.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/policy/policy_run.hpp"
@@ -50,7 +52,7 @@ struct ExploreOptions {
   ComparisonOptions comparison;
   std::uint64_t seed = 1;
   std::optional<double> start_x, start_y, start_theta;
-  std::string output, trajectory, truth, map, steps;
+  std::string output, trajectory, truth, map, steps, log, loss;
   RunRecordingOptions recording;
   bool live = false;
 };
@@ -160,6 +162,7 @@ void check_single(const ExploreOptions& options) {
                                               {"--truth", !options.truth.empty()},
                                               {"--map", !options.map.empty()},
                                               {"--steps", !options.steps.empty()},
+                                              {"--log", !options.log.empty()},
                                               {"--record", !options.recording.record.empty()},
                                               {"--live", options.live}};
   for (const auto& [option, given] : single) {
@@ -181,6 +184,10 @@ void check(const ExploreOptions& options, Session& session) {
   for (const std::string& graph : {options.output, options.trajectory, options.truth})
     check_output(graph, "", session, false);
   check_file(options.steps, session);
+  if (!options.log.empty()) {
+    check_scan_log_name(options.log, session.registry());
+    check_file(options.log, session);
+  }
   check_recording(options.recording, session);
 }
 
@@ -209,6 +216,7 @@ void write_outputs(const ExploreOptions& options, const ExploreOutcome& outcome,
   write(result.truth_trajectory, options.truth);
   results.write(options.map, [&] { write_grid(result.map.occupancy(), options.map, registry); });
   results.write(options.steps, [&] { write_file(options.steps, steps_csv(result)); });
+  results.write(options.log, [&] { write_scan_log(outcome.log, options.log, registry); });
   results.add([&] { session.write_json(report_json(outcome)); });
   results.add([&] {
     const auto points = positions(result.steps);
@@ -227,10 +235,43 @@ ExploreParts parts_of(const ExploreOptions& options) {
           .seed = options.seed};
 }
 
+/// The floor to drive on; none: a recorded robot has driven already.
+std::optional<OccupancyGrid> floor_of(const ExploreOptions& options, const World& world,
+                                      bool is_recorded, Session& session) {
+  if (options.floor.empty()) {
+    if (is_recorded) return std::nullopt;
+    throw Error(
+        ErrorCode::usage,
+        "FLOOR is missing: name the map of a floor, floor.yaml, or @KIND of a generated one, "
+        "such as @rooms; --world log alone needs none");
+  }
+  OccupancyGrid floor = load_floor(options.floor, session);
+  if (!is_recorded)
+    note_narrow_ways(options.floor, floor, world.robot().radius, start_of(options), session);
+  return floor;
+}
+
+/// Matches of scans of a real floor may be wrong.
+constexpr const char* kLossOfRecordings = "cauchy:scale=2";
+
+std::shared_ptr<const Loss> loop_loss(const ExploreOptions& options, bool is_recorded,
+                                      Registry& registry) {
+  std::string name = options.loss;
+  if (name.empty()) name = is_recorded ? kLossOfRecordings : "none";
+  return name == "none" ? nullptr : registry.make<Loss>(name);
+}
+
 int compare_explorers(const ExploreOptions& options, Session& session) {
   Registry& registry = session.registry();
   const ComponentSpec world = world_spec(options);
-  registry.make<World>(world);  // what is wrong with its options is reported before the work
+  // What is wrong with its options is reported before the work.
+  if (query<RecordedWorld>(*registry.make<World>(world))) {
+    throw Error(ErrorCode::usage,
+                fmt::format("--world: a robot of '{}' goes where it went, whatever an explorer "
+                            "decides: there is nothing to compare",
+                            world.name));
+  }
+  if (options.floor.empty()) throw Error(ErrorCode::usage, "FLOOR is missing");
   const MatchModel match = match_of(options.match);
   const ExplorationLimits limits = limits_of(options.until);
   const std::optional<Pose2> start = start_of(options);
@@ -269,8 +310,10 @@ int run_explore(const ExploreOptions& options, Session& session) {
       registry.make<Registration>(seeded(Registration::kKind, options.slam.registration));
   const auto mapper = registry.make<Mapper>(parse_component(options.slam.mapper));
   const auto explorer = registry.make<Explorer>(parse_component(options.explorer));
-  const OccupancyGrid floor = load_floor(options.floor, session);
-  note_narrow_ways(options.floor, floor, world->robot().radius, start, session);
+  const bool is_recorded = query<RecordedWorld>(*world) != nullptr;
+  const std::shared_ptr<const Loss> loss = loop_loss(options, is_recorded, registry);
+  const std::optional<OccupancyGrid> floor = floor_of(options, *world, is_recorded, session);
+  ScanLog log;
   const InterruptGuard guard;  // until the results are written
   ExploreProgress progress(options, session);
   const ExploreParts parts = parts_of(options);
@@ -282,21 +325,25 @@ int run_explore(const ExploreOptions& options, Session& session) {
       .mapper = *mapper,
       .explorer = *explorer,
       .registry = registry,
-      .start = {.floor = &floor, .pose = start, .seed = options.seed},
+      .start = {.floor = floor ? &*floor : nullptr, .pose = start, .seed = options.seed},
       .limits = limits,
       .match = match,
       .decision_budget = options.decision_budget,
       .sample_distance = ExplorationSetup::kSampleDistance,
       .interrupt = &guard.flag(),
       .decided = [&](const Decision& decision, const Situation&) { progress.decided(decision); },
-      .moved = [&](const ExplorationStep& step,
-                   const FloorMap& map) { progress.moved(step, map); }};
+      .moved = [&](const ExplorationStep& step, const FloorMap& map) { progress.moved(step, map); },
+      .match_consecutive = is_recorded,
+      .loop_loss = loss,
+      .log = options.log.empty() ? nullptr : &log};
   recording.follow(exploration);
-  const ExploreOutcome outcome{.floor = options.floor,
-                               .frame = floor.frame,
-                               .parts = parts,
-                               .repeatable = !std::isfinite(options.decision_budget),
-                               .result = run_exploration(exploration)};
+  ExploreOutcome outcome{.floor = options.floor,
+                         .frame = {},
+                         .parts = parts,
+                         .repeatable = !std::isfinite(options.decision_budget),
+                         .result = run_exploration(exploration),
+                         .log = std::move(log)};
+  outcome.frame = floor ? floor->frame : outcome.result.map.frame;
   progress.clear();
   for (const std::string& note : outcome.result.notes) session.note(note);
   Results results(session);
@@ -317,8 +364,7 @@ Command add_explore(ArgumentParser program) {
       "explore", "a simulated robot explores a floor, and decides by itself where to drive");
   cli.add_option("floor", options->floor, "the floor: floor.yaml, or @KIND[:k=v] to generate")
       .type_name("FLOOR")
-      .file_or_generated({"floor_plan"})
-      .required();
+      .file_or_generated({"floor_plan"});
   cli.add_option("-o,--output", options->output, "write the graph of the poses that are kept")
       .type_name("OUT");
   cli.add_option("--map", options->map, "write the map that was built").type_name("FILE");
@@ -326,6 +372,9 @@ Command add_explore(ArgumentParser program) {
       .type_name("FILE");
   cli.add_option("--truth", options->truth, "write where the robot truly was").type_name("FILE");
   cli.add_option("--steps", options->steps, "a row for each motion, as CSV").type_name("FILE");
+  cli.add_option("--log", options->log,
+                 "write scans, odometry and true poses as a log of CARMEN, run.clf.gz")
+      .type_name("FILE");
   add_recording_options(cli, options->recording);
   cli.add_option("--explorer", options->explorer,
                  "decides where to drive; options as NAME:k=v; several, A,B, are compared")
@@ -353,9 +402,14 @@ Command add_explore(ArgumentParser program) {
   cli.add_option("--seed", options->seed, "of all noise and random choices")
       .type_name("N")
       .show_default();
-  cli.add_option("--world", options->world, "the robot; its options: cairn plugins lidar_building")
+  cli.add_option("--world", options->world,
+                 "the robot; its options: cairn plugins lidar_building; log:file=robot.clf is one "
+                 "that was recorded, and goes where it went, without a FLOOR")
       .component({"world"})
       .show_default();
+  cli.add_option("--loss", options->loss,
+                 "robust loss of loop closures, or none [none; of a recorded robot cauchy:scale=2]")
+      .component({"loss"});
   add_slam_options(cli, options->slam);
   cli.add_flag("--live", options->live, "draw map, trajectory and path in the terminal on the way");
   cli.footer(
@@ -364,6 +418,7 @@ Command add_explore(ArgumentParser program) {
       "  cairn explore floor.yaml --until distance=250 --odometry relative=0.15 -o run.g2o --map "
       "map.yaml\n"
       "  cairn explore floor.yaml --record run.jsonl && cairn view run.jsonl -o run.html\n"
+      "  cairn explore --world log:file=robot.clf.gz --record run.jsonl --map map.yaml\n"
       "  cairn explore floor.yaml --explorer frontier,random --runs 20 --csv runs.csv --html "
       "compare.html");
   return {cli, [options](Session& session) { return run_explore(*options, session); }};

@@ -72,7 +72,7 @@ json::object report_json(const ExploreOutcome& outcome) {
   const ExplorationResult& result = outcome.result;
   const ExplorationStep& last = result.steps.back();
   json::object report = begin_report("explore");
-  report["floor"] = frame_json(outcome.floor, outcome.frame);
+  if (!outcome.floor.empty()) report["floor"] = frame_json(outcome.floor, outcome.frame);
   report["world"] = outcome.parts.world;
   report["policy"] = outcome.parts.policy;
   report["registration"] = outcome.parts.registration;

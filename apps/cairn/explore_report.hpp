@@ -18,11 +18,12 @@ struct ExploreParts {
 
 /// What `cairn explore` prints and writes.
 struct ExploreOutcome {
-  std::string floor;
-  GridFrame frame;
+  std::string floor;  ///< empty: none is known
+  GridFrame frame;    ///< of the floor, or else of the map
   ExploreParts parts;
   bool repeatable = true;  ///< no clock decides
   ExplorationResult result;
+  ScanLog log = {};  ///< if it is to be written
 };
 
 /// Adds "measures", {name: number}, and "measured_seconds", those of them that are times.

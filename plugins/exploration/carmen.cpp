@@ -3,7 +3,12 @@
 //
 //     FLASER n r_1 … r_n x y theta odom_x odom_y odom_theta stamp host stamp
 //
-// is a scan of the front laser. x, y, theta is where odometry has the laser.
+// is a scan of the front laser, from the right to the left. x, y, theta is where odometry has the
+// laser; ODOM lines have the same for those who read them alone. Before a scan,
+//
+//     TRUEPOS true_x true_y true_theta odom_x odom_y odom_theta stamp host stamp
+//
+// is where a simulated robot truly was, and PARAM robot_front_laser_max how far the laser saw.
 #include <algorithm>
 #include <charconv>
 #include <cmath>
@@ -13,6 +18,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -37,6 +43,11 @@ struct CarmenOptions {
 };
 
 constexpr int kMostReadings = 100000;
+constexpr std::string_view kScan = "FLASER ", kTruth = "TRUEPOS ",
+                           kRange = "PARAM robot_front_laser_max ";
+/// What a laser of CARMEN returns where it has measured nothing, and more than it ever measures
+/// [m].
+constexpr double kNothing = 81.91, kLargest = 80.0;
 
 /// Words of a line.
 class Words {
@@ -90,12 +101,22 @@ class Carmen final : public ScanLogFormat {
 
   ScanLog read(std::string_view text, const std::string& name) override {
     ScanLog log;
+    double range = options_.range;
+    std::optional<Pose2> truth;
     for (std::size_t number = 1; !text.empty(); ++number) {
       const std::size_t end = std::min(text.find('\n'), text.size());
-      constexpr std::string_view kTag = "FLASER ";
-      if (const std::string_view line = text.substr(0, end); line.starts_with(kTag)) {
-        Words words(line.substr(kTag.size()), fmt::format("{}:{}", name, number));
-        if (auto scan = logged(words)) log.scans.push_back(std::move(*scan));
+      const std::string_view line = text.substr(0, end);
+      const auto words = [&](std::string_view tag) {
+        return Words(line.substr(tag.size()), fmt::format("{}:{}", name, number));
+      };
+      if (line.starts_with(kScan)) {
+        log.scans.push_back(logged(words(kScan), range));
+        log.scans.back().truth = std::exchange(truth, std::nullopt);
+      } else if (line.starts_with(kTruth)) {
+        Words of_truth = words(kTruth);
+        truth = pose(of_truth);
+      } else if (line.starts_with(kRange)) {
+        range = std::min(options_.range, largest_range(words(kRange)));
       }
       text.remove_prefix(std::min(end + 1, text.size()));
     }
@@ -108,8 +129,68 @@ class Carmen final : public ScanLogFormat {
     return log;
   }
 
+  std::string write(const ScanLog& log) override {
+    std::string text = "# CARMEN Logfile\n";
+    double range = std::numeric_limits<double>::quiet_NaN();
+    for (const LoggedScan& logged : log.scans) {
+      check(logged.scan);
+      const std::string when = fmt::format("{} cairn {}\n", logged.stamp, logged.stamp);
+      const std::string at = pose_text(logged.odometry);
+      if (logged.scan.max_range != range) {
+        range = logged.scan.max_range;
+        text += fmt::format("{}{} {}", kRange, range, when);
+      }
+      if (logged.truth)
+        text += fmt::format("{}{} {} {}", kTruth, pose_text(*logged.truth), at, when);
+      text += fmt::format("ODOM {} 0 0 0 {}", at, when);
+      text += fmt::format("{}{}", kScan, logged.scan.ranges.size());
+      for (const float measured : logged.scan.ranges)
+        text += std::isnan(measured) ? fmt::format(" {}", kNothing) : fmt::format(" {}", measured);
+      text += fmt::format(" {} {} {}", at, at, when);
+    }
+    return text;
+  }
+
  private:
-  std::optional<LoggedScan> logged(Words& words) const {
+  static std::string pose_text(const Pose2& pose) {
+    return fmt::format("{} {} {}", pose.x(), pose.y(), pose.theta());
+  }
+
+  static Pose2 pose(Words& words) {
+    const double x = words.coordinate("x"), y = words.coordinate("y"),
+                 theta = words.coordinate("theta");
+    return {x, y, theta};
+  }
+
+  static double largest_range(Words words) {
+    const double range = words.number("the laser's range");
+    if (!(range > 0.0)) words.fail(fmt::format("{:g} is no range of a laser", range));
+    return range;
+  }
+
+  /// A FLASER line has no angles: its beams are a half circle.
+  static void check(const LaserScan& scan) {
+    const auto beams = static_cast<double>(scan.ranges.size());
+    const double step = std::numbers::pi / (std::fmod(beams, 2.0) == 0.0 ? beams : beams - 1.0);
+    constexpr double kSame = 1e-6;  // [rad]
+    if (beams < 2.0 || std::abs(scan.first_angle + 0.5 * std::numbers::pi) > kSame ||
+        std::abs(scan.angle_step - step) * beams > kSame) {
+      throw Error(ErrorCode::usage,
+                  fmt::format("a log of CARMEN cannot hold scans of {} beams over {:.4g}°: its "
+                              "lidars have an odd number of beams over 180°, as "
+                              "fov=180,beams=181",
+                              scan.ranges.size(),
+                              scan.angle_step * (beams - 1.0) * 180.0 / std::numbers::pi));
+    }
+    if (!(scan.max_range < kLargest)) {
+      throw Error(ErrorCode::usage,
+                  fmt::format("a log of CARMEN cannot hold ranges of {:g} m: its lidars see less "
+                              "than {:g} m",
+                              scan.max_range, kLargest));
+    }
+  }
+
+  LoggedScan logged(Words words, double max_range) const {
     const double count = words.number("the number of readings");
     if (!(count >= 1.0 && count <= kMostReadings) || count != std::floor(count))
       words.fail(fmt::format("{:g} is no number of readings", count));
@@ -117,7 +198,7 @@ class Carmen final : public ScanLogFormat {
     LoggedScan logged;
     logged.scan = {.first_angle = -0.5 * std::numbers::pi,
                    .angle_step = std::numbers::pi / (beams % 2 == 0 ? count : count - 1.0),
-                   .max_range = options_.range,
+                   .max_range = max_range,
                    .ranges = {}};
     if (beams == 1) logged.scan.angle_step = 0.0;
     logged.scan.ranges.reserve(beams);
@@ -125,11 +206,9 @@ class Carmen final : public ScanLogFormat {
       const double range = words.number("a range");
       logged.scan.ranges.push_back(range >= options_.none
                                        ? std::numeric_limits<float>::quiet_NaN()
-                                       : static_cast<float>(std::min(range, options_.range)));
+                                       : static_cast<float>(std::min(range, max_range)));
     }
-    const double x = words.coordinate("x"), y = words.coordinate("y"),
-                 theta = words.coordinate("theta");
-    logged.odometry = Pose2(x, y, theta);
+    logged.odometry = pose(words);
     for (const char* what : {"odom_x", "odom_y", "odom_theta"}) words.number(what);
     logged.stamp = words.number("the time");
     return logged;

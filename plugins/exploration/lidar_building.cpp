@@ -16,6 +16,7 @@
 #include "cairn/plugin/option_fields.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
+#include "log_world.hpp"
 
 namespace cairn::exploration {
 namespace {
@@ -184,4 +185,8 @@ void cairn_register(cairn::Registrar& registrar) {
         return std::make_unique<LidarBuilding>(options,
                                                registry.make<FloorSurveyor>(options.surveyor));
       });
+  registrar.add<World, LogWorldOptions>("log",
+                                        [](const LogWorldOptions& options, Registry& registry) {
+                                          return std::make_unique<LogWorld>(options, registry);
+                                        });
 }

@@ -61,6 +61,49 @@ TEST_F(Explore, SaysInFiveLinesWhatHappenedAndWritesAllOfIt) {
   EXPECT_EQ(floor.exit_code, 0) << floor.err;
 }
 
+TEST_F(Explore, ARunIsALogAndALogIsARun) {
+  need({{"scan_log", "carmen"}, {"registration", "icp"}});
+  const std::string log = folder_.file("run.clf.gz"), report = folder_.file("again.json"),
+                    record = folder_.file("again.jsonl");
+  const Outcome run = explore({"--until", "distance=12", "--log", log, "--seed", "4"});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const std::string world = "log:file=" + log + ",step=0";
+  const Outcome again = cairn({"explore", "--world", world, "--json", report, "--record", record});
+  ASSERT_EQ(again.exit_code, 0) << again.err;
+  EXPECT_THAT(again.out, HasSubstr("finished: the recording is at its end"));
+  const auto said = parse_json(read_text(report)).as_object();
+  EXPECT_FALSE(said.contains("floor"));
+  EXPECT_GE(said.at("distance").to_number<double>(), 12.0);
+  EXPECT_LT(said.at("error").at("ate_translation").to_number<double>(), 0.1);
+  EXPECT_EQ(cairn({"view", record, "-o", folder_.file("again.html")}).exit_code, 0);
+  // With the floor the map is compared with it.
+  const Outcome beside = cairn({"explore", kFloor, "--world", world, "--json", report});
+  ASSERT_EQ(beside.exit_code, 0) << beside.err;
+  EXPECT_GT(parse_json(read_text(report)).at("map").at("truth").at("seen").to_number<double>(),
+            5.0);
+  EXPECT_EQ(cairn({"map", log}).exit_code, 0);
+}
+
+TEST_F(Explore, LogsThatCannotBeAreRefused) {
+  need({{"scan_log", "carmen"}});
+  const std::string log = folder_.file("run.clf");
+  const auto refusal = [&](const Arguments& words, int code) {
+    const Outcome run = cairn(words);
+    EXPECT_EQ(run.exit_code, code) << run.err;
+    return unfolded(run.err);
+  };
+  EXPECT_THAT(refusal({"explore"}, 2), HasSubstr("FLOOR is missing"));
+  EXPECT_THAT(refusal({"explore", "--world", "log"}, 2), HasSubstr("log:file=robot.clf"));
+  EXPECT_THAT(refusal({"explore", kFloor, "--log", folder_.file("run.bag")}, 2), HasSubstr(".clf"));
+  EXPECT_THAT(refusal({"explore", kFloor, "--runs", "2", "--log", log}, 2), HasSubstr("--log"));
+  const Outcome wide = explore({"--until", "steps=2", "--lidar", "fov=270", "--log", log});
+  EXPECT_EQ(wide.exit_code, 2);
+  EXPECT_THAT(unfolded(wide.err), HasSubstr("over 270°"));
+  ASSERT_EQ(explore({"--until", "steps=2", "--log", log}).exit_code, 0);
+  EXPECT_THAT(refusal({"explore", "--world", "log:file=" + log, "--runs", "2"}, 2),
+              HasSubstr("there is nothing to compare"));
+}
+
 TEST_F(Explore, AGraphOnStandardOutputIsAloneThere) {
   const std::string file = folder_.file("run.g2o");
   ASSERT_EQ(explore({"--until", "steps=5", "-o", file}).exit_code, 0);

@@ -9,6 +9,7 @@
 #include <fmt/core.h>
 
 #include "cairn/evaluation/trajectory.hpp"
+#include "cairn/exploration/recorded_world.hpp"
 #include "cairn/exploration/scan_slam.hpp"
 #include "cairn/grid/cell_traversal.hpp"
 #include "cairn/runtime/plugin_call.hpp"
@@ -56,10 +57,26 @@ class Run {
   explicit Run(const Exploration& parts)
       : parts_(parts),
         robot_(parts.world.robot()),
-        slam_({parts.policy, parts.registration, parts.mapper, parts.registry}) {}
+        recorded_(query<RecordedWorld>(parts.world)),
+        slam_({.policy = parts.policy,
+               .registration = parts.registration,
+               .mapper = parts.mapper,
+               .registry = parts.registry,
+               .match_consecutive = parts.match_consecutive,
+               .loop_loss = parts.loop_loss}) {}
 
   ExplorationResult run() {
     begin();
+    if (recorded_)
+      follow();
+    else
+      explore();
+    finish();
+    return std::move(result_);
+  }
+
+ private:
+  void explore() {
     while (!ended_) {
       if (!check_limits()) break;
       const Decision decision = decide();
@@ -70,22 +87,40 @@ class Run {
                                                       : ExplorationEnd::stuck,
             decision.why);
     }
-    finish();
-    return std::move(result_);
   }
 
- private:
+  /// A recorded robot goes where it went.
+  void follow() {
+    while (!ended_ && check_limits()) {
+      if (recorded_->has_ended())
+        end(ExplorationEnd::finished, "the recording is at its end");
+      else
+        move(Pose2());
+    }
+  }
+
   void begin() {
     LaserScan scan = parts_.world.begin(parts_.start);
     const std::optional<Pose2> truth = parts_.world.truth();
     start_ = truth.value_or(parts_.start.pose.value_or(Pose2()));
+    log(start_, scan, truth);
     slam_.begin(start_, std::move(scan), robot_.odometry, Pose2(robot_.step, 0.0, 0.0), truth);
     parts_.explorer.begin(parts_.start.seed);
     record(0.0);
-    if (slam_.map().known_cells() == 0) {
+    if (!recorded_ && slam_.map().known_cells() == 0) {
       end(ExplorationEnd::stuck,
           "no beam of the first scan has measured anything, so that no floor is known");
     }
+  }
+
+  void log(const Pose2& odometry, const LaserScan& scan, const std::optional<Pose2>& truth) {
+    if (!parts_.log) return;
+    auto& scans = parts_.log->scans;
+    constexpr double kSecondsPerMotion = 1.0;  // a run has no clock
+    scans.push_back({.stamp = kSecondsPerMotion * static_cast<double>(scans.size()),
+                     .odometry = odometry,
+                     .scan = scan,
+                     .truth = truth});
   }
 
   void note_once(const std::string& note) {
@@ -157,7 +192,15 @@ class Run {
       end(ExplorationEnd::limit, fmt::format("{} motions are made", limits.steps));
     } else if (decisions_ >= limits.decisions) {
       end(ExplorationEnd::limit, fmt::format("{} decisions are made", limits.decisions));
-    } else if (result_.steps.back().distance - useful_distance_ > limits.idle_distance) {
+    } else if (!recorded_) {
+      check_progress();
+    }
+    return !ended_;
+  }
+
+  void check_progress() {
+    const ExplorationLimits& limits = parts_.limits;
+    if (result_.steps.back().distance - useful_distance_ > limits.idle_distance) {
       end(ExplorationEnd::stuck,
           fmt::format("{:g} m were driven without finding more floor", limits.idle_distance));
     } else if (collisions_in_row_ >= kMostCollisions) {
@@ -168,7 +211,6 @@ class Run {
       end(ExplorationEnd::stuck,
           fmt::format("{} decisions in a row led to no motion", kMostEmptyDecisions));
     }
-    return !ended_;
   }
 
   Decision decide() {
@@ -230,6 +272,8 @@ class Run {
     const bool idle = std::max(driven, std::abs(step.odometry.theta())) < kNoMotion;
     idle_ = idle ? idle_ + 1 : 0;
     if (!step.collided && !backing_off_ && driven > robot_.radius) collisions_in_row_ = 0;
+    if (parts_.log && !parts_.log->scans.empty())
+      log(parts_.log->scans.back().odometry * step.odometry, step.scan, parts_.world.truth());
     const Pose2 expected = slam_.pose() * step.odometry;
     slam_.add(step.odometry, step.covariance, std::move(step.scan), parts_.world.truth());
     record(driven);
@@ -278,6 +322,7 @@ class Run {
 
   const Exploration& parts_;
   RobotModel robot_;
+  RecordedWorld* recorded_;  // null: it explores
   ScanSlam slam_;
   ExplorationResult result_;
   Pose2 start_;

@@ -2,11 +2,6 @@
 #include "cairn/exploration/map_log.hpp"
 
 #include <algorithm>
-#include <cmath>
-
-#include <fmt/core.h>
-
-#include "cairn/runtime/error.hpp"
 
 namespace cairn {
 
@@ -21,34 +16,26 @@ double duration(const ScanLog& log) {
 }  // namespace
 
 MappedLog map_log(const ScanLog& log, ScanSlam& slam, const MapLogOptions& options) {
-  if (log.scans.empty()) throw Error(ErrorCode::input, "the log has no scans");
-  const bool sees = std::ranges::any_of(
-      log.scans, [](const LoggedScan& logged) { return measured_beams(logged.scan) > 0; });
-  if (!sees) {
-    throw Error(ErrorCode::input,
-                fmt::format("no range of the {} scans of the log is a measurement: they are "
-                            "missing, not above zero, or so long that they count as none",
-                            log.scans.size()));
-  }
+  check_measurements(log);
   MappedLog result;
   result.duration = duration(log);
-  const LoggedScan* last = &log.scans.front();
-  slam.begin(last->odometry, last->scan, options.odometry, Pose2(options.step, 0.0, 0.0));
+  std::size_t last = 0;
+  slam.begin(log.scans.front().odometry, log.scans.front().scan, options.odometry,
+             Pose2(options.step, 0.0, 0.0));
   result.scans = 1;
-  for (std::size_t k = 1; k < log.scans.size(); ++k) {
+  while (true) {
     if (options.interrupt && *options.interrupt) {
       result.interrupted = true;
       break;
     }
-    const LoggedScan& next = log.scans[k];
-    const Pose2 motion = last->odometry.between(next.odometry);
-    const double length = motion.translation().norm();
-    if (length < options.step && std::abs(motion.theta()) < options.turn) continue;
-    slam.add(motion, options.odometry.covariance(motion), next.scan);
-    last = &next;
+    const std::size_t next = next_scan(log, last, options.step, options.turn);
+    if (next == log.scans.size()) break;
+    const Pose2 motion = log.scans[last].odometry.between(log.scans[next].odometry);
+    slam.add(motion, options.odometry.covariance(motion), log.scans[next].scan);
+    last = next;
     ++result.scans;
-    result.distance += length;
-    if (options.progress) options.progress(k + 1);
+    result.distance += motion.translation().norm();
+    if (options.progress) options.progress(next + 1);
   }
   result.converged = slam.finish();
   return result;

@@ -10,6 +10,10 @@
 #include <memory>
 #include <optional>
 #include <sstream>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
 
 #include <fmt/format.h>
 
@@ -81,29 +85,82 @@ std::optional<std::vector<double>> numbers(const std::string& line) {
   return all;
 }
 
-std::string without_tag(const std::string& line) { return line.substr(7); }
+/// A line that means something, without its tag.
+struct Line {
+  enum class Kind { scan, truth, range } kind;
+  std::string text;
+};
 
-/// The lines of scans.
-std::vector<std::string> scan_lines(std::string_view text) {
-  std::vector<std::string> lines;
+std::vector<Line> tagged_lines(std::string_view text) {
+  static const std::array<std::pair<std::string, Line::Kind>, 3> tags{
+      {{"FLASER ", Line::Kind::scan},
+       {"TRUEPOS ", Line::Kind::truth},
+       {"PARAM robot_front_laser_max ", Line::Kind::range}}};
+  std::vector<Line> lines;
   std::istringstream in{std::string(text)};
   for (std::string line; std::getline(in, line);) {
-    if (line.starts_with("FLASER ")) lines.push_back(without_tag(line));
+    for (const auto& [tag, kind] : tags) {
+      if (line.starts_with(tag)) lines.push_back({kind, line.substr(tag.size())});
+    }
   }
   return lines;
 }
 
+/// The first `count` words as numbers.
+std::optional<std::vector<double>> leading_numbers(std::string text, int count) {
+  for (char& c : text) {
+    if (c == '\v' || c == '\f' || c == '\0') c = '?';
+  }
+  std::istringstream words(text);
+  std::vector<double> all;
+  for (int k = 0; k < count; ++k) {
+    const std::optional<double> value = number(words);
+    if (!value) return std::nullopt;
+    all.push_back(*value);
+  }
+  return all;
+}
+
+struct ExpectedScan {
+  std::vector<double> numbers;
+  double range;
+  std::optional<std::vector<double>> truth;
+};
+
+/// False: the line is malformed.
+bool take(const Line& line, const Reader& from, std::vector<ExpectedScan>& scans, double& range,
+          std::optional<std::vector<double>>& truth) {
+  if (line.kind == Line::Kind::scan) {
+    const auto all = numbers(line.text);
+    if (!all) return false;
+    scans.push_back({*all, range, std::exchange(truth, std::nullopt)});
+    return true;
+  }
+  const auto values = leading_numbers(line.text, line.kind == Line::Kind::truth ? 3 : 1);
+  if (!values) return false;
+  if (line.kind == Line::Kind::truth) {
+    truth = values;
+    return std::ranges::all_of(*values, [](double value) { return std::abs(value) <= 1e9; });
+  }
+  range = std::min(from.range, values->front());
+  return values->front() > 0.0;
+}
+
 bool same(double a, double b) { return a == b || (std::isnan(a) && std::isnan(b)); }
 
-void expect_scan(const LoggedScan& scan, const std::vector<double>& expected,
-                 const Reader& reader) {
+void expect_scan(const LoggedScan& scan, const ExpectedScan& all, const Reader& reader) {
+  const std::vector<double>& expected = all.numbers;
   const std::size_t beams = expected.size() - 7;
-  expect(scan.scan.ranges.size() == beams && scan.scan.max_range == reader.range &&
+  expect(scan.truth.has_value() == all.truth.has_value() &&
+             (!scan.truth ||
+              (scan.truth->x() == all.truth->at(0) && scan.truth->y() == all.truth->at(1))),
+         [] { return "another truth"; });
+  expect(scan.scan.ranges.size() == beams && scan.scan.max_range == all.range &&
              std::isfinite(scan.scan.angle(beams - 1)),
          [&] { return fmt::format("a scan with {} beams", scan.scan.ranges.size()); });
   for (std::size_t k = 0; k < beams; ++k) {
     const double range =
-        expected[k] >= reader.none ? kNoMeasurement : std::min(expected[k], reader.range);
+        expected[k] >= reader.none ? kNoMeasurement : std::min(expected[k], all.range);
     expect(same(scan.scan.ranges[k], static_cast<float>(range)),
            [&] { return fmt::format("a range of {}, not {}", scan.scan.ranges[k], range); });
   }
@@ -153,20 +210,17 @@ void run(Bytes bytes) {
   Source source(bytes);
   const Reader& from = reader(source.byte());
   const std::string_view text = text_of(source.rest());
-  const std::vector<std::string> lines = scan_lines(text);
-  std::vector<std::vector<double>> expected;
+  const std::vector<Line> lines = tagged_lines(text);
+  std::vector<ExpectedScan> expected;
   std::size_t good = 0;
-  for (const std::string& line : lines) {
-    const auto all = numbers(line);
-    if (!all) break;
-    ++good;
-    expected.push_back(*all);
-  }
-  const bool sound = good == lines.size() && !lines.empty();
+  double range = from.range;
+  std::optional<std::vector<double>> truth;
+  while (good < lines.size() && take(lines[good], from, expected, range, truth)) ++good;
+  const bool sound = good == lines.size() && !expected.empty();
   ScanLog log;
   try {
     log = from.format->read(text, "input");
-    expect(sound, [&] { return "taken, but malformed: " + lines.at(good); });
+    expect(sound, [&] { return "taken, but malformed: " + lines.at(good).text; });
   } catch (const Error& error) {
     expect(error.code() == ErrorCode::input && std::string_view(error.what()).starts_with("input:"),
            [&] { return fmt::format("refused by: {}", error.what()); });
@@ -183,10 +237,14 @@ std::vector<std::string> seeds() {
                     odometry = "ODOM 0.1 0.2 0.3 0 0 0 0.5 host 0.1\n",
                     one = "FLASER 5 1.5 2.25 81.91 3 0.02 1 2 0.5 1 2 0.5 10.25 host 0.2\n",
                     two = "FLASER 4 1 2 -3 79.9 -1 -2 -0.5 0 0 0 11 host 0.3\n";
+  const std::string truth = "TRUEPOS 4 5 0.25 1 2 0.5 1 host 1\n",
+                    range = "PARAM robot_front_laser_max 8 0 cairn 0\n";
   std::string wide = "FLASER 181";
   for (int k = 0; k < 181; ++k) wide += fmt::format(" {:.2f}", 2.0 + 0.01 * (k % 30));
   wide += " 0 0 0 0 0 0 1 host 1\n";
   return {'\0' + head + odometry + one + odometry + two,
+          '\0' + range + truth + one + two + range,
+          '\1' + truth + truth + one + truth,
           '\1' + one + two,
           '\2' + one + two + one,
           '\0' + wide,
@@ -206,6 +264,8 @@ std::vector<std::string> words() {
           "ODOM ",
           "PARAM ",
           "ROBOTLASER1 ",
+          "TRUEPOS ",
+          "\nPARAM robot_front_laser_max ",
           " 0 0 0 0 0 0 0 h 0\n",
           "\r\n",
           "\t",

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <string>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -10,6 +12,7 @@
 #include "cairn/exploration/map_truth.hpp"
 #include "cairn/exploration/scan_log.hpp"
 #include "cairn/grid/ray_caster.hpp"
+#include "cairn/io/random_numbers.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
 #include "unit/lib/exploration/drawn_map.hpp"
@@ -66,6 +69,84 @@ TEST(Carmen, WhatCannotBeReadIsNamedWithItsLine) {
   EXPECT_THAT(refusal("ROBOTLASER1 0 -1.57 3.14"), HasSubstr("ROBOTLASER1 lines are not"));
   EXPECT_THAT(refusal("\nFLASER 1 2 1e300 0 0 0 0 0 1 h 1"), HasSubstr("a.clf:2: x is 1e+300"));
   EXPECT_THAT(refusal("FLASER 1 2 0 0 -1e300 0 0 0 1 h 1"), HasSubstr("theta is -1e+300"));
+}
+
+TEST(Carmen, WhatIsWrittenIsReadAgain) {
+  ScanLog log;
+  RandomNumbers random(3);
+  for (int k = 0; k < 5; ++k) {
+    LoggedScan logged{.stamp = 1.5 * k,
+                      .odometry = {random.gaussian(), random.gaussian(), random.gaussian()},
+                      .scan = {.first_angle = -0.5 * pi,
+                               .angle_step = pi / 180.0,
+                               .max_range = k < 3 ? 8.0 : 12.5,
+                               .ranges = {}}};
+    for (int beam = 0; beam <= 180; ++beam)
+      logged.scan.ranges.push_back(static_cast<float>(8.0 * random.uniform()));
+    logged.scan.ranges[3] = 8.0F;
+    logged.scan.ranges[7] = std::numeric_limits<float>::quiet_NaN();
+    if (k != 2) logged.truth = Pose2(random.gaussian(), random.gaussian(), 0.1 * k);
+    log.scans.push_back(logged);
+  }
+  const auto format = Registry().make<ScanLogFormat>(parse_component("carmen"));
+  const ScanLog again = format->read(format->write(log), "again");
+  ASSERT_EQ(again.scans.size(), log.scans.size());
+  for (std::size_t k = 0; k < log.scans.size(); ++k) {
+    const LoggedScan &a = log.scans[k], &b = again.scans[k];
+    EXPECT_EQ(a.stamp, b.stamp);
+    EXPECT_EQ(a.odometry.state(), b.odometry.state());
+    EXPECT_EQ(a.scan.max_range, b.scan.max_range);
+    EXPECT_NEAR(a.scan.angle(180), b.scan.angle(180), 1e-12);
+    ASSERT_EQ(a.truth.has_value(), b.truth.has_value()) << k;
+    if (a.truth) EXPECT_EQ(a.truth->state(), b.truth->state());
+    for (std::size_t beam = 0; beam < a.scan.ranges.size(); ++beam) {
+      const float x = a.scan.ranges[beam], y = b.scan.ranges[beam];
+      EXPECT_TRUE(x == y || (std::isnan(x) && std::isnan(y))) << x << " " << y;
+    }
+  }
+}
+
+TEST(Carmen, ScansThatItCannotHoldAreRefused) {
+  const auto refusal = [](const LidarModel& lidar) -> std::string {
+    ScanLog log;
+    log.scans.push_back(
+        {.odometry = {},
+         .scan = {.first_angle = lidar.first_angle(),
+                  .angle_step = lidar.step(),
+                  .max_range = lidar.range,
+                  .ranges = std::vector<float>(static_cast<std::size_t>(lidar.beams), 1.0F)}});
+    try {
+      Registry().make<ScanLogFormat>(parse_component("carmen"))->write(log);
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ErrorCode::usage);
+      return error.what();
+    }
+    return "written";
+  };
+  EXPECT_EQ(refusal({}), "written");
+  EXPECT_THAT(refusal({.aperture = 1.5 * pi}), HasSubstr("181 beams over 270°"));
+  EXPECT_THAT(refusal({.beams = 180}), HasSubstr("an odd number of beams over 180°"));
+  EXPECT_THAT(refusal({.beams = 1}), HasSubstr("1 beams"));
+  EXPECT_THAT(refusal({.range = 100.0}), HasSubstr("less than 80 m"));
+}
+
+TEST(Carmen, TruthAndRangeAreThoseOfTheScansBehind) {
+  const std::string scan = "FLASER 3 1 9 30 1 2 0.5 0 0 0 1 h 1\n";
+  const ScanLog log =
+      read(scan + "PARAM robot_front_laser_max 8 1 h 1\nTRUEPOS 4 5 0.25 0 0 0 1 h 1\n" + scan +
+           scan + "PARAM robot_front_laser_max 50 1 h 1\n" + scan);
+  ASSERT_EQ(log.scans.size(), 4U);
+  EXPECT_EQ(log.scans[0].scan.max_range, 20.0);
+  EXPECT_EQ(log.scans[1].scan.max_range, 8.0);
+  EXPECT_EQ(log.scans[1].scan.ranges[1], 8.0F);
+  EXPECT_EQ(log.scans[3].scan.max_range, 20.0);  // no farther than it is trusted
+  EXPECT_FALSE(log.scans[0].truth);
+  ASSERT_TRUE(log.scans[1].truth);
+  EXPECT_EQ(log.scans[1].truth->y(), 5.0);
+  EXPECT_FALSE(log.scans[2].truth);
+  EXPECT_THAT(refusal(scan + "TRUEPOS 1 x 2\n"), HasSubstr("a.clf:2: 'x' is no finite number"));
+  EXPECT_THAT(refusal("PARAM robot_front_laser_max 0 1 h 1\n" + scan),
+              HasSubstr("a.clf:1: 0 is no range of a laser"));
 }
 
 ScanSlam slam_of(Registry& registry, PosePolicy& policy, Registration& matcher, Mapper& mapper) {

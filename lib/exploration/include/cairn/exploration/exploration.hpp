@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -13,12 +14,14 @@
 #include "cairn/exploration/explorer.hpp"
 #include "cairn/exploration/floor_map.hpp"
 #include "cairn/exploration/map_truth.hpp"
+#include "cairn/exploration/scan_log.hpp"
 #include "cairn/exploration/scan_slam.hpp"
 #include "cairn/exploration/world.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/policy/pose_policy.hpp"
 #include "cairn/policy/registration.hpp"
 #include "cairn/runtime/api.hpp"
+#include "cairn/types/loss.hpp"
 
 namespace cairn {
 
@@ -101,12 +104,21 @@ struct Exploration {
   /// The same with all that a recording holds: graph and map as the explorer would be given them,
   /// and the scan that was taken at the end of the motion.
   std::function<void(const ExplorationStep&, const Situation&, const LaserScan&)> scanned = {};
+  /// As in `ScanSlamParts`: for odometry of real wheels, and for matches that may be wrong.
+  bool match_consecutive = false;
+  std::shared_ptr<const Loss> loop_loss = nullptr;
+  /// The motions as odometry has them, and all scans, with the true poses if they are known. None:
+  /// they are not wanted.
+  ScanLog* log = nullptr;
 };
 
 /// Explores: decides, drives along the path that was chosen, and maps, until nothing is left to
 /// explore or a limit is reached. A path is given up, and the explorer asked again, when an
 /// obstacle is seen on it, when the robot collides, or when a loop closure moves the estimate by
 /// more than a cell of the map.
+///
+/// A world that is `RecordedWorld` goes where it went, until its recording ends, and the explorer
+/// is not asked.
 ///
 /// Each motion is a pose of the graph with a relative factor from odometry; the policy decides
 /// which are kept and which are registered with each other (thesis, 5.1). Throws `Error` as its
