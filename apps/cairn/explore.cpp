@@ -164,6 +164,7 @@ void check_single(const ExploreOptions& options) {
                                               {"--steps", !options.steps.empty()},
                                               {"--log", !options.log.empty()},
                                               {"--record", !options.recording.record.empty()},
+                                              {"--serve", options.recording.port.has_value()},
                                               {"--live", options.live}};
   for (const auto& [option, given] : single) {
     if (given) {
@@ -317,7 +318,7 @@ int run_explore(const ExploreOptions& options, Session& session) {
   const InterruptGuard guard;  // until the results are written
   ExploreProgress progress(options, session);
   const ExploreParts parts = parts_of(options);
-  RunRecording recording(options.recording, recorded_run(options, parts, *world));
+  RunRecording recording(options.recording, recorded_run(options, parts, *world), session);
   Exploration exploration{
       .world = *world,
       .policy = *policy,

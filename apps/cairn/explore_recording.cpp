@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "explore_recording.hpp"
 
+#include <cstddef>
+#include <cstdint>
+#include <string_view>
 #include <utility>
 
 #include <fmt/core.h>
@@ -8,6 +11,7 @@
 #include "album.hpp"
 #include "cairn/exploration/recording.hpp"
 #include "cairn/plugin/registry.hpp"
+#include "cairn/report/packed_array.hpp"
 #include "cairn/runtime/error.hpp"
 #include "graph_files.hpp"
 #include "picture_files.hpp"
@@ -21,27 +25,56 @@ void add_recording_options(ArgumentParser cli, RunRecordingOptions& options) {
   cli.add_option("--html", options.page,
                  "the same as a page for the browser, or of a comparison its tables and curves")
       .type_name("PAGE");
+  cli.add_option("--serve", options.port,
+                 "show it while the run goes on, to browsers on this machine: "
+                 "http://127.0.0.1:PORT/; 0: any port that is free")
+      .type_name("PORT")
+      .within(0, 65535);
 }
 
 void check_recording(const RunRecordingOptions& options, Session& session) {
   if (options.record == "-")
     throw Error(ErrorCode::usage, "--record writes to a file, not to standard output; name one");
   check_file(options.record, session);
-  if (options.page.empty()) return;
+  if (options.page.empty() && !options.port) return;
   if (!session.registry().has(Picture::kKind, "html")) {
     throw Error(ErrorCode::plugin,
-                "no plugin makes reports here: cairn was built without apps/report/dist and "
-                "without npm; leave out --html");
+                fmt::format("no plugin makes reports here: cairn was built without "
+                            "apps/report/dist and without npm; leave out {}",
+                            options.page.empty() ? "--serve" : "--html"));
   }
-  check_file(options.page, session);
+  if (!options.page.empty()) check_file(options.page, session);
 }
 
-RunRecording::RunRecording(const RunRecordingOptions& options, const RecordedRun& run)
+RunRecording::RunRecording(const RunRecordingOptions& options, const RecordedRun& run,
+                           Session& session)
     : options_(options), name_(run.name) {
-  if (options.record.empty() && options.page.empty()) return;
+  if (options.record.empty() && options.page.empty() && !options.port) return;
+  if (options.port) serve(session);
   ExplorationRecorder::Each each;
-  if (!options.page.empty()) each = [this](std::string_view line) { text_ += line; };
+  if (!options.page.empty() || options.port) {
+    each = [this](std::string_view line) {
+      if (!options_.page.empty()) text_ += line;
+      if (server_) server_->add(line);
+    };
+  }
   recorder_.emplace(options.record, run, std::move(each));
+}
+
+/// The page that `cairn view` makes, which asks for the lines of the run instead of having them.
+void RunRecording::serve(Session& session) {
+  Album album = begin_album(name_, "cairn explore --serve");
+  album.explorations.push_back(
+      fmt::format(R"({{"name":{},"complete":false,"header":{{}},"lines":[],"live":"lines"}})",
+                  json_string(name_)));
+  std::string page = draw_picture(album, {"html", {}}, session);
+  // A page in a file may ask nobody for anything; this one asks where it comes from.
+  constexpr std::string_view kPolicy = "Content-Security-Policy\" content=\"";
+  const std::size_t at = page.find(kPolicy);
+  if (at != std::string::npos) page.insert(at + kPolicy.size(), "connect-src 'self'; ");
+  server_ = std::make_unique<RunServer>(static_cast<std::uint16_t>(*options_.port));
+  server_->show(std::move(page));
+  session.note(fmt::format("follow the run at http://127.0.0.1:{}/", server_->port()));
 }
 
 void RunRecording::follow(Exploration& exploration) {
@@ -57,7 +90,10 @@ void RunRecording::follow(Exploration& exploration) {
 
 void RunRecording::write(const ExplorationResult& result, Results& results, Session& session) {
   if (!recorder_) return;
-  results.add([&] { recorder_->finish(result); });
+  results.add([&] {
+    recorder_->finish(result);
+    if (server_) server_->finish();
+  });
   results.write(options_.page, [&] { write_page(session); });
 }
 

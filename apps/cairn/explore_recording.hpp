@@ -1,29 +1,33 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 
 #include "arguments.hpp"
 #include "cairn/exploration/exploration.hpp"
 #include "cairn/exploration/recorder.hpp"
+#include "cairn/exploration/run_server.hpp"
 #include "results.hpp"
 #include "session.hpp"
 
 namespace cairn::app {
 
-/// `--record` and `--html` of `cairn explore`.
+/// `--record`, `--html` and `--serve` of `cairn explore`.
 struct RunRecordingOptions {
   std::string record, page;
+  std::optional<std::int64_t> port;  ///< 0: any that is free
 };
 void add_recording_options(ArgumentParser cli, RunRecordingOptions& options);
 /// Finds out before the run whether both can be written. Throws `Error`.
 void check_recording(const RunRecordingOptions& options, Session& session);
 
-/// The recording of a run, and its page, where they are asked for.
+/// The recording of a run, and its page, where they are asked for: at the end, or while it goes on.
 class RunRecording {
  public:
-  RunRecording(const RunRecordingOptions& options, const RecordedRun& run);
+  RunRecording(const RunRecordingOptions& options, const RecordedRun& run, Session& session);
   RunRecording(const RunRecording&) = delete;
   RunRecording& operator=(const RunRecording&) = delete;
 
@@ -33,11 +37,13 @@ class RunRecording {
   void write(const ExplorationResult& result, Results& results, Session& session);
 
  private:
+  void serve(Session& session);
   void write_page(Session& session) const;
 
   const RunRecordingOptions& options_;
   std::string name_;
   std::string text_;  // for the page
+  std::unique_ptr<RunServer> server_;
   std::optional<ExplorationRecorder> recorder_;
 };
 

@@ -1,13 +1,19 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // cairn explore --record and --html, and what cairn view and cairn plot make of recordings.
+#include <chrono>
+#include <cstdint>
+#include <future>
 #include <regex>
 #include <string>
+#include <thread>
 #include <vector>
 
+#include <fmt/core.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "integration/exploration_commands.hpp"
+#include "support/http_client.hpp"
 
 namespace cairn::test {
 namespace {
@@ -57,6 +63,41 @@ TEST_F(ExploreRecording, DiffersInTimesAloneWhateverTheNumberOfThreads) {
   ASSERT_EQ(explore({"--record", first, "--threads", "1"}).exit_code, 0);
   ASSERT_EQ(explore({"--record", second, "--threads", "3"}).exit_code, 0);
   EXPECT_EQ(without_times(first), without_times(second));
+}
+
+/// What a browser does: the page, and then lines until the end.
+std::vector<std::string> follow(std::uint16_t port, std::string& page) {
+  std::vector<std::string> all;
+  for (int tries = 0; tries < 6000; ++tries) {
+    if (page.empty()) page = http_get(port, "/").body;
+    const HttpAnswer answer =
+        page.empty() ? HttpAnswer{} : http_get(port, fmt::format("/lines?from={}", all.size()));
+    for (const std::string& line : lines(answer.body)) all.push_back(line);
+    if (!all.empty() && all.back().starts_with("{\"end\"")) break;
+    if (answer.status == 0) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  return all;
+}
+
+TEST_F(ExploreRecording, IsServedWhileItIsWritten) {
+  const std::string record = folder_.file("run.jsonl");
+  const std::uint16_t port = free_port();
+  std::string page;
+  auto lines_served = std::async(std::launch::async, [&] { return follow(port, page); });
+  const Outcome run = explore({"--record", record, "--serve", std::to_string(port)});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_THAT(run.err, HasSubstr(fmt::format("http://127.0.0.1:{}/", port)));
+  EXPECT_EQ(lines_served.get(), lines(read_text(record)));
+  EXPECT_THAT(page, AllOf(HasSubstr("\"live\":\"lines\""), HasSubstr("connect-src 'self'")));
+  EXPECT_EQ(http_get(port, "/").status, 0);
+}
+
+TEST_F(ExploreRecording, IsServedOfOneRunAtAPortThatIsOne) {
+  EXPECT_EQ(explore({"--serve", "70000"}).exit_code, 2);
+  const Outcome several = explore({"--serve", "0", "--runs", "2"});
+  EXPECT_EQ(several.exit_code, 2);
+  EXPECT_THAT(unfolded(several.err), HasSubstr("--serve is of one run"));
+  EXPECT_THAT(explore({"--serve", "0"}).err, HasSubstr("follow the run at http://127.0.0.1:"));
 }
 
 TEST_F(ExploreRecording, ThatWasCutShortIsShownAndSaid) {

@@ -5,6 +5,7 @@ import type { ReportJson } from "./data/contract";
 import { DataError } from "./data/decode";
 import { Exploration } from "./data/exploration";
 import { decodeGraph, type Graph } from "./data/graph";
+import { linesOf } from "./data/live";
 import { App } from "./ui/app";
 import { el } from "./ui/dom";
 
@@ -26,11 +27,34 @@ function read(): ReportJson {
   return report;
 }
 
+/** A run that goes on: shown from its first motion, and followed. */
+async function follow(report: ReportJson, root: HTMLElement): Promise<void> {
+  const exploration = report.explorations![0];
+  let app: App | null = null;
+  for await (const lines of linesOf(exploration.live!)) {
+    if (app) {
+      await app.grow(lines);
+      continue;
+    }
+    exploration.lines.push(...lines);
+    if (!exploration.lines.some((line) => line.step !== undefined)) continue;
+    app = new App(report, [], [await Exploration.decode(exploration, 0)]);
+    root.replaceChildren(app.build());
+    document.documentElement.dataset.ready = "true";
+  }
+  if (!app) throw new DataError("The run has ended before the page was loaded.");
+  document.documentElement.dataset.ended = "true";
+}
+
 async function start(): Promise<void> {
   const root = document.getElementById("app")!;
   root.replaceChildren(el("p", { class: "loading", role: "status" }, "Reading …"));
   try {
     const report = read();
+    if (report.explorations?.[0]?.live !== undefined) {
+      await follow(report, root);
+      return;
+    }
     const graphs: Graph[] = [];
     for (const [k, graph] of (report.graphs ?? []).entries()) graphs.push(await decodeGraph(graph, k));
     const explorations: Exploration[] = [];

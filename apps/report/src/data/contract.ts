@@ -227,6 +227,8 @@ export interface ExplorationJson {
   complete?: boolean;
   header?: ExplorationHeaderJson;
   lines: ExplorationLineJson[];
+  /** Of a run that goes on: where further lines come from, `?from=N` those from number N on. */
+  live?: string;
 }
 
 export interface ReportJson {

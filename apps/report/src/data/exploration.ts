@@ -113,7 +113,7 @@ export class Exploration {
   private readonly changes: GraphChange[] = [];
   private readonly checkpoints = new Map<number, GraphState>();
 
-  private constructor(readonly name: string, readonly header: ExplorationHeaderJson, readonly complete: boolean) {}
+  private constructor(readonly name: string, readonly header: ExplorationHeaderJson, public complete: boolean) {}
 
   static async decode(json: ExplorationJson, number: number): Promise<Exploration> {
     const where = `exploration ${number + 1}`;
@@ -123,6 +123,12 @@ export class Exploration {
     if (made.moments.length === 0) throw new DataError(`${where}: not even the start was recorded`);
     made.map.finish();
     return made;
+  }
+
+  /** More lines of a run that goes on. */
+  async append(lines: ExplorationLineJson[]): Promise<void> {
+    for (const line of lines) await this.add(line, `a further line, after ${this.moments.length} motions`);
+    this.map.finish();
   }
 
   /** The decision that the robot follows, or makes, at moment `k`; null before the first. */
@@ -187,6 +193,7 @@ export class Exploration {
     const last = this.moments.at(-1);
     if (!last) throw new DataError(`${where}: the end before the start`);
     this.end = String(line.end);
+    this.complete = true;
     this.why = String(line.why ?? "");
     this.notes = (line.notes ?? []).map(String);
     this.moments.push({ ...last, label: "end", time: finite(line.time) });

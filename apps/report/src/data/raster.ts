@@ -61,9 +61,13 @@ export class Raster {
     this.which.push(this.maps.length - 1);
   }
 
-  /** After the last change. */
+  /** After the last change; again after further ones. */
   finish(): void {
-    for (const map of this.maps) map.values = new Uint8Array(map.width * map.height).fill(kUnknown);
+    const grown = this.maps.filter((map) => map.values.length !== map.width * map.height);
+    if (grown.length === 0) return;
+    for (const map of grown) map.values = new Uint8Array(map.width * map.height).fill(kUnknown);
+    this.checkpoints.clear();
+    this.now = -1;
   }
 
   at(k: number): Cells {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The page: what it holds, in tabs.
-import type { ReportJson } from "../data/contract";
+import type { ExplorationLineJson, ReportJson } from "../data/contract";
 import type { Exploration } from "../data/exploration";
 import type { Graph } from "../data/graph";
 import { aboutView } from "./about";
@@ -41,6 +41,8 @@ export class App {
   private readonly curves = el("div", { class: "scroll" });
   private readonly decisions = el("div", { class: "scroll" });
   private explorationTitle: HTMLElement = el("span", {});
+  /** Curves and decisions lack what came since they were made. */
+  private stale = false;
 
   constructor(private readonly report: ReportJson, private readonly graphs: Graph[], private readonly explorations: Exploration[]) {}
 
@@ -89,6 +91,27 @@ export class App {
 
   private explore(exploration: Exploration): void {
     this.explored.show(exploration);
+    this.fill(exploration);
+  }
+
+  /** More of a run that goes on, the only one of the page. */
+  async grow(lines: ExplorationLineJson[]): Promise<void> {
+    const exploration = this.explorations[0];
+    await exploration.append(lines);
+    this.explored.grow();
+    this.stale = true;
+    this.refill();
+  }
+
+  /** What is not seen can wait. */
+  private refill(): void {
+    const seen = this.tabs.some((tab) => !tab.panel.hidden && kExplorationTabs.indexOf(tab.name) > 0);
+    if (!this.stale || !seen) return;
+    this.stale = false;
+    this.fill(this.explorations[0]);
+  }
+
+  private fill(exploration: Exploration): void {
     this.curves.replaceChildren(curvesView(exploration));
     this.decisions.replaceChildren(decisionsView(exploration, (decision) => {
       this.open(kExplorationTabs[0]);
@@ -124,6 +147,7 @@ export class App {
     const ofOneGraph = wanted === "Map" || wanted === "Runs";
     this.title.hidden = this.counts.hidden = !ofOneGraph;
     this.explorationTitle.hidden = !kExplorationTabs.includes(wanted);
+    this.refill();
   }
 
   private show(graph: Graph): void {

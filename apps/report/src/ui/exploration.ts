@@ -48,6 +48,9 @@ export class ExplorationView {
   private speed = 1;
   private requested = false;
   private fitted = false;
+  /** By hand: then the view stays where it is while the run goes on. */
+  private placed = false;
+  private layersThere = "";
   private readonly shown = Object.fromEntries(kFloorLayers.map((layer) => [layer, true])) as Shown;
   private readonly canvas = el("canvas", { class: "floor graph-like", tabindex: 0, role: "application", "aria-roledescription": "map" });
   private readonly drawing = new FloorDrawing(this.canvas);
@@ -98,6 +101,19 @@ export class ExplorationView {
     if (this.canvas.clientWidth > 0) this.fit();
   }
 
+  /** The run has gone on; who sees its end goes on, too. */
+  grow(): void {
+    const { exploration } = this;
+    if (!exploration) return;
+    const sawEnd = this.at === Number(this.slider.max) && !this.playing;
+    this.slider.max = String(exploration.moments.length - 1);
+    this.outline();
+    if (JSON.stringify(this.there(exploration)) !== this.layersThere) this.buildLayers();
+    if (sawEnd) this.go(exploration.moments.length - 1);
+    else this.refresh();
+    if (!this.placed && this.canvas.clientWidth > 0) this.fit();
+  }
+
   /** Shows the moment of a decision. */
   open(decision: Decision): void {
     this.playing = false;
@@ -112,6 +128,7 @@ export class ExplorationView {
     });
     this.canvas.addEventListener("pointermove", (event) => {
       if (!from) return;
+      this.placed = true;
       this.drawing.pan(event.clientX - from.x, event.clientY - from.y);
       from = { x: event.clientX, y: event.clientY };
       this.draw();
@@ -119,6 +136,7 @@ export class ExplorationView {
     for (const end of ["pointerup", "pointercancel"]) this.canvas.addEventListener(end, () => (from = null));
     this.canvas.addEventListener("wheel", (event) => {
       event.preventDefault();
+      this.placed = true;
       const box = this.canvas.getBoundingClientRect();
       const lines = event.deltaMode === 1 ? 16 : event.deltaMode === 2 ? 100 : 1;
       this.drawing.zoom(Math.exp(-Math.max(-0.5, Math.min(0.5, event.deltaY * lines * 0.0015))), event.clientX - box.left, event.clientY - box.top);
@@ -130,6 +148,7 @@ export class ExplorationView {
   private key(event: KeyboardEvent): void {
     if (event.ctrlKey || event.metaKey || event.altKey) return;
     const arrows: Record<string, [number, number]> = { ArrowLeft: [40, 0], ArrowRight: [-40, 0], ArrowUp: [0, 40], ArrowDown: [0, -40] };
+    if (event.key in arrows || event.key === "+" || event.key === "=" || event.key === "-") this.placed = true;
     if (event.key in arrows) this.drawing.pan(...arrows[event.key]);
     else if (event.key === "+" || event.key === "=") this.drawing.zoom(1.2);
     else if (event.key === "-") this.drawing.zoom(1 / 1.2);
@@ -143,6 +162,7 @@ export class ExplorationView {
   }
 
   private zoom(factor: number): void {
+    this.placed = true;
     this.drawing.zoom(factor);
     this.draw();
   }
@@ -150,6 +170,7 @@ export class ExplorationView {
   private fit(): void {
     if (!this.exploration) return;
     this.fitted = true;
+    this.placed = false;
     this.drawing.fit(this.exploration);
     this.draw();
   }
@@ -285,13 +306,18 @@ export class ExplorationView {
       ...(scale ? [el("p", { class: "hint" }, `values from ${number(scale.best, 4)} (best, strongest colour) to ${number(scale.worst, 4)}`)] : []));
   }
 
-  private buildLayers(): void {
-    const { exploration } = this;
-    if (!exploration) return;
-    const there: Partial<Record<FloorLayer, boolean>> = {
+  private there(exploration: Exploration): Partial<Record<FloorLayer, boolean>> {
+    return {
       truth: exploration.moments.some((m) => m.truth), tree: exploration.decisions.some((d) => d.tree),
       scan: exploration.moments.some((m) => m.scan), ellipse: exploration.moments.some((m) => m.covariance),
     };
+  }
+
+  private buildLayers(): void {
+    const { exploration } = this;
+    if (!exploration) return;
+    const there = this.there(exploration);
+    this.layersThere = JSON.stringify(there);
     const id = freshId("section");
     this.layers.setAttribute("aria-labelledby", id);
     this.layers.replaceChildren(el("h2", { id }, "Shown"), el("ul", { class: "rows" }, ...kFloorLayers.filter((layer) => there[layer] !== false).map((layer) =>

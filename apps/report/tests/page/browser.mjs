@@ -18,8 +18,9 @@ export async function launch() {
   });
 }
 
-/** Opens a file and watches over it; `guard.check()` asserts that nothing went wrong up to then. */
+/** Opens a file, or what a server has, and watches over it: only that server may be asked. `guard.check()` asserts that nothing went wrong up to then. */
 export async function open(browser, file, options = {}) {
+  const served = file.startsWith("http://127.0.0.1");
   const context = await browser.newContext({ viewport: { width: 1360, height: 860 }, acceptDownloads: true, reducedMotion: "reduce", ...options });
   const page = await context.newPage();
   const wrong = [];
@@ -30,14 +31,14 @@ export async function open(browser, file, options = {}) {
     void dialog.dismiss();
   });
   page.on("request", (request) => {
-    if (!/^(file|blob|data):/.test(request.url())) wrong.push(`request: ${request.url()}`);
+    if (!/^(file|blob|data):/.test(request.url()) && !request.url().startsWith(served ? file : "file:")) wrong.push(`request: ${request.url()}`);
   });
   page.on("websocket", (socket) => wrong.push(`socket: ${socket.url()}`));
   await page.addInitScript(() => {
     window.violations = [];
     document.addEventListener("securitypolicyviolation", (e) => window.violations.push(`${e.violatedDirective} ${e.blockedURI}`));
   });
-  await page.goto(`file://${file}`);
+  await page.goto(served ? file : `file://${file}`);
   await page.waitForSelector("html[data-ready], [role=alert]", { timeout: 120000 });
   const guard = {
     async check() {

@@ -3,6 +3,7 @@
 // With pages that the program wrote, only what any page must stand; without, everything, on made-up data.
 import assert from "node:assert/strict";
 import { mkdirSync, readFileSync, statSync, writeFileSync } from "node:fs";
+import { createServer } from "node:http";
 import { fileURLToPath } from "node:url";
 import { resolve } from "node:path";
 import { differing, inkShare, launch, open, picture, settled } from "./browser.mjs";
@@ -103,6 +104,46 @@ const tests = {
     assert.equal(differing(result, await picture(page)), 0, "the result is as it was");
     await guard.check();
     await guard.close();
+  },
+
+  async "a run that goes on is followed, unless the slider was moved"(browser) {
+    const whole = made.exploration();
+    const lines = whole.lines.map((line) => `${JSON.stringify(line)}\n`);
+    let there = 4;
+    const html = made.embed(template, made.report({ explorations: [{ ...whole, lines: [], complete: false, live: "lines" }] }))
+      .replace('Content-Security-Policy" content="', (start) => `${start}connect-src 'self'; `);
+    const server = createServer((request, response) => {
+      const from = new URL(request.url, "http://localhost").searchParams.get("from");
+      if (from === null) return response.writeHead(200, { "Content-Type": "text/html" }).end(html);
+      setTimeout(() => response.end(lines.slice(Number(from) - 1, there).join("")), 20);
+    });
+    await new Promise((done) => server.listen(0, "127.0.0.1", done));
+    const { page, guard } = await open(browser, `http://127.0.0.1:${server.address().port}/`);
+    const motions = (count) => lines.slice(0, count).filter((line) => line.includes('"step"') || line.includes('"end"')).length;
+    const shows = (moment) => page.waitForFunction((k) => document.querySelector("canvas.floor").dataset.moment === String(k), moment, { timeout: 30000 });
+    await shows(motions(4) - 1);
+    there = 20;
+    await shows(motions(20) - 1);
+    assert.equal(await page.getByRole("slider").getAttribute("max"), String(motions(20) - 1));
+    const before = await picture(page);
+    await page.getByRole("button", { name: "One motion back" }).click();
+    await shows(motions(20) - 2);
+    there = 30;
+    await page.waitForFunction((k) => document.querySelector("input[type=range]").max === String(k), motions(30) - 1, { timeout: 30000 });
+    await shows(motions(20) - 2);
+    await page.getByRole("tab", { name: "Curves" }).click();
+    await page.getByRole("tab", { name: "Decisions" }).click();
+    const rows = await page.locator(".decisions tbody tr").count();
+    there = lines.length;
+    await page.waitForSelector("html[data-ended]", { timeout: 30000, state: "attached" });
+    assert(await page.locator(".decisions tbody tr").count() > rows, "decisions that were made since");
+    await page.getByRole("tab", { name: "Exploration" }).click();
+    await page.getByRole("slider").press("End");
+    await shows(motions(lines.length) - 1);
+    assert(differing(before, await picture(page)) > 0.01, "the end is another picture");
+    await guard.check();
+    await guard.close();
+    server.close();
   },
 
   async "an exploration: every control works, and every switch and motion changes the picture"(browser) {

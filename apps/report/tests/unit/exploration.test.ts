@@ -22,6 +22,26 @@ function changing(steps: number): ExplorationJson {
 }
 
 describe("an exploration", () => {
+  test("that goes on is what one that was read at once is", async () => {
+    const whole = changing(120);
+    const lines = [...whole.lines, { end: "limit", why: "120 motions are made" } as ExplorationLineJson];
+    const grown = await Exploration.decode({ ...whole, lines: lines.slice(0, 5) }, 0);
+    for (let k = 5; k < lines.length; k += 7) {
+      grown.cells(grown.moments.length - 1);  // what has been looked at must not be kept
+      grown.graph(grown.moments.length - 1);
+      expect(grown.complete).toBe(false);
+      await grown.append(lines.slice(k, k + 7));
+    }
+    const read = await Exploration.decode({ ...whole, lines }, 0);
+    expect(grown.complete).toBe(true);
+    expect(grown.why).toBe(read.why);
+    expect(grown.moments).toEqual(read.moments);
+    for (const k of [0, 120, 40, 64, 7]) {
+      expect(grown.cells(k)).toEqual(read.cells(k));
+      expect(grown.graph(k)).toEqual(read.graph(k));
+    }
+  });
+
   test("is at every moment what its lines add up to, in whatever order moments are asked for", async () => {
     const exploration = await Exploration.decode(changing(120), 0);
     for (const k of [0, 119, 64, 65, 31, 32, 33, 3, 118, 0]) {

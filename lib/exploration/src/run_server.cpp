@@ -1,0 +1,291 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "cairn/exploration/run_server.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <chrono>
+#include <cstddef>
+#include <exception>
+#include <future>
+#include <list>
+#include <optional>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include <fmt/core.h>
+
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/post.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/beast/core/flat_buffer.hpp>
+#include <boost/beast/core/tcp_stream.hpp>
+#include <boost/beast/http.hpp>
+
+#include "cairn/runtime/error.hpp"
+
+namespace cairn {
+namespace {
+
+namespace asio = boost::asio;
+namespace beast = boost::beast;
+namespace http = beast::http;
+using asio::ip::tcp;
+using boost::system::error_code;
+using Request = http::request<http::empty_body>;
+using Response = http::response<http::string_body>;
+
+constexpr std::chrono::seconds kIdle{60};      // without a request, and for one to be read
+constexpr std::chrono::seconds kLongPoll{20};  // until an answer without lines
+constexpr std::chrono::milliseconds kPauseOfAccepting{100};  // where no more sockets can be had
+constexpr std::chrono::milliseconds kLookAtFollowers{20};
+constexpr std::size_t kMostConnections = 64;
+constexpr std::size_t kMostOfAnAnswer = std::size_t{4} << 20;  // [bytes], and one line more
+constexpr std::uint32_t kMostOfAHeader = 16384;                // [bytes]
+
+/// N of /lines?from=N; none: it is another request.
+std::optional<std::size_t> first_line(std::string_view target) {
+  constexpr std::string_view kLines = "/lines?from=";
+  if (!target.starts_with(kLines)) return std::nullopt;
+  const std::string_view number = target.substr(kLines.size());
+  std::size_t from = 0;
+  const auto [end, problem] = std::from_chars(number.data(), number.data() + number.size(), from);
+  if (problem != std::errc{} || end != number.data() + number.size()) return std::nullopt;
+  return from;
+}
+
+Response text_response(http::status status, std::string body, const char* type = "text/plain") {
+  Response response{status, 11};
+  response.set(http::field::content_type, fmt::format("{}; charset=utf-8", type));
+  response.body() = std::move(body);
+  return response;
+}
+
+/// What the thread that serves knows; nothing else touches it.
+struct Run {
+  std::string page;
+  std::vector<std::string> lines;
+  bool ended = false;
+  std::size_t fetched = 0;  ///< lines that one who follows has got, the most
+  bool followed = false;
+
+  std::string from(std::size_t first) const {
+    std::string text;
+    for (std::size_t k = first; k < lines.size() && text.size() < kMostOfAnAnswer; ++k)
+      text += lines[k];
+    return text;
+  }
+};
+
+/// A browser's connection, which handlers that wait for its socket own, too.
+class Connection : public std::enable_shared_from_this<Connection> {
+ public:
+  Connection(tcp::socket socket, Run& run)
+      : stream_(std::move(socket)), run_(run), patience_(stream_.get_executor()) {}
+
+  void read() {
+    parser_.emplace();
+    parser_->header_limit(kMostOfAHeader);
+    parser_->body_limit(0);
+    stream_.expires_after(kIdle);
+    http::async_read(stream_, buffer_, *parser_,
+                     [self = shared_from_this()](const error_code& error, std::size_t) {
+                       if (error) return self->close();
+                       self->answer();
+                     });
+  }
+  /// There are new lines, or there will be none.
+  void look() {
+    if (waits_for_) send_lines(*std::exchange(waits_for_, std::nullopt));
+  }
+  void close() {
+    error_code ignored;
+    patience_.cancel();
+    stream_.socket().shutdown(tcp::socket::shutdown_both, ignored);
+    stream_.socket().close(ignored);
+    closed_ = true;
+  }
+  bool is_closed() const { return closed_; }
+  bool is_sending() const { return sending_; }
+
+ private:
+  /// By its name; the port may be another where a tunnel leads here.
+  bool is_for_this_machine() const {
+    const std::string_view host = parser_->get()[http::field::host];
+    const std::string_view name = host.substr(0, host.rfind(':'));
+    return name == "127.0.0.1" || name == "localhost";
+  }
+
+  void answer() {
+    const Request& request = parser_->get();
+    const std::string_view target = request.target();
+    if (!is_for_this_machine())
+      return send(text_response(http::status::forbidden, "not for another host\n"));
+    if (request.method() != http::verb::get)
+      return send(text_response(http::status::method_not_allowed, "only GET\n"));
+    if (target == "/") return send(text_response(http::status::ok, run_.page, "text/html"));
+    const std::optional<std::size_t> from = first_line(target);
+    if (!from)
+      return send(text_response(http::status::not_found, "there are / and /lines?from=N\n"));
+    run_.followed = true;
+    if (*from < run_.lines.size() || run_.ended) return send_lines(*from);
+    waits_for_ = from;
+    stream_.expires_never();
+    patience_.expires_after(kLongPoll);
+    patience_.async_wait([self = shared_from_this()](const error_code& cancelled) {
+      if (!cancelled) self->look();
+    });
+  }
+
+  void send_lines(std::size_t from) {
+    patience_.cancel();
+    const std::string text = run_.from(from);
+    const auto count = static_cast<std::size_t>(std::ranges::count(text, '\n'));
+    reached_ = std::min(from, run_.lines.size()) + count;
+    send(text_response(http::status::ok, text, "application/x-ndjson"));
+  }
+
+  void send(Response response) {
+    response_ = std::move(response);
+    response_.set(http::field::cache_control, "no-store");
+    response_.set("X-Content-Type-Options", "nosniff");
+    response_.set("Cross-Origin-Resource-Policy", "same-origin");
+    response_.keep_alive(parser_->get().keep_alive());
+    response_.prepare_payload();
+    sending_ = true;
+    stream_.expires_after(kIdle);
+    http::async_write(stream_, response_,
+                      [self = shared_from_this()](const error_code& error, std::size_t) {
+                        self->sending_ = false;
+                        if (error) return self->close();
+                        self->run_.fetched = std::max(self->run_.fetched, self->reached_);
+                        if (self->response_.keep_alive()) return self->read();
+                        self->close();
+                      });
+  }
+
+  beast::tcp_stream stream_;
+  Run& run_;
+  asio::steady_timer patience_;
+  beast::flat_buffer buffer_{kMostOfAHeader};
+  std::optional<http::request_parser<http::empty_body>> parser_;
+  Response response_;
+  std::optional<std::size_t> waits_for_;
+  std::size_t reached_ = 0;
+  bool sending_ = false, closed_ = false;
+};
+
+[[noreturn]] void fail(std::uint16_t port, const error_code& error) {
+  const bool taken = error == asio::error::address_in_use;
+  throw Error(ErrorCode::usage,
+              fmt::format("port {} of 127.0.0.1 cannot be served: {}; take another one, or 0 for "
+                          "any that is free",
+                          port, taken ? "another program does so" : error.message()));
+}
+
+}  // namespace
+
+class RunServer::Service {
+ public:
+  explicit Service(std::uint16_t port) : acceptor_(io_), pause_(io_), goodbye_(io_) {
+    const tcp::endpoint here(asio::ip::address_v4::loopback(), port);
+    error_code error;
+    acceptor_.open(here.protocol(), error);
+    if (!error) acceptor_.set_option(tcp::acceptor::reuse_address(true), error);
+    if (!error) acceptor_.bind(here, error);
+    if (!error) acceptor_.listen(tcp::acceptor::max_listen_connections, error);
+    if (error) fail(port, error);
+    port_ = acceptor_.local_endpoint().port();
+    accept();
+    thread_ = std::thread([this] { run(); });
+  }
+  Service(const Service&) = delete;
+  Service& operator=(const Service&) = delete;
+  ~Service() {
+    io_.stop();
+    thread_.join();
+  }
+
+  std::uint16_t port() const { return port_; }
+  void show(std::string page) {
+    asio::post(io_, [this, page = std::move(page)]() mutable { run_.page = std::move(page); });
+  }
+  void add(std::string_view line) {
+    asio::post(io_, [this, line = std::string(line)]() mutable {
+      run_.lines.push_back(std::move(line));
+      look();
+    });
+  }
+  void finish(double farewell) {
+    const auto until = std::chrono::steady_clock::now() +
+                       std::chrono::duration_cast<std::chrono::steady_clock::duration>(
+                           std::chrono::duration<double>(farewell));
+    const auto said = std::make_shared<std::promise<void>>();  // which its thread may set later
+    asio::post(io_, [this, until, said] {
+      run_.ended = true;
+      look();
+      see_off(until, said);
+    });
+    said->get_future().wait_until(until + kLookAtFollowers);
+  }
+
+ private:
+  using Said = std::shared_ptr<std::promise<void>>;
+
+  void run() {
+    while (!io_.stopped()) {
+      try {
+        io_.run();
+      } catch (const std::exception&) {  // no memory for an answer: that one is not given
+      }
+    }
+  }
+  void accept() {
+    acceptor_.async_accept([this](const error_code& error, tcp::socket socket) {
+      if (error == asio::error::operation_aborted) return;
+      if (!error) welcome(std::move(socket));
+      if (!error || error == asio::error::connection_aborted) return accept();
+      pause_.expires_after(kPauseOfAccepting);  // of descriptors or memory
+      pause_.async_wait([this](const error_code& cancelled) {
+        if (!cancelled) accept();
+      });
+    });
+  }
+  void welcome(tcp::socket socket) {
+    connections_.remove_if([](const auto& connection) { return connection->is_closed(); });
+    if (connections_.size() >= kMostConnections) return;  // closed with the socket
+    connections_.push_back(std::make_shared<Connection>(std::move(socket), run_));
+    connections_.back()->read();
+  }
+  void look() {
+    for (const auto& connection : connections_) connection->look();
+  }
+  /// Until the last line has been fetched, if anybody follows.
+  void see_off(std::chrono::steady_clock::time_point until, const Said& said) {
+    const bool sending = std::ranges::any_of(
+        connections_, [](const auto& connection) { return connection->is_sending(); });
+    const bool done = !run_.followed || (run_.fetched >= run_.lines.size() && !sending);
+    if (done || std::chrono::steady_clock::now() >= until) return said->set_value();
+    goodbye_.expires_after(kLookAtFollowers);
+    goodbye_.async_wait([this, until, said](const error_code&) { see_off(until, said); });
+  }
+
+  asio::io_context io_{1};
+  Run run_;
+  std::uint16_t port_ = 0;
+  tcp::acceptor acceptor_;
+  asio::steady_timer pause_, goodbye_;
+  std::list<std::shared_ptr<Connection>> connections_;
+  std::thread thread_;
+};
+
+RunServer::RunServer(std::uint16_t port) : service_(std::make_unique<Service>(port)) {}
+RunServer::~RunServer() = default;
+
+std::uint16_t RunServer::port() const { return service_->port(); }
+void RunServer::show(std::string page) { service_->show(std::move(page)); }
+void RunServer::add(std::string_view line) { service_->add(line); }
+void RunServer::finish(double farewell) { service_->finish(farewell); }
+
+}  // namespace cairn
