@@ -26,6 +26,7 @@ json::object decisions_json(const ExplorationResult& result) {
   return {{"count", result.decision_seconds.size()},
           {"median_seconds", quantile(result.decision_seconds, 0.5)},
           {"p95_seconds", quantile(result.decision_seconds, 0.95)},
+          {"p99_seconds", quantile(result.decision_seconds, 0.99)},
           {"max_seconds", quantile(result.decision_seconds, 1.0)}};
 }
 

@@ -8,6 +8,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "cairn/exploration/explorer.hpp"
 #include "integration/exploration_commands.hpp"
 
 namespace cairn::test {
@@ -148,6 +149,25 @@ void remove_times(boost::json::value& report) {
     for (const char* name : {"seconds", "measured_seconds", "peak_memory_bytes"})
       object->erase(name);
     for (auto& [name, value] : *object) remove_times(value);
+  }
+}
+
+/// Also the decisions of those that search in parallel.
+TEST_F(Explore, TheSameReportWhateverTheNumberOfThreads) {
+  for (std::string explorer : Registry().names(Explorer::kKind)) {
+    if (explorer == "ede_gradient") explorer += ":orientations=24";
+    std::vector<boost::json::value> reports;
+    for (const char* threads : {"1", "2", "3", "1"}) {
+      const std::string report = folder_.file("run.json");
+      const Outcome run = explore({"--explorer", explorer, "--until", "distance=8", "--threads",
+                                   threads, "--json", report});
+      ASSERT_EQ(run.exit_code, 0) << run.err;
+      reports.push_back(parse_json(read_text(report)));
+      remove_times(reports.back());
+      reports.back().as_object().at("decisions").as_object() = {
+          {"count", reports.back().at("decisions").at("count")}};
+    }
+    for (const auto& report : reports) EXPECT_EQ(report, reports.front()) << explorer;
   }
 }
 
