@@ -136,13 +136,15 @@ std::unique_ptr<BoundResult> compact(BoundGraph& recording, const std::string& p
   out->data = policy_data(recording.get().clone(), std::move(true_graph), begin);
   const InterruptGuard guard;
   Follower follower(callback, guard.flag());
-  const PolicySetting setting{.data = out->data,
-                              .registry = default_registry(),
-                              .loss = plan.loss,
-                              .loss_on = plan.loss_on,
-                              .interrupt = &follower.stop(),
-                              .progress = [&](std::string_view, std::size_t,
-                                              const PolicyResult& counts) { follower(counts); }};
+  const PolicySetting setting{
+      .data = out->data,
+      .registry = default_registry(),
+      .loss = plan.loss,
+      .loss_on = plan.loss_on,
+      .interrupt = &follower.stop(),
+      .progress = [&](std::string_view, std::size_t, const PolicyResult& counts) {
+        follower.after(counts.poses.back());
+      }};
   try {
     const py::gil_scoped_release unlocked;
     run(plan, setting, follower, *out);
