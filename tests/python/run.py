@@ -3,7 +3,8 @@
 import importlib
 import sys
 
-for module in ["numpy", "pytest", *(["matplotlib"] if "test_docs" in sys.argv[1] else [])]:
+MORE = {"test_docs": ["matplotlib"], "test_notebook": ["matplotlib", "nbformat", "nbclient", "ipykernel"]}
+for module in ["numpy", "pytest", *(module for name, modules in MORE.items() if name in sys.argv[1] for module in modules)]:
     try:
         importlib.import_module(module)
     except ImportError:
