@@ -136,3 +136,34 @@ function(cairn_add_plugin)
     install(FILES ${folder}/${arg_NAME}.json DESTINATION ${install_folder} COMPONENT ${component})
   endif()
 endfunction()
+
+# cairn_add_plugin_tests(NAME name [SOURCES file.cpp …] [ARGUMENTS argument …])
+#
+# Tests of a plugin that cairn_add_plugin(NAME name) builds, for CTest, after enable_testing():
+# - name.check runs the conformance suite over it in a process of its own, `cairn plugins --check` with the ARGUMENTS, such
+#   as --seconds 120 or --types slam3d:metric=g2o. It needs the program, which is looked for beside the library and on the
+#   PATH; CAIRN_PROGRAM names another. Without one there is a line when configuring, and no such test.
+# - name.test, with SOURCES: a program of these, name_test, with the library cairn::slam, which is given the plugin's path.
+function(cairn_add_plugin_tests)
+  cmake_parse_arguments(PARSE_ARGV 0 arg "" "NAME" "SOURCES;ARGUMENTS")
+  if(arg_UNPARSED_ARGUMENTS)
+    message(FATAL_ERROR "cairn_add_plugin_tests: unknown argument ${arg_UNPARSED_ARGUMENTS}")
+  endif()
+  if(NOT TARGET cairn_plugin_${arg_NAME})
+    message(FATAL_ERROR "cairn_add_plugin_tests(NAME ${arg_NAME}): there is no such plugin in this project; "
+                        "cairn_add_plugin(NAME ${arg_NAME} …) comes first")
+  endif()
+  find_program(CAIRN_PROGRAM cairn HINTS ${cairn_DIR}/../../../bin ${cairn_DIR}/../../../../bin
+               DOC "The program cairn, whose `plugins --check` tests plugins")
+  if(CAIRN_PROGRAM)
+    add_test(NAME ${arg_NAME}.check
+             COMMAND ${CAIRN_PROGRAM} plugins ${arg_ARGUMENTS} --check $<TARGET_FILE:cairn_plugin_${arg_NAME}>)
+  else()
+    message(STATUS "cairn: no test ${arg_NAME}.check: the program cairn is not installed; CAIRN_PROGRAM names it")
+  endif()
+  if(arg_SOURCES)
+    add_executable(${arg_NAME}_test ${arg_SOURCES})
+    target_link_libraries(${arg_NAME}_test PRIVATE cairn::slam)
+    add_test(NAME ${arg_NAME}.test COMMAND ${arg_NAME}_test $<TARGET_FILE:cairn_plugin_${arg_NAME}>)
+  endif()
+endfunction()

@@ -38,8 +38,8 @@ class DenseLdlt final : public cairn::LinearSolver {
     }
     ldlt_.compute(dense_.selfadjointView<Eigen::Lower>());
     // Eigen pivots, so it cannot say at which block the matrix stopped being positive definite.
-    const bool ok =
-        ldlt_.info() == Eigen::Success && ldlt_.isPositive() && ldlt_.vectorD().minCoeff() > 0.0;
+    const Eigen::ArrayXd d = ldlt_.vectorD().array();  // not finite where H is not
+    const bool ok = ldlt_.info() == Eigen::Success && d.isFinite().all() && (d > 0.0).all();
     return {.ok = ok, .failed_block = -1};
   }
 
