@@ -325,6 +325,37 @@ TEST_P(EveryEstimator, AFixedLagKeepsItsSizeAndItsCovariance) {
   }
 }
 
+TEST_P(EveryEstimator, WhatHasLeftIsGoneAndItsIdIsFreeAgain) {
+  estimator_->update(chain(8));
+  GraphUpdate update;
+  update.removed_variables = {7};
+  update.marginalized = {1};
+  estimator_->update(update);
+  ASSERT_FALSE(estimator_->has(7) || estimator_->has(1));
+  for (const Id gone : {1, 7}) {
+    GraphUpdate on_it;
+    on_it.factors.push_back(between(2, gone));
+    EXPECT_THROW(estimator_->update(on_it), Error) << gone;
+    GraphUpdate leaves;
+    leaves.removed_variables = {gone};
+    EXPECT_THROW(estimator_->update(leaves), Error) << gone;
+  }
+  GraphUpdate back;
+  for (const Id id : {1, 7}) {
+    back.variables.push_back(pose(id));
+    back.factors.push_back(between(2, id, {0.5, 0.0, 0.0}));
+  }
+  estimator_->update(back, {.full = true});
+  ASSERT_EQ(estimator_->variable_count(), 8);
+  const std::span<const double> at = estimator_->state(2);
+  const Eigen::Vector3d two(at[0], at[1], at[2]);
+  for (const Id id : {1, 7}) {
+    const std::span<const double> x = estimator_->state(id);
+    const auto expected = Se2::compose<double>(two, {0.5, 0.0, 0.0});
+    for (int k = 0; k < 3; ++k) EXPECT_NEAR(x[k], expected[k], 1e-9);
+  }
+}
+
 TEST_P(EveryEstimator, ReadingChangesNoLaterResult) {
   // The same updates twice, read at every step the one, never the other.
   const std::unique_ptr<Estimator> quiet = registry_.make<Estimator>(GetParam());
