@@ -111,7 +111,8 @@ class Carmen final : public ScanLogFormat {
       };
       if (line.starts_with(kScan)) {
         log.scans.push_back(logged(words(kScan), range));
-        log.scans.back().truth = std::exchange(truth, std::nullopt);
+        if (truth) log.scans.back().truth.emplace(*truth);
+        truth.reset();
       } else if (line.starts_with(kTruth)) {
         Words of_truth = words(kTruth);
         truth = pose(of_truth);
