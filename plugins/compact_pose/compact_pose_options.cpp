@@ -69,7 +69,7 @@ OptionFields<CompactPoseOptions> CompactPoseOptions::fields() {
       .real("landmark_gain", &O::landmark_gain, -1.0, 1e9,
             "information gain that a measurement of a landmark in the graph must exceed [nats]; "
             "-1: 0.1 per DoF of a pose")
-      .real("landmark_loss", &O::landmark_loss, -1.0, 10.0,
+      .real("landmark_loss", &O::landmark_loss, -1.0, 3.0,
             "largest information about the map that is lost by removing a pose which landmarks "
             "locate, where another one stays [nats]; -1: 0.06 per DoF of a pose")
       .text("sensor", &O::sensor, numbers, text_of,

@@ -33,7 +33,7 @@ constexpr double kOfNewest = 0.1;
 constexpr std::size_t kMostCovers = 4;
 
 /// A variance that would grow by more than the inverse of this is one of something undetermined.
-constexpr double kDetermined = 1e-4;
+constexpr double kDetermined = 1e-9;
 
 /// ln |I − A|; −∞ where that is not positive definite.
 double log_determinant_of_rest(const MatrixXd& A) {

@@ -207,7 +207,7 @@ TEST_P(TemporaryPoses, AllStayWhereNoneMayBeLost) {
   begin("landmark_loss=0");
   drive(3 * kLap);
   const std::size_t all = kept_.size();
-  begin("landmark_loss=10");
+  begin("landmark_loss=3");
   kept_ = {0};
   drive(3 * kLap);
   EXPECT_LT(kept_.size(), all / 2);
