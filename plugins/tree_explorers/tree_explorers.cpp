@@ -2,6 +2,7 @@
 // Explorers that grow a tree of paths and drive along that which lowers the joint entropy of
 // trajectory and map most per metre (thesis, 5.4).
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstdint>
 #include <memory>
@@ -19,6 +20,7 @@
 #include "cairn/planning/rrt_star.hpp"
 #include "cairn/plugin/option_fields.hpp"
 #include "cairn/plugin/registry.hpp"
+#include "cairn/runtime/timed.hpp"
 #include "discovery.hpp"
 
 namespace cairn::exploration {
@@ -62,6 +64,8 @@ struct ErrtStarOptions {
 /// Part of the time budget of a decision for the growth of a tree whose paths are evaluated
 /// afterwards, and for both.
 constexpr double kGrowthPart = 0.3, kTreePart = 0.8;
+/// And the least that is left for it.
+constexpr double kLeastPart = 0.2;
 /// Further candidates that a decision lists, and how far their ends are apart [m].
 constexpr std::size_t kListed = 10;
 constexpr double kApart = 1.0;
@@ -108,6 +112,7 @@ class TreeExplorer : public Explorer {
   }
 
   Decision decide(const Situation& situation) override {
+    const auto begin = std::chrono::steady_clock::now();
     Decision decision;
     by_fallback_ = false;
     const FreeSpace space(situation.map, situation.pose.translation(), situation.robot.radius);
@@ -115,7 +120,10 @@ class TreeExplorer : public Explorer {
     const std::vector<Vector2d> left_out =
         discovery_.not_found(situation, options_.value.simulated_range);
     PathValue value(situation, options_.value, left_out);
-    const Search search = grow(space, value, situation.budget);
+    // What came before is part of the time, but there must be a tree.
+    const double left =
+        std::max(situation.budget - seconds_since(begin), kLeastPart * situation.budget);
+    const Search search = grow(space, value, left);
     add_tree(search, decision);
     if (!search.complete) decision.notes.emplace_back("trees were cut short by the time budget");
     const std::vector<std::size_t> best = best_nodes(search);
