@@ -53,6 +53,23 @@ TEST_F(PolicyRunTest, ATruthThatLacksPosesIsGoodForTheTrajectoryOnly) {
   EXPECT_THAT(*data.truth, SizeIs(12));
 }
 
+TEST_F(PolicyRunTest, RunsWithARegistrationOfTheCaller) {
+  const PolicyData data = world("manhattan:poses=60,streets=3");
+  int asked = 0;
+  FunctionRegistration none([&](Id, Id) {
+    ++asked;
+    return std::vector<Factor>();
+  });
+  const PolicySetting setting{.data = data, .registry = registry_};
+  PolicyRun run({parse_component("compact_pose:range=8,angle=3.15"), "there is no such", &none},
+                setting);
+  run.run(data.poses.size(), "");
+  EXPECT_GT(asked, 0);
+  EXPECT_EQ(run.counts().proposed, asked);
+  EXPECT_EQ(run.counts().registered, 0);
+  EXPECT_EQ(run.finish(Recovery::distribute).trajectory.variable_count(), 60);
+}
+
 TEST_F(PolicyRunTest, RefusesWhatIsNoTrajectory) {
   Simulation made = simulate("bundle");
   EXPECT_THROW(policy_data(std::move(made.graph)), Error);

@@ -2,6 +2,7 @@
 #include "cairn/policy/threshold_search.hpp"
 
 #include <cmath>
+#include <cstddef>
 #include <functional>
 #include <string>
 #include <utility>
@@ -186,6 +187,25 @@ TEST_F(FindThresholds, WhatIsFoundKeepsTheErrorWithinTheTolerance) {
   run.run(150, "");
   EXPECT_EQ(run.policy().estimator().variable_count(), found.trials[found.chosen].poses_kept);
   EXPECT_EQ(run.counts().kept_loops, found.trials[found.chosen].loops_kept);
+}
+
+TEST_F(FindThresholds, ASampleIsExtendedUntilItHasLoopClosures) {
+  const ThresholdSample sample = threshold_sample(data_, 0.01);
+  EXPECT_EQ(sample.asked, 2U);
+  ASSERT_GT(sample.count, sample.asked);
+  std::ptrdiff_t loops = 0;
+  for (std::size_t k = 0; k + 1 < sample.count; ++k) loops += std::ssize(data_.poses[k].links);
+  EXPECT_LT(loops, 3);
+  EXPECT_GE(loops + std::ssize(data_.poses[sample.count - 1].links), 3);
+  EXPECT_EQ(threshold_sample(data_, 0.6).count, 120U);
+}
+
+TEST_F(FindThresholds, AreFoundWhereTheyAreNotGivenAndThePolicyCan) {
+  EXPECT_FALSE(gives_thresholds(parse_component("compact_pose:gate=0.9,strategy=apfl")));
+  for (const char* given : {"range=3", "loop_gain=2", "pose_gain=1"})
+    EXPECT_TRUE(gives_thresholds(parse_component(std::string("compact_pose:") + given))) << given;
+  EXPECT_TRUE(finds_thresholds(parse_component("compact_pose:range=3"), registry_));
+  EXPECT_FALSE(finds_thresholds(parse_component("random_poses"), registry_));
 }
 
 TEST_F(FindThresholds, TriesNothingAtRatioZero) {
