@@ -9,6 +9,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "cairn/geometry/pose.hpp"
 #include "cairn/io/generator.hpp"
 #include "cairn/runtime/error.hpp"
 
