@@ -20,6 +20,7 @@
 #include "cairn/exploration/recorded_world.hpp"
 #include "cairn/exploration/scan_log.hpp"
 #include "cairn/grid/grid_format.hpp"
+#include "cairn/io/format_by_ending.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/policy/policy_run.hpp"
 #include "cairn/runtime/error.hpp"
@@ -185,9 +186,12 @@ void check(const ExploreOptions& options, Session& session) {
   for (const std::string& graph : {options.output, options.trajectory, options.truth})
     check_output(graph, "", session, false);
   check_file(options.steps, session);
+  const ComponentSpec world = world_spec(options);
+  if (const auto recording = world.values.find("file"); recording != world.values.end())
+    session.files.add_input(parse_named_file(recording->second).file.string());
   if (!options.log.empty()) {
     check_scan_log_name(options.log, session.registry());
-    check_file(options.log, session);
+    check_file(parse_named_file(options.log).file.string(), session);
   }
   check_recording(options.recording, session);
 }

@@ -103,6 +103,10 @@ TEST_F(Explore, LogsThatCannotBeAreRefused) {
   ASSERT_EQ(explore({"--until", "steps=2", "--log", log}).exit_code, 0);
   EXPECT_THAT(refusal({"explore", "--world", "log:file=" + log, "--runs", "2"}, 2),
               HasSubstr("there is nothing to compare"));
+  const std::string before = read_text(log);
+  EXPECT_THAT(refusal({"explore", "--world", "log:file=" + log, "--log", log}, 2),
+              HasSubstr("run.clf is read"));
+  EXPECT_EQ(read_text(log), before);
 }
 
 TEST_F(Explore, AGraphOnStandardOutputIsAloneThere) {
