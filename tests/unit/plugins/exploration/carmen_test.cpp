@@ -98,7 +98,9 @@ TEST(Carmen, WhatIsWrittenIsReadAgain) {
     EXPECT_EQ(a.scan.max_range, b.scan.max_range);
     EXPECT_NEAR(a.scan.angle(180), b.scan.angle(180), 1e-12);
     ASSERT_EQ(a.truth.has_value(), b.truth.has_value()) << k;
-    if (a.truth) EXPECT_EQ(a.truth->state(), b.truth->state());
+    if (a.truth) {
+      EXPECT_EQ(a.truth->state(), b.truth->state());
+    }
     for (std::size_t beam = 0; beam < a.scan.ranges.size(); ++beam) {
       const float x = a.scan.ranges[beam], y = b.scan.ranges[beam];
       EXPECT_TRUE(x == y || (std::isnan(x) && std::isnan(y))) << x << " " << y;
