@@ -123,9 +123,6 @@ class Engine : private EngineState {
   /// Takes what has been removed out of the graph: everything is numbered anew.
   void compact();
 
-  /// Anchors what the gauge of the graph as it is asks for, and lets go of the rest.
-  void settle_gauge();
-
   /// To be called for what has been added at the end of the graph, by `edit`.
   Graph& edit() { return graph_; }
   void added_variable();
@@ -150,8 +147,6 @@ class Engine : private EngineState {
   std::vector<FactorId> live_ids() const;
   /// Removed factors and variables that are still in the graph.
   int dead() const { return dead_; }
-  /// Whether they are so many that `compact` repays what it costs.
-  bool worth_compacting() const { return 2 * dead_ > states_.size() + models_.size(); }
 
   /// Solves until the estimate is as accurate as it is to be, the time is up (0: no limit), or the
   /// iterations are.
@@ -186,6 +181,7 @@ class Engine : private EngineState {
   bool have_digits(int v, std::int32_t first, std::int32_t count, const double* variances,
                    std::int64_t step) const;
   void load(Graph graph, std::vector<FactorId> ids);
+  void settle_gauge();
   void watch_gauge_anew();
   void hold(std::int32_t v, bool held);
   bool is_other(int f) const;

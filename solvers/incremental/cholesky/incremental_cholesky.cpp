@@ -10,6 +10,7 @@
 
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/timed.hpp"
+#include "cairn/update/elimination.hpp"
 #include "cairn/update/graph_update.hpp"
 
 namespace cairn::incremental {
@@ -44,11 +45,10 @@ IncrementalCholesky::IncrementalCholesky(const IncrementalCholesky& other)
 
 UpdateReport IncrementalCholesky::update(const GraphUpdate& update, const UpdateOptions& options) {
   const Clock::time_point begin = Clock::now();
-  if (engine_->dead() > 0 && (engine_->worth_compacting() || names_what_is_gone(update))) {
+  if (engine_->dead() > 0) {
     engine_->compact();
     forget_what_was_read();
   }
-  engine_->settle_gauge();  // after what was removed
   GraphUpdate checked = update;
   place_variables(checked, [this](Id id) {
     const auto v = find(id);
@@ -62,12 +62,7 @@ UpdateReport IncrementalCholesky::update(const GraphUpdate& update, const Update
   UpdateReport report;
   if (checked.marginalized.empty()) {
     apply(checked, report);
-  } else if (leaves_what_it_marginalizes_alone(checked)) {
-    // Eliminating may fail, on numbers: before anything has changed.
-    std::vector<int> variables;
-    for (const Id id : checked.marginalized) variables.push_back(index(id));
-    apply(checked, report, eliminate(variables));
-  } else {
+  } else {  // which may fail, on numbers
     const IncrementalCholesky before(*this);
     try {
       apply(checked, report);
@@ -106,9 +101,7 @@ UpdateReport IncrementalCholesky::update(const GraphUpdate& update, const Update
 /// The engine as what an update is carried out on.
 class IncrementalCholesky::Target final : public UpdateTarget {
  public:
-  /// `elimination`: what `eliminate` is to return, if it is known.
-  Target(IncrementalCholesky& owner, std::optional<Elimination> elimination)
-      : owner_(owner), engine_(*owner.engine_), elimination_(std::move(elimination)) {}
+  explicit Target(IncrementalCholesky& owner) : owner_(owner), engine_(*owner.engine_) {}
 
   Graph& graph() override { return engine_.edit(); }
   FactorId next_factor() const override { return engine_.next_id(); }
@@ -122,9 +115,7 @@ class IncrementalCholesky::Target final : public UpdateTarget {
     ++owner_.factors_;
   }
   void changed_factor(int position) override { engine_.changed_factor(position); }
-  Elimination eliminate(std::span<const int> variables) override {
-    return elimination_ ? *std::move(elimination_) : owner_.eliminate(variables);
-  }
+  Elimination eliminate(std::span<const int> variables) override;
   void remove(std::span<const int> factors, std::span<const int> variables) override;
 
  private:
@@ -135,51 +126,20 @@ class IncrementalCholesky::Target final : public UpdateTarget {
 
   IncrementalCholesky& owner_;
   Engine& engine_;
-  std::optional<Elimination> elimination_;
 };
 
-/// Whether it has an id of something that was removed but is still in the graph.
-bool IncrementalCholesky::names_what_is_gone(const GraphUpdate& update) const {
-  const auto gone = [&](Id id) {
-    const auto v = engine_->graph().find(id);
-    return v && !engine_->live_variable(*v);
-  };
-  const auto any = [&](const std::vector<Id>& ids) { return std::ranges::any_of(ids, gone); };
-  return std::ranges::any_of(update.variables, gone, &Variable::id) ||
-         std::ranges::any_of(update.factors, any, &Factor::variables) || any(update.marginalized) ||
-         any(update.removed_variables);
-}
-
-/// Whether variables can be eliminated before the rest of the update is carried out, with the same
-/// result: nothing that comes in is on them, and no gauge is fixed by a pose that is anchored and
-/// might not be then.
-bool IncrementalCholesky::leaves_what_it_marginalizes_alone(const GraphUpdate& update) const {
-  const auto leaves = [&](Id id) {
-    return std::ranges::find(update.marginalized, id) != update.marginalized.end();
-  };
-  const auto any = [&](const std::vector<Id>& ids) { return std::ranges::any_of(ids, leaves); };
-  if (!update.changed.empty() || std::ranges::any_of(update.variables, leaves, &Variable::id) ||
-      std::ranges::any_of(update.factors, any, &Factor::variables))
-    return false;
-  const Graph& graph = engine_->graph();
-  for (int v = 0; v < graph.variable_count(); ++v) {
-    if (engine_->live_variable(v) && engine_->held(v) && !graph.fixed(v)) return false;
-  }
-  return true;
-}
-
-Elimination IncrementalCholesky::eliminate(std::span<const int> variables) {
+Elimination IncrementalCholesky::Target::eliminate(std::span<const int> variables) {
   std::vector<int> factors;
   for (const int v : variables) {
-    const auto& on_it = engine_->factors_of(v);
+    const auto& on_it = engine_.factors_of(v);
     factors.insert(factors.end(), on_it.begin(), on_it.end());
   }
   std::ranges::sort(factors);
   factors.erase(std::unique(factors.begin(), factors.end()), factors.end());
-  engine_->write_back();
-  const Graph& graph = engine_->graph();
+  engine_.write_back();
+  const Graph& graph = engine_.graph();
   std::vector<bool> held(static_cast<std::size_t>(graph.variable_count()));
-  for (std::size_t v = 0; v < held.size(); ++v) held[v] = engine_->held(static_cast<int>(v));
+  for (std::size_t v = 0; v < held.size(); ++v) held[v] = engine_.held(static_cast<int>(v));
   return cairn::eliminate(graph, variables, held, factors);
 }
 
@@ -195,9 +155,8 @@ void IncrementalCholesky::Target::remove(std::span<const int> factors,
   }
 }
 
-void IncrementalCholesky::apply(const GraphUpdate& update, UpdateReport& report,
-                                std::optional<Elimination> elimination) {
-  Target target(*this, std::move(elimination));
+void IncrementalCholesky::apply(const GraphUpdate& update, UpdateReport& report) {
+  Target target(*this);
   AppliedUpdate applied = carry_out(update, losses_, target);
   report.first_factor = applied.first_factor;
   report.priors = std::move(applied.priors);

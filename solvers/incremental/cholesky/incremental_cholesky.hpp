@@ -12,7 +12,6 @@
 #include "cairn/plugin/option_fields.hpp"
 #include "cairn/solve/estimator.hpp"
 #include "cairn/solve/optimizer.hpp"
-#include "cairn/update/elimination.hpp"
 #include "cairn/update/loss_rule.hpp"
 #include "engine.hpp"
 
@@ -93,11 +92,7 @@ class IncrementalCholesky final : public Estimator {
   std::optional<int> position(FactorId id) const;
   int index(Id id) const;
   int block_size(int a, int b) const;
-  bool names_what_is_gone(const GraphUpdate& update) const;
-  bool leaves_what_it_marginalizes_alone(const GraphUpdate& update) const;
-  Elimination eliminate(std::span<const int> variables);
-  void apply(const GraphUpdate& update, UpdateReport& report,
-             std::optional<Elimination> elimination = {});
+  void apply(const GraphUpdate& update, UpdateReport& report);
   void forget_what_was_read() {
     read_.clear();
     all_.reset();

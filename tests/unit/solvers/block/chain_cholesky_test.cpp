@@ -116,11 +116,11 @@ TEST(ChainCholesky, AgreesWithDenseAlgebraForEveryKernelSetAndBothSizes) {
   for (const std::string& kernels : kernel_sets()) {
     for (const std::int32_t size : {3, 6}) {
       for (const bool shuffled : {false, true}) {
-        expect_dense(sparse_graph(rng, 130, 9, size, shuffled), kernels, rng);
-        expect_dense(sparse_graph(rng, 120, 8, size, shuffled, 10), kernels, rng);
+        expect_dense(sparse_graph(rng, 190, 9, size, shuffled), kernels, rng);
+        expect_dense(sparse_graph(rng, 180, 8, size, shuffled, 10), kernels, rng);
       }
     }
-    expect_dense(sparse_graph(rng, 140, 0, 3, true), kernels, rng);
+    expect_dense(sparse_graph(rng, 150, 0, 3, true), kernels, rng);
     expect_dense(rings(50), kernels, rng);
   }
 }
