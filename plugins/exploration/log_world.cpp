@@ -8,11 +8,7 @@
 namespace cairn::exploration {
 
 LogWorld::LogWorld(const LogWorldOptions& options, Registry& registry) : options_(options) {
-  if (options.file.empty()) {
-    throw Error(
-        ErrorCode::usage,
-        "world log: no log is named; name one with log:file=robot.clf or file=robot.clf.gz");
-  }
+  if (options.file.empty()) return;
   log_ = read_scan_log(options.file, registry);
   try {
     check_measurements(log_);
@@ -21,8 +17,17 @@ LogWorld::LogWorld(const LogWorldOptions& options, Registry& registry) : options
   }
 }
 
+const LaserScan& LogWorld::first_scan() const {
+  if (log_.scans.empty()) {
+    throw Error(
+        ErrorCode::usage,
+        "world log: no log is named; name one with log:file=robot.clf or file=robot.clf.gz");
+  }
+  return log_.scans.front().scan;
+}
+
 RobotModel LogWorld::robot() const {
-  const LaserScan& scan = log_.scans.front().scan;
+  const LaserScan& scan = first_scan();
   return {.radius = options_.radius,
           .step = options_.step,
           .turn = options_.turn,
@@ -35,9 +40,10 @@ RobotModel LogWorld::robot() const {
 }
 
 LaserScan LogWorld::begin(const WorldStart&) {
+  const LaserScan& first = first_scan();
   at_ = 0;
   next_ = next_scan(log_, at_, options_.step, options_.turn);
-  return log_.scans.front().scan;
+  return first;
 }
 
 WorldStep LogWorld::move(const Pose2&) {
@@ -52,7 +58,9 @@ WorldStep LogWorld::move(const Pose2&) {
   return step;
 }
 
-std::optional<Pose2> LogWorld::truth() const { return log_.scans[at_].truth; }
+std::optional<Pose2> LogWorld::truth() const {
+  return at_ < log_.scans.size() ? log_.scans[at_].truth : std::nullopt;
+}
 
 void* LogWorld::ability(std::string_view name) {
   return name == RecordedWorld::kAbility ? static_cast<RecordedWorld*>(this) : nullptr;

@@ -38,7 +38,8 @@ struct LogWorldOptions {
 /// A robot that goes where it went when its scans were recorded.
 class LogWorld final : public World, public RecordedWorld {
  public:
-  /// Reads the log. Throws `Error` (usage) unless one is named, (input) if it has no measurement.
+  /// Reads the log, if one is named; else `robot` and `begin` throw `Error` (usage). Throws `Error`
+  /// (input) if it has no measurement.
   LogWorld(const LogWorldOptions& options, Registry& registry);
 
   RobotModel robot() const override;
@@ -49,6 +50,7 @@ class LogWorld final : public World, public RecordedWorld {
   void* ability(std::string_view name) override;
 
  private:
+  const LaserScan& first_scan() const;
   LogWorldOptions options_;
   ScanLog log_;
   std::size_t at_ = 0, next_ = 0;

@@ -141,7 +141,7 @@ TEST_F(LogWorldTest, SaysWhatIsWrongWithALog) {
   Registry registry;
   const auto refusal = [&](const std::string& name) -> std::string {
     try {
-      registry.make<World>(parse_component(name));
+      static_cast<void>(registry.make<World>(parse_component(name))->robot());
     } catch (const Error& error) {
       return error.what();
     }
