@@ -5,6 +5,7 @@ import os
 import subprocess
 import sys
 import textwrap
+import threading
 
 import numpy as np
 import pytest
@@ -359,3 +360,79 @@ def test_factors_are_values():
     full = np.array([[4, 1, 0], [1, 3, 0.5], [0, 0.5, 2]])
     assert_allclose(Factor(Between(0, 1, Pose2()), covariance=full).information, np.linalg.inv(full))
     assert repr(factor) == "<cairn.Factor EDGE_SE2 0 1: 1 2 0.5>"
+
+
+def test_factors_with_too_many_ids_or_numbers_are_refused():
+    link = cairn.Measurement("EDGE_SE2_XY", [0] * 39 + [7], [0, 0])
+    with pytest.raises(cairn.Error, match="40 ids, expected 2"):
+        Factor(link, sigmas=0.1)
+    with pytest.raises(cairn.Error, match="3 numbers measured, expected 2"):
+        Factor(cairn.Measurement("EDGE_SE2_XY", [0, 7], [0, 0, 0]), sigmas=0.1)
+
+
+def test_a_refused_end_of_a_pose_can_be_repeated():
+    policy = cairn.PosePolicy(range=3, angle=1.5)
+    policy.add_pose(0, value=Pose2(), fixed=True)
+    busy = threading.Event()
+    done = threading.Event()
+
+    class Slow:
+        """Keeps the policy busy, in another thread."""
+
+        def __call__(self):
+            while not done.is_set():
+                policy.graph()
+                busy.set()
+
+    thread = threading.Thread(target=Slow())
+    thread.start()
+    busy.wait()
+    try:
+        for _ in range(1000):
+            try:
+                policy.end_pose()
+                break
+            except cairn.Error as error:
+                assert "in use" in str(error)
+    finally:
+        done.set()
+        thread.join()
+    policy.add_pose(1, Factor(Between(0, 1, Pose2(1, 0, 0)), sigmas=[0.1, 0.1, 0.1]))
+
+
+def test_a_matcher_is_told_of_each_run():
+    class Matcher:
+        def __init__(self):
+            self.runs = []
+
+        def begin(self):
+            self.runs.append([])
+
+        def match(self, proposal):
+            return None
+
+        def pose_ended(self, pose, kept):
+            self.runs[-1].append(pose)
+
+    graph = city(poses=100)
+    once, often = Matcher(), Matcher()
+    cairn.compact(graph, registration=once, find_thresholds=False, **OPTIONS)
+    assert once.runs == [list(range(100))]
+    cairn.compact(graph, registration=often, find_thresholds=True, range=3, angle=1.5)
+    assert len(often.runs) > 1 and often.runs[-1] == list(range(100))
+    assert all(run == sorted(set(run)) for run in often.runs)
+
+
+def test_arguments_of_the_wrong_kind_are_named():
+    graph = city(poses=30)
+    with pytest.raises(cairn.Error, match="truth: expected a cairn.Graph"):
+        cairn.compact(graph, truth=5, **OPTIONS)
+    with pytest.raises(cairn.Error, match="map: expected a cairn.Graph"):
+        cairn.compact(graph, map="x", **OPTIONS)
+    with pytest.raises(cairn.Error, match="keep: expected"):
+        cairn.compact(graph, keep=-3, **OPTIONS)
+
+
+def test_false_of_numpy_ends_a_run():
+    result = cairn.compact(city(poses=100), callback=lambda report: np.bool_(report.id < 20), **OPTIONS)
+    assert result.status == "interrupted" and len(result.poses) == 21

@@ -111,3 +111,9 @@ def test_ctrl_c_ends_it_with_the_map_so_far():
     """
     ended = subprocess.run([sys.executable, "-c", textwrap.dedent(run)], capture_output=True, text=True, timeout=120)
     assert (ended.returncode, ended.stdout) == (0, "went on\n"), ended.stderr
+
+
+@pytest.mark.parametrize("cells", [np.array([[0, 0.7, 1.0]]), np.array([[False, True]]), np.array([[2**64 - 1]], dtype=np.uint64)])
+def test_a_floor_is_of_integers(cells):
+    with pytest.raises(cairn.Error, match="cells: "):
+        cairn.Floor(cells, 0.1)

@@ -108,6 +108,12 @@ void run(Plan& plan, const PolicySetting& setting, Follower& follower, BoundResu
     out.notes.push_back(std::move(doubt));
 }
 
+const Graph& graph_of(const py::object& given, const char* what) {
+  if (!py::isinstance<BoundGraph>(given))
+    throw Error(ErrorCode::usage, fmt::format("{}: expected a cairn.Graph", what));
+  return given.cast<BoundGraph&>().get();
+}
+
 std::unique_ptr<BoundResult> compact(BoundGraph& recording, const std::string& policy,
                                      const py::object& registration, const py::object& truth,
                                      const py::object& map, std::optional<Id> begin,
@@ -123,6 +129,7 @@ std::unique_ptr<BoundResult> compact(BoundGraph& recording, const std::string& p
             .loss = loss_of(loss)};
   if (!(sample > 0.0 && sample <= 1.0))
     throw Error(ErrorCode::usage, "sample: expected a part of the poses, above 0 and at most 1");
+  if (keep < 0) throw Error(ErrorCode::usage, "keep: expected a number of poses, or 0 for any");
   if (!loss.is_none()) plan.loss_on = selector_of(loss_on);
   if (py::isinstance<py::str>(registration)) {
     plan.job.registration = registration.cast<std::string>();
@@ -130,8 +137,8 @@ std::unique_ptr<BoundResult> compact(BoundGraph& recording, const std::string& p
     plan.job.own = &plan.own.emplace(registration);
   }
   std::optional<Graph> true_graph;
-  if (!truth.is_none()) true_graph = truth.cast<BoundGraph&>().get().clone();
-  if (!map.is_none()) plan.map = map.cast<BoundGraph&>().get().clone();
+  if (!truth.is_none()) true_graph = graph_of(truth, "truth").clone();
+  if (!map.is_none()) plan.map = graph_of(map, "map").clone();
   auto out = std::make_unique<BoundResult>();
   out->data = policy_data(recording.get().clone(), std::move(true_graph), begin);
   const InterruptGuard guard;
@@ -267,8 +274,10 @@ graph: poses with unbroken odometry by rising id, loop closures, absolute measur
 policy: a name of `cairn.components("pose_policy")`; its options are further keyword arguments.
 registration: measures the pairs that the policy proposes: a name of `cairn.components("registration")`, of which
     "recorded" answers by the graph; or written in Python, a function match(proposal) that is given a MatchProposal and
-    returns a Factor, several, or None for no match. An object with such a method may have two more:
-    recognise(places, pose), which returns a pose of a map and the factors measured, and pose_ended(pose, kept).
+    returns a Factor, several, or None for no match. An object with such a method may have three more:
+    recognise(places, pose), which returns a pose of a map and the factors measured, pose_ended(pose, kept), and
+    begin(), which is called before each run over the graph: one for each trial where thresholds are found, then the
+    one that selects.
 truth: a Graph of the true poses, for `CompactResult.errors`.
 map: a Graph that an earlier session has left, which this trajectory continues.
 begin: the id of the first pose; those before it are of earlier sessions.

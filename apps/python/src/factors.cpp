@@ -53,6 +53,12 @@ std::string text_of(const Factor& factor) {
 
 Factor factor_of(const Measured& measured, const Noise& noise, const py::object& loss) {
   auto type = measured.own ? measured.own : default_registry().factor_type(measured.tag);
+  if (std::ssize(measured.ids) != type->arity())
+    throw Error(ErrorCode::usage, fmt::format("{}: {} ids, expected {}", type->tag(),
+                                              measured.ids.size(), type->arity()));
+  if (std::ssize(measured.numbers) != type->measurement_size())
+    throw Error(ErrorCode::usage, fmt::format("{}: {} numbers measured, expected {}", type->tag(),
+                                              measured.numbers.size(), type->measurement_size()));
   std::vector<double> packed = noise.packed(type->residual_size());
   return {std::move(type), measured.ids, measured.numbers, std::move(packed), loss_of(loss)};
 }

@@ -25,8 +25,6 @@
 namespace cairn::python {
 namespace {
 
-using Cells = py::array_t<std::int64_t, py::array::c_style | py::array::forcecast>;
-
 const char* const kDoc =
     R"(The map of a floor: square cells with the probability of being occupied in per cent, or -1 where that is unknown.
 
@@ -34,7 +32,21 @@ cells: (rows, columns) integers; row 0 is the lowest, x counts columns to the ri
 resolution: the side of a cell [m].
 origin: x y [m] of the lower left corner of cell (0, 0), and the angle [rad] by which the grid is turned about it.)";
 
-OccupancyGrid make(const Cells& cells, double resolution, const std::vector<double>& origin) {
+OccupancyGrid make(const py::object& given, double resolution, const std::vector<double>& origin) {
+  const py::array of_any_type = py::array::ensure(given);
+  if (!of_any_type) {
+    PyErr_Clear();
+    throw Error(ErrorCode::usage, "cells: expected (rows, columns) integers");
+  }
+  const char kind = of_any_type.dtype().kind();
+  if (kind != 'i' && kind != 'u') {
+    throw Error(ErrorCode::usage,
+                fmt::format("cells: expected integers, per cent or -1, not numbers of type {}",
+                            std::string(py::str(of_any_type.dtype()))));
+  }
+  if (kind == 'u' && of_any_type.itemsize() == sizeof(std::uint64_t))
+    throw Error(ErrorCode::usage, "cells: uint64 is too large for per cent; use int8");
+  const auto cells = py::array_t<std::int64_t, py::array::c_style>::ensure(of_any_type);
   if (cells.ndim() != 2)
     throw Error(ErrorCode::usage,
                 fmt::format("cells: the shape is {}, expected (rows, columns)", shape_text(cells)));

@@ -11,8 +11,14 @@ namespace cairn::python {
 
 namespace py = pybind11;
 
-/// Calls a function written in Python after each step of a run, and knows when the run shall end:
-/// when the function has returned False or raised, or Ctrl-C was pressed. It is used by a thread
+/// Whether it is False, of Python or of NumPy; None, 0 and others are not.
+inline bool is_false(const py::object& answer) {
+  py::detail::make_caster<bool> truth;
+  return truth.load(answer, false) && !static_cast<bool>(truth);
+}
+
+/// Calls a function written in Python after each step of a run, which is to end when the function
+/// has returned False or raised, or Ctrl-C was pressed. It is used by a thread
 /// without the interpreter's lock.
 class Follower {
  public:
@@ -28,7 +34,7 @@ class Follower {
     if (!follows_ || function_.is_none() || stop_) return;
     const py::gil_scoped_acquire locked;
     try {
-      if (function_(step).is(py::bool_(false))) stop_ = true;
+      if (is_false(function_(step))) stop_ = true;
     } catch (const py::error_already_set& error) {
       if (!error.matches(PyExc_KeyboardInterrupt) || !interrupt_->load())
         raised_ = std::current_exception();

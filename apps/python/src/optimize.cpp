@@ -23,6 +23,7 @@
 #include "cairn/solve/optimizer.hpp"
 #include "cairn/typed/print.hpp"
 #include "component_names.hpp"
+#include "follower.hpp"
 #include "graph_arrays.hpp"
 #include "interrupt.hpp"
 #include "named_guess.hpp"
@@ -59,7 +60,7 @@ class Callback final : public Observer {
           std::make_shared<BoundIteration>(BoundIteration{iteration, &graph, &values});
       const py::object answer = function_(bound);
       bound->graph = nullptr;
-      return !answer.is(py::bool_(false));
+      return !is_false(answer);
     } catch (py::error_already_set& error) {
       const bool obeyed = error.matches(PyExc_KeyboardInterrupt) && interrupt_->load();
       if (!obeyed) raised_ = std::current_exception();

@@ -160,8 +160,9 @@ void offer_landmark(BoundPolicy& bound, Id id, const py::object& measured) {
 
 PoseReport end_pose(BoundPolicy& bound) {
   check_open(bound, true);
+  PoseReport report = bound.unlocked([](PosePolicy& policy) { return policy.end_pose(); });
   bound.open = false;
-  return bound.unlocked([](PosePolicy& policy) { return policy.end_pose(); });
+  return report;
 }
 
 bool finish(BoundPolicy& bound) {

@@ -34,6 +34,7 @@ BoundProposal proposal_of(const MatchProposal& proposal, const VariableType& typ
 
 PythonRegistration::PythonRegistration(const py::object& matcher)
     : match_(method(matcher, "match")),
+      begin_(method(matcher, "begin")),
       recognise_(method(matcher, "recognise")),
       pose_ended_(method(matcher, "pose_ended")) {
   if (match_.is_none()) match_ = matcher;
@@ -57,6 +58,11 @@ Result PythonRegistration::call(const Work& work, Result otherwise) {
     raised_ = std::current_exception();
     throw;
   }
+}
+
+void PythonRegistration::begin(const RegistrationData& data) {
+  recording_ = data.recording;
+  if (!begin_.is_none()) call([&] { return begin_(), true; }, true);
 }
 
 std::vector<Factor> PythonRegistration::match(Id earlier, Id later) {

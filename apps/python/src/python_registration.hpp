@@ -24,13 +24,14 @@ struct BoundProposal {
 BoundProposal proposal_of(const MatchProposal& proposal, const VariableType& type);
 
 /// A registration written in Python: a function match(proposal), or an object with a method `match`
-/// and, if it has them, `recognise(places, pose)` and `pose_ended(pose, kept)`. It lives under the
-/// interpreter's lock, and is called by a thread without it.
+/// and, if it has them, `begin()`, `recognise(places, pose)` and `pose_ended(pose, kept)`. It lives
+/// under the interpreter's lock, and is called by a thread without it.
 class PythonRegistration final : public Registration {
  public:
   explicit PythonRegistration(const py::object& matcher);
 
-  void begin(const RegistrationData& data) override { recording_ = data.recording; }
+  /// Before each run: those that find thresholds, and the one that selects.
+  void begin(const RegistrationData& data) override;
   std::vector<Factor> match(Id earlier, Id later) override;
   std::vector<Factor> match_proposed(const MatchProposal& proposal) override;
   std::optional<RecognisedPlace> recognise(std::span<const Id> places, Id pose) override;
@@ -47,7 +48,7 @@ class PythonRegistration final : public Registration {
   template <class Work, class Result>
   Result call(const Work& work, Result otherwise);
 
-  py::object match_, recognise_, pose_ended_;  ///< None: it has no such method
+  py::object match_, begin_, recognise_, pose_ended_;  ///< None: it has no such method
   const Graph* recording_ = nullptr;
   std::exception_ptr raised_;
 };

@@ -92,6 +92,8 @@ std::unique_ptr<BoundSparsified> sparsify(
   job.optimizer = parse_component(optimizer);
   job.linear_solver = linear_solver;
   job.estimator = estimator;
+  if (online < 0)
+    throw Error(ErrorCode::usage, "online: expected a number of poses, or 0 for all at once");
   job.online = online;
   job.as_given = as_given;
   job.measure = measure;
