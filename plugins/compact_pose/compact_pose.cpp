@@ -351,7 +351,6 @@ LinkReport CompactPose::offer(Id other, std::span<const Factor> measured) {
   if (other == graph_.newest_id()) refuse(fmt::format("a link from pose {} to itself", other));
   const Motion motion =
       measured.empty() ? Motion() : graph_.fuse(measured, other, graph_.newest_id());
-  if (!measured.empty()) graph_.make_permanent(pose);
   if (!searched_) search();
   LinkReport report{.earlier = other, .later = graph_.newest_id()};
   const std::optional<Candidate> candidate = take_candidate(pose);
@@ -367,6 +366,8 @@ LinkReport CompactPose::offer(Id other, std::span<const Factor> measured) {
               .covariance = to_matrix(motion.covariance, graph_.group().tangent_size())};
     typical_.note(link.covariance);
     report.verdict = judge(link, report);
+    if (report.verdict == LinkVerdict::linked || report.verdict == LinkVerdict::waiting)
+      graph_.make_permanent(pose);
     if (report.verdict == LinkVerdict::linked) {
       const bool noted = candidate && options_.keep == 0;  // it takes memory for every loop
       if (noted)

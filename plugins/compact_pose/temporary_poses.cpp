@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <functional>
 #include <limits>
 #include <map>
@@ -12,6 +13,7 @@
 #include <utility>
 
 #include "cairn/runtime/timed.hpp"
+#include "cairn/types/loss.hpp"
 #include "compact_graph.hpp"
 #include "compact_pose.hpp"
 #include "dense/cholesky.hpp"
@@ -87,8 +89,10 @@ MatrixXd eliminate(const MatrixXd& J, Index count) {
 
 double information_about(const MatrixXd& R, const MatrixXd& S, const MatrixXd& S_given) {
   const double all = log_determinant_of_rest(R * S * R.transpose());
-  if (all == -kInfinity) return kInfinity;
-  return std::max(0.0, 0.5 * (log_determinant_of_rest(R * S_given * R.transpose()) - all));
+  const double given = log_determinant_of_rest(R * S_given * R.transpose());
+  // Where R alone determines anything, the difference is one of infinities, or of rounding.
+  const double loss = 0.5 * (given - all);
+  return std::isfinite(loss) ? std::max(0.0, loss) : kInfinity;
 }
 
 // The graph ---------------------------------------------------------------------------------------
@@ -99,6 +103,8 @@ bool CompactGraph::temporary(int pose) const {
 
 void CompactGraph::make_temporary() {
   temporary_.push_back({kept_.back().id, solved_ == size() ? latest_factors_ : kComing});
+  // Where no landmark is seen none is judged, and judging many takes the cube of their number.
+  while (temporary_.size() > kMostTemporary + 1) temporary_.erase(temporary_.begin());
 }
 
 void CompactGraph::make_permanent(int pose) {
@@ -126,6 +132,12 @@ std::vector<CompactGraph::IncidentFactor> CompactGraph::factors_of_temporary() {
       states.push_back(estimator_->state(id).data());
     }
     Measured::Linear linear = Measured(factor, plain, "a factor").at(states);
+    if (factor.loss) {
+      const double squared = linear.residual.squaredNorm();
+      double weight = 1.0;
+      factor.loss->evaluate({&squared, 1}, {}, {&weight, 1});
+      for (MatrixXd& J : linear.J) J *= std::sqrt(weight);
+    }
     incident.push_back({*f, std::move(factor), std::move(linear.J)});
   }
   return incident;

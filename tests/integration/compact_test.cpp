@@ -284,6 +284,19 @@ TEST_F(Compact, KeepsTheMeasurementsOfLandmarksThatAreInformative) {
   EXPECT_THAT(again.err, HasSubstr("is in the map and in the recording"));
 }
 
+// A robust loss takes weight from measurements, so that they tell no more than without it.
+TEST_F(Compact, AMapWithLandmarksStopsGrowingWithARobustLossToo) {
+  const auto kept = [&](const Arguments& more) {
+    Arguments arguments{"compact", "@landmarks2d:poses=1200,streets=3,block=8,seed=3", "--quiet"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return report_of(arguments).at("poses").at("kept").as_int64();
+  };
+  const auto without = static_cast<double>(kept({}));
+  EXPECT_LT(without, 300);
+  EXPECT_LT(static_cast<double>(kept({"--loss", "huber:scale=1"})), 1.3 * without);
+  EXPECT_LT(static_cast<double>(kept({"--loss", "cauchy:scale=1"})), 1.6 * without);
+}
+
 TEST_F(Compact, ReportsTheStrategyThatRan) {
   const Arguments all{"compact", kWorld, "--range", "3", "--policy", "compact_pose:strategy=apal"};
   const auto report = report_of(all);

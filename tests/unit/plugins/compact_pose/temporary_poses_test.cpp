@@ -77,6 +77,15 @@ TEST(InformationAbout, IsInfiniteWhereNothingElseDetermines) {
             std::numeric_limits<double>::infinity());
 }
 
+TEST(InformationAbout, IsInfiniteWhereRoundingHidesThatNothingElseDetermines) {
+  const MatrixXd R = MatrixXd::Identity(2, 2);
+  const double infinite = std::numeric_limits<double>::infinity();
+  EXPECT_EQ(information_about(R, MatrixXd::Identity(2, 2) * 0.999, MatrixXd::Identity(2, 2)),
+            infinite);
+  EXPECT_EQ(information_about(R, MatrixXd::Constant(2, 2, std::nan("")), MatrixXd::Zero(2, 2)),
+            infinite);
+}
+
 /// A robot that drives round and round among landmarks, and measures each that is near.
 class TemporaryPoses : public testing::TestWithParam<int> {
  protected:
