@@ -17,6 +17,19 @@ struct HttpAnswer {
 HttpAnswer http_exchange(std::uint16_t port, std::string_view bytes);
 /// GET, with a Host of this machine.
 HttpAnswer http_get(std::uint16_t port, std::string_view target);
+/// A connection that is kept open, as browsers keep theirs.
+class HttpConnection {
+ public:
+  explicit HttpConnection(std::uint16_t port);
+  HttpConnection(const HttpConnection&) = delete;
+  HttpConnection& operator=(const HttpConnection&) = delete;
+  ~HttpConnection();
+  /// As `http_get`; without status once the server has closed the connection.
+  HttpAnswer get(std::string_view target);
+
+ private:
+  int socket_;
+};
 /// A port at which nobody listens, just now.
 std::uint16_t free_port();
 

@@ -39,7 +39,7 @@ using Response = http::response<http::string_body>;
 constexpr std::chrono::seconds kIdle{60};      // without a request, and for one to be read
 constexpr std::chrono::seconds kLongPoll{20};  // until an answer without lines
 constexpr std::chrono::milliseconds kPauseOfAccepting{100};  // where no more sockets can be had
-constexpr std::chrono::milliseconds kLookAtFollowers{20};
+constexpr std::chrono::milliseconds kCheckOfFollowers{20};
 constexpr std::size_t kMostConnections = 64;
 constexpr std::size_t kMostOfAnAnswer = std::size_t{4} << 20;  // [bytes], and one line more
 constexpr std::uint32_t kMostOfAHeader = 16384;                // [bytes]
@@ -67,13 +67,13 @@ struct Run {
   std::string page;
   std::vector<std::string> lines;
   bool ended = false;
-  std::size_t fetched = 0;  ///< lines that one who follows has got, the most
-  bool followed = false;
+  bool followed = false;    ///< lines have been asked for
+  std::size_t fetched = 0;  ///< the largest number of lines that a browser has received
 
-  std::string from(std::size_t first) const {
+  /// The lines of one answer, from number `next` on, which becomes that of the next answer.
+  std::string from(std::size_t& next) const {
     std::string text;
-    for (std::size_t k = first; k < lines.size() && text.size() < kMostOfAnAnswer; ++k)
-      text += lines[k];
+    for (; next < lines.size() && text.size() < kMostOfAnAnswer; ++next) text += lines[next];
     return text;
   }
 };
@@ -107,7 +107,10 @@ class Connection : public std::enable_shared_from_this<Connection> {
     closed_ = true;
   }
   bool is_closed() const { return closed_; }
-  bool is_sending() const { return sending_; }
+  /// Its browser has asked for lines and has not received all that there are.
+  bool is_behind() const {
+    return follows_ && !closed_ && (sending_ || received_ < run_.lines.size());
+  }
 
  private:
   /// By its name; the port may be another where a tunnel leads here.
@@ -128,7 +131,8 @@ class Connection : public std::enable_shared_from_this<Connection> {
     const std::optional<std::size_t> from = first_line(target);
     if (!from)
       return send(text_response(http::status::not_found, "there are / and /lines?from=N\n"));
-    run_.followed = true;
+    // A number beyond the end is of a page of another run, which has none of these lines.
+    if (*from <= run_.lines.size()) follows_ = run_.followed = true;
     if (*from < run_.lines.size() || run_.ended) return send_lines(*from);
     waits_for_ = from;
     stream_.expires_never();
@@ -140,10 +144,10 @@ class Connection : public std::enable_shared_from_this<Connection> {
 
   void send_lines(std::size_t from) {
     patience_.cancel();
-    const std::string text = run_.from(from);
-    const auto count = static_cast<std::size_t>(std::ranges::count(text, '\n'));
-    reached_ = std::min(from, run_.lines.size()) + count;
-    send(text_response(http::status::ok, text, "application/x-ndjson"));
+    const bool is_of_this_run = from <= run_.lines.size();
+    std::string text = run_.from(from);
+    if (is_of_this_run) sent_ = from;
+    send(text_response(http::status::ok, std::move(text), "application/x-ndjson"));
   }
 
   void send(Response response) {
@@ -159,7 +163,8 @@ class Connection : public std::enable_shared_from_this<Connection> {
                       [self = shared_from_this()](const error_code& error, std::size_t) {
                         self->sending_ = false;
                         if (error) return self->close();
-                        self->run_.fetched = std::max(self->run_.fetched, self->reached_);
+                        self->received_ = self->sent_;
+                        self->run_.fetched = std::max(self->run_.fetched, self->received_);
                         if (self->response_.keep_alive()) return self->read();
                         self->close();
                       });
@@ -172,8 +177,8 @@ class Connection : public std::enable_shared_from_this<Connection> {
   std::optional<http::request_parser<http::empty_body>> parser_;
   Response response_;
   std::optional<std::size_t> waits_for_;
-  std::size_t reached_ = 0;
-  bool sending_ = false, closed_ = false;
+  std::size_t sent_ = 0, received_ = 0;  // lines, counted from the first of the run
+  bool follows_ = false, sending_ = false, closed_ = false;
 };
 
 [[noreturn]] void fail(std::uint16_t port, const error_code& error) {
@@ -188,7 +193,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
 
 class RunServer::Service {
  public:
-  explicit Service(std::uint16_t port) : acceptor_(io_), pause_(io_), goodbye_(io_) {
+  explicit Service(std::uint16_t port) : acceptor_(io_), pause_(io_), next_check_(io_) {
     const tcp::endpoint here(asio::ip::address_v4::loopback(), port);
     error_code error;
     acceptor_.open(here.protocol(), error);
@@ -217,21 +222,21 @@ class RunServer::Service {
       look();
     });
   }
-  void finish(double farewell) {
+  void finish(double timeout) {
     const auto until = std::chrono::steady_clock::now() +
                        std::chrono::duration_cast<std::chrono::steady_clock::duration>(
-                           std::chrono::duration<double>(farewell));
-    const auto said = std::make_shared<std::promise<void>>();  // which its thread may set later
-    asio::post(io_, [this, until, said] {
+                           std::chrono::duration<double>(timeout));
+    const auto fetched = std::make_shared<std::promise<void>>();  // which may be set after return
+    asio::post(io_, [this, until, fetched] {
       run_.ended = true;
       look();
-      see_off(until, said);
+      wait_for_followers(until, fetched);
     });
-    said->get_future().wait_until(until + kLookAtFollowers);
+    fetched->get_future().wait_until(until + kCheckOfFollowers);
   }
 
  private:
-  using Said = std::shared_ptr<std::promise<void>>;
+  using Signal = std::shared_ptr<std::promise<void>>;
 
   void run() {
     while (!io_.stopped()) {
@@ -244,8 +249,11 @@ class RunServer::Service {
   void accept() {
     acceptor_.async_accept([this](const error_code& error, tcp::socket socket) {
       if (error == asio::error::operation_aborted) return;
-      if (!error) welcome(std::move(socket));
-      if (!error || error == asio::error::connection_aborted) return accept();
+      if (!error || error == asio::error::connection_aborted) {
+        accept();  // first: a connection that there is no memory for must not be the last
+        if (!error) welcome(std::move(socket));
+        return;
+      }
       pause_.expires_after(kPauseOfAccepting);  // of descriptors or memory
       pause_.async_wait([this](const error_code& cancelled) {
         if (!cancelled) accept();
@@ -261,21 +269,23 @@ class RunServer::Service {
   void look() {
     for (const auto& connection : connections_) connection->look();
   }
-  /// Until the last line has been fetched, if anybody follows.
-  void see_off(std::chrono::steady_clock::time_point until, const Said& said) {
-    const bool sending = std::ranges::any_of(
-        connections_, [](const auto& connection) { return connection->is_sending(); });
-    const bool done = !run_.followed || (run_.fetched >= run_.lines.size() && !sending);
-    if (done || std::chrono::steady_clock::now() >= until) return said->set_value();
-    goodbye_.expires_after(kLookAtFollowers);
-    goodbye_.async_wait([this, until, said](const error_code&) { see_off(until, said); });
+  /// Sets `fetched` once all browsers that have asked for lines have all of them. Of those that
+  /// have closed their connection since, which may ask again on another, one must have them all.
+  void wait_for_followers(std::chrono::steady_clock::time_point until, const Signal& fetched) {
+    const bool behind = std::ranges::any_of(
+        connections_, [](const auto& connection) { return connection->is_behind(); });
+    const bool done = !run_.followed || (run_.fetched >= run_.lines.size() && !behind);
+    if (done || std::chrono::steady_clock::now() >= until) return fetched->set_value();
+    next_check_.expires_after(kCheckOfFollowers);
+    next_check_.async_wait(
+        [this, until, fetched](const error_code&) { wait_for_followers(until, fetched); });
   }
 
   asio::io_context io_{1};
   Run run_;
   std::uint16_t port_ = 0;
   tcp::acceptor acceptor_;
-  asio::steady_timer pause_, goodbye_;
+  asio::steady_timer pause_, next_check_;
   std::list<std::shared_ptr<Connection>> connections_;
   std::thread thread_;
 };
@@ -286,6 +296,6 @@ RunServer::~RunServer() = default;
 std::uint16_t RunServer::port() const { return service_->port(); }
 void RunServer::show(std::string page) { service_->show(std::move(page)); }
 void RunServer::add(std::string_view line) { service_->add(line); }
-void RunServer::finish(double farewell) { service_->finish(farewell); }
+void RunServer::finish(double timeout) { service_->finish(timeout); }
 
 }  // namespace cairn

@@ -21,6 +21,7 @@ using namespace std::chrono_literals;
 using test::http_exchange;
 using test::http_get;
 using test::HttpAnswer;
+using test::HttpConnection;
 using testing::HasSubstr;
 
 bool is_ready(const std::future<HttpAnswer>& answer) {
@@ -75,13 +76,38 @@ TEST(RunServer, ItsEndWaitsForThoseWhoFollowAndForNobodyElse) {
   EXPECT_EQ(end.wait_for(50ms), std::future_status::timeout);
   EXPECT_EQ(http_get(server.port(), "/lines?from=1").body, "{\"end\":\"limit\"}\n");
   end.get();
-  // One who does not come again is not waited for beyond the farewell.
+  // A browser that does not ask again is not waited for beyond the timeout.
   RunServer left(0);
   http_get(left.port(), "/");
   left.add("{}\n");
   http_get(left.port(), "/lines?from=0");
   left.add("{}\n");
   left.finish(0.05);
+}
+
+TEST(RunServer, ItsEndWaitsForTheSlowestOfSeveral) {
+  constexpr double kLong = 1000.0;  // [s], which no test has
+  RunServer server(0);
+  server.add("{}\n");
+  HttpConnection fast(server.port()), slow(server.port()), of_another_run(server.port());
+  EXPECT_EQ(fast.get("/lines?from=0").body, "{}\n");
+  EXPECT_EQ(slow.get("/lines?from=0").body, "{}\n");
+  server.add("{\"end\":\"limit\"}\n");
+  EXPECT_EQ(fast.get("/lines?from=1").body, "{\"end\":\"limit\"}\n");
+  auto end = std::async(std::launch::async, [&] { server.finish(kLong); });
+  // A number beyond the end is no sign of the lines before it.
+  EXPECT_EQ(of_another_run.get("/lines?from=70").body, "");
+  EXPECT_EQ(end.wait_for(100ms), std::future_status::timeout);
+  EXPECT_EQ(slow.get("/lines?from=1").body, "{\"end\":\"limit\"}\n");
+  end.get();
+  // A browser that has closed its connection is not waited for once another one has all lines.
+  RunServer second(0);
+  second.add("{}\n");
+  { EXPECT_EQ(HttpConnection(second.port()).get("/lines?from=0").body, "{}\n"); }
+  second.add("{}\n");
+  HttpConnection stays(second.port());
+  EXPECT_EQ(stays.get("/lines?from=0").body, "{}\n{}\n");
+  second.finish(kLong);
 }
 
 TEST(RunServer, IsForBrowsersOfThisMachineThatRead) {

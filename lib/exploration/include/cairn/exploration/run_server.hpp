@@ -22,7 +22,8 @@ namespace cairn {
 /// `GET /` is the page, `GET /lines?from=N` the lines of the recording from number N on, a few MB
 /// at most, as soon as there is one (after 20 s an empty answer). A request whose Host is not this
 /// machine's is refused, so that a page of another site can't read the run through a name that
-/// resolves to 127.0.0.1; nothing can be sent that changes anything.
+/// resolves to 127.0.0.1; nothing can be sent that changes anything. Every user of this machine can
+/// read the run: there is no password.
 ///
 /// A thread of its own serves, so that no browser delays the run. All lines are kept in memory.
 class CAIRN_API RunServer {
@@ -40,8 +41,9 @@ class CAIRN_API RunServer {
   void show(std::string page);
   /// The next line, with its line end.
   void add(std::string_view line);
-  /// No line follows. Returns once browsers that follow have all of them, or after `farewell` [s].
-  void finish(double farewell = 3.0);
+  /// No line follows. Returns once every browser that has asked for lines, and whose connection is
+  /// open, has all of them, or after `timeout` [s].
+  void finish(double timeout = 3.0);
 
  private:
   class Service;
