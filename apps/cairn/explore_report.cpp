@@ -138,11 +138,13 @@ std::string summary_text(const ExploreOutcome& outcome) {
                             plural(result.collisions, "collision"))});
   std::string map = fmt::format("{:.1f} m² known", result.map.coverage());
   if (result.against) {
-    map += fmt::format(
-        ", {:.1f} % of the {:.1f} m² that hang together with the start; wrong: {:.2f} "
-        "m² free, {:.2f} m² occupied",
-        100.0 * result.against->seen / result.against->floor, result.against->floor,
-        result.against->free_wrong, result.against->occupied_wrong);
+    const MapTruth& truth = *result.against;
+    map += truth.floor > 0.0
+               ? fmt::format(", {:.1f} % of the {:.1f} m² that hang together with the start",
+                             100.0 * truth.seen / truth.floor, truth.floor)
+               : ", the start is not on free floor";
+    map += fmt::format("; wrong: {:.2f} m² free, {:.2f} m² occupied", truth.free_wrong,
+                       truth.occupied_wrong);
   }
   table.add({"map", map});
   std::string poses = fmt::format("{} of {} kept, {}", result.graph.variable_count(),

@@ -102,9 +102,9 @@ class Run {
   void begin() {
     LaserScan scan = parts_.world.begin(parts_.start);
     const std::optional<Pose2> truth = parts_.world.truth();
-    start_ = truth.value_or(parts_.start.pose.value_or(Pose2()));
-    log(start_, scan, truth);
-    slam_.begin(start_, std::move(scan), robot_.odometry, Pose2(robot_.step, 0.0, 0.0), truth);
+    const Pose2 start = truth.value_or(parts_.start.pose.value_or(Pose2()));
+    log(start, scan, truth);
+    slam_.begin(start, std::move(scan), robot_.odometry, Pose2(robot_.step, 0.0, 0.0), truth);
     parts_.explorer.begin(parts_.start.seed);
     record(0.0);
     if (!recorded_ && slam_.map().known_cells() == 0) {
@@ -145,6 +145,7 @@ class Run {
                          .loops = slam_.counts().loops,
                          .collisions = result_.collisions};
     if (!result_.steps.empty()) step.distance += result_.steps.back().distance;
+    if (!first_truth_) first_truth_ = step.truth;
     watch_progress(step);
     result_.steps.push_back(step);
     sample_map();
@@ -167,9 +168,11 @@ class Run {
                      .coverage = map.coverage(),
                      .error = contradicted_area(map, slam_.scans(), slam_.poses()),
                      .against = {}};
-    if (parts_.start.floor && parts_.world.truth())
-      sample.against =
-          compare_with_floor(map, *parts_.start.floor, alignment(estimate), start_.translation());
+    if (parts_.start.floor && first_truth_) {
+      if (const std::optional<Pose2> to_floor = alignment(estimate))
+        sample.against =
+            compare_with_floor(map, *parts_.start.floor, *to_floor, first_truth_->translation());
+    }
     return sample;
   }
 
@@ -312,12 +315,16 @@ class Run {
     result_.against = result_.samples.back().against;
   }
 
-  /// From the world of the estimate to that of the floor.
-  Pose2 alignment(const Graph& estimate) const {
+  /// From the world of the estimate to that of the floor; none: the true poses do not determine it.
+  std::optional<Pose2> alignment(const Graph& estimate) const {
     constexpr int kFewest = 3;  // poses that determine one
-    if (estimate.variable_count() < kFewest) return {};
+    const auto known = slam_.truth().variable_count();
+    if (known < kFewest) {
+      // A run that has just begun did so at the true pose.
+      return known == estimate.variable_count() ? std::optional(Pose2()) : std::nullopt;
+    }
     const Pose pose = align(pair_by_id(trajectory(estimate), trajectory(slam_.truth())));
-    return {pose.t.x(), pose.t.y(), std::atan2(pose.R(1, 0), pose.R(0, 0))};
+    return Pose2(pose.t.x(), pose.t.y(), std::atan2(pose.R(1, 0), pose.R(0, 0)));
   }
 
   const Exploration& parts_;
@@ -325,7 +332,7 @@ class Run {
   RecordedWorld* recorded_;  // null: it explores
   ScanSlam slam_;
   ExplorationResult result_;
-  Pose2 start_;
+  std::optional<Pose2> first_truth_;  // of the poses of which it is known
   bool ended_ = false, backing_off_ = false;
   int decisions_ = 0, empty_decisions_ = 0, idle_ = 0, collisions_in_row_ = 0;
   double most_coverage_ = 0.0, useful_distance_ = 0.0;

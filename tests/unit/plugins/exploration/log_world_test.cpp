@@ -137,6 +137,35 @@ TEST_F(LogWorldTest, ScansAreTakenAfterAStepOrATurn) {
   EXPECT_EQ(run_exploration(short_run).end, ExplorationEnd::limit);
 }
 
+/// True poses of some scans alone: the map is compared with the floor once three determine how the
+/// two lie, and from the first of them.
+TEST_F(LogWorldTest, TruePosesMayBeFewOrBeginLate) {
+  Registry registry;
+  if (!registry.has("registration", "icp")) GTEST_SKIP() << "without icp";
+  const auto run_with = [&](std::size_t first, std::size_t last) {
+    ScanLog log = log_;
+    for (std::size_t k = 0; k < log.scans.size(); ++k) {
+      if (k < first || k > last) log.scans[k].truth.reset();
+    }
+    write_scan_log(log, file_, registry);
+    ExplorationParts parts(named(",step=0,relative=0.05"));
+    parts.registration = parts.make<Registration>("icp");
+    Exploration exploration = parts.on(floor_, 5);
+    exploration.match_consecutive = true;
+    return run_exploration(exploration);
+  };
+  const std::size_t end = log_.scans.size() - 1;
+  for (const std::size_t only : {std::size_t{0}, end - 1, end})
+    EXPECT_FALSE(run_with(only, only).against) << only;
+  EXPECT_FALSE(run_with(end - 1, end).against);
+  const ExplorationResult late = run_with(6, end), middle = run_with(6, end - 3);
+  for (const ExplorationResult* run : {&late, &middle}) {
+    ASSERT_TRUE(run->against);
+    EXPECT_EQ(run->against->floor, run_.against->floor);
+    EXPECT_NEAR(run->against->seen, run_.against->seen, 0.02 * run_.against->floor);
+  }
+}
+
 TEST_F(LogWorldTest, SaysWhatIsWrongWithALog) {
   Registry registry;
   const auto refusal = [&](const std::string& name) -> std::string {
