@@ -230,13 +230,20 @@ void write_outputs(const ExploreOptions& options, const ExploreOutcome& outcome,
   });
 }
 
-/// The parts as they were named.
-ExploreParts parts_of(const ExploreOptions& options) {
+/// Matches of scans of a real floor may be wrong.
+constexpr const char* kLossOfRecordings = "cauchy:scale=2";
+constexpr const char* kNoLoss = "none";
+
+/// The parts as they were named, and the loss as it is without a name.
+ExploreParts parts_of(const ExploreOptions& options, bool is_recorded) {
   return {.world = spec_text(world_spec(options)),
           .policy = options.slam.policy,
           .registration = options.slam.registration,
           .mapper = options.slam.mapper,
           .explorer = options.explorer,
+          .loss = !options.loss.empty() ? options.loss
+                  : is_recorded         ? kLossOfRecordings
+                                        : kNoLoss,
           .seed = options.seed};
 }
 
@@ -256,14 +263,8 @@ std::optional<OccupancyGrid> floor_of(const ExploreOptions& options, const World
   return floor;
 }
 
-/// Matches of scans of a real floor may be wrong.
-constexpr const char* kLossOfRecordings = "cauchy:scale=2";
-
-std::shared_ptr<const Loss> loop_loss(const ExploreOptions& options, bool is_recorded,
-                                      Registry& registry) {
-  std::string name = options.loss;
-  if (name.empty()) name = is_recorded ? kLossOfRecordings : "none";
-  return name == "none" ? nullptr : registry.make<Loss>(name);
+std::shared_ptr<const Loss> loop_loss(const std::string& name, Registry& registry) {
+  return name == kNoLoss ? nullptr : registry.make<Loss>(name);
 }
 
 int compare_explorers(const ExploreOptions& options, Session& session) {
@@ -280,6 +281,8 @@ int compare_explorers(const ExploreOptions& options, Session& session) {
   const MatchModel match = match_of(options.match);
   const ExplorationLimits limits = limits_of(options.until);
   const std::optional<Pose2> start = start_of(options);
+  const ExploreParts parts = parts_of(options, false);
+  const std::shared_ptr<const Loss> loss = loop_loss(parts.loss, registry);
   const OccupancyGrid floor = load_floor(options.floor, session);
   const ExplorationSetup setup{.registry = registry,
                                .world = world,
@@ -290,9 +293,10 @@ int compare_explorers(const ExploreOptions& options, Session& session) {
                                .start = start,
                                .limits = limits,
                                .match = match,
-                               .decision_budget = options.decision_budget};
-  return run_comparison(options.comparison, options.recording.page, setup, options.floor,
-                        parts_of(options), session);
+                               .decision_budget = options.decision_budget,
+                               .loop_loss = loss};
+  return run_comparison(options.comparison, options.recording.page, setup, options.floor, parts,
+                        session);
 }
 
 int run_explore(const ExploreOptions& options, Session& session) {
@@ -310,18 +314,19 @@ int run_explore(const ExploreOptions& options, Session& session) {
     return with_seed(registry, kind, parse_component(name), options.seed);
   };
   const auto world = registry.make<World>(world_name);
+  if (!options.log.empty()) check_scan_log(world->robot().lidar, options.log, registry);
   const auto policy = registry.make<PosePolicy>(seeded(PosePolicy::kKind, options.slam.policy));
   const auto registration =
       registry.make<Registration>(seeded(Registration::kKind, options.slam.registration));
   const auto mapper = registry.make<Mapper>(parse_component(options.slam.mapper));
   const auto explorer = registry.make<Explorer>(parse_component(options.explorer));
   const bool is_recorded = query<RecordedWorld>(*world) != nullptr;
-  const std::shared_ptr<const Loss> loss = loop_loss(options, is_recorded, registry);
+  const ExploreParts parts = parts_of(options, is_recorded);
+  const std::shared_ptr<const Loss> loss = loop_loss(parts.loss, registry);
   const std::optional<OccupancyGrid> floor = floor_of(options, *world, is_recorded, session);
   ScanLog log;
   const InterruptGuard guard;  // until the results are written
   ExploreProgress progress(options, session);
-  const ExploreParts parts = parts_of(options);
   RunRecording recording(options.recording, recorded_run(options, parts, *world), session);
   Exploration exploration{
       .world = *world,

@@ -314,6 +314,7 @@ json::object comparison_json(const ExploreComparison& comparison) {
   report["policy"] = comparison.parts.policy;
   report["registration"] = comparison.parts.registration;
   report["mapper"] = comparison.parts.mapper;
+  report["loss"] = comparison.parts.loss;
   report["seed"] = comparison.parts.seed;
   report["runs_of_each"] = comparison.runs;
   report["repeatable"] = comparison.repeatable;

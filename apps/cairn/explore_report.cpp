@@ -79,6 +79,7 @@ json::object report_json(const ExploreOutcome& outcome) {
   report["registration"] = outcome.parts.registration;
   report["mapper"] = outcome.parts.mapper;
   report["explorer"] = outcome.parts.explorer;
+  report["loss"] = outcome.parts.loss;
   report["seed"] = outcome.parts.seed;
   report["repeatable"] = outcome.repeatable;
   report["end"] = std::string(to_string(result.end));

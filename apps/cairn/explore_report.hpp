@@ -12,7 +12,7 @@ namespace cairn::app {
 
 /// The components of a run, as they are named on the command line.
 struct ExploreParts {
-  std::string world, policy, registration, mapper, explorer;
+  std::string world, policy, registration, mapper, explorer, loss;
   std::uint64_t seed = 1;
 };
 

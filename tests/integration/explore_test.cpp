@@ -97,8 +97,11 @@ TEST_F(Explore, LogsThatCannotBeAreRefused) {
   EXPECT_THAT(refusal({"explore", "--world", "log"}, 2), HasSubstr("log:file=robot.clf"));
   EXPECT_THAT(refusal({"explore", kFloor, "--log", folder_.file("run.bag")}, 2), HasSubstr(".clf"));
   EXPECT_THAT(refusal({"explore", kFloor, "--runs", "2", "--log", log}, 2), HasSubstr("--log"));
-  const Outcome wide = explore({"--until", "steps=2", "--lidar", "fov=270", "--log", log});
+  // Before the run, which may be long.
+  const Outcome wide =
+      explore({"--until", "steps=2", "--lidar", "fov=270", "--log", log, "--live"});
   EXPECT_EQ(wide.exit_code, 2);
+  EXPECT_THAT(wide.err, Not(HasSubstr("--live: standard error is not a terminal")));
   EXPECT_THAT(unfolded(wide.err), HasSubstr("over 270°"));
   ASSERT_EQ(explore({"--until", "steps=2", "--log", log}).exit_code, 0);
   EXPECT_THAT(refusal({"explore", "--world", "log:file=" + log, "--runs", "2"}, 2),
@@ -107,6 +110,30 @@ TEST_F(Explore, LogsThatCannotBeAreRefused) {
   EXPECT_THAT(refusal({"explore", "--world", "log:file=" + log, "--log", log}, 2),
               HasSubstr("run.clf is read"));
   EXPECT_EQ(read_text(log), before);
+}
+
+TEST_F(Explore, TheLossIsThatOfOneRunAndOfComparedOnes) {
+  const std::string report = folder_.file("run.json");
+  const auto said = [&](const Arguments& more) {
+    Arguments words{"--until", "distance=25", "--json", report};
+    words.insert(words.end(), more.begin(), more.end());
+    const Outcome run = explore(words);
+    EXPECT_EQ(run.exit_code, 0) << run.err;
+    return parse_json(read_text(report));
+  };
+  // At this scale loop closures hardly count.
+  constexpr const char* kLoss = "cauchy:scale=0.01";
+  const std::string csv = folder_.file("runs.csv");
+  const auto plain = said({}), robust = said({"--loss", kLoss}),
+             compared = said({"--loss", kLoss, "--csv", csv});
+  EXPECT_EQ(plain.at("loss"), "none");
+  EXPECT_EQ(robust.at("loss"), kLoss);
+  EXPECT_EQ(compared.at("loss"), kLoss);
+  EXPECT_NE(plain.at("measures"), robust.at("measures"));
+  EXPECT_EQ(compared.at("runs").at(0).at("measures"), robust.at("measures"));
+  const Outcome wrong = explore({"--runs", "2", "--until", "steps=2", "--loss", "nonsense"});
+  EXPECT_EQ(wrong.exit_code, 5);
+  EXPECT_THAT(unfolded(wrong.err), HasSubstr("nonsense"));
 }
 
 TEST_F(Explore, AGraphOnStandardOutputIsAloneThere) {

@@ -159,7 +159,8 @@ ExplorationResult run_exploration(const ExplorationSetup& setup, const Component
                   .sample_distance = setup.sample_distance,
                   .interrupt = setup.interrupt,
                   .decided = hooks.decided,
-                  .moved = hooks.moved});
+                  .moved = hooks.moved,
+                  .loop_loss = setup.loop_loss});
 }
 
 std::vector<ComparedRun> compare_explorers(const ExplorerComparison& comparison,

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include <fmt/core.h>
 
@@ -34,6 +35,21 @@ void write_scan_log(const ScanLog& log, std::string_view name, Registry& registr
 void check_scan_log_name(std::string_view name, Registry& registry) {
   with_format<ScanLogFormat>(name, kWhat, registry,
                              [](ScanLogFormat&, const std::filesystem::path&) {});
+}
+
+void check_scan_log(const LidarModel& lidar, std::string_view name, Registry& registry) {
+  LoggedScan logged;
+  logged.scan = {.first_angle = lidar.first_angle(),
+                 .angle_step = lidar.step(),
+                 .max_range = lidar.range,
+                 .ranges = std::vector<float>(static_cast<std::size_t>(lidar.beams),
+                                              static_cast<float>(lidar.range))};
+  ScanLog log;
+  log.scans.push_back(std::move(logged));
+  with_format<ScanLogFormat>(name, kWhat, registry,
+                             [&](ScanLogFormat& format, const std::filesystem::path&) {
+                               static_cast<void>(format.write(log));
+                             });
 }
 
 std::size_t next_scan(const ScanLog& log, std::size_t from, double step, double turn) {

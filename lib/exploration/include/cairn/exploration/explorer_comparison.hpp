@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <functional>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -18,6 +19,7 @@
 #include "cairn/plugin/options.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/api.hpp"
+#include "cairn/types/loss.hpp"
 
 namespace cairn {
 
@@ -38,6 +40,7 @@ struct ExplorationSetup {
   double decision_budget = std::numeric_limits<double>::infinity();  ///< see `Exploration` [s]
   double sample_distance = kSampleDistance;                          ///< see `Exploration` [m]
   const std::atomic<bool>* interrupt = nullptr;
+  std::shared_ptr<const Loss> loop_loss = nullptr;  ///< see `Exploration`; runs share it
 };
 
 /// What a caller wants to see of a run while it goes on; see `Exploration`.

@@ -51,6 +51,8 @@ CAIRN_API ScanLog read_scan_log(std::string_view name, Registry& registry);
 CAIRN_API void write_scan_log(const ScanLog& log, std::string_view name, Registry& registry);
 /// Throws `Error` (usage) unless a format goes by that ending.
 CAIRN_API void check_scan_log_name(std::string_view name, Registry& registry);
+/// The same, and unless that format can hold scans of such a lidar.
+CAIRN_API void check_scan_log(const LidarModel& lidar, std::string_view name, Registry& registry);
 
 /// The first scan behind number `from` before which odometry has moved by `step` [m] or turned by
 /// `turn` [rad], or more; the number of scans if there is none.
