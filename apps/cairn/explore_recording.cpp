@@ -3,6 +3,8 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <cstdio>
+#include <string>
 #include <string_view>
 #include <utility>
 
@@ -68,13 +70,18 @@ void RunRecording::serve(Session& session) {
       fmt::format(R"({{"name":{},"complete":false,"header":{{}},"lines":[],"live":"lines"}})",
                   json_string(name_)));
   std::string page = draw_picture(album, {"html", {}}, session);
-  // A page in a file may ask nobody for anything; this one asks where it comes from.
+  // The policy of a page in a file allows no requests; this one requests lines from its server.
   constexpr std::string_view kPolicy = "Content-Security-Policy\" content=\"";
   const std::size_t at = page.find(kPolicy);
   if (at != std::string::npos) page.insert(at + kPolicy.size(), "connect-src 'self'; ");
   server_ = std::make_unique<RunServer>(static_cast<std::uint16_t>(*options_.port));
   server_->show(std::move(page));
-  session.note(fmt::format("follow the run at http://127.0.0.1:{}/", server_->port()));
+  const std::string address = fmt::format("http://127.0.0.1:{}/", server_->port());
+  // A port that was not named is known from here alone: it is a result.
+  if (session.common.quiet && *options_.port == 0)
+    fmt::print(stderr, "{}\n", address);
+  else
+    session.note("follow the run at " + address);
 }
 
 void RunRecording::follow(Exploration& exploration) {

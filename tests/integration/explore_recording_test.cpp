@@ -21,6 +21,7 @@ namespace {
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::Not;
+using ::testing::StartsWith;
 
 class ExploreRecording : public ExplorationCommands {
  protected:
@@ -98,6 +99,9 @@ TEST_F(ExploreRecording, IsServedOfOneRunAtAPortThatIsOne) {
   EXPECT_EQ(several.exit_code, 2);
   EXPECT_THAT(unfolded(several.err), HasSubstr("--serve is of one run"));
   EXPECT_THAT(explore({"--serve", "0"}).err, HasSubstr("follow the run at http://127.0.0.1:"));
+  // Port 0 is not known otherwise.
+  EXPECT_THAT(explore({"--serve", "0", "--quiet"}).err, StartsWith("http://127.0.0.1:"));
+  EXPECT_EQ(explore({"--serve", std::to_string(free_port()), "--quiet"}).err, "");
 }
 
 TEST_F(ExploreRecording, ThatWasCutShortIsShownAndSaid) {
