@@ -52,30 +52,37 @@ RunRecording::RunRecording(const RunRecordingOptions& options, const RecordedRun
                            Session& session)
     : options_(options), name_(run.name) {
   if (options.record.empty() && options.page.empty() && !options.port) return;
-  if (options.port) serve(session);
+  if (options.port)
+    server_ = std::make_unique<RunServer>(static_cast<std::uint16_t>(*options_.port));
   ExplorationRecorder::Each each;
   if (!options.page.empty() || options.port) {
     each = [this](std::string_view line) {
+      if (header_.empty()) header_ = line;
       if (!options_.page.empty()) text_ += line;
       if (server_) server_->add(line);
     };
   }
   recorder_.emplace(options.record, run, std::move(each));
+  if (!server_) return;
+  server_->show(live_page(session));
+  note_address(session);
 }
 
 /// The page that `cairn view` makes, which asks for the lines of the run instead of having them.
-void RunRecording::serve(Session& session) {
+std::string RunRecording::live_page(Session& session) const {
   Album album = begin_album(name_, "cairn explore --serve");
   album.explorations.push_back(
-      fmt::format(R"({{"name":{},"complete":false,"header":{{}},"lines":[],"live":"lines"}})",
-                  json_string(name_)));
+      fmt::format(R"({{"name":{},"complete":false,"header":{},"lines":[],"live":"lines"}})",
+                  json_string(name_), header_.substr(0, header_.find('\n'))));
   std::string page = draw_picture(album, {"html", {}}, session);
   // The policy of a page in a file allows no requests; this one requests lines from its server.
   constexpr std::string_view kPolicy = "Content-Security-Policy\" content=\"";
   const std::size_t at = page.find(kPolicy);
   if (at != std::string::npos) page.insert(at + kPolicy.size(), "connect-src 'self'; ");
-  server_ = std::make_unique<RunServer>(static_cast<std::uint16_t>(*options_.port));
-  server_->show(std::move(page));
+  return page;
+}
+
+void RunRecording::note_address(const Session& session) const {
   const std::string address = fmt::format("http://127.0.0.1:{}/", server_->port());
   // A port that was not named is known from here alone: it is a result.
   if (session.common.quiet && *options_.port == 0)

@@ -37,12 +37,14 @@ class RunRecording {
   void write(const ExplorationResult& result, Results& results, Session& session);
 
  private:
-  void serve(Session& session);
+  std::string live_page(Session& session) const;
+  void note_address(const Session& session) const;
   void write_page(Session& session) const;
 
   const RunRecordingOptions& options_;
   std::string name_;
-  std::string text_;  // for the page
+  std::string text_;    // for the page
+  std::string header_;  // its first line
   std::unique_ptr<RunServer> server_;
   std::optional<ExplorationRecorder> recorder_;
 };

@@ -146,7 +146,7 @@ class Carmen final : public ScanLogFormat {
       text += fmt::format("ODOM {} 0 0 0 {}", at, when);
       text += fmt::format("{}{}", kScan, logged.scan.ranges.size());
       for (const float measured : logged.scan.ranges)
-        text += std::isnan(measured) ? fmt::format(" {}", kNothing) : fmt::format(" {}", measured);
+        text += fmt::format(" {}", readable(measured, logged.scan.max_range));
       text += fmt::format(" {} {} {}", at, at, when);
     }
     return text;
@@ -155,6 +155,12 @@ class Carmen final : public ScanLogFormat {
  private:
   static std::string pose_text(const Pose2& pose) {
     return fmt::format("{} {} {}", pose.x(), pose.y(), pose.theta());
+  }
+
+  /// What `read` takes for the same: it refuses what is not finite.
+  static double readable(float measured, double max_range) {
+    if (std::isnan(measured)) return kNothing;
+    return std::isinf(measured) ? (measured > 0.0F ? max_range : 0.0) : measured;
   }
 
   static Pose2 pose(Words& words) {

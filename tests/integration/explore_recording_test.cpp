@@ -90,6 +90,8 @@ TEST_F(ExploreRecording, IsServedWhileItIsWritten) {
   EXPECT_THAT(run.err, HasSubstr(fmt::format("http://127.0.0.1:{}/", port)));
   EXPECT_EQ(lines_served.get(), lines(read_text(record)));
   EXPECT_THAT(page, AllOf(HasSubstr("\"live\":\"lines\""), HasSubstr("connect-src 'self'")));
+  // Floor, seed and parts are in the page itself.
+  EXPECT_THAT(page, HasSubstr("\"header\":" + lines(read_text(record)).front()));
   EXPECT_EQ(http_get(port, "/").status, 0);
 }
 

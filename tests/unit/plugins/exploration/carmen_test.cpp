@@ -108,6 +108,22 @@ TEST(Carmen, WhatIsWrittenIsReadAgain) {
   }
 }
 
+TEST(Carmen, AScanOfALongRangeWithInfiniteReadingsIsReadAgain) {
+  constexpr float kInfinite = std::numeric_limits<float>::infinity();
+  ScanLog log;
+  log.scans.push_back({.odometry = {},
+                       .scan = {.first_angle = -0.5 * pi,
+                                .angle_step = 0.5 * pi,
+                                .max_range = 30.0,
+                                .ranges = {25.0F, kInfinite, -kInfinite}}});
+  const std::string text = Registry().make<ScanLogFormat>(parse_component("carmen"))->write(log);
+  const LaserScan trusted = read(text, "range=30").scans.front().scan;
+  EXPECT_EQ(trusted.max_range, 30.0);
+  EXPECT_EQ(trusted.ranges, (std::vector<float>{25.0F, 30.0F, 0.0F}));
+  EXPECT_EQ(measured_beams(trusted), measured_beams(log.scans.front().scan));
+  EXPECT_EQ(read(text, "none=80").scans.front().scan.max_range, 20.0);  // unless it is asked for
+}
+
 TEST(Carmen, ScansThatItCannotHoldAreRefused) {
   const auto refusal = [](const LidarModel& lidar) -> std::string {
     ScanLog log;

@@ -39,8 +39,8 @@ class CAIRN_API ScanLogFormat : public Component {
   virtual std::vector<std::string> extensions() const = 0;
   /// Throws `Error` (input) with file and line for what cannot be read. `name`: for messages.
   virtual ScanLog read(std::string_view text, const std::string& name) = 0;
-  /// The text of a log, from which `read` has the same scans. Throws `Error` (usage) for what the
-  /// format cannot hold.
+  /// The text of a log, from which `read` has the same scans, if its options trust the lidar as far
+  /// as it sees. Throws `Error` (usage) for what the format cannot hold.
   virtual std::string write(const ScanLog& log) = 0;
 };
 
