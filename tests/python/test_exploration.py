@@ -50,6 +50,14 @@ def test_it_does_what_the_program_does(tmp_path):
     assert len(result.decision_seconds) == result.measures["decisions"] and result.converged
 
 
+def test_a_recorded_robot_is_refused(tmp_path):
+    room().write(tmp_path / "floor.yaml")
+    command = [os.environ["CAIRN_PROGRAM"], "explore", "floor.yaml", "--until", "steps=3", "--log", "run.clf", "--quiet"]
+    subprocess.run(command, cwd=tmp_path, check=True, stdout=subprocess.DEVNULL)
+    with pytest.raises(cairn.Error, match="cairn explore --world log"):
+        cairn.explore(room(), world=f"log:file={tmp_path / 'run.clf'}")
+
+
 def test_a_callback_sees_each_motion_and_may_end_it():
     seen = []
     result = cairn.explore(room(), start=Pose2(0, 3, 0), callback=lambda step: seen.append(step) or step.step < 5)

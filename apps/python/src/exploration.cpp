@@ -20,6 +20,7 @@
 #include "bound_graph.hpp"
 #include "cairn/exploration/exploration_measures.hpp"
 #include "cairn/exploration/explorer_comparison.hpp"
+#include "cairn/exploration/recorded_world.hpp"
 #include "cairn/grid/grid.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
@@ -64,6 +65,16 @@ ExplorationLimits limits_of(const Limits& given) {
   return limits;
 }
 
+/// A recorded robot is mapped otherwise: its scans are matched in a row, and loop closures have a
+/// robust loss.
+void refuse_recorded(const ComponentSpec& world, Registry& registry) {
+  if (!query<RecordedWorld>(*registry.make<World>(world))) return;
+  throw Error(ErrorCode::usage,
+              fmt::format("world: a robot of '{}' has driven already, which is mapped otherwise: "
+                          "run `cairn explore --world {}:file=…`",
+                          world.name, world.name));
+}
+
 std::unique_ptr<BoundExploration> explore(
     const OccupancyGrid& floor, const std::string& explorer, std::uint64_t seed,
     const std::optional<Pose2>& start, std::optional<double> max_distance,
@@ -84,6 +95,7 @@ std::unique_ptr<BoundExploration> explore(
                          .start = start,
                          .limits = limits_of({max_distance, max_steps, max_decisions}),
                          .interrupt = &follower.stop()};
+  refuse_recorded(setup.world, setup.registry);
   set_positive("match_range", match_range, setup.match.range);
   set_positive("match_angle", match_angle, setup.match.angle);
   set_positive("decision_budget", decision_budget, setup.decision_budget);
