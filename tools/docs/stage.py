@@ -25,16 +25,6 @@ LINK = re.compile(r"(!?)\[((?:[^\[\]]|\[[^\]]*\])*)\]\(([^()\s]+(?:\([^()]*\))?)
 FENCE = re.compile(r"^(```.*?^```[^\S\n]*$)", re.MULTILINE | re.DOTALL)
 
 
-def outside_code(text, change):
-    """Applies `change` to all but fenced blocks and spans of code."""
-    parts = FENCE.split(text)
-    for k in range(0, len(parts), 2):
-        spans = re.split(r"(`+[^`\n]*`+)", parts[k])
-        spans[::2] = [change(span) for span in spans[::2]]
-        parts[k] = "".join(spans)
-    return "".join(parts)
-
-
 class Stage:
     def __init__(self, folder):
         self.folder = folder
@@ -49,7 +39,7 @@ class Stage:
         """A page of the repository, with its links checked."""
         source = SOURCE / name
 
-        # Code in the text of a link would split it: code is put aside first.
+        # Fenced blocks are left as they are.
         def link(match):
             return self.link(match, source)
 

@@ -53,9 +53,9 @@ class CAIRN_API FactorType {
   virtual void squared_norms(const FactorView& pool, std::size_t begin, std::size_t end,
                              double* out) const = 0;
 
-  /// Adds what factors [begin, end) contribute to H = Σ w JᵀJ and g = −Σ w Jᵀr. `weights` (null:
-  /// all one) holds end - begin weights, the first derivative of the loss. out_squared_norms,
-  /// unless null, gets ‖r_f‖² as `squared_norms` gives it.
+  /// Puts what factors [begin, end), in this order, contribute to H = Σ w JᵀJ and g = −Σ w Jᵀr at
+  /// the targets of `sink`, each once. `weights` (null: all one): end - begin first derivatives of
+  /// the loss. out_squared_norms, unless null, gets ‖r_f‖² as `squared_norms` gives it.
   virtual void linearize(const FactorView& pool, std::size_t begin, std::size_t end,
                          const double* weights, const LinearizeSink& sink,
                          double* out_squared_norms) const = 0;

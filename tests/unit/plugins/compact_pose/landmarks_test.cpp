@@ -8,7 +8,6 @@
 #include <cmath>
 #include <limits>
 #include <memory>
-#include <numbers>
 #include <numeric>
 #include <string>
 #include <vector>
@@ -21,11 +20,11 @@
 #include "cairn/lie/se2.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/types/define_factor.hpp"
-#include "support/components.hpp"
 #include "support/dense_algebra.hpp"
 #include "support/dense_system.hpp"
 #include "support/pose_world.hpp"
 #include "support/sample_graphs.hpp"
+#include "unit/plugins/compact_pose/landmark_course.hpp"
 #include "unit/plugins/compact_pose/robot.hpp"
 
 namespace cairn::compact {
@@ -43,9 +42,6 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::SizeIs;
 using Pose = PoseWorld::Pose;
-
-constexpr Id kFirstLandmark = 1000;
-constexpr double kSigma = 0.1;  ///< of what is measured of a landmark [m]
 
 // The choice among observations -----------------------------------------------------------------
 
@@ -135,39 +131,14 @@ TEST(ChooseObservations, LeavesOutWhatDoesNotPass) {
 
 // The policy --------------------------------------------------------------------------------------
 
-/// A robot that drives round and round, in the plane or in space, among landmarks; and everything
-/// it measures as a graph of its own.
-class Landmarks : public testing::TestWithParam<int> {
+/// Everything that is measured as a graph of its own, too.
+class Landmarks : public LandmarkCourse {
  protected:
-  static constexpr int kLap = 24;
-
-  Landmarks() : world_(test::types_of(GetParam(), registry_)), draw_(5) {
-    const bool planar = GetParam() == 2;
-    point_ = registry_.variable_type(planar ? "VERTEX_XY" : "VERTEX_TRACKXYZ");
-    seen_ = registry_.factor_type(planar ? "EDGE_SE2_XY" : "EDGE_SE3_TRACKXYZ");
-    for (int k = 0; k < 8; ++k) {
-      const double angle = 2.0 * std::numbers::pi * k / 8.0;
-      // The course is a circle of radius kLap / 2π about (0, that).
-      landmarks_.emplace_back(6.0 * std::cos(angle),
-                              kLap / (2.0 * std::numbers::pi) + 6.0 * std::sin(angle),
-                              planar ? 0.0 : 0.5 * std::sin(2.0 * angle));
-    }
-  }
-
-  MatrixXd Sigma(double translation, double rotation) const {
-    VectorXd sigmas = VectorXd::Constant(world_.tangent(), rotation);
-    sigmas.head(GetParam()).setConstant(translation);
-    return sigmas.cwiseAbs2().asDiagonal();
-  }
   void begin(const std::string& options) {
-    policy_ = registry_.make<PosePolicy>("compact_pose:range=3,angle=3.15" +
-                                         (options.empty() ? "" : "," + options));
-    truth_ = {world_.identity()};
+    begin_course("range=3,angle=3.15" + (options.empty() ? "" : "," + options));
     all_ = {};
     all_.set_fixed(all_.add_variable(world_.types().pose, 0, truth_.front()));
-    policy_->add_pose(world_.variable(0, truth_.front(), true), {});
   }
-  Id newest() const { return static_cast<Id>(truth_.size()) - 1; }
   void put(const Factor& factor) {
     std::vector<int> on;
     for (const Id id : factor.variables) on.push_back(*all_.find(id));
@@ -175,36 +146,11 @@ class Landmarks : public testing::TestWithParam<int> {
   }
   PoseReport advance() {
     const PoseReport report = policy_->end_pose();
-    VectorXd step = VectorXd::Zero(world_.tangent());
-    step[0] = 1.0;
-    step[step.size() - 1] = 2.0 * std::numbers::pi / kLap;
-    truth_.push_back(world_.moved(truth_.back(), step));
-    const MatrixXd S = Sigma(0.05, 0.02);
-    const Factor odometry =
-        world_.edge(newest() - 1, newest(), world_.moved(step_motion(step), draw_.error(S)), S);
+    const Factor odometry = moved_on();
     all_.add_variable(world_.types().pose, newest(), truth_.back());
     put(odometry);
     policy_->add_pose(world_.variable(newest()), {&odometry, 1});
     return report;
-  }
-  Pose step_motion(const VectorXd& step) const { return world_.moved(world_.identity(), step); }
-  LandmarkObservation see(int landmark, double sigma = kSigma) {
-    const auto [R, t] = world_.split(truth_.back());
-    const Vector3d at = R.transpose() * (landmarks_[landmark] - t);
-    const int d = GetParam();
-    std::vector<double> z;
-    for (int k = 0; k < d; ++k) z.push_back(at[k] + sigma * draw_.normal());
-    const Id id = kFirstLandmark + landmark;
-    return {{.type = point_, .id = id, .state = {}},
-            {{seen_, {newest(), id}, z, pack(MatrixXd::Identity(d, d) / (sigma * sigma))}}};
-  }
-  std::vector<int> visible() const {
-    const auto [R, t] = world_.split(truth_.back());
-    std::vector<int> near;
-    for (std::size_t k = 0; k < landmarks_.size(); ++k) {
-      if ((landmarks_[k] - t).norm() < 4.0) near.push_back(static_cast<int>(k));
-    }
-    return near;
   }
   /// Drives on, and sees what is near.
   std::vector<PoseReport> drive(int poses) {
@@ -234,14 +180,6 @@ class Landmarks : public testing::TestWithParam<int> {
     return (at - landmarks_[static_cast<std::size_t>(landmark - kFirstLandmark)]).norm();
   }
 
-  Registry registry_;
-  PoseWorld world_;
-  Draw draw_;
-  std::shared_ptr<const VariableType> point_;
-  std::shared_ptr<const FactorType> seen_;
-  std::vector<Vector3d> landmarks_;
-  std::unique_ptr<PosePolicy> policy_;
-  std::vector<Pose> truth_;
   Graph all_;
 };
 

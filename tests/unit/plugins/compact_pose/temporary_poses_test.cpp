@@ -6,8 +6,6 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <memory>
-#include <numbers>
 #include <set>
 #include <string>
 #include <vector>
@@ -15,13 +13,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "cairn/graph/packed.hpp"
 #include "cairn/policy/pose_policy.hpp"
-#include "support/components.hpp"
 #include "support/dense_algebra.hpp"
 #include "support/dense_system.hpp"
 #include "support/pose_world.hpp"
-#include "unit/plugins/compact_pose/robot.hpp"
+#include "unit/plugins/compact_pose/landmark_course.hpp"
 
 namespace cairn::compact {
 namespace {
@@ -86,63 +82,21 @@ TEST(InformationAbout, IsInfiniteWhereRoundingHidesThatNothingElseDetermines) {
             infinite);
 }
 
-/// A robot that drives round and round among landmarks, and measures each that is near.
-class TemporaryPoses : public testing::TestWithParam<int> {
+class TemporaryPoses : public LandmarkCourse {
  protected:
-  static constexpr int kLap = 24;
-  static constexpr Id kFirstLandmark = 1000000;
-
-  TemporaryPoses() : world_(test::types_of(GetParam(), registry_)), draw_(5) {
-    const bool planar = GetParam() == 2;
-    point_ = registry_.variable_type(planar ? "VERTEX_XY" : "VERTEX_TRACKXYZ");
-    seen_ = registry_.factor_type(planar ? "EDGE_SE2_XY" : "EDGE_SE3_TRACKXYZ");
-    for (int k = 0; k < 8; ++k) {
-      const double angle = 2.0 * std::numbers::pi * k / 8.0;
-      landmarks_.emplace_back(6.0 * std::cos(angle),
-                              kLap / (2.0 * std::numbers::pi) + 6.0 * std::sin(angle),
-                              planar ? 0.0 : 0.5 * std::sin(2.0 * angle));
-    }
-  }
-
   void begin(const std::string& options) {
-    policy_ = registry_.make<PosePolicy>("compact_pose:range=3,angle=0.6" +
-                                         (options.empty() ? "" : "," + options));
-    truth_ = {world_.identity()};
-    policy_->add_pose(world_.variable(0, truth_.front(), true), {});
-  }
-  void see() {
-    constexpr double kSigma = 0.1;
-    const auto [R, t] = world_.split(truth_.back());
-    for (std::size_t k = 0; k < landmarks_.size(); ++k) {
-      if ((landmarks_[k] - t).norm() > 4.0) continue;
-      const Vector3d at = R.transpose() * (landmarks_[k] - t);
-      std::vector<double> z;
-      for (int d = 0; d < GetParam(); ++d) z.push_back(at[d] + kSigma * draw_.normal());
-      const Id id = kFirstLandmark + static_cast<Id>(k), pose = static_cast<Id>(truth_.size()) - 1;
-      const MatrixXd information = MatrixXd::Identity(GetParam(), GetParam()) / (kSigma * kSigma);
-      policy_->offer_landmark(
-          {{.type = point_, .id = id, .state = {}}, {{seen_, {pose, id}, z, pack(information)}}});
-    }
+    begin_course("range=3,angle=0.6" + (options.empty() ? "" : "," + options));
   }
   PoseReport advance() {
     const PoseReport report = policy_->end_pose();
     removed_ = policy_->removed();
-    VectorXd step = VectorXd::Zero(world_.tangent()), sigmas = step;
-    step[0] = 1.0;
-    step[step.size() - 1] = 2.0 * std::numbers::pi / kLap;
-    sigmas.setConstant(0.02);
-    sigmas.head(GetParam()).setConstant(0.05);
-    const MatrixXd S = sigmas.cwiseAbs2().asDiagonal();
-    const auto motion = world_.moved(world_.identity(), step);
-    truth_.push_back(world_.moved(truth_.back(), step));
-    const Id now = static_cast<Id>(truth_.size()) - 1;
-    const Factor odometry = world_.edge(now - 1, now, world_.moved(motion, draw_.error(S)), S);
-    policy_->add_pose(world_.variable(now), {&odometry, 1});
+    const Factor odometry = moved_on();
+    policy_->add_pose(world_.variable(newest()), {&odometry, 1});
     return report;
   }
   void drive(int poses) {
     for (int k = 0; k < poses; ++k) {
-      see();
+      for (const int landmark : visible()) policy_->offer_landmark(see(landmark));
       const PoseReport report = advance();
       if (report.kept) kept_.insert(report.id);
       for (const Id id : removed_) kept_.erase(id);
@@ -156,14 +110,6 @@ class TemporaryPoses : public testing::TestWithParam<int> {
         .norm();
   }
 
-  Registry registry_;
-  PoseWorld world_;
-  Draw draw_;
-  std::shared_ptr<const VariableType> point_;
-  std::shared_ptr<const FactorType> seen_;
-  std::vector<Vector3d> landmarks_;
-  std::unique_ptr<PosePolicy> policy_;
-  std::vector<PoseWorld::Pose> truth_;
   std::set<Id> kept_{0};
   std::vector<Id> removed_;
 };
