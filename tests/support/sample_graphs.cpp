@@ -205,8 +205,8 @@ Graph stiff_chain(int poses, double strong) {
   return graph;
 }
 
-Graph held_by_a_point() {
-  Graph graph = poses_and_points(8, 0.01);
+Graph held_by_a_point(int poses) {
+  Graph graph = poses_and_points(poses, 0.01);
   graph.set_fixed(*graph.find(1000));
   return graph;
 }

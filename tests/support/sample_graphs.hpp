@@ -19,7 +19,7 @@ Graph ring_of_poses(int poses, double noise, int outliers = 0);
 Graph poses_and_points(int poses, double noise);
 
 /// As `poses_and_points`, but held by one point alone: the whole may turn about it.
-Graph held_by_a_point();
+Graph held_by_a_point(int poses = 8);
 
 /// Poses in steps of 100 m along x, with relative poses of so much information between neighbours,
 /// and an absolute pose of information 1 of the first.

@@ -9,6 +9,9 @@ namespace cairn {
 /// does nothing against the long chains of a trajectory, which is where the iterations go.
 class BlockJacobi final : public Preconditioner {
  public:
+  BlockJacobi() = default;
+  /// Factorised already; `diagonal` must outlive this object.
+  explicit BlockJacobi(const iterative::DiagonalBlocks& diagonal) : diagonal_(&diagonal) {}
   void analyze(const BlockStructure& structure) override;
   Factorization factorize(const BlockMatrix& H, const iterative::DiagonalBlocks& diagonal,
                           const NormalBlocks* factors) override;

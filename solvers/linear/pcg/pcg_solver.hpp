@@ -62,7 +62,8 @@ struct PcgOptions {
 /// often. That H is not positive definite is a failed factorisation where a diagonal block, or the
 /// preconditioner, shows it; where only a direction p with pᵀHp ≤ 0 does, in a solve, the x so far
 /// is returned and reported. An H that is only semidefinite, as under a free gauge, is solved all
-/// the same.
+/// the same: where the preconditioner is nearly singular then, and its solution leaves more than a
+/// tenth of g, the diagonal blocks take its place.
 ///
 /// Sums are taken in a fixed order: results do not depend on the number of threads.
 ///
@@ -91,8 +92,16 @@ class PcgSolver final : public LinearSolver, public IterativeSolver, public Jaco
     double plain = 0.0, scaled = 0.0;
     bool within(const Norms& goal) const { return plain <= goal.plain && scaled <= goal.scaled; }
   };
+  struct Outcome {
+    Norms residual;
+    iterative::Ending ending;
+  };
+  /// x = H⁻¹ g_ from 0, as far as it goes; `whole`: the norms of g. Adds to `iterations`.
+  Outcome solve_with(Preconditioner& preconditioner, const Norms& whole, std::span<double> x,
+                     std::int64_t& iterations);
   /// Improves x until its residual r is small; both are kept up to date. Adds to `iterations`.
-  iterative::Ending iterate(const Norms& goal, std::span<double> x, std::int64_t& iterations);
+  iterative::Ending iterate(Preconditioner& preconditioner, const Norms& goal, std::span<double> x,
+                            std::int64_t& iterations);
   Norms true_residual(std::span<const double> x);
   double scaled_norm();  ///< of r
   /// r = r − α q, x = x + α p; returns ‖r‖².

@@ -143,6 +143,29 @@ TEST_P(FreeGaugeTest, IsAnAnswerNotACrash) {
   }
 }
 
+// Near the minimum g is small, and what rounding leaves of it in the free direction, divided by the
+// nearly zero pivot of a preconditioner, is as large as the step.
+TEST_P(FreeGaugeTest, IsNoObstacleToConjugateGradients) {
+  Registry registry;
+  if (!registry.has("optimizer", GetParam()) || !registry.has("linear_solver", "pcg") ||
+      !registry.has("linear_solver", "block_cholesky"))
+    GTEST_SKIP();
+  const auto optimize = [&](int poses, const std::string& solver) {
+    Graph graph = held_by_a_point(poses);
+    return registry.make<Optimizer>(ComponentSpec{GetParam(), {{"linear_solver", solver}}})
+        ->optimize(graph);
+  };
+  for (int poses = 8; poses < 48; ++poses) {
+    const Summary expected = optimize(poses, "block_cholesky");
+    for (const char* preconditioner : {"incomplete_cholesky", "block_jacobi", "subgraph"}) {
+      SCOPED_TRACE(testing::Message() << poses << " poses, " << preconditioner);
+      const Summary summary = optimize(poses, std::string("pcg:preconditioner=") + preconditioner);
+      EXPECT_EQ(summary.status, Status::converged);
+      EXPECT_LE(summary.final_chi2, expected.final_chi2 * (1.0 + 1e-9));
+    }
+  }
+}
+
 TEST_P(FreeGaugeTest, NamesTheVariableWhereNothingHasWeight) {
   Registry registry;
   if (!registry.has("optimizer", GetParam()) || !registry.has("linear_solver", "eigen"))
