@@ -16,6 +16,8 @@ namespace {
 
 /// Groups of chains that one thread takes at a time.
 constexpr std::size_t kGroupsTogether = 8;
+/// Right-hand sides that are solved for together, as `SupernodalCholesky` has them.
+constexpr int kColumnsTogether = 8;
 
 template <class Body>
 void for_each_group(const Chains& chains, const Body& body) {
@@ -28,6 +30,11 @@ void for_each_group(const Chains& chains, const Body& body) {
 /// Where the numbers of a chain start in an array with `count` numbers for each lane.
 std::int64_t of_chain(const Chains& chains, const Chains::Chain& chain, std::int64_t count) {
   return (std::int64_t{chain.group} * chains.lanes() + chain.lane) * count;
+}
+
+/// Room for so many numbers; those that it has are lost.
+void grow(UninitializedVector& numbers, std::int64_t count) {
+  if (std::ssize(numbers) < count) numbers = UninitializedVector(count);
 }
 
 }  // namespace
@@ -53,11 +60,8 @@ void ChainCholesky::analyze(const BlockStructure& structure, std::string_view or
   const std::int64_t nodes = chains_.group_begin(chains_.groups()), d = chains_.block_size();
   const std::int64_t lanes = std::int64_t{chains_.groups()} * chains_.lanes();
   panels_ = UninitializedVector(nodes * panel_numbers());
-  y_ = UninitializedVector(nodes * d);
   ends_ = UninitializedVector(lanes * 3 * d * d);
-  ends_of_g_ = UninitializedVector(lanes * 2 * d);
   failed_.assign(chains_.groups(), 0);
-  g_rest_.resize(chains_.rest().size());
 }
 
 Factorization ChainCholesky::factorize(const BlockMatrix& H) {
@@ -125,42 +129,76 @@ void ChainCholesky::add_ends_to_rest(const BlockMatrix& H) {
 
 void ChainCholesky::solve(std::span<const double> g, std::span<double> x) {
   if (chains_.empty()) return rest_.solve(g, x);
+  solve_together(g, x, 1);
+}
+
+/// Chains of a group for all right-hand sides before the next group, so that its panel stays near;
+/// each side as if it were alone.
+void ChainCholesky::solve_together(std::span<const double> G, std::span<double> X, int columns) {
   if (!factorized_) throw std::logic_error("solve: there is no factorisation");
-  const int d = chains_.block_size();
-  const auto ends_of = [&](int group) {
-    return ends_of_g_.data() + std::int64_t{group} * chains_.lanes() * 2 * d;
+  const std::int64_t d = chains_.block_size(), size = structure_->size(),
+                     rest_size = chains_.rest().size();
+  const std::int64_t nodes = chains_.group_begin(chains_.groups());
+  const std::int64_t ends_size = std::int64_t{chains_.groups()} * chains_.lanes() * 2 * d;
+  grow(y_, nodes * d * columns);
+  grow(ends_of_g_, ends_size * columns);
+  G_rest_.resize(static_cast<std::size_t>(rest_size * columns));
+  const auto y_of = [&](int group, std::int64_t c) {
+    return y_.data() + (chains_.group_begin(group) * columns +
+                        (chains_.group_begin(group + 1) - chains_.group_begin(group)) * c) *
+                           d;
+  };
+  const auto ends_of = [&](int group, std::int64_t c) {
+    return ends_of_g_.data() + ends_size * c + std::int64_t{group} * chains_.lanes() * 2 * d;
   };
   for_each_group(chains_, [&](int group) {
-    chain_kernels().forward(chains_.group(group), panel(group), g.data(),
-                            y_.data() + chains_.group_begin(group) * d, ends_of(group));
+    for (std::int64_t c = 0; c < columns; ++c) {
+      chain_kernels().forward(chains_.group(group), panel(group), G.data() + c * size,
+                              y_of(group, c), ends_of(group, c));
+    }
   });
   const auto offsets = structure_->offsets(), in_rest = chains_.rest().offsets();
   const auto separators = chains_.separators();
-  for (std::size_t k = 0; k < separators.size(); ++k)
-    std::copy(g.begin() + offsets[separators[k]], g.begin() + offsets[separators[k] + 1],
-              g_rest_.begin() + in_rest[k]);
-  // visit(numbers of a separator, those of the chain's end)
-  const auto for_each_end = [&](auto visit) {
+  // visit(numbers of a separator in column c, those of the chain's end)
+  const auto for_each_end = [&](std::int64_t c, auto visit) {
     for (const Chains::Chain& chain : chains_.chains()) {
-      double* ends = ends_of_g_.data() + of_chain(chains_, chain, 2 * d);
+      double* ends = ends_of_g_.data() + ends_size * c + of_chain(chains_, chain, 2 * d);
       visit(chain.first, ends);
       visit(chain.last, ends + d);
     }
   };
-  for_each_end([&](std::int32_t block, const double* ends) {
-    for (int i = 0; block >= 0 && i < d; ++i) g_rest_[in_rest[block] + i] += ends[i];
-  });
-  rest_.solve(g_rest_, g_rest_);
-  for_each_end([&](std::int32_t block, double* ends) {
-    for (int i = 0; i < d; ++i) ends[i] = block < 0 ? 0.0 : g_rest_[in_rest[block] + i];
-  });
+  for (std::int64_t c = 0; c < columns; ++c) {
+    const double* g = G.data() + c * size;
+    double* g_rest = G_rest_.data() + c * rest_size;
+    for (std::size_t k = 0; k < separators.size(); ++k)
+      std::copy(g + offsets[separators[k]], g + offsets[separators[k] + 1], g_rest + in_rest[k]);
+    for_each_end(c, [&](std::int32_t block, const double* ends) {
+      for (int i = 0; block >= 0 && i < d; ++i) g_rest[in_rest[block] + i] += ends[i];
+    });
+  }
+  if (columns == 1)
+    rest_.solve(G_rest_, G_rest_);
+  else
+    rest_.solve(G_rest_, G_rest_, columns);
+  for (std::int64_t c = 0; c < columns; ++c) {
+    const double* x_rest = G_rest_.data() + c * rest_size;
+    for_each_end(c, [&](std::int32_t block, double* ends) {
+      for (int i = 0; i < d; ++i) ends[i] = block < 0 ? 0.0 : x_rest[in_rest[block] + i];
+    });
+  }
   for_each_group(chains_, [&](int group) {
-    chain_kernels().backward(chains_.group(group), panel(group),
-                             y_.data() + chains_.group_begin(group) * d, ends_of(group), x.data());
+    for (std::int64_t c = 0; c < columns; ++c) {
+      chain_kernels().backward(chains_.group(group), panel(group), y_of(group, c),
+                               ends_of(group, c), X.data() + c * size);
+    }
   });
-  for (std::size_t k = 0; k < separators.size(); ++k)
-    std::copy(g_rest_.begin() + in_rest[k], g_rest_.begin() + in_rest[k + 1],
-              x.begin() + offsets[separators[k]]);
+  for (std::int64_t c = 0; c < columns; ++c) {
+    const double* x_rest = G_rest_.data() + c * rest_size;
+    for (std::size_t k = 0; k < separators.size(); ++k) {
+      std::copy(x_rest + in_rest[k], x_rest + in_rest[k + 1],
+                X.data() + c * size + offsets[separators[k]]);
+    }
+  }
 }
 
 void ChainCholesky::solve(std::span<const double> G, std::span<double> X, int columns) {
@@ -168,8 +206,11 @@ void ChainCholesky::solve(std::span<const double> G, std::span<double> X, int co
   const auto size = static_cast<std::size_t>(structure_->size());
   if (G.size() != size * static_cast<std::size_t>(columns) || X.size() != G.size())
     throw std::logic_error("solve: right-hand sides or solutions are not size × columns");
-  for (std::size_t begin = 0; begin < G.size(); begin += size)
-    solve(G.subspan(begin, size), X.subspan(begin, size));
+  for (int begin = 0; begin < columns; begin += kColumnsTogether) {
+    const int count = std::min(kColumnsTogether, columns - begin);
+    solve_together(G.subspan(begin * size, count * size), X.subspan(begin * size, count * size),
+                   count);
+  }
 }
 
 void ChainCholesky::inverse_columns(std::span<const std::int64_t> scalars, std::span<double> X) {

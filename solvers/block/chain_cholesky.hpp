@@ -45,6 +45,7 @@ class ChainCholesky {
 
  private:
   friend class ChainInverse;
+  void solve_together(std::span<const double> G, std::span<double> X, int columns);
   Factorization failure(int group, unsigned lanes) const;
   void add_ends_to_rest(const BlockMatrix& H);
   std::int64_t panel_numbers() const {
@@ -67,9 +68,9 @@ class ChainCholesky {
   std::vector<std::int32_t> order_;
   UninitializedVector panels_;         // of the chains
   UninitializedVector ends_;           // what each chain adds to its separators' blocks
-  UninitializedVector y_, ends_of_g_;  // as panels_ and ends_, of a right-hand side
+  UninitializedVector y_, ends_of_g_;  // as panels_ and ends_, of right-hand sides
   std::vector<unsigned> failed_;       // by group
-  std::vector<double> g_rest_;
+  std::vector<double> G_rest_;
   bool factorized_ = false;
 };
 

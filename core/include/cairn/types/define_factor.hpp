@@ -88,6 +88,8 @@ class DefinedFactor<F, std::index_sequence<I...>> final : public FactorType {
                                              const lanes::Only<Vector<S, kZ>>& z) {
     F::template residual<D>(x..., z);
   };
+  /// What a group holds lies on the stack: wide factors are taken one at a time.
+  static constexpr bool kNarrow = Places::kNumbers + kR * (V<I>::kTangent + ...) <= 4096;
   template <class S>
   static constexpr bool kDifferentiates =
       kAnalytic<double> ? kAnalytic<S> : kComputes<S, Dual<(V<I>::kTangent + ...), S>>;
@@ -220,7 +222,7 @@ class DefinedFactor<F, std::index_sequence<I...>> final : public FactorType {
 
   void linearize(const FactorView& pool, std::size_t begin, std::size_t end, const double* weights,
                  const LinearizeSink& sink, double* out_squared_norms) const override {
-    lanes::for_machine<kDifferentiates<lanes::Widest>>([&]<class S>() {
+    lanes::for_machine<kNarrow && kDifferentiates<lanes::Widest>>([&]<class S>() {
       for (std::size_t f = begin; f < end; f += lanes::kWidth<S>) {
         const std::size_t count = std::min<std::size_t>(end - f, lanes::kWidth<S>);
         linearize_group<S>(pool, f, count, weights ? weights + (f - begin) : nullptr, sink,

@@ -77,6 +77,14 @@ void expect_dense(const BlockStructure& structure, const std::string& kernels, s
   const double log_determinant = oracle.vectorD().array().log().sum();
   EXPECT_NEAR(cholesky.log_determinant(), log_determinant, 1e-12 * std::abs(log_determinant));
 
+  // More than are solved for together, over themselves.
+  Eigen::MatrixXd X = Eigen::MatrixXd::Random(structure.size(), 19);
+  const Eigen::MatrixXd all_right = oracle.solve(X);
+  const std::span<double> numbers(X.data(), static_cast<std::size_t>(X.size()));
+  cholesky.solve(numbers, numbers, static_cast<int>(X.cols()));
+  for (Eigen::Index c = 0; c < X.cols(); ++c)
+    EXPECT_LT((X.col(c) - all_right.col(c)).norm(), 1e-12 * all_right.col(c).norm()) << c;
+
   const std::vector<std::int64_t> scalars{0, structure.size() / 2, structure.size() - 1};
   std::vector<double> columns(3 * structure.size());
   cholesky.inverse_columns(scalars, columns);

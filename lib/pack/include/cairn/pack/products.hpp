@@ -157,13 +157,17 @@ struct Contribution {
 };
 
 /// Writes or adds a part of what one factor contributes, whose numbers are `values`.
-template <class S, class Places, int kPart, int kBegin = 0>
+template <class S, class Places, int kPart>
 [[gnu::always_inline]] inline void put_part(const double* values, bool adds, double* to) {
-  if constexpr (kBegin < Places::size(kPart)) {
-    constexpr int kLength = stretch(Places::size(kPart) - kBegin);
-    put<S, kLength>(values + Places::place(kPart, kBegin), adds, to + kBegin);
-    put_part<S, Places, kPart, kBegin + kLength>(values, adds, to);
-  }
+  constexpr int kSize = Places::size(kPart), kEights = kSize / 8 * 8;
+#pragma GCC unroll 8
+  for (int k = 0; k < kEights; k += 8)
+    put<S, 8>(values + Places::place(kPart, 0) + k, adds, to + k);
+  if constexpr ((kSize & 4) != 0)
+    put<S, 4>(values + Places::place(kPart, kEights), adds, to + kEights);
+  constexpr int kTwo = kSize & ~3, kOne = kSize & ~1;
+  if constexpr ((kSize & 2) != 0) put<S, 2>(values + Places::place(kPart, kTwo), adds, to + kTwo);
+  if constexpr ((kSize & 1) != 0) put<S, 1>(values + Places::place(kPart, kOne), adds, to + kOne);
 }
 /// The same of a block of kRows × kColumns, transposed.
 template <class S, class Places, int kPart, int kRows, int kColumns>
