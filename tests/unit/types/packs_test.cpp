@@ -227,6 +227,62 @@ TEST(Packs, GiveTheSameAsOneFactorAtATimeForFactorsOfOthers) {
   expect_equal_bits<Between<Se3>>();
 }
 
+/// A pose whose retraction branches on the step.
+struct Stepping : Se2 {
+  static constexpr std::string_view kTag = "STEPPING";
+  template <class S>
+  static Vector<S, 3> retract(const Vector<S, 3>& x, const Vector<S, 3>& delta) {
+    using std::sin;
+    Vector<S, 3> y = x + delta;
+    if (delta[0] > 0.5) y[1] = sin(y[1]);
+    return y;
+  }
+};
+
+template <class V>
+void expect_equal_bits_of_retraction() {
+  static_assert(V::kPacks);
+  const auto type = define_variable<V>();
+  Sampler sampler(9);
+  for (std::size_t count = 1; count < 40; ++count) {
+    std::vector<double> x, deltas;
+    std::vector<std::int64_t> offsets;
+    for (std::size_t s = 0; s < count; ++s) {
+      const auto state = sampler.state(*type, {"any", -1.0});
+      x.insert(x.end(), state.begin(), state.end());
+      offsets.push_back(sampler.uniform(0.0, 1.0) < 0.2 ? -1 : std::ssize(deltas));
+      // Small, large and huge steps beside each other.
+      const auto step = sampler.vector(type->tangent_size(), 1.0);
+      const double size = std::pow(10.0, sampler.uniform(-9.0, count % 3 == 0 ? 6.0 : -4.0));
+      for (const double number : step) deltas.push_back(size * number);
+      if (sampler.uniform(0.0, 1.0) < 0.05)
+        deltas.back() = std::numeric_limits<double>::quiet_NaN();
+    }
+    std::vector<double> expected(x.size());
+    for (std::size_t s = 0; s < count; ++s) {
+      const std::size_t k = s * V::kAmbient;
+      std::vector<double> y(x.begin() + k, x.begin() + k + V::kAmbient);
+      if (offsets[s] >= 0) {
+        const auto moved = V::template retract<double>(
+            detail::load<V::kAmbient>(&x[k]), detail::load<V::kTangent>(&deltas[offsets[s]]));
+        std::copy_n(moved.data(), V::kAmbient, y.begin());
+      }
+      std::copy(y.begin(), y.end(), expected.begin() + k);
+    }
+    for (const int width : widths()) {
+      const Width set(width);
+      std::vector<double> moved = x;
+      type->retract(count, moved.data(), offsets.data(), deltas.data(), moved.data());
+      EXPECT_EQ(different(moved, expected), 0U) << count << " states, width " << width;
+    }
+  }
+}
+
+TEST(Packs, MoveStatesAsOneAtATime) {
+  expect_equal_bits_of_retraction<Se2>();
+  expect_equal_bits_of_retraction<Stepping>();
+}
+
 template <class F>
 Calls calls_of(int width, std::size_t count) {
   const Width set(width);

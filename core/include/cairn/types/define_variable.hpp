@@ -7,6 +7,7 @@
 #include <Eigen/Core>
 
 #include "cairn/pack/dual.hpp"
+#include "cairn/pack/products.hpp"
 #include "cairn/types/variable_type.hpp"
 
 namespace cairn {
@@ -40,7 +41,9 @@ using Measured = Vector<ValueOf<S>, N>;
 ///    differentiating `retract` and `local`;
 ///  - `static constexpr int kDimension`, `kOriented` and `rotation(x)` (kOriented only),
 ///    `position(x)`, `from_placement(R, t)` (R ignored by points): then it has the ability
-///    `Placement`.
+///    `Placement`;
+///  - `static constexpr bool kPacks = true`: `retract` takes packs as well (`cairn/pack/pack.hpp`),
+///    and is called for several states at a time.
 template <class V>
 concept VariableTraits = requires(const Vector<double, V::kAmbient>& x,
                                   const Vector<double, V::kTangent>& delta) {
@@ -130,6 +133,10 @@ class PlacementOf final : public Placement {
 template <VariableTraits V>
 class DefinedVariable final : public VariableType {
   static constexpr int kA = V::kAmbient, kT = V::kTangent;
+  static constexpr bool kInPacks = [] {
+    if constexpr (requires { V::kPacks; }) return V::kPacks;
+    return false;
+  }();
 
  public:
   std::string_view tag() const override { return V::kTag; }
@@ -147,15 +154,11 @@ class DefinedVariable final : public VariableType {
   }
   void retract(std::size_t count, const double* x, const std::int64_t* delta_offsets,
                const double* delta, double* out) const override {
-    for (std::size_t s = 0; s < count; ++s) {
-      const Vector<double, kA> state = load<kA>(x + s * kA);
-      if (delta_offsets[s] < 0) {
-        store<kA>(state, out + s * kA);
-      } else {
-        store<kA>(V::template retract<double>(state, load<kT>(delta + delta_offsets[s])),
-                  out + s * kA);
-      }
-    }
+    lanes::move_states<kInPacks, kA, kT>(
+        count, x, delta_offsets, delta, out,
+        []<class S>(const Vector<S, kA>& state, const Vector<S, kT>& step) {
+          return V::template retract<S>(state, step);
+        });
   }
   void local(std::size_t count, const double* x, const double* y, double* delta) const override {
     for (std::size_t s = 0; s < count; ++s) {

@@ -17,6 +17,7 @@ struct Se2 {
   static constexpr int kAmbient = 3, kTangent = 3;
   static constexpr int kDimension = 2;
   static constexpr bool kOriented = true;
+  static constexpr bool kPacks = true;
 
   static Vector<double, 3> identity() { return Vector<double, 3>::Zero(); }
 
@@ -52,18 +53,23 @@ struct Se2 {
     using std::sin;
     const S& phi = delta[2];
     const S square = phi * phi;
-    S A, B;
-    if (square < 1e-4) {
-      A = 1.0 - square * ((1.0 / 6) - square * ((1.0 / 120) - square * (1.0 / 5040)));
-      B = phi *
-          ((1.0 / 2) - square * ((1.0 / 24) - square * ((1.0 / 720) - square * (1.0 / 40320))));
-    } else {
-      const S half = phi * 0.5;
-      const S s = sin(half);
-      const S twice = s * 2.0 / phi;
-      A = twice * cos(half);
-      B = twice * s;
-    }
+    const S A = lanes::by_bound(
+        square, 1e-4,
+        [&] { return 1.0 - square * ((1.0 / 6) - square * ((1.0 / 120) - square * (1.0 / 5040))); },
+        [&] {
+          const S half = phi * 0.5;
+          return sin(half) * 2.0 / phi * cos(half);
+        });
+    const S B = lanes::by_bound(
+        square, 1e-4,
+        [&] {
+          return phi * ((1.0 / 2) -
+                        square * ((1.0 / 24) - square * ((1.0 / 720) - square * (1.0 / 40320))));
+        },
+        [&] {
+          const S s = sin(phi * 0.5);
+          return s * 2.0 / phi * s;
+        });
     return {A * delta[0] - B * delta[1], B * delta[0] + A * delta[1], wrap_angle<S>(phi)};
   }
   /// ρ = V⁻¹ t, V⁻¹ = [a h; −h a] with h = φ/2, a = h cot h.

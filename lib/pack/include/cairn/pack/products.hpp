@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <type_traits>
 #include <utility>
 
@@ -233,5 +235,56 @@ void for_machine(const Loop& loop) {
   loop.template operator()<double>();
 }
 #endif
+
+/// out = step(x, δ) for `count` states of A numbers each, as many at a time as this machine can if
+/// kPacked. δ, T numbers, of state s begins at delta[offsets[s]]; where that is below zero, the
+/// state stays as it is. `out` may be `x`.
+template <bool kPacked, int A, int T, class Step>
+void move_states(std::size_t count, const double* x, const std::int64_t* offsets,
+                 const double* delta, double* out, const Step& step) {
+  for_machine<kPacked>([&]<class S>() {
+    constexpr int kLanes = kWidth<S>, kPadded = (A + kLanes - 1) / kLanes * kLanes;
+    static constexpr double kNoStep[T] = {};
+    for (std::size_t first = 0; first < count; first += kLanes) {
+      const double *states[kLanes], *steps[kLanes];
+      for (std::size_t l = 0; l < kLanes; ++l) {
+        const std::size_t s = std::min(first + l, count - 1);
+        states[l] = x + s * A;
+        steps[l] = offsets[s] < 0 ? kNoStep : delta + offsets[s];
+      }
+      S moved[kPadded];
+      const auto move = [&](const double* const* from, const double* const* by) {
+        const Eigen::Matrix<S, A, 1> y =
+            step.template operator()<S>(load_lanes<S, A>(from), load_lanes<S, T>(by));
+        for (int k = 0; k < A; ++k) moved[k] = y[k];
+        for (int k = A; k < kPadded; ++k) moved[k] = 0.0;
+      };
+      const auto put = [&](std::size_t l, const double* y) {
+        std::copy_n(offsets[first + l] < 0 ? states[l] : y, A, out + (first + l) * A);
+      };
+      if constexpr (kLanes == 1) {
+        move(states, steps);
+        put(0, moved);
+      } else {
+        S::diverged = false;
+        move(states, steps);
+        const std::size_t used = std::min<std::size_t>(kLanes, count - first);
+        if (!S::diverged) [[likely]] {
+          const Separate<S, kPadded> separate(moved);
+          for (std::size_t l = 0; l < used; ++l) put(l, separate.lane(l));
+          continue;
+        }
+        // Where a branch divides the lanes, each by itself, in all lanes.
+        for (std::size_t l = 0; l < used; ++l) {
+          const double *state[kLanes], *its_step[kLanes];
+          std::fill_n(state, kLanes, states[l]);
+          std::fill_n(its_step, kLanes, steps[l]);
+          move(state, its_step);
+          put(l, Separate<S, kPadded>(moved).lane(0));
+        }
+      }
+    }
+  });
+}
 
 }  // namespace cairn::lanes

@@ -1,0 +1,132 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""tools/lint/tidy.py on small sources: what is clean, what is not, and files that cannot be checked together."""
+
+import contextlib
+import io
+import json
+import os
+import shutil
+import sys
+import tempfile
+import unittest
+from pathlib import Path
+from unittest import mock
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tools/lint"))
+import tidy  # noqa: E402
+
+CONFIGURATION = """Checks: '-*,clang-diagnostic-*,misc-redundant-expression,modernize-use-override'
+WarningsAsErrors: '*'
+HeaderFilterRegex: '/(lib)/[^ ]*\\.hpp$'
+"""
+WRONG = "int wrong(int a) { return a - a; }\n"
+NO_OVERRIDE = "struct A { virtual ~A() = default; virtual void f() = 0; };\nstruct B : A { void f(); };\n"
+
+
+class Tidy(unittest.TestCase):
+    """A checkout with sources in lib/, compiled in build/."""
+
+    def setUp(self) -> None:
+        self.root = Path(self.enterContext(tempfile.TemporaryDirectory())).resolve()
+        for folder in ("build/lint", "lib", "clean"):
+            (self.root / folder).mkdir(parents=True)
+        (self.root / ".clang-tidy").write_text(CONFIGURATION)
+        self.entries: list[dict[str, str]] = []
+        before = os.getcwd()
+        os.chdir(self.root)
+        self.addCleanup(os.chdir, before)
+
+    def enterContext(self, manager):  # of unittest from Python 3.11 on
+        value = manager.__enter__()
+        self.addCleanup(manager.__exit__, None, None, None)
+        return value
+
+    def add(self, name: str, text: str, flags: str = "") -> None:
+        file = self.root / "lib" / name
+        file.write_text(text)
+        if name.endswith(".cpp"):
+            self.entries.append({"directory": str(self.root / "build"), "file": str(file),
+                                 "command": f"/usr/bin/c++ -I{self.root}/lib -std=c++20 {flags} -o {name}.o -c {file}"})
+
+    def run_on(self, *names: str) -> tuple[set[str], str, int]:
+        """The names that are found clean, what is printed, the exit code, and how often clang-tidy ran."""
+        database = self.root / "build/lint/compile_commands.json"
+        database.write_text(json.dumps(self.entries))
+        for file in (self.root / "clean").iterdir():
+            file.unlink()
+        lines = "".join(f"key_of_{name} lib/{name}\n" for name in names)
+        out = io.StringIO()
+        with mock.patch("sys.stdin", io.StringIO(lines)), contextlib.redirect_stdout(out):
+            code = tidy.main(str(database), str(self.root / "clean"))
+        clean = {file.name.removeprefix("key_of_") for file in (self.root / "clean").iterdir()}
+        return clean, out.getvalue(), code
+
+    def test_sources_without_a_finding_are_clean(self) -> None:
+        names = [f"right{k}.cpp" for k in range(11)]
+        for k, name in enumerate(names):
+            self.add(name, f"int right{k}() {{ return {k}; }}\n")
+        with mock.patch.object(tidy.Linter, "_tidy", autospec=True, side_effect=tidy.Linter._tidy) as runs:
+            self.assertEqual(self.run_on(*names), (set(names), "", 0))
+        self.assertEqual(runs.call_count, 2)  # for eleven
+
+    def test_only_sources_that_are_asked_for_are_looked_at(self) -> None:
+        self.add("right.cpp", "int right() { return 1; }\n")
+        self.add("wrong.cpp", WRONG)
+        self.assertEqual(self.run_on("right.cpp"), ({"right.cpp"}, "", 0))
+
+    def test_one_wrong_source_is_named_and_the_others_are_clean(self) -> None:
+        for k in range(5):
+            self.add(f"right{k}.cpp", f"int right{k}() {{ return {k}; }}\n")
+        self.add("wrong.cpp", WRONG)
+        clean, output, code = self.run_on(*(f"right{k}.cpp" for k in range(5)), "wrong.cpp")
+        self.assertEqual((clean, code), ({f"right{k}.cpp" for k in range(5)}, 1))
+        self.assertIn("lib/wrong.cpp:1:", output)
+        self.assertIn("misc-redundant-expression", output)
+
+    def test_a_wrong_header_is_found(self) -> None:
+        self.add("wrong.hpp", "#pragma once\ninline " + WRONG)
+        self.add("user.cpp", '#include "wrong.hpp"\n')
+        self.add("right.cpp", "int right() { return 1; }\n")
+        clean, output, code = self.run_on("right.cpp", "user.cpp")
+        self.assertEqual((clean, code), ({"right.cpp"}, 1))
+        self.assertIn("lib/wrong.hpp:2:", output)
+
+    def test_names_that_clash_are_no_finding(self) -> None:
+        for k in range(4):
+            self.add(f"clash{k}.cpp", f"namespace {{ int same() {{ return {k}; }} }}\nint clash{k}() {{ return same(); }}\n")
+        names = {f"clash{k}.cpp" for k in range(4)}
+        self.assertEqual(self.run_on(*names), (names, "", 0))
+
+    def test_other_flags_are_other_groups(self) -> None:
+        self.add("with.cpp", "#ifndef GIVEN\n#error not given\n#endif\n", "-DGIVEN")
+        self.add("without.cpp", "#ifdef GIVEN\n#error given\n#endif\n")
+        self.assertEqual(self.run_on("with.cpp", "without.cpp"), ({"with.cpp", "without.cpp"}, "", 0))
+
+    def test_a_folder_may_leave_checks_out(self) -> None:
+        self.add("other.cpp", NO_OVERRIDE)
+        self.add("right.cpp", "int right() { return 1; }\n")
+        self.add("wrong.cpp", WRONG)
+        names = ("other.cpp", "right.cpp", "wrong.cpp")
+        clean, output, _ = self.run_on(*names)
+        self.assertEqual(clean, {"right.cpp"})
+        self.assertIn("modernize-use-override", output)
+        (self.root / "lib/.clang-tidy").write_text("InheritParentConfig: true\nChecks: '-modernize-use-override'\n")
+        clean, output, _ = self.run_on(*names)
+        self.assertEqual(clean, {"other.cpp", "right.cpp"})
+        self.assertIn("misc-redundant-expression", output)
+
+    def test_what_a_precompiled_header_hides_is_found(self) -> None:
+        precompiled = f"-include {self.root}/build/cmake_pch.hxx"
+        self.add("first.cpp", "#include <vector>\nint first(const std::vector<int>& v) { return v[0]; }\n", precompiled)
+        self.add("second.cpp", "int second(const std::vector<int>& v) { return v[0]; }\n", precompiled)
+        clean, output, code = self.run_on("first.cpp", "second.cpp")
+        self.assertEqual((clean, code), ({"first.cpp"}, 1))
+        self.assertIn("lib/second.cpp:1:", output)
+
+
+if __name__ == "__main__":
+    if not shutil.which("clang-tidy"):
+        print("clang-tidy is not installed")
+        sys.exit(77)
+    unittest.main()
