@@ -9,71 +9,6 @@
 namespace cairn::performance {
 namespace {
 
-const std::vector<DataSet>& published() {
-  static const std::vector<DataSet> all{
-      {"manhattanOlson3500", "pose2d/manhattanOlson3500.g2o", {}},
-      {"city10000", "pose2d/city10000.g2o", {}},
-      {"10kHog-man", "pose2d/10kHog-man.graph.gz", {}},
-      {"w20000", "pose2d/w20000_isam.txt", {}},
-      {"intel1728", "pose2d/intel1728.g2o", {}},
-      {"killian5489", "pose2d/killian5489_glc.g2o", {}},
-      {"kitti_00", "pose2d/kitti_00.g2o", {}},
-      {"sphere2500", "pose3d/sphere2500.g2o", {}},
-      {"sphere2500a", "pose3d/sphere2500a.g2o", {}},
-      {"torus3D", "pose3d/torus3D.g2o.gz", {}},
-      {"torus10000", "pose3d/torus10000_isam.txt", {}},
-      {"parking-garage", "pose3d/parking-garage.g2o", {}},
-      {"cubicle", "pose3d/cubicle.g2o", {"--repair-information"}},
-      {"sphere_bignoise", "pose3d/sphere_bignoise_vertex3.g2o", {}},
-      {"Victoria Park", "landmark2d/victoriaPark_isam.txt", {"--initial", "incremental"}},
-      {"cityTrees10000", "landmark2d/cityTrees10000_isam.txt", {}},
-      {"ladybug-49", "ba/ladybug-problem-49-7776-pre.txt", {}},
-      {"dubrovnik-3", "ba/dubrovnik-3-7-pre.txt", {}}};
-  return all;
-}
-
-const std::vector<DataSet>& generated() {
-  static const std::vector<DataSet> all{{"manhattan", "@manhattan", {}},
-                                        {"city", "@city", {}},
-                                        {"sphere", "@sphere", {}},
-                                        {"torus", "@torus:turns=60", {}},
-                                        {"grid3d 12³", "@grid3d:nx=12,ny=12,nz=12", {}},
-                                        {"grid3d 20³", "@grid3d:nx=20,ny=20,nz=20", {}},
-                                        {"landmarks2d", "@landmarks2d", {}},
-                                        {"bundle", "@bundle", {}}};
-  return all;
-}
-
-/// What `cairn replay` is fed with: it knows other initial guesses than `cairn optimize`.
-const std::vector<DataSet>& replayed() {
-  static const std::vector<std::string> like_g2o{"--types", "slam3d:metric=g2o"};
-  static const std::vector<DataSet> all{
-      {"manhattanOlson3500", "pose2d/manhattanOlson3500.g2o", {}},
-      {"manhattanOlson3500, file's start",
-       "pose2d/manhattanOlson3500.g2o",
-       {"--initial", "as_given"}},
-      {"intel1728", "pose2d/intel1728.g2o", {}},
-      {"city10000", "pose2d/city10000.g2o", {}},
-      {"sphere2500", "pose3d/sphere2500.g2o", like_g2o},
-      {"parking-garage", "pose3d/parking-garage.g2o", like_g2o},
-      {"10kHog-man", "pose2d/10kHog-man.graph.gz", {}},
-      {"killian5489", "pose2d/killian5489_glc.g2o", {}},
-      {"cityTrees10000", "landmark2d/cityTrees10000_isam.txt", {}},
-      {"Victoria Park", "landmark2d/victoriaPark_isam.txt", {}},
-      {"manhattan", "@manhattan", {}},
-      {"city", "@city:poses=5000", {}},
-      {"sphere", "@sphere", {}},
-      {"landmarks2d", "@landmarks2d", {}}};
-  return all;
-}
-
-const std::vector<DataSet>& replayed_quickly() {
-  static const std::vector<DataSet> all{{"intel1728", "pose2d/intel1728.g2o", {}},
-                                        {"manhattan, 600 poses", "@manhattan:poses=600", {}},
-                                        {"landmarks2d, 500 poses", "@landmarks2d:poses=500", {}}};
-  return all;
-}
-
 /// What `cairn compact` is fed with, with the truth.
 const std::vector<TruthfulSet>& compacted() {
   static const std::vector<TruthfulSet> all{
@@ -159,72 +94,7 @@ std::vector<DataSet> located_or(const std::vector<DataSet>& published, const std
 const DataSet kSmallPlane{"manhattan, 600 poses", "@manhattan:poses=600", {}};
 const DataSet kPlane{"manhattan", "@manhattan", {}};
 
-/// Those of the names that there are, in their order.
-std::vector<DataSet> chosen(const std::vector<std::string>& names, const std::string& data) {
-  std::vector<DataSet> sets;
-  for (const std::string& name : names) {
-    const auto of_name = [&](const DataSet& set) { return set.name == name; };
-    const auto real = std::find_if(published().begin(), published().end(), of_name);
-    if (real != published().end()) {
-      DataSet set = *real;
-      if (locate(set, data)) sets.push_back(std::move(set));
-      continue;
-    }
-    sets.push_back(*std::find_if(generated().begin(), generated().end(), of_name));
-  }
-  return sets;
-}
-
 }  // namespace
-
-std::vector<DataSet> pose_graphs(const std::string& data, bool quick) {
-  if (quick) return chosen({"manhattanOlson3500", "intel1728", "parking-garage", "sphere"}, data);
-  return chosen(
-      {"manhattanOlson3500", "city10000", "10kHog-man", "w20000", "intel1728", "killian5489",
-       "sphere2500", "sphere2500a", "torus3D", "torus10000", "parking-garage", "cubicle",
-       "sphere_bignoise", "manhattan", "city", "sphere", "torus", "grid3d 12³"},
-      data);
-}
-
-std::vector<DataSet> rate_sets(const std::string& data, bool quick) {
-  if (quick) return chosen({"manhattanOlson3500", "sphere2500", "manhattan"}, data);
-  return chosen({"manhattanOlson3500", "sphere2500", "torus3D", "torus10000", "manhattan", "sphere",
-                 "torus", "grid3d 20³"},
-                data);
-}
-
-std::vector<DataSet> thread_sets(const std::string& data, bool quick) {
-  if (quick) return chosen({"manhattanOlson3500", "torus"}, data);
-  return chosen({"manhattanOlson3500", "torus3D", "torus10000", "manhattan", "torus", "grid3d 20³"},
-                data);
-}
-
-std::vector<DataSet> marginals_sets(const std::string& data, bool quick) {
-  if (quick) return chosen({"intel1728", "parking-garage", "manhattan"}, data);
-  return chosen({"manhattanOlson3500", "intel1728", "city10000", "kitti_00", "sphere2500",
-                 "torus3D", "torus10000", "parking-garage", "sphere_bignoise", "manhattan", "city",
-                 "sphere", "torus", "grid3d 12³"},
-                data);
-}
-
-std::vector<DataSet> solver_sets(const std::string& data, bool quick) {
-  if (quick) return chosen({"intel1728", "dubrovnik-3", "landmarks2d"}, data);
-  return chosen({"manhattanOlson3500", "sphere2500", "Victoria Park", "cityTrees10000",
-                 "ladybug-49", "dubrovnik-3", "landmarks2d", "bundle"},
-                data);
-}
-
-std::vector<DataSet> online_sets(const std::string& data, bool quick) {
-  return located(quick ? replayed_quickly() : replayed(), data);
-}
-
-std::vector<DataSet> budget_sets(const std::string& data, bool quick) {
-  if (quick) return {{"city, 1000 poses", "@city:poses=1000", {}}};
-  std::vector<DataSet> sets = located(replayed(), data);
-  std::erase_if(sets,
-                [](const DataSet& set) { return set.name != "city10000" && set.name != "city"; });
-  return sets;
-}
 
 DataSet ellipse3d(const std::string& more) {
   return {"ellipse3d",

@@ -34,15 +34,6 @@ struct TruthfulSet {
 
 // The graphs of each study: the published ones that lie in the folder `data` (empty: none do), then
 // generated ones, which everybody has. `quick`: few and small.
-std::vector<DataSet> pose_graphs(const std::string& data, bool quick);
-
-std::vector<DataSet> rate_sets(const std::string& data, bool quick);
-std::vector<DataSet> thread_sets(const std::string& data, bool quick);
-std::vector<DataSet> marginals_sets(const std::string& data, bool quick);
-std::vector<DataSet> solver_sets(const std::string& data, bool quick);
-// For `cairn replay`:
-std::vector<DataSet> online_sets(const std::string& data, bool quick);
-std::vector<DataSet> budget_sets(const std::string& data, bool quick);
 // For `cairn compact`:
 /// The ellipses of Ila et al. (2017) with the noise that the errors in their Table 4 show, and more
 /// options of the generators. Their relative pose errors of odometry, 0.100 m and 3.16 degrees of

@@ -40,13 +40,6 @@ using Study = void (*)(const Bench&, const Keep&);
 
 const std::vector<std::pair<std::string, Study>>& all_studies() {
   static const std::vector<std::pair<std::string, Study>> all{
-      {"graphs", study_graphs},
-      {"rates", study_rates},
-      {"threads", study_threads},
-      {"scaling", study_scaling},
-      {"solvers", study_solvers},
-      {"marginals", study_marginals},
-      {"online", study_online},
       {"compact_sets", study_compact_sets},
       {"compact_gain", study_compact_gain},
       {"compact_figures", study_compact_figures},
@@ -155,9 +148,6 @@ void write_tables(const Arguments& arguments) {
     for (const Section& section : sections(report)) put_into(pages, section);
     const json::array& entries = list(report, "entries");
     const fs::path picture = fs::path(arguments.folder) / (name + "_picture.json");
-    if (name == "graphs") write(picture, json::serialize(graphs_picture(entries)));
-    if (name == "scaling") write(picture, json::serialize(scaling_picture(entries)));
-    if (name == "online") write(picture, json::serialize(online_picture(entries)));
     if (name == "compact_gain")
       write(fs::path(arguments.folder) / "compact_gain.csv", gain_curves(entries));
     if (name == "compact_growth") write(picture, json::serialize(compact_picture(entries)));
@@ -171,9 +161,7 @@ void write_tables(const Arguments& arguments) {
 int run(int argc, char** argv) {
   Arguments arguments;
   CLI::App app("Measures the program cairn, one JSON file a study, and turns those into tables.");
-  app.add_option("studies", arguments.studies,
-                 "all, or some of: graphs rates threads scaling "
-                 "solvers marginals online compact sparsify explore")
+  app.add_option("studies", arguments.studies, "all, or some of: compact sparsify explore")
       ->check(CLI::IsMember(study_names()));
   app.add_option("--cairn", arguments.cairn, "the program to measure");
   app.add_option("--folder", arguments.folder, "where the JSON is")->required();

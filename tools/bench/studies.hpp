@@ -23,31 +23,6 @@ struct Bench {
 /// Takes what was measured, one entry at a time, and keeps it at once: a study may take an hour.
 using Keep = std::function<void(boost::json::object entry)>;
 
-/// Ten Gauss-Newton iterations by cairn's own solver, by the best setting of `cholmod` and by the
-/// best of `ceres`; with one thread, then with two.
-void study_graphs(const Bench& bench, const Keep& keep);
-
-/// Rate of the factorisation against dgemm and the memory's bandwidth.
-void study_rates(const Bench& bench, const Keep& keep);
-
-/// One thread against two.
-void study_threads(const Bench& bench, const Keep& keep);
-
-/// Time and memory against size on generated graphs, and one graph of a million poses to
-/// convergence.
-void study_scaling(const Bench& bench, const Keep& keep);
-
-/// Every linear solver on offer, to convergence, with a limit of time.
-void study_solvers(const Bench& bench, const Keep& keep);
-
-/// All diagonal blocks of the covariance and its last block column: by cairn's own recursion with
-/// one thread and with two, and on small graphs by solves with `cholmod`.
-void study_marginals(const Bench& bench, const Keep& keep);
-
-/// Graphs as they came about, pose by pose: the incremental estimator against those in batch, with
-/// covariances and with a limit of time.
-void study_online(const Bench& bench, const Keep& keep);
-
 // `cairn compact`, whose studies are called compact_…; docs/compact_results.md has their tables.
 
 /// On the graphs of Ila et al. (2017), and others: thresholds, times, errors.

@@ -16,12 +16,6 @@ namespace cairn::performance {
 /// study that it does not know.
 std::vector<Section> sections(const boost::json::value& report);
 
-/// The main comparison's part of it, in tables_graphs.cpp.
-std::vector<Section> graphs_sections(const boost::json::array& entries);
-
-/// The replays' part of it, in tables_online.cpp.
-std::vector<Section> online_sections(const boost::json::array& entries);
-
 // The parts of `cairn compact`, in tables_compact.cpp.
 std::vector<Section> compact_sets_sections(const boost::json::array& entries);
 std::vector<Section> compact_gain_sections(const boost::json::array& entries);
@@ -52,13 +46,7 @@ std::vector<Section> explore_floors_sections(const boost::json::array& entries);
 std::vector<Section> explore_sensitivity_sections(const boost::json::array& entries);
 
 // What `cairn plot` draws, in the words of `cairn bench --json`:
-/// the main comparison, with the best of each family alone, as bars;
-boost::json::value graphs_picture(const boost::json::array& entries);
-/// the growth with size, a line a family;
-boost::json::value scaling_picture(const boost::json::array& entries);
-/// the time of the steps of replays, a point for so many steps;
-boost::json::value online_picture(const boost::json::array& entries);
-/// the growth with the number of poses of `cairn compact`, a line a strategy.
+/// The growth with the number of poses of `cairn compact`, a line a strategy.
 boost::json::value compact_picture(const boost::json::array& entries);
 
 // Numbers in words

@@ -1,0 +1,131 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The command line behind `./dev bench`: studies are measured, or with --tables written into pages."""
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import subprocess
+from pathlib import Path
+
+from .pages import put_into
+from .program import TINY, Cairn, Failed
+from .reports import Json, items, member, number, text
+from .studies import ALL
+from .study import Bench, Study, tell
+
+
+# What the program cairn_performance still measures.
+OLD = ["compact_sets", "compact_gain", "compact_figures", "compact_live", "compact_growth", "compact_consistency",
+       "compact_matches", "compact_million", "sparsify_sets", "sparsify_topology", "sparsify_problems", "sparsify_whole",
+       "sparsify_online", "sparsify_selection", "sparsify_edges", "explore_cave", "explore_freiburg", "explore_action",
+       "explore_scale", "explore_floors", "explore_sensitivity"]
+
+
+def is_chosen(study: str, chosen: list[str]) -> bool:
+    """Of a group of studies, such as compact_sets, the name before the underscore stands for all."""
+    return not chosen or any(study == name or study.startswith(name + "_") for name in chosen)
+
+
+def provenance(report: Json) -> str:
+    """"Measured on …", below each study's tables: they need not be of one day."""
+    quick = "Quick run, not a measurement. " if member(report, "quick") is True else ""
+    commit = text(report, "commit")
+    return (f"\n*{quick}{text(report, 'machine.cpu')}, {number(report, 'machine.cores'):.0f} cores, "
+            f"{text(report, 'build.simd')}; {text(report, 'build.compiler')}, `{text(report, 'build.flags')}`; "
+            f"{'commit ' + commit if commit else 'cairn ' + text(report, 'cairn')}.*\n")
+
+
+def finite(value: Json) -> Json:
+    """JSON has no NaN."""
+    if isinstance(value, dict):
+        return {name: finite(one) for name, one in value.items()}
+    if isinstance(value, list):
+        return [finite(one) for one in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def measure(arguments: argparse.Namespace) -> None:
+    bench = Bench(Cairn(arguments.cairn, arguments.folder / "work"), arguments.data, arguments.quick, arguments.ours,
+                  arguments.rounds or (2 if arguments.quick else 5))
+    # Machine and build, as the program that is measured reports them.
+    tiny = bench.cairn.optimize(TINY, ["--linear-solver", bench.ours]).required().report
+    for study in ALL:
+        if is_chosen(study.name, arguments.studies):
+            report = {"study": study.name, "cairn": tiny["cairn"], "commit": arguments.commit, "quick": bench.quick,
+                      "rounds": bench.rounds, "ours": bench.ours, "machine": tiny["machine"], "build": tiny["build"],
+                      "entries": []}
+            measure_study(study, bench, report, arguments.folder / f"{study.name}.json")
+    old = [name for name in OLD if is_chosen(name, arguments.studies)]
+    if old:
+        subprocess.run([arguments.old, *old, "--cairn", arguments.cairn, "--folder", arguments.folder,
+                        "--data", arguments.data or "", "--commit", arguments.commit, "--ours", bench.ours,
+                        "--rounds", str(bench.rounds), *(["--quick"] if bench.quick else [])], check=True)
+
+
+def measure_study(study: Study, bench: Bench, report: Json, file: Path) -> None:
+    def keep(entry: Json) -> None:
+        report["entries"].append(finite(entry))
+        file.write_text(json.dumps(report, ensure_ascii=False) + "\n", encoding="utf-8")
+
+    study.measure(bench, keep)
+
+
+def write_tables(arguments: argparse.Namespace) -> None:
+    """Of every study that there is a report of; the others' sections stay as they are."""
+    pages = [page.read_text(encoding="utf-8") for page in arguments.tables]
+    for study in ALL:
+        file = arguments.folder / f"{study.name}.json"
+        if not file.exists():
+            continue
+        report = json.loads(file.read_text(encoding="utf-8", errors="replace"))
+        for name, markdown in study.sections(items(report, "entries")).items():
+            put_into(pages, name, markdown + provenance(report))
+        for name, content in study.files(items(report, "entries")).items():
+            (arguments.folder / name).write_text(content, encoding="utf-8")
+    for page, content in zip(arguments.tables, pages):
+        page.write_text(content, encoding="utf-8")
+        tell(f"tables: {page}")
+    if arguments.old:
+        subprocess.run([arguments.old, "--folder", arguments.folder, "--tables", *arguments.tables], check=True)
+
+
+def parse(words: list[str]) -> argparse.Namespace:
+    studies = [study.name for study in ALL] + OLD
+    names = list(dict.fromkeys(name for study in studies for name in [study.partition("_")[0], study]))
+    parser = argparse.ArgumentParser(prog="bench", description="Measures the program cairn, one JSON file a study, and makes "
+                                     "tables of those.", allow_abbrev=False)
+    parser.add_argument("studies", nargs="*", metavar="STUDY", help="all, or some of: " + " ".join(names))
+    parser.add_argument("--cairn", metavar="PROGRAM", help="the program to measure")
+    parser.add_argument("--old", metavar="PROGRAM", help="cairn_performance")
+    parser.add_argument("--folder", type=Path, required=True, help="where the JSON is")
+    parser.add_argument("--data", type=Path, metavar="FOLDER", help="of the real graphs")
+    parser.add_argument("--commit", default="", help="what is measured, for the tables")
+    parser.add_argument("--ours", default="block_cholesky", metavar="SPEC",
+                        help="cairn's own linear solver, with options [block_cholesky]")
+    parser.add_argument("--rounds", type=int, metavar="N", help="of each comparison [5, quick 2]")
+    parser.add_argument("--quick", action="store_true", help="few and small graphs: shows that it works, no more")
+    parser.add_argument("--tables", type=Path, nargs="+", metavar="PAGE", help="do not measure: fill in the tables of these")
+    arguments = parser.parse_intermixed_args(words)
+    for name in arguments.studies:
+        if name not in names:
+            parser.error(f"there is no study '{name}'; there are: {' '.join(names)}")
+    if not arguments.tables and not arguments.cairn:
+        parser.error("--cairn PROGRAM is needed to measure")
+    if arguments.rounds is not None and not 1 <= arguments.rounds <= 1000:
+        parser.error("--rounds must be from 1 to 1000")
+    return arguments
+
+
+def main(words: list[str]) -> int:
+    arguments = parse(words)
+    try:
+        arguments.folder.mkdir(parents=True, exist_ok=True)
+        if arguments.tables:
+            write_tables(arguments)
+        else:
+            measure(arguments)
+    except (Failed, OSError, ValueError, subprocess.CalledProcessError) as error:
+        tell(f"bench: {error}")
+        return 1
+    return 0

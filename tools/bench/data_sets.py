@@ -1,0 +1,138 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The graphs that are measured on: published ones, which lie in a folder of data, and generated ones, which everybody has.
+
+A study takes those of its published graphs that are there, and the generated ones; `quick` means few and small.
+"""
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+
+@dataclass(frozen=True)
+class DataSet:
+    """A graph as the command line of `cairn` takes it, and where its true poses come from.
+
+    `truth`: "generated": the generator knows them; "file": a graph or a trajectory; "edges": measurements without noise, to
+    be optimised; "camera": poses of a camera in KITTI's axes; "simulated": the same, along which the graph is simulated,
+    too (camera_world.cpp); "de_facto": nobody knows them, and the minimum of all measurements stands in.
+    """
+
+    name: str
+    graph: str  # a file, or @KIND:options
+    arguments: list[str] = field(default_factory=list)  # what reading it needs
+    truth: str = "generated"
+    truth_file: str = ""
+    truth_arguments: list[str] = field(default_factory=list)  # what optimising it needs
+
+    @property
+    def generated(self) -> bool:
+        return self.graph.startswith("@")
+
+    def located(self, data: Path | None) -> DataSet | None:
+        """With its files as paths; None if one is not there."""
+        if self.generated:
+            return self
+        if data is None:
+            return None
+        graph, truth = data / self.graph, data / self.truth_file
+        there = graph.exists() and truth.exists()
+        return replace(self, graph=str(graph), truth_file=str(truth) if self.truth_file else "") if there else None
+
+
+def located(sets: Iterable[DataSet], data: Path | None) -> list[DataSet]:
+    """Those that there are."""
+    return [found for found in (one.located(data) for one in sets) if found]
+
+
+def located_or(published: list[DataSet], data: Path | None, quick: bool, small: DataSet, generated: DataSet) -> list[DataSet]:
+    """The published ones; if there are none or if it is to be quick, a generated one."""
+    return [small] if quick else located(published, data) or [generated]
+
+
+LIKE_G2O = ["--types", "slam3d:metric=g2o"]
+SMALL_PLANE, PLANE = DataSet("manhattan, 600 poses", "@manhattan:poses=600"), DataSet("manhattan", "@manhattan")
+
+_OPTIMIZED = {one.name: one for one in [
+    DataSet("manhattanOlson3500", "pose2d/manhattanOlson3500.g2o"),
+    DataSet("city10000", "pose2d/city10000.g2o"),
+    DataSet("10kHog-man", "pose2d/10kHog-man.graph.gz"),
+    DataSet("w20000", "pose2d/w20000_isam.txt"),
+    DataSet("intel1728", "pose2d/intel1728.g2o"),
+    DataSet("killian5489", "pose2d/killian5489_glc.g2o"),
+    DataSet("kitti_00", "pose2d/kitti_00.g2o"),
+    DataSet("sphere2500", "pose3d/sphere2500.g2o"),
+    DataSet("sphere2500a", "pose3d/sphere2500a.g2o"),
+    DataSet("torus3D", "pose3d/torus3D.g2o.gz"),
+    DataSet("torus10000", "pose3d/torus10000_isam.txt"),
+    DataSet("parking-garage", "pose3d/parking-garage.g2o"),
+    DataSet("cubicle", "pose3d/cubicle.g2o", ["--repair-information"]),
+    DataSet("sphere_bignoise", "pose3d/sphere_bignoise_vertex3.g2o"),
+    DataSet("Victoria Park", "landmark2d/victoriaPark_isam.txt", ["--initial", "incremental"]),
+    DataSet("cityTrees10000", "landmark2d/cityTrees10000_isam.txt"),
+    DataSet("ladybug-49", "ba/ladybug-problem-49-7776-pre.txt"),
+    DataSet("dubrovnik-3", "ba/dubrovnik-3-7-pre.txt"),
+    PLANE,
+    DataSet("city", "@city"),
+    DataSet("sphere", "@sphere"),
+    DataSet("torus", "@torus:turns=60"),
+    DataSet("grid3d 12³", "@grid3d:nx=12,ny=12,nz=12"),
+    DataSet("grid3d 20³", "@grid3d:nx=20,ny=20,nz=20"),
+    DataSet("landmarks2d", "@landmarks2d"),
+    DataSet("bundle", "@bundle"),
+]}
+
+# Of each study that optimises: all, and the few when it is to be quick.
+_CHOSEN = {
+    "graphs": (["manhattanOlson3500", "city10000", "10kHog-man", "w20000", "intel1728", "killian5489", "sphere2500",
+                "sphere2500a", "torus3D", "torus10000", "parking-garage", "cubicle", "sphere_bignoise", "manhattan",
+                "city", "sphere", "torus", "grid3d 12³"],
+               ["manhattanOlson3500", "intel1728", "parking-garage", "sphere"]),
+    "rates": (["manhattanOlson3500", "sphere2500", "torus3D", "torus10000", "manhattan", "sphere", "torus", "grid3d 20³"],
+              ["manhattanOlson3500", "sphere2500", "manhattan"]),
+    "threads": (["manhattanOlson3500", "torus3D", "torus10000", "manhattan", "torus", "grid3d 20³"],
+                ["manhattanOlson3500", "torus"]),
+    "marginals": (["manhattanOlson3500", "intel1728", "city10000", "kitti_00", "sphere2500", "torus3D", "torus10000",
+                   "parking-garage", "sphere_bignoise", "manhattan", "city", "sphere", "torus", "grid3d 12³"],
+                  ["intel1728", "parking-garage", "manhattan"]),
+    "solvers": (["manhattanOlson3500", "sphere2500", "Victoria Park", "cityTrees10000", "ladybug-49", "dubrovnik-3",
+                 "landmarks2d", "bundle"],
+                ["intel1728", "dubrovnik-3", "landmarks2d"]),
+}
+
+
+def sets_of(study: str, data: Path | None, quick: bool) -> list[DataSet]:
+    """The graphs of "graphs", "rates", "threads", "marginals" or "solvers"."""
+    return located((_OPTIMIZED[name] for name in _CHOSEN[study][quick]), data)
+
+
+# `cairn replay` has other initial guesses than `cairn optimize`.
+_REPLAYED = [
+    DataSet("manhattanOlson3500", "pose2d/manhattanOlson3500.g2o"),
+    DataSet("manhattanOlson3500, file's start", "pose2d/manhattanOlson3500.g2o", ["--initial", "as_given"]),
+    DataSet("intel1728", "pose2d/intel1728.g2o"),
+    DataSet("city10000", "pose2d/city10000.g2o"),
+    DataSet("sphere2500", "pose3d/sphere2500.g2o", LIKE_G2O),
+    DataSet("parking-garage", "pose3d/parking-garage.g2o", LIKE_G2O),
+    DataSet("10kHog-man", "pose2d/10kHog-man.graph.gz"),
+    DataSet("killian5489", "pose2d/killian5489_glc.g2o"),
+    DataSet("cityTrees10000", "landmark2d/cityTrees10000_isam.txt"),
+    DataSet("Victoria Park", "landmark2d/victoriaPark_isam.txt"),
+    PLANE,
+    DataSet("city", "@city:poses=5000"),
+    DataSet("sphere", "@sphere"),
+    DataSet("landmarks2d", "@landmarks2d"),
+]
+_REPLAYED_QUICKLY = [DataSet("intel1728", "pose2d/intel1728.g2o"), SMALL_PLANE,
+                     DataSet("landmarks2d, 500 poses", "@landmarks2d:poses=500")]
+
+
+def online_sets(data: Path | None, quick: bool) -> list[DataSet]:
+    return located(_REPLAYED_QUICKLY if quick else _REPLAYED, data)
+
+
+def budget_sets(data: Path | None, quick: bool) -> list[DataSet]:
+    if quick:
+        return [DataSet("city, 1000 poses", "@city:poses=1000")]
+    return [one for one in online_sets(data, quick) if one.name in ("city10000", "city")]

@@ -1,0 +1,41 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Tables in Markdown, and their places in the pages of docs/."""
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from tabulate import tabulate  # type: ignore[import]
+
+Sections = dict[str, str]  # the Markdown of each part of a page that is written by a study, by its name
+
+
+def table(heading: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """The first column is to the left, the others to the right."""
+    aligned = ["left"] + ["right"] * (len(heading) - 1) if rows else None  # tabulate has no columns without rows
+    markdown: str = tabulate(rows, heading, tablefmt="pipe", colalign=aligned, disable_numparse=True)
+    return markdown + "\n"
+
+
+def marker(name: str) -> str:
+    return f"<!-- table:{name} -->\n"
+
+
+def put(name: str, markdown: str, page: str) -> str:
+    """The page with the section between its markers, which stand on lines of their own and stay:
+
+        <!-- table:NAME -->
+        <!-- /table -->
+
+    Raises ValueError if the page has no such place.
+    """
+    before, begin, rest = page.partition(marker(name))
+    _, end, after = rest.partition("<!-- /table -->")
+    if not end:
+        raise ValueError(f"the page has no place for the table {name}")
+    return before + begin + markdown + end + after
+
+
+def put_into(pages: list[str], name: str, markdown: str) -> None:
+    """Into the page that has a place for it. Raises ValueError if none has."""
+    at = next((k for k, page in enumerate(pages) if marker(name) in page), 0)
+    pages[at] = put(name, markdown, pages[at])

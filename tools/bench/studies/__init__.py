@@ -1,0 +1,8 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The studies: each module measures, and makes tables of what was measured."""
+from __future__ import annotations
+
+from ..study import Study
+from . import graphs, marginals, online, rates, scaling, solvers
+
+ALL: list[Study] = [*graphs.STUDIES, *rates.STUDIES, *scaling.STUDIES, *solvers.STUDIES, *marginals.STUDIES, *online.STUDIES]
