@@ -8,6 +8,11 @@ from collections.abc import Sequence
 import numpy as np
 
 
+def ratio(value: float, reference: float) -> float:
+    """NaN of nothing."""
+    return value / reference if reference != 0.0 else math.nan
+
+
 def median(values: Sequence[float]) -> float:
     """The middle value, or the mean of the two in the middle."""
     return float(np.median(values)) if len(values) else math.nan

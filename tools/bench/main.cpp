@@ -40,14 +40,6 @@ using Study = void (*)(const Bench&, const Keep&);
 
 const std::vector<std::pair<std::string, Study>>& all_studies() {
   static const std::vector<std::pair<std::string, Study>> all{
-      {"compact_sets", study_compact_sets},
-      {"compact_gain", study_compact_gain},
-      {"compact_figures", study_compact_figures},
-      {"compact_live", study_compact_live},
-      {"compact_growth", study_compact_growth},
-      {"compact_consistency", study_compact_consistency},
-      {"compact_matches", study_compact_matches},
-      {"compact_million", study_compact_million},
       {"sparsify_sets", study_sparsify_sets},
       {"sparsify_topology", study_sparsify_topology},
       {"sparsify_problems", study_sparsify_problems},
@@ -146,11 +138,6 @@ void write_tables(const Arguments& arguments) {
     if (!fs::exists(file)) continue;
     const json::value report = json::parse(read(file));
     for (const Section& section : sections(report)) put_into(pages, section);
-    const json::array& entries = list(report, "entries");
-    const fs::path picture = fs::path(arguments.folder) / (name + "_picture.json");
-    if (name == "compact_gain")
-      write(fs::path(arguments.folder) / "compact_gain.csv", gain_curves(entries));
-    if (name == "compact_growth") write(picture, json::serialize(compact_picture(entries)));
   }
   for (std::size_t k = 0; k < pages.size(); ++k) {
     write(arguments.pages[k], pages[k]);
@@ -161,7 +148,7 @@ void write_tables(const Arguments& arguments) {
 int run(int argc, char** argv) {
   Arguments arguments;
   CLI::App app("Measures the program cairn, one JSON file a study, and turns those into tables.");
-  app.add_option("studies", arguments.studies, "all, or some of: compact sparsify explore")
+  app.add_option("studies", arguments.studies, "all, or some of: sparsify explore")
       ->check(CLI::IsMember(study_names()));
   app.add_option("--cairn", arguments.cairn, "the program to measure");
   app.add_option("--folder", arguments.folder, "where the JSON is")->required();

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from .averages import median
+from .averages import median, ratio
 
 Json = Any  # what json.loads returns
 NONE = math.nan
@@ -58,7 +58,7 @@ def median_of(contestant: Json, path: str) -> float:
 def paired_ratio(peer: Json, mine: Json) -> float:
     """The median of the ratios of total times within the rounds that both were in."""
     pairs = zip(items(peer, "runs"), items(mine, "runs"))
-    return median([number(a, "seconds.total") / number(b, "seconds.total") for a, b in pairs])
+    return median([ratio(number(a, "seconds.total"), number(b, "seconds.total")) for a, b in pairs])
 
 
 def was_late(contestant: Json) -> bool:

@@ -23,33 +23,6 @@ struct Bench {
 /// Takes what was measured, one entry at a time, and keeps it at once: a study may take an hour.
 using Keep = std::function<void(boost::json::object entry)>;
 
-// `cairn compact`, whose studies are called compact_…; docs/compact_results.md has their tables.
-
-/// On the graphs of Ila et al. (2017), and others: thresholds, times, errors.
-void study_compact_sets(const Bench& bench, const Keep& keep);
-
-/// Loops kept and errors against the threshold on the gain of a loop.
-void study_compact_gain(const Bench& bench, const Keep& keep);
-
-/// Maps with all poses and loop closures, few of the latter, and few of both; covariances.
-void study_compact_figures(const Bench& bench, const Keep& keep);
-
-/// With everything as by default, as a robot has it: how much is kept and asked for, and the error
-/// beside those of all loop closures, of a random choice and of odometry.
-void study_compact_live(const Bench& bench, const Keep& keep);
-
-/// Against the number of laps around the same ellipse.
-void study_compact_growth(const Bench& bench, const Keep& keep);
-
-/// Normalised errors over many runs, and covariances beside those with everything.
-void study_compact_consistency(const Bench& bench, const Keep& keep);
-
-/// With a registration of which a tenth is wrong.
-void study_compact_matches(const Bench& bench, const Keep& keep);
-
-/// A million poses in a city of 1 km², live, with a map of a fixed number of poses.
-void study_compact_million(const Bench& bench, const Keep& keep);
-
 // `cairn sparsify`, whose studies are called sparsify_…; docs/sparsify_results.md has their tables.
 
 /// The graphs of Vallvé's thesis, with several parts of the nodes left and each recovery.

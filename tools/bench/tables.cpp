@@ -36,15 +36,7 @@ struct StudySections {
   std::vector<Section> (*sections)(const json::array& entries);
 };
 
-constexpr StudySections kSections[] = {{"compact_sets", compact_sets_sections},
-                                       {"compact_growth", compact_growth_sections},
-                                       {"compact_consistency", compact_consistency_sections},
-                                       {"compact_gain", compact_gain_sections},
-                                       {"compact_figures", compact_figures_sections},
-                                       {"compact_live", compact_live_sections},
-                                       {"compact_matches", compact_matches_sections},
-                                       {"compact_million", compact_million_sections},
-                                       {"sparsify_sets", sparsify_sets_sections},
+constexpr StudySections kSections[] = {{"sparsify_sets", sparsify_sets_sections},
                                        {"sparsify_topology", sparsify_topology_sections},
                                        {"sparsify_problems", sparsify_problems_sections},
                                        {"sparsify_whole", sparsify_whole_sections},

@@ -16,20 +16,6 @@ namespace cairn::performance {
 /// study that it does not know.
 std::vector<Section> sections(const boost::json::value& report);
 
-// The parts of `cairn compact`, in tables_compact.cpp.
-std::vector<Section> compact_sets_sections(const boost::json::array& entries);
-std::vector<Section> compact_gain_sections(const boost::json::array& entries);
-std::vector<Section> compact_live_sections(const boost::json::array& entries);
-std::vector<Section> compact_growth_sections(const boost::json::array& entries);
-std::vector<Section> compact_consistency_sections(const boost::json::array& entries);
-std::vector<Section> compact_matches_sections(const boost::json::array& entries);
-/// In tables_compact_figures.cpp.
-std::vector<Section> compact_figures_sections(const boost::json::array& entries);
-/// Loop closures kept and errors of the study compact_gain against the threshold, as CSV.
-std::string gain_curves(const boost::json::array& entries);
-/// In tables_million.cpp.
-std::vector<Section> compact_million_sections(const boost::json::array& entries);
-
 // The parts of `cairn sparsify`, in tables_sparsify.cpp, tables_sparsify_problems.cpp and
 // tables_sparsify_edges.cpp.
 std::vector<Section> sparsify_sets_sections(const boost::json::array& entries);
@@ -44,10 +30,6 @@ std::vector<Section> sparsify_edges_sections(const boost::json::array& entries);
 std::vector<Section> explore_part_sections(const boost::json::array& entries);
 std::vector<Section> explore_floors_sections(const boost::json::array& entries);
 std::vector<Section> explore_sensitivity_sections(const boost::json::array& entries);
-
-// What `cairn plot` draws, in the words of `cairn bench --json`:
-/// The growth with the number of poses of `cairn compact`, a line a strategy.
-boost::json::value compact_picture(const boost::json::array& entries);
 
 // Numbers in words
 // --------------------------------------------------------------------------------------------

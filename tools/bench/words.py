@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from .averages import ratio
 from .reports import Json, median_of, number, was_late
 
 
@@ -24,9 +25,9 @@ def plain(value: float) -> str:
     return repr(float(value)).removesuffix(".0")
 
 
-def times(ratio: float) -> str:
+def times(factor: float) -> str:
     """"3.21 ×"."""
-    return digits(ratio) + " ×" if math.isfinite(ratio) else "-"
+    return digits(factor) + " ×" if math.isfinite(factor) else "-"
 
 
 def percent(part: float, decimals: int = 0) -> str:
@@ -57,7 +58,7 @@ def apart(value: float, reference: float, rounding: float = 0.0) -> str:
     """How far apart two numbers are, relative to the second, or to `rounding` if that is larger: "0", "3e-15"."""
     if not math.isfinite(value) or not math.isfinite(reference):
         return "-"
-    return "0" if value == reference else f"{abs(value - reference) / max(abs(reference), rounding):.0e}"
+    return "0" if value == reference else f"{ratio(abs(value - reference), max(abs(reference), rounding)):.0e}"
 
 
 def total(contestant: Json) -> str:

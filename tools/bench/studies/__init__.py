@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from ..study import Study
-from . import graphs, marginals, online, rates, scaling, solvers
+from . import compact, graphs, marginals, online, rates, scaling, solvers
 
-ALL: list[Study] = [*graphs.STUDIES, *rates.STUDIES, *scaling.STUDIES, *solvers.STUDIES, *marginals.STUDIES, *online.STUDIES]
+ALL: list[Study] = [*graphs.STUDIES, *rates.STUDIES, *scaling.STUDIES, *solvers.STUDIES, *marginals.STUDIES, *online.STUDIES,
+                    *compact.STUDIES]

@@ -8,6 +8,7 @@ import math
 
 import pandas as pd
 
+from ..averages import ratio
 from ..data_sets import DataSet, budget_sets, online_sets
 from ..pages import Sections, table
 from ..program import Run, Words
@@ -118,7 +119,7 @@ def last_check(entry: Json) -> Json:
 
 def final_excess(contestant: Json, check: Json) -> float:
     """By how much the final chi2 of a contestant is above the best that is known."""
-    return median_of(contestant, "chi2") / best(check) - 1.0 if contestant and check else NONE
+    return ratio(median_of(contestant, "chi2"), best(check)) - 1.0 if contestant and check else NONE
 
 
 def worst(entry: Json) -> float:
@@ -126,7 +127,7 @@ def worst(entry: Json) -> float:
     Before the first loop closes, chi2 is nothing but rounding, whose ratios say nothing."""
     rounding, last = 1e-9, last_check(entry)
     known = [check for check in items(entry, "checks") if best(check) > rounding * best(last)]
-    return max([final_excess(ours(entry), last), *(number(check, "chi2") / best(check) - 1.0 for check in known)])
+    return max([final_excess(ours(entry), last), *(ratio(number(check, "chi2"), best(check)) - 1.0 for check in known)])
 
 
 def times_table(entries: list[Json]) -> str:
@@ -147,7 +148,7 @@ def chi2_table(entries: list[Json]) -> str:
         if check := last_check(entry):
             rows.append([text(entry, "name"), f"{median_of(ours(entry), 'chi2'):.8g}", f"{number(check, 'batch'):.8g}",
                          f"{number(check, 'polished'):.8g}", above(final_excess(ours(entry), check)), above(worst(entry)),
-                         above(number(check, "chi2") / best(check) - 1.0),
+                         above(ratio(number(check, "chi2"), best(check)) - 1.0),
                          above(final_excess(contestant(entry, PERIODIC), check))])
     return table(["graph", "chi2", "batch, from the initial estimate", "batch, from the estimate", "above batch",
                   "at most, at the samples", "finished", "`periodic_batch` above batch"], rows)
@@ -177,7 +178,7 @@ def budget_table(entries: list[Json]) -> str:
         for c in items(entry, "contestants"):
             chi2 = median_of(c, "chi2")
             limit = digits(1e3 * number(entry, "budget")) if text(c, "name") == "budget" else "none"
-            rows.append([text(entry, "name"), limit, total(c), *step_times(c), f"{chi2:.8g}", above(chi2 / lowest - 1.0),
+            rows.append([text(entry, "name"), limit, total(c), *step_times(c), f"{chi2:.8g}", above(ratio(chi2, lowest) - 1.0),
                          count(median_of(c, "owed"))])
     return table(["graph", "limit [ms]", "all [s]", "median step [ms]", "95 %", "99 %", "longest", "chi2", "above batch",
                   "deferred at the end"], rows)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ..averages import median
+from ..averages import median, ratio
 from ..data_sets import DataSet, sets_of
 from ..pages import Sections, table
 from ..program import Run
@@ -90,10 +90,10 @@ def row_of(entry: Json, first: Json) -> list[str]:
     """The first is what the others are compared with."""
     reference, rounding = number(first, "chi2.final"), ROUNDING * number(first, "chi2.initial")
     chi2, inner = number(entry, "chi2.final"), number(entry, "solver.iterations")
-    elsewhere = member(entry, "finished") is True and abs(chi2 - reference) / max(reference, rounding) > SAME
+    elsewhere = member(entry, "finished") is True and ratio(abs(chi2 - reference), max(reference, rounding)) > SAME
     return [f"`{text(entry, 'setting')}`", f"{chi2:.8g}" if math.isfinite(chi2) else "-", apart(chi2, reference, rounding),
             whole(number(entry, "iterations")) if math.isfinite(chi2) else "-", count(inner) if math.isfinite(inner) else "",
-            milliseconds(number(entry, "seconds")), times(number(entry, "seconds") / number(first, "seconds")),
+            milliseconds(number(entry, "seconds")), times(ratio(number(entry, "seconds"), number(first, "seconds"))),
             megabytes(number(entry, "peak_memory_bytes")),
             text(entry, "result") + (", **another chi2**" if elsewhere else "")]
 

@@ -1,0 +1,9 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`cairn compact` on published and generated graphs: docs/compact_results.md has the tables."""
+from __future__ import annotations
+
+from ...study import Study
+from . import checks, figures, growth, million, sensitivity, sets
+
+STUDIES: list[Study] = [*sets.STUDIES, *sensitivity.STUDIES, *figures.STUDIES, *growth.STUDIES, *checks.STUDIES,
+                        *million.STUDIES]
