@@ -16,8 +16,7 @@ from .study import Bench, Study, tell
 
 
 # What the program cairn_performance still measures.
-OLD = ["sparsify_sets", "sparsify_topology", "sparsify_problems", "sparsify_whole",
-       "sparsify_online", "sparsify_selection", "sparsify_edges", "explore_cave", "explore_freiburg", "explore_action",
+OLD = ["explore_cave", "explore_freiburg", "explore_action",
        "explore_scale", "explore_floors", "explore_sensitivity"]
 
 

@@ -208,3 +208,40 @@ def live_sets(data: Path | None, quick: bool) -> list[tuple[DataSet, list[str]]]
                   *located([DataSet("FR079", "pose2d/FR079.g2o", truth="de_facto"),
                             DataSet("killian5489", "pose2d/killian5489_glc.g2o", truth="de_facto")], data)]
     return [circle(noisier, 25) for noisier in ["0.5", "1", "1.5", "2.5", "5"]] + [(one, []) for one in recordings]
+
+
+# `cairn sparsify`; without published graphs a generated one.
+
+_CHAIN = ["--initial", "odometry"]
+_M3500 = DataSet("M3500", "pose2d/M3500.g2o", _CHAIN)
+_CITY = DataSet("city10000", "pose2d/city10000_isam.txt")
+
+
+def thesis_sets(data: Path | None, quick: bool) -> list[DataSet]:
+    """Those of Vallvé's thesis."""
+    return located_or([_M3500, DataSet("Intel", "pose2d/intel1228_carlone.g2o", _CHAIN),
+                       DataSet("FR079", "pose2d/FR079.g2o", _CHAIN), DataSet("MITb", "pose2d/MITb.g2o", _CHAIN)],
+                      data, quick, SMALL_PLANE, PLANE)
+
+
+def space_sets(data: Path | None, quick: bool) -> list[DataSet]:
+    return located_or([DataSet("sphere2500", "pose3d/sphere2500_isam.txt"),
+                       DataSet("parking-garage", "pose3d/parking-garage.g2o", LIKE_G2O),
+                       DataSet("eecs", "pose3d/eecs_glc.g2o", LIKE_G2O),
+                       DataSet("duderstadt", "pose3d/duderstadt_glc.g2o", LIKE_G2O)], data, quick,
+                      DataSet("sphere, 200 poses", "@sphere:turns=10,poses_per_turn=20,radius=20"), DataSet("sphere", "@sphere"))
+
+
+def large_sets(data: Path | None, quick: bool) -> list[DataSet]:
+    return located_or([_M3500, _CITY], data, quick, SMALL_PLANE, PLANE)
+
+
+def sparsify_online_sets(data: Path | None, quick: bool) -> list[DataSet]:
+    return located_or([DataSet("manhattanOlson3500", "pose2d/manhattanOlson3500_isam.txt"), _CITY], data, quick, SMALL_PLANE,
+                      PLANE)
+
+
+def edge_sets(data: Path | None, quick: bool) -> list[DataSet]:
+    return located_or([DataSet("M3500", "pose2d/M3500.g2o"), DataSet("intel1728", "pose2d/intel1728.g2o"),
+                       DataSet("killian5489", "pose2d/killian5489_glc.g2o"), DataSet("sphere2500", "pose3d/sphere2500.g2o"),
+                       DataSet("parking-garage", "pose3d/parking-garage.g2o")], data, quick, SMALL_PLANE, PLANE)
