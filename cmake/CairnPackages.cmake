@@ -57,6 +57,19 @@ function(cairn_package component name section description)
           DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/${name} COMPONENT ${component})
 endfunction()
 
+# cairn_python_sources(component name): the compiled form of a package's Python sources comes and goes with it.
+function(cairn_python_sources component name)
+  string(TOUPPER ${component} COMPONENT)
+  set(scripts ${control_folder}/${name}/postinst ${control_folder}/${name}/prerm)
+  file(WRITE ${control_folder}/${name}/postinst
+       "#!/bin/sh\nset -e\nif [ \"$1\" = configure ] && command -v py3compile >/dev/null; then\n  py3compile -p ${name}\nfi\n")
+  file(WRITE ${control_folder}/${name}/prerm
+       "#!/bin/sh\nset -e\nif command -v py3clean >/dev/null; then\n  py3clean -p ${name}\nfi\n")
+  file(CHMOD ${scripts} PERMISSIONS
+       OWNER_READ OWNER_WRITE OWNER_EXECUTE GROUP_READ GROUP_EXECUTE WORLD_READ WORLD_EXECUTE)
+  set(CPACK_DEBIAN_${COMPONENT}_PACKAGE_CONTROL_EXTRA ${scripts} PARENT_SCOPE)
+endfunction()
+
 # The changes of cairn, and, as Debian asks for it, of the packages.
 find_program(CAIRN_GZIP gzip REQUIRED)
 file(MAKE_DIRECTORY ${control_folder})
@@ -121,15 +134,20 @@ NumPy arrays."
     DEPENDS libraries program)
   set(CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS "python3 (>= ${this_python}~), python3 (<< ${CMAKE_MATCH_1}.${next_minor}), python3-numpy")
   set(CPACK_DEBIAN_PYTHON_PACKAGE_RECOMMENDS python3-matplotlib)
-  # The compiled form of the sources comes and goes with the package.
-  file(WRITE ${control_folder}/python3-cairn/postinst
-       "#!/bin/sh\nset -e\nif [ \"$1\" = configure ] && command -v py3compile >/dev/null; then\n  py3compile -p python3-cairn\nfi\n")
-  file(WRITE ${control_folder}/python3-cairn/prerm
-       "#!/bin/sh\nset -e\nif command -v py3clean >/dev/null; then\n  py3clean -p python3-cairn\nfi\n")
-  file(CHMOD ${control_folder}/python3-cairn/postinst ${control_folder}/python3-cairn/prerm PERMISSIONS
-       OWNER_READ OWNER_WRITE OWNER_EXECUTE GROUP_READ GROUP_EXECUTE WORLD_READ WORLD_EXECUTE)
-  set(CPACK_DEBIAN_PYTHON_PACKAGE_CONTROL_EXTRA
-      ${control_folder}/python3-cairn/postinst ${control_folder}/python3-cairn/prerm)
+  cairn_python_sources(python python3-cairn)
+  if(CAIRN_ROS)
+    cairn_package(ros cairn-ros science "back end for graph SLAM, node for ROS
+${what_it_is}
+
+This package has a node for ROS 1 that estimates the trajectory of a robot from
+odometry and loop closures."
+      DEPENDS libraries python)
+    set(CPACK_DEBIAN_ROS_PACKAGE_SHLIBDEPS OFF)
+    set(CPACK_DEBIAN_ROS_PACKAGE_DEPENDS
+        "python3, python3-numpy, python3-rospy, python3-geometry-msgs, python3-nav-msgs, python3-tf2-msgs, python3-visualization-msgs")
+    set(CPACK_DEBIAN_ROS_PACKAGE_RECOMMENDS python3-roslaunch)
+    cairn_python_sources(ros cairn-ros)
+  endif()
 endif()
 
 # Plugins that need large libraries, or some under the GPL: each package says what it has, and under which licence that is

@@ -3,12 +3,13 @@
 import importlib
 import sys
 
-MORE = {"test_docs": ["matplotlib"], "test_notebook": ["matplotlib", "nbformat", "nbclient", "ipykernel"]}
+MORE = {"test_docs": ["matplotlib"], "test_notebook": ["matplotlib", "nbformat", "nbclient", "ipykernel"],
+        "test_ros_node": ["rospy", "roslaunch", "nav_msgs", "visualization_msgs", "tf2_msgs"]}
 for module in ["numpy", "pytest", *(module for name, modules in MORE.items() if name in sys.argv[1] for module in modules)]:
     try:
         importlib.import_module(module)
     except ImportError:
-        print(f"skipped: there is no module {module} (python3-{module}) for {sys.executable}")
+        print(f"skipped: there is no module {module} (python3-{module.replace('_', '-')}) for {sys.executable}")
         sys.exit(77)
 
 import pytest
