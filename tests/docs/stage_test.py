@@ -87,6 +87,17 @@ class Links(unittest.TestCase):
         self.assertIn("docs/python.md: gone.md is not there", self.stage.wrong)
 
 
+    def test_those_to_headings_that_there_are_not_are_found(self):
+        for text in ["[guide](cpp.md#no-such-heading)", "[below](#no-such-heading)"]:
+            self.assertEqual(self.link(text), text)
+        expected = ["docs/python.md: cpp.md has no heading for #no-such-heading", "docs/python.md: python.md has no heading for #no-such-heading"]
+        self.assertEqual(self.stage.wrong, expected)
+
+    def test_headings_have_the_anchors_of_a_forge(self):
+        text = "# One `two`: [three](x.md)!\n## Same\n## Same\n```sh\n# no heading\n```\n<a id=\"named\"></a>\n### Λ and x_1 – far\n"
+        self.assertEqual(stage.anchors(text), {"one-two-three", "same", "same-1", "named", "λ-and-x_1--far"})
+
+
 class Docstrings(unittest.TestCase):
     def test_arguments_become_a_list_and_examples_code(self):
         text = python_names.prose("Does it.\n\n    x = f(1)\n\nname: what\n    it is\nother: this\n")

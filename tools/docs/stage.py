@@ -25,6 +25,18 @@ LINK = re.compile(r"(!?)\[((?:[^\[\]]|\[[^\]]*\])*)\]\(([^()\s]+(?:\([^()]*\))?)
 FENCE = re.compile(r"^(```.*?^```[^\S\n]*$)", re.MULTILINE | re.DOTALL)
 
 
+def anchors(text):
+    """What links to a page can name after '#': its headings, as a forge and MyST make anchors of them, and explicit ones."""
+    prose = "".join(FENCE.split(text)[::2])
+    found, times = set(re.findall(r'<a (?:id|name)="([^"]+)"', prose)), {}
+    for heading in re.findall(r"^#{1,6} (.*)$", prose, re.MULTILINE):
+        words = LINK.sub(lambda match: match.group(2), heading).replace("`", "").strip().lower()
+        anchor = re.sub(r"[^\w\- ]", "", words).replace(" ", "-")
+        found.add(f"{anchor}-{times[anchor]}" if anchor in times else anchor)
+        times[anchor] = times.get(anchor, 0) + 1
+    return found
+
+
 class Stage:
     def __init__(self, folder):
         self.folder = folder
@@ -50,10 +62,10 @@ class Stage:
 
     def link(self, match, source):
         picture, text, target = match.groups()
-        if re.match(r"[a-z]+:", target) or target.startswith("#"):
+        if re.match(r"[a-z]+:", target):
             return match.group(0)
         path, _, anchor = target.partition("#")
-        there = (source.parent / path).resolve()
+        there = (source.parent / path).resolve() if path else source
         try:
             name = there.relative_to(SOURCE)
         except ValueError:
@@ -63,6 +75,10 @@ class Stage:
             return text
         if there.is_dir():
             return text
+        if anchor and there.suffix == ".md" and anchor not in anchors(there.read_text(encoding="utf-8")):
+            self.wrong.append(f"{source.relative_to(SOURCE)}: {path or source.name} has no heading for #{anchor}")
+        if not path:
+            return match.group(0)
         if str(name) == "docs/index.md":  # the first page of the site, at its top
             anchor = f"#{anchor}" if anchor else ""
             return f"{picture}[{text}]({os.path.relpath(SOURCE / 'index.md', source.parent)}{anchor})"
