@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import json
 import math
-import subprocess
 from pathlib import Path
 
 from .pages import put_into
@@ -13,11 +12,6 @@ from .program import TINY, Cairn, Failed
 from .reports import Json, items, member, number, text
 from .studies import ALL
 from .study import Bench, Study, tell
-
-
-# What the program cairn_performance still measures.
-OLD = ["explore_cave", "explore_freiburg", "explore_action",
-       "explore_scale", "explore_floors", "explore_sensitivity"]
 
 
 def is_chosen(study: str, chosen: list[str]) -> bool:
@@ -54,11 +48,6 @@ def measure(arguments: argparse.Namespace) -> None:
                       "rounds": bench.rounds, "ours": bench.ours, "machine": tiny["machine"], "build": tiny["build"],
                       "entries": []}
             measure_study(study, bench, report, arguments.folder / f"{study.name}.json")
-    old = [name for name in OLD if is_chosen(name, arguments.studies)]
-    if old:
-        subprocess.run([arguments.old, *old, "--cairn", arguments.cairn, "--folder", arguments.folder,
-                        "--data", arguments.data or "", "--commit", arguments.commit, "--ours", bench.ours,
-                        "--rounds", str(bench.rounds), *(["--quick"] if bench.quick else [])], check=True)
 
 
 def measure_study(study: Study, bench: Bench, report: Json, file: Path) -> None:
@@ -84,18 +73,14 @@ def write_tables(arguments: argparse.Namespace) -> None:
     for page, content in zip(arguments.tables, pages):
         page.write_text(content, encoding="utf-8")
         tell(f"tables: {page}")
-    if arguments.old:
-        subprocess.run([arguments.old, "--folder", arguments.folder, "--tables", *arguments.tables], check=True)
 
 
 def parse(words: list[str]) -> argparse.Namespace:
-    studies = [study.name for study in ALL] + OLD
-    names = list(dict.fromkeys(name for study in studies for name in [study.partition("_")[0], study]))
+    names = list(dict.fromkeys(name for study in ALL for name in [study.name.partition("_")[0], study.name]))
     parser = argparse.ArgumentParser(prog="bench", description="Measures the program cairn, one JSON file a study, and makes "
                                      "tables of those.", allow_abbrev=False)
     parser.add_argument("studies", nargs="*", metavar="STUDY", help="all, or some of: " + " ".join(names))
     parser.add_argument("--cairn", metavar="PROGRAM", help="the program to measure")
-    parser.add_argument("--old", metavar="PROGRAM", help="cairn_performance")
     parser.add_argument("--folder", type=Path, required=True, help="where the JSON is")
     parser.add_argument("--data", type=Path, metavar="FOLDER", help="of the real graphs")
     parser.add_argument("--commit", default="", help="what is measured, for the tables")
@@ -123,7 +108,9 @@ def main(words: list[str]) -> int:
             write_tables(arguments)
         else:
             measure(arguments)
-    except (Failed, OSError, ValueError, subprocess.CalledProcessError) as error:
+    except (Failed, OSError, ValueError) as error:
         tell(f"bench: {error}")
         return 1
+    except KeyboardInterrupt:  # what was measured is kept
+        return 130
     return 0

@@ -54,11 +54,10 @@ def run_program(words: list[str], work: Path, limit: float = 0.0) -> Outcome:
     out, error = work / "child.out", work / "child.err"
     write = os.O_WRONLY | os.O_CREAT | os.O_TRUNC
     begin = time.monotonic()
-    child = os.posix_spawnp(words[0], words, os.environ, file_actions=[
-        (os.POSIX_SPAWN_OPEN, 0, "/dev/null", os.O_RDONLY, 0),
-        (os.POSIX_SPAWN_OPEN, 1, os.fspath(out), write, 0o644),
-        (os.POSIX_SPAWN_OPEN, 2, os.fspath(error), write, 0o644),
-    ])
+    files = [(os.POSIX_SPAWN_OPEN, 0, "/dev/null", os.O_RDONLY, 0),
+             (os.POSIX_SPAWN_OPEN, 1, os.fspath(out), write, 0o644), (os.POSIX_SPAWN_OPEN, 2, os.fspath(error), write, 0o644)]
+    # Python ignores SIGPIPE, and a shell may have ignored SIGINT.
+    child = os.posix_spawnp(words[0], words, os.environ, file_actions=files, setsigdef=[signal.SIGINT, signal.SIGPIPE])
     most = int(allowed_memory())
     resource.prlimit(child, resource.RLIMIT_AS, (most, most))
     ended = _wait(child, limit if limit > 0.0 else None)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from ..study import Study
-from . import compact, graphs, marginals, online, rates, scaling, solvers, sparsify
+from . import compact, explore, graphs, marginals, online, rates, scaling, solvers, sparsify
 
 ALL: list[Study] = [*graphs.STUDIES, *rates.STUDIES, *scaling.STUDIES, *solvers.STUDIES, *marginals.STUDIES, *online.STUDIES,
-                    *compact.STUDIES, *sparsify.STUDIES]
+                    *compact.STUDIES, *sparsify.STUDIES,
+                    *explore.STUDIES]

@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Every explorer on every floor; and what the thesis is silent about, changed one by one."""
+from __future__ import annotations
+
+from ...data_sets import DataSet
+from ...pages import Sections, table
+from ...program import Words
+from ...reports import Json, number, text
+from ...study import Bench, Keep, Study
+from ...words import digits, whole
+from .runs import end_of, floor_of, mean_of, measure, measured, problem_of, runs_of
+from .thesis import action_space
+
+FLOORS = ["cave_20m", "fr079", "intel_lab", "hospital_40m", "willow_full", "stata_basement", "depot", "warehouse",
+          "simple_rooms", "tb3_sandbox"]
+SEEDS = 2
+
+
+def all_floors(bench: Bench) -> list[DataSet]:
+    floors = [floor for floor in (floor_of(bench, name, "") for name in FLOORS) if floor.graph]
+    floors = floors or [DataSet(kind, kind) for kind in ["@rooms", "@corridors", "@loop", "@cave"]]
+    return floors[:2] if bench.quick else floors
+
+
+def study_floors(bench: Bench, keep: Keep) -> None:
+    until = ["--until", "distance=10" if bench.quick else "distance=100"]
+    # Without noise and without a limit: all that can be reached is to be seen, and nothing hit.
+    exact = ["--odometry", "sigma_xy=1e-6,sigma_theta=1e-6,relative=0", "--lidar", "range_sigma=0",
+             *(until if bench.quick else [])]
+    for floor in all_floors(bench):
+        for explorer in bench.cairn.names("explorer"):
+            keep(measure(bench, "floors", floor, explorer, explorer, SEEDS, until))
+        keep(measure(bench, "exact", floor, "frontier", "frontier", 1, exact))
+
+
+def study_sensitivity(bench: Bench, keep: Keep) -> None:
+    changes: dict[str, Words] = {
+        "as in Table 5.6": action_space(bench), "aperture 90°": action_space(bench, fov=90),
+        "aperture 270°": action_space(bench, fov=270), "range 4 m": action_space(bench, reach=4),
+        "range 16 m": action_space(bench, reach=16),
+        "cells of 0.05 m": [*action_space(bench), "--mapper", "log_odds:resolution=0.05"],
+        "cells of 0.2 m": [*action_space(bench), "--mapper", "log_odds:resolution=0.2"]}
+    for change, settings in changes.items():
+        for method in ["frontier", "drrt_star"]:
+            entry = measure(bench, "sensitivity", floor_of(bench, "fr079", "@rooms"), method, method, bench.rounds, settings)
+            keep({**entry, "change": change})
+
+
+# Tables
+
+
+def floors_sections(entries: list[Json]) -> Sections:
+    floors, exact = [], []
+    before = ""
+    for entry in entries:
+        name, method = text(entry, "name"), text(entry, "method")
+        floor = "" if name == before else name
+        without_noise = text(entry, "part") == "exact"
+        if problem_of(entry) and not without_noise:
+            floors.append([floor, method, "", problem_of(entry), *[""] * 8])
+        for run in runs_of(entry):
+            of = {measure: measured(run, measure)
+                  for measure in ["distance", "seen", "loops", "collisions", "ate", "wrong", "decision_p95"]}
+            begin = [end_of(run), text(run, "why"), digits(of["distance"]), digits(of["seen"])]
+            if without_noise:
+                exact.append([name, *begin, whole(of["collisions"])])
+            else:
+                floors.append([floor, method, f"{number(run, 'seed'):.0f}", *begin, whole(of["loops"]), whole(of["collisions"]),
+                               *(digits(of[measure]) for measure in ["ate", "wrong", "decision_p95"])])
+                floor = ""
+        before = name
+    return {"explore-floors": table(["floor", "explorer", "seed", "end", "why", "driven [m]", "seen [m²]", "loops",
+                                     "collisions", "ATE [m]", "wrong [m²]", "95 % of decisions [s]"], floors),
+            "explore-exact": table(["floor", "end", "why", "driven [m]", "seen [m²]", "collisions"], exact)}
+
+
+def sensitivity_sections(entries: list[Json]) -> Sections:
+    measures = ["map_entropy", "trajectory_entropy", "loops", "coverage", "map_error", "wrong", "seconds"]
+    rows = [[text(entry, "change"), text(entry, "method"),
+             *(problem_of(entry) or mean_of(entry, measure).text() for measure in measures)] for entry in entries]
+    return {"explore-sensitivity": table(["changed", "method", "map entropy [nats·m²]", "trajectory entropy [nats]",
+                                          "loop closures", "coverage [m²]", "map error [m²]", "wrong cells [m²]",
+                                          "time of a run [s]"], rows)}
+
+
+STUDIES = [Study("explore_floors", study_floors, floors_sections),
+           Study("explore_sensitivity", study_sensitivity, sensitivity_sections)]

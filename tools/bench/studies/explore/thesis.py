@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Tables 5.4 to 5.6 of the thesis: search in configuration space and in action space; and the latter at the scale that the
+thesis's floor likely had."""
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from ...averages import ratio
+from ...pages import Sections, table
+from ...program import Words
+from ...published import said
+from ...reports import Json, member, text
+from ...study import Bench, Keep, Study
+from ...words import times
+from .claims import claims_table
+from .runs import (MAP_ERROR_AT_COVERAGE, WRONG_AT_SEEN, difference_of, ends_of, floor_of, mean_of, measure, runs_of)
+
+# What all of them have in common; the aperture, range and beams of the lidar are silent, and so is `loop_gain`:
+# docs/explore_results.md has where it is from.
+COMMON = ["--policy", "compact_pose:range=1,angle=0.35,reuse=false,gate=0.9999,loop_gain=6",
+          "--match", "range=1,angle=0.35,sigma_xy=0.05,sigma_theta=0.0017"]
+
+
+def configuration_space(bench: Bench) -> Words:
+    """E1 and E2 (5.3.3): noise per step."""
+    return [*COMMON, "--odometry", "sigma_xy=0.1,sigma_theta=0.0026,relative=0", "--lidar", "fov=180,range=8,beams=181",
+            "--until", "steps=30,decisions=15" if bench.quick else "steps=200,decisions=100"]
+
+
+def action_space(bench: Bench, fov: int = 180, reach: int = 8) -> Words:
+    """E3 (5.4.5): odometry's noise is 15 % of the motion, with a least one. The lidar has a beam for each degree of `fov`, and
+    a range of `reach` [m]."""
+    return [*COMMON, "--odometry", "relative=0.15,sigma_xy=0.01,sigma_theta=0.0052", "--lidar",
+            f"fov={fov},range={reach},beams={fov + 1},range_sigma=0.05", "--until",
+            "distance=15" if bench.quick else "distance=250"]
+
+
+# The methods of the thesis, and beyond: frontiers by exact paths, and by chance.
+CONFIGURATION_SPACE = {"frontier": "frontier:length=0.5,smallest=0.1,keep=1,planner=rrt_star", "ede_gradient": "ede_gradient",
+                       "ede_rrt_star": "ede_rrt_star", "ours: frontier": "frontier", "ours: dopt": "dopt"}
+ACTION_SPACE = {"frontier": "frontier:length=0.9,keep=1,planner=rrt_star",
+                "heuristic": "heuristic:keep=1,planner=rrt_star,entropy=thesis,revisits=0", "ede_rrt_star": "ede_rrt_star",
+                "drrt_star": "drrt_star", "errt_star": "errt_star", "ours: frontier": "frontier", "ours: dopt": "dopt",
+                "ours: random": "random"}
+
+
+def part_study(part: str, floor: str, generated: str, methods: dict[str, str], settings: Callable[[Bench], Words]) -> Study:
+    def study(bench: Bench, keep: Keep) -> None:
+        for method, explorer in methods.items():
+            keep(measure(bench, part, floor_of(bench, floor, generated), method, explorer, bench.rounds, settings(bench)))
+
+    return Study(f"explore_{part}", study, sections)
+
+
+# Tables
+
+ROWS = {"map_entropy": "map entropy [nats·m²]", "trajectory_entropy": "trajectory entropy [nats]",
+        "seconds": "time of a run [s]", "loops": "loop closures", "coverage": "coverage [m²]", "map_error": "map error [m²]",
+        "seen": "of the floor seen [m²]", "wrong": "wrong cells [m²]", "ate": "ATE [m]", "collisions": "collisions",
+        "distance": "driven [m]", "poses": "poses kept", "decisions": "decisions",
+        "decision_median": "a decision: median [s]", "decision_p95": "95 % [s]", "decision_max": "longest [s]"}
+IN_THESIS = ["map_entropy", "trajectory_entropy", "seconds", "loops", "coverage", "map_error"]
+# How long the thesis's runs are (5.4.5 and 5.3.3).
+THESIS_DISTANCE, THESIS_MOTIONS = 250.0, 200.0  # [m], motions
+
+
+def in_thesis(part: str, method: Json, measure: str) -> float:
+    return said("vallve2018_exploration", measure, part=part, method=text(method, "method"))
+
+
+def results_table(part: str, methods: list[Json]) -> str:
+    """"ours ± interval (the thesis's)"."""
+    rows = []
+    for measure_name, title in ROWS.items():
+        cells = [title]
+        for method in methods:
+            thesis = in_thesis(part, method, measure_name) if measure_name in IN_THESIS else math.nan
+            cells.append(mean_of(method, measure_name).text() + (f" ({thesis:.6g})" if math.isfinite(thesis) else ""))
+        rows.append(cells)
+    # Runs may be shorter than the thesis's: times are compared per metre, or per motion.
+    unit, of, length = ("metre", "distance", THESIS_DISTANCE) if part == "action" else ("motion", "motions", THESIS_MOTIONS)
+    faster = [times(ratio(in_thesis(part, method, "seconds") / length * mean_of(method, of).mean,
+                          mean_of(method, "seconds").mean)) for method in methods]
+    rows += [[f"the thesis's time per {unit} over ours", *faster], ["ends", *map(ends_of, methods)],
+             ["runs", *(str(len(runs_of(method))) for method in methods)]]
+    return table(["mean ± 95 % (thesis)", *(text(method, "method") for method in methods)], rows)
+
+
+def differences_table(methods: list[Json]) -> str:
+    reference, others = methods[0], methods[1:]
+    if not others:
+        return ""
+    measures = {name: title for name, title in ROWS.items() if not name.startswith("decision")}
+    measures |= {MAP_ERROR_AT_COVERAGE: "map error at equal coverage [m²]", WRONG_AT_SEEN: "wrong cells, as much floor seen [m²]"}
+    rows = []
+    for name, title in measures.items():
+        differences = [difference_of(method, reference, name) for method in others]
+        rows.append([title, *(one.text(sign=True) + (" *" if one.excludes_zero() else "") for one in differences)])
+    return table(["difference from frontier", *(text(method, "method") for method in others)], rows)
+
+
+def setting_of(methods: list[Json]) -> str:
+    """A floor and how it was driven on, below the tables."""
+    for method in methods:
+        if report := member(method, "report"):
+            return (f"\nOn `{text(method, 'name')}`; world `{text(report, 'world')}`, policy `{text(report, 'policy')}`, "
+                    f"registration `{text(report, 'registration')}`, mapper `{text(report, 'mapper')}`.\n")
+    return "\nNothing was measured.\n"
+
+
+def sections(methods: list[Json]) -> Sections:
+    if not methods:
+        return {}
+    part = text(methods[0], "part")
+    thesis = "action" if part == "scale" else part  # at the other scale the thesis's figures are those of the same table
+    return {f"explore-{part}": results_table(thesis, methods) + setting_of(methods),
+            f"explore-{part}-differences": differences_table(methods),
+            f"explore-{part}-claims": claims_table(thesis, methods)}
+
+
+STUDIES = [part_study("cave", "cave_20m", "@cave", CONFIGURATION_SPACE, configuration_space),
+           part_study("freiburg", "fr079", "@corridors", CONFIGURATION_SPACE, configuration_space),
+           part_study("action", "fr079", "@rooms", ACTION_SPACE, action_space),
+           part_study("scale", "fr079_thesis_scale", "@rooms", ACTION_SPACE, action_space)]
