@@ -98,6 +98,17 @@ class Links(unittest.TestCase):
         self.assertEqual(stage.anchors(text), {"one-two-three", "same", "same-1", "named", "λ-and-x_1--far"})
 
 
+class Gallery(unittest.TestCase):
+    def test_each_picture_is_drawn_by_a_command_of_the_page_and_is_there(self):
+        text = (SOURCE / "docs" / "gallery.md").read_text(encoding="utf-8")
+        commands = "\n".join(re.findall(r"^```sh\n(.*?)^```$", text, re.MULTILINE | re.DOTALL))
+        drawn = re.findall(r"^cairn plot .* -o (\S+)$", commands, re.MULTILINE)
+        self.assertEqual(re.findall(r"^!\[.+\]\(images/(\S+)\)$", text, re.MULTILINE), drawn)
+        self.assertGreaterEqual(len(drawn), 9)
+        for picture in drawn:
+            self.assertTrue((SOURCE / "docs" / "images" / picture).exists(), picture)
+
+
 class Docstrings(unittest.TestCase):
     def test_arguments_become_a_list_and_examples_code(self):
         text = python_names.prose("Does it.\n\n    x = f(1)\n\nname: what\n    it is\nother: this\n")

@@ -48,20 +48,27 @@ def test_every_block_of_the_guide_runs(tmp_path):
     assert run(SOURCE / "docs" / "python.md", tmp_path) >= 20
 
 
-@pytest.mark.parametrize("page, least", [("getting_started", 10), ("coming_from", 8)])
+@pytest.mark.parametrize("page, least", [("getting_started", 10), ("coming_from", 8), ("tutorials", 18)])
 def test_every_block_of_the_other_pages_runs(page, least, tmp_path):
     assert run(SOURCE / "docs" / f"{page}.md", tmp_path) >= least
 
 
-def test_the_commands_of_getting_started_run(tmp_path):
-    page = (SOURCE / "docs" / "getting_started.md").read_text(encoding="utf-8")
+@pytest.mark.parametrize(
+    "page, results",
+    [
+        ("getting_started", {"optimized.g2o", "compact.g2o", "sparse.g2o", "run.json"}),
+        ("tutorials", {"my_distance", "my_optimizer", "online.g2o", "full.g2o", "sparse_optimized.g2o"}),
+    ],
+)
+def test_the_commands_run(page, results, tmp_path):
+    page = (SOURCE / "docs" / f"{page}.md").read_text(encoding="utf-8")
     commands = [line for block in re.findall(r"^```sh\n(.*?)^```$", page, re.MULTILINE | re.DOTALL) for line in block.splitlines()]
     assert len(commands) >= 8 and all(line.startswith("cairn ") for line in commands)
     for line in commands:
         command = [os.environ["CAIRN_PROGRAM"], *shlex.split(line)[1:]]
         ended = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
         assert ended.returncode == 0, f"{line}\n{ended.stdout}{ended.stderr}"
-    assert {"optimized.g2o", "compact.g2o", "sparse.g2o", "run.json"} <= {path.name for path in tmp_path.iterdir()}
+    assert results <= {path.name for path in tmp_path.iterdir()}
 
 
 def test_the_block_of_the_readme_runs(tmp_path, capsys):
