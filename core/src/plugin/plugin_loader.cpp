@@ -105,7 +105,21 @@ std::string remedy(std::string_view core, std::string_view plugin) {
   if (right.size() < 2 || !std::equal(left.begin(), left.begin() + 2, right.begin()))
     return "build the plugin again, with the headers of this cairn";
   return "build the plugin with the compiler and flags of the core (leave out -march=native, "
-         "-mavx… and -D_GLIBCXX_DEBUG)";
+         "-mavx…, -stdlib=libc++ and -D_GLIBCXX_DEBUG)";
+}
+
+std::string difference(std::string_view plugin) {
+  return fmt::format(
+      "built differently from the core, so its objects cannot be passed around\n{}\n  {}",
+      compare_fingerprints(core_fingerprint(), plugin), remedy(core_fingerprint(), plugin));
+}
+
+/// The fingerprint in a file that cannot be loaded; empty if there is none.
+std::string fingerprint_in(const fs::path& library) {
+  std::ifstream file(library, std::ios::binary);
+  const std::string bytes(std::istreambuf_iterator<char>(file), {});
+  const std::size_t inside = bytes.find("; headers ");
+  return inside == std::string::npos ? "" : bytes.c_str() + bytes.rfind('\0', inside) + 1;
 }
 
 /// Whether the dynamic linker failed for lack of memory. That of glibc may also say then that there
@@ -126,8 +140,10 @@ boost::dll::shared_library open_library(const fs::path& library) {
     const int code = errno;
     if (lacked_memory(code, error.what(), library)) throw std::bad_alloc();
     // The dynamic linker's words first: an undefined symbol must not be blamed on anything else.
+    const std::string built = fingerprint_in(library);
     throw plugin_error(
-        fmt::format("{}\n  while loading plugin {}", error.what(), library.string()));
+        fmt::format("{}\n  while loading plugin {}{}", error.what(), library.string(),
+                    built.empty() || built == core_fingerprint() ? "" : ", " + difference(built)));
   }
 }
 
@@ -254,10 +270,7 @@ const PluginManifest& load_plugin(const fs::path& library) {
   const PluginManifest* manifest =
       it->second.get<PluginEntry>(CAIRN_STRINGIFY(CAIRN_PLUGIN_ENTRY))();
   if (std::string_view(manifest->fingerprint) != core_fingerprint()) {
-    throw plugin_error(fmt::format(
-        "{}: built differently from the core, so its objects cannot be passed around\n{}\n  {}",
-        library.string(), compare_fingerprints(core_fingerprint(), manifest->fingerprint),
-        remedy(core_fingerprint(), manifest->fingerprint)));
+    throw plugin_error(library.string() + ": " + difference(manifest->fingerprint));
   }
   return *manifest;
 }

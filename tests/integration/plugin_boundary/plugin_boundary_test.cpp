@@ -213,6 +213,19 @@ TEST_F(PluginBoundary, AnUndefinedSymbolIsToldInTheWordsOfTheDynamicLinker) {
   ASSERT_NE(ours, std::string::npos) << message;
   EXPECT_LT(symbol, ours);
   EXPECT_THAT(message, testing::Not(HasSubstr("entry point")));
+  EXPECT_THAT(message, testing::Not(HasSubstr("built differently")));
+}
+
+TEST_F(PluginBoundary, WhatCannotBeLoadedIsComparedToo) {
+  cairn::Registry registry(search_in({kBad / "other_library"}));
+  const std::string message = message_of(registry, "unresolved");
+  const std::size_t symbol = message.find("undefined symbol: ");
+  const std::size_t difference = message.find("built differently from the core");
+  ASSERT_NE(symbol, std::string::npos) << message;
+  ASSERT_NE(difference, std::string::npos) << message;
+  EXPECT_LT(symbol, difference);
+  EXPECT_THAT(message, testing::ContainsRegex("\n  ! libstdc\\+\\+ .*debug=0 .*debug=1 "));
+  EXPECT_THAT(message, testing::ContainsRegex("\n    headers [0-9a-f]+ +headers [0-9a-f]+\n"));
 }
 
 TEST_F(PluginBoundary, WhatIsNoSharedObjectIsToldInTheWordsOfTheDynamicLinker) {
