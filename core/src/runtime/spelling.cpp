@@ -55,6 +55,8 @@ bool abbreviates(std::string_view word, std::string_view candidate) {
 std::string nearest_spelling(std::string_view word, std::span<const std::string> candidates) {
   std::string best;
   if (word.size() > kLongestWord) return best;
+  for (const std::string& candidate : candidates)  // EDGE_SE3 is EDGE_SE3:QUAT, not EDGE_SE2
+    if (candidate.starts_with(word) && candidate[word.size()] == ':') return candidate;
   int best_distance = static_cast<int>(std::max<std::size_t>(2, word.size() / 3)) + 1;
   for (const std::string& candidate : candidates) {
     const int distance = edit_distance(word, candidate);

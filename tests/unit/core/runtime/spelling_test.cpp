@@ -26,6 +26,12 @@ TEST(Spelling, KnowsInitialsAndParts) {
             "--linear-solver");
 }
 
+TEST(Spelling, CompletesATagBeforeItsColon) {
+  const std::vector<std::string> tags{"EDGE_SE2", "EDGE_SE3:QUAT", "VERTEX_SE3:QUAT"};
+  EXPECT_EQ(nearest_spelling("EDGE_SE3", tags), "EDGE_SE3:QUAT");
+  EXPECT_EQ(nearest_spelling("EDGE_SE", tags), "EDGE_SE2");
+}
+
 TEST(Spelling, DoesNotGuessWildly) { EXPECT_EQ(nearest_spelling("mumps", kNames), ""); }
 
 TEST(Spelling, DoesNotCompareWhatIsLongerThanAnyName) {
