@@ -16,9 +16,12 @@ root=$(cd "$2" && pwd)
 
 mount -t proc proc "$root/proc"
 trap 'umount "$root/proc"' EXIT
-rm -rf "$root/packages" "$root/range"
+rm -rf "$root/packages" "$root/range" "$root/ros"
 cp -r "$packages" "$root/packages"
 cp -r "$source/tests/third_party/range" "$root/range"
+mkdir -p "$root/ros/tests" "$root/ros/examples"
+cp -r "$source/tests/ros" "$root/ros/tests"
+cp -r "$source/examples/ros" "$root/ros/examples"
 
 # What runs inside. Every command is shown with what it says, and must succeed.
 cat >"$root/use.sh" <<'END'
@@ -73,6 +76,28 @@ run cmake -S /range -B range-build -DCMAKE_VERBOSE_MAKEFILE=OFF
 run cmake --build range-build
 run cmake --install range-build
 run cairn optimize /range/beacons.g2o --linear-solver dense_ldlt -o beacons.g2o
+
+# What `cairn new-plugin` writes, as its README says it: built, tested, checked, installed, and used by name.
+export CTEST_OUTPUT_ON_FAILURE=1
+rm -rf my_distance my_solver
+new_plugin() {
+  run cairn new-plugin "$1" "$2"
+  run cmake -S "$1" -B "$1/build"
+  run cmake --build "$1/build"
+  run ctest --test-dir "$1/build"
+  run cairn plugins --check "$1/build/$1.so"
+  run cmake --install "$1/build"
+}
+new_plugin my_distance --factor
+run cairn optimize my_distance/example.g2o -o best.g2o
+run cairn bench my_distance/example.g2o --linear-solver block_cholesky,eigen --repeat 1 --quiet
+run python3 -c 'import cairn; graph = cairn.read("my_distance/example.g2o"); print(graph.factor_types, cairn.optimize(graph)); assert "EDGE_MY_DISTANCE" in graph.factor_types'
+new_plugin my_solver --linear-solver
+run cairn generate ring:poses=100 -o ring.g2o # it is dense
+run cairn optimize ring.g2o --linear-solver my_solver
+run cairn bench ring.g2o --linear-solver block_cholesky,my_solver --repeat 1 --quiet
+run python3 -c 'import cairn; summary = cairn.optimize(cairn.read("ring.g2o"), linear_solver="my_solver"); print(summary); assert summary.converged and summary.linear_solver == "my_solver"'
+
 cat >two.cpp <<'CPP'
 #include <cairn/cairn.hpp>
 #include <iostream>
@@ -83,6 +108,11 @@ run g++ -o two two.cpp "${flags[@]}"
 run ./two
 run env CAIRN_PLUGIN_PATH=/nowhere ./two >/dev/null
 
+printf '\n==== with ROS\n'
+printf '127.0.0.1 localhost\n' >/etc/hosts # debootstrap writes none, and roslaunch asks for it
+run install /packages/cairn-ros_*.deb python3-roslaunch python3-pytest
+run python3 -m pytest -q -p no:cacheprovider /ros/tests/ros/test_ros_node.py /ros/tests/ros/test_ros_conventions.py
+
 printf '\n==== removed\n'
 rm -rf ~/.local/share/cairn
 dpkg -L $(dpkg-query -W -f='${Package}\n' '*cairn*') | grep cairn | sort -u >files
@@ -90,7 +120,7 @@ apt-get purge -y -qq '*cairn*' >/tmp/apt.log 2>&1 || fail "$(cat /tmp/apt.log)"
 while IFS= read -r file; do
   [[ ! -e $file ]] || fail "$file is left"
 done <files
-[[ ! -e /usr/lib/python3/dist-packages/cairn ]] || fail "the Python package left $(find /usr/lib/python3/dist-packages/cairn)"
+[[ ! -e /usr/lib/python3/dist-packages/cairn && ! -e /usr/lib/python3/dist-packages/cairn_ros ]] || fail "the Python package left $(find /usr/lib/python3/dist-packages/cairn*)"
 printf 'nothing is left of %d files\n' "$(wc -l <files)"
 END
 chroot "$root" /bin/bash /use.sh

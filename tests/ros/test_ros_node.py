@@ -37,8 +37,10 @@ def ros(tmp_path_factory):
     """A master, and this process as a node of it."""
     home = tmp_path_factory.mktemp("ros")
     os.environ.update(
-        ROS_MASTER_URI=f"http://127.0.0.1:{free_port()}", ROS_IP="127.0.0.1", ROS_HOME=str(home), ROS_LOG_DIR=str(home), ROS_PACKAGE_PATH=str(SOURCE / "apps" / "ros")
+        ROS_MASTER_URI=f"http://127.0.0.1:{free_port()}", ROS_IP="127.0.0.1", ROS_HOME=str(home), ROS_LOG_DIR=str(home)
     )
+    if (SOURCE / "apps" / "ros").exists():  # otherwise the installed one
+        os.environ["ROS_PACKAGE_PATH"] = str(SOURCE / "apps" / "ros")
     port = os.environ["ROS_MASTER_URI"].rpartition(":")[2]
     master = subprocess.Popen(["roscore", "-p", port], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     import rospy
@@ -226,5 +228,8 @@ def test_a_drive_in_space_with_odometry_that_accumulates(ros, tmp_path):
 
 
 def test_an_estimator_that_there_is_not_ends_it_with_what_there_is(ros):
-    ended = subprocess.run(["/usr/bin/python3", SOURCE / "apps" / "ros" / "cairn_node", "_estimator:=isam9"], capture_output=True, text=True, timeout=60)
+    import rospkg
+
+    node = Path(rospkg.RosPack().get_path("cairn_ros")) / "cairn_node"
+    ended = subprocess.run(["/usr/bin/python3", node, "_estimator:=isam9"], capture_output=True, text=True, timeout=60)
     assert ended.returncode == 2 and "incremental_cholesky" in ended.stdout + ended.stderr
