@@ -132,6 +132,14 @@ Job prepare(const CompactOptions& options, const PolicySetting& setting, Results
   PolicyJob& job = result.job;
   job.registration = options.registration;
   if (options.strategy == "rfpfl") {
+    if (setting.data.landmarks > 0) {
+      throw Error(
+          ErrorCode::usage,
+          fmt::format("--strategy rfpfl draws poses and loop closures, and the graph has {}, "
+                      "which it does not take: give --strategy apal, apfl or fpfl, or leave "
+                      "the landmarks and what is measured of them out of the graph",
+                      plural(setting.data.landmarks, "landmark")));
+    }
     // The control draws from what was recorded, so the policy has no more to choose from.
     ComponentSpec registration = parse_component(options.registration);
     if (registration.name == "recorded") registration.values.emplace("carry", "0");

@@ -71,7 +71,9 @@ json::object result_json(const PolicyResult& result, const PolicyData& data) {
                      {"false_registered", result.false_registered},
                      {"false_kept", result.false_kept}};
   report["priors"] = {{"in", data.priors}, {"kept", result.kept_priors}};
-  report["landmarks"] = {{"in", data.landmarks}, {"kept", result.kept_landmarks}};
+  report["landmarks"] = {{"in", data.landmarks},
+                         {"kept", result.kept_landmarks},
+                         {"undetermined", result.undetermined_landmarks}};
   report["observations"] = {{"in", data.observations}, {"kept", result.kept_observations}};
   json::object verdicts;
   for (const auto& [name, count] : result.verdicts) verdicts[name] = count;
@@ -130,10 +132,15 @@ void add_result(Table& table, const PolicyResult& result, const PolicyData& data
                                      percent(result.kept_priors, data.priors))});
   }
   if (data.observations > 0) {
-    table.add({"landmarks", fmt::format("{} of {} kept, {} of {} measurements of them ({})",
-                                        result.kept_landmarks, data.landmarks,
-                                        result.kept_observations, data.observations,
-                                        percent(result.kept_observations, data.observations))});
+    table.add(
+        {"landmarks",
+         fmt::format("{} of {} kept, {} of {} measurements of them ({})", result.kept_landmarks,
+                     data.landmarks, result.kept_observations, data.observations,
+                     percent(result.kept_observations, data.observations)) +
+             (result.undetermined_landmarks > 0
+                  ? fmt::format("; {} not determined by what was measured of them",
+                                result.undetermined_landmarks)
+                  : "")});
   }
   const StepTimes times(step_seconds(result));
   table.add(

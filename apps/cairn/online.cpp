@@ -129,7 +129,7 @@ json::object report_json(const OnlineOptions& options, const Conversation::Count
     report["loops"] = {
         {"proposed", kept.proposed}, {"registered", kept.registered}, {"kept", kept.linked}};
     report["priors"] = {{"kept", kept.priors}};
-    report["landmarks"] = {{"kept", kept.landmarks}};
+    report["landmarks"] = {{"kept", kept.landmarks}, {"undetermined", policy->undetermined()}};
     report["observations"] = {{"kept", kept.observations}};
   }
   report["lines"] = {{"read", counts.lines},

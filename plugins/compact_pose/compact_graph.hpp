@@ -181,6 +181,9 @@ class CompactGraph {
   /// Joint covariance of landmarks of the graph and, after them, the newest pose; without passing
   /// anything to the estimator.
   Eigen::MatrixXd landmark_covariance(std::span<const Id> landmarks, PolicySeconds& seconds);
+  /// Joint covariance of a landmark and, after it, a kept pose; by solving, for which both must
+  /// reach the estimator.
+  Eigen::MatrixXd landmark_covariance(Id landmark, int pose, PolicySeconds& seconds);
   /// Keeps the newest pose; adds landmarks, and factors on it and landmarks.
   void see(std::vector<Variable> added, std::span<const Factor> factors, PolicySeconds& seconds);
 
@@ -194,10 +197,12 @@ class CompactGraph {
   /// and no more than this is lost about the map: the oldest with all that it measured, or if too
   /// much is lost by that, with what it measured of landmarks alone, while its odometry becomes a
   /// part of that to the next pose. Where no pose covers it, or more is lost, it is permanent from
-  /// now on. Nothing: none has left. It waits while it is the newest pose that would lose too much;
-  /// if too many wait, the first whose odometry can be joined is judged all the same.
+  /// now on. Nothing: none has left. It waits while it is the newest pose that would lose too much,
+  /// or while something else waits for it (`needed`); if too many wait, the first whose odometry
+  /// can be joined is judged all the same.
   std::optional<Leaving> drop_temporary(const InformationLoss& most,
                                         const std::function<std::optional<Id>(int)>& cover,
+                                        const std::function<bool(Id)>& needed,
                                         PolicySeconds& seconds);
 
   /// From each kept pose to the next one of the trajectory.

@@ -196,7 +196,8 @@ void CompactPose::check_new(const Variable& pose) const {
                        graph_.group().motions().type().tag()));
   }
   if (graph_.find(pose.id) >= 0) refuse(fmt::format("pose {} is there already", pose.id));
-  if (graph_.landmark(pose.id)) refuse(fmt::format("pose {} has the id of a landmark", pose.id));
+  if (graph_.landmark(pose.id) || waiting_landmarks_.contains(pose.id))
+    refuse(fmt::format("pose {} has the id of a landmark", pose.id));
 }
 
 /// Σ̄_y of this pose. What the options do not say is learnt; the first match is expected to be like
@@ -505,10 +506,11 @@ PoseReport CompactPose::end_pose() {
     settle_priors();
     const bool kept = graph_.newest_kept();
     use_landmarks();
+    const bool triangulated = use_waiting_landmarks();
     const bool by_landmarks = !kept && graph_.newest_kept();
     if (!graph_.newest_kept() && !report_.closed_loop && report_.least_gain > pose_gain_)
       graph_.keep(report_.seconds);
-    if (!add_landmarks() && !kept && graph_.newest_kept() && pose_gain_ > 0.0 &&
+    if (!add_landmarks() && !triangulated && !kept && graph_.newest_kept() && pose_gain_ > 0.0 &&
         !graph_.landmarks().empty())
       limit_poses_of_landmarks(by_landmarks);
     if (graph_.predecessor() >= 0 && report_.candidates > 0 && options_.keep == 0)

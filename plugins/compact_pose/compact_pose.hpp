@@ -2,7 +2,9 @@
 #pragma once
 
 #include <chrono>
+#include <cstddef>
 #include <deque>
+#include <map>
 #include <memory>
 #include <optional>
 #include <span>
@@ -21,6 +23,7 @@
 #include "proximity.hpp"
 #include "relocation.hpp"
 #include "threshold_finder.hpp"
+#include "triangulation.hpp"
 
 namespace cairn::compact {
 
@@ -53,6 +56,7 @@ class CompactPose final : public PosePolicy, public OptionFinder {
   std::optional<MatchProposal> next_match() override;
   LinkReport offer(Id other, std::span<const Factor> measured) override;
   PriorReport offer_prior(const Factor& measured) override;
+  bool takes_landmarks() const override { return true; }
   void offer_landmark(const LandmarkObservation& observation) override;
   bool revoke(Id a, Id b) override;
   PoseReport end_pose() override;
@@ -62,6 +66,7 @@ class CompactPose final : public PosePolicy, public OptionFinder {
   std::vector<Id> kept() const override { return graph_.kept(); }
   std::vector<Id> removed() const override { return removed_; }
   std::vector<Id> landmarks() const override { return graph_.landmarks(); }
+  std::vector<Id> undetermined() const override;
   int factor_count() const override { return graph_.factor_count(); }
   std::vector<double> newest_state() const override;
   const std::vector<OdometryChain>& chains() const override { return graph_.chains(); }
@@ -107,6 +112,17 @@ class CompactPose final : public PosePolicy, public OptionFinder {
     Variable landmark;
     std::vector<Measured> factors;
   };
+  /// A landmark that is not in the graph, since nothing determines it so far, and what poses that
+  /// are kept measure of it.
+  struct WaitingLandmark {
+    Variable landmark;
+    std::vector<View> views;  ///< in the order of arrival; perhaps none
+  };
+  /// Where it is by some of the views, of these numbers.
+  struct Triangulated {
+    std::vector<std::size_t> chosen;
+    Triangulation found;
+  };
 
   void start(const Variable& pose);
   void check_new(const Variable& pose) const;
@@ -131,6 +147,16 @@ class CompactPose final : public PosePolicy, public OptionFinder {
   void use_landmarks();
   std::optional<std::vector<double>> place(const Seen& seen) const;
   bool add_landmarks();
+  WaitingLandmark with_newest(const Seen& seen) const;
+  std::optional<Triangulated> triangulated(const WaitingLandmark& waiting);
+  bool fits(const Triangulated& triangulated) const;
+  void add_triangulated(WaitingLandmark waiting, Triangulated triangulated);
+  void judge_views(Id landmark, std::span<const View> views);
+  void settle_landmark(Id landmark);
+  bool use_waiting_landmarks();
+  bool add_or_wait(const Seen& seen);
+  bool has_waiting_views(Id pose) const;
+  void forget_views(std::span<const Id> poses);
   void forget(Id a, Id b);
   std::optional<Id> cover(int pose);
   void limit_poses_of_landmarks(bool located);
@@ -165,6 +191,7 @@ class CompactPose final : public PosePolicy, public OptionFinder {
 
   std::vector<Waiting> waiting_;
   std::vector<WaitingPrior> waiting_priors_;
+  std::map<Id, WaitingLandmark> waiting_landmarks_;
   ThresholdFinder finder_;
   TypicalMatch typical_;
   MatchRecord record_;

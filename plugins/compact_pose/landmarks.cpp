@@ -3,10 +3,12 @@
 #include "landmarks.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <limits>
 #include <memory>
 #include <string>
+#include <tuple>
 #include <unordered_map>
 #include <utility>
 
@@ -104,6 +106,36 @@ std::vector<ObservationFit> choose_observations(
   }
 }
 
+ObservationRows linearized(std::span<const Measured> factors, Id pose, const double* x,
+                           const double* landmark) {
+  ObservationRows all;
+  for (const Measured& factor : factors) {
+    const bool from_pose = factor.factor().variables.front() == pose;
+    const double* const states[] = {from_pose ? x : landmark, from_pose ? landmark : x};
+    const Measured::Linear one = factor.at(states);
+    const MatrixXd &J_pose = one.J[from_pose ? 0 : 1], &J_landmark = one.J[from_pose ? 1 : 0];
+    const Eigen::Index old = all.e.size(), rows = old + one.residual.size();
+    all.e.conservativeResize(rows);
+    all.J_pose.conservativeResize(rows, J_pose.cols());
+    all.J_landmark.conservativeResize(rows, J_landmark.cols());
+    all.e.tail(rows - old) = one.residual;
+    all.J_pose.bottomRows(rows - old) = J_pose;
+    all.J_landmark.bottomRows(rows - old) = J_landmark;
+  }
+  return all;
+}
+
+LandmarkReport report_of(Id pose, Id landmark, std::size_t factors, const ObservationFit& fit) {
+  return {.pose = pose,
+          .landmark = landmark,
+          .factors = static_cast<int>(factors),
+          .gain = fit.fit.gain,
+          .innovation = fit.fit.innovation,
+          .verdict = fit.used          ? LinkVerdict::linked
+                     : fit.informative ? LinkVerdict::inconsistent
+                                       : LinkVerdict::uninformative};
+}
+
 // The graph ---------------------------------------------------------------------------------------
 
 const VariableType* CompactGraph::landmark(Id id) const {
@@ -138,6 +170,23 @@ MatrixXd CompactGraph::landmark_covariance(std::span<const Id> landmarks, Policy
     column += size;
   }
   joint.bottomRightCorner(n, n) = S_nn;
+  return joint;
+}
+
+MatrixXd CompactGraph::landmark_covariance(Id landmark, int pose, PolicySeconds& seconds) {
+  update({}, seconds);
+  const Timed timed(seconds.covariances);
+  const std::array<Id, 2> ids{landmark, id(pose)};
+  const Eigen::Index first = this->landmark(landmark)->tangent_size(), n = group_->tangent_size();
+  MatrixXd joint(first + n, first + n);
+  for (const auto& [of, column, size] :
+       {std::tuple{ids[0], Eigen::Index{0}, first}, std::tuple{ids[1], first, n}}) {
+    MatrixXd block(first + n, size);
+    need_covariance(estimator_->covariance_column(
+                        of, ids, {block.data(), static_cast<std::size_t>(block.size())}),
+                    of);
+    joint.middleCols(column, size) = block;
+  }
   return joint;
 }
 
@@ -178,27 +227,6 @@ Measured checked(const Factor& factor, Id pose, const VariableType& pose_type,
   return {factor, types, name};
 }
 
-/// At the states of pose and landmark: all factors of an observation, one below the other.
-ObservationRows linearized(std::span<const Measured> factors, Id pose, const State& x,
-                           const double* landmark) {
-  ObservationRows all;
-  for (const Measured& factor : factors) {
-    const bool from_pose = factor.factor().variables.front() == pose;
-    const double* const states[] = {from_pose ? x.data() : landmark,
-                                    from_pose ? landmark : x.data()};
-    const Measured::Linear one = factor.at(states);
-    const MatrixXd &J_pose = one.J[from_pose ? 0 : 1], &J_landmark = one.J[from_pose ? 1 : 0];
-    const Eigen::Index old = all.e.size(), rows = old + one.residual.size();
-    all.e.conservativeResize(rows);
-    all.J_pose.conservativeResize(rows, J_pose.cols());
-    all.J_landmark.conservativeResize(rows, J_landmark.cols());
-    all.e.tail(rows - old) = one.residual;
-    all.J_pose.bottomRows(rows - old) = J_pose;
-    all.J_landmark.bottomRows(rows - old) = J_landmark;
-  }
-  return all;
-}
-
 }  // namespace
 
 void CompactPose::offer_landmark(const LandmarkObservation& observation) {
@@ -215,7 +243,10 @@ void CompactPose::offer_landmark(const LandmarkObservation& observation) {
   if (!is_point(*landmark.type) || placement->dimension() != graph_.group().dimension())
     refuse(name + " is not a point where the poses are: not a landmark");
   if (landmark.fixed) refuse(name + " is fixed, and a policy estimates all landmarks");
-  const VariableType* known = graph_.landmark(landmark.id);
+  const auto waiting = waiting_landmarks_.find(landmark.id);
+  const VariableType* known = waiting != waiting_landmarks_.end()
+                                  ? waiting->second.landmark.type.get()
+                                  : graph_.landmark(landmark.id);
   if (graph_.find(landmark.id) >= 0 || landmark.id == graph_.newest_id() ||
       (known && known->tag() != landmark.type->tag()))
     refuse(name + " has the id of something else");
@@ -243,7 +274,7 @@ void CompactPose::use_landmarks() {
       sizes.push_back(type->tangent_size());
     }
     known.push_back(k);
-    rows.push_back(linearized(seen_[k].factors, graph_.newest_id(), graph_.newest_state(),
+    rows.push_back(linearized(seen_[k].factors, graph_.newest_id(), graph_.newest_state().data(),
                               graph_.landmark_state(id).data()));
     rows.back().landmark = static_cast<int>(at);
   }
@@ -255,14 +286,7 @@ void CompactPose::use_landmarks() {
   for (std::size_t k = 0; k < known.size(); ++k) {
     const Seen& seen = seen_[known[k]];
     const ObservationFit& fit = fits[k];
-    report_.landmarks.push_back({.pose = report_.id,
-                                 .landmark = seen.landmark.id,
-                                 .factors = static_cast<int>(std::ssize(seen.factors)),
-                                 .gain = fit.fit.gain,
-                                 .innovation = fit.fit.innovation,
-                                 .verdict = fit.used          ? LinkVerdict::linked
-                                            : fit.informative ? LinkVerdict::inconsistent
-                                                              : LinkVerdict::uninformative});
+    report_.landmarks.push_back(report_of(report_.id, seen.landmark.id, seen.factors.size(), fit));
     if (!fit.used) continue;
     for (const Measured& factor : seen.factors) used.push_back(factor.factor());
   }
@@ -281,7 +305,7 @@ std::optional<std::vector<double>> CompactPose::place(const Seen& seen) const {
   if (!unplaced.empty()) return std::nullopt;
   std::vector<double>& state = trial.variables.front().state;
   const ObservationRows rows =
-      linearized(seen.factors, graph_.newest_id(), graph_.newest_state(), state.data());
+      linearized(seen.factors, graph_.newest_id(), graph_.newest_state().data(), state.data());
   if (rank(rows.J_landmark) < seen.landmark.type->tangent_size()) return std::nullopt;
   return std::move(state);
 }
@@ -290,29 +314,39 @@ std::optional<std::vector<double>> CompactPose::place(const Seen& seen) const {
 bool CompactPose::add_landmarks() {
   std::vector<Variable> added;
   std::vector<Factor> factors;
-  for (const Seen& seen : std::exchange(seen_, {})) {
+  std::vector<Seen> undetermined;
+  for (Seen& seen : std::exchange(seen_, {})) {
     const Id id = seen.landmark.id;
     const bool twice = std::ranges::find(added, id, &Variable::id) != added.end();
     if (!twice && graph_.landmark(id)) continue;
-    LandmarkReport report{.pose = report_.id,
-                          .landmark = id,
-                          .factors = static_cast<int>(std::ssize(seen.factors)),
-                          .gain = std::numeric_limits<double>::infinity()};
-    std::optional<std::vector<double>> state;
-    if (graph_.newest_kept() && !twice) state = place(seen);
-    if (state || twice) {
-      report.verdict = LinkVerdict::linked;
-      report.added = !twice;
-      for (const Measured& factor : seen.factors) factors.push_back(factor.factor());
-    }
-    if (state) {
+    if (!twice) {
+      std::optional<std::vector<double>> state = place(seen);
+      if (!state) {
+        undetermined.push_back(std::move(seen));
+        continue;
+      }
       added.push_back(seen.landmark);
       added.back().state = *std::move(state);
     }
-    report_.landmarks.push_back(report);
+    const bool kept = graph_.newest_kept();
+    report_.landmarks.push_back({.pose = report_.id,
+                                 .landmark = id,
+                                 .factors = static_cast<int>(std::ssize(seen.factors)),
+                                 .added = kept && !twice,
+                                 .gain = std::numeric_limits<double>::infinity(),
+                                 .verdict = kept ? LinkVerdict::linked : LinkVerdict::unmatched});
+    for (const Measured& factor : seen.factors) factors.push_back(factor.factor());
   }
-  if (!factors.empty()) graph_.see(std::move(added), factors, report_.seconds);
-  return !factors.empty();
+  bool any = false;
+  if (graph_.newest_kept() && !added.empty()) {
+    std::vector<Id> ids;
+    for (const Variable& landmark : added) ids.push_back(landmark.id);
+    graph_.see(std::move(added), factors, report_.seconds);
+    for (const Id id : ids) settle_landmark(id);
+    any = true;
+  }
+  for (const Seen& seen : undetermined) any = add_or_wait(seen) || any;
+  return any;
 }
 
 }  // namespace cairn::compact

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstddef>
 #include <functional>
 #include <span>
 #include <vector>
 
 #include <Eigen/Core>
 
+#include "cairn/policy/pose_policy.hpp"
 #include "measured.hpp"
 
 namespace cairn::compact {
@@ -17,6 +19,10 @@ struct ObservationRows {
   Eigen::MatrixXd J_pose, J_landmark;
   int landmark = 0;  ///< in the joint covariance
 };
+
+/// Of all factors on a landmark and a pose, one below the other, at these states.
+ObservationRows linearized(std::span<const Measured> factors, Id pose, const double* x,
+                           const double* landmark);
 
 /// What came of it.
 struct ObservationFit {
@@ -34,5 +40,8 @@ std::vector<ObservationFit> choose_observations(
     std::span<const ObservationRows> observations, std::span<const int> landmark_sizes,
     Eigen::MatrixXd covariance, double least_gain,
     const std::function<bool(const MeasuredFit&)>& passes);
+
+/// What is reported of it; `factors`: of the observation.
+LandmarkReport report_of(Id pose, Id landmark, std::size_t factors, const ObservationFit& fit);
 
 }  // namespace cairn::compact

@@ -34,6 +34,7 @@ void CompactPose::note_leaving(const CompactGraph::Leaving& leaving) {
   removed_.insert(removed_.end(), leaving.poses.begin(), leaving.poses.end());
   report_.removed = static_cast<int>(std::ssize(removed_));
   record_.renumber(leaving.now);
+  forget_views(leaving.poses);
   for (Waiting& waiting : waiting_) {
     waiting.link.earlier = leaving.now[waiting.link.earlier];
     waiting.link.later = leaving.now[waiting.link.later];

@@ -63,6 +63,13 @@ Measured::Linear Measured::at(std::span<const double* const> states) const {
   return linear;
 }
 
+double Measured::squared_norm(std::span<const double* const> states) const {
+  Eigen::VectorXd residual(factor_.type->residual_size());
+  factor_.type->evaluate(states.data(), factor_.measurement.data(), root_.data(), residual.data(),
+                         nullptr);
+  return residual.squaredNorm();
+}
+
 MeasuredFit compare(const Eigen::VectorXd& e, const Eigen::MatrixXd& S, const Eigen::MatrixXd& J) {
   const Eigen::MatrixXd noise = Eigen::MatrixXd::Identity(e.size(), e.size());
   MeasuredFit result;

@@ -29,6 +29,8 @@ class Measured {
   /// With a measurement in canonical form.
   const Factor& factor() const { return factor_; }
   Linear at(std::span<const double* const> states) const;
+  /// ‖e‖² of the whitened residual alone.
+  double squared_norm(std::span<const double* const> states) const;
 
  private:
   Factor factor_;

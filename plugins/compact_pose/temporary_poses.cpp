@@ -283,7 +283,7 @@ bool CompactGraph::joins(std::size_t k, std::span<const IncidentFactor> incident
 
 std::optional<CompactGraph::Leaving> CompactGraph::drop_temporary(
     const InformationLoss& most, const std::function<std::optional<Id>(int)>& cover,
-    PolicySeconds& seconds) {
+    const std::function<bool(Id)>& needed, PolicySeconds& seconds) {
   update({}, seconds);
   const Timed timed(seconds.estimate);
   const auto follows = [&](std::size_t k) {  // the trajectory continues from there
@@ -292,6 +292,7 @@ std::optional<CompactGraph::Leaving> CompactGraph::drop_temporary(
   };
   std::erase_if(temporary_, [&](const Temporary& pose) { return find(pose.id) < 0; });
   while (!temporary_.empty() && !follows(0)) {
+    if (temporary_.size() <= kMostTemporary && needed(temporary_.front().id)) break;
     const std::vector<IncidentFactor> incident = factors_of_temporary();
     const InformationLoss cut = loss_without(0, true, incident);
     const bool known = cut.newest <= most.newest;
@@ -334,7 +335,8 @@ void CompactPose::limit_poses_of_landmarks(bool located) {
   if (!located) return;
   const InformationLoss most{.map = landmark_loss_, .newest = kOfNewest * landmark_loss_};
   const auto covering = [&](int pose) { return cover(pose); };
-  while (auto leaving = graph_.drop_temporary(most, covering, report_.seconds))
+  const auto needed = [&](Id pose) { return has_waiting_views(pose); };
+  while (auto leaving = graph_.drop_temporary(most, covering, needed, report_.seconds))
     note_leaving(*leaving);
 }
 

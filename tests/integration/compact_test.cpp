@@ -329,6 +329,14 @@ TEST_F(Compact, SaysWhatIsWrongAndWhatWouldWork) {
               HasSubstr("standard output"));
 }
 
+TEST_F(Compact, TheControlSaysWhatToDoAboutLandmarksBeforeAnyWork) {
+  const Outcome run =
+      cairn({"study", "compact", "@landmarks2d:poses=60", "--strategy", "rfpfl", "-o", "-"});
+  EXPECT_EQ(run.exit_code, 2);
+  EXPECT_THAT(run.err, HasSubstr("give --strategy apal, apfl or fpfl"));
+  EXPECT_EQ(run.out, "");
+}
+
 TEST_F(Compact, RunsAPolicyThatFindsNoOptionsWithThoseThatAreGiven) {
   const boost::json::value report =
       report_of({"compact", kWorld, "--policy", "random_poses:poses=10,loops=2"});

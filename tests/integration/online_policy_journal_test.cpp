@@ -11,6 +11,7 @@
 #include <set>
 #include <sstream>
 #include <string>
+#include <vector>
 
 #include "integration/front_end.hpp"
 #include "integration/process.hpp"
@@ -224,18 +225,15 @@ TEST_F(OnlinePolicy, LinksThatWereRevokedStaySo) {
   EXPECT_EQ(read_text(folder_.file("parts.g2o")), read_text(folder_.file("whole.g2o")));
 }
 
-TEST_F(OnlinePolicy, LandmarksAreRestoredAndTheSameAsRecorded) {
-  const std::string graph = folder_.file("landmarks.g2o");
-  ASSERT_EQ(cairn({"generate", "landmarks2d:poses=150", "-o", graph}).exit_code, 0);
-  // The lines of the file, each pose with what it measures.
+/// The lines of a file in g2o as a robot would send them, each pose with what it measures; `seen`:
+/// the tag of what it measures of landmarks.
+Lines told_of(const Lines& recorded, const std::string& seen) {
   std::map<long, Lines> of_pose;
-  std::set<long> poses;
-  const Lines recorded = lines(read_text(graph));
+  std::set<long> poses, landmarks;
   for (const std::string& line : recorded) {
     if (line.starts_with("VERTEX_SE2")) poses.insert(std::stol(line.substr(11)));
   }
-  std::set<long> seen;
-  for (const char* tag : {"EDGE_SE2 ", "EDGE_SE2_XY "}) {  // odometry first
+  for (const std::string& tag : {std::string("EDGE_SE2 "), seen + " "}) {  // odometry first
     for (const std::string& line : recorded) {
       if (!line.starts_with(tag)) continue;
       std::istringstream words(line);
@@ -244,7 +242,7 @@ TEST_F(OnlinePolicy, LandmarksAreRestoredAndTheSameAsRecorded) {
       words >> word >> a >> b;
       const bool observation = !poses.contains(b);
       Lines& told = of_pose[observation ? a : std::max(a, b)];
-      if (observation && seen.insert(b).second)
+      if (observation && landmarks.insert(b).second)
         told.push_back("NEW VERTEX_XY " + std::to_string(b));
       told.push_back(line);
     }
@@ -259,24 +257,62 @@ TEST_F(OnlinePolicy, LandmarksAreRestoredAndTheSameAsRecorded) {
     std::ranges::copy(of_pose[pose], std::back_inserter(told));
     told.emplace_back("DONE");
   }
-  const std::string policy = "compact_pose:range=3,angle=0.8,landmark_gain=0.8";
-  const Outcome whole = cairn(online(policy, {"-o", folder_.file("whole.g2o")}), {}, joined(told));
+  return told;
+}
+
+/// A session as a whole, in parts that each begin from the journal, and the recording.
+void compare_live_with_recorded(const TemporaryFolder& folder, const Lines& told,
+                                const std::string& policy, const std::string& graph,
+                                const std::vector<const char*>& words) {
+  const Outcome whole = cairn(online(policy, {"-o", folder.file("whole.g2o")}), {}, joined(told));
   ASSERT_EQ(whole.exit_code, 0) << whole.err;
-  for (const char* word : {" ADDED ", " TAKEN ", " UNINFORMATIVE "})
-    EXPECT_THAT(whole.out, HasSubstr(word));
+  for (const char* word : words) EXPECT_THAT(whole.out, HasSubstr(word));
   const Arguments arguments =
-      online(policy, {"--journal", folder_.file("log"), "-o", folder_.file("parts.g2o")});
+      online(policy, {"--journal", folder.file("log"), "-o", folder.file("parts.g2o")});
   for (std::size_t from = 0; from < told.size(); from += 211) {
     const std::size_t end = std::min(from + 211, told.size());
     const Lines part(told.begin() + static_cast<std::ptrdiff_t>(from),
                      told.begin() + static_cast<std::ptrdiff_t>(end));
     ASSERT_EQ(cairn(arguments, {}, joined(part)).exit_code, 0);
   }
-  EXPECT_EQ(read_text(folder_.file("parts.g2o")), read_text(folder_.file("whole.g2o")));
+  EXPECT_EQ(read_text(folder.file("parts.g2o")), read_text(folder.file("whole.g2o")));
   const Outcome again = cairn({"compact", graph, "--policy", policy, "--quiet", "-o",
-                               folder_.file("recorded.g2o"), "--json", "-"});
+                               folder.file("recorded.g2o"), "--json", "-"});
   ASSERT_EQ(again.exit_code, 0) << again.err;
-  EXPECT_TRUE(read_text(folder_.file("recorded.g2o")) == read_text(folder_.file("whole.g2o")));
+  EXPECT_TRUE(read_text(folder.file("recorded.g2o")) == read_text(folder.file("whole.g2o")));
+}
+
+TEST_F(OnlinePolicy, LandmarksAreRestoredAndTheSameAsRecorded) {
+  const std::string graph = folder_.file("landmarks.g2o");
+  ASSERT_EQ(cairn({"generate", "landmarks2d:poses=150", "-o", graph}).exit_code, 0);
+  compare_live_with_recorded(folder_, told_of(lines(read_text(graph)), "EDGE_SE2_XY"),
+                             "compact_pose:range=3,angle=0.8,landmark_gain=0.8", graph,
+                             {" ADDED ", " TAKEN ", " UNINFORMATIVE "});
+}
+
+TEST_F(OnlinePolicy, BearingsAreRestoredAndTheSameAsRecorded) {
+  const std::string graph = folder_.file("bearings.g2o");
+  ASSERT_EQ(
+      cairn({"generate", "landmarks2d:poses=150,sensor=bearing_range", "-o", graph}).exit_code, 0);
+  Lines recorded = lines(read_text(graph));
+  const std::string tag = "EDGE_BEARING_RANGE_SE2_XY";
+  for (std::string& line : recorded) {
+    if (!line.starts_with(tag)) continue;
+    std::istringstream words(line);
+    std::string word, pose, landmark, bearing, range, information;
+    words >> word >> pose >> landmark >> bearing >> range >> information;
+    line = tag + ' ' + pose + ' ' + landmark + ' ' + bearing + ' ' + range + ' ' + information +
+           " 0 0";
+  }
+  // One that is seen once, and so is never determined.
+  recorded.push_back("VERTEX_XY 9000 1 1");
+  recorded.push_back(tag + " 20 9000 0.5 1 400 0 0");
+  write_text(graph, joined(recorded));
+  const std::string policy = "compact_pose:range=3,angle=0.8";
+  compare_live_with_recorded(
+      folder_, told_of(recorded, tag), policy, graph,
+      {" ADDED ", " TAKEN ", " UNINFORMATIVE ", " WAITING ",
+       "NOTE 1 of the landmarks that were seen are not in the graph: what was measured of them"});
 }
 
 TEST_F(OnlinePolicy, AbsoluteMeasurementsAreRestoredAndTheSameAsRecorded) {

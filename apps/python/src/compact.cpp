@@ -184,6 +184,7 @@ py::dict counts_of(const BoundResult& bound) {
   counts["kept_priors"] = result.kept_priors;
   counts["landmarks"] = bound.data.landmarks;
   counts["kept_landmarks"] = result.kept_landmarks;
+  counts["undetermined_landmarks"] = result.undetermined_landmarks;
   counts["observations"] = bound.data.observations;
   counts["kept_observations"] = result.kept_observations;
   counts["information_nonzeros"] = result.information_nonzeros;

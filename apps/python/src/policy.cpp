@@ -245,6 +245,11 @@ void bind_contents(PolicyClass& policy) {
           "landmarks", [](BoundPolicy& bound) { return array_of_ids(bound.policy().landmarks()); },
           "Ids of the landmarks that are in the graph: (n,) integers.")
       .def_property_readonly(
+          "undetermined",
+          [](BoundPolicy& bound) { return array_of_ids(bound.policy().undetermined()); },
+          "Ids of landmarks that are not, since what was measured of them does not determine where "
+          "they are: (n,) integers.")
+      .def_property_readonly(
           "factor_count", [](BoundPolicy& bound) { return bound.policy().factor_count(); },
           "Factors between all of these.")
       .def_property_readonly("newest", &newest,

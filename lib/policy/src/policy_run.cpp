@@ -93,14 +93,17 @@ void evaluate(PosePolicy& policy, const PolicyData& data, PolicyResult& result) 
     result.normalized = normalized_error(result.compact, *data.truth_graph);
 }
 
-}  // namespace
-
-namespace {
-
-/// Before any work: a policy would refuse it when a pose sees it.
-void check_landmarks(const Graph& recording) {
+/// Before any work: what the policy would refuse when a pose sees it.
+void check_landmarks(const PosePolicy& policy, const std::string& name, const Graph& recording) {
   for (int v = 0; v < recording.variable_count(); ++v) {
-    if (!recording.fixed(v) || !is_point(recording.type(v))) continue;
+    if (!is_point(recording.type(v))) continue;
+    if (!policy.takes_landmarks()) {
+      throw Error(ErrorCode::usage,
+                  fmt::format("policy '{}' takes no landmarks, and {} is one: use compact_pose, or "
+                              "leave the landmarks and what is measured of them out of the graph",
+                              name, recording.describe_variable(v)));
+    }
+    if (!recording.fixed(v)) continue;
     throw Error(ErrorCode::input,
                 fmt::format("{} is fixed (FIX), and a policy estimates all landmarks: remove its "
                             "FIX; where the map is follows from a pose that is fixed, or from "
@@ -112,7 +115,6 @@ void check_landmarks(const Graph& recording) {
 }  // namespace
 
 PolicyData policy_data(Graph recording, std::optional<Graph> truth, std::optional<Id> begin) {
-  check_landmarks(recording);
   PolicyData data;
   data.poses = pose_chain(recording, begin);
   for (const Arrival& pose : data.poses) {
@@ -143,6 +145,7 @@ PolicyRun::PolicyRun(const PolicyJob& job, const PolicySetting& setting)
       made_(job.own ? nullptr : setting.registry.make<Registration>(job.registration)),
       registration_(job.own ? job.own : made_.get()) {
   const PolicyData& data = setting.data;
+  check_landmarks(*policy_, job.policy.name, data.recording);
   policy_->estimator().set_loss(setting.loss, setting.loss_on);
   registration_->begin(
       {.recording = &data.recording, .truth = data.truth_graph ? &*data.truth_graph : nullptr});
@@ -212,6 +215,7 @@ PolicyResult PolicyRun::finish(Recovery recovery) {
     const auto there = recording.find(id);
     result_.kept_landmarks += there && is_point(recording.type(*there));
   }
+  result_.undetermined_landmarks = std::ssize(policy_->undetermined());
   result_.chi2 = policy_->estimator().chi2();
   result_.located = policy_->unlocated().empty();
   result_.trajectory = recovered_trajectory(*policy_, recovery);

@@ -381,6 +381,7 @@ void PolicySession::finish_trajectory() {
         "NOTE no pose was matched with one of the map: the two are not connected, and their "
         "relative position is unknown\n";
   }
+  note_undetermined();
   note_selection();
   finished_ = true;
   if (!newest_) return;

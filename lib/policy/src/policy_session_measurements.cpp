@@ -151,4 +151,14 @@ void PolicySession::note_landmark(const LandmarkReport& landmark) {
   if (landmark.verdict == LinkVerdict::linked) counts_.observations += landmark.factors;
 }
 
+/// At the end: landmarks that nothing will determine any more.
+void PolicySession::note_undetermined() {
+  if (const std::int64_t count = undetermined(); count > 0) {
+    answer_ += fmt::format(
+        "NOTE {} of the landmarks that were seen are not in the graph: what was measured of them "
+        "does not determine where they are\n",
+        count);
+  }
+}
+
 }  // namespace cairn

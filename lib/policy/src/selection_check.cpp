@@ -35,12 +35,12 @@ const ThresholdTrial* smaller_trial(const FoundThresholds& found) {
   return best;
 }
 
-/// The largest information gain among those of landmarks of the graph that were used [nats]; 0:
-/// there is none.
-double most_informative(const std::vector<LandmarkReport>& landmarks) {
+/// The largest information gain among what a pose measured of landmarks and was used [nats], but
+/// for that of landmarks which it alone determines; 0: there is none.
+double most_informative(Id pose, const std::vector<LandmarkReport>& landmarks) {
   double most = 0.0;
   for (const LandmarkReport& landmark : landmarks) {
-    if (landmark.verdict == LinkVerdict::linked && !landmark.added)
+    if (landmark.pose == pose && landmark.verdict == LinkVerdict::linked && !landmark.added)
       most = std::max(most, landmark.gain);
   }
   return most;
@@ -84,7 +84,7 @@ void SelectionCheck::add(const PoseReport& pose) {
   if (!pose.kept || poses_ == 1) return;
   if (pose.closed_loop) {
     ++kept_by_loop_;
-  } else if (const double gain = most_informative(pose.landmarks); gain > 0.0) {
+  } else if (const double gain = most_informative(pose.id, pose.landmarks); gain > 0.0) {
     ++kept_by_landmark_;
     gain_of_landmarks_ += gain;
   } else if (!std::isfinite(pose.least_gain)) {

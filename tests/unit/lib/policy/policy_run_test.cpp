@@ -18,6 +18,7 @@ namespace {
 
 using ::testing::Each;
 using ::testing::ElementsAre;
+using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::Key;
 using ::testing::SizeIs;
@@ -76,21 +77,31 @@ TEST_F(PolicyRunTest, RefusesWhatIsNoTrajectory) {
   EXPECT_THROW(policy_data(std::move(made.graph)), Error);
 }
 
-TEST_F(PolicyRunTest, RefusesAFixedLandmarkBeforeTheWork) {
+TEST_F(PolicyRunTest, RefusesLandmarksThatThePolicyDoesNotTakeBeforeTheWork) {
+  const auto refusal = [&](const PolicyData& data, const std::string& policy, ErrorCode code) {
+    const PolicySetting setting{.data = data, .registry = registry_};
+    try {
+      const PolicyRun run({parse_component(policy)}, setting);
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), code);
+      return std::string(error.what());
+    }
+    return std::string("it was taken");
+  };
   Simulation made = simulate("landmarks2d:poses=60");
   Graph& graph = made.graph;
   int landmark = 0;
   while (!is_point(graph.type(landmark))) ++landmark;
-  graph.set_fixed(landmark);
   const std::string name = graph.describe_variable(landmark);
-  try {
-    policy_data(std::move(made.graph));
-    FAIL() << "it was taken";
-  } catch (const Error& error) {
-    EXPECT_EQ(error.code(), ErrorCode::input);
-    EXPECT_THAT(error.what(), testing::HasSubstr(name));
-    EXPECT_THAT(error.what(), testing::HasSubstr("remove its FIX"));
-  }
+  const auto takes_none = testing::AllOf(HasSubstr("'random_poses' takes no landmarks"),
+                                         HasSubstr(name), HasSubstr("use compact_pose"));
+  EXPECT_THAT(refusal(policy_data(graph.clone()), "random_poses", ErrorCode::usage), takes_none);
+  graph.set_fixed(landmark);
+  const PolicyData fixed = policy_data(std::move(graph));
+  EXPECT_THAT(refusal(fixed, "compact_pose", ErrorCode::input),
+              testing::AllOf(HasSubstr(name), HasSubstr("remove its FIX")));
+  // Not what to do about the FIX of a landmark that is refused in any case.
+  EXPECT_THAT(refusal(fixed, "random_poses", ErrorCode::usage), takes_none);
 }
 
 TEST_F(PolicyRunTest, CountsLandmarksAndEachMeasurementOfThem) {

@@ -451,7 +451,7 @@ struct SeenBearing {
   }
 };
 
-TEST(LandmarksOfABearing, AreNotAddedWhereItDoesNotDetermineThem) {
+TEST(LandmarksOfABearing, WaitWhereItDoesNotDetermineThem) {
   Registry registry;
   const auto pose = registry.variable_type("VERTEX_SE2"),
              point = registry.variable_type("VERTEX_XY");
@@ -461,8 +461,9 @@ TEST(LandmarksOfABearing, AreNotAddedWhereItDoesNotDetermineThem) {
                           {{define_factor<SeenBearing>(), {0, 7}, {0.46}, {400.0}}}});
   const PoseReport report = policy->end_pose();
   ASSERT_THAT(report.landmarks, SizeIs(1));
-  EXPECT_EQ(report.landmarks.front().verdict, LinkVerdict::unmatched);
+  EXPECT_EQ(report.landmarks.front().verdict, LinkVerdict::waiting);
   EXPECT_THAT(policy->landmarks(), IsEmpty());
+  EXPECT_THAT(policy->undetermined(), ElementsAre(7));
   EXPECT_TRUE(policy->finish());
 }
 

@@ -32,10 +32,9 @@ struct PolicyData {
   std::int64_t landmarks = 0, observations = 0;  ///< landmarks; factors on a pose and a landmark
 };
 
-/// Throws `Error` (input) as `pose_chain` does, and for a landmark that is fixed. A `truth` that
-/// lacks a pose of the recording, or has it with another type, gives errors of the trajectory only.
-/// With `begin`, the trajectory begins at the pose with this id: those before it are of earlier
-/// sessions.
+/// Throws `Error` (input) as `pose_chain` does. A `truth` that lacks a pose of the recording, or
+/// has it with another type, gives errors of the trajectory only. With `begin`, the trajectory
+/// begins at the pose with this id: those before it are of earlier sessions.
 CAIRN_API PolicyData policy_data(Graph recording, std::optional<Graph> truth = {},
                                  std::optional<Id> begin = {});
 
@@ -63,6 +62,8 @@ struct PolicyResult {
   std::int64_t kept_priors = 0;  ///< absolute measurements that are in the graph
   /// Landmarks of the recording, and factors on these, that are in the graph.
   std::int64_t kept_landmarks = 0, kept_observations = 0;
+  /// Of the others, those that what was measured of them does not determine.
+  std::int64_t undetermined_landmarks = 0;
   PolicySeconds seconds;
   double registration_seconds = 0.0;
   std::int64_t information_nonzeros = 0, factor_nonzeros = 0;
@@ -91,8 +92,9 @@ struct PolicySetting {
 /// A policy over the first poses of a recording, counted and timed.
 class CAIRN_API PolicyRun {
  public:
-  /// `setting` must outlive the run. Throws `Error` for a name or an option that there is not, or
-  /// where the registration needs a truth that is not known.
+  /// `setting` must outlive the run. Throws `Error` for a name or an option that there is not,
+  /// where the registration needs a truth that is not known, (usage) if the recording has landmarks
+  /// and the policy takes none, and (input) for a landmark that is fixed.
   PolicyRun(const PolicyJob& job, const PolicySetting& setting);
 
   /// Before `run`: the trajectory continues this map (`PosePolicy::load`).

@@ -71,6 +71,8 @@ class CAIRN_API PolicySession final : public LineSession {
   std::int64_t pose_count() const;
   std::int64_t factor_count() const override;
   const Counts& counts() const { return counts_; }
+  /// Landmarks that were seen and are not in the graph (`PosePolicy::undetermined`).
+  std::int64_t undetermined() const { return std::ssize(policy_.undetermined()); }
 
  private:
   struct ArrivingPose {
@@ -136,6 +138,7 @@ class CAIRN_API PolicySession final : public LineSession {
   void note_link(const LinkReport& link);
   void note_prior(const PriorReport& prior);
   void note_landmark(const LandmarkReport& landmark);
+  void note_undetermined();
   void note_removed();
   void write_results(bool kept);
   bool in_graph(Id id) const;

@@ -53,11 +53,13 @@ struct LandmarkReport {
   int factors = 0;     ///< of the observation
   bool added = false;  ///< the landmark is in the graph with it, and was not before
   /// ½ ln |I + J Σ Jᵀ| with the joint covariance Σ of pose and landmark, given what was used before
-  /// it [nats]; of a landmark that is not in the graph infinite.
+  /// it [nats]; of a landmark that is not in the graph infinite. Where several poses determine a
+  /// landmark together: the entropy that these poses lose by what all of them measured of it.
   double gain = 0.0;
-  double innovation = 0.0;  ///< squared Mahalanobis distance from what was expected
-  /// `linked`: it is in the graph. `unmatched`: the landmark is not in the graph, since the pose
-  /// was not kept, or since this alone does not determine where the landmark is.
+  double innovation = 0.0;  ///< squared Mahalanobis distance from what was expected; likewise
+  /// `linked`: it is in the graph. `waiting`: what was measured so far does not determine where the
+  /// landmark is. `unmatched`: the landmark is not in the graph, since the pose was not kept, or
+  /// has left while it waited.
   LinkVerdict verdict = LinkVerdict::unmatched;
 };
 
@@ -88,7 +90,7 @@ struct PoseReport {
   double most_gain = 0.0;           ///< expected of those that were not proposed, at most [nats]
   std::vector<LinkReport> links;    ///< also earlier ones that had been waiting
   std::vector<PriorReport> priors;  ///< likewise
-  std::vector<LandmarkReport> landmarks;
+  std::vector<LandmarkReport> landmarks;  ///< likewise, of earlier poses as well
   int removed = 0;  ///< poses that left the graph with it: see `PosePolicy::removed`
   PolicySeconds seconds;
   std::vector<std::string> notes;
@@ -135,14 +137,17 @@ class CAIRN_API PosePolicy : public Component {
   /// `Error` (input) for a factor that is not on the newest pose alone, or while it is unknown
   /// where the trajectory is on a map; (usage) unless a policy overrides it.
   virtual PriorReport offer_prior(const Factor& measured);
+  /// Whether it takes landmarks; false unless a policy overrides this and `offer_landmark`.
+  virtual bool takes_landmarks() const { return false; }
   /// What the newest pose measures of a landmark, a point of any type that is placed in the plane
   /// or in space as the poses are. It is judged when the pose ends, with all others of the pose and
   /// after its links: those of landmarks that are in the graph are used, the most informative
   /// first, as long as the information gain of one exceeds a threshold, and the pose is kept then.
-  /// If the pose is kept, for whatever reason, landmarks that it sees for the first time are added.
-  /// Throws `Error` (input) for a factor that is not on the newest pose and this landmark, for a
-  /// landmark that is fixed, or of another type than before, or while it is unknown where the
-  /// trajectory is on a map; (usage) unless a policy overrides it.
+  /// If the pose is kept, for whatever reason, landmarks that it sees for the first time are added;
+  /// where a single observation does not determine one, as a bearing does not, it waits for those
+  /// of other poses. Throws `Error` (input) for a factor that is not on the newest pose and this
+  /// landmark, for a landmark that is fixed, or of another type than before, or while it is unknown
+  /// where the trajectory is on a map; (usage) unless a policy overrides it.
   virtual void offer_landmark(const LandmarkObservation& observation);
   /// Takes a link back that was false: the graph is as if there had never been one between these
   /// two poses, and so is what was learnt from it; which poses are kept stays as it was decided. At
@@ -167,6 +172,9 @@ class CAIRN_API PosePolicy : public Component {
   virtual std::vector<Id> removed() const { return {}; }
   /// The landmarks that are in the graph, in the order in which they were added.
   virtual std::vector<Id> landmarks() const { return {}; }
+  /// Those that were measured and are not in the graph, since what was measured of them does not
+  /// determine where they are, by rising id.
+  virtual std::vector<Id> undetermined() const { return {}; }
   /// How many factors there are between all of these; the estimator need not have all of them yet.
   virtual int factor_count() const = 0;
   /// The newest pose as it is estimated, kept or not.

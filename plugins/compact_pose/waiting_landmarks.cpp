@@ -1,0 +1,209 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Landmarks that no single measurement determines, such as those of which bearings are measured:
+// what was measured of them waits until several poses determine them together.
+#include <algorithm>
+#include <cstddef>
+#include <limits>
+#include <utility>
+
+#include "compact_pose.hpp"
+#include "landmarks.hpp"
+#include "triangulation.hpp"
+
+namespace cairn::compact {
+namespace {
+
+/// Of so many views at most a landmark is triangulated: the first, the last and some between. The
+/// others are judged one by one once it is in the graph.
+constexpr std::size_t kMostViews = 8;
+
+/// Numbers of views to triangulate from, in order.
+std::vector<std::size_t> chosen_of(std::size_t views) {
+  const std::size_t count = std::min(views, kMostViews);
+  std::vector<std::size_t> chosen;
+  for (std::size_t k = 0; k < count; ++k)
+    chosen.push_back(count == 1 ? views - 1 : k * (views - 1) / (count - 1));
+  return chosen;
+}
+
+}  // namespace
+
+std::vector<Id> CompactPose::undetermined() const {
+  std::vector<Id> ids;
+  for (const auto& [id, waiting] : waiting_landmarks_) ids.push_back(id);
+  return ids;
+}
+
+/// What the newest pose measures of a landmark, beside what waits.
+CompactPose::WaitingLandmark CompactPose::with_newest(const Seen& seen) const {
+  WaitingLandmark all{.landmark = seen.landmark, .views = {}};
+  if (const auto known = waiting_landmarks_.find(seen.landmark.id);
+      known != waiting_landmarks_.end())
+    all = known->second;
+  if (all.views.empty() || all.views.back().pose != graph_.newest_id())
+    all.views.push_back({.pose = graph_.newest_id(), .factors = {}});
+  std::vector<Measured>& factors = all.views.back().factors;
+  factors.insert(factors.end(), seen.factors.begin(), seen.factors.end());
+  return all;
+}
+
+/// Where views of which the last is the newest pose's put their landmark, and which of them say so.
+std::optional<CompactPose::Triangulated> CompactPose::triangulated(const WaitingLandmark& waiting) {
+  Triangulated result{.chosen = chosen_of(waiting.views.size()), .found = {}};
+  std::vector<PlacedView> views;
+  std::vector<int> poses;
+  for (const std::size_t k : result.chosen) {
+    const View& view = waiting.views[k];
+    const bool newest = view.pose == graph_.newest_id();
+    const int pose = newest ? -1 : graph_.find(view.pose);
+    const State& x = newest ? graph_.newest_state() : graph_.state(pose);
+    if (!newest) poses.push_back(pose);
+    views.push_back(
+        {.factors = view.factors, .pose = view.pose, .x = x, .at = graph_.group().place(x).at.t});
+  }
+  std::optional<Triangulation> found =
+      triangulate(*waiting.landmark.type, views, graph_.joint_covariance(poses, report_.seconds),
+                  options_.trust);
+  if (!found) return std::nullopt;
+  result.found = std::move(*found);
+  return result;
+}
+
+/// Adds a landmark with the views that put it there, and judges the others.
+void CompactPose::add_triangulated(WaitingLandmark waiting, Triangulated triangulated) {
+  const Id id = waiting.landmark.id;
+  waiting.landmark.state = std::move(triangulated.found.state);
+  std::vector<Factor> factors;
+  for (const std::size_t k : triangulated.chosen) {
+    View& view = waiting.views[k];
+    report_.landmarks.push_back({.pose = view.pose,
+                                 .landmark = id,
+                                 .factors = static_cast<int>(std::ssize(view.factors)),
+                                 .added = k == 0,
+                                 .gain = triangulated.found.fit.gain,
+                                 .innovation = triangulated.found.fit.innovation,
+                                 .verdict = LinkVerdict::linked});
+    for (const Measured& factor : view.factors) factors.push_back(factor.factor());
+    view.factors.clear();
+  }
+  std::vector<Variable> added;
+  added.push_back(std::move(waiting.landmark));
+  graph_.see(std::move(added), factors, report_.seconds);
+  judge_views(id, waiting.views);
+  waiting_landmarks_.erase(id);
+}
+
+/// A landmark is in the graph, by what the newest pose alone measured of it.
+void CompactPose::settle_landmark(Id landmark) {
+  const auto known = waiting_landmarks_.find(landmark);
+  if (known == waiting_landmarks_.end()) return;
+  judge_views(landmark, known->second.views);
+  waiting_landmarks_.erase(known);
+}
+
+/// Of a landmark that is in the graph now: what poses that are kept measured of it before.
+void CompactPose::judge_views(Id landmark, std::span<const View> views) {
+  const std::vector<int> size{graph_.landmark(landmark)->tangent_size()};
+  for (const View& view : views) {
+    if (view.factors.empty()) continue;
+    const int pose = graph_.find(view.pose);
+    std::vector<ObservationRows> rows;
+    const auto linear = [&] {
+      return linearized(view.factors, view.pose, graph_.state(pose).data(),
+                        graph_.landmark_state(landmark).data());
+    };
+    Eigen::MatrixXd covariance = graph_.landmark_covariance(landmark, pose, report_.seconds);
+    rows.push_back(linear());  // at the estimate that the covariance is of
+    const ObservationFit fit =
+        choose_observations(
+            rows, size, std::move(covariance), landmark_gain_,
+            [&](const MeasuredFit& f) { return check_->passes(f.innovation, f.dof); })
+            .front();
+    report_.landmarks.push_back(report_of(view.pose, landmark, view.factors.size(), fit));
+    if (!fit.used) continue;
+    std::vector<Factor> factors;
+    for (const Measured& factor : view.factors) factors.push_back(factor.factor());
+    graph_.add(factors, report_.seconds);
+  }
+}
+
+/// With what the newest pose measures, landmarks may be determined that were not: if the poses
+/// learn enough by that, it is kept. Whether one was added.
+bool CompactPose::use_waiting_landmarks() {
+  if (graph_.newest_kept()) return false;  // then all that are determined are added
+  for (std::size_t k = 0; k < seen_.size(); ++k) {
+    const Id id = seen_[k].landmark.id;
+    const auto known = waiting_landmarks_.find(id);
+    if (graph_.landmark(id) || known == waiting_landmarks_.end() || known->second.views.empty())
+      continue;
+    WaitingLandmark all = with_newest(seen_[k]);
+    std::optional<Triangulated> found = triangulated(all);
+    if (!found || !(found->found.fit.gain > landmark_gain_) || !fits(*found)) continue;
+    add_triangulated(std::move(all), std::move(*found));
+    return true;  // the others are added to a pose that is kept
+  }
+  return false;
+}
+
+bool CompactPose::fits(const Triangulated& triangulated) const {
+  const MeasuredFit& fit = triangulated.found.fit;
+  return check_->passes(fit.innovation, fit.dof);
+}
+
+/// Of a landmark that what the newest pose measures does not determine. Whether it is in the graph
+/// now.
+bool CompactPose::add_or_wait(const Seen& seen) {
+  const Id id = seen.landmark.id;
+  if (graph_.landmark(id)) {  // by another measurement of the pose
+    const View view{.pose = graph_.newest_id(), .factors = seen.factors};
+    judge_views(id, {&view, 1});
+    return true;
+  }
+  LandmarkReport report{.pose = report_.id,
+                        .landmark = id,
+                        .factors = static_cast<int>(std::ssize(seen.factors)),
+                        .gain = std::numeric_limits<double>::infinity()};
+  if (!graph_.newest_kept()) {
+    waiting_landmarks_.try_emplace(id, WaitingLandmark{.landmark = seen.landmark, .views = {}});
+    report_.landmarks.push_back(report);
+    return false;
+  }
+  WaitingLandmark all = with_newest(seen);
+  std::optional<Triangulated> found = triangulated(all);
+  if (found && fits(*found)) {
+    add_triangulated(std::move(all), std::move(*found));
+    return true;
+  }
+  if (found) {
+    report.verdict = LinkVerdict::inconsistent;
+    report.innovation = found->found.fit.innovation;
+  } else {
+    report.verdict = LinkVerdict::waiting;
+    waiting_landmarks_.insert_or_assign(id, std::move(all));
+  }
+  report_.landmarks.push_back(report);
+  return false;
+}
+
+bool CompactPose::has_waiting_views(Id pose) const {
+  return std::ranges::any_of(waiting_landmarks_, [&](const auto& one) {
+    return std::ranges::find(one.second.views, pose, &View::pose) != one.second.views.end();
+  });
+}
+
+/// What poses that have left measured waits no more.
+void CompactPose::forget_views(std::span<const Id> poses) {
+  for (auto& [id, waiting] : waiting_landmarks_) {
+    for (const Id pose : poses) {
+      const auto view = std::ranges::find(waiting.views, pose, &View::pose);
+      if (view == waiting.views.end()) continue;
+      report_.landmarks.push_back({.pose = pose,
+                                   .landmark = id,
+                                   .factors = static_cast<int>(std::ssize(view->factors)),
+                                   .gain = std::numeric_limits<double>::infinity()});
+      waiting.views.erase(view);
+    }
+  }
+}
+
+}  // namespace cairn::compact
