@@ -10,6 +10,7 @@
 #include <fmt/core.h>
 
 #include "cairn/runtime/error.hpp"
+#include "cairn/runtime/threads.hpp"
 #include "cholmod_ordering.hpp"
 
 namespace cairn {
@@ -23,6 +24,36 @@ void keep_blas_to_one_thread() {
   if (auto set = reinterpret_cast<SetThreads>(dlsym(RTLD_DEFAULT, "openblas_set_num_threads")))
     set(1);
 }
+
+/// CHOLMOD asks OpenMP for four threads whatever the machine has and whatever it is told; where
+/// they outnumber the processors they wait for each other, up to four times as long as one takes.
+/// While this lives, parallel regions that this thread begins have one thread if cairn has.
+class AsManyThreads {
+ public:
+  AsManyThreads() {
+    if (threads() > 1 || !get_levels() || !set_levels()) return;
+    before_ = get_levels()();
+    set_levels()(0);
+  }
+  AsManyThreads(const AsManyThreads&) = delete;
+  AsManyThreads& operator=(const AsManyThreads&) = delete;
+  ~AsManyThreads() {
+    if (before_ >= 0) set_levels()(before_);
+  }
+
+ private:
+  using Get = int (*)();
+  using Set = void (*)(int);
+  static Get get_levels() {
+    static const auto get = reinterpret_cast<Get>(dlsym(RTLD_DEFAULT, "omp_get_max_active_levels"));
+    return get;
+  }
+  static Set set_levels() {
+    static const auto set = reinterpret_cast<Set>(dlsym(RTLD_DEFAULT, "omp_set_max_active_levels"));
+    return set;
+  }
+  int before_ = -1;
+};
 
 [[noreturn]] void throw_cholmod_error(const char* during, int status) {
   if (status == CHOLMOD_OUT_OF_MEMORY) throw std::bad_alloc();
@@ -115,6 +146,7 @@ Factorization CholmodSolver::factorize(const BlockMatrix& H) {
   pattern_.scatter(H, values_);
   cholmod_sparse A = matrix();
   factorized_ = false;
+  const AsManyThreads as_many;
   if (!cholmod_factorize(&A, L_, &common_)) throw_cholmod_error("a factorisation", common_.status);
   if (common_.status == CHOLMOD_NOT_POSDEF || L_->minor < L_->n) return failed_at(L_->minor);
   read_pivots();
@@ -164,6 +196,7 @@ void CholmodSolver::solve(std::span<const double> G, std::span<double> X, int co
   right.x = const_cast<double*>(G.data());  // only read
   right.xtype = CHOLMOD_REAL;
   right.dtype = CHOLMOD_DOUBLE;
+  const AsManyThreads as_many;
   if (!cholmod_solve2(CHOLMOD_A, L_, &right, nullptr, &x_, nullptr, &y_, &e_, &common_)) {
     throw_cholmod_error("a solve", common_.status);
   }

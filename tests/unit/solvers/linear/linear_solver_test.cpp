@@ -2,9 +2,15 @@
 // What every linear solver owes, whoever wrote it.
 #include "cairn/linear/linear_solver.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <filesystem>
+#include <iterator>
 #include <limits>
 #include <stdexcept>
+#include <utility>
+#include <vector>
 
 #include <gtest/gtest.h>
 #include <Eigen/Core>
@@ -99,6 +105,31 @@ TEST_P(LinearSolverTest, AgreesWithDenseLdlt) {
     solver_->analyze(sample.structure);
     expect_agreement(*solver_, H, 2);
   }
+}
+
+/// How many threads this process has.
+std::ptrdiff_t tasks() {
+  const std::filesystem::directory_iterator all("/proc/self/task");
+  return std::distance(begin(all), end(all));
+}
+
+// Libraries may ask for more on their own.
+TEST_P(LinearSolverTest, StartsNoThreadWhereOneIsAllowed) {
+  if (!std::filesystem::exists("/proc/self/task")) GTEST_SKIP() << "no /proc here";
+  set_threads(1);
+  std::vector<std::pair<std::int32_t, std::int32_t>> pairs;  // a band
+  constexpr int kBlocks = 150, kBand = 25;
+  for (int j = 0; j < kBlocks; ++j) {
+    for (int i = j + 1; i < std::min(kBlocks, j + kBand); ++i) pairs.emplace_back(i, j);
+  }
+  const BlockStructure structure(std::vector<std::int32_t>(kBlocks, 6), std::move(pairs));
+  BlockMatrix H(structure);
+  fill_positive_definite(H, 4);
+  const std::ptrdiff_t before = tasks();
+  solver_->analyze(structure);
+  ASSERT_TRUE(solver_->factorize(H).ok);
+  solve(*solver_, random_vector(structure.size(), 3));
+  EXPECT_LE(tasks(), before);
 }
 
 TEST_P(LinearSolverTest, FactorizesNewValuesWithoutANewAnalysis) {
