@@ -204,7 +204,9 @@ TEST_P(Bearings, TheGainIsTheEntropyThatThePosesLose) {
   for (int k = 0; k < 2 * kLap; ++k) {
     // One at a time, so that each is judged by itself.
     const std::vector<int> near = visible();
-    const LandmarkObservation observation = bearing_of(near[static_cast<std::size_t>(k) % 2]);
+    ASSERT_FALSE(near.empty());
+    const LandmarkObservation observation =
+        bearing_of(near[static_cast<std::size_t>(k) % std::min<std::size_t>(near.size(), 2)]);
     const Id id = observation.landmark.id;
     policy_->offer_landmark(observation);
     const PoseReport report = policy_->end_pose();
