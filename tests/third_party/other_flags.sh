@@ -54,16 +54,16 @@ alignment='Eigen [0-9.]+ max-align=.* max-align='
 try release nothing "$compiler" -O3
 [[ -f $work/release.g2o ]] || exit 1
 try unoptimised nothing "$compiler" -O0
-try c++23 nothing "$compiler" -std=c++2b -O1 -g -UNDEBUG
+try c++23 nothing "$compiler" -std=c++2b -O0 -g -UNDEBUG
 try avx2 "$alignment" "$compiler" -O3 -mavx2
 try native "$alignment" "$compiler" -O3 -march=native
-try checked_library 'libstdc\+\+ .*debug=0 .*debug=1' "$compiler" -O1 -D_GLIBCXX_DEBUG
+try checked_library 'libstdc\+\+ .*debug=0 .*debug=1' "$compiler" -O0 -D_GLIBCXX_DEBUG
 try assertions 'libstdc\+\+ .*assertions=0.*assertions=1' "$compiler" -O1 -D_GLIBCXX_ASSERTIONS
-try old_strings 'libstdc\+\+ cxx11-abi=1 .*cxx11-abi=0' "$compiler" -O1 -D_GLIBCXX_USE_CXX11_ABI=0
+try old_strings 'libstdc\+\+ cxx11-abi=1 .*cxx11-abi=0' "$compiler" -O0 -D_GLIBCXX_USE_CXX11_ABI=0
 for other in g++ clang++; do
   [[ $("$compiler" --version) != "$("$other" --version 2>/dev/null)" ]] || continue  # tried already
   if command -v "$other" >/dev/null; then
-    try "other_$other" '(gcc|clang) [0-9]+ +(gcc|clang) [0-9]+' "$other" -O1
+    try "other_$other" '(gcc|clang) [0-9]+ +(gcc|clang) [0-9]+' "$other" -O0
   else
     lacks "other_$other" "$other"
   fi
@@ -71,7 +71,7 @@ done
 headers=$(find "$libcxx" /usr/lib/llvm-*/include/c++/v1 -path '*/c++/v1/version' -printf '%h\n' 2>/dev/null | head -n 1) || true
 if command -v clang++ >/dev/null && [[ -n $headers ]]; then
   # What the library itself is linked with does not matter: the dynamic linker finds none of the core's functions.
-  try libc++ 'libstdc\+\+ .* libc\+\+ ' clang++ -O1 -nostdinc++ -isystem "$headers" -nostdlib++
+  try libc++ 'libstdc\+\+ .* libc\+\+ ' clang++ -O0 -nostdinc++ -isystem "$headers" -nostdlib++
 else
   lacks libc++ "clang++ with libc++-dev"
 fi
