@@ -6,54 +6,14 @@
 #include <new>
 #include <stdexcept>
 
-#include <dlfcn.h>
 #include <fmt/core.h>
 
+#include "blas_threads.hpp"
 #include "cairn/runtime/error.hpp"
-#include "cairn/runtime/threads.hpp"
 #include "cholmod_ordering.hpp"
 
 namespace cairn {
 namespace {
-
-/// Threads inside BLAS make the small dense blocks of a sparse factorisation slower, three times on
-/// a busy machine. OpenBLAS is told so once; the reference BLAS has no threads, and others are left
-/// alone.
-void keep_blas_to_one_thread() {
-  using SetThreads = void (*)(int);
-  if (auto set = reinterpret_cast<SetThreads>(dlsym(RTLD_DEFAULT, "openblas_set_num_threads")))
-    set(1);
-}
-
-/// CHOLMOD asks OpenMP for four threads whatever the machine has and whatever it is told; where
-/// they outnumber the processors they wait for each other, up to four times as long as one takes.
-/// While this lives, parallel regions that this thread begins have one thread if cairn has.
-class AsManyThreads {
- public:
-  AsManyThreads() {
-    if (threads() > 1 || !get_levels() || !set_levels()) return;
-    before_ = get_levels()();
-    set_levels()(0);
-  }
-  AsManyThreads(const AsManyThreads&) = delete;
-  AsManyThreads& operator=(const AsManyThreads&) = delete;
-  ~AsManyThreads() {
-    if (before_ >= 0) set_levels()(before_);
-  }
-
- private:
-  using Get = int (*)();
-  using Set = void (*)(int);
-  static Get get_levels() {
-    static const auto get = reinterpret_cast<Get>(dlsym(RTLD_DEFAULT, "omp_get_max_active_levels"));
-    return get;
-  }
-  static Set set_levels() {
-    static const auto set = reinterpret_cast<Set>(dlsym(RTLD_DEFAULT, "omp_set_max_active_levels"));
-    return set;
-  }
-  int before_ = -1;
-};
 
 [[noreturn]] void throw_cholmod_error(const char* during, int status) {
   if (status == CHOLMOD_OUT_OF_MEMORY) throw std::bad_alloc();

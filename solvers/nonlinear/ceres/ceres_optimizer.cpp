@@ -11,6 +11,7 @@
 
 #include <fmt/core.h>
 
+#include "blas_threads.hpp"
 #include "cairn/graph/gauge.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/threads.hpp"
@@ -187,6 +188,7 @@ Summary CeresOptimizer::optimize(Graph& graph, const Stop& stop, Observer& obser
   ceres::Solver::Summary report;
   {
     const QuietGlog quiet;
+    const AsManyThreads as_many;
     ceres::Solve(options, &problem.problem(), &report);
   }
   graph.set_values(std::move(values));  // the last that was accepted, also where something threw

@@ -5,19 +5,12 @@
 #include <string>
 #include <utility>
 
-#include <dlfcn.h>
 #include <glog/logging.h>
 
 namespace cairn {
 
 QuietGlog::QuietGlog() : level_(FLAGS_minloglevel) { FLAGS_minloglevel = google::GLOG_FATAL; }
 QuietGlog::~QuietGlog() { FLAGS_minloglevel = level_; }
-
-void keep_blas_to_one_thread() {
-  using SetThreads = void (*)(int);
-  if (auto set = reinterpret_cast<SetThreads>(dlsym(RTLD_DEFAULT, "openblas_set_num_threads")))
-    set(1);
-}
 
 Summary begin_summary(std::string_view optimizer, std::string_view linear_solver,
                       const Graph& graph, const Gauge& gauge, Observer& observer) {

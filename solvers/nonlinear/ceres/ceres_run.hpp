@@ -23,10 +23,6 @@ class QuietGlog {
   int level_;
 };
 
-/// Threads inside BLAS make the small dense blocks of a sparse factorisation slower. OpenBLAS is
-/// set to one thread, others are left alone.
-void keep_blas_to_one_thread();
-
 /// A step of this fraction of the states, or of this change of chi2, may fail because of rounding.
 inline constexpr double kCeresRounding = 1e-6;
 

@@ -13,6 +13,7 @@
 
 #include <fmt/core.h>
 
+#include "blas_threads.hpp"
 #include "cairn/graph/gauge.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/threads.hpp"
@@ -196,6 +197,7 @@ Status Run::minimise(ceres::Solver::Options options) {
     if (stop_.max_seconds > 0.0)
       options.max_solver_time_in_seconds = std::max(0.0, stop_.max_seconds - seconds_since(begin));
     ceres::Solver::Summary report;
+    const AsManyThreads as_many;
     ceres::Solve(options, &problem_->problem(), &report);
     summary_.seconds.linearize += report.jacobian_evaluation_time_in_seconds;
     summary_.seconds.analyze += report.preprocessor_time_in_seconds;
