@@ -65,9 +65,14 @@ void draw_scaling(Canvas& canvas, const Theme& theme, const Album& album) {
     throw Error(ErrorCode::input, "no comparison to draw: give the JSON that cairn bench writes");
   }
   const std::vector<Solver> solvers = solvers_of(read_bench(album.bench));
-  const std::vector<Box> boxes = panels(canvas, 2, 2);
+  // Memory is not measured with --no-memory.
+  const bool with_memory =
+      std::ranges::any_of(solvers, [](const Solver& s) { return !s.mebibytes.empty(); });
+  const std::size_t count = with_memory ? 2 : 1;
+  const std::vector<Box> boxes = panels(canvas, count, count);
   draw_panel(canvas, theme, boxes[0], solvers, &Solver::seconds, "Time of optimisation",
              "time [s]");
+  if (!with_memory) return;
   draw_panel(canvas, theme, boxes[1], solvers, &Solver::mebibytes, "Peak memory",
              "peak memory [MiB]");
 }

@@ -325,8 +325,9 @@ void draw_scene(Canvas& canvas, const Theme& theme, const Scene& scene, const Bo
       })) {
     throw Error(ErrorCode::input,
                 scene.name +
-                    ": there are no covariances to draw: add the report of cairn optimize "
-                    "GRAPH --covariance blocks --json RUN.json -o OUT");
+                    ": there are no covariances to draw: give the report of cairn optimize GRAPH "
+                    "--covariance blocks --json RUN.json -o OUT too, beside the GRAPH that it is "
+                    "of: cairn plot GRAPH RUN.json --ellipses 3");
   }
   Bounds bounds = bounds_of(layers);
   if (bounds.empty())

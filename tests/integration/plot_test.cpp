@@ -187,6 +187,19 @@ TEST_F(PlotCommand, AComparisonShowsNamesAndLabelsNotPaths) {
   }
 }
 
+TEST_F(PlotCommand, GrowthOfMemoryIsDrawnWhereItWasMeasured) {
+  const std::string bench = folder_.file("scaling.json");
+  const Arguments with = {"bench", graph_, "--repeat", "1", "--json", bench, "--quiet"};
+  Arguments without = with;
+  without.emplace_back("--no-memory");
+  ASSERT_EQ(cairn(with).exit_code, 0);
+  EXPECT_THAT(plot({bench, "--what", "scaling"}, "svg"), HasSubstr("Peak memory"));
+  ASSERT_EQ(cairn(without).exit_code, 0);
+  const std::string time_alone = plot({bench, "--what", "scaling"}, "svg");
+  EXPECT_THAT(time_alone, HasSubstr("Time of optimisation"));
+  EXPECT_THAT(time_alone, Not(HasSubstr("Peak memory")));
+}
+
 TEST_F(PlotCommand, AnyNameCanBeDrawn) {
   const std::string name = folder_.file("<script>\xff\n\x01.g2o");
   std::filesystem::copy_file(graph_, name);
