@@ -315,10 +315,12 @@ Command add_plugins(ArgumentParser program) {
       .type_name("N")
       .show_default();
   cli.footer(
-      "Plugins are found by --plugin, CAIRN_PLUGIN_PATH, and in the folder cairn beside the core "
-      "library.\nA checked plugin finds others by --plugin and in that folder alone. Exit code: 0 "
-      "if "
-      "every check\nholds, 5 if one does not.\n\n"
+      "Plugins are found by --plugin, CAIRN_PLUGIN_PATH, in the user's folder (cairn/plugins below "
+      "XDG_DATA_HOME\nor ~/.local/share), and in the folder cairn beside the core library. A "
+      "checked "
+      "plugin, a file, finds others\nby --plugin and in the last alone. Exit code: 0 if every "
+      "check "
+      "holds, 5 if one does not.\n\n"
       "Example:\n"
       "  cairn plugins cholmod\n"
       "  cairn plugins --check build/range.so");

@@ -247,3 +247,23 @@ class CommandLineTest(unittest.TestCase):
     def test_members_that_are_not_there_are_none(self):
         self.assertIsNone(member({"a": [1]}, "a.b"))
         self.assertTrue(math.isnan(number({"a": True}, "a")))
+
+
+class ArgumentsTest(unittest.TestCase):
+    def refusal(self, *words):
+        error = io.StringIO()
+        with contextlib.redirect_stderr(error), self.assertRaises(SystemExit) as ended:
+            command_line.parse(["--folder", "anywhere", *words])
+        self.assertEqual(ended.exception.code, 2)
+        return error.getvalue()
+
+    def test_what_cannot_be_measured_is_refused_before_anything_is_built(self):
+        self.assertIn("there is no study 'nonsense'; there are: graphs", self.refusal("--check", "nonsense"))
+        self.assertIn("--data /not/there: there is no such folder", self.refusal("--check", "--data", "/not/there"))
+        self.assertIn("--cairn PROGRAM is needed", self.refusal("graphs"))
+
+    def test_arguments_alone_can_be_looked_at(self):
+        with tempfile.TemporaryDirectory() as place:
+            folder = Path(place) / "results"
+            self.assertEqual(command_line.main(["--check", "--folder", str(folder), "graphs", "compact"]), 0)
+            self.assertFalse(folder.exists())

@@ -88,12 +88,15 @@ def parse(words: list[str]) -> argparse.Namespace:
                         help="cairn's own linear solver, with options [block_cholesky]")
     parser.add_argument("--rounds", type=int, metavar="N", help="of each comparison [5, quick 2]")
     parser.add_argument("--quick", action="store_true", help="few and small graphs: shows that it works, no more")
+    parser.add_argument("--check", action="store_true", help="only look at the arguments")
     parser.add_argument("--tables", type=Path, nargs="+", metavar="PAGE", help="do not measure: fill in the tables of these")
     arguments = parser.parse_intermixed_args(words)
     for name in arguments.studies:
         if name not in names:
             parser.error(f"there is no study '{name}'; there are: {' '.join(names)}")
-    if not arguments.tables and not arguments.cairn:
+    if arguments.data and not arguments.data.is_dir():
+        parser.error(f"--data {arguments.data}: there is no such folder")
+    if not arguments.tables and not arguments.cairn and not arguments.check:
         parser.error("--cairn PROGRAM is needed to measure")
     if arguments.rounds is not None and not 1 <= arguments.rounds <= 1000:
         parser.error("--rounds must be from 1 to 1000")
@@ -102,6 +105,8 @@ def parse(words: list[str]) -> argparse.Namespace:
 
 def main(words: list[str]) -> int:
     arguments = parse(words)
+    if arguments.check:
+        return 0
     try:
         arguments.folder.mkdir(parents=True, exist_ok=True)
         if arguments.tables:
