@@ -315,11 +315,12 @@ Command add_plugins(ArgumentParser program) {
       .type_name("N")
       .show_default();
   cli.footer(
-      "Plugins are found by --plugin, CAIRN_PLUGIN_PATH, in the user's folder (cairn/plugins below "
-      "XDG_DATA_HOME\nor ~/.local/share), and in the folder cairn beside the core library. A "
-      "checked "
-      "plugin, a file, finds others\nby --plugin and in the last alone. Exit code: 0 if every "
-      "check "
+      "Plugins are found by --plugin, CAIRN_PLUGIN_PATH, in the user's folder (cairn/plugins "
+      "below\n"
+      "XDG_DATA_HOME or ~/.local/share), and in the folder cairn beside the core library. A "
+      "checked\n"
+      "plugin, a file, finds others by --plugin and in the last alone. Exit code: 0 if every "
+      "check\n"
       "holds, 5 if one does not.\n\n"
       "Example:\n"
       "  cairn plugins cholmod\n"

@@ -15,9 +15,9 @@ inline void keep_blas_to_one_thread() {
     set(1);
 }
 
-/// CHOLMOD asks OpenMP for four threads whatever the machine has and whatever it is told; where
-/// they outnumber the processors they wait for each other, up to four times as long as one takes.
-/// While this lives, parallel regions that this thread begins have one thread if cairn has.
+/// CHOLMOD asks OpenMP for four threads, whatever the machine has and `OMP_NUM_THREADS` says; where
+/// they outnumber the processors they take up to four times as long as one. While this lives,
+/// parallel regions that this thread begins have one thread if cairn has.
 class AsManyThreads {
  public:
   AsManyThreads() {
