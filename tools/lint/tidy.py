@@ -8,8 +8,8 @@ Parsing Eigen and the standard library takes most of the time of clang-tidy. So 
 and checked alike are included in one file, and parsed with it once. Where that finds anything, or names of two of them clash,
 each half is tried by itself, down to single files, whose verdict counts. What is clean is an empty file CLEAN/key.
 
-A file that is compiled with a precompiled header may lack an #include and not show it, here neither: such files are parsed by
-themselves too.
+Some is seen in the main file alone: what nothing uses in it, an #include that only an earlier file has, one of another source.
+So each source of a group that is clean is parsed by itself too, for the compiler's own warnings and includes.
 """
 
 import json
@@ -23,6 +23,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 TOGETHER = 8
+OF_MAIN_FILE = "-*,clang-diagnostic-*,bugprone-suspicious-include"
 
 
 @dataclass
@@ -33,7 +34,6 @@ class Source:
     key: str
     folder: str  # where it is compiled
     flags: list[str]
-    precompiled: bool  # the build includes a precompiled header
 
 
 @dataclass
@@ -44,24 +44,20 @@ class Result:
     output: list[str] = field(default_factory=list)
 
 
-def read_flags(command: str, file: str) -> tuple[list[str], bool]:
-    """The flags of a compiler's command without compiler, source and output, and whether a precompiled header was one."""
+def read_flags(command: str, file: str) -> list[str]:
+    """The flags of a compiler's command, without the compiler, the source, the output and a precompiled header."""
     words = shlex.split(command)
     flags: list[str] = []
-    precompiled = False
     at = next(k for k, word in enumerate(words) if word.startswith("-"))
     while at < len(words):
         word = words[at]
-        if word in ("-o", "-MF", "-MT", "-MQ"):
+        if word in ("-o", "-MF", "-MT", "-MQ") or word == "-include" and words[at + 1].endswith("cmake_pch.hxx"):
             at += 2
-        elif word == "-include" and words[at + 1].endswith("cmake_pch.hxx"):
-            precompiled = True
-            at += 2
-        else:
-            if word not in ("-c", "-MD", "-MMD", file):
-                flags.append(word)
-            at += 1
-    return flags, precompiled
+            continue
+        if word not in ("-c", "-MD", "-MMD", file):
+            flags.append(word)
+        at += 1
+    return flags
 
 
 def read_sources(database: Path, root: Path, keys: dict[str, str]) -> list[Source]:
@@ -70,8 +66,7 @@ def read_sources(database: Path, root: Path, keys: dict[str, str]) -> list[Sourc
     for entry in json.loads(database.read_text()):
         file = os.path.relpath(os.path.join(entry["directory"], entry["file"]), root)
         if file in keys and file not in sources:
-            flags, precompiled = read_flags(entry["command"], entry["file"])
-            sources[file] = Source(file, keys[file], entry["directory"], flags, precompiled)
+            sources[file] = Source(file, keys[file], entry["directory"], read_flags(entry["command"], entry["file"]))
     return [sources[file] for file in sorted(sources)]
 
 
@@ -114,7 +109,7 @@ class Linter:
                             "--checks=-bugprone-suspicious-include", f"--header-filter={self.included}")
         unit.unlink()
         if output is None:
-            return self._parsed(group)
+            return self._alone(group)
         half = len(group) // 2
         first, second = self.check(group[:half]), self.check(group[half:])
         return Result(first.clean + second.clean, first.output + second.output)
@@ -123,16 +118,15 @@ class Linter:
         output = self._tidy(self.root / source.file, source)
         return Result([source]) if output is None else Result(output=[output])
 
-    def _parsed(self, group: list[Source]) -> Result:
-        """Sources that are clean together, each by itself where the build does not show what it lacks."""
+    def _alone(self, group: list[Source]) -> Result:
+        """Sources that are clean together, each by itself for what is seen in the main file alone."""
         result = Result()
         for source in group:
-            if source.precompiled:
-                parsed = self._run(source, ["c++", "-fsyntax-only", "-w", *source.flags, str(self.root / source.file)])
-                if parsed.returncode != 0:
-                    result.output.append(parsed.stdout)
-                    continue
-            result.clean.append(source)
+            output = self._tidy(self.root / source.file, source, f"--checks={OF_MAIN_FILE}")
+            if output is None:
+                result.clean.append(source)
+            else:
+                result.output.append(output)
         return result
 
     def _tidy(self, file: Path, source: Source, *options: str) -> str | None:
