@@ -72,6 +72,9 @@ OptionFields<CompactPoseOptions> CompactPoseOptions::fields() {
       .real("landmark_loss", &O::landmark_loss, -1.0, 3.0,
             "largest information about the map that is lost by removing a pose which landmarks "
             "locate, where another one stays [nats]; -1: 0.06 per DoF of a pose")
+      .boolean("several_views", &O::several_views,
+               "landmarks that no single measurement determines, such as by bearings alone, are "
+               "added when several poses determine them together; false: never")
       .text("sensor", &O::sensor, numbers, text_of,
             "expected covariance of a match: standard deviations [m] and [rad], or its upper "
             "triangle; empty: the median of the latest matches, at first as odometry")

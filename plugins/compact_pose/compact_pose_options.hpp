@@ -59,6 +59,8 @@ struct CompactPoseOptions {
   /// What may be lost about the map where a pose leaves that landmarks locate [nats]; negative:
   /// likewise.
   double landmark_loss = -1.0;
+  /// Whether landmarks that no single measurement determines wait for other poses to see them.
+  bool several_views = false;
   /// Σ̄_y, what a registration is expected to be worth, upper triangle by rows, or the standard
   /// deviations of translation [m] and rotation [rad]. Empty: like the newest odometry.
   std::vector<double> sensor{};

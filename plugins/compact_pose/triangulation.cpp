@@ -211,37 +211,30 @@ struct Place {
   double squared = 0.0;  ///< eᵀ V⁻¹ e
 };
 
-/// The covariance of all poses when the last is known; zero for that.
-MatrixXd given_last(const MatrixXd& covariance, Index n) {
-  const Index others = covariance.rows() - n;
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> last(MatrixXd(covariance.bottomRightCorner(n, n)));
-  const VectorXd values = last.eigenvalues();
-  const double least = kNothing * std::max(values.maxCoeff(), 0.0);
-  VectorXd inverse = VectorXd::Zero(n);
-  for (Index k = 0; k < n; ++k) {
-    if (values[k] > least) inverse[k] = 1.0 / values[k];
-  }
-  const MatrixXd C = covariance.topRightCorner(others, n) * last.eigenvectors();
-  MatrixXd given = MatrixXd::Zero(covariance.rows(), covariance.cols());
-  given.topLeftCorner(others, others) =
-      covariance.topLeftCorner(others, others) - C * inverse.asDiagonal() * C.transpose();
-  return given;
+/// The covariance of the steps of all poses beside the last: B Σ Bᵀ.
+MatrixXd beside_last(std::span<const PlacedView> views, const MatrixXd& covariance) {
+  const Index n = covariance.rows() / std::ssize(views), last = covariance.rows() - n;
+  MatrixXd B = MatrixXd::Identity(covariance.rows(), covariance.cols());
+  B.bottomRightCorner(n, n).setZero();
+  for (Index row = 0; row < last; row += n)
+    B.block(row, last, n, n) = -views[static_cast<std::size_t>(row / n)].to_last;
+  return B * covariance * B.transpose();
 }
 
-Place weighted(const Views& views, const MatrixXd& given, std::vector<double> point) {
+Place weighted(const Views& views, const MatrixXd& relative, std::vector<double> point) {
   Place place{.point = std::move(point), .rows = {}, .V = {}, .Lambda = {}};
   place.rows = views.at(place.point);
   const MatrixXd& J = place.rows.J_poses;
-  place.V.compute(MatrixXd(MatrixXd::Identity(J.rows(), J.rows()) + J * given * J.transpose()));
+  place.V.compute(MatrixXd(MatrixXd::Identity(J.rows(), J.rows()) + J * relative * J.transpose()));
   place.Lambda = place.rows.J_point.transpose() * place.V.solve(place.rows.J_point);
   place.squared = place.rows.e.dot(place.V.solve(place.rows.e));
   return place;
 }
 
 /// Gauss-Newton with V: where J_lᵀ V⁻¹ e = 0. Nothing: it does not get there.
-std::optional<Place> refined(const Views& views, const MatrixXd& given,
+std::optional<Place> refined(const Views& views, const MatrixXd& relative,
                              const std::vector<double>& point) {
-  Place place = weighted(views, given, point);
+  Place place = weighted(views, relative, point);
   for (int step = 0; step < kMostSteps; ++step) {
     const VectorXd g = place.rows.J_point.transpose() * place.V.solve(place.rows.e);
     const Eigen::LLT<MatrixXd> llt(place.Lambda);
@@ -249,7 +242,7 @@ std::optional<Place> refined(const Views& views, const MatrixXd& given,
     const VectorXd delta = -llt.solve(g);
     if (!delta.allFinite()) return std::nullopt;
     if (std::sqrt(std::abs(delta.dot(g))) < kSmallStep) return place;
-    place = weighted(views, given, views.moved(place.point, delta));
+    place = weighted(views, relative, views.moved(place.point, delta));
   }
   return std::nullopt;
 }
@@ -289,11 +282,11 @@ std::optional<Triangulation> triangulate(const VariableType& type,
   const Views all(type, views);
   std::vector<Vector3d> centers;
   for (const PlacedView& view : views) centers.push_back(view.at);
-  const MatrixXd given = given_last(covariance, covariance.rows() / std::ssize(views));
+  const MatrixXd relative = beside_last(views, covariance);
   const int dimension = type.placement()->dimension();
   std::vector<Place> places;
   const auto search_from = [&](const std::vector<double>& start) {
-    std::optional<Place> place = refined(all, given, least_squares(all, start));
+    std::optional<Place> place = refined(all, relative, least_squares(all, start));
     if (place) places.push_back(std::move(*place));
   };
   for (const std::vector<double>& start : starts(all, centers, dimension)) search_from(start);

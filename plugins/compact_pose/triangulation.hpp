@@ -25,6 +25,7 @@ struct PlacedView {
   Id pose = 0;
   State x{};
   Eigen::Vector3d at;  ///< where that is [m]; z = 0 in the plane
+  Matrix to_last;      ///< Ad(x⁻¹ x_last)
 };
 
 /// Where a landmark is by what several poses measure of it.
@@ -41,10 +42,10 @@ struct Triangulation {
 /// ranges; nothing: they do not determine it. `covariance`: the joint Σ of their poses in order;
 /// each pose stands once.
 ///
-/// The last pose is taken for known, and the others have the covariance that they have then,
-/// Σ_p − Σ_pn Σ_nn⁺ Σ_np: the uncertainty of all poses together moves the point with them. With V =
-/// I + J_p Σ J_pᵀ, the point is where J_lᵀ V⁻¹ e = 0, and its information is Λ = J_lᵀ V⁻¹ J_l. It
-/// is determined if
+/// A motion of all poses together moves the point with them, so what counts is how they lie to the
+/// last, x_n: a step of the k-th is δ_k − Ad(x_k⁻¹ x_n) δ_n then, and that of the last is zero.
+/// With the covariance Σ' of these steps, and V = I + J_p Σ' J_pᵀ, the point is where J_lᵀ V⁻¹ e =
+/// 0, and its information is Λ = J_lᵀ V⁻¹ J_l. It is determined if
 ///
 /// - what is measured is linear over what is left uncertain: one standard deviation to either side
 ///   along each eigenvector of Λ, −ln p = ½ eᵀ V⁻¹ e differs from that of the linear model by less

@@ -52,14 +52,19 @@ std::optional<CompactPose::Triangulated> CompactPose::triangulated(const Waiting
   Triangulated result{.chosen = chosen_of(waiting.views.size()), .found = {}};
   std::vector<PlacedView> views;
   std::vector<int> poses;
+  const PlacedState last = graph_.group().place(graph_.newest_state());
   for (const std::size_t k : result.chosen) {
     const View& view = waiting.views[k];
     const bool newest = view.pose == graph_.newest_id();
     const int pose = newest ? -1 : graph_.find(view.pose);
     const State& x = newest ? graph_.newest_state() : graph_.state(pose);
     if (!newest) poses.push_back(pose);
-    views.push_back(
-        {.factors = view.factors, .pose = view.pose, .x = x, .at = graph_.group().place(x).at.t});
+    const PlacedState placed = graph_.group().place(x);
+    views.push_back({.factors = view.factors,
+                     .pose = view.pose,
+                     .x = x,
+                     .at = placed.at.t,
+                     .to_last = graph_.group().displacement(last, placed).adjoint});
   }
   std::optional<Triangulation> found =
       triangulate(*waiting.landmark.type, views, graph_.joint_covariance(poses, report_.seconds),
@@ -163,7 +168,7 @@ bool CompactPose::add_or_wait(const Seen& seen) {
                         .landmark = id,
                         .factors = static_cast<int>(std::ssize(seen.factors)),
                         .gain = std::numeric_limits<double>::infinity()};
-  if (!graph_.newest_kept()) {
+  if (!options_.several_views || !graph_.newest_kept()) {
     waiting_landmarks_.try_emplace(id, WaitingLandmark{.landmark = seen.landmark, .views = {}});
     report_.landmarks.push_back(report);
     return false;

@@ -308,7 +308,7 @@ TEST_F(OnlinePolicy, BearingsAreRestoredAndTheSameAsRecorded) {
   recorded.push_back("VERTEX_XY 9000 1 1");
   recorded.push_back(tag + " 20 9000 0.5 1 400 0 0");
   write_text(graph, joined(recorded));
-  const std::string policy = "compact_pose:range=3,angle=0.8";
+  const std::string policy = "compact_pose:range=3,angle=0.8,several_views=true";
   const Lines told = told_of(recorded, tag);
   compare_live_with_recorded(folder_, told, policy, graph,
                              {" ADDED ", " TAKEN ", " UNINFORMATIVE ", "LANDMARK 20 9000 WAITING"});

@@ -451,20 +451,24 @@ struct SeenBearing {
   }
 };
 
-TEST(LandmarksOfABearing, WaitWhereItDoesNotDetermineThem) {
+TEST(LandmarksOfABearing, WaitWhereItDoesNotDetermineThemIfAsked) {
   Registry registry;
   const auto pose = registry.variable_type("VERTEX_SE2"),
              point = registry.variable_type("VERTEX_XY");
-  const auto policy = registry.make<PosePolicy>("compact_pose");
-  policy->add_pose({.type = pose, .id = 0, .state = {0.0, 0.0, 0.0}, .fixed = true}, {});
-  policy->offer_landmark({{.type = point, .id = 7, .state = {2.0, 1.0}},
-                          {{define_factor<SeenBearing>(), {0, 7}, {0.46}, {400.0}}}});
-  const PoseReport report = policy->end_pose();
-  ASSERT_THAT(report.landmarks, SizeIs(1));
-  EXPECT_EQ(report.landmarks.front().verdict, LinkVerdict::waiting);
-  EXPECT_THAT(policy->landmarks(), IsEmpty());
-  EXPECT_THAT(policy->undetermined(), ElementsAre(7));
-  EXPECT_TRUE(policy->finish());
+  for (const bool several_views : {false, true}) {
+    const auto policy = registry.make<PosePolicy>(
+        ComponentSpec{"compact_pose", {{"several_views", several_views ? "true" : "false"}}});
+    policy->add_pose({.type = pose, .id = 0, .state = {0.0, 0.0, 0.0}, .fixed = true}, {});
+    policy->offer_landmark({{.type = point, .id = 7, .state = {2.0, 1.0}},
+                            {{define_factor<SeenBearing>(), {0, 7}, {0.46}, {400.0}}}});
+    const PoseReport report = policy->end_pose();
+    ASSERT_THAT(report.landmarks, SizeIs(1));
+    EXPECT_EQ(report.landmarks.front().verdict,
+              several_views ? LinkVerdict::waiting : LinkVerdict::unmatched);
+    EXPECT_THAT(policy->landmarks(), IsEmpty());
+    EXPECT_THAT(policy->undetermined(), ElementsAre(7));
+    EXPECT_TRUE(policy->finish());
+  }
 }
 
 }  // namespace

@@ -13,6 +13,7 @@
 
 #include <gtest/gtest.h>
 
+#include "cairn/lie/se2.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "support/dense_algebra.hpp"
 #include "support/pose_world.hpp"
@@ -56,7 +57,8 @@ class Triangulate : public testing::Test {
       placed.push_back({.factors = views[k].factors,
                         .pose = views[k].pose,
                         .x = {x[0], x[1], x[2]},
-                        .at = {x[0], x[1], 0.0}});
+                        .at = {x[0], x[1], 0.0},
+                        .to_last = Se2::adjoint(Se2::between<double>(x, poses.back()))});
     }
     return triangulate(*point_, placed, covariance, kTrust);
   }
@@ -146,6 +148,22 @@ TEST_F(Triangulate, CountsWhatIsNotKnownOfThePosesBetweenThem) {
   EXPECT_FALSE(found(poses, views, covariance(turned)));
 }
 
+// The first pose is the origin: what is known of the newest is what is known of the way to it.
+TEST_F(Triangulate, CountsTheWayFromAPoseThatIsKnown) {
+  const std::vector<Vector3d> poses{{0.0, 0.0, 0.0}, {0.0, 2.0, 0.0}};
+  const Vector2d landmark(15.0, 1.0);
+  std::vector<View> views;
+  for (Id k = 0; k < 2; ++k)
+    views.push_back(view(k, poses[static_cast<std::size_t>(k)], landmark, true));
+  const auto with_heading = [&](double sigma) {
+    MatrixXd all = MatrixXd::Zero(6, 6);
+    all.diagonal().tail<3>() << 1e-4, 1e-4, sigma * sigma;
+    return all;
+  };
+  EXPECT_TRUE(found(poses, views, with_heading(0.001)));
+  EXPECT_FALSE(found(poses, views, with_heading(0.2)));
+}
+
 // The oracle has the bearings' derivatives by differences, and everything dense.
 TEST_F(Triangulate, IsWhereTheWeightedResidualsVanishAndItsGainIsEntropy) {
   Draw draw(17);
@@ -197,12 +215,27 @@ TEST_F(Triangulate, IsWhereTheWeightedResidualsVanishAndItsGainIsEntropy) {
       J.col(c) = (residuals(x + 1e-6 * step) - residuals(x - 1e-6 * step)) / 2e-6;
     }
     const VectorXd e = residuals(x);
-    // Where the point is: with the last pose known.
-    const MatrixXd S_nn = Sigma.bottomRightCorner(3, 3), S_on = Sigma.topRightCorner(n - 3, 3);
-    const MatrixXd given =
-        Sigma.topLeftCorner(n - 3, n - 3) - S_on * symmetric_inverse(S_nn) * S_on.transpose();
+    // Where the point is: with the others as the last pose sees them.
+    MatrixXd B = MatrixXd::Zero(n - 3, n);
+    for (Eigen::Index k = 0; k < n - 3; k += 3) {
+      const auto seen = [&](const Vector3d& step, const Vector3d& last_step) -> Vector3d {
+        return Se2::between<double>(Se2::retract<double>(poses.back(), last_step),
+                                    Se2::retract<double>(x.segment<3>(k), step));
+      };
+      const Vector3d here = seen(Vector3d::Zero(), Vector3d::Zero());
+      for (Eigen::Index c = 0; c < 3; ++c) {
+        const Vector3d step = 1e-6 * Vector3d::Unit(c), none = Vector3d::Zero();
+        B.block<3, 1>(k, k + c) = (Se2::local<double>(here, seen(step, none)) -
+                                   Se2::local<double>(here, seen(-step, none))) /
+                                  2e-6;
+        B.block<3, 1>(k, n - 3 + c) = (Se2::local<double>(here, seen(none, step)) -
+                                       Se2::local<double>(here, seen(none, -step))) /
+                                      2e-6;
+      }
+    }
+    const MatrixXd relative = B * Sigma * B.transpose();
     const MatrixXd J_o = J.leftCols(n - 3), J_l = J.rightCols(2);
-    const MatrixXd V = MatrixXd::Identity(count, count) + J_o * given * J_o.transpose();
+    const MatrixXd V = MatrixXd::Identity(count, count) + J_o * relative * J_o.transpose();
     const MatrixXd Lambda = J_l.transpose() * symmetric_inverse(V) * J_l;
     const VectorXd step = symmetric_inverse(Lambda) * (J_l.transpose() * symmetric_inverse(V) * e);
     EXPECT_LT(step.dot(Lambda * step), 1e-6) << trial;
