@@ -112,6 +112,9 @@ def test_covariances_that_are_none_are_refused():
     with pytest.raises(ValueError, match="finite and symmetric"):
         conventions.step_covariance(POSE, np.triu(np.ones((6, 6))).ravel())
     assert not conventions.step_covariance(POSE, [0.0] * 36, semidefinite=True).any()
+    rounded = np.diag([0.01] * 6)
+    rounded[0, 1], rounded[1, 0] = 1e-19, -2e-19  # as filters leave it
+    assert np.allclose(conventions.step_covariance(POSE, rounded.ravel()), conventions.step_covariance(POSE, np.diag([0.01] * 6).ravel()))
     only_z = np.diag([1.0, 1.0, 0.0, 0.0, 0.0, 1.0])  # as planar robots send it
     assert_allclose(conventions.step_covariance(Pose2(0.0, 0.0, 0.3), only_z.ravel()), np.eye(3), atol=1e-15)
 

@@ -78,7 +78,8 @@ def step_covariance(pose, covariance, angles="fixed_axes", semidefinite=False):
     names = "x, y, z, rotations about X, Y and Z"
     if isinstance(pose, Pose2):
         sigma, names = sigma[np.ix_(PLANAR, PLANAR)], "x, y and the rotation about Z"
-    if not np.isfinite(sigma).all() or not np.allclose(sigma, sigma.T, rtol=1e-6, atol=0):
+    scale = np.sqrt(np.abs(np.diag(sigma)))
+    if not np.isfinite(sigma).all() or (np.abs(sigma - sigma.T) > 1e-6 * np.outer(scale, scale)).any():
         raise ValueError("the covariance is not finite and symmetric")
     least, *_, largest = np.linalg.eigvalsh(sigma)
     if least < -1e-9 * abs(largest) if semidefinite else least <= 0:
