@@ -225,6 +225,7 @@ def test_a_drive_in_space_with_odometry_that_accumulates(ros, tmp_path):
         at, sigma = at * step, A @ sigma @ A.T + Q
     until(lambda: len(robot.path()) == 5, "the path")
     robot.end()
+    until((tmp_path / "map.g2o").exists, "the file")
     written = cairn.read(tmp_path / "map.g2o")
     assert_allclose(written.information("EDGE_SE3:QUAT") @ Q, [np.eye(6)] * 4, atol=1e-3)
 
