@@ -155,8 +155,8 @@ void PolicySession::note_landmark(const LandmarkReport& landmark) {
 void PolicySession::note_undetermined() {
   if (const std::int64_t count = undetermined(); count > 0) {
     answer_ += fmt::format(
-        "NOTE {} of the landmarks that were seen are not in the graph: what was measured of them "
-        "does not determine where they are\n",
+        "NOTE {} of the landmarks that were seen are not in the graph: no single measurement "
+        "determines where they are (several_views=true takes several together)\n",
         count);
   }
 }

@@ -70,7 +70,7 @@ def measure(bench: Bench, family: str, poses: int, arguments: Words, rounds: int
         whole.append(run.outcome.seconds)
         entry.update({name: run.report[name] for name in ["graph", "solver", "status", "chi2", "initial"]})
         entry["iterations"] = len(items(run.report, "iterations"))
-    # The whole process generates the graph and makes the first estimate, too.
+    # The whole process generates the graph and makes the initial estimate, too.
     return {**entry, "rounds": rounds, "seconds": median(seconds), "peak_memory_bytes": median(memory),
             "process_seconds": median(whole)}
 

@@ -12,6 +12,7 @@
 
 #include <Eigen/Core>
 
+#include "cairn/graph/graph.hpp"
 #include "cairn/graph/packed.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/policy/pose_policy.hpp"
@@ -47,6 +48,8 @@ class LandmarkCourse : public testing::TestWithParam<int> {
     policy_ = registry_.make<PosePolicy>("compact_pose:" + options);
     truth_ = {world_.identity()};
     policy_->add_pose(world_.variable(0, truth_.front(), true), {});
+    all_ = {};
+    all_.set_fixed(all_.add_variable(world_.types().pose, 0, truth_.front()));
   }
   Id newest() const { return static_cast<Id>(truth_.size()) - 1; }
   Eigen::MatrixXd Sigma(double translation, double rotation) const {
@@ -63,6 +66,20 @@ class LandmarkCourse : public testing::TestWithParam<int> {
     const Eigen::MatrixXd S = Sigma(0.05, 0.02);
     const test::PoseWorld::Pose motion = world_.moved(world_.identity(), step);
     return world_.edge(newest() - 1, newest(), world_.moved(motion, draw_.error(S)), S);
+  }
+  /// The same as a new pose of the policy and of `all_`; ends the one before.
+  PoseReport advance() {
+    const PoseReport report = policy_->end_pose();
+    const Factor odometry = moved_on();
+    all_.add_variable(world_.types().pose, newest(), truth_.back());
+    put(odometry);
+    policy_->add_pose(world_.variable(newest()), {&odometry, 1});
+    return report;
+  }
+  void put(const Factor& factor) {
+    std::vector<int> on;
+    for (const Id id : factor.variables) on.push_back(*all_.find(id));
+    all_.add_factor(factor.type, on, factor.measurement, factor.information);
   }
   /// What the newest pose measures of a landmark.
   LandmarkObservation see(int landmark, double sigma = kSigma) {
@@ -96,6 +113,7 @@ class LandmarkCourse : public testing::TestWithParam<int> {
   std::vector<Eigen::Vector3d> landmarks_;
   std::unique_ptr<PosePolicy> policy_;
   std::vector<test::PoseWorld::Pose> truth_;
+  Graph all_;  ///< everything that `put` and `advance` measure, for a batch solution
 };
 
 }  // namespace cairn::compact

@@ -136,21 +136,6 @@ class Landmarks : public LandmarkCourse {
  protected:
   void begin(const std::string& options) {
     begin_course("range=3,angle=3.15" + (options.empty() ? "" : "," + options));
-    all_ = {};
-    all_.set_fixed(all_.add_variable(world_.types().pose, 0, truth_.front()));
-  }
-  void put(const Factor& factor) {
-    std::vector<int> on;
-    for (const Id id : factor.variables) on.push_back(*all_.find(id));
-    all_.add_factor(factor.type, on, factor.measurement, factor.information);
-  }
-  PoseReport advance() {
-    const PoseReport report = policy_->end_pose();
-    const Factor odometry = moved_on();
-    all_.add_variable(world_.types().pose, newest(), truth_.back());
-    put(odometry);
-    policy_->add_pose(world_.variable(newest()), {&odometry, 1});
-    return report;
   }
   /// Drives on, and sees what is near.
   std::vector<PoseReport> drive(int poses) {
@@ -179,8 +164,6 @@ class Landmarks : public LandmarkCourse {
     std::copy_n(state.begin(), GetParam(), at.data());
     return (at - landmarks_[static_cast<std::size_t>(landmark - kFirstLandmark)]).norm();
   }
-
-  Graph all_;
 };
 
 INSTANTIATE_TEST_SUITE_P(InThePlaneAndInSpace, Landmarks, testing::Values(2, 3));

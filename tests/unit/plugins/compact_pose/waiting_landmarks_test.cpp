@@ -60,8 +60,6 @@ class Bearings : public LandmarkCourse {
 
   void begin(const std::string& options) {
     begin_course("range=3,angle=0.6,several_views=true" + (options.empty() ? "" : "," + options));
-    all_ = {};
-    all_.set_fixed(all_.add_variable(world_.types().pose, 0, truth_.front()));
   }
   /// The bearing alone of what the newest pose sees.
   LandmarkObservation bearing_of(int landmark) {
@@ -93,19 +91,6 @@ class Bearings : public LandmarkCourse {
     }
     put(observation.factors.front());
   }
-  void put(const Factor& factor) {
-    std::vector<int> on;
-    for (const Id id : factor.variables) on.push_back(*all_.find(id));
-    all_.add_factor(factor.type, on, factor.measurement, factor.information);
-  }
-  PoseReport advance() {
-    const PoseReport report = policy_->end_pose();
-    const Factor odometry = moved_on();
-    all_.add_variable(world_.types().pose, newest(), truth_.back());
-    put(odometry);
-    policy_->add_pose(world_.variable(newest()), {&odometry, 1});
-    return report;
-  }
   std::vector<PoseReport> drive(int poses) {
     std::vector<PoseReport> reports;
     for (int k = 0; k < poses; ++k) {
@@ -122,7 +107,6 @@ class Bearings : public LandmarkCourse {
   }
 
   const std::shared_ptr<const FactorType> direction_ = define_factor<SeenDirection>();
-  Graph all_;
 };
 
 INSTANTIATE_TEST_SUITE_P(InThePlaneAndInSpace, Bearings, testing::Values(2, 3));

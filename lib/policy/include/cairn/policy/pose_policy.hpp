@@ -144,10 +144,11 @@ class CAIRN_API PosePolicy : public Component {
   /// after its links: those of landmarks that are in the graph are used, the most informative
   /// first, as long as the information gain of one exceeds a threshold, and the pose is kept then.
   /// If the pose is kept, for whatever reason, landmarks that it sees for the first time are added;
-  /// where a single observation does not determine one, as a bearing does not, it waits for those
-  /// of other poses. Throws `Error` (input) for a factor that is not on the newest pose and this
-  /// landmark, for a landmark that is fixed, or of another type than before, or while it is unknown
-  /// where the trajectory is on a map; (usage) unless a policy overrides it.
+  /// where a single observation does not determine one, as a bearing does not, it is left out, or
+  /// waits for those of other poses if an option of the policy says so. Throws `Error` (input) for
+  /// a factor that is not on the newest pose and this landmark, for a landmark that is fixed, or of
+  /// another type than before, or while it is unknown where the trajectory is on a map; (usage)
+  /// unless a policy overrides it.
   virtual void offer_landmark(const LandmarkObservation& observation);
   /// Takes a link back that was false: the graph is as if there had never been one between these
   /// two poses, and so is what was learnt from it; which poses are kept stays as it was decided. At
@@ -172,8 +173,8 @@ class CAIRN_API PosePolicy : public Component {
   virtual std::vector<Id> removed() const { return {}; }
   /// The landmarks that are in the graph, in the order in which they were added.
   virtual std::vector<Id> landmarks() const { return {}; }
-  /// Those that were measured and are not in the graph, since what was measured of them does not
-  /// determine where they are, by rising id.
+  /// Those that were measured and are not in the graph, since no observation, nor several where the
+  /// policy takes them together, determines where they are; by rising id.
   virtual std::vector<Id> undetermined() const { return {}; }
   /// How many factors there are between all of these; the estimator need not have all of them yet.
   virtual int factor_count() const = 0;
