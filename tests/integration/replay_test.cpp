@@ -50,6 +50,21 @@ TEST_F(Replay, ReportsStepsPhasesAndChecks) {
   EXPECT_EQ(cairn({"info", folder_.file("out.g2o")}).exit_code, 0);
 }
 
+// The states of a file do not follow what the estimator has made of the loop closures before.
+TEST_F(Replay, TheStatesOfAFileTakeHardlyMoreWorkThanOdometry) {
+  if (!Registry().has("estimator", "incremental_cholesky"))
+    GTEST_SKIP() << "there is no estimator incremental_cholesky";
+  const auto relinearized = [](const std::string& initial, const std::string& estimator) {
+    const Outcome run = cairn({"replay", "@manhattan:poses=400", "--initial", initial,
+                               "--estimator", estimator, "--json", "-", "--quiet"});
+    EXPECT_EQ(run.exit_code, 0) << run.err;
+    return parse_json(run.out).at("relinearized_factors").as_int64();
+  };
+  const auto odometry = relinearized("odometry", "incremental_cholesky");
+  EXPECT_LT(relinearized("as_given", "incremental_cholesky"), 2 * odometry + 100);
+  EXPECT_GT(relinearized("as_given", "incremental_cholesky:hints=false"), 20 * odometry);
+}
+
 TEST_F(Replay, ComparesCovariancesWhereThatIsAskedFor) {
   const Outcome run =
       cairn({"replay", "@landmarks2d:poses=30", "--estimator", "batch", "--check", "2",

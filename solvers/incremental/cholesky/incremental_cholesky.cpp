@@ -12,6 +12,7 @@
 #include "cairn/runtime/timed.hpp"
 #include "cairn/update/elimination.hpp"
 #include "cairn/update/graph_update.hpp"
+#include "cairn/update/initial_states.hpp"
 
 namespace cairn::incremental {
 namespace {
@@ -50,14 +51,17 @@ UpdateReport IncrementalCholesky::update(const GraphUpdate& update, const Update
     forget_what_was_read();
   }
   GraphUpdate checked = update;
-  place_variables(checked, [this](Id id) {
+  const auto state_of = [this](Id id) {
     const auto v = find(id);
     return v ? state(id) : std::span<const double>();
-  });
+  };
+  place_variables(checked, state_of);
   check_update(
       engine_->graph(),
       {.position = [this](FactorId id) { return position(id); }, .next = engine_->next_id()},
       checked);
+  if (options_.hints)
+    replace_poor_states(checked, state_of, losses_.empty() ? Deciding::all : Deciding::first);
   forget_what_was_read();
   UpdateReport report;
   if (checked.marginalized.empty()) {

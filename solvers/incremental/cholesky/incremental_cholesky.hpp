@@ -23,6 +23,7 @@ struct IncrementalCholeskyOptions {
   int solve_every = 1;  ///< updates that are solved for together
   int full_every = 0;   ///< updates from one full step to the next; 0: never by itself
   double budget = 0.0;  ///< of an update [s]; 0: no limit
+  bool hints = true;    ///< new variables may start where a measurement puts them
   std::string rescuer = "levenberg_marquardt";  ///< optimises where a step has raised chi2
 
   static auto fields() {
@@ -34,6 +35,10 @@ struct IncrementalCholeskyOptions {
                  "updates from one full batch step to the next; 0: only on demand")
         .real("budget", &O::budget, 0.0, 1e9,
               "seconds that an update may take before relinearisation is deferred; 0: no limit")
+        .boolean(
+            "hints", &O::hints,
+            "a new variable whose state its measurements contradict starts from where one of them "
+            "puts it")
         .component<Optimizer>(
             "rescuer", &O::rescuer,
             "fallback optimizer: runs on the whole graph where a step has raised chi2")

@@ -22,6 +22,8 @@ class CAIRN_API LossRule {
   LossRule() = default;
   LossRule(std::shared_ptr<const Loss> loss, FactorSelector which, const Graph& graph);
 
+  /// Whether it gives no factor a loss.
+  bool empty() const { return !loss_; }
   /// Follow what the graph gets and loses.
   void added_variable(const Graph& graph, int variable);
   void removed_variable(const Graph& graph, int variable);
