@@ -376,6 +376,7 @@ int run(OnlineOptions options, Session& session) {
     server.emplace(options.listen, conversation,
                    LineServerSettings{.rephrase = in_command_line_words});
     lines.protect(options.listen, "the socket");
+    listener.format->add_other_words(LineServer::words());
   }
   if (journal) server ? session.note(restored(conversation)) : write_stdout(conversation.restore());
 

@@ -7,6 +7,7 @@
 #include <array>
 #include <map>
 #include <memory>
+#include <span>
 #include <utility>
 
 #include <fmt/core.h>
@@ -38,12 +39,14 @@ using Offsets = std::map<Id, Offset>;
 
 class G2oReader {
  public:
-  /// `first_line`: the number of the text's first line; `offsets`: what lines before it gave.
+  /// `first_line`: the number of the text's first line; `offsets`: what lines before it gave;
+  /// `other_words`: those to suggest for an unknown tag besides tags.
   G2oReader(std::string_view text, const std::string& name, Registry& types,
             const ReadOptions& options, ReadReport& report, std::int64_t first_line = 1,
-            Offsets offsets = {})
+            Offsets offsets = {}, std::span<const std::string> other_words = {})
       : types_(types),
         options_(options),
+        other_words_(other_words),
         offsets_(std::move(offsets)),
         scanner_(text, name, first_line),
         draft_(name, "g2o", types, options, report) {
@@ -122,6 +125,7 @@ class G2oReader {
     const std::vector<std::string> factors = types_.names("factor");
     names.insert(names.end(), factors.begin(), factors.end());
     names.insert(names.end(), {"FIX", std::string(kOffset), std::string(kPrior)});
+    names.insert(names.end(), other_words_.begin(), other_words_.end());
     return names;
   }
 
@@ -197,6 +201,7 @@ class G2oReader {
 
   Registry& types_;
   const ReadOptions& options_;
+  std::span<const std::string> other_words_;
   Offsets offsets_;
   Scanner scanner_;
   Draft draft_;
@@ -211,7 +216,7 @@ class G2oStream final : public StreamFormat {
   StreamLine read(std::string_view line, const std::string& name, std::int64_t number,
                   Registry& types, const ReadOptions& options) override {
     ReadReport report;
-    G2oReader reader(line, name, types, options, report, number, offsets_);
+    G2oReader reader(line, name, types, options, report, number, offsets_, other_words());
     StreamLine said = reader.read_stream();
     said.skipped = !report.skipped.empty();
     if (reader.offsets().size() != offsets_.size()) offsets_ = reader.offsets();

@@ -2,6 +2,7 @@
 #include "cairn/online/line_server.hpp"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <deque>
 #include <string_view>
@@ -28,6 +29,7 @@ using boost::system::error_code;
 using Protocol = asio::local::stream_protocol;
 using ClientPtr = std::shared_ptr<LineClient>;  // which handlers that wait for a socket own, too
 
+const std::array<std::string, 3> kWords{"WRITE", "FOLLOW", "JSON"};
 constexpr std::chrono::milliseconds kLookAtStop{100};
 constexpr std::chrono::milliseconds kPauseOfAccepting{100};  // where no more sockets can be had
 
@@ -313,5 +315,7 @@ LineServer::~LineServer() = default;
 void LineServer::serve(const std::atomic<bool>& stop) { service_->serve(stop); }
 
 const LineServer::Counts& LineServer::counts() const { return service_->counts(); }
+
+std::span<const std::string> LineServer::words() { return kWords; }
 
 }  // namespace cairn

@@ -4,6 +4,7 @@
 #include <sys/stat.h>
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <optional>
@@ -13,8 +14,13 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "cairn/runtime/spelling.hpp"
+
 namespace cairn {
 namespace {
+
+/// What can be asked without an effect.
+const std::array<std::string, 3> kQuestions{"CHI2", "COVARIANCE", "ESTIMATE"};
 
 constexpr std::string_view kBlanks = " \t\r";
 
@@ -88,7 +94,9 @@ LineSession::Reply LineSession::ask(std::string_view line, std::int64_t number) 
   if (const std::string_view word = first_word(line); !word.empty() && !is_question(word)) {
     Reply reply;
     reply.refused = true;
-    reply.text = error_line(number, fmt::format("{} is not a question", word), kStreamName);
+    reply.text = error_line(
+        number, fmt::format("{} is not a question{}", word, what_is_on_offer(word, kQuestions)),
+        kStreamName);
     return reply;
   }
   const SetWhile asking(asking_);
@@ -102,7 +110,7 @@ std::string_view LineSession::first_word(std::string_view line) {
 }
 
 bool LineSession::is_question(std::string_view word) {
-  return word == "ESTIMATE" || word == "COVARIANCE" || word == "CHI2";
+  return std::ranges::find(kQuestions, word) != kQuestions.end();
 }
 
 void LineSession::restore(std::string_view line, std::int64_t number) {

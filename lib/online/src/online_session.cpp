@@ -15,10 +15,14 @@
 namespace cairn {
 OnlineSession::OnlineSession(Estimator& estimator, StreamFormat& format, Registry& registry,
                              OnlineSettings settings)
-    : estimator_(estimator), format_(format), registry_(registry), settings_(std::move(settings)) {}
+    : estimator_(estimator), format_(format), registry_(registry), settings_(std::move(settings)) {
+  std::vector<std::string> words;
+  for (const auto& [name, command] : commands()) words.emplace_back(name);
+  format_.add_other_words(words);
+}
 
-OnlineSession::Command OnlineSession::find_command(std::string_view word) {
-  static constexpr std::pair<std::string_view, Command> kCommands[] = {
+std::span<const OnlineSession::NamedCommand> OnlineSession::commands() {
+  static constexpr NamedCommand kCommands[] = {
       {"NEW", &OnlineSession::declare},
       {"REMOVE", &OnlineSession::remove},
       {"CHANGE", &OnlineSession::change},
@@ -32,7 +36,11 @@ OnlineSession::Command OnlineSession::find_command(std::string_view word) {
       {"SAVE", &OnlineSession::save},
       {"QUIT", &OnlineSession::quit},
   };
-  for (const auto& [name, command] : kCommands) {
+  return kCommands;
+}
+
+OnlineSession::Command OnlineSession::find_command(std::string_view word) {
+  for (const auto& [name, command] : commands()) {
     if (name == word) return command;
   }
   return nullptr;

@@ -53,10 +53,15 @@ PolicySession::PolicySession(PosePolicy& policy, StreamFormat& format, Registry&
                              PolicySettings settings)
     : policy_(policy), format_(format), registry_(registry), settings_(std::move(settings)) {
   policy_.keep_chains(settings_.trajectory);
+  std::vector<std::string> words;
+  for (const auto& [name, command] : commands()) {
+    if (command != &PolicySession::refuse) words.emplace_back(name);
+  }
+  format_.add_other_words(words);
 }
 
-PolicySession::Command PolicySession::find_command(std::string_view word) {
-  static constexpr std::pair<std::string_view, Command> kCommands[] = {
+std::span<const PolicySession::NamedCommand> PolicySession::commands() {
+  static constexpr NamedCommand kCommands[] = {
       {"NEW", &PolicySession::declare},
       {"NEXT", &PolicySession::propose},
       {"NOMATCH", &PolicySession::note_unmatched},
@@ -73,7 +78,11 @@ PolicySession::Command PolicySession::find_command(std::string_view word) {
       {"MARGINALIZE", &PolicySession::refuse},
       {"SPARSIFY", &PolicySession::refuse},
   };
-  for (const auto& [name, command] : kCommands) {
+  return kCommands;
+}
+
+PolicySession::Command PolicySession::find_command(std::string_view word) {
+  for (const auto& [name, command] : commands()) {
     if (name == word) return command;
   }
   return nullptr;

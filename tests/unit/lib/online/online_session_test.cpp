@@ -14,6 +14,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "cairn/online/line_server.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/solve/optimizer.hpp"
 #include "support/components.hpp"
@@ -55,6 +56,25 @@ class OnlineSessionTest : public ::testing::Test {
   std::unique_ptr<OnlineSession> session_;
   std::int64_t number_ = 0;
 };
+
+TEST_F(OnlineSessionTest, SuggestsTheCommandForAWordThatIsMisspelt) {
+  for (const auto& [misspelt, meant] : {std::pair("SLOVE", "SOLVE"),
+                                        {"solve", "SOLVE"},
+                                        {"ESTIMAT 1", "ESTIMATE"},
+                                        {"MARGINALISE 1", "MARGINALIZE"},
+                                        {"EDGE_SE 0 1", "EDGE_SE2"},
+                                        {"FIXX 0", "FIX"}}) {
+    const LineSession::Reply reply = take(misspelt);
+    EXPECT_TRUE(reply.refused);
+    EXPECT_FALSE(reply.changes);
+    EXPECT_THAT(reply.text, HasSubstr(std::string("; did you mean '") + meant + "'?"));
+  }
+  EXPECT_THAT(take("NOTHING_LIKE_THAT_IS_ON_OFFER 1").text, Not(HasSubstr("did you mean")));
+  EXPECT_THAT(take("FOLOW").text, Not(HasSubstr("did you mean")));
+  format_->add_other_words(LineServer::words());
+  EXPECT_THAT(take("FOLOW").text, HasSubstr("; did you mean 'FOLLOW'?"));
+  EXPECT_THAT(session_->ask("COVARIANC 0 0", 1).text, HasSubstr("did you mean 'COVARIANCE'?"));
+}
 
 TEST_F(OnlineSessionTest, TakesDataInSilenceAndAnswersWhenItHasSolved) {
   EXPECT_THAT(take("VERTEX_SE2 0 0 0 0").text, IsEmpty());

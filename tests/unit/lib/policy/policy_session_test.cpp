@@ -19,6 +19,7 @@ namespace {
 
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::Not;
 using ::testing::StartsWith;
 
 const std::string kQuarter = " 1 0 1.5707963267948966 400 0 0 400 0 400";
@@ -58,6 +59,12 @@ class PolicySessionTest : public ::testing::Test {
   std::unique_ptr<PolicySession> session_;
   std::int64_t number_ = 0;
 };
+
+TEST_F(PolicySessionTest, SuggestsTheCommandForAWordThatIsMisspelt) {
+  EXPECT_THAT(take("NXET").text, HasSubstr("; did you mean 'NEXT'?"));
+  EXPECT_THAT(take("NO_MATCH 0 1").text, HasSubstr("; did you mean 'NOMATCH'?"));
+  EXPECT_THAT(take("SLOVE").text, Not(HasSubstr("did you mean 'SOLVE'")));  // it would be refused
+}
 
 TEST_F(PolicySessionTest, ThePoseBeforeEndsWhereThePoseAfterItBegins) {
   EXPECT_THAT(take("NEW VERTEX_SE2 0").text, IsEmpty());

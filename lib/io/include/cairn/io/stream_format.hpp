@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -35,6 +36,18 @@ class CAIRN_API StreamFormat : public Component {
   /// 1), in the words of the format's reader of files; the line then counts as not read.
   virtual StreamLine read(std::string_view line, const std::string& name, std::int64_t number,
                           Registry& types, const ReadOptions& options) = 0;
+
+  /// Words that begin lines of the same stream and are not for `read`, such as the commands of
+  /// `cairn online`. What it says of an unknown tag suggests one of these, too.
+  void add_other_words(std::span<const std::string> words) {
+    other_words_.insert(other_words_.end(), words.begin(), words.end());
+  }
+
+ protected:
+  const std::vector<std::string>& other_words() const { return other_words_; }
+
+ private:
+  std::vector<std::string> other_words_;
 };
 
 }  // namespace cairn

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <span>
 #include <string>
 
 #include "cairn/online/conversation.hpp"
@@ -62,6 +63,9 @@ class CAIRN_API LineServer {
   void serve(const std::atomic<bool>& stop);
 
   const Counts& counts() const;
+
+  /// The first words of lines that only a service has: WRITE, FOLLOW and JSON.
+  static std::span<const std::string> words();
 
  private:
   class Service;

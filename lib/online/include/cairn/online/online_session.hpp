@@ -8,6 +8,7 @@
 #include <string>
 #include <string_view>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "cairn/io/stream_format.hpp"
@@ -42,6 +43,8 @@ class CAIRN_API OnlineSession final : public LineSession {
 
  private:
   using Command = void (OnlineSession::*)(const Words&, Reply&);
+  using NamedCommand = std::pair<std::string_view, Command>;
+  static std::span<const NamedCommand> commands();
   static Command find_command(std::string_view word);
   void perform(std::string_view line, const Words& words, Reply& reply) override;
 

@@ -9,6 +9,7 @@
 #include <string_view>
 #include <unordered_map>
 #include <unordered_set>
+#include <utility>
 #include <vector>
 
 #include "cairn/geometry/motion.hpp"
@@ -86,6 +87,8 @@ class CAIRN_API PolicySession final : public LineSession {
   };
 
   using Command = void (PolicySession::*)(const Words&, Reply&);
+  using NamedCommand = std::pair<std::string_view, Command>;
+  static std::span<const NamedCommand> commands();
   static Command find_command(std::string_view word);
   void perform(std::string_view line, const Words& words, Reply& reply) override;
   void perform_question(const Words& words, Reply& reply);
