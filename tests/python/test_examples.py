@@ -73,3 +73,9 @@ def test_ranges_of_plaza_1():
 def test_ranges_is_a_program(tmp_path):
     ended = subprocess.run([sys.executable, EXAMPLES / "ranges.py", simulate(tmp_path)], capture_output=True, text=True)
     assert ended.returncode == 0 and "converged, chi2" in ended.stdout, ended.stdout + ended.stderr
+
+
+def test_nearest_frontier_is_a_program():
+    ended = subprocess.run([sys.executable, EXAMPLES / "nearest_frontier.py", "--seed", "2"], capture_output=True, text=True)
+    assert ended.returncode == 0 and ended.stdout.startswith("finished: no frontier of 0.5 m"), ended.stdout + ended.stderr
+    assert len((EXAMPLES / "nearest_frontier.py").read_text().splitlines()) < 60

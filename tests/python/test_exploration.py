@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Floors and exploration, against the program."""
+import importlib.util
 import json
 import os
 import subprocess
 import sys
 import textwrap
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -125,3 +127,147 @@ def test_ctrl_c_ends_it_with_the_map_so_far():
 def test_a_floor_is_of_integers(cells):
     with pytest.raises(cairn.Error, match="cells: "):
         cairn.Floor(cells, 0.1)
+
+
+# Explorers written in Python ----------------------------------------------------------------------
+
+
+def nearest_frontier():
+    path = Path(__file__).resolve().parents[2] / "examples" / "python" / "nearest_frontier.py"
+    spec = importlib.util.spec_from_file_location("nearest_frontier", path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module.NearestFrontier
+
+
+def same_runs(one, other):
+    return one.steps.keys() == other.steps.keys() and all(
+        np.array_equal(one.steps[name], other.steps[name], equal_nan=True) for name in one.steps)
+
+
+def test_an_explorer_of_ones_own_sees_the_whole_floor_and_the_same_seed_gives_the_same_run():
+    floor = cairn.generate_floor("rooms", seed=3, width=8, height=6)
+    runs = [cairn.explore(floor, nearest_frontier()(), seed=seed) for seed in [2, 2, 3]]
+    for run in runs:
+        assert run.end == "finished" and run.why.startswith("no frontier of 0.5 m"), run.why
+        assert run.measures["seen"] > 0.95 * cairn.explore(floor, "frontier", seed=2).measures["seen"]
+    assert same_runs(runs[0], runs[1]) and not same_runs(runs[0], runs[2])
+    assert_array_equal(runs[0].map.cells, runs[1].map.cells)
+
+
+def test_it_is_begun_with_the_seed_and_asked_after_each_motion():
+    class Impatient:
+        asked = 0
+
+        def begin(self, seed):
+            self.seed = seed
+
+        def decide(self, situation):
+            self.decision = situation.decision
+            return cairn.Decision.drive([2.5, 4.5], "to the other corner") if situation.decision < 3 else cairn.Decision.stuck("enough")
+
+        def is_worthwhile(self, situation, path):
+            self.asked += 1
+            assert path.length > 0 and situation.free.any()
+            return False
+
+    explorer = Impatient()
+    run = cairn.explore(room(), explorer, seed=7, start=Pose2(0, 3, 0))
+    assert (explorer.seed, explorer.asked, explorer.decision) == (7, 3, 3)
+    assert (run.end, run.why) == ("stuck", "enough")
+    assert len(run.decision_seconds) == 4 and run.steps["step"][-1] == 3  # each path was left after one motion
+
+
+def test_the_situation_has_the_map_and_how_certain_the_poses_are():
+    seen = {}
+
+    def decide(situation):
+        if situation.decision == 0:
+            return cairn.Decision.drive([[1.0, 2.6], [2.4, 2.6]], look_at=[2.4, 4.0])  # below the wall in the middle
+        seen.update({name: getattr(situation, name) for name in
+                     ["pose", "poses", "free", "occupied", "log_odds", "clearance", "resolution", "radius", "frontiers"]})
+        seen["states"], seen["graph"] = situation.states(Pose2), situation.graph()
+        seen["covariance"] = situation.covariance(situation.poses)
+        row, column = situation.cells_at(situation.pose.state[:2])
+        assert situation.free[row, column]
+        assert_array_equal(situation.cells_at(situation.centres([row, column])), [row, column])
+        assert situation.path_to([0.0, 3.0]).points.shape[1] == 2
+        assert situation.path_to([50.0, 3.0]) is None
+        seen["situation"] = situation
+        return cairn.Decision.finished("seen")
+
+    run = cairn.explore(room(), decide, seed=4, start=Pose2(0, 3, 0))
+    assert run.end == "finished" and run.why == "seen"
+    assert_array_equal(run.steps["estimate"][-1], seen["pose"].state)
+    # It has driven along the path, past its corner, and looks where it shall.
+    assert np.hypot(*(seen["pose"].state[:2] - [2.4, 2.6])) < 0.1 and abs(seen["pose"].theta - np.pi / 2) < 0.1
+    assert np.linalg.norm(run.steps["estimate"][:, :2] - [1.0, 2.6], axis=1).min() < 0.3
+    cells = run.map.cells  # the same, as the run has left it
+    assert cells.shape == seen["free"].shape == seen["log_odds"].shape == seen["clearance"].shape
+    assert_array_equal(cells == -1, ~(seen["free"] | seen["occupied"]))
+    per_cent = 100 / (1 + np.exp(-seen["log_odds"].astype(float)))
+    known = cells >= 0
+    assert np.abs(per_cent[known] - cells[known]).max() <= 0.51  # rounded
+    assert not (seen["free"] & seen["occupied"]).any()
+    # Clearance is the distance to the nearest cell that is not free, or less, where a beam ends in a free cell.
+    free, other = np.argwhere(seen["free"]), np.argwhere(~seen["free"])
+    border = np.pad(other, 0)
+    distance = np.sqrt(((free[:, None] - border[None]) ** 2).sum(-1).min(1)) * seen["resolution"]
+    assert (seen["clearance"][tuple(free.T)] <= distance + 1e-4).all()
+    for frontier in seen["frontiers"]:
+        rows, columns = frontier.cells.T
+        assert seen["free"][rows, columns].all() and abs(frontier.length - len(rows) * seen["resolution"]) < 1e-9
+    # Poses and covariances, against those of the graph.
+    assert_array_equal(seen["states"], seen["graph"].states(Pose2))
+    assert seen["covariance"].shape == (len(seen["poses"]), 3, 3)
+    expected = cairn.marginals(seen["graph"], seen["poses"][1:])  # the estimator's are at an earlier linearisation
+    assert_allclose(seen["covariance"][1:], expected, rtol=0, atol=0.02 * np.abs(expected).max())
+    for use in [lambda s: s.free, lambda s: s.pose, lambda s: s.covariance(0), lambda s: s.path_to([0, 3])]:
+        with pytest.raises(cairn.Error, match="until the call that it was given to has returned"):
+            use(seen["situation"])
+
+
+def test_what_an_explorer_raises_reaches_the_caller():
+    def fails(situation):
+        raise ZeroDivisionError("in decide")
+
+    with pytest.raises(ZeroDivisionError, match="in decide"):
+        cairn.explore(room(), fails)
+    for returned, message in [
+        (None, "what the explorer returned is a NoneType; expected cairn.Decision.drive, finished or stuck"),
+        (cairn.Decision.drive(None), "None is no path; Situation.path_to returns it where there is none"),
+        (cairn.Decision.drive([90.0, 90.0]), r"no path to \(90, 90\)"),
+        (cairn.Decision.drive([1.0, 2.0, 3.0]), r"the shape is \(3,\), expected \(2,\) or \(n, 2\)"),
+        (cairn.Decision.drive([[1.0, np.nan]]), "a number that is not finite"),
+    ]:
+        with pytest.raises(cairn.Error, match=message):
+            cairn.explore(room(), lambda situation: returned)
+    with pytest.raises(cairn.Error, match="explorer: expected the name of one, a function"):
+        cairn.explore(room(), 3)
+    with pytest.raises(cairn.Error, match="an object .not its class. with such a method"):
+        cairn.explore(room(), nearest_frontier())
+    with pytest.raises(cairn.Error, match="explore has no argument 'smallest', and options are of explorers by name"):
+        cairn.explore(room(), nearest_frontier()(), smallest=2)
+
+
+def test_an_explorer_that_leads_nowhere_is_stuck():
+    run = cairn.explore(room(), lambda situation: cairn.Decision.drive(np.empty((0, 2))))
+    assert (run.end, run.why) == ("stuck", "3 decisions in a row led to no motion")
+
+
+def test_ctrl_c_within_a_decision_ends_the_run():
+    run = """
+        import os, signal, time
+        import cairn
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        def decide(situation):
+            if situation.decision < 2:
+                return cairn.Decision.drive([situation.pose.state[:2] + [0.3, 0.0]], "on")
+            os.kill(os.getpid(), signal.SIGINT)
+            time.sleep(30)
+        result = cairn.explore(cairn.generate_floor("rooms", seed=3), decide)
+        assert result.end == "interrupted", result
+        print("went on")
+    """
+    ended = subprocess.run([sys.executable, "-c", textwrap.dedent(run)], capture_output=True, text=True, timeout=120)
+    assert (ended.returncode, ended.stdout) == (0, "went on\n"), ended.stderr

@@ -28,6 +28,7 @@ void bind_policy(py::module_& module);
 void bind_compact(py::module_& module);
 void bind_sparsify(py::module_& module);
 void bind_floors(py::module_& module);
+void bind_situation(py::module_& module);
 void bind_exploration(py::module_& module);
 void bind_pictures(py::module_& module);
 void bind_components(py::module_& module);

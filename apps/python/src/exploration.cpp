@@ -27,6 +27,7 @@
 #include "component_names.hpp"
 #include "follower.hpp"
 #include "interrupt.hpp"
+#include "python_explorer.hpp"
 
 namespace cairn::python {
 namespace {
@@ -75,8 +76,21 @@ void refuse_recorded(const ComponentSpec& world, Registry& registry) {
                           world.name, world.name));
 }
 
+/// None: it is a name.
+std::unique_ptr<PythonExplorer> own_explorer(const py::object& explorer, const py::kwargs& options,
+                                             Follower& follower) {
+  if (py::isinstance<py::str>(explorer)) return nullptr;
+  auto own = std::make_unique<PythonExplorer>(explorer, [&follower] { follower.end(); });
+  if (options.empty()) return own;
+  throw Error(
+      ErrorCode::usage,
+      fmt::format("explore has no argument '{}', and options are of explorers by name: give "
+                  "those of your own where you make it",
+                  std::string(py::str(options.begin()->first))));
+}
+
 std::unique_ptr<BoundExploration> explore(
-    const OccupancyGrid& floor, const std::string& explorer, std::uint64_t seed,
+    const OccupancyGrid& floor, const py::object& explorer, std::uint64_t seed,
     const std::optional<Pose2>& start, std::optional<double> max_distance,
     std::optional<int> max_steps, std::optional<int> max_decisions, const std::string& world,
     const std::string& policy, const std::string& registration, const std::string& mapper,
@@ -85,7 +99,6 @@ std::unique_ptr<BoundExploration> explore(
   const InterruptGuard guard;
   Follower follower(callback, guard.flag());
   follower.follow();
-  const ComponentSpec explorer_spec = component_spec(explorer, options);
   ExplorationSetup setup{.registry = default_registry(),
                          .world = parse_component(world),
                          .policy = parse_component(policy),
@@ -99,12 +112,18 @@ std::unique_ptr<BoundExploration> explore(
   set_positive("match_range", match_range, setup.match.range);
   set_positive("match_angle", match_angle, setup.match.angle);
   set_positive("decision_budget", decision_budget, setup.decision_budget);
+  const auto own = own_explorer(explorer, options, follower);
+  const ComponentSpec spec = own ? ComponentSpec() : component_spec(py::str(explorer), options);
+  const ExplorationHooks hooks{
+      .moved = [&](const ExplorationStep& step, const FloorMap&) { follower.after(step); }};
   auto out = std::make_unique<BoundExploration>();
-  {
+  try {
     const py::gil_scoped_release unlocked;
-    out->result = run_exploration(
-        setup, explorer_spec, seed,
-        {.moved = [&](const ExplorationStep& step, const FloorMap&) { follower.after(step); }});
+    out->result =
+        own ? run_exploration(setup, *own, seed, hooks) : run_exploration(setup, spec, seed, hooks);
+  } catch (const Error&) {
+    if (own) own->rethrow();
+    throw;
   }
   guard.absorb();
   follower.rethrow();
@@ -242,7 +261,9 @@ void bind_exploration(py::module_& module) {
       R"(A simulated robot with a lidar explores a floor, and decides by itself where to drive (docs/explore.md).
 
 floor: a Floor to drive on.
-explorer: a name of `cairn.components("explorer")`; its options are further keyword arguments.
+explorer: a name of `cairn.components("explorer")`, whose options are further keyword arguments; or one of your own, a function
+    decide(situation) that returns a Decision, or an object with such a method, and if it has them begin(seed), called before
+    the first decision, and is_worthwhile(situation, path), called after each motion: False: it decides anew.
 seed: of all noise and random choices: the same seed gives the same run.
 start: the Pose2 at which it begins; None: the widest place.
 max_distance [m], max_steps, max_decisions: it ends there; None: when nothing is left to explore.
@@ -252,7 +273,7 @@ match_range [m], match_angle [rad]: within which the explorer expects loop closu
 decision_budget: searches for a path end after so long [s]; then no run is like the other.
 callback: called with an ExplorationStep after each motion; when it returns False, the run ends.
 
-Ctrl-C ends the run too, with the map so far. The interpreter's lock is released meanwhile.)");
+What an explorer of your own raises is raised here. Ctrl-C ends the run too, with the map so far. The interpreter's lock is released meanwhile.)");
 }
 
 }  // namespace cairn::python

@@ -41,6 +41,8 @@ class Follower {
       stop_ = true;
     }
   }
+  /// Ends the run.
+  void end() { stop_ = true; }
   const std::atomic<bool>& stop() const { return stop_; }
   /// Throws what the function has raised, if it has.
   void rethrow() const {

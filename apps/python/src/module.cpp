@@ -22,6 +22,7 @@ PYBIND11_MODULE(_cairn, module) {
   python::bind_compact(module);
   python::bind_sparsify(module);
   python::bind_floors(module);
+  python::bind_situation(module);
   python::bind_exploration(module);
   python::bind_pictures(module);
   python::bind_components(module);

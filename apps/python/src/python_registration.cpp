@@ -10,18 +10,9 @@
 #include "cairn/runtime/error.hpp"
 #include "cairn/typed/symbol.hpp"
 #include "factors.hpp"
-#include "interrupt.hpp"
 #include "types_of.hpp"
 
 namespace cairn::python {
-namespace {
-
-py::object method(const py::object& object, const char* name) {
-  if (!py::hasattr(object, name)) return py::none();
-  return object.attr(name);
-}
-
-}  // namespace
 
 BoundProposal proposal_of(const MatchProposal& proposal, const VariableType& type) {
   BoundProposal bound{proposal.earlier, proposal.later, proposal.gain, py::none(), py::none()};
@@ -33,30 +24,16 @@ BoundProposal proposal_of(const MatchProposal& proposal, const VariableType& typ
 }
 
 PythonRegistration::PythonRegistration(const py::object& matcher)
-    : match_(method(matcher, "match")),
-      begin_(method(matcher, "begin")),
-      recognise_(method(matcher, "recognise")),
-      pose_ended_(method(matcher, "pose_ended")) {
+    : PythonComponent("registration"),
+      match_(method_of(matcher, "match")),
+      begin_(method_of(matcher, "begin")),
+      recognise_(method_of(matcher, "recognise")),
+      pose_ended_(method_of(matcher, "pose_ended")) {
   if (match_.is_none()) match_ = matcher;
   if (PyCallable_Check(match_.ptr()) == 0) {
     throw Error(ErrorCode::usage,
                 "registration: expected the name of one, a function match(proposal) that returns "
                 "factors or None, or an object with such a method");
-  }
-}
-
-template <class Work, class Result>
-Result PythonRegistration::call(const Work& work, Result otherwise) {
-  const py::gil_scoped_acquire locked;
-  try {
-    return work();
-  } catch (const py::error_already_set& error) {
-    if (error.matches(PyExc_KeyboardInterrupt) && interrupted()) return otherwise;
-    raised_ = std::current_exception();
-    throw Error(ErrorCode::plugin, "the registration, written in Python, has raised an exception");
-  } catch (const Error&) {
-    raised_ = std::current_exception();
-    throw;
   }
 }
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <exception>
 #include <optional>
 #include <span>
 #include <vector>
@@ -9,10 +8,9 @@
 #include <pybind11/pybind11.h>
 
 #include "cairn/policy/registration.hpp"
+#include "python_component.hpp"
 
 namespace cairn::python {
-
-namespace py = pybind11;
 
 /// A pair that a policy proposes, as Python sees it.
 struct BoundProposal {
@@ -24,9 +22,8 @@ struct BoundProposal {
 BoundProposal proposal_of(const MatchProposal& proposal, const VariableType& type);
 
 /// A registration written in Python: a function match(proposal), or an object with a method `match`
-/// and, if it has them, `begin()`, `recognise(places, pose)` and `pose_ended(pose, kept)`. It lives
-/// under the interpreter's lock, and is called by a thread without it.
-class PythonRegistration final : public Registration {
+/// and, if it has them, `begin()`, `recognise(places, pose)` and `pose_ended(pose, kept)`.
+class PythonRegistration final : public Registration, public PythonComponent {
  public:
   explicit PythonRegistration(const py::object& matcher);
 
@@ -37,20 +34,9 @@ class PythonRegistration final : public Registration {
   std::optional<RecognisedPlace> recognise(std::span<const Id> places, Id pose) override;
   void pose_ended(Id pose, bool kept) override;
 
-  /// Throws what its Python code has raised, if it has.
-  void rethrow() const {
-    if (raised_) std::rethrow_exception(raised_);
-  }
-
  private:
-  /// `work` under the lock. What it raises is kept for `rethrow`, and ends the run as an `Error`;
-  /// Ctrl-C ends it as well, after `otherwise` is returned.
-  template <class Work, class Result>
-  Result call(const Work& work, Result otherwise);
-
   py::object match_, begin_, recognise_, pose_ended_;  ///< None: it has no such method
   const Graph* recording_ = nullptr;
-  std::exception_ptr raised_;
 };
 
 }  // namespace cairn::python

@@ -137,6 +137,11 @@ ComponentSpec with_seed(Registry& registry, std::string_view kind, ComponentSpec
 
 ExplorationResult run_exploration(const ExplorationSetup& setup, const ComponentSpec& explorer,
                                   std::uint64_t seed, const ExplorationHooks& hooks) {
+  return run_exploration(setup, *setup.registry.make<Explorer>(explorer), seed, hooks);
+}
+
+ExplorationResult run_exploration(const ExplorationSetup& setup, Explorer& explorer,
+                                  std::uint64_t seed, const ExplorationHooks& hooks) {
   Registry& registry = setup.registry;
   const auto world = registry.make<World>(setup.world);
   const auto policy =
@@ -144,13 +149,12 @@ ExplorationResult run_exploration(const ExplorationSetup& setup, const Component
   const auto registration = registry.make<Registration>(
       with_seed(registry, Registration::kKind, setup.registration, seed));
   const auto mapper = registry.make<Mapper>(setup.mapper);
-  const auto decides = registry.make<Explorer>(explorer);
   return run_exploration(
       Exploration{.world = *world,
                   .policy = *policy,
                   .registration = *registration,
                   .mapper = *mapper,
-                  .explorer = *decides,
+                  .explorer = explorer,
                   .registry = registry,
                   .start = {.floor = &setup.floor, .pose = setup.start, .seed = seed},
                   .limits = setup.limits,

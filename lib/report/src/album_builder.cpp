@@ -13,6 +13,7 @@
 #include "cairn/geometry/pose.hpp"
 #include "cairn/graph/packed.hpp"
 #include "cairn/runtime/error.hpp"
+#include "scene_alignment.hpp"
 
 namespace cairn {
 namespace {
@@ -98,17 +99,26 @@ void AlbumBuilder::note(const std::string& sentence) {
   notes_.push_back(sentence);
 }
 
-void AlbumBuilder::add_graph(const std::string& file, const std::string& name, Graph graph) {
+void AlbumBuilder::add_graph(const std::string& file, const std::string& name, Graph graph,
+                             std::span<const ReportedCovariance> covariances) {
   if (graph.factor_count() == 0) {
     trajectories_.push_back({file, name, std::move(graph)});
     return;
   }
-  for (Entry& entry : entries_) {
-    if (!apart_ && entry.graph && same_ids(entry.scene, graph))
-      return lay_over(entry, file, name, graph);
+  const auto over = std::ranges::find_if(entries_, [&](const Entry& entry) {
+    return !apart_ && entry.graph && same_ids(entry.scene, graph);
+  });
+  if (over == entries_.end()) {
+    Entry& entry = add_entry(file, name, std::move(graph));
+    if (apart_) entry.scene.name = name;
+    for (const ReportedCovariance& covariance : covariances)
+      add_ellipse(entry.scene, *entry.graph, entry.scene.estimates.back(), *entry.graph,
+                  covariance);
+    return;
   }
-  Entry& entry = add_entry(file, name, std::move(graph));
-  if (apart_) entry.scene.name = name;
+  lay_over(*over, file, name, graph);
+  for (const ReportedCovariance& covariance : covariances)
+    add_ellipse(over->scene, *over->graph, over->scene.estimates.back(), graph, covariance);
 }
 
 void AlbumBuilder::finish(Album& album) {
@@ -125,6 +135,7 @@ void AlbumBuilder::finish(Album& album) {
   if (initial_) join_initial();
   for (Entry& entry : entries_) {
     give_roles(entry.scene);
+    if (aligned_) align_estimates(entry.scene);
     album.scenes.push_back(std::move(entry.scene));
   }
   album.notes.insert(album.notes.end(), notes_.begin(), notes_.end());
@@ -196,6 +207,24 @@ void AlbumBuilder::join_truth() {
   if (!lay_by_id(file, "ground truth", graph, EstimateRole::truth)) {
     throw Error(ErrorCode::input,
                 fmt::format("{}: none of the graphs has the ids of this ground truth", file));
+  }
+}
+
+/// What stands nearest to the truth. Snapshots of runs move with the estimate.
+void AlbumBuilder::align_estimates(Scene& scene) {
+  const auto truth = std::ranges::find(scene.estimates, EstimateRole::truth, &SceneEstimate::role);
+  if (truth == scene.estimates.end()) return;
+  for (SceneEstimate& estimate : scene.estimates) {
+    if (estimate.role == EstimateRole::truth) continue;
+    const std::optional<Pose> motion = motion_to(*truth, estimate, scene);
+    if (!motion) {
+      note(fmt::format("{}: not aligned, fewer than two of its poses are in the ground truth",
+                       estimate.name));
+      continue;
+    }
+    move(estimate, scene, *motion);
+    if (estimate.role != EstimateRole::estimate) continue;
+    for (Recording& recording : scene.recordings) move(recording, scene, *motion);
   }
 }
 

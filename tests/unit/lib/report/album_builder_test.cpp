@@ -2,6 +2,7 @@
 #include "cairn/report/album_builder.hpp"
 
 #include <array>
+#include <cmath>
 #include <map>
 #include <optional>
 #include <string>
@@ -164,6 +165,45 @@ TEST_F(AlbumBuilderTest, CovariancesBecomeThoseOfPositions) {
   const SceneEstimate& estimate = made.scenes[0].estimates.back();
   EXPECT_THAT(estimate.covariance_variables, ElementsAre(2));
   EXPECT_THAT(estimate.covariance_upper, ElementsAre(0.5f, 0.1f, 0.25f));
+}
+
+TEST_F(AlbumBuilderTest, CovariancesMayComeWithTheGraph) {
+  const std::vector<ReportedCovariance> covariances = {
+      {2, {0.5, 0.1, 0, 0.1, 0.25, 0, 0, 0, 0.01}}};
+  builder_.add_graph("a.g2o", "a", line(0, 3, 1.5));
+  builder_.add_graph("b.g2o", "b", line(0, 3, 1.0), covariances);
+  const Album made = album();
+  const SceneEstimate& estimate = made.scenes[0].estimates.back();
+  EXPECT_EQ(estimate.name, "b");
+  EXPECT_THAT(estimate.covariance_variables, ElementsAre(2));
+  EXPECT_THAT(estimate.covariance_upper, ElementsAre(0.5f, 0.1f, 0.25f));
+  EXPECT_THAT(made.scenes[0].estimates.front().covariance_variables, IsEmpty());
+}
+
+/// The truth is the estimate, turned by 0.7 rad and moved: what is shown is where the truth is.
+TEST_F(AlbumBuilderTest, EstimatesAreAlignedToTheTruth) {
+  const double c = std::cos(0.7), s = std::sin(0.7);
+  Graph estimate = line(0, 5, 1.0), truth;
+  for (int k = 0; k < 5; ++k) {  // not all on a line
+    const double y = k == 2 ? 0.5 : 0.0;
+    estimate.set_state(k, std::array{1.0 * k, y, 0.1 * k});
+    truth.add_variable(types_.pose, k,
+                       std::array{3 + c * k - s * y, -2 + s * k + c * y, 0.1 * k + 0.7});
+  }
+  const std::vector<ReportedCovariance> covariances = {{0, {4, 0, 0, 0, 1, 0, 0, 0, 0.01}}};
+  builder_.add_graph("a.g2o", "a", std::move(estimate), covariances);
+  builder_.set_truth("truth.g2o", truth.clone());
+  builder_.align_to_truth();
+  const Album made = album();
+  const SceneEstimate &shown = made.scenes[0].estimates[0], &over = made.scenes[0].estimates[1];
+  ASSERT_EQ(over.role, EstimateRole::truth);
+  for (std::size_t k = 0; k < shown.positions.size(); ++k)
+    EXPECT_NEAR(shown.positions[k], over.positions[k], 1e-6) << k;  // orientations are floats
+  for (std::size_t k = 0; k < shown.orientation.size(); ++k)
+    EXPECT_NEAR(shown.orientation[k], over.orientation[k], 1e-6) << k;
+  const float expected[] = {float(4 * c * c + s * s), float(3 * c * s), float(4 * s * s + c * c)};
+  for (std::size_t k = 0; k < 3; ++k)
+    EXPECT_NEAR(shown.covariance_upper[k], expected[k], 1e-5) << k;
 }
 
 TEST_F(AlbumBuilderTest, TakesOneComparison) {

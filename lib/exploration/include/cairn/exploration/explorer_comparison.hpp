@@ -59,6 +59,9 @@ CAIRN_API ComponentSpec with_seed(Registry& registry, std::string_view kind, Com
 CAIRN_API ExplorationResult run_exploration(const ExplorationSetup& setup,
                                             const ComponentSpec& explorer, std::uint64_t seed,
                                             const ExplorationHooks& hooks = {});
+/// The same with an explorer that is there already, such as one of the calling program.
+CAIRN_API ExplorationResult run_exploration(const ExplorationSetup& setup, Explorer& explorer,
+                                            std::uint64_t seed, const ExplorationHooks& hooks = {});
 
 /// What is compared: every explorer runs once with each of the seeds `first_seed`, `first_seed` + 1
 /// …, which determine the noise of odometry and lidar, so that run k of all of them meets the same.

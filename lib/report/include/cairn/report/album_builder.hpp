@@ -3,6 +3,7 @@
 
 #include <functional>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <variant>
@@ -39,8 +40,11 @@ class CAIRN_API AlbumBuilder {
 
   /// Before any graph: each stands by itself under its name, also one with the ids of another.
   void keep_apart() { apart_ = true; }
-  /// A graph or, without factors, a trajectory. `name`: what to call its estimate.
-  void add_graph(const std::string& file, const std::string& name, Graph graph);
+  /// A graph or, without factors, a trajectory. `name`: what to call its estimate. `covariances`:
+  /// of its variables, of the step δ (x_true = x · exp(δ)), shown as those of positions; not of a
+  /// trajectory.
+  void add_graph(const std::string& file, const std::string& name, Graph graph,
+                 std::span<const ReportedCovariance> covariances = {});
   /// What `read_recording` has read.
   void add_recording(Scene recording) { recordings_.push_back(std::move(recording)); }
   void add_report(const std::string& file, std::variant<RunReport, BenchReport> report) {
@@ -56,6 +60,9 @@ class CAIRN_API AlbumBuilder {
   /// A sentence on what is shown, for the report and for `Note`.
   void add_note(const std::string& sentence) { note(sentence); }
   void set_truth(const std::string& file, Graph truth) { truth_.emplace(file, std::move(truth)); }
+  /// Each estimate is shown after the rigid motion that brings its poses nearest to those of the
+  /// truth, as `compare` (evaluation/trajectory.hpp) moves it.
+  void align_to_truth() { aligned_ = true; }
   /// Shows where this computation of initial estimates puts every graph; it outlives `finish`.
   void show_initial(const std::string& name, InitialGuess& initial) {
     initial_name_ = name;
@@ -90,6 +97,7 @@ class CAIRN_API AlbumBuilder {
   void join_estimate(Entry& entry, const std::string& file, const RunReport& report);
   void note_lost_covariances(const std::string& file);
   void join_truth();
+  void align_estimates(Scene& scene);
   void join_initial();
   Entry* find_graph(const std::string& graph, const std::string& report);
   bool known(const std::string& file) const;
@@ -101,7 +109,7 @@ class CAIRN_API AlbumBuilder {
   std::vector<Scene> recordings_;
   std::vector<std::pair<std::string, std::variant<RunReport, BenchReport>>> reports_;
   std::optional<std::pair<std::string, Graph>> truth_;
-  bool truth_known_ = false, apart_ = false;
+  bool truth_known_ = false, apart_ = false, aligned_ = false;
   std::string initial_name_;
   InitialGuess* initial_ = nullptr;  // borrowed until `finish`
   std::vector<std::string> notes_;
