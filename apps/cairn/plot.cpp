@@ -133,6 +133,7 @@ int run(const PlotOptions& options, Session& session) {
 Command add_plot(ArgumentParser program) {
   auto options = std::make_shared<PlotOptions>();  // lives as long as the parser and the run
   ArgumentParser cli = program.add_command("plot", "a static plot: SVG, PNG or PDF");
+  options->album.align = true;
   add_album_options(cli, options->album);
   cli.add_option("-o,--output", options->output,
                  "the plot: .svg, .png or .pdf [name of the first FILE, .svg]")
@@ -183,6 +184,7 @@ Command add_plot(ArgumentParser program) {
       "FILEs are laid together as by cairn view.\n\n"
       "Example:\n"
       "  cairn plot city.g2o best.g2o -o city.svg\n"
+      "  cairn plot best.g2o --truth truth.g2o -o errors.svg\n"
       "  cairn plot city.g2o compact.g2o --apart --poses -o maps.svg\n"
       "  cairn plot run1.json run2.json --what convergence --x time -o curves.pdf\n"
       "  cairn plot steps.csv --x variables --y seconds --y affected --log y -o steps.svg\n"

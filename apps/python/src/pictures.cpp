@@ -1,35 +1,109 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Pictures of graphs by the plugins that draw them.
+#include <cstddef>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include <fmt/core.h>
 #include <pybind11/pybind11.h>
 
+#include "arrays.hpp"
 #include "bindings.hpp"
 #include "bound_graph.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/report/album_builder.hpp"
+#include "cairn/report/run_report.hpp"
 #include "cairn/report/scene.hpp"
+#include "cairn/runtime/error.hpp"
+#include "cairn/typed/symbol.hpp"
 #include "component_names.hpp"
 
 namespace cairn::python {
 namespace {
 
-py::bytes draw(const py::dict& graphs, const std::string& picture, const py::kwargs& options) {
-  std::vector<std::pair<std::string, Graph>> named;
-  for (const auto& [name, graph] : graphs)
-    named.emplace_back(py::str(name), graph.cast<BoundGraph&>().get().clone());
-  const ComponentSpec spec = component_spec(picture, options);
+/// What `covariances` has for a graph: ids, and a block (d, d) for each.
+std::vector<ReportedCovariance> covariances_of(const py::object& given, const std::string& name,
+                                               const Graph& graph) {
+  const std::string what = fmt::format("covariances['{}']", name);
+  if (!py::isinstance<py::tuple>(given) || py::len(given) != 2) {
+    throw Error(ErrorCode::usage,
+                what + ": expected ids and their covariances (n, d, d), as cairn.marginals gives");
+  }
+  const Ids ids = ids_of(given[py::int_(0)], what);
+  const Doubles blocks = doubles_of(given[py::int_(1)], what);
+  if (blocks.ndim() != 3 || blocks.shape(0) != ids.size() || blocks.shape(1) != blocks.shape(2)) {
+    throw Error(ErrorCode::usage, fmt::format("{}: the shape is {}, expected ({}, d, d)", what,
+                                              shape_text(blocks), ids.size()));
+  }
+  const std::span<const double> numbers = span_of(blocks);
+  const std::size_t size = ids.size() == 0 ? 0 : numbers.size() / span_of(ids).size();
+  std::vector<ReportedCovariance> all;
+  for (const Id id : span_of(ids)) {
+    const std::optional<int> variable = graph.find(id);
+    if (!variable) {
+      throw Error(ErrorCode::usage, fmt::format("{}: there is no variable {}", what, id_text(id)));
+    }
+    const std::span<const double> block = numbers.subspan(all.size() * size, size);
+    const int d = graph.type(*variable).tangent_size();
+    if (blocks.shape(1) != d) {
+      throw Error(ErrorCode::usage,
+                  fmt::format("{}: blocks of {} x {} for variable {}, whose covariance is {} x {}",
+                              what, blocks.shape(1), blocks.shape(1), id_text(id), d, d));
+    }
+    all.push_back({id, {block.begin(), block.end()}});
+  }
+  return all;
+}
+
+struct NamedGraph {
+  std::string name;
+  Graph graph;
+  std::vector<ReportedCovariance> covariances;
+};
+
+std::vector<NamedGraph> named_graphs(const py::dict& graphs, const py::object& covariances) {
+  const py::dict given = covariances.is_none() ? py::dict() : py::dict(covariances);
+  for (const auto& [name, ignored] : given) {
+    if (!graphs.contains(name)) {
+      throw Error(ErrorCode::usage, fmt::format("covariances: there is no graph of the name '{}'",
+                                                std::string(py::str(name))));
+    }
+  }
+  std::vector<NamedGraph> named;
+  for (const auto& [name, graph] : graphs) {
+    const Graph& own = graph.cast<BoundGraph&>().get();
+    NamedGraph& one = named.emplace_back(NamedGraph{py::str(name), own.clone(), {}});
+    if (given.contains(name)) one.covariances = covariances_of(given[name], one.name, own);
+  }
+  return named;
+}
+
+py::bytes draw(const py::dict& graphs, const std::string& picture, const py::object& truth,
+               const py::object& covariances, const py::kwargs& options) {
+  constexpr const char *kEllipses = "ellipses", *kThreeSigma = "3";
+  std::vector<NamedGraph> named = named_graphs(graphs, covariances);
+  std::optional<Graph> true_graph;
+  if (!truth.is_none()) true_graph = truth.cast<BoundGraph&>().get().clone();
+  ComponentSpec spec = component_spec(picture, options, Picture::kKind, "draw");
   std::string bytes;
   {
     const py::gil_scoped_release unlocked;
+    if (!covariances.is_none() &&
+        default_registry().options(Picture::kKind, spec.name).find(kEllipses))
+      spec.values.emplace(kEllipses, kThreeSigma);
     const auto drawing = default_registry().make<Picture>(spec);
     AlbumBuilder builder([](const std::string&) { return std::optional<Graph>(); });
-    for (auto& [name, graph] : named) builder.add_graph(name, name, std::move(graph));
+    for (NamedGraph& one : named)
+      builder.add_graph(one.name, one.name, std::move(one.graph), one.covariances);
+    if (true_graph) {
+      builder.set_truth("truth", std::move(*true_graph));
+      builder.align_to_truth();
+    }
     Album album;
-    album.title = named.empty() ? "" : named.front().first;
+    album.title = named.empty() ? "" : named.front().name;
     builder.finish(album);
     bytes = drawing->draw(album);
   }
@@ -39,13 +113,17 @@ py::bytes draw(const py::dict& graphs, const std::string& picture, const py::kwa
 }  // namespace
 
 void bind_pictures(py::module_& module) {
-  module.def("draw", &draw, py::arg("graphs"), py::arg("picture") = "svg",
+  module.def("draw", &draw, py::arg("graphs"), py::arg("picture") = "svg", py::kw_only(),
+             py::arg("truth") = py::none(), py::arg("covariances") = py::none(),
              R"(Graphs drawn by a plugin: the bytes of a file.
 
 graphs: a Graph for each name, {"estimate": graph, "truth": other}; those with the same ids are laid over each other, the
     first of those without factors as the truth.
 picture: a name of `cairn.components("picture")`, such as "svg", "png", "pdf" or "html" (the page of cairn view), whose
-    options are further keyword arguments.)");
+    options are further keyword arguments.
+truth: a Graph of where the poses truly are; each estimate is aligned to it, as `cairn.evaluate` does.
+covariances: for a name the ids of variables and their covariances, {"estimate": (ids, cairn.marginals(graph, ids))}, drawn as
+    ellipses of their positions, of ellipsoids in space the outlines, of 3 standard deviations unless ellipses= says another number.)");
 }
 
 }  // namespace cairn::python
