@@ -6,6 +6,7 @@
 #include <memory>
 #include <numbers>
 #include <optional>
+#include <vector>
 
 #include <fmt/format.h>
 
@@ -71,7 +72,9 @@ class LidarBuilding final : public World {
                          .range = options.range,
                          .sigma = options.range_sigma},
                .odometry = {.absolute = {options.sigma_xy, options.sigma_xy, options.sigma_theta},
-                            .relative = options.relative}} {}
+                            .relative = options.relative}},
+        beams_(beam_directions(model_.lidar)),
+        hits_(beams_.size()) {}
 
   RobotModel robot() const override { return model_; }
 
@@ -114,10 +117,9 @@ class LidarBuilding final : public World {
                    .angle_step = lidar.step(),
                    .max_range = lidar.range,
                    .ranges = {}};
-    scan.ranges.reserve(static_cast<std::size_t>(lidar.beams));
-    for (int beam = 0; beam < lidar.beams; ++beam) {
-      const double angle = truth_.theta() + scan.angle(static_cast<std::size_t>(beam));
-      const RayHit hit = rays_->cast(truth_.translation(), angle, lidar.range);
+    rays_->cast(truth_.translation(), truth_.theta(), beams_, lidar.range, hits_);
+    scan.ranges.reserve(hits_.size());
+    for (const RayHit& hit : hits_) {
       // As many random numbers for each beam, whatever it meets.
       const bool lost = lidar_noise_->chance(options_.dropouts);
       const double noise = lidar.sigma * lidar_noise_->gaussian();
@@ -170,6 +172,8 @@ class LidarBuilding final : public World {
   RobotModel model_;
   OccupancyGrid floor_;
   std::optional<RayCaster> rays_;
+  std::vector<Vector2d> beams_;
+  std::vector<RayHit> hits_;
   std::optional<RandomStream> odometry_noise_, lidar_noise_;
   Pose2 truth_;
 };

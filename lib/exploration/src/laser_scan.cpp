@@ -12,6 +12,16 @@ namespace cairn {
 
 ScanRegistration::~ScanRegistration() = default;
 
+std::vector<Eigen::Vector2d> beam_directions(const LidarModel& lidar) {
+  std::vector<Eigen::Vector2d> directions;
+  directions.reserve(static_cast<std::size_t>(lidar.beams));
+  for (int beam = 0; beam < lidar.beams; ++beam) {
+    const double angle = lidar.first_angle() + lidar.step() * beam;
+    directions.emplace_back(std::cos(angle), std::sin(angle));
+  }
+  return directions;
+}
+
 void check_scan(const LaserScan& scan, std::string_view name) {
   const auto refuse = [&](const std::string& why) {
     throw Error(ErrorCode::input, fmt::format("{}: {}", name, why));

@@ -67,7 +67,9 @@ class PathSampler::Model {
         seed_(seed),
         information_(situation, options.information),
         seen_(situation.map, situation.robot.lidar, options.range),
-        rays_(over_obstacles(situation.map, options.range)) {
+        rays_(over_obstacles(situation.map, options.range)),
+        beams_(beam_directions(situation.robot.lidar)),
+        hits_(beams_.size()) {
     if (scans.size() != poses.size())
       throw Error(ErrorCode::usage, "path sampler: there are not as many scans as poses");
     const PoseGaussian now = gaussian_of(situation.estimator, situation.poses);
@@ -120,17 +122,16 @@ class PathSampler::Model {
                   sampled_map_entropy(poses, scans, mapper_, options_.samples, seed_).samples);
   }
 
-  LaserScan expected_scan(const Pose2& at) const {
+  LaserScan expected_scan(const Pose2& at) {
     const LidarModel& lidar = situation_.robot.lidar;
     LaserScan scan{.first_angle = lidar.first_angle(),
                    .angle_step = lidar.step(),
                    .max_range = options_.range,
                    .ranges = {}};
-    for (int beam = 0; beam < lidar.beams; ++beam) {
-      const double angle = at.theta() + scan.angle(static_cast<std::size_t>(beam));
-      const RayHit hit = rays_.cast(at.translation(), angle, options_.range);
+    rays_.cast(at.translation(), at.theta(), beams_, options_.range, hits_);
+    scan.ranges.reserve(hits_.size());
+    for (const RayHit& hit : hits_)
       scan.ranges.push_back(static_cast<float>(hit.hit ? hit.range : options_.range));
-    }
     return scan;
   }
 
@@ -153,6 +154,8 @@ class PathSampler::Model {
   PathInformation information_;
   SeenCells seen_;
   RayCaster rays_;
+  std::vector<Eigen::Vector2d> beams_;
+  std::vector<RayHit> hits_;
   std::vector<AttachedScan> scans_;
   std::vector<double> before_;
 };

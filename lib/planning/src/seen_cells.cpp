@@ -97,10 +97,7 @@ SeenCells::SeenCells(const FloorMap& map, const LidarModel& lidar, double range)
       if (state == CellState::occupied) obstacles_[at] |= bit_of(x + margin);
     }
   }
-  for (int beam = 0; beam < lidar.beams; ++beam) {
-    const double angle = lidar.first_angle() + lidar.step() * beam - frame_.yaw;
-    beams_.emplace_back(std::cos(angle), std::sin(angle));
-  }
+  beams_ = beam_directions(lidar);
   find_viewpoints();
 }
 
@@ -194,7 +191,7 @@ void SeenCells::cast(const Pose2& at, CellWindow& seen) const {
   const int start_x = static_cast<int>(from.x()), start_y = static_cast<int>(from.y());
   const std::size_t start = word_at(words_, start_y, start_x / kWordBits);
   if ((viewpoints_[start] & bit_of(start_x)) == 0) return;
-  const double c = std::cos(at.theta()), s = std::sin(at.theta());
+  const double turn = at.theta() - frame_.yaw, c = std::cos(turn), s = std::sin(turn);
   for (const Vector2d& beam : beams_) {
     Crossings along_x(from.x(), c * beam.x() - s * beam.y());
     Crossings along_y(from.y(), s * beam.x() + c * beam.y());

@@ -115,17 +115,19 @@ void expect_same_rays(const OccupancyGrid& grid, Source& choices) {
   const GridFrame& frame = grid.frame;
   const Eigen::Vector2d from =
       frame.to_world({frame.width * std::abs(choices.unit()), frame.height * choices.unit()});
-  constexpr int kDirections = 16;
+  constexpr int kDirections = 32;
   const double range = frame.resolution * (1 + choices.byte()), turn = choices.unit();
-  for (int k = 0; k < kDirections; ++k) {
-    const double angle = 0.4 * k + turn;
-    const RayHit leaping = rays.cast(from, angle, range),
-                 plain = rays.cast_plainly(from, angle, range);
-    expect(leaping.hit == plain.hit && leaping.range == plain.range &&
-               (!plain.hit || (leaping.x == plain.x && leaping.y == plain.y)),
+  std::vector<Eigen::Vector2d> beams;
+  for (int k = 0; k < kDirections; ++k) beams.emplace_back(std::cos(0.2 * k), std::sin(0.2 * k));
+  std::vector<RayHit> fast(beams.size()), exact(beams.size());
+  rays.cast(from, turn, beams, range, fast);
+  rays.cast_plainly(from, turn, beams, range, exact);
+  for (std::size_t k = 0; k < beams.size(); ++k) {
+    const RayHit &ray = fast[k], &plain = exact[k];
+    expect(ray.hit == plain.hit && ray.range == plain.range && ray.x == plain.x && ray.y == plain.y,
            [&] {
-             return fmt::format("a ray from ({}, {}) at {} leaps to cell ({}, {}), not ({}, {})",
-                                from.x(), from.y(), angle, leaping.x, leaping.y, plain.x, plain.y);
+             return fmt::format("ray {} from ({}, {}) at {} meets cell ({}, {}), not ({}, {})", k,
+                                from.x(), from.y(), turn, ray.x, ray.y, plain.x, plain.y);
            });
   }
 }

@@ -39,7 +39,7 @@ TEST(LidarBuilding, ScansAreTheRaysOfTheFloor) {
   EXPECT_NEAR(scan.angle(18), 0.0, 1e-12);  // the one in the middle looks ahead
   int far = 0;
   for (std::size_t beam = 0; beam < scan.ranges.size(); ++beam) {
-    const RayHit hit = rays.cast_plainly({2.3, 4.1}, 0.7 + scan.angle(beam), 5.0);
+    const RayHit hit = rays.cast({2.3, 4.1}, 0.7 + scan.angle(beam), 5.0);
     EXPECT_FLOAT_EQ(scan.ranges[beam], static_cast<float>(hit.hit ? hit.range : 5.0));
     far += !hit.hit;
   }

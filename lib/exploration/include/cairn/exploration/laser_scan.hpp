@@ -6,6 +6,8 @@
 #include <string_view>
 #include <vector>
 
+#include <Eigen/Core>
+
 #include "cairn/graph/graph.hpp"
 #include "cairn/runtime/api.hpp"
 
@@ -26,6 +28,9 @@ struct LidarModel {
   /// Of the first beam, in the robot's frame [rad]; the others follow counterclockwise.
   double first_angle() const { return -0.5 * step() * (beams - 1); }
 };
+
+/// Unit vectors along the beams, in the robot's frame.
+CAIRN_API std::vector<Eigen::Vector2d> beam_directions(const LidarModel& lidar);
 
 /// Ranges along beams that start at the robot's centre.
 struct LaserScan {
