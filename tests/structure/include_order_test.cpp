@@ -28,8 +28,9 @@ const Names kLayers{"runtime", "types", "graph", "linear", "solve", "plugin"};
 /// Libraries beside plugins, which plugins (and libraries) may include.
 const Names kShared{"solvers/block", "solvers/linear/blas", "solvers/linear/iterative",
                     "solvers/nonlinear/descent"};
-/// Eigen's decompositions, compiled once: what everything may include, and includes nothing.
-const std::string kDense = "lib/dense/";
+/// Eigen's decompositions, compiled once, and memory for arrays: what everything may include, and
+/// includes nothing.
+const Names kBelow{"lib/dense/", "lib/memory/"};
 /// Several numbers at a time, below the core too; its headers are public.
 const std::string kPack = "lib/pack/";
 /// Folders each of whose folders stands for itself: it includes no other.
@@ -40,6 +41,10 @@ std::string read(const fs::path& file) {
   std::ifstream stream(file);
   EXPECT_TRUE(stream) << file;
   return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+bool lies_below(const std::string& file) {
+  return std::ranges::any_of(kBelow, [&](const auto& folder) { return file.starts_with(folder); });
 }
 
 /// Position in a list, or -1.
@@ -131,8 +136,8 @@ class Tree {
   std::string public_fault(const std::string& file, const std::string& name) const {
     const std::string part = name.substr(6, name.find('/', 6) - 6);
     const int layer = position(kLayers, part), subject = position(subjects_, part);
-    if (part == "pack") return file.starts_with(kDense) ? "each stands for itself" : "";
-    if (file.starts_with(kDense) || file.starts_with(kPack))
+    if (part == "pack") return lies_below(file) ? "each stands for itself" : "";
+    if (lies_below(file) || file.starts_with(kPack))
       return "what lies below the core includes nothing of it";
     if (layer < 0 && subject < 0) return part + " is neither a layer of the core nor a subject";
     if (file.starts_with("core/")) {
@@ -162,7 +167,7 @@ class Tree {
   }
 
   std::string fault_between(const std::string& file, const std::string& other) const {
-    if (other.starts_with(kDense)) return {};
+    if (lies_below(other)) return {};
     const std::string from = part_of(file), to = part_of(other);
     if (!from.empty() || !to.empty()) {
       // Within the core, also those of earlier layers.
@@ -242,9 +247,10 @@ TEST_F(FaultyTree, ALaterLayerOrSubjectIsAFault) {
                                     HasSubstr("update is a later subject")));
 }
 
-TEST_F(FaultyTree, ALayerInTheDenseMatricesIsAFault) {
+TEST_F(FaultyTree, ALayerInWhatLiesBelowTheCoreIsAFault) {
   write("lib/dense/lu.hpp", "#include \"cairn/runtime/error.hpp\"\n");
-  EXPECT_THAT(faults(), ElementsAre(HasSubstr("below the core")));
+  write("lib/memory/aligned_memory.hpp", "#include \"cairn/runtime/error.hpp\"\n");
+  EXPECT_THAT(faults(), ElementsAre(HasSubstr("below the core"), HasSubstr("below the core")));
 }
 
 TEST_F(FaultyTree, PacksMayBeIncludedEverywhereAndIncludeNothingElse) {

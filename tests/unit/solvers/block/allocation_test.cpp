@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// A program of its own: it counts every `operator new` of the process, cairn's libraries included.
+// A program of its own: it counts every `operator new` of the process, cairn's libraries included,
+// and every array that they ask for.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -11,6 +12,7 @@
 #include "block/supernodal_cholesky.hpp"
 #include "cairn/graph/gauge.hpp"
 #include "cairn/linear/linearizer.hpp"
+#include "cairn/runtime/aligned.hpp"
 #include "cairn/runtime/threads.hpp"
 #include "support/planar_graph.hpp"
 
@@ -40,6 +42,13 @@ void operator delete(void* memory, std::align_val_t) noexcept { std::free(memory
 void operator delete(void* memory, std::size_t, std::align_val_t) noexcept { std::free(memory); }
 
 namespace cairn {
+
+// In the place of those of the core, which need not ask for memory anew.
+void* allocate_aligned(std::size_t bytes) { return ::operator new (bytes, std::align_val_t{64}); }
+void release_aligned(void* memory, std::size_t) noexcept {
+  ::operator delete (memory, std::align_val_t{64});
+}
+
 namespace {
 
 class AllocationTest : public ::testing::TestWithParam<int> {
@@ -99,6 +108,14 @@ TEST_P(AllocationTest, CovariancesOfAnIterationAllocateNothingOnceTheyWereComput
   for (int k = 0; k < 3; ++k) iterate();
   EXPECT_EQ(allocations - before, 0);
   EXPECT_TRUE(ok);
+}
+
+TEST(Allocations, OfArraysAreCountedWhateverTheirSize) {
+  for (const std::size_t bytes : {100U, 10000U, 100000U, 10000000U}) {
+    const int before = allocations;
+    const AlignedVector array(bytes / sizeof(double));
+    EXPECT_EQ(allocations - before, 1) << bytes;
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(Threads, AllocationTest, ::testing::Values(1, 2));
