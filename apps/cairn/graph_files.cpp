@@ -11,6 +11,7 @@
 #include <fmt/core.h>
 
 #include "arguments.hpp"
+#include "cairn/io/format_by_ending.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/plugin_call.hpp"
@@ -73,7 +74,7 @@ void check_ending(const std::string& file, Registry& registry) {
       registry, [](const Format& format) { return format.can_write(); }, broken);
   if (std::find(writable.begin(), writable.end(), file_ending(file)) != writable.end()) return;
   if (writable.empty() && broken) throw Error(*broken);
-  if (writable.empty()) throw Error(ErrorCode::usage, file + ": no plugin of formats is on offer");
+  if (writable.empty()) throw Error(ErrorCode::usage, file + ": " + no_plugin_of_formats(registry));
   throw Error(
       ErrorCode::usage,
       fmt::format("{}: no format writes files of that name; endings on offer: .{}; or name a "

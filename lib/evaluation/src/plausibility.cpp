@@ -13,11 +13,12 @@
 namespace cairn {
 
 std::int64_t degrees_of_freedom(const Graph& graph, const Gauge& gauge) {
-  std::int64_t free = 0;
+  std::int64_t measured = 0, free = 0;
+  for (int f = 0; f < graph.factor_count(); ++f) measured += graph.information_rank(f);
   for (int v = 0; v < graph.variable_count(); ++v) {
     if (!gauge.held[v]) free += graph.type(v).tangent_size();
   }
-  return graph.residual_size() - free;
+  return measured - free;
 }
 
 bool is_plausible(double chi2, std::int64_t degrees_of_freedom) {

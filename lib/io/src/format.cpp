@@ -2,12 +2,15 @@
 #include "cairn/io/format.hpp"
 
 #include <algorithm>
+#include <cstdlib>
 #include <memory>
 #include <utility>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "cairn/io/format_by_ending.hpp"
+#include "cairn/plugin/plugin_search.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/plugin_call.hpp"
@@ -64,8 +67,9 @@ Error nothing_fits(ErrorCode code, std::string message, const std::vector<std::s
 }
 
 /// "formats on offer: a, b", or that there is nothing.
-std::string on_offer(const char* what, const std::vector<std::string>& names) {
-  return names.empty() ? "no plugin of formats is on offer"
+std::string on_offer(const char* what, const std::vector<std::string>& names,
+                     const Registry& registry) {
+  return names.empty() ? no_plugin_of_formats(registry)
                        : fmt::format("{} on offer: {}", what, fmt::join(names, ", "));
 }
 
@@ -90,10 +94,11 @@ NamedFormat detect(const std::filesystem::path& file, std::string_view text, Reg
     for (const NamedFormat& f : formats) {
       if (f.format->can_read()) readers.push_back(f.name);
     }
-    throw nothing_fits(ErrorCode::input,
-                       fmt::format("{}: no format knows this content, which begins with '{}'; {}",
-                                   file.string(), beginning(text), on_offer("formats", readers)),
-                       problems);
+    throw nothing_fits(
+        ErrorCode::input,
+        fmt::format("{}: no format knows this content, which begins with '{}'; {}", file.string(),
+                    beginning(text), on_offer("formats", readers, registry)),
+        problems);
   }
   return std::move(*chosen);
 }
@@ -114,7 +119,7 @@ NamedFormat writer_by_ending(const std::filesystem::path& file, Registry& regist
                             : fmt::format("no format that writes has the ending '.{}'", wanted));
   throw nothing_fits(ErrorCode::usage,
                      fmt::format("{}: {}; {}; or name the format", file.string(), found,
-                                 on_offer("endings", endings)),
+                                 on_offer("endings", endings, registry)),
                      problems);
 }
 
@@ -122,6 +127,28 @@ NamedFormat writer_by_ending(const std::filesystem::path& file, Registry& regist
 std::string bare_name(std::string_view spec) { return std::string(spec.substr(0, spec.find(':'))); }
 
 }  // namespace
+
+std::string no_plugin_of_formats(const Registry& registry, std::string_view what) {
+  std::vector<std::string> folders;
+  for (const Offer& offer : registry.offers()) {
+    const std::string folder = offer.file.parent_path().string();
+    if (!folder.empty() && std::ranges::find(folders, folder) == folders.end())
+      folders.push_back(folder);
+  }
+  const char* path = std::getenv("CAIRN_PLUGIN_PATH");
+  std::string text = fmt::format(
+      "no plugin of formats{}{} is on offer; {}. Plugins are looked for in the folders of "
+      "CAIRN_PLUGIN_PATH, which is {}, in $XDG_DATA_HOME/cairn/plugins or "
+      "~/.local/share/cairn/plugins, and in the folder cairn beside the library libcairn.so",
+      what.empty() ? "" : " of ", what,
+      folders.empty()
+          ? "no plugin at all was found"
+          : fmt::format("plugins of other kinds were found in {}", fmt::join(folders, ", ")),
+      path && *path != '\0' ? fmt::format("'{}'", path) : "not set");
+  for (const PluginProblem& problem : registry.problems())
+    text += fmt::format("\n  note: {}", problem.message);
+  return text;
+}
 
 std::string file_ending(std::filesystem::path file) {
   if (file.extension() == ".gz") file.replace_extension();

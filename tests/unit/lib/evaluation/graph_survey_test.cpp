@@ -166,6 +166,16 @@ TEST_F(GraphSurveyTest, FindsMoreUnknownsThanMeasurements) {
   EXPECT_THAT(suspicions(), Contains(StartsWith("1 more unknowns than measurements")));
 }
 
+/// A landmark of which only one coordinate is measured, twice: each time one row counts.
+TEST_F(GraphSurveyTest, CountsTheRankOfTheInformation) {
+  chain(3, 0.0);
+  const int point = graph_.add_variable(types_.point, 9, std::array{3.0, 1.0});
+  for (const std::vector<double>& information :
+       {std::vector<double>{1, 0, 0}, std::vector<double>{4, 2, 1}, std::vector<double>{1, 0, 1}})
+    graph_.add_factor(types_.point_seen, std::array{2, point}, std::array{1.0, 1.0}, information);
+  EXPECT_EQ(survey_graph(graph_).degrees_of_freedom, 1 + 1 + 2 - 2);
+}
+
 TEST_F(GraphSurveyTest, ComparesChi2WithItsDegreesOfFreedom) {
   chain(4, 1.0);
   between(0, 3, 1.0);

@@ -14,7 +14,9 @@
 #include <string>
 #include <thread>
 
+#include "cairn/io/format_by_ending.hpp"
 #include "cairn/io/output_file.hpp"
+#include "cairn/plugin/plugin_search.hpp"
 #include "cairn/runtime/error.hpp"
 #include "unit/plugins/formats/reading.hpp"
 
@@ -251,6 +253,24 @@ TEST_F(File, WaitsForTheReaderOfAFifoUntilItIsInterrupted) {
   write_file(fifo, megabyte);
   reader.join();
   EXPECT_EQ(read, megabyte);
+}
+
+TEST_F(File, WithoutFormatsSaysWherePluginsWereFoundAndLookedFor) {
+  Registry none(PluginSearch{.environment = false,
+                             .user_folder = false,
+                             .default_folder = false,
+                             .folders = {folder_ / "missing"}});
+  const fs::path file = put("map.g2o", kGraph);
+  const std::string reading = message_of([&] { read_graph(file, none); });
+  EXPECT_THAT(reading, HasSubstr("no plugin of formats is on offer; no plugin at all was found. "));
+  EXPECT_THAT(reading, HasSubstr("in the folders of CAIRN_PLUGIN_PATH, which is "));
+  EXPECT_THAT(reading, HasSubstr("note: " + (folder_ / "missing").string() + ": no such folder"));
+  const std::string writing =
+      message_of([&] { write_graph(Graph(), path("out.g2o"), none); }, ErrorCode::usage);
+  EXPECT_THAT(writing, HasSubstr("no plugin of formats is on offer; no plugin at all was found. "));
+  EXPECT_THAT(no_plugin_of_formats(registry(), "grids"),
+              StartsWith("no plugin of formats of grids is on offer; plugins of other kinds were "
+                         "found in /"));
 }
 
 }  // namespace

@@ -40,8 +40,7 @@ struct GraphSurvey {
   std::int64_t doubled = 0;  ///< factors on variables that an earlier one of the type joins already
   Gauge gauge;
   std::int64_t gauge_freedoms = 0;  ///< degrees of freedom that no measurement determines
-  /// Residuals minus unknowns (the tangent sizes of the variables that are not constant): what chi2
-  /// of a good model is near. Negative: there are fewer measurements than unknowns.
+  /// As `degrees_of_freedom` (plausibility.hpp): what chi2 of a good model is near.
   std::int64_t degrees_of_freedom = 0;
   double chi2 = 0.0;
   std::vector<WorstFactor> worst;       ///< at most five, by falling chi2

@@ -11,8 +11,10 @@
 
 namespace cairn {
 
-/// Residuals minus unknowns (the tangent sizes of the variables that are not constant): the mean of
-/// chi2 at the minimum of a good model. Negative: there are fewer measurements than unknowns.
+/// The ranks of the information of all factors minus unknowns (the tangent sizes of the variables
+/// that are not constant): the mean of chi2 at the minimum of a good model. What a factor has no
+/// information of, such as the range of a measured bearing, counts for nothing. Negative: there are
+/// fewer measurements than unknowns.
 CAIRN_API std::int64_t degrees_of_freedom(const Graph& graph, const Gauge& gauge);
 
 /// Beyond this chi2 per degree of freedom, an optimised estimate is not plausible: on average,

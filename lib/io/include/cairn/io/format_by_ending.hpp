@@ -11,6 +11,7 @@
 #include "cairn/io/format.hpp"
 #include "cairn/plugin/options.hpp"
 #include "cairn/plugin/registry.hpp"
+#include "cairn/runtime/api.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/plugin_call.hpp"
 
@@ -58,11 +59,15 @@ FormatOfEnding format_of_ending(const std::string& wanted, Registry& registry) {
   return found;
 }
 
+/// "no plugin of formats is on offer", and where plugins were found and looked for; `what`: of
+/// files that hold this ("grids"), else of graphs.
+CAIRN_API std::string no_plugin_of_formats(const Registry& registry, std::string_view what = {});
+
 /// What is wrong with a file that no format goes by.
 inline std::string no_format_text(std::string_view name, const std::filesystem::path& file,
-                                  std::string_view what, const std::vector<std::string>& endings) {
-  if (endings.empty())
-    return std::string(name) + ": no plugin of formats of " + std::string(what) + " is on offer";
+                                  std::string_view what, const std::vector<std::string>& endings,
+                                  const Registry& registry) {
+  if (endings.empty()) return std::string(name) + ": " + no_plugin_of_formats(registry, what);
   std::string text =
       file.string() + ": no format of " + std::string(what) + " goes by that ending; on offer: ";
   for (const std::string& ending : endings)
@@ -77,7 +82,7 @@ auto with_format(std::string_view name, std::string_view what, Registry& registr
   const auto found = format_of_ending<Format>(file_ending(named.file), registry);
   if (found.name.empty() && found.broken) throw Error(*found.broken);
   if (found.name.empty())
-    throw Error(ErrorCode::usage, no_format_text(name, named.file, what, found.endings));
+    throw Error(ErrorCode::usage, no_format_text(name, named.file, what, found.endings, registry));
   const auto format = registry.make<Format>(ComponentSpec{found.name, std::move(named.options)});
   return call_plugin([&] { return "format '" + found.name + "' of " + std::string(what); },
                      [&] { return use(*format, named.file); });
