@@ -14,6 +14,7 @@
 #include "factor_pool_checks.hpp"
 #include "factor_samples.hpp"
 #include "repetition.hpp"
+#include "wrapping_checks.hpp"
 
 namespace cairn::conformance {
 namespace {
@@ -231,15 +232,16 @@ Repetition factor_uses(const Subject& subject, Checker& check) {
 }  // namespace
 
 std::span<const Group> factor_groups() {
-  static constexpr std::array<Group, 9> groups{{{"sizes", check_sizes},
-                                                {"measurement", check_measurements},
-                                                {"residual", check_residual},
-                                                {"Jacobians", check_jacobians},
-                                                {"pool", check_pools},
-                                                {"propagate", check_propagate},
-                                                {"memory", memory_group<factor_uses>, true},
-                                                {"threads", threads_group<factor_uses>, true},
-                                                {"time", note_time}}};
+  static constexpr std::array<Group, 10> groups{{{"sizes", check_sizes},
+                                                 {"measurement", check_measurements},
+                                                 {"residual", check_residual},
+                                                 {"Jacobians", check_jacobians},
+                                                 {"wrapping", check_wrapping},
+                                                 {"pool", check_pools},
+                                                 {"propagate", check_propagate},
+                                                 {"memory", memory_group<factor_uses>, true},
+                                                 {"threads", threads_group<factor_uses>, true},
+                                                 {"time", note_time}}};
   return groups;
 }
 

@@ -47,6 +47,14 @@ class FactorSamples {
   /// determines is near where the error is zero, as in an optimised graph.
   std::optional<FactorSample> sample(bool close);
 
+  // The functions of the type of a variable.
+  State retract(std::size_t v, const State& x, const State& delta) const {
+    return states_[v].retract(x, delta);
+  }
+  double apart(std::size_t v, const State& x, const State& y) const {
+    return states_[v].apart(x, y);
+  }
+
   // The type's own functions.
   /// The state of variable `target` at which the error is zero; none where it says that it knows
   /// none.

@@ -156,6 +156,16 @@ TEST(WrongFactor, ThatDependsOnEarlierCallsIsNamed) {
               Contains("the same input gives the same bits when it is repeated"));
 }
 
+TEST(WrongFactor, WhoseAngleIsNotWrappedIsNamedWithTheJump) {
+  EXPECT_THAT(wrong_factors().laws_of("EDGE_UNWRAPPED"),
+              ElementsAre("a residual that is an angle is wrapped to ±π"));
+  EXPECT_THAT(
+      wrong_factors().findings,
+      Contains(AllOf(HasSubstr("EDGE_UNWRAPPED / wrapping / "), HasSubstr("row 0 jumps from "),
+                     HasSubstr("wrap_angle"), HasSubstr("x0 = ("))));
+  EXPECT_THAT(wrong_factors().laws_of("EDGE_WRAPPED"), IsEmpty());
+}
+
 TEST(WrongFactor, DoesNotSpoilTheRightOneBesideIt) {
   EXPECT_THAT(wrong_factors().laws_of("EDGE_RIGHT"), IsEmpty());
   EXPECT_EQ(wrong_factors().exit_code, kFindings);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Factors on a point of the plane, each wrong in one way but for the last.
+// Factors, each wrong in one way but for EDGE_WRAPPED and EDGE_RIGHT; most are on a point of the
+// plane.
 #include <cmath>
 #include <cstdlib>
 #include <stdexcept>
@@ -8,6 +9,8 @@
 #include <tuple>
 
 #include "cairn/lie/point.hpp"
+#include "cairn/lie/se2.hpp"
+#include "cairn/lie/so2.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/types/define_factor.hpp"
 #include "cairn/types/evaluated_factor.hpp"
@@ -95,6 +98,38 @@ struct Remembering : Square {
   }
 };
 
+/// The direction in which a robot sees a point, whose error may be anything from −2π − 2 on.
+struct Bearing {
+  static constexpr int kResidual = 1, kMeasurement = 1;
+  using Variables = std::tuple<cairn::Se2, cairn::PointXY>;
+  template <class S>
+  static S error(const Vector<S, 3>& pose, const Vector<S, 2>& point, const Vector<double, 1>& z) {
+    using std::atan2;
+    using std::cos;
+    using std::sin;
+    const S c = cos(pose[2]), s = sin(pose[2]), x = point[0] - pose[0], y = point[1] - pose[1];
+    return S(atan2(c * y - s * x, c * x + s * y) - z[0]);
+  }
+};
+
+struct UnwrappedBearing : Bearing {
+  static constexpr std::string_view kTag = "EDGE_UNWRAPPED";
+  template <class S>
+  static Vector<S, 1> residual(const Vector<S, 3>& pose, const Vector<S, 2>& point,
+                               const Vector<double, 1>& z) {
+    return Vector<S, 1>(error<S>(pose, point, z));
+  }
+};
+
+struct WrappedBearing : Bearing {
+  static constexpr std::string_view kTag = "EDGE_WRAPPED";
+  template <class S>
+  static Vector<S, 1> residual(const Vector<S, 3>& pose, const Vector<S, 2>& point,
+                               const Vector<double, 1>& z) {
+    return Vector<S, 1>(cairn::wrap_angle<S>(error<S>(pose, point, z)));
+  }
+};
+
 /// Writes one number more than the residual has.
 class BeyondTheEnd final : public cairn::EvaluatedFactorType {
  public:
@@ -135,6 +170,7 @@ void cairn_register(cairn::Registrar& registrar) {
                     cairn::define_factor<Throwing>(), cairn::define_factor<Aborting>(),
                     cairn::define_factor<Exiting>(), cairn::define_factor<Looping>(),
                     cairn::define_factor<Remembering>(), std::make_shared<BeyondTheEnd>(),
-                    cairn::define_factor<Right>()}};
+                    cairn::define_factor<UnwrappedBearing>(),
+                    cairn::define_factor<WrappedBearing>(), cairn::define_factor<Right>()}};
   });
 }
