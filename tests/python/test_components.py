@@ -38,3 +38,19 @@ def test_a_wrong_kind_says_which_there_are():
 
 def test_values_of_options_are_written_as_on_the_command_line():
     assert cairn.spec("a", b=True, c=3, d=0.25, e="text", f=None) == "a:b=true,c=3,d=0.25,e=text"
+
+
+def test_an_argument_that_is_not_there_gets_a_suggestion():
+    graph, _ = cairn.generate("manhattan", poses=20)
+    for call, message in [
+        (lambda: cairn.optimize(graph, iterations=5), "optimize has no argument 'iterations', nor has levenberg_marquardt such an option; did you mean 'max_iterations'"),
+        (lambda: cairn.optimize(graph, "dogleg", iteration_limit=5), "nor has dogleg such an option; did you mean 'max_iterations'"),
+        (lambda: cairn.optimize(graph, initial_lamda=5), "has no option 'initial_lamda'; did you mean 'initial_lambda'"),
+        (lambda: cairn.explore(cairn.generate_floor("rooms"), distance=5), "did you mean 'max_distance'"),
+        (lambda: cairn.Estimator(keeps="last"), "Estimator has no argument 'keeps', nor has incremental_cholesky such an option; did you mean 'keep'"),
+        (lambda: cairn.PosePolicy("compact_pose", trajectry=True), "did you mean 'trajectory'"),
+        (lambda: cairn.draw({"graph": graph}, covariance={}), "did you mean 'covariances'"),
+        (lambda: cairn.sparsify(graph, every=3), "did you mean 'keep_every'"),
+    ]:
+        with pytest.raises(cairn.Error, match=message):
+            call()

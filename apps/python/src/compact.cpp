@@ -121,7 +121,7 @@ std::unique_ptr<BoundResult> compact(BoundGraph& recording, const std::string& p
                                      const std::string& recovery, const py::object& loss,
                                      const std::string& loss_on, const py::object& callback,
                                      const py::kwargs& options) {
-  Plan plan{.job = {component_spec(policy, options)},
+  Plan plan{.job = {component_spec(policy, options, PosePolicy::kKind, "compact")},
             .automatic = automatic,
             .sample = sample,
             .keep = keep,

@@ -1,13 +1,18 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "component_names.hpp"
 
+#include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <map>
+#include <string_view>
+#include <vector>
 
 #include <fmt/format.h>
 
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
+#include "cairn/runtime/spelling.hpp"
 
 namespace cairn::python {
 namespace {
@@ -22,7 +27,43 @@ std::string text_of(const std::string& name, const py::handle& value) {
                           py::type::of(value).attr("__name__").cast<std::string>()));
 }
 
+/// The names of a function's arguments, from the signature that pybind11 writes into its docstring:
+/// "optimize(graph: cairn.Graph, optimizer: str = 'levenberg_marquardt', **kwargs) -> …".
+std::vector<std::string> argument_names(const char* function) {
+  py::object named = py::module_::import("cairn._cairn").attr(function);
+  if (py::isinstance<py::type>(named)) named = named.attr("__init__");
+  const auto text = named.attr("__doc__").cast<std::string>();
+  const std::string_view signature = std::string_view(text).substr(0, text.find('\n'));
+  std::vector<std::string> names;
+  for (std::size_t end = signature.find(": "); end != std::string_view::npos;
+       end = signature.find(": ", end + 1)) {
+    const std::size_t begin = signature.find_last_of(" (", end - 1) + 1;
+    names.emplace_back(signature.substr(begin, end - begin));
+  }
+  return names;
+}
+
 }  // namespace
+
+ComponentSpec component_spec(const std::string& text, const py::kwargs& options,
+                             std::string_view kind, const char* function) {
+  ComponentSpec spec = component_spec(text, options);
+  if (options.empty()) return spec;
+  const OptionTable table = default_registry().options(kind, spec.name);
+  const std::vector<std::string> arguments = argument_names(function);
+  std::vector<std::string> all = arguments;
+  for (const OptionSpec& option : table.specs()) all.push_back(option.name);
+  for (const auto& [key, value] : options) {
+    const auto name = key.cast<std::string>();
+    const std::string nearest = table.find(name) ? "" : nearest_spelling(name, all);
+    if (std::ranges::find(arguments, nearest) == arguments.end()) continue;
+    throw Error(
+        ErrorCode::usage,
+        fmt::format("{} has no argument '{}', nor has {} such an option; did you mean '{}'?",
+                    function, name, spec.name, nearest));
+  }
+  return spec;
+}
 
 ComponentSpec component_spec(const std::string& text, const py::kwargs& options) {
   ComponentSpec spec = parse_component(text);

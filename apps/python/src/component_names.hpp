@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <string>
+#include <string_view>
 
 #include <pybind11/pybind11.h>
 
@@ -19,6 +20,12 @@ namespace py = pybind11;
 /// numbers, texts; None stands for the default. Throws `Error` (usage) for other values and for an
 /// option that is given twice.
 ComponentSpec component_spec(const std::string& text, const py::kwargs& options);
+
+/// The same of a component of this kind, for a function of the module that takes its options beside
+/// arguments of its own. An option that it does not have, and that is near to one of these, is
+/// refused with that suggestion.
+ComponentSpec component_spec(const std::string& text, const py::kwargs& options,
+                             std::string_view kind, const char* function);
 
 /// The loss of that name with its options, "cauchy:scale=2"; None: null. The same object for the
 /// same text, so that factors that are added one by one share it.

@@ -57,7 +57,8 @@ KeptMarginals kept_of(const std::string& keep) {
 std::unique_ptr<BoundEstimator> make(const std::string& name, const std::string& keep,
                                      const py::kwargs& options) {
   const KeptMarginals kept = kept_of(keep);
-  auto estimator = default_registry().make<Estimator>(component_spec(name, options));
+  auto estimator = default_registry().make<Estimator>(
+      component_spec(name, options, Estimator::kKind, "Estimator"));
   estimator->keep_marginals(kept);
   return std::make_unique<BoundEstimator>(std::move(estimator));
 }

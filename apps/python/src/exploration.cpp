@@ -113,7 +113,9 @@ std::unique_ptr<BoundExploration> explore(
   set_positive("match_angle", match_angle, setup.match.angle);
   set_positive("decision_budget", decision_budget, setup.decision_budget);
   const auto own = own_explorer(explorer, options, follower);
-  const ComponentSpec spec = own ? ComponentSpec() : component_spec(py::str(explorer), options);
+  const ComponentSpec spec =
+      own ? ComponentSpec()
+          : component_spec(py::str(explorer), options, Explorer::kKind, "explore");
   const ExplorationHooks hooks{
       .moved = [&](const ExplorationStep& step, const FloorMap&) { follower.after(step); }};
   auto out = std::make_unique<BoundExploration>();

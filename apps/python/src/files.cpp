@@ -49,7 +49,7 @@ void write(BoundGraph& bound, const std::filesystem::path& path, const std::stri
 
 std::pair<std::unique_ptr<BoundGraph>, std::unique_ptr<BoundGraph>> generate(
     const std::string& generator, std::uint64_t seed, const py::kwargs& options) {
-  const ComponentSpec spec = component_spec(generator, options);
+  const ComponentSpec spec = component_spec(generator, options, Generator::kKind, "generate");
   const py::gil_scoped_release unlocked;
   Simulation simulation =
       default_registry().make<Generator>(spec)->generate(default_registry(), seed);

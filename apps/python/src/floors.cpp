@@ -84,7 +84,7 @@ OccupancyGrid read(const std::filesystem::path& path) {
 }
 
 OccupancyGrid generate(const std::string& plan, std::uint64_t seed, const py::kwargs& options) {
-  const ComponentSpec spec = component_spec(plan, options);
+  const ComponentSpec spec = component_spec(plan, options, FloorPlan::kKind, "generate_floor");
   const py::gil_scoped_release unlocked;
   return default_registry().make<FloorPlan>(spec)->generate(seed);
 }

@@ -80,7 +80,8 @@ class BoundPolicy final : public HasEstimator {
 std::unique_ptr<BoundPolicy> make(const std::string& name, const py::object& loss,
                                   const std::string& loss_on, bool trajectory,
                                   const py::kwargs& options) {
-  auto policy = default_registry().make<PosePolicy>(component_spec(name, options));
+  auto policy = default_registry().make<PosePolicy>(
+      component_spec(name, options, PosePolicy::kKind, "PosePolicy"));
   if (!loss.is_none()) policy->estimator().set_loss(loss_of(loss), selector_of(loss_on));
   policy->keep_chains(trajectory);
   return std::make_unique<BoundPolicy>(std::move(policy));

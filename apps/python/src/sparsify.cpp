@@ -71,7 +71,7 @@ struct Optimisation {
 };
 
 ComponentSpec sparsifier_spec(const std::string& sparsifier, const py::kwargs& options) {
-  ComponentSpec spec = component_spec(sparsifier, options);
+  ComponentSpec spec = component_spec(sparsifier, options, Sparsifier::kKind, "sparsify");
   choose_recovery(spec);
   return spec;
 }
@@ -120,11 +120,12 @@ std::unique_ptr<BoundSparsified> sparsify_loop_closures(
     const std::string& linear_solver, const py::object& initial, bool as_given, bool measure,
     int max_iterations, double tolerance, const py::object& loss, const std::string& loss_on,
     const py::kwargs& options) {
-  const SparsifyEdgesJob job{.selection = component_spec(selection, options),
-                             .optimizer = parse_component(optimizer),
-                             .linear_solver = linear_solver,
-                             .as_given = as_given,
-                             .measure = measure};
+  const SparsifyEdgesJob job{
+      .selection = component_spec(selection, options, EdgeSelection::kKind, "sparsify_edges"),
+      .optimizer = parse_component(optimizer),
+      .linear_solver = linear_solver,
+      .as_given = as_given,
+      .measure = measure};
   Optimisation optimisation(initial, as_given, max_iterations, tolerance, loss, loss_on);
   auto out = std::make_unique<BoundSparsified>();
   const GraphUse use(bound);

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <tuple>
 #include <vector>
 
 #include <fmt/format.h>
@@ -26,9 +27,8 @@ int edit_distance(std::string_view a, std::string_view b) {
       const bool same = lower(a[i - 1]) == lower(b[j - 1]);
       current[j] = std::min({last[j] + 1, current[j - 1] + 1, last[j - 1] + (same ? 0 : 1)});
       if (i > 1 && j > 1 && lower(a[i - 1]) == lower(b[j - 2]) &&
-          lower(a[i - 2]) == lower(b[j - 1])) {
+          lower(a[i - 2]) == lower(b[j - 1]))
         current[j] = std::min(current[j], before_last[j - 2] + 1);
-      }
     }
     std::swap(before_last, last);
     std::swap(last, current);
@@ -40,11 +40,8 @@ int edit_distance(std::string_view a, std::string_view b) {
 bool abbreviates(std::string_view word, std::string_view candidate) {
   const auto parts = [](char c) { return c == '_' || c == '-'; };
   std::string initials;
-  bool begins = true;
-  for (const char c : candidate) {
-    if (begins && !parts(c)) initials += c;
-    begins = parts(c);
-  }
+  for (std::size_t k = 0; k < candidate.size(); ++k)
+    if (!parts(candidate[k]) && (k == 0 || parts(candidate[k - 1]))) initials += candidate[k];
   while (word.starts_with('-')) word.remove_prefix(1);
   return word.size() > 1 &&
          (word == initials || (word.size() > 3 && candidate.find(word) != std::string_view::npos));
@@ -60,15 +57,19 @@ std::string nearest_spelling(std::string_view word, std::span<const std::string>
   int best_distance = static_cast<int>(std::max<std::size_t>(2, word.size() / 3)) + 1;
   for (const std::string& candidate : candidates) {
     const int distance = edit_distance(word, candidate);
-    if (distance < best_distance) {
-      best_distance = distance;
-      best = candidate;
-    }
+    if (distance < best_distance) std::tie(best_distance, best) = std::tie(distance, candidate);
   }
   if (!best.empty()) return best;
-  const auto meant = std::ranges::find_if(
-      candidates, [&](const std::string& candidate) { return abbreviates(word, candidate); });
-  return meant == candidates.end() ? "" : *meant;
+  for (const std::string& candidate : candidates)
+    if (abbreviates(word, candidate)) return candidate;
+  while (!word.empty()) {  // "num_iterations" is max_iterations
+    const std::string_view part = word.substr(0, word.find_first_of("_-"));
+    const auto has = [part](const std::string& s) { return s.find(part) != std::string::npos; };
+    if (part.size() > 3 && std::ranges::count_if(candidates, has) == 1)
+      return *std::ranges::find_if(candidates, has);
+    word.remove_prefix(std::min(part.size() + 1, word.size()));
+  }
+  return best;
 }
 
 std::string what_is_on_offer(std::string_view word, std::span<const std::string> candidates) {

@@ -32,6 +32,16 @@ TEST(Spelling, CompletesATagBeforeItsColon) {
   EXPECT_EQ(nearest_spelling("EDGE_SE", tags), "EDGE_SE2");
 }
 
+TEST(Spelling, KnowsTheOneNameThatSharesAPart) {
+  const std::vector<std::string> options{"initial_lambda", "max_iterations", "tolerance"};
+  for (const char* word : {"iterations", "iteration_limit", "num_iterations", "max-iteration"})
+    EXPECT_EQ(nearest_spelling(word, options), "max_iterations") << word;
+  EXPECT_EQ(nearest_spelling("relative_tolerance", options), "tolerance");
+  EXPECT_EQ(nearest_spelling("max_seconds", options), "");  // "max" is too short to mean anything
+  const std::vector<std::string> tags{"EDGE_SE2_XY", "EDGE_SE3_TRACKXYZ", "VERTEX_XY"};
+  EXPECT_EQ(nearest_spelling("EDGE_OF_ANOTHER_KIND", tags), "");  // several share that much
+}
+
 TEST(Spelling, DoesNotGuessWildly) { EXPECT_EQ(nearest_spelling("mumps", kNames), ""); }
 
 TEST(Spelling, DoesNotCompareWhatIsLongerThanAnyName) {
