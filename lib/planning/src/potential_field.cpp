@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cmath>
 #include <numbers>
 
@@ -10,6 +11,7 @@
 
 #include "cairn/grid/cell_traversal.hpp"
 #include "cairn/runtime/error.hpp"
+#include "cairn/runtime/timed.hpp"
 #include "potential_grid.hpp"
 
 namespace cairn {
@@ -109,7 +111,8 @@ PotentialField::PotentialField(const ConfigurationSpace& space, std::span<const 
   }
 }
 
-PotentialField::Solution PotentialField::solve(double weight) {
+PotentialField::Solution PotentialField::solve(double weight, double seconds) {
+  const auto begin = std::chrono::steady_clock::now();
   if (!(weight >= 1.0))
     throw Error(ErrorCode::usage, "the weight of obstacles in a potential field is at least 1");
   weight_ = weight;
@@ -123,8 +126,12 @@ PotentialField::Solution PotentialField::solve(double weight) {
     if (fixed_[k] == 0) values_[k] = 0.0;
   grid.keep_unconnected();
   grid.values = std::move(values_);
-  const SweepCount count =
-      cairn::solve(grid, weight, options_.relaxation, options_.tolerance, options_.sweeps);
+  const auto goes_on = [&] { return std::isinf(seconds) || seconds_since(begin) < seconds; };
+  const SweepCount count = cairn::solve(grid, weight,
+                                        {.relaxation = options_.relaxation,
+                                         .tolerance = options_.tolerance,
+                                         .most = options_.sweeps,
+                                         .goes_on = goes_on});
   values_ = std::move(grid.values);
   return {count.sweeps, count.change, count.change <= options_.tolerance};
 }

@@ -124,12 +124,11 @@ double PotentialGrid::sweep(double weight, double relaxation) {
   return largest;
 }
 
-SweepCount solve(PotentialGrid& grid, double weight, double relaxation, double tolerance,
-                 int most) {
+SweepCount solve(PotentialGrid& grid, double weight, const SweepOptions& options) {
   if (grid.layer() > kFewest) {
     std::vector<std::int32_t> parents;
     PotentialGrid half = grid.coarser(parents);
-    solve(half, weight, relaxation, tolerance, most);
+    solve(half, weight, options);
     const int turns = grid.orientations / half.orientations;
     for (int k = 0; k < grid.orientations; ++k) {
       for (std::size_t n = 0; n < grid.layer(); ++n) {
@@ -141,9 +140,9 @@ SweepCount solve(PotentialGrid& grid, double weight, double relaxation, double t
   }
   SweepCount count;
   do {
-    count.change = grid.sweep(weight, relaxation);
+    count.change = grid.sweep(weight, options.relaxation);
     ++count.sweeps;
-  } while (count.sweeps < most && count.change > tolerance);
+  } while (count.sweeps < options.most && count.change > options.tolerance && options.goes_on());
   return count;
 }
 

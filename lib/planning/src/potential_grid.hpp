@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -41,7 +42,13 @@ struct SweepCount {
   double change = 0.0;
 };
 
+struct SweepOptions {
+  double relaxation, tolerance;
+  int most;                       ///< on each grid
+  std::function<bool()> goes_on;  ///< asked after each sweep
+};
+
 /// Sweeps until nothing changes by more than the tolerance, from the solution of coarser grids.
-SweepCount solve(PotentialGrid& grid, double weight, double relaxation, double tolerance, int most);
+SweepCount solve(PotentialGrid& grid, double weight, const SweepOptions& options);
 
 }  // namespace cairn

@@ -163,6 +163,25 @@ TEST(PotentialField, CoarserGridsChangeTheTimeAlone) {
   EXPECT_LT(largest, 1e-9);
 }
 
+TEST(PotentialField, WithoutTimeItIsSmoothFromTheAttractorsOn) {
+  const FloorMap map = two_rooms();
+  const ConfigurationSpace space(map, kRadius, 8);
+  const std::vector<float> decrease = one_attractor(space, 10, 4, 3);
+  PotentialField field(space, decrease, {.tolerance = 1e-12}), solved = field;
+  const PotentialField::Solution solution = field.solve(1.1, 0.0);
+  EXPECT_FALSE(solution.converged);
+  EXPECT_EQ(solution.sweeps, 1);
+  EXPECT_GT(solution.change, 1e-12);
+  EXPECT_TRUE(solved.solve(1.1, 1e9).converged);
+  for (std::size_t k = 0; k < space.size(); ++k) {
+    EXPECT_GE(field.value(k), 0.0);
+    EXPECT_LE(field.value(k), 2.0);
+  }
+  // And time that is left afterwards is used.
+  EXPECT_TRUE(field.solve(1.1).converged);
+  for (std::size_t k = 0; k < space.size(); ++k) EXPECT_EQ(field.value(k), solved.value(k));
+}
+
 TEST(PotentialField, RefusesWhatMakesNoSense) {
   const FloorMap map = two_rooms();
   const ConfigurationSpace space(map, kRadius, 4);

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -57,8 +58,9 @@ class CAIRN_API PotentialField {
     double change = 0.0;    ///< largest relative one in the last sweep
     bool converged = true;  ///< it stands
   };
-  /// Solves with a weight w ≥ 1, from the beginning.
-  Solution solve(double weight);
+  /// Solves with a weight w ≥ 1, from the beginning. Sweeps end after `seconds`, but for one on
+  /// each grid: what is there then is smooth, and depends on the clock.
+  Solution solve(double weight, double seconds = std::numeric_limits<double>::infinity());
 
   double value(std::size_t configuration) const { return values_[configuration]; }
   bool is_attractor(std::size_t configuration) const { return fixed_[configuration] != 0; }
