@@ -107,10 +107,13 @@ Factorization ChainCholesky::failure(int group, unsigned lanes) const {
 }
 
 void ChainCholesky::add_ends_to_rest(const BlockMatrix& H) {
-  schur_.set_zero();
   const auto values = schur_.values();
-  for (const Chains::Copy& copy : chains_.copies())
-    std::copy_n(H.values().begin() + copy.source, copy.size, values.begin() + copy.target);
+  auto done = values.begin();
+  for (const Chains::Copy& copy : chains_.copies()) {
+    std::fill(done, values.begin() + copy.target, 0.0);
+    done = std::copy_n(H.values().begin() + copy.source, copy.size, values.begin() + copy.target);
+  }
+  std::fill(done, values.end(), 0.0);
   const int d = chains_.block_size();
   for (const Chains::Chain& chain : chains_.chains()) {
     const double* ends = ends_.data() + of_chain(chains_, chain, 3 * d * d);

@@ -141,6 +141,8 @@ void Chains::build_rest(const BlockStructure& structure) {
     sizes.push_back(structure.block_size(b));
   }
   std::vector<std::pair<std::int32_t, std::int32_t>> entries;
+  entries.reserve(static_cast<std::size_t>(structure.entries() - structure.blocks()) +
+                  chains_.size());
   const auto for_each_entry = [&](auto visit) {
     for (const std::int32_t j : separators_) {
       for (std::int64_t e = structure.column_begin()[j]; e < structure.column_begin()[j + 1]; ++e) {
@@ -166,10 +168,19 @@ void Chains::build_rest(const BlockStructure& structure) {
     chain.common_block = place(chain.first, chain.last);
     chain.turned = chain.first > chain.last;
   }
+  // Entries that follow one another on both sides are one stretch.
   for_each_entry([&](std::int64_t e, std::int32_t i, std::int32_t j) {
-    const std::int64_t begin = structure.value_begin()[e];
-    copies_.push_back({begin, rest_.value_begin()[rest_.find(i, j)],
-                       static_cast<std::int32_t>(structure.value_begin()[e + 1] - begin)});
+    const std::int64_t source = structure.value_begin()[e],
+                       target = rest_.value_begin()[rest_.find(i, j)],
+                       size = structure.value_begin()[e + 1] - source;
+    if (!copies_.empty()) {
+      Copy& last = copies_.back();
+      if (last.source + last.size == source && last.target + last.size == target) {
+        last.size += size;
+        return;
+      }
+    }
+    copies_.push_back({source, target, size});
   });
 }
 

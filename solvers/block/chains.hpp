@@ -56,10 +56,10 @@ class Chains {
   /// Where a block of the structure is in `rest`, or -1.
   std::span<const std::int32_t> place_in_rest() const { return in_rest_; }
 
-  /// Entries of H between separators: where they are in H and in `rest`.
+  /// Stretches of the values between separators: where they are in H and in `rest`, there in
+  /// rising order. What lies between two of them are blocks that chains alone contribute to.
   struct Copy {
-    std::int64_t source, target;
-    std::int32_t size;
+    std::int64_t source, target, size;
   };
   std::span<const Copy> copies() const { return copies_; }
 

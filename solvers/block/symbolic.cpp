@@ -91,24 +91,51 @@ std::vector<std::int32_t> postorder(std::span<const std::int32_t> parent,
   return result;
 }
 
+/// The children of each node of a forest, as lists in the order in which they were appended.
+struct Families {
+  std::vector<std::int32_t> first, last, next, count;
+
+  explicit Families(std::size_t nodes)
+      : first(nodes, -1), last(nodes, -1), next(nodes, -1), count(nodes, 0) {}
+  void append(std::int32_t parent, std::int32_t child) {
+    (last[parent] < 0 ? first[parent] : next[last[parent]]) = child;
+    last[parent] = child;
+    ++count[parent];
+  }
+  /// Takes out a child; its own children come at the end of the list.
+  void replace_by_its_children(std::int32_t parent, std::int32_t child) {
+    std::int32_t before = -1;
+    for (std::int32_t c = first[parent]; c != child; c = next[c]) before = c;
+    (before < 0 ? first[parent] : next[before]) = next[child];
+    if (last[parent] == child) last[parent] = before;
+    count[parent] += count[child] - 1;
+    if (count[child] == 0) return;
+    (last[parent] < 0 ? first[parent] : next[last[parent]]) = first[child];
+    last[parent] = last[child];
+  }
+};
+
 /// How much of the stack of update matrices each node's subtree needs beyond what it leaves on it:
 /// to visit the neediest sibling first keeps the stack smallest (Liu 1986). Children have smaller
 /// numbers than their parents; `size`: of each node's update matrix.
 std::vector<double> stack_ranks(std::span<const std::int32_t> parent,
                                 std::span<const double> size) {
   const std::size_t n = parent.size();
-  std::vector<std::vector<std::int32_t>> children(n);
+  Families families(n);
+  std::vector<std::int32_t> children;
   std::vector<double> peak(n), rank(n);
   for (std::size_t v = 0; v < n; ++v) {
-    std::ranges::stable_sort(children[v], std::greater{}, [&](std::int32_t c) { return rank[c]; });
+    children.clear();
+    for (std::int32_t c = families.first[v]; c >= 0; c = families.next[c]) children.push_back(c);
+    std::ranges::stable_sort(children, std::greater{}, [&](std::int32_t c) { return rank[c]; });
     double held = 0.0;
-    for (const std::int32_t c : children[v]) {
+    for (const std::int32_t c : children) {
       peak[v] = std::max(peak[v], held + peak[c]);
       held += size[c];
     }
     peak[v] = std::max(peak[v], held + size[v]);
     rank[v] = peak[v] - size[v];
-    if (parent[v] >= 0) children[parent[v]].push_back(static_cast<std::int32_t>(v));
+    if (parent[v] >= 0) families.append(parent[v], static_cast<std::int32_t>(v));
   }
   return rank;
 }
@@ -220,13 +247,13 @@ void Symbolic::find_supernodes(const BlockStructure& structure, const CostModel&
   // Merge upwards, in postorder; merged_into leads to the node that a node became part of.
   std::vector<std::int32_t> parent(nodes), merged_into(nodes, -1);
   std::vector<double> columns(nodes, 0.0), below(nodes);
-  std::vector<std::vector<std::int32_t>> children(nodes);
+  Families children(nodes);
   for (std::int32_t p = 0; p < n; ++p) columns[node_of[p]] += static_cast<double>(size_of(p));
   for (std::int32_t s = 0; s < nodes; ++s) {
     const std::int32_t last = last_of[s];
     below[s] = static_cast<double>(scalar_counts_[last] - size_of(last));
     parent[s] = parent_[last] < 0 ? -1 : node_of[parent_[last]];
-    if (parent[s] >= 0) children[parent[s]].push_back(s);
+    if (parent[s] >= 0) children.append(parent[s], s);
   }
   for (std::int32_t s = 0; s < nodes; ++s) {
     // Largest overlap first: the child whose rows below are nearest in number to this front adds
@@ -236,7 +263,7 @@ void Symbolic::find_supernodes(const BlockStructure& structure, const CostModel&
       merged = false;
       double best_gain = 0.0;
       std::int32_t best = -1;
-      for (const std::int32_t c : children[s]) {
+      for (std::int32_t c = children.first[s]; c >= 0; c = children.next[c]) {
         const double gain = cost.time(columns[c], below[c]) + cost.time(columns[s], below[s]) -
                             cost.time(columns[c] + columns[s], below[s]);
         if (gain > best_gain) {
@@ -248,10 +275,8 @@ void Symbolic::find_supernodes(const BlockStructure& structure, const CostModel&
       merged = true;
       merged_into[best] = s;
       columns[s] += columns[best];
-      std::erase(children[s], best);
-      for (const std::int32_t grandchild : children[best]) children[s].push_back(grandchild);
-      children[best].clear();
-      if (children[s].size() > 64)
+      children.replace_by_its_children(s, best);
+      if (children.count[s] > 64)
         merged = false;  // a hub: one merge is enough, the search must not become quadratic
     }
   }
@@ -276,8 +301,13 @@ void Symbolic::find_supernodes(const BlockStructure& structure, const CostModel&
   std::vector<double> sizes(reps.size());
   for (std::size_t k = 0; k < reps.size(); ++k) sizes[k] = below[reps[k]] * below[reps[k]];
   const std::vector<std::int32_t> post = postorder(tree, stack_ranks(tree, sizes));
-  std::vector<std::vector<std::int32_t>> members(reps.size());
-  for (std::int32_t p = 0; p < n; ++p) members[compact[rep[node_of[p]]]].push_back(p);
+  std::vector<std::int32_t> member_begin(reps.size() + 1, 0), members(n);
+  for (std::int32_t p = 0; p < n; ++p) ++member_begin[compact[rep[node_of[p]]] + 1];
+  std::partial_sum(member_begin.begin(), member_begin.end(), member_begin.begin());
+  {
+    std::vector<std::int32_t> next(member_begin.begin(), member_begin.end() - 1);
+    for (std::int32_t p = 0; p < n; ++p) members[next[compact[rep[node_of[p]]]]++] = p;
+  }
 
   std::vector<std::int32_t> new_order;
   new_order.reserve(n);
@@ -288,7 +318,8 @@ void Symbolic::find_supernodes(const BlockStructure& structure, const CostModel&
     Supernode& node = supernodes_[k];
     final_index[post[k]] = static_cast<std::int32_t>(k);
     node.block_begin = static_cast<std::int32_t>(new_order.size());
-    for (const std::int32_t p : members[post[k]]) {
+    for (std::int32_t i = member_begin[post[k]]; i < member_begin[post[k] + 1]; ++i) {
+      const std::int32_t p = members[i];
       supernode_of_[new_order.size()] = static_cast<std::int32_t>(k);
       new_order.push_back(order_[p]);
     }
@@ -417,7 +448,7 @@ void Symbolic::assign_entries(const BlockStructure& structure) {
     }
   }
   std::partial_sum(assembly_begin_.begin(), assembly_begin_.end(), assembly_begin_.begin());
-  std::vector<Entry> entries(assembly_begin_.back());
+  LongList<Entry> entries(assembly_begin_.back());
   std::vector<std::int64_t> next(assembly_begin_.begin(), assembly_begin_.end() - 1);
   for (std::int32_t j = 0; j < n; ++j) {
     for (std::int64_t e = structure.column_begin()[j]; e < structure.column_begin()[j + 1]; ++e) {

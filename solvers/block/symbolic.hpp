@@ -7,8 +7,13 @@
 
 #include "block/kernels.hpp"
 #include "cairn/linear/block_matrix.hpp"
+#include "cairn/runtime/aligned.hpp"
 
 namespace cairn::block {
+
+/// A list of so many elements that the first touch of its memory counts.
+template <class T>
+using LongList = std::vector<T, AlignedAllocator<T>>;
 
 /// One supernode: consecutive columns of L that share their rows below.
 struct Supernode {
@@ -108,7 +113,7 @@ class Symbolic {
   std::vector<std::int32_t> supernode_of_;  // by position
   std::vector<std::int32_t> rows_;
   std::vector<Spread> spreads_;
-  std::vector<Assembly> assembly_;
+  LongList<Assembly> assembly_;
   std::vector<std::int64_t> assembly_begin_;
   std::vector<std::int32_t> children_;
   std::vector<std::int64_t> children_begin_;

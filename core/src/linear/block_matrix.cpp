@@ -65,11 +65,14 @@ BlockMatrix::BlockMatrix(const BlockStructure& structure)
 void BlockMatrix::set_zero() { std::fill(values_.begin(), values_.end(), 0.0); }
 
 void BlockMatrix::diagonal(std::span<double> out) const {
+  double* target = out.data();
+  const auto take = [&](const double* values, auto size) {
+    for (int k = 0; k < size; ++k) *target++ = values[k * size + k];
+  };
   for (int j = 0; j < structure_->blocks(); ++j) {
-    const std::int32_t size = structure_->block_size(j);
     const double* values = block(structure_->column_begin()[j]);
-    double* target = out.data() + structure_->offsets()[j];
-    for (std::int32_t k = 0; k < size; ++k) target[k] = values[k * size + k];
+    const std::int32_t size = structure_->block_size(j);
+    size == 3 ? take(values, std::integral_constant<int, 3>()) : take(values, size);
   }
 }
 

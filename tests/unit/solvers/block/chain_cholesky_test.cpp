@@ -164,6 +164,35 @@ TEST(ChainCholesky, CutsPathsIntoChainsThatMeetInSeparatorsOnly) {
   }
 }
 
+TEST(ChainCholesky, CopiesEveryEntryBetweenSeparatorsOnceInRisingOrder) {
+  std::mt19937 rng(7);
+  const BlockStructure structure = sparse_graph(rng, 300, 80, 3, true, 10);
+  const Chains chains(structure, 4);
+  ASSERT_FALSE(chains.empty());
+  // By number of `rest`, the one of H; -1 where only chains contribute.
+  std::vector<std::int64_t> source(chains.rest().values(), -1);
+  std::int64_t end = 0, copied = 0;
+  for (const Chains::Copy& copy : chains.copies()) {
+    EXPECT_GE(copy.target, end);
+    end = copy.target + copy.size;
+    ASSERT_LE(end, chains.rest().values());
+    for (std::int64_t k = 0; k < copy.size; ++k) source[copy.target + k] = copy.source + k;
+  }
+  for (std::int32_t j = 0; j < structure.blocks(); ++j) {
+    for (std::int64_t e = structure.column_begin()[j]; e < structure.column_begin()[j + 1]; ++e) {
+      const std::int32_t row = chains.place_in_rest()[structure.rows()[e]],
+                         column = chains.place_in_rest()[j];
+      if (row < 0 || column < 0) continue;
+      const std::int64_t begin = structure.value_begin()[e],
+                         to = chains.rest().value_begin()[chains.rest().find(row, column)];
+      for (std::int64_t k = 0; k < structure.value_begin()[e + 1] - begin; ++k, ++copied)
+        EXPECT_EQ(source[to + k], begin + k);
+    }
+  }
+  EXPECT_EQ(std::ranges::count_if(source, [](std::int64_t s) { return s >= 0; }), copied);
+  EXPECT_LT(copied, chains.rest().values());  // or nothing is left for chains alone
+}
+
 TEST(ChainCholesky, EliminatesEveryBlockOnceAndCountsWhatADenseFactorHas) {
   std::mt19937 rng(5);
   const BlockStructure s = sparse_graph(rng, 200, 12, 3, true);
