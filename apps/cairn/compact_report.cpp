@@ -74,7 +74,9 @@ json::object result_json(const PolicyResult& result, const PolicyData& data) {
   report["landmarks"] = {{"in", data.landmarks},
                          {"kept", result.kept_landmarks},
                          {"undetermined", result.undetermined_landmarks}};
-  report["observations"] = {{"in", data.observations}, {"kept", result.kept_observations}};
+  report["observations"] = {{"in", data.observations},
+                            {"kept", result.kept_observations},
+                            {"nonlinear", result.nonlinear_observations}};
   json::object verdicts;
   for (const auto& [name, count] : result.verdicts) verdicts[name] = count;
   report["verdicts"] = std::move(verdicts);
@@ -137,6 +139,9 @@ void add_result(Table& table, const PolicyResult& result, const PolicyData& data
          fmt::format("{} of {} kept, {} of {} measurements of them ({})", result.kept_landmarks,
                      data.landmarks, result.kept_observations, data.observations,
                      percent(result.kept_observations, data.observations)) +
+             (result.nonlinear_observations > 0
+                  ? fmt::format(", {} left out as not linear", result.nonlinear_observations)
+                  : "") +
              (result.undetermined_landmarks > 0
                   ? fmt::format("; {} not determined by what was measured of them",
                                 result.undetermined_landmarks)

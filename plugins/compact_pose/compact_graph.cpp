@@ -36,6 +36,7 @@ CompactGraph::CompactGraph(std::unique_ptr<Estimator> estimator, CompositionOrde
                            KeptMarginals marginals)
     : estimator_(std::move(estimator)), order_(order) {
   estimator_->keep_marginals(marginals);
+  keeps_covariances_ = marginals == KeptMarginals::diagonal;
 }
 
 void CompactGraph::load(const Graph& map) {
@@ -368,11 +369,14 @@ FactorId CompactGraph::update(std::span<const Factor> links, PolicySeconds& seco
   if (links.empty() && changed.empty() && solved_ == size()) return 0;
   const auto begin = Clock::now();
   GraphUpdate update = odometry_from(solved_);
-  std::ranges::move(added, std::back_inserter(update.variables));
   update.factors.insert(update.factors.end(), links.begin(), links.end());
   update.changed = std::move(changed);
+  std::vector<std::pair<Id, std::shared_ptr<const VariableType>>> landmarks;
+  for (const Variable& variable : added) landmarks.emplace_back(variable.id, variable.type);
+  std::ranges::move(added, std::back_inserter(update.variables));
   const UpdateReport report = estimator_->update(update);  // throws before anything has changed
   copy_.reset();
+  for (auto& [id, type] : landmarks) note_landmark(id, std::move(type));
   const FactorId first_link = report.first_factor + (size() - solved_);
   if (!update.factors.empty()) latest_factors_ = report.first_factor;
   for (Temporary& pose : temporary_) pose.since = std::min(pose.since, latest_factors_);
@@ -383,6 +387,12 @@ FactorId CompactGraph::update(std::span<const Factor> links, PolicySeconds& seco
   }
   anchor_ = newest_.kept ? size() - 1 : newest_.predecessor;
   newest_.ahead = newest_.kept ? Ahead() : compose({}, newest_.odometry);
+  if (!landmarks_.empty() && !update.factors.empty()) {
+    std::vector<Id> measured;
+    for (const Factor& link : links)
+      measured.insert(measured.end(), link.variables.begin(), link.variables.end());
+    if (!report.ok || !determined(measured)) restore_covariances(measured);
+  }
   refresh();
   seconds.estimate += seconds_since(begin);
   return first_link;
@@ -543,19 +553,27 @@ Matrix CompactGraph::block(int i, int k) {
   return S;
 }
 
-/// The newest is Σ_ia Aᵀ away from those that the estimator has.
+/// The newest is Σ_ia Aᵀ away from those that the estimator has. A column of each of these at a
+/// time.
 Eigen::MatrixXd CompactGraph::joint_covariance(std::span<const int> poses, PolicySeconds& seconds) {
   update({}, seconds);
   const int n = group_->tangent_size();
   const Eigen::Index last = n * std::ssize(poses);
   Eigen::MatrixXd joint(last + n, last + n);
   joint.bottomRightCorner(n, n) = newest_covariance(seconds);
+  const Timed timed(seconds.covariances);
+  std::vector<Id> ids;
+  for (const int pose : poses) ids.push_back(id(pose));
+  ids.push_back(id(anchor_));
+  Eigen::MatrixXd column(last + n, n);
   for (std::size_t k = 0; k < poses.size(); ++k) {
-    const Eigen::Index row = n * static_cast<Eigen::Index>(k);
-    for (std::size_t other = 0; other < poses.size(); ++other)
-      joint.block(row, n * static_cast<Eigen::Index>(other), n, n) = block(poses[k], poses[other]);
-    joint.block(row, last, n, n) = block(poses[k], anchor_) * A_.transpose();
-    joint.block(last, row, n, n) = joint.block(row, last, n, n).transpose();
+    need_covariance(estimator_->covariance_column(
+                        ids[k], ids, {column.data(), static_cast<std::size_t>(column.size())}),
+                    ids[k]);
+    const Eigen::Index at = n * static_cast<Eigen::Index>(k);
+    joint.block(0, at, last, n) = column.topRows(last);
+    joint.block(last, at, n, n) = A_ * column.bottomRows(n);
+    joint.block(at, last, n, n) = joint.block(last, at, n, n).transpose();
   }
   return joint;
 }

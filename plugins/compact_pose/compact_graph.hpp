@@ -50,6 +50,14 @@ class CompactGraph {
     std::vector<std::string> notes{};  ///< of the remover, each said once
   };
 
+  /// Measurements of a landmark that have left the graph, by their poses.
+  struct LeftOut {
+    Variable landmark;  ///< without a state
+    bool removed =
+        false;  ///< the landmark itself has left, these being all that was measured of it
+    std::vector<std::pair<Id, Factor>> factors;
+  };
+
   /// `marginals`: what the estimator keeps, which costs time with each link; the diagonal if many
   /// poses are candidates at a time, nothing if few are.
   CompactGraph(std::unique_ptr<Estimator> estimator, CompositionOrder order,
@@ -187,6 +195,12 @@ class CompactGraph {
   /// Keeps the newest pose; adds landmarks, and factors on it and landmarks.
   void see(std::vector<Variable> added, std::span<const Factor> factors, PolicySeconds& seconds);
 
+  /// Removes landmarks, and all that was measured of them.
+  void release(std::span<const Id> landmarks);
+  /// What has left the graph since this was called last: by `release`, or, since with it there was
+  /// no covariance of what an update measured, by that update.
+  std::vector<LeftOut> take_left_out();
+
   // Temporary poses ------------------------------------------------------------------------------
   /// Whether a kept pose is one.
   bool temporary(int pose) const;
@@ -271,6 +285,18 @@ class CompactGraph {
     std::vector<Eigen::MatrixXd> J{};  ///< whitened, by each variable
   };
   std::vector<IncidentFactor> factors_of_temporary();
+  struct LandmarkFactor {
+    FactorId id = 0;
+    Id pose = 0;
+    Factor factor;
+  };
+  bool has_covariance(Id id, Eigen::Index size);
+  bool determined(std::span<const Id> measured);
+  bool solved_anew(std::span<const Id> measured);
+  std::map<Id, std::vector<LandmarkFactor>> landmark_factors() const;
+  std::vector<std::size_t> not_linear(Id of, std::span<const LandmarkFactor> factors) const;
+  void leave_out(Id of, std::span<const LandmarkFactor> factors, bool with_landmark);
+  void restore_covariances(std::span<const Id> measured);
   InformationLoss loss_without(std::size_t k, bool all, std::span<const IncidentFactor> incident);
   void recast_chains(Id leaving, Id cover);
   bool joins(std::size_t k, std::span<const IncidentFactor> incident) const;
@@ -295,6 +321,8 @@ class CompactGraph {
   std::unordered_map<Id, int> number_;
   std::vector<Id> landmarks_;
   std::unordered_map<Id, std::shared_ptr<const VariableType>> landmark_types_;
+  std::vector<LeftOut> left_out_;
+  bool keeps_covariances_ = false;  ///< the estimator, of each variable
   Newest newest_;
   void end_chain(Id from, Id to);
 

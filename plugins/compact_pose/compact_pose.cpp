@@ -504,6 +504,7 @@ PoseReport CompactPose::end_pose() {
     if (!searched_) search();
     removed_.clear();
     settle_priors();
+    settle_left_out();  // by links of the pose, or its odometry
     const bool kept = graph_.newest_kept();
     use_landmarks();
     const bool triangulated = use_waiting_landmarks();
@@ -518,6 +519,7 @@ PoseReport CompactPose::end_pose() {
     for (const Candidate& left : candidates_)
       report_.most_gain = std::max(report_.most_gain, left.gain);
     make_room();
+    settle_left_out();
   }
   open_ = false;
   report_.kept = graph_.newest_kept();

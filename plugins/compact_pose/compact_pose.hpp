@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cstddef>
 #include <deque>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -18,6 +19,7 @@
 #include "compact_graph.hpp"
 #include "compact_pose_options.hpp"
 #include "consistency.hpp"
+#include "landmarks.hpp"
 #include "match_record.hpp"
 #include "measured.hpp"
 #include "proximity.hpp"
@@ -144,6 +146,9 @@ class CompactPose final : public PosePolicy, public OptionFinder {
   FrameEstimate frame();
   bool find_frame();
   void settle_priors();
+  MayUse may_use(std::function<bool(std::size_t, const Eigen::MatrixXd&)> linear) const;
+  bool linear(Id landmark, Id pose, const PlacedState& x, std::span<const Measured> factors,
+              const ObservationRows& rows, const Eigen::MatrixXd& joint) const;
   void use_landmarks();
   std::optional<std::vector<double>> place(const Seen& seen) const;
   bool add_landmarks();
@@ -155,6 +160,10 @@ class CompactPose final : public PosePolicy, public OptionFinder {
   void settle_landmark(Id landmark);
   bool use_waiting_landmarks();
   bool add_or_wait(const Seen& seen);
+  void see(std::vector<Variable> added, std::span<const Factor> factors);
+  void settle_left_out();
+  bool may_wait(Id landmark) const;
+  void wait_again(Id landmark, const View& view);
   bool has_waiting_views(Id pose) const;
   void forget_views(std::span<const Id> poses);
   void forget(Id a, Id b);
@@ -192,6 +201,8 @@ class CompactPose final : public PosePolicy, public OptionFinder {
   std::vector<Waiting> waiting_;
   std::vector<WaitingPrior> waiting_priors_;
   std::map<Id, WaitingLandmark> waiting_landmarks_;
+  int nonlinear_poses_ = 0;  ///< in a row, of which no measurement of a landmark was linear
+  std::unordered_map<Id, int> removals_;  ///< how often landmarks have left the graph
   ThresholdFinder finder_;
   TypicalMatch typical_;
   MatchRecord record_;

@@ -21,12 +21,16 @@
 #include "compact_graph.hpp"
 #include "compact_pose.hpp"
 #include "dense/cholesky.hpp"
+#include "linearity.hpp"
 
 namespace cairn::compact {
 namespace {
 
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+
+/// After so many poses in a row of which no measurement is linear, all of them are used.
+constexpr int kMostNonlinearPoses = 5;
 
 [[noreturn]] void refuse(const std::string& message) { throw Error(ErrorCode::input, message); }
 
@@ -49,6 +53,20 @@ class LocalFilter {
     MatrixXd J(observation.e.size(), observation.J_pose.cols() + observation.J_landmark.cols());
     J << observation.J_pose, observation.J_landmark;
     return compare(residual(observation), rows_of(observation, SJ), J);
+  }
+
+  /// Of the landmark and, after it, the pose.
+  MatrixXd joint(const ObservationRows& s) const {
+    const Eigen::Index own = s.J_landmark.cols(), n = s.J_pose.cols();
+    MatrixXd both(own + n, own + n);
+    const auto at = [&](bool pose) { return pose ? pose_ : offset_[s.landmark]; };
+    for (const bool row : {false, true}) {
+      for (const bool column : {false, true}) {
+        both.block(row ? own : 0, column ? own : 0, row ? n : own, column ? n : own) =
+            covariance_.block(at(row), at(column), row ? n : own, column ? n : own);
+      }
+    }
+    return both;
   }
 
   void use(const ObservationRows& observation) {
@@ -85,9 +103,10 @@ class LocalFilter {
 
 }  // namespace
 
-std::vector<ObservationFit> choose_observations(
-    std::span<const ObservationRows> observations, std::span<const int> landmark_sizes,
-    MatrixXd covariance, double least_gain, const std::function<bool(const MeasuredFit&)>& passes) {
+std::vector<ObservationFit> choose_observations(std::span<const ObservationRows> observations,
+                                                std::span<const int> landmark_sizes,
+                                                MatrixXd covariance, double least_gain,
+                                                const MayUse& may_use) {
   LocalFilter filter(landmark_sizes, std::move(covariance));
   std::vector<ObservationFit> chosen(observations.size());
   for (;;) {
@@ -98,7 +117,10 @@ std::vector<ObservationFit> choose_observations(
       one.fit = filter.fit(observations[k]);
       one.informative = one.fit.gain > least_gain;
       const bool better = best == observations.size() || one.fit.gain > chosen[best].fit.gain;
-      if (one.informative && better && passes(one.fit)) best = k;
+      if (!one.informative || !better) continue;
+      if (!may_use.fits(one.fit)) continue;
+      one.linear = may_use.linear(k, filter.joint(observations[k]));
+      if (one.linear) best = k;
     }
     if (best == observations.size()) return chosen;
     filter.use(observations[best]);
@@ -125,15 +147,29 @@ ObservationRows linearized(std::span<const Measured> factors, Id pose, const dou
   return all;
 }
 
+Measured checked_observation(const Factor& factor, Id pose, const VariableType& pose_type,
+                             const Variable& landmark) {
+  if (!factor.type) refuse("a measurement of a landmark without a type");
+  const std::string name =
+      fmt::format("{} of landmark {} from pose {}", factor.type->tag(), landmark.id, pose);
+  const bool from_pose = factor.variables == std::vector<Id>{pose, landmark.id};
+  if (!from_pose && factor.variables != std::vector<Id>{landmark.id, pose})
+    refuse(name + " is not on these two");
+  const VariableType* types[] = {&pose_type, landmark.type.get()};
+  if (!from_pose) std::swap(types[0], types[1]);
+  return {factor, types, name};
+}
+
 LandmarkReport report_of(Id pose, Id landmark, std::size_t factors, const ObservationFit& fit) {
   return {.pose = pose,
           .landmark = landmark,
           .factors = static_cast<int>(factors),
           .gain = fit.fit.gain,
           .innovation = fit.fit.innovation,
-          .verdict = fit.used          ? LinkVerdict::linked
-                     : fit.informative ? LinkVerdict::inconsistent
-                                       : LinkVerdict::uninformative};
+          .verdict = fit.used           ? LinkVerdict::linked
+                     : !fit.informative ? LinkVerdict::uninformative
+                     : fit.linear       ? LinkVerdict::inconsistent
+                                        : LinkVerdict::nonlinear};
 }
 
 // The graph ---------------------------------------------------------------------------------------
@@ -193,10 +229,7 @@ MatrixXd CompactGraph::landmark_covariance(Id landmark, int pose, PolicySeconds&
 void CompactGraph::see(std::vector<Variable> added, std::span<const Factor> factors,
                        PolicySeconds& seconds) {
   keep(seconds);
-  std::vector<std::pair<Id, std::shared_ptr<const VariableType>>> landmarks;
-  for (const Variable& landmark : added) landmarks.emplace_back(landmark.id, landmark.type);
   update(factors, seconds, {}, std::move(added));
-  for (auto& [id, type] : landmarks) note_landmark(id, std::move(type));
 }
 
 void CompactGraph::move_landmarks(const State& move, GraphUpdate& leaving,
@@ -211,23 +244,6 @@ void CompactGraph::move_landmarks(const State& move, GraphUpdate& leaving,
 }
 
 // The policy --------------------------------------------------------------------------------------
-
-namespace {
-
-Measured checked(const Factor& factor, Id pose, const VariableType& pose_type,
-                 const Variable& landmark) {
-  if (!factor.type) refuse("a measurement of a landmark without a type");
-  const std::string name =
-      fmt::format("{} of landmark {} from pose {}", factor.type->tag(), landmark.id, pose);
-  const bool from_pose = factor.variables == std::vector<Id>{pose, landmark.id};
-  if (!from_pose && factor.variables != std::vector<Id>{landmark.id, pose})
-    refuse(name + " is not on these two");
-  const VariableType* types[] = {&pose_type, landmark.type.get()};
-  if (!from_pose) std::swap(types[0], types[1]);
-  return {factor, types, name};
-}
-
-}  // namespace
 
 void CompactPose::offer_landmark(const LandmarkObservation& observation) {
   if (!open_) throw Error(ErrorCode::usage, "offer_landmark without a pose");
@@ -253,9 +269,27 @@ void CompactPose::offer_landmark(const LandmarkObservation& observation) {
   Seen seen{.landmark = landmark, .factors = {}};
   for (const Factor& factor : observation.factors) {
     seen.factors.push_back(
-        checked(factor, graph_.newest_id(), graph_.group().motions().type(), landmark));
+        checked_observation(factor, graph_.newest_id(), graph_.group().motions().type(), landmark));
   }
   if (!seen.factors.empty()) seen_.push_back(std::move(seen));
+}
+
+MayUse CompactPose::may_use(std::function<bool(std::size_t, const MatrixXd&)> linear) const {
+  return {
+      .fits = [this](const MeasuredFit& fit) { return check_->passes(fit.innovation, fit.dof); },
+      .linear = std::move(linear)};
+}
+
+/// Whether what a pose measures of a landmark in the graph is linear over their `joint` covariance,
+/// the landmark's first. `rows`: the linear model.
+bool CompactPose::linear(Id landmark, Id pose, const PlacedState& x,
+                         std::span<const Measured> factors, const ObservationRows& rows,
+                         const MatrixXd& joint) const {
+  if (options_.strategy == Strategy::apal) return true;  // everything
+  const VariableType& type = *graph_.landmark(landmark);
+  const std::span<const double> state = graph_.landmark_state(landmark);
+  const MatrixXd S = beside_pose(graph_.group(), x, type, state, joint);
+  return nonlinearity({type, state, factors, pose, x.x}, rows, S) <= kMostNonlinear;
 }
 
 /// Those of landmarks in the graph.
@@ -279,9 +313,22 @@ void CompactPose::use_landmarks() {
     rows.back().landmark = static_cast<int>(at);
   }
   if (known.empty()) return;
-  const std::vector<ObservationFit> fits = choose_observations(
-      rows, sizes, graph_.landmark_covariance(ids, report_.seconds), landmark_gain_,
-      [&](const MeasuredFit& fit) { return check_->passes(fit.innovation, fit.dof); });
+  const PlacedState x = graph_.group().place(graph_.newest_state());
+  // It is the pose that is not known then, not that it is near a landmark.
+  const bool lost = nonlinear_poses_ >= kMostNonlinearPoses;
+  const std::vector<ObservationFit> fits =
+      choose_observations(rows, sizes, graph_.landmark_covariance(ids, report_.seconds),
+                          landmark_gain_, may_use([&](std::size_t k, const MatrixXd& joint) {
+                            const Seen& seen = seen_[known[k]];
+                            return lost || linear(seen.landmark.id, graph_.newest_id(), x,
+                                                  seen.factors, rows[k], joint);
+                          }));
+  const auto any = [&](auto what) { return std::ranges::any_of(fits, what); };
+  if (any([](const ObservationFit& fit) { return fit.used; })) {
+    nonlinear_poses_ = 0;
+  } else if (any([](const ObservationFit& fit) { return !fit.linear; })) {
+    ++nonlinear_poses_;
+  }
   std::vector<Factor> used;
   for (std::size_t k = 0; k < known.size(); ++k) {
     const Seen& seen = seen_[known[k]];
@@ -290,7 +337,9 @@ void CompactPose::use_landmarks() {
     if (!fit.used) continue;
     for (const Measured& factor : seen.factors) used.push_back(factor.factor());
   }
-  if (!used.empty()) graph_.see({}, used, report_.seconds);
+  for (auto k = known.rbegin(); k != known.rend(); ++k)  // they are settled
+    seen_.erase(seen_.begin() + static_cast<std::ptrdiff_t>(*k));
+  if (!used.empty()) see({}, used);
 }
 
 /// Where the factors of an observation put a landmark that is new, or it was given; nothing: they
@@ -318,7 +367,11 @@ bool CompactPose::add_landmarks() {
   for (Seen& seen : std::exchange(seen_, {})) {
     const Id id = seen.landmark.id;
     const bool twice = std::ranges::find(added, id, &Variable::id) != added.end();
-    if (!twice && graph_.landmark(id)) continue;
+    if (graph_.landmark(id)) {  // by another measurement of the pose
+      const View view{.pose = graph_.newest_id(), .factors = std::move(seen.factors)};
+      judge_views(id, {&view, 1});
+      continue;
+    }
     if (!twice) {
       std::optional<std::vector<double>> state = place(seen);
       if (!state) {
@@ -341,7 +394,7 @@ bool CompactPose::add_landmarks() {
   if (graph_.newest_kept() && !added.empty()) {
     std::vector<Id> ids;
     for (const Variable& landmark : added) ids.push_back(landmark.id);
-    graph_.see(std::move(added), factors, report_.seconds);
+    see(std::move(added), factors);
     for (const Id id : ids) settle_landmark(id);
     any = true;
   }

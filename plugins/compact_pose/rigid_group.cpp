@@ -119,6 +119,13 @@ Eigen::Matrix<double, 6, 6> RigidGroup::twist_covariance(const Matrix& covarianc
   return twist_ * covariance * twist_.transpose();
 }
 
+Eigen::Matrix3Xd RigidGroup::point_jacobian(const Pose& at, const Eigen::Vector3d& point) const {
+  const Eigen::Vector3d p = at.R.transpose() * (point - at.t);
+  Eigen::Matrix3d cross;  // of p
+  cross << 0.0, -p.z(), p.y(), p.z(), 0.0, -p.x(), -p.y(), p.x(), 0.0;
+  return at.R * (twist_.topRows<3>() - cross * twist_.bottomRows<3>());
+}
+
 Matrix RigidGroup::isotropic(double sigma_translation, double sigma_rotation) const {
   // Information, since a plane's twists are fewer than six: Σ⁻¹ = Tᵀ W T.
   Eigen::Matrix<double, 6, 1> weights;

@@ -55,8 +55,11 @@ class RigidGroup : public PoseGroup {
   /// The covariance of a tangent vector ξ as one of (velocity, angular velocity) in the body's
   /// frame: six rows, those that a plane does not have are zero.
   Eigen::Matrix<double, 6, 6> twist_covariance(const Matrix& covariance) const;
-  /// The inverse, for independent components: the covariance of ξ for standard deviations of
-  /// translation [m] and rotation [rad] along every axis.
+  /// How a point of the body that is at `point` in the world moves there with a step ξ of a pose,
+  /// x exp(ξ): R (v + ω × Rᵀ (point − t)), three rows.
+  Eigen::Matrix3Xd point_jacobian(const Pose& at, const Eigen::Vector3d& point) const;
+  /// The inverse of `twist_covariance`, for independent components: the covariance of ξ for
+  /// standard deviations of translation [m] and rotation [rad] along every axis.
   Matrix isotropic(double sigma_translation, double sigma_rotation) const;
 
  private:

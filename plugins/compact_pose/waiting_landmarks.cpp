@@ -17,6 +17,9 @@ namespace {
 /// others are judged one by one once it is in the graph.
 constexpr std::size_t kMostViews = 8;
 
+/// A landmark that has left the graph so often is left out for good.
+constexpr int kMostRemovals = 3;
+
 /// Numbers of views to triangulate from, in order.
 std::vector<std::size_t> chosen_of(std::size_t views) {
   const std::size_t count = std::min(views, kMostViews);
@@ -91,44 +94,52 @@ void CompactPose::add_triangulated(WaitingLandmark waiting, Triangulated triangu
     for (const Measured& factor : view.factors) factors.push_back(factor.factor());
     view.factors.clear();
   }
-  std::vector<Variable> added;
-  added.push_back(std::move(waiting.landmark));
-  graph_.see(std::move(added), factors, report_.seconds);
-  judge_views(id, waiting.views);
+  std::erase_if(waiting.views, [](const View& view) { return view.factors.empty(); });
   waiting_landmarks_.erase(id);
+  see({waiting.landmark}, factors);
+  judge_views(id, waiting.views);
 }
 
 /// A landmark is in the graph, by what the newest pose alone measured of it.
 void CompactPose::settle_landmark(Id landmark) {
   const auto known = waiting_landmarks_.find(landmark);
   if (known == waiting_landmarks_.end()) return;
-  judge_views(landmark, known->second.views);
+  const std::vector<View> views = std::move(known->second.views);
   waiting_landmarks_.erase(known);
+  judge_views(landmark, views);
 }
 
 /// Of a landmark that is in the graph now: what poses that are kept measured of it before.
 void CompactPose::judge_views(Id landmark, std::span<const View> views) {
-  const std::vector<int> size{graph_.landmark(landmark)->tangent_size()};
   for (const View& view : views) {
-    if (view.factors.empty()) continue;
+    const VariableType* type = graph_.landmark(landmark);
+    if (!type) {  // it has left again
+      wait_again(landmark, view);
+      continue;
+    }
+    const std::vector<int> size{type->tangent_size()};
     const int pose = graph_.find(view.pose);
     std::vector<ObservationRows> rows;
-    const auto linear = [&] {
+    const auto linear_model = [&] {
       return linearized(view.factors, view.pose, graph_.state(pose).data(),
                         graph_.landmark_state(landmark).data());
     };
     Eigen::MatrixXd covariance = graph_.landmark_covariance(landmark, pose, report_.seconds);
-    rows.push_back(linear());  // at the estimate that the covariance is of
+    rows.push_back(linear_model());  // at the estimate that the covariance is of
+    const PlacedState x = graph_.group().place(graph_.state(pose));
     const ObservationFit fit =
-        choose_observations(
-            rows, size, std::move(covariance), landmark_gain_,
-            [&](const MeasuredFit& f) { return check_->passes(f.innovation, f.dof); })
+        choose_observations(rows, size, std::move(covariance), landmark_gain_,
+                            may_use([&](std::size_t, const Eigen::MatrixXd& joint) {
+                              return linear(landmark, view.pose, x, view.factors, rows.front(),
+                                            joint);
+                            }))
             .front();
     report_.landmarks.push_back(report_of(view.pose, landmark, view.factors.size(), fit));
     if (!fit.used) continue;
     std::vector<Factor> factors;
     for (const Measured& factor : view.factors) factors.push_back(factor.factor());
     graph_.add(factors, report_.seconds);
+    settle_left_out();
   }
 }
 
@@ -144,6 +155,7 @@ bool CompactPose::use_waiting_landmarks() {
     WaitingLandmark all = with_newest(seen_[k]);
     std::optional<Triangulated> found = triangulated(all);
     if (!found || !(found->found.fit.gain > landmark_gain_) || !fits(*found)) continue;
+    seen_.erase(seen_.begin() + static_cast<std::ptrdiff_t>(k));
     add_triangulated(std::move(all), std::move(*found));
     return true;  // the others are added to a pose that is kept
   }
@@ -168,7 +180,7 @@ bool CompactPose::add_or_wait(const Seen& seen) {
                         .landmark = id,
                         .factors = static_cast<int>(std::ssize(seen.factors)),
                         .gain = std::numeric_limits<double>::infinity()};
-  if (!options_.several_views || !graph_.newest_kept()) {
+  if (!may_wait(id) || !graph_.newest_kept()) {
     waiting_landmarks_.try_emplace(id, WaitingLandmark{.landmark = seen.landmark, .views = {}});
     report_.landmarks.push_back(report);
     return false;
@@ -188,6 +200,60 @@ bool CompactPose::add_or_wait(const Seen& seen) {
   }
   report_.landmarks.push_back(report);
   return false;
+}
+
+void CompactPose::see(std::vector<Variable> added, std::span<const Factor> factors) {
+  graph_.see(std::move(added), factors, report_.seconds);
+  settle_left_out();
+}
+
+/// A landmark, or what was measured of it, has left the graph, since with it there was no
+/// covariance.
+void CompactPose::settle_left_out() {
+  for (const CompactGraph::LeftOut& left : graph_.take_left_out()) {
+    const Id id = left.landmark.id;
+    const bool waits = left.removed && may_wait(id);
+    if (left.removed) {
+      waiting_landmarks_.try_emplace(id, WaitingLandmark{.landmark = left.landmark, .views = {}});
+      ++removals_[id];
+    }
+    for (const auto& [pose, factor] : left.factors) {
+      report_.landmarks.push_back({.pose = pose,
+                                   .landmark = id,
+                                   .factors = 1,
+                                   .removed = true,
+                                   .verdict = waits          ? LinkVerdict::waiting
+                                              : left.removed ? LinkVerdict::unmatched
+                                                             : LinkVerdict::nonlinear});
+      if (waits) {
+        const Measured measured =
+            checked_observation(factor, pose, graph_.group().motions().type(), left.landmark);
+        wait_again(id, {.pose = pose, .factors = {measured}});
+      }
+    }
+  }
+}
+
+/// Whether what poses measure of a landmark may wait: not of one that has left the graph so often
+/// that it will again.
+bool CompactPose::may_wait(Id landmark) const {
+  const auto removals = removals_.find(landmark);
+  return options_.several_views &&
+         (removals == removals_.end() || removals->second < kMostRemovals);
+}
+
+/// What a pose that is kept measured of a landmark that waits.
+void CompactPose::wait_again(Id landmark, const View& view) {
+  if (!may_wait(landmark)) return;
+  std::vector<View>& views = waiting_landmarks_.at(landmark).views;
+  const auto number = [&](Id pose) { return graph_.find(pose); };
+  const auto at = std::ranges::lower_bound(views, number(view.pose), {},
+                                           [&](const View& other) { return number(other.pose); });
+  if (at != views.end() && at->pose == view.pose) {
+    at->factors.insert(at->factors.end(), view.factors.begin(), view.factors.end());
+  } else {
+    views.insert(at, view);
+  }
 }
 
 bool CompactPose::has_waiting_views(Id pose) const {

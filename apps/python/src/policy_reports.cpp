@@ -16,7 +16,8 @@ namespace {
 constexpr const char* kVerdict =
     "'linked' (it is in the graph), 'unmatched' (there is nothing to link), 'uninformative' (its "
     "information gain is below the threshold), 'inconsistent' (it contradicts the estimate, or "
-    "other links) or 'waiting' (until others confirm it).";
+    "other links), 'waiting' (until others confirm it) or 'nonlinear' (of a landmark: not linear "
+    "over what is not known of where the two are).";
 
 /// What the three kinds of measurements have in common.
 template <class Report>
@@ -94,6 +95,8 @@ void bind_policy_reports(py::module_& module) {
       .def_readonly("landmark", &LandmarkReport::landmark)
       .def_readonly("factors", &LandmarkReport::factors, "How many they were.")
       .def_readonly("added", &LandmarkReport::added, "Whether the landmark came with them.")
+      .def_readonly("removed", &LandmarkReport::removed,
+                    "Whether they have left the graph with the landmark, which waits again.")
       .def("__repr__", [](const LandmarkReport& r) {
         return fmt::format("<cairn.LandmarkReport {} {}: {}>", id_text(r.pose), id_text(r.landmark),
                            to_string(r.verdict));

@@ -193,6 +193,9 @@ void PolicyRun::run(std::size_t count, std::string_view title,
         std::ranges::count(pose.priors, LinkVerdict::linked, &PriorReport::verdict);
     for (const LandmarkReport& landmark : pose.landmarks) {
       if (landmark.verdict == LinkVerdict::linked) result_.kept_observations += landmark.factors;
+      if (landmark.removed) result_.kept_observations -= landmark.factors;
+      result_.nonlinear_observations +=
+          landmark.verdict == LinkVerdict::nonlinear ? landmark.factors : 0;
     }
     if (setting_.progress) setting_.progress(title, count, result_);
     if (after) after(result_.poses.size() - 1);

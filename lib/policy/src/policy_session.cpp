@@ -28,6 +28,8 @@ std::string_view word_of(LinkVerdict verdict) {
       return "INCONSISTENT";
     case LinkVerdict::waiting:
       return "WAITING";
+    case LinkVerdict::nonlinear:
+      return "NONLINEAR";
   }
   return "";
 }

@@ -21,6 +21,8 @@ std::string_view word_of_prior(LinkVerdict verdict) {
       return "INCONSISTENT";
     case LinkVerdict::waiting:
       return "WAITING";
+    case LinkVerdict::nonlinear:
+      return "NONLINEAR";
     default:
       return "UNINFORMATIVE";
   }
@@ -141,7 +143,8 @@ void PolicySession::offer_landmarks() {
 }
 
 void PolicySession::note_landmark(const LandmarkReport& landmark) {
-  const std::string_view word = landmark.added ? "ADDED"
+  const std::string_view word = landmark.added     ? "ADDED"
+                                : landmark.removed ? "LEFT"
                                 : landmark.verdict == LinkVerdict::unmatched
                                     ? "NOTADDED"
                                     : word_of_prior(landmark.verdict);
@@ -149,6 +152,10 @@ void PolicySession::note_landmark(const LandmarkReport& landmark) {
                          landmark.gain, landmark.innovation);
   counts_.landmarks += landmark.added;
   if (landmark.verdict == LinkVerdict::linked) counts_.observations += landmark.factors;
+  if (!landmark.removed) return;
+  counts_.observations -= landmark.factors;
+  counts_.landmarks =
+      std::ranges::count_if(policy_.landmarks(), [&](Id id) { return landmarks_.contains(id); });
 }
 
 /// At the end: landmarks that nothing will determine any more.

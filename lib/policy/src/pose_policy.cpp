@@ -32,8 +32,8 @@ bool PosePolicy::revoke(Id, Id) {
 }
 
 std::string_view to_string(LinkVerdict verdict) {
-  constexpr std::array<std::string_view, 5> kNames{"linked", "unmatched", "uninformative",
-                                                   "inconsistent", "waiting"};
+  constexpr std::array<std::string_view, 6> kNames{"linked",       "unmatched", "uninformative",
+                                                   "inconsistent", "waiting",   "nonlinear"};
   return kNames[static_cast<std::size_t>(verdict)];
 }
 

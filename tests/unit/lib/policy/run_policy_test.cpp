@@ -254,6 +254,7 @@ TEST(PoseReports, VerdictsHaveNames) {
   EXPECT_EQ(to_string(LinkVerdict::uninformative), "uninformative");
   EXPECT_EQ(to_string(LinkVerdict::inconsistent), "inconsistent");
   EXPECT_EQ(to_string(LinkVerdict::waiting), "waiting");
+  EXPECT_EQ(to_string(LinkVerdict::nonlinear), "nonlinear");
 }
 
 TEST(PoseReports, SecondsAddUpPartByPart) {

@@ -67,8 +67,10 @@ TEST(ChooseObservations, IsTheGreedyOneOfDenseAlgebra) {
       observations.push_back(rows);
     }
     const double least = 0.8;
-    const std::vector<ObservationFit> fits = choose_observations(
-        observations, sizes, prior, least, [](const MeasuredFit&) { return true; });
+    const std::vector<ObservationFit> fits =
+        choose_observations(observations, sizes, prior, least,
+                            {.fits = [](const MeasuredFit&) { return true; },
+                             .linear = [](std::size_t, const MatrixXd&) { return true; }});
     // The same, with information matrices, always from the beginning.
     std::vector<bool> used(dense.size());
     for (;;) {
@@ -119,13 +121,50 @@ TEST(ChooseObservations, LeavesOutWhatDoesNotPass) {
   const std::vector<ObservationRows> both{rows, rows};
   const auto fits =
       choose_observations(both, sizes, 4.0 * MatrixXd::Identity(2, 2), 0.1,
-                          [](const MeasuredFit& fit) { return fit.innovation > 1.5; });
+                          {.fits = [](const MeasuredFit& fit) { return fit.innovation > 1.5; },
+                           .linear = [](std::size_t, const MatrixXd&) { return true; }});
   // V = 1 + 8: ½ ln 9, and 9/9 for e = 3.
   EXPECT_NEAR(fits[0].fit.gain, 0.5 * std::log(9.0), 1e-12);
   EXPECT_NEAR(fits[0].fit.innovation, 1.0, 1e-12);
   for (const ObservationFit& fit : fits) {
     EXPECT_TRUE(fit.informative);
     EXPECT_FALSE(fit.used);
+  }
+}
+
+TEST(ChooseObservations, AsksWhetherOneIsLinearWithTheCovarianceThatIsLeft) {
+  const std::vector<int> sizes{1, 1};
+  const ObservationRows first{.e = VectorXd::Zero(1),
+                              .J_pose = 3.0 * MatrixXd::Identity(1, 1),
+                              .J_landmark = MatrixXd::Zero(1, 1),
+                              .landmark = 0};
+  const ObservationRows second{.e = VectorXd::Zero(1),
+                               .J_pose = MatrixXd::Identity(1, 1),
+                               .J_landmark = -MatrixXd::Identity(1, 1),
+                               .landmark = 1};
+  const MatrixXd prior = Eigen::Vector3d(1.0, 4.0, 9.0).asDiagonal();
+  const std::vector<ObservationRows> both{second, first};
+  double most = 100.0;
+  std::vector<MatrixXd> asked;
+  const auto choose = [&] {
+    return choose_observations(both, sizes, prior, 0.1,
+                               {.fits = [](const MeasuredFit&) { return true; },
+                                .linear =
+                                    [&](std::size_t k, const MatrixXd& joint) {
+                                      if (k == 0) asked.push_back(joint);
+                                      return joint(1, 1) < most;
+                                    }});
+  };
+  for (const ObservationFit& fit : choose()) EXPECT_TRUE(fit.used && fit.linear);
+  // The landmark of the second, then the pose; once after the first was used: 9/(1 + 81).
+  EXPECT_NEAR((asked.front() - MatrixXd(Eigen::Vector2d(4.0, 9.0).asDiagonal())).norm(), 0.0,
+              1e-12);
+  EXPECT_NEAR((asked.back() - MatrixXd(Eigen::Vector2d(4.0, 9.0 / 82.0).asDiagonal())).norm(), 0.0,
+              1e-12);
+  most = 0.0;
+  for (const ObservationFit& fit : choose()) {
+    EXPECT_TRUE(fit.informative);
+    EXPECT_FALSE(fit.used || fit.linear);
   }
 }
 

@@ -62,6 +62,7 @@ struct PolicyResult {
   std::int64_t kept_priors = 0;  ///< absolute measurements that are in the graph
   /// Landmarks of the recording, and factors on these, that are in the graph.
   std::int64_t kept_landmarks = 0, kept_observations = 0;
+  std::int64_t nonlinear_observations = 0;  ///< left out for that (`LinkVerdict::nonlinear`)
   /// Of the others, those that what was measured of them does not determine.
   std::int64_t undetermined_landmarks = 0;
   PolicySeconds seconds;

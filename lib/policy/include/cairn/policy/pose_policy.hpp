@@ -26,6 +26,7 @@ enum class LinkVerdict {
   uninformative,  ///< its information gain is below the threshold
   inconsistent,   ///< it contradicts the estimate, or other links
   waiting,        ///< consistent, but not confirmed: until another link agrees
+  nonlinear,      ///< of a landmark: not linear over what is not known of where the two are
 };
 /// "linked", "unmatched", ….
 CAIRN_API std::string_view to_string(LinkVerdict verdict);
@@ -52,6 +53,9 @@ struct LandmarkReport {
   Id pose = 0, landmark = 0;
   int factors = 0;     ///< of the observation
   bool added = false;  ///< the landmark is in the graph with it, and was not before
+  /// It was in the graph, and has left with the landmark, which what was measured of it does not
+  /// determine any more; both wait again.
+  bool removed = false;
   /// ½ ln |I + J Σ Jᵀ| with the joint covariance Σ of pose and landmark, given what was used before
   /// it [nats]; of a landmark that is not in the graph infinite. Where several poses determine a
   /// landmark together: the entropy that these poses lose by what all of them measured of it.
@@ -59,7 +63,9 @@ struct LandmarkReport {
   double innovation = 0.0;  ///< squared Mahalanobis distance from what was expected; likewise
   /// `linked`: it is in the graph. `waiting`: what was measured so far does not determine where the
   /// landmark is. `unmatched`: the landmark is not in the graph, since the pose was not kept, or
-  /// has left while it waited.
+  /// has left while it waited. `nonlinear`: left out, since the estimate takes a measurement as
+  /// linear over what is not known of where the landmark is from the pose, and this one is not,
+  /// such as a bearing of a landmark that is nearer than it is known.
   LinkVerdict verdict = LinkVerdict::unmatched;
 };
 
