@@ -24,6 +24,7 @@
 #include "json_report.hpp"
 #include "problem_setup.hpp"
 #include "progress.hpp"
+#include "recording_redirection.hpp"
 #include "results.hpp"
 #include "sparsify.hpp"
 #include "sparsify_edges.hpp"
@@ -62,20 +63,23 @@ SparsifyJob job_of(const SparsifyCommandOptions& options, Session& session) {
   job.estimator = options.estimator;
   job.online = options.online;
   job.as_given = options.as_given;
-  if (options.redirect == "early") {
+  const bool beforehand = options.redirect == "beforehand";
+  if (options.redirect != "late") {
     if (options.keep_every == 0 || options.online == 0) {
-      throw Error(ErrorCode::usage,
-                  "--redirect early needs --online and --keep-every: only then it is known of each "
-                  "node whether it stays");
+      throw Error(
+          ErrorCode::usage,
+          fmt::format("--redirect {} needs --online and --keep-every: only then it is known "
+                      "of each node whether it stays",
+                      options.redirect));
     }
     job.redirect_early = options.keep_every;
     job.redirection.to = RedirectionRule::To::order;
   }
-  if (options.online == 0 && (!options.redirect_to.empty() || options.newer ||
-                              options.inflation != RedirectionRule{}.inflation)) {
+  if ((options.online == 0 || beforehand) && (!options.redirect_to.empty() || options.newer ||
+                                              options.inflation != RedirectionRule{}.inflation)) {
     throw Error(ErrorCode::usage,
                 "--redirect-to, --newer and --inflation are for factors that come late: they need "
-                "--online");
+                "--online, and --redirect late or early");
   }
   using To = RedirectionRule::To;
   for (const auto& [name, to] : {std::pair{"path", To::path},
@@ -293,13 +297,23 @@ int run_sparsify(SparsifyCommandOptions options, Session& session) {
   check_topology(options, job, registry);
   const ProblemSetup setup(options.problem, registry);
   const LoadedGraph loaded = load_graph(options.graph, options.input, session);
+  RedirectedRecording redirected;
+  const bool beforehand = options.redirect == "beforehand";
+  if (beforehand) redirected = redirect_recording(loaded.graph, options.keep_every);
   const InterruptGuard guard;
   ProblemRecorder recorder;
   SparsificationObserver observer;
   if (!options.record.empty())
     observer = [&](const SparsificationRecord& record) { recorder.add(record); };
-  const SparsifyResult result =
-      sparsify(loaded.graph, job, setup, options.problem.stop, guard, std::move(observer), session);
+  SparsifyResult result = sparsify(beforehand ? redirected.graph : loaded.graph, job, setup,
+                                   options.problem.stop, guard, std::move(observer), session);
+  if (beforehand) {
+    result.factors_before = loaded.graph.factor_count();
+    result.redirected = redirected.redirected;
+    result.dropped = redirected.dropped;
+    // The run has not seen the measurements as they were.
+    result.rmse_full = std::nan("");
+  }
   for (const std::string& note : result.notes) session.note(note);
   note_refused(result.change, session);
   Results results(session);

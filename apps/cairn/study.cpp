@@ -67,10 +67,11 @@ Command add_study_sparsify(ArgumentParser study) {
   add_sparsify_options(cli, *options);
   cli.add_option(
          "--redirect", options->redirect,
-         "online: factors to nodes that leave are redirected once these have left (late), or "
-         "as soon as the nodes are measured again (early)")
+         "online: factors to nodes that leave are redirected once these have left (late), as soon "
+         "as the nodes are measured again (early), or in the recording along its odometry, as in "
+         "the thesis (beforehand)")
       .type_name("WHEN")
-      .one_of({"late", "early"})
+      .one_of({"late", "early", "beforehand"})
       .show_default();
   cli.add_option(
          "--redirect-to", options->redirect_to,
