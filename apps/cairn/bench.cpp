@@ -16,6 +16,7 @@
 #include "commands.hpp"
 #include "interrupt.hpp"
 #include "json_text.hpp"
+#include "latex_table.hpp"
 #include "picture_files.hpp"
 #include "results.hpp"
 #include "table.hpp"
@@ -25,6 +26,7 @@ namespace {
 
 void check(const BenchOptions& options, Session& session) {
   check_file(options.csv, session);
+  check_file(options.latex, session);
   if (options.html.empty()) return;
   if (!session.registry().has(Picture::kKind, "html")) {
     throw Error(
@@ -90,9 +92,18 @@ void write_page(const BenchOptions& options, const std::vector<GraphResult>& gra
 void print_tables(const BenchOptions& options, const BenchResult& bench, const Session& session) {
   for (const GraphResult& graph : bench.graphs) {
     session.print((&graph == &bench.graphs.front() ? "" : "\n") +
-                  bench_table(graph, options.problem.stop, session.colour()));
+                  bench_text(graph, options.problem.stop, session.colour()));
   }
   if (!options.html.empty()) session.print(fmt::format("\npage: {}\n", options.html));
+}
+
+/// A table for each graph, below its name as a comment.
+void write_latex(const BenchOptions& options, const BenchResult& bench) {
+  std::string text;
+  for (const GraphResult& graph : bench.graphs)
+    text += fmt::format("% {}\n{}\n", printable(graph.loaded.label),
+                        bench_table(graph, options.problem.stop).latex());
+  write_file(options.latex, text);
 }
 
 /// What speaks against the best estimate of each graph.
@@ -116,6 +127,7 @@ int run(const BenchOptions& options, Session& session) {
   const boost::json::object report = bench_json(options, bench);
   Results results(session);
   results.write(options.csv, [&] { write_file(options.csv, bench_csv(bench.graphs)); });
+  results.write(options.latex, [&] { write_latex(options, bench); });
   results.write(options.html, [&] { write_page(options, bench.graphs, report, session); });
   results.add([&] { session.write_json(report); });
   results.add([&] { print_tables(options, bench, session); });
@@ -160,6 +172,7 @@ Command add_bench(ArgumentParser program) {
   cli.add_flag("--no-memory", options->no_memory, "leave out the extra run for the peak memory");
   cli.add_option("--csv", options->csv, "one line per run (- is standard output)")
       .type_name("FILE");
+  add_latex_option(cli, options->latex);
   cli.add_option("--html", options->html, "all of it as an HTML report with the graphs")
       .type_name("FILE");
   add_input_options(cli, options->input);

@@ -171,7 +171,7 @@ std::vector<std::string> csv_fields(const GraphResult& graph, const Configuratio
 
 }  // namespace
 
-std::string bench_table(const GraphResult& graph, const Stop& stop, bool colour) {
+Table bench_table(const GraphResult& graph, const Stop& stop) {
   using Align = Table::Align;
   std::vector<Table::Column> columns{
       {"optimizer", Align::left},     {"linear solver", Align::left}, {"median", Align::right},
@@ -187,10 +187,16 @@ std::string bench_table(const GraphResult& graph, const Stop& stop, bool colour)
     cells.erase(cells.begin(), cells.begin() + leading);
     table.add(std::move(cells));
   }
-  std::string text = fmt::format("{}: {}, {}{}\n{}", bold(graph.loaded.label, colour),
-                                 plural(graph.loaded.graph.variable_count(), "variable"),
-                                 plural(graph.loaded.graph.factor_count(), "factor"),
-                                 optimizer.empty() ? "" : "; " + optimizer, table.text(colour));
+  return table;
+}
+
+std::string bench_text(const GraphResult& graph, const Stop& stop, bool colour) {
+  const std::string optimizer = common_optimizer(graph);
+  std::string text =
+      fmt::format("{}: {}, {}{}\n{}", bold(graph.loaded.label, colour),
+                  plural(graph.loaded.graph.variable_count(), "variable"),
+                  plural(graph.loaded.graph.factor_count(), "factor"),
+                  optimizer.empty() ? "" : "; " + optimizer, bench_table(graph, stop).text(colour));
   for (const ConfigurationResult& result : graph.results) {
     if (!result.error.empty()) {
       text += fmt::format("failed: {} {}: {}\n", result.configuration.optimizer,

@@ -21,6 +21,7 @@ struct BenchOptions {
   int repeat = 5;
   bool no_memory = false;
   std::string csv;
+  std::string latex;
   std::string html;
 };
 

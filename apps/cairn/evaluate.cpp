@@ -19,6 +19,7 @@
 #include "covariances.hpp"
 #include "graph_files.hpp"
 #include "json_report.hpp"
+#include "latex_table.hpp"
 #include "problem_setup.hpp"
 #include "results.hpp"
 #include "table.hpp"
@@ -44,6 +45,7 @@ struct EvaluateOptions {
   bool kld = false;
   std::string compared_at = "common";
   std::string linear_solver = kDefaultLinearSolver;  ///< of the KLD
+  std::string latex;
 
   StampMatching matching() const {
     StampMatching m;
@@ -166,21 +168,20 @@ GraphDivergence divergence_of(const Graph& truth, const Graph& estimate,
 
 // Results -----------------------------------------------------------------------------------------
 
-std::string divergence_text(const GraphDivergence& divergence, const EvaluateOptions& options,
-                            bool colour) {
-  if (!divergence.error) return "";
+Table divergence_table(const GraphDivergence& divergence, const EvaluateOptions& options) {
   Table table({{fmt::format("KLD of {}, at the states of {}",
                             plural(static_cast<std::int64_t>(divergence.variables), "variable"),
                             options.compared_at == "minima" ? "each" : "TRUTH"),
                 Table::Align::left},
                {"nats", Table::Align::right}});
+  if (!divergence.error) return table;
   table.add({"divergence", fmt::format("{:.6g}", divergence.error->kld)});
   table.add({"of this, covariances", fmt::format("{:.6g}", divergence.error->covariance)});
   table.add({"and means", fmt::format("{:.6g}", divergence.error->mean)});
-  return "\n" + table.text(colour);
+  return table;
 }
 
-std::string table_text(const TrajectoryError& error, bool by_stamp, bool colour) {
+Table error_table(const TrajectoryError& error, bool by_stamp) {
   Table table({{fmt::format("{} compared{}", plural(error.poses, "pose"),
                             by_stamp ? ", matched by time" : ""),
                 Table::Align::left},
@@ -192,7 +193,7 @@ std::string table_text(const TrajectoryError& error, bool by_stamp, bool colour)
   row("ATE (absolute, after rigid alignment)", error.ate_translation, error.ate_rotation);
   row("RPE (consecutive poses)", error.rpe_translation, error.rpe_rotation);
   row("RPE all to all (every pair)", error.rpe_all_translation, error.rpe_all_rotation);
-  return table.text(colour);
+  return table;
 }
 
 json::object error_json(double translation, double rotation) {
@@ -243,6 +244,7 @@ json::object report_json(const EvaluateOptions& options, bool by_stamp,
 
 int run(const EvaluateOptions& options, Session& session) {
   session.use_threads();
+  check_file(options.latex, session);
   std::optional<CovarianceSolver> solver;  // a wrong name is reported before a file is read
   if (options.kld) {
     solver = make_determinant_solver(options.linear_solver, session.registry(), true);
@@ -279,9 +281,13 @@ int run(const EvaluateOptions& options, Session& session) {
     if (solver) add_divergence(divergence, options, report);
     session.write_json(report);
   });
+  const Table errors = error_table(error, by_stamp), nats = divergence_table(divergence, options);
+  results.write(options.latex, [&] {
+    write_file(options.latex, errors.latex() + (nats.empty() ? "" : "\n" + nats.latex()));
+  });
   results.add([&] {
-    session.print(table_text(error, by_stamp, session.colour()) +
-                  divergence_text(divergence, options, session.colour()));
+    session.print(errors.text(session.colour()) +
+                  (nats.empty() ? "" : "\n" + nats.text(session.colour())));
   });
   results.finish();
   return 0;
@@ -339,6 +345,7 @@ Command add_evaluate(ArgumentParser program) {
   cli.add_option("--linear-solver", options->linear_solver, "gives covariances for --kld")
       .component({"linear_solver"})
       .show_default();
+  add_latex_option(cli, options->latex);
   add_input_options(cli, options->input);
   cli.footer(
       "Root mean squares: ATE after the rigid motion that brings ESTIMATE nearest to TRUTH, RPE "

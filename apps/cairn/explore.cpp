@@ -171,7 +171,7 @@ void check_single(const ExploreOptions& options) {
     if (given) {
       throw Error(ErrorCode::usage,
                   fmt::format("{} is of one run: it goes with one explorer, and without --runs, "
-                              "--csv and --curves",
+                              "--csv, --curves and --latex",
                               option));
     }
   }

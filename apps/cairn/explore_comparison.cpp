@@ -14,6 +14,7 @@
 #include "explore_comparison_report.hpp"
 #include "graph_files.hpp"
 #include "interrupt.hpp"
+#include "latex_table.hpp"
 #include "progress.hpp"
 #include "results.hpp"
 #include "table.hpp"
@@ -67,6 +68,7 @@ void write_outputs(const ComparisonOptions& options, const std::string& page,
                    const ExploreComparison& comparison, Session& session) {
   Results results(session);
   results.write(options.csv, [&] { write_file(options.csv, comparison_csv(comparison)); });
+  results.write(options.latex, [&] { write_file(options.latex, comparison_latex(comparison)); });
   results.write(options.curves,
                 [&] { write_file(options.curves, csv_text(all_curves(comparison))); });
   results.write(page, [&] { write_file(page, comparison_page(comparison, session)); });
@@ -97,10 +99,12 @@ void add_comparison_options(ArgumentParser cli, ComparisonOptions& options) {
       .type_name("FILE");
   cli.add_option("--curves", options.curves, "mean curves of entropies and errors, as CSV")
       .type_name("FILE");
+  add_latex_option(cli, options.latex);
 }
 
 void check_comparison(const ComparisonOptions& options, const std::string& page, Session& session) {
-  for (const std::string& file : {options.csv, options.curves, page}) check_file(file, session);
+  for (const std::string& file : {options.csv, options.curves, options.latex, page})
+    check_file(file, session);
 }
 
 int run_comparison(const ComparisonOptions& options, const std::string& page,

@@ -15,13 +15,13 @@ namespace cairn::app {
 /// Options of `cairn explore` that compare explorers.
 struct ComparisonOptions {
   int runs = 1;
-  std::string csv, curves;
+  std::string csv, curves, latex;
   bool asked_for(const std::vector<std::string>& explorers) const {
-    return explorers.size() > 1 || runs > 1 || !csv.empty() || !curves.empty();
+    return explorers.size() > 1 || runs > 1 || !csv.empty() || !curves.empty() || !latex.empty();
   }
 };
 
-/// --runs, --csv and --curves.
+/// --runs, --csv, --curves and --latex.
 void add_comparison_options(ArgumentParser cli, ComparisonOptions& options);
 /// Finds out before the work whether its files can be written.
 void check_comparison(const ComparisonOptions& options, const std::string& page, Session& session);

@@ -71,7 +71,7 @@ void add_row(Table& table, const ExploreComparison& comparison, std::size_t firs
   table.add(std::move(row));
 }
 
-std::string means_text(const ExploreComparison& comparison, bool colour) {
+Table means_table(const ExploreComparison& comparison) {
   Table table = table_of(comparison, 0);
   add_row(table, comparison, 0, "runs", [&](std::size_t e) {
     return fmt::format("{}",
@@ -84,7 +84,7 @@ std::string means_text(const ExploreComparison& comparison, bool colour) {
       return interval_text(mean_of(comparison, e, measure_named(shown.measure)));
     });
   }
-  return table.text(colour);
+  return table;
 }
 
 /// "-3.2 ± 1.1 *", the star where the interval is clear of zero.
@@ -92,7 +92,7 @@ std::string difference_text(const MeanInterval& difference) {
   return interval_text(difference, true) + (difference.excludes_zero() ? " *" : "");
 }
 
-std::string differences_text(const ExploreComparison& comparison, bool colour) {
+Table differences_table(const ExploreComparison& comparison) {
   Table table = table_of(comparison, 1);
   for (const Shown& shown : kShown) {
     add_row(table, comparison, 1, shown.title, [&](std::size_t e) {
@@ -106,7 +106,7 @@ std::string differences_text(const ExploreComparison& comparison, bool colour) {
   };
   add_map_error("map error at equal coverage [m²]", MapQuality::contradicted);
   add_map_error("wrong cells, as much floor seen [m²]", MapQuality::wrong);
-  return table.text(colour);
+  return table;
 }
 
 /// How many runs of an explorer ended in each way.
@@ -281,12 +281,21 @@ NumberTable curves_over(const ExploreComparison& comparison, const char* x, cons
 }  // namespace
 
 std::string comparison_text(const ExploreComparison& comparison, bool colour) {
-  std::string text = means_text(comparison, colour);
+  std::string text = means_table(comparison).text(colour);
   if (comparison.explorers.size() > 1)
     text += fmt::format("\nDifference from {}, seed by seed (* clear of zero):\n{}",
-                        comparison.explorers.front(), differences_text(comparison, colour));
+                        comparison.explorers.front(), differences_table(comparison).text(colour));
   text += "\nEnds:\n" + ends_text(comparison);
   if (comparison.runs > 1) text += "Means with 95 % intervals (Student's t).\n";
+  return text;
+}
+
+std::string comparison_latex(const ExploreComparison& comparison) {
+  std::string text = means_table(comparison).latex();
+  if (comparison.explorers.size() > 1) {
+    text += fmt::format("\n% difference from {}, seed by seed\n{}", comparison.explorers.front(),
+                        differences_table(comparison).latex());
+  }
   return text;
 }
 

@@ -30,6 +30,8 @@ struct ExploreComparison {
 std::string comparison_text(const ExploreComparison& comparison, bool colour);
 /// A row for each run; the columns are described in docs/explore.md.
 std::string comparison_csv(const ExploreComparison& comparison);
+/// Means, and differences from the first explorer, as tables of LaTeX.
+std::string comparison_latex(const ExploreComparison& comparison);
 boost::json::object comparison_json(const ExploreComparison& comparison);
 
 /// Mean curves by explorer: entropies and coverage against the distance, and against the number of

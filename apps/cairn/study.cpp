@@ -17,6 +17,7 @@
 #include "graph_files.hpp"
 #include "interrupt.hpp"
 #include "json_report.hpp"
+#include "latex_table.hpp"
 #include "progress.hpp"
 #include "recovery_curves.hpp"
 #include "results.hpp"
@@ -112,7 +113,7 @@ struct ProblemsOptions {
   std::string problems;
   std::vector<std::string> topologies{"ekld"}, recoveries{"ncfd"};
   std::string population = "tree:2";
-  std::string curves, against = "time";
+  std::string curves, against = "time", latex;
 };
 
 json::array notes_json(const ReplayRow& row) {
@@ -161,6 +162,7 @@ int solve_problems(const ProblemsOptions& options, Session& session) {
   session.use_threads();
   session.files.add_input(options.problems);
   check_file(options.curves, session);
+  check_file(options.latex, session);
   const std::vector<DenseBlanket> problems = read_problems(options.problems);
   const InterruptGuard guard;
   StatusLine line(session.common.quiet);
@@ -202,6 +204,7 @@ int solve_problems(const ProblemsOptions& options, Session& session) {
                fmt::format("{:.1f}", row.iterations), seconds_text(row.topology_seconds),
                seconds_text(row.recovery_seconds)});
   }
+  results.write(options.latex, [&] { write_file(options.latex, table.latex()); });
   results.add([&] { session.print(table.text(session.colour())); });
   results.finish();
   return guard.interrupted() ? kExitInterrupted : 0;
@@ -227,6 +230,7 @@ Command add_study_problems(ArgumentParser study) {
   cli.add_option("--curves", options->curves,
                  "the mean KLD of each recovery and blanket size as it falls, as CSV")
       .type_name("FILE");
+  add_latex_option(cli, options->latex);
   cli.add_option("--against", options->against, "of --curves: time or iterations")
       .type_name("AXIS")
       .one_of({"time", "iterations"})

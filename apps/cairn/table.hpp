@@ -38,6 +38,8 @@ class Table {
   /// its column (a path, which must stay whole to be copied) makes a line longer.
   /// With `colour`, the titles are bold. Columns without any title have no title line.
   std::string text(bool colour, std::size_t width = output_width()) const;
+  /// A tabular of LaTeX with all columns, as wide as it is; it needs no package.
+  std::string latex() const;
 
  private:
   struct Layout;

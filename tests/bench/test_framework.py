@@ -211,6 +211,19 @@ class PagesTest(unittest.TestCase):
         self.assertEqual(len(pages.table(["name", "value"], []).splitlines()), 2)
 
 
+    def test_tables_of_a_section_become_tabulars_of_latex(self):
+        section = ("Words before.\n\n" + pages.table(["name", "ms & %"], [["a_b", "**1.50 ×**"], ["`c`", "-"]])
+                   + "\nbetween | words\n\n" + pages.table(["name"], []))
+        self.assertEqual([len(rows) for rows in pages.tables_in(section)], [3, 1])
+        first, second = pages.latex(section).split("\n\n")
+        lines = first.splitlines()
+        self.assertEqual((lines[0], lines[-1]), (r"\begin{tabular}{lr}", r"\end{tabular}"))
+        cells = [[cell.strip() for cell in line.rstrip("\\").split(" & ")] for line in lines if " & " in line]
+        self.assertEqual(cells, [["name", r"ms \& \%"], [r"a\_b", "1.50 ×"], ["c", "-"]])
+        self.assertIn("name", second)
+        self.assertEqual(pages.latex("No table.\n"), "")
+
+
 class CommandLineTest(unittest.TestCase):
     def test_the_name_of_a_group_stands_for_all_of_its_studies(self):
         self.assertTrue(command_line.is_chosen("compact_sets", ["compact"]))
@@ -234,11 +247,14 @@ class CommandLineTest(unittest.TestCase):
             # What it said is shown: ctest skips the test where it asks for a plugin that is not built.
             self.assertEqual((ended, (folder / "threads.json").exists()), (0, True), said.getvalue())
             page.write_text("<!-- table:threads -->\n<!-- /table -->\n", encoding="utf-8")
-            self.assertEqual(command_line.main(["--folder", str(folder), "--tables", str(page)]), 0)
+            self.assertEqual(command_line.main(["--folder", str(folder), "--tables", str(page), "--latex", f"{place}/latex"]), 0)
+            latex = (Path(place) / "latex" / "threads.tex").read_text(encoding="utf-8")
             entries = json.loads((folder / "threads.json").read_text(encoding="utf-8"))["entries"]
             written = page.read_text(encoding="utf-8")
         self.assertGreater(number(entries[0], "one.iteration"), number(entries[0], "one.factorize"))
-        self.assertIn(f"{words.milliseconds(number(entries[0], 'two.factorize'))}", written)
+        factorize = words.milliseconds(number(entries[0], 'two.factorize'))
+        self.assertIn(factorize, written)
+        self.assertTrue(latex.startswith(r"\begin{tabular}{l") and factorize in latex and "Quick" not in latex, latex)
         self.assertRegex(written, r"\*Quick run, not a measurement\. .*; commit abc\.\*")
 
     def test_a_number_that_is_none_is_null_in_json(self):
@@ -261,6 +277,7 @@ class ArgumentsTest(unittest.TestCase):
         self.assertIn("there is no study 'nonsense'; there are: graphs", self.refusal("--check", "nonsense"))
         self.assertIn("--data /not/there: there is no such folder", self.refusal("--check", "--data", "/not/there"))
         self.assertIn("--cairn PROGRAM is needed", self.refusal("graphs"))
+        self.assertIn("--latex needs --tables PAGE", self.refusal("--cairn", "x", "--latex", "there"))
 
     def test_arguments_alone_can_be_looked_at(self):
         with tempfile.TemporaryDirectory() as place:

@@ -73,6 +73,16 @@ TEST(BenchCommand, MediansAndPairedRatiosFollowFromTheRunsThatItLists) {
   EXPECT_TRUE(rows[0].at("peak_memory_bytes").is_null());
 }
 
+TEST(BenchCommand, ATableOfLatexHasAllColumnsAndEscapesWhatHasAMeaningThere) {
+  const Outcome outcome = cairn({"bench", "@ring:poses=40", "--linear-solver", "block_cholesky",
+                                 "--repeat", "1", "--no-memory", "--latex", "-"});
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("% @ring:poses=40\n\\begin{tabular}{lrrrrrrrrrl}\n\\hline\n"));
+  EXPECT_THAT(outcome.out,
+              HasSubstr("linear solver & median & min \\dots{} max & ratio & ms/it & "));
+  EXPECT_THAT(outcome.out, HasSubstr("\nblock\\_cholesky & "));
+}
+
 TEST(BenchCommand, EveryRunStartsFromTheSameFirstEstimate) {
   const auto report =
       parse_json(cairn({"bench", "@manhattan:poses=80", "--initial", "spanning_tree", "--repeat",

@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <cmath>
+#include <fstream>
+#include <iterator>
 #include <sstream>
+#include <string>
 
+#include <fmt/core.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -11,6 +15,7 @@
 namespace cairn::test {
 namespace {
 
+using ::testing::EndsWith;
 using ::testing::HasSubstr;
 
 boost::json::value errors(const std::string& estimate, const std::string& truth) {
@@ -102,6 +107,23 @@ class EvaluateDivergence : public ::testing::Test {
               sparse_ = folder_.file("sparse.g2o");
   boost::json::value from_sparsify_;
 };
+
+TEST_F(EvaluateDivergence, IsATableOfLatexToo) {
+  const std::string latex = folder_.file("errors.tex");
+  const Outcome outcome = cairn({"evaluate", sparse_, best_, "--kld", "--latex", latex});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  std::ifstream file(latex);
+  const std::string text{std::istreambuf_iterator<char>(file), {}};
+  const std::string ate =
+      fmt::format("{:.6g}", errors(sparse_, best_).at("ate").at("translation").to_number<double>());
+  EXPECT_THAT(text, HasSubstr("\\begin{tabular}{lrr}\n\\hline\n"));
+  EXPECT_THAT(text, HasSubstr(" & translation [m] & rotation [deg] \\\\\n\\hline\n"));
+  EXPECT_THAT(text, HasSubstr("ATE (absolute, after rigid alignment) & " + ate + " & "));
+  EXPECT_THAT(text, HasSubstr("\\begin{tabular}{lr}\n"));
+  EXPECT_THAT(text, EndsWith("\\hline\n\\end{tabular}\n"));
+  const Outcome printed = cairn({"evaluate", sparse_, best_, "--latex", "-"});
+  EXPECT_THAT(printed.out, HasSubstr("\\begin{tabular}{lrr}"));
+}
 
 TEST_F(EvaluateDivergence, OfASparseGraphIsWhatSparsifyReports) {
   const auto found = report(sparse_, best_);

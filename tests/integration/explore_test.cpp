@@ -232,15 +232,21 @@ TEST_F(Explore, ComparesExplorersAtTheSameSeedsWhateverTheNumberOfThreads) {
 
 TEST_F(Explore, AComparisonIsWrittenAsRowsCurvesAndAPage) {
   const std::string runs = folder_.file("runs.csv"), curves = folder_.file("curves.csv"),
-                    page = folder_.file("compare.html"), report = folder_.file("compare.json");
-  ASSERT_EQ(explore({"--explorer", "frontier,random", "--runs", "2", "--until", "distance=10",
-                     "--csv", runs, "--curves", curves, "--html", page, "--json", report})
-                .exit_code,
-            0);
+                    page = folder_.file("compare.html"), report = folder_.file("compare.json"),
+                    latex = folder_.file("compare.tex");
+  ASSERT_EQ(
+      explore({"--explorer", "frontier,random", "--runs", "2", "--until", "distance=10", "--csv",
+               runs, "--curves", curves, "--latex", latex, "--html", page, "--json", report})
+          .exit_code,
+      0);
   const auto rows = lines(read_text(runs));
   ASSERT_EQ(rows.size(), 5U);
   EXPECT_TRUE(rows[0].starts_with("explorer,seed,end,why,distance,"));
   EXPECT_TRUE(rows[4].starts_with("random,2,"));
+  EXPECT_THAT(read_text(latex),
+              AllOf(HasSubstr("\\begin{tabular}{lrr}\n\\hline\n & frontier & random \\\\\n"),
+                    HasSubstr("runs & 2 & 2 \\\\\n"), HasSubstr(" $\\pm$ "),
+                    HasSubstr("% difference from frontier, seed by seed\n\\begin{tabular}{lr}\n")));
   EXPECT_THAT(read_text(page), AllOf(HasSubstr("<!doctype html>"), HasSubstr("data:image/svg"),
                                      ::testing::Not(HasSubstr("src=\"http"))));
   EXPECT_EQ(cairn({"plot", curves, "--x", "distance", "--y", "map_entropy *", "--y",

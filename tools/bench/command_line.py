@@ -7,7 +7,7 @@ import json
 import math
 from pathlib import Path
 
-from .pages import put_into
+from .pages import latex, put_into
 from .program import TINY, Cairn, Failed
 from .reports import Json, items, member, number, text
 from .studies import ALL
@@ -60,6 +60,8 @@ def measure_study(study: Study, bench: Bench, report: Json, file: Path) -> None:
 
 def write_tables(arguments: argparse.Namespace) -> None:
     """Of every study that there is a report of; the others' sections stay as they are."""
+    if arguments.latex:
+        arguments.latex.mkdir(parents=True, exist_ok=True)
     pages = [page.read_text(encoding="utf-8") for page in arguments.tables]
     for study in ALL:
         file = arguments.folder / f"{study.name}.json"
@@ -68,6 +70,8 @@ def write_tables(arguments: argparse.Namespace) -> None:
         report = json.loads(file.read_text(encoding="utf-8", errors="replace"))
         for name, markdown in study.sections(items(report, "entries")).items():
             put_into(pages, name, markdown + provenance(report))
+            if arguments.latex and (tables := latex(markdown)):
+                (arguments.latex / f"{name}.tex").write_text(tables, encoding="utf-8")
         for name, content in study.files(items(report, "entries")).items():
             (arguments.folder / name).write_text(content, encoding="utf-8")
     for page, content in zip(arguments.tables, pages):
@@ -90,10 +94,13 @@ def parse(words: list[str]) -> argparse.Namespace:
     parser.add_argument("--quick", action="store_true", help="few and small graphs: shows that it works, no more")
     parser.add_argument("--check", action="store_true", help="only look at the arguments")
     parser.add_argument("--tables", type=Path, nargs="+", metavar="PAGE", help="do not measure: fill in the tables of these")
+    parser.add_argument("--latex", type=Path, metavar="FOLDER", help="with --tables: the same tables in LaTeX too, a file NAME.tex each")
     arguments = parser.parse_intermixed_args(words)
     for name in arguments.studies:
         if name not in names:
             parser.error(f"there is no study '{name}'; there are: {' '.join(names)}")
+    if arguments.latex and not arguments.tables and not arguments.check:
+        parser.error("--latex needs --tables PAGE: it writes the tables that are filled in")
     if arguments.data and not arguments.data.is_dir():
         parser.error(f"--data {arguments.data}: there is no such folder")
     if not arguments.tables and not arguments.cairn and not arguments.check:

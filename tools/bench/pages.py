@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Tables in Markdown, and their places in the pages of docs/."""
+"""Tables in Markdown, their places in the pages of docs/, and the same tables in LaTeX."""
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from collections.abc import Iterator, Sequence
 
 from tabulate import tabulate  # type: ignore[import]
 
@@ -14,6 +15,23 @@ def table(heading: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     aligned = ["left"] + ["right"] * (len(heading) - 1) if rows else None  # tabulate has no columns without rows
     markdown: str = tabulate(rows, heading, tablefmt="pipe", colalign=aligned, disable_numparse=True)
     return markdown + "\n"
+
+
+def tables_in(markdown: str) -> Iterator[list[list[str]]]:
+    """The tables of a section as `table` writes them: the cells of each row, first those of the heading."""
+    for block in re.findall(r"(?:^\|.*\n)+", markdown, re.MULTILINE):
+        rows = [[cell.strip() for cell in line.strip().strip("|").split("|")] for line in block.splitlines()]
+        yield rows[:1] + rows[2:]
+
+
+def latex(markdown: str) -> str:
+    """The tables of a section as tabulars of LaTeX, one after the other; emphasis is left out."""
+    texts = []
+    for heading, *rows in tables_in(markdown):
+        plain = [[re.sub(r"\*\*|`", "", cell) for cell in row] for row in rows]
+        aligned = ["left"] + ["right"] * (len(heading) - 1) if rows else None
+        texts.append(tabulate(plain, heading, tablefmt="latex", colalign=aligned, disable_numparse=True) + "\n")
+    return "\n".join(texts)
 
 
 def marker(name: str) -> str:

@@ -43,13 +43,10 @@ std::vector<std::string> argument_names(const char* function) {
   return names;
 }
 
-}  // namespace
-
-ComponentSpec component_spec(const std::string& text, const py::kwargs& options,
-                             std::string_view kind, const char* function) {
-  ComponentSpec spec = component_spec(text, options);
-  if (options.empty()) return spec;
-  const OptionTable table = default_registry().options(kind, spec.name);
+/// Refuses an option that the component does not have and that is near to an argument.
+void check_names(const std::string& component, const py::kwargs& options, std::string_view kind,
+                 const char* function) {
+  const OptionTable table = default_registry().options(kind, component);
   const std::vector<std::string> arguments = argument_names(function);
   std::vector<std::string> all = arguments;
   for (const OptionSpec& option : table.specs()) all.push_back(option.name);
@@ -60,9 +57,16 @@ ComponentSpec component_spec(const std::string& text, const py::kwargs& options,
     throw Error(
         ErrorCode::usage,
         fmt::format("{} has no argument '{}', nor has {} such an option; did you mean '{}'?",
-                    function, name, spec.name, nearest));
+                    function, name, component, nearest));
   }
-  return spec;
+}
+
+}  // namespace
+
+ComponentSpec component_spec(const std::string& text, const py::kwargs& options,
+                             std::string_view kind, const char* function) {
+  if (!options.empty()) check_names(parse_component(text).name, options, kind, function);
+  return component_spec(text, options);
 }
 
 ComponentSpec component_spec(const std::string& text, const py::kwargs& options) {

@@ -256,7 +256,8 @@ TEST_F(File, WaitsForTheReaderOfAFifoUntilItIsInterrupted) {
 }
 
 TEST_F(File, WithoutFormatsSaysWherePluginsWereFoundAndLookedFor) {
-  Registry none(PluginSearch{.environment = false,
+  Registry none(PluginSearch{.files = {},
+                             .environment = false,
                              .user_folder = false,
                              .default_folder = false,
                              .folders = {folder_ / "missing"}});
