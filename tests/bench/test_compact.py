@@ -198,6 +198,18 @@ class ChecksTest(unittest.TestCase):
         self.assertIn("|  | 10 % | none | > 300 s | - |", text)
 
 
+class SeedsTest(unittest.TestCase):
+    RUNS = [{"apal": {"ate": 0.2}, "fpfl": {"ate": 0.3 + 0.1 * k}, "by_rule": {"ate": 0.3 * (k + 1)}} for k in range(10)]
+
+    def test_the_papers_ratio_is_put_among_those_of_all_draws(self):
+        text = section(report("compact_seeds", {"name": "ellipse3d", "runs": self.RUNS}), "compact-seeds")
+        self.assertIn("| ellipse3d | APAL | 10 | 0.200 | 0.173 |", text)
+        # Of ten values the second from either end; the paper has 0.338 m and 0.173 m.
+        self.assertIn("|  | FPFL as published | 10 | 1.65 | 0.338 | 8.25 × | 3.00 … 13.5 | 4.50 … 12.0 | 1.50 … 15.0 | 1.95 × | 10 % |\n",
+                      text)
+        self.assertIn("|  | FPFL | 10 | 0.750 |  | 3.75 × | 2.00 … 5.50 |", text)
+
+
 class MillionTest(unittest.TestCase):
     def test_there_is_a_row_for_each_stop(self):
         million = report("compact_million", {

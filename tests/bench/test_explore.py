@@ -3,7 +3,7 @@
 import math
 import unittest
 
-from bench.intervals import MeanInterval, mean_interval, paired_difference, student_t_quantile, value_at
+from bench.intervals import MeanInterval, mean_interval, median_interval, paired_difference, student_t_quantile, value_at
 from bench.published import said
 from reports_of import report, section
 
@@ -41,6 +41,14 @@ class IntervalsTest(unittest.TestCase):
     def test_of_one_number_there_is_no_interval_and_of_none_no_mean(self):
         self.assertEqual(mean_interval([2.5]).text(), "2.500")
         self.assertEqual(mean_interval([math.nan]).text(), "-")
+
+    def test_the_interval_of_a_median_is_of_order_statistics(self):
+        # Ranks from tables of the sign test, at 95 %.
+        for count, rank in [(6, 1), (9, 2), (10, 2), (25, 8), (40, 14), (100, 40)]:
+            values = [float(k) for k in range(count, 0, -1)]
+            self.assertEqual(median_interval(values), (float(rank), float(count + 1 - rank)), count)
+        self.assertEqual(median_interval([3.0, 1.0]), (1.0, 3.0))
+        self.assertTrue(all(math.isnan(end) for end in median_interval([])))
 
     def test_two_digits_of_the_half_width_are_written(self):
         self.assertEqual(MeanInterval(2, 22.0, 25.4).text(), "22 ± 25")

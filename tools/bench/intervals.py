@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Means with their 95 % confidence intervals by Student's t, as `cairn explore` has them.
+"""Means with their 95 % confidence intervals by Student's t, as `cairn explore` has them, and medians by order statistics.
 
 SciPy, which has the quantile of t, cannot be installed beside Boost 1.81 on Debian 12.
 """
@@ -64,6 +64,20 @@ def mean_interval(values: Sequence[float]) -> MeanInterval:
 def paired_difference(values: Sequence[float], references: Sequence[float]) -> MeanInterval:
     """Of what is left of the first after the second, one by one."""
     return mean_interval([a - b for a, b in zip(values, references)])
+
+
+def median_interval(values: Sequence[float], confidence: float = 0.95) -> tuple[float, float]:
+    """The two order statistics that contain the median of whatever distribution with this confidence: the k-th from either end,
+    with the largest k for which at most k - 1 of n tosses of a coin are heads with probability (1 - confidence) / 2. The ends
+    where there are too few values, NaN of nothing."""
+    n = len(values)
+    if n == 0:
+        return NONE, NONE
+    rank, below = 0, 0.0
+    while (below := below + math.comb(n, rank) / 2.0 ** n) <= (1.0 - confidence) / 2.0:
+        rank += 1
+    rising = sorted(values)
+    return rising[max(rank - 1, 0)], rising[n - max(rank, 1)]
 
 
 def value_at(x: Sequence[float], y: Sequence[float], place: float) -> float:
