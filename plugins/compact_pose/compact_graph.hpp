@@ -196,7 +196,7 @@ class CompactGraph {
   void see(std::vector<Variable> added, std::span<const Factor> factors, PolicySeconds& seconds);
 
   /// Removes landmarks, and all that was measured of them.
-  void release(std::span<const Id> landmarks);
+  void release(std::span<const Id> landmarks, PolicySeconds& seconds);
   /// What has left the graph since this was called last: by `release`, or, since with it there was
   /// no covariance of what an update measured, by that update.
   std::vector<LeftOut> take_left_out();
@@ -296,6 +296,7 @@ class CompactGraph {
   std::map<Id, std::vector<LandmarkFactor>> landmark_factors() const;
   std::vector<std::size_t> not_linear(Id of, std::span<const LandmarkFactor> factors) const;
   void leave_out(Id of, std::span<const LandmarkFactor> factors, bool with_landmark);
+  void leave_out(std::span<const Id> landmarks);
   void restore_covariances(std::span<const Id> measured);
   InformationLoss loss_without(std::size_t k, bool all, std::span<const IncidentFactor> incident);
   void recast_chains(Id leaving, Id cover);

@@ -114,6 +114,15 @@ class CompactPose final : public PosePolicy, public OptionFinder {
     Variable landmark;
     std::vector<Measured> factors;
   };
+  /// Where a single pose puts a landmark; without a state: it does not determine it.
+  struct FirstPlace {
+    std::optional<std::vector<double>> state;
+    std::string problem;  ///< why it cannot be used; empty: it can
+  };
+  /// Of a landmark in the graph: of how many poses measurements were used, or refused by the gate.
+  struct Agreement {
+    int used = 0, refused = 0;
+  };
   /// A landmark that is not in the graph, since nothing determines it so far, and what poses that
   /// are kept measure of it.
   struct WaitingLandmark {
@@ -150,11 +159,19 @@ class CompactPose final : public PosePolicy, public OptionFinder {
   bool linear(Id landmark, Id pose, const PlacedState& x, std::span<const Measured> factors,
               const ObservationRows& rows, const Eigen::MatrixXd& joint) const;
   void use_landmarks();
-  std::optional<std::vector<double>> place(const Seen& seen) const;
+  FirstPlace place(const Seen& seen) const;
+  void release_contradicted();
   bool add_landmarks();
   WaitingLandmark with_newest(const Seen& seen) const;
   std::optional<Triangulated> triangulated(const WaitingLandmark& waiting);
+  std::vector<PlacedView> placed_views(const WaitingLandmark& waiting,
+                                       std::span<const std::size_t> chosen) const;
+  std::optional<Triangulated> consensus_of(
+      std::span<const std::size_t> places,
+      const std::function<std::optional<Triangulated>(std::span<const std::size_t>)>& of) const;
   bool fits(const Triangulated& triangulated) const;
+  bool agree(const Triangulated& some) const;
+  void limit_waiting(Id newest);
   void add_triangulated(WaitingLandmark waiting, Triangulated triangulated);
   void judge_views(Id landmark, std::span<const View> views);
   void settle_landmark(Id landmark);
@@ -202,7 +219,8 @@ class CompactPose final : public PosePolicy, public OptionFinder {
   std::vector<WaitingPrior> waiting_priors_;
   std::map<Id, WaitingLandmark> waiting_landmarks_;
   int nonlinear_poses_ = 0;  ///< in a row, of which no measurement of a landmark was linear
-  std::unordered_map<Id, int> removals_;  ///< how often landmarks have left the graph
+  std::unordered_map<Id, Agreement> agreement_;  ///< with a gate
+  std::unordered_map<Id, int> removals_;         ///< how often landmarks have left the graph
   ThresholdFinder finder_;
   TypicalMatch typical_;
   MatchRecord record_;

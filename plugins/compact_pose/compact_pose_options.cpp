@@ -75,6 +75,9 @@ OptionFields<CompactPoseOptions> CompactPoseOptions::fields() {
       .boolean("several_views", &O::several_views,
                "landmarks that no single measurement determines, such as by bearings alone, are "
                "added when several poses determine them together; false: never")
+      .integer("waiting", &O::waiting, 1, 1e9,
+               "with several_views: most landmarks that wait for other poses to determine them; of "
+               "more, what was measured of the one not seen for longest is given up")
       .text("sensor", &O::sensor, numbers, text_of,
             "expected covariance of a match: standard deviations [m] and [rad], or its upper "
             "triangle; empty: the median of the latest matches, at first as odometry")

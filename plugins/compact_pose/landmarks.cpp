@@ -29,6 +29,9 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
+/// Of a position, in its standard deviations.
+constexpr double kMostDigits = 1e12;
+
 /// After so many poses in a row of which no measurement is linear, all of them are used.
 constexpr int kMostNonlinearPoses = 5;
 
@@ -323,6 +326,11 @@ void CompactPose::use_landmarks() {
                             return lost || linear(seen.landmark.id, graph_.newest_id(), x,
                                                   seen.factors, rows[k], joint);
                           }));
+  for (std::size_t k = 0; k < known.size() && check_->on(); ++k) {
+    Agreement& agreement = agreement_[seen_[known[k]].landmark.id];
+    agreement.used += fits[k].used;
+    agreement.refused += fits[k].informative && fits[k].linear && !fits[k].used;
+  }
   const auto any = [&](auto what) { return std::ranges::any_of(fits, what); };
   if (any([](const ObservationFit& fit) { return fit.used; })) {
     nonlinear_poses_ = 0;
@@ -340,23 +348,47 @@ void CompactPose::use_landmarks() {
   for (auto k = known.rbegin(); k != known.rend(); ++k)  // they are settled
     seen_.erase(seen_.begin() + static_cast<std::ptrdiff_t>(*k));
   if (!used.empty()) see({}, used);
+  release_contradicted();
 }
 
-/// Where the factors of an observation put a landmark that is new, or it was given; nothing: they
-/// do not determine it.
-std::optional<std::vector<double>> CompactPose::place(const Seen& seen) const {
+/// Landmarks that more poses contradict than agree with: what put them there was false.
+void CompactPose::release_contradicted() {
+  std::vector<Id> contradicted;
+  for (const auto& [id, agreement] : agreement_) {
+    if (agreement.refused > agreement.used && graph_.landmark(id)) contradicted.push_back(id);
+  }
+  std::ranges::sort(contradicted);
+  if (contradicted.empty()) return;
+  graph_.release(contradicted, report_.seconds);
+  settle_left_out();
+}
+
+/// Where the factors of an observation put a landmark that is new, or it was given.
+CompactPose::FirstPlace CompactPose::place(const Seen& seen) const {
   GraphUpdate trial;
   trial.variables.push_back(seen.landmark);
   for (const Measured& factor : seen.factors) trial.factors.push_back(factor.factor());
   const auto pose = graph_.group().view(graph_.newest_state());
   const std::vector<int> unplaced =
       place_variables(trial, [&](Id) { return std::span<const double>(pose); });
-  if (!unplaced.empty()) return std::nullopt;
+  if (!unplaced.empty()) return {};
   std::vector<double>& state = trial.variables.front().state;
   const ObservationRows rows =
       linearized(seen.factors, graph_.newest_id(), graph_.newest_state().data(), state.data());
-  if (rank(rows.J_landmark) < seen.landmark.type->tangent_size()) return std::nullopt;
-  return std::move(state);
+  const double distance =
+      (position(*seen.landmark.type, state) - graph_.group().place(graph_.newest_state()).at.t)
+          .norm();
+  // Of the standard deviation 1/|J|.
+  if (!rows.e.allFinite() || !(distance * rows.J_landmark.norm() < kMostDigits)) {
+    return {.state = {},
+            .problem = fmt::format(
+                "what pose {} measured of landmark {} is left out: it puts the landmark {:.3g} m "
+                "away, of which rounding leaves no digit that was measured; expected a distance of "
+                "less than {:.0e} times its standard deviation",
+                graph_.newest_id(), seen.landmark.id, distance, kMostDigits)};
+  }
+  if (rank(rows.J_landmark) < seen.landmark.type->tangent_size()) return {};
+  return {.state = std::move(state), .problem = {}};
 }
 
 /// Those that the newest pose, which is kept, sees first. Whether there are any.
@@ -373,13 +405,20 @@ bool CompactPose::add_landmarks() {
       continue;
     }
     if (!twice) {
-      std::optional<std::vector<double>> state = place(seen);
-      if (!state) {
+      FirstPlace first = place(seen);
+      if (!first.problem.empty()) {
+        report_.notes.push_back(std::move(first.problem));
+        report_.landmarks.push_back({.pose = report_.id,
+                                     .landmark = id,
+                                     .factors = static_cast<int>(std::ssize(seen.factors))});
+        continue;
+      }
+      if (!first.state) {
         undetermined.push_back(std::move(seen));
         continue;
       }
       added.push_back(seen.landmark);
-      added.back().state = *std::move(state);
+      added.back().state = *std::move(first.state);
     }
     const bool kept = graph_.newest_kept();
     report_.landmarks.push_back({.pose = report_.id,
@@ -395,7 +434,10 @@ bool CompactPose::add_landmarks() {
     std::vector<Id> ids;
     for (const Variable& landmark : added) ids.push_back(landmark.id);
     see(std::move(added), factors);
-    for (const Id id : ids) settle_landmark(id);
+    for (const Id id : ids) {
+      if (check_->on()) agreement_[id].used = 1;
+      settle_landmark(id);
+    }
     any = true;
   }
   for (const Seen& seen : undetermined) any = add_or_wait(seen) || any;

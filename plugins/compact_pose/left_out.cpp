@@ -10,6 +10,7 @@
 #include <set>
 #include <utility>
 
+#include "cairn/runtime/timed.hpp"
 #include "compact_graph.hpp"
 #include "dense/cholesky.hpp"
 #include "dense/eigenvalues.hpp"
@@ -130,11 +131,21 @@ void CompactGraph::leave_out(Id of, std::span<const LandmarkFactor> factors, boo
   landmark_types_.erase(of);
 }
 
-void CompactGraph::release(std::span<const Id> landmarks) {
+/// Those of these that are landmarks.
+void CompactGraph::leave_out(std::span<const Id> landmarks) {
   std::map<Id, std::vector<LandmarkFactor>> all = landmark_factors();
   for (const Id id : landmarks) {
     if (landmark(id)) leave_out(id, all[id], true);
   }
+}
+
+void CompactGraph::release(std::span<const Id> landmarks, PolicySeconds& seconds) {
+  update({}, seconds);
+  const Timed timed(seconds.estimate);
+  leave_out(landmarks);
+  estimator_->update({});
+  copy_.reset();
+  refresh();
 }
 
 /// After an update that has left variables without a covariance; `measured`: what its factors are
@@ -153,7 +164,7 @@ void CompactGraph::restore_covariances(std::span<const Id> measured) {
     any = true;
   }
   if (any && solved_anew(measured)) return;
-  release(measured);
+  leave_out(measured);
   (void)solved_anew(measured);
 }
 

@@ -271,7 +271,16 @@ MeasuredFit fit_of(const Rows& rows, const MatrixXd& covariance) {
   J << rows.J_point, rows.e, rows.J_poses;
   const MatrixXd rest = eliminate(J, d);
   const MatrixXd R = rest.rightCols(rows.J_poses.cols());
-  return compare(rest.col(0), R * covariance * R.transpose(), R);
+  MeasuredFit fit = compare(rest.col(0), R * covariance * R.transpose(), R);
+  // Where the landmark explains everything, R is rounding: beside J_p, it measures nothing.
+  const auto squares = [](const MatrixXd& M) {
+    return Eigen::SelfAdjointEigenSolver<MatrixXd>(MatrixXd(M * M.transpose()),
+                                                   Eigen::EigenvaluesOnly)
+        .eigenvalues();
+  };
+  const double nothing = kNothing * squares(rows.J_poses).maxCoeff();
+  fit.dof = static_cast<int>((squares(R).array() > nothing).count());
+  return fit;
 }
 
 }  // namespace

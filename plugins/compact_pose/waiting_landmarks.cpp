@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <limits>
+#include <numeric>
 #include <utility>
 
 #include "compact_pose.hpp"
@@ -16,6 +17,9 @@ namespace {
 /// Of so many views at most a landmark is triangulated: the first, the last and some between. The
 /// others are judged one by one once it is in the graph.
 constexpr std::size_t kMostViews = 8;
+
+/// Of so many poses at most a landmark waits for others: older ones are given up.
+constexpr std::size_t kMostWaitingViews = 64;
 
 /// A landmark that has left the graph so often is left out for good.
 constexpr int kMostRemovals = 3;
@@ -50,31 +54,86 @@ CompactPose::WaitingLandmark CompactPose::with_newest(const Seen& seen) const {
   return all;
 }
 
-/// Where views of which the last is the newest pose's put their landmark, and which of them say so.
-std::optional<CompactPose::Triangulated> CompactPose::triangulated(const WaitingLandmark& waiting) {
-  Triangulated result{.chosen = chosen_of(waiting.views.size()), .found = {}};
+/// What the triangulation of a landmark needs of each of some of its views, these numbers.
+std::vector<PlacedView> CompactPose::placed_views(const WaitingLandmark& waiting,
+                                                  std::span<const std::size_t> chosen) const {
+  const RigidGroup& group = graph_.group();
+  const auto state = [&](const View& view) -> const State& {
+    const int pose = graph_.find(view.pose);
+    return pose < 0 ? graph_.newest_state() : graph_.state(pose);
+  };
+  const PlacedState last = group.place(state(waiting.views[chosen.back()]));
   std::vector<PlacedView> views;
-  std::vector<int> poses;
-  const PlacedState last = graph_.group().place(graph_.newest_state());
-  for (const std::size_t k : result.chosen) {
+  for (const std::size_t k : chosen) {
     const View& view = waiting.views[k];
-    const bool newest = view.pose == graph_.newest_id();
-    const int pose = newest ? -1 : graph_.find(view.pose);
-    const State& x = newest ? graph_.newest_state() : graph_.state(pose);
-    if (!newest) poses.push_back(pose);
-    const PlacedState placed = graph_.group().place(x);
+    const PlacedState placed = group.place(state(view));
     views.push_back({.factors = view.factors,
                      .pose = view.pose,
-                     .x = x,
+                     .x = placed.x,
                      .at = placed.at.t,
-                     .to_last = graph_.group().displacement(last, placed).adjoint});
+                     .to_last = group.displacement(last, placed).adjoint});
   }
-  std::optional<Triangulation> found =
-      triangulate(*waiting.landmark.type, views, graph_.joint_covariance(poses, report_.seconds),
-                  options_.trust);
-  if (!found) return std::nullopt;
-  result.found = std::move(*found);
-  return result;
+  return views;
+}
+
+/// Where views of which the last is the newest pose's put their landmark, and which of them say so.
+std::optional<CompactPose::Triangulated> CompactPose::triangulated(const WaitingLandmark& waiting) {
+  const std::vector<std::size_t> all = chosen_of(waiting.views.size());
+  std::vector<int> poses;
+  for (const std::size_t k : all) {
+    const Id pose = waiting.views[k].pose;
+    if (pose != graph_.newest_id()) poses.push_back(graph_.find(pose));
+  }
+  const Eigen::MatrixXd covariance = graph_.joint_covariance(poses, report_.seconds);
+  const Eigen::Index n = graph_.group().tangent_size();
+  const auto of = [&](std::span<const std::size_t> places) -> std::optional<Triangulated> {
+    Triangulated some{.chosen = {}, .found = {}};
+    std::vector<Eigen::Index> rows;
+    for (const std::size_t place : places) {
+      some.chosen.push_back(all[place]);
+      for (Eigen::Index r = 0; r < n; ++r) rows.push_back(n * static_cast<Eigen::Index>(place) + r);
+    }
+    std::optional<Triangulation> found =
+        triangulate(*waiting.landmark.type, placed_views(waiting, some.chosen),
+                    Eigen::MatrixXd(covariance(rows, rows)), options_.trust);
+    if (!found) return std::nullopt;
+    some.found = std::move(*found);
+    return some;
+  };
+  std::vector<std::size_t> places(all.size());
+  std::iota(places.begin(), places.end(), std::size_t{0});
+  std::optional<Triangulated> found = of(places);
+  if (!check_->on() || (found && agree(*found))) return found;
+  if (std::optional<Triangulated> consensus = consensus_of(places, of)) return consensus;
+  return found;
+}
+
+/// Whether views agree, of which there are more than their landmark needs: any others do.
+bool CompactPose::agree(const Triangulated& some) const {
+  return some.found.fit.dof > 0 && fits(some);
+}
+
+/// The largest set of views that agree without one or two of all, and are more than half of them:
+/// the best of these. Nothing: there is none.
+std::optional<CompactPose::Triangulated> CompactPose::consensus_of(
+    std::span<const std::size_t> places,
+    const std::function<std::optional<Triangulated>(std::span<const std::size_t>)>& of) const {
+  std::optional<Triangulated> best;
+  const auto consider = [&](std::size_t without, std::size_t and_without) {
+    std::vector<std::size_t> others;
+    for (const std::size_t place : places) {
+      if (place != without && place != and_without) others.push_back(place);
+    }
+    std::optional<Triangulated> found = of(others);
+    if (!found || !agree(*found)) return;
+    if (!best || found->found.fit.innovation < best->found.fit.innovation) best = std::move(found);
+  };
+  const std::size_t count = places.size();
+  for (std::size_t k = 0; k < count && 2 * (count - 1) > count; ++k) consider(k, k);
+  for (std::size_t k = 0; k < count && !best && 2 * (count - 2) > count; ++k) {
+    for (std::size_t other = 0; other < k; ++other) consider(k, other);
+  }
+  return best;
 }
 
 /// Adds a landmark with the views that put it there, and judges the others.
@@ -95,6 +154,7 @@ void CompactPose::add_triangulated(WaitingLandmark waiting, Triangulated triangu
     view.factors.clear();
   }
   std::erase_if(waiting.views, [](const View& view) { return view.factors.empty(); });
+  if (check_->on()) agreement_[id].used = static_cast<int>(std::ssize(triangulated.chosen));
   waiting_landmarks_.erase(id);
   see({waiting.landmark}, factors);
   judge_views(id, waiting.views);
@@ -154,7 +214,9 @@ bool CompactPose::use_waiting_landmarks() {
       continue;
     WaitingLandmark all = with_newest(seen_[k]);
     std::optional<Triangulated> found = triangulated(all);
-    if (!found || !(found->found.fit.gain > landmark_gain_) || !fits(*found)) continue;
+    if (!found || !(found->found.fit.gain > landmark_gain_) ||
+        !(check_->on() ? agree(*found) : fits(*found)))
+      continue;
     seen_.erase(seen_.begin() + static_cast<std::ptrdiff_t>(k));
     add_triangulated(std::move(all), std::move(*found));
     return true;  // the others are added to a pose that is kept
@@ -187,19 +249,42 @@ bool CompactPose::add_or_wait(const Seen& seen) {
   }
   WaitingLandmark all = with_newest(seen);
   std::optional<Triangulated> found = triangulated(all);
-  if (found && fits(*found)) {
+  if (found && (check_->on() ? agree(*found) : fits(*found))) {
     add_triangulated(std::move(all), std::move(*found));
     return true;
   }
-  if (found) {
-    report.verdict = LinkVerdict::inconsistent;
-    report.innovation = found->found.fit.innovation;
-  } else {
-    report.verdict = LinkVerdict::waiting;
-    waiting_landmarks_.insert_or_assign(id, std::move(all));
-  }
+  report.verdict = LinkVerdict::waiting;
+  if (found) report.innovation = found->found.fit.innovation;
   report_.landmarks.push_back(report);
+  waiting_landmarks_.insert_or_assign(id, std::move(all));
+  limit_waiting(id);
   return false;
+}
+
+/// Gives up what waits of the landmark that was not seen for longest, where more than so many wait;
+/// and of the newest's views the oldest.
+void CompactPose::limit_waiting(Id newest) {
+  const auto give_up = [&](Id id, const View& view) {
+    report_.landmarks.push_back({.pose = view.pose,
+                                 .landmark = id,
+                                 .factors = static_cast<int>(std::ssize(view.factors)),
+                                 .gain = std::numeric_limits<double>::infinity()});
+  };
+  std::vector<View>& views = waiting_landmarks_.at(newest).views;
+  while (views.size() > kMostWaitingViews) {
+    give_up(newest, views.front());
+    views.erase(views.begin());
+  }
+  const auto waits = [](const auto& one) { return !one.second.views.empty(); };
+  while (std::ranges::count_if(waiting_landmarks_, waits) > options_.waiting) {
+    const auto last_seen = [&](const auto& one) {
+      return waits(one) ? graph_.find(one.second.views.back().pose)
+                        : std::numeric_limits<int>::max();
+    };
+    auto& [id, oldest] = *std::ranges::min_element(waiting_landmarks_, {}, last_seen);
+    for (const View& view : oldest.views) give_up(id, view);
+    oldest.views.clear();
+  }
 }
 
 void CompactPose::see(std::vector<Variable> added, std::span<const Factor> factors) {
@@ -216,6 +301,7 @@ void CompactPose::settle_left_out() {
     if (left.removed) {
       waiting_landmarks_.try_emplace(id, WaitingLandmark{.landmark = left.landmark, .views = {}});
       ++removals_[id];
+      agreement_.erase(id);
     }
     for (const auto& [pose, factor] : left.factors) {
       report_.landmarks.push_back({.pose = pose,

@@ -102,7 +102,7 @@ TEST_F(LeftOutOfTheGraph, AreTheLandmarksThatAreToBeReleased) {
   EXPECT_THAT(graph_.take_left_out(), IsEmpty());
   ASSERT_THAT(graph_.landmarks(), ElementsAre(kLandmark, kLandmark + 1));
   const std::array<Id, 1> one{kLandmark};
-  graph_.release(one);
+  graph_.release(one, seconds_);
   EXPECT_THAT(graph_.landmarks(), ElementsAre(kLandmark + 1));
   EXPECT_THAT(graph_.take_left_out(), SizeIs(1));
   EXPECT_EQ(graph_.factor_count(), 3 + 4);
@@ -212,6 +212,109 @@ TEST_F(LeftOutOfASession, IsNoSecondMeasurementByThePoseThatDeterminesTheLandmar
     poses.push_back(one.pose);
   }
   EXPECT_THAT(poses, ElementsAre(0, 1, 16, 16));
+}
+
+/// With a gate, what the first pose sees may be something else.
+class FalseFirstView : public LeftOutOfASession {
+ protected:
+  Eigen::Vector2d position() {
+    const auto state = policy_->estimator().state(kLandmark);
+    return {state[0], state[1]};
+  }
+  /// What the newest pose measures of where it is.
+  Factor seen_at(const Eigen::Vector2d& at) {
+    return {registry_.factor_type("EDGE_SE2_XY"),
+            {newest_, kLandmark},
+            {at.x() - static_cast<double>(newest_), at.y()},
+            {100.0, 0.0, 100.0}};
+  }
+  const Eigen::Vector2d at_{5.0, 3.0};
+};
+
+TEST_F(FalseFirstView, OfABearingIsOutvoted) {
+  begin("strategy=apfl,several_views=true,gate=0.999,landmark_gain=0");
+  see(bearing(0, -1.0));
+  std::vector<LandmarkReport> reports = advance().landmarks;
+  while (newest_ < 8) {
+    see(exact(newest_, at_));
+    std::ranges::copy(advance().landmarks, std::back_inserter(reports));
+  }
+  ASSERT_THAT(policy_->landmarks(), ElementsAre(kLandmark));
+  EXPECT_LT((position() - at_).norm(), 0.1);
+  const auto of_first = [](const LandmarkReport& one) { return one.pose == 0; };
+  EXPECT_EQ(std::ranges::count_if(reports, of_first), 2);  // it waits, then is judged
+  const auto last = std::ranges::find_if(reports.rbegin(), reports.rend(), of_first);
+  EXPECT_EQ(last->verdict, LinkVerdict::inconsistent);
+}
+
+TEST_F(FalseFirstView, IsNotAgreedWithByOneOther) {
+  for (const bool gate : {false, true}) {
+    newest_ = 0;
+    begin(std::string("strategy=apfl,several_views=true") + (gate ? ",gate=0.999" : ""));
+    for (int pose = 0; pose < 6; ++pose) {
+      if (pose == 0 || pose == 4) see(exact(newest_, at_));
+      advance();
+    }
+    // Two bearings meet wherever they point to.
+    EXPECT_EQ(policy_->landmarks().empty(), gate);
+    see(exact(newest_, at_));
+    advance();
+    EXPECT_THAT(policy_->landmarks(), ElementsAre(kLandmark));
+  }
+}
+
+TEST_F(FalseFirstView, OfAPositionIsContradictedByTwo) {
+  begin("strategy=apfl,several_views=true,gate=0.999,landmark_gain=0");
+  see(seen_at({-3.0, -7.0}));
+  advance();
+  EXPECT_THAT(policy_->landmarks(), ElementsAre(kLandmark));
+  std::vector<LandmarkReport> reports;
+  while (newest_ < 6) {
+    see(seen_at(at_));
+    std::ranges::copy(advance().landmarks, std::back_inserter(reports));
+  }
+  ASSERT_THAT(policy_->landmarks(), ElementsAre(kLandmark));
+  EXPECT_LT((position() - at_).norm(), 0.1);
+  EXPECT_EQ(std::ranges::count_if(reports, &LandmarkReport::removed), 1);
+}
+
+TEST_F(LeftOutOfASession, IsWhatWaitsForLongestWhereMoreWaitThanMay) {
+  begin("strategy=apfl,several_views=true,waiting=2");
+  for (Id id = kLandmark; id < kLandmark + 3; ++id) {
+    see(bearing(newest_, 0.5, id));
+    const PoseReport report = advance();
+    const auto given_up =
+        std::ranges::count(report.landmarks, LinkVerdict::unmatched, &LandmarkReport::verdict);
+    EXPECT_EQ(given_up, id == kLandmark + 2 ? 1 : 0);
+    if (given_up > 0) EXPECT_EQ(report.landmarks.back().landmark, kLandmark);
+  }
+  EXPECT_THAT(policy_->undetermined(), SizeIs(3));
+  // What waits is of two: the first begins anew.
+  const Eigen::Vector2d at(6.0, 4.0);
+  see(exact(newest_, at));
+  advance();
+  EXPECT_THAT(policy_->landmarks(), IsEmpty());
+}
+
+TEST_F(LeftOutOfASession, IsALandmarkTooFarAwayForItsDigits) {
+  for (const double range : {1e14, 1e200, 1e308}) {
+    newest_ = 0;
+    begin("several_views=true");
+    Factor far = bearing(0, 0.3);
+    far.measurement[1] = range;
+    far.information = {2500.0, 0.0, 100.0};
+    see(far);
+    const PoseReport report = advance();
+    ASSERT_THAT(report.notes, SizeIs(1)) << range;
+    EXPECT_THAT(report.notes.front(), testing::HasSubstr("what pose 0 measured of landmark 1000"));
+    ASSERT_THAT(report.landmarks, SizeIs(1));
+    EXPECT_EQ(report.landmarks.front().verdict, LinkVerdict::unmatched);
+    EXPECT_THAT(policy_->landmarks(), IsEmpty());
+    for (int k = 0; k < 3; ++k) advance();
+    policy_->end_pose();
+    EXPECT_TRUE(policy_->finish());
+    for (const double x : policy_->newest_state()) EXPECT_TRUE(std::isfinite(x));
+  }
 }
 
 }  // namespace
