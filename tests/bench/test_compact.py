@@ -8,6 +8,7 @@ import numpy as np
 
 from bench.published import said
 from bench.studies.compact.million import chained, compose, planar_error
+from bench.studies.compact.recoveries import poses_of, position, widest_stretch
 from bench.studies.compact.runs import planar_truth
 from reports_of import report, section, studies
 
@@ -133,6 +134,22 @@ class SensitivityTest(unittest.TestCase):
         text = section(figures, "compact-figures")
         self.assertIn("| town | (a) all poses, all loop closures | 100 | 100.0 % | 200 | 100.0 % | 0.250 | 0.500 |\n", text)
         self.assertIn("|  | (c) few of both | 30 | 30.0 % | 10 | 5.0 % | 0.750 | 1.50 |\n", text)
+
+    def test_recovered_paths_are_drawn_and_have_no_row(self):
+        figures = report("compact_figures", {"part": "recoveries", "name": "town", "runs": {"v0": run(1.0, 30, 10, 0.75)}})
+        self.assertNotIn("town", section(figures, "compact-figures"))
+
+    def test_the_detail_is_where_paths_differ_most(self):
+        straight = poses_of("\n".join(f"VERTEX_SE2 {k} {k} 0 0" for k in range(20)) + "\nEDGE_SE2 0 1 1 0 0 1 0 0 1 0 1\n")
+        bent = {k: f"VERTEX_SE2 {k} {k} {1.0 if k == 12 else 0.1} 0" for k in range(1, 20)}
+        self.assertEqual(widest_stretch(straight, bent, 4), [10, 11, 12, 13])
+        bent[19] = "VERTEX_SE2 19 19 -3 0"
+        self.assertEqual(widest_stretch(straight, bent, 4), [16, 17, 18, 19])
+        self.assertEqual(widest_stretch(straight, {}, 4), [])
+
+    def test_how_far_poses_are_apart_is_of_all_coordinates_that_they_have(self):
+        self.assertEqual(position("VERTEX_SE3:QUAT 7 1 2 3 0 0 0 1"), [1.0, 2.0, 3.0])
+        self.assertEqual(position("VERTEX_SE2 7 1 2 3"), [1.0, 2.0])
 
 
 def growth_report():

@@ -1,10 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Tables of docs/sparsify_results.md, of made-up reports."""
+import json
 import math
+import tempfile
 import unittest
+from pathlib import Path
 
+from bench.program import Cairn
 from bench.published import said
-from reports_of import report, section
+from bench.studies.sparsify.example import measure_example, middle_problem
+from bench.study import Bench
+from reports_of import report, section, studies
 
 
 def run(kld, seconds):
@@ -133,6 +139,34 @@ class ProblemsTest(unittest.TestCase):
         table = section(problems("initial", row("mi", "fd:initial=odb,iterations=0", 4, 2.0), row("mi", "ncfd", 4, 1.0)),
                         "sparsify-initial")
         self.assertIn("| whole graph | 4 | 8 | - ± - | 2.00 ± 0.250 | - ± - | - ± - | 1.00 ± 0.250 |\n", table)
+
+    def test_the_example_is_the_problem_in_the_middle(self):
+        made = [{"sizes": [3] * nodes, "kld": kld} for nodes, kld in [(6, 0.5), (5, 0.1), (6, 0.1), (6, 0.9)]]
+        self.assertEqual(middle_problem(made, 6), made[0])
+        self.assertEqual(middle_problem(made, 4), None)
+
+    def test_the_example_has_a_curve_for_each_topology(self):
+        def of(factors, topology, kld):
+            return {"factors": factors, "topology": topology, "kld": kld}
+        files = studies()["sparsify_problems"].files([{"part": "example", "rows": [
+            of(5, "mi", 0.5), of(5, "best:most=10000,beyond=refuse", 0.25), of(6, "mi", 0.125), of(6, "odd", -1e-16)]}])
+        self.assertEqual(files, {"sparsify_example.csv": 'factors,"KLD, mi","KLD, dmi","KLD, ekld","KLD, odd","KLD, best"\n'
+                                                         "5,0.5,,,,0.25\n6,0.125,,,,\n"})
+
+    def test_all_topologies_solve_the_example_with_every_number_of_factors(self):
+        with tempfile.TemporaryDirectory() as folder:
+            file = Path(folder) / "problems.json"
+            file.write_text(json.dumps({"problems": [{"sizes": [3] * 5, "kld": 1.0}]}), encoding="utf-8")
+            asked = []
+
+            def solve(problem, words):
+                self.assertEqual(len(json.loads(problem.read_text(encoding="utf-8"))["problems"]), 1)
+                asked.append(words[words.index("--population") + 1])
+                return [row("mi", "ncfd", nodes, 0.5) for nodes in [None, 5]]
+            example = measure_example(Bench(Cairn("cairn", Path(folder)), quick=True), file, solve)
+        # Of ten pairs of five nodes, four to nine.
+        self.assertEqual([round(10 * float(population.partition(":")[2])) for population in asked], [4, 5, 6, 7, 8, 9])
+        self.assertEqual([one["factors"] for one in example["rows"]], [4, 5, 6, 7, 8, 9])
 
     def test_topologies_that_did_all_problems_are_compared(self):
         table = section(problems("topology", row("mi", "ncfd", 4, 2.0), row("best:most=9", "ncfd", 4, 1.0),

@@ -7,9 +7,10 @@ import json
 
 from ...data_sets import DataSet, compact_sets_named
 from ...pages import Sections, table
-from ...reports import Json, number, text
+from ...reports import Json, number, parts, text
 from ...study import Bench, Keep, Study, for_each_set
 from ...words import digits, whole
+from .recoveries import draw_recoveries
 from .runs import ALL_LOOPS, AS_PUBLISHED, BY_RULE, find_thresholds, named_once, part_kept, run_compact, summary, with_truth
 
 WITH_NORMS = ["ellipse3d"]  # of covariances, which takes longer
@@ -43,6 +44,8 @@ def draw_set(bench: Bench, plain: DataSet) -> Json:
 def study_figures(bench: Bench, keep: Keep) -> None:
     sets = compact_sets_named(["ellipse3d", "parking-garage", "manhattanOlson3500"], bench.data, bench.quick)
     for_each_set("compact, figures", sets, lambda data: keep(draw_set(bench, data)))
+    sets = compact_sets_named(["ellipse3d" if bench.quick else "kitti_00, simulated"], bench.data, bench.quick)
+    for_each_set("compact, recovered paths", sets, lambda data: keep(draw_recoveries(bench, data)))
 
 
 def part(entry: Json, of: str) -> list[str]:
@@ -52,7 +55,7 @@ def part(entry: Json, of: str) -> list[str]:
 
 def sections(entries: list[Json]) -> Sections:
     rows = []
-    for entry in entries:
+    for entry in parts(entries, ""):
         some = [[title, *part(entry, f"{strategy}.poses"), *part(entry, f"{strategy}.loops"),
                  *(digits(number(entry, f"{strategy}.errors.v2.ate.{of}")) for of in ["translation", "rotation"])]
                 for strategy, title in [("apal", "(a) all poses, all loop closures"),

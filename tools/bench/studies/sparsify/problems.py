@@ -12,6 +12,7 @@ from ...program import Words
 from ...reports import NONE, Json, items, number, text
 from ...study import Bench, Keep, Study, attempt
 from ...words import digits, whole
+from .example import example_curves, measure_example
 from .runs import thesis_experiment
 
 RECORDINGS = {"online": "every 100 poses", "whole": "whole graph"}
@@ -27,9 +28,9 @@ def each(option: str, values: Words) -> Words:
 
 
 def record_problems(bench: Bench, data: DataSet, name: str, arguments: Words) -> Path:
-    """One run that writes the problems that come up."""
-    file = bench.cairn.work / f"{name}_problems.json"
-    bench.cairn.on("study sparsify", data, [*arguments, "--no-kld", "--record", str(file)]).required()
+    """One run that writes the problems that come up, and the sparse graph."""
+    file, sparse = bench.cairn.work / f"{name}_problems.json", bench.cairn.work / f"sparsify_{name}.g2o"
+    bench.cairn.on("study sparsify", data, [*arguments, "--no-kld", "--record", str(file), "-o", str(sparse)]).required()
     return file
 
 
@@ -61,6 +62,10 @@ def measure_problems(bench: Bench, data: DataSet, recording: str, arguments: Wor
     part("initial", [*SAME_FACTORS, *each("--recovery", [f"fd:initial={guess},iterations=0" for guess in GUESSES] + ["ncfd"])])
     if recording == "online":
         draw_convergence(bench, problems)
+    else:
+        # ./dev bench draws the sparse graph over the original one, as in Figure 4.8.
+        bench.cairn.optimize(data, ["-o", str(bench.cairn.work / "sparsify_original.g2o")]).required()
+        keep(measure_example(bench, problems, lambda file, words: solve_problems(bench, file, words)))
     topologies = [*TOPOLOGIES[:-1], f"best:most={most},beyond=refuse"]
     part("topology", ["--population", "fill:0.75", "--recovery", "ncfd", *each("--topology", topologies)])
 
@@ -196,4 +201,4 @@ def sections(entries: list[Json]) -> Sections:
             "sparsify-topologies": topologies_table(entries)}
 
 
-STUDIES = [Study("sparsify_problems", study_problems, sections)]
+STUDIES = [Study("sparsify_problems", study_problems, sections, example_curves)]
