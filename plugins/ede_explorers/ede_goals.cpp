@@ -2,12 +2,14 @@
 #include "ede_goals.hpp"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include "cairn/exploration/path_planner.hpp"
+#include "cairn/runtime/timed.hpp"
 
 namespace cairn::exploration {
 namespace {
@@ -19,10 +21,17 @@ constexpr double kSameGoal = 0.5;
 constexpr int kMostTries = 4;
 /// The known floor must grow by this factor to be a discovery.
 constexpr double kDiscovery = 1.002;
+/// Directions and orientations may be divided by this at most: at the end of beams of 8 m, 360 / 4
+/// are 0.56 m apart. And so many are left of them.
+constexpr int kCoarsest = 4, kFewest = 16;
+/// What a field has taken per cell and direction counts so much less with each field.
+constexpr double kFading = 0.7;
 /// What is left of the frontier cells in sight of a goal that is worth driving to.
 constexpr double kLeft = 0.5;
 
-Situation with_robot(const Situation& situation, const RobotModel& robot) {
+}  // namespace
+
+Situation adapted(const Situation& situation, const RobotModel& robot, double budget) {
   return {.estimator = situation.estimator,
           .poses = situation.poses,
           .pose = situation.pose,
@@ -31,10 +40,8 @@ Situation with_robot(const Situation& situation, const RobotModel& robot) {
           .decision = situation.decision,
           .match = situation.match,
           .first_sigma = situation.first_sigma,
-          .budget = situation.budget};
+          .budget = budget};
 }
-
-}  // namespace
 
 RobotModel narrowed(const RobotModel& robot, const GridFrame& frame) {
   RobotModel result = robot;
@@ -60,13 +67,14 @@ void EdeGoals::begin() {
   coverage_ = 0.0;
   revisits_ = 0;
   tight_ = false;
+  beam_cell_ = 0.0;
 }
 
 double EdeGoals::smallest(const Situation& situation) const {
   return options_.smallest > 0.0 ? options_.smallest : 2.0 * situation.robot.radius;
 }
 
-ReachableField EdeGoals::field(const Situation& situation, bool tight) {
+ReachableField EdeGoals::field(const Situation& situation, bool tight, double seconds) {
   review_goal(situation);
   tight_ = tight;
   const double coverage = situation.map.coverage();
@@ -74,13 +82,30 @@ ReachableField EdeGoals::field(const Situation& situation, bool tight) {
     coverage_ = coverage;
     revisits_ = 0;
   }
+  // What it would take in full, by the last one.
+  const double whole =
+      beam_cell_ * static_cast<double>(situation.map.frame.size()) * options_.field.directions;
+  int part = 1;
+  while (part < kCoarsest && whole / part > seconds) part *= 2;
+  ReachableField result = field_with(situation, tight, part);
+  if (result.coarse && !result.discovers) result = field_with(situation, tight, 1);
+  return result;
+}
+
+ReachableField EdeGoals::field_with(const Situation& situation, bool tight, int part) {
+  const auto begin = std::chrono::steady_clock::now();
   ReachableField result;
+  result.coarse = part > 1;
   result.cells = beam_cells(situation.map);
   given_up_.remove_from(result.cells, situation.map, smallest(situation));
   const RobotModel robot = tight ? narrowed(situation.robot, situation.map.frame) : situation.robot;
   const bool loops = options_.revisits == 0 || revisits_ < options_.revisits;
+  EntropyFieldOptions options = options_.field;
+  const auto fewer = [&](int count) { return std::max(count / part, std::min(count, kFewest)); };
+  options.directions = fewer(options.directions);
+  options.orientations = fewer(options.orientations);
   result.field = std::make_unique<EntropyField>(
-      with_robot(situation, robot), options_.field,
+      adapted(situation, robot, situation.budget), options,
       EntropyField::Parts{.cells = result.cells, .loop_closures = loops});
   const ConfigurationSpace& space = result.field->space();
   result.lengths = path_lengths(space, situation.map, situation.pose.translation());
@@ -89,6 +114,8 @@ ReachableField EdeGoals::field(const Situation& situation, bool tight) {
     result.discovers = result.field->seen(k) >= 1.0 &&
                        result.reachable[static_cast<std::size_t>(space.number_of(k))] != 0;
   }
+  const double work = static_cast<double>(situation.map.frame.size()) * options.directions;
+  beam_cell_ = std::max(seconds_since(begin) / work, kFading * beam_cell_);
   return result;
 }
 

@@ -39,7 +39,12 @@ struct ReachableField {
   std::vector<float> lengths;   ///< of paths, by cell of the configuration space [m]
   std::vector<char> reachable;  ///< by cell of the configuration space
   bool discovers = false;       ///< a frontier is in sight of some configuration that is reachable
+  bool coarse = false;          ///< of fewer directions and orientations than asked for
 };
+
+/// Of a decision by a field that is coarse.
+inline constexpr const char* kCoarseNote =
+    "fields had fewer directions and orientations, for the time budget";
 
 /// What both explorers share: the field at a decision, and what became of the goal before.
 ///
@@ -53,8 +58,10 @@ class EdeGoals {
   explicit EdeGoals(const EdeGoalsOptions& options) : options_(options) {}
 
   void begin();
-  /// For a decision. `tight`: through gaps that may be a cell narrower than the body.
-  ReachableField field(const Situation& situation, bool tight);
+  /// For a decision. `tight`: through gaps that may be a cell narrower than the body. Where more
+  /// than `seconds` are expected, by what the last one took, there are a half or a quarter of the
+  /// directions of beams and of the orientations, unless no frontier would then be in sight.
+  ReachableField field(const Situation& situation, bool tight, double seconds);
   /// Gives up what is in sight of a configuration; and it counts as a revisit.
   void give_up(const Situation& situation, const ReachableField& at, std::size_t configuration);
   /// The robot drives to a configuration, of the field's space.
@@ -75,15 +82,20 @@ class EdeGoals {
   };
 
   void review_goal(const Situation& situation);
+  ReachableField field_with(const Situation& situation, bool tight, int part);
   double smallest(const Situation& situation) const;
 
   EdeGoalsOptions options_;
   GivenUpFrontiers given_up_;
   std::optional<Goal> goal_;
-  double coverage_ = 0.0;  ///< at the last discovery [m²]
-  int revisits_ = 0;       ///< since then
-  bool tight_ = false;     ///< as the last field
+  double coverage_ = 0.0;   ///< at the last discovery [m²]
+  int revisits_ = 0;        ///< since then
+  bool tight_ = false;      ///< as the last field
+  double beam_cell_ = 0.0;  ///< what a field has taken per cell of the map and direction [s]
 };
+
+/// A situation, but for another robot or time budget.
+Situation adapted(const Situation& situation, const RobotModel& robot, double budget);
 
 /// The situation of a robot that is a cell narrower, as far as that is above half its radius.
 RobotModel narrowed(const RobotModel& robot, const GridFrame& frame);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstddef>
 #include <memory>
 #include <optional>
 #include <string>
@@ -9,6 +10,7 @@
 #include "cairn/planning/potential_field.hpp"
 #include "cairn/plugin/option_fields.hpp"
 #include "cairn/plugin/registry.hpp"
+#include "decision_time.hpp"
 #include "ede_goals.hpp"
 
 namespace cairn::exploration {
@@ -44,14 +46,17 @@ class EdeGradient final : public Explorer {
   bool is_worthwhile(const Situation& situation, const PlannedPath& path) override;
 
  private:
-  std::optional<Decision> descend(const Situation& situation, const ReachableField& at);
-  Decision stuck(const Situation& situation);
+  std::optional<Decision> descend(const Situation& situation, const ReachableField& at,
+                                  const DecisionTime& time);
+  Decision stuck(const Situation& situation, const DecisionTime& time);
 
   EdeGradientOptions options_;
   EdeGoals goals_;
   std::unique_ptr<Explorer> fallback_;
   bool falls_back_ = false;
+  bool is_cut_ = false;  ///< the last descent: by the time budget
   int decisions_ = 0, stuck_ = 0;
+  std::size_t too_many_ = 0;  ///< configurations: a potential of as many was cut too short
 };
 
 }  // namespace cairn::exploration

@@ -17,6 +17,10 @@ using Eigen::Vector2d;
 
 /// Candidates are at least so far apart, and a path may end so far from its goal [m].
 constexpr double kSpacing = 1.0, kTolerance = 0.5;
+/// Part of the time budget for fields.
+constexpr double kFieldPart = 0.4;
+/// And the least that the fallback has.
+constexpr double kLeastPart = 0.2;
 /// How often a goal at which the robot is already is given up in one decision.
 constexpr int kMostRounds = 20;
 
@@ -45,13 +49,15 @@ void EdeRrtStar::begin(std::uint64_t seed) {
 }
 
 Decision EdeRrtStar::decide(const Situation& situation) {
+  const DecisionTime time(situation.budget);
   Decision decision;
   falls_back_ = false;
   for (const bool tight : {false, true})
-    if (drive(situation, tight, decision)) return decision;
+    if (drive(situation, tight, time, decision)) return decision;
   if (fallback_) {
     falls_back_ = true;
-    decision = fallback_->decide(situation);
+    const double least = kLeastPart * situation.budget;
+    decision = fallback_->decide(adapted(situation, situation.robot, std::max(time.left(), least)));
     decision.notes.push_back("no configuration was worth driving to: the fallback went on");
     return decision;
   }
@@ -63,10 +69,12 @@ bool EdeRrtStar::is_worthwhile(const Situation& situation, const PlannedPath& pa
 }
 
 /// False: there is no goal with a path.
-bool EdeRrtStar::drive(const Situation& situation, bool tight, Decision& decision) {
+bool EdeRrtStar::drive(const Situation& situation, bool tight, const DecisionTime& time,
+                       Decision& decision) {
   bool started = false;
   for (int round = 0; round < kMostRounds; ++round) {
-    const ReachableField at = goals_.field(situation, tight);
+    const double before = time.passed();
+    const ReachableField at = goals_.field(situation, tight, time.left(kFieldPart));
     if (!at.discovers) return false;
     const std::vector<Goal> goals = best_goals(situation, at);
     if (goals.empty()) return false;
@@ -93,9 +101,14 @@ bool EdeRrtStar::drive(const Situation& situation, bool tight, Decision& decisio
     }
     if (there) {
       goals_.give_up(situation, at, *there);
-      continue;
+      // Another field would take as long; the next best goals of this one are known.
+      const bool is_late = time.left() < time.passed() - before;
+      if (!is_late || decision.candidates.empty()) continue;
+      decision.notes.emplace_back(
+          "where the time budget left none for another field, the next best goal was taken");
     }
     if (decision.candidates.empty()) return false;
+    if (at.coarse) decision.notes.emplace_back(kCoarseNote);
     decision.chosen = 0;  // the best comes first
     const Candidate& chosen = decision.candidates.front();
     goals_.chosen(at, configurations.front());

@@ -10,6 +10,7 @@
 #include "cairn/exploration/path_planner.hpp"
 #include "cairn/plugin/option_fields.hpp"
 #include "cairn/plugin/registry.hpp"
+#include "decision_time.hpp"
 #include "ede_goals.hpp"
 
 namespace cairn::exploration {
@@ -53,7 +54,7 @@ class EdeRrtStar final : public Explorer {
 
   std::vector<Goal> best_goals(const Situation& situation, const ReachableField& at) const;
   std::optional<PlannedPath> path_to(const ReachableField& at, std::size_t configuration);
-  bool drive(const Situation& situation, bool tight, Decision& decision);
+  bool drive(const Situation& situation, bool tight, const DecisionTime& time, Decision& decision);
 
   EdeRrtStarOptions options_;
   EdeGoals goals_;

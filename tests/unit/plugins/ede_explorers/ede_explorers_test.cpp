@@ -139,6 +139,42 @@ TEST(EdeExplorers, WhereNothingIsLeftTheFallbackGoesOn) {
   EXPECT_THAT(goes_on.decisions.front().why, HasSubstr("a frontier of"));
 }
 
+class EdeWithoutTime : public testing::TestWithParam<const char*> {};
+
+/// With a budget that is over before anything is computed, each decision is the one that is known
+/// at once; nothing of it depends on the clock.
+TEST_P(EdeWithoutTime, TheyGoOnByWhatIsKnownAtOnce) {
+  const OccupancyGrid floor = test::floor_named("rooms:width=9,height=7", 3);
+  test::ExplorationParts parts(kExactRobot, GetParam());
+  Exploration exploration = parts.on(floor);
+  exploration.decision_budget = 1e-9;
+  exploration.limits.distance = 150.0;
+  int paths = 0;
+  exploration.decided = [&](const Decision& decision, const Situation& situation) {
+    if (decision.kind != Decision::Kind::drive) return;
+    const PlannedPath& path = decision.candidates[decision.chosen].path;
+    ASSERT_GE(path.points.size(), 2U);
+    double length = 0.0;
+    for (std::size_t k = 1; k < path.points.size(); ++k)
+      length += (path.points[k] - path.points[k - 1]).norm();
+    EXPECT_NEAR(path.length, length, 1e-9);
+    EXPECT_EQ(path.points.front(), situation.pose.translation());
+    paths += decision.why.find("by the shortest path") != std::string::npos;
+  };
+  const ExplorationResult result = run_exploration(exploration);
+  EXPECT_EQ(result.end, ExplorationEnd::finished) << result.why;
+  EXPECT_EQ(result.collisions, 0);
+  ASSERT_TRUE(result.against);
+  EXPECT_GE(result.against->seen, 0.98 * result.against->floor);
+  if (std::string(GetParam()).starts_with("ede_gradient")) {
+    EXPECT_GT(paths, 3);
+    EXPECT_THAT(result.notes, testing::Contains(HasSubstr("time budget")));
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Both, EdeWithoutTime,
+                         testing::Values("ede_rrt_star:planner=grid_dijkstra", kGradient));
+
 TEST(EdeExplorers, RefuseWhatMakesNoSense) {
   const auto refusal = [](const std::string& name) -> std::string {
     try {
