@@ -286,7 +286,9 @@ TEST_F(LeftOutOfASession, IsWhatWaitsForLongestWhereMoreWaitThanMay) {
     const auto given_up =
         std::ranges::count(report.landmarks, LinkVerdict::unmatched, &LandmarkReport::verdict);
     EXPECT_EQ(given_up, id == kLandmark + 2 ? 1 : 0);
-    if (given_up > 0) EXPECT_EQ(report.landmarks.back().landmark, kLandmark);
+    if (given_up > 0) {
+      EXPECT_EQ(report.landmarks.back().landmark, kLandmark);
+    }
   }
   EXPECT_THAT(policy_->undetermined(), SizeIs(3));
   // What waits is of two: the first begins anew.
