@@ -183,8 +183,7 @@ Command add_plot(ArgumentParser program) {
   cli.footer(
       "FILEs are laid together as by cairn view.\n\n"
       "Example:\n"
-      "  cairn plot city.g2o best.g2o -o city.svg\n"
-      "  cairn plot best.g2o --truth truth.g2o -o errors.svg\n"
+      "  cairn plot city.g2o best.g2o --truth truth.g2o -o city.svg\n"
       "  cairn plot city.g2o compact.g2o --apart --poses -o maps.svg\n"
       "  cairn plot run1.json run2.json --what convergence --x time -o curves.pdf\n"
       "  cairn plot steps.csv --x variables --y seconds --y affected --log y -o steps.svg\n"
