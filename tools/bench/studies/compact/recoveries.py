@@ -52,9 +52,9 @@ def draw_recoveries(bench: Bench, plain: DataSet) -> Json:
     runs = {recovery: summary(run_compact(bench, data, [
         "--strategy", "fpfl", "--policy", AS_PUBLISHED, "--thresholds", rule.file, "--recovery", recovery,
         "--trajectory", file(recovery)]).report) for recovery in RECOVERIES}
-    # What the errors are measured against.
     paths = {recovery: lines(file(recovery)) for recovery in RECOVERIES}
-    paths["truth"] = lines(data.arguments[data.arguments.index("--truth") + 1])
+    if "--truth" in data.arguments:  # that of a generated graph is in no file
+        paths["truth"] = lines(data.arguments[data.arguments.index("--truth") + 1])
     stretch = widest_stretch(paths["v0"], paths["v2"], SHOWN)
     for name, path in paths.items():
         with open(file(f"{name}_detail"), "w", encoding="utf-8") as out:
