@@ -393,8 +393,9 @@ Command add_explore(ArgumentParser program) {
   cli.add_option("--until", options->until, "limits: distance=250 [m], steps=N, decisions=N")
       .type_name("K=V,…");
   add_comparison_options(cli, options->comparison);
-  cli.add_option("--decision-budget", options->decision_budget,
-                 "ends searches for a path after so long [s]: then no run is like the other")
+  cli.add_option(
+         "--decision-budget", options->decision_budget,
+         "within which explorers decide [s], as far as they can: then no run is like the other")
       .type_name("S")
       .seconds_from(1e-3);
   cli.add_option("--match", options->match,

@@ -272,7 +272,7 @@ max_distance [m], max_steps, max_decisions: it ends there; None: when nothing is
 world, policy, registration, mapper: the robot, and what makes a graph and a map of its scans, with options:
     world="lidar_building:range=8,fov=180".
 match_range [m], match_angle [rad]: within which the explorer expects loop closures.
-decision_budget: searches for a path end after so long [s]; then no run is like the other.
+decision_budget: within which explorers decide [s], as far as they can; then no run is like the other.
 callback: called with an ExplorationStep after each motion; when it returns False, the run ends.
 
 What an explorer of your own raises is raised here. Ctrl-C ends the run too, with the map so far. The interpreter's lock is released meanwhile.)");
