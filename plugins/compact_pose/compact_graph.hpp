@@ -9,6 +9,7 @@
 #include <span>
 #include <string>
 #include <unordered_map>
+#include <unordered_set>
 #include <utility>
 #include <vector>
 
@@ -291,7 +292,7 @@ class CompactGraph {
     Factor factor;
   };
   bool has_covariance(Id id, Eigen::Index size);
-  bool determined(std::span<const Id> measured);
+  bool determined(std::span<const Id> measured, const std::unordered_set<Id>& gone = {});
   bool solved_anew(std::span<const Id> measured);
   std::map<Id, std::vector<LandmarkFactor>> landmark_factors() const;
   std::vector<std::size_t> not_linear(Id of, std::span<const LandmarkFactor> factors) const;

@@ -60,7 +60,7 @@ struct CompactPoseOptions {
   /// likewise.
   double landmark_loss = -1.0;
   /// Whether landmarks that no single measurement determines wait for other poses to see them.
-  bool several_views = false;
+  bool several_views = true;
   int waiting = 1000;  ///< most landmarks that do, with up to 64 poses each
   /// Σ̄_y, what a registration is expected to be worth, upper triangle by rows, or the standard
   /// deviations of translation [m] and rotation [rad]. Empty: like the newest odometry.

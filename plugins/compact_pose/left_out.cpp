@@ -49,13 +49,13 @@ bool CompactGraph::has_covariance(Id id, Eigen::Index size) {
 }
 
 /// Whether the estimate has a covariance of every pose and landmark; where the estimator does not
-/// keep them, of those that were measured.
-bool CompactGraph::determined(std::span<const Id> measured) {
+/// keep them, of those that were measured. `gone`: poses that have left it already.
+bool CompactGraph::determined(std::span<const Id> measured, const std::unordered_set<Id>& gone) {
   const std::set<Id> some(measured.begin(), measured.end());
   const auto asked = [&](Id id) { return keeps_covariances_ || some.contains(id); };
   const Eigen::Index n = group_->tangent_size();
   for (int pose = 0; pose < solved_; ++pose) {
-    if (asked(id(pose)) && !has_covariance(id(pose), n)) return false;
+    if (asked(id(pose)) && !gone.contains(id(pose)) && !has_covariance(id(pose), n)) return false;
   }
   return std::ranges::all_of(landmarks_, [&](Id id) {
     return !asked(id) || has_covariance(id, landmark(id)->tangent_size());

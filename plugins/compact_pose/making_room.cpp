@@ -6,6 +6,8 @@
 #include <unordered_set>
 #include <utility>
 
+#include <fmt/core.h>
+
 #include "cairn/runtime/timed.hpp"
 #include "compact_graph.hpp"
 #include "compact_pose.hpp"
@@ -76,8 +78,19 @@ CompactGraph::Leaving CompactGraph::make_room(PoseRemover& remover, int limit,
   std::vector<Factor> removed;
   for (const FactorId id : removal.update.removed_factors)
     removed.push_back(estimator_->factor(id));
+  // Where landmarks are held by bearings, what takes the place of poses may not determine them.
+  std::unique_ptr<Estimator> before = landmarks_.empty() ? nullptr : estimator_->clone();
   const UpdateReport report = estimator_->update(removal.update);
   copy_.reset();
+  if (before && !(report.ok && determined({}, gone))) {
+    estimator_ = std::move(before);
+    return {.poses = {},
+            .now = {},
+            .note = fmt::format("more than {} poses stay for now: what would take the place of {} "
+                                "others leaves poses or landmarks undetermined",
+                                limit, leaving.poses.size()),
+            .notes = {}};
+  }
   merge_ways(removal.update, removed);
   renumber(removal.update, report.first_factor, leaving.now);
   join_chains(removal.update);

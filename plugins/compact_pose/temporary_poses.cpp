@@ -260,7 +260,7 @@ CompactGraph::Leaving CompactGraph::remove_temporary(std::size_t k, bool joined,
   }
   recast_chains(pose.id, cover);
   removal.removed_variables = update.removed_variables = {pose.id};
-  estimator_->update(update);
+  const bool ok = estimator_->update(update).ok;
   copy_.reset();
   temporary_.erase(temporary_.begin() + static_cast<std::ptrdiff_t>(k));
   Leaving leaving{.poses = {pose.id}, .now = {}, .note = {}};
@@ -268,6 +268,7 @@ CompactGraph::Leaving CompactGraph::remove_temporary(std::size_t k, bool joined,
   for (const Kept& kept : kept_) leaving.now.push_back(kept.id == pose.id ? -1 : left++);
   merge_ways(removal, removed);
   renumber(removal, 0, leaving.now);
+  if (!ok || !determined({})) restore_covariances({});
   refresh();
   return leaving;
 }

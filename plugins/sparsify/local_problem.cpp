@@ -27,6 +27,11 @@ constexpr double kSettled = 1e-9, kRounding = 1e-12;
 /// What is left of a diagonal element, as a part of it, where a direction is open, and the damping
 /// that keeps steps in such directions small.
 constexpr double kZeroPivot = 1e-11, kDamping = 1e-8;
+/// Of H scaled to a unit diagonal, where there are landmarks: smaller eigenvalues, as a part of the
+/// largest, are of directions that are not determined.
+constexpr double kUndetermined = 1e-9, kTiny = 1e-200;
+/// How far from the linear model's the minimum may be there, squared and in standard deviations.
+constexpr double kNearLinear = 1.0;
 /// Columns of J N, N being orthonormal in units of Λ's diagonal, that are zero but for rounding.
 constexpr double kOpen = 1e-6;
 /// Diagonal elements of Λ that are squares of rounding, as a part of the largest.
@@ -111,8 +116,28 @@ class DenseSystem {
   /// To the minimum, the last pose of the blanket held unless the problem is absolute. By Gauss and
   /// Newton from a minimum of the whole graph, which is near; a step that does not lower chi2 is
   /// not taken. Given are chi2, H and g where it is; H and g become those of the minimum.
+  ///
+  /// Bearings of a few poses alone may not determine a landmark, so that their minimum is far from
+  /// that of the graph, or nowhere. Then it stays where it is: in directions that H does not
+  /// determine, and in all if the minimum is not where the linear model at the beginning has it.
   void solve(double chi2, Matrix& H, Vector& g) {
     const std::vector<int> free = free_columns();
+    const auto states = states_;
+    const Matrix H_before = H;
+    const Vector g_before = g;
+    Vector linear = Vector::Zero(size());
+    descend(free, chi2, H, g, linear);
+    if (!has_landmarks()) return;
+    const Vector off = moved_from(states) - linear;
+    if (off.dot(H_before * off) < kNearLinear) return;
+    states_ = states;
+    H = H_before;
+    g = g_before;
+  }
+
+ private:
+  /// `linear`: becomes the first step.
+  void descend(const std::vector<int>& free, double chi2, Matrix& H, Vector& g, Vector& linear) {
     for (int k = 0; k < kIterations && !free.empty(); ++k) {
       Matrix A = H(free, free);
       Eigen::LDLT<Matrix> ldlt(A);
@@ -123,8 +148,10 @@ class DenseSystem {
       }
       if (ldlt.info() != Eigen::Success || !ldlt.isPositive()) return;
       Vector step = Vector::Zero(size());
-      const Vector of_free = ldlt.solve(Vector(g(free)));
+      const Vector of_free = has_landmarks() ? determined_step(H(free, free), g(free))
+                                             : Vector(ldlt.solve(Vector(g(free))));
       step(free) = of_free;
+      if (k == 0) linear = step;
       const double expected = step.dot(g);
       if (!(expected > kSettled * chi2) || is_rounding(step)) return;
       const auto before = states_;
@@ -148,7 +175,34 @@ class DenseSystem {
     }
   }
 
- private:
+  bool has_landmarks() const {
+    return std::ranges::any_of(nodes_,
+                               [&](int node) { return is_point(work_->graph().type(node)); });
+  }
+
+  /// H⁻¹ g in the directions that H determines; zero in others. H is scaled to a unit diagonal.
+  static Vector determined_step(const Matrix& H, const Vector& g) {
+    const Vector scale = H.diagonal().array().max(kTiny).rsqrt();
+    const Eigen::SelfAdjointEigenSolver<Matrix> solver(
+        Matrix(scale.asDiagonal() * H * scale.asDiagonal()));
+    const Vector values = solver.eigenvalues();
+    const Vector inverse =
+        (values.array() > kUndetermined * values.maxCoeff()).select(values.cwiseInverse(), 0.0);
+    const Vector in_directions =
+        inverse.cwiseProduct(Vector(solver.eigenvectors().transpose() * scale.cwiseProduct(g)));
+    return scale.cwiseProduct(Vector(solver.eigenvectors() * in_directions));
+  }
+
+  /// The steps that lead here from these states.
+  Vector moved_from(const std::vector<std::vector<double>>& states) const {
+    Vector steps(size());
+    for (std::size_t k = 0; k < nodes_.size(); ++k) {
+      work_->graph().type(nodes_[k]).local(1, states[k].data(), states_[k].data(),
+                                           steps.data() + begin_[k]);
+    }
+    return steps;
+  }
+
   std::vector<int> free_columns() const {
     const std::size_t held = local_->removed.size() + static_cast<std::size_t>(local_->poses) - 1;
     std::vector<int> free;

@@ -162,8 +162,9 @@ void PolicySession::note_landmark(const LandmarkReport& landmark) {
 void PolicySession::note_undetermined() {
   if (const std::int64_t count = undetermined(); count > 0) {
     answer_ += fmt::format(
-        "NOTE {} of the landmarks that were seen are not in the graph: no single measurement "
-        "determines where they are (several_views=true takes several together)\n",
+        "NOTE {} of the landmarks that were seen are not in the graph: what was measured of them "
+        "does "
+        "not determine where they are (several poses together may, unless several_views=false)\n",
         count);
   }
 }

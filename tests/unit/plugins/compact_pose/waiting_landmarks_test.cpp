@@ -59,7 +59,7 @@ class Bearings : public LandmarkCourse {
   static constexpr double kBearing = 0.03;  ///< [rad]
 
   void begin(const std::string& options) {
-    begin_course("range=3,angle=0.6,several_views=true" + (options.empty() ? "" : "," + options));
+    begin_course("range=3,angle=0.6" + (options.empty() ? "" : "," + options));
   }
   /// The bearing alone of what the newest pose sees.
   LandmarkObservation bearing_of(int landmark) {
