@@ -25,7 +25,7 @@ constexpr std::size_t kSmall = 0, kShared = kHugePage, kSharedEnd = kHugePage;
 constexpr std::size_t kSmall = 4096;
 // Arrays of these sizes share huge pages. Smaller ones mostly find room in pages that were touched
 // before; larger ones leave room in a page that others rarely fill.
-constexpr std::size_t kShared = 16384, kSharedEnd = kHugePage / 2;
+constexpr std::size_t kShared = 16384, kSharedEnd = kHugePage / 4;
 #endif
 // What is left of a large array after its whole huge pages gets one too, if it is so much.
 constexpr std::size_t kWorthHugePage = kHugePage / 4 * 3;

@@ -149,9 +149,10 @@ void CompactGraph::release(std::span<const Id> landmarks, PolicySeconds& seconds
 }
 
 /// After an update that has left variables without a covariance; `measured`: what its factors are
-/// on. Mostly it is enough to
-/// relinearise: on its way to the estimate a landmark came close to a pose. If not, what is not
-/// linear leaves; if that is not it, the landmarks that were measured last.
+/// on. Mostly it is enough to relinearise: on its way to the estimate a landmark came close to a
+/// pose. If not, what is not linear leaves; if that is not it, the landmarks that were measured
+/// last; and if that is not it either, as where false measurements have moved everything, all
+/// landmarks: odometry determines the poses.
 void CompactGraph::restore_covariances(std::span<const Id> measured) {
   if (solved_anew(measured)) return;
   bool any = false;
@@ -165,6 +166,8 @@ void CompactGraph::restore_covariances(std::span<const Id> measured) {
   }
   if (any && solved_anew(measured)) return;
   leave_out(measured);
+  if (solved_anew(measured)) return;
+  leave_out(std::vector<Id>(landmarks_));
   (void)solved_anew(measured);
 }
 

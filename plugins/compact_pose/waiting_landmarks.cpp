@@ -162,6 +162,7 @@ void CompactPose::add_triangulated(WaitingLandmark waiting, Triangulated triangu
 
 /// A landmark is in the graph, by what the newest pose alone measured of it.
 void CompactPose::settle_landmark(Id landmark) {
+  if (!graph_.landmark(landmark)) return;  // it has left at once, and waits with all of its views
   const auto known = waiting_landmarks_.find(landmark);
   if (known == waiting_landmarks_.end()) return;
   const std::vector<View> views = std::move(known->second.views);

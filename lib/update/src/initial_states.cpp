@@ -19,6 +19,9 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 /// A measurement contradicts a state that leaves so many times the chi2 of another state: three
 /// times the residuals.
 constexpr double kContradicted = 9.0;
+/// So many of the measurements that put a variable somewhere are tried, so that the time is linear
+/// in their number.
+constexpr int kTried = 16;
 /// chi2 per row of the residuals that is nothing.
 constexpr double kRounding = 1e-9;
 
@@ -165,8 +168,11 @@ void InitialStates::settle(std::size_t k) {
   };
   double least = kInfinity;
   std::vector<double> best;
+  int tried = 0;
   for (Measured& by : measured) {
+    if (tried == kTried) break;
     if (!place(by, variable, placed)) continue;
+    ++tried;
     if (const double of_placed = cost(placed); of_placed < least) {
       least = of_placed;
       best = placed;
