@@ -178,6 +178,40 @@ def test_it_is_begun_with_the_seed_and_asked_after_each_motion():
     assert len(run.decision_seconds) == 4 and run.steps["step"][-1] == 3  # each path was left after one motion
 
 
+@pytest.mark.parametrize("returned, goes_on", [(True, True), (np.bool_(False), False), (0, False)])
+def test_what_is_worthwhile_returns_is_a_truth_value(returned, goes_on):
+    class Explorer:
+        def decide(self, situation):
+            self.decision = situation.decision
+            return cairn.Decision.drive([2.5, 4.5]) if situation.decision < 2 else cairn.Decision.stuck("enough")
+
+        def is_worthwhile(self, situation, path):
+            self.asked = getattr(self, "asked", 0) + 1
+            return returned
+
+    explorer = Explorer()
+    assert cairn.explore(room(), explorer, seed=7, start=Pose2(0, 3, 0)).end == "stuck"
+    assert (explorer.asked == explorer.decision) != goes_on
+
+
+@pytest.mark.parametrize("returned, name", [(None, "NoneType"), ("no", "str")])
+def test_what_else_it_returns_is_refused(returned, name):
+    class Explorer:
+        def decide(self, situation):
+            return cairn.Decision.drive([2.5, 4.5])
+
+        def is_worthwhile(self, situation, path):
+            return returned
+
+    with pytest.raises(TypeError, match=f"is_worthwhile returned: expected True or False, not a value of type {name}"):
+        cairn.explore(room(), Explorer(), seed=7, start=Pose2(0, 3, 0))
+
+
+def test_a_path_without_points_is_refused():
+    with pytest.raises(cairn.Error, match="Decision.drive: the path has no points"):
+        cairn.explore(room(), lambda situation: cairn.Decision.drive(np.zeros((0, 2))), start=Pose2(0, 3, 0))
+
+
 def test_the_situation_has_the_map_and_how_certain_the_poses_are():
     seen = {}
 

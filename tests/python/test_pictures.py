@@ -145,11 +145,27 @@ def test_covariances_that_do_not_fit_are_refused():
         ({"other": ([1], np.eye(3)[None])}, "there is no graph of the name 'other'"),
         ({"graph": np.eye(3)[None]}, "expected ids and their covariances"),
         ({"graph": ([1, 2], np.eye(3)[None])}, r"the shape is \(1, 3, 3\), expected \(2, d, d\)"),
+        ({"graph": ([1, 2], [np.eye(3), np.diag([1, -1, 1])])}, r"covariances\['graph'\]: .* variable 2 has the negative variance -1"),
+        ({"graph": ([1], np.full((1, 3, 3), np.nan))}, "variable 1 has a number that is not finite"),
         ({"graph": ([999], np.eye(3)[None])}, "there is no variable 999"),
         ({"graph": ([1], np.eye(2)[None])}, "blocks of 2 x 2 for variable 1, whose covariance is 3 x 3"),
     ]:
         with pytest.raises(cairn.Error, match=message):
             cairn.draw({"graph": graph}, covariances=given)
+
+
+def test_values_of_other_types_cannot_be_drawn():
+    graph, _ = cairn.generate("manhattan", seed=1, poses=20)
+    for arguments, message in [
+        (dict(graphs={"t": "x"}), r"graphs\['t'\]: expected a cairn.Graph, not a value of type str"),
+        (dict(graphs={"t": graph}, truth="truth.g2o"), "truth: expected a cairn.Graph, not a value of type str"),
+        (dict(graphs={"t": graph}, truth=5), "truth: expected a cairn.Graph, not a value of type int"),
+        (dict(graphs={"t": graph}, covariances=5), r"covariances: expected ids and covariances .*not a value of type int"),
+    ]:
+        with pytest.raises(TypeError, match=message):
+            cairn.draw(**arguments)
+    with pytest.raises(cairn.Error, match="there is no graph to draw"):
+        cairn.draw({}, "svg")
 
 
 @pytest.mark.skipif("html" not in cairn.components("picture"), reason="no plugin makes pages")

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Pictures of graphs by the plugins that draw them.
+#include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <optional>
 #include <span>
@@ -23,6 +25,28 @@
 
 namespace cairn::python {
 namespace {
+
+/// The graph that `what` is. Throws a `TypeError` for anything else.
+BoundGraph& bound_graph_of(const py::handle& given, const std::string& what) {
+  if (py::isinstance<BoundGraph>(given)) return given.cast<BoundGraph&>();
+  throw py::type_error(what + ": expected a cairn.Graph, not a value of type " +
+                       Py_TYPE(given.ptr())->tp_name);
+}
+
+/// Throws `Error` (usage) for a block with a number that no covariance has.
+void check_covariance(std::span<const double> block, int size, const std::string& what, Id id) {
+  if (!std::ranges::all_of(block, [](double number) { return std::isfinite(number); })) {
+    throw Error(ErrorCode::usage,
+                fmt::format("{}: the covariance of variable {} has a number that is not finite",
+                            what, id_text(id)));
+  }
+  for (std::size_t k = 0; k < block.size(); k += static_cast<std::size_t>(size) + 1) {
+    if (block[k] >= 0.0) continue;
+    throw Error(ErrorCode::usage, fmt::format("{}: the covariance of variable {} has the negative "
+                                              "variance {:g} on its diagonal",
+                                              what, id_text(id), block[k]));
+  }
+}
 
 /// What `covariances` has for a graph: ids, and a block (d, d) for each.
 std::vector<ReportedCovariance> covariances_of(const py::object& given, const std::string& name,
@@ -53,6 +77,7 @@ std::vector<ReportedCovariance> covariances_of(const py::object& given, const st
                   fmt::format("{}: blocks of {} x {} for variable {}, whose covariance is {} x {}",
                               what, blocks.shape(1), blocks.shape(1), id_text(id), d, d));
     }
+    check_covariance(block, d, what, id);
     all.push_back({id, {block.begin(), block.end()}});
   }
   return all;
@@ -65,6 +90,17 @@ struct NamedGraph {
 };
 
 std::vector<NamedGraph> named_graphs(const py::dict& graphs, const py::object& covariances) {
+  if (graphs.empty()) {
+    throw Error(ErrorCode::usage,
+                "draw: there is no graph to draw; expected a cairn.Graph for each name, "
+                "{\"estimate\": graph}");
+  }
+  if (!covariances.is_none() && !py::isinstance<py::dict>(covariances)) {
+    throw py::type_error(
+        std::string("covariances: expected ids and covariances for each name, {\"estimate\": "
+                    "(ids, cairn.marginals(graph, ids))}, not a value of type ") +
+        Py_TYPE(covariances.ptr())->tp_name);
+  }
   const py::dict given = covariances.is_none() ? py::dict() : py::dict(covariances);
   for (const auto& [name, ignored] : given) {
     if (!graphs.contains(name)) {
@@ -74,7 +110,8 @@ std::vector<NamedGraph> named_graphs(const py::dict& graphs, const py::object& c
   }
   std::vector<NamedGraph> named;
   for (const auto& [name, graph] : graphs) {
-    const Graph& own = graph.cast<BoundGraph&>().get();
+    const Graph& own =
+        bound_graph_of(graph, fmt::format("graphs['{}']", std::string(py::str(name)))).get();
     NamedGraph& one = named.emplace_back(NamedGraph{py::str(name), own.clone(), {}});
     if (given.contains(name)) one.covariances = covariances_of(given[name], one.name, own);
   }
@@ -86,7 +123,7 @@ py::bytes draw(const py::dict& graphs, const std::string& picture, const py::obj
   constexpr const char *kEllipses = "ellipses", *kThreeSigma = "3";
   std::vector<NamedGraph> named = named_graphs(graphs, covariances);
   std::optional<Graph> true_graph;
-  if (!truth.is_none()) true_graph = truth.cast<BoundGraph&>().get().clone();
+  if (!truth.is_none()) true_graph = bound_graph_of(truth, "truth").get().clone();
   ComponentSpec spec = component_spec(picture, options, Picture::kKind, "draw");
   std::string bytes;
   {

@@ -29,6 +29,18 @@ class Asked {
   BoundSituation* situation_;
 };
 
+/// What `is_worthwhile` has returned: a bool, NumPy's too, or an integer. None, which a method
+/// without a return statement returns, is not one.
+bool truth_of(const py::object& returned) {
+  py::detail::make_caster<bool> boolean;
+  if (boolean.load(returned, false)) return py::detail::cast_op<bool>(boolean);
+  if (py::isinstance<py::int_>(returned)) return bool(py::bool_(returned));
+  PyErr_Format(PyExc_TypeError,
+               "what is_worthwhile returned: expected True or False, not a value of type %s",
+               Py_TYPE(returned.ptr())->tp_name);
+  throw py::error_already_set();
+}
+
 }  // namespace
 
 PythonExplorer::PythonExplorer(const py::object& explorer, std::function<void()> stop)
@@ -64,7 +76,7 @@ bool PythonExplorer::is_worthwhile(const Situation& situation, const PlannedPath
   if (is_worthwhile_.is_none()) return Explorer::is_worthwhile(situation, path);
   const auto work = [&]() -> std::optional<bool> {
     const Asked asked(situation);
-    return bool(py::bool_(is_worthwhile_(asked.object(), path)));
+    return truth_of(is_worthwhile_(asked.object(), path));
   };
   const auto worthwhile = call(work, std::optional<bool>());
   if (!worthwhile) stop_();

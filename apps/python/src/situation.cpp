@@ -154,6 +154,11 @@ PlannedPath path_of(const py::object& to, BoundSituation& situation) {
                             "within 2 m; Situation.path_to returns None for such goals",
                             goal.x(), goal.y()));
   }
+  if (numbers.shape(0) == 0) {
+    throw Error(ErrorCode::usage,
+                "Decision.drive: the path has no points; where nothing is left to drive to return "
+                "Decision.finished or Decision.stuck");
+  }
   PlannedPath path;
   Vector2d from = situation.now().pose.translation();
   for (py::ssize_t k = 0; k < numbers.size(); k += 2) {
