@@ -39,7 +39,8 @@ void add_common_options(ProgramParser& program, CommonOptions& common) {
       .component({"types"})
       .type_name("NAME:K=V")
       .repeatable();
-  cli.add_flag("--quiet", common.quiet, "no progress and no notes, only results and errors");
+  cli.add_flag("--quiet", common.quiet,
+               "no progress, and no notes but those that stand in results");
   program.add_config("--config", "TOML: options above at the top, [optimize] for a command's own")
       .type_name("FILE");
 }

@@ -74,6 +74,8 @@ constexpr std::array<Kind, 8> kKinds{
       "\"pose_policy|@NAME@|a pose every so many metres\"", "",
       "cairn compact @ring --policy @NAME@:distance=2 --plugin build/@NAME@.so", kSlam}}};
 
+constexpr const char* kExamplePrefix = "$HOME/cairn";  // to install to
+
 /// Where the templates are, from the program's own place: PREFIX/bin/cairn.
 fs::path template_folder() {
   std::error_code error;
@@ -241,12 +243,19 @@ int make_project(const Chosen& chosen, Session& session) {
   report["folder"] = folder.string();
   report["files"] = strings_json(written);
   session.write_json(report);
+  const std::string place = templates.parent_path().parent_path().parent_path().string();
+  const bool installed = !fs::exists(fs::path(place) / "CMakeCache.txt");
+  const std::string install =
+      installed ? ""
+                : fmt::format(
+                      "  cmake --install {} --prefix {}  # this cairn is in its build "
+                      "folder, against which nothing else can be built\n",
+                      printable(place), kExamplePrefix);
   session.print(fmt::format(
-      "{}\n\nNext:\n  cd {}\n  cmake -B build -DCMAKE_PREFIX_PATH={} && cmake --build build\n"
+      "{}\n\nNext:\n{}  cd {}\n  cmake -B build -DCMAKE_PREFIX_PATH={} && cmake --build build\n"
       "  ctest --test-dir build --output-on-failure\n  {}\n",
-      printable(joined(written, "\n"), true), printable(folder.string()),
-      printable(templates.parent_path().parent_path().parent_path().string()),
-      filled_in(kind.use, words)));
+      printable(joined(written, "\n"), true), install, printable(folder.string()),
+      installed ? printable(place) : kExamplePrefix, filled_in(kind.use, words)));
   return 0;
 }
 

@@ -7,6 +7,7 @@
 #include <fmt/core.h>
 
 #include "cairn/io/format.hpp"
+#include "cairn/plugin/plugin_search.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/plugin_call.hpp"
@@ -26,9 +27,12 @@ std::string picture_format(const std::string& file, Session& session) {
   std::string ending = file_ending(file);
   const std::vector<std::string> names = session.registry().names(Picture::kKind);
   if (names.empty()) {
-    throw Error(ErrorCode::plugin,
-                "no plugin draws reports or plots here: cairn was built without Cairo and without "
-                "the page");
+    std::string text =
+        "no plugin draws reports or plots: neither 'plot', which is built where Cairo is, nor "
+        "'report', the page, was found";
+    for (const PluginProblem& problem : session.registry().problems())
+      text += fmt::format("\n  note: {}", problem.message);
+    throw Error(ErrorCode::plugin, text);
   }
   if (std::find(names.begin(), names.end(), ending) == names.end()) {
     throw Error(ErrorCode::usage,

@@ -362,6 +362,11 @@ int check_plugins(const PluginCheckOptions& options, Session& session) {
   json::array files;
   bool ok = true;
   for (const std::string& file : options.files) {
+    std::error_code ignored;
+    if (fs::is_directory(file, ignored)) {
+      throw Error(ErrorCode::usage,
+                  fmt::format("{} is a folder; give the plugin's .so file", file));
+    }
     session.files.add_input(file);
     FileCheck check(file, options, session);
     check.run();

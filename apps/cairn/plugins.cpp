@@ -86,9 +86,17 @@ json::array problems_json(const Registry& registry) {
   return all;
 }
 
-int list(Session& session) {
+/// Those of a kind, as `cairn plugins` or options name it: "linear solver", "linear_solver".
+std::vector<Offer> offers_of_kind(const Registry& registry, const std::string& kind) {
+  std::vector<Offer> offers = registry.offers();
+  std::erase_if(offers, [&](const Offer& offer) {
+    return kind_in_words(offer.kind) != kind && offer.kind != kind;
+  });
+  return offers;
+}
+
+int list(const std::vector<Offer>& offers, Session& session) {
   const Registry& registry = session.registry();
-  const std::vector<Offer> offers = registry.offers();
   json::object report = begin_report("plugins");
   json::array& all = report["offers"].emplace_array();
   for (const Offer& offer : offers) all.push_back(offer_json(offer));
@@ -269,6 +277,11 @@ std::vector<Offer> offers_named(const Registry& registry, const std::string& nam
 
 int show(const std::string& name, Session& session) {
   Registry& registry = session.registry();
+  const std::vector<Offer> everything = registry.offers();
+  const bool named = std::ranges::any_of(
+      everything, [&](const Offer& offer) { return offer.name == name || offer.plugin == name; });
+  if (const std::vector<Offer> kind = offers_of_kind(registry, name); !named && !kind.empty())
+    return list(kind, session);
   json::object report = begin_report("plugins");
   json::array& all = report["offers"].emplace_array();
   std::string text;
@@ -301,7 +314,7 @@ Command add_plugins(ArgumentParser program) {
   ArgumentParser cli =
       program.add_command("plugins", "what is on offer, one name's options, or checks of a plugin");
   cli.add_option("name", chosen->name,
-                 "a solver, type, format …: its options, abilities and limits")
+                 "a solver, type, format …: its options, abilities and limits; a kind: what it has")
       .component({});
   cli.add_option("--check", chosen->check.files,
                  "run the conformance suite over these plugins, in child processes")
@@ -334,7 +347,8 @@ Command add_plugins(ArgumentParser program) {
               }
               return check_plugins(chosen->check, session);
             }
-            return chosen->name.empty() ? list(session) : show(chosen->name, session);
+            return chosen->name.empty() ? list(session.registry().offers(), session)
+                                        : show(chosen->name, session);
           }};
 }
 

@@ -298,13 +298,14 @@ void CompactPose::see(std::vector<Variable> added, std::span<const Factor> facto
 void CompactPose::settle_left_out() {
   for (const CompactGraph::LeftOut& left : graph_.take_left_out()) {
     const Id id = left.landmark.id;
-    const bool waits = left.removed && may_wait(id);
     if (left.removed) {
       waiting_landmarks_.try_emplace(id, WaitingLandmark{.landmark = left.landmark, .views = {}});
       ++removals_[id];
       agreement_.erase(id);
     }
     for (const auto& [pose, factor] : left.factors) {
+      // What a pose measured that leaves with it, or was not kept, is lost.
+      const bool waits = left.removed && may_wait(id) && graph_.find(pose) >= 0;
       report_.landmarks.push_back({.pose = pose,
                                    .landmark = id,
                                    .factors = 1,
@@ -331,7 +332,7 @@ bool CompactPose::may_wait(Id landmark) const {
 
 /// What a pose that is kept measured of a landmark that waits.
 void CompactPose::wait_again(Id landmark, const View& view) {
-  if (!may_wait(landmark)) return;
+  if (!may_wait(landmark) || graph_.find(view.pose) < 0) return;
   std::vector<View>& views = waiting_landmarks_.at(landmark).views;
   const auto number = [&](Id pose) { return graph_.find(pose); };
   const auto at = std::ranges::lower_bound(views, number(view.pose), {},

@@ -80,18 +80,34 @@ TEST_F(PlotCommand, MarksEachPose) {
   EXPECT_EQ(corners(marked) - corners(plain), 120 * 3 + 1);  // 1: the legend's sample
 }
 
+/// Those in the thin stroke; the other one is the legend's sample.
+std::int64_t ellipses(const std::string& picture) {
+  std::int64_t most = 0;
+  for (std::size_t at = picture.find("stroke-width:0.7;"); at != std::string::npos;
+       at = picture.find("stroke-width:0.7;", at + 1))
+    most = std::max(most, count(picture.substr(at, picture.find("/>", at) - at), "M "));
+  return most;
+}
+
 TEST_F(PlotCommand, DrawsCovariancesAsEllipses) {
   const std::string best = folder_.file("best.g2o");
   run({"optimize", graph_, "--covariance", "blocks", "-o", best, "--json", report_, "--quiet"});
-  const std::string picture = plot({graph_, report_, "--ellipses", "3"}, "svg");
-  std::int64_t ellipses = 0;  // in the thin stroke; the other one is the legend's sample
-  for (std::size_t at = picture.find("stroke-width:0.7;"); at != std::string::npos;
-       at = picture.find("stroke-width:0.7;", at + 1))
-    ellipses = std::max(ellipses, count(picture.substr(at, picture.find("/>", at) - at), "M "));
-  EXPECT_EQ(ellipses, 119);  // the pose that is anchored has no covariance
+  // The pose that is anchored has no covariance.
+  EXPECT_EQ(ellipses(plot({graph_, report_, "--ellipses", "3"}, "svg")), 119);
+  EXPECT_EQ(ellipses(plot({best, report_, "--ellipses", "3"}, "svg")), 119);
   const Outcome none = cairn({"plot", graph_, "--ellipses", "3", "-o", folder_.file("x.svg")});
   EXPECT_EQ(none.exit_code, 3);
   EXPECT_THAT(none.err, HasSubstr("--covariance blocks"));
+}
+
+TEST_F(PlotCommand, TheOutputOfARunFromStandardInputHasItsCovariances) {
+  const std::string best = folder_.file("best.g2o");
+  const Outcome optimized =
+      cairn({"optimize", "-", "--covariance", "blocks", "-o", best, "--json", report_, "--quiet"},
+            {}, read_text(graph_));
+  EXPECT_EQ(optimized.exit_code, 0) << optimized.err;
+  EXPECT_EQ(ellipses(plot({report_, "--ellipses", "3"}, "svg")), 119);
+  EXPECT_EQ(cairn({"plot", report_, "-o", folder_.file("curves.svg")}).err, "");
 }
 
 TEST_F(PlotCommand, GraphsWithTheSamePosesAreDrawnBesideEachOther) {

@@ -103,6 +103,24 @@ TEST(PluginsCommand, APluginsNameShowsAllThatItOffers) {
   EXPECT_THAT(text, HasSubstr("sphere (generator)"));
 }
 
+TEST(PluginsCommand, AKindListsWhatItHas) {
+  CAIRN_NEEDS("loss", "huber");
+  for (const char* kind : {"initial_guess", "initial guess"}) {
+    const Outcome outcome = cairn({"plugins", kind});
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  }
+  const std::string text = cairn({"plugins", "loss"}).out;
+  EXPECT_THAT(text, HasSubstr("  huber"));
+  EXPECT_THAT(text, Not(HasSubstr("block_cholesky")));
+}
+
+TEST(PluginsCommand, AFolderIsNoPluginToCheck) {
+  const TemporaryFolder folder;
+  const Outcome outcome = cairn({"plugins", "--check", folder.path().string()});
+  EXPECT_EQ(outcome.exit_code, 2);
+  EXPECT_THAT(outcome.err, HasSubstr("is a folder; give the plugin's .so file"));
+}
+
 TEST(PluginsCommand, WhatAnOptionMeansHasATitleOfItsOwn) {
   const auto table = lines(cairn({"plugins", "levenberg_marquardt"}).out);
   const auto title = std::ranges::find_if(
@@ -178,6 +196,22 @@ TEST(PluginsCommand, ASharedObjectThatIsGoneIsMissedOnlyByWhoAsksForIt) {
                               {"plugins"},
                               {"convert", "@ring:poses=40", "-", "--to", "g2o"}}) {
     EXPECT_EQ(cairn(other, environment).exit_code, 0) << other.front();
+  }
+}
+
+TEST(PluginsCommand, WithoutAnyPluginTheFoldersOfTheSearchAreNamed) {
+  const TemporaryFolder folder;
+  Environment environment = installation_without(folder, {});
+  std::filesystem::remove_all(folder.path() / "cairn");
+  environment["XDG_DATA_HOME"] = folder.path().string();
+  const std::string where =
+      "no plugin was found in " + (folder.path() / "cairn").string() + ", nor in";
+  const Outcome all = cairn({"plugins"}, environment);
+  EXPECT_THAT(unfolded(all.out), HasSubstr(where));
+  for (const Arguments& arguments :
+       {Arguments{"optimize", "@ring"}, Arguments{"online"}, Arguments{"explore", "@rooms"},
+        Arguments{"plot", "@ring", "-o", folder.file("ring.svg")}}) {
+    EXPECT_THAT(cairn(arguments, environment).err, HasSubstr(where)) << arguments.front();
   }
 }
 

@@ -147,12 +147,11 @@ boost::dll::shared_library open_library(const fs::path& library) {
   }
 }
 
-/// The folder of plugins beside the core library.
+}  // namespace
+
 fs::path default_folder() {
   return fs::path(boost::dll::this_line_location().string()).parent_path() / "cairn";
 }
-
-}  // namespace
 
 const char* core_fingerprint() { return CAIRN_ABI_FINGERPRINT; }
 

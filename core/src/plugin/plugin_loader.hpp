@@ -24,6 +24,9 @@ struct Sidecar {
 /// Reads one sidecar file. Throws `Error` (plugin) saying what is missing in it.
 Sidecar read_sidecar(const std::filesystem::path& file);
 
+/// The folder of plugins beside the core library.
+std::filesystem::path default_folder();
+
 /// The folders of a search, in order, that exist. What is refused (a folder that others may write
 /// to, one named in the environment that does not exist) is added to `problems`.
 std::vector<std::filesystem::path> plugin_folders(const PluginSearch& search,

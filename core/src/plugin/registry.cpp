@@ -340,6 +340,13 @@ Registry::Registry(const PluginSearch& search) : impl_(std::make_unique<Impl>())
       }
     }
   }
+  if (search.default_folder && impl_->plugins.empty()) {
+    impl_->problems.push_back(
+        {default_folder(),
+         fmt::format("no plugin was found in {}, nor in the folders of CAIRN_PLUGIN_PATH and in "
+                     "$XDG_DATA_HOME/cairn/plugins or ~/.local/share/cairn/plugins",
+                     default_folder().string())});
+  }
 }
 
 Registry::~Registry() = default;

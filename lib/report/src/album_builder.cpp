@@ -268,7 +268,12 @@ void AlbumBuilder::join_bench(const std::string& file, const BenchReport& report
 }
 
 void AlbumBuilder::join_run(const std::string& file, RunReport report) {
-  Entry* entry = find_graph(report.graph, file);
+  // Its output is the same graph: where that is shown and its input is not, or where the input was
+  // standard input, which is gone.
+  const bool written = !report.output.empty() && report.output != "-";
+  const bool by_output = written && !known(report.graph) &&
+                         (known(report.output) || report.graph.empty() || report.graph == "-");
+  Entry* entry = find_graph(by_output ? report.output : report.graph, file);
   if (entry && entry->graph) {
     join_estimate(*entry, file, report);
   } else if (report.has_covariances) {
