@@ -58,7 +58,8 @@ std::string laps(unsigned seed) {
 }
 
 TEST(OnlineWithFalseBearings, GoesOn) {
-  if (!Registry().has("pose_policy", "compact_pose")) GTEST_SKIP() << "there is no policy compact_pose";
+  if (!Registry().has("pose_policy", "compact_pose"))
+    GTEST_SKIP() << "there is no policy compact_pose";
   for (unsigned seed = 1; seed <= 40; ++seed) {
     const Outcome run =
         cairn({"online", "--quiet", "--policy", "compact_pose:range=3,angle=1"}, {}, laps(seed));
