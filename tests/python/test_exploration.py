@@ -285,7 +285,10 @@ def test_what_an_explorer_raises_reaches_the_caller():
 
 
 def test_an_explorer_that_leads_nowhere_is_stuck():
-    run = cairn.explore(room(), lambda situation: cairn.Decision.drive(np.empty((0, 2))))
+    def stay(situation):
+        return cairn.Decision.drive(np.array([[situation.pose.x, situation.pose.y]]))
+
+    run = cairn.explore(room(), stay)
     assert (run.end, run.why) == ("stuck", "3 decisions in a row led to no motion")
 
 
