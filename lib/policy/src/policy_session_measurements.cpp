@@ -163,8 +163,8 @@ void PolicySession::note_undetermined() {
   if (const std::int64_t count = undetermined(); count > 0) {
     answer_ += fmt::format(
         "NOTE {} of the landmarks that were seen are not in the graph: what was measured of them "
-        "does "
-        "not determine where they are (several poses together may, unless several_views=false)\n",
+        "does not determine where they are (several poses together may, unless "
+        "several_views=false)\n",
         count);
   }
 }

@@ -104,7 +104,7 @@ TEST_F(Nonlinearity, ExceedsTheLimitWhereABearingIsOfALandmarkThatIsNearerThanIt
   // In another unit of length nothing is different.
   EXPECT_NEAR(of(2.5e6, 1e6, 1e6), of(2.5, 1.0, 1.0), 1e-9);
   EXPECT_NEAR(of(2.5e-6, 1e-6, 1e-6), of(2.5, 1.0, 1.0), 1e-6);
-  // A bearing that is measured badly, as against what is known, tells little wherever it is.
+  // A bearing of large variance, beside what is known, is linear enough at that distance.
   EXPECT_LT(of(2.3, 1.0, 1.0, true, 1.0), kMostNonlinear);
   // What is not known across is known all the same once bearings are.
   EXPECT_LT(of(10.0, 5.0, 0.03), kMostNonlinear);

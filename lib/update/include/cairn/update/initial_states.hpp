@@ -20,12 +20,12 @@ enum class Deciding {
 /// A new variable may come with a state that belongs to another estimate of the rest, such as that
 /// of a file or of a front end that does not follow loop closures; what is linearised there is off
 /// by the whole difference. So for each new variable that factors of the update join with what was
-/// there before, directly or through other new ones, chi2 over these factors is computed where each
-/// of them puts it (`FactorType::propagate`). It gets the best of these states if the one that it
-/// came with leaves more than nine times as much, three times the residuals, in each single one of
-/// the factors that can put it somewhere. What was composed from the current estimate and one of
-/// the measurements therefore stays; and so do fixed variables, those that are not joined with what
-/// was there before, and those that no factor puts anywhere.
+/// there before, directly or through other new ones, chi2 over these factors is computed where the
+/// first sixteen of them that can put it (`FactorType::propagate`). It gets the best of these
+/// states if the one that it came with leaves more than nine times as much, three times the
+/// residuals, in each single one of the factors that can put it somewhere. What was composed from
+/// the current estimate and one of the measurements therefore stays; and so do fixed variables,
+/// those that are not joined with what was there before, and those that no factor puts anywhere.
 ///
 /// `update` is one that `check_update` has passed; `state_of`: the estimate of a variable that was
 /// there before. `deciding`: `first` where losses are not those of the factors, so that an outlier
