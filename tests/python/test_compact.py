@@ -384,10 +384,12 @@ def test_a_refused_end_of_a_pose_can_be_repeated():
 
     def keep_busy():
         while not done.is_set():
-            try:
-                policy.graph()
-            except cairn.Error:
-                pass
+            for _ in range(50):
+                try:
+                    policy.graph()
+                except cairn.Error:
+                    pass
+            time.sleep(0.001)  # or the other thread may never find the policy free
 
     def repeated(call):
         while True:
@@ -401,7 +403,7 @@ def test_a_refused_end_of_a_pose_can_be_repeated():
     thread = threading.Thread(target=keep_busy)
     thread.start()
     try:
-        for k in range(1, 300):
+        for k in range(1, 5000):
             repeated(policy.end_pose)
             step = Factor(Between(k - 1, k, Pose2(1, 0, 0)), sigmas=[0.1, 0.1, 0.1])
             repeated(lambda: policy.add_pose(k, step))
@@ -410,6 +412,7 @@ def test_a_refused_end_of_a_pose_can_be_repeated():
     finally:
         done.set()
         thread.join()
+    assert refused
     policy.end_pose()
 
 
