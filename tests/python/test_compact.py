@@ -36,6 +36,10 @@ def same(result, report, compact):
     assert (counts["loops"], counts["proposed"], counts["registered"], counts["kept_loops"]) == tuple(
         loops[key] for key in ["in", "proposed", "registered", "kept"]
     )
+    seen = report["observations"]
+    assert (counts["observations"], counts["kept_observations"], counts["nonlinear_observations"]) == tuple(
+        seen[key] for key in ["in", "kept", "nonlinear"]
+    )
     assert result.verdicts == report["verdicts"] and result.policy == report["policy"]
     assert counts["factor_nonzeros"] == report["nonzeros"]["factor"]
     if report["errors"]:

@@ -187,6 +187,7 @@ py::dict counts_of(const BoundResult& bound) {
   counts["undetermined_landmarks"] = result.undetermined_landmarks;
   counts["observations"] = bound.data.observations;
   counts["kept_observations"] = result.kept_observations;
+  counts["nonlinear_observations"] = result.nonlinear_observations;
   counts["information_nonzeros"] = result.information_nonzeros;
   counts["factor_nonzeros"] = result.factor_nonzeros;
   return counts;

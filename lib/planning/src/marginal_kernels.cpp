@@ -6,16 +6,16 @@
 namespace cairn {
 
 namespace portable {
-void update_marginals(const MarginalUpdate& update);
+void update_marginals(const MarginalUpdate* updates, int count);
 void update_partners(const PartnerUpdate& update);
 }  // namespace portable
 #if defined(CAIRN_X86_KERNELS)
 namespace avx2 {
-void update_marginals(const MarginalUpdate& update);
+void update_marginals(const MarginalUpdate* updates, int count);
 void update_partners(const PartnerUpdate& update);
 }  // namespace avx2
 namespace avx512 {
-void update_marginals(const MarginalUpdate& update);
+void update_marginals(const MarginalUpdate* updates, int count);
 void update_partners(const PartnerUpdate& update);
 }  // namespace avx512
 #endif

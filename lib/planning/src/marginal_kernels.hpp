@@ -15,12 +15,13 @@ struct MarginalUpdate {
   const double* inverse;                  ///< L⁻¹, by columns; its upper triangle is not read
   const double *diagonal, *determinants;  ///< Σ_ii before, 6 entries, and 1 / |Σ_ii| now
   double *Z, *updated;                    ///< 9 and 6 entries
-  double* ratios;                         ///< |Σ'_ii| / |Σ_ii now|
+  double* ratios;                         ///< |Σ'_ii| / |Σ_ii now|; may be null
 };
 
 /// Z_i = L⁻¹ (cov(y, ε_i) − Σ_b L_b Z_b,i) with cov(ε_i, y) = Σ_it − Σ_il, and
-/// Σ'_ii = Σ_ii − Z_iᵀ Z_i, of all poses.
-using UpdateMarginals = void (*)(const MarginalUpdate&);
+/// Σ'_ii = Σ_ii − Z_iᵀ Z_i, of all poses, by `count` loop closures one after another. What one
+/// writes those behind it may read.
+using UpdateMarginals = void (*)(const MarginalUpdate*, int count);
 
 /// What a loop closure on a path does to the partners of poses ahead (see `PathDeterminants`).
 /// Arrays hold a number for each partner, by entry, as above with `stride` in place of `padded`.

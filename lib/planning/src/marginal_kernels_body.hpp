@@ -28,38 +28,58 @@ inline __attribute__((always_inline)) Vec determinant(const Vec* D) {
          D[2] * (D[1] * D[4] - D[3] * D[2]);
 }
 
-/// As many poses as a register has numbers, from `i` on.
-inline __attribute__((always_inline)) void update_poses(const MarginalUpdate& u, long i) {
+/// Poses that several closures update while what they read of those before is in the caches. Read
+/// pose by pose, the entries of the closures before would be more streams than are prefetched.
+constexpr long kPosesAtOnce = 64;
+
+/// `count` poses from `begin` on, a multiple of the width.
+inline __attribute__((always_inline)) void update_poses(const MarginalUpdate& u, long begin,
+                                                        long count) {
   const long padded = u.padded;
+  alignas(64) double sums[9 * kPosesAtOnce];  // cov(y, ε_i) − Σ_b L_b Z_b,i
+  for (int e = 0; e < 9; ++e) {
+    const double *newest = u.newest + e * padded + begin, *other = u.other + e * padded + begin;
+    for (long i = 0; i < count; i += kWidth)
+      store(sums + e * kPosesAtOnce + i, load(newest + i) - load(other + i));
+  }
+  for (int b = 0; b < u.closures; ++b) {
+    const double* L = u.coupling + 9 * b;
+    for (int r = 0; r < 3; ++r) {  // a coordinate of ε_i
+      const double* before = u.Z_before[b] + 3 * r * padded + begin;
+      double* y = sums + r * kPosesAtOnce;
+      for (long i = 0; i < count; i += kWidth) {
+        const Vec z0 = load(before + i), z1 = load(before + padded + i),
+                  z2 = load(before + 2 * padded + i);
+        for (int c = 0; c < 3; ++c) {
+          double* sum = y + 3 * c * kPosesAtOnce + i;
+          store(sum, load(sum) - (L[c] * z0 + L[3 + c] * z1 + L[6 + c] * z2));
+        }
+      }
+    }
+  }
   const double* inverse = u.inverse;
-  Vec Z[9];
-  for (int r = 0; r < 3; ++r) {  // a coordinate of ε_i
-    Vec y[3];
+  for (long k = 0; k < count; k += kWidth) {
+    const long i = begin + k;
+    Vec Z[9];
+    for (int r = 0; r < 3; ++r) {
+      const double* y = sums + r * kPosesAtOnce + k;
+      const Vec y0 = load(y), y1 = load(y + 3 * kPosesAtOnce), y2 = load(y + 6 * kPosesAtOnce);
+      Z[3 * r] = inverse[0] * y0;
+      Z[3 * r + 1] = inverse[1] * y0 + inverse[4] * y1;
+      Z[3 * r + 2] = inverse[2] * y0 + inverse[5] * y1 + inverse[8] * y2;
+      for (int c = 0; c < 3; ++c) store(u.Z + (3 * r + c) * padded + i, Z[3 * r + c]);
+    }
+    Vec D[6];
+    int entry = 0;
     for (int c = 0; c < 3; ++c) {
-      const long entry = (3 * c + r) * padded + i;
-      y[c] = load(u.newest + entry) - load(u.other + entry);
+      for (int r = c; r < 3; ++r, ++entry) {
+        D[entry] = load(u.diagonal + entry * padded + i) - Z[3 * r] * Z[3 * c] -
+                   Z[3 * r + 1] * Z[3 * c + 1] - Z[3 * r + 2] * Z[3 * c + 2];
+        store(u.updated + entry * padded + i, D[entry]);
+      }
     }
-    for (int b = 0; b < u.closures; ++b) {
-      const double* L = u.coupling + 9 * b;
-      const double* before = u.Z_before[b] + 3 * r * padded + i;
-      const Vec z0 = load(before), z1 = load(before + padded), z2 = load(before + 2 * padded);
-      for (int c = 0; c < 3; ++c) y[c] -= L[c] * z0 + L[3 + c] * z1 + L[6 + c] * z2;
-    }
-    Z[3 * r] = inverse[0] * y[0];
-    Z[3 * r + 1] = inverse[1] * y[0] + inverse[4] * y[1];
-    Z[3 * r + 2] = inverse[2] * y[0] + inverse[5] * y[1] + inverse[8] * y[2];
-    for (int c = 0; c < 3; ++c) store(u.Z + (3 * r + c) * padded + i, Z[3 * r + c]);
+    if (u.ratios) store(u.ratios + i, determinant(D) * load(u.determinants + i));
   }
-  Vec D[6];
-  int entry = 0;
-  for (int c = 0; c < 3; ++c) {
-    for (int r = c; r < 3; ++r, ++entry) {
-      D[entry] = load(u.diagonal + entry * padded + i) - Z[3 * r] * Z[3 * c] -
-                 Z[3 * r + 1] * Z[3 * c + 1] - Z[3 * r + 2] * Z[3 * c + 2];
-      store(u.updated + entry * padded + i, D[entry]);
-    }
-  }
-  store(u.ratios + i, determinant(D) * load(u.determinants + i));
 }
 
 /// As many partners as a register has numbers, from `p` on.
@@ -105,9 +125,14 @@ inline __attribute__((always_inline)) void update_some_partners(const PartnerUpd
 
 }  // namespace
 
-void update_marginals(const MarginalUpdate& u);
-void update_marginals(const MarginalUpdate& u) {
-  for (long i = 0; i < u.padded; i += kWidth) update_poses(u, i);
+void update_marginals(const MarginalUpdate* updates, int count);
+void update_marginals(const MarginalUpdate* updates, int count) {
+  const long padded = count > 0 ? updates->padded : 0;
+  for (long begin = 0; begin < padded; begin += kPosesAtOnce) {
+    const long left = padded - begin;
+    for (int k = 0; k < count; ++k)
+      update_poses(updates[k], begin, left < kPosesAtOnce ? left : kPosesAtOnce);
+  }
 }
 
 void update_partners(const PartnerUpdate& u);

@@ -59,9 +59,8 @@ MarginalUpdates::MarginalUpdates(PoseCovariances& covariances, double memory)
 }
 
 double MarginalUpdates::change(const PathClosure& closure) {
-  double change = 0.0;
-  marginals(in_order(&closure), &change);
-  return change;
+  if (!closure.change) update(in_order(&closure));
+  return *closure.change;
 }
 
 std::shared_ptr<UpdatedMarginals> MarginalUpdates::unused() {
@@ -81,33 +80,36 @@ std::shared_ptr<UpdatedMarginals> MarginalUpdates::unused() {
   return fresh;
 }
 
-MarginalUpdates::Marginals MarginalUpdates::marginals(std::span<const PathClosure* const> closures,
-                                                      double* change) {
-  const PathClosure& last = *closures.back();
-  if (!change) {
-    if (Marginals kept = last.marginals.lock()) return kept;
-  }
-  std::vector<Marginals> before;
-  for (std::size_t b = 1; b < closures.size(); ++b)
-    before.push_back(marginals(closures.first(b), nullptr));
-  const std::shared_ptr<UpdatedMarginals> updated = unused();
-  std::vector<const double*> Z_before;
-  for (const Marginals& marginals : before) Z_before.push_back(marginals->Z.data());
-  kernel_({.padded = covariances_.padded(),
+void MarginalUpdates::update(std::span<const PathClosure* const> closures) {
+  std::vector<std::shared_ptr<const UpdatedMarginals>> after;  // each of the closures
+  for (const PathClosure* closure : closures) after.push_back(closure->marginals.lock());
+  after.back() = nullptr;
+  std::vector<const double*> Z(closures.size());
+  std::vector<MarginalUpdate> updates;
+  for (std::size_t k = 0; k < closures.size(); ++k) {
+    const PathClosure& closure = *closures[k];
+    if (!after[k]) {
+      const std::shared_ptr<UpdatedMarginals> updated = unused();
+      updates.push_back(
+          {.padded = covariances_.padded(),
            .newest = covariances_.column(covariances_.size() - 1),
-           .other = covariances_.column(last.pose),
-           .closures = static_cast<int>(before.size()),
-           .Z_before = Z_before.data(),
-           .coupling = last.coupling.empty() ? nullptr : last.coupling.front().data(),
-           .inverse = last.inverse.data(),
-           .diagonal = before.empty() ? diagonal_.data() : before.back()->diagonal.data(),
+           .other = covariances_.column(closure.pose),
+           .closures = static_cast<int>(k),
+           .Z_before = Z.data(),
+           .coupling = closure.coupling.empty() ? nullptr : closure.coupling.front().data(),
+           .inverse = closure.inverse.data(),
+           .diagonal = k == 0 ? diagonal_.data() : after[k - 1]->diagonal.data(),
            .determinants = inverse_determinants_.data(),
            .Z = updated->Z.data(),
            .updated = updated->diagonal.data(),
-           .ratios = ratios_.data()});
-  if (change) *change = sum_of_logarithms(ratios_);
-  last.marginals = updated;
-  return updated;
+           .ratios = k + 1 == closures.size() ? ratios_.data() : nullptr});
+      closure.marginals = updated;
+      after[k] = updated;
+    }
+    Z[k] = after[k]->Z.data();
+  }
+  kernel_(updates.data(), static_cast<int>(updates.size()));
+  closures.back()->change = sum_of_logarithms(ratios_);
 }
 
 void MarginalUpdates::whiten(std::span<const PathClosure* const> closures, int pose,
@@ -116,7 +118,7 @@ void MarginalUpdates::whiten(std::span<const PathClosure* const> closures, int p
   const int newest = covariances_.size() - 1;
   for (std::size_t c = 0; c < closures.size(); ++c) {
     const PathClosure& closure = *closures[c];
-    if (const Marginals kept = closure.marginals.lock()) {
+    if (const auto kept = closure.marginals.lock()) {
       const double* entries = kept->Z.data() + pose;
       for (std::ptrdiff_t entry = 0; entry < 9; ++entry)
         Z[c].data()[entry] = entries[entry * covariances_.padded()];

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <deque>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -44,6 +45,9 @@ struct PathClosure {
   std::vector<Eigen::Matrix3d> path_Z, path_posterior;
   /// As long as they are kept.
   mutable std::weak_ptr<const UpdatedMarginals> marginals;
+  /// Σ ln(|Σ'_ii| / |Σ_ii|) of the graph's poses after this closure and those before it, once it
+  /// has been asked for.
+  mutable std::optional<double> change;
 };
 
 /// The closures of a path in their order.
@@ -57,16 +61,17 @@ class MarginalUpdates {
 
   /// Σ ln|Σ_ii| now, with the prior.
   double sum() const { return sum_; }
-  /// Σ ln(|Σ'_ii| / |Σ_ii|) after this closure and those before it.
+  /// `PathClosure::change`. A path that closes several loops before it is asked for takes little
+  /// more time than the last of them.
   double change(const PathClosure& closure);
   /// Z of the closures for one pose of the graph.
   void whiten(std::span<const PathClosure* const> closures, int pose,
               std::vector<Eigen::Matrix3d>& Z);
 
  private:
-  using Marginals = std::shared_ptr<const UpdatedMarginals>;
-  /// Those after the last of the closures, computed unless they are kept.
-  Marginals marginals(std::span<const PathClosure* const> closures, double* change);
+  /// Computes the marginals after the last of the closures, with those before that are not kept,
+  /// and its change.
+  void update(std::span<const PathClosure* const> closures);
   std::shared_ptr<UpdatedMarginals> unused();
 
   PoseCovariances& covariances_;

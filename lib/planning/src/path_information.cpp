@@ -22,16 +22,14 @@ using Eigen::Matrix3d;
 
 struct PathInformation::Node {
   std::shared_ptr<const Node> before;
-  const PoseCovariances* frame = nullptr;
+  Model* model = nullptr;
   Pose2 pose;
   int steps = 0;
   double length = 0.0;
   Matrix3d walk = Matrix3d::Zero();            ///< of ε_k − ε_t, without loop closures
   Matrix3d posterior = Matrix3d::Zero();       ///< of ε_k, without the prior
-  double graph_change = 0.0;                   ///< Σ ln(|Σ'_ii| / |Σ_ii|) of the graph's poses
   double path_sum = 0.0;                       ///< Σ ln|Σ_jj| of those of the path
   double odometry = 0.0, loop = 0.0;           ///< changes of ln|Λ|
-  double change = 0.0;                         ///< of the trajectory's entropy
   std::shared_ptr<const PathClosure> closure;  ///< the last one
 };
 
@@ -56,7 +54,7 @@ class PathInformation::Model {
         factor_(options.entropy == EntropyForm::standard ? 0.5 : 1.0),
         log_match_(std::log(match_.covariance().determinant())) {
     start_ = std::make_shared<Node>();
-    start_->frame = &covariances_;
+    start_->model = this;
     start_->pose = situation.pose;
     // A robot whose newest pose is not kept has driven on from the one before.
     if (const auto since = motion_since_newest(situation))
@@ -69,7 +67,7 @@ class PathInformation::Model {
                                        const Pose2& motion) {
     auto next = std::make_shared<Node>();
     next->before = path;
-    next->frame = &covariances_;
+    next->model = this;
     next->pose = path->pose * motion;
     next->steps = path->steps + 1;
     next->length = path->length + motion.translation().norm();
@@ -77,7 +75,6 @@ class PathInformation::Model {
     const Matrix3d noise = covariances_.moved(next->pose, Q);
     next->walk = path->walk + noise;
     next->posterior = path->posterior + noise;
-    next->graph_change = path->graph_change;
     next->path_sum = path->path_sum + log_determinant(next->posterior);
     next->odometry = path->odometry - std::log(Q.determinant());
     next->loop = path->loop;
@@ -86,11 +83,17 @@ class PathInformation::Model {
       close_exactly(*next);
     else
       close_as_thesis(*next);
-    const double sum = updates_.sum() + next->graph_change + next->path_sum;
-    next->change = factor_ * (sum / (covariances_.size() + next->steps) - mean());
     return next;
   }
 
+  /// Of the trajectory's entropy.
+  double change(const Node& node) {
+    double sum = updates_.sum() + node.path_sum;
+    if (node.closure && options_.loops == LoopForm::exact) sum += updates_.change(*node.closure);
+    return factor_ * (sum / (covariances_.size() + node.steps) - mean());
+  }
+
+  const PoseCovariances& covariances() const { return covariances_; }
   double mean() const { return updates_.sum() / covariances_.size(); }
   double factor() const { return factor_; }
   int poses() const { return covariances_.size(); }
@@ -164,7 +167,6 @@ class PathInformation::Model {
     node.posterior = symmetric(node.posterior - closure->end.transpose() * closure->end);
     node.loop += choice.gain;
     node.closure = closure;
-    node.graph_change = updates_.change(*closure);
     node.path_sum = path_sum(node, closures, *closure);
   }
 
@@ -251,18 +253,19 @@ class PathInformation::Model {
 const Pose2& PathInformation::State::pose() const { return node_->pose; }
 int PathInformation::State::steps() const { return node_->steps; }
 double PathInformation::State::length() const { return node_->length; }
-double PathInformation::State::trajectory_change() const { return node_->change; }
+double PathInformation::State::trajectory_change() const { return node_->model->change(*node_); }
 double PathInformation::State::odometry_log_determinant() const { return node_->odometry; }
 double PathInformation::State::loop_log_determinant() const { return node_->loop; }
 int PathInformation::State::loops() const { return node_->closure ? node_->closure->count : 0; }
 
 Matrix3d PathInformation::State::covariance() const {
-  return symmetric(node_->frame->moved_back(node_->pose, node_->posterior + node_->frame->prior()));
+  const PoseCovariances& frame = node_->model->covariances();
+  return symmetric(frame.moved_back(node_->pose, node_->posterior + frame.prior()));
 }
 
 std::optional<Id> PathInformation::State::closes_with() const {
   if (!node_->closure || node_->closure->step != node_->steps) return std::nullopt;
-  return node_->frame->id(node_->closure->pose);
+  return node_->model->covariances().id(node_->closure->pose);
 }
 
 PathInformation::State PathInformation::State::before() const {
