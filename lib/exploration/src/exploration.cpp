@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
+#include <numeric>
 #include <utility>
 
 #include <fmt/core.h>
@@ -225,12 +227,42 @@ class Run {
       return call_plugin([] { return std::string("explorer"); },
                          [&] { return parts_.explorer.decide(situation(map, kept)); });
     }();
+    if (decision.kind == Decision::Kind::drive) {
+      Timed timed(seconds);
+      make_drivable(decision, map);
+    }
     ++decisions_;
     result_.decide_seconds += seconds;
     result_.decision_seconds.push_back(seconds);
     for (const std::string& note : decision.notes) note_once(note);
     if (parts_.decided) parts_.decided(decision, situation(map, kept));
     return decision;
+  }
+
+  /// The chosen path as the robot can drive it, or that of the next best candidate which it can.
+  void make_drivable(Decision& decision, const FloorMap& map) {
+    std::vector<std::size_t> order(decision.candidates.size());
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    std::ranges::stable_sort(order, {}, [&](std::size_t k) {
+      return std::pair(k != decision.chosen, decision.candidates[k].value);
+    });
+    const std::size_t wanted = decision.chosen;
+    for (const std::size_t k : order) {
+      Candidate& candidate = decision.candidates[k];
+      std::optional<PlannedPath> driven = drivable_path(candidate.path, slam_.pose(), robot_, map);
+      if (!driven) {
+        ++not_driven_;
+        continue;
+      }
+      candidate.path = std::move(*driven);
+      decision.chosen = k;
+      if (k != wanted)
+        decision.why += fmt::format("; it can't follow that path: to {} instead", candidate.what);
+      return;
+    }
+    if (order.empty()) return;
+    decision.why += "; it can't follow that path, nor another";
+    decision.candidates[wanted].path = {};
   }
 
   Situation situation(const FloorMap& map, std::span<const Id> kept) {
@@ -304,6 +336,12 @@ class Run {
 
   void finish() {
     result_.converged = slam_.finish();
+    if (not_driven_ > 0) {
+      note_once(fmt::format(
+          "{} paths could not be followed with a turning radius of {:g} m: their goals were given "
+          "up",
+          not_driven_, robot_.turning_radius));
+    }
     for (const std::string& note : slam_.counts().notes) note_once(note);
     result_.map = slam_.map();
     result_.slam = slam_.counts();
@@ -334,6 +372,7 @@ class Run {
   ExplorationResult result_;
   std::optional<Pose2> first_truth_;  // of the poses of which it is known
   bool ended_ = false, backing_off_ = false;
+  int not_driven_ = 0;  // paths
   int decisions_ = 0, empty_decisions_ = 0, idle_ = 0, collisions_in_row_ = 0;
   double most_coverage_ = 0.0, useful_distance_ = 0.0;
 };

@@ -44,10 +44,21 @@ class CAIRN_API PathPlanner : public Component {
   virtual std::optional<PlannedPath> path_to(const Eigen::Vector2d& goal, double tolerance) = 0;
 };
 
-/// The next motion along a path: the robot turns first and then drives straight, both in one step
-/// as far as `robot.step` and `robot.turn` allow. `passed` counts the points of the path that are
-/// behind the robot, and is advanced. None: it is there, and looks where it shall.
+/// The next motion along a path, as far as `robot.step` and `robot.turn` allow in one:
+/// `differential` turns first and then drives straight, `holonomic` drives at once and turns to
+/// where it drives on the way, `dubins` takes the arc to a point ahead on the path, no narrower
+/// than its turning radius (pure pursuit): it follows the paths that `drivable_path` returns.
+/// `passed` counts the points of the path that are behind the robot, and is advanced. None: it is
+/// there, and looks where it shall, which `dubins` does only if the path leads it so.
 CAIRN_API std::optional<Pose2> next_motion(const Pose2& at, const PlannedPath& path,
                                            const RobotModel& robot, std::size_t& passed);
+
+/// The path as the robot can drive it from `at`, with the same end: as it is for robots that turn
+/// in place, and for `dubins` where following it comes near no obstacle; otherwise along arcs and
+/// Dubins curves, searched on the map near the path (hybrid A*: Dolgov, Thrun, Montemerlo and
+/// Diebel, 2010), with points a few centimetres apart, and at the end a heading with `look_at`
+/// before the lidar. None: there is no such curve, so that the goal has to be given up.
+CAIRN_API std::optional<PlannedPath> drivable_path(PlannedPath path, const Pose2& at,
+                                                   const RobotModel& robot, const FloorMap& map);
 
 }  // namespace cairn

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <string_view>
@@ -11,6 +12,7 @@
 #include "cairn/grid/grid.hpp"
 #include "cairn/runtime/api.hpp"
 #include "cairn/runtime/component.hpp"
+#include "cairn/runtime/enum_names.hpp"
 #include "cairn/typed/pose2.hpp"
 
 namespace cairn {
@@ -31,11 +33,25 @@ struct OdometryModel {
   }
 };
 
+/// How a robot moves.
+enum class MotionModel {
+  differential,  ///< turns in place, and drives straight ahead
+  holonomic,     ///< drives in any direction at once, and turns on the way
+  dubins         ///< drives ahead, straight or along arcs, and can't turn in place
+};
+constexpr auto enum_names(MotionModel) {
+  return std::to_array<EnumName<MotionModel>>({{MotionModel::differential, "differential"},
+                                               {MotionModel::holonomic, "holonomic"},
+                                               {MotionModel::dubins, "dubins"}});
+}
+
 /// What a robot is and senses, as planners and explorers need it.
 struct RobotModel {
   double radius = 0.2;  ///< of its round body [m]
   double step = 0.5;    ///< farthest that it drives between two scans [m]
   double turn = 0.3;    ///< most that it turns between two scans [rad]
+  MotionModel motion = MotionModel::differential;
+  double turning_radius = 0.5;  ///< least one of `dubins` [m]
   LidarModel lidar;
   OdometryModel odometry;
 };
@@ -69,8 +85,10 @@ class CAIRN_API World : public Component {
   /// Puts the robot at its start and takes the first scan. Throws `Error` (usage) without what it
   /// needs, (input) for a start where its body does not fit.
   virtual LaserScan begin(const WorldStart& start) = 0;
-  /// Moves straight to `motion`, in the frame of where the robot truly is, turning on the way. It
-  /// stops where its body would touch an obstacle.
+  /// Moves straight to `motion`, in the frame of where the robot truly is, turning on the way; a
+  /// robot of `MotionModel::dubins` along the arc that leads there, or straight back after a
+  /// collision. It stops where its body would touch an obstacle. Throws `Error` (usage) for a
+  /// motion that such a robot can't make.
   virtual WorldStep move(const Pose2& motion) = 0;
   /// Where the robot truly is, in the frame of the floor; none: that is not known.
   virtual std::optional<Pose2> truth() const = 0;

@@ -1,0 +1,376 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Paths for a robot that can't turn in place.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <numbers>
+#include <optional>
+#include <queue>
+#include <utility>
+#include <vector>
+
+#include "cairn/exploration/path_planner.hpp"
+#include "cairn/geometry/dubins_curve.hpp"
+
+namespace cairn {
+namespace {
+
+using Eigen::Vector2d;
+using std::numbers::pi;
+
+/// Curves are planned with a turning radius that is so much larger, so that the robot can steer
+/// back onto them.
+constexpr double kSpareRadius = 1.1;
+/// Headings that the search tells apart, and the poses that it looks at before it gives up.
+constexpr int kHeadings = 32;
+constexpr std::size_t kMostPoses = 400000;
+/// Arcs of the search cross a cell: this long at least [cells].
+constexpr double kArcCells = 1.5;
+/// A metre on an arc costs so much more than a straight one, and so much more for each metre that
+/// it lies away from the path, up to the most.
+constexpr double kTurnCost = 0.05, kAwayCost = 1.0, kMostAway = 1.0;
+/// Headings at the end of a path: this far apart [rad], so much of the lidar's aperture to either
+/// side of what it shall see, and no more than the most.
+constexpr double kHeadingStep = pi / 12.0, kSeenPart = 0.4, kMostAside = pi / 3.0;
+/// Nearer than this there is no direction to look in [m]. A path that is followed ends as near.
+constexpr double kThere = 0.15;
+/// A path is followed on a way that is longer by this factor at most.
+constexpr double kDetour = 1.1;
+
+double distance_to_segment(const Vector2d& point, const Vector2d& a, const Vector2d& b) {
+  const Vector2d along = b - a;
+  const double squared = along.squaredNorm();
+  const double part = squared > 0.0 ? std::clamp((point - a).dot(along) / squared, 0.0, 1.0) : 0.0;
+  return (point - a - part * along).norm();
+}
+
+/// Where a body may be: in cells with some clearance; and a robot that is too near to an obstacle
+/// may leave it, coming no nearer.
+class Room {
+ public:
+  Room(const FloorMap& map, double needed) : map_(&map), needed_(needed) {}
+
+  double needed() const { return needed_; }
+  double stride() const { return 0.5 * map_->frame.resolution; }
+  /// −1 outside.
+  double clearance(const Vector2d& point) const {
+    const Vector2d cell = map_->frame.to_cells(point).array().floor();
+    const GridFrame& frame = map_->frame;
+    if (!(cell.x() >= 0.0 && cell.y() >= 0.0 && cell.x() < frame.width && cell.y() < frame.height))
+      return -1.0;
+    return map_->clearance[frame.index(static_cast<int>(cell.x()), static_cast<int>(cell.y()))];
+  }
+  /// Whether the body can go on from where the clearance was `before`, which is advanced.
+  bool admits(const Vector2d& point, double& before) const {
+    const double here = clearance(point);
+    if (here < needed_ && (here <= 0.0 || here < before)) return false;
+    before = here;
+    return true;
+  }
+
+ private:
+  const FloorMap* map_;
+  double needed_;
+};
+
+/// What a path needs: what the body does, or less where the path leads through a gap that seems
+/// too narrow on the map.
+double needed_along(const PlannedPath& path, const Vector2d& from, const RobotModel& robot,
+                    const FloorMap& map) {
+  const double most = needed_clearance(robot.radius, map.frame);
+  const Room room(map, most);
+  double least = most;
+  bool leaving = true;
+  Vector2d at = from;
+  for (const Vector2d& point : path.points) {
+    const int strides = 1 + static_cast<int>((point - at).norm() / room.stride());
+    for (int k = 1; k <= strides; ++k) {
+      const double here = room.clearance(at + (point - at) * (double(k) / strides));
+      leaving = leaving && here < most;
+      if (!leaving) least = std::min(least, here);
+    }
+    at = point;
+  }
+  return std::clamp(least, most - map.frame.resolution, most);
+}
+
+/// Whether a robot that follows the path as it is comes near no obstacle, and to its end without a
+/// detour.
+bool is_followed(const PlannedPath& path, const Pose2& from, const RobotModel& robot,
+                 const Room& room) {
+  std::size_t passed = 0;
+  Pose2 at = from;
+  double before = room.clearance(from.translation()), driven = 0.0;
+  const double most = kDetour * path.length + kThere;
+  while (const std::optional<Pose2> motion = next_motion(at, path, robot, passed)) {
+    const double chord = motion->translation().norm();
+    const double turn = motion->theta();
+    const double length = std::abs(turn) < 1e-9 ? chord : chord * 0.5 * turn / std::sin(0.5 * turn);
+    driven += length;
+    if (!(length > 1e-6) || driven > most) return false;
+    const int strides = 1 + static_cast<int>(length / room.stride());
+    for (int k = 1; k <= strides; ++k) {
+      const double part = double(k) / strides;
+      const Pose2 on = at * along_arc(turn / length, part * length);
+      if (!room.admits(on.translation(), before)) return false;
+    }
+    at = at * *motion;
+  }
+  if (!path.points.empty() && (path.points.back() - at.translation()).norm() > kThere) return false;
+  if (!path.look_at || (*path.look_at - at.translation()).norm() < kThere) return true;
+  const Vector2d seen = at.transform_to(*path.look_at);
+  return std::abs(std::atan2(seen.y(), seen.x())) <=
+         std::max(0.5 * robot.lidar.aperture, kHeadingStep);
+}
+
+/// Hybrid A* from a pose to the end of a path: arcs and straight lines of one length from pose to
+/// pose, of which one for each cell and heading is kept, and from some of them Dubins curves that
+/// end at the goal exactly.
+class CurveSearch {
+ public:
+  CurveSearch(const PlannedPath& path, const RobotModel& robot, const FloorMap& map, double needed)
+      : path_(path),
+        map_(map),
+        room_(map, needed),
+        radius_(kSpareRadius * robot.turning_radius),
+        arc_(std::max(kArcCells * map.frame.resolution, radius_ * 2.0 * pi / kHeadings)),
+        goals_(goals(path, robot)) {}
+
+  /// The points of a curve; none: there is none.
+  std::optional<PlannedPath> from(const Pose2& start) {
+    measure_to_goal();
+    if (room_.clearance(start.translation()) >= room_.needed() && !std::isfinite(left(start)))
+      return std::nullopt;
+    std::vector<bool> seen(map_.frame.size() * kHeadings, false);
+    nodes_.push_back({.at = start, .clearance = room_.clearance(start.translation())});
+    open_.push({left(start), 0});
+    std::size_t expanded = 0;
+    while (!open_.empty() && expanded < kMostPoses) {
+      const std::size_t index = open_.top().second;
+      open_.pop();
+      const Node node = nodes_[index];
+      const std::optional<std::size_t> key = key_of(node.at);
+      if (!key || seen[*key]) continue;
+      seen[*key] = true;
+      if (tries_goal(node, expanded++)) {
+        if (const auto curve = curve_to_goal(node)) return joined(index, *curve);
+      }
+      for (const int turn : {0, 1, -1}) expand(index, turn);
+    }
+    return std::nullopt;
+  }
+
+ private:
+  struct Node {
+    Pose2 at;
+    double cost = 0.0, clearance = 0.0;
+    std::size_t parent = 0;
+    int turn = 0;  ///< of the arc that leads here
+  };
+  struct Goal {
+    Pose2 at;
+    double aside = 0.0;  ///< how far off the heading that is best [rad]
+  };
+  using Open = std::pair<double, std::size_t>;
+
+  static std::vector<Goal> goals(const PlannedPath& path, const RobotModel& robot) {
+    const Vector2d end = path.points.back();
+    Vector2d ahead = path.look_at ? Vector2d(*path.look_at - end) : Vector2d::Zero();
+    double most = std::clamp(kSeenPart * robot.lidar.aperture, kHeadingStep, kMostAside);
+    if (ahead.norm() < kThere) {
+      most = pi;
+      const std::size_t points = path.points.size();
+      ahead = points > 1 ? Vector2d(end - path.points[points - 2]) : Vector2d(1.0, 0.0);
+    }
+    const double theta = std::atan2(ahead.y(), ahead.x());
+    std::vector<Goal> all{{Pose2(end.x(), end.y(), theta), 0.0}};
+    for (double aside = kHeadingStep; aside <= most; aside += kHeadingStep) {
+      for (const double side : {1.0, -1.0})
+        all.push_back({Pose2(end.x(), end.y(), theta + side * aside), aside});
+    }
+    return all;
+  }
+
+  /// The distance to the goal over cells where the body fits, by steps to eight neighbours.
+  void measure_to_goal() {
+    const GridFrame& frame = map_.frame;
+    to_goal_.assign(frame.size(), std::numeric_limits<double>::infinity());
+    const std::optional<std::size_t> goal = cell_of(goals_.front().at.translation());
+    if (!goal) return;
+    std::priority_queue<Open, std::vector<Open>, std::greater<>> open;
+    to_goal_[*goal] = 0.0;
+    open.push({0.0, *goal});
+    while (!open.empty()) {
+      const auto [length, index] = open.top();
+      open.pop();
+      if (length > to_goal_[index]) continue;
+      const int x = static_cast<int>(index) % frame.width;
+      const int y = static_cast<int>(index) / frame.width;
+      for (int dy = -1; dy <= 1; ++dy) {
+        for (int dx = -1; dx <= 1; ++dx) {
+          if (!frame.contains(x + dx, y + dy)) continue;
+          const std::size_t next = frame.index(x + dx, y + dy);
+          const double there = length + frame.resolution * std::hypot(dx, dy);
+          if (map_.clearance[next] < room_.needed() || there >= to_goal_[next]) continue;
+          to_goal_[next] = there;
+          open.push({there, next});
+        }
+      }
+    }
+  }
+
+  std::optional<std::size_t> cell_of(const Vector2d& point) const {
+    if (room_.clearance(point) < 0.0) return std::nullopt;
+    const Vector2d cell = map_.frame.to_cells(point).array().floor();
+    return map_.frame.index(static_cast<int>(cell.x()), static_cast<int>(cell.y()));
+  }
+
+  std::optional<std::size_t> key_of(const Pose2& at) const {
+    const std::optional<std::size_t> cell = cell_of(at.translation());
+    if (!cell) return std::nullopt;
+    const double part = (at.theta() + pi) / (2.0 * pi);
+    const int heading = std::clamp(static_cast<int>(part * kHeadings), 0, kHeadings - 1);
+    return *cell * kHeadings + static_cast<std::size_t>(heading);
+  }
+
+  /// How far it is to the goal, about [m].
+  double left(const Pose2& at) const {
+    const Vector2d apart = goals_.front().at.translation() - at.translation();
+    const std::optional<std::size_t> cell = cell_of(at.translation());
+    const bool fits = cell && map_.clearance[*cell] >= room_.needed();
+    return fits ? std::max(to_goal_[*cell], apart.norm()) : apart.norm();
+  }
+
+  double away(const Vector2d& point) const {
+    double least = kMostAway;
+    for (std::size_t k = 1; k < path_.points.size(); ++k)
+      least = std::min(least, distance_to_segment(point, path_.points[k - 1], path_.points[k]));
+    return least;
+  }
+
+  /// Whether the body can go along a curve, `at` of which is a pose for each length.
+  template <class Along>
+  bool is_free(double length, double clearance, Along&& at, double* end = nullptr) const {
+    const int strides = 1 + static_cast<int>(length / room_.stride());
+    for (int k = 1; k <= strides; ++k) {
+      if (!room_.admits(at(length * (double(k) / strides)).translation(), clearance)) return false;
+    }
+    if (end) *end = clearance;
+    return true;
+  }
+
+  void expand(std::size_t index, int turn) {
+    const Node from = nodes_[index];
+    Node next{.clearance = from.clearance, .parent = index, .turn = turn};
+    const double curvature = turn / radius_;
+    const auto at = [&](double length) { return from.at * along_arc(curvature, length); };
+    if (!is_free(arc_, from.clearance, at, &next.clearance)) return;
+    next.at = at(arc_);
+    const double ahead = left(next.at);
+    if (!std::isfinite(ahead)) return;
+    const double per_metre =
+        1.0 + (turn != 0 ? kTurnCost : 0.0) + kAwayCost * away(next.at.translation());
+    next.cost = from.cost + arc_ * per_metre;
+    open_.push({next.cost + ahead, nodes_.size()});
+    nodes_.push_back(next);
+  }
+
+  /// Rarely while the goal is far.
+  bool tries_goal(const Node& node, std::size_t count) const {
+    const auto every = 1 + static_cast<std::size_t>(left(node.at) / (4.0 * arc_));
+    return count % every == 0;
+  }
+
+  /// The curve that costs least to any of the headings at the goal.
+  std::optional<DubinsCurve> curve_to_goal(const Node& node) const {
+    std::optional<DubinsCurve> best;
+    double least = std::numeric_limits<double>::infinity();
+    for (const Goal& goal : goals_) {
+      const double cost = radius_ * goal.aside;
+      const auto curve = free_curve(node, goal.at, least - cost);
+      if (!curve) continue;
+      least = curve->length() + cost;
+      best = curve;
+    }
+    return best;
+  }
+
+  /// The shortest Dubins curve of those shorter than `most` along which the body can go.
+  std::optional<DubinsCurve> free_curve(const Node& node, const Pose2& to, double most) const {
+    for (const DubinsCurve& curve : dubins_curves(node.at.between(to), radius_)) {
+      if (curve.length() >= most) break;
+      const auto at = [&](double length) { return node.at * curve.at(length); };
+      if (is_free(curve.length(), node.clearance, at)) return curve;
+    }
+    return std::nullopt;
+  }
+
+  /// From the start to a node, and from there to the goal. Dubins curves take the place of what the
+  /// search has pieced together where they are shorter.
+  PlannedPath joined(std::size_t last, const DubinsCurve& to_goal) const {
+    std::vector<std::size_t> chain{last};
+    while (chain.back() != 0) chain.push_back(nodes_[chain.back()].parent);
+    std::ranges::reverse(chain);
+    PlannedPath result{.look_at = path_.look_at};
+    result.points.push_back(nodes_.front().at.translation());
+    for (std::size_t k = 0; k + 1 < chain.size();) k = append_shortcut(chain, k, result);
+    append(nodes_[last].at, to_goal, result);
+    return result;
+  }
+
+  /// A curve from a node to the farthest one behind it to which there is a shorter one than the
+  /// arcs; returns where it leads.
+  std::size_t append_shortcut(const std::vector<std::size_t>& chain, std::size_t from,
+                              PlannedPath& result) const {
+    const Node& node = nodes_[chain[from]];
+    constexpr double kRounding = 1e-6;
+    for (std::size_t to = chain.size() - 1; to > from + 1; --to) {
+      const double arcs = arc_ * static_cast<double>(to - from);
+      const auto curve = free_curve(node, nodes_[chain[to]].at, arcs + kRounding);
+      if (!curve) continue;
+      append(node.at, *curve, result);
+      return to;
+    }
+    const DubinsCurve one{.turns = {nodes_[chain[from + 1]].turn, 0, 0},
+                          .lengths = {arc_, 0.0, 0.0},
+                          .radius = radius_};
+    append(node.at, one, result);
+    return from + 1;
+  }
+
+  void append(const Pose2& from, const DubinsCurve& curve, PlannedPath& result) const {
+    const int strides = 1 + static_cast<int>(curve.length() / room_.stride());
+    for (int k = 1; k <= strides; ++k)
+      result.points.push_back(
+          (from * curve.at(curve.length() * (double(k) / strides))).translation());
+    result.length += curve.length();
+  }
+
+  const PlannedPath& path_;
+  const FloorMap& map_;
+  Room room_;
+  double radius_, arc_;
+  std::vector<Goal> goals_;
+  std::vector<double> to_goal_;
+  std::vector<Node> nodes_;
+  std::priority_queue<Open, std::vector<Open>, std::greater<>> open_;
+};
+
+}  // namespace
+
+std::optional<PlannedPath> drivable_path(PlannedPath path, const Pose2& at, const RobotModel& robot,
+                                         const FloorMap& map) {
+  if (robot.motion != MotionModel::dubins) return path;
+  if (path.points.empty()) path.points.emplace_back(at.translation());
+  const double needed = needed_along(path, at.translation(), robot, map);
+  // Steering may stray so far from a curve.
+  const Room room(map, needed - 0.5 * map.frame.resolution);
+  if (is_followed(path, at, robot, room)) return path;
+  std::optional<PlannedPath> curve = CurveSearch(path, robot, map, needed).from(at);
+  if (curve && !is_followed(*curve, at, robot, room)) return std::nullopt;
+  return curve;
+}
+
+}  // namespace cairn
