@@ -2,6 +2,7 @@
 #include "tag_lines.hpp"
 
 #include <fmt/core.h>
+#include <fmt/ranges.h>
 
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/spelling.hpp"
@@ -20,13 +21,12 @@ void unknown_tag(const Scanner& scanner, Draft& draft, const ReadOptions& option
     ++draft.report().skipped[shown(scanner.tag())];
     return;
   }
-  std::string offered;
-  for (const std::string& tag : on_offer) offered += (offered.empty() ? "" : ", ") + tag;
   const std::string nearest = nearest_spelling(scanner.tag(), on_offer);
-  scanner.fail(fmt::format(
-      "unknown tag '{}'{}; on offer: {} (ReadOptions::skip_unknown leaves such lines out){}",
-      shown(scanner.tag()), nearest.empty() ? "" : fmt::format("; did you mean '{}'?", nearest),
-      offered, draft.plugin_problems()));
+  const std::string remedy = nearest.empty()
+                                 ? fmt::format("; on offer: {}", fmt::join(on_offer, ", "))
+                                 : fmt::format("; did you mean '{}'?", nearest);
+  scanner.fail(fmt::format("unknown tag '{}'{} (ReadOptions::skip_unknown leaves such lines out){}",
+                           shown(scanner.tag()), remedy, draft.plugin_problems()));
 }
 
 Draft::FactorSlots read_factor(Scanner& scanner, Draft& draft, std::int32_t kind) {

@@ -136,15 +136,18 @@ std::string no_plugin_of_formats(const Registry& registry, std::string_view what
       folders.push_back(folder);
   }
   const char* path = std::getenv("CAIRN_PLUGIN_PATH");
+  const std::string set = path && *path != '\0' ? fmt::format("'{}'", path) : "not set";
+  // Without any plugin the registry's problems say where it looked.
   std::string text = fmt::format(
-      "no plugin of formats{}{} is on offer; {}. Plugins are looked for in the folders of "
-      "CAIRN_PLUGIN_PATH, which is {}, in $XDG_DATA_HOME/cairn/plugins or "
-      "~/.local/share/cairn/plugins, and in the folder cairn beside the library libcairn.so",
-      what.empty() ? "" : " of ", what,
+      "no plugin of formats{}{} is on offer; {}", what.empty() ? "" : " of ", what,
       folders.empty()
-          ? "no plugin at all was found"
-          : fmt::format("plugins of other kinds were found in {}", fmt::join(folders, ", ")),
-      path && *path != '\0' ? fmt::format("'{}'", path) : "not set");
+          ? fmt::format("no plugin at all was found (CAIRN_PLUGIN_PATH is {})", set)
+          : fmt::format(
+                "plugins of other kinds were found in {}. Plugins are looked for in the folders of "
+                "CAIRN_PLUGIN_PATH, which is {}, in $XDG_DATA_HOME/cairn/plugins or "
+                "~/.local/share/cairn/plugins, and in the folder cairn beside the library "
+                "libcairn.so",
+                fmt::join(folders, ", "), set));
   for (const PluginProblem& problem : registry.problems())
     text += fmt::format("\n  note: {}", problem.message);
   return text;

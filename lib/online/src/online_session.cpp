@@ -10,6 +10,7 @@
 #include "cairn/graph/packed.hpp"
 #include "cairn/io/format.hpp"
 #include "cairn/runtime/error.hpp"
+#include "cairn/runtime/spelling.hpp"
 #include "cairn/update/marginal_prior.hpp"
 
 namespace cairn {
@@ -218,9 +219,14 @@ void OnlineSession::declare(const Words& words, Reply& reply) {
 }
 
 void OnlineSession::remove(const Words& words, Reply& reply) {
-  const bool factors = words.size() > 1 && words[1] == "FACTOR";
-  if (words.size() < 3 || (!factors && words[1] != "VARIABLE"))
-    throw bad_line("expected 'REMOVE FACTOR k …' or 'REMOVE VARIABLE id …'");
+  static const std::vector<std::string> kWhat{"FACTOR", "VARIABLE"};
+  const bool factors = words.size() > 1 && words[1] == kWhat[0];
+  if (words.size() < 3 || (!factors && words[1] != kWhat[1])) {
+    const std::string near = words.size() > 1 ? nearest_spelling(words[1], kWhat) : "";
+    throw bad_line(fmt::format(
+        "expected 'REMOVE FACTOR k …' or 'REMOVE VARIABLE id …'{}",
+        near.empty() || near == words[1] ? "" : fmt::format("; did you mean '{}'?", near)));
+  }
   const auto ids = parse_ids(std::span(words).subspan(2), factors ? "number of a factor" : "id");
   GraphUpdate leaving;
   (factors ? leaving.removed_factors : leaving.removed_variables) = ids;

@@ -12,6 +12,7 @@
 #include "cairn/geometry/pose.hpp"
 #include "cairn/graph/packed.hpp"
 #include "cairn/io/format.hpp"
+#include "cairn/runtime/spelling.hpp"
 
 namespace cairn {
 namespace {
@@ -457,7 +458,11 @@ void PolicySession::finish_pose(const Words& words, Reply& reply) {
 }
 
 void PolicySession::take_back(const Words& words, Reply& reply) {
-  if (words.size() > 1 && words[1] == "LINK") return revoke(words, reply);
+  static const std::vector<std::string> kWhat{"LINK", "VARIABLE"};
+  const std::string_view what = words.size() > 1 ? words[1] : "";
+  if (what == kWhat[0]) return revoke(words, reply);
+  if (const std::string near = nearest_spelling(what, kWhat); !near.empty() && near != what)
+    throw bad_line(fmt::format("REMOVE {}; did you mean 'REMOVE {}'?", what, near));
   if (words.size() != 3 || words[1] != "VARIABLE" || !arriving_ ||
       parse_whole(words[2], "id") != arriving_->pose.id) {
     throw bad_line(

@@ -63,13 +63,20 @@ TEST_F(OnlineSessionTest, SuggestsTheCommandForAWordThatIsMisspelt) {
                                         {"ESTIMAT 1", "ESTIMATE"},
                                         {"MARGINALISE 1", "MARGINALIZE"},
                                         {"EDGE_SE 0 1", "EDGE_SE2"},
-                                        {"FIXX 0", "FIX"}}) {
+                                        {"FIXX 0", "FIX"},
+                                        {"REMOVE FACTER 1", "FACTOR"},
+                                        {"REMOVE variable 1", "VARIABLE"}}) {
     const LineSession::Reply reply = take(misspelt);
     EXPECT_TRUE(reply.refused);
     EXPECT_FALSE(reply.changes);
     EXPECT_THAT(reply.text, HasSubstr(std::string("; did you mean '") + meant + "'?"));
+    EXPECT_THAT(reply.text, Not(HasSubstr("on offer")));
   }
-  EXPECT_THAT(take("NOTHING_LIKE_THAT_IS_ON_OFFER 1").text, Not(HasSubstr("did you mean")));
+  EXPECT_THAT(take("REMOVE 7 1").text, HasSubstr("or 'REMOVE VARIABLE id …'\n"));
+  EXPECT_THAT(take("REMOVE FACTOR").text, HasSubstr("or 'REMOVE VARIABLE id …'\n"));
+  const std::string far = take("NOTHING_LIKE_THAT_IS_ON_OFFER 1").text;
+  EXPECT_THAT(far, Not(HasSubstr("did you mean")));
+  EXPECT_THAT(far, HasSubstr("; on offer: "));
   EXPECT_THAT(take("FOLOW").text, Not(HasSubstr("did you mean")));
   format_->add_other_words(LineServer::words());
   EXPECT_THAT(take("FOLOW").text, HasSubstr("; did you mean 'FOLLOW'?"));
