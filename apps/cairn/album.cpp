@@ -116,8 +116,7 @@ void add_album_options(ArgumentParser cli, AlbumOptions& options) {
       .type_name("TEXT")
       .repeatable();
   cli.add_option("--truth", options.truth,
-                 options.align ? "the ground truth, by id; estimates are aligned as by evaluate"
-                               : "the ground truth, laid over by id")
+                 "the ground truth, by id; estimates are aligned as by evaluate")
       .type_name("FILE");
   cli.add_option("--initial", options.initial, "initial estimate to show too: kind initial_guess")
       .component({"initial_guess"});
@@ -146,7 +145,7 @@ Album load_album(const AlbumOptions& options, const std::string& command, Sessio
   AlbumBuilder builder([&](const std::string& file) { return load_named(file, options, session); },
                        [&](const std::string& sentence) { session.note(sentence); });
   if (options.apart) builder.keep_apart();
-  if (options.align) builder.align_to_truth();
+  builder.align_to_truth();
   for (std::size_t k = 0; k < options.files.size(); ++k) {
     const std::string& file = options.files[k];
     const std::string name = k < options.names.size() ? options.names[k] : short_name(file);

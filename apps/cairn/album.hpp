@@ -22,7 +22,6 @@ struct AlbumOptions {
   std::string title;
   InputOptions input;
   bool apart = false;   ///< each graph by itself, also one with the ids of another
-  bool align = false;   ///< estimates to the truth
   bool curves = false;  ///< of recordings of explorations the curves alone, as tables
 };
 

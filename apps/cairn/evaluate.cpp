@@ -124,6 +124,19 @@ void warn_of_missing(std::int64_t count, const std::string& in, const std::strin
       fmt::format("{} of {} {} in {} and left out", plural(count, "pose"), in, verb, not_in));
 }
 
+/// Of poses as they are compared; graphs of the plane have no height to be wrong.
+void warn_of_dimensions(const LoadedGraph& estimate, const LoadedGraph& truth,
+                        const Trajectory& poses, const Trajectory& true_poses,
+                        const Session& session) {
+  const bool planar_estimate = is_planar(estimate.graph) && !is_planar(true_poses);
+  const bool planar_truth = is_planar(truth.graph) && !is_planar(poses);
+  if (!planar_estimate && !planar_truth) return;
+  session.note(fmt::format(
+      "{} is of the plane and {} in space: heights, roll and pitch count as "
+      "errors; --planar compares x, y and yaw alone",
+      (planar_estimate ? estimate : truth).label, (planar_estimate ? truth : estimate).label));
+}
+
 // Divergence --------------------------------------------------------------------------------------
 
 /// D(TRUTH‖ESTIMATE) that was asked for. Without an error: it could not be computed.
@@ -269,6 +282,7 @@ int run(const EvaluateOptions& options, Session& session) {
                   session);
   warn_of_missing(pairs.only_in_truth, options.truth.file, options.estimate.file, by_stamp,
                   session);
+  warn_of_dimensions(estimate_graph, truth_graph, estimate, truth, session);
   Results results(session);
   GraphDivergence divergence;
   if (solver) {

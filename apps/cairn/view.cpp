@@ -98,11 +98,11 @@ Command add_view(ArgumentParser program) {
   cli.add_option("-o,--output", options->output, "the page [name of the first FILE, .html]")
       .type_name("PAGE");
   cli.footer(
-      "Graphs with the same ids are laid over each other: the lowest chi2 is the estimate, the "
-      "first\n"
-      "FILE else the initial estimate. Files without factors: ground truth, by id. The page needs "
-      "no\n"
-      "network.\n\n"
+      "Graphs with the same ids are laid over each other: the lowest chi2 is the estimate, of two "
+      "the\n"
+      "first FILE else the initial estimate. Files without factors: ground truth, by id. The page "
+      "needs\n"
+      "no network.\n\n"
       "Example:\n"
       "  cairn optimize city.g2o -o best.g2o --json run.json --record run.jsonl\n"
       "  cairn view city.g2o best.g2o run.json run.jsonl -o city.html\n"

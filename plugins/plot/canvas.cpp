@@ -85,7 +85,7 @@ Theme theme(std::string_view name) {
   t.grid = pick(0xe4e5e3, 0x262b31);
   t.initial = {pick(0x8a8f98, 0x8a919c), 1, {1, 2}};
   t.estimate = {pick(0x0072b2, 0x56b4e9), 2, {}};
-  t.truth = {pick(0x1a1d21, 0xf2f4f7), 1.5, {8, 4}};
+  t.truth = {pick(0x1a1d21, 0xf2f4f7), 1, {6, 4}};
   t.loop = {pick(0xe69f00, 0xe69f00, 0.55), 1, {}};
   t.landmark = {pick(0x009e73, 0x2fc79a, 0.45), 0.75, {}};
   t.peers = {{pick(0xd55e00, 0xff8a3d), 1.5, {6, 3}},

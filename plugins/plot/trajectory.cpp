@@ -80,7 +80,8 @@ struct Layer {
   Stroke stroke;
 };
 
-/// What lies below first: the guess, then peers, the truth, the estimate.
+/// What lies below first: the guess, then peers, the estimate, the truth, which is thin and dashed
+/// and would be hidden by a good estimate.
 std::vector<Layer> layers_of(const Scene& scene, const Theme& theme) {
   std::vector<Layer> layers;
   std::size_t peers = 0;
@@ -106,12 +107,21 @@ std::vector<Layer> layers_of(const Scene& scene, const Theme& theme) {
     layers.push_back(std::move(layer));
   }
   const auto height = [](const Layer& layer) {
-    constexpr std::array kHeights{0, 3, 2, 1};
+    constexpr std::array kHeights{0, 2, 3, 1};  // in the order of EstimateRole
     return kHeights[static_cast<std::size_t>(layer.estimate->role)];
   };
   std::stable_sort(layers.begin(), layers.end(),
                    [&](const Layer& a, const Layer& b) { return height(a) < height(b); });
   return layers;
+}
+
+/// The layer that has the edges, landmarks and poses: the uppermost but the truth, which has them
+/// where there is nothing else.
+const Layer& main_layer(const std::vector<Layer>& layers) {
+  const auto shown = std::find_if(layers.rbegin(), layers.rend(), [](const Layer& layer) {
+    return layer.estimate->role != EstimateRole::truth;
+  });
+  return shown == layers.rend() ? layers.back() : *shown;
 }
 
 Bounds bounds_of(const std::vector<Layer>& layers) {
@@ -150,8 +160,9 @@ class Drawing {
 
   void draw(const std::vector<Layer>& layers, const PlotOptions& options) {
     canvas_.clip(area_);
+    const Layer& uppermost = main_layer(layers);
     for (const Layer& layer : layers) {
-      const bool main = &layer == &layers.back();
+      const bool main = &layer == &uppermost;
       if (main && options.colour == EdgeColour::by_residual) {
         draw_residuals(layer);
       } else {
@@ -297,7 +308,7 @@ std::vector<LegendEntry> legend_of(const Scene& scene, const Theme& theme,
   const bool by_residual = options.colour == EdgeColour::by_residual;
   std::vector<LegendEntry> legend;
   for (auto layer = layers.rbegin(); layer != layers.rend(); ++layer) {
-    if (by_residual && layer == layers.rbegin()) {
+    if (by_residual && &*layer == &main_layer(layers)) {
       legend.push_back({"small residual", {theme.residual(0.1), 1, {}}});
       legend.push_back({"largest residual", {theme.residual(1), 3, {}}});
     } else {

@@ -9,6 +9,7 @@
 #include "cairn/linear/iterative_solver.hpp"
 #include "cairn/linear/linear_solver.hpp"
 #include "cairn/plugin/registry.hpp"
+#include "integration/latex_tabular.hpp"
 #include "integration/process.hpp"
 
 namespace cairn::test {
@@ -81,6 +82,7 @@ TEST(BenchCommand, ATableOfLatexHasAllColumnsAndEscapesWhatHasAMeaningThere) {
   EXPECT_THAT(outcome.out,
               HasSubstr("linear solver & median & min \\dots{} max & ratio & ms/it & "));
   EXPECT_THAT(outcome.out, HasSubstr("\nblock\\_cholesky & "));
+  EXPECT_EQ(latex_tabular(outcome.out).rows.size(), 2U);
 }
 
 TEST(BenchCommand, EveryRunStartsFromTheSameFirstEstimate) {

@@ -118,6 +118,26 @@ TEST_F(PlotCommand, GraphsWithTheSamePosesAreDrawnBesideEachOther) {
   EXPECT_EQ(count(plot({graph_, best, "--apart"}, "svg"), estimate), 4);
 }
 
+TEST_F(PlotCommand, TheTruthIsDrawnOverTheEstimateThinAndDashed) {
+  const std::string best = folder_.file("best.g2o"), truth = folder_.file("truth.g2o");
+  run({"generate", "manhattan:poses=120", "-o", graph_, "--ground-truth", truth, "--seed", "4"});
+  run({"optimize", graph_, "-o", best, "--quiet"});
+  const std::string estimate = "stroke:rgb(0%,44.705882%,69.803922%)",
+                    dashes = "stroke-dasharray:6,4";
+  for (const Arguments& files : {Arguments{best}, Arguments{graph_, best}}) {
+    Arguments arguments = files;
+    arguments.insert(arguments.end(), {"--truth", truth});
+    const std::string picture = plot(arguments, "svg");
+    EXPECT_EQ(count(picture, dashes), 2);  // the legend's sample is one
+    EXPECT_LT(picture.rfind(estimate), picture.rfind(dashes));
+  }
+  // The residuals and loop closures are those of the estimate all the same.
+  const std::string coloured = plot({best, "--truth", truth, "--colour", "residual"}, "svg");
+  EXPECT_GE(count(coloured, "stroke:rgb(36.07"), 2);  // the worst, and its sample
+  EXPECT_EQ(count(coloured, dashes), 2);
+  EXPECT_EQ(count(coloured, estimate), 0);
+}
+
 TEST_F(PlotCommand, TheWrongLoopClosureIsTheOneInTheWorstColour) {
   const std::string best = folder_.file("best.g2o");
   run({"optimize", graph_, "--initial", "odometry", "--loss", "cauchy", "--loss-on", "loops", "-o",

@@ -23,6 +23,7 @@
 #include "cairn/runtime/error.hpp"
 #include "cairn/solve/optimizer.hpp"
 #include "cairn/sparsification/sparsification.hpp"
+#include "integration/latex_tabular.hpp"
 #include "integration/process.hpp"
 #include "integration/sparsify_command.hpp"
 
@@ -32,6 +33,7 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using testing::AllOf;
+using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::Not;
 using testing::SizeIs;
@@ -219,6 +221,33 @@ TEST_F(Sparsify, ReplaysWhatItRecorded) {
       all = number(row.at("kld")) * static_cast<double>(row.at("problems").as_int64());
   }
   EXPECT_NEAR(all, number(told.at("problems").at("kld")), 1e-3 * (1.0 + all));
+}
+
+TEST_F(Sparsify, TheTableOfSolvedProblemsIsATabularOfLatex) {
+  const std::string problems = folder_.file("problems.json"), latex = folder_.file("table.tex");
+  study({"@manhattan:poses=150", "--keep-every", "4", "--record", problems});
+  const boost::json::value told = study({problems, "--topology", "mi", "--topology",
+                                         "best:most=100", "--recovery", "ncfd", "--latex", latex},
+                                        "problems");
+  const LatexTabular table = latex_tabular(read_text(latex));
+  EXPECT_EQ(table.alignment, "llrrrrrrrr");
+  const boost::json::array& rows = told.at("rows").as_array();
+  ASSERT_EQ(table.rows.size(), rows.size() + 1);
+  EXPECT_EQ(table.rows[0][2], "nodes");
+  std::set<std::string> topologies;
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    const std::vector<std::string>& cells = table.rows[k + 1];
+    ASSERT_EQ(cells.size(), 10U);
+    topologies.insert(cells[0]);
+    EXPECT_EQ(cells[1], "ncfd");
+    EXPECT_EQ(cells[2], rows[k].at("nodes").is_null()
+                            ? "all"
+                            : std::to_string(rows[k].at("nodes").as_int64()));
+    EXPECT_EQ(cells[3], std::to_string(rows[k].at("problems").as_int64()));
+    EXPECT_NEAR(std::stod(cells[5]), number(rows[k].at("kld")),
+                1e-3 * std::abs(number(rows[k].at("kld"))));
+  }
+  EXPECT_THAT(topologies, ElementsAre("best:most=100", "mi"));
 }
 
 TEST_F(Sparsify, SaysForHowManyBlanketsBestHadTooManyToTry) {

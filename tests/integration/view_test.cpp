@@ -6,6 +6,7 @@
 #include <map>
 
 #include "cairn/plugin/registry.hpp"
+#include "cairn/report/packed_array.hpp"
 #include "integration/process.hpp"
 
 namespace cairn::test {
@@ -99,6 +100,25 @@ TEST_F(ViewCommand, TakesATrajectoryForTheTruth) {
   const auto page = data_of({"view", tum, graph_});
   ASSERT_EQ(page.at("graphs").as_array().size(), 1U);
   EXPECT_EQ(roles(page.at("graphs").at(0)).at("truth.tum"), "truth");
+}
+
+TEST_F(ViewCommand, EstimatesAreAlignedToTheTruth) {
+  const std::string here = "VERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 1 0 0\nVERTEX_SE2 2 1 2 0\n";
+  write_text(graph_, here + "EDGE_SE2 0 1 1 0 0 1 0 0 1 0 1\nEDGE_SE2 1 2 0 2 0 1 0 0 1 0 1\n");
+  // Turned by a right angle, and 10 m away.
+  write_text(truth_,
+             "VERTEX_SE2 0 10 0 1.5708\nVERTEX_SE2 1 10 1 1.5708\n"
+             "VERTEX_SE2 2 8 1 1.5708\n");
+  const auto estimates =
+      data_of({"view", graph_, "--truth", truth_}).at("graphs").at(0).at("estimates");
+  ASSERT_EQ(estimates.as_array().size(), 2U);
+  std::vector<std::vector<double>> positions;
+  for (const auto& estimate : estimates.as_array())
+    positions.push_back(
+        unpack_numbers("f32", std::string(estimate.at("positions").at("base64").as_string()),
+                       Packing::base64, 6, "positions"));
+  for (std::size_t k = 0; k < 6; ++k) EXPECT_NEAR(positions[0][k], positions[1][k], 1e-5) << k;
+  EXPECT_NEAR(positions[1][2], positions[1][0], 1e-5);  // the truth stays where it is
 }
 
 TEST_F(ViewCommand, ShowsAGuessAndTakesNames) {

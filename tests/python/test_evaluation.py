@@ -1,4 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
+import warnings
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -52,6 +54,22 @@ def test_files_with_time_stamps_are_paired_by_time(tmp_path):
         cairn.evaluate(estimate, trajectory(dense.loop().poses), match="stamp")
     with pytest.raises(cairn.Error, match="expected 'auto', 'id' or 'stamp'"):
         cairn.evaluate(estimate, truth, match="time")
+
+
+def test_a_planar_estimate_beside_a_spatial_truth_is_warned_of():
+    truth = cairn.Graph()
+    height = np.array([0.0, 0.4, 0.1])  # of three poses on a line, level
+    spatial = np.column_stack([np.arange(3.0), np.zeros(3), height, np.zeros((3, 3)), np.ones(3)])
+    truth.add_variables(cairn.Pose3, np.arange(3), spatial)
+    estimate = trajectory(np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0]]))
+    for a, b in [(estimate, truth), (truth, estimate)]:
+        with pytest.warns(UserWarning, match="heights, roll and pitch count as errors; planar=True"):
+            assert cairn.evaluate(a, b).ate_translation > 0.1
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert_allclose(cairn.evaluate(estimate, truth, planar=True).ate_translation, 0, atol=1e-12)
+        cairn.evaluate(truth, truth)
+        cairn.evaluate(estimate, estimate)
 
 
 def test_less_than_two_common_poses_are_an_error():

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Errors of trajectories.
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <fmt/core.h>
@@ -38,9 +39,27 @@ bool by_stamp(const std::string& match, const Trajectory& estimate, const Trajec
   return true;
 }
 
-TrajectoryError evaluate(BoundGraph& estimate, BoundGraph& truth, const std::string& match) {
-  const Trajectory poses = trajectory_of(estimate.get(), estimate.stamps);
-  const Trajectory true_poses = trajectory_of(truth.get(), truth.stamps);
+/// A UserWarning where one of the two has no height that could be wrong.
+void warn_of_dimensions(const Graph& estimate, const Graph& truth, const Trajectory& poses,
+                        const Trajectory& true_poses) {
+  const bool planar_estimate = is_planar(estimate) && !is_planar(true_poses);
+  if (!planar_estimate && !(is_planar(truth) && !is_planar(poses))) return;
+  const std::string text = fmt::format(
+      "the {} is of the plane and the {} in space: heights, roll and pitch count as errors; "
+      "planar=True compares x, y and yaw alone",
+      planar_estimate ? "estimate" : "truth", planar_estimate ? "truth" : "estimate");
+  if (PyErr_WarnEx(PyExc_UserWarning, text.c_str(), 1) != 0) throw py::error_already_set();
+}
+
+TrajectoryError evaluate(BoundGraph& estimate, BoundGraph& truth, const std::string& match,
+                         bool planar) {
+  Trajectory poses = trajectory_of(estimate.get(), estimate.stamps);
+  Trajectory true_poses = trajectory_of(truth.get(), truth.stamps);
+  if (planar) {
+    poses = projected_to_plane(std::move(poses));
+    true_poses = projected_to_plane(std::move(true_poses));
+  }
+  warn_of_dimensions(estimate.get(), truth.get(), poses, true_poses);
   const bool stamps = by_stamp(match, poses, true_poses);
   const py::gil_scoped_release unlocked;
   return compare(stamps ? pair_by_stamp(poses, true_poses) : pair_by_id(poses, true_poses));
@@ -70,11 +89,12 @@ void bind_evaluation(py::module_& module) {
       });
   module.def(
       "evaluate", &evaluate, py::arg("estimate"), py::arg("truth"), py::kw_only(),
-      py::arg("match") = "auto",
+      py::arg("match") = "auto", py::arg("planar") = false,
       R"(Errors of the poses of a graph against those of another, after rigid alignment: a TrajectoryError.
 
 match: "id" pairs poses of equal id, "stamp" by the time stamps of the files that both were read from, "auto" does what
-fits them.)");
+fits them.
+planar: compares x, y and yaw alone. Without it a UserWarning says where one of the two is of the plane and the other not.)");
 }
 
 }  // namespace cairn::python

@@ -59,6 +59,22 @@ Trajectory trajectory(const Graph& graph) {
   return result;
 }
 
+bool is_planar(const Graph& graph) {
+  bool poses = false;
+  for (const VariablePool& pool : graph.variable_pools()) {
+    if (!has_orientation(*pool.type) || pool.variables.empty()) continue;
+    if (pool.type->placement()->dimension() != 2) return false;
+    poses = true;
+  }
+  return poses;
+}
+
+bool is_planar(const Trajectory& poses) {
+  return std::ranges::all_of(poses, [](const TrajectoryPose& pose) {
+    return pose.t[2] == 0.0 && pose.R[8] == 1.0;  // the last is z·z
+  });
+}
+
 std::vector<double> read_stamps(const std::filesystem::path& file) {
   const std::string bytes = read_file(file);
   std::vector<double> stamps;

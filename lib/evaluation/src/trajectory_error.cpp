@@ -30,6 +30,7 @@ Pose pose_of(const TrajectoryPose& pose) {
 
 struct Pairs {
   std::vector<Pose> estimate, truth;
+  bool planar = false;
   std::size_t size() const { return truth.size(); }
 };
 
@@ -37,6 +38,7 @@ Pairs pairs_of(const TrajectoryPairs& poses) {
   Pairs pairs;
   for (const TrajectoryPose& pose : poses.estimate) pairs.estimate.push_back(pose_of(pose));
   for (const TrajectoryPose& pose : poses.truth) pairs.truth.push_back(pose_of(pose));
+  pairs.planar = is_planar(poses.estimate) && is_planar(poses.truth);
   return pairs;
 }
 
@@ -46,11 +48,6 @@ Vector3d centroid(const std::vector<Pose>& poses) {
   Vector3d sum = Vector3d::Zero();
   for (const Pose& pose : poses) sum += pose.t;
   return sum / static_cast<double>(poses.size());
-}
-
-bool is_planar(const std::vector<Pose>& poses) {
-  return std::all_of(poses.begin(), poses.end(),
-                     [](const Pose& pose) { return pose.t.z() == 0.0 && pose.R(2, 2) == 1.0; });
 }
 
 Matrix3d about_z(double angle) {
@@ -112,9 +109,8 @@ Pose align(const Pairs& pairs) {
     truth_spread += t.squaredNorm();
   }
   const double spread = std::sqrt(estimate_spread * truth_spread);
-  const bool planar = is_planar(pairs.estimate) && is_planar(pairs.truth);
-  const Matrix3d R =
-      planar ? planar_rotation(M, orientations, spread) : spatial_rotation(M, orientations, spread);
+  const Matrix3d R = pairs.planar ? planar_rotation(M, orientations, spread)
+                                  : spatial_rotation(M, orientations, spread);
   return {R, truth_centre - R * estimate_centre};
 }
 

@@ -10,6 +10,7 @@
 #include <fmt/core.h>
 #include <Eigen/Core>
 
+#include "cairn/evaluation/trajectory.hpp"
 #include "cairn/geometry/pose.hpp"
 #include "cairn/graph/packed.hpp"
 #include "cairn/runtime/error.hpp"
@@ -67,8 +68,8 @@ void add_ellipse(const Scene& scene, const Graph& of_scene, SceneEstimate& estim
     estimate.covariance_upper.push_back(static_cast<float>(number));
 }
 
-/// The lowest chi2 is the estimate; where it is not the first file's, that one is what it began
-/// with.
+/// The lowest chi2 is the estimate; where there are two and it is the second's, the first is what
+/// it began with. Several are a comparison.
 void give_roles(Scene& scene) {
   std::vector<SceneEstimate*> open;
   for (SceneEstimate& estimate : scene.estimates) {
@@ -84,7 +85,8 @@ void give_roles(Scene& scene) {
   const bool guessed = std::any_of(
       scene.estimates.begin(), scene.estimates.end(),
       [](const SceneEstimate& estimate) { return estimate.role == EstimateRole::initial; });
-  if (best != open.front() && !guessed) open.front()->role = EstimateRole::initial;
+  if (open.size() == 2 && best != open.front() && !guessed)
+    open.front()->role = EstimateRole::initial;
 }
 
 }  // namespace
@@ -163,6 +165,7 @@ void AlbumBuilder::lay_over(Entry& entry, const std::string& file, const std::st
     const int other = *graph.find(moved.id(v));
     if (moved.type(v).tag() != graph.type(other).tag()) {
       int matched = 0;
+      note_dimensions(entry, file, graph);
       entry.scene.estimates.push_back(
           place_by_id(graph, entry.scene, name, EstimateRole::peer, matched));
       entry.scene.estimates.back().file = file;
@@ -172,6 +175,19 @@ void AlbumBuilder::lay_over(Entry& entry, const std::string& file, const std::st
   }
   entry.scene.estimates.push_back(place(moved, entry.scene, name, EstimateRole::peer));
   entry.scene.estimates.back().file = file;
+}
+
+/// Says where a graph of the plane and one in space are laid over each other.
+void AlbumBuilder::note_dimensions(const Entry& entry, const std::string& file,
+                                   const Graph& graph) {
+  if (entry.scene.dimension == 2) {
+    if (is_planar(trajectory(graph))) return;
+    note(fmt::format("{}: is in space, {} of the plane: x, y and the heading are shown alone", file,
+                     entry.scene.name));
+  } else if (is_planar(graph) && !(entry.graph && is_planar(trajectory(*entry.graph)))) {
+    note(fmt::format("{}: is of the plane, {} in space: it is shown at z = 0", file,
+                     entry.scene.name));
+  }
 }
 
 /// Whether some scene took it; the last one that has its ids does.
@@ -185,6 +201,7 @@ bool AlbumBuilder::lay_by_id(const std::string& file, const std::string& name, c
       note(fmt::format("{}: {} of {} are in {} by id, the rest is not shown", file, matched,
                        counted(graph.variable_count(), "variable"), entry->scene.name));
     }
+    note_dimensions(*entry, file, graph);
     estimate.file = file;
     entry->scene.estimates.push_back(std::move(estimate));
     return true;

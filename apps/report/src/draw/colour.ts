@@ -31,7 +31,7 @@ export interface Stroke {
 const kRoles: Record<Exclude<Role, "peer">, Stroke> = {
   estimate: { light: "#0072b2", dark: "#56b4e9", width: 2, dash: [] },
   initial: { light: "#8a8f98", dark: "#8a919c", width: 1.25, dash: [1.5, 3] },
-  truth: { light: "#1a1d21", dark: "#f2f4f7", width: 1.5, dash: [8, 4] },
+  truth: { light: "#1a1d21", dark: "#f2f4f7", width: 1, dash: [6, 4] },
 };
 
 const kPeers: Stroke[] = [

@@ -285,7 +285,8 @@ export class Drawing {
         u.width.value = budget.thick ? [stroke.width * ratio, worst * ratio] : [0, 0];
         const dash = recorded ? [] : stroke.dash;
         u.dash.value = s > 0 ? [0, 0, 0, 0] : [0, 1, 2, 3].map((d) => (dash[d] ?? 0));
-        layer.order(inFocus ? 2.5 : 2);
+        // The truth is thin and dashed: a good estimate would hide it.
+        layer.order(this.graph.estimates[k].role === "truth" ? 2.75 : inFocus ? 2.5 : 2);
       });
     });
   }

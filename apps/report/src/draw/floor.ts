@@ -116,8 +116,8 @@ export class FloorDrawing {
     if (shown.tree && decision?.tree) this.drawTree(context, decision, theme);
     if (shown.graph) this.drawGraph(context, exploration, k, theme);
     const until = exploration.moments.slice(0, k + 1);
-    if (shown.truth) this.line(context, until.flatMap((m) => (m.truth ? [point(m.truth)] : [])), truth, theme);
     if (shown.trajectory) this.line(context, until.map((m) => point(m.estimate)), estimate, theme);
+    if (shown.truth) this.line(context, until.flatMap((m) => (m.truth ? [point(m.truth)] : [])), truth, theme);
     if (shown.candidates && decision) this.drawCandidates(context, decision, marked, theme);
     if (shown.ellipse) this.drawEllipse(context, exploration, k, theme);
     if (shown.truth && moment.truth) this.drawRobot(context, exploration, moment.truth, truth, theme);

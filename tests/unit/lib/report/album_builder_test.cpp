@@ -11,6 +11,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
 #include "support/planar_graph.hpp"
 
@@ -59,6 +60,10 @@ class AlbumBuilderTest : public ::testing::Test {
   test::PlanarTypes types_;
   std::map<std::string, Graph> files_;  ///< what reports may name
   std::vector<std::string> notes_;
+  AlbumBuilder builder_with_notes() {
+    return AlbumBuilder([](const std::string&) { return std::optional<Graph>(); },
+                        [this](const std::string& sentence) { notes_.push_back(sentence); });
+  }
   AlbumBuilder builder_{[this](const std::string& file) -> std::optional<Graph> {
                           const auto there = files_.find(file);
                           if (there == files_.end()) return std::nullopt;
@@ -75,10 +80,16 @@ TEST_F(AlbumBuilderTest, GraphsWithTheSameIdsAreLaidOverTheFirst) {
   const Album made = album();
   ASSERT_THAT(made.scenes, SizeIs(2));
   EXPECT_EQ(made.scenes[0].name, "a.g2o");
-  EXPECT_THAT(names(made.scenes[0]), ElementsAre("initial a", "estimate b", "peer c"));
+  EXPECT_THAT(names(made.scenes[0]), ElementsAre("peer a", "estimate b", "peer c"));
   EXPECT_THAT(names(made.scenes[1]), ElementsAre("estimate other"));
   EXPECT_NEAR(made.scenes[0].estimates[0].chi2, 4 * 0.25, 1e-12);
   EXPECT_THAT(notes_, IsEmpty());
+}
+
+TEST_F(AlbumBuilderTest, OfTwoGraphsTheFirstIsWhatTheOtherBeganWith) {
+  builder_.add_graph("a.g2o", "a", line(0, 5, 1.5));
+  builder_.add_graph("b.g2o", "b", line(0, 5, 1.0));
+  EXPECT_THAT(names(album().scenes[0]), ElementsAre("initial a", "estimate b"));
 }
 
 TEST_F(AlbumBuilderTest, GraphsThatAreKeptApartStandByThemselves) {
@@ -204,6 +215,35 @@ TEST_F(AlbumBuilderTest, EstimatesAreAlignedToTheTruth) {
   const float expected[] = {float(4 * c * c + s * s), float(3 * c * s), float(4 * s * s + c * c)};
   for (std::size_t k = 0; k < 3; ++k)
     EXPECT_NEAR(shown.covariance_upper[k], expected[k], 1e-5) << k;
+}
+
+TEST_F(AlbumBuilderTest, APlanarAndASpatialGraphAreSaidToBeSo) {
+  Registry registry;
+  if (!registry.has("variable", "VERTEX_SE3:QUAT")) GTEST_SKIP() << "built without slam3d";
+  const auto spatial = [&](double height) {
+    Graph graph;
+    for (int k = 0; k < 5; ++k)
+      graph.add_variable(registry.variable_type("VERTEX_SE3:QUAT"), k,
+                         std::array{1.0 * k, 0.0, height * k, 0.0, 0.0, 0.0, 1.0});
+    return graph;
+  };
+  builder_.add_graph("a.g2o", "a", line(0, 5, 1.0));
+  builder_.add_graph("flat.tum", "flat", spatial(0.0));
+  album();
+  EXPECT_THAT(notes_, IsEmpty());  // nothing of it is lost
+  AlbumBuilder planar(builder_with_notes()), in_space(builder_with_notes());
+  Album made;
+  planar.add_graph("a.g2o", "a", line(0, 5, 1.0));
+  planar.set_truth("truth.tum", spatial(0.1));
+  planar.finish(made);
+  EXPECT_THAT(notes_, ElementsAre("truth.tum: is in space, a.g2o of the plane: x, y and the "
+                                  "heading are shown alone"));
+  notes_.clear();
+  in_space.add_graph("b.tum", "b", spatial(0.1));
+  in_space.set_truth("truth.g2o", line(0, 5, 1.0, false));
+  in_space.finish(made);
+  EXPECT_THAT(notes_,
+              ElementsAre("truth.g2o: is of the plane, b.tum in space: it is shown at z = 0"));
 }
 
 TEST_F(AlbumBuilderTest, TakesOneComparison) {

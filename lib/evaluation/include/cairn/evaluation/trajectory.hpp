@@ -28,6 +28,11 @@ using Trajectory = std::vector<TrajectoryPose>;
 /// does not know any, but the report of reading it may (`ReadReport::stamps`).
 CAIRN_API Trajectory trajectory(const Graph& graph);
 
+/// Whether a graph has poses, all of types of the plane, such as VERTEX_SE2.
+CAIRN_API bool is_planar(const Graph& graph);
+/// Whether all poses lie in z = 0, turned about z alone.
+CAIRN_API bool is_planar(const Trajectory& poses);
+
 /// Time stamps [s] of a text with one number per line, such as KITTI's times.txt; '#' begins a
 /// comment. Throws `Error` (input) with file and line where one is no finite number or not above
 /// the one before.

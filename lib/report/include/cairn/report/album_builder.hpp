@@ -20,7 +20,7 @@ namespace cairn {
 /// Combines graphs, trajectories, recordings and runs into what `Album` holds:
 ///
 /// - graphs with the same ids over the first of them; the one with the lowest chi2 is the estimate,
-///   the first otherwise the initial estimate, all others peers;
+///   of two otherwise the first the initial estimate, all others peers;
 /// - graphs without factors (trajectories) over the last graph that has their ids, the first of
 ///   them as ground truth unless that is given;
 /// - recordings and reports of runs with their graph;
@@ -86,8 +86,8 @@ class CAIRN_API AlbumBuilder {
 
   void note(const std::string& sentence);
   Entry& add_entry(const std::string& file, const std::string& name, Graph graph);
-  static void lay_over(Entry& entry, const std::string& file, const std::string& name,
-                       const Graph& graph);
+  void lay_over(Entry& entry, const std::string& file, const std::string& name, const Graph& graph);
+  void note_dimensions(const Entry& entry, const std::string& file, const Graph& graph);
   bool lay_by_id(const std::string& file, const std::string& name, const Graph& graph,
                  EstimateRole role);
   void join_trajectory(NamedGraph trajectory);
