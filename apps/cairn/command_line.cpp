@@ -20,6 +20,7 @@
 #include "completion.hpp"
 #include "help.hpp"
 #include "manual_page.hpp"
+#include "option_words.hpp"
 
 namespace cairn::app {
 namespace {
@@ -288,7 +289,15 @@ std::function<int()> CommandLine::parse(int argc, const char* const* argv) {
   if (help_.parsed()) return [this] { return explain(); };
   if (complete_.parsed()) return [this] { return complete(words_to_complete_); };
   for (const Command& command : commands_) {
-    if (command.parser.parsed()) return [&] { return command.run(session_); };
+    if (!command.parser.parsed()) continue;
+    const std::vector<std::string> options = option_names(options_of(program, chosen));
+    return [this, &command, name = command_name(*chosen), options] {
+      try {
+        return command.run(session_);
+      } catch (const Error& error) {
+        throw Error(error.code(), with_option_of_command(error.what(), name, options));
+      }
+    };
   }
   return [program] { return print_usage_of_nothing(program); };
 }

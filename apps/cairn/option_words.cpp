@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "option_words.hpp"
 
+#include <algorithm>
 #include <array>
-#include <string_view>
 #include <utility>
+
+#include <fmt/core.h>
 
 namespace cairn::app {
 namespace {
@@ -24,6 +26,25 @@ std::string in_command_line_words(std::string message) {
          at += option.size()) {
       message.replace(at, member.size(), option);
     }
+  }
+  return message;
+}
+
+std::string with_option_of_command(std::string message, std::string_view command,
+                                   std::span<const std::string> options) {
+  constexpr std::string_view kBefore[] = {" has no option '", " takes no options, but '"};
+  for (const std::string_view before : kBefore) {
+    const std::size_t found = message.find(before);
+    if (found == std::string::npos) continue;
+    const std::size_t name = found + before.size(), end = message.find('\'', name);
+    if (end == std::string::npos) continue;
+    std::string option = "--" + message.substr(name, end - name);
+    std::ranges::replace(option, '_', '-');
+    if (std::ranges::find(options, option) == options.end()) continue;
+    const std::string remedy = fmt::format("{} has {}", command, option);
+    const bool in_middle = before == kBefore[0];
+    return message.insert(in_middle ? end + 1 : message.size(),
+                          (in_middle ? ", but " : "; ") + remedy);
   }
   return message;
 }

@@ -56,7 +56,7 @@ std::string list_text(const std::vector<Offer>& offers, bool colour) {
     table.add({"  " + offer.name, offer.summary, offer.file.filename().string(), offer.licence});
     last_kind = offer.kind;
   }
-  return offers.empty() ? "no plugins found\n" : table.text(colour);
+  return table.text(colour);
 }
 
 std::string problems_text(const Registry& registry, bool colour) {
@@ -95,6 +95,14 @@ std::vector<Offer> offers_of_kind(const Registry& registry, const std::string& k
   return offers;
 }
 
+Error nothing_found(const Registry& registry) {
+  std::string text =
+      "no plugins found; name their folder in CAIRN_PLUGIN_PATH, or a file with --plugin";
+  for (const PluginProblem& problem : registry.problems())
+    text += fmt::format("\n  note: {}", problem.message);
+  return {ErrorCode::plugin, text};
+}
+
 int list(const std::vector<Offer>& offers, Session& session) {
   const Registry& registry = session.registry();
   json::object report = begin_report("plugins");
@@ -102,6 +110,7 @@ int list(const std::vector<Offer>& offers, Session& session) {
   for (const Offer& offer : offers) all.push_back(offer_json(offer));
   report["problems"] = problems_json(registry);
   session.write_json(report);
+  if (offers.empty()) throw nothing_found(registry);
   session.print(list_text(offers, session.colour()) + problems_text(registry, session.colour()));
   return 0;
 }
@@ -332,9 +341,9 @@ Command add_plugins(ArgumentParser program) {
       "below\n"
       "XDG_DATA_HOME or ~/.local/share), and in the folder cairn beside the core library. A "
       "checked\n"
-      "plugin, a file, finds others by --plugin and in the last alone. Exit code: 0 if every "
-      "check\n"
-      "holds, 5 if one does not.\n\n"
+      "plugin, a file, finds others by --plugin and in the last alone. Exit code: 0; 5 if a check "
+      "does\n"
+      "not hold, or nothing was found.\n\n"
       "Example:\n"
       "  cairn plugins cholmod\n"
       "  cairn plugins --check build/range.so");

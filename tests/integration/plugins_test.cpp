@@ -19,6 +19,7 @@ using ::testing::Contains;
 using ::testing::ContainsRegex;
 using ::testing::HasSubstr;
 using ::testing::Not;
+using ::testing::StartsWith;
 
 TEST(PluginsCommand, ListsEverythingOnOffer) {
   const Registry registry;
@@ -207,12 +208,24 @@ TEST(PluginsCommand, WithoutAnyPluginTheFoldersOfTheSearchAreNamed) {
   const std::string where =
       "no plugin was found in " + (folder.path() / "cairn").string() + ", nor in";
   const Outcome all = cairn({"plugins"}, environment);
-  EXPECT_THAT(unfolded(all.out), HasSubstr(where));
+  EXPECT_EQ(all.exit_code, 5);
+  EXPECT_THAT(all.err, StartsWith("cairn: no plugins found; "));
+  EXPECT_THAT(all.err, HasSubstr(where));
+  const Outcome report = cairn({"plugins", "--json", "-"}, environment);
+  EXPECT_EQ(report.exit_code, 5);
+  EXPECT_TRUE(parse_json(report.out).at("offers").as_array().empty());
   for (const Arguments& arguments :
        {Arguments{"optimize", "@ring"}, Arguments{"online"}, Arguments{"explore", "@rooms"},
         Arguments{"plot", "@ring", "-o", folder.file("ring.svg")}}) {
     EXPECT_THAT(cairn(arguments, environment).err, HasSubstr(where)) << arguments.front();
   }
+  // Where formats are missing, the folders are said once too.
+  write_text(folder.file("map.g2o"), "VERTEX_SE2 0 0 0 0\n");
+  const std::string said = cairn({"info", folder.file("map.g2o")}, environment).err;
+  EXPECT_THAT(said, HasSubstr("no plugin of formats is on offer; no plugin at all was found"));
+  EXPECT_THAT(said, HasSubstr(where));
+  const std::size_t at = said.find("cairn/plugins");
+  EXPECT_EQ(said.find("$XDG_DATA_HOME", at), std::string::npos) << said;
 }
 
 TEST(PluginsCommand, APluginThatIsGoneAltogetherIsNotOnOffer) {

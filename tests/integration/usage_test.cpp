@@ -11,10 +11,12 @@
 #include <boost/json/parse.hpp>
 
 #include "integration/process.hpp"
+#include "support/components.hpp"
 
 namespace cairn::test {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::EndsWith;
 using ::testing::HasSubstr;
 using ::testing::Not;
@@ -357,6 +359,20 @@ TEST(Usage, ANewPluginHasANameOfItsOwn) {
   EXPECT_EQ(folder.contents().size(), 0U);
 }
 
+TEST(Usage, ANewPluginOfACairnInItsBuildFolderSaysToInstallThatFirst) {
+  const TemporaryFolder folder;
+  const std::string own = folder.file("mine");
+  const Outcome made = cairn({"new-plugin", "mine", "--loss", "--folder", own});
+  ASSERT_EQ(made.exit_code, 0) << made.err;
+  const std::size_t next = made.out.find("\nNext:\n  cmake --install /");
+  ASSERT_NE(next, std::string::npos) << made.out;
+  EXPECT_THAT(made.out.substr(next),
+              AllOf(HasSubstr(" --prefix $HOME/cairn  # "), HasSubstr("\n  cd " + own + "\n"),
+                    HasSubstr("-DCMAKE_PREFIX_PATH=$HOME/cairn && cmake --build build\n")));
+  const std::string build = made.out.substr(next + 24, made.out.find(" --prefix ") - next - 24);
+  EXPECT_TRUE(std::filesystem::exists(build + "/CMakeCache.txt")) << build;
+}
+
 TEST(Usage, IntegersAreDecimalAndInRange) {
   for (const char* seed : {"-1", "18446744073709551616", "1.5", "0x10", ""}) {
     expect_error(
@@ -386,6 +402,21 @@ TEST(Usage, MessagesOfLibrariesNameTheOptionsOfTheProgram) {
   const Outcome outcome = cairn({"info", folder.file("odd.g2o")});
   expect_error(outcome, kInput, "--skip-unknown leaves such lines out");
   EXPECT_THAT(outcome.err, Not(HasSubstr("ReadOptions")));
+}
+
+TEST(Usage, AnOptionOfTheCommandThatIsGivenToAComponentIsPointedTo) {
+  CAIRN_NEEDS("optimizer", "gauss_newton");
+  const auto error = [](const Arguments& arguments) { return cairn(arguments).err; };
+  EXPECT_THAT(error({"optimize", "@ring", "--optimizer", "gauss_newton:iterations=5"}),
+              HasSubstr("gauss_newton has no option 'iterations', but cairn optimize has "
+                        "--iterations; "));
+  EXPECT_THAT(error({"optimize", "@ring", "--optimizer", "gauss_newton:max_seconds=5"}),
+              Not(HasSubstr("cairn optimize has")));
+  if (Registry().has("initial_guess", "as_given")) {
+    EXPECT_THAT(error({"optimize", "@ring", "--initial", "as_given:linear_solver=eigen"}),
+                HasSubstr("as_given takes no options, but 'linear_solver' was given; cairn "
+                          "optimize has --linear-solver\n"));
+  }
 }
 
 TEST(Usage, ProgressIsOneLineOnATerminalAndPlainLinesElsewhere) {

@@ -18,6 +18,8 @@ for file in CMakeLists.txt README.md my_own_2.cpp tests/my_own_2_test.cpp; do
   [[ -f my_own_2/$file ]] || fail "there is no $file"
   grep -qx "my_own_2/$file" out || fail "$file is not named: $(cat out)"
 done
+grep -qF -- "-DCMAKE_PREFIX_PATH=$prefix &&" out || fail "the installed cairn is not named: $(cat out)"
+grep -q 'cmake --install' out && fail "it is installed already: $(cat out)"
 grep -rn '@[A-Z]\+@' my_own_2 && fail "a word was not filled in"
 ls -d my_own_2.* 2>/dev/null && fail "something unfinished is left"
 
