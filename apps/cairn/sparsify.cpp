@@ -20,6 +20,7 @@
 #include "cairn/sparsification/sparsify_graph.hpp"
 #include "commands.hpp"
 #include "graph_files.hpp"
+#include "information_frame.hpp"
 #include "interrupt.hpp"
 #include "json_report.hpp"
 #include "problem_setup.hpp"
@@ -296,17 +297,20 @@ int run_sparsify(SparsifyCommandOptions options, Session& session) {
   registry.make<NodeSelection>(job.selection);
   check_topology(options, job, registry);
   const ProblemSetup setup(options.problem, registry);
-  const LoadedGraph loaded = load_graph(options.graph, options.input, session);
+  LoadedGraph loaded = load_graph(options.graph, options.input, session);
   RedirectedRecording redirected;
   const bool beforehand = options.redirect == "beforehand";
   if (beforehand) redirected = redirect_recording(loaded.graph, options.keep_every);
+  Graph& graph = beforehand ? redirected.graph : loaded.graph;
+  // Once it is redirected: a measurement keeps the information that it has in the file.
+  if (options.information_frame == "first") information_of_first_frame(graph);
   const InterruptGuard guard;
   ProblemRecorder recorder;
   SparsificationObserver observer;
   if (!options.record.empty())
     observer = [&](const SparsificationRecord& record) { recorder.add(record); };
-  SparsifyResult result = sparsify(beforehand ? redirected.graph : loaded.graph, job, setup,
-                                   options.problem.stop, guard, std::move(observer), session);
+  SparsifyResult result =
+      sparsify(graph, job, setup, options.problem.stop, guard, std::move(observer), session);
   if (beforehand) {
     result.factors_before = loaded.graph.factor_count();
     result.redirected = redirected.redirected;

@@ -30,6 +30,7 @@ struct SparsifyCommandOptions {
   std::string redirect = "late", redirect_to;
   bool newer = false;
   double inflation = RedirectionRule{}.inflation;
+  std::string information_frame = "second";
   std::string compared_at = "common";
   std::string record;
 };

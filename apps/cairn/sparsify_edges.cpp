@@ -17,6 +17,7 @@
 #include "cairn/sparsification/sparsify_edges.hpp"
 #include "commands.hpp"
 #include "graph_files.hpp"
+#include "information_frame.hpp"
 #include "interrupt.hpp"
 #include "json_report.hpp"
 #include "problem_setup.hpp"
@@ -184,7 +185,8 @@ int run_sparsify_edges(const SparsifyCommandOptions& options, Session& session) 
   const SparsifyEdgesJob job = job_of(options, session);
   registry.make<EdgeSelection>(job.selection);  // a wrong name is refused before a graph is read
   const ProblemSetup setup(options.problem, registry);
-  const LoadedGraph loaded = load_graph(options.graph, options.input, session);
+  LoadedGraph loaded = load_graph(options.graph, options.input, session);
+  if (options.information_frame == "first") information_of_first_frame(loaded.graph);
   const InterruptGuard guard;
   EdgeProgress edges(session.common.quiet);
   GuessProgress guess(session.common.quiet, guard.flag());

@@ -92,6 +92,14 @@ Command add_study_sparsify(ArgumentParser study) {
       .within(0.0, 1e6)
       .show_default();
   cli.add_option(
+         "--information-frame", options->information_frame,
+         "in the plane: the frame of whose translation a measurement's information is, that of its "
+         "second pose as measured, as in g2o (second), or that of its first (first), as it seems "
+         "to be in the thesis")
+      .type_name("WHICH")
+      .one_of({"first", "second"})
+      .show_default();
+  cli.add_option(
          "--compared-at", options->compared_at,
          "for the KLD both graphs are linearised at the states of the original (common), or "
          "each at its own minimum in world coordinates (minima), as in the thesis")

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // cairn study sparsify --redirect beforehand: a recording's loop closures are moved along its
-// odometry.
+// odometry. --information-frame: a file's information is read as that of other residuals.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <complex>
 #include <string>
 #include <vector>
@@ -129,6 +130,40 @@ TEST_F(Sparsify, ARecordingIsRedirectedBeforehandOnlyWhereItsOdometryIsWhole) {
   run = cairn(arguments);
   EXPECT_EQ(run.exit_code, 2);
   EXPECT_THAT(run.err, HasSubstr("--redirect late or early"));
+}
+
+// Its chi2 is that of the errors in the first pose's frame; with g2o's it is another one.
+TEST_F(Sparsify, InformationIsOfTheFirstPosesFrameOnDemand) {
+  const std::vector<Planar> at = dead_reckoning();
+  const Planar along = measured(at[2], at[12]), back = measured(at[16], at[6]);
+  std::string text;
+  for (int n = 0; n < kPoses; ++n) {
+    text += fmt::format("VERTEX_SE2 {} {:.17g} {:.17g} {:.17g}\n", n, at[n].t.real(),
+                        at[n].t.imag(), at[n].angle);
+  }
+  for (int n = 0; n + 1 < kPoses; ++n) text += edge(n, n + 1, step(n));
+  write_text(folder_.file("in.g2o"), text + edge(2, 12, along) + edge(16, 6, back, 20.0));
+  const auto chi2 = [](const Planar& expected, const Planar& z, double information) {
+    const double x = expected.t.real() - z.t.real(), y = expected.t.imag() - z.t.imag(),
+                 a = expected.angle - z.angle;
+    return information * x * x + 4.0 * x * y + 2.0 * x * a + 2.0 * information * y * y +
+           6.0 * y * a + 400.0 * a * a;
+  };
+  const double expected =
+      chi2(seen(at[2], at[12]), along, 50.0) + chi2(seen(at[16], at[6]), back, 20.0);
+  const Arguments options{folder_.file("in.g2o"), "--as-given"};
+  const auto before = [&](const Arguments& more) {
+    Arguments all = options;
+    all.insert(all.end(), more.begin(), more.end());
+    return number(study(all).at("chi2").at("before"));
+  };
+  EXPECT_NEAR(before({"--keep-every", "2", "--information-frame", "first"}), expected, 1e-9);
+  EXPECT_NEAR(before({"--edges", "mac:part=0.5", "--information-frame", "first"}), expected, 1e-9);
+  EXPECT_GT(std::abs(before({"--keep-every", "2"}) - expected), 0.01);
+  const Outcome run = cairn({"study", "sparsify", "@sphere:turns=2,poses_per_turn=5",
+                             "--keep-every", "2", "--information-frame", "first"});
+  EXPECT_EQ(run.exit_code, 2);
+  EXPECT_THAT(run.err, HasSubstr("EDGE_SE3:QUAT"));
 }
 
 }  // namespace

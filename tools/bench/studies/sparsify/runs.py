@@ -35,9 +35,10 @@ def measure(bench: Bench, data: DataSet, contestants: list[Contestant], rounds: 
 
 def thesis_experiment(keep_every: int, scheme: str, compared_at: str = "minima") -> Words:
     """Options of the experiment of section 4.6.4 of the thesis: a node of so many stays, the others leave every hundred
-    poses, and the recording has been redirected before; its KLD is that of graphs each linearised at its own minimum."""
-    return ["--online", "100", "--keep-every", str(keep_every), "--redirect", "beforehand", "--scheme", scheme,
-            "--compared-at", compared_at, "--sparsifier", "sparsify:linearize=local"]
+    poses, and the recording has been redirected before; a file's information is taken as that of the first pose's frame; its
+    KLD is that of graphs each linearised at its own minimum."""
+    return ["--online", "100", "--keep-every", str(keep_every), "--redirect", "beforehand", "--information-frame", "first",
+            "--scheme", scheme, "--compared-at", compared_at, "--sparsifier", "sparsify:linearize=local"]
 
 
 # Tables
