@@ -39,8 +39,8 @@ void grow(UninitializedVector& numbers, std::int64_t count) {
 
 }  // namespace
 
-ChainCholesky::ChainCholesky(std::string_view kernels)
-    : kernels_(choose_kernels(std::string(kernels).c_str())), rest_(kernels) {}
+ChainCholesky::ChainCholesky(std::string_view kernels, Precision precision)
+    : kernels_(choose_kernels(std::string(kernels).c_str())), rest_(kernels, precision) {}
 
 void ChainCholesky::analyze(const BlockStructure& structure, std::string_view ordering) {
   factorized_ = false;
@@ -49,14 +49,15 @@ void ChainCholesky::analyze(const BlockStructure& structure, std::string_view or
   chains_ = ordering == "auto" ? Chains(structure, kernels_->lanes) : Chains();
   if (chains_.empty()) {
     rest_.analyze(structure, ordering);
-    const auto order = rest_.symbolic().order();
+    const auto order = rest_.cholesky().symbolic().order();
     order_.assign(order.begin(), order.end());
     return;
   }
   rest_.analyze(chains_.rest(), ordering);
   schur_ = BlockMatrix(chains_.rest());
   order_.assign(chains_.nodes().begin(), chains_.nodes().end());
-  for (const std::int32_t b : rest_.symbolic().order()) order_.push_back(chains_.separators()[b]);
+  for (const std::int32_t b : rest_.cholesky().symbolic().order())
+    order_.push_back(chains_.separators()[b]);
   const std::int64_t nodes = chains_.group_begin(chains_.groups()), d = chains_.block_size();
   const std::int64_t lanes = std::int64_t{chains_.groups()} * chains_.lanes();
   panels_ = UninitializedVector(nodes * panel_numbers());
@@ -227,7 +228,7 @@ void ChainCholesky::inverse_columns(std::span<const std::int64_t> scalars, std::
   solve(X, X, static_cast<int>(scalars.size()));
 }
 
-double ChainCholesky::log_determinant() const {
+double ChainCholesky::log_determinant() {
   if (!chains_.empty() && !factorized_)
     throw std::logic_error("log_determinant: there is no factorisation");
   double sum = 0.0;
@@ -242,7 +243,7 @@ double ChainCholesky::log_determinant() const {
 }
 
 std::int64_t ChainCholesky::factor_nonzeros() const {
-  std::int64_t sum = rest_.symbolic().factor_nonzeros;
+  std::int64_t sum = rest_.cholesky().symbolic().factor_nonzeros;
   const std::int64_t d = chains_.block_size();
   for (const Chains::Chain& chain : chains_.chains()) {
     const auto length = static_cast<std::int64_t>(chain.length);
@@ -253,7 +254,7 @@ std::int64_t ChainCholesky::factor_nonzeros() const {
 }
 
 double ChainCholesky::factor_flops() const {
-  double sum = rest_.symbolic().factor_flops;
+  double sum = rest_.cholesky().symbolic().factor_flops;
   const int d = chains_.block_size();
   for (const Chains::Chain& chain : chains_.chains()) {
     for (std::size_t k = 0; k < chain.length; ++k) {
@@ -271,14 +272,17 @@ std::string ChainCholesky::description() const {
     text = std::to_string(chains_.nodes().size()) + " variables in " +
            std::to_string(chains_.chains().size()) + " chains, ";
   }
-  return text + std::to_string(rest_.symbolic().supernodes().size()) + " supernodes, " +
-         std::string(rest_.kernel_set()) + " kernels";
+  text += std::to_string(rest_.cholesky().symbolic().supernodes().size()) + " supernodes, " +
+          std::string(rest_.cholesky().kernel_set()) + " kernels";
+  const std::string refinement = rest_.description();
+  return refinement.empty() ? text : text + "; " + refinement;
 }
 
 void ChainInverse::compute() {
   const Chains& chains = cholesky_->chains_;
   if (!chains.empty() && !cholesky_->factorized_)
     throw std::logic_error("inverse: there is no factorisation");
+  cholesky_->rest_.require_double();
   rest_.compute();
   if (chains.empty()) return;
   const auto d = static_cast<std::size_t>(chains.block_size());

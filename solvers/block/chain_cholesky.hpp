@@ -9,22 +9,24 @@
 #include <vector>
 
 #include "block/chains.hpp"
+#include "block/refined_cholesky.hpp"
 #include "block/selected_inverse.hpp"
-#include "block/supernodal_cholesky.hpp"
 
 namespace cairn::block {
 
 /// Cholesky factorisation that eliminates chains of blocks first, many side by side in the lanes of
-/// vectors, and leaves what remains to `SupernodalCholesky`: the Schur complement on the
-/// separators, which it orders too. Where a graph has few chains it is `SupernodalCholesky` alone.
+/// vectors, and leaves what remains to `RefinedCholesky`: the Schur complement on the separators,
+/// which it orders too. Where a graph has few chains it is `RefinedCholesky` alone. The chains
+/// themselves are in double precision in any case.
 ///
 /// Chains have nothing to do with each other, so threads share their groups; what they add to the
 /// separators is added in the order of the chains. So the result does not depend on the number of
 /// threads.
 class ChainCholesky {
  public:
-  /// As for `SupernodalCholesky`.
-  explicit ChainCholesky(std::string_view kernels = "auto");
+  /// As for `RefinedCholesky`.
+  explicit ChainCholesky(std::string_view kernels = "auto",
+                         Precision precision = Precision::in_double);
 
   /// As for `SupernodalCholesky`; chains are looked for if `ordering` is auto.
   void analyze(const BlockStructure& structure, std::string_view ordering);
@@ -32,15 +34,16 @@ class ChainCholesky {
   void solve(std::span<const double> g, std::span<double> x);
   void solve(std::span<const double> G, std::span<double> X, int columns);
   void inverse_columns(std::span<const std::int64_t> scalars, std::span<double> X);
-  double log_determinant() const;
+  double log_determinant();
 
   /// Element k is the block eliminated k-th.
   std::span<const std::int32_t> order() const { return order_; }
   std::int64_t factor_nonzeros() const;
   double factor_flops() const;
-  /// What to know of the last analysis.
+  /// What to know of the last analysis and, in mixed precision, of what followed.
   std::string description() const;
-  const std::string& ordering() const { return rest_.ordering(); }
+  const std::string& ordering() const { return rest_.cholesky().ordering(); }
+  const RefinedCholesky& rest() const { return rest_; }
   const Chains& chains() const { return chains_; }
 
  private:
@@ -63,7 +66,7 @@ class ChainCholesky {
   const BlockStructure* structure_ = nullptr;
   std::uint64_t version_ = 0;
   Chains chains_;
-  SupernodalCholesky rest_;
+  RefinedCholesky rest_;
   BlockMatrix schur_;  // on the separators
   std::vector<std::int32_t> order_;
   UninitializedVector panels_;         // of the chains
@@ -79,7 +82,8 @@ class ChainCholesky {
 class ChainInverse {
  public:
   /// `cholesky` must outlive this object.
-  explicit ChainInverse(ChainCholesky& cholesky) : cholesky_(&cholesky), rest_(cholesky.rest_) {}
+  explicit ChainInverse(ChainCholesky& cholesky)
+      : cholesky_(&cholesky), rest_(cholesky.rest_.cholesky()) {}
 
   /// As for `SelectedInverse`.
   void compute();

@@ -12,7 +12,9 @@ int round_up(int rows) { return (rows + 7) / 8 * 8; }
 
 }  // namespace
 
-int factor_front(const Kernels& kernels, double* panel, std::int64_t stride, int columns, int m) {
+template <class Real>
+int factor_front(const FrontKernels<Real>& kernels, Real* panel, std::int64_t stride, int columns,
+                 int m) {
   const int rows = static_cast<int>(stride);
   if (!is_large(m)) return kernels.factor_panel(panel, stride, 0, columns, rows);
   int failed = -1;
@@ -25,6 +27,8 @@ int factor_front(const Kernels& kernels, double* panel, std::int64_t stride, int
   }
   return failed;
 }
+template int factor_front(const FrontKernels<double>&, double*, std::int64_t, int, int);
+template int factor_front(const FrontKernels<float>&, float*, std::int64_t, int, int);
 
 void append_rows(std::vector<Spread>& spreads, std::size_t begin, std::int32_t source,
                  std::int32_t target, std::int32_t size) {

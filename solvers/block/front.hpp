@@ -16,7 +16,9 @@ inline bool is_large(std::int64_t m) { return m * m > 256 * 256; }
 
 /// Factors the whole panel of a front of m rows, in strips of columns if it is large. Returns -1,
 /// or the first column whose pivot is not positive.
-int factor_front(const Kernels& kernels, double* panel, std::int64_t stride, int columns, int m);
+template <class Real>
+int factor_front(const FrontKernels<Real>& kernels, Real* panel, std::int64_t stride, int columns,
+                 int m);
 
 /// Notes that `size` rows of a child's update matrix, from `source` on, are rows `target` … of its
 /// parent's front. `begin`: where this child's spreads start in `spreads`.

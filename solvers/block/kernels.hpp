@@ -63,7 +63,8 @@ struct ChainKernels {
                    const double* ends, double* x);
 };
 
-/// The dense work on one supernode, for one instruction set.
+/// The dense work on one supernode, for one instruction set and one precision (Real: double
+/// or float).
 ///
 /// The *front* of a supernode has m rows: its own `columns` (scalar) columns first, then the rows
 /// below. The *panel* holds the front's first `columns` columns, column-major, leading dimension
@@ -73,47 +74,53 @@ struct ChainKernels {
 /// 8⌊columns/8⌋, so that panel and update matrix have the same rows in one vector; its columns are
 /// counted from `columns`; leading dimension stride - 8⌊columns/8⌋. What lies above the diagonal is
 /// zero in a factored panel's diagonal blocks of one vector, else not defined.
-struct Kernels {
-  const char* name;
-  int lanes;               ///< doubles in a vector: chains that are eliminated side by side
-  ChainKernels chains[2];  ///< of blocks of size 3 and of size 6
-
-  /// Sets a panel of `size` doubles (a multiple of 8) to zero and writes `count` entries of H into
+template <class Real>
+struct FrontKernels {
+  /// Sets a panel of `size` numbers (a multiple of 8) to zero and writes `count` entries of H into
   /// it.
-  void (*assemble)(const Assembly* entries, int count, const double* values, double* panels,
-                   double* panel, std::int64_t size);
+  void (*assemble)(const Assembly* entries, int count, const double* values, Real* panels,
+                   Real* panel, std::int64_t size);
 
   /// Cholesky factorisation of columns [first, last) of the panel in place, those before being
   /// done, in rows first … row_end-1: the diagonal block becomes L_JJ, the rows below
   /// L_RJ = A_RJ L_JJ⁻ᵀ. `first` and `row_end` are multiples of 8. Returns -1, or the first column
   /// whose pivot is not positive; what follows it is then worthless.
-  int (*factor_panel)(double* panel, std::int64_t stride, int first, int last, int row_end);
+  int (*factor_panel)(Real* panel, std::int64_t stride, int first, int last, int row_end);
   /// The rows [row_begin, row_end), multiples of 8, of columns whose diagonal block is done by
   /// `factor_panel`.
-  void (*factor_rows)(double* panel, std::int64_t stride, int first, int last, int row_begin,
+  void (*factor_rows)(Real* panel, std::int64_t stride, int first, int last, int row_begin,
                       int row_end);
 
   /// U = -L_RJ L_RJᵀ for the vectors of rows [row_begin, row_end) of the front, both multiples
   /// of 8.
-  void (*update)(const double* panel, std::int64_t stride, int columns, int m, double* U,
-                 int row_begin, int row_end);
+  void (*update)(const Real* panel, std::int64_t stride, int columns, int m, Real* U, int row_begin,
+                 int row_end);
 
   /// Adds columns [first, last) of a child's update matrix, whose row 0 is at `child`, to the
   /// parent's front: all of them to the panel, or all to the update matrix, `parent` being where
   /// row and column 0 of the front are or would be.
-  void (*extend_add)(const Spread* spreads, int count, int first, int last, const double* child,
-                     std::int64_t child_stride, double* parent, std::int64_t parent_stride);
+  void (*extend_add)(const Spread* spreads, int count, int first, int last, const Real* child,
+                     std::int64_t child_stride, Real* parent, std::int64_t parent_stride);
 
   /// x = L⁻¹ x for one supernode. `own`: its `columns` entries of x; `runs`: where its rows below
   /// are, as stretches of `vector` (source) and of the front (target), and there they are
-  /// updated. `front`: room for `stride` doubles on a 64-byte boundary.
-  void (*forward)(const double* panel, std::int64_t stride, int columns, double* own,
-                  const Run* runs, int count, double* vector, double* front);
+  /// updated. `front`: room for `stride` numbers on a 64-byte boundary.
+  void (*forward)(const Real* panel, std::int64_t stride, int columns, Real* own, const Run* runs,
+                  int count, Real* vector, Real* front);
   /// x = L⁻ᵀ x for one supernode: the rows below are only read.
-  void (*backward)(const double* panel, std::int64_t stride, int columns, int m, double* own,
-                   const Run* runs, int count, const double* vector, double* front);
-  /// The same for eight right-hand sides side by side: every row of `own`, `vector` and `front` is
-  /// eight doubles on a 64-byte boundary.
+  void (*backward)(const Real* panel, std::int64_t stride, int columns, int m, Real* own,
+                   const Run* runs, int count, const Real* vector, Real* front);
+};
+
+/// The same in double precision, and what there is in that alone.
+struct Kernels : FrontKernels<double> {
+  const char* name;
+  int lanes;  ///< doubles in a vector: chains that are eliminated side by side
+  const FrontKernels<float>* single;  ///< of the same instruction set
+  ChainKernels chains[2];             ///< of blocks of size 3 and of size 6
+
+  /// `forward` and `backward` for eight right-hand sides side by side: every row of `own`, `vector`
+  /// and `front` is eight doubles on a 64-byte boundary.
   void (*forward_many)(const double* panel, std::int64_t stride, int columns, double* own,
                        const Run* runs, int count, double* vector, double* front);
   void (*backward_many)(const double* panel, std::int64_t stride, int columns, int m, double* own,

@@ -34,7 +34,7 @@ void SelectedInverse::prepare() {
 }
 
 void SelectedInverse::compute() {
-  if (!cholesky_->factorized_) throw std::logic_error("inverse: there is no factorisation");
+  if (!cholesky_->double_.factorized) throw std::logic_error("inverse: there is no factorisation");
   prepare();
   const Schedule& schedule = cholesky_->schedule_;
   if (schedule.lanes == 1) {
@@ -58,9 +58,9 @@ void SelectedInverse::compute() {
 /// Z in the columns of one supernode, and Z_RR of its children.
 void SelectedInverse::invert(std::int32_t s, std::int64_t lane) {
   const Supernode& node = nodes()[s];
-  invert_front(*cholesky_->kernels_, cholesky_->panels_.data() + node.panel, node.stride,
-               node.columns, node.m, cholesky_->update_matrix(s, lane), panel(s),
-               room_.data() + lane * lane_room_);
+  invert_front(*cholesky_->kernels_, cholesky_->double_.panels.data() + node.panel, node.stride,
+               node.columns, node.m, cholesky_->update_matrix(cholesky_->double_, s, lane),
+               panel(s), room_.data() + lane * lane_room_);
   for (const std::int32_t child : cholesky_->symbolic_.children(s)) {
     const int rows = nodes()[child].m - nodes()[child].columns;
     hand_down(s, child, lane, 0, rows);
@@ -72,7 +72,7 @@ void SelectedInverse::invert(std::int32_t s, std::int64_t lane) {
 void SelectedInverse::invert_large(std::int32_t s) {
   const Kernels& kernels = *cholesky_->kernels_;
   const Supernode& node = nodes()[s];
-  const double* L = cholesky_->panels_.data() + node.panel;
+  const double* L = cholesky_->double_.panels.data() + node.panel;
   const int c8 = round_up(node.columns), rows = node.m - node.columns;
   const int below = node.columns / 8 * 8;
   double* V = room_.data();
@@ -92,8 +92,8 @@ void SelectedInverse::invert_large(std::int32_t s) {
   });
   if (rows > 0) {
     tiles(node.stride - below, [&](int begin, int end) {
-      kernels.inverse_rows(cholesky_->update_matrix(s, 0), node.stride, node.columns, node.m, T,
-                           panel(s), below + begin, below + end);
+      kernels.inverse_rows(cholesky_->update_matrix(cholesky_->double_, s, 0), node.stride,
+                           node.columns, node.m, T, panel(s), below + begin, below + end);
     });
   }
   tiles(c8, [&](int begin, int end) {
@@ -117,7 +117,7 @@ void SelectedInverse::hand_down(std::int32_t s, std::int32_t child, std::int64_t
   const Supernode& to = nodes()[child];
   const Spread* spreads = cholesky_->symbolic_.spreads().data() + to.spreads_begin;
   const int count = static_cast<int>(to.spreads_end - to.spreads_begin);
-  double* U = cholesky_->update_matrix(child, lane);
+  double* U = cholesky_->update_matrix(cholesky_->double_, child, lane);
   const int split = std::clamp(to.panel_rows, first, last);
   if (first < split) {
     kernels.gather(spreads, count, first, split, 0, U, to.update_stride(), to.columns % 8, panel(s),
@@ -126,8 +126,8 @@ void SelectedInverse::hand_down(std::int32_t s, std::int32_t child, std::int64_t
   if (split < last) {
     // Z_RR as if it were a part of the whole front.
     const std::int64_t stride = node.update_stride();
-    const double* front =
-        cholesky_->update_matrix(s, lane) - node.columns * stride - node.columns / 8 * 8;
+    const double* front = cholesky_->update_matrix(cholesky_->double_, s, lane) -
+                          node.columns * stride - node.columns / 8 * 8;
     kernels.gather(spreads, count, split, last, to.panel_rows, U, to.update_stride(),
                    to.columns % 8, front, stride);
   }
@@ -137,8 +137,8 @@ void SelectedInverse::hand_down(std::int32_t s, std::int32_t child, std::int64_t
 void SelectedInverse::mirror(std::int32_t child, std::int64_t lane, int first, int last) {
   const Supernode& to = nodes()[child];
   if (first >= last) return;
-  cholesky_->kernels_->mirror(cholesky_->update_matrix(child, lane), to.update_stride(),
-                              to.columns % 8, to.panel_rows, first, last);
+  cholesky_->kernels_->mirror(cholesky_->update_matrix(cholesky_->double_, child, lane),
+                              to.update_stride(), to.columns % 8, to.panel_rows, first, last);
 }
 
 void SelectedInverse::diagonal_blocks(std::span<double> out) const {

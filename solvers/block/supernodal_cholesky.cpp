@@ -42,11 +42,12 @@ SupernodalCholesky::SupernodalCholesky(std::string_view kernels)
     throw Error(ErrorCode::usage,
                 "this machine cannot run the kernels '" + std::string(kernels) + "'; use auto");
   }
+  double_.kernels = kernels_;
+  single_.kernels = kernels_->single;
 }
 
 void SupernodalCholesky::analyze(const BlockStructure& structure, std::string_view ordering,
                                  const CostModel& cost) {
-  factorized_ = false;
   if (ordering == "auto") {
     Choice choice = choose(structure);
     ordering_ = std::move(choice.name);
@@ -59,32 +60,52 @@ void SupernodalCholesky::analyze(const BlockStructure& structure, std::string_vi
   structure_ = &structure;
   version_ = structure.version();
   schedule_ = Schedule(symbolic_, threads());
-  panels_ = UninitializedVector(symbolic_.panel_values());
-  workspace_ = UninitializedVector(schedule_.size);
   failed_.assign(symbolic_.supernodes().size(), -1);
   gates_.assign(schedule_.gates, 0);
   plan_solve();
+  const auto forget = []<class Real>(Numbers<Real>& numbers) {
+    const FrontKernels<Real>* kernels = numbers.kernels;
+    numbers = {};
+    numbers.kernels = kernels;
+  };
+  forget(double_);
+  forget(single_);
 }
 
-Factorization SupernodalCholesky::factorize(const BlockMatrix& H) {
+template <class Real>
+void SupernodalCholesky::make_room(Numbers<Real>& numbers) const {
+  using Array = Numbers<Real>::Array;
+  numbers.panels = Array(symbolic_.panel_values());
+  numbers.workspace = Array(schedule_.size);
+  numbers.vectors = decltype(numbers.vectors)(vector_rows_);
+  numbers.fronts = decltype(numbers.fronts)(front_rows_ * schedule_.lanes);
+}
+
+template <class Real>
+Factorization SupernodalCholesky::factorize_in(const BlockMatrix& H, Numbers<Real>& numbers) {
   if (!structure_ || H.structure().version() != version_) {
     throw std::logic_error("factorize: analyze this structure first");
   }
+  double_.factorized = single_.factorized = false;
+  if (numbers.panels.empty()) make_room(numbers);
   if (schedule_.lanes == 1) {
     for (std::int32_t s = 0; s < static_cast<std::int32_t>(failed_.size()); ++s)
-      factorize_supernode(H, s, 0);
+      factorize_supernode(H, numbers, s, 0);
   } else {
     std::ranges::fill(gates_, 0);
     next_step_ = 0;
-    const auto lane_loop = [&](std::size_t lane) { run_steps(H, static_cast<std::int64_t>(lane)); };
+    const auto lane_loop = [&](std::size_t lane) {
+      run_steps(H, numbers, static_cast<std::int64_t>(lane));
+    };
     for_each_chunk(static_cast<std::size_t>(schedule_.lanes), lane_loop);
   }
 
-  factorized_ = true;
   const auto failed =
       std::ranges::find_if(failed_, [](std::int32_t column) { return column >= 0; });
-  if (failed == failed_.end()) return {};
-  factorized_ = false;
+  if (failed == failed_.end()) {
+    numbers.factorized = true;
+    return {};
+  }
   const Supernode& node = symbolic_.supernodes()[failed - failed_.begin()];
   const auto offsets = symbolic_.offsets();
   std::int32_t position = node.block_begin;
@@ -92,68 +113,80 @@ Factorization SupernodalCholesky::factorize(const BlockMatrix& H) {
   return {.ok = false, .failed_block = symbolic_.order()[position]};
 }
 
-void SupernodalCholesky::factorize_supernode(const BlockMatrix& H, std::int32_t s,
-                                             std::int64_t lane) {
+template <class Real>
+void SupernodalCholesky::factorize_supernode(const BlockMatrix& H, Numbers<Real>& numbers,
+                                             std::int32_t s, std::int64_t lane) {
   const auto nodes = symbolic_.supernodes();
   const Supernode& node = nodes[s];
-  double* panel = panels_.data() + node.panel;
-  assemble(H, s, std::int64_t{node.stride} * node.columns);
+  Real* panel = numbers.panels.data() + node.panel;
+  assemble(H, numbers, s, std::int64_t{node.stride} * node.columns);
   for (const std::int32_t c : symbolic_.children(s))
-    add_to_panel(s, c, lane, 0, nodes[c].panel_rows);
-  failed_[s] = factor_front(*kernels_, panel, node.stride, node.columns, node.m);
+    add_to_panel(numbers, s, c, lane, 0, nodes[c].panel_rows);
+  failed_[s] = factor_front(*numbers.kernels, panel, node.stride, node.columns, node.m);
   if (node.m == node.columns) return;
-  kernels_->update(panel, node.stride, node.columns, node.m, update_matrix(s, lane),
-                   node.columns / 8 * 8, node.stride);
+  numbers.kernels->update(panel, node.stride, node.columns, node.m, update_matrix(numbers, s, lane),
+                          node.columns / 8 * 8, node.stride);
   for (const std::int32_t c : symbolic_.children(s))
-    add_to_update(s, c, lane, nodes[c].panel_rows, nodes[c].m - nodes[c].columns);
+    add_to_update(numbers, s, c, lane, nodes[c].panel_rows, nodes[c].m - nodes[c].columns);
 }
 
 /// Entries of H into the panel, `size` doubles of which are set to zero before.
-void SupernodalCholesky::assemble(const BlockMatrix& H, std::int32_t s, std::int64_t size) {
+template <class Real>
+void SupernodalCholesky::assemble(const BlockMatrix& H, Numbers<Real>& numbers, std::int32_t s,
+                                  std::int64_t size) {
   const auto entries = symbolic_.assembly(s);
-  kernels_->assemble(entries.data(), static_cast<int>(entries.size()), H.values().data(),
-                     panels_.data(), panels_.data() + symbolic_.supernodes()[s].panel, size);
+  numbers.kernels->assemble(entries.data(), static_cast<int>(entries.size()), H.values().data(),
+                            numbers.panels.data(),
+                            numbers.panels.data() + symbolic_.supernodes()[s].panel, size);
 }
 
-void SupernodalCholesky::add_to_panel(std::int32_t s, std::int32_t c, std::int64_t lane, int first,
-                                      int last) {
+template <class Real>
+void SupernodalCholesky::add_to_panel(Numbers<Real>& numbers, std::int32_t s, std::int32_t c,
+                                      std::int64_t lane, int first, int last) {
   const Supernode& node = symbolic_.supernodes()[s];
-  add_child(c, lane, first, last, panels_.data() + node.panel, node.stride);
+  add_child(numbers, c, lane, first, last, numbers.panels.data() + node.panel, node.stride);
 }
 
-void SupernodalCholesky::add_to_update(std::int32_t s, std::int32_t c, std::int64_t lane, int first,
-                                       int last) {
+template <class Real>
+void SupernodalCholesky::add_to_update(Numbers<Real>& numbers, std::int32_t s, std::int32_t c,
+                                       std::int64_t lane, int first, int last) {
   const Supernode& node = symbolic_.supernodes()[s];
   // The update matrix as if it were a part of the whole front.
   const std::int64_t stride = node.update_stride();
-  double* front = update_matrix(s, lane) - node.columns * stride - node.columns / 8 * 8;
-  add_child(c, lane, first, last, front, stride);
+  Real* front = update_matrix(numbers, s, lane) - node.columns * stride - node.columns / 8 * 8;
+  add_child(numbers, c, lane, first, last, front, stride);
 }
 
 /// Adds columns [first, last) of a child's update matrix to a front.
-void SupernodalCholesky::add_child(std::int32_t c, std::int64_t lane, int first, int last,
-                                   double* front, std::int64_t stride) {
+template <class Real>
+void SupernodalCholesky::add_child(Numbers<Real>& numbers, std::int32_t c, std::int64_t lane,
+                                   int first, int last, Real* front, std::int64_t stride) {
   const Supernode& child = symbolic_.supernodes()[c];
-  kernels_->extend_add(symbolic_.spreads().data() + child.spreads_begin,
-                       static_cast<int>(child.spreads_end - child.spreads_begin), first, last,
-                       update_matrix(c, lane) + child.columns % 8, child.update_stride(), front,
-                       stride);
+  numbers.kernels->extend_add(symbolic_.spreads().data() + child.spreads_begin,
+                              static_cast<int>(child.spreads_end - child.spreads_begin), first,
+                              last, update_matrix(numbers, c, lane) + child.columns % 8,
+                              child.update_stride(), front, stride);
 }
 
 /// The diagonal block of columns [first, last), those before being done.
-void SupernodalCholesky::factor_pivots(std::int32_t s, int first, int last) {
+template <class Real>
+void SupernodalCholesky::factor_pivots(Numbers<Real>& numbers, std::int32_t s, int first,
+                                       int last) {
   const Supernode& node = symbolic_.supernodes()[s];
-  const int failed = kernels_->factor_panel(panels_.data() + node.panel, node.stride, first, last,
-                                            std::min(node.stride, (last + 7) / 8 * 8));
+  const int failed =
+      numbers.kernels->factor_panel(numbers.panels.data() + node.panel, node.stride, first, last,
+                                    std::min(node.stride, (last + 7) / 8 * 8));
   if (failed_[s] < 0) failed_[s] = failed;
 }
 
-void SupernodalCholesky::run_steps(const BlockMatrix& H, std::int64_t lane) {
+template <class Real>
+void SupernodalCholesky::run_steps(const BlockMatrix& H, Numbers<Real>& numbers,
+                                   std::int64_t lane) {
   const auto count = static_cast<std::int32_t>(schedule_.steps.size());
   for (std::int32_t k = next_step_++; k < count; k = next_step_++) {
     const Step& step = schedule_.steps[k];
     wait_for(step);
-    run(step, H, lane);
+    run(step, H, numbers, lane);
     for (const std::int32_t gate : step.signals) signal(gate);
   }
 }
@@ -175,19 +208,21 @@ void SupernodalCholesky::signal(std::int32_t gate) {
     std::atomic_ref<std::int32_t>(gates_[gate]).fetch_add(1, std::memory_order_acq_rel);
 }
 
-void SupernodalCholesky::run(const Step& step, const BlockMatrix& H, std::int64_t lane) {
+template <class Real>
+void SupernodalCholesky::run(const Step& step, const BlockMatrix& H, Numbers<Real>& numbers,
+                             std::int64_t lane) {
   const auto nodes = symbolic_.supernodes();
   if (step.kind == Step::Kind::task) {
     const Schedule::Task& task = schedule_.tasks[step.which];
     for (std::int32_t s = task.begin; s < task.end; ++s) {
-      factorize_supernode(H, s, lane);
+      factorize_supernode(H, numbers, s, lane);
       if (nodes[s].parent >= task.end) signal(schedule_.ready[nodes[s].parent]);
     }
     return;
   }
   const std::int32_t s = step.which;
   const Supernode& node = nodes[s];
-  double* panel = panels_.data() + node.panel;
+  Real* panel = numbers.panels.data() + node.panel;
   const auto begin = static_cast<int>(step.begin), end = static_cast<int>(step.end);
   const auto children = symbolic_.children(s).subspan(
       step.child, static_cast<std::size_t>(step.child_end - step.child));
@@ -196,38 +231,41 @@ void SupernodalCholesky::run(const Step& step, const BlockMatrix& H, std::int64_
     case Step::Kind::finish:
       break;
     case Step::Kind::front:
-      factorize_supernode(H, s, lane);
+      factorize_supernode(H, numbers, s, lane);
       break;
     case Step::Kind::zero:
-      std::fill(panel + step.begin, panel + step.end, 0.0);
+      std::fill(panel + step.begin, panel + step.end, Real{});
       break;
     case Step::Kind::assemble:
       failed_[s] = -1;
-      assemble(H, s, 0);
+      assemble(H, numbers, s, 0);
       break;
     case Step::Kind::add_to_panel:
       for (const std::int32_t c : children)
-        add_to_panel(s, c, lane, begin, end > begin ? end : nodes[c].panel_rows);
+        add_to_panel(numbers, s, c, lane, begin, end > begin ? end : nodes[c].panel_rows);
       break;
     case Step::Kind::pivots:
-      factor_pivots(s, step.first, step.last);
+      factor_pivots(numbers, s, step.first, step.last);
       break;
     case Step::Kind::rows:
-      kernels_->factor_rows(panel, node.stride, step.first, step.last, begin, end);
+      numbers.kernels->factor_rows(panel, node.stride, step.first, step.last, begin, end);
       if (step.pivots_follow)
-        factor_pivots(s, step.last, std::min(node.columns, step.last + kStripColumns));
+        factor_pivots(numbers, s, step.last, std::min(node.columns, step.last + kStripColumns));
       break;
     case Step::Kind::update:
-      kernels_->update(panel, node.stride, node.columns, node.m, update_matrix(s, lane), begin,
-                       end);
+      numbers.kernels->update(panel, node.stride, node.columns, node.m,
+                              update_matrix(numbers, s, lane), begin, end);
       break;
     case Step::Kind::add_to_update:
       for (const std::int32_t c : children) {
-        add_to_update(s, c, lane, end > begin ? begin : nodes[c].panel_rows,
+        add_to_update(numbers, s, c, lane, end > begin ? begin : nodes[c].panel_rows,
                       end > begin ? end : nodes[c].m - nodes[c].columns);
       }
       break;
   }
 }
+
+template Factorization SupernodalCholesky::factorize_in(const BlockMatrix&, Numbers<double>&);
+template Factorization SupernodalCholesky::factorize_in(const BlockMatrix&, Numbers<float>&);
 
 }  // namespace cairn::block

@@ -2,6 +2,8 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <concepts>
+#include <limits>
 #include <stdexcept>
 
 #include "block/supernodal_cholesky.hpp"
@@ -80,31 +82,36 @@ void SupernodalCholesky::plan_solve() {
     gather_begin_.push_back(std::ssize(gathers_));
     front_rows_ = std::max<std::int64_t>(front_rows_, node.stride);
   }
-  vectors_ = AlignedVector(vector_rows_);
-  fronts_ = AlignedVector(front_rows_ * schedule_.lanes);
 }
 
-void SupernodalCholesky::substitute(int width, bool marked) {
+template <class Real>
+void SupernodalCholesky::substitute(Numbers<Real>& numbers, int width, bool marked) {
   const auto nodes = symbolic_.supernodes();
   const auto offsets = symbolic_.offsets();
-  double* const vector = vectors_.data();
+  Real* const vector = numbers.vectors.data();
   const auto front_of = [&](std::size_t lane) {
-    return fronts_.data() + static_cast<std::int64_t>(lane) * front_rows_ * width;
+    return numbers.fronts.data() + static_cast<std::int64_t>(lane) * front_rows_ * width;
   };
-  const auto forward = [&](std::int32_t s, double* front) {
+  const auto forward = [&](std::int32_t s, Real* front) {
     if (marked && !on_path_[s]) return;
     const Supernode& node = nodes[s];
-    (width == 1 ? kernels_->forward : kernels_->forward_many)(
-        panels_.data() + node.panel, node.stride, node.columns,
-        vector + offsets[node.block_begin] * width, gathers_.data() + gather_begin_[s],
-        static_cast<int>(gather_begin_[s + 1] - gather_begin_[s]), vector, front);
+    auto kernel = numbers.kernels->forward;
+    if constexpr (std::same_as<Real, double>) {
+      if (width > 1) kernel = kernels_->forward_many;
+    }
+    kernel(numbers.panels.data() + node.panel, node.stride, node.columns,
+           vector + offsets[node.block_begin] * width, gathers_.data() + gather_begin_[s],
+           static_cast<int>(gather_begin_[s + 1] - gather_begin_[s]), vector, front);
   };
-  const auto backward = [&](std::int32_t s, double* front) {
+  const auto backward = [&](std::int32_t s, Real* front) {
     const Supernode& node = nodes[s];
-    (width == 1 ? kernels_->backward : kernels_->backward_many)(
-        panels_.data() + node.panel, node.stride, node.columns, node.m,
-        vector + offsets[node.block_begin] * width, gathers_.data() + gather_begin_[s],
-        static_cast<int>(gather_begin_[s + 1] - gather_begin_[s]), vector, front);
+    auto kernel = numbers.kernels->backward;
+    if constexpr (std::same_as<Real, double>) {
+      if (width > 1) kernel = kernels_->backward_many;
+    }
+    kernel(numbers.panels.data() + node.panel, node.stride, node.columns, node.m,
+           vector + offsets[node.block_begin] * width, gathers_.data() + gather_begin_[s],
+           static_cast<int>(gather_begin_[s + 1] - gather_begin_[s]), vector, front);
   };
   const auto copies = [&](std::size_t t) {
     return std::span(outside_).subspan(outside_of_[t].first,
@@ -118,16 +125,16 @@ void SupernodalCholesky::substitute(int width, bool marked) {
     for_each_chunk(static_cast<std::size_t>(schedule_.lanes), lane_loop);
   };
 
-  for_each_task([&](std::size_t t, double* front) {
+  for_each_task([&](std::size_t t, Real* front) {
     for (const Run& run : copies(t))
-      std::fill_n(vector + std::int64_t{run.target} * width, run.length * width, 0.0);
+      std::fill_n(vector + std::int64_t{run.target} * width, run.length * width, Real{});
     for (std::int32_t s = schedule_.tasks[t].begin; s < schedule_.tasks[t].end; ++s)
       forward(s, front);
   });
   for (std::size_t t = 0; t < schedule_.tasks.size(); ++t) {
     for (const Run& run : copies(t)) {
-      double* target = vector + std::int64_t{run.source} * width;
-      const double* source = vector + std::int64_t{run.target} * width;
+      Real* target = vector + std::int64_t{run.source} * width;
+      const Real* source = vector + std::int64_t{run.target} * width;
       for (std::int32_t k = 0; k < run.length * width; ++k) target[k] += source[k];
     }
   }
@@ -137,7 +144,7 @@ void SupernodalCholesky::substitute(int width, bool marked) {
   for (std::size_t l = schedule_.levels.size(); l-- > 0;) {
     for (const std::int32_t s : schedule_.levels[l]) backward(s, front_of(0));
   }
-  for_each_task([&](std::size_t t, double* front) {
+  for_each_task([&](std::size_t t, Real* front) {
     for (const Run& run : copies(t)) {
       std::copy_n(vector + std::int64_t{run.source} * width, run.length * width,
                   vector + std::int64_t{run.target} * width);
@@ -147,30 +154,39 @@ void SupernodalCholesky::substitute(int width, bool marked) {
   });
 }
 
-void SupernodalCholesky::solve(std::span<const double> g, std::span<double> x) {
-  if (!factorized_) throw std::logic_error("solve: there is no factorisation");
+template <class Real>
+void SupernodalCholesky::solve_in(Numbers<Real>& numbers, std::span<const double> g,
+                                  std::span<double> x) {
+  if (!numbers.factorized) throw std::logic_error("solve: there is no factorisation");
   const auto order = symbolic_.order();
   const auto offsets = symbolic_.offsets();
   const auto from = structure_->offsets();
-  double* p = vectors_.data();
+  Real* p = numbers.vectors.data();
   for (std::size_t k = 0; k < order.size(); ++k) {
     for (std::int64_t i = 0; i < offsets[k + 1] - offsets[k]; ++i)
-      p[offsets[k] + i] = g[from[order[k]] + i];
+      p[offsets[k] + i] = static_cast<Real>(g[from[order[k]] + i]);
   }
-  substitute(1);
+  substitute(numbers, 1);
   for (std::size_t k = 0; k < order.size(); ++k) {
     for (std::int64_t i = 0; i < offsets[k + 1] - offsets[k]; ++i)
       x[from[order[k]] + i] = p[offsets[k] + i];
   }
 }
 
+void SupernodalCholesky::solve(std::span<const double> g, std::span<double> x) {
+  solve_in(double_, g, x);
+}
+void SupernodalCholesky::solve_single(std::span<const double> g, std::span<double> x) {
+  solve_in(single_, g, x);
+}
+
 void SupernodalCholesky::solve(std::span<const double> G, std::span<double> X, int columns) {
-  if (!factorized_) throw std::logic_error("solve: there is no factorisation");
+  if (!double_.factorized) throw std::logic_error("solve: there is no factorisation");
   const std::int64_t size = structure_->size();
   if (std::ssize(G) != size * columns || std::ssize(X) != size * columns)
     throw std::logic_error("solve: right-hand sides or solutions are not size × columns");
-  vectors_.resize(vector_rows_ * kTogether);
-  fronts_.resize(front_rows_ * schedule_.lanes * kTogether);
+  double_.vectors.resize(vector_rows_ * kTogether);
+  double_.fronts.resize(front_rows_ * schedule_.lanes * kTogether);
   const auto order = symbolic_.order();
   const auto offsets = symbolic_.offsets();
   const auto from = structure_->offsets();
@@ -178,7 +194,7 @@ void SupernodalCholesky::solve(std::span<const double> G, std::span<double> X, i
   const auto for_each_number = [&](int first, int count, auto visit) {
     for (std::size_t k = 0; k < order.size(); ++k) {
       for (std::int64_t i = 0; i < offsets[k + 1] - offsets[k]; ++i) {
-        double* row = vectors_.data() + (offsets[k] + i) * kTogether;
+        double* row = double_.vectors.data() + (offsets[k] + i) * kTogether;
         const std::int64_t at = from[order[k]] + i;
         for (int c = 0; c < count; ++c) visit(row[c], (first + c) * size + at);
         for (int c = count; c < kTogether; ++c) row[c] = 0.0;
@@ -188,7 +204,7 @@ void SupernodalCholesky::solve(std::span<const double> G, std::span<double> X, i
   for (int first = 0; first < columns; first += kTogether) {
     const int count = std::min(kTogether, columns - first);
     for_each_number(first, count, [&](double& number, std::int64_t at) { number = G[at]; });
-    substitute(kTogether);
+    substitute(double_, kTogether);
     for_each_number(first, count, [&](double& number, std::int64_t at) { X[at] = number; });
   }
 }
@@ -206,31 +222,31 @@ void SupernodalCholesky::mark_path(std::int64_t row) {
 
 void SupernodalCholesky::inverse_columns(std::span<const std::int64_t> scalars,
                                          std::span<double> X) {
-  if (!factorized_) throw std::logic_error("inverse_columns: there is no factorisation");
+  if (!double_.factorized) throw std::logic_error("inverse_columns: there is no factorisation");
   const std::int64_t size = structure_->size();
   if (std::ssize(X) != size * std::ssize(scalars))
     throw std::logic_error("inverse_columns: the result is not size × columns");
-  vectors_.resize(vector_rows_ * kTogether);
-  fronts_.resize(front_rows_ * schedule_.lanes * kTogether);
+  double_.vectors.resize(vector_rows_ * kTogether);
+  double_.fronts.resize(front_rows_ * schedule_.lanes * kTogether);
   const auto order = symbolic_.order();
   const auto position = symbolic_.position();
   const auto offsets = symbolic_.offsets();
   const auto from = structure_->offsets();
   for (std::int64_t first = 0; first < std::ssize(scalars); first += kTogether) {
     const auto count = std::min<std::int64_t>(kTogether, std::ssize(scalars) - first);
-    std::fill_n(vectors_.begin(), size * kTogether, 0.0);
+    std::fill_n(double_.vectors.begin(), size * kTogether, 0.0);
     on_path_.assign(symbolic_.supernodes().size(), false);
     for (std::int64_t c = 0; c < count; ++c) {
       const std::int64_t scalar = scalars[first + c];
       const auto block = std::ranges::upper_bound(from, scalar) - from.begin() - 1;
       const std::int64_t row = offsets[position[block]] + scalar - from[block];
-      vectors_[row * kTogether + c] = 1.0;
+      double_.vectors[row * kTogether + c] = 1.0;
       mark_path(row);
     }
-    substitute(kTogether, true);
+    substitute(double_, kTogether, true);
     for (std::size_t k = 0; k < order.size(); ++k) {
       for (std::int64_t i = 0; i < offsets[k + 1] - offsets[k]; ++i) {
-        const double* row = vectors_.data() + (offsets[k] + i) * kTogether;
+        const double* row = double_.vectors.data() + (offsets[k] + i) * kTogether;
         double* to = X.data() + first * size + from[order[k]] + i;
         for (std::int64_t c = 0; c < count; ++c) to[c * size] = row[c];
       }
@@ -238,11 +254,27 @@ void SupernodalCholesky::inverse_columns(std::span<const std::int64_t> scalars,
   }
 }
 
+double SupernodalCholesky::smallest_single_pivot(std::span<const double> d) const {
+  if (!single_.factorized) throw std::logic_error("smallest_single_pivot: no factorisation");
+  const auto order = symbolic_.order();
+  const auto offsets = symbolic_.offsets();
+  const auto from = structure_->offsets();
+  double smallest = std::numeric_limits<double>::infinity();
+  for (const Supernode& node : symbolic_.supernodes()) {
+    const float* pivot = single_.panels.data() + node.panel;
+    for (std::int32_t b = node.block_begin; b < node.block_end; ++b) {
+      for (std::int64_t i = 0; i < offsets[b + 1] - offsets[b]; ++i, pivot += node.stride + 1)
+        smallest = std::min(smallest, static_cast<double>(*pivot) / d[from[order[b]] + i]);
+    }
+  }
+  return smallest;
+}
+
 double SupernodalCholesky::log_determinant() const {
-  if (!factorized_) throw std::logic_error("log_determinant: there is no factorisation");
+  if (!double_.factorized) throw std::logic_error("log_determinant: there is no factorisation");
   double sum = 0.0;
   for (const Supernode& node : symbolic_.supernodes()) {
-    const double* panel = panels_.data() + node.panel;
+    const double* panel = double_.panels.data() + node.panel;
     for (std::int32_t j = 0; j < node.columns; ++j)
       sum += std::log(panel[static_cast<std::int64_t>(j) * node.stride + j]);
   }

@@ -155,6 +155,29 @@ TEST_P(PublishedData, ReachesThePublishedMinimumWithEverySolver) {
   results().push_back(result);
 }
 
+TEST_P(PublishedData, HasTheSameMinimumInMixedPrecision) {
+  CAIRN_NEEDS_DATA();
+  const PublishedGraph& published = GetParam();
+  Registry registry;
+  Graph graph = read_published(published, registry);
+  registry.make<InitialGuess>(published.guess)->compute(graph);
+  std::vector<double> chi2;
+  for (const char* linear : {"block_cholesky", "block_cholesky:precision=mixed"}) {
+    Graph copy = graph.clone();
+    const ComponentSpec spec{"levenberg_marquardt", {{"linear_solver", linear}}};
+    const Summary summary = registry.make<Optimizer>(spec)->optimize(
+        copy, {.max_iterations = 1000, .tolerance = 1e-12});
+    EXPECT_EQ(summary.status, Status::converged) << linear;
+    chi2.push_back(summary.final_chi2);
+    if (chi2.size() == 2) EXPECT_NE(summary.solver.note.find("mixed precision"), std::string::npos);
+  }
+  if (published.absolute > 0.0) {
+    EXPECT_LE(chi2[1], published.absolute);
+  } else {
+    EXPECT_LE(std::abs(chi2[1] - chi2[0]), 1e-9 * chi2[0]);
+  }
+}
+
 double chi2_from_given(const Graph& graph, Registry& registry, const char* optimizer) {
   Graph copy = graph.clone();
   return registry.make<Optimizer>(optimizer)->optimize(copy).final_chi2;

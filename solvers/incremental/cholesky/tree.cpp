@@ -175,7 +175,8 @@ bool Tree::factorize_node(Node& node) {
   }
   for (const std::int32_t v : node.variables) front_row_[v] = -1;
 
-  if (block::factor_front(*kernels_, panel, stride, node.columns, node.m) >= 0) return false;
+  if (block::factor_front<double>(*kernels_, panel, stride, node.columns, node.m) >= 0)
+    return false;
   if (!inner) return true;
   kernels_->update(panel, stride, node.columns, node.m, update, node.columns / 8 * 8, node.stride);
   for (std::size_t k = 0; k < children_part.size(); ++k) update[k] += children_part[k];

@@ -89,7 +89,10 @@ class BlockCholesky final : public LinearSolver,
                             public ManyRightHandSides {
  public:
   explicit BlockCholesky(const BlockCholeskyOptions& options)
-      : ordering_(options.ordering_text()), cholesky_(options.kernels) {}
+      : ordering_(options.ordering_text()),
+        is_mixed_(options.precision == "mixed"),
+        cholesky_(options.kernels,
+                  is_mixed_ ? block::Precision::mixed : block::Precision::in_double) {}
 
   void analyze(const BlockStructure& structure) override {
     cholesky_.analyze(structure, ordering_);
@@ -104,7 +107,10 @@ class BlockCholesky final : public LinearSolver,
     marginals_.forget();
     return cholesky_.factorize(H);
   }
-  void solve(std::span<const double> g, std::span<double> x) override { cholesky_.solve(g, x); }
+  void solve(std::span<const double> g, std::span<double> x) override {
+    cholesky_.solve(g, x);
+    if (is_mixed_) stats_.note = cholesky_.description();
+  }
   void solve(std::span<const double> G, std::span<double> X, int columns) override {
     cholesky_.solve(G, X, columns);
   }
@@ -122,7 +128,9 @@ class BlockCholesky final : public LinearSolver,
 
  private:
   std::string ordering_;
-  block::ChainCholesky cholesky_;
+  bool is_mixed_;
+  // In mixed precision the first log determinant factors anew.
+  mutable block::ChainCholesky cholesky_;
   BlockMarginals marginals_{*this, cholesky_};
   LinearSolverStats stats_;
 };

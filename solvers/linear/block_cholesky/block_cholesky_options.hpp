@@ -10,9 +10,10 @@
 namespace cairn {
 
 struct BlockCholeskyOptions {
-  std::string ordering = "auto";  ///< one of `block::every_ordering_name`
-  std::int64_t last = 0;          ///< variables at the end that are eliminated last
-  std::string kernels = "auto";   ///< auto, portable, avx2 or avx512
+  std::string ordering = "auto";     ///< one of `block::every_ordering_name`
+  std::string precision = "double";  ///< double or mixed: `block::RefinedCholesky`
+  std::int64_t last = 0;             ///< variables at the end that are eliminated last
+  std::string kernels = "auto";      ///< auto, portable, avx2 or avx512
 
   static auto fields() {
     using O = BlockCholeskyOptions;
@@ -22,6 +23,9 @@ struct BlockCholeskyOptions {
         .integer("last", &O::last, 0, 1e9,
                  "variables at the end that are eliminated last, as incremental solvers need; "
                  "not with metis")
+        .choice("precision", &O::precision, {"double", "mixed"},
+                "mixed: factors in single precision and refines each solution to what double "
+                "gives; by itself double where conditioning forbids that, and for covariances")
         .choice("kernels", &O::kernels, {"auto", "portable", "avx2", "avx512"},
                 "instruction set, as far as the machine has it");
   }

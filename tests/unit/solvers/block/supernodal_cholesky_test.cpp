@@ -143,6 +143,62 @@ TEST(SupernodalCholesky, FactorsWideFrontsForEveryKernelSet) {
   }
 }
 
+Eigen::VectorXd solve_single(SupernodalCholesky& cholesky, const Eigen::VectorXd& g) {
+  Eigen::VectorXd x(g.size());
+  cholesky.solve_single({g.data(), static_cast<std::size_t>(g.size())},
+                        {x.data(), static_cast<std::size_t>(x.size())});
+  return x;
+}
+
+TEST(SupernodalCholesky, FactorsInSinglePrecisionForEveryKernelSetAndBlockSize) {
+  std::mt19937 rng(27);
+  const std::vector<std::vector<std::int32_t>> mixes = {{3}, {6}, {3, 6}, {1}, {1, 2, 3, 6, 7, 9}};
+  for (int trial = 0; trial < 40; ++trial) {
+    const int blocks = 1 + static_cast<int>(rng() % 50);
+    const BlockStructure structure = random_structure(
+        rng, blocks, static_cast<int>(rng() % (2 * blocks)), mixes[trial % mixes.size()]);
+    BlockMatrix H(structure);
+    fill_positive_definite(rng, H);
+    const Eigen::VectorXd g = Eigen::VectorXd::Random(structure.size());
+    const Eigen::VectorXd expected = Eigen::LDLT<Eigen::MatrixXd>(dense(H)).solve(g);
+    for (const std::string& kernels : kernel_sets()) {
+      for (const std::string& ordering : orderings()) {
+        SupernodalCholesky cholesky(kernels);
+        cholesky.analyze(structure, ordering);
+        ASSERT_TRUE(cholesky.factorize_single(H).ok);
+        // Diagonally dominant: rounding to single precision is all there is.
+        EXPECT_LT((solve_single(cholesky, g) - expected).norm(), 2e-6 * expected.norm())
+            << kernels << ' ' << ordering << ' ' << trial;
+        EXPECT_THROW(solve(cholesky, g), std::logic_error);
+        EXPECT_THROW(cholesky.log_determinant(), std::logic_error);
+        ASSERT_TRUE(cholesky.factorize(H).ok);
+        EXPECT_LT((solve(cholesky, g) - expected).norm(), 1e-12 * expected.norm());
+        EXPECT_THROW(solve_single(cholesky, g), std::logic_error);
+      }
+    }
+  }
+}
+
+TEST(SupernodalCholesky, FactorsWideFrontsInSinglePrecisionForEveryKernelSet) {
+  std::mt19937 rng(28);
+  for (const int size : {3, 6, 7}) {
+    const BlockStructure structure = grid_with_a_dense_edge(17, size);
+    BlockMatrix H(structure);
+    fill_positive_definite(rng, H);
+    const Eigen::VectorXd g = Eigen::VectorXd::Random(structure.size());
+    const Eigen::VectorXd expected = Eigen::LDLT<Eigen::MatrixXd>(dense(H)).solve(g);
+    for (const std::string& kernels : kernel_sets()) {
+      for (const double supernode : {120.0, 1e6}) {
+        SupernodalCholesky cholesky(kernels);
+        cholesky.analyze(structure, "natural", {.supernode = supernode});
+        ASSERT_TRUE(cholesky.factorize_single(H).ok);
+        EXPECT_LT((solve_single(cholesky, g) - expected).norm(), 2e-6 * expected.norm())
+            << kernels << ' ' << size << ' ' << supernode;
+      }
+    }
+  }
+}
+
 TEST(SupernodalCholesky, NamesTheBlockThatIsNotPositiveInAWideFront) {
   std::mt19937 rng(22);
   const BlockStructure structure = grid_with_a_dense_edge(15, 6);
@@ -156,6 +212,7 @@ TEST(SupernodalCholesky, NamesTheBlockThatIsNotPositiveInAWideFront) {
     SupernodalCholesky cholesky;
     cholesky.analyze(structure, "natural");
     EXPECT_EQ(cholesky.factorize(H).failed_block, bad);
+    EXPECT_EQ(cholesky.factorize_single(H).failed_block, bad);
     set_threads(before);
   }
 }
@@ -200,7 +257,7 @@ TEST(SupernodalCholesky, KeepsTheStackOfUpdateMatricesSmall) {
   SupernodalCholesky cholesky;
   cholesky.analyze(structure, "amd");
   set_threads(before);
-  EXPECT_LT(cholesky.doubles(), 3 * cholesky.symbolic().factor_nonzeros);
+  EXPECT_LT(cholesky.numbers(), 3 * cholesky.symbolic().factor_nonzeros);
 }
 
 TEST(SupernodalCholesky, NamesABlockThatIsNotPositiveAndRecovers) {
