@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <span>
 #include <string>
 #include <utility>
@@ -15,7 +16,9 @@
 #include "cairn/solve/optimizer.hpp"
 #include "covariances.hpp"
 #include "gauge_watch.hpp"
+#include "job.hpp"
 #include "models.hpp"
+#include "pace.hpp"
 #include "states.hpp"
 #include "system.hpp"
 #include "tree.hpp"
@@ -42,6 +45,12 @@ struct Settings {
 struct Rescuer {
   std::unique_ptr<Optimizer> optimizer;
   std::mutex mutex;
+};
+
+/// A new variable that waits: where it is from another one, which moves while it waits.
+struct Follower {
+  std::int32_t variable, leader;
+  std::vector<double> relative;  ///< x_leader⁻¹ x_variable, both of one Lie group
 };
 
 /// What an engine knows from one update to the next, but for the graph and the tree.
@@ -91,6 +100,19 @@ struct EngineState {
   std::vector<FactorId> ids_;     // by factor, rising
   FactorId next_id_ = 0;
   std::vector<std::uint8_t> is_source_;  // by variable
+  Pace pace_;
+  Job job_;
+  std::int32_t admitted_ = 0;  // so many factors are in H; the others wait for the job to end
+  int unsolved_ = 0;           // of them, since the last job began
+  std::vector<Follower> followers_;
+  /// The estimate as it is to be seen while what the engine has is not proven.
+  std::optional<Estimate> shown_;
+  std::vector<const double*> factor_steps_;
+  std::vector<std::int32_t> looked_;   // factors of the last evaluation
+  std::vector<std::int32_t> changed_;  // by the last substitution
+  double looked_at_ = 0.0;             // what steps had gained before the last evaluation
+  double mismatch_ = 0.0;   // of factors on several variables that are not relative, then
+  double shortfall_ = 0.0;  // by how much more than expected the cost was then
 };
 
 /// Solves the nonlinear least-squares problem of a graph that changes: keeps its linear models,
@@ -110,7 +132,7 @@ class Engine : private EngineState {
   /// x_v at the current estimate, ambient_size doubles. Changes nothing.
   std::vector<double> x(int v) const;
   /// All states at the current estimate. Changes nothing.
-  Estimate current() const { return tree_.settled(); }
+  Estimate current() const { return shown_ ? *shown_ : tree_.settled(); }
   /// The factor's number in the graph, or -1.
   std::int32_t place_of(FactorId id) const {
     const auto found = std::ranges::lower_bound(ids_, id);
@@ -148,9 +170,21 @@ class Engine : private EngineState {
   /// Removed factors and variables that are still in the graph.
   int dead() const { return dead_; }
 
-  /// Solves until the estimate is as accurate as it is to be, the time is up (0: no limit), or the
-  /// iterations are.
+  /// Solves until the estimate is as accurate as it is to be, or the iterations are up.
+  ///
+  /// With a limit of time [s] (0: none) the work stops where the next piece of it would exceed the
+  /// limit, and is continued by the next call. Until it has ended, factors that are added wait for
+  /// it, and their new variables move with those that they are joined with; the estimate is the
+  /// last one whose chi2 was evaluated. What is `owed` then counts the factors that this is about,
+  /// and those that wait.
   void solve(double max_seconds, UpdateReport& report);
+  /// Whether the tree is the factor of all that has been added; if not, there is a job or something
+  /// to be solved for. Nothing may be removed or changed while there is a job: solve without a
+  /// limit before.
+  bool up_to_date() const { return !busy() && touched_.empty(); }
+  bool busy() const { return job_.stage != Job::Stage::none; }
+  /// The clock that limits refer to, for tests.
+  void set_clock(Pace::Clock clock) { pace_.set_clock(std::move(clock)); }
   /// Relinearises everything at the current estimate, with a new order, until it has converged.
   void solve_fully(UpdateReport& report);
   /// Σ ρ(‖r‖²) at the current estimate.
@@ -193,9 +227,45 @@ class Engine : private EngineState {
   void touch(std::int32_t v);
   void follow(std::int32_t v);
   void apply_steps();
+  void forget_steps();
+  void move_state(std::int32_t v);
+  void move_models_of(std::int32_t v);
   void move_model(int f);
   void count_bonds(int f, std::int32_t sign);
+  void admit();
+  bool admit_waiting();
+  bool follows(std::int32_t v) const;
+  void note_follower(int f);
+  void place_followers();
+  void show_what_is_proven();
+  // What a job consists of (see `Job`): `…_more` goes on, and is false if there was no time for all.
+  bool begin_job(UpdateReport& report);
+  bool go_on(UpdateReport& report);
+  bool advance(UpdateReport& report);
+  void end_job();
+  bool order_affected(UpdateReport& report);
+  bool factorize_more(UpdateReport& report);
+  void factorized(UpdateReport& report);
+  void not_positive_definite(UpdateReport& report);
+  bool set_right_hand_side_more();
+  bool move_more();
+  void look(UpdateReport& report);
+  bool evaluate_more();
+  void evaluated(UpdateReport& report);
+  void prove();
+  void improve(UpdateReport& report);
+  bool set_aside_more();
+  bool relinearize_more(UpdateReport& report);
+  void begin_relinearizing_all();
+  bool relinearize_all_more();
+  void linearized_all(UpdateReport& report);
+  void diverged(UpdateReport& report);
+  void damp_more();
+  void give_up();
+  void judge(UpdateReport& report);
+  // Parts of it at once, without a limit.
   bool bring_factor_up_to_date(UpdateReport& report);
+  void step_and_look(UpdateReport& report);
   bool negligible();
   /// Σ ρ(‖r‖²), as far as it is known.
   double cost() const { return std::max(cost_ - gained_, 0.0); }
@@ -204,12 +274,7 @@ class Engine : private EngineState {
   double rounding();
   double rounding_scale(int f) const;
   void touch_all();
-  void set_right_hand_side();
-  void set_aside();
   void bring_back();
-  void take_step(double tolerance, UpdateReport& report);
-  bool check(bool anyway, UpdateReport& report);
-  bool improve(bool enough_time, UpdateReport& report);
   void step_back();
   void rescue(UpdateReport& report, double tolerance);
   void as_seen_from(int a, int b, double* block, std::int64_t stride) const;
@@ -218,14 +283,6 @@ class Engine : private EngineState {
   void remove_dead(Graph& graph) const;
   Values values_of(const Estimate& estimate) const;
 
-  // The passes at hand: of no meaning between calls.
-  std::vector<const double*> factor_steps_;
-  std::vector<std::int32_t> looked_;   // factors of the last evaluation
-  std::vector<std::int32_t> changed_;  // by the last substitution
-  double looked_at_ = 0.0;             // what steps had gained before the last evaluation
-  double mismatch_ = 0.0;   // of factors on several variables that are not relative, then
-  double shortfall_ = 0.0;  // by how much more than expected the cost was then
-  double limit_ = 0.0;      // seconds that the update at hand may take; 0: any
   std::vector<std::int32_t> anchored_;
   std::vector<std::int32_t> disconnected_;  // some may have new factors since, or be gone
 

@@ -41,6 +41,12 @@ void Engine::load(Graph graph, std::vector<FactorId> ids) {
   steps_.clear();
   moving_.clear();
   retiring_.clear();
+  looked_.clear();
+  changed_.clear();
+  followers_.clear();
+  job_ = {};
+  shown_.reset();
+  admitted_ = unsolved_ = 0;
   anchored_.clear();
   disconnected_.clear();
   checked_at_.clear();
@@ -61,6 +67,7 @@ void Engine::added_variable() {
   const VariableType& type = graph_.type(v);
   system_.add_variable(type.tangent_size());
   states_.add(graph_.type_of(v), graph_.state(v));
+  if (shown_) shown_->add(graph_.state(v));
   steps_.resize(static_cast<std::size_t>(system_.scalars()), 0.0);
   gauge_.add_variable(type.tangent_size(), type.lie_group() != nullptr, graph_.fixed(v));
   held_.push_back(1);  // until it has a factor
@@ -79,12 +86,23 @@ void Engine::added_factor() {
   models_.add(graph_, f);
   live_factor_.push_back(1);
   checked_at_.push_back(-1);
+  if (busy()) {
+    note_follower(f);
+  } else {
+    admit();
+  }
+}
+
+/// The next factor that is there becomes a part of the system.
+void Engine::admit() {
+  const int f = admitted_++;
   const auto variables = graph_.factor_variables(f);
   gauge_.add_factor(variables.data(), static_cast<int>(variables.size()), graph_.absolute_size(f));
   settle_gauge();
   for (const std::int32_t v : variables) follow(v);
   for (const std::int32_t v : variables) factors_of_[v].push_back(f);
   ++live_factors_;
+  ++unsolved_;
   rounding_scale_ += rounding_scale(f);
   models_.linearize(f, graph_, states_);
   cost_ += models_.cost(f);
@@ -279,17 +297,25 @@ void Engine::follow(std::int32_t v) {
 /// Moves the estimate and the models by the steps of `changed_`.
 void Engine::apply_steps() {
   ++check_;
-  for (const std::int32_t v : changed_) {
-    if (!held_[v]) states_.move(v, steps_.data() + system_.offset(v));
-    moved_at_[v] = check_;
+  for (const std::int32_t v : changed_) move_state(v);
+  for (const std::int32_t v : changed_) move_models_of(v);
+  forget_steps();
+}
+
+void Engine::move_state(std::int32_t v) {
+  if (!held_[v]) states_.move(v, steps_.data() + system_.offset(v));
+  moved_at_[v] = check_;
+}
+
+void Engine::move_models_of(std::int32_t v) {
+  for (const std::int32_t f : factors_of_[v]) {
+    if (checked_at_[f] == check_) continue;
+    checked_at_[f] = check_;
+    move_model(f);
   }
-  for (const std::int32_t v : changed_) {
-    for (const std::int32_t f : factors_of_[v]) {
-      if (checked_at_[f] == check_) continue;
-      checked_at_[f] = check_;
-      move_model(f);
-    }
-  }
+}
+
+void Engine::forget_steps() {
   for (const std::int32_t v : changed_)
     std::fill_n(steps_.data() + system_.offset(v), system_.size(v), 0.0);
   changed_.clear();

@@ -22,6 +22,12 @@ using Clock = std::chrono::steady_clock;
 /// So many states are read one by one.
 constexpr int kFew = 8;
 
+/// Whether an update does more than add.
+bool takes_out(const GraphUpdate& update) {
+  return !update.changed.empty() || !update.marginalized.empty() ||
+         !update.removed_factors.empty() || !update.removed_variables.empty();
+}
+
 }  // namespace
 
 IncrementalCholesky::IncrementalCholesky(const IncrementalCholeskyOptions& options,
@@ -64,6 +70,11 @@ UpdateReport IncrementalCholesky::update(const GraphUpdate& update, const Update
     replace_poor_states(checked, state_of, losses_.empty() ? Deciding::all : Deciding::first);
   forget_what_was_read();
   UpdateReport report;
+  ++since_solved_;
+  ++since_full_;
+  const bool full =
+      options.full || (options_.full_every > 0 && since_full_ >= options_.full_every);
+  if (engine_->busy() && (full || takes_out(checked))) engine_->solve(0.0, report);
   if (checked.marginalized.empty()) {
     apply(checked, report);
   } else {  // which may fail, on numbers
@@ -80,10 +91,8 @@ UpdateReport IncrementalCholesky::update(const GraphUpdate& update, const Update
   }
   report.seconds.linearize += seconds_since(begin);
 
-  ++since_solved_;
-  ++since_full_;
   const double max_seconds = options.max_seconds > 0.0 ? options.max_seconds : options_.budget;
-  if (options.full || (options_.full_every > 0 && since_full_ >= options_.full_every)) {
+  if (full) {
     engine_->solve_fully(report);
     since_full_ = since_solved_ = 0;
   } else if (!options.defer && since_solved_ >= options_.solve_every) {
@@ -92,7 +101,8 @@ UpdateReport IncrementalCholesky::update(const GraphUpdate& update, const Update
     engine_->solve(left, report);
     since_solved_ = 0;
   }
-  if (report.ok && since_solved_ == 0 && engine_->covariances().keeps_anything()) {
+  if (report.ok && since_solved_ == 0 && engine_->up_to_date() &&
+      engine_->covariances().keeps_anything()) {
     const Clock::time_point covariances_begin = Clock::now();
     report.marginals_by = engine_->update_covariances();
     report.seconds.marginals += seconds_since(covariances_begin);
@@ -251,7 +261,7 @@ bool IncrementalCholesky::covariance(Id a, Id b, std::span<double> block) {
     throw Error(ErrorCode::usage, fmt::format("the covariance of {} and {} has {} numbers, not {}",
                                               a, b, block_size(va, vb), block.size()));
   }
-  return engine_->covariance(va, vb, block.data());
+  return solved().covariance(va, vb, block.data());
 }
 
 bool IncrementalCholesky::covariance_column(Id id, std::span<const Id> variables,
@@ -268,7 +278,18 @@ bool IncrementalCholesky::covariance_column(Id id, std::span<const Id> variables
         ErrorCode::usage,
         fmt::format("this column of the covariance has {} numbers, not {}", size, out.size()));
   }
-  return engine_->covariance_column(rows, column, out.data());
+  return solved().covariance_column(rows, column, out.data());
+}
+
+/// What covariances are read from: where work is left from the last update, a copy that has done it.
+Engine& IncrementalCholesky::solved() {
+  if (!engine_->busy() && (since_solved_ > 0 || engine_->up_to_date())) return *engine_;
+  if (!finished_) {
+    finished_ = std::make_unique<Engine>(*engine_);
+    UpdateReport report;
+    finished_->solve(0.0, report);
+  }
+  return *finished_;
 }
 
 void IncrementalCholesky::reset() {

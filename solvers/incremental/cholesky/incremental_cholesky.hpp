@@ -34,7 +34,7 @@ struct IncrementalCholeskyOptions {
         .integer("full_every", &O::full_every, 0, 1e9,
                  "updates from one full batch step to the next; 0: only on demand")
         .real("budget", &O::budget, 0.0, 1e9,
-              "seconds that an update may take before relinearisation is deferred; 0: no limit")
+              "seconds that an update may take; what is left goes on in the next ones; 0: no limit")
         .boolean(
             "hints", &O::hints,
             "a new variable whose state its measurements contradict starts from where one of them "
@@ -101,7 +101,9 @@ class IncrementalCholesky final : public Estimator {
   void forget_what_was_read() {
     read_.clear();
     all_.reset();
+    finished_.reset();
   }
+  Engine& solved();
   void note_gauge(UpdateReport& report);
 
   IncrementalCholeskyOptions options_;
@@ -113,6 +115,7 @@ class IncrementalCholesky final : public Estimator {
   KeptMarginals kept_ = KeptMarginals::none;
   std::map<int, std::vector<double>> read_;  // states by variable, since the last update
   std::optional<Estimate> all_;              // or all of them
+  std::unique_ptr<Engine> finished_;         // see solved()
   std::set<Id> told_;                        // anchors that a note has named
 };
 

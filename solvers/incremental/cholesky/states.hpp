@@ -57,6 +57,22 @@ class States {
     }
     remember();
   }
+  /// The states as `undo` would leave them, which changes nothing here; before_other(index, values)
+  /// is called in its place for what was logged by `log_other`, last first.
+  template <class BeforeOther>
+  Estimate before(BeforeOther before_other) const {
+    Estimate estimate = estimate_;
+    for (std::size_t k = log_.size(); k-- > 0;) {
+      const Change& change = log_[k];
+      const std::span<const double> values = std::span(logged_).subspan(change.begin, change.count);
+      if (change.other) {
+        before_other(change.index, values);
+      } else {
+        std::ranges::copy(values, estimate.x(change.index));
+      }
+    }
+    return estimate;
+  }
   /// Logs values outside this class that are about to change.
   void log_other(std::int32_t index, std::span<const double> values) {
     log_.push_back({index, true, logged_.size(), values.size()});

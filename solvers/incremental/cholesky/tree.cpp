@@ -9,6 +9,12 @@
 #include "block/front.hpp"
 
 namespace cairn::incremental {
+namespace {
+
+constexpr block::CostModel kCost;
+
+}  // namespace
+
 Tree::Tree(const Tree& other, const System& system, States& states,
            const std::vector<std::int32_t>& bound)
     : Tree(other) {
@@ -60,11 +66,17 @@ void Tree::retire(std::int32_t variable) {
 
 // --- numbers ---
 
-std::int32_t Tree::factorize() {
+void Tree::begin_factorization(double damping) {
   std::ranges::sort(affected_, {}, [&](std::int32_t n) { return nodes_[n].sequence; });
-  for (const std::int32_t n : affected_) {
-    if (factorize_node(nodes_[n])) continue;
-    const Node& node = nodes_[n];
+  factorized_ = 0;
+  damping_ = damping;
+}
+
+std::int32_t Tree::factorize_more(Pace& pace) {
+  for (; factorized_ < affected_.size(); ++factorized_) {
+    Node& node = nodes_[affected_[factorized_]];
+    if (!pace.allows(Work::factorize, kCost.time(node.columns, node.below()))) return kPaused;
+    if (factorize_node(node)) continue;
     for (const std::int32_t v : node.own_variables()) {
       const std::int32_t row = front_row(node, v);
       for (std::int32_t c = row; c < row + system_->size(v); ++c) {
@@ -93,6 +105,7 @@ void Tree::assemble(Node& node) {
     const double* diagonal = system_->diagonal(v);
     for (std::int32_t c = 0; c < size; ++c) {
       for (std::int32_t r = 0; r < size; ++r) columns[c * stride + at + r] = *diagonal++;
+      columns[c * stride + at + c] *= 1.0 + damping_;
     }
     for (const System::Link& link : system_->links(v)) {
       const std::int32_t other = front_row_[link.other];

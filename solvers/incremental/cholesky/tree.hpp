@@ -3,11 +3,13 @@
 
 #include <cstdint>
 #include <span>
+#include <unordered_map>
 #include <vector>
 
 #include "block/kernels.hpp"
 #include "block/symbolic.hpp"
 #include "cairn/runtime/aligned.hpp"
+#include "pace.hpp"
 #include "small_graph.hpp"
 #include "states.hpp"
 #include "system.hpp"
@@ -101,7 +103,17 @@ class Tree {
   double seconds_to_order_anew() const;
   /// Computes the affected nodes. Returns -1, or a variable whose pivots are not positive; then the
   /// tree is invalid until everything has been touched and factorised.
-  std::int32_t factorize();
+  std::int32_t factorize() {
+    Pace any;
+    begin_factorization(0.0);
+    return factorize_more(any);
+  }
+  /// The same in pieces: `factorize_more` returns `kPaused` where there is no time for the next
+  /// node, and goes on there when it is called again. Until it has ended nothing may be touched, and
+  /// H must not change. The factor is that of H with its diagonal times 1 + `damping`.
+  void begin_factorization(double damping);
+  std::int32_t factorize_more(Pace& pace);
+  static constexpr std::int32_t kPaused = -2;
   /// Solves H δ = g, where g is zero but at `sources` and leaves as zero. `steps`, all zero before,
   /// gets δ of the variables that `changed` then lists. Returns gᵀ H⁻¹ g.
   ///
@@ -112,6 +124,16 @@ class Tree {
   /// deferred.
   double solve(std::span<const std::int32_t> sources, double tolerance, std::vector<double>& g,
                std::vector<double>& steps, std::vector<std::int32_t>& changed);
+  /// The same in pieces, false where there is no time for the next node: `begin_climb`, `climb` until
+  /// it has ended, then gᵀ H⁻¹ g is `climbed`; then either `end_decrement`, or `begin_descent`, and
+  /// `descend` until it has ended. Nothing else may be called in between but what is const.
+  void begin_climb(std::span<const std::int32_t> sources);
+  bool climb(std::vector<double>& g, Pace& pace);
+  double climbed() const { return climbed_; }
+  void end_decrement(std::vector<double>& g);
+  void begin_descent();
+  bool descend(double tolerance, std::vector<double>& g, std::vector<double>& steps,
+               std::vector<std::int32_t>& changed, Pace& pace);
   /// gᵀ H⁻¹ g alone, the predicted decrease of chi2. Leaves g as zero.
   double decrement(std::span<const std::int32_t> sources, std::vector<double>& g);
   /// Applies the deferred steps of the nodes on the path from a variable to its root. To be called
@@ -126,7 +148,10 @@ class Tree {
   /// Changes nothing.
   bool read(std::int32_t variable, double* x) const;
   /// All states, as `settle_all` would leave them.
-  Estimate settled() const;
+  Estimate settled() const { return settled(states_->estimate(), {}); }
+  /// The same for these states, and with these leads of some nodes instead of theirs.
+  using Leads = std::unordered_map<std::int32_t, std::vector<double>>;
+  Estimate settled(Estimate estimate, const Leads& leads) const;
   /// Undoes what was noted for a node (see `States::undo`).
   void undo_lead(std::int32_t node, std::span<const double> lead) {
     nodes_[node].lead.assign(lead.begin(), lead.end());
@@ -176,7 +201,6 @@ class Tree {
   void assemble(Node& node);
   void add_scattered(const Node& child, Node& parent);
   bool factorize_node(Node& node);
-  double forward(std::vector<double>& g);
   void solve_node(Node& node, const double* y, std::vector<double>& steps,
                   std::vector<std::int32_t>& changed);
   double owed_square(const Node& node) const;
@@ -198,6 +222,8 @@ class Tree {
   std::vector<std::int32_t> fresh_;     // touched variables in no node
   std::vector<std::uint8_t> is_fresh_;  // by variable
   std::vector<std::uint8_t> retired_;   // by variable
+  std::size_t factorized_ = 0;          // of them
+  double damping_ = 0.0;
   std::int64_t next_sequence_ = 0;
   int affected_variables_ = 0;
   std::int64_t doubles_ = 0;
@@ -221,6 +247,8 @@ class Tree {
   std::vector<double> rigid_, matrix_, twist_;
   std::int64_t leads_ = 0;  // so many motions have been noted
   std::vector<std::int32_t> stack_, path_, settle_path_;
+  std::size_t next_on_path_ = 0;
+  double climbed_ = 0.0;
   std::vector<std::uint8_t> on_path_;  // by node
 };
 

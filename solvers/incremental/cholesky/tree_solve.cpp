@@ -37,6 +37,12 @@ void multiply_square(Size size, const double* matrix, const double* vector, doub
     out[r] = sum;
   }
 }
+/// Doubles that substitution reads of a node; the number of nodes counts as well.
+double work_of(const Node& node) {
+  constexpr double kNode = 300.0;
+  return kNode + static_cast<double>(std::ssize(node.panel));
+}
+
 template <std::int32_t n>
 using Constant = std::integral_constant<std::int32_t, n>;
 
@@ -210,9 +216,8 @@ bool Tree::read(std::int32_t variable, double* x) const {
   return true;
 }
 
-Estimate Tree::settled() const {
+Estimate Tree::settled(Estimate estimate, const Leads& leads) const {
   constexpr std::int32_t kUnknown = -2, kNone = -1;
-  Estimate estimate = states_->estimate();
   std::vector<std::vector<double>> totals;                      // leads with all above them
   std::vector<std::int32_t> total_of(nodes_.size(), kUnknown);  // by node: which total
   std::vector<std::int32_t> path;
@@ -226,10 +231,12 @@ Estimate Tree::settled() const {
       const Node& node = nodes_[path.back()];
       const std::int32_t above = node.parent < 0 ? kNone : total_of[node.parent];
       total_of[path.back()] = above;
-      if (node.lead.empty()) continue;
-      totals.push_back(node.lead);
+      const auto other = leads.find(path.back());
+      const std::vector<double>& lead = other == leads.end() ? node.lead : other->second;
+      if (lead.empty()) continue;
+      totals.push_back(lead);
       if (above != kNone)
-        group->compose(totals[above].data(), node.lead.data(), totals.back().data());
+        group->compose(totals[above].data(), lead.data(), totals.back().data());
       total_of[path.back()] = static_cast<std::int32_t>(std::ssize(totals) - 1);
     }
     if (const std::int32_t total = total_of[own]; total != kNone)
@@ -267,46 +274,59 @@ double Tree::owed_square(const Node& node) const {
   return sum;
 }
 
-/// g ← L⁻¹ g along `path_`; returns the square of its norm.
-double Tree::forward(std::vector<double>& g) {
-  double square = 0.0;
+void Tree::begin_climb(std::span<const std::int32_t> sources) {
+  collect_paths(sources);
+  next_on_path_ = 0;
+  climbed_ = 0.0;
+}
+
+/// g ← L⁻¹ g along `path_`, whose norm is squared on the way.
+bool Tree::climb(std::vector<double>& g, Pace& pace) {
   double* const own = front_.data();
-  for (const std::int32_t n : path_) {
-    const Node& node = nodes_[n];
+  for (; next_on_path_ < path_.size(); ++next_on_path_) {
+    const Node& node = nodes_[path_[next_on_path_]];
+    if (!pace.allows(Work::substitute, work_of(node))) return false;
     double* const front = own + node.stride;
     gather_own(*system_, node, g.data(), 1, own);
     kernels_->forward(node.panel.data(), node.stride, node.columns, own, node.runs.data(),
                       static_cast<int>(node.runs.size()), g.data(), front);
-    for (std::int32_t c = 0; c < node.columns; ++c) square += own[c] * own[c];
+    for (std::int32_t c = 0; c < node.columns; ++c) climbed_ += own[c] * own[c];
     scatter_own(*system_, node, own, 1, g.data());
   }
-  return square;
+  return true;
 }
 
-double Tree::decrement(std::span<const std::int32_t> sources, std::vector<double>& g) {
-  collect_paths(sources);
-  const double square = forward(g);
+void Tree::end_decrement(std::vector<double>& g) {
   for (const std::int32_t n : path_) {
     for (const std::int32_t v : nodes_[n].own_variables())
       std::fill_n(g.data() + system_->offset(v), system_->size(v), 0.0);
   }
-  return square;
 }
 
-double Tree::solve(std::span<const std::int32_t> sources, double tolerance, std::vector<double>& g,
-                   std::vector<double>& steps, std::vector<std::int32_t>& changed) {
-  collect_paths(sources);
-  const double square = forward(g);
+double Tree::decrement(std::span<const std::int32_t> sources, std::vector<double>& g) {
+  Pace any;
+  begin_climb(sources);
+  climb(g, any);
+  end_decrement(g);
+  return climbed_;
+}
+
+void Tree::begin_descent() {
   ++pass_;
   for (const std::int32_t n : path_) on_path_[n] = 1;
   stack_.clear();
   for (const std::int32_t n : path_) {
     if (nodes_[n].parent < 0) stack_.push_back(n);
   }
+}
+
+bool Tree::descend(double tolerance, std::vector<double>& g, std::vector<double>& steps,
+                   std::vector<std::int32_t>& changed, Pace& pace) {
   while (!stack_.empty()) {
     const std::int32_t n = stack_.back();
-    stack_.pop_back();
     Node& node = nodes_[n];
+    if (!pace.allows(Work::substitute, work_of(node))) return false;
+    stack_.pop_back();
     const double enough = tolerance * static_cast<double>(node.separator().size());
     if (!on_path_[n] &&
         (owed_square(node) <= enough || (node.movable && move_as_a_whole(node, enough)))) {
@@ -321,7 +341,17 @@ double Tree::solve(std::span<const std::int32_t> sources, double tolerance, std:
     on_path_[n] = 0;
     stack_.insert(stack_.end(), node.children.begin(), node.children.end());
   }
-  return square;
+  return true;
+}
+
+double Tree::solve(std::span<const std::int32_t> sources, double tolerance, std::vector<double>& g,
+                   std::vector<double>& steps, std::vector<std::int32_t>& changed) {
+  Pace any;
+  begin_climb(sources);
+  climb(g, any);
+  begin_descent();
+  descend(tolerance, g, steps, changed, any);
+  return climbed_;
 }
 
 void Tree::follow(std::int32_t variable, std::vector<double>& steps,

@@ -1,0 +1,622 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// How a change is solved for: in pieces, so that it can go on in a later update.
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "cairn/runtime/timed.hpp"
+#include "engine.hpp"
+
+namespace cairn::incremental {
+namespace {
+
+// How the accuracy that is asked for, a fraction of chi2, is shared out. Found by trying on the
+// published graphs: what is left at the end stays well within it.
+constexpr double kEnough = 0.2;     ///< of it all: by how much more solving could lower chi2
+constexpr double kStepShare = 0.1;  ///< of a factor's: steps that are not followed down the tree
+/// So much may be left of the steps since the factors were evaluated, before they are again.
+constexpr double kLook = 0.1;
+/// A step that has gained so many times what may be left is looked at in any case.
+constexpr double kFar = 4.0;
+/// What is left is guessed from what was: a share of what the steps have gained, at least …
+constexpr double kLeastShare = 5e-3;
+constexpr double kOthersShare = 0.01;  ///< … where factors are not of poses alone, …
+constexpr double kForget = 0.5;        ///< … and not less than so much of the guess before
+/// What can still be gained is at most so many times what steps have fallen short of.
+constexpr double kCaution = 6.0;
+/// Gradients that promise up to so many times as much say that H is right.
+constexpr double kTrusted = 3.0;
+/// Where some factors are none of poses alone: while a solution leaves less than this fraction of
+/// what it has gained, H does as it is.
+constexpr double kFast = 0.2;
+/// Jacobians of such factors that are off by more than this part are renewed.
+constexpr double kMismatch = 0.05;
+/// What would lower chi2 by nothing that matters is solved for once it comes from so many
+/// variables, or each update would look at all that came since the last step.
+constexpr std::size_t kMostSources = 256;
+/// In graphs of no more factors all are evaluated after each step.
+constexpr int kFew = 200;
+/// If more than this part of the factors were to be renewed, all are.
+constexpr double kMost = 0.2;
+
+// Damped rounds, with H + λ diag(H).
+constexpr double kFirstDamping = 1e-6;
+constexpr double kMostDamping = 1e12;
+constexpr double kEase = 0.1;  ///< factor of λ after a step that is accepted
+/// Once a step lowers chi2 by less than this fraction, H is not damped: it would only delay.
+constexpr double kUndamped = 1e-3;
+constexpr double kConverged = 1e-6;
+constexpr int kMostDampedRounds = 100;
+
+/// What it takes to copy a variable's state for `Engine::shown_` [s].
+constexpr double kCopySeconds = 0.15e-6;
+
+}  // namespace
+
+void Engine::solve(double max_seconds, UpdateReport& report) {
+  pace_.begin(max_seconds);
+  while (busy() || begin_job(report)) {
+    if (!go_on(report) || !admit_waiting()) break;
+    if (!pace_.allows(Work::order, 1.0)) break;
+  }
+  const int waiting = models_.size() - admitted_;
+  if (busy()) {
+    show_what_is_proven();
+    report.owed = std::max(job_.factors, 1) + waiting;
+  } else if (!touched_.empty()) {
+    report.owed += unsolved_;
+  }
+  report.ok = !broken_;
+}
+
+/// Whether there is anything to be solved for.
+bool Engine::begin_job(UpdateReport& report) {
+  settle_gauge();
+  ++time_;
+  states_.remember();
+  if (broken_) {
+    diverged(report);
+    return busy();
+  }
+  if (must_look_) bring_back();
+  if (touched_.empty() && sources_.empty()) return false;
+  job_ = {};
+  job_.factors = std::exchange(unsolved_, 0);
+  job_.go_to(Job::Stage::order);
+  return true;
+}
+
+/// Continues the job until it has ended. False if there was no time for that.
+bool Engine::go_on(UpdateReport& report) {
+  while (busy()) {
+    if (!advance(report)) return false;
+  }
+  return true;
+}
+
+void Engine::end_job() {
+  job_ = {};
+  pace_.keep_free(0.0);
+  shown_.reset();
+}
+
+/// A stage of the job. False if there was no time for all of it.
+bool Engine::advance(UpdateReport& report) {
+  using enum Job::Stage;
+  UpdateSeconds& seconds = report.seconds;
+  switch (job_.stage) {
+    case none: break;
+    case order: return order_affected(report);
+    case factorize: return factorize_more(report);
+    case right_hand_side: {
+      const Timed timed(seconds.solve);
+      if (!set_right_hand_side_more()) return false;
+      for (const std::int32_t v : sources_) system_.mark_solved(v);
+      tree_.begin_climb(sources_);
+      job_.go_to(climb);
+      break;
+    }
+    case climb: {
+      const Timed timed(seconds.solve);
+      if (!tree_.climb(system_.g(), pace_)) return false;
+      decrease_ = tree_.climbed();
+      gained_ += decrease_;
+      for (const std::int32_t v : sources_) is_source_[v] = 0;
+      sources_.clear();
+      job_.unproven = true;
+      if (!shown_) pace_.keep_free(kCopySeconds * states_.size());
+      tree_.begin_descent();
+      job_.go_to(descend);
+      break;
+    }
+    case descend: {
+      const Timed timed(seconds.solve);
+      if (!tree_.descend(job_.tolerance, system_.g(), steps_, changed_, pace_)) return false;
+      ++check_;
+      job_.go_to(move_states);
+      break;
+    }
+    case move_states:
+    case move_models: {
+      const Timed timed(seconds.check);
+      if (!move_more()) return false;
+      if (job_.damped == Job::Damped::tried) {
+        begin_relinearizing_all();
+      } else {
+        look(report);
+      }
+      break;
+    }
+    case evaluate: {
+      const Timed timed(seconds.check);
+      if (!evaluate_more()) return false;
+      evaluated(report);
+      break;
+    }
+    case gradient: {
+      const Timed timed(seconds.solve);
+      if (!set_right_hand_side_more()) return false;
+      tree_.begin_climb(sources_);
+      job_.go_to(decrement);
+      break;
+    }
+    case decrement: {
+      const Timed timed(seconds.solve);
+      if (!tree_.climb(system_.g(), pace_)) return false;
+      tree_.end_decrement(system_.g());
+      improve(report);
+      break;
+    }
+    case set_aside: {
+      const Timed timed(seconds.solve);
+      return set_aside_more();
+    }
+    case relinearize: {
+      const Timed timed(seconds.linearize);
+      return relinearize_more(report);
+    }
+    case follow_all:
+    case frame_all:
+    case linearize_all: {
+      const Timed timed(seconds.linearize);
+      if (!relinearize_all_more()) return false;
+      linearized_all(report);
+      break;
+    }
+  }
+  return true;
+}
+
+/// Finds what is affected, and orders it anew if blocks of H have come or gone.
+bool Engine::order_affected(UpdateReport& report) {
+  const Timed timed(report.seconds.order);
+  tree_.clear_affected();
+  if (structure_changed_ && tree_.worn_out() &&
+      (!pace_.limited() || tree_.seconds_to_order_anew() < pace_.limit())) {
+    touch_all();
+  }
+  for (const std::int32_t v : touched_) {
+    if (!held_[v] || tree_.node_of(v) >= 0) tree_.touch(v);
+  }
+  for (const std::int32_t v : retiring_) tree_.retire(v);
+  if (structure_changed_) {
+    if (!pace_.allows(Work::order, tree_.affected_variables())) return false;
+    tree_.restructure(touched_at_, time_ - settings_.recent);
+    states_.remember();  // nodes keep their numbers from here on
+  }
+  retiring_.clear();
+  structure_changed_ = false;
+  report.affected_variables += tree_.affected_variables();
+  for (const std::int32_t v : touched_) add_source(v);
+  touched_.clear();
+  if (job_.damped == Job::Damped::no) job_.before = cost();
+  tree_.begin_factorization(job_.damped == Job::Damped::no ? 0.0 : job_.lambda);
+  job_.go_to(Job::Stage::factorize);
+  return true;
+}
+
+bool Engine::factorize_more(UpdateReport& report) {
+  std::int32_t result = 0;
+  {
+    const Timed timed(report.seconds.factorize);
+    result = tree_.factorize_more(pace_);
+  }
+  if (result == Tree::kPaused) return false;
+  if (result < 0) {
+    factorized(report);
+  } else {
+    not_positive_definite(report);
+  }
+  return true;
+}
+
+void Engine::factorized(UpdateReport& report) {
+  job_.tolerance = 0.0;
+  switch (job_.damped) {
+    case Job::Damped::no:
+      if (job_.rounds == 0 && sources_.size() < kMostSources && negligible()) return end_job();
+      job_.tolerance = share(kStepShare);
+      break;
+    case Job::Damped::begun:
+      states_.remember();
+      job_.damped = Job::Damped::tried;
+      break;
+    case Job::Damped::tried: break;
+    case Job::Damped::last:
+      broken_ = false;
+      if (job_.converged) break;
+      report.converged = false;
+      report.notes.push_back(fmt::format("not converged after {} iterations", job_.rounds));
+      return end_job();
+  }
+  job_.go_to(Job::Stage::right_hand_side);
+}
+
+/// Whether what has not been solved for yet would lower chi2 by nothing that matters.
+bool Engine::negligible() {
+  for (const std::int32_t v : sources_) {
+    tree_.settle(v);
+    models_.right_hand_side(system_, states_, v);
+  }
+  const double gain = tree_.decrement(sources_, system_.g());
+  return gain <= std::min(settings_.significance, kEnough * settings_.accuracy * cost());
+}
+
+/// A share of the accuracy that is asked for, of the mean cost of a factor.
+double Engine::share(double part) const {
+  return part * settings_.accuracy * cost() / std::max(live_factors_, 1);
+}
+
+bool Engine::set_right_hand_side_more() {
+  for (; job_.next < sources_.size(); ++job_.next) {
+    if (!pace_.allows(Work::move, 1.0)) return false;
+    const std::int32_t v = sources_[job_.next];
+    tree_.settle(v);
+    models_.right_hand_side(system_, states_, v);
+  }
+  return true;
+}
+
+void Engine::touch_all() {
+  for (int v = 0; v < states_.size(); ++v) {
+    if (!live_variable_[v] || held_[v]) continue;
+    follow(v);
+    touch(v);
+  }
+}
+
+/// Moves the estimate and the models by the step.
+bool Engine::move_more() {
+  if (job_.stage == Job::Stage::move_states) {
+    for (; job_.next < changed_.size(); ++job_.next) {
+      if (!pace_.allows(Work::move, 1.0)) return false;
+      move_state(changed_[job_.next]);
+    }
+    job_.go_to(Job::Stage::move_models);
+  }
+  for (; job_.next < changed_.size(); ++job_.next) {
+    const std::int32_t v = changed_[job_.next];
+    if (!pace_.allows(Work::move, static_cast<double>(factors_of_[v].size()))) return false;
+    move_models_of(v);
+  }
+  forget_steps();
+  return true;
+}
+
+/// After a step: if what is known of the factors may be wrong by too much, all that have moved are
+/// to be evaluated: few of them alone would say nothing of the rest.
+void Engine::look(UpdateReport& report) {
+  const bool last = job_.damped == Job::Damped::last;
+  if (!last) ++report.iterations;
+  const bool anyway = std::exchange(must_look_, false) || live_factors_ <= kFew || last ||
+                      job_.rounds > 0;
+  ++job_.rounds;
+  const double allowed = settings_.accuracy * cost();
+  if (!anyway && left_share_ * gained_ <= kLook * allowed && decrease_ <= kFar * allowed)
+    return end_job();
+  job_.expected = cost();
+  looked_at_ = std::exchange(gained_, 0.0);
+  looked_.swap(moving_);
+  moving_.clear();
+  job_.square = 0.0;
+  job_.compared = 0;
+  job_.go_to(Job::Stage::evaluate);
+}
+
+bool Engine::evaluate_more() {
+  for (; job_.next < looked_.size(); ++job_.next) {
+    const std::int32_t f = looked_[job_.next];
+    if (!live_factor_[f]) continue;
+    if (!pace_.allows(Work::evaluate, 1.0)) return false;
+    for (const std::int32_t v : models_.variables(f)) tree_.settle(v);
+    cost_ -= models_.cost(f);
+    const bool compare = others_ > 0 && is_other(f);
+    const double mismatch = models_.correct(f, graph_, states_, system_, held_, compare);
+    job_.square += mismatch * mismatch;
+    job_.compared += compare;
+    cost_ += models_.cost(f);
+    for (const std::int32_t v : models_.variables(f)) add_source(v);
+  }
+  mismatch_ = job_.compared > 0 ? std::sqrt(job_.square / job_.compared) : 0.0;
+  shortfall_ = cost_ - job_.expected;
+  return true;
+}
+
+void Engine::evaluated(UpdateReport& report) {
+  if (job_.damped == Job::Damped::last) return end_job();
+  // Negated, so that what is not a number is bad too.
+  if (!(cost_ <= 2.0 * job_.before + rounding())) return diverged(report);
+  if (pace_.limited() && cost_ <= job_.before + rounding()) prove();
+  job_.go_to(Job::Stage::gradient);
+}
+
+/// The estimate is as good as it was before the round: it may be seen, and is what a later round
+/// would go back to.
+void Engine::prove() {
+  job_.unproven = false;
+  pace_.keep_free(0.0);
+  shown_.reset();
+  place_followers();
+  states_.remember();
+}
+
+/// Whether to solve once more: whether that would lower chi2 noticeably.
+///
+/// The gradients that are left would gain gᵀH⁻¹g if H were right, and for poses alone, as a rule,
+/// not much more than what chi2 has fallen short of (see docs/online.md). If both agree, H does as
+/// it is; if the former is much larger, H is not that of the current estimate, and what has moved
+/// is relinearised.
+void Engine::improve(UpdateReport& report) {
+  const double left = tree_.climbed();
+  const double allowed = settings_.accuracy * cost_ + rounding();
+  report.owed = 0;
+  const bool poses_alone = others_ == 0 && live_factors_ > kFew;
+  const double likely = poses_alone ? std::min(left, kCaution * std::abs(shortfall_)) : left;
+  left_share_ = std::max(kForget * left_share_, poses_alone ? kLeastShare : kOthersShare);
+  if (looked_at_ > 0.0) left_share_ = std::clamp(likely / looked_at_, left_share_, 1.0);
+  const bool right =
+      poses_alone ? left <= std::min(kTrusted * likely, looked_at_) : left <= kFast * looked_at_;
+  if (likely <= kEnough * allowed && mismatch_ <= kMismatch)
+    return job_.go_to(Job::Stage::set_aside);
+  if (job_.rounds >= settings_.iterations) {
+    report.owed = static_cast<int>(looked_.size());
+    return end_job();
+  }
+  job_.factors = static_cast<int>(looked_.size());
+  if (right && mismatch_ <= kMismatch) return job_.go_to(Job::Stage::order);
+  if (job_.rounds >= 2 || static_cast<double>(looked_.size()) > kMost * live_factors_)
+    return begin_relinearizing_all();
+  job_.go_to(Job::Stage::relinearize);
+}
+
+/// Leaves the gradients at hand alone until the factors are evaluated again: with an old H, what
+/// little they have to tell might do more harm than good.
+bool Engine::set_aside_more() {
+  for (; job_.next < sources_.size(); ++job_.next) {
+    if (!pace_.allows(Work::move, 1.0)) return false;
+    const std::int32_t v = sources_[job_.next];
+    tree_.settle(v);
+    models_.right_hand_side(system_, states_, v);
+    system_.set_aside(v);
+    is_source_[v] = 0;
+  }
+  sources_.clear();
+  end_job();
+  return true;
+}
+
+bool Engine::relinearize_more(UpdateReport& report) {
+  for (; job_.next < looked_.size(); ++job_.next) {
+    const std::int32_t f = looked_[job_.next];
+    if (!live_factor_[f]) continue;
+    if (!pace_.allows(Work::linearize, 1.0)) return false;
+    relinearize(f);
+    ++report.relinearized_factors;
+  }
+  job_.go_to(Job::Stage::order);
+  return true;
+}
+
+void Engine::begin_relinearizing_all() {
+  covariances_.note_everything();
+  job_.go_to(Job::Stage::follow_all);
+}
+
+/// Everything at the current estimate: H and g are summed anew, without the rounding of updates.
+bool Engine::relinearize_all_more() {
+  const std::size_t variables = static_cast<std::size_t>(states_.size());
+  if (job_.stage == Job::Stage::follow_all) {
+    for (; job_.next < variables; ++job_.next) {
+      if (!pace_.allows(Work::move, 1.0)) return false;
+      const std::int32_t v = static_cast<std::int32_t>(job_.next);
+      if (!live_variable_[v] || held_[v]) continue;
+      follow(v);
+      touch(v);
+    }
+    moving_.clear();
+    for (const std::int32_t v : sources_) is_source_[v] = 0;
+    sources_.clear();
+    system_.clear_values();
+    cost_ = gained_ = 0.0;
+    job_.go_to(Job::Stage::frame_all);
+  }
+  if (job_.stage == Job::Stage::frame_all) {
+    for (; job_.next < variables; ++job_.next) {
+      if (!pace_.allows(Work::move, 1.0)) return false;
+      states_.put_frame_here(static_cast<std::int32_t>(job_.next));
+    }
+    job_.go_to(Job::Stage::linearize_all);
+  }
+  for (; job_.next < static_cast<std::size_t>(admitted_); ++job_.next) {
+    const int f = static_cast<int>(job_.next);
+    if (!live_factor_[f]) continue;
+    if (!pace_.allows(Work::linearize, 1.0)) return false;
+    models_.linearize(f, graph_, states_);
+    cost_ += models_.cost(f);
+    models_.add_to(system_, f, 1.0, held_);
+  }
+  return true;
+}
+
+void Engine::linearized_all(UpdateReport& report) {
+  if (job_.damped == Job::Damped::tried) return judge(report);
+  if (job_.damped == Job::Damped::no) report.relinearized_factors += live_factors_;
+  if (job_.damped == Job::Damped::begun) job_.before = cost_;
+  job_.go_to(Job::Stage::order);
+}
+
+/// A step has raised chi2, or H is not positive definite: back to the estimate from before, and on
+/// from there with an optimizer that never raises chi2. With a limit of time this is done here, by
+/// Levenberg-Marquardt, since it has to be done in pieces.
+void Engine::diverged(UpdateReport& report) {
+  step_back();
+  const int factors = job_.factors;
+  end_job();
+  if (!pace_.limited()) return rescue(report, kConverged);
+  job_.factors = std::max(factors, live_factors_);
+  job_.damped = Job::Damped::begun;
+  job_.lambda = kFirstDamping;
+  left_share_ = 1.0;
+  place_followers();
+  begin_relinearizing_all();
+}
+
+void Engine::not_positive_definite(UpdateReport& report) {
+  switch (job_.damped) {
+    case Job::Damped::no: return diverged(report);
+    case Job::Damped::last: broken_ = true; return end_job();
+    default: break;
+  }
+  damp_more();
+  if (job_.damped == Job::Damped::last && !job_.converged) job_.lambda = 0.0;
+  tree_.begin_factorization(job_.lambda);
+  job_.go_to(Job::Stage::factorize);
+}
+
+void Engine::damp_more() {
+  job_.undamped_fails = job_.undamped_fails || job_.lambda == 0.0;
+  job_.lambda = std::max(job_.lambda, kFirstDamping) * job_.growth;
+  job_.growth *= 2.0;
+  if (job_.lambda > kMostDamping) give_up();
+}
+
+void Engine::give_up() {
+  job_.converged = false;
+  job_.damped = Job::Damped::last;
+  job_.lambda = 0.0;
+}
+
+/// After a damped step, with everything linearised there: whether it is accepted.
+void Engine::judge(UpdateReport& report) {
+  ++report.iterations;
+  ++job_.rounds;
+  if (cost_ <= job_.before + rounding()) {
+    const double gain = job_.before - cost_;
+    job_.before = cost_;
+    prove();
+    job_.growth = 2.0;
+    job_.damped = Job::Damped::begun;
+    const bool judges = job_.lambda == 0.0 || job_.undamped_fails;
+    if (judges && gain <= kConverged * cost_ + rounding()) {
+      job_.damped = Job::Damped::last;
+      job_.lambda = 0.0;
+    } else if (!job_.undamped_fails && gain <= kUndamped * cost_) {
+      job_.lambda = 0.0;
+    } else {
+      job_.lambda *= kEase;
+    }
+  } else {
+    step_back();
+    job_.unproven = false;
+    pace_.keep_free(0.0);
+    shown_.reset();
+    job_.damped = Job::Damped::begun;
+    damp_more();
+    begin_relinearizing_all();
+  }
+  if (job_.rounds >= kMostDampedRounds && job_.damped != Job::Damped::last) give_up();
+  if (job_.stage == Job::Stage::linearize_all) job_.go_to(Job::Stage::order);
+}
+
+/// A step with the factor at hand to its end, and everything that has moved evaluated.
+void Engine::step_and_look(UpdateReport& report) {
+  job_ = {};
+  job_.damped = Job::Damped::last;
+  job_.go_to(Job::Stage::right_hand_side);
+  go_on(report);
+}
+
+void Engine::relinearize_all() {
+  begin_relinearizing_all();
+  relinearize_all_more();
+  job_ = {};
+}
+
+/// The factor of H as it is now. False if H is not positive definite.
+bool Engine::bring_factor_up_to_date(UpdateReport& report) {
+  job_ = {};
+  order_affected(report);
+  job_ = {};
+  const Timed timed(report.seconds.factorize);
+  return tree_.factorize_more(pace_) < 0;
+}
+
+// What comes while a job is not done -------------------------------------------------------------
+
+/// A pose that waits is placed beside the first other pose that a factor joins it with.
+void Engine::note_follower(int f) {
+  const auto variables = models_.variables(f);
+  for (const std::int32_t v : variables) {
+    if (!factors_of_[v].empty() || graph_.fixed(v) || follows(v)) continue;
+    const LieGroup* group = states_.type(v).lie_group();
+    const auto leader = std::ranges::find_if(variables, [&](std::int32_t other) {
+      return other != v && graph_.pool(other) == graph_.pool(v) &&
+             (!factors_of_[other].empty() || graph_.fixed(other) || follows(other));
+    });
+    if (!group || leader == variables.end()) continue;
+    std::vector<double> relative(x(v).size());
+    group->inverse(x(*leader).data(), relative.data());
+    group->compose(relative.data(), x(v).data(), relative.data());
+    followers_.push_back({v, *leader, std::move(relative)});
+  }
+}
+
+bool Engine::follows(std::int32_t v) const {
+  return std::ranges::any_of(followers_, [&](const Follower& one) { return one.variable == v; });
+}
+
+void Engine::place_followers() {
+  for (const Follower& one : followers_) {
+    const LieGroup& group = *states_.type(one.variable).lie_group();
+    tree_.settle(one.leader);
+    std::vector<double> motion(one.relative.size());
+    group.inverse(states_.x(one.variable), motion.data());
+    group.compose(one.relative.data(), motion.data(), motion.data());
+    group.compose(states_.x(one.leader), motion.data(), motion.data());
+    states_.lead(one.variable, motion.data());
+    states_.put_frame_here(one.variable);
+  }
+}
+
+/// Whether any factors have waited.
+bool Engine::admit_waiting() {
+  place_followers();
+  followers_.clear();
+  const bool any = admitted_ < models_.size();
+  while (admitted_ < models_.size()) admit();
+  return any;
+}
+
+/// Keeps the estimate from before a step that has not been evaluated.
+void Engine::show_what_is_proven() {
+  if (!job_.unproven || shown_) return;
+  Tree::Leads leads;
+  Estimate before = states_.before([&](std::int32_t node, std::span<const double> lead) {
+    leads[node].assign(lead.begin(), lead.end());
+  });
+  shown_ = tree_.settled(std::move(before), leads);
+}
+
+}  // namespace cairn::incremental
