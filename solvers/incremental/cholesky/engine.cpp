@@ -43,8 +43,9 @@ double Engine::rounding() {
   return kRounding * rounding_scale_;
 }
 
-/// The estimate from before this update.
+/// The estimate from before this update; everything is then to be linearised anew.
 void Engine::step_back() {
+  tree_.drop_deferred();
   states_.undo(
       [&](std::int32_t node, std::span<const double> lead) { tree_.undo_lead(node, lead); });
 }

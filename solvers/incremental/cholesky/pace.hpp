@@ -47,7 +47,7 @@ class Pace {
   bool allows(Work kind, double amount) {
     if (!limited()) return true;
     const double expected = rate(kind) * amount;
-    if (piece_ && piece_->kind == kind && piece_->expected + expected < kShort) {
+    if (piece_ && piece_->kind == kind && piece_->expected + expected < short_) {
       piece_->expected += expected;
       piece_->amount += amount;
       return true;
@@ -61,8 +61,11 @@ class Pace {
   }
   /// So many seconds at the end of the update are for something else.
   void keep_free(double seconds) { reserved_ = seconds; }
-  /// So that tests do not depend on time.
-  void set_clock(Clock clock) { clock_ = std::move(clock); }
+  /// So that tests do not depend on time. It is read for each piece.
+  void set_clock(Clock clock) {
+    clock_ = std::move(clock);
+    short_ = 0.0;
+  }
 
  private:
   struct Piece {
@@ -86,6 +89,7 @@ class Pace {
   }
 
   Clock clock_;
+  double short_ = kShort;
   double limit_ = 0.0, end_ = 0.0, reserved_ = 0.0;
   bool first_ = true;
   std::optional<Piece> piece_;

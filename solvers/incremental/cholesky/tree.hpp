@@ -141,6 +141,10 @@ class Tree {
   void follow(std::int32_t variable, std::vector<double>& steps,
               std::vector<std::int32_t>& changed);
 
+  /// Drops the deferred steps of all nodes. To be called where the last steps are undone, before
+  /// everything is linearised anew: what is deferred contains a part of them.
+  void drop_deferred();
+
   /// Applies what the nodes above a variable are to be moved by to their states: x_v is then right.
   void settle(std::int32_t variable);
   void settle_all();

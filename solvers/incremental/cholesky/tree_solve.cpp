@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <type_traits>
+#include <utility>
 
 #include "tree.hpp"
 
@@ -369,6 +370,13 @@ void Tree::follow(std::int32_t variable, std::vector<double>& steps,
   for (std::int32_t n = node_of(variable); n >= 0; n = nodes_[n].parent) stack_.push_back(n);
   for (std::size_t k = stack_.size(); k-- > 0;) {
     if (nodes_[stack_[k]].owes) solve_node(nodes_[stack_[k]], nullptr, steps, changed);
+  }
+}
+
+void Tree::drop_deferred() {
+  for (Node& node : nodes_) {
+    if (!std::exchange(node.owes, false)) continue;
+    std::ranges::fill(node.owed, 0.0);
   }
 }
 

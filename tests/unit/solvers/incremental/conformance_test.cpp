@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cmath>
 #include <numbers>
 #include <random>
@@ -28,7 +29,13 @@ unsigned from_environment(const char* name, unsigned otherwise) {
   return text ? static_cast<unsigned>(std::strtoul(text, nullptr, 10)) : otherwise;
 }
 
-std::vector<std::string> every_estimator() { return Registry().names(Estimator::kKind); }
+/// One of them with a limit of time that leaves it a piece of work in each update as well.
+std::vector<std::string> every_estimator() {
+  std::vector<std::string> names = Registry().names(Estimator::kKind);
+  if (Registry().has(Estimator::kKind, "incremental_cholesky"))
+    names.emplace_back("incremental_cholesky:budget=1e-9");
+  return names;
+}
 
 const std::vector<double> kUnit = {1, 0, 0, 1, 0, 1};
 
@@ -200,6 +207,73 @@ TEST_P(EveryEstimator, ADeferredUpdateLeavesTheEstimateOfOldVariables) {
   EXPECT_EQ(before, std::vector<double>(estimator_->state(2).begin(), estimator_->state(2).end()));
   estimator_->update({}, {.full = true});
   EXPECT_NE(before, std::vector<double>(estimator_->state(2).begin(), estimator_->state(2).end()));
+}
+
+// A ring whose poses come one by one, with chords, in updates that have no time.
+TEST_P(EveryEstimator, WhatATimeLimitLeavesIsThereAndIsDoneInTheEnd) {
+  constexpr int kPoses = 40;
+  const double turn = 2.0 * std::numbers::pi / 20.0;
+  const auto unlimited = registry_.make<Estimator>(GetParam());
+  int factors = 0;
+  for (int k = 0; k < kPoses; ++k) {
+    GraphUpdate update;
+    update.variables.push_back(
+        pose(k, k == 0 ? std::vector<double>{0, 0, 0} : std::vector<double>()));
+    if (k > 0) update.factors.push_back(between(k - 1, k, {1.0, 0.02 * (k % 3), turn + 0.03}));
+    if (k >= 20) update.factors.push_back(between(k - 20, k, {0.1, 0.0, 0.05}));
+    const UpdateReport report = estimator_->update(update, {.max_seconds = 1e-9});
+    unlimited->update(update, {.max_seconds = 1e9});
+    EXPECT_EQ(report.first_factor, factors);
+    factors += static_cast<int>(update.factors.size());
+    ASSERT_EQ(estimator_->variable_count(), k + 1);
+    ASSERT_EQ(estimator_->factor_count(), factors);
+    ASSERT_TRUE(estimator_->has(k));
+    if (k == 0) continue;
+    EXPECT_EQ(estimator_->factor(factors - 1).variables[1], k);
+    EXPECT_EQ(estimator_->graph().factor_count(), factors);
+    const auto x = estimator_->state(k);
+    EXPECT_TRUE(std::ranges::equal(estimator_->graph().state(k), x)) << k;
+    if (k % 7 != 0) continue;
+    Eigen::Matrix3d block;
+    ASSERT_TRUE(estimator_->covariance(k, k, {block.data(), 9}));
+    EXPECT_GT(block.eigenvalues().real().minCoeff(), 0.0);
+  }
+  for (Estimator* one : {estimator_.get(), unlimited.get()}) one->update({}, {.full = true});
+  if (is_filter()) return;
+  EXPECT_NEAR(estimator_->chi2(), unlimited->chi2(), 1e-9 * unlimited->chi2());
+  for (int k = 0; k < kPoses; ++k) {
+    const auto x = estimator_->state(k), y = unlimited->state(k);
+    for (int c = 0; c < 3; ++c) EXPECT_NEAR(x[c], y[c], 1e-6) << k;
+  }
+  const DenseSystem system = dense_system(estimator_->graph());
+  const auto rows = system.rows.at(kPoses - 1);
+  const Eigen::Matrix3d wanted = system.Sigma().block<3, 3>(rows.first, rows.first);
+  Eigen::Matrix3d block;
+  ASSERT_TRUE(estimator_->covariance(kPoses - 1, kPoses - 1, {block.data(), 9}));
+  EXPECT_LT((block - wanted).norm(), 1e-6 * wanted.norm());
+}
+
+TEST_P(EveryEstimator, WhatATimeLimitLeavesCanBeRemovedAndMarginalised) {
+  GraphUpdate update = chain(12);
+  update.factors.push_back(between(0, 11, {1.0, 2.0, 1.0}));
+  estimator_->update(update, {.max_seconds = 1e-9});
+  update = {};
+  update.variables = {pose(12)};
+  update.factors = {between(11, 12), between(3, 12, {0.5, 1.0, 0.3})};
+  const FactorId first = estimator_->update(update, {.max_seconds = 1e-9}).first_factor;
+  update = {};
+  update.removed_factors = {first + 1};
+  update.marginalized = {5};
+  update.changed = {{0, {1.0, 0.1, 0.1}, kUnit}};
+  estimator_->update(update, {.max_seconds = 1e-9});
+  EXPECT_FALSE(estimator_->has_factor(first + 1));
+  EXPECT_FALSE(estimator_->has(5));
+  EXPECT_EQ(estimator_->variable_count(), 12);
+  estimator_->update({}, {.max_seconds = 1e-9});
+  EXPECT_TRUE(estimator_->update({}, {.full = true}).ok);
+  if (is_filter()) return;
+  const DenseSystem system = dense_system(estimator_->graph());
+  EXPECT_LT(system.g.dot(system.H.ldlt().solve(system.g)), 1e-9);
 }
 
 TEST_P(EveryEstimator, AFixedVariableStays) {
@@ -391,7 +465,12 @@ TEST_P(EveryEstimator, ReadingChangesNoLaterResult) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Registered, EveryEstimator, testing::ValuesIn(every_estimator()),
-                         [](const auto& named) { return named.param; });
+                         [](const auto& named) {
+                           std::string name = named.param;
+                           std::ranges::replace_if(
+                               name, [](unsigned char c) { return std::isalnum(c) == 0; }, '_');
+                           return name;
+                         });
 GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(EveryEstimator);
 
 }  // namespace
