@@ -11,6 +11,7 @@ from .pages import latex, put_into
 from .program import TINY, Cairn, Failed
 from .reports import Json, items, member, number, text
 from .studies import ALL
+from .studies.minimum import Peer
 from .study import Bench, Study, tell
 
 
@@ -39,7 +40,7 @@ def finite(value: Json) -> Json:
 
 def measure(arguments: argparse.Namespace) -> None:
     bench = Bench(Cairn(arguments.cairn, arguments.folder / "work"), arguments.data, arguments.quick, arguments.ours,
-                  arguments.rounds or (2 if arguments.quick else 5))
+                  arguments.rounds or (2 if arguments.quick else 5), arguments.peer)
     # Machine and build, as the program that is measured reports them.
     tiny = bench.cairn.optimize(TINY, ["--linear-solver", bench.ours]).required().report
     for study in ALL:
@@ -91,6 +92,8 @@ def parse(words: list[str]) -> argparse.Namespace:
     parser.add_argument("--ours", default="block_cholesky", metavar="SPEC",
                         help="cairn's own linear solver, with options [block_cholesky]")
     parser.add_argument("--rounds", type=int, metavar="N", help="of each comparison [5, quick 2]")
+    parser.add_argument("--peer", action="append", default=[], metavar="NAME=COMMAND",
+                        help="minimum: another program, which is called with a g2o file and reports as cairn does")
     parser.add_argument("--quick", action="store_true", help="few and small graphs: shows that it works, no more")
     parser.add_argument("--check", action="store_true", help="only look at the arguments")
     parser.add_argument("--tables", type=Path, nargs="+", metavar="PAGE", help="do not measure: fill in the tables of these")
@@ -105,6 +108,11 @@ def parse(words: list[str]) -> argparse.Namespace:
         parser.error(f"--data {arguments.data}: there is no such folder")
     if not arguments.tables and not arguments.cairn and not arguments.check:
         parser.error("--cairn PROGRAM is needed to measure")
+    for given in arguments.peer:
+        try:
+            Peer.of(given)
+        except ValueError as error:
+            parser.error(f"--peer: {error}")
     if arguments.rounds is not None and not 1 <= arguments.rounds <= 1000:
         parser.error("--rounds must be from 1 to 1000")
     return arguments

@@ -107,6 +107,19 @@ def sets_of(study: str, data: Path | None, quick: bool) -> list[DataSet]:
     return located((_OPTIMIZED[name] for name in _CHOSEN[study][quick]), data)
 
 
+def pose_graphs(data: Path | None, quick: bool) -> list[DataSet]:
+    """Every pose graph of the folders pose2d and pose3d of `data`, and generated ones; in space with g2o's residual, which all
+    programs have."""
+    small_space = DataSet("sphere, 200 poses", "@sphere:turns=10,poses_per_turn=20,radius=20", LIKE_G2O)
+    if quick:
+        return [SMALL_PLANE, small_space]
+    def published(folder: str, arguments: list[str]) -> list[DataSet]:
+        files = sorted((data / folder).iterdir(), key=lambda file: file.name.lower()) if data and (data / folder).is_dir() else []
+        return [DataSet(file.name.removesuffix(".gz"), str(file), ["--repair-information", *arguments]) for file in files]
+    space = [replace(_OPTIMIZED[name], arguments=LIKE_G2O) for name in ["sphere", "torus", "grid3d 12³"]]
+    return [*published("pose2d", []), *published("pose3d", LIKE_G2O), PLANE, _OPTIMIZED["city"], *space]
+
+
 # `cairn replay` has other initial guesses than `cairn optimize`.
 _REPLAYED = [
     DataSet("manhattanOlson3500", "pose2d/manhattanOlson3500.g2o"),

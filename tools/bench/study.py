@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from .data_sets import DataSet
@@ -22,6 +22,7 @@ class Bench:
     quick: bool = False
     ours: str = "block_cholesky"  # cairn's own linear solver, with options
     rounds: int = 5
+    peers: list[str] = field(default_factory=list)  # of the study minimum: NAME=COMMAND
 
     @property
     def rounds_of_runs(self) -> int:
