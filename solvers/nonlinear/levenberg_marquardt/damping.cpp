@@ -2,16 +2,39 @@
 #include "damping.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <utility>
 
 namespace cairn {
+namespace {
+
+/// A gain ratio this close to 1 shows that damping is not what the step needs.
+constexpr double kAsPredicted = 0.06;
+/// The least factor of λ after one step.
+constexpr double kLeastFactor = 1e-6;
+
+}  // namespace
 
 void Damping::ease(double gain_ratio) {
   const double x = 2.0 * gain_ratio - 1.0;
-  lambda_ = std::clamp(lambda_ * std::max(1.0 / 3.0, 1.0 - x * x * x), smallest_, largest_);
+  const double factor = std::max(1.0 / 3.0, 1.0 - x * x * x);
+  if (std::abs(gain_ratio - 1.0) < kAsPredicted) {
+    lambda_ *= std::max(std::pow(factor, ease_), kLeastFactor);
+    ease_ = std::min(2.0 * ease_, 1e3);
+  } else {
+    lambda_ *= factor;
+    ease_ = 1.0;
+  }
+  lambda_ = std::clamp(lambda_, smallest_, largest_);
   growth_ = 2.0;
 }
 
 void Damping::raise() {
+  ease_ = 1.0;
+  if (std::exchange(never_failed_, false) && lambda_ < after_first_failure_) {
+    lambda_ = std::min(after_first_failure_, largest_);
+    return;
+  }
   lambda_ = std::clamp(lambda_ * growth_, smallest_, largest_);
   growth_ *= 2.0;
 }

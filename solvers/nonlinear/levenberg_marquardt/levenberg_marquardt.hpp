@@ -12,10 +12,10 @@ namespace cairn {
 
 struct LevenbergMarquardtOptions {
   std::string linear_solver = "block_cholesky";  ///< of the normal equations
-  /// Damping of the first step, relative to the diagonal of H. 0: 1e-6, or 1e-4 where the gauge is
-  /// left free: there damping alone makes H regular, and such problems (cameras and points) are so
-  /// far from linear that a first step with less may throw points behind their cameras, into
-  /// another minimum.
+  /// Damping of the first step, relative to the diagonal of H. 0: 1e-10, and at least 1e-6 after
+  /// the first step that is not taken; or 1e-4 where the gauge is left free: there damping alone
+  /// makes H regular, and such problems (cameras and points) are so far from linear that a first
+  /// step with less may throw points behind their cameras, into another minimum.
   double initial_lambda = 0.0;
   double largest_lambda = 1e16;      ///< where the run gives up
   double smallest_diagonal = 1e-12;  ///< D is at least this share of its largest entry of a unit
@@ -25,9 +25,10 @@ struct LevenbergMarquardtOptions {
     using O = LevenbergMarquardtOptions;
     return OptionFields<O>()
         .component<LinearSolver>("linear_solver", &O::linear_solver, "solves the normal equations")
-        .real("initial_lambda", &O::initial_lambda, 0.0, 1e16,
-              "damping of the first step, as a fraction of the diagonal of H; 0: 1e-6, or 1e-4 "
-              "where the gauge is left free")
+        .real(
+            "initial_lambda", &O::initial_lambda, 0.0, 1e16,
+            "damping of the first step, as a fraction of the diagonal of H; 0: 1e-10, and at least "
+            "1e-6 after the first failure, or 1e-4 where the gauge is left free")
         .real("largest_lambda", &O::largest_lambda, 1.0, 1e30, "damping at which the run gives up")
         .real("smallest_diagonal", &O::smallest_diagonal, 0.0, 1.0,
               "lower bound of the diagonal of H in the damping, as a fraction of its largest entry "
@@ -38,8 +39,9 @@ struct LevenbergMarquardtOptions {
 };
 
 /// Levenberg-Marquardt: (H + λ D) δ = g with D = diag(H) (Marquardt's scaling, which makes λ a pure
-/// number whatever the units) and Nielsen's rule for λ. A step is taken only if it lowers chi2; one
-/// that is not costs a factorisation but no linearisation. Convergence is judged on undamped steps
+/// number whatever the units) and Nielsen's rule for λ, with two additions (`Damping`). A step is
+/// taken only if it lowers chi2; one that is not costs a factorisation but no linearisation.
+/// Convergence is judged on undamped steps
 /// (`Endgame`), so that heavy damping is not mistaken for convergence. With Stop.tolerance = 0 it
 /// makes exactly the number of trial steps asked for, all of them damped.
 class LevenbergMarquardt final : public Optimizer {
