@@ -22,25 +22,31 @@ std::size_t word_at(int words_per_row, int row, int word) {
 
 std::uint64_t bit_of(int x) { return std::uint64_t{1} << (static_cast<unsigned>(x) % kWordBits); }
 
-/// Where a ray crosses the borders of cells along one axis, in cells from its start. The borders
-/// are computed as `RayCaster` does, so that both enter the same cells.
+/// Where a ray crosses the borders of cells along one axis, in cells from its start, once it is in
+/// a cell. The borders are computed as `RayCaster` does, so that both enter the same cells.
 struct Crossings {
-  Crossings(double from, double direction)
-      : cell(static_cast<int>(std::floor(from))),
+  Crossings(double from, double direction, int cell_)
+      : cell(cell_),
         step(direction < 0.0 ? -1 : 1),
-        border(direction > 0.0 ? std::floor(from) + 1.0 : std::floor(from)),
+        border(direction > 0.0 ? cell + 1.0 : cell),
         inverse(1.0 / direction),
-        start(from),
-        next(direction == 0.0 ? std::numeric_limits<double>::infinity()
-                              : (border - from) * inverse) {}
-  void advance() {
-    cell += step;
-    border += step;
-    next = (border - start) * inverse;
+        start(from) {
+    if (direction != 0.0) return;
+    // None, however often it is asked.
+    step = 0;
+    border = 1.0;
+    start = 0.0;
+    inverse = std::numeric_limits<double>::infinity();
+  }
+  double next() const { return (border - start) * inverse; }
+  /// By 1 step or none, without a branch: which axis is next can't be foretold.
+  void advance(int steps) {
+    cell += step * steps;
+    border += step * steps;
   }
 
   int cell, step;
-  double border, inverse, start, next;
+  double border, inverse, start;
 };
 
 }  // namespace
@@ -79,7 +85,7 @@ void CellSet::add(const CellWindow& window) {
 }
 
 SeenCells::SeenCells(const FloorMap& map, const LidarModel& lidar, double range)
-    : range_(range / map.frame.resolution) {
+    : reach_(range), range_(range / map.frame.resolution) {
   const int margin = static_cast<int>(std::ceil(range_)) + 1;
   frame_ = map.frame;
   frame_.width += 2 * margin;
@@ -89,14 +95,17 @@ SeenCells::SeenCells(const FloorMap& map, const LidarModel& lidar, double range)
   const auto size = static_cast<std::size_t>(frame_.height) * static_cast<std::size_t>(words_);
   unknown_.assign(size, ~std::uint64_t{0});
   obstacles_.assign(size, 0);
+  OccupancyGrid floor{frame_, std::vector<std::int8_t>(frame_.size(), kUnknownCell)};
   for (int y = 0; y < map.frame.height; ++y) {
     for (int x = 0; x < map.frame.width; ++x) {
       const CellState state = map.cells[map.frame.index(x, y)];
       const std::size_t at = word_at(words_, y + margin, (x + margin) / kWordBits);
       if (state != CellState::unknown) unknown_[at] &= ~bit_of(x + margin);
       if (state == CellState::occupied) obstacles_[at] |= bit_of(x + margin);
+      if (state == CellState::free) floor.occupancy[frame_.index(x + margin, y + margin)] = 0;
     }
   }
+  floor_.emplace(floor);
   beams_ = beam_directions(lidar);
   find_viewpoints();
 }
@@ -159,7 +168,8 @@ CellWindow SeenCells::look(std::span<const Pose2> poses) const {
   };
   if (std::ranges::all_of(poses, sees_nothing)) return {};
   CellWindow seen = window_around(poses);
-  for (const Pose2& pose : poses) cast(pose, seen);
+  std::vector<RayHit> hits(beams_.size());
+  for (const Pose2& pose : poses) cast(pose, hits, seen);
   if (std::ranges::all_of(seen.bits, [](std::uint64_t word) { return word == 0; })) return {};
   return seen;
 }
@@ -175,15 +185,15 @@ CellWindow SeenCells::window_around(std::span<const Pose2> poses) const {
     return static_cast<int>(std::clamp(std::floor(value), 0.0, size - 1.0));
   };
   CellWindow window;
-  window.first_row = within(low.y() - range_, frame_.height);
+  window.first_row = within(low.y() - range_ - 1.0, frame_.height);
   window.rows = within(high.y() + range_, frame_.height) - window.first_row + 1;
-  window.first_word = within(low.x() - range_, frame_.width) / kWordBits;
+  window.first_word = within(low.x() - range_ - 1.0, frame_.width) / kWordBits;
   window.words = within(high.x() + range_, frame_.width) / kWordBits - window.first_word + 1;
   window.bits.assign(word_at(window.words, window.rows, 0), 0);
   return window;
 }
 
-void SeenCells::cast(const Pose2& at, CellWindow& seen) const {
+void SeenCells::cast(const Pose2& at, std::span<RayHit> hits, CellWindow& seen) const {
   const Vector2d from = frame_.to_cells(at.translation());
   const bool on_map = from.x() > range_ && from.y() > range_ && from.x() < frame_.width - range_ &&
                       from.y() < frame_.height - range_;
@@ -191,10 +201,19 @@ void SeenCells::cast(const Pose2& at, CellWindow& seen) const {
   const int start_x = static_cast<int>(from.x()), start_y = static_cast<int>(from.y());
   const std::size_t start = word_at(words_, start_y, start_x / kWordBits);
   if ((viewpoints_[start] & bit_of(start_x)) == 0) return;
-  const double turn = at.theta() - frame_.yaw, c = std::cos(turn), s = std::sin(turn);
-  for (const Vector2d& beam : beams_) {
-    Crossings along_x(from.x(), c * beam.x() - s * beam.y());
-    Crossings along_y(from.y(), s * beam.x() + c * beam.y());
+  floor_->cast(at.translation(), at.theta(), beams_, reach_, hits);
+  mark(from, at.theta() - frame_.yaw, hits, seen);
+}
+
+/// The unknown ones of the cells that the beams enter, each from the cell on where it has hit.
+void SeenCells::mark(const Vector2d& from, double turn, std::span<const RayHit> hits,
+                     CellWindow& seen) const {
+  const double c = std::cos(turn), s = std::sin(turn);
+  for (std::size_t k = 0; k < beams_.size(); ++k) {
+    if (!hits[k].hit) continue;
+    const Vector2d& beam = beams_[k];
+    Crossings along_x(from.x(), c * beam.x() - s * beam.y(), hits[k].x);
+    Crossings along_y(from.y(), s * beam.x() + c * beam.y(), hits[k].y);
     while (true) {
       const int x = along_x.cell, y = along_y.cell;
       const std::size_t word = word_at(words_, y, x / kWordBits);
@@ -202,9 +221,11 @@ void SeenCells::cast(const Pose2& at, CellWindow& seen) const {
       if ((obstacles_[word] & bit) != 0) break;
       seen.bits[word_at(seen.words, y - seen.first_row, x / kWordBits - seen.first_word)] |=
           unknown_[word] & bit;
-      const bool crosses_x = along_x.next <= along_y.next;
-      if (!((crosses_x ? along_x.next : along_y.next) <= range_)) break;
-      (crosses_x ? along_x : along_y).advance();
+      const double next_x = along_x.next(), next_y = along_y.next();
+      const int crosses_x = next_x <= next_y ? 1 : 0;
+      if (!(std::min(next_x, next_y) <= range_)) break;
+      along_x.advance(crosses_x);
+      along_y.advance(1 - crosses_x);
     }
   }
 }

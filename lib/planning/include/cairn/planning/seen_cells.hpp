@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -11,6 +12,7 @@
 #include "cairn/exploration/floor_map.hpp"
 #include "cairn/exploration/laser_scan.hpp"
 #include "cairn/grid/grid.hpp"
+#include "cairn/grid/ray_caster.hpp"
 #include "cairn/runtime/api.hpp"
 #include "cairn/typed/pose2.hpp"
 
@@ -52,7 +54,9 @@ class CAIRN_API CellSet {
 /// range that is simulated. That range is between caution and the sensor's own.
 ///
 /// Beams are those of the lidar model, and cells those of exact traversal, so that where the floor
-/// is as expected a scan discovers these and no others. Cells beyond the map are unknown.
+/// is as expected a scan discovers these and no others. Cells beyond the map are unknown. Over
+/// known floor beams are followed by `RayCaster`; from the first unknown cell on they go cell by
+/// cell.
 ///
 ///     SeenCells seen(map, robot.lidar, 4.0);
 ///     CellSet path = seen.none();
@@ -79,16 +83,20 @@ class CAIRN_API SeenCells {
 
  private:
   void find_viewpoints();
-  void cast(const Pose2& at, CellWindow& seen) const;
+  void cast(const Pose2& at, std::span<RayHit> hits, CellWindow& seen) const;
+  void mark(const Eigen::Vector2d& from, double turn, std::span<const RayHit> hits,
+            CellWindow& seen) const;
   CellWindow window_around(std::span<const Pose2> poses) const;
 
   GridFrame frame_;
   int words_ = 0;                                   ///< per row
-  double range_ = 0.0;                              ///< [cells]
+  double reach_ = 0.0;                              ///< the range [m]
+  double range_ = 0.0;                              ///< the same in cells
   std::vector<std::uint64_t> unknown_, obstacles_;  ///< bits by cell
   /// Cells from which an unknown one may be seen, by the number of cells on the way; bits by cell.
   std::vector<std::uint64_t> viewpoints_;
   std::vector<Eigen::Vector2d> beams_;  ///< directions in the robot's frame
+  std::optional<RayCaster> floor_;      ///< what is known to be free
 };
 
 }  // namespace cairn
