@@ -12,13 +12,15 @@ namespace {
 constexpr double kAsPredicted = 0.06;
 /// The least factor of λ after one step.
 constexpr double kLeastFactor = 1e-6;
+/// λ after the first failure.
+constexpr double kModest = 1e-6;
 
 }  // namespace
 
 void Damping::ease(double gain_ratio) {
   const double x = 2.0 * gain_ratio - 1.0;
   const double factor = std::max(1.0 / 3.0, 1.0 - x * x * x);
-  if (std::abs(gain_ratio - 1.0) < kAsPredicted) {
+  if (hopeful_ && std::abs(gain_ratio - 1.0) < kAsPredicted) {
     lambda_ *= std::max(std::pow(factor, ease_), kLeastFactor);
     ease_ = std::min(2.0 * ease_, 1e3);
   } else {
@@ -31,8 +33,8 @@ void Damping::ease(double gain_ratio) {
 
 void Damping::raise() {
   ease_ = 1.0;
-  if (std::exchange(never_failed_, false) && lambda_ < after_first_failure_) {
-    lambda_ = std::min(after_first_failure_, largest_);
+  if (std::exchange(never_failed_, false) && hopeful_ && lambda_ < kModest) {
+    lambda_ = std::min(kModest, largest_);
     return;
   }
   lambda_ = std::clamp(lambda_ * growth_, smallest_, largest_);

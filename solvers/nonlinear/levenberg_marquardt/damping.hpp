@@ -9,18 +9,15 @@ namespace cairn {
 /// decrease of chi2) / (predicted decrease) by the rule of Nielsen (1999): λ ← λ max(1/3, 1 − (2ρ −
 /// 1)³) after a step that is taken, λ ← λν with ν = 2, 4, 8, … after steps that are not.
 ///
-/// Two additions save iterations on graphs of poses. While steps in a row gain what was predicted
-/// (|ρ − 1| < 0.06), the factor is squared from one to the next, so that a λ that was needed once
-/// is gone after a few. And λ may start so small that a first step is all but undamped: after the
-/// first step that is not taken it is at least `after_first_failure`, instead of climbing there by
-/// one failed step after the other.
+/// `hopeful` adds two things, which save iterations where H is regular without damping. While steps
+/// in a row gain what was predicted (|ρ − 1| < 0.06), the factor is squared from one to the next,
+/// so that a λ that was needed once is gone after a few. And λ may begin so small that a first step
+/// is all but undamped: after the first step that is not taken it is at least 1e-6, instead of
+/// climbing there by one failed step after the other.
 class Damping {
  public:
-  Damping(double initial, double after_first_failure, double smallest, double largest)
-      : lambda_(initial),
-        after_first_failure_(after_first_failure),
-        smallest_(smallest),
-        largest_(largest) {}
+  Damping(double initial, double smallest, double largest, bool hopeful)
+      : lambda_(initial), smallest_(smallest), largest_(largest), hopeful_(hopeful) {}
 
   double lambda() const { return lambda_; }
   bool at_limit() const { return lambda_ >= largest_; }
@@ -29,9 +26,9 @@ class Damping {
 
  private:
   double lambda_;
-  double after_first_failure_;
   double smallest_;
   double largest_;
+  bool hopeful_;
   double growth_ = 2.0;
   double ease_ = 1.0;  // power of the factor
   bool never_failed_ = true;

@@ -24,11 +24,6 @@ double initial_lambda(const LevenbergMarquardtOptions& options, const Gauge& gau
   return gauge.left_free.empty() ? 1e-10 : 1e-4;
 }
 
-/// Of λ, after the first step that is not taken.
-double after_first_failure(const LevenbergMarquardtOptions& options) {
-  return options.initial_lambda > 0.0 ? 0.0 : 1e-6;
-}
-
 /// Undamped steps need an H that is not singular.
 bool may_go_undamped(const LevenbergMarquardtOptions& options, const Gauge& gauge) {
   return options.endgame && gauge.left_free.empty();
@@ -40,8 +35,8 @@ class Run {
   Run(Descent& descent, const LevenbergMarquardtOptions& options)
       : run_(descent),
         equations_(descent.equations()),
-        damping_(initial_lambda(options, equations_.gauge()), after_first_failure(options), 1e-20,
-                 options.largest_lambda),
+        damping_(initial_lambda(options, equations_.gauge()), 1e-20, options.largest_lambda,
+                 equations_.gauge().left_free.empty()),
         may_go_undamped_(may_go_undamped(options, equations_.gauge())),
         endgame_(may_go_undamped_ ? std::sqrt(descent.stop().tolerance) : 0.0),
         convergence_(descent.stop().tolerance),

@@ -25,10 +25,9 @@ struct LevenbergMarquardtOptions {
     using O = LevenbergMarquardtOptions;
     return OptionFields<O>()
         .component<LinearSolver>("linear_solver", &O::linear_solver, "solves the normal equations")
-        .real(
-            "initial_lambda", &O::initial_lambda, 0.0, 1e16,
-            "damping of the first step, as a fraction of the diagonal of H; 0: 1e-10, and at least "
-            "1e-6 after the first failure, or 1e-4 where the gauge is left free")
+        .real("initial_lambda", &O::initial_lambda, 0.0, 1e16,
+              "damping of the first step, as a fraction of the diagonal of H; 0: 1e-10, or 1e-4 "
+              "where the gauge is left free")
         .real("largest_lambda", &O::largest_lambda, 1.0, 1e30, "damping at which the run gives up")
         .real("smallest_diagonal", &O::smallest_diagonal, 0.0, 1.0,
               "lower bound of the diagonal of H in the damping, as a fraction of its largest entry "
@@ -41,9 +40,9 @@ struct LevenbergMarquardtOptions {
 /// Levenberg-Marquardt: (H + λ D) δ = g with D = diag(H) (Marquardt's scaling, which makes λ a pure
 /// number whatever the units) and Nielsen's rule for λ, with two additions (`Damping`). A step is
 /// taken only if it lowers chi2; one that is not costs a factorisation but no linearisation.
-/// Convergence is judged on undamped steps
-/// (`Endgame`), so that heavy damping is not mistaken for convergence. With Stop.tolerance = 0 it
-/// makes exactly the number of trial steps asked for, all of them damped.
+/// Convergence is judged on undamped steps (`Endgame`), so that heavy damping is not mistaken for
+/// convergence. With Stop.tolerance = 0 it makes exactly the number of trial steps asked for, all
+/// of them damped.
 class LevenbergMarquardt final : public Optimizer {
  public:
   LevenbergMarquardt(std::unique_ptr<LinearSolver> solver, LevenbergMarquardtOptions options);

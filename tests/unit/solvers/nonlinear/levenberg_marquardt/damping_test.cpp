@@ -11,7 +11,7 @@ namespace {
 constexpr double kSmallest = 1e-20, kLargest = 1e16;
 
 TEST(Damping, FollowsNielsensRuleBetweenStepsThatGainSomethingElse) {
-  Damping damping(1.0, 0.0, kSmallest, kLargest);
+  Damping damping(1.0, kSmallest, kLargest, true);
   damping.ease(0.5);  // 1 − 0³
   EXPECT_DOUBLE_EQ(damping.lambda(), 1.0);
   damping.ease(0.75);  // 1 − ½³
@@ -23,7 +23,7 @@ TEST(Damping, FollowsNielsensRuleBetweenStepsThatGainSomethingElse) {
 }
 
 TEST(Damping, GrowsFasterWithEachFailureInARow) {
-  Damping damping(1e-3, 0.0, kSmallest, kLargest);
+  Damping damping(1e-3, kSmallest, kLargest, true);
   for (const double expected : {2e-3, 8e-3, 64e-3}) {
     damping.raise();
     EXPECT_DOUBLE_EQ(damping.lambda(), expected);
@@ -34,7 +34,7 @@ TEST(Damping, GrowsFasterWithEachFailureInARow) {
 }
 
 TEST(Damping, FallsFasterWithEachStepInARowThatGainsWhatWasPredicted) {
-  Damping damping(1.0, 0.0, kSmallest, kLargest);
+  Damping damping(1.0, kSmallest, kLargest, true);
   for (const double expected : {1.0 / 3.0, 1.0 / 27.0, 1.0 / 2187.0}) {
     damping.ease(1.0);
     EXPECT_NEAR(damping.lambda(), expected, 1e-15);
@@ -49,7 +49,7 @@ TEST(Damping, FallsFasterWithEachStepInARowThatGainsWhatWasPredicted) {
 }
 
 TEST(Damping, FallsByAMillionAtMostAndNotBelowItsLimit) {
-  Damping damping(1.0, 0.0, kSmallest, kLargest);
+  Damping damping(1.0, kSmallest, kLargest, true);
   double before = 1.0;
   for (int k = 0; k < 100; ++k) {
     damping.ease(1.0);
@@ -60,7 +60,7 @@ TEST(Damping, FallsByAMillionAtMostAndNotBelowItsLimit) {
 }
 
 TEST(Damping, TheFirstFailureEndsAnOptimisticStart) {
-  Damping damping(1e-10, 1e-6, kSmallest, kLargest);
+  Damping damping(1e-10, kSmallest, kLargest, true);
   damping.ease(0.9);
   damping.raise();
   EXPECT_EQ(damping.lambda(), 1e-6);
@@ -74,13 +74,22 @@ TEST(Damping, TheFirstFailureEndsAnOptimisticStart) {
 }
 
 TEST(Damping, TheFirstFailureOfAHeavyDampingRaisesIt) {
-  Damping damping(1e-3, 1e-6, kSmallest, kLargest);
+  Damping damping(1e-3, kSmallest, kLargest, true);
   damping.raise();
   EXPECT_DOUBLE_EQ(damping.lambda(), 2e-3);
 }
 
+TEST(Damping, FollowsNielsensRuleAloneWhereHNeedsDamping) {
+  Damping damping(1e-10, kSmallest, kLargest, false);
+  damping.raise();
+  EXPECT_DOUBLE_EQ(damping.lambda(), 2e-10);
+  damping.ease(1.0);
+  damping.ease(1.0);
+  EXPECT_DOUBLE_EQ(damping.lambda(), 2e-10 / 9.0);
+}
+
 TEST(Damping, EndsAtItsLargest) {
-  Damping damping(1e-10, 1e-6, kSmallest, 1e-7);
+  Damping damping(1e-10, kSmallest, 1e-7, true);
   EXPECT_FALSE(damping.at_limit());
   damping.raise();
   EXPECT_TRUE(damping.at_limit());
