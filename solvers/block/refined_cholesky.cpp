@@ -37,7 +37,7 @@ void RefinedCholesky::analyze(const BlockStructure& structure, std::string_view 
   if (precision_ == Precision::in_double) return;
   H_ = BlockMatrix(structure);
   const auto size = static_cast<std::size_t>(structure.size());
-  for (std::vector<double>* numbers : {&d_, &inverse_d_, &x_, &r_, &z_, &p_, &q_})
+  for (std::vector<double>* numbers : {&d_, &inverse_d_, &g_, &x_, &r_, &z_, &p_, &q_})
     numbers->assign(size, 0.0);
 }
 
@@ -81,8 +81,15 @@ void RefinedCholesky::require_double() {
 void RefinedCholesky::solve(std::span<const double> g, std::span<double> x) {
   if (is_single_) {
     ++solutions_;
-    if (refine(g)) {
-      std::ranges::copy(x_, x.begin());
+    // By a power of two: products of tiny residuals would vanish, those of huge ones overflow.
+    double largest = 0.0;
+    for (const double value : g) largest = std::max(largest, std::abs(value));
+    const int exponent =
+        largest > 0.0 && std::isfinite(largest) ? std::clamp(std::ilogb(largest), -1000, 1000) : 0;
+    const double down = std::ldexp(1.0, -exponent), up = std::ldexp(1.0, exponent);
+    for (std::size_t k = 0; k < g_.size(); ++k) g_[k] = g[k] * down;
+    if (refine()) {
+      for (std::size_t k = 0; k < x_.size(); ++k) x[k] = x_[k] * up;
       return;
     }
     if (!fall_back("ten steps of refinement were not enough").ok) {
@@ -93,16 +100,16 @@ void RefinedCholesky::solve(std::span<const double> g, std::span<double> x) {
   cholesky_.solve(g, x);
 }
 
-bool RefinedCholesky::refine(std::span<const double> g) {
+bool RefinedCholesky::refine() {
   std::ranges::fill(x_, 0.0);
-  std::ranges::copy(g, r_.begin());
+  std::ranges::copy(g_, r_.begin());
   scaled_g_ = 0.0;
   for (std::size_t k = 0; k < r_.size(); ++k)
-    scaled_g_ = std::max(scaled_g_, std::abs(g[k]) * inverse_d_[k]);
+    scaled_g_ = std::max(scaled_g_, std::abs(g_[k]) * inverse_d_[k]);
   for (int start = 0; start < kMostStarts; ++start) {
     if (!take_steps()) return false;
     H_.multiply(x_, r_);
-    for (std::size_t k = 0; k < r_.size(); ++k) r_[k] = g[k] - r_[k];
+    for (std::size_t k = 0; k < r_.size(); ++k) r_[k] = g_[k] - r_[k];
     if (is_accurate()) return true;
   }
   return false;

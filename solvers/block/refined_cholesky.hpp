@@ -71,8 +71,8 @@ class RefinedCholesky {
   std::string description() const;
 
  private:
-  /// A solution, or something else if the steps do not lead to one: then false.
-  bool refine(std::span<const double> g);
+  /// x_ = H⁻¹ g_, or something else if the steps do not lead there: then false.
+  bool refine();
   bool take_steps();
   void precondition();
   bool is_accurate() const;  // by r_
@@ -88,6 +88,7 @@ class RefinedCholesky {
   BlockMatrix H_;                      // as it was factored: the caller's may have changed since
   std::vector<double> d_, inverse_d_;  // √H_ii and 1 / √H_ii
   double scaled_g_ = 0.0;              // max |g|_i / d_i
+  std::vector<double> g_;              // scaled
   std::vector<double> x_, r_, z_, p_, q_;
 };
 

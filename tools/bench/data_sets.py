@@ -91,6 +91,10 @@ _CHOSEN = {
                ["manhattanOlson3500", "intel1728", "parking-garage", "sphere"]),
     "rates": (["manhattanOlson3500", "sphere2500", "torus3D", "torus10000", "manhattan", "sphere", "torus", "grid3d 20³"],
               ["manhattanOlson3500", "sphere2500", "manhattan"]),
+    "precision": (["manhattanOlson3500", "city10000", "intel1728", "killian5489", "kitti_00", "sphere2500", "sphere2500a",
+                   "torus3D", "torus10000", "parking-garage", "cubicle", "sphere_bignoise", "Victoria Park",
+                   "cityTrees10000", "manhattan", "grid3d 12³", "grid3d 20³"],
+                  ["intel1728", "parking-garage", "sphere2500"]),
     "threads": (["manhattanOlson3500", "torus3D", "torus10000", "manhattan", "torus", "grid3d 20³"],
                 ["manhattanOlson3500", "torus"]),
     "marginals": (["manhattanOlson3500", "intel1728", "city10000", "kitti_00", "sphere2500", "torus3D", "torus10000",
@@ -103,7 +107,7 @@ _CHOSEN = {
 
 
 def sets_of(study: str, data: Path | None, quick: bool) -> list[DataSet]:
-    """The graphs of "graphs", "rates", "threads", "marginals" or "solvers"."""
+    """The graphs of "graphs", "rates", "precision", "threads", "marginals" or "solvers"."""
     return located((_OPTIMIZED[name] for name in _CHOSEN[study][quick]), data)
 
 

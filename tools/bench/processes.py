@@ -24,6 +24,7 @@ class Outcome:
     peak_memory: float  # resident [bytes]
     output: str
     complaint: str  # the last line of standard error
+    processor: float = 0.0  # time of all threads, in user mode and in the system [s]
 
 
 def allowed_memory() -> float:
@@ -73,4 +74,4 @@ def run_program(words: list[str], work: Path, limit: float = 0.0) -> Outcome:
     lines = error.read_text(encoding="utf-8", errors="replace").rstrip("\n").split("\n")
     return Outcome(in_time=in_time, exit_code=os.waitstatus_to_exitcode(status), seconds=time.monotonic() - begin,
                    peak_memory=1024.0 * usage.ru_maxrss, output=out.read_text(encoding="utf-8", errors="replace"),
-                   complaint=lines[-1])
+                   complaint=lines[-1], processor=usage.ru_utime + usage.ru_stime)

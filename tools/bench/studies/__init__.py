@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..study import Study
-from . import compact, explore, graphs, marginals, minimum, online, rates, scaling, solvers, sparsify
+from . import compact, explore, graphs, marginals, minimum, online, precision, rates, scaling, solvers, sparsify
 
-ALL: list[Study] = [*graphs.STUDIES, *rates.STUDIES, *scaling.STUDIES, *solvers.STUDIES, *minimum.STUDIES, *marginals.STUDIES,
-                    *online.STUDIES, *compact.STUDIES, *sparsify.STUDIES, *explore.STUDIES]
+ALL: list[Study] = [*graphs.STUDIES, *rates.STUDIES, *precision.STUDIES, *scaling.STUDIES, *solvers.STUDIES, *minimum.STUDIES,
+                    *marginals.STUDIES, *online.STUDIES, *compact.STUDIES, *sparsify.STUDIES, *explore.STUDIES]
