@@ -94,7 +94,7 @@ void InformationForm::multiply_covariance(std::span<const double> g, std::span<d
   if (factorize() && !x.empty()) cholesky_->solve(g, x);
 }
 
-std::int64_t InformationForm::memory() const { return cholesky_ ? 8 * cholesky_->doubles() : 0; }
+std::int64_t InformationForm::memory() const { return cholesky_ ? 8 * cholesky_->numbers() : 0; }
 
 void InformationForm::changed(bool blocks) {
   factorized_ = false;
