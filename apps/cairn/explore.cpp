@@ -414,8 +414,9 @@ Command add_explore(ArgumentParser program) {
       .type_name("N")
       .show_default();
   cli.add_option("--world", options->world,
-                 "the robot; its options: cairn plugins lidar_building; log:file=robot.clf is one "
-                 "that was recorded, and goes where it went, without a FLOOR")
+                 "the robot; its options: cairn plugins lidar_building, motion=holonomic or "
+                 "motion=dubins for instance; log:file=robot.clf is one that was recorded, and "
+                 "goes where it went, without a FLOOR")
       .component({"world"})
       .show_default();
   cli.add_option("--loss", options->loss,

@@ -58,7 +58,9 @@ Decision end_decision(Decision::Kind kind, std::string why) {
 
 bool moves(const Situation& situation, const PlannedPath& path) {
   std::size_t passed = 0;
-  return next_motion(situation.pose, path, situation.robot, passed).has_value();
+  const std::optional<PlannedPath> driven =
+      drivable_path(path, situation.pose, situation.robot, situation.map);
+  return driven && next_motion(situation.pose, *driven, situation.robot, passed).has_value();
 }
 
 void EdeGoals::begin() {

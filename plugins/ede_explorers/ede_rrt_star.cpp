@@ -88,6 +88,8 @@ bool EdeRrtStar::drive(const Situation& situation, bool tight, const DecisionTim
     std::vector<std::size_t> configurations;
     for (const Goal& goal : goals) {
       std::optional<PlannedPath> path = path_to(at, goal.configuration);
+      if (path)
+        path = drivable_path(std::move(*path), situation.pose, situation.robot, situation.map);
       if (!path) continue;
       if (!moves(situation, *path)) {
         if (decision.candidates.empty()) there = goal.configuration;

@@ -12,13 +12,17 @@ namespace {
 constexpr double kSameGoal = 1.0;
 
 /// The sentence with which a run without any frontier left ends.
-std::string end_text(const FrontierGoals& goals, double smallest) {
+std::string end_text(const FrontierGoals& goals, const RobotModel& robot, double smallest) {
   if (goals.unreachable() == 0)
     return fmt::format("no frontier of {:g} m or more is left", smallest);
+  const std::string path =
+      robot.motion == MotionModel::dubins
+          ? fmt::format("a curve with a turning radius of {:g} m", robot.turning_radius)
+          : "a path";
   return fmt::format(
-      "no frontier of {:g} m or more is left that can be reached; {} without a path, "
+      "no frontier of {:g} m or more is left that can be reached; {} without {}, "
       "the longest {:.1f} m",
-      smallest, goals.unreachable(), goals.longest_unreachable());
+      smallest, goals.unreachable(), path, goals.longest_unreachable());
 }
 
 }  // namespace
@@ -46,7 +50,7 @@ Decision FrontierExplorer::decide(const Situation& situation) {
   }
   if (decision.candidates.empty()) {
     decision.kind = Decision::Kind::finished;
-    decision.why = end_text(goals_, smallest);
+    decision.why = end_text(goals_, situation.robot, smallest);
     return decision;
   }
   for (Candidate& candidate : decision.candidates) {

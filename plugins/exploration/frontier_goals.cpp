@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -55,7 +56,8 @@ std::optional<PlannedPath> FrontierGoals::path_to(const Pose2& pose) {
   if (!path) return path;
   const Vector2d end = path->points.empty() ? pose.translation() : path->points.back();
   path->look_at = end + Vector2d(std::cos(pose.theta()), std::sin(pose.theta()));
-  if (!moves(*path)) return std::nullopt;
+  path = driven(std::move(*path));
+  if (!path || !moves(*path)) return std::nullopt;
   return path;
 }
 
@@ -76,6 +78,7 @@ std::optional<PlannedPath> FrontierGoals::path_to(const Frontier& frontier) {
 std::optional<PlannedPath> FrontierGoals::path_to(const Vector2d& goal) {
   if (is_given_up(goal)) return std::nullopt;
   std::optional<PlannedPath> path = planner_->path_to(goal, kNear);
+  if (path) path = driven(std::move(*path));
   if (!path || moves(*path)) return path;
   given_up_.push_back({goal, known_around(goal)});
   return std::nullopt;
@@ -89,6 +92,10 @@ bool FrontierGoals::is_there(const FloorMap& map, const Vector2d& middle) {
   return std::ranges::any_of(map.frontiers, [&](const Frontier& frontier) {
     return std::ranges::any_of(frontier.cells, near);
   });
+}
+
+std::optional<PlannedPath> FrontierGoals::driven(PlannedPath path) const {
+  return drivable_path(std::move(path), situation_->pose, situation_->robot, situation_->map);
 }
 
 bool FrontierGoals::moves(const PlannedPath& path) const {

@@ -47,6 +47,8 @@ class FrontierGoals {
   std::optional<PlannedPath> path_to(const Eigen::Vector2d& goal);
   bool is_given_up(const Eigen::Vector2d& goal) const;
   std::size_t known_around(const Eigen::Vector2d& point) const;
+  /// A path as the robot can drive it; none: it can't.
+  std::optional<PlannedPath> driven(PlannedPath path) const;
   bool moves(const PlannedPath& path) const;
 
   std::unique_ptr<PathPlanner> planner_;

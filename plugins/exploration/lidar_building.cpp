@@ -12,6 +12,7 @@
 
 #include "cairn/exploration/random_stream.hpp"
 #include "cairn/exploration/world.hpp"
+#include "cairn/geometry/dubins_curve.hpp"
 #include "cairn/grid/floor_survey.hpp"
 #include "cairn/grid/ray_caster.hpp"
 #include "cairn/plugin/option_fields.hpp"
@@ -25,6 +26,8 @@ namespace {
 using Eigen::Vector2d;
 
 constexpr double kDegree = std::numbers::pi / 180.0;
+/// Turns by less are none [rad].
+constexpr double kStraight = 1e-9;
 
 struct LidarBuildingOptions {
   double fov = 180.0;  // [°]
@@ -32,6 +35,8 @@ struct LidarBuildingOptions {
   double range = 8.0, range_sigma = 0.01, dropouts = 0.0;
   double sigma_xy = 0.01, sigma_theta = 0.005, relative = 0.05;
   double radius = 0.2, step = 0.5, turn = 0.3;
+  MotionModel motion = MotionModel::differential;
+  double turning_radius = 0.5;
   std::string surveyor = "round_body";
 
   static auto fields() {
@@ -48,6 +53,11 @@ struct LidarBuildingOptions {
         .real("radius", &O::radius, 0.01, 10.0, "of the robot's round body [m]")
         .real("step", &O::step, 0.01, 100.0, "farthest that it drives between two scans [m]")
         .real("turn", &O::turn, 0.01, 3.14, "most that it turns between two scans [rad]")
+        .choice("motion", &O::motion,
+                "differential: turns in place, then drives ahead; holonomic: drives in any "
+                "direction at once; dubins: drives ahead along arcs and can't turn in place")
+        .real("turning_radius", &O::turning_radius, 0.01, 100.0,
+              "least one, with motion=dubins [m]")
         .component<FloorSurveyor>("surveyor", &O::surveyor, "finds the start, or checks it");
   }
 };
@@ -67,6 +77,8 @@ class LidarBuilding final : public World {
         model_{.radius = options.radius,
                .step = options.step,
                .turn = options.turn,
+               .motion = options.motion,
+               .turning_radius = options.turning_radius,
                .lidar = {.aperture = options.fov * kDegree,
                          .beams = options.beams,
                          .range = options.range,
@@ -94,8 +106,18 @@ class LidarBuilding final : public World {
 
   WorldStep move(const Pose2& motion) override {
     const Pose2 before = truth_;
-    const double part = free_part(motion.translation());
-    truth_ = before * Pose2(part * motion.x(), part * motion.y(), motion.theta());
+    const std::optional<double> curvature = curvature_of(motion);
+    double part;
+    if (curvature) {
+      const double length = std::abs(motion.theta()) > kStraight ? motion.theta() / *curvature
+                                                                 : motion.translation().norm();
+      const auto along = [&](double of) { return along_arc(*curvature, of * length); };
+      part = free_part(length, [&](double of) { return truth_ * along(of).translation(); });
+      truth_ = part < 1.0 ? before * along(part) : before * motion;
+    } else {
+      part = free_part(motion.translation());
+      truth_ = before * Pose2(part * motion.x(), part * motion.y(), motion.theta());
+    }
     const Pose2 moved = before.between(truth_);
     WorldStep step;
     step.collided = part < 1.0;
@@ -130,16 +152,51 @@ class LidarBuilding final : public World {
     return scan;
   }
 
+  /// Of the arc that a robot which can't turn in place drives; none: the motion is a straight one.
+  std::optional<double> curvature_of(const Pose2& motion) const {
+    if (model_.motion != MotionModel::dubins) return std::nullopt;
+    const double chord = motion.translation().norm(), turn = motion.theta();
+    const bool is_straight = std::abs(motion.y()) <= kStraight * chord;
+    if (is_straight && std::abs(turn) <= kStraight) return std::nullopt;  // ahead or back
+    const double aside = 2.0 * std::atan2(motion.y(), motion.x());
+    const double curvature = chord > 0.0 ? 2.0 * motion.y() / (chord * chord) : 0.0;
+    constexpr double kSlack = 1e-6;
+    if (!(chord > 0.0) || std::abs(aside - turn) > kSlack ||
+        std::abs(curvature) * model_.turning_radius > 1.0 + kSlack) {
+      throw Error(ErrorCode::usage,
+                  fmt::format("world lidar_building: with motion=dubins the robot can't make the "
+                              "motion {}: it drives along arcs of at least {:g} m "
+                              "(turning_radius)",
+                              to_string(motion), model_.turning_radius));
+    }
+    return curvature;
+  }
+
   /// How much of a straight motion the body makes before it touches a cell that is not free.
   double free_part(const Vector2d& motion) const {
     const Vector2d from = floor_.frame.to_cells(truth_.translation());
     const Vector2d apart = floor_.frame.to_cells(truth_ * motion) - from;
+    return free_part_of(apart.norm(), from,
+                        [&](double part) -> Vector2d { return from + apart * part; });
+  }
+
+  /// The same of a motion of this length [m], `at` of which is a point for each part [m].
+  template <class At>
+  double free_part(double length, At&& at) const {
+    return free_part_of(length / floor_.frame.resolution,
+                        floor_.frame.to_cells(truth_.translation()),
+                        [&](double part) -> Vector2d { return floor_.frame.to_cells(at(part)); });
+  }
+
+  /// The same in cells.
+  template <class At>
+  double free_part_of(double length, const Vector2d& from, At&& at) const {
     constexpr double kStride = 0.25;  // [cells]
-    const int strides = std::max(1, static_cast<int>(std::ceil(apart.norm() / kStride)));
+    const int strides = std::max(1, static_cast<int>(std::ceil(length / kStride)));
     // A body that touches something already may move away from it.
     double room = clearance(from);
     for (int k = 1; k <= strides; ++k) {
-      const double next = clearance(from + apart * (double(k) / strides));
+      const double next = clearance(at(double(k) / strides));
       if (next < options_.radius && next < room) return double(k - 1) / strides;
       room = next;
     }

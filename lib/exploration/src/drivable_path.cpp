@@ -365,11 +365,17 @@ std::optional<PlannedPath> drivable_path(PlannedPath path, const Pose2& at, cons
   if (robot.motion != MotionModel::dubins) return path;
   if (path.points.empty()) path.points.emplace_back(at.translation());
   const double needed = needed_along(path, at.translation(), robot, map);
-  // Steering may stray so far from a curve.
-  const Room room(map, needed - 0.5 * map.frame.resolution);
-  if (is_followed(path, at, robot, room)) return path;
+  const auto keeps = [&](const PlannedPath& curve, double clearance) {
+    return is_followed(curve, at, robot, Room(map, clearance));
+  };
+  if (keeps(path, needed)) return path;
   std::optional<PlannedPath> curve = CurveSearch(path, robot, map, needed).from(at);
-  if (curve && !is_followed(*curve, at, robot, room)) return std::nullopt;
+  if (!curve || keeps(*curve, needed)) return curve;
+  // Steering strays from curves: one with room for that is better.
+  const double spare = 0.5 * map.frame.resolution;
+  std::optional<PlannedPath> wider = CurveSearch(path, robot, map, needed + spare).from(at);
+  if (wider && keeps(*wider, needed)) return wider;
+  if (!keeps(*curve, needed - spare)) return std::nullopt;
   return curve;
 }
 
