@@ -579,6 +579,7 @@ void Engine::note_follower(int f) {
     std::vector<double> relative(x(v).size());
     group->inverse(x(*leader).data(), relative.data());
     group->compose(relative.data(), x(v).data(), relative.data());
+    states_.type(v).normalize(relative.data());
     followers_.push_back({v, *leader, std::move(relative)});
   }
 }
@@ -595,6 +596,8 @@ void Engine::place_followers() {
     group.inverse(states_.x(one.variable), motion.data());
     group.compose(one.relative.data(), motion.data(), motion.data());
     group.compose(states_.x(one.leader), motion.data(), motion.data());
+    // Or rounding would multiply from one pose to the next, and from one time to the next.
+    states_.type(one.variable).normalize(motion.data());
     states_.lead(one.variable, motion.data());
     states_.put_frame_here(one.variable);
   }

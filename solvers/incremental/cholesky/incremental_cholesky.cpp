@@ -67,14 +67,14 @@ UpdateReport IncrementalCholesky::update(const GraphUpdate& update, const Update
     replace_poor_states(checked, state_of, losses_.empty() ? Deciding::all : Deciding::first);
   forget_what_was_read();
   UpdateReport report;
-  ++since_solved_;
-  ++since_full_;
   const bool full =
-      options.full || (options_.full_every > 0 && since_full_ >= options_.full_every);
+      options.full || (options_.full_every > 0 && since_full_ + 1 >= options_.full_every);
   if (engine_->busy() && (full || takes_out(checked))) engine_->solve(0.0, report);
   carry_out_or_not_at_all(checked, report);
   report.seconds.linearize += seconds_since(begin);
 
+  ++since_solved_;
+  ++since_full_;
   const double max_seconds = options.max_seconds > 0.0 ? options.max_seconds : options_.budget;
   if (full) {
     engine_->solve_fully(report);

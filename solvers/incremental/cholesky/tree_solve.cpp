@@ -374,6 +374,8 @@ void Tree::follow(std::int32_t variable, std::vector<double>& steps,
 }
 
 void Tree::drop_deferred() {
+  // Zeros of L beyond a node's last row are multiplied with what is here, which must be finite.
+  std::ranges::fill(front_, 0.0);
   for (Node& node : nodes_) {
     if (!std::exchange(node.owes, false)) continue;
     std::ranges::fill(node.owed, 0.0);
