@@ -248,7 +248,8 @@ class Engine : private EngineState {
   void note_follower(int f);
   void place_followers();
   void show_what_is_proven();
-  // What a job consists of (see `Job`): `…_more` goes on, and is false if there was no time for all.
+  // What a job consists of (see `Job`): `…_more` goes on, and is false if there was no time for
+  // all.
   bool begin_job(UpdateReport& report);
   bool go_on(UpdateReport& report);
   bool advance(UpdateReport& report);

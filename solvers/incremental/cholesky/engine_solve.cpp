@@ -107,9 +107,12 @@ bool Engine::advance(UpdateReport& report) {
   using enum Job::Stage;
   UpdateSeconds& seconds = report.seconds;
   switch (job_.stage) {
-    case none: break;
-    case order: return order_affected(report);
-    case factorize: return factorize_more(report);
+    case none:
+      break;
+    case order:
+      return order_affected(report);
+    case factorize:
+      return factorize_more(report);
     case right_hand_side: {
       const Timed timed(seconds.solve);
       if (!set_right_hand_side_more()) return false;
@@ -243,7 +246,8 @@ void Engine::factorized(UpdateReport& report) {
       states_.remember();
       job_.damped = Job::Damped::tried;
       break;
-    case Job::Damped::tried: break;
+    case Job::Damped::tried:
+      break;
     case Job::Damped::last:
       broken_ = false;
       if (job_.converged) break;
@@ -310,8 +314,8 @@ bool Engine::move_more() {
 void Engine::look(UpdateReport& report) {
   const bool last = job_.damped == Job::Damped::last;
   if (!last) ++report.iterations;
-  const bool anyway = std::exchange(must_look_, false) || live_factors_ <= kFew || last ||
-                      job_.rounds > 0;
+  const bool anyway =
+      std::exchange(must_look_, false) || live_factors_ <= kFew || last || job_.rounds > 0;
   ++job_.rounds;
   const double allowed = settings_.accuracy * cost();
   if (!anyway && left_share_ * gained_ <= kLook * allowed && decrease_ <= kFar * allowed)
@@ -485,9 +489,13 @@ void Engine::diverged(UpdateReport& report) {
 
 void Engine::not_positive_definite(UpdateReport& report) {
   switch (job_.damped) {
-    case Job::Damped::no: return diverged(report);
-    case Job::Damped::last: broken_ = true; return end_job();
-    default: break;
+    case Job::Damped::no:
+      return diverged(report);
+    case Job::Damped::last:
+      broken_ = true;
+      return end_job();
+    default:
+      break;
   }
   damp_more();
   if (job_.damped == Job::Damped::last && !job_.converged) job_.lambda = 0.0;

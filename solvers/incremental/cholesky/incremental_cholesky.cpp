@@ -301,7 +301,8 @@ bool IncrementalCholesky::covariance_column(Id id, std::span<const Id> variables
   return solved().covariance_column(rows, column, out.data());
 }
 
-/// What covariances are read from: where work is left from the last update, a copy that has done it.
+/// What covariances are read from: where work is left from the last update, a copy that has done
+/// it.
 Engine& IncrementalCholesky::solved() {
   if (!engine_->busy() && (since_solved_ > 0 || engine_->up_to_date())) return *engine_;
   if (!finished_) {

@@ -54,7 +54,7 @@ struct Job {
   };
   Damped damped = Damped::no;
   double lambda = 0.0;
-  double growth = 2.0;  ///< of lambda, if the next step is rejected
+  double growth = 2.0;          ///< of lambda, if the next step is rejected
   bool undamped_fails = false;  ///< has raised chi2 before
   bool converged = true;
 

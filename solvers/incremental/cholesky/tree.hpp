@@ -109,8 +109,8 @@ class Tree {
     return factorize_more(any);
   }
   /// The same in pieces: `factorize_more` returns `kPaused` where there is no time for the next
-  /// node, and goes on there when it is called again. Until it has ended nothing may be touched, and
-  /// H must not change. The factor is that of H with its diagonal times 1 + `damping`.
+  /// node, and goes on there when it is called again. Until it has ended nothing may be touched,
+  /// and H must not change. The factor is that of H with its diagonal times 1 + `damping`.
   void begin_factorization(double damping);
   std::int32_t factorize_more(Pace& pace);
   static constexpr std::int32_t kPaused = -2;
@@ -124,9 +124,10 @@ class Tree {
   /// deferred.
   double solve(std::span<const std::int32_t> sources, double tolerance, std::vector<double>& g,
                std::vector<double>& steps, std::vector<std::int32_t>& changed);
-  /// The same in pieces, false where there is no time for the next node: `begin_climb`, `climb` until
-  /// it has ended, then gᵀ H⁻¹ g is `climbed`; then either `end_decrement`, or `begin_descent`, and
-  /// `descend` until it has ended. Nothing else may be called in between but what is const.
+  /// The same in pieces, false where there is no time for the next node: `begin_climb`, `climb`
+  /// until it has ended, then gᵀ H⁻¹ g is `climbed`; then either `end_decrement`, or
+  /// `begin_descent`, and `descend` until it has ended. Nothing else may be called in between but
+  /// what is const.
   void begin_climb(std::span<const std::int32_t> sources);
   bool climb(std::vector<double>& g, Pace& pace);
   double climbed() const { return climbed_; }

@@ -236,8 +236,7 @@ Estimate Tree::settled(Estimate estimate, const Leads& leads) const {
       const std::vector<double>& lead = other == leads.end() ? node.lead : other->second;
       if (lead.empty()) continue;
       totals.push_back(lead);
-      if (above != kNone)
-        group->compose(totals[above].data(), lead.data(), totals.back().data());
+      if (above != kNone) group->compose(totals[above].data(), lead.data(), totals.back().data());
       total_of[path.back()] = static_cast<std::int32_t>(std::ssize(totals) - 1);
     }
     if (const std::int32_t total = total_of[own]; total != kNone)

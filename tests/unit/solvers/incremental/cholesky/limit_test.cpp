@@ -69,8 +69,8 @@ class EngineWithALimit : public testing::TestWithParam<Case> {
     rescuer_->optimizer = registry_.make<Optimizer>("levenberg_marquardt");
   }
   GrowingGraph graph(unsigned seed) const {
-    return {GetParam().spatial ? spatial_types() : planar_types(), {.noise = GetParam().noise},
-            seed};
+    return {
+        GetParam().spatial ? spatial_types() : planar_types(), {.noise = GetParam().noise}, seed};
   }
   /// chi2 of the minimum next to the engine's estimate.
   double minimum(const Engine& engine) {
@@ -123,7 +123,8 @@ TEST_P(EngineWithALimit, DoesNoMoreWorkInAnUpdateThanItMay) {
       engine.solve(GetParam().pieces, report);
       // Each piece reads the clock before it; the update does once at its beginning, and once more
       // where it stops.
-      EXPECT_LE(clock.reads - before, GetParam().pieces + 2) << "seed " << seed << ", step " << step;
+      EXPECT_LE(clock.reads - before, GetParam().pieces + 2)
+          << "seed " << seed << ", step " << step;
       left += !engine.up_to_date();
     }
     if (GetParam().pieces == 1) {
