@@ -11,11 +11,12 @@ from ..program import Run, Words
 from ..reports import Json, contestant, items, median_of, number, text
 from ..rounds import Contestant, entries_of, run_rounds
 from ..study import Bench, Keep, Study, for_each_set
-from ..words import apart, digits, megabytes, milliseconds, times
+from ..words import apart, digits, milliseconds, times
 from .graphs import ITERATIONS
 
 WORTHWHILE = 1.3  # times faster, for mixed precision to be the choice
 DOUBLE, MIXED, START = "double", "mixed", "start"
+ENOUGH = 600.0  # of all rounds of one of them [s]; long, since a busy machine does not spoil the processor's time much
 
 
 def study_precision(bench: Bench, keep: Keep) -> None:
@@ -26,17 +27,18 @@ def study_precision(bench: Bench, keep: Keep) -> None:
 
     def measure(data: DataSet) -> None:
         # Reading, the initial estimate and the analysis are the same for both: they are taken off.
-        contestants = [Contestant(START, arguments(bench.ours, 0)), Contestant(DOUBLE, arguments(bench.ours, ITERATIONS)),
-                       Contestant(MIXED, arguments(f"{bench.ours}{separator}precision=mixed", ITERATIONS))]
+        contestants = [Contestant(name, arguments(solver, iterations), enough=ENOUGH) for name, solver, iterations in [
+            (START, bench.ours, 0), (DOUBLE, bench.ours, ITERATIONS),
+            (MIXED, f"{bench.ours}{separator}precision=mixed", ITERATIONS)]]
 
         def run(one: Contestant) -> Run:
             words = [*one.arguments, *([] if "--initial" in data.arguments else ["--initial", "auto"])]
             done = bench.cairn.optimize(data, words).required()
-            done.report.update(processor=done.outcome.processor, peak_memory=done.outcome.peak_memory)
+            done.report.update(processor=done.outcome.processor)
             return done
 
         def summary(report: Json) -> Json:
-            return {of: report[of] for of in ["processor", "peak_memory", "chi2", "solver"]}
+            return {of: report[of] for of in ["processor", "chi2", "solver"]}
 
         run_rounds(bench.rounds, contestants, run, summary)
         keep({"name": data.name, "contestants": entries_of(contestants)})
@@ -75,12 +77,11 @@ def precision_sections(entries: list[Json]) -> Sections:
         flops = number(double, "solver.factor_flops") / number(double, "solver.factor_nonzeros")
         rows.append([text(entry, "name"), digits(flops), *(milliseconds(iteration(entry, of)) for of in [DOUBLE, MIXED]),
                      f"**{times(ratio)}**" if ratio >= WORTHWHILE else times(ratio), refinement(mixed),
-                     apart(number(mixed, "chi2.final"), number(double, "chi2.final")),
-                     " / ".join(megabytes(median_of(contestant(entry, of), "peak_memory")) for of in [DOUBLE, MIXED])])
+                     apart(number(mixed, "chi2.final"), number(double, "chi2.final"))])
     if ratios:
-        rows.append(["**geometric mean**", "", "", "", f"**{times(geometric_mean(ratios))}**", "", "", ""])
-    return {"precision": table(["graph", "flops per nonzero", "double [ms]", "mixed [ms]", "faster", "steps", "chi2 apart",
-                                "peak memory [MB]"], rows)}
+        rows.append(["**geometric mean**", "", "", "", f"**{times(geometric_mean(ratios))}**", "", ""])
+    return {"precision": table(["graph", "flops per nonzero", "double [ms]", "mixed [ms]", "faster", "steps", "chi2 apart"],
+                               rows)}
 
 
 STUDIES = [Study("precision", study_precision, precision_sections)]
