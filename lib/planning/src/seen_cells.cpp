@@ -2,6 +2,7 @@
 #include "cairn/planning/seen_cells.hpp"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <limits>
@@ -25,28 +26,33 @@ std::uint64_t bit_of(int x) { return std::uint64_t{1} << (static_cast<unsigned>(
 /// Where a ray crosses the borders of cells along one axis, in cells from its start, once it is in
 /// a cell. The borders are computed as `RayCaster` does, so that both enter the same cells.
 struct Crossings {
+  Crossings() = default;
   Crossings(double from, double direction, int cell_)
       : cell(cell_),
-        step(direction < 0.0 ? -1 : 1),
         border(direction > 0.0 ? cell + 1.0 : cell),
         inverse(1.0 / direction),
-        start(from) {
+        start(from),
+        cells{0, direction < 0.0 ? -1 : 1},
+        borders{0.0, direction < 0.0 ? -1.0 : 1.0} {
     if (direction != 0.0) return;
     // None, however often it is asked.
-    step = 0;
     border = 1.0;
     start = 0.0;
     inverse = std::numeric_limits<double>::infinity();
+    cells[1] = 0;
+    borders[1] = 0.0;
   }
   double next() const { return (border - start) * inverse; }
   /// By 1 step or none, without a branch: which axis is next can't be foretold.
-  void advance(int steps) {
-    cell += step * steps;
-    border += step * steps;
+  void advance(std::size_t steps) {
+    cell += cells[steps];
+    border += borders[steps];
   }
 
-  int cell, step;
-  double border, inverse, start;
+  int cell = 0;
+  double border = 0.0, inverse = 0.0, start = 0.0;
+  std::array<int, 2> cells{};  ///< by which it moves with none and with 1 step
+  std::array<double, 2> borders{};
 };
 
 }  // namespace
@@ -205,27 +211,47 @@ void SeenCells::cast(const Pose2& at, std::span<RayHit> hits, CellWindow& seen) 
   mark(from, at.theta() - frame_.yaw, hits, seen);
 }
 
-/// The unknown ones of the cells that the beams enter, each from the cell on where it has hit.
+/// The unknown ones of the cells that the beams enter, each from the cell on where it has hit. Some
+/// beams take turns: each step of one waits for the numbers of the step before.
 void SeenCells::mark(const Vector2d& from, double turn, std::span<const RayHit> hits,
                      CellWindow& seen) const {
+  struct Ray {
+    Crossings along_x, along_y;
+  };
   const double c = std::cos(turn), s = std::sin(turn);
-  for (std::size_t k = 0; k < beams_.size(); ++k) {
-    if (!hits[k].hit) continue;
-    const Vector2d& beam = beams_[k];
-    Crossings along_x(from.x(), c * beam.x() - s * beam.y(), hits[k].x);
-    Crossings along_y(from.y(), s * beam.x() + c * beam.y(), hits[k].y);
-    while (true) {
-      const int x = along_x.cell, y = along_y.cell;
-      const std::size_t word = word_at(words_, y, x / kWordBits);
-      const std::uint64_t bit = bit_of(x);
-      if ((obstacles_[word] & bit) != 0) break;
-      seen.bits[word_at(seen.words, y - seen.first_row, x / kWordBits - seen.first_word)] |=
-          unknown_[word] & bit;
-      const double next_x = along_x.next(), next_y = along_y.next();
-      const int crosses_x = next_x <= next_y ? 1 : 0;
-      if (!(std::min(next_x, next_y) <= range_)) break;
-      along_x.advance(crosses_x);
-      along_y.advance(1 - crosses_x);
+  std::size_t next = 0;
+  const auto start = [&](Ray& ray) {
+    while (next < hits.size() && !hits[next].hit) ++next;
+    if (next == hits.size()) return false;
+    const Vector2d& beam = beams_[next];
+    ray = {{from.x(), c * beam.x() - s * beam.y(), hits[next].x},
+           {from.y(), s * beam.x() + c * beam.y(), hits[next].y}};
+    ++next;
+    return true;
+  };
+  const auto enter = [&](Ray& ray) {
+    const int x = ray.along_x.cell, y = ray.along_y.cell;
+    const std::size_t word = word_at(words_, y, x / kWordBits);
+    const std::uint64_t bit = bit_of(x);
+    if ((obstacles_[word] & bit) != 0) return false;
+    seen.bits[word_at(seen.words, y - seen.first_row, x / kWordBits - seen.first_word)] |=
+        unknown_[word] & bit;
+    const double next_x = ray.along_x.next(), next_y = ray.along_y.next();
+    const std::size_t crosses_x = next_x <= next_y ? 1 : 0;
+    ray.along_x.advance(crosses_x);
+    ray.along_y.advance(1 - crosses_x);
+    return std::min(next_x, next_y) <= range_;
+  };
+  constexpr std::size_t kAtOnce = 4;
+  std::array<Ray, kAtOnce> rays;
+  std::size_t count = 0;
+  while (count < kAtOnce && start(rays[count])) ++count;
+  while (count > 0) {
+    for (std::size_t k = 0; k < count;) {
+      if (enter(rays[k]) || start(rays[k]))
+        ++k;
+      else
+        rays[k] = rays[--count];
     }
   }
 }

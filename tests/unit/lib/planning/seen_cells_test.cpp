@@ -2,6 +2,7 @@
 #include "cairn/planning/seen_cells.hpp"
 
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <set>
 #include <string>
@@ -19,11 +20,13 @@ namespace {
 using Eigen::Vector2d;
 using Cell = std::pair<int, int>;
 
-FloorMap random_map(test::Draw& draw, int width, int height, double resolution) {
+FloorMap random_map(test::Draw& draw, int width, int height, double resolution,
+                    double unknown = 0.5) {
   std::vector<std::string> rows;
   for (int y = 0; y < height; ++y) {
     std::string row;
-    for (int x = 0; x < width; ++x) row += draw.chance(0.05) ? '#' : draw.chance(0.5) ? '?' : '.';
+    for (int x = 0; x < width; ++x)
+      row += draw.chance(0.05) ? '#' : draw.chance(unknown) ? '?' : '.';
     rows.push_back(row);
   }
   return test::drawn_map(rows, resolution);
@@ -111,6 +114,63 @@ TEST(SeenCells, AreThoseThatTheBeamsOfTheWorldEnter) {
     total += united.count();
   }
   EXPECT_GT(total, 1000U);
+}
+
+/// The cells that a ray enters, cell by cell, with the borders' distances as `RayCaster` has them.
+template <class Visit>
+void traverse_plainly(const Vector2d& from, const Vector2d& direction, double length,
+                      Visit&& visit) {
+  const Eigen::Vector2i step(direction.x() < 0.0 ? -1 : 1, direction.y() < 0.0 ? -1 : 1);
+  Eigen::Vector2i cell(int(std::floor(from.x())), int(std::floor(from.y())));
+  const auto next = [&](int axis) {
+    if (direction[axis] == 0.0) return std::numeric_limits<double>::infinity();
+    const double border = direction[axis] > 0.0 ? cell[axis] + 1.0 : cell[axis];
+    return (border - from[axis]) * (1.0 / direction[axis]);
+  };
+  while (visit(cell.x(), cell.y())) {
+    const int axis = next(0) <= next(1) ? 0 : 1;
+    if (!(next(axis) <= length)) return;
+    cell[axis] += step[axis];
+  }
+}
+
+TEST(SeenCells, AreThoseOfPlainTraversalToTheBit) {
+  test::Draw draw(9);
+  const LidarModel lidar{.aperture = 2.0 * std::numbers::pi, .beams = 64, .range = 8.0};
+  const std::vector<Vector2d> beams = beam_directions(lidar);
+  for (int k = 0; k < 16; ++k) {
+    const FloorMap map = random_map(draw, 90, 60, 0.1, k % 4 < 2 ? 0.02 : 0.5);
+    // Whole numbers of cells, so that ranges may end at borders.
+    const double range = k % 2 == 0 ? 2.0 : draw.uniform(0.5, 3.0);
+    const SeenCells seen(map, lidar, range);
+    const GridFrame& frame = seen.frame();
+    const int margin = (frame.width - map.frame.width) / 2;
+    for (int n = 0; n < 12; ++n) {
+      // At corners of cells, along their sides and diagonals, and anywhere.
+      Vector2d at(draw.uniform(0.0, 90.0), draw.uniform(0.0, 60.0));
+      double theta = draw.uniform(-3.0, 3.0);
+      if (n % 2 == 0) at = at.array().floor().matrix().eval();
+      if (n % 4 < 2) theta = 0.0;
+      const Pose2 pose(map.frame.to_world(at).x(), map.frame.to_world(at).y(), theta);
+      std::set<Cell> expected;
+      const double c = std::cos(theta), s = std::sin(theta);
+      for (const Vector2d& beam : beams) {
+        const Vector2d direction(c * beam.x() - s * beam.y(), s * beam.x() + c * beam.y());
+        traverse_plainly(frame.to_cells(pose.translation()), direction, range / frame.resolution,
+                         [&](int x, int y) {
+                           const bool on = map.frame.contains(x - margin, y - margin);
+                           const CellState state =
+                               on ? map.cells[map.frame.index(x - margin, y - margin)]
+                                  : CellState::unknown;
+                           if (state == CellState::unknown) expected.insert({x, y});
+                           return state != CellState::occupied;
+                         });
+      }
+      CellSet cells = seen.none();
+      cells.add(seen.look(std::vector<Pose2>{pose}));
+      ASSERT_EQ(cells_of(cells, frame), expected) << k << " " << n;
+    }
+  }
 }
 
 TEST(SeenCells, OfSeveralPosesAreTheUnionOfTheirs) {
