@@ -47,6 +47,7 @@ TEST(Pace, LearnsWhatWorkTakesAndAllowsWhatFits) {
     pace.begin(100.0);
     ASSERT_TRUE(pace.allows(Work::evaluate, 10.0));
     clock.time += 1.0;
+    ASSERT_TRUE(pace.allows(Work::move, 0.0));
   }
   pace.begin(100.0);
   ASSERT_TRUE(pace.allows(Work::evaluate, 10.0));
@@ -63,6 +64,7 @@ TEST(Pace, OnePieceThatWasInterruptedCountsForLittle) {
     pace.begin(100.0);
     ASSERT_TRUE(pace.allows(Work::evaluate, 10.0));
     clock.time += update == 299 ? 1e6 : 1.0;
+    pace.allows(Work::move, 0.0);
   }
   pace.begin(100.0);
   ASSERT_TRUE(pace.allows(Work::order, 1.0));
