@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from ..averages import geometric_mean, median
+from ..averages import geometric_mean
 from ..data_sets import DataSet, sets_of
 from ..pages import Sections, table
 from ..program import Run, Words
@@ -52,13 +52,6 @@ def iteration(entry: Json, name: str) -> float:
     return (end - start) / ITERATIONS
 
 
-def faster(entry: Json) -> float:
-    """The median over the rounds of the ratio of the times of ten iterations."""
-    start = median_of(contestant(entry, START), "processor")
-    double, mixed = (items(contestant(entry, of), "runs") for of in [DOUBLE, MIXED])
-    return median([(number(a, "processor") - start) / (number(b, "processor") - start) for a, b in zip(double, mixed)])
-
-
 def refinement(run: Json) -> str:
     """Steps for each solution, or that it fell back."""
     note = text(run, "solver.note")
@@ -72,7 +65,7 @@ def precision_sections(entries: list[Json]) -> Sections:
     rows, ratios = [], []
     for entry in entries:
         double, mixed = (items(contestant(entry, of), "runs")[-1] for of in [DOUBLE, MIXED])
-        ratio = faster(entry)
+        ratio = iteration(entry, DOUBLE) / iteration(entry, MIXED)
         ratios.append(ratio)
         flops = number(double, "solver.factor_flops") / number(double, "solver.factor_nonzeros")
         rows.append([text(entry, "name"), digits(flops), *(milliseconds(iteration(entry, of)) for of in [DOUBLE, MIXED]),
