@@ -74,7 +74,7 @@ void SupernodalCholesky::analyze(const BlockStructure& structure, std::string_vi
 
 template <class Real>
 void SupernodalCholesky::make_room(Numbers<Real>& numbers) const {
-  using Array = Numbers<Real>::Array;
+  using Array = typename Numbers<Real>::Array;
   numbers.panels = Array(symbolic_.panel_values());
   numbers.workspace = Array(schedule_.size);
   numbers.vectors = decltype(numbers.vectors)(vector_rows_);
