@@ -122,7 +122,7 @@ TEST(EvaluateCommand, APlanarEstimateBesideASpatialTruthIsSaid) {
   write_text(flat, "VERTEX_SE3:QUAT 0 0 0 0" + level + "VERTEX_SE3:QUAT 1 1 0 0" + level +
                        "VERTEX_SE3:QUAT 2 2 1 0" + level);
   EXPECT_THAT(cairn({"evaluate", plane, space}).err,
-              HasSubstr("plane.g2o is of the plane and " + space + " in space: heights, roll"));
+              HasSubstr("plane.g2o is of the plane and space.g2o in space: heights, roll"));
   EXPECT_THAT(cairn({"evaluate", space, plane}).err, HasSubstr("plane.g2o is of the plane and "));
   for (const Arguments& quiet :
        {Arguments{"evaluate", plane, space, "--planar"}, Arguments{"evaluate", plane, flat},

@@ -279,3 +279,38 @@ print(summary.status)
 """
     ended = subprocess.run([sys.executable, "-c", program, __file__.rsplit("/", 1)[0]], capture_output=True, text=True, timeout=60)
     assert (ended.returncode, ended.stdout) == (0, "interrupted\n"), ended.stderr
+
+
+def bearings(wrapped):
+    """A robot that drives a circle and sees three landmarks; only where the error is wrapped is it right everywhere."""
+
+    def residual(pose, landmark, measured):
+        dx, dy = (landmark - pose[:, :2]).T
+        error = (np.arctan2(dy, dx) - pose[:, 2])[:, None] - measured
+        return (error + np.pi) % (2 * np.pi) - np.pi if wrapped else error
+
+    direction = cairn.FactorType("EDGE_DIRECTION", [cairn.Pose2, cairn.Point2], residual, residual_size=1, measurement_size=1)
+    angles = np.arange(40) * 2 * np.pi / 40
+    poses = np.column_stack([20 * np.cos(angles), 20 * np.sin(angles), (angles + 1.5 * np.pi) % (2 * np.pi) - np.pi])
+    landmarks = np.array([[-30.0, -30.0], [30.0, -30.0], [-30.0, 30.0]])
+    graph = cairn.Graph()
+    graph.add_variables(cairn.Pose2, np.arange(40), poses)
+    graph.add_variables(cairn.Point2, [100, 101, 102], landmarks + 0.5)
+    graph.fix([0])
+    pairs = np.array([[k, 100 + b] for k in range(40) for b in range(3)])
+    offset = landmarks[pairs[:, 1] - 100] - poses[pairs[:, 0], :2]
+    seen = np.arctan2(offset[:, 1], offset[:, 0]) - poses[pairs[:, 0], 2]
+    graph.add_factors(direction, pairs, (seen + np.pi) % (2 * np.pi) - np.pi, sigmas=0.01)
+    steps = [cairn.Pose2(*poses[k]).between(cairn.Pose2(*poses[k + 1])).state for k in range(39)]
+    graph.add_factors("EDGE_SE2", np.column_stack([np.arange(39), np.arange(1, 40)]), steps, sigmas=[0.1, 0.1, 0.05])
+    return graph, landmarks
+
+
+def test_an_angle_that_is_not_wrapped_is_noted():
+    graph, landmarks = bearings(wrapped=True)
+    summary = cairn.optimize(graph, initial=None)
+    assert summary.converged and not any("angle" in note for note in summary.notes)
+    assert_allclose(graph.states(cairn.Point2), landmarks, atol=1e-6)
+    graph, _ = bearings(wrapped=False)
+    notes = cairn.optimize(graph, initial=None, max_iterations=3).notes
+    assert any("EDGE_DIRECTION" in note and "is an angle of" in note for note in notes), notes

@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "cairn/evaluation/check_factor.hpp"
+#include "unwrapped_angle.hpp"
 
 namespace cairn {
 
@@ -30,14 +31,14 @@ std::string implausible_estimate(const Graph& graph, double chi2) {
   const std::int64_t dof = degrees_of_freedom(graph, resolve_gauge(graph));
   if (is_plausible(chi2, dof)) return {};
   if (!std::isfinite(chi2)) return "chi2 is not finite: the estimate means nothing";
-  return fmt::format(
-      "chi2 is {:.3g} times the {} degrees of freedom: this estimate is hardly the right one. "
-      "Either "
-      "measurements are wrong (a robust loss such as cauchy limits them), or their information is "
-      "too "
-      "large or in another order, or this is a local minimum (the initial guess incremental is "
-      "thorough, and slow)",
+  const std::string text = fmt::format(
+      "chi2 is {:.3g} times the {} degrees of freedom: this estimate is hardly the right one. ",
       chi2 / static_cast<double>(dof), dof);
+  if (const std::string angle = unwrapped_angle(graph); !angle.empty()) return text + angle;
+  return text +
+         "Either measurements are wrong (a robust loss such as cauchy limits them), or their "
+         "information is too large or in another order, or this is a local minimum (the initial "
+         "guess incremental is thorough, and slow)";
 }
 
 namespace {

@@ -11,7 +11,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "cairn/lie/point.hpp"
 #include "cairn/lie/se2.hpp"
+#include "cairn/lie/so2.hpp"
 #include "cairn/types/define_factor.hpp"
 #include "cairn/types/define_variable.hpp"
 #include "cairn/types/loss.hpp"
@@ -52,6 +54,32 @@ struct Partial {
     if (x[0] >= S(1.0)) throw std::domain_error("beyond");
     using std::log;
     return Vector<S, 1>(log(x[0]) - z[0]);
+  }
+};
+
+/// The direction in which a landmark is seen, wrapped or not.
+template <bool wrapped>
+struct Direction {
+  static constexpr std::string_view kTag = wrapped ? "DIRECTION" : "UNWRAPPED";
+  static constexpr int kResidual = 1, kMeasurement = 1;
+  using Variables = std::tuple<Se2, PointXY>;
+  template <class S>
+  static Vector<S, 1> residual(const Vector<S, 3>& x, const Vector<S, 2>& l,
+                               const Vector<double, 1>& z) {
+    using std::atan2;
+    const S error = atan2(l[1] - x[1], l[0] - x[0]) - x[2] - z[0];
+    return Vector<S, 1>(wrapped ? wrap_angle<S>(error) : error);
+  }
+};
+
+/// A prior on x alone, in metres, which grows as an angle would.
+struct East {
+  static constexpr std::string_view kTag = "EAST";
+  static constexpr int kResidual = 1, kMeasurement = 1;
+  using Variables = std::tuple<Se2>;
+  template <class S>
+  static Vector<S, 1> residual(const Vector<S, 3>& x, const Vector<double, 1>& z) {
+    return Vector<S, 1>(x[0] - z[0]);
   }
 };
 
@@ -96,6 +124,36 @@ class OneSigma final : public Loss {
   }
   double second_derivative(double) const override { return 0.0; }
 };
+
+/// A pose that looks west at a landmark a little south of west, measured five times, with the
+/// error of its x in metres.
+template <class Bearing>
+std::string doubt_of_bearings(double heading, double measured, double x) {
+  static const auto pose_type = define_variable<Se2>();
+  static const auto point_type = define_variable<PointXY>();
+  static const auto bearing = define_factor<Bearing>();
+  static const auto east = define_factor<East>();
+  const double state[] = {0.0, 0.0, heading}, landmark[] = {-5.0, -0.5}, z[] = {measured},
+               place[] = {x}, information[] = {1e6}, little[] = {1.0};
+  Graph graph;
+  const int both[] = {graph.add_variable(pose_type, 0, state),
+                      graph.add_variable(point_type, 1, landmark)};
+  for (int k = 0; k < 5; ++k) graph.add_factor(bearing, both, z, information);
+  graph.add_factor(east, std::span(both, 1), place, little);
+  return implausible_estimate(graph, chi2(graph));
+}
+
+TEST(ImplausibleEstimate, NamesAnAngleThatIsNotWrapped) {
+  // The landmark is seen at -3.04 rad in the world, the pose heads at 3: 0.24 rad to its left.
+  EXPECT_THAT(doubt_of_bearings<Direction<false>>(3.0, 0.24, 0.0),
+              HasSubstr("UNWRAPPED 0 1: its error in row 0 is an angle of -6.2"));
+  EXPECT_THAT(doubt_of_bearings<Direction<true>>(3.0, 0.24, 0.0), IsEmpty());
+  // Wrong, and no more than that: an angle within ±π, and a distance beyond.
+  for (const std::string& doubt : {doubt_of_bearings<Direction<true>>(3.0, 1.24, 0.0),
+                                   doubt_of_bearings<Direction<false>>(1.0, -2.0, 0.0),
+                                   doubt_of_bearings<Direction<true>>(3.0, 0.24, 1000.0)})
+    EXPECT_THAT(doubt, HasSubstr("hardly the right one. Either measurements are wrong"));
+}
 
 TEST(LossesWeighNothing, OnlyWhereNoFactorHasAnyWeight) {
   Graph graph = test::ring_of_poses(30, 0.05);
