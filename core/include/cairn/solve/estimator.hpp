@@ -21,8 +21,8 @@ struct UpdateOptions {
   bool defer = false;
   /// Relinearise, reorder and solve everything, until it has converged.
   bool full = false;
-  /// 0: no limit. Otherwise relinearisation that would take longer is deferred to later updates,
-  /// and reported as `owed`.
+  /// 0: no limit [s]. Otherwise what would take longer is left to later updates and counted as
+  /// `owed`; new measurements wait meanwhile.
   double max_seconds = 0.0;
 };
 
