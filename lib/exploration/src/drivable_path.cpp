@@ -263,7 +263,7 @@ class CurveSearch {
 
   void expand(std::size_t index, int turn) {
     const Node from = nodes_[index];
-    Node next{.clearance = from.clearance, .parent = index, .turn = turn};
+    Node next{.at = {}, .clearance = from.clearance, .parent = index, .turn = turn};
     const double curvature = turn / radius_;
     const auto at = [&](double length) { return from.at * along_arc(curvature, length); };
     if (!is_free(arc_, from.clearance, at, &next.clearance)) return;
@@ -313,7 +313,7 @@ class CurveSearch {
     std::vector<std::size_t> chain{last};
     while (chain.back() != 0) chain.push_back(nodes_[chain.back()].parent);
     std::ranges::reverse(chain);
-    PlannedPath result{.look_at = path_.look_at};
+    PlannedPath result{.points = {}, .look_at = path_.look_at};
     result.points.push_back(nodes_.front().at.translation());
     for (std::size_t k = 0; k + 1 < chain.size();) k = append_shortcut(chain, k, result);
     append(nodes_[last].at, to_goal, result);
