@@ -169,7 +169,9 @@ TEST_P(PublishedData, HasTheSameMinimumInMixedPrecision) {
         copy, {.max_iterations = 1000, .tolerance = 1e-12});
     EXPECT_EQ(summary.status, Status::converged) << linear;
     chi2.push_back(summary.final_chi2);
-    if (chi2.size() == 2) EXPECT_NE(summary.solver.note.find("mixed precision"), std::string::npos);
+    if (chi2.size() == 2) {
+      EXPECT_NE(summary.solver.note.find("mixed precision"), std::string::npos);
+    }
   }
   if (published.absolute > 0.0) {
     EXPECT_LE(chi2[1], published.absolute);

@@ -127,7 +127,8 @@ class OneGoal final : public Explorer {
   void begin(std::uint64_t) override {}
   Decision decide(const Situation& situation) override {
     const Eigen::Vector2d at = situation.pose.translation();
-    Decision decision{.why = "back"};
+    Decision decision;
+    decision.why = "back";
     const Eigen::Vector2d behind = situation.pose * Eigen::Vector2d(-1.0, 0.0);
     decision.candidates.push_back({{.points = {at, behind}, .length = 1.0}, 0.0, "behind it"});
     return decision;
