@@ -10,9 +10,9 @@
 
 #include <fmt/format.h>
 
+#include "cairn/exploration/dubins_curve.hpp"
 #include "cairn/exploration/random_stream.hpp"
 #include "cairn/exploration/world.hpp"
-#include "cairn/geometry/dubins_curve.hpp"
 #include "cairn/grid/floor_survey.hpp"
 #include "cairn/grid/ray_caster.hpp"
 #include "cairn/plugin/option_fields.hpp"

@@ -11,8 +11,8 @@
 #include <utility>
 #include <vector>
 
+#include "cairn/exploration/dubins_curve.hpp"
 #include "cairn/exploration/path_planner.hpp"
-#include "cairn/geometry/dubins_curve.hpp"
 
 namespace cairn {
 namespace {

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "cairn/geometry/dubins_curve.hpp"
+#include "cairn/exploration/dubins_curve.hpp"
 
 namespace cairn {
 namespace {

@@ -117,7 +117,8 @@ class Difference {
 };
 
 /// The largest eigenvalue of a positive definite matrix by Lanczos' recursion. Vectors are not
-/// kept: lost orthogonality repeats eigenvalues, and adds none.
+/// kept: lost orthogonality repeats eigenvalues and adds none, but it may take more than `n` steps
+/// then.
 double largest_eigenvalue(Eigen::Index n, const std::function<Vector(const Vector&)>& multiply) {
   std::vector<double> diagonal, beside;
   Vector before = Vector::Zero(n), v(n);
@@ -130,14 +131,14 @@ double largest_eigenvalue(Eigen::Index n, const std::function<Vector(const Vecto
     w -= diagonal.back() * v;
     if (k > 1) w -= beside.back() * before;
     const double next = w.norm();
-    const bool last = k == std::min<Eigen::Index>(n, kLanczosSteps) || next == 0.0;
-    if (last || k % 10 == 0) {
+    const bool last = k == kLanczosSteps || next == 0.0;
+    if (last || k == n || k % 10 == 0) {
       Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> ritz;
       ritz.computeFromTridiagonal(Eigen::Map<const Vector>(diagonal.data(), k),
                                   Eigen::Map<const Vector>(beside.data(), k - 1));
       const double largest = ritz.eigenvalues()[k - 1];
       const double residual = next * std::abs(ritz.eigenvectors()(k - 1, k - 1));
-      if (residual <= kAccuracy * largest || k == n || next == 0.0) return largest;
+      if (residual <= kAccuracy * largest || next == 0.0) return largest;
       if (last) {
         if (residual <= kAcceptable * largest) return largest;
         throw Error(ErrorCode::numerical,

@@ -12,8 +12,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "cairn/exploration/dubins_curve.hpp"
 #include "cairn/exploration/exploration.hpp"
-#include "cairn/geometry/dubins_curve.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
 #include "support/components.hpp"

@@ -9,7 +9,7 @@
 #include <gtest/gtest.h>
 #include <Eigen/Dense>
 
-#include "cairn/geometry/dubins_curve.hpp"
+#include "cairn/exploration/dubins_curve.hpp"
 
 namespace cairn {
 namespace {

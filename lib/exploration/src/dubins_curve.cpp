@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "cairn/geometry/dubins_curve.hpp"
+#include "cairn/exploration/dubins_curve.hpp"
 
 #include <algorithm>
 #include <cmath>
