@@ -130,8 +130,6 @@ void Engine::changed_factor(int f) {
 
 void Engine::remove_factor(int f) {
   for (const std::int32_t v : models_.variables(f)) follow(v);
-  covariances_
-      .note_everything();  // downdates that follow a removal have been seen to be off by 1e-4
   take_out(f);
   live_factor_[f] = 0;
   rounding_is_old_ = true;  // a difference of very unequal numbers would lose the small ones
