@@ -101,7 +101,7 @@ TEST_F(Removal, FromALargeMapStartsNothingAnew) {
   for (const GraphUpdate& update : {leaves, removed}) {
     const UpdateReport report = estimator_->update(update);
     EXPECT_TRUE(report.ok);
-    EXPECT_LT(report.affected_variables, kPoses / 2);
+    EXPECT_LT(report.affected_variables, kPoses / 4);
     EXPECT_LT(report.relinearized_factors, kPoses / 4);
     watched_->evaluations = 0;
     EXPECT_EQ(estimator_->update({}).affected_variables, 0);
