@@ -178,6 +178,8 @@ class Engine : private EngineState {
   void set_loss(const std::shared_ptr<const Loss>& loss, const FactorSelector& which);
   /// Ids of the factors that are there, rising.
   std::vector<FactorId> live_ids() const;
+  /// Removed factors and variables that are still in the graph.
+  int dead() const { return dead_; }
 
   /// Solves until the estimate is as accurate as it is to be, or the iterations are up.
   ///

@@ -60,7 +60,7 @@ GrowingTypes spatial_types() {
 }
 
 void GrowingGraph::grow(Engine& engine) {
-  if (engine.mostly_dead()) engine.compact();
+  if (engine.dead() > 0) engine.compact();
   const double what = uniform(0.0, 1.0);
   if (poses_.size() < 3 || what < 0.5) {
     add_pose(engine);
