@@ -52,17 +52,20 @@ IncrementalCholesky::IncrementalCholesky(const IncrementalCholesky& other)
 
 UpdateReport IncrementalCholesky::update(const GraphUpdate& update, const UpdateOptions& options) {
   const Clock::time_point begin = Clock::now();
+  if (engine_->dead() > 0) {
+    engine_->compact();
+    forget_what_was_read();
+  }
   GraphUpdate checked = update;
   const auto state_of = [this](Id id) {
     const auto v = find(id);
     return v ? state(id) : std::span<const double>();
   };
   place_variables(checked, state_of);
-  check_update(engine_->graph(),
-               {.position = [this](FactorId id) { return position(id); },
-                .next = engine_->next_id(),
-                .variable = [this](Id id) { return find(id); }},
-               checked);
+  check_update(
+      engine_->graph(),
+      {.position = [this](FactorId id) { return position(id); }, .next = engine_->next_id()},
+      checked);
   if (options_.hints)
     replace_poor_states(checked, state_of, losses_.empty() ? Deciding::all : Deciding::first);
   forget_what_was_read();
@@ -70,7 +73,20 @@ UpdateReport IncrementalCholesky::update(const GraphUpdate& update, const Update
   const bool full =
       options.full || (options_.full_every > 0 && since_full_ + 1 >= options_.full_every);
   if (engine_->busy() && (full || takes_out(checked))) engine_->solve(0.0, report);
-  carry_out_or_not_at_all(checked, report);
+  if (checked.marginalized.empty()) {
+    apply(checked, report);
+  } else {  // which may fail, on numbers
+    const IncrementalCholesky before(*this);
+    try {
+      apply(checked, report);
+    } catch (...) {
+      engine_ = std::make_unique<Engine>(*before.engine_);
+      variables_ = before.variables_;
+      factors_ = before.factors_;
+      losses_ = before.losses_;
+      throw;
+    }
+  }
   report.seconds.linearize += seconds_since(begin);
 
   ++since_solved_;
@@ -99,8 +115,7 @@ UpdateReport IncrementalCholesky::update(const GraphUpdate& update, const Update
 /// The engine as what an update is carried out on.
 class IncrementalCholesky::Target final : public UpdateTarget {
  public:
-  Target(IncrementalCholesky& owner, std::optional<Elimination> foreseen)
-      : owner_(owner), engine_(*owner.engine_), foreseen_(std::move(foreseen)) {}
+  explicit Target(IncrementalCholesky& owner) : owner_(owner), engine_(*owner.engine_) {}
 
   Graph& graph() override { return engine_.edit(); }
   FactorId next_factor() const override { return engine_.next_id(); }
@@ -125,13 +140,21 @@ class IncrementalCholesky::Target final : public UpdateTarget {
 
   IncrementalCholesky& owner_;
   Engine& engine_;
-  std::optional<Elimination> foreseen_;
 };
 
 Elimination IncrementalCholesky::Target::eliminate(std::span<const int> variables) {
-  if (foreseen_) return std::move(*foreseen_);
-  engine_.settle_gauge();
-  return engine_.eliminate(variables);
+  std::vector<int> factors;
+  for (const int v : variables) {
+    const auto& on_it = engine_.factors_of(v);
+    factors.insert(factors.end(), on_it.begin(), on_it.end());
+  }
+  std::ranges::sort(factors);
+  factors.erase(std::unique(factors.begin(), factors.end()), factors.end());
+  engine_.write_back();
+  const Graph& graph = engine_.graph();
+  std::vector<bool> held(static_cast<std::size_t>(graph.variable_count()));
+  for (std::size_t v = 0; v < held.size(); ++v) held[v] = engine_.held(static_cast<int>(v));
+  return cairn::eliminate(graph, variables, held, factors);
 }
 
 void IncrementalCholesky::Target::remove(std::span<const int> factors,
@@ -146,54 +169,11 @@ void IncrementalCholesky::Target::remove(std::span<const int> factors,
   }
 }
 
-/// Marginalising may fail, on numbers. Then everything is as before, to the last bit: a journal
-/// does not have what was refused. So it is computed before anything changes, or else on a copy.
-void IncrementalCholesky::carry_out_or_not_at_all(const GraphUpdate& update, UpdateReport& report) {
-  const bool compacts = engine_->mostly_dead() || brings_back(update);
-  std::optional<Elimination> foreseen;
-  std::optional<IncrementalCholesky> before;
-  if (!update.marginalized.empty()) {
-    if (!compacts && can_be_foreseen(update)) {
-      std::vector<int> leaving;
-      for (const Id id : update.marginalized) leaving.push_back(index(id));
-      foreseen = engine_->eliminate(leaving);
-    } else {
-      before.emplace(*this);
-    }
-  }
-  try {
-    if (compacts) engine_->compact();
-    Target target(*this, std::move(foreseen));
-    AppliedUpdate applied = carry_out(update, losses_, target);
-    report.first_factor = applied.first_factor;
-    report.priors = std::move(applied.priors);
-  } catch (...) {
-    if (before) {
-      engine_ = std::move(before->engine_);
-      variables_ = before->variables_;
-      factors_ = before->factors_;
-      losses_ = before->losses_;
-    }
-    throw;
-  }
-}
-
-/// Whether a new variable has the id of one that has been removed and is still in the graph.
-bool IncrementalCholesky::brings_back(const GraphUpdate& update) const {
-  return std::ranges::any_of(update.variables, [&](const Variable& variable) {
-    return engine_->graph().find(variable.id).has_value();
-  });
-}
-
-/// Whether nothing else in the update changes what the marginalised variables leave.
-bool IncrementalCholesky::can_be_foreseen(const GraphUpdate& update) const {
-  if (!update.changed.empty() || engine_->gauge_is_old()) return false;
-  return std::ranges::all_of(update.marginalized, [&](Id id) {
-    const std::optional<int> v = find(id);
-    return v && !engine_->held(*v) && std::ranges::none_of(update.factors, [&](const Factor& f) {
-             return std::ranges::find(f.variables, id) != f.variables.end();
-           });
-  });
+void IncrementalCholesky::apply(const GraphUpdate& update, UpdateReport& report) {
+  Target target(*this);
+  AppliedUpdate applied = carry_out(update, losses_, target);
+  report.first_factor = applied.first_factor;
+  report.priors = std::move(applied.priors);
 }
 
 void IncrementalCholesky::note_gauge(UpdateReport& report) {

@@ -97,9 +97,7 @@ class IncrementalCholesky final : public Estimator {
   std::optional<int> position(FactorId id) const;
   int index(Id id) const;
   int block_size(int a, int b) const;
-  void carry_out_or_not_at_all(const GraphUpdate& update, UpdateReport& report);
-  bool brings_back(const GraphUpdate& update) const;
-  bool can_be_foreseen(const GraphUpdate& update) const;
+  void apply(const GraphUpdate& update, UpdateReport& report);
   void forget_what_was_read() {
     read_.clear();
     all_.reset();
