@@ -52,6 +52,11 @@ IncrementalCholesky::IncrementalCholesky(const IncrementalCholesky& other)
 
 UpdateReport IncrementalCholesky::update(const GraphUpdate& update, const UpdateOptions& options) {
   const Clock::time_point begin = Clock::now();
+  UpdateReport report;
+  const bool full =
+      options.full || (options_.full_every > 0 && since_full_ + 1 >= options_.full_every);
+  if (engine_->busy() && (full || takes_out(update))) end_solution(report);
+  const Clock::time_point solved = Clock::now();
   if (engine_->dead() > 0) {
     engine_->compact();
     forget_what_was_read();
@@ -69,10 +74,6 @@ UpdateReport IncrementalCholesky::update(const GraphUpdate& update, const Update
   if (options_.hints)
     replace_poor_states(checked, state_of, losses_.empty() ? Deciding::all : Deciding::first);
   forget_what_was_read();
-  UpdateReport report;
-  const bool full =
-      options.full || (options_.full_every > 0 && since_full_ + 1 >= options_.full_every);
-  if (engine_->busy() && (full || takes_out(checked))) engine_->solve(0.0, report);
   if (checked.marginalized.empty()) {
     apply(checked, report);
   } else {  // which may fail, on numbers
@@ -87,7 +88,7 @@ UpdateReport IncrementalCholesky::update(const GraphUpdate& update, const Update
       throw;
     }
   }
-  report.seconds.linearize += seconds_since(begin);
+  report.seconds.linearize += seconds_since(solved);
 
   ++since_solved_;
   ++since_full_;
@@ -110,6 +111,20 @@ UpdateReport IncrementalCholesky::update(const GraphUpdate& update, const Update
   note_gauge(report);
   report.seconds.total = seconds_since(begin);
   return report;
+}
+
+/// Ends a solution that an update with a time limit has left, before new variables are placed by its
+/// states, or something is taken out. What it cost is in the report.
+void IncrementalCholesky::end_solution(UpdateReport& report) {
+  UpdateReport of_solution;
+  engine_->solve(0.0, of_solution);
+  if (of_solution.ok && engine_->up_to_date() && engine_->covariances().keeps_anything())
+    engine_->update_covariances();
+  forget_what_was_read();
+  report.iterations = of_solution.iterations;
+  report.affected_variables = of_solution.affected_variables;
+  report.relinearized_factors = of_solution.relinearized_factors;
+  report.seconds = of_solution.seconds;
 }
 
 /// The engine as what an update is carried out on.
@@ -261,24 +276,29 @@ bool IncrementalCholesky::covariance(Id a, Id b, std::span<double> block) {
     throw Error(ErrorCode::usage, fmt::format("the covariance of {} and {} has {} numbers, not {}",
                                               a, b, block_size(va, vb), block.size()));
   }
-  return solved().covariance(va, vb, block.data());
+  Engine& engine = solved();
+  return engine.covariance(place_in(engine, a), place_in(engine, b), block.data());
 }
 
 bool IncrementalCholesky::covariance_column(Id id, std::span<const Id> variables,
                                             std::span<double> out) {
   const int column = index(id);
-  std::vector<std::int32_t> rows;
   std::int64_t size = 0;
-  for (const Id row : variables) {
-    rows.push_back(index(row));
-    size += block_size(rows.back(), column);
-  }
+  for (const Id row : variables) size += block_size(index(row), column);
   if (std::ssize(out) != size) {
     throw Error(
         ErrorCode::usage,
         fmt::format("this column of the covariance has {} numbers, not {}", size, out.size()));
   }
-  return solved().covariance_column(rows, column, out.data());
+  Engine& engine = solved();
+  std::vector<std::int32_t> rows;
+  for (const Id row : variables) rows.push_back(place_in(engine, row));
+  return engine.covariance_column(rows, place_in(engine, id), out.data());
+}
+
+/// The number of a variable that is there, in the engine or in a copy that may have renumbered.
+int IncrementalCholesky::place_in(const Engine& engine, Id id) const {
+  return &engine == engine_.get() ? index(id) : static_cast<int>(*engine.graph().find(id));
 }
 
 /// What covariances are read from: where work is left from the last update, a copy that has done
@@ -289,6 +309,8 @@ Engine& IncrementalCholesky::solved() {
     finished_ = std::make_unique<Engine>(*engine_);
     UpdateReport report;
     finished_->solve(0.0, report);
+    if (report.ok && finished_->up_to_date() && finished_->covariances().keeps_anything())
+      finished_->update_covariances();
   }
   return *finished_;
 }

@@ -104,6 +104,8 @@ class IncrementalCholesky final : public Estimator {
     finished_.reset();
   }
   Engine& solved();
+  int place_in(const Engine& engine, Id id) const;
+  void end_solution(UpdateReport& report);
   void note_gauge(UpdateReport& report);
 
   IncrementalCholeskyOptions options_;
