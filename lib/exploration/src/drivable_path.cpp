@@ -25,7 +25,9 @@ using std::numbers::pi;
 constexpr double kSpareRadius = 1.1;
 /// Headings that the search tells apart, and the poses that it looks at before it gives up.
 constexpr int kHeadings = 32;
-constexpr std::size_t kMostPoses = 400000;
+constexpr std::size_t kMostPoses = 60000;
+/// Curves to the goal are tried half as often after so many that were not free.
+constexpr std::size_t kTries = 64;
 /// Arcs of the search cross a cell: this long at least [cells].
 constexpr double kArcCells = 1.5;
 /// A metre on an arc costs so much more than a straight one, and so much more for each metre that
@@ -156,6 +158,7 @@ class CurveSearch {
       seen[*key] = true;
       if (tries_goal(node, expanded++)) {
         if (const auto curve = curve_to_goal(node)) return joined(index, *curve);
+        ++tries_;
       }
       for (const int turn : {0, 1, -1}) expand(index, turn);
     }
@@ -277,10 +280,10 @@ class CurveSearch {
     nodes_.push_back(next);
   }
 
-  /// Rarely while the goal is far.
+  /// Rarely while the goal is far, and the more rarely the more curves were not free.
   bool tries_goal(const Node& node, std::size_t count) const {
     const auto every = 1 + static_cast<std::size_t>(left(node.at) / (4.0 * arc_));
-    return count % every == 0;
+    return count % (every * (1 + tries_ / kTries)) == 0;
   }
 
   /// The curve that costs least to any of the headings at the goal.
@@ -356,6 +359,7 @@ class CurveSearch {
   std::vector<double> to_goal_;
   std::vector<Node> nodes_;
   std::priority_queue<Open, std::vector<Open>, std::greater<>> open_;
+  std::size_t tries_ = 0;  ///< of curves to the goal
 };
 
 }  // namespace

@@ -113,8 +113,8 @@ UpdateReport IncrementalCholesky::update(const GraphUpdate& update, const Update
   return report;
 }
 
-/// Ends a solution that an update with a time limit has left, before new variables are placed by its
-/// states, or something is taken out. What it cost is in the report.
+/// Ends a solution that an update with a time limit has left, before new variables are placed by
+/// its states, or something is taken out. What it cost is in the report.
 void IncrementalCholesky::end_solution(UpdateReport& report) {
   UpdateReport of_solution;
   engine_->solve(0.0, of_solution);

@@ -34,6 +34,7 @@ class Descent {
 
   NormalEquations& equations() { return *equations_; }
   const Stop& stop() const { return stop_; }
+  bool has_losses() const { return graph_.has_losses(); }
   /// Stop.tolerance is 0: no test of convergence is to be made.
   bool exact() const { return !(stop_.tolerance > 0.0); }
 

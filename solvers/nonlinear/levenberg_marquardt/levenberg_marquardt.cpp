@@ -19,9 +19,16 @@ namespace {
 constexpr int kSmallPromises = 3;
 constexpr double kLightDamping = 1e-8;
 
-double initial_lambda(const LevenbergMarquardtOptions& options, const Gauge& gauge) {
+/// Whether undamped steps are likely to be good: H is regular, and chi2 close to quadratic, as it
+/// is not under robust losses.
+bool is_hopeful(Descent& descent) {
+  return descent.equations().gauge().left_free.empty() && !descent.has_losses();
+}
+
+double initial_lambda(const LevenbergMarquardtOptions& options, Descent& descent) {
   if (options.initial_lambda > 0.0) return options.initial_lambda;
-  return gauge.left_free.empty() ? 1e-10 : 1e-4;
+  if (!descent.equations().gauge().left_free.empty()) return 1e-4;
+  return descent.has_losses() ? 1e-6 : 1e-10;
 }
 
 /// Undamped steps need an H that is not singular.
@@ -35,8 +42,8 @@ class Run {
   Run(Descent& descent, const LevenbergMarquardtOptions& options)
       : run_(descent),
         equations_(descent.equations()),
-        damping_(initial_lambda(options, equations_.gauge()), 1e-20, options.largest_lambda,
-                 equations_.gauge().left_free.empty()),
+        damping_(initial_lambda(options, descent), 1e-20, options.largest_lambda,
+                 is_hopeful(descent)),
         may_go_undamped_(may_go_undamped(options, equations_.gauge())),
         endgame_(may_go_undamped_ ? std::sqrt(descent.stop().tolerance) : 0.0),
         convergence_(descent.stop().tolerance),

@@ -13,9 +13,10 @@ namespace cairn {
 struct LevenbergMarquardtOptions {
   std::string linear_solver = "block_cholesky";  ///< of the normal equations
   /// Damping of the first step, relative to the diagonal of H. 0: 1e-10, and at least 1e-6 after
-  /// the first step that is not taken; or 1e-4 where the gauge is left free: there damping alone
-  /// makes H regular, and such problems (cameras and points) are so far from linear that a first
-  /// step with less may throw points behind their cameras, into another minimum.
+  /// the first step that is not taken; 1e-6 with robust losses; or 1e-4 where the gauge is left
+  /// free: there damping alone makes H regular, and such problems (cameras and points) are so far
+  /// from linear that a first step with less may throw points behind their cameras, into another
+  /// minimum.
   double initial_lambda = 0.0;
   double largest_lambda = 1e16;      ///< where the run gives up
   double smallest_diagonal = 1e-12;  ///< D is at least this share of its largest entry of a unit
@@ -25,9 +26,10 @@ struct LevenbergMarquardtOptions {
     using O = LevenbergMarquardtOptions;
     return OptionFields<O>()
         .component<LinearSolver>("linear_solver", &O::linear_solver, "solves the normal equations")
-        .real("initial_lambda", &O::initial_lambda, 0.0, 1e16,
-              "damping of the first step, as a fraction of the diagonal of H; 0: 1e-10, or 1e-4 "
-              "where the gauge is left free")
+        .real(
+            "initial_lambda", &O::initial_lambda, 0.0, 1e16,
+            "damping of the first step, as a fraction of the diagonal of H; 0: 1e-10, with robust "
+            "losses 1e-6, where the gauge is left free 1e-4")
         .real("largest_lambda", &O::largest_lambda, 1.0, 1e30, "damping at which the run gives up")
         .real("smallest_diagonal", &O::smallest_diagonal, 0.0, 1.0,
               "lower bound of the diagonal of H in the damping, as a fraction of its largest entry "
