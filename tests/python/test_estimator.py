@@ -178,3 +178,44 @@ def test_other_threads_run_during_an_update():
     thread.join()
     assert ticks[0] > 1 and any("in use by a call in another thread" in message for message in refused)
     assert estimator.variable_count == 3000
+
+
+def circle(poses, name="incremental_cholesky", **options):
+    """Odometry around a circle that does not close, pose by pose."""
+    estimator = cairn.Estimator(name, **options)
+    turn = 2 * np.pi / poses
+    for k in range(poses):
+        estimator.add(k, cairn.Pose2() if k == 0 else cairn.Pose2, fixed=k == 0)
+        if k:
+            estimator.add(cairn.Between(k - 1, k, cairn.Pose2(1, 0, turn + 0.03)), sigmas=[0.1, 0.1, 0.05])
+        estimator.update()
+    return estimator, cairn.Between(poses - 1, 0, cairn.Pose2(1, 0, turn))
+
+
+@pytest.mark.parametrize("leaves", [5, 39])
+def test_what_is_new_is_placed_after_a_solution_that_a_time_limit_has_left(leaves):
+    ends = []
+    for name, limit in [("batch", 0), ("incremental_cholesky", 0), ("incremental_cholesky", 1e-9)]:
+        estimator, loop = circle(40, name)
+        estimator.add(loop, sigmas=0.001)
+        report = estimator.update(max_seconds=limit)
+        assert (report.owed > 0) == (limit > 0)
+        estimator.add(40, cairn.Pose2)
+        estimator.add(cairn.Between(39, 40, cairn.Pose2(1, 0, 0.1)), sigmas=0.1)
+        estimator.marginalize(leaves)
+        estimator.update(max_seconds=limit)
+        assert estimator.update(full=True).converged
+        ends.append(estimator.estimate(40).state)
+    assert_allclose(ends[1:], [ends[0]] * 2, atol=1e-6)
+
+
+@pytest.mark.parametrize("keep", ["none", "diagonal"])
+def test_covariances_are_those_of_the_end_of_a_solution_that_a_time_limit_has_left(keep):
+    estimator, loop = circle(12, keep=keep)
+    estimator.add(loop, sigmas=0.001)
+    closure = estimator.update().first_factor
+    estimator.remove(factors=closure)
+    assert estimator.update(max_seconds=1e-9).owed > 0
+    finished = estimator.copy()
+    finished.update(full=True)
+    assert_allclose(estimator.covariance(11), finished.covariance(11), rtol=1e-3)
