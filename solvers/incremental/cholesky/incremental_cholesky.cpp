@@ -52,41 +52,34 @@ IncrementalCholesky::IncrementalCholesky(const IncrementalCholesky& other)
 
 UpdateReport IncrementalCholesky::update(const GraphUpdate& update, const UpdateOptions& options) {
   const Clock::time_point begin = Clock::now();
-  UpdateReport report;
-  const bool full =
-      options.full || (options_.full_every > 0 && since_full_ + 1 >= options_.full_every);
-  if (engine_->busy() && (full || takes_out(update))) end_solution(report);
-  const Clock::time_point solved = Clock::now();
   if (engine_->dead() > 0) {
     engine_->compact();
     forget_what_was_read();
   }
-  GraphUpdate checked = update;
-  const auto state_of = [this](Id id) {
-    const auto v = find(id);
-    return v ? state(id) : std::span<const double>();
-  };
-  place_variables(checked, state_of);
-  check_update(
-      engine_->graph(),
-      {.position = [this](FactorId id) { return position(id); }, .next = engine_->next_id()},
-      checked);
-  if (options_.hints)
-    replace_poor_states(checked, state_of, losses_.empty() ? Deciding::all : Deciding::first);
-  forget_what_was_read();
-  if (checked.marginalized.empty()) {
-    apply(checked, report);
-  } else {  // which may fail, on numbers
-    const IncrementalCholesky before(*this);
-    try {
-      apply(checked, report);
-    } catch (...) {
-      engine_ = std::make_unique<Engine>(*before.engine_);
-      variables_ = before.variables_;
-      factors_ = before.factors_;
-      losses_ = before.losses_;
-      throw;
+  const bool full =
+      options.full || (options_.full_every > 0 && since_full_ + 1 >= options_.full_every);
+  GraphUpdate checked = placed(update);
+  // An update may be refused on numbers where something is marginalised.
+  std::unique_ptr<IncrementalCholesky> before;
+  if (!checked.marginalized.empty()) before = std::make_unique<IncrementalCholesky>(*this);
+  UpdateReport report;
+  Clock::time_point solved = begin;
+  try {
+    if (engine_->busy() && (full || takes_out(update))) {
+      end_solution(report);
+      solved = Clock::now();
+      checked = placed(update);
     }
+    apply(checked, report);
+  } catch (...) {
+    if (before) {
+      engine_ = std::make_unique<Engine>(*before->engine_);
+      variables_ = before->variables_;
+      factors_ = before->factors_;
+      losses_ = before->losses_;
+      forget_what_was_read();
+    }
+    throw;
   }
   report.seconds.linearize += seconds_since(solved);
 
@@ -113,14 +106,29 @@ UpdateReport IncrementalCholesky::update(const GraphUpdate& update, const Update
   return report;
 }
 
+/// The update with its new variables placed by the estimate, if it is one that can be carried out.
+GraphUpdate IncrementalCholesky::placed(const GraphUpdate& update) {
+  GraphUpdate result = update;
+  const auto state_of = [this](Id id) {
+    const auto v = find(id);
+    return v ? state(id) : std::span<const double>();
+  };
+  place_variables(result, state_of);
+  check_update(
+      engine_->graph(),
+      {.position = [this](FactorId id) { return position(id); }, .next = engine_->next_id()},
+      result);
+  if (options_.hints)
+    replace_poor_states(result, state_of, losses_.empty() ? Deciding::all : Deciding::first);
+  forget_what_was_read();
+  return result;
+}
+
 /// Ends a solution that an update with a time limit has left, before new variables are placed by
 /// its states, or something is taken out. What it cost is in the report.
 void IncrementalCholesky::end_solution(UpdateReport& report) {
   UpdateReport of_solution;
   engine_->solve(0.0, of_solution);
-  if (of_solution.ok && engine_->up_to_date() && engine_->covariances().keeps_anything())
-    engine_->update_covariances();
-  forget_what_was_read();
   report.iterations = of_solution.iterations;
   report.affected_variables = of_solution.affected_variables;
   report.relinearized_factors = of_solution.relinearized_factors;

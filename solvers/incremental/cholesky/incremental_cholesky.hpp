@@ -105,6 +105,7 @@ class IncrementalCholesky final : public Estimator {
   }
   Engine& solved();
   int place_in(const Engine& engine, Id id) const;
+  GraphUpdate placed(const GraphUpdate& update);
   void end_solution(UpdateReport& report);
   void note_gauge(UpdateReport& report);
 
