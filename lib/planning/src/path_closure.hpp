@@ -61,8 +61,8 @@ class MarginalUpdates {
 
   /// Σ ln|Σ_ii| now, with the prior.
   double sum() const { return sum_; }
-  /// `PathClosure::change`. A path that closes several loops before it is asked for takes little
-  /// more time than the last of them.
+  /// `PathClosure::change`. The loops that a path has closed since it was asked for last are worked
+  /// off together, in one pass over the poses.
   double change(const PathClosure& closure);
   /// Z of the closures for one pose of the graph.
   void whiten(std::span<const PathClosure* const> closures, int pose,
