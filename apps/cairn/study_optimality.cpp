@@ -218,10 +218,12 @@ Command add_study_optimality(ArgumentParser study) {
       .type_name("N")
       .within(2, 1000000)
       .show_default();
-  cli.add_option("--loop-gain", options->loop_gain,
-                 "information that a loop closure on a path must exceed [nats]")
+  cli.add_option(
+         "--loop-gain", options->loop_gain,
+         "information that a loop closure on a path must exceed [nats]; negative: that of the "
+         "policy")
       .type_name("X")
-      .within(0.0, 1e9)
+      .within(-1.0, 1e9)
       .show_default();
   cli.add_option("--linear-solver", options->solver, "factorises the matrix of the graph")
       .component({"linear_solver"})

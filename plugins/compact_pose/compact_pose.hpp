@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <cstddef>
 #include <deque>
@@ -70,6 +71,7 @@ class CompactPose final : public PosePolicy, public OptionFinder {
   std::vector<Id> landmarks() const override { return graph_.landmarks(); }
   std::vector<Id> undetermined() const override;
   int factor_count() const override { return graph_.factor_count(); }
+  std::optional<double> link_gain() const override { return std::max(loop_gain_, 0.0); }
   std::vector<double> newest_state() const override;
   const std::vector<OdometryChain>& chains() const override { return graph_.chains(); }
   void keep_chains(bool keep) override { graph_.keep_chains(keep); }

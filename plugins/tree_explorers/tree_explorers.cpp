@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -66,6 +68,8 @@ struct ErrtStarOptions {
 constexpr double kGrowthPart = 0.3, kTreePart = 0.8;
 /// And the least that is left for it.
 constexpr double kLeastPart = 0.2;
+/// Paths of a tree that are evaluated exactly at least, the best ones by their estimates.
+constexpr std::size_t kEvaluated = 32;
 /// Further candidates that a decision lists, and how far their ends are apart [m].
 constexpr std::size_t kListed = 10;
 constexpr double kApart = 1.0;
@@ -123,10 +127,10 @@ class TreeExplorer : public Explorer {
     // What came before is part of the time, but there must be a tree.
     const double left =
         std::max(situation.budget - seconds_since(begin), kLeastPart * situation.budget);
-    const Search search = grow(space, value, left);
+    Search search = grow(space, value, left);
+    const std::vector<std::size_t> best = best_nodes(search, value);
     add_tree(search, decision);
     if (!search.complete) decision.notes.emplace_back("trees were cut short by the time budget");
-    const std::vector<std::size_t> best = best_nodes(search);
     for (const std::size_t node : best)
       decision.candidates.push_back(candidate(search, node, situation));
     if (best.empty() || !(search.values[best.front()]->value < -options_.least_gain)) {
@@ -177,21 +181,38 @@ class TreeExplorer : public Explorer {
     }
   }
 
-  /// The best one and further ones of which each ends away from the others, best first.
-  static std::vector<std::size_t> best_nodes(const Search& search) {
+  /// The best one and further ones of which each ends away from the others, best first, with their
+  /// exact values. Of all paths those may be better that are estimated to be worse than these.
+  static std::vector<std::size_t> best_nodes(Search& search, const PathValue& value) {
+    const auto value_of = [&](std::size_t k) { return search.values[k]->value; };
     std::vector<std::size_t> nodes;
     for (std::size_t k = 1; k < search.points.size(); ++k) {
       if (search.values[k] && search.values[k]->information.steps() > 0) nodes.push_back(k);
     }
-    std::ranges::stable_sort(nodes, {}, [&](std::size_t k) { return search.values[k]->value; });
+    std::ranges::stable_sort(nodes, {}, value_of);
+    double least = std::numeric_limits<double>::infinity();
+    std::size_t count = 0;
+    for (; count < nodes.size(); ++count) {
+      std::optional<PathValue::State>& state = search.values[nodes[count]];
+      if (count >= kEvaluated && !(state->value < least)) break;
+      state = value.evaluated(*std::move(state));
+      least = std::min(least, state->value);
+    }
+    std::ranges::stable_sort(nodes.begin(), nodes.begin() + static_cast<std::ptrdiff_t>(count), {},
+                             value_of);
     std::vector<std::size_t> listed;
     for (const std::size_t node : nodes) {
       const bool apart = std::ranges::all_of(listed, [&](std::size_t other) {
         return (search.points[node] - search.points[other]).norm() > kApart;
       });
-      if (apart) listed.push_back(node);
+      if (!apart) continue;
+      std::optional<PathValue::State>& state = search.values[node];
+      if (!state->is_exact) state = value.evaluated(*std::move(state));
+      listed.push_back(node);
       if (listed.size() > kListed) break;
     }
+    // Those behind the best were in the order of their estimates.
+    std::ranges::stable_sort(listed, {}, value_of);
     return listed;
   }
 

@@ -266,13 +266,15 @@ class Run {
   }
 
   Situation situation(const FloorMap& map, std::span<const Id> kept) {
+    MatchModel match = parts_.match;
+    match.loop_gain = parts_.policy.link_gain().value_or(match.loop_gain);
     return {.estimator = parts_.policy.estimator(),
             .poses = kept,
             .pose = slam_.pose(),
             .map = map,
             .robot = robot_,
             .decision = decisions_,
-            .match = parts_.match,
+            .match = match,
             .first_sigma = parts_.first_sigma,
             .budget = parts_.decision_budget};
   }

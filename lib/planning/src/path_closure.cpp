@@ -34,17 +34,26 @@ std::vector<const PathClosure*> in_order(const PathClosure* last) {
   return closures;
 }
 
-MarginalUpdates::MarginalUpdates(PoseCovariances& covariances, double memory)
-    : covariances_(covariances), kernel_(choose_marginal_kernel()) {
-  const auto padded = static_cast<std::size_t>(covariances.padded());
+MarginalUpdates::MarginalUpdates(PoseCovariances& covariances, double memory, int most_poses,
+                                 ClosureEffect PathClosure::*effect)
+    : covariances_(covariances),
+      effect_(effect),
+      kernel_(choose_marginal_kernel()),
+      every_((covariances.size() + most_poses - 1) / most_poses),
+      count_(static_cast<std::size_t>((covariances.size() + every_ - 1) / every_)),
+      padded_((count_ + PoseCovariances::kLanes - 1) / PoseCovariances::kLanes *
+              PoseCovariances::kLanes),
+      last_weight_(covariances.size() - every_ * (static_cast<int>(count_) - 1)),
+      columns_(is_of_all() ? 0 : static_cast<std::size_t>(covariances.size())) {
+  const std::size_t padded = padded_;
   diagonal_.assign(6 * padded, 0.0);
   inverse_determinants_.assign(padded, 1.0);
   ratios_.assign(padded, 1.0);
   for (std::size_t i = 0; i < padded; ++i) {
     // A pose without uncertainty counts as one with |Σ_ii| = 1, before and after.
     Matrix3d D = Matrix3d::Identity();
-    if (i < static_cast<std::size_t>(covariances.size())) {
-      const Matrix3d now = covariances.diagonal(static_cast<int>(i)) + covariances.prior();
+    if (i < count_) {
+      const Matrix3d now = covariances.diagonal(pose(i)) + covariances.prior();
       if (now.determinant() > 0.0) D = now;
     }
     std::size_t entry = 0;
@@ -58,9 +67,21 @@ MarginalUpdates::MarginalUpdates(PoseCovariances& covariances, double memory)
   most_kept_ = static_cast<std::size_t>(memory / each) + 1;
 }
 
+const double* MarginalUpdates::column(int a) {
+  if (is_of_all()) return covariances_.column(a);
+  std::vector<double>& column = columns_[static_cast<std::size_t>(a)];
+  if (!column.empty()) return column.data();
+  const double* all = covariances_.column(a);
+  column.assign(9 * padded_, 0.0);
+  for (std::size_t entry = 0; entry < 9; ++entry, all += covariances_.padded()) {
+    for (std::size_t i = 0; i < count_; ++i) column[entry * padded_ + i] = all[pose(i)];
+  }
+  return column.data();
+}
+
 double MarginalUpdates::change(const PathClosure& closure) {
-  if (!closure.change) update(in_order(&closure));
-  return *closure.change;
+  if (!(closure.*effect_).change) update(in_order(&closure));
+  return *(closure.*effect_).change;
 }
 
 std::shared_ptr<UpdatedMarginals> MarginalUpdates::unused() {
@@ -73,16 +94,15 @@ std::shared_ptr<UpdatedMarginals> MarginalUpdates::unused() {
   // A new control block: the closure whose marginals these were must not find them again.
   auto fresh = std::make_shared<UpdatedMarginals>();
   if (free) std::swap(*fresh, *free);
-  const auto padded = static_cast<std::size_t>(covariances_.padded());
-  fresh->Z.resize(9 * padded);
-  fresh->diagonal.resize(6 * padded);
+  fresh->Z.resize(9 * padded_);
+  fresh->diagonal.resize(6 * padded_);
   kept_.push_back(fresh);
   return fresh;
 }
 
 void MarginalUpdates::update(std::span<const PathClosure* const> closures) {
   std::vector<std::shared_ptr<const UpdatedMarginals>> after;  // each of the closures
-  for (const PathClosure* closure : closures) after.push_back(closure->marginals.lock());
+  for (const PathClosure* closure : closures) after.push_back((closure->*effect_).marginals.lock());
   after.back() = nullptr;
   std::vector<const double*> Z(closures.size());
   std::vector<MarginalUpdate> updates;
@@ -91,9 +111,9 @@ void MarginalUpdates::update(std::span<const PathClosure* const> closures) {
     if (!after[k]) {
       const std::shared_ptr<UpdatedMarginals> updated = unused();
       updates.push_back(
-          {.padded = covariances_.padded(),
-           .newest = covariances_.column(covariances_.size() - 1),
-           .other = covariances_.column(closure.pose),
+          {.padded = static_cast<int>(padded_),
+           .newest = column(covariances_.size() - 1),
+           .other = column(closure.pose),
            .closures = static_cast<int>(k),
            .Z_before = Z.data(),
            .coupling = closure.coupling.empty() ? nullptr : closure.coupling.front().data(),
@@ -103,13 +123,15 @@ void MarginalUpdates::update(std::span<const PathClosure* const> closures) {
            .Z = updated->Z.data(),
            .updated = updated->diagonal.data(),
            .ratios = k + 1 == closures.size() ? ratios_.data() : nullptr});
-      closure.marginals = updated;
+      (closure.*effect_).marginals = updated;
       after[k] = updated;
     }
     Z[k] = after[k]->Z.data();
   }
   kernel_(updates.data(), static_cast<int>(updates.size()));
-  closures.back()->change = sum_of_logarithms(ratios_);
+  const std::span<const double> ratios(ratios_);
+  (closures.back()->*effect_).change = every_ * sum_of_logarithms(ratios.first(count_ - 1)) +
+                                       last_weight_ * std::log(ratios[count_ - 1]);
 }
 
 void MarginalUpdates::whiten(std::span<const PathClosure* const> closures, int pose,
@@ -118,16 +140,23 @@ void MarginalUpdates::whiten(std::span<const PathClosure* const> closures, int p
   const int newest = covariances_.size() - 1;
   for (std::size_t c = 0; c < closures.size(); ++c) {
     const PathClosure& closure = *closures[c];
-    if (const auto kept = closure.marginals.lock()) {
+    if (const auto kept = (closure.*effect_).marginals.lock()) {
       const double* entries = kept->Z.data() + pose;
       for (std::ptrdiff_t entry = 0; entry < 9; ++entry)
         Z[c].data()[entry] = entries[entry * covariances_.padded()];
       continue;
     }
+    const auto known = std::ranges::find(closure.poses, pose);
+    if (known != closure.poses.end()) {
+      Z[c] = closure.pose_Z[static_cast<std::size_t>(known - closure.poses.begin())];
+      continue;
+    }
     Matrix3d y =
         (covariances_.block(pose, newest) - covariances_.block(pose, closure.pose)).transpose();
-    for (std::size_t b = 0; b < c; ++b) y -= closure.coupling[b] * Z[b];
-    Z[c] = closure.inverse * y;
+    for (std::size_t b = 0; b < c; ++b) y.noalias() -= closure.coupling[b] * Z[b];
+    Z[c].noalias() = closure.inverse * y;
+    closure.poses.push_back(pose);
+    closure.pose_Z.push_back(Z[c]);
   }
 }
 

@@ -15,7 +15,7 @@
 
 namespace cairn {
 
-/// The marginals of the graph's poses after a loop closure on a path, stored as the columns of
+/// The marginals of poses of the graph after a loop closure on a path, stored as the columns of
 /// `PoseCovariances` are.
 struct UpdatedMarginals {
   /// Z_i = L⁻¹ cov(y, ε_i) of this closure, by which Σ_ii has become less: Σ'_ii = Σ_ii − Z_iᵀ Z_i.
@@ -23,6 +23,14 @@ struct UpdatedMarginals {
   std::vector<double> Z;
   /// Σ'_ii with the prior after all closures so far, its lower triangle by columns.
   std::vector<double> diagonal;
+};
+
+/// What a path's loop closures do to the poses of the graph, as far as it has been computed.
+struct ClosureEffect {
+  /// As long as they are kept.
+  mutable std::weak_ptr<const UpdatedMarginals> marginals;
+  /// Σ ln(|Σ'_ii| / |Σ_ii|) of the graph's poses after this closure and those before it.
+  mutable std::optional<double> change;
 };
 
 /// A loop closure on a path: the measurement y = ε_k − ε_l + ν of a pose k of the path and l of the
@@ -43,39 +51,62 @@ struct PathClosure {
   /// Of the poses 1 … k − 1 of the path: Z, and Σ'_jj without the prior after all closures so far.
   /// With these stored, a further closure takes time as there are closures, not as their square.
   std::vector<Eigen::Matrix3d> path_Z, path_posterior;
-  /// As long as they are kept.
-  mutable std::weak_ptr<const UpdatedMarginals> marginals;
-  /// Σ ln(|Σ'_ii| / |Σ_ii|) of the graph's poses after this closure and those before it, once it
-  /// has been asked for.
-  mutable std::optional<double> change;
+  /// Z of those poses of the graph for which it has been computed one by one.
+  mutable std::vector<int> poses;
+  mutable std::vector<Eigen::Matrix3d> pose_Z;
+  /// On all poses of the graph, and estimated by a few of them.
+  ClosureEffect exact, estimate;
 };
 
 /// The closures of a path in their order.
 std::vector<const PathClosure*> in_order(const PathClosure* last);
 
-/// The marginals of the graph's poses after the closures of a path.
+/// The marginals of the graph's poses after the closures of a path, of all of them or of a few by
+/// which the others are estimated: marginals change smoothly along a trajectory.
 class MarginalUpdates {
  public:
-  /// `memory`: for those that are kept [bytes].
-  MarginalUpdates(PoseCovariances& covariances, double memory);
+  /// The effect of a closure on all poses, for which `memory` is kept [bytes].
+  MarginalUpdates(PoseCovariances& covariances, double memory)
+      : MarginalUpdates(covariances, memory, covariances.size(), &PathClosure::exact) {}
+  /// The estimate by at most `most_poses` (1 or more) of them: each stands for a part of the
+  /// trajectory, of the same length but for the last one, in the middle of which it is.
+  MarginalUpdates(PoseCovariances& covariances, double memory, int most_poses)
+      : MarginalUpdates(covariances, memory, most_poses, &PathClosure::estimate) {}
 
-  /// Σ ln|Σ_ii| now, with the prior.
+  /// Whether it is of all poses.
+  bool is_of_all() const { return every_ == 1; }
+  /// Σ ln|Σ_ii| now, with the prior, of its poses.
   double sum() const { return sum_; }
-  /// `PathClosure::change`. The loops that a path has closed since it was asked for last are worked
-  /// off together, in one pass over the poses.
+  /// `ClosureEffect::change`. The loops that a path has closed since it was asked for last are
+  /// worked off together, in one pass over the poses.
   double change(const PathClosure& closure);
-  /// Z of the closures for one pose of the graph.
+  /// Z of the closures for one pose of the graph, with what they know of it already; only where it
+  /// is of all poses.
   void whiten(std::span<const PathClosure* const> closures, int pose,
               std::vector<Eigen::Matrix3d>& Z);
 
  private:
+  MarginalUpdates(PoseCovariances& covariances, double memory, int most_poses,
+                  ClosureEffect PathClosure::*effect);
+  /// The number in the graph of its pose i: the middle one of those for which it stands.
+  int pose(std::size_t i) const {
+    const int begin = every_ * static_cast<int>(i);
+    return begin + (i + 1 < count_ ? every_ : last_weight_) / 2;
+  }
+  /// Σ_ia of its poses.
+  const double* column(int a);
   /// Computes the marginals after the last of the closures, with those before that are not kept,
   /// and its change.
   void update(std::span<const PathClosure* const> closures);
   std::shared_ptr<UpdatedMarginals> unused();
 
   PoseCovariances& covariances_;
+  ClosureEffect PathClosure::*effect_;
   UpdateMarginals kernel_;
+  int every_;                                            ///< poses for which one stands
+  std::size_t count_, padded_;                           ///< its poses
+  int last_weight_;                                      ///< poses for which the last one stands
+  std::vector<std::vector<double>> columns_;             ///< of its poses, where it has not all
   std::vector<double> diagonal_, inverse_determinants_;  ///< with the prior, now
   std::vector<double> ratios_;
   double sum_ = 0.0;

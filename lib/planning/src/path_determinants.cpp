@@ -33,7 +33,7 @@ PathDeterminants::PathDeterminants(const Situation& situation, double loop_gain,
       to_robot_(Matrix3d::Zero()),
       robot_(situation.pose),
       log_match_(std::log(match_.covariance().determinant())),
-      least_determinant_(std::exp(log_match_ + 2.0 * loop_gain)),
+      least_determinant_(std::exp(log_match_ + 2.0 * match_.loop_gain_unless(loop_gain))),
       partner_of_(situation.poses.size(), -1) {
   if (const auto since = motion_since_newest(situation))
     to_robot_ = covariances_.moved(robot_, odometry_.covariance(*since));

@@ -45,12 +45,15 @@ class PathInformation::Model {
   Model(const Situation& situation, const PathInformationOptions& options, CanMatch can_match)
       : covariances_(situation, situation.pose),
         updates_(covariances_, options.memory * 1e6),
+        estimates_(covariances_, options.memory * 1e6,
+                   options.sampled_poses > 0 ? options.sampled_poses : covariances_.size()),
         options_(options),
         can_match_(std::move(can_match)),
         match_(situation.match),
         odometry_(situation.robot.odometry),
         index_(covariances_.poses(), situation.pose, situation.match),
         newest_(covariances_.size() - 1),
+        loop_gain_(match_.loop_gain_unless(options.loop_gain)),
         factor_(options.entropy == EntropyForm::standard ? 0.5 : 1.0),
         log_match_(std::log(match_.covariance().determinant())) {
     start_ = std::make_shared<Node>();
@@ -86,10 +89,13 @@ class PathInformation::Model {
     return next;
   }
 
-  /// Of the trajectory's entropy.
-  double change(const Node& node) {
+  /// Of the trajectory's entropy, exactly or estimated.
+  double change(const Node& node, bool is_exact) {
     double sum = updates_.sum() + node.path_sum;
-    if (node.closure && options_.loops == LoopForm::exact) sum += updates_.change(*node.closure);
+    if (node.closure && options_.loops == LoopForm::exact) {
+      MarginalUpdates& updates = is_exact || estimates_.is_of_all() ? updates_ : estimates_;
+      sum += updates.change(*node.closure);
+    }
     return factor_ * (sum / (covariances_.size() + node.steps) - mean());
   }
 
@@ -139,7 +145,7 @@ class PathInformation::Model {
       }
       S = symmetric(S);
       const double gain = std::log(S.determinant()) - log_match_;
-      if (!(gain > 2.0 * options_.loop_gain)) return;
+      if (!(gain > 2.0 * loop_gain_)) return;
       const Matrix3d after =
           node.posterior + covariances_.prior() - K * S.inverse() * K.transpose();
       const double determinant = after.determinant();
@@ -213,7 +219,7 @@ class PathInformation::Model {
     const Matrix3d now = node.posterior + covariances_.prior();
     Matrix3d after;
     int best = -1;
-    double least = now.determinant() * std::exp(-2.0 * options_.loop_gain);
+    double least = now.determinant() * std::exp(-2.0 * loop_gain_);
     for_matches(node.pose, [&](int l) {
       const Matrix3d older = std::cbrt(ratio(node.closure.get(), l)) *
                              (covariances_.diagonal(l) + covariances_.prior());
@@ -239,21 +245,26 @@ class PathInformation::Model {
   }
 
   PoseCovariances covariances_;
-  MarginalUpdates updates_;
+  MarginalUpdates updates_, estimates_;
   PathInformationOptions options_;
   CanMatch can_match_;
   MatchModel match_;
   OdometryModel odometry_;
   MatchIndex index_;
   int newest_;
-  double factor_, log_match_;
+  double loop_gain_, factor_, log_match_;
   std::shared_ptr<Node> start_;
 };
 
 const Pose2& PathInformation::State::pose() const { return node_->pose; }
 int PathInformation::State::steps() const { return node_->steps; }
 double PathInformation::State::length() const { return node_->length; }
-double PathInformation::State::trajectory_change() const { return node_->model->change(*node_); }
+double PathInformation::State::trajectory_change() const {
+  return node_->model->change(*node_, true);
+}
+double PathInformation::State::estimated_trajectory_change() const {
+  return node_->model->change(*node_, false);
+}
 double PathInformation::State::odometry_log_determinant() const { return node_->odometry; }
 double PathInformation::State::loop_log_determinant() const { return node_->loop; }
 int PathInformation::State::loops() const { return node_->closure ? node_->closure->count : 0; }

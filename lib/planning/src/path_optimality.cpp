@@ -72,7 +72,7 @@ class LaplacianOptimalities final : public PathOptimalities::Model {
   LaplacianOptimalities(const Situation& situation, const PathOptimalityOptions& options,
                         LinearSolver& solver)
       : situation_(situation),
-        loop_gain_(options.loop_gain),
+        loop_gain_(situation.match.loop_gain_unless(options.loop_gain)),
         match_weight_(edge_weight(situation.match.covariance())),
         laplacian_(situation.estimator.graph(), situation.poses, solver),
         poses_(poses_of(situation)),

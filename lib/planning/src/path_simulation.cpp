@@ -97,6 +97,7 @@ std::optional<SimulatedDrive::Closure> PathSimulation::closure(SimulatedGraph& g
   const Matrix3d prior =
       moved * situation_.first_sigma.array().square().matrix().asDiagonal() * moved.transpose();
   const Matrix3d R = situation_.match.covariance();
+  const double loop_gain = situation_.match.loop_gain_unless(options_.loop_gain);
   SimulatedDrive::Closure best{.newer = newest};
   double least = std::numeric_limits<double>::infinity();
   for (std::size_t k = 0; k < ids.size(); ++k) {
@@ -108,7 +109,7 @@ std::optional<SimulatedDrive::Closure> PathSimulation::closure(SimulatedGraph& g
     const Matrix3d K = kk - kl * A.transpose();
     const Matrix3d S = K - A * (kl.transpose() - ll * A.transpose());
     const double gain = information_gain(S, R);
-    if (!(gain > options_.loop_gain)) continue;
+    if (!(gain > loop_gain)) continue;
     const Matrix3d after = kk + prior - K * (S + R).inverse() * K.transpose();
     const double determinant = after.determinant();
     if (!(determinant < least)) continue;

@@ -73,8 +73,14 @@ PathValue::State PathValue::extended(const State& path, const Vector2d&, const V
   next.segment = segment(path.information.pose(), to, before);
   next.information = information_.extended(path.information, next.segment->motions);
   next.cells = path.cells + path.seen->missing(next.segment->seen);
-  evaluate(next);
+  evaluate(next, next.information.estimated_trajectory_change());
   return next;
+}
+
+PathValue::State PathValue::evaluated(State path) const {
+  evaluate(path, path.information.trajectory_change());
+  path.is_exact = true;
+  return path;
 }
 
 PathValue::State PathValue::adopted(State path, const State& parent) const {
@@ -99,10 +105,9 @@ std::shared_ptr<const PathValue::Segment> PathValue::segment(const Pose2& start,
   return segment;
 }
 
-void PathValue::evaluate(State& path) const {
-  path.change =
-      objective_.change(path.information.trajectory_change(), seen_.entropy_change(path.cells),
-                        now_, path.information.covariance());
+void PathValue::evaluate(State& path, double trajectory_change) const {
+  path.change = objective_.change(trajectory_change, seen_.entropy_change(path.cells), now_,
+                                  path.information.covariance());
   if (path.information.steps() == 0) return;
   path.value = objective_.value(path.change, map_now_, now_) /
                std::max(path.information.length(), situation_.robot.step);

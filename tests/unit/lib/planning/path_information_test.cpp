@@ -122,6 +122,84 @@ TEST(PathInformation, PathsOfATreeDoNotDependOnTheOrderOrTheMemory) {
               a[best].trajectory_change(), 1e-9);
 }
 
+/// Estimated by the poses in the middle of parts of the trajectory, from full inference.
+TEST(PathInformation, AnEstimateIsByTheMiddlePoseOfEachPart) {
+  constexpr int kPoses = 45, kSampled = 7, kPart = 7, kLastPart = 3;
+  static_assert((kSampled - 1) * kPart + kLastPart == kPoses);
+  int loops = 0;
+  for (std::uint64_t seed = 1; seed <= 12; ++seed) {
+    const PathGraph graph = test::wandering(kPoses, 7.0, seed);
+    PathInformation information(
+        graph.situation(),
+        {.entropy = EntropyForm::thesis, .loop_gain = 0.2, .sampled_poses = kSampled});
+    RandomNumbers random(seed + 100);
+    const State end = information.extended(information.start(),
+                                           test::random_motions(graph.pose, 25, 7.0, random));
+    loops += end.loops();
+    const std::vector<double> now = test::infer(graph, information.start()).log_determinants;
+    const test::FullInference full = test::infer(graph, end);
+    double sum = 0.0, sum_now = 0.0;
+    for (std::size_t i = 0; i < full.log_determinants.size(); ++i) {
+      if (i >= kPoses)
+        sum += full.log_determinants[i];
+      else
+        sum_now += now[i];
+    }
+    for (int part = 0; part < kSampled; ++part) {
+      const int length = part + 1 < kSampled ? kPart : kLastPart;
+      const auto middle = static_cast<std::size_t>(part * kPart + length / 2);
+      sum += length * (full.log_determinants[middle] - now[middle]);
+    }
+    const double expected = (sum_now + sum) / (kPoses + end.steps()) - sum_now / kPoses;
+    EXPECT_NEAR(end.estimated_trajectory_change(), expected, 1e-8);
+    EXPECT_NEAR(end.trajectory_change(), full.trajectory_entropy, 1e-8);
+  }
+  EXPECT_GT(loops, 10);
+}
+
+TEST(PathInformation, AnEstimateByAllPosesHasTheBitsOfTheExactValue) {
+  const PathGraph graph = test::wandering(45, 7.0, 3);
+  for (const int sampled : {0, 45, 1000}) {
+    PathInformation information(graph.situation(), {.loop_gain = 0.2, .sampled_poses = sampled});
+    RandomNumbers random(5);
+    const State end = information.extended(information.start(),
+                                           test::random_motions(graph.pose, 25, 7.0, random));
+    EXPECT_GT(end.loops(), 0);
+    EXPECT_EQ(end.estimated_trajectory_change(), end.trajectory_change());
+  }
+}
+
+/// On a long trajectory, where the default samples every fifth pose.
+TEST(PathInformation, AnEstimateIsNearTheExactValue) {
+  const PathGraph graph = test::wandering(600, 12.0, 4);
+  PathInformation information(graph.situation(), {.loop_gain = 0.2});
+  RandomNumbers random(5);
+  double error = 0.0, size = 0.0;
+  for (int path = 0; path < 40; ++path) {
+    const State end = information.extended(information.start(),
+                                           test::random_motions(graph.pose, 30, 12.0, random));
+    const double exact = end.trajectory_change();
+    error += std::pow(end.estimated_trajectory_change() - exact, 2);
+    size += exact * exact;
+  }
+  EXPECT_GT(error, 0.0);
+  EXPECT_LT(std::sqrt(error), 0.05 * std::sqrt(size)) << std::sqrt(error / size);
+}
+
+TEST(PathInformation, ExpectsTheLoopClosuresOfThePolicy) {
+  PathGraph graph = test::wandering(45, 7.0, 3);
+  RandomNumbers random(5);
+  const std::vector<Pose2> motions = test::random_motions(graph.pose, 40, 7.0, random);
+  const auto loops = [&](double of_policy, double option) {
+    graph.match.loop_gain = of_policy;
+    PathInformation information(graph.situation(), {.loop_gain = option});
+    return information.extended(information.start(), motions).loops();
+  };
+  EXPECT_GT(loops(0.2, -1.0), loops(5.0, -1.0));
+  EXPECT_EQ(loops(0.2, -1.0), loops(5.0, 0.2));
+  EXPECT_EQ(loops(5.0, -1.0), loops(0.2, 5.0));
+}
+
 TEST(PathInformation, TheStandardEntropyChangesHalfAsMuch) {
   const PathGraph graph = test::wandering(40, 6.0, 9);
   PathInformation standard(graph.situation()), thesis(graph.situation(), kThesisEntropy);

@@ -146,6 +146,29 @@ TEST(PathValue, OfATreeOfShortPathsIsThatOfEachPathAnew) {
   }
 }
 
+TEST(PathValue, EvaluatesEstimatedPathsExactly) {
+  const test::PathGraph graph = test::partly_explored(2);
+  const Situation situation = graph.situation();
+  const FreeSpace space(graph.map, graph.pose.translation(), graph.robot.radius);
+  PathValueOptions options;
+  options.information.sampled_poses = 3;
+  PathValue value(situation, options);
+  RrtStar<PathValue> tree(space, value, {});
+  RandomNumbers random(2);
+  tree.grow(random, 2.0);
+  int estimated = 0;
+  for (int k = 1; k < tree.size(); k += 3) {
+    const PathValue::State& state = tree.nodes()[std::size_t(k)].state;
+    const double expected = literal_value(graph, options, points_to(tree, k));
+    EXPECT_FALSE(state.is_exact);
+    const PathValue::State exact = value.evaluated(state);
+    EXPECT_TRUE(exact.is_exact);
+    EXPECT_NEAR(exact.value, expected, 1e-8 * (1.0 + std::abs(expected))) << k;
+    estimated += std::abs(state.value - expected) > 1e-6 * std::abs(expected);
+  }
+  EXPECT_GT(estimated, 5);
+}
+
 TEST(PathValue, CellsThatAreLeftOutDoNotCount) {
   const test::PathGraph graph = test::partly_explored(3);
   const Situation situation = graph.situation();

@@ -11,6 +11,8 @@
 #include "cairn/exploration/exploration.hpp"
 #include "cairn/grid/floor_plan.hpp"
 #include "cairn/planning/free_space.hpp"
+#include "cairn/planning/path_information.hpp"
+#include "cairn/planning/path_motions.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "support/exploration_runs.hpp"
 #include "unit/plugins/tree_explorers/known_floor.hpp"
@@ -53,6 +55,54 @@ TEST_P(TreeExplorers, DriveAlongTheBestPathOfTheirTree) {
   };
   run_exploration(exploration);
   EXPECT_GT(driven, 2);
+}
+
+/// What a tree estimates by two poses of the graph alone is exact where it decides.
+TEST_P(TreeExplorers, ListCandidatesWithExactValues) {
+  const OccupancyGrid floor = test::known_floor("rooms:width=12,height=9", 3).floor;
+  ExplorationParts parts(kNoisyRobot,
+                         std::string(GetParam()) + ":density=2,sampled_poses=2,loop_gain=0.1");
+  Exploration exploration = parts.on(floor);
+  exploration.limits.decisions = 8;
+  int with_loops = 0;
+  exploration.decided = [&](const Decision& decision, const Situation& situation) {
+    const auto in_sight = [&](const Pose2&, const Pose2&) { return true; };
+    PathInformation information(situation, {.loop_gain = 0.1}, in_sight);
+    for (const Candidate& candidate : decision.candidates) {
+      if (!candidate.change || candidate.path.points.size() < 2) continue;
+      PathInformation::State path = information.start();
+      for (std::size_t k = 1; k < candidate.path.points.size(); ++k) {
+        const PlannedPath segment{.points = {candidate.path.points[k]}, .length = 1.0};
+        path = information.extended(path, motions_along(path.pose(), segment, situation.robot));
+      }
+      // With walls between poses there may be fewer loops.
+      if (candidate.what.find(std::to_string(path.loops()) + " loop closure") == std::string::npos)
+        continue;
+      with_loops += path.loops() > 0;
+      EXPECT_NEAR(candidate.change->trajectory, path.trajectory_change(), 1e-9);
+    }
+    ASSERT_TRUE(std::ranges::is_sorted(decision.candidates, {}, &Candidate::value));
+  };
+  run_exploration(exploration);
+  EXPECT_GT(with_loops, 5);
+}
+
+TEST_P(TreeExplorers, KnowWhichLoopClosuresThePolicyMakes) {
+  const OccupancyGrid floor = test::known_floor("rooms:width=12,height=9", 3).floor;
+  for (const char* gain : {"0.5", "6"}) {
+    ExplorationParts parts(kNoisyRobot, std::string(GetParam()) + ":density=1");
+    parts.policy =
+        parts.make<PosePolicy>(std::string("compact_pose:reuse=false,loop_gain=") + gain);
+    Exploration exploration = parts.on(floor);
+    exploration.limits.decisions = 2;
+    int decisions = 0;
+    exploration.decided = [&](const Decision&, const Situation& situation) {
+      EXPECT_EQ(situation.match.loop_gain, std::stod(gain));
+      ++decisions;
+    };
+    run_exploration(exploration);
+    EXPECT_EQ(decisions, 2);
+  }
 }
 
 TEST_P(TreeExplorers, TheSameSeedGivesTheSameRun) {

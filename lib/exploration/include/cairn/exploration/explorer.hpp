@@ -27,7 +27,12 @@ struct MatchModel {
   double angle = 0.35;  ///< largest difference of the headings [rad]
   /// Standard deviations of a match [m, m, rad].
   Eigen::Vector3d sigma = Eigen::Vector3d(0.05, 0.05, 0.0017);
+  /// Information gain that a loop closure must exceed to be made [nats]: that of `compact_pose` by
+  /// default. `run_exploration` has that of its policy here, where the policy decides by it.
+  double loop_gain = 1.64;
 
+  /// What an option of an explorer chose, or `loop_gain` where that is negative.
+  double loop_gain_unless(double chosen) const { return chosen < 0.0 ? loop_gain : chosen; }
   Eigen::Matrix3d covariance() const { return sigma.array().square().matrix().asDiagonal(); }
 };
 

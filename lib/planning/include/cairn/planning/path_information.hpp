@@ -30,9 +30,12 @@ constexpr auto enum_names(LoopForm) {
 struct PathInformationOptions {
   LoopForm loops = LoopForm::exact;
   EntropyForm entropy = EntropyForm::standard;
-  /// Which a loop closure must exceed to be made [nats]; the default is that of `compact_pose`.
-  double loop_gain = 1.64;
+  /// Which a loop closure must exceed to be made [nats]; negative: `MatchModel::loop_gain`.
+  double loop_gain = -1.0;
   double memory = 32.0;  ///< [MB], for covariances that paths with common beginnings share
+  /// By which `estimated_trajectory_change` estimates the change of all poses of the graph, at
+  /// most; 0: by all.
+  int sampled_poses = 128;
 
   static auto fields() {
     using O = PathInformationOptions;
@@ -41,11 +44,15 @@ struct PathInformationOptions {
                 "covariances after a loop closure: exact, or interpolated as in the thesis (5.16)")
         .choice("entropy", &O::entropy,
                 "of a Gaussian: standard is ½ ln((2πe)ⁿ|Σ|), thesis lacks the root of |Σ|")
-        .real("loop_gain", &O::loop_gain, 0.0, 1e9,
-              "information gain that a loop closure on a path must exceed to be expected [nats]")
+        .real("loop_gain", &O::loop_gain, -1.0, 1e9,
+              "information gain that a loop closure on a path must exceed to be expected [nats]; "
+              "negative: that of the policy")
         .real("memory", &O::memory, 0.0, 1e6,
               "for covariances that paths with common beginnings share [MB]; what does not fit "
-              "is computed again");
+              "is computed again")
+        .integer("sampled_poses", &O::sampled_poses, 0, 2147483647,
+                 "poses of the graph by which the change of all is estimated where paths are only "
+                 "compared, at most; 0: all");
   }
 };
 
@@ -90,6 +97,10 @@ class CAIRN_API PathInformation {
     /// The change of the trajectory's entropy, the mean of that of its poses (thesis, 5.13):
     /// (1/k) Σ_{i≤k} h(Σ'_ii) − (1/n) Σ_{i≤n} h(Σ_ii), n poses now and k with the path [nats].
     double trajectory_change() const;
+    /// The same, but the poses of the graph that loop closures change are estimated by
+    /// `sampled_poses` of them, each of which stands for a part of the trajectory. The time does
+    /// not grow with the graph.
+    double estimated_trajectory_change() const;
     /// ln |Λ'| − ln |Λ| of the graph's information matrix [twice nats]: of odometry Σ ln |Q⁻¹|,
     /// the units of which depend on those of the poses, and of loop closures Σ ln(|S| / |R|).
     double odometry_log_determinant() const;

@@ -24,8 +24,8 @@ constexpr auto enum_names(OptimalityForm) {
 
 struct PathOptimalityOptions {
   OptimalityForm by = OptimalityForm::exact;
-  /// Which a loop closure must exceed to be made [nats]; the default is that of `compact_pose`.
-  double loop_gain = 1.64;
+  /// Which a loop closure must exceed to be made [nats]; negative: `MatchModel::loop_gain`.
+  double loop_gain = -1.0;
 
   static auto fields() {
     using O = PathOptimalityOptions;
@@ -33,8 +33,9 @@ struct PathOptimalityOptions {
         .choice("by", &O::by,
                 "D-optimality of the information matrix, or of the Laplacian of the graph whose "
                 "edges weigh |Ω|^(1/3), as published")
-        .real("loop_gain", &O::loop_gain, 0.0, 1e9,
-              "information gain that a loop closure on a path must exceed to be expected [nats]");
+        .real("loop_gain", &O::loop_gain, -1.0, 1e9,
+              "information gain that a loop closure on a path must exceed to be expected [nats]; "
+              "negative: that of the policy");
   }
 };
 

@@ -21,8 +21,8 @@ class MatchIndex;
 
 struct PathSimulationOptions {
   EntropyForm entropy = EntropyForm::standard;
-  /// Which a loop closure must exceed to be made [nats]; the default is that of `compact_pose`.
-  double loop_gain = 1.64;
+  /// Which a loop closure must exceed to be made [nats]; negative: `MatchModel::loop_gain`.
+  double loop_gain = -1.0;
   double simulated_range = 4.0;  ///< of the lidar, in what is unknown [m]
 
   static auto fields() {
@@ -30,8 +30,9 @@ struct PathSimulationOptions {
     return OptionFields<O>()
         .choice("entropy", &O::entropy,
                 "of a Gaussian: standard is ½ ln((2πe)ⁿ|Σ|), thesis lacks the root of |Σ|")
-        .real("loop_gain", &O::loop_gain, 0.0, 1e9,
-              "information gain that a loop closure on a path must exceed to be expected [nats]")
+        .real("loop_gain", &O::loop_gain, -1.0, 1e9,
+              "information gain that a loop closure on a path must exceed to be expected [nats]; "
+              "negative: that of the policy")
         .real("simulated_range", &O::simulated_range, 0.1, 1000.0,
               "within which unknown floor is expected to be discovered [m]: between caution and "
               "the lidar's own range, which limits it");

@@ -43,11 +43,14 @@ struct PathValueOptions {
                   .choice("loops", &I::loops,
                           "covariances after a loop closure: exact, or interpolated as in the "
                           "thesis (5.16)")
-                  .real("loop_gain", &I::loop_gain, 0.0, 1e9,
+                  .real("loop_gain", &I::loop_gain, -1.0, 1e9,
                         "information gain that a loop closure on a path must exceed to be expected "
-                        "[nats]")
+                        "[nats]; negative: that of the policy")
                   .real("memory", &I::memory, 0.0, 1e6,
-                        "for covariances that paths with common beginnings share [MB]"));
+                        "for covariances that paths with common beginnings share [MB]")
+                  .integer("sampled_poses", &I::sampled_poses, 0, 2147483647,
+                           "poses of the graph by which the change of all is estimated while a "
+                           "tree grows, at most; the best paths are evaluated with all; 0: all"));
   }
 };
 
@@ -61,7 +64,8 @@ struct PathValueOptions {
 /// free.) Every motion that the robot makes on the path is a pose with a scan. Loops are closed
 /// only with poses that no known obstacle hides.
 ///
-/// It is a `PathCost`, for `RrtStar`.
+/// It is a `PathCost`, for `RrtStar`: in a tree ΔH(x) is estimated
+/// (`PathInformation::State::estimated_trajectory_change`), and `evaluated` has the exact value.
 class CAIRN_API PathValue {
  public:
   /// The last segment of a path.
@@ -76,7 +80,8 @@ class CAIRN_API PathValue {
     std::shared_ptr<const CellSet> seen = {};     ///< on the whole path, once adopted
     std::size_t cells = 0;                        ///< how many it discovers
     InformationChange change = {};
-    double value = 0.0;  ///< [nats/m]
+    double value = 0.0;     ///< [nats/m]
+    bool is_exact = false;  ///< else ΔH(x) is estimated
   };
 
   /// `left_out`: points [m] whose cells do not count as discovered. The situation, and what it
@@ -89,13 +94,15 @@ class CAIRN_API PathValue {
                  const State* before);
   State adopted(State path, const State& parent) const;
   double value(const State& path) const { return path.value; }
+  /// The same path with its exact value.
+  State evaluated(State path) const;
 
   const SeenCells& seen_cells() const { return seen_; }
 
  private:
   std::shared_ptr<const Segment> segment(const Pose2& start, const Eigen::Vector2d& to,
                                          const State* before) const;
-  void evaluate(State& path) const;
+  void evaluate(State& path, double trajectory_change) const;
 
   const Situation& situation_;
   JointObjective objective_;
@@ -105,8 +112,8 @@ class CAIRN_API PathValue {
   double map_now_;       ///< entropy [nats·m²]; only where the objective needs it
 };
 
-/// The values of all paths of a tree, by node, nodes nearer to the root (in segments) first. Those
-/// that were not evaluated within `seconds` are none.
+/// The values of all paths of a tree, estimated as in a tree that is grown for them, by node, nodes
+/// nearer to the root (in segments) first. Those that were not evaluated within `seconds` are none.
 template <class Cost>
 std::vector<std::optional<PathValue::State>> path_values(
     const RrtStar<Cost>& tree, PathValue& value,

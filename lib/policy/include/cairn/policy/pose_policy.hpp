@@ -184,6 +184,9 @@ class CAIRN_API PosePolicy : public Component {
   virtual std::vector<Id> undetermined() const { return {}; }
   /// How many factors there are between all of these; the estimator need not have all of them yet.
   virtual int factor_count() const = 0;
+  /// The information gain that a link must exceed to be used [nats], good from the first pose on;
+  /// none: the policy does not decide by it, as all do that don't override it.
+  virtual std::optional<double> link_gain() const { return std::nullopt; }
   /// The newest pose as it is estimated, kept or not.
   virtual std::vector<double> newest_state() const = 0;
   /// From each kept pose to the next one of the trajectory, in order. A chain may end at a pose
