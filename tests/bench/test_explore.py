@@ -8,12 +8,12 @@ from bench.published import said
 from reports_of import report, section
 
 
-def run(seed, map_entropy=500.0, loops=20.0, coverage=700.0, seconds=1.0, error=0.1, end="limit"):
+def run(seed, map_entropy=500.0, loops=20.0, coverage=700.0, seconds=1.0, error=0.1, end="limit", **measures):
     """A run whose map has errors of so much of its coverage, as `cairn explore --json` writes it."""
     wrong = error * coverage
     return {"explorer": "x", "seed": seed, "end": end, "why": "250 m are driven",
             "measures": {"map_entropy": map_entropy, "loops": loops, "coverage": coverage, "distance": 250,
-                         "trajectory_entropy": -6, "map_error": wrong, "collisions": 0},
+                         "trajectory_entropy": -6, "map_error": wrong, "collisions": 0, **measures},
             "measured_seconds": {"seconds": seconds, "decision_p95": 0.5},
             "samples": {"distance": [0, 250], "coverage": [0, coverage], "map_error": [0, wrong], "seen": [0, coverage],
                         "free_wrong": [0, wrong], "occupied_wrong": [0, 0]}}
@@ -132,6 +132,17 @@ class FloorsTest(unittest.TestCase):
         self.assertIn("|  | frontier | 2 | limit |", table)
         self.assertIn("| depot | dopt |  | took too long |", table)
         self.assertIn("| fr079 | limit | 250 m are driven |", section(floors, "explore-exact"))
+
+    def test_means_of_each_explorer_on_each_floor(self):
+        runs = [{"seen": seen, "wrong": 1.0} for seen in (20.0, 24.0)]
+        floors = report("explore_floors", entry("floors", "frontier", *runs), entry("exact", "frontier", {"seen": 99.0}),
+                        entry("floors", "dopt", *runs, runs[0]))
+        table = section(floors, "explore-floors-means")
+        self.assertIn("| mean ± 95 % | floor | frontier | dopt |", table)
+        self.assertIn("| of the floor seen [m²] | fr079 | 22 ± 25 | 21.3 ± 5.7 |", table)
+        self.assertIn("| wrong cells [m²] | fr079 | 1.000 ± 0.000 | 1.000 ± 0.000 |", table)
+        # Lines of their own have the first two.
+        self.assertEqual(section(floors, "explore-floors").count("| limit |"), 4)
 
     def test_what_was_changed_has_a_row_for_each_method(self):
         changed = {**entry("sensitivity", "drrt_star", {"loops": 20.0}, {"loops": 24.0}), "change": "range 4 m"}

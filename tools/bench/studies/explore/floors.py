@@ -13,7 +13,9 @@ from .thesis import action_space
 
 FLOORS = ["cave_20m", "fr079", "intel_lab", "hospital_40m", "willow_full", "stata_basement", "depot", "warehouse",
           "simple_rooms", "tb3_sandbox"]
-SEEDS = 2
+# Of each method on a floor so many runs have a line of their own; the means are of all.
+LISTED = 2
+MEANS = {"seen": "of the floor seen [m²]", "wrong": "wrong cells [m²]", "ate": "ATE [m]", "trajectory_entropy": "trajectory entropy [nats]"}
 
 
 def all_floors(bench: Bench) -> list[DataSet]:
@@ -29,7 +31,7 @@ def study_floors(bench: Bench, keep: Keep) -> None:
              *(until if bench.quick else [])]
     for floor in all_floors(bench):
         for explorer in bench.cairn.names("explorer"):
-            keep(measure(bench, "floors", floor, explorer, explorer, SEEDS, until))
+            keep(measure(bench, "floors", floor, explorer, explorer, bench.rounds, until))
         keep(measure(bench, "exact", floor, "frontier", "frontier", 1, exact))
 
 
@@ -58,7 +60,7 @@ def floors_sections(entries: list[Json]) -> Sections:
         without_noise = text(entry, "part") == "exact"
         if problem_of(entry) and not without_noise:
             floors.append([floor, method, "", problem_of(entry), *[""] * 8])
-        for run in runs_of(entry):
+        for run in runs_of(entry)[:LISTED]:
             of = {measure: measured(run, measure)
                   for measure in ["distance", "seen", "loops", "collisions", "ate", "wrong", "decision_p95"]}
             begin = [end_of(run), text(run, "why"), digits(of["distance"]), digits(of["seen"])]
@@ -69,9 +71,24 @@ def floors_sections(entries: list[Json]) -> Sections:
                                *(digits(of[measure]) for measure in ["ate", "wrong", "decision_p95"])])
                 floor = ""
         before = name
-    return {"explore-floors": table(["floor", "explorer", "seed", "end", "why", "driven [m]", "seen [m²]", "loops",
+    return {"explore-floors-means": means_table([entry for entry in entries if text(entry, "part") == "floors"]),
+            "explore-floors": table(["floor", "explorer", "seed", "end", "why", "driven [m]", "seen [m²]", "loops",
                                      "collisions", "ATE [m]", "wrong [m²]", "95 % of decisions [s]"], floors),
             "explore-exact": table(["floor", "end", "why", "driven [m]", "seen [m²]", "collisions"], exact)}
+
+
+def means_table(entries: list[Json]) -> str:
+    """A row for each measure and floor, a column for each explorer."""
+    explorers = list(dict.fromkeys(text(entry, "method") for entry in entries))
+    by_place = {(text(entry, "name"), text(entry, "method")): entry for entry in entries}
+    rows = []
+    for measure_name, title in MEANS.items():
+        for floor in dict.fromkeys(text(entry, "name") for entry in entries):
+            cells = [mean_of(by_place[floor, explorer], measure_name).text() if (floor, explorer) in by_place else "-"
+                     for explorer in explorers]
+            rows.append([title, floor, *cells])
+            title = ""
+    return table(["mean ± 95 %", "floor", *explorers], rows)
 
 
 def sensitivity_sections(entries: list[Json]) -> Sections:
