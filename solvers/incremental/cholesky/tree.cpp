@@ -7,13 +7,68 @@
 #include <utility>
 
 #include "block/front.hpp"
+#include "block/schedule.hpp"
 
 namespace cairn::incremental {
 namespace {
 
 constexpr block::CostModel kCost;
+/// What a piece of a front is to take at most [ns by `kCost`].
+constexpr double kPiece = 2e5;
+/// Rows are divided at multiples of so many, the height of the kernels' tiles.
+constexpr std::int64_t kRows = 24;
+
+std::int32_t round_up(std::int32_t rows) { return (rows + 7) / 8 * 8; }
 
 }  // namespace
+
+/// How the work on one front is divided where the time is limited, and what the pieces take [ns by
+/// `kCost`]. A front that is not large, or whose time is not limited, is one piece.
+class Tree::FrontPieces {
+ public:
+  FrontPieces(const Node& node, Pace& pace)
+      : node_(node), pace_(pace), in_pieces_(block::is_large(node.m) && pace.limited()) {}
+  bool in_pieces() const { return in_pieces_; }
+  bool allows(double nanoseconds) const {
+    return !in_pieces_ || pace_.allows(Work::factorize, nanoseconds);
+  }
+
+  /// Where a piece of the panel's doubles ends that begins at `next`.
+  std::int64_t end_of_doubles(std::int64_t next) const {
+    const std::int64_t all = std::ssize(node_.panel);
+    return in_pieces_ ? std::min(all, next + block::kTileZeroed) : all;
+  }
+  /// Columns of a child's update matrix.
+  double of_child(const Node& child, std::int32_t columns) const {
+    return kCost.extend_entry * columns * child.below();
+  }
+  /// Rows of the columns [first, last), those before being done.
+  double of_rows(int first, int last, std::int64_t rows) const {
+    return kCost.panel_flop * static_cast<double>(rows) * (last - first) * (first + last);
+  }
+  std::int64_t end_of_rows(int first, int last, std::int64_t row) const {
+    return end_of(row, of_rows(first, last, kRows));
+  }
+  /// Rows [begin, end) of the update matrix's lower triangle, counted in the front.
+  double of_update(std::int64_t begin, std::int64_t end) const {
+    const double width = 0.5 * static_cast<double>(begin + end) - node_.columns + 8.0;
+    return kCost.update_flop * 2.0 * node_.columns * width * static_cast<double>(end - begin);
+  }
+  std::int64_t end_of_update(std::int64_t row) const {
+    return end_of(row, of_update(row, row + kRows));
+  }
+
+ private:
+  std::int64_t end_of(std::int64_t row, double of_tile) const {
+    if (!in_pieces_) return node_.stride;
+    const auto tiles = static_cast<std::int64_t>(kPiece / of_tile);
+    return std::min<std::int64_t>(node_.stride, row + kRows * std::max<std::int64_t>(1, tiles));
+  }
+
+  const Node& node_;
+  Pace& pace_;
+  bool in_pieces_;
+};
 
 Tree::Tree(const Tree& other, const System& system, States& states,
            const std::vector<std::int32_t>& bound)
@@ -69,14 +124,15 @@ void Tree::retire(std::int32_t variable) {
 void Tree::begin_factorization(double damping) {
   std::ranges::sort(affected_, {}, [&](std::int32_t n) { return nodes_[n].sequence; });
   factorized_ = 0;
+  progress_ = {};
   damping_ = damping;
 }
 
 std::int32_t Tree::factorize_more(Pace& pace) {
-  for (; factorized_ < affected_.size(); ++factorized_) {
+  for (; factorized_ < affected_.size(); ++factorized_, progress_ = {}) {
     Node& node = nodes_[affected_[factorized_]];
-    if (!pace.allows(Work::factorize, kCost.time(node.columns, node.below()))) return kPaused;
-    if (factorize_node(node)) continue;
+    if (!factorize_node(node, pace)) return kPaused;
+    if (progress_.failed < 0) continue;
     for (const std::int32_t v : node.own_variables()) {
       const std::int32_t row = front_row(node, v);
       for (std::int32_t c = row; c < row + system_->size(v); ++c) {
@@ -89,11 +145,10 @@ std::int32_t Tree::factorize_more(Pace& pace) {
   return -1;
 }
 
-/// H's entries into the panel.
+/// H's entries into the panel, which is zero before. From here on `front_row_` is that of the node.
 void Tree::assemble(Node& node) {
   double* panel = node.panel.data();
   const std::int64_t stride = node.stride;
-  std::fill(node.panel.begin(), node.panel.end(), 0.0);
   std::int32_t row = 0;
   for (const std::int32_t v : node.variables) {
     front_row_[v] = row;
@@ -158,50 +213,131 @@ void Tree::add_scattered(const Node& child, Node& parent) {
   }
 }
 
-bool Tree::factorize_node(Node& node) {
-  assemble(node);
-  double* panel = node.panel.data();
-  double* update = node.update.data();
-  const bool inner = node.below() > 0;
-  const std::int64_t stride = node.stride, update_stride = node.update_stride();
-  // The update matrix starts with what comes from children; the product is taken off it later.
-  bool scattered = false;
-  for (const std::int32_t c : node.children) {
-    const Node& child = nodes_[c];
-    if (!child.straight) {
-      scattered = true;
-      continue;
-    }
-    kernels_->extend_add(child.spreads.data(), static_cast<int>(child.spreads.size()), 0,
-                         child.panel_rows, child.update.data() + child.columns % 8,
-                         child.update_stride(), panel, stride);
-  }
-  UninitializedVector children_part;
-  if (scattered) {
-    // Panel and update matrix at once: the latter into zeros, to be added after the product.
-    if (inner) std::fill(node.update.begin(), node.update.end(), 0.0);
-    for (const std::int32_t c : node.children) {
-      if (!nodes_[c].straight) add_scattered(nodes_[c], node);
-    }
-    if (inner) std::swap(children_part, node.update), node.update.resize(children_part.size());
-    update = node.update.data();
-  }
-  for (const std::int32_t v : node.variables) front_row_[v] = -1;
-
-  if (block::factor_front<double>(*kernels_, panel, stride, node.columns, node.m) >= 0)
+/// Computes a node. Where its front is large and the time is limited, in pieces: false if there was
+/// no time for the next one, and then the next call goes on there. `progress_.failed` says whether
+/// there is a pivot that is not positive.
+bool Tree::factorize_node(Node& node, Pace& pace) {
+  using enum Progress::Part;
+  const FrontPieces front(node, pace);
+  if (!front.in_pieces() && !pace.allows(Work::factorize, kCost.time(node.columns, node.below())))
     return false;
-  if (!inner) return true;
-  kernels_->update(panel, stride, node.columns, node.m, update, node.columns / 8 * 8, node.stride);
-  for (std::size_t k = 0; k < children_part.size(); ++k) update[k] += children_part[k];
-  double* front = update - node.columns * update_stride - node.columns / 8 * 8;
-  for (const std::int32_t c : node.children) {
-    const Node& child = nodes_[c];
-    if (!child.straight) continue;
-    kernels_->extend_add(child.spreads.data(), static_cast<int>(child.spreads.size()),
-                         child.panel_rows, child.below(), child.update.data() + child.columns % 8,
-                         child.update_stride(), front, update_stride);
+  double* const panel = node.panel.data();
+  const bool inner = node.below() > 0;
+  const std::int64_t stride = node.stride;
+  std::int64_t& next = progress_.next;
+  switch (progress_.part) {
+    case zero:
+      for (; next < std::ssize(node.panel); next = progress_.end) {
+        progress_.end = front.end_of_doubles(next);
+        if (!front.allows(kCost.panel_entry * static_cast<double>(progress_.end - next)))
+          return false;
+        std::fill(panel + next, panel + progress_.end, 0.0);
+      }
+      progress_.go_to(assemble_H);
+      [[fallthrough]];
+    case assemble_H:
+      if (!front.allows(kCost.supernode * static_cast<double>(node.own))) return false;
+      assemble(node);
+      progress_.go_to(add_to_panel);
+      [[fallthrough]];
+    case add_to_panel:
+      // What comes from children goes into the panel here, into the update matrix at the end.
+      for (; next < std::ssize(node.children); ++next) {
+        const Node& child = nodes_[node.children[next]];
+        if (!child.straight) {
+          progress_.scattered = true;
+          continue;
+        }
+        if (!front.allows(front.of_child(child, child.panel_rows))) return false;
+        kernels_->extend_add(child.spreads.data(), static_cast<int>(child.spreads.size()), 0,
+                             child.panel_rows, child.update.data() + child.columns % 8,
+                             child.update_stride(), panel, stride);
+      }
+      progress_.go_to(add_scattered_ones);
+      [[fallthrough]];
+    case add_scattered_ones:
+      // Panel and update matrix at once: the latter into zeros, to be added after the product.
+      for (; progress_.scattered && next < std::ssize(node.children); ++next) {
+        const Node& child = nodes_[node.children[next]];
+        if (!child.straight && !front.allows(front.of_child(child, child.below()))) return false;
+        if (next == 0 && inner) std::fill(node.update.begin(), node.update.end(), 0.0);
+        if (!child.straight) add_scattered(child, node);
+      }
+      for (const std::int32_t v : node.variables) front_row_[v] = -1;
+      if (progress_.scattered && inner) {
+        std::swap(progress_.children_part, node.update);
+        node.update.resize(progress_.children_part.size());
+      }
+      progress_.go_to(columns);
+      [[fallthrough]];
+    case columns:
+      if (!factorize_columns(node, front)) return false;
+      if (progress_.failed >= 0 || !inner) return true;
+      progress_.go_to(update);
+      next = node.columns / 8 * 8;
+      [[fallthrough]];
+    case update:
+      for (; next < stride; next = progress_.end) {
+        progress_.end = front.end_of_update(next);
+        if (!front.allows(front.of_update(next, progress_.end))) return false;
+        kernels_->update(panel, stride, node.columns, node.m, node.update.data(),
+                         static_cast<int>(next), static_cast<int>(progress_.end));
+      }
+      progress_.go_to(add_to_update);
+      [[fallthrough]];
+    case add_to_update:
+      add_children_part(node);
+      for (; next < std::ssize(node.children); ++next) {
+        const Node& child = nodes_[node.children[next]];
+        if (!child.straight) continue;
+        if (!front.allows(front.of_child(child, child.below() - child.panel_rows))) return false;
+        // The update matrix as if it were a part of the whole front.
+        double* const whole =
+            node.update.data() - node.columns * node.update_stride() - node.columns / 8 * 8;
+        kernels_->extend_add(child.spreads.data(), static_cast<int>(child.spreads.size()),
+                             child.panel_rows, child.below(),
+                             child.update.data() + child.columns % 8, child.update_stride(), whole,
+                             node.update_stride());
+      }
   }
   return true;
+}
+
+/// The panel, strip by strip if the front is large.
+bool Tree::factorize_columns(Node& node, const FrontPieces& front) {
+  double* const panel = node.panel.data();
+  const std::int64_t stride = node.stride;
+  if (!block::is_large(node.m)) {
+    progress_.failed = block::factor_front<double>(*kernels_, panel, stride, node.columns, node.m);
+    return true;
+  }
+  std::int64_t& row = progress_.end;  // of the strip at hand: 0 before its pivots
+  for (; progress_.next < node.columns; progress_.next += block::kStripColumns, row = 0) {
+    const int first = static_cast<int>(progress_.next),
+              last = std::min(node.columns, first + block::kStripColumns);
+    if (row == 0) {
+      const int below = std::min(node.stride, round_up(last));
+      if (!front.allows(front.of_rows(first, last, below - first))) return false;
+      const int failed = kernels_->factor_panel(panel, stride, first, last, below);
+      if (progress_.failed < 0) progress_.failed = failed;
+      row = below;
+    }
+    while (row < stride) {
+      const std::int64_t end = front.end_of_rows(first, last, row);
+      if (!front.allows(front.of_rows(first, last, end - row))) return false;
+      kernels_->factor_rows(panel, stride, first, last, static_cast<int>(row),
+                            static_cast<int>(end));
+      row = end;
+    }
+  }
+  return true;
+}
+
+/// What scattered children have added beside the product.
+void Tree::add_children_part(Node& node) {
+  for (std::size_t k = 0; k < progress_.children_part.size(); ++k)
+    node.update[k] += progress_.children_part[k];
+  progress_.children_part = UninitializedVector();
 }
 
 std::int32_t Tree::front_row(const Node& node, std::int32_t variable) const {

@@ -108,9 +108,11 @@ class Tree {
     begin_factorization(0.0);
     return factorize_more(any);
   }
-  /// The same in pieces: `factorize_more` returns `kPaused` where there is no time for the next
-  /// node, and goes on there when it is called again. Until it has ended nothing may be touched,
-  /// and H must not change. The factor is that of H with its diagonal times 1 + `damping`.
+  /// The same in pieces, a node or a part of a large one (columns of its panel, rows of its update
+  /// matrix): `factorize_more` returns `kPaused` where there is no time for the next piece, and
+  /// goes on there when it is called again. Until it has ended nothing may be touched, and H must
+  /// not change. The factor is that of H with its diagonal times 1 + `damping`, and has the same
+  /// bits however often it has paused.
   void begin_factorization(double damping);
   std::int32_t factorize_more(Pace& pace);
   static constexpr std::int32_t kPaused = -2;
@@ -190,6 +192,29 @@ class Tree {
   std::int32_t front_row(const Node& node, std::int32_t variable) const;
 
  private:
+  class FrontPieces;
+  /// How far the factorisation of a node has come.
+  struct Progress {
+    enum class Part : std::uint8_t {
+      zero,                ///< the panel: doubles
+      assemble_H,          ///< the entries of H, at once
+      add_to_panel,        ///< children
+      add_scattered_ones,  ///< children whose separator has another order than the front
+      columns,             ///< of the panel: a strip, and its rows up to `end`
+      update,              ///< the update matrix: rows of the front
+      add_to_update        ///< children
+    };
+    Part part = Part::zero;
+    std::int64_t next = 0, end = 0;     ///< the part goes on there; where its last piece ended
+    bool scattered = false;             ///< there are such children, …
+    UninitializedVector children_part;  ///< … and this is what they add to the update matrix
+    int failed = -1;                    ///< the first column whose pivot is not positive
+
+    void go_to(Part other) {
+      part = other;
+      next = end = 0;
+    }
+  };
   void make_room_for_variables();
   std::int32_t new_node();
   void free_node(std::int32_t n);
@@ -205,7 +230,9 @@ class Tree {
   void connect(Node& child, const Node& parent);
   void assemble(Node& node);
   void add_scattered(const Node& child, Node& parent);
-  bool factorize_node(Node& node);
+  bool factorize_node(Node& node, Pace& pace);
+  bool factorize_columns(Node& node, const FrontPieces& front);
+  void add_children_part(Node& node);
   void solve_node(Node& node, const double* y, std::vector<double>& steps,
                   std::vector<std::int32_t>& changed);
   double owed_square(const Node& node) const;
@@ -228,6 +255,7 @@ class Tree {
   std::vector<std::uint8_t> is_fresh_;  // by variable
   std::vector<std::uint8_t> retired_;   // by variable
   std::size_t factorized_ = 0;          // of them
+  Progress progress_;                   // of the one at hand
   double damping_ = 0.0;
   std::int64_t next_sequence_ = 0;
   int affected_variables_ = 0;

@@ -95,6 +95,11 @@ class Changing {
   }
 
   std::int32_t bring_up_to_date() {
+    restructure();
+    return tree_.factorize();
+  }
+  /// The tree as it is to be, whose affected nodes are still to be factorised.
+  void restructure() {
     tree_.clear_affected();
     for (const std::int32_t v : touched_) tree_.touch(v);
     for (const std::int32_t v : retiring_) tree_.retire(v);
@@ -103,7 +108,6 @@ class Changing {
     retiring_.clear();
     structure_changed_ = false;
     ++time_;
-    return tree_.factorize();
   }
 
   std::int32_t any() { return alive_[rng_() % alive_.size()]; }
@@ -296,6 +300,103 @@ TEST(Tree, AgreesInWideFronts) {
     ASSERT_EQ(changing.bring_up_to_date(), -1);
     expect_solutions(changing);
     ASSERT_FALSE(testing::Test::HasFailure()) << kernels->name;
+  }
+}
+
+/// L and all update matrices.
+std::vector<double> numbers_of(const Tree& tree) {
+  std::vector<double> all;
+  for (const Node& node : tree.nodes()) {
+    if (!node.live) continue;
+    for (std::int64_t c = 0; c < node.columns; ++c) {
+      const auto column = node.panel.begin() + c * node.stride;
+      all.insert(all.end(), column + c, column + node.m);
+    }
+    for (std::int32_t c = node.columns; c < node.m; ++c) {
+      const auto column = node.update.begin() + node.update_place(c, c);
+      all.insert(all.end(), column, column + node.m - c);
+    }
+  }
+  return all;
+}
+
+/// Goes on with a factorisation, one piece at a time; `pause` is called after each.
+template <class Pause>
+std::int32_t factorize_in_pieces(Tree& tree, Pause pause) {
+  double reads = 0.0;
+  Pace pace;
+  pace.set_clock([&] { return reads += 1.0; });
+  std::int32_t result = Tree::kPaused;
+  while (result == Tree::kPaused) {
+    pace.begin(0.5);
+    result = tree.factorize_more(pace);
+    if (result == Tree::kPaused) pause();
+  }
+  return result;
+}
+
+/// Variables of a solid grid, whose fronts are large and have others above them; and more that come
+/// later and make children whose separators have another order than their parents' fronts.
+void fill_with_large_fronts(Changing& changing) {
+  constexpr int kSide = 6;
+  for (int k = 0; k < kSide * kSide * kSide; ++k) {
+    changing.add_variable(6);
+    if (k % kSide > 0) changing.add_edge(k - 1, k);
+    if (k / kSide % kSide > 0) changing.add_edge(k - kSide, k);
+    if (k >= kSide * kSide) changing.add_edge(k - kSide * kSide, k);
+  }
+  ASSERT_EQ(changing.bring_up_to_date(), -1);
+  for (int more = 0; more < 6; ++more) {
+    const std::int32_t v = changing.add_variable(5);
+    for (int k = 0; k < 3; ++k) {
+      if (const std::int32_t other = changing.any(); other != v) changing.add_edge(v, other);
+    }
+    ASSERT_EQ(changing.bring_up_to_date(), -1);
+  }
+}
+
+TEST(Tree, AFactorizationThatPausesHasTheSameBits) {
+  for (const block::Kernels* kernels : kernel_sets()) {
+    Changing changing(11, *kernels);
+    fill_with_large_fronts(changing);
+    Tree& tree = changing.tree();
+    const auto large = [](const Node& node) {
+      return node.live && node.m > 256 && node.below() > 0 && !node.children.empty();
+    };
+    ASSERT_TRUE(std::ranges::any_of(tree.nodes(), large));
+    ASSERT_TRUE(std::ranges::any_of(tree.nodes(), [&](const Node& node) {
+      return node.live && node.parent >= 0 && !node.straight &&
+             large(tree.nodes()[static_cast<std::size_t>(node.parent)]);
+    }));
+    for (const std::int32_t v : changing.alive()) changing.touch(v);
+    changing.restructure();
+    const auto nodes = static_cast<int>(tree.affected().size());
+    ASSERT_EQ(tree.factorize(), -1);
+    const std::vector<double> wanted = numbers_of(tree);
+
+    tree.begin_factorization(0.0);
+    int pauses = 0;
+    const std::vector<std::int32_t> bound(changing.alive().size(), 1);
+    const auto pause = [&] {
+      if (++pauses % 40 != 0) return;
+      States states;
+      Tree copy(tree, changing.system(), states, bound);
+      Pace any;
+      ASSERT_EQ(copy.factorize_more(any), -1);
+      ASSERT_EQ(numbers_of(copy), wanted) << kernels->name << ": a copy at pause " << pauses;
+    };
+    ASSERT_EQ(factorize_in_pieces(tree, pause), -1);
+    EXPECT_EQ(numbers_of(tree), wanted) << kernels->name;
+    EXPECT_GT(pauses, nodes + 20) << "large fronts are divided";
+    expect_solutions(changing);
+
+    const std::int32_t bad = changing.any();
+    const MatrixXd much = 1e6 * MatrixXd::Identity(6, 6).topLeftCorner(changing.system().size(bad),
+                                                                       changing.system().size(bad));
+    changing.add_to_diagonal(bad, -much);
+    changing.restructure();
+    tree.begin_factorization(0.0);
+    EXPECT_EQ(factorize_in_pieces(tree, [] {}), bad) << kernels->name;
   }
 }
 
