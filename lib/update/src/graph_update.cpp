@@ -168,13 +168,13 @@ class Checker {
     for (const Variable& variable : update_.variables) {
       if (!variable.type) throw bad_input(fmt::format("variable {} has no type", variable.id));
       check_type(*variable.type, variable.type.get(), variable.id);
-      if (const auto there = graph_.find(variable.id)) {
+      if (const auto there = find_variable(variable.id)) {
         throw bad_input(fmt::format("{} {}: the id is already that of {}", variable.type->tag(),
                                     variable.id, graph_.describe_variable(*there)));
       }
     }
     unplaced_ = place_variables(update_, [this](Id id) {
-      const auto v = graph_.find(id);
+      const auto v = find_variable(id);
       return v ? graph_.state(*v) : std::span<const double>();
     });
     for (const Variable& variable : update_.variables) {
@@ -199,7 +199,7 @@ class Checker {
   /// Of a variable in the sketch; one that was in the graph before is added to it.
   int in_sketch(Id id, const Factor& factor) {
     if (const auto there = sketch_.find(id)) return *there;
-    const auto v = graph_.find(id);
+    const auto v = find_variable(id);
     if (!v) {
       throw bad_input(fmt::format(
           "{}: there is no variable {}; expected one that was added before or with it, and not "
@@ -215,6 +215,10 @@ class Checker {
       for (const Id id : factor.variables) in_sketch(id, factor);
       sketch_.add(factor);
     }
+  }
+
+  std::optional<int> find_variable(Id id) const {
+    return factors_.variable ? factors_.variable(id) : graph_.find(id);
   }
 
   /// The type and the variables of a factor that was there before, or that the update adds.
@@ -249,7 +253,7 @@ class Checker {
   void check_leaving() {
     std::unordered_set<Id> marginalized, removed;
     const auto note = [&](Id id, std::unordered_set<Id>& set, const char* what) {
-      const bool there = graph_.find(id) || is_new(id);
+      const bool there = find_variable(id) || is_new(id);
       if (!there) throw bad_input(fmt::format("there is no variable {} to be {}", id, what));
       if (!set.insert(id).second || marginalized.count(id) + removed.count(id) > 1) {
         throw bad_input(fmt::format("variable {} is to leave twice in one update", id));

@@ -14,6 +14,7 @@
 #include "cairn/graph/graph.hpp"
 #include "cairn/solve/estimator.hpp"
 #include "cairn/solve/optimizer.hpp"
+#include "cairn/update/elimination.hpp"
 #include "covariances.hpp"
 #include "gauge_watch.hpp"
 #include "job.hpp"
@@ -142,8 +143,11 @@ class Engine : private EngineState {
                                                                     : -1;
   }
   FactorId next_id() const { return next_id_; }
-  /// Takes what has been removed out of the graph: everything is numbered anew.
+  /// Takes what has been removed out of the graph: everything is numbered and linearised anew.
   void compact();
+  /// Whether most of the graph has been removed: arrays are twice as large as they need to be, and
+  /// `compact` costs no more for each variable and factor that has left than adding one does.
+  bool mostly_dead() const { return 2 * dead_ > states_.size() + models_.size(); }
 
   /// To be called for what has been added at the end of the graph, by `edit`.
   Graph& edit() { return graph_; }
@@ -158,6 +162,13 @@ class Engine : private EngineState {
   bool live_variable(int v) const { return live_variable_[v]; }
   const std::vector<std::int32_t>& factors_of(int v) const { return factors_of_[v]; }
   bool held(int v) const { return held_[v]; }
+  /// Whether factors have been removed or changed since it was last found out what is held.
+  bool gauge_is_old() const { return gauge_is_old_; }
+  /// Finds it out.
+  void settle_gauge();
+  /// What takes the place of these variables (`cairn::eliminate`), linearised at the current
+  /// estimate. Changes nothing, also where it throws.
+  Elimination eliminate(std::span<const int> variables);
   /// Variables that have been anchored to fix the gauge since this was last asked.
   std::vector<std::int32_t> take_anchored() { return std::exchange(anchored_, {}); }
   /// Variables whose last factor has been removed since this was last asked, and that are still
@@ -167,8 +178,6 @@ class Engine : private EngineState {
   void set_loss(const std::shared_ptr<const Loss>& loss, const FactorSelector& which);
   /// Ids of the factors that are there, rising.
   std::vector<FactorId> live_ids() const;
-  /// Removed factors and variables that are still in the graph.
-  int dead() const { return dead_; }
 
   /// Solves until the estimate is as accurate as it is to be, or the iterations are up.
   ///
@@ -215,7 +224,6 @@ class Engine : private EngineState {
   bool have_digits(int v, std::int32_t first, std::int32_t count, const double* variances,
                    std::int64_t step) const;
   void load(Graph graph, std::vector<FactorId> ids);
-  void settle_gauge();
   void watch_gauge_anew();
   void hold(std::int32_t v, bool held);
   bool is_other(int f) const;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // What is added, removed, changed and held: brought into the models, H and the gradient.
 #include <algorithm>
+#include <cassert>
 #include <utility>
 
 #include "cairn/update/marginal_prior.hpp"
@@ -129,6 +130,7 @@ void Engine::changed_factor(int f) {
 }
 
 void Engine::remove_factor(int f) {
+  assert(live_factor_[f]);
   for (const std::int32_t v : models_.variables(f)) follow(v);
   take_out(f);
   live_factor_[f] = 0;
@@ -161,6 +163,34 @@ void Engine::remove_variable(int v) {
     held_[v] = 1;
   }
   ++dead_;
+}
+
+Elimination Engine::eliminate(std::span<const int> variables) {
+  std::vector<int> factors;
+  for (const int v : variables)
+    factors.insert(factors.end(), factors_of_[v].begin(), factors_of_[v].end());
+  std::ranges::sort(factors);
+  factors.erase(std::unique(factors.begin(), factors.end()), factors.end());
+  // Only the states around the variables are read, so only these are brought up to date.
+  Values values = graph_.values();
+  for (const int f : factors) {
+    for (const std::int32_t v : models_.variables(f)) {
+      const std::vector<double> now = x(v);
+      std::ranges::copy(now,
+                        values.pools[graph_.pool(v)].begin() + graph_.slot(v) * std::ssize(now));
+    }
+  }
+  const std::vector<bool> held(held_.begin(), held_.end());
+  Values before = graph_.values();
+  graph_.set_values(std::move(values));
+  try {
+    Elimination result = cairn::eliminate(graph_, variables, held, factors);
+    graph_.set_values(std::move(before));
+    return result;
+  } catch (...) {
+    graph_.set_values(std::move(before));
+    throw;
+  }
 }
 
 void Engine::settle_gauge() {

@@ -46,42 +46,19 @@ IncrementalCholesky::IncrementalCholesky(const IncrementalCholesky& other)
       since_solved_(other.since_solved_),
       since_full_(other.since_full_),
       kept_(other.kept_),
-      told_(other.told_) {}
+      told_(other.told_),
+      has_removed_(other.has_removed_) {}
 
 // --- updates ---
 
 UpdateReport IncrementalCholesky::update(const GraphUpdate& update, const UpdateOptions& options) {
   const Clock::time_point begin = Clock::now();
-  if (engine_->dead() > 0) {
-    engine_->compact();
-    forget_what_was_read();
-  }
+  if (has_removed_) compact();
   const bool full =
       options.full || (options_.full_every > 0 && since_full_ + 1 >= options_.full_every);
-  GraphUpdate checked = placed(update);
-  // An update may be refused on numbers where something is marginalised.
-  std::unique_ptr<IncrementalCholesky> before;
-  if (!checked.marginalized.empty()) before = std::make_unique<IncrementalCholesky>(*this);
   UpdateReport report;
-  Clock::time_point solved = begin;
-  try {
-    if (engine_->busy() && (full || takes_out(update))) {
-      end_solution(report);
-      solved = Clock::now();
-      checked = placed(update);
-    }
-    apply(checked, report);
-  } catch (...) {
-    if (before) {
-      engine_ = std::make_unique<Engine>(*before->engine_);
-      variables_ = before->variables_;
-      factors_ = before->factors_;
-      losses_ = before->losses_;
-      forget_what_was_read();
-    }
-    throw;
-  }
-  report.seconds.linearize += seconds_since(solved);
+  const double of_solution = carry_out_or_not_at_all(update, full, report);
+  report.seconds.linearize += seconds_since(begin) - of_solution;
 
   ++since_solved_;
   ++since_full_;
@@ -114,10 +91,11 @@ GraphUpdate IncrementalCholesky::placed(const GraphUpdate& update) {
     return v ? state(id) : std::span<const double>();
   };
   place_variables(result, state_of);
-  check_update(
-      engine_->graph(),
-      {.position = [this](FactorId id) { return position(id); }, .next = engine_->next_id()},
-      result);
+  check_update(engine_->graph(),
+               {.position = [this](FactorId id) { return position(id); },
+                .next = engine_->next_id(),
+                .variable = [this](Id id) { return find(id); }},
+               result);
   if (options_.hints)
     replace_poor_states(result, state_of, losses_.empty() ? Deciding::all : Deciding::first);
   forget_what_was_read();
@@ -138,7 +116,8 @@ void IncrementalCholesky::end_solution(UpdateReport& report) {
 /// The engine as what an update is carried out on.
 class IncrementalCholesky::Target final : public UpdateTarget {
  public:
-  explicit Target(IncrementalCholesky& owner) : owner_(owner), engine_(*owner.engine_) {}
+  Target(IncrementalCholesky& owner, std::optional<Elimination> foreseen)
+      : owner_(owner), engine_(*owner.engine_), foreseen_(std::move(foreseen)) {}
 
   Graph& graph() override { return engine_.edit(); }
   FactorId next_factor() const override { return engine_.next_id(); }
@@ -163,21 +142,13 @@ class IncrementalCholesky::Target final : public UpdateTarget {
 
   IncrementalCholesky& owner_;
   Engine& engine_;
+  std::optional<Elimination> foreseen_;
 };
 
 Elimination IncrementalCholesky::Target::eliminate(std::span<const int> variables) {
-  std::vector<int> factors;
-  for (const int v : variables) {
-    const auto& on_it = engine_.factors_of(v);
-    factors.insert(factors.end(), on_it.begin(), on_it.end());
-  }
-  std::ranges::sort(factors);
-  factors.erase(std::unique(factors.begin(), factors.end()), factors.end());
-  engine_.write_back();
-  const Graph& graph = engine_.graph();
-  std::vector<bool> held(static_cast<std::size_t>(graph.variable_count()));
-  for (std::size_t v = 0; v < held.size(); ++v) held[v] = engine_.held(static_cast<int>(v));
-  return cairn::eliminate(graph, variables, held, factors);
+  if (foreseen_) return std::move(*foreseen_);
+  engine_.settle_gauge();
+  return engine_.eliminate(variables);
 }
 
 void IncrementalCholesky::Target::remove(std::span<const int> factors,
@@ -192,11 +163,75 @@ void IncrementalCholesky::Target::remove(std::span<const int> factors,
   }
 }
 
-void IncrementalCholesky::apply(const GraphUpdate& update, UpdateReport& report) {
-  Target target(*this);
-  AppliedUpdate applied = carry_out(update, losses_, target);
-  report.first_factor = applied.first_factor;
-  report.priors = std::move(applied.priors);
+/// Marginalising may fail, on numbers. Then everything is as before, to the last bit: a journal
+/// does not have what was refused. So it is computed before anything changes, or else on a copy.
+/// Returns the seconds that it took to end the solution that a time limit has left.
+double IncrementalCholesky::carry_out_or_not_at_all(const GraphUpdate& update, bool full,
+                                                    UpdateReport& report) {
+  GraphUpdate checked = placed(update);
+  const bool ends = engine_->busy() && (full || takes_out(checked));
+  const bool compacts = engine_->mostly_dead() || brings_back(checked);
+  std::optional<Elimination> foreseen;
+  std::unique_ptr<IncrementalCholesky> before;
+  if (!checked.marginalized.empty()) {
+    if (!ends && !compacts && can_be_foreseen(checked)) {
+      std::vector<int> leaving;
+      for (const Id id : checked.marginalized) leaving.push_back(index(id));
+      foreseen = engine_->eliminate(leaving);
+    } else {
+      before = std::make_unique<IncrementalCholesky>(*this);
+    }
+  }
+  double of_solution = 0.0;
+  try {
+    if (ends) {
+      const Clock::time_point begin = Clock::now();
+      end_solution(report);
+      checked = placed(update);
+      of_solution = seconds_since(begin);
+    }
+    if (compacts) compact();
+    Target target(*this, std::move(foreseen));
+    AppliedUpdate applied = carry_out(checked, losses_, target);
+    report.first_factor = applied.first_factor;
+    report.priors = std::move(applied.priors);
+    has_removed_ = !update.removed_factors.empty() || !update.removed_variables.empty();
+  } catch (...) {
+    if (before) {
+      engine_ = std::move(before->engine_);
+      variables_ = before->variables_;
+      factors_ = before->factors_;
+      losses_ = before->losses_;
+      forget_what_was_read();
+    }
+    throw;
+  }
+  return of_solution;
+}
+
+/// Takes what has left out of the engine's arrays.
+void IncrementalCholesky::compact() {
+  engine_->compact();
+  has_removed_ = false;
+  forget_what_was_read();
+}
+
+/// Whether a new variable has the id of one that has been removed and is still in the graph.
+bool IncrementalCholesky::brings_back(const GraphUpdate& update) const {
+  return std::ranges::any_of(update.variables, [&](const Variable& variable) {
+    return engine_->graph().find(variable.id).has_value();
+  });
+}
+
+/// Whether nothing else in the update changes what the marginalised variables leave.
+bool IncrementalCholesky::can_be_foreseen(const GraphUpdate& update) const {
+  if (!update.changed.empty() || engine_->gauge_is_old()) return false;
+  return std::ranges::all_of(update.marginalized, [&](Id id) {
+    const std::optional<int> v = find(id);
+    return v && !engine_->held(*v) && std::ranges::none_of(update.factors, [&](const Factor& f) {
+             return std::ranges::find(f.variables, id) != f.variables.end();
+           });
+  });
 }
 
 void IncrementalCholesky::note_gauge(UpdateReport& report) {
@@ -218,6 +253,7 @@ void IncrementalCholesky::note_gauge(UpdateReport& report) {
 void IncrementalCholesky::set_loss(std::shared_ptr<const Loss> loss, const FactorSelector& which) {
   forget_what_was_read();
   engine_->set_loss(loss, which);
+  has_removed_ = false;
   losses_ = LossRule(std::move(loss), which, engine_->graph());
 }
 
@@ -327,6 +363,7 @@ void IncrementalCholesky::reset() {
   engine_ = std::make_unique<Engine>(options_.settings, rescuer_);
   engine_->covariances().keep(kept_);
   variables_ = factors_ = since_solved_ = since_full_ = 0;
+  has_removed_ = false;
   losses_.clear();
   told_.clear();
   forget_what_was_read();

@@ -97,7 +97,10 @@ class IncrementalCholesky final : public Estimator {
   std::optional<int> position(FactorId id) const;
   int index(Id id) const;
   int block_size(int a, int b) const;
-  void apply(const GraphUpdate& update, UpdateReport& report);
+  double carry_out_or_not_at_all(const GraphUpdate& update, bool full, UpdateReport& report);
+  void compact();
+  bool brings_back(const GraphUpdate& update) const;
+  bool can_be_foreseen(const GraphUpdate& update) const;
   void forget_what_was_read() {
     read_.clear();
     all_.reset();
@@ -120,6 +123,8 @@ class IncrementalCholesky final : public Estimator {
   std::optional<Estimate> all_;              // or all of them
   std::unique_ptr<Engine> finished_;         // see solved()
   std::set<Id> told_;                        // anchors that a note has named
+  /// Something has been removed, not marginalised: the next update begins by `compact`.
+  bool has_removed_ = false;
 };
 
 }  // namespace cairn::incremental

@@ -36,11 +36,14 @@ class CAIRN_API FactorIds {
   FactorId next_ = 0;
 };
 
-/// How to find the factors that an update refers to.
+/// How to find the factors, and the variables, that an update refers to.
 struct FactorLookup {
   /// Position in the graph of the factor with that id, if it is there.
   std::function<std::optional<int>(FactorId)> position;
   FactorId next = 0;  ///< id of the update's first new factor
+  /// Index in the graph of the variable with that id, if it is there; empty: `Graph::find`. For a
+  /// graph that still holds variables which have been removed.
+  std::function<std::optional<int>(Id)> variable = {};
 };
 
 /// Gives the new variables that have no state one: where the first of the update's factors that can

@@ -37,6 +37,10 @@ std::vector<Case> cases() {
     all.push_back({"Loops" + where, types, {}});
     all.push_back({"Points" + where, types, {.points = true, .priors = true}});
     all.push_back({"Cuts" + where, types, {.cuts = true, .priors = true}});
+    all.push_back(
+        {"PointsNotCompacted" + where, types, {.points = true, .priors = true, .compacts = false}});
+    all.push_back(
+        {"CutsNotCompacted" + where, types, {.cuts = true, .priors = true, .compacts = false}});
   }
   return all;
 }

@@ -60,7 +60,7 @@ GrowingTypes spatial_types() {
 }
 
 void GrowingGraph::grow(Engine& engine) {
-  if (engine.dead() > 0) engine.compact();
+  if (happenings_.compacts && engine.mostly_dead()) engine.compact();
   const double what = uniform(0.0, 1.0);
   if (poses_.size() < 3 || what < 0.5) {
     add_pose(engine);
@@ -143,11 +143,11 @@ void GrowingGraph::change_measurement(Engine& engine) {
 
 void GrowingGraph::remove(Engine& engine) {
   std::erase_if(loops_, [&](FactorId id) { return engine.place_of(id) < 0; });
-  const int factors = engine.graph().factor_count();
+  const std::vector<FactorId> factors = engine.live_ids();
   if (happenings_.cuts && chance(0.5)) {
     remove_variable(engine, poses_);
-  } else if (happenings_.cuts && factors > 0 && chance(0.5)) {
-    remove_factor(engine, static_cast<int>(rng_() % static_cast<unsigned>(factors)));
+  } else if (happenings_.cuts && !factors.empty() && chance(0.5)) {
+    remove_factor(engine, engine.place_of(factors[rng_() % factors.size()]));
   } else if (!points_.empty() && chance(0.3)) {
     remove_variable(engine, points_);
   } else if (!loops_.empty()) {

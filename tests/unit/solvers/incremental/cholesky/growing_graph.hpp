@@ -22,10 +22,11 @@ GrowingTypes spatial_types();
 
 /// What may happen to a graph besides odometry and loop closures.
 struct Happenings {
-  bool points = false;  ///< landmarks come into sight, and leave
-  bool cuts = false;    ///< new components, and anything may be removed; not with points
-  bool priors = false;  ///< priors and fixed variables
-  double noise = 0.03;  ///< of all measurements [m, rad]
+  bool points = false;   ///< landmarks come into sight, and leave
+  bool cuts = false;     ///< new components, and anything may be removed; not with points
+  bool priors = false;   ///< priors and fixed variables
+  double noise = 0.03;   ///< of all measurements [m, rad]
+  bool compacts = true;  ///< what has been removed leaves the arrays once it is most of them
 };
 
 /// A random walk, what is measured on it, and an engine that is told, at random but for the seed.
