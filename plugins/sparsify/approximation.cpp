@@ -6,6 +6,8 @@
 #include <numeric>
 #include <utility>
 
+#include <fmt/core.h>
+
 #include "cairn/runtime/error.hpp"
 #include "dense/cholesky.hpp"
 #include "dense/eigenvalues.hpp"
@@ -64,6 +66,9 @@ ScaledProblem::ScaledProblem(const RecoveryProblem& problem) : rank(problem.rank
     Phi_root.push_back(eigen.operatorInverseSqrt());
     Q.push_back(dense::product(Phi_root.back(), J));
   }
+  background = Matrix::Zero(rank, rank);
+  if (!problem.background.empty())
+    background = Eigen::Map<const Matrix>(problem.background.data(), rank, rank);
   if (problem.basis.empty()) {
     T = Matrix::Identity(rank, rank);
     A = Q;
@@ -86,6 +91,14 @@ Matrix ScaledProblem::scaled(int k, const Matrix& information) const {
   return dense::product(dense::product(root, information), root);
 }
 
+void refuse_background(const RecoveryProblem& problem, const char* method) {
+  if (problem.background.empty()) return;
+  throw Error(ErrorCode::usage,
+              fmt::format("{} does not solve problems that take account of the rest of the graph "
+                          "(sparsify:fit=graph): take ncfd or fd",
+                          method));
+}
+
 Matrix nearest_positive(const Matrix& A, double floor) {
   const Eigen::SelfAdjointEigenSolver<Matrix> eigen(Matrix(0.5 * (A + A.transpose())));
   return dense::from_eigenvalues(eigen.eigenvectors(), eigen.eigenvalues().cwiseMax(floor));
@@ -103,8 +116,8 @@ bool Approximation::set(std::vector<Matrix> W) {
 
 bool Approximation::refresh() {
   const int r = problem_->rank;
-  Matrix L = Matrix::Zero(r, r);
-  trace_ = 0.0;
+  Matrix L = problem_->background;
+  trace_ = L.trace();
   for (int k = 0; k < problem_->factors(); ++k) {
     const Matrix WQ = dense::product(W_[k], problem_->Q[k]);
     dense::add_product_of_transpose(problem_->Q[k], WQ, L);

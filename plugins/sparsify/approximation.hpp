@@ -18,9 +18,9 @@ inline constexpr double kFloor = 1e-7;
 /// A recovery problem in units in which each factor's optimum without the others would be the
 /// identity: with Φ = (J Jᵀ)⁻¹, Q = Φ^½ J has orthonormal rows, and Ω = Φ^½ W Φ^½. The cost is then
 ///
-///     2 KLD = Σ_k tr W_k − ln |Σ_k Q_kᵀ W_k Q_k| − r
+///     2 KLD = tr R + Σ_k tr W_k − ln |R + Σ_k Q_kᵀ W_k Q_k| − r
 ///
-/// and its gradient by W_k I − M_k, M_k = Q_k Λ̆⁻¹ Q_kᵀ.
+/// and its gradient by W_k I − M_k, M_k = Q_k Λ̆⁻¹ Q_kᵀ; R is the problem's background, mostly zero.
 struct ScaledProblem {
   /// Throws `Error` (numerical) where a Jacobian is not of full rank.
   explicit ScaledProblem(const RecoveryProblem& problem);
@@ -30,6 +30,7 @@ struct ScaledProblem {
   std::vector<Matrix> Phi_root;  ///< Φ^½, symmetric
   /// Q_k = A_k T(columns_k, ·); where the problem has no such form, T is the identity.
   Matrix T;               ///< d × r
+  Matrix background;      ///< R, r × r
   std::vector<Matrix> A;  ///< m × columns
   std::vector<std::vector<int>> columns;
 
@@ -39,12 +40,16 @@ struct ScaledProblem {
   Matrix scaled(int k, const Matrix& information) const;
 };
 
+/// Throws `Error` (usage) if a problem has a background, which the method of this name does not
+/// solve.
+void refuse_background(const RecoveryProblem& problem, const char* method);
+
 /// The nearest symmetric positive semidefinite matrix in the Frobenius norm, with eigenvalues of at
 /// least `floor` (Higham 1988).
 Matrix nearest_positive(const Matrix& A, double floor = kFloor);
 
-/// Λ̆ = Σ_k Q_kᵀ W_k Q_k, its inverse S as V = T S Tᵀ, and all M_k = A_k V A_kᵀ, while single W_k
-/// change.
+/// Λ̆ = R + Σ_k Q_kᵀ W_k Q_k, its inverse S as V = T S Tᵀ, and all M_k = A_k V A_kᵀ, while single
+/// W_k change.
 ///
 /// The information of the other factors in the space of factor k is, by the matrix inversion lemma,
 ///

@@ -150,6 +150,7 @@ RecoveryResult RecoveryClock::finish(const Approximation& at, int iterations, bo
 }
 
 RecoveryResult ClosedForm::recover(const RecoveryProblem& problem) {
+  refuse_background(problem, "closed_form");
   RecoveryClock clock({}, false);
   const ScaledProblem scaled(problem);
   Approximation at(scaled);
@@ -168,6 +169,7 @@ RecoveryResult ClosedForm::recover(const RecoveryProblem& problem) {
 }
 
 RecoveryResult FactorDescent::recover(const RecoveryProblem& problem) {
+  if (conservative_) refuse_background(problem, "conservative=true");
   RecoveryClock clock(options_, trace_);
   const ScaledProblem scaled(problem);
   Approximation at(scaled);

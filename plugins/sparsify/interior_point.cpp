@@ -208,6 +208,7 @@ Eigen::LLT<Matrix> factorized(Matrix H) {
 }  // namespace
 
 RecoveryResult InteriorPoint::recover(const RecoveryProblem& problem) {
+  refuse_background(problem, "ip");
   RecoveryClock clock(options_, trace_);
   const ScaledProblem scaled(problem);
   Approximation at(scaled);

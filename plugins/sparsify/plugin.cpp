@@ -75,9 +75,11 @@ void cairn_register(Registrar& registrar) {
   add_topologies(registrar);
   add_recoveries(registrar);
   add_selections(registrar);
-  registrar.add<Sparsifier, SparsifyOptions>(
-      "sparsify", [](const SparsifyOptions& options, Registry& registry) {
-        return std::make_unique<Sparsify>(registry.make<Topology>(options.topology),
-                                          registry.make<FactorRecovery>(options.recovery), options);
-      });
+  registrar.add<Sparsifier, SparsifyOptions>("sparsify", [](const SparsifyOptions& options,
+                                                            Registry& registry) {
+    return std::make_unique<Sparsify>(
+        registry.make<Topology>(options.topology), registry.make<FactorRecovery>(options.recovery),
+        options,
+        options.fit == Fit::blanket ? nullptr : registry.make<LinearSolver>(options.linear_solver));
+  });
 }

@@ -111,6 +111,7 @@ Vector minimize(const Model& model, const Stack& stack, const Vector& x, const V
 }  // namespace
 
 RecoveryResult ProjectedQuasiNewton::recover(const RecoveryProblem& problem) {
+  refuse_background(problem, "pqn");
   RecoveryClock clock(options_, trace_);
   const ScaledProblem scaled(problem);
   Approximation at(scaled);

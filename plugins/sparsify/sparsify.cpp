@@ -105,8 +105,11 @@ LocalMinimum local_minimum(const SparsifyOptions& options, const LocalProblem& l
 }  // namespace
 
 Sparsify::Sparsify(std::unique_ptr<Topology> topology, std::unique_ptr<FactorRecovery> recovery,
-                   SparsifyOptions options)
-    : topology_(std::move(topology)), recovery_(std::move(recovery)), options_(options) {}
+                   SparsifyOptions options, std::unique_ptr<LinearSolver> solver)
+    : topology_(std::move(topology)),
+      recovery_(std::move(recovery)),
+      options_(std::move(options)),
+      solver_(std::move(solver)) {}
 
 /// Nodes that leave together: one by one, or those that factors connect, in the order in which
 /// their first is asked for.
@@ -133,16 +136,45 @@ std::vector<std::vector<int>> Sparsify::groups(const WorkGraph& work,
   return result;
 }
 
-void Sparsify::recover(const BlanketProjection& coordinates, Solved& solved,
-                       SparsificationSeconds& seconds) {
+void Sparsify::recover(const Recovered& of, Solved& solved, SparsificationSeconds& seconds) {
   const Timed timed(seconds.recovery);
-  const RecoveryProblem problem = coordinates.problem(solved.marginal.dense, solved.topology);
+  const DenseBlanket& own = solved.marginal.dense;
+  RecoveryProblem problem = of.coordinates.problem(of.whole ? *of.whole : own, solved.topology);
+  if (of.whole) problem.background = background(*of.whole, own, of.coordinates);
   solved.recovery =
       topology_->whole() ? ClosedForm().recover(problem) : recovery_->recover(problem);
+  if (options_.fit != Fit::scaled || of.own_covariance.size() == 0) return;
+  const double scale =
+      certainty_scale(own, solved.topology, solved.recovery.information, of.own_covariance);
+  for (std::vector<double>& information : solved.recovery.information) {
+    for (double& x : information) x *= scale;
+  }
+}
+
+/// What the whole graph, as it is now, knows of a blanket; empty where that is not asked for, or
+/// not determined.
+Matrix Sparsify::known_in_graph(const WorkGraph& work, const LocalProblem& local,
+                                const Marginal& marginal) const {
+  if (options_.fit == Fit::blanket || topology_->whole() || marginal.open > 0) return {};
+  const Graph& graph = work.graph();
+  Sparsification so_far;
+  collect(work, so_far);
+  std::optional<Matrix> joint;
+  if (so_far.removed_variables.empty()) {
+    joint = joint_covariance(graph, *solver_, local.blanket);
+  } else {
+    Graph now = graph.clone();
+    apply(so_far, now);
+    std::vector<int> there;
+    for (const int v : local.blanket) there.push_back(now.find(graph.id(v)).value());
+    joint = joint_covariance(now, *solver_, there);
+  }
+  if (!joint) return {};
+  return own_covariance(marginal.dense, *joint).value_or(Matrix());
 }
 
 Sparsify::Solved Sparsify::solve(const WorkGraph& work, const LocalProblem& local,
-                                 SparsificationSeconds& seconds) {
+                                 SparsificationSeconds& seconds, bool in_graph) {
   Solved solved;
   {
     const Timed timed(seconds.marginalize);
@@ -159,7 +191,13 @@ Sparsify::Solved Sparsify::solve(const WorkGraph& work, const LocalProblem& loca
       std::ranges::all_of(local.removed, [&](int v) { return is_point(work.graph().type(v)); });
   if (solved.marginal.open > 0 && !landmarks && options_.open == Open::refuse)
     refuse_open(work.graph(), local, solved.marginal, options_.open);
-  const BlanketProjection coordinates = project(dense, options_.projection);
+  Recovered of{.own_covariance = in_graph ? known_in_graph(work, local, solved.marginal) : Matrix(),
+               .whole = {},
+               .coordinates = project(dense, options_.projection)};
+  if (options_.fit == Fit::graph && of.own_covariance.size() > 0) {
+    of.whole = within_graph(dense, of.own_covariance);
+    of.coordinates = project(*of.whole, options_.projection);
+  }
   const int nodes = static_cast<int>(std::ssize(dense.node_sizes));
   // One prior of those that there are models of, besides the factors between nodes.
   const int prior = dense.absolute ? 1 : 0;
@@ -174,7 +212,7 @@ Sparsify::Solved Sparsify::solve(const WorkGraph& work, const LocalProblem& loca
         solved.topology = topology_->choose(dense, count);
         solved.note = topology_->note();
       }
-      recover(coordinates, solved, seconds);
+      recover(of, solved, seconds);
     } catch (const Error&) {
       if (solved.marginal.open > 0)
         refuse_open(work.graph(), local, solved.marginal, options_.open);
@@ -252,7 +290,7 @@ void Sparsify::take_out(WorkGraph& work, std::vector<int> group, Sparsification&
   Solved solved;
   if (!local.blanket.empty()) {
     try {
-      solved = solve(work, local, result.seconds);
+      solved = solve(work, local, result.seconds, true);
     } catch (const Error& error) {
       if (error.code() != ErrorCode::numerical) throw;
       return refuse(error.what());
@@ -289,6 +327,27 @@ void Sparsify::take_out(WorkGraph& work, std::vector<int> group, Sparsification&
   observer_(record);
 }
 
+/// The change that led to where the work is.
+void Sparsify::collect(const WorkGraph& work, Sparsification& result) {
+  const Graph& graph = work.graph();
+  for (int v = 0; v < graph.variable_count(); ++v) {
+    if (work.gone(v)) result.removed_variables.push_back(v);
+  }
+  for (int f = 0; f < work.factor_count(); ++f) {
+    const WorkFactor& factor = work.factor(f);
+    if (factor.there && factor.position < 0) {
+      Factor fresh{.type = factor.type,
+                   .variables = {},
+                   .measurement = factor.measurement,
+                   .information = factor.information};
+      for (const int v : factor.variables) fresh.variables.push_back(graph.id(v));
+      result.factors.push_back(std::move(fresh));
+    } else if (!factor.there && factor.position >= 0) {
+      result.removed_factors.push_back(factor.position);
+    }
+  }
+}
+
 Sparsification Sparsify::remove(const Graph& graph, std::span<const int> nodes,
                                 const std::function<bool(int)>& step) {
   Sparsification result;
@@ -311,22 +370,7 @@ Sparsification Sparsify::remove(const Graph& graph, std::span<const int> nodes,
     }
   } catch (const Interruption&) {  // in a blanket, which stays as it is
   }
-  for (int v = 0; v < graph.variable_count(); ++v) {
-    if (work.gone(v)) result.removed_variables.push_back(v);
-  }
-  for (int f = 0; f < work.factor_count(); ++f) {
-    const WorkFactor& factor = work.factor(f);
-    if (factor.there && factor.position < 0) {
-      Factor fresh{.type = factor.type,
-                   .variables = {},
-                   .measurement = factor.measurement,
-                   .information = factor.information};
-      for (const int v : factor.variables) fresh.variables.push_back(graph.id(v));
-      result.factors.push_back(std::move(fresh));
-    } else if (!factor.there && factor.position >= 0) {
-      result.removed_factors.push_back(factor.position);
-    }
-  }
+  collect(work, result);
   return result;
 }
 
@@ -339,7 +383,7 @@ std::vector<double> Sparsify::losses(const Graph& graph, std::span<const int> no
     double kld = std::numeric_limits<double>::infinity();
     if (local.refusal.empty()) {
       try {
-        kld = local.blanket.empty() ? 0.0 : solve(work, local, seconds).recovery.kld;
+        kld = local.blanket.empty() ? 0.0 : solve(work, local, seconds, false).recovery.kld;
       } catch (const Error& error) {
         if (error.code() != ErrorCode::numerical) throw;
       }

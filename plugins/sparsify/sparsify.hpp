@@ -3,15 +3,18 @@
 
 #include <array>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "cairn/linear/linear_solver.hpp"
 #include "cairn/plugin/option_fields.hpp"
 #include "cairn/sparsification/recovery.hpp"
 #include "cairn/sparsification/sparsifier.hpp"
 #include "cairn/sparsification/topology.hpp"
 #include "constraint_model.hpp"
+#include "fit.hpp"
 #include "local_problem.hpp"
 #include "work_graph.hpp"
 
@@ -51,7 +54,9 @@ struct SparsifyOptions {
   bool resolve = true;  ///< the cropped problem is solved by itself
   LinearizeAt linearize = LinearizeAt::graph;
   Open open = Open::refuse;
-  int largest_group = 50;  ///< nodes that leave together, at most
+  Fit fit = Fit::blanket;
+  std::string linear_solver = "block_cholesky";  ///< for `fit`
+  int largest_group = 50;                        ///< nodes that leave together, at most
 
   static auto fields() {
     using O = SparsifyOptions;
@@ -74,6 +79,12 @@ struct SparsifyOptions {
         .choice("open", &O::open,
                 "a pose without which its neighbours are not determined, as by a measured position "
                 "alone, stays, or leaves factors of lower rank")
+        .choice("fit", &O::fit,
+                "information of new factors by the covariance of the cropped problem alone (the "
+                "thesis), the same scaled so that the whole graph is as certain as it was, or by "
+                "the covariance in the whole graph (ncfd and fd)")
+        .component<LinearSolver>("linear_solver", &O::linear_solver,
+                                 "factorises the whole graph, for fit")
         .integer("largest_group", &O::largest_group, 1, 100000,
                  "nodes that leave together, at most");
   }
@@ -82,8 +93,10 @@ struct SparsifyOptions {
 /// The whole process (T figure 4.2): crop, marginalise, choose a topology, recover its factors.
 class Sparsify final : public Sparsifier {
  public:
+  /// `solver`: for the covariance of blankets in the whole graph, which `Fit::blanket` does not
+  /// need.
   Sparsify(std::unique_ptr<Topology> topology, std::unique_ptr<FactorRecovery> recovery,
-           SparsifyOptions options);
+           SparsifyOptions options, std::unique_ptr<LinearSolver> solver = nullptr);
 
   Sparsification remove(const Graph& graph, std::span<const int> nodes,
                         const std::function<bool(int)>& step) override;
@@ -99,10 +112,20 @@ class Sparsify final : public Sparsifier {
     std::vector<std::vector<double>> information;  ///< of the new factors, packed
     std::string note;                              ///< of the topology
   };
+  /// How a blanket is recovered.
+  struct Recovered {
+    Matrix own_covariance;              ///< `own_covariance` in the whole graph; empty: not used
+    std::optional<DenseBlanket> whole;  ///< `within_graph`, where factors are fitted to it
+    BlanketProjection coordinates;
+  };
   LocalProblem cropped(const WorkGraph& work, std::vector<int> group) const;
-  Solved solve(const WorkGraph& work, const LocalProblem& local, SparsificationSeconds& seconds);
-  void recover(const BlanketProjection& coordinates, Solved& solved,
-               SparsificationSeconds& seconds);
+  /// `in_graph`: as `SparsifyOptions::fit` says; otherwise by the cropped problem alone.
+  Solved solve(const WorkGraph& work, const LocalProblem& local, SparsificationSeconds& seconds,
+               bool in_graph);
+  Matrix known_in_graph(const WorkGraph& work, const LocalProblem& local,
+                        const Marginal& marginal) const;
+  void recover(const Recovered& of, Solved& solved, SparsificationSeconds& seconds);
+  static void collect(const WorkGraph& work, Sparsification& result);
   void add_factors(WorkGraph& work, const LocalProblem& local, const Solved& solved);
   std::shared_ptr<const FactorType> pair_type(const std::shared_ptr<const FactorType>& relative,
                                               const std::vector<std::array<int, 2>>& between);
@@ -112,6 +135,7 @@ class Sparsify final : public Sparsifier {
   std::unique_ptr<Topology> topology_;
   std::unique_ptr<FactorRecovery> recovery_;
   SparsifyOptions options_;
+  std::unique_ptr<LinearSolver> solver_;
   SparsificationObserver observer_;
   struct PairType {
     std::shared_ptr<const FactorType> relative;

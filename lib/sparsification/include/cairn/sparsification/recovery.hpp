@@ -20,7 +20,8 @@ namespace cairn {
 ///     KLD = ½ (tr Λ̆ − ln |Λ̆| − r),   Λ̆ = Σ_k J_kᵀ Ω_k J_k
 ///
 /// (T 4.2), in r coordinates in which the dense Gaussian is N(0, I): the projection (T 4.3),
-/// scaled.
+/// scaled. With a `background` R, information that stays whatever the factors are, it is Λ̆ = R +
+/// Σ_k J_kᵀ Ω_k J_k.
 struct RecoveryProblem {
   struct Factor {
     int size = 0;                  ///< m
@@ -36,6 +37,9 @@ struct RecoveryProblem {
   int rank = 0;  ///< r
   std::vector<Factor> factors;
   std::vector<double> basis{};  ///< T, d × r, column-major; may be empty
+  /// R ⪰ 0, r × r; empty: zero. `fd` and `ncfd` alone solve problems that have one; the others
+  /// refuse it.
+  std::vector<double> background{};
 };
 
 /// How coordinates are chosen in which the dense Gaussian has a covariance (T 4.3).
