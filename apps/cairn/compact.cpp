@@ -7,12 +7,14 @@
 #include <memory>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 #include <fmt/core.h>
 #include <boost/json/object.hpp>
 
 #include "arguments.hpp"
 #include "cairn/evaluation/plausibility.hpp"
+#include "cairn/geometry/pose.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/policy/policy_run.hpp"
 #include "cairn/policy/selection_check.hpp"
@@ -59,6 +61,39 @@ void note_fixed_start(const Recording& recording, const Session& session) {
   if (!data.recording.fixed(first)) return;
   session.note(fmt::format("{} is not fixed: where it is on the map is found by matches",
                            data.recording.describe_variable(first)));
+}
+
+/// A measurement of a pose of an earlier session that the map has not kept can be carried over to
+/// one that it has by odometry of that session alone, which a recording may lack.
+void note_lost_measurements(const Recording& recording, const CompactOptions& options,
+                            const Session& session) {
+  const PolicyData& data = recording.data;
+  if (!recording.map || data.poses.empty() || !options.registration.starts_with("recorded")) return;
+  const Graph& graph = data.recording;
+  const Id first = graph.id(data.poses.front().pose());
+  const auto earlier = [&](int v) { return !is_point(graph.type(v)) && graph.id(v) < first; };
+  std::vector<bool> led_to(graph.variable_count());  // by a measurement of an earlier session
+  for (int f = 0; f < graph.factor_count(); ++f) {
+    const auto on = graph.factor_variables(f);
+    if (on.size() != 2 || !earlier(on[0]) || !earlier(on[1])) continue;
+    led_to[on[0]] = led_to[on[1]] = true;
+  }
+  int between = 0, lost = 0;
+  for (const Arrival& arrival : data.poses) {
+    for (const int f : arrival.links) {
+      for (const int v : graph.factor_variables(f)) {
+        if (!earlier(v)) continue;
+        ++between;
+        lost += !led_to[v] && !recording.map->find(graph.id(v));
+      }
+    }
+  }
+  if (lost == 0) return;
+  session.note(fmt::format(
+      "{} of {} measurements between the sessions are lost: they are of poses that {} has not "
+      "kept, and {} has no odometry of the earlier session to carry them over to others; give a "
+      "recording that has it as well, and --begin {}",
+      lost, between, options.map, recording.name, first));
 }
 
 /// Shows how far a run is.
@@ -257,6 +292,7 @@ int run_compact(const CompactOptions& options, Session& session) {
   const ProblemSetup setup(options.problem, registry);
   const Recording recording = load_recording(options, session);
   note_fixed_start(recording, session);
+  note_lost_measurements(recording, options, session);
   const InterruptGuard guard;  // until the results are written
   PolicyProgress progress(session.common.quiet);
   const PolicySetting setting{

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <filesystem>
 #include <sstream>
 #include <string>
@@ -229,6 +230,27 @@ TEST_F(Compact, ContinuesTheMapOfAnEarlierSession) {
             whole(second, "poses", "map") + whole(second, "poses", "kept"));
   EXPECT_EQ(joint.at("components").as_int64(), 1);
 
+  // Measurements of poses that the map has not kept need the way from there to one that it has.
+  std::string lines_without;
+  for (const std::string& line : lines(read_text(tuesday))) {
+    std::istringstream words(line);
+    std::string tag;
+    int one_end = 0, other_end = 0;
+    words >> tag >> one_end >> other_end;
+    if (!tag.starts_with("EDGE") || std::max(one_end, other_end) >= 400)
+      lines_without += line + '\n';
+  }
+  const std::string without = folder_.file("without.g2o"), lost = "between the sessions are lost";
+  write_text(without, lines_without);
+  const auto notes = [&](const std::string& recording) {
+    const Outcome run =
+        cairn({"compact", recording, "--begin", "400", "--map", map, "--thresholds", robot});
+    EXPECT_EQ(run.exit_code, 0) << run.err;
+    return run.err;
+  };
+  EXPECT_THAT(notes(without), HasSubstr(lost));
+  EXPECT_THAT(notes(tuesday), Not(HasSubstr(lost)));
+
   // Without a measurement between the two.
   const std::string apart = folder_.file("apart.g2o");
   write_text(apart, part_of(all, 400, false, false));
@@ -243,6 +265,36 @@ TEST_F(Compact, ContinuesTheMapOfAnEarlierSession) {
   EXPECT_THAT(same.err, HasSubstr("is in the map and in the recording"));
   EXPECT_THAT(cairn({"compact", tuesday, "--begin", "4000", "--range", "3"}).err,
               HasSubstr("there is no pose 4000"));
+}
+
+// With thresholds of the first. One world says little: with other noise the error of either varies
+// by a factor of two.
+TEST_F(Compact, AMapOfTwoSessionsHasTheErrorOfOne) {
+  double two = 0.0, one = 0.0;
+  for (const char* seed : {"1", "2", "3", "4", "5", "6"}) {
+    const std::string all = folder_.file("all.g2o"), truth = folder_.file("truth.g2o"),
+                      first = folder_.file("first.g2o"), second = folder_.file("second.g2o"),
+                      map = folder_.file("map.g2o"), both = folder_.file("both.g2o"),
+                      together = folder_.file("one.g2o"), robot = folder_.file("robot.json");
+    ASSERT_EQ(cairn({"generate", "manhattan:poses=800,streets=5", "--seed", seed, "-o", all,
+                     "--ground-truth", truth})
+                  .exit_code,
+              0);
+    write_text(first, part_of(all, 400, true, false));
+    write_text(second, part_of(all, 400, true, true) + part_of(all, 400, false, false));
+    const auto error = [&](const std::string& file) {
+      const boost::json::value report =
+          parse_json(cairn({"evaluate", file, truth, "--json", "-"}).out);
+      const double ate = report.at("ate").at("translation").to_number<double>();
+      return ate * ate;
+    };
+    report({first, "-o", map, "--save-thresholds", robot});
+    report({second, "--begin", "400", "--map", map, "--thresholds", robot, "-o", both});
+    report({all, "--thresholds", robot, "-o", together});
+    two += error(both);
+    one += error(together);
+  }
+  EXPECT_LT(std::sqrt(two), 1.3 * std::sqrt(one));
 }
 
 TEST_F(Compact, KeepsTheMeasurementsOfLandmarksThatAreInformative) {
