@@ -40,7 +40,8 @@ Situation adapted(const Situation& situation, const RobotModel& robot, double bu
           .decision = situation.decision,
           .match = situation.match,
           .first_sigma = situation.first_sigma,
-          .budget = budget};
+          .budget = budget,
+          .interrupt = situation.interrupt};
 }
 
 RobotModel narrowed(const RobotModel& robot, const GridFrame& frame) {
@@ -59,7 +60,7 @@ Decision end_decision(Decision::Kind kind, std::string why) {
 bool moves(const Situation& situation, const PlannedPath& path) {
   std::size_t passed = 0;
   const std::optional<PlannedPath> driven =
-      drivable_path(path, situation.pose, situation.robot, situation.map);
+      drivable_path(path, situation.pose, situation.robot, situation.map, situation.interrupt);
   return driven && next_motion(situation.pose, *driven, situation.robot, passed).has_value();
 }
 

@@ -103,7 +103,7 @@ Decision EdeGradient::decide(const Situation& situation) {
   falls_back_ = false;
   ++decisions_;
   for (const bool tight : {false, true}) {
-    for (int round = 0; round < kMostRounds; ++round) {
+    for (int round = 0; round < kMostRounds && !situation.interrupted(); ++round) {
       const double before = time.passed();
       // Once a potential was cut too short, it has fewer configurations.
       const bool too_many = too_many_ < std::numeric_limits<std::size_t>::max();

@@ -53,7 +53,7 @@ Decision EdeRrtStar::decide(const Situation& situation) {
   Decision decision;
   falls_back_ = false;
   for (const bool tight : {false, true})
-    if (drive(situation, tight, time, decision)) return decision;
+    if (drive(situation, tight, time, decision) || situation.interrupted()) return decision;
   if (fallback_) {
     falls_back_ = true;
     const double least = kLeastPart * situation.budget;
@@ -72,7 +72,7 @@ bool EdeRrtStar::is_worthwhile(const Situation& situation, const PlannedPath& pa
 bool EdeRrtStar::drive(const Situation& situation, bool tight, const DecisionTime& time,
                        Decision& decision) {
   bool started = false;
-  for (int round = 0; round < kMostRounds; ++round) {
+  for (int round = 0; round < kMostRounds && !situation.interrupted(); ++round) {
     const double before = time.passed();
     const ReachableField at = goals_.field(situation, tight, time.left(kFieldPart));
     if (!at.discovers) return false;
@@ -87,9 +87,11 @@ bool EdeRrtStar::drive(const Situation& situation, bool tight, const DecisionTim
     std::optional<std::size_t> there;  // the robot stands at this goal
     std::vector<std::size_t> configurations;
     for (const Goal& goal : goals) {
+      if (situation.interrupted()) break;
       std::optional<PlannedPath> path = path_to(at, goal.configuration);
       if (path)
-        path = drivable_path(std::move(*path), situation.pose, situation.robot, situation.map);
+        path = drivable_path(std::move(*path), situation.pose, situation.robot, situation.map,
+                             situation.interrupt);
       if (!path) continue;
       if (!moves(situation, *path)) {
         if (decision.candidates.empty()) there = goal.configuration;

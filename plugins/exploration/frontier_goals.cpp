@@ -37,7 +37,7 @@ std::vector<Candidate> FrontierGoals::candidates(double least) {
   unreachable_ = 0;
   longest_unreachable_ = 0.0;
   for (const Frontier& frontier : situation_->map.frontiers) {
-    if (frontier.length < least) break;  // longest first
+    if (frontier.length < least || situation_->interrupted()) break;  // longest first
     std::optional<PlannedPath> path = path_to(frontier);
     if (path) {
       const double length = path->length;
@@ -68,6 +68,7 @@ std::optional<PlannedPath> FrontierGoals::path_to(const Frontier& frontier) {
   const GridFrame& frame = situation_->map.frame;
   const auto stride = static_cast<std::size_t>(std::max(1.0, kSpacing / frame.resolution));
   for (std::size_t k = stride / 2; k < frontier.cells.size(); k += stride) {
+    if (situation_->interrupted()) break;
     const std::int32_t cell = frontier.cells[k];
     auto path = path_to(frame.centre(cell % frame.width, cell / frame.width));
     if (path && (!best || path->length < best->length)) best = std::move(path);
@@ -95,7 +96,8 @@ bool FrontierGoals::is_there(const FloorMap& map, const Vector2d& middle) {
 }
 
 std::optional<PlannedPath> FrontierGoals::driven(PlannedPath path) const {
-  return drivable_path(std::move(path), situation_->pose, situation_->robot, situation_->map);
+  return drivable_path(std::move(path), situation_->pose, situation_->robot, situation_->map,
+                       situation_->interrupt);
 }
 
 bool FrontierGoals::moves(const PlannedPath& path) const {

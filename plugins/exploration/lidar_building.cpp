@@ -241,8 +241,18 @@ class LidarBuilding final : public World {
 void cairn_register(cairn::Registrar& registrar) {
   using namespace cairn;
   using namespace cairn::exploration;
-  registrar.add<World, LidarBuildingOptions>(
-      "lidar_building", [](const LidarBuildingOptions& options, Registry& registry) {
+  registrar.add<World>(
+      "lidar_building", LidarBuildingOptions::fields().table(),
+      [](const Options& given, Registry& registry) {
+        const LidarBuildingOptions options = LidarBuildingOptions::fields().read(given);
+        if (given.given("turning_radius") && options.motion != MotionModel::dubins) {
+          throw Error(
+              ErrorCode::usage,
+              fmt::format("world lidar_building: turning_radius goes with motion=dubins, and the "
+                          "robot is {}, which turns in place: add motion=dubins, or leave "
+                          "turning_radius out",
+                          to_string(options.motion)));
+        }
         return std::make_unique<LidarBuilding>(options,
                                                registry.make<FloorSurveyor>(options.surveyor));
       });

@@ -2,6 +2,7 @@
 // Paths for a robot that can't turn in place.
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -132,9 +133,12 @@ bool is_followed(const PlannedPath& path, const Pose2& from, const RobotModel& r
 /// end at the goal exactly.
 class CurveSearch {
  public:
-  CurveSearch(const PlannedPath& path, const RobotModel& robot, const FloorMap& map, double needed)
+  /// `interrupt`: once it is true there is no curve; may be null.
+  CurveSearch(const PlannedPath& path, const RobotModel& robot, const FloorMap& map, double needed,
+              const std::atomic<bool>* interrupt)
       : path_(path),
         map_(map),
+        interrupt_(interrupt),
         room_(map, needed),
         radius_(kSpareRadius * robot.turning_radius),
         arc_(std::max(kArcCells * map.frame.resolution, radius_ * 2.0 * pi / kHeadings)),
@@ -149,7 +153,7 @@ class CurveSearch {
     nodes_.push_back({.at = start, .clearance = room_.clearance(start.translation())});
     open_.push({left(start), 0});
     std::size_t expanded = 0;
-    while (!open_.empty() && expanded < kMostPoses) {
+    while (!open_.empty() && expanded < kMostPoses && !interrupted()) {
       const std::size_t index = open_.top().second;
       open_.pop();
       const Node node = nodes_[index];
@@ -178,6 +182,8 @@ class CurveSearch {
   };
   using Open = std::pair<double, std::size_t>;
 
+  bool interrupted() const { return interrupt_ && interrupt_->load(std::memory_order_relaxed); }
+
   static std::vector<Goal> goals(const PlannedPath& path, const RobotModel& robot) {
     const Vector2d end = path.points.back();
     Vector2d ahead = path.look_at ? Vector2d(*path.look_at - end) : Vector2d::Zero();
@@ -205,7 +211,7 @@ class CurveSearch {
     std::priority_queue<Open, std::vector<Open>, std::greater<>> open;
     to_goal_[*goal] = 0.0;
     open.push({0.0, *goal});
-    while (!open.empty()) {
+    while (!open.empty() && !interrupted()) {
       const auto [length, index] = open.top();
       open.pop();
       if (length > to_goal_[index]) continue;
@@ -353,6 +359,7 @@ class CurveSearch {
 
   const PlannedPath& path_;
   const FloorMap& map_;
+  const std::atomic<bool>* interrupt_;
   Room room_;
   double radius_, arc_;
   std::vector<Goal> goals_;
@@ -365,7 +372,7 @@ class CurveSearch {
 }  // namespace
 
 std::optional<PlannedPath> drivable_path(PlannedPath path, const Pose2& at, const RobotModel& robot,
-                                         const FloorMap& map) {
+                                         const FloorMap& map, const std::atomic<bool>* interrupt) {
   if (robot.motion != MotionModel::dubins) return path;
   if (path.points.empty()) path.points.emplace_back(at.translation());
   const double needed = needed_along(path, at.translation(), robot, map);
@@ -373,11 +380,14 @@ std::optional<PlannedPath> drivable_path(PlannedPath path, const Pose2& at, cons
     return is_followed(curve, at, robot, Room(map, clearance));
   };
   if (keeps(path, needed)) return path;
-  std::optional<PlannedPath> curve = CurveSearch(path, robot, map, needed).from(at);
+  const auto curve_with = [&](double clearance) {
+    return CurveSearch(path, robot, map, clearance, interrupt).from(at);
+  };
+  std::optional<PlannedPath> curve = curve_with(needed);
   if (!curve || keeps(*curve, needed)) return curve;
   // Steering strays from curves: one with room for that is better.
   const double spare = 0.5 * map.frame.resolution;
-  std::optional<PlannedPath> wider = CurveSearch(path, robot, map, needed + spare).from(at);
+  std::optional<PlannedPath> wider = curve_with(needed + spare);
   if (wider && keeps(*wider, needed)) return wider;
   if (!keeps(*curve, needed - spare)) return std::nullopt;
   return curve;

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <numeric>
+#include <optional>
 #include <utility>
 
 #include <fmt/core.h>
@@ -81,13 +82,16 @@ class Run {
   void explore() {
     while (!ended_) {
       if (!check_limits()) break;
-      const Decision decision = decide();
-      if (decision.kind == Decision::Kind::drive)
-        drive(decision.candidates.at(decision.chosen).path);
-      else
-        end(decision.kind == Decision::Kind::finished ? ExplorationEnd::finished
-                                                      : ExplorationEnd::stuck,
-            decision.why);
+      const std::optional<Decision> decision = decide();
+      if (!decision) {
+        end_interrupted();
+      } else if (decision->kind == Decision::Kind::drive) {
+        drive(decision->candidates.at(decision->chosen).path);
+      } else {
+        end(decision->kind == Decision::Kind::finished ? ExplorationEnd::finished
+                                                       : ExplorationEnd::stuck,
+            decision->why);
+      }
     }
   }
 
@@ -186,11 +190,14 @@ class Run {
     result_.why = std::move(why);
   }
 
+  bool is_interrupted() const { return parts_.interrupt && *parts_.interrupt; }
+  void end_interrupted() { end(ExplorationEnd::interrupted, "it was interrupted"); }
+
   /// False: the run is over.
   bool check_limits() {
     const ExplorationLimits& limits = parts_.limits;
-    if (parts_.interrupt && *parts_.interrupt) {
-      end(ExplorationEnd::interrupted, "it was interrupted");
+    if (is_interrupted()) {
+      end_interrupted();
     } else if (result_.steps.back().distance >= limits.distance) {
       end(ExplorationEnd::limit, fmt::format("{:g} m are driven", limits.distance));
     } else if (result_.steps.back().step >= limits.steps) {
@@ -218,7 +225,8 @@ class Run {
     }
   }
 
-  Decision decide() {
+  /// None: it was interrupted, so that what was decided is worth nothing.
+  std::optional<Decision> decide() {
     const FloorMap& map = slam_.map();
     const std::vector<Id> kept = parts_.policy.kept();
     double seconds = 0.0;
@@ -227,10 +235,11 @@ class Run {
       return call_plugin([] { return std::string("explorer"); },
                          [&] { return parts_.explorer.decide(situation(map, kept)); });
     }();
-    if (decision.kind == Decision::Kind::drive) {
+    if (decision.kind == Decision::Kind::drive && !is_interrupted()) {
       Timed timed(seconds);
       make_drivable(decision, map);
     }
+    if (is_interrupted()) return std::nullopt;
     ++decisions_;
     result_.decide_seconds += seconds;
     result_.decision_seconds.push_back(seconds);
@@ -249,7 +258,9 @@ class Run {
     const std::size_t wanted = decision.chosen;
     for (const std::size_t k : order) {
       Candidate& candidate = decision.candidates[k];
-      std::optional<PlannedPath> driven = drivable_path(candidate.path, slam_.pose(), robot_, map);
+      std::optional<PlannedPath> driven =
+          drivable_path(candidate.path, slam_.pose(), robot_, map, parts_.interrupt);
+      if (is_interrupted()) return;
       if (!driven) {
         ++not_driven_;
         continue;
@@ -276,7 +287,8 @@ class Run {
             .decision = decisions_,
             .match = match,
             .first_sigma = parts_.first_sigma,
-            .budget = parts_.decision_budget};
+            .budget = parts_.decision_budget,
+            .interrupt = parts_.interrupt};
   }
 
   void drive(const PlannedPath& path) {

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <atomic>
 #include <cmath>
 #include <numbers>
 #include <optional>
@@ -145,6 +146,21 @@ TEST(DrivablePath, TurnsRoundWhereThereIsRoom) {
   double least = 4.0;
   for (const Vector2d& point : curve->points) least = std::min(least, point.x());
   EXPECT_LT(least, 3.2);
+}
+
+TEST(DrivablePath, ThereIsNoneOnceTheSearchIsInterrupted) {
+  const FloorMap map = room_and_corridor();
+  const RobotModel robot = dubins_robot(0.5);
+  const Pose2 start(4.0, 1.6, pi);
+  const PlannedPath path{
+      .points = {{4.0, 1.6}, {7.0, 1.6}}, .length = 3.0, .look_at = Vector2d(8.0, 1.6)};
+  std::atomic<bool> interrupt = false;
+  const auto curve = drivable_path(path, start, robot, map);
+  const auto watched = drivable_path(path, start, robot, map, &interrupt);
+  ASSERT_TRUE(curve && watched);
+  EXPECT_EQ(watched->points, curve->points);
+  interrupt = true;
+  EXPECT_FALSE(drivable_path(path, start, robot, map, &interrupt));
 }
 
 TEST(DrivablePath, ThereIsNoneWhereTheRobotCannotTurn) {

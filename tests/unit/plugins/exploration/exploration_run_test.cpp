@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <atomic>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <string>
+#include <utility>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -101,6 +104,66 @@ TEST(Exploration, AnInterruptEndsItWithItsResults) {
   EXPECT_EQ(result.steps.size(), 11U);
   EXPECT_EQ(result.trajectory.variable_count(), 11);
   EXPECT_GT(result.map.coverage(), 0.0);
+}
+
+/// Is interrupted while it decides, and says then that nothing is left.
+class InterruptedExplorer final : public Explorer {
+ public:
+  InterruptedExplorer(std::atomic<bool>& interrupt, std::unique_ptr<Explorer> other)
+      : interrupt_(interrupt), other_(std::move(other)) {}
+  void begin(std::uint64_t seed) override { other_->begin(seed); }
+  Decision decide(const Situation& situation) override {
+    if (situation.decision > 0) {
+      EXPECT_FALSE(situation.interrupted());
+      interrupt_ = true;
+      EXPECT_TRUE(situation.interrupted());
+    }
+    return other_->decide(situation);
+  }
+
+ private:
+  std::atomic<bool>& interrupt_;
+  std::unique_ptr<Explorer> other_;
+};
+
+TEST(Exploration, ADecisionThatIsInterruptedDoesNotCount) {
+  const OccupancyGrid floor = floor_named("rooms:width=12,height=9", 5);
+  for (const std::string& name : Registry().names(Explorer::kKind)) {
+    SCOPED_TRACE(name);
+    ExplorationParts parts(kExactRobot, name);
+    std::atomic<bool> interrupt{false};
+    parts.explorer = std::make_unique<InterruptedExplorer>(interrupt, std::move(parts.explorer));
+    Exploration exploration = parts.on(floor);
+    exploration.interrupt = &interrupt;
+    int decided = 0;
+    exploration.decided = [&](const Decision&, const Situation&) { ++decided; };
+    const ExplorationResult result = run_exploration(exploration);
+    EXPECT_EQ(result.end, ExplorationEnd::interrupted) << result.why;
+    EXPECT_EQ(decided, 1);
+    EXPECT_EQ(result.decision_seconds.size(), 1U);
+    EXPECT_GT(result.map.coverage(), 0.0);
+  }
+}
+
+TEST(Exploration, AFrontierIsNotSearchedForOnceTheRunIsInterrupted) {
+  const OccupancyGrid floor = floor_named("rooms:width=12,height=9", 5);
+  ExplorationParts parts(kExactRobot);
+  Exploration exploration = parts.on(floor);
+  exploration.limits.decisions = 1;
+  std::size_t without = 0, with = 99;
+  const auto again = parts.make<Explorer>("frontier");
+  exploration.decided = [&](const Decision&, const Situation& situation) {
+    std::atomic<bool> interrupt{false};
+    Situation asked = situation;
+    asked.interrupt = &interrupt;
+    again->begin(1);
+    without = again->decide(asked).candidates.size();
+    interrupt = true;
+    with = again->decide(asked).candidates.size();
+  };
+  run_exploration(exploration);
+  EXPECT_GT(without, 0U);
+  EXPECT_EQ(with, 0U);
 }
 
 /// Drives back and forth between two places.

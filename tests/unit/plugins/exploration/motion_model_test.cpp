@@ -54,6 +54,21 @@ TEST(MotionModel, DubinsDrivesAlongArcsAndRefusesOthers) {
   }
 }
 
+TEST(MotionModel, ATurningRadiusOfARobotThatTurnsInPlaceIsRefused) {
+  for (const char* motion : {"differential", "holonomic"}) {
+    try {
+      robot(std::string(motion) + ",turning_radius=0.5");  // the default, but it was given
+      ADD_FAILURE() << motion;
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ErrorCode::usage);
+      EXPECT_THAT(error.what(), HasSubstr("motion=dubins"));
+      EXPECT_THAT(error.what(), HasSubstr(motion));
+    }
+  }
+  EXPECT_EQ(robot("dubins,turning_radius=0.7")->robot().turning_radius, 0.7);
+  EXPECT_EQ(robot("dubins")->robot().turning_radius, 0.5);
+}
+
 TEST(MotionModel, ABodyOnAnArcStopsAtAWall) {
   // 8 m × 6 m inside, with cells of 1 m.
   const OccupancyGrid floor =

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <limits>
 #include <optional>
@@ -50,6 +51,11 @@ struct Situation {
   Eigen::Vector3d first_sigma = Eigen::Vector3d(0.05, 0.05, 0.0017);
   /// Within which an explorer that can stop early should decide [s].
   double budget = std::numeric_limits<double>::infinity();
+  /// Becomes true when the run is to end at once; null: it never does. An explorer whose decision
+  /// takes long looks at it on the way, and returns any decision then: it is not used.
+  const std::atomic<bool>* interrupt = nullptr;
+
+  bool interrupted() const { return interrupt && interrupt->load(std::memory_order_relaxed); }
 };
 
 /// What a path is expected to do to the entropies of trajectory and map; a decrease is negative.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <atomic>
 #include <cstddef>
 #include <optional>
 #include <string_view>
@@ -57,8 +58,10 @@ CAIRN_API std::optional<Pose2> next_motion(const Pose2& at, const PlannedPath& p
 /// in place, and for `dubins` where following it comes near no obstacle; otherwise along arcs and
 /// Dubins curves, searched on the map near the path (hybrid A*: Dolgov, Thrun, Montemerlo and
 /// Diebel, 2010), with points a few centimetres apart, and at the end a heading with `look_at`
-/// before the lidar. None: there is no such curve, so that the goal has to be given up.
+/// before the lidar. None: there is no such curve, so that the goal has to be given up; or
+/// `interrupt`, if not null, has become true, which ends the search at once.
 CAIRN_API std::optional<PlannedPath> drivable_path(PlannedPath path, const Pose2& at,
-                                                   const RobotModel& robot, const FloorMap& map);
+                                                   const RobotModel& robot, const FloorMap& map,
+                                                   const std::atomic<bool>* interrupt = nullptr);
 
 }  // namespace cairn
