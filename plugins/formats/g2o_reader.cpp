@@ -40,7 +40,7 @@ using Offsets = std::map<Id, Offset>;
 class G2oReader {
  public:
   /// `first_line`: the number of the text's first line; `offsets`: what lines before it gave;
-  /// `other_words`: those to suggest for an unknown tag besides tags.
+  /// `other_words`: the commands that stand in a stream beside tags.
   G2oReader(std::string_view text, const std::string& name, Registry& types,
             const ReadOptions& options, ReadReport& report, std::int64_t first_line = 1,
             Offsets offsets = {}, std::span<const std::string> other_words = {})
@@ -105,7 +105,7 @@ class G2oReader {
       ++unused_parameters_[shown(tag)];
       return;
     } else {
-      return unknown_tag(scanner_, draft_, options_, tags_on_offer());
+      return unknown_tag(scanner_, draft_, options_, tags_on_offer(), other_words_);
     }
     (*tags_.find(tag))(scanner_, draft_);
   }
@@ -125,7 +125,6 @@ class G2oReader {
     const std::vector<std::string> factors = types_.names("factor");
     names.insert(names.end(), factors.begin(), factors.end());
     names.insert(names.end(), {"FIX", std::string(kOffset), std::string(kPrior)});
-    names.insert(names.end(), other_words_.begin(), other_words_.end());
     return names;
   }
 

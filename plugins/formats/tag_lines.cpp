@@ -15,18 +15,31 @@ void read_fix(Scanner& scanner, Draft& draft) {
   while (scanner.more()) draft.add_held(scanner.read_id(), scanner.line());
 }
 
+namespace {
+
+std::string remedy(std::string_view tag, std::span<const std::string> on_offer,
+                   std::span<const std::string> commands) {
+  std::vector<std::string> words(on_offer.begin(), on_offer.end());
+  words.insert(words.end(), commands.begin(), commands.end());
+  const std::string nearest = nearest_spelling(tag, words);
+  if (!nearest.empty()) return fmt::format("; did you mean '{}'?", nearest);
+  if (commands.empty()) return fmt::format("; on offer: {}", fmt::join(on_offer, ", "));
+  return fmt::format(
+      "; commands: {}; `cairn plugins factor` and `cairn plugins variable` list tags",
+      fmt::join(commands, ", "));
+}
+
+}  // namespace
+
 void unknown_tag(const Scanner& scanner, Draft& draft, const ReadOptions& options,
-                 std::span<const std::string> on_offer) {
+                 std::span<const std::string> on_offer, std::span<const std::string> commands) {
   if (options.skip_unknown) {
     ++draft.report().skipped[shown(scanner.tag())];
     return;
   }
-  const std::string nearest = nearest_spelling(scanner.tag(), on_offer);
-  const std::string remedy = nearest.empty()
-                                 ? fmt::format("; on offer: {}", fmt::join(on_offer, ", "))
-                                 : fmt::format("; did you mean '{}'?", nearest);
   scanner.fail(fmt::format("unknown tag '{}'{} (ReadOptions::skip_unknown leaves such lines out){}",
-                           shown(scanner.tag()), remedy, draft.plugin_problems()));
+                           shown(scanner.tag()), remedy(scanner.tag(), on_offer, commands),
+                           draft.plugin_problems()));
 }
 
 Draft::FactorSlots read_factor(Scanner& scanner, Draft& draft, std::int32_t kind) {

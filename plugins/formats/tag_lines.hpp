@@ -52,10 +52,12 @@ class TagTable {
 /// `FIX id id …`.
 void read_fix(Scanner& scanner, Draft& draft);
 
-/// A line with an unknown tag: counted where that was asked for, else an error with the tags on
-/// offer.
+/// A line with an unknown tag: counted where that was asked for, else an error with the tag of
+/// `on_offer` or of `commands` that is nearest, or with all tags where none is near. `commands`:
+/// the other words that lines of a stream begin with, which stand for the many tags there, since a
+/// stream may have such lines again and again.
 void unknown_tag(const Scanner& scanner, Draft& draft, const ReadOptions& options,
-                 std::span<const std::string> on_offer);
+                 std::span<const std::string> on_offer, std::span<const std::string> commands = {});
 
 /// Reads ids, measurement and information of a factor line as they stand.
 Draft::FactorSlots read_factor(Scanner& scanner, Draft& draft, std::int32_t kind);

@@ -74,9 +74,14 @@ TEST_F(OnlineSessionTest, SuggestsTheCommandForAWordThatIsMisspelt) {
   }
   EXPECT_THAT(take("REMOVE 7 1").text, HasSubstr("or 'REMOVE VARIABLE id …'\n"));
   EXPECT_THAT(take("REMOVE FACTOR").text, HasSubstr("or 'REMOVE VARIABLE id …'\n"));
+  // Where nothing is near, a short line, since it may come for each of many lines: the commands,
+  // and where the tags are listed.
   const std::string far = take("NOTHING_LIKE_THAT_IS_ON_OFFER 1").text;
   EXPECT_THAT(far, Not(HasSubstr("did you mean")));
-  EXPECT_THAT(far, HasSubstr("; on offer: "));
+  EXPECT_THAT(far, HasSubstr("; commands: NEW, REMOVE, CHANGE, "));
+  EXPECT_THAT(far, HasSubstr("`cairn plugins factor`"));
+  EXPECT_THAT(far, Not(HasSubstr("EDGE_")));
+  EXPECT_LT(far.size(), 320U) << far;
   EXPECT_THAT(take("FOLOW").text, Not(HasSubstr("did you mean")));
   format_->add_other_words(LineServer::words());
   EXPECT_THAT(take("FOLOW").text, HasSubstr("; did you mean 'FOLLOW'?"));
