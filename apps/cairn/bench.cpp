@@ -28,12 +28,7 @@ void check(const BenchOptions& options, Session& session) {
   check_file(options.csv, session);
   check_file(options.latex, session);
   if (options.html.empty()) return;
-  if (!session.registry().has(Picture::kKind, "html")) {
-    throw Error(
-        ErrorCode::plugin,
-        "no plugin makes reports here: cairn was built without apps/report/dist and without "
-        "npm; leave out --html");
-  }
+  check_makes_pages("leave out --html", session);
   check_file(options.html, session);
 }
 

@@ -39,12 +39,8 @@ void check_recording(const RunRecordingOptions& options, Session& session) {
     throw Error(ErrorCode::usage, "--record writes to a file, not to standard output; name one");
   check_file(options.record, session);
   if (options.page.empty() && !options.port) return;
-  if (!session.registry().has(Picture::kKind, "html")) {
-    throw Error(ErrorCode::plugin,
-                fmt::format("no plugin makes reports here: cairn was built without "
-                            "apps/report/dist and without npm; leave out {}",
-                            options.page.empty() ? "--serve" : "--html"));
-  }
+  check_makes_pages(fmt::format("leave out {}", options.page.empty() ? "--serve" : "--html"),
+                    session);
   if (!options.page.empty()) check_file(options.page, session);
 }
 

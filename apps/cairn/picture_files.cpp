@@ -16,6 +16,17 @@
 
 namespace cairn::app {
 
+namespace {
+
+/// What is wrong with plugins says, where none was found, where they were looked for.
+Error with_problems(std::string text, Session& session) {
+  for (const PluginProblem& problem : session.registry().problems())
+    text += fmt::format("\n  note: {}", problem.message);
+  return {ErrorCode::plugin, text};
+}
+
+}  // namespace
+
 std::string default_picture(const std::string& file, const std::string& ending) {
   if (file == "-" || file.starts_with('@')) return "cairn." + ending;
   std::filesystem::path name = std::filesystem::path(file).filename();
@@ -27,12 +38,10 @@ std::string picture_format(const std::string& file, Session& session) {
   std::string ending = file_ending(file);
   const std::vector<std::string> names = session.registry().names(Picture::kKind);
   if (names.empty()) {
-    std::string text =
+    throw with_problems(
         "no plugin draws reports or plots: neither 'plot', which is built where Cairo is, nor "
-        "'report', the page, was found";
-    for (const PluginProblem& problem : session.registry().problems())
-      text += fmt::format("\n  note: {}", problem.message);
-    throw Error(ErrorCode::plugin, text);
+        "'report', the page, was found",
+        session);
   }
   if (std::find(names.begin(), names.end(), ending) == names.end()) {
     throw Error(ErrorCode::usage,
@@ -40,6 +49,16 @@ std::string picture_format(const std::string& file, Session& session) {
                             joined(names, ", .")));
   }
   return ending;
+}
+
+void check_makes_pages(const std::string& remedy, Session& session) {
+  if (session.registry().has(Picture::kKind, "html")) return;
+  if (session.registry().offers().empty())
+    throw with_problems("no plugin makes reports: none was found", session);
+  throw Error(ErrorCode::plugin,
+              "no plugin makes reports here: cairn was built without apps/report/dist and without "
+              "npm; " +
+                  remedy);
 }
 
 void check_picture(const std::string& file, Session& session) {

@@ -19,6 +19,10 @@ std::string default_picture(const std::string& file, const std::string& ending);
 /// on offer.
 std::string picture_format(const std::string& file, Session& session);
 
+/// Throws `Error` (plugin) where nothing makes pages for the browser, with what to do instead, or
+/// with where plugins were looked for if none was found at all.
+void check_makes_pages(const std::string& remedy, Session& session);
+
 /// Finds out before the work whether a plot can be written there: see also `check_file`.
 void check_picture(const std::string& file, Session& session);
 

@@ -267,6 +267,7 @@ std::string details_text(const Offer& offer, bool optimized, const OptionTable& 
 /// Everything of that name, whatever its kind; a plugin's name stands for all that it offers.
 std::vector<Offer> offers_named(const Registry& registry, const std::string& name) {
   const std::vector<Offer> all = registry.offers();
+  if (all.empty()) throw nothing_found(registry);
   std::vector<Offer> found;
   std::vector<std::string> names;
   for (const Offer& offer : all) {

@@ -69,12 +69,7 @@ int run(const ViewOptions& options, Session& session) {
     page = default_picture(options.album.files.front(), "html");
     check_default(page);
   }
-  if (!session.registry().has(Picture::kKind, "html")) {
-    throw Error(
-        ErrorCode::plugin,
-        "no plugin makes reports here: cairn was built without apps/report/dist and without "
-        "npm; cairn plot draws static plots");
-  }
+  check_makes_pages("cairn plot draws static plots", session);
   check_file(page, session);
   session.use_threads();
   const Album album = load_album(

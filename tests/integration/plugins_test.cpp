@@ -214,14 +214,38 @@ TEST(PluginsCommand, WithoutAnyPluginTheFoldersOfTheSearchAreNamed) {
   const Outcome report = cairn({"plugins", "--json", "-"}, environment);
   EXPECT_EQ(report.exit_code, 5);
   EXPECT_TRUE(parse_json(report.out).at("offers").as_array().empty());
+  write_text(folder.file("map.g2o"), "VERTEX_SE2 0 0 0 0\n");
+  write_text(folder.file("floor.yaml"), "image: floor.pgm\n");
+  const std::string graph = folder.file("map.g2o");
   for (const Arguments& arguments :
-       {Arguments{"optimize", "@ring"}, Arguments{"online"}, Arguments{"explore", "@rooms"},
-        Arguments{"plot", "@ring", "-o", folder.file("ring.svg")}}) {
-    EXPECT_THAT(cairn(arguments, environment).err, HasSubstr(where)) << arguments.front();
+       std::vector<Arguments>{{"optimize", "@ring"},
+                              {"online"},
+                              {"explore", "@rooms"},
+                              {"explore", folder.file("floor.yaml")},
+                              {"plot", "@ring", "-o", folder.file("ring.svg")},
+                              {"plugins", "cholmod"},
+                              {"plugins", "linear_solver"},
+                              {"optimize", graph, "--optimizer", "dogleg"},
+                              {"optimize", graph, "--linear-solver", "cholmod"},
+                              {"bench", "@ring", "--linear-solver", "cholmod"},
+                              {"marginals", "@ring"},
+                              {"generate", "ring", "-o", folder.file("ring.g2o")},
+                              {"convert", graph, folder.file("other.g2o")},
+                              {"convert", graph, "-", "--to", "g2o"},
+                              {"info", "@ring"},
+                              {"compact", "@ring"},
+                              {"sparsify", "@ring"},
+                              {"replay", "@ring"},
+                              {"evaluate", graph, graph},
+                              {"view", graph},
+                              {"bench", "@ring", "--html", folder.file("bench.html")},
+                              {"map", folder.file("log.clf")}}) {
+    const Outcome outcome = cairn(arguments, environment);
+    EXPECT_NE(outcome.exit_code, 0);
+    EXPECT_THAT(outcome.err, HasSubstr(where)) << testing::PrintToString(arguments);
   }
   // Where formats are missing, the folders are said once too.
-  write_text(folder.file("map.g2o"), "VERTEX_SE2 0 0 0 0\n");
-  const std::string said = cairn({"info", folder.file("map.g2o")}, environment).err;
+  const std::string said = cairn({"info", graph}, environment).err;
   EXPECT_THAT(said, HasSubstr("no plugin of formats is on offer; no plugin at all was found"));
   EXPECT_THAT(said, HasSubstr(where));
   const std::size_t at = said.find("cairn/plugins");

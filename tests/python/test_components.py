@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 import math
+import os
+import shutil
+import subprocess
+import sys
 
 import pytest
 
@@ -34,6 +38,34 @@ def test_every_default_is_accepted():
 def test_a_wrong_kind_says_which_there_are():
     with pytest.raises(cairn.Error, match="nothing of kind 'optimiser' is on offer; kinds: .*optimizer"):
         cairn.components("optimiser")
+
+
+def test_without_plugins_the_folders_of_the_search_are_named(tmp_path):
+    # The libraries alone: plugins are looked for beside them.
+    with open("/proc/self/maps") as maps:
+        libraries = {line.split()[-1] for line in maps if "/libcairn.so" in line}
+    assert libraries
+    for library in libraries:
+        shutil.copy(library, tmp_path)
+        soname = os.path.basename(library)
+        while soname != "libcairn.so":  # libcairn.so.0.1.0, .0.1, .0: whichever the module asks for
+            soname = soname.rpartition(".")[0]
+            if not (tmp_path / soname).exists():
+                (tmp_path / soname).symlink_to(os.path.basename(library))
+    program = """
+import cairn
+assert cairn.kinds() == []
+try:
+    cairn.components("optimizer")
+except cairn.Error as error:
+    print(error)
+"""
+    environment = {name: value for name, value in os.environ.items() if name != "CAIRN_PLUGIN_PATH"}
+    environment.update(LD_LIBRARY_PATH=f"{tmp_path}:{environment.get('LD_LIBRARY_PATH', '')}", XDG_DATA_HOME=str(tmp_path))
+    ended = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True)
+    assert ended.returncode == 0, ended.stderr
+    assert "nothing of kind 'optimizer' is on offer" in ended.stdout
+    assert f"no plugin was found in {tmp_path / 'cairn'}, nor in the folders of CAIRN_PLUGIN_PATH" in ended.stdout
 
 
 def test_values_of_options_are_written_as_on_the_command_line():

@@ -61,10 +61,13 @@ std::map<std::string, Offer> components(const std::string& kind) {
   }
   if (!all.empty()) return all;
   for (const std::string& other : kinds()) there += (there.empty() ? "" : ", ") + other;
-  throw Error(ErrorCode::usage, fmt::format("nothing of kind '{}' is on offer; kinds: {}", kind,
-                                            there.empty() ? "none, since no plugin was found; see "
-                                                            "CAIRN_PLUGIN_PATH"
-                                                          : there));
+  std::string text = fmt::format("nothing of kind '{}' is on offer; kinds: {}", kind,
+                                 there.empty() ? "none, since no plugin was found" : there);
+  if (there.empty()) {  // the problems name the folders of the search
+    for (const PluginProblem& problem : default_registry().problems())
+      text += fmt::format("\n  note: {}", problem.message);
+  }
+  throw Error(ErrorCode::usage, text);
 }
 
 }  // namespace
