@@ -306,6 +306,73 @@ def bearings(wrapped):
     return graph, landmarks
 
 
+def direction(error, wrapped=False, variables=(cairn.Pose2, cairn.Point2), measurement_size=1, jacobians=None):
+    """A factor whose error is an angle, wrapped or not."""
+
+    def residual(*arguments):
+        e = error(*arguments)
+        return (e + np.pi) % (2 * np.pi) - np.pi if wrapped else e
+
+    return cairn.FactorType("EDGE_DIRECTION", list(variables), residual, residual_size=1, measurement_size=measurement_size, jacobians=jacobians)
+
+
+def seen_from(pose, landmark, measured):
+    dx, dy = (landmark - pose[:, :2]).T
+    return (np.arctan2(dy, dx) - pose[:, 2])[:, None] - measured
+
+
+def seen_in_frame(pose, landmark, measured):
+    """As before, but that the angle of the landmark in the robot's frame is wrapped by arctan2: alone what was measured may take it beyond."""
+    dx, dy = (landmark - pose[:, :2]).T
+    c, s = np.cos(pose[:, 2]), np.sin(pose[:, 2])
+    return np.arctan2(c * dy - s * dx, c * dx + s * dy)[:, None] - measured
+
+
+def between_points(first, second, measured):
+    dx, dy = (second - first).T
+    return np.arctan2(dy, dx)[:, None] - measured
+
+
+ANGLES = {
+    "bearing": (seen_from, (cairn.Pose2, cairn.Point2), [[0, 0, 0], [1, 0]], [0]),
+    "bearing, anywhere": (seen_from, (cairn.Pose2, cairn.Point2), [[1, 2, 0.3], [4, 6]], [0.2]),
+    "bearing, far away": (seen_from, (cairn.Pose2, cairn.Point2), [[4e5, 5e6, 0.3], [4e5 + 3, 5e6 - 4]], [0.2]),
+    "in the robot's frame": (seen_in_frame, (cairn.Pose2, cairn.Point2), [[0, 0, 0], [1, 0]], [0.1]),
+    "compass": (lambda pose, measured: pose[:, 2:] - measured, (cairn.Pose2,), [[0, 0, 0]], [0]),
+    "headings": (lambda a, b, measured: (b - a)[:, 2:] - measured, (cairn.Pose2, cairn.Pose2), [[0, 0, 0], [1, 0, 0]], [0]),
+    "line of two points": (between_points, (cairn.Point2, cairn.Point2), [[0, 0], [3, 1]], [0.2]),
+    "yaw in space": (lambda pose, measured: np.array([[cairn.Pose3.from_state(x).rotation().roll_pitch_yaw()[2]] for x in pose]) - measured, (cairn.Pose3,), [[1, 2, 3, 0, 0, 0, 1]], [0.3]),
+}
+
+
+@pytest.mark.parametrize("name", ANGLES)
+def test_a_check_finds_an_angle_that_is_not_wrapped(name):
+    error, variables, states, measured = ANGLES[name]
+    with pytest.raises(cairn.Error, match=r"'EDGE_DIRECTION': an error that is an angle is not wrapped .* row 0 (jumps|is) "):
+        direction(error, variables=variables).check(states, measured)
+    assert direction(error, wrapped=True, variables=variables).check(states, measured) < 1e-6
+
+
+def test_a_check_accepts_what_jumps_otherwise_and_what_is_not_defined_everywhere():
+    states, measured = [[1, 2, 0.3], [4, 6]], [0.2]
+
+    def kinked(pose, landmark, measured):
+        """Jumps by one where a landmark passes behind the robot, and is steep."""
+        return 3 * np.sign(np.sin(pose[:, 2]))[:, None] + np.arctan(1e6 * (landmark - pose[:, :2]))[:, :1] - measured
+
+    def ahead(pose, landmark, measured):
+        """Only for landmarks ahead of the robot."""
+        error = seen_in_frame(pose, landmark, measured)
+        if (np.abs(error + measured) > 1.5).any():
+            raise ValueError("the landmark is behind")
+        return error
+
+    for error in [kinked, ahead]:
+        direction(error).check(states, measured)
+    given = direction(seen_from, wrapped=True, jacobians=lambda *arguments: [np.zeros((1, 1, 3)), np.zeros((1, 1, 2))])
+    assert given.check(states, measured) > 0.1  # its Jacobians are wrong, and that alone
+
+
 def test_an_angle_that_is_not_wrapped_is_noted():
     graph, landmarks = bearings(wrapped=True)
     summary = cairn.optimize(graph, initial=None)

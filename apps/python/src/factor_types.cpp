@@ -12,6 +12,7 @@
 #include "arrays.hpp"
 #include "bindings.hpp"
 #include "cairn/evaluation/check_factor.hpp"
+#include "cairn/evaluation/check_wrapping.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
 #include "component_names.hpp"
@@ -55,6 +56,7 @@ std::shared_ptr<PythonFactor> make(std::string tag, const py::iterable& variable
                                         std::move(jacobians));
 }
 
+/// Throws `Error` (plugin) where an error is an angle that is not wrapped.
 double largest_deviation(const PythonFactor& factor, const py::sequence& states,
                          const py::object& measurement) {
   if (py::len(states) != static_cast<std::size_t>(factor.arity())) {
@@ -78,6 +80,13 @@ double largest_deviation(const PythonFactor& factor, const py::sequence& states,
     throw Error(ErrorCode::usage, fmt::format("measurement: {} numbers, expected {}",
                                               measured.size(), factor.measurement_size()));
   }
+  if (const auto angle = find_unwrapped_angle(factor, types, x, span_of(measured))) {
+    throw Error(
+        ErrorCode::plugin,
+        fmt::format("factor '{}': an error that is an angle is not wrapped to [-pi, pi): {}; "
+                    "(error + numpy.pi) % (2 * numpy.pi) - numpy.pi is",
+                    factor.tag(), to_text(*angle)));
+  }
   return check_factor(factor, types, x, span_of(measured)).largest_deviation;
 }
 
@@ -96,7 +105,11 @@ void bind_factor_types(py::module_& module) {
           R"(How far the Jacobians are from differences of the residual, relative to their largest entry, at least to 1.
 
 Right ones deviate by some 1e-9 (central differences by 1e-8), wrong ones by 1e-2 or more.
-states: a state for each variable. measurement: measurement_size numbers.)")
+states: a state for each variable. measurement: measurement_size numbers.
+
+Raises Error where an error jumps by a full turn elsewhere than at ±pi, as an angle does that is not wrapped: while each
+variable moves, from these states and from others around them, also with other measurements. Where residual raises there,
+it is not looked at. Calls residual some 2000 times for each degree of freedom.)")
       .def("__repr__", [](const PythonFactor& factor) {
         return fmt::format("<cairn.FactorType {}>", factor.tag());
       });
