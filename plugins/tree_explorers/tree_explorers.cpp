@@ -2,6 +2,7 @@
 // Explorers that grow a tree of paths and drive along that which lowers the joint entropy of
 // trajectory and map most per metre (thesis, 5.4).
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <cstddef>
@@ -127,7 +128,8 @@ class TreeExplorer : public Explorer {
     // What came before is part of the time, but there must be a tree.
     const double left =
         std::max(situation.budget - seconds_since(begin), kLeastPart * situation.budget);
-    Search search = grow(space, value, left);
+    Search search = grow(space, value, left, situation.interrupt);
+    if (situation.interrupted()) return decision;
     const std::vector<std::size_t> best = best_nodes(search, value);
     add_tree(search, decision);
     if (!search.complete) decision.notes.emplace_back("trees were cut short by the time budget");
@@ -163,7 +165,8 @@ class TreeExplorer : public Explorer {
   }
 
  protected:
-  virtual Search grow(const FreeSpace& space, PathValue& value, double budget) = 0;
+  virtual Search grow(const FreeSpace& space, PathValue& value, double budget,
+                      const std::atomic<bool>* interrupt) = 0;
 
   RrtStarOptions tree_options() const { return {.step = options_.step, .reach = options_.reach}; }
 
@@ -260,12 +263,13 @@ class DrrtStar final : public TreeExplorer {
   using TreeExplorer::TreeExplorer;
 
  private:
-  Search grow(const FreeSpace& space, PathValue& value, double budget) override {
+  Search grow(const FreeSpace& space, PathValue& value, double budget,
+              const std::atomic<bool>* interrupt) override {
     PathLength length;
     RrtStar<PathLength> tree(space, length, tree_options());
-    const bool grown = tree.grow(*random_, options_.density, kGrowthPart * budget);
+    const bool grown = tree.grow(*random_, options_.density, kGrowthPart * budget, interrupt);
     Search search = nodes_of(tree);
-    search.values = path_values(tree, value, (kTreePart - kGrowthPart) * budget);
+    search.values = path_values(tree, value, (kTreePart - kGrowthPart) * budget, interrupt);
     search.complete = grown && std::ranges::none_of(search.values, [](const auto& state) {
                         return !state.has_value();
                       });
@@ -279,9 +283,10 @@ class ErrtStar final : public TreeExplorer {
   using TreeExplorer::TreeExplorer;
 
  private:
-  Search grow(const FreeSpace& space, PathValue& value, double budget) override {
+  Search grow(const FreeSpace& space, PathValue& value, double budget,
+              const std::atomic<bool>* interrupt) override {
     RrtStar<PathValue> tree(space, value, tree_options());
-    const bool grown = tree.grow(*random_, options_.density, kTreePart * budget);
+    const bool grown = tree.grow(*random_, options_.density, kTreePart * budget, interrupt);
     Search search = nodes_of(tree);
     for (const auto& node : tree.nodes()) search.values.emplace_back(node.state);
     search.complete = grown;

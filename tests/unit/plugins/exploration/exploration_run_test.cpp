@@ -166,6 +166,29 @@ TEST(Exploration, AFrontierIsNotSearchedForOnceTheRunIsInterrupted) {
   EXPECT_EQ(with, 0U);
 }
 
+TEST(Exploration, ATreeIsNotGrownOnceTheRunIsInterrupted) {
+  const OccupancyGrid floor = floor_named("rooms:width=12,height=9", 5);
+  for (const char* name : {"drrt_star", "errt_star"}) {
+    SCOPED_TRACE(name);
+    ExplorationParts parts(kNoisyRobot, name);
+    Exploration exploration = parts.on(floor);
+    exploration.limits.decisions = 1;
+    std::size_t without = 99, with = 99;
+    const auto again = parts.make<Explorer>(name);
+    exploration.decided = [&](const Decision& decision, const Situation& situation) {
+      without = decision.tree.size();
+      const std::atomic<bool> interrupt{true};
+      Situation asked = situation;
+      asked.interrupt = &interrupt;
+      again->begin(1);
+      with = again->decide(asked).tree.size();
+    };
+    run_exploration(exploration);
+    EXPECT_GT(without, 10U);
+    EXPECT_EQ(with, 0U);
+  }
+}
+
 /// Drives back and forth between two places.
 class Pendulum final : public Explorer {
  public:

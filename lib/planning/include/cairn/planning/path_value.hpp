@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <cstddef>
 #include <limits>
@@ -113,11 +114,13 @@ class CAIRN_API PathValue {
 };
 
 /// The values of all paths of a tree, estimated as in a tree that is grown for them, by node, nodes
-/// nearer to the root (in segments) first. Those that were not evaluated within `seconds` are none.
+/// nearer to the root (in segments) first. Those that were not evaluated within `seconds`, or
+/// before `interrupt`, if not null, became true, are none.
 template <class Cost>
 std::vector<std::optional<PathValue::State>> path_values(
     const RrtStar<Cost>& tree, PathValue& value,
-    double seconds = std::numeric_limits<double>::infinity()) {
+    double seconds = std::numeric_limits<double>::infinity(),
+    const std::atomic<bool>* interrupt = nullptr) {
   using Clock = std::chrono::steady_clock;
   const Clock::time_point start = Clock::now();
   const auto at = [](int node) { return static_cast<std::size_t>(node); };
@@ -129,6 +132,7 @@ std::vector<std::optional<PathValue::State>> path_values(
     const auto& above = nodes[at(order[head])];
     const PathValue::State& path = *values[at(order[head])];
     for (const int child : above.children) {
+      if (interrupt && interrupt->load(std::memory_order_relaxed)) return values;
       if (std::chrono::duration<double>(Clock::now() - start).count() > seconds) return values;
       values[at(child)] =
           value.adopted(value.extended(path, above.point, nodes[at(child)].point, nullptr), path);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <concepts>
@@ -133,14 +134,17 @@ class RrtStar {
   }
 
   /// Adds nodes at random until there are `density` of them per m² of free space, or `seconds` are
-  /// over. False: it was the time, so that the tree depends on the clock.
+  /// over, or `interrupt`, if not null, is true. False: it was one of the latter two, so that the
+  /// tree depends on the clock.
   bool grow(RandomNumbers& random, double density,
-            double seconds = std::numeric_limits<double>::infinity()) {
+            double seconds = std::numeric_limits<double>::infinity(),
+            const std::atomic<bool>* interrupt = nullptr) {
     using Clock = std::chrono::steady_clock;
     const Clock::time_point start = Clock::now();
     const auto wanted = static_cast<int>(std::ceil(density * space_.area()));
     constexpr int kMostTries = 20;  // per node: space whose parts no segment joins stays empty
     for (int tries = kMostTries * wanted; size() < wanted && tries > 0; --tries) {
+      if (interrupt && interrupt->load(std::memory_order_relaxed)) return false;
       if (std::isfinite(seconds) &&
           std::chrono::duration<double>(Clock::now() - start).count() > seconds) {
         return false;
