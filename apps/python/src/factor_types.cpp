@@ -109,7 +109,7 @@ states: a state for each variable. measurement: measurement_size numbers.
 
 Raises Error where an error jumps by a full turn elsewhere than at ±pi, as an angle does that is not wrapped: while each
 variable moves, from these states and from others around them, also with other measurements. Where residual raises there,
-it is not looked at. Calls residual some 2000 times for each degree of freedom.)")
+it is left out. Calls residual some 2000 times for each degree of freedom.)")
       .def("__repr__", [](const PythonFactor& factor) {
         return fmt::format("<cairn.FactorType {}>", factor.tag());
       });

@@ -41,7 +41,7 @@ struct UnwrappedAngle {
 /// variable by a full turn or, in directions that are not turns, along a line, from the states that
 /// are given and from random ones around them, also with other measurements (that `normalize`
 /// accepts). None: no error jumps as only an angle does that is not wrapped. Where the type throws
-/// `Error` beside the states that are given, it is not looked at.
+/// `Error` beside the states that are given, it is left out.
 ///
 /// `variables`: the types, in the order of the factor. `x`: their states. Evaluates the factor some
 /// 2,000 times for each degree of freedom.
