@@ -341,7 +341,7 @@ ANGLES = {
     "compass": (lambda pose, measured: pose[:, 2:] - measured, (cairn.Pose2,), [[0, 0, 0]], [0]),
     "headings": (lambda a, b, measured: (b - a)[:, 2:] - measured, (cairn.Pose2, cairn.Pose2), [[0, 0, 0], [1, 0, 0]], [0]),
     "line of two points": (between_points, (cairn.Point2, cairn.Point2), [[0, 0], [3, 1]], [0.2]),
-    "yaw in space": (lambda pose, measured: np.array([[cairn.Pose3.from_state(x).rotation().roll_pitch_yaw()[2]] for x in pose]) - measured, (cairn.Pose3,), [[1, 2, 3, 0, 0, 0, 1]], [0.3]),
+    "yaw in space": (lambda pose, measured: np.array([[cairn.Pose3.from_state(x).rotation.roll_pitch_yaw[2]] for x in pose]) - measured, (cairn.Pose3,), [[1, 2, 3, 0, 0, 0, 1]], [0.3]),
 }
 
 
@@ -350,7 +350,9 @@ def test_a_check_finds_an_angle_that_is_not_wrapped(name):
     error, variables, states, measured = ANGLES[name]
     with pytest.raises(cairn.Error, match=r"'EDGE_DIRECTION': an error that is an angle is not wrapped .* row 0 (jumps|is) "):
         direction(error, variables=variables).check(states, measured)
-    assert direction(error, wrapped=True, variables=variables).check(states, measured) < 1e-6
+    # Differences of coordinates of 5e6 have rounding errors of 1e-9.
+    deviation = 1e-4 if name == "bearing, far away" else 1e-6
+    assert direction(error, wrapped=True, variables=variables).check(states, measured) < deviation
 
 
 def test_a_check_accepts_what_jumps_otherwise_and_what_is_not_defined_everywhere():
