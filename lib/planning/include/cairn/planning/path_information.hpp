@@ -98,8 +98,8 @@ class CAIRN_API PathInformation {
     /// (1/k) Σ_{i≤k} h(Σ'_ii) − (1/n) Σ_{i≤n} h(Σ_ii), n poses now and k with the path [nats].
     double trajectory_change() const;
     /// The same, but the poses of the graph that loop closures change are estimated by
-    /// `sampled_poses` of them, each of which stands for a part of the trajectory. The time does
-    /// not grow with the graph.
+    /// `sampled_poses` of them, each of which stands for a part of the trajectory. The time for
+    /// their marginals does not grow with the graph.
     double estimated_trajectory_change() const;
     /// ln |Λ'| − ln |Λ| of the graph's information matrix [twice nats]: of odometry Σ ln |Q⁻¹|,
     /// the units of which depend on those of the poses, and of loop closures Σ ln(|S| / |R|).
