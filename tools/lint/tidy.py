@@ -5,11 +5,12 @@
     tidy.py DATABASE CLEAN < lines "key file"
 
 Parsing Eigen and the standard library takes most of the time of clang-tidy. So sources that are compiled with the same flags
-and checked alike are included in one file, and parsed with it once. Where that finds anything, or names of two of them clash,
-each half is tried by itself, down to single files, whose verdict counts. What is clean is an empty file CLEAN/key.
+and checked alike are put one after the other into one file, and parsed with it once; #line says which is which, so that all of
+them count as the main file, for which the compiler has warnings of its own. Where that finds anything, or names of two of them
+clash, each half is tried by itself, down to single files, whose verdict counts. What is clean is an empty file CLEAN/key.
 
-Some is seen in the main file alone: what nothing uses in it, an #include that only an earlier file has, one of another source.
-So each source of a group that is clean is parsed by itself too, for the compiler's own warnings and includes.
+One thing is not seen so: an #include that only an earlier source has. A compiler sees it where no precompiled header hides it;
+a source that is compiled with one is parsed by itself too.
 """
 
 import json
@@ -23,7 +24,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 TOGETHER = 8
-OF_MAIN_FILE = "-*,clang-diagnostic-*,bugprone-suspicious-include"
+# What the compiler itself says; clang-tidy wants a check besides, and this one costs nothing.
+OF_COMPILER = "-*,clang-diagnostic-*,bugprone-suspicious-include"
+# A #define between two sources, since an #include may be repeated after one (readability-duplicate-include).
+BETWEEN = "#define CAIRN_LINT_NEXT_SOURCE\n#undef CAIRN_LINT_NEXT_SOURCE\n"
 
 
 @dataclass
@@ -34,6 +38,7 @@ class Source:
     key: str
     folder: str  # where it is compiled
     flags: list[str]
+    precompiled: bool  # with a precompiled header
 
 
 @dataclass
@@ -66,7 +71,8 @@ def read_sources(database: Path, root: Path, keys: dict[str, str]) -> list[Sourc
     for entry in json.loads(database.read_text()):
         file = os.path.relpath(os.path.join(entry["directory"], entry["file"]), root)
         if file in keys and file not in sources:
-            sources[file] = Source(file, keys[file], entry["directory"], read_flags(entry["command"], entry["file"]))
+            command = entry["command"]
+            sources[file] = Source(file, keys[file], entry["directory"], read_flags(command, entry["file"]), "cmake_pch.hxx" in command)
     return [sources[file] for file in sorted(sources)]
 
 
@@ -90,26 +96,33 @@ def in_groups(root: Path, sources: list[Source]) -> list[list[Source]]:
     return sorted(groups, key=len, reverse=True)
 
 
+def as_part(path: Path) -> str:
+    """A source's text as a part of another file, elsewhere."""
+    def found(include: re.Match[str]) -> str:
+        beside = path.parent / include[2]
+        return f'{include[1]}"{beside}"' if beside.is_file() else include[0]
+
+    text = re.sub(r'^( *# *include *)"([^"]+)"', found, path.read_text(), flags=re.MULTILINE)
+    return f'{BETWEEN}#line 1 "{path}"\n{text}\n'
+
+
 class Linter:
     """clang-tidy with the configuration of a checkout; `work`: a folder below its root for files of its own."""
 
     def __init__(self, root: Path, work: Path):
         self.root = root
         self.work = work
-        headers = re.search(r"^HeaderFilterRegex: '(.*)'$", (root / ".clang-tidy").read_text(), re.MULTILINE)
-        self.included = headers[1].replace(r"\.hpp$", r"\.[ch]pp$") if headers else ""
 
     def check(self, group: list[Source]) -> Result:
         """Together, and where that is not clean each half."""
         if len(group) == 1:
             return self._check_one(group[0])
         unit = self.work / f"{group[0].key}.cpp"
-        unit.write_text("".join(f'#include "{self.root / source.file}"\n' for source in group))
-        output = self._tidy(unit, group[0], f"--config-file={nearest_configuration(self.root, group[0].file)}",
-                            "--checks=-bugprone-suspicious-include", f"--header-filter={self.included}")
+        unit.write_text("".join(as_part(self.root / source.file) for source in group))
+        output = self._tidy(unit, group[0], f"--config-file={nearest_configuration(self.root, group[0].file)}")
         unit.unlink()
         if output is None:
-            return self._alone(group)
+            return self._includes(group)
         half = len(group) // 2
         first, second = self.check(group[:half]), self.check(group[half:])
         return Result(first.clean + second.clean, first.output + second.output)
@@ -118,11 +131,11 @@ class Linter:
         output = self._tidy(self.root / source.file, source)
         return Result([source]) if output is None else Result(output=[output])
 
-    def _alone(self, group: list[Source]) -> Result:
-        """Sources that are clean together, each by itself for what is seen in the main file alone."""
+    def _includes(self, group: list[Source]) -> Result:
+        """Sources that are clean together, each parsed by itself if a precompiled header hides from the compiler what it lacks."""
         result = Result()
         for source in group:
-            output = self._tidy(self.root / source.file, source, f"--checks={OF_MAIN_FILE}")
+            output = self._tidy(self.root / source.file, source, f"--checks={OF_COMPILER}") if source.precompiled else None
             if output is None:
                 result.clean.append(source)
             else:
