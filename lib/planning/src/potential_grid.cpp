@@ -6,11 +6,16 @@
 #include <limits>
 #include <utility>
 
+#include <Eigen/Core>
+
 namespace cairn {
 namespace {
 
 /// Coarser grids than this are not worth making.
 constexpr std::size_t kFewest = 64;
+
+/// Changes are relative to at least this.
+constexpr double kLeast = std::numeric_limits<double>::min();
 
 std::size_t at(std::int32_t cell) { return static_cast<std::size_t>(cell); }
 
@@ -32,8 +37,6 @@ void PotentialGrid::connect() {
   neighbours.clear();
   for (const auto& [x, y] : cells)
     neighbours.push_back({number(x - 1, y), number(x + 1, y), number(x, y - 1), number(x, y + 1)});
-  for (std::size_t k = 0; k < cells.size(); ++k)
-    colours[at((cells[k][0] + cells[k][1]) % 2)].push_back(static_cast<std::int32_t>(k));
 }
 
 void PotentialGrid::keep_unconnected() {
@@ -88,41 +91,147 @@ PotentialGrid PotentialGrid::coarser(std::vector<std::int32_t>& parents) const {
   return half;
 }
 
-double PotentialGrid::sweep(double weight, double relaxation) {
-  std::array<double, 5> factor{};  // by neighbours that are not there
-  for (std::size_t k = 0; k < factor.size(); ++k)
-    factor[k] = relaxation / (6.0 - static_cast<double>(k) / weight);
-  double largest = 0.0;
-  const std::size_t size = layer();
-  for (int colour = 0; colour < 2; ++colour) {
-    for (int k = 0; k < orientations; ++k) {
-      double* const here = &values[at(k) * size];
-      const double* const before = &values[at((k + orientations - 1) % orientations) * size];
-      const double* const after = &values[at((k + 1) % orientations) * size];
-      const char* const keeps = &fixed[at(k) * size];
-      for (const std::int32_t cell : colours[at((k + colour) % 2)]) {
-        const std::size_t n = at(cell);
-        if (keeps[n] != 0) continue;
-        double sum = before[n] + after[n];
-        std::size_t missing = 0;
-        for (const std::int32_t other : neighbours[n]) {
-          if (other >= 0)
-            sum += here[at(other)];
-          else
-            ++missing;
-        }
-        const double old = here[n];
-        const double value = (1.0 - relaxation) * old + factor[missing] * sum;
-        // Only where it is more than the largest so far is there something to divide.
-        const double change = std::abs(value - old);
-        const double own = std::max(std::abs(value), std::numeric_limits<double>::min());
-        if (change > largest * own) largest = change / own;
-        here[n] = value;
+namespace {
+
+/// The values of a grid while they are swept: by cell, and of each cell those of the orientations
+/// of one colour together, so that an update reads and writes neighbouring numbers. Where the
+/// number of orientations is odd, the first and the last are beside each other and have the same
+/// colour: they are by cell alone, one updated after the other.
+class Relaxation {
+ public:
+  Relaxation(PotentialGrid& grid, double weight, double relaxation)
+      : grid_(grid),
+        turns_(at(grid.orientations)),
+        half_(grid.orientations % 2 == 0 ? turns_ / 2 : 0),
+        keeps_(1.0 - relaxation),
+        values_(grid.values.size()),
+        fixed_(grid.values.size()),
+        nothing_(turns_, 0.0),
+        beside_(turns_ + 1),
+        next_(turns_) {
+    for (std::size_t k = 0; k < factor_.size(); ++k)
+      factor_[k] = relaxation / (6.0 - static_cast<double>(k) / weight);
+    for (std::size_t k = 0; k < turns_; ++k) {
+      for (std::size_t n = 0; n < grid.layer(); ++n) {
+        const std::size_t from = k * grid.layer() + n, to = index(n, k);
+        values_[to] = grid.values[from];
+        fixed_[to] = grid.fixed[from];
       }
     }
+    if (half_ == 0) return;
+    for (std::size_t row = 0; row < 2 * grid.layer(); ++row) {
+      fixed_from_.push_back(fixed_in_row_.size());
+      for (std::size_t j = 0; j < half_; ++j)
+        if (fixed_[row * half_ + j] != 0) fixed_in_row_.push_back(j);
+    }
+    fixed_from_.push_back(fixed_in_row_.size());
   }
-  return largest;
-}
+
+  /// Returns the largest relative change.
+  double sweep() {
+    largest_ = 0.0;
+    for (std::size_t colour = 0; colour < 2; ++colour) {
+      for (std::size_t n = 0; n < grid_.layer(); ++n) {
+        const std::size_t parity = (at(grid_.cells[n][0]) + at(grid_.cells[n][1]) + colour) % 2;
+        if (half_ > 0)
+          update_together(n, parity);
+        else
+          update_in_turn(n, parity);
+      }
+    }
+    return largest_;
+  }
+
+  void write_back() const {
+    for (std::size_t k = 0; k < turns_; ++k)
+      for (std::size_t n = 0; n < grid_.layer(); ++n)
+        grid_.values[k * grid_.layer() + n] = values_[index(n, k)];
+  }
+
+ private:
+  /// What an update needs of a cell's four neighbours.
+  struct Neighbours {
+    std::array<const double*, 4> values;
+    double factor;
+  };
+
+  std::size_t index(std::size_t cell, std::size_t turn) const {
+    if (half_ == 0) return cell * turns_ + turn;
+    return cell * turns_ + turn % 2 * half_ + turn / 2;
+  }
+
+  /// `first`: of the orientations, by place in a cell.
+  Neighbours neighbours_of(std::size_t cell, std::size_t first) const {
+    Neighbours result{};
+    std::size_t missing = 0;
+    for (std::size_t k = 0; k < 4; ++k) {
+      const std::int32_t other = grid_.neighbours[cell][k];
+      result.values[k] = other < 0 ? nothing_.data() : &values_[at(other) * turns_ + first];
+      if (other < 0) ++missing;
+    }
+    result.factor = factor_[missing];
+    return result;
+  }
+
+  /// Only where it is more than the largest so far is there something to divide.
+  void note_change(double old, double value) {
+    const double change = std::abs(value - old);
+    const double own = std::max(std::abs(value), kLeast);
+    if (change > largest_ * own) largest_ = change / own;
+  }
+
+  /// All orientations of one parity, none of which is beside another.
+  void update_together(std::size_t cell, std::size_t parity) {
+    double* const here = &values_[cell * turns_ + parity * half_];
+    const double* const others = &values_[cell * turns_ + (1 - parity) * half_];
+    const auto [beside, factor] = neighbours_of(cell, parity * half_);
+    // Those before and after: others[j − 1] and others[j], or others[j] and others[j + 1].
+    std::copy_n(others, half_, &beside_[1 - parity]);
+    (parity == 0 ? beside_.front() : beside_[half_]) = parity == 0 ? others[half_ - 1] : others[0];
+    const double keeps = keeps_;
+    const double *const left = beside[0], *const right = beside[1], *const below = beside[2],
+                        *const above = beside[3];
+    for (std::size_t j = 0; j < half_; ++j) {
+      const double sum = beside_[j] + beside_[j + 1] + left[j] + right[j] + below[j] + above[j];
+      next_[j] = keeps * here[j] + factor * sum;
+    }
+    const std::size_t row = 2 * cell + parity;
+    for (std::size_t k = fixed_from_[row]; k < fixed_from_[row + 1]; ++k)
+      next_[fixed_in_row_[k]] = here[fixed_in_row_[k]];
+    const Eigen::Map<const Eigen::ArrayXd> before(here, static_cast<Eigen::Index>(half_)),
+        after(next_.data(), before.size());
+    if (((after - before).abs() - largest_ * after.abs().max(kLeast)).maxCoeff() > 0.0)
+      for (std::size_t j = 0; j < half_; ++j) note_change(here[j], next_[j]);
+    std::copy_n(next_.data(), half_, here);
+  }
+
+  void update_in_turn(std::size_t cell, std::size_t parity) {
+    double* const here = &values_[cell * turns_];
+    const char* const fixed = &fixed_[cell * turns_];
+    const auto [beside, factor] = neighbours_of(cell, 0);
+    for (std::size_t k = parity; k < turns_; k += 2) {
+      if (fixed[k] != 0) continue;
+      double sum = here[(k + turns_ - 1) % turns_] + here[(k + 1) % turns_];
+      for (const double* const values : beside) sum += values[k];
+      const double value = keeps_ * here[k] + factor * sum;
+      note_change(here[k], value);
+      here[k] = value;
+    }
+  }
+
+  PotentialGrid& grid_;
+  std::size_t turns_, half_;
+  double keeps_;
+  std::array<double, 5> factor_{};  ///< by neighbours that are not there
+  std::vector<double> values_;
+  std::vector<char> fixed_;
+  std::vector<std::size_t> fixed_from_,
+      fixed_in_row_;  ///< of orientations of one parity: by cell and parity
+  std::vector<double> nothing_, beside_, next_;
+  double largest_ = 0.0;
+};
+
+}  // namespace
 
 SweepCount solve(PotentialGrid& grid, double weight, const SweepOptions& options) {
   if (grid.layer() > kFewest) {
@@ -138,11 +247,13 @@ SweepCount solve(PotentialGrid& grid, double weight, const SweepOptions& options
       }
     }
   }
+  Relaxation relaxation(grid, weight, options.relaxation);
   SweepCount count;
   do {
-    count.change = grid.sweep(weight, options.relaxation);
+    count.change = relaxation.sweep();
     ++count.sweeps;
   } while (count.sweeps < options.most && count.change > options.tolerance && options.goes_on());
+  relaxation.write_back();
   return count;
 }
 

@@ -19,7 +19,6 @@ struct PotentialGrid {
       neighbours;           ///< −x, +x, −y, +y; −1: the body does not fit
   std::vector<char> fixed;  ///< by orientation and cell: keeps its value
   std::vector<double> values;
-  std::array<std::vector<std::int32_t>, 2> colours;  ///< cells whose x + y is even, and odd
 
   /// Finds the neighbours of `cells`, which are in the order of rising y and x.
   void connect();
@@ -31,10 +30,6 @@ struct PotentialGrid {
   /// Half as many cells each way and, where their number is even, orientations. Each takes the
   /// largest of its fixed values. `parents`: by cell of this one, that of the coarser one.
   PotentialGrid coarser(std::vector<std::int32_t>& parents) const;
-
-  /// One sweep of successive over-relaxation over (5.9), in two colours like those of a chessboard;
-  /// `weight`: of a neighbour that is not there, as a divisor. Returns the largest relative change.
-  double sweep(double weight, double relaxation);
 };
 
 struct SweepCount {
@@ -48,7 +43,9 @@ struct SweepOptions {
   std::function<bool()> goes_on;  ///< asked after each sweep
 };
 
-/// Sweeps until nothing changes by more than the tolerance, from the solution of coarser grids.
+/// Sweeps of successive over-relaxation over (5.9), in two colours like those of a chessboard,
+/// until nothing changes by more than the tolerance, from the solution of coarser grids. `weight`:
+/// of a neighbour that is not there, as a divisor.
 SweepCount solve(PotentialGrid& grid, double weight, const SweepOptions& options);
 
 }  // namespace cairn
