@@ -146,17 +146,15 @@ void MarginalUpdates::whiten(std::span<const PathClosure* const> closures, int p
         Z[c].data()[entry] = entries[entry * covariances_.padded()];
       continue;
     }
-    const auto known = std::ranges::find(closure.poses, pose);
-    if (known != closure.poses.end()) {
-      Z[c] = closure.pose_Z[static_cast<std::size_t>(known - closure.poses.begin())];
+    if (const auto known = closure.pose_Z.find(pose); known != closure.pose_Z.end()) {
+      Z[c] = known->second;
       continue;
     }
     Matrix3d y =
         (covariances_.block(pose, newest) - covariances_.block(pose, closure.pose)).transpose();
     for (std::size_t b = 0; b < c; ++b) y.noalias() -= closure.coupling[b] * Z[b];
     Z[c].noalias() = closure.inverse * y;
-    closure.poses.push_back(pose);
-    closure.pose_Z.push_back(Z[c]);
+    closure.pose_Z.emplace(pose, Z[c]);
   }
 }
 

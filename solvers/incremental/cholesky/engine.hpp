@@ -286,7 +286,9 @@ class Engine : private EngineState {
   void bring_back();
   void step_back();
   void rescue(UpdateReport& report, double tolerance);
-  void as_seen_from(int a, int b, double* block, std::int64_t stride) const;
+  class Turn;
+  void as_seen_from(std::span<const std::int32_t> rows, int b, double* blocks,
+                    std::int64_t stride) const;
   void add_source(std::int32_t v);
   Graph clean_graph() const;
   void remove_dead(Graph& graph) const;

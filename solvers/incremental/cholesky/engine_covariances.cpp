@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Covariances that somebody asks for.
 #include <algorithm>
+#include <span>
 #include <vector>
 
 #include <Eigen/Core>
@@ -16,27 +17,78 @@ namespace {
 /// many rows are most of it.
 constexpr std::int64_t kFewRows = 8;
 
+/// B = T B, or with `transposed` B = B Tᵀ, for the sizes of poses without memory of its own.
+template <bool transposed, int size>
+void turn_by(const double* T, Eigen::Map<Eigen::MatrixXd, 0, Eigen::OuterStride<>>& B) {
+  const Eigen::Map<const Eigen::Matrix<double, size, size>> turn(T);
+  const Eigen::Index others = transposed ? B.rows() : B.cols();
+  Eigen::Matrix<double, size, 1> turned;
+  for (Eigen::Index k = 0; k < others; ++k) {
+    if constexpr (transposed) {
+      turned.noalias() = turn * B.row(k).transpose();
+      B.row(k) = turned.transpose();
+    } else {
+      turned.noalias() = turn * B.col(k);
+      B.col(k) = turned;
+    }
+  }
+}
+
+template <bool transposed>
+void turn_block(std::span<const double> T, int size,
+                Eigen::Map<Eigen::MatrixXd, 0, Eigen::OuterStride<>>& B) {
+  if (size == 3) return turn_by<transposed, 3>(T.data(), B);
+  if (size == 6) return turn_by<transposed, 6>(T.data(), B);
+  const Eigen::Map<const Eigen::MatrixXd> turn(T.data(), size, size);
+  if (transposed) {
+    B = dense::product_with_transpose(B, turn);
+  } else {
+    B = dense::product(turn, B);
+  }
+}
+
 }  // namespace
 
-/// Σ_ab in the variables' frames becomes T_a Σ_ab T_bᵀ: as seen from the poses.
-void Engine::as_seen_from(int a, int b, double* block, std::int64_t stride) const {
-  const std::int32_t rows = system_.size(a), columns = system_.size(b);
+/// From a variable's frame to the pose itself.
+class Engine::Turn {
+ public:
+  explicit Turn(const Engine& engine) : engine_(engine) {}
+
+  /// Whether the variable has moved since its frame was put down; else both are the same.
+  bool find(int v) {
+    size_ = engine_.system_.size(v);
+    x_.resize(static_cast<std::size_t>(engine_.states_.ambient(v)));
+    if (!engine_.tree_.read(v, x_.data())) {
+      if (!engine_.states_.away(v)) return false;
+      std::copy_n(engine_.states_.x(v), x_.size(), x_.begin());
+    }
+    T_.resize(static_cast<std::size_t>(size_) * size_);
+    engine_.states_.frame_to_body(v, x_.data(), T_.data());
+    return true;
+  }
+  std::span<const double> matrix() const { return T_; }
+  int size() const { return size_; }
+
+ private:
+  const Engine& engine_;
+  int size_ = 0;
+  std::vector<double> x_, T_;
+};
+
+/// Σ_ab in the variables' frames, one block below the other for each a, becomes T_a Σ_ab T_bᵀ: as
+/// seen from the poses.
+void Engine::as_seen_from(std::span<const std::int32_t> rows, int b, double* blocks,
+                          std::int64_t stride) const {
   using Block = Eigen::Map<Eigen::MatrixXd, 0, Eigen::OuterStride<>>;
-  Block sigma(block, rows, columns, Eigen::OuterStride<>(stride));
-  std::vector<double> x, T;
-  const auto turn = [&](int v, std::int32_t size) {
-    T.resize(static_cast<std::size_t>(size) * size);
-    states_.frame_to_body(v, x.data(), T.data());
-    return Eigen::Map<const Eigen::MatrixXd>(T.data(), size, size);
-  };
-  const auto away = [&](int v) {
-    x.resize(static_cast<std::size_t>(states_.ambient(v)));
-    if (tree_.read(v, x.data())) return true;
-    std::copy_n(states_.x(v), x.size(), x.begin());
-    return states_.away(v);
-  };
-  if (away(a)) sigma = dense::product(turn(a, rows), sigma);
-  if (away(b)) sigma = dense::product_with_transpose(sigma, turn(b, columns));
+  Turn of_row(*this), of_column(*this);
+  const bool turns_column = of_column.find(b);
+  for (const std::int32_t v : rows) {
+    Block block(blocks, system_.size(v), system_.size(b), Eigen::OuterStride<>(stride));
+    blocks += block.rows();
+    if (held_[v]) continue;
+    if (of_row.find(v)) turn_block<false>(of_row.matrix(), of_row.size(), block);
+    if (turns_column) turn_block<true>(of_column.matrix(), of_column.size(), block);
+  }
 }
 
 bool Engine::have_digits(int v, std::int32_t first, std::int32_t count, const double* variances,
@@ -50,15 +102,14 @@ bool Engine::have_digits(int v, std::int32_t first, std::int32_t count, const do
 }
 
 bool Engine::covariance(int a, int b, double* block) {
-  const std::int32_t rows = system_.size(a), columns = system_.size(b);
+  const std::int32_t row = a, rows = system_.size(a), columns = system_.size(b);
   if (const double* kept = covariances_.kept(a, b); kept && !broken_) {
     const double* own = a == b ? kept : covariances_.kept(b, b);
     if (own && !have_digits(b, 0, columns, own, columns + 1)) return false;
     std::copy_n(kept, rows * columns, block);
-    as_seen_from(a, b, block, rows);
+    as_seen_from({&row, 1}, b, block, rows);
     return true;
   }
-  const std::int32_t row = a;
   return covariance_column({&row, 1}, b, block);
 }
 
@@ -96,11 +147,7 @@ bool Engine::covariance_column(std::span<const std::int32_t> rows, int b, double
       }
     }
   }
-  std::int64_t row = 0;
-  for (const std::int32_t v : rows) {
-    if (!held_[v]) as_seen_from(v, b, column + row, height);
-    row += system_.size(v);
-  }
+  as_seen_from(rows, b, column, height);
   return true;
 }
 

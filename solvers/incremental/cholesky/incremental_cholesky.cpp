@@ -327,16 +327,20 @@ bool IncrementalCholesky::covariance(Id a, Id b, std::span<double> block) {
 bool IncrementalCholesky::covariance_column(Id id, std::span<const Id> variables,
                                             std::span<double> out) {
   const int column = index(id);
+  std::vector<std::int32_t> rows;
   std::int64_t size = 0;
-  for (const Id row : variables) size += block_size(index(row), column);
+  for (const Id row : variables) {
+    rows.push_back(index(row));
+    size += block_size(rows.back(), column);
+  }
   if (std::ssize(out) != size) {
     throw Error(
         ErrorCode::usage,
         fmt::format("this column of the covariance has {} numbers, not {}", size, out.size()));
   }
   Engine& engine = solved();
-  std::vector<std::int32_t> rows;
-  for (const Id row : variables) rows.push_back(place_in(engine, row));
+  if (&engine != engine_.get())
+    for (std::size_t k = 0; k < rows.size(); ++k) rows[k] = place_in(engine, variables[k]);
   return engine.covariance_column(rows, place_in(engine, id), out.data());
 }
 
