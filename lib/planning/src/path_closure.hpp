@@ -6,10 +6,10 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <unordered_map>
 #include <vector>
 
 #include <Eigen/Core>
-#include <boost/unordered/unordered_flat_map.hpp>
 
 #include "marginal_kernels.hpp"
 #include "pose_covariances.hpp"
@@ -53,7 +53,7 @@ struct PathClosure {
   /// With these stored, a further closure takes time as there are closures, not as their square.
   std::vector<Eigen::Matrix3d> path_Z, path_posterior;
   /// Z of those poses of the graph for which it has been computed one by one.
-  mutable boost::unordered_flat_map<int, Eigen::Matrix3d> pose_Z;
+  mutable std::unordered_map<int, Eigen::Matrix3d> pose_Z;
   /// On all poses of the graph, and estimated by a few of them.
   ClosureEffect exact, estimate;
 };
