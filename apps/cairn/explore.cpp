@@ -247,8 +247,14 @@ ExploreParts parts_of(const ExploreOptions& options, bool is_recorded) {
           .seed = options.seed};
 }
 
+/// A floor, and what a robot can cover of it.
+struct ExploredFloor {
+  OccupancyGrid grid;
+  std::vector<std::uint8_t> reachable;
+};
+
 /// The floor to drive on; none: a recorded robot has driven already.
-std::optional<OccupancyGrid> floor_of(const ExploreOptions& options, const World& world,
+std::optional<ExploredFloor> floor_of(const ExploreOptions& options, const World& world,
                                       bool is_recorded, Session& session) {
   if (options.floor.empty()) {
     if (is_recorded) return std::nullopt;
@@ -257,9 +263,10 @@ std::optional<OccupancyGrid> floor_of(const ExploreOptions& options, const World
         "FLOOR is missing: name the map of a floor, floor.yaml, or @KIND of a generated one, "
         "such as @rooms; --world log alone needs none");
   }
-  OccupancyGrid floor = load_floor(options.floor, session);
+  ExploredFloor floor{.grid = load_floor(options.floor, session), .reachable = {}};
   if (!is_recorded)
-    note_narrow_ways(options.floor, floor, world.robot().radius, start_of(options), session);
+    floor.reachable = note_narrow_ways(options.floor, floor.grid, world.robot().radius,
+                                       start_of(options), session);
   return floor;
 }
 
@@ -271,25 +278,26 @@ int compare_explorers(const ExploreOptions& options, Session& session) {
   Registry& registry = session.registry();
   const ComponentSpec world = world_spec(options);
   // What is wrong with its options is reported before the work.
-  if (query<RecordedWorld>(*registry.make<World>(world))) {
+  const auto one_world = registry.make<World>(world);
+  if (query<RecordedWorld>(*one_world)) {
     throw Error(ErrorCode::usage,
                 fmt::format("--world: a robot of '{}' goes where it went, whatever an explorer "
                             "decides: there is nothing to compare",
                             world.name));
   }
-  if (options.floor.empty()) throw Error(ErrorCode::usage, "FLOOR is missing");
   const MatchModel match = match_of(options.match);
   const ExplorationLimits limits = limits_of(options.until);
   const std::optional<Pose2> start = start_of(options);
   const ExploreParts parts = parts_of(options, false);
   const std::shared_ptr<const Loss> loss = loop_loss(parts.loss, registry);
-  const OccupancyGrid floor = load_floor(options.floor, session);
+  const ExploredFloor floor = *floor_of(options, *one_world, false, session);
   const ExplorationSetup setup{.registry = registry,
                                .world = world,
                                .policy = parse_component(options.slam.policy),
                                .registration = parse_component(options.slam.registration),
                                .mapper = parse_component(options.slam.mapper),
-                               .floor = floor,
+                               .floor = floor.grid,
+                               .reachable = floor.reachable,
                                .start = start,
                                .limits = limits,
                                .match = match,
@@ -323,7 +331,7 @@ int run_explore(const ExploreOptions& options, Session& session) {
   const bool is_recorded = query<RecordedWorld>(*world) != nullptr;
   const ExploreParts parts = parts_of(options, is_recorded);
   const std::shared_ptr<const Loss> loss = loop_loss(parts.loss, registry);
-  const std::optional<OccupancyGrid> floor = floor_of(options, *world, is_recorded, session);
+  const std::optional<ExploredFloor> floor = floor_of(options, *world, is_recorded, session);
   ScanLog log;
   const InterruptGuard guard;  // until the results are written
   ExploreProgress progress(options, session);
@@ -335,7 +343,7 @@ int run_explore(const ExploreOptions& options, Session& session) {
       .mapper = *mapper,
       .explorer = *explorer,
       .registry = registry,
-      .start = {.floor = floor ? &*floor : nullptr, .pose = start, .seed = options.seed},
+      .start = {.floor = floor ? &floor->grid : nullptr, .pose = start, .seed = options.seed},
       .limits = limits,
       .match = match,
       .decision_budget = options.decision_budget,
@@ -346,6 +354,7 @@ int run_explore(const ExploreOptions& options, Session& session) {
       .match_consecutive = is_recorded,
       .loop_loss = loss,
       .log = options.log.empty() ? nullptr : &log};
+  if (floor) exploration.reachable = floor->reachable;
   recording.follow(exploration);
   ExploreOutcome outcome{.floor = options.floor,
                          .frame = {},
@@ -353,7 +362,7 @@ int run_explore(const ExploreOptions& options, Session& session) {
                          .repeatable = !std::isfinite(options.decision_budget),
                          .result = run_exploration(exploration),
                          .log = std::move(log)};
-  outcome.frame = floor ? floor->frame : outcome.result.map.frame;
+  outcome.frame = floor ? floor->grid.frame : outcome.result.map.frame;
   progress.clear();
   for (const std::string& note : outcome.result.notes) session.note(note);
   Results results(session);

@@ -42,6 +42,8 @@ json::object map_json(const ExplorationResult& result) {
                     {"seen", result.against->seen},
                     {"free_wrong", result.against->free_wrong},
                     {"occupied_wrong", result.against->occupied_wrong}};
+    if (result.against->reachable_seen)
+      map["truth"].as_object()["reachable_seen"] = *result.against->reachable_seen;
   }
   return map;
 }
@@ -144,6 +146,8 @@ std::string summary_text(const ExploreOutcome& outcome) {
                ? fmt::format(", {:.1f} % of the {:.1f} m² that hang together with the start",
                              100.0 * truth.seen / truth.floor, truth.floor)
                : ", the start is not on free floor";
+    if (truth.reachable_seen)
+      map += fmt::format(", {:.1f} % of what the body can cover", 100.0 * *truth.reachable_seen);
     map += fmt::format("; wrong: {:.2f} m² free, {:.2f} m² occupied", truth.free_wrong,
                        truth.occupied_wrong);
   }

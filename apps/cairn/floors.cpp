@@ -133,14 +133,15 @@ OccupancyGrid load_floor(const std::string& name, Session& session) {
   return generate(spec, seed, registry);
 }
 
-void note_narrow_ways(const std::string& name, const OccupancyGrid& floor, double radius,
-                      const std::optional<Pose2>& start, Session& session) {
+std::vector<std::uint8_t> note_narrow_ways(const std::string& name, const OccupancyGrid& floor,
+                                           double radius, const std::optional<Pose2>& start,
+                                           Session& session) {
   Registry& registry = session.registry();
-  if (!registry.has(FloorSurveyor::kKind, kSurveyor)) return;
+  if (!registry.has(FloorSurveyor::kKind, kSurveyor)) return {};
   FloorSurveyOptions options{.radius = radius};
   if (start) options.start = start->translation();
   const auto surveyor = registry.make<FloorSurveyor>(kSurveyor);
-  const FloorSurvey survey = survey_floor(name, floor, options, *surveyor);
+  FloorSurvey survey = survey_floor(name, floor, options, *surveyor);
   if (survey.larger_part) {
     session.note(
         fmt::format("the start {} is in a pocket that a body with a radius of {:g} m cannot leave, "
@@ -148,7 +149,7 @@ void note_narrow_ways(const std::string& name, const OccupancyGrid& floor, doubl
                     "nearest at {}",
                     point_text(survey.start), radius, survey.standing_area, survey.larger_area,
                     point_text(*survey.larger_part)));
-    return;
+    return std::move(survey.covered);
   }
   // Less is the corners behind furniture.
   constexpr double kMuch = 0.05;
@@ -159,6 +160,7 @@ void note_narrow_ways(const std::string& name, const OccupancyGrid& floor, doubl
                     plural(survey.unreachable_parts, "part"), survey.unreachable_area, radius,
                     point_text(survey.start)));
   }
+  return std::move(survey.covered);
 }
 
 std::string size_text(const GridFrame& frame) {

@@ -112,6 +112,7 @@ Decision EdeGradient::decide(const Situation& situation) {
       if (!at.discovers || !at.field->best(at.reachable)) break;
       const double field_took = time.passed() - before;
       std::optional<Decision> decision = descend(situation, at, time);
+      if (situation.interrupted()) return {};
       if (!decision && is_cut_) decision = decide_at_once(situation, at);
       if (!decision) return stuck(situation, time);
       if (!moves(situation, decision->candidates.front().path)) {
@@ -144,7 +145,9 @@ std::optional<Decision> EdeGradient::descend(const Situation& situation, const R
     const bool in_time = time.left(kSolvePart) >= kLeastPart * situation.budget;
     is_cut_ = !in_time || space.size() >= too_many_;
     if (is_cut_) break;
-    const PotentialField::Solution solution = potential.solve(weight, time.left(kSolvePart));
+    const PotentialField::Solution solution =
+        potential.solve(weight, time.left(kSolvePart), situation.interrupt);
+    if (situation.interrupted()) return std::nullopt;
     const PotentialField::Descent descent = potential.descend(start);
     const bool cut = !solution.converged && solution.sweeps < options_.potential.sweeps;
     if (descent.end != PotentialField::End::minimum) {

@@ -23,6 +23,7 @@ void Dopt::choose(const Situation& situation, Decision& decision) {
   PathOptimalities optimalities(situation, options_.optimality, *solver_);
   std::vector<int> loops;
   for (Candidate& candidate : candidates) {
+    if (situation.interrupted()) return;
     const PathOptimality path =
         optimalities.along(motions_along(situation.pose, candidate.path, situation.robot));
     candidate.value = optimalities.now().log_optimality - path.log_optimality;

@@ -53,6 +53,7 @@ void Heuristic::choose(const Situation& situation, Decision& decision) {
   const PathSimulation simulation(situation, options_.simulation, registry_);
   std::vector<std::size_t> loops;
   for (Candidate& candidate : candidates) {
+    if (situation.interrupted()) return;
     const SimulatedDrive drive = simulation.drive(candidate.path);
     candidate.value = drive.value();
     candidate.change = drive.change;
@@ -80,8 +81,11 @@ std::optional<Candidate> Heuristic::revisit(const Situation& situation) {
       loop_closure_values(situation, options_.simulation.entropy);
   std::ranges::stable_sort(values, {}, &LoopClosureValue::change);
   if (values.size() > kMostTries) values.resize(kMostTries);
+  // The thesis's form of the entropy is twice that in which information gains are.
+  const double form = options_.simulation.entropy == EntropyForm::thesis ? 2.0 : 1.0;
+  const double least = form * situation.match.loop_gain_unless(options_.simulation.loop_gain);
   for (const LoopClosureValue& value : values) {
-    if (!(-value.change > options_.simulation.loop_gain)) break;
+    if (!(-value.change > least) || situation.interrupted()) break;
     std::optional<PlannedPath> path = goals().path_to(value.pose);
     if (!drives(path, situation.robot)) continue;
     return Candidate{.path = std::move(*path),

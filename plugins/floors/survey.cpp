@@ -195,6 +195,10 @@ FloorSurvey survey_floor(const OccupancyGrid& grid, const FloorSurveyOptions& op
       (static_cast<double>(distance.at<float>(start.y, start.x)) - 0.5) * frame.resolution;
   survey.standing_area = cell_area * parts.cells(part);
   survey.covered_area = cell_area * cv::countNonZero(covered);
+  for (int y = 0; y < covered.rows; ++y) {
+    const auto* row = covered.ptr<std::uint8_t>(y);
+    for (int x = 0; x < covered.cols; ++x) survey.covered.push_back(row[x] != 0 ? 1 : 0);
+  }
   survey.unreachable_parts = parts.count - 1;
   survey.unreachable_area = cell_area * cv::countNonZero(fits) - survey.standing_area;
   if (const int largest = parts.largest(); parts.cells(largest) > parts.cells(part)) {

@@ -130,7 +130,8 @@ class TreeExplorer : public Explorer {
         std::max(situation.budget - seconds_since(begin), kLeastPart * situation.budget);
     Search search = grow(space, value, left, situation.interrupt);
     if (situation.interrupted()) return decision;
-    const std::vector<std::size_t> best = best_nodes(search, value);
+    const std::vector<std::size_t> best = best_nodes(search, value, situation);
+    if (situation.interrupted()) return decision;
     add_tree(search, decision);
     if (!search.complete) decision.notes.emplace_back("trees were cut short by the time budget");
     for (const std::size_t node : best)
@@ -186,7 +187,8 @@ class TreeExplorer : public Explorer {
 
   /// The best one and further ones of which each ends away from the others, best first, with their
   /// exact values. Of all paths those may be better that are estimated to be worse than these.
-  static std::vector<std::size_t> best_nodes(Search& search, const PathValue& value) {
+  static std::vector<std::size_t> best_nodes(Search& search, const PathValue& value,
+                                             const Situation& situation) {
     const auto value_of = [&](std::size_t k) { return search.values[k]->value; };
     std::vector<std::size_t> nodes;
     for (std::size_t k = 1; k < search.points.size(); ++k) {
@@ -195,7 +197,7 @@ class TreeExplorer : public Explorer {
     std::ranges::stable_sort(nodes, {}, value_of);
     double least = std::numeric_limits<double>::infinity();
     std::size_t count = 0;
-    for (; count < nodes.size(); ++count) {
+    for (; count < nodes.size() && !situation.interrupted(); ++count) {
       std::optional<PathValue::State>& state = search.values[nodes[count]];
       if (count >= kEvaluated && !(state->value < least)) break;
       state = value.evaluated(*std::move(state));

@@ -27,7 +27,8 @@ constexpr double kSpareRadius = 1.1;
 /// Headings that the search tells apart, and the poses that it looks at before it gives up.
 constexpr int kHeadings = 32;
 constexpr std::size_t kMostPoses = 60000;
-/// Curves to the goal are tried half as often after so many that were not free.
+/// Curves to the goal are tried less often the more were not free: half as often after so many, a
+/// third after twice as many.
 constexpr std::size_t kTries = 64;
 /// Arcs of the search cross a cell: this long at least [cells].
 constexpr double kArcCells = 1.5;

@@ -176,8 +176,8 @@ class Run {
                      .against = {}};
     if (parts_.start.floor && first_truth_) {
       if (const std::optional<Pose2> to_floor = alignment(estimate))
-        sample.against =
-            compare_with_floor(map, *parts_.start.floor, *to_floor, first_truth_->translation());
+        sample.against = compare_with_floor(map, *parts_.start.floor, *to_floor,
+                                            first_truth_->translation(), parts_.reachable);
     }
     return sample;
   }

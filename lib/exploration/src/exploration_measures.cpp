@@ -20,6 +20,7 @@ std::span<const ExplorationMeasure> exploration_measures() {
        {"decisions", "", "decisions", &M::decisions},
        {"coverage", "m²", "area of the cells that are known", &M::coverage},
        {"seen", "m²", "of the true floor around the start, what is known", &M::seen},
+       {"reachable_seen", "", "part of what the body can cover that is known", &M::reachable_seen},
        {"map_entropy", "nats·m²", "(5.6) over the floor's grid", &M::map_entropy},
        {"trajectory_entropy", "nats", "(5.13)", &M::trajectory_entropy},
        {"map_error", "m²", "cells that contradict a scan", &M::map_error},
@@ -65,6 +66,7 @@ ExplorationMeasures measures_of(const ExplorationResult& result, double floor_ar
   m.trajectory_entropy = last.trajectory_entropy;
   m.map_error = result.map_error;
   m.seen = result.against ? result.against->seen : kUnknown;
+  m.reachable_seen = result.against ? result.against->reachable_seen.value_or(kUnknown) : kUnknown;
   m.wrong = result.against ? result.against->free_wrong + result.against->occupied_wrong : kUnknown;
   m.loops = result.slam.loops;
   m.poses = result.graph.variable_count();

@@ -157,6 +157,7 @@ ExplorationResult run_exploration(const ExplorationSetup& setup, Explorer& explo
                   .explorer = explorer,
                   .registry = registry,
                   .start = {.floor = &setup.floor, .pose = setup.start, .seed = seed},
+                  .reachable = setup.reachable,
                   .limits = setup.limits,
                   .match = setup.match,
                   .decision_budget = setup.decision_budget,

@@ -7,6 +7,8 @@
 #include <limits>
 #include <vector>
 
+#include "cairn/runtime/error.hpp"
+
 namespace cairn {
 namespace {
 
@@ -63,20 +65,30 @@ bool near_obstacle(const OccupancyGrid& floor, const Eigen::Vector2d& point, dou
 }  // namespace
 
 MapTruth compare_with_floor(const FloorMap& map, const OccupancyGrid& floor, const Pose2& alignment,
-                            const Eigen::Vector2d& start) {
+                            const Eigen::Vector2d& start, std::span<const std::uint8_t> reachable) {
+  if (!reachable.empty() && reachable.size() != floor.occupancy.size())
+    throw Error(ErrorCode::usage, "what a robot can reach is not by the cells of its floor");
   MapTruth result;
   const std::vector<std::uint8_t> connected = connected_free(floor, cell_at(floor.frame, start));
   // Of the floor, by its own cells: what of it the map knows.
-  std::size_t all = 0, seen = 0;
+  std::size_t all = 0, seen = 0, all_reachable = 0, reachable_seen = 0;
   for (int y = 0; y < floor.frame.height; ++y) {
     for (int x = 0; x < floor.frame.width; ++x) {
-      if (connected[floor.frame.index(x, y)] == 0) continue;
-      ++all;
+      const std::size_t index = floor.frame.index(x, y);
+      const bool is_reachable = !reachable.empty() && reachable[index] != 0;
+      if (connected[index] == 0 && !is_reachable) continue;
       const Cell cell = cell_at(map.frame, alignment.transform_to(floor.frame.centre(x, y)));
-      seen += map.frame.contains(cell.x, cell.y) &&
-              map.cells[map.frame.index(cell.x, cell.y)] != CellState::unknown;
+      const bool known = map.frame.contains(cell.x, cell.y) &&
+                         map.cells[map.frame.index(cell.x, cell.y)] != CellState::unknown;
+      all += connected[index];
+      seen += connected[index] != 0 && known;
+      all_reachable += is_reachable;
+      reachable_seen += is_reachable && known;
     }
   }
+  if (all_reachable > 0)
+    result.reachable_seen =
+        static_cast<double>(reachable_seen) / static_cast<double>(all_reachable);
   result.floor = static_cast<double>(all) * floor.frame.cell_area();
   result.seen = static_cast<double>(seen) * floor.frame.cell_area();
   // Of the map, by its cells: what is otherwise on the floor.

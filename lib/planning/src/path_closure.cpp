@@ -39,7 +39,7 @@ MarginalUpdates::MarginalUpdates(PoseCovariances& covariances, double memory, in
     : covariances_(covariances),
       effect_(effect),
       kernel_(choose_marginal_kernel()),
-      every_((covariances.size() + most_poses - 1) / most_poses),
+      every_(1 + (covariances.size() - 1) / most_poses),
       count_(static_cast<std::size_t>((covariances.size() + every_ - 1) / every_)),
       padded_((count_ + PoseCovariances::kLanes - 1) / PoseCovariances::kLanes *
               PoseCovariances::kLanes),

@@ -111,7 +111,8 @@ PotentialField::PotentialField(const ConfigurationSpace& space, std::span<const 
   }
 }
 
-PotentialField::Solution PotentialField::solve(double weight, double seconds) {
+PotentialField::Solution PotentialField::solve(double weight, double seconds,
+                                               const std::atomic<bool>* interrupt) {
   const auto begin = std::chrono::steady_clock::now();
   if (!(weight >= 1.0))
     throw Error(ErrorCode::usage, "the weight of obstacles in a potential field is at least 1");
@@ -126,7 +127,10 @@ PotentialField::Solution PotentialField::solve(double weight, double seconds) {
     if (fixed_[k] == 0) values_[k] = 0.0;
   grid.keep_unconnected();
   grid.values = std::move(values_);
-  const auto goes_on = [&] { return std::isinf(seconds) || seconds_since(begin) < seconds; };
+  const auto goes_on = [&] {
+    if (interrupt && interrupt->load(std::memory_order_relaxed)) return false;
+    return std::isinf(seconds) || seconds_since(begin) < seconds;
+  };
   const SweepCount count = cairn::solve(grid, weight,
                                         {.relaxation = options_.relaxation,
                                          .tolerance = options_.tolerance,

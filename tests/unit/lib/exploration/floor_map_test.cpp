@@ -2,7 +2,9 @@
 #include "cairn/exploration/floor_map.hpp"
 
 #include <cmath>
+#include <cstdint>
 #include <numbers>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -42,6 +44,21 @@ TEST(MapTruth, AMapIsComparedCellByCell) {
   EXPECT_DOUBLE_EQ(truth.seen, 5.0);
   EXPECT_DOUBLE_EQ(truth.free_wrong, 1.0);
   EXPECT_DOUBLE_EQ(truth.occupied_wrong, 0.0);
+  EXPECT_FALSE(truth.reachable_seen);
+}
+
+TEST(MapTruth, OfWhatTheBodyCanCoverThePartThatIsKnownCounts) {
+  const OccupancyGrid floor = drawn_floor({"######", "#....#", "######"});
+  const FloorMap map = drawn_map({"######", "#.. .#", "######"});
+  std::vector<std::uint8_t> reachable(floor.occupancy.size());
+  for (const int x : {1, 2, 3}) reachable[floor.frame.index(x, 1)] = 1;
+  const MapTruth truth = compare_with_floor(map, floor, {}, {1.5, 1.5}, reachable);
+  EXPECT_DOUBLE_EQ(truth.reachable_seen.value(), 2.0 / 3.0);
+  EXPECT_DOUBLE_EQ(truth.seen, 3.0);
+  // On a floor that is none of the robot's there is nothing to see.
+  EXPECT_FALSE(
+      compare_with_floor(map, floor, {}, {1.5, 1.5}, std::vector<std::uint8_t>(18)).reachable_seen);
+  EXPECT_THROW(compare_with_floor(map, floor, {}, {1.5, 1.5}, std::vector<std::uint8_t>(5)), Error);
 }
 
 TEST(MapTruth, AnAlignmentTakesTheMapToTheFloor) {

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -159,7 +160,7 @@ TEST(PathInformation, AnEstimateIsByTheMiddlePoseOfEachPart) {
 
 TEST(PathInformation, AnEstimateByAllPosesHasTheBitsOfTheExactValue) {
   const PathGraph graph = test::wandering(45, 7.0, 3);
-  for (const int sampled : {0, 45, 1000}) {
+  for (const int sampled : {0, 45, 1000, std::numeric_limits<int>::max()}) {
     PathInformation information(graph.situation(), {.loop_gain = 0.2, .sampled_poses = sampled});
     RandomNumbers random(5);
     const State end = information.extended(information.start(),

@@ -2,6 +2,7 @@
 #include "cairn/planning/potential_field.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -59,9 +60,13 @@ std::vector<float> one_attractor(const ConfigurationSpace& space, int x, int y, 
   return decrease;
 }
 
-TEST(PotentialField, SolvesTheEquationsAsADenseSolverDoes) {
+class PotentialFieldOf : public testing::TestWithParam<int> {};
+
+/// Also with an odd number of orientations, of which the first and the last are swept one after
+/// the other.
+TEST_P(PotentialFieldOf, OrientationsSolvesTheEquationsAsADenseSolverDoes) {
   const FloorMap map = two_rooms();
-  const ConfigurationSpace space(map, kRadius, 6);
+  const ConfigurationSpace space(map, kRadius, GetParam());
   std::vector<float> decrease = one_attractor(space, 10, 4, 3);
   decrease[space.index(space.number(2, 1), 0)] = 1.5F;
   PotentialField field(space, decrease, {.tolerance = 3e-12});
@@ -84,6 +89,8 @@ TEST(PotentialField, SolvesTheEquationsAsADenseSolverDoes) {
     }
   }
 }
+
+INSTANTIATE_TEST_SUITE_P(Numbers, PotentialFieldOf, testing::Values(4, 5, 6, 9));
 
 /// Multiplying by w at obstacles, as a potential that is positive would have it, has no limit: the
 /// iteration matrix of (5.9) has an eigenvalue above 1, whereas dividing keeps all below it.
@@ -180,6 +187,17 @@ TEST(PotentialField, WithoutTimeItIsSmoothFromTheAttractorsOn) {
   // And time that is left afterwards is used.
   EXPECT_TRUE(field.solve(1.1).converged);
   for (std::size_t k = 0; k < space.size(); ++k) EXPECT_EQ(field.value(k), solved.value(k));
+}
+
+TEST(PotentialField, AnInterruptEndsItAfterOneSweepOfEachGrid) {
+  const FloorMap map = two_rooms();
+  const ConfigurationSpace space(map, kRadius, 8);
+  PotentialField field(space, one_attractor(space, 10, 4, 3), {.tolerance = 1e-12});
+  const std::atomic<bool> interrupt = true;
+  const PotentialField::Solution solution =
+      field.solve(1.1, std::numeric_limits<double>::infinity(), &interrupt);
+  EXPECT_FALSE(solution.converged);
+  EXPECT_EQ(solution.sweeps, 1);
 }
 
 TEST(PotentialField, RefusesWhatMakesNoSense) {

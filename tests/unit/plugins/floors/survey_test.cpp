@@ -119,6 +119,8 @@ TEST(FloorSurvey, IsWhatItsDefinitionsSayOnRandomFloors) {
       const double cell = grid.frame.cell_area();
       EXPECT_DOUBLE_EQ(found.standing_area, cell * std::ssize(literal.parts.front()));
       EXPECT_DOUBLE_EQ(found.covered_area, cell * literal.covered(grid, radius));
+      ASSERT_EQ(found.covered.size(), grid.occupancy.size());
+      EXPECT_DOUBLE_EQ(found.covered_area, cell * std::ranges::count(found.covered, 1));
       EXPECT_EQ(found.unreachable_parts, std::ssize(literal.parts) - 1);
       EXPECT_NEAR(found.unreachable_area + found.standing_area,
                   cell * std::ranges::count(literal.standing, true), 1e-9);

@@ -7,7 +7,7 @@ from ...pages import Sections, table
 from ...program import Words
 from ...reports import Json, number, text
 from ...study import Bench, Keep, Study
-from ...words import digits, whole
+from ...words import digits, percent, whole
 from .runs import end_of, floor_of, mean_of, measure, measured, problem_of, runs_of
 from .thesis import action_space
 
@@ -65,7 +65,7 @@ def floors_sections(entries: list[Json]) -> Sections:
                   for measure in ["distance", "seen", "loops", "collisions", "ate", "wrong", "decision_p95"]}
             begin = [end_of(run), text(run, "why"), digits(of["distance"]), digits(of["seen"])]
             if without_noise:
-                exact.append([name, *begin, whole(of["collisions"])])
+                exact.append([name, *begin, percent(measured(run, "reachable_seen"), 1), whole(of["collisions"])])
             else:
                 floors.append([floor, method, f"{number(run, 'seed'):.0f}", *begin, whole(of["loops"]), whole(of["collisions"]),
                                *(digits(of[measure]) for measure in ["ate", "wrong", "decision_p95"])])
@@ -74,7 +74,7 @@ def floors_sections(entries: list[Json]) -> Sections:
     return {"explore-floors-means": means_table([entry for entry in entries if text(entry, "part") == "floors"]),
             "explore-floors": table(["floor", "explorer", "seed", "end", "why", "driven [m]", "seen [m²]", "loops",
                                      "collisions", "ATE [m]", "wrong [m²]", "95 % of decisions [s]"], floors),
-            "explore-exact": table(["floor", "end", "why", "driven [m]", "seen [m²]", "collisions"], exact)}
+            "explore-exact": table(["floor", "end", "why", "driven [m]", "seen [m²]", "of what the body can cover", "collisions"], exact)}
 
 
 def means_table(entries: list[Json]) -> str:

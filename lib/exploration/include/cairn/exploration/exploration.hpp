@@ -7,6 +7,7 @@
 #include <limits>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -87,6 +88,9 @@ struct Exploration {
   Explorer& explorer;
   Registry& registry;
   WorldStart start;
+  /// By cell of the floor to drive on: whether the robot's body can cover it
+  /// (`FloorSurvey::covered`), for `MapTruth::reachable_seen`. Empty: not known.
+  std::span<const std::uint8_t> reachable = {};
   ExplorationLimits limits;
   /// Standard deviations of the first pose [m, m, rad], for `trajectory_entropy` and the explorer.
   Eigen::Vector3d first_sigma = Eigen::Vector3d(0.05, 0.05, 0.0017);

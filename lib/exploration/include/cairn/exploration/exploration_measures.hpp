@@ -16,6 +16,7 @@ struct ExplorationMeasures {
   double motions = 0.0, decisions = 0.0;
   double coverage = 0.0;  ///< `FloorMap::coverage` [m²]
   double seen = 0.0;      ///< of the floor that hangs together with the start, what is known [m²]
+  double reachable_seen = 0.0;  ///< part of what the robot's body can cover that is known
   /// (5.6) over a grid as large as that of the floor, whatever the size of the map's [nats·m²].
   double map_entropy = 0.0;
   double trajectory_entropy = 0.0;  ///< (5.13) [nats]

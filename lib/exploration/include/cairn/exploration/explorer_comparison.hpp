@@ -34,7 +34,8 @@ struct ExplorationSetup {
   Registry& registry;
   ComponentSpec world, policy, registration, mapper;
   const OccupancyGrid& floor;
-  std::optional<Pose2> start = {};  ///< none: the world chooses
+  std::span<const std::uint8_t> reachable = {};  ///< see `Exploration`
+  std::optional<Pose2> start = {};               ///< none: the world chooses
   ExplorationLimits limits = {};
   MatchModel match = {};
   double decision_budget = std::numeric_limits<double>::infinity();  ///< see `Exploration` [s]

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -16,16 +18,21 @@ namespace cairn {
 /// A map beside the floor that it is of [m²]. Cells of the map are compared with the cell of the
 /// floor in which their middle lies.
 struct MapTruth {
-  double floor = 0.0;       ///< free floor that hangs together with the start, over sides of cells
-  double seen = 0.0;        ///< of that, what the map knows
-  double free_wrong = 0.0;  ///< free in the map, an obstacle of the floor
+  double floor = 0.0;  ///< free floor that hangs together with the start, over sides of cells
+  double seen = 0.0;   ///< of that, what the map knows
+  /// Of the floor that the robot's body can cover, the part that the map knows; none: which floor
+  /// that is was not given.
+  std::optional<double> reachable_seen{};
+  double free_wrong = 0.0;      ///< free in the map, an obstacle of the floor
   double occupied_wrong = 0.0;  ///< occupied in the map; free on the floor, and not beside a wall
 };
 
 /// Compares a map with the floor. `alignment` takes points of the map's world to that of the floor;
-/// `start` is a point of the floor [m].
+/// `start` is a point of the floor [m]; `reachable`, if not empty: by cell of the floor, whether
+/// the robot's body can cover it (`FloorSurvey::covered`).
 CAIRN_API MapTruth compare_with_floor(const FloorMap& map, const OccupancyGrid& floor,
-                                      const Pose2& alignment, const Eigen::Vector2d& start);
+                                      const Pose2& alignment, const Eigen::Vector2d& start,
+                                      std::span<const std::uint8_t> reachable = {});
 
 /// Cells of the map that are free though an end point of a scan lies in them, each once [m²]: the
 /// "map error" of the thesis (5.4.5) without knowledge of the truth.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string_view>
 #include <vector>
@@ -26,9 +27,10 @@ struct FloorSurvey {
   /// Where the robot is: as asked for, else the middle of the cell that is farthest from all that
   /// is not free.
   Eigen::Vector2d start = Eigen::Vector2d::Zero();
-  double start_clearance = 0.0;  ///< from there to the nearest cell that is not free [m]
-  double standing_area = 0.0;    ///< of the cells that the body's centre can reach [m²]
-  double covered_area = 0.0;     ///< of the free cells that its body can cover [m²]
+  double start_clearance = 0.0;         ///< from there to the nearest cell that is not free [m]
+  double standing_area = 0.0;           ///< of the cells that the body's centre can reach [m²]
+  double covered_area = 0.0;            ///< of the free cells that its body can cover [m²]
+  std::vector<std::uint8_t> covered{};  ///< by cell of the grid: 1 if it is one of these
   /// Parts of the floor where the body fits as well, and that it cannot reach.
   int unreachable_parts = 0;
   double unreachable_area = 0.0;  ///< of the cells that a body's centre could be in there [m²]

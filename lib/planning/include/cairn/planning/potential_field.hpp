@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -59,8 +60,10 @@ class CAIRN_API PotentialField {
     bool converged = true;  ///< it stands
   };
   /// Solves with a weight w ≥ 1, from the beginning. Sweeps end after `seconds`, but for one on
-  /// each grid: what is there then is smooth, and depends on the clock.
-  Solution solve(double weight, double seconds = std::numeric_limits<double>::infinity());
+  /// each grid, or when `interrupt`, if not null, is true: what is there then is smooth, and
+  /// depends on the clock.
+  Solution solve(double weight, double seconds = std::numeric_limits<double>::infinity(),
+                 const std::atomic<bool>* interrupt = nullptr);
 
   double value(std::size_t configuration) const { return values_[configuration]; }
   bool is_attractor(std::size_t configuration) const { return fixed_[configuration] != 0; }

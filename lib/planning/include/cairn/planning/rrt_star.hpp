@@ -141,9 +141,9 @@ class RrtStar {
             const std::atomic<bool>* interrupt = nullptr) {
     using Clock = std::chrono::steady_clock;
     const Clock::time_point start = Clock::now();
-    const auto wanted = static_cast<int>(std::ceil(density * space_.area()));
-    constexpr int kMostTries = 20;  // per node: space whose parts no segment joins stays empty
-    for (int tries = kMostTries * wanted; size() < wanted && tries > 0; --tries) {
+    const double wanted = std::ceil(density * space_.area());
+    constexpr double kMostTries = 20.0;  // per node: space whose parts no segment joins stays empty
+    for (double tries = kMostTries * wanted; size() < wanted && tries > 0.0; --tries) {
       if (interrupt && interrupt->load(std::memory_order_relaxed)) return false;
       if (std::isfinite(seconds) &&
           std::chrono::duration<double>(Clock::now() - start).count() > seconds) {
