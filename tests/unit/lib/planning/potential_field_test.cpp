@@ -6,6 +6,8 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <string>
+#include <vector>
 
 #include <gtest/gtest.h>
 #include <Eigen/Dense>
@@ -168,6 +170,19 @@ TEST(PotentialField, CoarserGridsChangeTheTimeAlone) {
     if (value > 0.0) largest = std::max(largest, std::abs(sum / 6.0 - value) / value);
   }
   EXPECT_LT(largest, 1e-9);
+}
+
+/// What is far from attractors needs a larger factor of over-relaxation than it begins with.
+TEST(PotentialField, SweepsOfALongHallAreFew) {
+  const FloorMap map = test::drawn_map(std::vector<std::string>(40, std::string(200, '.')));
+  const ConfigurationSpace space(map, kRadius, 4);
+  std::vector<float> decrease = one_attractor(space, 4, 4, 0);
+  decrease[space.index(space.number(195, 35), 2)] =
+      0.7F * decrease[space.index(space.number(4, 4), 0)];
+  PotentialField field(space, decrease, {.tolerance = 1e-8});
+  const PotentialField::Solution solution = field.solve(1.0);
+  EXPECT_TRUE(solution.converged);
+  EXPECT_LT(solution.sweeps, 1500);  // with the factor 1.8 alone 5000 are too few
 }
 
 TEST(PotentialField, WithoutTimeItIsSmoothFromTheAttractorsOn) {

@@ -26,7 +26,8 @@ struct PotentialFieldOptions {
               "configurations with more than this part of the largest decrease attract")
         .real("tolerance", &O::tolerance, 1e-14, 0.1,
               "relative change in a sweep of smoothing at which the field stands")
-        .real("relaxation", &O::relaxation, 0.01, 1.99, "factor of successive over-relaxation")
+        .real("relaxation", &O::relaxation, 0.01, 1.99,
+              "factor of successive over-relaxation at the beginning")
         .integer("sweeps", &O::sweeps, 1, 1000000, "of smoothing, at most");
   }
 };
@@ -46,7 +47,8 @@ struct PotentialFieldOptions {
 /// sweep, and has no limit on most floors (a test shows it for a corridor).
 ///
 /// It is solved by successive over-relaxation, in two colours, from the solution on a grid of
-/// half as many cells and orientations, that on half as many again, and so forth.
+/// half as many cells and orientations, that on half as many again, and so forth. Its factor grows
+/// to the best one for the rate at which changes become less (Young 1971).
 class CAIRN_API PotentialField {
  public:
   /// `decrease`: −E ≥ 0 [nats], by `ConfigurationSpace::index`. The space must outlive it. 9 bytes
