@@ -53,16 +53,16 @@ IncrementalCholesky::IncrementalCholesky(const IncrementalCholesky& other)
 
 UpdateReport IncrementalCholesky::update(const GraphUpdate& update, const UpdateOptions& options) {
   const Clock::time_point begin = Clock::now();
-  if (has_removed_) compact();
   const bool full =
       options.full || (options_.full_every > 0 && since_full_ + 1 >= options_.full_every);
+  const double max_seconds = options.max_seconds > 0.0 ? options.max_seconds : options_.budget;
   UpdateReport report;
-  const double of_solution = carry_out_or_not_at_all(update, full, report);
+  const double of_solution =
+      carry_out_or_not_at_all(update, full, !full && max_seconds > 0.0, report);
   report.seconds.linearize += seconds_since(begin) - of_solution;
 
   ++since_solved_;
   ++since_full_;
-  const double max_seconds = options.max_seconds > 0.0 ? options.max_seconds : options_.budget;
   if (full) {
     engine_->solve_fully(report);
     since_full_ = since_solved_ = 0;
@@ -103,14 +103,18 @@ GraphUpdate IncrementalCholesky::placed(const GraphUpdate& update) {
 }
 
 /// Ends a solution that an update with a time limit has left, before new variables are placed by
-/// its states, or something is taken out. What it cost is in the report.
-void IncrementalCholesky::end_solution(UpdateReport& report) {
-  UpdateReport of_solution;
-  engine_->solve(0.0, of_solution);
-  report.iterations = of_solution.iterations;
-  report.affected_variables = of_solution.affected_variables;
-  report.relinearized_factors = of_solution.relinearized_factors;
-  report.seconds = of_solution.seconds;
+/// its states, or something is taken out. How it ended and what it cost are in the report; a full
+/// step, which follows, says itself whether all has converged. Returns the seconds that it took.
+double IncrementalCholesky::end_solution(bool full, UpdateReport& report) {
+  const Clock::time_point begin = Clock::now();
+  engine_->solve(0.0, report);
+  forget_what_was_read();
+  if (full) {
+    report.converged = true;
+    report.owed = 0;
+    report.notes.clear();
+  }
+  return seconds_since(begin);
 }
 
 /// The engine as what an update is carried out on.
@@ -167,10 +171,12 @@ void IncrementalCholesky::Target::remove(std::span<const int> factors,
 /// does not have what was refused. So it is computed before anything changes, or else on a copy.
 /// Returns the seconds that it took to end the solution that a time limit has left.
 double IncrementalCholesky::carry_out_or_not_at_all(const GraphUpdate& update, bool full,
-                                                    UpdateReport& report) {
+                                                    bool limited, UpdateReport& report) {
   GraphUpdate checked = placed(update);
-  const bool ends = engine_->busy() && (full || takes_out(checked));
-  const bool compacts = engine_->mostly_dead() || brings_back(checked);
+  const bool returns = brings_back(checked);
+  const bool ends = engine_->busy() && (full || returns || takes_out(checked));
+  const bool goes_on = engine_->busy() && !ends;
+  const bool compacts = returns || (!goes_on && compaction_is_due(limited));
   std::optional<Elimination> foreseen;
   std::unique_ptr<IncrementalCholesky> before;
   if (!checked.marginalized.empty()) {
@@ -185,28 +191,35 @@ double IncrementalCholesky::carry_out_or_not_at_all(const GraphUpdate& update, b
   double of_solution = 0.0;
   try {
     if (ends) {
-      const Clock::time_point begin = Clock::now();
-      end_solution(report);
+      of_solution = end_solution(full, report);
       checked = placed(update);
-      of_solution = seconds_since(begin);
     }
     if (compacts) compact();
     Target target(*this, std::move(foreseen));
     AppliedUpdate applied = carry_out(checked, losses_, target);
     report.first_factor = applied.first_factor;
     report.priors = std::move(applied.priors);
-    has_removed_ = !update.removed_factors.empty() || !update.removed_variables.empty();
+    if (!update.removed_factors.empty() || !update.removed_variables.empty()) has_removed_ = true;
   } catch (...) {
     if (before) {
       engine_ = std::move(before->engine_);
       variables_ = before->variables_;
       factors_ = before->factors_;
       losses_ = before->losses_;
+      has_removed_ = before->has_removed_;
       forget_what_was_read();
     }
     throw;
   }
   return of_solution;
+}
+
+/// Whether what has left is to be taken out of the engine's arrays, where no solution goes on,
+/// which would begin anew. That linearises everything at once, and all is factorised after it: with
+/// a time limit what was removed stays where it is, as what was marginalised does, until it is most
+/// of all.
+bool IncrementalCholesky::compaction_is_due(bool limited) const {
+  return engine_->mostly_dead() || (has_removed_ && !limited);
 }
 
 /// Takes what has left out of the engine's arrays.
@@ -327,21 +340,30 @@ bool IncrementalCholesky::covariance(Id a, Id b, std::span<double> block) {
 bool IncrementalCholesky::covariance_column(Id id, std::span<const Id> variables,
                                             std::span<double> out) {
   const int column = index(id);
-  std::vector<std::int32_t> rows;
-  std::int64_t size = 0;
-  for (const Id row : variables) {
-    rows.push_back(index(row));
-    size += block_size(rows.back(), column);
-  }
+  const Rows& rows = rows_of(variables);
+  const std::int64_t size = rows.height * engine_->graph().type(column).tangent_size();
   if (std::ssize(out) != size) {
     throw Error(
         ErrorCode::usage,
         fmt::format("this column of the covariance has {} numbers, not {}", size, out.size()));
   }
   Engine& engine = solved();
-  if (&engine != engine_.get())
-    for (std::size_t k = 0; k < rows.size(); ++k) rows[k] = place_in(engine, variables[k]);
-  return engine.covariance_column(rows, place_in(engine, id), out.data());
+  if (&engine == engine_.get()) return engine.covariance_column(rows.places, column, out.data());
+  std::vector<std::int32_t> places;
+  for (const Id row : variables) places.push_back(place_in(engine, row));
+  return engine.covariance_column(places, place_in(engine, id), out.data());
+}
+
+/// Where these variables are in the engine. Columns are asked for many at a time, with the same
+/// rows.
+const IncrementalCholesky::Rows& IncrementalCholesky::rows_of(std::span<const Id> variables) {
+  if (std::ranges::equal(variables, rows_.ids)) return rows_;
+  Rows rows{{variables.begin(), variables.end()}, {}, 0};
+  for (const Id id : variables) {
+    rows.places.push_back(index(id));
+    rows.height += engine_->graph().type(rows.places.back()).tangent_size();
+  }
+  return rows_ = std::move(rows);
 }
 
 /// The number of a variable that is there, in the engine or in a copy that may have renumbered.

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <cstdint>
 #include <map>
 #include <memory>
 #include <optional>
 #include <set>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "cairn/plugin/option_fields.hpp"
@@ -90,14 +92,25 @@ class IncrementalCholesky final : public Estimator {
   void reset() override;
   std::unique_ptr<Estimator> clone() const override;
   std::int64_t memory() const override { return engine_->doubles() * 8; }
+  /// The clock that limits refer to, for tests.
+  void set_clock(Pace::Clock clock) { engine_->set_clock(std::move(clock)); }
 
  private:
   class Target;
+  /// Variables whose rows of a covariance are asked for.
+  struct Rows {
+    std::vector<Id> ids;
+    std::vector<std::int32_t> places;  ///< in the engine
+    std::int64_t height = 0;           ///< rows of all together
+  };
   std::optional<int> find(Id id) const;
   std::optional<int> position(FactorId id) const;
   int index(Id id) const;
   int block_size(int a, int b) const;
-  double carry_out_or_not_at_all(const GraphUpdate& update, bool full, UpdateReport& report);
+  const Rows& rows_of(std::span<const Id> variables);
+  double carry_out_or_not_at_all(const GraphUpdate& update, bool full, bool limited,
+                                 UpdateReport& report);
+  bool compaction_is_due(bool limited) const;
   void compact();
   bool brings_back(const GraphUpdate& update) const;
   bool can_be_foreseen(const GraphUpdate& update) const;
@@ -105,11 +118,12 @@ class IncrementalCholesky final : public Estimator {
     read_.clear();
     all_.reset();
     finished_.reset();
+    rows_ = {};
   }
   Engine& solved();
   int place_in(const Engine& engine, Id id) const;
   GraphUpdate placed(const GraphUpdate& update);
-  void end_solution(UpdateReport& report);
+  double end_solution(bool full, UpdateReport& report);
   void note_gauge(UpdateReport& report);
 
   IncrementalCholeskyOptions options_;
@@ -122,8 +136,10 @@ class IncrementalCholesky final : public Estimator {
   std::map<int, std::vector<double>> read_;  // states by variable, since the last update
   std::optional<Estimate> all_;              // or all of them
   std::unique_ptr<Engine> finished_;         // see solved()
+  Rows rows_;                                // that were asked for last, since the last update
   std::set<Id> told_;                        // anchors that a note has named
-  /// Something has been removed, not marginalised: the next update begins by `compact`.
+  /// Something has been removed, not marginalised, and is still in the engine's arrays: the next
+  /// update without a time limit takes it out.
   bool has_removed_ = false;
 };
 

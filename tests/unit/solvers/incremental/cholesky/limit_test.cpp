@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "cairn/plugin/registry.hpp"
+#include "counting_clock.hpp"
 #include "engine.hpp"
 #include "growing_graph.hpp"
 
@@ -18,15 +19,6 @@ namespace cairn::incremental {
 namespace {
 
 constexpr double kNothing = 1e-4;
-
-/// A clock that moves on by a second whenever it is read, which is once for each piece of work: a
-/// limit of n seconds is one of n pieces.
-struct CountingClock {
-  double reads = 0.0;
-  void drive(Engine& engine) {
-    engine.set_clock([this] { return reads += 1.0; });
-  }
-};
 
 struct Case {
   std::string name;
