@@ -2,6 +2,7 @@
 #include "cairn/planning/path_value.hpp"
 
 #include <cmath>
+#include <numbers>
 #include <utility>
 
 #include "cairn/planning/path_motions.hpp"
