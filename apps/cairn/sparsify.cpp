@@ -160,11 +160,10 @@ json::object report_json(const SparsifyCommandOptions& options, const LoadedGrap
                         {"after", nonzeros_json(result.nonzeros_after)}};
   report["conservative_margin"] = number_json(result.conservative_margin);
   report["chi2"] = {{"before", result.chi2_before}, {"after", result.chi2_after}};
-  report["seconds"] = {{"total", change.seconds.total},
-                       {"marginalize", change.seconds.marginalize},
-                       {"topology", change.seconds.topology},
-                       {"recovery", change.seconds.recovery},
-                       {"select", result.select_seconds}};
+  report["seconds"] = {
+      {"total", change.seconds.total},           {"marginalize", change.seconds.marginalize},
+      {"covariance", change.seconds.covariance}, {"topology", change.seconds.topology},
+      {"recovery", change.seconds.recovery},     {"select", result.select_seconds}};
   if (job.online > 0) {
     report["redirected"] = result.redirected;
     report["dropped"] = result.dropped;
@@ -209,12 +208,16 @@ std::string summary_text(const SparsifyCommandOptions& options, const LoadedGrap
                                        result.conservative_margin)});
     }
   }
+  const SparsificationSeconds& seconds = change.seconds;
+  const std::string covariance =
+      seconds.covariance > 0.0
+          ? fmt::format("covariance in the graph {}, ", seconds_text(seconds.covariance))
+          : "";
   table.add(
-      {"time",
-       fmt::format("{} (marginalize {}, topology {}, recovery {}), select {}",
-                   seconds_text(change.seconds.total), seconds_text(change.seconds.marginalize),
-                   seconds_text(change.seconds.topology), seconds_text(change.seconds.recovery),
-                   seconds_text(result.select_seconds))});
+      {"time", fmt::format("{} (marginalize {}, {}topology {}, recovery {}), select {}",
+                           seconds_text(seconds.total), seconds_text(seconds.marginalize),
+                           covariance, seconds_text(seconds.topology),
+                           seconds_text(seconds.recovery), seconds_text(result.select_seconds))});
   if (job.online > 0) {
     table.add({"a pose", StepTimes(result.steps).text()});
     table.add({"late", fmt::format("{} for nodes that had left redirected, {} dropped",

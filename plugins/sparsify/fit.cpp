@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "fit.hpp"
 
+#include <cmath>
 #include <utility>
 
 #include "blanket_matrices.hpp"
@@ -98,6 +99,21 @@ double certainty_scale(const DenseBlanket& blanket, std::span<const FactorChoice
   }
   const double dense = information(blanket).bottomRightCorner(r, r).cwiseProduct(S).sum();
   return sparse > 0.0 && dense > 0.0 ? dense / sparse : 1.0;
+}
+
+void scale(const RecoveryProblem& problem, double s, RecoveryResult& result) {
+  const ScaledProblem units(problem);
+  std::vector<Matrix> W;
+  double trace = 0.0;  // of Λ̆
+  for (int k = 0; k < units.factors(); ++k) {
+    std::vector<double>& information = result.information[k];
+    for (double& x : information) x *= s;
+    W.push_back(units.scaled(
+        k, Eigen::Map<const Matrix>(information.data(), units.size(k), units.size(k))));
+    trace += W.back().trace() / s;
+  }
+  result.kld += 0.5 * ((s - 1.0) * trace - problem.rank * std::log(s));
+  if (Approximation at(units); at.set(std::move(W))) result.gradient = at.gradient();
 }
 
 DenseBlanket within_graph(DenseBlanket blanket, const Matrix& S) {

@@ -12,6 +12,7 @@
 #include "cairn/linear/linear_solver.hpp"
 #include "cairn/runtime/enum_names.hpp"
 #include "cairn/sparsification/blanket.hpp"
+#include "cairn/sparsification/recovery.hpp"
 
 namespace cairn::sparsify {
 
@@ -44,6 +45,11 @@ std::optional<Matrix> own_covariance(const DenseBlanket& blanket, const Matrix& 
 /// expectation as it was, one for each degree of freedom: tr (Λ_rest + s Λ̆) Σ = tr (Λ_rest + Λ) Σ.
 double certainty_scale(const DenseBlanket& blanket, std::span<const FactorChoice> topology,
                        const std::vector<std::vector<double>>& information, const Matrix& S);
+
+/// Multiplies the information of all factors by s > 0, and makes `kld` and `gradient` those of the
+/// factors as they are then: Λ̆ → s Λ̆ in the r coordinates of the problem, whose background is zero,
+/// so that KLD = ½ (tr Λ̆ − ln |Λ̆| − r) grows by ½ ((s − 1) tr Λ̆ − r ln s).
+void scale(const RecoveryProblem& problem, double s, RecoveryResult& result);
 
 /// The same blanket with S⁻¹ (as `S` of `own_covariance`), in place of its own information.
 DenseBlanket within_graph(DenseBlanket blanket, const Matrix& S);

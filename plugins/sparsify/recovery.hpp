@@ -100,6 +100,7 @@ class FactorDescent final : public IterativeRecovery {
   FactorDescent(RecoveryOptions options, bool greedy, bool conservative = false)
       : IterativeRecovery(options), greedy_(greedy), conservative_(conservative) {}
   RecoveryResult recover(const RecoveryProblem& problem) override;
+  bool takes_background() const override { return !conservative_; }
 
  private:
   bool greedy_, conservative_;

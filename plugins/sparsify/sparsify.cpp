@@ -14,6 +14,7 @@
 #include "blanket_matrices.hpp"
 #include "cairn/geometry/pose.hpp"
 #include "cairn/graph/packed.hpp"
+#include "cairn/linear/marginals.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/timed.hpp"
 #include "cairn/sparsification/correlated_pair.hpp"
@@ -109,7 +110,31 @@ Sparsify::Sparsify(std::unique_ptr<Topology> topology, std::unique_ptr<FactorRec
     : topology_(std::move(topology)),
       recovery_(std::move(recovery)),
       options_(std::move(options)),
-      solver_(std::move(solver)) {}
+      solver_(std::move(solver)) {
+  if (options_.fit != Fit::blanket) check_fit();
+}
+
+void Sparsify::check_fit() const {
+  const std::string fit = fmt::format("sparsify:fit={}", to_string(options_.fit));
+  if (topology_->whole()) {
+    throw Error(ErrorCode::usage,
+                fmt::format("topology {} has one factor that repeats Λ of the blanket, so that {} "
+                            "has nothing to fit: leave fit at blanket, or take another topology",
+                            options_.topology, fit));
+  }
+  if (options_.fit == Fit::graph && !recovery_->takes_background()) {
+    throw Error(ErrorCode::usage,
+                fmt::format("{} is not for recovery={}, which does not take account of the rest of "
+                            "the graph: take ncfd or fd, without conservative, or fit=scaled",
+                            fit, options_.recovery));
+  }
+  if (!solver_ || !query<Marginals>(*solver_)) {
+    throw Error(ErrorCode::usage,
+                fmt::format("{} needs a linear solver that gives covariances, which {} does not: "
+                            "take linear_solver=block_cholesky",
+                            fit, solver_ ? options_.linear_solver : "none"));
+  }
+}
 
 /// Nodes that leave together: one by one, or those that factors connect, in the order in which
 /// their first is asked for.
@@ -136,6 +161,16 @@ std::vector<std::vector<int>> Sparsify::groups(const WorkGraph& work,
   return result;
 }
 
+Sparsify::Recovered Sparsify::prepared(const DenseBlanket& dense, Matrix own_covariance,
+                                       SparsificationSeconds& seconds) const {
+  const Timed timed(seconds.recovery);
+  if (options_.fit != Fit::graph || own_covariance.size() == 0)
+    return {std::move(own_covariance), {}, project(dense, options_.projection)};
+  DenseBlanket whole = within_graph(dense, own_covariance);
+  BlanketProjection coordinates = project(whole, options_.projection);
+  return {std::move(own_covariance), std::move(whole), std::move(coordinates)};
+}
+
 void Sparsify::recover(const Recovered& of, Solved& solved, SparsificationSeconds& seconds) {
   const Timed timed(seconds.recovery);
   const DenseBlanket& own = solved.marginal.dense;
@@ -144,18 +179,22 @@ void Sparsify::recover(const Recovered& of, Solved& solved, SparsificationSecond
   solved.recovery =
       topology_->whole() ? ClosedForm().recover(problem) : recovery_->recover(problem);
   if (options_.fit != Fit::scaled || of.own_covariance.size() == 0) return;
-  const double scale =
-      certainty_scale(own, solved.topology, solved.recovery.information, of.own_covariance);
-  for (std::vector<double>& information : solved.recovery.information) {
-    for (double& x : information) x *= scale;
-  }
+  scale(problem,
+        certainty_scale(own, solved.topology, solved.recovery.information, of.own_covariance),
+        solved.recovery);
 }
 
 /// What the whole graph, as it is now, knows of a blanket; empty where that is not asked for, or
-/// not determined.
-Matrix Sparsify::known_in_graph(const WorkGraph& work, const LocalProblem& local,
-                                const Marginal& marginal) const {
-  if (options_.fit == Fit::blanket || topology_->whole() || marginal.open > 0) return {};
+/// not determined, which is noted.
+Matrix Sparsify::known_in_graph(const WorkGraph& work, const LocalProblem& local, Solved& solved,
+                                SparsificationSeconds& seconds) const {
+  if (options_.fit == Fit::blanket) return {};
+  const Timed timed(seconds.covariance);
+  const auto by_itself = [&](const char* reason) {
+    solved.notes.push_back(std::string(reason) + "; fitted to the blanket alone (fit=blanket)");
+    return Matrix();
+  };
+  if (solved.marginal.open > 0) return by_itself("what leaves does not determine the neighbours");
   const Graph& graph = work.graph();
   Sparsification so_far;
   collect(work, so_far);
@@ -169,8 +208,9 @@ Matrix Sparsify::known_in_graph(const WorkGraph& work, const LocalProblem& local
     for (const int v : local.blanket) there.push_back(now.find(graph.id(v)).value());
     joint = joint_covariance(now, *solver_, there);
   }
-  if (!joint) return {};
-  return own_covariance(marginal.dense, *joint).value_or(Matrix());
+  if (!joint) return by_itself("the information of the whole graph is singular");
+  const std::optional<Matrix> own = own_covariance(solved.marginal.dense, *joint);
+  return own ? *own : by_itself("its covariance in the whole graph is singular");
 }
 
 Sparsify::Solved Sparsify::solve(const WorkGraph& work, const LocalProblem& local,
@@ -191,13 +231,8 @@ Sparsify::Solved Sparsify::solve(const WorkGraph& work, const LocalProblem& loca
       std::ranges::all_of(local.removed, [&](int v) { return is_point(work.graph().type(v)); });
   if (solved.marginal.open > 0 && !landmarks && options_.open == Open::refuse)
     refuse_open(work.graph(), local, solved.marginal, options_.open);
-  Recovered of{.own_covariance = in_graph ? known_in_graph(work, local, solved.marginal) : Matrix(),
-               .whole = {},
-               .coordinates = project(dense, options_.projection)};
-  if (options_.fit == Fit::graph && of.own_covariance.size() > 0) {
-    of.whole = within_graph(dense, of.own_covariance);
-    of.coordinates = project(*of.whole, options_.projection);
-  }
+  Matrix known = in_graph ? known_in_graph(work, local, solved, seconds) : Matrix();
+  const Recovered of = prepared(dense, std::move(known), seconds);
   const int nodes = static_cast<int>(std::ssize(dense.node_sizes));
   // One prior of those that there are models of, besides the factors between nodes.
   const int prior = dense.absolute ? 1 : 0;
@@ -205,12 +240,13 @@ Sparsify::Solved Sparsify::solve(const WorkGraph& work, const LocalProblem& loca
   const int all =
       pairs + (topology_->parts() ? static_cast<int>(std::ssize(prior_models(dense))) : prior);
   const bool bounded = options_.population.kind == Population::Kind::loss;
+  std::string of_topology;
   for (int count = std::min(all, prior + options_.population.count(nodes));;) {
     try {
       {
         const Timed timed(seconds.topology);
         solved.topology = topology_->choose(dense, count);
-        solved.note = topology_->note();
+        of_topology = topology_->note();
       }
       recover(of, solved, seconds);
     } catch (const Error&) {
@@ -226,6 +262,7 @@ Sparsify::Solved Sparsify::solve(const WorkGraph& work, const LocalProblem& loca
     }
     count = std::min(all, count + std::max(1, count / 8));
   }
+  solved.notes.push_back(std::move(of_topology));
   for (std::size_t k = 0; k < solved.topology.size(); ++k)
     solved.information.push_back(
         whole_information(solved.marginal, solved.topology[k], solved.recovery.information[k]));
@@ -282,7 +319,10 @@ LocalProblem Sparsify::cropped(const WorkGraph& work, std::vector<int> group) co
 
 void Sparsify::take_out(WorkGraph& work, std::vector<int> group, Sparsification& result) {
   const Graph& graph = work.graph();
-  const LocalProblem local = cropped(work, std::move(group));
+  const LocalProblem local = [&] {
+    const Timed timed(result.seconds.marginalize);
+    return cropped(work, std::move(group));
+  }();
   const auto refuse = [&](const std::string& reason) {
     for (const int v : local.removed) result.refused.push_back({graph.id(v), reason});
   };
@@ -304,7 +344,7 @@ void Sparsify::take_out(WorkGraph& work, std::vector<int> group, Sparsification&
     result.largest_blanket = std::max(result.largest_blanket, n);
     result.kld += solved.recovery.kld;
     result.not_converged += !solved.recovery.converged;
-    result.note(solved.note);
+    for (const std::string& note : solved.notes) result.note(note);
   }
   // With a blanket of one node nothing that the factors say is about anything else; those within
   // the blanket stay then.

@@ -94,7 +94,7 @@ struct SparsifyOptions {
 class Sparsify final : public Sparsifier {
  public:
   /// `solver`: for the covariance of blankets in the whole graph, which `Fit::blanket` does not
-  /// need.
+  /// need. Throws `Error` (usage) for a `Fit` that the others cannot follow.
   Sparsify(std::unique_ptr<Topology> topology, std::unique_ptr<FactorRecovery> recovery,
            SparsifyOptions options, std::unique_ptr<LinearSolver> solver = nullptr);
 
@@ -110,7 +110,7 @@ class Sparsify final : public Sparsifier {
     std::vector<FactorChoice> topology;
     RecoveryResult recovery;
     std::vector<std::vector<double>> information;  ///< of the new factors, packed
-    std::string note;                              ///< of the topology
+    std::vector<std::string> notes;                ///< of the topology, and of `known_in_graph`
   };
   /// How a blanket is recovered.
   struct Recovered {
@@ -122,8 +122,11 @@ class Sparsify final : public Sparsifier {
   /// `in_graph`: as `SparsifyOptions::fit` says; otherwise by the cropped problem alone.
   Solved solve(const WorkGraph& work, const LocalProblem& local, SparsificationSeconds& seconds,
                bool in_graph);
-  Matrix known_in_graph(const WorkGraph& work, const LocalProblem& local,
-                        const Marginal& marginal) const;
+  void check_fit() const;
+  Matrix known_in_graph(const WorkGraph& work, const LocalProblem& local, Solved& solved,
+                        SparsificationSeconds& seconds) const;
+  Recovered prepared(const DenseBlanket& dense, Matrix own_covariance,
+                     SparsificationSeconds& seconds) const;
   void recover(const Recovered& of, Solved& solved, SparsificationSeconds& seconds);
   static void collect(const WorkGraph& work, Sparsification& result);
   void add_factors(WorkGraph& work, const LocalProblem& local, const Solved& solved);

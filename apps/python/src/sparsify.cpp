@@ -159,6 +159,7 @@ py::dict seconds_of(const BoundSparsified& bound) {
   py::dict result;
   result["total"] = seconds.total;
   result["marginalize"] = seconds.marginalize;
+  result["covariance"] = seconds.covariance;
   result["topology"] = seconds.topology;
   result["recovery"] = seconds.recovery;
   result["select"] = bound.result.select_seconds;
@@ -232,8 +233,9 @@ void bind_sparsified(py::module_& module) {
           "problems", [](const BoundSparsified& bound) { return bound.result.change.problems; },
           "How many sets of neighbours got new factors.")
       .def_property_readonly("seconds", &seconds_of,
-                             "Of each part: marginalize, topology, recovery, select; total of the "
-                             "first three.")
+                             "Of each part: marginalize, covariance (of neighbours in the whole "
+                             "graph, for fit), topology, recovery, select; total of all but the "
+                             "last.")
       .def_property_readonly("notes", &notes_of, "Sentences for the user.")
       .def("__repr__", [](const BoundSparsified& bound) {
         return fmt::format("<cairn.SparsifyResult {}: {} removed, KLD {:.4g} nats>", bound.status(),

@@ -22,6 +22,7 @@ std::vector<int> NodeSelection::choose(const Graph& graph, std::span<const int> 
 SparsificationSeconds& SparsificationSeconds::operator+=(const SparsificationSeconds& other) {
   total += other.total;
   marginalize += other.marginalize;
+  covariance += other.covariance;
   topology += other.topology;
   recovery += other.recovery;
   return *this;

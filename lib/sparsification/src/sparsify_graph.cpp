@@ -127,6 +127,9 @@ void measure(const Graph& original, Parts& parts, SparsifyResult& result) {
 void choose_recovery(ComponentSpec& sparsifier) {
   const auto topology = sparsifier.values.find("topology");
   if (topology == sparsifier.values.end()) return;
+  // Beside the rest of the graph, what is exact for the tree alone is no minimum.
+  const auto fit = sparsifier.values.find("fit");
+  if (fit != sparsifier.values.end() && fit->second == "graph") return;
   if (topology->second.starts_with("clt") || topology->second.starts_with("cliquey"))
     sparsifier.values.emplace("recovery", "closed_form");
 }

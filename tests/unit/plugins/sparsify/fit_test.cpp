@@ -10,15 +10,19 @@
 #include <gtest/gtest.h>
 #include <Eigen/Dense>
 
+#include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
+#include "sparsify.hpp"
 #include "unit/plugins/sparsify/world.hpp"
 
 namespace cairn::sparsify {
 namespace {
 
+using testing::AllOf;
 using testing::DoubleNear;
 using testing::Gt;
 using testing::HasSubstr;
+using testing::IsEmpty;
 using testing::Lt;
 
 class FitToTheGraph : public testing::TestWithParam<int> {
@@ -115,6 +119,76 @@ TEST_P(FitToTheGraph, HasTheLeastDivergenceOfTheWhole) {
   }
 }
 
+/// Of the factors that came, from what the blanket of node 4 alone says, by dense matrices.
+double of_the_blanket_alone(const World& world, const Sparsification& change) {
+  Graph alone;
+  const LocalProblem local = crop(WorkGraph(world.graph), world.indices({4}));
+  for (const int v : local.blanket)
+    alone.add_variable(world.graph.variable(v).type, world.graph.id(v), world.graph.state(v));
+  for (const Factor& factor : change.factors) {
+    std::vector<int> on;
+    for (const Id id : factor.variables) on.push_back(alone.find(id).value());
+    alone.add_factor(factor.type, on, factor.measurement, factor.information);
+  }
+  const DenseBlanket blanket = world.blanket({4});
+  const Eigen::Map<const Matrix> L(blanket.information.data(), blanket.size(), blanket.size());
+  return dense_divergence(L, marginal_of(alone, alone));
+}
+
+// Also where all of them have been scaled.
+TEST_P(FitToTheGraph, ReportsTheDivergenceOfTheFactorsThatItAdds) {
+  for (const bool landmarks : {false, true}) {
+    double apart = 0.0;
+    for (unsigned seed = 1; seed < 6; ++seed) {
+      World world(GetParam(), seed);
+      fill(world, landmarks, seed % 2 == 0);
+      const Sparsification own = world.removal({4}, with("blanket")),
+                           scaled = world.removal({4}, with("scaled")),
+                           whole = world.removal({4}, with("graph"));
+      for (const Sparsification* change : {&own, &scaled}) {
+        const double expected = of_the_blanket_alone(world, *change);
+        EXPECT_THAT(change->kld, DoubleNear(expected, 1e-8 * (1.0 + expected))) << seed;
+      }
+      apart += scaled.kld - own.kld;
+      Graph sparse = world.graph.clone();
+      apply(whole, sparse);
+      const double expected = divergence(world.graph, sparse);
+      EXPECT_THAT(whole.kld, DoubleNear(expected, 1e-6 * (1.0 + expected))) << seed;
+    }
+    EXPECT_THAT(apart, Gt(1e-3)) << landmarks;
+  }
+}
+
+// The information that was found for the factors alone is the minimum, and what is scaled is not.
+TEST_P(FitToTheGraph, ReportsTheGradientOfTheFactorsThatItAdds) {
+  World world(GetParam(), 2);
+  fill(world, false);
+  Registry registry;
+  double gradient = 0.0;
+  for (const char* fit : {"blanket", "scaled"}) {
+    const auto sparsifier = registry.make<Sparsifier>(with(fit));
+    sparsifier->observe(
+        [&](const SparsificationRecord& record) { gradient = record.recovery->gradient; });
+    sparsifier->remove(world.graph, world.indices({4}));
+    if (fit == std::string("blanket"))
+      EXPECT_THAT(gradient, Lt(1e-8));
+    else
+      EXPECT_THAT(gradient, Gt(1e-4));
+  }
+}
+
+// population=loss: the bound is one of what is added.
+TEST_P(FitToTheGraph, BoundsTheDivergenceOfTheFactorsThatItAdds) {
+  World world(GetParam(), 3);
+  fill(world, false);
+  const std::string scaled = "sparsify:fit=scaled,population=loss:";
+  const double tree = world.removal({4}, scaled + "1000").kld,
+               alone = world.removal({4}, "sparsify:population=loss:1000").kld;
+  ASSERT_THAT(tree, Gt(alone));
+  const double bound = 0.5 * (tree + alone);
+  EXPECT_THAT(world.removal({4}, scaled + std::to_string(bound)).kld, Lt(bound));
+}
+
 // Where there is no rest of the graph all are the same.
 TEST_P(FitToTheGraph, IsThatOfTheBlanketWhereNothingElseIsMeasured) {
   World world(GetParam(), 3);
@@ -140,6 +214,69 @@ TEST_P(FitToTheGraph, IsNotForMethodsThatKnowNoRest) {
       EXPECT_THAT(error.what(), HasSubstr("fit=graph"));
     }
   }
+}
+
+// Before there is a graph.
+TEST(Fit, IsRefusedWhereItCannotBeFollowed) {
+  Registry registry;
+  const auto refusal = [&](const std::string& options) -> std::string {
+    try {
+      registry.make<Sparsifier>("sparsify:" + options);
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), ErrorCode::usage) << options;
+      return error.what();
+    }
+    return {};
+  };
+  for (const char* recovery : {"ip", "pqn", "closed_form", "fd:conservative=true"})
+    EXPECT_THAT(refusal(std::string("fit=graph,recovery=") + recovery),
+                AllOf(HasSubstr("fit=graph"), HasSubstr(recovery), HasSubstr("take ncfd or fd")));
+  for (const char* fit : {"fit=scaled", "fit=graph"}) {
+    EXPECT_THAT(refusal(std::string(fit) + ",topology=glc"),
+                AllOf(HasSubstr(fit), HasSubstr("leave fit at blanket")));
+    EXPECT_THAT(refusal(std::string(fit) + ",linear_solver=jacobi"),
+                AllOf(HasSubstr(fit), HasSubstr("take linear_solver=block_cholesky")));
+    EXPECT_THAT(refusal(fit), IsEmpty());
+  }
+  EXPECT_THAT(refusal("fit=scaled,recovery=ip"), IsEmpty());
+  EXPECT_THAT(refusal("topology=glc,linear_solver=jacobi"), IsEmpty());
+  SparsifyOptions options;
+  options.fit = Fit::scaled;
+  EXPECT_THROW(Sparsify(registry.make<Topology>("ekld"), registry.make<FactorRecovery>("ncfd"),
+                        options, nullptr),
+               Error);
+}
+
+// Two poses beside the map, all but one number of whose relative pose is open.
+TEST_P(FitToTheGraph, NotesWhereItIsThatOfTheBlanket) {
+  World world(GetParam(), 1);
+  fill(world, false);
+  for (const Id id : {20, 21}) world.pose(id);
+  EXPECT_THAT(world.removal({4}, with("graph")).notes, IsEmpty());
+  const auto type = world.graph.factor(0).type;
+  const auto z = world.graph.measurement(0);
+  std::vector<double> nothing(world.graph.information(0).size());
+  nothing.front() = 1.0;
+  world.graph.add_factor(type, world.indices({20, 21}), std::vector<double>(z.begin(), z.end()),
+                         nothing);
+  for (const char* fit : {"scaled", "graph"}) {
+    const Sparsification change = world.removal({4, 1}, with(fit));
+    ASSERT_THAT(change.notes, testing::SizeIs(1)) << fit;
+    EXPECT_THAT(change.notes[0].text, HasSubstr("the whole graph is singular"));
+    EXPECT_EQ(change.notes[0].problems, 2);
+    EXPECT_EQ(change.kld, world.removal({4, 1}, with("blanket")).kld);
+  }
+  EXPECT_THAT(world.removal({4}, with("blanket")).notes, IsEmpty());
+}
+
+TEST_P(FitToTheGraph, CountsItsTimeByItself) {
+  World world(GetParam(), 1);
+  fill(world, false);
+  EXPECT_EQ(world.removal({4}, with("blanket")).seconds.covariance, 0.0);
+  const SparsificationSeconds seconds = world.removal({4}, with("graph")).seconds;
+  EXPECT_THAT(seconds.covariance, Gt(0.0));
+  EXPECT_LE(seconds.marginalize + seconds.covariance + seconds.topology + seconds.recovery,
+            seconds.total);
 }
 
 INSTANTIATE_TEST_SUITE_P(PlaneAndSpace, FitToTheGraph, testing::Values(2, 3));

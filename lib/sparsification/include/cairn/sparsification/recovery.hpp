@@ -37,8 +37,8 @@ struct RecoveryProblem {
   int rank = 0;  ///< r
   std::vector<Factor> factors;
   std::vector<double> basis{};  ///< T, d × r, column-major; may be empty
-  /// R ⪰ 0, r × r; empty: zero. `fd` and `ncfd` alone solve problems that have one; the others
-  /// refuse it.
+  /// R ⪰ 0, r × r; empty: zero. Methods that do not solve problems with one refuse it
+  /// (`FactorRecovery::takes_background`).
   std::vector<double> background{};
 };
 
@@ -101,6 +101,8 @@ class CAIRN_API FactorRecovery : public Interruptible {
   /// Throws `Error` (usage) if the method cannot solve such a problem, (numerical) if the factors
   /// do not determine all r coordinates.
   virtual RecoveryResult recover(const RecoveryProblem& problem) = 0;
+  /// Whether it solves problems that have a `RecoveryProblem::background`.
+  virtual bool takes_background() const { return false; }
   /// Record `RecoveryResult::trace` from now on.
   virtual void trace(bool on) { (void)on; }
 };

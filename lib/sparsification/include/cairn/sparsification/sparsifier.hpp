@@ -24,7 +24,7 @@ struct SparsificationRecord {
   std::vector<Id> blanket;                   ///< the nodes that stay
   std::vector<std::vector<double>> states;   ///< of the blanket, where it was linearised
   std::string variable_type, factor_type;    ///< tags
-  const DenseBlanket* dense = nullptr;       ///< good during the call
+  const DenseBlanket* dense = nullptr;       ///< of the blanket by itself; good during the call
   const RecoveryResult* recovery = nullptr;  ///< likewise; null: nothing had to be recovered
   int factors_before = 0;                    ///< that leave
   int factors_after = 0;                     ///< that come
@@ -35,6 +35,7 @@ using SparsificationObserver = std::function<void(const SparsificationRecord&)>;
 struct SparsificationSeconds {
   double total = 0.0;
   double marginalize = 0.0;  ///< cropping, solving and marginalising the local problem
+  double covariance = 0.0;   ///< of blankets in the whole graph, where factors are fitted to it
   double topology = 0.0;
   double recovery = 0.0;
 
@@ -63,7 +64,12 @@ struct Sparsification {
   int problems = 0;           ///< blankets that got factors
   double mean_blanket = 0.0;  ///< nodes of a blanket, on average
   int largest_blanket = 0;
-  double kld = 0.0;                       ///< sum over the problems, each by itself [nats]
+  /// Sum of `RecoveryResult::kld` over the problems [nats]. Each is that of the factors that were
+  /// added, from Λ of the blanket by itself; of `sparsify`, also where they have been scaled
+  /// (`fit=scaled`). Where they were fitted within the whole graph (`fit=graph`), it is what
+  /// replacing the blanket's factors costs the whole, Λ̆ + R from Λ + R, R being what the rest of
+  /// the graph knows of the blanket.
+  double kld = 0.0;
   int not_converged = 0;                  ///< recoveries that ended before
   std::vector<SparsificationNote> notes;  ///< each text once
   SparsificationSeconds seconds;

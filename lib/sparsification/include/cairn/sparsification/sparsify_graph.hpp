@@ -51,7 +51,7 @@ struct SparsifyJob {
 };
 
 /// Where the sparsifier's topology is a tree and its options name no factor recovery: the closed
-/// form, which is exact there.
+/// form, which is exact there; not with fit=graph, where factors are not alone.
 CAIRN_API void choose_recovery(ComponentSpec& sparsifier);
 
 struct SparsifyResult {
