@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 import gc
+import signal
 import subprocess
 import sys
 import threading
@@ -353,6 +354,39 @@ def test_a_check_finds_an_angle_that_is_not_wrapped(name):
     # Differences of coordinates of 5e6 have rounding errors of 1e-9.
     deviation = 1e-4 if name == "bearing, far away" else 1e-6
     assert direction(error, wrapped=True, variables=variables).check(states, measured) < deviation
+
+
+@pytest.mark.parametrize("by_signal", [False, True])
+@pytest.mark.parametrize("at", [1, 500, 8000])
+def test_ctrl_c_ends_a_check(at, by_signal):
+    calls = 0
+
+    def residual(a, b, measured):
+        nonlocal calls
+        calls += 1
+        if calls == at:
+            if not by_signal:
+                raise KeyboardInterrupt
+            signal.raise_signal(signal.SIGINT)
+        return b - a - measured
+
+    type = cairn.FactorType("OFFSET", [cairn.Point2] * 2, residual, residual_size=2, measurement_size=2)
+    handler = signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background ignores it
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            type.check([[0, 0], [1, 1]], [1, 1])
+    finally:
+        signal.signal(signal.SIGINT, handler)
+    assert calls == at
+
+
+def test_what_is_no_exception_passes_through_a_check():
+    def residual(a, b, measured):
+        raise SystemExit(7)
+
+    type = cairn.FactorType("OFFSET", [cairn.Point2] * 2, residual, residual_size=2, measurement_size=2)
+    with pytest.raises(SystemExit):
+        type.check([[0, 0], [1, 1]], [1, 1])
 
 
 def test_a_check_accepts_what_jumps_otherwise_and_what_is_not_defined_everywhere():

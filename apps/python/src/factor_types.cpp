@@ -80,6 +80,7 @@ double largest_deviation(const PythonFactor& factor, const py::sequence& states,
     throw Error(ErrorCode::usage, fmt::format("measurement: {} numbers, expected {}",
                                               measured.size(), factor.measurement_size()));
   }
+  const InterruptsPass pass;
   if (const auto angle = find_unwrapped_angle(factor, types, x, span_of(measured))) {
     throw Error(
         ErrorCode::plugin,
@@ -109,7 +110,8 @@ states: a state for each variable. measurement: measurement_size numbers.
 
 Raises Error where an error jumps by a full turn elsewhere than at ±pi, as an angle does that is not wrapped: while each
 variable moves, from these states and from others around them, also with other measurements. Where residual raises there,
-it is left out. Calls residual some 2000 times for each degree of freedom.)")
+it is left out; Ctrl-C ends the check with KeyboardInterrupt. Calls residual some 2000 times for each degree of
+freedom.)")
       .def("__repr__", [](const PythonFactor& factor) {
         return fmt::format("<cairn.FactorType {}>", factor.tag());
       });

@@ -43,7 +43,17 @@ std::string text_of(const py::error_already_set& error) {
              innermost.attr("tb_lineno").cast<int>());
 }
 
+thread_local bool interrupts_pass = false;
+
+bool passes(const py::error_already_set& error) {
+  return interrupts_pass && !error.matches(PyExc_Exception);
+}
+
 }  // namespace
+
+InterruptsPass::InterruptsPass() : before_(std::exchange(interrupts_pass, true)) {}
+
+InterruptsPass::~InterruptsPass() { interrupts_pass = before_; }
 
 PythonFactor::PythonFactor(Description description, py::object residual, py::object jacobians)
     : BatchedFactorType(std::move(description)),
@@ -78,10 +88,11 @@ py::object PythonFactor::call(const py::object& function, std::size_t count,
       return function(*arguments);
     } catch (const py::error_already_set& error) {
       // Ctrl-C ends the optimisation, with its best estimate, after what is being computed.
-      if (!error.matches(PyExc_KeyboardInterrupt) || !interrupted()) throw;
+      if (passes(error) || !error.matches(PyExc_KeyboardInterrupt) || !interrupted()) throw;
     }
     return function(*arguments);
   } catch (const py::error_already_set& error) {
+    if (passes(error)) throw;
     throw Error(ErrorCode::plugin,
                 fmt::format("factor '{}', written in Python: {}", tag(), text_of(error)));
   }

@@ -44,6 +44,20 @@ class PythonFactor final : public BatchedFactorType {
   py::object residual_, jacobians_;
 };
 
+/// While one exists, what a factor's function raises that is no Exception, as Ctrl-C does
+/// (KeyboardInterrupt), passes through this thread's calls as it is. An optimisation obeys Ctrl-C
+/// otherwise (`InterruptGuard`), and keeps its best estimate.
+class InterruptsPass {
+ public:
+  InterruptsPass();
+  InterruptsPass(const InterruptsPass&) = delete;
+  InterruptsPass& operator=(const InterruptsPass&) = delete;
+  ~InterruptsPass();
+
+ private:
+  bool before_;
+};
+
 /// The factor type that a Python object is, or null if it is none.
 std::shared_ptr<PythonFactor> python_factor(const py::object& type);
 

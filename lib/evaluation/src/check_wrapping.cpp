@@ -12,12 +12,13 @@
 
 #include "cairn/io/random_numbers.hpp"
 #include "cairn/runtime/error.hpp"
+#include "moved_factor.hpp"
 
 namespace cairn {
 namespace {
 
 constexpr double kTurn = 2.0 * std::numbers::pi;
-constexpr double kSame = 1e-6;      // two states, or an angle and 2π [rad]
+constexpr double kSame = 1e-6;      // an angle and 2π [rad]
 constexpr double kUnlikePi = 1e-3;  // of what is beside a jump [rad]
 constexpr int kSteps = 180;         // along a turn or a line
 constexpr int kHalvings = 50;       // until a step has only the jump in it
@@ -39,61 +40,6 @@ std::optional<AngleJump> jump_within(const ErrorsAlong& errors, double low, doub
   if (!by_a_turn || std::abs(above + below) < kUnlikePi) return std::nullopt;
   return AngleJump{.row = row, .before = below, .after = above, .moved = low, .of_a_turn = false};
 }
-
-/// A factor at some states, one of whose variables is moved.
-class MovedVariable {
- public:
-  using States = std::vector<std::vector<double>>;
-
-  MovedVariable(const FactorType& type, std::span<const VariableType* const> variables,
-                const States& states, const std::vector<double>& measurement, int variable,
-                int direction)
-      : type_(type),
-        moving_(*variables[static_cast<std::size_t>(variable)]),
-        from_(states[static_cast<std::size_t>(variable)]),
-        measurement_(measurement),
-        direction_(static_cast<std::size_t>(direction)) {
-    for (int row = 0; row < type.residual_size(); ++row) {
-      identity_.push_back(1.0);
-      identity_.insert(identity_.end(), std::size_t(type.residual_size() - row - 1), 0.0);
-    }
-    moved_.resize(from_.size());
-    for (const std::vector<double>& state : states) x_.push_back(state.data());
-    x_[static_cast<std::size_t>(variable)] = moved_.data();
-  }
-
-  std::vector<double> errors(double t) {
-    move(t);
-    std::vector<double> r(std::size_t(type_.residual_size()));
-    type_.evaluate(x_.data(), measurement_.data(), identity_.data(), r.data(), nullptr);
-    return r;
-  }
-  /// Whether the variable is back after a full turn, and only then: headings and rotations.
-  bool turns() { return distance(kTurn) < kSame && distance(0.5 * kTurn) > 1.0; }
-
- private:
-  void move(double t) {
-    std::vector<double> step(std::size_t(moving_.tangent_size()));
-    step[direction_] = t;
-    const std::int64_t offset = 0;
-    moving_.retract(1, from_.data(), &offset, step.data(), moved_.data());
-  }
-  double distance(double t) {
-    move(t);
-    std::vector<double> step(std::size_t(moving_.tangent_size()));
-    moving_.local(1, from_.data(), moved_.data(), step.data());
-    double squares = 0.0;
-    for (const double s : step) squares += s * s;
-    return std::sqrt(squares);
-  }
-
-  const FactorType& type_;
-  const VariableType& moving_;
-  const std::vector<double>&from_, &measurement_;
-  std::size_t direction_;
-  std::vector<double> identity_, moved_;
-  std::vector<const double*> x_;
-};
 
 }  // namespace
 
@@ -122,7 +68,7 @@ std::optional<UnwrappedAngle> find_unwrapped_angle(const FactorType& type,
                                                    std::span<const VariableType* const> variables,
                                                    std::span<const double* const> x,
                                                    std::span<const double> measurement) {
-  MovedVariable::States given;
+  std::vector<std::vector<double>> given;
   double reach = kReach;
   for (std::size_t v = 0; v < variables.size(); ++v) {
     given.emplace_back(x[v], x[v] + variables[v]->ambient_size());
@@ -130,7 +76,7 @@ std::optional<UnwrappedAngle> find_unwrapped_angle(const FactorType& type,
   }
   RandomNumbers random(RandomNumbers::mixed(1));
   for (int start = 0; start < kStarts; ++start) {
-    MovedVariable::States states = given;
+    std::vector<std::vector<double>> states = given;
     std::vector<double> z(measurement.begin(), measurement.end());
     for (std::size_t v = 0; start > 0 && v < variables.size(); ++v) {
       std::vector<double> step(std::size_t(variables[v]->tangent_size()));
@@ -142,14 +88,16 @@ std::optional<UnwrappedAngle> find_unwrapped_angle(const FactorType& type,
       for (double& number : z) number += random.uniform(-kMeasured, kMeasured);
       if (!type.normalize(z.data()).empty()) continue;
     }
-    for (int v = 0; v < type.arity(); ++v) {
-      for (int k = 0; k < variables[static_cast<std::size_t>(v)]->tangent_size(); ++k) {
+    std::vector<const double*> from;
+    for (const std::vector<double>& state : states) from.push_back(state.data());
+    MovedFactor factor(type, variables, std::move(from), z);
+    for (std::size_t v = 0; v < factor.variables(); ++v) {
+      for (int k = 0; k < factor.directions(v); ++k) {
         try {
-          MovedVariable moved(type, variables, states, z, v, k);
-          const bool turn = moved.turns();
-          const auto jump = find_angle_jump([&](double t) { return moved.errors(t); },
+          const bool turn = factor.turns(v, k);
+          const auto jump = find_angle_jump([&](double t) { return factor.error(v, k, t); },
                                             turn ? 0.0 : -reach, turn ? kTurn : reach, turn);
-          if (jump) return UnwrappedAngle{v, k, *jump};
+          if (jump) return UnwrappedAngle{static_cast<int>(v), k, *jump};
         } catch (const Error&) {  // it is not defined there
         }
       }

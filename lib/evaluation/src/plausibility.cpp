@@ -9,6 +9,8 @@
 #include <fmt/format.h>
 
 #include "cairn/evaluation/check_factor.hpp"
+#include "cairn/runtime/error.hpp"
+#include "cairn/runtime/plugin_call.hpp"
 #include "unwrapped_angle.hpp"
 
 namespace cairn {
@@ -60,10 +62,12 @@ FactorCheck check(const Graph& graph, int position) {
   const double rounding = std::numeric_limits<double>::epsilon() * largest;
   const double step = std::max(kStep, 100.0 * rounding / kLargestDeviation);
   if (!(step <= kLargestStep)) return {.largest_deviation = std::nan("")};
+  const FactorType& type = graph.factor_type(position);
   try {
-    return check_factor(graph.factor_type(position), types, states, graph.measurement(position), {},
-                        step);
-  } catch (...) {  // beside the states it may not be defined
+    return call_plugin(
+        [&] { return fmt::format("factor '{}'", type.tag()); },
+        [&] { return check_factor(type, types, states, graph.measurement(position), {}, step); });
+  } catch (const Error&) {  // beside the states it may not be defined
     return {.largest_deviation = std::nan("")};
   }
 }

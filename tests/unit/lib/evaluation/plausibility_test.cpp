@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <new>
 #include <span>
 #include <stdexcept>
 #include <tuple>
@@ -54,6 +55,18 @@ struct Partial {
     if (x[0] >= S(1.0)) throw std::domain_error("beyond");
     using std::log;
     return Vector<S, 1>(log(x[0]) - z[0]);
+  }
+};
+
+/// Far from what it measures, and without memory where the pose has turned.
+struct Exhausted {
+  static constexpr std::string_view kTag = "EXHAUSTED";
+  static constexpr int kResidual = 1, kMeasurement = 1;
+  using Variables = std::tuple<Se2>;
+  template <class S>
+  static Vector<S, 1> residual(const Vector<S, 3>& x, const Vector<double, 1>& z) {
+    if (x[2] > S(0.1 + 1e-5)) throw std::bad_alloc();
+    return Vector<S, 1>(x[0] - 1e4 - z[0]);
   }
 };
 
@@ -110,6 +123,20 @@ TEST(WrongJacobians, LeaveOutFactorsThatThrowBesideTheStates) {
   Graph graph;
   add_one_pose<Partial>(graph, 1, 1.0 - 1e-5);
   EXPECT_THAT(wrong_jacobians(graph), IsEmpty());
+}
+
+// What makes others leave a factor out must not hide that there is no memory.
+TEST(ReasonsForDoubt, DoNotHideThatThereIsNoMemory) {
+  Graph graph;
+  for (const Id id : {1, 2, 3, 4}) add_one_pose<Exhausted>(graph, id, 0.3);
+  EXPECT_THROW(wrong_jacobians(graph), std::bad_alloc);
+  for (int more = 0; more < 9; ++more) {
+    const double z[] = {0.25}, unit[] = {1.0};
+    const int pose[] = {0};
+    graph.add_factor(graph.factor(0).type, pose, z, unit);
+  }
+  for (int v = 1; v < 4; ++v) graph.set_fixed(v, true);
+  EXPECT_THROW(implausible_estimate(graph, chi2(graph)), std::bad_alloc);
 }
 
 /// Of weight 1 within one standard deviation, and none beyond.
