@@ -30,6 +30,8 @@ constexpr int kMostEmptyDecisions = 3;
 constexpr int kMostCollisions = 10;
 /// The known floor must grow by this factor to be progress.
 constexpr double kProgress = 1.002;
+/// Decisions without progress before a run is stuck: on a large floor one way alone may be long.
+constexpr int kIdleDecisions = 5;
 
 /// Whether a body can still go along what is left of a path, which may begin too near to an
 /// obstacle.
@@ -212,7 +214,8 @@ class Run {
 
   void check_progress() {
     const ExplorationLimits& limits = parts_.limits;
-    if (result_.steps.back().distance - useful_distance_ > limits.idle_distance) {
+    if (result_.steps.back().distance - useful_distance_ > limits.idle_distance &&
+        decisions_ - useful_decision_ >= kIdleDecisions) {
       end(ExplorationEnd::stuck,
           fmt::format("{:g} m were driven without finding more floor", limits.idle_distance));
     } else if (collisions_in_row_ >= kMostCollisions) {
@@ -343,6 +346,7 @@ class Run {
     // A map that is made anew, blurred a little more or less, is no progress.
     if (step.coverage <= kProgress * most_coverage_) return;
     useful_distance_ = step.distance;
+    useful_decision_ = decisions_;
     most_coverage_ = step.coverage;
   }
 
@@ -387,7 +391,7 @@ class Run {
   std::optional<Pose2> first_truth_;  // of the poses of which it is known
   bool ended_ = false, backing_off_ = false;
   int not_driven_ = 0;  // paths
-  int decisions_ = 0, empty_decisions_ = 0, idle_ = 0, collisions_in_row_ = 0;
+  int decisions_ = 0, useful_decision_ = 0, empty_decisions_ = 0, idle_ = 0, collisions_in_row_ = 0;
   double most_coverage_ = 0.0, useful_distance_ = 0.0;
 };
 

@@ -223,6 +223,17 @@ TEST(Exploration, ARunWithoutProgressIsStuckAndSaysWhy) {
     EXPECT_THAT(result.why, HasSubstr("50 m were driven"));
     EXPECT_LT(result.steps.back().distance, 60.0);
   }
+  {
+    // Not on one long way, but in five decisions.
+    ExplorationParts parts(kExactRobot);
+    parts.explorer = std::make_unique<Pendulum>();
+    Exploration exploration = parts.on(floor);
+    exploration.limits.idle_distance = 0.5;
+    const ExplorationResult result = run_exploration(exploration);
+    EXPECT_EQ(result.end, ExplorationEnd::stuck);
+    EXPECT_GE(result.steps.back().decision, 5);
+    EXPECT_LT(result.steps.back().distance, 20.0);
+  }
   ExplorationParts parts(kExactRobot);
   parts.explorer = std::make_unique<Idler>();
   const ExplorationResult result = run_exploration(parts.on(floor));
