@@ -86,6 +86,29 @@ std::vector<int> anchors(const Graph& q, const Gauge& gauge, const Partners& at)
   return all;
 }
 
+/// Poses of `q` that no factor is left on, where `p` has no more than them of a component whose
+/// gauge is free: neither graph says where they are, so they are constant in both.
+std::vector<int> lone_anchors(const Graph& p, const Graph& q, const Gauge& gauge,
+                              const Partners& at) {
+  std::vector<int> alone;
+  for (const int v : gauge.unconstrained) {
+    if (at[v] >= 0 && !q.fixed(v) && q.type(v).lie_group()) alone.push_back(v);
+  }
+  if (alone.empty()) return alone;
+  const Gauge of_p = resolve_gauge(p);
+  std::vector<int> compared(of_p.components, 0);  // by component of p
+  for (const int v : at) {
+    if (v >= 0) ++compared[of_p.component[v]];
+  }
+  std::vector<bool> is_free(of_p.components, false);
+  for (const int v : of_p.anchored) is_free[of_p.component[v]] = true;
+  std::erase_if(alone, [&](int v) {
+    const int component = of_p.component[at[v]];
+    return !is_free[component] || compared[component] > 1;
+  });
+  return alone;
+}
+
 /// Moves each component of q whose gauge is free, and which is poses of one kind, so that its
 /// anchor is where it is in p: how the whole is placed is no difference of the graphs.
 void place_anchors(const Graph& p, const Partners& at, const std::vector<int>& component,
@@ -223,7 +246,9 @@ void check_constant(const Graph& p, const Graph& q, const Partners& at) {
 Comparison comparison(const Graph& p, const Graph& q, Partners partners, ComparedAt compared) {
   Comparison c{p.clone(), q.clone(), std::move(partners), {}, {}, {}};
   const Gauge gauge = resolve_gauge(q);
-  const std::vector<int> anchored = anchors(q, gauge, c.at);
+  std::vector<int> anchored = anchors(q, gauge, c.at);
+  const std::vector<int> alone = lone_anchors(p, q, gauge, c.at);
+  anchored.insert(anchored.end(), alone.begin(), alone.end());
   place_anchors(p, c.at, gauge.component, anchored, c.q);
   for (const int v : anchored) {
     c.q.set_fixed(v);

@@ -362,7 +362,7 @@ class OnlineRun {
     try {
       result_.rmse_full = sparsification_error(full, result_.sparse, *parts_.solver).rmse;
     } catch (const Error& error) {
-      if (error.code() != ErrorCode::numerical) throw;
+      if (error.code() != ErrorCode::numerical && error.code() != ErrorCode::input) throw;
       result_.rmse_full = std::nan("");
     }
   }

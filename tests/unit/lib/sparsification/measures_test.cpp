@@ -172,6 +172,33 @@ TEST_F(MarginalDivergence, WhereAWholeGraphLiesIsNoDivergence) {
     EXPECT_NEAR(divergence(p, moved, some, at).kld, 0.0, 1e-6);
 }
 
+/// Two chains of poses that nothing connects.
+Graph two_chains(Registry& registry) {
+  Graph graph;
+  for (int k = 0; k < 8; ++k) {
+    graph.add_variable(registry.variable_type("VERTEX_SE2"), k, std::array{double(k), 0.0, 0.0});
+    if (k % 4 == 0) continue;
+    graph.add_factor(registry.factor_type("EDGE_SE2"), std::array{k - 1, k},
+                     std::array{1.0, 0.0, 0.0}, std::array{50.0, 3.0, 1.0, 80.0, 2.0, 200.0});
+  }
+  return graph;
+}
+
+TEST_F(MarginalDivergence, ThatOfAPoseWhichIsAllThatIsLeftOfItsComponentIsNone) {
+  const Graph original = two_chains(registry_);
+  Graph sparse;
+  for (const int v : {0, 1, 6}) sparse.add_variable(original.type_of(v), v, original.state(v));
+  const Factor first = original.factor(0);
+  sparse.add_factor(first.type, std::array{0, 1}, first.measurement, first.information);
+  EXPECT_NEAR(sparsification_error(original, sparse, *solver_).kld, 0.0, 1e-9);
+  EXPECT_NEAR(conservative_margin(original, sparse, *solver_), 0.0, 1e-9);
+  EXPECT_NEAR(divergence(original, sparse, {0, 1, 6}).kld, 0.0, 1e-9);
+  // Of two poses, how they lie to each other is lost.
+  sparse.add_variable(original.type_of(7), 7, original.state(7));
+  expect_refusal([&] { sparsification_error(original, sparse, *solver_); },
+                 "constant in one of the graphs and free in the other");
+}
+
 TEST_F(MarginalDivergence, SaysWhatCannotBeCompared) {
   const Graph original = optimized("manhattan:poses=60"), sparse = thinned(original, 1);
   expect_refusal([&] { divergence(original, sparse, {0, 1}); }, "1 is not in the second graph");

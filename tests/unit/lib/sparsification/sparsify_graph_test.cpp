@@ -200,6 +200,29 @@ TEST_F(SparsifyGraph, OnlineAChainKeepsAllItsInformation) {
   EXPECT_NEAR(result.rmse_full, 0.0, 1e-8);
 }
 
+/// Nothing connects the second chain, and in the end one pose or a few are left of it.
+TEST_F(SparsifyGraph, OnlineWhatCannotBeComparedCostsTheMeasureAlone) {
+  Graph graph = chain(12), both;
+  for (int v = 0; v < 12; ++v) {
+    const auto x = graph.state(v);
+    both.add_variable(graph.type_of(v), v < 6 ? v : 100 + v, x);
+  }
+  for (int f = 0; f < graph.factor_count(); ++f) {
+    const Factor factor = graph.factor(f);
+    if (f == 5) continue;  // from one chain to the other
+    both.add_factor(factor.type, std::array{f, f + 1}, factor.measurement, factor.information);
+  }
+  for (const char* selection : {"oldest:part=0.5", "keep_every:every=2"}) {
+    for (const int every : {1, 2, 3, 4}) {
+      SparsifyJob online = job(selection);
+      online.online = every;
+      const SparsifyResult result = sparsify_online(both, online, setting_);
+      EXPECT_TRUE(result.sparse.find(111).has_value()) << selection << " " << every;
+      EXPECT_TRUE(result.error.has_value() || !result.notes.empty()) << selection << " " << every;
+    }
+  }
+}
+
 TEST_F(SparsifyGraph, OnlineNewFactorsHaveNoLoss) {
   CAIRN_NEEDS("loss", "cauchy");
   setting_.loss = std::shared_ptr<const Loss>(registry_.make<Loss>("cauchy"));
