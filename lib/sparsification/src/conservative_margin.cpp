@@ -30,6 +30,15 @@ constexpr int kLanczosSteps = 300;
 /// Of the residual, as a part of the eigenvalue: where the iteration ends, and after the last step.
 constexpr double kAccuracy = 1e-9, kAcceptable = 1e-3;
 
+/// The exponent of the power of two nearest to the largest diagonal entry of a graph's H.
+int exponent_of(const Vector& diagonal) {
+  constexpr int kLargest = 1000;  // a power of two and its inverse are numbers
+  const double largest = diagonal.size() > 0 ? diagonal.maxCoeff() : 0.0;
+  return largest > 0.0 && std::isfinite(largest)
+             ? std::clamp(std::ilogb(largest), -kLargest, kLargest)
+             : 0;
+}
+
 /// H of a graph at its states.
 struct LinearizedAt {
   explicit LinearizedAt(const Graph& graph)
@@ -44,7 +53,8 @@ struct LinearizedAt {
 /// M = H − Λ̆ of the original graph's H, with Λ̆ in the rows of the nodes that are kept. Its Schur
 /// complement on these is Λ − Λ̆, so (M + sE)⁻¹ has (Λ − Λ̆ + sI)⁻¹ in it, E being the identity on
 /// the kept nodes. Where the others are determined, M + sE is positive definite if and only if Λ −
-/// Λ̆ + sI is.
+/// Λ̆ + sI is. All is divided by a power of two near the largest entry of H, which costs no digit:
+/// of an inverse near 1e200 the squares would be no numbers.
 class Difference {
  public:
   Difference(const Graph& p, const Graph& q, const std::vector<int>& at) {
@@ -60,11 +70,14 @@ class Difference {
                [&](int r, int c, std::int64_t) { entries.emplace_back(partner[r], partner[c]); });
     structure_ = BlockStructure({of_p.sizes().begin(), of_p.sizes().end()}, std::move(entries));
     M_ = BlockMatrix(structure_);
-    for_blocks(of_p, [&](int r, int c, std::int64_t k) { add(1.0, original.H, k, r, c, r, c); });
     diagonal_.resize(structure_.size());
+    original.H.diagonal({diagonal_.data(), static_cast<std::size_t>(diagonal_.size())});
+    exponent_ = exponent_of(diagonal_);
+    const double unit = std::ldexp(1.0, -exponent_);
+    for_blocks(of_p, [&](int r, int c, std::int64_t k) { add(unit, original.H, k, r, c, r, c); });
     M_.diagonal({diagonal_.data(), static_cast<std::size_t>(diagonal_.size())});
     for_blocks(of_q, [&](int r, int c, std::int64_t k) {
-      add(-1.0, sparse.H, k, r, c, partner[r], partner[c]);
+      add(-unit, sparse.H, k, r, c, partner[r], partner[c]);
     });
     for (const std::int32_t block : partner) {
       for (auto k = structure_.offsets()[block]; k < structure_.offsets()[block + 1]; ++k)
@@ -76,8 +89,9 @@ class Difference {
   const std::vector<Eigen::Index>& kept() const { return kept_; }
   Eigen::Index size() const { return structure_.size(); }
   const BlockStructure& structure() const { return structure_; }
-  /// Largest diagonal entry of H.
+  /// Largest diagonal entry of H, in units of 2^exponent.
   double scale() const { return diagonal_.maxCoeff(); }
+  int exponent() const { return exponent_; }
   BlockMatrix shifted(double s) const {
     BlockMatrix shifted = M_;
     Vector diagonal(size());
@@ -96,23 +110,24 @@ class Difference {
         visit(structure.rows()[k], c, k);
     }
   }
-  /// Adds entry k of H, which is at (r, c) there, at (row, column).
-  void add(double sign, const BlockMatrix& H, std::int64_t k, int r, int c, std::int32_t row,
+  /// Adds a multiple of entry k of H, which is at (r, c) there, at (row, column).
+  void add(double factor, const BlockMatrix& H, std::int64_t k, int r, int c, std::int32_t row,
            std::int32_t column) {
     const ConstBlock value(H.block(k), H.structure().block_size(r), H.structure().block_size(c));
     Block to(M_.block(structure_.find(std::max(row, column), std::min(row, column))),
              structure_.block_size(std::max(row, column)),
              structure_.block_size(std::min(row, column)));
     if (row >= column) {
-      to += sign * value;
+      to += factor * value;
     } else {
-      to += sign * value.transpose();
+      to += factor * value.transpose();
     }
   }
 
   BlockStructure structure_;
   BlockMatrix M_;
   Vector diagonal_;
+  int exponent_ = 0;
   std::vector<Eigen::Index> kept_;
 };
 
@@ -131,6 +146,9 @@ double largest_eigenvalue(Eigen::Index n, const std::function<Vector(const Vecto
     w -= diagonal.back() * v;
     if (k > 1) w -= beside.back() * before;
     const double next = w.norm();
+    // Eigen's iteration would not end.
+    if (!std::isfinite(next) || !std::isfinite(diagonal.back()))
+      throw Error(ErrorCode::numerical, "Lanczos' method met a number that is not finite");
     const bool last = k == kLanczosSteps || next == 0.0;
     if (last || k == n || k % 10 == 0) {
       Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> ritz;
@@ -173,7 +191,7 @@ double least_eigenvalue_of_difference(const Graph& p, const Graph& q, const std:
     solver.solve(view, view);
     return Vector(x(kept));
   });
-  return 1.0 / largest - s;
+  return std::ldexp(1.0 / largest - s, difference.exponent());
 }
 
 }  // namespace cairn

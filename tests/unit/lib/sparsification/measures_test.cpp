@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <functional>
 #include <memory>
 #include <string>
@@ -280,6 +281,34 @@ TEST_F(MarginalDivergence, OverconfidenceIsTheLeastEigenvalueOfTheDifference) {
         EXPECT_LT(found, -1e-3 * size);
       }
     }
+  }
+}
+
+/// The same graph with all of its information times `scale`.
+Graph scaled(const Graph& graph, double scale) {
+  Graph result;
+  for (int v = 0; v < graph.variable_count(); ++v)
+    result.add_variable(graph.type_of(v), graph.id(v), graph.state(v));
+  for (int f = 0; f < graph.factor_count(); ++f) {
+    Factor factor = graph.factor(f);
+    for (double& entry : factor.information) entry *= scale;
+    std::vector<int> on;
+    for (const Id id : factor.variables) on.push_back(*graph.find(id));
+    result.add_factor(factor.type, on, factor.measurement, factor.information);
+  }
+  return result;
+}
+
+// The inverse of an information of 1e-200 is a number, and its square is none.
+TEST_F(MarginalDivergence, OverconfidenceScalesWithTheInformation) {
+  const Graph original = optimized("manhattan:poses=60"), sparse = thinned(original, 1);
+  const double margin = conservative_margin(original, sparse, *solver_);
+  for (const int exponent : {-960, -700, -20, 20, 700}) {
+    const double scale = std::ldexp(1.0, exponent);
+    EXPECT_NEAR(
+        conservative_margin(scaled(original, scale), scaled(sparse, scale), *solver_) / scale,
+        margin, 1e-6 * std::abs(margin))
+        << exponent;
   }
 }
 
