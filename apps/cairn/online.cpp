@@ -356,6 +356,14 @@ void write_map(const Graph& graph, const std::string& file, Session& session) {
   }
 }
 
+/// Of a map without variables.
+std::string why_empty(const Conversation::Counts& counts, const LineSession& lines) {
+  if (counts.lines == 0 && counts.restored == 0) return "nothing was sent";
+  const std::string waiting = lines.waiting();
+  return fmt::format("nothing was estimated, since {}",
+                     waiting.empty() ? "no variable came, or all were removed" : waiting);
+}
+
 int run(OnlineOptions options, Session& session) {
   check(options, session);
   session.use_threads();
@@ -401,8 +409,12 @@ int run(OnlineOptions options, Session& session) {
   }
   try {
     const bool nothing_came = server && lines.variable_count() == 0;
-    if (nothing_came && !options.output.empty())
-      session.note(fmt::format("nothing was sent: {} is not written", options.output));
+    if (nothing_came && !options.output.empty()) {
+      session.note(fmt::format("{}: {} is not written", why_empty(conversation.counts(), lines),
+                               options.output));
+    } else if (const std::string waiting = lines.waiting(); !waiting.empty()) {
+      session.note(waiting + ": not in the estimate");
+    }
     if (!options.output.empty() && !nothing_came) {
       const Graph graph = lines.estimator().graph();
       write_map(graph, options.output, session);

@@ -268,6 +268,22 @@ TEST_F(OnlineService, StopsWithoutAMapWhereNothingCame) {
   EXPECT_THAT(folder_.contents(), IsEmpty());
 }
 
+TEST_F(OnlineService, SaysWhyNothingWasEstimatedOfWhatCame) {
+  Partner process({"online", "--listen", socket(), "-o", folder_.file("map.g2o")});
+  SocketClient robot(socket());
+  for (int k = 0; k < 121; ++k) robot.tell(fmt::format("VERTEX_SE2 {} {} 0 0", k, k));
+  EXPECT_THAT(robot.ask("CHI2"), ElementsAre(StartsWith("NOTE 121 variables wait "),
+                                             StartsWith("CHI2"), StartsWith("OK 122 ")));
+  process.send_signal(SIGTERM);
+  const Outcome outcome = process.end();
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_THAT(outcome.err,
+              HasSubstr("nothing was estimated, since 121 variables wait for a measurement, the "
+                        "first of them VERTEX_SE2 0: " +
+                        folder_.file("map.g2o") + " is not written"));
+  EXPECT_THAT(folder_.contents(), IsEmpty());
+}
+
 TEST_F(OnlineService, RefusesASocketThatIsInUse) {
   const Partner process(service());
   SocketClient robot(socket());

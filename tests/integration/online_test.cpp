@@ -281,6 +281,18 @@ TEST_F(Online, EndsWithQuitOrTheInputAndCounts) {
   EXPECT_THAT(read_text(folder_.file("last.g2o")), HasSubstr("EDGE_SE2 0 1 "));
 }
 
+TEST_F(Online, SaysWhatIsNotInTheMapItWrites) {
+  const std::string map = folder_.file("map.g2o");
+  const Outcome run = cairn({"online", "--estimator", kBatch, "-o", map}, {},
+                            "VERTEX_SE2 0 0 0 0\nFIX 0\nNEW VERTEX_SE2 1\nEDGE_SE2 0 1" + kEdge +
+                                "\nVERTEX_SE2 5 0 0 0\nNEW VERTEX_SE2 6\n");
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_THAT(run.err,
+              HasSubstr("2 variables wait for a measurement, the first of them VERTEX_SE2 5: "
+                        "not in the estimate"));
+  EXPECT_THAT(read_text(map), Not(HasSubstr("VERTEX_SE2 5")));
+}
+
 TEST_F(Online, SensorOffsetsAreRemembered) {
   const Outcome run =
       cairn(online({"--output", "none"}), {},

@@ -5,6 +5,7 @@ import os
 import re
 import shlex
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -76,6 +77,26 @@ def test_the_block_of_the_readme_runs(tmp_path, capsys):
     assert run(SOURCE / "README.md", tmp_path) == 1
     printed = capsys.readouterr().out
     assert printed.count("converged: chi2") == 3 and "ATE" in printed and (tmp_path / "solved.g2o").exists()
+
+
+def test_the_clients_of_the_service_run(tmp_path, capsys):
+    page = (SOURCE / "docs" / "online.md").read_text(encoding="utf-8").replace("/run/cairn/", f"{tmp_path}/")
+    (_, reader), (_, writer) = blocks(page)
+    service = subprocess.Popen([os.environ["CAIRN_PROGRAM"], "online", "--quiet", "--listen", tmp_path / "robot.socket"])
+    try:
+        while not (tmp_path / "robot.socket").exists():
+            assert service.poll() is None
+        follower = subprocess.Popen([sys.executable, "-u", "-c", reader], stdout=subprocess.PIPE, text=True)
+        assert follower.stdout.readline().startswith("FOLLOWS 0 ")
+        exec(compile(writer, "online.md", "exec"), {})
+    finally:
+        service.terminate()
+    assert service.wait() == 0
+    printed = capsys.readouterr().out.splitlines()
+    assert printed[0] == "['VERTEX_SE2', '1', '1', '0', '0.5']" and len(printed) == 4 and printed[3].startswith("['CHI2', ")
+    followed, _ = follower.communicate()
+    assert follower.returncode == 0
+    assert [line for line in followed.splitlines() if line.startswith("UPDATE")] == [f"UPDATE {k}" for k in (4, 6, 8, 9)]
 
 
 def test_a_wrong_block_is_found(tmp_path):

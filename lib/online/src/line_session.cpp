@@ -75,6 +75,7 @@ std::optional<Number> number_of(std::string_view word) {
 
 LineSession::~LineSession() = default;
 void LineSession::finish() {}
+std::string LineSession::waiting() const { return {}; }
 
 LineSession::Reply LineSession::take(std::string_view line, std::int64_t number) {
   line_ = number;

@@ -63,7 +63,7 @@ void OnlineSession::take_data(std::string_view text, Reply& reply) {
   for (Factor& factor : said.factors) take_factor(std::move(factor), reply);
   // Each is held or none: a line is taken in whole.
   for (const Id id : said.held) {
-    if (!std::ranges::any_of(waiting_, [id](const Variable& v) { return v.id == id; })) {
+    if (!find_waiting(id)) {
       throw bad_line(
           fmt::format("FIX {}: only what no measurement and no SOLVE has taken in yet can be held; "
                       "expected FIX "
@@ -76,8 +76,12 @@ void OnlineSession::take_data(std::string_view text, Reply& reply) {
 }
 
 void OnlineSession::take_variable(Variable variable) {
-  const auto same = [&](const Variable& other) { return other.id == variable.id; };
-  if (estimator_.has(variable.id) || std::ranges::any_of(waiting_, same)) {
+  const auto there = std::ranges::find(waiting_, variable.id, &Variable::id);
+  // One that was declared without a state, and whose first measurement does not determine it, gets
+  // its state by a line of its own.
+  const bool gets_state = there != waiting_.end() && there->state.empty() &&
+                          !variable.state.empty() && there->type->tag() == variable.type->tag();
+  if (estimator_.has(variable.id) || (there != waiting_.end() && !gets_state)) {
     throw bad_line(
         fmt::format("{} {}: the id is already in use", variable.type->tag(), variable.id));
   }
@@ -86,7 +90,16 @@ void OnlineSession::take_variable(Variable variable) {
         !problem.empty())
       throw bad_line(fmt::format("{} {}: {}", variable.type->tag(), variable.id, problem));
   }
-  waiting_.push_back(std::move(variable));
+  if (gets_state) {
+    there->state = std::move(variable.state);
+  } else {
+    waiting_.push_back(std::move(variable));
+  }
+}
+
+const Variable* OnlineSession::find_waiting(Id id) const {
+  const auto there = std::ranges::find(waiting_, id, &Variable::id);
+  return there == waiting_.end() ? nullptr : &*there;
 }
 
 void OnlineSession::hold(Id id) {
@@ -211,6 +224,26 @@ void OnlineSession::write_results(const UpdateReport& report, Reply& reply) {
   acknowledge(reply, owed_, !report.ok ? "SINGULAR" : !report.converged ? "UNCONVERGED" : "OK");
 }
 
+std::string OnlineSession::waiting() const {
+  if (waiting_.empty()) return {};
+  const std::string first = fmt::format("{} {}", waiting_.front().type->tag(), waiting_.front().id);
+  if (waiting_.size() == 1) return first + " waits for a measurement";
+  return fmt::format("{} variables wait for a measurement, the first of them {}", waiting_.size(),
+                     first);
+}
+
+void OnlineSession::note_waiting(Reply& reply) const {
+  if (waiting_.empty() || silent()) return;
+  reply.text += fmt::format("NOTE {}: not in the estimate", waiting());
+  if (settings_.automatic) {
+    reply.text += fmt::format(
+        "; until {} one or is removed (REMOVE VARIABLE), lines of data are not solved but by SOLVE "
+        "and FULL",
+        waiting_.size() == 1 ? "it has" : "each has");
+  }
+  reply.text += '\n';
+}
+
 // Commands --------------------------------------------------------------------------------------
 
 void OnlineSession::declare(const Words& words, Reply& reply) {
@@ -231,9 +264,7 @@ void OnlineSession::remove(const Words& words, Reply& reply) {
   GraphUpdate leaving;
   (factors ? leaving.removed_factors : leaving.removed_variables) = ids;
   // What only waits has not reached the estimator.
-  const auto waits = [&](Id id) {
-    return std::ranges::any_of(waiting_, [id](const Variable& v) { return v.id == id; });
-  };
+  const auto waits = [&](Id id) { return find_waiting(id) != nullptr; };
   if (!factors) std::erase_if(leaving.removed_variables, waits);
   update(std::move(leaving), settings_.automatic, false, reply);
   if (!factors) {
@@ -273,6 +304,14 @@ void OnlineSession::marginalize(const Words& words, Reply& reply) {
   const UpdateReport report = update(std::move(leaving), settings_.automatic, false, reply);
   if (silent()) return;
   std::string priors;
+  if (!report.priors.empty() && !std::exchange(noted_unwritable_, true)) {
+    priors += fmt::format(
+        "NOTE what MARGINALIZE leaves is in no format of graphs: SAVE and -o write no graph while "
+        "it is there, only the poses (SAVE poses.tum); SPARSIFY removes variables and leaves "
+        "factors that are written, and REMOVE FACTOR {} takes out what this left, with its "
+        "information\n",
+        fmt::join(report.priors, " "));
+  }
   for (const FactorId prior : report.priors) priors += fmt::format("PRIOR {}\n", prior);
   reply.text = priors + reply.text;
   if (!reply.solved) acknowledge(reply, owed_);
@@ -339,6 +378,7 @@ void OnlineSession::solve(const Words& words, Reply& reply) {
 
 void OnlineSession::solve_fully(const Words& words, Reply& reply) {
   expect_words(words, 1, "FULL");
+  note_waiting(reply);
   solve_now({}, true, reply);
 }
 
@@ -353,6 +393,7 @@ void OnlineSession::report_covariance(const Words& words, Reply& reply) {
 void OnlineSession::report_estimate(const Words& words, Reply& reply) {
   expect_words(words, 2, "ESTIMATE id' or 'ESTIMATE ALL");
   if (words[1] == "ALL") {
+    note_waiting(reply);
     for (const Id id : known_) write_estimate(id, reply.text);
   } else {
     write_estimate(parse_whole(words[1], "id"), reply.text);
@@ -362,7 +403,9 @@ void OnlineSession::report_estimate(const Words& words, Reply& reply) {
 
 void OnlineSession::report_chi2(const Words& words, Reply& reply) {
   expect_words(words, 1, "CHI2");
-  reply.text += chi2_line(estimator_);
+  const std::string chi2 = chi2_line(estimator_);
+  note_waiting(reply);
+  reply.text += chi2;
   acknowledge(reply, owed_);
 }
 
@@ -384,12 +427,14 @@ void OnlineSession::quit(const Words& words, Reply& reply) {
 const VariableType& OnlineSession::type_of(Id id) const {
   const auto there = types_.find(id);
   if (there == types_.end())
-    throw bad_line(fmt::format("there is no variable {} in the estimate", id));
+    throw bad_line(fmt::format("there is no variable {} in the estimate{}", id,
+                               find_waiting(id) ? ": it waits for a measurement" : ""));
   return *there->second;
 }
 
 void OnlineSession::write_estimate(Id id, std::string& text) const {
-  text += estimate_line(type_of(id), id, estimator_.state(id));
+  const VariableType& type = type_of(id);  // first: its message says more
+  text += estimate_line(type, id, estimator_.state(id));
 }
 
 bool OnlineSession::write_covariance(Id a, Id b, std::string& text) {

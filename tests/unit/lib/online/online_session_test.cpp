@@ -158,11 +158,62 @@ TEST_F(OnlineSessionTest, ChangesRemovesAndMarginalizes) {
   take_all({"NEW VERTEX_SE2 2", "EDGE_SE2 1 2" + kStep});
   take("CHANGE 0 2 0 0 25 0 0 25 0 25");
   EXPECT_THAT(take("ESTIMATE 1").text, StartsWith("VERTEX_SE2 1 2 "));
-  EXPECT_THAT(take("MARGINALIZE 0 1").text, StartsWith("PRIOR 2\n"));
+  EXPECT_THAT(take("MARGINALIZE 0 1").text, HasSubstr("\nPRIOR 2\n"));
   EXPECT_EQ(session_->variable_count(), 1);
   EXPECT_THAT(take("ESTIMATE 0").text, HasSubstr("there is no variable 0"));
   take("REMOVE FACTOR 2");
   EXPECT_EQ(session_->factor_count(), 0);
+}
+
+TEST_F(OnlineSessionTest, AVariableThatWaitsWithoutAStateIsGivenOneByItsLine) {
+  const std::string edge = "EDGE_SE2 0 1" + kStep;
+  take_all({"NEW VERTEX_SE2 0", "NEW VERTEX_SE2 1"});
+  EXPECT_THAT(take(edge).text, HasSubstr("VERTEX_SE2 0: has no state, and no factor of the update "
+                                         "determines it; give it a state"));
+  EXPECT_THAT(take("NEW VERTEX_SE2 0").text, HasSubstr("the id is already in use"));
+  EXPECT_THAT(take("VERTEX_XY 0 2 3").text, HasSubstr("the id is already in use"));
+  EXPECT_THAT(take("VERTEX_SE2 0 nan 0 0").text, StartsWith("ERROR"));
+  const LineSession::Reply given = take("VERTEX_SE2 0 2 3 0");
+  EXPECT_EQ(given.text, "");
+  EXPECT_TRUE(given.changes);  // and so is in the journal
+  EXPECT_THAT(take("VERTEX_SE2 0 4 3 0").text, HasSubstr("the id is already in use"));
+  take("FIX 0");
+  EXPECT_THAT(take(edge).text, HasSubstr("OK "));
+  EXPECT_THAT(take("ESTIMATE 1").text, StartsWith("VERTEX_SE2 1 3 3 0.1\n"));
+  EXPECT_THAT(take("VERTEX_SE2 0 2 3 0").text, HasSubstr("the id is already in use"));
+}
+
+TEST_F(OnlineSessionTest, AnswersOfTheWholeEstimateSayWhatIsNotInIt) {
+  take_all(two_poses_);
+  EXPECT_THAT(take_all({"CHI2", "FULL", "ESTIMATE ALL"}), Not(HasSubstr("NOTE")));
+  take_all({"NEW VERTEX_SE2 7", "VERTEX_SE2 8 0 0 0", "VERTEX_SE2 9 0 0 0"});
+  const std::string note =
+      "NOTE 3 variables wait for a measurement, the first of them VERTEX_SE2 7: not in the "
+      "estimate";
+  for (const char* line : {"CHI2", "FULL", "ESTIMATE ALL"})
+    EXPECT_THAT(take(line).text, StartsWith(note)) << line;
+  EXPECT_THAT(take("ESTIMATE 8").text, HasSubstr("waits for a measurement"));
+  EXPECT_THAT(take("ESTIMATE 1").text, Not(HasSubstr("NOTE")));
+  // Measurements are not solved meanwhile.
+  EXPECT_EQ(take("EDGE_SE2 1 8" + kStep).text, "");
+  EXPECT_THAT(take("CHI2").text, HasSubstr("until each has one or is removed"));
+  take("REMOVE VARIABLE 9");
+  EXPECT_THAT(take("CHI2").text, StartsWith("NOTE VERTEX_SE2 7 waits for a measurement: "));
+  EXPECT_EQ(session_->waiting(), "VERTEX_SE2 7 waits for a measurement");
+  EXPECT_THAT(take("EDGE_SE2 1 7" + kStep).text, HasSubstr("OK "));
+  EXPECT_THAT(take_all({"CHI2", "FULL", "ESTIMATE ALL"}), Not(HasSubstr("NOTE")));
+  EXPECT_EQ(session_->waiting(), "");
+}
+
+TEST_F(OnlineSessionTest, TheFirstMarginalizeSaysWhatCannotBeWrittenAnyMore) {
+  take_all(two_poses_);
+  take_all(
+      {"NEW VERTEX_SE2 2", "EDGE_SE2 1 2" + kStep, "NEW VERTEX_SE2 3", "EDGE_SE2 2 3" + kStep});
+  const std::string first = take("MARGINALIZE 0").text;
+  EXPECT_THAT(first, StartsWith("NOTE what MARGINALIZE leaves is in no format of graphs"));
+  for (const char* word : {"SAVE and -o", "SPARSIFY", "REMOVE FACTOR 3", "\nPRIOR 3\n"})
+    EXPECT_THAT(first, HasSubstr(word));
+  EXPECT_THAT(take("MARGINALIZE 1").text, StartsWith("PRIOR "));
 }
 
 TEST_F(OnlineSessionTest, RestoredLinesGiveTheSameEstimateWithoutAnswers) {

@@ -56,6 +56,8 @@ class CAIRN_API LineSession {
   virtual Estimator& estimator() = 0;
   virtual std::int64_t variable_count() const = 0;
   virtual std::int64_t factor_count() const = 0;
+  /// What has come and is not in the graph, as a clause without its end; empty: there is nothing.
+  virtual std::string waiting() const;
 
  protected:
   using Words = std::vector<std::string_view>;

@@ -40,6 +40,8 @@ class CAIRN_API OnlineSession final : public LineSession {
   Estimator& estimator() override { return estimator_; }
   std::int64_t variable_count() const override { return estimator_.variable_count(); }
   std::int64_t factor_count() const override { return estimator_.factor_count(); }
+  /// Variables that are not in the graph, for want of a measurement: their number, and the first.
+  std::string waiting() const override;
 
  private:
   using Command = void (OnlineSession::*)(const Words&, Reply&);
@@ -67,6 +69,7 @@ class CAIRN_API OnlineSession final : public LineSession {
   void take_variable(Variable variable);
   void take_factor(Factor factor, Reply& reply);
   void hold(Id id);
+  const Variable* find_waiting(Id id) const;
 
   /// Hands an update over; solves where that is due or asked for. `removal` becomes a part of it.
   UpdateReport update(GraphUpdate update, bool solve, bool full, Reply& reply,
@@ -78,6 +81,8 @@ class CAIRN_API OnlineSession final : public LineSession {
   void write_removal(const PoseRemover::Removal& removal, FactorId first_factor, Reply& reply);
   void follow(const GraphUpdate& update);
   void write_results(const UpdateReport& report, Reply& reply);
+  /// If variables wait: that they are not in what is answered.
+  void note_waiting(Reply& reply) const;
   void write_estimate(Id id, std::string& text) const;
   bool write_covariance(Id a, Id b, std::string& text);
   const VariableType& type_of(Id id) const;
@@ -88,6 +93,7 @@ class CAIRN_API OnlineSession final : public LineSession {
   OnlineSettings settings_;
   int owed_ = 0;
   std::string noted_;  ///< why fewer poses have left than should have, as it was last reported
+  bool noted_unwritable_ = false;  ///< that SAVE cannot write what MARGINALIZE leaves
   /// Variables that no measurement has touched yet: the estimator gets them with the first that
   /// does.
   std::vector<Variable> waiting_;
