@@ -2,17 +2,30 @@
 #include "results.hpp"
 
 #include <algorithm>
+#include <cstdio>
+
+#include <fmt/core.h>
 
 #include "cairn/runtime/error.hpp"
+#include "option_words.hpp"
+#include "table.hpp"
 
 namespace cairn::app {
+namespace {
+
+/// With --quiet too: an output that cannot be written is an error, though not the first.
+void name(const Error& error) {
+  fmt::print(stderr, "note: {}\n", printable(in_command_line_words(error.what()), true));
+}
+
+}  // namespace
 
 bool Results::add(const std::function<void()>& write) {
   try {
     write();
     return true;
   } catch (const Error& error) {
-    if (first_) session_.note(error.what());
+    if (first_) name(error);
     if (!first_) first_ = std::current_exception();
   } catch (...) {  // of memory above all: the others may need less
     if (!first_) first_ = std::current_exception();

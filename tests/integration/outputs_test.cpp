@@ -200,6 +200,29 @@ TEST_F(Outputs, OneThatFailsCostsNoneOfTheOthers) {
   EXPECT_EQ(lines(read_text(steps)).size(), 201U);
 }
 
+TEST_F(Outputs, EachOneThatFailsIsNamedAlsoWithQuiet) {
+  const Outcome outcome = cairn(
+      {"optimize", graph(), "-o", "/dev/full", "--to", "g2o", "--record", "/dev/full", "--quiet"});
+  EXPECT_EQ(outcome.exit_code, 3);
+  EXPECT_THAT(outcome.err, HasSubstr("note: /dev/full: cannot be written"));
+  EXPECT_THAT(outcome.err, HasSubstr("\ncairn: /dev/full: cannot be written"));
+}
+
+TEST_F(Outputs, OneThatDoesNotFitLeavesItsRoomToTheOthers) {
+  graph();
+  if (shell("unshare -rm true", folder_).exit_code != 0)
+    GTEST_SKIP() << "this system does not let its users mount anything";
+  const Outcome outcome = shell(
+      "cd $D; mkdir disk; unshare -rm sh -c 'mount -t tmpfs -o size=200k tmpfs disk && "
+      "$C optimize graph.g2o --optimizer gauss_newton --tolerance 0 --iterations 200 "
+      "-o disk/best.g2o --json disk/run.json "
+      "--record disk/run.jsonl --quiet; echo code=$? >&2; ls disk'",
+      folder_);
+  EXPECT_THAT(outcome.err, HasSubstr("code=3"));
+  EXPECT_THAT(outcome.err, HasSubstr("cairn: disk/run.jsonl: cannot be written"));
+  EXPECT_THAT(outcome.out, testing::EndsWith("best.g2o\nrun.json\n"));
+}
+
 TEST_F(Outputs, ARecordingReplacesAnotherOnlyWhenItIsWhole) {
   graph();
   write_text(folder_.file("run.jsonl"), "before");

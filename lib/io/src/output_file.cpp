@@ -115,6 +115,12 @@ std::string why_not_replaced(const fs::path& file, const fs::path& folder) {
   return {};
 }
 
+/// A file that will not be finished takes no room on a full disk from those that follow; its name
+/// goes with the `OutputFile`.
+void empty_unfinished(const fs::path& beside) noexcept {
+  if (!beside.empty() && ::truncate(beside.c_str(), 0) != 0) errno = 0;  // nothing else to be done
+}
+
 OutputFile*& first_unfinished() {
   static OutputFile* first = nullptr;
   return first;
@@ -210,7 +216,10 @@ void OutputFile::write(std::string_view bytes) noexcept {
       if (is_fifo_ && is_interrupted()) failure_ = EINTR;
       continue;
     }
-    if (put < 0) failure_ = errno;
+    if (put < 0) {
+      failure_ = errno;
+      empty_unfinished(beside_);
+    }
     if (put > 0) bytes.remove_prefix(static_cast<std::size_t>(put));
   }
 }
@@ -231,6 +240,7 @@ void OutputFile::finish() {
 }
 
 void OutputFile::fail(int reason) const {
+  empty_unfinished(beside_);
   refuse(file_, "cannot be written: " + system_message(reason));
 }
 
