@@ -31,6 +31,7 @@
 #include "results.hpp"
 #include "table.hpp"
 #include "threshold_files.hpp"
+#include "used_thresholds.hpp"
 
 namespace cairn::app {
 namespace {
@@ -141,10 +142,11 @@ bool names_thresholds(const CompactOptions& options, const ComponentSpec& policy
          !options.thresholds.empty() || gives_thresholds(policy);
 }
 
-/// What to run, and the thresholds that were found, or read.
+/// What to run, and the thresholds.
 struct Job {
   PolicyJob job;
-  FoundThresholds found;
+  FoundThresholds found;  ///< or read
+  UsedThresholds thresholds = {};
   std::string strategy = {};  ///< empty: the policy has none
 };
 
@@ -193,6 +195,7 @@ Job prepare(const CompactOptions& options, const PolicySetting& setting, Results
         "those of the policy's defaults are used");
   }
   emplace(given_thresholds(options));
+  const OptionValues given = job.policy.values;
   if (!options.estimator.empty()) emplace({{"estimator", options.estimator}});
   if (!options.thresholds.empty())
     result.found.options = read_thresholds(options.thresholds, job.policy.name);
@@ -203,6 +206,7 @@ Job prepare(const CompactOptions& options, const PolicySetting& setting, Results
   }
   emplace(result.found.options);
   const OptionTable& table = setting.registry.options(PosePolicy::kKind, job.policy.name);
+  result.thresholds = used_thresholds(given, result.found.options, table);
   // Not while thresholds are found, for which all measurements of the sample are used.
   if (options.keep > 0 &&
       !job.policy.values.emplace("keep", fmt::format("{}", options.keep)).second)
@@ -217,7 +221,7 @@ Job prepare(const CompactOptions& options, const PolicySetting& setting, Results
     result.strategy = options.strategy == "rfpfl" ? options.strategy : chosen;
   }
   results.write(options.save_thresholds, [&] {
-    write_thresholds(options.save_thresholds, job.policy.name, result.found.options);
+    write_thresholds(options.save_thresholds, job.policy.name, result.thresholds.options);
   });
   return result;
 }
@@ -237,6 +241,17 @@ void check(const CompactOptions& options, Session& session) {
   }
   if (options.automatic && !options.thresholds.empty())
     throw Error(ErrorCode::usage, "--auto finds thresholds, --thresholds reads them: give one");
+}
+
+/// One threshold that is given leaves the others at values that know nothing of the data.
+void note_defaults(const CompactOptions& options, const CompactOutcome& outcome, Session& session) {
+  if (!finds_thresholds(parse_component(options.policy), session.registry())) return;
+  const std::string defaults = replaceable_defaults(outcome.thresholds, outcome.strategy);
+  if (defaults.empty() || outcome.data.loops == 0) return;  // or a search would find none
+  session.note(
+      fmt::format("some thresholds are given, so no others were looked for: of {} the policy's "
+                  "defaults are used, whatever the sensor and the data; --auto finds them",
+                  defaults));
 }
 
 /// The options by their names on the command line. One that is given stops the search of the others
@@ -328,6 +343,7 @@ int run_compact(const CompactOptions& options, Session& session) {
                          .strategy = job.strategy,
                          .data = recording.data,
                          .found = job.found,
+                         .thresholds = job.thresholds,
                          .result = run_job(job.job, comparison ? &*comparison : nullptr),
                          .control = {}};
   if (options.strategy == "rfpfl") {
@@ -356,6 +372,7 @@ int run_compact(const CompactOptions& options, Session& session) {
     if (comparison) report["compare"] = comparison_json(comparison->steps());
     session.write_json(report);
   });
+  note_defaults(options, outcome, session);
   note_selection(options, outcome, session);
   results.add([&] { session.print(summary_text(options, outcome, results)); });
   results.finish();
@@ -411,14 +428,15 @@ void add_compact_options(ArgumentParser cli, CompactOptions& options,
       .component({"registration"})
       .show_default();
   cli.add_flag("--auto", options.automatic,
-               "find thresholds in a sample; the default if none are given");
+               "find those thresholds in a sample that are not given; the default if none are");
   cli.add_option("--sample", options.sample, "part of the poses that is the sample")
       .type_name("PART")
       .within(0.0, 1.0)
       .show_default();
   cli.add_option("--thresholds", options.thresholds, "take thresholds from a file")
       .type_name("FILE");
-  cli.add_option("--save-thresholds", options.save_thresholds, "write those found to a file")
+  cli.add_option("--save-thresholds", options.save_thresholds,
+                 "write those given and found to a file")
       .type_name("FILE");
   cli.add_option("--range", options.range, "how far the sensor matches [m]").type_name("M");
   cli.add_option("--angle", options.angle, "and between which orientations [rad]").type_name("RAD");

@@ -23,7 +23,7 @@ json::object options_json(const OptionValues& values) {
   return all;
 }
 
-json::object thresholds_json(const FoundThresholds& found) {
+json::object thresholds_json(const UsedThresholds& used, const FoundThresholds& found) {
   json::array trials;
   for (const ThresholdTrial& trial : found.trials) {
     trials.push_back({{"loop_gain_factor", trial.links},
@@ -33,7 +33,11 @@ json::object thresholds_json(const FoundThresholds& found) {
                       {"poses", trial.poses_kept},
                       {"loops", trial.loops_kept}});
   }
-  return {{"options", options_json(found.options)},
+  json::array given;
+  for (const std::string& name : used.given) given.emplace_back(name);
+  return {{"options", options_json(used.options)},
+          {"given", std::move(given)},
+          {"defaults", options_json(used.defaults)},
           {"trials", std::move(trials)},
           {"chosen", found.chosen},
           {"noise_scale", found.noise_scale},
@@ -166,15 +170,6 @@ void add_result(Table& table, const PolicyResult& result, const PolicyData& data
   }
 }
 
-std::string thresholds_line(const OptionValues& values) {
-  std::string text;
-  for (const auto& [name, value] : values) {
-    if (name == "sensor") continue;
-    text += fmt::format("{}{} {}", text.empty() ? "" : ", ", name, value);
-  }
-  return text;
-}
-
 }  // namespace
 
 json::object report_json(const CompactOptions& options, const CompactOutcome& outcome) {
@@ -187,7 +182,7 @@ json::object report_json(const CompactOptions& options, const CompactOutcome& ou
                      : !outcome.shown().located  ? "unlocated"
                      : outcome.shown().converged ? "converged"
                                                  : "max_iterations";
-  report["thresholds"] = thresholds_json(outcome.found);
+  report["thresholds"] = thresholds_json(outcome.thresholds, outcome.found);
   for (auto& [name, value] : result_json(outcome.shown(), outcome.data)) report[name] = value;
   if (outcome.control) report["like"] = result_json(outcome.result, outcome.data);
   report["recovery"] = options.recovery;
@@ -252,8 +247,8 @@ std::string summary_text(const CompactOptions& options, const CompactOutcome& ou
                                   plural(data.recording.variable_count() - data.landmarks, "pose"),
                                   landmarks, plural(data.loops, "loop closure"))});
   if (!outcome.strategy.empty()) table.add({"strategy", outcome.strategy});
-  if (!outcome.found.options.empty())
-    table.add({"thresholds", thresholds_line(outcome.found.options)});
+  if (const std::string line = thresholds_line(outcome.thresholds); !line.empty())
+    table.add({"thresholds", line});
   add_result(table, outcome.shown(), outcome.data, outcome.found);
   if (outcome.result.interrupted) table.add({"status", "interrupted"});
   for (const std::string& file :

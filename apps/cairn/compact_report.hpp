@@ -12,6 +12,7 @@
 #include "cairn/policy/uncertainty_comparison.hpp"
 #include "compact.hpp"
 #include "results.hpp"
+#include "used_thresholds.hpp"
 
 namespace cairn::app {
 
@@ -20,7 +21,8 @@ struct CompactOutcome {
   const std::string& name;      ///< of the graph
   const std::string& strategy;  ///< empty: the policy has none
   const PolicyData& data;
-  const FoundThresholds& found;
+  const FoundThresholds& found;      ///< by a search; none: there was none
+  const UsedThresholds& thresholds;  ///< of the run, whatever was found
   PolicyResult result;
   std::optional<PolicyResult> control;  ///< as many poses and loops at random
 

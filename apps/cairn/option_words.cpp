@@ -10,11 +10,12 @@
 namespace cairn::app {
 namespace {
 
-constexpr std::array<std::pair<std::string_view, std::string_view>, 5> kWords{{
+constexpr std::array<std::pair<std::string_view, std::string_view>, 6> kWords{{
     {"ReadOptions::skip_unknown", "--skip-unknown"},
     {"ReadOptions::repair_information", "--repair-information"},
     {"StampMatching::offset", "--offset"},
     {"StampMatching::max_difference", "--max-time-difference"},
+    {"(begin=", "(--begin "},
     {"RecordingWriter", "cairn optimize --record"},
 }};
 

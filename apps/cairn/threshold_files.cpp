@@ -20,6 +20,13 @@ OptionValues read_thresholds(const std::string& file, const std::string& policy)
   try {
     const json::value value = json::parse(text);
     const json::object& all = value.as_object();
+    if (const json::value* command = all.if_contains("command"); command && all.contains("cairn")) {
+      throw Error(
+          ErrorCode::input,
+          fmt::format("{}: this is the report of a run of cairn {} (--json), not thresholds; "
+                      "give a file that cairn compact --save-thresholds has written",
+                      file, std::string_view(command->as_string())));
+    }
     if (const auto& name = all.at("policy").as_string(); name != policy) {
       throw Error(ErrorCode::input, fmt::format("{}: thresholds of policy '{}', not of '{}'", file,
                                                 std::string_view(name), policy));

@@ -127,6 +127,56 @@ TEST_F(Compact, ThresholdsAreFoundSavedAndRead) {
   EXPECT_EQ(whole(stricter, "loops", "kept"), 0);
 }
 
+/// Rows of a table are wrapped.
+std::string on_one_line(const std::string& text) {
+  std::istringstream words(text);
+  std::string line;
+  for (std::string word; words >> word;) line += (line.empty() ? "" : " ") + word;
+  return line;
+}
+
+TEST_F(Compact, ReportsTheThresholdsOfTheRunWhateverWasFound) {
+  const std::string file = folder_.file("robot.json"), json = folder_.file("report.json");
+  report({kWorld, "--save-thresholds", file});
+  const std::string found(parse_json(read_text(file)).at("options").at("range").as_string());
+  ASSERT_NE(found, "4");
+  for (const Arguments& others : {Arguments{"--thresholds", file}, Arguments{"--auto"}}) {
+    const std::string saved = folder_.file("saved.json");
+    Arguments command{"compact", kWorld, "--range",           "4",
+                      "--json",  json,   "--save-thresholds", saved};
+    command.insert(command.end(), others.begin(), others.end());
+    const Outcome run = cairn(command);
+    ASSERT_EQ(run.exit_code, 0) << run.err;
+    EXPECT_THAT(on_one_line(run.out), HasSubstr("range 4 (given)"));
+    EXPECT_THAT(run.err, Not(HasSubstr("--auto")));
+    const boost::json::value thresholds = parse_json(read_text(json)).at("thresholds");
+    EXPECT_EQ(thresholds.at("options").at("range").as_string(), "4");
+    EXPECT_EQ(thresholds.at("given"), parse_json(R"(["range"])"));
+    EXPECT_FALSE(thresholds.at("defaults").as_object().contains("angle"));
+    // With what is saved the run is the same.
+    EXPECT_EQ(parse_json(read_text(saved)).at("options"), thresholds.at("options"));
+    EXPECT_EQ(report({kWorld, "--thresholds", saved}).at("errors"),
+              parse_json(read_text(json)).at("errors"));
+  }
+}
+
+TEST_F(Compact, SaysWhichThresholdsAreDefaultsWhereOneIsGiven) {
+  const std::string json = folder_.file("report.json");
+  const Outcome one = cairn({"compact", kWorld, "--loop-gain", "1", "--json", json});
+  EXPECT_EQ(one.exit_code, 0) << one.err;
+  EXPECT_THAT(on_one_line(one.out),
+              AllOf(HasSubstr(" thresholds angle "), HasSubstr("loop_gain 1 (given)"),
+                    testing::ContainsRegex("range [0-9.]+ \\(default\\)")));
+  EXPECT_THAT(one.err, AllOf(HasSubstr("of range, angle and pose_gain the policy's defaults are "),
+                             HasSubstr("--auto finds them")));
+  const boost::json::value thresholds = parse_json(read_text(json)).at("thresholds");
+  EXPECT_EQ(thresholds.at("options"), parse_json(R"({"loop_gain": "1"})"));
+  EXPECT_TRUE(thresholds.at("defaults").as_object().contains("range"));
+  // What a strategy has no use for is not missed.
+  EXPECT_THAT(cairn({"compact", kWorld, "--strategy", "apal", "--range", "3", "--angle", "3"}).err,
+              Not(HasSubstr("--auto")));
+}
+
 TEST_F(Compact, LowersThresholdsUntilTheErrorIsAsAskedFor) {
   const boost::json::value strict = study({kWorld, "--error-ratio", "1.05"}),
                            loose = study({kWorld, "--error-ratio", "50"});
@@ -255,16 +305,22 @@ TEST_F(Compact, ContinuesTheMapOfAnEarlierSession) {
   const std::string apart = folder_.file("apart.g2o");
   write_text(apart, part_of(all, 400, false, false));
   const Outcome unlocated = cairn({"compact", apart, "--map", map, "--thresholds", robot, "--json",
-                                   folder_.file("unlocated.json")});
+                                   folder_.file("unlocated.json"), "--truth", truth});
   EXPECT_EQ(parse_json(read_text(folder_.file("unlocated.json"))).at("status").as_string(),
             "unlocated");
   EXPECT_EQ(unlocated.exit_code, 4);
+  EXPECT_THAT(unlocated.out, Not(HasSubstr("NEES")));
+  EXPECT_TRUE(parse_json(read_text(folder_.file("unlocated.json"))).at("nees").is_null());
   EXPECT_THAT(unlocated.err, HasSubstr("no pose was matched with one of " + map));
   const Outcome same = cairn({"compact", monday, "--map", map, "--thresholds", robot});
   EXPECT_EQ(same.exit_code, 3);
   EXPECT_THAT(same.err, HasSubstr("is in the map and in the recording"));
   EXPECT_THAT(cairn({"compact", tuesday, "--begin", "4000", "--range", "3"}).err,
               HasSubstr("there is no pose 4000"));
+  const Outcome broken = cairn({"compact", tuesday, "--map", map, "--thresholds", robot});
+  EXPECT_EQ(broken.exit_code, 3);
+  EXPECT_THAT(broken.err, AllOf(HasSubstr("no factor joins VERTEX_SE2 400 to VERTEX_SE2 399"),
+                                HasSubstr("(--begin 400)")));
 }
 
 // With thresholds of the first. One world says little: with other noise the error of either varies
@@ -373,6 +429,11 @@ TEST_F(Compact, SaysWhatIsWrongAndWhatWouldWork) {
   const std::string junk = folder_.file("junk.json");
   write_text(junk, "{\"policy\": 3}");
   EXPECT_THAT(refused({kWorld, "--thresholds", junk}, 3), HasSubstr("--save-thresholds"));
+  const std::string told = folder_.file("report.json");
+  write_text(told, "{\"cairn\": \"0.1.0\", \"command\": \"compact\", \"thresholds\": {}}");
+  EXPECT_THAT(refused({kWorld, "--thresholds", told}, 3),
+              AllOf(HasSubstr("this is the report of a run of cairn compact (--json)"),
+                    HasSubstr("give a file that cairn compact --save-thresholds has written")));
   EXPECT_THAT(refused({"@manhattan:poses=20,loop_density=0"}, 3), HasSubstr("no loop closure"));
   EXPECT_THAT(refused({kWorld, "--policy", "compact_pose:rage=3"}, 2), HasSubstr("range"));
   EXPECT_THAT(refused({kWorld, "--policy", "random_poses:poses=10", "--auto"}, 2),

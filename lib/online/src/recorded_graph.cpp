@@ -193,8 +193,10 @@ std::vector<Arrival> pose_chain(const Graph& graph, std::optional<Id> begin) {
     if (!chain[k].odometry.empty()) continue;
     throw bad_input(fmt::format(
         "no factor joins {} to {}, the pose before it by id: odometry must be unbroken and ids "
-        "increase along the trajectory",
-        graph.describe_variable(chain[k].pose()), graph.describe_variable(chain[k - 1].pose())));
+        "increase along the trajectory; if the poses before it are of an earlier session, give the "
+        "first one of this session, at which to begin (begin={})",
+        graph.describe_variable(chain[k].pose()), graph.describe_variable(chain[k - 1].pose()),
+        graph.id(chain[k].pose())));
   }
   return chain;
 }

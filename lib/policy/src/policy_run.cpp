@@ -89,7 +89,8 @@ void evaluate(PosePolicy& policy, const PolicyData& data, PolicyResult& result) 
   } catch (const Error& error) {  // too few poses to compare, when it was interrupted
     if (!result.interrupted || error.code() != ErrorCode::input) throw;
   }
-  if (data.truth_graph && has_all_of(*data.truth_graph, result.compact))
+  // A map without a common frame is nowhere in that of the truth.
+  if (result.located && data.truth_graph && has_all_of(*data.truth_graph, result.compact))
     result.normalized = normalized_error(result.compact, *data.truth_graph);
 }
 
@@ -156,11 +157,13 @@ void PolicyRun::load(const Graph& map) {
   for (const Arrival& arrival : setting_.data.poses) {
     const Id pose = setting_.data.recording.id(arrival.pose());
     if (!map.find(pose)) continue;
-    throw Error(ErrorCode::input,
-                fmt::format("pose {} is in the map and in the recording: where the recording has "
-                            "earlier sessions as well, say at which pose to begin; where it is "
-                            "another pose, give it another id",
-                            pose));
+    throw Error(
+        ErrorCode::input,
+        fmt::format(
+            "pose {} is in the map and in the recording: where the recording has "
+            "earlier sessions as well, give the pose at which to begin (begin=ID); where it is "
+            "another pose, give it another id",
+            pose));
   }
   call_plugin([&] { return fmt::format("policy '{}'", result_.policy); },
               [&] { policy_->load(map); });
