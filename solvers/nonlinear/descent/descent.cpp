@@ -39,6 +39,26 @@ constexpr int kIterationsForExtent = 2;
 /// rounding.
 constexpr double kUnit = 1e-30;
 
+/// Where the information of two factors differs by this, H in double precision holds nothing of
+/// the smaller one beside the larger one.
+constexpr double kLargestSpread = 1e15;
+
+/// The largest of the information of all factors divided by the smallest that is not zero.
+double information_spread(const Graph& graph) {
+  double least = std::numeric_limits<double>::infinity(), most = 0.0;
+  for (int f = 0; f < graph.factor_count(); ++f) {
+    const std::span<const double> upper = graph.information(f);
+    const int n = graph.factor_type(f).residual_size();
+    std::size_t at = 0;  // of the diagonal, in the upper triangle row by row
+    for (int k = 0; k < n; at += static_cast<std::size_t>(n - k), ++k) {
+      if (!(upper[at] > 0.0)) continue;
+      least = std::min(least, upper[at]);
+      most = std::max(most, upper[at]);
+    }
+  }
+  return most > 0.0 ? most / least : 1.0;
+}
+
 /// The first iteration, and about one in sixteen of those that follow, by multiplicative hashing.
 bool is_sampled(int iteration) {
   return iteration == 1 || (static_cast<std::uint32_t>(iteration) * 2654435769U) >> 28U == 0;
@@ -259,10 +279,24 @@ double Descent::coordinate_rounding() const {
   return sum / 12.0;  // the variance of what is spread evenly over one unit
 }
 
-void Descent::end_without_descent(double promise, double step_norm) {
+void Descent::end_converged(bool is_damped) {
+  const double spread = is_damped ? information_spread(graph_) : 1.0;
+  if (spread <= kLargestSpread) {
+    end(Status::converged);
+    return;
+  }
+  note(
+      fmt::format("the information of the factors differs by a factor of {:.1g}, and of the "
+                  "smallest H has no digit left in double precision: that no step lowers chi2 is "
+                  "no sign of a minimum; linear solver spqr works without H",
+                  spread));
+  end(Status::not_positive_definite);
+}
+
+void Descent::end_without_descent(double promise, double step_norm, bool is_damped) {
   if (promise <= std::max(kRounding * chi2, coordinate_rounding()) ||
       step_norm <= kRounding * state_extent_) {
-    end(Status::converged);
+    end_converged(is_damped);
     return;
   }
   note(

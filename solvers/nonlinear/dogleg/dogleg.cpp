@@ -54,9 +54,9 @@ class Run {
     const bool lowered = trial_chi2 < run_.chi2;  // false for what is not a number
     const bool exhausted = convergence_.exhausted(lowered, step_norm, run_.state_extent());
     if (arrived) {
-      run_.end(Status::converged);
+      run_.end_converged(is_damped());
     } else if (exhausted && run_.solves(path_.newton())) {
-      run_.end_without_descent(newton_promise_, newton_norm_);
+      run_.end_without_descent(newton_promise_, newton_norm_, is_damped());
     }
     adapt_radius(lowered ? (run_.chi2 - trial_chi2) / step.promise : -1.0, step.length);
     if (lowered) take_step(trial_chi2);
@@ -68,6 +68,7 @@ class Run {
   /// at a damped step. False if none does.
   bool factorize() {
     Factorization factorization = equations_.factorize();
+    is_damped_ = !factorization.ok;
     if (factorization.ok) return true;
     if (!explained_) run_.note(equations_.explain(factorization) + "; steps are regularised");
     explained_ = true;
@@ -82,6 +83,9 @@ class Run {
     run_.end_not_positive_definite(factorization);
     return false;
   }
+
+  /// Though the gauge is not free: then H is singular as it should be.
+  bool is_damped() const { return is_damped_ && equations_.gauge().left_free.empty(); }
 
   void take_step(double trial_chi2) {
     std::swap(run_.estimate, run_.trial);
@@ -104,6 +108,7 @@ class Run {
   double newton_promise_ = 0.0, newton_norm_ = 0.0;  // of the full step
   double radius_;
   bool path_is_current_ = false;
+  bool is_damped_ = false;  // what was factorised last
   bool explained_ = false;
 };
 

@@ -82,7 +82,7 @@ class Run {
     const bool lowered = trial_chi2 < run_.chi2;  // false for what is not a number
     const double gained = run_.chi2 - trial_chi2;
     const bool exhausted = convergence_.exhausted(lowered, step_norm, run_.state_extent());
-    if (!run_.ended() && arrived) run_.end(Status::converged);
+    if (!run_.ended() && arrived) run_.end_converged(!undamped && may_go_undamped_);
     if (!run_.ended() && exhausted && run_.solves(run_.step)) end_without_descent();
 
     const double before = run_.chi2;
@@ -150,15 +150,17 @@ class Run {
   /// No step helps. Whether that is the minimum is asked of what H promises with as little damping
   /// as it can be factorised with: under a heavy one every promise is small.
   void end_without_descent() {
+    bool is_damped = may_go_undamped_ && first_lambda_ > 0.0;
     for (const double lambda : {0.0, kLightDamping, 1e-6, 1e-4}) {
       if (lambda >= first_lambda_) break;
       if (lambda == 0.0 && !may_go_undamped_) continue;
       if (!factorize(lambda).ok || !run_.solve(run_.step)) continue;
       first_promise_ = dot(equations_.g(), run_.step) + damping_energy();
       first_norm_ = run_.step_norm();
+      is_damped = is_damped && lambda > 0.0;
       break;
     }
-    run_.end_without_descent(first_promise_, first_norm_);
+    run_.end_without_descent(first_promise_, first_norm_, is_damped);
   }
 
   void take_failure(const Factorization& failure, bool undamped) {

@@ -316,5 +316,26 @@ TEST_P(Methods, FindTheSameEstimateAtAnyScaleOfTheInformation) {
   }
 }
 
+/// Of the weak factors H holds no digit: where damping alone makes it positive definite, no step
+/// that is short or promises little shows a minimum.
+TEST_P(Methods, ClaimNoMinimumThatHDoesNotShow) {
+  if (!registry_.has(LinearSolver::kKind, "spqr")) GTEST_SKIP() << "nothing to compare with";
+  if (std::string(GetParam()) == "ceres") GTEST_SKIP() << "Ceres decides by rules of its own";
+  for (const double strong : {1e16, 1e18, 1e20}) {
+    Graph graph = test::ring_of_poses(30, 0.05);
+    for (int f = 0; f < graph.factor_count(); ++f) {
+      std::vector<double> information(graph.information(f).begin(), graph.information(f).end());
+      for (double& value : information) value *= f % 5 < 2 ? strong : f % 5 < 4 ? 1.0 : 1 / strong;
+      graph.set_measurement(f, graph.measurement(f), information);
+    }
+    Graph best = graph.clone();
+    const Summary reference =
+        registry_.make<Optimizer>("levenberg_marquardt:linear_solver=spqr")->optimize(best);
+    const Summary summary = optimizer_->optimize(graph);
+    if (summary.status != Status::converged) continue;
+    EXPECT_LE(summary.final_chi2, 1.001 * reference.final_chi2) << strong;
+  }
+}
+
 }  // namespace
 }  // namespace cairn
