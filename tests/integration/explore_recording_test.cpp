@@ -19,6 +19,7 @@ namespace cairn::test {
 namespace {
 
 using ::testing::AllOf;
+using ::testing::Each;
 using ::testing::HasSubstr;
 using ::testing::Not;
 using ::testing::StartsWith;
@@ -123,6 +124,27 @@ TEST_F(ExploreRecording, ThatWasCutShortIsShownAndSaid) {
   const Outcome more = cairn({"view", record, "-o", page});
   EXPECT_EQ(more.exit_code, 3);
   EXPECT_THAT(unfolded(more.err), HasSubstr("follows the end"));
+}
+
+TEST_F(ExploreRecording, EntropiesOfTheMapAreOverOneArea) {
+  const std::string record = folder_.file("run.jsonl"), report = folder_.file("run.json");
+  ASSERT_EQ(explore({"--record", record, "--json", report}).exit_code, 0);
+  const std::string text = read_text(record);
+  const std::regex member(R"re("map_entropy":([-0-9.e]+),"grid_area":([-0-9.e]+))re");
+  std::vector<double> entropies, areas;
+  for (auto at = std::sregex_iterator(text.begin(), text.end(), member);
+       at != std::sregex_iterator(); ++at) {
+    entropies.push_back(std::stod((*at)[1]));
+    areas.push_back(std::stod((*at)[2]));
+  }
+  ASSERT_GT(entropies.size(), 3U);
+  EXPECT_THAT(areas, Each(areas.front()));
+  for (std::size_t k = 1; k < entropies.size(); ++k)
+    EXPECT_LT(entropies[k], entropies[k - 1] + 0.02 * entropies.front()) << k;
+  EXPECT_LT(entropies.back(), 0.9 * entropies.front());
+  const double measure =
+      parse_json(read_text(report)).at("measures").at("map_entropy").to_number<double>();
+  EXPECT_NEAR(entropies.back(), measure, 1e-6 * measure);
 }
 
 TEST_F(ExploreRecording, HasCurvesToPlot) {

@@ -12,6 +12,7 @@
 #include <fmt/core.h>
 
 #include "cairn/evaluation/trajectory.hpp"
+#include "cairn/exploration/exploration_measures.hpp"
 #include "cairn/exploration/recorded_world.hpp"
 #include "cairn/exploration/scan_slam.hpp"
 #include "cairn/grid/cell_traversal.hpp"
@@ -55,6 +56,10 @@ bool is_open(const FloorMap& map, const Pose2& at, const PlannedPath& path, std:
     from = path.points[k];
   }
   return true;
+}
+
+double area_of(const GridFrame& grid) {
+  return static_cast<double>(grid.size()) * grid.cell_area();
 }
 
 class Run {
@@ -139,14 +144,16 @@ class Run {
   void record(double driven) {
     const FloorMap& map = slam_.map();
     const std::vector<Id> kept = parts_.policy.kept();
+    // The map's grid grows, so that its entropy alone is over another area at each step.
+    const double area = area_of(parts_.start.floor ? parts_.start.floor->frame : map.frame);
     ExplorationStep step{.step = static_cast<int>(result_.steps.size()),
                          .decision = decisions_,
                          .distance = driven,
                          .estimate = slam_.pose(),
                          .truth = parts_.world.truth(),
                          .coverage = map.coverage(),
-                         .map_entropy = map.entropy(),
-                         .grid_area = static_cast<double>(map.frame.size()) * map.frame.cell_area(),
+                         .map_entropy = entropy_of_area(map.entropy(), area_of(map.frame), area),
+                         .grid_area = area,
                          .trajectory_entropy = trajectory_entropy(parts_.policy.estimator(), kept,
                                                                   parts_.first_sigma),
                          .kept = static_cast<int>(kept.size()),

@@ -264,13 +264,14 @@ void ExplorationRecorder::moved(const ExplorationStep& step, const Situation& at
                   step.decision, rounded(step.distance), pose_json(step.estimate));
   if (step.truth) text += fmt::format(R"(,"truth":{})", pose_json(*step.truth));
   text += fmt::format(
-      R"(,"covariance":{},"coverage":{},"map_entropy":{},"trajectory_entropy":{},"kept":{},)"
+      R"(,"covariance":{},"coverage":{},"map_entropy":{},"grid_area":{},)"
+      R"("trajectory_entropy":{},"kept":{},)"
       R"("loops":{},"collisions":{},"scan":{{"first_angle":{},"angle_step":{},"max_range":{},)"
       R"("ranges":{}}})",
       covariance_json(at), json_number(step.coverage), json_number(step.map_entropy),
-      json_number(step.trajectory_entropy), step.kept, step.loops, step.collisions,
-      json_number(scan.first_angle), json_number(scan.angle_step), json_number(scan.max_range),
-      packed_points_json(scan.ranges, 1));
+      json_number(step.grid_area), json_number(step.trajectory_entropy), step.kept, step.loops,
+      step.collisions, json_number(scan.first_angle), json_number(scan.angle_step),
+      json_number(scan.max_range), packed_points_json(scan.ranges, 1));
   impl_->write(text + impl_->graph.changes(at.estimator, at.poses) + impl_->map_member(at.map));
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "cairn/exploration/recording.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
@@ -13,6 +14,7 @@
 #include <boost/json/parse.hpp>
 #include <boost/json/serialize.hpp>
 
+#include "cairn/exploration/exploration_measures.hpp"
 #include "cairn/report/packed_array.hpp"
 #include "cairn/report/recording.hpp"
 #include "cairn/runtime/error.hpp"
@@ -24,7 +26,9 @@ namespace json = boost::json;
 
 constexpr std::string_view kKind = R"("kind":"exploration")";
 constexpr double kMostCells = 1e8;
-constexpr std::array kColumns{"distance",           "step", "decision", "coverage",  "map_entropy",
+constexpr const char* kMapEntropy = "map_entropy";
+constexpr const char* kGridArea = "grid_area";
+constexpr std::array kColumns{"distance",           "step", "decision", "coverage",  kMapEntropy,
                               "trajectory_entropy", "kept", "loops",    "collisions"};
 
 std::optional<json::object> parsed(std::string_view text) {
@@ -147,6 +151,25 @@ void read_header(std::string_view text, const std::string& where, const std::str
   recording.header = std::string(text);
 }
 
+NumberTable::Column& column_of(NumberTable& table, std::string_view name) {
+  return *std::ranges::find(table.columns, name, &NumberTable::Column::name);
+}
+
+/// Where the floor is not known, the entropy of a map is over its own grid, which grows: over the
+/// largest all are comparable. Recordings of earlier versions don't say over which area theirs is.
+void put_over_one_area(NumberTable& steps) {
+  const NumberTable::Column areas = std::move(steps.columns.back());  // kGridArea
+  steps.columns.pop_back();
+  double largest = 0.0;
+  for (const double area : areas.values) largest = std::max(largest, area);  // not a NaN
+  if (!(largest > 0.0)) return;
+  std::vector<double>& entropies = column_of(steps, kMapEntropy).values;
+  for (std::size_t k = 0; k < entropies.size(); ++k) {
+    if (areas.values[k] > 0.0)
+      entropies[k] = entropy_of_area(entropies[k], areas.values[k], largest);
+  }
+}
+
 std::size_t size_of(const std::vector<std::string>& lines) {
   std::size_t size = 0;
   for (const std::string& line : lines) size += line.size() + 1;
@@ -177,6 +200,7 @@ bool is_exploration_recording(std::string_view head) {
 ExplorationRecording read_exploration_recording(std::string_view text, const std::string& name) {
   ExplorationRecording recording;
   for (const char* column : kColumns) recording.steps.columns.push_back({column, {}});
+  recording.steps.columns.push_back({kGridArea, {}});
   recording.steps.name = name;
   for (int number = 1; !text.empty(); ++number) {
     const std::size_t end = text.find('\n');
@@ -194,6 +218,7 @@ ExplorationRecording read_exploration_recording(std::string_view text, const std
   }
   if (recording.steps.columns.front().values.empty())
     throw Error(ErrorCode::input, fmt::format("{}: not even the start was recorded", name));
+  put_over_one_area(recording.steps);
   return recording;
 }
 

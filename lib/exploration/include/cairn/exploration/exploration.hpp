@@ -47,8 +47,8 @@ struct ExplorationStep {
   Pose2 estimate;
   std::optional<Pose2> truth;
   double coverage = 0.0;            ///< `FloorMap::coverage` [m²]
-  double map_entropy = 0.0;         ///< `FloorMap::entropy` [nats·m²]
-  double grid_area = 0.0;           ///< of the map's grid, known or not [m²]
+  double map_entropy = 0.0;         ///< (5.6), over `grid_area` [nats·m²]
+  double grid_area = 0.0;           ///< of the floor's grid; if not known, of the map's [m²]
   double trajectory_entropy = 0.0;  ///< (5.13): see `trajectory_entropy` [nats]
   int kept = 0, loops = 0, collisions = 0;
 };
