@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "album.hpp"
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <ctime>
 #include <filesystem>
 #include <memory>
@@ -11,10 +13,12 @@
 #include <utility>
 
 #include <fmt/core.h>
+#include <boost/json/parse.hpp>
 #include <boost/json/serialize.hpp>
 
 #include "arguments.hpp"
 #include "cairn/exploration/recording.hpp"
+#include "cairn/grid/grid_format.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/report/recording.hpp"
 #include "cairn/report/run_report.hpp"
@@ -59,6 +63,48 @@ void add_exploration(const std::string& file, const std::string& name, std::stri
   for (const std::string& note : notes) builder.add_note(note);
 }
 
+bool has_number(const NumberTable::Column& column) {
+  return std::ranges::any_of(column.values, [](double value) { return std::isfinite(value); });
+}
+
+/// Without columns of text where the first is one, which would be the horizontal axis.
+NumberTable numbers_only(NumberTable table, const AlbumOptions& options, Session& session) {
+  if (!options.curves || has_number(table.columns.front())) return table;
+  std::vector<std::string> left_out;
+  for (const NumberTable::Column& column : table.columns) {
+    if (!has_number(column)) left_out.push_back(column.name);
+  }
+  if (left_out.size() == table.columns.size()) return table;  // refused where it is drawn
+  session.note(
+      fmt::format("{}: without the columns that have no numbers, {}; --x COLUMN and --y "
+                  "COLUMNS choose among the others",
+                  table.name, joined(left_out, ", ")));
+  std::erase_if(table.columns, [](const auto& column) { return !has_number(column); });
+  return table;
+}
+
+/// Whether it is the JSON of `cairn explore`.
+bool is_of_explore(const std::string& text) {
+  json::error_code error;
+  const json::value value = json::parse(text, error);
+  if (error || !value.is_object()) return false;
+  const json::value* command = value.get_object().if_contains("command");
+  return command && *command == "explore";
+}
+
+auto report_of(const std::string& text, const std::string& file) {
+  try {
+    return read_report(text, file);
+  } catch (const Error&) {
+    if (!is_of_explore(text)) throw;
+    throw Error(ErrorCode::input,
+                fmt::format("{}: the JSON of cairn explore has nothing to draw: give the run that "
+                            "--record FILE.jsonl has written, or plot the CSV of --steps or "
+                            "--curves",
+                            file));
+  }
+}
+
 void add_file(const std::string& file, const std::string& name, const AlbumOptions& options,
               AlbumBuilder& builder, Session& session) {
   const bool named = file == "-" || file.starts_with('@');
@@ -66,7 +112,7 @@ void add_file(const std::string& file, const std::string& name, const AlbumOptio
   if (!named && (is_csv(file) || is_recording(text) || is_json(text)))
     session.files.add_input(file);
   if (is_csv(file)) {
-    builder.add_table(read_number_table(text, file), name);
+    builder.add_table(numbers_only(read_number_table(text, file), options, session), name);
   } else if (is_exploration_recording(text)) {
     add_exploration(file, name, text, options, builder);
   } else if (is_recording(text)) {
@@ -74,7 +120,12 @@ void add_file(const std::string& file, const std::string& name, const AlbumOptio
     if (name != short_name(file)) recording.recordings.front().name = name;
     builder.add_recording(std::move(recording));
   } else if (is_json(text)) {
-    builder.add_report(file, read_report(text, file));
+    builder.add_report(file, report_of(text, file));
+  } else if (!named && names_grid(file, session.registry())) {
+    throw Error(ErrorCode::input,
+                fmt::format("{0} is the map of a floor, which has no graph: cairn info {0} "
+                            "describes it, cairn explore {0} drives on it",
+                            file));
   } else {
     builder.add_graph(file, name, load_graph(file, options.input, session).graph);
   }
@@ -106,9 +157,8 @@ bool has_columns(const std::string& file) {
   return std::filesystem::is_regular_file(file, error) && is_exploration_recording(read_file(file));
 }
 
-void add_album_options(ArgumentParser cli, AlbumOptions& options) {
-  cli.add_option("files", options.files,
-                 "graphs (.gz too, @KIND to generate), trajectories, recordings, JSON of runs, CSV")
+void add_album_options(ArgumentParser cli, AlbumOptions& options, const char* files) {
+  cli.add_option("files", options.files, files)
       .type_name("FILE")
       .file_or_generated({"generator"})
       .required();

@@ -32,7 +32,8 @@ inline constexpr std::size_t kMostOfAPage = 13'000'000;
 bool is_csv(const std::string& file);
 /// Whether it has columns to plot: as `is_csv`, or a recording of an exploration.
 bool has_columns(const std::string& file);
-void add_album_options(ArgumentParser cli, AlbumOptions& options);
+/// `files`: what FILE may be.
+void add_album_options(ArgumentParser cli, AlbumOptions& options, const char* files);
 
 /// Reads the files (graphs, trajectories, recordings, the JSON of runs, CSV) and lays together what
 /// belongs together, as `AlbumBuilder` does. Throws `Error` for files that cannot be read.

@@ -73,7 +73,12 @@ std::vector<std::string> option_names(const std::vector<Argument>& options) {
 /// The nearest option if there is one; not all of them, which --help shows better.
 std::string suggestion(const std::string& word, const std::vector<std::string>& candidates) {
   if (word.size() <= 2) return "";  // "-o" is no misspelt "-h"
-  const std::string nearest = nearest_spelling(word, candidates);
+  // What begins with it, such as --keep-every for --keep, before what is spelt like it.
+  const auto begins = std::ranges::find_if(candidates, [&](const std::string& name) {
+    return word.size() > 4 && name.starts_with(word);
+  });
+  const std::string nearest =
+      begins != candidates.end() ? *begins : nearest_spelling(word, candidates);
   return nearest.empty() ? "" : fmt::format("; did you mean '{}'?", nearest);
 }
 

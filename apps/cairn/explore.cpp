@@ -71,6 +71,8 @@ void merge(const std::string& words, const char* option, ComponentSpec& spec) {
 
 ComponentSpec world_spec(const ExploreOptions& options) {
   ComponentSpec spec = parse_component(options.world);
+  check_part_words(options.lidar, "--lidar");
+  check_part_words(options.odometry, "--odometry");
   merge(options.lidar, "--lidar", spec);
   merge(options.odometry, "--odometry", spec);
   return spec;
@@ -178,6 +180,7 @@ void check_single(const ExploreOptions& options) {
 }
 
 void check(const ExploreOptions& options, Session& session) {
+  check_world(parse_component(options.world).name, session.registry());
   if (compares(options)) {
     check_single(options);
     return check_comparison(options.comparison, options.recording.page, session);

@@ -38,8 +38,9 @@ class ComparisonProgress {
     std::string what = run.done ? fmt::format("{:.0f} m, {:.0f} m² known, {}",
                                               run.measures.distance, run.measures.coverage, run.why)
                                 : run.why;
-    line_.show(fmt::format("{} of {} runs, {} left: {} with seed {}: {}", done_, all_,
-                           seconds_text(left), explorers_[run.explorer], run.seed, what));
+    const std::string until = done_ < all_ ? fmt::format(", {} left", seconds_text(left)) : "";
+    line_.show(fmt::format("{} of {} runs{}: {} with seed {}: {}", done_, all_, until,
+                           explorers_[run.explorer], run.seed, what));
   }
 
   void clear() { line_.clear(); }
@@ -123,6 +124,12 @@ int run_comparison(const ComparisonOptions& options, const std::string& page,
                           .first_seed = parts.seed,
                           .threads = threads()};
   for (const std::string& name : comparison.explorers) {
+    if (std::ranges::count(comparison.explorers, name) > 1) {
+      throw Error(ErrorCode::usage,
+                  fmt::format("--explorer: {} is there twice, with the same seeds: --runs {} makes "
+                              "more runs of it",
+                              name, options.runs + 1));
+    }
     work.explorers.push_back(parse_component(name));
     setup.registry.make<Explorer>(work.explorers.back());  // a wrong name is reported at once
   }

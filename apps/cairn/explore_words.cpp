@@ -2,12 +2,14 @@
 #include "explore_words.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <exception>
 
 #include <fmt/core.h>
 
+#include "cairn/exploration/world.hpp"
 #include "cairn/plugin/options.hpp"
 #include "cairn/runtime/error.hpp"
 
@@ -69,6 +71,39 @@ ExplorationLimits limits_of(const std::string& words) {
     }
   }
   return limits;
+}
+
+void check_world(std::string_view name, const Registry& registry) {
+  constexpr std::array<std::string_view, 3> kMotions{"differential", "holonomic", "dubins"};
+  if (std::ranges::find(kMotions, name) == kMotions.end() || registry.has(World::kKind, name))
+    return;
+  throw Error(ErrorCode::usage, fmt::format("--world: '{0}' is a way to move, no world: --world "
+                                            "lidar_building:motion={0}",
+                                            name));
+}
+
+void check_part_words(const std::string& words, std::string_view option) {
+  constexpr std::array kLidar{"fov", "beams", "range", "range_sigma", "dropouts"};
+  constexpr std::array kOdometry{"sigma_xy", "sigma_theta", "relative"};
+  constexpr std::array kRobot{"radius", "step", "turn", "motion", "turning_radius", "surveyor"};
+  if (words.empty()) return;
+  const auto holds = [](const auto& all, const std::string& key) {
+    return std::ranges::find(all, key) != all.end();
+  };
+  for (const auto& [key, text] : parse_component("part:" + words).values) {
+    std::string_view belongs = option;
+    if (holds(kLidar, key)) belongs = "--lidar";
+    if (holds(kOdometry, key)) belongs = "--odometry";
+    if (holds(kRobot, key)) belongs = "--world";
+    if (belongs == option) continue;
+    throw Error(
+        ErrorCode::usage,
+        fmt::format("{0}: '{1}' is an option of the {2}: {3}{1}={4}", option, key,
+                    belongs == "--lidar"      ? "lidar"
+                    : belongs == "--odometry" ? "odometry"
+                                              : "robot",
+                    belongs == "--world" ? "--world NAME:" : std::string(belongs) + " ", text));
+  }
 }
 
 MatchModel match_of(const std::string& words) {

@@ -2,8 +2,10 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 
 #include "cairn/exploration/exploration.hpp"
+#include "cairn/plugin/registry.hpp"
 
 namespace cairn::app {
 
@@ -15,5 +17,12 @@ namespace cairn::app {
 ExplorationLimits limits_of(const std::string& words);
 /// --match
 MatchModel match_of(const std::string& words);
+
+/// Throws `Error` (usage) for the name of a motion in place of that of a world.
+void check_world(std::string_view name, const Registry& registry);
+
+/// Throws `Error` (usage) for an option of the world that `--lidar` or `--odometry` is not for, and
+/// names what is; options of worlds of other plugins may be anything.
+void check_part_words(const std::string& words, std::string_view option);
 
 }  // namespace cairn::app

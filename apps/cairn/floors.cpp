@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <filesystem>
 #include <iterator>
 #include <vector>
 
@@ -122,9 +123,18 @@ json::object report_json(const std::string& name, const GridFrame& frame, const 
 
 }  // namespace
 
+/// The name of a floor plan without its @.
+void check_is_no_plan(const std::string& name, const Registry& registry) {
+  const std::string kind = name.substr(0, name.find(':'));
+  if (!registry.has(FloorPlan::kKind, kind) || std::filesystem::exists(name)) return;
+  throw Error(ErrorCode::input,
+              fmt::format("there is no file {}; @{} makes that floor plan", kind, name));
+}
+
 OccupancyGrid load_floor(const std::string& name, Session& session) {
   Registry& registry = session.registry();
   if (!name.starts_with('@')) {
+    check_is_no_plan(name, registry);
     for (const auto& file : grid_files_read(name, registry)) session.files.add_input(file.string());
     return read_grid(name, registry);
   }

@@ -345,7 +345,8 @@ void add_sparsify_options(ArgumentParser cli, SparsifyCommandOptions& options) {
   cli.add_option("--to", options.output_format, "format of OUT")
       .component({"format"})
       .type_name("FORMAT");
-  cli.add_option("--keep-every", options.keep_every, "one of so many nodes stays")
+  cli.add_option("--keep-every", options.keep_every,
+                 "one of so many nodes stays; --select for others")
       .type_name("N")
       .within(1.0, 1e9);
   cli.add_option("--select", options.select,
@@ -355,10 +356,10 @@ void add_sparsify_options(ArgumentParser cli, SparsifyCommandOptions& options) {
   cli.add_option("--nodes", options.nodes, "what may leave: poses, landmarks or all [poses]")
       .type_name("KIND")
       .one_of({"poses", "landmarks", "all"});
-  cli.add_option(
-         "--topology", options.topology,
-         "pairs that get a factor: clt, mi, dmi, ekld, mixed, odd, l1, best; or one factor on all "
-         "neighbours: glc [ekld]")
+  cli.add_option("--topology", options.topology,
+                 "pairs that get a factor: clt, cliquey, mi, dmi, ekld, mixed, odd, l1, best; or "
+                 "one factor "
+                 "on all neighbours: glc [ekld]")
       .component({"topology"});
   cli.add_option("--population", options.population,
                  "number of new factors: tree:γ, fill:α or loss:KLD [tree:2]")
@@ -371,7 +372,8 @@ void add_sparsify_options(ArgumentParser cli, SparsifyCommandOptions& options) {
          "single: one by one; runs: those in a row together; multi: all connected ones [single]")
       .type_name("HOW")
       .one_of({"single", "runs", "multi"});
-  cli.add_option("--sparsifier", options.sparsifier, "the sparsifier, with more options")
+  cli.add_option("--sparsifier", options.sparsifier,
+                 "the sparsifier, with more options: sparsify:fit=graph")
       .component({"sparsifier"})
       .show_default();
   cli.add_option("--edges", options.edges,

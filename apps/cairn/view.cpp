@@ -89,7 +89,9 @@ int run(const ViewOptions& options, Session& session) {
 Command add_view(ArgumentParser program) {
   auto options = std::make_shared<ViewOptions>();  // lives as long as the parser and the run
   ArgumentParser cli = program.add_command("view", "an HTML report with interactive graphs");
-  add_album_options(cli, options->album);
+  add_album_options(cli, options->album,
+                    "graphs (.gz too, @KIND to generate), trajectories, recordings (--record), "
+                    "JSON of optimize, bench or replay");
   cli.add_option("-o,--output", options->output, "the page [name of the first FILE, .html]")
       .type_name("PAGE");
   cli.footer(

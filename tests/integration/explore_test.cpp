@@ -301,6 +301,12 @@ TEST_F(Explore, WhatCannotWorkIsRefusedBeforeTheWork) {
   EXPECT_THAT(refusal({"--until", "distance"}, 2), HasSubstr("is not of the form distance=250"));
   EXPECT_THAT(refusal({"--explorer", "frontir"}, 5), HasSubstr("frontier"));
   EXPECT_THAT(refusal({"--lidar", "beams=0"}, 2), HasSubstr("beams"));
+  EXPECT_THAT(refusal({"--lidar", "sigma_xy=0.1"}, 2), HasSubstr("--odometry sigma_xy=0.1"));
+  EXPECT_THAT(refusal({"--odometry", "fov=90"}, 2), HasSubstr("--lidar fov=90"));
+  EXPECT_THAT(refusal({"--lidar", "radius=0.1"}, 2), HasSubstr("--world NAME:radius=0.1"));
+  EXPECT_THAT(refusal({"--world", "dubins"}, 2), HasSubstr("lidar_building:motion=dubins"));
+  EXPECT_THAT(refusal({"--explorer", "frontier,frontier"}, 2), HasSubstr("is there twice"));
+  EXPECT_THAT(cairn({"explore", "rooms"}).err, HasSubstr("@rooms"));
   EXPECT_THAT(refusal({"--lidar", "fov=90", "--world", "lidar_building:fov=100"}, 2),
               HasSubstr("give one"));
   EXPECT_THAT(refusal({"--map", folder_.file("map.g2o")}, 2), HasSubstr("map.yaml"));

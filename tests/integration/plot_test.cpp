@@ -293,6 +293,31 @@ TEST_F(PlotCommand, SaysWhichColumnsThereAre) {
   EXPECT_THAT(page.err, HasSubstr("cairn plot"));
 }
 
+TEST_F(PlotCommand, ColumnsOfTextAreLeftOut) {
+  const std::string csv = folder_.file("runs.csv"), plot = folder_.file("runs.svg");
+  write_text(csv, "explorer,seed,coverage,end\nfrontier,1,20,finished\nrandom,2,30,limit\n");
+  const Outcome outcome = cairn({"plot", csv, "-o", plot});
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_THAT(unfolded(outcome.err), HasSubstr("no numbers, explorer, end; --x COLUMN"));
+  EXPECT_THAT(read_text(plot), HasSubstr("coverage"));
+}
+
+TEST_F(PlotCommand, WhatHasNoGraphIsRefusedWithWhatWouldWork) {
+  const std::string report = folder_.file("run.json"), floor = folder_.file("floor.yaml");
+  write_text(report, R"({"cairn":"0","command":"explore","steps":[]})");
+  write_text(floor, "image: floor.png\nresolution: 0.1\n");
+  for (const char* command : {"plot", "view"}) {
+    const std::string page = folder_.file(std::string("x.") + (*command == 'p' ? "svg" : "html"));
+    const Outcome of_json = cairn({command, report, "-o", page});
+    EXPECT_EQ(of_json.exit_code, 3);
+    EXPECT_THAT(unfolded(of_json.err), HasSubstr("--record FILE.jsonl"));
+    const Outcome of_floor = cairn({command, floor, "-o", page});
+    EXPECT_EQ(of_floor.exit_code, 3);
+    EXPECT_THAT(unfolded(of_floor.err), HasSubstr("is the map of a floor"));
+  }
+  EXPECT_THAT(cairn({"view", "--help"}).out, Not(HasSubstr("CSV")));
+}
+
 TEST_F(PlotCommand, SaysWhatIsMissing) {
   const Outcome outcome = cairn({"plot", graph_, "--what", "bars", "-o", folder_.file("x.svg")});
   EXPECT_EQ(outcome.exit_code, 3);

@@ -88,6 +88,8 @@ TEST(Usage, AnUnknownOptionIsAnsweredWithTheNearest) {
   expect_error(cairn({"optimize", "--iteratons", "5", "x.g2o"}), kUsage, "'--iteratons'");
   expect_error(cairn({"info", "x.g2o", "--thread=2"}), kUsage, "did you mean '--threads'?");
   expect_error(cairn({"--frobnicate"}), kUsage, "'--frobnicate'");
+  expect_error(cairn({"sparsify", "x.g2o", "--keep", "100"}), kUsage,
+               "did you mean '--keep-every'?");
 }
 
 TEST(Usage, MissingAndSurplusAndMalformedArgumentsAreRefused) {
