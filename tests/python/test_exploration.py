@@ -308,3 +308,21 @@ def test_ctrl_c_within_a_decision_ends_the_run():
     """
     ended = subprocess.run([sys.executable, "-c", textwrap.dedent(run)], capture_output=True, text=True, timeout=120)
     assert (ended.returncode, ended.stdout) == (0, "went on\n"), ended.stderr
+
+
+def test_a_floor_goes_by_its_name(tmp_path):
+    room().write(tmp_path / "floor.yaml")
+    for floor in [tmp_path / "floor.yaml", str(tmp_path / "floor.yaml")]:
+        assert_array_equal(cairn.explore(floor, max_steps=2).steps["coverage"], cairn.explore(room(), max_steps=2).steps["coverage"])
+    named, made = cairn.explore("@rooms:width=12,seed=3", max_steps=2), cairn.explore(cairn.generate_floor("rooms", seed=3, width=12), max_steps=2)
+    assert_array_equal(named.steps["coverage"], made.steps["coverage"])
+    with pytest.raises(cairn.Error, match="there is no file 'rooms'; '@rooms' makes that floor plan"):
+        cairn.explore("rooms")
+    with pytest.raises(TypeError, match="floor: expected a cairn.Floor, the name of a file .* or a floor plan such as '@rooms', not a int"):
+        cairn.explore(3)
+
+
+@pytest.mark.parametrize("name", ["until", "lidar"])
+def test_an_option_that_nothing_has_is_answered_by_the_arguments(name):
+    with pytest.raises(cairn.Error, match=f"explore has no argument '{name}', nor has frontier such an option; arguments: floor, .*max_distance.*world.*options: "):
+        cairn.explore(room(), **{name: "x"})

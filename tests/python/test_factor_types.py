@@ -417,3 +417,11 @@ def test_an_angle_that_is_not_wrapped_is_noted():
     graph, _ = bearings(wrapped=False)
     notes = cairn.optimize(graph, initial=None, max_iterations=3).notes
     assert any("EDGE_DIRECTION" in note and "is an angle of" in note for note in notes), notes
+
+
+def test_a_tag_of_a_plugin_is_refused():
+    with pytest.raises(cairn.Error, match="'EDGE_SE2' is a factor type of the plugin 'slam2d' already: give yours a tag of its own"):
+        cairn.FactorType("EDGE_SE2", [cairn.Pose2, cairn.Pose2], residual, residual_size=3, measurement_size=3)
+    graph = cairn.Graph()
+    graph.add(0, cairn.Pose2())
+    graph.add(cairn.Prior(0, cairn.Pose2()), sigmas=1)

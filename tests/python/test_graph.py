@@ -125,3 +125,39 @@ def test_errors_carry_the_message_and_the_kind():
     assert raised.value.kind == "usage"
     with pytest.raises(cairn.Error, match="there is no factor 12"):
         graph.factor(12)
+
+
+def test_ids_below_zero_are_refused():
+    graph = small()
+    with pytest.raises(cairn.Error, match="the id -1 is below 0: ids are from 0, as in files"):
+        graph.add(-1, cairn.Pose2())
+    with pytest.raises(cairn.Error, match="the id -2 is below 0"):
+        graph.add_variables(cairn.Point2, [5, -2], [[0, 0], [1, 1]])
+    with pytest.raises(cairn.Error, match="the id -1 is below 0"):
+        cairn.Estimator().add(-1, cairn.Pose2())
+    assert graph.variable_count == 3
+
+
+def test_calls_that_do_not_fit_say_what_does():
+    graph = small()
+    for call, message in [
+        (lambda: graph.add("x0", cairn.Pose2()), r"an id is an integer, not the text 'x0'; cairn.symbol\('x', 0\) makes one of it"),
+        (lambda: cairn.Estimator().add("x0", cairn.Pose2()), "not the text 'x0'"),
+        (lambda: graph.add(cairn.Pose2()), "add takes an id and a value"),
+        (lambda: graph.add(cairn.Between(0, 1, cairn.Pose2()), 0.1), "a measurement with its noise by name"),
+        (lambda: graph.remove(0), r"remove takes what leaves by name: remove\(variables=ids\)"),
+        (lambda: graph.states(), "of which type.* the graph has VERTEX_SE2, VERTEX_XY"),
+        (lambda: graph.positions(), "of which type.* the graph has EDGE_"),
+        (lambda: cairn.Between(0, 1, (1, 0, 0)), r"Between: what is measured is a value such as Pose2\(1, 0, 0\) or a Pose3, not a tuple"),
+        (lambda: cairn.Between("x0", 1, cairn.Pose2()), "not the text 'x0'"),
+        (lambda: cairn.Prior(0, [1, 2]), "Prior: .* not a list"),
+        (lambda: cairn.Observation(0, 1, (1, 2)), "Observation: .* not a tuple"),
+    ]:
+        with pytest.raises(TypeError, match=message):
+            call()
+    graph.remove(factors=0)
+    graph.remove(variables=cairn.L(0))
+    assert graph.variable_count == 2
+    graph.add(np.int64(7), cairn.Pose2(), 1)
+    graph.add(8, cairn.Pose2(), fixed=np.True_)
+    assert graph.fixed == [cairn.X(0), 7, 8]

@@ -107,13 +107,13 @@ def test_states_are_replaced_whole_or_in_part():
 
 def test_ids_may_be_far_apart():
     graph = cairn.Graph()
-    graph.add_variables(cairn.Pose2, [cairn.X(0), cairn.X(1), -5], np.zeros((3, 3)))
+    graph.add_variables(cairn.Pose2, [cairn.X(0), cairn.X(1), 5], np.zeros((3, 3)))
     graph.add_variables("VERTEX_XY", [cairn.L(7), 2**62], [[1, 2], [3, 4]])
-    pairs = [[cairn.X(1), cairn.L(7)], [-5, 2**62], [cairn.X(0), cairn.L(7)]]
+    pairs = [[cairn.X(1), cairn.L(7)], [5, 2**62], [cairn.X(0), cairn.L(7)]]
     graph.add_factors("EDGE_SE2_XY", pairs, [[0, 2], [3, 3], [1, 4]], sigmas=1)
     assert_allclose(graph.squared_norms(), [1, 1, 4])
     with pytest.raises(cairn.Error, match=r"ids\[1\]: there is no variable l8"):
-        graph.add_factors("EDGE_SE2_XY", [pairs[0], [-5, cairn.L(8)]], [[0, 2], [3, 3]], sigmas=1)
+        graph.add_factors("EDGE_SE2_XY", [pairs[0], [5, cairn.L(8)]], [[0, 2], [3, 3]], sigmas=1)
 
 
 def test_an_unsigned_id_that_is_no_id_is_refused():
@@ -137,3 +137,27 @@ def test_a_loss_in_bulk_is_of_these_factors():
     before = graph.chi2()
     graph.add_factors("EDGE_SE2", pairs, measurements, information, loss="cauchy:scale=1")
     assert_allclose(graph.chi2(), before + np.log1p(bulk(walk).squared_norms()).sum())
+
+
+def test_factors_are_added_by_the_class_of_their_measurements():
+    walk = dense.loop()
+    ids, states, pairs, measurements, information = arrays_of(walk)
+    graph, other = cairn.Graph(), bulk(walk)
+    graph.add_variables(cairn.Pose2, ids, [cairn.Pose2(*state) for state in states])
+    graph.add_factors(cairn.Between, pairs, [cairn.Pose2(*z) for z in measurements], information)
+    assert_array_equal(graph.squared_norms(), other.squared_norms())
+    assert_array_equal(graph.measurements(cairn.Between), other.measurements("EDGE_SE2"))
+    graph.add_factors(cairn.Prior, [[0]], (cairn.Pose2(),), sigmas=1)
+    graph.add_variables("VERTEX_SE3:QUAT", [100, 101], [cairn.Pose3()] * 2)
+    graph.add_factors(cairn.Between, [[100, 101]], [cairn.Pose3()], sigmas=1)
+    graph.add_variables(cairn.Point2, [200], [[1, 1]])
+    graph.add_factors(cairn.BearingRange, [[0, 200]], [[0.5, 1]], sigmas=1)
+    assert graph.factor_types == {"EDGE_SE2": len(pairs), "EDGE_PRIOR_SE2": 1, "EDGE_SE3:QUAT": 1, "EDGE_BEARING_RANGE_SE2_XY": 1}
+    for call, message in [
+        (lambda: graph.measurements(cairn.Between), "a Between is of one of several types: give the tag, 'EDGE_SE2' or 'EDGE_SE3:QUAT'"),
+        (lambda: graph.add_factors(cairn.Between, [[0, 200]], [[0, 0, 0]], sigmas=1), r"ids\[0\]: no Between is on VERTEX_SE2 and VERTEX_XY"),
+        (lambda: graph.add_factors(7, [[0, 1]], [[0, 0, 0]], sigmas=1), "or by a class such as cairn.Pose2 or cairn.Between"),
+        (lambda: cairn.Measurement(cairn.Between, [0, 1], [0, 0, 0]), "a Between is of one of several types"),
+    ]:
+        with pytest.raises(cairn.Error, match=message):
+            call()

@@ -114,3 +114,15 @@ def test_symbols_are_ids():
     assert cairn.id_text(12) == "12"
     with pytest.raises(cairn.Error, match="a symbol is one letter"):
         cairn.symbol("xy", 1)
+
+
+def test_values_are_equal_where_all_their_numbers_are():
+    makers = [lambda: cairn.Pose2(1, 2, 3), lambda: some_pose3(7), lambda: cairn.Point2(1, 2), lambda: cairn.Point3(1, 2, 3), lambda: some_pose3(8).rotation]
+    for make in makers:
+        value = make()
+        assert value == make() and not value != make()
+        assert hash(value) == hash(make()) and {value: 1}[make()] == 1
+        assert value in [make()]
+        assert value != type(value)() and value != "text" and value is not None
+    assert cairn.Pose2(1, 2, 3) != cairn.Pose2(1, 2, np.nextafter(3, 4))
+    assert cairn.Point2(1, 2) != cairn.Pose2(1, 2, 0)

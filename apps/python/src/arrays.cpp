@@ -11,6 +11,22 @@
 #include "cairn/runtime/error.hpp"
 
 namespace cairn::python {
+namespace {
+
+/// A list of values such as `Pose2` as one of their states: NumPy takes objects that turn into
+/// arrays, but are no sequences, with a warning.
+py::object with_states(const py::object& given) {
+  if (!py::isinstance<py::list>(given) && !py::isinstance<py::tuple>(given)) return given;
+  const auto is_value = [](const py::handle one) { return py::hasattr(one, "from_state"); };
+  if (py::len(given) == 0 || !is_value(given[py::int_(0)])) return given;
+  py::list states;
+  for (const py::handle one : given)
+    states.append(is_value(one) ? py::object(one.attr("state"))
+                                : py::reinterpret_borrow<py::object>(one));
+  return states;
+}
+
+}  // namespace
 
 Ids ids_of(const py::object& sequence, const std::string& what, int dimensions) {
   const py::array numbers = py::array::ensure(sequence);
@@ -40,7 +56,8 @@ Ids ids_of(const py::object& sequence, const std::string& what, int dimensions) 
   return Ids::ensure(numbers);
 }
 
-Doubles doubles_of(const py::object& sequence, const std::string& what) {
+Doubles doubles_of(const py::object& given, const std::string& what) {
+  const py::object sequence = with_states(given);
   Doubles numbers = Doubles::ensure(sequence);
   if (!numbers) {
     PyErr_Clear();

@@ -13,6 +13,7 @@
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/spelling.hpp"
+#include "ids.hpp"
 
 namespace cairn::python {
 namespace {
@@ -43,7 +44,16 @@ std::vector<std::string> argument_names(const char* function) {
   return names;
 }
 
-/// Refuses an option that the component does not have and that is near to an argument.
+/// "arguments: a, b; options: c, d"
+std::string what_there_is(const std::vector<std::string>& arguments, const OptionTable& table) {
+  std::vector<std::string> options;
+  for (const OptionSpec& option : table.specs()) options.push_back(option.name);
+  return fmt::format("arguments: {}; {}", fmt::join(arguments, ", "),
+                     options.empty() ? "it has no options"
+                                     : fmt::format("its options: {}", fmt::join(options, ", ")));
+}
+
+/// Refuses an option that the component does not have, unless it is near to one of its own.
 void check_names(const std::string& component, const py::kwargs& options, std::string_view kind,
                  const char* function) {
   const OptionTable table = default_registry().options(kind, component);
@@ -52,13 +62,28 @@ void check_names(const std::string& component, const py::kwargs& options, std::s
   for (const OptionSpec& option : table.specs()) all.push_back(option.name);
   for (const auto& [key, value] : options) {
     const auto name = key.cast<std::string>();
-    const std::string nearest = table.find(name) ? "" : nearest_spelling(name, all);
-    if (std::ranges::find(arguments, nearest) == arguments.end()) continue;
-    throw Error(
-        ErrorCode::usage,
-        fmt::format("{} has no argument '{}', nor has {} such an option; did you mean '{}'?",
-                    function, name, component, nearest));
+    if (table.find(name)) continue;
+    const std::string nearest = nearest_spelling(name, all);
+    const bool is_argument = std::ranges::find(arguments, nearest) != arguments.end();
+    if (!nearest.empty() && !is_argument) continue;  // the component says so itself
+    throw Error(ErrorCode::usage,
+                fmt::format("{} has no argument '{}', nor has {} such an option; {}", function,
+                            name, component,
+                            is_argument ? fmt::format("did you mean '{}'?", nearest)
+                                        : what_there_is(arguments, table)));
   }
+}
+
+std::string name_of(const py::object& type) { return type.attr("__name__").cast<std::string>(); }
+
+/// "'a', 'b' or 'c'"
+std::string either(const std::vector<std::string>& tags) {
+  std::string text;
+  for (std::size_t k = 0; k < tags.size(); ++k) {
+    if (k > 0) text += k + 1 < tags.size() ? ", " : " or ";
+    text += "'" + tags[k] + "'";
+  }
+  return text;
 }
 
 }  // namespace
@@ -110,10 +135,19 @@ FactorSelector selector_of(const std::string& which) {
 
 std::string tag_of(const py::object& type) {
   if (py::isinstance<py::str>(type)) return type.cast<std::string>();
-  if (py::hasattr(type, "tag")) return type.attr("tag").cast<std::string>();
-  throw Error(
-      ErrorCode::usage,
-      "a type is given by its tag, such as 'VERTEX_SE2', or by a class such as cairn.Pose2");
+  if (py::hasattr(type, "tag")) {
+    const py::object tag = type.attr("tag");  // a property, of classes of measurements
+    if (py::isinstance<py::str>(tag)) return tag.cast<std::string>();
+  }
+  const std::vector<std::string> tags = tags_of_class(type);
+  if (tags.size() == 1) return tags.front();
+  if (!tags.empty()) {
+    throw Error(ErrorCode::usage, fmt::format("a {} is of one of several types: give the tag, {}",
+                                              name_of(type), either(tags)));
+  }
+  throw Error(ErrorCode::usage,
+              "a type is given by its tag, such as 'VERTEX_SE2' or 'EDGE_SE2', or by a class such "
+              "as cairn.Pose2 or cairn.Between");
 }
 
 }  // namespace cairn::python

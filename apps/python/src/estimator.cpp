@@ -20,6 +20,7 @@
 #include "cairn/typed/symbol.hpp"
 #include "component_names.hpp"
 #include "factors.hpp"
+#include "ids.hpp"
 #include "measured.hpp"
 #include "types_of.hpp"
 
@@ -67,6 +68,7 @@ std::unique_ptr<BoundEstimator> make(const std::string& name, const std::string&
 
 void add_variable(BoundEstimator& bound, Id id, const py::object& value, bool fixed,
                   const py::object& type) {
+  check_new_id(id);
   const bool placed_later = value.is_none() || py::isinstance<py::type>(value);
   const py::object which = !type.is_none() ? type : value;
   Variable variable{default_registry().variable_type(tag_of(which)), id, {}, fixed};
@@ -179,6 +181,12 @@ such as cairn.Pose2, or None with `type`: the first measurement of the update th
             bound.pending().factors.push_back(factor);
           },
           py::arg("factor"), "Adds a measurement with its noise with the next update.")
+      .def(
+          "add",
+          [](BoundEstimator&, const py::args& arguments, const py::kwargs& named) {
+            refuse_added(arguments, named);
+          },
+          "Anything else is a TypeError.")
       .def("change", &change, py::arg("factor"), py::arg("values"), py::kw_only(),
            py::arg("sigmas") = py::none(), py::arg("information") = py::none(),
            py::arg("covariance") = py::none(),

@@ -25,6 +25,7 @@
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
 #include "component_names.hpp"
+#include "floors.hpp"
 #include "follower.hpp"
 #include "interrupt.hpp"
 #include "python_explorer.hpp"
@@ -90,12 +91,13 @@ std::unique_ptr<PythonExplorer> own_explorer(const py::object& explorer, const p
 }
 
 std::unique_ptr<BoundExploration> explore(
-    const OccupancyGrid& floor, const py::object& explorer, std::uint64_t seed,
+    const py::object& given_floor, const py::object& explorer, std::uint64_t seed,
     const std::optional<Pose2>& start, std::optional<double> max_distance,
     std::optional<int> max_steps, std::optional<int> max_decisions, const std::string& world,
     const std::string& policy, const std::string& registration, const std::string& mapper,
     std::optional<double> match_range, std::optional<double> match_angle,
     std::optional<double> decision_budget, const py::object& callback, const py::kwargs& options) {
+  const OccupancyGrid floor = floor_of(given_floor);
   const InterruptGuard guard;
   Follower follower(callback, guard.flag());
   follower.follow();
@@ -172,6 +174,7 @@ py::dict steps_of(const BoundExploration& bound) {
       poses(steps, [&](const Step& s) { return s.truth.value_or(Pose2(nan, nan, nan)); });
   all["coverage"] = column(steps, [](const Step& s) { return s.coverage; });
   all["map_entropy"] = column(steps, [](const Step& s) { return s.map_entropy; });
+  all["grid_area"] = column(steps, [](const Step& s) { return s.grid_area; });
   all["trajectory_entropy"] = column(steps, [](const Step& s) { return s.trajectory_entropy; });
   all["kept"] = column(steps, [](const Step& s) { return s.kept; });
   all["loops"] = column(steps, [](const Step& s) { return s.loops; });
@@ -195,7 +198,9 @@ void bind_step(py::module_& module) {
       .def_readonly("estimate", &Step::estimate, "Where the robot is, as estimated: a Pose2.")
       .def_readonly("truth", &Step::truth, "Where it truly is: a Pose2; None: that is not known.")
       .def_readonly("coverage", &Step::coverage, "Of the cells that are known [m^2].")
-      .def_readonly("map_entropy", &Step::map_entropy, "[nats m^2]")
+      .def_readonly("map_entropy", &Step::map_entropy,
+                    "Over the floor's grid or, where that is not known, the map's [nats m^2].")
+      .def_readonly("grid_area", &Step::grid_area, "Of that grid, known or not [m^2].")
       .def_readonly("trajectory_entropy", &Step::trajectory_entropy, "[nats]")
       .def_readonly("kept", &Step::kept, "Poses that are kept.")
       .def_readonly("loops", &Step::loops, "Loop closures in the graph.")
@@ -262,7 +267,7 @@ void bind_exploration(py::module_& module) {
       py::arg("decision_budget") = py::none(), py::arg("callback") = py::none(),
       R"(A simulated robot with a lidar explores a floor, and decides by itself where to drive (docs/explore.md).
 
-floor: a Floor to drive on.
+floor: a Floor to drive on, the name of a file of one, as of `read_floor`, or "@rooms", a floor plan with its options.
 explorer: a name of `cairn.components("explorer")`, whose options are further keyword arguments; or one of your own, a function
     decide(situation) that returns a Decision, or an object with such a method, and if it has them begin(seed), called before
     the first decision, and is_worthwhile(situation, path), called after each motion: False: it decides anew.

@@ -2,6 +2,7 @@
 // cairn.FactorType: factors written in Python.
 #include <memory>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -13,6 +14,7 @@
 #include "bindings.hpp"
 #include "cairn/evaluation/check_factor.hpp"
 #include "cairn/evaluation/check_wrapping.hpp"
+#include "cairn/plugin/plugin_search.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
 #include "component_names.hpp"
@@ -31,7 +33,7 @@ const char* const kDoc =
     distance = cairn.FactorType("EDGE_DISTANCE", [cairn.Pose2, cairn.Point2], residual, residual_size=1, measurement_size=1)
     graph.add_factors(distance, ids, distances, sigmas=0.1)
 
-tag: its name in files and messages.
+tag: its name in files and messages, which no plugin's factor type has.
 variables: the types of its variables, by class or tag.
 residual: called with the states of each variable, an array (n, m) of the numbers that a graph stores, and with what was
     measured, (n, measurement_size); returns the errors, (n, residual_size), prediction minus measurement, not whitened.
@@ -40,9 +42,21 @@ jacobians: called likewise; returns for each variable an array (n, residual_size
 
 Both must depend on their arguments alone. An exception in them becomes an Error.)";
 
+/// A tag of a plugin: with two types of it, neither could be asked for by its tag any more.
+void refuse_tag_of_plugin(std::string_view tag) {
+  for (const Offer& offer : default_registry().offers()) {
+    if (offer.kind != "factor" || offer.name != tag || offer.file.empty()) continue;
+    throw Error(ErrorCode::usage,
+                fmt::format("FactorType: '{}' is a factor type of the plugin '{}' already: give "
+                            "yours a tag of its own, such as 'MY_{}'",
+                            tag, offer.plugin, tag));
+  }
+}
+
 std::shared_ptr<PythonFactor> make(std::string tag, const py::iterable& variables,
                                    py::object residual, int residual_size, int measurement_size,
                                    py::object jacobians) {
+  refuse_tag_of_plugin(tag);
   BatchedFactorType::Description description{std::move(tag), {}, residual_size, measurement_size};
   for (const py::handle type : variables) {
     description.variables.push_back(
@@ -118,6 +132,7 @@ freedom.)")
   module.def(
       "register",
       [](const std::shared_ptr<PythonFactor>& factor, const std::string& summary) {
+        refuse_tag_of_plugin(factor->tag());  // whose plugin may have been found since
         default_registry().add(std::shared_ptr<const FactorType>(factor), summary);
       },
       py::arg("factor_type"), py::arg("summary") = "",

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // cairn.Floor: occupancy grids, from files, generated, or from an array.
 #include <algorithm>
+#include <charconv>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <string>
+#include <system_error>
 #include <vector>
 
 #include <fmt/core.h>
@@ -21,6 +23,8 @@
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
 #include "component_names.hpp"
+#include "floors.hpp"
+#include "ids.hpp"
 
 namespace cairn::python {
 namespace {
@@ -78,6 +82,14 @@ py::array_t<std::int8_t> cells_of(const OccupancyGrid& floor) {
   return cells;
 }
 
+/// The name of a floor plan without its @ is no file.
+void check_is_file(const std::string& name) {
+  const ComponentSpec spec = parse_component(name.substr(0, name.find(':')));
+  if (std::filesystem::exists(name) || !default_registry().has(FloorPlan::kKind, spec.name)) return;
+  throw Error(ErrorCode::input,
+              fmt::format("there is no file '{0}'; '@{0}' makes that floor plan", name));
+}
+
 OccupancyGrid read(const std::filesystem::path& path) {
   const py::gil_scoped_release unlocked;
   return read_grid(path.string(), default_registry());
@@ -89,7 +101,41 @@ OccupancyGrid generate(const std::string& plan, std::uint64_t seed, const py::kw
   return default_registry().make<FloorPlan>(spec)->generate(seed);
 }
 
+/// "rooms:width=12,seed=3", as the program takes it after an @.
+OccupancyGrid generate_named(const std::string& plan) {
+  ComponentSpec spec = parse_component(plan);
+  std::uint64_t seed = 0;  // the program's
+  const auto given = spec.values.find("seed");
+  if (given != spec.values.end() &&
+      !default_registry().options(FloorPlan::kKind, spec.name).find("seed")) {
+    const std::string& text = given->second;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), seed);
+    if (error != std::errc() || end != text.data() + text.size()) {
+      throw Error(ErrorCode::usage,
+                  fmt::format("@{}: the seed is '{}', expected an integer from 0", plan, text));
+    }
+    spec.values.erase(given);
+  }
+  const py::gil_scoped_release unlocked;
+  return default_registry().make<FloorPlan>(spec)->generate(seed);
+}
+
 }  // namespace
+
+OccupancyGrid floor_of(const py::object& given) {
+  if (py::isinstance<OccupancyGrid>(given)) return given.cast<OccupancyGrid>();
+  if (py::isinstance<py::str>(given)) {
+    const auto name = given.cast<std::string>();
+    if (name.starts_with('@')) return generate_named(name.substr(1));
+    check_is_file(name);
+    return read(name);
+  }
+  if (py::hasattr(given, "__fspath__")) return read(given.cast<std::filesystem::path>());
+  throw py::type_error(fmt::format(
+      "floor: expected a cairn.Floor, the name of a file such as 'floor.yaml', or a floor plan "
+      "such as '@rooms', not a {}",
+      type_name(given)));
+}
 
 void bind_floors(py::module_& module) {
   py::class_<OccupancyGrid>(module, "Floor", kDoc)

@@ -21,6 +21,7 @@
 #include "cairn/typed/print.hpp"
 #include "component_names.hpp"
 #include "graph_arrays.hpp"
+#include "ids.hpp"
 #include "measured.hpp"
 #include "types_of.hpp"
 
@@ -41,6 +42,7 @@ returns are copies; calls that change the graph while another thread optimises i
 int add_variable(BoundGraph& bound, Id id, const py::object& value, bool fixed,
                  const py::object& type) {
   Graph& graph = bound.get();
+  check_new_id(id);
   const Doubles state = doubles_of(value, "value");
   const std::string tag = tag_of(type.is_none() ? value : type);
   const int index = graph.add_variable(variable_type_of(graph, tag), id, span_of(state));
@@ -77,10 +79,13 @@ Measured measured_at(BoundGraph& bound, int position) {
           std::move(factor.measurement), std::move(factor.type)};
 }
 
+Ids one_or_several(const py::object& ids, const char* what) {
+  return ids_of(py::isinstance<py::int_>(ids) ? py::make_tuple(ids) : ids, what);
+}
+
 void fix(BoundGraph& bound, const py::object& ids, bool fixed) {
   Graph& graph = bound.get();
-  const Ids which =
-      py::isinstance<py::int_>(ids) ? ids_of(py::make_tuple(ids), "ids") : ids_of(ids, "ids");
+  const Ids which = one_or_several(ids, "ids");
   std::vector<int> indices;
   for (const Id id : span_of(which)) indices.push_back(cairn::detail::index_of(graph, id));
   for (const int index : indices) graph.set_fixed(index, fixed);
@@ -96,10 +101,16 @@ std::vector<Id> fixed_ids(BoundGraph& bound) {
 }
 
 /// Factors by position, variables by id with all factors on them.
-void remove(BoundGraph& bound, const py::object& ids, const py::object& factors) {
+void remove(BoundGraph& bound, const py::args& unnamed, const py::object& ids,
+            const py::object& factors) {
+  if (!unnamed.empty()) {
+    throw py::type_error(
+        "remove takes what leaves by name: remove(variables=ids), remove(factors=positions)");
+  }
   Graph& graph = bound.get();
   std::vector<bool> factor_leaves(graph.factor_count()), variable_leaves(graph.variable_count());
-  const Ids positions = ids_of(factors, "factors"), variables = ids_of(ids, "variables");
+  const Ids positions = one_or_several(factors, "factors"),
+            variables = one_or_several(ids, "variables");
   for (const Id position : span_of(positions)) {
     if (position < 0 || position >= graph.factor_count())
       throw Error(ErrorCode::usage, fmt::format("there is no factor {}", position));
@@ -175,12 +186,17 @@ loss: a robust loss of its own, such as "cauchy:scale=2".)")
       .def(
           "add", [](BoundGraph& bound, const Factor& factor) { return bound.get().add(factor); },
           py::arg("factor"), "Adds a measurement with its noise; returns its position.")
+      .def(
+          "add",
+          [](BoundGraph&, const py::args& arguments, const py::kwargs& named) {
+            refuse_added(arguments, named);
+          },
+          "Anything else is a TypeError.")
       .def("fix", &fix, py::arg("ids"), py::arg("fixed") = true,
            "Holds variables at their present estimates, or releases them: one id, or several.")
-      .def("remove", &remove, py::kw_only(), py::arg("variables") = py::tuple(),
-           py::arg("factors") = py::tuple(),
-           "Takes out variables (ids) with all factors on them, and factors (positions); those "
-           "after them move up.")
+      .def("remove", &remove, py::arg("variables") = py::tuple(), py::arg("factors") = py::tuple(),
+           "Takes out variables (ids, or one id) with all factors on them, and factors (positions, "
+           "or one); those after them move up. By name: remove(variables=…).")
       .def(
           "set_loss",
           [](BoundGraph& bound, const py::object& loss, const std::string& on) {

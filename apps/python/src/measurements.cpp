@@ -13,6 +13,7 @@
 #include "cairn/typed/measurements.hpp"
 #include "cairn/typed/symbol.hpp"
 #include "component_names.hpp"
+#include "ids.hpp"
 #include "measured.hpp"
 #include "python_factor.hpp"
 
@@ -46,6 +47,20 @@ std::string text_of(const Measured& measured) {
   return "<" + text + ">";
 }
 
+/// Classes know the tags of their factor types.
+template <class... M>
+py::tuple tags() {
+  return py::make_tuple(std::string(M::kTag)...);
+}
+
+/// What has not been a measurement of any kind that there is.
+[[noreturn]] void refuse(const char* kind, const py::tuple& ids, const py::object& measured,
+                         const char* example) {
+  for (const py::handle id : ids) refuse_id_that_is_none(py::reinterpret_borrow<py::object>(id));
+  throw py::type_error(fmt::format("{}: what is measured is a value such as {}, not a {}", kind,
+                                   example, type_name(measured)));
+}
+
 void bind_measurement(py::module_& module) {
   py::class_<Measured>(
       module, "Measurement",
@@ -72,38 +87,61 @@ values: the numbers measured, in the order and the units of the type.)")
 }
 
 void bind_kinds(py::module_& module) {
-  py::class_<MeasuredBetween, Measured>(
+  py::class_<MeasuredBetween, Measured> between_class(
       module, "Between",
       R"(Odometry or a loop closure: pose `to_id` as seen from pose `from_id`.
 
 measured = pose(from_id).inverse() * pose(to_id). The error has three numbers (x y [m], theta [rad]) for a `Pose2`, six
-(translation [m], rotation [rad]) for a `Pose3`.)")
+(translation [m], rotation [rad]) for a `Pose3`.)");
+  between_class.attr("tags") = tags<Between<Pose2>, Between<Pose3>>();
+  between_class
       .def(py::init(&between<Pose2>), py::arg("from_id"), py::arg("to_id"), py::arg("measured"))
-      .def(py::init(&between<Pose3>), py::arg("from_id"), py::arg("to_id"), py::arg("measured"));
-  py::class_<MeasuredPrior, Measured>(module, "Prior",
-                                      R"(Where a pose or a landmark is in the world.
+      .def(py::init(&between<Pose3>), py::arg("from_id"), py::arg("to_id"), py::arg("measured"))
+      .def(py::init([](const py::object& from, const py::object& to,
+                       const py::object& measured) -> MeasuredBetween {
+             refuse("Between", py::make_tuple(from, to), measured, "Pose2(1, 0, 0) or a Pose3");
+           }),
+           py::arg("from_id"), py::arg("to_id"), py::arg("measured"));
+  py::class_<MeasuredPrior, Measured> prior_class(module, "Prior",
+                                                  R"(Where a pose or a landmark is in the world.
 
 What is not known has an infinite sigma: a position alone, as from GPS, is
-`Prior(id, Pose2(x, y, 0))` with sigmas=(s, s, inf).)")
-      .def(py::init(&prior<Pose2>), py::arg("id"), py::arg("measured"))
+`Prior(id, Pose2(x, y, 0))` with sigmas=(s, s, inf).)");
+  prior_class.attr("tags") = tags<Prior<Pose2>, Prior<Pose3>, Prior<Point2>, Prior<Point3>>();
+  prior_class.def(py::init(&prior<Pose2>), py::arg("id"), py::arg("measured"))
       .def(py::init(&prior<Pose3>), py::arg("id"), py::arg("measured"))
       .def(py::init(&prior<Point2>), py::arg("id"), py::arg("measured"))
-      .def(py::init(&prior<Point3>), py::arg("id"), py::arg("measured"));
-  py::class_<MeasuredObservation, Measured>(
+      .def(py::init(&prior<Point3>), py::arg("id"), py::arg("measured"))
+      .def(py::init([](const py::object& id, const py::object& measured) -> MeasuredPrior {
+             refuse("Prior", py::make_tuple(id), measured,
+                    "Pose2(1, 0, 0), Pose3, Point2 or Point3");
+           }),
+           py::arg("id"), py::arg("measured"));
+  py::class_<MeasuredObservation, Measured> observation_class(
       module, "Observation",
-      "A landmark seen from a pose: its position [m] in the frame of the pose.")
+      "A landmark seen from a pose: its position [m] in the frame of the pose.");
+  observation_class.attr("tags") = tags<Observation<Point2>, Observation<Point3>>();
+  observation_class
       .def(py::init(&observation<Point2>), py::arg("pose"), py::arg("landmark"),
            py::arg("measured"))
       .def(py::init(&observation<Point3>), py::arg("pose"), py::arg("landmark"),
-           py::arg("measured"));
-  py::class_<MeasuredBearingRange, Measured>(
+           py::arg("measured"))
+      .def(py::init([](const py::object& pose, const py::object& landmark,
+                       const py::object& measured) -> MeasuredObservation {
+             refuse("Observation", py::make_tuple(pose, landmark), measured,
+                    "Point2(1, 0) or a Point3");
+           }),
+           py::arg("pose"), py::arg("landmark"), py::arg("measured"));
+  py::class_<MeasuredBearingRange, Measured> bearing_range_class(
       module, "BearingRange",
       "A landmark of the plane seen from a pose: direction [rad], anticlockwise from straight "
-      "ahead, and distance [m].")
-      .def(py::init([](Id pose, Id landmark, double bearing, double range) {
-             return measured_as<MeasuredBearingRange>(BearingRange(pose, landmark, bearing, range));
-           }),
-           py::arg("pose"), py::arg("landmark"), py::arg("bearing"), py::arg("range"));
+      "ahead, and distance [m].");
+  bearing_range_class.attr("tags") = tags<BearingRange>();
+  bearing_range_class.def(
+      py::init([](Id pose, Id landmark, double bearing, double range) {
+        return measured_as<MeasuredBearingRange>(BearingRange(pose, landmark, bearing, range));
+      }),
+      py::arg("pose"), py::arg("landmark"), py::arg("bearing"), py::arg("range"));
 }
 
 void bind_symbols(py::module_& module) {

@@ -9,6 +9,7 @@
 #include <fmt/core.h>
 #include <pybind11/operators.h>
 #include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
 
 #include "arrays.hpp"
 #include "bindings.hpp"
@@ -73,6 +74,12 @@ py::array_t<double> each_point(const py::object& points, const Function& functio
   return out;
 }
 
+template <class T>
+std::vector<double> numbers_of(const T& value) {
+  const auto& state = value.state();
+  return {state.data(), state.data() + state.size()};
+}
+
 /// What all values have: the numbers of their state, text, copies and pickles.
 template <class T, class Class>
 void bind_value(Class& type) {
@@ -89,6 +96,11 @@ void bind_value(Class& type) {
           "equals", [](const T& a, const T& b, double tolerance) { return a.equals(b, tolerance); },
           py::arg("other"), py::arg("tolerance") = 1e-9,
           "Whether no coordinate of the difference is beyond the tolerance [m, rad].")
+      .def(
+          "__eq__", [](const T& a, const T& b) { return numbers_of(a) == numbers_of(b); },
+          py::is_operator(), "Whether all numbers of the state are the same, exactly.")
+      .def("__hash__",
+           [](const T& value) { return py::hash(py::tuple(py::cast(numbers_of(value)))); })
       .def("__repr__", [](const T& value) { return to_string(value); })
       .def("__copy__", [](const T& value) { return value; })
       .def("__deepcopy__", [](const T& value, const py::dict&) { return value; })
