@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <cstdint>
+#include <limits>
 
 #include <fmt/core.h>
 
@@ -123,6 +125,13 @@ int run_comparison(const ComparisonOptions& options, const std::string& page,
                           .runs = options.runs,
                           .first_seed = parts.seed,
                           .threads = threads()};
+  const std::uint64_t most = std::numeric_limits<std::uint64_t>::max();
+  if (static_cast<std::uint64_t>(options.runs - 1) > most - parts.seed) {
+    throw Error(ErrorCode::usage,
+                fmt::format("--runs {} with the seeds from --seed {} on go beyond the largest, {}: "
+                            "give a smaller seed",
+                            options.runs, parts.seed, most));
+  }
   for (const std::string& name : comparison.explorers) {
     if (std::ranges::count(comparison.explorers, name) > 1) {
       throw Error(ErrorCode::usage,

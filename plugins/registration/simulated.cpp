@@ -47,7 +47,8 @@ class Simulated final : public Registration, public FalseMatches {
     if (!data.truth) {
       throw bad_data(ErrorCode::usage,
                      "needs the truth: give a graph with the true states of the recording's poses "
-                     "(RegistrationData::truth), or take the registration 'recorded', which "
+                     "(--truth FILE, in C++ RegistrationData::truth), or take the registration "
+                     "'recorded', which "
                      "answers from the recording itself");
     }
     const RecordedLinks links = recorded_links(data, "simulated");

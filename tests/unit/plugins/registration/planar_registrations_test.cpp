@@ -76,8 +76,8 @@ TEST_F(PlanarRegistrations, SimulatedSaysWhatItNeeds) {
   const auto simulated = registry.make<Registration>("simulated");
   EXPECT_THAT(message_of([&] { simulated->begin({.recording = &world.graph, .truth = nullptr}); },
                          ErrorCode::usage),
-              AllOf(HasSubstr("needs the truth"), HasSubstr("give a graph with the true states"),
-                    HasSubstr("'recorded'")));
+              AllOf(HasSubstr("needs the truth"), HasSubstr("--truth FILE"),
+                    HasSubstr("give a graph with the true states"), HasSubstr("'recorded'")));
   EXPECT_THAT(message_of([&] { simulated->begin({.recording = nullptr, .truth = &world.truth}); },
                          ErrorCode::usage),
               HasSubstr("needs the recording"));
