@@ -21,6 +21,8 @@
 #include "cairn/exploration/exploration_measures.hpp"
 #include "cairn/exploration/explorer_comparison.hpp"
 #include "cairn/exploration/recorded_world.hpp"
+#include "cairn/exploration/world.hpp"
+#include "cairn/grid/floor_survey.hpp"
 #include "cairn/grid/grid.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
@@ -77,6 +79,20 @@ void refuse_recorded(const ComponentSpec& world, Registry& registry) {
                           world.name, world.name));
 }
 
+/// What a robot can cover of a floor; empty where it cannot start, as the run will say, or where
+/// the surveyor's plugin is missing.
+std::vector<std::uint8_t> reachable_floor(const ExplorationSetup& setup) {
+  constexpr const char* kSurveyor = "round_body";
+  if (!setup.registry.has(FloorSurveyor::kKind, kSurveyor)) return {};
+  FloorSurveyOptions options{.radius = setup.registry.make<World>(setup.world)->robot().radius};
+  if (setup.start) options.start = setup.start->translation();
+  try {
+    return setup.registry.make<FloorSurveyor>(kSurveyor)->survey(setup.floor, options).covered;
+  } catch (const Error&) {
+    return {};
+  }
+}
+
 /// None: it is a name.
 std::unique_ptr<PythonExplorer> own_explorer(const py::object& explorer, const py::kwargs& options,
                                              Follower& follower) {
@@ -111,6 +127,8 @@ std::unique_ptr<BoundExploration> explore(
                          .limits = limits_of({max_distance, max_steps, max_decisions}),
                          .interrupt = &follower.stop()};
   refuse_recorded(setup.world, setup.registry);
+  const std::vector<std::uint8_t> reachable = reachable_floor(setup);
+  setup.reachable = reachable;
   set_positive("match_range", match_range, setup.match.range);
   set_positive("match_angle", match_angle, setup.match.angle);
   set_positive("decision_budget", decision_budget, setup.decision_budget);

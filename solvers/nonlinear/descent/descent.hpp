@@ -72,10 +72,10 @@ class Descent {
   /// the residuals: diverged. `is_damped`: as for `end_converged`.
   void end_without_descent(double promise, double step_norm, bool is_damped);
 
-  /// Ends the run as converged; `is_damped`: by what a step promises that only damping made
-  /// possible, though the gauge is not free. Where the information of the factors differs by more
-  /// than the digits of H can hold, such a promise leaves out what the weakest factors say, and is
-  /// no sign of a minimum: then H is not positive definite, and a note says what would help.
+  /// Ends the run as converged; `is_damped`: by the predicted decrease of a step that only damping
+  /// made possible, though the gauge is not free. Where the information of the factors differs by
+  /// more than the digits of H can hold, that prediction is without the weakest factors, and no
+  /// sign of a minimum: then H is not positive definite, and a note says what would help.
   void end_converged(bool is_damped);
 
   /// Remembers the estimate if its chi2 is the lowest so far; true if it is.
