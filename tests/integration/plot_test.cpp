@@ -299,7 +299,10 @@ TEST_F(PlotCommand, ColumnsOfTextAreLeftOut) {
   const Outcome outcome = cairn({"plot", csv, "-o", plot});
   EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
   EXPECT_THAT(unfolded(outcome.err), HasSubstr("no numbers, explorer, end; --x COLUMN"));
-  EXPECT_THAT(read_text(plot), HasSubstr("coverage"));
+  const std::string numbers = folder_.file("numbers.csv"), same = folder_.file("numbers.svg");
+  write_text(numbers, "seed,coverage\n1,20\n2,30\n");
+  ASSERT_EQ(cairn({"plot", numbers, "-o", same}).exit_code, 0);
+  EXPECT_EQ(read_text(plot), read_text(same));
 }
 
 TEST_F(PlotCommand, WhatHasNoGraphIsRefusedWithWhatWouldWork) {
