@@ -73,7 +73,7 @@ void add_transposed_product(int rows, const double* A, int a, const double* B, i
 void Models::add(const Graph& graph, int position) {
   const FactorRef ref = graph.ref(position);
   const FactorType& type = *graph.factor_pools()[ref.pool].type;
-  Record record{.place = std::ssize(values_),
+  Record record{.place = 0,
                 .variables = static_cast<std::int32_t>(variables_.size()),
                 .pool = ref.pool,
                 .entry = ref.entry,
@@ -87,16 +87,15 @@ void Models::add(const Graph& graph, int position) {
   }
   const auto factor_variables = graph.factor_variables(position);
   variables_.insert(variables_.end(), factor_variables.begin(), factor_variables.end());
-  values_.resize(values_.size() +
-                 static_cast<std::size_t>(record.rows) *
-                     static_cast<std::size_t>(record.scalars + 1) +
-                 static_cast<std::size_t>(record.scalars));
+  const auto rows = static_cast<std::size_t>(record.rows);
+  const auto scalars = static_cast<std::size_t>(record.scalars);
+  record.place = values_.take(rows * (scalars + 1) + scalars);
   records_.push_back(record);
 }
 
 /// J of its k-th variable.
 const double* Models::block(const Record& record, int k) const {
-  const double* J = values_.data() + record.place;
+  const double* J = values_.at(record.place);
   for (int before = 0; before < k; ++before) J += record.rows * size_of(record, before);
   return J;
 }
@@ -154,7 +153,7 @@ void Models::into_frames(const Record& record, const States& states, double* J) 
 void Models::linearize(int f, const Graph& graph, const States& states) {
   Record& record = records_[f];
   const int rows = record.rows;
-  double* const J = values_.data() + record.place;
+  double* const J = values_.at(record.place);
   double* const r = J + rows * record.scalars;
   double* const gradient = r + rows;
   record.cost = evaluate(record, graph, states.estimate(), r, J);
@@ -187,7 +186,7 @@ void Models::add_to(System& system, int f, double sign, std::span<const std::uin
   const Record& record = records_[f];
   const int rows = record.rows;
   const std::int32_t* v = variables_.data() + record.variables;
-  const double* J = values_.data() + record.place;
+  const double* J = values_.at(record.place);
   const double* const change = J + rows * record.scalars;
   const double* gradient = change + rows;
   for (int ka = 0; ka < record.arity; ++ka) {
@@ -244,8 +243,8 @@ void move_pair(const double* J, const double* const* steps, double* r) {
 bool Models::move(int f, const double* const* steps) {
   Record& record = records_[f];
   const int rows = record.rows;
-  const double* J = values_.data() + record.place;
-  double* change = values_.data() + record.place + rows * record.scalars;
+  const double* J = values_.at(record.place);
+  double* change = values_.at(record.place) + rows * record.scalars;
   if (record.arity == 2 && rows == 3 && record.scalars == 6 && size_of(record, 0) == 3) {
     move_pair<3, 3>(J, steps, change);
   } else if (record.arity == 2 && rows == 6 && record.scalars == 12 && size_of(record, 0) == 6) {
@@ -270,8 +269,8 @@ double Models::correct(int f, const Graph& graph, const States& states, System& 
   double* const r_now = J_now + doubles;
   double* const beyond = r_now + rows;  // J(x)ᵀ r(x) less γ when last evaluated
   record.cost = evaluate(record, graph, states.estimate(), r_now, J_now);
-  const double* const J = values_.data() + record.place;
-  double* const change = values_.data() + record.place + doubles;
+  const double* const J = values_.at(record.place);
+  double* const change = values_.at(record.place) + doubles;
   double* const gradient = change + rows;
   std::fill_n(beyond, record.scalars, 0.0);
   add_transposed_product(rows, J_now, record.scalars, r_now, 1, 1.0, beyond);

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "cairn/graph/graph.hpp"
-#include "cairn/runtime/aligned.hpp"
+#include "segmented_array.hpp"
 #include "states.hpp"
 #include "system.hpp"
 
@@ -72,8 +72,8 @@ class Models {
   /// ρ(‖r‖²) at an estimate; nothing is kept of it.
   double cost_now(int f, const Graph& graph, const Estimate& estimate) const;
   /// J of all its variables side by side, rows × scalars, column-major.
-  const double* jacobian(int f) const { return values_.data() + records_[f].place; }
-  std::int64_t doubles() const { return std::ssize(values_); }
+  const double* jacobian(int f) const { return values_.at(records_[f].place); }
+  std::int64_t doubles() const { return values_.size(); }
 
  private:
   struct Record {
@@ -97,7 +97,7 @@ class Models {
   std::vector<Record> records_;
   std::vector<std::int32_t> variables_;
   std::vector<std::int16_t> tangents_;  // of each of a factor's variables
-  AlignedVector values_;
+  SegmentedArray values_;
   mutable std::vector<double> scratch_, turned_;
   mutable std::vector<double*> pointers_;
   mutable std::vector<const double*> points_;

@@ -93,7 +93,7 @@ bool System::has_set_aside(std::int32_t v) const {
 }
 
 void System::clear_values() {
-  std::ranges::fill(values_, 0.0);
+  values_.fill_with_zeros();
   for (std::vector<double>* vector : {&g_, &pending_, &gradient_, &change_, &aside_})
     std::ranges::fill(*vector, 0.0);
   std::ranges::fill(counts_all_, 0);
@@ -104,13 +104,11 @@ std::int64_t System::take(std::int32_t doubles) {
   if (static_cast<std::size_t>(doubles) < free_values_.size() && !free_values_[doubles].empty()) {
     const std::int64_t place = free_values_[doubles].back();
     free_values_[doubles].pop_back();
-    std::fill_n(values_.begin() + place, doubles, 0.0);
+    std::fill_n(values_.at(place), doubles, 0.0);
     return place;
   }
   if (free_values_.size() <= static_cast<std::size_t>(doubles)) free_values_.resize(doubles + 1);
-  const std::int64_t place = std::ssize(values_);
-  values_.resize(values_.size() + doubles, 0.0);
-  return place;
+  return values_.take(static_cast<std::size_t>(doubles));
 }
 
 }  // namespace cairn::incremental

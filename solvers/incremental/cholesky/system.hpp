@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "cairn/runtime/aligned.hpp"
+#include "segmented_array.hpp"
 
 namespace cairn::incremental {
 
@@ -38,11 +38,11 @@ class System {
   std::int32_t find(std::int32_t a, std::int32_t b) const;
 
   /// H_vv, column-major.
-  double* diagonal(std::int32_t v) { return values_.data() + diagonals_[v]; }
-  const double* diagonal(std::int32_t v) const { return values_.data() + diagonals_[v]; }
+  double* diagonal(std::int32_t v) { return values_.at(diagonals_[v]); }
+  const double* diagonal(std::int32_t v) const { return values_.at(diagonals_[v]); }
   /// H_ab with a < b: size_a × size_b, column-major.
-  double* block(std::int32_t entry) { return values_.data() + entries_[entry].value; }
-  const double* block(std::int32_t entry) const { return values_.data() + entries_[entry].value; }
+  double* block(std::int32_t entry) { return values_.at(entries_[entry].value); }
+  const double* block(std::int32_t entry) const { return values_.at(entries_[entry].value); }
   /// The right-hand side, zero but while it is being solved for (see `Models::right_hand_side`).
   std::vector<double>& g() { return g_; }
   double* g(std::int32_t v) { return g_.data() + offsets_[v]; }
@@ -72,7 +72,7 @@ class System {
   /// H and all vectors become zero; the blocks stay.
   void clear_values();
 
-  std::int64_t doubles() const { return std::ssize(values_) + 5 * std::ssize(g_); }
+  std::int64_t doubles() const { return values_.size() + 5 * std::ssize(g_); }
 
  private:
   struct Entry {
@@ -89,7 +89,7 @@ class System {
   std::vector<Entry> entries_;
   std::vector<std::int32_t> free_entries_;
   std::vector<std::vector<std::int64_t>> free_values_;  // by number of doubles
-  AlignedVector values_;
+  SegmentedArray values_;
   std::vector<double> g_, pending_, gradient_, change_, aside_;
   std::vector<std::uint8_t> counts_all_;  // by variable
   std::int64_t scalars_ = 0;
