@@ -163,6 +163,17 @@ std::size_t sample_size(const CompactOptions& options, const PolicyData& data,
   return count;
 }
 
+/// What thresholds allow was checked for a run as long as their sample.
+void note_short_sample(std::int64_t sample, const PolicyData& data, const Session& session) {
+  constexpr std::int64_t kLonger = 2;  // times
+  if (sample == 0 || std::ssize(data.poses) <= kLonger * sample) return;
+  session.note(fmt::format(
+      "the thresholds were found in {} poses, and this recording has {}: the error of a map grows "
+      "with its size, and with these thresholds may be several times that of all measurements. "
+      "Find them in a longer recording (--auto), or give a lower --loop-gain",
+      sample, data.poses.size()));
+}
+
 Job prepare(const CompactOptions& options, const PolicySetting& setting, Results& results,
             const Session& session) {
   Job result;
@@ -197,11 +208,17 @@ Job prepare(const CompactOptions& options, const PolicySetting& setting, Results
   emplace(given_thresholds(options));
   const OptionValues given = job.policy.values;
   if (!options.estimator.empty()) emplace({{"estimator", options.estimator}});
-  if (!options.thresholds.empty())
-    result.found.options = read_thresholds(options.thresholds, job.policy.name);
+  std::int64_t sample = 0;  // poses in which the thresholds were found
+  if (!options.thresholds.empty()) {
+    SavedThresholds saved = read_thresholds(options.thresholds, job.policy.name);
+    result.found.options = std::move(saved.options);
+    sample = saved.poses;
+    note_short_sample(sample, setting.data, session);
+  }
   if (automatic) {
-    result.found = find_thresholds(job, sample_size(options, setting.data, session),
-                                   options.error_ratio, setting);
+    const std::size_t count = sample_size(options, setting.data, session);
+    sample = static_cast<std::int64_t>(count);
+    result.found = find_thresholds(job, count, options.error_ratio, setting);
     if (setting.interrupted()) return result;
   }
   emplace(result.found.options);
@@ -221,7 +238,8 @@ Job prepare(const CompactOptions& options, const PolicySetting& setting, Results
     result.strategy = options.strategy == "rfpfl" ? options.strategy : chosen;
   }
   results.write(options.save_thresholds, [&] {
-    write_thresholds(options.save_thresholds, job.policy.name, result.thresholds.options);
+    write_thresholds(options.save_thresholds, job.policy.name,
+                     {.options = result.thresholds.options, .poses = sample});
   });
   return result;
 }

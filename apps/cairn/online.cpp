@@ -239,7 +239,7 @@ Listener follow_policy(const OnlineOptions& options, const ProblemSetup& setup, 
   Registry& registry = session.registry();
   ComponentSpec spec = policy_spec(options, registry);
   if (!options.thresholds.empty()) {
-    for (const auto& [name, value] : read_thresholds(options.thresholds, spec.name))
+    for (const auto& [name, value] : read_thresholds(options.thresholds, spec.name).options)
       spec.values.emplace(name, value);
   }
   Listener listener;

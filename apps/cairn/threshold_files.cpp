@@ -15,7 +15,7 @@ namespace cairn::app {
 
 namespace json = boost::json;
 
-OptionValues read_thresholds(const std::string& file, const std::string& policy) {
+SavedThresholds read_thresholds(const std::string& file, const std::string& policy) {
   const std::string text = read_file(file);
   try {
     const json::value value = json::parse(text);
@@ -31,10 +31,11 @@ OptionValues read_thresholds(const std::string& file, const std::string& policy)
       throw Error(ErrorCode::input, fmt::format("{}: thresholds of policy '{}', not of '{}'", file,
                                                 std::string_view(name), policy));
     }
-    OptionValues values;
+    SavedThresholds thresholds;
     for (const auto& [name, option] : all.at("options").as_object())
-      values[name] = std::string(option.as_string());
-    return values;
+      thresholds.options[name] = std::string(option.as_string());
+    if (const json::value* poses = all.if_contains("poses")) thresholds.poses = poses->as_int64();
+    return thresholds;
   } catch (const Error&) {
     throw;
   } catch (const std::exception&) {
@@ -46,10 +47,12 @@ OptionValues read_thresholds(const std::string& file, const std::string& policy)
 }
 
 void write_thresholds(const std::string& file, const std::string& policy,
-                      const OptionValues& options) {
-  json::object all;
-  for (const auto& [name, value] : options) all[name] = value;
-  write_file(file, json_text(json::object{{"policy", policy}, {"options", std::move(all)}}) + "\n");
+                      const SavedThresholds& thresholds) {
+  json::object options;
+  for (const auto& [name, value] : thresholds.options) options[name] = value;
+  json::object all{{"policy", policy}, {"options", std::move(options)}};
+  if (thresholds.poses > 0) all["poses"] = thresholds.poses;
+  write_file(file, json_text(all) + "\n");
 }
 
 }  // namespace cairn::app

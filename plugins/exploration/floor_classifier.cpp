@@ -89,6 +89,8 @@ void FloorClassifier::move_to(const EvidenceGrid& grid) {
   map_.cells = moved(map_.cells, from, to, shift, CellState::unknown);
   map_.clearance = moved(map_.clearance, from, to, shift, 0.0F);
   seen_ = moved(seen_, from, to, shift, CellState::unknown);
+  map_.caution = moved(map_.caution, from, to, shift, 0.0F);
+  part_filled_ = moved(part_filled_, from, to, shift, std::uint8_t{0});
   border_ = moved(border_, from, to, shift, std::uint8_t{0});
   part_.assign(static_cast<std::size_t>(to.size()), -1);
   map_.frame = to;
@@ -101,6 +103,7 @@ void FloorClassifier::weigh(const EvidenceGrid& grid, const CellBox& box) {
     const double sum = model_.hit * cell.hits - model_.miss * cell.misses;
     const float value = std::clamp(static_cast<float>(sum), -model_.limit, model_.limit);
     map_.log_odds[k] = value;
+    part_filled_[k] = cell.hits > 0 && cell.hits >= model_.part_filled * (cell.hits + cell.misses);
     seen_[k] = value < model_.free_below       ? CellState::free
                : value > model_.occupied_above ? CellState::occupied
                                                : CellState::unknown;
@@ -158,8 +161,8 @@ void FloorClassifier::find_clearance(const CellBox& box) {
   for (int margin = reach + kSlack; !measure_clearance(affected, margin);) margin *= 2;
 }
 
-/// The clearance in a box, from the cells up to `margin` around it. False, with nothing changed, if
-/// what is farther away could be nearer than all of these.
+/// Clearance and caution in a box, from the cells up to `margin` around it. False, with nothing
+/// changed, if what is farther away could be nearer than all of these.
 bool FloorClassifier::measure_clearance(const CellBox& box, int margin) {
   const GridFrame& frame = map_.frame;
   const CellBox around = box.grown(margin).within(whole());
@@ -175,20 +178,30 @@ bool FloorClassifier::measure_clearance(const CellBox& box, int margin) {
     if ((cell.array() >= 0).all() && cell.x() < around.width() && cell.y() < around.height())
       free.at<std::uint8_t>(cell.y() + 1, cell.x() + 1) = 0;
   }
-  cv::distanceTransform(free, distance, cv::DIST_L2, cv::DIST_MASK_PRECISE, CV_32F);
   const cv::Rect inner(box.low.x() - around.low.x() + 1, box.low.y() - around.low.y() + 1,
                        box.width(), box.height());
+  const auto side = static_cast<float>(frame.resolution);
+  const auto keep = [&](std::vector<float>& result) {
+    for (int y = box.low.y(); y < box.high.y(); ++y) {
+      const float* row = distance.ptr<float>(y - around.low.y() + 1) + inner.x;
+      std::transform(row, row + box.width(), &result[frame.index(box.low.x(), y)],
+                     [&](float cells) { return cells * side; });
+    }
+  };
+  cv::distanceTransform(free, distance, cv::DIST_L2, cv::DIST_MASK_PRECISE, CV_32F);
   double most = 0.0;
   cv::minMaxLoc(distance(inner), nullptr, &most);
   const CellBox all = whole();
   if (most > margin && (around.low != all.low || around.high != all.high)) return false;
-  const auto side = static_cast<float>(frame.resolution);
-  for (int y = box.low.y(); y < box.high.y(); ++y) {
-    const float* row = distance.ptr<float>(y - around.low.y() + 1) + inner.x;
-    std::transform(row, row + box.width(), &map_.clearance[frame.index(box.low.x(), y)],
-                   [&](float cells) { return cells * side; });
-  }
+  keep(map_.clearance);
   most_clearance_ = std::max(most_clearance_, static_cast<float>(most) * side);
+  // With more obstacles nothing is farther away than it was without.
+  around.for_each([&](int x, int y) {
+    if (part_filled_[frame.index(x, y)] != 0)
+      free.at<std::uint8_t>(y - around.low.y() + 1, x - around.low.x() + 1) = 0;
+  });
+  cv::distanceTransform(free, distance, cv::DIST_L2, cv::DIST_MASK_PRECISE, CV_32F);
+  keep(map_.caution);
   return true;
 }
 

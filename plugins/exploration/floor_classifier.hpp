@@ -18,6 +18,7 @@ struct CellModel {
   float limit = 4.2F;                              ///< most log odds, either way
   float free_below = 0.0F, occupied_above = 0.0F;  ///< [log odds]
   bool smooth = true;                              ///< unknown specks amid free cells are free
+  double part_filled = 0.1;  ///< a wall fills a free cell in part if so many scans end in it
 };
 
 /// Makes a `FloorMap` of evidence, and keeps it up to date: it computes again only where evidence
@@ -50,8 +51,9 @@ class FloorClassifier {
   CellModel model_;
   FloorMap map_;
   Eigen::Vector2i first_ = Eigen::Vector2i::Zero();  ///< cell (0, 0) of the map, in the world
-  std::vector<CellState> seen_;           ///< by the evidence of each cell alone, without smoothing
-  std::vector<std::uint8_t> border_;      ///< free cells beside unknown ones: 1
+  std::vector<CellState> seen_;  ///< by the evidence of each cell alone, without smoothing
+  std::vector<std::uint8_t> part_filled_;  ///< cells that a wall fills in part, or wholly: 1
+  std::vector<std::uint8_t> border_;       ///< free cells beside unknown ones: 1
   std::vector<std::int32_t> part_;        ///< of border cells, while frontiers are found; else −1
   std::vector<Eigen::Vector2i> blocked_;  ///< in the world
   float most_clearance_ = 0.0F;           ///< no clearance has been larger [m]

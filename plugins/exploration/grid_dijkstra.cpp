@@ -64,14 +64,18 @@ class GridDijkstra final : public PathPlanner {
 
  private:
   static constexpr float kFar = std::numeric_limits<float>::infinity();
-  /// The cost of a metre where the body does not fit, which it leaves soon.
-  static constexpr double kTooNear = 10.0;
+  /// The cost of a metre where the body does not fit, which it leaves soon; and where it does, but
+  /// may touch a wall that fills a cell in part.
+  static constexpr double kTooNear = 10.0, kMayTouch = 5.0;
 
   static std::size_t at(std::int32_t cell) { return static_cast<std::size_t>(cell); }
   int x_of(std::int32_t cell) const { return cell % map_->frame.width; }
   int y_of(std::int32_t cell) const { return cell / map_->frame.width; }
   Vector2d middle(std::int32_t cell) const { return map_->frame.centre(x_of(cell), y_of(cell)); }
   bool stands(std::int32_t cell) const { return map_->clearance[at(cell)] >= needed_; }
+  float caution(std::int32_t cell) const {
+    return map_->caution.empty() ? map_->clearance[at(cell)] : map_->caution[at(cell)];
+  }
 
   /// Whether the body may go from one cell to the next: where it fits; and out of where it does
   /// not, no nearer to anything than it is at the start.
@@ -93,8 +97,9 @@ class GridDijkstra final : public PathPlanner {
   /// The cost of a metre at a cell.
   double cost_at(std::int32_t cell) const {
     if (!stands(cell)) return kTooNear;
-    if (options_.margin == 0.0) return 1.0;
-    const double lacking = needed_ + options_.margin - map_->clearance[at(cell)];
+    if (options_.margin == 0.0 || options_.weight == 0.0) return 1.0;
+    const double lacking = needed_ + options_.margin - caution(cell);
+    if (lacking > options_.margin) return std::max(1.0 + options_.weight, kMayTouch);
     return 1.0 + options_.weight * std::clamp(lacking / options_.margin, 0.0, 1.0);
   }
 
@@ -127,31 +132,50 @@ class GridDijkstra final : public PathPlanner {
     return true;
   }
 
+  /// The view of a goal where the body can't touch anything; if there is none, where it fits.
   std::int32_t nearest_cell(const Vector2d& goal, double tolerance) const {
-    return nearest_view(*map_, goal, tolerance,
-                        [&](std::int32_t cell) { return cost_[at(cell)] < kFar && stands(cell); });
+    const auto reached = [&](std::int32_t cell) { return cost_[at(cell)] < kFar && stands(cell); };
+    const std::int32_t safe = nearest_view(*map_, goal, tolerance, [&](std::int32_t cell) {
+      return reached(cell) && caution(cell) >= needed_;
+    });
+    return safe >= 0 ? safe : nearest_view(*map_, goal, tolerance, reached);
+  }
+
+  /// The least clearance and caution of a path [m].
+  struct Room {
+    float clearance = kFar, caution = kFar;
+  };
+
+  void add(std::int32_t cell, Room& room) const {
+    room.clearance = std::min(room.clearance, map_->clearance[at(cell)]);
+    room.caution = std::min(room.caution, caution(cell));
   }
 
   /// The corners of a polyline that comes no nearer to obstacles than the cells do, up to the
   /// margin.
   std::vector<Vector2d> straightened(const std::vector<std::int32_t>& cells) const {
     std::vector<Vector2d> points{from_};
-    float least = kFar;  // clearance since the last corner
+    const auto enough = static_cast<float>(needed_ + options_.margin);
+    Room least;  // since the last corner
     for (std::size_t k = 1; k < cells.size(); ++k) {
-      least = std::min(least, map_->clearance[at(cells[k])]);
-      const auto enough = std::min(least, static_cast<float>(needed_ + options_.margin));
-      if (k == 1 || clear(points.back(), middle(cells[k]), enough)) continue;
+      add(cells[k], least);
+      const Room room{std::min(least.clearance, enough), std::min(least.caution, enough)};
+      if (k == 1 || clear(points.back(), middle(cells[k]), room)) continue;
       points.push_back(middle(cells[k - 1]));
-      least = std::min(map_->clearance[at(cells[k - 1])], map_->clearance[at(cells[k])]);
+      least = {};
+      add(cells[k - 1], least);
+      add(cells[k], least);
     }
     if (cells.size() > 1) points.push_back(middle(cells.back()));
     return points;
   }
 
-  bool clear(const Vector2d& from, const Vector2d& to, float enough) const {
+  bool clear(const Vector2d& from, const Vector2d& to, const Room& room) const {
     const GridFrame& frame = map_->frame;
     return traverse_cells(frame.to_cells(from), frame.to_cells(to), [&](int x, int y) {
-      return frame.contains(x, y) && map_->clearance[frame.index(x, y)] >= enough;
+      if (!frame.contains(x, y)) return false;
+      const auto cell = static_cast<std::int32_t>(frame.index(x, y));
+      return map_->clearance[at(cell)] >= room.clearance && caution(cell) >= room.caution;
     });
   }
 

@@ -25,6 +25,7 @@ struct LogOddsOptions {
   double resolution = 0.1;
   double hit = 0.9, miss = 0.7, limit = 4.2;
   double free = 0.35, occupied = 0.65, tolerance = 0.25;
+  double part_filled = 0.1;
   bool smooth = true;
 
   static auto fields() {
@@ -40,6 +41,10 @@ struct LogOddsOptions {
             "tolerance", &O::tolerance, 0.0, 10.0,
             "a scan is drawn again when what it shows has moved by more than this part of a cell, "
             "on average")
+        .real(
+            "part_filled", &O::part_filled, 0.0, 1.0,
+            "paths that have room avoid a free cell in which at least this part of the scans that "
+            "reach it end: a wall fills it in part")
         .boolean("smooth", &O::smooth,
                  "unknown cells that a square of 3 × 3 does not fit into are free, if most known "
                  "ones around are (morphological opening)");
@@ -59,7 +64,8 @@ class LogOdds final : public Mapper {
                .limit = static_cast<float>(options.limit),
                .free_below = log_odds_of(options.free),
                .occupied_above = log_odds_of(options.occupied),
-               .smooth = options.smooth},
+               .smooth = options.smooth,
+               .part_filled = options.part_filled},
         grid_(options.resolution),
         classifier_(model_) {}
 

@@ -135,6 +135,34 @@ std::string on_one_line(const std::string& text) {
   return line;
 }
 
+TEST_F(Compact, HasNoScansForARegistrationOfScans) {
+  if (cairn({"plugins", "icp"}).exit_code != 0) GTEST_SKIP() << "there is no registration icp";
+  for (const Arguments& more : {Arguments{}, Arguments{"--range", "3"}}) {
+    Arguments command{"compact", kWorld, "--registration", "icp"};
+    command.insert(command.end(), more.begin(), more.end());
+    const Outcome run = cairn(command);
+    EXPECT_EQ(run.exit_code, 2) << run.err;
+    EXPECT_THAT(on_one_line(run.err), HasSubstr("matches laser scans, and a graph has none"));
+  }
+}
+
+TEST_F(Compact, NotesThresholdsOfAMuchShorterRecording) {
+  const std::string file = folder_.file("robot.json");
+  report({kWorld, "--save-thresholds", file});
+  const std::int64_t poses = parse_json(read_text(file)).at("poses").as_int64();
+  EXPECT_EQ(poses, 180);
+  EXPECT_THAT(cairn({"compact", kWorld, "--thresholds", file}).err,
+              Not(HasSubstr("were found in")));
+  report({kWorld, "--sample", "0.4", "--save-thresholds", file});
+  const std::string again = folder_.file("again.json");
+  const Outcome run = cairn({"compact", kWorld, "--thresholds", file, "--save-thresholds", again});
+  EXPECT_THAT(on_one_line(run.err), HasSubstr("poses, and this recording has"));
+  EXPECT_THAT(on_one_line(run.err), HasSubstr("--loop-gain"));
+  // The file says so still.
+  EXPECT_THAT(on_one_line(cairn({"compact", kWorld, "--thresholds", again}).err),
+              HasSubstr("poses, and this recording has"));
+}
+
 TEST_F(Compact, ReportsTheThresholdsOfTheRunWhateverWasFound) {
   const std::string file = folder_.file("robot.json"), json = folder_.file("report.json");
   report({kWorld, "--save-thresholds", file});

@@ -219,7 +219,7 @@ def test_the_situation_has_the_map_and_how_certain_the_poses_are():
         if situation.decision == 0:
             return cairn.Decision.drive([[1.0, 2.6], [2.4, 2.6]], look_at=[2.4, 4.0])  # below the wall in the middle
         seen.update({name: getattr(situation, name) for name in
-                     ["pose", "poses", "free", "occupied", "log_odds", "clearance", "resolution", "radius", "frontiers"]})
+                     ["pose", "poses", "free", "occupied", "log_odds", "clearance", "caution", "resolution", "radius", "frontiers"]})
         seen["states"], seen["graph"] = situation.states(Pose2), situation.graph()
         seen["covariance"] = situation.covariance(situation.poses)
         row, column = situation.cells_at(situation.pose.state[:2])
@@ -248,6 +248,7 @@ def test_the_situation_has_the_map_and_how_certain_the_poses_are():
     border = np.pad(other, 0)
     distance = np.sqrt(((free[:, None] - border[None]) ** 2).sum(-1).min(1)) * seen["resolution"]
     assert (seen["clearance"][tuple(free.T)] <= distance + 1e-4).all()
+    assert (seen["caution"] <= seen["clearance"]).all()
     for frontier in seen["frontiers"]:
         rows, columns = frontier.cells.T
         assert seen["free"][rows, columns].all() and abs(frontier.length - len(rows) * seen["resolution"]) < 1e-9

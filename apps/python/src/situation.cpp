@@ -295,6 +295,13 @@ void bind_situation(py::module_& module) {
       .def_property_readonly(
           "clearance", [](const Bound& b) { return numbers_of(b, &FloorMap::clearance); },
           "From the middle of a cell to that of the nearest one that is not free [m].")
+      .def_property_readonly(
+          "caution",
+          [](const Bound& b) {
+            return numbers_of(
+                b, b.now().map.caution.empty() ? &FloorMap::clearance : &FloorMap::caution);
+          },
+          "The same, or less: to free cells as well that a wall may fill in part [m].")
       .def_property_readonly("frontiers", &frontiers_of, "A list of Frontier, longest first.")
       .def_property_readonly(
           "resolution", [](const Bound& b) { return b.now().map.frame.resolution; },

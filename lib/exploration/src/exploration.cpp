@@ -12,6 +12,7 @@
 #include <fmt/core.h>
 
 #include "cairn/evaluation/trajectory.hpp"
+#include "cairn/exploration/contacts.hpp"
 #include "cairn/exploration/exploration_measures.hpp"
 #include "cairn/exploration/recorded_world.hpp"
 #include "cairn/exploration/scan_slam.hpp"
@@ -73,7 +74,8 @@ class Run {
                .mapper = parts.mapper,
                .registry = parts.registry,
                .match_consecutive = parts.match_consecutive,
-               .loop_loss = parts.loop_loss}) {}
+               .loop_loss = parts.loop_loss}),
+        contacts_(robot_.radius) {}
 
   ExplorationResult run() {
     begin();
@@ -235,9 +237,13 @@ class Run {
     }
   }
 
+  const FloorMap& map_to_drive_by() {
+    return contacts_.seen_by(slam_.map(), result_.steps.back().distance);
+  }
+
   /// None: it was interrupted, so that what was decided is worth nothing.
   std::optional<Decision> decide() {
-    const FloorMap& map = slam_.map();
+    const FloorMap& map = map_to_drive_by();
     const std::vector<Id> kept = parts_.policy.kept();
     double seconds = 0.0;
     Decision decision = [&] {
@@ -315,7 +321,7 @@ class Run {
 
   /// Whether the rest of a path can be driven, and is worth it.
   bool goes_on(const PlannedPath& path, std::size_t passed) {
-    const FloorMap& map = slam_.map();
+    const FloorMap& map = map_to_drive_by();
     if (!is_open(map, slam_.pose(), path, passed, robot_.radius)) return false;
     const std::vector<Id> kept = parts_.policy.kept();
     Timed timed(result_.decide_seconds);
@@ -325,6 +331,7 @@ class Run {
 
   /// False: a new decision is needed.
   bool move(const Pose2& motion) {
+    const double heading = slam_.pose().theta();
     WorldStep step = parts_.world.move(motion);
     result_.collisions += step.collided;
     const double driven = step.odometry.translation().norm();
@@ -337,8 +344,18 @@ class Run {
     slam_.add(step.odometry, step.covariance, std::move(step.scan), parts_.world.truth());
     record(driven);
     const double jump = (slam_.pose().translation() - expected.translation()).norm();
-    if (step.collided) back_off();
+    if (step.collided) {
+      touch(heading, motion);
+      back_off();
+    }
     return !step.collided && jump <= slam_.map().frame.resolution;
+  }
+
+  /// After a motion from where the robot had this heading, which an obstacle has stopped.
+  void touch(double heading, const Pose2& motion) {
+    const Eigen::Vector2d direction = Pose2(0.0, 0.0, heading) * motion.translation();
+    if (direction.norm() > 0.0)
+      contacts_.add(slam_.pose().translation(), direction, result_.steps.back().distance);
   }
 
   /// After a collision: the same motion from the same place would end like it.
@@ -394,6 +411,7 @@ class Run {
   RobotModel robot_;
   RecordedWorld* recorded_;  // null: it explores
   ScanSlam slam_;
+  Contacts contacts_;
   ExplorationResult result_;
   std::optional<Pose2> first_truth_;  // of the poses of which it is known
   bool ended_ = false, backing_off_ = false;

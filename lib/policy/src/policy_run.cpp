@@ -139,11 +139,29 @@ std::string spec_text(const ComponentSpec& spec) {
   return text;
 }
 
+namespace {
+
+std::unique_ptr<Registration> make_registration(const std::string& text, Registry& registry) {
+  std::unique_ptr<Registration> made = registry.make<Registration>(text);
+  // `ScanRegistration::kAbility`, which this library does not know.
+  if (made->ability("scan_registration")) {
+    throw Error(
+        ErrorCode::usage,
+        fmt::format("registration '{}' matches laser scans, and a graph has none: 'recorded' "
+                    "takes its loop closures, 'simulated' the truth; cairn explore and "
+                    "cairn map have scans",
+                    parse_component(text).name));
+  }
+  return made;
+}
+
+}  // namespace
+
 PolicyRun::PolicyRun(const PolicyJob& job, const PolicySetting& setting)
     : setting_(setting),
       policy_(setting.registry.make<PosePolicy>(job.policy)),
       registration_name_(job.own ? "of the caller" : job.registration),
-      made_(job.own ? nullptr : setting.registry.make<Registration>(job.registration)),
+      made_(job.own ? nullptr : make_registration(job.registration, setting.registry)),
       registration_(job.own ? job.own : made_.get()) {
   const PolicyData& data = setting.data;
   check_landmarks(*policy_, job.policy.name, data.recording);

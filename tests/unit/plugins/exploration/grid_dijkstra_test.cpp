@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -111,6 +112,57 @@ TEST(GridDijkstra, DoesNotSeeAGoalThroughAWall) {
   const auto planner = shortest();
   planner->start(map, map.frame.centre(1, 1), kRadius);
   EXPECT_FALSE(planner->path_to(map.frame.centre(4, 1), 5.0));
+}
+
+/// Of two doors the way leads through the farther one where a wall fills the cell of the nearer one
+/// in part; where it does so in both, or lengths alone count, through the nearer one.
+TEST(GridDijkstra, AvoidsCellsThatAWallFillsInPart) {
+  FloorMap map = drawn_map({"###########", "#....#....#", "#.........#", "#....#....#",
+                            "#....#....#", "#.........#", "#....#....#", "###########"},
+                           0.5);
+  const GridFrame& frame = map.frame;
+  const int door = 5, near = 5, far = 2;
+  const auto used = [&](PathPlanner& planner) {
+    planner.start(map, frame.centre(3, 4), 0.2);
+    const auto path = planner.path_to(frame.centre(7, 4), 0.1);
+    int row = -1;
+    if (!path) return row;
+    for (std::size_t k = 1; k < path->points.size(); ++k) {
+      traverse_cells(frame.to_cells(path->points[k - 1]), frame.to_cells(path->points[k]),
+                     [&](int x, int y) {
+                       if (x == door) row = y;
+                       return true;
+                     });
+    }
+    return row;
+  };
+  const auto careful = Registry().make<PathPlanner>(parse_component("grid_dijkstra"));
+  EXPECT_EQ(used(*careful), near);
+  map.caution = map.clearance;
+  map.caution[frame.index(door, near)] = 0.0F;
+  EXPECT_EQ(used(*careful), far);
+  EXPECT_EQ(used(*shortest()), near);
+  map.caution[frame.index(door, far)] = 0.0F;
+  EXPECT_EQ(used(*careful), near);
+}
+
+/// It looks at a goal from where it can't touch anything, if there is such a place.
+TEST(GridDijkstra, LooksAtGoalsFromWhereThereIsRoom) {
+  FloorMap map = drawn_map({"########", "#......#", "#......#", "########"});
+  const GridFrame& frame = map.frame;
+  const auto planner = shortest();
+  const Vector2d goal = frame.centre(6, 1);
+  const auto end = [&] {
+    planner->start(map, frame.centre(1, 1), kRadius);
+    return planner->path_to(goal, 2.0)->points.back();
+  };
+  EXPECT_EQ(end(), goal);
+  map.caution = map.clearance;
+  map.caution[frame.index(6, 1)] = 0.0F;
+  EXPECT_NE(end(), goal);
+  EXPECT_GE((end() - goal).norm(), 1.0);
+  std::ranges::fill(map.caution, 0.0F);
+  EXPECT_EQ(end(), goal);
 }
 
 TEST(GridDijkstra, LeavesWhereTheBodyDoesNotFitAwayFromObstaclesOnly) {

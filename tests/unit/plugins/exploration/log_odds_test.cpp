@@ -189,6 +189,36 @@ TEST(LogOdds, TheNewestScanStandsInTheWayOfABody) {
   EXPECT_EQ(map.clearance[at(map, 2.05)], 0.0F);
 }
 
+/// A wall that fills a cell in part: one scan of five ends there.
+TEST(LogOdds, CautionIsTheDistanceToCellsInWhichSomeBeamsEnd) {
+  for (const bool counts : {true, false}) {
+    const auto map_of =
+        mapper(counts ? "resolution=0.1,part_filled=0.2" : "resolution=0.1,part_filled=0.21");
+    LaserScan open{.first_angle = -0.6, .angle_step = 0.01, .max_range = 4.0, .ranges = {}};
+    open.ranges.assign(121, 3.0F);
+    LaserScan ends = open;
+    ends.ranges[60] = 1.95F;  // straight ahead
+    map_of->add(Pose2(0.05, 0.05, 0.0), ends);
+    for (int k = 0; k < 4; ++k) map_of->add(Pose2(0.05, 0.05, 0.0), open);
+    const FloorMap& map = map_of->map();
+    const auto at = [&](double x) {
+      const Vector2d cell = map.frame.to_cells({x, 0.05}).array().floor();
+      return map.frame.index(static_cast<int>(cell.x()), static_cast<int>(cell.y()));
+    };
+    EXPECT_EQ(map.cells[at(2.05)], CellState::free);
+    EXPECT_GT(map.clearance[at(2.05)], 0.5F);
+    if (counts) {
+      EXPECT_EQ(map.caution[at(2.05)], 0.0F);
+      EXPECT_NEAR(map.caution[at(1.75)], 0.3, 1e-6);
+      EXPECT_NEAR(map.caution[at(2.25)], 0.2, 1e-6);
+    } else {
+      EXPECT_EQ(map.caution, map.clearance);
+    }
+    // Where a beam ends in more scans than not, the cell is no free one, and limits both.
+    for (std::size_t k = 0; k < map.cells.size(); ++k) EXPECT_LE(map.caution[k], map.clearance[k]);
+  }
+}
+
 TEST(LogOdds, WhatIsNoScanAndWhatIsTooFarAwayIsRefusedAndLeavesTheMap) {
   test::Draw draw(19);
   const auto map_of = mapper("resolution=0.1");

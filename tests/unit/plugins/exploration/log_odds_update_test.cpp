@@ -48,6 +48,7 @@ void expect_same(const FloorMap& a, const FloorMap& b) {
   expect_same_bits(a.log_odds, b.log_odds, "log odds");
   expect_same_bits(a.cells, b.cells, "cells");
   expect_same_bits(a.clearance, b.clearance, "clearance");
+  expect_same_bits(a.caution, b.caution, "caution");
   ASSERT_EQ(a.frontiers.size(), b.frontiers.size());
   for (std::size_t k = 0; k < a.frontiers.size(); ++k) {
     EXPECT_EQ(a.frontiers[k].cells, b.frontiers[k].cells) << k;
