@@ -48,8 +48,7 @@ void Contacts::add(const Vector2d& at, const Vector2d& direction, double driven)
 
 const FloorMap& Contacts::seen_by(const FloorMap& map, double driven) {
   std::erase_if(contacts_, [&](const Contact& one) { return driven - one.driven > kRemembered; });
-  if (std::ranges::none_of(contacts_, [](const Contact& one) { return one.times >= kObstacle; }))
-    return map;
+  if (!any_obstacle()) return map;
   map_ = map;
   for (const Contact& contact : contacts_) {
     if (contact.times < kObstacle) continue;
@@ -57,6 +56,16 @@ const FloorMap& Contacts::seen_by(const FloorMap& map, double driven) {
     if (!map_.caution.empty()) limit(map.frame, contact.point, radius_ + kMargin, map_.caution);
   }
   return map_;
+}
+
+bool Contacts::forget() {
+  const bool known = any_obstacle();
+  contacts_.clear();
+  return known;
+}
+
+bool Contacts::any_obstacle() const {
+  return std::ranges::any_of(contacts_, [](const Contact& one) { return one.times >= kObstacle; });
 }
 
 }  // namespace cairn

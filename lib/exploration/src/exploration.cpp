@@ -96,7 +96,7 @@ class Run {
         end_interrupted();
       } else if (decision->kind == Decision::Kind::drive) {
         drive(decision->candidates.at(decision->chosen).path);
-      } else {
+      } else if (!contacts_.forget()) {  // else what was touched may be all that was in the way
         end(decision->kind == Decision::Kind::finished ? ExplorationEnd::finished
                                                        : ExplorationEnd::stuck,
             decision->why);

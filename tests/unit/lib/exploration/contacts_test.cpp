@@ -60,6 +60,17 @@ TEST(Contacts, AreForgottenAfterAWay) {
   EXPECT_EQ(&contacts.seen_by(map, 53.0), &map);
 }
 
+TEST(Contacts, SaysWhetherItForgetsAnObstacle) {
+  const FloorMap map = room();
+  Contacts contacts(kRadius);
+  contacts.add({2.0, 2.0}, {1.0, 0.0}, 1.0);
+  EXPECT_FALSE(contacts.forget());
+  for (const double driven : {1.0, 2.0}) contacts.add({2.0, 2.0}, {1.0, 0.0}, driven);
+  EXPECT_TRUE(contacts.forget());
+  EXPECT_FALSE(contacts.forget());
+  EXPECT_EQ(&contacts.seen_by(map, 3.0), &map);
+}
+
 TEST(Contacts, AtTheEdgeOfTheMapAndBeyond) {
   const FloorMap map = room();
   Contacts contacts(kRadius);

@@ -23,6 +23,8 @@ class CAIRN_API Contacts {
   /// The map, whose clearances are no larger than up to obstacles that were touched; it is good
   /// until the next call, and as long as `map`.
   const FloorMap& seen_by(const FloorMap& map, double driven);
+  /// Forgets everything. Returns whether something was an obstacle.
+  bool forget();
 
  private:
   struct Contact {
@@ -30,6 +32,7 @@ class CAIRN_API Contacts {
     double driven;          // when it was touched last [m]
     int times;
   };
+  bool any_obstacle() const;
 
   double radius_;
   std::vector<Contact> contacts_;
