@@ -164,14 +164,17 @@ std::size_t sample_size(const CompactOptions& options, const PolicyData& data,
 }
 
 /// What thresholds allow was checked for a run as long as their sample.
-void note_short_sample(std::int64_t sample, const PolicyData& data, const Session& session) {
+void note_short_sample(std::int64_t sample, const CompactOptions& options, const PolicyData& data,
+                       const Session& session) {
   constexpr std::int64_t kLonger = 2;  // times
-  if (sample == 0 || std::ssize(data.poses) <= kLonger * sample) return;
+  if (sample == 0 || options.loop_gain || std::ssize(data.poses) / kLonger <= sample) return;
   session.note(fmt::format(
       "the thresholds were found in {} poses, and this recording has {}: the error of a map grows "
-      "with its size, and with these thresholds may be several times that of all measurements. "
-      "Find them in a longer recording (--auto), or give a lower --loop-gain",
-      sample, data.poses.size()));
+      "with its size, and with these thresholds may be several times that of all measurements. {}, "
+      "or give a lower --loop-gain",
+      sample, data.poses.size(),
+      options.thresholds.empty() ? "Take a larger --sample"
+                                 : "Find them here, without --thresholds"));
 }
 
 Job prepare(const CompactOptions& options, const PolicySetting& setting, Results& results,
@@ -213,7 +216,6 @@ Job prepare(const CompactOptions& options, const PolicySetting& setting, Results
     SavedThresholds saved = read_thresholds(options.thresholds, job.policy.name);
     result.found.options = std::move(saved.options);
     sample = saved.poses;
-    note_short_sample(sample, setting.data, session);
   }
   if (automatic) {
     const std::size_t count = sample_size(options, setting.data, session);
@@ -221,6 +223,7 @@ Job prepare(const CompactOptions& options, const PolicySetting& setting, Results
     result.found = find_thresholds(job, count, options.error_ratio, setting);
     if (setting.interrupted()) return result;
   }
+  note_short_sample(sample, options, setting.data, session);
   emplace(result.found.options);
   const OptionTable& table = setting.registry.options(PosePolicy::kKind, job.policy.name);
   result.thresholds = used_thresholds(given, result.found.options, table);
@@ -239,7 +242,7 @@ Job prepare(const CompactOptions& options, const PolicySetting& setting, Results
   }
   results.write(options.save_thresholds, [&] {
     write_thresholds(options.save_thresholds, job.policy.name,
-                     {.options = result.thresholds.options, .poses = sample});
+                     {.options = result.thresholds.options, .poses = given.empty() ? sample : 0});
   });
   return result;
 }

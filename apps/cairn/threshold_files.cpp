@@ -6,6 +6,7 @@
 
 #include <fmt/core.h>
 #include <boost/json/parse.hpp>
+#include <boost/json/serialize.hpp>
 
 #include "cairn/io/format.hpp"
 #include "cairn/runtime/error.hpp"
@@ -34,7 +35,16 @@ SavedThresholds read_thresholds(const std::string& file, const std::string& poli
     SavedThresholds thresholds;
     for (const auto& [name, option] : all.at("options").as_object())
       thresholds.options[name] = std::string(option.as_string());
-    if (const json::value* poses = all.if_contains("poses")) thresholds.poses = poses->as_int64();
+    if (const json::value* poses = all.if_contains("poses")) {
+      const std::int64_t* count = poses->if_int64();
+      if (!count || *count < 0) {
+        throw Error(ErrorCode::input,
+                    fmt::format("{}: poses is {}, expected the number of those in "
+                                "which the thresholds were found",
+                                file, json::serialize(*poses)));
+      }
+      thresholds.poses = *count;
+    }
     return thresholds;
   } catch (const Error&) {
     throw;

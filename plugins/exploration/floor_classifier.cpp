@@ -196,11 +196,14 @@ bool FloorClassifier::measure_clearance(const CellBox& box, int margin) {
   keep(map_.clearance);
   most_clearance_ = std::max(most_clearance_, static_cast<float>(most) * side);
   // With more obstacles nothing is farther away than it was without.
+  bool more = false;
   around.for_each([&](int x, int y) {
-    if (part_filled_[frame.index(x, y)] != 0)
-      free.at<std::uint8_t>(y - around.low.y() + 1, x - around.low.x() + 1) = 0;
+    std::uint8_t& there = free.at<std::uint8_t>(y - around.low.y() + 1, x - around.low.x() + 1);
+    if (part_filled_[frame.index(x, y)] == 0 || there == 0) return;
+    there = 0;
+    more = true;
   });
-  cv::distanceTransform(free, distance, cv::DIST_L2, cv::DIST_MASK_PRECISE, CV_32F);
+  if (more) cv::distanceTransform(free, distance, cv::DIST_L2, cv::DIST_MASK_PRECISE, CV_32F);
   keep(map_.caution);
   return true;
 }

@@ -31,7 +31,9 @@ struct GridDijkstraOptions {
         .real("margin", &O::margin, 0.0, 100.0,
               "paths keep so much farther from obstacles where that is no great detour [m]")
         .real("weight", &O::weight, 0.0, 1000.0,
-              "of a metre with none of that margin, in metres; 0: the shortest paths");
+              "of a metre with none of that margin, in metres (5 where a wall may fill a cell in "
+              "part); "
+              "0: the shortest paths");
   }
 };
 
@@ -67,6 +69,7 @@ class GridDijkstra final : public PathPlanner {
   /// The cost of a metre where the body does not fit, which it leaves soon; and where it does, but
   /// may touch a wall that fills a cell in part.
   static constexpr double kTooNear = 10.0, kMayTouch = 5.0;
+  static constexpr double kFartherView = 0.5;  ///< of a goal, where nothing can be touched [m]
 
   static std::size_t at(std::int32_t cell) { return static_cast<std::size_t>(cell); }
   int x_of(std::int32_t cell) const { return cell % map_->frame.width; }
@@ -74,7 +77,7 @@ class GridDijkstra final : public PathPlanner {
   Vector2d middle(std::int32_t cell) const { return map_->frame.centre(x_of(cell), y_of(cell)); }
   bool stands(std::int32_t cell) const { return map_->clearance[at(cell)] >= needed_; }
   float caution(std::int32_t cell) const {
-    return map_->caution.empty() ? map_->clearance[at(cell)] : map_->caution[at(cell)];
+    return map_->has_caution() ? map_->caution[at(cell)] : map_->clearance[at(cell)];
   }
 
   /// Whether the body may go from one cell to the next: where it fits; and out of where it does
@@ -99,7 +102,7 @@ class GridDijkstra final : public PathPlanner {
     if (!stands(cell)) return kTooNear;
     if (options_.margin == 0.0 || options_.weight == 0.0) return 1.0;
     const double lacking = needed_ + options_.margin - caution(cell);
-    if (lacking > options_.margin) return std::max(1.0 + options_.weight, kMayTouch);
+    if (caution(cell) < needed_) return std::max(1.0 + options_.weight, kMayTouch);
     return 1.0 + options_.weight * std::clamp(lacking / options_.margin, 0.0, 1.0);
   }
 
@@ -132,13 +135,19 @@ class GridDijkstra final : public PathPlanner {
     return true;
   }
 
-  /// The view of a goal where the body can't touch anything; if there is none, where it fits.
+  /// The nearest view of a goal; one a little farther away if the body can't touch anything there,
+  /// as long as lengths are not all that counts.
   std::int32_t nearest_cell(const Vector2d& goal, double tolerance) const {
     const auto reached = [&](std::int32_t cell) { return cost_[at(cell)] < kFar && stands(cell); };
-    const std::int32_t safe = nearest_view(*map_, goal, tolerance, [&](std::int32_t cell) {
-      return reached(cell) && caution(cell) >= needed_;
+    const std::int32_t nearest = nearest_view(*map_, goal, tolerance, reached);
+    if (nearest < 0 || caution(nearest) >= needed_ || options_.margin == 0.0 ||
+        options_.weight == 0.0)
+      return nearest;
+    const double most = std::min(tolerance, (middle(nearest) - goal).norm() + kFartherView);
+    const std::int32_t safe = nearest_view(*map_, goal, most, [&](std::int32_t cell) {
+      return reached(cell) && caution(cell) >= needed_ && before_[at(cell)] >= 0;
     });
-    return safe >= 0 ? safe : nearest_view(*map_, goal, tolerance, reached);
+    return safe >= 0 ? safe : nearest;
   }
 
   /// The least clearance and caution of a path [m].

@@ -147,20 +147,37 @@ TEST_F(Compact, HasNoScansForARegistrationOfScans) {
 }
 
 TEST_F(Compact, NotesThresholdsOfAMuchShorterRecording) {
+  const auto noted = [](const Arguments& more) {
+    Arguments command{"compact", kWorld};
+    command.insert(command.end(), more.begin(), more.end());
+    const Outcome run = cairn(command);
+    EXPECT_EQ(run.exit_code, 0) << run.err;
+    return on_one_line(run.err).find("poses, and this recording has 300") != std::string::npos;
+  };
+  const std::string file = folder_.file("robot.json"), again = folder_.file("again.json");
+  EXPECT_FALSE(noted({"--save-thresholds", file}));
+  EXPECT_EQ(parse_json(read_text(file)).at("poses").as_int64(), 180);
+  EXPECT_FALSE(noted({"--thresholds", file}));
+  EXPECT_TRUE(noted({"--sample", "0.4", "--save-thresholds", file}));
+  EXPECT_TRUE(noted({"--thresholds", file, "--save-thresholds", again}));
+  EXPECT_TRUE(noted({"--thresholds", again}));
+  // Some are the user's own.
+  EXPECT_FALSE(noted({"--thresholds", file, "--loop-gain", "1"}));
+  EXPECT_TRUE(noted({"--thresholds", file, "--range", "4", "--save-thresholds", again}));
+  EXPECT_FALSE(parse_json(read_text(again)).as_object().contains("poses"));
+}
+
+TEST_F(Compact, RefusesThresholdsOfNoNumberOfPoses) {
   const std::string file = folder_.file("robot.json");
-  report({kWorld, "--save-thresholds", file});
-  const std::int64_t poses = parse_json(read_text(file)).at("poses").as_int64();
-  EXPECT_EQ(poses, 180);
-  EXPECT_THAT(cairn({"compact", kWorld, "--thresholds", file}).err,
-              Not(HasSubstr("were found in")));
-  report({kWorld, "--sample", "0.4", "--save-thresholds", file});
-  const std::string again = folder_.file("again.json");
-  const Outcome run = cairn({"compact", kWorld, "--thresholds", file, "--save-thresholds", again});
-  EXPECT_THAT(on_one_line(run.err), HasSubstr("poses, and this recording has"));
-  EXPECT_THAT(on_one_line(run.err), HasSubstr("--loop-gain"));
-  // The file says so still.
-  EXPECT_THAT(on_one_line(cairn({"compact", kWorld, "--thresholds", again}).err),
-              HasSubstr("poses, and this recording has"));
+  for (const char* poses : {"-1", "\"many\"", "1e30", "18446744073709551615", "null"}) {
+    write_text(file,
+               R"({"policy":"compact_pose","options":{},"poses":)" + std::string(poses) + "}");
+    const Outcome run = cairn({"compact", kWorld, "--thresholds", file});
+    EXPECT_EQ(run.exit_code, 3) << poses;
+    EXPECT_THAT(run.err, HasSubstr("poses is"));
+  }
+  write_text(file, R"({"policy":"compact_pose","options":{},"poses":9223372036854775807})");
+  EXPECT_EQ(cairn({"compact", kWorld, "--thresholds", file}).exit_code, 0);
 }
 
 TEST_F(Compact, ReportsTheThresholdsOfTheRunWhateverWasFound) {

@@ -62,6 +62,23 @@ def test_any_layout_of_memory_will_do():
     assert_array_equal(graph.squared_norms(), bulk(walk).squared_norms())
 
 
+def test_in_many_small_parts_it_is_the_same_graph():
+    walk = dense.loop()
+    ids, states, pairs, measurements, information = arrays_of(walk)
+    graph = cairn.Graph()
+    added = 0
+    for k in range(len(ids)):
+        graph.add_variables("VERTEX_SE2", ids[k : k + 1], states[k : k + 1])
+        while added < len(pairs) and np.isin(pairs[added], ids[: k + 1]).all():
+            one = slice(added, added + 1)
+            graph.add_factors("EDGE_SE2", pairs[one], measurements[one], information=information[one])
+            added += 1
+    graph.fix(0)
+    whole = bulk(walk)
+    assert_array_equal(graph.factor_ids("EDGE_SE2"), whole.factor_ids("EDGE_SE2"))
+    assert_array_equal(graph.squared_norms(), whole.squared_norms())
+
+
 def test_an_error_leaves_the_graph_as_it_was():
     walk = dense.loop()
     ids, states, pairs, measurements, information = arrays_of(walk)

@@ -294,7 +294,9 @@ void bind_situation(py::module_& module) {
           "ln(p / (1 - p)), p the probability of being occupied; 0: unknown.")
       .def_property_readonly(
           "clearance", [](const Bound& b) { return numbers_of(b, &FloorMap::clearance); },
-          "From the middle of a cell to that of the nearest one that is not free [m].")
+          "From the middle of a cell to that of the nearest one that is not free, or to what the "
+          "robot "
+          "has touched twice [m].")
       .def_property_readonly(
           "caution",
           [](const Bound& b) {

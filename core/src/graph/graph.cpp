@@ -57,6 +57,13 @@ std::string problem_of(const Root& root, std::span<const double> information) {
              : "the information matrix is not positive semidefinite";
 }
 
+/// For `size` elements in all. Where there is not, for twice as many as there was for, so that
+/// asking for a few more again and again does not copy everything each time.
+template <class Vector>
+void make_room(Vector& vector, std::size_t size) {
+  if (size > vector.capacity()) vector.reserve(std::max(size, 2 * vector.capacity()));
+}
+
 }  // namespace
 
 Graph::Graph() = default;
@@ -78,9 +85,11 @@ Graph Graph::clone() const {
 }
 
 void Graph::reserve(std::size_t variables, std::size_t factors) {
-  records_.reserve(variables);
-  index_of_id_.reserve(variables);
-  factors_.reserve(factors);
+  make_room(records_, variables);
+  const auto places = static_cast<std::size_t>(static_cast<double>(index_of_id_.bucket_count()) *
+                                               index_of_id_.max_load_factor());
+  if (variables > places) index_of_id_.reserve(std::max(variables, 2 * places));
+  make_room(factors_, factors);
 }
 
 /// The pool of a type; one past the last if there is none yet.

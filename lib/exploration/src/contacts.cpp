@@ -2,7 +2,6 @@
 #include "cairn/exploration/contacts.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 namespace cairn {
 namespace {
@@ -12,14 +11,14 @@ using Eigen::Vector2d;
 /// A contact is forgotten after so many metres: the estimate drifts, and what was touched moves.
 constexpr double kRemembered = 50.0;
 constexpr int kObstacle = 2;  ///< times that it was touched
-/// Planners keep no farther from obstacles than this beyond the body's radius [m].
-constexpr double kMargin = 0.5;
+/// Contacts as near to each other as the body is wide are one, but at least, and at most [m].
+constexpr double kSamePlace = 0.1, kSamePlaceAtMost = 0.5;
+/// Beyond the radius: clearances are left as they are where no planner keeps so far away [m].
+constexpr double kReach = 2.0;
 
 /// No clearance is larger than to a point at the surface of an obstacle.
 void limit(const GridFrame& frame, const Vector2d& point, double reach,
            std::vector<float>& clearance) {
-  const double half =
-      0.5 * frame.resolution;  // from the surface to the middle of an obstacle's cell
   const Vector2d low = frame.to_cells(point - Vector2d::Constant(reach)).array().floor(),
                  high = frame.to_cells(point + Vector2d::Constant(reach)).array().floor();
   const int first_x = static_cast<int>(std::max(low.x(), 0.0)),
@@ -29,7 +28,7 @@ void limit(const GridFrame& frame, const Vector2d& point, double reach,
   for (int y = first_y; y <= last_y; ++y) {
     for (int x = first_x; x <= last_x; ++x) {
       float& value = clearance[frame.index(x, y)];
-      value = std::min(value, static_cast<float>((frame.centre(x, y) - point).norm() + half));
+      value = std::min(value, static_cast<float>((frame.centre(x, y) - point).norm()));
     }
   }
 }
@@ -38,30 +37,35 @@ void limit(const GridFrame& frame, const Vector2d& point, double reach,
 
 void Contacts::add(const Vector2d& at, const Vector2d& direction, double driven) {
   const Vector2d point = at + radius_ * direction.normalized();
-  for (Contact& contact : contacts_) {
-    if ((contact.point - point).norm() > radius_) continue;
-    contact = {point, driven, contact.times + 1};
-    return;
+  const auto apart = [&](const Contact& contact) { return (contact.point - point).norm(); };
+  const auto nearest = std::ranges::min_element(contacts_, {}, apart);
+  if (nearest != contacts_.end() &&
+      apart(*nearest) <= std::clamp(radius_, kSamePlace, kSamePlaceAtMost)) {
+    *nearest = {point, driven, nearest->times + 1};
+  } else {
+    contacts_.push_back({point, driven, 1});
   }
-  contacts_.push_back({point, driven, 1});
 }
 
 const FloorMap& Contacts::seen_by(const FloorMap& map, double driven) {
   std::erase_if(contacts_, [&](const Contact& one) { return driven - one.driven > kRemembered; });
-  if (!any_obstacle()) return map;
+  if (!any_obstacle()) {
+    map_ = {};
+    return map;
+  }
   map_ = map;
   for (const Contact& contact : contacts_) {
     if (contact.times < kObstacle) continue;
-    limit(map.frame, contact.point, radius_ + kMargin, map_.clearance);
-    if (!map_.caution.empty()) limit(map.frame, contact.point, radius_ + kMargin, map_.caution);
+    limit(map.frame, contact.point, radius_ + kReach, map_.clearance);
+    if (map.has_caution()) limit(map.frame, contact.point, radius_ + kReach, map_.caution);
   }
   return map_;
 }
 
-bool Contacts::forget() {
-  const bool known = any_obstacle();
-  contacts_.clear();
-  return known;
+bool Contacts::doubt() {
+  const bool any = any_obstacle();
+  for (Contact& contact : contacts_) contact.times = std::min(contact.times, kObstacle - 1);
+  return any;
 }
 
 bool Contacts::any_obstacle() const {

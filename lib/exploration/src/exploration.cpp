@@ -96,7 +96,7 @@ class Run {
         end_interrupted();
       } else if (decision->kind == Decision::Kind::drive) {
         drive(decision->candidates.at(decision->chosen).path);
-      } else if (!contacts_.forget()) {  // else what was touched may be all that was in the way
+      } else if (!doubts_contacts()) {
         end(decision->kind == Decision::Kind::finished ? ExplorationEnd::finished
                                                        : ExplorationEnd::stuck,
             decision->why);
@@ -237,13 +237,9 @@ class Run {
     }
   }
 
-  const FloorMap& map_to_drive_by() {
-    return contacts_.seen_by(slam_.map(), result_.steps.back().distance);
-  }
-
   /// None: it was interrupted, so that what was decided is worth nothing.
   std::optional<Decision> decide() {
-    const FloorMap& map = map_to_drive_by();
+    const FloorMap& map = contacts_.seen_by(slam_.map(), result_.steps.back().distance);
     const std::vector<Id> kept = parts_.policy.kept();
     double seconds = 0.0;
     Decision decision = [&] {
@@ -288,6 +284,7 @@ class Run {
       return;
     }
     if (order.empty()) return;
+    doubts_contacts();
     decision.why += "; it can't follow that path, nor another";
     decision.candidates[wanted].path = {};
   }
@@ -321,7 +318,7 @@ class Run {
 
   /// Whether the rest of a path can be driven, and is worth it.
   bool goes_on(const PlannedPath& path, std::size_t passed) {
-    const FloorMap& map = map_to_drive_by();
+    const FloorMap& map = slam_.map();
     if (!is_open(map, slam_.pose(), path, passed, robot_.radius)) return false;
     const std::vector<Id> kept = parts_.policy.kept();
     Timed timed(result_.decide_seconds);
@@ -331,7 +328,6 @@ class Run {
 
   /// False: a new decision is needed.
   bool move(const Pose2& motion) {
-    const double heading = slam_.pose().theta();
     WorldStep step = parts_.world.move(motion);
     result_.collisions += step.collided;
     const double driven = step.odometry.translation().norm();
@@ -344,18 +340,26 @@ class Run {
     slam_.add(step.odometry, step.covariance, std::move(step.scan), parts_.world.truth());
     record(driven);
     const double jump = (slam_.pose().translation() - expected.translation()).norm();
+    if (jump > slam_.map().frame.resolution) contacts_.forget();  // they were in another frame
     if (step.collided) {
-      touch(heading, motion);
+      touch(motion, slam_.pose().theta() - step.odometry.theta());
       back_off();
     }
     return !step.collided && jump <= slam_.map().frame.resolution;
   }
 
-  /// After a motion from where the robot had this heading, which an obstacle has stopped.
-  void touch(double heading, const Pose2& motion) {
+  /// What was touched may be all that is in the way, but not again before something new is seen.
+  bool doubts_contacts() {
+    if (doubted_at_ == most_coverage_ || !contacts_.doubt()) return false;
+    doubted_at_ = most_coverage_;
+    return true;
+  }
+
+  /// An obstacle has stopped a motion that began with a heading.
+  void touch(const Pose2& motion, double heading) {
     const Eigen::Vector2d direction = Pose2(0.0, 0.0, heading) * motion.translation();
-    if (direction.norm() > 0.0)
-      contacts_.add(slam_.pose().translation(), direction, result_.steps.back().distance);
+    if (direction.norm() == 0.0) return;
+    contacts_.add(slam_.pose().translation(), direction, result_.steps.back().distance);
   }
 
   /// After a collision: the same motion from the same place would end like it.
@@ -415,7 +419,8 @@ class Run {
   ExplorationResult result_;
   std::optional<Pose2> first_truth_;  // of the poses of which it is known
   bool ended_ = false, backing_off_ = false;
-  int not_driven_ = 0;  // paths
+  double doubted_at_ = -1.0;  // coverage when contacts were doubted so as to go on [m²]
+  int not_driven_ = 0;        // paths
   int decisions_ = 0, useful_decision_ = 0, empty_decisions_ = 0, idle_ = 0, collisions_in_row_ = 0;
   double most_coverage_ = 0.0, useful_distance_ = 0.0;
 };

@@ -143,8 +143,7 @@ namespace {
 
 std::unique_ptr<Registration> make_registration(const std::string& text, Registry& registry) {
   std::unique_ptr<Registration> made = registry.make<Registration>(text);
-  // `ScanRegistration::kAbility`, which this library does not know.
-  if (made->ability("scan_registration")) {
+  if (made->ability(kScanRegistration)) {
     throw Error(
         ErrorCode::usage,
         fmt::format("registration '{}' matches laser scans, and a graph has none: 'recorded' "

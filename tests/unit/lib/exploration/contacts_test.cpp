@@ -24,7 +24,8 @@ TEST(Contacts, OneIsNoObstacleTwoAtAPlaceAre) {
   map.caution = map.clearance;
   const GridFrame& frame = map.frame;
   Contacts contacts(kRadius);
-  const Vector2d at(2.05, 2.05), ahead(0.0, 3.0), touched = at + Vector2d(0.0, kRadius);
+  const Vector2d at(2.05, 2.05);
+  const Vector2d ahead(0.0, 3.0), touched = at + Vector2d(0.0, kRadius);
   EXPECT_EQ(&contacts.seen_by(map, 0.0), &map);
   contacts.add(at, ahead, 1.0);
   contacts.add(at, Vector2d(-1.0, 0.0), 2.0);  // elsewhere
@@ -37,9 +38,8 @@ TEST(Contacts, OneIsNoObstacleTwoAtAPlaceAre) {
   for (int y = 0; y < frame.height; ++y) {
     for (int x = 0; x < frame.width; ++x) {
       const std::size_t k = frame.index(x, y);
-      const double distance = (frame.centre(x, y) - touched).norm() + 0.5 * frame.resolution;
-      // As far as any planner looks.
-      if (distance < needed_clearance(kRadius, frame) + 0.2) {
+      const double distance = (frame.centre(x, y) - touched).norm();
+      if (distance < 2.0) {
         EXPECT_NEAR(seen.clearance[k], std::min<double>(map.clearance[k], distance), 1e-6);
         EXPECT_NEAR(seen.caution[k], std::min<double>(map.caution[k], distance), 1e-6);
       }
@@ -60,14 +60,21 @@ TEST(Contacts, AreForgottenAfterAWay) {
   EXPECT_EQ(&contacts.seen_by(map, 53.0), &map);
 }
 
-TEST(Contacts, SaysWhetherItForgetsAnObstacle) {
+TEST(Contacts, OfWhichOneIsDoubtedAreNoneUntilTouchedOnceMore) {
   const FloorMap map = room();
   Contacts contacts(kRadius);
-  contacts.add({2.0, 2.0}, {1.0, 0.0}, 1.0);
-  EXPECT_FALSE(contacts.forget());
-  for (const double driven : {1.0, 2.0}) contacts.add({2.0, 2.0}, {1.0, 0.0}, driven);
-  EXPECT_TRUE(contacts.forget());
-  EXPECT_FALSE(contacts.forget());
+  const auto touch = [&] { contacts.add({2.0, 2.0}, {1.0, 0.0}, 1.0); };
+  touch();
+  EXPECT_FALSE(contacts.doubt());
+  touch();
+  EXPECT_NE(&contacts.seen_by(map, 3.0), &map);
+  EXPECT_TRUE(contacts.doubt());
+  EXPECT_FALSE(contacts.doubt());
+  EXPECT_EQ(&contacts.seen_by(map, 3.0), &map);
+  touch();
+  EXPECT_NE(&contacts.seen_by(map, 3.0), &map);
+  contacts.forget();
+  touch();
   EXPECT_EQ(&contacts.seen_by(map, 3.0), &map);
 }
 
@@ -75,11 +82,12 @@ TEST(Contacts, AtTheEdgeOfTheMapAndBeyond) {
   const FloorMap map = room();
   Contacts contacts(kRadius);
   for (const double driven : {1.0, 2.0}) {
-    contacts.add({3.95, 0.05}, {1.0, 0.0}, driven);
+    contacts.add({3.55, 0.35}, {1.0, 0.0}, driven);
     contacts.add({-3.0, 99.0}, {1.0, 0.0}, driven);
   }
   const FloorMap& seen = contacts.seen_by(map, 3.0);
-  EXPECT_NEAR(seen.clearance[map.frame.index(39, 0)], 0.1, 1e-6);  // the edge is nearer
+  EXPECT_LT(seen.clearance[map.frame.index(37, 3)], 0.05F);
+  EXPECT_EQ(seen.clearance[map.frame.index(39, 0)], map.clearance[map.frame.index(39, 0)]);
   EXPECT_EQ(seen.clearance[map.frame.index(0, 39)], map.clearance[map.frame.index(0, 39)]);
 }
 

@@ -146,23 +146,30 @@ TEST(GridDijkstra, AvoidsCellsThatAWallFillsInPart) {
   EXPECT_EQ(used(*careful), near);
 }
 
-/// It looks at a goal from where it can't touch anything, if there is such a place.
+/// It looks at a goal from where it can't touch anything, if there is such a place near.
 TEST(GridDijkstra, LooksAtGoalsFromWhereThereIsRoom) {
-  FloorMap map = drawn_map({"########", "#......#", "#......#", "########"});
+  FloorMap map = drawn_map({"########", "#......#", "#......#", "########"}, 0.4);
   const GridFrame& frame = map.frame;
-  const auto planner = shortest();
   const Vector2d goal = frame.centre(6, 1);
-  const auto end = [&] {
-    planner->start(map, frame.centre(1, 1), kRadius);
-    return planner->path_to(goal, 2.0)->points.back();
+  const auto end = [&](const char* planner, int from) {
+    const auto by = Registry().make<PathPlanner>(parse_component(planner));
+    by->start(map, frame.centre(from, 1), 0.15);
+    const auto path = by->path_to(goal, 2.0);
+    return path->points.back();
   };
-  EXPECT_EQ(end(), goal);
+  const char* const careful = "grid_dijkstra";
+  EXPECT_EQ(end(careful, 1), goal);
   map.caution = map.clearance;
   map.caution[frame.index(6, 1)] = 0.0F;
-  EXPECT_NE(end(), goal);
-  EXPECT_GE((end() - goal).norm(), 1.0);
+  EXPECT_NEAR((end(careful, 1) - goal).norm(), 0.4, 1e-9);
+  EXPECT_EQ(end("grid_dijkstra:weight=0", 1), goal);
+  EXPECT_EQ(end("grid_dijkstra:margin=0", 1), goal);
+  for (const int x : {5, 6}) map.caution[frame.index(x, 2)] = 0.0F;
+  EXPECT_EQ(end(careful, 5), goal);  // it stands at the only such place, and goes on
+  map.caution[frame.index(5, 1)] = 0.0F;
+  EXPECT_EQ(end(careful, 1), goal);  // the next one is too far away
   std::ranges::fill(map.caution, 0.0F);
-  EXPECT_EQ(end(), goal);
+  EXPECT_EQ(end(careful, 1), goal);
 }
 
 TEST(GridDijkstra, LeavesWhereTheBodyDoesNotFitAwayFromObstaclesOnly) {

@@ -11,20 +11,23 @@
 namespace cairn {
 
 /// Where a round body has touched obstacles. What it has touched at one place twice is an obstacle
-/// to paths for some time, whatever the map shows there: the same path would touch it again. Once
-/// is no reason, since the place is known no better than by the direction of the motion.
+/// to paths for some time, whatever the map shows there: the same path would touch it again.
 class CAIRN_API Contacts {
  public:
   explicit Contacts(double radius) : radius_(radius) {}
 
-  /// Something in the `direction` of the motion (of any length but 0) has stopped the body at `at`
-  /// [m], after so many metres were `driven`.
+  /// Something has stopped the body at `at` [m], after so many metres were `driven`, on a motion in
+  /// `direction` (of any length but 0): it is taken to be straight ahead, which is no more than
+  /// likely.
   void add(const Eigen::Vector2d& at, const Eigen::Vector2d& direction, double driven);
-  /// The map, whose clearances are no larger than up to obstacles that were touched; it is good
-  /// until the next call, and as long as `map`.
+  /// The map, with clearance and caution no larger than the distance to what was touched twice;
+  /// good until the next call, and as long as `map`.
   const FloorMap& seen_by(const FloorMap& map, double driven);
-  /// Forgets everything. Returns whether something was an obstacle.
-  bool forget();
+  /// What is an obstacle is none any more until it is touched once again. Returns whether there was
+  /// any.
+  bool doubt();
+  /// Nothing was touched.
+  void forget() { contacts_.clear(); }
 
  private:
   struct Contact {

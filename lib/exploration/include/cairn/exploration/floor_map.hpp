@@ -37,11 +37,12 @@ struct CAIRN_API FloorMap {
   /// the newest scan ends [m]; what lies outside the grid is not free.
   std::vector<float> clearance;
   /// The same, but no farther than to a free cell in which some beams end: a wall that fills it in
-  /// part. Bodies fit through doors by `clearance`; by this, paths that have room avoid walls.
-  /// Empty: it is the same.
+  /// part. Bodies fit through doors by `clearance`; by this, paths that have room avoid walls. Of
+  /// another size: this mapper has none.
   std::vector<float> caution;
   std::vector<Frontier> frontiers;  ///< longest first
 
+  bool has_caution() const { return caution.size() == clearance.size(); }
   std::size_t known_cells() const;
   /// Of the cells that are free or occupied [m²].
   double coverage() const { return static_cast<double>(known_cells()) * frame.cell_area(); }

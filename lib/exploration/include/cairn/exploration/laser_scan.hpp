@@ -9,6 +9,7 @@
 #include <Eigen/Core>
 
 #include "cairn/graph/graph.hpp"
+#include "cairn/policy/registration.hpp"
 #include "cairn/runtime/api.hpp"
 
 namespace cairn {
@@ -55,7 +56,7 @@ CAIRN_API std::size_t measured_beams(const LaserScan& scan);
 /// Ability of a registration that matches laser scans: it is given them as they are taken.
 class CAIRN_API ScanRegistration {
  public:
-  static constexpr std::string_view kAbility = "scan_registration";
+  static constexpr std::string_view kAbility = kScanRegistration;
   virtual ~ScanRegistration();
   /// The scan that was taken at a pose; called before the first match with it. After
   /// `Registration::pose_ended` with false it may be forgotten, that of the newest pose once the

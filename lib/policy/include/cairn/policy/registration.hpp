@@ -61,6 +61,10 @@ class CAIRN_API Registration : public Component {
   virtual bool matches_recorded_only() const;
 };
 
+/// The name of the ability of registrations that match laser scans, `ScanRegistration`: a graph has
+/// none.
+inline constexpr std::string_view kScanRegistration = "scan_registration";
+
 /// Ability of a registration that knows which of its answers are false: for experiments, which
 /// count their outcomes.
 class CAIRN_API FalseMatches {

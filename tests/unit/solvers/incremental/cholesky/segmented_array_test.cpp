@@ -53,6 +53,21 @@ TEST(SegmentedArray, ArraysKeepWhatIsWrittenToThem) {
   }
 }
 
+// A segment that is full to the last double; nothing after it; one that is longer before all
+// others.
+TEST(SegmentedArray, FullSegmentsAndLongFirstOnes) {
+  SegmentedArray values;
+  const Taken full{values.take(32768), 32768, 1.0}, none{values.take(0), 0, 2.0};
+  const Taken next{values.take(3), 3, 3.0};
+  for (const Taken& taken : {full, none, next}) fill(values, taken);
+  EXPECT_TRUE(holds(values, full, 1.0) && holds(values, next, 3.0));
+  SegmentedArray longer;
+  const Taken first{longer.take(70000), 70000, 4.0}, second{longer.take(5), 5, 5.0};
+  for (const Taken& taken : {first, second}) fill(longer, taken);
+  EXPECT_TRUE(holds(longer, first, 4.0) && holds(longer, second, 5.0));
+  EXPECT_EQ(longer.size(), 70005);
+}
+
 // Past the first segment nothing moves, which is what it is for.
 TEST(SegmentedArray, LargeOnesAreNotCopiedWhenTheyGrow) {
   SegmentedArray values;
