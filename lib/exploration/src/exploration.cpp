@@ -63,6 +63,9 @@ double area_of(const GridFrame& grid) {
   return static_cast<double>(grid.size()) * grid.cell_area();
 }
 
+/// Metres between two times that contacts are doubted.
+constexpr double kBetweenDoubts = 5.0;
+
 class Run {
  public:
   explicit Run(const Exploration& parts)
@@ -348,10 +351,11 @@ class Run {
     return !step.collided && jump <= slam_.map().frame.resolution;
   }
 
-  /// What was touched may be all that is in the way, but not again before something new is seen.
+  /// What was touched may be all that is in the way, but not again where nothing else was tried.
   bool doubts_contacts() {
-    if (doubted_at_ == most_coverage_ || !contacts_.doubt()) return false;
-    doubted_at_ = most_coverage_;
+    const double driven = result_.steps.back().distance;
+    if (driven < next_doubt_ || !contacts_.doubt()) return false;
+    next_doubt_ = driven + kBetweenDoubts;
     return true;
   }
 
@@ -419,8 +423,8 @@ class Run {
   ExplorationResult result_;
   std::optional<Pose2> first_truth_;  // of the poses of which it is known
   bool ended_ = false, backing_off_ = false;
-  double doubted_at_ = -1.0;  // coverage when contacts were doubted so as to go on [m²]
-  int not_driven_ = 0;        // paths
+  double next_doubt_ = 0.0;  // of contacts, so as to go on, no earlier [m driven]
+  int not_driven_ = 0;       // paths
   int decisions_ = 0, useful_decision_ = 0, empty_decisions_ = 0, idle_ = 0, collisions_in_row_ = 0;
   double most_coverage_ = 0.0, useful_distance_ = 0.0;
 };
