@@ -4,6 +4,8 @@
 #include <sys/mman.h>
 
 #include <cstdint>
+#include <cstring>
+#include <limits>
 #include <mutex>
 #include <new>
 #include <utility>
@@ -20,12 +22,15 @@ constexpr std::size_t kHugePage = std::size_t{1} << 21;
 #if defined(CAIRN_SANITIZED)
 // Every byte beyond an array is noticed.
 constexpr std::size_t kSmall = 0, kShared = kHugePage, kSharedEnd = kHugePage;
+constexpr std::size_t kMapped = std::numeric_limits<std::size_t>::max();
 #else
 // Below, the C library's own alignment takes several times as long as what a cache line costs.
 constexpr std::size_t kSmall = 4096;
 // Arrays of these sizes share huge pages. Smaller ones mostly find room in pages that were touched
 // before; larger ones leave room in a page that others rarely fill.
 constexpr std::size_t kShared = 16384, kSharedEnd = kHugePage / 4;
+// Arrays that grow are mappings of their own from this size on.
+constexpr std::size_t kMapped = kSharedEnd;
 #endif
 // What is left of a large array after its whole huge pages gets one too, if it is so much.
 constexpr std::size_t kWorthHugePage = kHugePage / 4 * 3;
@@ -92,6 +97,14 @@ SharedPages& shared_pages() {
   return *pages;
 }
 
+void* map(std::size_t bytes, int advice) {
+  void* memory =
+      ::mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+  if (memory == MAP_FAILED) throw std::bad_alloc();
+  ::madvise(memory, bytes, advice);
+  return memory;
+}
+
 }  // namespace
 
 void* allocate(std::size_t bytes) {
@@ -114,6 +127,29 @@ void release(void* memory, std::size_t bytes) noexcept {
   if (bytes < kShared) return ::operator delete (memory, std::align_val_t{kCacheLine});
   if (bytes < kSharedEnd) return shared_pages().release(memory);
   release_pages(memory);
+}
+
+void* allocate_growing(std::size_t bytes) {
+  return bytes < kMapped ? allocate(bytes) : map(bytes, MADV_HUGEPAGE);
+}
+
+void* grow(void* memory, std::size_t used, std::size_t bytes, std::size_t more) {
+  // The first touch of a huge page clears 2 MB at once: here each page is cleared when it is needed.
+  if (bytes >= kMapped) {
+    void* larger = ::mremap(memory, bytes, more, MREMAP_MAYMOVE);
+    if (larger == MAP_FAILED) throw std::bad_alloc();
+    ::madvise(larger, more, MADV_NOHUGEPAGE);
+    return larger;
+  }
+  void* larger = more < kMapped ? allocate(more) : map(more, MADV_NOHUGEPAGE);
+  if (used > 0) std::memcpy(larger, memory, used);
+  if (memory) release(memory, bytes);
+  return larger;
+}
+
+void release_growing(void* memory, std::size_t bytes) noexcept {
+  if (bytes < kMapped) return release(memory, bytes);
+  ::munmap(memory, bytes);
 }
 
 }  // namespace cairn::memory

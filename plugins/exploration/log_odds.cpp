@@ -25,7 +25,7 @@ struct LogOddsOptions {
   double resolution = 0.1;
   double hit = 0.9, miss = 0.7, limit = 4.2;
   double free = 0.35, occupied = 0.65, tolerance = 0.25;
-  double part_filled = 0.1;
+  double part_filled = 0.1, newest = 1.5;
   bool smooth = true;
 
   static auto fields() {
@@ -45,6 +45,9 @@ struct LogOddsOptions {
             "part_filled", &O::part_filled, 0.0, 1.0,
             "paths that have room avoid a free cell in which at least this part of the scans that "
             "reach it end: a wall fills it in part")
+        .real("newest", &O::newest, 0.0, 1000.0,
+              "where the newest scan ends within this distance of the robot, an obstacle is in the "
+              "way, whatever older scans have shown there [m]")
         .boolean("smooth", &O::smooth,
                  "unknown cells that a square of 3 × 3 does not fit into are free, if most known "
                  "ones around are (morphological opening)");
@@ -178,13 +181,15 @@ class LogOdds final : public Mapper {
     }
   }
 
-  /// The cells in which beams of the newest scan end stand in its way, whatever older scans have
-  /// shown there.
+  /// The cells near the robot in which beams of the newest scan end stand in its way, whatever
+  /// older scans have shown there. Farther away noise of a single scan would close doors that are
+  /// open.
   std::vector<Vector2i> obstructed() const {
     std::vector<Vector2i> cells;
     if (scans_.empty()) return cells;
-    for_each_end(scans_.back(), [&](const BeamEnd& end, const Vector2d&) {
-      if (end.hit) cells.push_back(end.cell());
+    const Vector2d from = scans_.back().at.translation();
+    for_each_end(scans_.back(), [&](const BeamEnd& end, const Vector2d& point) {
+      if (end.hit && (point - from).norm() <= options_.newest) cells.push_back(end.cell());
     });
     return cells;
   }

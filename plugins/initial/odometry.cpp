@@ -34,7 +34,8 @@ class Odometry final : public InitialGuess {
     const std::vector<bool> is_chain = chain_types(graph);
     for (std::size_t pool = 0; pool < is_chain.size(); ++pool) {
       if (!is_chain[pool]) continue;
-      std::vector<int> chain = graph.variable_pools()[pool].variables;
+      const GrowingArray<std::int32_t>& variables = graph.variable_pools()[pool].variables;
+      std::vector<int> chain(variables.begin(), variables.end());
       std::sort(chain.begin(), chain.end(),
                 [&](int a, int b) { return graph.id(a) < graph.id(b); });
       // Forward from the first pose that is known; those before it, backward.

@@ -189,7 +189,7 @@ py::array_t<double> information_of(BoundGraph& bound, const py::object& type) {
 }
 
 py::array_t<std::int32_t> positions_of(BoundGraph& bound, const py::object& type) {
-  const std::vector<std::int32_t>& sequence = factor_pool_of(bound, type).sequence;
+  const GrowingArray<std::int32_t>& sequence = factor_pool_of(bound, type).sequence;
   return py::array_t<std::int32_t>(static_cast<py::ssize_t>(sequence.size()), sequence.data());
 }
 

@@ -14,7 +14,7 @@ namespace {
 std::vector<std::int32_t> rank_within_type(const Graph& graph) {
   std::vector<std::int32_t> rank(graph.variable_count());
   for (const VariablePool& pool : graph.variable_pools()) {
-    std::vector<std::int32_t> order = pool.variables;
+    std::vector<std::int32_t> order(pool.variables.begin(), pool.variables.end());
     const auto by_id = [&](std::int32_t a, std::int32_t b) { return graph.id(a) < graph.id(b); };
     if (!std::ranges::is_sorted(order, by_id)) std::ranges::sort(order, by_id);
     for (std::size_t k = 0; k < order.size(); ++k) rank[order[k]] = static_cast<std::int32_t>(k);

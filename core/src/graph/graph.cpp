@@ -57,13 +57,6 @@ std::string problem_of(const Root& root, std::span<const double> information) {
              : "the information matrix is not positive semidefinite";
 }
 
-/// For `size` elements in all. Where there is not, for twice as many as there was for, so that
-/// asking for a few more again and again does not copy everything each time.
-template <class Vector>
-void make_room(Vector& vector, std::size_t size) {
-  if (size > vector.capacity()) vector.reserve(std::max(size, 2 * vector.capacity()));
-}
-
 }  // namespace
 
 Graph::Graph() = default;
@@ -85,11 +78,11 @@ Graph Graph::clone() const {
 }
 
 void Graph::reserve(std::size_t variables, std::size_t factors) {
-  make_room(records_, variables);
+  records_.reserve(variables);
   const auto places = static_cast<std::size_t>(static_cast<double>(index_of_id_.bucket_count()) *
                                                index_of_id_.max_load_factor());
   if (variables > places) index_of_id_.reserve(std::max(variables, 2 * places));
-  make_room(factors_, factors);
+  factors_.reserve(factors);
 }
 
 /// The pool of a type; one past the last if there is none yet.
@@ -142,7 +135,7 @@ int Graph::add_variable(std::shared_ptr<const VariableType> type, Id id,
   }
   values_.pools[p].insert(values_.pools[p].end(), state.begin(), state.end());
   const int index = variable_count();
-  std::vector<std::int32_t>& variables = variable_pools_[p].variables;
+  GrowingArray<std::int32_t>& variables = variable_pools_[p].variables;
   records_.push_back({id, p, static_cast<std::int32_t>(variables.size()), false});
   variables.push_back(index);
   index_of_id_.emplace(id, index);
@@ -233,9 +226,9 @@ int Graph::add_factor(std::shared_ptr<const FactorType> type, std::span<const in
     for (const int v : variables) factor_pools_[p].variable_pools.push_back(records_[v].pool);
   }
   FactorPool& pool = factor_pools_[p];
-  pool.measurements.insert(pool.measurements.end(), z.begin(), z.end());
-  pool.information.insert(pool.information.end(), information.begin(), information.end());
-  pool.sqrt_information.insert(pool.sqrt_information.end(), root.packed.begin(), root.packed.end());
+  pool.measurements.append(z);
+  pool.information.append(information);
+  pool.sqrt_information.append(root.packed);
   pool.ranks.push_back(static_cast<std::int16_t>(root.rank));
   pool.losses.push_back(of_loss);
   for (const int v : variables) {

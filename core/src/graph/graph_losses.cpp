@@ -41,10 +41,8 @@ const Loss* Graph::loss(int position) const { return losses_[loss_of(position)].
 
 bool Graph::any_loss(int factor_pool, std::size_t begin, std::size_t end) const {
   if (!has_losses()) return false;
-  const std::vector<std::int16_t>& of = factor_pools_[factor_pool].losses;
-  return std::any_of(of.begin() + static_cast<std::ptrdiff_t>(begin),
-                     of.begin() + static_cast<std::ptrdiff_t>(end),
-                     [](std::int16_t k) { return k != 0; });
+  const std::int16_t* of = factor_pools_[factor_pool].losses.data();
+  return std::any_of(of + begin, of + end, [](std::int16_t k) { return k != 0; });
 }
 
 void Graph::weigh(int factor_pool, std::size_t begin, std::span<const double> norms,

@@ -72,7 +72,8 @@ Renumbering Graph::erase_factor(int position) {
 void Graph::remove_factors(const std::vector<bool>& leaves,
                            const std::vector<std::int32_t>& position) {
   std::vector<FactorPool> pools;
-  std::vector<FactorRef> factors(static_cast<std::size_t>(std::ranges::count(leaves, false)));
+  GrowingArray<FactorRef> factors;
+  factors.resize(static_cast<std::size_t>(std::ranges::count(leaves, false)));
   for (FactorPool& pool : factor_pools_) {
     const std::size_t arity = static_cast<std::size_t>(pool.type->arity()),
                       measurement = static_cast<std::size_t>(pool.type->measurement_size()),

@@ -124,7 +124,7 @@ std::string losses_weigh_nothing(const Graph& graph) {
   const std::vector<double> norms = squared_norms(graph);
   double heaviest = 0.0;
   for (std::size_t p = 0; p < graph.factor_pools().size(); ++p) {
-    const std::vector<std::int32_t>& positions = graph.factor_pools()[p].sequence;
+    const GrowingArray<std::int32_t>& positions = graph.factor_pools()[p].sequence;
     std::vector<double> of_pool, weights(positions.size());
     for (const std::int32_t position : positions) of_pool.push_back(norms[position]);
     graph.weigh(static_cast<int>(p), 0, of_pool, {}, weights);

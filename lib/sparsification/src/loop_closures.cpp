@@ -23,7 +23,7 @@ using Eigen::MatrixXd;
 std::vector<int> ranks(const Graph& graph) {
   std::vector<int> rank(graph.variable_count());
   for (const VariablePool& pool : graph.variable_pools()) {
-    std::vector<std::int32_t> order = pool.variables;
+    std::vector<std::int32_t> order(pool.variables.begin(), pool.variables.end());
     std::ranges::sort(order, {}, [&](int v) { return graph.id(v); });
     for (std::size_t k = 0; k < order.size(); ++k) rank[order[k]] = static_cast<int>(k);
   }

@@ -13,6 +13,7 @@
 #include "cairn/graph/factor_selector.hpp"
 #include "cairn/runtime/aligned.hpp"
 #include "cairn/runtime/api.hpp"
+#include "cairn/runtime/growing_array.hpp"
 #include "cairn/types/factor_type.hpp"
 #include "cairn/types/loss.hpp"
 #include "cairn/types/variable_type.hpp"
@@ -31,21 +32,21 @@ struct Values {
 /// the type came from, and graphs share types.
 struct VariablePool {
   std::shared_ptr<const VariableType> type;
-  std::vector<std::int32_t> variables;  ///< slot → index of the variable in the graph
+  GrowingArray<std::int32_t> variables;  ///< slot → index of the variable in the graph
 };
 
 /// All factors of one type, entry by entry in the order in which they were added.
 struct FactorPool {
   std::shared_ptr<const FactorType> type;
   std::vector<std::int32_t> variable_pools;  ///< arity: pool of each of the factor's variables
-  std::vector<std::int32_t> slots;           ///< size × arity: slot within that pool
-  std::vector<std::int32_t> variables;       ///< size × arity: index of the variable in the graph
-  AlignedVector measurements;                ///< size × measurement_size
-  AlignedVector information;           ///< size × n(n+1)/2: upper triangle, row by row, as given
-  AlignedVector sqrt_information;      ///< size × n(n+1)/2: U with UᵀU = information, row by row
-  std::vector<std::int16_t> ranks;     ///< size: rank of the information
-  std::vector<std::int16_t> losses;    ///< size: index of the loss in `Graph::losses()`, 0: none
-  std::vector<std::int32_t> sequence;  ///< position among all factors of the graph
+  GrowingArray<std::int32_t> slots;          ///< size × arity: slot within that pool
+  GrowingArray<std::int32_t> variables;      ///< size × arity: index of the variable in the graph
+  GrowingArray<double> measurements;         ///< size × measurement_size
+  GrowingArray<double> information;       ///< size × n(n+1)/2: upper triangle, row by row, as given
+  GrowingArray<double> sqrt_information;  ///< size × n(n+1)/2: U with UᵀU = information, row by row
+  GrowingArray<std::int16_t> ranks;       ///< size: rank of the information
+  GrowingArray<std::int16_t> losses;      ///< size: index of the loss in `Graph::losses()`, 0: none
+  GrowingArray<std::int32_t> sequence;    ///< position among all factors of the graph
 
   std::size_t size() const { return sequence.size(); }
 };
@@ -222,10 +223,10 @@ class CAIRN_API Graph {
   void remove_factors(const std::vector<bool>& leaves, const std::vector<std::int32_t>& position);
   void remove_variables(const std::vector<bool>& leaves, const std::vector<std::int32_t>& index);
 
-  std::vector<VariableRecord> records_;
+  GrowingArray<VariableRecord> records_;
   std::vector<VariablePool> variable_pools_;
   Values values_;
-  std::vector<FactorRef> factors_;
+  GrowingArray<FactorRef> factors_;
   std::vector<FactorPool> factor_pools_;
   std::unordered_map<Id, int> index_of_id_;
   std::vector<std::shared_ptr<const Loss>> losses_{nullptr};

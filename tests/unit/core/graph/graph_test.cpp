@@ -103,7 +103,7 @@ TEST_F(GraphTest, KeepsInformationAsGivenAndItsSquareRoot) {
   const std::vector<double> omega = {4, 1, 0.5, 3, 0.2, 2};
   connect(0, 1, omega);
   EXPECT_THAT(graph_.information(0), ::testing::ElementsAreArray(omega));
-  const AlignedVector& u = graph_.factor_pools()[0].sqrt_information;
+  const GrowingArray<double>& u = graph_.factor_pools()[0].sqrt_information;
   Eigen::Matrix3d U = Eigen::Matrix3d::Zero(), Omega;
   U << u[0], u[1], u[2], 0, u[3], u[4], 0, 0, u[5];
   Omega << 4, 1, 0.5, 1, 3, 0.2, 0.5, 0.2, 2;

@@ -168,25 +168,34 @@ TEST(LogOdds, FrontiersAreFreeCellsBesideUnknownOnes) {
   for (std::size_t k = 0; k < literal.size(); ++k) EXPECT_LE(map.clearance[k], literal[k] + 1e-4F);
 }
 
-TEST(LogOdds, TheNewestScanStandsInTheWayOfABody) {
-  const auto map_of = mapper("resolution=0.1");
-  LaserScan open{.first_angle = -0.6, .angle_step = 0.01, .max_range = 4.0, .ranges = {}};
-  open.ranges.assign(121, 3.0F);
-  for (int k = 0; k < 9; ++k) map_of->add(Pose2(0.05, 0.05, 0.0), open);
-  const auto at = [](const FloorMap& map, double x) {
-    const Vector2d cell = map.frame.to_cells({x, 0.05}).array().floor();
-    return map.frame.index(static_cast<int>(cell.x()), static_cast<int>(cell.y()));
+/// One beam of the newest scan ends where nine scans have seen nothing.
+TEST(LogOdds, TheNewestScanStandsInTheWayOfABodyThatIsNear) {
+  struct Case {
+    const char* options;
+    double range;
+    bool in_the_way;
   };
-  {
+  for (const Case& c : {Case{"resolution=0.1", 1.35, true}, Case{"resolution=0.1", 1.95, false},
+                        Case{"resolution=0.1,newest=2.5", 1.95, true},
+                        Case{"resolution=0.1,newest=0", 1.35, false}}) {
+    SCOPED_TRACE(std::string(c.options) + " " + std::to_string(c.range));
+    const auto map_of = mapper(c.options);
+    LaserScan open{.first_angle = -0.6, .angle_step = 0.01, .max_range = 4.0, .ranges = {}};
+    open.ranges.assign(121, 3.0F);
+    for (int k = 0; k < 9; ++k) map_of->add(Pose2(0.05, 0.05, 0.0), open);
+    const auto there = [&](const FloorMap& map) {
+      const Vector2d cell = map.frame.to_cells({c.range + 0.1, 0.05}).array().floor();
+      return map.frame.index(static_cast<int>(cell.x()), static_cast<int>(cell.y()));
+    };
+    const float before = map_of->map().clearance[there(map_of->map())];
+    EXPECT_GT(before, 0.5F);
+    LaserScan blocked = open;
+    blocked.ranges[60] = static_cast<float>(c.range);  // straight ahead
+    map_of->add(Pose2(0.05, 0.05, 0.0), blocked);
     const FloorMap& map = map_of->map();
-    EXPECT_GT(map.clearance[at(map, 2.0)], 0.5F);
+    EXPECT_EQ(map.cells[there(map)], CellState::free);  // by the majority of scans
+    EXPECT_EQ(map.clearance[there(map)], c.in_the_way ? 0.0F : before);
   }
-  LaserScan blocked = open;
-  blocked.ranges[60] = 1.95F;  // straight ahead
-  map_of->add(Pose2(0.05, 0.05, 0.0), blocked);
-  const FloorMap& map = map_of->map();
-  EXPECT_EQ(map.cells[at(map, 2.05)], CellState::free);  // by the majority of scans
-  EXPECT_EQ(map.clearance[at(map, 2.05)], 0.0F);
 }
 
 /// A wall that fills a cell in part: one scan of five ends there.

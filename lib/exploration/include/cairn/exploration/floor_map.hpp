@@ -34,7 +34,7 @@ struct CAIRN_API FloorMap {
   std::vector<float> log_odds;
   std::vector<CellState> cells;
   /// From the middle of a cell to that of the nearest one that is not free, or in which a beam of
-  /// the newest scan ends [m]; what lies outside the grid is not free.
+  /// the newest scan ends near the robot [m]; what lies outside the grid is not free.
   std::vector<float> clearance;
   /// The same, but no farther than to a free cell in which some beams end: a wall that fills it in
   /// part. Bodies fit through doors by `clearance`; by this, paths that have room avoid walls. Of
