@@ -98,8 +98,7 @@ SharedPages& shared_pages() {
 }
 
 void* map(std::size_t bytes, int advice) {
-  void* memory =
-      ::mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+  void* memory = ::mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
   if (memory == MAP_FAILED) throw std::bad_alloc();
   ::madvise(memory, bytes, advice);
   return memory;
@@ -134,7 +133,8 @@ void* allocate_growing(std::size_t bytes) {
 }
 
 void* grow(void* memory, std::size_t used, std::size_t bytes, std::size_t more) {
-  // The first touch of a huge page clears 2 MB at once: here each page is cleared when it is needed.
+  // The first touch of a huge page clears 2 MB at once: here each page is cleared when it is
+  // needed.
   if (bytes >= kMapped) {
     void* larger = ::mremap(memory, bytes, more, MREMAP_MAYMOVE);
     if (larger == MAP_FAILED) throw std::bad_alloc();

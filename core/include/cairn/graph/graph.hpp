@@ -42,11 +42,11 @@ struct FactorPool {
   GrowingArray<std::int32_t> slots;          ///< size × arity: slot within that pool
   GrowingArray<std::int32_t> variables;      ///< size × arity: index of the variable in the graph
   GrowingArray<double> measurements;         ///< size × measurement_size
-  GrowingArray<double> information;       ///< size × n(n+1)/2: upper triangle, row by row, as given
+  GrowingArray<double> information;  ///< size × n(n+1)/2: upper triangle, row by row, as given
   GrowingArray<double> sqrt_information;  ///< size × n(n+1)/2: U with UᵀU = information, row by row
   GrowingArray<std::int16_t> ranks;       ///< size: rank of the information
   GrowingArray<std::int16_t> losses;      ///< size: index of the loss in `Graph::losses()`, 0: none
-  GrowingArray<std::int32_t> sequence;    ///< position among all factors of the graph
+  GrowingArray<std::int32_t> sequence;  ///< position among all factors of the graph
 
   std::size_t size() const { return sequence.size(); }
 };
