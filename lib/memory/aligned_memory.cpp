@@ -134,7 +134,7 @@ void* allocate_growing(std::size_t bytes) {
 
 void* grow(void* memory, std::size_t used, std::size_t bytes, std::size_t more) {
   // The first touch of a huge page clears 2 MB at once: here each page is cleared when it is
-  // needed.
+  // needed. The advice is for all of a mapping, since mremap takes only what has one.
   if (bytes >= kMapped) {
     void* larger = ::mremap(memory, bytes, more, MREMAP_MAYMOVE);
     if (larger == MAP_FAILED) throw std::bad_alloc();

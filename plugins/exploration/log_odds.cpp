@@ -188,8 +188,9 @@ class LogOdds final : public Mapper {
     std::vector<Vector2i> cells;
     if (scans_.empty()) return cells;
     const Vector2d from = scans_.back().at.translation();
+    const double within = options_.newest + kSurfaceInset * options_.resolution;
     for_each_end(scans_.back(), [&](const BeamEnd& end, const Vector2d& point) {
-      if (end.hit && (point - from).norm() <= options_.newest) cells.push_back(end.cell());
+      if (end.hit && (point - from).norm() <= within) cells.push_back(end.cell());
     });
     return cells;
   }

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include <fmt/core.h>
 #include <boost/container/small_vector.hpp>
@@ -78,6 +79,13 @@ Graph Graph::clone() const {
 }
 
 void Graph::reserve(std::size_t variables, std::size_t factors) {
+  constexpr std::size_t kMost = std::numeric_limits<std::int32_t>::max();
+  if (std::max(variables, factors) > kMost) {
+    throw Error(ErrorCode::usage,
+                fmt::format("Graph::reserve: a graph has no room for {} variables "
+                            "and {} factors, but for {} of each at most",
+                            variables, factors, kMost));
+  }
   records_.reserve(variables);
   const auto places = static_cast<std::size_t>(static_cast<double>(index_of_id_.bucket_count()) *
                                                index_of_id_.max_load_factor());
@@ -225,13 +233,16 @@ int Graph::add_factor(std::shared_ptr<const FactorType> type, std::span<const in
     factor_pools_.emplace_back().type = std::move(type);
     for (const int v : variables) factor_pools_[p].variable_pools.push_back(records_[v].pool);
   }
+  // What was given may be of this graph itself, whose arrays move while they grow.
+  const Numbers given(information.begin(), information.end());
+  const boost::container::small_vector<int, 8> ends(variables.begin(), variables.end());
   FactorPool& pool = factor_pools_[p];
   pool.measurements.append(z);
-  pool.information.append(information);
+  pool.information.append(given);
   pool.sqrt_information.append(root.packed);
   pool.ranks.push_back(static_cast<std::int16_t>(root.rank));
   pool.losses.push_back(of_loss);
-  for (const int v : variables) {
+  for (const int v : ends) {
     pool.variables.push_back(v);
     pool.slots.push_back(records_[v].slot);
   }

@@ -30,8 +30,8 @@ constexpr double kNoMotion = 0.005;  // [m], [rad]
 constexpr int kMostEmptyDecisions = 3;
 /// Collisions without a free motion in between.
 constexpr int kMostCollisions = 10;
-/// The known floor must grow by this part of it, or by this area [m²], to be progress.
-constexpr double kProgressPart = 0.002, kProgressArea = 0.5;
+/// The known floor must grow by this factor to be progress.
+constexpr double kProgress = 1.002;
 /// Decisions without progress before a run is stuck: on a large floor one way alone may be long.
 constexpr int kIdleDecisions = 5;
 
@@ -376,8 +376,7 @@ class Run {
 
   void watch_progress(const ExplorationStep& step) {
     // A map that is made anew, blurred a little more or less, is no progress.
-    const double least = std::min(kProgressPart * most_coverage_, kProgressArea);
-    if (step.coverage <= most_coverage_ + least) return;
+    if (step.coverage <= kProgress * most_coverage_) return;
     useful_distance_ = step.distance;
     useful_decision_ = decisions_;
     most_coverage_ = step.coverage;

@@ -215,9 +215,10 @@ int main(int argc, char** argv) {
   print("through the socket", outside);
   print("in process, fastest of the rounds", fastest_inside);
   print("through the socket, fastest of the rounds", fastest_outside);
-  // Update by update: what the longest of them compute is the same in both, and drops out.
+  // Update by update: what the longest of them compute is the same in both, and drops out. The
+  // fastest may be of different rounds, so single differences may be negative.
   std::vector<double> added = fastest_outside;
   for (std::size_t k = 0; k < added.size(); ++k) added[k] -= fastest_inside[k];
-  print("what the socket adds to an update, fastest of the rounds", added);
+  print("difference of the fastest, by update", added);
   return 0;
 }

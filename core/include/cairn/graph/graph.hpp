@@ -119,7 +119,7 @@ class CAIRN_API Graph {
   /// (usage), and removes nothing, if a factor that stays is on a variable that leaves.
   Renumbering remove(const std::vector<bool>& factors, const std::vector<bool>& variables);
 
-  /// Makes room beforehand; purely for speed.
+  /// Makes room beforehand; purely for speed. Throws `Error` (usage) for 2³¹ or more of either.
   void reserve(std::size_t variables, std::size_t factors);
 
   // Variables -----------------------------------------------------------------------------------

@@ -20,9 +20,9 @@ CAIRN_API void* grow_aligned(void* memory, std::size_t used, std::size_t bytes, 
 CAIRN_API void release_growing(void* memory, std::size_t bytes) noexcept;
 
 /// A contiguous array of plain values, on a cache line, for what gets a few elements again and
-/// again. Unlike with std::vector, no single addition takes time in proportion to the whole: a
-/// large array moves to a larger place by its pages, without a copy, and the room that is not used
-/// yet takes no memory. References and iterators are valid until the next addition.
+/// again. Unlike with std::vector, no addition copies all that is there: a large array moves to a
+/// larger place by its pages, and the room that is not used yet takes no memory. References and
+/// iterators are valid until the next addition. For as many elements as there is memory for.
 template <class T>
 class GrowingArray {
   static_assert(std::is_trivially_copyable_v<T>);

@@ -110,6 +110,34 @@ TEST_F(GraphTest, KeepsInformationAsGivenAndItsSquareRoot) {
   EXPECT_LT((U.transpose() * U - Omega).norm(), 1e-14);
 }
 
+/// Its arrays move while they grow, several times up to the size at which they are mappings.
+TEST_F(GraphTest, TakesTheNumbersOfOneOfItsOwnFactors) {
+  add_pose(0);
+  add_pose(1);
+  const std::vector<double> omega = {4, 1, 0.5, 3, 0.2, 2};
+  connect(0, 1, omega);
+  constexpr int kCount = 40000;  // 2 MB of information
+  for (int f = 0; f + 1 < kCount; ++f) {
+    graph_.add_factor(types_.relative_pose, graph_.factor_variables(f), graph_.measurement(f),
+                      graph_.information(f));
+  }
+  for (int f = 0; f < kCount; ++f) {
+    ASSERT_THAT(graph_.information(f), ::testing::ElementsAreArray(omega)) << f;
+    ASSERT_THAT(graph_.factor_variables(f), ElementsAre(0, 1)) << f;
+    ASSERT_THAT(graph_.measurement(f), ElementsAre(1.0, 0.0, 0.0)) << f;
+  }
+}
+
+TEST_F(GraphTest, RefusesToReserveMoreThanItCanHave) {
+  EXPECT_THROW(graph_.reserve(0, std::size_t{1} << 31U), Error);
+  EXPECT_THROW(graph_.reserve(~std::size_t{0}, 0), Error);
+  graph_.reserve(1000, 100000);
+  add_pose(0);
+  add_pose(1);
+  connect(0, 1);
+  EXPECT_EQ(graph_.factor_count(), 1);
+}
+
 TEST_F(GraphTest, ReplacesAMeasurement) {
   add_pose(0);
   add_pose(1);
