@@ -2,7 +2,9 @@
 #include "memory/aligned_memory.hpp"
 
 #include <sys/mman.h>
+#include <unistd.h>
 
+#include <algorithm>
 #include <cstdint>
 #include <cstring>
 #include <limits>
@@ -13,6 +15,8 @@
 
 #include <boost/interprocess/mem_algo/rbtree_best_fit.hpp>
 #include <boost/interprocess/sync/mutex_family.hpp>
+
+#include "cairn/memory/growing_array.hpp"
 
 namespace cairn::memory {
 namespace {
@@ -97,11 +101,43 @@ SharedPages& shared_pages() {
   return *pages;
 }
 
+/// Whole pages of the system, from the beginning of a huge page on, so that all that can be huge
+/// may be.
 void* map(std::size_t bytes, int advice) {
-  void* memory = ::mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
-  if (memory == MAP_FAILED) throw std::bad_alloc();
+  const std::size_t more = bytes + kHugePage;
+  void* const mapped =
+      ::mmap(nullptr, more, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+  if (mapped == MAP_FAILED) throw std::bad_alloc();
+  auto* const first = static_cast<unsigned char*>(mapped);
+  const std::size_t before =
+      (kHugePage - reinterpret_cast<std::uintptr_t>(first) % kHugePage) % kHugePage;
+  if (before > 0) ::munmap(first, before);
+  unsigned char* const memory = first + before;
+  ::munmap(memory + bytes, more - bytes - before);
   ::madvise(memory, bytes, advice);
   return memory;
+}
+
+/// What a mapping for so many bytes takes.
+std::size_t mapped_size(std::size_t bytes) {
+  static const auto page = static_cast<std::size_t>(::sysconf(_SC_PAGESIZE));
+  return (in_pages(bytes) + page - 1) / page * page;
+}
+
+/// `old`, a mapping of its own or not, as room for `bytes`.
+Room moved_to_room(const Room& old, std::size_t used, std::size_t bytes) {
+  // The first touch of a huge page clears 2 MB at once: while an array grows each page is cleared
+  // when it is needed. The advice is for all of a mapping, since mremap takes only what has one.
+  if (old.bytes >= kMapped) {
+    void* larger = ::mremap(old.begin, mapped_size(old.bytes), mapped_size(bytes), MREMAP_MAYMOVE);
+    if (larger == MAP_FAILED) throw std::bad_alloc();
+    ::madvise(larger, mapped_size(bytes), MADV_NOHUGEPAGE);
+    return {larger, bytes};
+  }
+  void* larger = bytes < kMapped ? allocate(bytes) : map(mapped_size(bytes), MADV_NOHUGEPAGE);
+  if (used > 0) std::memcpy(larger, old.begin, used);
+  release(old);
+  return {larger, bytes};
 }
 
 }  // namespace
@@ -128,28 +164,31 @@ void release(void* memory, std::size_t bytes) noexcept {
   release_pages(memory);
 }
 
-void* allocate_growing(std::size_t bytes) {
-  return bytes < kMapped ? allocate(bytes) : map(bytes, MADV_HUGEPAGE);
+Room make_room(std::size_t bytes) {
+  return {bytes < kMapped ? allocate(bytes) : map(mapped_size(bytes), MADV_HUGEPAGE), bytes};
 }
 
-void* grow(void* memory, std::size_t used, std::size_t bytes, std::size_t more) {
-  // The first touch of a huge page clears 2 MB at once: here each page is cleared when it is
-  // needed. The advice is for all of a mapping, since mremap takes only what has one.
-  if (bytes >= kMapped) {
-    void* larger = ::mremap(memory, bytes, more, MREMAP_MAYMOVE);
-    if (larger == MAP_FAILED) throw std::bad_alloc();
-    ::madvise(larger, more, MADV_NOHUGEPAGE);
-    return larger;
+Room enlarge(const Room& old, std::size_t used, std::size_t needed) {
+  constexpr std::size_t kMost = std::numeric_limits<std::ptrdiff_t>::max() - 2 * kHugePage;
+  if (needed > kMost) throw std::bad_alloc();
+  const std::size_t twice = std::min(2 * std::max(old.bytes, kCacheLine), kMost);
+  if (needed >= twice) return moved_to_room(old, used, needed);
+  for (const std::size_t bytes : {twice, needed + (twice - needed) / 8}) {
+    try {
+      return moved_to_room(old, used, bytes);
+    } catch (const std::bad_alloc&) {
+      continue;  // less may do
+    }
   }
-  void* larger = more < kMapped ? allocate(more) : map(more, MADV_NOHUGEPAGE);
-  if (used > 0) std::memcpy(larger, memory, used);
-  if (memory) release(memory, bytes);
-  return larger;
+  return moved_to_room(old, used, needed);
 }
 
-void release_growing(void* memory, std::size_t bytes) noexcept {
-  if (bytes < kMapped) return release(memory, bytes);
-  ::munmap(memory, bytes);
+void release(const Room& room) noexcept {
+  if (room.bytes >= kMapped) {
+    ::munmap(room.begin, mapped_size(room.bytes));
+  } else if (room.begin) {
+    release(room.begin, room.bytes);
+  }
 }
 
 }  // namespace cairn::memory

@@ -49,6 +49,12 @@ Decision FrontierExplorer::decide(const Situation& situation) {
     if (!decision.candidates.empty()) break;
   }
   if (decision.candidates.empty()) {
+    if (std::optional<PlannedPath> turn = goals_.look_around()) {
+      decision.candidates.push_back({std::move(*turn), 0.0, "what is around it"});
+      decision.why =
+          fmt::format("none of {} frontiers can be reached: it looks around", goals_.unreachable());
+      return decision;
+    }
     decision.kind = Decision::Kind::finished;
     decision.why = end_text(goals_, situation.robot, smallest);
     return decision;

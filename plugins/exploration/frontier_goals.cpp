@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <utility>
 
 #include <fmt/format.h>
@@ -18,12 +19,20 @@ constexpr double kNear = 2.0;
 constexpr double kNearPose = 0.5;
 /// A frontier is there still if a cell of one is so near to where its middle was [m].
 constexpr double kStillThere = 0.5;
-/// The map around a frontier [m], which must change before it is tried again.
-constexpr double kAround = 1.0;
+/// The map around a frontier [m], which must change before it is tried again; after so many times
+/// in vain this part of it must have become known: single cells change with every scan where
+/// measurements have noise.
+constexpr double kAround = 1.0, kGrown = 0.05;
+constexpr int kInVain = 2;
 /// Between the cells of a frontier that are tried as goals [m].
 constexpr double kSpacing = 0.5;
 
 }  // namespace
+
+void FrontierGoals::begin() {
+  given_up_.clear();
+  looked_around_ = 0.0;
+}
 
 void FrontierGoals::start(const Situation& situation, bool tight) {
   situation_ = &situation;
@@ -48,7 +57,19 @@ std::vector<Candidate> FrontierGoals::candidates(double least) {
       longest_unreachable_ = std::max(longest_unreachable_, frontier.length);
     }
   }
+  if (!found.empty()) looked_around_ = 0.0;
   return found;
+}
+
+std::optional<PlannedPath> FrontierGoals::look_around() {
+  const RobotModel& robot = situation_->robot;
+  if (unreachable_ == 0 || robot.motion == MotionModel::dubins) return std::nullopt;
+  if (looked_around_ >= 2.0 * std::numbers::pi) return std::nullopt;
+  looked_around_ += robot.turn;
+  PlannedPath path;
+  path.look_at =
+      (situation_->pose * Pose2(0.0, 0.0, robot.turn)).transform_from(Vector2d(1.0, 0.0));
+  return path;
 }
 
 std::optional<PlannedPath> FrontierGoals::path_to(const Pose2& pose) {
@@ -81,7 +102,7 @@ std::optional<PlannedPath> FrontierGoals::path_to(const Vector2d& goal) {
   std::optional<PlannedPath> path = planner_->path_to(goal, kNear);
   if (path) path = driven(std::move(*path));
   if (!path || moves(*path)) return path;
-  given_up_.push_back({goal, known_around(goal)});
+  give_up(goal);
   return std::nullopt;
 }
 
@@ -105,17 +126,34 @@ bool FrontierGoals::moves(const PlannedPath& path) const {
   return next_motion(situation_->pose, path, situation_->robot, passed).has_value();
 }
 
+void FrontierGoals::give_up(const Vector2d& goal) {
+  const auto distance = [&](const GivenUp& other) { return (other.goal - goal).norm(); };
+  const auto again = std::ranges::min_element(given_up_, {}, distance);
+  if (again == given_up_.end() || distance(*again) >= kStillThere ||
+      again->known == known_around(again->goal)) {  // another one, or another cell of the same
+    given_up_.push_back({goal, known_around(goal), 1});
+  } else {
+    again->known = known_around(again->goal);
+    ++again->times;
+  }
+}
+
 bool FrontierGoals::is_given_up(const Vector2d& goal) const {
-  const double near = 3.0 * situation_->map.frame.resolution;
+  const double cell = situation_->map.frame.resolution;
+  const double side = 2.0 * kAround / cell;
+  const auto grown = static_cast<std::size_t>(kGrown * side * side);
   return std::ranges::any_of(given_up_, [&](const GivenUp& other) {
-    return (other.goal - goal).norm() < near && other.known == known_around(other.goal);
+    const bool in_vain = other.times >= kInVain;
+    if ((other.goal - goal).norm() >= (in_vain ? kStillThere : 3.0 * cell)) return false;
+    const std::size_t known = known_around(other.goal);
+    return in_vain ? known <= other.known + grown : known == other.known;
   });
 }
 
 std::size_t FrontierGoals::known_around(const Vector2d& point) const {
   const FloorMap& map = situation_->map;
   const Vector2d cell = map.frame.to_cells(point).array().floor();
-  const int reach = static_cast<int>(kAround / map.frame.resolution);
+  const int reach = std::max(1, static_cast<int>(kAround / map.frame.resolution));
   const int middle_x = static_cast<int>(cell.x()), middle_y = static_cast<int>(cell.y());
   std::size_t known = 0;
   for (int y = middle_y - reach; y <= middle_y + reach; ++y) {

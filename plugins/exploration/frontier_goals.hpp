@@ -14,12 +14,13 @@ namespace cairn::exploration {
 /// Paths to frontiers, for the explorers that drive there.
 ///
 /// A frontier at which the robot is, at which it looks, and which is there still, is given up until
-/// the map around it changes: it would drive there for ever.
+/// the map around it changes, the second time until clearly more of it is known: it would drive
+/// there for ever.
 class FrontierGoals {
  public:
   explicit FrontierGoals(std::unique_ptr<PathPlanner> planner) : planner_(std::move(planner)) {}
 
-  void begin() { given_up_.clear(); }
+  void begin();
   /// Looks at the frontiers of a situation, for those that follow. `tight`: through gaps, too, that
   /// may be a cell narrower than the body: on a map, whose cells are occupied as a whole, it may
   /// seem not to fit through a door through which it has come.
@@ -29,6 +30,11 @@ class FrontierGoals {
   /// A path to where the robot can stand as at a pose, with its heading at the end; none: there is
   /// no path, or it is there already.
   std::optional<PlannedPath> path_to(const Pose2& pose);
+
+  /// Where none of the frontiers that the last `candidates` has seen has a path: a turn of one
+  /// motion, until the robot has turned once around. With noise the newest scan alone may close a
+  /// door near the robot, which it does not see with another heading.
+  std::optional<PlannedPath> look_around();
 
   /// Whether there is a frontier yet where the middle of one was.
   static bool is_there(const FloorMap& map, const Eigen::Vector2d& middle);
@@ -41,10 +47,12 @@ class FrontierGoals {
   struct GivenUp {
     Eigen::Vector2d goal;
     std::size_t known;  ///< cells around it
+    int times;          ///< that it was reached in vain
   };
 
   std::optional<PlannedPath> path_to(const Frontier& frontier);
   std::optional<PlannedPath> path_to(const Eigen::Vector2d& goal);
+  void give_up(const Eigen::Vector2d& goal);
   bool is_given_up(const Eigen::Vector2d& goal) const;
   std::size_t known_around(const Eigen::Vector2d& point) const;
   /// A path as the robot can drive it; none: it can't.
@@ -56,6 +64,7 @@ class FrontierGoals {
   std::vector<GivenUp> given_up_;
   std::size_t unreachable_ = 0;
   double longest_unreachable_ = 0.0;
+  double looked_around_ = 0.0;  // since there was a path [rad]
 };
 
 }  // namespace cairn::exploration

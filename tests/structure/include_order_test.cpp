@@ -30,9 +30,9 @@ const Names kShared{"solvers/block", "solvers/linear/blas", "solvers/linear/iter
                     "solvers/nonlinear/descent"};
 /// Eigen's decompositions, compiled once, and memory for arrays: what everything may include, and
 /// includes nothing.
-const Names kBelow{"lib/dense/", "lib/memory/"};
-/// Several numbers at a time, below the core too; its headers are public.
-const std::string kPack = "lib/pack/";
+const Names kBelow{"lib/dense/", "lib/memory/", "lib/pack/"};
+/// Of what lies below the core, the folders of public headers: several numbers at a time, arrays.
+const Names kPublicBelow{"pack", "memory"};
 /// Folders each of whose folders stands for itself: it includes no other.
 const Names kWings{"types", "solvers/linear", "solvers/nonlinear", "solvers/incremental", "plugins",
                    "apps"};
@@ -136,9 +136,11 @@ class Tree {
   std::string public_fault(const std::string& file, const std::string& name) const {
     const std::string part = name.substr(6, name.find('/', 6) - 6);
     const int layer = position(kLayers, part), subject = position(subjects_, part);
-    if (part == "pack") return lies_below(file) ? "each stands for itself" : "";
-    if (lies_below(file) || file.starts_with(kPack))
-      return "what lies below the core includes nothing of it";
+    if (position(kPublicBelow, part) >= 0) {
+      const bool other = lies_below(file) && part_of(file) != part;
+      return other ? "each stands for itself" : "";
+    }
+    if (lies_below(file)) return "what lies below the core includes nothing of it";
     if (layer < 0 && subject < 0) return part + " is neither a layer of the core nor a subject";
     if (file.starts_with("core/")) {
       if (layer < 0) return "the core includes nothing of lib";
@@ -259,6 +261,8 @@ TEST_F(FaultyTree, PacksMayBeIncludedEverywhereAndIncludeNothingElse) {
   EXPECT_THAT(faults(), IsEmpty());
   write("lib/pack/include/cairn/pack/p.hpp", "#include \"cairn/types/t.hpp\"\n");
   EXPECT_THAT(faults(), ElementsAre(HasSubstr("below the core")));
+  write("lib/pack/include/cairn/pack/p.hpp", "#include \"cairn/memory/growing_array.hpp\"\n");
+  EXPECT_THAT(faults(), ElementsAre(HasSubstr("each stands for itself")));
 }
 
 TEST_F(FaultyTree, LibInTheCoreIsAFault) {

@@ -50,6 +50,17 @@ Root root_of(std::span<const double> information, int n) {
 
 std::size_t size_of(int n) { return static_cast<std::size_t>(n); }
 
+/// Of a type there are so many at least before there is room for all that are expected.
+constexpr std::size_t kMany = 1000;
+
+template <class... Arrays>
+void reserve_if_possible(std::size_t size, Arrays&... arrays) {
+  try {
+    (arrays.reserve(size), ...);
+  } catch (const std::exception&) {  // so much is refused: they grow as they are filled
+  }
+}
+
 /// What is wrong with an information matrix, or nothing.
 std::string problem_of(const Root& root, std::span<const double> information) {
   if (root.rank > 0) return {};
@@ -80,17 +91,17 @@ Graph Graph::clone() const {
 
 void Graph::reserve(std::size_t variables, std::size_t factors) {
   constexpr std::size_t kMost = std::numeric_limits<std::int32_t>::max();
-  if (std::max(variables, factors) > kMost) {
-    throw Error(ErrorCode::usage,
-                fmt::format("Graph::reserve: a graph has no room for {} variables "
-                            "and {} factors, but for {} of each at most",
-                            variables, factors, kMost));
-  }
-  records_.reserve(variables);
+  if (std::max(variables, factors) > kMost)
+    throw Error(ErrorCode::usage, fmt::format("Graph::reserve: no room for {} variables and {} "
+                                              "factors, but for {} of each at most",
+                                              variables, factors, kMost));
+  reserve_if_possible(variables, records_);
   const auto places = static_cast<std::size_t>(static_cast<double>(index_of_id_.bucket_count()) *
                                                index_of_id_.max_load_factor());
-  if (variables > places) index_of_id_.reserve(std::max(variables, 2 * places));
-  factors_.reserve(factors);
+  if (variables > places) reserve_if_possible(std::max(variables, 2 * places), index_of_id_);
+  reserve_if_possible(factors, factors_);
+  expected_variables_ = variables;
+  expected_factors_ = factors;
 }
 
 /// The pool of a type; one past the last if there is none yet.
@@ -123,9 +134,8 @@ int Graph::add_variable(std::shared_ptr<const VariableType> type, Id id,
   if (!type) throw bad_input(fmt::format("variable {} has no type", id));
   const std::string_view tag = type->tag();
   const std::size_t size = size_of(type->ambient_size());
-  if (x.size() != size) {
+  if (x.size() != size)
     throw bad_input(fmt::format("{} {} has {} numbers, expected {}", tag, id, x.size(), size));
-  }
   if (!all_finite(x))
     throw bad_input(fmt::format("{} {} has a number that is not finite", tag, id));
   if (const auto there = find(id)) {
@@ -146,6 +156,8 @@ int Graph::add_variable(std::shared_ptr<const VariableType> type, Id id,
   GrowingArray<std::int32_t>& variables = variable_pools_[p].variables;
   records_.push_back({id, p, static_cast<std::int32_t>(variables.size()), false});
   variables.push_back(index);
+  if (variables.size() == kMany)
+    reserve_if_possible(std::max(expected_variables_, kMany) * size, values_.pools[p]);
   index_of_id_.emplace(id, index);
   ++structure_version_;
   return index;
@@ -167,11 +179,10 @@ int Graph::add(const Factor& factor) {
 }
 
 void Graph::check_ends(const FactorType& type, std::span<const int> variables) const {
-  const std::string_view tag = type.tag();
   const int arity = type.arity();
-  if (variables.size() != size_of(arity)) {
-    throw bad_input(fmt::format("{} joins {} variables, not {}", tag, arity, variables.size()));
-  }
+  if (variables.size() != size_of(arity))
+    throw bad_input(
+        fmt::format("{} joins {} variables, not {}", type.tag(), arity, variables.size()));
   const auto name = [&] { return name_of(type, variables); };
   for (int k = 0; k < arity; ++k) {
     const int v = variables[k];
@@ -218,9 +229,8 @@ int Graph::add_factor(std::shared_ptr<const FactorType> type, std::span<const in
                     name_of(*type, variables), measurement.size(), information.size(),
                     measurement_size, information_size));
   }
-  if (!all_finite(measurement) || !all_finite(information)) {
+  if (!all_finite(measurement) || !all_finite(information))
     throw bad_input(fmt::format("{}: has a number that is not finite", name_of(*type, variables)));
-  }
   Numbers z(measurement.begin(), measurement.end());
   std::string problem = normalize(*type, z);
   const Root root = root_of(information, n);
@@ -233,22 +243,26 @@ int Graph::add_factor(std::shared_ptr<const FactorType> type, std::span<const in
     factor_pools_.emplace_back().type = std::move(type);
     for (const int v : variables) factor_pools_[p].variable_pools.push_back(records_[v].pool);
   }
-  // What was given may be of this graph itself, whose arrays move while they grow.
-  const Numbers given(information.begin(), information.end());
-  const boost::container::small_vector<int, 8> ends(variables.begin(), variables.end());
+  // What was given may be of this graph itself, whose arrays move while they grow: it comes first.
   FactorPool& pool = factor_pools_[p];
+  pool.information.append(information);
+  pool.variables.append(variables);
   pool.measurements.append(z);
-  pool.information.append(given);
   pool.sqrt_information.append(root.packed);
   pool.ranks.push_back(static_cast<std::int16_t>(root.rank));
   pool.losses.push_back(of_loss);
-  for (const int v : ends) {
-    pool.variables.push_back(v);
+  for (const int v : std::span(pool.variables).last(variables.size()))
     pool.slots.push_back(records_[v].slot);
-  }
   const int position = factor_count();
   factors_.push_back({p, static_cast<std::int32_t>(pool.size())});
   pool.sequence.push_back(position);
+  if (pool.size() == kMany && factors_.size() < expected_factors_) {
+    const std::size_t all = kMany + expected_factors_ - factors_.size();
+    reserve_if_possible(all * pool.variable_pools.size(), pool.variables, pool.slots);
+    reserve_if_possible(all * measurement_size, pool.measurements);
+    reserve_if_possible(all * information_size, pool.information, pool.sqrt_information);
+    reserve_if_possible(all, pool.ranks, pool.losses, pool.sequence);
+  }
   ++structure_version_;
   return position;
 }
@@ -276,9 +290,8 @@ void Graph::set_state(int variable, std::span<const double> x) {
         fmt::format("{}: a state is {} finite numbers", describe_variable(variable), size));
   }
   Numbers state(x.begin(), x.end());
-  if (const std::string problem = normalize(t, state); !problem.empty()) {
+  if (const std::string problem = normalize(t, state); !problem.empty())
     throw bad_input(fmt::format("{}: {}", describe_variable(variable), problem));
-  }
   std::ranges::copy(state, values_.pools[pool(variable)].begin() +
                                slot(variable) * static_cast<std::ptrdiff_t>(size));
 }

@@ -12,14 +12,11 @@ namespace cairn {
 
 std::int16_t Graph::loss_index(const FactorType& type, const std::shared_ptr<const Loss>& loss) {
   if (!loss || !type.takes_loss()) return 0;
-  const auto at = std::ranges::find(losses_, loss);
-  if (at == losses_.end()) {
-    if (losses_.size() > static_cast<std::size_t>(std::numeric_limits<std::int16_t>::max()))
-      throw Error(ErrorCode::usage, "a graph holds at most 32767 different losses");
-    losses_.push_back(loss);
-    return static_cast<std::int16_t>(losses_.size() - 1);
-  }
-  return static_cast<std::int16_t>(at - losses_.begin());
+  const auto at = std::ranges::find(losses_, loss) - losses_.begin();
+  if (at > std::numeric_limits<std::int16_t>::max())
+    throw Error(ErrorCode::usage, "a graph holds at most 32767 different losses");
+  if (at == std::ssize(losses_)) losses_.push_back(loss);
+  return static_cast<std::int16_t>(at);
 }
 
 std::int16_t Graph::loss_of(int position) const {

@@ -2,7 +2,9 @@
 // What the socket of `cairn online --listen` adds to the time of an update: the same stream through
 // a LineSession in this process, and through the service with clients that follow; a table of both.
 //
-//   cairn_online_latency [POSES] [FOLLOWERS] [ROUNDS]     default: 2000 20 5
+//   cairn_online_latency [POSES] [FOLLOWERS] [ROUNDS] [PAUSE]     default: 2000 20 5 0
+//
+// PAUSE: milliseconds between an answer and the next update, of a robot that does something else.
 #include <signal.h>
 #include <sys/socket.h>
 #include <sys/un.h>
@@ -34,6 +36,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 using Microseconds = std::chrono::duration<double, std::micro>;
+using Pause = std::chrono::milliseconds;
 
 /// A line or two, answered by the last.
 using Update = std::string;
@@ -58,8 +61,8 @@ std::vector<Update> stream_of_circles(int poses) {
 
 constexpr const char* kFirst = "VERTEX_SE2 0 0 0 0\nFIX 0\n";
 
-/// Microseconds of each update.
-std::vector<double> in_process(const std::vector<Update>& updates) {
+/// Microseconds of each update, with a pause before each.
+std::vector<double> in_process(const std::vector<Update>& updates, Pause pause) {
   Registry registry;
   const auto estimator = registry.make<Estimator>("incremental_cholesky");
   const auto format = registry.make<StreamFormat>("g2o");
@@ -75,6 +78,7 @@ std::vector<double> in_process(const std::vector<Update>& updates) {
   take(kFirst);
   std::vector<double> times;
   for (const Update& update : updates) {
+    if (pause > Pause::zero()) std::this_thread::sleep_for(pause);
     const Clock::time_point begin = Clock::now();
     take(update);
     times.push_back(Microseconds(Clock::now() - begin).count());
@@ -135,7 +139,7 @@ class Client {
   int descriptor_ = -1;
 };
 
-std::vector<double> through_socket(const std::vector<Update>& updates, int followers,
+std::vector<double> through_socket(const std::vector<Update>& updates, int followers, Pause pause,
                                    const std::filesystem::path& program) {
   const std::string file =
       (std::filesystem::temp_directory_path() / fmt::format("cairn-latency-{}", ::getpid()))
@@ -160,6 +164,7 @@ std::vector<double> through_socket(const std::vector<Update>& updates, int follo
     std::this_thread::sleep_for(std::chrono::milliseconds(200));
     writer.send(kFirst);
     for (const Update& update : updates) {
+      if (pause > Pause::zero()) std::this_thread::sleep_for(pause);
       const Clock::time_point begin = Clock::now();
       writer.send(update);
       writer.read_answer();
@@ -191,9 +196,11 @@ int main(int argc, char** argv) {
     return argc > k ? std::atoi(argv[k]) : otherwise;
   };
   const int poses = number(1, 2000), followers = number(2, 20), rounds = number(3, 5);
-  if (poses < 2 || followers < 0 || rounds < 1) {
+  const Pause pause(number(4, 0));
+  if (poses < 2 || followers < 0 || rounds < 1 || pause < Pause::zero()) {
     fmt::print(stderr,
-               "usage: cairn_online_latency [POSES] [FOLLOWERS] [ROUNDS], 2000 20 5 by default\n");
+               "usage: cairn_online_latency [POSES] [FOLLOWERS] [ROUNDS] [PAUSE], 2000 20 5 0 by "
+               "default\n");
     return 1;
   }
   const std::vector<Update> updates = stream_of_circles(poses);
@@ -206,8 +213,8 @@ int main(int argc, char** argv) {
     for (std::size_t k = 0; k < times.size(); ++k) fastest[k] = std::min(fastest[k], times[k]);
   };
   for (int round = 0; round < rounds; ++round) {  // in turn, so that both meet what else runs
-    add(inside, fastest_inside, in_process(updates));
-    add(outside, fastest_outside, through_socket(updates, followers, program));
+    add(inside, fastest_inside, in_process(updates, pause));
+    add(outside, fastest_outside, through_socket(updates, followers, pause, program));
   }
   fmt::print("| update, {} followers | updates | median [us] | 99 % | 99.9 % |\n", followers);
   fmt::print("| --- | ---: | ---: | ---: | ---: |\n");

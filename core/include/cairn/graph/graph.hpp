@@ -11,9 +11,9 @@
 
 #include "cairn/graph/elements.hpp"
 #include "cairn/graph/factor_selector.hpp"
+#include "cairn/memory/growing_array.hpp"
 #include "cairn/runtime/aligned.hpp"
 #include "cairn/runtime/api.hpp"
-#include "cairn/runtime/growing_array.hpp"
 #include "cairn/types/factor_type.hpp"
 #include "cairn/types/loss.hpp"
 #include "cairn/types/variable_type.hpp"
@@ -119,7 +119,8 @@ class CAIRN_API Graph {
   /// (usage), and removes nothing, if a factor that stays is on a variable that leaves.
   Renumbering remove(const std::vector<bool>& factors, const std::vector<bool>& variables);
 
-  /// Makes room beforehand; purely for speed. Throws `Error` (usage) for 2³¹ or more of either.
+  /// Makes room for so many in all, of whatever types; purely for speed, so that it is no error if
+  /// there is not so much memory. Throws `Error` (usage) for 2³¹ or more of either.
   void reserve(std::size_t variables, std::size_t factors);
 
   // Variables -----------------------------------------------------------------------------------
@@ -231,6 +232,7 @@ class CAIRN_API Graph {
   std::unordered_map<Id, int> index_of_id_;
   std::vector<std::shared_ptr<const Loss>> losses_{nullptr};
   std::uint64_t structure_version_ = 0;
+  std::size_t expected_variables_ = 0, expected_factors_ = 0;  // by `reserve`, of any type
 };
 
 /// Σ ‖r‖² of every factor (whitened, no loss, no half), by position; n = factor_count().

@@ -4,7 +4,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <sys/resource.h>
+#include <unistd.h>
+
 #include <cmath>
+#include <cstdlib>
+#include <fstream>
 #include <functional>
 #include <limits>
 #include <string>
@@ -136,6 +141,38 @@ TEST_F(GraphTest, RefusesToReserveMoreThanItCanHave) {
   add_pose(1);
   connect(0, 1);
   EXPECT_EQ(graph_.factor_count(), 1);
+}
+
+TEST_F(GraphTest, HasRoomForWhatWasReservedOnceATypeHasMany) {
+  graph_.reserve(1000, 100000);
+  add_pose(0);
+  add_pose(1);
+  connect(0, 1);
+  const FactorPool& pool = graph_.factor_pools()[0];
+  EXPECT_LT(pool.information.capacity(), 1000U) << "others may be of another type";
+  while (graph_.factor_count() < 1000) connect(0, 1);
+  EXPECT_GE(pool.sequence.capacity(), 100000U);
+  EXPECT_GE(pool.information.capacity(), 600000U);
+}
+
+TEST_F(GraphTest, IsAGraphAsAnyOtherWhereRoomIsRefused) {
+#if defined(CAIRN_SANITIZED)
+  GTEST_SKIP() << "sanitizers refuse it by ending the process";
+#endif
+  const auto fill = [&] {
+    std::size_t pages = 0;
+    std::ifstream("/proc/self/statm") >> pages;
+    rlimit limit{};
+    ::getrlimit(RLIMIT_AS, &limit);
+    limit.rlim_cur = pages * static_cast<rlim_t>(::sysconf(_SC_PAGESIZE)) + (rlim_t{256} << 20);
+    if (::setrlimit(RLIMIT_AS, &limit) != 0) std::_Exit(2);
+    graph_.reserve(std::size_t{1} << 30, std::size_t{1} << 30);
+    add_pose(0);
+    add_pose(1);
+    while (graph_.factor_count() < 2000) connect(0, 1);
+    std::_Exit(graph_.factor_pools()[0].information.capacity() < 100000 ? 0 : 3);
+  };
+  EXPECT_EXIT(fill(), ::testing::ExitedWithCode(0), "");
 }
 
 TEST_F(GraphTest, ReplacesAMeasurement) {

@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "cairn/runtime/aligned.hpp"
-#include "cairn/runtime/growing_array.hpp"
 
 #include <gtest/gtest.h>
 
-#include <sys/resource.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -104,76 +102,6 @@ TEST(AlignedMemory, GoesBackToTheSystemOnceItIsReleased) {
 #if !defined(CAIRN_SANITIZED)  // sanitizers keep what was released, to notice its use
   EXPECT_LT(resident() - before, most / 4);
 #endif
-}
-
-/// Numbers from `first` on.
-std::vector<std::int32_t> count_from(std::int32_t first, std::size_t count) {
-  std::vector<std::int32_t> numbers(count);
-  std::iota(numbers.begin(), numbers.end(), first);
-  return numbers;
-}
-
-TEST(GrowingArray, IsAVectorWhateverItsSize) {
-  GrowingArray<std::int32_t> array;
-  std::vector<std::int32_t> expected;
-  EXPECT_TRUE(array.empty());
-  std::mt19937 random(1);
-  // To 8 MB: through every way of allocating.
-  for (std::int32_t next = 0; expected.size() < (std::size_t{1} << 21);) {
-    if (random() % 2 == 0) {
-      array.push_back(next);
-      expected.push_back(next++);
-    } else {
-      const std::vector<std::int32_t> more = count_from(next, random() % (expected.size() + 2));
-      array.append(more);
-      expected.insert(expected.end(), more.begin(), more.end());
-      next += static_cast<std::int32_t>(more.size());
-    }
-    ASSERT_EQ(array.size(), expected.size());
-    ASSERT_TRUE(starts_a_cache_line(array.data()));
-  }
-  EXPECT_TRUE(std::ranges::equal(array, expected));
-
-  const GrowingArray<std::int32_t> copy = array;
-  EXPECT_EQ(copy.capacity(), copy.size());
-  array.resize(10);
-  EXPECT_EQ(array.size(), 10);
-  array.resize(12);
-  EXPECT_EQ(array[9], 9);
-  EXPECT_EQ(array[10], 0) << "and not what was there";
-  EXPECT_TRUE(std::ranges::equal(copy, expected)) << "a copy is of its own";
-  GrowingArray<std::int32_t> moved = std::move(array);
-  EXPECT_EQ(moved.size(), 12);
-  moved = copy;
-  moved.push_back(-1);
-  EXPECT_EQ(moved.back(), -1);
-  EXPECT_EQ(moved.size(), expected.size() + 1);
-  EXPECT_TRUE(std::ranges::equal(std::span(moved).first(expected.size()), expected));
-}
-
-/// Pages that this process has touched for the first time while `action` ran.
-template <class Action>
-long page_faults(const Action& action) {
-  rusage before{}, after{};
-  ::getrusage(RUSAGE_SELF, &before);
-  action();
-  ::getrusage(RUSAGE_SELF, &after);
-  return after.ru_minflt - before.ru_minflt;
-}
-
-TEST(GrowingArray, MovesByItsPagesWhereItIsLarge) {
-#if defined(CAIRN_SANITIZED)
-  GTEST_SKIP() << "sanitizers watch over memory of their own";
-#endif
-  constexpr std::size_t kSize = std::size_t{1} << 23;  // 64 MB
-  GrowingArray<double> array;
-  array.resize(kSize);
-  array.back() = 17.0;
-  AlignedVector copied(array.begin(), array.end());
-  EXPECT_LT(page_faults([&] { array.reserve(2 * kSize); }), 10);
-  EXPECT_GT(page_faults([&] { copied.reserve(2 * kSize); }), 25) << "of 2 MB: so it can be seen";
-  EXPECT_EQ(array.size(), kSize);
-  EXPECT_EQ(array.back(), 17.0);
 }
 
 }  // namespace

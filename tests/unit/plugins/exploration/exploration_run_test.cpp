@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <numbers>
 #include <optional>
 #include <string>
 #include <utility>
@@ -255,6 +256,102 @@ class Idler final : public Explorer {
     return decision;
   }
 };
+
+/// A room of which a part is unknown, behind a frontier that stays however often it is looked at.
+class FrontierThatStays : public testing::Test {
+ protected:
+  FrontierThatStays() {
+    for (int y = 0; y < 40; ++y)
+      rows_.push_back(y == 0 || y == 39 ? std::string(120, '#')
+                                        : "#" + std::string(79, '.') + std::string(40, ' '));
+    parts_.explorer->begin(1);
+  }
+  /// What is decided at a pose.
+  Decision decision_at(const Pose2& pose) {
+    if (std::exchange(drawn_, rows_) != rows_) {
+      map_ = test::drawn_map(rows_, 0.1);
+      const auto cell = static_cast<std::int32_t>(map_.frame.index(79, 20));
+      map_.frontiers.push_back(
+          {.cells = {cell}, .length = 0.5, .middle = map_.frame.centre(79, 20)});
+    }
+    return parts_.explorer->decide({.estimator = parts_.policy->estimator(),
+                                    .poses = {},
+                                    .pose = pose,
+                                    .map = map_,
+                                    .robot = parts_.world->robot()});
+  }
+  static bool drives(const Decision& decision) {
+    return decision.kind == Decision::Kind::drive &&
+           !decision.candidates.at(decision.chosen).path.points.empty();
+  }
+  /// Whether a robot that stands in the room drives there, which it does to the end.
+  bool is_tried() {
+    Pose2 pose = start_;
+    for (int decisions = 0; decisions < 10; ++decisions) {
+      const Decision decision = decision_at(pose);
+      if (!drives(decision)) return decisions > 0;
+      const PlannedPath& path = decision.candidates.at(decision.chosen).path;
+      const Eigen::Vector2d end = path.points.back(), ahead = *path.look_at - end;
+      pose = Pose2(end.x(), end.y(), std::atan2(ahead.y(), ahead.x()));
+    }
+    ADD_FAILURE() << "it is never given up";
+    return true;
+  }
+  /// So many cells in a column behind the frontier are known to be free.
+  void see(std::size_t column, std::size_t cells) {
+    for (std::size_t k = 0; k < cells; ++k) rows_[20 + k][column] = '.';
+  }
+  /// A wall across the room.
+  void close(std::size_t column, char cell) {
+    for (std::size_t k = 1; k < 39; ++k) rows_[k][column] = cell;
+  }
+
+  FloorMap map_;
+  const Pose2 start_{2.05, 2.05, 0.0};
+  std::vector<std::string> rows_, drawn_;
+  ExplorationParts parts_{kExactRobot};
+};
+
+TEST_F(FrontierThatStays, IsTriedAgainWhenTheMapChangesAndAfterTwiceInVainWhenMoreOfItIsKnown) {
+  EXPECT_TRUE(is_tried());
+  EXPECT_FALSE(is_tried());
+  see(85, 1);
+  EXPECT_TRUE(is_tried()) << "a cell has changed";
+  EXPECT_FALSE(is_tried());
+  see(86, 1);
+  EXPECT_FALSE(is_tried()) << "a cell is too little by now";
+  for (const std::size_t column : {83, 84, 87}) see(column, 8);
+  EXPECT_TRUE(is_tried()) << "a quarter of a square metre";
+}
+
+TEST_F(FrontierThatStays, ARobotTurnsOnceAroundBeforeItEndsForWantOfAPath) {
+  const double turn = parts_.world->robot().turn;
+  const int motions = static_cast<int>(std::ceil(2.0 * std::numbers::pi / turn));
+  close(50, '#');
+  for (const bool opens : {true, false}) {
+    Pose2 pose = start_;
+    for (int k = 0; k < motions; ++k) {
+      const Decision decision = decision_at(pose);
+      ASSERT_EQ(decision.kind, Decision::Kind::drive) << k;
+      ASSERT_FALSE(drives(decision)) << k;
+      const PlannedPath& path = decision.candidates.at(decision.chosen).path;
+      std::size_t passed = 0;
+      const auto motion = next_motion(pose, path, parts_.world->robot(), passed);
+      ASSERT_TRUE(motion) << k;
+      EXPECT_NEAR(motion->theta(), turn, 1e-9);
+      pose = pose * *motion;
+      EXPECT_FALSE(next_motion(pose, path, parts_.world->robot(), passed)) << k;
+      if (opens && k == 3) {
+        close(50, '.');
+        EXPECT_TRUE(drives(decision_at(pose))) << "a way has turned up";
+        close(50, '#');
+        break;  // so that it may turn around once more
+      }
+    }
+    if (opens) continue;
+    EXPECT_EQ(decision_at(pose).kind, Decision::Kind::finished);
+  }
+}
 
 TEST(Exploration, ARunWithoutProgressIsStuckAndSaysWhy) {
   const OccupancyGrid floor = floor_named("rooms:width=12,height=9", 5);
