@@ -18,7 +18,6 @@
 
 #include "arguments.hpp"
 #include "cairn/exploration/recording.hpp"
-#include "cairn/grid/grid_format.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/report/recording.hpp"
 #include "cairn/report/run_report.hpp"
@@ -121,11 +120,6 @@ void add_file(const std::string& file, const std::string& name, const AlbumOptio
     builder.add_recording(std::move(recording));
   } else if (is_json(text)) {
     builder.add_report(file, report_of(text, file));
-  } else if (!named && names_grid(file, session.registry())) {
-    throw Error(ErrorCode::input,
-                fmt::format("{0} is the map of a floor, which has no graph: cairn info {0} "
-                            "describes it, cairn explore {0} drives on it",
-                            file));
   } else {
     builder.add_graph(file, name, load_graph(file, options.input, session).graph);
   }

@@ -202,6 +202,12 @@ bool names_floor_plan(const std::string& kind, Session& session) {
   return registry.has(FloorPlan::kKind, name) && !registry.has(Generator::kKind, name);
 }
 
+Error no_graph_of_floor(const std::string& file) {
+  return {ErrorCode::input, fmt::format("{0} is the map of a floor, which has no graph: cairn info "
+                                        "{0} describes it, cairn explore {0} drives on it",
+                                        file)};
+}
+
 bool names_floor(const std::string& name, Session& session) {
   if (name.starts_with('@')) return names_floor_plan(name.substr(1), session);
   // Formats of graphs first: those of grids need not be loaded for a graph.

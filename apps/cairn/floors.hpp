@@ -9,6 +9,7 @@
 #include <boost/json/object.hpp>
 
 #include "cairn/grid/grid.hpp"
+#include "cairn/runtime/error.hpp"
 #include "cairn/typed/pose2.hpp"
 #include "session.hpp"
 
@@ -19,6 +20,9 @@ namespace cairn::app {
 /// Whether a name is that of a floor: a file with the ending of a grid format and not of a format
 /// of graphs, or @KIND of a floor plan.
 bool names_floor(const std::string& name, Session& session);
+
+/// What to throw (input) where a graph is expected and a file is the map of a floor.
+Error no_graph_of_floor(const std::string& file);
 
 /// A floor from a file or, as "@rooms:seed=3", generated.
 OccupancyGrid load_floor(const std::string& name, Session& session);

@@ -16,6 +16,7 @@
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/plugin_call.hpp"
 #include "cairn/runtime/timed.hpp"
+#include "floors.hpp"
 #include "graph_labels.hpp"
 #include "table.hpp"
 
@@ -42,7 +43,15 @@ LoadedGraph read_named_graph(const std::string& name, const InputOptions& option
                              Session& session) {
   LoadedGraph loaded;
   const std::string file = name == "-" ? "/dev/stdin" : name;
-  loaded.graph = read_graph(file, session.registry(), options.read, loaded.report, options.format);
+  try {
+    loaded.graph =
+        read_graph(file, session.registry(), options.read, loaded.report, options.format);
+  } catch (const Error& error) {
+    const bool is_floor = error.code() == ErrorCode::input && options.format.empty() &&
+                          std::filesystem::exists(file) && names_floor(name, session);
+    if (!is_floor) throw;
+    throw no_graph_of_floor(name);
+  }
   return loaded;
 }
 

@@ -127,6 +127,8 @@ Decision EdeGradient::decide(const Situation& situation) {
       if (!configuration) return stuck(situation, time);
       goals_.chosen(at, *configuration);
       if (at.coarse) decision->notes.emplace_back(kCoarseNote);
+      PlannedPath& path = decision->candidates.front().path;
+      if (tight) path.radius = narrowed(situation.robot, situation.map.frame).radius;
       return std::move(*decision);
     }
   }

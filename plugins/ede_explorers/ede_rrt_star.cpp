@@ -93,6 +93,7 @@ bool EdeRrtStar::drive(const Situation& situation, bool tight, const DecisionTim
         path = drivable_path(std::move(*path), situation.pose, situation.robot, situation.map,
                              situation.interrupt);
       if (!path) continue;
+      if (tight) path->radius = narrowed(situation.robot, situation.map.frame).radius;
       if (!moves(situation, *path)) {
         if (decision.candidates.empty()) there = goal.configuration;
         continue;

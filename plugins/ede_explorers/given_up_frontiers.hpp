@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <cstddef>
 #include <span>
 #include <vector>
 
-#include <Eigen/Core>
-
 #include "cairn/exploration/floor_map.hpp"
+#include "cairn/exploration/known_surroundings.hpp"
 #include "cairn/planning/frontier_view.hpp"
 
 namespace cairn::exploration {
@@ -23,11 +21,7 @@ class GivenUpFrontiers {
   void remove_from(std::vector<BeamCell>& cells, const FloorMap& map, double least);
 
  private:
-  struct Cell {
-    Eigen::Vector2d at;  ///< its middle [m]
-    std::size_t known;   ///< cells around it
-  };
-  std::vector<Cell> cells_;
+  std::vector<KnownSurroundings> cells_;
 };
 
 }  // namespace cairn::exploration

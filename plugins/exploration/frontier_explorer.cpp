@@ -40,8 +40,9 @@ Decision FrontierExplorer::decide(const Situation& situation) {
   const double smallest =
       options_.smallest > 0.0 ? options_.smallest : 2.0 * situation.robot.radius;
   double least = 0.0;
+  goals_.start(situation);
   for (const bool tight : {false, true}) {
-    goals_.start(situation, tight);
+    if (tight && !goals_.start_through_gaps()) break;
     for (least = std::max(options_.length, smallest);; least = std::max(0.5 * least, smallest)) {
       decision.candidates = goals_.candidates(least);
       if (!decision.candidates.empty() || least <= smallest) break;
@@ -67,6 +68,7 @@ Decision FrontierExplorer::decide(const Situation& situation) {
   choose(situation, decision);
   const Candidate& chosen = decision.candidates[decision.chosen];
   goal_ = chosen.path.look_at;
+  goals_.chosen(chosen.path);
   if (decision.why.empty())
     decision.why = fmt::format("to {}, {:.1f} m away, of {} of at least {:.2g} m", chosen.what,
                                chosen.path.length, frontiers, least);

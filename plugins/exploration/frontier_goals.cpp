@@ -19,11 +19,14 @@ constexpr double kNear = 2.0;
 constexpr double kNearPose = 0.5;
 /// A frontier is there still if a cell of one is so near to where its middle was [m].
 constexpr double kStillThere = 0.5;
-/// The map around a frontier [m], which must change before it is tried again; after so many times
-/// in vain this part of it must have become known: single cells change with every scan where
-/// measurements have noise.
-constexpr double kAround = 1.0, kGrown = 0.05;
+/// After so many times in vain clearly more must be known around a frontier before it is tried
+/// again; before, anything has to change there.
 constexpr int kInVain = 2;
+/// A robot has come nearer to a goal if the path is shorter by this [m]; so often it may choose one
+/// without coming nearer, one behind a gap that may be too narrow once, since it touches walls
+/// there.
+constexpr double kNearer = 0.5;
+constexpr int kMostAttempts = 8, kMostNarrowAttempts = 1;
 /// Between the cells of a frontier that are tried as goals [m].
 constexpr double kSpacing = 0.5;
 
@@ -31,14 +34,25 @@ constexpr double kSpacing = 0.5;
 
 void FrontierGoals::begin() {
   given_up_.clear();
+  attempted_.clear();
   looked_around_ = 0.0;
 }
 
-void FrontierGoals::start(const Situation& situation, bool tight) {
+void FrontierGoals::start(const Situation& situation) {
   situation_ = &situation;
+  narrow_radius_ = 0.0;
+  planner_->start(situation.map, situation.pose.translation(), situation.robot.radius);
+}
+
+bool FrontierGoals::start_through_gaps() {
+  const Situation& situation = *situation_;
+  if (situation.poses.empty()) return false;
+  const Pose2 first = Pose2::from_state(situation.estimator.state(situation.poses.front()));
+  if (planner_->path_to(first.translation(), kNearPose)) return false;
   const double cell = situation.map.frame.resolution, radius = situation.robot.radius;
-  planner_->start(situation.map, situation.pose.translation(),
-                  tight ? std::max(radius - cell, 0.5 * radius) : radius);
+  narrow_radius_ = std::max(radius - cell, 0.5 * radius);
+  planner_->start(situation.map, situation.pose.translation(), narrow_radius_);
+  return true;
 }
 
 std::vector<Candidate> FrontierGoals::candidates(double least) {
@@ -101,7 +115,8 @@ std::optional<PlannedPath> FrontierGoals::path_to(const Vector2d& goal) {
   if (is_given_up(goal)) return std::nullopt;
   std::optional<PlannedPath> path = planner_->path_to(goal, kNear);
   if (path) path = driven(std::move(*path));
-  if (!path || moves(*path)) return path;
+  if (!path || comes_no_nearer(goal, path->length)) return std::nullopt;
+  if (moves(*path)) return path;
   give_up(goal);
   return std::nullopt;
 }
@@ -117,8 +132,10 @@ bool FrontierGoals::is_there(const FloorMap& map, const Vector2d& middle) {
 }
 
 std::optional<PlannedPath> FrontierGoals::driven(PlannedPath path) const {
-  return drivable_path(std::move(path), situation_->pose, situation_->robot, situation_->map,
-                       situation_->interrupt);
+  std::optional<PlannedPath> driven = drivable_path(
+      std::move(path), situation_->pose, situation_->robot, situation_->map, situation_->interrupt);
+  if (driven) driven->radius = narrow_radius_;
+  return driven;
 }
 
 bool FrontierGoals::moves(const PlannedPath& path) const {
@@ -126,42 +143,53 @@ bool FrontierGoals::moves(const PlannedPath& path) const {
   return next_motion(situation_->pose, path, situation_->robot, passed).has_value();
 }
 
+void FrontierGoals::chosen(const PlannedPath& path) {
+  const FloorMap& map = situation_->map;
+  if (!path.look_at || !is_there(map, *path.look_at)) return;
+  std::erase_if(attempted_, [&](const Attempted& other) { return other.goal.more_in(map); });
+  const auto known = std::ranges::find_if(attempted_, [&](const Attempted& other) {
+    return (other.goal.at() - *path.look_at).norm() < kStillThere;
+  });
+  if (known == attempted_.end()) {
+    attempted_.push_back({KnownSurroundings(map, *path.look_at), path.length, 1});
+  } else if (path.length < known->length - kNearer) {
+    known->length = path.length;
+    known->times = 1;
+  } else {
+    ++known->times;
+  }
+}
+
+bool FrontierGoals::comes_no_nearer(const Vector2d& goal, double length) const {
+  const int most = narrow_radius_ > 0.0 ? kMostNarrowAttempts : kMostAttempts;
+  return std::ranges::any_of(attempted_, [&](const Attempted& other) {
+    return other.times >= most && length > other.length - kNearer &&
+           (other.goal.at() - goal).norm() < kStillThere && !other.goal.more_in(situation_->map);
+  });
+}
+
 void FrontierGoals::give_up(const Vector2d& goal) {
-  const auto distance = [&](const GivenUp& other) { return (other.goal - goal).norm(); };
+  const FloorMap& map = situation_->map;
+  const auto distance = [&](const GivenUp& other) { return (other.goal.at() - goal).norm(); };
   const auto again = std::ranges::min_element(given_up_, {}, distance);
   if (again == given_up_.end() || distance(*again) >= kStillThere ||
-      again->known == known_around(again->goal)) {  // another one, or another cell of the same
-    given_up_.push_back({goal, known_around(goal), 1});
+      again->goal.same_as(map)) {  // another one, or another cell of the same
+    given_up_.push_back({KnownSurroundings(map, goal), 1});
   } else {
-    again->known = known_around(again->goal);
+    again->goal = KnownSurroundings(map, again->goal.at());
     ++again->times;
   }
 }
 
 bool FrontierGoals::is_given_up(const Vector2d& goal) const {
-  const double cell = situation_->map.frame.resolution;
-  const double side = 2.0 * kAround / cell;
-  const auto grown = static_cast<std::size_t>(kGrown * side * side);
-  return std::ranges::any_of(given_up_, [&](const GivenUp& other) {
-    const bool in_vain = other.times >= kInVain;
-    if ((other.goal - goal).norm() >= (in_vain ? kStillThere : 3.0 * cell)) return false;
-    const std::size_t known = known_around(other.goal);
-    return in_vain ? known <= other.known + grown : known == other.known;
-  });
-}
-
-std::size_t FrontierGoals::known_around(const Vector2d& point) const {
   const FloorMap& map = situation_->map;
-  const Vector2d cell = map.frame.to_cells(point).array().floor();
-  const int reach = std::max(1, static_cast<int>(kAround / map.frame.resolution));
-  const int middle_x = static_cast<int>(cell.x()), middle_y = static_cast<int>(cell.y());
-  std::size_t known = 0;
-  for (int y = middle_y - reach; y <= middle_y + reach; ++y) {
-    for (int x = middle_x - reach; x <= middle_x + reach; ++x) {
-      known += map.frame.contains(x, y) && map.cells[map.frame.index(x, y)] != CellState::unknown;
-    }
-  }
-  return known;
+  const auto is_near = [&](const KnownSurroundings& other, double distance) {
+    return (other.at() - goal).norm() < distance;
+  };
+  return std::ranges::any_of(given_up_, [&](const GivenUp& other) {
+    if (other.times >= kInVain) return is_near(other.goal, kStillThere) && !other.goal.more_in(map);
+    return is_near(other.goal, 3.0 * map.frame.resolution) && other.goal.same_as(map);
+  });
 }
 
 }  // namespace cairn::exploration

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "cairn/exploration/explorer.hpp"
+#include "cairn/exploration/known_surroundings.hpp"
 #include "cairn/exploration/path_planner.hpp"
 
 namespace cairn::exploration {
@@ -21,15 +22,21 @@ class FrontierGoals {
   explicit FrontierGoals(std::unique_ptr<PathPlanner> planner) : planner_(std::move(planner)) {}
 
   void begin();
-  /// Looks at the frontiers of a situation, for those that follow. `tight`: through gaps, too, that
-  /// may be a cell narrower than the body: on a map, whose cells are occupied as a whole, it may
-  /// seem not to fit through a door through which it has come.
-  void start(const Situation& situation, bool tight);
+  /// Looks at the frontiers of a situation, for those that follow.
+  void start(const Situation& situation);
+  /// From here on paths lead through gaps, too, that are a cell narrower on each side than the
+  /// body: on a map, whose cells are occupied as a whole, it may seem not to fit through a door
+  /// through which it has come. False: there is another way to the first pose, so that it has not.
+  bool start_through_gaps();
   /// Paths to the frontiers of at least this length [m].
   std::vector<Candidate> candidates(double least);
   /// A path to where the robot can stand as at a pose, with its heading at the end; none: there is
   /// no path, or it is there already.
   std::optional<PlannedPath> path_to(const Pose2& pose);
+
+  /// The robot drives along a path of `candidates`. A frontier to which it drives again and again
+  /// without coming nearer, since it is stopped on the way, is given up as well.
+  void chosen(const PlannedPath& path);
 
   /// Where none of the frontiers that the last `candidates` has seen has a path: a turn of one
   /// motion, until the robot has turned once around. With noise the newest scan alone may close a
@@ -45,16 +52,21 @@ class FrontierGoals {
 
  private:
   struct GivenUp {
-    Eigen::Vector2d goal;
-    std::size_t known;  ///< cells around it
-    int times;          ///< that it was reached in vain
+    KnownSurroundings goal;
+    int times;  ///< that it was reached in vain
+  };
+  /// A goal to which the robot drives without coming nearer.
+  struct Attempted {
+    KnownSurroundings goal;
+    double length;  ///< of the shortest path to it so far [m]
+    int times;      ///< that it was chosen without a shorter one
   };
 
   std::optional<PlannedPath> path_to(const Frontier& frontier);
   std::optional<PlannedPath> path_to(const Eigen::Vector2d& goal);
   void give_up(const Eigen::Vector2d& goal);
   bool is_given_up(const Eigen::Vector2d& goal) const;
-  std::size_t known_around(const Eigen::Vector2d& point) const;
+  bool comes_no_nearer(const Eigen::Vector2d& goal, double length) const;
   /// A path as the robot can drive it; none: it can't.
   std::optional<PlannedPath> driven(PlannedPath path) const;
   bool moves(const PlannedPath& path) const;
@@ -62,9 +74,11 @@ class FrontierGoals {
   std::unique_ptr<PathPlanner> planner_;
   const Situation* situation_ = nullptr;
   std::vector<GivenUp> given_up_;
+  std::vector<Attempted> attempted_;
   std::size_t unreachable_ = 0;
   double longest_unreachable_ = 0.0;
   double looked_around_ = 0.0;  // since there was a path [rad]
+  double narrow_radius_ = 0.0;  // of the body that paths are for [m]; 0: the robot's
 };
 
 }  // namespace cairn::exploration

@@ -59,6 +59,12 @@ BenchConfiguration read_configuration(const json::value& value) {
 }  // namespace
 
 std::vector<BenchGraph> read_bench(std::string_view bench) {
+  if (bench.empty()) {
+    throw Error(
+        ErrorCode::input,
+        "no comparison to draw: give the JSON that cairn bench --json writes; of a CSV file "
+        "columns are drawn");
+  }
   json::parse_options options;
   options.allow_invalid_utf8 = true;
   json::error_code error;

@@ -22,7 +22,7 @@ struct BenchGraph {
   std::vector<BenchConfiguration> configurations;
 };
 
-/// Throws `Error` (input) for text that is no such report.
+/// Throws `Error` (input) for text that is no such report, as where there is none.
 std::vector<BenchGraph> read_bench(std::string_view json);
 
 }  // namespace cairn::plot

@@ -60,7 +60,7 @@ std::vector<CurveGroup> needed_curves(const Album& album) {
   if (groups.empty()) {
     throw Error(ErrorCode::input,
                 "no run to draw: give a recording, or the JSON that cairn optimize or cairn bench "
-                "writes");
+                "writes; of a CSV file columns are drawn");
   }
   return groups;
 }

@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "bench_data.hpp"
-#include "cairn/runtime/error.hpp"
 #include "chart.hpp"
 #include "lines.hpp"
 #include "plots.hpp"
@@ -61,9 +60,6 @@ void draw_panel(Canvas& canvas, const Theme& theme, const Box& box,
 }  // namespace
 
 void draw_scaling(Canvas& canvas, const Theme& theme, const Album& album) {
-  if (album.bench.empty()) {
-    throw Error(ErrorCode::input, "no comparison to draw: give the JSON that cairn bench writes");
-  }
   const std::vector<Solver> solvers = solvers_of(read_bench(album.bench));
   // Memory is not measured with --no-memory.
   const bool with_memory =

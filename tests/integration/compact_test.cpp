@@ -355,6 +355,7 @@ TEST_F(Compact, ContinuesTheMapOfAnEarlierSession) {
             "unlocated");
   EXPECT_EQ(unlocated.exit_code, 4);
   EXPECT_THAT(unlocated.out, Not(HasSubstr("NEES")));
+  EXPECT_THAT(unlocated.out, HasSubstr("status      unlocated: no pose was matched"));
   EXPECT_TRUE(parse_json(read_text(folder_.file("unlocated.json"))).at("nees").is_null());
   EXPECT_THAT(unlocated.err, HasSubstr("no pose was matched with one of " + map));
   const Outcome same = cairn({"compact", monday, "--map", map, "--thresholds", robot});

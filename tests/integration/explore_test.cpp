@@ -385,6 +385,16 @@ TEST_F(Explore, NarrowDoorsAndPocketsAreNoted) {
               HasSubstr("nearest to the start at (2."));
 }
 
+TEST_F(Explore, SaysWhereHardlyAnyScansMatch) {
+  const auto said = [&](const char* registration) {
+    return cairn({"explore", "@rooms:width=12,height=9", "--registration", registration, "--lidar",
+                  "range_sigma=0.3", "--until", "distance=20", "--seed", "1"})
+        .err;
+  };
+  EXPECT_THAT(said("icp"), HasSubstr("the map rests mostly on odometry"));
+  EXPECT_THAT(said(kTrueMatcher), Not(HasSubstr("rests mostly on odometry")));
+}
+
 TEST_F(Explore, ARobotThatSeesNothingIsStuckAndSaysWhy) {
   const Outcome run = explore({"--lidar", "dropouts=1"});
   EXPECT_EQ(run.exit_code, 0) << run.err;

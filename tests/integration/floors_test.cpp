@@ -9,6 +9,7 @@ namespace cairn::test {
 namespace {
 
 using ::testing::HasSubstr;
+using ::testing::Not;
 using ::testing::StartsWith;
 
 class Floors : public ::testing::Test {
@@ -50,6 +51,18 @@ TEST_F(Floors, InfoSaysWhatABodyReaches) {
   EXPECT_EQ(cairn({"info", "@loop", "--start-x", "0"}).exit_code, 2);
   EXPECT_EQ(cairn({"info", "@loop", "--entropy"}).exit_code, 2);
   EXPECT_EQ(cairn({"info", "@rooms", "--radius", "30"}).exit_code, 3);
+}
+
+TEST_F(Floors, WhereAGraphIsExpectedWhatAMapIsForIsSaid) {
+  ASSERT_EQ(cairn({"generate", "rooms:width=12,height=9", "-o", floor_}).exit_code, 0);
+  for (const std::string command : {"optimize", "compact", "sparsify", "marginals"}) {
+    const Outcome refused = cairn({command, floor_});
+    EXPECT_EQ(refused.exit_code, 3) << command;
+    EXPECT_THAT(refused.err, HasSubstr("cairn explore")) << command;
+  }
+  EXPECT_THAT(cairn({"optimize", floor_, "--from", "g2o"}).err, HasSubstr("unknown tag"));
+  const std::string other = folder_.file("none.yaml");
+  EXPECT_THAT(cairn({"optimize", other}).err, Not(HasSubstr("cairn explore")));
 }
 
 TEST_F(Floors, WhatIsNoMapsNameIsRefusedBeforeTheWork) {

@@ -324,7 +324,14 @@ TEST_F(PlotCommand, WhatHasNoGraphIsRefusedWithWhatWouldWork) {
 TEST_F(PlotCommand, SaysWhatIsMissing) {
   const Outcome outcome = cairn({"plot", graph_, "--what", "bars", "-o", folder_.file("x.svg")});
   EXPECT_EQ(outcome.exit_code, 3);
-  EXPECT_THAT(outcome.err, HasSubstr("the JSON that cairn bench writes"));
+  EXPECT_THAT(outcome.err, HasSubstr("the JSON that cairn bench --json writes"));
+  const std::string csv = folder_.file("bench.csv");
+  write_text(csv, "graph,seconds\nsphere,1\n");
+  for (const std::string what : {"bars", "scaling", "steps"}) {
+    const Outcome of_csv = cairn({"plot", csv, "--what", what, "-o", folder_.file("x.svg")});
+    EXPECT_EQ(of_csv.exit_code, 3) << what;
+    EXPECT_THAT(unfolded(of_csv.err), HasSubstr("of a CSV file columns are drawn")) << what;
+  }
 }
 
 }  // namespace

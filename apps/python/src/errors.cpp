@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "cairn/runtime/error.hpp"
 
+#include <cstddef>
 #include <exception>
+#include <string>
+#include <string_view>
 
 #include "bindings.hpp"
 
@@ -30,6 +33,14 @@ const char* kind_of(ErrorCode code) {
   return "plugin";
 }
 
+/// "ReadOptions::skip_unknown" in a message is the keyword argument skip_unknown in Python.
+std::string in_words_of_python(std::string message) {
+  constexpr std::string_view kPrefix = "ReadOptions::";
+  for (std::size_t at = 0; (at = message.find(kPrefix, at)) != std::string::npos;)
+    message.erase(at, kPrefix.size());
+  return message;
+}
+
 // The translator of exceptions is a plain function, so the class has to be where it can find it. It
 // lives as long as the process, as modules do.
 PyObject* error_class = nullptr;
@@ -38,7 +49,7 @@ void translate(std::exception_ptr thrown) {
   try {
     if (thrown) std::rethrow_exception(thrown);
   } catch (const Error& error) {
-    const py::object instance = py::handle(error_class)(error.what());
+    const py::object instance = py::handle(error_class)(in_words_of_python(error.what()));
     instance.attr("kind") = kind_of(error.code());
     PyErr_SetObject(error_class, instance.ptr());
   }

@@ -30,10 +30,12 @@ constexpr double kNoMotion = 0.005;  // [m], [rad]
 constexpr int kMostEmptyDecisions = 3;
 /// Collisions without a free motion in between.
 constexpr int kMostCollisions = 10;
-/// The known floor must grow by this factor to be progress.
-constexpr double kProgress = 1.002;
-/// Decisions without progress before a run is stuck: on a large floor one way alone may be long.
-constexpr int kIdleDecisions = 5;
+/// The known floor must grow by this part, on a large floor by this area [m²], to be progress: a
+/// map that is made anew, blurred a little more or less, is none.
+constexpr double kProgress = 0.002, kProgressArea = 0.1;
+/// Of the way of one decision this part of `idle_distance` counts at most: on a large floor the way
+/// to the next frontier alone may be longer than that.
+constexpr double kMostOfOneWay = 0.2;
 
 /// Whether a body can still go along what is left of a path, which may begin too near to an
 /// obstacle.
@@ -226,8 +228,7 @@ class Run {
 
   void check_progress() {
     const ExplorationLimits& limits = parts_.limits;
-    if (result_.steps.back().distance - useful_distance_ > limits.idle_distance &&
-        decisions_ - useful_decision_ >= kIdleDecisions) {
+    if (idle_distance_ + idle_way() > limits.idle_distance) {
       end(ExplorationEnd::stuck,
           fmt::format("{:g} m were driven without finding more floor", limits.idle_distance));
     } else if (collisions_in_row_ >= kMostCollisions) {
@@ -238,6 +239,12 @@ class Run {
       end(ExplorationEnd::stuck,
           fmt::format("{} decisions in a row led to no motion", kMostEmptyDecisions));
     }
+  }
+
+  /// What counts of the way since the newest decision, as driven without progress [m].
+  double idle_way() const {
+    return std::min(result_.steps.back().distance - way_begin_,
+                    kMostOfOneWay * parts_.limits.idle_distance);
   }
 
   /// None: it was interrupted, so that what was decided is worth nothing.
@@ -256,6 +263,8 @@ class Run {
     }
     if (is_interrupted()) return std::nullopt;
     ++decisions_;
+    idle_distance_ += idle_way();
+    way_begin_ = result_.steps.back().distance;
     result_.decide_seconds += seconds;
     result_.decision_seconds.push_back(seconds);
     for (const std::string& note : decision.notes) note_once(note);
@@ -322,7 +331,8 @@ class Run {
   /// Whether the rest of a path can be driven, and is worth it.
   bool goes_on(const PlannedPath& path, std::size_t passed) {
     const FloorMap& map = slam_.map();
-    if (!is_open(map, slam_.pose(), path, passed, robot_.radius)) return false;
+    const double radius = path.radius > 0.0 ? path.radius : robot_.radius;
+    if (!is_open(map, slam_.pose(), path, passed, radius)) return false;
     const std::vector<Id> kept = parts_.policy.kept();
     Timed timed(result_.decide_seconds);
     return call_plugin([] { return std::string("explorer"); },
@@ -375,10 +385,10 @@ class Run {
   }
 
   void watch_progress(const ExplorationStep& step) {
-    // A map that is made anew, blurred a little more or less, is no progress.
-    if (step.coverage <= kProgress * most_coverage_) return;
-    useful_distance_ = step.distance;
-    useful_decision_ = decisions_;
+    const double least = std::min(kProgress * most_coverage_, kProgressArea);
+    if (step.coverage <= most_coverage_ + least) return;
+    idle_distance_ = 0.0;
+    way_begin_ = step.distance;
     most_coverage_ = step.coverage;
   }
 
@@ -393,6 +403,7 @@ class Run {
           not_driven_, robot_.turning_radius));
     }
     for (const std::string& note : slam_.counts().notes) note_once(note);
+    note_refused_matches();
     result_.map = slam_.map();
     result_.slam = slam_.counts();
     result_.graph = parts_.policy.estimator().graph();
@@ -401,6 +412,21 @@ class Run {
     result_.samples.push_back(map_sample(result_.trajectory));
     result_.map_error = result_.samples.back().error;
     result_.against = result_.samples.back().against;
+  }
+
+  /// Where the registration refuses nearly all pairs, and has matched few scans, the map rests on
+  /// odometry.
+  void note_refused_matches() {
+    constexpr int kEnoughToTell = 50;
+    constexpr double kFew = 0.15, kFewOfScans = 0.1;
+    const ScanSlamCounts& counts = slam_.counts();
+    if (counts.proposed < kEnoughToTell || counts.registered >= kFew * counts.proposed ||
+        counts.registered >= kFewOfScans * static_cast<double>(result_.steps.size()))
+      return;
+    note_once(fmt::format(
+        "of {} pairs of scans that were to be matched, the registration has refused {}: the map "
+        "rests mostly on odometry; its options say how noisy scans may be and how far apart",
+        counts.proposed, counts.proposed - counts.registered));
   }
 
   /// From the world of the estimate to that of the floor; none: the true poses do not determine it.
@@ -425,8 +451,10 @@ class Run {
   bool ended_ = false, backing_off_ = false;
   double next_doubt_ = 0.0;  // of contacts, so as to go on, no earlier [m driven]
   int not_driven_ = 0;       // paths
-  int decisions_ = 0, useful_decision_ = 0, empty_decisions_ = 0, idle_ = 0, collisions_in_row_ = 0;
-  double most_coverage_ = 0.0, useful_distance_ = 0.0;
+  int decisions_ = 0, empty_decisions_ = 0, idle_ = 0, collisions_in_row_ = 0;
+  double most_coverage_ = 0.0;
+  double idle_distance_ = 0.0,
+         way_begin_ = 0.0;  // without progress; where the newest way began [m]
 };
 
 }  // namespace

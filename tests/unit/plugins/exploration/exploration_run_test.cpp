@@ -17,6 +17,7 @@
 #include "cairn/exploration/exploration.hpp"
 #include "cairn/grid/floor_plan.hpp"
 #include "cairn/plugin/registry.hpp"
+#include "cairn/typed/build.hpp"
 #include "support/exploration_runs.hpp"
 #include "unit/lib/exploration/drawn_map.hpp"
 
@@ -275,10 +276,18 @@ class FrontierThatStays : public testing::Test {
           {.cells = {cell}, .length = 0.5, .middle = map_.frame.centre(79, 20)});
     }
     return parts_.explorer->decide({.estimator = parts_.policy->estimator(),
-                                    .poses = {},
+                                    .poses = poses_,
                                     .pose = pose,
                                     .map = map_,
                                     .robot = parts_.world->robot()});
+  }
+  /// Its first pose, from where it has driven to where decisions are made.
+  void begin_at(const Pose2& pose) {
+    Variable first = make_variable(0, pose);
+    first.fixed = true;
+    parts_.policy->add_pose(first, {});
+    parts_.policy->end_pose();
+    poses_.push_back(0);
   }
   static bool drives(const Decision& decision) {
     return decision.kind == Decision::Kind::drive &&
@@ -305,10 +314,16 @@ class FrontierThatStays : public testing::Test {
   void close(std::size_t column, char cell) {
     for (std::size_t k = 1; k < 39; ++k) rows_[k][column] = cell;
   }
+  /// A wall with a door of 0.4 m, which is as wide as the robot.
+  void narrow(std::size_t column) {
+    close(column, '#');
+    for (std::size_t k = 18; k < 22; ++k) rows_[k][column] = '.';
+  }
 
   FloorMap map_;
   const Pose2 start_{2.05, 2.05, 0.0};
   std::vector<std::string> rows_, drawn_;
+  std::vector<Id> poses_;
   ExplorationParts parts_{kExactRobot};
 };
 
@@ -322,6 +337,44 @@ TEST_F(FrontierThatStays, IsTriedAgainWhenTheMapChangesAndAfterTwiceInVainWhenMo
   EXPECT_FALSE(is_tried()) << "a cell is too little by now";
   for (const std::size_t column : {83, 84, 87}) see(column, 8);
   EXPECT_TRUE(is_tried()) << "a quarter of a square metre";
+}
+
+TEST_F(FrontierThatStays, IsGivenUpWhereTheRobotDoesNotComeNearer) {
+  const auto tries_at = [&](const Pose2& pose) {
+    int tries = 0;
+    while (tries < 50 && drives(decision_at(pose))) ++tries;
+    return tries;
+  };
+  EXPECT_EQ(tries_at(start_), 8) << "it is stopped on the way, each time at the same place";
+  EXPECT_EQ(tries_at(start_), 0) << "given up until more of the map around it is known";
+  EXPECT_EQ(tries_at(start_ * Pose2(0.3, 0.0, 0.0)), 0);
+  EXPECT_EQ(tries_at(start_ * Pose2(2.0, 0.0, 0.0)), 8) << "or the robot is nearer";
+  for (const std::size_t column : {84, 85, 86}) see(column, 8);
+  EXPECT_EQ(tries_at(start_), 8);
+}
+
+TEST_F(FrontierThatStays, IsNotGivenUpOnAWayThatIsDecidedAnewEachMetre) {
+  for (double x = 0.0; x < 5.0; x += 0.6) {
+    EXPECT_TRUE(drives(decision_at(start_ * Pose2(x, 0.0, 0.0)))) << x;
+    EXPECT_TRUE(drives(decision_at(start_ * Pose2(x, 0.0, 0.0)))) << x;
+  }
+}
+
+TEST_F(FrontierThatStays, ANarrowDoorIsTriedByARobotThatHasComeThroughIt) {
+  narrow(50);
+  begin_at(Pose2(6.5, 2.0, 0.0));
+  const Decision decision = decision_at(start_);
+  ASSERT_TRUE(drives(decision));
+  const PlannedPath& path = decision.candidates.at(decision.chosen).path;
+  EXPECT_NEAR(path.radius, 0.1, 1e-9);
+  EXPECT_GT(path.points.back().x(), 5.5);
+  EXPECT_FALSE(drives(decision_at(start_))) << "once, since it has come no nearer";
+}
+
+TEST_F(FrontierThatStays, ANarrowDoorIsLeftAloneByARobotThatCanGoWhereItBegan) {
+  narrow(50);
+  begin_at(Pose2(1.0, 1.0, 0.0));
+  EXPECT_FALSE(drives(decision_at(start_)));
 }
 
 TEST_F(FrontierThatStays, ARobotTurnsOnceAroundBeforeItEndsForWantOfAPath) {

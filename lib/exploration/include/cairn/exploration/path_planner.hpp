@@ -22,6 +22,9 @@ struct PlannedPath {
   std::vector<Eigen::Vector2d> points;          ///< of a polyline, from where the robot is [m]
   double length = 0.0;                          ///< [m]
   std::optional<Eigen::Vector2d> look_at = {};  ///< towards which the robot turns at its end [m]
+  /// Of the body that it was planned for, where gaps may be narrower than the robot's; 0: as that
+  /// [m].
+  double radius = 0.0;
 };
 
 /// How near an obstacle, or an unknown cell, the centre of a round body may come: its radius and
