@@ -126,16 +126,22 @@ class ThesisTest(unittest.TestCase):
 class FloorsTest(unittest.TestCase):
     def test_how_each_run_ended(self):
         late = {"part": "floors", "name": "depot", "method": "dopt", "error": "took too long"}
-        floors = report("explore_floors", entry("floors", "frontier", {}, {"coverage": 300.0}), entry("exact", "frontier", {}), late)
+        floors = report("explore_floors", entry("floors", "frontier", {}, {"coverage": 300.0}), late)
         table = section(floors, "explore-floors")
         self.assertIn("| fr079 | frontier | 1 | limit | 250 m are driven | 250 |", table)
         self.assertIn("|  | frontier | 2 | limit |", table)
         self.assertIn("| depot | dopt |  | took too long |", table)
-        self.assertIn("| fr079 | limit | 250 m are driven |", section(floors, "explore-exact"))
+
+    def test_what_is_seen_without_noise(self):
+        late = {"part": "exact", "name": "depot", "method": "frontier", "error": "took too long"}
+        table = section(report("explore_exact", entry("exact", "frontier", {"reachable_seen": 0.995}), late), "explore-exact")
+        self.assertIn("| fr079 | limit | 250 m are driven | 250 |", table)
+        self.assertIn("| 99.5 % |", table)
+        self.assertIn("| depot | took too long |", table)
 
     def test_means_of_each_explorer_on_each_floor(self):
         runs = [{"seen": seen, "wrong": 1.0} for seen in (20.0, 24.0)]
-        floors = report("explore_floors", entry("floors", "frontier", *runs), entry("exact", "frontier", {"seen": 99.0}),
+        floors = report("explore_floors", entry("floors", "frontier", *runs),
                         entry("floors", "dopt", *runs, runs[0]))
         table = section(floors, "explore-floors-means")
         self.assertIn("| mean ± 95 % | floor | frontier | dopt |", table)

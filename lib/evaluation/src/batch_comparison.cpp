@@ -32,8 +32,9 @@ double relative_difference(std::span<const double> a, std::span<const double> b)
 }  // namespace
 
 double BatchCheck::excess() const {
+  constexpr double kRounding = 1e-9;
   const double best = std::min(batch, polished);
-  return best > 0.0 ? chi2 / best - 1.0 : 0.0;
+  return (chi2 - best) / std::max(best, kRounding);
 }
 
 BatchChecker::BatchChecker(const Graph& recording, BatchProblem problem, Registry& registry)

@@ -26,12 +26,16 @@ def all_floors(bench: Bench) -> list[DataSet]:
 
 def study_floors(bench: Bench, keep: Keep) -> None:
     until = ["--until", "distance=10" if bench.quick else "distance=100"]
-    # Without noise and without a limit: all that can be reached is to be seen, and nothing hit.
-    exact = ["--odometry", "sigma_xy=1e-6,sigma_theta=1e-6,relative=0", "--lidar", "range_sigma=0",
-             *(until if bench.quick else [])]
     for floor in all_floors(bench):
         for explorer in bench.cairn.names("explorer"):
             keep(measure(bench, "floors", floor, explorer, explorer, bench.rounds, until))
+
+
+def study_exact(bench: Bench, keep: Keep) -> None:
+    """Without noise and without a limit: all that can be reached is to be seen, and nothing hit."""
+    exact = ["--odometry", "sigma_xy=1e-6,sigma_theta=1e-6,relative=0", "--lidar", "range_sigma=0",
+             *(["--until", "distance=10"] if bench.quick else [])]
+    for floor in all_floors(bench):
         keep(measure(bench, "exact", floor, "frontier", "frontier", 1, exact))
 
 
@@ -52,29 +56,37 @@ def study_sensitivity(bench: Bench, keep: Keep) -> None:
 
 
 def floors_sections(entries: list[Json]) -> Sections:
-    floors, exact = [], []
+    rows = []
     before = ""
     for entry in entries:
         name, method = text(entry, "name"), text(entry, "method")
         floor = "" if name == before else name
-        without_noise = text(entry, "part") == "exact"
-        if problem_of(entry) and not without_noise:
-            floors.append([floor, method, "", problem_of(entry), *[""] * 8])
+        if problem_of(entry):
+            rows.append([floor, method, "", problem_of(entry), *[""] * 8])
         for run in runs_of(entry)[:LISTED]:
             of = {measure: measured(run, measure)
                   for measure in ["distance", "seen", "loops", "collisions", "ate", "wrong", "decision_p95"]}
-            begin = [end_of(run), text(run, "why"), digits(of["distance"]), digits(of["seen"])]
-            if without_noise:
-                exact.append([name, *begin, percent(measured(run, "reachable_seen"), 1), whole(of["collisions"])])
-            else:
-                floors.append([floor, method, f"{number(run, 'seed'):.0f}", *begin, whole(of["loops"]), whole(of["collisions"]),
-                               *(digits(of[measure]) for measure in ["ate", "wrong", "decision_p95"])])
-                floor = ""
+            rows.append([floor, method, f"{number(run, 'seed'):.0f}", end_of(run), text(run, "why"), digits(of["distance"]),
+                         digits(of["seen"]), whole(of["loops"]), whole(of["collisions"]),
+                         *(digits(of[measure]) for measure in ["ate", "wrong", "decision_p95"])])
+            floor = ""
         before = name
-    return {"explore-floors-means": means_table([entry for entry in entries if text(entry, "part") == "floors"]),
+    return {"explore-floors-means": means_table(entries),
             "explore-floors": table(["floor", "explorer", "seed", "end", "why", "driven [m]", "seen [m²]", "loops",
-                                     "collisions", "ATE [m]", "wrong [m²]", "95 % of decisions [s]"], floors),
-            "explore-exact": table(["floor", "end", "why", "driven [m]", "seen [m²]", "of what the body can cover", "collisions"], exact)}
+                                     "collisions", "ATE [m]", "wrong [m²]", "95 % of decisions [s]"], rows)}
+
+
+def exact_sections(entries: list[Json]) -> Sections:
+    rows = []
+    for entry in entries:
+        name = text(entry, "name")
+        if problem_of(entry):
+            rows.append([name, problem_of(entry), *[""] * 5])
+        for run in runs_of(entry):
+            rows.append([name, end_of(run), text(run, "why"), digits(measured(run, "distance")), digits(measured(run, "seen")),
+                         percent(measured(run, "reachable_seen"), 1), whole(measured(run, "collisions"))])
+    return {"explore-exact": table(["floor", "end", "why", "driven [m]", "seen [m²]", "of what the body can cover",
+                                    "collisions"], rows)}
 
 
 def means_table(entries: list[Json]) -> str:
@@ -101,4 +113,5 @@ def sensitivity_sections(entries: list[Json]) -> Sections:
 
 
 STUDIES = [Study("explore_floors", study_floors, floors_sections),
+           Study("explore_exact", study_exact, exact_sections),
            Study("explore_sensitivity", study_sensitivity, sensitivity_sections)]

@@ -27,7 +27,8 @@ struct CAIRN_API BatchCheck {
   /// same graph at the same estimate; none if that was not asked for.
   std::optional<double> covariance_difference = std::nullopt;
 
-  /// (χ² − χ²_best) / χ²_best with the lower of the two optimisations; 0 where that is 0.
+  /// (χ² − χ²_best) / χ²_best with the lower of the two optimisations; where that is below 10⁻⁹,
+  /// which is rounding, relative to 10⁻⁹.
   double excess() const;
 };
 
