@@ -250,9 +250,11 @@ std::string summary_text(const CompactOptions& options, const CompactOutcome& ou
   if (const std::string line = thresholds_line(outcome.thresholds); !line.empty())
     table.add({"thresholds", line});
   add_result(table, outcome.shown(), outcome.data, outcome.found);
-  if (outcome.result.interrupted) table.add({"status", "interrupted"});
-  if (!outcome.shown().located)
+  if (outcome.result.interrupted) {
+    table.add({"status", "interrupted"});
+  } else if (!outcome.shown().located) {
     table.add({"status", "unlocated: no pose was matched with one of the map"});
+  }
   for (const std::string& file :
        results.written({options.output, options.trajectory, options.save_thresholds, options.steps,
                         options.compare})) {

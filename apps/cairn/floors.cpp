@@ -202,6 +202,16 @@ bool names_floor_plan(const std::string& kind, Session& session) {
   return registry.has(FloorPlan::kKind, name) && !registry.has(Generator::kKind, name);
 }
 
+bool is_floor(const std::string& file, Session& session) {
+  try {
+    if (!names_floor(file, session)) return false;
+    read_grid(file, session.registry());
+    return true;
+  } catch (const Error&) {
+    return false;
+  }
+}
+
 Error no_graph_of_floor(const std::string& file) {
   return {ErrorCode::input, fmt::format("{0} is the map of a floor, which has no graph: cairn info "
                                         "{0} describes it, cairn explore {0} drives on it",

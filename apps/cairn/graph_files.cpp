@@ -47,9 +47,8 @@ LoadedGraph read_named_graph(const std::string& name, const InputOptions& option
     loaded.graph =
         read_graph(file, session.registry(), options.read, loaded.report, options.format);
   } catch (const Error& error) {
-    const bool is_floor = error.code() == ErrorCode::input && options.format.empty() &&
-                          std::filesystem::exists(file) && names_floor(name, session);
-    if (!is_floor) throw;
+    const bool may_be_floor = error.code() == ErrorCode::input && options.format.empty();
+    if (!may_be_floor || !is_floor(name, session)) throw;
     throw no_graph_of_floor(name);
   }
   return loaded;

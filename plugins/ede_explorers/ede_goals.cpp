@@ -46,7 +46,7 @@ Situation adapted(const Situation& situation, const RobotModel& robot, double bu
 
 RobotModel narrowed(const RobotModel& robot, const GridFrame& frame) {
   RobotModel result = robot;
-  result.radius = std::max(robot.radius - frame.resolution, 0.5 * robot.radius);
+  result.radius = narrow_radius(robot.radius, frame);
   return result;
 }
 

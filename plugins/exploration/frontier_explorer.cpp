@@ -20,7 +20,7 @@ std::string end_text(const FrontierGoals& goals, const RobotModel& robot, double
           ? fmt::format("a curve with a turning radius of {:g} m", robot.turning_radius)
           : "a path";
   return fmt::format(
-      "no frontier of {:g} m or more is left that can be reached; {} without {}, "
+      "no frontier of {:g} m or more is left that can be reached; {} without {} or tried in vain, "
       "the longest {:.1f} m",
       smallest, goals.unreachable(), path, goals.longest_unreachable());
 }
@@ -68,7 +68,7 @@ Decision FrontierExplorer::decide(const Situation& situation) {
   choose(situation, decision);
   const Candidate& chosen = decision.candidates[decision.chosen];
   goal_ = chosen.path.look_at;
-  goals_.chosen(chosen.path);
+  if (chose_frontier()) goals_.chosen(chosen.path);
   if (decision.why.empty())
     decision.why = fmt::format("to {}, {:.1f} m away, of {} of at least {:.2g} m", chosen.what,
                                chosen.path.length, frontiers, least);

@@ -46,6 +46,9 @@ class FrontierExplorer : public Explorer {
   /// is at least one. `decision.why` begins as empty; then it gets what was chosen.
   virtual void choose(const Situation& situation, Decision& decision) = 0;
 
+  /// Whether `choose` has chosen a frontier.
+  virtual bool chose_frontier() const { return true; }
+
   FrontierGoals& goals() { return goals_; }
 
  private:

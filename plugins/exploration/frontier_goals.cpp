@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <numbers>
 #include <utility>
 
@@ -22,11 +23,19 @@ constexpr double kStillThere = 0.5;
 /// After so many times in vain clearly more must be known around a frontier before it is tried
 /// again; before, anything has to change there.
 constexpr int kInVain = 2;
-/// A robot has come nearer to a goal if the path is shorter by this [m]; so often it may choose one
-/// without coming nearer, one behind a gap that may be too narrow once, since it touches walls
-/// there.
+/// A robot has come nearer to a goal if the path is shorter by this [m].
 constexpr double kNearer = 0.5;
-constexpr int kMostAttempts = 8, kMostNarrowAttempts = 1;
+/// A robot that is elsewhere by less [m], with another heading by more [rad], has only turned: the
+/// scan with which it turned may have closed the way, and another heading may open it.
+constexpr double kMoved = 0.05;
+constexpr int kTurned = 1, kDriven = 4;
+/// So often a goal may be chosen without coming nearer: eight times, and once through a gap that
+/// may be too narrow, since the robot touches walls there.
+constexpr int kMostWide = 8 * kDriven, kMostNarrow = kDriven;
+/// So many gaps in a row that have proved too narrow: then no more are tried.
+constexpr int kMostNarrowFailures = 2;
+/// A robot that has moved by this looks around anew [m].
+constexpr double kElsewhere = 0.5;
 /// Between the cells of a frontier that are tried as goals [m].
 constexpr double kSpacing = 0.5;
 
@@ -35,22 +44,27 @@ constexpr double kSpacing = 0.5;
 void FrontierGoals::begin() {
   given_up_.clear();
   attempted_.clear();
+  attempt_.reset();
+  narrow_failures_ = 0;
   looked_around_ = 0.0;
+  looked_at_.reset();
 }
 
 void FrontierGoals::start(const Situation& situation) {
   situation_ = &situation;
   narrow_radius_ = 0.0;
+  settle_attempt();
   planner_->start(situation.map, situation.pose.translation(), situation.robot.radius);
 }
 
 bool FrontierGoals::start_through_gaps() {
   const Situation& situation = *situation_;
-  if (situation.poses.empty()) return false;
-  const Pose2 first = Pose2::from_state(situation.estimator.state(situation.poses.front()));
-  if (planner_->path_to(first.translation(), kNearPose)) return false;
-  const double cell = situation.map.frame.resolution, radius = situation.robot.radius;
-  narrow_radius_ = std::max(radius - cell, 0.5 * radius);
+  if (narrow_failures_ >= kMostNarrowFailures) {
+    if (situation.poses.empty()) return false;
+    const Pose2 first = Pose2::from_state(situation.estimator.state(situation.poses.front()));
+    if (planner_->path_to(first.translation(), kNearPose)) return false;
+  }
+  narrow_radius_ = narrow_radius(situation.robot.radius, situation.map.frame);
   planner_->start(situation.map, situation.pose.translation(), narrow_radius_);
   return true;
 }
@@ -71,13 +85,17 @@ std::vector<Candidate> FrontierGoals::candidates(double least) {
       longest_unreachable_ = std::max(longest_unreachable_, frontier.length);
     }
   }
-  if (!found.empty()) looked_around_ = 0.0;
   return found;
 }
 
 std::optional<PlannedPath> FrontierGoals::look_around() {
   const RobotModel& robot = situation_->robot;
   if (unreachable_ == 0 || robot.motion == MotionModel::dubins) return std::nullopt;
+  const Vector2d here = situation_->pose.translation();
+  if (!looked_at_ || (here - *looked_at_).norm() > kElsewhere) {
+    looked_at_ = here;
+    looked_around_ = 0.0;
+  }
   if (looked_around_ >= 2.0 * std::numbers::pi) return std::nullopt;
   looked_around_ += robot.turn;
   PlannedPath path;
@@ -146,25 +164,42 @@ bool FrontierGoals::moves(const PlannedPath& path) const {
 void FrontierGoals::chosen(const PlannedPath& path) {
   const FloorMap& map = situation_->map;
   if (!path.look_at || !is_there(map, *path.look_at)) return;
+  attempt_ = Attempt{.goal = KnownSurroundings(map, *path.look_at),
+                     .length = path.length,
+                     .from = situation_->pose,
+                     .narrow = path.radius > 0.0};
+}
+
+/// What has come of the last attempt.
+void FrontierGoals::settle_attempt() {
+  const FloorMap& map = situation_->map;
   std::erase_if(attempted_, [&](const Attempted& other) { return other.goal.more_in(map); });
-  const auto known = std::ranges::find_if(attempted_, [&](const Attempted& other) {
-    return (other.goal.at() - *path.look_at).norm() < kStillThere;
+  const std::optional<Attempt> attempt = std::exchange(attempt_, std::nullopt);
+  if (!attempt) return;
+  const bool succeeded = attempt->goal.more_in(map);
+  const Pose2 motion = attempt->from.between(situation_->pose);
+  const bool turned = motion.translation().norm() < kMoved && std::abs(motion.theta()) > kMoved;
+  if (attempt->narrow && (succeeded || !turned))
+    narrow_failures_ = succeeded ? 0 : narrow_failures_ + 1;
+  if (succeeded) return;
+  auto known = std::ranges::find_if(attempted_, [&](const Attempted& other) {
+    return (other.goal.at() - attempt->goal.at()).norm() < kStillThere;
   });
   if (known == attempted_.end()) {
-    attempted_.push_back({KnownSurroundings(map, *path.look_at), path.length, 1});
-  } else if (path.length < known->length - kNearer) {
-    known->length = path.length;
-    known->times = 1;
-  } else {
-    ++known->times;
+    attempted_.push_back({attempt->goal, attempt->length});
+    known = std::prev(attempted_.end());
+  } else if (attempt->length < known->length - kNearer) {
+    *known = {attempt->goal, attempt->length};
   }
+  (attempt->narrow ? known->narrow : known->wide) += turned ? kTurned : kDriven;
 }
 
 bool FrontierGoals::comes_no_nearer(const Vector2d& goal, double length) const {
-  const int most = narrow_radius_ > 0.0 ? kMostNarrowAttempts : kMostAttempts;
   return std::ranges::any_of(attempted_, [&](const Attempted& other) {
-    return other.times >= most && length > other.length - kNearer &&
-           (other.goal.at() - goal).norm() < kStillThere && !other.goal.more_in(situation_->map);
+    const bool in_vain =
+        other.wide >= kMostWide || (narrow_radius_ > 0.0 && other.narrow >= kMostNarrow);
+    return in_vain && length >= other.length - kNearer &&
+           (other.goal.at() - goal).norm() < kStillThere;
   });
 }
 

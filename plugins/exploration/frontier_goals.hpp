@@ -25,8 +25,8 @@ class FrontierGoals {
   /// Looks at the frontiers of a situation, for those that follow.
   void start(const Situation& situation);
   /// From here on paths lead through gaps, too, that are a cell narrower on each side than the
-  /// body: on a map, whose cells are occupied as a whole, it may seem not to fit through a door
-  /// through which it has come. False: there is another way to the first pose, so that it has not.
+  /// body (`narrow_radius`). False: several of those paths have led nowhere in a row, and there is
+  /// another way to the first pose, so that the robot is not shut in.
   bool start_through_gaps();
   /// Paths to the frontiers of at least this length [m].
   std::vector<Candidate> candidates(double least);
@@ -34,8 +34,9 @@ class FrontierGoals {
   /// no path, or it is there already.
   std::optional<PlannedPath> path_to(const Pose2& pose);
 
-  /// The robot drives along a path of `candidates`. A frontier to which it drives again and again
-  /// without coming nearer, since it is stopped on the way, is given up as well.
+  /// The robot drives along one of the `candidates`. A frontier to which it drives again and again
+  /// without coming nearer, since it is stopped on the way, is given up as well: one behind a
+  /// narrow gap at once.
   void chosen(const PlannedPath& path);
 
   /// Where none of the frontiers that the last `candidates` has seen has a path: a turn of one
@@ -55,13 +56,22 @@ class FrontierGoals {
     KnownSurroundings goal;
     int times;  ///< that it was reached in vain
   };
-  /// A goal to which the robot drives without coming nearer.
+  /// A goal to which the robot has driven, and how often without coming nearer.
   struct Attempted {
     KnownSurroundings goal;
     double length;  ///< of the shortest path to it so far [m]
-    int times;      ///< that it was chosen without a shorter one
+    /// Weights of the attempts, along ordinary paths and through gaps (`settle_attempt`).
+    int wide = 0, narrow = 0;
+  };
+  /// What was chosen last.
+  struct Attempt {
+    KnownSurroundings goal;
+    double length;  ///< of the path [m]
+    Pose2 from;
+    bool narrow;
   };
 
+  void settle_attempt();
   std::optional<PlannedPath> path_to(const Frontier& frontier);
   std::optional<PlannedPath> path_to(const Eigen::Vector2d& goal);
   void give_up(const Eigen::Vector2d& goal);
@@ -75,10 +85,13 @@ class FrontierGoals {
   const Situation* situation_ = nullptr;
   std::vector<GivenUp> given_up_;
   std::vector<Attempted> attempted_;
+  std::optional<Attempt> attempt_;
+  int narrow_failures_ = 0;  // in a row
   std::size_t unreachable_ = 0;
   double longest_unreachable_ = 0.0;
-  double looked_around_ = 0.0;  // since there was a path [rad]
-  double narrow_radius_ = 0.0;  // of the body that paths are for [m]; 0: the robot's
+  double looked_around_ = 0.0;                // at one place [rad]
+  std::optional<Eigen::Vector2d> looked_at_;  // that place [m]
+  double narrow_radius_ = 0.0;                // of the body that paths are for [m]; 0: the robot's
 };
 
 }  // namespace cairn::exploration

@@ -47,6 +47,7 @@ class Heuristic final : public FrontierExplorer {
 
  private:
   void choose(const Situation& situation, Decision& decision) override;
+  bool chose_frontier() const override { return !revisits_now_; }
   std::optional<Candidate> revisit(const Situation& situation);
   std::optional<Candidate> home(const Situation& situation);
 

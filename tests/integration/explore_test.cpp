@@ -387,9 +387,11 @@ TEST_F(Explore, NarrowDoorsAndPocketsAreNoted) {
 
 TEST_F(Explore, SaysWhereHardlyAnyScansMatch) {
   const auto said = [&](const char* registration) {
-    return cairn({"explore", "@rooms:width=12,height=9", "--registration", registration, "--lidar",
-                  "range_sigma=0.3", "--until", "distance=20", "--seed", "1"})
-        .err;
+    const Outcome run =
+        cairn({"explore", "@rooms:width=12,height=9", "--registration", registration, "--lidar",
+               "range_sigma=0.3", "--until", "distance=20", "--seed", "1"});
+    EXPECT_EQ(run.exit_code, 0) << run.err;
+    return unfolded(run.err);
   };
   EXPECT_THAT(said("icp"), HasSubstr("the map rests mostly on odometry"));
   EXPECT_THAT(said(kTrueMatcher), Not(HasSubstr("rests mostly on odometry")));

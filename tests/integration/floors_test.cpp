@@ -8,6 +8,7 @@
 namespace cairn::test {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::Not;
 using ::testing::StartsWith;
@@ -61,8 +62,14 @@ TEST_F(Floors, WhereAGraphIsExpectedWhatAMapIsForIsSaid) {
     EXPECT_THAT(refused.err, HasSubstr("cairn explore")) << command;
   }
   EXPECT_THAT(cairn({"optimize", floor_, "--from", "g2o"}).err, HasSubstr("unknown tag"));
-  const std::string other = folder_.file("none.yaml");
-  EXPECT_THAT(cairn({"optimize", other}).err, Not(HasSubstr("cairn explore")));
+  // By its name alone it is none.
+  const std::string other = folder_.file("other.yaml");
+  for (const bool is_there : {false, true}) {
+    if (is_there) write_text(other, "a: 1\n");
+    const Outcome refused = cairn({"optimize", other});
+    EXPECT_EQ(refused.exit_code, 3);
+    EXPECT_THAT(refused.err, AllOf(HasSubstr(other), Not(HasSubstr("cairn explore"))));
+  }
 }
 
 TEST_F(Floors, WhatIsNoMapsNameIsRefusedBeforeTheWork) {

@@ -33,11 +33,13 @@ const char* kind_of(ErrorCode code) {
   return "plugin";
 }
 
-/// "ReadOptions::skip_unknown" in a message is the keyword argument skip_unknown in Python.
+/// "ReadOptions::skip_unknown" in a message is the keyword argument skip_unknown in Python. (For
+/// the program, option_words.cpp has the same.)
 std::string in_words_of_python(std::string message) {
-  constexpr std::string_view kPrefix = "ReadOptions::";
-  for (std::size_t at = 0; (at = message.find(kPrefix, at)) != std::string::npos;)
-    message.erase(at, kPrefix.size());
+  for (const std::string_view prefix : {"ReadOptions::", "StampMatching::"}) {
+    for (std::size_t at = 0; (at = message.find(prefix, at)) != std::string::npos;)
+      message.erase(at, prefix.size());
+  }
   return message;
 }
 

@@ -323,7 +323,7 @@ class CurveSearch {
     std::vector<std::size_t> chain{last};
     while (chain.back() != 0) chain.push_back(nodes_[chain.back()].parent);
     std::ranges::reverse(chain);
-    PlannedPath result{.points = {}, .look_at = path_.look_at};
+    PlannedPath result{.points = {}, .look_at = path_.look_at, .radius = path_.radius};
     result.points.push_back(nodes_.front().at.translation());
     for (std::size_t k = 0; k + 1 < chain.size();) k = append_shortcut(chain, k, result);
     append(nodes_[last].at, to_goal, result);

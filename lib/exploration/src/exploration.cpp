@@ -30,7 +30,7 @@ constexpr double kNoMotion = 0.005;  // [m], [rad]
 constexpr int kMostEmptyDecisions = 3;
 /// Collisions without a free motion in between.
 constexpr int kMostCollisions = 10;
-/// The known floor must grow by this part, on a large floor by this area [m²], to be progress: a
+/// The known floor must grow by this part, or by this area [m²] if that is less, to be progress: a
 /// map that is made anew, blurred a little more or less, is none.
 constexpr double kProgress = 0.002, kProgressArea = 0.1;
 /// Of the way of one decision this part of `idle_distance` counts at most: on a large floor the way
@@ -229,8 +229,8 @@ class Run {
   void check_progress() {
     const ExplorationLimits& limits = parts_.limits;
     if (idle_distance_ + idle_way() > limits.idle_distance) {
-      end(ExplorationEnd::stuck,
-          fmt::format("{:g} m were driven without finding more floor", limits.idle_distance));
+      end(ExplorationEnd::stuck, fmt::format("{:.0f} m were driven without finding more floor",
+                                             result_.steps.back().distance - useful_distance_));
     } else if (collisions_in_row_ >= kMostCollisions) {
       end(ExplorationEnd::stuck, fmt::format("{} collisions in a row", kMostCollisions));
     } else if (idle_ >= kMostIdle) {
@@ -388,7 +388,7 @@ class Run {
     const double least = std::min(kProgress * most_coverage_, kProgressArea);
     if (step.coverage <= most_coverage_ + least) return;
     idle_distance_ = 0.0;
-    way_begin_ = step.distance;
+    way_begin_ = useful_distance_ = step.distance;
     most_coverage_ = step.coverage;
   }
 
@@ -453,8 +453,8 @@ class Run {
   int not_driven_ = 0;       // paths
   int decisions_ = 0, empty_decisions_ = 0, idle_ = 0, collisions_in_row_ = 0;
   double most_coverage_ = 0.0;
-  double idle_distance_ = 0.0,
-         way_begin_ = 0.0;  // without progress; where the newest way began [m]
+  // What counts as driven without progress; where the newest way began, and progress ended [m].
+  double idle_distance_ = 0.0, way_begin_ = 0.0, useful_distance_ = 0.0;
 };
 
 }  // namespace

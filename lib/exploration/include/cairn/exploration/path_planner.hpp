@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <cstddef>
 #include <optional>
@@ -22,8 +23,7 @@ struct PlannedPath {
   std::vector<Eigen::Vector2d> points;          ///< of a polyline, from where the robot is [m]
   double length = 0.0;                          ///< [m]
   std::optional<Eigen::Vector2d> look_at = {};  ///< towards which the robot turns at its end [m]
-  /// Of the body that it was planned for, where gaps may be narrower than the robot's; 0: as that
-  /// [m].
+  /// Radius of the body for which it was planned [m]; 0: the robot's.
   double radius = 0.0;
 };
 
@@ -31,6 +31,13 @@ struct PlannedPath {
 /// half a cell [m], compared with `FloorMap::clearance`.
 inline double needed_clearance(double radius, const GridFrame& frame) {
   return radius + 0.5 * frame.resolution;
+}
+
+/// Radius of a body that is a cell narrower on each side, at least half as wide [m]. On a map,
+/// whose cells are occupied as a whole, a robot may seem not to fit through a door that is wide
+/// enough.
+inline double narrow_radius(double radius, const GridFrame& frame) {
+  return std::max(radius - frame.resolution, 0.5 * radius);
 }
 
 /// Finds paths for a robot with a round body.
