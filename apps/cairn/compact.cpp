@@ -401,10 +401,16 @@ int run_compact(const CompactOptions& options, Session& session) {
   for (const std::string& doubt : reasons_for_doubt(shown.compact, chi2(shown.compact)))
     session.note(doubt);
   if (!shown.located) {
+    const auto waiting = shown.verdicts.find("waiting");
+    const bool wait = waiting != shown.verdicts.end() && waiting->second > 0;
     session.note(fmt::format(
-        "no pose was matched with one of {}: the map and the trajectory are not connected, and "
-        "their relative position is unknown",
-        options.map));
+        "no pose was {} with one of {}: the map and the trajectory are not connected, and "
+        "their relative position is unknown{}",
+        wait ? "matched for certain" : "matched", options.map,
+        wait ? fmt::format("; matches that wait for another which agrees: {} (--policy "
+                           "compact_pose:trust=1 uses each that is consistent by itself)",
+                           waiting->second)
+             : ""));
     return static_cast<int>(ErrorCode::numerical);
   }
   if (shown.converged) return 0;

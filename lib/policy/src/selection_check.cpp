@@ -71,6 +71,7 @@ void SelectionCheck::add(const PoseReport& pose) {
     ++proposed_;
     matched_ += link.verdict != LinkVerdict::unmatched;
     inconsistent_ += link.verdict == LinkVerdict::inconsistent;
+    waiting_ += link.verdict == LinkVerdict::waiting;
     if (link.verdict == LinkVerdict::uninformative) {
       ++uninformative_;
       most_uninformative_ = std::max(most_uninformative_, link.gain);
@@ -179,6 +180,14 @@ std::optional<SelectionCheck::Advice> SelectionCheck::no_loops(
                                       candidates_, nats(most_gain_)),
                   {{"loop_gain", nats(kBelow * most_gain_)}},
                   "asks for the best of them"};
+  }
+  // Of those that wait the oldest are given up as inconsistent, which they are not.
+  if (waiting_ > uninformative_ && waiting_ >= inconsistent_) {
+    return Advice{begin + fmt::format("{} matches wait for another that agrees with them, since a "
+                                      "false one would be as consistent with the estimate",
+                                      waiting_),
+                  {{"trust", "1"}},
+                  "uses each that is consistent by itself"};
   }
   if (inconsistent_ > uninformative_) {
     return Advice{begin + fmt::format("{} of {} matches contradict the estimate: either they are "

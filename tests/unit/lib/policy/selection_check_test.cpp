@@ -138,6 +138,16 @@ TEST_F(SelectionChecks, MatchesThatContradictTheEstimateAreNamed) {
   EXPECT_GT(follow({{"gate", "0.99"}}, none.advice[0]).links, 0U);
 }
 
+TEST_F(SelectionChecks, MatchesThatNoOtherCanConfirmAreNamed) {
+  const OptionValues doubtful{{"gate", "0.99"}, {"trust", "1e-9"}};
+  const Outcome none = run(doubtful);
+  EXPECT_EQ(none.links, 0U);
+  ASSERT_THAT(none.advice, SizeIs(1));
+  EXPECT_THAT(none.advice[0].finding, HasSubstr("wait for another that agrees"));
+  EXPECT_THAT(none.advice[0].options, ElementsAre(Pair("trust", "1")));
+  EXPECT_GT(follow(doubtful, none.advice[0]).links, 0U);
+}
+
 /// By hand
 /// -----------------------------------------------------------------------------------------
 

@@ -33,8 +33,8 @@ class CAIRN_API SelectionCheck {
   /// to reach its tolerance, poses that stay since they close a loop or measure a landmark, steps
   /// longer than the sensor's range, and steps of odometry whose information gain exceeds the
   /// threshold of poses. Of loop closures: no pose within range of another, information gains below
-  /// the threshold before or after the match, pairs that do not match, and matches that contradict
-  /// the estimate.
+  /// the threshold before or after the match, pairs that do not match, matches that contradict the
+  /// estimate, and matches that wait for another which agrees.
   ///
   /// `found` are the thresholds that were found for the run, if they were; `loops` is how many loop
   /// closures a recording has, if it is one. Nothing where the selection is as it should be, or of
@@ -56,7 +56,7 @@ class CAIRN_API SelectionCheck {
   std::int64_t candidates_ = 0;     ///< besides the pose before
   double most_gain_ = 0.0;          ///< expected of a pair that was not proposed [nats]
   std::int64_t proposed_ = 0, matched_ = 0, linked_ = 0;
-  std::int64_t uninformative_ = 0, inconsistent_ = 0;
+  std::int64_t uninformative_ = 0, inconsistent_ = 0, waiting_ = 0;
   double most_uninformative_ = 0.0;  ///< [nats]
   double gain_of_links_ = 0.0;       ///< sum over those linked, where finite [nats]
   std::int64_t gains_of_links_ = 0;
