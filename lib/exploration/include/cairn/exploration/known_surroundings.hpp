@@ -10,8 +10,8 @@
 
 namespace cairn {
 
-/// How much of the map is known around a place, within 1 m of it along each axis, at some time: from
-/// that an explorer can see whether it is worth going there again after it has looked in vain.
+/// How much of the map is known around a place, within 1 m of it along each axis, at some time:
+/// from that an explorer can see whether it is worth going there again after it has looked in vain.
 class CAIRN_API KnownSurroundings {
  public:
   /// `at`: in the frame of the map [m].
