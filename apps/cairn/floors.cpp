@@ -202,20 +202,22 @@ bool names_floor_plan(const std::string& kind, Session& session) {
   return registry.has(FloorPlan::kKind, name) && !registry.has(Generator::kKind, name);
 }
 
-bool is_floor(const std::string& file, Session& session) {
+Error no_graph(const std::string& file, const Error& refusal, Session& session) {
   try {
-    if (!names_floor(file, session)) return false;
-    read_grid(file, session.registry());
-    return true;
-  } catch (const Error&) {
-    return false;
+    if (!std::filesystem::is_regular_file(file) || !names_floor(file, session)) return refusal;
+  } catch (const Error&) {  // of a plugin that is broken
+    return refusal;
   }
-}
-
-Error no_graph_of_floor(const std::string& file) {
-  return {ErrorCode::input, fmt::format("{0} is the map of a floor, which has no graph: cairn info "
-                                        "{0} describes it, cairn explore {0} drives on it",
-                                        file)};
+  const std::string remedy = fmt::format(
+      "the map of a floor, which has no graph: cairn info {0} describes it, cairn explore {0} "
+      "drives on it",
+      file);
+  try {
+    read_grid(file, session.registry());
+    return {ErrorCode::input, fmt::format("{} is {}", file, remedy)};
+  } catch (const Error&) {
+    return {ErrorCode::input, fmt::format("{}. If it is {}", refusal.what(), remedy)};
+  }
 }
 
 bool names_floor(const std::string& name, Session& session) {

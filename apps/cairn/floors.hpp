@@ -21,10 +21,8 @@ namespace cairn::app {
 /// of graphs, or @KIND of a floor plan.
 bool names_floor(const std::string& name, Session& session);
 
-/// Whether a file is the map of a floor, by its name and by what is in it.
-bool is_floor(const std::string& file, Session& session);
-/// What to throw (input) where a graph is expected and a file is the map of a floor.
-Error no_graph_of_floor(const std::string& file);
+/// What to throw (input) where a file was refused as a graph: it may be the map of a floor.
+Error no_graph(const std::string& file, const Error& refusal, Session& session);
 
 /// A floor from a file or, as "@rooms:seed=3", generated.
 OccupancyGrid load_floor(const std::string& name, Session& session);

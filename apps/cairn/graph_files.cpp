@@ -47,9 +47,8 @@ LoadedGraph read_named_graph(const std::string& name, const InputOptions& option
     loaded.graph =
         read_graph(file, session.registry(), options.read, loaded.report, options.format);
   } catch (const Error& error) {
-    const bool may_be_floor = error.code() == ErrorCode::input && options.format.empty();
-    if (!may_be_floor || !is_floor(name, session)) throw;
-    throw no_graph_of_floor(name);
+    if (error.code() != ErrorCode::input || !options.format.empty()) throw;
+    throw no_graph(name, error, session);
   }
   return loaded;
 }
