@@ -6,6 +6,7 @@ import json
 import math
 import os
 import signal
+import subprocess
 import sys
 import tempfile
 import unittest
@@ -33,6 +34,19 @@ class ProcessesTest(unittest.TestCase):
         outcome = self.python("import sys; print('out'); print('first\\nlast', file=sys.stderr); sys.exit(3)")
         self.assertEqual((outcome.output, outcome.complaint, outcome.exit_code), ("out\n", "last", 3))
         self.assertTrue(outcome.in_time)
+
+    def test_two_measurements_in_one_folder_do_not_mix(self):
+        program = ("import sys; from pathlib import Path; from bench.processes import run_program; "
+                   "print(run_program([sys.executable, '-c', 'import time; print(1, flush=True); time.sleep(2)'], "
+                   "Path(sys.argv[1])).output, end='')")
+        with subprocess.Popen([sys.executable, "-c", program, str(self.work)], stdout=subprocess.PIPE, text=True,
+                              env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}) as other:
+            outputs = []
+            while other.poll() is None:
+                outputs.append(self.python("print('another')").output)
+            self.assertEqual(other.stdout.read(), "1\n")
+        self.assertEqual(set(outputs), {"another\n"})
+        self.assertEqual(list(self.work.iterdir()), [])
 
     def test_the_peak_of_memory_is_that_of_the_child(self):
         self.assertGreater(self.python("bytearray(b'x') * 300_000_000").peak_memory, 3e8)

@@ -52,7 +52,8 @@ def run_program(words: list[str], work: Path, limit: float = 0.0) -> Outcome:
     later it is killed. Raises OSError if it cannot be started.
     """
     work.mkdir(parents=True, exist_ok=True)
-    out, error = work / "child.out", work / "child.err"
+    # Another measurement may use the same folder at the same time.
+    out, error = work / f"child.{os.getpid()}.out", work / f"child.{os.getpid()}.err"
     write = os.O_WRONLY | os.O_CREAT | os.O_TRUNC
     begin = time.monotonic()
     files = [(os.POSIX_SPAWN_OPEN, 0, "/dev/null", os.O_RDONLY, 0),
@@ -71,7 +72,10 @@ def run_program(words: list[str], work: Path, limit: float = 0.0) -> Outcome:
         ended = _wait(child, None)
     assert ended is not None
     status, usage = ended
-    lines = error.read_text(encoding="utf-8", errors="replace").rstrip("\n").split("\n")
-    return Outcome(in_time=in_time, exit_code=os.waitstatus_to_exitcode(status), seconds=time.monotonic() - begin,
-                   peak_memory=1024.0 * usage.ru_maxrss, output=out.read_text(encoding="utf-8", errors="replace"),
-                   complaint=lines[-1], processor=usage.ru_utime + usage.ru_stime)
+    seconds = time.monotonic() - begin
+    said, complaints = (file.read_text(encoding="utf-8", errors="replace") for file in (out, error))
+    for file in (out, error):
+        file.unlink()
+    return Outcome(in_time=in_time, exit_code=os.waitstatus_to_exitcode(status), seconds=seconds,
+                   peak_memory=1024.0 * usage.ru_maxrss, output=said, complaint=complaints.rstrip("\n").split("\n")[-1],
+                   processor=usage.ru_utime + usage.ru_stime)
