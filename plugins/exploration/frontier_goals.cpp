@@ -33,7 +33,7 @@ constexpr int kTurned = 1, kDriven = 4;
 /// may be too narrow, since the robot touches walls there.
 constexpr int kMostWide = 8 * kDriven, kMostNarrow = kDriven;
 /// So many gaps in a row that have proved too narrow: then no more are tried.
-constexpr int kMostNarrowFailures = 2;
+constexpr int kMostNarrowFailures = 6;
 /// A robot that has moved by this looks around anew [m].
 constexpr double kElsewhere = 0.5;
 /// Between the cells of a frontier that are tried as goals [m].

@@ -13,6 +13,8 @@ constexpr double kRemembered = 50.0;
 constexpr int kObstacle = 2;  ///< times that it was touched
 /// Contacts as near to each other as the body is wide are one, but at least, and at most [m].
 constexpr double kSamePlace = 0.1, kSamePlaceAtMost = 0.5;
+/// Points as near to each other of what is seen are one [m].
+constexpr double kSeenApart = 0.05;
 /// Beyond the radius: clearances are left as they are where no planner keeps so far away [m].
 constexpr double kReach = 2.0;
 
@@ -45,6 +47,14 @@ void Contacts::add(const Vector2d& at, const Vector2d& direction, double driven)
   } else {
     contacts_.push_back({point, driven, 1});
   }
+}
+
+bool Contacts::see(const Vector2d& point, double driven) {
+  const bool known = std::ranges::any_of(contacts_, [&](const Contact& contact) {
+    return contact.times >= kObstacle && (contact.point - point).norm() < kSeenApart;
+  });
+  if (!known) contacts_.push_back({point, driven, kObstacle});
+  return !known;
 }
 
 const FloorMap& Contacts::seen_by(const FloorMap& map, double driven) {

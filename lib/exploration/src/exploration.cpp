@@ -13,8 +13,10 @@
 
 #include "cairn/evaluation/trajectory.hpp"
 #include "cairn/exploration/contacts.hpp"
+#include "cairn/exploration/discovered_floor.hpp"
 #include "cairn/exploration/exploration_measures.hpp"
 #include "cairn/exploration/recorded_world.hpp"
+#include "cairn/exploration/scan_clearance.hpp"
 #include "cairn/exploration/scan_slam.hpp"
 #include "cairn/grid/cell_traversal.hpp"
 #include "cairn/runtime/plugin_call.hpp"
@@ -28,11 +30,10 @@ namespace {
 constexpr int kMostIdle = 20;
 constexpr double kNoMotion = 0.005;  // [m], [rad]
 constexpr int kMostEmptyDecisions = 3;
+/// Along one path, to pass by what would be touched.
+constexpr int kMostSidesteps = 10;
 /// Collisions without a free motion in between.
 constexpr int kMostCollisions = 10;
-/// The known floor must grow by this part, or by this area [m²] if that is less, to be progress: a
-/// map that is made anew, blurred a little more or less, is none.
-constexpr double kProgress = 0.002, kProgressArea = 0.1;
 /// Of the way of one decision this part of `idle_distance` counts at most: on a large floor the way
 /// to the next frontier alone may be longer than that.
 constexpr double kMostOfOneWay = 0.2;
@@ -127,9 +128,15 @@ class Run {
     slam_.begin(start, std::move(scan), robot_.odometry, Pose2(robot_.step, 0.0, 0.0), truth);
     parts_.explorer.begin(parts_.start.seed);
     record(0.0);
-    if (!recorded_ && slam_.map().known_cells() == 0) {
+    if (recorded_) return;
+    const FloorMap& map = slam_.map();
+    if (map.known_cells() == 0) {
       end(ExplorationEnd::stuck,
           "no beam of the first scan has measured anything, so that no floor is known");
+    } else if (std::ranges::find(map.cells, CellState::free) == map.cells.end()) {
+      end(ExplorationEnd::stuck,
+          "the map of the first scan has no free floor: one scan has to be evidence enough (mapper "
+          "log_odds: a larger `miss`, or `free` nearer to 0.5)");
     }
   }
 
@@ -319,13 +326,35 @@ class Run {
   void drive(const PlannedPath& path) {
     std::size_t passed = 0;
     bool moved = false;
+    int sidesteps = 0;
     while (check_limits()) {
-      const std::optional<Pose2> motion = next_motion(slam_.pose(), path, robot_, passed);
+      std::optional<Pose2> motion = next_motion(slam_.pose(), path, robot_, passed);
       if (!motion) break;
+      if (const std::optional<bool> is_new = foreseen_obstacle(*motion)) {
+        moved = moved || *is_new;  // with it the next decision is another
+        // Other paths avoid what is known. Through a gap that may be too narrow they lead along the
+        // middles of cells, and the robot may pass nearer to the middle of the gap.
+        if (!*is_new && path.radius > 0.0 && sidesteps++ < kMostSidesteps)
+          motion = motion_beside(slam_.scans().back(), *motion, robot_);
+        else if (*is_new || path.radius > 0.0)
+          break;
+        if (!motion) break;
+      }
       moved = true;
       if (!move(*motion) || !goes_on(path, passed)) break;
     }
     empty_decisions_ = moved ? 0 : empty_decisions_ + 1;
+  }
+
+  /// What the newest scan shows that a motion would touch is an obstacle to paths from here on.
+  /// Returns whether it was none before; none: the way is clear.
+  std::optional<bool> foreseen_obstacle(const Pose2& motion) {
+    const auto points = touched_points(slam_.scans().back(), motion, robot_);
+    if (points.empty()) return std::nullopt;
+    bool is_new = false;
+    for (const Eigen::Vector2d& point : points)
+      is_new |= contacts_.see(slam_.pose() * point, result_.steps.back().distance);
+    return is_new;
   }
 
   /// Whether the rest of a path can be driven, and is worth it.
@@ -385,11 +414,9 @@ class Run {
   }
 
   void watch_progress(const ExplorationStep& step) {
-    const double least = std::min(kProgress * most_coverage_, kProgressArea);
-    if (step.coverage <= most_coverage_ + least) return;
+    if (!discovered_.grows(slam_.map())) return;
     idle_distance_ = 0.0;
     way_begin_ = useful_distance_ = step.distance;
-    most_coverage_ = step.coverage;
   }
 
   // The end ---------------------------------------------------------------------------------------
@@ -452,7 +479,7 @@ class Run {
   double next_doubt_ = 0.0;  // of contacts, so as to go on, no earlier [m driven]
   int not_driven_ = 0;       // paths
   int decisions_ = 0, empty_decisions_ = 0, idle_ = 0, collisions_in_row_ = 0;
-  double most_coverage_ = 0.0;
+  DiscoveredFloor discovered_;
   // What counts as driven without progress; where the newest way began, and progress ended [m].
   double idle_distance_ = 0.0, way_begin_ = 0.0, useful_distance_ = 0.0;
 };

@@ -52,6 +52,19 @@ TEST(Contacts, OneIsNoObstacleTwoAtAPlaceAre) {
   EXPECT_LT(nearer, 30);  // a body's width or so
 }
 
+TEST(Contacts, WhatIsSeenIsAnObstacleAtOnceAndNewButOnce) {
+  const FloorMap map = room();
+  Contacts contacts(kRadius);
+  const Vector2d point(2.05, 2.05);
+  EXPECT_TRUE(contacts.see(point, 1.0));
+  const FloorMap& seen = contacts.seen_by(map, 1.0);
+  EXPECT_NEAR(seen.clearance[map.frame.index(22, 20)], 0.2, 1e-6);
+  EXPECT_FALSE(contacts.see(point + Vector2d(0.03, 0.0), 2.0));
+  EXPECT_TRUE(contacts.see(point + Vector2d(0.08, 0.0), 2.0));
+  EXPECT_TRUE(contacts.doubt());
+  EXPECT_TRUE(contacts.see(point, 3.0)) << "it was doubted";
+}
+
 TEST(Contacts, AreForgottenAfterAWay) {
   const FloorMap map = room();
   Contacts contacts(kRadius);

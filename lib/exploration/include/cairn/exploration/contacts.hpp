@@ -20,6 +20,9 @@ class CAIRN_API Contacts {
   /// `direction` (of any length but 0): it is taken to be straight ahead, which is no more than
   /// likely.
   void add(const Eigen::Vector2d& at, const Eigen::Vector2d& direction, double driven);
+  /// The surface of an obstacle has been seen at a point [m], after so many metres were `driven`:
+  /// it is one at once. False: it was one already.
+  bool see(const Eigen::Vector2d& point, double driven);
   /// The map, with clearance and caution no larger than the distance to what was touched twice;
   /// good until the next call, and as long as `map`.
   const FloorMap& seen_by(const FloorMap& map, double driven);

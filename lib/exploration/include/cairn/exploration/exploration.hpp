@@ -31,8 +31,8 @@ struct ExplorationLimits {
   double distance = std::numeric_limits<double>::infinity();  ///< driven [m]
   int steps = std::numeric_limits<int>::max();                ///< motions
   int decisions = std::numeric_limits<int>::max();
-  /// Driven without the known floor growing, by 0.2 % or 0.1 m², whichever is less [m]: then it
-  /// is stuck. Of the way of each decision a fifth of this counts at most.
+  /// Driven without a discovery (`DiscoveredFloor`) [m]: then it is stuck. Of the way of each
+  /// decision a fifth of this counts at most.
   double idle_distance = 50.0;
 };
 

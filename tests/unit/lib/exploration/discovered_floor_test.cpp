@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "cairn/exploration/discovered_floor.hpp"
+
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "unit/lib/exploration/drawn_map.hpp"
+
+namespace cairn {
+namespace {
+
+/// A map of 12 × 12 cells of 0.1 m, known in its first columns.
+FloorMap known_columns(int count, int first_column = 0) {
+  std::vector<std::string> rows(12, std::string(12, ' '));
+  for (std::string& row : rows) {
+    for (int x = 0; x < count; ++x) row[static_cast<std::size_t>(x)] = x % 2 == 0 ? '.' : '#';
+  }
+  FloorMap map = test::drawn_map(rows, 0.1);
+  map.frame.origin.x() = 0.1 * first_column;
+  return map;
+}
+
+TEST(DiscoveredFloor, GrowsByHalfASquare) {
+  DiscoveredFloor floor;
+  EXPECT_FALSE(floor.grows(known_columns(0)));
+  EXPECT_TRUE(floor.grows(known_columns(3)));
+  EXPECT_FALSE(floor.grows(known_columns(3)));
+  EXPECT_FALSE(floor.grows(known_columns(4))) << "a third of the next squares";
+  EXPECT_TRUE(floor.grows(known_columns(5))) << "two thirds";
+}
+
+TEST(DiscoveredFloor, WhatAMapLosesAndFindsAgainIsNoDiscovery) {
+  DiscoveredFloor floor;
+  EXPECT_TRUE(floor.grows(known_columns(9)));
+  EXPECT_FALSE(floor.grows(known_columns(3)));
+  EXPECT_FALSE(floor.grows(known_columns(9)));
+  floor.forget();
+  EXPECT_TRUE(floor.grows(known_columns(9)));
+}
+
+TEST(DiscoveredFloor, SquaresStayWhereTheyAreAsTheGridGrows) {
+  DiscoveredFloor floor;
+  EXPECT_TRUE(floor.grows(known_columns(6)));
+  // The same columns, on a grid that begins three cells farther to the left.
+  std::vector<std::string> rows(12, "   ......      ");
+  FloorMap grown = test::drawn_map(rows, 0.1);
+  grown.frame.origin.x() = -0.3;
+  EXPECT_FALSE(floor.grows(grown));
+  EXPECT_TRUE(floor.grows(known_columns(3, -3))) << "to the left of it";
+}
+
+}  // namespace
+}  // namespace cairn
