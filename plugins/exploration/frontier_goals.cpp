@@ -26,9 +26,10 @@ constexpr int kInVain = 2;
 /// A robot has come nearer to a goal if the path is shorter by this [m].
 constexpr double kNearer = 0.5;
 /// A robot that is elsewhere by less [m], with another heading by more [rad], has only turned: the
-/// scan with which it turned may have closed the way, and another heading may open it.
+/// scan with which it turned may have closed the way, and another heading may open it. And one that
+/// has not set out through a gap has seen something in its way, which the next path avoids.
 constexpr double kMoved = 0.05;
-constexpr int kTurned = 1, kDriven = 4;
+constexpr int kStayed = 1, kDriven = 4;
 /// So often a goal may be chosen without coming nearer: eight times, and once through a gap that
 /// may be too narrow, since the robot touches walls there.
 constexpr int kMostWide = 8 * kDriven, kMostNarrow = kDriven;
@@ -177,11 +178,13 @@ void FrontierGoals::settle_attempt() {
   const std::optional<Attempt> attempt = std::exchange(attempt_, std::nullopt);
   if (!attempt) return;
   const bool succeeded = attempt->goal.more_in(map);
+  if (succeeded) {
+    if (attempt->narrow) narrow_failures_ = 0;
+    return;
+  }
   const Pose2 motion = attempt->from.between(situation_->pose);
-  const bool turned = motion.translation().norm() < kMoved && std::abs(motion.theta()) > kMoved;
-  if (attempt->narrow && (succeeded || !turned))
-    narrow_failures_ = succeeded ? 0 : narrow_failures_ + 1;
-  if (succeeded) return;
+  const bool stayed = motion.translation().norm() < kMoved &&
+                      (attempt->narrow || std::abs(motion.theta()) > kMoved);
   auto known = std::ranges::find_if(attempted_, [&](const Attempted& other) {
     return (other.goal.at() - attempt->goal.at()).norm() < kStillThere;
   });
@@ -191,7 +194,8 @@ void FrontierGoals::settle_attempt() {
   } else if (attempt->length < known->length - kNearer) {
     *known = {attempt->goal, attempt->length};
   }
-  (attempt->narrow ? known->narrow : known->wide) += turned ? kTurned : kDriven;
+  (attempt->narrow ? known->narrow : known->wide) += stayed ? kStayed : kDriven;
+  if (attempt->narrow && known->narrow >= kMostNarrow) ++narrow_failures_;
 }
 
 bool FrontierGoals::comes_no_nearer(const Vector2d& goal, double length) const {

@@ -23,7 +23,7 @@ using Eigen::Vector2i;
 
 struct LogOddsOptions {
   double resolution = 0.1;
-  double hit = 1.4, miss = 0.7, limit = 4.2;
+  double hit = 1.2, miss = 0.7, limit = 4.2;
   double free = 0.35, occupied = 0.65, tolerance = 0.25;
   double part_filled = 0.1, newest = 1.5;
   bool smooth = true;

@@ -2,6 +2,8 @@
 #include "cairn/exploration/contacts.hpp"
 
 #include <algorithm>
+#include <limits>
+#include <utility>
 
 namespace cairn {
 namespace {
@@ -40,21 +42,29 @@ void limit(const GridFrame& frame, const Vector2d& point, double reach,
 void Contacts::add(const Vector2d& at, const Vector2d& direction, double driven) {
   const Vector2d point = at + radius_ * direction.normalized();
   const auto apart = [&](const Contact& contact) { return (contact.point - point).norm(); };
-  const auto nearest = std::ranges::min_element(contacts_, {}, apart);
+  // What was seen is where it is, which is more than likely.
+  const auto guessed = [&](const Contact& contact) {
+    return contact.seen ? std::numeric_limits<double>::infinity() : apart(contact);
+  };
+  const auto nearest = std::ranges::min_element(contacts_, {}, guessed);
   if (nearest != contacts_.end() &&
-      apart(*nearest) <= std::clamp(radius_, kSamePlace, kSamePlaceAtMost)) {
-    *nearest = {point, driven, nearest->times + 1};
+      guessed(*nearest) <= std::clamp(radius_, kSamePlace, kSamePlaceAtMost)) {
+    *nearest = {point, driven, nearest->times + 1, false};
   } else {
-    contacts_.push_back({point, driven, 1});
+    contacts_.push_back({point, driven, 1, false});
   }
 }
 
 bool Contacts::see(const Vector2d& point, double driven) {
-  const bool known = std::ranges::any_of(contacts_, [&](const Contact& contact) {
-    return contact.times >= kObstacle && (contact.point - point).norm() < kSeenApart;
+  const auto known = std::ranges::find_if(contacts_, [&](const Contact& contact) {
+    return contact.seen && (contact.point - point).norm() < kSeenApart;
   });
-  if (!known) contacts_.push_back({point, driven, kObstacle});
-  return !known;
+  if (known == contacts_.end()) {
+    contacts_.push_back({point, driven, kObstacle, true});
+    return true;
+  }
+  known->driven = driven;
+  return std::exchange(known->times, kObstacle) < kObstacle;
 }
 
 const FloorMap& Contacts::seen_by(const FloorMap& map, double driven) {

@@ -8,41 +8,62 @@
 namespace cairn {
 namespace {
 
-constexpr double kSide = 0.3;  // of a square [m]
+using Eigen::Vector2i;
+
+constexpr double kSide = 0.3;  // of a square, about [m]
+
+/// Rounded down, also below zero.
+int divided(int number, int by) { return (number >= 0 ? number : number - by + 1) / by; }
 
 }  // namespace
 
 bool DiscoveredFloor::grows(const FloorMap& map) {
   const GridFrame& frame = map.frame;
-  const double side = std::max(kSide, frame.resolution);
-  const auto square = [&](double metres) { return static_cast<int>(std::floor(metres / side)); };
-  const auto column = [&](int x) { return square(frame.centre(x, 0).x()); };
-  const int first_x = column(0), first_y = square(frame.origin.y());
-  const int width = column(frame.width - 1) - first_x + 1;
-  const int height = square(frame.centre(0, frame.height - 1).y()) - first_y + 1;
-  known_.assign(static_cast<std::size_t>(width) * static_cast<std::size_t>(height), 0);
-  std::vector<int> columns(static_cast<std::size_t>(frame.width));
-  for (int x = 0; x < frame.width; ++x) columns[static_cast<std::size_t>(x)] = column(x) - first_x;
+  if (frame.size() == 0) return false;
+  const int side = std::max(1, static_cast<int>(std::lround(kSide / frame.resolution)));
+  const Vector2i origin = (frame.origin / frame.resolution).array().round().cast<int>();
+  const auto square = [&](int x, int y) {
+    return Vector2i(divided(origin.x() + x, side), divided(origin.y() + y, side));
+  };
+  cover(square(0, 0), square(frame.width - 1, frame.height - 1));
+  const Vector2i shift = origin - side * low_;
+  std::ranges::fill(known_, 0);
   for (int y = 0; y < frame.height; ++y) {
-    int* row = &known_[static_cast<std::size_t>(square(frame.centre(0, y).y()) - first_y) *
-                       static_cast<std::size_t>(width)];
     const CellState* cells = &map.cells[frame.index(0, y)];
+    int* row = &known_[index(0, (shift.y() + y) / side)];
     for (int x = 0; x < frame.width; ++x)
-      row[columns[static_cast<std::size_t>(x)]] += cells[x] != CellState::unknown;
+      row[(shift.x() + x) / side] += cells[x] != CellState::unknown;
   }
-  const double half = 0.5 * side * side / frame.cell_area();
   bool grown = false;
-  for (int y = 0; y < height; ++y) {
-    for (int x = 0; x < width; ++x) {
-      const auto k = static_cast<std::size_t>(y) * static_cast<std::size_t>(width) +
-                     static_cast<std::size_t>(x);
-      if (known_[k] < half) continue;
-      const auto key = (static_cast<std::uint64_t>(static_cast<std::uint32_t>(first_x + x)) << 32) |
-                       static_cast<std::uint32_t>(first_y + y);
-      grown |= squares_.insert(key).second;
-    }
+  for (std::size_t k = 0; k < known_.size(); ++k) {
+    if (ever_[k] != 0 || 2 * known_[k] < side * side) continue;
+    ever_[k] = 1;
+    grown = true;
   }
   return grown;
+}
+
+/// Makes room for squares up to these corners.
+void DiscoveredFloor::cover(const Vector2i& low, const Vector2i& high) {
+  const Vector2i last = low_ + size_ - Vector2i::Ones();
+  const bool is_empty = ever_.empty();
+  if (!is_empty && (low.array() >= low_.array()).all() && (high.array() <= last.array()).all())
+    return;
+  const DiscoveredFloor before = *this;
+  low_ = is_empty ? low : Vector2i(low.cwiseMin(low_));
+  size_ = (is_empty ? high : Vector2i(high.cwiseMax(last))) - low_ + Vector2i::Ones();
+  ever_.assign(static_cast<std::size_t>(size_.x()) * static_cast<std::size_t>(size_.y()), 0);
+  known_.assign(ever_.size(), 0);
+  const Vector2i shift = before.low_ - low_;
+  for (int y = 0; y < before.size_.y(); ++y) {
+    std::copy_n(&before.ever_[before.index(0, y)], before.size_.x(),
+                &ever_[index(shift.x(), y + shift.y())]);
+  }
+}
+
+std::size_t DiscoveredFloor::index(int x, int y) const {
+  return static_cast<std::size_t>(y) * static_cast<std::size_t>(size_.x()) +
+         static_cast<std::size_t>(x);
 }
 
 }  // namespace cairn

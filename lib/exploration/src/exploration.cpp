@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <numeric>
 #include <optional>
+#include <span>
 #include <utility>
 
 #include <fmt/core.h>
@@ -30,6 +31,15 @@ namespace {
 constexpr int kMostIdle = 20;
 constexpr double kNoMotion = 0.005;  // [m], [rad]
 constexpr int kMostEmptyDecisions = 3;
+/// Paths in a row on which the robot would touch something before it has moved.
+constexpr int kMostRefused = 60;
+/// After so many it drives on one that is planned for the whole body all the same.
+constexpr int kMostWideRefused = 30;
+/// So many of the newest scans show what is around the robot.
+constexpr std::size_t kScansAround = 8;
+/// Where the robot would touch what its path avoids, so many motions of this length follow it [m].
+constexpr int kCarefulMotions = 6;
+constexpr double kCarefulStep = 0.1;
 /// Along one path, to pass by what would be touched.
 constexpr int kMostSidesteps = 10;
 /// Collisions without a free motion in between.
@@ -245,6 +255,9 @@ class Run {
     } else if (empty_decisions_ >= kMostEmptyDecisions) {
       end(ExplorationEnd::stuck,
           fmt::format("{} decisions in a row led to no motion", kMostEmptyDecisions));
+    } else if (refused_paths_ >= kMostRefused && !doubts_contacts()) {
+      end(ExplorationEnd::stuck,
+          fmt::format("on {} paths in a row something is in the way at once", kMostRefused));
     }
   }
 
@@ -325,35 +338,80 @@ class Run {
 
   void drive(const PlannedPath& path) {
     std::size_t passed = 0;
-    bool moved = false;
-    int sidesteps = 0;
+    bool moved = false, refused = false, was_careful = false;
+    int careful = 0, sidesteps = 0;
     while (check_limits()) {
-      std::optional<Pose2> motion = next_motion(slam_.pose(), path, robot_, passed);
+      RobotModel robot = robot_;
+      if (careful > 0) robot.step = std::min(robot_.step, kCarefulStep);
+      const std::size_t before = passed;
+      std::optional<Pose2> motion = next_motion(slam_.pose(), path, robot, passed);
       if (!motion) break;
-      if (const std::optional<bool> is_new = foreseen_obstacle(*motion)) {
-        moved = moved || *is_new;  // with it the next decision is another
-        // Other paths avoid what is known. Through a gap that may be too narrow they lead along the
-        // middles of cells, and the robot may pass nearer to the middle of the gap.
-        if (!*is_new && path.radius > 0.0 && sidesteps++ < kMostSidesteps)
-          motion = motion_beside(slam_.scans().back(), *motion, robot_);
-        else if (*is_new || path.radius > 0.0)
+      const std::vector<Eigen::Vector2d> around = seen_around();
+      if (const std::optional<bool> is_new = foreseen_obstacle(*motion, around)) {
+        refused = *is_new;
+        if (!refused && !was_careful) {
+          // Paths avoid what is known: it would cut a corner.
+          was_careful = true;
+          careful = kCarefulMotions;
+          passed = before;
+          continue;
+        }
+        // Paths through narrow gaps lead along the middles of cells: it may pass nearer to the
+        // middle of the gap.
+        std::optional<Pose2> beside;
+        if (!refused && sidesteps++ < kMostSidesteps)
+          beside = motion_beside(around, *motion, robot_);
+        const bool has_other = path.radius > 0.0 || refused_paths_ < kMostWideRefused;
+        refused = refused || (!beside && has_other);
+        if (refused) {
+          if (robot_.motion == MotionModel::dubins) make_room(around);
           break;
-        if (!motion) break;
+        }
+        if (beside) motion = beside;
       }
+      careful = std::max(careful, 1) - 1;
       moved = true;
+      if (motion->translation().norm() > kNoMotion) refused_paths_ = 0;
       if (!move(*motion) || !goes_on(path, passed)) break;
     }
-    empty_decisions_ = moved ? 0 : empty_decisions_ + 1;
+    empty_decisions_ = moved || refused ? 0 : empty_decisions_ + 1;
+    refused_paths_ += refused;
   }
 
-  /// What the newest scan shows that a motion would touch is an obstacle to paths from here on.
-  /// Returns whether it was none before; none: the way is clear.
-  std::optional<bool> foreseen_obstacle(const Pose2& motion) {
-    const auto points = touched_points(slam_.scans().back(), motion, robot_);
+  /// A robot that can't turn away from what is in its way goes back, where that is free.
+  void make_room(std::span<const Eigen::Vector2d> around) {
+    if (touched_points(around, Pose2(-robot_.radius, 0.0, 0.0), robot_).empty()) back_off();
+  }
+
+  /// Where beams of the newest scan have ended within a motion's reach, and of those shortly before
+  /// it where it does not look, in the frame of the robot [m].
+  std::vector<Eigen::Vector2d> seen_around() const {
+    const std::size_t count = slam_.scans().size();
+    const double aside = 0.5 * robot_.lidar.aperture;
+    const double reach = robot_.step + 2.0 * robot_.radius;
+    std::vector<Eigen::Vector2d> around;
+    for (std::size_t back = 1; back <= std::min(count, kScansAround); ++back) {
+      const LaserScan& scan = slam_.scans()[count - back];
+      const Pose2 from = slam_.pose().between(slam_.poses()[count - back]);
+      if (from.translation().norm() > scan.max_range + reach) continue;
+      for (const Eigen::Vector2d& end : beam_ends(scan)) {
+        const Eigen::Vector2d point = back == 1 ? end : from * Point2(end);
+        const bool is_behind = std::abs(std::atan2(point.y(), point.x())) > aside;
+        if (point.norm() < reach && (back == 1 || is_behind)) around.push_back(point);
+      }
+    }
+    return around;
+  }
+
+  /// What a motion would touch of these is an obstacle to paths from here on. Returns whether it
+  /// was none before; none: the way is clear.
+  std::optional<bool> foreseen_obstacle(const Pose2& motion,
+                                        std::span<const Eigen::Vector2d> around) {
+    const auto points = touched_points(around, motion, robot_);
     if (points.empty()) return std::nullopt;
     bool is_new = false;
     for (const Eigen::Vector2d& point : points)
-      is_new |= contacts_.see(slam_.pose() * point, result_.steps.back().distance);
+      is_new |= contacts_.see(slam_.pose() * Point2(point), result_.steps.back().distance);
     return is_new;
   }
 
@@ -385,6 +443,7 @@ class Run {
     if (jump > slam_.map().frame.resolution) contacts_.forget();  // they were in another frame
     if (step.collided) {
       touch(motion, slam_.pose().theta() - step.odometry.theta());
+      if (!backing_off_) ++collisions_in_row_;
       back_off();
     }
     return !step.collided && jump <= slam_.map().frame.resolution;
@@ -405,16 +464,16 @@ class Run {
     contacts_.add(slam_.pose().translation(), direction, result_.steps.back().distance);
   }
 
-  /// After a collision: the same motion from the same place would end like it.
+  /// After a collision, since the same motion from the same place would end like it; and before
+  /// one.
   void back_off() {
     if (std::exchange(backing_off_, true)) return;
-    ++collisions_in_row_;
     move(Pose2(-robot_.radius, 0.0, 0.0));
     backing_off_ = false;
   }
 
   void watch_progress(const ExplorationStep& step) {
-    if (!discovered_.grows(slam_.map())) return;
+    if (recorded_ || !discovered_.grows(slam_.map())) return;
     idle_distance_ = 0.0;
     way_begin_ = useful_distance_ = step.distance;
   }
@@ -478,7 +537,7 @@ class Run {
   bool ended_ = false, backing_off_ = false;
   double next_doubt_ = 0.0;  // of contacts, so as to go on, no earlier [m driven]
   int not_driven_ = 0;       // paths
-  int decisions_ = 0, empty_decisions_ = 0, idle_ = 0, collisions_in_row_ = 0;
+  int decisions_ = 0, empty_decisions_ = 0, refused_paths_ = 0, idle_ = 0, collisions_in_row_ = 0;
   DiscoveredFloor discovered_;
   // What counts as driven without progress; where the newest way began, and progress ended [m].
   double idle_distance_ = 0.0, way_begin_ = 0.0, useful_distance_ = 0.0;

@@ -15,7 +15,7 @@ using Eigen::Vector2d;
 
 /// Between two places of the body that are compared with the scan [m].
 constexpr double kStride = 0.01;
-/// An edge may lie between two beams, nearer than either [m].
+/// An edge may lie between two beams, nearer than either by their distance, or by this at most [m].
 constexpr double kBetweenBeams = 0.01;
 constexpr double kSigmas = 2.0, kLeastPart = 0.5;
 /// Motions to a side: so many, so far apart [rad].
@@ -39,17 +39,27 @@ std::vector<Vector2d> places_along(const Pose2& motion, MotionModel model) {
 
 }  // namespace
 
-std::vector<Vector2d> touched_points(const LaserScan& scan, const Pose2& motion,
+std::vector<Vector2d> beam_ends(const LaserScan& scan) {
+  std::vector<Vector2d> ends;
+  for (std::size_t beam = 0; beam < scan.ranges.size(); ++beam) {
+    const double range = scan.ranges[beam], angle = scan.angle(beam);
+    if (range > 0.0 && range < scan.max_range)
+      ends.push_back(range * Vector2d(std::cos(angle), std::sin(angle)));
+  }
+  return ends;
+}
+
+std::vector<Vector2d> touched_points(std::span<const Vector2d> points, const Pose2& motion,
                                      const RobotModel& robot) {
-  const double near = std::max(kLeastPart * robot.radius,
-                               robot.radius + kBetweenBeams - kSigmas * robot.lidar.sigma);
-  const double reach = motion.translation().norm() + near;
+  const double noise = kSigmas * robot.lidar.sigma;
+  const double reach = motion.translation().norm() + robot.radius + kBetweenBeams;
   const std::vector<Vector2d> places = places_along(motion, robot.motion);
   std::vector<Vector2d> touched;
-  for (std::size_t beam = 0; beam < scan.ranges.size(); ++beam) {
-    const double range = scan.ranges[beam];
-    if (!(range > 0.0 && range < reach && range < scan.max_range)) continue;
-    const Vector2d point = range * Vector2d(std::cos(scan.angle(beam)), std::sin(scan.angle(beam)));
+  for (const Vector2d& point : points) {
+    const double range = point.norm();
+    if (range > reach) continue;
+    const double between = std::min(range * robot.lidar.step(), kBetweenBeams);
+    const double near = std::max(kLeastPart * robot.radius, robot.radius + between - noise);
     double before = range;
     const bool is_touched = std::ranges::any_of(places, [&](const Vector2d& place) {
       const double apart = (point - place).norm();
@@ -62,17 +72,20 @@ std::vector<Vector2d> touched_points(const LaserScan& scan, const Pose2& motion,
   return touched;
 }
 
-std::optional<Pose2> motion_beside(const LaserScan& scan, const Pose2& motion,
+std::optional<Pose2> motion_beside(std::span<const Vector2d> points, const Pose2& motion,
                                    const RobotModel& robot) {
   if (robot.motion == MotionModel::dubins) return std::nullopt;
   for (const double part : {1.0, 0.5}) {
     for (int k = 1; k <= kTurns; ++k) {
       for (const double side : {1.0, -1.0}) {
         const double turn = side * k * kTurn;
+        if (robot.motion == MotionModel::differential &&
+            std::abs(motion.theta() + turn) > robot.turn)
+          continue;  // it drives where it looks
         const Vector2d way = part * (Pose2(0.0, 0.0, turn) * motion.translation());
         const Pose2 beside(way.x(), way.y(),
                            std::clamp(motion.theta() + turn, -robot.turn, robot.turn));
-        if (touched_points(scan, beside, robot).empty()) return beside;
+        if (touched_points(points, beside, robot).empty()) return beside;
       }
     }
   }

@@ -2,6 +2,7 @@
 #include "cairn/exploration/discovered_floor.hpp"
 
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -36,8 +37,6 @@ TEST(DiscoveredFloor, WhatAMapLosesAndFindsAgainIsNoDiscovery) {
   EXPECT_TRUE(floor.grows(known_columns(9)));
   EXPECT_FALSE(floor.grows(known_columns(3)));
   EXPECT_FALSE(floor.grows(known_columns(9)));
-  floor.forget();
-  EXPECT_TRUE(floor.grows(known_columns(9)));
 }
 
 TEST(DiscoveredFloor, SquaresStayWhereTheyAreAsTheGridGrows) {
@@ -49,6 +48,24 @@ TEST(DiscoveredFloor, SquaresStayWhereTheyAreAsTheGridGrows) {
   grown.frame.origin.x() = -0.3;
   EXPECT_FALSE(floor.grows(grown));
   EXPECT_TRUE(floor.grows(known_columns(3, -3))) << "to the left of it";
+}
+
+TEST(DiscoveredFloor, SquaresAreOfWholeCells) {
+  constexpr int kSide = 24;
+  for (const auto& [resolution, side] : {std::pair(0.05, 6), {0.1, 3}, {0.2, 1}, {0.5, 1}}) {
+    FloorMap map;
+    map.frame = {.width = kSide, .height = kSide, .resolution = resolution};
+    map.frame.origin = -12.0 * resolution * Eigen::Vector2d::Ones();
+    map.cells.assign(map.frame.size(), CellState::unknown);
+    DiscoveredFloor floor;
+    EXPECT_FALSE(floor.grows(map));
+    int discoveries = 0;
+    for (CellState& cell : map.cells) {
+      cell = CellState::free;
+      discoveries += floor.grows(map);
+    }
+    EXPECT_EQ(discoveries, kSide * kSide / (side * side)) << resolution;
+  }
 }
 
 }  // namespace

@@ -87,8 +87,8 @@ class CAIRN_API World : public Component {
   virtual LaserScan begin(const WorldStart& start) = 0;
   /// Moves straight to `motion`, in the frame of where the robot truly is, turning on the way; a
   /// robot of `MotionModel::dubins` along the arc that leads there, or straight back after a
-  /// collision. It stops where its body would touch an obstacle. Throws `Error` (usage) for a
-  /// motion that such a robot can't make.
+  /// collision, or before one. It stops where its body would touch an obstacle. Throws `Error`
+  /// (usage) for a motion that such a robot can't make.
   virtual WorldStep move(const Pose2& motion) = 0;
   /// Where the robot truly is, in the frame of the floor; none: that is not known.
   virtual std::optional<Pose2> truth() const = 0;
