@@ -75,8 +75,7 @@ TEST_P(RealFloors, WithoutNoiseAllIsSeenAndNothingIsTouched) {
   EXPECT_GE(*result.against->reachable_seen, 0.99);
 }
 
-INSTANTIATE_TEST_SUITE_P(Maps, RealFloors,
-                         testing::Values("fr079", "stata_basement", "cave_20m"));
+INSTANTIATE_TEST_SUITE_P(Maps, RealFloors, testing::Values("fr079", "stata_basement", "cave_20m"));
 
 /// Another world, with a pane of glass across it that no beam shows.
 class GlassWorld final : public World {
