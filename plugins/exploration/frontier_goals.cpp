@@ -30,8 +30,8 @@ constexpr double kNearer = 0.5;
 /// has not set out through a gap has seen something in its way, which the next path avoids.
 constexpr double kMoved = 0.05;
 constexpr int kStayed = 1, kDriven = 4;
-/// So often a goal may be chosen without coming nearer: eight times, and once through a gap that
-/// may be too narrow, since the robot touches walls there.
+/// So often a goal may be chosen without coming nearer: eight times, and through a gap that may be
+/// too narrow once, since the robot may touch walls there, or four times if it has not set out.
 constexpr int kMostWide = 8 * kDriven, kMostNarrow = kDriven;
 /// So many gaps in a row that have proved too narrow: then no more are tried.
 constexpr int kMostNarrowFailures = 6;

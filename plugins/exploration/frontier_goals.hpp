@@ -36,7 +36,7 @@ class FrontierGoals {
 
   /// The robot drives along one of the `candidates`. A frontier to which it drives again and again
   /// without coming nearer, since it is stopped on the way, is given up as well: one behind a
-  /// narrow gap at once.
+  /// narrow gap at once, if the robot has set out.
   void chosen(const PlannedPath& path);
 
   /// Where none of the frontiers that the last `candidates` has seen has a path: a turn of one
