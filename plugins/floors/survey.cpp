@@ -161,10 +161,11 @@ std::vector<FloorLeak> find_leaks(const GridFrame& frame, const cv::Mat& floor,
                      top = box[cv::CC_STAT_TOP];
     const bool at_edge = left == 0 || top == 0 || left + box[cv::CC_STAT_WIDTH] == frame.width ||
                          top + box[cv::CC_STAT_HEIGHT] == frame.height;
-    const Cell cell =
-        nearest_cell(label == k, {middle.at<double>(k, 0) + 0.5, middle.at<double>(k, 1) + 0.5});
-    leaks.push_back(
-        {frame.centre(cell.x, cell.y), box[cv::CC_STAT_AREA] * frame.resolution, at_edge});
+    const cv::Mat own = label({left, top, box[cv::CC_STAT_WIDTH], box[cv::CC_STAT_HEIGHT]}) == k;
+    const Cell cell = nearest_cell(
+        own, {middle.at<double>(k, 0) + 0.5 - left, middle.at<double>(k, 1) + 0.5 - top});
+    leaks.push_back({frame.centre(left + cell.x, top + cell.y),
+                     box[cv::CC_STAT_AREA] * frame.resolution, at_edge});
   }
   std::ranges::stable_sort(leaks, std::greater{}, &FloorLeak::length);
   return leaks;

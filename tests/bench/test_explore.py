@@ -100,6 +100,16 @@ class ThesisTest(unittest.TestCase):
         self.assertIn("| map error at equal coverage [m²] | -35.00 ± 0.00 * |", table)
         self.assertIn("| wrong cells, as much floor seen [m²] | -35.00 ± 0.00 * |", table)
 
+    def test_on_other_floors_differences_are_from_the_first_method_of_the_same_floor(self):
+        other = {**entry("elsewhere", "drrt_star", {"error": 0.05}, {"error": 0.05}), "name": "depot"}
+        table = section(report("explore_elsewhere", entry("elsewhere", "frontier", {"loops": 20.0}, {"loops": 24.0}),
+                               entry("elsewhere", "drrt_star", {"loops": 21.0, "error": 0.05}, {"loops": 25.0, "error": 0.05}),
+                               other), "explore-elsewhere")
+        self.assertIn("| fr079 | map entropy [nats·m²] |", table)
+        self.assertIn("|  | loop closures | 22 ± 25 | 23 ± 25 | +1.000 ± 0.000 * |", table)
+        self.assertIn("|  | map error at equal coverage [m²] | - | - | -35.00 ± 0.00 * |", table)
+        self.assertIn("| depot | map entropy [nats·m²] | - | 500.0 ± 0.0 | - |", table)
+
     def test_a_run_that_failed_has_no_measures_and_no_pair(self):
         table = section(report("explore_cave", entry("cave", "frontier", {"loops": 20.0}, {"loops": 24.0}),
                                entry("cave", "ede_gradient", {"loops": 21.0}, {"loops": 99.0, "end": "interrupted"})),

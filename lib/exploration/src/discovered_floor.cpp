@@ -31,8 +31,10 @@ bool DiscoveredFloor::grows(const FloorMap& map) {
   for (int y = 0; y < frame.height; ++y) {
     const CellState* cells = &map.cells[frame.index(0, y)];
     int* row = &known_[index(0, (shift.y() + y) / side)];
-    for (int x = 0; x < frame.width; ++x)
-      row[(shift.x() + x) / side] += cells[x] != CellState::unknown;
+    for (int x = 0, column = shift.x() / side; x < frame.width; ++column) {
+      const int end = std::min(frame.width, side * (column + 1) - shift.x());
+      for (; x < end; ++x) row[column] += cells[x] != CellState::unknown;
+    }
   }
   bool grown = false;
   for (std::size_t k = 0; k < known_.size(); ++k) {

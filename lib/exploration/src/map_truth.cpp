@@ -112,16 +112,35 @@ MapTruth compare_with_floor(const FloorMap& map, const OccupancyGrid& floor, con
 
 namespace {
 
+/// Unit vectors along the beams of scans, in the robot's frame; kept as long as the scans are of
+/// one lidar.
+class BeamDirections {
+ public:
+  const std::vector<Eigen::Vector2d>& of(const LaserScan& scan) {
+    if (scan.first_angle != first_angle_ || scan.angle_step != angle_step_) directions_.clear();
+    first_angle_ = scan.first_angle;
+    angle_step_ = scan.angle_step;
+    for (std::size_t beam = directions_.size(); beam < scan.ranges.size(); ++beam)
+      directions_.emplace_back(std::cos(scan.angle(beam)), std::sin(scan.angle(beam)));
+    return directions_;
+  }
+
+ private:
+  double first_angle_ = 0.0, angle_step_ = 0.0;
+  std::vector<Eigen::Vector2d> directions_;
+};
+
 /// Calls `visit` with each cell of the map in which a beam of a scan ends.
 template <class Visit>
-void for_each_end(const FloorMap& map, const LaserScan& scan, const Pose2& pose, Visit&& visit) {
+void for_each_end(const FloorMap& map, const LaserScan& scan, const Pose2& pose,
+                  BeamDirections& directions, Visit&& visit) {
+  const std::vector<Eigen::Vector2d>& beams = directions.of(scan);
+  const Eigen::Matrix2d R = pose.rotation().matrix();
   for (std::size_t beam = 0; beam < scan.ranges.size(); ++beam) {
     double range = scan.ranges[beam];
     if (!(range > 0.0) || range >= scan.max_range) continue;
     range += kSurfaceInset * map.frame.resolution;
-    const double angle = scan.angle(beam);
-    const Cell cell =
-        cell_at(map.frame, pose * Point2(range * std::cos(angle), range * std::sin(angle)));
+    const Cell cell = cell_at(map.frame, R * (range * beams[beam]) + pose.translation());
     if (map.frame.contains(cell.x, cell.y)) visit(cell);
   }
 }
@@ -142,8 +161,9 @@ double contradicted_area(const FloorMap& map, std::span<const LaserScan> scans,
                          std::span<const Pose2> poses) {
   std::vector<std::uint8_t> hit(map.cells.size());
   std::size_t count = 0;
+  BeamDirections directions;
   for (std::size_t k = 0; k < scans.size(); ++k) {
-    for_each_end(map, scans[k], poses[k], [&](const Cell& cell) {
+    for_each_end(map, scans[k], poses[k], directions, [&](const Cell& cell) {
       const std::size_t index = map.frame.index(cell.x, cell.y);
       count += map.cells[index] == CellState::free && hit[index] == 0;
       hit[index] = 1;
@@ -156,9 +176,10 @@ std::vector<double> scan_agreement(const FloorMap& map, std::span<const LaserSca
                                    std::span<const Pose2> poses) {
   std::vector<double> parts;
   parts.reserve(scans.size());
+  BeamDirections directions;
   for (std::size_t k = 0; k < scans.size(); ++k) {
     int ends = 0, agreeing = 0;
-    for_each_end(map, scans[k], poses[k], [&](const Cell& cell) {
+    for_each_end(map, scans[k], poses[k], directions, [&](const Cell& cell) {
       ++ends;
       agreeing += beside_occupied(map, cell);
     });

@@ -111,6 +111,14 @@ SeenCells::SeenCells(const FloorMap& map, const LidarModel& lidar, double range)
       if (state == CellState::free) floor.occupancy[frame_.index(x + margin, y + margin)] = 0;
     }
   }
+  // The bits of a row's last word that are no cells.
+  if (const int rest = frame_.width % kWordBits; rest > 0) {
+    for (int y = 0; y < frame_.height; ++y) {
+      const std::size_t last = word_at(words_, y, words_ - 1);
+      unknown_[last] &= bit_of(rest) - 1;
+      obstacles_[last] |= ~(bit_of(rest) - 1);
+    }
+  }
   floor_.emplace(floor);
   beams_ = beam_directions(lidar);
   find_viewpoints();
@@ -121,26 +129,22 @@ SeenCells::SeenCells(const FloorMap& map, const LidarModel& lidar, double range)
 void SeenCells::find_viewpoints() {
   const int most = static_cast<int>(std::numbers::sqrt2 * range_) + 2;
   viewpoints_ = unknown_;
-  std::vector<std::pair<int, int>> border, next;
-  for (int y = 0; y < frame_.height; ++y) {
-    for (int x = 0; x < frame_.width; ++x) {
-      if ((unknown_[word_at(words_, y, x / kWordBits)] & bit_of(x)) != 0) border.emplace_back(x, y);
-    }
-  }
-  for (int steps = 0; steps < most && !border.empty(); ++steps, std::swap(border, next)) {
-    next.clear();
-    const auto enter = [&](int x, int y) {
-      if (!frame_.contains(x, y)) return;
-      const std::size_t word = word_at(words_, y, x / kWordBits);
-      if (((obstacles_[word] | viewpoints_[word]) & bit_of(x)) != 0) return;
-      viewpoints_[word] |= bit_of(x);
-      next.emplace_back(x, y);
-    };
-    for (const auto& [x, y] : border) {
-      enter(x - 1, y);
-      enter(x + 1, y);
-      enter(x, y - 1);
-      enter(x, y + 1);
+  std::vector<std::uint64_t> before;
+  bool grows = true;
+  for (int steps = 0; steps < most && grows; ++steps) {
+    before = viewpoints_;
+    grows = false;
+    for (int y = 0; y < frame_.height; ++y) {
+      for (int word = 0; word < words_; ++word) {
+        const std::size_t at = word_at(words_, y, word);
+        std::uint64_t beside = (before[at] << 1) | (before[at] >> 1);
+        if (word > 0) beside |= before[at - 1] >> (kWordBits - 1);
+        if (word + 1 < words_) beside |= before[at + 1] << (kWordBits - 1);
+        if (y > 0) beside |= before[word_at(words_, y - 1, word)];
+        if (y + 1 < frame_.height) beside |= before[word_at(words_, y + 1, word)];
+        viewpoints_[at] |= beside & ~obstacles_[at];
+        grows = grows || viewpoints_[at] != before[at];
+      }
     }
   }
 }

@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Tables 5.4 to 5.6 of the thesis: search in configuration space and in action space; and the latter at the scale that the
-thesis's floor likely had."""
+thesis's floor likely had, and on other floors."""
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
 
 from ...averages import ratio
+from ...intervals import MeanInterval
 from ...pages import Sections, table
 from ...program import Words
 from ...published import said
@@ -43,6 +44,9 @@ ACTION_SPACE = {"frontier": "frontier:length=0.9,keep=1,planner=rrt_star",
                 "heuristic": "heuristic:keep=1,planner=rrt_star,entropy=thesis,revisits=0", "ede_rrt_star": "ede_rrt_star",
                 "drrt_star": "drrt_star", "errt_star": "errt_star", "ours: frontier": "frontier", "ours: dopt": "dopt",
                 "ours: random": "random"}
+# On other floors the claim that counts is tried: a better map at equal coverage.
+ELSEWHERE = {name: ACTION_SPACE[name] for name in ["frontier", "drrt_star", "errt_star"]}
+OTHER_FLOORS = {"intel_lab": "@corridors", "stata_basement": "@loop"}
 
 
 def part_study(part: str, floor: str, generated: str, methods: dict[str, str], settings: Callable[[Bench], Words]) -> Study:
@@ -51,6 +55,13 @@ def part_study(part: str, floor: str, generated: str, methods: dict[str, str], s
             keep(measure(bench, part, floor_of(bench, floor, generated), method, explorer, bench.rounds, settings(bench)))
 
     return Study(f"explore_{part}", study, sections)
+
+
+def study_elsewhere(bench: Bench, keep: Keep) -> None:
+    for floor, generated in OTHER_FLOORS.items():
+        for method, explorer in ELSEWHERE.items():
+            keep(measure(bench, "elsewhere", floor_of(bench, floor, generated), method, explorer, bench.rounds,
+                         action_space(bench)))
 
 
 # Tables
@@ -119,7 +130,30 @@ def sections(methods: list[Json]) -> Sections:
             f"explore-{part}-claims": claims_table(thesis, methods)}
 
 
+def elsewhere_sections(entries: list[Json]) -> Sections:
+    """A row for each floor and measure, with the differences from the first method on that floor."""
+    rows = []
+    measures = {name: title for name, title in ROWS.items() if not name.startswith("decision_m") and name != "coverage"}
+    measures |= {MAP_ERROR_AT_COVERAGE: "map error at equal coverage [m²]", WRONG_AT_SEEN: "wrong cells, as much floor seen [m²]"}
+    names = list(dict.fromkeys(text(entry, "method") for entry in entries))
+    for floor in dict.fromkeys(text(entry, "name") for entry in entries):
+        methods = {text(entry, "method"): entry for entry in entries if text(entry, "name") == floor}
+        reference = methods.get(names[0])
+        title = floor
+        for measure_name, measure_title in measures.items():
+            means = [mean_of(methods[name], measure_name).text() if name in methods else "-" for name in names]
+            apart = [difference_of(methods[name], reference, measure_name) if reference and name in methods else MeanInterval()
+                     for name in names[1:]]
+            rows.append([title, measure_title, *means,
+                         *(one.text(sign=True) + (" *" if one.excludes_zero() else "") for one in apart)])
+            title = ""
+        rows.append(["", "ends", *(ends_of(methods[name]) if name in methods else "-" for name in names),
+                     *[""] * (len(names) - 1)])
+    return {"explore-elsewhere": table(["floor", "mean ± 95 %", *names, *(f"{name} − {names[0]}" for name in names[1:])], rows)}
+
+
 STUDIES = [part_study("cave", "cave_20m", "@cave", CONFIGURATION_SPACE, configuration_space),
            part_study("freiburg", "fr079", "@corridors", CONFIGURATION_SPACE, configuration_space),
            part_study("action", "fr079", "@rooms", ACTION_SPACE, action_space),
-           part_study("scale", "fr079_thesis_scale", "@rooms", ACTION_SPACE, action_space)]
+           part_study("scale", "fr079_thesis_scale", "@rooms", ACTION_SPACE, action_space),
+           Study("explore_elsewhere", study_elsewhere, elsewhere_sections)]

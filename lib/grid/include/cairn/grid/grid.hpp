@@ -40,6 +40,7 @@ struct GridFrame {
 
  private:
   static Eigen::Vector2d turned(const Eigen::Vector2d& v, double angle) {
+    if (angle == 0.0) return v;  // as most grids are
     const double c = std::cos(angle), s = std::sin(angle);
     return {c * v.x() - s * v.y(), s * v.x() + c * v.y()};
   }
