@@ -6,6 +6,7 @@
 #include <cmath>
 #include <ctime>
 #include <filesystem>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string_view>
@@ -46,7 +47,7 @@ std::optional<Graph> load_named(const std::string& file, const AlbumOptions& opt
   return load_graph(file, options.input, session).graph;
 }
 
-/// Adds a recording of an exploration: to the page whole, to a plot its curves.
+/// Adds a recording of an exploration: to the page and to maps whole, to other plots its curves.
 void add_exploration(const std::string& file, const std::string& name, std::string_view text,
                      const AlbumOptions& options, AlbumBuilder& builder) {
   ExplorationRecording recording = read_exploration_recording(text, file);
@@ -54,10 +55,11 @@ void add_exploration(const std::string& file, const std::string& name, std::stri
   if (recording.torn) notes.push_back(fmt::format("{}: the last line was cut short", file));
   if (!recording.ended)
     notes.push_back(fmt::format("{}: the run was killed, or goes on: it has no last line", file));
-  if (options.curves) {
+  if (options.curves && !options.maps) {
     builder.add_table(std::move(recording.steps), name);
   } else {
-    builder.add_exploration(exploration_json(recording, name, kMostOfAPage, notes));
+    const std::size_t most = options.maps ? std::numeric_limits<std::size_t>::max() : kMostOfAPage;
+    builder.add_exploration(exploration_json(recording, name, most, notes));
   }
   for (const std::string& note : notes) builder.add_note(note);
 }

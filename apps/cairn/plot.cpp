@@ -33,6 +33,7 @@ struct PlotOptions {
   std::string colour = "class";
   bool poses = false;
   double ellipses = 0.0;
+  int decision = -1;
   std::string x;
   std::vector<std::string> y;
   std::optional<double> x_max;
@@ -77,6 +78,8 @@ std::string output_of(const PlotOptions& options, Session& session) {
 }
 
 void check_columns(const PlotOptions& options) {
+  if (options.decision >= 0 && options.what != "map")
+    throw Error(ErrorCode::usage, "--decision is for --what map");
   if (std::ranges::any_of(options.album.files, has_columns)) return;
   if (!options.y.empty() || options.x_max || options.logarithmic != "none")
     throw Error(ErrorCode::usage,
@@ -99,6 +102,7 @@ ComponentSpec picture_spec(const PlotOptions& options, const std::string& output
   picture.values["x"] = options.x;
   picture.values["y_columns"] = joined(options.y, "\n");
   picture.values["logarithmic"] = options.logarithmic;
+  picture.values["decision"] = fmt::format("{}", options.decision);
   if (options.x_max) picture.values["x_max"] = fmt::format("{}", *options.x_max);
   put_size(options.size, picture);
   return picture;
@@ -111,6 +115,7 @@ int run(const PlotOptions& options, Session& session) {
   session.use_threads();
   AlbumOptions files = options.album;
   files.curves = picture.name != "html";
+  files.maps = options.what == "map";
   const Album album =
       load_album(files, fmt::format("cairn plot {}", joined(options.album.files, " ")), session);
   const std::string bytes = draw_picture(album, picture, session);
@@ -140,10 +145,11 @@ Command add_plot(ArgumentParser program) {
                  "the plot: .svg, .png or .pdf [name of the first FILE, .svg]")
       .type_name("PICTURE");
   cli.add_option("--what", options->what,
-                 "trajectory, convergence, bars, scaling, sparsity, steps, columns; auto: by FILE")
+                 "trajectory, convergence, bars, scaling, sparsity, steps, columns, map; auto: by "
+                 "FILE")
       .type_name("WHAT")
-      .one_of(
-          {"auto", "trajectory", "convergence", "bars", "scaling", "sparsity", "steps", "columns"})
+      .one_of({"auto", "trajectory", "convergence", "bars", "scaling", "sparsity", "steps",
+               "columns", "map"})
       .show_default();
   cli.add_option("--size", options->size, "WIDTHxHEIGHT [px; in a PDF 1/96 inch] [900x600]")
       .type_name("SIZE");
@@ -160,6 +166,11 @@ Command add_plot(ArgumentParser program) {
                  "covariances [σ], of the JSON of optimize --covariance blocks")
       .type_name("SIGMAS")
       .within(0.0, 1000.0);
+  cli.add_option("--decision", options->decision,
+                 "of a map: when this decision was made, counted from 0, with what was to choose "
+                 "from; default: at the end")
+      .type_name("N")
+      .within(0, 2147483647);
   cli.add_flag("--apart", options->album.apart,
                "each graph beside the others, not one over the other");
   cli.add_option("--x", options->x,
@@ -188,6 +199,7 @@ Command add_plot(ArgumentParser program) {
       "  cairn plot city.g2o compact.g2o --apart --poses -o maps.svg\n"
       "  cairn plot run1.json run2.json --what convergence --x time -o curves.pdf\n"
       "  cairn plot steps.csv --x variables --y seconds --y affected --log y -o steps.svg\n"
+      "  cairn plot robot.jsonl --what map --decision 40 -o robot.png\n"
       "  cairn plot @sphere --what sparsity --linear-solver block_cholesky:ordering=natural -o "
       "L.png");
   return {cli, [options](Session& session) { return run(*options, session); }};

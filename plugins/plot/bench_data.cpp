@@ -1,37 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "bench_data.hpp"
 
-#include <limits>
-
 #include <boost/json/parse.hpp>
 
 #include "cairn/runtime/error.hpp"
+#include "json_members.hpp"
 
 namespace cairn::plot {
 namespace {
 
 namespace json = boost::json;
-
-const json::value* member(const json::value& value, const char* name) {
-  return value.is_object() ? value.get_object().if_contains(name) : nullptr;
-}
-
-double number(const json::value& value, const char* name) {
-  const json::value* found = member(value, name);
-  return found && found->is_number() ? found->to_number<double>()
-                                     : std::numeric_limits<double>::quiet_NaN();
-}
-
-std::string text(const json::value& value, const char* name) {
-  const json::value* found = member(value, name);
-  return found && found->is_string() ? std::string(found->get_string()) : std::string();
-}
-
-const json::array& list(const json::value& value, const char* name) {
-  static const json::array empty;
-  const json::value* found = member(value, name);
-  return found && found->is_array() ? found->get_array() : empty;
-}
 
 BenchConfiguration read_configuration(const json::value& value) {
   BenchConfiguration c;

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <cstring>
 #include <new>
 #include <numbers>
 
@@ -133,6 +135,41 @@ void Canvas::line(double x0, double y0, double x1, double y1, const Stroke& how)
   move_to(x0, y0);
   line_to(x1, y1);
   stroke(how);
+}
+
+void Canvas::image(const std::function<Colour(std::size_t)>& cells, int columns, int rows,
+                   const std::array<double, 2>& origin, const std::array<double, 2>& column,
+                   const std::array<double, 2>& row) {
+  const std::unique_ptr<cairo_surface_t, Release> image(
+      cairo_image_surface_create(CAIRO_FORMAT_RGB24, columns, rows));
+  if (cairo_surface_status(image.get()) != CAIRO_STATUS_SUCCESS)
+    throw Error(ErrorCode::input,
+                fmt::format("a map of {} x {} cells is too large to draw", columns, rows));
+  unsigned char* const bytes = cairo_image_surface_get_data(image.get());
+  const auto stride = static_cast<std::size_t>(cairo_image_surface_get_stride(image.get()));
+  const auto byte = [](double part) {
+    return static_cast<std::uint32_t>(std::lround(255.0 * std::clamp(part, 0.0, 1.0)));
+  };
+  std::size_t cell = 0;
+  for (int y = 0; y < rows; ++y) {
+    for (int x = 0; x < columns; ++x) {
+      const Colour c = cells(cell++);
+      const std::uint32_t pixel = byte(c.r) << 16 | byte(c.g) << 8 | byte(c.b);
+      std::memcpy(bytes + static_cast<std::size_t>(y) * stride + 4 * static_cast<std::size_t>(x),
+                  &pixel, sizeof pixel);
+    }
+  }
+  cairo_surface_mark_dirty(image.get());
+  cairo_save(context_.get());
+  cairo_matrix_t matrix;
+  cairo_matrix_init(&matrix, column[0] - origin[0], column[1] - origin[1], row[0] - origin[0],
+                    row[1] - origin[1], origin[0], origin[1]);
+  cairo_transform(context_.get(), &matrix);
+  cairo_set_source_surface(context_.get(), image.get(), 0, 0);
+  cairo_pattern_set_filter(cairo_get_source(context_.get()), CAIRO_FILTER_NEAREST);
+  rectangle({0, 0, double(columns), double(rows)});
+  cairo_fill(context_.get());
+  cairo_restore(context_.get());
 }
 
 void Canvas::clip(const Box& box) {

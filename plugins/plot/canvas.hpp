@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <array>
+#include <cstddef>
+#include <functional>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -65,6 +68,13 @@ class Canvas {
   void stroke(const Stroke& stroke);
   void fill(const Colour& colour);
   void line(double x0, double y0, double x1, double y1, const Stroke& how);
+
+  /// Cells of a grid, whose colours are asked for by number, row by row: the first one has a corner
+  /// at `origin`, from which `column` is one column and `row` one row away (each x and y). Throws
+  /// `Error` (input) for more than 32767 rows or columns.
+  void image(const std::function<Colour(std::size_t)>& cells, int columns, int rows,
+             const std::array<double, 2>& origin, const std::array<double, 2>& column,
+             const std::array<double, 2>& row);
 
   /// Whatever is drawn until `unclip` stays within the box.
   void clip(const Box& box);

@@ -61,6 +61,23 @@ Chart::Chart(Canvas& canvas, const Theme& theme, const Box& box, const Range& x,
   canvas.text_upwards(box.x + kTextSize, area_.y + area_.height / 2, y_label, kTextSize, theme.ink);
 }
 
+void equalise(Bounds& bounds, const Box& box) {
+  const double room = 0.03 * std::max(bounds.size(), 1e-6);
+  const double width = bounds.x1 - bounds.x0 + 2 * room;
+  const double height = bounds.y1 - bounds.y0 + 2 * room;
+  const double metres = std::max(width / box.width, height / box.height);
+  const double x = (bounds.x0 + bounds.x1) / 2, y = (bounds.y0 + bounds.y1) / 2;
+  bounds = {x - metres * box.width / 2, x + metres * box.width / 2, y - metres * box.height / 2,
+            y + metres * box.height / 2};
+}
+
+Chart plane(Canvas& canvas, const Theme& theme, const Box& box, Bounds& bounds) {
+  // Room for the axes' texts, which depend little on the numbers.
+  equalise(bounds, {0, 0, box.width - 70, box.height - 40});
+  return {canvas,  theme,  box, {bounds.x0, bounds.x1, false}, {bounds.y0, bounds.y1, false},
+          "x [m]", "y [m]"};
+}
+
 std::vector<Box> panels(const Canvas& canvas, std::size_t count, std::size_t columns) {
   if (columns == 0) {
     columns = static_cast<std::size_t>(std::ceil(std::sqrt(static_cast<double>(count))));

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "axis.hpp"
+#include "bounds.hpp"
 #include "canvas.hpp"
 
 namespace cairn::plot {
@@ -36,6 +37,13 @@ class Chart {
   Box area_;
   Range x_, y_;
 };
+
+/// Widens the bounds so that both axes of the box have the same number of pixels a metre, with some
+/// room around.
+void equalise(Bounds& bounds, const Box& box);
+
+/// Axes in metres with the same scale, for bounds that are widened to fill the box.
+Chart plane(Canvas& canvas, const Theme& theme, const Box& box, Bounds& bounds);
 
 /// The boxes of `count` charts on a page, in rows of `columns`; 0: as square as can be.
 std::vector<Box> panels(const Canvas& canvas, std::size_t count, std::size_t columns = 0);

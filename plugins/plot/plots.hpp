@@ -15,6 +15,9 @@ namespace cairn::plot {
 /// Poses and edges of each graph, with marks and ellipses as `options` says.
 void draw_trajectories(Canvas& canvas, const Theme& theme, const Album& album,
                        const PlotOptions& options);
+/// Map, graph and newest scan of each recorded exploration at its end, or at a decision with what
+/// was to choose from; `options` says which.
+void draw_maps(Canvas& canvas, const Theme& theme, const Album& album, const PlotOptions& options);
 /// chi2 of each run against iterations or time, logarithmic.
 void draw_convergence(Canvas& canvas, const Theme& theme, const Album& album, bool against_time);
 /// Seconds of each iteration of each run.

@@ -52,6 +52,9 @@ class Plot final : public Picture {
       case Subject::columns:
         plot::draw_columns(canvas, theme_, album, options_);
         break;
+      case Subject::map:
+        plot::draw_maps(canvas, theme_, album, options_);
+        break;
     }
     return canvas.finish();
   }

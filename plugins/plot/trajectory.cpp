@@ -9,6 +9,7 @@
 
 #include <fmt/core.h>
 
+#include "bounds.hpp"
 #include "cairn/runtime/error.hpp"
 #include "chart.hpp"
 #include "ellipse.hpp"
@@ -25,11 +26,6 @@ constexpr double kGuessMayExceed = 2.5;
 constexpr int kShades = 48;
 // Side of the mark of a pose [px]; smaller where there are more poses than this.
 constexpr double kMark = 3.4, kLeastMark = 1.2, kLargeMarks = 400;
-
-struct Point {
-  double x = 0, y = 0;
-  bool there() const { return std::isfinite(x) && std::isfinite(y); }
-};
 
 /// Parallel projection, upwards being up.
 const std::array<std::array<double, 3>, 2>& projection() {
@@ -56,22 +52,6 @@ std::vector<Point> project(const Scene& scene, const SceneEstimate& estimate) {
   }
   return points;
 }
-
-struct Bounds {
-  double x0 = std::numeric_limits<double>::infinity(), x1 = -x0, y0 = x0, y1 = -x0;
-
-  void add(const std::vector<Point>& points) {
-    for (const Point& p : points) {
-      if (!p.there()) continue;
-      x0 = std::min(x0, p.x);
-      x1 = std::max(x1, p.x);
-      y0 = std::min(y0, p.y);
-      y1 = std::max(y1, p.y);
-    }
-  }
-  bool empty() const { return x0 > x1; }
-  double size() const { return std::max(x1 - x0, y1 - y0); }
-};
 
 /// An estimate as it is drawn.
 struct Layer {
@@ -132,17 +112,6 @@ Bounds bounds_of(const std::vector<Layer>& layers) {
   }
   if (most.empty() || all.size() <= kGuessMayExceed * most.size()) return all;
   return most;
-}
-
-/// The same number of pixels a metre on both axes.
-void equalise(Bounds& bounds, const Box& box) {
-  const double room = 0.03 * std::max(bounds.size(), 1e-6);
-  const double width = bounds.x1 - bounds.x0 + 2 * room;
-  const double height = bounds.y1 - bounds.y0 + 2 * room;
-  const double metres = std::max(width / box.width, height / box.height);
-  const double x = (bounds.x0 + bounds.x1) / 2, y = (bounds.y0 + bounds.y1) / 2;
-  bounds = {x - metres * box.width / 2, x + metres * box.width / 2, y - metres * box.height / 2,
-            y + metres * box.height / 2};
 }
 
 Stroke mark(const Theme& theme) { return {theme.residual(0.8), kMark, {}}; }
@@ -350,12 +319,8 @@ void draw_scene(Canvas& canvas, const Theme& theme, const Scene& scene, const Bo
     Drawing(canvas, theme, scene, rest, bounds).draw(layers, options);
     return draw_scale(canvas, theme, rest, bounds);
   }
-  // Room for the axes' texts, which depend little on the numbers.
-  equalise(bounds, {0, 0, rest.width - 70, rest.height - 40});
-  const Chart chart(canvas, theme, rest, {bounds.x0, bounds.x1, false},
-                    {bounds.y0, bounds.y1, false}, "x [m]", "y [m]");
-  Bounds fitted = bounds;
-  Drawing(canvas, theme, scene, chart.area(), fitted).draw(layers, options);
+  const Chart chart = plane(canvas, theme, rest, bounds);
+  Drawing(canvas, theme, scene, chart.area(), bounds).draw(layers, options);
 }
 
 }  // namespace

@@ -160,6 +160,24 @@ TEST_F(ExploreRecording, HasCurvesToPlot) {
   EXPECT_THAT(unfolded(wrong.err), HasSubstr("trajectory_entropy"));
 }
 
+TEST_F(ExploreRecording, HasMapsToPlot) {
+  if (!Registry().has("picture", "svg")) GTEST_SKIP() << "built without plots";
+  const std::string record = folder_.file("run.jsonl"), plot = folder_.file("map.svg");
+  ASSERT_EQ(cairn({"explore", "@rooms", "--until", "distance=4", "--record", record}).exit_code, 0);
+  const Outcome whole = cairn({"plot", record, "--what", "map", "-o", plot});
+  ASSERT_EQ(whole.exit_code, 0) << whole.err;
+  EXPECT_THAT(read_text(plot), AllOf(HasSubstr("<image"), Not(HasSubstr("NaN"))));
+  const std::string end = read_text(plot);
+  ASSERT_EQ(cairn({"plot", record, "--what", "map", "--decision", "0", "-o", plot}).exit_code, 0);
+  EXPECT_NE(read_text(plot), end);
+  const Outcome late = cairn({"plot", record, "--what", "map", "--decision", "99", "-o", plot});
+  EXPECT_EQ(late.exit_code, 3);
+  EXPECT_THAT(late.err, HasSubstr("there is no decision 99; the last one is"));
+  const Outcome curves = cairn({"plot", record, "--decision", "0", "-o", plot});
+  EXPECT_EQ(curves.exit_code, 2);
+  EXPECT_THAT(curves.err, HasSubstr("--decision is for --what map"));
+}
+
 TEST_F(ExploreRecording, IsRefusedBeforeTheRunWhereItCannotBeWritten) {
   EXPECT_EQ(explore({"--record", "-"}).exit_code, 2);
   EXPECT_EQ(explore({"--record", folder_.file("none/run.jsonl")}).exit_code, 3);
