@@ -33,7 +33,7 @@ struct PlotOptions {
   std::string colour = "class";
   bool poses = false;
   double ellipses = 0.0;
-  int decision = -1;
+  int decision = 0;
   std::string x;
   std::vector<std::string> y;
   std::optional<double> x_max;
@@ -78,7 +78,7 @@ std::string output_of(const PlotOptions& options, Session& session) {
 }
 
 void check_columns(const PlotOptions& options) {
-  if (options.decision >= 0 && options.what != "map")
+  if (options.decision > 0 && options.what != "map")
     throw Error(ErrorCode::usage, "--decision is for --what map");
   if (std::ranges::any_of(options.album.files, has_columns)) return;
   if (!options.y.empty() || options.x_max || options.logarithmic != "none")
@@ -167,10 +167,10 @@ Command add_plot(ArgumentParser program) {
       .type_name("SIGMAS")
       .within(0.0, 1000.0);
   cli.add_option("--decision", options->decision,
-                 "of a map: when this decision was made, counted from 0, with what was to choose "
+                 "of a map: when this decision was made, counted from 1, with what was to choose "
                  "from; default: at the end")
       .type_name("N")
-      .within(0, 2147483647);
+      .within(1, 2147483647);
   cli.add_flag("--apart", options->album.apart,
                "each graph beside the others, not one over the other");
   cli.add_option("--x", options->x,

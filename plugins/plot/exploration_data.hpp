@@ -62,7 +62,7 @@ struct RecordedState {
   std::optional<RecordedDecision> decision;  ///< that was asked for
 };
 
-/// Replays an EXPLORATION of docs/report.md up to a decision (counted from 0), or to its end.
+/// Replays an EXPLORATION of docs/report.md up to the decision of that number, or to its end.
 /// Throws `Error` (input) if there is no such decision, or no map.
 RecordedState recorded_state(std::string_view exploration, std::optional<int> decision);
 

@@ -216,7 +216,7 @@ void draw_maps(Canvas& canvas, const Theme& theme, const Album& album, const Plo
   }
   const double sigmas = options.ellipses > 0.0 ? options.ellipses : kSigmas;
   const std::optional<int> decision =
-      options.decision >= 0 ? std::optional(options.decision) : std::nullopt;
+      options.decision > 0 ? std::optional(options.decision) : std::nullopt;
   const std::vector<Box> boxes = panels(canvas, album.explorations.size());
   for (std::size_t k = 0; k < boxes.size(); ++k) {
     const RecordedState state = recorded_state(album.explorations[k], decision);

@@ -58,7 +58,7 @@ struct PlotOptions {
   EdgeColour colour = EdgeColour::by_class;
   bool poses = false;     ///< of trajectories: a mark at each pose
   double ellipses = 0.0;  ///< of trajectories: covariances of positions [σ]; 0: none
-  int decision = -1;      ///< of maps: at which decision of the robot; negative: at the end
+  int decision = 0;       ///< of maps: at which decision of the robot, from 1; 0: at the end
   /// Of convergence: iterations (empty, too) or time; of columns: the name of one, or the first.
   std::string x;
   std::string y_columns;  ///< its panels, separated by line ends: each a pattern with * and ?
@@ -80,9 +80,9 @@ struct PlotOptions {
         .boolean("poses", &O::poses, "marks each pose of a trajectory")
         .real("ellipses", &O::ellipses, 0.0, 1000.0,
               "standard deviations of the ellipses of a trajectory's covariances; 0: none")
-        .integer("decision", &O::decision, -1, 2147483647,
-                 "of a map: when this decision was made, counted from 0, with what was to choose "
-                 "from; -1: at the end")
+        .integer("decision", &O::decision, 0, 2147483647,
+                 "of a map: when this decision was made, counted from 1, with what was to choose "
+                 "from; 0: at the end")
         .text("x", &O::x,
               "horizontal axis: of convergence iterations or time, of columns one of them; empty: "
               "iterations, or the first column")

@@ -168,12 +168,12 @@ TEST_F(ExploreRecording, HasMapsToPlot) {
   ASSERT_EQ(whole.exit_code, 0) << whole.err;
   EXPECT_THAT(read_text(plot), AllOf(HasSubstr("<image"), Not(HasSubstr("NaN"))));
   const std::string end = read_text(plot);
-  ASSERT_EQ(cairn({"plot", record, "--what", "map", "--decision", "0", "-o", plot}).exit_code, 0);
+  ASSERT_EQ(cairn({"plot", record, "--what", "map", "--decision", "1", "-o", plot}).exit_code, 0);
   EXPECT_NE(read_text(plot), end);
   const Outcome late = cairn({"plot", record, "--what", "map", "--decision", "99", "-o", plot});
   EXPECT_EQ(late.exit_code, 3);
   EXPECT_THAT(late.err, HasSubstr("there is no decision 99; the last one is"));
-  const Outcome curves = cairn({"plot", record, "--decision", "0", "-o", plot});
+  const Outcome curves = cairn({"plot", record, "--decision", "1", "-o", plot});
   EXPECT_EQ(curves.exit_code, 2);
   EXPECT_THAT(curves.err, HasSubstr("--decision is for --what map"));
 }
