@@ -67,6 +67,14 @@ void cut(Line& line, double right) {
   line.y.resize(left);
 }
 
+/// The words before the one * of a pattern, such as "map_error" of "map_error *", which columns of
+/// several methods begin with.
+std::string first_words(const std::string& pattern) {
+  return pattern.ends_with(" *") && pattern.find_first_of("*?[") + 1 == pattern.size()
+             ? pattern.substr(0, pattern.size() - 2)
+             : "";
+}
+
 struct Panel {
   LineChart chart;
   std::vector<Line> lines;
@@ -77,13 +85,17 @@ Panel panel_of(const std::vector<NumberTable>& tables, const PlotOptions& option
                const std::string& pattern) {
   Panel panel;
   std::vector<std::string> names;  // of the columns, each once
+  const bool one_each = std::ranges::all_of(tables, [&](const NumberTable& table) {
+    return selected(table, horizontal(table, options.x), pattern).size() == 1;
+  });
   for (const NumberTable& table : tables) {
     const Column& x = horizontal(table, options.x);
     panel.chart.x_label = x.name;
     for (const Column* column : selected(table, x, pattern)) {
-      panel.lines.push_back(
-          {tables.size() == 1 ? column->name : fmt::format("{}: {}", table.name, column->name),
-           x.values, column->values});
+      const std::string name = tables.size() == 1 ? column->name
+                               : one_each         ? table.name
+                                                  : fmt::format("{}: {}", table.name, column->name);
+      panel.lines.push_back({name, x.values, column->values});
       cut(panel.lines.back(), options.x_max);
       if (std::ranges::find(names, column->name) == names.end()) names.push_back(column->name);
     }
@@ -93,10 +105,12 @@ Panel panel_of(const std::vector<NumberTable>& tables, const PlotOptions& option
                 fmt::format("no column with numbers matches '{}'; {} has {}", pattern,
                             tables.front().name, column_names(tables.front())));
   }
-  panel.chart.y_label = names.size() == 1 ? names.front() : std::string();
-  const std::string what = names.size() <= 3 ? fmt::format("{}", fmt::join(names, ", "))
-                           : pattern == "*"  ? tables.front().name
-                                             : pattern;
+  const std::string common = first_words(pattern);
+  panel.chart.y_label = names.size() == 1 ? names.front() : common;
+  const std::string what = !common.empty()     ? common
+                           : names.size() <= 3 ? fmt::format("{}", fmt::join(names, ", "))
+                           : pattern == "*"    ? tables.front().name
+                                               : pattern;
   panel.chart.title = fmt::format("{} against {}", what, panel.chart.x_label);
   const Logarithmic log = options.logarithmic;
   panel.chart.logarithmic_x = log == Logarithmic::x || log == Logarithmic::both;

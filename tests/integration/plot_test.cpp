@@ -264,6 +264,12 @@ TEST_F(PlotCommand, DrawsColumnsOfCsv) {
   const std::string other = folder_.file("other.csv");
   write_text(other, "step,seconds\n1,5\n");
   EXPECT_NE(plot({csv, other, "--y", "seconds"}, "svg"), plot({csv, "--y", "seconds"}, "svg"));
+  // Columns of two methods, one in each file: what they are called is that of the method's file.
+  write_text(csv, "step,map error a:x=1\n1,0.1\n2,0.2\n");
+  write_text(other, "step,map error b\n1,0.3\n2,0.1\n");
+  const std::string both = plot({csv, other, "--y", "map error *", "--name", "first"}, "svg");
+  write_text(csv, "step,map error c\n1,0.1\n2,0.2\n");
+  EXPECT_EQ(plot({csv, other, "--y", "map error *", "--name", "first"}, "svg"), both);
 }
 
 TEST_F(PlotCommand, SaysWhichColumnsThereAre) {
