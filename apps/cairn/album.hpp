@@ -23,7 +23,7 @@ struct AlbumOptions {
   InputOptions input;
   bool apart = false;   ///< each graph by itself, also one with the ids of another
   bool curves = false;  ///< of recordings of explorations the curves alone, as tables
-  bool maps = false;    ///< but these whole, since their maps are drawn
+  bool maps = false;    ///< recordings of explorations whole, also with `curves`
 };
 
 /// Of a recording of an exploration [bytes], so that a page is below 15 MB.

@@ -80,6 +80,10 @@ std::string output_of(const PlotOptions& options, Session& session) {
 void check_columns(const PlotOptions& options) {
   if (options.decision > 0 && options.what != "map")
     throw Error(ErrorCode::usage, "--decision is for --what map");
+  if (options.what == "map" &&
+      (!options.x.empty() || !options.y.empty() || options.x_max || options.logarithmic != "none"))
+    throw Error(ErrorCode::usage,
+                "--x, --y, --x-max and --log are for columns, not for --what map");
   if (std::ranges::any_of(options.album.files, has_columns)) return;
   if (!options.y.empty() || options.x_max || options.logarithmic != "none")
     throw Error(ErrorCode::usage,
@@ -162,8 +166,10 @@ Command add_plot(ArgumentParser program) {
       .one_of({"class", "residual"})
       .show_default();
   cli.add_flag("--poses", options->poses, "mark each pose of a trajectory");
-  cli.add_option("--ellipses", options->ellipses,
-                 "covariances [σ], of the JSON of optimize --covariance blocks")
+  cli.add_option(
+         "--ellipses", options->ellipses,
+         "covariances [σ], of the JSON of optimize --covariance blocks; on a map the robot's, 3 σ "
+         "by default")
       .type_name("SIGMAS")
       .within(0.0, 1000.0);
   cli.add_option("--decision", options->decision,

@@ -147,14 +147,14 @@ void Canvas::image(const std::function<Colour(std::size_t)>& cells, int columns,
                 fmt::format("a map of {} x {} cells is too large to draw", columns, rows));
   unsigned char* const bytes = cairo_image_surface_get_data(image.get());
   const auto stride = static_cast<std::size_t>(cairo_image_surface_get_stride(image.get()));
-  const auto byte = [](double part) {
+  const auto to_byte = [](double part) {
     return static_cast<std::uint32_t>(std::lround(255.0 * std::clamp(part, 0.0, 1.0)));
   };
   std::size_t cell = 0;
   for (int y = 0; y < rows; ++y) {
     for (int x = 0; x < columns; ++x) {
       const Colour c = cells(cell++);
-      const std::uint32_t pixel = byte(c.r) << 16 | byte(c.g) << 8 | byte(c.b);
+      const std::uint32_t pixel = to_byte(c.r) << 16 | to_byte(c.g) << 8 | to_byte(c.b);
       std::memcpy(bytes + static_cast<std::size_t>(y) * stride + 4 * static_cast<std::size_t>(x),
                   &pixel, sizeof pixel);
     }

@@ -85,9 +85,11 @@ Panel panel_of(const std::vector<NumberTable>& tables, const PlotOptions& option
                const std::string& pattern) {
   Panel panel;
   std::vector<std::string> names;  // of the columns, each once
-  const bool one_each = std::ranges::all_of(tables, [&](const NumberTable& table) {
-    return selected(table, horizontal(table, options.x), pattern).size() == 1;
-  });
+  const std::string common = first_words(pattern);
+  const bool one_each =
+      !common.empty() && std::ranges::all_of(tables, [&](const NumberTable& table) {
+        return selected(table, horizontal(table, options.x), pattern).size() == 1;
+      });
   for (const NumberTable& table : tables) {
     const Column& x = horizontal(table, options.x);
     panel.chart.x_label = x.name;
@@ -105,7 +107,6 @@ Panel panel_of(const std::vector<NumberTable>& tables, const PlotOptions& option
                 fmt::format("no column with numbers matches '{}'; {} has {}", pattern,
                             tables.front().name, column_names(tables.front())));
   }
-  const std::string common = first_words(pattern);
   panel.chart.y_label = names.size() == 1 ? names.front() : common;
   const std::string what = !common.empty()     ? common
                            : names.size() <= 3 ? fmt::format("{}", fmt::join(names, ", "))

@@ -20,11 +20,17 @@ namespace json = boost::json;
 
 constexpr double kMostCells = 1e8;
 constexpr double kMostNumbers = 1e8;
+constexpr double kFarthest = 1e9;  // [m]
 constexpr double kMissing = 65535.0, kSteps = 65534.0;
 
-std::int64_t whole(const json::value& value) {
+/// −1 for what is none.
+std::int64_t integer(const json::value& value) {
   const double found = number(value);
   return std::abs(found) < 9e15 ? static_cast<std::int64_t>(found) : -1;
+}
+
+bool is_integer(double number, double least, double most) {
+  return number == std::floor(number) && number >= least && number <= most;
 }
 
 Point point(const json::array& numbers) {
@@ -64,20 +70,21 @@ class Replay {
     for (const json::value& pose : list(line, "poses")) {
       const json::array& numbers = list(pose);
       if (numbers.size() >= 3)
-        state_.poses[whole(numbers[0])] = {number(numbers[1]), number(numbers[2])};
+        state_.poses[integer(numbers[0])] = {number(numbers[1]), number(numbers[2])};
     }
-    for (const json::value& id : list(line, "removed_poses")) state_.poses.erase(whole(id));
+    for (const json::value& id : list(line, "removed_poses")) state_.poses.erase(integer(id));
     for (const json::value& edge : list(line, "edges")) {
       const json::array& numbers = list(edge);
       if (numbers.size() >= 4) {
-        state_.edges[whole(numbers[0])] = {whole(numbers[1]), whole(numbers[2]),
-                                           static_cast<EdgeClass>(whole(numbers[3]))};
+        state_.edges[integer(numbers[0])] = {integer(numbers[1]), integer(numbers[2]),
+                                             static_cast<EdgeClass>(integer(numbers[3]))};
       }
     }
-    for (const json::value& id : list(line, "removed_edges")) state_.edges.erase(whole(id));
+    for (const json::value& id : list(line, "removed_edges")) state_.edges.erase(integer(id));
     if (const json::value* scan = member(line, "scan")) scan_ = scan;
     if (const json::array& pose = list(line, "estimate"); pose.size() >= 3) {
-      state_.robot = point(pose);
+      const Point at = point(pose);
+      if (std::max(std::abs(at.x), std::abs(at.y)) <= kFarthest) state_.robot = at;
       heading_ = number(pose[2]);
     }
     if (member(line, "covariance")) {
@@ -111,20 +118,30 @@ class Replay {
   }
 
  private:
+  /// As `check_frame` has it.
+  void begin_map(const json::value& map) {
+    state_.map = {};
+    state_.map.resolution = number(map, "resolution");
+    state_.map.origin = point(list(map, "origin"));
+    state_.map.yaw = member(map, "yaw") ? number(map, "yaw") : 0.0;
+    const Point& origin = state_.map.origin;
+    if (!(state_.map.resolution >= 1e-6 && state_.map.resolution <= 1e6) ||
+        !(std::max(std::abs(origin.x), std::abs(origin.y)) <= kFarthest) ||
+        !std::isfinite(state_.map.yaw))
+      throw Error(ErrorCode::input,
+                  state_.name + ": its map has a resolution or an origin that cannot be");
+  }
+
   void take_map(const json::value& map) {
-    if (const double resolution = number(map, "resolution"); resolution > 0.0) {
-      state_.map = {};
-      state_.map.resolution = resolution;
-      state_.map.origin = point(list(map, "origin"));
-      state_.map.yaw = number(map, "yaw");
-      if (!std::isfinite(state_.map.yaw)) state_.map.yaw = 0.0;
-    }
+    if (member(map, "resolution")) begin_map(map);
     const double x = number(map, "x"), y = number(map, "y"), width = number(map, "width"),
                  height = number(map, "height");
-    const bool there = std::abs(x) <= kMostCells && std::abs(y) <= kMostCells && width > 0.0 &&
-                       height > 0.0 && width * height <= kMostCells;
+    const bool is_box = is_integer(x, -kMostCells, kMostCells) &&
+                        is_integer(y, -kMostCells, kMostCells) &&
+                        is_integer(width, 1.0, kMostCells) && is_integer(height, 1.0, kMostCells) &&
+                        width * height <= kMostCells;
     const json::value* packed = member(map, "cells");
-    if (!there || !packed || !(state_.map.resolution > 0.0)) return;
+    if (!is_box || !packed || !(state_.map.resolution > 0.0)) return;
     const int left = static_cast<int>(x), bottom = static_cast<int>(y),
               columns = static_cast<int>(width), rows = static_cast<int>(height);
     const std::vector<double> cells = unpacked(*packed, state_.name + ", cells");
@@ -149,21 +166,25 @@ class Replay {
 
   /// Makes the box of the map hold this one, ends excluded.
   void cover(int left, int bottom, int right, int top) {
-    const RecordedMap before = state_.map;
-    if (!before.cells.empty()) {
-      left = std::min(left, before.first_x);
-      bottom = std::min(bottom, before.first_y);
-      right = std::max(right, before.first_x + before.width);
-      top = std::max(top, before.first_y + before.height);
-    }
     RecordedMap& map = state_.map;
+    if (!map.cells.empty()) {
+      left = std::min(left, map.first_x);
+      bottom = std::min(bottom, map.first_y);
+      right = std::max(right, map.first_x + map.width);
+      top = std::max(top, map.first_y + map.height);
+      if (right - left == map.width && top - bottom == map.height) return;
+    }
     if (!(double(right - left) * (top - bottom) <= kMostCells))
       throw Error(ErrorCode::input, state_.name + ": its map has too many cells to draw");
-    map.first_x = left;
-    map.first_y = bottom;
-    map.width = right - left;
-    map.height = top - bottom;
-    if (map.width == before.width && map.height == before.height) return;
+    const RecordedMap before = std::move(map);
+    map = {.resolution = before.resolution,
+           .origin = before.origin,
+           .yaw = before.yaw,
+           .first_x = left,
+           .first_y = bottom,
+           .width = right - left,
+           .height = top - bottom,
+           .cells = {}};
     map.cells.assign(static_cast<std::size_t>(map.width) * static_cast<std::size_t>(map.height),
                      RecordedMap::kUnknown);
     for (int y = 0; y < before.height; ++y) {
@@ -229,21 +250,24 @@ RecordedState recorded_state(std::string_view exploration, std::optional<int> de
   const json::value* robot = header ? member(*header, "robot") : nullptr;
   const std::string name = text(recording, "name");
   Replay replay(name, robot ? number(*robot, "radius") : 0.0);
-  double last = -1.0;
+  double last = -1.0;  // of those before
   for (const json::value& line : list(recording, "lines")) {
     const bool decides = member(line, "kind") != nullptr;
     if (!decides) replay.take(line);
     if (!decides || !decision) continue;
-    last = number(line, "decision");
-    if (last != *decision) continue;
+    const double which = number(line, "decision");
+    if (which != *decision) {
+      if (which > last) last = which;
+      continue;
+    }
     replay.decide(line);
     return std::move(replay).finish();
   }
   if (decision) {
     throw Error(ErrorCode::input,
                 last < 0.0 ? fmt::format("{}: the recording has no decisions", name)
-                           : fmt::format("{}: there is no decision {}; the last one is {:g}", name,
-                                         *decision, last));
+                           : fmt::format("{}: there is no decision {}; the last one is {:.0f}",
+                                         name, *decision, last));
   }
   return std::move(replay).finish();
 }

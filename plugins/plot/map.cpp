@@ -25,9 +25,9 @@ constexpr int kShades = 24;
 constexpr double kScanDot = 1.0;  // [px]
 
 Stroke trajectory_stroke(const Theme& theme) { return {theme.estimate.colour, 1.2, {}}; }
-Stroke path_stroke(const Theme& theme) { return {theme.peer(0).colour, 2.5, {}}; }
+Stroke path_stroke(const Theme& theme) { return {theme.peer(2).colour, 3, {}}; }
 Stroke scan_stroke(const Theme& theme) { return {theme.peer(1).colour, 2.0, {}}; }
-Stroke robot_stroke(const Theme& theme) { return {theme.peer(2).colour, 1.5, {}}; }
+Stroke robot_stroke(const Theme& theme) { return {theme.estimate.colour, 1.5, {}}; }
 
 Colour cell_colour(const Theme& theme, std::uint8_t cell) {
   if (cell == RecordedMap::kUnknown) return theme.grid;
@@ -37,17 +37,23 @@ Colour cell_colour(const Theme& theme, std::uint8_t cell) {
 /// Where the known cells are, and the robot.
 Bounds bounds_of(const RecordedState& state) {
   const RecordedMap& map = state.map;
-  Bounds bounds;
+  int left = map.width, right = -1, bottom = map.height, top = -1;
   for (int y = 0; y < map.height; ++y) {
     for (int x = 0; x < map.width; ++x) {
       if (map.cells[static_cast<std::size_t>(y) * static_cast<std::size_t>(map.width) +
                     static_cast<std::size_t>(x)] == RecordedMap::kUnknown)
         continue;
-      for (const double corner : {0.0, 1.0})
-        bounds.add(map.at(map.first_x + x + corner, map.first_y + y + corner));
+      left = std::min(left, x);
+      right = std::max(right, x);
+      bottom = std::min(bottom, y);
+      top = std::max(top, y);
     }
   }
+  Bounds bounds;
   bounds.add(state.robot);
+  if (right < 0) return bounds;
+  for (const int x : {left, right + 1})
+    for (const int y : {bottom, top + 1}) bounds.add(map.at(map.first_x + x, map.first_y + y));
   return bounds;
 }
 
@@ -64,10 +70,12 @@ class Goodness {
     if (best_ < 0.0) worst_ = std::min(worst_, 0.0);
   }
   bool empty() const { return best_ > worst_; }
+  bool differs() const { return worst_ > best_; }
   double best() const { return best_; }
   double worst() const { return worst_; }
   double of(double value) const {
-    if (!std::isfinite(value) || !(worst_ > best_)) return 0.0;
+    if (!std::isfinite(value)) return 0.0;
+    if (!differs()) return 1.0;
     return std::clamp((worst_ - value) / (worst_ - best_), 0.0, 1.0);
   }
 
@@ -111,8 +119,11 @@ class MapDrawing {
       const Point p = map.at(map.first_x + column, map.first_y + row);
       return std::array{x(p), y(p)};
     };
-    canvas_.image([&](std::size_t k) { return cell_colour(theme_, map.cells[k]); }, map.width,
-                  map.height, corner(0, 0), corner(1, 0), corner(0, 1));
+    std::array<Colour, 256> colours;
+    for (std::size_t k = 0; k < colours.size(); ++k)
+      colours[k] = cell_colour(theme_, static_cast<std::uint8_t>(k));
+    canvas_.image([&](std::size_t k) { return colours[map.cells[k]]; }, map.width, map.height,
+                  corner(0, 0), corner(1, 0), corner(0, 1));
   }
 
   void draw_scan() {
@@ -172,7 +183,8 @@ class MapDrawing {
     const Point& at = state_.robot;
     if (!at.there()) return;
     const double radius = state_.radius > 0.0 ? x({at.x + state_.radius, at.y}) - x(at) : 0.0;
-    canvas_.dot(x(at), y(at), std::max(radius, 2.0));
+    constexpr double kLeast = 2.0, kMost = 1000.0;  // [px]
+    canvas_.dot(x(at), y(at), std::clamp(radius, kLeast, kMost));
     std::vector<Point> corners;
     for (const auto& [dx, dy] : ellipse(state_.covariance, sigmas))
       corners.push_back({at.x + dx, at.y + dy});
@@ -200,7 +212,8 @@ std::vector<LegendEntry> legend_of(const RecordedState& state, const Theme& them
   if (!goodness.empty()) {
     legend.push_back(
         {fmt::format("{} of {:.3g}", what, goodness.best()), {theme.residual(1), 2, {}}});
-    legend.push_back({fmt::format("of {:.3g}", goodness.worst()), {theme.residual(0), 1, {}}});
+    if (goodness.differs())
+      legend.push_back({fmt::format("of {:.3g}", goodness.worst()), {theme.residual(0), 1, {}}});
   }
   if (state.decision->chosen >= 0) legend.push_back({"chosen", path_stroke(theme)});
   return legend;
@@ -221,6 +234,7 @@ void draw_maps(Canvas& canvas, const Theme& theme, const Album& album, const Plo
   for (std::size_t k = 0; k < boxes.size(); ++k) {
     const RecordedState state = recorded_state(album.explorations[k], decision);
     Bounds bounds = bounds_of(state);
+    if (bounds.empty()) throw Error(ErrorCode::input, state.name + ": nothing on its map is known");
     const Box rest =
         draw_heading(canvas, theme, boxes[k], state.name, legend_of(state, theme, sigmas));
     const Chart chart = plane(canvas, theme, rest, bounds);

@@ -79,7 +79,8 @@ struct PlotOptions {
         .choice("colour", &O::colour, "what colours edges")
         .boolean("poses", &O::poses, "marks each pose of a trajectory")
         .real("ellipses", &O::ellipses, 0.0, 1000.0,
-              "standard deviations of the ellipses of a trajectory's covariances; 0: none")
+              "standard deviations of the ellipses of a trajectory's covariances, 0: none; of a "
+              "map the robot's, 0: 3")
         .integer("decision", &O::decision, 0, 2147483647,
                  "of a map: when this decision was made, counted from 1, with what was to choose "
                  "from; 0: at the end")

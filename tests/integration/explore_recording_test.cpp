@@ -173,6 +173,7 @@ TEST_F(ExploreRecording, HasMapsToPlot) {
   const Outcome late = cairn({"plot", record, "--what", "map", "--decision", "99", "-o", plot});
   EXPECT_EQ(late.exit_code, 3);
   EXPECT_THAT(late.err, HasSubstr("there is no decision 99; the last one is"));
+  EXPECT_EQ(cairn({"plot", record, "--what", "map", "--y", "loops", "-o", plot}).exit_code, 2);
   const Outcome curves = cairn({"plot", record, "--decision", "1", "-o", plot});
   EXPECT_EQ(curves.exit_code, 2);
   EXPECT_THAT(curves.err, HasSubstr("--decision is for --what map"));

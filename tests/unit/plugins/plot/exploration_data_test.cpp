@@ -7,6 +7,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -44,14 +45,14 @@ std::string exploration() {
       R"("width":2,"height":2,"cells":{}}}}})",
       scan, cells({0, 100, 255, 40}));
   const std::string first =
-      R"({"decision":0,"kind":"drive","candidates":[{"value":3,"points":[[1,2],[4,6]]},{"value":2}],"chosen":0})";
+      R"({"decision":1,"kind":"drive","candidates":[{"value":3,"points":[[1,2],[4,6]]},{"value":2}],"chosen":0})";
   const std::string motion =
       fmt::format(R"({{"step":1,"decision":1,"estimate":[4,6,{}],"covariance":null,{},)"
                   R"("poses":[[0,1.5,2,0],[7,4,6,1],[8,5,6,1]],"edges":[[3,0,7,0],[4,7,8,1]],)"
                   R"("map":{{"x":0,"y":1,"width":2,"height":2,"cells":{}}}}})",
                   std::numbers::pi / 2, scan, cells({7, 254, 254, 8}));
   const std::string second = fmt::format(
-      R"({{"decision":1,"kind":"drive","candidates":[],"tree":{{"count":3,"positions":{},)"
+      R"({{"decision":2,"kind":"drive","candidates":[],"tree":{{"count":3,"positions":{},)"
       R"("parents":{},"values":{}}}}})",
       points({4.0F, 6.0F, 5.0F, 6.0F, 5.0F, 8.0F}, 2),
       packed_json(std::span<const std::int32_t>(parents), Packing::deflate),
@@ -64,7 +65,7 @@ std::string exploration() {
 }
 
 TEST(RecordedState, AtADecisionIsWhatWasKnownThen) {
-  const RecordedState state = recorded_state(exploration(), 0);
+  const RecordedState state = recorded_state(exploration(), 1);
   EXPECT_EQ(state.name, "run");
   EXPECT_EQ(state.radius, 0.25);
   EXPECT_EQ(state.robot.x, 1.0);
@@ -86,7 +87,7 @@ TEST(RecordedState, AtADecisionIsWhatWasKnownThen) {
 }
 
 TEST(RecordedState, PutsTogetherWhatHasChanged) {
-  const RecordedState state = recorded_state(exploration(), 1);
+  const RecordedState state = recorded_state(exploration(), 2);
   // The box has grown by a column to the right and a row below; 254 has not changed.
   EXPECT_EQ(state.map.first_x, -1);
   EXPECT_EQ(state.map.first_y, 1);
@@ -112,15 +113,33 @@ TEST(RecordedState, AtItsEndHasNoDecision) {
 
 TEST(RecordedState, SaysWhichDecisionsThereAre) {
   try {
-    recorded_state(exploration(), 2);
+    recorded_state(exploration(), 3);
     FAIL();
   } catch (const Error& error) {
     EXPECT_EQ(error.code(), ErrorCode::input);
-    EXPECT_THAT(error.what(), HasSubstr("run: there is no decision 2; the last one is 1"));
+    EXPECT_THAT(error.what(), HasSubstr("run: there is no decision 3; the last one is 2"));
   }
   EXPECT_THROW(recorded_state(R"({"name":"a","lines":[]})", 0), Error);
   EXPECT_THROW(recorded_state(R"({"name":"a","lines":[]})", {}), Error);
   EXPECT_THROW(recorded_state("", {}), Error);
+}
+
+TEST(RecordedState, OfAMapThatCannotBeIsRefused) {
+  const auto changed = [](const std::string& from, const std::string& to) {
+    std::string text = exploration();
+    const std::size_t at = text.find(from);
+    EXPECT_NE(at, std::string::npos) << from;
+    return text.replace(at, from.size(), to);
+  };
+  for (const auto& [from, to] : {std::pair{"\"resolution\":0.5", "\"resolution\":1e-300"},
+                                 {"[10,20]", "[1e20,20]"},
+                                 {"[10,20]", "[]"},
+                                 {"\"yaw\":0", "\"yaw\":null"}})
+    EXPECT_THROW(recorded_state(changed(from, to), 1), Error) << to;
+  // A part that cannot be is left out; a robot too far off has not come there.
+  EXPECT_THROW(recorded_state(changed("\"width\":2", "\"width\":1e-300"), 1), Error);
+  EXPECT_EQ(recorded_state(changed("\"x\":0", "\"x\":0.5"), 2).map.width, 2);
+  EXPECT_EQ(recorded_state(changed("[4,6,", "[4e20,6,"), 2).robot.x, 1.0);
 }
 
 TEST(RecordedState, OfDamagedTextIsAnErrorAtMost) {

@@ -77,8 +77,9 @@ def study_figures(bench: Bench, keep: Keep) -> None:
 def study_elsewhere(bench: Bench, keep: Keep) -> None:
     for floor, generated in OTHER_FLOORS.items():
         for method, explorer in ELSEWHERE.items():
-            keep(measure(bench, "elsewhere", floor_of(bench, floor, generated), method, explorer, bench.rounds,
-                         action_space(bench)))
+            entry = measure(bench, f"elsewhere_{floor}", floor_of(bench, floor, generated), method, explorer, bench.rounds,
+                            action_space(bench))
+            keep({**entry, "part": "elsewhere"})
 
 
 # Tables
@@ -166,7 +167,7 @@ def elsewhere_sections(entries: list[Json]) -> Sections:
             title = ""
         rows.append(["", "ends", *(ends_of(methods[name]) if name in methods else "-" for name in names),
                      *[""] * (len(names) - 1)])
-    return {"explore-elsewhere": table(["floor", "mean ± 95 %", *names, *(f"{name} − {names[0]}" for name in names[1:])], rows)}
+    return {"explore-elsewhere": table(["floor", "mean ± 95 % of", *names, *(f"{name} − {names[0]}" for name in names[1:])], rows)}
 
 
 STUDIES = [part_study("cave", "cave_20m", "@cave", CONFIGURATION_SPACE, configuration_space),
