@@ -166,15 +166,12 @@ Command add_plot(ArgumentParser program) {
       .one_of({"class", "residual"})
       .show_default();
   cli.add_flag("--poses", options->poses, "mark each pose of a trajectory");
-  cli.add_option(
-         "--ellipses", options->ellipses,
-         "covariances [σ], of the JSON of optimize --covariance blocks; on a map the robot's, 3 σ "
-         "by default")
+  cli.add_option("--ellipses", options->ellipses,
+                 "covariances [σ], of optimize --covariance blocks; on maps the robot's")
       .type_name("SIGMAS")
       .within(0.0, 1000.0);
   cli.add_option("--decision", options->decision,
-                 "of a map: when this decision was made, counted from 1, with what was to choose "
-                 "from; default: at the end")
+                 "of a map: at this decision, with what was to choose from [the end]")
       .type_name("N")
       .within(1, 2147483647);
   cli.add_flag("--apart", options->album.apart,
@@ -183,8 +180,7 @@ Command add_plot(ArgumentParser program) {
                  "of convergence: iterations or time [iterations]; of CSV: a column [first]")
       .type_name("AXIS");
   cli.add_option("--y", options->y,
-                 "columns of CSV or of an exploration, such as 'chi2' or 'seconds*': each --y is a "
-                 "chart [all in one]")
+                 "columns, such as 'chi2' or 'seconds*': each --y is a chart [all in one]")
       .type_name("COLUMNS")
       .repeatable();
   cli.add_option("--x-max", options->x_max,
@@ -204,7 +200,6 @@ Command add_plot(ArgumentParser program) {
       "  cairn plot city.g2o best.g2o --truth truth.g2o -o city.svg\n"
       "  cairn plot city.g2o compact.g2o --apart --poses -o maps.svg\n"
       "  cairn plot run1.json run2.json --what convergence --x time -o curves.pdf\n"
-      "  cairn plot steps.csv --x variables --y seconds --y affected --log y -o steps.svg\n"
       "  cairn plot robot.jsonl --what map --decision 40 -o robot.png\n"
       "  cairn plot @sphere --what sparsity --linear-solver block_cholesky:ordering=natural -o "
       "L.png");
