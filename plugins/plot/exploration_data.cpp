@@ -118,18 +118,17 @@ class Replay {
   }
 
  private:
-  /// As `check_frame` has it.
   void begin_map(const json::value& map) {
+    const Point origin = point(list(map, "origin"));
+    first_x_ = first_y_ = 0;
     state_.map = {};
-    state_.map.resolution = number(map, "resolution");
-    state_.map.origin = point(list(map, "origin"));
-    state_.map.yaw = member(map, "yaw") ? number(map, "yaw") : 0.0;
-    const Point& origin = state_.map.origin;
-    if (!(state_.map.resolution >= 1e-6 && state_.map.resolution <= 1e6) ||
-        !(std::max(std::abs(origin.x), std::abs(origin.y)) <= kFarthest) ||
-        !std::isfinite(state_.map.yaw))
-      throw Error(ErrorCode::input,
-                  state_.name + ": its map has a resolution or an origin that cannot be");
+    state_.map.frame = {.width = 1,
+                        .height = 1,
+                        .resolution = number(map, "resolution"),
+                        .origin = {origin.x, origin.y},
+                        .yaw = member(map, "yaw") ? number(map, "yaw") : 0.0};
+    check_frame(state_.map.frame, state_.name);
+    state_.map.frame.width = state_.map.frame.height = 0;
   }
 
   void take_map(const json::value& map) {
@@ -141,7 +140,7 @@ class Replay {
                         is_integer(width, 1.0, kMostCells) && is_integer(height, 1.0, kMostCells) &&
                         width * height <= kMostCells;
     const json::value* packed = member(map, "cells");
-    if (!is_box || !packed || !(state_.map.resolution > 0.0)) return;
+    if (!is_box || !packed || !(state_.map.frame.resolution > 0.0)) return;
     const int left = static_cast<int>(x), bottom = static_cast<int>(y),
               columns = static_cast<int>(width), rows = static_cast<int>(height);
     const std::vector<double> cells = unpacked(*packed, state_.name + ", cells");
@@ -158,39 +157,36 @@ class Replay {
     }
   }
 
+  /// Of a cell, counted from the origin.
   std::size_t index(int x, int y) const {
-    const RecordedMap& map = state_.map;
-    return static_cast<std::size_t>(y - map.first_y) * static_cast<std::size_t>(map.width) +
-           static_cast<std::size_t>(x - map.first_x);
+    return state_.map.frame.index(x - first_x_, y - first_y_);
   }
 
   /// Makes the box of the map hold this one, ends excluded.
   void cover(int left, int bottom, int right, int top) {
     RecordedMap& map = state_.map;
     if (!map.cells.empty()) {
-      left = std::min(left, map.first_x);
-      bottom = std::min(bottom, map.first_y);
-      right = std::max(right, map.first_x + map.width);
-      top = std::max(top, map.first_y + map.height);
-      if (right - left == map.width && top - bottom == map.height) return;
+      left = std::min(left, first_x_);
+      bottom = std::min(bottom, first_y_);
+      right = std::max(right, first_x_ + map.frame.width);
+      top = std::max(top, first_y_ + map.frame.height);
+      if (right - left == map.frame.width && top - bottom == map.frame.height) return;
     }
-    if (!(double(right - left) * (top - bottom) <= kMostCells))
-      throw Error(ErrorCode::input, state_.name + ": its map has too many cells to draw");
     const RecordedMap before = std::move(map);
-    map = {.resolution = before.resolution,
-           .origin = before.origin,
-           .yaw = before.yaw,
-           .first_x = left,
-           .first_y = bottom,
-           .width = right - left,
-           .height = top - bottom,
-           .cells = {}};
-    map.cells.assign(static_cast<std::size_t>(map.width) * static_cast<std::size_t>(map.height),
-                     RecordedMap::kUnknown);
-    for (int y = 0; y < before.height; ++y) {
-      std::copy_n(before.cells.begin() + std::ptrdiff_t{y} * before.width, before.width,
-                  map.cells.begin() +
-                      static_cast<std::ptrdiff_t>(index(before.first_x, before.first_y + y)));
+    const int shift_x = first_x_ - left, shift_y = first_y_ - bottom;
+    first_x_ = left;
+    first_y_ = bottom;
+    map.frame = before.frame;
+    map.frame.width = right - left;
+    map.frame.height = top - bottom;
+    map.frame.origin = before.frame.to_world({-shift_x, -shift_y});
+    check_frame(map.frame, state_.name);
+    map.cells.assign(static_cast<std::size_t>(map.frame.size()), RecordedMap::kUnknown);
+    for (int y = 0; y < before.frame.height; ++y) {
+      std::copy_n(
+          before.cells.begin() + static_cast<std::ptrdiff_t>(before.frame.index(0, y)),
+          before.frame.width,
+          map.cells.begin() + static_cast<std::ptrdiff_t>(map.frame.index(shift_x, y + shift_y)));
     }
   }
 
@@ -227,16 +223,12 @@ class Replay {
   }
 
   RecordedState state_;
+  int first_x_ = 0, first_y_ = 0;      ///< cells from the recorded origin to that of the box
   const json::value* scan_ = nullptr;  ///< the newest
   double heading_ = 0.0;
 };
 
 }  // namespace
-
-Point RecordedMap::at(double x, double y) const {
-  const double c = std::cos(yaw), s = std::sin(yaw);
-  return {origin.x + resolution * (c * x - s * y), origin.y + resolution * (s * x + c * y)};
-}
 
 RecordedState recorded_state(std::string_view exploration, std::optional<int> decision) {
   json::parse_options options;

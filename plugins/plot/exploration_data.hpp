@@ -10,24 +10,18 @@
 #include <vector>
 
 #include "bounds.hpp"
+#include "cairn/grid/grid.hpp"
 #include "cairn/report/scene.hpp"
 #include "ellipse.hpp"
 
 namespace cairn::plot {
 
-/// The map of a robot: cell (x, y) of the box is `first_x` + x columns to the right of and
-/// `first_y` + y rows above the one with its lower left corner in `origin`.
+/// The map of a robot: a box that holds all that it knows.
 struct RecordedMap {
   static constexpr std::uint8_t kUnknown = 255, kUnchanged = 254;
 
-  double resolution = 0.0;  ///< side of a cell [m]
-  Point origin;             ///< [m]
-  double yaw = 0.0;         ///< by which the grid is turned about it [rad]
-  int first_x = 0, first_y = 0, width = 0, height = 0;
-  std::vector<std::uint8_t> cells;  ///< row by row from below: per cent occupied, or `kUnknown`
-
-  /// A place in cells from `origin`, in the world [m].
-  Point at(double x, double y) const;
+  GridFrame frame;
+  std::vector<std::uint8_t> cells;  ///< by `GridFrame::index`: per cent occupied, or `kUnknown`
 };
 
 /// What was decided between.

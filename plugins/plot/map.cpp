@@ -34,15 +34,19 @@ Colour cell_colour(const Theme& theme, std::uint8_t cell) {
   return mix(theme.paper, theme.ink, std::min(cell / 100.0, 1.0));
 }
 
+/// A place of the map, in cells.
+Point place(const GridFrame& frame, int x, int y) {
+  const Eigen::Vector2d world = frame.to_world({x, y});
+  return {world.x(), world.y()};
+}
+
 /// Where the known cells are, and the robot.
 Bounds bounds_of(const RecordedState& state) {
-  const RecordedMap& map = state.map;
-  int left = map.width, right = -1, bottom = map.height, top = -1;
-  for (int y = 0; y < map.height; ++y) {
-    for (int x = 0; x < map.width; ++x) {
-      if (map.cells[static_cast<std::size_t>(y) * static_cast<std::size_t>(map.width) +
-                    static_cast<std::size_t>(x)] == RecordedMap::kUnknown)
-        continue;
+  const GridFrame& frame = state.map.frame;
+  int left = frame.width, right = -1, bottom = frame.height, top = -1;
+  for (int y = 0; y < frame.height; ++y) {
+    for (int x = 0; x < frame.width; ++x) {
+      if (state.map.cells[frame.index(x, y)] == RecordedMap::kUnknown) continue;
       left = std::min(left, x);
       right = std::max(right, x);
       bottom = std::min(bottom, y);
@@ -53,7 +57,7 @@ Bounds bounds_of(const RecordedState& state) {
   bounds.add(state.robot);
   if (right < 0) return bounds;
   for (const int x : {left, right + 1})
-    for (const int y : {bottom, top + 1}) bounds.add(map.at(map.first_x + x, map.first_y + y));
+    for (const int y : {bottom, top + 1}) bounds.add(place(frame, x, y));
   return bounds;
 }
 
@@ -116,14 +120,14 @@ class MapDrawing {
     canvas_.rectangle(chart_.area());
     canvas_.fill(cell_colour(theme_, RecordedMap::kUnknown));
     const auto corner = [&](int column, int row) {
-      const Point p = map.at(map.first_x + column, map.first_y + row);
+      const Point p = place(map.frame, column, row);
       return std::array{x(p), y(p)};
     };
     std::array<Colour, 256> colours;
     for (std::size_t k = 0; k < colours.size(); ++k)
       colours[k] = cell_colour(theme_, static_cast<std::uint8_t>(k));
-    canvas_.image([&](std::size_t k) { return colours[map.cells[k]]; }, map.width, map.height,
-                  corner(0, 0), corner(1, 0), corner(0, 1));
+    canvas_.image([&](std::size_t k) { return colours[map.cells[k]]; }, map.frame.width,
+                  map.frame.height, corner(0, 0), corner(1, 0), corner(0, 1));
   }
 
   void draw_scan() {

@@ -72,8 +72,7 @@ TEST(RecordedState, AtADecisionIsWhatWasKnownThen) {
   EXPECT_EQ(state.covariance.xy, 0.01);
   EXPECT_THAT(state.map.cells, ElementsAre(0, 100, 255, 40));
   // Cell (−1, 2) of half a metre from (10, 20).
-  EXPECT_EQ(state.map.at(state.map.first_x, state.map.first_y).x, 9.5);
-  EXPECT_EQ(state.map.at(state.map.first_x, state.map.first_y).y, 21.0);
+  EXPECT_EQ(state.map.frame.origin, Eigen::Vector2d(9.5, 21.0));
   // To the right 2 m, ahead nothing, to the left 1 m.
   ASSERT_THAT(state.scan, SizeIs(2));
   EXPECT_NEAR(state.scan[0].x, 1.0, 1e-3);
@@ -89,8 +88,7 @@ TEST(RecordedState, AtADecisionIsWhatWasKnownThen) {
 TEST(RecordedState, PutsTogetherWhatHasChanged) {
   const RecordedState state = recorded_state(exploration(), 2);
   // The box has grown by a column to the right and a row below; 254 has not changed.
-  EXPECT_EQ(state.map.first_x, -1);
-  EXPECT_EQ(state.map.first_y, 1);
+  EXPECT_EQ(state.map.frame.origin, Eigen::Vector2d(9.5, 20.5));
   EXPECT_THAT(state.map.cells, ElementsAre(255, 7, 255, 0, 100, 8, 255, 40, 255));
   EXPECT_EQ(state.poses.at(0).x, 1.5);
   EXPECT_EQ(state.edges.at(4).kind, EdgeClass::loop);
@@ -138,7 +136,7 @@ TEST(RecordedState, OfAMapThatCannotBeIsRefused) {
     EXPECT_THROW(recorded_state(changed(from, to), 1), Error) << to;
   // A part that cannot be is left out; a robot too far off has not come there.
   EXPECT_THROW(recorded_state(changed("\"width\":2", "\"width\":1e-300"), 1), Error);
-  EXPECT_EQ(recorded_state(changed("\"x\":0", "\"x\":0.5"), 2).map.width, 2);
+  EXPECT_EQ(recorded_state(changed("\"x\":0", "\"x\":0.5"), 2).map.frame.width, 2);
   EXPECT_EQ(recorded_state(changed("[4,6,", "[4e20,6,"), 2).robot.x, 1.0);
 }
 
