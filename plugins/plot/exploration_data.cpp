@@ -172,7 +172,7 @@ class Replay {
       top = std::max(top, first_y_ + map.frame.height);
       if (right - left == map.frame.width && top - bottom == map.frame.height) return;
     }
-    const RecordedMap before = std::move(map);
+    const RecordedMap before = std::exchange(map, {});
     const int shift_x = first_x_ - left, shift_y = first_y_ - bottom;
     first_x_ = left;
     first_y_ = bottom;
