@@ -184,7 +184,7 @@ void CompactPose::add_pose(const Variable& pose, std::span<const Factor> odometr
   }
   open_ = true;
   searched_ = false;
-  answered_ = 0;
+  answered_ = in_vain_ = 0;
   candidates_.clear();
   dimensions_.clear();
   seen_.clear();
@@ -299,6 +299,7 @@ std::optional<MatchProposal> CompactPose::next_match() {
   const Timed timed(report_.seconds.total);
   if (!searched_) search();
   if (options_.matches > 0 && answered_ >= options_.matches) return std::nullopt;
+  if (gives_up()) return std::nullopt;
   while (!candidates_.empty()) {
     Candidate& best = candidates_.front();
     if (!(best.gain > loop_gain_)) {
@@ -367,15 +368,17 @@ LinkReport CompactPose::offer(Id other, std::span<const Factor> measured) {
               .covariance = to_matrix(motion.covariance, graph_.group().tangent_size())};
     typical_.note(link.covariance);
     report.verdict = judge(link, report);
-    if (report.verdict == LinkVerdict::linked || report.verdict == LinkVerdict::waiting)
-      graph_.make_permanent(pose);
+    const bool waits = report.verdict == LinkVerdict::waiting;
+    if (report.verdict == LinkVerdict::linked) in_vain_ = 0;
+    if (report.verdict == LinkVerdict::inconsistent || waits) ++in_vain_;
+    if (report.verdict == LinkVerdict::linked || waits) graph_.make_permanent(pose);
     if (report.verdict == LinkVerdict::linked) {
       const bool noted = candidate && options_.keep == 0;  // it takes memory for every loop
       if (noted)
         finder_.note_loop(*test_, dimensions_[candidate->place], report.gain, link.covariance);
       learnt_.push_back({other, graph_.newest_id(), link.covariance, report.gain, noted});
       use(link);
-    } else if (report.verdict == LinkVerdict::waiting) {
+    } else if (waits) {
       if (!graph_.newest_kept()) graph_.keep(report_.seconds);
       learnt_.push_back({other, graph_.newest_id(), link.covariance, report.gain, false});
       waiting_.push_back({std::move(link), report});
@@ -516,8 +519,9 @@ PoseReport CompactPose::end_pose() {
       limit_poses_of_landmarks(by_landmarks);
     if (graph_.predecessor() >= 0 && report_.candidates > 0 && options_.keep == 0)
       finder_.note_pose(report_.least_gain);
-    for (const Candidate& left : candidates_)
-      report_.most_gain = std::max(report_.most_gain, left.gain);
+    for (const Candidate& left : candidates_) {
+      if (!gives_up()) report_.most_gain = std::max(report_.most_gain, left.gain);
+    }
     make_room();
     settle_left_out();
   }

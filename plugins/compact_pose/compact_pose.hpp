@@ -141,6 +141,8 @@ class CompactPose final : public PosePolicy, public OptionFinder {
   void check_new(const Variable& pose) const;
   void expect_matches();
   bool answered(int pose) const;
+  /// So many matches of the newest pose have not passed the gate that others will hardly do so.
+  bool gives_up() const { return options_.attempts > 0 && in_vain_ >= options_.attempts; }
   void search();
   std::vector<int> recorded_pairs() const;
   Displacement known_displacement(int pose);
@@ -213,6 +215,7 @@ class CompactPose final : public PosePolicy, public OptionFinder {
   bool open_ = false, searched_ = false;
   std::vector<Candidate> candidates_;  ///< a heap by worth
   int answered_ = 0;                   ///< requests for a match
+  int in_vain_ = 0;                    ///< matches in a row that the gate did not let pass
   int solved_version_ = -1;            ///< of the graph when candidates were last solved for
   int asked_version_ = -1;             ///< of the graph when a single candidate was evaluated again
   std::vector<Dimensions> dimensions_;  ///< of the candidates, before any link of this pose

@@ -103,6 +103,10 @@ OptionFields<CompactPoseOptions> CompactPoseOptions::fields() {
           "most pairs that are proposed per pose, those first whose information gain times the "
           "probability of a match is largest, which is learnt from earlier answers; 0: any "
           "number, by information gain alone")
+      .integer(
+          "attempts", &O::attempts, 0, 1e9,
+          "with gate: matches of a pose in a row that are inconsistent or wait, after which no "
+          "other is proposed for it; 0: any number")
       .integer("keep", &O::keep, 0, 1e9,
                "most poses that are kept: of more, some leave and are replaced by factors between "
                "their neighbours; 0: any number")

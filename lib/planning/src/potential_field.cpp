@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cmath>
 #include <numbers>
+#include <string>
 
 #include <Eigen/Core>
 
@@ -97,8 +98,16 @@ Pose2 to_pose(const ConfigurationSpace& space, const Vector3d& point) {
 }  // namespace
 
 PotentialField::PotentialField(const ConfigurationSpace& space, std::span<const float> decrease,
-                               const PotentialFieldOptions& options)
-    : space_(space), options_(options), values_(space.size()), fixed_(space.size()) {
+                               const PotentialFieldOptions& options, std::string_view kernels)
+    : space_(space),
+      options_(options),
+      values_(space.size()),
+      fixed_(space.size()),
+      relax_row_(choose_relax_row(kernels)) {
+  if (!relax_row_) {
+    throw Error(ErrorCode::usage, "a potential field: there are no kernels '" +
+                                      std::string(kernels) + "' that this machine can run");
+  }
   if (decrease.size() != space.size())
     throw Error(ErrorCode::usage, "a potential field needs one value per configuration");
   float largest = 0.0F;
@@ -135,6 +144,7 @@ PotentialField::Solution PotentialField::solve(double weight, double seconds,
                                         {.relaxation = options_.relaxation,
                                          .tolerance = options_.tolerance,
                                          .most = options_.sweeps,
+                                         .relax_row = relax_row_,
                                          .goes_on = goes_on});
   values_ = std::move(grid.values);
   return {count.sweeps, count.change, count.change <= options_.tolerance};

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <numbers>
 #include <utility>
@@ -15,8 +16,9 @@ namespace {
 /// Coarser grids than this are not worth making.
 constexpr std::size_t kFewest = 64;
 
-/// Changes are relative to at least this.
-constexpr double kLeast = std::numeric_limits<double>::min();
+/// Changes are relative to at least this, so far above the least number that no tolerance times it
+/// is subnormal: processors take a hundred times as long for such numbers.
+constexpr double kLeast = 1e-290;
 
 std::size_t at(std::int32_t cell) { return static_cast<std::size_t>(cell); }
 
@@ -95,154 +97,132 @@ PotentialGrid PotentialGrid::coarser(std::vector<std::int32_t>& parents) const {
 namespace {
 
 /// The values of a grid while they are swept: by cell, and of each cell those of the orientations
-/// of one colour together, so that an update reads and writes neighbouring numbers. Where the
-/// number of orientations is odd, the first and the last are beside each other and have the same
-/// colour: they are by cell alone, one updated after the other.
+/// of one colour together (`PotentialRows`), so that an update reads and writes neighbouring
+/// numbers. Where the number of orientations is odd, the first and the last are beside each other
+/// and have the same colour: they are by cell alone, one updated after the other.
 class Relaxation {
  public:
-  Relaxation(PotentialGrid& grid, double weight, double relaxation)
+  Relaxation(PotentialGrid& grid, double weight, const SweepOptions& options)
       : grid_(grid),
         turns_(at(grid.orientations)),
         half_(grid.orientations % 2 == 0 ? turns_ / 2 : 0),
-        values_(grid.values.size()),
-        fixed_(grid.values.size()),
-        nothing_(turns_, 0.0),
-        beside_(turns_ + 1),
-        next_(turns_) {
-    set_factor(weight, relaxation);
-    for (std::size_t k = 0; k < turns_; ++k) {
-      for (std::size_t n = 0; n < grid.layer(); ++n) {
-        const std::size_t from = k * grid.layer() + n, to = index(n, k);
-        values_[to] = grid.values[from];
-        fixed_[to] = grid.fixed[from];
-      }
+        stride_(half_ > 0 ? (half_ + 9) / 8 * 8 : turns_),
+        relax_row_(options.relax_row),
+        rows_((half_ > 0 ? 2 : 1) * grid.layer() * stride_),
+        nothing_(stride_, 0.0) {
+    set_factor(weight, options.relaxation);
+    for (std::size_t n = 0; n < grid.layer(); ++n) {
+      if (n == 0 || grid.cells[n][1] != grid.cells[n - 1][1]) row_begins_.push_back(n);
+      for (std::size_t k = 0; k < turns_; ++k)
+        rows_[index(n, k)] = grid.values[k * grid.layer() + n];
+      if (half_ == 0) continue;
+      rows_[2 * n * stride_ + half_] = rows_[index(n, 0)];
+      rows_[(2 * n + 1) * stride_ - 1] = rows_[index(n, turns_ - 1)];
+      for (std::size_t parity = 0; parity < 2; ++parity) note_fixed(n, parity);
     }
-    if (half_ == 0) return;
-    for (std::size_t row = 0; row < 2 * grid.layer(); ++row) {
-      fixed_from_.push_back(fixed_in_row_.size());
-      for (std::size_t j = 0; j < half_; ++j)
-        if (fixed_[row * half_ + j] != 0) fixed_in_row_.push_back(j);
-    }
-    fixed_from_.push_back(fixed_in_row_.size());
+    row_begins_.push_back(grid.layer());
+    cells_.half = half_;
+    cells_.stride = stride_;
+    cells_.values = rows_.data();
+    cells_.nothing = nothing_.data();
+    cells_.neighbours = grid.neighbours.front().data();
+    cells_.free_row = free_row_.data();
+    cells_.free = free_.data();
+    cells_.least = kLeast;
   }
 
   /// The factor of over-relaxation.
   void set_factor(double weight, double relaxation) {
-    keeps_ = 1.0 - relaxation;
-    for (std::size_t k = 0; k < factor_.size(); ++k)
-      factor_[k] = relaxation / (6.0 - static_cast<double>(k) / weight);
+    cells_.keeps = 1.0 - relaxation;
+    for (std::size_t k = 0; k < std::size(cells_.factor); ++k)
+      cells_.factor[k] = relaxation / (6.0 - static_cast<double>(k) / weight);
   }
 
-  /// Returns the largest relative change.
-  double sweep() {
-    largest_ = 0.0;
-    for (std::size_t colour = 0; colour < 2; ++colour) {
-      for (std::size_t n = 0; n < grid_.layer(); ++n) {
-        const std::size_t parity = (at(grid_.cells[n][0]) + at(grid_.cells[n][1]) + colour) % 2;
-        if (half_ > 0)
-          update_together(n, parity);
-        else
-          update_in_turn(n, parity);
+  /// So many sweeps; returns the largest relative change in the last one. Each colour of each sweep
+  /// follows the one before it a row of cells behind, while what it reads is in the caches. What
+  /// it reads of the rows beside is as if sweeps were made one after another.
+  double sweep(int count) {
+    double largest = 0.0;
+    const std::ptrdiff_t rows = std::ssize(row_begins_) - 1, stages = 2 * count;
+    for (std::ptrdiff_t front = 0; front < rows + stages - 1; ++front) {
+      for (std::ptrdiff_t stage = 0; stage < stages; ++stage) {
+        const std::ptrdiff_t row = front - stage;
+        if (row < 0 || row >= rows) continue;
+        update_row(static_cast<std::size_t>(row), static_cast<std::size_t>(stage % 2),
+                   stage >= stages - 2 ? &largest : nullptr);
       }
     }
-    return largest_;
+    return largest;
   }
 
   void write_back() const {
     for (std::size_t k = 0; k < turns_; ++k)
       for (std::size_t n = 0; n < grid_.layer(); ++n)
-        grid_.values[k * grid_.layer() + n] = values_[index(n, k)];
+        grid_.values[k * grid_.layer() + n] = rows_[index(n, k)];
   }
 
  private:
-  /// What an update needs of a cell's four neighbours.
-  struct Neighbours {
-    std::array<const double*, 4> values;
-    double factor;
-  };
-
   std::size_t index(std::size_t cell, std::size_t turn) const {
     if (half_ == 0) return cell * turns_ + turn;
-    return cell * turns_ + turn % 2 * half_ + turn / 2;
+    return (2 * cell + turn % 2) * stride_ + turn / 2;
   }
 
-  /// `first`: of the orientations, by place in a cell.
-  Neighbours neighbours_of(std::size_t cell, std::size_t first) const {
-    Neighbours result{};
+  void note_fixed(std::size_t cell, std::size_t parity) {
+    const auto fixed = [&](std::size_t j) {
+      return grid_.fixed[(2 * j + parity) * grid_.layer() + cell] != 0;
+    };
+    bool any = false;
+    for (std::size_t j = 0; j < half_; ++j) any = any || fixed(j);
+    free_row_.push_back(any ? static_cast<std::int32_t>(free_.size() / stride_) : -1);
+    if (!any) return;
+    for (std::size_t j = 0; j < stride_; ++j) free_.push_back(j < half_ && !fixed(j) ? -1 : 0);
+  }
+
+  /// Of the cells of a row, those orientations that have this colour. `largest` may be null.
+  void update_row(std::size_t row, std::size_t colour, double* largest) {
+    for (std::size_t n = row_begins_[row]; n < row_begins_[row + 1]; ++n) {
+      const std::size_t parity = (at(grid_.cells[n][0]) + at(grid_.cells[n][1]) + colour) % 2;
+      if (half_ > 0)
+        relax_row_(cells_, n, parity, largest);
+      else
+        update_in_turn(n, parity, largest);
+    }
+  }
+
+  void update_in_turn(std::size_t cell, std::size_t parity, double* largest) {
+    double* const here = &rows_[cell * turns_];
+    std::array<const double*, 4> beside{};
     std::size_t missing = 0;
     for (std::size_t k = 0; k < 4; ++k) {
       const std::int32_t other = grid_.neighbours[cell][k];
-      result.values[k] = other < 0 ? nothing_.data() : &values_[at(other) * turns_ + first];
+      beside[k] = other < 0 ? nothing_.data() : &rows_[at(other) * turns_];
       if (other < 0) ++missing;
     }
-    result.factor = factor_[missing];
-    return result;
-  }
-
-  /// Only where it is more than the largest so far is there something to divide.
-  void note_change(double old, double value) {
-    const double change = std::abs(value - old);
-    const double own = std::max(std::abs(value), kLeast);
-    if (change > largest_ * own) largest_ = change / own;
-  }
-
-  /// All orientations of one parity, none of which is beside another.
-  void update_together(std::size_t cell, std::size_t parity) {
-    double* const here = &values_[cell * turns_ + parity * half_];
-    const double* const others = &values_[cell * turns_ + (1 - parity) * half_];
-    const auto [beside, factor] = neighbours_of(cell, parity * half_);
-    // Those before and after: others[j − 1] and others[j], or others[j] and others[j + 1].
-    std::copy_n(others, half_, &beside_[1 - parity]);
-    (parity == 0 ? beside_.front() : beside_[half_]) = parity == 0 ? others[half_ - 1] : others[0];
-    const double keeps = keeps_;
-    const double *const left = beside[0], *const right = beside[1], *const below = beside[2],
-                        *const above = beside[3];
-    for (std::size_t j = 0; j < half_; ++j) {
-      const double sum = beside_[j] + beside_[j + 1] + left[j] + right[j] + below[j] + above[j];
-      next_[j] = keeps * here[j] + factor * sum;
-    }
-    const std::size_t row = 2 * cell + parity;
-    for (std::size_t k = fixed_from_[row]; k < fixed_from_[row + 1]; ++k)
-      next_[fixed_in_row_[k]] = here[fixed_in_row_[k]];
-    const Eigen::Map<const Eigen::ArrayXd> before(here, static_cast<Eigen::Index>(half_)),
-        after(next_.data(), before.size());
-    if (((after - before).abs() - largest_ * after.abs().max(kLeast)).maxCoeff() > 0.0)
-      for (std::size_t j = 0; j < half_; ++j) note_change(here[j], next_[j]);
-    std::copy_n(next_.data(), half_, here);
-  }
-
-  void update_in_turn(std::size_t cell, std::size_t parity) {
-    double* const here = &values_[cell * turns_];
-    const char* const fixed = &fixed_[cell * turns_];
-    const auto [beside, factor] = neighbours_of(cell, 0);
     for (std::size_t k = parity; k < turns_; k += 2) {
-      if (fixed[k] != 0) continue;
+      if (grid_.fixed[k * grid_.layer() + cell] != 0) continue;
       double sum = here[(k + turns_ - 1) % turns_] + here[(k + 1) % turns_];
       for (const double* const values : beside) sum += values[k];
-      const double value = keeps_ * here[k] + factor * sum;
-      note_change(here[k], value);
+      const double value = cells_.keeps * here[k] + cells_.factor[missing] * sum;
+      const double change = std::abs(value - here[k]), own = std::max(std::abs(value), kLeast);
+      if (largest && change > *largest * own) *largest = change / own;
       here[k] = value;
     }
   }
 
   PotentialGrid& grid_;
-  std::size_t turns_, half_;
-  double keeps_ = 0.0;
-  std::array<double, 5> factor_{};  ///< by neighbours that are not there
-  std::vector<double> values_;
-  std::vector<char> fixed_;
-  std::vector<std::size_t> fixed_from_,
-      fixed_in_row_;  ///< of orientations of one parity: by cell and parity
-  std::vector<double> nothing_, beside_, next_;
-  double largest_ = 0.0;
+  std::size_t turns_, half_, stride_;
+  RelaxRow relax_row_;
+  std::vector<double, Eigen::aligned_allocator<double>> rows_;
+  std::vector<double> nothing_;
+  std::vector<std::int32_t> free_row_;
+  std::vector<std::int64_t> free_;
+  std::vector<std::size_t> row_begins_;  ///< of the cells of one y
+  PotentialRows cells_{};
 };
 
-}  // namespace
-
-namespace {
-
-/// Sweeps between two estimates of how fast changes become less.
-constexpr int kBetweenFactors = 10;
+/// Sweeps between two estimates of how fast changes become less, and how many are made together:
+/// the rows of cells that these are in at a time should fit in the second cache.
+constexpr int kBetweenFactors = 10, kTogether = 5;
 /// Two estimates of the rate agree if they differ by less.
 constexpr double kSameRate = 0.1;
 
@@ -279,13 +259,16 @@ SweepCount solve(PotentialGrid& grid, double weight, const SweepOptions& options
       }
     }
   }
-  Relaxation relaxation(grid, weight, options.relaxation);
+  Relaxation relaxation(grid, weight, options);
   SweepCount count;
   const double largest = std::max(largest_factor(grid), options.relaxation);
   double factor = options.relaxation, before = 0.0, rate_before = 0.0;
   do {
-    count.change = relaxation.sweep();
-    ++count.sweeps;
+    // The first one alone, if that is all that there is time for.
+    const int most = count.sweeps == 0 ? 1 : kTogether - count.sweeps % kTogether;
+    const int together = std::min(most, options.most - count.sweeps);
+    count.change = relaxation.sweep(together);
+    count.sweeps += together;
     if (count.sweeps % kBetweenFactors != 0) continue;
     // The first changes are not those of the slowest mode, which the rate of all later ones is.
     const double rate = std::pow(count.change / before, 1.0 / kBetweenFactors);

@@ -8,6 +8,8 @@
 #include <span>
 #include <vector>
 
+#include "potential_kernels.hpp"
+
 namespace cairn {
 
 /// The cells of a potential over x, y and θ, and which are beside each other. Values are by
@@ -39,13 +41,15 @@ struct SweepCount {
 
 struct SweepOptions {
   double relaxation, tolerance;
-  int most;                       ///< on each grid
-  std::function<bool()> goes_on;  ///< asked after each sweep
+  int most;  ///< on each grid
+  RelaxRow relax_row;
+  std::function<bool()> goes_on;  ///< asked after the first sweep, and after some more each time
 };
 
 /// Sweeps of successive over-relaxation over (5.9), in two colours like those of a chessboard,
-/// until nothing changes by more than the tolerance, from the solution of coarser grids. `weight`:
-/// of a neighbour that is not there, as a divisor.
+/// until nothing changes by more than the tolerance, from the solution of coarser grids. Several
+/// sweeps are made at once, while what they read is in the caches, and their number is a multiple.
+/// `weight`: of a neighbour that is not there, as a divisor.
 SweepCount solve(PotentialGrid& grid, double weight, const SweepOptions& options);
 
 }  // namespace cairn

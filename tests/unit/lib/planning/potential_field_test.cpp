@@ -62,6 +62,21 @@ std::vector<float> one_attractor(const ConfigurationSpace& space, int x, int y, 
   return decrease;
 }
 
+/// Those that this machine can run.
+std::vector<std::string> kernel_sets() {
+  const FloorMap map = two_rooms();
+  const ConfigurationSpace space(map, kRadius, 4);
+  std::vector<std::string> sets;
+  for (const char* name : {"portable", "avx2", "avx512"}) {
+    try {
+      const PotentialField field(space, std::vector<float>(space.size()), {}, name);
+      sets.emplace_back(name);
+    } catch (const Error&) {
+    }
+  }
+  return sets;
+}
+
 class PotentialFieldOf : public testing::TestWithParam<int> {};
 
 /// Also with an odd number of orientations, of which the first and the last are swept one after
@@ -71,10 +86,12 @@ TEST_P(PotentialFieldOf, OrientationsSolvesTheEquationsAsADenseSolverDoes) {
   const ConfigurationSpace space(map, kRadius, GetParam());
   std::vector<float> decrease = one_attractor(space, 10, 4, 3);
   decrease[space.index(space.number(2, 1), 0)] = 1.5F;
-  PotentialField field(space, decrease, {.tolerance = 3e-12});
+  std::vector<PotentialField> fields;
+  for (const std::string& kernels : kernel_sets())
+    fields.emplace_back(space, decrease, PotentialFieldOptions{.tolerance = 3e-12}, kernels);
+  PotentialField& field = fields.front();
   for (const double weight : {1.0, 1.1, 1.5, 3.0}) {
-    const PotentialField::Solution solution = field.solve(weight);
-    EXPECT_TRUE(solution.converged);
+    for (PotentialField& one : fields) EXPECT_TRUE(one.solve(weight).converged);
     VectorXd right = VectorXd::Zero(static_cast<Eigen::Index>(space.size()));
     int attractors = 0;
     for (std::size_t k = 0; k < space.size(); ++k) {
@@ -87,12 +104,13 @@ TEST_P(PotentialFieldOf, OrientationsSolvesTheEquationsAsADenseSolverDoes) {
     EXPECT_GT(expected.minCoeff(), 0.0);
     for (std::size_t k = 0; k < space.size(); ++k) {
       const double value = expected[static_cast<Eigen::Index>(k)];
-      ASSERT_NEAR(field.value(k), value, 1e-9 * value) << weight;
+      for (std::size_t set = 0; set < fields.size(); ++set)
+        ASSERT_NEAR(fields[set].value(k), value, 1e-9 * value) << weight << kernel_sets()[set];
     }
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Numbers, PotentialFieldOf, testing::Values(4, 5, 6, 9));
+INSTANTIATE_TEST_SUITE_P(Numbers, PotentialFieldOf, testing::Values(4, 5, 6, 9, 14, 16, 20));
 
 /// Multiplying by w at obstacles, as a potential that is positive would have it, has no limit: the
 /// iteration matrix of (5.9) has an eigenvalue above 1, whereas dividing keeps all below it.
@@ -219,6 +237,7 @@ TEST(PotentialField, RefusesWhatMakesNoSense) {
   const FloorMap map = two_rooms();
   const ConfigurationSpace space(map, kRadius, 4);
   EXPECT_THROW(PotentialField(space, std::vector<float>(3)), Error);
+  EXPECT_THROW(PotentialField(space, std::vector<float>(space.size()), {}, "sse"), Error);
   PotentialField field(space, one_attractor(space, 1, 1, 0));
   EXPECT_THROW(field.solve(0.9), Error);
 }

@@ -147,6 +147,33 @@ TEST_F(CompactPoseTest, EdgesMayPointBackwards) {
     most = std::max(most, poses.log(poses.between(a.state(v), b.state(v))).norm());
   EXPECT_LT(most, 0.01);
 }
+TEST_F(CompactPoseTest, AfterSeveralAttemptsInARowNoMoreIsProposed) {
+  const std::string options = "strategy=apfl,range=30,angle=3.15,loop_gain=0.2,gate=0.999,";
+  // How many matches are proposed for a pose, if all are far off but that of number `right`.
+  const auto proposed = [](Robot& robot, int right) {
+    const Pose off{7.0, -4.0, 1.0};
+    int count = 0;
+    for (; const auto match = robot.policy().next_match(); ++count) {
+      const Factor measured = robot.right(match->earlier);
+      const LinkVerdict expected = count == right ? LinkVerdict::linked : LinkVerdict::inconsistent;
+      const Pose false_one = robot.world().compose(measured.measurement, off);
+      EXPECT_EQ(
+          robot.offer(count == right ? measured : robot.wrong(match->earlier, false_one)).verdict,
+          expected);
+    }
+    return count;
+  };
+  Robot robot(registry, options + "attempts=3");
+  for (int k = 0; k < 30; ++k) robot.advance();
+  EXPECT_EQ(proposed(robot, -1), 3);
+  EXPECT_EQ(robot.advance().links.size(), 3U);
+  EXPECT_EQ(proposed(robot, 2), 6);  // counted again from the link on
+  robot.advance();
+  EXPECT_EQ(proposed(robot, -1), 3);
+  Robot other(registry, options + "attempts=0");
+  for (int k = 0; k < 30; ++k) other.advance();
+  EXPECT_GT(proposed(other, -1), 10);
+}
 
 TEST_F(CompactPoseTest, SeveralMeasurementsOfOneMotionCountAsOne) {
   const PoseWorld world(planar_types(registry));

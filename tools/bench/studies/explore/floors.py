@@ -13,9 +13,11 @@ from .thesis import action_space
 
 FLOORS = ["cave_20m", "fr079", "intel_lab", "hospital_40m", "willow_full", "stata_basement", "depot", "warehouse",
           "simple_rooms", "tb3_sandbox"]
+SIX = ["cave_20m", "fr079", "intel_lab", "depot", "simple_rooms", "tb3_sandbox"]
 # Of each method on a floor so many runs have a line of their own; the means are of all.
 LISTED = 2
 MEANS = {"seen": "of the floor seen [m²]", "wrong": "wrong cells [m²]", "ate": "ATE [m]", "trajectory_entropy": "trajectory entropy [nats]"}
+SIX_MEANS = {**MEANS, "map_entropy": "map entropy [nats·m²]", "loops": "loop closures", "seconds": "time of a run [s]"}
 
 
 def all_floors(bench: Bench) -> list[DataSet]:
@@ -29,6 +31,15 @@ def study_floors(bench: Bench, keep: Keep) -> None:
     for floor in all_floors(bench):
         for explorer in bench.cairn.names("explorer"):
             keep(measure(bench, "floors", floor, explorer, explorer, bench.rounds, until))
+
+
+def study_six(bench: Bench, keep: Keep) -> None:
+    """Every explorer on six floors with many seeds, over a distance at which none of the larger floors is done."""
+    until = ["--until", "distance=10" if bench.quick else "distance=50"]
+    floors = [floor for floor in all_floors(bench) if floor.name in SIX or floor.name.startswith("@")]
+    for floor in floors:
+        for explorer in bench.cairn.names("explorer"):
+            keep(measure(bench, "six", floor, explorer, explorer, bench.rounds, until))
 
 
 def study_exact(bench: Bench, keep: Keep) -> None:
@@ -72,7 +83,7 @@ def floors_sections(entries: list[Json]) -> Sections:
                          *(digits(of[measure]) for measure in ["ate", "wrong", "decision_p95"])])
             floor = ""
         before = name
-    return {"explore-floors-means": means_table(entries),
+    return {"explore-floors-means": means_table(entries, MEANS),
             "explore-floors": table(["floor", "explorer", "seed", "end", "why", "driven [m]", "seen [m²]", "loops",
                                      "collisions", "ATE [m]", "wrong [m²]", "95 % of decisions [s]"], rows)}
 
@@ -90,18 +101,22 @@ def exact_sections(entries: list[Json]) -> Sections:
                                     "collisions"], rows)}
 
 
-def means_table(entries: list[Json]) -> str:
+def means_table(entries: list[Json], measures: dict[str, str]) -> str:
     """A row for each measure and floor, a column for each explorer."""
     explorers = list(dict.fromkeys(text(entry, "method") for entry in entries))
     by_place = {(text(entry, "name"), text(entry, "method")): entry for entry in entries}
     rows = []
-    for measure_name, title in MEANS.items():
+    for measure_name, title in measures.items():
         for floor in dict.fromkeys(text(entry, "name") for entry in entries):
             cells = [mean_of(by_place[floor, explorer], measure_name).text() if (floor, explorer) in by_place else "-"
                      for explorer in explorers]
             rows.append([title, floor, *cells])
             title = ""
     return table(["mean ± 95 %", "floor", *explorers], rows)
+
+
+def six_sections(entries: list[Json]) -> Sections:
+    return {"explore-six": means_table(entries, SIX_MEANS)}
 
 
 def sensitivity_sections(entries: list[Json]) -> Sections:
@@ -114,5 +129,6 @@ def sensitivity_sections(entries: list[Json]) -> Sections:
 
 
 STUDIES = [Study("explore_floors", study_floors, floors_sections),
-           Study("explore_exact", study_exact, exact_sections),
+           Study("explore_six", study_six, six_sections),
+          Study("explore_exact", study_exact, exact_sections),
            Study("explore_sensitivity", study_sensitivity, sensitivity_sections)]

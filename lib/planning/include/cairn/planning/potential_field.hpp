@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <limits>
 #include <span>
+#include <string_view>
 #include <vector>
 
 #include "cairn/planning/configuration_space.hpp"
@@ -14,6 +15,8 @@
 #include "cairn/typed/pose2.hpp"
 
 namespace cairn {
+
+struct PotentialRows;
 
 struct PotentialFieldOptions {
   double attractor = 0.6, tolerance = 1e-3, relaxation = 1.8;
@@ -52,9 +55,11 @@ struct PotentialFieldOptions {
 class CAIRN_API PotentialField {
  public:
   /// `decrease`: −E ≥ 0 [nats], by `ConfigurationSpace::index`. The space must outlive it. 9 bytes
-  /// per configuration, and 16 per cell; while it solves, up to three times as many.
+  /// per configuration, and 16 per cell; while it solves, up to three times as many. `kernels`: by
+  /// default the fastest that the machine can run; by name portable, avx2 or avx512. Throws `Error`
+  /// (usage) for kernels that the machine cannot run, or another number of values.
   PotentialField(const ConfigurationSpace& space, std::span<const float> decrease,
-                 const PotentialFieldOptions& options = {});
+                 const PotentialFieldOptions& options = {}, std::string_view kernels = "auto");
 
   struct Solution {
     int sweeps = 0;         ///< over all configurations
@@ -88,6 +93,7 @@ class CAIRN_API PotentialField {
   PotentialFieldOptions options_;
   std::vector<double> values_;
   std::vector<char> fixed_;
+  void (*relax_row_)(const PotentialRows&, std::size_t, std::size_t, double*);
   double weight_ = 1.0;
 };
 

@@ -1,0 +1,4 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#define CAIRN_KERNEL_SET portable
+#define CAIRN_KERNEL_WIDTH 2
+#include "potential_kernels_body.hpp"
