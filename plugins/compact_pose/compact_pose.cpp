@@ -185,6 +185,7 @@ void CompactPose::add_pose(const Variable& pose, std::span<const Factor> odometr
   open_ = true;
   searched_ = false;
   answered_ = in_vain_ = 0;
+  proposed_ = -1;
   candidates_.clear();
   dimensions_.clear();
   seen_.clear();
@@ -311,6 +312,7 @@ std::optional<MatchProposal> CompactPose::next_match() {
     if (best.version == graph_.version()) {
       const Displacement d = known_displacement(best.pose);
       const auto mean = graph_.group().view(d.mean);
+      proposed_ = best.pose;
       return MatchProposal{graph_.id(best.pose),
                            graph_.newest_id(),
                            best.gain,
@@ -370,7 +372,7 @@ LinkReport CompactPose::offer(Id other, std::span<const Factor> measured) {
     report.verdict = judge(link, report);
     const bool waits = report.verdict == LinkVerdict::waiting;
     if (report.verdict == LinkVerdict::linked) in_vain_ = 0;
-    if (report.verdict == LinkVerdict::inconsistent || waits) ++in_vain_;
+    if (pose == proposed_ && (report.verdict == LinkVerdict::inconsistent || waits)) ++in_vain_;
     if (report.verdict == LinkVerdict::linked || waits) graph_.make_permanent(pose);
     if (report.verdict == LinkVerdict::linked) {
       const bool noted = candidate && options_.keep == 0;  // it takes memory for every loop
@@ -519,9 +521,8 @@ PoseReport CompactPose::end_pose() {
       limit_poses_of_landmarks(by_landmarks);
     if (graph_.predecessor() >= 0 && report_.candidates > 0 && options_.keep == 0)
       finder_.note_pose(report_.least_gain);
-    for (const Candidate& left : candidates_) {
-      if (!gives_up()) report_.most_gain = std::max(report_.most_gain, left.gain);
-    }
+    for (const Candidate& left : candidates_)
+      report_.most_gain = std::max(report_.most_gain, left.gain);
     make_room();
     settle_left_out();
   }

@@ -141,8 +141,12 @@ class CompactPose final : public PosePolicy, public OptionFinder {
   void check_new(const Variable& pose) const;
   void expect_matches();
   bool answered(int pose) const;
-  /// So many matches of the newest pose have not passed the gate that others will hardly do so.
-  bool gives_up() const { return options_.attempts > 0 && in_vain_ >= options_.attempts; }
+  /// So many matches that were proposed for the newest pose led to no link that others will hardly
+  /// do so. Never where all loop closures are wanted, or a recording has them all.
+  bool gives_up() const {
+    return options_.attempts > 0 && in_vain_ >= options_.attempts &&
+           options_.strategy != Strategy::apal && options_.search != Search::recorded;
+  }
   void search();
   std::vector<int> recorded_pairs() const;
   Displacement known_displacement(int pose);
@@ -215,7 +219,8 @@ class CompactPose final : public PosePolicy, public OptionFinder {
   bool open_ = false, searched_ = false;
   std::vector<Candidate> candidates_;  ///< a heap by worth
   int answered_ = 0;                   ///< requests for a match
-  int in_vain_ = 0;                    ///< matches in a row that the gate did not let pass
+  int in_vain_ = 0;                    ///< proposed ones that are inconsistent or wait, in a row
+  int proposed_ = -1;                  ///< the pose that was proposed last; −1: none
   int solved_version_ = -1;            ///< of the graph when candidates were last solved for
   int asked_version_ = -1;             ///< of the graph when a single candidate was evaluated again
   std::vector<Dimensions> dimensions_;  ///< of the candidates, before any link of this pose

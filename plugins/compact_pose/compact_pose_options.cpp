@@ -105,8 +105,9 @@ OptionFields<CompactPoseOptions> CompactPoseOptions::fields() {
           "number, by information gain alone")
       .integer(
           "attempts", &O::attempts, 0, 1e9,
-          "with gate: matches of a pose in a row that are inconsistent or wait, after which no "
-          "other is proposed for it; 0: any number")
+          "with gate: proposed matches of a pose that are inconsistent or wait, since the last "
+          "that was linked, after which no other is proposed for it; 0: any number, as with "
+          "strategy=apal and search=recorded")
       .integer("keep", &O::keep, 0, 1e9,
                "most poses that are kept: of more, some leave and are replaced by factors between "
                "their neighbours; 0: any number")

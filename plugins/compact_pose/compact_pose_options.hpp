@@ -73,8 +73,10 @@ struct CompactPoseOptions {
   /// … where the link loses at most this information [nats per DoF and kept pose nearby].
   double reuse_loss = 0.06;
   int matches = 0;  ///< most requests for a match per pose; 0: any number
-  /// Matches of a pose, one after another, that are inconsistent or wait, after which no more is
-  /// asked for; 0: any number. Where the estimate is wrong or uncertain, all of them are or do.
+  /// Of the matches that are proposed for a pose, those that are inconsistent or wait for another,
+  /// since the last that was linked, after which no more is proposed; 0: any number. Where the
+  /// estimate is wrong, all others are inconsistent as well; where matches are too uncertain to
+  /// confirm one another, all wait. Of no effect with `Strategy::apal` and `Search::recorded`.
   int attempts = 8;
   int keep = 0;  ///< most poses that are kept, as others leave; 0: any number
   std::string select = "nearest:leaving=true";  ///< which poses leave

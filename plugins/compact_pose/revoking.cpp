@@ -268,6 +268,7 @@ bool CompactPose::revoke(Id a, Id b) {
   if (!open_) return true;
   // Others tell more without it, so what is known of the candidates is no bound any more.
   searched_ = false;
+  in_vain_ = 0;
   candidates_.clear();
   dimensions_.clear();
   report_.candidates = 0;

@@ -160,6 +160,12 @@ class FloorsTest(unittest.TestCase):
         # Lines of their own have the first two.
         self.assertEqual(section(floors, "explore-floors").count("| limit |"), 4)
 
+    def test_means_on_six_floors_have_the_graph_and_the_time_as_well(self):
+        table = section(report("explore_six", entry("six", "frontier", {"loops": 20.0, "seconds": 1.0}, {"loops": 24.0, "seconds": 3.0})),
+                        "explore-six")
+        self.assertIn("| loop closures | fr079 | 22 ± 25 |", table)
+        self.assertIn("| time of a run [s] | fr079 | 2 ± 13 |", table)
+
     def test_what_was_changed_has_a_row_for_each_method(self):
         changed = {**entry("sensitivity", "drrt_star", {"loops": 20.0}, {"loops": 24.0}), "change": "range 4 m"}
         missing = {"part": "sensitivity", "method": "frontier", "change": "range 4 m", "missing": True}

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <iterator>
 #include <limits>
+#include <memory>
 #include <numbers>
 #include <utility>
 
@@ -16,8 +17,8 @@ namespace {
 /// Coarser grids than this are not worth making.
 constexpr std::size_t kFewest = 64;
 
-/// Changes are relative to at least this, so far above the least number that no tolerance times it
-/// is subnormal: processors take a hundred times as long for such numbers.
+/// Changes are relative to at least this, so far above the least normal number that this times a
+/// relative change is none below it: processors take a hundred times as long for such numbers.
 constexpr double kLeast = 1e-290;
 
 std::size_t at(std::int32_t cell) { return static_cast<std::size_t>(cell); }
@@ -106,13 +107,14 @@ class Relaxation {
       : grid_(grid),
         turns_(at(grid.orientations)),
         half_(grid.orientations % 2 == 0 ? turns_ / 2 : 0),
-        stride_(half_ > 0 ? (half_ + 9) / 8 * 8 : turns_),
+        stride_(half_ > 0 ? stride_of(half_) : turns_),
         relax_row_(options.relax_row),
-        rows_((half_ > 0 ? 2 : 1) * grid.layer() * stride_),
+        storage_((half_ > 0 ? 2 : 1) * grid.layer() * stride_ + kAligned / sizeof(double)),
+        rows_(aligned(storage_)),
         nothing_(stride_, 0.0) {
     set_factor(weight, options.relaxation);
     for (std::size_t n = 0; n < grid.layer(); ++n) {
-      if (n == 0 || grid.cells[n][1] != grid.cells[n - 1][1]) row_begins_.push_back(n);
+      if (n == 0 || grid.cells[n][1] != grid.cells[n - 1][1]) line_begins_.push_back(n);
       for (std::size_t k = 0; k < turns_; ++k)
         rows_[index(n, k)] = grid.values[k * grid.layer() + n];
       if (half_ == 0) continue;
@@ -120,36 +122,36 @@ class Relaxation {
       rows_[(2 * n + 1) * stride_ - 1] = rows_[index(n, turns_ - 1)];
       for (std::size_t parity = 0; parity < 2; ++parity) note_fixed(n, parity);
     }
-    row_begins_.push_back(grid.layer());
-    cells_.half = half_;
-    cells_.stride = stride_;
-    cells_.values = rows_.data();
-    cells_.nothing = nothing_.data();
-    cells_.neighbours = grid.neighbours.front().data();
-    cells_.free_row = free_row_.data();
-    cells_.free = free_.data();
-    cells_.least = kLeast;
+    line_begins_.push_back(grid.layer());
+    sweep_.half = half_;
+    sweep_.stride = stride_;
+    sweep_.values = rows_;
+    sweep_.nothing = nothing_.data();
+    sweep_.neighbours = grid.neighbours.data()->data();
+    sweep_.free_row = free_row_.data();
+    sweep_.free = free_.data();
+    sweep_.least = kLeast;
   }
 
   /// The factor of over-relaxation.
   void set_factor(double weight, double relaxation) {
-    cells_.keeps = 1.0 - relaxation;
-    for (std::size_t k = 0; k < std::size(cells_.factor); ++k)
-      cells_.factor[k] = relaxation / (6.0 - static_cast<double>(k) / weight);
+    sweep_.keeps = 1.0 - relaxation;
+    for (std::size_t k = 0; k < std::size(sweep_.factor); ++k)
+      sweep_.factor[k] = relaxation / (6.0 - static_cast<double>(k) / weight);
   }
 
   /// So many sweeps; returns the largest relative change in the last one. Each colour of each sweep
-  /// follows the one before it a row of cells behind, while what it reads is in the caches. What
-  /// it reads of the rows beside is as if sweeps were made one after another.
+  /// follows the one before it a line of cells behind, while what it reads is in the caches. What
+  /// it reads of the lines beside is as if sweeps were made one after another.
   double sweep(int count) {
     double largest = 0.0;
-    const std::ptrdiff_t rows = std::ssize(row_begins_) - 1, stages = 2 * count;
-    for (std::ptrdiff_t front = 0; front < rows + stages - 1; ++front) {
+    const std::ptrdiff_t lines = std::ssize(line_begins_) - 1, stages = 2 * count;
+    for (std::ptrdiff_t front = 0; front < lines + stages - 1; ++front) {
       for (std::ptrdiff_t stage = 0; stage < stages; ++stage) {
-        const std::ptrdiff_t row = front - stage;
-        if (row < 0 || row >= rows) continue;
-        update_row(static_cast<std::size_t>(row), static_cast<std::size_t>(stage % 2),
-                   stage >= stages - 2 ? &largest : nullptr);
+        const std::ptrdiff_t line = front - stage;
+        if (line < 0 || line >= lines) continue;
+        update_line(static_cast<std::size_t>(line), static_cast<std::size_t>(stage % 2),
+                    stage >= stages - 2 ? &largest : nullptr);
       }
     }
     return largest;
@@ -162,6 +164,17 @@ class Relaxation {
   }
 
  private:
+  /// Of a few orientations, whole vectors do not reach the last number of a row, which is written
+  /// by itself: what is read across it has to wait.
+  static std::size_t stride_of(std::size_t half) { return (half + (half > 16 ? 9 : 15)) / 8 * 8; }
+
+  static constexpr std::size_t kAligned = 64;  ///< bytes: lines of a cache
+  static double* aligned(std::vector<double>& storage) {
+    void* begin = storage.data();
+    std::size_t space = storage.size() * sizeof(double);
+    return static_cast<double*>(std::align(kAligned, sizeof(double), begin, space));
+  }
+
   std::size_t index(std::size_t cell, std::size_t turn) const {
     if (half_ == 0) return cell * turns_ + turn;
     return (2 * cell + turn % 2) * stride_ + turn / 2;
@@ -178,12 +191,12 @@ class Relaxation {
     for (std::size_t j = 0; j < stride_; ++j) free_.push_back(j < half_ && !fixed(j) ? -1 : 0);
   }
 
-  /// Of the cells of a row, those orientations that have this colour. `largest` may be null.
-  void update_row(std::size_t row, std::size_t colour, double* largest) {
-    for (std::size_t n = row_begins_[row]; n < row_begins_[row + 1]; ++n) {
+  /// Of the cells of a line, those orientations that have this colour. `largest` may be null.
+  void update_line(std::size_t line, std::size_t colour, double* largest) {
+    for (std::size_t n = line_begins_[line]; n < line_begins_[line + 1]; ++n) {
       const std::size_t parity = (at(grid_.cells[n][0]) + at(grid_.cells[n][1]) + colour) % 2;
       if (half_ > 0)
-        relax_row_(cells_, n, parity, largest);
+        relax_row_(sweep_, n, parity, largest);
       else
         update_in_turn(n, parity, largest);
     }
@@ -202,7 +215,7 @@ class Relaxation {
       if (grid_.fixed[k * grid_.layer() + cell] != 0) continue;
       double sum = here[(k + turns_ - 1) % turns_] + here[(k + 1) % turns_];
       for (const double* const values : beside) sum += values[k];
-      const double value = cells_.keeps * here[k] + cells_.factor[missing] * sum;
+      const double value = sweep_.keeps * here[k] + sweep_.factor[missing] * sum;
       const double change = std::abs(value - here[k]), own = std::max(std::abs(value), kLeast);
       if (largest && change > *largest * own) *largest = change / own;
       here[k] = value;
@@ -212,16 +225,17 @@ class Relaxation {
   PotentialGrid& grid_;
   std::size_t turns_, half_, stride_;
   RelaxRow relax_row_;
-  std::vector<double, Eigen::aligned_allocator<double>> rows_;
+  std::vector<double> storage_;
+  double* rows_;  ///< the values
   std::vector<double> nothing_;
   std::vector<std::int32_t> free_row_;
   std::vector<std::int64_t> free_;
-  std::vector<std::size_t> row_begins_;  ///< of the cells of one y
-  PotentialRows cells_{};
+  std::vector<std::size_t> line_begins_;  ///< of the cells of one y
+  PotentialRows sweep_{};
 };
 
 /// Sweeps between two estimates of how fast changes become less, and how many are made together:
-/// the rows of cells that these are in at a time should fit in the second cache.
+/// the lines of cells that these are in at a time should fit in the second cache.
 constexpr int kBetweenFactors = 10, kTogether = 5;
 /// Two estimates of the rate agree if they differ by less.
 constexpr double kSameRate = 0.1;
@@ -246,6 +260,7 @@ double better_factor(double factor, double rate) {
 }  // namespace
 
 SweepCount solve(PotentialGrid& grid, double weight, const SweepOptions& options) {
+  if (grid.layer() == 0) return {};
   if (grid.layer() > kFewest) {
     std::vector<std::int32_t> parents;
     PotentialGrid half = grid.coarser(parents);
@@ -265,8 +280,8 @@ SweepCount solve(PotentialGrid& grid, double weight, const SweepOptions& options
   double factor = options.relaxation, before = 0.0, rate_before = 0.0;
   do {
     // The first one alone, if that is all that there is time for.
-    const int most = count.sweeps == 0 ? 1 : kTogether - count.sweeps % kTogether;
-    const int together = std::min(most, options.most - count.sweeps);
+    const int left = count.sweeps == 0 ? 1 : kTogether - count.sweeps % kTogether;
+    const int together = std::min(left, std::max(options.most - count.sweeps, 1));
     count.change = relaxation.sweep(together);
     count.sweeps += together;
     if (count.sweeps % kBetweenFactors != 0) continue;

@@ -47,8 +47,8 @@ struct SweepOptions {
 };
 
 /// Sweeps of successive over-relaxation over (5.9), in two colours like those of a chessboard,
-/// until nothing changes by more than the tolerance, from the solution of coarser grids. Several
-/// sweeps are made at once, while what they read is in the caches, and their number is a multiple.
+/// until nothing changes by more than the tolerance, from the solution of coarser grids. After the
+/// first one five sweeps are made at a time, while what they read is in the caches.
 /// `weight`: of a neighbour that is not there, as a divisor.
 SweepCount solve(PotentialGrid& grid, double weight, const SweepOptions& options);
 

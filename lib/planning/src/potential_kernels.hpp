@@ -8,10 +8,10 @@
 namespace cairn {
 
 /// Orientations of one parity at one cell, for a sweep of (5.9). A row of values has `stride`
-/// numbers, a multiple of eight with two more than there are orientations: row 2 n is that of the
-/// even ones of cell n, row 2 n + 1 that of the odd ones. Behind an even row stands its first value
-/// again, before an odd row its last (the last number of the even row before), so that the
-/// orientations beside an orientation are always beside it in the other row.
+/// numbers, a multiple of eight, and at least two more than it has orientations: row 2 n is that of
+/// the even ones of cell n, row 2 n + 1 that of the odd ones. Behind the values of an even row its
+/// first stands again; its last number is the last value of the odd row behind it, again. So the
+/// orientations beside an orientation are always beside each other in the other row.
 struct PotentialRows {
   std::size_t half;    ///< orientations in a row
   std::size_t stride;  ///< numbers in a row

@@ -46,8 +46,7 @@ inline __attribute__((always_inline)) Mask first_lanes(std::size_t count) {
 void relax_row(const PotentialRows& rows, std::size_t cell, std::size_t parity, double* largest) {
   const std::size_t row = 2 * cell + parity, stride = rows.stride, half = rows.half;
   double* const here = rows.values + row * stride;
-  // Of the orientations before and after: others[j − 1] and others[j] of an even one, others[j] and
-  // others[j + 1] of an odd one.
+  // In the other row, before[j] and before[j + 1] are the orientations before and after.
   const double* const before = parity == 0 ? here + stride - 1 : here - stride;
   const double* beside[4];
   int missing = 0;

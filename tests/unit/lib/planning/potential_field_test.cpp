@@ -110,7 +110,7 @@ TEST_P(PotentialFieldOf, OrientationsSolvesTheEquationsAsADenseSolverDoes) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Numbers, PotentialFieldOf, testing::Values(4, 5, 6, 9, 14, 16, 20));
+INSTANTIATE_TEST_SUITE_P(Numbers, PotentialFieldOf, testing::Values(2, 4, 5, 6, 9, 14, 16, 20, 34));
 
 /// Multiplying by w at obstacles, as a potential that is positive would have it, has no limit: the
 /// iteration matrix of (5.9) has an eigenvalue above 1, whereas dividing keeps all below it.
@@ -231,6 +231,26 @@ TEST(PotentialField, AnInterruptEndsItAfterOneSweepOfEachGrid) {
       field.solve(1.1, std::numeric_limits<double>::infinity(), &interrupt);
   EXPECT_FALSE(solution.converged);
   EXPECT_EQ(solution.sweeps, 1);
+}
+
+/// Several sweeps are made at a time; a limit ends them where it would end single ones.
+TEST(PotentialField, MakesAsManySweepsAsItMay) {
+  const FloorMap map = two_rooms();
+  const ConfigurationSpace space(map, kRadius, 4);
+  for (const int most : {1, 2, 3, 5, 7, 12}) {
+    PotentialField field(space, one_attractor(space, 10, 4, 3),
+                         {.tolerance = 1e-14, .sweeps = most});
+    const PotentialField::Solution solution = field.solve(1.1);
+    EXPECT_EQ(solution.sweeps, most);
+    EXPECT_FALSE(solution.converged);
+  }
+}
+
+TEST(PotentialField, OfNoCellIsSolvedAtOnce) {
+  const FloorMap map = test::drawn_map({"###", "###"});
+  const ConfigurationSpace space(map, kRadius, 4);
+  PotentialField field(space, {});
+  EXPECT_TRUE(field.solve(1.1).converged);
 }
 
 TEST(PotentialField, RefusesWhatMakesNoSense) {

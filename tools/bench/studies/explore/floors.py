@@ -130,5 +130,5 @@ def sensitivity_sections(entries: list[Json]) -> Sections:
 
 STUDIES = [Study("explore_floors", study_floors, floors_sections),
            Study("explore_six", study_six, six_sections),
-          Study("explore_exact", study_exact, exact_sections),
+           Study("explore_exact", study_exact, exact_sections),
            Study("explore_sensitivity", study_sensitivity, sensitivity_sections)]

@@ -55,20 +55,22 @@ struct PotentialFieldOptions {
 class CAIRN_API PotentialField {
  public:
   /// `decrease`: −E ≥ 0 [nats], by `ConfigurationSpace::index`. The space must outlive it. 9 bytes
-  /// per configuration, and 16 per cell; while it solves, up to three times as many. `kernels`: by
+  /// per configuration, and 16 per cell; while it solves, two to four times as
+  /// many, and seven times with less than ten orientations. `kernels`: by
   /// default the fastest that the machine can run; by name portable, avx2 or avx512. Throws `Error`
   /// (usage) for kernels that the machine cannot run, or another number of values.
   PotentialField(const ConfigurationSpace& space, std::span<const float> decrease,
                  const PotentialFieldOptions& options = {}, std::string_view kernels = "auto");
 
   struct Solution {
-    int sweeps = 0;         ///< over all configurations
-    double change = 0.0;    ///< largest relative one in the last sweep
+    int sweeps = 0;  ///< over all configurations
+    /// Largest relative one in the last sweep; values below 1e-290 count as if they were that.
+    double change = 0.0;
     bool converged = true;  ///< it stands
   };
   /// Solves with a weight w ≥ 1, from the beginning. Sweeps end after `seconds`, but for one on
-  /// each grid, or when `interrupt`, if not null, is true: what is there then is smooth, and
-  /// depends on the clock.
+  /// each grid and up to five where they are then, or when `interrupt`, if not null, is true: what
+  /// is there then is smooth, and depends on the clock.
   Solution solve(double weight, double seconds = std::numeric_limits<double>::infinity(),
                  const std::atomic<bool>* interrupt = nullptr);
 
