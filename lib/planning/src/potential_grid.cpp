@@ -237,6 +237,9 @@ class Relaxation {
 /// Sweeps between two estimates of how fast changes become less, and how many are made together:
 /// the lines of cells that these are in at a time should fit in the second cache.
 constexpr int kBetweenFactors = 10, kTogether = 5;
+/// Over-relaxation overshoots where values still change by more than this part of themselves after
+/// some sweeps, as in narrow corridors, along which they fall by a large factor per cell.
+constexpr double kOvershoots = 1.0;
 /// Two estimates of the rate agree if they differ by less.
 constexpr double kSameRate = 0.1;
 
@@ -289,6 +292,9 @@ SweepCount solve(PotentialGrid& grid, double weight, const SweepOptions& options
     const double rate = std::pow(count.change / before, 1.0 / kBetweenFactors);
     if (rate < 1.0 && std::abs(rate - rate_before) < kSameRate * (1.0 - rate)) {
       factor = std::min(better_factor(factor, rate), largest);
+      relaxation.set_factor(weight, factor);
+    } else if (count.change > kOvershoots && std::isfinite(rate_before) && rate_before > 0.0) {
+      factor = 1.0 + 0.5 * (factor - 1.0);
       relaxation.set_factor(weight, factor);
     }
     rate_before = rate;

@@ -233,6 +233,27 @@ TEST(PotentialField, AnInterruptEndsItAfterOneSweepOfEachGrid) {
   EXPECT_EQ(solution.sweeps, 1);
 }
 
+/// In a corridor that is one cell wide the potential falls so fast that over-relaxation overshoots.
+TEST(PotentialField, StandsInANarrowCorridor) {
+  for (const int length : {100, 900}) {
+    const FloorMap map = test::drawn_map(
+        {std::string(length, '#'), std::string(length, '.'), std::string(length, '#')});
+    const ConfigurationSpace space(map, kRadius, 4);
+    for (const double weight : {1.1, 1.5, 3.0}) {
+      PotentialField field(space, one_attractor(space, 1, 1, 0), {.tolerance = 1e-6});
+      const PotentialField::Solution solution = field.solve(weight);
+      EXPECT_TRUE(solution.converged) << length << ' ' << weight;
+      double before = 2.0;
+      for (int x = 2; x < std::min(length - 1, 500); ++x) {
+        const double value = field.value(space.index(space.number(x, 1), 2));
+        EXPECT_GT(value, 0.0) << x;
+        EXPECT_LT(value, before) << x;
+        before = value;
+      }
+    }
+  }
+}
+
 /// Several sweeps are made at a time; a limit ends them where it would end single ones.
 TEST(PotentialField, MakesAsManySweepsAsItMay) {
   const FloorMap map = two_rooms();

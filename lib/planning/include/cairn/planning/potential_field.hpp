@@ -51,7 +51,8 @@ struct PotentialFieldOptions {
 ///
 /// It is solved by successive over-relaxation, in two colours, from the solution on a grid of
 /// half as many cells and orientations, that on half as many again, and so forth. Its factor grows
-/// to the best one for the rate at which changes become less (Young 1971).
+/// to the best one for the rate at which changes become less (Young 1971), and falls where values
+/// overshoot, as along narrow corridors.
 class CAIRN_API PotentialField {
  public:
   /// `decrease`: −E ≥ 0 [nats], by `ConfigurationSpace::index`. The space must outlive it. 9 bytes
