@@ -4,12 +4,9 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
-#include <limits>
 #include <memory>
 #include <numbers>
 #include <utility>
-
-#include <Eigen/Core>
 
 namespace cairn {
 namespace {

@@ -147,7 +147,8 @@ TEST_F(CompactPoseTest, EdgesMayPointBackwards) {
     most = std::max(most, poses.log(poses.between(a.state(v), b.state(v))).norm());
   EXPECT_LT(most, 0.01);
 }
-/// Of which the newest pose is offered false matches: with other poses, all by the same motion.
+
+/// The newest pose is offered false matches with others, all off by the same motion.
 class InVain : public CompactPoseTest {
  protected:
   Robot driven(const std::string& options) {

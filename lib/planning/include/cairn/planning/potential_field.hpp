@@ -56,10 +56,10 @@ struct PotentialFieldOptions {
 class CAIRN_API PotentialField {
  public:
   /// `decrease`: −E ≥ 0 [nats], by `ConfigurationSpace::index`. The space must outlive it. 9 bytes
-  /// per configuration, and 16 per cell; while it solves, two to four times as
-  /// many, and seven times with less than ten orientations. `kernels`: by
-  /// default the fastest that the machine can run; by name portable, avx2 or avx512. Throws `Error`
-  /// (usage) for kernels that the machine cannot run, or another number of values.
+  /// per configuration, and 16 per cell; while it solves, two to four times as many, and seven
+  /// times with less than ten orientations. `kernels`: by default the fastest that the machine can
+  /// run; by name portable, avx2 or avx512. Throws `Error` (usage) for kernels that the machine
+  /// cannot run, or another number of values.
   PotentialField(const ConfigurationSpace& space, std::span<const float> decrease,
                  const PotentialFieldOptions& options = {}, std::string_view kernels = "auto");
 
