@@ -130,6 +130,12 @@ std::string Table::part_text(const Layout& layout, const std::vector<std::size_t
 
 std::string Table::text(bool colour, std::size_t width) const {
   Layout layout = natural_layout();
+  if (width == 0) {
+    width = output_width();
+    const auto is_dispensable = [](const Column& column) { return column.dispensable > 0; };
+    if (!is_terminal(stdout) && std::ranges::any_of(columns_, is_dispensable))
+      width = std::max(width, layout.total());
+  }
   leave_out(layout, width);
   fold(layout, width);
   std::string all;

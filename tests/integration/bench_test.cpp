@@ -18,6 +18,7 @@ namespace {
 using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::Not;
 using ::testing::StartsWith;
 using ::testing::UnorderedElementsAreArray;
 
@@ -72,6 +73,16 @@ TEST(BenchCommand, MediansAndPairedRatiosFollowFromTheRunsThatItLists) {
   EXPECT_DOUBLE_EQ(rows[1].at("seconds").at("median").as_double(), second[2]);
   EXPECT_DOUBLE_EQ(rows[1].at("ratio").as_double(), ratios[2]);
   EXPECT_TRUE(rows[0].at("peak_memory_bytes").is_null());
+}
+
+TEST(BenchCommand, ATableThatGoesIntoAFileHasAllColumnsHoweverWide) {
+  const Outcome outcome =
+      cairn({"bench", "@ring:poses=40", "--linear-solver",
+             "block_cholesky,block_cholesky:ordering=amd,eigen", "--repeat", "1", "--no-memory"});
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  for (const char* column : {"min … max", "ms/it", "nnz(L)", "memory"})
+    EXPECT_THAT(outcome.out, HasSubstr(column));
+  EXPECT_THAT(outcome.out, Not(HasSubstr("no room for")));
 }
 
 TEST(BenchCommand, ATableOfLatexHasAllColumnsAndEscapesWhatHasAMeaningThere) {

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -90,6 +91,30 @@ TEST_P(TreeExplorers, ListCandidatesWithExactValues) {
   };
   run_exploration(exploration);
   EXPECT_GT(with_loops, 5);
+}
+
+/// By default what is discovered counts the same on all paths of a decision; with `alpha=end` by
+/// where each of them ends.
+TEST_P(TreeExplorers, WeighTheMapByHowWellThePoseIsKnownNow) {
+  const OccupancyGrid floor = test::known_floor("rooms:width=12,height=9", 3).floor;
+  const auto decisions_with_several = [&](const std::string& options) {
+    ExplorationParts parts(kNoisyRobot, std::string(GetParam()) + ":density=2" + options);
+    Exploration exploration = parts.on(floor);
+    exploration.limits.decisions = 5;
+    int several = 0;
+    exploration.decided = [&](const Decision& decision, const Situation&) {
+      std::set<double> weights;
+      for (const Candidate& candidate : decision.candidates) {
+        if (candidate.change) weights.insert(candidate.change->alpha);
+      }
+      several += weights.size() > 1;
+    };
+    run_exploration(exploration);
+    return several;
+  };
+  EXPECT_EQ(decisions_with_several(""), 0);
+  EXPECT_EQ(decisions_with_several(",alpha=now"), 0);
+  EXPECT_GT(decisions_with_several(",alpha=end"), 2);
 }
 
 TEST_P(TreeExplorers, KnowWhichLoopClosuresThePolicyMakes) {

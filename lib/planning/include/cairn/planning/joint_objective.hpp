@@ -21,10 +21,11 @@ constexpr auto enum_names(EntropyForm) {
 }
 
 /// By which pose α weighs the map's entropy in the decrease that a path is expected to bring:
-/// `end` is ΔH(x) + α_T ΔH(m) with the pose at its end, `now` with the pose at its beginning,
-/// `both` is ΔH(x) + α_T H(m_T) − α_t H(m_t) (thesis, 5.11 and 5.12 as printed: there a path that
-/// discovers nothing and loses its way is better than any exploration), and `none` has α = 1
-/// (Valencia et al. 2012).
+/// `now` is ΔH(x) + α_t ΔH(m) with the pose at its beginning, so that α is the same for all paths
+/// of a decision; `end` is ΔH(x) + α_T ΔH(m) with the pose at its end, which favours paths that
+/// close a loop last; `both` is ΔH(x) + α_T H(m_T) − α_t H(m_t) (thesis, 5.11 and 5.12 as printed:
+/// there a path that discovers nothing and loses its way is better than any exploration), and
+/// `none` has α = 1 (Valencia et al. 2012).
 enum class AlphaForm { end, now, both, none };
 constexpr auto enum_names(AlphaForm) {
   return std::to_array<EnumName<AlphaForm>>({{AlphaForm::end, "end"},
@@ -37,7 +38,7 @@ constexpr auto enum_names(AlphaForm) {
 /// trajectory and map (thesis, 5.4 and 5.10), with what is left open there as options.
 struct JointObjectiveOptions {
   EntropyForm entropy = EntropyForm::standard;
-  AlphaForm alpha = AlphaForm::end;
+  AlphaForm alpha = AlphaForm::now;
   /// |Σ_ref| of α = (|Σ_ref| / |Σ|)^power [m⁴rad²]; 1 is the thesis's α. 0: that of the pose error
   /// which blurs a point at half the lidar's range by one cell: σ_xy = l/√2, σ_θ = √2 l/range.
   double reference = 0.0;
@@ -48,9 +49,10 @@ struct JointObjectiveOptions {
     return OptionFields<O>()
         .choice("entropy", &O::entropy,
                 "of a Gaussian: standard is ½ ln((2πe)ⁿ|Σ|), thesis lacks the root of |Σ|")
-        .choice("alpha", &O::alpha,
-                "the pose whose uncertainty weighs what is discovered: at the path's end, now, "
-                "both as printed in the thesis, or none")
+        .choice(
+            "alpha", &O::alpha,
+            "the pose whose uncertainty weighs what is discovered: now, at the path's end, both "
+            "as printed in the thesis, or none")
         .real("reference", &O::reference, 0.0, 1e12,
               "determinant [m⁴rad²] with which a discovery counts fully; 0: from the cell's size "
               "and the lidar's range; 1: as in the thesis")

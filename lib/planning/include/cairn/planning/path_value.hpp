@@ -24,8 +24,8 @@
 namespace cairn {
 
 struct PathValueOptions {
-  /// With α as the ratio of mean variances, which is the power 1/3: with power 1 it varies by four
-  /// orders of magnitude among the paths of one tree, and then decides alone.
+  /// With α as the ratio of mean variances, which is the power 1/3: with `alpha=end` and power 1 it
+  /// varies by four orders of magnitude among the paths of one tree, and then decides alone.
   JointObjectiveOptions objective = {.power = 1.0 / 3.0};
   /// Its form of the entropy is that of the objective, whatever stands here.
   PathInformationOptions information;
