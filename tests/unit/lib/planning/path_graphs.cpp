@@ -20,8 +20,9 @@ Information information_of(const Eigen::Matrix3d& covariance) {
 }
 
 Pose2 noisy(const Pose2& motion, const Eigen::Vector3d& sigma, RandomNumbers& random) {
-  const Eigen::Vector3d xi(sigma[0] * random.gaussian(), sigma[1] * random.gaussian(),
-                           sigma[2] * random.gaussian());
+  // Braces, so that every compiler draws in this order.
+  const Eigen::Vector3d xi{sigma[0] * random.gaussian(), sigma[1] * random.gaussian(),
+                           sigma[2] * random.gaussian()};
   return motion.retract(xi);
 }
 
