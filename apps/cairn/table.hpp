@@ -36,9 +36,9 @@ class Table {
   /// (a last line names them), then texts are folded between words, and what is still too wide is
   /// continued below, each part beginning with the first column. Only a word that is longer than
   /// its column (a path, which must stay whole to be copied) makes a line longer. Without `width`
-  /// it is that of the output; files and pipes get all columns, however wide, so that no result
-  /// depends on where it goes.
-  /// With `colour`, the titles are bold. Columns without any title have no title line.
+  /// it is that of the terminal; in files and pipes a table with dispensable columns is as wide as
+  /// it is, so that none is left out. With `colour`, the titles are bold. Columns without any title
+  /// have no title line.
   std::string text(bool colour, std::size_t width = 0) const;
   /// A tabular of LaTeX with all columns, as wide as it is; it needs no package.
   std::string latex() const;

@@ -54,7 +54,7 @@ OTHER_FLOORS = {"intel_lab": "@corridors", "stata_basement": "@loop"}
 def part_study(part: str, floor: str, generated: str, methods: dict[str, str], settings: Callable[[Bench], Words]) -> Study:
     def study(bench: Bench, keep: Keep) -> None:
         for method, explorer in methods.items():
-            rounds = min(bench.rounds, MOST_RUNS_BEYOND) if method.startswith("ours") else bench.rounds
+            rounds = min(bench.rounds, MOST_RUNS_BEYOND) if method.startswith("ours") and "alpha" not in method else bench.rounds
             keep(measure(bench, part, floor_of(bench, floor, generated), method, explorer, rounds, settings(bench)))
 
     return Study(f"explore_{part}", study, sections)
