@@ -9,7 +9,7 @@ from ...reports import Json, number, text
 from ...study import Bench, Keep, Study
 from ...words import digits, percent, whole
 from .runs import end_of, floor_of, mean_of, measure, measured, problem_of, runs_of
-from .thesis import action_space
+from .thesis import ALPHA_AT_END, action_space
 
 FLOORS = ["cave_20m", "fr079", "intel_lab", "hospital_40m", "willow_full", "stata_basement", "depot", "warehouse",
           "simple_rooms", "tb3_sandbox"]
@@ -38,7 +38,7 @@ def study_six(bench: Bench, keep: Keep) -> None:
     until = ["--until", "distance=10" if bench.quick else "distance=50"]
     floors = [floor for floor in all_floors(bench) if floor.name in SIX or floor.name.startswith("@")]
     for floor in floors:
-        for explorer in bench.cairn.names("explorer"):
+        for explorer in sorted([*bench.cairn.names("explorer"), *ALPHA_AT_END]):
             keep(measure(bench, "six", floor, explorer, explorer, bench.rounds, until))
 
 
