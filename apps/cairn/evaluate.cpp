@@ -154,11 +154,22 @@ void need_factors(const LoadedGraph& loaded) {
                   loaded.label));
 }
 
-/// The ids that both graphs have.
-std::vector<Id> common_ids(const Graph& a, const Graph& b) {
+/// The ids of the estimate that the truth has, too. Throws `Error` (input) where a variable is of
+/// another type there.
+std::vector<Id> common_ids(const Graph& estimate, const Graph& truth) {
   std::vector<Id> ids;
-  for (int v = 0; v < a.variable_count(); ++v) {
-    if (b.find(a.id(v))) ids.push_back(a.id(v));
+  for (int v = 0; v < estimate.variable_count(); ++v) {
+    const std::optional<int> there = truth.find(estimate.id(v));
+    if (!there) continue;
+    if (truth.type(*there).tag() != estimate.type(v).tag()) {
+      throw Error(
+          ErrorCode::input,
+          fmt::format("--kld compares the same variables, but {} of ESTIMATE is {} in TRUTH: "
+                      "without --kld a trajectory of the plane and one in space can be "
+                      "compared",
+                      estimate.describe_variable(v), truth.describe_variable(*there)));
+    }
+    ids.push_back(estimate.id(v));
   }
   return ids;
 }

@@ -28,6 +28,8 @@ namespace {
 using Clock = std::chrono::steady_clock;
 /// So often it is asked whether to go on with a blanket.
 constexpr std::chrono::milliseconds kAskEvery(10);
+/// Nats by which the divergence of a blanket may be off by rounding of its determinants.
+constexpr double kRounding = 1e-9;
 
 /// B Ω Bᵀ, packed: the information of a choice's models in the residuals of their types. Throws
 /// `Error` (numerical) where rounding has made it indefinite.
@@ -256,8 +258,11 @@ Sparsify::Solved Sparsify::solve(const WorkGraph& work, const LocalProblem& loca
     }
     // A topology that does not grow any more has done what it can.
     const int size = static_cast<int>(std::ssize(solved.topology));
-    if (!bounded || solved.recovery.kld <= options_.population.value || count >= all ||
-        (size < count && !topology_->parts())) {
+    if (!bounded || solved.recovery.kld <= options_.population.value + kRounding) break;
+    if (count >= all || (size < count && !topology_->parts())) {
+      solved.notes.push_back(
+          fmt::format("population=loss:{:g} was not reached with all factors that topology={} has",
+                      options_.population.value, options_.topology));
       break;
     }
     count = std::min(all, count + std::max(1, count / 8));

@@ -201,6 +201,9 @@ TEST_F(EvaluateDivergence, SaysWhatCannotBeCompared) {
   write_text(folder_.file("fixed.g2o"), read_text(best_) + "FIX 0\nFIX 60\n");
   expect_refusal({"evaluate", folder_.file("fixed.g2o"), best_, "--kld"}, 3,
                  "constant in one of the graphs and free in the other");
+  report_of({"generate", "sphere", "-o", folder_.file("space.g2o")});
+  expect_refusal({"evaluate", sparse_, folder_.file("space.g2o"), "--kld"}, 3,
+                 "VERTEX_SE2 0 of ESTIMATE is VERTEX_SE3:QUAT 0 in TRUTH");
 }
 
 TEST_F(EvaluateDivergence, RefusesASolverThatCannotBeforeItReadsAFile) {

@@ -116,6 +116,9 @@ TEST_F(PlotCommand, GraphsWithTheSamePosesAreDrawnBesideEachOther) {
   const std::string estimate = "stroke:rgb(0%,44.705882%,69.803922%)";  // and the legend's sample
   EXPECT_EQ(count(plot({graph_, best}, "svg"), estimate), 2);
   EXPECT_EQ(count(plot({graph_, best, "--apart"}, "svg"), estimate), 4);
+  const Outcome titled = cairn({"plot", graph_, best, "--apart", "--title", "both"});
+  EXPECT_EQ(titled.exit_code, 2);
+  EXPECT_THAT(titled.err, HasSubstr("--name"));
 }
 
 TEST_F(PlotCommand, TheTruthIsDrawnOverTheEstimateThinAndDashed) {
