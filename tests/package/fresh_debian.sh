@@ -72,6 +72,7 @@ run cairn explore @rooms --until distance=20 --seed 3 --quiet
 
 printf '\n==== a plugin and a program of somebody else\n'
 run install /packages/libcairn-dev_*.deb g++ cmake make pkg-config
+rm -rf range-build my_distance my_solver # of an earlier run
 run cmake -S /range -B range-build -DCMAKE_VERBOSE_MAKEFILE=OFF
 run cmake --build range-build
 run cmake --install range-build
@@ -79,7 +80,6 @@ run cairn optimize /range/beacons.g2o --linear-solver dense_ldlt -o beacons.g2o
 
 # What `cairn new-plugin` writes, as its README says it: built, tested, checked, installed, and used by name.
 export CTEST_OUTPUT_ON_FAILURE=1
-rm -rf my_distance my_solver
 new_plugin() {
   run cairn new-plugin "$1" "$2"
   run cmake -S "$1" -B "$1/build"
@@ -123,4 +123,9 @@ done <files
 [[ ! -e /usr/lib/python3/dist-packages/cairn && ! -e /usr/lib/python3/dist-packages/cairn_ros ]] || fail "the Python package left $(find /usr/lib/python3/dist-packages/cairn*)"
 printf 'nothing is left of %d files\n' "$(wc -l <files)"
 END
-chroot "$root" /bin/bash /use.sh
+# Nothing of the environment here, such as settings of CMake, has a part in it, but how the network is reached.
+environment=(HOME=/root PATH=/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin)
+for name in http_proxy https_proxy no_proxy; do
+  [[ -z ${!name:-} ]] || environment+=("$name=${!name}")
+done
+chroot "$root" /usr/bin/env -i "${environment[@]}" /bin/bash /use.sh
