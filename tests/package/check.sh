@@ -57,7 +57,8 @@ while IFS= read -r file; do
   grep -q '(RPATH)' "$work/dynamic" && fail "$what has an RPATH"
   runpath=$(sed -n 's/.*(RUNPATH).*\[\(.*\)\]/\1/p' "$work/dynamic")
   [[ -z $runpath || ($runpath == "\$ORIGIN"* && $runpath != *:*) ]] || fail "$what looks for libraries in $runpath"
-  grep -qF "$source" "$file" && fail "$what names the folder of its sources"
+  # A path that begins with that folder, which may be one like /cairn: /usr/lib/cairn has it in the middle.
+  grep -qaP "(?<![\\w./-])\\Q$source\\E/(apps|build|core|lib|plugins)/" "$file" && fail "$what names the folder of its sources"
   # All of it, in the folder that has all packages.
   LD_LIBRARY_PATH='' ldd "$root/${what#*/}" >"$work/ldd" || fail "ldd $what"
   grep -q 'not found' "$work/ldd" && fail "$what: $(grep 'not found' "$work/ldd" | tr '\n' ' ')"
