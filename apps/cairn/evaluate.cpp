@@ -175,8 +175,8 @@ std::vector<Id> common_ids(const Graph& estimate, const Graph& truth) {
 }
 
 GraphDivergence divergence_of(const Graph& truth, const Graph& estimate,
-                              const EvaluateOptions& options, CovarianceSolver& solver) {
-  const std::vector<Id> common = common_ids(estimate, truth);
+                              const std::vector<Id>& common, const EvaluateOptions& options,
+                              CovarianceSolver& solver) {
   const ComparedAt at = options.compared_at == "minima" ? ComparedAt::minima : ComparedAt::common;
   GraphDivergence result;
   result.variables = common.size();
@@ -279,9 +279,11 @@ int run(const EvaluateOptions& options, Session& session) {
   }
   const LoadedGraph estimate_graph = load_graph(options.estimate.file, options.input, session);
   const LoadedGraph truth_graph = load_graph(options.truth.file, options.input, session);
+  std::vector<Id> common;
   if (options.kld) {
     need_factors(estimate_graph);
     need_factors(truth_graph);
+    common = common_ids(estimate_graph.graph, truth_graph.graph);
   }
   const Trajectory estimate = trajectory_of(estimate_graph, options.estimate, options, session);
   const Trajectory truth = trajectory_of(truth_graph, options.truth, options, session);
@@ -298,7 +300,7 @@ int run(const EvaluateOptions& options, Session& session) {
   GraphDivergence divergence;
   if (solver) {
     results.add([&] {
-      divergence = divergence_of(truth_graph.graph, estimate_graph.graph, options, *solver);
+      divergence = divergence_of(truth_graph.graph, estimate_graph.graph, common, options, *solver);
     });
   }
   results.add([&] {

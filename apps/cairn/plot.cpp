@@ -97,7 +97,7 @@ ComponentSpec picture_spec(const PlotOptions& options, const std::string& output
   check_columns(options);
   ComponentSpec picture{picture_format(output, session), {}};
   if (picture.name == "html") return picture;
-  if (options.album.apart && !options.album.title.empty())
+  if (options.album.apart && options.album.files.size() > 1 && !options.album.title.empty())
     throw Error(
         ErrorCode::usage,
         "--title is that of one plot; with --apart each has the name of its file, or one by "

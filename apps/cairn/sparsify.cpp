@@ -356,10 +356,9 @@ void add_sparsify_options(ArgumentParser cli, SparsifyCommandOptions& options) {
   cli.add_option("--nodes", options.nodes, "what may leave: poses, landmarks or all [poses]")
       .type_name("KIND")
       .one_of({"poses", "landmarks", "all"});
-  cli.add_option(
-         "--topology", options.topology,
-         "pairs that get a factor: clt, cliquey, mi, dmi, ekld, mixed, odd, l1, best (tries "
-         "all: slow); or one factor on all neighbours: glc [ekld]")
+  cli.add_option("--topology", options.topology,
+                 "pairs that get a factor: clt, cliquey, mi, dmi, ekld, mixed, odd, l1, best (of "
+                 "all: minutes to hours); or one factor on all neighbours: glc [ekld]")
       .component({"topology"});
   cli.add_option("--population", options.population,
                  "number of new factors: tree:γ, fill:α or loss:KLD [tree:2]")

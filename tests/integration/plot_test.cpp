@@ -118,7 +118,8 @@ TEST_F(PlotCommand, GraphsWithTheSamePosesAreDrawnBesideEachOther) {
   EXPECT_EQ(count(plot({graph_, best, "--apart"}, "svg"), estimate), 4);
   const Outcome titled = cairn({"plot", graph_, best, "--apart", "--title", "both"});
   EXPECT_EQ(titled.exit_code, 2);
-  EXPECT_THAT(titled.err, HasSubstr("--name"));
+  EXPECT_THAT(titled.err, HasSubstr("--apart each has the name of its file, or one by --name"));
+  plot({graph_, "--apart", "--title", "alone"}, "svg");
 }
 
 TEST_F(PlotCommand, TheTruthIsDrawnOverTheEstimateThinAndDashed) {
