@@ -3,8 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
-#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -15,6 +13,7 @@
 #include "cairn/lie/se2.hpp"
 #include "cairn/runtime/error.hpp"
 #include "scan_matcher.hpp"
+#include "scans_by_pose.hpp"
 
 namespace cairn::icp {
 namespace {
@@ -33,18 +32,8 @@ class Icp final : public Registration, public ScanRegistration {
 
   void begin(const RegistrationData&) override {}
 
-  void take(Id pose, LaserScan scan) override {
-    scans_.insert_or_assign(pose, matcher_.prepare(scan));
-    newest_ = pose;
-  }
-
-  void pose_ended(Id pose, bool kept) override {
-    if (dropped_ && *dropped_ != pose) scans_.erase(*dropped_);
-    dropped_.reset();
-    if (!kept && pose != newest_) scans_.erase(pose);
-    if (!kept && pose == newest_) dropped_ = pose;  // the next may be matched with it
-    newest_.reset();
-  }
+  void take(Id pose, LaserScan scan) override { scans_.take(pose, matcher_.prepare(scan)); }
+  void pose_ended(Id pose, bool kept) override { scans_.pose_ended(pose, kept); }
 
   std::vector<Factor> match(Id earlier, Id later) override {
     return measure(earlier, later, Pose2::identity(), matcher_.options().window);
@@ -93,10 +82,10 @@ class Icp final : public Registration, public ScanRegistration {
 
   std::vector<Factor> measure(Id earlier, Id later, const Pose2& guess,
                               const SearchWindow& window) const {
-    const auto from = scans_.find(earlier), to = scans_.find(later);
-    if (earlier == later || from == scans_.end() || to == scans_.end()) return {};
-    const ScanMatch found = poor(window) ? matcher_.search(from->second, to->second, guess, window)
-                                         : matcher_.refine(from->second, to->second, guess);
+    const SurfaceScan *const from = scans_.find(earlier), *const to = scans_.find(later);
+    if (earlier == later || !from || !to) return {};
+    const ScanMatch found = poor(window) ? matcher_.search(*from, *to, guess, window)
+                                         : matcher_.refine(*from, *to, guess);
     if (!found.accepted()) return {};
     const std::span<const double> z = found.pose, sigma(found.covariance.data(), 9);
     return {group_.to_factor(
@@ -107,8 +96,7 @@ class Icp final : public Registration, public ScanRegistration {
   ScanMatcher matcher_;
   MotionGroup group_;
   std::shared_ptr<const FactorType> edge_;
-  std::map<Id, SurfaceScan> scans_;
-  std::optional<Id> newest_, dropped_;
+  ScansByPose<SurfaceScan> scans_;
 };
 
 }  // namespace
