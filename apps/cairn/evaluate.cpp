@@ -164,9 +164,7 @@ std::vector<Id> common_ids(const Graph& estimate, const Graph& truth) {
     if (truth.type(*there).tag() != estimate.type(v).tag()) {
       throw Error(
           ErrorCode::input,
-          fmt::format("--kld compares the same variables, but {} of ESTIMATE is {} in TRUTH: "
-                      "without --kld a trajectory of the plane and one in space can be "
-                      "compared",
+          fmt::format("--kld compares the same variables, but {} of ESTIMATE is {} in TRUTH",
                       estimate.describe_variable(v), truth.describe_variable(*there)));
     }
     ids.push_back(estimate.id(v));
