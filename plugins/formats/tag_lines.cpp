@@ -5,7 +5,7 @@
 #include <fmt/ranges.h>
 
 #include "cairn/runtime/error.hpp"
-#include "cairn/runtime/spelling.hpp"
+#include "cairn/text/spelling.hpp"
 
 namespace cairn::formats {
 

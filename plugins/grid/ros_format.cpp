@@ -13,7 +13,7 @@
 
 #include "cairn/io/format.hpp"
 #include "cairn/runtime/error.hpp"
-#include "cairn/runtime/spelling.hpp"
+#include "cairn/text/spelling.hpp"
 
 namespace cairn::grids {
 namespace {

@@ -21,16 +21,13 @@ WorkGraph::WorkGraph(const Graph& graph)
     const FactorPool& of = graph.factor_pools()[pool];
     const auto variables = graph.factor_variables(f);
     const auto z = graph.measurement(f);
-    const auto information = graph.information(f);
+    const auto information = graph.information(f), root = graph.sqrt_information(f);
     WorkFactor factor{.type = of.type,
                       .variables = {variables.begin(), variables.end()},
                       .measurement = {z.begin(), z.end()},
                       .information = {information.begin(), information.end()},
-                      .sqrt_information = {},
+                      .sqrt_information = {root.begin(), root.end()},
                       .position = f};
-    const auto count = information.size();
-    const double* root = of.sqrt_information.data() + static_cast<std::size_t>(entry) * count;
-    factor.sqrt_information.assign(root, root + count);
     if (graph.loss(f)) {
       double weight = 1.0;
       graph.weigh(pool, static_cast<std::size_t>(entry), {&norms[f], 1}, {}, {&weight, 1});

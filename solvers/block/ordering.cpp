@@ -22,7 +22,7 @@
 #include "block/block_graph.hpp"
 #include "block/dissection.hpp"
 #include "cairn/runtime/error.hpp"
-#include "cairn/runtime/spelling.hpp"
+#include "cairn/text/spelling.hpp"
 
 namespace cairn::block {
 namespace {

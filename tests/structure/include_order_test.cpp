@@ -30,9 +30,9 @@ const Names kShared{"solvers/block", "solvers/linear/blas", "solvers/linear/iter
                     "solvers/nonlinear/descent"};
 /// Eigen's decompositions, compiled once, and memory for arrays: what everything may include, and
 /// includes nothing.
-const Names kBelow{"lib/dense/", "lib/memory/", "lib/pack/"};
+const Names kBelow{"lib/dense/", "lib/memory/", "lib/pack/", "lib/text/"};
 /// Of what lies below the core, the folders of public headers: several numbers at a time, arrays.
-const Names kPublicBelow{"pack", "memory"};
+const Names kPublicBelow{"pack", "memory", "text"};
 /// Folders each of whose folders stands for itself: it includes no other.
 const Names kWings{"types", "solvers/linear", "solvers/nonlinear", "solvers/incremental", "plugins",
                    "apps"};

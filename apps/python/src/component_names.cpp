@@ -12,7 +12,7 @@
 
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
-#include "cairn/runtime/spelling.hpp"
+#include "cairn/text/spelling.hpp"
 #include "ids.hpp"
 
 namespace cairn::python {

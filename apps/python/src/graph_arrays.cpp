@@ -181,8 +181,7 @@ py::array_t<double> information_of(BoundGraph& bound, const py::object& type) {
   const int n = pool.type->residual_size();
   std::vector<double> dense;
   for (std::size_t k = 0; k < pool.size(); ++k) {
-    const Eigen::MatrixXd A =
-        unpack({pool.information.data() + k * packed_size(n), packed_size(n)}, n);
+    const Eigen::MatrixXd A = unpack(bound.get().information(pool.sequence[k]), n);
     dense.insert(dense.end(), A.data(), A.data() + A.size());
   }
   return array_of(dense, {pool.size(), size_of(n), size_of(n)});

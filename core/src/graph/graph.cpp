@@ -61,6 +61,24 @@ void reserve_if_possible(std::size_t size, Arrays&... arrays) {
   }
 }
 
+/// Another information matrix of a pool, which nothing uses yet. Where there is no memory for it
+/// the pool stays as it was.
+std::int32_t add_noise(FactorPool& pool, std::span<const double> information,
+                       std::span<const double> root, int rank) {
+  const std::size_t count = pool.ranks.size(), numbers = pool.information.size() + root.size();
+  const Numbers row(information.begin(), information.end());  // may be of the pool itself
+  pool.information.reserve(numbers);
+  pool.sqrt_information.reserve(numbers);
+  pool.ranks.reserve(count + 1);
+  pool.uses.reserve(count + 1);
+  pool.information.append(row);
+  pool.sqrt_information.append(root);
+  pool.ranks.push_back(static_cast<std::int16_t>(rank));
+  pool.uses.push_back(0);
+  pool.recent.note(row, static_cast<std::int32_t>(count));
+  return static_cast<std::int32_t>(count);
+}
+
 /// What is wrong with an information matrix, or nothing.
 std::string problem_of(const Root& root, std::span<const double> information) {
   if (root.rank > 0) return {};
@@ -233,23 +251,29 @@ int Graph::add_factor(std::shared_ptr<const FactorType> type, std::span<const in
     throw bad_input(fmt::format("{}: has a number that is not finite", name_of(*type, variables)));
   Numbers z(measurement.begin(), measurement.end());
   std::string problem = normalize(*type, z);
-  const Root root = root_of(information, n);
-  if (problem.empty()) problem = problem_of(root, information);
-  if (!problem.empty()) throw bad_input(fmt::format("{}: {}", name_of(*type, variables), problem));
   const int p = find_pool(type);
+  const bool has_pool = p < std::ssize(factor_pools_);
+  std::int32_t noise =
+      has_pool ? factor_pools_[p].recent.find(information, factor_pools_[p].information) : -1;
+  Root root;
+  if (problem.empty() && noise < 0) {
+    root = root_of(information, n);
+    problem = problem_of(root, information);
+  }
+  if (!problem.empty()) throw bad_input(fmt::format("{}: {}", name_of(*type, variables), problem));
   const std::int16_t of_loss = loss_index(*type, loss);
   // Nothing is refused from here on.
-  if (p == std::ssize(factor_pools_)) {
+  if (!has_pool) {
     factor_pools_.emplace_back().type = std::move(type);
     for (const int v : variables) factor_pools_[p].variable_pools.push_back(records_[v].pool);
   }
   // What was given may be of this graph itself, whose arrays move while they grow: it comes first.
   FactorPool& pool = factor_pools_[p];
-  pool.information.append(information);
+  if (noise < 0) noise = add_noise(pool, information, root.packed, root.rank);
+  ++pool.uses[noise];
+  pool.noises.push_back(noise);
   pool.variables.append(variables);
   pool.measurements.append(z);
-  pool.sqrt_information.append(root.packed);
-  pool.ranks.push_back(static_cast<std::int16_t>(root.rank));
   pool.losses.push_back(of_loss);
   for (const int v : std::span(pool.variables).last(variables.size()))
     pool.slots.push_back(records_[v].slot);
@@ -260,8 +284,11 @@ int Graph::add_factor(std::shared_ptr<const FactorType> type, std::span<const in
     const std::size_t all = kMany + expected_factors_ - factors_.size();
     reserve_if_possible(all * pool.variable_pools.size(), pool.variables, pool.slots);
     reserve_if_possible(all * measurement_size, pool.measurements);
-    reserve_if_possible(all * information_size, pool.information, pool.sqrt_information);
-    reserve_if_possible(all, pool.ranks, pool.losses, pool.sequence);
+    reserve_if_possible(all, pool.noises, pool.losses, pool.sequence);
+    if (pool.ranks.size() > kMany / 2) {  // most have one of their own
+      reserve_if_possible(all * information_size, pool.information, pool.sqrt_information);
+      reserve_if_possible(all, pool.ranks, pool.uses);
+    }
   }
   ++structure_version_;
   return position;
@@ -325,17 +352,18 @@ std::span<const double> Graph::measurement(int position) const {
 std::span<const double> Graph::information(int position) const {
   const FactorPool& pool = factor_pools_[factors_[position].pool];
   const std::size_t size = packed_size(pool.type->residual_size());
-  return {pool.information.data() + factors_[position].entry * size, size};
+  return {pool.information.data() + pool.noises[factors_[position].entry] * size, size};
 }
 
 std::span<const double> Graph::sqrt_information(int position) const {
   const FactorPool& pool = factor_pools_[factors_[position].pool];
   const std::size_t size = packed_size(pool.type->residual_size());
-  return {pool.sqrt_information.data() + factors_[position].entry * size, size};
+  return {pool.sqrt_information.data() + pool.noises[factors_[position].entry] * size, size};
 }
 
 int Graph::information_rank(int position) const {
-  return factor_pools_[factors_[position].pool].ranks[factors_[position].entry];
+  const FactorPool& pool = factor_pools_[factors_[position].pool];
+  return pool.ranks[pool.noises[factors_[position].entry]];
 }
 
 int Graph::absolute_size(int position) const {
@@ -380,13 +408,22 @@ void Graph::set_measurement(int position, std::span<const double> measurement,
     if (problem.empty()) problem = problem_of(root, information);
   }
   if (!problem.empty()) throw bad_input(fmt::format("{}: {}", describe_factor(position), problem));
+  std::int32_t& noise = pool.noises[entry];
+  const std::int32_t old = noise;
+  const bool own = information.empty() || pool.uses[old] == 1;
+  if (!own) noise = add_noise(pool, information, root.packed, root.rank);
   std::ranges::copy(z, pool.measurements.begin() + static_cast<std::ptrdiff_t>(entry * size));
   if (information.empty()) return;
-  const auto begin = static_cast<std::ptrdiff_t>(entry * packed);
+  if (pool.ranks[old] != root.rank) ++structure_version_;  // the gauge may be another
+  if (!own) {
+    --pool.uses[old];
+    ++pool.uses[noise];
+    return;
+  }
+  const auto begin = noise * static_cast<std::ptrdiff_t>(packed);
   std::ranges::copy(information, pool.information.begin() + begin);
   std::ranges::copy(root.packed, pool.sqrt_information.begin() + begin);
-  if (pool.ranks[entry] != root.rank) ++structure_version_;  // the gauge may be another
-  pool.ranks[entry] = static_cast<std::int16_t>(root.rank);
+  pool.ranks[noise] = static_cast<std::int16_t>(root.rank);
 }
 
 std::string Graph::describe_factor(int position) const {
@@ -414,6 +451,7 @@ FactorView Graph::view(int factor_pool, const Values& values,
           .slots = pool.slots.data(),
           .measurements = pool.measurements.data(),
           .sqrt_information = pool.sqrt_information.data(),
+          .noises = pool.noises.data(),
           .states = states.data()};
 }
 

@@ -29,6 +29,32 @@ void move_group(Array& array, std::size_t from, std::size_t to, std::size_t size
   if (from != to) std::copy_n(array.begin() + from * size, size, array.begin() + to * size);
 }
 
+/// Leaves the information matrices that factors have.
+void drop_unused_noises(FactorPool& pool) {
+  const std::size_t packed = packed_size(pool.type->residual_size());
+  std::ranges::fill(pool.uses, 0);
+  for (const std::int32_t noise : pool.noises) ++pool.uses[noise];
+  std::vector<std::int32_t> number(pool.uses.size());
+  std::size_t kept = 0;
+  for (std::size_t k = 0; k < number.size(); ++k) {
+    if (pool.uses[k] == 0) continue;
+    move_group(pool.information, k, kept, packed);
+    move_group(pool.sqrt_information, k, kept, packed);
+    pool.ranks[kept] = pool.ranks[k];
+    pool.uses[kept] = pool.uses[k];
+    number[k] = static_cast<std::int32_t>(kept++);
+  }
+  pool.information.resize(kept * packed);
+  pool.sqrt_information.resize(kept * packed);
+  pool.ranks.resize(kept);
+  pool.uses.resize(kept);
+  pool.recent = {};
+  for (std::size_t k = 0; k < kept; ++k) {
+    pool.recent.note({pool.information.data() + k * packed, packed}, static_cast<std::int32_t>(k));
+  }
+  for (std::int32_t& noise : pool.noises) noise = number[noise];
+}
+
 }  // namespace
 
 Renumbering Graph::remove(const std::vector<bool>& factors, const std::vector<bool>& variables) {
@@ -76,8 +102,7 @@ void Graph::remove_factors(const std::vector<bool>& leaves,
   factors.resize(static_cast<std::size_t>(std::ranges::count(leaves, false)));
   for (FactorPool& pool : factor_pools_) {
     const std::size_t arity = static_cast<std::size_t>(pool.type->arity()),
-                      measurement = static_cast<std::size_t>(pool.type->measurement_size()),
-                      packed = packed_size(pool.type->residual_size());
+                      measurement = static_cast<std::size_t>(pool.type->measurement_size());
     std::size_t kept = 0;
     for (std::size_t f = 0; f < pool.size(); ++f) {
       const std::int32_t now = position[pool.sequence[f]];
@@ -85,9 +110,7 @@ void Graph::remove_factors(const std::vector<bool>& leaves,
       move_group(pool.slots, f, kept, arity);
       move_group(pool.variables, f, kept, arity);
       move_group(pool.measurements, f, kept, measurement);
-      move_group(pool.information, f, kept, packed);
-      move_group(pool.sqrt_information, f, kept, packed);
-      pool.ranks[kept] = pool.ranks[f];
+      pool.noises[kept] = pool.noises[f];
       pool.losses[kept] = pool.losses[f];
       pool.sequence[kept] = now;
       factors[now] = {static_cast<std::int32_t>(pools.size()), static_cast<std::int32_t>(kept++)};
@@ -96,11 +119,10 @@ void Graph::remove_factors(const std::vector<bool>& leaves,
     pool.slots.resize(kept * arity);
     pool.variables.resize(kept * arity);
     pool.measurements.resize(kept * measurement);
-    pool.information.resize(kept * packed);
-    pool.sqrt_information.resize(kept * packed);
-    pool.ranks.resize(kept);
+    pool.noises.resize(kept);
     pool.losses.resize(kept);
     pool.sequence.resize(kept);
+    drop_unused_noises(pool);
     pools.push_back(std::move(pool));
   }
   factor_pools_ = std::move(pools);

@@ -152,7 +152,7 @@ struct JacobianEvaluator::Plan {
     call_factor(type, [&] {
       type.evaluate(
           states.data(), view.measurements + f * static_cast<std::size_t>(type.measurement_size()),
-          view.sqrt_information + f * packed_size(type.residual_size()),
+          view.sqrt_information + view.noise(f) * packed_size(type.residual_size()),
           J.residual().data() + structure.row_offsets()[pool.sequence[f]], jacobians.data());
     });
   }

@@ -19,8 +19,9 @@ constexpr std::size_t kColumnChunk = 512;
 
 using Target = LinearizeTarget;
 
-/// A block of H or a part of g to which factors of several runs contribute: what each adds has a
-/// place of its own in scratch, and the places are added up in the order of the factors.
+/// A block of H or a part of g to which factors of several runs contribute: the first run sums in
+/// place, what the others add has places of its own in scratch, which are added in the order of the
+/// factors.
 struct Sum {
   Target::Array array;
   std::int32_t size;    // doubles
@@ -30,8 +31,7 @@ struct Sum {
 
 template <class Size>
 void gather(std::span<const std::int64_t> places, const double* scratch, Size size, double* out) {
-  for (int k = 0; k < size; ++k) out[k] = scratch[places[0] + k];
-  for (const std::int64_t place : places.subspan(1)) {
+  for (const std::int64_t place : places) {
     for (int k = 0; k < size; ++k) out[k] += scratch[place + k];
   }
 }
@@ -171,8 +171,8 @@ struct Linearizer::Plan {
   }
 
   /// Every sum is that of its contributions in the order of the factors, however many runs there
-  /// are. Where all of them come from one run, the first is written in place and the others are
-  /// added to it; else each has a place in scratch. So one run needs no scratch.
+  /// are. The first is written in place, and the others of the same run are added to it; those of
+  /// later runs have places in scratch. So one run needs no scratch.
   void assign_targets() {
     runs = wanted_runs();
     targets.assign(graph->factor_pools().size(), {});
@@ -182,13 +182,13 @@ struct Linearizer::Plan {
       targets[p].blocks.resize(pool.size() * (arity * (arity + 1) / 2));
       targets[p].gradients.resize(pool.size() * arity);
     }
-    const std::vector<std::int64_t> sum_of = find_sums();
+    const Sums found = find_sums();
     std::vector<std::pair<std::int64_t, std::int64_t>> contributions;  // sum, place
     std::int64_t used = 0;
     std::vector<bool> begun(structure.entries(), false), begun_gradient(structure.blocks(), false);
-    const auto put = [&](Target& target, const Sum& what, std::int64_t sum, bool transposed,
-                         std::vector<bool>::reference started) {
-      if (sum >= 0) {
+    const auto put = [&](Target& target, const Sum& what, std::int64_t sum, bool here,
+                         bool transposed, std::vector<bool>::reference started) {
+      if (!here) {
         target = Target(Target::Array::scratch, used, Target::How::write, transposed);
         contributions.emplace_back(sum, used);
         used += what.size;
@@ -203,11 +203,13 @@ struct Linearizer::Plan {
       for_each_target(
           run,
           [&](Target& target, std::int64_t entry, bool transposed) {
-            put(target, block_sum(entry), sum_of[entry], transposed, begun[entry]);
+            put(target, block_sum(entry), found.number[entry], found.first_run[entry] == run,
+                transposed, begun[entry]);
           },
           [&](Target& target, std::int32_t block) {
-            const std::int64_t sum = sum_of[structure.column_begin()[block]];
-            put(target, gradient_sum(block), sum < 0 ? -1 : sum + 1, false, begun_gradient[block]);
+            const std::int64_t entry = structure.column_begin()[block];
+            put(target, gradient_sum(block), found.number[entry] + 1, found.first_run[entry] == run,
+                false, begun_gradient[block]);
           });
     }
     scratch = AlignedVector(used);
@@ -227,33 +229,41 @@ struct Linearizer::Plan {
     return {Target::Array::gradient, structure.block_size(block), structure.offsets()[block], 0};
   }
 
-  /// Lists the sums to which several runs contribute. By entry of H the number of its own, or -1;
+  /// By entry of H: the first run that contributes to it, and the number of its sum if others do;
   /// that of a gradient follows that of the block on the diagonal.
-  std::vector<std::int64_t> find_sums() {
+  struct Sums {
+    std::vector<std::uint32_t> first_run;
+    std::vector<std::int64_t> number;
+  };
+  /// Lists the sums to which several runs contribute.
+  Sums find_sums() {
     sums.clear();
-    std::vector<std::int64_t> sum_of(structure.entries(), -1);
-    if (runs == 1) return sum_of;
-    constexpr std::int64_t kNobody = -1, kSeveral = -2;
-    std::vector<std::int64_t> owner(structure.entries(), kNobody);
+    const std::size_t entries = static_cast<std::size_t>(structure.entries());
+    Sums found{std::vector<std::uint32_t>(entries, 0), std::vector<std::int64_t>(entries, -1)};
+    if (runs == 1) return found;
+    constexpr std::uint32_t kNobody = ~std::uint32_t{0};
+    std::ranges::fill(found.first_run, kNobody);
+    std::vector<bool> shared(entries, false);
     for (std::size_t run = 0; run < runs; ++run) {
-      const auto mine = static_cast<std::int64_t>(run);
       for_each_target(
           run,
           [&](Target&, std::int64_t entry, bool) {
-            owner[entry] = owner[entry] == kNobody || owner[entry] == mine ? mine : kSeveral;
+            std::uint32_t& first = found.first_run[entry];
+            if (first == kNobody) first = static_cast<std::uint32_t>(run);
+            if (first != run) shared[entry] = true;
           },
           [](Target&, std::int32_t) {});
     }
     for (std::int32_t j = 0; j < structure.blocks(); ++j) {
       const std::int64_t diagonal = structure.column_begin()[j];
       for (std::int64_t e = diagonal; e < structure.column_begin()[j + 1]; ++e) {
-        if (owner[e] != kSeveral) continue;
-        sum_of[e] = std::ssize(sums);
+        if (!shared[e]) continue;
+        found.number[e] = std::ssize(sums);
         sums.push_back(block_sum(e));
         if (e == diagonal) sums.push_back(gradient_sum(j));
       }
     }
-    return sum_of;
+    return found;
   }
 
   /// `contributions`: (sum, place), in the order of the factors.
@@ -266,7 +276,7 @@ struct Linearizer::Plan {
     for (const auto& [sum, place] : contributions) places[next[sum]++] = place;
   }
 
-  /// Adds up what runs contributed, and sets to zero what nobody contributes to.
+  /// Adds what later runs contributed, and sets to zero what nobody contributes to.
   void add_up(const LinearizeSink& sink) const {
     for_each_range(sums.size(), kColumnChunk, [&](std::size_t begin, std::size_t end) {
       for (std::size_t k = begin; k < end; ++k) {

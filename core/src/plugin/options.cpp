@@ -9,7 +9,7 @@
 #include <fmt/format.h>
 
 #include "cairn/runtime/error.hpp"
-#include "cairn/runtime/spelling.hpp"
+#include "cairn/text/spelling.hpp"
 
 namespace cairn {
 namespace {

@@ -13,7 +13,7 @@
 #include "cairn/plugin/plugin_search.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/plugin_call.hpp"
-#include "cairn/runtime/spelling.hpp"
+#include "cairn/text/spelling.hpp"
 #include "plugin_loader.hpp"
 
 namespace cairn {

@@ -35,13 +35,18 @@ std::size_t packed_size(const FactorType& type) {
 
 EvaluatedFactorType::~EvaluatedFactorType() = default;
 
+void EvaluatedFactorType::evaluate_entry(const FactorView& pool, std::size_t f, double* residual,
+                                         double* const* jacobians) const {
+  evaluate(states_of(*this, pool, f).data(),
+           pool.measurements + f * static_cast<std::size_t>(measurement_size()),
+           pool.sqrt_information + pool.noise(f) * packed_size(*this), residual, jacobians);
+}
+
 void EvaluatedFactorType::squared_norms(const FactorView& pool, std::size_t begin, std::size_t end,
                                         double* out) const {
   VectorXd r(residual_size());
-  const auto numbers = static_cast<std::size_t>(measurement_size());
   for (std::size_t f = begin; f < end; ++f) {
-    evaluate(states_of(*this, pool, f).data(), pool.measurements + f * numbers,
-             pool.sqrt_information + f * packed_size(*this), r.data(), nullptr);
+    evaluate_entry(pool, f, r.data(), nullptr);
     out[f - begin] = r.squaredNorm();
   }
 }
@@ -51,15 +56,13 @@ void EvaluatedFactorType::linearize(const FactorView& pool, std::size_t begin, s
                                     double* out_squared_norms) const {
   const int n = arity(), m = residual_size();
   const auto pairs = static_cast<std::size_t>(n * (n + 1) / 2);
-  const auto numbers = static_cast<std::size_t>(measurement_size());
   VectorXd r(m);
   std::vector<MatrixXd> J;
   std::vector<double*> out;
   for (int k = 0; k < n; ++k) J.emplace_back(m, tangent_size(k));
   for (MatrixXd& block : J) out.push_back(block.data());
   for (std::size_t f = begin; f < end; ++f) {
-    evaluate(states_of(*this, pool, f).data(), pool.measurements + f * numbers,
-             pool.sqrt_information + f * packed_size(*this), r.data(), out.data());
+    evaluate_entry(pool, f, r.data(), out.data());
     if (out_squared_norms) out_squared_norms[f - begin] = r.squaredNorm();
     const double weight = weights ? weights[f - begin] : 1.0;
     std::size_t pair = f * pairs;

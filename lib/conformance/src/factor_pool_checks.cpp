@@ -36,7 +36,9 @@ class Pool {
         array.insert(array.end(), s.x[v].begin(), s.x[v].end());
       }
       measurements_.insert(measurements_.end(), s.z.begin(), s.z.end());
-      whitening_.insert(whitening_.end(), s.U.begin(), s.U.end());
+      // In another order than the factors.
+      whitening_.insert(whitening_.begin(), s.U.begin(), s.U.end());
+      noises_.insert(noises_.begin(), static_cast<std::int32_t>(noises_.size()));
     }
     std::map<const VariableType*, std::size_t> places;
     for (const auto& [variable, array] : arrays) {
@@ -45,13 +47,13 @@ class Pool {
     }
     for (const VariableType* variable : type.variables())
       pointers_.push_back(states_[places[variable]].data());
-    view_ = {factors.size(), slots_.data(), measurements_.data(), whitening_.data(),
-             pointers_.data()};
+    view_ = {factors.size(),    slots_.data(),  measurements_.data(),
+             whitening_.data(), noises_.data(), pointers_.data()};
   }
   const FactorView& view() const { return view_; }
 
  private:
-  std::vector<std::int32_t> slots_;
+  std::vector<std::int32_t> slots_, noises_;
   std::vector<double> measurements_, whitening_;
   std::vector<Guarded> states_;
   std::vector<const double*> pointers_;

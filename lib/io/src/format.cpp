@@ -14,7 +14,7 @@
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/plugin_call.hpp"
-#include "cairn/runtime/spelling.hpp"
+#include "cairn/text/spelling.hpp"
 
 namespace cairn {
 

@@ -14,7 +14,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "cairn/runtime/spelling.hpp"
+#include "cairn/text/spelling.hpp"
 
 namespace cairn {
 namespace {

@@ -10,7 +10,7 @@
 #include "cairn/graph/packed.hpp"
 #include "cairn/io/format.hpp"
 #include "cairn/runtime/error.hpp"
-#include "cairn/runtime/spelling.hpp"
+#include "cairn/text/spelling.hpp"
 #include "cairn/update/marginal_prior.hpp"
 
 namespace cairn {

@@ -12,7 +12,7 @@
 #include "cairn/geometry/pose.hpp"
 #include "cairn/graph/packed.hpp"
 #include "cairn/io/format.hpp"
-#include "cairn/runtime/spelling.hpp"
+#include "cairn/text/spelling.hpp"
 
 namespace cairn {
 namespace {

@@ -93,8 +93,7 @@ struct BatchedFactorType::Batch {
 /// The factors of one evaluated pool, for what the base class does with `evaluate`.
 class BatchedFactorType::Evaluated final : public EvaluatedFactorType {
  public:
-  Evaluated(const BatchedFactorType& type, const FactorView& pool, const Batch& batch)
-      : type_(&type), pool_(&pool), batch_(&batch) {}
+  Evaluated(const BatchedFactorType& type, const Batch& batch) : type_(&type), batch_(&batch) {}
 
   std::string_view tag() const override { return type_->tag(); }
   int arity() const override { return type_->arity(); }
@@ -109,12 +108,12 @@ class BatchedFactorType::Evaluated final : public EvaluatedFactorType {
   bool propagate(int, const double* const*, const double*, double*) const override { return false; }
   bool is_relative() const override { return false; }
 
-  /// Which factor it is follows from where its information is.
-  void evaluate(const double* const*, const double*, const double* sqrt_information,
-                double* residual, double* const* jacobians) const override {
+  void evaluate(const double* const*, const double*, const double*, double*,
+                double* const*) const override {}  // all are entries of the pool
+  void evaluate_entry(const FactorView& pool, std::size_t f, double* residual,
+                      double* const* jacobians) const override {
     const int n = residual_size();
-    const std::size_t f =
-        static_cast<std::size_t>(sqrt_information - pool_->sqrt_information) / packed_size(n);
+    const double* sqrt_information = pool.sqrt_information + pool.noise(f) * packed_size(n);
     whiten(sqrt_information, n, 1, batch_->residuals.data() + f * size_of(n), residual);
     for (int k = 0; jacobians && k < arity(); ++k) {
       if (!jacobians[k]) continue;
@@ -126,7 +125,6 @@ class BatchedFactorType::Evaluated final : public EvaluatedFactorType {
 
  private:
   const BatchedFactorType* type_;
-  const FactorView* pool_;
   const Batch* batch_;
 };
 
@@ -210,14 +208,14 @@ std::shared_ptr<const BatchedFactorType::Batch> BatchedFactorType::batch(
 void BatchedFactorType::squared_norms(const FactorView& pool, std::size_t begin, std::size_t end,
                                       double* out) const {
   const std::shared_ptr<const Batch> all = batch(pool, begin, end, false);
-  Evaluated(*this, pool, *all).squared_norms(pool, begin, end, out);
+  Evaluated(*this, *all).squared_norms(pool, begin, end, out);
 }
 
 void BatchedFactorType::linearize(const FactorView& pool, std::size_t begin, std::size_t end,
                                   const double* weights, const LinearizeSink& sink,
                                   double* out_squared_norms) const {
   const std::shared_ptr<const Batch> all = batch(pool, begin, end, true);
-  Evaluated(*this, pool, *all).linearize(pool, begin, end, weights, sink, out_squared_norms);
+  Evaluated(*this, *all).linearize(pool, begin, end, weights, sink, out_squared_norms);
 }
 
 void BatchedFactorType::evaluate(const double* const* x, const double* measurement,

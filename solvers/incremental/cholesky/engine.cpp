@@ -14,9 +14,6 @@
 namespace cairn::incremental {
 namespace {
 
-/// What a factor's chi2 may be off by rounding, where its information is ordinary.
-constexpr double kRounding = 1e-18;
-
 const block::Kernels& kernels_named(const std::string& name) {
   const block::Kernels* kernels = block::choose_kernels(name.c_str());
   if (kernels) return *kernels;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -35,11 +36,14 @@ struct Settings {
   /// adds up.
   double significance = 0.25;
   /// Linear systems solved in one update, at most.
-  int iterations = 10;
+  int iterations = 30;
   /// Variables touched within so many updates are ordered last.
   int recent = 4;
   std::string kernels = "auto";
 };
+
+/// What a factor's chi2 may be off by rounding, where its information is ordinary.
+inline constexpr double kRounding = 1e-18;
 
 /// The fallback optimizer for when Gauss-Newton diverges. Copies of an engine share it, in all
 /// threads.
@@ -72,33 +76,36 @@ struct EngineState {
   std::vector<std::uint8_t> live_variable_, live_factor_;
   std::vector<std::vector<std::int32_t>> factors_of_;
   std::vector<std::int32_t> bound_;       // by variable: see Tree
-  std::vector<std::int64_t> moved_at_;    // by variable: the last apply_steps that moved it
   std::vector<std::int64_t> touched_at_;  // by variable: update
   std::vector<std::int32_t>
       touched_;  // variables whose part of H has changed since the last solution
   std::vector<std::int32_t> sources_;  // … or of the right-hand side alone
   std::vector<double> steps_;          // by scalars; zero between calls
-  std::vector<std::int32_t> moving_;   // factors that have moved since they were last evaluated
+  std::vector<std::int32_t>
+      moved_;  // variables that steps have moved since factors were last evaluated
+  std::vector<std::uint8_t> has_moved_;  // by variable: whether it is one of them
   std::vector<std::int32_t> retiring_;
   std::vector<std::int64_t> checked_at_;  // by factor: to visit each once
   std::int64_t check_ = 0;
   std::int64_t time_ = 0;
   bool structure_changed_ = false;
   bool broken_ = false;
+  bool exhausted_ = false;  // the last solution has used up its iterations
   bool gauge_is_old_ = false;
   int dead_ = 0;
   int live_factors_ = 0;
-  double rounding_scale_ = 0.0;   // of `rounding`: sum over factors
-  bool rounding_is_old_ = false;  // that sum is to be taken anew
-  double cost_ = 0.0;             // sum over factors
-  double gained_ = 0.0;           // of the cost, by steps since factors were evaluated
-  bool must_look_ = false;        // something has been removed or changed: `gained_` is
-                                  // no measure then
-  int others_ = 0;                // factors of several variables that depend on rigid
-                                  // motions of these
-  double left_share_ = 1.0;       // how much of the shortfall was left to gain
-  double decrease_ = 0.0;         // of the last solution: gᵀH⁻¹g
-  std::vector<FactorId> ids_;     // by factor, rising
+  double rounding_scale_ = 0.0;                                   // of `rounding`: sum over factors
+  bool rounding_is_old_ = false;                                  // that sum is to be taken anew
+  std::map<const VariableType*, std::vector<double>> positions_;  // see `Engine::position`
+  double cost_ = 0.0;                                             // sum over factors
+  double gained_ = 0.0;        // of the cost, by steps since factors were evaluated
+  bool must_look_ = false;     // something has been removed or changed: `gained_` is
+                               // no measure then
+  int others_ = 0;             // factors of several variables that depend on rigid
+                               // motions of these
+  double left_share_ = 1.0;    // how much of the shortfall was left to gain
+  double decrease_ = 0.0;      // of the last solution: gᵀH⁻¹g
+  std::vector<FactorId> ids_;  // by factor, rising
   FactorId next_id_ = 0;
   std::vector<std::uint8_t> is_source_;  // by variable
   Pace pace_;
@@ -108,10 +115,10 @@ struct EngineState {
   std::vector<Follower> followers_;
   /// The estimate as it is to be seen while what the engine has is not proven.
   std::optional<Estimate> shown_;
-  std::vector<const double*> factor_steps_;
-  std::vector<std::int32_t> looked_;   // factors of the last evaluation
-  std::vector<std::int32_t> changed_;  // by the last substitution
-  double looked_at_ = 0.0;             // what steps had gained before the last evaluation
+  std::vector<std::int32_t> looked_;    // factors of the last evaluation
+  std::vector<std::int32_t> together_;  // those of them that are evaluated at a time
+  std::vector<std::int32_t> changed_;   // by the last substitution
+  double looked_at_ = 0.0;              // what steps had gained before the last evaluation
   double mismatch_ = 0.0;   // of factors on several variables that are not relative, then
   double shortfall_ = 0.0;  // by how much more than expected the cost was then
 };
@@ -236,9 +243,9 @@ class Engine : private EngineState {
   void follow(std::int32_t v);
   void apply_steps();
   void forget_steps();
-  void move_state(std::int32_t v);
-  void move_models_of(std::int32_t v);
-  void move_model(int f);
+  void move_states(std::span<const std::int32_t> variables);
+  void turn_models(const Tree::Turn& turn);
+  void collect_moved_factors();
   void count_bonds(int f, std::int32_t sign);
   void admit();
   bool admit_waiting();
@@ -260,6 +267,7 @@ class Engine : private EngineState {
   bool move_more();
   void look(UpdateReport& report);
   bool evaluate_more();
+  void evaluate(std::span<const std::int32_t> factors);
   void evaluated(UpdateReport& report);
   void prove();
   void improve(UpdateReport& report);
@@ -281,7 +289,8 @@ class Engine : private EngineState {
   double share(double part) const;
   /// What rounding may do to the cost.
   double rounding();
-  double rounding_scale(int f) const;
+  double rounding_scale(int f);
+  std::pair<std::span<const double>, double> position(std::int32_t v);
   void touch_all();
   void bring_back();
   void step_back();

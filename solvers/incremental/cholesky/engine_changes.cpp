@@ -2,6 +2,7 @@
 // What is added, removed, changed and held: brought into the models, H and the gradient.
 #include <algorithm>
 #include <cassert>
+#include <cmath>
 #include <utility>
 
 #include "cairn/update/marginal_prior.hpp"
@@ -12,6 +13,8 @@ namespace {
 
 /// Up to here chi2 is rounded as if its residuals were of ordinary size.
 constexpr double kOrdinaryInformation = 1e12;
+/// Relative rounding of a difference of two positions, some operations later.
+constexpr double kDigitsOfPositions = 2e-15;
 
 }  // namespace
 
@@ -35,12 +38,12 @@ void Engine::load(Graph graph, std::vector<FactorId> ids) {
   live_factor_.clear();
   factors_of_.clear();
   bound_.clear();
-  moved_at_.clear();
   touched_.clear();
   sources_.clear();
   is_source_.clear();
   steps_.clear();
-  moving_.clear();
+  moved_.clear();
+  has_moved_.clear();
   retiring_.clear();
   looked_.clear();
   changed_.clear();
@@ -51,7 +54,8 @@ void Engine::load(Graph graph, std::vector<FactorId> ids) {
   anchored_.clear();
   disconnected_.clear();
   checked_at_.clear();
-  broken_ = gauge_is_old_ = rounding_is_old_ = false;
+  positions_.clear();
+  broken_ = exhausted_ = gauge_is_old_ = rounding_is_old_ = false;
   dead_ = live_factors_ = 0;
   cost_ = decrease_ = gained_ = rounding_scale_ = 0.0;
   others_ = 0;
@@ -77,7 +81,7 @@ void Engine::added_variable() {
   factors_of_.emplace_back();
   touched_at_.push_back(time_);
   bound_.push_back(0);
-  moved_at_.push_back(-1);
+  has_moved_.push_back(0);
   is_source_.push_back(0);
 }
 
@@ -104,23 +108,63 @@ void Engine::admit() {
   for (const std::int32_t v : variables) factors_of_[v].push_back(f);
   ++live_factors_;
   ++unsolved_;
-  rounding_scale_ += rounding_scale(f);
   models_.linearize(f, graph_, states_);
+  rounding_scale_ += rounding_scale(f);
   cost_ += models_.cost(f);
   put_in(f);
 }
 
-/// Below and above what is ordinary, the rounding of a factor's chi2 goes with its information.
+/// Below and above what is ordinary, the rounding of a factor's chi2 goes with its information, and
+/// far from the origin with the digits that positions have left.
 /// What marginalisation leaves has its weight in its Jacobian, and is no larger than what it
 /// replaces.
-double Engine::rounding_scale(int f) const {
+double Engine::rounding_scale(int f) {
   const FactorType& type = graph_.factor_type(f);
   if (type.tag() == MarginalPrior::kTag) return 0.0;
   double largest = 0.0;
   const double* diagonal = graph_.information(f).data();
   for (int left = type.residual_size(); left > 0; diagonal += left--)
     largest = std::max(largest, *diagonal);
-  return largest < 1.0 ? largest : std::max(1.0, largest / kOrdinaryInformation);
+  const double ordinary = largest < 1.0 ? largest : std::max(1.0, largest / kOrdinaryInformation);
+  double off = 0.0;  // squared, of the residual
+  const double* J = models_.jacobian(f);
+  for (const std::int32_t v : models_.variables(f)) {
+    const auto [coordinates, length] = position(v);
+    for (std::int32_t k = 0; k < system_.size(v); ++k) {
+      for (std::int32_t row = 0; row < models_.rows(f); ++row, ++J) {
+        const double by =
+            coordinates[static_cast<std::size_t>(k)] * kDigitsOfPositions * length * *J;
+        off += by * by;
+      }
+    }
+  }
+  return ordinary + off / kRounding;
+}
+
+/// For each coordinate of a variable's steps whether it moves its position, 1 or 0, and how far
+/// from the origin that is.
+std::pair<std::span<const double>, double> Engine::position(std::int32_t v) {
+  const VariableType& type = states_.type(v);
+  const Placement* place = type.placement();
+  std::vector<double>& coordinates = positions_[&type];
+  const auto size = static_cast<std::size_t>(type.tangent_size());
+  if (coordinates.size() != size) {
+    coordinates.assign(size, place && !place->has_orientation() ? 1.0 : 0.0);
+    const LieGroup* group = type.lie_group();
+    for (std::size_t k = 0; place && place->has_orientation() && group && k < size; ++k) {
+      std::vector<double> step(size, 0.0), x(static_cast<std::size_t>(type.ambient_size()));
+      step[k] = 0.1;
+      group->exp(step.data(), x.data());
+      double R[9] = {}, t[3] = {};
+      place->split(x.data(), R, t);
+      double trace = 0.0;
+      for (int i = 0; i < place->dimension(); ++i) trace += R[i * (place->dimension() + 1)];
+      coordinates[k] = trace > place->dimension() - 1e-6 ? 1.0 : 0.0;
+    }
+  }
+  double R[9] = {}, t[3] = {};
+  if (place) place->split(states_.x(v), R, t);
+  return {coordinates, std::max({std::abs(t[0]), std::abs(t[1]), std::abs(t[2])})};
 }
 
 void Engine::changed_factor(int f) {
@@ -255,7 +299,7 @@ void Engine::put_in(int f) {
       if (!held_[variables[b]]) system_.connect(variables[a], variables[b]);
     }
   }
-  models_.add_to(system_, f, 1.0, held_);
+  models_.add_to(system_, states_, f, 1.0, held_);
   covariances_.note(models_, system_, f, 1.0, held_);
   count_bonds(f, 1);
   structure_changed_ = true;
@@ -282,7 +326,7 @@ void Engine::take_out(int f) {
   must_look_ = true;
   count_bonds(f, -1);
   covariances_.note(models_, system_, f, -1.0, held_);
-  models_.add_to(system_, f, -1.0, held_);
+  models_.add_to(system_, states_, f, -1.0, held_);
   const auto variables = models_.variables(f);
   for (std::size_t a = 0; a < variables.size(); ++a) {
     if (held_[variables[a]]) continue;
@@ -307,11 +351,11 @@ void Engine::sum_anew(std::int32_t v) {
 void Engine::relinearize(int f) {
   for (const std::int32_t v : models_.variables(f)) follow(v);
   covariances_.note(models_, system_, f, -1.0, held_);
-  models_.add_to(system_, f, -1.0, held_);
+  models_.add_to(system_, states_, f, -1.0, held_);
   cost_ -= models_.cost(f);
   models_.linearize(f, graph_, states_);
   cost_ += models_.cost(f);
-  models_.add_to(system_, f, 1.0, held_);
+  models_.add_to(system_, states_, f, 1.0, held_);
   covariances_.note(models_, system_, f, 1.0, held_);
   for (const std::int32_t v : models_.variables(f)) {
     if (!held_[v]) touch(v);
@@ -324,25 +368,18 @@ void Engine::follow(std::int32_t v) {
   if (!changed_.empty()) apply_steps();
 }
 
-/// Moves the estimate and the models by the steps of `changed_`.
+/// Moves the estimate by the steps of `changed_`.
 void Engine::apply_steps() {
-  ++check_;
-  for (const std::int32_t v : changed_) move_state(v);
-  for (const std::int32_t v : changed_) move_models_of(v);
+  move_states(changed_);
   forget_steps();
 }
 
-void Engine::move_state(std::int32_t v) {
-  if (!held_[v]) states_.move(v, steps_.data() + system_.offset(v));
-  moved_at_[v] = check_;
-}
-
-void Engine::move_models_of(std::int32_t v) {
-  for (const std::int32_t f : factors_of_[v]) {
-    if (checked_at_[f] == check_) continue;
-    checked_at_[f] = check_;
-    move_model(f);
+void Engine::move_states(std::span<const std::int32_t> variables) {
+  for (const std::int32_t v : variables) {
+    if (held_[v]) std::fill_n(steps_.data() + system_.offset(v), system_.size(v), 0.0);
+    if (!std::exchange(has_moved_[v], 1)) moved_.push_back(v);
   }
+  states_.move(variables, steps_.data());
 }
 
 void Engine::forget_steps() {
@@ -351,24 +388,26 @@ void Engine::forget_steps() {
   changed_.clear();
 }
 
-/// A variable of the factor whose step was not computed is below a node that the pass ended at: its
-/// model moves by what arrived there.
-void Engine::move_model(int f) {
-  const auto variables = models_.variables(f);
-  const Node* end = nullptr;
-  for (const std::int32_t v : variables) {
-    if (moved_at_[v] != check_ && !held_[v]) end = tree_.end_of_pass(v);
+/// For the factors that join its variable with the subtree.
+void Engine::turn_models(const Tree::Turn& turn) {
+  for (const std::int32_t f : factors_of_[turn.variable]) {
+    const auto below = [&](std::int32_t v) { return tree_.below(v, turn.node); };
+    if (std::ranges::any_of(models_.variables(f), below))
+      models_.move(f, turn.variable, tree_.turned_steps().data() + turn.step);
   }
-  factor_steps_.clear();
-  for (const std::int32_t v : variables) {
-    const double* step = nullptr;
-    if (moved_at_[v] == check_) step = steps_.data() + system_.offset(v);
-    if (step && end) {
-      if (const double* arrived = tree_.arrived(*end, v)) step = arrived;
+}
+
+/// `looked_`: the factors of all variables that have moved since factors were last evaluated.
+void Engine::collect_moved_factors() {
+  ++check_;
+  looked_.clear();
+  for (const std::int32_t v : moved_) {
+    has_moved_[v] = 0;
+    for (const std::int32_t f : factors_of_[v]) {
+      if (std::exchange(checked_at_[f], check_) != check_) looked_.push_back(f);
     }
-    factor_steps_.push_back(step);
   }
-  if (models_.move(f, factor_steps_.data())) moving_.push_back(f);
+  moved_.clear();
 }
 
 }  // namespace cairn::incremental

@@ -14,16 +14,17 @@ namespace {
 
 // How the accuracy that is asked for, a fraction of chi2, is shared out. Found by trying on the
 // published graphs: what is left at the end stays well within it.
-constexpr double kEnough = 0.2;     ///< of it all: by how much more solving could lower chi2
+constexpr double kEnough = 0.08;    ///< of it all: by how much more solving could lower chi2
 constexpr double kStepShare = 0.1;  ///< of a factor's: steps that are not followed down the tree
 /// So much may be left of the steps since the factors were evaluated, before they are again.
-constexpr double kLook = 0.1;
+constexpr double kLook = 0.15;
 /// A step that has gained so many times what may be left is looked at in any case.
-constexpr double kFar = 4.0;
+constexpr double kFar = 6.0;
 /// What is left is guessed from what was: a share of what the steps have gained, at least …
 constexpr double kLeastShare = 5e-3;
-constexpr double kOthersShare = 0.01;  ///< … where factors are not of poses alone, …
-constexpr double kForget = 0.5;        ///< … and not less than so much of the guess before
+constexpr double kOthersShare = 0.05;   ///< … where factors are not of poses alone, …
+constexpr double kForget = 0.5;         ///< … and not less than so much of the guess before, …
+constexpr double kOthersForget = 0.95;  ///< … where they are not
 /// What can still be gained is at most so many times what steps have fallen short of.
 constexpr double kCaution = 6.0;
 /// Gradients that promise up to so many times as much say that H is right.
@@ -38,18 +39,13 @@ constexpr double kMismatch = 0.05;
 constexpr std::size_t kMostSources = 256;
 /// In graphs of no more factors all are evaluated after each step.
 constexpr int kFew = 200;
+/// Fewer iterations in each of two solutions do not say that there will never be enough.
+constexpr int kPatience = 10;
 /// If more than this part of the factors were to be renewed, all are.
 constexpr double kMost = 0.2;
 
-// Damped rounds, with H + λ diag(H).
-constexpr double kFirstDamping = 1e-6;
-constexpr double kMostDamping = 1e12;
-constexpr double kEase = 0.1;  ///< factor of λ after a step that is accepted
-/// Once a step lowers chi2 by less than this fraction, H is not damped: it would only delay.
-constexpr double kUndamped = 1e-3;
-constexpr double kConverged = 1e-6;
-constexpr int kMostDampedRounds = 100;
-
+/// So many variables are moved, and factors evaluated, at a time.
+constexpr std::size_t kAtOnce = 64;
 /// What it takes to copy a variable's state for `Engine::shown_` [s].
 constexpr double kCopySeconds = 0.15e-6;
 
@@ -84,6 +80,7 @@ bool Engine::begin_job(UpdateReport& report) {
   if (touched_.empty() && sources_.empty()) return false;
   job_ = {};
   job_.factors = std::exchange(unsolved_, 0);
+  job_.at_first = cost();
   job_.go_to(Job::Stage::order);
   return true;
 }
@@ -98,6 +95,7 @@ bool Engine::go_on(UpdateReport& report) {
 
 void Engine::end_job() {
   job_ = {};
+  exhausted_ = false;
   pace_.keep_free(0.0);
   shown_.reset();
 }
@@ -137,12 +135,11 @@ bool Engine::advance(UpdateReport& report) {
     case descend: {
       const Timed timed(seconds.solve);
       if (!tree_.descend(job_.tolerance, system_.g(), steps_, changed_, pace_)) return false;
-      ++check_;
       job_.go_to(move_states);
       break;
     }
     case move_states:
-    case move_models: {
+    case turn_models: {
       const Timed timed(seconds.check);
       if (!move_more()) return false;
       if (job_.damped == Job::Damped::tried) {
@@ -291,19 +288,21 @@ void Engine::touch_all() {
   }
 }
 
-/// Moves the estimate and the models by the step.
+/// Moves the estimate by the step.
 bool Engine::move_more() {
   if (job_.stage == Job::Stage::move_states) {
-    for (; job_.next < changed_.size(); ++job_.next) {
-      if (!pace_.allows(Work::move, 1.0)) return false;
-      move_state(changed_[job_.next]);
+    while (job_.next < changed_.size()) {
+      const std::size_t count = std::min(changed_.size() - job_.next, kAtOnce);
+      if (!pace_.allows(Work::move, static_cast<double>(count))) return false;
+      move_states(std::span(changed_).subspan(job_.next, count));
+      job_.next += count;
     }
-    job_.go_to(Job::Stage::move_models);
+    job_.go_to(Job::Stage::turn_models);
   }
-  for (; job_.next < changed_.size(); ++job_.next) {
-    const std::int32_t v = changed_[job_.next];
-    if (!pace_.allows(Work::move, static_cast<double>(factors_of_[v].size()))) return false;
-    move_models_of(v);
+  for (const auto turns = tree_.turns(); job_.next < turns.size(); ++job_.next) {
+    const auto factors = factors_of_[turns[job_.next].variable].size();
+    if (!pace_.allows(Work::move, static_cast<double>(factors))) return false;
+    turn_models(turns[job_.next]);
   }
   forget_steps();
   return true;
@@ -322,30 +321,49 @@ void Engine::look(UpdateReport& report) {
     return end_job();
   job_.expected = cost();
   looked_at_ = std::exchange(gained_, 0.0);
-  looked_.swap(moving_);
-  moving_.clear();
+  collect_moved_factors();
   job_.square = 0.0;
   job_.compared = 0;
   job_.go_to(Job::Stage::evaluate);
 }
 
 bool Engine::evaluate_more() {
-  for (; job_.next < looked_.size(); ++job_.next) {
-    const std::int32_t f = looked_[job_.next];
-    if (!live_factor_[f]) continue;
-    if (!pace_.allows(Work::evaluate, 1.0)) return false;
-    for (const std::int32_t v : models_.variables(f)) tree_.settle(v);
-    cost_ -= models_.cost(f);
-    const bool compare = others_ > 0 && is_other(f);
-    const double mismatch = models_.correct(f, graph_, states_, system_, held_, compare);
-    job_.square += mismatch * mismatch;
-    job_.compared += compare;
-    cost_ += models_.cost(f);
-    for (const std::int32_t v : models_.variables(f)) add_source(v);
+  while (job_.next < looked_.size()) {
+    std::size_t end = job_.next;
+    together_.clear();
+    for (; end < looked_.size() && together_.size() < kAtOnce; ++end) {
+      if (!live_factor_[looked_[end]]) continue;
+      if (!together_.empty() && !models_.alike(together_.front(), looked_[end])) break;
+      together_.push_back(looked_[end]);
+    }
+    if (!pace_.allows(Work::evaluate, static_cast<double>(together_.size()))) return false;
+    evaluate(together_);
+    job_.next = end;
   }
   mismatch_ = job_.compared > 0 ? std::sqrt(job_.square / job_.compared) : 0.0;
   shortfall_ = cost_ - job_.expected;
   return true;
+}
+
+/// Evaluates factors that are alike again. Where a factor type throws, nothing has changed.
+void Engine::evaluate(std::span<const std::int32_t> factors) {
+  double before = 0.0, now = 0.0;
+  for (const std::int32_t f : factors) {
+    for (const std::int32_t v : models_.variables(f)) {
+      tree_.settle(v);
+      add_source(v);
+    }
+    before += models_.cost(f);
+  }
+  models_.correct(factors, graph_, states_, system_, held_);
+  for (const std::int32_t f : factors) now += models_.cost(f);
+  cost_ += now - before;
+  for (const std::int32_t f : factors) {
+    if (others_ == 0 || !is_other(f)) continue;
+    const double mismatch = models_.mismatch(f, graph_, states_);
+    job_.square += mismatch * mismatch;
+    ++job_.compared;
+  }
 }
 
 void Engine::evaluated(UpdateReport& report) {
@@ -373,20 +391,29 @@ void Engine::prove() {
 /// it is; if the former is much larger, H is not that of the current estimate, and what has moved
 /// is relinearised.
 void Engine::improve(UpdateReport& report) {
-  const double left = tree_.climbed();
+  const double left = std::min(tree_.climbed(), cost_);  // more is rounding: chi2 is not negative
   const double allowed = settings_.accuracy * cost_ + rounding();
   report.owed = 0;
   const bool poses_alone = others_ == 0 && live_factors_ > kFew;
   const double likely = poses_alone ? std::min(left, kCaution * std::abs(shortfall_)) : left;
-  left_share_ = std::max(kForget * left_share_, poses_alone ? kLeastShare : kOthersShare);
+  left_share_ = poses_alone ? std::max(kForget * left_share_, kLeastShare)
+                            : std::max(kOthersForget * left_share_, kOthersShare);
   if (looked_at_ > 0.0) left_share_ = std::clamp(likely / looked_at_, left_share_, 1.0);
   const bool right =
       poses_alone ? left <= std::min(kTrusted * likely, looked_at_) : left <= kFast * looked_at_;
   if (likely <= kEnough * allowed && mismatch_ <= kMismatch)
     return job_.go_to(Job::Stage::set_aside);
   if (job_.rounds >= settings_.iterations) {
+    // The next update goes on; where that is not enough either, Gauss-Newton may never be.
+    const bool hopeless = exhausted_ && job_.rounds >= kPatience && likely > settings_.significance;
+    if (hopeless) {
+      if (cost_ <= job_.at_first + rounding()) prove();
+      return diverged(report);
+    }
     report.owed = static_cast<int>(looked_.size());
-    return end_job();
+    end_job();
+    exhausted_ = true;
+    return;
   }
   job_.factors = static_cast<int>(looked_.size());
   if (right && mismatch_ <= kMismatch) return job_.go_to(Job::Stage::order);
@@ -423,131 +450,6 @@ bool Engine::relinearize_more(UpdateReport& report) {
   return true;
 }
 
-void Engine::begin_relinearizing_all() {
-  covariances_.note_everything();
-  job_.go_to(Job::Stage::follow_all);
-}
-
-/// Everything at the current estimate: H and g are summed anew, without the rounding of updates.
-bool Engine::relinearize_all_more() {
-  const std::size_t variables = static_cast<std::size_t>(states_.size());
-  if (job_.stage == Job::Stage::follow_all) {
-    for (; job_.next < variables; ++job_.next) {
-      if (!pace_.allows(Work::move, 1.0)) return false;
-      const std::int32_t v = static_cast<std::int32_t>(job_.next);
-      if (!live_variable_[v] || held_[v]) continue;
-      follow(v);
-      touch(v);
-    }
-    moving_.clear();
-    for (const std::int32_t v : sources_) is_source_[v] = 0;
-    sources_.clear();
-    system_.clear_values();
-    cost_ = gained_ = 0.0;
-    job_.go_to(Job::Stage::frame_all);
-  }
-  if (job_.stage == Job::Stage::frame_all) {
-    for (; job_.next < variables; ++job_.next) {
-      if (!pace_.allows(Work::move, 1.0)) return false;
-      states_.put_frame_here(static_cast<std::int32_t>(job_.next));
-    }
-    job_.go_to(Job::Stage::linearize_all);
-  }
-  for (; job_.next < static_cast<std::size_t>(admitted_); ++job_.next) {
-    const int f = static_cast<int>(job_.next);
-    if (!live_factor_[f]) continue;
-    if (!pace_.allows(Work::linearize, 1.0)) return false;
-    models_.linearize(f, graph_, states_);
-    cost_ += models_.cost(f);
-    models_.add_to(system_, f, 1.0, held_);
-  }
-  return true;
-}
-
-void Engine::linearized_all(UpdateReport& report) {
-  if (job_.damped == Job::Damped::tried) return judge(report);
-  if (job_.damped == Job::Damped::no) report.relinearized_factors += live_factors_;
-  if (job_.damped == Job::Damped::begun) job_.before = cost_;
-  job_.go_to(Job::Stage::order);
-}
-
-/// A step has raised chi2, or H is not positive definite: back to the estimate from before, and on
-/// from there with an optimizer that never raises chi2. With a limit of time this is done here, by
-/// Levenberg-Marquardt, since it has to be done in pieces.
-void Engine::diverged(UpdateReport& report) {
-  step_back();
-  const int factors = job_.factors;
-  end_job();
-  if (!pace_.limited()) return rescue(report, kConverged);
-  job_.factors = std::max(factors, live_factors_);
-  job_.damped = Job::Damped::begun;
-  job_.lambda = kFirstDamping;
-  left_share_ = 1.0;
-  place_followers();
-  begin_relinearizing_all();
-}
-
-void Engine::not_positive_definite(UpdateReport& report) {
-  switch (job_.damped) {
-    case Job::Damped::no:
-      return diverged(report);
-    case Job::Damped::last:
-      broken_ = true;
-      return end_job();
-    default:
-      break;
-  }
-  damp_more();
-  if (job_.damped == Job::Damped::last && !job_.converged) job_.lambda = 0.0;
-  tree_.begin_factorization(job_.lambda);
-  job_.go_to(Job::Stage::factorize);
-}
-
-void Engine::damp_more() {
-  job_.undamped_fails = job_.undamped_fails || job_.lambda == 0.0;
-  job_.lambda = std::max(job_.lambda, kFirstDamping) * job_.growth;
-  job_.growth *= 2.0;
-  if (job_.lambda > kMostDamping) give_up();
-}
-
-void Engine::give_up() {
-  job_.converged = false;
-  job_.damped = Job::Damped::last;
-  job_.lambda = 0.0;
-}
-
-/// After a damped step, with everything linearised there: whether it is accepted.
-void Engine::judge(UpdateReport& report) {
-  ++report.iterations;
-  ++job_.rounds;
-  if (cost_ <= job_.before + rounding()) {
-    const double gain = job_.before - cost_;
-    job_.before = cost_;
-    prove();
-    job_.growth = 2.0;
-    job_.damped = Job::Damped::begun;
-    const bool judges = job_.lambda == 0.0 || job_.undamped_fails;
-    if (judges && gain <= kConverged * cost_ + rounding()) {
-      job_.damped = Job::Damped::last;
-      job_.lambda = 0.0;
-    } else if (!job_.undamped_fails && gain <= kUndamped * cost_) {
-      job_.lambda = 0.0;
-    } else {
-      job_.lambda *= kEase;
-    }
-  } else {
-    step_back();
-    job_.unproven = false;
-    pace_.keep_free(0.0);
-    shown_.reset();
-    job_.damped = Job::Damped::begun;
-    damp_more();
-    begin_relinearizing_all();
-  }
-  if (job_.rounds >= kMostDampedRounds && job_.damped != Job::Damped::last) give_up();
-  if (job_.stage == Job::Stage::linearize_all) job_.go_to(Job::Stage::order);
-}
-
 /// A step with the factor at hand to its end, and everything that has moved evaluated.
 void Engine::step_and_look(UpdateReport& report) {
   job_ = {};
@@ -569,65 +471,6 @@ bool Engine::bring_factor_up_to_date(UpdateReport& report) {
   job_ = {};
   const Timed timed(report.seconds.factorize);
   return tree_.factorize_more(pace_) < 0;
-}
-
-// What comes while a job is not done -------------------------------------------------------------
-
-/// A pose that waits is placed beside the first other pose that a factor joins it with.
-void Engine::note_follower(int f) {
-  const auto variables = models_.variables(f);
-  for (const std::int32_t v : variables) {
-    if (!factors_of_[v].empty() || graph_.fixed(v) || follows(v)) continue;
-    const LieGroup* group = states_.type(v).lie_group();
-    const auto leader = std::ranges::find_if(variables, [&](std::int32_t other) {
-      return other != v && graph_.pool(other) == graph_.pool(v) &&
-             (!factors_of_[other].empty() || graph_.fixed(other) || follows(other));
-    });
-    if (!group || leader == variables.end()) continue;
-    std::vector<double> relative(x(v).size());
-    group->inverse(x(*leader).data(), relative.data());
-    group->compose(relative.data(), x(v).data(), relative.data());
-    states_.type(v).normalize(relative.data());
-    followers_.push_back({v, *leader, std::move(relative)});
-  }
-}
-
-bool Engine::follows(std::int32_t v) const {
-  return std::ranges::any_of(followers_, [&](const Follower& one) { return one.variable == v; });
-}
-
-void Engine::place_followers() {
-  for (const Follower& one : followers_) {
-    const LieGroup& group = *states_.type(one.variable).lie_group();
-    tree_.settle(one.leader);
-    std::vector<double> motion(one.relative.size());
-    group.inverse(states_.x(one.variable), motion.data());
-    group.compose(one.relative.data(), motion.data(), motion.data());
-    group.compose(states_.x(one.leader), motion.data(), motion.data());
-    // Or rounding would multiply from one pose to the next, and from one time to the next.
-    states_.type(one.variable).normalize(motion.data());
-    states_.lead(one.variable, motion.data());
-    states_.put_frame_here(one.variable);
-  }
-}
-
-/// Whether any factors have waited.
-bool Engine::admit_waiting() {
-  place_followers();
-  followers_.clear();
-  const bool any = admitted_ < models_.size();
-  while (admitted_ < models_.size()) admit();
-  return any;
-}
-
-/// Keeps the estimate from before a step that has not been evaluated.
-void Engine::show_what_is_proven() {
-  if (!job_.unproven || shown_) return;
-  Tree::Leads leads;
-  Estimate before = states_.before([&](std::int32_t node, std::span<const double> lead) {
-    leads[node].assign(lead.begin(), lead.end());
-  });
-  shown_ = tree_.settled(std::move(before), leads);
 }
 
 }  // namespace cairn::incremental

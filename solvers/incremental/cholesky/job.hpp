@@ -22,7 +22,7 @@ struct Job {
     climb,
     descend,
     move_states,
-    move_models,
+    turn_models,  ///< those of factors that join what moves as a whole with the rest
     evaluate,
     // Whether there is to be another:
     gradient,
@@ -37,7 +37,8 @@ struct Job {
   Stage stage = Stage::none;
   std::size_t next = 0;  ///< what the stage is to go on with
   int rounds = 0;
-  double before = 0.0;     ///< the cost before the round
+  double at_first = 0.0;   ///< the cost before the job, …
+  double before = 0.0;     ///< … and before the round
   double tolerance = 0.0;  ///< of the step, see `Tree::solve`
   double expected = 0.0;   ///< the cost after it, by the models
   double square = 0.0;     ///< of the mismatches, summed over …

@@ -89,7 +89,7 @@ void Models::add(const Graph& graph, int position) {
   variables_.insert(variables_.end(), factor_variables.begin(), factor_variables.end());
   const auto rows = static_cast<std::size_t>(record.rows);
   const auto scalars = static_cast<std::size_t>(record.scalars);
-  record.place = values_.take(rows * (scalars + 1) + scalars);
+  record.place = values_.take(rows * scalars + 2 * scalars);
   records_.push_back(record);
 }
 
@@ -119,7 +119,8 @@ double Models::evaluate(const Record& record, const Graph& graph, const Estimate
   type.evaluate(
       points_.data(),
       pool.measurements.data() + entry * static_cast<std::size_t>(type.measurement_size()),
-      pool.sqrt_information.data() + entry * packed, r, J ? pointers_.data() : nullptr);
+      pool.sqrt_information.data() + static_cast<std::size_t>(pool.noises[entry]) * packed, r,
+      J ? pointers_.data() : nullptr);
   double s = 0.0;
   for (int k = 0; k < record.rows; ++k) s += r[k] * r[k];
   if (!graph.has_losses() || !graph.any_loss(record.pool, entry, entry + 1)) return s;
@@ -154,14 +155,13 @@ void Models::linearize(int f, const Graph& graph, const States& states) {
   Record& record = records_[f];
   const int rows = record.rows;
   double* const J = values_.at(record.place);
-  double* const r = J + rows * record.scalars;
-  double* const gradient = r + rows;
-  record.cost = evaluate(record, graph, states.estimate(), r, J);
+  double* const gradient = J + rows * record.scalars + record.scalars;
+  scratch_.resize(static_cast<std::size_t>(rows));
+  record.cost = evaluate(record, graph, states.estimate(), scratch_.data(), J);
   std::fill_n(gradient, record.scalars, 0.0);
-  add_transposed_product(rows, J, record.scalars, r, 1, 1.0, gradient);
-  std::fill_n(r, rows, 0.0);
+  add_transposed_product(rows, J, record.scalars, scratch_.data(), 1, 1.0, gradient);
   into_frames(record, states, J);
-  record.moving = false;
+  start_here(record, states);
 }
 
 double Models::cost_now(int f, const Graph& graph, const Estimate& estimate) const {
@@ -182,13 +182,14 @@ void Models::add_block(System& system, const Record& record, int ka, int kb, dou
   }
 }
 
-void Models::add_to(System& system, int f, double sign, std::span<const std::uint8_t> held) const {
+void Models::add_to(System& system, const States& states, int f, double sign,
+                    std::span<const std::uint8_t> held) const {
   const Record& record = records_[f];
   const int rows = record.rows;
   const std::int32_t* v = variables_.data() + record.variables;
   const double* J = values_.at(record.place);
-  const double* const change = J + rows * record.scalars;
-  const double* gradient = change + rows;
+  const double* gradient = J + rows * record.scalars + record.scalars;
+  const double* const change = this->change(f, states);
   for (int ka = 0; ka < record.arity; ++ka) {
     const std::int32_t a = v[ka], size = system.size(a);
     if (!held[a]) {
@@ -223,76 +224,150 @@ void Models::add_row(System& system, int f, std::int32_t variable,
   }
 }
 
-namespace {
-
-/// r ← r + Σ J_k δ_k for two variables of `Size` coordinates.
-template <int Rows, int Size>
-void move_pair(const double* J, const double* const* steps, double* r) {
-  double change[Rows] = {};
-  for (int k = 0; k < 2; ++k, J += Rows * Size) {
-    if (!steps[k]) continue;
-    for (int c = 0; c < Size; ++c) {
-      for (int i = 0; i < Rows; ++i) change[i] += J[c * Rows + i] * steps[k][c];
-    }
+void Models::move(int f, std::int32_t variable, const double* step) {
+  const Record& record = records_[f];
+  double* start = values_.at(record.place) + record.rows * record.scalars;
+  for (int k = 0; k < record.arity; start += size_of(record, k++)) {
+    if (variables_[record.variables + k] != variable) continue;
+    for (int i = 0; i < size_of(record, k); ++i) start[i] -= step[i];
   }
-  for (int i = 0; i < Rows; ++i) r[i] += change[i];
 }
 
-}  // namespace
+/// The variables have travelled so far.
+void Models::start_here(const Record& record, const States& states) {
+  double* start = values_.at(record.place) + record.rows * record.scalars;
+  for (int k = 0; k < record.arity; ++k) {
+    start =
+        std::copy_n(states.travelled(variables_[record.variables + k]), size_of(record, k), start);
+  }
+}
 
-bool Models::move(int f, const double* const* steps) {
-  Record& record = records_[f];
+const double* Models::change(int f, const States& states) const {
+  const Record& record = records_[f];
+  const double* J = values_.at(record.place);
+  const double* start = J + record.rows * record.scalars;
+  step_.resize(static_cast<std::size_t>(record.scalars));
+  double* next = step_.data();
+  for (int k = 0; k < record.arity; ++k) {
+    const double* now = states.travelled(variables_[record.variables + k]);
+    for (int i = 0; i < size_of(record, k); ++i) *next++ = *now++ - *start++;
+  }
+  change_.assign(static_cast<std::size_t>(record.rows), 0.0);
+  add_product(record.rows, J, record.scalars, step_.data(), change_.data());
+  return change_.data();
+}
+
+/// `gathered_`: these factors at the estimate.
+void Models::gather(std::span<const std::int32_t> factors, const Graph& graph,
+                    const Estimate& estimate) {
+  const Record& one = records_[factors.front()];
+  const FactorPool& pool = graph.factor_pools()[one.pool];
+  const std::size_t arity = static_cast<std::size_t>(one.arity),
+                    measured = static_cast<std::size_t>(pool.type->measurement_size());
+  Gathered& all = gathered_;
+  all.slots.clear();
+  all.measurements.clear();
+  all.noises.clear();
+  all.states.resize(arity);
+  for (std::vector<double>& states : all.states) states.clear();
+  for (const std::int32_t f : factors) {
+    const Record& record = records_[f];
+    const std::size_t entry = static_cast<std::size_t>(record.entry);
+    const double* z = pool.measurements.data() + entry * measured;
+    all.measurements.insert(all.measurements.end(), z, z + measured);
+    all.noises.push_back(pool.noises[entry]);
+    const std::int32_t place = static_cast<std::int32_t>(all.slots.size() / arity);
+    for (std::size_t k = 0; k < arity; ++k) {
+      const double* x = estimate.x(variables_[record.variables + static_cast<std::int32_t>(k)]);
+      all.slots.push_back(place);
+      all.states[k].insert(all.states[k].end(), x,
+                           x + pool.type->ambient_size(static_cast<int>(k)));
+    }
+  }
+  all.state_arrays.clear();
+  for (const std::vector<double>& states : all.states) all.state_arrays.push_back(states.data());
+}
+
+void Models::correct(std::span<const std::int32_t> factors, const Graph& graph,
+                     const States& states, System& system, std::span<const std::uint8_t> held) {
+  if (factors.empty()) return;
+  gather(factors, graph, states.estimate());
+  const Record& one = records_[factors.front()];
+  const FactorPool& pool = graph.factor_pools()[one.pool];
+  const FactorType& type = *pool.type;
+  const std::size_t count = factors.size(), arity = static_cast<std::size_t>(one.arity);
+  Gathered& all = gathered_;
+  const FactorView view{.size = count,
+                        .slots = all.slots.data(),
+                        .measurements = all.measurements.data(),
+                        .sqrt_information = pool.sqrt_information.data(),
+                        .noises = all.noises.data(),
+                        .states = all.state_arrays.data()};
+  all.norms.resize(count);
+  all.costs.resize(count);
+  all.weights.clear();
+  if (graph.has_losses() && type.takes_loss()) {
+    type.squared_norms(view, 0, count, all.norms.data());
+    for (std::size_t i = 0; i < count; ++i) {
+      double& weight = all.weights.emplace_back(1.0);
+      graph.weigh(one.pool, static_cast<std::size_t>(records_[factors[i]].entry),
+                  {&all.norms[i], 1}, {&all.costs[i], 1}, {&weight, 1});
+    }
+  }
+  all.blocks.resize(count * arity * (arity + 1) / 2);  // nowhere
+  all.gradient_targets.clear();
+  std::int64_t place = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    for (int k = 0; k < one.arity; ++k) {
+      all.gradient_targets.emplace_back(LinearizeTarget::Array::gradient, place,
+                                        LinearizeTarget::How::write);
+      place += size_of(one, k);
+    }
+  }
+  all.gradients.resize(static_cast<std::size_t>(place));
+  const LinearizeSink sink{.arrays = {nullptr, all.gradients.data(), nullptr},
+                           .blocks = all.blocks.data(),
+                           .gradients = all.gradient_targets.data()};
+  type.linearize(view, 0, count, all.weights.empty() ? nullptr : all.weights.data(), sink,
+                 all.norms.data());
+  for (std::size_t i = 0; i < count; ++i) {
+    records_[factors[i]].cost = all.weights.empty() ? all.norms[i] : all.costs[i];
+    replace_gradient(factors[i], all.gradients.data() + i * static_cast<std::size_t>(one.scalars),
+                     states, system, held);
+  }
+}
+
+/// The gradient of a factor, of which `now` is the negative, is that at the current estimate.
+void Models::replace_gradient(int f, const double* now, const States& states, System& system,
+                              std::span<const std::uint8_t> held) {
+  const Record& record = records_[f];
   const int rows = record.rows;
   const double* J = values_.at(record.place);
-  double* change = values_.at(record.place) + rows * record.scalars;
-  if (record.arity == 2 && rows == 3 && record.scalars == 6 && size_of(record, 0) == 3) {
-    move_pair<3, 3>(J, steps, change);
-  } else if (record.arity == 2 && rows == 6 && record.scalars == 12 && size_of(record, 0) == 6) {
-    move_pair<6, 6>(J, steps, change);
-  } else {
-    for (int k = 0; k < record.arity; ++k) {
-      const int size = size_of(record, k);
-      if (steps[k]) add_product(rows, J, size, steps[k], change);
-      J += rows * size;
-    }
-  }
-  return !std::exchange(record.moving, true);
-}
-
-double Models::correct(int f, const Graph& graph, const States& states, System& system,
-                       std::span<const std::uint8_t> held, bool compare) {
-  Record& record = records_[f];
-  const int rows = record.rows, doubles = rows * record.scalars;
-  const std::int64_t room = std::int64_t{doubles} + rows + record.scalars;
-  scratch_.resize(static_cast<std::size_t>(room));
-  double* const J_now = scratch_.data();
-  double* const r_now = J_now + doubles;
-  double* const beyond = r_now + rows;  // J(x)ᵀ r(x) less γ when last evaluated
-  record.cost = evaluate(record, graph, states.estimate(), r_now, J_now);
-  const double* const J = values_.at(record.place);
-  double* const change = values_.at(record.place) + doubles;
-  double* const gradient = change + rows;
-  std::fill_n(beyond, record.scalars, 0.0);
-  add_transposed_product(rows, J_now, record.scalars, r_now, 1, 1.0, beyond);
-  for (int c = 0; c < record.scalars; ++c) {
-    const double now = beyond[c];
-    beyond[c] -= gradient[c];
-    gradient[c] = now;
-  }
-  record.moving = false;
-  int first = 0;
+  double* gradient = values_.at(record.place) + rows * record.scalars + record.scalars;
+  const double* const change = this->change(f, states);
+  start_here(record, states);
   for (int k = 0; k < record.arity; ++k) {
     const std::int32_t v = variables_[record.variables + k], size = system.size(v);
     if (!held[v]) {
       system.count_all(v);
-      add_transposed_product(rows, J + first * rows, size, change, 1, -1.0, system.change(v));
-      for (int i = 0; i < size; ++i) system.gradient(v)[i] += beyond[first + i];
+      add_transposed_product(rows, J, size, change, 1, -1.0, system.change(v));
+      for (int i = 0; i < size; ++i) system.gradient(v)[i] += -now[i] - gradient[i];
     }
-    first += size;
+    for (int i = 0; i < size; ++i) gradient[i] = -now[i];
+    J += rows * size;
+    now += size;
+    gradient += size;
   }
-  std::fill_n(change, rows, 0.0);
-  if (!compare) return 0.0;
+}
+
+double Models::mismatch(int f, const Graph& graph, const States& states) const {
+  const Record& record = records_[f];
+  const int rows = record.rows, doubles = rows * record.scalars;
+  scratch_.resize(static_cast<std::size_t>(doubles) + static_cast<std::size_t>(rows));
+  double* const J_now = scratch_.data();
+  evaluate(record, graph, states.estimate(), J_now + doubles, J_now);
   into_frames(record, states, J_now);
+  const double* const J = values_.at(record.place);
   double difference = 0.0, norm = 0.0;
   for (int k = 0; k < doubles; ++k) {
     difference += (J_now[k] - J[k]) * (J_now[k] - J[k]);

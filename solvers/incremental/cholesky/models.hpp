@@ -13,7 +13,8 @@
 namespace cairn::incremental {
 
 /// The linear model of every factor: a whitened Jacobian J, that of some earlier estimate, its
-/// gradient γ = Jᵀr when it was last evaluated, and the change of r by the steps since.
+/// gradient γ = Jᵀr when it was last evaluated, and where its variables were then: the change of r
+/// by the steps since is J (t − t₀), t being what `States` counts as `travelled`.
 ///
 /// Steps are always expressed from the current estimate, in the frames of `States`. A step δ moves
 /// the estimate, and the modelled residual and gradient by J δ and JᵀJ δ. The error of that is
@@ -48,21 +49,27 @@ class Models {
   void linearize(int f, const Graph& graph, const States& states);
   /// Adds the factor's part of H and of the right-hand side, times `sign`; constant variables have
   /// none.
-  void add_to(System& system, int f, double sign, std::span<const std::uint8_t> held) const;
+  void add_to(System& system, const States& states, int f, double sign,
+              std::span<const std::uint8_t> held) const;
   /// Its part of the block row of one of its variables: H_vv and what joins v with others.
   void add_row(System& system, int f, std::int32_t variable,
                std::span<const std::uint8_t> held) const;
 
-  /// The residual changes by Σ J_k δ_k; steps[k] is null where δ_k is zero. Returns whether it is
-  /// the first time since the factor was last evaluated.
-  bool move(int f, const double* const* steps);
-  /// Evaluates the factor again: its drift goes into the gradient. Returns its mismatch, if it is
-  /// to `compare` Jacobians.
-  double correct(int f, const Graph& graph, const States& states, System& system,
-                 std::span<const std::uint8_t> held, bool compare);
+  /// Counts a step of one of its variables for this factor alone.
+  void move(int f, std::int32_t variable, const double* step);
+  /// Whether two factors are of one type, between variables of the same types.
+  bool alike(int f, int other) const { return records_[f].pool == records_[other].pool; }
+  /// Evaluates factors that are alike again: their drift goes into the gradient.
+  void correct(std::span<const std::int32_t> factors, const Graph& graph, const States& states,
+               System& system, std::span<const std::uint8_t> held);
+  /// ‖J(x) − J‖ / ‖J‖ of a factor, its mismatch.
+  double mismatch(int f, const Graph& graph, const States& states) const;
   /// g_v: minus the gradient of all its factors at the current estimate, by the model.
   void right_hand_side(System& system, const States& states, std::int32_t v) const;
 
+  /// What steps have changed in its residual since it was last evaluated, by the model: `rows`
+  /// doubles, until this is called again.
+  const double* change(int f, const States& states) const;
   /// Whether it is invariant to rigid motions of all its variables.
   bool relative(int f) const { return records_[f].relative; }
   /// ρ(‖r‖²) when last evaluated.
@@ -77,16 +84,19 @@ class Models {
 
  private:
   struct Record {
-    std::int64_t place;  // in values_: J; what steps have changed in r; γ
+    std::int64_t place;  // in values_: J; what its variables had travelled; γ
     std::int32_t variables;
     std::int32_t pool, entry;
     std::int16_t arity, rows, scalars;
     bool relative;
     double cost = 0.0;
-    bool moving = false;  // since it was last evaluated
   };
   int size_of(const Record& record, int k) const { return tangents_[record.variables + k]; }
   const double* block(const Record& record, int k) const;
+  void gather(std::span<const std::int32_t> factors, const Graph& graph, const Estimate& estimate);
+  void replace_gradient(int f, const double* now, const States& states, System& system,
+                        std::span<const std::uint8_t> held);
+  void start_here(const Record& record, const States& states);
   void add_block(System& system, const Record& record, int ka, int kb, double sign) const;
   void add_in_frame(const States& states, std::int32_t v, int size, const double* gradient,
                     double* out) const;
@@ -98,9 +108,20 @@ class Models {
   std::vector<std::int32_t> variables_;
   std::vector<std::int16_t> tangents_;  // of each of a factor's variables
   SegmentedArray values_;
-  mutable std::vector<double> scratch_, turned_;
+  mutable std::vector<double> scratch_, turned_, change_, step_;
   mutable std::vector<double*> pointers_;
   mutable std::vector<const double*> points_;
+
+  /// Factors that are evaluated together, as a pool of their own.
+  struct Gathered {
+    std::vector<std::int32_t> slots, noises;
+    std::vector<double> measurements;
+    std::vector<std::vector<double>> states;  // of the k-th variables
+    std::vector<const double*> state_arrays;
+    std::vector<LinearizeTarget> blocks, gradient_targets;
+    std::vector<double> gradients, norms, costs, weights;
+  };
+  Gathered gathered_;
 };
 
 }  // namespace cairn::incremental

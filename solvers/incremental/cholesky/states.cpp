@@ -6,6 +6,24 @@
 #include <vector>
 
 namespace cairn::incremental {
+namespace {
+
+/// out += M v, M being size × size, column-major.
+template <int Size>
+void add_product(const double* M, const double* v, double* out) {
+  for (int c = 0; c < Size; ++c) {
+    for (int r = 0; r < Size; ++r) out[r] += M[c * Size + r] * v[c];
+  }
+}
+void add_product(std::int32_t size, const double* M, const double* v, double* out) {
+  if (size == 3) return add_product<3>(M, v, out);
+  if (size == 6) return add_product<6>(M, v, out);
+  for (std::int32_t c = 0; c < size; ++c) {
+    for (std::int32_t r = 0; r < size; ++r) out[r] += M[c * size + r] * v[c];
+  }
+}
+
+}  // namespace
 
 void States::add(std::shared_ptr<const VariableType> type, std::span<const double> state) {
   const std::int32_t tangent = type->tangent_size();
@@ -15,8 +33,10 @@ void States::add(std::shared_ptr<const VariableType> type, std::span<const doubl
                       .ambient = static_cast<std::int32_t>(state.size()),
                       .matrices = std::ssize(adjoints_),
                       .tangent = tangent,
+                      .first = std::ssize(travelled_),
                       .group = group});
   estimate_.add(state);
+  travelled_.resize(travelled_.size() + static_cast<std::size_t>(tangent), 0.0);
   frames_.insert(frames_.end(), state.begin(), state.end());
   if (!group) return;
   adjoints_.resize(adjoints_.size() + static_cast<std::size_t>(tangent * tangent));
@@ -35,38 +55,66 @@ void States::log(std::int32_t v) {
   logged_.insert(logged_.end(), x(v), x(v) + record.ambient);
 }
 
-void States::lead(std::int32_t v, const double* g) {
+void States::lead(std::int32_t v, const double* g, const double* twist) {
   log(v);
   Record& record = records_[v];
   double* x = estimate_.x(v);
   record.type->lie_group()->compose(g, x, x);
   record.away = true;
   record.known = false;
+  if (twist)
+    add_product(record.tangent, world_to_frame(v), twist, travelled_.data() + record.first);
 }
 
-void States::move(std::int32_t v, const double* delta) {
-  log(v);
-  Record& record = records_[v];
-  const std::int64_t first = 0;
-  double* x = estimate_.x(v);
-  if (record.away) {
-    const std::int32_t size = record.tangent;
-    const double* T = frame_to_body(v);
-    step_.assign(static_cast<std::size_t>(size), 0.0);
-    for (std::int32_t c = 0; c < size; ++c) {
-      for (std::int32_t r = 0; r < size; ++r) step_[r] += T[c * size + r] * delta[c];
-    }
-    delta = step_.data();
+void States::move(std::span<const std::int32_t> variables, const double* steps) {
+  for (std::size_t begin = 0; begin < variables.size();) {
+    const auto first = variables.begin() + static_cast<std::ptrdiff_t>(begin);
+    const VariableType* type = records_[*first].type.get();
+    const auto end = std::find_if(first, variables.end(),
+                                  [&](std::int32_t v) { return records_[v].type.get() != type; });
+    move_alike({first, end}, steps);
+    begin += static_cast<std::size_t>(end - first);
   }
-  record.type->retract(1, x, &first, delta, x);
-  record.away = record.group;
-  record.known = false;
+}
+
+/// For variables of one type, which are moved several at a time.
+void States::move_alike(std::span<const std::int32_t> variables, const double* steps) {
+  const Record& one = records_[variables.front()];
+  const std::int32_t ambient = one.ambient, tangent = one.tangent;
+  moved_.clear();
+  turned_.assign(variables.size() * static_cast<std::size_t>(tangent), 0.0);
+  turned_at_.clear();
+  double* turned = turned_.data();
+  for (const std::int32_t v : variables) {
+    log(v);
+    const Record& record = records_[v];
+    const double* step = steps + record.first;
+    for (std::int32_t k = 0; k < tangent; ++k) travelled_[record.first + k] += step[k];
+    moved_.insert(moved_.end(), x(v), x(v) + ambient);
+    turned_at_.push_back(turned - turned_.data());
+    if (record.away) {
+      add_product(tangent, frame_to_body(v), step, turned);
+    } else {
+      std::copy_n(step, tangent, turned);
+    }
+    turned += tangent;
+  }
+  one.type->retract(variables.size(), moved_.data(), turned_at_.data(), turned_.data(),
+                    moved_.data());
+  const double* next = moved_.data();
+  for (const std::int32_t v : variables) {
+    std::copy_n(next, ambient, estimate_.x(v));
+    next += ambient;
+    records_[v].away = records_[v].group;
+    records_[v].known = false;
+  }
 }
 
 void States::put_frame_here(std::int32_t v) {
   Record& record = records_[v];
   std::copy_n(x(v), record.ambient, frames_.begin() + record.place);
   record.away = record.known = false;
+  std::fill_n(travelled_.begin() + record.first, record.tangent, 0.0);
   if (!record.group) return;
   const LieGroup& group = *record.type->lie_group();
   element_.resize(static_cast<std::size_t>(record.ambient));

@@ -89,14 +89,18 @@ class States {
   /// The states alone.
   const Estimate& estimate() const { return estimate_; }
   std::int32_t ambient(std::int32_t v) const { return records_[v].ambient; }
-  /// x_v ← g x_v, g being an element of the variable's group.
-  void lead(std::int32_t v, const double* g);
-  /// Moves x_v by a step in its frame.
-  void move(std::int32_t v, const double* delta);
+  /// x_v ← g x_v, g being an element of the variable's group. That is a step of Ad(F_v⁻¹) η for
+  /// every η with exp(η) = g; `twist` (null: zero) is the sum of those of which g is composed.
+  void lead(std::int32_t v, const double* g, const double* twist = nullptr);
+  /// Moves variables by steps in their frames: `steps` has those of all variables.
+  void move(std::span<const std::int32_t> variables, const double* steps);
+  /// The sum of all steps of a variable since its frame was put where it is, `tangent_size`
+  /// doubles. It is not undone: only differences mean anything, to what is linearised since.
+  const double* travelled(std::int32_t v) const { return travelled_.data() + records_[v].first; }
 
   /// F_v, like x_v.
   const double* frame(std::int32_t v) const { return frames_.data() + records_[v].place; }
-  /// F_v ← x_v.
+  /// F_v ← x_v. What has `travelled` is zero again: its factors are to be linearised anew.
   void put_frame_here(std::int32_t v);
   /// Whether T_v may be anything but the identity.
   bool away(std::int32_t v) const { return records_[v].away; }
@@ -116,6 +120,7 @@ class States {
     std::int32_t ambient;
     std::int64_t matrices;  // in turns_ and adjoints_
     std::int32_t tangent;
+    std::int64_t first;          // in travelled_, and among the steps
     bool group;                  // of a Lie group
     bool away = false;           // from its frame
     mutable bool known = false;  // T
@@ -126,6 +131,7 @@ class States {
     std::size_t begin, count;  // in logged_
   };
   void log(std::int32_t v);
+  void move_alike(std::span<const std::int32_t> variables, const double* steps);
 
   std::vector<Change> log_;
   std::vector<double> logged_;
@@ -133,9 +139,11 @@ class States {
   Estimate estimate_;
   AlignedVector frames_;  // like the estimate
   AlignedVector adjoints_;
+  AlignedVector travelled_;
   mutable AlignedVector turns_;
   std::vector<double> element_;
-  std::vector<double> step_;
+  std::vector<double> moved_, turned_;  // of several variables, one after the other
+  std::vector<std::int64_t> turned_at_;
 };
 
 }  // namespace cairn::incremental

@@ -41,10 +41,9 @@ struct Node {
   /// Whether this subtree is invariant to rigid motions, except for its separator: all its factors
   /// are relative ones between variables of one group.
   bool movable = false;
-  std::vector<double>
-      lead;  ///< the group element by which all of this subtree is still to be moved
-  std::vector<double> arrived;   ///< the part of the last pass's steps that was added to `owed`
-  std::int64_t arrived_at = 0;   ///< that pass
+  /// The group element by which all of this subtree is still to be moved, and the sum of the
+  /// twists of which it is composed.
+  std::vector<double> lead;
   std::int64_t settled_at = -1;  ///< nothing above has had a lead since that many (see `Tree`)
   bool live = false;
   bool affected = false;
@@ -164,11 +163,17 @@ class Tree {
     nodes_[node].lead.assign(lead.begin(), lead.end());
     ++leads_;
   }
-  /// After `solve` or `follow`, for a variable whose step was not computed: the node above it that
-  /// the pass ended at, or null.
-  const Node* end_of_pass(std::int32_t variable) const;
-  /// The part of the step of one of its separator's variables that was added to such a node.
-  const double* arrived(const Node& node, std::int32_t variable) const;
+  /// A variable of a separator has a further step as seen from a subtree that has moved as a whole:
+  /// what is deferred there is counted from where the motion has brought it.
+  struct Turn {
+    std::int32_t node, variable;
+    std::size_t step;  ///< where in `turned_steps`
+  };
+  /// Those of the last `solve`.
+  std::span<const Turn> turns() const { return turns_; }
+  std::span<const double> turned_steps() const { return turned_steps_; }
+  /// Whether a variable is in the subtree of a node.
+  bool below(std::int32_t variable, std::int32_t node) const;
 
   /// X = H⁻¹ B for eight right-hand sides side by side, rows as in δ. `sources`: variables at which
   /// B is not zero. X: room for 8 × scalars() doubles, zero but for B.
@@ -237,7 +242,7 @@ class Tree {
                   std::vector<std::int32_t>& changed);
   double owed_square(const Node& node) const;
   bool move_as_a_whole(Node& node, double tolerance);
-  void add_lead(Node& node, const double* g);
+  void add_lead(Node& node, const std::vector<double>& lead);
   void hand_down(Node& node);
   void collect_paths(std::span<const std::int32_t> sources);
   void forward_many(std::span<const std::int32_t> sources, AlignedVector& X);
@@ -276,8 +281,9 @@ class Tree {
   std::vector<double> scalars_below_, scalars_own_;
   std::vector<std::int32_t> front_row_;  // by variable, of the node at hand
   AlignedVector front_;
-  std::int64_t pass_ = 0;
-  std::vector<double> rigid_, matrix_, twist_;
+  std::vector<Turn> turns_;
+  std::vector<double> turned_steps_;
+  std::vector<double> rigid_, matrix_, lead_;
   std::int64_t leads_ = 0;  // so many motions have been noted
   std::vector<std::int32_t> stack_, path_, settle_path_;
   std::size_t next_on_path_ = 0;

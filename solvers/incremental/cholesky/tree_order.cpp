@@ -331,7 +331,6 @@ void Tree::lay_out(Node& node) {
     node.m += size;
   }
   node.stride = round_up(node.m);
-  node.arrived_at = 0;
   node.settled_at = -1;
   node.owed.assign(static_cast<std::size_t>(node.below()), 0.0);
   make_room(node.panel, std::int64_t{node.stride} * node.columns);

@@ -74,22 +74,16 @@ void Tree::solve_node(Node& node, const double* y, std::vector<double>& steps,
   }
   std::ranges::fill(node.owed, 0.0);
   node.owes = false;
-  node.arrived_at = 0;
   for (const std::int32_t c : node.children) {
     Node& child = nodes_[c];
-    child.arrived.resize(child.owed.size());
-    double *owed = child.owed.data(), *arrived = child.arrived.data();
+    double* owed = child.owed.data();
     const auto separator = child.separator();
     for (std::size_t k = 0; k < separator.size(); ++k) {
       const std::int32_t size = system_->size(separator[k]);
       const double* step = front + child.rows_above[k];
-      for (std::int32_t i = 0; i < size; ++i) {
-        *owed++ += step[i];
-        *arrived++ = step[i];
-      }
+      for (std::int32_t i = 0; i < size; ++i) *owed++ += step[i];
     }
     child.owes = true;
-    child.arrived_at = pass_;
   }
 }
 
@@ -103,9 +97,8 @@ bool Tree::move_as_a_whole(Node& node, double tolerance) {
   const std::int32_t ambient = states_->ambient(separator.front());
   rigid_.resize(node.owed.size());
   matrix_.resize(static_cast<std::size_t>(square));
-  twist_.resize(static_cast<std::size_t>(std::int64_t{size} + 2 * ambient));
-  double* const twist = twist_.data();
-  double* const element = twist + size;
+  lead_.resize(static_cast<std::size_t>(ambient) + static_cast<std::size_t>(size));
+  double* const twist = lead_.data() + ambient;
   const auto multiply = [&](const double* matrix, const double* vector, double* out) {
     if (size == 3)
       multiply_square(Constant<3>{}, matrix, vector, out);
@@ -134,12 +127,11 @@ bool Tree::move_as_a_whole(Node& node, double tolerance) {
   }
   // exp(rigid + rest) = exp(D rest) exp(rigid), with the left Jacobian: what is left is counted
   // from where the motion has brought x. D is the identity but for about half the motion.
-  double *rest = node.owed.data(), *arrived = node.arrived.data();
+  double* rest = node.owed.data();
   rigid = rigid_.data();
   for (const std::int32_t v : separator) {
     double length = 0.0;  // squared
     for (std::int32_t k = 0; k < size; ++k) {
-      arrived[k] -= rest[k];
       rest[k] -= rigid[k];
       length += rigid[k] * rigid[k];
       rigid[k] = -rigid[k];
@@ -147,28 +139,30 @@ bool Tree::move_as_a_whole(Node& node, double tolerance) {
     if (length > kShort * kShort) {
       states_->type(v).retract_jacobian(states_->x(v), rigid, matrix_.data());
       multiply(matrix_.data(), rest, rigid);
-      std::copy_n(rigid, size, rest);
+      turns_.push_back({static_cast<std::int32_t>(&node - nodes_.data()), v, turned_steps_.size()});
+      for (std::int32_t k = 0; k < size; ++k)
+        turned_steps_.push_back(rigid[k] - std::exchange(rest[k], rigid[k]));
     }
-    for (std::int32_t k = 0; k < size; ++k) arrived[k] += rest[k];
     rest += size;
-    arrived += size;
     rigid += size;
   }
-  group.exp(twist, element);
-  add_lead(node, element);
+  group.exp(twist, lead_.data());
+  add_lead(node, lead_);
   ++leads_;
   return true;
 }
 
-/// All of the subtree is to be moved by g, after what it is to be moved by already.
-void Tree::add_lead(Node& node, const double* g) {
-  const std::int32_t v = node.variables.front(), ambient = states_->ambient(v);
+/// All of the subtree is to be moved by a lead, after what it is to be moved by already.
+void Tree::add_lead(Node& node, const std::vector<double>& lead) {
+  const std::int32_t v = node.variables.front();
   states_->log_other(static_cast<std::int32_t>(&node - nodes_.data()), node.lead);
   node.settled_at = -1;
   if (node.lead.empty()) {
-    node.lead.assign(g, g + ambient);
+    node.lead = lead;
   } else {
-    states_->type(v).lie_group()->compose(g, node.lead.data(), node.lead.data());
+    states_->type(v).lie_group()->compose(lead.data(), node.lead.data(), node.lead.data());
+    for (std::size_t k = static_cast<std::size_t>(states_->ambient(v)); k < lead.size(); ++k)
+      node.lead[k] += lead[k];
   }
 }
 
@@ -176,8 +170,9 @@ void Tree::add_lead(Node& node, const double* g) {
 /// its children.
 void Tree::hand_down(Node& node) {
   if (node.lead.empty()) return;
-  for (const std::int32_t v : node.own_variables()) states_->lead(v, node.lead.data());
-  for (const std::int32_t c : node.children) add_lead(nodes_[c], node.lead.data());
+  const double* twist = node.lead.data() + states_->ambient(node.variables.front());
+  for (const std::int32_t v : node.own_variables()) states_->lead(v, node.lead.data(), twist);
+  for (const std::int32_t c : node.children) add_lead(nodes_[c], node.lead);
   states_->log_other(static_cast<std::int32_t>(&node - nodes_.data()), node.lead);
   node.lead.clear();
 }
@@ -245,20 +240,10 @@ Estimate Tree::settled(Estimate estimate, const Leads& leads) const {
   return estimate;
 }
 
-const Node* Tree::end_of_pass(std::int32_t variable) const {
-  for (std::int32_t n = node_of(variable); n >= 0; n = nodes_[n].parent) {
-    if (nodes_[n].arrived_at == pass_) return &nodes_[n];
-  }
-  return nullptr;
-}
-
-const double* Tree::arrived(const Node& node, std::int32_t variable) const {
-  const double* at = node.arrived.data();
-  for (const std::int32_t v : node.separator()) {
-    if (v == variable) return at;
-    at += system_->size(v);
-  }
-  return nullptr;
+bool Tree::below(std::int32_t variable, std::int32_t node) const {
+  std::int32_t n = node_of(variable);
+  while (n >= 0 && nodes_[n].sequence < nodes_[node].sequence) n = nodes_[n].parent;
+  return n == node;
 }
 
 /// What a node owes, squared and weighted with the diagonal of H.
@@ -312,7 +297,8 @@ double Tree::decrement(std::span<const std::int32_t> sources, std::vector<double
 }
 
 void Tree::begin_descent() {
-  ++pass_;
+  turns_.clear();
+  turned_steps_.clear();
   for (const std::int32_t n : path_) on_path_[n] = 1;
   stack_.clear();
   for (const std::int32_t n : path_) {
@@ -364,7 +350,6 @@ void Tree::follow(std::int32_t variable, std::vector<double>& steps,
   }
   settle(variable);
   if (!any) return;
-  ++pass_;
   stack_.clear();
   for (std::int32_t n = node_of(variable); n >= 0; n = nodes_[n].parent) stack_.push_back(n);
   for (std::size_t k = stack_.size(); k-- > 0;) {

@@ -180,7 +180,7 @@ void expect_linearized_as_evaluated(const Sample& s, double weight, bool transpo
   const int arity = s.type->arity();
   const std::vector<std::int32_t> slots(arity, 0);
   const auto states = s.states();
-  const FactorView pool{1, slots.data(), s.z.data(), s.U.data(), states.data()};
+  const FactorView pool{1, slots.data(), s.z.data(), s.U.data(), nullptr, states.data()};
 
   std::vector<double> H, g;
   std::vector<LinearizeTarget> blocks, gradients;
@@ -236,7 +236,7 @@ TEST(EveryFactor, WritesNothingForVariablesThatAreHeld) {
     const std::vector<std::int32_t> slots(arity, 0);
     const std::vector<LinearizeTarget> nowhere(arity * (arity + 1) / 2);
     const auto states = s.states();
-    const FactorView pool{1, slots.data(), s.z.data(), s.U.data(), states.data()};
+    const FactorView pool{1, slots.data(), s.z.data(), s.U.data(), nullptr, states.data()};
     // A write would go to a null pointer.
     const LinearizeSink sink{.blocks = nowhere.data(), .gradients = nowhere.data()};
     double squared = -1.0;

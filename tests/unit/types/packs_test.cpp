@@ -51,18 +51,24 @@ struct Pool {
   std::size_t size = 0;
   std::vector<std::vector<double>> states;
   std::vector<double> measurements, sqrt_information, weights;
-  std::vector<std::int32_t> slots;
+  std::vector<std::int32_t> slots, noises;
   std::vector<LinearizeTarget> blocks, gradients;
   std::int64_t numbers = 0;
 
   Pool(const FactorType& of, const std::vector<const VariableType*>& variables, std::size_t count,
        Sampler& sampler)
       : type(of), size(count), states(variables.size()) {
+    std::int32_t noise = -1;
     for (std::size_t f = 0; f < size; ++f) {
       add_states(variables, sampler);
       add_targets(sampler);
-      const auto U = sampler.sqrt_information(type.residual_size());
-      sqrt_information.insert(sqrt_information.end(), U.begin(), U.end());
+      // About half of the groups of eight have one in all lanes.
+      if (f == 0 || sampler.uniform(0.0, 1.0) < 0.1) {
+        const auto U = sampler.sqrt_information(type.residual_size());
+        sqrt_information.insert(sqrt_information.end(), U.begin(), U.end());
+        ++noise;
+      }
+      noises.push_back(noise);
       weights.push_back(sampler.uniform(0.0, 1.0));
     }
   }
@@ -71,8 +77,9 @@ struct Pool {
   std::vector<double> linearized(bool weighted, std::size_t split = 0) const {
     std::vector<const double*> of_variables;
     for (const auto& x : states) of_variables.push_back(x.data());
-    const FactorView view{size, slots.data(), measurements.data(), sqrt_information.data(),
-                          of_variables.data()};
+    const FactorView view{
+        size,          slots.data(),       measurements.data(), sqrt_information.data(),
+        noises.data(), of_variables.data()};
     std::vector<double> norms(2 * size), H(numbers, 0.25), g(numbers, 0.75), scratch(numbers, 0.5);
     const LinearizeSink sink{{H.data(), g.data(), scratch.data()}, blocks.data(), gradients.data()};
     for (const auto& [begin, end] : {std::pair(std::size_t{0}, split), std::pair(split, size)}) {

@@ -12,6 +12,7 @@
 #include "cairn/graph/elements.hpp"
 #include "cairn/graph/factor_selector.hpp"
 #include "cairn/memory/growing_array.hpp"
+#include "cairn/memory/recent_rows.hpp"
 #include "cairn/runtime/aligned.hpp"
 #include "cairn/runtime/api.hpp"
 #include "cairn/types/factor_type.hpp"
@@ -42,11 +43,15 @@ struct FactorPool {
   GrowingArray<std::int32_t> slots;          ///< size × arity: slot within that pool
   GrowingArray<std::int32_t> variables;      ///< size × arity: index of the variable in the graph
   GrowingArray<double> measurements;         ///< size × measurement_size
-  GrowingArray<double> information;  ///< size × n(n+1)/2: upper triangle, row by row, as given
-  GrowingArray<double> sqrt_information;  ///< size × n(n+1)/2: U with UᵀU = information, row by row
-  GrowingArray<std::int16_t> ranks;       ///< size: rank of the information
+  GrowingArray<std::int32_t> noises;         ///< size: which of the information matrices it has
+  /// Matrices × n(n+1)/2: upper triangle, row by row, as given. Factors with equal ones share one.
+  GrowingArray<double> information;
+  GrowingArray<double> sqrt_information;  ///< likewise: U with UᵀU = information
+  GrowingArray<std::int16_t> ranks;       ///< matrices: rank of the information
+  GrowingArray<std::int32_t> uses;        ///< matrices: how many factors have it
+  RecentRows recent;                      ///< of the information matrices
   GrowingArray<std::int16_t> losses;      ///< size: index of the loss in `Graph::losses()`, 0: none
-  GrowingArray<std::int32_t> sequence;  ///< position among all factors of the graph
+  GrowingArray<std::int32_t> sequence;    ///< position among all factors of the graph
 
   std::size_t size() const { return sequence.size(); }
 };

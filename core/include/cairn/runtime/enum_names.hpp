@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "cairn/runtime/error.hpp"
-#include "cairn/runtime/spelling.hpp"
+#include "cairn/text/spelling.hpp"
 
 namespace cairn {
 

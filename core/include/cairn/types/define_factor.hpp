@@ -140,7 +140,9 @@ class DefinedFactor<F, std::index_sequence<I...>> final : public FactorType {
           }
         }
       }
-      const Vector<S, kU> u = lanes::load_entries<S, kU>(pool.sqrt_information, factors);
+      for (std::size_t& f : factors) f = pool.noise(f);
+      const Vector<S, kU> u =
+          lanes::load_entries_often_equal<S, kU>(pool.sqrt_information, factors);
       lanes::whiten(u.data(), r);
       if constexpr (kWithJacobians) (lanes::whiten(u.data(), std::get<I>(jacobians)), ...);
     }

@@ -18,6 +18,11 @@ class CAIRN_API EvaluatedFactorType : public FactorType {
                      double* out) const override;
   void linearize(const FactorView& pool, std::size_t begin, std::size_t end, const double* weights,
                  const LinearizeSink& sink, double* out_squared_norms) const override;
+
+ protected:
+  /// Factor f of a pool, as `evaluate` gives it.
+  virtual void evaluate_entry(const FactorView& pool, std::size_t f, double* residual,
+                              double* const* jacobians) const;
 };
 
 }  // namespace cairn

@@ -19,11 +19,18 @@ struct FactorView {
   const std::int32_t* slots = nullptr;
   /// size × measurement_size.
   const double* measurements = nullptr;
-  /// size × n(n+1)/2, n = residual size: U upper triangular with UᵀU = information, row by row.
+  /// n(n+1)/2 doubles each, n = residual size: U upper triangular with UᵀU = information, row by
+  /// row.
   const double* sqrt_information = nullptr;
+  /// size: which of these is a factor's; null: factor f has the f-th.
+  const std::int32_t* noises = nullptr;
   /// arity arrays of states, one for each of the factor's variables in order (the same array twice
   /// if two variables are of one type).
   const double* const* states = nullptr;
+
+  std::size_t noise(std::size_t f) const {
+    return noises ? static_cast<std::size_t>(noises[f]) : f;
+  }
 };
 
 /// A kind of factor (relative pose, landmark seen, prior, …). One object serves all graphs; it has

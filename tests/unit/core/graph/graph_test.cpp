@@ -12,8 +12,10 @@
 #include <fstream>
 #include <functional>
 #include <limits>
+#include <random>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include <Eigen/Core>
 
@@ -149,10 +151,90 @@ TEST_F(GraphTest, HasRoomForWhatWasReservedOnceATypeHasMany) {
   add_pose(1);
   connect(0, 1);
   const FactorPool& pool = graph_.factor_pools()[0];
-  EXPECT_LT(pool.information.capacity(), 1000U) << "others may be of another type";
+  EXPECT_LT(pool.sequence.capacity(), 1000U) << "others may be of another type";
   while (graph_.factor_count() < 1000) connect(0, 1);
   EXPECT_GE(pool.sequence.capacity(), 100000U);
-  EXPECT_GE(pool.information.capacity(), 600000U);
+  EXPECT_LT(pool.information.capacity(), 1000U) << "all have the same";
+}
+
+TEST_F(GraphTest, HasRoomForAsManyInformationMatricesAsMostFactorsNeed) {
+  graph_.reserve(1000, 100000);
+  add_pose(0);
+  add_pose(1);
+  for (int f = 0; f < 1000; ++f) connect(0, 1, {1.0 + f, 0, 0, 1, 0, 1});
+  EXPECT_GE(graph_.factor_pools()[0].information.capacity(), 600000U);
+}
+
+TEST_F(GraphTest, FactorsWithEqualInformationShareIt) {
+  add_pose(0);
+  add_pose(1);
+  const std::vector<double> one = {4, 1, 0.5, 3, 0.2, 2}, other = {9, 0, 0, 9, 0, 9};
+  for (int f = 0; f < 10; ++f) connect(0, 1, f % 3 == 0 ? other : one);
+  const FactorPool& pool = graph_.factor_pools()[0];
+  EXPECT_EQ(pool.information.size(), 12U);
+  EXPECT_EQ(pool.sqrt_information.size(), 12U);
+  EXPECT_THAT(pool.uses, ElementsAre(4, 6));
+  for (int f = 0; f < 10; ++f) {
+    EXPECT_THAT(graph_.information(f), ::testing::ElementsAreArray(f % 3 == 0 ? other : one));
+    EXPECT_EQ(graph_.information_rank(f), 3);
+    EXPECT_EQ(graph_.sqrt_information(f)[0], f % 3 == 0 ? 3.0 : 2.0);
+  }
+}
+
+TEST_F(GraphTest, AFactorWhoseInformationChangesLeavesThatOfTheOthers) {
+  add_pose(0);
+  add_pose(1);
+  for (int f = 0; f < 3; ++f) connect(0, 1, {4, 0, 0, 4, 0, 4});
+  const std::array z{1.0, 0.0, 0.0};
+  for (int change = 1; change <= 100; ++change) {
+    const double w = change % 7 == 0 ? 4.0 : 1.0 / change;
+    graph_.set_measurement(1, z, std::array{w, 0.0, 0.0, w, 0.0, w});
+    ASSERT_EQ(graph_.information(1)[0], w);
+    ASSERT_EQ(graph_.information(0)[0], 4.0);
+    ASSERT_EQ(graph_.information(2)[0], 4.0);
+  }
+  EXPECT_EQ(graph_.factor_pools()[0].uses.size(), 2U) << "one of its own, however often it changes";
+  connect(0, 1, {4, 0, 0, 4, 0, 4});
+  EXPECT_EQ(graph_.information(3)[0], 4.0);
+  graph_.set_measurement(1, z, graph_.information(0));  // of the graph itself
+  EXPECT_EQ(graph_.information(1)[0], 4.0);
+}
+
+TEST_F(GraphTest, RemovesInformationWithTheLastFactorThatHasIt) {
+  add_pose(0);
+  add_pose(1);
+  for (int f = 0; f < 12; ++f) {
+    const double w = f % 4 + 1;
+    connect(0, 1, {w, 0, 0, w, 0, w});
+  }
+  std::vector<bool> leaves(12, false);
+  for (const int f : {1, 5, 9, 2, 0}) leaves[static_cast<std::size_t>(f)] = true;
+  graph_.remove(leaves, {false, false});
+  const FactorPool& pool = graph_.factor_pools()[0];
+  EXPECT_THAT(pool.uses, ElementsAre(2, 2, 3));
+  std::vector<double> weights;
+  for (int f = 0; f < graph_.factor_count(); ++f) weights.push_back(graph_.information(f)[0]);
+  EXPECT_THAT(weights, ElementsAre(4, 1, 3, 4, 1, 3, 4));  // of 3, 4, 6, 7, 8, 10, 11
+  connect(0, 1, {2, 0, 0, 2, 0, 2});
+  EXPECT_EQ(graph_.information(7)[0], 2.0);
+  EXPECT_EQ(graph_.information(1)[0], 1.0);
+}
+
+/// Equal and different in turn: factors that are linearised together have them as they please.
+TEST_F(GraphTest, WhitensByTheInformationThatEachFactorHas) {
+  for (Id id = 0; id < 50; ++id) add_pose(id);
+  std::mt19937 random(1);
+  for (int f = 0; f < 200; ++f) {
+    const double w = f < 40 ? 1.0 : f < 80 ? f : static_cast<double>(random() % 3 + 1);
+    connect(f % 49, f % 49 + 1, {w, 0, 0, 2 * w, 0, 3 * w});
+  }
+  const std::vector<double> norms = squared_norms(graph_);
+  for (int f = 0; f < 200; ++f) {
+    Graph alone;
+    for (const int v : {f % 49, f % 49 + 1}) alone.add(graph_.variable(v));
+    alone.add(graph_.factor(f));
+    EXPECT_EQ(norms[static_cast<std::size_t>(f)], squared_norms(alone)[0]) << f;
+  }
 }
 
 TEST_F(GraphTest, IsAGraphAsAnyOtherWhereRoomIsRefused) {
@@ -169,7 +251,8 @@ TEST_F(GraphTest, IsAGraphAsAnyOtherWhereRoomIsRefused) {
     graph_.reserve(std::size_t{1} << 30, std::size_t{1} << 30);
     add_pose(0);
     add_pose(1);
-    while (graph_.factor_count() < 2000) connect(0, 1);
+    while (graph_.factor_count() < 2000)
+      connect(0, 1, {1.0 + graph_.factor_count(), 0, 0, 1, 0, 1});
     std::_Exit(graph_.factor_pools()[0].information.capacity() < 100000 ? 0 : 3);
   };
   EXPECT_EXIT(fill(), ::testing::ExitedWithCode(0), "");
@@ -225,9 +308,8 @@ TEST_F(GraphTest, SquaredNormsAreByPositionAcrossPools) {
     x.clear();
     for (const std::int32_t v : graph.factor_variables(f)) x.push_back(graph.state(v).data());
     Eigen::VectorXd r(n);
-    pool.type->evaluate(x.data(), graph.measurement(f).data(),
-                        pool.sqrt_information.data() + ref.entry * n * (n + 1) / 2, r.data(),
-                        nullptr);
+    pool.type->evaluate(x.data(), graph.measurement(f).data(), graph.sqrt_information(f).data(),
+                        r.data(), nullptr);
     EXPECT_NEAR(norms[f], r.squaredNorm(), 1e-12 * (1.0 + norms[f]));
   }
 }

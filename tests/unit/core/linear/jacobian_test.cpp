@@ -47,7 +47,7 @@ Eigen::VectorXd residuals(const Graph& graph, const Values& values) {
                        std::ptrdiff_t{view.slots[ref.entry * arity + a]} * type.ambient_size(a));
     }
     type.evaluate(states.data(), view.measurements + ref.entry * type.measurement_size(),
-                  view.sqrt_information + ref.entry * (n * (n + 1) / 2), all.data() + row, nullptr);
+                  graph.sqrt_information(position).data(), all.data() + row, nullptr);
     row += n;
   }
   return all;

@@ -55,9 +55,8 @@ struct Oracle {
       }
       for (Eigen::MatrixXd& j : J) J_data.push_back(j.data());
       Eigen::VectorXd r(n);
-      pool.type->evaluate(x.data(), graph.measurement(f).data(),
-                          pool.sqrt_information.data() + ref.entry * n * (n + 1) / 2, r.data(),
-                          J_data.data());
+      pool.type->evaluate(x.data(), graph.measurement(f).data(), graph.sqrt_information(f).data(),
+                          r.data(), J_data.data());
       double rho = r.squaredNorm(), weight = 1.0;
       if (const Loss* loss = graph.loss(f)) {
         const double squared = rho;

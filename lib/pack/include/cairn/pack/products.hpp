@@ -45,6 +45,18 @@ Eigen::Matrix<S, N, 1> load_entries(const double* all, const Index* entries) {
   return load_lanes<S, N>(places);
 }
 
+/// The same where most often all lanes have one entry.
+template <class S, int N, class Index>
+Eigen::Matrix<S, N, 1> load_entries_often_equal(const double* all, const Index* entries) {
+  bool equal = kWidth<S> > 1;
+  for (int l = 1; l < kWidth<S>; ++l) equal = equal && entries[l] == entries[0];
+  if (!equal) return load_entries<S, N>(all, entries);
+  const double* one = all + static_cast<std::size_t>(entries[0]) * N;
+  Eigen::Matrix<S, N, 1> x;
+  for (int k = 0; k < N; ++k) x[k] = one[k];
+  return x;
+}
+
 /// One lane of `to` becomes that of `from`.
 template <class M>
 void merge_lane(int lane, const M& from, M& to) {

@@ -4,9 +4,12 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <memory>
 #include <ostream>
+#include <random>
 #include <string>
+#include <vector>
 
 #include "cairn/plugin/registry.hpp"
 #include "growing_graph.hpp"
@@ -97,6 +100,46 @@ TEST_P(EngineOnGrowingGraphs, GivesAllDigitsIfAskedTo) {
           << "seed " << seed << ", step " << step << ":\n"
           << graph.log();
     }
+  }
+}
+
+/// Odometry of which nothing contradicts anything: chi2 is rounding, and more so far from the
+/// origin.
+TEST_P(EngineOnGrowingGraphs, TakesNoRoundingForSomethingToBeSolved) {
+  const GrowingTypes& types = GetParam().types;
+  const LieGroup& group = *types.pose->lie_group();
+  const auto ambient = static_cast<std::size_t>(types.pose->ambient_size());
+  const auto tangent = static_cast<std::size_t>(types.pose->tangent_size());
+  for (const double far : {0.0, 1e4, 1e6}) {
+    Engine engine({}, rescuer_);
+    std::vector<double> x(ambient), step(ambient), delta(tangent, 0.0), information;
+    types.pose->identity(x.data());
+    x[0] = x[1] = far;
+    for (std::size_t row = 0; row < tangent; ++row) {
+      for (std::size_t column = row; column < tangent; ++column)
+        information.push_back(row == column ? 1e6 : 0.0);
+    }
+    std::mt19937 rng(1);
+    int iterations = 0;
+    for (int k = 0; k < 200; ++k) {
+      if (k > 0) {
+        for (double& value : delta) value = std::normal_distribution(0.0, 0.1)(rng);
+        delta[0] += 1.0;
+        group.exp(delta.data(), step.data());
+        group.compose(x.data(), step.data(), x.data());
+      }
+      engine.edit().add_variable(types.pose, k, x);
+      engine.added_variable();
+      if (k == 0) continue;
+      engine.edit().add_factor(types.relative_pose, std::array{k - 1, k}, step, information);
+      engine.added_factor();
+      UpdateReport report;
+      engine.solve(0.0, report);
+      iterations += report.iterations;
+      ASSERT_EQ(report.owed, 0) << "pose " << k << " at " << far << " m";
+      ASSERT_EQ(report.relinearized_factors, 0) << "pose " << k << " at " << far << " m";
+    }
+    EXPECT_LE(iterations, 200) << "at " << far << " m";
   }
 }
 

@@ -131,8 +131,8 @@ TEST_P(EngineWithALimit, DoesNoMoreWorkInAnUpdateThanItMay) {
 }
 
 TEST_P(EngineWithALimit, TheSameEstimateIsThereAsWithoutALimitOnceNothingIsOwed) {
-  for (unsigned seed = 1; seed <= 4; ++seed) {
-    Engine limited({}, rescuer_);
+  for (unsigned seed = 1; seed <= 10; ++seed) {
+    Engine limited({.iterations = 10}, rescuer_);
     CountingClock clock;
     clock.drive(limited);
     GrowingGraph growing = graph(seed);
@@ -142,12 +142,17 @@ TEST_P(EngineWithALimit, TheSameEstimateIsThereAsWithoutALimitOnceNothingIsOwed)
       UpdateReport report;
       limited.solve(GetParam().pieces, report);
     }
-    for (int update = 0; update < 20000 && !limited.up_to_date(); ++update) {
+    // Where measurements contradict each other much, a solution may need more iterations than it
+    // has; the next update goes on.
+    int owed = 1;
+    for (int update = 0; update < 200000 && owed > 0; ++update) {
       UpdateReport report;
       limited.solve(GetParam().pieces, report);
-      EXPECT_EQ(report.owed == 0, limited.up_to_date());
+      owed = report.owed;
+      EXPECT_TRUE(limited.up_to_date() || owed > 0);
     }
-    ASSERT_TRUE(limited.up_to_date()) << "updates without anything new come to an end";
+    ASSERT_EQ(owed, 0) << "updates without anything new come to an end";
+    EXPECT_TRUE(limited.up_to_date());
     EXPECT_LE(limited.chi2(), 1.01 * minimum(limited) + kNothing) << "seed " << seed;
   }
 }

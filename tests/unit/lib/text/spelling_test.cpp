@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "cairn/runtime/spelling.hpp"
+#include "cairn/text/spelling.hpp"
 
 #include <gtest/gtest.h>
 
