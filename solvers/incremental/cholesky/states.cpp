@@ -5,26 +5,9 @@
 #include <utility>
 #include <vector>
 
+#include "add_product.hpp"
+
 namespace cairn::incremental {
-namespace {
-
-/// out += M v, M being size × size, column-major.
-template <int Size>
-void add_product(const double* M, const double* v, double* out) {
-  for (int c = 0; c < Size; ++c) {
-    for (int r = 0; r < Size; ++r) out[r] += M[c * Size + r] * v[c];
-  }
-}
-void add_product(std::int32_t size, const double* M, const double* v, double* out) {
-  if (size == 3) return add_product<3>(M, v, out);
-  if (size == 6) return add_product<6>(M, v, out);
-  for (std::int32_t c = 0; c < size; ++c) {
-    for (std::int32_t r = 0; r < size; ++r) out[r] += M[c * size + r] * v[c];
-  }
-}
-
-}  // namespace
-
 void States::add(std::shared_ptr<const VariableType> type, std::span<const double> state) {
   const std::int32_t tangent = type->tangent_size();
   const bool group = type->lie_group() != nullptr;
@@ -63,7 +46,8 @@ void States::lead(std::int32_t v, const double* g, const double* twist) {
   record.away = true;
   record.known = false;
   if (twist)
-    add_product(record.tangent, world_to_frame(v), twist, travelled_.data() + record.first);
+    add_product(record.tangent, world_to_frame(v), record.tangent, twist,
+                travelled_.data() + record.first);
 }
 
 void States::move(std::span<const std::int32_t> variables, const double* steps) {
@@ -93,7 +77,7 @@ void States::move_alike(std::span<const std::int32_t> variables, const double* s
     moved_.insert(moved_.end(), x(v), x(v) + ambient);
     turned_at_.push_back(turned - turned_.data());
     if (record.away) {
-      add_product(tangent, frame_to_body(v), step, turned);
+      add_product(tangent, frame_to_body(v), tangent, step, turned);
     } else {
       std::copy_n(step, tangent, turned);
     }
