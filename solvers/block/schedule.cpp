@@ -2,13 +2,17 @@
 #include "block/schedule.hpp"
 
 #include <algorithm>
+#include <functional>
 #include <map>
+#include <queue>
+#include <span>
+#include <utility>
 
 namespace cairn::block {
 namespace {
 
 /// Subtrees are cut until none holds more than this part of all work …
-constexpr double kLargestTask = 1.0 / 16.0;
+constexpr double kLargestTask = 1.0 / 32.0;
 /// … or until they are too little to be worth a task.
 constexpr double kSmallestTask = 1e5;
 
@@ -68,13 +72,13 @@ class Places {
 /// The steps of one large front. Each phase waits for the one before.
 class FrontSteps {
  public:
-  FrontSteps(const Symbolic& symbolic, std::int32_t node, std::int32_t level, Step::Wait children,
-             std::int32_t& gates)
+  FrontSteps(const Symbolic& symbolic, std::int32_t node, Step::Wait children, std::int32_t& gates,
+             std::vector<Step>& steps)
       : symbolic_(symbolic),
         node_(symbolic.supernodes()[node]),
         which_(node),
-        level_(level),
-        gates_(gates) {
+        gates_(gates),
+        steps_(steps) {
     zero();
     assemble(children);
     add_children(Step::Kind::add_to_panel);
@@ -85,8 +89,6 @@ class FrontSteps {
     }
   }
 
-  /// By phase.
-  const std::vector<std::vector<Step>>& phases() const { return phases_; }
   /// For the last phase.
   Step::Wait done() const { return before_; }
 
@@ -105,7 +107,7 @@ class FrontSteps {
     const std::int32_t gate = gates_++;
     for (Step& each : steps) each.signals[0] = gate;
     before_ = {gate, static_cast<std::int32_t>(steps.size())};
-    phases_.push_back(std::move(steps));
+    steps_.insert(steps_.end(), steps.begin(), steps.end());
   }
 
   void zero() {
@@ -153,7 +155,7 @@ class FrontSteps {
     Step first = step(Step::Kind::pivots);
     first.last = std::min(node_.columns, kStripColumns);
     first.signals[0] = pivots;
-    phases_.push_back({first});
+    steps_.push_back(first);
     before_ = {pivots, 1};
     for (std::int32_t begin = 0; begin < node_.columns; begin += kStripColumns) {
       const std::int32_t last = std::min(node_.columns, begin + kStripColumns);
@@ -181,29 +183,265 @@ class FrontSteps {
     for (int tile = tiles - 1; tile >= 0; --tile) {  // the last have the longest rows
       const int row = begin + tile * kTileRows;
       steps.push_back(step(Step::Kind::update, row, std::min(node_.stride, row + kTileRows)));
-      steps.back().levels = level_;
     }
     phase(std::move(steps));
   }
 
   const Symbolic& symbolic_;
   const Supernode& node_;
-  std::int32_t which_, level_;
+  std::int32_t which_;
   std::int32_t& gates_;
-  std::vector<std::vector<Step>> phases_;
+  std::vector<Step>& steps_;
   Step::Wait before_;
 };
 
 /// Doubles of an update matrix, up to a cache line.
 std::int64_t room(const Supernode& node) { return (node.update_size() + 7) / 8 * 8; }
 
+/// About how long a step takes, in the units of `work_of`.
+double work_of(const Step& step, const Symbolic& symbolic) {
+  const Supernode& node = symbolic.supernodes()[step.which];
+  const double rows = static_cast<double>(step.end - step.begin);
+  switch (step.kind) {
+    case Step::Kind::task:  // known to the schedule
+    case Step::Kind::finish:
+      return 0.0;
+    case Step::Kind::front:
+      return work_of(node);
+    case Step::Kind::zero:
+      return rows;
+    case Step::Kind::assemble:
+      return 4000.0;
+    case Step::Kind::add_to_panel:
+    case Step::Kind::add_to_update: {
+      double entries = 0.0;
+      for (const std::int32_t c :
+           symbolic.children(step.which).subspan(step.child, step.child_end - step.child)) {
+        const Supernode& child = symbolic.supernodes()[c];
+        const double columns = rows > 0.0                              ? rows
+                               : step.kind == Step::Kind::add_to_panel ? child.panel_rows
+                                                                       : child.m - child.columns;
+        entries += 0.5 * columns * (child.m - child.columns);
+      }
+      return 2.0 * entries;
+    }
+    case Step::Kind::pivots:
+    case Step::Kind::rows: {
+      const double columns = step.last - step.first;
+      return std::max(rows, columns) * columns * (step.first + step.last);
+    }
+    case Step::Kind::update:
+      return 1.5 * rows * node.columns * static_cast<double>(step.begin + step.end);
+  }
+  return 0.0;
+}
+
+/// Places in one array for matrices whose lives are known: the largest first, each at the lowest
+/// place that none has which lives at the same time.
+///
+/// `taken`: they begin (s) and end (~s) in this order. `size`: by matrix; `place`, too.
+std::int64_t place_by_size(std::span<const std::int32_t> taken, std::span<const std::int64_t> size,
+                           std::span<std::int64_t> place) {
+  std::vector<std::int32_t> all, living;
+  std::vector<std::vector<std::int32_t>> beside(size.size());
+  for (const std::int32_t event : taken) {
+    if (event < 0) {
+      living.erase(std::ranges::find(living, ~event));
+      continue;
+    }
+    for (const std::int32_t other : living) {
+      beside[other].push_back(event);
+      beside[event].push_back(other);
+    }
+    living.push_back(event);
+    all.push_back(event);
+    place[event] = -1;
+  }
+  std::ranges::stable_sort(all, std::greater{}, [&](std::int32_t s) { return size[s]; });
+  std::int64_t end = 0;
+  std::vector<std::pair<std::int64_t, std::int64_t>> used;
+  for (const std::int32_t s : all) {
+    used.clear();
+    for (const std::int32_t other : beside[s]) {
+      if (place[other] >= 0) used.emplace_back(place[other], place[other] + size[other]);
+    }
+    std::ranges::sort(used);
+    std::int64_t at = 0;
+    for (const auto& [first, last] : used) {
+      if (first - at >= size[s]) break;
+      at = std::max(at, last);
+    }
+    place[s] = at;
+    end = std::max(end, at + size[s]);
+  }
+  return end;
+}
+
+/// Runs all steps as so many lanes would that take them in postorder: in which order they begin,
+/// and where what leaves a task is meanwhile.
+///
+/// The times are guessed, so whoever takes room that another matrix has had waits for the supernode
+/// which has used that up.
+class Rehearsal {
+ public:
+  /// `done`: by supernode, the gate that is signalled at its end.
+  Rehearsal(const Symbolic& symbolic, Schedule& schedule, std::span<const std::int32_t> done,
+            std::span<const Step> all)
+      : symbolic_(symbolic),
+        schedule_(schedule),
+        done_(done),
+        all_(all),
+        begun_(symbolic.supernodes().size(), false) {}
+
+  void run(int lanes) {
+    using Ready = std::pair<std::int32_t, std::int32_t>;  // postorder, step
+    using Running = std::pair<double, std::int32_t>;      // its end, step
+    std::vector<std::int32_t> to_come(schedule_.gates, 0);
+    std::vector<std::vector<std::int32_t>> waiting(schedule_.gates);
+    std::vector<std::int32_t> missing(all_.size(), 0);
+    std::priority_queue<Ready, std::vector<Ready>, std::greater<>> ready;
+    std::priority_queue<Running, std::vector<Running>, std::greater<>> running;
+    for (std::size_t k = 0; k < all_.size(); ++k) {
+      const auto step = static_cast<std::int32_t>(k);
+      for (const Step::Wait& wait : all_[k].waits) {
+        if (wait.gate < 0 || wait.count == 0) continue;
+        waiting[wait.gate].push_back(step);
+        ++missing[k];
+      }
+      for_each_signal(all_[k], [&](std::int32_t gate) { ++to_come[gate]; });
+      if (missing[k] == 0) ready.emplace(postorder(all_[k]), step);
+    }
+    double now = 0.0;
+    for (int free = lanes;;) {
+      for (; free > 0 && !ready.empty(); --free) {
+        const std::int32_t step = ready.top().second;
+        ready.pop();
+        begin(all_[step]);
+        running.emplace(now + work(all_[step]), step);
+      }
+      if (running.empty()) break;
+      const auto [time, step] = running.top();
+      running.pop();
+      now = time;
+      ++free;
+      end(all_[step]);
+      for_each_signal(all_[step], [&](std::int32_t gate) {
+        if (--to_come[gate] > 0) return;
+        for (const std::int32_t next : waiting[gate]) {
+          if (--missing[next] == 0) ready.emplace(postorder(all_[next]), next);
+        }
+      });
+    }
+  }
+
+  /// Finds room, and who has had it before.
+  void place() {
+    const auto nodes = symbolic_.supernodes();
+    Placement& placement = schedule_.placement;
+    const std::int64_t above = placement.size;
+    std::vector<std::int64_t> size(nodes.size()), place(nodes.size());
+    for (std::size_t s = 0; s < nodes.size(); ++s) size[s] = room(nodes[s]);
+    placement.size += place_by_size(taken_, size, place);
+
+    struct Freed {
+      std::int64_t begin, end;
+      std::int32_t gate;  // of the supernode that has given it back
+    };
+    std::vector<Freed> free, left;
+    std::vector<std::pair<std::int32_t, std::int32_t>> waits(nodes.size());  // in `freed`
+    for (const std::int32_t event : taken_) {
+      const std::int32_t s = event < 0 ? ~event : event;
+      const std::int64_t begin = place[s], end = begin + size[s];
+      if (event < 0) {
+        free.push_back({begin, end, done_[nodes[s].parent]});
+        continue;
+      }
+      placement.place[s] = above + begin;
+      waits[s].first = static_cast<std::int32_t>(schedule_.freed.size());
+      left.clear();
+      for (const Freed& other : free) {
+        if (other.end <= begin || other.begin >= end) {
+          left.push_back(other);
+          continue;
+        }
+        schedule_.freed.push_back(other.gate);
+        if (other.begin < begin) left.push_back({other.begin, begin, other.gate});
+        if (other.end > end) left.push_back({end, other.end, other.gate});
+      }
+      std::swap(free, left);
+      waits[s].second = static_cast<std::int32_t>(schedule_.freed.size());
+    }
+    for (Step& step : schedule_.steps) {
+      const auto wait_for = [&](std::int32_t s) {
+        if (step.freed_begin == step.freed_end) step.freed_begin = waits[s].first;
+        step.freed_end = waits[s].second;
+      };
+      if (step.kind == Step::Kind::front || step.kind == Step::Kind::update) wait_for(step.which);
+      // What leaves a task begins together.
+      if (step.kind == Step::Kind::task)
+        for_each_that_leaves(schedule_.tasks[step.which], wait_for);
+    }
+  }
+
+ private:
+  std::int32_t postorder(const Step& step) const {
+    return step.kind == Step::Kind::task ? schedule_.tasks[step.which].begin : step.which;
+  }
+  double work(const Step& step) const {
+    constexpr double kStep = 500.0;  // of any
+    return kStep + (step.kind == Step::Kind::task ? schedule_.tasks[step.which].work
+                                                  : work_of(step, symbolic_));
+  }
+  template <class Visit>
+  void for_each_that_leaves(const Schedule::Task& task, const Visit& visit) const {
+    for (std::int32_t s = task.begin; s < task.end; ++s) {
+      if (symbolic_.supernodes()[s].parent >= task.end) visit(s);
+    }
+  }
+  template <class Visit>
+  void for_each_signal(const Step& step, const Visit& visit) const {
+    for (const std::int32_t gate : step.signals) {
+      if (gate >= 0) visit(gate);
+    }
+    if (step.kind != Step::Kind::task) return;
+    for_each_that_leaves(schedule_.tasks[step.which], [&](std::int32_t s) {
+      visit(schedule_.ready[symbolic_.supernodes()[s].parent]);
+    });
+  }
+
+  void begin(const Step& step) {
+    schedule_.steps.push_back(step);
+    if (step.kind == Step::Kind::task)
+      for_each_that_leaves(schedule_.tasks[step.which], [&](std::int32_t s) { take(s); });
+    if (step.kind == Step::Kind::front || step.kind == Step::Kind::update) take(step.which);
+  }
+  void take(std::int32_t s) {
+    if (begun_[s] || symbolic_.supernodes()[s].update_size() == 0) return;
+    begun_[s] = true;
+    taken_.push_back(s);
+  }
+  void end(const Step& step) {
+    if (step.kind != Step::Kind::front && step.kind != Step::Kind::finish) return;
+    for (const std::int32_t c : symbolic_.children(step.which)) {
+      if (begun_[c]) taken_.push_back(~c);
+    }
+  }
+
+  const Symbolic& symbolic_;
+  Schedule& schedule_;
+  std::span<const std::int32_t> done_;
+  std::span<const Step> all_;
+  std::vector<bool> begun_;          // by supernode: whether it has taken room
+  std::vector<std::int32_t> taken_;  // takes room: s, and gives it back: ~s
+};
+
 }  // namespace
 
 Schedule::Schedule(const Symbolic& symbolic, int threads) {
   cut(symbolic);
   lanes = std::max(1, std::min(threads, static_cast<int>(tasks.size())));
-  place.assign(symbolic.supernodes().size(), 0);
-  in_lane.assign(symbolic.supernodes().size(), false);
+  placement.place.assign(symbolic.supernodes().size(), 0);
+  placement.in_lane.assign(symbolic.supernodes().size(), false);
   if (lanes == 1) {
     place_as_stack(symbolic);
   } else {
@@ -259,84 +497,87 @@ void Schedule::place_as_stack(const Symbolic& symbolic) {
   const auto nodes = symbolic.supernodes();
   Places places;
   for (std::size_t s = 0; s < nodes.size(); ++s) {
-    place[s] = places.take(room(nodes[s]));
+    placement.place[s] = places.take(room(nodes[s]));
     for (const std::int32_t c : symbolic.children(static_cast<int>(s)))
-      places.give_back(place[c], room(nodes[c]));
+      places.give_back(placement.place[c], room(nodes[c]));
   }
-  size = places.end();
+  placement.size = places.end();
 }
 
+/// What stays within a task.
 void Schedule::place_in_lanes(const Symbolic& symbolic) {
   const auto nodes = symbolic.supernodes();
   for (const Task& task : tasks) {
     Places places;
     for (std::int32_t s = task.begin; s < task.end; ++s) {
-      in_lane[s] = nodes[s].parent >= 0 && nodes[s].parent < task.end;
-      if (in_lane[s]) place[s] = places.take(room(nodes[s]));
-      for (const std::int32_t c : symbolic.children(s)) places.give_back(place[c], room(nodes[c]));
+      placement.in_lane[s] = nodes[s].parent >= 0 && nodes[s].parent < task.end;
+      if (placement.in_lane[s]) placement.place[s] = places.take(room(nodes[s]));
+      for (const std::int32_t c : symbolic.children(s))
+        places.give_back(placement.place[c], room(nodes[c]));
     }
-    lane_size = std::max(lane_size, places.end());
+    placement.lane_size = std::max(placement.lane_size, places.end());
   }
-  // What leaves a task is kept until its parent, above, is done.
-  const std::int64_t begin = lane_size * lanes;
+  placement.size = placement.lane_size * lanes;
+}
+
+Placement Schedule::by_levels(const Symbolic& symbolic) const {
+  if (lanes == 1) return placement;
+  const auto nodes = symbolic.supernodes();
+  Placement result = placement;
+  const std::int64_t begin = result.lane_size * lanes;
   Places places;
   for (const Task& task : tasks) {
     for (std::int32_t s = task.begin; s < task.end; ++s) {
-      if (!in_lane[s]) place[s] = begin + places.take(room(nodes[s]));
+      if (!result.in_lane[s]) result.place[s] = begin + places.take(room(nodes[s]));
     }
   }
   for (const std::vector<std::int32_t>& level : levels) {
-    for (const std::int32_t s : level) place[s] = begin + places.take(room(nodes[s]));
+    for (const std::int32_t s : level) result.place[s] = begin + places.take(room(nodes[s]));
     for (const std::int32_t s : level) {
       for (const std::int32_t c : symbolic.children(s))
-        places.give_back(place[c] - begin, room(nodes[c]));
+        places.give_back(result.place[c] - begin, room(nodes[c]));
     }
   }
-  size = begin + places.end();
+  result.size = begin + places.end();
+  return result;
 }
 
 void Schedule::list_steps(const Symbolic& symbolic) {
   const auto nodes = symbolic.supernodes();
   ready.assign(nodes.size(), -1);
+  std::vector<std::int32_t> done(nodes.size(), -1);
   for (const std::vector<std::int32_t>& level : levels) {
-    for (const std::int32_t s : level) ready[s] = gates++;
+    for (const std::int32_t s : level) {
+      ready[s] = gates++;
+      done[s] = gates++;
+    }
   }
-  for (std::size_t l = 0; l < levels.size(); ++l) level_gates.push_back(gates++);
+  std::vector<Step> all;
   for (std::size_t t = 0; t < tasks.size(); ++t) {
     Step step;
     step.kind = Step::Kind::task;
     step.which = static_cast<std::int32_t>(t);
-    steps.push_back(step);
+    all.push_back(step);
   }
-  for (std::size_t l = 0; l < levels.size(); ++l) {
-    const auto level = static_cast<std::int32_t>(l);
-    std::vector<std::vector<Step>> phases;  // of all fronts of the level, side by side
-    std::vector<Step> last;
-    for (const std::int32_t s : levels[l]) {
+  for (const std::vector<std::int32_t>& level : levels) {
+    for (const std::int32_t s : level) {
       const Step::Wait children{ready[s], static_cast<std::int32_t>(symbolic.children(s).size())};
       Step end;
       end.which = s;
-      end.signals[0] = level_gates[l];
+      end.signals[0] = done[s];
       if (nodes[s].parent >= 0) end.signals[1] = ready[nodes[s].parent];
-      if (!is_large(nodes[s].m)) {
+      if (is_large(nodes[s].m)) {
+        end.waits[0] = FrontSteps(symbolic, s, children, gates, all).done();
+      } else {
         end.kind = Step::Kind::front;
         end.waits[0] = children;
-        end.levels = level;
-        if (phases.empty()) phases.emplace_back();
-        phases.front().push_back(end);
-        continue;
       }
-      const FrontSteps front(symbolic, s, level, children, gates);
-      if (phases.size() < front.phases().size()) phases.resize(front.phases().size());
-      for (std::size_t p = 0; p < front.phases().size(); ++p)
-        phases[p].insert(phases[p].end(), front.phases()[p].begin(), front.phases()[p].end());
-      end.waits[0] = front.done();
-      last.push_back(end);
+      all.push_back(end);
     }
-    for (const std::vector<Step>& phase : phases)
-      steps.insert(steps.end(), phase.begin(), phase.end());
-    steps.insert(steps.end(), last.begin(), last.end());
   }
+  Rehearsal rehearsal(symbolic, *this, done, all);
+  rehearsal.run(lanes);
+  rehearsal.place();
 }
 
 }  // namespace cairn::block

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <atomic>
 #include <stdexcept>
+#include <type_traits>
 
 #include "block/front.hpp"
 #include "cairn/runtime/threads.hpp"
@@ -30,6 +31,10 @@ void SelectedInverse::prepare() {
     std::fill(supernode_of_.begin() + node.block_begin, supernode_of_.begin() + node.block_end, s);
   }
   room_ = UninitializedVector(lane_room_ * cholesky_->schedule_.lanes);
+  placement_ = cholesky_->schedule_.by_levels(cholesky_->symbolic_);
+  auto& workspace = cholesky_->double_.workspace;
+  if (std::ssize(workspace) < placement_.size)
+    workspace = std::remove_reference_t<decltype(workspace)>(placement_.size);
   version_ = cholesky_->version_;
 }
 
@@ -59,8 +64,7 @@ void SelectedInverse::compute() {
 void SelectedInverse::invert(std::int32_t s, std::int64_t lane) {
   const Supernode& node = nodes()[s];
   invert_front(*cholesky_->kernels_, cholesky_->double_.panels.data() + node.panel, node.stride,
-               node.columns, node.m, cholesky_->update_matrix(cholesky_->double_, s, lane),
-               panel(s), room_.data() + lane * lane_room_);
+               node.columns, node.m, rest(s, lane), panel(s), room_.data() + lane * lane_room_);
   for (const std::int32_t child : cholesky_->symbolic_.children(s)) {
     const int rows = nodes()[child].m - nodes()[child].columns;
     hand_down(s, child, lane, 0, rows);
@@ -92,8 +96,8 @@ void SelectedInverse::invert_large(std::int32_t s) {
   });
   if (rows > 0) {
     tiles(node.stride - below, [&](int begin, int end) {
-      kernels.inverse_rows(cholesky_->update_matrix(cholesky_->double_, s, 0), node.stride,
-                           node.columns, node.m, T, panel(s), below + begin, below + end);
+      kernels.inverse_rows(rest(s, 0), node.stride, node.columns, node.m, T, panel(s),
+                           below + begin, below + end);
     });
   }
   tiles(c8, [&](int begin, int end) {
@@ -117,7 +121,7 @@ void SelectedInverse::hand_down(std::int32_t s, std::int32_t child, std::int64_t
   const Supernode& to = nodes()[child];
   const Spread* spreads = cholesky_->symbolic_.spreads().data() + to.spreads_begin;
   const int count = static_cast<int>(to.spreads_end - to.spreads_begin);
-  double* U = cholesky_->update_matrix(cholesky_->double_, child, lane);
+  double* U = rest(child, lane);
   const int split = std::clamp(to.panel_rows, first, last);
   if (first < split) {
     kernels.gather(spreads, count, first, split, 0, U, to.update_stride(), to.columns % 8, panel(s),
@@ -126,8 +130,7 @@ void SelectedInverse::hand_down(std::int32_t s, std::int32_t child, std::int64_t
   if (split < last) {
     // Z_RR as if it were a part of the whole front.
     const std::int64_t stride = node.update_stride();
-    const double* front = cholesky_->update_matrix(cholesky_->double_, s, lane) -
-                          node.columns * stride - node.columns / 8 * 8;
+    const double* front = rest(s, lane) - node.columns * stride - node.columns / 8 * 8;
     kernels.gather(spreads, count, split, last, to.panel_rows, U, to.update_stride(),
                    to.columns % 8, front, stride);
   }
@@ -137,8 +140,8 @@ void SelectedInverse::hand_down(std::int32_t s, std::int32_t child, std::int64_t
 void SelectedInverse::mirror(std::int32_t child, std::int64_t lane, int first, int last) {
   const Supernode& to = nodes()[child];
   if (first >= last) return;
-  cholesky_->kernels_->mirror(cholesky_->update_matrix(cholesky_->double_, child, lane),
-                              to.update_stride(), to.columns % 8, to.panel_rows, first, last);
+  cholesky_->kernels_->mirror(rest(child, lane), to.update_stride(), to.columns % 8, to.panel_rows,
+                              first, last);
 }
 
 void SelectedInverse::diagonal_blocks(std::span<double> out) const {

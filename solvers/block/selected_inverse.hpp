@@ -19,12 +19,12 @@ namespace cairn::block {
 ///
 /// and Z_RR is known, since R lies within the front of the parent. So the tree is processed from
 /// its roots to its leaves: the factorisation in reverse, each supernode passing Z_RR to its
-/// children where the factorisation had read their update matrices. It uses the same offsets in the
-/// factorisation's own memory, which is free by then; what it allocates are the panels of Z (as
-/// large as those of L) and a little memory for each thread, both once per structure. It takes
-/// about three times the arithmetic of a factorisation. Subtrees run in parallel, and so do rows of
-/// large fronts; every number has one writer and one order of summation, so the result does not
-/// depend on the number of threads.
+/// children where the factorisation had read their update matrices. It uses the factorisation's own
+/// memory, which is free by then and with one thread large enough; what it allocates are the panels
+/// of Z (as large as those of L) and a little memory for each thread, both once per structure. It
+/// takes about three times the arithmetic of a factorisation. Subtrees run in parallel, and so do
+/// rows of large fronts; every number has one writer and one order of summation, so the result does
+/// not depend on the number of threads.
 class SelectedInverse {
  public:
   /// `cholesky` must outlive this object.
@@ -46,10 +46,15 @@ class SelectedInverse {
   void hand_down(std::int32_t s, std::int32_t child, std::int64_t lane, int first, int last);
   void mirror(std::int32_t child, std::int64_t lane, int first, int last);
   double* panel(std::int32_t s) { return panels_.data() + nodes()[s].panel; }
+  /// Z_RR of a supernode.
+  double* rest(std::int32_t s, std::int64_t lane) {
+    return cholesky_->double_.workspace.data() + placement_.of(s, lane);
+  }
   std::span<const Supernode> nodes() const { return cholesky_->symbolic_.supernodes(); }
 
   SupernodalCholesky* cholesky_;
   std::uint64_t version_ = 0;               // of the structure that room was made for
+  Placement placement_;                     // of Z_RR
   UninitializedVector panels_;              // of Z, laid out as those of L
   UninitializedVector room_;                // for V and T of a supernode, by lane
   std::int64_t lane_room_ = 0;              // doubles

@@ -76,7 +76,7 @@ template <class Real>
 void SupernodalCholesky::make_room(Numbers<Real>& numbers) const {
   using Array = typename Numbers<Real>::Array;
   numbers.panels = Array(symbolic_.panel_values());
-  numbers.workspace = Array(schedule_.size);
+  numbers.workspace = Array(schedule_.placement.size);
   numbers.vectors = decltype(numbers.vectors)(vector_rows_);
   numbers.fronts = decltype(numbers.fronts)(front_rows_ * schedule_.lanes);
 }
@@ -199,8 +199,7 @@ void SupernodalCholesky::wait_for(const Step& step) {
   for (const Step::Wait& each : step.waits) {
     if (each.gate >= 0) wait(each.gate, each.count);
   }
-  for (std::int32_t l = 0; l < step.levels; ++l)
-    wait(schedule_.level_gates[l], static_cast<std::int32_t>(schedule_.levels[l].size()));
+  for (std::int32_t k = step.freed_begin; k < step.freed_end; ++k) wait(schedule_.freed[k], 1);
 }
 
 void SupernodalCholesky::signal(std::int32_t gate) {

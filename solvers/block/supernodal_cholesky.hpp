@@ -63,7 +63,7 @@ class SupernodalCholesky {
   std::span<const double> panels() const { return double_.panels; }
   std::string_view kernel_set() const { return kernels_->name; }
   /// Numbers of panels and room for update matrices.
-  std::int64_t numbers() const { return symbolic_.panel_values() + schedule_.size; }
+  std::int64_t numbers() const { return symbolic_.panel_values() + schedule_.placement.size; }
 
  private:
   friend class SelectedInverse;  // the same tree, panels and room, worked off backwards
@@ -110,8 +110,7 @@ class SupernodalCholesky {
   void signal(std::int32_t gate);
   template <class Real>
   Real* update_matrix(Numbers<Real>& numbers, std::int32_t s, std::int64_t lane) {
-    const std::int64_t begin = schedule_.in_lane[s] ? lane * schedule_.lane_size : 0;
-    return numbers.workspace.data() + begin + schedule_.place[s];
+    return numbers.workspace.data() + schedule_.placement.of(s, lane);
   }
   template <class Real>
   void solve_in(Numbers<Real>& numbers, std::span<const double> g, std::span<double> x);

@@ -22,6 +22,34 @@ constexpr std::size_t kMostRows = 24;
 constexpr double kLeastEigenvalue = 1e-4;
 /// Rounding adds up slowly; every so many downdates all is computed anew.
 constexpr int kOldest = 1000;
+/// What changes the variances of a subtree by less than this part is left out.
+constexpr double kNothing = 1e-11;
+
+/// The rows of a node's own variables in eight columns become zero.
+void clear_rows(const System& system, const Node& node, AlignedVector& X) {
+  for (const std::int32_t v : node.own_variables())
+    std::fill_n(X.data() + system.offset(v) * 8, std::int64_t{system.size(v)} * 8, 0.0);
+}
+void clear_path(const System& system, const Tree& tree, AlignedVector& X) {
+  for (const std::int32_t n : tree.path()) clear_rows(system, tree.nodes()[n], X);
+}
+
+/// |s| Σ H_ii ‖X_i‖² over a node's separator, of the first `width` columns.
+template <int width>
+double bound_below(const System& system, const Node& node, const AlignedVector& X) {
+  double sum = 0.0;
+  for (const std::int32_t v : node.separator()) {
+    const std::int32_t size = system.size(v);
+    const double* const H = system.diagonal(v);
+    const double* row = X.data() + system.offset(v) * 8;
+    for (std::int32_t i = 0; i < size; ++i, row += 8) {
+      double square = 0.0;
+      for (int k = 0; k < width; ++k) square += row[k] * row[k];
+      sum += H[i * (size + 1)] * square;
+    }
+  }
+  return sum * node.below();
+}
 
 }  // namespace
 
@@ -109,22 +137,35 @@ bool Covariances::downdate(const System& system, Tree& tree, std::span<const std
   if (rows_.size() > kMostRows || ++age_ > kOldest) return false;
   if (!fresh_.empty() && !rows_.empty() && !take_out_fresh(system, tree)) return false;
   const std::size_t n = rows_.size(), groups = (n + 7) / 8;
-  while (B_.size() < groups) B_.emplace_back();
   for (std::size_t g = 0; g < groups; ++g) {
-    AlignedVector& B = B_[g];
-    B.assign(static_cast<std::size_t>(system.scalars()) * 8, 0.0);
+    AlignedVector& B = columns(system, g);
     for (std::size_t r = g * 8; r < std::min(n, g * 8 + 8); ++r) {
       for (std::size_t e = rows_[r].begin; e < rows_[r].begin + rows_[r].count; ++e)
         B[static_cast<std::size_t>(entries_[e].scalar) * 8 + r % 8] += entries_[e].value;
     }
-    tree.solve_many(sources_, B);
+    tree.forward_many(sources_, B);
   }
-  if (n > 0 && !apply(system, tree)) return false;
+  if (n > 0 && !scale_rows(system, tree)) {
+    for (std::size_t g = 0; g < groups; ++g) clear_path(system, tree, B_[g]);
+    return false;
+  }
+  for (std::size_t g = 0; g < groups; ++g) {
+    const double* const signs = signs_.data() + g * 8;
+    n - g * 8 <= 4 ? apply<4>(system, tree, B_[g], signs) : apply<8>(system, tree, B_[g], signs);
+  }
   for (const std::int32_t v : fresh_) {
     std::fill_n(diagonal(v), system.size(v) * system.size(v), 0.0);
     if (!held[v] && tree.node_of(v) >= 0) solve_for(system, tree, v);
   }
   return true;
+}
+
+/// Eight columns of zeros, one row for each scalar.
+AlignedVector& Covariances::columns(const System& system, std::size_t group) {
+  if (B_.size() <= group) B_.resize(group + 1);
+  const std::size_t doubles = static_cast<std::size_t>(system.scalars()) * 8;
+  if (B_[group].size() < doubles) B_[group].resize(doubles, 0.0);
+  return B_[group];
 }
 
 /// What the rows say of the variables that were there before, when those that are new have been
@@ -184,59 +225,76 @@ bool Covariances::take_out_fresh(const System& system, const Tree& tree) {
   return true;
 }
 
-/// Σ ← Σ − B U⁻¹ Bᵀ on the diagonal. False if U is too badly conditioned.
-bool Covariances::apply(const System& system, const Tree& tree) {
-  const std::size_t n = rows_.size(), groups = (n + 7) / 8, width = groups * 8;
+/// Y, in B_, becomes Y Q |Λ|^(−1/2) with Q Λ Qᵀ = U = S − Yᵀ Y. False if U is too badly
+/// conditioned.
+bool Covariances::scale_rows(const System& system, const Tree& tree) {
+  const std::size_t n = rows_.size();
+  const auto for_each_row = [&](const auto& visit) {
+    for (const std::int32_t node : tree.path()) {
+      for (const std::int32_t v : tree.nodes()[node].own_variables()) {
+        const std::size_t first = static_cast<std::size_t>(system.offset(v));
+        for (std::size_t row = first; row < first + static_cast<std::size_t>(system.size(v)); ++row)
+          visit(row * 8);
+      }
+    }
+  };
   Eigen::MatrixXd U =
       Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(n), static_cast<Eigen::Index>(n));
-  for (std::size_t i = 0; i < n; ++i) {
-    U(i, i) = rows_[i].sign;
-    for (std::size_t e = rows_[i].begin; e < rows_[i].begin + rows_[i].count; ++e) {
-      for (std::size_t j = 0; j < n; ++j)
-        U(i, j) -=
-            entries_[e].value * B_[j / 8][static_cast<std::size_t>(entries_[e].scalar) * 8 + j % 8];
+  for_each_row([&](std::size_t row) {
+    for (std::size_t j = 0; j < n; ++j) {
+      const double value = B_[j / 8][row + j % 8];
+      for (std::size_t i = j; i < n; ++i) U(i, j) -= value * B_[i / 8][row + i % 8];
     }
-  }
-  U = 0.5 * (U + U.transpose().eval());
-  const Eigen::VectorXd eigenvalues =
-      Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(U, Eigen::EigenvaluesOnly).eigenvalues();
-  if (!(eigenvalues.cwiseAbs().minCoeff() >= kLeastEigenvalue)) return false;
-  // U⁻¹ in rows of whole groups of eight, as B has them.
-  const Eigen::MatrixXd inverse = U.inverse();
-  AlignedVector inverse_rows(n * width, 0.0), row(width);
-  for (std::size_t i = 0; i < n; ++i) {
-    for (std::size_t j = 0; j < n; ++j)
-      inverse_rows[i * width + j] =
-          inverse(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
-  }
-  for (std::int32_t v = 0; v < system.variables(); ++v) {
-    const std::int32_t size = system.size(v);
-    double* const block = diagonal(v);
-    if (tree.node_of(v) < 0) {
-      std::fill_n(block, size * size, 0.0);
-      continue;
+  });
+  for (std::size_t i = 0; i < n; ++i) U(i, i) += rows_[i].sign;
+  // The lower triangle is read.
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> parts(U);
+  const Eigen::VectorXd& values = parts.eigenvalues();
+  if (!(values.cwiseAbs().minCoeff() >= kLeastEigenvalue)) return false;
+  const Eigen::MatrixXd scale =
+      parts.eigenvectors() * values.cwiseAbs().cwiseSqrt().cwiseInverse().asDiagonal();
+  std::vector<double> before(n), after(n);
+  for_each_row([&](std::size_t row) {
+    for (std::size_t j = 0; j < n; ++j) before[j] = B_[j / 8][row + j % 8];
+    for (std::size_t j = 0; j < n; ++j) {
+      double sum = 0.0;
+      for (std::size_t i = 0; i < n; ++i) sum += before[i] * scale(i, j);
+      B_[j / 8][row + j % 8] = sum;
     }
-    const std::size_t first = static_cast<std::size_t>(system.offset(v)) * 8;
-    for (std::int32_t c = 0; c < size; ++c) {
-      // A row of B_v U⁻¹, times B_vᵀ.
-      std::ranges::fill(row, 0.0);
-      for (std::size_t j = 0; j < n; ++j) {
-        const double value = B_[j / 8][first + static_cast<std::size_t>(c) * 8 + j % 8];
-        const double* from = inverse_rows.data() + j * width;
-        for (std::size_t k = 0; k < width; ++k) row[k] += value * from[k];
-      }
-      for (std::int32_t r = c; r < size; ++r) {
-        double sum = 0.0;
-        for (std::size_t g = 0; g < groups; ++g) {
-          const double* B_r = B_[g].data() + first + static_cast<std::size_t>(r) * 8;
-          for (std::size_t k = 0; k < 8; ++k) sum += row[g * 8 + k] * B_r[k];
-        }
-        block[c * size + r] -= sum;
-        block[r * size + c] = block[c * size + r];
-      }
-    }
-  }
+  });
+  signs_.assign((n + 7) / 8 * 8, 0.0);
+  for (std::size_t j = 0; j < n; ++j) signs_[j] = values[j] > 0.0 ? 1.0 : -1.0;
   return true;
+}
+
+/// C ← L⁻ᵀ C, then Σ ← Σ − C sign(Λ) Cᵀ on the diagonal; leaves C as zero. Its columns from
+/// `width` on are zero.
+template <int width>
+void Covariances::apply(const System& system, Tree& tree, AlignedVector& C, const double* signs) {
+  visited_.clear();
+  const auto enter = [&](const Node& node) {
+    return !(bound_below<width>(system, node, C) <= kNothing);  // also where it is not a number
+  };
+  const auto subtract = [&](const Node& node) {
+    visited_.push_back(static_cast<std::int32_t>(&node - tree.nodes().data()));
+    for (const std::int32_t v : node.own_variables()) {
+      const std::int32_t size = system.size(v);
+      double* const block = diagonal(v);
+      const double* const rows = C.data() + system.offset(v) * 8;
+      for (std::int32_t c = 0; c < size; ++c) {
+        double row[width];
+        for (int k = 0; k < width; ++k) row[k] = signs[k] * rows[c * 8 + k];
+        for (std::int32_t r = c; r < size; ++r) {
+          double sum = 0.0;
+          for (int k = 0; k < width; ++k) sum += row[k] * rows[r * 8 + k];
+          block[c * size + r] -= sum;
+          block[r * size + c] = block[c * size + r];
+        }
+      }
+    }
+  };
+  tree.backward_many(C, enter, subtract);
+  for (const std::int32_t n : visited_) clear_rows(system, tree.nodes()[n], C);
 }
 
 void Covariances::recompute(const System& system, Tree& tree) {
@@ -254,11 +312,9 @@ void Covariances::recompute(const System& system, Tree& tree) {
 /// Σ_vv by solving along the path from v to its root.
 void Covariances::solve_for(const System& system, Tree& tree, std::int32_t v) {
   const std::int32_t size = system.size(v);
-  B_.resize(std::max<std::size_t>(B_.size(), 1));
-  AlignedVector& X = B_.front();
+  AlignedVector& X = columns(system, 0);
   for (std::int32_t first = 0; first < size; first += 8) {
     const std::int32_t width = std::min(8, size - first);
-    X.assign(static_cast<std::size_t>(system.scalars()) * 8, 0.0);
     for (std::int32_t k = 0; k < width; ++k)
       X[static_cast<std::size_t>(system.offset(v) + first + k) * 8 + k] = 1.0;
     tree.solve_many_above({&v, 1}, X);
@@ -267,13 +323,13 @@ void Covariances::solve_for(const System& system, Tree& tree, std::int32_t v) {
         diagonal(v)[(first + k) * size + r] =
             X[static_cast<std::size_t>(system.offset(v) + r) * 8 + k];
     }
+    clear_path(system, tree, X);
   }
 }
 
 void Covariances::solve_crosses(const System& system, Tree& tree,
                                 std::span<const std::uint8_t> held) {
-  B_.resize(std::max<std::size_t>(B_.size(), 1));
-  AlignedVector& X = B_.front();
+  AlignedVector& X = columns(system, 0);
   for (auto& [pair, block] : crosses_) {
     const auto [a, b] = pair;
     const std::int32_t rows = system.size(a), columns = system.size(b);
@@ -281,7 +337,6 @@ void Covariances::solve_crosses(const System& system, Tree& tree,
     if (held[a] || held[b]) continue;
     for (std::int32_t first = 0; first < columns; first += 8) {
       const std::int32_t width = std::min(8, columns - first);
-      X.assign(static_cast<std::size_t>(system.scalars()) * 8, 0.0);
       for (std::int32_t k = 0; k < width; ++k)
         X[static_cast<std::size_t>(system.offset(b) + first + k) * 8 + k] = 1.0;
       const std::int32_t both[2] = {a, b};
@@ -290,6 +345,7 @@ void Covariances::solve_crosses(const System& system, Tree& tree,
         for (std::int32_t r = 0; r < rows; ++r)
           block[(first + k) * rows + r] = X[static_cast<std::size_t>(system.offset(a) + r) * 8 + k];
       }
+      clear_path(system, tree, X);
     }
   }
 }

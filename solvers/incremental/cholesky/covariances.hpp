@@ -25,9 +25,20 @@ namespace cairn::incremental {
 ///
 /// (IJRR 2017, equations 11 to 15, there for S = 1 and with the increment's sign turned). Variables
 /// that are new are eliminated from V first, and their own blocks solved for. B takes a solution
-/// for each row that is left, eight at a time. Where these are too many, or U too badly
-/// conditioned, all blocks on the diagonal are recomputed by the recursion from the roots of the
-/// tree down.
+/// for each row that is left, eight at a time. With L Lᵀ = H′ and Y = L⁻¹ Vᵀ, which is zero but on
+/// the paths from the variables of V to the roots, U = S − Yᵀ Y is known half-way; it is
+/// Q Λ Qᵀ, and what is substituted backwards is Y Q |Λ|^(−1/2), so that
+///
+///     C = L⁻ᵀ Y Q |Λ|^(−1/2),   Σ′_ii = Σ_ii − C_i sign(Λ) C_iᵀ.
+///
+/// A subtree that V does not touch is left out where that changes nothing: its variables v depend
+/// on the rest by its separator s alone, C_v = Σ′_vs Σ′_ss⁻¹ C_s, so that
+///
+///     C_vᵀ Σ′_vv⁻¹ C_v ≤ C_sᵀ Σ′_ss⁻¹ C_s ≤ C_sᵀ H_ss C_s ≤ |s| Σ_i H_ii ‖C_i‖²  (i in s)
+///
+/// bounds what any variance in it changes by, as a part of itself. Where the rows are too many, or
+/// U too badly conditioned, all blocks on the diagonal are recomputed by the recursion from the
+/// roots of the tree down.
 class Covariances {
  public:
   /// What changes: to be called before H does, for every factor that goes or is relinearised, and
@@ -54,11 +65,14 @@ class Covariances {
  private:
   bool downdate(const System& system, Tree& tree, std::span<const std::uint8_t> held);
   bool take_out_fresh(const System& system, const Tree& tree);
-  bool apply(const System& system, const Tree& tree);
+  bool scale_rows(const System& system, const Tree& tree);
+  template <int width>
+  void apply(const System& system, Tree& tree, AlignedVector& C, const double* signs);
   void recompute(const System& system, Tree& tree);
   void solve_for(const System& system, Tree& tree, std::int32_t v);
   void solve_crosses(const System& system, Tree& tree, std::span<const std::uint8_t> held);
   double* diagonal(std::int32_t v) { return diagonal_.data() + place_[v]; }
+  AlignedVector& columns(const System& system, std::size_t group);
 
   struct Row {
     std::size_t begin, count;  // in entries_
@@ -78,8 +92,10 @@ class Covariances {
   std::vector<std::int64_t> place_;  // by variable, in diagonal_
   std::vector<double> diagonal_;
   std::map<std::pair<std::int32_t, std::int32_t>, std::vector<double>> crosses_;
-  std::vector<AlignedVector> B_;  // eight columns each
-  int age_ = 0;                   // downdates since the last recomputation
+  std::vector<AlignedVector> B_;  // eight columns each, zero from one use to the next
+  std::vector<std::int32_t> visited_;
+  std::vector<double> signs_;  // of U's eigenvalues, and zeros up to a multiple of eight
+  int age_ = 0;                // downdates since the last recomputation
 };
 
 }  // namespace cairn::incremental

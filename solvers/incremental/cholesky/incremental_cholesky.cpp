@@ -305,10 +305,15 @@ Factor IncrementalCholesky::factor(FactorId id) const {
 }
 
 std::span<const double> IncrementalCholesky::state(Id id) {
-  const int v = index(id);
+  // Most read one variable after the other, in the order in which they have come.
+  const Graph& graph = engine_->graph();
+  const bool next = next_to_read_ < graph.variable_count() && graph.id(next_to_read_) == id &&
+                    engine_->live_variable(next_to_read_);
+  const int v = next ? next_to_read_ : index(id);
+  next_to_read_ = v + 1;
   // Where many are read, most likely all will be: together they are cheaper.
   if (!all_ && std::ssize(read_) >= kFew) all_ = engine_->current();
-  const auto size = static_cast<std::size_t>(engine_->graph().type(v).ambient_size());
+  const auto size = static_cast<std::size_t>(graph.type(v).ambient_size());
   if (all_) return {all_->x(v), size};
   const auto known = read_.find(v);
   return known != read_.end() ? known->second : read_.emplace(v, engine_->x(v)).first->second;

@@ -135,6 +135,7 @@ class IncrementalCholesky final : public Estimator {
   KeptMarginals kept_ = KeptMarginals::none;
   std::map<int, std::vector<double>> read_;  // states by variable, since the last update
   std::optional<Estimate> all_;              // or all of them
+  int next_to_read_ = 0;                     // a guess
   std::unique_ptr<Engine> finished_;         // see solved()
   Rows rows_;                                // that were asked for last, since the last update
   std::set<Id> told_;                        // anchors that a note has named

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <span>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "block/kernels.hpp"
@@ -180,6 +181,30 @@ class Tree {
   void solve_many(std::span<const std::int32_t> sources, AlignedVector& X);
   /// The same, but only for the rows of variables on the paths from `sources` to the roots.
   void solve_many_above(std::span<const std::int32_t> sources, AlignedVector& X);
+  /// Its first half, X = L⁻¹ B: zero but for the own variables of the nodes in `path`.
+  void forward_many(std::span<const std::int32_t> sources, AlignedVector& X);
+  /// The nodes on the paths from the last `sources` to the roots, children first.
+  std::span<const std::int32_t> path() const { return path_; }
+  /// The second half, X = L⁻ᵀ X from the roots down, as far as `enter(node)` says for nodes that
+  /// are not in `path`: their rows then stay zero, and those of all below. `visit(node)` is called
+  /// when the rows of its own variables are done.
+  template <class Enter, class Visit>
+  void backward_many(AlignedVector& X, const Enter& enter, const Visit& visit) {
+    for (const std::int32_t n : path_) on_path_[n] = 1;
+    stack_.clear();
+    for (const std::int32_t n : path_) {
+      if (nodes_[n].parent < 0) stack_.push_back(n);
+    }
+    while (!stack_.empty()) {
+      const std::int32_t n = stack_.back();
+      stack_.pop_back();
+      const Node& node = nodes_[n];
+      if (!std::exchange(on_path_[n], 0) && !enter(node)) continue;
+      backward_many(node, X);
+      visit(node);
+      stack_.insert(stack_.end(), node.children.begin(), node.children.end());
+    }
+  }
 
   /// Node of a variable, -1 for none.
   std::int32_t node_of(std::int32_t variable) const {
@@ -245,7 +270,6 @@ class Tree {
   void add_lead(Node& node, const std::vector<double>& lead);
   void hand_down(Node& node);
   void collect_paths(std::span<const std::int32_t> sources);
-  void forward_many(std::span<const std::int32_t> sources, AlignedVector& X);
   void backward_many(const Node& node, AlignedVector& X);
 
   const System* system_;

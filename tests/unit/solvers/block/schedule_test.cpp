@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <set>
+#include <string>
 #include <vector>
 
 #include "block/ordering.hpp"
@@ -30,8 +31,8 @@ class OneAfterTheOther {
     for (const Step::Wait& wait : step.waits) {
       if (wait.gate >= 0 && signalled_[wait.gate] < wait.count) ++waiting_;
     }
-    for (std::int32_t l = 0; l < step.levels; ++l) {
-      if (signalled_[schedule_.level_gates[l]] < std::ssize(schedule_.levels[l])) ++waiting_;
+    for (std::int32_t k = step.freed_begin; k < step.freed_end; ++k) {
+      if (signalled_[schedule_.freed[k]] < 1) ++waiting_;
     }
     const auto nodes = symbolic_.supernodes();
     if (step.kind == Step::Kind::task) {
@@ -57,6 +58,99 @@ class OneAfterTheOther {
   std::multiset<std::int32_t> finished_;
   int large_ = 0, waiting_ = 0;
 };
+
+/// What each step waits for, directly or because others do: `before[k][j]` says that step k begins
+/// only after step j has ended.
+std::vector<std::vector<bool>> order_of(const Symbolic& symbolic, const Schedule& schedule) {
+  const std::size_t count = schedule.steps.size();
+  std::vector<std::vector<std::size_t>> signal(schedule.gates);
+  for (std::size_t k = 0; k < count; ++k) {
+    const Step& step = schedule.steps[k];
+    for (const std::int32_t gate : step.signals) {
+      if (gate >= 0) signal[gate].push_back(k);
+    }
+    if (step.kind != Step::Kind::task) continue;
+    const Schedule::Task& task = schedule.tasks[step.which];
+    for (std::int32_t s = task.begin; s < task.end; ++s) {
+      const std::int32_t parent = symbolic.supernodes()[s].parent;
+      if (parent >= task.end) signal[schedule.ready[parent]].push_back(k);
+    }
+  }
+  std::vector<std::vector<bool>> before(count, std::vector<bool>(count, false));
+  for (std::size_t k = 0; k < count; ++k) {
+    const Step& step = schedule.steps[k];
+    const auto wait_for = [&](std::int32_t gate) {
+      for (const std::size_t j : signal[gate]) {
+        before[k][j] = true;
+        for (std::size_t i = 0; i < j; ++i) before[k][i] = before[k][i] || before[j][i];
+      }
+    };
+    for (const Step::Wait& wait : step.waits) {
+      if (wait.gate < 0) continue;
+      EXPECT_EQ(wait.count, std::ssize(signal[wait.gate]));
+      wait_for(wait.gate);
+    }
+    for (std::int32_t f = step.freed_begin; f < step.freed_end; ++f) wait_for(schedule.freed[f]);
+  }
+  return before;
+}
+
+// However long the steps take: what writes an update matrix begins only after the supernode that
+// uses up whatever else was in that room.
+TEST(Schedule, UsesRoomAgainOnlyAfterItIsFree) {
+  for (const char* ordering : {"amd", "natural"}) {
+    for (const int lanes : {2, 3, 8}) {
+      const BlockStructure structure = test::solid_grid(11, 6);
+      const Symbolic symbolic(structure, order(structure, ordering));
+      const Schedule schedule(symbolic, lanes);
+      const auto nodes = symbolic.supernodes();
+      const auto before = order_of(symbolic, schedule);
+      // Of what leaves a task or is above: the steps that write it, and the last that reads it.
+      std::vector<std::vector<std::size_t>> writes(nodes.size());
+      std::vector<std::size_t> end(nodes.size(), 0);
+      for (std::size_t k = 0; k < schedule.steps.size(); ++k) {
+        const Step& step = schedule.steps[k];
+        if (step.kind == Step::Kind::task) {
+          for (std::int32_t s = schedule.tasks[step.which].begin;
+               s < schedule.tasks[step.which].end; ++s) {
+            if (!schedule.placement.in_lane[s] && nodes[s].update_size() > 0)
+              writes[s].push_back(k);
+          }
+        }
+        if ((step.kind == Step::Kind::front || step.kind == Step::Kind::update) &&
+            nodes[step.which].update_size() > 0)
+          writes[step.which].push_back(k);
+        if (step.kind == Step::Kind::front || step.kind == Step::Kind::finish) {
+          for (const std::int32_t c : symbolic.children(step.which)) end[c] = k;
+        }
+      }
+      int again = 0;
+      for (std::size_t a = 0; a < nodes.size(); ++a) {
+        for (std::size_t b = 0; b < a; ++b) {
+          if (writes[a].empty() || writes[b].empty()) continue;
+          const std::int64_t at_a = schedule.placement.place[a], at_b = schedule.placement.place[b];
+          if (at_a + nodes[a].update_size() <= at_b || at_b + nodes[b].update_size() <= at_a)
+            continue;
+          ++again;
+          const auto after = [&](std::size_t later, std::size_t sooner) {
+            return std::ranges::all_of(writes[later],
+                                       [&](std::size_t k) { return bool{before[k][end[sooner]]}; });
+          };
+          EXPECT_TRUE(after(a, b) || after(b, a)) << a << ' ' << b;
+        }
+      }
+      for (std::size_t s = 0; s < nodes.size(); ++s)
+        EXPECT_LE(schedule.placement.place[s] + nodes[s].update_size(), schedule.placement.size);
+      // A tree that is a path has nothing to choose.
+      const std::int64_t of_levels = schedule.by_levels(symbolic).size;
+      EXPECT_LE(schedule.placement.size, of_levels);
+      if (std::string(ordering) == "amd" && lanes < 8) {
+        EXPECT_GT(again, 0);
+        EXPECT_LT(schedule.placement.size, of_levels / 4 * 3);
+      }
+    }
+  }
+}
 
 // In a solid grid the upper separators make large fronts, several to a level.
 TEST(Schedule, PutsEveryStepAfterAllThatItWaitsFor) {

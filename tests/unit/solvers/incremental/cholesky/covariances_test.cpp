@@ -216,6 +216,48 @@ TEST_P(KeptCovariances, AreSolvedForWhereTheyAreNotKept) {
   }
 }
 
+// Loops far apart change nothing before the first of their poses, and little elsewhere: subtrees
+// are left out of a downdate, and what they keep must be as right as the rest, each beside its own
+// size.
+TEST_P(KeptCovariances, OfALongWalkAreRightWhereDowndatesLeaveThemOut) {
+  Engine engine({}, rescuer_);
+  engine.covariances().keep(KeptMarginals::diagonal);
+  GrowingGraph graph(GetParam().types, {.noise = 0.003}, 5);
+  int downdates = 0;
+  for (int k = 0; k < 160; ++k) {
+    graph.add_pose(engine);
+    if (k % 12 == 11) graph.add_loop(engine);
+    downdates += solve(engine) == MarginalsBy::downdate;
+  }
+  EXPECT_GT(downdates, 120);
+  const MatrixXd Sigma = test::inverse_of(dense(engine.system(), engine.tree()));
+  for (int v = 0; v < engine.system().variables(); ++v) {
+    if (engine.held(v)) continue;
+    const MatrixXd wanted = block_of(engine, Sigma, v, v);
+    const Eigen::Map<const MatrixXd> kept(engine.covariances().kept(v, v), wanted.rows(),
+                                          wanted.cols());
+    EXPECT_LE((kept - wanted).norm(), 1e-8 * wanted.norm()) << v;
+  }
+}
+
+// Where a loop says much more than was known, U has lost its digits.
+TEST_P(KeptCovariances, AreRecomputedWhereADowndateIsGivenUp) {
+  Engine engine({}, rescuer_);
+  engine.covariances().keep(KeptMarginals::diagonal);
+  GrowingGraph graph(GetParam().types, {}, 6);
+  for (int round = 0; round < 4; ++round) {
+    for (int k = 0; k < 15; ++k) graph.add_pose(engine);
+    solve(engine);
+    graph.add_precise_loop(engine, 1e5);
+    EXPECT_EQ(solve(engine), MarginalsBy::recomputation);
+    EXPECT_EQ(relinearized_, 0) << "it was given up for the number of rows";
+    expect_kept(engine, {}, 1e-7);
+    graph.add_precise_loop(engine, 1.0);
+    EXPECT_EQ(solve(engine), MarginalsBy::downdate);
+    expect_kept(engine, {}, 1e-7);
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(Random, KeptCovariances, testing::ValuesIn(cases()),
                          [](const auto& named) { return named.param.name; });
 

@@ -108,6 +108,11 @@ void GrowingGraph::add_loop(Engine& engine) {
              noisy(between(a.truth, b.truth)));
 }
 
+void GrowingGraph::add_precise_loop(Engine& engine, double more) {
+  const int a = *engine.graph().find(poses_.front().id), b = *engine.graph().find(poses_.back().id);
+  add_factor(engine, types_.relative_pose, {a, b}, between(engine.x(a), engine.x(b)), more);
+}
+
 /// One that is new or was seen before, from some pose.
 void GrowingGraph::add_point(Engine& engine) {
   const Variable& from = any(poses_);
@@ -182,12 +187,14 @@ int GrowingGraph::add_variable(Engine& engine, const std::shared_ptr<const Varia
 }
 
 void GrowingGraph::add_factor(Engine& engine, const std::shared_ptr<const FactorType>& type,
-                              std::initializer_list<int> variables, const State& z) {
+                              std::initializer_list<int> variables, const State& z,
+                              double information_factor) {
   std::vector<double> information;
   const int n = type->residual_size();
   for (int row = 0; row < n; ++row) {
     for (int column = row; column < n; ++column)
-      information.push_back((row == column ? uniform(0.5, 2.0) : uniform(-0.05, 0.05)) * 1e3);
+      information.push_back((row == column ? uniform(0.5, 2.0) : uniform(-0.05, 0.05)) * 1e3 *
+                            information_factor);
   }
   const int f = engine.edit().add_factor(type, std::vector<int>(variables), z, information);
   log_ += fmt::format("{} as {}\n", engine.graph().describe_factor(f), engine.next_id());

@@ -40,6 +40,9 @@ class GrowingGraph {
   void grow(Engine& engine);
   void add_pose(Engine& engine);
   void add_loop(Engine& engine);
+  /// From the first pose to the newest, as the estimate has it, with so many times the information
+  /// that others have.
+  void add_precise_loop(Engine& engine, double more);
   /// What was done, for a failure's message.
   const std::string& log() const { return log_; }
 
@@ -59,7 +62,8 @@ class GrowingGraph {
   int add_variable(Engine& engine, const std::shared_ptr<const VariableType>& type, const State& x,
                    bool fixed);
   void add_factor(Engine& engine, const std::shared_ptr<const FactorType>& type,
-                  std::initializer_list<int> variables, const State& z);
+                  std::initializer_list<int> variables, const State& z,
+                  double information_factor = 1.0);
   State exp(std::span<const double> delta) const;
   State compose(const State& a, const State& b) const;
   State between(const State& a, const State& b) const;
