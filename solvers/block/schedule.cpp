@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <iterator>
 #include <map>
 #include <queue>
 #include <span>
@@ -23,11 +24,12 @@ double work_of(const Supernode& node) {
 }
 
 /// Assigns places in one array to update matrices that live from their supernode to its parent:
-/// first fit.
+/// first fit, among the first so many.
 class Places {
  public:
   std::int64_t take(std::int64_t size) {
-    for (auto it = free_.begin(); it != free_.end(); ++it) {
+    int tried = 0;
+    for (auto it = free_.begin(); it != free_.end() && tried < kMostTried; ++it, ++tried) {
       if (it->second < size) continue;
       const std::int64_t begin = it->first, left = it->second - size;
       free_.erase(it);
@@ -65,6 +67,8 @@ class Places {
   std::int64_t end() const { return end_; }
 
  private:
+  static constexpr int kMostTried = 256;
+
   std::map<std::int64_t, std::int64_t> free_;
   std::int64_t end_ = 0;
 };
@@ -237,45 +241,96 @@ double work_of(const Step& step, const Symbolic& symbolic) {
 }
 
 /// Places in one array for matrices whose lives are known: the largest first, each at the lowest
-/// place that none has which lives at the same time.
+/// place that none has which lives at the same time. Where too many live at the same time as others
+/// for that to be worth its time and memory, first fit.
 ///
 /// `taken`: they begin (s) and end (~s) in this order. `size`: by matrix; `place`, too.
-std::int64_t place_by_size(std::span<const std::int32_t> taken, std::span<const std::int64_t> size,
-                           std::span<std::int64_t> place) {
-  std::vector<std::int32_t> all, living;
-  std::vector<std::vector<std::int32_t>> beside(size.size());
-  for (const std::int32_t event : taken) {
-    if (event < 0) {
-      living.erase(std::ranges::find(living, ~event));
-      continue;
-    }
-    for (const std::int32_t other : living) {
-      beside[other].push_back(event);
-      beside[event].push_back(other);
-    }
-    living.push_back(event);
-    all.push_back(event);
-    place[event] = -1;
+class PlacesOfLives {
+ public:
+  PlacesOfLives(std::span<const std::int32_t> taken, std::span<const std::int64_t> size,
+                std::span<std::int64_t> place)
+      : taken_(taken), size_(size), place_(place) {}
+
+  /// Returns the size of the array.
+  std::int64_t find() {
+    if (pairs() > kMostPairs) return by_time();
+    find_neighbours();
+    return by_size();
   }
-  std::ranges::stable_sort(all, std::greater{}, [&](std::int32_t s) { return size[s]; });
-  std::int64_t end = 0;
-  std::vector<std::pair<std::int64_t, std::int64_t>> used;
-  for (const std::int32_t s : all) {
-    used.clear();
-    for (const std::int32_t other : beside[s]) {
-      if (place[other] >= 0) used.emplace_back(place[other], place[other] + size[other]);
+
+ private:
+  static constexpr std::int64_t kMostPairs = 1 << 20;
+
+  /// How many pairs live at the same time.
+  std::int64_t pairs() const {
+    std::int64_t living = 0, result = 0;
+    for (const std::int32_t event : taken_) {
+      if (event >= 0) result += living;
+      living += event < 0 ? -1 : 1;
     }
-    std::ranges::sort(used);
-    std::int64_t at = 0;
-    for (const auto& [first, last] : used) {
-      if (first - at >= size[s]) break;
-      at = std::max(at, last);
-    }
-    place[s] = at;
-    end = std::max(end, at + size[s]);
+    return result;
   }
-  return end;
-}
+  void find_neighbours() {
+    std::vector<std::int32_t> living, at(size_.size(), 0);
+    beside_.resize(size_.size());
+    for (const std::int32_t event : taken_) {
+      if (event < 0) {
+        at[living.back()] = at[~event];
+        living[at[~event]] = living.back();
+        living.pop_back();
+        continue;
+      }
+      for (const std::int32_t other : living) {
+        beside_[other].push_back(event);
+        beside_[event].push_back(other);
+      }
+      at[event] = static_cast<std::int32_t>(living.size());
+      living.push_back(event);
+    }
+  }
+  std::int64_t by_size() {
+    std::vector<std::int32_t> all;
+    for (const std::int32_t event : taken_) {
+      if (event < 0) continue;
+      all.push_back(event);
+      place_[event] = -1;
+    }
+    std::ranges::stable_sort(all, std::greater{}, [&](std::int32_t s) { return size_[s]; });
+    std::int64_t end = 0;
+    std::vector<std::pair<std::int64_t, std::int64_t>> used;
+    for (const std::int32_t s : all) {
+      used.clear();
+      for (const std::int32_t other : beside_[s]) {
+        if (place_[other] >= 0) used.emplace_back(place_[other], place_[other] + size_[other]);
+      }
+      std::ranges::sort(used);
+      std::int64_t at = 0;
+      for (const auto& [first, last] : used) {
+        if (first - at >= size_[s]) break;
+        at = std::max(at, last);
+      }
+      place_[s] = at;
+      end = std::max(end, at + size_[s]);
+    }
+    return end;
+  }
+  std::int64_t by_time() {
+    Places places;
+    for (const std::int32_t event : taken_) {
+      if (event < 0) {
+        places.give_back(place_[~event], size_[~event]);
+      } else {
+        place_[event] = places.take(size_[event]);
+      }
+    }
+    return places.end();
+  }
+
+  std::span<const std::int32_t> taken_;
+  std::span<const std::int64_t> size_;
+  std::span<std::int64_t> place_;
+  std::vector<std::vector<std::int32_t>> beside_;  // by matrix: those that live at the same time
+};
 
 /// Runs all steps as so many lanes would that take them in postorder: in which order they begin,
 /// and where what leaves a task is meanwhile.
@@ -341,34 +396,33 @@ class Rehearsal {
     const std::int64_t above = placement.size;
     std::vector<std::int64_t> size(nodes.size()), place(nodes.size());
     for (std::size_t s = 0; s < nodes.size(); ++s) size[s] = room(nodes[s]);
-    placement.size += place_by_size(taken_, size, place);
+    placement.size += PlacesOfLives(taken_, size, place).find();
 
     struct Freed {
-      std::int64_t begin, end;
+      std::int64_t end;
       std::int32_t gate;  // of the supernode that has given it back
     };
-    std::vector<Freed> free, left;
+    std::map<std::int64_t, Freed> free;  // by where it begins; they do not overlap
     std::vector<std::pair<std::int32_t, std::int32_t>> waits(nodes.size());  // in `freed`
     for (const std::int32_t event : taken_) {
       const std::int32_t s = event < 0 ? ~event : event;
       const std::int64_t begin = place[s], end = begin + size[s];
       if (event < 0) {
-        free.push_back({begin, end, done_[nodes[s].parent]});
+        free[begin] = {end, done_[nodes[s].parent]};
         continue;
       }
       placement.place[s] = above + begin;
       waits[s].first = static_cast<std::int32_t>(schedule_.freed.size());
-      left.clear();
-      for (const Freed& other : free) {
-        if (other.end <= begin || other.begin >= end) {
-          left.push_back(other);
-          continue;
-        }
-        schedule_.freed.push_back(other.gate);
-        if (other.begin < begin) left.push_back({other.begin, begin, other.gate});
-        if (other.end > end) left.push_back({end, other.end, other.gate});
+      auto other = free.upper_bound(begin);
+      if (other != free.begin() && std::prev(other)->second.end > begin) --other;
+      while (other != free.end() && other->first < end) {
+        const std::int64_t first = other->first;
+        const Freed had = other->second;
+        schedule_.freed.push_back(had.gate);
+        other = free.erase(other);
+        if (first < begin) free.emplace(first, Freed{begin, had.gate});
+        if (had.end > end) free.emplace(end, had);
       }
-      std::swap(free, left);
       waits[s].second = static_cast<std::int32_t>(schedule_.freed.size());
     }
     for (Step& step : schedule_.steps) {

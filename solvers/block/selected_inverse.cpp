@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <atomic>
 #include <stdexcept>
-#include <type_traits>
 
 #include "block/front.hpp"
 #include "cairn/runtime/threads.hpp"
@@ -19,9 +18,9 @@ constexpr std::size_t kTileColumns = 48;
 
 }  // namespace
 
-/// Room, once per structure.
+/// Room, once per analysis.
 void SelectedInverse::prepare() {
-  if (version_ == cholesky_->version_) return;
+  if (analysis_ == cholesky_->analyses_) return;
   panels_ = UninitializedVector(cholesky_->symbolic_.panel_values());
   lane_room_ = 0;
   supernode_of_.assign(cholesky_->symbolic_.order().size(), 0);
@@ -33,9 +32,11 @@ void SelectedInverse::prepare() {
   room_ = UninitializedVector(lane_room_ * cholesky_->schedule_.lanes);
   placement_ = cholesky_->schedule_.by_levels(cholesky_->symbolic_);
   auto& workspace = cholesky_->double_.workspace;
-  if (std::ssize(workspace) < placement_.size)
-    workspace = std::remove_reference_t<decltype(workspace)>(placement_.size);
-  version_ = cholesky_->version_;
+  if (std::ssize(workspace) < placement_.size) {
+    workspace = {};
+    workspace.resize(placement_.size);
+  }
+  analysis_ = cholesky_->analyses_;
 }
 
 void SelectedInverse::compute() {

@@ -21,7 +21,7 @@ namespace cairn::block {
 /// its roots to its leaves: the factorisation in reverse, each supernode passing Z_RR to its
 /// children where the factorisation had read their update matrices. It uses the factorisation's own
 /// memory, which is free by then and with one thread large enough; what it allocates are the panels
-/// of Z (as large as those of L) and a little memory for each thread, both once per structure. It
+/// of Z (as large as those of L) and a little memory for each thread, both once per analysis. It
 /// takes about three times the arithmetic of a factorisation. Subtrees run in parallel, and so do
 /// rows of large fronts; every number has one writer and one order of summation, so the result does
 /// not depend on the number of threads.
@@ -53,7 +53,7 @@ class SelectedInverse {
   std::span<const Supernode> nodes() const { return cholesky_->symbolic_.supernodes(); }
 
   SupernodalCholesky* cholesky_;
-  std::uint64_t version_ = 0;               // of the structure that room was made for
+  std::uint64_t analysis_ = 0;              // that room was made for
   Placement placement_;                     // of Z_RR
   UninitializedVector panels_;              // of Z, laid out as those of L
   UninitializedVector room_;                // for V and T of a supernode, by lane

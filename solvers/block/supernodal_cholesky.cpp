@@ -59,6 +59,7 @@ void SupernodalCholesky::analyze(const BlockStructure& structure, std::string_vi
   }
   structure_ = &structure;
   version_ = structure.version();
+  ++analyses_;
   schedule_ = Schedule(symbolic_, threads());
   failed_.assign(symbolic_.supernodes().size(), -1);
   gates_.assign(schedule_.gates, 0);

@@ -124,6 +124,7 @@ class SupernodalCholesky {
   std::string ordering_;
   const BlockStructure* structure_ = nullptr;
   std::uint64_t version_ = 0;
+  std::uint64_t analyses_ = 0;
   Symbolic symbolic_;
   Schedule schedule_;
   Numbers<double> double_;

@@ -17,9 +17,10 @@ namespace {
 
 /// More rows than this are not worth a solution each: recomputing is cheaper. Found by measuring.
 constexpr std::size_t kMostRows = 24;
-/// U's eigenvalues are between −1 and 1, and near 0 where a measurement tells much more than was
-/// known: as many digits are lost as they are small.
-constexpr double kLeastEigenvalue = 1e-4;
+/// U's eigenvalues are between 0 and 1 where measurements come, near 0 where one tells much more
+/// than was known: as many digits are lost as they are small. They are below −1 where measurements
+/// go, far below where these told much, and all have the rounding of the largest.
+constexpr double kLeastEigenvalue = 1e-4, kLeastPart = 1e-6;
 /// Rounding adds up slowly; every so many downdates all is computed anew.
 constexpr int kOldest = 1000;
 /// What changes the variances of a subtree by less than this part is left out.
@@ -250,9 +251,11 @@ bool Covariances::scale_rows(const System& system, const Tree& tree) {
   // The lower triangle is read.
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> parts(U);
   const Eigen::VectorXd& values = parts.eigenvalues();
-  if (!(values.cwiseAbs().minCoeff() >= kLeastEigenvalue)) return false;
+  if (parts.info() != Eigen::Success || !values.allFinite()) return false;
+  const Eigen::VectorXd sizes = values.cwiseAbs();
+  if (sizes.minCoeff() < std::max(kLeastEigenvalue, kLeastPart * sizes.maxCoeff())) return false;
   const Eigen::MatrixXd scale =
-      parts.eigenvectors() * values.cwiseAbs().cwiseSqrt().cwiseInverse().asDiagonal();
+      parts.eigenvectors() * sizes.cwiseSqrt().cwiseInverse().asDiagonal();
   std::vector<double> before(n), after(n);
   for_each_row([&](std::size_t row) {
     for (std::size_t j = 0; j < n; ++j) before[j] = B_[j / 8][row + j % 8];
@@ -334,7 +337,7 @@ void Covariances::solve_crosses(const System& system, Tree& tree,
     const auto [a, b] = pair;
     const std::int32_t rows = system.size(a), columns = system.size(b);
     block.assign(static_cast<std::size_t>(rows) * static_cast<std::size_t>(columns), 0.0);
-    if (held[a] || held[b]) continue;
+    if (held[a] || held[b] || tree.node_of(b) < 0) continue;
     for (std::int32_t first = 0; first < columns; first += 8) {
       const std::int32_t width = std::min(8, columns - first);
       for (std::int32_t k = 0; k < width; ++k)
