@@ -35,9 +35,11 @@ void clear_path(const System& system, const Tree& tree, AlignedVector& X) {
   for (const std::int32_t n : tree.path()) clear_rows(system, tree.nodes()[n], X);
 }
 
-/// |s| Σ H_ii ‖X_i‖² over a node's separator, of the first `width` columns.
+/// Whether |s| Σ H_ii ‖X_i‖² over a node's separator, of the first `width` columns, is no more than
+/// `kNothing`; mostly the first row says that it is more.
 template <int width>
-double bound_below(const System& system, const Node& node, const AlignedVector& X) {
+bool changes_nothing_below(const System& system, const Node& node, const AlignedVector& X) {
+  const double most = kNothing / std::max(node.below(), 1);
   double sum = 0.0;
   for (const std::int32_t v : node.separator()) {
     const std::int32_t size = system.size(v);
@@ -47,9 +49,10 @@ double bound_below(const System& system, const Node& node, const AlignedVector& 
       double square = 0.0;
       for (int k = 0; k < width; ++k) square += row[k] * row[k];
       sum += H[i * (size + 1)] * square;
+      if (!(sum <= most)) return false;  // also where it is not a number
     }
   }
-  return sum * node.below();
+  return true;
 }
 
 }  // namespace
@@ -276,7 +279,7 @@ template <int width>
 void Covariances::apply(const System& system, Tree& tree, AlignedVector& C, const double* signs) {
   visited_.clear();
   const auto enter = [&](const Node& node) {
-    return !(bound_below<width>(system, node, C) <= kNothing);  // also where it is not a number
+    return !changes_nothing_below<width>(system, node, C);
   };
   const auto subtract = [&](const Node& node) {
     visited_.push_back(static_cast<std::int32_t>(&node - tree.nodes().data()));
