@@ -9,6 +9,8 @@
 #include <span>
 #include <utility>
 
+#include "block/places.hpp"
+
 namespace cairn::block {
 namespace {
 
@@ -22,56 +24,6 @@ double work_of(const Supernode& node) {
   const double columns = node.columns, below = node.m - node.columns;
   return 4000.0 + columns * columns * node.m + 1.5 * below * below * columns;
 }
-
-/// Assigns places in one array to update matrices that live from their supernode to its parent:
-/// first fit, among the first so many.
-class Places {
- public:
-  std::int64_t take(std::int64_t size) {
-    int tried = 0;
-    for (auto it = free_.begin(); it != free_.end() && tried < kMostTried; ++it, ++tried) {
-      if (it->second < size) continue;
-      const std::int64_t begin = it->first, left = it->second - size;
-      free_.erase(it);
-      if (left > 0) free_.emplace(begin + size, left);
-      return begin;
-    }
-    // A free stretch at the end may grow.
-    std::int64_t begin = end_;
-    if (!free_.empty()) {
-      const auto last = std::prev(free_.end());
-      if (last->first + last->second == end_) {
-        begin = last->first;
-        free_.erase(last);
-      }
-    }
-    end_ = begin + size;
-    return begin;
-  }
-  void give_back(std::int64_t begin, std::int64_t size) {
-    if (size == 0) return;
-    auto [it, added] = free_.emplace(begin, size);
-    const auto next = std::next(it);
-    if (next != free_.end() && it->first + it->second == next->first) {
-      it->second += next->second;
-      free_.erase(next);
-    }
-    if (it != free_.begin()) {
-      const auto before = std::prev(it);
-      if (before->first + before->second == it->first) {
-        before->second += it->second;
-        free_.erase(it);
-      }
-    }
-  }
-  std::int64_t end() const { return end_; }
-
- private:
-  static constexpr int kMostTried = 256;
-
-  std::map<std::int64_t, std::int64_t> free_;
-  std::int64_t end_ = 0;
-};
 
 /// The steps of one large front. Each phase waits for the one before.
 class FrontSteps {
@@ -240,108 +192,16 @@ double work_of(const Step& step, const Symbolic& symbolic) {
   return 0.0;
 }
 
-/// Places in one array for matrices whose lives are known: the largest first, each at the lowest
-/// place that none has which lives at the same time. Where too many live at the same time as others
-/// for that to be worth its time and memory, first fit.
-///
-/// `taken`: they begin (s) and end (~s) in this order. `size`: by matrix; `place`, too.
-class PlacesOfLives {
- public:
-  PlacesOfLives(std::span<const std::int32_t> taken, std::span<const std::int64_t> size,
-                std::span<std::int64_t> place)
-      : taken_(taken), size_(size), place_(place) {}
-
-  /// Returns the size of the array.
-  std::int64_t find() {
-    if (pairs() > kMostPairs) return by_time();
-    find_neighbours();
-    return by_size();
-  }
-
- private:
-  static constexpr std::int64_t kMostPairs = 1 << 20;
-
-  /// How many pairs live at the same time.
-  std::int64_t pairs() const {
-    std::int64_t living = 0, result = 0;
-    for (const std::int32_t event : taken_) {
-      if (event >= 0) result += living;
-      living += event < 0 ? -1 : 1;
-    }
-    return result;
-  }
-  void find_neighbours() {
-    std::vector<std::int32_t> living, at(size_.size(), 0);
-    beside_.resize(size_.size());
-    for (const std::int32_t event : taken_) {
-      if (event < 0) {
-        at[living.back()] = at[~event];
-        living[at[~event]] = living.back();
-        living.pop_back();
-        continue;
-      }
-      for (const std::int32_t other : living) {
-        beside_[other].push_back(event);
-        beside_[event].push_back(other);
-      }
-      at[event] = static_cast<std::int32_t>(living.size());
-      living.push_back(event);
-    }
-  }
-  std::int64_t by_size() {
-    std::vector<std::int32_t> all;
-    for (const std::int32_t event : taken_) {
-      if (event < 0) continue;
-      all.push_back(event);
-      place_[event] = -1;
-    }
-    std::ranges::stable_sort(all, std::greater{}, [&](std::int32_t s) { return size_[s]; });
-    std::int64_t end = 0;
-    std::vector<std::pair<std::int64_t, std::int64_t>> used;
-    for (const std::int32_t s : all) {
-      used.clear();
-      for (const std::int32_t other : beside_[s]) {
-        if (place_[other] >= 0) used.emplace_back(place_[other], place_[other] + size_[other]);
-      }
-      std::ranges::sort(used);
-      std::int64_t at = 0;
-      for (const auto& [first, last] : used) {
-        if (first - at >= size_[s]) break;
-        at = std::max(at, last);
-      }
-      place_[s] = at;
-      end = std::max(end, at + size_[s]);
-    }
-    return end;
-  }
-  std::int64_t by_time() {
-    Places places;
-    for (const std::int32_t event : taken_) {
-      if (event < 0) {
-        places.give_back(place_[~event], size_[~event]);
-      } else {
-        place_[event] = places.take(size_[event]);
-      }
-    }
-    return places.end();
-  }
-
-  std::span<const std::int32_t> taken_;
-  std::span<const std::int64_t> size_;
-  std::span<std::int64_t> place_;
-  std::vector<std::vector<std::int32_t>> beside_;  // by matrix: those that live at the same time
-};
-
-/// Runs all steps as so many lanes would that take them in postorder: in which order they begin,
-/// and where what leaves a task is meanwhile.
+/// Simulates the factorisation by so many lanes that take steps in postorder: in which order they
+/// begin, and where what leaves a task is meanwhile.
 ///
 /// The times are guessed, so whoever takes room that another matrix has had waits for the supernode
 /// which has used that up.
-class Rehearsal {
+class Simulation {
  public:
   /// `done`: by supernode, the gate that is signalled at its end.
-  Rehearsal(const Symbolic& symbolic, Schedule& schedule, std::span<const std::int32_t> done,
-            std::span<const Step> all)
+  Simulation(const Symbolic& symbolic, Schedule& schedule, std::span<const std::int32_t> done,
+             std::span<const Step> all)
       : symbolic_(symbolic),
         schedule_(schedule),
         done_(done),
@@ -396,7 +256,7 @@ class Rehearsal {
     const std::int64_t above = placement.size;
     std::vector<std::int64_t> size(nodes.size()), place(nodes.size());
     for (std::size_t s = 0; s < nodes.size(); ++s) size[s] = room(nodes[s]);
-    placement.size += PlacesOfLives(taken_, size, place).find();
+    placement.size += place_by_lifetimes(taken_, size, place);
 
     struct Freed {
       std::int64_t end;
@@ -629,9 +489,9 @@ void Schedule::list_steps(const Symbolic& symbolic) {
       all.push_back(end);
     }
   }
-  Rehearsal rehearsal(symbolic, *this, done, all);
-  rehearsal.run(lanes);
-  rehearsal.place();
+  Simulation simulation(symbolic, *this, done, all);
+  simulation.run(lanes);
+  simulation.place();
 }
 
 }  // namespace cairn::block

@@ -20,11 +20,11 @@ namespace cairn::block {
 /// and Z_RR is known, since R lies within the front of the parent. So the tree is processed from
 /// its roots to its leaves: the factorisation in reverse, each supernode passing Z_RR to its
 /// children where the factorisation had read their update matrices. It uses the factorisation's own
-/// memory, which is free by then and with one thread large enough; what it allocates are the panels
-/// of Z (as large as those of L) and a little memory for each thread, both once per analysis. It
-/// takes about three times the arithmetic of a factorisation. Subtrees run in parallel, and so do
-/// rows of large fronts; every number has one writer and one order of summation, so the result does
-/// not depend on the number of threads.
+/// memory, which is free by then (with several threads it is made larger); what it allocates are
+/// the panels of Z (as large as those of L) and a little memory for each thread, both once per
+/// analysis. It takes about three times the arithmetic of a factorisation. Subtrees run in
+/// parallel, and so do rows of large fronts; every number has one writer and one order of
+/// summation, so the result does not depend on the number of threads.
 class SelectedInverse {
  public:
   /// `cholesky` must outlive this object.

@@ -17,9 +17,9 @@ namespace {
 
 /// More rows than this are not worth a solution each: recomputing is cheaper. Found by measuring.
 constexpr std::size_t kMostRows = 24;
-/// U's eigenvalues are between 0 and 1 where measurements come, near 0 where one tells much more
-/// than was known: as many digits are lost as they are small. They are below −1 where measurements
-/// go, far below where these told much, and all have the rounding of the largest.
+/// U's eigenvalues are between 0 and 1 for rows that are added, the smaller the more information a
+/// measurement has beside what there was, and the more digits are lost; for rows that are removed
+/// they are below −1. All have the rounding of the largest.
 constexpr double kLeastEigenvalue = 1e-4, kLeastPart = 1e-6;
 /// Rounding adds up slowly; every so many downdates all is computed anew.
 constexpr int kOldest = 1000;

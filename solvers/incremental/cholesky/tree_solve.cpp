@@ -406,8 +406,8 @@ void Tree::backward_many(const Node& node, AlignedVector& X) {
 
 void Tree::solve_many(std::span<const std::int32_t> sources, AlignedVector& X) {
   forward_many(sources, X);
-  top_down(stack_);
-  for (const std::int32_t n : stack_) backward_many(nodes_[n], X);
+  backward_many(
+      X, [](const Node&) { return true; }, [](const Node&) {});
 }
 
 void Tree::solve_many_above(std::span<const std::int32_t> sources, AlignedVector& X) {
