@@ -50,7 +50,7 @@ class Tidy(unittest.TestCase):
                                  "command": f"/usr/bin/c++ -I{self.root}/lib -std=c++20 {flags} -o {name}.o -c {file}"})
 
     def run_on(self, *names: str) -> tuple[set[str], str, int]:
-        """The names that are found clean, what is printed, the exit code, and how often clang-tidy ran."""
+        """The names that are found clean, what is printed, and the exit code."""
         database = self.root / "build/lint/compile_commands.json"
         database.write_text(json.dumps(self.entries))
         for file in (self.root / "clean").iterdir():
@@ -62,14 +62,17 @@ class Tidy(unittest.TestCase):
         clean = {file.name.removeprefix("key_of_") for file in (self.root / "clean").iterdir()}
         return clean, out.getvalue(), code
 
+    def runs_on(self, *names: str) -> tuple[int, set[str], str, int]:
+        """How often clang-tidy ran, and the result of run_on."""
+        with mock.patch.object(tidy.Linter, "_tidy", autospec=True, side_effect=tidy.Linter._tidy) as runs:
+            result = self.run_on(*names)
+        return runs.call_count, *result
+
     def test_sources_without_a_finding_are_clean(self) -> None:
-        names = [f"right{k}.cpp" for k in range(11)]
+        names = [f"right{k}.cpp" for k in range(tidy.TOGETHER + 3)]
         for k, name in enumerate(names):
             self.add(name, f"int right{k}() {{ return {k}; }}\n")
-        with mock.patch.object(tidy.Linter, "_tidy", autospec=True, side_effect=tidy.Linter._tidy) as runs:
-            self.assertEqual(self.run_on(*names), (set(names), "", 0))
-        together = [call for call in runs.call_args_list if call.args[1].parent.name == "units"]
-        self.assertEqual(len(together), 2)  # for eleven
+        self.assertEqual(self.runs_on(*names), (2, set(names), "", 0))
 
     def test_only_sources_that_are_asked_for_are_looked_at(self) -> None:
         self.add("right.cpp", "int right() { return 1; }\n")
@@ -117,13 +120,36 @@ class Tidy(unittest.TestCase):
         self.assertEqual(clean, {"other.cpp", "right.cpp"})
         self.assertIn("misc-redundant-expression", output)
 
+    def test_plugins_and_what_differs_in_places_alone_are_checked_together(self) -> None:
+        for k in range(3):
+            (self.root / f"lib/part{k}").mkdir()
+            (self.root / f"lib/part{k}/header{k}.hpp").write_text("#pragma once\n")
+            self.add(f"plugin{k}.cpp", f'#include "header{k}.hpp"\nextern "C" void cairn_plugin_v1() {{}}\n',
+                     f"-I{self.root}/lib/part{k} -Dplugin{k}_EXPORTS -O{k} -fno-math-errno")
+        names = {f"plugin{k}.cpp" for k in range(3)}
+        self.assertEqual(self.runs_on(*names), (1, names, "", 0))
+
     def test_what_a_precompiled_header_hides_is_found(self) -> None:
+        (self.root / "build/cmake_pch.hxx").write_text("#include <array>\n#include <map>\n#include <vector>\n")
         precompiled = f"-include {self.root}/build/cmake_pch.hxx"
-        self.add("first.cpp", "#include <vector>\nint first(const std::vector<int>& v) { return v[0]; }\n", precompiled)
-        self.add("second.cpp", "int second(const std::vector<int>& v) { return v[0]; }\n", precompiled)
+        uses = "int {0}(const std::vector<int>& v) {{ return v[0]; }}\n"
+        self.add("first.cpp", "#include <vector>\n" + uses.format("first"), precompiled)
+        self.add("second.cpp", uses.format("second"), precompiled)
         clean, output, code = self.run_on("first.cpp", "second.cpp")
         self.assertEqual((clean, code), ({"first.cpp"}, 1), output)
         self.assertIn("lib/second.cpp:1:", output)
+        # Neither may come after the other; the one without either may come before both.
+        self.add("third.cpp", "#include <array>\nint third(const std::array<int, 1>& a) { return a[0]; }\n", precompiled)
+        self.add("fourth.cpp", "int fourth() { return 4; }\n", precompiled)
+        names = {"first.cpp", "third.cpp", "fourth.cpp"}
+        self.assertEqual(self.runs_on(*names), (2, names, "", 0))
+
+    def test_what_a_header_lacks_behind_a_precompiled_one_is_found(self) -> None:
+        (self.root / "build/cmake_pch.hxx").write_text("#include <vector>\n")
+        self.add("lacks.hpp", "#pragma once\ninline int lacking(const std::vector<int>& v) { return v[0]; }\n")
+        self.add("user.cpp", '#include "lacks.hpp"\n', f"-include {self.root}/build/cmake_pch.hxx")
+        self.add("a.cpp", "#include <vector>\n", f"-include {self.root}/build/cmake_pch.hxx")
+        self.assertEqual(self.run_on("user.cpp", "a.cpp")[0], {"a.cpp"})
 
     def test_what_nothing_uses_in_a_source_is_found(self) -> None:
         self.add("right.cpp", "int right() { return 1; }\n")

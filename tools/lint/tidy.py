@@ -4,30 +4,33 @@
 
     tidy.py DATABASE CLEAN < lines "key file"
 
-Parsing Eigen and the standard library takes most of the time of clang-tidy. So sources that are compiled with the same flags
-and checked alike are put one after the other into one file, and parsed with it once; #line says which is which, so that all of
-them count as the main file, for which the compiler has warnings of its own. Where that finds anything, or names of two of them
-clash, each half is tried by itself, down to single files, whose verdict counts. What is clean is an empty file CLEAN/key.
+Parsing Eigen and the standard library takes most of the time of clang-tidy. So sources that are compiled and checked alike are
+put one after the other into one file, and parsed with it once; #line says which is which, so that all of them count as the
+main file, for which the compiler has warnings of its own. Where that finds anything, or names of two of them clash, the sources
+that are named and the others are tried by themselves, down to single files, whose verdict counts. What is clean is an empty file
+CLEAN/key.
 
-One thing is not seen so: an #include that only an earlier source has. A compiler sees it where no precompiled header hides it;
-a source that is compiled with one is parsed by itself too.
+A source must not get from an earlier one an #include that it lacks. Of most the compiler sees that; of one that is compiled
+with a precompiled header it does not see which of that header's files are missing. So a source comes after others only if they
+lack all files of the precompiled header that it lacks (clang-scan-deps says which).
 """
 
 import json
 import os
 import re
 import shlex
+import shutil
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 
-TOGETHER = 8
-# What the compiler itself says; clang-tidy wants a check besides, and this one costs nothing.
-OF_COMPILER = "-*,clang-diagnostic-*,bugprone-suspicious-include"
-# A #define between two sources, since an #include may be repeated after one (readability-duplicate-include).
-BETWEEN = "#define CAIRN_LINT_NEXT_SOURCE\n#undef CAIRN_LINT_NEXT_SOURCE\n"
+TOGETHER = 16
+# Between two sources: a #define, since an #include may be repeated after one (readability-duplicate-include), and other names for
+# the functions that each plugin has.
+EVERY_PLUGINS = ("cairn_plugin_v1", "cairn_register")
+BETWEEN = "".join(f"#undef {name}\n#define {name} {name}_{{}}\n" for name in EVERY_PLUGINS)
 
 
 @dataclass
@@ -38,7 +41,8 @@ class Source:
     key: str
     folder: str  # where it is compiled
     flags: list[str]
-    precompiled: bool  # with a precompiled header
+    precompiled: str  # the precompiled header, or nothing
+    lacks: frozenset[str] = frozenset()  # what that header includes and the source does not
 
 
 @dataclass
@@ -65,6 +69,17 @@ def read_flags(command: str, file: str) -> list[str]:
     return flags
 
 
+def find_precompiled(command: str) -> str:
+    """The precompiled header in a compiler's command, or nothing."""
+    return next((word for word in shlex.split(command) if word.endswith("cmake_pch.hxx")), "")
+
+
+def as_others(flags: list[str]) -> tuple[str, ...]:
+    """The flags that decide with which other sources one may be parsed: not those for the optimizer or the linker, nor where
+    the headers of the project are."""
+    return tuple(flag for flag in flags if not re.match(r"-f|-O|-I|-D\w+_EXPORTS$", flag))
+
+
 def read_sources(database: Path, root: Path, keys: dict[str, str]) -> list[Source]:
     """Those of the database that have a key."""
     sources = {}
@@ -72,8 +87,29 @@ def read_sources(database: Path, root: Path, keys: dict[str, str]) -> list[Sourc
         file = os.path.relpath(os.path.join(entry["directory"], entry["file"]), root)
         if file in keys and file not in sources:
             command = entry["command"]
-            sources[file] = Source(file, keys[file], entry["directory"], read_flags(command, entry["file"]), "cmake_pch.hxx" in command)
+            sources[file] = Source(file, keys[file], entry["directory"], read_flags(command, entry["file"]), find_precompiled(command))
     return [sources[file] for file in sorted(sources)]
+
+
+def find_lacking(root: Path, work: Path, sources: list[Source]) -> None:
+    """Sets `lacks` of sources that are compiled with a precompiled header. A source of which clang-scan-deps says nothing (since
+    it does not find a header, say) lacks everything."""
+    hidden = [source for source in sources if source.precompiled]
+    if not hidden:
+        return
+    database = work / "dependencies.json"
+    database.write_text(json.dumps([{"directory": source.folder, "file": str(root / source.file), "output": source.key,
+                                     "arguments": ["clang++", *source.flags, "-c", str(root / source.file), "-o", source.key]} for source in hidden]))
+    program = Path(shutil.which("clang-tidy") or "clang-tidy").resolve().parent / "clang-scan-deps"
+    rules = subprocess.run([program, f"--compilation-database={database}"], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, check=False).stdout
+    reached = {}
+    for rule in rules.replace("\\\n", " ").splitlines():
+        target, _, files = rule.partition(":")
+        reached[target.strip()] = files.split()
+    included = {header: re.findall(r'#include [<"]([^>"]+)[>"]', Path(header).read_text()) for header in {source.precompiled for source in hidden}}
+    for source in hidden:
+        files = reached.get(source.key, [])
+        source.lacks = frozenset(name for name in included[source.precompiled] if not any(file.endswith(f"/{name}") for file in files))
 
 
 def nearest_configuration(root: Path, file: str) -> str:
@@ -84,26 +120,57 @@ def nearest_configuration(root: Path, file: str) -> str:
     return str(folder / ".clang-tidy")
 
 
+def declared(text: str) -> frozenset[str]:
+    """What a source seems to declare for itself: types and constants by their names, functions with the line that they begin on.
+    Two sources that share something are better not parsed together."""
+    found = re.findall(r"^(?:(?:class|struct|union|enum(?: class)?) (\w+)|(?!namespace |using |void cairn_register)[A-Za-z_][\w:<>,&*\[\] ]*?[ &*]"
+                       r"(?:(\w+)(?:\[\w*\])?(?: =|\{|;)|(\w+\(.*)))", text, flags=re.MULTILINE)
+    return frozenset("".join(match) for match in found)
+
+
+class Group:
+    """Sources that are parsed together."""
+
+    def __init__(self) -> None:
+        self.sources: list[Source] = []
+        self.names: set[str] = set()
+
+    def takes(self, source: Source, names: frozenset[str]) -> bool:
+        """Puts a source at the end, if it lacks no more than the last one and shares no name with any."""
+        if len(self.sources) == TOGETHER or self.sources and not source.lacks <= self.sources[-1].lacks or names & self.names:
+            return False
+        self.sources.append(source)
+        self.names |= names
+        return True
+
+
 def in_groups(root: Path, sources: list[Source]) -> list[list[Source]]:
-    """Sources with equal flags, compiled at the same place and checked alike, at most TOGETHER in each, the largest first."""
-    alike: dict[tuple, list[Source]] = {}
-    for source in sources:
-        alike.setdefault((source.folder, nearest_configuration(root, source.file), *source.flags), []).append(source)
-    groups = []
-    for same in alike.values():
-        count = -(-len(same) // TOGETHER)
-        groups += [same[len(same) * k // count:len(same) * (k + 1) // count] for k in range(count)]
-    return sorted(groups, key=len, reverse=True)
+    """Sources that are compiled and checked alike, at most TOGETHER in each, each after sources that lack what it lacks; the
+    largest groups first."""
+    alike: dict[tuple, list[Group]] = {}
+    for source in sorted(sources, key=lambda each: -len(each.lacks)):
+        names = declared((root / source.file).read_text())
+        groups = alike.setdefault((nearest_configuration(root, source.file), source.precompiled, as_others(source.flags)), [])
+        if not any(group.takes(source, names) for group in groups):
+            groups.append(Group())
+            groups[-1].takes(source, names)
+    return sorted((group.sources for groups in alike.values() for group in groups), key=len, reverse=True)
 
 
-def as_part(path: Path) -> str:
+def flags_of(group: list[Source]) -> list[str]:
+    """Those of the first, and where else the headers of the others are."""
+    flags = list(group[0].flags)
+    return flags + [flag for flag in dict.fromkeys(flag for source in group for flag in source.flags if flag.startswith("-I")) if flag not in flags]
+
+
+def as_part(path: Path, number: int) -> str:
     """A source's text as a part of another file, elsewhere."""
     def found(include: re.Match[str]) -> str:
         beside = path.parent / include[2]
         return f'{include[1]}"{beside}"' if beside.is_file() else include[0]
 
     text = re.sub(r'^( *# *include *)"([^"]+)"', found, path.read_text(), flags=re.MULTILINE)
-    return f'{BETWEEN}#line 1 "{path}"\n{text}\n'
+    return f'{BETWEEN.format(number, number)}#line 1 "{path}"\n{text}\n'
 
 
 class Linter:
@@ -114,43 +181,32 @@ class Linter:
         self.work = work
 
     def check(self, group: list[Source]) -> Result:
-        """Together, and where that is not clean each half."""
+        """Together; where that is not clean, the sources that it names and the others, or each half if it names none or all."""
         if len(group) == 1:
             return self._check_one(group[0])
         unit = self.work / f"{group[0].key}.cpp"
-        unit.write_text("".join(as_part(self.root / source.file) for source in group))
-        output = self._tidy(unit, group[0], f"--config-file={nearest_configuration(self.root, group[0].file)}")
+        unit.write_text("".join(as_part(self.root / source.file, number) for number, source in enumerate(group)))
+        output = self._tidy(unit, group, f"--config-file={nearest_configuration(self.root, group[0].file)}")
         unit.unlink()
         if output is None:
-            return self._includes(group)
-        half = len(group) // 2
-        first, second = self.check(group[:half]), self.check(group[half:])
+            return Result(group)
+        named = [source for source in group if f"{self.root / source.file}:" in output]
+        if not 0 < len(named) < len(group):
+            named = group[len(group) // 2:]
+        first, second = self.check([source for source in group if source not in named]), self.check(named)
         return Result(first.clean + second.clean, first.output + second.output)
 
     def _check_one(self, source: Source) -> Result:
-        output = self._tidy(self.root / source.file, source)
+        output = self._tidy(self.root / source.file, [source])
         return Result([source]) if output is None else Result(output=[output])
 
-    def _includes(self, group: list[Source]) -> Result:
-        """Sources that are clean together, each parsed by itself if a precompiled header hides from the compiler what it lacks."""
-        result = Result()
-        for source in group:
-            output = self._tidy(self.root / source.file, source, f"--checks={OF_COMPILER}") if source.precompiled else None
-            if output is None:
-                result.clean.append(source)
-            else:
-                result.output.append(output)
-        return result
-
-    def _tidy(self, file: Path, source: Source, *options: str) -> str | None:
-        """What clang-tidy says of a file that is compiled as the source is; None: nothing."""
-        done = self._run(source, ["clang-tidy", "--quiet", *options, str(file), "--", *source.flags])
+    def _tidy(self, file: Path, group: list[Source], *options: str) -> str | None:
+        """What clang-tidy says of a file that is compiled as the group is; None: nothing."""
+        done = subprocess.run(["clang-tidy", "--quiet", *options, str(file), "--", *flags_of(group)], cwd=group[0].folder,
+                              stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
         if done.returncode == 0:
             return None
         return "\n".join(line for line in done.stdout.splitlines() if not re.fullmatch(r"\d+ warnings? generated\.", line))
-
-    def _run(self, source: Source, command: list[str]) -> subprocess.CompletedProcess[str]:
-        return subprocess.run(command, cwd=source.folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
 
 
 def main(database: str, clean: str) -> int:
@@ -163,9 +219,11 @@ def main(database: str, clean: str) -> int:
         key, file = line.split()
         keys[file] = key
     linter = Linter(root, work.resolve())
+    sources = read_sources(Path(database), root, keys)
+    find_lacking(root, work, sources)
     failed = False
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        for result in pool.map(linter.check, in_groups(root, read_sources(Path(database), root, keys))):
+        for result in pool.map(linter.check, in_groups(root, sources)):
             for source in result.clean:
                 (Path(clean) / source.key).touch()
             for text in result.output:
