@@ -21,6 +21,7 @@
 #include "job.hpp"
 #include "models.hpp"
 #include "pace.hpp"
+#include "revisits.hpp"
 #include "states.hpp"
 #include "system.hpp"
 #include "tree.hpp"
@@ -39,6 +40,9 @@ struct Settings {
   int iterations = 30;
   /// Variables touched within so many updates are ordered last.
   int recent = 4;
+  /// Where a solution costs no more than this, by the cost model of factorisations [ns], it
+  /// prepares for nothing: there is little to gain.
+  double prepares_above = 1e5;
   std::string kernels = "auto";
 };
 
@@ -77,6 +81,9 @@ struct EngineState {
   std::vector<std::vector<std::int32_t>> factors_of_;
   std::vector<std::int32_t> bound_;       // by variable: see Tree
   std::vector<std::int64_t> touched_at_;  // by variable: update
+  Revisits revisits_;
+  std::vector<Tree::Expected> expected_;  // soon
+  std::int64_t prepared_ = 0;             // variables so far
   std::vector<std::int32_t>
       touched_;  // variables whose part of H has changed since the last solution
   std::vector<std::int32_t> sources_;  // … or of the right-hand side alone
@@ -220,6 +227,8 @@ class Engine : private EngineState {
   bool covariance(int a, int b, double* block);
   /// The rows of Σ_vb for all of `rows`, one below the other, by solving.
   bool covariance_column(std::span<const std::int32_t> rows, int b, double* column);
+  /// So many times a variable was detached since it was expected soon.
+  std::int64_t prepared() const { return prepared_; }
   const Tree& tree() const { return tree_; }
   const System& system() const { return system_; }
   const Models& models() const { return models_; }
@@ -260,6 +269,7 @@ class Engine : private EngineState {
   bool advance(UpdateReport& report);
   void end_job();
   bool order_affected(UpdateReport& report);
+  void prepare_for_revisits();
   bool factorize_more(UpdateReport& report);
   void factorized(UpdateReport& report);
   void not_positive_definite(UpdateReport& report);

@@ -15,6 +15,8 @@ namespace {
 constexpr double kOrdinaryInformation = 1e12;
 /// Relative rounding of a difference of two positions, some operations later.
 constexpr double kDigitsOfPositions = 2e-15;
+/// A variable that no factor has joined for more than so many solutions is one of long ago.
+constexpr std::int64_t kLongAgo = 8;
 
 }  // namespace
 
@@ -61,6 +63,7 @@ void Engine::load(Graph graph, std::vector<FactorId> ids) {
   others_ = 0;
   left_share_ = 1.0;
   touched_at_.clear();
+  revisits_.clear();
   const int variables = graph_.variable_count(), factors = graph_.factor_count();
   while (states_.size() < variables) added_variable();
   while (models_.size() < factors) added_factor();
@@ -294,6 +297,7 @@ void Engine::put_in(int f) {
   for (std::size_t a = 0; a < variables.size(); ++a) {
     if (held_[variables[a]]) continue;
     touch(variables[a]);
+    if (time_ - touched_at_[variables[a]] > kLongAgo) revisits_.note(variables[a]);
     touched_at_[variables[a]] = time_;
     for (std::size_t b = a + 1; b < variables.size(); ++b) {
       if (!held_[variables[b]]) system_.connect(variables[a], variables[b]);

@@ -44,6 +44,11 @@ constexpr int kPatience = 10;
 /// If more than this part of the factors were to be renewed, all are.
 constexpr double kMost = 0.2;
 
+/// What is done for the next updates may cost so much of what this one does anyway.
+constexpr double kPreparation = 0.25;
+/// Of what is expected, so many variables of a run are ordered with the last ones.
+constexpr std::int32_t kSoon = 10;
+
 /// So many variables are moved, and factors evaluated, at a time.
 constexpr std::size_t kAtOnce = 64;
 /// What it takes to copy a variable's state for `Engine::shown_` [s].
@@ -202,8 +207,9 @@ bool Engine::order_affected(UpdateReport& report) {
   }
   for (const std::int32_t v : retiring_) tree_.retire(v);
   if (structure_changed_) {
+    prepare_for_revisits();
     if (!pace_.allows(Work::order, tree_.affected_variables())) return false;
-    tree_.restructure(touched_at_, time_ - settings_.recent);
+    tree_.restructure(touched_at_, time_ - settings_.recent, expected_);
     states_.remember();  // nodes keep their numbers from here on
   }
   retiring_.clear();
@@ -215,6 +221,36 @@ bool Engine::order_affected(UpdateReport& report) {
   tree_.begin_factorization(job_.damped == Job::Damped::no ? 0.0 : job_.lambda);
   job_.go_to(Job::Stage::factorize);
   return true;
+}
+
+/// Touches what measurements will probably join next, where that costs little beside what is
+/// affected anyway: ordered last together, the paths of the next updates are short.
+void Engine::prepare_for_revisits() {
+  expected_.clear();
+  const double cost = tree_.affected_cost();
+  double budget = kPreparation * cost;
+  for (Revisits::Run& run : revisits_.at(time_)) {
+    bool prepare = !run.was_prepared();
+    if (prepare && cost <= settings_.prepares_above) continue;
+    for (std::int32_t k = 1; k <= run.expected(); ++k) {
+      const std::int32_t v = run.variable + k * run.direction;
+      if (v < 0 || v >= states_.size()) break;
+      if (!live_variable_[v] || held_[v] || tree_.node_of(v) < 0) continue;
+      expected_.push_back({v, k <= kSoon});
+      if (!prepare) continue;
+      const double more = tree_.cost_to_touch(v, budget);
+      prepare = more <= budget;
+      if (!prepare) continue;
+      if (more > 0.0) {
+        ++prepared_;
+        budget -= more;
+        follow(v);
+        tree_.touch(v);
+      }
+      run.prepared_to = v;
+      run.prepared_at = time_;
+    }
+  }
 }
 
 bool Engine::factorize_more(UpdateReport& report) {

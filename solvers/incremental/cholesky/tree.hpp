@@ -93,9 +93,21 @@ class Tree {
   /// must not join it with anything any more.
   void retire(std::int32_t variable);
 
-  /// Reorders the affected variables, those last that were touched last and those near them:
-  /// `touched_at[v]` says when, and from `since` on it counts.
-  void restructure(std::span<const std::int64_t> touched_at, std::int64_t since);
+  /// The cost of factorising the affected nodes, by the cost model [ns], and what `touch` would add
+  /// to it; summed no further than beyond `limit`.
+  double affected_cost() const;
+  double cost_to_touch(std::int32_t variable, double limit) const;
+
+  /// A variable that will probably be touched in one of the next updates.
+  struct Expected {
+    std::int32_t variable;
+    bool soon;  ///< in one of the very next
+  };
+  /// Reorders the affected variables, those last that were touched last, those near them and those
+  /// that are expected soon, and before them what else is expected: `touched_at[v]` says when, and
+  /// from `since` on it counts.
+  void restructure(std::span<const std::int64_t> touched_at, std::int64_t since,
+                   std::span<const Expected> expected = {});
   /// Whether the factor has become more costly, since all of it was last ordered, than the growth
   /// of the graph explains.
   bool worn_out() const;
@@ -214,6 +226,9 @@ class Tree {
   const block::Kernels& kernels() const { return *kernels_; }
   std::span<const std::int32_t> affected() const { return affected_; }
   int affected_variables() const { return affected_variables_; }
+  /// So many nodes were taken down that had something deferred, which is lost: none, unless
+  /// whoever touched them did not `follow` first.
+  std::int64_t unsettled() const { return unsettled_; }
   std::int64_t doubles() const { return doubles_; }
   double log_determinant() const;
   /// Nodes with parents before their children.
@@ -249,7 +264,9 @@ class Tree {
   std::int32_t new_node();
   void free_node(std::int32_t n);
   void take_down(std::vector<std::int32_t>& members, std::vector<std::int32_t>& orphans);
-  void add_near(std::vector<std::uint8_t>& set);
+  void group(std::span<const std::int64_t> touched_at, std::int64_t since,
+             std::span<const Expected> expected);
+  void add_near();
   void order_small();
   void order_large();
   void eliminate();
@@ -288,6 +305,7 @@ class Tree {
   double damping_ = 0.0;
   std::int64_t next_sequence_ = 0;
   int affected_variables_ = 0;
+  std::int64_t unsettled_ = 0;
   std::int64_t doubles_ = 0;
   double cost_ = 0.0;  // of factorising everything, by the cost model [ns]
   int variables_ = 0;  // in the tree
@@ -297,7 +315,7 @@ class Tree {
   // Room for restructuring: columns by place in the order, see eliminate().
   SmallGraph graph_;
   std::vector<std::int32_t> members_, orphans_, order_, local_;  // local_: by variable
-  std::vector<std::uint8_t> groups_;
+  std::vector<std::uint8_t> groups_;  // by member: those of a higher one are ordered later
   std::vector<std::int64_t> column_begin_;
   std::vector<std::int32_t> column_rows_, column_parent_, mark_, first_child_, sibling_,
       orphan_first_, orphan_next_;

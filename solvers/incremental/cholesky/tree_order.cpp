@@ -17,6 +17,8 @@ constexpr block::CostModel kCost;
 constexpr int kSmall = 1500;
 /// So many links away from what has been touched is still near it.
 constexpr int kNear = 5;
+/// The groups of members.
+constexpr std::uint8_t kFirst = 0, kBeforeLast = 1, kLast = 2;
 
 std::int32_t round_up(std::int32_t value) { return (value + 7) / 8 * 8; }
 
@@ -34,13 +36,26 @@ void make_room(UninitializedVector& buffer, std::int64_t doubles) {
 
 }  // namespace
 
-void Tree::restructure(std::span<const std::int64_t> touched_at, std::int64_t since) {
+double Tree::affected_cost() const {
+  double sum = 0.0;
+  for (const std::int32_t n : affected_) sum += kCost.time(nodes_[n].columns, nodes_[n].below());
+  return sum;
+}
+
+double Tree::cost_to_touch(std::int32_t variable, double limit) const {
+  double sum = 0.0;
+  for (std::int32_t n = node_of(variable); n >= 0 && !nodes_[n].affected && sum <= limit;
+       n = nodes_[n].parent)
+    sum += kCost.time(nodes_[n].columns, nodes_[n].below());
+  return sum;
+}
+
+void Tree::restructure(std::span<const std::int64_t> touched_at, std::int64_t since,
+                       std::span<const Expected> expected) {
   take_down(members_, orphans_);
   const int n = static_cast<int>(members_.size());
-  groups_.resize(n);
+  group(touched_at, since, expected);
   std::size_t clique_entries = 0;
-  for (int k = 0; k < n; ++k) groups_[k] = touched_at[members_[k]] >= since;
-  add_near(groups_);
   for (const std::int32_t o : orphans_)
     clique_entries += nodes_[o].separator().size() * nodes_[o].separator().size();
   static const bool has_camd =
@@ -61,12 +76,26 @@ void Tree::restructure(std::span<const std::int64_t> touched_at, std::int64_t si
   variables_when_ordered_ = variables_;
 }
 
-/// Adds to a set of members those that a few blocks of H lead to from it: a robot that looks at
+/// Which members are ordered last, which before them, and which first.
+void Tree::group(std::span<const std::int64_t> touched_at, std::int64_t since,
+                 std::span<const Expected> expected) {
+  groups_.assign(members_.size(), kFirst);
+  for (std::size_t k = 0; k < members_.size(); ++k) {
+    if (touched_at[members_[k]] >= since) groups_[k] = kLast;
+  }
+  add_near();
+  for (const Expected& one : expected) {
+    const std::int32_t k = local_[one.variable];
+    if (k >= 0) groups_[k] = std::max(groups_[k], one.soon ? kLast : kBeforeLast);
+  }
+}
+
+/// Adds to the last group those that a few blocks of H lead to from it: a robot that looks at
 /// places where it has been will look at the next ones soon.
-void Tree::add_near(std::vector<std::uint8_t>& set) {
+void Tree::add_near() {
   stack_.clear();
-  for (std::size_t k = 0; k < set.size(); ++k) {
-    if (set[k]) stack_.push_back(static_cast<std::int32_t>(k));
+  for (std::size_t k = 0; k < groups_.size(); ++k) {
+    if (groups_[k] == kLast) stack_.push_back(static_cast<std::int32_t>(k));
   }
   std::size_t begin = 0;
   for (int links = 0; links < kNear; ++links) {
@@ -74,8 +103,8 @@ void Tree::add_near(std::vector<std::uint8_t>& set) {
     for (; begin < end; ++begin) {
       for (const System::Link& link : system_->links(members_[stack_[begin]])) {
         const std::int32_t other = local_[link.other];
-        if (other < 0 || set[other]) continue;
-        set[other] = 1;
+        if (other < 0 || groups_[other] == kLast) continue;
+        groups_[other] = kLast;
         stack_.push_back(other);
       }
     }
@@ -135,6 +164,7 @@ void Tree::take_down(std::vector<std::int32_t>& members, std::vector<std::int32_
   members.clear();
   orphans.clear();
   for (const std::int32_t n : affected_) {
+    unsettled_ += nodes_[n].owes || !nodes_[n].lead.empty();
     const auto own = nodes_[n].own_variables();
     members.insert(members.end(), own.begin(), own.end());
     for (const std::int32_t c : nodes_[n].children) {

@@ -108,6 +108,14 @@ void GrowingGraph::add_loop(Engine& engine) {
              noisy(between(a.truth, b.truth)));
 }
 
+void GrowingGraph::add_loop_back(Engine& engine, std::size_t poses) {
+  if (poses == 0 || poses >= poses_.size()) return;
+  const Variable &a = poses_[poses_.size() - 1 - poses], &b = poses_.back();
+  loops_.push_back(engine.next_id());
+  add_factor(engine, types_.relative_pose, {*engine.graph().find(a.id), *engine.graph().find(b.id)},
+             noisy(between(a.truth, b.truth)));
+}
+
 void GrowingGraph::add_precise_loop(Engine& engine, double more) {
   const int a = *engine.graph().find(poses_.front().id), b = *engine.graph().find(poses_.back().id);
   add_factor(engine, types_.relative_pose, {a, b}, between(engine.x(a), engine.x(b)), more);

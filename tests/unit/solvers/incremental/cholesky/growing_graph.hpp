@@ -40,6 +40,8 @@ class GrowingGraph {
   void grow(Engine& engine);
   void add_pose(Engine& engine);
   void add_loop(Engine& engine);
+  /// From the newest pose to the one that is so many poses older, if there is one.
+  void add_loop_back(Engine& engine, std::size_t poses);
   /// From the first pose to the newest, as the estimate has it, with so many times the information
   /// that others have.
   void add_precise_loop(Engine& engine, double more);
