@@ -144,6 +144,25 @@ class Tidy(unittest.TestCase):
         names = {"first.cpp", "third.cpp", "fourth.cpp"}
         self.assertEqual(self.runs_on(*names), (2, names, "", 0))
 
+    def test_what_comes_with_a_precompiled_header_is_no_include(self) -> None:
+        (self.root / "build/cmake_pch.hxx").write_text("#include <map>\n#include <regex>\n")
+        precompiled = f"-include {self.root}/build/cmake_pch.hxx"
+        self.add("first.cpp", "#include <cctype>\n#include <locale>\nbool first(char c) { return std::isspace(c, std::locale()); }\n", precompiled)
+        self.add("second.cpp", "bool second(char c) { return std::isspace(c, std::locale()); }\n", precompiled)
+        self.assertEqual(self.run_on("first.cpp", "second.cpp")[0], {"first.cpp"})
+
+    def test_a_header_of_the_same_name_is_another_one(self) -> None:
+        for name, text in (("first", "inline int f() { return 1; }\n"), ("second", "inline " + WRONG)):
+            (self.root / "lib" / name).mkdir()
+            (self.root / "lib" / name / "same.hpp").write_text("#pragma once\n" + text)
+            self.add(f"{name}.cpp", f'#include "same.hpp"\nint {name}() {{ return 1; }}\n', f"-I{self.root}/lib/{name}")
+        self.assertEqual(self.run_on("first.cpp", "second.cpp")[0], {"first.cpp"})
+
+    def test_what_silences_the_compiler_does_so_in_one_source(self) -> None:
+        self.add("first.cpp", '#pragma GCC diagnostic ignored "-Wunused-variable"\nvoid first() { int a = 1; }\n', "-Wall")
+        self.add("second.cpp", "void second() { int b = 1; }\n", "-Wall")
+        self.assertEqual(self.run_on("first.cpp", "second.cpp")[0], {"first.cpp"})
+
     def test_what_a_header_lacks_behind_a_precompiled_one_is_found(self) -> None:
         (self.root / "build/cmake_pch.hxx").write_text("#include <vector>\n")
         self.add("lacks.hpp", "#pragma once\ninline int lacking(const std::vector<int>& v) { return v[0]; }\n")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 
-from tabulate import tabulate  # type: ignore[import]
+from tabulate import tabulate
 
 Sections = dict[str, str]  # the Markdown of each part of a page that is written by a study, by its name
 

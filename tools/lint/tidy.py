@@ -11,10 +11,13 @@ that are named and the others are tried by themselves, down to single files, who
 CLEAN/key.
 
 A source must not get from an earlier one an #include that it lacks. Of most the compiler sees that; of one that is compiled
-with a precompiled header it does not see which of that header's files are missing. So a source comes after others only if they
-lack all files of the precompiled header that it lacks (clang-scan-deps says which).
+with a precompiled header it does not see which of the files are missing that come with that header. So a source comes after
+others only if they lack all of these files that it lacks (clang-scan-deps says which). Nor must an #include find another file
+than it does by itself: sources whose folders of headers have a name in common are not put together. One thing is not seen so:
+a class that is declared in a wrong namespace while a later source defines one of that name there.
 """
 
+import functools
 import json
 import os
 import re
@@ -23,7 +26,7 @@ import shutil
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 TOGETHER = 16
@@ -42,7 +45,7 @@ class Source:
     folder: str  # where it is compiled
     flags: list[str]
     precompiled: str  # the precompiled header, or nothing
-    lacks: frozenset[str] = frozenset()  # what that header includes and the source does not
+    lacks: frozenset[str] = frozenset()  # the files that come with that header and not with the source
 
 
 @dataclass
@@ -91,25 +94,49 @@ def read_sources(database: Path, root: Path, keys: dict[str, str]) -> list[Sourc
     return [sources[file] for file in sorted(sources)]
 
 
-def find_lacking(root: Path, work: Path, sources: list[Source]) -> None:
-    """Sets `lacks` of sources that are compiled with a precompiled header. A source of which clang-scan-deps says nothing (since
-    it does not find a header, say) lacks everything."""
-    hidden = [source for source in sources if source.precompiled]
-    if not hidden:
-        return
+def reached(work: Path, sources: list[Source]) -> dict[str, set[str]]:
+    """By key: all files that a source includes, also through others, without a precompiled header. What clang-scan-deps says
+    nothing of (since it does not find a header, say) is left out."""
     database = work / "dependencies.json"
-    database.write_text(json.dumps([{"directory": source.folder, "file": str(root / source.file), "output": source.key,
-                                     "arguments": ["clang++", *source.flags, "-c", str(root / source.file), "-o", source.key]} for source in hidden]))
+    database.write_text(json.dumps([{"directory": source.folder, "file": source.file, "output": source.key,
+                                     "arguments": ["clang++", *source.flags, "-x", "c++", "-c", source.file, "-o", source.key]} for source in sources]))
     program = Path(shutil.which("clang-tidy") or "clang-tidy").resolve().parent / "clang-scan-deps"
     rules = subprocess.run([program, f"--compilation-database={database}"], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, check=False).stdout
-    reached = {}
+    result = {}
     for rule in rules.replace("\\\n", " ").splitlines():
         target, _, files = rule.partition(":")
-        reached[target.strip()] = files.split()
-    included = {header: re.findall(r'#include [<"]([^>"]+)[>"]', Path(header).read_text()) for header in {source.precompiled for source in hidden}}
-    for source in hidden:
-        files = reached.get(source.key, [])
-        source.lacks = frozenset(name for name in included[source.precompiled] if not any(file.endswith(f"/{name}") for file in files))
+        result[target.strip()] = {os.path.realpath(file) for file in files.split()}
+    return result
+
+
+def is_public(file: str) -> bool:
+    """Whether sources may include a header, rather than one that includes it."""
+    return not re.search(r"/(bits|internal|src|detail|debug|ext|backward|pstl)/", file)
+
+
+def find_lacking(root: Path, work: Path, sources: list[Source]) -> None:
+    """Sets `lacks` of sources that are compiled with a precompiled header."""
+    hidden = [replace(source, file=str(root / source.file)) for source in sources if source.precompiled]
+    if not hidden:
+        return
+    headers = {source.precompiled: replace(source, file=source.precompiled, key=source.precompiled) for source in hidden}
+    files = reached(work, [*hidden, *headers.values()])
+    for source in sources:
+        if source.precompiled:
+            has, all_files = files.get(source.key, set()), files.get(source.precompiled, {source.file})
+            source.lacks = frozenset(file for file in all_files if file not in has and is_public(file))
+
+
+@functools.cache
+def headers_in(folder: str) -> frozenset[str]:
+    """What may be included from a folder."""
+    return frozenset(os.path.relpath(path, folder) for path in Path(folder).rglob("*") if path.suffix in (".h", ".hpp"))
+
+
+@functools.cache
+def share_a_header(first: str, second: str) -> bool:
+    """Whether an #include may mean a file in either of two folders."""
+    return not headers_in(first).isdisjoint(headers_in(second))
 
 
 def nearest_configuration(root: Path, file: str) -> str:
@@ -134,11 +161,17 @@ class Group:
     def __init__(self) -> None:
         self.sources: list[Source] = []
         self.names: set[str] = set()
+        self.folders: set[str] = set()  # of headers
 
     def takes(self, source: Source, names: frozenset[str]) -> bool:
-        """Puts a source at the end, if it lacks no more than the last one and shares no name with any."""
+        """Puts a source at the end, if it lacks no more than the last one, shares no name with any, and each of them finds the
+        same headers as by itself."""
         if len(self.sources) == TOGETHER or self.sources and not source.lacks <= self.sources[-1].lacks or names & self.names:
             return False
+        folders = {flag[2:] for flag in source.flags if flag.startswith("-I")}
+        if self.sources and any(share_a_header(one, other) for one in self.folders - folders for other in folders - self.folders):
+            return False
+        self.folders |= folders
         self.sources.append(source)
         self.names |= names
         return True
@@ -149,8 +182,11 @@ def in_groups(root: Path, sources: list[Source]) -> list[list[Source]]:
     largest groups first."""
     alike: dict[tuple, list[Group]] = {}
     for source in sorted(sources, key=lambda each: -len(each.lacks)):
-        names = declared((root / source.file).read_text())
-        groups = alike.setdefault((nearest_configuration(root, source.file), source.precompiled, as_others(source.flags)), [])
+        text = (root / source.file).read_text()
+        names = declared(text)
+        # What silences the compiler might do so for the next source, too.
+        alone = source.file if re.search(r"# *pragma +(GCC|clang) +diagnostic", text) else ""
+        groups = alike.setdefault((nearest_configuration(root, source.file), source.precompiled, as_others(source.flags), alone), [])
         if not any(group.takes(source, names) for group in groups):
             groups.append(Group())
             groups[-1].takes(source, names)

@@ -19,7 +19,7 @@ class Revisits {
  public:
   static constexpr std::int32_t kStep = 2;
   static constexpr std::int64_t kPause = 3;
-  /// At most so many runs are told, the longest.
+  /// At most so many runs are returned, the longest.
   static constexpr int kMostRuns = 16;
   /// So many variables are expected at most.
   static constexpr std::int32_t kFarthest = 20;

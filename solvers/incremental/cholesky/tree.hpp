@@ -226,8 +226,8 @@ class Tree {
   const block::Kernels& kernels() const { return *kernels_; }
   std::span<const std::int32_t> affected() const { return affected_; }
   int affected_variables() const { return affected_variables_; }
-  /// So many nodes were taken down that had something deferred, which is lost: none, unless
-  /// whoever touched them did not `follow` first.
+  /// So many nodes were detached with steps or motions still deferred, which are lost: none if
+  /// their variables were followed (`follow`) before they were touched.
   std::int64_t unsettled() const { return unsettled_; }
   std::int64_t doubles() const { return doubles_; }
   double log_determinant() const;

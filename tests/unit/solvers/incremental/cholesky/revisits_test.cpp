@@ -52,7 +52,7 @@ TEST(Revisits, ARunBearsSmallGapsAndShortPauses) {
   EXPECT_EQ(update(revisits, time += 4, {v + 2}).at(0).length, 0);
 }
 
-TEST(Revisits, WhoTurnsRoundBeginsAnew) {
+TEST(Revisits, ATurnBeginsANewRun) {
   Revisits revisits;
   for (std::int32_t k = 0; k < 9; ++k) update(revisits, k, {k});
   EXPECT_EQ(update(revisits, 9, {7}).at(0).length, 1);
@@ -84,7 +84,7 @@ TEST(Revisits, OfManyTheLongestAreFollowed) {
   }
 }
 
-TEST(Revisits, WhoAsksTwiceIsToldTheSame) {
+TEST(Revisits, AskedTwiceTheAnswerIsTheSame) {
   Revisits revisits;
   for (std::int32_t k = 0; k < 9; ++k) update(revisits, k, {k});
   const auto again = update(revisits, 8, {});
