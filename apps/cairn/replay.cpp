@@ -97,10 +97,12 @@ class Feeder {
   }
 
   void read_estimate() {
-    copy_.clear();
+    std::size_t at = 0;
     for (const Id id : known_) {
       const std::span<const double> x = estimator_.state(id);
-      copy_.insert(copy_.end(), x.begin(), x.end());
+      if (at + x.size() > copy_.size()) copy_.resize(2 * (at + x.size()));
+      std::ranges::copy(x, copy_.begin() + static_cast<std::ptrdiff_t>(at));
+      at += x.size();
     }
   }
 

@@ -17,6 +17,7 @@
 #include <boost/interprocess/sync/mutex_family.hpp>
 
 #include "cairn/memory/growing_array.hpp"
+#include "cairn/memory/small_pages.hpp"
 
 namespace cairn::memory {
 namespace {
@@ -39,10 +40,16 @@ constexpr std::size_t kMapped = kSharedEnd;
 // What is left of a large array after its whole huge pages gets one too, if it is so much.
 constexpr std::size_t kWorthHugePage = kHugePage / 4 * 3;
 
-/// Memory of whole huge pages. That they are huge is advice, so a refusal is no error.
+/// How many `SmallPages` this thread has.
+thread_local int small_pages = 0;
+
+/// Whether pages are to be huge. That is advice, so a refusal is no error.
+int advice_on_pages() { return small_pages > 0 ? MADV_NOHUGEPAGE : MADV_HUGEPAGE; }
+
+/// Memory of whole huge pages, or of as many small ones.
 void* allocate_pages(std::size_t bytes) {
   void* memory = ::operator new (bytes, std::align_val_t{kHugePage});
-  ::madvise(memory, bytes / kHugePage * kHugePage, MADV_HUGEPAGE);
+  ::madvise(memory, bytes / kHugePage * kHugePage, advice_on_pages());
   return memory;
 }
 void release_pages(void* memory) noexcept {
@@ -55,19 +62,21 @@ std::size_t in_pages(std::size_t bytes) {
   return rest >= kWorthHugePage ? bytes - rest + kHugePage : bytes;
 }
 
-/// Huge pages that arrays share, each with an allocator of Boost's at its beginning. A page that
-/// nobody uses any more goes back to the system, except for the last of them.
+/// Huge pages that arrays share, each with an allocator of Boost's at its beginning, and stretches
+/// of small pages of the same size. What nobody uses any more goes back to the system, except for
+/// the last of them.
 class SharedPages {
  public:
   void* allocate(std::size_t bytes) {
     const std::lock_guard lock(mutex_);
-    for (Page* page : pages_) {
+    std::vector<Page*>& pages = small_pages > 0 ? small_ : huge_;
+    for (Page* page : pages) {
       if (void* memory = page->allocate(bytes)) return memory;
     }
-    pages_.reserve(pages_.size() + 1);
+    pages.reserve(pages.size() + 1);
     void* memory = allocate_pages(kHugePage);
-    pages_.push_back(::new (memory) Page(kHugePage, 0));
-    return pages_.back()->allocate(bytes);
+    pages.push_back(::new (memory) Page(kHugePage, 0));
+    return pages.back()->allocate(bytes);
   }
   void release(void* memory) noexcept {
     const std::lock_guard lock(mutex_);
@@ -75,7 +84,8 @@ class SharedPages {
     page->deallocate(memory);
     if (!page->all_memory_deallocated()) return;
     if (spare_ && spare_ != page && spare_->all_memory_deallocated()) {
-      std::erase(pages_, page);
+      std::erase(huge_, page);
+      std::erase(small_, page);
       page->~Page();
       return release_pages(page);
     }
@@ -91,7 +101,7 @@ class SharedPages {
   }
 
   std::mutex mutex_;
-  std::vector<Page*> pages_;
+  std::vector<Page*> huge_, small_;
   Page* spare_ = nullptr;  // one that was empty when last seen
 };
 
@@ -164,8 +174,11 @@ void release(void* memory, std::size_t bytes) noexcept {
   release_pages(memory);
 }
 
+SmallPages::SmallPages() noexcept { ++small_pages; }
+SmallPages::~SmallPages() { --small_pages; }
+
 Room make_room(std::size_t bytes) {
-  return {bytes < kMapped ? allocate(bytes) : map(mapped_size(bytes), MADV_HUGEPAGE), bytes};
+  return {bytes < kMapped ? allocate(bytes) : map(mapped_size(bytes), advice_on_pages()), bytes};
 }
 
 Room enlarge(const Room& old, std::size_t used, std::size_t needed) {

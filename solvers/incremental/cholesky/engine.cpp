@@ -14,6 +14,13 @@
 namespace cairn::incremental {
 namespace {
 
+/// Converged where everything is solved for: a step could lower chi2 by less than this fraction.
+constexpr double kExact = 1e-12;
+/// A factor of H does for another step where the first could gain less than this part of chi2 …
+constexpr double kNear = 1e-2;
+/// … and each other one less than this part of the last.
+constexpr double kFast = 0.1;
+
 const block::Kernels& kernels_named(const std::string& name) {
   const block::Kernels* kernels = block::choose_kernels(name.c_str());
   if (kernels) return *kernels;
@@ -112,12 +119,26 @@ void Engine::remove_dead(Graph& graph) const {
   graph.remove(factors, variables);
 }
 
+/// Steps with the factor at hand; near the minimum again, for as long as each can gain only a small
+/// part of what the last one could. Whether that was next to nothing from the first: it is then the
+/// factor of where the estimate has converged.
+bool Engine::step_fully(UpdateReport& report) {
+  for (int steps = 1;; ++steps) {
+    const double last = decrease_, before = cost_;
+    step_and_look(report);
+    ++report.iterations;
+    if (decrease_ <= kExact * cost_ + rounding()) return steps == 1;
+    const bool fast = steps == 1 ? decrease_ <= kNear * cost_ : decrease_ <= kFast * last;
+    if (!fast || !(cost_ <= before + rounding())) return false;
+  }
+}
+
 void Engine::solve_fully(UpdateReport& report) {
   pace_.begin(0.0);
   settle_gauge();
   ++time_;
   states_.remember();
-  if (broken_) return rescue(report, 1e-12);
+  if (broken_) return rescue(report, kExact);
   structure_changed_ = true;
   for (int round = 0; round < 50; ++round) {
     {
@@ -127,17 +148,14 @@ void Engine::solve_fully(UpdateReport& report) {
     }
     const double before = cost_;
     const bool ok = bring_factor_up_to_date(report);
-    if (ok) {
-      step_and_look(report);
-      ++report.iterations;
-    }
+    const bool converged = ok && step_fully(report);
     if (!ok || !(cost_ <= 1.01 * before + rounding())) {
       step_back();
-      return rescue(report, 1e-12);
+      return rescue(report, kExact);
     }
-    if (decrease_ <= 1e-12 * cost_ + rounding()) return;
+    if (converged) return;
   }
-  rescue(report, 1e-12);
+  rescue(report, kExact);
 }
 
 std::vector<double> Engine::x(int v) const {

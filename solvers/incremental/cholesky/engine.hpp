@@ -122,6 +122,7 @@ struct EngineState {
   std::vector<Follower> followers_;
   /// The estimate as it is to be seen while what the engine has is not proven.
   std::optional<Estimate> shown_;
+  std::vector<double> gradients_;       // g of `sources_` after the last evaluation, as in `System`
   std::vector<std::int32_t> looked_;    // factors of the last evaluation
   std::vector<std::int32_t> together_;  // those of them that are evaluated at a time
   std::vector<std::int32_t> changed_;   // by the last substitution
@@ -293,6 +294,7 @@ class Engine : private EngineState {
   // Parts of it at once, without a limit.
   bool bring_factor_up_to_date(UpdateReport& report);
   void step_and_look(UpdateReport& report);
+  bool step_fully(UpdateReport& report);
   bool negligible();
   /// Σ ρ(‖r‖²), as far as it is known.
   double cost() const { return std::max(cost_ - gained_, 0.0); }

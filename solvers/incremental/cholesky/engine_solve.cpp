@@ -163,6 +163,9 @@ bool Engine::advance(UpdateReport& report) {
     case gradient: {
       const Timed timed(seconds.solve);
       if (!set_right_hand_side_more()) return false;
+      gradients_.resize(system_.g().size());
+      for (const std::int32_t v : sources_)
+        std::copy_n(system_.g(v), system_.size(v), gradients_.data() + system_.offset(v));
       tree_.begin_climb(sources_);
       job_.go_to(decrement);
       break;
@@ -386,6 +389,7 @@ void Engine::evaluate(std::span<const std::int32_t> factors) {
   double before = 0.0, now = 0.0;
   for (const std::int32_t f : factors) {
     for (const std::int32_t v : models_.variables(f)) {
+      if (is_source_[v]) continue;
       tree_.settle(v);
       add_source(v);
     }
@@ -464,8 +468,7 @@ bool Engine::set_aside_more() {
   for (; job_.next < sources_.size(); ++job_.next) {
     if (!pace_.allows(Work::move, 1.0)) return false;
     const std::int32_t v = sources_[job_.next];
-    tree_.settle(v);
-    models_.right_hand_side(system_, states_, v);
+    std::copy_n(gradients_.data() + system_.offset(v), system_.size(v), system_.g(v));
     system_.set_aside(v);
     is_source_[v] = 0;
   }

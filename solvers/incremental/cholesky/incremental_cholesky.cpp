@@ -3,11 +3,13 @@
 
 #include <algorithm>
 #include <chrono>
+#include <optional>
 #include <utility>
 #include <vector>
 
 #include <fmt/core.h>
 
+#include "cairn/memory/small_pages.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/timed.hpp"
 #include "cairn/update/elimination.hpp"
@@ -56,6 +58,8 @@ UpdateReport IncrementalCholesky::update(const GraphUpdate& update, const Update
   const bool full =
       options.full || (options_.full_every > 0 && since_full_ + 1 >= options_.full_every);
   const double max_seconds = options.max_seconds > 0.0 ? options.max_seconds : options_.budget;
+  std::optional<memory::SmallPages> small_pages;
+  if (max_seconds > 0.0) small_pages.emplace();
   UpdateReport report;
   const double of_solution =
       carry_out_or_not_at_all(update, full, !full && max_seconds > 0.0, report);
@@ -313,7 +317,7 @@ std::span<const double> IncrementalCholesky::state(Id id) {
   next_to_read_ = v + 1;
   // Where many are read, most likely all will be: together they are cheaper.
   if (!all_ && std::ssize(read_) >= kFew) all_ = engine_->current();
-  const auto size = static_cast<std::size_t>(graph.type(v).ambient_size());
+  const auto size = static_cast<std::size_t>(engine_->states().ambient(v));
   if (all_) return {all_->x(v), size};
   const auto known = read_.find(v);
   return known != read_.end() ? known->second : read_.emplace(v, engine_->x(v)).first->second;

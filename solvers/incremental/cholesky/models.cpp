@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <type_traits>
 #include <utility>
 
 #include "add_product.hpp"
@@ -11,9 +12,10 @@
 namespace cairn::incremental {
 namespace {
 
-/// out += sign · Aᵀ B; A rows × a, B rows × b, out a × b, all column-major.
-template <int Rows>
-void add_transposed_product(const double* A, int a, const double* B, int b, double sign,
+/// out += sign · Aᵀ B; A rows × a, B rows × b, out a × b, all column-major. Sizes that the compiler
+/// knows unroll the loops.
+template <int Rows, class SizeA, class SizeB>
+void add_transposed_product(SizeA a, SizeB b, const double* A, const double* B, double sign,
                             double* out) {
   for (int j = 0; j < b; ++j) {
     double column[Rows];
@@ -24,6 +26,19 @@ void add_transposed_product(const double* A, int a, const double* B, int b, doub
       *out++ += sum;
     }
   }
+}
+template <int Rows>
+void add_transposed_product(const double* A, int a, const double* B, int b, double sign,
+                            double* out) {
+  // The factors of poses have as many rows as a pose has coordinates.
+  constexpr std::integral_constant<int, Rows> kRows;
+  constexpr std::integral_constant<int, 1> kOne;
+  if (a == Rows && b == Rows)
+    add_transposed_product<Rows>(kRows, kRows, A, B, sign, out);
+  else if (a == Rows && b == 1)
+    add_transposed_product<Rows>(kRows, kOne, A, B, sign, out);
+  else
+    add_transposed_product<Rows>(a, b, A, B, sign, out);
 }
 void add_transposed_product(int rows, const double* A, int a, const double* B, int b, double sign,
                             double* out) {
@@ -42,6 +57,20 @@ void add_transposed_product(int rows, const double* A, int a, const double* B, i
           *out++ += sign * sum;
         }
       }
+  }
+}
+
+/// The sum of J_k (now_k − start_k) over the two variables of a factor, which starts from now then.
+template <int Size>
+void take_steps(const double* J, const double* const* now, double* start, double* change) {
+  std::fill_n(change, Size, 0.0);
+  for (int k = 0; k < 2; ++k) {
+    for (int i = 0; i < Size; ++i) {
+      const double step = now[k][i] - *start;
+      *start++ = now[k][i];
+      for (int r = 0; r < Size; ++r) change[r] += J[r] * step;
+      J += Size;
+    }
   }
 }
 
@@ -64,6 +93,8 @@ void Models::add(const Graph& graph, int position) {
   }
   const auto factor_variables = graph.factor_variables(position);
   variables_.insert(variables_.end(), factor_variables.begin(), factor_variables.end());
+  record.of_poses = record.arity == 2 && type.tangent_size(0) == record.rows &&
+                    type.tangent_size(1) == record.rows;
   const auto rows = static_cast<std::size_t>(record.rows);
   const auto scalars = static_cast<std::size_t>(record.scalars);
   record.place = values_.take(rows * scalars + 2 * scalars);
@@ -166,12 +197,12 @@ void Models::add_to(System& system, const States& states, int f, double sign,
   const std::int32_t* v = variables_.data() + record.variables;
   const double* J = values_.at(record.place);
   const double* gradient = J + rows * record.scalars + record.scalars;
-  const double* const change = this->change(f, states);
+  const double* const change = has_moved(record, states) ? this->change(f, states) : nullptr;
   for (int ka = 0; ka < record.arity; ++ka) {
     const std::int32_t a = v[ka], size = system.size(a);
     if (!held[a]) {
       add_transposed_product(rows, J, size, J, size, sign, system.diagonal(a));
-      add_transposed_product(rows, J, size, change, 1, sign, system.change(a));
+      if (change) add_transposed_product(rows, J, size, change, 1, sign, system.change(a));
       for (int i = 0; i < size; ++i) {
         system.gradient(a)[i] += sign * gradient[i];
         system.pending(a)[i] += gradient[i];
@@ -219,6 +250,16 @@ void Models::start_here(const Record& record, const States& states) {
   }
 }
 
+/// Whether any of its variables has moved, in its frame, since it was last evaluated.
+bool Models::has_moved(const Record& record, const States& states) const {
+  const double* start = values_.at(record.place) + record.rows * record.scalars;
+  for (int k = 0; k < record.arity; start += size_of(record, k++)) {
+    const double* now = states.travelled(variables_[record.variables + k]);
+    if (!std::equal(now, now + size_of(record, k), start)) return true;
+  }
+  return false;
+}
+
 const double* Models::change(int f, const States& states) const {
   const Record& record = records_[f];
   const double* J = values_.at(record.place);
@@ -242,23 +283,27 @@ void Models::gather(std::span<const std::int32_t> factors, const Graph& graph,
   const std::size_t arity = static_cast<std::size_t>(one.arity),
                     measured = static_cast<std::size_t>(pool.type->measurement_size());
   Gathered& all = gathered_;
-  all.slots.clear();
-  all.measurements.clear();
-  all.noises.clear();
+  all.slots.resize(factors.size() * arity);
+  all.measurements.resize(factors.size() * measured);
+  all.noises.resize(factors.size());
   all.states.resize(arity);
-  for (std::vector<double>& states : all.states) states.clear();
-  for (const std::int32_t f : factors) {
-    const Record& record = records_[f];
+  for (std::size_t k = 0; k < arity; ++k)
+    all.states[k].resize(factors.size() *
+                         static_cast<std::size_t>(pool.type->ambient_size(static_cast<int>(k))));
+  for (std::size_t i = 0; i < factors.size(); ++i) {
+    const Record& record = records_[factors[i]];
     const std::size_t entry = static_cast<std::size_t>(record.entry);
-    const double* z = pool.measurements.data() + entry * measured;
-    all.measurements.insert(all.measurements.end(), z, z + measured);
-    all.noises.push_back(pool.noises[entry]);
-    const std::int32_t place = static_cast<std::int32_t>(all.slots.size() / arity);
-    for (std::size_t k = 0; k < arity; ++k) {
-      const double* x = estimate.x(variables_[record.variables + static_cast<std::int32_t>(k)]);
-      all.slots.push_back(place);
-      all.states[k].insert(all.states[k].end(), x,
-                           x + pool.type->ambient_size(static_cast<int>(k)));
+    std::copy_n(pool.measurements.data() + entry * measured, measured,
+                all.measurements.data() + i * measured);
+    all.noises[i] = pool.noises[entry];
+    std::fill_n(all.slots.data() + i * arity, arity, static_cast<std::int32_t>(i));
+  }
+  for (std::size_t k = 0; k < arity; ++k) {
+    const int ambient = pool.type->ambient_size(static_cast<int>(k));
+    double* to = all.states[k].data();
+    for (const std::int32_t f : factors) {
+      const std::int32_t v = variables_[records_[f].variables + static_cast<std::int32_t>(k)];
+      to = std::copy_n(estimate.x(v), ambient, to);
     }
   }
   all.state_arrays.clear();
@@ -307,10 +352,44 @@ void Models::correct(std::span<const std::int32_t> factors, const Graph& graph,
                            .gradients = all.gradient_targets.data()};
   type.linearize(view, 0, count, all.weights.empty() ? nullptr : all.weights.data(), sink,
                  all.norms.data());
+  const double* now = all.gradients.data();
   for (std::size_t i = 0; i < count; ++i) {
-    records_[factors[i]].cost = all.weights.empty() ? all.norms[i] : all.costs[i];
-    replace_gradient(factors[i], all.gradients.data() + i * static_cast<std::size_t>(one.scalars),
-                     states, system, held);
+    Record& record = records_[factors[i]];
+    record.cost = all.weights.empty() ? all.norms[i] : all.costs[i];
+    if (one.of_poses && one.rows == 3)
+      replace_gradient_of_pair<3>(record, now, states, system, held);
+    else if (one.of_poses && one.rows == 6)
+      replace_gradient_of_pair<6>(record, now, states, system, held);
+    else
+      replace_gradient(factors[i], now, states, system, held);
+    now += one.scalars;
+  }
+}
+
+/// As `replace_gradient`, for a factor of two variables with as many coordinates as it has rows.
+template <int Size>
+void Models::replace_gradient_of_pair(const Record& record, const double* now, const States& states,
+                                      System& system, std::span<const std::uint8_t> held) {
+  const std::int32_t* v = variables_.data() + record.variables;
+  double* const numbers = values_.at(record.place);
+  const double* J = numbers;
+  double* gradient = numbers + 2 * Size * (Size + 1);
+  const double* const travelled[] = {states.travelled(v[0]), states.travelled(v[1])};
+  double change[Size];
+  take_steps<Size>(J, travelled, numbers + 2 * Size * Size, change);
+  for (int k = 0; k < 2; ++k, J += Size * Size, gradient += Size, now += Size) {
+    if (!held[v[k]]) {
+      system.count_all(v[k]);
+      double* const changed = system.change(v[k]);
+      double* const sum = system.gradient(v[k]);
+      for (int i = 0; i < Size; ++i) {
+        double by = 0.0;
+        for (int r = 0; r < Size; ++r) by += J[i * Size + r] * change[r];
+        changed[i] -= by;
+        sum[i] += -now[i] - gradient[i];
+      }
+    }
+    for (int i = 0; i < Size; ++i) gradient[i] = -now[i];
   }
 }
 
@@ -356,13 +435,10 @@ double Models::mismatch(int f, const Graph& graph, const States& states) const {
 /// out += T_vᵀ γ: a gradient as seen from the variable, in its frame.
 void Models::add_in_frame(const States& states, std::int32_t v, int size, const double* gradient,
                           double* out) const {
-  if (!states.away(v)) {
+  if (states.away(v)) {
+    add_transposed_product(size, states.frame_to_body(v), size, gradient, 1, 1.0, out);
+  } else {
     for (int i = 0; i < size; ++i) out[i] += gradient[i];
-    return;
-  }
-  const double* T = states.frame_to_body(v);
-  for (int i = 0; i < size; ++i) {
-    for (int k = 0; k < size; ++k) out[i] += T[i * size + k] * gradient[k];
   }
 }
 

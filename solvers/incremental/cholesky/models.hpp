@@ -89,6 +89,7 @@ class Models {
     std::int32_t pool, entry;
     std::int16_t arity, rows, scalars;
     bool relative;
+    bool of_poses = false;  // two variables, both with as many coordinates as it has rows
     double cost = 0.0;
   };
   int size_of(const Record& record, int k) const { return tangents_[record.variables + k]; }
@@ -96,7 +97,11 @@ class Models {
   void gather(std::span<const std::int32_t> factors, const Graph& graph, const Estimate& estimate);
   void replace_gradient(int f, const double* now, const States& states, System& system,
                         std::span<const std::uint8_t> held);
+  template <int Size>
+  void replace_gradient_of_pair(const Record& record, const double* now, const States& states,
+                                System& system, std::span<const std::uint8_t> held);
   void start_here(const Record& record, const States& states);
+  bool has_moved(const Record& record, const States& states) const;
   void add_block(System& system, const Record& record, int ka, int kb, double sign) const;
   void add_in_frame(const States& states, std::int32_t v, int size, const double* gradient,
                     double* out) const;

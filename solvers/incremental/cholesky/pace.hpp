@@ -37,6 +37,7 @@ class Pace {
     limit_ = max_seconds;
     first_ = true;
     piece_.reset();
+    largest_ = 0.0;
     if (limited()) end_ = now() + limit_;
   }
   bool limited() const { return limit_ > 0.0; }
@@ -57,10 +58,13 @@ class Pace {
     piece_.reset();
     if (!std::exchange(first_, false) && time + expected > end_ - reserved_) return false;
     piece_ = {kind, amount, expected, time};
+    largest_ = std::max(largest_, amount);
     return true;
   }
   /// So many seconds at the end of the update are for something else.
   void keep_free(double seconds) { reserved_ = seconds; }
+  /// The largest amount of work that began as one piece in this update, for tests.
+  double largest() const { return largest_; }
   /// So that tests do not depend on time. It is read for each piece.
   void set_clock(Clock clock) {
     clock_ = std::move(clock);
@@ -90,7 +94,7 @@ class Pace {
 
   Clock clock_;
   double short_ = kShort;
-  double limit_ = 0.0, end_ = 0.0, reserved_ = 0.0;
+  double limit_ = 0.0, end_ = 0.0, reserved_ = 0.0, largest_ = 0.0;
   bool first_ = true;
   std::optional<Piece> piece_;
   /// Seconds for each unit, on an ordinary machine at first.

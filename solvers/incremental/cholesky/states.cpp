@@ -65,23 +65,28 @@ void States::move(std::span<const std::int32_t> variables, const double* steps) 
 void States::move_alike(std::span<const std::int32_t> variables, const double* steps) {
   const Record& one = records_[variables.front()];
   const std::int32_t ambient = one.ambient, tangent = one.tangent;
-  moved_.clear();
+  const std::size_t before = logged_.size(), doubles = static_cast<std::size_t>(ambient);
+  logged_.resize(before + variables.size() * doubles);
+  moved_.resize(variables.size() * doubles);
   turned_.assign(variables.size() * static_cast<std::size_t>(tangent), 0.0);
-  turned_at_.clear();
-  double* turned = turned_.data();
-  for (const std::int32_t v : variables) {
-    log(v);
+  turned_at_.resize(variables.size());
+  for (std::size_t i = 0; i < variables.size(); ++i) {
+    const std::int32_t v = variables[i];
     const Record& record = records_[v];
+    const std::size_t place = before + i * doubles;
+    log_.push_back({v, false, place, doubles});
+    std::copy_n(x(v), ambient, logged_.data() + place);
+    std::copy_n(x(v), ambient, moved_.data() + i * doubles);
     const double* step = steps + record.first;
-    for (std::int32_t k = 0; k < tangent; ++k) travelled_[record.first + k] += step[k];
-    moved_.insert(moved_.end(), x(v), x(v) + ambient);
-    turned_at_.push_back(turned - turned_.data());
+    double* const travelled = travelled_.data() + record.first;
+    for (std::int32_t k = 0; k < tangent; ++k) travelled[k] += step[k];
+    turned_at_[i] = static_cast<std::int64_t>(i) * tangent;
+    double* const turned = turned_.data() + turned_at_[i];
     if (record.away) {
       add_product(tangent, frame_to_body(v), tangent, step, turned);
     } else {
       std::copy_n(step, tangent, turned);
     }
-    turned += tangent;
   }
   one.type->retract(variables.size(), moved_.data(), turned_at_.data(), turned_.data(),
                     moved_.data());

@@ -33,21 +33,25 @@ class Tree::FrontPieces {
     return !in_pieces_ || pace_.allows(Work::factorize, nanoseconds);
   }
 
-  /// Where a piece of the panel's doubles ends that begins at `next`.
-  std::int64_t end_of_doubles(std::int64_t next) const {
-    const std::int64_t all = std::ssize(node_.panel);
+  /// Where a piece of so many doubles ends that begins at `next`.
+  std::int64_t end_of_doubles(std::int64_t next, std::int64_t all) const {
     return in_pieces_ ? std::min(all, next + block::kTileZeroed) : all;
   }
   /// Columns of a child's update matrix.
-  double of_child(const Node& child, std::int32_t columns) const {
-    return kCost.extend_entry * columns * child.below();
+  double of_child(const Node& child, std::int64_t columns) const {
+    return kCost.extend_entry * static_cast<double>(columns) * child.below();
+  }
+  std::int64_t end_of_child(const Node& child, std::int64_t column, std::int64_t last) const {
+    if (!in_pieces_) return last;
+    const auto columns = static_cast<std::int64_t>(kPiece / of_child(child, 1));
+    return std::min(last, column + std::max<std::int64_t>(8, columns));
   }
   /// Rows of the columns [first, last), those before being done.
   double of_rows(int first, int last, std::int64_t rows) const {
     return kCost.panel_flop * static_cast<double>(rows) * (last - first) * (first + last);
   }
   std::int64_t end_of_rows(int first, int last, std::int64_t row) const {
-    return end_of(row, of_rows(first, last, kRows));
+    return end_of(row, [&](std::int64_t end) { return of_rows(first, last, end - row); });
   }
   /// Rows [begin, end) of the update matrix's lower triangle, counted in the front.
   double of_update(std::int64_t begin, std::int64_t end) const {
@@ -55,14 +59,17 @@ class Tree::FrontPieces {
     return kCost.update_flop * 2.0 * node_.columns * width * static_cast<double>(end - begin);
   }
   std::int64_t end_of_update(std::int64_t row) const {
-    return end_of(row, of_update(row, row + kRows));
+    return end_of(row, [&](std::int64_t end) { return of_update(row, end); });
   }
 
  private:
-  std::int64_t end_of(std::int64_t row, double of_tile) const {
+  /// `time` is that of the rows from `row` up to some other one.
+  template <class Time>
+  std::int64_t end_of(std::int64_t row, Time time) const {
     if (!in_pieces_) return node_.stride;
-    const auto tiles = static_cast<std::int64_t>(kPiece / of_tile);
-    return std::min<std::int64_t>(node_.stride, row + kRows * std::max<std::int64_t>(1, tiles));
+    std::int64_t end = row + kRows;
+    while (end < node_.stride && time(end + kRows) <= kPiece) end += kRows;
+    return std::min<std::int64_t>(node_.stride, end);
   }
 
   const Node& node_;
@@ -182,7 +189,7 @@ void Tree::assemble(Node& node) {
 
 /// A child whose separator has another order than the front: block by block. Into the panel and
 /// what is there of the update matrix, which must have been computed.
-void Tree::add_scattered(const Node& child, Node& parent) {
+bool Tree::add_scattered(const Node& child, Node& parent, const FrontPieces& front) {
   const std::int32_t shift = child.columns / 8 * 8;
   // Element (row, column) of the parent's front, row ≥ column, is column_of(column)[row].
   const auto column_of = [&](std::int32_t column) {
@@ -190,10 +197,14 @@ void Tree::add_scattered(const Node& child, Node& parent) {
                ? parent.panel.data() + std::int64_t{column} * parent.stride
                : parent.update.data() + parent.update_place(column, column) - column;
   };
-  std::int32_t j = 0;
   const auto separator = child.separator();
-  for (std::size_t b = 0; b < separator.size(); ++b) {
+  std::int64_t& next = progress_.end;  // of the separator: those before are done
+  std::int32_t j = 0;
+  for (std::int64_t b = 0; b < next; ++b) j += system_->size(separator[b]);
+  for (; next < std::ssize(separator); ++next) {
+    const std::size_t b = static_cast<std::size_t>(next);
     const std::int32_t width = system_->size(separator[b]), to_j = front_row_[separator[b]];
+    if (!front.allows(front.of_child(child, width))) return false;
     std::int32_t i = j;
     for (std::size_t a = b; a < separator.size(); ++a) {
       const std::int32_t height = system_->size(separator[a]), to_i = front_row_[separator[a]];
@@ -211,6 +222,37 @@ void Tree::add_scattered(const Node& child, Node& parent) {
     }
     j += width;
   }
+  next = 0;
+  return true;
+}
+
+/// Sets all of an array to zero.
+bool Tree::fill_with_zeros(std::span<double> array, const FrontPieces& front) {
+  const std::int64_t all = std::ssize(array);
+  for (std::int64_t& next = progress_.next; next < all; next = progress_.end) {
+    progress_.end = front.end_of_doubles(next, all);
+    if (!front.allows(kCost.panel_entry * static_cast<double>(progress_.end - next))) return false;
+    std::fill(array.begin() + next, array.begin() + progress_.end, 0.0);
+  }
+  return true;
+}
+
+/// Adds columns [first, last) of the update matrix of a child that is `straight`, see `extend_add`.
+bool Tree::add_child(const Node& child, std::int32_t first, std::int32_t last, double* parent,
+                     std::int64_t parent_stride, const FrontPieces& front) {
+  std::int64_t& column = progress_.end;
+  column = std::max<std::int64_t>(column, first);
+  while (column < last) {
+    const std::int64_t end = front.end_of_child(child, column, last);
+    if (!front.allows(front.of_child(child, end - column))) return false;
+    kernels_->extend_add(child.spreads.data(), static_cast<int>(child.spreads.size()),
+                         static_cast<int>(column), static_cast<int>(end),
+                         child.update.data() + child.columns % 8, child.update_stride(), parent,
+                         parent_stride);
+    column = end;
+  }
+  column = 0;
+  return true;
 }
 
 /// Computes a node. Where its front is large and the time is limited, in pieces: false if there was
@@ -227,12 +269,7 @@ bool Tree::factorize_node(Node& node, Pace& pace) {
   std::int64_t& next = progress_.next;
   switch (progress_.part) {
     case zero:
-      for (; next < std::ssize(node.panel); next = progress_.end) {
-        progress_.end = front.end_of_doubles(next);
-        if (!front.allows(kCost.panel_entry * static_cast<double>(progress_.end - next)))
-          return false;
-        std::fill(panel + next, panel + progress_.end, 0.0);
-      }
+      if (!fill_with_zeros(node.panel, front)) return false;
       progress_.go_to(assemble_H);
       [[fallthrough]];
     case assemble_H:
@@ -248,20 +285,19 @@ bool Tree::factorize_node(Node& node, Pace& pace) {
           progress_.scattered = true;
           continue;
         }
-        if (!front.allows(front.of_child(child, child.panel_rows))) return false;
-        kernels_->extend_add(child.spreads.data(), static_cast<int>(child.spreads.size()), 0,
-                             child.panel_rows, child.update.data() + child.columns % 8,
-                             child.update_stride(), panel, stride);
+        if (!add_child(child, 0, child.panel_rows, panel, stride, front)) return false;
       }
+      progress_.go_to(zero_update);
+      [[fallthrough]];
+    case zero_update:
+      if (progress_.scattered && inner && !fill_with_zeros(node.update, front)) return false;
       progress_.go_to(add_scattered_ones);
       [[fallthrough]];
     case add_scattered_ones:
       // Panel and update matrix at once: the latter into zeros, to be added after the product.
       for (; progress_.scattered && next < std::ssize(node.children); ++next) {
         const Node& child = nodes_[node.children[next]];
-        if (!child.straight && !front.allows(front.of_child(child, child.below()))) return false;
-        if (next == 0 && inner) std::fill(node.update.begin(), node.update.end(), 0.0);
-        if (!child.straight) add_scattered(child, node);
+        if (!child.straight && !add_scattered(child, node, front)) return false;
       }
       for (const std::int32_t v : node.variables) front_row_[v] = -1;
       if (progress_.scattered && inner) {
@@ -283,21 +319,21 @@ bool Tree::factorize_node(Node& node, Pace& pace) {
         kernels_->update(panel, stride, node.columns, node.m, node.update.data(),
                          static_cast<int>(next), static_cast<int>(progress_.end));
       }
+      progress_.go_to(add_scattered_part);
+      [[fallthrough]];
+    case add_scattered_part:
+      if (!add_children_part(node, front)) return false;
       progress_.go_to(add_to_update);
       [[fallthrough]];
     case add_to_update:
-      add_children_part(node);
       for (; next < std::ssize(node.children); ++next) {
         const Node& child = nodes_[node.children[next]];
         if (!child.straight) continue;
-        if (!front.allows(front.of_child(child, child.below() - child.panel_rows))) return false;
         // The update matrix as if it were a part of the whole front.
         double* const whole =
             node.update.data() - node.columns * node.update_stride() - node.columns / 8 * 8;
-        kernels_->extend_add(child.spreads.data(), static_cast<int>(child.spreads.size()),
-                             child.panel_rows, child.below(),
-                             child.update.data() + child.columns % 8, child.update_stride(), whole,
-                             node.update_stride());
+        if (!add_child(child, child.panel_rows, child.below(), whole, node.update_stride(), front))
+          return false;
       }
   }
   return true;
@@ -334,10 +370,16 @@ bool Tree::factorize_columns(Node& node, const FrontPieces& front) {
 }
 
 /// What scattered children have added beside the product.
-void Tree::add_children_part(Node& node) {
-  for (std::size_t k = 0; k < progress_.children_part.size(); ++k)
-    node.update[k] += progress_.children_part[k];
+bool Tree::add_children_part(Node& node, const FrontPieces& front) {
+  const std::int64_t all = std::ssize(progress_.children_part);
+  for (std::int64_t& next = progress_.next; next < all; next = progress_.end) {
+    progress_.end = front.end_of_doubles(next, all);
+    if (!front.allows(kCost.panel_entry * static_cast<double>(progress_.end - next))) return false;
+    for (std::int64_t k = next; k < progress_.end; ++k)
+      node.update[k] += progress_.children_part[k];
+  }
   progress_.children_part = UninitializedVector();
+  return true;
 }
 
 std::int32_t Tree::front_row(const Node& node, std::int32_t variable) const {

@@ -243,11 +243,13 @@ class Tree {
     enum class Part : std::uint8_t {
       zero,                ///< the panel: doubles
       assemble_H,          ///< the entries of H, at once
-      add_to_panel,        ///< children
-      add_scattered_ones,  ///< children whose separator has another order than the front
+      add_to_panel,        ///< children: the next one's columns up to `end`
+      zero_update,         ///< the update matrix, if there are …
+      add_scattered_ones,  ///< … children whose separator has another order than the front
       columns,             ///< of the panel: a strip, and its rows up to `end`
       update,              ///< the update matrix: rows of the front
-      add_to_update        ///< children
+      add_scattered_part,  ///< `children_part`: doubles
+      add_to_update        ///< children, as to the panel
     };
     Part part = Part::zero;
     std::int64_t next = 0, end = 0;     ///< the part goes on there; where its last piece ended
@@ -276,10 +278,13 @@ class Tree {
   void connect_children(const Node& parent);
   void connect(Node& child, const Node& parent);
   void assemble(Node& node);
-  void add_scattered(const Node& child, Node& parent);
+  bool fill_with_zeros(std::span<double> array, const FrontPieces& front);
+  bool add_child(const Node& child, std::int32_t first, std::int32_t last, double* parent,
+                 std::int64_t parent_stride, const FrontPieces& front);
+  bool add_scattered(const Node& child, Node& parent, const FrontPieces& front);
   bool factorize_node(Node& node, Pace& pace);
   bool factorize_columns(Node& node, const FrontPieces& front);
-  void add_children_part(Node& node);
+  bool add_children_part(Node& node, const FrontPieces& front);
   void solve_node(Node& node, const double* y, std::vector<double>& steps,
                   std::vector<std::int32_t>& changed);
   double owed_square(const Node& node) const;

@@ -320,7 +320,8 @@ std::vector<double> numbers_of(const Tree& tree) {
   return all;
 }
 
-/// Goes on with a factorisation, one piece at a time; `pause` is called after each.
+/// Goes on with a factorisation, one piece at a time; `pause` is called after each, with how much
+/// work it was.
 template <class Pause>
 std::int32_t factorize_in_pieces(Tree& tree, Pause pause) {
   double reads = 0.0;
@@ -330,7 +331,7 @@ std::int32_t factorize_in_pieces(Tree& tree, Pause pause) {
   while (result == Tree::kPaused) {
     pace.begin(0.5);
     result = tree.factorize_more(pace);
-    if (result == Tree::kPaused) pause();
+    if (result == Tree::kPaused) pause(pace.largest());
   }
   return result;
 }
@@ -377,7 +378,7 @@ TEST(Tree, AFactorizationThatPausesHasTheSameBits) {
     tree.begin_factorization(0.0);
     int pauses = 0;
     const std::vector<std::int32_t> bound(changing.alive().size(), 1);
-    const auto pause = [&] {
+    const auto pause = [&](double) {
       if (++pauses % 40 != 0) return;
       States states;
       Tree copy(tree, changing.system(), states, bound);
@@ -396,8 +397,33 @@ TEST(Tree, AFactorizationThatPausesHasTheSameBits) {
     changing.add_to_diagonal(bad, -much);
     changing.restructure();
     tree.begin_factorization(0.0);
-    EXPECT_EQ(factorize_in_pieces(tree, [] {}), bad) << kernels->name;
+    EXPECT_EQ(factorize_in_pieces(tree, [](double) {}), bad) << kernels->name;
   }
+}
+
+/// Wherever in a front they begin.
+TEST(Tree, PiecesOfLargeFrontsAreAllSmall) {
+  Changing changing(3, *kernel_sets().front());
+  // Two groups that are joined with a third, but not with each other, are eliminated before it.
+  constexpr int kGroup = 60, kThird = 100;
+  for (int k = 0; k < 2 * kGroup + kThird; ++k) {
+    changing.add_variable(6);
+    for (int j = k < 2 * kGroup ? k / kGroup * kGroup : 0; j < k; ++j) changing.add_edge(j, k);
+  }
+  for (const std::int32_t v : changing.alive()) changing.touch(v);
+  changing.restructure();
+  Tree& tree = changing.tree();
+  EXPECT_GE(std::ranges::count_if(tree.affected(),
+                                  [&](std::int32_t n) {
+                                    const Node& node = tree.nodes()[static_cast<std::size_t>(n)];
+                                    return node.columns > 300 && node.below() > 500;
+                                  }),
+            2);
+  tree.begin_factorization(0.0);
+  double largest = 0.0;  // [ns by the cost model]
+  ASSERT_EQ(factorize_in_pieces(tree, [&](double amount) { largest = std::max(largest, amount); }),
+            -1);
+  EXPECT_LT(largest, 4e5);
 }
 
 TEST(Tree, WhatIsOwedAndFollowedIsTheWholeSolution) {
