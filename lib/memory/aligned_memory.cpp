@@ -64,45 +64,51 @@ std::size_t in_pages(std::size_t bytes) {
 
 /// Huge pages that arrays share, each with an allocator of Boost's at its beginning, and stretches
 /// of small pages of the same size. What nobody uses any more goes back to the system, except for
-/// the last of them.
+/// the last of each kind.
 class SharedPages {
  public:
   void* allocate(std::size_t bytes) {
     const std::lock_guard lock(mutex_);
-    std::vector<Page*>& pages = small_pages > 0 ? small_ : huge_;
-    for (Page* page : pages) {
-      if (void* memory = page->allocate(bytes)) return memory;
+    Kind& wanted = small_pages > 0 ? small_ : huge_;
+    // What has been touched, of either kind, costs nothing.
+    for (const Kind* kind : {&wanted, &wanted == &small_ ? &huge_ : &small_}) {
+      for (Page* page : kind->pages) {
+        if (void* memory = page->allocate(bytes)) return memory;
+      }
     }
-    pages.reserve(pages.size() + 1);
+    wanted.pages.reserve(wanted.pages.size() + 1);
     void* memory = allocate_pages(kHugePage);
-    pages.push_back(::new (memory) Page(kHugePage, 0));
-    return pages.back()->allocate(bytes);
+    wanted.pages.push_back(::new (memory) Page(kHugePage, 0));
+    return wanted.pages.back()->allocate(bytes);
   }
   void release(void* memory) noexcept {
     const std::lock_guard lock(mutex_);
     Page* page = page_of(memory);
     page->deallocate(memory);
     if (!page->all_memory_deallocated()) return;
-    if (spare_ && spare_ != page && spare_->all_memory_deallocated()) {
-      std::erase(huge_, page);
-      std::erase(small_, page);
+    Kind& kind = std::ranges::find(small_.pages, page) != small_.pages.end() ? small_ : huge_;
+    if (kind.spare && kind.spare != page && kind.spare->all_memory_deallocated()) {
+      std::erase(kind.pages, page);
       page->~Page();
       return release_pages(page);
     }
-    spare_ = page;
+    kind.spare = page;
   }
 
  private:
   using Page = boost::interprocess::rbtree_best_fit<boost::interprocess::null_mutex_family, void*,
                                                     kCacheLine>;
+  struct Kind {
+    std::vector<Page*> pages;
+    Page* spare = nullptr;  // one that was empty when last seen
+  };
   static Page* page_of(void* memory) {
     const auto address = reinterpret_cast<std::uintptr_t>(memory);
     return reinterpret_cast<Page*>(address / kHugePage * kHugePage);
   }
 
   std::mutex mutex_;
-  std::vector<Page*> huge_, small_;
-  Page* spare_ = nullptr;  // one that was empty when last seen
+  Kind huge_, small_;
 };
 
 SharedPages& shared_pages() {

@@ -11,7 +11,7 @@
 /// the first of its iterations takes half of the time.
 namespace cairn::memory {
 
-/// Memory on a 64-byte boundary, not in huge pages while there are `SmallPages`. Several threads
+/// Memory on a 64-byte boundary, in no new huge page while there are `SmallPages`. Several threads
 /// may call this at once. Throws std::bad_alloc.
 void* allocate(std::size_t bytes);
 /// Gives it back; `bytes` as they were asked for.

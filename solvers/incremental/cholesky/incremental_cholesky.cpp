@@ -59,7 +59,7 @@ UpdateReport IncrementalCholesky::update(const GraphUpdate& update, const Update
       options.full || (options_.full_every > 0 && since_full_ + 1 >= options_.full_every);
   const double max_seconds = options.max_seconds > 0.0 ? options.max_seconds : options_.budget;
   std::optional<memory::SmallPages> small_pages;
-  if (max_seconds > 0.0) small_pages.emplace();
+  if (!full && max_seconds > 0.0) small_pages.emplace();
   UpdateReport report;
   const double of_solution =
       carry_out_or_not_at_all(update, full, !full && max_seconds > 0.0, report);
@@ -76,6 +76,7 @@ UpdateReport IncrementalCholesky::update(const GraphUpdate& update, const Update
     engine_->solve(left, report);
     since_solved_ = 0;
   }
+  small_pages.reset();
   if (report.ok && since_solved_ == 0 && engine_->up_to_date() &&
       engine_->covariances().keeps_anything()) {
     const Clock::time_point covariances_begin = Clock::now();

@@ -63,7 +63,8 @@ class Pace {
   }
   /// So many seconds at the end of the update are for something else.
   void keep_free(double seconds) { reserved_ = seconds; }
-  /// The largest amount of work that began as one piece in this update, for tests.
+  /// The largest amount of work that began as one piece in this update; for tests, with a clock of
+  /// their own.
   double largest() const { return largest_; }
   /// So that tests do not depend on time. It is read for each piece.
   void set_clock(Clock clock) {

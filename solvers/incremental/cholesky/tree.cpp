@@ -301,8 +301,8 @@ bool Tree::factorize_node(Node& node, Pace& pace) {
       }
       for (const std::int32_t v : node.variables) front_row_[v] = -1;
       if (progress_.scattered && inner) {
-        std::swap(progress_.children_part, node.update);
-        node.update.resize(progress_.children_part.size());
+        UninitializedVector product(node.update.size());  // where memory ends, all is as it was
+        progress_.children_part = std::exchange(node.update, std::move(product));
       }
       progress_.go_to(columns);
       [[fallthrough]];

@@ -3,6 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <sys/resource.h>
+
+#include <algorithm>
 #include <cstddef>
 #include <thread>
 #include <vector>
@@ -51,31 +54,58 @@ TEST_F(SmallPages, AreThoseOfOneThread) {
   EXPECT_TRUE(huge);
 }
 
-/// Arrays that share pages, some of them huge: each keeps its numbers, whenever it is given back.
-TEST_F(SmallPages, AreSharedWithNothingInHugePages) {
+/// Arrays that share pages of both kinds: each keeps its numbers, whenever it is given back, and
+/// none of a limited part takes a new huge page.
+TEST_F(SmallPages, ShareWhatThereIsButTakeNothingHuge) {
   std::vector<AlignedVector> huge, small;
   for (int k = 0; k < 200; ++k) {
     huge.emplace_back(3000 + k, k);
-    EXPECT_TRUE(*advised_to_be_huge(huge.back().data()));
+    const std::size_t before = bytes_advised_to_be_huge();
     const memory::SmallPages pages;
     small.emplace_back(3000 + k, -k);
-    EXPECT_FALSE(*advised_to_be_huge(small.back().data()));
-    if (k % 3 == 0) huge[k / 2] = AlignedVector(4000, k / 2);
+    EXPECT_EQ(bytes_advised_to_be_huge(), before);
+    if (k % 3 == 0) huge[static_cast<std::size_t>(k) / 2] = AlignedVector(4000, k);
   }
-  for (int k = 0; k < 200; ++k) {
-    EXPECT_EQ(huge[k], AlignedVector(huge[k].size(), k));
-    EXPECT_EQ(small[k], AlignedVector(3000 + k, -k));
+  const auto check = [&] {
+    for (int k = 0; k < 200; ++k) {
+      const AlignedVector &one = huge[static_cast<std::size_t>(k)],
+                          &other = small[static_cast<std::size_t>(k)];
+      EXPECT_EQ(std::ranges::count(one, one.empty() ? 0.0 : one.front()), std::ssize(one));
+      EXPECT_EQ(std::ranges::count(other, -k), std::ssize(other));
+    }
+  };
+  check();
+  for (std::size_t k = 0; k < 200; ++k) {
     if (k % 2 == 0) huge[k] = {};
     if (k % 3 == 0) small[k] = {};
   }
-  for (int k = 0; k < 200; ++k) {
-    if (k % 2 != 0) {
-      EXPECT_EQ(huge[k], AlignedVector(huge[k].size(), k));
-    }
-    if (k % 3 != 0) {
-      EXPECT_EQ(small[k], AlignedVector(3000 + k, -k));
-    }
+  check();
+}
+
+/// Pages that nobody uses are kept for the next array, whichever kind was used last.
+TEST_F(SmallPages, AreTouchedOnce) {
+  constexpr std::size_t kSome = 5000;  // doubles: 40 KB, for which pages are shared
+  const auto faults_of_use = [] {
+    rusage before{}, after{};
+    ::getrusage(RUSAGE_SELF, &before);
+    for (int k = 0; k < 100; ++k) const AlignedVector array(kSome, 1.0);
+    ::getrusage(RUSAGE_SELF, &after);
+    return after.ru_minflt - before.ru_minflt;
+  };
+  // No room is left in what there is already.
+  std::vector<AlignedVector> all;
+  for (int k = 0; k < 400; ++k) all.emplace_back(kSome, 1.0);
+  {
+    const memory::SmallPages pages;
+    for (int k = 0; k < 400; ++k) all.emplace_back(kSome, 1.0);
+    faults_of_use();
+    EXPECT_LT(faults_of_use(), 10);
   }
+  faults_of_use();
+  EXPECT_LT(faults_of_use(), 10);
+  const memory::SmallPages pages;
+  faults_of_use();
+  EXPECT_LT(faults_of_use(), 10);
 }
 
 TEST_F(SmallPages, AreThoseOfAnArrayThatBeginsLarge) {

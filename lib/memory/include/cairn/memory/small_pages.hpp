@@ -3,8 +3,8 @@
 
 namespace cairn::memory {
 
-/// While one of these exists, the arrays that its thread asks for are not in huge pages: for work
-/// with a limit of time. The first touch of a huge page clears 2 MB, which takes 0.1 ms, and
+/// While one of these exists, the arrays of its thread ask for no further huge pages: for work with
+/// a limit of time. The first touch of a huge page clears 2 MB, which takes 0.1 ms, and
 /// several where the system has to make room for it first, or a virtual machine has to get it from
 /// its host.
 class __attribute__((visibility("default"))) SmallPages {

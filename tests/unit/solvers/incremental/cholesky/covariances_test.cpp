@@ -182,6 +182,9 @@ TEST_P(KeptCovariances, AreDowndatedForFewFactorsAndRecomputedForMany) {
   EXPECT_GT(downdates, 5);
   UpdateReport report;
   engine.solve_fully(report);
+  // Near the minimum, what was linearised first does until it is linearised there.
+  EXPECT_EQ(report.relinearized_factors, 2 * engine.graph().factor_count());
+  EXPECT_GT(report.iterations, 2);
   EXPECT_EQ(engine.update_covariances(), MarginalsBy::recomputation);
   expect_kept(engine, {}, 1e-9);
 }
