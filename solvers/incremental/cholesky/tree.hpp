@@ -120,10 +120,10 @@ class Tree {
     begin_factorization(0.0);
     return factorize_more(any);
   }
-  /// The same in pieces, a node or a part of a large one (see `Progress`): `factorize_more` returns `kPaused` where there is no time for the next piece, and
-  /// goes on there when it is called again. Until it has ended nothing may be touched, and H must
-  /// not change. The factor is that of H with its diagonal times 1 + `damping`, and has the same
-  /// bits however often it has paused.
+  /// The same in pieces, a node or a part of a large one (see `Progress`): `factorize_more` returns
+  /// `kPaused` where there is no time for the next piece, and goes on there when it is called
+  /// again. Until it has ended nothing may be touched, and H must not change. The factor is that of
+  /// H with its diagonal times 1 + `damping`, and has the same bits however often it has paused.
   void begin_factorization(double damping);
   std::int32_t factorize_more(Pace& pace);
   static constexpr std::int32_t kPaused = -2;
