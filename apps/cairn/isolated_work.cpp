@@ -19,6 +19,7 @@
 #include <cstring>
 #include <exception>
 #include <new>
+#include <random>
 
 #include <fmt/core.h>
 
@@ -79,7 +80,8 @@ void copy_text(std::string_view text, std::array<char, N>& to) {
 }  // namespace
 
 void IsolatedWork::Sender::send(std::string_view line) const {
-  std::string text(line);
+  std::string text = mark_;
+  text += line;
   text += '\n';
   for (std::size_t done = 0; done < text.size();) {
     const ssize_t count = ::write(pipe_, text.data() + done, text.size() - done);
@@ -95,7 +97,8 @@ void IsolatedWork::Sender::calling(std::string_view function, std::string_view a
   copy_text(arguments, call.arguments);
 }
 
-IsolatedWork::IsolatedWork(const std::function<void(const Sender&)>& work) {
+IsolatedWork::IsolatedWork(const std::function<void(const Sender&)>& work)
+    : mark_(fmt::format("{:08x} ", std::random_device()())) {
   const auto refuse = [] {
     return Error(ErrorCode::numerical,
                  fmt::format("a child process cannot be started ({})", std::strerror(errno)));
@@ -111,7 +114,7 @@ IsolatedWork::IsolatedWork(const std::function<void(const Sender&)>& work) {
   child_ = ::fork();
   if (child_ == 0) {
     ::close(ends[0]);
-    run_child(work, Sender(ends[1], shared_), output_);
+    run_child(work, Sender(ends[1], shared_, mark_), output_);
   }
   ::close(ends[1]);
   pipe_ = ends[0];
@@ -132,8 +135,9 @@ std::optional<std::string> IsolatedWork::next_line(double seconds) {
     if (const std::size_t at = buffer_.find('\n'); at != std::string::npos) {
       std::string line = buffer_.substr(0, at);
       buffer_.erase(0, at + 1);
-      if (!line.empty()) return line;
-      finished_ = true;
+      foreign_ = !line.starts_with(mark_);
+      finished_ = !foreign_ && line.size() == mark_.size();
+      if (!foreign_ && !finished_) return line.substr(mark_.size());
       kill_child();
       return {};
     }
@@ -172,6 +176,7 @@ void IsolatedWork::kill_child() {
 
 std::string IsolatedWork::failure() const {
   if (finished_) return {};
+  if (foreign_) return "wrote to a descriptor that it has not opened";
   if (waited_ > 0.0) return fmt::format("did not return within {:g} s", waited_);
   if (WIFSIGNALED(status_)) return fmt::format("crashed ({})", ::strsignal(WTERMSIG(status_)));
   return fmt::format("ended the process with exit code {}", WEXITSTATUS(status_));

@@ -17,7 +17,8 @@ class IsolatedWork {
   /// What the work has of its connection to this process.
   class Sender {
    public:
-    Sender(int pipe, void* shared) : pipe_(pipe), shared_(shared) {}
+    Sender(int pipe, void* shared, std::string_view mark)
+        : pipe_(pipe), shared_(shared), mark_(mark) {}
     /// One line; `line` must hold no line break.
     void send(std::string_view line) const;
     /// A call that may not return: its function and its arguments in words.
@@ -26,6 +27,7 @@ class IsolatedWork {
    private:
     int pipe_;
     void* shared_;
+    std::string mark_;  // before each line
   };
 
   /// Starts the work. Throws `Error` (numerical) where the system has no process for it.
@@ -40,11 +42,13 @@ class IsolatedWork {
   std::optional<std::string> next_line(double seconds);
 
   /// After the last line: how the process ended where its work did not: "crashed (Segmentation
-  /// fault)", "ended the process with exit code 3", "did not return within 10 s". Empty: the work
-  /// was finished.
+  /// fault)", "ended the process with exit code 3", "did not return within 10 s", "wrote to a
+  /// descriptor that it has not opened". Empty: the work was finished.
   std::string failure() const;
   /// Whether it was killed since it did not return.
   bool timed_out() const { return waited_ > 0.0; }
+  /// Whether the work wrote where only this process's lines belong.
+  bool wrote_elsewhere() const { return foreign_; }
   /// The call during which that was.
   std::string function() const;
   std::string arguments() const;
@@ -60,8 +64,10 @@ class IsolatedWork {
   void* shared_ = nullptr;
   std::string buffer_;
   int status_ = 0;
+  std::string mark_;  // a random word: what has none was not sent by the work
   bool finished_ = false;
-  double waited_ = 0.0;  // seconds, when it was killed for that
+  bool foreign_ = false;  // something without the mark came
+  double waited_ = 0.0;   // seconds, when it was killed for that
 };
 
 }  // namespace cairn::app

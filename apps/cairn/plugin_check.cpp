@@ -25,6 +25,7 @@
 #include "isolated_work.hpp"
 #include "json_report.hpp"
 #include "table.hpp"
+#include "unlinked_symbols.hpp"
 
 namespace cairn::app {
 namespace {
@@ -143,6 +144,17 @@ ConformanceResult check_registration(const fs::path& file, const std::vector<Off
     check("what the manifest declares is registered", fmt::format("{} {}", offer.kind, offer.name),
           [&] { ask_for(offer, registry); });
   }
+  check("it is linked with every library that it uses", "", [&] {
+    const std::vector<std::string> symbols = unlinked_symbols(file);
+    if (symbols.empty()) return;
+    throw Error(
+        ErrorCode::plugin,
+        fmt::format("not with {}{}; programs that have not loaded it, such as Python, "
+                    "cannot load the plugin: LIBRARIES cairn::slam in cairn_add_plugin() "
+                    "links it",
+                    symbols.front(),
+                    symbols.size() > 1 ? fmt::format(" and {} more", symbols.size() - 1) : ""));
+  });
   check("it is loaded quickly", "", [&] {
     const double seconds = seconds_since(begin);
     if (seconds <= kLoadingSeconds) return;
@@ -249,7 +261,22 @@ class FileCheck {
     }
     session_.print(bad == 0 ? fmt::format("  all {} checks hold\n", checks)
                             : fmt::format("  groups of checks with findings: {} of {}\n", bad,
-                                          results_.size()));
+                                          results_.size()) +
+                                  summary_of_findings());
+  }
+
+  /// "    format 'xyz': round trip, memory", a line for each component with findings.
+  std::string summary_of_findings() const {
+    std::string text, last;
+    for (const ConformanceResult& result : results_) {
+      if (result.ok()) continue;
+      const std::string name =
+          printable(fmt::format("{} '{}'", result.checked.kind, result.checked.name));
+      text += name == last ? ", " : fmt::format("{}    {}: ", text.empty() ? "" : "\n", name);
+      text += result.checked.group;
+      last = name;
+    }
+    return text + "\n";
   }
 
   bool ok() const {
@@ -341,7 +368,9 @@ class FileCheck {
       const std::size_t last = printed.rfind('\n');
       problem += "; printed last: " + printed.substr(last == std::string::npos ? 0 : last + 1);
     }
-    result.findings.push_back({fmt::format("{} returns", work.function()), printable(problem),
+    const char* const law =
+        work.wrote_elsewhere() ? "{} writes to its own files alone" : "{} returns";
+    result.findings.push_back({fmt::format(fmt::runtime(law), work.function()), printable(problem),
                                printable(work.arguments()), 1});
     return result;
   }

@@ -171,6 +171,26 @@ void check_jacobians(const Subject& subject, Checker& check) {
   });
 }
 
+/// A variable that no residual depends on is not determined by its factor, and does not belong to
+/// it.
+void check_influence(const Subject& subject, Checker& check) {
+  std::vector<double> largest;
+  for_factors(subject, check, [&](const FactorSamples& type, const FactorSample& s) {
+    largest.resize(type.arity(), 0.0);
+    const Evaluation evaluation = type.evaluate(s);
+    for (std::size_t v = 0; v < type.arity(); ++v) {
+      const double norm = evaluation.J[v].norm();
+      if (!(norm <= largest[v])) largest[v] = norm;
+    }
+  });
+  check.describe("");
+  for (std::size_t v = 0; v < largest.size(); ++v) {
+    check.expect(largest[v] != 0.0, "every variable has an influence on the residual", [&] {
+      return fmt::format("the Jacobian by variable {} is zero at all random states", v);
+    });
+  }
+}
+
 void check_propagate(const Subject& subject, Checker& check) {
   bool some = false;
   for_factors(subject, check, [&](const FactorSamples& type, const FactorSample& s) {
@@ -232,10 +252,11 @@ Repetition factor_uses(const Subject& subject, Checker& check) {
 }  // namespace
 
 std::span<const Group> factor_groups() {
-  static constexpr std::array<Group, 10> groups{{{"sizes", check_sizes},
+  static constexpr std::array<Group, 11> groups{{{"sizes", check_sizes},
                                                  {"measurement", check_measurements},
                                                  {"residual", check_residual},
                                                  {"Jacobians", check_jacobians},
+                                                 {"influence", check_influence},
                                                  {"wrapping", check_wrapping},
                                                  {"pool", check_pools},
                                                  {"propagate", check_propagate},

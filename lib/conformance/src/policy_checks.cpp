@@ -31,6 +31,9 @@ constexpr int kPoses = 40;
 /// the odometry of half a lap.
 constexpr double kDrift = 0.5;
 
+/// Share of chi2 that may be left after `finish`.
+constexpr double kSolved = 1e-6;
+
 /// The largest distance of a variable of both graphs.
 double largest_distance(const Graph& some, const Graph& all) {
   double largest = 0.0;
@@ -64,6 +67,25 @@ class Recorded {
   std::map<std::pair<Id, Id>, std::vector<Factor>> factors_;
 };
 
+/// After `finish`: the estimate is of the poses that are kept, with all of their factors, and
+/// solved.
+void check_what_is_kept(PosePolicy& policy, const Graph& compact, const std::set<Id>& kept,
+                        Checker& check) {
+  const std::vector<Id> ids = policy.estimator().variables();
+  check.expect(std::set<Id>(ids.begin(), ids.end()) == kept,
+               "the estimate has the poses that are kept, and no others",
+               [&] { return fmt::format("{} poses, where {} are kept", ids.size(), kept.size()); });
+  check.expect(policy.factor_count() == compact.factor_count(),
+               "factor_count is that of the estimate after finish", [&] {
+                 return fmt::format("{} and {}", policy.factor_count(), compact.factor_count());
+               });
+  Graph solved = compact.clone();
+  const double found = chi2(compact), least = minimize_densely(solved);
+  check.expect(found <= least * (1.0 + kSolved) + kSolved, "finish solves to convergence", [&] {
+    return fmt::format("chi2 {}, where dense Gauss-Newton reaches {}", found, least);
+  });
+}
+
 void check_policy(const Subject& subject, Checker& check) {
   Graph minimum = two_laps(kPoses, check.options().seed);
   minimize_densely(minimum);
@@ -91,6 +113,7 @@ void check_policy(const Subject& subject, Checker& check) {
     const Graph compact = check.call("estimator", [&] { return policy->estimator().graph(); });
     check.expect(std::isfinite(chi2(compact)), "chi2 is finite",
                  [&] { return fmt::format("{}", chi2(compact)); });
+    check_what_is_kept(*policy, compact, distinct, check);
     check.within(largest_distance(compact, minimum), kDrift,
                  "poses that are kept are where all measurements put them");
     const Graph whole =
@@ -149,6 +172,74 @@ void check_bad_calls(PosePolicy& policy, const PolicyData& data, Checker& check)
     check.expect(held() == before, "a refused call changes nothing",
                  [] { return std::string("it does"); });
   }
+}
+
+/// One pose of the recording, with every match that is proposed answered.
+void drive(PosePolicy& policy, const PolicyData& data, const Recorded& recorded, std::size_t k,
+           const std::function<void()>& while_open) {
+  const Arrival& arrival = data.poses[k];
+  std::vector<Factor> odometry;
+  for (const int f : arrival.odometry) odometry.push_back(data.recording.factor(f));
+  policy.add_pose(data.recording.variable(arrival.pose()), odometry);
+  while_open();
+  for (std::size_t proposals = 0; proposals <= k; ++proposals) {
+    const std::optional<MatchProposal> proposal = policy.next_match();
+    if (!proposal) break;
+    policy.offer(proposal->earlier, recorded(proposal->earlier, proposal->later));
+  }
+  policy.end_pose();
+}
+
+/// The end of a drive, to the last bit.
+State end_of(PosePolicy& policy) {
+  State all = policy.newest_state();
+  all.push_back(policy.finish() ? 1.0 : 0.0);
+  for (const Id id : policy.kept()) all.push_back(static_cast<double>(id));
+  all.push_back(policy.factor_count());
+  const State states = states_of(policy.estimator().graph());
+  all.insert(all.end(), states.begin(), states.end());
+  return all;
+}
+
+/// A drive with refused calls on the way ends as one without: what they would have left may show
+/// with the next pose alone.
+void check_refusals(const Subject& subject, Checker& check) {
+  check.sample(fmt::format("{} poses on two laps, with wrong calls after some", kPoses), [&] {
+    const PolicyData data = policy_data(two_laps(kPoses, check.options().seed));
+    const Recorded recorded(data.recording);
+    const auto undisturbed = made<PosePolicy>(subject, check),
+               disturbed = made<PosePolicy>(subject, check);
+    const auto refused = [&](const std::function<void()>& call) {
+      try {
+        call();
+      } catch (const Error&) {  // as it must be; that it is is checked elsewhere
+      }
+    };
+    Factor foreign = data.recording.factor(0);
+    foreign.variables = {data.recording.id(data.poses.front().pose()), 1000000};
+    for (PosePolicy* policy : {undisturbed.get(), disturbed.get()})
+      check.call("expect", [&] { policy->expect(data.recording, data.poses); });
+    for (std::size_t k = 0; k < data.poses.size(); ++k) {
+      check.call("the policy", [&] {
+        drive(*undisturbed, data, recorded, k, [] {});
+        const bool wrong = k > 0 && k % 5 == 0;
+        if (wrong) {
+          Variable pose = data.recording.variable(data.poses[k].pose());
+          refused([&] { disturbed->add_pose(pose, {}); });
+          pose.id = 1000000;
+          refused([&] { disturbed->add_pose(pose, {&foreign, 1}); });
+        }
+        drive(*disturbed, data, recorded, k, [&] {
+          if (wrong) refused([&] { disturbed->offer(2000000, {&foreign, 1}); });
+        });
+      });
+    }
+    const State right = check.call("finish", [&] { return end_of(*undisturbed); }),
+                found = check.call("finish", [&] { return end_of(*disturbed); });
+    check.expect(found == right, "a refused call changes nothing of what follows", [&] {
+      return fmt::format("it ends with {} and not with {}", text_of(found), text_of(right));
+    });
+  });
 }
 
 /// Pose by pose, each decision against what the policy had said before.
@@ -290,8 +381,9 @@ Repetition sparsifier_uses(const Subject& subject, Checker& check) {
 }  // namespace
 
 std::span<const Group> pose_policy_groups() {
-  static constexpr std::array<Group, 4> groups{{{"run", check_policy},
+  static constexpr std::array<Group, 5> groups{{{"run", check_policy},
                                                 {"decisions", check_decisions},
+                                                {"refusals", check_refusals},
                                                 {"memory", memory_group<policy_uses>, true},
                                                 {"threads", threads_group<policy_uses>, true}}};
   return groups;

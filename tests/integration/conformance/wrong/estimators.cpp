@@ -104,6 +104,32 @@ struct Keeps final : Wrapped {
   }
 };
 
+/// So do those that it is to remove by their ids.
+struct RemovesNoFactor final : Wrapped {
+  using Wrapped::Wrapped;
+  UpdateReport update(const GraphUpdate& update, const UpdateOptions& options) override {
+    GraphUpdate less = update;
+    less.removed_factors.clear();
+    return Wrapped::update(less, options);
+  }
+};
+
+/// Solves every third update, and does not say so.
+struct SolvesSeldom final : Wrapped {
+  using Wrapped::Wrapped;
+  UpdateReport update(const GraphUpdate& update, const UpdateOptions& options) override {
+    UpdateOptions less = options;
+    less.defer = !options.full && ++updates_ % 3 != 0;
+    UpdateReport report = Wrapped::update(update, less);
+    report.owed = 0;
+    report.converged = true;
+    return report;
+  }
+
+ private:
+  int updates_ = 0;
+};
+
 template <class Wrong>
 void add(Registrar& registrar, const char* name) {
   registrar.add<Estimator>(name, {}, [](const Options&, Registry& registry) {
@@ -118,4 +144,6 @@ void cairn_register(Registrar& registrar) {
   add<HalfRefuses>(registrar, "half_refuses");
   add<SharesCopies>(registrar, "shares_copies");
   add<Keeps>(registrar, "keeps_what_leaves");
+  add<RemovesNoFactor>(registrar, "removes_no_factor");
+  add<SolvesSeldom>(registrar, "solves_seldom");
 }

@@ -34,6 +34,18 @@ struct Right : Square {
   static constexpr std::string_view kTag = "EDGE_RIGHT";
 };
 
+/// Its second point is there, and nothing more.
+struct Bystander {
+  static constexpr std::string_view kTag = "EDGE_BYSTANDER";
+  static constexpr int kResidual = 1, kMeasurement = 1;
+  using Variables = std::tuple<cairn::PointXY, cairn::PointXY>;
+  template <class S>
+  static Vector<S, 1> residual(const Vector<S, 2>& x, const Vector<S, 2>&,
+                               const Vector<double, 1>& z) {
+    return Square::residual<S>(x, z);
+  }
+};
+
 struct WrongJacobian : Square {
   static constexpr std::string_view kTag = "EDGE_WRONG_JACOBIAN";
   static Vector<double, 1> evaluate(const Vector<double, 2>& x, const Vector<double, 1>& z,
@@ -171,6 +183,7 @@ void cairn_register(cairn::Registrar& registrar) {
                     cairn::define_factor<Exiting>(), cairn::define_factor<Looping>(),
                     cairn::define_factor<Remembering>(), std::make_shared<BeyondTheEnd>(),
                     cairn::define_factor<UnwrappedBearing>(),
-                    cairn::define_factor<WrappedBearing>(), cairn::define_factor<Right>()}};
+                    cairn::define_factor<WrappedBearing>(), cairn::define_factor<Bystander>(),
+                    cairn::define_factor<Right>()}};
   });
 }

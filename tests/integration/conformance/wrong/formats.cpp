@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // g2o as cairn's own format reads and writes it, with one thing wrong each.
 #include <cstdlib>
+#include <iomanip>
 #include <memory>
+#include <sstream>
 #include <string>
 #include <utility>
 #include <vector>
@@ -13,6 +15,12 @@
 namespace {
 
 using namespace cairn;
+
+double rounded(double number) {
+  std::ostringstream text;
+  text << std::setprecision(9) << number;
+  return std::stod(text.str());
+}
 
 class Wrapped : public Format {
  public:
@@ -64,6 +72,42 @@ struct CrashesOnHalf final : Wrapped {
   }
 };
 
+/// Every variable is free.
+struct LosesFix final : Wrapped {
+  using Wrapped::Wrapped;
+  Graph read(std::string_view text, const std::string& name, Registry& types,
+             const ReadOptions& options, ReadReport& report) override {
+    Graph graph = Wrapped::read(text, name, types, options, report);
+    for (int v = 0; v < graph.variable_count(); ++v) graph.set_fixed(v, false);
+    return graph;
+  }
+};
+
+/// Nine digits are kept.
+struct NineDigits final : Wrapped {
+  using Wrapped::Wrapped;
+  Graph read(std::string_view text, const std::string& name, Registry& types,
+             const ReadOptions& options, ReadReport& report) override {
+    Graph graph = Wrapped::read(text, name, types, options, report);
+    for (int v = 0; v < graph.variable_count(); ++v) {
+      std::vector<double> state(graph.state(v).begin(), graph.state(v).end());
+      for (double& number : state) number = rounded(number);
+      graph.set_state(v, state);
+    }
+    return graph;
+  }
+};
+
+/// Lines that it does not know are skipped, and nobody hears of it.
+struct SkipsSilently final : Wrapped {
+  using Wrapped::Wrapped;
+  Graph read(std::string_view text, const std::string& name, Registry& types, const ReadOptions&,
+             ReadReport&) override {
+    ReadReport unseen;
+    return Wrapped::read(text, name, types, {.skip_unknown = true}, unseen);
+  }
+};
+
 template <class Wrong>
 void add(Registrar& registrar, const char* name) {
   registrar.add<Format>(name, {}, [](const Options&, Registry& registry) {
@@ -77,4 +121,7 @@ void cairn_register(Registrar& registrar) {
   add<LosesTheLast>(registrar, "loses_the_last");
   add<AcceptsAnything>(registrar, "accepts_anything");
   add<CrashesOnHalf>(registrar, "crashes_on_half");
+  add<LosesFix>(registrar, "loses_fix");
+  add<NineDigits>(registrar, "nine_digits");
+  add<SkipsSilently>(registrar, "skips_silently");
 }

@@ -88,6 +88,49 @@ struct AcceptsAnyOffer final : Wrapped {
   }
 };
 
+/// Says so of all poses that ever were, too.
+struct BoastsTwice final : Wrapped {
+  using Wrapped::Wrapped;
+  void add_pose(const Variable& pose, std::span<const Factor> odometry) override {
+    Wrapped::add_pose(pose, odometry);
+    all_.push_back(pose.id);
+  }
+  PoseReport end_pose() override {
+    PoseReport report = Wrapped::end_pose();
+    report.kept = true;
+    return report;
+  }
+  std::vector<Id> kept() const override { return all_; }
+
+ private:
+  std::vector<Id> all_;
+};
+
+/// Leaves the end as it is.
+struct NeverFinishes final : Wrapped {
+  using Wrapped::Wrapped;
+  bool finish() override { return true; }
+};
+
+/// After a refused call the next pose is where the refused one would have been.
+struct RemembersWhatItRefuses final : Wrapped {
+  using Wrapped::Wrapped;
+  void add_pose(const Variable& pose, std::span<const Factor> odometry) override {
+    std::vector<Factor> moved(odometry.begin(), odometry.end());
+    if (refused_ && !moved.empty()) moved.front().measurement.front() += 0.01;
+    refused_ = false;
+    try {
+      Wrapped::add_pose(pose, moved);
+    } catch (const Error&) {
+      refused_ = true;
+      throw;
+    }
+  }
+
+ private:
+  bool refused_ = false;
+};
+
 template <class Wrong>
 void add(Registrar& registrar, const char* name) {
   registrar.add<PosePolicy>(name, {}, [](const Options&, Registry& registry) {
@@ -102,4 +145,7 @@ void cairn_register(Registrar& registrar) {
   add<Boasts>(registrar, "boasts");
   add<ForgetsSteps>(registrar, "forgets_steps");
   add<AcceptsAnyOffer>(registrar, "accepts_any_offer");
+  add<BoastsTwice>(registrar, "boasts_twice");
+  add<NeverFinishes>(registrar, "never_finishes");
+  add<RemembersWhatItRefuses>(registrar, "remembers_what_it_refuses");
 }
