@@ -25,7 +25,7 @@ struct RelativePose {
   using Variables = std::tuple<Se2, Se2>;
   template <class S>
   static Vector<S, 3> residual(const Vector<S, 3>& a, const Vector<S, 3>& b,
-                               const Vector<double, 3>& z) {
+                               const Vector<double, 3>& z) noexcept {
     const Vector<S, 3> measured = z.template cast<S>();
     return Se2::between<S>(measured, Se2::between<S>(a, b));
   }
@@ -44,7 +44,7 @@ struct PosePrior {
   static constexpr int kResidual = 3, kMeasurement = 3;
   using Variables = std::tuple<Se2>;
   template <class S>
-  static Vector<S, 3> residual(const Vector<S, 3>& a, const Vector<double, 3>& z) {
+  static Vector<S, 3> residual(const Vector<S, 3>& a, const Vector<double, 3>& z) noexcept {
     return Se2::between<S>(z.template cast<S>(), a);
   }
 };
@@ -54,7 +54,7 @@ struct PointPrior {
   static constexpr int kResidual = 2, kMeasurement = 2;
   using Variables = std::tuple<PointXY>;
   template <class S>
-  static Vector<S, 2> residual(const Vector<S, 2>& a, const Vector<double, 2>& z) {
+  static Vector<S, 2> residual(const Vector<S, 2>& a, const Vector<double, 2>& z) noexcept {
     return a - z.template cast<S>();
   }
 };
@@ -66,7 +66,7 @@ struct PointSeen {
   using Variables = std::tuple<Se2, PointXY>;
   template <class S>
   static Vector<S, 2> residual(const Vector<S, 3>& pose, const Vector<S, 2>& point,
-                               const Vector<double, 2>& z) {
+                               const Vector<double, 2>& z) noexcept {
     using std::cos;
     using std::sin;
     const S c = cos(pose[2]), s = sin(pose[2]), dx = point[0] - pose[0], dy = point[1] - pose[1];

@@ -43,7 +43,7 @@ struct Reprojection {
 
   template <class S>
   static Vector<S, 2> residual(const Vector<S, 10>& camera, const Vector<S, 3>& point,
-                               const Measured<S, 2>& z) {
+                               const Measured<S, 2>& z) noexcept {
     const Vector<S, 7> pose = Camera::pose<S>(camera);
     const Vector<S, 3> apart = point - Se3::translation<S>(pose);
     const Vector<S, 3> P = so3::rotate_back<S>(Se3::quaternion<S>(pose), apart);
@@ -59,7 +59,7 @@ struct Reprojection {
   template <class S>
   static Vector<S, 2> evaluate(const Vector<S, 10>& camera, const Vector<S, 3>& point,
                                const Vector<S, 2>& z, Eigen::Matrix<S, 2, 9>& J_camera,
-                               Eigen::Matrix<S, 2, 3>& J_point) {
+                               Eigen::Matrix<S, 2, 3>& J_point) noexcept {
     const Vector<S, 7> pose = Camera::pose<S>(camera);
     const so3::Matrix3<S> R = so3::matrix<S>(Se3::quaternion<S>(pose));  // from camera to world
     const Vector<S, 3> apart = point - Se3::translation<S>(pose);

@@ -5,6 +5,7 @@
 
 #include "cairn/plugin/registry.hpp"
 #include "cairn/types/loss.hpp"
+#include "cairn/types/never_throws.hpp"
 #include "loss_options.hpp"
 #include "shapes.hpp"
 
@@ -14,7 +15,7 @@ using namespace cairn;
 
 /// A shape with its scale: the loop over a batch, inlined.
 template <class Shape>
-class ScaledLoss final : public Loss {
+class ScaledLoss final : public Loss, public NeverThrows {
  public:
   explicit ScaledLoss(double scale) : square_(scale * scale) {}
 

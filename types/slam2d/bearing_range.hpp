@@ -18,7 +18,7 @@ struct BearingRange {
 
   template <class S>
   static Vector<S, 2> residual(const Vector<S, 3>& pose, const Vector<S, 2>& landmark,
-                               const Measured<S, 2>& z) {
+                               const Measured<S, 2>& z) noexcept {
     using std::sqrt;
     const so2::Rotation<S> R(pose[2]);
     const S dx = landmark[0] - pose[0], dy = landmark[1] - pose[1];
@@ -29,7 +29,7 @@ struct BearingRange {
   template <class S>
   static Vector<S, 2> evaluate(const Vector<S, 3>& pose, const Vector<S, 2>& landmark,
                                const Vector<S, 2>& z, Eigen::Matrix<S, 2, 3>& J_pose,
-                               Eigen::Matrix<S, 2, 2>& J_landmark) {
+                               Eigen::Matrix<S, 2, 2>& J_landmark) noexcept {
     using lanes::if_less;
     using std::sqrt;
     const so2::Rotation<S> R(pose[2]);

@@ -15,7 +15,7 @@ struct Landmark {
 
   template <class S>
   static Vector<S, 2> residual(const Vector<S, 3>& pose, const Vector<S, 2>& landmark,
-                               const Measured<S, 2>& z) {
+                               const Measured<S, 2>& z) noexcept {
     const so2::Rotation<S> R(pose[2]);
     const S dx = landmark[0] - pose[0], dy = landmark[1] - pose[1];
     return {R.c * dx + R.s * dy - z[0], R.c * dy - R.s * dx - z[1]};
@@ -24,7 +24,7 @@ struct Landmark {
   template <class S>
   static Vector<S, 2> evaluate(const Vector<S, 3>& pose, const Vector<S, 2>& landmark,
                                const Vector<S, 2>& z, Eigen::Matrix<S, 2, 3>& J_pose,
-                               Eigen::Matrix<S, 2, 2>& J_landmark) {
+                               Eigen::Matrix<S, 2, 2>& J_landmark) noexcept {
     const so2::Rotation<S> R(pose[2]);
     const S dx = landmark[0] - pose[0], dy = landmark[1] - pose[1];
     const S px = R.c * dx + R.s * dy, py = R.c * dy - R.s * dx;

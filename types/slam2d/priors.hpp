@@ -16,7 +16,7 @@ struct PosePrior {
   using Variables = std::tuple<Se2>;
 
   template <class S>
-  static Vector<S, 3> residual(const Vector<S, 3>& x, const Measured<S, 3>& z) {
+  static Vector<S, 3> residual(const Vector<S, 3>& x, const Measured<S, 3>& z) noexcept {
     const so2::Rotation<ValueOf<S>> R_z(z[2]);
     const S dx = x[0] - z[0], dy = x[1] - z[1];
     return {dx * R_z.c + dy * R_z.s, dy * R_z.c - dx * R_z.s, wrap_angle<S>(x[2] - z[2])};
@@ -24,7 +24,7 @@ struct PosePrior {
 
   template <class S>
   static Vector<S, 3> evaluate(const Vector<S, 3>& x, const Vector<S, 3>& z,
-                               Eigen::Matrix<S, 3, 3>& J) {
+                               Eigen::Matrix<S, 3, 3>& J) noexcept {
     const Vector<S, 3> e = residual<S>(x, z);
     const so2::Rotation<S> R_e(e[2]);
     J << R_e.c, -R_e.s, S(0), R_e.s, R_e.c, S(0), S(0), S(0), S(1);
@@ -45,12 +45,12 @@ struct LandmarkPrior {
   using Variables = std::tuple<PointXY>;
 
   template <class S>
-  static Vector<S, 2> residual(const Vector<S, 2>& x, const Measured<S, 2>& z) {
+  static Vector<S, 2> residual(const Vector<S, 2>& x, const Measured<S, 2>& z) noexcept {
     return {x[0] - z[0], x[1] - z[1]};
   }
   template <class S>
   static Vector<S, 2> evaluate(const Vector<S, 2>& x, const Vector<S, 2>& z,
-                               Eigen::Matrix<S, 2, 2>& J) {
+                               Eigen::Matrix<S, 2, 2>& J) noexcept {
     J << S(1), S(0), S(0), S(1);
     return x - z;
   }

@@ -16,7 +16,7 @@ struct RelativePose {
 
   template <class S>
   static Vector<S, 3> residual(const Vector<S, 3>& a, const Vector<S, 3>& b,
-                               const Measured<S, 3>& z) {
+                               const Measured<S, 3>& z) noexcept {
     const so2::Rotation<S> R_a(a[2]);
     const so2::Rotation<ValueOf<S>> R_z(z[2]);
     const S dx = b[0] - a[0], dy = b[1] - a[1];
@@ -26,7 +26,7 @@ struct RelativePose {
 
   template <class S>
   static Vector<S, 3> evaluate(const Vector<S, 3>& a, const Vector<S, 3>& b, const Vector<S, 3>& z,
-                               Eigen::Matrix<S, 3, 3>& J_a, Eigen::Matrix<S, 3, 3>& J_b) {
+                               Eigen::Matrix<S, 3, 3>& J_a, Eigen::Matrix<S, 3, 3>& J_b) noexcept {
     const so2::Rotation<S> R_a(a[2]), R_z(z[2]);
     const S dx = b[0] - a[0], dy = b[1] - a[1];
     const S px = R_a.c * dx + R_a.s * dy, py = R_a.c * dy - R_a.s * dx;  // b seen from a

@@ -15,7 +15,7 @@ struct Landmark {
 
   template <class S>
   static Vector<S, 3> residual(const Vector<S, 7>& pose, const Vector<S, 3>& landmark,
-                               const Measured<S, 3>& z) {
+                               const Measured<S, 3>& z) noexcept {
     const Vector<S, 3> apart = landmark - Se3::translation<S>(pose);
     const Vector<S, 3> seen = so3::rotate_back<S>(Se3::quaternion<S>(pose), apart);
     return {seen[0] - z[0], seen[1] - z[1], seen[2] - z[2]};
@@ -24,7 +24,7 @@ struct Landmark {
   template <class S>
   static Vector<S, 3> evaluate(const Vector<S, 7>& pose, const Vector<S, 3>& landmark,
                                const Vector<S, 3>& z, Eigen::Matrix<S, 3, 6>& J_pose,
-                               so3::Matrix3<S>& J_landmark) {
+                               so3::Matrix3<S>& J_landmark) noexcept {
     J_landmark = so3::matrix<S>(Se3::quaternion<S>(pose)).transpose();
     const Vector<S, 3> apart = landmark - Se3::translation<S>(pose);
     const Vector<S, 3> seen = so3::times<S>(J_landmark, apart);

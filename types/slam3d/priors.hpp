@@ -19,13 +19,13 @@ struct PosePrior {
   using Variables = std::tuple<Se3>;
 
   template <class S>
-  static Vector<S, 6> residual(const Vector<S, 7>& x, const Measured<S, 7>& z) {
+  static Vector<S, 6> residual(const Vector<S, 7>& x, const Measured<S, 7>& z) noexcept {
     const Vector<S, 7> known = z.template cast<S>();
     return Metric::template error<S>(Se3::between<S>(known, x));
   }
   template <class S>
   static Vector<S, 6> evaluate(const Vector<S, 7>& x, const Vector<S, 7>& z,
-                               Eigen::Matrix<S, 6, 6>& J) {
+                               Eigen::Matrix<S, 6, 6>& J) noexcept {
     ErrorDerivative<S> D;
     const Vector<S, 6> e = Metric::template derivative<S>(Se3::between<S>(z, x), D);
     D.assemble(J);
@@ -46,12 +46,12 @@ struct LandmarkPrior {
   using Variables = std::tuple<PointXYZ>;
 
   template <class S>
-  static Vector<S, 3> residual(const Vector<S, 3>& x, const Measured<S, 3>& z) {
+  static Vector<S, 3> residual(const Vector<S, 3>& x, const Measured<S, 3>& z) noexcept {
     return {x[0] - z[0], x[1] - z[1], x[2] - z[2]};
   }
   template <class S>
   static Vector<S, 3> evaluate(const Vector<S, 3>& x, const Vector<S, 3>& z,
-                               Eigen::Matrix<S, 3, 3>& J) {
+                               Eigen::Matrix<S, 3, 3>& J) noexcept {
     for (int k = 0; k < 9; ++k) J.data()[k] = k % 4 == 0 ? 1.0 : 0.0;
     return x - z;
   }

@@ -19,7 +19,7 @@ struct RelativePose {
 
   template <class S>
   static Vector<S, 6> residual(const Vector<S, 7>& a, const Vector<S, 7>& b,
-                               const Measured<S, 7>& z) {
+                               const Measured<S, 7>& z) noexcept {
     const Vector<S, 7> z_ab = z.template cast<S>();
     return Metric::template error<S>(Se3::between<S>(z_ab, Se3::between<S>(a, b)));
   }
@@ -28,7 +28,7 @@ struct RelativePose {
   /// to E exp(−Ad(M⁻¹) δ), Ad(M⁻¹) = [R_mᵀ −R_mᵀ[p]ₓ; 0 R_mᵀ].
   template <class S>
   static Vector<S, 6> evaluate(const Vector<S, 7>& a, const Vector<S, 7>& b, const Vector<S, 7>& z,
-                               Eigen::Matrix<S, 6, 6>& J_a, Eigen::Matrix<S, 6, 6>& J_b) {
+                               Eigen::Matrix<S, 6, 6>& J_a, Eigen::Matrix<S, 6, 6>& J_b) noexcept {
     const Vector<S, 7> M = Se3::between<S>(a, b);
     ErrorDerivative<S> D;
     const Vector<S, 6> e = Metric::template derivative<S>(Se3::between<S>(z, M), D);

@@ -2,11 +2,13 @@
 // The losses of a graph's factors, and chi2, which they enter.
 #include <algorithm>
 #include <limits>
+#include <string>
+#include <string_view>
 
 #include "cairn/graph/graph.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/threads.hpp"
-#include "graph/factor_call.hpp"
+#include "cairn/types/factor_call.hpp"
 
 namespace cairn {
 
@@ -53,7 +55,12 @@ void Graph::weigh(int factor_pool, std::size_t begin, std::span<const double> no
       return all.empty() ? all : all.subspan(first, count);
     };
     if (const Loss* loss = losses_[of[first]].get()) {
-      loss->evaluate(norms.subspan(first, count), part(rho), part(weights));
+      call_plugin(
+          [&] {
+            const std::string_view tag = factor_pools_[factor_pool].type->tag();
+            return "the loss of factor '" + std::string(tag) + "'";
+          },
+          [&] { loss->evaluate(norms.subspan(first, count), part(rho), part(weights)); });
     } else {
       std::ranges::copy(norms.subspan(first, rho.empty() ? 0 : count), part(rho).begin());
       std::ranges::fill(part(weights), 1.0);

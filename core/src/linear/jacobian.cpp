@@ -9,8 +9,8 @@
 
 #include "cairn/graph/packed.hpp"
 #include "cairn/runtime/threads.hpp"
+#include "cairn/types/factor_call.hpp"
 #include "cairn/types/loss.hpp"
-#include "graph/factor_call.hpp"
 
 namespace cairn {
 namespace {

@@ -6,7 +6,7 @@
 #include <stdexcept>
 
 #include "cairn/runtime/threads.hpp"
-#include "graph/factor_call.hpp"
+#include "cairn/types/factor_call.hpp"
 
 namespace cairn {
 namespace {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "cairn/types/factor_type.hpp"
 #include "cairn/types/loss.hpp"
+#include "cairn/types/never_throws.hpp"
 #include "cairn/types/variable_type.hpp"
 
 namespace cairn {
@@ -10,5 +11,6 @@ Placement::~Placement() = default;
 VariableType::~VariableType() = default;
 FactorType::~FactorType() = default;
 Loss::~Loss() = default;
+NeverThrows::~NeverThrows() = default;
 
 }  // namespace cairn

@@ -13,6 +13,7 @@
 #include <fmt/core.h>
 
 #include "cairn/runtime/error.hpp"
+#include "cairn/types/factor_call.hpp"
 #include "cairn/types/loss.hpp"
 #include "cairn/update/marginal_prior.hpp"
 #include "dense/cholesky.hpp"
@@ -176,8 +177,12 @@ class Eliminator {
     }
     for (MatrixXd& block : J) targets.push_back(block.data());
     VectorXd r(rows);
-    type.evaluate(x.data(), graph_.measurement(f).data(), graph_.sqrt_information(f).data(),
-                  r.data(), targets.data());
+    call_factor(
+        type, [&] { return graph_.describe_factor(f); },
+        [&] {
+          type.evaluate(x.data(), graph_.measurement(f).data(), graph_.sqrt_information(f).data(),
+                        r.data(), targets.data());
+        });
     const double weight = weight_of(f, r.squaredNorm());
     for (std::size_t a = 0; a < variables.size(); ++a) {
       const auto row = columns.place.find(variables[a]);

@@ -11,6 +11,7 @@
 
 #include "cairn/graph/gauge.hpp"
 #include "cairn/runtime/error.hpp"
+#include "cairn/types/factor_call.hpp"
 #include "cairn/update/elimination.hpp"
 #include "cairn/update/marginal_prior.hpp"
 
@@ -115,7 +116,9 @@ class Placer {
     x[target] = out.data();
     std::vector<double> placed(out.size());
     if (!factor.type->normalize(z.data()).empty() ||
-        !factor.type->propagate(target, x.data(), z.data(), placed.data()) ||
+        !call_factor(
+            *factor.type, [&] { return describe(factor); },
+            [&] { return factor.type->propagate(target, x.data(), z.data(), placed.data()); }) ||
         !std::ranges::all_of(placed, [](double v) { return std::isfinite(v); }) ||
         !variable.type->normalize(placed.data()).empty())
       return false;

@@ -6,11 +6,14 @@
 #include <limits>
 #include <queue>
 #include <span>
+#include <string>
 #include <unordered_map>
 #include <utility>
 #include <vector>
 
 #include "cairn/graph/packed.hpp"
+#include "cairn/runtime/plugin_call.hpp"
+#include "cairn/types/factor_call.hpp"
 
 namespace cairn {
 namespace {
@@ -24,6 +27,12 @@ constexpr double kContradicted = 9.0;
 constexpr int kTried = 16;
 /// chi2 per row of the residuals that is nothing.
 constexpr double kRounding = 1e-9;
+
+std::string described(const Factor& factor) {
+  std::string text(factor.type->tag());
+  for (const Id id : factor.variables) text += " " + std::to_string(id);
+  return text;
+}
 
 class InitialStates {
  public:
@@ -126,7 +135,13 @@ void InitialStates::measure(std::size_t k, Measured one) {
 double InitialStates::chi2(Measured& one, const std::vector<double>& state) {
   std::vector<double> residual(static_cast<std::size_t>(one.factor->type->residual_size()));
   one.x[one.place] = state.data();
-  one.factor->type->evaluate(one.x.data(), one.z.data(), one.root.data(), residual.data(), nullptr);
+  const Factor& factor = *one.factor;
+  call_factor(
+      *factor.type, [&] { return described(factor); },
+      [&] {
+        factor.type->evaluate(one.x.data(), one.z.data(), one.root.data(), residual.data(),
+                              nullptr);
+      });
   double square = 0.0;
   for (const double r : residual) square += r * r;
   return std::isfinite(square) ? square : kInfinity;
@@ -135,9 +150,13 @@ double InitialStates::chi2(Measured& one, const std::vector<double>& state) {
 /// Where a factor puts the variable. False if it does not determine that.
 bool InitialStates::place(Measured& by, const Variable& variable, std::vector<double>& placed) {
   by.x[by.place] = variable.state.data();
-  return by.factor->type->propagate(static_cast<int>(by.place), by.x.data(), by.z.data(),
-                                    placed.data()) &&
-         std::ranges::all_of(placed, [](double v) { return std::isfinite(v); }) &&
+  const bool determined = call_factor(
+      *by.factor->type, [&] { return described(*by.factor); },
+      [&] {
+        return by.factor->type->propagate(static_cast<int>(by.place), by.x.data(), by.z.data(),
+                                          placed.data());
+      });
+  return determined && std::ranges::all_of(placed, [](double v) { return std::isfinite(v); }) &&
          variable.type->normalize(placed.data()).empty();
 }
 
@@ -161,7 +180,9 @@ void InitialStates::settle(std::size_t k) {
     for (Measured& one : measured) {
       double square = chi2(one, state);
       if (one.factor->loss)
-        one.factor->loss->evaluate(std::span(&square, 1), std::span(&square, 1), {});
+        call_plugin(
+            [&] { return "the loss of factor '" + std::string(one.factor->type->tag()) + "'"; },
+            [&] { one.factor->loss->evaluate(std::span(&square, 1), std::span(&square, 1), {}); });
       sum += square;
     }
     return sum;

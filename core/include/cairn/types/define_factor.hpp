@@ -6,6 +6,7 @@
 #include <memory>
 #include <string>
 #include <tuple>
+#include <type_traits>
 #include <utility>
 
 #include <Eigen/Core>
@@ -14,6 +15,7 @@
 #include "cairn/types/autodiff.hpp"
 #include "cairn/types/define_variable.hpp"
 #include "cairn/types/factor_type.hpp"
+#include "cairn/types/never_throws.hpp"
 
 namespace cairn {
 
@@ -42,6 +44,9 @@ namespace cairn {
 ///  - `static constexpr bool kRelative = true`: z is a group element with x_1 ≈ x_0 z;
 ///  - `static constexpr std::string_view kMetric`: the name of the error metric.
 ///
+/// Where `residual`, and `evaluate` if there is one, are `noexcept`, the type `NeverThrows`: an
+/// estimator then takes in its factors without keeping what it would go back to.
+///
 /// `Variables` names the structs that describe the variables: those of `cairn/lie/` or your own.
 template <class F>
 concept FactorTraits = requires {
@@ -57,8 +62,31 @@ template <class F,
           class Indices = std::make_index_sequence<std::tuple_size_v<typename F::Variables>>>
 class DefinedFactor;
 
+/// Whether a struct's functions are `noexcept`.
+template <class F, class... V>
+constexpr bool never_throws(const std::tuple<V...>*) {
+  using Z = Vector<double, F::kMeasurement>;
+  constexpr bool error = noexcept(F::template residual<double>(
+      std::declval<const Vector<double, V::kAmbient>&>()..., std::declval<const Z&>()));
+  if constexpr (requires(const Vector<double, V::kAmbient>&... x, const Z& z,
+                         Eigen::Matrix<double, F::kResidual, V::kTangent>&... J) {
+                  F::evaluate(x..., z, J...);
+                }) {
+    constexpr bool analytic = noexcept(
+        F::evaluate(std::declval<const Vector<double, V::kAmbient>&>()..., std::declval<const Z&>(),
+                    std::declval<Eigen::Matrix<double, F::kResidual, V::kTangent>&>()...));
+    return error && analytic;
+  } else {
+    return error;
+  }
+}
+struct MayThrow {};
+
 template <class F, std::size_t... I>
-class DefinedFactor<F, std::index_sequence<I...>> final : public FactorType {
+class DefinedFactor<F, std::index_sequence<I...>> final
+    : public FactorType,
+      public std::conditional_t<never_throws<F>(static_cast<typename F::Variables*>(nullptr)),
+                                NeverThrows, MayThrow> {
   static constexpr int kArity = sizeof...(I);
   static constexpr int kR = F::kResidual, kZ = F::kMeasurement;
   static constexpr int kU = kR * (kR + 1) / 2;

@@ -9,6 +9,7 @@
 
 #include "cairn/runtime/api.hpp"
 #include "cairn/types/evaluated_factor.hpp"
+#include "cairn/types/never_throws.hpp"
 
 namespace cairn {
 
@@ -19,7 +20,7 @@ namespace cairn {
 /// It is on three variables; `first` and `second` say which two of them each measurement is
 /// between, in its order. The whole of its kind is one factor type for each such pattern. It cannot
 /// be written to files.
-class CAIRN_API CorrelatedPair final : public EvaluatedFactorType {
+class CAIRN_API CorrelatedPair final : public EvaluatedFactorType, public NeverThrows {
  public:
   static constexpr std::string_view kTag = "CORRELATED_PAIR";
 

@@ -9,6 +9,7 @@
 
 #include "cairn/runtime/api.hpp"
 #include "cairn/types/evaluated_factor.hpp"
+#include "cairn/types/never_throws.hpp"
 #include "cairn/types/variable_type.hpp"
 
 namespace cairn {
@@ -25,7 +26,7 @@ namespace cairn {
 ///
 /// Measurement: z_0 if it is absolute, z_1, z_2, …; b; G column by column. One object serves all
 /// factors of that rank on the same kinds of nodes. It cannot be written to files.
-class CAIRN_API LinearConstraint final : public EvaluatedFactorType {
+class CAIRN_API LinearConstraint final : public EvaluatedFactorType, public NeverThrows {
  public:
   static constexpr std::string_view kTag = "LINEAR_CONSTRAINT";
 

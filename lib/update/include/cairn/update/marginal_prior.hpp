@@ -9,6 +9,7 @@
 #include "cairn/runtime/api.hpp"
 #include "cairn/types/evaluated_factor.hpp"
 #include "cairn/types/factor_type.hpp"
+#include "cairn/types/never_throws.hpp"
 #include "cairn/types/variable_type.hpp"
 
 namespace cairn {
@@ -40,7 +41,7 @@ CAIRN_API LinearResidual square_root(std::span<const double> H, std::span<const 
 ///
 /// Each object serves one factor of a graph, with any number of variables of any types; its
 /// measurement is empty, its information the identity. It cannot be written to files.
-class CAIRN_API MarginalPrior final : public EvaluatedFactorType {
+class CAIRN_API MarginalPrior final : public EvaluatedFactorType, public NeverThrows {
  public:
   static constexpr std::string_view kTag = "MARGINAL_PRIOR";
 
