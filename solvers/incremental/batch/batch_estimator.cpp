@@ -34,44 +34,123 @@ void add_seconds(const Seconds& from, UpdateSeconds& to) {
 BatchEstimator::BatchEstimator(int every, const Stop& stop, std::shared_ptr<BatchTools> tools)
     : every_(every), stop_(stop), tools_(std::move(tools)) {}
 
+/// All that an update changes, to go back to where it fails half-way: on numbers, or since a factor
+/// throws while it is evaluated. What an update only adds is taken out again; for any other the
+/// graph is copied.
+class BatchEstimator::Before {
+ public:
+  Before(BatchEstimator& of, const GraphUpdate& update)
+      : adds_(only_adds(update)),
+        variables_(of.graph_.variable_count()),
+        factors_(of.graph_.factor_count()),
+        values_(of.graph_.values()),
+        ids_(of.ids_),
+        linearized_at_(of.linearized_at_),
+        since_batch_(of.since_batch_),
+        must_batch_(of.must_batch_),
+        unsolved_factors_(of.unsolved_factors_),
+        last_(of.last_),
+        told_(of.told_),
+        memory_(of.memory_),
+        diagonal_(std::exchange(of.diagonal_, {})),  // no update keeps them
+        diagonal_begin_(std::exchange(of.diagonal_begin_, {})),
+        blocks_(std::exchange(of.blocks_, {})) {
+    if (adds_) return;
+    graph_ = of.graph_.clone();
+    losses_ = of.losses_;
+    crosses_ = of.crosses_;
+  }
+
+  void restore(BatchEstimator& to) {
+    if (adds_) {
+      take_out_what_is_new(to);
+    } else {
+      to.graph_ = std::move(graph_);
+      to.losses_ = std::move(losses_);
+      to.crosses_ = std::move(crosses_);
+    }
+    to.ids_ = std::move(ids_);
+    to.linearized_at_ = std::move(linearized_at_);
+    to.since_batch_ = since_batch_;
+    to.must_batch_ = must_batch_;
+    to.unsolved_factors_ = unsolved_factors_;
+    to.last_ = last_;
+    to.told_ = std::move(told_);
+    to.memory_ = memory_;
+    to.covariances_.reset();  // the solver has another factorisation by now
+    to.tools_->user = nullptr;
+    to.diagonal_ = std::move(diagonal_);
+    to.diagonal_begin_ = std::move(diagonal_begin_);
+    to.blocks_ = std::move(blocks_);
+  }
+
+ private:
+  void take_out_what_is_new(BatchEstimator& to) {
+    Graph& graph = to.graph_;
+    std::vector<bool> factors(static_cast<std::size_t>(graph.factor_count()), false);
+    std::vector<bool> variables(static_cast<std::size_t>(graph.variable_count()), false);
+    std::fill(factors.begin() + factors_, factors.end(), true);
+    std::fill(variables.begin() + variables_, variables.end(), true);
+    for (int v = variables_; v < graph.variable_count(); ++v) to.losses_.removed_variable(graph, v);
+    graph.remove(factors, variables);
+    values_.pools.resize(graph.values().pools.size());  // types that were new keep theirs, empty
+    graph.set_values(std::move(values_));
+  }
+
+  bool adds_;
+  int variables_, factors_;
+  Values values_;
+  FactorIds ids_;
+  Values linearized_at_;
+  int since_batch_;
+  bool must_batch_;
+  int unsolved_factors_;
+  Id last_;
+  std::set<std::string> told_;
+  std::int64_t memory_;
+  std::vector<double> diagonal_;
+  std::vector<std::size_t> diagonal_begin_;
+  std::map<std::pair<Id, Id>, std::vector<double>> blocks_;
+  // Of an update that does more than add:
+  Graph graph_;
+  LossRule losses_;
+  std::set<std::pair<Id, Id>> crosses_;
+};
+
 UpdateReport BatchEstimator::update(const GraphUpdate& update, const UpdateOptions& options) {
   const auto begin = Clock::now();
   const std::lock_guard lock(tools_->mutex);
   GraphUpdate checked = update;
   check_update(graph_, ids_, checked);
-  const AppliedUpdate applied = apply(checked);
-  forget_covariances();
-
+  Before before(*this, checked);
   UpdateReport report;
-  report.first_factor = applied.first_factor;
-  report.priors = applied.priors;
-  must_batch_ = must_batch_ || !only_adds(checked);
-  unsolved_factors_ += static_cast<int>(std::ssize(checked.factors));
-  ++since_batch_;
-  if (!options.defer || options.full) {
-    if (options.full || must_batch_ || since_batch_ >= every_) {
-      batch_step(options, report);
-    } else {
-      linear_step(report);
-    }
-    if (report.ok) compute_kept(report);
+  try {
+    carry_out(checked, options, report);
+  } catch (...) {
+    before.restore(*this);
+    throw;
   }
   report.seconds.total = seconds_since(begin);
   return report;
 }
 
-/// All or nothing: only marginalisation can still fail, and that on numbers.
-AppliedUpdate BatchEstimator::apply(GraphUpdate& update) {
+void BatchEstimator::carry_out(const GraphUpdate& update, const UpdateOptions& options,
+                               UpdateReport& report) {
   if (!update.variables.empty()) last_ = update.variables.back().id;
-  if (update.marginalized.empty()) return apply_update(update, graph_, ids_, losses_);
-  Graph graph = graph_.clone();
-  FactorIds ids = ids_;
-  LossRule losses = losses_;
-  AppliedUpdate applied = apply_update(update, graph, ids, losses);
-  graph_ = std::move(graph);
-  ids_ = std::move(ids);
-  losses_ = std::move(losses);
-  return applied;
+  const AppliedUpdate applied = apply_update(update, graph_, ids_, losses_);
+  forget_covariances();
+  report.first_factor = applied.first_factor;
+  report.priors = applied.priors;
+  must_batch_ = must_batch_ || !only_adds(update);
+  unsolved_factors_ += static_cast<int>(std::ssize(update.factors));
+  ++since_batch_;
+  if (options.defer && !options.full) return;
+  if (options.full || must_batch_ || since_batch_ >= every_) {
+    batch_step(options, report);
+  } else {
+    linear_step(report);
+  }
+  if (report.ok) compute_kept(report);
 }
 
 void BatchEstimator::batch_step(const UpdateOptions& options, UpdateReport& report) {

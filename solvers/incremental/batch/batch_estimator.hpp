@@ -100,7 +100,8 @@ class BatchEstimator final : public Estimator {
   std::int64_t memory() const override { return memory_; }
 
  private:
-  AppliedUpdate apply(GraphUpdate& update);
+  class Before;
+  void carry_out(const GraphUpdate& update, const UpdateOptions& options, UpdateReport& report);
   void batch_step(const UpdateOptions& options, UpdateReport& report);
   void linear_step(UpdateReport& report);
   void extend_linearization_points();

@@ -60,19 +60,36 @@ void Engine::rescue(UpdateReport& report, double tolerance) {
     const Timed timed(report.seconds.linearize);
     write_back();
     Graph graph = clean_graph();
-    const std::lock_guard lock(rescuer_->mutex);
-    const Summary summary =
-        rescuer_->optimizer->optimize(graph, {.max_iterations = 100, .tolerance = tolerance});
-    report.iterations += static_cast<int>(summary.iterations.size());
-    report.converged = summary.status == Status::converged;
-    if (!report.converged)
-      report.notes.push_back(fmt::format("not converged: {} after {} iterations",
-                                         to_string(summary.status), summary.iterations.size()));
+    if (answers_) {
+      graph.set_values(answers_->object([&] {
+        optimize(graph, tolerance, report);
+        return graph.values();
+      }));
+    } else {
+      optimize(graph, tolerance, report);
+    }
     load(std::move(graph), live_ids());
   }
   broken_ = !bring_factor_up_to_date(report);
   report.ok = !broken_;
   if (!broken_) step_and_look(report);
+}
+
+void Engine::optimize(Graph& graph, double tolerance, UpdateReport& report) {
+  const std::lock_guard lock(rescuer_->mutex);
+  const Summary summary =
+      rescuer_->optimizer->optimize(graph, {.max_iterations = 100, .tolerance = tolerance});
+  report.iterations += static_cast<int>(summary.iterations.size());
+  report.converged = summary.status == Status::converged;
+  if (!report.converged)
+    report.notes.push_back(fmt::format("not converged: {} after {} iterations",
+                                       to_string(summary.status), summary.iterations.size()));
+}
+
+void Engine::keep_answers(Answers* answers) {
+  answers_.in(answers);
+  models_.keep_answers(answers);
+  pace_.keep_answers(answers);
 }
 
 void Engine::add_source(std::int32_t v) {

@@ -209,6 +209,11 @@ class Engine : private EngineState {
   bool busy() const { return job_.stage != Job::Stage::none; }
   /// The clock that limits refer to, for tests.
   void set_clock(Pace::Clock clock) { pace_.set_clock(std::move(clock)); }
+  const Pace& pace() const { return pace_; }
+  void set_pace(const Pace& pace) { pace_ = pace; }
+  /// What factors, the rescuer and the clock answer is recorded there, or taken from there; null:
+  /// neither. A copy of the engine does neither.
+  void keep_answers(Answers* answers);
   /// Relinearises everything at the current estimate, with a new order, until it has converged.
   void solve_fully(UpdateReport& report);
   /// Σ ρ(‖r‖²) at the current estimate.
@@ -241,6 +246,8 @@ class Engine : private EngineState {
   bool have_digits(int v, std::int32_t first, std::int32_t count, const double* variances,
                    std::int64_t step) const;
   void load(Graph graph, std::vector<FactorId> ids);
+  Elimination eliminate_here(std::span<const int> variables);
+  void optimize(Graph& graph, double tolerance, UpdateReport& report);
   void watch_gauge_anew();
   void hold(std::int32_t v, bool held);
   bool is_other(int f) const;
@@ -315,6 +322,7 @@ class Engine : private EngineState {
   void remove_dead(Graph& graph) const;
   Values values_of(const Estimate& estimate) const;
 
+  AnswersKept answers_;
   std::vector<std::int32_t> anchored_;
   std::vector<std::int32_t> disconnected_;  // some may have new factors since, or be gone
 

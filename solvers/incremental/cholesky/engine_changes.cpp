@@ -213,6 +213,11 @@ void Engine::remove_variable(int v) {
 }
 
 Elimination Engine::eliminate(std::span<const int> variables) {
+  if (!answers_) return eliminate_here(variables);
+  return answers_->object([&] { return eliminate_here(variables); });
+}
+
+Elimination Engine::eliminate_here(std::span<const int> variables) {
   std::vector<int> factors;
   for (const int v : variables)
     factors.insert(factors.end(), factors_of_[v].begin(), factors_of_[v].end());

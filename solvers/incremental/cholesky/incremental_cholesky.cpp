@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <functional>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -12,6 +13,7 @@
 #include "cairn/memory/small_pages.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/timed.hpp"
+#include "cairn/types/never_throws.hpp"
 #include "cairn/update/elimination.hpp"
 #include "cairn/update/graph_update.hpp"
 #include "cairn/update/initial_states.hpp"
@@ -32,6 +34,32 @@ bool takes_out(const GraphUpdate& update) {
 
 }  // namespace
 
+/// Updates from one copy on, so that the state after all of them can be had again: the copy, what
+/// was done since, and what others have answered meanwhile.
+struct IncrementalCholesky::Record {
+  /// Of less it is no use to make another copy.
+  static constexpr std::size_t kBytes = std::size_t{1} << 20;
+  static constexpr std::size_t kSteps = 256;
+
+  explicit Record(const IncrementalCholesky& of)
+      : before(std::make_unique<IncrementalCholesky>(of)) {}
+
+  /// Whether to begin anew from a copy costs no more than what was recorded.
+  bool is_long() const {
+    const auto bytes = static_cast<std::size_t>(8 * before->engine_->doubles());
+    const auto variables = static_cast<std::size_t>(before->variables_);
+    return answers.bytes() > std::max(kBytes, bytes) ||
+           steps.size() > std::max(kSteps, variables / 4);
+  }
+
+  std::unique_ptr<IncrementalCholesky> before;
+  std::vector<std::function<void(IncrementalCholesky&)>> steps;
+  Answers answers;
+  // Of the update at hand:
+  Answers::Place begin;
+  Pace pace;
+};
+
 IncrementalCholesky::IncrementalCholesky(const IncrementalCholeskyOptions& options,
                                          std::shared_ptr<Rescuer> rescuer)
     : options_(options),
@@ -41,7 +69,7 @@ IncrementalCholesky::IncrementalCholesky(const IncrementalCholeskyOptions& optio
 IncrementalCholesky::IncrementalCholesky(const IncrementalCholesky& other)
     : options_(other.options_),
       rescuer_(other.rescuer_),
-      engine_(std::make_unique<Engine>(*other.engine_)),
+      engine_(std::make_unique<Engine>(other.engine())),
       variables_(other.variables_),
       factors_(other.factors_),
       losses_(other.losses_),
@@ -49,11 +77,119 @@ IncrementalCholesky::IncrementalCholesky(const IncrementalCholesky& other)
       since_full_(other.since_full_),
       kept_(other.kept_),
       told_(other.told_),
-      has_removed_(other.has_removed_) {}
+      has_removed_(other.has_removed_),
+      may_throw_(other.may_throw_) {}
+
+IncrementalCholesky::~IncrementalCholesky() = default;
+
+void IncrementalCholesky::become(IncrementalCholesky&& other) {
+  engine_ = std::move(other.engine_);
+  variables_ = other.variables_;
+  factors_ = other.factors_;
+  losses_ = std::move(other.losses_);
+  since_solved_ = other.since_solved_;
+  since_full_ = other.since_full_;
+  kept_ = other.kept_;
+  told_ = std::move(other.told_);
+  has_removed_ = other.has_removed_;
+  forget_what_was_read();
+}
+
+// --- updates that fail ---
+
+void IncrementalCholesky::refuse_if_lost() const {
+  if (!lost_) [[likely]]
+    return;
+  throw Error(ErrorCode::usage,
+              "an earlier update of this estimator has failed half-way, where it could not be "
+              "undone; reset it, or go on with a copy from before");
+}
+
+/// Whether something in the update, if it is evaluated, may throw.
+bool IncrementalCholesky::may_throw(const GraphUpdate& update) const {
+  const FactorType* last = nullptr;
+  for (const Factor& factor : update.factors) {
+    if (factor.loss && !dynamic_cast<const NeverThrows*>(factor.loss.get())) return true;
+    if (factor.type.get() == last) continue;
+    last = factor.type.get();
+    if (last && !dynamic_cast<const NeverThrows*>(last)) return true;
+  }
+  return false;
+}
+
+/// The update that follows is recorded as the next step, with what others answer meanwhile.
+void IncrementalCholesky::begin_step(const UpdateOptions& options) {
+  if (!record_ || record_->is_long()) {
+    record_.reset();
+    record_ = std::make_unique<Record>(*this);
+  }
+  record_->begin = record_->answers.end();
+  record_->pace = engine_->pace();
+  record_->steps.emplace_back(
+      [options](IncrementalCholesky& also) { also.carry_out({}, options); });
+  keep_answers(&record_->answers);
+}
+
+/// Takes back the step that was begun last.
+void IncrementalCholesky::forget_step() {
+  keep_answers(nullptr);
+  if (!record_) return;
+  record_->steps.pop_back();
+  record_->answers.cut(record_->begin);
+}
+
+void IncrementalCholesky::keep_answers(Answers* answers) {
+  answers_.in(answers);
+  engine_->keep_answers(answers);
+}
+
+/// Undoes the update that has failed: to the last bit, or else nothing can be done with the
+/// estimator any more. A journal does not have what was refused.
+void IncrementalCholesky::go_back() {
+  lost_ = true;
+  try {
+    if (before_) {
+      become(std::move(*before_));
+    } else if (record_) {
+      Record& record = *record_;
+      record.answers.repeat(true);
+      auto again = std::make_unique<IncrementalCholesky>(*record.before);
+      again->keep_answers(&record.answers);
+      for (const auto& step : record.steps) step(*again);
+      again->keep_answers(nullptr);
+      again->engine_->set_pace(record.pace);
+      become(std::move(*again));
+      record_.reset();  // the next one begins here
+    } else {
+      return;
+    }
+    lost_ = false;
+  } catch (...) {  // the first failure is the one to be reported
+    record_.reset();
+  }
+}
 
 // --- updates ---
 
 UpdateReport IncrementalCholesky::update(const GraphUpdate& update, const UpdateOptions& options) {
+  refuse_if_lost();
+  may_throw_ = may_throw_ || may_throw(update);
+  if (may_throw_) begin_step(options);
+  try {
+    UpdateReport report = carry_out(update, options);
+    keep_answers(nullptr);
+    before_.reset();
+    return report;
+  } catch (...) {
+    forget_step();
+    if (std::exchange(changes_, false)) go_back();
+    before_.reset();
+    throw;
+  }
+}
+
+UpdateReport IncrementalCholesky::carry_out(const GraphUpdate& update,
+                                            const UpdateOptions& options) {
   const Clock::time_point begin = Clock::now();
   const bool full =
       options.full || (options_.full_every > 0 && since_full_ + 1 >= options_.full_every);
@@ -61,8 +197,7 @@ UpdateReport IncrementalCholesky::update(const GraphUpdate& update, const Update
   std::optional<memory::SmallPages> small_pages;
   if (!full && max_seconds > 0.0) small_pages.emplace();
   UpdateReport report;
-  const double of_solution =
-      carry_out_or_not_at_all(update, full, !full && max_seconds > 0.0, report);
+  const double of_solution = change_graph(update, full, !full && max_seconds > 0.0, report);
   report.seconds.linearize += seconds_since(begin) - of_solution;
 
   ++since_solved_;
@@ -71,9 +206,10 @@ UpdateReport IncrementalCholesky::update(const GraphUpdate& update, const Update
     engine_->solve_fully(report);
     since_full_ = since_solved_ = 0;
   } else if (!options.defer && since_solved_ >= options_.solve_every) {
-    const double left =
-        max_seconds > 0.0 ? std::max(1e-9, max_seconds - seconds_since(begin)) : 0.0;
-    engine_->solve(left, report);
+    const auto left = [&] { return std::max(1e-9, max_seconds - seconds_since(begin)); };
+    double limit = 0.0;
+    if (max_seconds > 0.0) limit = answers_ ? answers_->number(left) : left();
+    engine_->solve(limit, report);
     since_solved_ = 0;
   }
   small_pages.reset();
@@ -84,25 +220,30 @@ UpdateReport IncrementalCholesky::update(const GraphUpdate& update, const Update
     report.seconds.marginals += seconds_since(covariances_begin);
   }
   note_gauge(report);
+  changes_ = false;
   report.seconds.total = seconds_since(begin);
   return report;
 }
 
 /// The update with its new variables placed by the estimate, if it is one that can be carried out.
 GraphUpdate IncrementalCholesky::placed(const GraphUpdate& update) {
-  GraphUpdate result = update;
-  const auto state_of = [this](Id id) {
-    const auto v = find(id);
-    return v ? state(id) : std::span<const double>();
+  const auto place = [&] {
+    GraphUpdate result = update;
+    const auto state_of = [this](Id id) {
+      const auto v = find(id);
+      return v ? state(id) : std::span<const double>();
+    };
+    place_variables(result, state_of);
+    check_update(engine_->graph(),
+                 {.position = [this](FactorId id) { return position(id); },
+                  .next = engine_->next_id(),
+                  .variable = [this](Id id) { return find(id); }},
+                 result);
+    if (options_.hints)
+      replace_poor_states(result, state_of, losses_.empty() ? Deciding::all : Deciding::first);
+    return result;
   };
-  place_variables(result, state_of);
-  check_update(engine_->graph(),
-               {.position = [this](FactorId id) { return position(id); },
-                .next = engine_->next_id(),
-                .variable = [this](Id id) { return find(id); }},
-               result);
-  if (options_.hints)
-    replace_poor_states(result, state_of, losses_.empty() ? Deciding::all : Deciding::first);
+  GraphUpdate result = answers_ ? answers_->object(place) : place();
   forget_what_was_read();
   return result;
 }
@@ -172,50 +313,38 @@ void IncrementalCholesky::Target::remove(std::span<const int> factors,
   }
 }
 
-/// Marginalising may fail, on numbers. Then everything is as before, to the last bit: a journal
-/// does not have what was refused. So it is computed before anything changes, or else on a copy.
+/// Brings the graph of the engine to where the update wants it. Marginalising may fail, on numbers:
+/// it is computed before anything changes, or else there is a copy or a record to go back to.
 /// Returns the seconds that it took to end the solution that a time limit has left.
-double IncrementalCholesky::carry_out_or_not_at_all(const GraphUpdate& update, bool full,
-                                                    bool limited, UpdateReport& report) {
+double IncrementalCholesky::change_graph(const GraphUpdate& update, bool full, bool limited,
+                                         UpdateReport& report) {
   GraphUpdate checked = placed(update);
   const bool returns = brings_back(checked);
   const bool ends = engine_->busy() && (full || returns || takes_out(checked));
   const bool goes_on = engine_->busy() && !ends;
   const bool compacts = returns || (!goes_on && compaction_is_due(limited));
   std::optional<Elimination> foreseen;
-  std::unique_ptr<IncrementalCholesky> before;
   if (!checked.marginalized.empty()) {
     if (!ends && !compacts && can_be_foreseen(checked)) {
       std::vector<int> leaving;
       for (const Id id : checked.marginalized) leaving.push_back(index(id));
       foreseen = engine_->eliminate(leaving);
-    } else {
-      before = std::make_unique<IncrementalCholesky>(*this);
+    } else if (!may_throw_) {
+      before_ = std::make_unique<IncrementalCholesky>(*this);
     }
   }
+  changes_ = true;
   double of_solution = 0.0;
-  try {
-    if (ends) {
-      of_solution = end_solution(full, report);
-      checked = placed(update);
-    }
-    if (compacts) compact();
-    Target target(*this, std::move(foreseen));
-    AppliedUpdate applied = carry_out(checked, losses_, target);
-    report.first_factor = applied.first_factor;
-    report.priors = std::move(applied.priors);
-    if (!update.removed_factors.empty() || !update.removed_variables.empty()) has_removed_ = true;
-  } catch (...) {
-    if (before) {
-      engine_ = std::move(before->engine_);
-      variables_ = before->variables_;
-      factors_ = before->factors_;
-      losses_ = before->losses_;
-      has_removed_ = before->has_removed_;
-      forget_what_was_read();
-    }
-    throw;
+  if (ends) {
+    of_solution = end_solution(full, report);
+    checked = placed(update);
   }
+  if (compacts) compact();
+  Target target(*this, std::move(foreseen));
+  AppliedUpdate applied = cairn::carry_out(checked, losses_, target);
+  report.first_factor = applied.first_factor;
+  report.priors = std::move(applied.priors);
+  if (!checked.removed_factors.empty() || !checked.removed_variables.empty()) has_removed_ = true;
   return of_solution;
 }
 
@@ -269,16 +398,21 @@ void IncrementalCholesky::note_gauge(UpdateReport& report) {
 }
 
 void IncrementalCholesky::set_loss(std::shared_ptr<const Loss> loss, const FactorSelector& which) {
+  auto next = std::make_unique<Engine>(engine());
+  next->set_loss(loss, which);
+  may_throw_ = may_throw_ || which.kind() == FactorSelector::Kind::predicate ||
+               (loss && !dynamic_cast<const NeverThrows*>(loss.get()));
+  losses_ = LossRule(std::move(loss), which, next->graph());
+  engine_ = std::move(next);
+  record_.reset();
   forget_what_was_read();
-  engine_->set_loss(loss, which);
   has_removed_ = false;
-  losses_ = LossRule(std::move(loss), which, engine_->graph());
 }
 
 // --- what is known ---
 
 std::optional<int> IncrementalCholesky::find(Id id) const {
-  const auto v = engine_->graph().find(id);
+  const auto v = engine().graph().find(id);
   return v && engine_->live_variable(*v) ? v : std::nullopt;
 }
 
@@ -288,13 +422,13 @@ int IncrementalCholesky::index(Id id) const {
 }
 
 std::optional<int> IncrementalCholesky::position(FactorId id) const {
-  const int place = engine_->place_of(id);
+  const int place = engine().place_of(id);
   return place < 0 ? std::nullopt : std::optional<int>(place);
 }
 
 std::vector<Id> IncrementalCholesky::variables() const {
   std::vector<Id> ids;
-  for (int v = 0; v < engine_->graph().variable_count(); ++v) {
+  for (int v = 0; v < engine().graph().variable_count(); ++v) {
     if (engine_->live_variable(v)) ids.push_back(engine_->graph().id(v));
   }
   return ids;
@@ -311,7 +445,7 @@ Factor IncrementalCholesky::factor(FactorId id) const {
 
 std::span<const double> IncrementalCholesky::state(Id id) {
   // Most read one variable after the other, in the order in which they have come.
-  const Graph& graph = engine_->graph();
+  const Graph& graph = engine().graph();
   const bool next = next_to_read_ < graph.variable_count() && graph.id(next_to_read_) == id &&
                     engine_->live_variable(next_to_read_);
   const int v = next ? next_to_read_ : index(id);
@@ -329,12 +463,16 @@ int IncrementalCholesky::block_size(int a, int b) const {
 }
 
 void IncrementalCholesky::keep_marginals(KeptMarginals kept) {
+  engine().covariances().keep(kept);
   kept_ = kept;
-  engine_->covariances().keep(kept);
+  if (record_)
+    record_->steps.emplace_back([kept](IncrementalCholesky& also) { also.keep_marginals(kept); });
 }
 
 void IncrementalCholesky::keep_cross(Id a, Id b) {
-  engine_->covariances().keep(index(a), index(b));
+  engine().covariances().keep(index(a), index(b));
+  if (record_)
+    record_->steps.emplace_back([a, b](IncrementalCholesky& also) { also.keep_cross(a, b); });
 }
 
 bool IncrementalCholesky::covariance(Id a, Id b, std::span<double> block) {
@@ -386,17 +524,21 @@ int IncrementalCholesky::place_in(const Engine& engine, Id id) const {
 Engine& IncrementalCholesky::solved() {
   if (!engine_->busy() && (since_solved_ > 0 || engine_->up_to_date())) return *engine_;
   if (!finished_) {
-    finished_ = std::make_unique<Engine>(*engine_);
+    auto copy = std::make_unique<Engine>(*engine_);
     UpdateReport report;
-    finished_->solve(0.0, report);
-    if (report.ok && finished_->up_to_date() && finished_->covariances().keeps_anything())
-      finished_->update_covariances();
+    copy->solve(0.0, report);
+    if (report.ok && copy->up_to_date() && copy->covariances().keeps_anything())
+      copy->update_covariances();
+    finished_ = std::move(copy);
   }
   return *finished_;
 }
 
 void IncrementalCholesky::reset() {
-  engine_ = std::make_unique<Engine>(options_.settings, rescuer_);
+  auto fresh = std::make_unique<Engine>(options_.settings, rescuer_);
+  lost_ = may_throw_ = false;
+  record_.reset();
+  engine_ = std::move(fresh);
   engine_->covariances().keep(kept_);
   variables_ = factors_ = since_solved_ = since_full_ = 0;
   has_removed_ = false;

@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "answers.hpp"
 #include "cairn/plugin/option_fields.hpp"
 #include "cairn/solve/estimator.hpp"
 #include "cairn/solve/optimizer.hpp"
@@ -71,32 +72,34 @@ class IncrementalCholesky final : public Estimator {
   IncrementalCholesky(const IncrementalCholeskyOptions& options, std::shared_ptr<Rescuer> rescuer);
   IncrementalCholesky(const IncrementalCholesky& other);
   IncrementalCholesky& operator=(const IncrementalCholesky&) = delete;
+  ~IncrementalCholesky() override;
 
   UpdateReport update(const GraphUpdate& update, const UpdateOptions& options) override;
   void set_loss(std::shared_ptr<const Loss> loss, const FactorSelector& which) override;
   bool has(Id id) const override { return find(id).has_value(); }
-  int variable_count() const override { return variables_; }
-  int factor_count() const override { return factors_; }
+  int variable_count() const override { return refuse_if_lost(), variables_; }
+  int factor_count() const override { return refuse_if_lost(), factors_; }
   std::vector<Id> variables() const override;
   std::shared_ptr<const VariableType> type(Id id) const override;
-  std::vector<FactorId> factors() const override { return engine_->live_ids(); }
+  std::vector<FactorId> factors() const override { return engine().live_ids(); }
   bool has_factor(FactorId id) const override { return position(id).has_value(); }
   Factor factor(FactorId id) const override;
   std::span<const double> state(Id id) override;
-  double chi2() override { return engine_->chi2(); }
-  Graph graph() override { return engine_->snapshot(); }
+  double chi2() override { return engine().chi2(); }
+  Graph graph() override { return engine().snapshot(); }
   void keep_marginals(KeptMarginals kept) override;
   void keep_cross(Id a, Id b) override;
   bool covariance(Id a, Id b, std::span<double> block) override;
   bool covariance_column(Id id, std::span<const Id> variables, std::span<double> out) override;
   void reset() override;
   std::unique_ptr<Estimator> clone() const override;
-  std::int64_t memory() const override { return engine_->doubles() * 8; }
+  std::int64_t memory() const override { return engine().doubles() * 8; }
   /// The clock that limits refer to, for tests.
-  void set_clock(Pace::Clock clock) { engine_->set_clock(std::move(clock)); }
+  void set_clock(Pace::Clock clock) { engine().set_clock(std::move(clock)); }
 
  private:
   class Target;
+  struct Record;
   /// Variables whose rows of a covariance are asked for.
   struct Rows {
     std::vector<Id> ids;
@@ -108,8 +111,17 @@ class IncrementalCholesky final : public Estimator {
   int index(Id id) const;
   int block_size(int a, int b) const;
   const Rows& rows_of(std::span<const Id> variables);
-  double carry_out_or_not_at_all(const GraphUpdate& update, bool full, bool limited,
-                                 UpdateReport& report);
+  UpdateReport carry_out(const GraphUpdate& update, const UpdateOptions& options);
+  double change_graph(const GraphUpdate& update, bool full, bool limited, UpdateReport& report);
+  void refuse_if_lost() const;
+  Engine& engine() { return refuse_if_lost(), *engine_; }
+  const Engine& engine() const { return refuse_if_lost(), *engine_; }
+  bool may_throw(const GraphUpdate& update) const;
+  void begin_step(const UpdateOptions& options);
+  void forget_step();
+  void keep_answers(Answers* answers);
+  void go_back();
+  void become(IncrementalCholesky&& other);
   bool compaction_is_due(bool limited) const;
   void compact();
   bool brings_back(const GraphUpdate& update) const;
@@ -142,6 +154,14 @@ class IncrementalCholesky final : public Estimator {
   /// Something has been removed, not marginalised, and is still in the engine's arrays: the next
   /// update without a time limit takes it out.
   bool has_removed_ = false;
+
+  // What is gone back to where an update fails while it is carried out:
+  bool changes_ = false;                         ///< one is being carried out, and is so in part
+  std::unique_ptr<IncrementalCholesky> before_;  ///< a copy, made for this update
+  bool may_throw_ = false;          ///< something of the graph may throw where it is evaluated, …
+  std::unique_ptr<Record> record_;  ///< … and then there is this
+  AnswersKept answers_;
+  bool lost_ = false;  ///< an update has failed that could not be undone
 };
 
 }  // namespace cairn::incremental

@@ -8,6 +8,7 @@
 
 #include "add_product.hpp"
 #include "cairn/graph/packed.hpp"
+#include "cairn/types/factor_call.hpp"
 
 namespace cairn::incremental {
 namespace {
@@ -112,6 +113,17 @@ const double* Models::block(const Record& record, int k) const {
 /// Returns ρ(‖r‖²).
 double Models::evaluate(const Record& record, const Graph& graph, const Estimate& estimate,
                         double* r, double* J) const {
+  if (!answers_) return ask(record, graph, estimate, r, J);
+  const auto rows = static_cast<std::size_t>(record.rows);
+  const std::size_t numbers = J ? rows * static_cast<std::size_t>(record.scalars) : 0;
+  double rho = 0.0;
+  answers_->write({{r, rows}, {J, numbers}, {&rho, 1}},
+                  [&] { rho = ask(record, graph, estimate, r, J); });
+  return rho;
+}
+
+double Models::ask(const Record& record, const Graph& graph, const Estimate& estimate, double* r,
+                   double* J) const {
   const FactorPool& pool = graph.factor_pools()[record.pool];
   const FactorType& type = *pool.type;
   points_.clear();
@@ -124,11 +136,15 @@ double Models::evaluate(const Record& record, const Graph& graph, const Estimate
   }
   const std::size_t packed = packed_size(record.rows);
   const std::size_t entry = static_cast<std::size_t>(record.entry);
-  type.evaluate(
-      points_.data(),
-      pool.measurements.data() + entry * static_cast<std::size_t>(type.measurement_size()),
-      pool.sqrt_information.data() + static_cast<std::size_t>(pool.noises[entry]) * packed, r,
-      J ? pointers_.data() : nullptr);
+  call_factor(
+      type, [&] { return graph.describe_factor(pool.sequence[entry]); },
+      [&] {
+        type.evaluate(
+            points_.data(),
+            pool.measurements.data() + entry * static_cast<std::size_t>(type.measurement_size()),
+            pool.sqrt_information.data() + static_cast<std::size_t>(pool.noises[entry]) * packed, r,
+            J ? pointers_.data() : nullptr);
+      });
   double s = 0.0;
   for (int k = 0; k < record.rows; ++k) s += r[k] * r[k];
   if (!graph.has_losses() || !graph.any_loss(record.pool, entry, entry + 1)) return s;
@@ -315,6 +331,47 @@ void Models::correct(std::span<const std::int32_t> factors, const Graph& graph,
   if (factors.empty()) return;
   gather(factors, graph, states.estimate());
   const Record& one = records_[factors.front()];
+  const std::size_t count = factors.size();
+  const bool weighs = graph.has_losses() && graph.factor_pools()[one.pool].type->takes_loss();
+  Gathered& all = gathered_;
+  all.norms.resize(count);
+  all.costs.resize(count);
+  all.gradients.resize(count * static_cast<std::size_t>(one.scalars));
+  if (answers_) {
+    answers_->write({all.norms, all.costs, all.gradients}, [&] { ask(factors, graph, weighs); });
+  } else {
+    ask(factors, graph, weighs);
+  }
+  const double* now = all.gradients.data();
+  for (std::size_t i = 0; i < count; ++i) {
+    Record& record = records_[factors[i]];
+    record.cost = weighs ? all.costs[i] : all.norms[i];
+    if (one.of_poses && one.rows == 3)
+      replace_gradient_of_pair<3>(record, now, states, system, held);
+    else if (one.of_poses && one.rows == 6)
+      replace_gradient_of_pair<6>(record, now, states, system, held);
+    else
+      replace_gradient(factors[i], now, states, system, held);
+    now += one.scalars;
+  }
+}
+
+/// Evaluates the factors that `gathered_` has: norms, costs where one is weighed, and gradients.
+void Models::ask(std::span<const std::int32_t> factors, const Graph& graph, bool weighs) {
+  const Record& one = records_[factors.front()];
+  const FactorPool& pool = graph.factor_pools()[one.pool];
+  const int position = pool.sequence[static_cast<std::size_t>(one.entry)];
+  if (factors.size() == 1) {
+    call_factor(
+        *pool.type, [&] { return graph.describe_factor(position); },
+        [&] { ask_gathered(factors, graph, weighs); });
+  } else {
+    call_factor(*pool.type, [&] { ask_gathered(factors, graph, weighs); });
+  }
+}
+
+void Models::ask_gathered(std::span<const std::int32_t> factors, const Graph& graph, bool weighs) {
+  const Record& one = records_[factors.front()];
   const FactorPool& pool = graph.factor_pools()[one.pool];
   const FactorType& type = *pool.type;
   const std::size_t count = factors.size(), arity = static_cast<std::size_t>(one.arity);
@@ -325,10 +382,8 @@ void Models::correct(std::span<const std::int32_t> factors, const Graph& graph,
                         .sqrt_information = pool.sqrt_information.data(),
                         .noises = all.noises.data(),
                         .states = all.state_arrays.data()};
-  all.norms.resize(count);
-  all.costs.resize(count);
   all.weights.clear();
-  if (graph.has_losses() && type.takes_loss()) {
+  if (weighs) {
     type.squared_norms(view, 0, count, all.norms.data());
     for (std::size_t i = 0; i < count; ++i) {
       double& weight = all.weights.emplace_back(1.0);
@@ -346,24 +401,11 @@ void Models::correct(std::span<const std::int32_t> factors, const Graph& graph,
       place += size_of(one, k);
     }
   }
-  all.gradients.resize(static_cast<std::size_t>(place));
   const LinearizeSink sink{.arrays = {nullptr, all.gradients.data(), nullptr},
                            .blocks = all.blocks.data(),
                            .gradients = all.gradient_targets.data()};
   type.linearize(view, 0, count, all.weights.empty() ? nullptr : all.weights.data(), sink,
                  all.norms.data());
-  const double* now = all.gradients.data();
-  for (std::size_t i = 0; i < count; ++i) {
-    Record& record = records_[factors[i]];
-    record.cost = all.weights.empty() ? all.norms[i] : all.costs[i];
-    if (one.of_poses && one.rows == 3)
-      replace_gradient_of_pair<3>(record, now, states, system, held);
-    else if (one.of_poses && one.rows == 6)
-      replace_gradient_of_pair<6>(record, now, states, system, held);
-    else
-      replace_gradient(factors[i], now, states, system, held);
-    now += one.scalars;
-  }
 }
 
 /// As `replace_gradient`, for a factor of two variables with as many coordinates as it has rows.

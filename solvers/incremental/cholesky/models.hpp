@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "answers.hpp"
 #include "cairn/graph/graph.hpp"
 #include "segmented_array.hpp"
 #include "states.hpp"
@@ -81,6 +82,8 @@ class Models {
   /// J of all its variables side by side, rows × scalars, column-major.
   const double* jacobian(int f) const { return values_.at(records_[f].place); }
   std::int64_t doubles() const { return values_.size(); }
+  /// What factors answer is recorded here, or taken from here.
+  void keep_answers(Answers* answers) { answers_.in(answers); }
 
  private:
   struct Record {
@@ -108,6 +111,10 @@ class Models {
   void into_frames(const Record& record, const States& states, double* J) const;
   double evaluate(const Record& record, const Graph& graph, const Estimate& estimate, double* r,
                   double* J) const;
+  double ask(const Record& record, const Graph& graph, const Estimate& estimate, double* r,
+             double* J) const;
+  void ask(std::span<const std::int32_t> factors, const Graph& graph, bool weighs);
+  void ask_gathered(std::span<const std::int32_t> factors, const Graph& graph, bool weighs);
 
   std::vector<Record> records_;
   std::vector<std::int32_t> variables_;
@@ -127,6 +134,7 @@ class Models {
     std::vector<double> gradients, norms, costs, weights;
   };
   Gathered gathered_;
+  AnswersKept answers_;
 };
 
 }  // namespace cairn::incremental

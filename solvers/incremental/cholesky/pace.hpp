@@ -9,6 +9,8 @@
 #include <optional>
 #include <utility>
 
+#include "answers.hpp"
+
 namespace cairn::incremental {
 
 /// Kinds of work, of which each piece has an amount, in a unit of its own.
@@ -47,20 +49,11 @@ class Pace {
   /// kind that are expected to take little are allowed several at a time.
   bool allows(Work kind, double amount) {
     if (!limited()) return true;
-    const double expected = rate(kind) * amount;
-    if (piece_ && piece_->kind == kind && piece_->expected + expected < short_) {
-      piece_->expected += expected;
-      piece_->amount += amount;
-      return true;
-    }
-    const double time = now();
-    learn(time);
-    piece_.reset();
-    if (!std::exchange(first_, false) && time + expected > end_ - reserved_) return false;
-    piece_ = {kind, amount, expected, time};
-    largest_ = std::max(largest_, amount);
-    return true;
+    if (!answers_) return measure(kind, amount);
+    return answers_->number([&] { return measure(kind, amount) ? 1.0 : 0.0; }) != 0.0;
   }
+  /// What is allowed is recorded there, or taken from there (see `Answers`).
+  void keep_answers(Answers* answers) { answers_.in(answers); }
   /// So many seconds at the end of the update are for something else.
   void keep_free(double seconds) { reserved_ = seconds; }
   /// The largest amount of work that began as one piece in this update; for tests, with a clock of
@@ -80,6 +73,21 @@ class Pace {
   static constexpr double kShort = 30e-6;  ///< seconds between two looks at the clock
   static constexpr double kLearn = 0.1;    ///< weight of the last piece in what is expected
 
+  bool measure(Work kind, double amount) {
+    const double expected = rate(kind) * amount;
+    if (piece_ && piece_->kind == kind && piece_->expected + expected < short_) {
+      piece_->expected += expected;
+      piece_->amount += amount;
+      return true;
+    }
+    const double time = now();
+    learn(time);
+    piece_.reset();
+    if (!std::exchange(first_, false) && time + expected > end_ - reserved_) return false;
+    piece_ = {kind, amount, expected, time};
+    largest_ = std::max(largest_, amount);
+    return true;
+  }
   double& rate(Work kind) { return rates_[static_cast<std::size_t>(kind)]; }
   double now() const {
     if (clock_) return clock_();
@@ -93,6 +101,7 @@ class Pace {
     known += kLearn * (std::min((time - piece_->begin) / piece_->amount, 2.0 * known) - known);
   }
 
+  AnswersKept answers_;
   Clock clock_;
   double short_ = kShort;
   double limit_ = 0.0, end_ = 0.0, reserved_ = 0.0, largest_ = 0.0;

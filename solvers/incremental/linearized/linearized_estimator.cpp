@@ -12,6 +12,7 @@
 #include "cairn/geometry/pose.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/timed.hpp"
+#include "cairn/types/factor_call.hpp"
 #include "cairn/types/loss.hpp"
 #include "cairn/update/marginal_prior.hpp"
 
@@ -87,8 +88,12 @@ Rows LinearizedEstimator::State::linearize(int factor, bool at_origins) const {
     J.push_back(rows.J.col(at).data());
     at += size;
   }
-  type.evaluate(x.data(), graph.measurement(factor).data(), graph.sqrt_information(factor).data(),
-                rows.c.data(), J.data());
+  call_factor(
+      type, [&] { return graph.describe_factor(factor); },
+      [&] {
+        type.evaluate(x.data(), graph.measurement(factor).data(),
+                      graph.sqrt_information(factor).data(), rows.c.data(), J.data());
+      });
   const double root = std::sqrt(weight_of(graph, factor, rows.c.squaredNorm()));
   rows.J *= root;
   rows.c *= root;
@@ -197,6 +202,67 @@ LinearizedEstimator::LinearizedEstimator(std::unique_ptr<GaussianForm> form,
                                          std::optional<BatchSteps> batch)
     : form_(std::move(form)), batch_(std::move(batch)) {}
 
+/// All that an update changes, to go back to where it fails half-way: on numbers, or since a factor
+/// throws while it is evaluated. An update that only adds evaluates nothing once its factors are
+/// linearised: what is new is taken out again. Of any other, of a batch step, and of a filter's
+/// answer whether it has converged, everything is copied.
+class LinearizedEstimator::Before {
+ public:
+  Before(const LinearizedEstimator& of, const GraphUpdate& update, const UpdateOptions& options)
+      : copies_(!only_adds(update) || options.full || of.is_batch_step(update, options)),
+        variables_(of.state_.graph.variable_count()),
+        factors_(of.state_.graph.factor_count()),
+        ids_(of.state_.ids),
+        must_batch_(of.must_batch_),
+        since_batch_(of.since_batch_) {
+    if (!copies_) return;
+    state_ = of.state_.clone();
+    form_ = of.form_->clone();
+    determined_ = of.determined_;
+    gauge_ = of.gauge_;
+    reported_ = of.reported_;
+  }
+
+  void restore(LinearizedEstimator& to) {
+    to.must_batch_ = must_batch_;
+    to.since_batch_ = since_batch_;
+    if (!copies_) return take_out_what_is_new(to.state_);
+    to.state_ = std::move(state_);
+    to.form_ = std::move(form_);
+    to.determined_ = determined_;
+    to.gauge_ = std::move(gauge_);
+    to.reported_ = std::move(reported_);
+  }
+
+ private:
+  void take_out_what_is_new(State& state) {
+    Graph& graph = state.graph;
+    std::vector<bool> factors(static_cast<std::size_t>(graph.factor_count()), false);
+    std::vector<bool> variables(static_cast<std::size_t>(graph.variable_count()), false);
+    std::fill(factors.begin() + factors_, factors.end(), true);
+    std::fill(variables.begin() + variables_, variables.end(), true);
+    for (int v = variables_; v < graph.variable_count(); ++v)
+      state.losses.removed_variable(graph, v);
+    graph.remove(factors, variables);
+    state.ids = std::move(ids_);
+    state.models.resize(static_cast<std::size_t>(factors_));
+    state.displacements.resize(static_cast<std::size_t>(variables_));
+    state.origins.resize(static_cast<std::size_t>(variables_));
+  }
+
+  bool copies_;
+  int variables_, factors_;
+  FactorIds ids_;
+  bool must_batch_;
+  int since_batch_;
+  // If everything is copied:
+  State state_;
+  std::unique_ptr<GaussianForm> form_;
+  bool determined_ = true;
+  Gauge gauge_;
+  std::set<std::string> reported_;
+};
+
 UpdateReport LinearizedEstimator::update(const GraphUpdate& update, const UpdateOptions& options) {
   const auto begin = Clock::now();
   GraphUpdate checked = update;
@@ -204,58 +270,45 @@ UpdateReport LinearizedEstimator::update(const GraphUpdate& update, const Update
   std::int64_t size = state_.graph.tangent_size();
   for (const Variable& variable : checked.variables) size += variable.type->tangent_size();
   form_->check_size(size);
-  const AppliedUpdate applied = apply(checked);
+  Before before(*this, checked, options);
   UpdateReport report;
-  report.first_factor = applied.first_factor;
-  report.priors = applied.priors;
-  report.seconds.linearize = seconds_since(begin);
-  must_batch_ = must_batch_ || !only_adds(checked);
-  ++since_batch_;
-  if (!options.defer || options.full) {
-    if (batch_ && (options.full || must_batch_ || since_batch_ >= batch_->every)) {
-      batch_step(options, report);
-    } else {
-      if (options.full) form_->recover_fully();
-      solve(report);
-    }
-    if (options.full && !batch_) check_converged(report);
-  } else {
-    take_models();
+  try {
+    carry_out(checked, options, report);
+  } catch (...) {
+    before.restore(*this);
+    throw;
   }
   report.seconds.total = seconds_since(begin);
   return report;
 }
 
-/// All or nothing: after the check only marginalisation and derivatives can fail, and those on
-/// numbers.
-AppliedUpdate LinearizedEstimator::apply(const GraphUpdate& update) {
-  const auto size = state_.graph.variable_count();
-  const auto factors = state_.graph.factor_count();
-  if (!only_adds(update)) {
-    State state = state_.clone();
-    Target target(state, !batch_);
-    AppliedUpdate applied = carry_out(update, state.losses, target);
-    state_ = std::move(state);
-    return applied;
-  }
-  const FactorIds ids = state_.ids;
+bool LinearizedEstimator::is_batch_step(const GraphUpdate& update,
+                                        const UpdateOptions& options) const {
+  if (!batch_ || (options.defer && !options.full)) return false;
+  return options.full || must_batch_ || !only_adds(update) || since_batch_ + 1 >= batch_->every;
+}
+
+void LinearizedEstimator::carry_out(const GraphUpdate& update, const UpdateOptions& options,
+                                    UpdateReport& report) {
+  const auto begin = Clock::now();
+  const bool batch = is_batch_step(update, options);
+  Target target(state_, !batch_);
+  const AppliedUpdate applied = cairn::carry_out(update, state_.losses, target);
+  report.first_factor = applied.first_factor;
+  report.priors = applied.priors;
+  report.seconds.linearize = seconds_since(begin);
+  must_batch_ = must_batch_ || !only_adds(update);
+  ++since_batch_;
+  if (batch) return batch_step(options, report);
   try {
-    Target target(state_, !batch_);
-    return carry_out(update, state_.losses, target);
-  } catch (...) {  // what was added goes again
-    std::vector<bool> new_factors(static_cast<std::size_t>(state_.graph.factor_count()), false);
-    std::vector<bool> new_variables(static_cast<std::size_t>(state_.graph.variable_count()), false);
-    std::fill(new_factors.begin() + factors, new_factors.end(), true);
-    std::fill(new_variables.begin() + size, new_variables.end(), true);
-    for (int v = size; v < state_.graph.variable_count(); ++v)
-      state_.losses.removed_variable(state_.graph, v);
-    state_.graph.remove(new_factors, new_variables);
-    state_.ids = ids;
-    state_.models.resize(static_cast<std::size_t>(factors));
-    state_.displacements.resize(static_cast<std::size_t>(size));
-    state_.origins.resize(static_cast<std::size_t>(size));
+    if (options.defer && !options.full) return take_models();
+    if (options.full) form_->recover_fully();
+    solve(report);
+  } catch (...) {  // of memory: the form may have taken a part of what is new
+    state_.rebuild = true;
     throw;
   }
+  if (options.full) check_converged(report);
 }
 
 void LinearizedEstimator::linearize_all() {
@@ -334,16 +387,22 @@ void LinearizedEstimator::take_models() {
 
 void LinearizedEstimator::move_estimate() {
   const std::span<const double> d = form_->displacement();
+  const auto next = [&](int v) {
+    return Eigen::Map<const VectorXd>(d.data() + form_->offset(state_.graph.id(v)),
+                                      state_.graph.type(v).tangent_size());
+  };
+  std::vector<std::vector<double>> states(state_.displacements.size());  // all, or none moves
   for (int v = 0; v < state_.graph.variable_count(); ++v) {
     if (is_held(v)) continue;
     const auto k = static_cast<std::size_t>(v);
-    VectorXd& now = state_.displacements[k];
-    const VectorXd next = Eigen::Map<const VectorXd>(d.data() + form_->offset(state_.graph.id(v)),
-                                                     state_.graph.type(v).tangent_size());
     const VariableType& type = state_.graph.type(v);
-    state_.graph.set_state(v, batch_ ? moved(type, state_.origins[k], next)
-                                     : moved(type, state_.graph.state(v), next - now));
-    now = next;
+    states[k] = batch_ ? moved(type, state_.origins[k], next(v))
+                       : moved(type, state_.graph.state(v), next(v) - state_.displacements[k]);
+  }
+  for (int v = 0; v < state_.graph.variable_count(); ++v) {
+    if (is_held(v)) continue;
+    state_.graph.set_state(v, states[static_cast<std::size_t>(v)]);
+    state_.displacements[static_cast<std::size_t>(v)] = next(v);
   }
 }
 
@@ -452,9 +511,15 @@ void LinearizedEstimator::note(const std::string& sentence, UpdateReport& report
 }
 
 void LinearizedEstimator::set_loss(std::shared_ptr<const Loss> loss, const FactorSelector& which) {
-  state_.graph.set_loss(loss, which);
-  state_.losses = LossRule(std::move(loss), which, state_.graph);
-  linearize_all();
+  State before = state_.clone();
+  try {
+    state_.graph.set_loss(loss, which);
+    state_.losses = LossRule(std::move(loss), which, state_.graph);
+    linearize_all();
+  } catch (...) {
+    state_ = std::move(before);
+    throw;
+  }
   take_models();
   must_batch_ = true;
 }

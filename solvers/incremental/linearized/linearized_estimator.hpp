@@ -95,7 +95,9 @@ class LinearizedEstimator final : public Estimator {
     Rows linearize(int factor, bool at_origins) const;
   };
 
-  AppliedUpdate apply(const GraphUpdate& update);
+  class Before;
+  void carry_out(const GraphUpdate& update, const UpdateOptions& options, UpdateReport& report);
+  bool is_batch_step(const GraphUpdate& update, const UpdateOptions& options) const;
   void linearize_all();
   /// The columns of variables that are not constant; the constant ones are in c.
   Rows free_rows(const Model& model) const;

@@ -73,11 +73,14 @@ enum class KeptMarginals {
 /// Keeps the maximum likelihood estimate of a graph, with covariances, up to date while the graph
 /// grows and changes.
 ///
-/// A variable is known by its `Id` and a factor by its `FactorId`. Every update is atomic: what it
-/// asks for is checked before anything changes, so an `Error` (input: an unknown id, a duplicate, a
-/// wrong size, …) leaves the estimator as it was. A component of the graph without a fixed variable
-/// or prior gets its first pose anchored, as by `resolve_gauge`, which a note reports. It minimises
-/// the sum of ρ(‖r‖²), as an `Optimizer` does.
+/// A variable is known by its `Id` and a factor by its `FactorId`. Every update is atomic: an
+/// `Error` leaves the estimator as it was, and has no part in any later result, to the last bit.
+/// What an update asks for is checked before anything changes (input: an unknown id, a duplicate, a
+/// wrong size, …); where a factor or a loss throws while it is evaluated, however late (plugin,
+/// with the factor's name), what was done is undone. What cannot be undone, such as where memory
+/// ends, leaves one whose every call but `reset` throws `Error` (usage). A component of the graph
+/// without a fixed variable or prior gets its first pose anchored, as by `resolve_gauge`, which a
+/// note reports. It minimises the sum of ρ(‖r‖²), as an `Optimizer` does.
 class CAIRN_API Estimator : public Component {
  public:
   static constexpr std::string_view kKind = "estimator";
