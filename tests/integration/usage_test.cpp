@@ -338,6 +338,30 @@ TEST(Usage, AnExceptionInAPluginNamesThePluginsPart) {
     expect_error(cairn({command, folder.file("brittle.g2o"), "--plugin", factor, "--quiet"}),
                  kPlugin, "factor 'EDGE_BRITTLE' failed: the measurement is out of my range");
   }
+  for (const char* estimator : {"incremental_cholesky", "incremental_qr", "ekf", "batch"}) {
+    expect_error(cairn({"replay", folder.file("brittle.g2o"), "--plugin", factor, "--estimator",
+                        estimator, "--quiet"}),
+                 kPlugin, "factor 'EDGE_BRITTLE' failed: the measurement is out of my range");
+  }
+  // A session goes on, as if the line had not come; what its journal has is the same.
+  const std::vector<std::string> session{
+      "online", "--plugin", factor, "--output", "all", "--journal", folder.file("brittle.log")};
+  const Outcome online = cairn(session, {},
+                               "VERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 1 0 0\n"
+                               "EDGE_SE2 0 1 1.1 0 0 1 0 0 1 0 1\nEDGE_BRITTLE 1 7 1\n"
+                               "EDGE_BRITTLE 1 0.9 1\nCHI2\nESTIMATE ALL\n");
+  EXPECT_EQ(online.code, 0) << online.err;
+  EXPECT_THAT(online.out, HasSubstr("ERROR line 4: factor 'EDGE_BRITTLE' failed: the measurement "
+                                    "is out of my range (EDGE_BRITTLE 1)\n"));
+  EXPECT_THAT(online.out, HasSubstr("OK 7 variables 2 factors 2 owed 0\n"));
+  const Outcome restored = cairn(session, {}, "CHI2\nESTIMATE ALL\n");
+  const auto answers = [](const std::string& out) {
+    std::string text;  // without the numbers of lines
+    const std::size_t begin = out.rfind("CHI2");
+    for (const char c : out.substr(begin, out.rfind("OK") - begin)) text += c;
+    return text.substr(0, text.find("OK")) + text.substr(text.find("VERTEX"));
+  };
+  EXPECT_EQ(answers(restored.out), answers(online.out));
   expect_error(cairn({"info", folder.file("brittle.g2o"), "--plugin", factor, "--types",
                       "brittle:sound=false"}),
                kPlugin, "brittle.so: types 'brittle' failed: no types of mine");

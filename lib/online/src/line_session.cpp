@@ -85,6 +85,7 @@ LineSession::Reply LineSession::take(std::string_view line, std::int64_t number)
   try {
     perform(line, words, reply);
   } catch (const Error& error) {
+    if (error.code() == ErrorCode::plugin && !undoes_failures() && !is_question(words[0])) throw;
     reply.text = error_line(number, error.what(), kStreamName);
     reply.refused = true;
   }

@@ -68,6 +68,10 @@ class CAIRN_API LineSession {
   /// cannot. Nothing has changed then, or `reply.changes` says so.
   virtual void perform(std::string_view line, const Words& words, Reply& reply) = 0;
 
+  /// Whether a line in which a plugin has failed (`Error` of code plugin) has changed nothing, and
+  /// is answered like any other that is refused; otherwise `take` throws that error.
+  virtual bool undoes_failures() const { return true; }
+
   std::int64_t line() const { return line_; }
   /// Within `ask`: nothing may change.
   bool asking() const { return asking_; }

@@ -91,6 +91,8 @@ class CAIRN_API PolicySession final : public LineSession {
   static std::span<const NamedCommand> commands();
   static Command find_command(std::string_view word);
   void perform(std::string_view line, const Words& words, Reply& reply) override;
+  /// A policy may have decided in part.
+  bool undoes_failures() const override { return false; }
   void perform_question(const Words& words, Reply& reply);
 
   // A command each; the words are those of its line.
