@@ -17,6 +17,7 @@
 #include "cairn/runtime/error.hpp"
 #include "cairn/solve/estimator.hpp"
 #include "checker.hpp"
+#include "failure_checks.hpp"
 #include "repetition.hpp"
 #include "sample_graph.hpp"
 #include "samples.hpp"
@@ -418,10 +419,11 @@ Repetition estimator_uses(const Subject& subject, Checker& check) {
 }  // namespace
 
 std::span<const Group> estimator_groups() {
-  static constexpr std::array<Group, 8> groups{{{"estimate", check_estimate},
+  static constexpr std::array<Group, 9> groups{{{"estimate", check_estimate},
                                                 {"on the way", check_on_the_way, true},
                                                 {"covariances", check_covariances},
                                                 {"bad updates", check_bad_updates},
+                                                {"failing updates", check_failing_updates},
                                                 {"changes", check_changes},
                                                 {"copies", check_copies},
                                                 {"memory", memory_group<estimator_uses>, true},
