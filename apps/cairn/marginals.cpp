@@ -393,7 +393,8 @@ void add_rows(const Graph& graph, const Block& block, Table& table) {
   const std::size_t rows = tangent(graph, block.a);
   for (std::size_t r = 0; r < rows; ++r) {
     std::vector<std::string> cells{
-        r == 0 ? fmt::format("{}, {}", graph.id(block.a), graph.id(block.b)) : ""};
+        r == 0 ? fmt::format("{}, {}", id_text(graph.id(block.a)), id_text(graph.id(block.b)))
+               : ""};
     for (std::size_t c = 0; c < tangent(graph, block.b); ++c)
       cells.push_back(fmt::format("{:.6g}", block.values[c * rows + r]));
     table.add(std::move(cells));
@@ -402,7 +403,7 @@ void add_rows(const Graph& graph, const Block& block, Table& table) {
 
 std::string set_text(const Graph& graph, const std::vector<int>& variables) {
   std::string text;
-  for (const int v : variables) text += fmt::format("{}{}", text.empty() ? "" : "+", graph.id(v));
+  for (const int v : variables) text += (text.empty() ? "" : "+") + id_text(graph.id(v));
   return text;
 }
 

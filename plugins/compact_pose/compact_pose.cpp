@@ -10,6 +10,7 @@
 #include <fmt/core.h>
 #include <Eigen/Cholesky>
 
+#include "cairn/graph/id_text.hpp"
 #include "cairn/graph/packed.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/timed.hpp"
@@ -161,20 +162,21 @@ void CompactPose::add_pose(const Variable& pose, std::span<const Factor> odometr
   report.id = pose.id;
   if (graph_.empty()) {
     if (!odometry.empty())
-      refuse(fmt::format("pose {} is the first, and moved from another", pose.id));
+      refuse(fmt::format("pose {} is the first, and moved from another", id_text(pose.id)));
     if (graph_.size() > 0) check_new(pose);
     std::swap(report_, report);
     start(pose);
   } else {
     check_new(pose);
-    if (pose.id == graph_.newest_id()) refuse(fmt::format("pose {} is there already", pose.id));
+    if (pose.id == graph_.newest_id())
+      refuse(fmt::format("pose {} is there already", id_text(pose.id)));
     if (pose.fixed && !graph_.located()) {
       refuse(fmt::format("pose {} is held, while it is unknown where the trajectory is on the map",
                          pose.id));
     }
     if (odometry.empty())
-      refuse(
-          fmt::format("pose {} comes without odometry from pose {}", pose.id, graph_.newest_id()));
+      refuse(fmt::format("pose {} comes without odometry from pose {}", id_text(pose.id),
+                         id_text(graph_.newest_id())));
     const Motion motion = graph_.fuse(odometry, graph_.newest_id(), pose.id);
     std::swap(report_, report);
     const Timed timed(report_.seconds.total);
@@ -193,12 +195,12 @@ void CompactPose::add_pose(const Variable& pose, std::span<const Factor> odometr
 
 void CompactPose::check_new(const Variable& pose) const {
   if (pose.type->tag() != graph_.group().motions().type().tag()) {
-    refuse(fmt::format("pose {} is a {}; the poses before it are {}", pose.id, pose.type->tag(),
-                       graph_.group().motions().type().tag()));
+    refuse(fmt::format("pose {} is a {}; the poses before it are {}", id_text(pose.id),
+                       pose.type->tag(), graph_.group().motions().type().tag()));
   }
-  if (graph_.find(pose.id) >= 0) refuse(fmt::format("pose {} is there already", pose.id));
+  if (graph_.find(pose.id) >= 0) refuse(fmt::format("pose {} is there already", id_text(pose.id)));
   if (graph_.landmark(pose.id) || waiting_landmarks_.contains(pose.id))
-    refuse(fmt::format("pose {} has the id of a landmark", pose.id));
+    refuse(fmt::format("pose {} has the id of a landmark", id_text(pose.id)));
 }
 
 /// Σ̄_y of this pose. What the options do not say is learnt; the first match is expected to be like
@@ -352,7 +354,8 @@ LinkReport CompactPose::offer(Id other, std::span<const Factor> measured) {
     refuse(fmt::format("pose {} is not in the compact graph{}", other,
                        other == graph_.newest_id() ? "; it is the newest" : ""));
   }
-  if (other == graph_.newest_id()) refuse(fmt::format("a link from pose {} to itself", other));
+  if (other == graph_.newest_id())
+    refuse(fmt::format("a link from pose {} to itself", id_text(other)));
   const Motion motion =
       measured.empty() ? Motion() : graph_.fuse(measured, other, graph_.newest_id());
   if (!searched_) search();

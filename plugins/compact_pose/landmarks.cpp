@@ -15,6 +15,7 @@
 #include <fmt/core.h>
 
 #include "cairn/geometry/pose.hpp"
+#include "cairn/graph/id_text.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/timed.hpp"
 #include "cairn/update/graph_update.hpp"
@@ -153,8 +154,8 @@ ObservationRows linearized(std::span<const Measured> factors, Id pose, const dou
 Measured checked_observation(const Factor& factor, Id pose, const VariableType& pose_type,
                              const Variable& landmark) {
   if (!factor.type) refuse("a measurement of a landmark without a type");
-  const std::string name =
-      fmt::format("{} of landmark {} from pose {}", factor.type->tag(), landmark.id, pose);
+  const std::string name = fmt::format("{} of landmark {} from pose {}", factor.type->tag(),
+                                       id_text(landmark.id), id_text(pose));
   const bool from_pose = factor.variables == std::vector<Id>{pose, landmark.id};
   if (!from_pose && factor.variables != std::vector<Id>{landmark.id, pose})
     refuse(name + " is not on these two");
@@ -251,8 +252,8 @@ void CompactGraph::move_landmarks(const State& move, GraphUpdate& leaving,
 void CompactPose::offer_landmark(const LandmarkObservation& observation) {
   if (!open_) throw Error(ErrorCode::usage, "offer_landmark without a pose");
   const Variable& landmark = observation.landmark;
-  if (!landmark.type) refuse(fmt::format("landmark {} has no type", landmark.id));
-  const std::string name = fmt::format("{} {}", landmark.type->tag(), landmark.id);
+  if (!landmark.type) refuse(fmt::format("landmark {} has no type", id_text(landmark.id)));
+  const std::string name = fmt::format("{} {}", landmark.type->tag(), id_text(landmark.id));
   if (!graph_.located()) {
     refuse(
         "it is not known where the pose is on the map: landmarks are used from the first match "

@@ -8,6 +8,7 @@
 #include <fmt/core.h>
 #include <boost/container/small_vector.hpp>
 
+#include "cairn/graph/id_text.hpp"
 #include "cairn/graph/packed.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/plugin_call.hpp"
@@ -149,20 +150,19 @@ int Graph::add(const Variable& variable) {
 
 int Graph::add_variable(std::shared_ptr<const VariableType> type, Id id,
                         std::span<const double> x) {
-  if (!type) throw bad_input(fmt::format("variable {} has no type", id));
-  const std::string_view tag = type->tag();
+  if (!type) throw bad_input(fmt::format("variable {} has no type", id_text(id)));
+  const auto name = [&] { return fmt::format("{} {}", type->tag(), id_text(id)); };
   const std::size_t size = size_of(type->ambient_size());
   if (x.size() != size)
-    throw bad_input(fmt::format("{} {} has {} numbers, expected {}", tag, id, x.size(), size));
-  if (!all_finite(x))
-    throw bad_input(fmt::format("{} {} has a number that is not finite", tag, id));
+    throw bad_input(fmt::format("{} has {} numbers, expected {}", name(), x.size(), size));
+  if (!all_finite(x)) throw bad_input(name() + " has a number that is not finite");
   if (const auto there = find(id)) {
     throw bad_input(
-        fmt::format("{} {}: the id is already that of {}", tag, id, describe_variable(*there)));
+        fmt::format("{}: the id is already that of {}", name(), describe_variable(*there)));
   }
   Numbers state(x.begin(), x.end());
   if (const std::string problem = normalize(*type, state); !problem.empty())
-    throw bad_input(fmt::format("{} {}: {}", tag, id, problem));
+    throw bad_input(fmt::format("{}: {}", name(), problem));
   const int p = find_pool(type);
   // Nothing is refused from here on.
   if (p == std::ssize(variable_pools_)) {
@@ -188,8 +188,8 @@ int Graph::add(const Factor& factor) {
     const std::optional<int> v = find(id);
     if (!v) {
       std::string name(factor.type->tag());
-      for (const Id each : factor.variables) name += fmt::format(" {}", each);
-      throw bad_input(fmt::format("{}: there is no variable {}", name, id));
+      for (const Id each : factor.variables) name += " " + id_text(each);
+      throw bad_input(fmt::format("{}: there is no variable {}", name, id_text(id)));
     }
     variables.push_back(*v);
   }
@@ -207,7 +207,7 @@ void Graph::check_ends(const FactorType& type, std::span<const int> variables) c
     if (v < 0 || v >= variable_count())
       throw bad_input(fmt::format("{}: there is no such variable", name()));
     if (this->type(v).tag() != type.variable_tags()[k]) {
-      throw bad_input(fmt::format("{}: variable {} is a {}, expected a {}", name(), id(v),
+      throw bad_input(fmt::format("{}: variable {} is a {}, expected a {}", name(), id_text(id(v)),
                                   this->type(v).tag(), type.variable_tags()[k]));
     }
     if (this->type(v).ambient_size() != type.ambient_size(k) ||
@@ -219,7 +219,7 @@ void Graph::check_ends(const FactorType& type, std::span<const int> variables) c
     }
     for (int other = 0; other < k; ++other) {
       if (variables[other] == v)
-        throw bad_input(fmt::format("{}: joins variable {} with itself", name(), id(v)));
+        throw bad_input(fmt::format("{}: joins variable {} with itself", name(), id_text(id(v))));
     }
   }
 }
@@ -227,8 +227,7 @@ void Graph::check_ends(const FactorType& type, std::span<const int> variables) c
 std::string Graph::name_of(const FactorType& type, std::span<const int> variables) const {
   std::string text(type.tag());
   for (const int v : variables)
-    text +=
-        v >= 0 && v < variable_count() ? fmt::format(" {}", id(v)) : fmt::format(" (index {})", v);
+    text += v >= 0 && v < variable_count() ? " " + id_text(id(v)) : fmt::format(" (index {})", v);
   return text;
 }
 
@@ -329,12 +328,7 @@ Variable Graph::variable(int variable) const {
 }
 
 std::string Graph::describe_variable(int variable) const {
-  // What `symbol` of cairn/typed/symbol.hpp made shows as x3: a letter above 45 bits of an index.
-  const Id number = id(variable), letter = number >> 45;
-  const bool symbol = (letter >= 'a' && letter <= 'z') || (letter >= 'A' && letter <= 'Z');
-  const std::string_view tag = type(variable).tag();
-  if (!symbol) return fmt::format("{} {}", tag, number);
-  return fmt::format("{} {:c}{}", tag, static_cast<char>(letter), number & ((Id{1} << 45) - 1));
+  return fmt::format("{} {}", type(variable).tag(), id_text(id(variable)));
 }
 
 std::span<const std::int32_t> Graph::factor_variables(int position) const {
@@ -428,7 +422,7 @@ void Graph::set_measurement(int position, std::span<const double> measurement,
 
 std::string Graph::describe_factor(int position) const {
   std::string text(factor_pools_[factors_[position].pool].type->tag());
-  for (const std::int32_t v : factor_variables(position)) text += fmt::format(" {}", id(v));
+  for (const std::int32_t v : factor_variables(position)) text += " " + id_text(id(v));
   return text;
 }
 

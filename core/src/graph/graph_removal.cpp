@@ -7,6 +7,7 @@
 #include <fmt/core.h>
 
 #include "cairn/graph/graph.hpp"
+#include "cairn/graph/id_text.hpp"
 #include "cairn/graph/packed.hpp"
 #include "cairn/runtime/error.hpp"
 
@@ -80,7 +81,8 @@ Renumbering Graph::remove(const std::vector<bool>& factors, const std::vector<bo
 
 Renumbering Graph::erase(Id id) {
   const std::optional<int> v = find(id);
-  if (!v) throw Error(ErrorCode::usage, fmt::format("there is no variable {} to erase", id));
+  if (!v)
+    throw Error(ErrorCode::usage, fmt::format("there is no variable {} to erase", id_text(id)));
   std::vector<bool> variables(records_.size(), false), factors(factors_.size(), false);
   variables[*v] = true;
   for (const int f : factors_of(*v)) factors[f] = true;

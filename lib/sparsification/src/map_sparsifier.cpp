@@ -10,6 +10,7 @@
 
 #include "cairn/geometry/pose.hpp"
 #include "cairn/graph/gauge.hpp"
+#include "cairn/graph/id_text.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/plugin_call.hpp"
 #include "plain_loss.hpp"
@@ -84,9 +85,11 @@ PoseRemover::Removal MapSparsifier::remove(Estimator& estimator, std::span<const
   std::vector<int> nodes;
   for (const Id id : poses) {
     const auto v = graph.find(id);
-    if (!v) throw Error(ErrorCode::input, fmt::format("there is no variable {} to be removed", id));
+    if (!v)
+      throw Error(ErrorCode::input,
+                  fmt::format("there is no variable {} to be removed", id_text(id)));
     if (std::ranges::count(nodes, *v) > 0)
-      throw Error(ErrorCode::input, fmt::format("variable {} is to leave twice", id));
+      throw Error(ErrorCode::input, fmt::format("variable {} is to leave twice", id_text(id)));
     nodes.push_back(*v);
   }
   const Sparsification change =

@@ -10,6 +10,7 @@
 #include <fmt/core.h>
 
 #include "cairn/graph/gauge.hpp"
+#include "cairn/graph/id_text.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/types/factor_call.hpp"
 #include "cairn/update/elimination.hpp"
@@ -22,7 +23,7 @@ Error bad_input(const std::string& message) { return {ErrorCode::input, message}
 
 std::string describe(const Factor& factor) {
   std::string text(factor.type->tag());
-  for (const Id id : factor.variables) text += fmt::format(" {}", id);
+  for (const Id id : factor.variables) text += " " + id_text(id);
   return text;
 }
 
@@ -158,7 +159,7 @@ class Checker {
       throw bad_input(
           fmt::format("{} {}: has no state, and no factor of the update determines it; give it "
                       "a state",
-                      update_.variables[k].type->tag(), update_.variables[k].id));
+                      update_.variables[k].type->tag(), id_text(update_.variables[k].id)));
     }
     for (std::size_t k = 0; k < update_.variables.size(); ++k) {
       const std::span<const double> x = sketch_.state(static_cast<int>(k));
@@ -169,11 +170,12 @@ class Checker {
  private:
   void check_variables() {
     for (const Variable& variable : update_.variables) {
-      if (!variable.type) throw bad_input(fmt::format("variable {} has no type", variable.id));
+      if (!variable.type)
+        throw bad_input(fmt::format("variable {} has no type", id_text(variable.id)));
       check_type(*variable.type, variable.type.get(), variable.id);
       if (const auto there = find_variable(variable.id)) {
         throw bad_input(fmt::format("{} {}: the id is already that of {}", variable.type->tag(),
-                                    variable.id, graph_.describe_variable(*there)));
+                                    id_text(variable.id), graph_.describe_variable(*there)));
       }
     }
     unplaced_ = place_variables(update_, [this](Id id) {
@@ -195,7 +197,7 @@ class Checker {
       if (pool.type.get() == object || pool.type->tag() != type.tag()) continue;
       throw bad_input(fmt::format(
           "{} {}: another type of that name is in use; take all types from one registry",
-          type.tag(), id));
+          type.tag(), id_text(id)));
     }
   }
 
@@ -207,7 +209,7 @@ class Checker {
       throw bad_input(fmt::format(
           "{}: there is no variable {}; expected one that was added before or with it, and not "
           "removed",
-          describe(factor), id));
+          describe(factor), id_text(id)));
     }
     return sketch_.add_variable(graph_.type_of(*v), id, graph_.state(*v));
   }
@@ -257,9 +259,10 @@ class Checker {
     std::unordered_set<Id> marginalized, removed;
     const auto note = [&](Id id, std::unordered_set<Id>& set, const char* what) {
       const bool there = find_variable(id) || is_new(id);
-      if (!there) throw bad_input(fmt::format("there is no variable {} to be {}", id, what));
+      if (!there)
+        throw bad_input(fmt::format("there is no variable {} to be {}", id_text(id), what));
       if (!set.insert(id).second || marginalized.count(id) + removed.count(id) > 1) {
-        throw bad_input(fmt::format("variable {} is to leave twice in one update", id));
+        throw bad_input(fmt::format("variable {} is to leave twice in one update", id_text(id)));
       }
     };
     for (const Id id : update_.marginalized) note(id, marginalized, "marginalized");
@@ -274,7 +277,7 @@ class Checker {
         throw bad_input(
             fmt::format("factor {} ({}) cannot be removed: variable {} is marginalized in the same "
                         "update, and the factor with it; remove the factor before",
-                        id, describe(factor), on));
+                        id, describe(factor), id_text(on)));
       }
     }
   }

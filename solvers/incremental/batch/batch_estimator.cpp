@@ -7,6 +7,7 @@
 #include <fmt/core.h>
 
 #include "cairn/graph/gauge.hpp"
+#include "cairn/graph/id_text.hpp"
 #include "cairn/linear/normal_equations.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/timed.hpp"
@@ -277,7 +278,7 @@ std::size_t BatchEstimator::block_size(int a, int b) const {
 
 int BatchEstimator::index(Id id) const {
   if (const auto v = graph_.find(id)) return *v;
-  throw Error(ErrorCode::usage, fmt::format("there is no variable {}", id));
+  throw Error(ErrorCode::usage, "there is no variable " + id_text(id));
 }
 
 void BatchEstimator::keep_cross(Id a, Id b) {

@@ -10,6 +10,7 @@
 
 #include <fmt/core.h>
 
+#include "cairn/graph/id_text.hpp"
 #include "cairn/memory/small_pages.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/timed.hpp"
@@ -418,7 +419,7 @@ std::optional<int> IncrementalCholesky::find(Id id) const {
 
 int IncrementalCholesky::index(Id id) const {
   if (const auto v = find(id)) return *v;
-  throw Error(ErrorCode::usage, fmt::format("there is no variable {}", id));
+  throw Error(ErrorCode::usage, "there is no variable " + id_text(id));
 }
 
 std::optional<int> IncrementalCholesky::position(FactorId id) const {

@@ -10,6 +10,7 @@
 #include <fmt/core.h>
 
 #include "cairn/geometry/pose.hpp"
+#include "cairn/graph/id_text.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/timed.hpp"
 #include "cairn/types/factor_call.hpp"
@@ -578,7 +579,7 @@ void LinearizedEstimator::keep_cross(Id a, Id b) {
 
 int LinearizedEstimator::index(Id id) const {
   if (const auto v = state_.graph.find(id)) return *v;
-  throw Error(ErrorCode::usage, fmt::format("there is no variable {}", id));
+  throw Error(ErrorCode::usage, "there is no variable " + id_text(id));
 }
 
 std::vector<Id> LinearizedEstimator::variables() const {

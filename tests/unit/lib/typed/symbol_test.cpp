@@ -1,17 +1,24 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "cairn/typed/symbol.hpp"
 
+#include <string>
+
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "cairn/graph/graph.hpp"
 #include "cairn/typed/build.hpp"
+#include "cairn/typed/measurements.hpp"
 #include "cairn/typed/point.hpp"
+#include "cairn/typed/pose2.hpp"
+#include "cairn/update/graph_update.hpp"
 
 namespace cairn {
 namespace {
 
 using symbols::L;
 using symbols::X;
+using ::testing::HasSubstr;
 
 TEST(Symbols, AreLettersWithAnIndex) {
   EXPECT_EQ(as_symbol(symbol('x', 3)), (Symbol{'x', 3}));
@@ -53,6 +60,42 @@ TEST(Symbols, AreWhatMessagesShow) {
     graph.add(id, Point2(0.0, 0.0));
   for (int k = 0; k < graph.variable_count(); ++k)
     EXPECT_EQ(graph.describe_variable(k), "VERTEX_XY " + id_text(graph.id(k)));
+}
+
+/// The message of what `call` throws.
+template <class Call>
+std::string message(const Call& call) {
+  try {
+    call();
+  } catch (const Error& error) {
+    return error.what();
+  }
+  ADD_FAILURE() << "no error";
+  return "";
+}
+
+TEST(Symbols, NameVariablesInMessagesOfGraphsAndUpdates) {
+  Graph graph;
+  graph.add(X(0), Pose2());
+  graph.add(X(1), Pose2());
+  const int between = graph.add(Between(X(0), X(1), Pose2()), Information::sigmas(1.0, 1.0, 1.0));
+  EXPECT_EQ(graph.describe_factor(between), "EDGE_SE2 x0 x1");
+  EXPECT_THAT(message([&] { graph.add(X(1), Pose2()); }),
+              HasSubstr("VERTEX_SE2 x1: the id is already that of VERTEX_SE2 x1"));
+  EXPECT_THAT(message([&] { graph.erase(L(4)); }), HasSubstr("there is no variable l4 to erase"));
+  Factor seen = graph.factor(between);
+  seen.variables = {X(0), X(7)};
+  EXPECT_THAT(message([&] { graph.add(seen); }),
+              HasSubstr("EDGE_SE2 x0 x7: there is no variable x7"));
+
+  GraphUpdate update;
+  update.variables.push_back({graph.type_of(0), X(2), {}, false});
+  EXPECT_THAT(message([&] { check_update(graph, FactorIds(), update); }),
+              HasSubstr("VERTEX_SE2 x2: has no state, and no factor"));
+  update = {};
+  update.removed_variables = {X(9)};
+  EXPECT_THAT(message([&] { check_update(graph, FactorIds(), update); }),
+              HasSubstr("there is no variable x9 to be removed"));
 }
 
 TEST(Symbols, RefuseOtherLettersAndIndices) {

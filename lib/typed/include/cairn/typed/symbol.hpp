@@ -9,27 +9,10 @@
 #include <system_error>
 
 #include "cairn/graph/elements.hpp"
+#include "cairn/graph/id_text.hpp"
 #include "cairn/runtime/error.hpp"
 
 namespace cairn {
-
-/// What a variable's id says if it was made by `symbol`: x3, l2.
-struct Symbol {
-  char letter = 'x';
-  std::int64_t index = 0;
-
-  friend bool operator==(const Symbol&, const Symbol&) = default;
-};
-
-namespace detail {
-/// Bits of the index. With the seven of the letter an id stays below 2^53, so that it is exact
-/// wherever numbers are read as doubles: JSON, tables, other tools.
-inline constexpr int kSymbolBits = 45;
-
-constexpr bool is_letter(std::int64_t c) {
-  return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z');
-}
-}  // namespace detail
 
 /// The id of variable `index` of a kind that a letter stands for, such as symbol('x', 3): poses and
 /// landmarks count from 0 each by themselves, and one kind's ids follow each other. Throws `Error`
@@ -40,19 +23,6 @@ constexpr Id symbol(char letter, std::int64_t index) {
                                       std::string(1, letter) + "' and " + std::to_string(index));
   }
   return (static_cast<Id>(letter) << detail::kSymbolBits) | index;
-}
-
-/// Letter and index of an id that `symbol` made; nothing for any other, such as those of files.
-constexpr std::optional<Symbol> as_symbol(Id id) {
-  const Id letter = id >> detail::kSymbolBits;
-  if (!detail::is_letter(letter)) return std::nullopt;
-  return Symbol{static_cast<char>(letter), id & ((Id{1} << detail::kSymbolBits) - 1)};
-}
-
-/// "x3" for a symbol, the number of any other id.
-inline std::string id_text(Id id) {
-  const std::optional<Symbol> named = as_symbol(id);
-  return named ? named->letter + std::to_string(named->index) : std::to_string(id);
 }
 
 /// The inverse of `id_text`: the id that "x3" or "17" stands for, and nothing for any other text.
