@@ -190,23 +190,29 @@ void AlbumBuilder::note_dimensions(const Entry& entry, const std::string& file,
   }
 }
 
-/// Whether some scene took it; the last one that has its ids does.
+/// Whether some scene took it: the one that has most of its ids, of several the last.
 bool AlbumBuilder::lay_by_id(const std::string& file, const std::string& name, const Graph& graph,
                              EstimateRole role) {
-  for (auto entry = entries_.rbegin(); entry != entries_.rend(); ++entry) {
+  Entry* best = nullptr;
+  SceneEstimate estimate;
+  int most = kFewestShared - 1;
+  for (Entry& entry : entries_) {
     int matched = 0;
-    SceneEstimate estimate = place_by_id(graph, entry->scene, name, role, matched);
-    if (matched < kFewestShared) continue;
-    if (matched < graph.variable_count()) {
-      note(fmt::format("{}: {} of {} are in {} by id, the rest is not shown", file, matched,
-                       counted(graph.variable_count(), "variable"), entry->scene.name));
-    }
-    note_dimensions(*entry, file, graph);
-    estimate.file = file;
-    entry->scene.estimates.push_back(std::move(estimate));
-    return true;
+    SceneEstimate here = place_by_id(graph, entry.scene, name, role, matched);
+    if (matched < std::max(most, kFewestShared)) continue;
+    most = matched;
+    best = &entry;
+    estimate = std::move(here);
   }
-  return false;
+  if (!best) return false;
+  if (most < graph.variable_count()) {
+    note(fmt::format("{}: {} of {} are in {} by id, the rest is not shown", file, most,
+                     counted(graph.variable_count(), "variable"), best->scene.name));
+  }
+  note_dimensions(*best, file, graph);
+  estimate.file = file;
+  best->scene.estimates.push_back(std::move(estimate));
+  return true;
 }
 
 void AlbumBuilder::join_trajectory(NamedGraph trajectory) {

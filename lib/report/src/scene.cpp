@@ -63,36 +63,65 @@ void add_variables(const Graph& graph, Scene& scene) {
   scene.held = resolve_gauge(graph).held;
 }
 
-EdgeClass class_of(const Graph& graph, int factor, bool closes_loop) {
+/// Two variables that a factor is drawn between; b = -1 where there is one alone to draw it at.
+struct Ends {
+  std::int32_t a, b;
+};
+
+/// A factor on many variables joins the first that is somewhere to each other that is. What has no
+/// position, such as a velocity, travels with its pose and has no edge.
+std::vector<Ends> ends_of(const Graph& graph, int factor) {
   const auto variables = graph.factor_variables(factor);
-  if (variables.size() == 1) return EdgeClass::prior;
-  if (variables.size() != 2) return EdgeClass::other;
-  const bool first = has_orientation(graph.type(variables[0]));
-  const bool second = has_orientation(graph.type(variables[1]));
-  if (first != second) return EdgeClass::landmark;
+  std::vector<std::int32_t> placed;
+  for (const std::int32_t v : variables) {
+    if (has_position(graph.type(v))) placed.push_back(v);
+  }
+  if (placed.size() < 2) return {{placed.empty() ? variables[0] : placed[0], -1}};
+  std::vector<Ends> ends;
+  for (std::size_t k = 1; k < placed.size(); ++k) ends.push_back({placed[0], placed[k]});
+  return ends;
+}
+
+/// Of each variable among those of its type, by id.
+std::vector<std::int32_t> ranks(const Graph& graph) {
+  std::vector<std::int32_t> rank(static_cast<std::size_t>(graph.variable_count()));
+  for (const VariablePool& pool : graph.variable_pools()) {
+    std::vector<std::int32_t> order(pool.variables.begin(), pool.variables.end());
+    std::ranges::sort(order, {}, [&](std::int32_t v) { return graph.id(v); });
+    for (std::size_t k = 0; k < order.size(); ++k) rank[order[k]] = static_cast<std::int32_t>(k);
+  }
+  return rank;
+}
+
+EdgeClass class_of(const Graph& graph, int factor, const Ends& ends,
+                   const std::vector<std::int32_t>& rank) {
+  if (ends.b < 0)
+    return graph.factor_variables(factor).size() == 1 ? EdgeClass::prior : EdgeClass::other;
+  const bool first = has_orientation(graph.type(ends.a));
+  if (first != has_orientation(graph.type(ends.b))) return EdgeClass::landmark;
   if (!first) return EdgeClass::other;
-  return closes_loop ? EdgeClass::loop : EdgeClass::odometry;
+  // As `loop_closures` of factor_selector.hpp, for factors on more than two variables as well.
+  const bool follow =
+      graph.pool(ends.a) != graph.pool(ends.b) || std::abs(rank[ends.a] - rank[ends.b]) == 1;
+  return follow ? EdgeClass::odometry : EdgeClass::loop;
 }
 
 void add_edges(const Graph& graph, Scene& scene) {
   for (const FactorPool& pool : graph.factor_pools()) {
     scene.edge_types.push_back({std::string(pool.type->tag()), pool.type->residual_size()});
   }
-  const std::vector<bool> closes = loop_closures(graph);
+  const std::vector<std::int32_t> rank = ranks(graph);
   scene.factors = graph.factor_count();
-  bool one_each = true;
   for (int f = 0; f < graph.factor_count(); ++f) {
-    const auto variables = graph.factor_variables(f);
-    one_each = one_each && variables.size() <= 2;
-    for (std::size_t k = variables.size() == 1 ? 0 : 1; k < variables.size(); ++k) {
-      scene.a.push_back(variables[0]);
-      scene.b.push_back(variables.size() == 1 ? -1 : variables[k]);
-      scene.edge_class.push_back(class_of(graph, f, closes[f]));
+    for (const Ends& ends : ends_of(graph, f)) {
+      scene.a.push_back(ends.a);
+      scene.b.push_back(ends.b);
+      scene.edge_class.push_back(class_of(graph, f, ends, rank));
       scene.edge_type.push_back(static_cast<std::uint8_t>(graph.ref(f).pool));
       scene.factor.push_back(f);
     }
   }
-  if (one_each) scene.factor.clear();
+  if (std::ssize(scene.factor) == scene.factors) scene.factor.clear();
 }
 
 /// A file without factors shows as a line through its poses, by rising id.

@@ -34,6 +34,16 @@ export interface Edges {
   columns: NumberColumn[];
 }
 
+/** Whether the edge is the first of its factor, and of its class: a factor on many variables has several edges, one after another. */
+export function countsOnce(edges: Edges, e: number): boolean {
+  return !edges.factor || e === 0 || edges.factor[e] !== edges.factor[e - 1] || edges.class[e] !== edges.class[e - 1];
+}
+
+/** How many factors the edges are of, or how many edges where they are of none. */
+export function factorCount(edges: Edges): number {
+  return edges.factor ? new Set(edges.factor).size : edges.count;
+}
+
 /** Of some variables' positions: xx xy xz yy yz zz [m²], also in 2D. */
 export interface Covariance {
   variable: Int32Array;

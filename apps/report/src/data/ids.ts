@@ -2,6 +2,16 @@
 import type { NumberArray } from "./contract";
 import { DataError, decodeNumbers } from "./decode";
 
+const kSymbolBits = 45n;
+
+/** As messages of cairn name it: x3 where a letter stands above 45 bits of an index, else the number. */
+function idText(id: string | number | bigint): string {
+  if (typeof id === "string" || !(id > 0)) return String(id);
+  const whole = BigInt(id), code = whole >> kSymbolBits;
+  const letter = code < 128n ? String.fromCharCode(Number(code)) : "";
+  return /[a-zA-Z]/.test(letter) ? `${letter}${whole - (code << kSymbolBits)}` : String(id);
+}
+
 /** The names of variables: numbers of up to 64 bits, any text, or simply 0, 1, 2, … */
 export class Ids {
   private index: Map<string, number> | null = null;
@@ -21,7 +31,7 @@ export class Ids {
   }
 
   label(variable: number): string {
-    return this.names ? String(this.names[variable]) : String(variable);
+    return this.names ? idText(this.names[variable]) : String(variable);
   }
 
   /** The variable of that name, or -1. */

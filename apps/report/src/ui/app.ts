@@ -2,7 +2,7 @@
 // The page: what it holds, in tabs.
 import type { ExplorationLineJson, ReportJson } from "../data/contract";
 import type { Exploration } from "../data/exploration";
-import type { Graph } from "../data/graph";
+import { factorCount, type Graph } from "../data/graph";
 import { aboutView } from "./about";
 import { benchView } from "./bench";
 import { choice, el, freshId, iconButton, svg } from "./dom";
@@ -153,7 +153,7 @@ export class App {
   private show(graph: Graph): void {
     this.map?.show(graph);
     const what = graph.edges.class.some((c) => c !== 4) ? "edge" : "pair";
-    this.counts.textContent = `${plural(graph.variables.count, "variable")}, ${plural(graph.edges.count, what)}`;
+    this.counts.textContent = `${plural(graph.variables.count, "variable")}, ${plural(factorCount(graph.edges), what)}`;
     this.runs.replaceChildren(runsView(graph) ?? el("div", { class: "page" }, el("p", { class: "lead" }, "Nothing was run on this graph.")));
   }
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The panel beside the map: what is shown, and what is worst.
-import { EdgeClass, kEdgeClassNames, type Graph } from "../data/graph";
+import { countsOnce, EdgeClass, kEdgeClassNames, type Graph } from "../data/graph";
 import { worstEdges } from "../draw/chains";
 import { css, kLandmarkEdge, kLoop, kOtherEdge, kPrior, ramp, residualFraction, residualScale, type Stroke } from "../draw/colour";
 import type { Stage } from "../draw/stage";
@@ -98,7 +98,7 @@ export class Legend {
 
   private edges(graph: Graph, state: ViewState): HTMLElement {
     const counts = new Array<number>(kEdgeClassNames.length).fill(0);
-    for (const c of graph.edges.class) ++counts[c];
+    graph.edges.class.forEach((c, e) => { if (countsOnce(graph.edges, e)) ++counts[c]; });
     const focusStroke = this.stage.current!.strokes[state.focus] ?? this.stage.current!.strokes[0];
     const rows = counts.map((n, c) => {
       if (n === 0) return null;

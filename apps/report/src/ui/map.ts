@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The map: canvas, tools over it, panel beside it, recording under it.
-import type { Graph } from "../data/graph";
+import { factorCount, type Graph } from "../data/graph";
 import { listen } from "../draw/gestures";
 import { Stage } from "../draw/stage";
 import type { Hit, ViewState } from "../draw/state";
@@ -89,7 +89,7 @@ export class MapView {
     this.card.hidden = this.tooltip.hidden = true;
     const keys = graph.dimension === 2 ? "Arrow keys move" : "Arrow keys turn, with shift move";
     this.stage.canvas.setAttribute("aria-label",
-      `${graph.name}: ${graph.variables.count} variables and ${graph.edges.count} edges in ${graph.dimension}D. ${keys}, plus and minus zoom, F shows all.`);
+      `${graph.name}: ${graph.variables.count} variables and ${factorCount(graph.edges)} edges in ${graph.dimension}D. ${keys}, plus and minus zoom, F shows all.`);
   }
 
   private tools(graph: Graph): void {

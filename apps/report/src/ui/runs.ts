@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // How a graph's runs went.
 import type { RunJson } from "../data/contract";
-import type { Graph } from "../data/graph";
+import { factorCount, type Graph } from "../data/graph";
 import { lineChart, type Line } from "./chart";
 import { el } from "./dom";
 import { bytes, count, kNone, number, plural, seconds } from "./format";
@@ -75,7 +75,7 @@ export function runsView(graph: Graph): HTMLElement | null {
   const notes = runs.flatMap((run, k) => (run.notes ?? []).map((note) => `${runName(run, k)}: ${String(note)}`));
   return el("div", { class: "page" },
     el("h1", {}, graph.name),
-    el("p", { class: "lead" }, `${plural(graph.variables.count, "variable")}, ${plural(graph.edges.count, "edge")}, ${graph.dimension}D`),
+    el("p", { class: "lead" }, `${plural(graph.variables.count, "variable")}, ${plural(factorCount(graph.edges), "edge")}, ${graph.dimension}D`),
     runs.length > 0 ? runsTable(runs) : null,
     notes.length > 0 ? el("ul", { class: "notes" }, ...notes.map((note) => el("li", {}, note))) : null,
     el("div", { class: "charts" }, ...charts));

@@ -71,6 +71,9 @@ describe("ids", () => {
     const names = await Ids.decode(["x0", "__proto__"], 2, "ids");
     expect(names.find("__proto__")).toBe(1);
     expect(names.find("constructor")).toBe(-1);
+    const symbols = await Ids.decode(pack(BigInt64Array.from([(120n << 45n) + 3n, (90n << 45n), 91n << 45n])), 3, "ids");
+    expect([symbols.label(0), symbols.label(1), symbols.label(2)]).toEqual(["x3", "Z0", String(91n << 45n)]);
+    expect(symbols.find("x3")).toBe(0);
     const counted = await Ids.decode("sequence", 5, "ids");
     expect([counted.label(4), counted.find("4"), counted.find("5")]).toEqual(["4", 4, -1]);
   });

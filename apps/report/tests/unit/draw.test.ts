@@ -6,7 +6,7 @@ import { luminance, ramp, residualFraction, residualScale, rgb, strokes, type Th
 import { confidenceRadius, ellipseSegments, halfAxes } from "../../src/draw/ellipses";
 import { nearestEdge, nearestPoint, project, squaredDistance } from "../../src/draw/pick";
 import { logTicks, multiples, niceStep, niceTicks, tickLabel } from "../../src/draw/ticks";
-import type { Edges } from "../../src/data/graph";
+import { countsOnce, factorCount, type Edges } from "../../src/data/graph";
 
 describe("ticks", () => {
   test("are 1, 2 or 5 times a power of ten apart", () => {
@@ -105,6 +105,16 @@ function edgesOf(rows: [number, number, number][]): Edges {
     types: [], type: new Uint8Array(rows.length), factor: null, columns: [],
   };
 }
+
+describe("edges", () => {
+  test("are counted by the factors that they are of", () => {
+    const edges = edgesOf([[0, 1, 0], [0, 2, 0], [0, 5, 2], [1, 2, 0]]);
+    expect(factorCount(edges)).toBe(4);
+    edges.factor = Int32Array.from([0, 0, 0, 1]);
+    expect(factorCount(edges)).toBe(2);
+    expect([0, 1, 2, 3].map((e) => countsOnce(edges, e))).toEqual([true, false, true, true]);
+  });
+});
 
 describe("drawing orders", () => {
   test("follow the trajectory even where edges point backwards or come mixed", () => {

@@ -112,6 +112,18 @@ TEST_F(AlbumBuilderTest, TheFirstTrajectoryIsTheTruth) {
   EXPECT_THAT(names(made.scenes[0]), ElementsAre("estimate a", "truth t", "peer u"));
 }
 
+TEST_F(AlbumBuilderTest, ATrajectoryLiesOverTheGraphThatHasMostOfItsPoses) {
+  builder_.add_graph("a.g2o", "a", line(0, 8, 1.0));
+  builder_.add_graph("sparse.g2o", "sparse", line(0, 4, 1.0));
+  builder_.add_graph("t.tum", "t", line(0, 8, 1.1, false));
+  builder_.add_graph("u.tum", "u", line(0, 3, 1.1, false));  // in both: with the last
+  const Album made = album();
+  ASSERT_THAT(made.scenes, SizeIs(2));
+  EXPECT_THAT(names(made.scenes[0]), ElementsAre("estimate a", "truth t"));
+  EXPECT_THAT(names(made.scenes[1]), ElementsAre("estimate sparse", "peer u"));
+  EXPECT_THAT(notes_, IsEmpty());
+}
+
 TEST_F(AlbumBuilderTest, ATruthThatIsGivenMakesTrajectoriesPeers) {
   builder_.add_graph("a.g2o", "a", line(0, 5, 1.0));
   builder_.add_graph("t.tum", "t", line(0, 4, 1.1, false));

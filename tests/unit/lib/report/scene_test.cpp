@@ -3,12 +3,19 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <numeric>
+#include <string_view>
+#include <tuple>
 
 #include "cairn/io/generator.hpp"
+#include "cairn/lie/point.hpp"
+#include "cairn/lie/se2.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/report/scene_json.hpp"
+#include "cairn/types/define_factor.hpp"
+#include "support/placeless.hpp"
 
 namespace cairn::test {
 namespace {
@@ -44,6 +51,63 @@ TEST(Scene, TellsLandmarksFromPoses) {
     seen += mixed;
   }
   EXPECT_GT(seen, 10);
+}
+
+/// A velocity, which is nowhere.
+struct Velocity : Placeless<2> {
+  static constexpr std::string_view kTag = "VERTEX_VELOCITY";
+};
+
+/// Two poses, the velocity between them, and a point seen on the way.
+struct Motion {
+  static constexpr std::string_view kTag = "EDGE_MOTION";
+  static constexpr int kResidual = 2, kMeasurement = 2;
+  using Variables = std::tuple<Velocity, Se2, Se2, PointXY>;
+  template <class S>
+  static Vector<S, 2> residual(const Vector<S, 2>& v, const Vector<S, 3>& a, const Vector<S, 3>& b,
+                               const Vector<S, 2>& p, const Vector<double, 2>& z) {
+    return v + a.template head<2>() - b.template head<2>() + p - z.template cast<S>();
+  }
+};
+
+/// A pose and its velocity.
+struct Speed {
+  static constexpr std::string_view kTag = "EDGE_SPEED";
+  static constexpr int kResidual = 2, kMeasurement = 2;
+  using Variables = std::tuple<Se2, Velocity>;
+  template <class S>
+  static Vector<S, 2> residual(const Vector<S, 3>& a, const Vector<S, 2>& v,
+                               const Vector<double, 2>& z) {
+    return v - a.template head<2>() - z.template cast<S>();
+  }
+};
+
+TEST(Scene, AFactorOnManyVariablesJoinsThoseThatAreSomewhere) {
+  Graph graph;
+  const auto pose = define_variable<Se2>();
+  const auto velocity = define_variable<Velocity>();
+  const auto point = define_variable<PointXY>();
+  const auto motion = define_factor<Motion>();
+  const std::array<double, 3> x{};
+  const std::array<double, 2> p{};
+  const std::array<double, 3> unit{1, 0, 1};
+  std::array<int, 3> v{}, a{};
+  for (int k = 2; k >= 0; --k) {  // by id, not by their order in the graph
+    a[k] = graph.add_variable(pose, 10 + k, x);
+    v[k] = graph.add_variable(velocity, 100 + k, p);
+  }
+  const int l = graph.add_variable(point, 200, p);
+  graph.add_factor(motion, std::array{v[0], a[0], a[1], l}, p, unit);
+  graph.add_factor(motion, std::array{v[1], a[2], a[0], l}, p, unit);
+  graph.add_factor(define_factor<Speed>(), std::array{a[1], v[1]}, p, unit);
+  const Scene scene = scene_of(graph, "imu");
+  EXPECT_EQ(scene.a, (std::vector<std::int32_t>{a[0], a[0], a[2], a[2], a[1]}));
+  EXPECT_EQ(scene.b, (std::vector<std::int32_t>{a[1], l, a[0], l, -1}));
+  EXPECT_EQ(scene.edge_class,
+            (std::vector{EdgeClass::odometry, EdgeClass::landmark, EdgeClass::loop,
+                         EdgeClass::landmark, EdgeClass::other}));
+  EXPECT_EQ(scene.factor, (std::vector<std::int32_t>{0, 0, 1, 1, 2}));
+  EXPECT_EQ(scene.factors, 3);
 }
 
 TEST(Scene, PlacesVariablesWithTheResidualsThere) {

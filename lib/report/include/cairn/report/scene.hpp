@@ -90,8 +90,9 @@ struct Scene {
   std::vector<std::uint8_t> variable_type;
   std::vector<std::int32_t> fixed;  ///< by the user
   std::vector<bool> held;           ///< constant: fixed or anchored; no columns in H
-  // Edges: a factor on n > 2 variables has n - 1, from its first variable to each other.
-  std::vector<std::int32_t> a, b;  ///< variables; b = -1 for a factor on one
+  // Edges: a factor has one from the first of its variables that has a position to each other that
+  // has, and at least one.
+  std::vector<std::int32_t> a, b;  ///< variables; b = -1 where none other has a position
   std::vector<EdgeClass> edge_class;
   std::vector<SceneEdgeType> edge_types;
   std::vector<std::uint8_t> edge_type;
