@@ -22,17 +22,46 @@ namespace {
 
 constexpr int kNever = std::numeric_limits<int>::max();
 
+/// Whether each variable is a step of its own: those with an orientation. What has no position at
+/// all, such as a velocity or a bias, travels with a pose, unless there is none.
+std::vector<bool> find_poses(const Graph& graph) {
+  const bool oriented = std::ranges::any_of(graph.variable_pools(), [](const VariablePool& pool) {
+    return has_orientation(*pool.type) && !pool.variables.empty();
+  });
+  std::vector<bool> poses(static_cast<std::size_t>(graph.variable_count()));
+  for (int v = 0; v < graph.variable_count(); ++v)
+    poses[v] = oriented ? has_orientation(graph.type(v)) : !is_point(graph.type(v));
+  return poses;
+}
+
 /// The step of each pose; kNever for all else.
-std::vector<int> steps_of_poses(const Graph& graph, int& steps) {
+std::vector<int> steps_of_poses(const Graph& graph, const std::vector<bool>& is_step, int& steps) {
   std::vector<int> poses;
   for (int v = 0; v < graph.variable_count(); ++v) {
-    if (!is_point(graph.type(v))) poses.push_back(v);
+    if (is_step[v]) poses.push_back(v);
   }
   std::ranges::stable_sort(poses, {}, [&](int v) { return graph.id(v); });
   std::vector<int> step(static_cast<std::size_t>(graph.variable_count()), kNever);
   for (std::size_t k = 0; k < poses.size(); ++k) step[poses[k]] = static_cast<int>(k);
   steps = std::max(1, static_cast<int>(poses.size()));
   return step;
+}
+
+/// What has no position comes with the first factor that ties it to poses, when the latest of these
+/// is there. (Two velocities of one factor would wait for each other if they waited for all else.)
+void settle_passengers(const Graph& graph, std::vector<int>& step) {
+  const std::vector<int> poses = step;
+  for (int f = 0; f < graph.factor_count(); ++f) {
+    const auto on = graph.factor_variables(f);
+    int latest = -1;
+    for (const std::int32_t v : on) {
+      if (poses[v] != kNever) latest = std::max(latest, poses[v]);
+    }
+    if (latest < 0) continue;
+    for (const std::int32_t v : on) {
+      if (poses[v] == kNever && !has_position(graph.type(v))) step[v] = std::min(step[v], latest);
+    }
+  }
 }
 
 /// A landmark comes with the first factor that it shares with nothing that comes later. Landmarks
@@ -68,13 +97,14 @@ bool joins(const Graph& graph, int factor, int a, int b) {
 
 std::vector<Arrival> arrival_order(const Graph& graph) {
   int steps = 0;
-  std::vector<int> step = steps_of_poses(graph, steps);
+  const std::vector<bool> is_step = find_poses(graph);
+  std::vector<int> step = steps_of_poses(graph, is_step, steps);
+  settle_passengers(graph, step);
   settle_landmarks(graph, step);
   std::vector<Arrival> arrivals(static_cast<std::size_t>(steps));
-  for (int pass = 0; pass < 2; ++pass) {  // poses, then what they see
+  for (const bool pass : {true, false}) {  // poses, then what comes with them
     for (int v = 0; v < graph.variable_count(); ++v) {
-      if (is_point(graph.type(v)) == (pass == 1))
-        arrivals[std::min(step[v], steps - 1)].variables.push_back(v);
+      if (is_step[v] == pass) arrivals[std::min(step[v], steps - 1)].variables.push_back(v);
     }
   }
   for (int f = 0; f < graph.factor_count(); ++f) {

@@ -16,7 +16,9 @@
 #include "cairn/lie/se3.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
+#include "cairn/typed/symbol.hpp"
 #include "cairn/types/define_factor.hpp"
+#include "support/placeless.hpp"
 #include "support/planar_graph.hpp"
 #include "support/scaled_pose.hpp"
 
@@ -113,6 +115,80 @@ TEST_F(ArrivalOrder, IsBrokenByAFactorThatComesTooEarly) {
   EXPECT_TRUE(in_arrival_order(arrival_order(graph_)));
   between(b, a);
   EXPECT_FALSE(in_arrival_order(arrival_order(graph_)));
+}
+
+/// A velocity and a bias, which are nowhere.
+struct Velocity : test::Placeless<2> {
+  static constexpr std::string_view kTag = "VERTEX_VELOCITY";
+};
+struct Bias : test::Placeless<1> {
+  static constexpr std::string_view kTag = "VERTEX_BIAS";
+};
+
+/// From one pose and velocity to the next, by a sensor with a bias.
+struct Motion {
+  static constexpr std::string_view kTag = "EDGE_MOTION";
+  static constexpr int kResidual = 2, kMeasurement = 2;
+  using Variables = std::tuple<Se2, Velocity, Se2, Velocity, Bias>;
+  template <class S>
+  static Vector<S, 2> residual(const Vector<S, 3>& a, const Vector<S, 2>& v, const Vector<S, 3>& b,
+                               const Vector<S, 2>& w, const Vector<S, 1>& bias,
+                               const Vector<double, 2>& z) {
+    return a.template head<2>() + v - b.template head<2>() + w - z.template cast<S>() * bias[0];
+  }
+};
+
+/// How a bias walks.
+struct Walk {
+  static constexpr std::string_view kTag = "EDGE_WALK";
+  static constexpr int kResidual = 1, kMeasurement = 1;
+  using Variables = std::tuple<Bias, Bias>;
+  template <class S>
+  static Vector<S, 1> residual(const Vector<S, 1>& a, const Vector<S, 1>& b,
+                               const Vector<double, 1>& z) {
+    return b - a - z.template cast<S>();
+  }
+};
+
+// With ids as symbols all biases come first in a file, then all velocities, then the poses. The last
+// bias is met by another bias alone.
+TEST_F(ArrivalOrder, WhatHasNoPositionComesWithTheFirstFactorThatTiesItToPoses) {
+  const auto velocity = define_variable<Velocity>();
+  const auto bias = define_variable<Bias>();
+  const auto motion = define_factor<Motion>();
+  const auto walk = define_factor<Walk>();
+  std::vector<int> b, v, x, motions, walks;
+  for (int k = 0; k < 4; ++k)
+    b.push_back(graph_.add_variable(bias, symbol('b', k), std::array{0.0}));
+  for (int k = 0; k < 4; ++k)
+    v.push_back(graph_.add_variable(velocity, symbol('v', k), std::array{0.0, 0.0}));
+  for (int k = 0; k < 4; ++k) x.push_back(pose(symbol('x', k)));
+  for (int k = 1; k < 4; ++k) {
+    motions.push_back(graph_.add_factor(motion,
+                                        std::array{x[k - 1], v[k - 1], x[k], v[k], b[k - 1]},
+                                        std::array{1.0, 0.0}, kUnit2));
+    walks.push_back(
+        graph_.add_factor(walk, std::array{b[k - 1], b[k]}, std::array{0.0}, std::array{1.0}));
+  }
+  const std::vector<Arrival> order = arrival_order(graph_);
+  ASSERT_THAT(order, SizeIs(4));
+  EXPECT_THAT(order[0].variables, ElementsAre(x[0]));
+  EXPECT_THAT(order[1].variables, ElementsAre(x[1], b[0], v[0], v[1]));
+  EXPECT_THAT(order[2].variables, ElementsAre(x[2], b[1], v[2]));
+  EXPECT_THAT(order[3].variables, ElementsAre(x[3], b[2], b[3], v[3]));
+  EXPECT_THAT(order[1].links, ElementsAre(motions[0]));
+  EXPECT_THAT(order[3].links, ElementsAre(walks[1], motions[2], walks[2]));
+}
+
+TEST_F(ArrivalOrder, WithoutPosesWhatHasNoPositionIsAStep) {
+  const auto bias = define_variable<Bias>();
+  const int b = graph_.add_variable(bias, 2, std::array{0.0}),
+            a = graph_.add_variable(bias, 1, std::array{0.0});
+  graph_.add_factor(define_factor<Walk>(), std::array{a, b}, std::array{0.0}, std::array{1.0});
+  const std::vector<Arrival> order = arrival_order(graph_);
+  ASSERT_THAT(order, SizeIs(2));
+  EXPECT_THAT(order[0].variables, ElementsAre(a));
+  EXPECT_THAT(order[1].variables, ElementsAre(b));
 }
 
 // Pose graphs -------------------------------------------------------------------------------------

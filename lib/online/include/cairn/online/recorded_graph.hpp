@@ -11,8 +11,8 @@
 
 namespace cairn {
 
-/// One step of a recording: a pose, what it sees for the first time, and the measurements that
-/// became possible with it.
+/// One step of a recording: a pose, what it sees for the first time, what travels with it (a
+/// velocity, a bias), and the measurements that became possible with it.
 struct Arrival {
   std::vector<int> variables;  ///< by index in the graph: the pose first
   /// Factors between this pose and the one before, in either direction; by position in the graph.
@@ -28,8 +28,10 @@ struct Arrival {
 /// The order in which a graph was recorded. A step is a pose, in the order of ids,
 /// with everything else of which it is the latest: the factors whose other variables are there, and
 /// the landmarks that no earlier pose has seen. Every variable and every factor is in one step. A
-/// pose is what has an orientation, or no position at all; variables that no pose ever meets come
-/// with the last step (a graph without poses is one step).
+/// pose is what has an orientation. What has no position, such as a velocity, a bias or a
+/// calibration, comes with the first factor that ties it to poses; in a graph without orientations
+/// it is a step as a pose is. Variables that no pose ever meets come with the last step (a graph of
+/// points is one step).
 CAIRN_API std::vector<Arrival> arrival_order(const Graph& graph);
 
 /// Whether a graph lists its poses and factors in the order in which they arrived.
