@@ -4,16 +4,19 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <numeric>
 
 #include "cairn/runtime/error.hpp"
 #include "information.hpp"
+#include "row_text.hpp"
 #include "scanner.hpp"
 
 namespace cairn::formats {
 namespace {
 
 constexpr int kLines = 600;      // that hold something: enough to see past a bad one
-constexpr int kLongestRow = 12;  // fields of a KITTI row
+constexpr int kLongestRow = 18;  // fields: all rows that are longer than EuRoC's count as one kind
+constexpr std::size_t kBytes = std::size_t{1} << 18;  // that so many rows of a trajectory fit in
 
 struct Votes {
   int lines = 0;
@@ -22,6 +25,7 @@ struct Votes {
   int vertices = 0;                         // of TORO
   int tagged = 0;                           // any other word
   std::array<int, kLongestRow + 1> rows{};  // of numbers, by their count
+  int nanoseconds = 0;                      // of rows, those that begin with 19 digits
 };
 
 /// Counts the lines that are as the first line of a BAL file promises: cameras, points and
@@ -64,6 +68,11 @@ bool is_number_like(std::string_view field) {
   return field.find_first_not_of("0123456789+-.eEinfaNIAF") == std::string_view::npos;
 }
 
+/// A time since 1970 of this age, 19 digits.
+bool is_nanoseconds(std::string_view field) {
+  return field.size() == 19 && field.find_first_not_of("0123456789") == std::string_view::npos;
+}
+
 /// An edge that is TORO's or iSAM's: from to x y theta and six numbers that tell, or don't.
 void vote_on_edge(Scanner& scanner, Votes& votes) {
   scanner.expect({2, 3, 6});
@@ -94,7 +103,9 @@ void vote(Scanner& scanner, Votes& votes) {
   if (!is_word(tag)) {
     scanner.expect_row({}, "");
     const int fields = scanner.count_fields();
-    if (fields <= kLongestRow && is_number_like(tag)) ++votes.rows[fields];
+    if (!is_number_like(tag)) return;
+    ++votes.rows[std::min(fields, kLongestRow)];
+    votes.nanoseconds += is_nanoseconds(tag);
   } else if (tag == "VERTEX2" || tag == "VERTEX") {
     ++votes.toro;
     ++votes.vertices;
@@ -122,9 +133,29 @@ void settle_undecided(Votes& votes) {
 
 }  // namespace
 
+namespace {
+
+/// Lines of trajectories with stamps, by the place of w in the quaternion.
+struct Stamped {
+  int tum = 0, euroc = 0;
+};
+
+Stamped stamped_rows(const Votes& votes, const RowText& rows) {
+  const int longer = std::accumulate(votes.rows.begin() + 9, votes.rows.end(), 0);
+  if (rows.column_of_w() == 4) return {0, votes.rows[8] + longer};
+  const bool nanoseconds = votes.nanoseconds > 0;
+  if (rows.column_of_w() || !nanoseconds || !rows.has_commas())
+    return {votes.rows[8], nanoseconds ? votes.rows[17] : 0};
+  // Positions alone, too, which the reader refuses by name.
+  return {0, votes.rows[4] + votes.rows[8] + votes.rows[17]};
+}
+
+}  // namespace
+
 Likelihood look_at(std::string_view text) {
   Votes votes;
-  Scanner scanner(text, "");
+  const RowText rows(text.substr(0, kBytes));
+  Scanner scanner(rows.is_changed() ? rows.text() : text, "");
   BalVotes bal;
   while (votes.lines < kLines && scanner.next_line()) {
     bal.vote(scanner);
@@ -142,11 +173,14 @@ Likelihood look_at(std::string_view text) {
   likelihood.toro = score(votes.toro);
   likelihood.isam = score(votes.isam);
   likelihood.bal = score(bal.lines());
-  likelihood.tum = score(votes.rows[8]);
-  likelihood.kitti = score(votes.rows[12]);
+  const Stamped stamped = stamped_rows(votes, rows);
+  likelihood.tum = score(stamped.tum);
+  likelihood.euroc = score(stamped.euroc);
+  likelihood.kitti = rows.column_of_w() ? 0 : score(votes.rows[12]);
   // A single row of counts is no table: it may be the first line of anything.
   const bool counts_alone = votes.lines == 1 && text.find_first_of(".eE") == std::string_view::npos;
-  likelihood.table = counts_alone ? 0 : score(std::max(votes.rows[3], votes.rows[4]));
+  likelihood.table =
+      counts_alone || votes.nanoseconds > 0 ? 0 : score(std::max(votes.rows[3], votes.rows[4]));
   // Words that no format knows may be tags of a third party's types, which g2o's reader asks the
   // registry for; failing that, it says which line it does not understand.
   if (votes.tagged > 0 && likelihood.g2o == 0) likelihood.g2o = 1;

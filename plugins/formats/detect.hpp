@@ -7,7 +7,7 @@ namespace cairn::formats {
 
 /// The confidence of each format in a text, 0 to 100, by its first lines that are not empty.
 struct Likelihood {
-  int g2o = 0, toro = 0, isam = 0, bal = 0, tum = 0, kitti = 0, table = 0;
+  int g2o = 0, toro = 0, isam = 0, bal = 0, tum = 0, euroc = 0, kitti = 0, table = 0;
 };
 
 /// Considers tags and numbers, never names of files. Lines vote, so that one bad line does not
@@ -18,6 +18,8 @@ struct Likelihood {
 ///    on the diagonal when it is taken for iSAM's square root, or vice versa;
 ///  - a BAL file begins with three counts, and then has lines of four numbers (as many tables do)
 ///    and of one; the counts say how many of which.
+///  - eight numbers are TUM's or EuRoC's, which has w of the quaternion first: the names of the
+///    columns decide, else commas with nanoseconds are EuRoC's.
 ///  - LANDMARK has 7 numbers in iSAM, 11 in SLAM++'s flavour of TORO.
 Likelihood look_at(std::string_view text);
 

@@ -7,6 +7,7 @@
 #include <fmt/core.h>
 
 #include "cairn/io/format.hpp"
+#include "cairn/io/trajectory_writer.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
 #include "detect.hpp"
@@ -24,15 +25,16 @@ struct TextFormatParts {
   std::vector<std::string> extensions;
   int Likelihood::*likelihood;
   decltype(&read_g2o) read;
-  decltype(&write_g2o) write;  ///< null if the format only reads
+  decltype(&write_g2o) write;  ///< null if the format only reads, or writes poses alone
+  decltype(&write_tum) write_poses = nullptr;
 };
 
-class TextFormat final : public Format {
+class TextFormat final : public Format, public TrajectoryWriter {
  public:
   explicit TextFormat(TextFormatParts parts) : parts_(std::move(parts)) {}
 
   bool can_read() const override { return true; }
-  bool can_write() const override { return parts_.write != nullptr; }
+  bool can_write() const override { return parts_.write || parts_.write_poses; }
   std::vector<std::string> extensions() const override { return parts_.extensions; }
   int detect(std::string_view head) const override { return look_at(head).*parts_.likelihood; }
   Graph read(std::string_view text, const std::string& name, Registry& types,
@@ -40,7 +42,16 @@ class TextFormat final : public Format {
     report.format = parts_.name;
     return parts_.read(text, name, types, options, report);
   }
+  void* ability(std::string_view name) override {
+    return name == TrajectoryWriter::kAbility && parts_.write_poses
+               ? static_cast<TrajectoryWriter*>(this)
+               : nullptr;
+  }
+  std::string write_poses(const Graph& graph, std::span<const double> stamps) override {
+    return parts_.write_poses(graph, stamps);
+  }
   std::string write(const Graph& graph) override {
+    if (parts_.write_poses) return parts_.write_poses(graph, {});
     if (!parts_.write)
       throw Error(ErrorCode::usage, fmt::format("format {} only reads", parts_.name));
     return parts_.write(graph);
@@ -58,8 +69,9 @@ void cairn_register(Registrar& registrar) {
       {"toro", {"graph", "toro"}, &Likelihood::toro, read_toro, write_toro},
       {"isam", {"isam", "txt"}, &Likelihood::isam, read_isam, nullptr},
       {"bal", {"bal"}, &Likelihood::bal, read_bal, write_bal},
-      {"tum", {"tum"}, &Likelihood::tum, read_tum, write_tum},
-      {"kitti", {"kitti"}, &Likelihood::kitti, read_kitti, write_kitti},
+      {"tum", {"tum"}, &Likelihood::tum, read_tum, nullptr, write_tum},
+      {"euroc", {"csv"}, &Likelihood::euroc, read_euroc, nullptr},
+      {"kitti", {"kitti"}, &Likelihood::kitti, read_kitti, nullptr, write_kitti},
       {"table", {"dat"}, &Likelihood::table, read_table, nullptr},
   };
   for (const TextFormatParts& parts : all) {

@@ -22,6 +22,8 @@ Graph read_bal(std::string_view text, const std::string& name, Registry& types,
                const ReadOptions& options, ReadReport& report);
 Graph read_tum(std::string_view text, const std::string& name, Registry& types,
                const ReadOptions& options, ReadReport& report);
+Graph read_euroc(std::string_view text, const std::string& name, Registry& types,
+                 const ReadOptions& options, ReadReport& report);
 Graph read_kitti(std::string_view text, const std::string& name, Registry& types,
                  const ReadOptions& options, ReadReport& report);
 Graph read_table(std::string_view text, const std::string& name, Registry& types,

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Trajectories without factors: TUM (stamp x y z qx qy qz qw), KITTI (rows of [R t]) and plain
-// planar tables (x y theta, or id x y theta). Where rows have no id, the id is the row number from
-// 0.
+// Trajectories without factors: TUM (stamp x y z qx qy qz qw), EuRoC (stamp x y z qw qx qy qz …),
+// KITTI (rows of [R t]) and plain planar tables (x y theta, or id x y theta). Where rows have no
+// id, the id is the row number from 0.
 
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -16,18 +17,26 @@
 
 #include "draft.hpp"
 #include "readers.hpp"
+#include "row_text.hpp"
 #include "scanner.hpp"
+#include "stamped_rows.hpp"
 
 namespace cairn::formats {
 namespace {
 
-/// A stamp that can be an id: an integer from 0 that a double holds exactly.
-bool is_whole(double stamp) {
-  return stamp >= 0.0 && stamp <= 9007199254740992.0 && stamp == std::floor(stamp);
-}
-
 /// How far a 3×3 block may be from a rotation by rounding in a file with few digits.
 constexpr double kRotationTolerance = 1e-3;
+
+/// Where w of the quaternion is, counted from 0.
+constexpr int kTumW = 7, kEurocW = 4;
+
+/// The names of the columns say that the quaternion is not where the format has it.
+[[noreturn]] void fail_order(const Scanner& scanner, int column) {
+  scanner.fail(fmt::format(
+      "the names of the columns have w of the quaternion in column {}; expected it in column {} "
+      "(format tum) or {} (format euroc)",
+      column + 1, kTumW + 1, kEurocW + 1));
+}
 
 bool is_rotation(const Eigen::Matrix3d& R) {
   return (R * R.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() <
@@ -35,47 +44,64 @@ bool is_rotation(const Eigen::Matrix3d& R) {
          R.determinant() > 0.0;
 }
 
-/// Ids from stamps: the stamps themselves if all are integers, else row numbers. Either way
-/// the ids rise with the stamps.
-void set_ids_from_stamps(Draft& draft, const std::vector<double>& stamps) {
-  bool whole = true;
-  for (const double stamp : stamps) whole = whole && is_whole(stamp);
-  std::vector<Draft::Variable>& rows = draft.variables();
-  for (std::size_t row = 0; row < rows.size(); ++row) {
-    if (!whole && row > 0 && !(stamps[row] > stamps[row - 1])) {
-      draft.fail(rows[row].line, fmt::format("stamp {} after {}; expected rising stamps",
-                                             stamps[row], stamps[row - 1]));
-    }
-    rows[row].id = whole ? static_cast<Id>(stamps[row]) : static_cast<Id>(row);
-  }
-  if (!whole) {
-    draft.report().notes.push_back("the stamps are not integers: ids are the row numbers from 0");
-  }
-}
-
 }  // namespace
 
 Graph read_tum(std::string_view text, const std::string& name, Registry& types,
                const ReadOptions& options, ReadReport& report) {
-  Scanner scanner(text, name);
+  const RowText rows(text);
+  Scanner scanner(rows.text(), name);
   Draft draft(name, "tum", types, options, report);
   const std::int32_t pose = draft.variable_kind("VERTEX_SE3:QUAT");
-  std::vector<double> stamps;
+  StampedRows stamps;
   while (scanner.next_line()) {
     scanner.expect_row({0, 8, 0}, "a TUM row");
-    stamps.push_back(scanner.read_number());
+    if (rows.column_of_w().value_or(kTumW) != kTumW) fail_order(scanner, *rows.column_of_w());
+    stamps.add(scanner.tag(), scanner.read_number());
     scanner.read_numbers(draft.add_variable(pose, 0, scanner.line()));
     scanner.end_line();
   }
-  set_ids_from_stamps(draft, stamps);
-  std::sort(stamps.begin(), stamps.end());
-  report.stamps = std::move(stamps);
+  stamps.finish(draft, StampedRows::Whole::id, rows.stamp_unit());
+  return draft.build();
+}
+
+Graph read_euroc(std::string_view text, const std::string& name, Registry& types,
+                 const ReadOptions& options, ReadReport& report) {
+  const RowText rows(text);
+  Scanner scanner(rows.text(), name);
+  Draft draft(name, "euroc", types, options, report);
+  const std::int32_t kind = draft.variable_kind("VERTEX_SE3:QUAT");
+  StampedRows stamps;
+  int columns = 0;  // the first row decides
+  std::vector<double> others;
+  while (scanner.next_line()) {
+    if (columns == 0) {
+      scanner.expect_row({}, "");
+      columns = std::max(scanner.count_fields(), 8);
+      others.resize(static_cast<std::size_t>(columns - 8));
+    }
+    scanner.expect_row({0, columns, 0}, "an EuRoC row");
+    if (rows.column_of_w().value_or(kEurocW) != kEurocW) fail_order(scanner, *rows.column_of_w());
+    stamps.add(scanner.tag(), scanner.read_number());
+    const std::span<double> pose = draft.add_variable(kind, 0, scanner.line());
+    scanner.read_numbers(pose.first(3));
+    pose[6] = scanner.read_number();
+    scanner.read_numbers(pose.subspan(3, 3));
+    scanner.read_numbers(others);
+    scanner.end_line();
+  }
+  if (!rows.column_of_w())
+    report.notes.push_back("the fifth column is taken for w of the quaternion, as EuRoC has it");
+  if (!others.empty())
+    report.notes.push_back(fmt::format(
+        "the last {} columns, such as velocities and biases, are left out", others.size()));
+  stamps.finish(draft, StampedRows::Whole::nanoseconds, rows.stamp_unit());
   return draft.build();
 }
 
 Graph read_kitti(std::string_view text, const std::string& name, Registry& types,
                  const ReadOptions& options, ReadReport& report) {
-  Scanner scanner(text, name);
+  const RowText rows(text);
+  Scanner scanner(rows.text(), name);
   Draft draft(name, "kitti", types, options, report);
   const std::int32_t kind = draft.variable_kind("VERTEX_SE3:QUAT");
   const Placement* placement = draft.variable(kind).type->placement();
@@ -96,12 +122,14 @@ Graph read_kitti(std::string_view text, const std::string& name, Registry& types
     // The quaternion is normalized when the graph takes it, which mends the rounding of the file.
     placement->join(R.data(), t.data(), draft.add_variable(kind, row++, scanner.line()).data());
   }
+  report.row_ids = true;
   return draft.build();
 }
 
 Graph read_table(std::string_view text, const std::string& name, Registry& types,
                  const ReadOptions& options, ReadReport& report) {
-  Scanner scanner(text, name);
+  const RowText rows(text);
+  Scanner scanner(rows.text(), name);
   Draft draft(name, "table", types, options, report);
   const std::int32_t pose = draft.variable_kind("VERTEX_SE2");
   int ids = -1;  // a row: 1 if the table has them, 0 if not; the first row decides
@@ -116,6 +144,7 @@ Graph read_table(std::string_view text, const std::string& name, Registry& types
     scanner.read_numbers(draft.add_variable(pose, id, scanner.line()));
     scanner.end_line();
   }
+  report.row_ids = ids == 0;
   return draft.build();
 }
 

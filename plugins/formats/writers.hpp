@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <span>
 #include <string>
 
 #include "cairn/graph/graph.hpp"
@@ -17,11 +18,11 @@ std::string write_toro(const Graph& graph);
 /// Cameras and points, each numbered by rising id, and observations in their order. Rotations and
 /// translations are those of the file that was read but for rounding.
 std::string write_bal(const Graph& graph);
-/// Poses by rising id: the id as stamp, position, quaternion. Points (landmarks) are no part of a
-/// trajectory.
-std::string write_tum(const Graph& graph);
+/// Poses by rising id: the time as stamp, or the id where there are not as many `stamps` as poses,
+/// position, quaternion. Points (landmarks), velocities and all else are no part of a trajectory.
+std::string write_tum(const Graph& graph, std::span<const double> stamps);
 /// Poses by rising id: rows of [R t]. The row number is the id, so ids must be 0, 1, 2 … without a
 /// gap.
-std::string write_kitti(const Graph& graph);
+std::string write_kitti(const Graph& graph, std::span<const double> stamps);
 
 }  // namespace cairn::formats

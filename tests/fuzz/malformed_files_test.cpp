@@ -120,7 +120,7 @@ TEST_P(MalformedFiles, WithOptionsOnAreRefusedOrSound) {
 TEST_P(MalformedFiles, ThatAreScrambledAreRefusedOrSound) {
   const Seed& seed = GetParam();
   for (const std::string& text : scrambled(seed, 300)) {
-    for (const char* format : {"g2o", "toro", "isam", "bal", "tum", "kitti", "table"}) {
+    for (const char* format : {"g2o", "toro", "isam", "bal", "tum", "euroc", "kitti", "table"}) {
       try {
         expect_sound(read(format, text));
       } catch (const Error& error) {

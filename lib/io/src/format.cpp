@@ -10,6 +10,7 @@
 #include <fmt/ranges.h>
 
 #include "cairn/io/format_by_ending.hpp"
+#include "cairn/io/trajectory_writer.hpp"
 #include "cairn/plugin/plugin_search.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
@@ -187,17 +188,36 @@ Graph read_graph(const std::filesystem::path& file, Registry& registry) {
   return read_graph(file, registry, ReadOptions{}, report);
 }
 
-void write_graph(const Graph& graph, const std::filesystem::path& file, Registry& registry,
-                 std::string_view format) {
-  const NamedFormat writer = format.empty()
-                                 ? writer_by_ending(file, registry)
-                                 : NamedFormat{bare_name(format), registry.make<Format>(format)};
+namespace {
+
+NamedFormat writer_of(const std::filesystem::path& file, Registry& registry,
+                      std::string_view format) {
+  NamedFormat writer = format.empty()
+                           ? writer_by_ending(file, registry)
+                           : NamedFormat{bare_name(format), registry.make<Format>(format)};
   if (!writer.format->can_write()) {
     throw Error(ErrorCode::usage,
                 fmt::format("{}: format '{}' only reads", file.string(), writer.name));
   }
+  return writer;
+}
+
+}  // namespace
+
+void write_graph(const Graph& graph, const std::filesystem::path& file, Registry& registry,
+                 std::string_view format, std::span<const double> stamps) {
+  const NamedFormat writer = writer_of(file, registry, format);
   write_file(file, call_plugin([&] { return fmt::format("format '{}'", writer.name); },
-                               [&] { return writer.format->write(graph); }));
+                               [&] {
+                                 auto* poses = query<TrajectoryWriter>(*writer.format);
+                                 return poses ? poses->write_poses(graph, stamps)
+                                              : writer.format->write(graph);
+                               }));
+}
+
+bool writes_poses_alone(const std::filesystem::path& file, Registry& registry,
+                        std::string_view format) {
+  return query<TrajectoryWriter>(*writer_of(file, registry, format).format) != nullptr;
 }
 
 }  // namespace cairn

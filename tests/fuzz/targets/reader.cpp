@@ -18,9 +18,10 @@
 namespace cairn::fuzz {
 namespace {
 
-constexpr std::array<std::string_view, 7> kFormats = {"g2o", "toro",  "isam", "bal",
-                                                      "tum", "kitti", "table"};
-constexpr int kDetected = 7, kSkipUnknown = 8, kRepair = 16;
+constexpr std::array<std::string_view, 8> kFormats = {"g2o", "toro",  "isam",  "bal",
+                                                      "tum", "kitti", "table", "euroc"};
+// Of the first byte: the format, or that it is detected, and the options.
+constexpr int kDetected = 15, kSkipUnknown = 16, kRepair = 32;
 constexpr const char* kName = "input";
 
 /// Each format, made once: none has a state of its own.
@@ -117,8 +118,8 @@ void run(Bytes bytes) {
   Source source(bytes);
   const int choice = source.byte();
   const std::string_view text = text_of(source.rest());
-  std::optional<std::size_t> index = choice % 8;
-  if (*index == kDetected) index = detected(text);
+  std::optional<std::size_t> index = choice % (kDetected + 1);
+  if (*index >= kFormats.size()) index = detected(text);
   if (!index) return;
   const std::optional<Graph> graph = read(*index, text,
                                           {.skip_unknown = (choice & kSkipUnknown) != 0,
@@ -135,6 +136,18 @@ std::vector<std::string> seeds() {
     const auto index = std::ranges::find(kFormats, seed.format) - kFormats.begin();
     for (const auto choice : {index, std::ptrdiff_t{kDetected}, index | kSkipUnknown | kRepair})
       all.push_back(static_cast<char>(choice) + seed.text);
+  }
+  for (const char* rows :
+       {"#timestamp [ns], p_x, p_y, p_z, q_w, q_x, q_y, "
+        "q_z\n5000000,1,2,3,1,0,0,0\n6000000,1,2,3,0,1,"
+        "0,0\n",
+        "1403715524907143168,1,2,3,1,0,0,0,9,9\n1403715524907143168,1,2,3,1,0,0,0,9,9\n",
+        "timestamp,tx,ty,tz,qx,qy,qz,qw\n1.4e9,1,2,3,0,0,0,1\n1400000000.5,1,2,3,0,0,0,1\n"}) {
+    for (const char* chosen : {"euroc", "tum"}) {
+      const auto index = std::ranges::find(kFormats, chosen) - kFormats.begin();
+      for (const auto choice : {index, std::ptrdiff_t{kDetected}})
+        all.push_back(static_cast<char>(choice) + std::string(rows));
+    }
   }
   for (const char* graph :
        {"manhattan:poses=6", "sphere:turns=2,poses_per_turn=3", "landmarks2d:poses=5"}) {
@@ -167,6 +180,10 @@ std::vector<std::string> words() {
                                   "\n",
                                   "\r\n",
                                   "\t",
+                                  ",",
+                                  "#timestamp [ns], p_x, p_y, p_z, q_w, q_x, q_y, q_z\n",
+                                  "1403715524907143168,",
+                                  "1.403715524e9 ",
                                   " 0 0 0 0 0 0 0 1 ",
                                   "nan",
                                   "-inf",

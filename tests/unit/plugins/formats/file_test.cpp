@@ -128,7 +128,7 @@ TEST_F(File, SaysWhyAFileCannotBeRead) {
   }
   EXPECT_THAT(message_of([&] { read_graph(put("x.png", "\x89PNG\r\n"), registry()); }),
               HasSubstr("x.png: no format knows this content, which begins with '\\x89PNG\\x0d'; "
-                        "formats on offer: bal, g2o"));
+                        "formats on offer: bal, euroc, g2o"));
 }
 
 TEST_F(File, DoesNotReadDevicesThatMayNeverEnd) {

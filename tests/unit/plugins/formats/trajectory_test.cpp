@@ -3,9 +3,16 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
+#include <array>
+#include <filesystem>
 #include <numbers>
+#include <string>
 
+#include "cairn/types/define_variable.hpp"
+
+#include "support/placeless.hpp"
 #include "unit/plugins/formats/reading.hpp"
 
 namespace cairn::test {
@@ -44,9 +51,123 @@ TEST(Trajectory, TumStampsAreReportedByRisingId) {
 TEST(Trajectory, TumStampsMustRiseWhereRowsAreIds) {
   EXPECT_EQ(refusal("tum", "3.5 1 2 3 0 0 0 1\n3.25 4 5 6 0 0 0 1\n"),
             "file:2: stamp 3.25 after 3.5; expected rising stamps");
-  EXPECT_EQ(
-      refusal("tum", "3 1 2 3 0 0 0 1\n3 4 5 6 0 0 0 1\n"),
-      "file:2: VERTEX_SE3:QUAT 3: the id was already given in line 1; expected every id once");
+}
+
+TEST(Trajectory, OfTumRowsWithOneStampTheFirstIsKept) {
+  const Reading times =
+      read("tum", "0.5 1 2 3 0 0 0 1\n0.75 4 5 6 0 0 0 1\n0.75 4 5 6 0 0 0 1\n1 7 8 9 0 0 0 1\n");
+  EXPECT_EQ(times.graph.variable_count(), 3);
+  EXPECT_THAT(times.state(2), ElementsAre(7, 8, 9, 0, 0, 0, 1));
+  EXPECT_THAT(times.report.stamps, ElementsAre(0.5, 0.75, 1));
+  EXPECT_THAT(times.report.notes[0],
+              "1 row has the stamp of an earlier row, the first in line 3: of rows with one stamp "
+              "the first is kept");
+  const Reading ids = read("tum", "3 1 2 3 0 0 0 1\n7 9 9 9 0 0 0 1\n3 4 5 6 0 0 0 1\n");
+  EXPECT_THAT(ids.state(3), ElementsAre(1, 2, 3, 0, 0, 0, 1));
+  EXPECT_THAT(ids.report.stamps, ElementsAre(3, 7));
+  EXPECT_THAT(ids.report.notes,
+              ElementsAre(HasSubstr("in line 3: of rows with one stamp the first is kept, though 1 "
+                                    "of the others has another pose")));
+  EXPECT_THAT(refusal("tum", "0 1 2 3 0 0 0 1\n0 4 5 6 0 0 0 1\n0 7 8 9 0 0 0 1\n"),
+              HasSubstr("file:2: stamp 0 as in every other row"));
+}
+
+TEST(Trajectory, TumStampsInNanosecondsAreSecondsToTheLastBit) {
+  const char* rows[] = {
+      "1403715524907143168 1 2 3 0 0 0 1\n1403715525107143168 4 5 6 0 0 0 1\n",
+      "1.403715524907143168e18 1 2 3 0 0 0 1\n1.403715525107143168E+18 4 5 6 0 0 "
+      "0 1\n",
+      "+1403715524907143168 1 2 3 0 0 0 1\n1403715525107143168.0 4 5 6 0 0 0 1\n"};
+  for (const char* text : rows) {
+    const Reading r = read("tum", text);
+    EXPECT_THAT(r.report.stamps, ElementsAre(1403715524.907143168, 1403715525.107143168)) << text;
+    EXPECT_THAT(r.report.notes,
+                ElementsAre("the stamps are nanoseconds, read as seconds; ids are the row numbers "
+                            "from 0"));
+    EXPECT_TRUE(r.report.row_ids);
+  }
+}
+
+TEST(Trajectory, TumMayHaveCommasAndNamesOfItsColumns) {
+  for (const char* names : {"", "timestamp,tx,ty,tz,qx,qy,qz,qw\n", "# t,x,y,z,qx,qy,qz,qw\n"}) {
+    const std::string text =
+        std::string(names) + "1.4e9,1,2,3,0,0,0.6,0.8\n1400000000.5, 4, 5, 6, 0, 0, 0, 1\n";
+    EXPECT_EQ(detected(text), "tum") << names;
+    const Reading r = read("tum", text);
+    EXPECT_THAT(r.state(0), ElementsAre(1, 2, 3, 0, 0, 0.6, 0.8));
+    EXPECT_THAT(r.report.stamps, ElementsAre(1.4e9, 1400000000.5));
+  }
+  EXPECT_EQ(refusal("tum", "time,x,y,z,qx,qy,qz,qw\n1.5,1,2,3,0,0,1\n"),
+            "file:2: a TUM row with 7 fields; expected 8 fields (8 numbers)");
+  EXPECT_THAT(
+      refusal("tum", "#time,x,y,z,qw,qx,qy,qz\n1.5,1,2,3,1,0,0,0\n"),
+      HasSubstr("w of the quaternion in column 5; expected it in column 8 (format tum) or 5 "
+                "(format euroc)"));
+}
+
+// EuRoC -------------------------------------------------------------------------------------------
+
+constexpr const char* kEurocNames =
+    "#timestamp, p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [], q_RS_x [], q_RS_y [], q_RS_z "
+    "[], v_RS_R_x [m s^-1], v_RS_R_y [m s^-1], v_RS_R_z [m s^-1], b_w_RS_S_x [rad s^-1], "
+    "b_w_RS_S_y "
+    "[rad s^-1], b_w_RS_S_z [rad s^-1], b_a_RS_S_x [m s^-2], b_a_RS_S_y [m s^-2], b_a_RS_S_z [m "
+    "s^-2]\n";
+constexpr const char* kEurocRows =
+    "1403636580838555648,4.688319,-1.786938,0.783338,0.8,0.6,0,0,-0.027876,0.033207,0.800006,-"
+    "0.003172,0.021267,0.078502,-0.025266,0.136696,0.075593\n"
+    "1403636580843555328,4.688177,-1.78677,0.78735,0.6,0,0.8,0,-0.029272,0.033992,0.804771,-"
+    "0.003172,0.021267,0.078502,-0.025266,0.136696,0.075593\r\n";
+
+TEST(Trajectory, EurocHasNanosecondsAndWFirst) {
+  for (const std::string& names : {std::string(kEurocNames), std::string()}) {
+    const std::string text = names + kEurocRows;
+    EXPECT_EQ(detected(text), "euroc");
+    const Reading r = read("euroc", text);
+    EXPECT_THAT(r.state(0), ElementsAre(4.688319, -1.786938, 0.783338, 0.6, 0, 0, 0.8));
+    EXPECT_THAT(r.state(1), ElementsAre(4.688177, -1.78677, 0.78735, 0, 0.8, 0, 0.6));
+    EXPECT_THAT(r.report.stamps, ElementsAre(1403636580.838555648, 1403636580.843555328));
+    EXPECT_TRUE(r.report.row_ids);
+    EXPECT_THAT(r.report.notes, ::testing::Contains("the last 9 columns, such as velocities and "
+                                                    "biases, are left out"));
+    EXPECT_EQ(r.report.notes.size(), names.empty() ? 3U : 2U);  // that w is taken to be first
+  }
+}
+
+TEST(Trajectory, EurocMayEndWithTheQuaternion) {
+  const std::string names =
+      "#timestamp [ns], p_x [m], p_y [m], p_z [m], q_w [], q_x [], q_y [], q_z []\n";
+  const Reading r = read("euroc", names + "5000000,1,2,3,0.8,0,0.6,0\n10000000,4,5,6,1,0,0,0\n");
+  EXPECT_THAT(r.report.stamps, ElementsAre(0.005, 0.01));
+  EXPECT_THAT(r.state(0), ElementsAre(1, 2, 3, 0, 0.6, 0, 0.8));
+  EXPECT_EQ(detected("1403636580838555648,1,2,3,0.8,0,0.6,0\n"), "euroc");
+  // Names that say seconds, and fields between blanks.
+  const std::string seconds = "# time [s] x y z qw qx qy qz\n";
+  EXPECT_EQ(detected(seconds + "0.5 1 2 3 0.8 0 0.6 0\n0.75 1 2 3 1 0 0 0\n"), "tum");
+  const std::string spaced =
+      "# time x y z qw qx qy qz\n0.5 1 2 3 0.8 0 0.6 0\n0.75 1 2 3 1 0 0 0\n";
+  EXPECT_EQ(detected(spaced), "euroc");
+  EXPECT_THAT(read("euroc", spaced).report.stamps, ElementsAre(0.5, 0.75));
+  EXPECT_THAT(read("euroc", spaced).state(0), ElementsAre(1, 2, 3, 0, 0.6, 0, 0.8));
+}
+
+TEST(Trajectory, PositionsAloneAreNoTrajectoryOfEuroc) {
+  const std::string text =
+      "#timestamp [ns], p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m]\n"
+      "1403636580838555648,4.7,-1.8,0.8\n";
+  EXPECT_EQ(detected(text), "euroc") << "not a table of id x y theta";
+  EXPECT_EQ(refusal("euroc", text),
+            "file:2: an EuRoC row with 4 fields; expected 8 fields (8 numbers)");
+}
+
+TEST(Trajectory, OtherRowsMayHaveCommasToo) {
+  EXPECT_EQ(detected("1,0,0,0,0,1,0,0,0,0,1,0\n"), "kitti");
+  EXPECT_THAT(read("kitti", "1,0,0,7,0,1,0,8,0,0,1,9\n").state(0),
+              ElementsAre(7, 8, 9, 0, 0, 0, 1));
+  EXPECT_TRUE(read("kitti", "1,0,0,7,0,1,0,8,0,0,1,9\n").report.row_ids);
+  EXPECT_THAT(read("table", "7,1,2,0.5\n").state(7), ElementsAre(1, 2, 0.5));
+  EXPECT_FALSE(read("table", "7,1,2,0.5\n").report.row_ids);
+  EXPECT_TRUE(read("table", "1 2 0.5\n").report.row_ids);
 }
 
 TEST(Trajectory, KittiRowsAreRotationAndPosition) {
@@ -95,6 +216,33 @@ TEST(Trajectory, WritesPosesByIdAndLeavesOutLandmarks) {
   EXPECT_THAT(back.state(4), ElementsAre(1, 2, 0, 0, 0, 0, 1));
   EXPECT_THAT(back.state(2),
               Pointwise(DoubleNear(1e-15), std::vector<double>{0.5, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0}));
+}
+
+TEST(Trajectory, TumHasTheTimesWhereTheyAreKnown) {
+  const Reading r = read("tum", "1403715524.907143 1 2 3 0 0 0 1\n1403715526 4 5 6 0 0 0 1\n");
+  const std::filesystem::path file = std::filesystem::temp_directory_path() /
+                                     ("cairn-times-" + std::to_string(::getpid()) + ".tum");
+  write_graph(r.graph, file, registry(), {}, r.report.stamps);
+  EXPECT_EQ(read_file(file), "1403715524.907143 1 2 3 0 0 0 1\n1403715526 4 5 6 0 0 0 1\n");
+  write_graph(r.graph, file, registry(), {}, std::vector<double>{1.5});  // of another graph
+  EXPECT_EQ(read_file(file), "0 1 2 3 0 0 0 1\n1 4 5 6 0 0 0 1\n");
+  std::filesystem::remove(file);
+  EXPECT_TRUE(writes_poses_alone("a.tum", registry()));
+  EXPECT_TRUE(writes_poses_alone("-", registry(), "kitti"));
+  EXPECT_FALSE(writes_poses_alone("a.g2o", registry()));
+}
+
+/// A velocity, which is nowhere.
+struct Velocity : Placeless<3> {
+  static constexpr std::string_view kTag = "VERTEX_VELOCITY";
+};
+
+TEST(Trajectory, WritesThePosesOfAGraphWithOtherVariables) {
+  Reading r = read("g2o", "VERTEX_SE3:QUAT 1 1 2 3 0 0 0 1\nVERTEX_SE3:QUAT 0 0 0 0 0 0 0 1\n");
+  const auto velocity = define_variable<Velocity>();
+  for (const Id id : {100, 101}) r.graph.add_variable(velocity, id, std::array{1.0, 0.0, 0.0});
+  EXPECT_EQ(write("tum", r.graph), "0 0 0 0 0 0 0 1\n1 1 2 3 0 0 0 1\n");
+  EXPECT_EQ(write("kitti", r.graph), "1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 1 0 1 0 2 0 0 1 3\n");
 }
 
 TEST(Trajectory, KittiRefusesIdsThatItsRowsCannotSay) {

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -29,6 +30,7 @@ struct ReadReport {
   std::int64_t repaired = 0;                    ///< information matrices repaired
   std::vector<std::string> notes;  ///< sentences: renumbered ids, missing vertices, …
   std::vector<double> stamps;  ///< time [s] of each pose, by rising id; empty if the file has none
+  bool row_ids = false;        ///< the file has no ids: they are the numbers of its rows from 0
 };
 
 /// A file format. The reader is given the whole text, unpacked.
@@ -65,9 +67,14 @@ CAIRN_API Graph read_graph(const std::filesystem::path& file, Registry& registry
 
 /// Writes a graph: format by `format`, else by the file's ending (before .gz, which packs). The
 /// file is written beside and renamed, so that a failure never leaves half a file. "-" is standard
-/// output.
+/// output. `stamps`: the time [s] of each pose, by rising id, for formats that have times.
 CAIRN_API void write_graph(const Graph& graph, const std::filesystem::path& file,
-                           Registry& registry, std::string_view format = {});
+                           Registry& registry, std::string_view format = {},
+                           std::span<const double> stamps = {});
+
+/// Whether the format that `write_graph` would choose writes poses alone (`TrajectoryWriter`).
+CAIRN_API bool writes_poses_alone(const std::filesystem::path& file, Registry& registry,
+                                  std::string_view format = {});
 
 /// The ending of a file's name without the dot and in lower case, "g2o" of "map.G2O.gz": .gz is
 /// taken off before. Empty: it has none.
