@@ -26,6 +26,7 @@
 #include "cairn/solve/initial_guess.hpp"
 #include "json_report.hpp"
 #include "table.hpp"
+#include "trajectory_axes.hpp"
 
 namespace cairn::app {
 namespace {
@@ -35,6 +36,12 @@ namespace json = boost::json;
 bool is_json(std::string_view text) {
   const std::size_t first = text.find_first_not_of(" \t\r\n");
   return first != std::string_view::npos && text[first] == '{';
+}
+
+/// Whether the text of a CSV file is a trajectory with time stamps, which formats of graphs read.
+bool is_trajectory(std::string_view text, Registry& registry) {
+  constexpr const char* kFormat = "euroc";
+  return registry.has(Format::kKind, kFormat) && registry.make<Format>(kFormat)->detect(text) > 50;
 }
 
 /// A graph that a report names, if it can be read.
@@ -106,13 +113,21 @@ auto report_of(const std::string& text, const std::string& file) {
   }
 }
 
+/// Trajectories lie over graphs by id; one without ids by its rows.
+void note_rows(const LoadedGraph& loaded, const AlbumOptions& options, const Session& session) {
+  const bool alone = options.files.size() == 1 && options.truth.empty();
+  if (alone || !loaded.report.row_ids) return;
+  session.note(fmt::format("{}: has no ids, so that over a graph its row k is pose k{}",
+                           loaded.name, loaded.report.stamps.empty() ? "" : ", whatever its time"));
+}
+
 void add_file(const std::string& file, const std::string& name, const AlbumOptions& options,
               AlbumBuilder& builder, Session& session) {
   const bool named = file == "-" || file.starts_with('@');
   const std::string text = named ? std::string() : read_file(file);
-  if (!named && (is_csv(file) || is_recording(text) || is_json(text)))
-    session.files.add_input(file);
-  if (is_csv(file)) {
+  const bool is_table = is_csv(file) && !is_trajectory(text, session.registry());
+  if (!named && (is_table || is_recording(text) || is_json(text))) session.files.add_input(file);
+  if (is_table) {
     builder.add_table(numbers_only(read_number_table(text, file), options, session), name);
   } else if (is_exploration_recording(text)) {
     add_exploration(file, name, text, options, builder);
@@ -123,7 +138,10 @@ void add_file(const std::string& file, const std::string& name, const AlbumOptio
   } else if (is_json(text)) {
     builder.add_report(file, report_of(text, file));
   } else {
-    builder.add_graph(file, name, load_graph(file, options.input, session).graph);
+    LoadedGraph loaded = load_graph(file, options.input, session);
+    show_in_robot_axes(loaded, options.axes, session);
+    note_rows(loaded, options, session);
+    builder.add_graph(file, name, std::move(loaded.graph));
   }
 }
 
@@ -164,6 +182,9 @@ void add_album_options(ArgumentParser cli, AlbumOptions& options, const char* fi
   cli.add_option("--truth", options.truth,
                  "the ground truth, by id; estimates are aligned as by evaluate")
       .type_name("FILE");
+  add_axes_option(cli, options.axes,
+                  "of trajectories: robot (x ahead, z up) or camera (z ahead, y down), which is "
+                  "shown as a robot's [camera for KITTI]");
   cli.add_option("--initial", options.initial, "initial estimate to show too: kind initial_guess")
       .component({"initial_guess"});
   cli.add_option("--title", options.title, "title [name of the first FILE]").type_name("TEXT");
@@ -198,8 +219,10 @@ Album load_album(const AlbumOptions& options, const std::string& command, Sessio
     add_file(file, name, options, builder, session);
   }
   if (!options.truth.empty()) {
-    builder.set_truth(options.truth,
-                      load_ground_truth(options.truth, options.input, session).graph);
+    LoadedGraph truth = load_ground_truth(options.truth, options.input, session);
+    show_in_robot_axes(truth, options.axes, session);
+    note_rows(truth, options, session);
+    builder.set_truth(options.truth, std::move(truth.graph));
   }
   std::unique_ptr<InitialGuess> initial;
   if (!options.initial.empty()) {

@@ -20,6 +20,7 @@ struct AlbumOptions {
   std::string truth;
   std::string initial;  ///< a name of kind initial_guess, or empty
   std::string title;
+  std::string axes;  ///< of trajectories, robot or camera; empty: by their format
   InputOptions input;
   bool apart = false;   ///< each graph by itself, also one with the ids of another
   bool curves = false;  ///< of recordings of explorations the curves alone, as tables
@@ -29,7 +30,7 @@ struct AlbumOptions {
 /// Of a recording of an exploration [bytes], so that a page is below 15 MB.
 inline constexpr std::size_t kMostOfAPage = 13'000'000;
 
-/// Whether a file is read as a table, by its name.
+/// Whether a file is read as a table by its name, unless it is a trajectory.
 bool is_csv(const std::string& file);
 /// Whether it has columns to plot: as `is_csv`, or a recording of an exploration.
 bool has_columns(const std::string& file);

@@ -11,6 +11,7 @@
 #include "json_report.hpp"
 #include "results.hpp"
 #include "table.hpp"
+#include "trajectory_axes.hpp"
 
 namespace cairn::app {
 namespace {
@@ -19,32 +20,53 @@ struct ConvertOptions {
   std::string input_file;
   std::string output_file;
   std::string output_format;
+  std::string axes;  ///< of IN
   InputOptions input;
 };
 
-boost::json::object report_json(const ConvertOptions& options, const LoadedGraph& loaded) {
+boost::json::object report_json(const ConvertOptions& options, const LoadedGraph& loaded,
+                                bool poses_alone) {
   boost::json::object report = begin_report("convert");
   report["graph"] = graph_json(loaded.graph, loaded.name);
   report["format"] = loaded.report.format;
   report["output"] = options.output_file;
+  report["poses_alone"] = poses_alone;
   report["read_notes"] = strings_json(sentences(loaded.report));
   report["seconds"] = boost::json::object{{"read", loaded.seconds}};
   return report;
 }
 
+std::string contents(const Graph& graph, bool poses_alone) {
+  if (poses_alone) return plural(pose_count(graph), "pose");
+  return fmt::format("{}, {}", plural(graph.variable_count(), "variable"),
+                     plural(graph.factor_count(), "factor"));
+}
+
+/// A KITTI file is in the axes of a camera, which other formats are not read in.
+void note_axes(const ConvertOptions& options, const LoadedGraph& loaded, const Session& session) {
+  if (loaded.report.format != "kitti" || !options.axes.empty()) return;
+  session.note(
+      fmt::format("{}: KITTI's axes are those of a camera, and are kept; --axes camera "
+                  "turns them into a robot's, x ahead and z up",
+                  loaded.name));
+}
+
 int run(const ConvertOptions& options, Session& session) {
   check_output(options.output_file, options.output_format, session);
-  const LoadedGraph loaded = load_graph(options.input_file, options.input, session);
+  LoadedGraph loaded = load_graph(options.input_file, options.input, session);
+  turn_to_robot_axes(loaded, options.axes);
+  const std::string format = output_format(options.output_file, options.output_format);
+  const bool poses_alone = note_poses_alone(loaded.graph, options.output_file, format, session);
+  note_axes(options, loaded, session);
   Results results(session);
   results.write(options.output_file, [&] {
-    write_graph(loaded.graph, options.output_file, session.registry(),
-                output_format(options.output_file, options.output_format));
+    write_graph(loaded.graph, options.output_file, session.registry(), format,
+                loaded.report.stamps);
   });
-  results.add([&] { session.write_json(report_json(options, loaded)); });
+  results.add([&] { session.write_json(report_json(options, loaded, poses_alone)); });
   results.finish();
-  session.print(fmt::format("{} ({}): {}, {} written to {}\n", loaded.name, loaded.report.format,
-                            plural(loaded.graph.variable_count(), "variable"),
-                            plural(loaded.graph.factor_count(), "factor"), options.output_file));
+  session.print(fmt::format("{} ({}): {} written to {}\n", loaded.name, loaded.report.format,
+                            contents(loaded.graph, poses_alone), options.output_file));
   return 0;
 }
 
@@ -65,11 +87,15 @@ Command add_convert(ArgumentParser program) {
   cli.add_option("--to", options->output_format, "format of OUT, instead of by the ending")
       .component({"format"})
       .type_name("FORMAT");
+  add_axes_option(cli, options->axes,
+                  "of IN, a trajectory: camera (z ahead, y down) is turned into robot (x ahead, z "
+                  "up)");
   add_input_options(cli, options->input);
   cli.footer(
       "Example:\n"
       "  cairn convert manhattan_isam.txt manhattan.g2o.gz\n"
-      "  cairn convert best.g2o - --to tum");
+      "  cairn convert best.g2o - --to tum\n"
+      "  cairn convert 00.txt robot.tum --axes camera");
   return {cli, [options](Session& session) { return run(*options, session); }};
 }
 

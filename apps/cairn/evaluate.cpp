@@ -42,6 +42,7 @@ struct EvaluateOptions {
   std::string match;  ///< id or stamp; empty: what fits the files
   std::optional<double> offset, max_time_difference;
   bool planar = false;
+  bool scale = false;
   bool kld = false;
   std::string compared_at = "common";
   std::string linear_solver = kDefaultLinearSolver;  ///< of the KLD
@@ -57,8 +58,8 @@ struct EvaluateOptions {
 
 // Reading -----------------------------------------------------------------------------------------
 
-void set_stamps(Trajectory& poses, const std::vector<double>& stamps,
-                const TrajectoryOptions& options) {
+Trajectory stamped(Trajectory poses, const std::vector<double>& stamps,
+                   const TrajectoryOptions& options, const Session& session) {
   if (stamps.size() != poses.size()) {
     throw Error(ErrorCode::input,
                 fmt::format("{}: {} for {} of {}; expected one for each pose, by rising id",
@@ -66,7 +67,10 @@ void set_stamps(Trajectory& poses, const std::vector<double>& stamps,
                             plural(static_cast<std::int64_t>(stamps.size()), "stamp"),
                             plural(static_cast<std::int64_t>(poses.size()), "pose"), options.file));
   }
-  for (std::size_t k = 0; k < poses.size(); ++k) poses[k].stamp = stamps[k];
+  std::vector<std::string> notes;
+  poses = with_stamps(std::move(poses), stamps, notes);
+  for (const std::string& note : notes) session.note(options.stamps + ": " + note);
+  return poses;
 }
 
 Trajectory trajectory_of(const LoadedGraph& loaded, const TrajectoryOptions& options,
@@ -74,9 +78,12 @@ Trajectory trajectory_of(const LoadedGraph& loaded, const TrajectoryOptions& opt
   Trajectory poses = trajectory(loaded.graph);
   if (!options.stamps.empty()) {
     session.files.add_input(options.stamps);
-    set_stamps(poses, read_stamps(options.stamps), options);
+    std::vector<std::string> notes;
+    const std::vector<double> stamps = read_stamps(options.stamps, notes);
+    for (const std::string& note : notes) session.note(note);
+    poses = stamped(std::move(poses), stamps, options, session);
   } else if (!loaded.report.stamps.empty()) {
-    set_stamps(poses, loaded.report.stamps, options);
+    poses = stamped(std::move(poses), loaded.report.stamps, options, session);
   }
   if (options.axes == "camera") poses = camera_to_robot_axes(std::move(poses));
   if (all.planar) poses = projected_to_plane(std::move(poses));
@@ -135,6 +142,107 @@ void warn_of_dimensions(const LoadedGraph& estimate, const LoadedGraph& truth,
       "{} is of the plane and {} in space: heights, roll and pitch count as "
       "errors; --planar compares x, y and yaw alone",
       (planar_estimate ? estimate : truth).label, (planar_estimate ? truth : estimate).label));
+}
+
+/// How poses were paired, in the words of results.
+struct Pairing {
+  TrajectoryPairs pairs;
+  bool by_stamp = false;
+  RowPairing rows = RowPairing::none;
+  std::string text;  ///< ", matched by time"
+};
+
+/// Refuses, or notes, what rests on the numbers of rows.
+void judge_rows(const Pairing& pairing, const EvaluateOptions& options, bool estimate_rows,
+                const Session& session) {
+  if (options.match == "id" || pairing.rows == RowPairing::none) return;
+  const TrajectoryPairs& pairs = pairing.pairs;
+  const std::string& rows = estimate_rows ? options.estimate.file : options.truth.file;
+  const bool estimate_timed = pairs.estimate.front().stamp.has_value();
+  const bool truth_timed = pairs.truth.front().stamp.has_value();
+  const std::string times =
+      estimate_timed == truth_timed
+          ? "with the times of both, --stamps FILE and --truth-stamps FILE, poses are paired by "
+            "time"
+          : fmt::format("{} FILE, the times of {}, one per line, pairs poses by time",
+                        estimate_timed ? "--truth-stamps" : "--stamps",
+                        estimate_timed ? options.truth.file : options.estimate.file);
+  const std::string left_out =
+      plural(pairs.only_in_estimate + pairs.only_in_truth, "pose") + " left without a partner";
+  if (pairing.rows == RowPairing::unfounded) {
+    throw Error(
+        ErrorCode::input,
+        fmt::format("{}: has times and no ids, so that pose k would be compared with row "
+                    "k, and {}: that means nothing where rows were taken at other times; "
+                    "{}; --match id compares by row all the same",
+                    truth_timed ? options.truth.file : options.estimate.file, left_out, times));
+  }
+  if (pairing.rows == RowPairing::partial) {
+    session.note(
+        fmt::format("{}: has no ids, and pose k is compared with row k, with {}: right if "
+                    "ids are row numbers; {}; --match id takes them for it without a note",
+                    rows, left_out, times));
+  } else if (estimate_timed || truth_timed) {
+    session.note(fmt::format("{}: has no ids, and pose k is compared with row k of as many; {}",
+                             rows, times));
+  }
+}
+
+std::string pairing_text(const Pairing& pairing) {
+  if (pairing.by_stamp) return ", matched by time";
+  return pairing.rows == RowPairing::none ? ", matched by id" : ", id k with row k";
+}
+
+Pairing pair(const Trajectory& estimate, const Trajectory& truth, const LoadedGraph& estimate_graph,
+             const LoadedGraph& truth_graph, const EvaluateOptions& options,
+             const Session& session) {
+  Pairing result;
+  result.by_stamp = match_by_stamp(options, estimate, truth);
+  if (result.by_stamp) {
+    result.pairs = pair_by_stamp(estimate, truth, options.matching());
+  } else {
+    result.pairs = pair_by_id(estimate, truth);
+    const bool estimate_rows = estimate_graph.report.row_ids;
+    result.rows = row_pairing(result.pairs, estimate_rows, truth_graph.report.row_ids);
+    judge_rows(result, options, estimate_rows, session);
+  }
+  result.text = pairing_text(result);
+  return result;
+}
+
+// Doubts ------------------------------------------------------------------------------------------
+
+void suggest_scale(const TrajectoryPairs& pairs, const EvaluateOptions& options,
+                   const TrajectoryError& error, const Session& session) {
+  if (options.scale) return;
+  const std::optional<double> scale = explaining_scale(pairs);
+  if (!scale) return;
+  const TrajectoryError scaled = compare(pairs, Alignment::similarity);
+  session.note(
+      fmt::format("{} times as large, the estimate has an ATE of {:.6g} m instead of "
+                  "{:.6g} m; --align-scale compares it so, as is usual for a single camera",
+                  fmt::format("{:.6g}", *scale), scaled.ate_translation, error.ate_translation));
+}
+
+/// Orientations that are off by about the 120° between a camera's axes and a robot's, and agree
+/// when one of the two trajectories is turned.
+void suggest_axes(const TrajectoryPairs& pairs, const EvaluateOptions& options,
+                  const TrajectoryError& error, const Session& session) {
+  constexpr double kFar = 90.0, kShare = 0.1;  // [deg], of the error
+  if (error.ate_rotation < kFar || options.planar) return;
+  for (const bool of_estimate : {true, false}) {
+    if ((of_estimate ? options.estimate : options.truth).axes == "camera") continue;
+    TrajectoryPairs turned = pairs;
+    Trajectory& poses = of_estimate ? turned.estimate : turned.truth;
+    poses = camera_to_robot_axes(std::move(poses));
+    const double left = rotation_error(turned);
+    if (left > kShare * error.ate_rotation) continue;
+    session.note(
+        fmt::format("with {} camera the ATE in rotation is {:.6g} deg instead of {:.6g} "
+                    "deg: one of the two is in the axes of a camera, the other of a robot",
+                    of_estimate ? "--axes" : "--truth-axes", left, error.ate_rotation));
+    return;
+  }
 }
 
 // Divergence --------------------------------------------------------------------------------------
@@ -203,18 +311,21 @@ Table divergence_table(const GraphDivergence& divergence, const EvaluateOptions&
   return table;
 }
 
-Table error_table(const TrajectoryError& error, bool by_stamp) {
-  Table table({{fmt::format("{} compared{}", plural(error.poses, "pose"),
-                            by_stamp ? ", matched by time" : ""),
-                Table::Align::left},
-               {"translation [m]", Table::Align::right},
-               {"rotation [deg]", Table::Align::right}});
+Table error_table(const TrajectoryError& error, const EvaluateOptions& options,
+                  const std::string& pairing) {
+  Table table(
+      {{fmt::format("{} compared{}", plural(error.poses, "pose"), pairing), Table::Align::left},
+       {"translation [m]", Table::Align::right},
+       {"rotation [deg]", Table::Align::right}});
   const auto row = [&](const char* name, double translation, double rotation) {
     table.add({name, fmt::format("{:.6g}", translation), fmt::format("{:.6g}", rotation)});
   };
-  row("ATE (absolute, after rigid alignment)", error.ate_translation, error.ate_rotation);
+  row(options.scale ? "ATE (absolute, after alignment with scale)"
+                    : "ATE (absolute, after rigid alignment)",
+      error.ate_translation, error.ate_rotation);
   row("RPE (consecutive poses)", error.rpe_translation, error.rpe_rotation);
   row("RPE all to all (every pair)", error.rpe_all_translation, error.rpe_all_rotation);
+  if (options.scale) table.add({"scale of the estimate", fmt::format("{:.6g}", error.scale), ""});
   return table;
 }
 
@@ -222,14 +333,13 @@ json::object error_json(double translation, double rotation) {
   return {{"translation", translation}, {"rotation", rotation}};
 }
 
-json::object association_json(const EvaluateOptions& options, bool by_stamp,
-                              const TrajectoryPairs& pairs) {
-  if (!by_stamp) return {{"by", "id"}};
+json::object association_json(const EvaluateOptions& options, const Pairing& pairing) {
+  if (!pairing.by_stamp) return {{"by", "id"}, {"row_numbers", pairing.rows != RowPairing::none}};
   const StampMatching matching = options.matching();
   return {{"by", "stamp"},
           {"offset", matching.offset},
           {"max_time_difference", matching.max_difference},
-          {"largest_time_difference", pairs.largest_difference}};
+          {"largest_time_difference", pairing.pairs.largest_difference}};
 }
 
 /// As cairn sparsify reports it.
@@ -245,17 +355,19 @@ void add_divergence(const GraphDivergence& divergence, const EvaluateOptions& op
                       {"linear_solver", options.linear_solver}};
 }
 
-json::object report_json(const EvaluateOptions& options, bool by_stamp,
-                         const TrajectoryPairs& pairs, const TrajectoryError& error) {
+json::object report_json(const EvaluateOptions& options, const Pairing& pairing,
+                         const TrajectoryError& error) {
   json::object report = begin_report("evaluate");
   report["estimate"] = options.estimate.file;
   report["truth"] = options.truth.file;
-  report["association"] = association_json(options, by_stamp, pairs);
+  report["association"] = association_json(options, pairing);
   report["axes"] = {{"estimate", options.estimate.axes}, {"truth", options.truth.axes}};
   report["planar"] = options.planar;
+  report["alignment"] = options.scale ? "similarity" : "rigid";
+  report["scale"] = error.scale;
   report["poses"] = {{"compared", error.poses},
-                     {"only_in_estimate", pairs.only_in_estimate},
-                     {"only_in_truth", pairs.only_in_truth}};
+                     {"only_in_estimate", pairing.pairs.only_in_estimate},
+                     {"only_in_truth", pairing.pairs.only_in_truth}};
   report["ate"] = error_json(error.ate_translation, error.ate_rotation);
   report["rpe"] = error_json(error.rpe_translation, error.rpe_rotation);
   report["rpe_all"] = error_json(error.rpe_all_translation, error.rpe_all_rotation);
@@ -285,14 +397,16 @@ int run(const EvaluateOptions& options, Session& session) {
   }
   const Trajectory estimate = trajectory_of(estimate_graph, options.estimate, options, session);
   const Trajectory truth = trajectory_of(truth_graph, options.truth, options, session);
-  const bool by_stamp = match_by_stamp(options, estimate, truth);
-  const TrajectoryPairs pairs =
-      by_stamp ? pair_by_stamp(estimate, truth, options.matching()) : pair_by_id(estimate, truth);
-  const TrajectoryError error = compare(pairs);
-  warn_of_missing(pairs.only_in_estimate, options.estimate.file, options.truth.file, by_stamp,
+  const Pairing pairing = pair(estimate, truth, estimate_graph, truth_graph, options, session);
+  const TrajectoryPairs& pairs = pairing.pairs;
+  const TrajectoryError error =
+      compare(pairs, options.scale ? Alignment::similarity : Alignment::rigid);
+  warn_of_missing(pairs.only_in_estimate, options.estimate.file, options.truth.file,
+                  pairing.by_stamp, session);
+  warn_of_missing(pairs.only_in_truth, options.truth.file, options.estimate.file, pairing.by_stamp,
                   session);
-  warn_of_missing(pairs.only_in_truth, options.truth.file, options.estimate.file, by_stamp,
-                  session);
+  suggest_scale(pairs, options, error, session);
+  suggest_axes(pairs, options, error, session);
   warn_of_dimensions(estimate_graph, truth_graph, estimate, truth, session);
   Results results(session);
   GraphDivergence divergence;
@@ -302,11 +416,12 @@ int run(const EvaluateOptions& options, Session& session) {
     });
   }
   results.add([&] {
-    json::object report = report_json(options, by_stamp, pairs, error);
+    json::object report = report_json(options, pairing, error);
     if (solver) add_divergence(divergence, options, report);
     session.write_json(report);
   });
-  const Table errors = error_table(error, by_stamp), nats = divergence_table(divergence, options);
+  const Table errors = error_table(error, options, pairing.text),
+              nats = divergence_table(divergence, options);
   results.write(options.latex, [&] {
     write_file(options.latex, errors.latex() + (nats.empty() ? "" : "\n" + nats.latex()));
   });
@@ -343,7 +458,8 @@ Command add_evaluate(ArgumentParser program) {
       .type_name("TRUTH")
       .required();
   cli.add_option("--match", options->match,
-                 "pair poses by id or stamp; else by stamp where both have times")
+                 "pair poses by id or stamp; else by stamp where both have times. id: row numbers "
+                 "are ids where a file has none")
       .type_name("BY")
       .one_of({"id", "stamp"});
   cli.add_option("--max-time-difference", options->max_time_difference,
@@ -358,6 +474,9 @@ Command add_evaluate(ArgumentParser program) {
   add_trajectory_options(cli, options->estimate, "", "ESTIMATE");
   add_trajectory_options(cli, options->truth, "truth-", "TRUTH");
   cli.add_flag("--planar", options->planar, "compare x, y and yaw only, as seen on a map");
+  cli.add_flag(
+      "--align-scale", options->scale,
+      "align with a scale, too, which the estimate of a single camera lacks, and print it");
   cli.add_flag("--kld", options->kld,
                "also the divergence D(TRUTH||ESTIMATE) of two graphs on the variables of both, in "
                "nats");
@@ -376,10 +495,12 @@ Command add_evaluate(ArgumentParser program) {
       "Root mean squares: ATE after the rigid motion that brings ESTIMATE nearest to TRUTH, RPE "
       "between\n"
       "consecutive poses, RPE all to all over every pair; translation in metres, rotation in "
-      "degrees.\n\n"
+      "degrees. With\n"
+      "--align-scale the positions of ESTIMATE are scaled before all of them.\n\n"
       "Example:\n"
       "  cairn evaluate best.g2o truth.g2o --json errors.json\n"
       "  cairn evaluate slam.tum poses.txt --truth-stamps times.txt --truth-axes camera\n"
+      "  cairn evaluate camera.tum euroc.csv --align-scale\n"
       "  cairn evaluate sparse.g2o best.g2o --kld");
   return {cli, [options](Session& session) { return run(*options, session); }};
 }

@@ -11,6 +11,7 @@
 #include <fmt/core.h>
 
 #include "arguments.hpp"
+#include "cairn/geometry/pose.hpp"
 #include "cairn/io/format_by_ending.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
@@ -173,6 +174,29 @@ void check_output(const std::string& file, const std::string& format, Session& s
   if (file == "-") session.write_file_to_stdout();
   may_replace_graph ? session.files.add_result(file) : session.files.add_output(file);
   check_writable(file);
+}
+
+std::int64_t pose_count(const Graph& graph) {
+  std::int64_t poses = 0;
+  for (const VariablePool& pool : graph.variable_pools()) {
+    if (has_orientation(*pool.type)) poses += std::ssize(pool.variables);
+  }
+  return poses;
+}
+
+bool note_poses_alone(const Graph& graph, const std::string& file, const std::string& format,
+                      Session& session) {
+  if (!writes_poses_alone(file, session.registry(), format)) return false;
+  std::vector<std::string> left_out;
+  for (const VariablePool& pool : graph.variable_pools()) {
+    if (has_orientation(*pool.type) || pool.variables.empty()) continue;
+    left_out.push_back(fmt::format("{} {}", pool.variables.size(), pool.type->tag()));
+  }
+  if (!left_out.empty()) {
+    session.note(fmt::format("{}: a trajectory has poses alone; left out: {}",
+                             file == "-" ? "standard output" : file, joined(left_out, ", ")));
+  }
+  return true;
 }
 
 void check_file(const std::string& file, Session& session) {

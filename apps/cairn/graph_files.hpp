@@ -61,6 +61,14 @@ std::string output_format(const std::string& file, const std::string& named);
 void check_output(const std::string& file, const std::string& format, Session& session,
                   bool may_replace_graph = true);
 
+/// Notes which variables of a graph a trajectory format leaves out, to which it is written, and
+/// returns whether it is one. `format`: of `output_format`.
+bool note_poses_alone(const Graph& graph, const std::string& file, const std::string& format,
+                      Session& session);
+
+/// How many variables have an orientation: those that a trajectory format writes.
+std::int64_t pose_count(const Graph& graph);
+
 /// The same for an output of another kind, which replaces no input.
 void check_file(const std::string& file, Session& session);
 

@@ -175,8 +175,9 @@ int run(const OptimizeOptions& options, Session& session) {
       [&] { return solve(loaded.graph, *optimizer, options, guard, session, recording); });
   Results results(session);
   results.write(options.output, [&] {
-    write_graph(loaded.graph, options.output, registry,
-                output_format(options.output, options.output_format));
+    const std::string format = output_format(options.output, options.output_format);
+    note_poses_alone(loaded.graph, options.output, format, session);
+    write_graph(loaded.graph, options.output, registry, format);
   });
   const Stop& stop = options.problem.stop;
   for (std::string& note : notes_on_the_end(summary, stop, loaded.graph))

@@ -229,8 +229,9 @@ int run(const ReplayOptions& options, Session& session) {
   Results results(session);
   if (failure) results.add([&] { std::rethrow_exception(failure); });
   results.write(options.output, [&] {
-    write_graph(estimator->graph(), options.output, registry,
-                output_format(options.output, options.output_format));
+    const std::string format = output_format(options.output, options.output_format);
+    note_poses_alone(estimator->graph(), options.output, format, session);
+    write_graph(estimator->graph(), options.output, registry, format);
   });
   results.write(options.steps, [&] { write_file(options.steps, steps_csv(replay)); });
   if (failure) results.finish();  // throws

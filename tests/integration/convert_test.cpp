@@ -3,11 +3,13 @@
 #include <gtest/gtest.h>
 
 #include "integration/process.hpp"
+#include "support/components.hpp"
 
 namespace cairn::test {
 namespace {
 
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 TEST(ConvertCommand, ThereAndBackIsTheSameGraph) {
   const TemporaryFolder folder;
@@ -33,6 +35,40 @@ TEST(ConvertCommand, WritesATrajectoryToStandardOutput) {
   const Outcome outcome = cairn({"convert", "@ring:poses=30", "-", "--to", "tum"});
   EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
   EXPECT_EQ(lines(outcome.out).size(), 30u);
+}
+
+TEST(ConvertCommand, SaysWhatATrajectoryLeavesOut) {
+  const TemporaryFolder folder;
+  const std::string graph = folder.file("graph.g2o"), tum = folder.file("poses.tum");
+  write_text(graph,
+             "VERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 1 0 0\nVERTEX_XY 7 2 3\n"
+             "EDGE_SE2 0 1 1 0 0 1 0 0 1 0 1\nEDGE_SE2_XY 0 7 2 3 1 0 1\n");
+  const Outcome outcome = cairn({"convert", graph, tum});
+  EXPECT_EQ(outcome.exit_code, 0);
+  EXPECT_THAT(unfolded(outcome.err),
+              HasSubstr("poses.tum: a trajectory has poses alone; left out: 1 VERTEX_XY"));
+  EXPECT_THAT(outcome.out, HasSubstr("graph.g2o (g2o): 2 poses written to " + tum));
+  EXPECT_EQ(cairn({"convert", tum, folder.file("again.tum")}).err, "");
+  EXPECT_EQ(read_text(folder.file("again.tum")), read_text(tum));
+}
+
+// Two metres ahead, in the axes of a camera; then a turn to the left.
+TEST(ConvertCommand, TurnsTheAxesOfACameraToThoseOfARobot) {
+  CAIRN_NEEDS("variable", "VERTEX_SE3:QUAT");
+  const TemporaryFolder folder;
+  const std::string kitti = folder.file("00.txt"), tum = folder.file("00.tum");
+  write_text(kitti, "1 0 0 0 0 1 0 0 0 0 1 0\n0 0 -1 0 0 1 0 -0.5 1 0 0 2\n");
+  const Outcome kept = cairn({"convert", kitti, tum});
+  EXPECT_THAT(unfolded(kept.err), HasSubstr("KITTI's axes are those of a camera, and are kept; "
+                                            "--axes camera turns them"));
+  EXPECT_THAT(read_text(tum), HasSubstr("1 0 -0.5 2 "));
+  const Outcome turned = cairn({"convert", kitti, tum, "--axes", "camera"});
+  EXPECT_EQ(turned.exit_code, 0) << turned.err;
+  EXPECT_THAT(turned.err, Not(HasSubstr("axes")));
+  EXPECT_THAT(read_text(tum), HasSubstr("1 2 0 0.5 "));
+  const Outcome planar = cairn({"convert", "@ring", tum, "--axes", "camera"});
+  EXPECT_EQ(planar.exit_code, 3);
+  EXPECT_THAT(planar.err, HasSubstr("@ring: --axes camera: "));
 }
 
 TEST(ConvertCommand, NeedsAFormatWhereTheNameTellsNone) {

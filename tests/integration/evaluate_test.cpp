@@ -4,6 +4,7 @@
 #include <iterator>
 #include <sstream>
 #include <string>
+#include <utility>
 
 #include <fmt/core.h>
 #include <gmock/gmock.h>
@@ -16,8 +17,10 @@
 namespace cairn::test {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::EndsWith;
 using ::testing::HasSubstr;
+using ::testing::Not;
 using ::testing::SizeIs;
 
 boost::json::value errors(const std::string& estimate, const std::string& truth) {
@@ -298,7 +301,7 @@ TEST_F(EvaluateByTime, KittiFilesHaveTheirStampsBesideThem) {
 
 TEST_F(EvaluateByTime, WhatCannotBeDoneWithoutStampsSaysWhereTheyGo) {
   write_text(truth_, "VERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 1 0 0\n");
-  EXPECT_EQ(cairn({"evaluate", estimate_, truth_}).exit_code, 0);  // by row
+  EXPECT_EQ(cairn({"evaluate", estimate_, truth_, "--match", "id"}).exit_code, 0);  // by row
   expect_refusal({"--offset", "1"}, 2, "--truth-stamps FILE");
   expect_refusal({"--match", "stamp"}, 2, "--truth-stamps FILE");
   expect_refusal({"--match", "id", "--offset", "1"}, 2, "leave out --offset");
@@ -306,7 +309,195 @@ TEST_F(EvaluateByTime, WhatCannotBeDoneWithoutStampsSaysWhereTheyGo) {
   expect_refusal({"--max-time-difference=-1"}, 2, "seconds, from 0");
 }
 
+// Key frames with ids beside a truth with times: pose k is not row k.
+TEST_F(EvaluateByTime, IdsAreNotComparedWithRowNumbersInSilence) {
+  std::string frames, times;
+  for (int k = 0; k < 8; ++k) {
+    const double t = 1.0 + k;
+    frames += fmt::format("VERTEX_SE3:QUAT {} {:.17g} {:.17g} {:.17g} 0 0 {:.17g} {:.17g}\n", k,
+                          std::cos(t), std::sin(t), 0.1 * t, std::sin(0.5 * t), std::cos(0.5 * t));
+    times += fmt::format("{}\n", t + 0.004);
+  }
+  const std::string graph = folder_.file("frames.g2o"), clock = folder_.file("frames.txt");
+  write_text(graph, frames);
+  write_text(clock, times);
+  const Outcome refused = cairn({"evaluate", graph, truth_});
+  EXPECT_EQ(refused.exit_code, 3) << refused.out;
+  EXPECT_THAT(unfolded(refused.err),
+              AllOf(HasSubstr("truth.tum: has times and no ids, so that pose k would be compared "
+                              "with row k, and 192 poses left without a partner"),
+                    HasSubstr("--stamps FILE, the times of " + graph),
+                    HasSubstr("--match id compares by row")));
+  const auto timed = report_of({"evaluate", graph, truth_, "--stamps", clock});
+  EXPECT_NEAR(number(timed, "ate", "translation"), 0.0, 1e-12);
+  EXPECT_EQ(timed.at("poses").at("compared").as_int64(), 8);
+  // The other way round it is the truth that has no times.
+  EXPECT_THAT(unfolded(cairn({"evaluate", truth_, graph}).err),
+              HasSubstr("--truth-stamps FILE, the times of " + graph));
+  // As asked for, it is said in the results.
+  const Outcome by_row = cairn({"evaluate", graph, truth_, "--match", "id"});
+  EXPECT_EQ(by_row.exit_code, 0);
+  EXPECT_THAT(by_row.out, HasSubstr("8 poses compared, id k with row k"));
+  EXPECT_TRUE(report_of({"evaluate", graph, truth_, "--match", "id"})
+                  .at("association")
+                  .at("row_numbers")
+                  .as_bool());
+  EXPECT_THAT(cairn({"evaluate", graph, graph}).out, HasSubstr("8 poses compared, matched by id"));
+}
+
+TEST_F(EvaluateByTime, RowsOfAsManyPosesOrWithoutTimesAreComparedWithANote) {
+  const std::string graph = folder_.file("rows.g2o"), kitti = folder_.file("rows.kitti");
+  std::string poses, rows;
+  for (int k = 0; k < 20; ++k) {
+    poses += fmt::format("VERTEX_SE2 {} {} 0 0\n", k, k);
+    rows += fmt::format("1 0 0 {} 0 1 0 0 0 0 1 0\n", k);
+  }
+  write_text(graph, poses);
+  write_text(kitti, rows);
+  const Outcome as_many = cairn({"evaluate", graph, estimate_});
+  EXPECT_EQ(as_many.exit_code, 0);
+  EXPECT_THAT(unfolded(as_many.err),
+              HasSubstr("has no ids, and pose k is compared with row k of as many; --stamps FILE"));
+  EXPECT_THAT(unfolded(cairn({"evaluate", graph, kitti}).err), Not(HasSubstr("has no ids")));
+  write_text(kitti, rows + rows);
+  const Outcome more = cairn({"evaluate", graph, kitti});
+  EXPECT_EQ(more.exit_code, 0);
+  EXPECT_THAT(unfolded(more.err),
+              AllOf(HasSubstr("rows.kitti: has no ids, and pose k is compared with row k, with 20 "
+                              "poses left without a partner: right if ids are row numbers"),
+                    HasSubstr("--match id")));
+  EXPECT_THAT(cairn({"evaluate", graph, kitti, "--match", "id"}).err, Not(HasSubstr("row k")));
+  EXPECT_THAT(more.out, HasSubstr("id k with row k"));
+}
+
+TEST_F(EvaluateByTime, AnInstantThatIsThereTwiceIsComparedOnce) {
+  const std::string drive = tum_drive(200, 1.0, 0.05, 0.004);
+  const std::size_t line = drive.find('\n') + 1;
+  write_text(truth_, drive.substr(0, line) + drive);  // the first row twice
+  const Outcome outcome = cairn({"evaluate", estimate_, truth_});
+  EXPECT_EQ(outcome.exit_code, 0);
+  EXPECT_THAT(unfolded(outcome.err), HasSubstr("1 row has the stamp of an earlier row"));
+  const auto errors = report({});
+  EXPECT_EQ(errors.at("poses").at("compared").as_int64(), 20);
+  EXPECT_NEAR(number(errors, "ate", "translation"), 0.0, 1e-12);
+}
+
+/// The same drive as EuRoC has it: commas, nanoseconds, w first, and columns for what moves it.
+std::string euroc_drive(int poses, double begin, double step) {
+  std::string text =
+      "#timestamp [ns], p_x [m], p_y [m], p_z [m], q_w [], q_x [], q_y [], q_z [], v_x, "
+      "v_y, v_z\n";
+  for (int k = 0; k < poses; ++k) {
+    const double t = begin + k * step;
+    text += fmt::format("{}{:09},{:.17g},{:.17g},{:.17g},{:.17g},0,0,{:.17g},0,0,0\n", 1403715524,
+                        std::llround(t * 1e7), std::cos(t), std::sin(t), 0.1 * t, std::cos(0.5 * t),
+                        std::sin(0.5 * t));
+  }
+  return text;
+}
+
+TEST_F(EvaluateByTime, EurocIsComparedWithTumByItsNanoseconds) {
+  const std::string euroc = folder_.file("euroc.csv"), nanoseconds = folder_.file("ns.tum");
+  write_text(euroc, euroc_drive(100, 1.0, 0.05));
+  std::string slow, fast;
+  for (int k = 0; k < 20; ++k) {
+    const double t = 1.5 + 0.1 * k;
+    const std::string pose =
+        fmt::format("{:.17g} {:.17g} {:.17g} 0 0 {:.17g} {:.17g}", std::cos(t), std::sin(t),
+                    0.1 * t, std::sin(0.5 * t), std::cos(0.5 * t));
+    slow += fmt::format("1403715524.{:09} {}\n", std::llround(t * 1e7), pose);
+    fast += fmt::format("1403715524{:09} {}\n", std::llround(t * 1e7), pose);
+  }
+  write_text(estimate_, slow);
+  write_text(nanoseconds, fast);
+  for (const auto& [a, b] : {std::pair{estimate_, euroc},
+                             {euroc, estimate_},
+                             {nanoseconds, euroc},
+                             {nanoseconds, estimate_}}) {
+    const auto errors = report_of({"evaluate", a, b});
+    EXPECT_EQ(errors.at("poses").at("compared").as_int64(), 20) << a << " " << b;
+    EXPECT_NEAR(number(errors, "ate", "translation"), 0.0, 1e-12);
+    EXPECT_NEAR(number(errors, "ate", "rotation"), 0.0, 1e-6);
+    EXPECT_EQ(number(errors, "association", "largest_time_difference"), 0.0);
+  }
+  // Its times stay with it.
+  const std::string tum = folder_.file("euroc.tum");
+  ASSERT_EQ(cairn({"convert", euroc, tum}).exit_code, 0);
+  EXPECT_THAT(read_text(tum), HasSubstr("1403715524.01 "));
+  EXPECT_EQ(number(report_of({"evaluate", tum, euroc}), "association", "largest_time_difference"),
+            0.0);
+}
+
+TEST_F(EvaluateByTime, AnotherUnitIsNamedWhereNoOffsetCanHelp) {
+  write_text(estimate_, tum_drive(20, 5e9 + 0.5, 1e8, 0.0));
+  expect_refusal({}, 3, "its stamps may be nanoseconds");
+  const Outcome outcome = cairn({"evaluate", estimate_, truth_});
+  EXPECT_THAT(outcome.err, Not(HasSubstr("--offset")));
+}
+
+// Scale -------------------------------------------------------------------------------------------
+
+/// The poses of a wound way, `scale` times as large and off by up to `noise`.
+std::string wound_way(int poses, double scale, double noise) {
+  std::string text;
+  for (int k = 0; k < poses; ++k) {
+    const double t = 0.3 * k, wobble = noise * std::sin(17.0 * k * k);
+    text += fmt::format("VERTEX_SE3:QUAT {} {:.17g} {:.17g} {:.17g} 0 0 {:.17g} {:.17g}\n", k,
+                        scale * 5 * std::cos(t) + wobble, scale * 3 * std::sin(0.7 * t) - wobble,
+                        scale * std::sin(2 * t), std::sin(0.5 * t), std::cos(0.5 * t));
+  }
+  return text;
+}
+
+TEST(EvaluateCommand, AScaleIsAlignedWhereItIsAskedForAndSuggestedWhereItExplainsTheError) {
+  const TemporaryFolder folder;
+  const std::string small = folder.file("small.g2o"), truth = folder.file("truth.g2o"),
+                    noisy = folder.file("noisy.g2o"), few = folder.file("few.g2o");
+  write_text(truth, wound_way(40, 1.0, 0.0));
+  write_text(small, wound_way(40, 1.0 / 2.2, 0.0));
+  write_text(noisy, wound_way(40, 0.999, 0.05));
+  write_text(few, wound_way(3, 1.0 / 2.2, 0.0));
+  const Outcome rigid = cairn({"evaluate", small, truth});
+  EXPECT_EQ(rigid.exit_code, 0);
+  EXPECT_THAT(unfolded(rigid.err),
+              AllOf(HasSubstr("2.2 times as large, the estimate has an ATE of"),
+                    HasSubstr("--align-scale")));
+  const Outcome scaled = cairn({"evaluate", small, truth, "--align-scale"});
+  EXPECT_THAT(scaled.out, AllOf(HasSubstr("ATE (absolute, after alignment with scale)"),
+                                HasSubstr("scale of the estimate"), HasSubstr("2.2")));
+  EXPECT_EQ(scaled.err, "");
+  const auto report = report_of({"evaluate", small, truth, "--align-scale"});
+  EXPECT_NEAR(report.at("scale").as_double(), 2.2, 1e-12);
+  EXPECT_EQ(report.at("alignment").as_string(), "similarity");
+  for (const char* error : {"ate", "rpe", "rpe_all"})
+    EXPECT_NEAR(number(report, error, "translation"), 0.0, 1e-12) << error;
+  EXPECT_EQ(report_of({"evaluate", small, truth}).at("scale").as_double(), 1.0);
+  EXPECT_EQ(cairn({"evaluate", noisy, truth}).err, "");
+  EXPECT_THAT(cairn({"evaluate", few, truth}).err, Not(HasSubstr("--align-scale")));
+  write_text(few, "VERTEX_SE2 0 1 1 0\nVERTEX_SE2 1 1 1 0\nVERTEX_SE2 2 1 1 0\n");
+  const Outcome point = cairn({"evaluate", few, truth, "--align-scale"});
+  EXPECT_EQ(point.exit_code, 3);
+  EXPECT_THAT(point.err, HasSubstr("are one point"));
+}
+
 // Frames ------------------------------------------------------------------------------------------
+
+TEST(EvaluateCommand, AxesOfACameraThatWereForgottenAreNamed) {
+  const TemporaryFolder folder;
+  const std::string robot = folder.file("robot.g2o"), camera = folder.file("camera.g2o"),
+                    kitti = folder.file("camera.kitti");
+  write_text(robot, wound_way(12, 1.0, 0.0));
+  ASSERT_EQ(cairn({"convert", robot, kitti}).exit_code, 0);
+  // What `--axes camera` takes for a camera's is a robot's, three times over.
+  ASSERT_EQ(cairn({"convert", kitti, camera, "--axes", "camera"}).exit_code, 0);
+  const Outcome outcome = cairn({"evaluate", camera, robot});
+  EXPECT_THAT(unfolded(outcome.err), HasSubstr("with --truth-axes camera the ATE in rotation is"));
+  EXPECT_THAT(unfolded(cairn({"evaluate", robot, camera}).err),
+              HasSubstr("with --axes camera the ATE in rotation is"));
+  EXPECT_EQ(cairn({"evaluate", robot, camera, "--axes", "camera"}).err, "");
+  EXPECT_NEAR(number(report_of({"evaluate", robot, camera, "--axes", "camera"}), "ate", "rotation"),
+              0.0, 1e-6);
+}
 
 // Two metres ahead, then, turned to the left, one metre ahead: in a camera's axes, on a road that
 // rises by half a metre.

@@ -8,6 +8,7 @@
 #include "cairn/plugin/registry.hpp"
 #include "cairn/report/packed_array.hpp"
 #include "integration/process.hpp"
+#include "support/components.hpp"
 
 namespace cairn::test {
 namespace {
@@ -100,6 +101,33 @@ TEST_F(ViewCommand, TakesATrajectoryForTheTruth) {
   const auto page = data_of({"view", tum, graph_});
   ASSERT_EQ(page.at("graphs").as_array().size(), 1U);
   EXPECT_EQ(roles(page.at("graphs").at(0)).at("truth.tum"), "truth");
+}
+
+TEST_F(ViewCommand, ShowsKittiUprightAndEurocAsATrajectory) {
+  CAIRN_NEEDS("variable", "VERTEX_SE3:QUAT");
+  const std::string kitti = folder_.file("00.txt"), euroc = folder_.file("data.csv");
+  write_text(kitti, "1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 0 0 1 0 0 0 0 1 2\n");  // two metres ahead
+  const auto last_position = [&](const Arguments& arguments) {
+    const auto graph = data_of(arguments).at("graphs").at(0);
+    return unpack_numbers(
+        "f32", std::string(graph.at("estimates").at(0).at("positions").at("base64").as_string()),
+        Packing::base64, 6, "positions");
+  };
+  const auto way = [&](const Arguments& arguments) {
+    const std::vector<double> p = last_position(arguments);
+    return std::vector<double>{p[3] - p[0], p[4] - p[1], p[5] - p[2]};
+  };
+  EXPECT_EQ(way({"view", kitti}), (std::vector<double>{2, 0, 0}));
+  EXPECT_EQ(way({"view", kitti, "--axes", "camera"}), (std::vector<double>{2, 0, 0}));
+  EXPECT_EQ(way({"view", kitti, "--axes", "robot"}), (std::vector<double>{0, 0, 2}));
+  EXPECT_THAT(unfolded(cairn({"view", kitti, "-o", page_}).err),
+              HasSubstr("KITTI's axes are those of a camera"));
+  EXPECT_THAT(unfolded(cairn({"view", graph_, kitti, "-o", page_}).err),
+              HasSubstr("00.txt: has no ids, so that over a graph its row k is pose k"));
+  write_text(euroc,
+             "#timestamp [ns],p_x,p_y,p_z,q_w,q_x,q_y,q_z\n1403636580838555648,1,2,3,1,0,0,0\n"
+             "1403636580843555328,2,2,5,1,0,0,0\n");
+  EXPECT_EQ(way({"view", euroc}), (std::vector<double>{1, 0, 2}));
 }
 
 TEST_F(ViewCommand, EstimatesAreAlignedToTheTruth) {

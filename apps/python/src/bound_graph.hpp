@@ -23,6 +23,7 @@ class BoundGraph {
   }
 
   std::vector<double> stamps;      ///< time [s] of each pose, by rising id, if its file has them
+  bool row_ids = false;            ///< its file has no ids: they are the numbers of its rows
   std::vector<std::string> notes;  ///< what reading it skipped or changed
 
  private:

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Errors of trajectories.
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -39,6 +40,10 @@ bool by_stamp(const std::string& match, const Trajectory& estimate, const Trajec
   return true;
 }
 
+void warn(const std::string& text) {
+  if (PyErr_WarnEx(PyExc_UserWarning, text.c_str(), 1) != 0) throw py::error_already_set();
+}
+
 /// A UserWarning where one of the two has no height that could be wrong.
 void warn_of_dimensions(const Graph& estimate, const Graph& truth, const Trajectory& poses,
                         const Trajectory& true_poses) {
@@ -48,11 +53,36 @@ void warn_of_dimensions(const Graph& estimate, const Graph& truth, const Traject
       "the {} is of the plane and the {} in space: heights, roll and pitch count as errors; "
       "planar=True compares x, y and yaw alone",
       planar_estimate ? "estimate" : "truth", planar_estimate ? "truth" : "estimate");
-  if (PyErr_WarnEx(PyExc_UserWarning, text.c_str(), 1) != 0) throw py::error_already_set();
+  warn(text);
+}
+
+/// Refuses, or warns of, what rests on the numbers of rows.
+void judge_rows(const TrajectoryPairs& pairs, bool estimate_rows, bool truth_rows) {
+  const RowPairing rows = row_pairing(pairs, estimate_rows, truth_rows);
+  if (rows == RowPairing::none || rows == RowPairing::complete) return;
+  const std::string what = fmt::format(
+      "the {} has no ids, and pose k is compared with row k, with {} poses left without a partner",
+      estimate_rows ? "estimate" : "truth", pairs.only_in_estimate + pairs.only_in_truth);
+  if (rows == RowPairing::partial) return warn(what + "; match='id' takes rows for ids");
+  const bool truth_timed = pairs.truth.front().stamp.has_value();
+  throw Error(ErrorCode::input,
+              fmt::format("{}: that means nothing where rows were taken at other times; set the "
+                          "stamps of the {} (Graph.stamps) to pair by time, or match='id' to "
+                          "compare by row all the same",
+                          what, truth_timed ? "estimate" : "truth"));
+}
+
+void suggest_scale(const TrajectoryPairs& pairs) {
+  const std::optional<double> scale = explaining_scale(pairs);
+  if (!scale) return;
+  warn(
+      fmt::format("a scale of {:.6g} explains most of the error of the estimate, as for a single "
+                  "camera; align_scale=True compares it so",
+                  *scale));
 }
 
 TrajectoryError evaluate(BoundGraph& estimate, BoundGraph& truth, const std::string& match,
-                         bool planar) {
+                         bool planar, bool align_scale) {
   Trajectory poses = trajectory_of(estimate.get(), estimate.stamps);
   Trajectory true_poses = trajectory_of(truth.get(), truth.stamps);
   if (planar) {
@@ -61,8 +91,12 @@ TrajectoryError evaluate(BoundGraph& estimate, BoundGraph& truth, const std::str
   }
   warn_of_dimensions(estimate.get(), truth.get(), poses, true_poses);
   const bool stamps = by_stamp(match, poses, true_poses);
+  const TrajectoryPairs pairs =
+      stamps ? pair_by_stamp(poses, true_poses) : pair_by_id(poses, true_poses);
+  if (!stamps && match != "id") judge_rows(pairs, estimate.row_ids, truth.row_ids);
+  if (!align_scale) suggest_scale(pairs);
   const py::gil_scoped_release unlocked;
-  return compare(stamps ? pair_by_stamp(poses, true_poses) : pair_by_id(poses, true_poses));
+  return compare(pairs, align_scale ? Alignment::similarity : Alignment::rigid);
 }
 
 }  // namespace
@@ -71,8 +105,11 @@ void bind_evaluation(py::module_& module) {
   py::class_<TrajectoryError>(module, "TrajectoryError",
                               "Root mean squares of errors of an estimate against the truth.")
       .def_readonly("poses", &TrajectoryError::poses, "How many were compared.")
+      .def_readonly(
+          "scale", &TrajectoryError::scale,
+          "By which the positions of the estimate were multiplied: 1 without align_scale.")
       .def_readonly("ate_translation", &TrajectoryError::ate_translation,
-                    "Absolute, after rigid alignment [m].")
+                    "Absolute, after alignment [m].")
       .def_readonly("ate_rotation", &TrajectoryError::ate_rotation, "[deg]")
       .def_readonly("rpe_translation", &TrajectoryError::rpe_translation,
                     "Relative, between consecutive poses [m].")
@@ -89,11 +126,14 @@ void bind_evaluation(py::module_& module) {
       });
   module.def(
       "evaluate", &evaluate, py::arg("estimate"), py::arg("truth"), py::kw_only(),
-      py::arg("match") = "auto", py::arg("planar") = false,
+      py::arg("match") = "auto", py::arg("planar") = false, py::arg("align_scale") = false,
       R"(Errors of the poses of a graph against those of another, after rigid alignment: a TrajectoryError.
 
-match: "id" pairs poses of equal id, "stamp" by the time stamps of the files that both were read from, "auto" does what
-fits them.
+match: "id" pairs poses of equal id, "stamp" by the times of both (Graph.stamps), "auto" does what fits them. Where a file
+has no ids, they are its row numbers: an Error where the other has ids, one of the two has times, and not every pose has a
+partner; match="id" compares by row all the same.
+align_scale: aligns with a scale, too, which the estimate of a single camera lacks (`TrajectoryError.scale`), for all errors
+alike. Without it a UserWarning says where a scale explains most of the error.
 planar: compares x, y and yaw alone. Without it a UserWarning says where one of the two is of the plane and the other not.)");
 }
 

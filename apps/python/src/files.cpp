@@ -12,9 +12,11 @@
 
 #include "bindings.hpp"
 #include "bound_graph.hpp"
+#include "cairn/evaluation/trajectory.hpp"
 #include "cairn/io/format.hpp"
 #include "cairn/io/generator.hpp"
 #include "cairn/plugin/registry.hpp"
+#include "cairn/runtime/error.hpp"
 #include "component_names.hpp"
 
 namespace cairn::python {
@@ -31,20 +33,31 @@ std::vector<std::string> notes_of(const ReadReport& report) {
 }
 
 std::unique_ptr<BoundGraph> read(const std::filesystem::path& path, const std::string& format,
-                                 bool skip_unknown, bool repair_information) {
+                                 bool skip_unknown, bool repair_information,
+                                 const std::string& axes) {
+  if (axes != "robot" && axes != "camera")
+    throw Error(ErrorCode::usage, fmt::format("axes='{}': expected 'robot' or 'camera'", axes));
   const py::gil_scoped_release unlocked;
   ReadReport report;
   auto bound = std::make_unique<BoundGraph>(
       read_graph(path, default_registry(), {skip_unknown, repair_information}, report, format));
   bound->notes = notes_of(report);
   bound->stamps = std::move(report.stamps);
+  bound->row_ids = report.row_ids;
+  if (axes == "camera") {
+    try {
+      camera_to_robot_axes(bound->get());
+    } catch (const Error& error) {
+      throw Error(error.code(), fmt::format("{}: axes='camera': {}", path.string(), error.what()));
+    }
+  }
   return bound;
 }
 
 void write(BoundGraph& bound, const std::filesystem::path& path, const std::string& format) {
   const GraphUse use(bound);
   const py::gil_scoped_release unlocked;
-  write_graph(use.graph(), path, default_registry(), format);
+  write_graph(use.graph(), path, default_registry(), format, bound.stamps);
 }
 
 std::pair<std::unique_ptr<BoundGraph>, std::unique_ptr<BoundGraph>> generate(
@@ -62,16 +75,20 @@ std::pair<std::unique_ptr<BoundGraph>, std::unique_ptr<BoundGraph>> generate(
 void bind_files(py::module_& module) {
   module.def("read", &read, py::arg("path"), py::arg("format") = "", py::kw_only(),
              py::arg("skip_unknown") = false, py::arg("repair_information") = false,
+             py::arg("axes") = "robot",
              R"(Reads a graph or a trajectory, plain or packed with gzip.
 
 format: a name of `cairn.components("format")`; empty: by the content.
 skip_unknown: skips lines with unknown tags, counted in `Graph.notes`, instead of an Error.
-repair_information: repairs known mistakes in published information matrices.)");
+repair_information: repairs known mistakes in published information matrices.
+axes: "camera" turns a trajectory in the axes of a camera (x right, y down, z ahead), as KITTI's are, into a robot's (x ahead,
+y left, z up).)");
   module.def("write", &write, py::arg("graph"), py::arg("path"), py::arg("format") = "",
              R"(Writes a graph: its estimate and, where the format has them, its factors.
 
 format: a name of `cairn.components("format")`; empty: by the ending of the name, before .gz, which packs. The file is
-written beside and renamed, so that a failure never leaves half a file.)");
+written beside and renamed, so that a failure never leaves half a file. Trajectory formats (tum, kitti) get the poses
+alone; tum with `Graph.stamps` where there are any, else with the ids as stamps.)");
   const py::object graph = module.attr("Graph");
   graph.attr("write") =
       py::cpp_function(&write, py::name("write"), py::is_method(graph), py::arg("path"),

@@ -2,6 +2,8 @@
 // cairn.Graph: one by one, what it holds, and its copies. Arrays are in graph_arrays.cpp.
 #include "cairn/graph/graph.hpp"
 
+#include <algorithm>
+#include <cmath>
 #include <map>
 #include <memory>
 #include <string>
@@ -15,6 +17,7 @@
 #include "arrays.hpp"
 #include "bindings.hpp"
 #include "bound_graph.hpp"
+#include "cairn/geometry/pose.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/typed/build.hpp"
@@ -161,8 +164,26 @@ py::array_t<double> squared_norms_of(BoundGraph& bound) {
 std::unique_ptr<BoundGraph> copy(BoundGraph& bound) {
   auto result = std::make_unique<BoundGraph>(bound.get().clone());
   result->stamps = bound.stamps;
+  result->row_ids = bound.row_ids;
   result->notes = bound.notes;
   return result;
+}
+
+void set_stamps(BoundGraph& bound, std::vector<double> stamps) {
+  const Graph& graph = bound.get();
+  std::size_t poses = 0;
+  for (const VariablePool& pool : graph.variable_pools()) {
+    if (has_orientation(*pool.type)) poses += pool.variables.size();
+  }
+  const bool rising = std::ranges::is_sorted(stamps) &&
+                      std::ranges::all_of(stamps, [](double s) { return std::isfinite(s); });
+  if (stamps.size() != poses || !rising) {
+    throw Error(ErrorCode::usage,
+                fmt::format("stamps: expected {} finite numbers that do not fall, one for each "
+                            "pose by rising id",
+                            poses));
+  }
+  bound.stamps = std::move(stamps);
 }
 
 void bind_building(py::class_<BoundGraph>& graph) {
@@ -234,9 +255,10 @@ void bind_contents(py::class_<BoundGraph>& graph) {
       .def("copy", &copy, "A graph of its own with the same contents.")
       .def("__copy__", &copy)
       .def("__deepcopy__", [](BoundGraph& bound, const py::dict&) { return copy(bound); })
-      .def_property_readonly(
-          "stamps", [](const BoundGraph& bound) { return array_of(bound.stamps); },
-          "Time [s] of each pose by rising id, where the file that it was read from has them.")
+      .def_property(
+          "stamps", [](const BoundGraph& bound) { return array_of(bound.stamps); }, &set_stamps,
+          "Time [s] of each pose by rising id, where the file that it was read from has them, or "
+          "as they were set.")
       .def_property_readonly(
           "notes", [](const BoundGraph& bound) { return bound.notes; },
           "What reading the file skipped or changed, a sentence each.")

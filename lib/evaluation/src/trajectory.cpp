@@ -2,6 +2,7 @@
 #include "cairn/evaluation/trajectory.hpp"
 
 #include <algorithm>
+#include <cassert>
 #include <charconv>
 #include <cmath>
 #include <string>
@@ -12,6 +13,7 @@
 
 #include "cairn/geometry/pose.hpp"
 #include "cairn/io/format.hpp"
+#include "cairn/io/time_stamps.hpp"
 #include "cairn/runtime/error.hpp"
 
 namespace cairn {
@@ -29,6 +31,10 @@ std::string_view content(std::string_view line) {
   if (begin == std::string_view::npos) return {};
   return line.substr(begin, line.find_last_not_of(kBlanks) + 1 - begin);
 }
+
+/// Takes a robot's coordinates (x forward, y left, z up) to a camera's (x right, y down, z
+/// forward).
+Matrix3d robot_to_camera() { return Matrix3d{{0, -1, 0}, {0, 0, -1}, {1, 0, 0}}; }
 
 double stamp_of(std::string_view text, const std::string& where) {
   double stamp = 0.0;
@@ -75,9 +81,11 @@ bool is_planar(const Trajectory& poses) {
   });
 }
 
-std::vector<double> read_stamps(const std::filesystem::path& file) {
+std::vector<double> read_stamps(const std::filesystem::path& file,
+                                std::vector<std::string>& notes) {
   const std::string bytes = read_file(file);
   std::vector<double> stamps;
+  std::vector<std::string_view> texts;
   std::string_view rest = bytes;
   for (int line = 1; !rest.empty(); ++line) {
     const std::size_t length = std::min(rest.find('\n'), rest.size());
@@ -86,17 +94,37 @@ std::vector<double> read_stamps(const std::filesystem::path& file) {
     if (text.empty()) continue;
     const std::string where = fmt::format("{}:{}", file.string(), line);
     const double stamp = stamp_of(text, where);
-    if (!stamps.empty() && !(stamp > stamps.back())) {
+    if (!stamps.empty() && stamp < stamps.back()) {
       throw Error(ErrorCode::input, fmt::format("{}: stamp {} after {}; expected rising stamps",
                                                 where, stamp, stamps.back()));
     }
     stamps.push_back(stamp);
+    texts.push_back(text);
   }
+  const StampUnit unit = stamp_unit(stamps);
+  if (unit.exponent == 0) return stamps;
+  notes.push_back(fmt::format("{}: the stamps are {}, read as seconds", file.string(), unit.name));
+  for (std::size_t k = 0; k < stamps.size(); ++k) stamps[k] = seconds_of(texts[k], unit);
   return stamps;
 }
 
+Trajectory with_stamps(Trajectory poses, const std::vector<double>& stamps,
+                       std::vector<std::string>& notes) {
+  assert(poses.size() == stamps.size());
+  for (std::size_t k = 0; k < poses.size(); ++k) poses[k].stamp = stamps[k];
+  const auto same = std::ranges::unique(poses, {}, &TrajectoryPose::stamp);
+  if (!same.empty()) {
+    notes.push_back(
+        fmt::format("{} the stamp of the pose before: of poses with one stamp the "
+                    "first is kept",
+                    same.size() == 1 ? "1 pose has" : fmt::format("{} poses have", same.size())));
+  }
+  poses.erase(same.begin(), same.end());
+  return poses;
+}
+
 Trajectory camera_to_robot_axes(Trajectory poses) {
-  const Matrix3d C{{0, -1, 0}, {0, 0, -1}, {1, 0, 0}};
+  const Matrix3d C = robot_to_camera();
   for (TrajectoryPose& pose : poses) {
     Eigen::Map<Matrix3d> R(pose.R.data());
     Eigen::Map<Vector3d> t(pose.t.data());
@@ -104,6 +132,36 @@ Trajectory camera_to_robot_axes(Trajectory poses) {
     t = (C.transpose() * t).eval();
   }
   return poses;
+}
+
+void camera_to_robot_axes(Graph& trajectory) {
+  if (trajectory.factor_count() > 0) {
+    throw Error(ErrorCode::input,
+                "it has factors, which measure in the axes of its poses; axes can be changed of "
+                "trajectories alone");
+  }
+  for (const VariablePool& pool : trajectory.variable_pools()) {
+    const VariableType& type = *pool.type;
+    if (has_position(type) && type.placement()->dimension() == 2)
+      throw Error(ErrorCode::input, "it is of the plane, and a camera's axes are of space");
+    if (has_orientation(type) && !is_pose(type)) {
+      throw Error(ErrorCode::input,
+                  fmt::format("a {} is more than a pose, and axes can be changed of poses alone",
+                              type.tag()));
+    }
+  }
+  const Matrix3d C = robot_to_camera();
+  for (int v = 0; v < trajectory.variable_count(); ++v) {
+    const Placement* placement = trajectory.type(v).placement();
+    if (!placement) continue;
+    const std::span<const double> state = trajectory.state(v);
+    const Pose old = pose_of(*placement, state.data());
+    const Matrix3d R = C.transpose() * old.R * C;
+    const Vector3d t = C.transpose() * old.t;
+    std::vector<double> x(state.begin(), state.end());
+    placement->join(R.data(), t.data(), x.data());
+    trajectory.set_state(v, x);
+  }
 }
 
 Trajectory projected_to_plane(Trajectory poses) {

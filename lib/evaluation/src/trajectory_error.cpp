@@ -12,6 +12,7 @@
 #include <Eigen/SVD>
 
 #include "cairn/geometry/pose.hpp"
+#include "cairn/runtime/error.hpp"
 #include "cairn/runtime/threads.hpp"
 
 namespace cairn {
@@ -96,27 +97,69 @@ Matrix3d spatial_rotation(const Matrix3d& M, const Matrix3d& orientations, doubl
   return Eigen::AngleAxisd(std::atan2(B, A), a).toRotationMatrix() * R0;
 }
 
-/// The rigid motion (R, t) that minimises Σ ‖truth - (R estimate + t)‖² over positions.
-Pose align(const Pairs& pairs) {
+/// The rigid motion (R, t) that minimises Σ ‖truth - (R estimate + t)‖² over positions, and the
+/// sums that it follows from, of positions relative to their centroids.
+struct Aligned {
+  Pose motion;
+  double product = 0.0;                              ///< Σ truth · R estimate [m²]
+  double estimate_spread = 0.0, truth_spread = 0.0;  ///< Σ ‖·‖² [m²]
+  double spread() const { return std::sqrt(estimate_spread * truth_spread); }
+};
+
+Aligned align(const Pairs& pairs) {
   const Vector3d estimate_centre = centroid(pairs.estimate), truth_centre = centroid(pairs.truth);
+  Aligned result;
   Matrix3d M = Matrix3d::Zero(), orientations = Matrix3d::Zero();
-  double estimate_spread = 0.0, truth_spread = 0.0;
   for (std::size_t k = 0; k < pairs.size(); ++k) {
     const Vector3d e = pairs.estimate[k].t - estimate_centre, t = pairs.truth[k].t - truth_centre;
     M += t * e.transpose();
     orientations += pairs.truth[k].R * pairs.estimate[k].R.transpose();
-    estimate_spread += e.squaredNorm();
-    truth_spread += t.squaredNorm();
+    result.estimate_spread += e.squaredNorm();
+    result.truth_spread += t.squaredNorm();
   }
-  const double spread = std::sqrt(estimate_spread * truth_spread);
-  const Matrix3d R = pairs.planar ? planar_rotation(M, orientations, spread)
-                                  : spatial_rotation(M, orientations, spread);
-  return {R, truth_centre - R * estimate_centre};
+  const Matrix3d R = pairs.planar ? planar_rotation(M, orientations, result.spread())
+                                  : spatial_rotation(M, orientations, result.spread());
+  result.motion = {R, truth_centre - R * estimate_centre};
+  result.product = (R.transpose() * M).trace();
+  return result;
+}
+
+/// None where one trajectory is in one point.
+std::optional<double> scale_of(const Aligned& aligned) {
+  if (!(aligned.product > kDegenerate * aligned.spread())) return std::nullopt;
+  return aligned.product / aligned.estimate_spread;
 }
 
 }  // namespace
 
-Pose align(const TrajectoryPairs& pairs) { return align(pairs_of(pairs)); }
+Pose align(const TrajectoryPairs& pairs) { return align(pairs_of(pairs)).motion; }
+
+double aligning_scale(const TrajectoryPairs& pairs) {
+  const std::optional<double> scale = scale_of(align(pairs_of(pairs)));
+  if (!scale) {
+    throw Error(ErrorCode::input,
+                "cannot align with scale: all positions of the estimate, or of the truth, are one "
+                "point");
+  }
+  return *scale;
+}
+
+std::optional<double> explaining_scale(const TrajectoryPairs& poses) {
+  constexpr std::size_t kFewest = 4;
+  constexpr double kLeast = 0.02, kLeft = 0.25, kSure = 300.0;
+  if (poses.truth.size() < kFewest) return std::nullopt;
+  const Aligned aligned = align(pairs_of(poses));
+  const std::optional<double> scale = scale_of(aligned);
+  if (!scale || std::abs(*scale - 1.0) <= kLeast) return std::nullopt;
+  // Σ ‖t - s R e‖² with s = 1, and with the scale.
+  const double rigid = aligned.truth_spread - 2.0 * aligned.product + aligned.estimate_spread;
+  const double similar = aligned.truth_spread - *scale * aligned.product;
+  // Per degree of freedom that is left: few poses must agree the better.
+  const double freedom = 3.0 * static_cast<double>(poses.truth.size()) - 7.0;
+  const bool explains =
+      similar <= kLeft * kLeft * rigid && (rigid - similar) * freedom >= kSure * similar;
+  return explains ? scale : std::nullopt;
+}
 
 namespace {
 
@@ -168,7 +211,7 @@ double squared_angle(const Eigen::Vector4d& p, const Eigen::Vector4d& q) {
 Eigen::Vector4d quaternion(const Matrix3d& R) { return Quaterniond(R).normalized().coeffs(); }
 
 Squares absolute_errors(const Pairs& pairs) {
-  const Pose motion = align(pairs);
+  const Pose motion = align(pairs).motion;
   Squares sum;
   for (std::size_t k = 0; k < pairs.size(); ++k) {
     const Pose &e = pairs.estimate[k], &t = pairs.truth[k];
@@ -277,9 +320,11 @@ Squares all_errors(const RelativeErrors& errors) {
 
 }  // namespace
 
-TrajectoryError compare(const TrajectoryPairs& poses) {
+TrajectoryError compare(const TrajectoryPairs& poses, Alignment alignment) {
   assert(poses.estimate.size() == poses.truth.size() && poses.truth.size() >= 2);
-  const Pairs pairs = pairs_of(poses);
+  Pairs pairs = pairs_of(poses);
+  const double scale = alignment == Alignment::similarity ? aligning_scale(poses) : 1.0;
+  for (Pose& pose : pairs.estimate) pose.t *= scale;
   const RelativeErrors relative(pairs);
   const Squares absolute = absolute_errors(pairs);
   const Squares consecutive = consecutive_errors(relative);
@@ -289,6 +334,7 @@ TrajectoryError compare(const TrajectoryPairs& poses) {
   const auto root_mean = [](double sum, double count) { return std::sqrt(sum / count); };
   TrajectoryError error;
   error.poses = static_cast<std::int64_t>(pairs.size());
+  error.scale = scale;
   error.ate_translation = root_mean(absolute.translation, n);
   error.ate_rotation = kDegrees * root_mean(absolute.rotation, n);
   error.rpe_translation = root_mean(consecutive.translation, n - 1.0);
@@ -300,6 +346,11 @@ TrajectoryError compare(const TrajectoryPairs& poses) {
 
 TrajectoryError compare(const Trajectory& estimate, const Trajectory& truth) {
   return compare(pair_by_id(estimate, truth));
+}
+
+double rotation_error(const TrajectoryPairs& poses) {
+  const Pairs pairs = pairs_of(poses);
+  return kDegrees * std::sqrt(absolute_errors(pairs).rotation / static_cast<double>(pairs.size()));
 }
 
 double absolute_error(const Trajectory& estimate, const Trajectory& truth) {

@@ -5,6 +5,7 @@
 #include <cassert>
 #include <cmath>
 #include <string>
+#include <utility>
 
 #include <fmt/core.h>
 
@@ -70,19 +71,66 @@ Times times(const Trajectory& poses, double offset = 0.0) {
   return {*first->stamp + offset, *last->stamp + offset};
 }
 
+/// The middle one of the times from each pose to the next [s].
+double median_step(const Trajectory& poses) {
+  std::vector<double> stamps;
+  for (const TrajectoryPose& pose : poses) stamps.push_back(*pose.stamp);
+  std::ranges::sort(stamps);
+  for (std::size_t k = stamps.size() - 1; k > 0; --k) stamps[k] -= stamps[k - 1];
+  const auto middle = stamps.begin() + std::ssize(stamps) / 2;
+  std::nth_element(stamps.begin() + 1, middle, stamps.end());
+  return *middle;
+}
+
+/// Whether two poses or more would be near each other with this offset: within half a step of the
+/// faster of the two.
+bool offset_helps(const Trajectory& estimate, const Trajectory& truth, double offset,
+                  double max_difference) {
+  if (estimate.size() < 2 || truth.size() < 2) return true;
+  const double near =
+      std::max(max_difference, 0.5 * std::min(median_step(estimate), median_step(truth)));
+  const std::vector<Candidate> all = candidates(time_line(estimate, truth, offset));
+  return all.size() > 1 && all[1].difference <= near;
+}
+
+/// "…; those of the estimate may be milliseconds" where one lasts so many times as long as the
+/// other; empty where they last about equally long.
+std::string other_unit(const Times& ours, const Times& theirs) {
+  const double ratio = (ours.last - ours.first) / (theirs.last - theirs.first);
+  for (const auto& [factor, name] :
+       {std::pair{1e3, "milliseconds"}, {1e6, "microseconds"}, {1e9, "nanoseconds"}}) {
+    for (const bool estimated : {true, false}) {
+      const double longer = (estimated ? ratio : 1.0 / ratio) / factor;
+      if (!(longer > 0.2 && longer < 5.0)) continue;
+      return fmt::format(
+          "; the {} lasts about {:.0e} times as long as the {}: its stamps may be {}, and are "
+          "to be seconds",
+          estimated ? "estimate" : "truth", factor, estimated ? "truth" : "estimate", name);
+    }
+  }
+  return "";
+}
+
 /// Why so little matches, and what would help.
-std::string diagnosis(const Trajectory& estimate, const Trajectory& truth, double offset,
-                      double nearest) {
+std::string diagnosis(const Trajectory& estimate, const Trajectory& truth,
+                      const StampMatching& matching, double nearest) {
+  const double offset = matching.offset;
   const Times ours = times(estimate, offset), theirs = times(truth);
   const std::string found = fmt::format(
       "stamps of the estimate{} go from {:.15g} to {:.15g} s, of the truth from {:.15g} to "
       "{:.15g} s",
       offset == 0.0 ? "" : fmt::format(", shifted by {:.15g} s,", offset), ours.first, ours.last,
       theirs.first, theirs.last);
+  if (const std::string unit = other_unit(ours, theirs); !unit.empty()) return found + unit;
   if (ours.last < theirs.first || theirs.last < ours.first) {
-    const double microseconds = std::round(1e6 * (offset + theirs.first - ours.first));
-    return fmt::format("{}; StampMatching::offset {:.15g} would let both begin together", found,
-                       1e-6 * microseconds);
+    const double advised = 1e-6 * std::round(1e6 * (offset + theirs.first - ours.first));
+    return offset_helps(estimate, truth, advised, matching.max_difference)
+               ? fmt::format("{}; StampMatching::offset {:.15g} would let both begin together",
+                             found, advised)
+               : fmt::format(
+                     "{}; no offset lets both begin together and go on so: the steps are "
+                     "about {:.3g} and {:.3g} s",
+                     found, median_step(estimate), median_step(truth));
   }
   return fmt::format(
       "{}, and the nearest two are {:.6g} s apart; allow more with StampMatching::max_difference, "
@@ -98,14 +146,24 @@ std::string diagnosis(const Trajectory& estimate, const Trajectory& truth, doubl
       fmt::format("cannot compare trajectories: of {} estimated and {} true poses only {} match "
                   "within {} s, and at least two are needed{}",
                   estimate.size(), truth.size(), pairs, matching.max_difference,
-                  nearest.empty() ? ""
-                                  : "; " + diagnosis(estimate, truth, matching.offset,
-                                                     nearest.front().difference)));
+                  nearest.empty()
+                      ? ""
+                      : "; " + diagnosis(estimate, truth, matching, nearest.front().difference)));
 }
 
 bool has_stamps(const Trajectory& poses) {
   return std::all_of(poses.begin(), poses.end(),
                      [](const TrajectoryPose& pose) { return pose.stamp.has_value(); });
+}
+
+/// Where one of the two has time stamps and the other has not: "; the truth has time stamps …".
+std::string times_of_one(const Trajectory& estimate, const Trajectory& truth) {
+  if (estimate.empty() || truth.empty() || has_stamps(estimate) == has_stamps(truth)) return "";
+  const bool estimated = has_stamps(estimate);
+  return fmt::format(
+      "; the {} has time stamps: with those of the {} as well, poses can be paired "
+      "by time",
+      estimated ? "estimate" : "truth", estimated ? "truth" : "estimate");
 }
 
 bool stamps_are_ids(const Trajectory& poses) {
@@ -133,11 +191,19 @@ TrajectoryPairs pair_by_id(const Trajectory& estimate, const Trajectory& truth) 
   if (pairs.truth.size() < 2) {
     throw Error(ErrorCode::input,
                 fmt::format("cannot compare trajectories: of {} estimated and {} true poses only "
-                            "{} have an id in both; at least two are needed",
-                            estimate.size(), truth.size(), pairs.truth.size()));
+                            "{} have an id in both; at least two are needed{}",
+                            estimate.size(), truth.size(), pairs.truth.size(),
+                            times_of_one(estimate, truth)));
   }
   count_the_others(estimate, truth, pairs);
   return pairs;
+}
+
+RowPairing row_pairing(const TrajectoryPairs& pairs, bool estimate_rows, bool truth_rows) {
+  if (!estimate_rows && !truth_rows) return RowPairing::none;
+  if (pairs.only_in_estimate == 0 && pairs.only_in_truth == 0) return RowPairing::complete;
+  return has_stamps(pairs.estimate) || has_stamps(pairs.truth) ? RowPairing::unfounded
+                                                               : RowPairing::partial;
 }
 
 TrajectoryPairs pair_by_stamp(const Trajectory& estimate, const Trajectory& truth,

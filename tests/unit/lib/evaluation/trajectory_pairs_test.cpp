@@ -175,6 +175,47 @@ TEST(PairByStamp, SaysWhatWouldHelpWhereTooLittleMatches) {
               AllOf(HasSubstr("of 0 estimated"), Not(HasSubstr("StampMatching::offset"))));
 }
 
+TEST(PairByStamp, NamesAnotherUnitInsteadOfAnOffsetThatCannotHelp) {
+  const auto times = [](double begin, double step) {
+    std::vector<double> all;
+    for (int k = 0; k < 20; ++k) all.push_back(begin + k * step);
+    return at(all);
+  };
+  EXPECT_THAT(refusal(times(5e9, 1e8), times(1000, 0.1), {}),
+              AllOf(HasSubstr("the estimate lasts about 1e+09 times as long as the truth: its "
+                              "stamps may be nanoseconds"),
+                    Not(HasSubstr("offset"))));
+  EXPECT_THAT(refusal(times(1000, 0.1), times(5e6, 100), {}),
+              AllOf(HasSubstr("the truth lasts about 1e+03 times"), HasSubstr("milliseconds"),
+                    Not(HasSubstr("offset"))));
+  EXPECT_THAT(refusal(times(0, 0.1), times(1e4, 5.0), {}),
+              AllOf(HasSubstr("no offset lets both begin together and go on so"),
+                    Not(HasSubstr("StampMatching::offset"))));
+}
+
+TEST(PairById, SaysWhereTimesOfOneWaitForThoseOfTheOther) {
+  const auto message = [](const Trajectory& estimate, const Trajectory& truth) {
+    try {
+      pair_by_id(estimate, truth);
+    } catch (const Error& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  EXPECT_THAT(message(with_ids({70, 71}), at({0.5, 1.5})),
+              HasSubstr("the truth has time stamps: with those of the estimate as well"));
+  EXPECT_THAT(message(with_ids({70, 71}), with_ids({0, 1})), Not(HasSubstr("time stamps")));
+}
+
+TEST(RowPairing, IsUnfoundedWhereTimesOfOneSayThatRowsAreNoIds) {
+  const Trajectory ids = with_ids({0, 1, 2}), timed = at({0.5, 0.75, 1.0, 1.25});
+  EXPECT_EQ(row_pairing(pair_by_id(ids, timed), false, true), RowPairing::unfounded);
+  EXPECT_EQ(row_pairing(pair_by_id(timed, ids), true, false), RowPairing::unfounded);
+  EXPECT_EQ(row_pairing(pair_by_id(ids, with_ids({0, 1, 2, 3})), false, true), RowPairing::partial);
+  EXPECT_EQ(row_pairing(pair_by_id(ids, at({0.5, 0.75, 1.0})), false, true), RowPairing::complete);
+  EXPECT_EQ(row_pairing(pair_by_id(ids, with_ids({1, 2, 9})), false, false), RowPairing::none);
+}
+
 TEST(StampsTellMore, WhereBothHaveThemAndTheyAreNotTheIds) {
   const Trajectory ids_as_stamps = at({0, 1, 2}), times = at({0, 0.5, 1}), none = with_ids({0, 1});
   EXPECT_TRUE(stamps_tell_more(times, times));

@@ -86,7 +86,8 @@ class ReadStamps : public testing::Test {
   ~ReadStamps() override { std::filesystem::remove(file_); }
   std::vector<double> read(const std::string& text) {
     write_file(file_, text);
-    return read_stamps(file_);
+    notes_.clear();
+    return read_stamps(file_, notes_);
   }
   std::string refusal(const std::string& text) {
     try {
@@ -98,6 +99,8 @@ class ReadStamps : public testing::Test {
     ADD_FAILURE() << "no error";
     return "";
   }
+
+  std::vector<std::string> notes_;
 
  private:
   std::filesystem::path file_ = std::filesystem::temp_directory_path() /
@@ -117,8 +120,41 @@ TEST_F(ReadStamps, NamesTheLineThatIsWrong) {
   for (const char* bad : {"nan", "inf", "1e999", "one", "1,5"}) {
     EXPECT_THAT(refusal(std::string("1\n\n") + bad), testing::HasSubstr("txt:3: found '")) << bad;
   }
-  EXPECT_THAT(refusal("1.5\n1.5\n"),
-              EndsWith("txt:2: stamp 1.5 after 1.5; expected rising stamps"));
+  EXPECT_THAT(refusal("1.5\n1.25\n"),
+              EndsWith("txt:2: stamp 1.25 after 1.5; expected rising stamps"));
+}
+
+TEST_F(ReadStamps, AnInstantMayBeTwice) {
+  EXPECT_THAT(read("1.5\n1.5\n2\n"), ElementsAre(1.5, 1.5, 2.0));
+  EXPECT_THAT(notes_, IsEmpty());
+}
+
+TEST_F(ReadStamps, TimesInOtherUnitsAreMadeSecondsToTheLastBit) {
+  EXPECT_THAT(read("1403715524907143168\n1403715525107143168\n"),
+              ElementsAre(1403715524.907143168, 1403715525.107143168));
+  EXPECT_THAT(notes_, ElementsAre(EndsWith("txt: the stamps are nanoseconds, read as seconds")));
+  EXPECT_THAT(read("1.403715524907143e15\n1.403715525107143e15\n"),
+              ElementsAre(1403715524.907143, 1403715525.107143));
+  EXPECT_THAT(notes_, ElementsAre(EndsWith("microseconds, read as seconds")));
+  EXPECT_THAT(read("1403715524907\n"), ElementsAre(1403715524.907));
+  EXPECT_THAT(notes_, ElementsAre(EndsWith("milliseconds, read as seconds")));
+  // Seconds, ids of symbols, and what does not agree.
+  EXPECT_THAT(read("1403715524\n1e12\n"), ElementsAre(1403715524.0, 1e12));
+  EXPECT_THAT(read("2286984185774080\n"), ElementsAre(2286984185774080.0));  // A0
+  EXPECT_THAT(notes_, IsEmpty());
+}
+
+TEST(WithStamps, KeepsTheFirstOfPosesWithOneStamp) {
+  Trajectory poses(4);
+  for (std::size_t k = 0; k < 4; ++k) poses[k].id = static_cast<Id>(k);
+  std::vector<std::string> notes;
+  const Trajectory timed = with_stamps(poses, {1.0, 1.5, 1.5, 1.75}, notes);
+  ASSERT_EQ(timed.size(), 3U);
+  EXPECT_EQ(timed[1].id, 1);
+  EXPECT_EQ(timed[2].id, 3);
+  EXPECT_EQ(*timed[2].stamp, 1.75);
+  EXPECT_THAT(notes, ElementsAre("1 pose has the stamp of the pose before: of poses with one "
+                                 "stamp the first is kept"));
 }
 
 }  // namespace

@@ -150,8 +150,8 @@ struct Walk {
   }
 };
 
-// With ids as symbols all biases come first in a file, then all velocities, then the poses. The last
-// bias is met by another bias alone.
+// With ids as symbols all biases come first in a file, then all velocities, then the poses. The
+// last bias is met by another bias alone.
 TEST_F(ArrivalOrder, WhatHasNoPositionComesWithTheFirstFactorThatTiesItToPoses) {
   const auto velocity = define_variable<Velocity>();
   const auto bias = define_variable<Bias>();
