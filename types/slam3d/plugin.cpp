@@ -2,6 +2,7 @@
 #include "cairn/plugin/registry.hpp"
 #include "landmark.hpp"
 #include "priors.hpp"
+#include "relative_point.hpp"
 #include "relative_pose.hpp"
 #include "slam3d_options.hpp"
 
@@ -13,7 +14,8 @@ template <class Metric>
 TypeSet types() {
   return {{define_variable<Se3>(), define_variable<PointXYZ>()},
           {define_factor<slam3d::RelativePose<Metric>>(), define_factor<slam3d::Landmark>(),
-           define_factor<slam3d::PosePrior<Metric>>(), define_factor<slam3d::LandmarkPrior>()}};
+           define_factor<slam3d::PosePrior<Metric>>(), define_factor<slam3d::LandmarkPrior>(),
+           define_factor<slam3d::RelativePoint>()}};
 }
 
 TypeSet types_of(const slam3d::Slam3dOptions& options) {

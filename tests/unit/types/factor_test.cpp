@@ -167,7 +167,8 @@ TEST(EveryFactor, PropagatesToWhereItsErrorIsZero) {
   for (const char* must :
        {"EDGE_SE2 0", "EDGE_SE2 1", "EDGE_SE2_XY 1", "EDGE_BEARING_RANGE_SE2_XY 1",
         "EDGE_PRIOR_SE2 0", "EDGE_PRIOR_XY 0", "EDGE_SE3:QUAT 0", "EDGE_SE3:QUAT 1",
-        "EDGE_SE3_TRACKXYZ 1", "EDGE_PRIOR_SE3:QUAT 0", "EDGE_PRIOR_TRACKXYZ 0"}) {
+        "EDGE_SE3_TRACKXYZ 1", "EDGE_PRIOR_SE3:QUAT 0", "EDGE_PRIOR_TRACKXYZ 0", "EDGE_POINTXY 0",
+        "EDGE_POINTXY 1", "EDGE_POINTXYZ 0", "EDGE_POINTXYZ 1"}) {
     const std::string tag = std::string(must).substr(0, std::string(must).find(' '));
     EXPECT_TRUE(propagating.contains(must) || !Registry().has("factor", tag)) << must;
   }

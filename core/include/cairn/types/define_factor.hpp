@@ -42,6 +42,8 @@ namespace cairn {
 ///    what is wrong;
 ///  - `static bool propagate(int target, const double* const* x, const double* z, double* out)`;
 ///  - `static constexpr bool kRelative = true`: z is a group element with x_1 ≈ x_0 z;
+///  - `static constexpr int kAbsolute`: `FactorType::absolute_size`, of a factor between variables
+///    that a rigid motion of all of them changes all the same;
 ///  - `static constexpr std::string_view kMetric`: the name of the error metric.
 ///
 /// Where `residual`, and `evaluate` if there is one, are `noexcept`, the type `NeverThrows`: an
@@ -331,6 +333,10 @@ class DefinedFactor<F, std::index_sequence<I...>> final
   bool is_relative() const override {
     if constexpr (requires { F::kRelative; }) return F::kRelative;
     return false;
+  }
+  int absolute_size() const override {
+    if constexpr (requires { F::kAbsolute; }) return F::kAbsolute;
+    return FactorType::absolute_size();
   }
   std::string_view metric() const override {
     if constexpr (requires { F::kMetric; }) return F::kMetric;
