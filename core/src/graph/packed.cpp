@@ -1,15 +1,19 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "cairn/graph/packed.hpp"
 
-#include <algorithm>
 #include <cmath>
 
 #include "dense/cholesky.hpp"
+#include "dense/eigenvalues.hpp"
 
 namespace cairn {
 namespace {
 
-/// Cholesky's factor. False unless A is positive definite. `L` has the size of A.
+/// A pivot of Cholesky's method above this share of its diagonal entry is one. What is below may be
+/// what rounding left of zero, where a small pivot before it has magnified that.
+constexpr double kSurePivot = 1e-8;
+
+/// Cholesky's factor. False unless A is surely positive definite. `L` has the size of A.
 template <class Matrix>
 bool cholesky(std::span<const double> A, Matrix L, std::span<double> U) {
   std::size_t k = 0;
@@ -19,6 +23,11 @@ bool cholesky(std::span<const double> A, Matrix L, std::span<double> U) {
   }
   const Eigen::LLT<Matrix, Eigen::Lower> llt(L);
   if (llt.info() != Eigen::Success || !std::isfinite(llt.matrixLLT()(n - 1, n - 1))) return false;
+  k = 0;
+  for (Eigen::Index row = 0; row < n; k += static_cast<std::size_t>(n - row++)) {
+    const double pivot = llt.matrixLLT()(row, row);
+    if (!(pivot * pivot > kSurePivot * A[k])) return false;
+  }
   k = 0;
   for (Eigen::Index row = 0; row < n; ++row) {
     for (Eigen::Index column = row; column < n; ++column) U[k++] = llt.matrixLLT()(column, row);
@@ -39,14 +48,15 @@ bool cholesky(std::span<const double> A, int n, std::span<double> U) {
 constexpr double kZeroPivot = 1e-12;
 
 /// Cholesky's method where pivots may be zero: in a positive semidefinite matrix the row of a zero
-/// pivot is zero too, so that U gets a row of zeros there.
-bool semidefinite_root(std::span<const double> A, int n, std::span<double> root) {
+/// pivot is zero too, so that U gets a row of zeros there. False, too, where a pivot may be either.
+bool cholesky_with_zeros(std::span<const double> A, int n, std::span<double> root) {
   Eigen::MatrixXd rest = unpack(A, n);
   if (!rest.allFinite()) return false;
   const Eigen::VectorXd scale = rest.diagonal().cwiseAbs().cwiseSqrt();
   Eigen::MatrixXd U = Eigen::MatrixXd::Zero(n, n);
   for (int k = 0; k < n; ++k) {
     if (rest(k, k) > kZeroPivot * scale(k) * scale(k)) {
+      if (!(rest(k, k) > kSurePivot * scale(k) * scale(k))) return false;
       U.row(k).tail(n - k) = rest.row(k).tail(n - k) / std::sqrt(rest(k, k));
       rest.bottomRightCorner(n - k, n - k) -=
           U.row(k).tail(n - k).transpose() * U.row(k).tail(n - k);
@@ -60,11 +70,62 @@ bool semidefinite_root(std::span<const double> A, int n, std::span<double> root)
   return true;
 }
 
+/// Eigenvalues of A, scaled to a unit diagonal: above minus the first, and below the second, one is
+/// what rounding left of zero.
+constexpr double kZeroEigenvalue = 1e-12, kNoEigenvalue = 1e-14;
+
+/// B with BᵀB = A, as many rows as the rank of A; false if A is indefinite or not finite. Of the
+/// eigenvectors of A scaled to a unit diagonal, so that units do not matter.
+bool eigenvector_root(const Eigen::MatrixXd& A, Eigen::MatrixXd& B) {
+  const Eigen::Index n = A.rows();
+  const Eigen::VectorXd size = A.diagonal().cwiseAbs().cwiseSqrt();
+  Eigen::VectorXd scale(n);
+  for (Eigen::Index i = 0; i < n; ++i) scale(i) = size(i) > 0.0 ? 1.0 / size(i) : 0.0;
+  if (!A.allFinite() || !scale.allFinite()) return false;
+  for (Eigen::Index i = 0; i < n; ++i) {  // nothing beside a zero of the diagonal
+    if (size(i) == 0.0 && (A.row(i).array() != 0.0).any()) return false;
+  }
+  const Eigen::MatrixXd scaled = scale.asDiagonal() * A * scale.asDiagonal();
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scaled);
+  const Eigen::VectorXd& values = eigen.eigenvalues();
+  if (eigen.info() != Eigen::Success || !(values(0) >= -kZeroEigenvalue)) return false;
+  const Eigen::Index rank = (values.array() > kNoEigenvalue).count();
+  B = values.tail(rank).cwiseSqrt().asDiagonal() *
+      eigen.eigenvectors().rightCols(rank).transpose() * size.asDiagonal();
+  return true;
+}
+
+/// The root of a semidefinite matrix that has small eigenvalues beside those of zero, as one that
+/// was printed: Cholesky's method divides by them, and takes what rounding leaves for indefinite.
+/// Here B is brought to upper triangular form by reflections, where a column that adds nothing to
+/// those before it gets a row of zeros.
+bool reflected_root(std::span<const double> A, int n, std::span<double> root) {
+  const Eigen::MatrixXd full = unpack(A, n);
+  Eigen::MatrixXd B, U = Eigen::MatrixXd::Zero(n, n);
+  if (!eigenvector_root(full, B)) return false;
+  constexpr double kNothing = 1e-12;  // of a column's length, which eigenvectors are good to
+  Eigen::Index row = 0;
+  for (Eigen::Index k = 0; k < n && row < B.rows(); ++k) {
+    Eigen::VectorXd v = B.col(k).tail(B.rows() - row);
+    const double length = v.norm();
+    if (!(length > kNothing * std::sqrt(full(k, k)))) continue;
+    v(0) += v(0) < 0.0 ? -length : length;
+    auto rest = B.bottomRightCorner(B.rows() - row, n - k);
+    const Eigen::RowVectorXd along = v.transpose() * rest;
+    rest -= (2.0 / v.squaredNorm()) * v * along;
+    if (rest(0, 0) < 0.0) rest.row(0) *= -1.0;
+    U.row(k).tail(n - k) = rest.row(0);
+    ++row;
+  }
+  pack(U, root.data());
+  return true;
+}
+
 }  // namespace
 
 bool square_root(std::span<const double> A, int n, std::span<double> U) {
   if (n == 0) return true;
-  return cholesky(A, n, U) || semidefinite_root(A, n, U);
+  return cholesky(A, n, U) || cholesky_with_zeros(A, n, U) || reflected_root(A, n, U);
 }
 
 }  // namespace cairn

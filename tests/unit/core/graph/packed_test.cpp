@@ -62,6 +62,27 @@ TEST(SquareRoot, IsTriangularForEveryRankOfASemidefiniteMatrix) {
   }
 }
 
+TEST(SquareRoot, OfSmallEigenvaluesBesideZeroIsThatOfTheMatrix) {
+  test::Sampler sampler(3);
+  for (const int n : {3, 4, 6, 9}) {
+    for (int zeros = 1; zeros < n - 1; ++zeros) {
+      for (int k = 0; k < 50; ++k) {
+        const Eigen::MatrixXd Q =
+            Eigen::HouseholderQR<Eigen::MatrixXd>(random(sampler, n, n)).householderQ();
+        Eigen::VectorXd values = Eigen::VectorXd::Ones(n);
+        values.head(zeros).setZero();
+        for (int i = zeros; i < n - 1; i += 2) values(i) = std::pow(10.0, -2.0 - k % 6);
+        const Eigen::MatrixXd A = Q * values.asDiagonal() * Q.transpose();
+        std::vector<double> U(packed_size(n));
+        ASSERT_TRUE(square_root(pack(A), n, U)) << n << " " << zeros << " " << k;
+        const Eigen::MatrixXd root = triangle(U, n);
+        EXPECT_LT((root.transpose() * root - A).norm(), 1e-11) << n << " " << zeros << " " << k;
+        EXPECT_EQ((root.diagonal().array() > 0.0).count(), n - zeros);
+      }
+    }
+  }
+}
+
 TEST(SquareRoot, KeepsDirectionsThatAreNotMeasuredAtZero) {
   // Position without heading, in units nine orders of magnitude apart.
   std::vector<double> U(6);
