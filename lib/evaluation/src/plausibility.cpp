@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "cairn/evaluation/check_factor.hpp"
+#include "cairn/evaluation/fixed_variables.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/plugin_call.hpp"
 #include "unwrapped_angle.hpp"
@@ -37,6 +38,8 @@ std::string implausible_estimate(const Graph& graph, double chi2) {
       "chi2 is {:.3g} times the {} degrees of freedom: this estimate is hardly the right one. ",
       chi2 / static_cast<double>(dof), dof);
   if (const std::string angle = unwrapped_angle(graph); !angle.empty()) return text + angle;
+  if (const std::string fixed = contradicting_fixed_poses(graph); !fixed.empty())
+    return text + fixed;
   return text +
          "Either measurements are wrong (a robust loss such as cauchy limits them), or their "
          "information is too large or in another order, or this is a local minimum (the initial "
