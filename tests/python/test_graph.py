@@ -71,6 +71,30 @@ def test_what_is_not_measured_has_an_infinite_sigma():
     assert_allclose(graph.squared_norms()[-1], 4)
 
 
+def test_a_part_of_a_pose_has_a_type_of_its_own():
+    for yaw in (0.0, 1.0, 2.0, 3.0):  # what is not measured changes nothing
+        graph = cairn.Graph()
+        turn = cairn.Rot3.from_roll_pitch_yaw(0, 0, yaw) * cairn.Rot3.from_roll_pitch_yaw(0.01, 0, 0)
+        graph.add(0, cairn.Pose3(turn, cairn.Point3(3, 4, 5)))
+        graph.add(cairn.Position(0, cairn.Point3(2, 4, 7)), sigmas=[1, 1, np.inf])
+        graph.add(cairn.Direction(0, cairn.Point3(0, 0, -9.81), cairn.Point3(0, 0, -1)), sigmas=0.01)
+        graph.add(cairn.Orientation(0, cairn.Rot3.from_roll_pitch_yaw(0, 0, yaw)), sigmas=0.01)
+        graph.add(cairn.Prior(0, cairn.Pose3(cairn.Rot3(), cairn.Point3(2, 4, 7))), sigmas=[1, 1, np.inf, np.inf, np.inf, np.inf])
+        assert_allclose(graph.squared_norms(), [1, 1, 1, 1], rtol=1e-4)
+        assert repr(graph.factor(1)) == "<EDGE_SE3_PRIORVEC 0: 0 0 -1 0 0 -1>"
+    plane = cairn.Graph()
+    plane.add(0, cairn.Pose2(1, 2, 3))
+    plane.add(cairn.Position(0, cairn.Point2(1, 3)), sigmas=0.5)
+    assert_allclose(plane.squared_norms(), [4])
+    for make, message in [
+        (lambda: cairn.Position(0, cairn.Pose2()), "Position: .* not a Pose2"),
+        (lambda: cairn.Orientation(0, 1.5), "Orientation: .* not a float"),
+        (lambda: cairn.Direction(0, [0, 0, 1], [0, 0, 1]), "Direction: .* not a list"),
+    ]:
+        with pytest.raises(TypeError, match=message):
+            make()
+
+
 def test_any_type_goes_by_its_tag():
     graph = cairn.Graph()
     graph.add(0, [0, 0, 0], type="VERTEX_SE2")

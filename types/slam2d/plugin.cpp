@@ -2,6 +2,7 @@
 #include "bearing_range.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "landmark.hpp"
+#include "position.hpp"
 #include "priors.hpp"
 #include "relative_point.hpp"
 #include "relative_pose.hpp"
@@ -13,6 +14,7 @@ void cairn_register(cairn::Registrar& registrar) {
         {define_variable<Se2>(), define_variable<PointXY>()},
         {define_factor<slam2d::RelativePose>(), define_factor<slam2d::Landmark>(),
          define_factor<slam2d::BearingRange>(), define_factor<slam2d::PosePrior>(),
-         define_factor<slam2d::LandmarkPrior>(), define_factor<slam2d::RelativePoint>()}};
+         define_factor<slam2d::LandmarkPrior>(), define_factor<slam2d::RelativePoint>(),
+         define_factor<slam2d::Position>()}};
   });
 }

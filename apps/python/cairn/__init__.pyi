@@ -9,7 +9,7 @@ _Floats = npt.NDArray[np.float64]
 _Integers = npt.NDArray[np.int64]
 _Value = Union[Pose2, Pose3, Point2, Point3]
 _ValueType = Union[str, Type[Pose2], Type[Pose3], Type[Point2], Type[Point3]]
-_FactorType = Union[str, FactorType, Type[Between], Type[Prior], Type[Observation], Type[BearingRange]]
+_FactorType = Union[str, FactorType, Type[Between], Type[Prior], Type[Position], Type[Orientation], Type[Direction], Type[Observation], Type[BearingRange]]
 _Path = Union[str, "os.PathLike[str]"]
 _OptionValue = Union[None, bool, int, float, str]
 
@@ -188,6 +188,21 @@ class Prior(Measurement):
     def __init__(self, id: int, measured: Point2) -> None: ...
     @overload
     def __init__(self, id: int, measured: Point3) -> None: ...
+
+class Position(Measurement):
+    tags: Tuple[str, ...]
+    @overload
+    def __init__(self, id: int, measured: Point2) -> None: ...
+    @overload
+    def __init__(self, id: int, measured: Point3) -> None: ...
+
+class Orientation(Measurement):
+    tags: Tuple[str, ...]
+    def __init__(self, id: int, measured: Rot3) -> None: ...
+
+class Direction(Measurement):
+    tags: Tuple[str, ...]
+    def __init__(self, id: int, in_world: Point3, seen: Point3) -> None: ...
 
 class Observation(Measurement):
     tags: Tuple[str, ...]

@@ -24,6 +24,9 @@ struct Measured {
 // One class each in Python, which differ in how they are made.
 struct MeasuredBetween : Measured {};
 struct MeasuredPrior : Measured {};
+struct MeasuredPosition : Measured {};
+struct MeasuredOrientation : Measured {};
+struct MeasuredDirection : Measured {};
 struct MeasuredObservation : Measured {};
 struct MeasuredBearingRange : Measured {};
 

@@ -35,6 +35,10 @@ MeasuredPrior prior(Id id, const T& value) {
   return measured_as<MeasuredPrior>(Prior<T>(id, value));
 }
 template <class Point>
+MeasuredPosition position(Id pose, const Point& point) {
+  return measured_as<MeasuredPosition>(Position<Point>(pose, point));
+}
+template <class Point>
 MeasuredObservation observation(Id pose, Id landmark, const Point& point) {
   return measured_as<MeasuredObservation>(Observation<Point>(pose, landmark, point));
 }
@@ -86,6 +90,54 @@ values: the numbers measured, in the order and the units of the type.)")
       .def("__repr__", &text_of);
 }
 
+/// What is measured of a pose without the rest of it.
+void bind_parts_of_poses(py::module_& module) {
+  py::class_<MeasuredPosition, Measured> position_class(
+      module, "Position",
+      R"(Where a pose is in the world, without its orientation, as from GNSS: a `Point2` for a `Pose2`, a `Point3` for a `Pose3`.
+
+The error [m] is along the axes of the world. An altimeter is `Position(id, Point3(0, 0, z))` with sigmas=(inf, inf, s).)");
+  position_class.attr("tags") = tags<Position<Point2>, Position<Point3>>();
+  position_class.def(py::init(&position<Point2>), py::arg("id"), py::arg("measured"))
+      .def(py::init(&position<Point3>), py::arg("id"), py::arg("measured"))
+      .def(py::init([](const py::object& id, const py::object& measured) -> MeasuredPosition {
+             refuse("Position", py::make_tuple(id), measured, "Point2(1, 0) or a Point3");
+           }),
+           py::arg("id"), py::arg("measured"));
+  py::class_<MeasuredOrientation, Measured> orientation_class(
+      module, "Orientation",
+      R"(How a `Pose3` is turned in the world, without its position, as from an attitude filter.
+
+The error is the rotation vector [rad] of measured.inverse() * orientation.)");
+  orientation_class.attr("tags") = tags<Orientation>();
+  orientation_class
+      .def(py::init([](Id id, const Rot3& measured) {
+             return measured_as<MeasuredOrientation>(Orientation(id, measured));
+           }),
+           py::arg("id"), py::arg("measured"))
+      .def(py::init([](const py::object& id, const py::object& measured) -> MeasuredOrientation {
+             refuse("Orientation", py::make_tuple(id), measured, "Rot3()");
+           }),
+           py::arg("id"), py::arg("measured"));
+  py::class_<MeasuredDirection, Measured> direction_class(
+      module, "Direction",
+      R"(A direction that is known in the world, such as that of gravity, seen in the frame of a `Pose3`; lengths do not matter.
+
+The error has three numbers, the difference of the unit vectors in the frame of the pose: for small angles the angle
+between them [rad]. Roll and pitch without yaw are `Direction(id, Point3(0, 0, -1), seen)`.)");
+  direction_class.attr("tags") = tags<Direction>();
+  direction_class
+      .def(py::init([](Id id, const Point3& in_world, const Point3& seen) {
+             return measured_as<MeasuredDirection>(Direction(id, in_world, seen));
+           }),
+           py::arg("id"), py::arg("in_world"), py::arg("seen"))
+      .def(py::init([](const py::object& id, const py::object&,
+                       const py::object& seen) -> MeasuredDirection {
+             refuse("Direction", py::make_tuple(id), seen, "Point3(0, 0, -1), both times");
+           }),
+           py::arg("id"), py::arg("in_world"), py::arg("seen"));
+}
+
 void bind_kinds(py::module_& module) {
   py::class_<MeasuredBetween, Measured> between_class(
       module, "Between",
@@ -105,8 +157,8 @@ measured = pose(from_id).inverse() * pose(to_id). The error has three numbers (x
   py::class_<MeasuredPrior, Measured> prior_class(module, "Prior",
                                                   R"(Where a pose or a landmark is in the world.
 
-What is not known has an infinite sigma: a position alone, as from GPS, is
-`Prior(id, Pose2(x, y, 0))` with sigmas=(s, s, inf).)");
+The error of a pose is along the axes of the pose that was measured. What is not known has an infinite sigma, and then
+changes nothing of the rest; `Position`, `Orientation` and `Direction` are what is measured alone.)");
   prior_class.attr("tags") = tags<Prior<Pose2>, Prior<Pose3>, Prior<Point2>, Prior<Point3>>();
   prior_class.def(py::init(&prior<Pose2>), py::arg("id"), py::arg("measured"))
       .def(py::init(&prior<Pose3>), py::arg("id"), py::arg("measured"))
@@ -117,6 +169,7 @@ What is not known has an infinite sigma: a position alone, as from GPS, is
                     "Pose2(1, 0, 0), Pose3, Point2 or Point3");
            }),
            py::arg("id"), py::arg("measured"));
+  bind_parts_of_poses(module);
   py::class_<MeasuredObservation, Measured> observation_class(
       module, "Observation",
       "A landmark seen from a pose: its position [m] in the frame of the pose.");

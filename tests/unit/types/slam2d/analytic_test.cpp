@@ -5,6 +5,7 @@
 
 #include "slam2d/bearing_range.hpp"
 #include "slam2d/landmark.hpp"
+#include "slam2d/position.hpp"
 #include "slam2d/priors.hpp"
 #include "slam2d/relative_pose.hpp"
 
@@ -23,6 +24,12 @@ TEST(AnalyticJacobian, OfABearingAndRangeIsTheAutomaticOne) {
 TEST(AnalyticJacobian, OfAPlanarPriorIsTheAutomaticOne) {
   check_prior<slam2d::PosePrior, Se2>();
   check_prior<slam2d::LandmarkPrior, PointXY>();
+}
+TEST(AnalyticJacobian, OfAPlanarPositionIsTheAutomaticOne) {
+  Sampler sampler(43);
+  for (const Regime& regime : regimes())
+    expect_agreement<slam2d::Position>(sample<PointXY>(sampler, kAny),
+                                       sample<Se2>(sampler, regime));
 }
 }  // namespace
 }  // namespace cairn::test

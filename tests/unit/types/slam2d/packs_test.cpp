@@ -5,6 +5,7 @@
 
 #include "slam2d/bearing_range.hpp"
 #include "slam2d/landmark.hpp"
+#include "slam2d/position.hpp"
 #include "slam2d/priors.hpp"
 #include "slam2d/relative_pose.hpp"
 
@@ -17,6 +18,7 @@ TEST(Packs, GiveTheSameAsOneFactorAtATimeInThePlane) {
   expect_equal_bits<slam2d::BearingRange>();
   expect_equal_bits<slam2d::PosePrior>();
   expect_equal_bits<slam2d::LandmarkPrior>();
+  expect_equal_bits<slam2d::Position>();
 }
 
 }  // namespace

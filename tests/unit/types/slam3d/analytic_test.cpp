@@ -3,8 +3,11 @@
 
 #include <gtest/gtest.h>
 
+#include "slam3d/direction.hpp"
 #include "slam3d/landmark.hpp"
 #include "slam3d/metrics.hpp"
+#include "slam3d/orientation.hpp"
+#include "slam3d/position.hpp"
 #include "slam3d/priors.hpp"
 #include "slam3d/relative_pose.hpp"
 
@@ -24,6 +27,41 @@ TEST(AnalyticJacobian, OfAPriorIsTheAutomaticOneInEachMetric) {
   check_prior<slam3d::PosePrior<slam3d::QuaternionVector>, Se3>();
   check_prior<slam3d::PosePrior<slam3d::TranslationAndRotationVector>, Se3>();
   check_prior<slam3d::LandmarkPrior, PointXYZ>();
+}
+
+TEST(AnalyticJacobian, OfAPositionOrADirectionIsTheAutomaticOne) {
+  Sampler sampler(43);
+  for (const Regime& regime : regimes()) {
+    SCOPED_TRACE(regime.name);
+    for (int k = 0; k < 20; ++k) {
+      const auto x = sample<Se3>(sampler, regime);
+      expect_agreement<slam3d::Position>(sample<PointXYZ>(sampler, kAny), x);
+      Vector<double, 6> z;
+      z << sample<PointXYZ>(sampler, kAny), sample<PointXYZ>(sampler, kAny);
+      ASSERT_EQ(slam3d::Direction::normalize(z), "");
+      expect_agreement<slam3d::Direction>(z, x);
+    }
+  }
+}
+
+/// Where the error turns by the angle of each regime.
+template <class Metric>
+void check_orientation() {
+  Sampler sampler(47);
+  for (const Regime& regime : regimes()) {
+    SCOPED_TRACE(regime.name);
+    for (int k = 0; k < 20; ++k) {
+      const auto known = sample<Se3>(sampler, kAny);
+      const auto x = Se3::compose<double>(known, sample<Se3>(sampler, regime));
+      expect_agreement<slam3d::Orientation<Metric>>(
+          Vector<double, 4>(known[6], known[3], known[4], known[5]), x);
+    }
+  }
+}
+TEST(AnalyticJacobian, OfAnOrientationIsTheAutomaticOneInEachMetric) {
+  check_orientation<slam3d::Logarithm>();
+  check_orientation<slam3d::QuaternionVector>();
+  check_orientation<slam3d::TranslationAndRotationVector>();
 }
 
 /// From the identity, so that rounding does not choose between the two logarithms.

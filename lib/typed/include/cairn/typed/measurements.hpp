@@ -14,6 +14,7 @@
 #include "cairn/typed/point.hpp"
 #include "cairn/typed/pose2.hpp"
 #include "cairn/typed/pose3.hpp"
+#include "cairn/typed/rot3.hpp"
 #include "cairn/types/define_factor.hpp"
 
 namespace cairn {
@@ -51,11 +52,13 @@ struct Tags<Pose3> {
 };
 template <>
 struct Tags<Point2> {
-  static constexpr std::string_view kSeen = "EDGE_SE2_XY", kPrior = "EDGE_PRIOR_XY";
+  static constexpr std::string_view kSeen = "EDGE_SE2_XY", kPrior = "EDGE_PRIOR_XY",
+                                    kPosition = "EDGE_PRIOR_SE2_XY";
 };
 template <>
 struct Tags<Point3> {
-  static constexpr std::string_view kSeen = "EDGE_SE3_TRACKXYZ", kPrior = "EDGE_PRIOR_TRACKXYZ";
+  static constexpr std::string_view kSeen = "EDGE_SE3_TRACKXYZ", kPrior = "EDGE_PRIOR_TRACKXYZ",
+                                    kPosition = "EDGE_SE3_PRIORXYZ";
 };
 
 inline std::vector<double> copied(std::span<const double> numbers) {
@@ -78,9 +81,10 @@ struct Between {
   std::vector<double> numbers() const { return detail::copied(measured); }
 };
 
-/// Where a pose or a landmark is in the world. What is not known has no information: a position
-/// alone (GPS) in the plane is
-/// `Prior(id, Pose2(x, y, 0)), Information::sigmas(s, s, infinity)`.
+/// Where a pose or a landmark is in the world. The error of a pose is along the axes of the pose
+/// that was measured. What is not known has no information, and then changes nothing of the rest;
+/// but two of the three components of a rotation depend on how large the third is, so that there
+/// are types for what is measured alone: `Position`, `Orientation` and `Direction`.
 template <class T>
 struct Prior {
   static constexpr std::string_view kTag = detail::Tags<T>::kPrior;
@@ -90,6 +94,54 @@ struct Prior {
   Prior(Id id, const T& value) : variable(id), measured(value) {}
   std::vector<Id> variables() const { return {variable}; }
   std::vector<double> numbers() const { return detail::copied(measured); }
+};
+
+/// Where a pose is in the world, without its orientation, as from GNSS: `Point2` for a `Pose2`,
+/// `Point3` for a `Pose3`. The error [m] is along the axes of the world; a component that is not
+/// measured (an altimeter measures z alone) has an infinite standard deviation.
+template <class Point>
+struct Position {
+  static constexpr std::string_view kTag = detail::Tags<Point>::kPosition;
+  Id pose;
+  Point measured;
+
+  Position(Id pose_id, const Point& point) : pose(pose_id), measured(point) {}
+  std::vector<Id> variables() const { return {pose}; }
+  std::vector<double> numbers() const { return detail::copied(measured); }
+};
+
+/// How a `Pose3` is turned in the world, without its position, as from an attitude filter. The
+/// error is the rotation vector [rad] of measured⁻¹ · orientation (with `slam3d:metric=g2o` its
+/// half).
+struct Orientation {
+  static constexpr std::string_view kTag = "EDGE_SE3_PRIORQUAT";
+  Id pose;
+  Rot3 measured;
+
+  Orientation(Id pose_id, const Rot3& rotation) : pose(pose_id), measured(rotation) {}
+  std::vector<Id> variables() const { return {pose}; }
+  std::vector<double> numbers() const {
+    const std::vector<double> q = detail::copied(measured);
+    return {q[3], q[0], q[1], q[2]};
+  }
+};
+
+/// A direction that is known in the world, such as that of gravity, seen in the frame of a `Pose3`;
+/// lengths do not matter. The error has three numbers, Rᵀ · (unit in the world) − (unit seen), of
+/// which two are free: for small angles the angle between the two [rad]. The turn about the
+/// direction is not measured, and changes nothing however large it is: roll and pitch without yaw
+/// are `Direction(id, Point3(0, 0, -1), seen)`.
+struct Direction {
+  static constexpr std::string_view kTag = "EDGE_SE3_PRIORVEC";
+  Id pose;
+  Point3 in_world, seen;
+
+  Direction(Id pose_id, const Point3& direction_in_world, const Point3& direction_seen)
+      : pose(pose_id), in_world(direction_in_world), seen(direction_seen) {}
+  std::vector<Id> variables() const { return {pose}; }
+  std::vector<double> numbers() const {
+    return {in_world[0], in_world[1], in_world[2], seen[0], seen[1], seen[2]};
+  }
 };
 
 /// A landmark seen from a pose: its position [m] in the frame of the pose (`Point2` or `Point3`).
