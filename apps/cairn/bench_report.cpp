@@ -8,6 +8,7 @@
 
 #include "cairn/report/number_table.hpp"
 #include "cairn/runtime/threads.hpp"
+#include "error_metric.hpp"
 #include "json_report.hpp"
 #include "table.hpp"
 
@@ -191,11 +192,12 @@ Table bench_table(const GraphResult& graph, const Stop& stop) {
 }
 
 std::string bench_text(const GraphResult& graph, const Stop& stop, bool colour) {
-  const std::string optimizer = common_optimizer(graph);
+  const std::string optimizer = common_optimizer(graph), metric = metric_of(graph.loaded.graph);
   std::string text =
-      fmt::format("{}: {}, {}{}\n{}", bold(graph.loaded.label, colour),
+      fmt::format("{}: {}, {}{}{}\n{}", bold(graph.loaded.label, colour),
                   plural(graph.loaded.graph.variable_count(), "variable"),
                   plural(graph.loaded.graph.factor_count(), "factor"),
+                  metric.empty() ? "" : ", metric " + metric,
                   optimizer.empty() ? "" : "; " + optimizer, bench_table(graph, stop).text(colour));
   for (const ConfigurationResult& result : graph.results) {
     if (!result.error.empty()) {

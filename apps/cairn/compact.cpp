@@ -395,7 +395,7 @@ int run_compact(const CompactOptions& options, Session& session) {
   });
   note_defaults(options, outcome, session);
   note_selection(options, outcome, session);
-  results.add([&] { session.print(summary_text(options, outcome, results)); });
+  results.add([&] { session.print(summary_text(options, outcome, results, session)); });
   results.finish();
   if (guard.interrupted()) return kExitInterrupted;
   for (const std::string& doubt : reasons_for_doubt(shown.compact, chi2(shown.compact)))

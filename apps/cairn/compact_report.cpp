@@ -8,6 +8,7 @@
 #include <fmt/core.h>
 
 #include "cairn/runtime/threads.hpp"
+#include "error_metric.hpp"
 #include "json_report.hpp"
 #include "step_times.hpp"
 #include "table.hpp"
@@ -238,7 +239,7 @@ std::string steps_csv(const PolicyResult& result) {
 }
 
 std::string summary_text(const CompactOptions& options, const CompactOutcome& outcome,
-                         const Results& results) {
+                         const Results& results, const Session& session) {
   Table table({{"", Table::Align::left}, {"", Table::Align::left}});
   const PolicyData& data = outcome.data;
   const std::string landmarks =
@@ -246,6 +247,7 @@ std::string summary_text(const CompactOptions& options, const CompactOutcome& ou
   table.add({"graph", fmt::format("{}: {}{}, {}", outcome.name,
                                   plural(data.recording.variable_count() - data.landmarks, "pose"),
                                   landmarks, plural(data.loops, "loop closure"))});
+  add_metric(table, data.recording, session);
   if (!outcome.strategy.empty()) table.add({"strategy", outcome.strategy});
   if (const std::string line = thresholds_line(outcome.thresholds); !line.empty())
     table.add({"thresholds", line});

@@ -32,7 +32,7 @@ struct CompactOutcome {
 
 boost::json::object report_json(const CompactOptions& options, const CompactOutcome& outcome);
 std::string summary_text(const CompactOptions& options, const CompactOutcome& outcome,
-                         const Results& results);
+                         const Results& results, const Session& session);
 
 /// A row for each pose.
 std::string steps_csv(const PolicyResult& result);

@@ -16,6 +16,7 @@
 #include "cairn/runtime/timed.hpp"
 #include "commands.hpp"
 #include "covariances.hpp"
+#include "error_metric.hpp"
 #include "floors.hpp"
 #include "graph_files.hpp"
 #include "json_report.hpp"
@@ -83,8 +84,9 @@ std::string entropy_text(const Entropy& entropy) {
 }
 
 std::string figures_text(const Graph& graph, const GraphSurvey& s,
-                         const std::optional<Entropy>& entropy) {
+                         const std::optional<Entropy>& entropy, const Session& session) {
   Table table({{"", Table::Align::left}, {"", Table::Align::left}}, "  ");
+  add_metric(table, graph, session);
   table.add({"components", fmt::format("{}", s.gauge.components)});
   table.add({"odometry / loop closures", fmt::format("{} / {}", s.odometry, s.loops)});
   table.add({"gauge freedoms", gauge_text(graph, s)});
@@ -226,7 +228,7 @@ int run(const InfoOptions& options, Session& session) {
   results.add([&] { session.write_json(report_json(loaded, s, entropy)); });
   results.add([&] {
     const bool colour = session.colour();
-    session.print(counts_text(loaded, s, colour) + figures_text(loaded.graph, s, entropy) +
+    session.print(counts_text(loaded, s, colour) + figures_text(loaded.graph, s, entropy, session) +
                   worst_text(s, colour) + list_text("what looks wrong", s.suspicions, colour));
   });
   results.finish();

@@ -8,6 +8,7 @@
 
 #include "cairn/io/format.hpp"
 #include "cairn/runtime/version.hpp"
+#include "error_metric.hpp"
 #include "graph_labels.hpp"
 #include "peak_memory.hpp"
 
@@ -55,7 +56,8 @@ json::object graph_json(const Graph& graph, const std::string& file, const std::
           {"variables", graph.variable_count()},
           {"factors", graph.factor_count()},
           {"residual_size", graph.residual_size()},
-          {"tangent_size", graph.tangent_size()}};
+          {"tangent_size", graph.tangent_size()},
+          {"metric", text_json(metric_of(graph))}};
 }
 
 json::object seconds_json(const Seconds& seconds) {

@@ -18,8 +18,9 @@ boost::json::object begin_report(std::string_view command);
 /// Adds "peak_memory_bytes", "machine" and "build", how reports with times end.
 void end_report(boost::json::object& report);
 
-/// {"file", "name", "variables", "factors", "residual_size", "tangent_size"}; `name` is what tables
-/// and pictures call the graph (empty: its `graph_label`).
+/// {"file", "name", "variables", "factors", "residual_size", "tangent_size", "metric"}; `name` is
+/// what tables and pictures call the graph (empty: its `graph_label`); the metric (`metric_of`) is
+/// null where no factor has a choice.
 boost::json::object graph_json(const Graph& graph, const std::string& file,
                                const std::string& name = "");
 /// The members of "seconds" that an optimisation has.

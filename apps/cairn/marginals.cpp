@@ -24,6 +24,7 @@
 #include "cairn/typed/symbol.hpp"
 #include "commands.hpp"
 #include "covariances.hpp"
+#include "error_metric.hpp"
 #include "graph_files.hpp"
 #include "interrupt.hpp"
 #include "json_report.hpp"
@@ -424,8 +425,9 @@ std::string mutual_text(const Graph& graph, const Request& request, const Answer
 
 std::string result_text(const MarginalsOptions& options, const LoadedGraph& loaded,
                         const std::optional<Summary>& summary, const Request& request,
-                        const Answer& answer, const Results& results, bool colour) {
+                        const Answer& answer, const Results& results, const Session& session) {
   const Graph& graph = loaded.graph;
+  const bool colour = session.colour();
   std::string text;
   if (request.diagonal) text += diagonal_text(graph, answer.diagonal, colour);
   if (!request.pairs.empty() || request.column) {
@@ -442,6 +444,7 @@ std::string result_text(const MarginalsOptions& options, const LoadedGraph& load
   if (!request.mutual.empty())
     text += (text.empty() ? "" : "\n") + mutual_text(graph, request, answer, colour);
   Table facts({{"", Table::Align::left}, {"", Table::Align::left}});
+  add_metric(facts, graph, session);
   if (summary) {
     facts.add(
         {"estimate", fmt::format("{}, chi2 {}, {}", summary->optimizer,
@@ -524,8 +527,7 @@ int run(MarginalsOptions options, Session& session) {
         report_json(options, loaded, summary, request, answer, solver.solver->stats()));
   });
   results.add([&] {
-    session.print(
-        result_text(options, loaded, summary, request, answer, results, session.colour()));
+    session.print(result_text(options, loaded, summary, request, answer, results, session));
   });
   results.finish();
   return 0;

@@ -19,6 +19,7 @@
 #include "cairn/runtime/timed.hpp"
 #include "commands.hpp"
 #include "covariances.hpp"
+#include "error_metric.hpp"
 #include "graph_files.hpp"
 #include "interrupt.hpp"
 #include "json_report.hpp"
@@ -105,11 +106,12 @@ std::string times_text(const Seconds& seconds) {
 
 std::string summary_text(const OptimizeOptions& options, const LoadedGraph& loaded,
                          const Summary& summary, const DiagonalCovariances& covariances,
-                         const Results& results) {
+                         const Results& results, const Session& session) {
   Table table({{"", Table::Align::left}, {"", Table::Align::left}});
   table.add({"graph", fmt::format("{}: {}, {}", loaded.label,
                                   plural(loaded.graph.variable_count(), "variable"),
                                   plural(loaded.graph.factor_count(), "factor"))});
+  add_metric(table, loaded.graph, session);
   table.add({"solver", summary.linear_solver.empty()
                            ? summary.optimizer
                            : fmt::format("{} with {}", summary.optimizer, summary.linear_solver)});
@@ -192,7 +194,9 @@ int run(const OptimizeOptions& options, Session& session) {
   results.write(options.record, [&] { recording->finish(loaded.graph, summary); });
   results.add(
       [&] { session.write_json(report_json(options, loaded, initial, summary, covariances)); });
-  results.add([&] { session.print(summary_text(options, loaded, summary, covariances, results)); });
+  results.add([&] {
+    session.print(summary_text(options, loaded, summary, covariances, results, session));
+  });
   results.finish();
   const int code = exit_code(summary, stop);
   return code == 0 && covariance_solver && !covariances.there

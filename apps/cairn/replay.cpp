@@ -248,7 +248,8 @@ int run(const ReplayOptions& options, Session& session) {
       [&] { session.write_json(report_json(options, loaded, sorted, replay, *estimator, chi2)); });
   // Last of the files: libraries for fonts may end the process where memory is short.
   results.write(options.plot, [&] { draw_steps(replay, options, loaded, session); });
-  results.add([&] { session.print(summary_text(options, loaded, replay, chi2, results)); });
+  results.add(
+      [&] { session.print(summary_text(options, loaded, replay, chi2, results, session)); });
   results.finish();
   return exit_code(replay);
 }

@@ -11,6 +11,7 @@
 #include "album.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/threads.hpp"
+#include "error_metric.hpp"
 #include "json_report.hpp"
 #include "picture_files.hpp"
 #include "step_times.hpp"
@@ -185,11 +186,13 @@ void draw_steps(const Replay& replay, const ReplayOptions& options, const Loaded
 }
 
 std::string summary_text(const ReplayOptions& options, const LoadedGraph& loaded,
-                         const Replay& replay, double chi2, const Results& results) {
+                         const Replay& replay, double chi2, const Results& results,
+                         const Session& session) {
   Table table({{"", Table::Align::left}, {"", Table::Align::left}});
   table.add({"graph", fmt::format("{}: {}, {}", loaded.name,
                                   plural(loaded.graph.variable_count(), "variable"),
                                   plural(loaded.graph.factor_count(), "factor"))});
+  add_metric(table, loaded.graph, session);
   table.add({"estimator", options.estimator});
   if (options.keep > 0) {
     table.add({"kept", fmt::format("{} at most ({}): {} removed, divergence {:.4g} nats; {} of "

@@ -75,7 +75,8 @@ boost::json::object report_json(const ReplayOptions& options, const LoadedGraph&
                                 bool sorted, const Replay& replay, const Estimator& estimator,
                                 double chi2);
 std::string summary_text(const ReplayOptions& options, const LoadedGraph& loaded,
-                         const Replay& replay, double chi2, const Results& results);
+                         const Replay& replay, double chi2, const Results& results,
+                         const Session& session);
 
 /// A row for each step.
 std::string steps_csv(const Replay& replay);

@@ -19,6 +19,7 @@
 #include "cairn/runtime/threads.hpp"
 #include "cairn/sparsification/sparsify_graph.hpp"
 #include "commands.hpp"
+#include "error_metric.hpp"
 #include "graph_files.hpp"
 #include "information_frame.hpp"
 #include "interrupt.hpp"
@@ -178,12 +179,13 @@ json::object report_json(const SparsifyCommandOptions& options, const LoadedGrap
 
 std::string summary_text(const SparsifyCommandOptions& options, const LoadedGraph& loaded,
                          const SparsifyJob& job, const SparsifyResult& result,
-                         const Results& results) {
+                         const Results& results, const Session& session) {
   const Sparsification& change = result.change;
   Table table({{"", Table::Align::left}, {"", Table::Align::left}});
   table.add(
       {"graph", fmt::format("{}: {}, {}", loaded.name, plural(result.variables_before, "variable"),
                             plural(result.factors_before, "factor"))});
+  add_metric(table, loaded.graph, session);
   const auto removed = static_cast<std::int64_t>(std::ssize(change.removed_variables));
   table.add(
       {"removed", fmt::format("{} ({}{}), in {} whose neighbours are {:.2f} on average, {} at most",
@@ -330,7 +332,7 @@ int run_sparsify(SparsifyCommandOptions options, Session& session) {
   });
   results.write(options.record, [&] { write_file(options.record, recorder.text()); });
   results.add([&] { session.write_json(report_json(options, loaded, job, result)); });
-  results.add([&] { session.print(summary_text(options, loaded, job, result, results)); });
+  results.add([&] { session.print(summary_text(options, loaded, job, result, results, session)); });
   results.finish();
   if (guard.interrupted()) return kExitInterrupted;
   return result.converged ? 0 : static_cast<int>(ErrorCode::numerical);

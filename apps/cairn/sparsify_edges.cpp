@@ -16,6 +16,7 @@
 #include "cairn/runtime/threads.hpp"
 #include "cairn/sparsification/sparsify_edges.hpp"
 #include "commands.hpp"
+#include "error_metric.hpp"
 #include "graph_files.hpp"
 #include "information_frame.hpp"
 #include "interrupt.hpp"
@@ -125,12 +126,13 @@ std::string connectivity_text(const SparsifyEdgesResult& result) {
 
 std::string summary_text(const SparsifyCommandOptions& options, const LoadedGraph& loaded,
                          const SparsifyEdgesJob& job, const SparsifyEdgesResult& result,
-                         const Results& results) {
+                         const Results& results, const Session& session) {
   const SparsifyResult& whole = result.whole;
   Table table({{"", Table::Align::left}, {"", Table::Align::left}});
   table.add(
       {"graph", fmt::format("{}: {}, {}", loaded.name, plural(whole.variables_before, "variable"),
                             plural(whole.factors_before, "factor"))});
+  add_metric(table, loaded.graph, session);
   const auto loops = std::ssize(result.closures.candidates);
   table.add({"removed", fmt::format("{} of {} ({})", std::ssize(whole.change.removed_factors),
                                     plural(loops, "loop closure"), to_text(job.selection))});
@@ -209,7 +211,7 @@ int run_sparsify_edges(const SparsifyCommandOptions& options, Session& session) 
                 output_format(options.output, options.output_format));
   });
   results.add([&] { session.write_json(report_json(options, loaded, job, result)); });
-  results.add([&] { session.print(summary_text(options, loaded, job, result, results)); });
+  results.add([&] { session.print(summary_text(options, loaded, job, result, results, session)); });
   results.finish();
   if (guard.interrupted()) return kExitInterrupted;
   return result.whole.converged ? 0 : static_cast<int>(ErrorCode::numerical);

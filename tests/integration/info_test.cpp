@@ -115,7 +115,25 @@ TEST_F(InfoCommand, SaysThatTheGaugeOfCamerasIsLeftFree) {
 TEST_F(InfoCommand, TellsTheMetric) {
   const Outcome outcome = cairn({"info", "@sphere", "--types", "slam3d:metric=g2o"});
   EXPECT_THAT(outcome.out, HasSubstr("metric g2o"));
-  EXPECT_THAT(cairn({"info", "@sphere"}).out, HasSubstr("metric logarithm"));
+  EXPECT_THAT(outcome.out, Not(HasSubstr("formerly")));
+  // The default has a word on what it was; graphs of the plane have no metric.
+  const std::string by_default = unfolded(cairn({"info", "@sphere"}).out);
+  EXPECT_THAT(by_default, HasSubstr("metric rotation_vector"));
+  EXPECT_THAT(by_default, HasSubstr("rotation_vector (default; formerly logarithm: --types "));
+  EXPECT_THAT(cairn({"info", "@ring"}).out, Not(HasSubstr("metric")));
+}
+
+TEST_F(InfoCommand, SuspectsAPriorOnAPartOfAnOrientationInSpace) {
+  const std::string pose = "VERTEX_SE3:QUAT 4 0 0 0 0 0 0 1\n";
+  const std::string position = "EDGE_PRIOR_SE3:QUAT 4 0 0 0 0 0 0 1 1 0 0 0 0 0 1 0 0 0 0 1 0 0 0 ";
+  // Roll and pitch; all or nothing of the orientation is as good as it looks.
+  EXPECT_THAT(suspicions(info_of(pose + position + "9 0 0 9 0 0\n")),
+              HasSubstr("1 prior measures a part of an orientation in space (first: "
+                        "EDGE_PRIOR_SE3:QUAT 4)"));
+  EXPECT_THAT(suspicions(info_of(pose + position + "9 0 0 9 0 9\n")),
+              Not(HasSubstr("part of an orientation")));
+  EXPECT_THAT(suspicions(info_of(pose + position + "0 0 0 0 0 0\n")),
+              Not(HasSubstr("part of an orientation")));
 }
 
 // Two unknown poses in a chain: H = JᵀJ with |det J| = 1 (two rigid motions), so that |H| is the

@@ -21,6 +21,25 @@ double final_chi2(const boost::json::value& report) {
 
 using OptimizeCommand = WithGraphFile;
 
+TEST_F(OptimizeCommand, NamesTheErrorMetricWhereThereIsAChoice) {
+  const std::string space = folder_.file("space.g2o"), plane = folder_.file("plane.g2o");
+  write_text(space,
+             "VERTEX_SE3:QUAT 0 0 0 0 0 0 0 1\nVERTEX_SE3:QUAT 1 1 0 0 0 0 0 1\n"
+             "EDGE_SE3:QUAT 0 1 1 0 0 0 0 0 1 1 0 0 0 0 0 1 0 0 0 0 1 0 0 0 1 0 0 1 0 1\n");
+  write_text(plane, "VERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 1 0 0\nEDGE_SE2 0 1 1 0 0 1 0 0 1 0 1\n");
+  EXPECT_EQ(report_of({"optimize", space}).at("graph").at("metric").as_string(), "rotation_vector");
+  EXPECT_TRUE(report_of({"optimize", plane}).at("graph").at("metric").is_null());
+  const Arguments old{"optimize", space, "--types", "slam3d:metric=logarithm"};
+  EXPECT_EQ(report_of(old).at("graph").at("metric").as_string(), "logarithm");
+  for (const char* command : {"optimize", "marginals", "replay"}) {
+    EXPECT_THAT(unfolded(cairn({command, space}).out),
+                HasSubstr("rotation_vector (default; formerly logarithm: --types "
+                          "slam3d:metric=logarithm)"))
+        << command;
+    EXPECT_THAT(cairn({command, plane}).out, Not(HasSubstr("formerly"))) << command;
+  }
+}
+
 TEST_F(OptimizeCommand, ReportsAllMembersThatScriptsRelyOn) {
   const std::string file = graph();
   const auto report = report_of({"optimize", file, "--threads", "2"});

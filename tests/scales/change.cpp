@@ -35,6 +35,10 @@ constexpr FactorLengths kFactors[] = {{"EDGE_SE2", {0, 2}, {0, 2}, false},
                                       {"EDGE_SE3_TRACKXYZ", {0, 3}, {0, 3}, false},
                                       {"EDGE_PRIOR_SE3:QUAT", {0, 3}, {0, 3}, true},
                                       {"EDGE_PRIOR_TRACKXYZ", {0, 3}, {0, 3}, true},
+                                      {"EDGE_PRIOR_SE2_XY", {0, 2}, {0, 2}, true},
+                                      {"EDGE_SE3_PRIORXYZ", {0, 3}, {0, 3}, true},
+                                      {"EDGE_SE3_PRIORQUAT", {0, 0}, {0, 0}, false},
+                                      {"EDGE_SE3_PRIORVEC", {0, 0}, {0, 0}, false},
                                       {"EDGE_PROJECT_BAL", {0, 0}, {0, 0}, false}};
 
 template <class Table>

@@ -52,6 +52,9 @@ def located_or(published: list[DataSet], data: Path | None, quick: bool, small: 
 
 
 LIKE_G2O = ["--types", "slam3d:metric=g2o"]
+# What the pages were measured with where they name no other: the default until `rotation_vector` became it.
+LOGARITHM = ["--types", "slam3d:metric=logarithm"]
+ROTATION_VECTOR = ["--types", "slam3d:metric=rotation_vector"]
 SMALL_PLANE, PLANE = DataSet("manhattan, 600 poses", "@manhattan:poses=600"), DataSet("manhattan", "@manhattan")
 
 _OPTIMIZED = {one.name: one for one in [
@@ -62,23 +65,23 @@ _OPTIMIZED = {one.name: one for one in [
     DataSet("intel1728", "pose2d/intel1728.g2o"),
     DataSet("killian5489", "pose2d/killian5489_glc.g2o"),
     DataSet("kitti_00", "pose2d/kitti_00.g2o"),
-    DataSet("sphere2500", "pose3d/sphere2500.g2o"),
-    DataSet("sphere2500a", "pose3d/sphere2500a.g2o"),
-    DataSet("torus3D", "pose3d/torus3D.g2o.gz"),
-    DataSet("torus10000", "pose3d/torus10000_isam.txt"),
-    DataSet("parking-garage", "pose3d/parking-garage.g2o"),
-    DataSet("cubicle", "pose3d/cubicle.g2o", ["--repair-information"]),
-    DataSet("sphere_bignoise", "pose3d/sphere_bignoise_vertex3.g2o"),
+    DataSet("sphere2500", "pose3d/sphere2500.g2o", LOGARITHM),
+    DataSet("sphere2500a", "pose3d/sphere2500a.g2o", LOGARITHM),
+    DataSet("torus3D", "pose3d/torus3D.g2o.gz", LOGARITHM),
+    DataSet("torus10000", "pose3d/torus10000_isam.txt", LOGARITHM),
+    DataSet("parking-garage", "pose3d/parking-garage.g2o", LOGARITHM),
+    DataSet("cubicle", "pose3d/cubicle.g2o", ["--repair-information", *LOGARITHM]),
+    DataSet("sphere_bignoise", "pose3d/sphere_bignoise_vertex3.g2o", LOGARITHM),
     DataSet("Victoria Park", "landmark2d/victoriaPark_isam.txt", ["--initial", "incremental"]),
     DataSet("cityTrees10000", "landmark2d/cityTrees10000_isam.txt"),
     DataSet("ladybug-49", "ba/ladybug-problem-49-7776-pre.txt"),
     DataSet("dubrovnik-3", "ba/dubrovnik-3-7-pre.txt"),
     PLANE,
     DataSet("city", "@city"),
-    DataSet("sphere", "@sphere"),
-    DataSet("torus", "@torus:turns=60"),
-    DataSet("grid3d 12³", "@grid3d:nx=12,ny=12,nz=12"),
-    DataSet("grid3d 20³", "@grid3d:nx=20,ny=20,nz=20"),
+    DataSet("sphere", "@sphere", LOGARITHM),
+    DataSet("torus", "@torus:turns=60", LOGARITHM),
+    DataSet("grid3d 12³", "@grid3d:nx=12,ny=12,nz=12", LOGARITHM),
+    DataSet("grid3d 20³", "@grid3d:nx=20,ny=20,nz=20", LOGARITHM),
     DataSet("landmarks2d", "@landmarks2d"),
     DataSet("bundle", "@bundle"),
 ]}
@@ -137,7 +140,7 @@ _REPLAYED = [
     DataSet("Victoria Park", "landmark2d/victoriaPark_isam.txt"),
     PLANE,
     DataSet("city", "@city:poses=5000"),
-    DataSet("sphere", "@sphere"),
+    DataSet("sphere", "@sphere", LOGARITHM),
     DataSet("landmarks2d", "@landmarks2d"),
 ]
 _REPLAYED_QUICKLY = [DataSet("intel1728", "pose2d/intel1728.g2o"), SMALL_PLANE,
@@ -163,7 +166,7 @@ def budget_sets(data: Path | None, quick: bool) -> list[DataSet]:
 def ellipse3d(more: str = "") -> DataSet:
     """`more`: options of the generator."""
     return DataSet("ellipse3d", "@ellipse3d:translation_error=0,rotation_error=0,translation_sigma=0.058,rotation_sigma=0.032"
-                   + more)
+                   + more, LOGARITHM)
 
 
 def ellipse_n(laps: int, more: str = "") -> DataSet:
@@ -173,14 +176,13 @@ def ellipse_n(laps: int, more: str = "") -> DataSet:
 
 # The sensor of these, as options of the registration `simulated`.
 ELLIPSE_SENSOR, ELLIPSE_N_SENSOR = "range=3,angle=0.2", "range=1,angle=0.2"
-_LOGARITHMIC = ["--types", "slam3d:metric=rotation_vector"]
 _COMPACTED = [
     ellipse3d(),
     ellipse_n(10),
     DataSet("kitti_00", "pose2d/kitti_00.g2o", truth="camera", truth_file="groundtruth/kitti_00_poses.txt"),
-    DataSet("kitti_00, simulated", "", _LOGARITHMIC, "simulated", "groundtruth/kitti_00_poses.txt"),
+    DataSet("kitti_00, simulated", "", ROTATION_VECTOR, "simulated", "groundtruth/kitti_00_poses.txt"),
     DataSet("sphere2500", "pose3d/sphere2500.g2o", LIKE_G2O, "edges", "groundtruth/sphere2500_groundtruth_isam.txt"),
-    DataSet("sphere2500_isam", "pose3d/sphere2500_isam.txt", _LOGARITHMIC, "edges",
+    DataSet("sphere2500_isam", "pose3d/sphere2500_isam.txt", ROTATION_VECTOR, "edges",
             "groundtruth/sphere2500_groundtruth_isam.txt"),
     DataSet("parking-garage", "pose3d/parking-garage.g2o", LIKE_G2O, "de_facto"),
     DataSet("10kHog-man", "pose2d/10kHog-man.graph.gz", [], "de_facto", truth_arguments=["--initial", "chordal"]),
@@ -205,7 +207,7 @@ def simulated_sets(data: Path | None, quick: bool) -> list[tuple[DataSet, str]]:
     ellipse = (ellipse3d(), ELLIPSE_SENSOR)
     if quick:
         return [ellipse, (DataSet("manhattan, 300 poses", "@manhattan:poses=300"), planar)]
-    return [ellipse, (DataSet("sphere, 900 poses", "@sphere:turns=30,poses_per_turn=30,radius=30"), "range=8,angle=0.6"),
+    return [ellipse, (DataSet("sphere, 900 poses", "@sphere:turns=30,poses_per_turn=30,radius=30", LOGARITHM), "range=8,angle=0.6"),
             (DataSet("manhattan, 2000 poses", "@manhattan:poses=2000"), planar),
             *((one, planar) for one in compact_sets_named(["manhattanOlson3500"], data, quick))]
 
@@ -241,11 +243,11 @@ def thesis_sets(data: Path | None, quick: bool) -> list[DataSet]:
 
 
 def space_sets(data: Path | None, quick: bool) -> list[DataSet]:
-    return located_or([DataSet("sphere2500", "pose3d/sphere2500_isam.txt"),
+    return located_or([DataSet("sphere2500", "pose3d/sphere2500_isam.txt", LOGARITHM),
                        DataSet("parking-garage", "pose3d/parking-garage.g2o", LIKE_G2O),
                        DataSet("eecs", "pose3d/eecs_glc.g2o", LIKE_G2O),
                        DataSet("duderstadt", "pose3d/duderstadt_glc.g2o", LIKE_G2O)], data, quick,
-                      DataSet("sphere, 200 poses", "@sphere:turns=10,poses_per_turn=20,radius=20"), DataSet("sphere", "@sphere"))
+                      DataSet("sphere, 200 poses", "@sphere:turns=10,poses_per_turn=20,radius=20", LOGARITHM), DataSet("sphere", "@sphere", LOGARITHM))
 
 
 def large_sets(data: Path | None, quick: bool) -> list[DataSet]:
@@ -259,5 +261,5 @@ def sparsify_online_sets(data: Path | None, quick: bool) -> list[DataSet]:
 
 def edge_sets(data: Path | None, quick: bool) -> list[DataSet]:
     return located_or([DataSet("M3500", "pose2d/M3500.g2o"), DataSet("intel1728", "pose2d/intel1728.g2o"),
-                       DataSet("killian5489", "pose2d/killian5489_glc.g2o"), DataSet("sphere2500", "pose3d/sphere2500.g2o"),
-                       DataSet("parking-garage", "pose3d/parking-garage.g2o")], data, quick, SMALL_PLANE, PLANE)
+                       DataSet("killian5489", "pose2d/killian5489_glc.g2o"), DataSet("sphere2500", "pose3d/sphere2500.g2o", LOGARITHM),
+                       DataSet("parking-garage", "pose3d/parking-garage.g2o", LOGARITHM)], data, quick, SMALL_PLANE, PLANE)

@@ -17,15 +17,16 @@ constexpr auto enum_names(Metric) {
        {Metric::translation_and_rotation_vector, TranslationAndRotationVector::kName}});
 }
 
-/// Options of the types `slam3d`.
+/// Options of the types `slam3d`. The default keeps the position apart from the rotation, so that a
+/// component that is not measured changes nothing of the others, and has angles in radians.
 struct Slam3dOptions {
-  Metric metric = Metric::logarithm;
+  Metric metric = Metric::translation_and_rotation_vector;
 
   static auto fields() {
     return OptionFields<Slam3dOptions>().choice(
         "metric", &Slam3dOptions::metric,
-        "error of pose measurements: logarithm of the group; g2o: translation and "
-        "vector part of the quaternion; translation and rotation vector");
+        "error of pose measurements: translation and rotation vector; g2o: translation and "
+        "vector part of the quaternion (half the angle); logarithm of the group");
   }
 };
 

@@ -5,6 +5,7 @@
 #include <map>
 #include <numeric>
 #include <set>
+#include <span>
 #include <string_view>
 #include <utility>
 
@@ -12,6 +13,7 @@
 
 #include "cairn/evaluation/fixed_variables.hpp"
 #include "cairn/evaluation/plausibility.hpp"
+#include "cairn/geometry/pose.hpp"
 
 namespace cairn {
 namespace {
@@ -138,6 +140,44 @@ void suspect_structure(const Graph& graph, GraphSurvey& s) {
   }
 }
 
+/// How many of the three numbers of an orientation in space a prior on a pose measures; none where
+/// it is another kind of factor.
+int turns_measured(const Graph& graph, int position) {
+  const FactorType& type = graph.factor_type(position);
+  constexpr int kPose = 6, kTurns = 3;
+  if (type.arity() != 1 || type.residual_size() != kPose) return 0;
+  const VariableType& pose = graph.type(graph.factor_variables(position)[0]);
+  if (pose.tangent_size() != kPose || !has_orientation(pose) ||
+      pose.placement()->dimension() != kTurns)
+    return 0;
+  // The last rows of the triangular root are what the rotation has beside the translation.
+  const std::span<const double> root = graph.sqrt_information(position);
+  std::size_t row = root.size();
+  int measured = 0;
+  for (int k = 0; k < kTurns; ++k) {
+    row -= static_cast<std::size_t>(k + 1);
+    measured += root[row] > 0.0;
+  }
+  return measured;
+}
+
+void suspect_parts_of_rotations(const Graph& graph, GraphSurvey& s) {
+  std::int64_t count = 0;
+  int first = -1;
+  for (int f = 0; f < graph.factor_count(); ++f) {
+    const int measured = turns_measured(graph, f);
+    if (measured == 0 || measured == 3) continue;
+    if (count++ == 0) first = f;
+  }
+  if (count == 0) return;
+  s.suspicions.push_back(fmt::format(
+      "{} a part of an orientation in space (first: {}): what it weighs depends on the part that "
+      "is "
+      "not measured; a direction, such as that of gravity for roll and pitch, is EDGE_SE3_PRIORVEC",
+      count == 1 ? "1 prior measures" : fmt::format("{} priors measure", count),
+      graph.describe_factor(first)));
+}
+
 void suspect_numbers(GraphSurvey& s) {
   const auto say = [&](std::string sentence) { s.suspicions.push_back(std::move(sentence)); };
   const auto dof = static_cast<double>(s.degrees_of_freedom);
@@ -180,6 +220,7 @@ GraphSurvey survey_graph(const Graph& graph) {
   count_freedoms(graph, s);
   find_worst(graph, norms, s);
   suspect_structure(graph, s);
+  suspect_parts_of_rotations(graph, s);
   suspect_numbers(s);
   return s;
 }

@@ -173,6 +173,10 @@ TEST(EveryFactor, PropagatesToWhereItsErrorIsZero) {
     EXPECT_TRUE(propagating.contains(must) || !Registry().has("factor", tag)) << must;
   }
   EXPECT_FALSE(propagating.contains("EDGE_SE2_XY 0"));
+  // What measures a part of a pose does not determine it.
+  for (const char* part : {"EDGE_PRIOR_SE2_XY 0", "EDGE_SE3_PRIORXYZ 0", "EDGE_SE3_PRIORQUAT 0",
+                           "EDGE_SE3_PRIORVEC 0"})
+    EXPECT_FALSE(propagating.contains(part)) << part;
   EXPECT_FALSE(propagating.contains("EDGE_PROJECT_BAL 1"));
 }
 

@@ -273,14 +273,21 @@ TEST(Guide, CheckingAFactor) {
   EXPECT_LT(check_factor(*factor_type<Range>(), types, states, distance).largest_deviation, 1e-7);
 }
 
-TEST(Guide, PositionAlone) {
-  Graph graph;
-  graph.add(X(0), Pose2(1.0, 2.0, 0.5));
+TEST(Guide, PartOfAPose) {
+  Graph drone, car;
+  drone.add(X(0), Pose3(Rot3::yaw(3.0) * Rot3::roll_pitch_yaw(0.0, -0.02, 0.0), Point3(5, 6, 9.2)));
+  car.add(X(0), Pose2(2.6, 0.9, 1.65));
   const double unknown = std::numeric_limits<double>::infinity();
-  const auto gps = Information::sigmas(0.5, 0.5, unknown);
-  graph.add(Prior(X(0), Pose2(1.5, 2.0, 0.0)), gps);
+  drone.add(Position(X(0), Point3(0.0, 0.0, 9.8)), Information::sigmas(unknown, unknown, 0.3));
+  car.add(Position(X(0), Point2(2.1, 0.9)), Information::isotropic(2, 0.5));
+  car.add(Prior(X(0), Pose2(0.0, 0.0, 1.6)), Information::sigmas(unknown, unknown, 0.05));
+  const Point3 down(0.0, 0.0, -1.0);  // in the world; the other as the robot sees it
+  drone.add(Direction(X(0), down, Point3(0.1, 0.0, -9.8)), Information::isotropic(3, 0.02));
 
-  EXPECT_NEAR(chi2(graph), 1.0, 1e-12);
+  // 2 sigma of the height; the robot sees down at 0.1 / 9.8 rad where its pitch says 0.02.
+  const double tilt = 0.02 + 0.1 / 9.8;
+  EXPECT_NEAR(chi2(drone), 4.0 + tilt * tilt / (0.02 * 0.02), 0.01);
+  EXPECT_NEAR(chi2(car), 1.0 + 1.0, 1e-12);
 }
 
 TEST(Guide, Errors) {
