@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "cairn/geometry/pose.hpp"
+#include "cairn/update/placement.hpp"
 
 namespace cairn::formats {
 namespace {
@@ -61,18 +62,48 @@ class Propagator {
     }
   }
   bool start_at_identity(int v) {
-    std::vector<double> state(static_cast<std::size_t>(graph_.type(v).ambient_size()));
-    graph_.type(v).identity(state.data());
+    std::vector<double> state = identity(v);
+    for (const int f : factors_of(v)) {
+      const double* const own = state.data();
+      if (type_of(f).arity() == 1) {
+        place_in_part(type_of(f), graph_.type(v), graph_.sqrt_information(f), 0, {&own, 1},
+                      graph_.measurement(f).data(), state);
+      }
+    }
     graph_.set_state(v, state);
     return true;
   }
+  std::vector<double> identity(int v) const {
+    std::vector<double> state(static_cast<std::size_t>(graph_.type(v).ambient_size()));
+    graph_.type(v).identity(state.data());
+    return state;
+  }
 
+  /// By measurements that determine a variable wholly as far as they reach; only then by one that
+  /// has no information in some directions.
   void spread() {
-    while (!frontier_.empty()) {
-      const int v = frontier_.top();
-      frontier_.pop();
-      if (!known_[v] && determine(v)) accept(v);
+    do {
+      while (!frontier_.empty()) {
+        const int v = frontier_.top();
+        frontier_.pop();
+        if (known_[v]) continue;
+        if (determine(v)) {
+          accept(v);
+        } else if (!candidates_.empty()) {
+          in_part_.push(v);
+        }
+      }
+    } while (spread_in_part());
+  }
+  bool spread_in_part() {
+    while (!in_part_.empty()) {
+      const int v = in_part_.top();
+      in_part_.pop();
+      if (known_[v] || !determine_in_part(v)) continue;
+      accept(v);
+      return true;
     }
+    return false;
   }
   void accept(int v) {
     known_[v] = true;
@@ -97,17 +128,28 @@ class Propagator {
                                [&](int other) { return other == v || known_[other]; });
   }
 
-  /// Sets the state of v from the best factor that determines it.
-  bool determine(int v) {
+  /// The factors on v whose other variables are known, the best first.
+  void find_candidates(int v) {
     candidates_.clear();
     for (const int f : factors_of(v)) {
       if (others_known(f, v)) candidates_.push_back(rank(f, v));
     }
     std::sort(candidates_.begin(), candidates_.end());
-    return std::ranges::any_of(candidates_,
-                               [&](const Rank& r) { return propagate(std::get<2>(r), v); });
   }
-  bool propagate(int f, int v) {
+  /// Sets the state of v from the best factor that determines it.
+  bool determine(int v) {
+    find_candidates(v);
+    return std::ranges::any_of(candidates_,
+                               [&](const Rank& r) { return propagate(std::get<2>(r), v, true); });
+  }
+  /// The same from one that determines it but for directions without information, in which v stays
+  /// beside the variable that it is seen from, or at the identity.
+  bool determine_in_part(int v) {
+    find_candidates(v);
+    return std::ranges::any_of(candidates_,
+                               [&](const Rank& r) { return propagate(std::get<2>(r), v, false); });
+  }
+  bool propagate(int f, int v, bool wholly) {
     const auto ends = graph_.factor_variables(f);
     std::vector<const double*> states;
     int target = 0;
@@ -115,9 +157,18 @@ class Propagator {
       states.push_back(graph_.state(ends[k]).data());
       if (ends[k] == v) target = static_cast<int>(k);
     }
-    std::vector<double> state(static_cast<std::size_t>(graph_.type(v).ambient_size()));
-    if (!type_of(f).propagate(target, states.data(), graph_.measurement(f).data(), state.data())) {
-      return false;
+    const FactorType& type = type_of(f);
+    const std::span<const double> root = graph_.sqrt_information(f);
+    const double* const z = graph_.measurement(f).data();
+    std::vector<double> state = identity(v);
+    if (wholly) {
+      if (!place_wholly(type, root, target, states.data(), z, state.data())) return false;
+    } else {
+      if (!type.propagate(target, states.data(), z, state.data())) return false;
+      state = identity(v);
+      if (const double* const beside = neighbour(type, target, states))
+        state.assign(beside, beside + state.size());
+      if (!place_in_part(type, graph_.type(v), root, target, states, z, state)) return false;
     }
     graph_.set_state(v, state);
     return true;
@@ -127,7 +178,7 @@ class Propagator {
   std::vector<bool> known_;
   std::vector<std::size_t> begin_;
   std::vector<int> factors_;
-  std::priority_queue<int, std::vector<int>, std::greater<>> frontier_;
+  std::priority_queue<int, std::vector<int>, std::greater<>> frontier_, in_part_;
   std::vector<Rank> candidates_;
   Propagation result_;
 };

@@ -21,9 +21,11 @@ namespace {
 /// and Dellaert, ICRA 2015), for the poses of one pool in dimension D:
 ///   min Σ κ_ij ‖R_i Z_ij - R_j‖²_F    without the constraint that R is a rotation, then projected,
 ///   min Σ ‖t_j - t_i - R_i z_ij‖²_W   with W the information, turned into the world.
-/// Both are linear. The rows of R_i are the unknowns of the first: with x_i = (row of R_i)ᵀ a term
-/// is ‖Z_ijᵀ x_i - x_j‖², so that all rows share one matrix of D × D blocks and are D right-hand
-/// sides.
+/// Measurements that leave a part of the orientation open take no part in the first; where they
+/// leave a direction of the translation open the second has t_j ≈ t_i there, with next to no
+/// weight. Both are linear. The rows of R_i are the unknowns of the first: with x_i = (row of R_i)ᵀ
+/// a term is ‖Z_ijᵀ x_i - x_j‖², so that all rows share one matrix of D × D blocks and are D
+/// right-hand sides.
 template <int D>
 class ChordalPool {
   using Matrix = Eigen::Matrix<double, D, D>;
@@ -36,7 +38,7 @@ class ChordalPool {
         type_(*graph.variable_pools()[pool].type),
         placement_(*type_.placement()),
         unit_weights_(unit_weights),
-        links_(relative_links(graph, pool)),
+        links_(relative_links(graph, pool, kAngles)),
         points_(cartesian_links(graph, pool)),
         unknown_(static_cast<std::size_t>(graph.variable_count()), kNone),
         R_(graph.variable_pools()[pool].variables.size(), Matrix::Zero()),
@@ -56,6 +58,7 @@ class ChordalPool {
 
  private:
   static constexpr int kNone = -1;
+  static constexpr double kHeld = 1e-8;  // of the weight of what is measured
 
   Matrix& rotation(int variable) { return R_[static_cast<std::size_t>(graph_.slot(variable))]; }
   std::pair<Matrix, Vector> split(const double* x) const {
@@ -82,7 +85,9 @@ class ChordalPool {
   /// prior; else its first pose stays where it is. All others are unknown.
   void find_unknown_poses(std::vector<std::string>& notes) {
     std::vector<bool> linked(unknown_.size(), false), reached(unknown_.size(), false);
-    for (const Link& link : links_) linked[link.from] = linked[link.to] = true;
+    std::vector<bool> is_link(static_cast<std::size_t>(graph_.factor_count()), false);
+    for (const Link& link : links_)
+      linked[link.from] = linked[link.to] = is_link[static_cast<std::size_t>(link.factor)] = true;
     std::vector<int> queue;
     const auto reach = [&](int v) {
       if (reached[v]) return;
@@ -94,7 +99,7 @@ class ChordalPool {
         const int v = queue.back();
         queue.pop_back();
         for (int f : placing_.factors()[v]) {
-          if (!graph_.factor_type(f).is_relative()) continue;
+          if (!is_link[static_cast<std::size_t>(f)]) continue;
           for (int other : graph_.factor_variables(f)) reach(other);
         }
       }
@@ -204,16 +209,27 @@ class ChordalPool {
           rotation(link.from) * Z;  // the error is measured in the frame of the second pose
       const Matrix W = translation_weight(link);
       add_difference(problem, link, R_j * W * R_j.transpose(), rotation(link.from) * z);
+      hold_together(problem, link);
     }
     for (const Link& link : points_) {
       const Matrix& R_i = rotation(link.from);
       const Vector z = Eigen::Map<const Vector>(graph_.measurement(link.factor).data());
       const Matrix W = information_matrix(graph_, link.factor);
       add_difference(problem, link, R_i * W * R_i.transpose(), R_i * z);
+      hold_together(problem, link);
     }
     check(problem.solve(solver));
     for (int k = 0; k < count_; ++k)
       set_state(variables_[k], problem.solution(k) + origin(variables_[k]));
+  }
+
+  /// Where a measurement lacks information: next to no weight on being in one place, or nothing
+  /// would determine what only such measurements reach.
+  void hold_together(BlockProblem<D, 1>& problem, const Link& link) {
+    if (graph_.information_rank(link.factor) == graph_.factor_type(link.factor).residual_size())
+      return;
+    const double mean = information_matrix(graph_, link.factor).diagonal().mean();
+    add_difference(problem, link, Matrix(kHeld * mean * Matrix::Identity()), Vector::Zero());
   }
 
   /// ‖t_j - t_i - d‖²_W.

@@ -7,6 +7,7 @@
 #include "cairn/evaluation/watched_guess.hpp"
 #include "cairn/geometry/pose.hpp"
 #include "cairn/graph/gauge.hpp"
+#include "cairn/update/placement.hpp"
 #include "guesses.hpp"
 #include "placing.hpp"
 
@@ -82,16 +83,18 @@ class Incremental final : public InitialGuess, public WatchedGuess {
     void add_pose(int variable) {
       std::vector<double> state(whole.state(variable).begin(), whole.state(variable).end());
       if (!gauge.held[variable]) {
-        for (const int f : factors[variable]) {
-          if (place(variable, f, state)) break;
-        }
+        const auto placed_by = [&](Extent extent) {
+          return std::ranges::any_of(factors[variable],
+                                     [&](int f) { return place(variable, f, extent, state); });
+        };
+        if (!placed_by(Extent::whole)) placed_by(Extent::part);
       }
       add(variable, state);
       for (const int f : factors[variable]) {
         for (const std::int32_t other : whole.factor_variables(f)) {
           if (index[other] >= 0 || !is_point(whole.type(other))) continue;
           std::vector<double> seen(whole.state(other).begin(), whole.state(other).end());
-          if (gauge.held[other] || place(other, f, seen)) add(other, seen);
+          if (gauge.held[other] || place(other, f, Extent::whole, seen)) add(other, seen);
         }
       }
       add_factors_of(variable);
@@ -116,7 +119,10 @@ class Incremental final : public InitialGuess, public WatchedGuess {
     Graph grown;
 
    private:
-    bool place(int variable, int factor, std::vector<double>& state) {
+    /// Of a state that a measurement gives: all of it, or all but directions without information.
+    enum class Extent { whole, part };
+
+    bool place(int variable, int factor, Extent extent, std::vector<double>& state) {
       const auto variables = whole.factor_variables(factor);
       std::vector<const double*> x;
       int target = -1;
@@ -131,9 +137,18 @@ class Incremental final : public InitialGuess, public WatchedGuess {
         }
       }
       const FactorType& type = whole.factor_type(factor);
+      const std::span<const double> root = whole.sqrt_information(factor);
+      const double* const z = whole.measurement(factor).data();
       std::vector<double> placed(state.size());
-      if (!type.propagate(target, x.data(), whole.measurement(factor).data(), placed.data()))
-        return false;
+      if (extent == Extent::whole) {
+        if (!place_wholly(type, root, target, x.data(), z, placed.data())) return false;
+      } else {
+        if (x.size() < 2 || !type.propagate(target, x.data(), z, placed.data())) return false;
+        placed = state;
+        if (const double* const beside = neighbour(type, target, x))
+          placed.assign(beside, beside + placed.size());
+        if (!place_in_part(type, whole.type(variable), root, target, x, z, placed)) return false;
+      }
       state = std::move(placed);
       return true;
     }

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "cairn/update/placement.hpp"
+
 namespace cairn::initial {
 
 FactorsOfVariables::FactorsOfVariables(const Graph& graph)
@@ -25,23 +27,46 @@ Placing::Placing(Graph& graph)
       factors_(graph),
       placed_(static_cast<std::size_t>(graph.variable_count()), false) {}
 
-bool Placing::place(int variable, int factor) {
+Placing::Ends Placing::ends(int variable, int factor) const {
+  Ends found;
   const auto variables = graph_.factor_variables(factor);
-  std::vector<const double*> x(variables.size());
-  int target = -1;
   for (std::size_t k = 0; k < variables.size(); ++k) {
     if (variables[k] == variable) {
-      target = static_cast<int>(k);
+      found.target = static_cast<int>(k);
     } else if (!placed_[variables[k]]) {
-      return false;
+      return {};
     }
-    x[k] = graph_.state(variables[k]).data();
+    found.states.push_back(graph_.state(variables[k]).data());
   }
-  const FactorType& type = graph_.factor_type(factor);
+  return found;
+}
+
+bool Placing::place(int variable, int factor) {
+  const Ends found = ends(variable, factor);
+  if (found.target < 0) return false;
   std::vector<double> out(static_cast<std::size_t>(graph_.type(variable).ambient_size()));
-  if (!type.propagate(target, x.data(), graph_.measurement(factor).data(), out.data()))
+  if (!place_wholly(graph_.factor_type(factor), graph_.sqrt_information(factor), found.target,
+                    found.states.data(), graph_.measurement(factor).data(), out.data()))
     return false;
   graph_.set_state(variable, out);
+  placed_[variable] = true;
+  return true;
+}
+
+bool Placing::place_in_part(int variable, int factor) {
+  const Ends found = ends(variable, factor);
+  if (found.target < 0 || found.states.size() < 2) return false;
+  const FactorType& type = graph_.factor_type(factor);
+  const double* const z = graph_.measurement(factor).data();
+  std::vector<double> state(graph_.state(variable).begin(), graph_.state(variable).end());
+  std::vector<double> unused(state.size());
+  if (!type.propagate(found.target, found.states.data(), z, unused.data())) return false;
+  if (const double* const beside = neighbour(type, found.target, found.states))
+    state.assign(beside, beside + state.size());
+  if (!cairn::place_in_part(type, graph_.type(variable), graph_.sqrt_information(factor),
+                            found.target, found.states, z, state))
+    return false;
+  graph_.set_state(variable, state);
   placed_[variable] = true;
   return true;
 }
@@ -73,7 +98,7 @@ std::vector<int> Placing::place_roots(const Gauge& gauge) {
   return roots;
 }
 
-void Placing::spread(std::vector<int> start) {
+std::vector<int> Placing::spread(std::vector<int> start) {
   std::vector<int>& queue = start;
   for (std::size_t head = 0; head < queue.size(); ++head) {
     for (int f : factors_[queue[head]]) {
@@ -82,17 +107,38 @@ void Placing::spread(std::vector<int> start) {
       }
     }
   }
+  return start;
 }
 
-void Placing::spread() {
+std::vector<int> Placing::all_placed() const {
   std::vector<int> all;
   for (int v = 0; v < graph_.variable_count(); ++v) {
     if (placed_[v]) all.push_back(v);
   }
-  spread(std::move(all));
+  return all;
+}
+
+void Placing::spread() { spread(all_placed()); }
+
+std::vector<int> Placing::spread_in_part(std::vector<int> start) {
+  std::vector<int> in_part;
+  std::vector<int>& queue = start;
+  for (std::size_t head = 0; head < queue.size(); ++head) {
+    for (int f : factors_[queue[head]]) {
+      for (int v : graph_.factor_variables(f)) {
+        if (placed_[v] || !place_in_part(v, f)) continue;
+        in_part.push_back(v);
+        const std::vector<int> reached = spread({v});
+        queue.insert(queue.end(), reached.begin(), reached.end());
+      }
+    }
+  }
+  return in_part;
 }
 
 void Placing::finish(std::vector<std::string>& notes) {
+  if (std::ranges::find(placed_, false) == placed_.end()) return;
+  std::vector<int> in_part = spread_in_part(all_placed());
   std::vector<int> left;
   for (int v = 0; v < graph_.variable_count(); ++v) {
     if (!placed_[v]) left.push_back(v);
@@ -106,7 +152,14 @@ void Placing::finish(std::vector<std::string>& notes) {
     if (placed_[v]) continue;
     if (kept++ == 0) first = v;
     placed_[v] = true;
-    spread({v});
+    const std::vector<int> from_it = spread_in_part(spread({v}));
+    in_part.insert(in_part.end(), from_it.begin(), from_it.end());
+  }
+  if (!in_part.empty()) {
+    notes.push_back(counted(std::ssize(in_part), "variable is", "variables are") +
+                    " placed by a measurement without information in some directions, where it "
+                    "stays beside the variable that it is seen from (first: " +
+                    graph_.describe_variable(in_part.front()) + ")");
   }
   if (kept == 0) return;
   notes.push_back(counted(kept, "variable keeps its state", "variables keep their states") +

@@ -36,7 +36,8 @@ class Placing {
   void set_placed(int variable) { placed_[variable] = true; }
 
   /// Places `variable` by `factor` (a position in the graph). False, and nothing done, where
-  /// another variable of the factor is not placed or the measurement does not determine the state.
+  /// another variable of the factor is not placed or the measurement does not determine the state:
+  /// also where a component of it has no information.
   bool place(int variable, int factor);
 
   /// Initialises the roots: constant variables keep their states. In a component without a constant
@@ -44,17 +45,31 @@ class Placing {
   /// prior that determines it takes its state from that. Returns the variables placed, by index.
   std::vector<int> place_roots(const Gauge& gauge);
 
-  /// Breadth first from `start` (in that order) over whatever factors determine a place.
-  void spread(std::vector<int> start);
+  /// Breadth first from `start` (in that order) over whatever factors determine a place. Returns
+  /// what is placed by then: `start` and all that it reached.
+  std::vector<int> spread(std::vector<int> start);
   /// From all that is placed.
   void spread();
 
-  /// Ends the placing: what no factor ties to what is placed keeps its state, and places others
-  /// from there, so that each connected piece is in itself as measured. Poses before landmarks.
-  /// Adds a note about it.
+  /// Ends the placing. What is tied to what is placed by measurements without information in some
+  /// directions alone stays in these beside the variable that it is seen from. What no factor ties
+  /// to it keeps its state, and places others from there, so that each connected piece is in itself
+  /// as measured. Poses before landmarks. Adds notes about it.
   void finish(std::vector<std::string>& notes);
 
  private:
+  /// The states of a factor's variables, in its order.
+  struct Ends {
+    int target = -1;  // which of them is to be placed; -1 if another is not placed
+    std::vector<const double*> states;
+  };
+  Ends ends(int variable, int factor) const;
+  bool place_in_part(int variable, int factor);
+  /// From `start` by measurements in part, and by all that determine a place from there. Returns
+  /// the variables that were placed in part.
+  std::vector<int> spread_in_part(std::vector<int> start);
+  std::vector<int> all_placed() const;
+
   Graph& graph_;
   FactorsOfVariables factors_;
   std::vector<bool> placed_;

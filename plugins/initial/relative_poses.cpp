@@ -7,6 +7,7 @@
 
 #include "cairn/geometry/pose.hpp"
 #include "cairn/graph/packed.hpp"
+#include "cairn/update/placement.hpp"
 
 namespace cairn::initial {
 namespace {
@@ -43,9 +44,24 @@ bool is_cartesian(const FactorType& factor, const VariableType& pose, const Vari
                     [](double a, double b) { return std::abs(a - b) < 1e-12; });
 }
 
+/// Whether a relative pose has information on all of the orientation, which is the end of its
+/// residual; of one whose residual is of another size, on all. In the triangular root of the
+/// information these rows are what the orientation has beside the translation.
+bool measures_orientation(const Graph& graph, int factor, int angles) {
+  const FactorType& type = graph.factor_type(factor);
+  const std::span<const double> root = graph.sqrt_information(factor);
+  if (type.residual_size() != type.tangent_size(0)) return measures_all(type, root);
+  std::size_t row = root.size();
+  for (int k = 0; k < angles; ++k) {
+    row -= static_cast<std::size_t>(k + 1);
+    if (!(root[row] > 0.0)) return false;
+  }
+  return true;
+}
+
 }  // namespace
 
-std::vector<Link> relative_links(const Graph& graph, int variable_pool) {
+std::vector<Link> relative_links(const Graph& graph, int variable_pool, int angles) {
   std::vector<Link> links;
   for (const FactorPool& pool : graph.factor_pools()) {
     if (pool.type->is_relative() && pool.variable_pools[0] == variable_pool &&
@@ -53,6 +69,8 @@ std::vector<Link> relative_links(const Graph& graph, int variable_pool) {
       append(pool, links);
     }
   }
+  std::erase_if(
+      links, [&](const Link& link) { return !measures_orientation(graph, link.factor, angles); });
   sort_by_factor(links);
   return links;
 }

@@ -16,8 +16,9 @@ struct Link {
   int factor;  ///< position in the graph
 };
 
-/// The relative-pose factors on the variables of one pool.
-std::vector<Link> relative_links(const Graph& graph, int variable_pool);
+/// The relative-pose factors on the variables of one pool, whose orientations have `angles` degrees
+/// of freedom: those that measure the whole orientation.
+std::vector<Link> relative_links(const Graph& graph, int variable_pool, int angles);
 
 /// Factors that measure a point in the Cartesian frame of a pose of that pool. What a factor
 /// measures is found by asking it where a pose at the origin sees the point: where the measurement

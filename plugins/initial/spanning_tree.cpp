@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 
 #include "cairn/graph/gauge.hpp"
+#include "cairn/update/placement.hpp"
 #include "dense/cholesky.hpp"
 #include "guesses.hpp"
 #include "placing.hpp"
@@ -47,6 +48,7 @@ class SpanningTree final : public InitialGuess {
     std::priority_queue<Step, std::vector<Step>, std::greater<>> steps;
     const auto look_around = [&](int variable, double so_far) {
       for (int f : placing.factors()[variable]) {
+        if (!measures_all(graph.factor_type(f), graph.sqrt_information(f))) continue;
         for (int v : graph.factor_variables(f)) {
           if (!placing.placed(v)) steps.emplace(so_far + variance(graph, f), f, v);
         }

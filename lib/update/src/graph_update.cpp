@@ -6,15 +6,18 @@
 #include <string>
 #include <unordered_map>
 #include <unordered_set>
+#include <utility>
 
 #include <fmt/core.h>
 
 #include "cairn/graph/gauge.hpp"
 #include "cairn/graph/id_text.hpp"
+#include "cairn/graph/packed.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/types/factor_call.hpp"
 #include "cairn/update/elimination.hpp"
 #include "cairn/update/marginal_prior.hpp"
+#include "cairn/update/placement.hpp"
 
 namespace cairn {
 namespace {
@@ -67,6 +70,10 @@ class Placer {
     for (bool again = unplaced() > 0; again;) {
       again = false;
       for (const Factor& factor : update_.factors) again = place_by(factor) || again;
+      // Only where no factor determines all of one: by one that determines it in part.
+      again = again || std::ranges::any_of(update_.factors, [this](const Factor& factor) {
+                return place_in_part_by(factor);
+              });
       again = again && unplaced() > 0;
     }
     std::vector<int> left;
@@ -88,39 +95,88 @@ class Placer {
     return state_of_(id);
   }
 
-  /// Places the one variable of a factor that has no place yet. What is wrong with a factor is
-  /// found when it is checked.
-  bool place_by(const Factor& factor) {
-    if (!factor.type || factor.variables.size() != static_cast<std::size_t>(factor.type->arity()) ||
-        factor.measurement.size() != static_cast<std::size_t>(factor.type->measurement_size()))
-      return false;
-    std::vector<const double*> x;
+  /// A factor as its type takes it, all of whose variables but one have their states.
+  struct Measured {
+    Variable* variable = nullptr;  // that one; null if it is not so
     int target = -1;
+    std::vector<const double*> x;
+    std::vector<double> z, root;
+  };
+
+  /// What is wrong with a factor is found when it is checked.
+  Measured look_at(const Factor& factor) {
+    if (!factor.type || factor.variables.size() != static_cast<std::size_t>(factor.type->arity()) ||
+        factor.measurement.size() != static_cast<std::size_t>(factor.type->measurement_size()) ||
+        factor.information.size() != packed_size(factor.type->residual_size()))
+      return {};
+    Measured one;
+    one.z = factor.measurement;
+    one.root = factor.information;
     for (std::size_t k = 0; k < factor.variables.size(); ++k) {
       const std::span<const double> at = state(factor.variables[k]);
-      x.push_back(at.data());
+      one.x.push_back(at.data());
       if (at.empty()) {
-        if (target >= 0) return false;
-        target = static_cast<int>(k);
+        if (one.target >= 0) return {};
+        one.target = static_cast<int>(k);
       } else if (at.size() !=
                  static_cast<std::size_t>(factor.type->ambient_size(static_cast<int>(k)))) {
-        return false;
+        return {};
       }
     }
-    if (target < 0) return false;
-    const auto it = new_.find(factor.variables[target]);
-    if (it == new_.end()) return false;
+    if (one.target < 0) return {};
+    const auto it = new_.find(factor.variables[one.target]);
+    if (it == new_.end()) return {};
     Variable& variable = update_.variables[it->second];
-    if (variable.type->tag() != factor.type->variable_tags()[target]) return false;
-    std::vector<double> z = factor.measurement, out(variable.type->ambient_size());
-    variable.type->identity(out.data());
-    x[target] = out.data();
-    std::vector<double> placed(out.size());
-    if (!factor.type->normalize(z.data()).empty() ||
-        !call_factor(
-            *factor.type, [&] { return describe(factor); },
-            [&] { return factor.type->propagate(target, x.data(), z.data(), placed.data()); }) ||
-        !std::ranges::all_of(placed, [](double v) { return std::isfinite(v); }) ||
+    if (variable.type->tag() == factor.type->variable_tags()[one.target] &&
+        factor.type->normalize(one.z.data()).empty() &&
+        square_root(factor.information, factor.type->residual_size(), one.root))
+      one.variable = &variable;
+    return one;
+  }
+
+  /// Places the one variable of a factor that has no place yet, if the factor determines all of it.
+  bool place_by(const Factor& factor) {
+    Measured one = look_at(factor);
+    if (!one.variable) return false;
+    std::vector<double> own = identity(*one.variable), placed(own.size());
+    one.x[one.target] = own.data();
+    return call_factor(
+               *factor.type, [&] { return describe(factor); },
+               [&] {
+                 return place_wholly(*factor.type, one.root, one.target, one.x.data(),
+                                     one.z.data(), placed.data());
+               }) &&
+           take(*one.variable, std::move(placed));
+  }
+
+  /// The same by a factor that lacks information in some directions: there the variable stays
+  /// beside the other that it is seen from, or at the identity.
+  bool place_in_part_by(const Factor& factor) {
+    Measured one = look_at(factor);
+    if (!one.variable) return false;
+    std::vector<double> placed = identity(*one.variable), unused(placed.size());
+    one.x[one.target] = placed.data();
+    std::vector<double> from = placed;
+    if (const double* const beside = neighbour(*factor.type, one.target, one.x))
+      from.assign(beside, beside + from.size());
+    return call_factor(
+               *factor.type, [&] { return describe(factor); },
+               [&] {
+                 return factor.type->propagate(one.target, one.x.data(), one.z.data(),
+                                               unused.data()) &&
+                        place_in_part(*factor.type, *one.variable->type, one.root, one.target,
+                                      one.x, one.z.data(), from);
+               }) &&
+           take(*one.variable, std::move(from));
+  }
+
+  static std::vector<double> identity(const Variable& variable) {
+    std::vector<double> state(static_cast<std::size_t>(variable.type->ambient_size()));
+    variable.type->identity(state.data());
+    return state;
+  }
+  static bool take(Variable& variable, std::vector<double> placed) {
+    if (!std::ranges::all_of(placed, [](double v) { return std::isfinite(v); }) ||
         !variable.type->normalize(placed.data()).empty())
       return false;
     variable.state = std::move(placed);

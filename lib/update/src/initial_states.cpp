@@ -14,6 +14,7 @@
 #include "cairn/graph/packed.hpp"
 #include "cairn/runtime/plugin_call.hpp"
 #include "cairn/types/factor_call.hpp"
+#include "cairn/update/placement.hpp"
 
 namespace cairn {
 namespace {
@@ -153,8 +154,8 @@ bool InitialStates::place(Measured& by, const Variable& variable, std::vector<do
   const bool determined = call_factor(
       *by.factor->type, [&] { return described(*by.factor); },
       [&] {
-        return by.factor->type->propagate(static_cast<int>(by.place), by.x.data(), by.z.data(),
-                                          placed.data());
+        return place_wholly(*by.factor->type, by.root, static_cast<int>(by.place), by.x.data(),
+                            by.z.data(), placed.data());
       });
   return determined && std::ranges::all_of(placed, [](double v) { return std::isfinite(v); }) &&
          variable.type->normalize(placed.data()).empty();

@@ -60,6 +60,21 @@ TEST_F(GraphUpdateTest, PlacesWhatIsNewWhateverTheOrder) {
   EXPECT_EQ(graph_.variable_count(), 0);
 }
 
+TEST_F(GraphUpdateTest, PlacesByAComponentWithoutInformationNothing) {
+  GraphUpdate update;
+  update.variables = {pose(0, {2, 3, 0.5}), pose(1), pose(2)};
+  update.factors = {between(0, 1), between(1, 2), between(0, 2)};
+  update.factors[0].measurement = {77, 0.25, 0};  // nothing of how far ahead
+  update.factors[0].information = {0, 0, 0, 1, 0, 1};
+  update.factors[2].information = {1, 0, 0, 1, 0, 0};  // without the heading
+  check_update(graph_, ids_, update);
+  // Beside pose 0 but for what is measured.
+  const std::vector<double>& placed = update.variables[1].state;
+  EXPECT_NEAR(placed[0], 2 - 0.25 * std::sin(0.5), 1e-12);
+  EXPECT_NEAR(placed[1], 3 + 0.25 * std::cos(0.5), 1e-12);
+  EXPECT_NEAR(placed[2], 0.5, 1e-12);
+}
+
 TEST_F(GraphUpdateTest, TellsWhatItCannotPlace) {
   GraphUpdate update;
   update.variables = {pose(0), pose(1)};

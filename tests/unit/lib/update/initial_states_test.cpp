@@ -66,6 +66,15 @@ TEST_F(InitialStatesTest, AStateOfAnotherEstimateGivesWayToTheMeasurement) {
   EXPECT_THAT(update.variables[0].state, at(11, 0, 0.5));
 }
 
+TEST_F(InitialStatesTest, AComponentWithoutInformationReplacesNoState) {
+  GraphUpdate update;
+  update.variables = {pose(2, {-7, 3, 2})};
+  update.factors = {between(1, 2, {1, 0, 0.5})};
+  update.factors[0].information = {1, 0, 0, 1, 0, 0};
+  EXPECT_EQ(replace(update), 0);
+  EXPECT_THAT(update.variables[0].state, at(-7, 3, 2));
+}
+
 TEST_F(InitialStatesTest, AStateStaysThatOneMeasurementDoesNotContradict) {
   for (const double x : {11.0, 11.0 + 2.9, 11.0 + 3.1, 10.0 - 2.9, 10.0 - 3.1}) {
     GraphUpdate update;  // where either puts it, the other leaves a chi2 of 1

@@ -58,6 +58,34 @@ TEST(MissingVertices, StandAtTheirPriors) {
   EXPECT_THAT(r.state(0), ElementsAre(4, 5, 0));
 }
 
+// What is not measured is beside the pose before, whatever number stands there.
+TEST(MissingVertices, TakeNothingFromComponentsWithoutInformation) {
+  const Reading r =
+      read("g2o", std::string("EDGE_SE2 0 1 77 0.5 0 0 0 0 1 0 1\n") + "EDGE_SE2 1 2 1 0 0" + kI);
+  EXPECT_THAT(r.state(1), Pointwise(DoubleNear(1e-12), std::vector<double>{0, 0.5, 0}));
+  EXPECT_THAT(r.state(2), Pointwise(DoubleNear(1e-12), std::vector<double>{1, 0.5, 0}));
+  EXPECT_THAT(r.report.notes, ElementsAre("the file has no vertices: 3 were made, with states "
+                                          "propagated along the factors"));
+}
+
+TEST(MissingVertices, GoAroundAnEdgeWithoutInformationOnTheHeading) {
+  const Reading r = read("g2o", std::string("EDGE_SE2 0 1 1 0 3 1 0 0 1 0 0\n") +
+                                    "EDGE_SE2 0 2 1 1 0" + kI + "EDGE_SE2 2 1 0 -1 0.5" + kI);
+  EXPECT_THAT(r.state(1), Pointwise(DoubleNear(1e-12), std::vector<double>{1, 0, 0.5}));
+}
+
+TEST(MissingVertices, StandAtTheirPositionWhereThatIsAllThatIsKnown) {
+  const std::string edge = std::string("EDGE_SE2 0 1 1 0 0") + kI;
+  for (const char* prior :
+       {"EDGE_PRIOR_SE2 0 500000 5 2 1 0 0 1 0 0\n", "EDGE_PRIOR_SE2_XY 0 500000 5 1 0 1\n"}) {
+    const Reading r = read("g2o", edge + prior);
+    EXPECT_THAT(r.state(0), Pointwise(DoubleNear(1e-9), std::vector<double>{500000, 5, 0}))
+        << prior;
+    EXPECT_THAT(r.state(1), Pointwise(DoubleNear(1e-9), std::vector<double>{500001, 5, 0}))
+        << prior;
+  }
+}
+
 TEST(MissingVertices, SeesLandmarksFromTheFirstPoseInTheFile) {
   const Reading r = read("g2o", std::string("EDGE_SE2 0 1 1 0 0") + kI +
                                     "EDGE_SE2_XY 0 9 3 4 1 0 1\nEDGE_SE2_XY 1 9 7 7 1 0 1\n");

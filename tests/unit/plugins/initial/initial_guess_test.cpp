@@ -7,6 +7,7 @@
 #include <complex>
 #include <numeric>
 #include <random>
+#include <string_view>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -176,9 +177,14 @@ class Planar : public testing::Test {
     graph.add_factor(registry.factor_type("EDGE_SE2_XY"), std::array<int, 2>{pose, landmark}, z,
                      std::array<double, 3>{1, 0, 1});
   }
-  void prior(int pose, std::array<double, 3> z) {
+  /// `weight`: the information of x, y and theta; 0 for what is not measured.
+  void link_in_part(int a, int b, std::array<double, 3> z, std::array<double, 3> weight) {
+    const std::array<double, 6> information{weight[0], 0, 0, weight[1], 0, weight[2]};
+    graph.add_factor(registry.factor_type("EDGE_SE2"), std::array<int, 2>{a, b}, z, information);
+  }
+  void prior(int pose, std::array<double, 3> z, double heading = 1.0) {
     graph.add_factor(registry.factor_type("EDGE_PRIOR_SE2"), std::array<int, 1>{pose}, z,
-                     std::array<double, 6>{1, 0, 0, 1, 0, 1});
+                     std::array<double, 6>{1, 0, 0, 1, 0, heading});
   }
   std::array<double, 3> at(int pose) const {
     const auto x = graph.state(pose);
@@ -236,6 +242,58 @@ TEST_F(Planar, APriorSaysWhereToStart) {
     expect_at(a, {2, 4, 0});
     expect_at(b, {3, 4, 0});
     expect_at(c, {4, 4, 0});
+  }
+}
+
+/// A number without information is none: whatever stands there, nothing is placed by it.
+TEST_F(Planar, AComponentWithoutInformationPlacesNothing) {
+  const int a = pose(0, {0, 0, 0}), b = pose(1), c = pose(2), d = pose(3);
+  link(a, b, {1, 0, 0.5});
+  // As matching along a corridor has it: nothing along the axis of the pose that is seen.
+  link_in_part(b, c, {77 * std::cos(0.5), 77 * std::sin(0.5), 0.5}, {0, 1, 1});
+  link(c, d, {1, 0, 0});
+  for (const char* name : {"odometry", "spanning_tree", "spanning_tree:weight=information",
+                           "incremental", "chordal"}) {
+    SCOPED_TRACE(name);
+    const auto notes = guess(registry, name, graph);
+    const double x = 1, y = 0;  // c is where b is, but turned
+    const double tolerance = std::string_view(name) == "chordal" ? 1e-6 : 1e-9;
+    EXPECT_NEAR(at(c)[0], x, tolerance);
+    EXPECT_NEAR(at(c)[1], y, tolerance);
+    EXPECT_NEAR(at(c)[2], 1.0, 1e-9);
+    EXPECT_NEAR(at(d)[0], x + std::cos(1.0), tolerance);
+    EXPECT_NEAR(at(d)[1], y + std::sin(1.0), tolerance);
+    if (std::string_view(name).starts_with("spanning_tree") ||
+        std::string_view(name) == "odometry") {
+      EXPECT_THAT(notes, Contains(AllOf(HasSubstr("1 variable is placed by a measurement without"),
+                                        HasSubstr("VERTEX_SE2 2"))));
+    }
+  }
+}
+
+TEST_F(Planar, AnEdgeWithoutOrientationGoesAroundWhereOthersLead) {
+  const int a = pose(0, {0, 0, 0}), b = pose(1), c = pose(2);
+  link_in_part(a, b, {1, 0, 2.5}, {1, 1, 0});
+  link(a, c, {1, 1, 0});
+  link(c, b, {0, -1, 0.5});
+  for (const char* name :
+       {"odometry", "spanning_tree", "spanning_tree:weight=information", "chordal"}) {
+    SCOPED_TRACE(name);
+    guess(registry, name, graph);
+    expect_at(b, {1, 0, 0.5});
+    expect_at(c, {1, 1, 0});
+  }
+}
+
+TEST_F(Planar, APositionAloneSetsNoHeading) {
+  const int a = pose(0, {3, 4, 0.5}), b = pose(1);
+  link(a, b, {1, 0, 0});
+  prior(a, {30, 40, 2.0}, 0.0);
+  for (const char* name : {"odometry", "spanning_tree", "chordal"}) {
+    SCOPED_TRACE(name);
+    guess(registry, name, graph);
+    expect_at(a, {3, 4, 0.5});
+    expect_at(b, {3 + std::cos(0.5), 4 + std::sin(0.5), 0.5});
   }
 }
 

@@ -47,8 +47,10 @@ struct FactorLookup {
 };
 
 /// Gives the new variables that have no state one: where the first of the update's factors that can
-/// puts them, given the others. `state_of` is the estimate of a variable that was there before
-/// (empty: unknown). Returns which of `update.variables` no factor places.
+/// puts them, given the others; where none determines all of a variable, one that lacks information
+/// in some directions does, in which the variable stays beside the other that it is seen from, or
+/// at the identity (`place_in_part`). `state_of` is the estimate of a variable that was there
+/// before (empty: unknown). Returns which of `update.variables` no factor places.
 CAIRN_API std::vector<int> place_variables(
     GraphUpdate& update, const std::function<std::span<const double>(Id)>& state_of);
 

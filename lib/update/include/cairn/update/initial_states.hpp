@@ -21,7 +21,7 @@ enum class Deciding {
 /// of a file or of a front end that does not follow loop closures; what is linearised there is off
 /// by the whole difference. So for each new variable that factors of the update join with what was
 /// there before, directly or through other new ones, chi2 over these factors is computed where the
-/// first sixteen of them that can put it (`FactorType::propagate`). It gets the best of these
+/// first sixteen of them that can put it (`place_wholly`). It gets the best of these
 /// states if the one that it came with leaves more than nine times as much, three times the
 /// residuals, in each single one of the factors that can put it somewhere. What was composed from
 /// the current estimate and one of the measurements therefore stays; and so do fixed variables,
