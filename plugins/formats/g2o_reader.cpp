@@ -4,10 +4,12 @@
 // party's types work in files; only FIX, PARAMS_… and the factors that refer to parameters are
 // known here by name.
 
+#include <algorithm>
 #include <array>
 #include <map>
 #include <memory>
 #include <span>
+#include <unordered_set>
 #include <utility>
 
 #include <fmt/core.h>
@@ -24,6 +26,16 @@ constexpr std::string_view kOffset = "PARAMS_SE3OFFSET";
 constexpr std::string_view kPointSeen = "EDGE_SE3_TRACKXYZ";  // pose, point, parameter, x y z
 constexpr std::string_view kPrior = "EDGE_SE3_PRIOR";         // pose, parameter, pose
 constexpr std::string_view kOwnPrior = "EDGE_PRIOR_SE3:QUAT";
+
+// Positions of poses as g2o and programs that use it write them, beside the tags of the types here.
+constexpr std::string_view kPosition = "EDGE_SE3_PRIORXYZ";        // pose, x y z
+constexpr std::string_view kPlanarPosition = "EDGE_PRIOR_SE2_XY";  // pose, x y
+constexpr std::string_view kPointPrior = "EDGE_PRIOR_TRACKXYZ";    // point, x y z
+constexpr std::string_view kHorizontal = "EDGE_SE3_PRIORXY";       // pose, x y
+constexpr std::string_view kXyzPrior = "EDGE_SE3_XYZ_PRIOR";       // pose, (parameter,) x y z
+constexpr std::string_view kXyzOfEither = "EDGE_POINTXYZ_PRIOR";   // pose or point, x y z
+constexpr std::string_view kPlanarPriorXy = "EDGE_SE2_PRIORXY";    // pose, x y
+constexpr std::array kPositionTags{kHorizontal, kXyzPrior, kXyzOfEither, kPlanarPriorXy};
 
 /// g2o has parameters of many kinds, all called PARAMS_ and a word in capitals.
 bool is_parameter_tag(std::string_view tag) {
@@ -58,6 +70,7 @@ class G2oReader {
 
   Graph read() {
     while (scanner_.next_line()) read_line();
+    find_positions_of_poses();
     apply_offsets();
     note_unused_parameters();
     return draft_.build();
@@ -97,6 +110,7 @@ class G2oReader {
   void read_line() {
     const std::string_view tag = scanner_.tag();
     if (const LineReader* reader = tags_.find(tag)) return (*reader)(scanner_, draft_);
+    if (add_position_tag(tag)) return (*tags_.find(tag))(scanner_, draft_);
     if (types_.has("variable", tag)) {
       add_variable_tag(tag);
     } else if (types_.has("factor", tag)) {
@@ -125,6 +139,9 @@ class G2oReader {
     const std::vector<std::string> factors = types_.names("factor");
     names.insert(names.end(), factors.begin(), factors.end());
     names.insert(names.end(), {"FIX", std::string(kOffset), std::string(kPrior)});
+    for (const std::string_view tag : kPositionTags) {
+      if (types_.has("factor", own_position(tag))) names.emplace_back(tag);
+    }
     return names;
   }
 
@@ -161,6 +178,88 @@ class G2oReader {
   void read_point_seen() { read_with_parameter(draft_.factor_kind(kPointSeen)); }
   void read_prior() { read_with_parameter(draft_.factor_kind(kOwnPrior, kPrior)); }
 
+  /// The type of such a line; empty for another tag.
+  static std::string_view own_position(std::string_view tag) {
+    if (tag == kHorizontal || tag == kXyzPrior) return kPosition;
+    if (tag == kPlanarPriorXy || tag == kPlanarPosition) return kPlanarPosition;
+    return tag == kXyzOfEither ? kPointPrior : std::string_view();
+  }
+  bool add_position_tag(std::string_view tag) {
+    const std::string_view own = own_position(tag);
+    if (own.empty() || !types_.has("factor", own)) return false;
+    const std::int32_t kind = draft_.factor_kind(own, tag);
+    tags_.add(std::string(tag), [this, kind, own](Scanner&, Draft&) {
+      if (own == kPosition) return read_position(kind);
+      if (own == kPlanarPosition) return read_planar_position(kind);
+      of_pose_or_point_.push_back(draft_.factors().size());
+      read_factor(scanner_, draft_, kind);
+      draft_.finish_factor();
+    });
+    return true;
+  }
+  void read_position(std::int32_t kind) {
+    if (draft_.factor(kind).name == kHorizontal) return read_horizontal_position(kind);
+    // g2o has the id of a parameter after that of the pose, some who write its tag have none.
+    if (fields_of_line() == 1 + 3 + 6) {
+      read_factor(scanner_, draft_, kind);
+      draft_.finish_factor();
+    } else {
+      read_with_parameter(kind);
+    }
+  }
+  /// After the tag, before the line is read.
+  int fields_of_line() const { return scanner_.count_fields() - 1; }
+  /// x and y alone: no information on z.
+  void read_horizontal_position(std::int32_t kind) {
+    scanner_.expect({1, 2, 3});
+    const Draft::FactorSlots slots = draft_.add_factor(kind, scanner_.line());
+    slots.ids[0] = scanner_.read_id();
+    scanner_.read_numbers(slots.measurement.first<2>());
+    std::array<double, 3> information;
+    scanner_.read_numbers(information);
+    scanner_.end_line();
+    slots.measurement[2] = 0.0;
+    const auto& [xx, xy, yy] = information;
+    std::ranges::copy(std::array{xx, xy, 0.0, yy, 0.0, 0.0}, slots.information.begin());
+    draft_.finish_factor();
+  }
+  /// g2o reads the upper triangle, and has long written the whole matrix.
+  void read_planar_position(std::int32_t kind) {
+    if (fields_of_line() != 1 + 2 + 4) {
+      read_factor(scanner_, draft_, kind);
+      return draft_.finish_factor();
+    }
+    scanner_.expect({1, 2, 4});
+    const Draft::FactorSlots slots = draft_.add_factor(kind, scanner_.line());
+    slots.ids[0] = scanner_.read_id();
+    scanner_.read_numbers(slots.measurement);
+    std::array<double, 4> information;
+    scanner_.read_numbers(information);
+    scanner_.end_line();
+    const auto& [xx, xy, yx, yy] = information;
+    if (xy != yx) {
+      scanner_.fail(
+          fmt::format("the information is not symmetric ({} and {}); expected I11 I12 "
+                      "I22, or I11 I12 I12 I22",
+                      xy, yx));
+    }
+    std::ranges::copy(std::array{xx, xy, yy}, slots.information.begin());
+    draft_.finish_factor();
+  }
+  /// The tag of g2o's prior on a point is that of a position where others put a pose.
+  void find_positions_of_poses() {
+    if (of_pose_or_point_.empty()) return;
+    const std::int32_t position = draft_.factor_kind(kPosition, kXyzOfEither);
+    std::unordered_set<Id> poses;
+    for (const Draft::Variable& v : draft_.variables()) {
+      if (v.kind == draft_.factor(position).variable_kinds[0]) poses.insert(v.id);
+    }
+    for (const std::size_t at : of_pose_or_point_) {
+      Draft::Factor& factor = draft_.factors()[at];
+      if (poses.contains(draft_.slots(factor).ids[0])) factor.kind = position;
+    }
+  }
+
   void apply_offsets() {
     for (const Reference& reference : references_) {
       const Draft::Factor& factor = draft_.factors()[reference.factor];
@@ -176,7 +275,7 @@ class G2oReader {
   }
   void apply(const Offset& offset, const Draft::Factor& factor, const Draft::FactorKind& kind) {
     if (offset.value.is_identity) return;
-    if (kind.name == kPrior) {
+    if (kind.name == kPrior || kind.name == kXyzPrior) {
       // x O ≈ z could be written x ≈ z O⁻¹, but then the residual, and with it the information,
       // would be that of another frame: exact for one metric only.
       draft_.fail(
@@ -206,6 +305,7 @@ class G2oReader {
   Draft draft_;
   TagTable tags_;
   std::vector<Reference> references_;
+  std::vector<std::size_t> of_pose_or_point_;  // factors whose variable says what they are
   std::map<std::string, std::int64_t> unused_parameters_;
 };
 

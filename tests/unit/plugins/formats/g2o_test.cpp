@@ -163,6 +163,75 @@ TEST(G2o, ReadsAPriorOnlyWhereItsOffsetIsTheIdentity) {
           "expected an offset of 0 0 0 0 0 0 1"));
 }
 
+// The tags by which programs write positions, orientations and directions of poses.
+
+constexpr const char* kSpatialPose = "VERTEX_SE3:QUAT 0 0 0 0 0 0 0 1\n";
+
+TEST(G2o, ReadsAPositionByEveryTagThatMeansOne) {
+  const std::string numbers = " 1 2 3 10 1 2 20 3 30\n";
+  const std::string offset = "PARAMS_SE3OFFSET 7 0 0 0 0 0 0 1\n";
+  for (const std::string& line :
+       {"EDGE_SE3_PRIORXYZ 0" + numbers, "EDGE_SE3_XYZ_PRIOR 0 7" + numbers + offset,
+        "EDGE_SE3_XYZ_PRIOR 0" + numbers, "EDGE_POINTXYZ_PRIOR 0" + numbers}) {
+    for (const std::string& text : {kSpatialPose + line, line + kSpatialPose}) {
+      SCOPED_TRACE(text);
+      const Reading r = read("g2o", text);
+      EXPECT_EQ(r.factor_tag(0), "EDGE_SE3_PRIORXYZ");
+      EXPECT_THAT(r.measurement(0), ElementsAre(1, 2, 3));
+      EXPECT_THAT(r.information(0), ElementsAre(10, 1, 2, 20, 3, 30));
+    }
+  }
+}
+
+TEST(G2o, ReadsAHorizontalPositionWithoutInformationOnTheHeight) {
+  const Reading r = read("g2o", std::string(kSpatialPose) + "EDGE_SE3_PRIORXY 0 1 2 10 1 20\n");
+  EXPECT_EQ(r.factor_tag(0), "EDGE_SE3_PRIORXYZ");
+  EXPECT_THAT(r.measurement(0), ElementsAre(1, 2, 0));
+  EXPECT_THAT(r.information(0), ElementsAre(10, 1, 0, 20, 0, 0));
+}
+
+TEST(G2o, ReadsAPriorOnAPointByTheSameTagAsAPosition) {
+  const Reading r =
+      read("g2o", std::string(kPoseAndPoint) + "EDGE_POINTXYZ_PRIOR 1 1 2 3 10 1 2 20 3 30\n");
+  EXPECT_EQ(r.factor_tag(0), "EDGE_PRIOR_TRACKXYZ");
+  EXPECT_THAT(r.measurement(0), ElementsAre(1, 2, 3));
+}
+
+TEST(G2o, ReadsAPositionInThePlaneByEveryTagThatMeansOne) {
+  for (const char* line : {"EDGE_PRIOR_SE2_XY 0 1 2 10 1 20\n", "EDGE_SE2_PRIORXY 0 1 2 10 1 20\n",
+                           "EDGE_PRIOR_SE2_XY 0 1 2 10 1 1 20\n"}) {
+    const Reading r = read("g2o", std::string("VERTEX_SE2 0 0 0 0\n") + line);
+    EXPECT_EQ(r.factor_tag(0), "EDGE_PRIOR_SE2_XY") << line;
+    EXPECT_THAT(r.measurement(0), ElementsAre(1, 2)) << line;
+    EXPECT_THAT(r.information(0), ElementsAre(10, 1, 20)) << line;
+  }
+  EXPECT_THAT(refusal("g2o", "VERTEX_SE2 0 0 0 0\nEDGE_PRIOR_SE2_XY 0 1 2 10 1 9 20\n"),
+              HasSubstr("file:2: the information is not symmetric (1 and 9)"));
+}
+
+TEST(G2o, ReadsAnOrientationWithWFirstAndADirection) {
+  const Reading r = read("g2o", std::string(kSpatialPose) +
+                                    "EDGE_SE3_PRIORQUAT 0 0.6 0 0.8 0 10 1 2 20 3 30\n"
+                                    "EDGE_SE3_PRIORVEC 0 0 0 -9.81 0 -2 0 10 1 2 20 3 30\n");
+  EXPECT_THAT(r.measurement(0), ElementsAre(0.6, 0, 0.8, 0));
+  EXPECT_THAT(r.measurement(1), ElementsAre(0, 0, -1, 0, -1, 0));
+}
+
+TEST(G2o, RefusesAPositionOfASensorBesideTheRobot) {
+  EXPECT_THAT(
+      refusal("g2o", std::string(kSpatialPose) + "EDGE_SE3_XYZ_PRIOR 0 7 1 2 3 10 1 2 20 3 30\n"
+                                                 "PARAMS_SE3OFFSET 7 0 0 1 0 0 0 1\n"),
+      HasSubstr("file:2: EDGE_SE3_XYZ_PRIOR with the sensor offset of line 3"));
+}
+
+TEST(G2o, WritesPartsOfPosesAsItReadsThem) {
+  const std::string text = std::string(kSpatialPose) +
+                           "EDGE_SE3_PRIORXYZ 0 1 2 3 10 1 2 20 3 30\n"
+                           "EDGE_SE3_PRIORQUAT 0 0.6 0 0.8 0 10 1 2 20 3 30\n"
+                           "EDGE_SE3_PRIORVEC 0 0 0 -1 0 -1 0 10 1 2 20 3 30\n";
+  EXPECT_EQ(write("g2o", read("g2o", text).graph), text);
+}
+
 TEST(G2o, SaysWhichParametersItLeavesAside) {
   const Reading r =
       read("g2o", std::string("PARAMS_CAMERACALIB 0 1 2 3\nPARAMS_CAMERACALIB 1\n") + kPlanar);
