@@ -70,6 +70,8 @@ double dot(std::span<const double> a, std::span<const double> b) {
   return std::inner_product(a.begin(), a.end(), b.begin(), 0.0);
 }
 
+double norm(std::span<const double> a) { return std::sqrt(dot(a, a)); }
+
 Descent::Descent(std::string optimizer, std::string linear_solver, LinearSolver& solver,
                  Graph& graph, const Stop& stop, Observer& observer)
     : estimate(graph.values()),
@@ -153,7 +155,7 @@ void Descent::record(double step_norm, double lambda, bool accepted) {
 
 bool Descent::solve(std::span<double> out) {
   equations_->solve(out);
-  step_norm_ = std::sqrt(dot(out, out));
+  step_norm_ = norm(out);
   if (!std::isfinite(step_norm_)) return false;
   if (number_ != sampled_ && is_sampled(number_) && !query<IterativeSolver>(solver_)) {
     sampled_ = number_;

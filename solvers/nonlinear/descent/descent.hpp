@@ -16,6 +16,9 @@ namespace cairn {
 /// Scalar product.
 double dot(std::span<const double> a, std::span<const double> b);
 
+/// Euclidean norm.
+double norm(std::span<const double> a);
+
 /// One run of a second-order optimizer, as far as the method does not matter: the normal equations,
 /// the estimate and the best one met, the limits of `Stop`, the records of the iterations, and the
 /// summary.
@@ -33,10 +36,15 @@ class Descent {
           const Stop& stop, Observer& observer);
 
   NormalEquations& equations() { return *equations_; }
+  const NormalEquations& equations() const { return *equations_; }
   const Stop& stop() const { return stop_; }
   bool has_losses() const { return graph_.has_losses(); }
+  bool gauge_is_left_free() const { return !equations_->gauge().left_free.empty(); }
   /// Stop.tolerance is 0: no test of convergence is to be made.
   bool exact() const { return !(stop_.tolerance > 0.0); }
+
+  /// Whether chi2 may fall by no more than that before the run counts as converged.
+  bool is_small(double decrease) const { return decrease <= stop_.tolerance * chi2; }
 
   /// The current estimate, with its chi2. Code that changes it must update chi2, H and g.
   Values estimate;
@@ -57,6 +65,10 @@ class Descent {
   /// finite, which more damping may cure. In the first iteration and some others a note names a
   /// linear solver whose result does not solve its system.
   bool solve(std::span<double> out);
+  /// out = (what was factorised last)⁻¹ right.
+  void solve_for(std::span<const double> right, std::span<double> out) {
+    solver_.solve(right, out);
+  }
   /// ‖out‖ of the last `solve`.
   double step_norm() const { return step_norm_; }
   /// Whether `out` solves its system (`NormalEquations::backward_error`), as a step must by which

@@ -3,9 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
 #include <vector>
 
+#include "acceleration.hpp"
 #include "convergence.hpp"
 #include "descent.hpp"
 #include "path.hpp"
@@ -26,6 +28,7 @@ class Run {
 
   void iterate() {
     bool arrived = false;
+    const bool is_new = !path_is_current_;
     if (!path_is_current_) {
       if (!factorize() || run_.must_stop()) return;
       if (!run_.solve(path_.newton())) {
@@ -36,19 +39,25 @@ class Run {
       path_is_current_ = true;
       newton_promise_ = dot(equations_.g(), path_.newton());
       newton_norm_ = run_.step_norm();
-      arrived = convergence_.arrived(newton_promise_, run_.chi2);
+      acceleration_.aim(run_);
+      arrived = convergence_.arrived(newton_promise_, run_.chi2) && acceleration_.may_end(run_);
       if (arrived && !run_.solves(path_.newton())) return;
     }
     const double radius = radius_;
     const DoglegPath::Step step = arrived ? path_.end(run_.step) : path_.at(radius, run_.step);
-    const double step_norm = std::sqrt(dot(run_.step, run_.step));
+    double step_norm = norm(run_.step);
     if (!std::isfinite(step_norm)) {
       run_.note("the step is not finite");
       run_.end(Status::diverged);
       return;
     }
-    equations_.retract(run_.estimate, run_.step, run_.trial);
-    const double trial_chi2 = equations_.chi2(run_.trial);
+    const std::optional<double> faster = is_new ? acceleration_.take(run_) : std::nullopt;
+    if (faster) {
+      step_norm = norm(run_.step);
+    } else {
+      equations_.retract(run_.estimate, run_.step, run_.trial);
+    }
+    const double trial_chi2 = faster ? *faster : equations_.chi2(run_.trial);
     if (run_.must_stop()) return;
 
     const bool lowered = trial_chi2 < run_.chi2;  // false for what is not a number
@@ -58,7 +67,8 @@ class Run {
     } else if (exhausted && run_.solves(path_.newton())) {
       run_.end_without_descent(newton_promise_, newton_norm_, is_damped());
     }
-    adapt_radius(lowered ? (run_.chi2 - trial_chi2) / step.promise : -1.0, step.length);
+    if (!faster)
+      adapt_radius(lowered ? (run_.chi2 - trial_chi2) / step.promise : -1.0, step.length);
     if (lowered) take_step(trial_chi2);
     run_.record(step_norm, 1.0 / radius, lowered);
   }
@@ -88,6 +98,7 @@ class Run {
   bool is_damped() const { return is_damped_ && equations_.gauge().left_free.empty(); }
 
   void take_step(double trial_chi2) {
+    acceleration_.follow(run_);
     std::swap(run_.estimate, run_.trial);
     const bool final = run_.ended() || run_.last_iteration();
     run_.chi2 = final ? trial_chi2 : equations_.linearize(run_.estimate);
@@ -103,6 +114,7 @@ class Run {
   Descent& run_;
   NormalEquations& equations_;
   Convergence convergence_;
+  Acceleration acceleration_;
   DoglegPath path_;
   std::vector<double> min_diagonal_;
   double newton_promise_ = 0.0, newton_norm_ = 0.0;  // of the full step

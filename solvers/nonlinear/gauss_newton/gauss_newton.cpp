@@ -6,6 +6,7 @@
 
 #include <fmt/core.h>
 
+#include "acceleration.hpp"
 #include "convergence.hpp"
 #include "descent.hpp"
 
@@ -30,6 +31,7 @@ GaussNewton::GaussNewton(std::unique_ptr<LinearSolver> solver, GaussNewtonOption
 Summary GaussNewton::optimize(Graph& graph, const Stop& stop, Observer& observer) {
   Descent run("gauss_newton", options_.linear_solver, *solver_, graph, stop, observer);
   Convergence convergence(stop.tolerance);
+  Acceleration acceleration;
   NormalEquations& equations = run.equations();
   bool best = true;
   int rises = 0;
@@ -43,17 +45,21 @@ Summary GaussNewton::optimize(Graph& graph, const Stop& stop, Observer& observer
       if (!run.ended()) run.end_not_finite();
       break;
     }
-    const double step_norm = run.step_norm();
     const double before = run.chi2;
-    const bool arrived = convergence.arrived(dot(equations.g(), run.step), before);
+    acceleration.aim(run);
+    const bool arrived =
+        convergence.arrived(dot(equations.g(), run.step), before) && acceleration.may_end(run);
     const bool may_end =
-        arrived || (!run.exact() && Convergence::negligible(step_norm, run.state_extent()));
+        arrived || (!run.exact() && Convergence::negligible(run.step_norm(), run.state_extent()));
     if (may_end && !run.solves(run.step)) break;
-    equations.retract(run.estimate, run.step, run.trial);
+    const bool faster = acceleration.take(run).has_value();
+    const double step_norm = faster ? norm(run.step) : run.step_norm();
+    if (!faster) equations.retract(run.estimate, run.step, run.trial);
     if (run.must_stop()) break;
 
     std::swap(run.estimate, run.trial);
     const bool final = arrived || run.last_iteration();
+    acceleration.follow(run);
     run.chi2 = final ? equations.chi2(run.estimate) : equations.linearize(run.estimate);
     best = run.keep_if_best();
     rises = run.chi2 > before ? rises + 1 : 0;

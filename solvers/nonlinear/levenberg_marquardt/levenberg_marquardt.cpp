@@ -3,9 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
 #include <vector>
 
+#include "acceleration.hpp"
 #include "convergence.hpp"
 #include "damping.hpp"
 #include "descent.hpp"
@@ -65,19 +67,26 @@ class Run {
       run_.record(0.0, lambda, false);
       return;
     }
-    const double step_norm = run_.step_norm();
-    const double promise = dot(equations_.g(), run_.step) + damping_energy();
+    double step_norm = run_.step_norm();
+    double promise = dot(equations_.g(), run_.step) + damping_energy();
     if (first_trial_) {
       first_promise_ = promise;
       first_norm_ = step_norm;
       first_lambda_ = lambda;
       first_trial_ = false;
     }
+    acceleration_.aim(run_);
     bool arrived = undamped ? convergence_.arrived(promise, run_.chi2) : damped_arrival(promise);
-    if (arrived) arrived = run_.solves(run_.step);
+    arrived = arrived && acceleration_.may_end(run_) && run_.solves(run_.step);
 
-    equations_.retract(run_.estimate, run_.step, run_.trial);
-    const double trial_chi2 = equations_.chi2(run_.trial);
+    const std::optional<double> faster = acceleration_.take(run_);
+    if (faster) {
+      step_norm = norm(run_.step);
+      promise = acceleration_.decrement();
+    } else {
+      equations_.retract(run_.estimate, run_.step, run_.trial);
+    }
+    const double trial_chi2 = faster ? *faster : equations_.chi2(run_.trial);
     if (run_.must_stop()) return;
     const bool lowered = trial_chi2 < run_.chi2;  // false for what is not a number
     const double gained = run_.chi2 - trial_chi2;
@@ -122,6 +131,7 @@ class Run {
   }
 
   void take_step(double trial_chi2) {
+    acceleration_.follow(run_);
     std::swap(run_.estimate, run_.trial);
     const bool final = run_.ended() || run_.last_iteration();
     run_.chi2 = final ? trial_chi2 : equations_.linearize(run_.estimate);
@@ -181,6 +191,7 @@ class Run {
   bool may_go_undamped_;
   Endgame endgame_;
   Convergence convergence_;
+  Acceleration acceleration_;
   std::vector<double> damped_by_;     // λ D
   std::vector<double> min_diagonal_;  // of D
   int small_promises_ = 0;
