@@ -62,8 +62,7 @@ class Bridge final : public ceres::IterationCallback {
     // The cost of a step that was not taken is that of the trial.
     if (ceres.iteration == 0 || ceres.step_is_successful) chi2_ = 2.0 * ceres.cost / cost_scale_;
     if (ceres.iteration == 0) {
-      summary_.initial_chi2 = chi2_;
-      observer_.on_start(graph_, chi2_);
+      observer_.on_start(graph_, summary_.initial_chi2);
       return;
     }
     const Iteration iteration{.number = ceres.iteration,

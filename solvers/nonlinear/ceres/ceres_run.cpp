@@ -2,6 +2,7 @@
 #include "ceres_run.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <string>
 #include <utility>
 
@@ -28,9 +29,12 @@ Summary begin_summary(std::string_view optimizer, std::string_view linear_solver
 bool ends_at_once(const Graph& graph, const Gauge& gauge, const Stop& stop, Observer& observer,
                   Summary& summary) {
   const bool idle = std::ranges::all_of(gauge.held, [](bool held) { return held; });
-  if (!idle && stop.max_iterations > 0) return false;
   summary.initial_chi2 = summary.final_chi2 = chi2(graph);
-  summary.status = idle ? Status::converged : Status::max_iterations;
+  // Ceres ends the process for numbers that it does not expect.
+  const bool finite = std::isfinite(summary.initial_chi2);
+  if (!idle && stop.max_iterations > 0 && finite) return false;
+  if (!finite) summary.notes.emplace_back("chi2 of the initial estimate is not finite");
+  summary.status = !finite ? Status::diverged : idle ? Status::converged : Status::max_iterations;
   observer.on_start(graph, summary.initial_chi2);
   return true;
 }

@@ -127,8 +127,8 @@ class Run final : public ceres::IterationCallback {
 
 void Run::start(double chi2) {
   started_ = true;
-  chi2_ = summary_.initial_chi2 = chi2;
-  observer_.on_start(graph_, chi2);
+  chi2_ = chi2;
+  observer_.on_start(graph_, summary_.initial_chi2);
 }
 
 void Run::record(const ceres::IterationSummary& ceres) {

@@ -92,9 +92,11 @@ TangentScaling NewtonDecrement::block_jacobi(const Graph& graph, const Values& v
     B.diagonal().array() += kSmallestOfABlock * B.diagonal().maxCoeff();
     Eigen::MatrixXd Lt = B.llt().matrixU();
     if (!(Lt.diagonal().minCoeff() > 0.0)) Lt.setIdentity();
-    const Eigen::MatrixXd inverse =
-        Lt.triangularView<Eigen::Upper>().solve(Eigen::MatrixXd::Identity(n, n)) / residual_scale;
+    const Eigen::MatrixXd I = Eigen::MatrixXd::Identity(n, n);
+    Eigen::MatrixXd inverse = Lt.triangularView<Eigen::Upper>().solve(I) / residual_scale;
     Lt *= residual_scale;
+    if (!Lt.allFinite() || !inverse.allFinite())
+      Lt = inverse = I;  // Ceres accepts finite ones only
     const auto variable = static_cast<std::size_t>(linearizer_.variable_of(block));
     scaling.Lt[variable].assign(Lt.data(), Lt.data() + Lt.size());
     scaling.Lt_inverse[variable].assign(inverse.data(), inverse.data() + inverse.size());

@@ -102,6 +102,24 @@ TEST_P(OptimizerTest, ReachesTheMinimum) {
   }
 }
 
+// Ceres ends the process for numbers that it does not expect.
+TEST_P(OptimizerTest, EndsAtOnceWhereChi2IsNotFinite) {
+  for (const double far : {1e200, 1e307}) {
+    Graph graph = ring_of_poses(10, 0.1);
+    for (int v = 0; v < graph.variable_count(); ++v) {
+      std::vector<double> x(graph.state(v).begin(), graph.state(v).end());
+      x[0] = far * (0.1 * v);
+      graph.set_state(v, x);
+    }
+    const Summary summary = optimizer_->optimize(graph);
+    EXPECT_EQ(summary.status, Status::diverged) << far;
+    EXPECT_FALSE(std::isfinite(summary.initial_chi2)) << far;
+    EXPECT_FALSE(std::isfinite(summary.final_chi2)) << far;
+    EXPECT_TRUE(summary.iterations.empty()) << far;
+    EXPECT_THAT(summary.notes, Contains(HasSubstr("not finite"))) << far;
+  }
+}
+
 TEST_P(OptimizerTest, EndsWhereResidualsVanish) {
   Graph graph = rosenbrock();
   const Summary summary = optimizer_->optimize(graph, Stop{.max_iterations = 500});
