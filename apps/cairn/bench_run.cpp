@@ -77,6 +77,8 @@ std::vector<std::string> optimize_arguments(const BenchOptions& options, const s
   add("--threads", fmt::format("{}", common.threads));
   if (options.input.read.skip_unknown) words.push_back("--skip-unknown");
   if (options.input.read.repair_information) words.push_back("--repair-information");
+  if (options.input.read.unit_information) words.push_back("--unit-information");
+  if (options.input.read.skip_dangling) words.push_back("--skip-dangling");
   for (const std::string& file : common.plugins) add("--plugin", file);
   for (const std::string& types : common.types) add("--types", types);
   return words;

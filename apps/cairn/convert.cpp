@@ -6,6 +6,7 @@
 
 #include "arguments.hpp"
 #include "cairn/plugin/registry.hpp"
+#include "cairn/runtime/error.hpp"
 #include "commands.hpp"
 #include "graph_files.hpp"
 #include "json_report.hpp"
@@ -21,6 +22,7 @@ struct ConvertOptions {
   std::string output_file;
   std::string output_format;
   std::string axes;  ///< of IN
+  std::string ground_truth;  ///< file, or empty
   InputOptions input;
 };
 
@@ -31,6 +33,7 @@ boost::json::object report_json(const ConvertOptions& options, const LoadedGraph
   report["format"] = loaded.report.format;
   report["output"] = options.output_file;
   report["poses_alone"] = poses_alone;
+  report["ground_truth"] = text_json(options.ground_truth);
   report["read_notes"] = strings_json(sentences(loaded.report));
   report["seconds"] = boost::json::object{{"read", loaded.seconds}};
   return report;
@@ -53,7 +56,14 @@ void note_axes(const ConvertOptions& options, const LoadedGraph& loaded, const S
 
 int run(const ConvertOptions& options, Session& session) {
   check_output(options.output_file, options.output_format, session);
+  check_output(options.ground_truth, options.output_format, session, false);
   LoadedGraph loaded = load_graph(options.input_file, options.input, session);
+  if (!options.ground_truth.empty() && !loaded.truth) {
+    throw Error(ErrorCode::usage,
+                fmt::format("--ground-truth: {} has no truth beside its states; format pyfg and "
+                            "generated graphs do",
+                            loaded.name));
+  }
   turn_to_robot_axes(loaded, options.axes);
   const std::string format = output_format(options.output_file, options.output_format);
   const bool poses_alone = note_poses_alone(loaded.graph, options.output_file, format, session);
@@ -62,6 +72,10 @@ int run(const ConvertOptions& options, Session& session) {
   results.write(options.output_file, [&] {
     write_graph(loaded.graph, options.output_file, session.registry(), format,
                 loaded.report.stamps);
+  });
+  results.write(options.ground_truth, [&] {
+    write_graph(*loaded.truth, options.ground_truth, session.registry(),
+                output_format(options.ground_truth, options.output_format));
   });
   results.add([&] { session.write_json(report_json(options, loaded, poses_alone)); });
   results.finish();
@@ -90,12 +104,16 @@ Command add_convert(ArgumentParser program) {
   add_axes_option(cli, options->axes,
                   "of IN, a trajectory: camera (z ahead, y down) is turned into robot (x ahead, z "
                   "up)");
+  cli.add_option("--ground-truth", options->ground_truth,
+                 "write the true states too, of a graph that has them beside")
+      .type_name("FILE");
   add_input_options(cli, options->input);
   cli.footer(
       "Example:\n"
       "  cairn convert manhattan_isam.txt manhattan.g2o.gz\n"
       "  cairn convert best.g2o - --to tum\n"
-      "  cairn convert 00.txt robot.tum --axes camera");
+      "  cairn convert 00.txt robot.tum --axes camera\n"
+      "  cairn convert drone.pyfg drone.g2o --ground-truth truth.g2o");
   return {cli, [options](Session& session) { return run(*options, session); }};
 }
 

@@ -388,7 +388,7 @@ int run(const EvaluateOptions& options, Session& session) {
     }
   }
   const LoadedGraph estimate_graph = load_graph(options.estimate.file, options.input, session);
-  const LoadedGraph truth_graph = load_graph(options.truth.file, options.input, session);
+  const LoadedGraph truth_graph = load_ground_truth(options.truth.file, options.input, session);
   std::vector<Id> common;
   if (options.kld) {
     need_factors(estimate_graph);

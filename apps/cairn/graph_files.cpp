@@ -7,6 +7,7 @@
 #include <chrono>
 #include <filesystem>
 #include <optional>
+#include <utility>
 
 #include <fmt/core.h>
 
@@ -118,9 +119,13 @@ void add_input_options(ArgumentParser cli, InputOptions& options) {
       .component({"format"})
       .type_name("FORMAT");
   cli.add_flag("--skip-unknown", options.read.skip_unknown,
-               "skip and count lines with unknown tags, instead of refusing the file");
+               "skip and count lines with unknown tags and factors on vertices that are skipped");
   cli.add_flag("--repair-information", options.read.repair_information,
                "repair known mistakes in information matrices");
+  cli.add_flag("--unit-information", options.read.unit_information,
+               "take factors without information as of unit information, counted");
+  cli.add_flag("--skip-dangling", options.read.skip_dangling,
+               "leave out and count factors on vertices that the file does not have");
 }
 
 std::string output_format(const std::string& file, const std::string& named) {
@@ -133,6 +138,7 @@ LoadedGraph load(const std::string& name, const InputOptions& options, Session& 
   const auto start = std::chrono::steady_clock::now();
   LoadedGraph loaded = name.starts_with('@') ? generate_graph(name, session)
                                              : read_named_graph(name, options, session);
+  if (loaded.report.truth) loaded.truth = std::exchange(loaded.report.truth, std::nullopt);
   loaded.seconds = seconds_since(start);
   loaded.name = name;
   loaded.label = graph_label(name);
@@ -152,7 +158,10 @@ LoadedGraph load_graph(const std::string& name, const InputOptions& options, Ses
 LoadedGraph load_ground_truth(const std::string& name, const InputOptions& options,
                               Session& session) {
   session.files.add_input(name);
-  return load(name, options, session);
+  LoadedGraph loaded = load(name, options, session);
+  if (loaded.truth) loaded.graph = std::move(*loaded.truth);
+  loaded.truth.reset();
+  return loaded;
 }
 
 Simulation simulate(const std::string& spec, std::uint64_t seed, Session& session) {

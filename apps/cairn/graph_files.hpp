@@ -26,7 +26,7 @@ inline constexpr const char* kGraphHelp =
 
 struct LoadedGraph {
   Graph graph;
-  std::optional<Graph> truth;  ///< of a graph that was generated
+  std::optional<Graph> truth;  ///< of a graph that was generated, or whose file has it
   ReadReport report;
   std::string name;      ///< as on the command line
   std::string label;     ///< what results call it: see `graph_label`
@@ -37,7 +37,8 @@ struct LoadedGraph {
 /// "@manhattan:poses=500,seed=3" is generated: a generator, its options, and the seed.
 LoadedGraph load_graph(const std::string& name, const InputOptions& options, Session& session);
 
-/// The same for the ground truth, which no output may replace.
+/// The same for the ground truth, which no output may replace: the true states where they are known
+/// beside the graph.
 LoadedGraph load_ground_truth(const std::string& name, const InputOptions& options,
                               Session& session);
 

@@ -78,6 +78,7 @@ std::string identity(const OnlineOptions& options, const std::string& who, const
                                  options.problem.loss.empty() ? "none" : options.problem.loss,
                                  options.problem.loss_on, options.solve);
   // Not where they are not given: journals of before are continued.
+  if (options.input.read.unit_information) text += ", unit information";
   if (options.keep > 0) text += fmt::format(", keep {}", options.keep);
   if (!options.sparsifier.empty()) text += ", sparsifier " + options.sparsifier;
   if (!options.select.empty()) text += ", select " + options.select;

@@ -10,9 +10,11 @@
 namespace cairn::app {
 namespace {
 
-constexpr std::array<std::pair<std::string_view, std::string_view>, 6> kWords{{
+constexpr std::array<std::pair<std::string_view, std::string_view>, 8> kWords{{
     {"ReadOptions::skip_unknown", "--skip-unknown"},
     {"ReadOptions::repair_information", "--repair-information"},
+    {"ReadOptions::unit_information", "--unit-information"},
+    {"ReadOptions::skip_dangling", "--skip-dangling"},
     {"StampMatching::offset", "--offset"},
     {"StampMatching::max_difference", "--max-time-difference"},
     {"(begin=", "(--begin "},

@@ -20,9 +20,8 @@ constexpr std::size_t kBytes = std::size_t{1} << 18;  // that so many rows of a 
 
 struct Votes {
   int lines = 0;
-  int g2o = 0, toro = 0, isam = 0;
+  int g2o = 0, toro = 0, isam = 0, pyfg = 0;
   int toro_or_isam = 0;                     // by tag either, and the numbers don't tell
-  int vertices = 0;                         // of TORO
   int tagged = 0;                           // any other word
   std::array<int, kLongestRow + 1> rows{};  // of numbers, by their count
   int nanoseconds = 0;                      // of rows, those that begin with 19 digits
@@ -73,22 +72,41 @@ bool is_nanoseconds(std::string_view field) {
   return field.size() == 19 && field.find_first_not_of("0123456789") == std::string_view::npos;
 }
 
-/// An edge that is TORO's or iSAM's: from to x y theta and six numbers that tell, or don't.
-void vote_on_edge(Scanner& scanner, Votes& votes) {
-  scanner.expect({2, 3, 6});
-  std::array<double, 6> six;
+/// An edge that is TORO's or iSAM's: two ids, `measured` numbers, and the information in TORO's
+/// order or its root in iSAM's, which tell, or don't.
+template <std::size_t Numbers>
+void vote_on_edge(Scanner& scanner, int measured, Votes& votes) {
+  scanner.expect({2, measured, static_cast<int>(Numbers)});
+  std::array<double, Numbers> last;
   try {
     scanner.read_id();
     scanner.read_id();
-    std::array<double, 3> measurement;
-    scanner.read_numbers(measurement);
-    scanner.read_numbers(six);
-  } catch (const Error&) {  // a bad line: its reader will say so
+    for (int k = 0; k < measured; ++k) scanner.read_number();
+    scanner.read_numbers(last);
+  } catch (const Error&) {  // a bad line, or without information: its reader will say so
     ++votes.toro_or_isam;
     return;
   }
-  const bool toro = fits_toro(six), isam = fits_isam(six);
+  bool toro = false, isam = false;
+  if constexpr (Numbers == 6) {
+    toro = fits_toro(last);
+    isam = fits_isam(last);
+  } else {
+    toro = is_positive_definite(6, last);
+    for (int row = 0; row < 6; ++row) isam = isam || last[triangle_index(6, row, row)] > 0.0;
+  }
   ++(toro == isam ? votes.toro_or_isam : toro ? votes.toro : votes.isam);
+}
+
+/// Whether one of the first fields after the tag is a name, which PyFactorGraph has for ids.
+bool names_variable(Scanner& scanner) {
+  scanner.expect({});
+  std::array<std::string_view, 2> first;
+  scanner.first_fields(first);
+  return std::ranges::any_of(first, [](std::string_view field) {
+    return field.size() > 1 && std::isalpha(static_cast<unsigned char>(field[0])) != 0 &&
+           std::isdigit(static_cast<unsigned char>(field[1])) != 0;
+  });
 }
 
 void vote_on_landmark(Scanner& scanner, Votes& votes) {
@@ -106,19 +124,17 @@ void vote(Scanner& scanner, Votes& votes) {
     if (!is_number_like(tag)) return;
     ++votes.rows[std::min(fields, kLongestRow)];
     votes.nanoseconds += is_nanoseconds(tag);
-  } else if (tag == "VERTEX2" || tag == "VERTEX") {
+  } else if (tag == "VERTEX2" || tag == "VERTEX" || tag == "VERTEX3" || tag == "EDGE" ||
+             tag == "EQUIV" || tag == "BR") {
     ++votes.toro;
-    ++votes.vertices;
   } else if (tag == "EDGE2" || tag == "ODOMETRY") {
-    vote_on_edge(scanner, votes);
-  } else if (tag == "EDGE") {
-    ++votes.toro;
+    vote_on_edge<6>(scanner, 3, votes);
   } else if (tag == "EDGE3") {
-    ++votes.isam;
+    vote_on_edge<21>(scanner, 6, votes);
   } else if (tag == "LANDMARK") {
     vote_on_landmark(scanner, votes);
   } else if (tag.starts_with("VERTEX_") || tag.starts_with("EDGE_") || tag.starts_with("PARAMS_")) {
-    ++votes.g2o;
+    ++(names_variable(scanner) ? votes.pyfg : votes.g2o);
   } else {
     ++votes.tagged;  // FIX among them, which every format with tags takes
   }
@@ -173,6 +189,7 @@ Likelihood look_at(std::string_view text) {
   likelihood.toro = score(votes.toro);
   likelihood.isam = score(votes.isam);
   likelihood.bal = score(bal.lines());
+  likelihood.pyfg = score(votes.pyfg);
   const Stamped stamped = stamped_rows(votes, rows);
   likelihood.tum = score(stamped.tum);
   likelihood.euroc = score(stamped.euroc);

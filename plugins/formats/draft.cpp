@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <iterator>
+#include <optional>
 #include <utility>
 
 #include <fmt/core.h>
@@ -11,11 +13,25 @@
 #include "cairn/graph/packed.hpp"
 #include "cairn/plugin/plugin_search.hpp"
 #include "cairn/runtime/error.hpp"
-#include "information.hpp"
+#include "cairn/typed/symbol.hpp"
+#include "printed_digits.hpp"
 #include "propagate.hpp"
-#include "scanner.hpp"
 
 namespace cairn::formats {
+namespace {
+
+/// Of the kind that published files have with misplaced entries.
+bool is_repairable(const Draft::FactorKind& kind) {
+  return kind.residual == 6 && kind.type->is_relative();
+}
+
+/// A state or measurement with one number more than it has degrees of freedom, and four at least:
+/// the last four are a rotation.
+bool ends_with_quaternion(int numbers, int degrees) {
+  return numbers == degrees + 1 && numbers >= 4;
+}
+
+}  // namespace
 
 Draft::Draft(std::string file, std::string format, Registry& types, const ReadOptions& options,
              ReadReport& report)
@@ -89,15 +105,17 @@ Draft::FactorSlots Draft::slots(const Factor& factor) {
           {numbers + k.measurement, static_cast<std::size_t>(k.information)}};
 }
 
-void Draft::finish_factor(std::span<const double> as_in_file) {
-  const Factor& factor = factors_.back();
+void Draft::finish_factor(const Scanner& scanner, const Arrangement& arrangement) {
+  Factor& factor = factors_.back();
   const FactorKind& kind = factor_kinds_[factor.kind];
-  const std::span<double> information{numbers_.data() + factor.numbers + kind.measurement,
-                                      static_cast<std::size_t>(kind.information)};
-  const auto failed = first_failed_pivot(kind.residual, information);
-  if (!failed) return;
-  const bool repairable = kind.residual == 6 && kind.type->is_relative();
-  if (repairable && options_.repair_information &&
+  const std::span<double> information = slots(factor).information;
+  if (is_positive_definite(kind.residual, information)) return;
+  if (std::ranges::all_of(information, [](double x) { return x == 0.0; })) {
+    factor.has_effect = false;
+    without_effect_.add(fmt::format("{} in line {}", describe(factor), factor.line));
+    return;
+  }
+  if (options_.repair_information && is_repairable(kind) &&
       repair_misplaced_entries(information.first<21>())) {
     ++report_->repaired;
     return;
@@ -105,29 +123,87 @@ void Draft::finish_factor(std::span<const double> as_in_file) {
   // Semidefinite is fine: it leaves a direction open. But the square of any numbers read as iSAM's
   // root is semidefinite: there they must not fit another meaning.
   std::vector<double> root(information.size());
-  const bool zero = std::ranges::all_of(information, [](double x) { return x == 0.0; });
-  const bool semidefinite = !zero && square_root(information, kind.residual, root);
-  if (semidefinite && format_ != "isam") return;
-  std::string advice;
+  const bool semidefinite = square_root(information, kind.residual, root);
+  if (semidefinite && (!arrangement.is_root || advice(factor, scanner).empty())) return;
+  if (!semidefinite && settle(factor, scanner, arrangement)) return;
+  refuse_information(factor, scanner, arrangement);
+}
+
+bool Draft::settle(const Factor& factor, const Scanner& scanner, const Arrangement& arrangement) {
+  const std::span<double> information = slots(factor).information;
+  std::vector<std::string_view> fields(static_cast<std::size_t>(scanner.layout().information));
+  scanner.last_fields(fields);
+  std::vector<double> as_in_file(fields.size()), rounding(information.size());
+  printed_rounding(fields, as_in_file);
+  arrangement.to_rows(as_in_file, rounding);
+  if (!settle_rounding(factor_kinds_[factor.kind].residual, rounding, information)) return false;
+  settled_.add(fmt::format("{} in line {}", describe(factor), factor.line));
+  return true;
+}
+
+/// What else the numbers may be, and what would help.
+std::string Draft::advice(const Factor& factor, const Scanner& scanner) const {
+  const FactorKind& kind = factor_kinds_[factor.kind];
   if (kind.residual == 3 && kind.type->is_relative()) {
-    if (as_in_file.empty()) as_in_file = information;
-    advice = other_order_hint(as_in_file.first<6>(), format_);
+    std::array<std::string_view, 6> fields;
+    scanner.last_fields(fields);
+    std::array<double, 6> as_in_file{};
+    for (std::size_t k = 0; k < fields.size(); ++k) parse_number(fields[k], as_in_file[k]);
+    return other_order_hint(as_in_file, format_, !variables_.empty());
   }
-  if (repairable && !options_.repair_information) {
-    std::array<double, 21> copy;
-    std::copy(information.begin(), information.end(), copy.begin());
-    if (repair_misplaced_entries(copy)) {
-      advice +=
-          "; moving its (z, rx) and (z, ry) entries to (x, rz) and (y, rz) would make it so: "
-          "ReadOptions::repair_information";
-    }
+  if (!is_repairable(kind) || options_.repair_information) return {};
+  std::array<double, 21> copy;
+  std::copy_n(numbers_.data() + factor.numbers + kind.measurement, copy.size(), copy.begin());
+  return repair_misplaced_entries(copy)
+             ? "; moving its (z, rx) and (z, ry) entries to (x, rz) and (y, rz) would make it so: "
+               "ReadOptions::repair_information"
+             : "";
+}
+
+void Draft::refuse_information(const Factor& factor, const Scanner& scanner,
+                               const Arrangement& arrangement) const {
+  const FactorKind& kind = factor_kinds_[factor.kind];
+  const std::span<const double> information{numbers_.data() + factor.numbers + kind.measurement,
+                                            static_cast<std::size_t>(kind.information)};
+  const auto failed = first_failed_pivot(kind.residual, information);
+  const std::string found =
+      arrangement.is_root
+          ? fmt::format(
+                "the square root of the information of {} has a zero on its diagonal (row "
+                "{})",
+                describe(factor), failed->row + 1)
+          : fmt::format(
+                "the information of {} is not positive semidefinite (pivot {} of its "
+                "Cholesky factor is {:.6g}); expected a positive semidefinite {}x{} matrix",
+                describe(factor), failed->row + 1, failed->pivot, kind.residual, kind.residual);
+  fail(factor.line, found + advice(factor, scanner));
+}
+
+void Draft::take_unit_information(const Scanner& scanner) {
+  const Factor& factor = factors_.back();
+  const FactorKind& kind = factor_kinds_[factor.kind];
+  if (!options_.unit_information) {
+    fail(factor.line,
+         fmt::format("{} without {}; expected {} more (ReadOptions::unit_information takes it as "
+                     "the identity)",
+                     describe(factor), scanner.layout().matrix,
+                     scanner.layout().information == 1
+                         ? "1 number"
+                         : fmt::format("{} numbers", scanner.layout().information)));
   }
-  if (semidefinite && advice.empty()) return;
-  fail(factor.line,
-       fmt::format(
-           "the information of {} is not positive semidefinite or zero (pivot {} of its Cholesky "
-           "factor is {:.6g}); expected a positive semidefinite {}x{} matrix{}",
-           describe(factor), failed->row + 1, failed->pivot, kind.residual, kind.residual, advice));
+  const std::span<double> information = slots(factor).information;
+  std::ranges::fill(information, 0.0);
+  for (int row = 0; row < kind.residual; ++row)
+    information[static_cast<std::size_t>(triangle_index(kind.residual, row, row))] = 1.0;
+  of_unit_information_.add(fmt::format("{} in line {}", describe(factor), factor.line));
+}
+
+void Draft::add_skipped(const Scanner& scanner) {
+  const std::string tag = shown(scanner.tag());
+  ++report_->skipped[tag];
+  if (scanner.tag().starts_with("EDGE") || scanner.tag().starts_with("PARAMS")) return;
+  if (const std::optional<Id> id = scanner.id_after_tag())
+    skipped_vertices_.try_emplace(*id, SkippedVertex{tag, scanner.line()});
 }
 
 Graph Draft::build() {
@@ -150,13 +226,14 @@ Graph Draft::build() {
   if (vertices_missing) {
     const Propagation result = propagate_states(graph);
     report_->notes.push_back(fmt::format(
-        "the file has no vertices: {} were made, with states propagated along the factors{}",
-        graph.variable_count(),
+        "the file has no vertices{}: {} were made, with states propagated along the factors{}",
+        skipped_vertices_.empty() ? "" : " of known types", graph.variable_count(),
         result.roots > 1
             ? fmt::format(" from {} starting points that no factor connects", result.roots)
             : ""));
   }
   hold_variables_of(graph);
+  write_notes();
   return graph;
 }
 
@@ -215,37 +292,59 @@ std::int32_t Draft::index_of(Id id) const {
              : static_cast<std::int32_t>(it - variables_.begin());
 }
 
+std::string Draft::name_of(Id id) const {
+  return format_ == "pyfg" ? id_text(id) : fmt::format("{}", id);
+}
+
 std::string Draft::describe(const Factor& factor) const {
   const FactorKind& kind = factor_kinds_[factor.kind];
   std::string text = kind.name;
-  for (int k = 0; k < kind.arity; ++k) text += fmt::format(" {}", ids_[factor.ids + k]);
+  for (int k = 0; k < kind.arity; ++k) text += " " + name_of(ids_[factor.ids + k]);
   return text;
 }
 
-void Draft::check_ends(const Factor& factor, std::span<int> indices) const {
+/// Whether what names `missing`, which is no variable, is to be left out; it is counted then.
+bool Draft::leave_out(const std::string& what, std::int64_t line, Id missing) {
+  const auto skipped = skipped_vertices_.find(missing);
+  if (skipped != skipped_vertices_.end()) {
+    on_skipped_.add(fmt::format("{} in line {}, on {} {} of line {}", what, line,
+                                skipped->second.tag, name_of(missing), skipped->second.line));
+    return true;
+  }
+  if (options_.skip_dangling) {
+    dangling_.add(fmt::format("{} in line {}", what, line));
+    return true;
+  }
+  fail(line,
+       fmt::format("{}: there is no vertex {} in this file; expected a line that gives it, or "
+                   "a file without any vertices (ReadOptions::skip_dangling leaves out what "
+                   "leads to vertices of another file)",
+                   what, name_of(missing)));
+}
+
+bool Draft::find_ends(const Factor& factor, std::span<int> indices) {
   const FactorKind& kind = factor_kinds_[factor.kind];
   for (int k = 0; k < kind.arity; ++k) {
     const Id id = ids_[factor.ids + k];
     indices[k] = index_of(id);
     if (indices[k] < 0) {
-      fail(factor.line,
-           fmt::format("{}: there is no vertex {} in this file; expected a line that gives it, "
-                       "or a file without any vertices",
-                       describe(factor), id));
+      leave_out(describe(factor), factor.line, id);
+      return false;
     }
     const Variable& variable = variables_[indices[k]];
     if (variable.kind != kind.variable_kinds[k]) {
       fail(factor.line, fmt::format("{}: {} is a {} by line {}; expected a {}", describe(factor),
-                                    id, variable_kinds_[variable.kind].tag, variable.line,
+                                    name_of(id), variable_kinds_[variable.kind].tag, variable.line,
                                     variable_kinds_[kind.variable_kinds[k]].tag));
     }
     for (int other = 0; other < k; ++other) {
       if (indices[other] == indices[k]) {
         fail(factor.line, fmt::format("{} joins variable {} to itself; expected different ids",
-                                      describe(factor), id));
+                                      describe(factor), name_of(id)));
       }
     }
   }
+  return true;
 }
 
 void Draft::add_variables_to(Graph& graph) const {
@@ -260,12 +359,12 @@ void Draft::add_variables_to(Graph& graph) const {
   }
 }
 
-void Draft::add_factors_to(Graph& graph) const {
+void Draft::add_factors_to(Graph& graph) {
   std::vector<int> indices;
   for (const Factor& factor : factors_) {
     const FactorKind& kind = factor_kinds_[factor.kind];
     indices.resize(static_cast<std::size_t>(kind.arity));
-    check_ends(factor, indices);
+    if (!find_ends(factor, indices) || !factor.has_effect) continue;
     const double* numbers = numbers_.data() + factor.numbers;
     try {
       graph.add_factor(kind.type, indices, {numbers, static_cast<std::size_t>(kind.measurement)},
@@ -276,14 +375,87 @@ void Draft::add_factors_to(Graph& graph) const {
   }
 }
 
-void Draft::hold_variables_of(Graph& graph) const {
+void Draft::hold_variables_of(Graph& graph) {
   for (const Held& held : held_) {
     const std::int32_t index = index_of(held.id);
-    if (index < 0) {
-      fail(held.line, fmt::format("FIX {}: there is no vertex {} in this file", held.id, held.id));
+    if (index >= 0) {
+      graph.set_fixed(index);
+    } else {
+      leave_out(fmt::format("FIX {}", name_of(held.id)), held.line, held.id);
     }
-    graph.set_fixed(index);
   }
+}
+
+// Notes -------------------------------------------------------------------------------------------
+
+namespace {
+
+/// Of the last four numbers.
+double norm_of(std::span<const double> numbers) {
+  const double* q = numbers.data() + numbers.size() - 4;
+  return std::hypot(std::hypot(q[0], q[1]), std::hypot(q[2], q[3]));
+}
+
+/// More than six digits leave; zero is refused.
+bool is_off(double norm) {
+  constexpr double kTolerance = 1e-5;
+  return norm != 0.0 && std::abs(norm - 1.0) > kTolerance;
+}
+
+/// Whether a type makes the last four numbers, which are not of norm 1, a quaternion.
+template <class Type>
+bool would_normalize(const Type& type, std::span<const double> numbers) {
+  if (!is_off(norm_of(numbers))) return false;
+  std::vector<double> copy(numbers.begin(), numbers.end());
+  return type.normalize(copy.data()).empty() && !is_off(norm_of(copy));
+}
+
+}  // namespace
+
+void Draft::check_quaternion(std::span<const double> numbers, std::int64_t line,
+                             const std::string& what) {
+  const double norm = norm_of(numbers);
+  if (is_off(norm)) norms_.add(fmt::format("{} in line {} with the norm {:.6g}", what, line, norm));
+}
+
+void Draft::check_quaternions() {
+  if (format_ == "kitti") return;  // of matrices, which its reader checks
+  for (const Variable& variable : variables_) {
+    const VariableKind& kind = variable_kinds_[variable.kind];
+    if (!ends_with_quaternion(kind.size, kind.type->tangent_size())) continue;
+    const std::span<const double> state{numbers_.data() + variable.numbers,
+                                        static_cast<std::size_t>(kind.size)};
+    if (would_normalize(*kind.type, state))
+      check_quaternion(state, variable.line, fmt::format("{} {}", kind.tag, name_of(variable.id)));
+  }
+  for (const Factor& factor : factors_) {
+    const FactorKind& kind = factor_kinds_[factor.kind];
+    if (!ends_with_quaternion(kind.measurement, kind.residual)) continue;
+    const std::span<const double> z = slots(factor).measurement;
+    if (would_normalize(*kind.type, z)) check_quaternion(z, factor.line, describe(factor));
+  }
+}
+
+void Draft::write_notes() {
+  check_quaternions();
+  const auto note = [this](const Tally& tally, const char* one, const char* many,
+                           std::string_view rest) {
+    if (tally.count == 0) return;
+    report_->notes.push_back(fmt::format("{} {}{}: {}{}", tally.count,
+                                         tally.count == 1 ? one : many, rest,
+                                         tally.count == 1 ? "" : "the first is ", tally.first));
+  };
+  note(settled_, "factor", "factors",
+       " had information that was not positive semidefinite by less than its printed digits; it "
+       "was set to the nearest semidefinite matrix");
+  note(without_effect_, "factor has zero information and", "factors have zero information and",
+       " no effect (left out)");
+  note(of_unit_information_, "factor", "factors",
+       " without information taken as of unit information");
+  note(on_skipped_, "line", "lines", " left out, on vertices of skipped lines");
+  note(dangling_, "line", "lines", " left out, on vertices that this file does not have");
+  note(norms_, "quaternion is", "quaternions are",
+       " not of norm 1 and normalised (expected qx qy qz qw)");
 }
 
 void Draft::fail(std::int64_t line, std::string_view what) const {

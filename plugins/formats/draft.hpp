@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <span>
 #include <string>
@@ -10,6 +11,8 @@
 
 #include "cairn/io/format.hpp"
 #include "cairn/plugin/registry.hpp"
+#include "information.hpp"
+#include "scanner.hpp"
 
 namespace cairn::formats {
 
@@ -27,8 +30,9 @@ class Draft {
   struct Factor {
     std::int32_t kind;
     std::int64_t line;
-    std::size_t ids;      ///< first of arity
-    std::size_t numbers;  ///< first of measurement_size + n(n+1)/2
+    std::size_t ids;         ///< first of arity
+    std::size_t numbers;     ///< first of measurement_size + n(n+1)/2
+    bool has_effect = true;  ///< its information is not zero
   };
   struct Held {
     Id id;
@@ -68,16 +72,21 @@ class Draft {
     std::span<double> information;
   };
   FactorSlots add_factor(std::int32_t kind, std::int64_t line);
-  /// To be called when the slots of the last factor are filled: repairs its information where that
-  /// is asked for and possible, and complains if it is not positive definite. `as_in_file`: the
-  /// numbers of the information as they stood there, if that was in another order, for a hint at
-  /// what else they could be.
-  void finish_factor(std::span<const double> as_in_file = {});
+  /// To be called when the slots of the last factor are filled from the line of `scanner`, its
+  /// information by `arrangement`. Information that is not positive definite is repaired where that
+  /// is asked for and possible, set to the nearest semidefinite matrix where it is indefinite by no
+  /// more than the digits printed, and refused else; a factor without any has no effect.
+  void finish_factor(const Scanner& scanner, const Arrangement& arrangement = kRows);
+  /// For the last factor, whose line ends before the information: the identity, if that is asked
+  /// for; refused else.
+  void take_unit_information(const Scanner& scanner);
+  /// A line with an unknown tag was left out; what looks like a vertex is known by its id.
+  void add_skipped(const Scanner& scanner);
   void add_held(Id id, std::int64_t line) { held_.push_back({id, line}); }
 
   std::vector<Variable>& variables() { return variables_; }
   std::vector<Factor>& factors() { return factors_; }
-  const std::vector<Held>& held() const { return held_; }
+  std::vector<Held>& held() { return held_; }
   FactorSlots slots(const Factor& factor);
   /// A number of a state or measurement by its place.
   double number(std::size_t place) const { return numbers_[place]; }
@@ -86,6 +95,16 @@ class Draft {
   /// not on offer: "; note: …" for each, empty if nothing is.
   std::string plugin_problems() const;
   const std::string& file() const { return file_; }
+  const ReadOptions& options() const { return options_; }
+  /// "EDGE_SE2 3 4", with names where the format has names in place of ids.
+  std::string describe(const Factor& factor) const;
+
+  /// Counts a quaternion, the last four of these numbers, whose norm is not 1 but for rounding.
+  void check_quaternion(std::span<const double> numbers, std::int64_t line,
+                        const std::string& what);
+
+  /// Reports what was counted: to be called by readers that build no graph.
+  void write_notes();
 
   /// The graph: variables by rising id, factors as in the file. If the file has no vertices at all,
   /// those that its factors join are made, with states propagated along the factors. Throws `Error`
@@ -95,14 +114,30 @@ class Draft {
   [[noreturn]] void fail(std::int64_t line, std::string_view what) const;
 
  private:
+  /// How often something was done that the report has to say, and where first.
+  struct Tally {
+    std::int64_t count = 0;
+    std::string first;
+    void add(const std::string& what) {
+      if (count++ == 0) first = what;
+    }
+  };
+
+  std::string name_of(Id id) const;
+  void refuse_information(const Factor& factor, const Scanner& scanner,
+                          const Arrangement& arrangement) const;
+  bool settle(const Factor& factor, const Scanner& scanner, const Arrangement& arrangement);
+  std::string advice(const Factor& factor, const Scanner& scanner) const;
   void make_missing_variables();
   void sort_variables();
   std::int32_t index_of(Id id) const;  ///< among the sorted variables, or -1
-  std::string describe(const Factor& factor) const;
-  void check_ends(const Factor& factor, std::span<int> indices) const;
+  /// False if the factor is to be left out, since a variable of it is not there.
+  bool find_ends(const Factor& factor, std::span<int> indices);
+  bool leave_out(const std::string& what, std::int64_t line, Id missing);
   void add_variables_to(Graph& graph) const;
-  void add_factors_to(Graph& graph) const;
-  void hold_variables_of(Graph& graph) const;
+  void add_factors_to(Graph& graph);
+  void hold_variables_of(Graph& graph);
+  void check_quaternions();
 
   std::string file_;
   std::string format_;
@@ -116,6 +151,12 @@ class Draft {
   std::vector<Held> held_;
   std::vector<Id> ids_;
   std::vector<double> numbers_;
+  struct SkippedVertex {
+    std::string tag;
+    std::int64_t line;
+  };
+  std::map<Id, SkippedVertex> skipped_vertices_;
+  Tally settled_, without_effect_, of_unit_information_, on_skipped_, dangling_, norms_;
 };
 
 }  // namespace cairn::formats

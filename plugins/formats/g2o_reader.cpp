@@ -45,6 +45,7 @@ bool is_parameter_tag(std::string_view tag) {
 
 struct Offset {
   SensorOffset value;
+  std::array<double, 7> numbers;  ///< as they stand
   std::int64_t line;
 };
 using Offsets = std::map<Id, Offset>;
@@ -80,6 +81,8 @@ class G2oReader {
   StreamLine read_stream() {
     while (scanner_.next_line()) read_line();
     apply_offsets();
+    refuse_without_effect();
+    draft_.write_notes();
     StreamLine line;
     for (const Draft::Variable& v : draft_.variables()) {
       const Draft::VariableKind& kind = draft_.variable(v.kind);
@@ -131,7 +134,6 @@ class G2oReader {
   void add_factor_tag(std::string_view tag) {
     tags_.add(std::string(tag), [kind = draft_.factor_kind(tag)](Scanner& scanner, Draft& draft) {
       read_factor(scanner, draft, kind);
-      draft.finish_factor();
     });
   }
   std::vector<std::string> tags_on_offer() const {
@@ -148,18 +150,19 @@ class G2oReader {
   void read_offset() {
     scanner_.expect({1, 7, 0});
     const Id id = scanner_.read_id();
-    std::array<double, 7> numbers;
-    scanner_.read_numbers(numbers);
+    Offset offset{{}, {}, scanner_.line()};
+    scanner_.read_numbers(offset.numbers);
     scanner_.end_line();
-    Offset offset{{}, scanner_.line()};
-    if (const std::string problem = offset.value.set(numbers); !problem.empty()) {
+    if (const std::string problem = offset.value.set(offset.numbers); !problem.empty()) {
       scanner_.fail(fmt::format("{} {}: {}", kOffset, id, problem));
     }
+    draft_.check_quaternion(offset.numbers, scanner_.line(), fmt::format("{} {}", kOffset, id));
+    // Files that were put together from others give the same parameter again and again.
     const auto [place, added] = offsets_.emplace(id, offset);
-    if (!added) {
-      scanner_.fail(
-          fmt::format("{} {}: the id was already given in line {}; expected every id once", kOffset,
-                      id, place->second.line));
+    if (!added && place->second.numbers != offset.numbers) {
+      scanner_.fail(fmt::format(
+          "{} {}: line {} gives other numbers for this id; expected the same, or another id",
+          kOffset, id, place->second.line));
     }
   }
 
@@ -171,9 +174,7 @@ class G2oReader {
     for (Id& id : slots.ids) id = scanner_.read_id();
     references_.push_back({draft_.factors().size() - 1, scanner_.read_id()});
     scanner_.read_numbers(slots.measurement);
-    scanner_.read_numbers(slots.information);
-    scanner_.end_line();
-    draft_.finish_factor();
+    read_information(scanner_, draft_);
   }
   void read_point_seen() { read_with_parameter(draft_.factor_kind(kPointSeen)); }
   void read_prior() { read_with_parameter(draft_.factor_kind(kOwnPrior, kPrior)); }
@@ -289,6 +290,15 @@ class G2oReader {
     offset.value.apply_to_point(slots.measurement.first<3>(), slots.information.first<6>());
   }
 
+  /// A stream has no place for a measurement that measures nothing.
+  void refuse_without_effect() {
+    for (const Draft::Factor& factor : draft_.factors()) {
+      if (factor.has_effect) continue;
+      draft_.fail(factor.line, fmt::format("the information of {} is zero: it would have no effect",
+                                           draft_.describe(factor)));
+    }
+  }
+
   void note_unused_parameters() {
     for (const auto& [tag, lines] : unused_parameters_) {
       draft_.report().notes.push_back(
@@ -318,6 +328,7 @@ class G2oStream final : public StreamFormat {
     G2oReader reader(line, name, types, options, report, number, offsets_, other_words());
     StreamLine said = reader.read_stream();
     said.skipped = !report.skipped.empty();
+    said.notes = std::move(report.notes);
     if (reader.offsets().size() != offsets_.size()) offsets_ = reader.offsets();
     return said;
   }

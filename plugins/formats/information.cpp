@@ -6,6 +6,8 @@
 #include <utility>
 #include <vector>
 
+#include "cairn/graph/packed.hpp"
+
 namespace cairn::formats {
 namespace {
 
@@ -17,11 +19,22 @@ std::array<double, 6> copy_of(std::span<const double, 6> numbers) {
 
 }  // namespace
 
-void from_toro_order(std::span<double, 6> information) {
-  const auto [i11, i12, i22, i33, i13, i23] = copy_of(information);
-  const std::array<double, 6> rows{i11, i12, i13, i22, i23, i33};
-  std::copy(rows.begin(), rows.end(), information.begin());
-}
+const Arrangement kRows{[](std::span<const double> as_in_file, std::span<double> rows) {
+  std::ranges::copy(as_in_file, rows.begin());
+}};
+
+const Arrangement kToroOrder{[](std::span<const double> toro, std::span<double> rows) {
+  constexpr std::array<std::size_t, 6> kPlaces{0, 1, 4, 2, 5, 3};
+  for (std::size_t k = 0; k < kPlaces.size(); ++k) rows[k] = toro[kPlaces[k]];
+}};
+
+const Arrangement kRoot{[](std::span<const double> root, std::span<double> rows) {
+                          std::ranges::copy(root, rows.begin());
+                          int n = 1;
+                          while (packed_size(n) < rows.size()) ++n;
+                          square_from_root(n, rows);
+                        },
+                        true};
 
 void to_toro_order(std::span<double, 6> information) {
   const auto [i11, i12, i13, i22, i23, i33] = copy_of(information);
@@ -84,8 +97,8 @@ bool repair_misplaced_entries(std::span<double, 21> information) {
 bool fits_g2o(std::span<const double, 6> as_in_file) { return is_positive_definite(3, as_in_file); }
 
 bool fits_toro(std::span<const double, 6> as_in_file) {
-  std::array<double, 6> information = copy_of(as_in_file);
-  from_toro_order(information);
+  std::array<double, 6> information;
+  kToroOrder.to_rows(as_in_file, information);
   return is_positive_definite(3, information);
 }
 
@@ -93,15 +106,21 @@ bool fits_isam(std::span<const double, 6> as_in_file) {
   return as_in_file[0] > 0.0 && as_in_file[3] > 0.0 && as_in_file[5] > 0.0;
 }
 
-std::string other_order_hint(std::span<const double, 6> as_in_file, std::string_view read_as) {
-  if (read_as != "toro" && fits_toro(as_in_file)) {
+std::string other_order_hint(std::span<const double, 6> as_in_file, std::string_view read_as,
+                             bool has_vertices) {
+  if (read_as == "g2o" && fits_toro(as_in_file)) {
+    return "; the numbers would fit TORO's order of information, I11 I12 I22 I33 I13 I23, whose "
+           "tag is EDGE2";
+  }
+  if (read_as == "isam" && fits_toro(as_in_file)) {
     return "; the numbers would fit TORO's order of information (format toro)";
   }
-  if (read_as != "isam" && fits_isam(as_in_file)) {
+  if (read_as == "toro" && !has_vertices && fits_isam(as_in_file)) {
     return "; the numbers would fit iSAM's square root of the information (format isam)";
   }
-  if (read_as != "g2o" && fits_g2o(as_in_file)) {
-    return "; the numbers would fit g2o's order of information (format g2o)";
+  if (read_as == "toro" && fits_g2o(as_in_file)) {
+    return "; the numbers would fit g2o's order of information, I11 I12 I13 I22 I23 I33, whose tag "
+           "is EDGE_SE2";
   }
   return {};
 }

@@ -16,10 +16,21 @@ constexpr int triangle_index(int n, int row, int column) {
   return row * n - row * (row - 1) / 2 + (column - row);
 }
 
-/// TORO's order of a planar pose's information, I11 I12 I22 I33 I13 I23, to rows of the upper
-/// triangle.
-void from_toro_order(std::span<double, 6> information);
-/// The inverse.
+/// How the numbers at the end of a factor's line become its information.
+struct Arrangement {
+  /// From the numbers of the line to rows of the upper triangle.
+  void (*to_rows)(std::span<const double> as_in_file, std::span<double> rows);
+  /// They are a square root of it, so that the result is semidefinite whatever was rounded.
+  bool is_root = false;
+};
+/// As they stand.
+extern const Arrangement kRows;
+/// TORO's order of a planar pose: I11 I12 I22 I33 I13 I23.
+extern const Arrangement kToroOrder;
+/// iSAM's upper-triangular square root U, row by row: the information is UᵀU.
+extern const Arrangement kRoot;
+
+/// From rows of the upper triangle to TORO's order of a planar pose.
 void to_toro_order(std::span<double, 6> information);
 
 /// Upper-triangular square root U (n × n, row by row) to information UᵀU, in place.
@@ -43,10 +54,11 @@ inline bool is_positive_definite(int n, std::span<const double> information) {
 /// definite.
 bool repair_misplaced_entries(std::span<double, 21> information);
 
-/// What to try when planar information is not positive definite as it was read but would be in the
-/// order of another format; empty if nothing would help. `as_in_file`: the six numbers as they
-/// stand.
-std::string other_order_hint(std::span<const double, 6> as_in_file, std::string_view read_as);
+/// What else the six numbers of a planar pose's information may be that are not positive definite
+/// as they were read; empty if nothing. A format is named only where it reads lines of these tags
+/// too: TORO's text, unless it `has_vertices`, is read as iSAM's, and the reverse.
+std::string other_order_hint(std::span<const double, 6> as_in_file, std::string_view read_as,
+                             bool has_vertices);
 
 /// Whether six numbers make sense as TORO's information, or as iSAM's square root (positive
 /// diagonal).

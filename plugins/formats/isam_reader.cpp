@@ -6,8 +6,6 @@
 //     LANDMARK       pose landmark x y               + 3    Cartesian, in the frame of the pose
 
 #include <algorithm>
-#include <array>
-#include <cmath>
 #include <iterator>
 #include <limits>
 #include <vector>
@@ -21,15 +19,6 @@
 namespace cairn::formats {
 namespace {
 
-/// qx qy qz qw of Rz(yaw) Ry(pitch) Rx(roll).
-std::array<double, 4> quaternion_from(double roll, double pitch, double yaw) {
-  const double cr = std::cos(roll / 2), sr = std::sin(roll / 2);
-  const double cp = std::cos(pitch / 2), sp = std::sin(pitch / 2);
-  const double cy = std::cos(yaw / 2), sy = std::sin(yaw / 2);
-  return {sr * cp * cy - cr * sp * sy, cr * sp * cy + sr * cp * sy, cr * cp * sy - sr * sp * cy,
-          cr * cp * cy + sr * sp * sy};
-}
-
 class IsamReader {
  public:
   IsamReader(std::string_view text, const std::string& name, Registry& types,
@@ -38,12 +27,12 @@ class IsamReader {
     for (const char* tag : {"ODOMETRY", "EDGE2"}) {
       tags_.add(tag, [kind = -1](Scanner& scanner, Draft& draft) mutable {
         if (kind < 0) kind = draft.factor_kind("EDGE_SE2", scanner.tag());
-        read_planar(scanner, draft, kind);
+        read_factor(scanner, draft, kind, kRoot);
       });
     }
     tags_.add("EDGE3", [kind = -1](Scanner& scanner, Draft& draft) mutable {
       if (kind < 0) kind = draft.factor_kind("EDGE_SE3:QUAT", scanner.tag());
-      read_spatial(scanner, draft, kind);
+      read_edge_of_angles(scanner, draft, kind, kRoot);
     });
     tags_.add("LANDMARK", [this](Scanner&, Draft&) { read_landmark(); });
     tags_.add("FIX", read_fix);
@@ -63,43 +52,16 @@ class IsamReader {
   }
 
  private:
-  static void read_planar(Scanner& scanner, Draft& draft, std::int32_t kind) {
-    const Draft::FactorSlots slots = read_factor(scanner, draft, kind);
-    std::array<double, 6> as_in_file;
-    std::copy(slots.information.begin(), slots.information.end(), as_in_file.begin());
-    square_from_root(3, slots.information);
-    draft.finish_factor(as_in_file);
-  }
-
-  static void read_spatial(Scanner& scanner, Draft& draft, std::int32_t kind) {
-    scanner.expect({2, 6, 21});
-    const Draft::FactorSlots slots = draft.add_factor(kind, scanner.line());
-    for (Id& id : slots.ids) id = scanner.read_id();
-    scanner.read_numbers(slots.measurement.first<3>());
-    std::array<double, 3> angles;
-    scanner.read_numbers(angles);
-    const std::array<double, 4> q = quaternion_from(angles[0], angles[1], angles[2]);
-    std::copy(q.begin(), q.end(), slots.measurement.begin() + 3);
-    scanner.read_numbers(slots.information);
-    scanner.end_line();
-    square_from_root(6, slots.information);
-    draft.finish_factor();
-  }
-
   void read_landmark() {
     if (landmark_kind_ < 0) landmark_kind_ = draft_.factor_kind("EDGE_SE2_XY", scanner_.tag());
-    const Draft::FactorSlots slots = read_factor(scanner_, draft_, landmark_kind_);
-    square_from_root(2, slots.information);
-    draft_.finish_factor();
+    read_factor(scanner_, draft_, landmark_kind_, kRoot);
   }
 
   void refuse_vertices() const {
-    if (scanner_.tag().starts_with("VERTEX")) {
-      scanner_.fail(
-          fmt::format("'{}', but iSAM text has no vertices; expected edges only, or another format "
-                      "(toro, g2o) to be named",
-                      shown(scanner_.tag())));
-    }
+    if (!scanner_.tag().starts_with("VERTEX")) return;
+    scanner_.fail(fmt::format(
+        "'{}', but iSAM text has no vertices; expected edges only (format {} reads such vertices)",
+        shown(scanner_.tag()), scanner_.tag().starts_with("VERTEX_") ? "g2o" : "toro"));
   }
 
   /// Landmarks may have ids of their own that collide with those of poses. Then all landmarks are

@@ -69,6 +69,7 @@ void cairn_register(Registrar& registrar) {
       {"toro", {"graph", "toro"}, &Likelihood::toro, read_toro, write_toro},
       {"isam", {"isam", "txt"}, &Likelihood::isam, read_isam, nullptr},
       {"bal", {"bal"}, &Likelihood::bal, read_bal, write_bal},
+      {"pyfg", {"pyfg"}, &Likelihood::pyfg, read_pyfg, nullptr},
       {"tum", {"tum"}, &Likelihood::tum, read_tum, nullptr, write_tum},
       {"euroc", {"csv"}, &Likelihood::euroc, read_euroc, nullptr},
       {"kitti", {"kitti"}, &Likelihood::kitti, read_kitti, nullptr, write_kitti},

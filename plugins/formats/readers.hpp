@@ -20,6 +20,8 @@ Graph read_isam(std::string_view text, const std::string& name, Registry& types,
                 const ReadOptions& options, ReadReport& report);
 Graph read_bal(std::string_view text, const std::string& name, Registry& types,
                const ReadOptions& options, ReadReport& report);
+Graph read_pyfg(std::string_view text, const std::string& name, Registry& types,
+                const ReadOptions& options, ReadReport& report);
 Graph read_tum(std::string_view text, const std::string& name, Registry& types,
                const ReadOptions& options, ReadReport& report);
 Graph read_euroc(std::string_view text, const std::string& name, Registry& types,

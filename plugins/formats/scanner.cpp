@@ -4,12 +4,14 @@
 #include <charconv>
 #include <cmath>
 #include <cstring>
+#include <optional>
 #include <utility>
 
 #include <fast_float/fast_float.h>
 #include <fmt/core.h>
 
 #include "cairn/runtime/error.hpp"
+#include "cairn/typed/symbol.hpp"
 
 namespace cairn::formats {
 namespace {
@@ -37,17 +39,6 @@ std::string_view without_plus(std::string_view field) {
                                                                                    : field;
 }
 
-/// Whether the whole field is spelled as a number, infinity and NaN among them. Versions of
-/// fast_float differ in whether they report what is too large or too small for a double; the value
-/// is then infinite, or the nearest double (be it zero), either way.
-bool parse_number(std::string_view field, double& number) {
-  const std::string_view digits = without_plus(field);
-  const char* const end = digits.data() + digits.size();
-  const auto result = fast_float::from_chars(digits.data(), end, number);
-  return (result.ec == std::errc{} || result.ec == std::errc::result_out_of_range) &&
-         result.ptr == end;
-}
-
 std::string expected_fields(const Layout& layout) {
   const auto count = [](int n, const char* one, const char* many) {
     return fmt::format("{} {}", n, n == 1 ? one : many);
@@ -61,7 +52,7 @@ std::string expected_fields(const Layout& layout) {
     add(count(layout.measurement, "number", "numbers") +
         (layout.information > 0 ? " of the measurement" : ""));
   }
-  if (layout.information > 0) add(fmt::format("{} of the information", layout.information));
+  if (layout.information > 0) add(fmt::format("{} of the {}", layout.information, layout.matrix));
   return fmt::format("{}{}", count(layout.total(), "field", "fields"),
                      parts.empty() ? "" : fmt::format(" ({})", parts));
 }
@@ -70,6 +61,14 @@ std::string expected_fields(const Layout& layout) {
 
 std::string located(std::string_view file, std::int64_t line, std::string_view what) {
   return fmt::format("{}:{}: {}", file, line, what);
+}
+
+bool parse_number(std::string_view field, double& number) {
+  const std::string_view digits = without_plus(field);
+  const char* const end = digits.data() + digits.size();
+  const auto result = fast_float::from_chars(digits.data(), end, number);
+  return (result.ec == std::errc{} || result.ec == std::errc::result_out_of_range) &&
+         result.ptr == end;
 }
 
 std::string shown(std::string_view field) {
@@ -139,6 +138,17 @@ std::string_view Scanner::required_field() {
 Id Scanner::read_id() { return read_whole("an id", INT64_MAX); }
 std::int64_t Scanner::read_count() { return read_whole("a count", INT32_MAX); }
 
+Id Scanner::read_symbol() {
+  const std::string_view field = required_field();
+  const std::optional<Id> id = id_from_text(field);
+  if (!id || !as_symbol(*id)) {
+    if (count_fields() != layout_.total()) fail_count();
+    fail(fmt::format("field {} of {} is '{}'; expected a name, a letter and a number such as A0",
+                     read_, shown(subject_), shown(field)));
+  }
+  return *id;
+}
+
 std::int64_t Scanner::read_whole(std::string_view what, std::int64_t largest) {
   const std::string_view field = required_field();
   const std::string_view digits = without_plus(field);
@@ -176,6 +186,28 @@ int Scanner::count_fields() const {
   int fields = 0;
   while (!take_field(text).empty()) ++fields;
   return fields;
+}
+
+std::optional<Id> Scanner::id_after_tag() const {
+  std::string_view text = start_;
+  take_field(text);  // the tag: nothing of this line was expected yet
+  const std::string_view digits = without_plus(take_field(text));
+  Id id = 0;
+  const auto [end, problem] = std::from_chars(digits.data(), digits.data() + digits.size(), id);
+  const bool whole = problem == std::errc{} && end == digits.data() + digits.size() && id >= 0;
+  return whole && !digits.empty() ? std::optional(id) : std::nullopt;
+}
+
+void Scanner::first_fields(std::span<std::string_view> out) const {
+  std::string_view text = start_;
+  for (std::string_view& field : out) field = take_field(text);
+}
+
+void Scanner::last_fields(std::span<std::string_view> out) const {
+  const auto fields = static_cast<std::size_t>(count_fields());
+  std::string_view text = start_;
+  for (std::size_t k = out.size(); k < fields; ++k) take_field(text);
+  for (std::string_view& field : out) field = take_field(text);
 }
 
 void Scanner::fail(std::string_view what) const {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -18,6 +19,8 @@ struct Layout {
   int ids = 0;
   int measurement = 0;  ///< numbers of the state or measurement
   int information = 0;  ///< numbers of the information matrix
+  /// What messages call that matrix where it is another.
+  std::string_view matrix = "information";
   int total() const { return ids + measurement + information; }
 };
 
@@ -46,6 +49,8 @@ class Scanner {
   void expect_row(Layout layout, std::string_view what);
 
   Id read_id();
+  /// The id that a name stands for, a letter and a number such as A0 (`cairn::symbol`).
+  Id read_symbol();
   /// How many of something: an integer from 0 to 2³¹ − 1.
   std::int64_t read_count();
   double read_number();
@@ -55,8 +60,16 @@ class Scanner {
   /// Complains if fields are left.
   void end_line();
 
+  /// As it was expected.
+  const Layout& layout() const { return layout_; }
+  /// The field after the tag, if it is an id.
+  std::optional<Id> id_after_tag() const;
   /// Fields of this line after the tag (or all, in a row).
   int count_fields() const;
+  /// The first fields after the tag, as many as `out` has room for; empty where there are fewer.
+  void first_fields(std::span<std::string_view> out) const;
+  /// The last fields of this line, as many as `out` has room for; empty where there are fewer.
+  void last_fields(std::span<std::string_view> out) const;
   [[noreturn]] void fail(std::string_view what) const;
 
  private:
@@ -78,6 +91,11 @@ class Scanner {
   Layout layout_;
   int read_ = 0;  // fields read since expect
 };
+
+/// Whether the whole field is spelled as a number, infinity and NaN among them. Versions of
+/// fast_float differ in whether they report what is too large or too small for a double; the value
+/// is then infinite, or the nearest double (be it zero), either way.
+bool parse_number(std::string_view field, double& number);
 
 /// A field as it is shown in a message: cut short, bytes that cannot be printed as \xNN.
 std::string shown(std::string_view field);

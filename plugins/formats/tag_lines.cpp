@@ -1,11 +1,18 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "tag_lines.hpp"
 
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <span>
+#include <vector>
+
 #include <fmt/core.h>
 #include <fmt/ranges.h>
 
 #include "cairn/runtime/error.hpp"
 #include "cairn/text/spelling.hpp"
+#include "euler_angles.hpp"
 
 namespace cairn::formats {
 
@@ -34,7 +41,7 @@ std::string remedy(std::string_view tag, std::span<const std::string> on_offer,
 void unknown_tag(const Scanner& scanner, Draft& draft, const ReadOptions& options,
                  std::span<const std::string> on_offer, std::span<const std::string> commands) {
   if (options.skip_unknown) {
-    ++draft.report().skipped[shown(scanner.tag())];
+    draft.add_skipped(scanner);
     return;
   }
   scanner.fail(fmt::format("unknown tag '{}'{} (ReadOptions::skip_unknown leaves such lines out){}",
@@ -42,15 +49,48 @@ void unknown_tag(const Scanner& scanner, Draft& draft, const ReadOptions& option
                            draft.plugin_problems()));
 }
 
-Draft::FactorSlots read_factor(Scanner& scanner, Draft& draft, std::int32_t kind) {
+void read_factor(Scanner& scanner, Draft& draft, std::int32_t kind,
+                 const Arrangement& arrangement) {
   const Draft::FactorKind& k = draft.factor(kind);
   scanner.expect({k.arity, k.measurement, k.information});
   const Draft::FactorSlots slots = draft.add_factor(kind, scanner.line());
   for (Id& id : slots.ids) id = scanner.read_id();
   scanner.read_numbers(slots.measurement);
-  scanner.read_numbers(slots.information);
+  read_information(scanner, draft, arrangement);
+}
+
+void read_information(Scanner& scanner, Draft& draft, const Arrangement& arrangement) {
+  if (!scanner.more()) return draft.take_unit_information(scanner);
+  constexpr std::size_t kUsual = 21;  // up to 6 × 6, without allocating
+  std::array<double, kUsual> usual;
+  std::vector<double> large;
+  std::span<double> as_in_file(usual);
+  const auto count = static_cast<std::size_t>(scanner.layout().information);
+  if (count > kUsual) {
+    large.resize(count);
+    as_in_file = large;
+  }
+  as_in_file = as_in_file.first(count);
+  scanner.read_numbers(as_in_file);
   scanner.end_line();
-  return slots;
+  arrangement.to_rows(as_in_file, draft.slots(draft.factors().back()).information);
+  draft.finish_factor(scanner, arrangement);
+}
+
+void read_pose_of_angles(Scanner& scanner, std::span<double> pose) {
+  scanner.read_numbers(pose.first<3>());
+  std::array<double, 3> angles;
+  scanner.read_numbers(angles);
+  std::ranges::copy(quaternion_from(angles), pose.begin() + 3);
+}
+
+void read_edge_of_angles(Scanner& scanner, Draft& draft, std::int32_t kind,
+                         const Arrangement& arrangement) {
+  scanner.expect({2, 6, 21});
+  const Draft::FactorSlots slots = draft.add_factor(kind, scanner.line());
+  for (Id& id : slots.ids) id = scanner.read_id();
+  read_pose_of_angles(scanner, slots.measurement);
+  read_information(scanner, draft, arrangement);
 }
 
 void read_variable(Scanner& scanner, Draft& draft, std::int32_t kind) {

@@ -59,8 +59,16 @@ void read_fix(Scanner& scanner, Draft& draft);
 void unknown_tag(const Scanner& scanner, Draft& draft, const ReadOptions& options,
                  std::span<const std::string> on_offer, std::span<const std::string> commands = {});
 
-/// Reads ids, measurement and information of a factor line as they stand.
-Draft::FactorSlots read_factor(Scanner& scanner, Draft& draft, std::int32_t kind);
+/// Reads a factor line whose measurement stands there as it is kept: ids, measurement, information.
+void read_factor(Scanner& scanner, Draft& draft, std::int32_t kind,
+                 const Arrangement& arrangement = kRows);
+/// Reads the information of the draft's last factor, and thereby ends its line.
+void read_information(Scanner& scanner, Draft& draft, const Arrangement& arrangement = kRows);
+/// The same of an edge of poses in space, measured as x y z roll pitch yaw.
+void read_edge_of_angles(Scanner& scanner, Draft& draft, std::int32_t kind,
+                         const Arrangement& arrangement);
+/// x y z roll pitch yaw as x y z qx qy qz qw.
+void read_pose_of_angles(Scanner& scanner, std::span<double> pose);
 /// Reads a variable line: id and state.
 void read_variable(Scanner& scanner, Draft& draft, std::int32_t kind);
 

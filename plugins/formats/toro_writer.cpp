@@ -3,6 +3,7 @@
 #include <array>
 #include <string>
 
+#include "euler_angles.hpp"
 #include "information.hpp"
 #include "line_writer.hpp"
 #include "writer_order.hpp"
@@ -11,15 +12,24 @@
 namespace cairn::formats {
 namespace {
 
-constexpr std::string_view kExpected = "a planar pose graph (VERTEX_SE2, EDGE_SE2) with ids from 0";
+constexpr std::string_view kExpected =
+    "a pose graph in the plane (VERTEX_SE2, EDGE_SE2) or in space (VERTEX_SE3:QUAT, EDGE_SE3:QUAT) "
+    "with ids from 0";
+
+void write_pose_of_angles(std::span<const double> pose, LineWriter& out) {
+  out.fields(pose.first(3)).fields(angles_from(pose.subspan<3, 4>()));
+}
 
 void write_vertices(const Graph& graph, LineWriter& out) {
   const std::vector<int> order = variables_by_id(graph);
   for (const int v : order) {
-    if (graph.type(v).tag() != "VERTEX_SE2" || graph.id(v) < 0) {
+    const std::string_view tag = graph.type(v).tag();
+    const bool in_space = tag == "VERTEX_SE3:QUAT";
+    if ((tag != "VERTEX_SE2" && !in_space) || graph.id(v) < 0) {
       cannot_express("toro", graph.describe_variable(v), kExpected);
     }
-    out.field("VERTEX2").field(graph.id(v)).fields(graph.state(v));
+    out.field(in_space ? "VERTEX3" : "VERTEX2").field(graph.id(v));
+    in_space ? write_pose_of_angles(graph.state(v), out) : void(out.fields(graph.state(v)));
     out.end_line();
   }
   // Not TORO's own, but its readers pass over lines that they don't know, and ours keeps it.
@@ -31,15 +41,22 @@ void write_vertices(const Graph& graph, LineWriter& out) {
 }
 
 void write_edge(const Graph& graph, int position, LineWriter& out) {
-  if (graph.factor_type(position).tag() != "EDGE_SE2") {
+  const std::string_view tag = graph.factor_type(position).tag();
+  const bool in_space = tag == "EDGE_SE3:QUAT";
+  if (tag != "EDGE_SE2" && !in_space) {
     cannot_express("toro", graph.describe_factor(position), kExpected);
   }
-  out.field("EDGE2");
+  out.field(in_space ? "EDGE3" : "EDGE2");
   for (const int v : graph.factor_variables(position)) out.field(graph.id(v));
-  std::array<double, 6> information;
-  std::ranges::copy(graph.information(position), information.begin());
-  to_toro_order(information);
-  out.fields(graph.measurement(position)).fields(information);
+  if (in_space) {
+    write_pose_of_angles(graph.measurement(position), out);
+    out.fields(graph.information(position));
+  } else {
+    std::array<double, 6> information;
+    std::ranges::copy(graph.information(position), information.begin());
+    to_toro_order(information);
+    out.fields(graph.measurement(position)).fields(information);
+  }
   out.end_line();
 }
 

@@ -13,7 +13,8 @@ namespace cairn::formats {
 
 /// Variables by rising id, then FIX lines, then factors in their order, of whatever types.
 std::string write_g2o(const Graph& graph);
-/// Planar pose graphs: VERTEX2 and EDGE2.
+/// Pose graphs: VERTEX2 and EDGE2, in space VERTEX3 and EDGE3, whose rotations are rounded to
+/// angles.
 std::string write_toro(const Graph& graph);
 /// Cameras and points, each numbered by rising id, and observations in their order. Rotations and
 /// translations are those of the file that was read but for rounding.

@@ -109,8 +109,11 @@ TEST_P(MalformedFiles, WithOptionsOnAreRefusedOrSound) {
   const Seed& seed = GetParam();
   for (const Mutant& mutant : mutants(seed)) {
     try {
-      expect_sound(
-          read(seed.format, mutant.text, {.skip_unknown = true, .repair_information = true}));
+      expect_sound(read(seed.format, mutant.text,
+                        {.skip_unknown = true,
+                         .repair_information = true,
+                         .unit_information = true,
+                         .skip_dangling = true}));
     } catch (const Error& error) {
       EXPECT_THAT(error.what(), ::testing::StartsWith("file:"));
     }
@@ -120,7 +123,8 @@ TEST_P(MalformedFiles, WithOptionsOnAreRefusedOrSound) {
 TEST_P(MalformedFiles, ThatAreScrambledAreRefusedOrSound) {
   const Seed& seed = GetParam();
   for (const std::string& text : scrambled(seed, 300)) {
-    for (const char* format : {"g2o", "toro", "isam", "bal", "tum", "euroc", "kitti", "table"}) {
+    for (const char* format :
+         {"g2o", "toro", "isam", "bal", "pyfg", "tum", "euroc", "kitti", "table"}) {
       try {
         expect_sound(read(format, text));
       } catch (const Error& error) {

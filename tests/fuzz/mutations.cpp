@@ -79,6 +79,7 @@ class LineMutator {
       change_id(static_cast<std::size_t>(k) + (shape_.tag ? 1 : 0));
     if (shape_.edge) change_ends();
     if (shape_.information > 0) spoil_information();
+    // A parameter may be given again as it is.
     if (!shape_.edge && shape_.variable_ids == 1) repeat_line();
     spoil_rotation();
   }
@@ -172,13 +173,11 @@ class LineMutator {
     // A zero is no fault where the rest of the row is zero too: the information is semidefinite.
     if (!root && fields_[first + 1] != "0") add_field("zero information", first, "0");
     if (!root) add_field("negative information", first, "-5");
-    Fields zero = fields_;
-    std::fill(zero.begin() + static_cast<std::ptrdiff_t>(first), zero.end(), "0");
-    add("all information zero", join(zero, " "));
+    // Of a factor without any information no line is at fault: it has no effect.
     if (!root) add_field("a large entry beside the diagonal", first + 1, "1e6");
   }
 
-  /// A vertex or parameter given twice: the copy is what is wrong.
+  /// A vertex given twice: the copy is what is wrong.
   void repeat_line() {
     std::vector<std::string> changed = lines_;
     changed.insert(changed.begin() + static_cast<std::ptrdiff_t>(line_) + 1, lines_[line_]);
@@ -231,6 +230,10 @@ const std::vector<Seed>& seeds() {
       {"toro", "toro",
        "VERTEX2 0 0 0 0\nVERTEX2 1 1 0 0\nEDGE2 0 1 1 0 0 50 1 60 70 2 3\nEDGE2 1 0 -1 0 0 50 0 60 "
        "70 0 0\n",
+       true},
+      {"toro spatial", "toro",
+       "VERTEX3 0 0 0 0 0 0 0\nVERTEX3 1 1 0 0 0.1 0.2 0.3\n"
+       "EDGE3 0 1 1 0 0 0.1 0.2 0.3 9 1 0 0 0 0 9 0 0 0 0 9 0 0 0 9 0 0 9 0 9\n",
        true},
       {"slam++", "toro",
        "VERTEX2 0 0 0 0\nODOMETRY 1 0 -1 0 0 100 0 500 500 0 0\nVERTEX2 1 1 0 0\n"

@@ -60,6 +60,29 @@ def test_unknown_lines_are_skipped_on_request(tmp_path):
     assert any("THING" in note for note in graph.notes)
 
 
+def test_what_files_lack_is_supplied_or_left_out_on_request(tmp_path):
+    (tmp_path / "odd.g2o").write_text("VERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 1 0 0\nEDGE_SE2 0 1 1 0 0\nEDGE_SE2 0 9 1 0 0 1 0 0 1 0 1\n")
+    with pytest.raises(cairn.Error, match=r"\(unit_information takes it as the identity\)"):
+        cairn.read(tmp_path / "odd.g2o")
+    with pytest.raises(cairn.Error, match=r"\(skip_dangling leaves out"):
+        cairn.read(tmp_path / "odd.g2o", unit_information=True)
+    graph = cairn.read(tmp_path / "odd.g2o", unit_information=True, skip_dangling=True)
+    assert graph.factor_count == 1 and len(graph.notes) == 2
+    assert_array_equal(graph.factor(0).information, np.eye(3))
+    assert graph.truth is None
+
+
+def test_the_truth_of_a_file_is_kept_beside_its_graph(tmp_path):
+    (tmp_path / "x.pyfg").write_text(
+        "VERTEX_SE2 0.5 A0 5 5 0\nVERTEX_SE2 1.5 A1 7 5 0\nEDGE_SE2 0.5 A0 A1 1 0 0 0.25 0 0 0.5 0 0.01\n"
+    )
+    graph = cairn.read(tmp_path / "x.pyfg")
+    assert_array_equal(graph.states(cairn.Pose2), [[0, 0, 0], [1, 0, 0]])
+    assert_array_equal(graph.truth.states(cairn.Pose2), [[5, 5, 0], [7, 5, 0]])
+    assert_array_equal(graph.stamps, [0.5, 1.5])
+    assert_array_equal(graph.copy().truth.states(cairn.Pose2), graph.truth.states(cairn.Pose2))
+
+
 def test_generators_are_repeatable_and_take_options():
     one, _ = cairn.generate("manhattan", seed=9, poses=50)
     two, _ = cairn.generate("manhattan:poses=50", seed=9)

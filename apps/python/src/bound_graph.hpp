@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
@@ -22,9 +23,10 @@ class BoundGraph {
     return graph_;
   }
 
-  std::vector<double> stamps;      ///< time [s] of each pose, by rising id, if its file has them
-  bool row_ids = false;            ///< its file has no ids: they are the numbers of its rows
-  std::vector<std::string> notes;  ///< what reading it skipped or changed
+  std::vector<double> stamps;         ///< time [s] of each pose, by rising id, if its file has them
+  bool row_ids = false;               ///< its file has no ids: they are the numbers of its rows
+  std::vector<std::string> notes;     ///< what reading it skipped or changed
+  std::unique_ptr<BoundGraph> truth;  ///< at the true states, if its file has them beside
 
  private:
   friend class GraphUse;

@@ -33,15 +33,20 @@ std::vector<std::string> notes_of(const ReadReport& report) {
 }
 
 std::unique_ptr<BoundGraph> read(const std::filesystem::path& path, const std::string& format,
-                                 bool skip_unknown, bool repair_information,
-                                 const std::string& axes) {
+                                 bool skip_unknown, bool repair_information, bool unit_information,
+                                 bool skip_dangling, const std::string& axes) {
   if (axes != "robot" && axes != "camera")
     throw Error(ErrorCode::usage, fmt::format("axes='{}': expected 'robot' or 'camera'", axes));
   const py::gil_scoped_release unlocked;
   ReadReport report;
-  auto bound = std::make_unique<BoundGraph>(
-      read_graph(path, default_registry(), {skip_unknown, repair_information}, report, format));
+  const ReadOptions options{skip_unknown, repair_information, unit_information, skip_dangling};
+  auto bound =
+      std::make_unique<BoundGraph>(read_graph(path, default_registry(), options, report, format));
   bound->notes = notes_of(report);
+  if (report.truth) {
+    bound->truth = std::make_unique<BoundGraph>(std::move(*report.truth));
+    bound->truth->stamps = report.stamps;
+  }
   bound->stamps = std::move(report.stamps);
   bound->row_ids = report.row_ids;
   if (axes == "camera") {
@@ -75,14 +80,18 @@ std::pair<std::unique_ptr<BoundGraph>, std::unique_ptr<BoundGraph>> generate(
 void bind_files(py::module_& module) {
   module.def("read", &read, py::arg("path"), py::arg("format") = "", py::kw_only(),
              py::arg("skip_unknown") = false, py::arg("repair_information") = false,
+             py::arg("unit_information") = false, py::arg("skip_dangling") = false,
              py::arg("axes") = "robot",
              R"(Reads a graph or a trajectory, plain or packed with gzip.
 
 format: a name of `cairn.components("format")`; empty: by the content.
 skip_unknown: skips lines with unknown tags, counted in `Graph.notes`, instead of an Error.
 repair_information: repairs known mistakes in published information matrices.
+unit_information: takes factors whose lines have no information as of unit information.
+skip_dangling: leaves out factors on variables that the file does not have, such as those of another robot.
 axes: "camera" turns a trajectory in the axes of a camera (x right, y down, z ahead), as KITTI's are, into a robot's (x ahead,
-y left, z up).)");
+y left, z up).
+The true states, where the file has them beside (format pyfg), are `Graph.truth`.)");
   module.def("write", &write, py::arg("graph"), py::arg("path"), py::arg("format") = "",
              R"(Writes a graph: its estimate and, where the format has them, its factors.
 

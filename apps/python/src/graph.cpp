@@ -166,6 +166,7 @@ std::unique_ptr<BoundGraph> copy(BoundGraph& bound) {
   result->stamps = bound.stamps;
   result->row_ids = bound.row_ids;
   result->notes = bound.notes;
+  if (bound.truth) result->truth = copy(*bound.truth);
   return result;
 }
 
@@ -262,6 +263,11 @@ void bind_contents(py::class_<BoundGraph>& graph) {
       .def_property_readonly(
           "notes", [](const BoundGraph& bound) { return bound.notes; },
           "What reading the file skipped or changed, a sentence each.")
+      .def_property_readonly(
+          "truth", [](const BoundGraph& bound) { return bound.truth.get(); },
+          py::return_value_policy::reference_internal,
+          "The graph at the true states, where the file that it was read from has them (format "
+          "pyfg); else None.")
       .def("__repr__", [](BoundGraph& bound) {
         const std::string text = to_string(bound.get(), 0);
         return "<cairn.Graph: " + text.substr(0, text.find('\n')) + ">";

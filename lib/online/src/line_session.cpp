@@ -128,6 +128,13 @@ void LineSession::restore(std::string_view line, std::int64_t number) {
   }
 }
 
+void LineSession::put_notes(const std::vector<std::string>& notes, Reply& reply) const {
+  if (silent()) return;
+  std::string text;
+  for (const std::string& note : notes) text += fmt::format("NOTE {}\n", note);
+  reply.text = text + reply.text;
+}
+
 void LineSession::acknowledge(Reply& reply, int owed, std::string_view word) const {
   if (silent_) return;
   reply.text += fmt::format("{} {} variables {} factors {} owed {}\n", word, line_,

@@ -73,6 +73,7 @@ void OnlineSession::take_data(std::string_view text, Reply& reply) {
   }
   for (const Id id : said.held) hold(id);
   reply.changes = !said.skipped;
+  put_notes(said.notes, reply);
 }
 
 void OnlineSession::take_variable(Variable variable) {

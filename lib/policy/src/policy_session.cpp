@@ -153,6 +153,7 @@ void PolicySession::take_data(std::string_view text, Reply& reply) {
   }
   if (!said.held.empty()) hold(said.held);
   reply.changes = !said.skipped;
+  put_notes(said.notes, reply);
 }
 
 void PolicySession::take_variable(Variable variable, Reply& reply) {

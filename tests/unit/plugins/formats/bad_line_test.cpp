@@ -78,32 +78,27 @@ INSTANTIATE_TEST_SUITE_P(
                 "VERTEX_XY 1: the id was already given in line 2; expected every id once"},
         BadLine{"EdgeToNowhere", "EDGE_SE2 0 9 1 0 0 1 0 0 1 0 1",
                 "EDGE_SE2 0 9: there is no vertex 9 in this file; expected a line that gives it, "
-                "or a file without any "
-                "vertices"},
+                "or a file without any vertices (ReadOptions::skip_dangling leaves out what leads "
+                "to vertices of another file)"},
         BadLine{"EdgeToItself", "EDGE_SE2 1 1 1 0 0 1 0 0 1 0 1",
                 "EDGE_SE2 1 1 joins variable 1 to itself; expected different ids"},
         BadLine{"EdgeToAnotherType", "EDGE_SE2_XY 0 1 1 0 1 0 1",
                 "EDGE_SE2_XY 0 1: 1 is a VERTEX_SE2 by line 2; expected a VERTEX_XY"},
-        BadLine{
-            "Indefinite", "EDGE_SE2 0 1 1 0 0 1 2 0 1 0 1",
-            "the information of EDGE_SE2 0 1 is not positive semidefinite or zero (pivot 2 of its "
-            "Cholesky "
-            "factor is -3); "
-            "expected a positive semidefinite 3x3 matrix; the numbers would fit iSAM's square root "
-            "of the information "
-            "(format isam)"},
+        BadLine{"Indefinite", "EDGE_SE2 0 1 1 0 0 1 2 0 1 0 1",
+                "the information of EDGE_SE2 0 1 is not positive semidefinite (pivot 2 of its "
+                "Cholesky factor is -3); expected a positive semidefinite 3x3 matrix"},
         BadLine{"NegativeInformation", "EDGE_SE2 0 1 1 0 0 -4 0 0 1 0 1",
-                "the information of EDGE_SE2 0 1 is not positive semidefinite or zero (pivot 1 of "
-                "its Cholesky "
-                "factor is -4); "
-                "expected a positive semidefinite 3x3 matrix"},
-        BadLine{"SingularInformation", "EDGE_PRIOR_XY 0 0 0 0 0 0",
-                "the information of EDGE_PRIOR_XY 0 is not positive semidefinite or zero (pivot 1 "
-                "of its "
-                "Cholesky factor is 0); "
-                "expected a positive semidefinite 2x2 matrix"},
+                "the information of EDGE_SE2 0 1 is not positive semidefinite (pivot 1 of its "
+                "Cholesky factor is -4); expected a positive semidefinite 3x3 matrix"},
+        BadLine{"NoInformation", "EDGE_SE2 0 1 1 0 0",
+                "EDGE_SE2 0 1 without information; expected 6 numbers more "
+                "(ReadOptions::unit_information takes it as the identity)"},
         BadLine{"FixNothing", "FIX", "FIX without an id; expected one or more ids"},
-        BadLine{"FixNobody", "FIX 0 9", "FIX 9: there is no vertex 9 in this file"},
+        BadLine{
+            "FixNobody", "FIX 0 9",
+            "FIX 9: there is no vertex 9 in this file; expected a line that gives it, or a file "
+            "without any vertices (ReadOptions::skip_dangling leaves out what leads to "
+            "vertices of another file)"},
         BadLine{"FixNoId", "FIX 0 x", "field 2 of FIX is 'x'; " + kIdExpected},
         BadLine{"Binary", std::string("VERTEX_SE2 7 1 \x01\xff\0 0", 20),
                 "field 3 of VERTEX_SE2 is '\\x01\\xff\\x00', which is not a number; expected a "

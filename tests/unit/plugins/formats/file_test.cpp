@@ -218,8 +218,8 @@ TEST_F(File, LeavesNothingBehindWhenWritingFails) {
               HasSubstr("cannot be written: No such file or directory"));
   EXPECT_THAT(names(), ElementsAre("a.g2o"));
   put("b.graph", "old");
-  const Graph spatial = read("g2o", "VERTEX_SE3:QUAT 0 0 0 0 0 0 0 1\n").graph;
-  EXPECT_THAT(message_of([&] { write_graph(spatial, path("b.graph"), registry()); }),
+  const Graph point = read("g2o", "VERTEX_TRACKXYZ 0 0 0 0\n").graph;
+  EXPECT_THAT(message_of([&] { write_graph(point, path("b.graph"), registry()); }),
               HasSubstr("cannot express"));
   EXPECT_EQ(raw(path("b.graph")), "old");
 }

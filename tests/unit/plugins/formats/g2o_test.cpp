@@ -81,9 +81,12 @@ TEST(G2o, ReadsEveryTagThatTypesOffer) {
            "EDGE_PRIOR_SE2 0 0 0 0 1 0 0 1 0 1\n"
            "EDGE_PRIOR_XY 5 2 1 1 0 1\n"
            "EDGE_PRIOR_SE3:QUAT 10 0 0 0 0 0 0 1 1 0 0 0 0 0 1 0 0 0 0 1 0 0 0 1 0 0 1 0 1\n"
-           "EDGE_PRIOR_TRACKXYZ 11 1 2 3 1 0 0 1 0 1\n");
-  EXPECT_EQ(r.graph.variable_count(), 4);
-  EXPECT_EQ(r.graph.factor_count(), 6);
+           "EDGE_PRIOR_TRACKXYZ 11 1 2 3 1 0 0 1 0 1\n"
+           "VERTEX_TRACKXYZ 12 2 2 3\nVERTEX_XY 6 3 1\n"
+           "EDGE_POINTXYZ 11 12 1 0 0 1 0 0 1 0 1\n"
+           "EDGE_POINTXY 5 6 1 0 1 0 1\n");
+  EXPECT_EQ(r.graph.variable_count(), 6);
+  EXPECT_EQ(r.graph.factor_count(), 8);
   EXPECT_EQ(r.variable_tag(11), "VERTEX_TRACKXYZ");
   EXPECT_THAT(r.measurement(1), ElementsAre(0.4636, 2.236));
 }
@@ -230,6 +233,18 @@ TEST(G2o, WritesPartsOfPosesAsItReadsThem) {
                            "EDGE_SE3_PRIORQUAT 0 0.6 0 0.8 0 10 1 2 20 3 30\n"
                            "EDGE_SE3_PRIORVEC 0 0 0 -1 0 -1 0 10 1 2 20 3 30\n";
   EXPECT_EQ(write("g2o", read("g2o", text).graph), text);
+}
+
+TEST(G2o, TakesAParameterAgainThatSaysTheSame) {
+  const std::string once = std::string(kPoseAndPoint) + "PARAMS_SE3OFFSET 7 0.5 0 0 0 0 0 1\n";
+  const std::string seen = "EDGE_SE3_TRACKXYZ 0 1 7 1 2 3 10 1 2 20 3 30\n";
+  EXPECT_EQ(difference(read("g2o", once + seen).graph,
+                       read("g2o", once + "PARAMS_SE3OFFSET 7 0.50 0 0 0 0 0 1\n" + seen).graph),
+            "");
+  EXPECT_EQ(
+      refusal("g2o", once + seen + "PARAMS_SE3OFFSET 7 0.25 0 0 0 0 0 1\n"),
+      "file:5: PARAMS_SE3OFFSET 7: line 3 gives other numbers for this id; expected the same, "
+      "or another id");
 }
 
 TEST(G2o, SaysWhichParametersItLeavesAside) {

@@ -23,7 +23,8 @@ TEST(InformationOrder, DependsOnTheFormat) {
 TEST(InformationOrder, GivesAHintWhereAnotherOneWouldFit) {
   EXPECT_THAT(
       refusal("g2o", "EDGE_SE2 0 1 1 0 0 44 0 44 31 0 0\n"),
-      ::testing::EndsWith("; the numbers would fit TORO's order of information (format toro)"));
+      ::testing::EndsWith("; the numbers would fit TORO's order of information, I11 I12 I22 I33 "
+                          "I13 I23, whose tag is EDGE2"));
 }
 
 TEST(InformationOrder, ASemidefiniteMatrixIsReadAgainWhateverElseItsNumbersFit) {

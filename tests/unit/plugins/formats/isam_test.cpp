@@ -79,20 +79,17 @@ TEST(Isam, KeepsLandmarksThatShareTheIdsOfPoses) {
 }
 
 TEST(Isam, RefusesVerticesAndSaysWhatToDo) {
-  EXPECT_EQ(refusal("isam", std::string(kChain) + "VERTEX2 0 0 0 0\n"),
-            "file:3: 'VERTEX2', but iSAM text has no vertices; expected edges only, or another "
-            "format (toro, g2o) "
-            "to be named");
+  EXPECT_EQ(
+      refusal("isam", std::string(kChain) + "VERTEX2 0 0 0 0\n"),
+      "file:3: 'VERTEX2', but iSAM text has no vertices; expected edges only (format toro reads "
+      "such vertices)");
 }
 
 TEST(Isam, RefusesARootThatIsSingular) {
   EXPECT_EQ(
       refusal("isam", std::string(kChain) + "EDGE2 2 3 1 0 0 44 0 44 31 0 0\n"),
-      "file:3: the information of EDGE2 2 3 is not positive semidefinite or zero (pivot 3 of its "
-      "Cholesky factor is 0); "
-      "expected a positive semidefinite 3x3 matrix; the numbers would fit TORO's order of "
-      "information (format "
-      "toro)");
+      "file:3: the square root of the information of EDGE2 2 3 has a zero on its diagonal (row 3); "
+      "the numbers would fit TORO's order of information (format toro)");
 }
 
 TEST(Isam, RefusesAnIdThatIsPlanarAndSpatial) {

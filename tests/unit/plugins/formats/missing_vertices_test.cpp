@@ -95,8 +95,8 @@ TEST(MissingVertices, SeesLandmarksFromTheFirstPoseInTheFile) {
 TEST(MissingVertices, AreAnErrorWhereTheFileHasOthers) {
   EXPECT_EQ(refusal("g2o", std::string("VERTEX_SE2 0 0 0 0\nEDGE_SE2 0 1 1 0 0") + kI),
             "file:2: EDGE_SE2 0 1: there is no vertex 1 in this file; expected a line that gives "
-            "it, or a file "
-            "without any vertices");
+            "it, or a file without any vertices (ReadOptions::skip_dangling leaves out what leads "
+            "to vertices of another file)");
 }
 
 TEST(MissingVertices, CanBeHeld) {

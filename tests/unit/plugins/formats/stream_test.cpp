@@ -74,8 +74,24 @@ TEST_F(Stream, RemembersTheOffsetsOfSensors) {
   read("PARAMS_SE3OFFSET 5 10 0 0 0 0 0 1");
   EXPECT_THAT(read("EDGE_SE3_TRACKXYZ 0 1 5 1 2 3 1 0 0 1 0 1").factors[0].measurement,
               ElementsAre(11, 2, 3));
+  read("PARAMS_SE3OFFSET 5 10 0 0 0 0 0 1");  // as it was
   EXPECT_THAT(refusal_of("PARAMS_SE3OFFSET 5 0 0 0 0 0 0 1"),
-              HasSubstr("the id was already given in line 2"));
+              HasSubstr("line 2 gives other numbers for this id"));
+}
+
+TEST_F(Stream, NotesWhatItChanges) {
+  EXPECT_THAT(read("VERTEX_SE3:QUAT 0 0 0 0 0 0 0 2").notes,
+              ElementsAre("1 quaternion is not of norm 1 and normalised (expected qx qy qz qw): "
+                          "VERTEX_SE3:QUAT 0 in line 1 with the norm 2"));
+  const StreamLine corridor =
+      read("EDGE_SE2 0 1 1.01 0 0.01 307121 -243387 -342143 192879 271141 1.6817e+07");
+  EXPECT_THAT(corridor.notes, ElementsAre(HasSubstr("less than its printed digits")));
+  EXPECT_THAT(read("EDGE_SE2 0 1 1 0 0 1 0 0 1 0 1").notes, IsEmpty());
+}
+
+TEST_F(Stream, RefusesAMeasurementOfNothing) {
+  EXPECT_EQ(refusal_of("EDGE_SE2 0 1 1 0 0 0 0 0 0 0 0"),
+            "file:1: the information of EDGE_SE2 0 1 is zero: it would have no effect");
 }
 
 TEST(WhatMarginalizationLeaves, HasNoPlaceInAFile) {

@@ -92,10 +92,14 @@ TEST(Toro, RefusesANegativeRange) {
 }
 
 TEST(Toro, HintsAtTheOtherOrdersOfInformation) {
-  const std::string vertices = "VERTEX2 0 0 0 0\nVERTEX2 1 1 0 0\n";
+  const std::string edge = "EDGE2 0 1 1 0 0 50 0 0 50 0 100\n";
   EXPECT_THAT(
-      refusal("toro", vertices + "EDGE2 0 1 1 0 0 50 0 0 50 0 100\n"),
+      refusal("toro", edge),
       HasSubstr("; the numbers would fit iSAM's square root of the information (format isam)"));
+  // Format isam would refuse the vertices.
+  EXPECT_THAT(refusal("toro", "VERTEX2 0 0 0 0\nVERTEX2 1 1 0 0\n" + edge),
+              HasSubstr("; the numbers would fit g2o's order of information, I11 I12 I13 I22 I23 "
+                        "I33, whose tag is EDGE_SE2"));
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -18,8 +19,13 @@ class Registry;
 
 /// How to read a file.
 struct ReadOptions {
-  bool skip_unknown = false;        ///< skip lines with unknown tags, counted in the report
+  /// Skip lines with unknown tags, counted in the report, and factors on vertices that are skipped.
+  bool skip_unknown = false;
   bool repair_information = false;  ///< repair known mistakes in information matrices
+  /// Take the information of factors whose lines end before it as the identity.
+  bool unit_information = false;
+  /// Leave out factors on variables that the file does not give, as those of another robot.
+  bool skip_dangling = false;
 };
 
 /// What reading did beyond building the graph. Everything that is skipped or changed is listed
@@ -31,6 +37,8 @@ struct ReadReport {
   std::vector<std::string> notes;  ///< sentences: renumbered ids, missing vertices, …
   std::vector<double> stamps;  ///< time [s] of each pose, by rising id; empty if the file has none
   bool row_ids = false;        ///< the file has no ids: they are the numbers of its rows from 0
+  /// The graph at the true states, where the file has them beside (`pyfg`).
+  std::optional<Graph> truth;
 };
 
 /// A file format. The reader is given the whole text, unpacked.

@@ -20,8 +20,9 @@ class Registry;
 struct StreamLine {
   std::vector<Variable> variables;
   std::vector<Factor> factors;
-  std::vector<Id> held;  ///< variables to be held fixed
-  bool skipped = false;  ///< its tag is unknown, and such lines are to be left out
+  std::vector<Id> held;            ///< variables to be held fixed
+  bool skipped = false;            ///< its tag is unknown, and such lines are to be left out
+  std::vector<std::string> notes;  ///< what reading it changed, a sentence each
 };
 
 /// A text format that can be read line by line as it comes, without knowing what follows. One

@@ -77,6 +77,8 @@ class CAIRN_API LineSession {
   bool asking() const { return asking_; }
   /// Restoring: answers are not read.
   bool silent() const { return silent_; }
+  /// Puts what reading a line changed in front of its answer.
+  void put_notes(const std::vector<std::string>& notes, Reply& reply) const;
   /// The line that ends an answer.
   void acknowledge(Reply& reply, int owed = 0, std::string_view word = "OK") const;
 

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <span>
+#include <string_view>
+
+namespace cairn::formats {
+
+// Matrices of rank less than full that were printed with a few digits are indefinite by these
+// digits: a scan matcher's information along a corridor, 3 × 3 of rank two, has a smallest
+// eigenvalue of about minus the last digit of the largest entry.
+
+/// What printing may have changed of each number: half a unit of its last digit.
+///
+/// Numbers that all have the same count of decimals and no exponent were printed with these
+/// decimals (%f). Others have significant digits (%g, %e, the shortest text of a double), as many
+/// as the longest of them shows, since trailing zeros are left out, and 4 at least: what has less
+/// was written by hand, and means what it says. A zero is then exact.
+void printed_rounding(std::span<const std::string_view> fields, std::span<double> rounding);
+
+/// Replaces a symmetric n × n matrix A (upper triangle row by row) by the nearest positive
+/// semidefinite one, if one may have been printed as A: if vᵀ A v ≥ −|v|ᵀ R |v| for each
+/// eigenvector v with a negative eigenvalue, R being the rounding of each entry (packed like A).
+/// No semidefinite matrix within R of A fails that. Nearest, and eigenvectors, are those of A
+/// scaled to a common rounding of the diagonal, so that metres and radians do not matter. False,
+/// and nothing is changed, where A is indefinite by more.
+bool settle_rounding(int n, std::span<const double> rounding, std::span<double> information);
+
+}  // namespace cairn::formats
