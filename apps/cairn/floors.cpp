@@ -14,6 +14,7 @@
 #include "cairn/grid/floor_plan.hpp"
 #include "cairn/grid/floor_survey.hpp"
 #include "cairn/grid/grid_format.hpp"
+#include "cairn/io/format_by_ending.hpp"
 #include "cairn/io/generator.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
@@ -202,9 +203,32 @@ bool names_floor_plan(const std::string& kind, Session& session) {
   return registry.has(FloorPlan::kKind, name) && !registry.has(Generator::kKind, name);
 }
 
+namespace {
+
+/// For a file that is neither, by its ending and its content: what maps of floors end in.
+Error neither_graph_nor_floor(const std::string& name, const std::filesystem::path& file,
+                              const Error& refusal, Session& session) {
+  Registry& registry = session.registry();
+  const auto maps = format_of_ending<GridFormat>(file_ending(file), registry);
+  const std::string why = refusal.what();
+  const bool has_options = name != file.string();
+  const bool is_read = !has_options && why.find("no format knows") == std::string::npos;
+  if (is_read || maps.endings.empty() || has_graph_ending(file.string(), registry)) return refusal;
+  return {ErrorCode::input,
+          fmt::format("{} of floors end in .{}",
+                      has_options ? file.string() + ": no format of maps goes by that ending, and "
+                                                    "graphs have no options behind the name; maps"
+                                  : why + ". Maps",
+                      joined(maps.endings, ", ."))};
+}
+
+}  // namespace
+
 Error no_graph(const std::string& file, const Error& refusal, Session& session) {
   try {
-    if (!std::filesystem::is_regular_file(file) || !names_floor(file, session)) return refusal;
+    const std::filesystem::path named = parse_named_file(file).file;
+    if (!std::filesystem::is_regular_file(named)) return refusal;
+    if (!names_floor(file, session)) return neither_graph_nor_floor(file, named, refusal, session);
   } catch (const Error&) {  // of a plugin that is broken
     return refusal;
   }

@@ -61,6 +61,10 @@ struct InitialEstimate {
 
 InitialEstimate initialise(Graph& graph, const ProblemSetup& setup, const OptimizeOptions& options,
                            const InterruptGuard& guard, const Session& session) {
+  if (graph.factor_count() == 0) {  // a trajectory: all guesses would be as good
+    session.note(fmt::format("{} has no factors: nothing to optimise", options.graph));
+    return {};
+  }
   const auto begin = std::chrono::steady_clock::now();
   GuessProgress progress(session.common.quiet, guard.flag());
   InitialEstimate result{.notes = setup.apply(graph, std::ref(progress))};
