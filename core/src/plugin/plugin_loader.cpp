@@ -22,6 +22,7 @@
 
 #include "cairn/plugin/fingerprint.hpp"
 #include "cairn/runtime/error.hpp"
+#include "trial_opening.hpp"
 
 namespace cairn {
 namespace {
@@ -147,6 +148,14 @@ boost::dll::shared_library open_library(const fs::path& library) {
   }
 }
 
+/// Of a plugin that is not installed with the core. An exception in a static constructor would end
+/// the process, whatever program it is.
+void expect_to_open(const fs::path& library) {
+  const std::string failure = failure_of_static_constructors(library);
+  if (!failure.empty())
+    throw plugin_error(fmt::format("{}\n  while loading plugin {}", failure, library.string()));
+}
+
 }  // namespace
 
 fs::path default_folder() {
@@ -257,6 +266,7 @@ const PluginManifest& load_plugin(const fs::path& library) {
           "{}: refused, since other users may write to it or its folder; 'chmod o-w' them",
           library.string()));
     }
+    if (!fs::equivalent(path.parent_path(), default_folder(), error)) expect_to_open(path);
     boost::dll::shared_library opened = open_library(path);
     if (!opened.has(CAIRN_STRINGIFY(CAIRN_PLUGIN_ENTRY))) {
       throw plugin_error(

@@ -11,6 +11,7 @@
 #include <fstream>
 #include <initializer_list>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "cairn/plugin/fingerprint.hpp"
@@ -180,6 +181,26 @@ TEST_F(PluginBoundary, WhatItThrowsWhileRegisteringIsPassedOn) {
   EXPECT_EQ(message_of(registry, "throwing_number"),
             so("throws_a_number", "throwing_number") +
                 ": plugin 'throwing_number' failed while registering");
+}
+
+/// An exception of a static constructor would end the process, as exit() does.
+TEST_F(PluginBoundary, WhatAStaticConstructorDoesIsAnErrorWithItsName) {
+  const std::vector<std::pair<const char*, const char*>> cases{
+      {"throws", "threw an exception: there is no camera"},
+      {"throws a number", "threw an exception: it is not a std::exception"},
+      {"exits", "ended the process with exit code 0"},
+      {"ends at once", "ended the process with exit code 3"},
+      {"crashes", "crashed (Segmentation fault)"}};
+  for (const auto& [does, expected] : cases) {
+    ASSERT_EQ(::setenv("CAIRN_TEST_CONSTRUCTOR", does, 1), 0);
+    cairn::Registry registry(search_in({kBad / "static_constructor"}));
+    EXPECT_EQ(message_of(registry, "eager"), "a static constructor " + std::string(expected) +
+                                                 "\n  while loading plugin " +
+                                                 so("static_constructor", "eager"));
+  }
+  ::unsetenv("CAIRN_TEST_CONSTRUCTOR");
+  cairn::Registry registry(search_in({kBad / "static_constructor"}));
+  EXPECT_NE(registry.make<cairn::Loss>("eager"), nullptr);
 }
 
 TEST_F(PluginBoundary, TwoOfOneNameAreAnErrorThatNamesBothFilesOnlyWhenAskedFor) {

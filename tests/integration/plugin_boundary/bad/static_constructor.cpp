@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Does in a static constructor what the environment variable CAIRN_TEST_CONSTRUCTOR names.
+#include <csignal>
+#include <cstdlib>
+#include <stdexcept>
+#include <string_view>
+
+#include "plain_loss.hpp"
+
+namespace {
+
+struct Eager {
+  Eager() {
+    const char* named = std::getenv("CAIRN_TEST_CONSTRUCTOR");
+    const std::string_view what = named ? named : "";
+    if (what == "throws") throw std::runtime_error("there is no camera");
+    if (what == "throws a number") throw 7;  // NOLINT(hicpp-exception-baseclass)
+    if (what == "exits") std::exit(0);
+    if (what == "ends at once") std::_Exit(3);
+    if (what == "crashes") static_cast<void>(std::raise(SIGSEGV));
+  }
+} const eager;
+
+}  // namespace
+
+void cairn_register(cairn::Registrar& registrar) {
+  registrar.add<cairn::Loss>("eager", {}, make_plain_loss);
+}
