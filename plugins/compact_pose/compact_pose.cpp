@@ -378,7 +378,7 @@ LinkReport CompactPose::offer(Id other, std::span<const Factor> measured) {
     if (pose == proposed_ && (report.verdict == LinkVerdict::inconsistent || waits)) ++in_vain_;
     if (report.verdict == LinkVerdict::linked || waits) graph_.make_permanent(pose);
     if (report.verdict == LinkVerdict::linked) {
-      const bool noted = candidate && options_.keep == 0;  // it takes memory for every loop
+      const bool noted = candidate && watches();
       if (noted)
         finder_.note_loop(*test_, dimensions_[candidate->place], report.gain, link.covariance);
       learnt_.push_back({other, graph_.newest_id(), link.covariance, report.gain, noted});
@@ -522,7 +522,7 @@ PoseReport CompactPose::end_pose() {
     if (!add_landmarks() && !triangulated && !kept && graph_.newest_kept() && pose_gain_ > 0.0 &&
         !graph_.landmarks().empty())
       limit_poses_of_landmarks(by_landmarks);
-    if (graph_.predecessor() >= 0 && report_.candidates > 0 && options_.keep == 0)
+    if (graph_.predecessor() >= 0 && report_.candidates > 0 && watches())
       finder_.note_pose(report_.least_gain);
     for (const Candidate& left : candidates_)
       report_.most_gain = std::max(report_.most_gain, left.gain);

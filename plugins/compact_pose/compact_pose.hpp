@@ -147,6 +147,9 @@ class CompactPose final : public PosePolicy, public OptionFinder {
     return options_.attempts > 0 && in_vain_ >= options_.attempts &&
            options_.strategy != Strategy::apal && options_.search != Search::recorded;
   }
+  /// Whether thresholds may be asked for (`OptionFinder::watching`): what they are found from takes
+  /// memory for every pose and every loop closure, as the graph itself does then.
+  bool watches() const { return options_.strategy == Strategy::apal && options_.keep == 0; }
   void search();
   std::vector<int> recorded_pairs() const;
   Displacement known_displacement(int pose);
@@ -231,7 +234,7 @@ class CompactPose final : public PosePolicy, public OptionFinder {
   int nonlinear_poses_ = 0;  ///< in a row, of which no measurement of a landmark was linear
   std::unordered_map<Id, Agreement> agreement_;  ///< with a gate
   std::unordered_map<Id, int> removals_;         ///< how often landmarks have left the graph
-  ThresholdFinder finder_;
+  ThresholdFinder finder_;                       ///< has nothing unless this `watches`
   TypicalMatch typical_;
   MatchRecord record_;
   std::deque<Learnt> learnt_;  ///< of the latest links

@@ -222,6 +222,17 @@ TEST_F(CompactPoseTest, FindsThresholdsThatLoseNoLoopOfTheSample) {
             std::set<Pair>(found_again.begin(), found_again.end()));
 }
 
+/// What thresholds are found from takes memory for every loop closure: nobody asks a policy that
+/// runs with thresholds for others.
+TEST_F(CompactPoseTest, RemembersLoopsForThresholdsOnlyWhereItWatches) {
+  const Simulation world = simulate(registry, "manhattan:poses=250,streets=5");
+  const PolicyRun live =
+      run(registry, world, "compact_pose:range=3,angle=3.15", "simulated:range=3");
+  EXPECT_GT(live.links().size(), 10U);
+  EXPECT_THAT(message_of([&] { query<OptionFinder>(*live.policy)->found(); }, ErrorCode::input),
+              HasSubstr("no loop closure"));
+}
+
 /// Of a recording, where the others do not match: the same, without the gain of every pair.
 TEST_F(CompactPoseTest, OnlyThePairsOfARecordingNeedToBeAskedFor) {
   for (const char* generator :
