@@ -518,7 +518,8 @@ Command add_online(ArgumentParser program) {
   add_input_options(cli, options->input);
   cli.footer(
       "Lines are those of g2o files and SOLVE, FULL, NEW, REMOVE, CHANGE, MARGINALIZE, SPARSIFY,\n"
-      "COVARIANCE, ESTIMATE, CHI2, SAVE and QUIT; with --policy NEXT, NOMATCH and DONE; with\n"
+      "COVARIANCE, ESTIMATE, CHI2, SAVE, HELP and QUIT; with --policy NEXT, NOMATCH and DONE; "
+      "with\n"
       "--listen WRITE, FOLLOW and JSON: docs/online.md.\n\n"
       "Example:\n"
       "  robot | cairn online --marginals last --journal today.journal\n"

@@ -2,7 +2,6 @@
 #include "cairn/online/json_answer.hpp"
 
 #include <algorithm>
-#include <array>
 #include <span>
 #include <utility>
 #include <vector>
@@ -13,18 +12,16 @@
 #include <boost/json/serialize.hpp>
 #include <boost/json/value.hpp>
 
+#include "escaped_bytes.hpp"
+
 namespace cairn {
 namespace {
 
 using Words = std::vector<std::string_view>;
 
-/// What a policy reports of poses, links and absolute measurements.
-constexpr std::array<std::string_view, 11> kResults{
-    "MATCH",   "LOCATE",   "LINKED", "UNMATCHED", "UNINFORMATIVE", "INCONSISTENT",
-    "WAITING", "UNLINKED", "PRIOR",  "KEPT",      "DROPPED"};
-
 std::string quoted(std::string_view text) {
-  return boost::json::serialize(boost::json::string_view(text.data(), text.size()));
+  const std::string valid = escaped_bytes(text);
+  return boost::json::serialize(boost::json::string_view(valid.data(), valid.size()));
 }
 
 /// By the grammar of RFC 8259, section 6.
@@ -75,6 +72,8 @@ Words split(std::string_view line) {
 
 class Object {
  public:
+  explicit Object(const IsVariableType& is_variable_type) : is_variable_type_(is_variable_type) {}
+
   void add_line(std::string_view line) {
     const Words words = split(line);
     if (words.empty()) return;
@@ -94,10 +93,10 @@ class Object {
       return add_to("covariances", fmt::format(R"({{"ids":{},"rows":{},"columns":{},"values":{}}})",
                                                array_of(rest.first(2)), value_of(rest[2]),
                                                value_of(rest[3]), array_of(rest.subspan(4))));
-    if (words.size() < 2 || std::ranges::find(kResults, word) != kResults.end())
-      return add_to("results", array_of(words));
-    add_to("estimates", fmt::format(R"({{"type":{},"id":{},"state":{}}})", quoted(word),
-                                    value_of(rest[0]), array_of(rest.subspan(1))));
+    if (words.size() > 1 && is_variable_type_(word))
+      return add_to("estimates", fmt::format(R"({{"type":{},"id":{},"state":{}}})", quoted(word),
+                                             value_of(rest[0]), array_of(rest.subspan(1))));
+    add_to("results", array_of(words));
   }
 
   std::string text() const {
@@ -133,15 +132,16 @@ class Object {
     for (std::size_t k = 2; k + 1 < words.size(); k += 2) add(words[k], value_of(words[k + 1]));
   }
 
+  const IsVariableType& is_variable_type_;
   std::vector<std::string> members_;
   std::vector<std::pair<std::string_view, std::vector<std::string>>> lists_;
 };
 
 }  // namespace
 
-std::string json_answer(std::string_view text) {
+std::string json_answer(std::string_view text, const IsVariableType& is_variable_type) {
   if (text.empty()) return {};
-  Object object;
+  Object object(is_variable_type);
   for (std::size_t at = 0; at < text.size();) {
     const std::size_t end = std::min(text.find('\n', at), text.size());
     object.add_line(text.substr(at, end - at));

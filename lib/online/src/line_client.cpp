@@ -9,8 +9,6 @@
 
 #include <boost/asio/buffer.hpp>
 
-#include "cairn/online/json_answer.hpp"
-
 namespace cairn {
 namespace {
 
@@ -93,8 +91,8 @@ void LineClient::send(std::string answer) {
 }
 
 void LineClient::add(std::string answer) {
-  const auto& text = output_.emplace_back(
-      std::make_shared<const std::string>(wants_json ? json_answer(answer) : std::move(answer)));
+  const auto& text = output_.emplace_back(std::make_shared<const std::string>(
+      wants_json ? json_answer(answer, events_.is_variable_type) : std::move(answer)));
   unread_ += text->size();
 }
 

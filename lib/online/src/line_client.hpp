@@ -10,6 +10,8 @@
 
 #include <boost/asio/local/stream_protocol.hpp>
 
+#include "cairn/online/json_answer.hpp"
+
 namespace cairn {
 
 /// A connection to a `LineServer`: lines come in, whole answers go out, and nothing is waited for.
@@ -26,6 +28,7 @@ class LineClient : public std::enable_shared_from_this<LineClient> {
   struct Events {
     std::function<void(const std::shared_ptr<LineClient>&)> ready;  // `has_line`
     std::function<void(const std::shared_ptr<LineClient>&)> gone;   // once
+    IsVariableType is_variable_type;                                // for answers in JSON
   };
 
   LineClient(Socket socket, Limits limits, const Events& events);

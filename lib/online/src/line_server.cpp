@@ -18,6 +18,7 @@
 #include <boost/asio/steady_timer.hpp>
 
 #include "cairn/online/json_answer.hpp"
+#include "escaped_bytes.hpp"
 #include "line_client.hpp"
 #include "socket_file.hpp"
 
@@ -30,8 +31,14 @@ using Protocol = asio::local::stream_protocol;
 using ClientPtr = std::shared_ptr<LineClient>;  // which handlers that wait for a socket own, too
 
 const std::array<std::string, 3> kWords{"WRITE", "FOLLOW", "JSON"};
+constexpr std::size_t kLongestShown = 40;  // [bytes] of a word
 constexpr std::chrono::milliseconds kLookAtStop{100};
 constexpr std::chrono::milliseconds kPauseOfAccepting{100};  // where no more sockets can be had
+
+/// A word of a client, made fit for a message.
+std::string shown(std::string_view word) {
+  return escaped_bytes(word.substr(0, kLongestShown)) + (word.size() > kLongestShown ? "..." : "");
+}
 
 }  // namespace
 
@@ -49,6 +56,9 @@ class LineServer::Service {
     events_.gone = [this](const ClientPtr& client) {
       // Not here: a caller may be going through the clients.
       asio::post(io_, [this, client] { forget(client); });
+    };
+    events_.is_variable_type = [this](std::string_view tag) {
+      return conversation_.is_variable_type(tag);
     };
   }
 
@@ -232,9 +242,9 @@ std::string LineServer::Service::answer(LineClient& client, const std::string& l
   if (writer_) {
     return refusal(client,
                    fmt::format("{} is for the client that writes, which is another until it "
-                               "disconnects; expected ESTIMATE, COVARIANCE, CHI2, FOLLOW, JSON or "
-                               "QUIT",
-                               word));
+                               "disconnects; expected ESTIMATE, COVARIANCE, CHI2, HELP, FOLLOW, "
+                               "JSON or QUIT",
+                               shown(word)));
   }
   return answer_change(client, line);
 }
@@ -251,7 +261,7 @@ std::string LineServer::Service::answer_switch(LineClient& client, std::string_v
                                                std::string_view line) {
   const std::string_view more = LineSession::first_word(line.substr(line.find(word) + word.size()));
   if (!more.empty() && more != "OFF") {
-    return refusal(client, fmt::format("{0} {1}; expected '{0}' or '{0} OFF'", word, more));
+    return refusal(client, fmt::format("{0} {1}; expected '{0}' or '{0} OFF'", word, shown(more)));
   }
   (word == "FOLLOW" ? client.follows : client.wants_json) = more.empty();
   return acknowledgement(client, !more.empty() ? "OFF" : word == "FOLLOW" ? "FOLLOWS" : "JSON");
@@ -280,7 +290,8 @@ void LineServer::Service::publish(const std::string& text, const LineClient& wri
           fmt::format("UPDATE {}\n{}", conversation_.line_number(), text));
     }
     if (client->wants_json && !update_in_json)
-      update_in_json = std::make_shared<const std::string>(json_answer(*update));
+      update_in_json =
+          std::make_shared<const std::string>(json_answer(*update, events_.is_variable_type));
     const bool taken = client->enqueue(client->wants_json ? update_in_json : update);
     ++(taken ? counts_.updates : counts_.dropped);
     schedule(client);

@@ -15,14 +15,16 @@
 #include <fmt/ranges.h>
 
 #include "cairn/text/spelling.hpp"
+#include "escaped_bytes.hpp"
 
 namespace cairn {
 namespace {
 
 /// What can be asked without an effect.
-const std::array<std::string, 3> kQuestions{"CHI2", "COVARIANCE", "ESTIMATE"};
+const std::array<std::string, 4> kQuestions{"CHI2", "COVARIANCE", "ESTIMATE", "HELP"};
 
 constexpr std::string_view kBlanks = " \t\r";
+constexpr std::size_t kLongestMessage = 4000;  // [bytes] a line may have 16 MB
 
 std::vector<std::string_view> split(std::string_view line) {
   std::vector<std::string_view> words;
@@ -40,7 +42,8 @@ std::string error_line(std::int64_t number, std::string message, std::string_vie
   const std::string place = fmt::format("{}:{}: ", stream, number);
   if (message.starts_with(place)) message.erase(0, place.size());
   std::ranges::replace(message, '\n', ' ');
-  return fmt::format("ERROR line {}: {}\n", number, message);
+  if (message.size() > kLongestMessage) message = message.substr(0, kLongestMessage) + "...";
+  return fmt::format("ERROR line {}: {}\n", number, escaped_bytes(message));
 }
 
 /// Also of sockets, which std::filesystem::equivalent leaves open. False where one is not there.
@@ -189,6 +192,13 @@ Variable LineSession::declared_variable(const Words& words, Registry& registry) 
   const Id id = parse_whole(words[2], "id");
   if (id < 0) throw bad_line(fmt::format("'{}' is not an id; expected an integer from 0", id));
   return {registry.variable_type(words[1]), id, {}, false};
+}
+
+std::string LineSession::help_line(std::span<const std::string_view> commands) {
+  return fmt::format(
+      "NOTE commands: {}; with --listen WRITE, FOLLOW and JSON; other lines are data, such as NEW "
+      "VERTEX_SE2 0; docs/online.md explains each\n",
+      fmt::join(commands, ", "));
 }
 
 std::string LineSession::chi2_line(Estimator& estimator) {

@@ -35,6 +35,7 @@ std::span<const OnlineSession::NamedCommand> OnlineSession::commands() {
       {"ESTIMATE", &OnlineSession::report_estimate},
       {"CHI2", &OnlineSession::report_chi2},
       {"SAVE", &OnlineSession::save},
+      {"HELP", &OnlineSession::help},
       {"QUIT", &OnlineSession::quit},
   };
   return kCommands;
@@ -414,6 +415,14 @@ void OnlineSession::save(const Words& words, Reply& reply) {
   const std::string file = file_to_save(words);
   // No journal has this line, unless it was forged: then it must not replace files.
   if (!silent()) write_graph(estimator_.graph(), file, registry_);
+  acknowledge(reply, owed_);
+}
+
+void OnlineSession::help(const Words& words, Reply& reply) {
+  expect_words(words, 1, "HELP");
+  std::vector<std::string_view> names;
+  for (const auto& [name, command] : commands()) names.push_back(name);
+  reply.text += help_line(names);
   acknowledge(reply, owed_);
 }
 

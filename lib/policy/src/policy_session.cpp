@@ -74,6 +74,7 @@ std::span<const PolicySession::NamedCommand> PolicySession::commands() {
       {"ESTIMATE", &PolicySession::report_estimate},
       {"CHI2", &PolicySession::report_chi2},
       {"SAVE", &PolicySession::save},
+      {"HELP", &PolicySession::help},
       {"QUIT", &PolicySession::quit},
       {"SOLVE", &PolicySession::refuse},
       {"FULL", &PolicySession::refuse},
@@ -519,6 +520,16 @@ void PolicySession::save(const Words& words, Reply& reply) {
 }
 
 /// Not a change: a journal goes on before it.
+void PolicySession::help(const Words& words, Reply& reply) {
+  expect_words(words, 1, "HELP");
+  std::vector<std::string_view> names;
+  for (const auto& [name, command] : commands()) {
+    if (command != &PolicySession::refuse) names.push_back(name);
+  }
+  answer_ += help_line(names);
+  answer(reply);
+}
+
 void PolicySession::quit(const Words& words, Reply& reply) {
   expect_words(words, 1, "QUIT");
   reply.quit = true;

@@ -32,6 +32,7 @@ class Notebook final : public LineSession {
   Estimator& estimator() override { throw std::logic_error("not asked for"); }
   std::int64_t variable_count() const override { return std::ssize(set); }
   std::int64_t factor_count() const override { return 0; }
+  bool is_variable_type(std::string_view) const override { return false; }
 
  private:
   void perform(std::string_view text, const Words& words, Reply& reply) override {

@@ -2,6 +2,7 @@
 #include "cairn/online/json_answer.hpp"
 
 #include <string>
+#include <string_view>
 
 #include <gtest/gtest.h>
 
@@ -15,6 +16,12 @@ namespace {
 boost::json::value parsed(const std::string& line) {
   EXPECT_EQ(line.find('\n'), line.size() - 1);
   return boost::json::parse(line);
+}
+
+bool is_variable_type(std::string_view tag) { return tag == "VERTEX_SE2" || tag == "VERTEX_XY"; }
+
+std::string json_answer(std::string_view answer) {
+  return cairn::json_answer(answer, is_variable_type);
 }
 
 /// As an answer, equal to this JSON.
@@ -59,6 +66,23 @@ TEST(JsonAnswer, HasTheResultsOfAPolicy) {
   expect("MATCH NONE\nOK 10 variables 3 factors 3 owed 0\n",
          R"({"results": [["MATCH", "NONE"]], "answer": "OK", "line": 10, "variables": 3,
              "factors": 3, "owed": 0})");
+}
+
+/// A client keeps estimates by id: what is none must not take the place of one.
+TEST(JsonAnswer, HasNoEstimateOfAWordThatIsNoType) {
+  expect("LANDMARK 0 100 ADDED inf 0\nKEPT 0\nNONLINEAR 0 3 1 2\nVERTEX_OTHER 5 1 2\n",
+         R"({"results": [["LANDMARK", 0, 100, "ADDED", null, 0], ["KEPT", 0],
+                         ["NONLINEAR", 0, 3, 1, 2], ["VERTEX_OTHER", 5, 1, 2]]})");
+}
+
+TEST(JsonAnswer, EscapesWhatIsNoUtf8) {
+  expect("ERROR line 3: \xd3\xfc\x8b is for the client that writes\n",
+         R"({"answer": "ERROR", "line": 3,
+             "message": "\\xd3\\xfc\\x8b is for the client that writes"})");
+  // Longer forms than needed, a surrogate, beyond U+10FFFF, and cut off; but not what is right.
+  expect("NOTE \xc0\xaf \xed\xa0\x80 \xf4\x90\x80\x80 \xe2\x82 \xe2\x82\xac \xf0\x9f\x97\xba\n",
+         R"({"notes": ["\\xc0\\xaf \\xed\\xa0\\x80 \\xf4\\x90\\x80\\x80 \\xe2\\x82 €)"
+         " \xf0\x9f\x97\xba\"]}");
 }
 
 TEST(JsonAnswer, KeepsTheDigitsAndIsJsonForAnyText) {

@@ -39,6 +39,7 @@ class Notebook final : public LineSession {
   Estimator& estimator() override { throw std::logic_error("not asked for"); }
   std::int64_t variable_count() const override { return std::ssize(set_); }
   std::int64_t factor_count() const override { return 0; }
+  bool is_variable_type(std::string_view) const override { return false; }
 
  private:
   void perform(std::string_view text, const Words& words, Reply& reply) override {
@@ -275,6 +276,21 @@ TEST_F(LineServerTest, AnswersInJsonWhereAClientWantsIt) {
   reader.tell("SET b");
   EXPECT_THAT(reader.hear().value(), StartsWith(R"({"answer":"ERROR","line":3,"message":"SET is)"));
   EXPECT_THAT(reader.ask("JSON OFF"), ElementsAre("OFF 1 variables 1 factors 0"));
+}
+
+/// What a client sends is repeated in messages: cut, and escaped where it is no text.
+TEST_F(LineServerTest, RepeatsNoBytesThatAreNoText) {
+  serve();
+  SocketClient robot = writer(), reader = client();
+  robot.ask("SET a");
+  EXPECT_THAT(reader.ask("\xd3\xfc\x8b 1 2"),
+              ElementsAre(StartsWith(R"(ERROR line 1: \xd3\xfc\x8b is for the client)")));
+  EXPECT_THAT(reader.ask("JSON \xff"), ElementsAre(HasSubstr(R"(JSON \xff; expected 'JSON')")));
+  EXPECT_LT(reader.ask(std::string(100000, 'x')).front().size(), 300U);
+  reader.tell("JSON");
+  reader.hear();
+  reader.tell("\xd3\xfc\x8b 1 2");
+  EXPECT_THAT(reader.hear().value(), HasSubstr(R"("message":"\\xd3\\xfc\\x8b is for)"));
 }
 
 TEST_F(LineServerTest, AnswersWhatCameBeforeTheEndOfInput) {

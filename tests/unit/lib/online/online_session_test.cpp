@@ -101,6 +101,18 @@ TEST_F(OnlineSessionTest, TakesDataInSilenceAndAnswersWhenItHasSolved) {
   EXPECT_FALSE(reply.quit);
 }
 
+TEST_F(OnlineSessionTest, HelpListsTheCommands) {
+  take_all(two_poses_);
+  for (const bool other : {false, true}) {
+    const LineSession::Reply reply = other ? session_->ask("HELP", 7) : take("HELP");
+    EXPECT_THAT(reply.text, StartsWith("NOTE commands: NEW, REMOVE, CHANGE, MARGINALIZE, "));
+    EXPECT_THAT(reply.text, HasSubstr(" CHI2, SAVE, HELP, QUIT; "));
+    EXPECT_THAT(reply.text, HasSubstr("\nOK "));
+    EXPECT_FALSE(reply.changes || reply.refused || reply.solved);
+  }
+  EXPECT_TRUE(take("HELP ME").refused);
+}
+
 TEST_F(OnlineSessionTest, QuestionsChangeNothing) {
   take_all(two_poses_);
   for (const auto& [question, answer] :

@@ -1,9 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "cairn/policy/policy_session.hpp"
 
+#include <malloc.h>
+
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <iomanip>
 #include <memory>
+#include <numbers>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -323,6 +328,14 @@ TEST_F(PolicySessionTest, TheEndKeepsTheNewestPose) {
   EXPECT_TRUE(session_->estimator().has(4));
 }
 
+TEST_F(PolicySessionTest, HelpListsTheCommandsThatItTakes) {
+  drive();
+  const std::string text = take("HELP").text;
+  EXPECT_THAT(text, HasSubstr("NOTE commands: NEW, NEXT, NOMATCH, DONE, "));
+  EXPECT_THAT(text, Not(HasSubstr("SOLVE")));
+  EXPECT_THAT(session_->ask("HELP", 3).text, HasSubstr("NOTE commands: NEW, NEXT, "));
+}
+
 TEST_F(PolicySessionTest, RestoredLinesGiveTheSameEstimate) {
   std::vector<std::string> lines = square();
   lines.insert(lines.end(), {"EDGE_SE2 0 4" + kHere, "DONE"});
@@ -332,6 +345,43 @@ TEST_F(PolicySessionTest, RestoredLinesGiveTheSameEstimate) {
   for (const std::string& line : lines) session_->restore(line, ++number_);
   EXPECT_EQ(take("ESTIMATE ALL").text, estimate);
   EXPECT_EQ(session_->counts().linked, 1);
+}
+
+/// A service runs for days: what it holds after many laps is what it held after some.
+TEST_F(PolicySessionTest, HoldsNoMoreHoweverLongItRuns) {
+#if defined(CAIRN_SANITIZED)
+  GTEST_SKIP() << "mallinfo2 does not know the sanitizer's allocator";
+#else
+  policy_ = registry_.make<PosePolicy>("compact_pose:range=1.5,angle=1,loop_gain=1,pose_gain=1");
+  session_ = std::make_unique<PolicySession>(*policy_, *format_, registry_,
+                                             PolicySettings{.read = {}, .output = "none"});
+  constexpr int kPlaces = 40;  // of a circle
+  constexpr double kTurn = 2.0 * std::numbers::pi / kPlaces;
+  std::ostringstream step;
+  step << std::setprecision(17) << ' ' << 5.0 * std::sin(kTurn) << ' '
+       << 5.0 * (1.0 - std::cos(kTurn)) << ' ' << kTurn << " 2500 0 0 2500 0 40000";
+  take("NEW VERTEX_SE2 0");
+  const auto drive_to = [&](int end) {
+    for (int k = static_cast<int>(session_->counts().poses); k < end; ++k) {
+      const std::string pose = std::to_string(k);
+      take("NEW VERTEX_SE2 " + pose);
+      take("EDGE_SE2 " + std::to_string(k - 1) + " " + pose + step.str());
+      if (k >= kPlaces)
+        take("EDGE_SE2 " + std::to_string(k % kPlaces) + " " + pose +
+             " 0 0 0 2500 0 0 2500 0 40000");
+      take("DONE");
+    }
+    return ::mallinfo2().uordblks + ::mallinfo2().hblkhd;
+  };
+  take("DONE");
+  const std::size_t early = drive_to(2000);
+  const std::int64_t kept = session_->pose_count();
+  const std::size_t late = drive_to(6000);
+  EXPECT_LT(kept, 50);
+  EXPECT_EQ(session_->pose_count(), kept);
+  EXPECT_GT(session_->counts().linked, 5900);
+  EXPECT_LT(late, early + 40000);  // 10 bytes for each pose
+#endif
 }
 
 /// Three laps of a square in steps of half a side: every other pose is left out.

@@ -47,6 +47,8 @@ class CAIRN_API Conversation {
   /// No line follows: commits the journal and ends the session.
   void finish();
 
+  /// Of lines in the answers: `LineSession::is_variable_type`.
+  bool is_variable_type(std::string_view tag) const { return session_.is_variable_type(tag); }
   /// Of the latest line of the stream.
   std::int64_t line_number() const { return number_; }
   /// The number of the latest line and the size of the graph, after a word:

@@ -43,7 +43,7 @@ class CAIRN_API LineSession {
   void restore(std::string_view line, std::int64_t number);
   /// The first word of a line; empty if there is none, or a comment.
   static std::string_view first_word(std::string_view line);
-  /// Of a first word: ESTIMATE, COVARIANCE and CHI2.
+  /// Of a first word: ESTIMATE, COVARIANCE, CHI2 and HELP.
   static bool is_question(std::string_view word);
   /// SAVE must not replace this file: the journal.
   void protect(std::filesystem::path file, std::string what) {
@@ -56,6 +56,8 @@ class CAIRN_API LineSession {
   virtual Estimator& estimator() = 0;
   virtual std::int64_t variable_count() const = 0;
   virtual std::int64_t factor_count() const = 0;
+  /// Whether lines of answers that begin with this word are estimates of variables.
+  virtual bool is_variable_type(std::string_view tag) const = 0;
   /// What has come and is not in the graph, as a clause without its end; empty: there is nothing.
   virtual std::string waiting() const;
 
@@ -96,6 +98,8 @@ class CAIRN_API LineSession {
   static Variable declared_variable(const Words& words, Registry& registry);
 
   // Lines of answers.
+  /// What HELP is answered by.
+  static std::string help_line(std::span<const std::string_view> commands);
   /// "CHI2 value"; throws `Error` (numerical) where that is not finite.
   static std::string chi2_line(Estimator& estimator);
   /// "VERTEX_SE2 7 x y theta"

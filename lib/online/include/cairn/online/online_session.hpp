@@ -40,6 +40,9 @@ class CAIRN_API OnlineSession final : public LineSession {
   Estimator& estimator() override { return estimator_; }
   std::int64_t variable_count() const override { return estimator_.variable_count(); }
   std::int64_t factor_count() const override { return estimator_.factor_count(); }
+  bool is_variable_type(std::string_view tag) const override {
+    return registry_.has("variable", tag);
+  }
   /// Variables that are not in the graph, for want of a measurement: their number, and the first.
   std::string waiting() const override;
 
@@ -63,6 +66,7 @@ class CAIRN_API OnlineSession final : public LineSession {
   void report_estimate(const Words& words, Reply& reply);
   void report_chi2(const Words& words, Reply& reply);
   void save(const Words& words, Reply& reply);
+  void help(const Words& words, Reply& reply);
   void quit(const Words& words, Reply& reply);
 
   void take_data(std::string_view text, Reply& reply);

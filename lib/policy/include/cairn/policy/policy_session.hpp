@@ -71,6 +71,9 @@ class CAIRN_API PolicySession final : public LineSession {
   std::int64_t variable_count() const override;
   std::int64_t pose_count() const;
   std::int64_t factor_count() const override;
+  bool is_variable_type(std::string_view tag) const override {
+    return registry_.has("variable", tag);
+  }
   const Counts& counts() const { return counts_; }
   /// Landmarks that were seen and are not in the graph (`PosePolicy::undetermined`).
   std::int64_t undetermined() const { return std::ssize(policy_.undetermined()); }
@@ -106,6 +109,7 @@ class CAIRN_API PolicySession final : public LineSession {
   void report_estimate(const Words& words, Reply& reply);
   void report_chi2(const Words& words, Reply& reply);
   void save(const Words& words, Reply& reply);
+  void help(const Words& words, Reply& reply);
   void quit(const Words& words, Reply& reply);
   void refuse(const Words& words, Reply& reply);
 
