@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <fcntl.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cerrno>
 #include <csignal>
@@ -9,6 +10,7 @@
 #include <exception>
 #include <functional>
 #include <new>
+#include <span>
 #include <string>
 #include <string_view>
 #include <system_error>
@@ -29,10 +31,26 @@ namespace {
 constexpr int kExitBug = 1;
 constexpr const char* kOutOfMemory = "out of memory";
 
+/// Without most of words that are longer than any name or path: what a file or an argument has
+/// instead of one is repeated in messages.
+std::string cut_words(const std::string& message) {
+  constexpr std::size_t kLongest = 5000, kShown = 100;  // [bytes]; a path has 4096 at most
+  std::string cut;
+  for (std::size_t at = 0; at < message.size();) {
+    const std::size_t end = std::min(message.find_first_of(" \n", at), message.size());
+    const bool whole = end - at <= kLongest;
+    cut += message.substr(at, whole ? end - at : kShown);
+    if (!whole) cut += "...";
+    if (end < message.size()) cut += message[end];
+    at = end + 1;
+  }
+  return cut;
+}
+
 /// One line on standard error, whatever the message looked like; only a table, whose lines are
 /// indented by four columns, keeps its lines.
 void print_error(std::string message) {
-  message = cairn::app::in_command_line_words(std::move(message));
+  message = cairn::app::in_command_line_words(cut_words(message));
   const bool table = message.find("\n    ") != std::string::npos;
   for (std::size_t k = 0; !table && (k = message.find('\n', k)) != std::string::npos;) {
     const std::size_t next = message.find_first_not_of(" \n", k);
@@ -112,6 +130,16 @@ std::atomic<bool> memory_ran_out{false};
   std::_Exit(kExitBug);
 }
 
+/// `cairn online --listen …`: to be ended is how it ends, from its first moment on. With a journal
+/// it may have something to write before.
+bool is_service(std::span<char* const> words) {
+  const auto given = [&](std::string_view begin) {
+    return std::ranges::any_of(
+        words, [&](const char* word) { return std::string_view(word).starts_with(begin); });
+  };
+  return given("online") && given("--listen") && !given("--journal");
+}
+
 bool thread_can_be_started() {
   try {
     std::thread([] {}).join();
@@ -150,7 +178,8 @@ int main(int argc, char** argv) {
   std::set_new_handler(note_out_of_memory);
   std::set_terminate(end_badly);
   static_cast<void>(std::atexit(end_after_foreign_exit));
-  cairn::app::end_on_interrupts();
+  cairn::app::end_on_interrupts(
+      is_service({argv, static_cast<std::size_t>(argc)}) ? 0 : cairn::app::kExitInterrupted);
   std::signal(SIGPIPE, SIG_IGN);  // `cairn … | head` is no reason to die before files are written
   std::signal(SIGXFSZ, SIG_IGN);  // the limit of a file's size is an error of its output
   try {

@@ -233,7 +233,7 @@ TEST_F(OnlineService, LosesNothingAcknowledgedAndTearsNoLineWhenItIsKilled) {
 }
 
 TEST_F(OnlineService, StopsWithItsMapAndItsReportWritten) {
-  for (const int signal : {SIGTERM, SIGINT}) {
+  for (const int signal : {SIGTERM, SIGINT, SIGHUP}) {
     Partner process(service({"-o", folder_.file("map.g2o"), "--json", "-"}));
     SocketClient robot(socket()), reader(socket());
     for (const char* line : {"VERTEX_SE2 0 0 0 0", "FIX 0", "NEW VERTEX_SE2 1"}) robot.tell(line);
