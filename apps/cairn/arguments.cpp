@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "arguments.hpp"
+#include "decimal_number.hpp"
 #include "table.hpp"
 
 #include <algorithm>
 #include <charconv>
-#include <cmath>
 #include <istream>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <sstream>
 #include <system_error>
 #include <utility>
@@ -41,24 +42,31 @@ CLI::Validator integer() {
   return integer_within(std::numeric_limits<Integer>::min(), std::numeric_limits<Integer>::max());
 }
 
+/// The parser would take hexadecimal digits, blanks before them, and zero for 1e-400.
+CLI::Validator any_number() {
+  const auto check = [](const std::string& text) {
+    return decimal_number(text) ? std::string() : fmt::format("'{}' is not a finite number", text);
+  };
+  return {check, ""};
+}
+
 CLI::Validator number_within(double low, double high) {
   const auto check = [low, high](const std::string& text) {
-    double value = 0.0;
-    const bool good = CLI::detail::lexical_cast(text, value) && value >= low && value <= high;
-    return good ? std::string()
-                : fmt::format("'{}' is not a number from {} to {}", text, low, high);
+    const std::optional<double> value = decimal_number(text);
+    return value && *value >= low && *value <= high
+               ? std::string()
+               : fmt::format("'{}' is not a number from {} to {}", text, low, high);
   };
   return {check, ""};
 }
 
 CLI::Validator finite_seconds(double least) {
   const auto check = [least](const std::string& text) {
-    double value = 0.0;
-    const bool good =
-        CLI::detail::lexical_cast(text, value) && std::isfinite(value) && value >= least;
-    return good ? std::string()
-                : fmt::format("'{}' is not a number of seconds{}", text,
-                              least < 0.0 ? "" : fmt::format(", from {}", least));
+    const std::optional<double> value = decimal_number(text);
+    return value && *value >= least
+               ? std::string()
+               : fmt::format("'{}' is not a number of seconds{}", text,
+                             least < 0.0 ? "" : fmt::format(", from {}", least));
   };
   return {check, ""};
 }
@@ -152,7 +160,7 @@ Argument& Argument::none_or_within(int low, int high) {
 }
 
 Argument& Argument::within(double low, double high) {
-  option_->check(number_within(low, high));
+  option_->transform(number_within(low, high));  // before the check of any number, which says less
   return *this;
 }
 
@@ -185,7 +193,7 @@ Argument& Argument::file_or_generated(std::vector<std::string> kinds) {
 }
 
 Argument& Argument::seconds_from(double least) {
-  option_->check(finite_seconds(least));
+  option_->transform(finite_seconds(least));
   return *this;
 }
 
@@ -240,7 +248,7 @@ Argument ArgumentParser::add_option(const std::string& names, int& value, const 
 
 Argument ArgumentParser::add_option(const std::string& names, double& value,
                                     const std::string& help) {
-  return number(*app_->add_option(names, value, help));
+  return number(*app_->add_option(names, value, help)->check(any_number()));
 }
 
 Argument ArgumentParser::add_option(const std::string& names, std::uint64_t& value,
@@ -250,7 +258,7 @@ Argument ArgumentParser::add_option(const std::string& names, std::uint64_t& val
 
 Argument ArgumentParser::add_option(const std::string& names, std::optional<double>& value,
                                     const std::string& help) {
-  return number(*app_->add_option(names, value, help));
+  return number(*app_->add_option(names, value, help)->check(any_number()));
 }
 
 Argument ArgumentParser::add_option(const std::string& names, std::optional<std::int64_t>& value,

@@ -162,6 +162,10 @@ Error bad_value(const ParseOutcome& outcome, const ArgumentParser& program,
 
 /// What a configuration file says that nobody takes: the parser only tells "section.name".
 Error unknown_key(const std::string& what, const ArgumentParser& program) {
+  if (const std::size_t end = what.find(": This option is not allowed"); end != what.npos) {
+    return {ErrorCode::usage,
+            fmt::format("--config: '{}' is for the command line alone", what.substr(0, end))};
+  }
   const std::string path = what.substr(what.rfind(' ') + 1);
   const std::size_t dot = path.rfind('.');
   const std::string key = path.substr(dot == std::string::npos ? 0 : dot + 1);

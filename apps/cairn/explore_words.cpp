@@ -5,30 +5,25 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <exception>
+#include <optional>
 
 #include <fmt/core.h>
 
 #include "cairn/exploration/world.hpp"
 #include "cairn/plugin/options.hpp"
 #include "cairn/runtime/error.hpp"
+#include "decimal_number.hpp"
 
 namespace cairn::app {
 namespace {
 
 double positive(const char* option, const std::string& key, const std::string& text) {
-  std::size_t read = 0;
-  double value = 0.0;
-  try {
-    value = std::stod(text, &read);
-  } catch (const std::exception&) {
-    read = 0;
-  }
-  if (read == 0 || read != text.size() || !(value > 0.0)) {
+  const std::optional<double> value = decimal_number(text);
+  if (!value || !(*value > 0.0)) {
     throw Error(ErrorCode::usage,
                 fmt::format("{}: '{}' is no number above zero for {}", option, text, key));
   }
-  return value;
+  return *value;
 }
 
 int count(const char* option, const std::string& key, const std::string& text) {

@@ -100,6 +100,18 @@ std::string class_name(const std::string& name) {
   }
   return result;
 }
+/// Whether a word stands in a text by itself, not as a part of another.
+bool has_word(std::string_view text, std::string_view word) {
+  const auto continues = [&](std::size_t at) {
+    return at < text.size() &&
+           (std::isalnum(static_cast<unsigned char>(text[at])) != 0 || text[at] == '_');
+  };
+  for (std::size_t at = 0; (at = text.find(word, at)) != text.npos; at += word.size()) {
+    if (!continues(at + word.size()) && (at == 0 || !continues(at - 1))) return true;
+  }
+  return false;
+}
+
 std::string upper_case(std::string name) {
   std::ranges::transform(name, name.begin(),
                          [](unsigned char c) { return static_cast<char>(std::toupper(c)); });
@@ -128,14 +140,18 @@ void check_name(const std::string& name) {
 using Words = std::vector<std::pair<std::string, std::string>>;
 
 /// What stands for each @WORD@ of the templates. Values may hold words that come after them.
-Words words_for(const Kind& kind, const std::string& name) {
+Words words_for(const Kind& kind, const std::string& name, const fs::path& templates) {
+  // What the template declares, or uses, is no name for a class of its own: Vector, Tools.
+  std::string own = class_name(name);
+  if (has_word(read_file((templates / kind.folder / "plugin.cpp.in").string()), own))
+    own += class_name(kind.folder);
   return {{"@DESCRIPTION@", kind.description},
           {"@OFFERS@", kind.offers},
           {"@LIBRARIES@", kind.libraries},
           {"@USE@", kind.use},
           {"@TAG@", kind.tag},
           {"@VERSION@", CAIRN_VERSION},
-          {"@CLASS@", class_name(name)},
+          {"@CLASS@", own},
           {"@UPPER@", upper_case(name)},
           {"@NAME@", name}};
 }
@@ -217,7 +233,7 @@ int make_project(const Chosen& chosen, Session& session) {
   check_not_on_offer(kind, chosen.name, session.registry());
   const fs::path templates = template_folder();
   const fs::path folder = chosen.folder.empty() ? chosen.name : chosen.folder;
-  const Words words = words_for(kind, chosen.name);
+  const Words words = words_for(kind, chosen.name, templates);
   struct File {
     fs::path from, to;
   };

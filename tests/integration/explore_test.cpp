@@ -318,7 +318,7 @@ TEST_F(Explore, WhatCannotWorkIsRefusedBeforeTheWork) {
   EXPECT_THAT(refusal({"--seed", "18446744073709551615", "--runs", "2"}, 2),
               HasSubstr("give a smaller seed"));
   EXPECT_THAT(refusal({"--start-x", "2", "--start-y", "2", "--start-theta", "nan"}, 2),
-              HasSubstr("--start-theta: nan is no finite number"));
+              HasSubstr("--start-theta: 'nan' is not a finite number"));
   EXPECT_THAT(refusal({"--lidar", "range=nan"}, 2), HasSubstr("range"));
   EXPECT_THAT(refusal({"--explorer", "frontier:lenght=2"}, 2), HasSubstr("did you mean 'length'"));
   EXPECT_THAT(refusal({"--mapper", "log_odds:resolution=0"}, 2), HasSubstr("resolution"));

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <tuple>
 #include <utility>
 
 #include <boost/json/parse.hpp>
@@ -211,6 +212,9 @@ TEST(Usage, AConfigurationFileWithUnknownKeysIsRefused) {
   expect_error(with("[optimize]\niteratons = 2\n"), kUsage, "did you mean '--iterations'?");
   expect_error(with("iterations = 2\n"), kUsage, "'iterations'");
   expect_error(with("[optimise]\niterations = 2\n"), kUsage, "'optimise'");
+  write_text(folder.file("again.toml"), "config = \"run.toml\"\n");
+  expect_error(cairn({"info", "@ring", "--config", folder.file("again.toml")}), kUsage,
+               "--config: 'config' is for the command line alone");
   expect_error(cairn({"info", "@ring", "--config", folder.file("none.toml")}), kInput, "none.toml");
   expect_error(cairn({"info", "@ring", "--config", "/dev/zero"}), kInput, "more than 1 MB");
 }
@@ -385,6 +389,20 @@ TEST(Usage, ANewPluginHasANameOfItsOwn) {
   EXPECT_EQ(folder.contents().size(), 0U);
 }
 
+/// Whatever names the templates use: `Vector` in that of a factor, `Tools` in an estimator's.
+TEST(Usage, ANewPluginHasAClassOfItsOwn) {
+  const TemporaryFolder folder;
+  for (const auto& [name, kind, expected] :
+       {std::tuple("vector", "factor", "struct VectorFactor {"),
+        {"tools", "estimator", "class ToolsEstimator final"},
+        {"laser_range", "factor", "struct LaserRange {"}}) {
+    const std::string own = folder.file(std::string(name) + kind);
+    const Outcome made = cairn({"new-plugin", name, std::string("--") + kind, "--folder", own});
+    ASSERT_EQ(made.exit_code, 0) << made.err;
+    EXPECT_THAT(read_text(own + "/" + name + ".cpp"), HasSubstr(expected));
+  }
+}
+
 TEST(Usage, ANewPluginOfACairnInItsBuildFolderSaysToInstallThatFirst) {
   const TemporaryFolder folder;
   const std::string own = folder.file("mine");
@@ -412,6 +430,34 @@ TEST(Usage, IntegersAreDecimalAndInRange) {
   const Outcome zero = cairn({"optimize", "@ring:poses=9", "--tolerance", "0", "--iterations",
                               "010", "--json", "-", "--quiet"});
   EXPECT_EQ(parse_json(zero.out).at("iterations").as_array().size(), 10);
+}
+
+TEST(Usage, NumbersAreDecimalFiniteAndNotTooSmall) {
+  for (const char* number : {"1e-400", "1e400", "inf", "nan", "0x1p-3", " 1", "1 ", "0,1", "++1"}) {
+    expect_error(cairn({"optimize", "@ring:poses=9", "--tolerance", number}), kUsage,
+                 "is not a number from 0 to 1");
+  }
+  for (const char* number : {"inf", "1e400", "0x10", " 5", "0"})
+    expect_error(cairn({"explore", "@rooms", "--until", std::string("distance=") + number}), kUsage,
+                 "is no number above zero");
+  for (const char* number : {"0.001", "+1e-3", ".001", "1E-3"}) {
+    EXPECT_EQ(cairn({"optimize", "@ring:poses=9", "--tolerance", number}).exit_code, 0) << number;
+  }
+}
+
+TEST(Usage, MessagesCutWordsThatAreNoNames) {
+  const TemporaryFolder folder;
+  write_text(folder.file("brackets"), std::string(900000, '['));
+  const std::string name(100000, 'x');
+  for (const Arguments& arguments :
+       {Arguments{"info", "@ring:poses=9", "--config", folder.file("brackets")},
+        Arguments{"optimize", "@ring:poses=9", "--optimizer", name},
+        Arguments{"optimize", "@ring:poses=9", "--" + name}}) {
+    const Outcome outcome = cairn(arguments);
+    EXPECT_NE(outcome.exit_code, 0);
+    EXPECT_LT(outcome.err.size(), 2000U);
+    EXPECT_THAT(outcome.err, HasSubstr("..."));
+  }
 }
 
 TEST(Usage, APluginThatEndsTheProgramIsAnError) {
