@@ -24,7 +24,6 @@ namespace {
 
 namespace json = boost::json;
 
-constexpr std::string_view kKind = R"("kind":"exploration")";
 constexpr double kMostCells = 1e8;
 constexpr const char* kMapEntropy = "map_entropy";
 constexpr const char* kGridArea = "grid_area";
@@ -180,11 +179,12 @@ std::size_t size_of(const std::vector<std::string>& lines) {
 std::vector<std::string> thinned(const std::vector<std::string>& lines, const char* member) {
   std::vector<std::string> less;
   bool keep = false;
-  const std::string quoted = fmt::format("\"{}\":", member);
+  const std::string quoted = fmt::format("\"{}\"", member);
   for (const std::string& line : lines) {
     less.push_back(line);
-    if (line.find(quoted) == std::string::npos || (keep = !keep)) continue;
+    if (line.find(quoted) == std::string::npos) continue;
     json::object object = parsed(line).value_or(json::object());
+    if (!object.contains(member) || (keep = !keep)) continue;
     object.erase(member);
     less.back() = json::serialize(object);
   }
@@ -194,7 +194,10 @@ std::vector<std::string> thinned(const std::vector<std::string>& lines, const ch
 }  // namespace
 
 bool is_exploration_recording(std::string_view head) {
-  return is_recording(head) && head.substr(0, head.find('\n')).find(kKind) != head.npos;
+  if (!is_recording(head)) return false;
+  const std::optional<json::object> header = parsed(head.substr(0, head.find('\n')));
+  const json::value* kind = header ? header->if_contains("kind") : nullptr;
+  return kind && *kind == "exploration";
 }
 
 ExplorationRecording read_exploration_recording(std::string_view text, const std::string& name) {

@@ -211,7 +211,18 @@ class FrameReader {
 
 }  // namespace
 
-bool is_recording(std::string_view head) { return head.starts_with(kOpening); }
+/// As this program writes it, or with blanks and an order of the members that others give it.
+bool is_recording(std::string_view head) {
+  if (head.starts_with(kOpening)) return true;
+  const std::string_view line = head.substr(0, head.find('\n'));
+  const std::size_t first = line.find_first_not_of(" \t\r");
+  if (first == std::string_view::npos || line[first] != '{') return false;
+  try {
+    return JsonReader(line, "").text("format") == "cairn-recording";
+  } catch (const Error&) {
+    return false;
+  }
+}
 
 Scene read_recording(std::string_view text, const std::string& name) {
   if (!is_recording(text)) {

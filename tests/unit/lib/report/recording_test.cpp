@@ -12,6 +12,7 @@
 #include "cairn/io/generator.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
+#include "support/spaced_json.hpp"
 
 namespace cairn::test {
 namespace {
@@ -74,6 +75,28 @@ TEST_F(Recorded, HasTheRunAsItWasReported) {
     EXPECT_DOUBLE_EQ(back.iterations[k].chi2, summary.iterations[k].chi2);
     EXPECT_EQ(back.iterations[k].accepted, summary.iterations[k].accepted);
   }
+}
+
+/// Any JSON library writes it with blanks, and some sort the members.
+TEST_F(Recorded, IsReadWhateverItsBlanksAndTheOrderOfItsMembers) {
+  record();
+  const std::string text = read_file(file_);
+  const std::string first = R"("format":"cairn-recording",)";
+  ASSERT_EQ(text.find(first), 1U);
+  std::string sorted = text;
+  sorted.erase(1, first.size()).insert(sorted.find("}\n"), R"(,"format":"cairn-recording")");
+  const Scene expected = read_recording(text, "run.jsonl");
+  for (const std::string& other : {spaced_json(text), sorted, spaced_json(sorted)}) {
+    ASSERT_TRUE(is_recording(other)) << other.substr(0, 100);
+    const Scene scene = read_recording(other, "run.jsonl");
+    ASSERT_EQ(scene.recordings.size(), 1U);
+    const std::vector<Frame>& frames = scene.recordings[0].frames;
+    ASSERT_EQ(frames.size(), expected.recordings[0].frames.size());
+    for (std::size_t k = 0; k < frames.size(); ++k)
+      EXPECT_EQ(frames[k].positions, expected.recordings[0].frames[k].positions);
+  }
+  for (const char* none : {"", "{", "{}\n", R"({"format":"cairn-report"})", "[1]", "VERTEX_SE2 0"})
+    EXPECT_FALSE(is_recording(none)) << none;
 }
 
 TEST_F(Recorded, OfARunThatWasKilledIsReadAsFarAsItGot) {

@@ -27,6 +27,7 @@
 #include "cairn/plugin/registry.hpp"
 #include "cairn/report/packed_array.hpp"
 #include "cairn/runtime/error.hpp"
+#include "support/spaced_json.hpp"
 
 namespace cairn {
 namespace {
@@ -330,6 +331,24 @@ TEST_F(Recorded, EachLineIsInTheFileAsSoonAsItIsComplete) {
   EXPECT_EQ(text(), lines);
   EXPECT_FALSE(std::filesystem::exists(part));
   EXPECT_GT(std::ranges::count(lines, '\n'), 14);
+}
+
+TEST_F(Recorded, IsReadWithWhateverBlanksAnotherProgramGivesIt) {
+  record();
+  const std::string spaced = test::spaced_json(text());
+  EXPECT_TRUE(is_exploration_recording(spaced));
+  EXPECT_FALSE(
+      is_exploration_recording(R"({ "format" : "cairn-recording", "kind" : "iterations" })"));
+  const ExplorationRecording expected = read_exploration_recording(text(), "run");
+  const ExplorationRecording recording = read_exploration_recording(spaced, "run");
+  EXPECT_TRUE(recording.ended);
+  EXPECT_EQ(recording.steps.columns[3].values, expected.steps.columns[3].values);
+  EXPECT_EQ(recording.decisions, expected.decisions);
+  // Thinned, until nothing of what may be left out is there.
+  std::vector<std::string> notes;
+  const std::string small = exploration_json(recording, "run", 1, notes);
+  EXPECT_EQ(notes.size(), 2U);
+  EXPECT_LT(small.size(), exploration_json(expected, "run", 100000000, notes).size());
 }
 
 TEST_F(Recorded, WhatWasWrittenUpToAnyByteOpens) {
