@@ -55,6 +55,24 @@ std::optional<std::size_t> first_line(std::string_view target) {
   return from;
 }
 
+/// "http://localhost:8125/lines?from=0" as its parts; the authority is empty where there is none.
+struct Target {
+  std::string_view authority, path;
+};
+Target parts_of(std::string_view target) {
+  constexpr std::string_view kScheme = "http://";
+  if (!target.starts_with(kScheme)) return {{}, target};
+  target.remove_prefix(kScheme.size());
+  const std::size_t slash = std::min(target.find('/'), target.size());
+  return {target.substr(0, slash), slash < target.size() ? target.substr(slash) : "/"};
+}
+
+/// By its name; the port may be another where a tunnel leads here.
+bool is_this_machine(std::string_view host) {
+  const std::string_view name = host.substr(0, host.rfind(':'));
+  return name == "127.0.0.1" || name == "localhost";
+}
+
 Response text_response(http::status status, std::string body, const char* type = "text/plain") {
   Response response{status, 11};
   response.set(http::field::content_type, fmt::format("{}; charset=utf-8", type));
@@ -89,8 +107,11 @@ class Connection : public std::enable_shared_from_this<Connection> {
     parser_->header_limit(kMostOfAHeader);
     parser_->body_limit(0);
     stream_.expires_after(kIdle);
+    reading_ = true;
     http::async_read(stream_, buffer_, *parser_,
                      [self = shared_from_this()](const error_code& error, std::size_t) {
+                       self->reading_ = false;
+                       if (is_of_a_request(error)) return self->refuse_request();
                        if (error) return self->close();
                        self->answer();
                      });
@@ -107,30 +128,40 @@ class Connection : public std::enable_shared_from_this<Connection> {
     closed_ = true;
   }
   bool is_closed() const { return closed_; }
+  /// Nothing is owed to its browser, which has not asked for anything yet, or not again.
+  bool is_idle() const { return reading_ && !closed_; }
   /// Its browser has asked for lines and has not received all that there are.
   bool is_behind() const {
     return follows_ && !closed_ && (sending_ || received_ < run_.lines.size());
   }
 
  private:
-  /// By its name; the port may be another where a tunnel leads here.
-  bool is_for_this_machine() const {
-    const std::string_view host = parser_->get()[http::field::host];
-    const std::string_view name = host.substr(0, host.rfind(':'));
-    return name == "127.0.0.1" || name == "localhost";
+  /// That what came is no HTTP, or too long, instead of that nothing more came.
+  static bool is_of_a_request(const error_code& error) {
+    return error && error.category() == make_error_code(http::error::bad_method).category() &&
+           error != http::error::end_of_stream && error != http::error::partial_message;
+  }
+  void refuse_request() {
+    send(text_response(http::status::bad_request, "not a request\n"), false);
   }
 
   void answer() {
     const Request& request = parser_->get();
-    const std::string_view target = request.target();
-    if (!is_for_this_machine())
+    const std::string_view asked = request.target();
+    const auto [authority, target] = parts_of(asked);
+    if (request.count(http::field::host) > 1)
+      return send(text_response(http::status::bad_request, "more than one Host\n"));
+    if (!is_this_machine(request[http::field::host]) ||
+        (!authority.empty() && !is_this_machine(authority)))
       return send(text_response(http::status::forbidden, "not for another host\n"));
-    if (request.method() != http::verb::get)
-      return send(text_response(http::status::method_not_allowed, "only GET\n"));
+    const bool head = request.method() == http::verb::head;
+    if (!head && request.method() != http::verb::get)
+      return send(text_response(http::status::method_not_allowed, "only GET and HEAD\n"));
     if (target == "/") return send(text_response(http::status::ok, run_.page, "text/html"));
     const std::optional<std::size_t> from = first_line(target);
     if (!from)
       return send(text_response(http::status::not_found, "there are / and /lines?from=N\n"));
+    if (head) return send(text_response(http::status::ok, "", "application/x-ndjson"));
     // A number beyond the end is of a page of another run, which has none of these lines.
     if (*from <= run_.lines.size()) follows_ = run_.followed = true;
     if (*from < run_.lines.size() || run_.ended) return send_lines(*from);
@@ -150,24 +181,28 @@ class Connection : public std::enable_shared_from_this<Connection> {
     send(text_response(http::status::ok, std::move(text), "application/x-ndjson"));
   }
 
-  void send(Response response) {
+  void send(Response response) { send(std::move(response), parser_->get().keep_alive()); }
+  void send(Response response, bool keep_alive) {
     response_ = std::move(response);
     response_.set(http::field::cache_control, "no-store");
     response_.set("X-Content-Type-Options", "nosniff");
     response_.set("Cross-Origin-Resource-Policy", "same-origin");
-    response_.keep_alive(parser_->get().keep_alive());
+    response_.keep_alive(keep_alive);
     response_.prepare_payload();
     sending_ = true;
     stream_.expires_after(kIdle);
-    http::async_write(stream_, response_,
-                      [self = shared_from_this()](const error_code& error, std::size_t) {
-                        self->sending_ = false;
-                        if (error) return self->close();
-                        self->received_ = self->sent_;
-                        self->run_.fetched = std::max(self->run_.fetched, self->received_);
-                        if (self->response_.keep_alive()) return self->read();
-                        self->close();
-                      });
+    auto sent = [self = shared_from_this()](const error_code& error, std::size_t) {
+      self->sending_ = false;
+      if (error) return self->close();
+      self->received_ = self->sent_;
+      self->run_.fetched = std::max(self->run_.fetched, self->received_);
+      if (self->response_.keep_alive()) return self->read();
+      self->close();
+    };
+    if (parser_->get().method() != http::verb::head)
+      return http::async_write(stream_, response_, std::move(sent));
+    head_.emplace(response_);
+    http::async_write_header(stream_, *head_, std::move(sent));
   }
 
   beast::tcp_stream stream_;
@@ -176,9 +211,10 @@ class Connection : public std::enable_shared_from_this<Connection> {
   beast::flat_buffer buffer_{kMostOfAHeader};
   std::optional<http::request_parser<http::empty_body>> parser_;
   Response response_;
+  std::optional<http::response_serializer<http::string_body>> head_;  // of what has no body
   std::optional<std::size_t> waits_for_;
   std::size_t sent_ = 0, received_ = 0;  // lines, counted from the first of the run
-  bool follows_ = false, sending_ = false, closed_ = false;
+  bool follows_ = false, reading_ = false, sending_ = false, closed_ = false;
 };
 
 [[noreturn]] void fail(std::uint16_t port, const error_code& error) {
@@ -262,9 +298,18 @@ class RunServer::Service {
   }
   void welcome(tcp::socket socket) {
     connections_.remove_if([](const auto& connection) { return connection->is_closed(); });
+    if (connections_.size() >= kMostConnections) make_room();
     if (connections_.size() >= kMostConnections) return;  // closed with the socket
     connections_.push_back(std::make_shared<Connection>(std::move(socket), run_));
     connections_.back()->read();
+  }
+  /// Who connects and asks for nothing must not keep others out: the oldest of these is closed.
+  void make_room() {
+    const auto idle = std::ranges::find_if(
+        connections_, [](const auto& connection) { return connection->is_idle(); });
+    if (idle == connections_.end()) return;
+    (*idle)->close();
+    connections_.erase(idle);
   }
   void look() {
     for (const auto& connection : connections_) connection->look();

@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <future>
+#include <list>
 #include <string>
 #include <thread>
 #include <vector>
@@ -123,18 +124,50 @@ TEST(RunServer, IsForBrowsersOfThisMachineThatRead) {
   EXPECT_EQ(ask("GET /lines?from=0", "robots.example"), 403);
   EXPECT_EQ(ask("GET /lines?from=0", "127.0.0.1.example:80"), 403);
   EXPECT_EQ(ask("GET /lines?from=0", ""), 403);
+  EXPECT_EQ(ask("GET /lines?from=0", "localhost\r\nHost: localhost"), 400);
+  EXPECT_EQ(ask("GET /lines?from=0", "localhost\r\nHost: robots.example"), 400);
+  EXPECT_EQ(ask("GET http://localhost:80/lines?from=0", "localhost"), 200);
+  EXPECT_EQ(ask("GET http://localhost", "localhost"), 200);
+  EXPECT_EQ(ask("GET http://robots.example/lines?from=0", "localhost"), 403);
   EXPECT_EQ(ask("POST /", "localhost"), 405);
   for (const char* target : {"/lines", "/lines?from=", "/lines?from=-1", "/lines?from=1x",
                              "/lines?from=99999999999999999999999", "/../etc/passwd", "*"})
     EXPECT_EQ(ask(std::string("GET ") + target, "localhost"), 404) << target;
 }
 
+TEST(RunServer, TheHeadOfAnAnswerComesAlone) {
+  RunServer server(0);
+  server.show("the page");
+  for (const char* target : {"/", "/lines?from=0"}) {
+    const HttpAnswer answer = http_exchange(
+        server.port(),
+        fmt::format("HEAD {} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n", target));
+    EXPECT_EQ(answer.status, 200);
+    EXPECT_EQ(answer.body, "");
+  }
+  EXPECT_THAT(http_exchange(server.port(),
+                            "HEAD / HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n")
+                  .head,
+              HasSubstr("Content-Length: 8"));
+}
+
+/// Any user of the machine can connect, and say nothing.
+TEST(RunServer, WhoAsksForNothingKeepsNobodyOut) {
+  RunServer server(0);
+  server.show("the page");
+  std::list<HttpConnection> silent;
+  for (int k = 0; k < 200; ++k) silent.emplace_back(server.port());
+  EXPECT_EQ(http_get(server.port(), "/").body, "the page");
+}
+
 TEST(RunServer, WhatIsNoRequestDisturbsNobody) {
   RunServer server(0);
   server.add("{}\n");
-  http_exchange(server.port(), "\r\n\r\n\r\n");
-  http_exchange(server.port(), "GET\r\n\r\n");
-  http_exchange(server.port(), std::string("\x16\x03\x01\x00\xff\x00", 6) + "\r\n\r\n");
+  EXPECT_EQ(http_exchange(server.port(), "\r\n\r\n\r\n").status, 400);
+  EXPECT_EQ(http_exchange(server.port(), "GET\r\n\r\n").status, 400);
+  EXPECT_EQ(
+      http_exchange(server.port(), std::string("\x16\x03\x01\x00\xff\x00", 6) + "\r\n\r\n").status,
+      400);
   http_exchange(server.port(), "GET /" + std::string(100000, 'x') + " HTTP/1.1\r\n\r\n");
   http_exchange(server.port(),
                 "POST / HTTP/1.1\r\nHost: localhost\r\nContent-Length: 99999999\r\n\r\nx");
