@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include "cairn/types/domain.hpp"
 #include "cairn/types/factor_type.hpp"
 #include "cairn/types/loss.hpp"
 #include "cairn/types/never_throws.hpp"
@@ -6,6 +7,7 @@
 
 namespace cairn {
 
+Domain::~Domain() = default;
 LieGroup::~LieGroup() = default;
 Placement::~Placement() = default;
 VariableType::~VariableType() = default;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <utility>
 
 #include <fmt/format.h>
@@ -12,6 +13,7 @@
 #include "cairn/evaluation/fixed_variables.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/plugin_call.hpp"
+#include "cairn/types/domain.hpp"
 #include "unwrapped_angle.hpp"
 
 namespace cairn {
@@ -122,6 +124,29 @@ std::string residual_not_finite(const Graph& graph) {
   return {};
 }
 
+std::vector<std::string> outside_of_domains(const Graph& graph) {
+  std::vector<std::string> sentences;
+  for (const FactorPool& pool : graph.factor_pools()) {
+    const auto* domain = dynamic_cast<const Domain*>(pool.type.get());
+    if (!domain) continue;
+    std::map<std::string, std::pair<int, int>> reasons;  // the first factor and the number of each
+    for (const std::int32_t position : pool.sequence) {
+      std::vector<const double*> states;
+      for (const std::int32_t v : graph.factor_variables(position))
+        states.push_back(graph.state(v).data());
+      const std::string reason = domain->outside(states.data());
+      if (!reason.empty()) ++reasons.try_emplace(reason, position, 0).first->second.second;
+    }
+    for (const auto& [reason, found] : reasons) {
+      const auto [first, count] = found;
+      sentences.push_back(
+          fmt::format("{}: {}{}", graph.describe_factor(first), reason,
+                      count == 1 ? "" : fmt::format("; so are {} more", count - 1)));
+    }
+  }
+  return sentences;
+}
+
 std::string losses_weigh_nothing(const Graph& graph) {
   if (!graph.has_losses() || graph.factor_count() == 0) return {};
   const std::vector<double> norms = squared_norms(graph);
@@ -145,6 +170,7 @@ std::vector<std::string> reasons_for_doubt(const Graph& graph, double chi2) {
                                       losses_weigh_nothing(graph)}) {
     if (!sentence.empty()) sentences.push_back(sentence);
   }
+  for (std::string& outside : outside_of_domains(graph)) sentences.push_back(std::move(outside));
   for (std::string& wrong : wrong_jacobians(graph)) sentences.push_back(std::move(wrong));
   return sentences;
 }

@@ -177,6 +177,7 @@ Summary CeresOptimizer::optimize(Graph& graph, const Stop& stop, Observer& obser
   }
 
   Values values = graph.values();
+  begin_inside(graph, gauge, values, summary);
   CeresProblem problem(graph, gauge, values, make_ceres_loss(loss_));
   Bridge bridge(graph, values, problem.cost_scale(), stop, observer, summary);
   ceres::Solver::Options options = options_;

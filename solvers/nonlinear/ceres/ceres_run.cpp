@@ -8,6 +8,8 @@
 
 #include <glog/logging.h>
 
+#include "domain_entry.hpp"
+
 namespace cairn {
 
 QuietGlog::QuietGlog() : level_(FLAGS_minloglevel) { FLAGS_minloglevel = google::GLOG_FATAL; }
@@ -37,6 +39,17 @@ bool ends_at_once(const Graph& graph, const Gauge& gauge, const Stop& stop, Obse
   summary.status = !finite ? Status::diverged : idle ? Status::converged : Status::max_iterations;
   observer.on_start(graph, summary.initial_chi2);
   return true;
+}
+
+void begin_inside(const Graph& graph, const Gauge& gauge, Values& values, Summary& summary) {
+  Values inside = values;
+  std::string moved = enter_domains(graph, gauge.held, inside);
+  if (moved.empty()) return;
+  Graph there = graph.clone();
+  there.set_values(inside);
+  if (!(chi2(there) < summary.initial_chi2)) return;
+  values = std::move(inside);
+  summary.notes.push_back(std::move(moved));
 }
 
 }  // namespace cairn

@@ -36,4 +36,7 @@ Summary begin_summary(std::string_view optimizer, std::string_view linear_solver
 bool ends_at_once(const Graph& graph, const Gauge& gauge, const Stop& stop, Observer& observer,
                   Summary& summary);
 
+/// Begins where all residuals have a meaning, with a note, if that lowers chi2 (`enter_domains`).
+void begin_inside(const Graph& graph, const Gauge& gauge, Values& values, Summary& summary);
+
 }  // namespace cairn

@@ -66,6 +66,7 @@ class Run final : public ceres::IterationCallback {
         observer_(observer),
         summary_(summary),
         decrement_(graph, gauge) {
+    begin_inside(graph, gauge, values_, summary);
     if (options.direction == "bfgs" && decrement_.size() > options.max_size) {
       throw Error(
           ErrorCode::usage,

@@ -14,6 +14,7 @@
 
 #include "cairn/linear/iterative_solver.hpp"
 #include "cairn/runtime/timed.hpp"
+#include "domain_entry.hpp"
 
 namespace cairn {
 
@@ -91,23 +92,37 @@ Descent::Descent(std::string optimizer, std::string linear_solver, LinearSolver&
     note(std::move(gauge));
   const bool nothing_to_do = equations_->size() == 0;
   if (nothing_to_do) {
-    chi2 = equations_->chi2(estimate);
+    chi2 = summary_.initial_chi2 = equations_->chi2(estimate);
     note("nothing to optimise: every variable is constant");
     end(Status::converged);
   } else {
     step.resize(static_cast<std::size_t>(equations_->size()));
     trial = estimate;
-    chi2 = equations_->linearize(estimate);
+    chi2 = summary_.initial_chi2 = equations_->linearize(estimate);
+    begin_inside();
   }
   state_extent_ = cairn::state_extent(graph, equations_->gauge(), estimate);
   best_ = estimate;
-  best_chi2_ = summary_.initial_chi2 = chi2;
+  best_chi2_ = chi2;
   for (const std::string& sentence : summary_.notes) observer_.on_message(sentence);
-  observer_.on_start(graph, chi2);
+  observer_.on_start(graph, summary_.initial_chi2);
   if (!std::isfinite(chi2)) {
     note("chi2 of the initial estimate is not finite");
     end(Status::diverged);
   }
+}
+
+/// Begins where all residuals have a meaning, if that lowers chi2.
+void Descent::begin_inside() {
+  std::string moved = enter_domains(graph_, equations_->gauge().held, trial);
+  if (moved.empty()) return;
+  if (!(equations_->chi2(trial) < chi2)) {
+    trial = estimate;
+    return;
+  }
+  estimate = trial;
+  chi2 = equations_->linearize(estimate);
+  note(std::move(moved));
 }
 
 bool Descent::next_iteration() {

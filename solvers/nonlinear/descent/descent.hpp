@@ -113,6 +113,7 @@ class Descent {
   Summary finish();
 
  private:
+  void begin_inside();
   /// What rounding of the estimate's numbers adds to chi2, as expected: Σ H_kk (2⁻⁵² |x|)² / 12,
   /// |x| the largest coordinate of a pose or point, 1 for orientations, else the largest number of
   /// the state.

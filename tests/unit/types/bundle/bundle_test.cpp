@@ -181,6 +181,71 @@ TEST(Reprojection, MirrorsWhatIsBehindTheCamera) {
       1e-9);
 }
 
+// Where the formula does not hold any more: near the plane of the camera, and far from the axis.
+TEST(Reprojection, HasJacobiansWhereThereIsNoImage) {
+  Sampler sampler(8);
+  CameraState camera = Camera::identity();
+  camera.head<3>() << 500.0, -0.1, 0.01;
+  const Pixel z(1.0, 2.0);
+  for (int k = 0; k < 200; ++k) {
+    Point X(sampler.uniform(-3.0, 3.0), sampler.uniform(-3.0, 3.0), 0.0);
+    const double aside = std::abs(X[0]) + std::abs(X[1]);
+    const bool in_plane = k % 2 == 0;
+    X[2] = in_plane ? sampler.uniform(-0.99e-4, 0.99e-4) * aside
+                    : X.norm() / sampler.uniform(k % 4 == 1 ? -2.8 : 2.0, k % 4 == 1 ? -2.0 : 2.8);
+    EXPECT_EQ(Reprojection::in_plane<double>(X), in_plane);
+    std::tuple<Eigen::Matrix<double, 2, 9>, Eigen::Matrix<double, 2, 3>> analytic, automatic;
+    const Pixel r =
+        Reprojection::evaluate(camera, X, z, std::get<0>(analytic), std::get<1>(analytic));
+    const Pixel r_automatic = autodiff::evaluate<Reprojection>(std::tuple(camera, X), z, automatic);
+    EXPECT_EQ(r, residual(camera, X, z));
+    EXPECT_LT((r - r_automatic).norm(), 1e-13 * (10.0 + r.norm()));
+    for (int c = 0; c < 9; ++c) {
+      const auto a = std::get<0>(analytic).col(c), b = std::get<0>(automatic).col(c);
+      EXPECT_LT((a - b).norm(), 1e-11 * (1.0 + b.norm())) << "camera, column " << c;
+    }
+    EXPECT_LT((std::get<1>(analytic) - std::get<1>(automatic)).norm(),
+              1e-11 * (1.0 + std::get<1>(automatic).norm()));
+    // In the plane the error falls along its Jacobian, towards the front.
+    if (in_plane && X[2] < 0.0) {
+      EXPECT_LT(residual(camera, X - Point(0, 0, 1e-6 * aside), z).norm(), r.norm());
+    }
+  }
+}
+
+TEST(Reprojection, GoesOverIntoAPinholeWithoutAStep) {
+  CameraState camera = Camera::identity();
+  camera.head<3>() << 500.0, -0.1, 0.01;
+  const Pixel z(0.0, 0.0);
+  for (const double square : {Reprojection::kField, Reprojection::kBeyond}) {
+    const double at = std::sqrt(square);
+    const Pixel before = residual(camera, Point(at * (1.0 - 1e-9), 0.0, -1.0), z),
+                after = residual(camera, Point(at * (1.0 + 1e-9), 0.0, -1.0), z);
+    EXPECT_LT((after - before).norm(), 1e-4) << square;
+  }
+  EXPECT_LT((residual(camera, Point(3.0, 0.0, -1.0), z) - Pixel(1500.0, 0.0)).norm(), 1e-9);
+}
+
+TEST(Reprojection, SaysWhereNothingIsSeen) {
+  const CameraState camera = Camera::identity();
+  const auto outside = [&](const Point& X) {
+    const double* const x[] = {camera.data(), X.data()};
+    return Reprojection::outside(x);
+  };
+  EXPECT_EQ(outside({1, 2, -4}), "");
+  EXPECT_EQ(outside({1, 2, 4}), "the point is behind the camera, which cannot see it");
+  for (const Point& X : {Point(1, 2, 0), Point(1, 2, -1e-5), Point(0, 0, 0)})
+    EXPECT_EQ(outside(X), "the point is in the plane of the camera, and has no image");
+  Point placed;
+  const Point behind(1, 2, 4);
+  const double* const x[] = {camera.data(), behind.data()};
+  const Pixel z(0.25, 0.5);
+  ASSERT_TRUE(Reprojection::place(1, x, z.data(), 8.0, placed.data()));
+  EXPECT_NEAR(placed.norm(), 8.0, 1e-12);
+  EXPECT_LT(residual(camera, placed, z).norm(), 1e-12);
+  EXPECT_FALSE(Reprojection::place(0, x, z.data(), 8.0, placed.data()));
+}
+
 TEST(Reprojection, StaysANumberWhereThereIsNoImage) {
   CameraState camera = Camera::identity();
   camera[0] = 500.0;

@@ -39,12 +39,18 @@ CAIRN_API std::vector<std::string> wrong_jacobians(const Graph& graph);
 /// empty if there is none.
 CAIRN_API std::string residual_not_finite(const Graph& graph);
 
+/// Names the factors whose residual has no meaning at the graph's states (`Domain`), such as points
+/// behind the camera that sees them: a sentence for each type and reason, with the first of them
+/// and their number.
+CAIRN_API std::vector<std::string> outside_of_domains(const Graph& graph);
+
 /// A sentence where robust losses take the weight of every factor at the graph's states (ρ′ below
 /// 1e-9): H is then zero to rounding. Empty else.
 CAIRN_API std::string losses_weigh_nothing(const Graph& graph);
 
 /// What speaks against an optimised estimate of this chi2, a sentence each: `implausible_estimate`,
-/// `residual_not_finite`, `losses_weigh_nothing` and `wrong_jacobians`. Empty if nothing does.
+/// `residual_not_finite`, `losses_weigh_nothing`, `outside_of_domains` and `wrong_jacobians`. Empty
+/// if nothing does.
 CAIRN_API std::vector<std::string> reasons_for_doubt(const Graph& graph, double chi2);
 
 }  // namespace cairn

@@ -1,0 +1,232 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "domain_entry.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <iterator>
+#include <optional>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include <fmt/core.h>
+#include <Eigen/Core>
+
+#include "cairn/types/domain.hpp"
+#include "dense/cholesky.hpp"
+
+namespace cairn {
+namespace {
+
+/// Factors with smaller squared residuals, by number of them, may be mirrored images that fit.
+constexpr double kLarge = 2500.0;
+/// So many times farther than others, a point is as good as at infinity.
+constexpr double kFar = 30.0;
+constexpr int kIterations = 30;
+/// Places for a variable, as shares of the distance at which others are.
+constexpr double kReaches[] = {1.0, 0.3, 3.0};
+
+using State = std::vector<double>;
+
+template <class Values>
+auto state_in(const Graph& graph, Values& values, int v) {
+  const auto size = static_cast<std::size_t>(graph.type(v).ambient_size());
+  auto& pool = values.pools[static_cast<std::size_t>(graph.pool(v))];
+  return std::span(pool.data() + static_cast<std::size_t>(graph.slot(v)) * size, size);
+}
+
+/// The states of a factor's variables.
+std::vector<const double*> states_in(const Graph& graph, const Values& values, int factor) {
+  std::vector<const double*> all;
+  for (const std::int32_t v : graph.factor_variables(factor))
+    all.push_back(state_in(graph, values, v).data());
+  return all;
+}
+
+/// One variable, all others constant.
+class Alone {
+ public:
+  Alone(const Graph& graph, const Values& values, int variable, std::span<const int> factors)
+      : graph_(graph), values_(values), variable_(variable), factors_(factors) {}
+
+  std::span<const double> now() const { return state_in(graph_, values_, variable_); }
+  std::span<const int> factors() const { return factors_; }
+
+  /// The states of a factor's variables, this one's being `x`.
+  std::vector<const double*> states(int factor, const State& x) const {
+    std::vector<const double*> all = states_in(graph_, values_, factor);
+    const auto on = graph_.factor_variables(factor);
+    for (std::size_t k = 0; k < on.size(); ++k) {
+      if (on[k] == variable_) all[k] = x.data();
+    }
+    return all;
+  }
+  double chi2(const State& x) const {
+    double sum = 0.0;
+    for (const int f : factors_) sum += residual(f, x, nullptr).squaredNorm();
+    return sum;
+  }
+  bool is_inside(const State& x) const {
+    return std::ranges::all_of(factors_, [&](int f) {
+      const auto* domain = dynamic_cast<const Domain*>(&graph_.factor_type(f));
+      return !domain || domain->outside(states(f, x).data()).empty();
+    });
+  }
+  /// A few iterations of Levenberg-Marquardt from x; returns chi2.
+  double descend(State& x) const;
+
+ private:
+  Eigen::VectorXd residual(int factor, const State& x, Eigen::MatrixXd* J) const {
+    const FactorType& type = graph_.factor_type(factor);
+    const auto on = graph_.factor_variables(factor);
+    Eigen::VectorXd r(type.residual_size());
+    std::vector<double*> jacobians(on.size(), nullptr);
+    for (std::size_t k = 0; J && k < on.size(); ++k) {
+      if (on[k] != variable_) continue;
+      J->resize(r.size(), type.tangent_size(static_cast<int>(k)));
+      jacobians[k] = J->data();
+    }
+    type.evaluate(states(factor, x).data(), graph_.measurement(factor).data(),
+                  graph_.sqrt_information(factor).data(), r.data(), J ? jacobians.data() : nullptr);
+    return r;
+  }
+
+  const Graph& graph_;
+  const Values& values_;
+  int variable_;
+  std::span<const int> factors_;
+};
+
+double Alone::descend(State& x) const {
+  const VariableType& type = graph_.type(variable_);
+  const int n = type.tangent_size();
+  double reached = chi2(x), lambda = 1e-4;
+  State trial = x;
+  Eigen::MatrixXd J;
+  for (int k = 0; k < kIterations && lambda < 1e10; ++k) {
+    Eigen::MatrixXd H = Eigen::MatrixXd::Zero(n, n);
+    Eigen::VectorXd g = Eigen::VectorXd::Zero(n);
+    for (const int f : factors_) {
+      const Eigen::VectorXd r = residual(f, x, &J);
+      H.noalias() += J.transpose() * J;
+      g.noalias() -= J.transpose() * r;
+    }
+    H.diagonal() *= 1.0 + lambda;
+    const Eigen::VectorXd step = Eigen::LDLT<Eigen::MatrixXd>(H).solve(g);
+    if (!step.allFinite()) break;
+    const std::int64_t offset = 0;
+    type.retract(1, x.data(), &offset, step.data(), trial.data());
+    const double next = chi2(trial);
+    if (next < reached) {
+      const bool arrived = next > (1.0 - 1e-9) * reached;
+      x = trial;
+      reached = next;
+      lambda *= 0.1;
+      if (arrived) break;
+    } else {
+      lambda *= 10.0;
+    }
+  }
+  return reached;
+}
+
+/// The factors of one type with a domain: how far their variables are from each other inside of it,
+/// and which are outside, or much farther.
+struct Survey {
+  const Domain* domain = nullptr;
+  std::vector<int> astray;  ///< positions in the graph
+  double reach = 1.0;       ///< median
+};
+
+Survey survey(const Graph& graph, const FactorPool& pool, const Values& values) {
+  Survey result;
+  result.domain = dynamic_cast<const Domain*>(pool.type.get());
+  if (!result.domain) return result;
+  std::vector<std::pair<double, int>> reaches;
+  for (const std::int32_t f : pool.sequence) {
+    const std::vector<const double*> x = states_in(graph, values, f);
+    if (!result.domain->outside(x.data()).empty()) {
+      result.astray.push_back(f);
+    } else {
+      reaches.emplace_back(result.domain->reach(x.data()), f);
+    }
+  }
+  if (reaches.empty()) return result;
+  const auto middle = reaches.begin() + std::ssize(reaches) / 2;
+  std::ranges::nth_element(reaches, middle);
+  result.reach = middle->first;
+  for (const auto& [reach, f] : reaches) {
+    if (reach > kFar * result.reach) result.astray.push_back(f);
+  }
+  std::ranges::sort(result.astray);
+  return result;
+}
+
+/// The best state inside all domains that is found from the places that the factors give; nothing
+/// if none is better than the present one, or none gives any.
+std::optional<State> better_inside(const Graph& graph, const Alone& alone, int variable,
+                                   double reach) {
+  const State now(alone.now().begin(), alone.now().end());
+  double least = alone.chi2(now);
+  if (least <= kLarge * static_cast<double>(alone.factors().size())) return std::nullopt;
+  std::optional<State> best;
+  for (const int f : alone.factors()) {
+    const auto* domain = dynamic_cast<const Domain*>(&graph.factor_type(f));
+    const auto on = graph.factor_variables(f);
+    const int target = static_cast<int>(std::ranges::find(on, variable) - on.begin());
+    for (const double share : kReaches) {
+      State x = now;
+      if (!domain || !domain->place(target, alone.states(f, now).data(),
+                                    graph.measurement(f).data(), share * reach, x.data()))
+        break;
+      const double reached = alone.descend(x);
+      if (!(reached < least) || !alone.is_inside(x)) continue;
+      least = reached;
+      best = std::move(x);
+    }
+  }
+  return best;
+}
+
+std::string in_words(const Graph& graph, const Domain& domain, const Values& values, int factor) {
+  const auto x = states_in(graph, values, factor);
+  const std::string outside = domain.outside(x.data());
+  return fmt::format(
+      "{}: {}", graph.describe_factor(factor),
+      outside.empty() ? "its variables are far from each other beside the others" : outside);
+}
+
+}  // namespace
+
+std::string enter_domains(const Graph& graph, const std::vector<bool>& held, Values& values) {
+  std::vector<Survey> surveys;
+  for (const FactorPool& pool : graph.factor_pools())
+    surveys.push_back(survey(graph, pool, values));
+  if (std::ranges::all_of(surveys, [](const Survey& s) { return s.astray.empty(); })) return {};
+
+  const std::vector<std::vector<int>> factors = factors_by_variable(graph);
+  std::vector<bool> tried(held);
+  std::string first;
+  int moved = 0;
+  for (const Survey& of : surveys) {
+    for (const int f : of.astray) {
+      for (const std::int32_t v : graph.factor_variables(f)) {
+        const auto k = static_cast<std::size_t>(v);
+        if (tried[k]) continue;
+        tried[k] = true;
+        const Alone alone(graph, values, v, factors[k]);
+        const std::optional<State> better = better_inside(graph, alone, v, of.reach);
+        if (!better) continue;
+        if (moved++ == 0) first = in_words(graph, *of.domain, values, f);
+        std::ranges::copy(*better, state_in(graph, values, v).begin());
+      }
+    }
+  }
+  if (moved == 0) return {};
+  if (moved == 1) return first + "; it began where its factors put it instead";
+  return fmt::format("{}; {} variables began where their factors put them instead", first, moved);
+}
+
+}  // namespace cairn
