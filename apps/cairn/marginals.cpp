@@ -468,14 +468,13 @@ std::optional<Summary> optimize(Graph& graph, Optimizer* optimizer, const Margin
   OptimizationProgress progress(session.common.quiet, stop.max_iterations);
   Summary summary = call_plugin([&] { return fmt::format("optimizer '{}'", options.optimizer); },
                                 [&] { return optimizer->optimize(graph, stop, progress); });
-  if (summary.status == Status::interrupted) return summary;
-  if (summary.status != Status::converged) {
-    session.note(fmt::format(
+  for (std::string& note : notes_on_the_end(summary, stop, graph))
+    summary.notes.push_back(std::move(note));
+  if (summary.status != Status::interrupted && summary.status != Status::converged) {
+    summary.notes.push_back(fmt::format(
         "the optimisation ended as {}: covariances are of where it stopped, which is not a minimum",
         to_string(summary.status)));
   }
-  for (const std::string& note : notes_on_the_end(summary, options.problem.stop, graph))
-    session.note(note);
   return summary;
 }
 
@@ -530,7 +529,7 @@ int run(MarginalsOptions options, Session& session) {
     session.print(result_text(options, loaded, summary, request, answer, results, session));
   });
   results.finish();
-  return 0;
+  return summary ? exit_code(*summary, options.problem.stop) : 0;
 }
 
 }  // namespace

@@ -3,14 +3,12 @@
 
 #include <algorithm>
 #include <functional>
-#include <iterator>
 #include <utility>
 
 #include <fmt/core.h>
 
 #include "arguments.hpp"
 #include "cairn/evaluation/optimization.hpp"
-#include "cairn/evaluation/plausibility.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "interrupt.hpp"
 #include "table.hpp"
@@ -84,31 +82,12 @@ std::vector<std::string> ProblemSetup::apply(Graph& graph, WatchedGuess::GoOn go
 
 std::vector<std::string> notes_on_the_end(const Summary& summary, const Stop& stop,
                                           const Graph& graph) {
-  std::vector<std::string> notes;
-  if (summary.status == Status::interrupted) return notes;
-  if (summary.status == Status::max_iterations && stop.tolerance > 0.0 &&
-      std::ssize(summary.iterations) >= stop.max_iterations) {
-    notes.push_back(
-        fmt::format("stopped by --iterations {} before it converged", stop.max_iterations));
-  }
-  for (std::string& doubt : reasons_for_doubt(graph, summary.final_chi2))
-    notes.push_back(std::move(doubt));
-  return notes;
+  return cairn::notes_on_the_end(summary, stop, graph, "--iterations");
 }
 
 int exit_code(const Summary& summary, const Stop& stop) {
-  switch (summary.status) {
-    case Status::converged:
-      return 0;
-    case Status::max_iterations:
-      return stop.tolerance > 0.0 ? static_cast<int>(ErrorCode::numerical) : 0;
-    case Status::diverged:
-    case Status::not_positive_definite:
-      return static_cast<int>(ErrorCode::numerical);
-    case Status::interrupted:
-      return kExitInterrupted;
-  }
-  return static_cast<int>(ErrorCode::numerical);
+  if (summary.status == Status::interrupted) return kExitInterrupted;
+  return is_estimate(summary, stop) ? 0 : static_cast<int>(ErrorCode::numerical);
 }
 
 namespace {

@@ -55,8 +55,7 @@ class ProblemSetup {
   FactorSelector selector_;
 };
 
-/// Sentences on how an optimisation ended: that it stopped before it converged, and what helps;
-/// that chi2 of the estimate is implausible. None for one that was interrupted.
+/// As of the library, with the program's name of the limit.
 std::vector<std::string> notes_on_the_end(const Summary& summary, const Stop& stop,
                                           const Graph& graph);
 

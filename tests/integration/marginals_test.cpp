@@ -70,6 +70,23 @@ TEST_F(MarginalsCommand, ReportsWhatScriptsRelyOn) {
   EXPECT_NEAR(position[0] + position[3], own[0] + own[4], 1e-8 * (own[0] + own[4]));
 }
 
+TEST_F(MarginalsCommand, SayThatTheyAreOfNoEstimate) {
+  const std::string file = graph(), json = (folder_.path() / "short.json").string();
+  const Outcome run = cairn(
+      {"marginals", file, "--initial", "odometry", "--iterations", "1", "--quiet", "--json", json});
+  EXPECT_EQ(run.exit_code, 4) << run.err;
+  const boost::json::value report = parse_json(read_text(json));
+  EXPECT_EQ(report.at("status"), "max_iterations");
+  const std::string notes = boost::json::serialize(report.at("notes"));
+  EXPECT_THAT(notes, HasSubstr("stopped by --iterations 1 before it converged"));
+  EXPECT_THAT(notes, HasSubstr("covariances are of where it stopped"));
+  EXPECT_THAT(run.out, HasSubstr("stopped by --iterations 1 before it converged"));
+  EXPECT_EQ(report.at("diagonal").as_array().size(), 200u) << "what was computed is there";
+  EXPECT_EQ(
+      cairn({"marginals", file, "--iterations", "3", "--tolerance", "0", "--quiet"}).exit_code, 0)
+      << "that many were asked for";
+}
+
 TEST_F(MarginalsCommand, GivesTheDiagonalIfNothingElseIsAskedFor) {
   const std::string file = graph();
   const auto plain = report_of({"marginals", file}).as_object();

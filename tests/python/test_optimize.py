@@ -36,6 +36,23 @@ def test_the_minimum_is_that_of_dense_gauss_newton(optimizer, linear_solver):
     assert [it.number for it in summary.iterations] == list(range(1, len(summary.iterations) + 1))
 
 
+def test_a_summary_says_that_its_limit_ended_it():
+    summary = cairn.optimize(from_dense(disturbed()), initial=None, max_iterations=1)
+    assert not summary.converged and "stopped by max_iterations 1 before it converged" in summary.notes
+    summary = cairn.optimize(from_dense(disturbed()), initial=None, max_iterations=1, tolerance=0)
+    assert not any("stopped by" in note for note in summary.notes)
+
+
+def test_states_that_are_too_large_end_no_process():
+    if "ceres_line_search" not in cairn.components("optimizer"):
+        pytest.skip("there is no optimizer ceres_line_search")
+    graph = from_dense(disturbed())
+    graph.set_states(cairn.Pose2, graph.states(cairn.Pose2) * [1e307, 1.0, 1.0])
+    summary = cairn.optimize(graph, "ceres_line_search", initial=None)
+    assert summary.status == "diverged" and not np.isfinite(summary.initial_chi2)
+    assert not summary.iterations
+
+
 def test_it_does_what_the_program_does(tmp_path):
     graph, _ = cairn.generate("manhattan", seed=3, poses=300)
     graph.write(tmp_path / "in.g2o")

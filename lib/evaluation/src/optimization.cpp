@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "cairn/evaluation/optimization.hpp"
 
+#include <iterator>
 #include <utility>
 
 #include <fmt/core.h>
@@ -26,12 +27,29 @@ Summary optimize(Graph& graph, const Optimization& of, const Stop& stop, Observe
   for (std::string& note : notes) note = fmt::format("initial guess {}: {}", of.guess_name, note);
   Summary summary = call_plugin([&] { return fmt::format("optimizer '{}'", of.optimizer_name); },
                                 [&] { return of.optimizer.optimize(graph, stop, observer); });
-  if (summary.status != Status::interrupted) {
-    for (std::string& doubt : reasons_for_doubt(graph, summary.final_chi2))
-      summary.notes.push_back(std::move(doubt));
-  }
+  for (std::string& note : notes_on_the_end(summary, stop, graph))
+    summary.notes.push_back(std::move(note));
   summary.notes.insert(summary.notes.begin(), notes.begin(), notes.end());
   return summary;
+}
+
+bool is_estimate(const Summary& summary, const Stop& stop) {
+  return summary.status == Status::converged ||
+         (summary.status == Status::max_iterations && !(stop.tolerance > 0.0));
+}
+
+std::vector<std::string> notes_on_the_end(const Summary& summary, const Stop& stop,
+                                          const Graph& graph, std::string_view max_iterations) {
+  std::vector<std::string> notes;
+  if (summary.status == Status::interrupted) return notes;
+  if (summary.status == Status::max_iterations && !is_estimate(summary, stop) &&
+      std::ssize(summary.iterations) >= stop.max_iterations) {
+    notes.push_back(
+        fmt::format("stopped by {} {} before it converged", max_iterations, stop.max_iterations));
+  }
+  for (std::string& doubt : reasons_for_doubt(graph, summary.final_chi2))
+    notes.push_back(std::move(doubt));
+  return notes;
 }
 
 }  // namespace cairn

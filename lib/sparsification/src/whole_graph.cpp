@@ -3,6 +3,7 @@
 
 #include <fmt/core.h>
 
+#include "cairn/evaluation/optimization.hpp"
 #include "cairn/evaluation/plausibility.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/plugin_call.hpp"
@@ -22,8 +23,7 @@ double optimize_whole(Graph& graph, Optimizer& optimizer, const std::string& nam
   if (summary.status == Status::interrupted) {
     result.interrupted = true;
   } else if (summary.status != Status::converged) {
-    if (setting.stop.tolerance > 0.0 || summary.status != Status::max_iterations)
-      result.converged = false;
+    if (!is_estimate(summary, setting.stop)) result.converged = false;
     result.notes.push_back(fmt::format("the optimisation of {} ended as {}: it is not at a minimum",
                                        what, to_string(summary.status)));
   }

@@ -102,6 +102,34 @@ TEST_F(Optimizations, DoNotDoubtWhatWasInterrupted) {
   EXPECT_THAT(run(optimizer, &near).notes, ElementsAre("initial guess moves: moved", "stayed"));
 }
 
+// Whoever uses the states afterwards asks this one question.
+TEST_F(Optimizations, LeaveAnEstimateWhereTheyDidWhatWasAsked) {
+  const Stop exactly{.tolerance = 0.0};
+  for (const Status status : {Status::converged, Status::max_iterations, Status::diverged,
+                              Status::not_positive_definite, Status::interrupted}) {
+    Summary summary;
+    summary.status = status;
+    EXPECT_EQ(is_estimate(summary, Stop()), status == Status::converged) << to_string(status);
+    EXPECT_EQ(is_estimate(summary, exactly),
+              status == Status::converged || status == Status::max_iterations)
+        << to_string(status);
+  }
+}
+
+TEST_F(Optimizations, SayThatTheirLimitEndedThem) {
+  Summary summary;
+  summary.final_chi2 = test::chi2_of(graph_);
+  summary.iterations.resize(3);
+  const auto notes = [&](const Stop& stop) { return notes_on_the_end(summary, stop, graph_); };
+  EXPECT_THAT(notes({.max_iterations = 3}),
+              testing::Contains("stopped by max_iterations 3 before it converged"));
+  EXPECT_THAT(notes({.max_iterations = 3, .tolerance = 0.0}),
+              testing::Not(testing::Contains(HasSubstr("stopped by"))));
+  EXPECT_THAT(notes({.max_iterations = 4}),
+              testing::Not(testing::Contains(HasSubstr("stopped by"))))
+      << "that was the limit of time";
+}
+
 TEST_F(Optimizations, WithoutAGuessStartFromTheStates) {
   Stays optimizer(Status::converged);
   EXPECT_THAT(run(optimizer, nullptr).notes, ElementsAre("stayed"));

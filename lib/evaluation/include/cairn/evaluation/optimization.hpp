@@ -28,10 +28,22 @@ CAIRN_API std::vector<std::string> compute_guess(Graph& graph, InitialGuess& gue
                                                  WatchedGuess::GoOn go_on = {});
 
 /// The initial guess, then the optimizer. The summary's notes are those of the guess, each after
-/// "initial guess NAME: ", those of the optimizer, and, unless it was interrupted, what speaks
-/// against the estimate (`reasons_for_doubt`). `go_on`: as above; none: what `stop.interrupt` says.
+/// "initial guess NAME: ", those of the optimizer, and those on the end (`notes_on_the_end`).
+/// `go_on`: as above; none: what `stop.interrupt` says.
 /// What a component throws names it.
 CAIRN_API Summary optimize(Graph& graph, const Optimization& of, const Stop& stop,
                            Observer& observer, WatchedGuess::GoOn go_on = {});
+
+/// Whether a run leaves an estimate that may be used as the minimum: it has converged, or had no
+/// tolerance to reach and made its iterations. Otherwise the graph has the best states found, and
+/// whatever is computed from them has to say that they are none.
+CAIRN_API bool is_estimate(const Summary& summary, const Stop& stop);
+
+/// Sentences on how a run ended: that it stopped before it converged, by the limit
+/// `max_iterations` (which the program calls by the name of its option), and what speaks against
+/// the estimate (`reasons_for_doubt`). None for one that was interrupted.
+CAIRN_API std::vector<std::string> notes_on_the_end(
+    const Summary& summary, const Stop& stop, const Graph& graph,
+    std::string_view max_iterations = "max_iterations");
 
 }  // namespace cairn
