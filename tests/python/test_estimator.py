@@ -28,6 +28,16 @@ def feed(estimator, walk, until=None):
     return reports
 
 
+@pytest.mark.parametrize("name", ["batch", "periodic_batch:every=1"])
+def test_converged_is_what_has_converged(name):
+    walk = dense.loop()
+    separator = "," if ":" in name else ":"
+    short = feed(cairn.Estimator(f"{name}{separator}iterations=1"), walk)
+    assert not short[-1].converged
+    assert sum("not converged: max_iterations after 1 iterations" in note for report in short for note in report.notes) == 1
+    assert all(report.converged for report in feed(cairn.Estimator(name), walk))
+
+
 @pytest.mark.parametrize("name", ["incremental_cholesky", "batch", "periodic_batch:every=5", "incremental_qr"])
 def test_the_estimate_is_that_of_dense_gauss_newton(name):
     walk = dense.loop()

@@ -3,9 +3,11 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 
 #include <fmt/core.h>
 
+#include "cairn/evaluation/batch_step.hpp"
 #include "cairn/graph/gauge.hpp"
 #include "cairn/graph/id_text.hpp"
 #include "cairn/linear/normal_equations.hpp"
@@ -21,6 +23,13 @@ using Clock = std::chrono::steady_clock;
 bool only_adds(const GraphUpdate& update) {
   return update.changed.empty() && update.marginalized.empty() && update.removed_factors.empty() &&
          update.removed_variables.empty();
+}
+
+constexpr const char* kStepNotFinite =
+    "not converged: the step is not finite, and the estimate stays";
+
+bool is_finite(std::span<const double> numbers) {
+  return std::ranges::all_of(numbers, [](double x) { return std::isfinite(x); });
 }
 
 void add_seconds(const Seconds& from, UpdateSeconds& to) {
@@ -161,17 +170,11 @@ void BatchEstimator::batch_step(const UpdateOptions& options, UpdateReport& repo
   tools_->user = nullptr;
   const Summary summary = tools_->optimizer->optimize(graph_, stop);
   for (const std::string& sentence : summary.notes) note(sentence, report);
-  report.ok = summary.status != Status::not_positive_definite;
-  report.converged = !options.full || summary.status == Status::converged;
-  if (!report.converged)
-    report.notes.push_back(fmt::format("not converged: {} after {} iterations",
-                                       to_string(summary.status), std::ssize(summary.iterations)));
-  report.iterations = static_cast<int>(std::ssize(summary.iterations));
+  const std::string why = report_batch_step(summary, stop_, options, graph_.factor_count(), report);
+  if (!why.empty()) note(why, report, options.full);
   report.affected_variables = report.iterations * graph_.variable_count();
   if (report.iterations > 0)
     report.relinearized_factors = std::max(0, graph_.factor_count() - unsolved_factors_);
-  const bool done = summary.status == Status::converged || !(options.max_seconds > 0.0);
-  report.owed = done ? 0 : graph_.factor_count();
   add_seconds(summary.seconds, report.seconds);
   memory_ = std::max(memory_, 8 * summary.solver.factor_nonzeros);
   linearized_at_ = graph_.values();
@@ -195,10 +198,12 @@ void BatchEstimator::linear_step(UpdateReport& report) {
   if (report.ok) {
     std::vector<double> step(static_cast<std::size_t>(equations.size()));
     equations.solve(step);
+    report.iterations = 1;
+    report.converged = is_finite(step);
+    if (!report.converged) return note(kStepNotFinite, report);
     Values values;
     equations.retract(linearized_at_, step, values);
     graph_.set_values(std::move(values));
-    report.iterations = 1;
     report.affected_variables = graph_.variable_count();
     unsolved_factors_ = 0;
   } else {
@@ -219,8 +224,8 @@ void BatchEstimator::extend_linearization_points() {
   }
 }
 
-void BatchEstimator::note(const std::string& sentence, UpdateReport& report) {
-  if (told_.insert(sentence).second) report.notes.push_back(sentence);
+void BatchEstimator::note(const std::string& sentence, UpdateReport& report, bool again) {
+  if (told_.insert(sentence).second || again) report.notes.push_back(sentence);
 }
 
 void BatchEstimator::compute_kept(UpdateReport& report) {

@@ -105,7 +105,8 @@ class BatchEstimator final : public Estimator {
   void batch_step(const UpdateOptions& options, UpdateReport& report);
   void linear_step(UpdateReport& report);
   void extend_linearization_points();
-  void note(const std::string& sentence, UpdateReport& report);
+  /// Once, or `again` each time.
+  void note(const std::string& sentence, UpdateReport& report, bool again = false);
   void compute_kept(UpdateReport& report);
   int index(Id id) const;
   void keep_diagonal(GraphMarginals& all);

@@ -9,6 +9,7 @@
 
 #include <fmt/core.h>
 
+#include "cairn/evaluation/batch_step.hpp"
 #include "cairn/geometry/pose.hpp"
 #include "cairn/graph/id_text.hpp"
 #include "cairn/runtime/error.hpp"
@@ -40,6 +41,10 @@ double weight_of(const Graph& graph, int factor, double squared_norm) {
   const FactorRef at = graph.ref(factor);
   graph.weigh(at.pool, static_cast<std::size_t>(at.entry), {&squared_norm, 1}, {}, {&weight, 1});
   return weight;
+}
+
+bool is_finite(std::span<const double> numbers) {
+  return std::ranges::all_of(numbers, [](double x) { return std::isfinite(x); });
 }
 
 /// x moved by δ.
@@ -413,7 +418,10 @@ void LinearizedEstimator::solve(UpdateReport& report) {
   if (state_.graph.factor_count() == 0) return;
   report.ok = determined_;
   if (const std::string gauge = gauge_.describe(state_.graph); !gauge.empty()) note(gauge, report);
-  if (report.ok) {
+  if (report.ok && !is_finite(form_->displacement())) {
+    report.converged = false;
+    note("not converged: the estimate is not finite, and stays as it was", report);
+  } else if (report.ok) {
     move_estimate();
     report.iterations = 1;
     report.affected_variables = state_.graph.variable_count();
@@ -435,17 +443,11 @@ void LinearizedEstimator::batch_step(const UpdateOptions& options, UpdateReport&
     summary = batch_->optimizer->optimize(state_.graph, stop);
   }
   for (const std::string& sentence : summary.notes) note(sentence, report);
-  report.ok = summary.status != Status::not_positive_definite;
-  report.converged = !options.full || summary.status == Status::converged;
-  if (!report.converged) {
-    report.notes.push_back(fmt::format("not converged: {} after {} iterations",
-                                       to_string(summary.status), std::ssize(summary.iterations)));
-  }
-  report.iterations = static_cast<int>(std::ssize(summary.iterations));
+  const std::string why =
+      report_batch_step(summary, batch_->stop, options, state_.graph.factor_count(), report);
+  if (!why.empty()) note(why, report, options.full);
   report.affected_variables = report.iterations * state_.graph.variable_count();
   report.relinearized_factors = state_.graph.factor_count();
-  const bool done = summary.status == Status::converged || !(options.max_seconds > 0.0);
-  report.owed = done ? 0 : state_.graph.factor_count();
   report.seconds.linearize += summary.seconds.linearize + summary.seconds.update;
   report.seconds.order += summary.seconds.analyze;
   report.seconds.factorize += summary.seconds.factorize;
@@ -507,8 +509,8 @@ LinearizedEstimator::Step LinearizedEstimator::newton_step() {
   return {gradient.dot(delta), delta.norm()};
 }
 
-void LinearizedEstimator::note(const std::string& sentence, UpdateReport& report) {
-  if (reported_.insert(sentence).second) report.notes.push_back(sentence);
+void LinearizedEstimator::note(const std::string& sentence, UpdateReport& report, bool again) {
+  if (reported_.insert(sentence).second || again) report.notes.push_back(sentence);
 }
 
 void LinearizedEstimator::set_loss(std::shared_ptr<const Loss> loss, const FactorSelector& which) {

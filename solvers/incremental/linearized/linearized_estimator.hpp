@@ -115,7 +115,8 @@ class LinearizedEstimator final : public Estimator {
     double decrease, norm;
   };
   Step newton_step();
-  void note(const std::string& sentence, UpdateReport& report);
+  /// Once, or `again` each time.
+  void note(const std::string& sentence, UpdateReport& report, bool again = false);
   int index(Id id) const;
 
   std::unique_ptr<GaussianForm> form_;

@@ -273,9 +273,10 @@ TEST_F(OnlineSessionTest, FullSaysIfItHasNotConverged) {
                                              OnlineSettings{.read = {}, .output = "none"});
   number_ = 0;
   take_all(two_poses_);
+  EXPECT_EQ(take("SOLVE").text, "UNCONVERGED 5 variables 2 factors 1 owed 0\n") << "noted before";
   EXPECT_EQ(take("FULL").text,
             "NOTE not converged: max_iterations after 0 iterations\n"
-            "UNCONVERGED 5 variables 2 factors 1 owed 0\n");
+            "UNCONVERGED 6 variables 2 factors 1 owed 0\n");
 }
 
 TEST_F(OnlineSessionTest, AChi2ThatIsNotFiniteIsAnError) {

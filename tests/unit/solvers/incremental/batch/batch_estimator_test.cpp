@@ -66,6 +66,34 @@ TEST_F(BatchEstimators, BetweenBatchStepsPeriodicSolvesTheLinearSystem) {
   }
 }
 
+// OK is for what has converged, whoever asked: one iteration is not enough here.
+TEST_F(BatchEstimators, SayWhereABatchStepHasNotConverged) {
+  for (const char* name : {"batch", "periodic_batch:every=1"}) {
+    const std::string one = std::string(name) + (name[0] == 'b' ? ":" : ",") + "iterations=1";
+    const auto short_of_it = registry_.make<Estimator>(one);
+    const auto enough = registry_.make<Estimator>(name);
+    const auto counted = registry_.make<Estimator>(one + ",tolerance=0");
+    std::vector<std::string> notes;
+    for (int k = 0; k < 6; ++k) {
+      const UpdateReport report = short_of_it->update(step(k));
+      EXPECT_TRUE(enough->update(step(k)).converged) << one << ' ' << k;
+      EXPECT_TRUE(counted->update(step(k)).converged) << "made the iterations that were asked for";
+      notes.insert(notes.end(), report.notes.begin(), report.notes.end());
+      if (k < 3) continue;
+      EXPECT_TRUE(report.ok);
+      EXPECT_FALSE(report.converged) << one << ' ' << k;
+    }
+    constexpr const char* kWhy = "not converged: max_iterations after 1 iterations";
+    EXPECT_EQ(std::ranges::count(notes, kWhy), 1) << "once; a full update repeats it";
+    GraphUpdate loop;
+    loop.factors.push_back({types_.relative_pose, {0, 5}, {0.5, 2.0, -2.5}, kUnit});
+    const UpdateReport full = short_of_it->update(loop, {.full = true});
+    EXPECT_FALSE(full.converged);
+    EXPECT_THAT(full.notes, testing::Contains(kWhy));
+    EXPECT_FALSE(counted->update(loop, {.full = true}).converged) << "a full one has to converge";
+  }
+}
+
 TEST_F(BatchEstimators, SayBeforehandThatTheirSolverHasNoCovariances) {
   if (!registry_.has("linear_solver", "pcg")) GTEST_SKIP() << "there is no linear solver pcg";
   const auto estimator = registry_.make<Estimator>("batch:linear_solver=pcg");
