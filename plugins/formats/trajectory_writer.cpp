@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <cmath>
+#include <optional>
 
 #include <fmt/core.h>
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
 #include "cairn/geometry/pose.hpp"
+#include "cairn/graph/id_text.hpp"
 #include "line_writer.hpp"
 #include "writer_order.hpp"
 #include "writers.hpp"
@@ -69,10 +71,11 @@ std::string write_kitti(const Graph& graph, std::span<const double>) {
   LineWriter out;
   Id row = 0;
   for (const int v : poses_by_id(graph, "kitti")) {
-    if (graph.id(v) != row) {
-      cannot_express(
-          "kitti", fmt::format("{} in row {}", graph.describe_variable(v), row),
-          "poses 0, 1, 2 … without a gap, since the row is the id (format tum keeps ids)");
+    const std::optional<Symbol> symbol = as_symbol(graph.id(v));
+    if ((symbol ? symbol->index : graph.id(v)) != row) {
+      cannot_express("kitti", fmt::format("{} in row {}", graph.describe_variable(v), row),
+                     "poses 0, 1, 2 … or x0, x1, x2 … without a gap, since the row is the id "
+                     "(format tum keeps ids)");
     }
     const Pose pose = pose_of(graph.type(v), graph.state(v));
     for (int i = 0; i < 3; ++i) {

@@ -22,8 +22,8 @@ std::string write_bal(const Graph& graph);
 /// Poses by rising id: the time as stamp, or the id where there are not as many `stamps` as poses,
 /// position, quaternion. Points (landmarks), velocities and all else are no part of a trajectory.
 std::string write_tum(const Graph& graph, std::span<const double> stamps);
-/// Poses by rising id: rows of [R t]. The row number is the id, so ids must be 0, 1, 2 … without a
-/// gap.
+/// Poses by rising id: rows of [R t]. The row number is the id, so ids must be 0, 1, 2 …, or
+/// symbols of one letter with these numbers, without a gap.
 std::string write_kitti(const Graph& graph, std::span<const double> stamps);
 
 }  // namespace cairn::formats

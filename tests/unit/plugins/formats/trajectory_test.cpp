@@ -10,6 +10,7 @@
 #include <numbers>
 #include <string>
 
+#include "cairn/typed/symbol.hpp"
 #include "cairn/types/define_variable.hpp"
 
 #include "support/placeless.hpp"
@@ -247,10 +248,19 @@ TEST(Trajectory, WritesThePosesOfAGraphWithOtherVariables) {
 
 TEST(Trajectory, KittiRefusesIdsThatItsRowsCannotSay) {
   const Reading r = read("table", "0 0 0 0\n2 1 0 0\n");
-  EXPECT_EQ(write_refusal("kitti", r.graph),
-            "format kitti cannot express VERTEX_SE2 2 in row 1; expected poses 0, 1, 2 … without a "
-            "gap, since the row "
-            "is the id (format tum keeps ids)");
+  EXPECT_EQ(
+      write_refusal("kitti", r.graph),
+      "format kitti cannot express VERTEX_SE2 2 in row 1; expected poses 0, 1, 2 … or x0, x1, "
+      "x2 … without a gap, since the row is the id (format tum keeps ids)");
+}
+
+TEST(Trajectory, KittiHasSymbolsByTheirNumbers) {
+  const auto line = [](Id id) { return "VERTEX_SE2 " + std::to_string(id) + " 1 2 0\n"; };
+  const Reading r = read("g2o", line(symbol('x', 1)) + line(symbol('x', 0)));
+  EXPECT_THAT(read("kitti", write("kitti", r.graph)).state(1), ElementsAre(1, 2, 0, 0, 0, 0, 1));
+  EXPECT_THAT(
+      write_refusal("kitti", read("g2o", line(symbol('x', 0)) + line(symbol('y', 0))).graph),
+      HasSubstr("cannot express VERTEX_SE2 y0 in row 1"));
 }
 
 TEST(Trajectory, RefusesToWriteNoPoses) {
