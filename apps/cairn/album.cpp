@@ -183,8 +183,7 @@ void add_album_options(ArgumentParser cli, AlbumOptions& options, const char* fi
                  "the ground truth, by id; estimates are aligned as by evaluate")
       .type_name("FILE");
   add_axes_option(cli, options.axes,
-                  "of trajectories: robot (x ahead, z up) or camera (z ahead, y down), which is "
-                  "shown as a robot's [camera for KITTI]");
+                  "of trajectories, shown as a robot's: robot, camera [camera for KITTI]");
   cli.add_option("--initial", options.initial, "initial estimate to show too: kind initial_guess")
       .component({"initial_guess"});
   cli.add_option("--title", options.title, "title [name of the first FILE]").type_name("TEXT");

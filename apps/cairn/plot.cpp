@@ -203,7 +203,6 @@ Command add_plot(ArgumentParser program) {
       "FILEs are laid together as by cairn view.\n\n"
       "Example:\n"
       "  cairn plot city.g2o best.g2o --truth truth.g2o -o city.svg\n"
-      "  cairn plot city.g2o compact.g2o --apart --poses -o maps.svg\n"
       "  cairn plot run1.json run2.json --what convergence --x time -o curves.pdf\n"
       "  cairn plot robot.jsonl --what map --decision 40 -o robot.png\n"
       "  cairn plot @sphere --what sparsity --linear-solver block_cholesky:ordering=natural -o "

@@ -93,20 +93,25 @@ bool offset_helps(const Trajectory& estimate, const Trajectory& truth, double of
   return all.size() > 1 && all[1].difference <= near;
 }
 
-/// "…; those of the estimate may be milliseconds" where one lasts so many times as long as the
-/// other; empty where they last about equally long.
-std::string other_unit(const Times& ours, const Times& theirs) {
-  const double ratio = (ours.last - ours.first) / (theirs.last - theirs.first);
+/// Whether a ratio is about 10^3, 10^6 or 10^9.
+bool is_about(double ratio, double factor) { return ratio > 0.1 * factor && ratio < 10.0 * factor; }
+
+/// "; its stamps may be milliseconds" where one of the two lasts, and steps, about so many times as
+/// long as the other; else empty.
+std::string other_unit(const Trajectory& estimate, const Trajectory& truth, const Times& ours,
+                       const Times& theirs) {
+  if (estimate.size() < 2 || truth.size() < 2) return "";
+  const double lasts = (ours.last - ours.first) / (theirs.last - theirs.first);
+  const double steps = median_step(estimate) / median_step(truth);
   for (const auto& [factor, name] :
        {std::pair{1e3, "milliseconds"}, {1e6, "microseconds"}, {1e9, "nanoseconds"}}) {
-    for (const bool estimated : {true, false}) {
-      const double longer = (estimated ? ratio : 1.0 / ratio) / factor;
-      if (!(longer > 0.2 && longer < 5.0)) continue;
-      return fmt::format(
-          "; the {} lasts about {:.0e} times as long as the {}: its stamps may be {}, and are "
-          "to be seconds",
-          estimated ? "estimate" : "truth", factor, estimated ? "truth" : "estimate", name);
-    }
+    const bool longer = is_about(lasts, factor) && is_about(steps, factor);
+    const bool shorter = is_about(1.0 / lasts, factor) && is_about(1.0 / steps, factor);
+    if (!longer && !shorter) continue;
+    return fmt::format(
+        "; the {} lasts about {:.0e} times as long as the {}: its stamps may be {}, and are to be "
+        "seconds",
+        longer ? "estimate" : "truth", factor, longer ? "truth" : "estimate", name);
   }
   return "";
 }
@@ -121,7 +126,8 @@ std::string diagnosis(const Trajectory& estimate, const Trajectory& truth,
       "{:.15g} s",
       offset == 0.0 ? "" : fmt::format(", shifted by {:.15g} s,", offset), ours.first, ours.last,
       theirs.first, theirs.last);
-  if (const std::string unit = other_unit(ours, theirs); !unit.empty()) return found + unit;
+  if (const std::string unit = other_unit(estimate, truth, ours, theirs); !unit.empty())
+    return found + unit;
   if (ours.last < theirs.first || theirs.last < ours.first) {
     const double advised = 1e-6 * std::round(1e6 * (offset + theirs.first - ours.first));
     return offset_helps(estimate, truth, advised, matching.max_difference)
