@@ -16,9 +16,12 @@
 /// optimization using dynamic covariance scaling", 2013. [Zhang97] Zhang, "Parameter estimation
 /// techniques: a tutorial", 1997, has most of them in one table.
 ///
-/// `kScale` is the scale by default: where [Zhang97] has one, that which is 95 % as efficient as
-/// least squares on normal noise of one dimension. Residuals of more dimensions are longer: a
-/// larger scale suits them.
+/// `kScale` is the scale by default, of residuals of one number: where [Zhang97] has one, that
+/// which is 95 % as efficient as least squares on normal noise, else the 95 % quantile of |r|.
+/// `kGrows`: that of residuals of more numbers, which are longer, is larger (scale_of_size.hpp). It
+/// is so where residuals beyond the scale lose their influence: right ones must not. Where they
+/// keep it (huber, pseudo_huber), or nearly (cauchy), a small scale costs little, and limits wrong
+/// ones more.
 namespace cairn::losses {
 
 /// ρ(s) and its first two derivatives.
@@ -29,6 +32,7 @@ struct Value {
 /// s up to q, then 2c√s − q: convex, linear in the norm. [Huber64]
 struct Huber {
   static constexpr double kScale = 1.345;
+  static constexpr bool kGrows = false;
   static Value at(double s, double q) {
     if (s <= q) return {s, 1.0, 0.0};
     const double ratio = std::sqrt(q / s);
@@ -39,6 +43,7 @@ struct Huber {
 /// 2q (√(1 + s/q) − 1): Huber's without the corner. [Charbonnier94]
 struct PseudoHuber {
   static constexpr double kScale = 1.345;
+  static constexpr bool kGrows = false;
   static Value at(double s, double q) {
     const double root = std::sqrt(1.0 + s / q);
     // √(1 + x) − 1 = x / (√(1 + x) + 1) keeps its digits where x is small.
@@ -49,6 +54,7 @@ struct PseudoHuber {
 /// q ln(1 + s/q). [Black96]
 struct Cauchy {
   static constexpr double kScale = 2.3849;
+  static constexpr bool kGrows = false;
   static Value at(double s, double q) {
     const double weight = 1.0 / (1.0 + s / q);
     return {q * std::log1p(s / q), weight, -weight * weight / q};
@@ -57,7 +63,8 @@ struct Cauchy {
 
 /// s / (1 + s/q), never more than q. [GM85], scaled as in [Black96]
 struct GemanMcClure {
-  static constexpr double kScale = 1.0;
+  static constexpr double kScale = 1.9600;
+  static constexpr bool kGrows = true;
   static Value at(double s, double q) {
     const double ratio = 1.0 / (1.0 + s / q);
     return {s * ratio, ratio * ratio, -2.0 * ratio * ratio * ratio / q};
@@ -67,6 +74,7 @@ struct GemanMcClure {
 /// q (1 − exp(−s/q)), never more than q. [Dennis78]
 struct Welsch {
   static constexpr double kScale = 2.9846;
+  static constexpr bool kGrows = true;
   static Value at(double s, double q) {
     const double weight = std::exp(-s / q);
     return {-q * std::expm1(-s / q), weight, -weight / q};
@@ -76,6 +84,7 @@ struct Welsch {
 /// q/3 (1 − (1 − s/q)³) up to q, then q/3: no influence at all beyond the scale. [Beaton74]
 struct Tukey {
   static constexpr double kScale = 4.6851;
+  static constexpr bool kGrows = true;
   static Value at(double s, double q) {
     if (s > q) return {q / 3.0, 0.0, 0.0};
     const double x = s / q, rest = 1.0 - x;
@@ -86,7 +95,8 @@ struct Tukey {
 /// s up to q, then q (3s − q)/(q + s): the loss whose weight is the squared scaling factor
 /// min(1, 2Φ/(Φ + s))² of dynamic covariance scaling with Φ = q. [Agarwal13]
 struct DynamicCovarianceScaling {
-  static constexpr double kScale = 1.0;
+  static constexpr double kScale = 1.9600;
+  static constexpr bool kGrows = true;
   static Value at(double s, double q) {
     if (s <= q) return {s, 1.0, 0.0};
     const double ratio = 2.0 * q / (q + s);

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include <fmt/core.h>
 #include <boost/container/small_vector.hpp>
@@ -12,6 +13,7 @@
 #include "cairn/graph/packed.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/plugin_call.hpp"
+#include "cairn/types/loss_by_size.hpp"
 
 namespace cairn {
 namespace {
@@ -260,7 +262,8 @@ int Graph::add_factor(std::shared_ptr<const FactorType> type, std::span<const in
     problem = problem_of(root, information);
   }
   if (!problem.empty()) throw bad_input(fmt::format("{}: {}", name_of(*type, variables), problem));
-  const std::int16_t of_loss = loss_index(*type, loss);
+  const int rank = noise < 0 ? root.rank : factor_pools_[p].ranks[noise];
+  const std::int16_t of_loss = loss_index(*type, for_size(std::move(loss), rank));
   // Nothing is refused from here on.
   if (!has_pool) {
     factor_pools_.emplace_back().type = std::move(type);

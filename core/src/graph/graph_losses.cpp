@@ -4,11 +4,13 @@
 #include <limits>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "cairn/graph/graph.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/threads.hpp"
 #include "cairn/types/factor_call.hpp"
+#include "cairn/types/loss_by_size.hpp"
 
 namespace cairn {
 
@@ -27,7 +29,8 @@ std::int16_t Graph::loss_of(int position) const {
 
 void Graph::set_loss(int position, std::shared_ptr<const Loss> loss) {
   const FactorRef at = factors_[position];
-  factor_pools_[at.pool].losses[at.entry] = loss_index(factor_type(position), loss);
+  factor_pools_[at.pool].losses[at.entry] =
+      loss_index(factor_type(position), for_size(std::move(loss), information_rank(position)));
 }
 
 void Graph::set_loss(const std::shared_ptr<const Loss>& loss, const FactorSelector& which) {

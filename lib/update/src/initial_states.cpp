@@ -14,6 +14,7 @@
 #include "cairn/graph/packed.hpp"
 #include "cairn/runtime/plugin_call.hpp"
 #include "cairn/types/factor_call.hpp"
+#include "cairn/types/loss_by_size.hpp"
 #include "cairn/update/placement.hpp"
 
 namespace cairn {
@@ -180,10 +181,11 @@ void InitialStates::settle(std::size_t k) {
     double sum = 0.0;
     for (Measured& one : measured) {
       double square = chi2(one, state);
-      if (one.factor->loss)
+      const int size = one.factor->type->residual_size();
+      if (const auto loss = for_size(one.factor->loss, size))
         call_plugin(
             [&] { return "the loss of factor '" + std::string(one.factor->type->tag()) + "'"; },
-            [&] { one.factor->loss->evaluate(std::span(&square, 1), std::span(&square, 1), {}); });
+            [&] { loss->evaluate(std::span(&square, 1), std::span(&square, 1), {}); });
       sum += square;
     }
     return sum;
