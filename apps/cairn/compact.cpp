@@ -398,7 +398,7 @@ int run_compact(const CompactOptions& options, Session& session) {
   results.add([&] { session.print(summary_text(options, outcome, results, session)); });
   results.finish();
   if (guard.interrupted()) return kExitInterrupted;
-  for (const std::string& doubt : reasons_for_doubt(shown.compact, chi2(shown.compact)))
+  for (const std::string& doubt : notes_on_estimate(shown.compact, chi2(shown.compact)))
     session.note(doubt);
   if (!shown.located) {
     const auto waiting = shown.verdicts.find("waiting");

@@ -420,7 +420,7 @@ int run(OnlineOptions options, Session& session) {
       const Graph graph = lines.estimator().graph();
       write_map(graph, options.output, session);
       if (!failure) {  // within an update it may have been left in part
-        for (const std::string& doubt : reasons_for_doubt(graph, chi2(graph))) session.note(doubt);
+        for (const std::string& doubt : notes_on_estimate(graph, chi2(graph))) session.note(doubt);
       }
     }
   } catch (const std::exception& error) {

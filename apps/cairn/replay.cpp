@@ -241,7 +241,7 @@ int run(const ReplayOptions& options, Session& session) {
   }
   const double chi2 = estimator->chi2();
   if (!replay.interrupted) {
-    for (std::string& doubt : reasons_for_doubt(estimator->graph(), chi2))
+    for (std::string& doubt : notes_on_estimate(estimator->graph(), chi2))
       replay.notes.push_back(std::move(doubt));
   }
   results.add(

@@ -3,10 +3,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <memory>
 #include <new>
 #include <span>
 #include <stdexcept>
+#include <string>
 #include <tuple>
 
 #include <gmock/gmock.h>
@@ -194,6 +196,68 @@ TEST(LossesWeighNothing, OnlyWhereNoFactorHasAnyWeight) {
   apart.set_loss(std::make_shared<OneSigma>());
   ASSERT_GT(squared_norms(apart).front(), 1.0);
   EXPECT_THAT(losses_weigh_nothing(apart), HasSubstr("no factor any weight"));
+}
+
+/// No weight for the factors of a graph whose position is given, as if they were wrong.
+Graph ring_that_rejects(int poses, const std::function<bool(const Graph&, int)>& which) {
+  Graph graph = test::ring_of_poses(poses, 0.05);
+  struct Nothing final : Loss {
+    void evaluate(std::span<const double> s, std::span<double> rho,
+                  std::span<double> weight) const override {
+      for (std::size_t k = 0; k < s.size(); ++k) {
+        if (!rho.empty()) rho[k] = 0.0;
+        if (!weight.empty()) weight[k] = 0.009;
+      }
+    }
+    double second_derivative(double) const override { return 0.0; }
+  };
+  struct Everything final : Loss {
+    void evaluate(std::span<const double> s, std::span<double> rho,
+                  std::span<double> weight) const override {
+      for (std::size_t k = 0; k < s.size(); ++k) {
+        if (!rho.empty()) rho[k] = s[k];
+        if (!weight.empty()) weight[k] = 0.011;
+      }
+    }
+    double second_derivative(double) const override { return 0.0; }
+  };
+  graph.set_loss(std::make_shared<Everything>(), FactorSelector::loops());
+  const auto nothing = std::make_shared<Nothing>();
+  for (int f = 0; f < graph.factor_count(); ++f) {
+    if (which(graph, f)) graph.set_loss(f, nothing);
+  }
+  return graph;
+}
+
+bool closes_loop(const Graph& graph, int f) { return loop_closures(graph)[f]; }
+
+TEST(RejectedFactors, AreCountedWhereALossLeavesThemLessThanOnePerCent) {
+  const Graph none = ring_that_rejects(30, [](const Graph&, int) { return false; });
+  const auto loops = rejected_factors(none).loops;
+  ASSERT_GE(loops, 5);
+  EXPECT_EQ(rejected_factors(none).rejected_loops, 0);
+  EXPECT_THAT(notes_on_estimate(none, 1.0), IsEmpty());
+  EXPECT_EQ(rejected_factors(test::ring_of_poses(30, 0.05)).loops, 0);
+
+  int left = 2;
+  const Graph two = ring_that_rejects(
+      30, [&](const Graph& graph, int f) { return closes_loop(graph, f) && left-- > 0; });
+  EXPECT_EQ(rejected_factors(two).rejected_loops, 2);
+  EXPECT_THAT(notes_on_estimate(two, 1.0),
+              ElementsAre("the loss leaves 2 of " + std::to_string(loops) +
+                          " loop closures less than 1 % of their weight"));
+  EXPECT_THAT(reasons_for_doubt(two, 1.0), IsEmpty());
+
+  const Graph all =
+      ring_that_rejects(30, [](const Graph& graph, int f) { return closes_loop(graph, f); });
+  const auto said =
+      HasSubstr(std::to_string(loops) + " of " + std::to_string(loops) + " loop closures");
+  EXPECT_THAT(notes_on_estimate(all, 1.0), ElementsAre(said));
+  EXPECT_THAT(reasons_for_doubt(all, 1.0), ElementsAre(HasSubstr("hardly the right one")));
+
+  const Graph odometry =
+      ring_that_rejects(30, [](const Graph& graph, int f) { return !closes_loop(graph, f); });
+  EXPECT_THAT(notes_on_estimate(odometry, 1.0), ElementsAre(HasSubstr("other factors less than")));
 }
 
 TEST(ResidualNotFinite, IsNamedWithItsMeasurement) {

@@ -48,9 +48,25 @@ CAIRN_API std::vector<std::string> outside_of_domains(const Graph& graph);
 /// 1e-9): H is then zero to rounding. Empty else.
 CAIRN_API std::string losses_weigh_nothing(const Graph& graph);
 
+/// How many factors robust losses have all but taken from an estimate: whose weight ρ′ at the
+/// graph's states is below one per cent.
+struct RejectedFactors {
+  std::int64_t loops = 0, rejected_loops = 0;    ///< loop closures with a loss; those of them
+  std::int64_t others = 0, rejected_others = 0;  ///< other factors with a loss; those of them
+  /// Nearly all loop closures (nine in ten or more, three at least): what is left is dead
+  /// reckoning, and contradicts nothing.
+  bool nearly_all_loops() const { return rejected_loops >= 3 && 10 * rejected_loops >= 9 * loops; }
+};
+CAIRN_API RejectedFactors rejected_factors(const Graph& graph);
+
 /// What speaks against an optimised estimate of this chi2, a sentence each: `implausible_estimate`,
-/// `residual_not_finite`, `losses_weigh_nothing`, `outside_of_domains` and `wrong_jacobians`. Empty
-/// if nothing does.
+/// `residual_not_finite`, `losses_weigh_nothing`, loop closures that are rejected nearly all
+/// (`rejected_factors`), `outside_of_domains` and `wrong_jacobians`. Empty if nothing does.
 CAIRN_API std::vector<std::string> reasons_for_doubt(const Graph& graph, double chi2);
+
+/// What a user is to be given with an estimate: the reasons for doubt, or, where losses reject
+/// fewer factors, how many they are ("the loss leaves 3 of 120 loop closures less than 1 % of their
+/// weight").
+CAIRN_API std::vector<std::string> notes_on_estimate(const Graph& graph, double chi2);
 
 }  // namespace cairn
