@@ -460,14 +460,18 @@ std::string result_text(const MarginalsOptions& options, const LoadedGraph& load
 
 // The command -------------------------------------------------------------------------------------
 
-std::optional<Summary> optimize(Graph& graph, Optimizer* optimizer, const MarginalsOptions& options,
-                                const InterruptGuard& guard, const Session& session) {
+std::optional<Summary> optimize(Graph& graph, Optimizer* optimizer, const ProblemSetup& setup,
+                                const MarginalsOptions& options, const InterruptGuard& guard,
+                                const Session& session) {
   if (!optimizer) return std::nullopt;
   Stop stop = options.problem.stop;
   stop.interrupt = &guard.flag();
   OptimizationProgress progress(session.common.quiet, stop.max_iterations);
   Summary summary = call_plugin([&] { return fmt::format("optimizer '{}'", options.optimizer); },
                                 [&] { return optimizer->optimize(graph, stop, progress); });
+  GuessProgress of_guess(session.common.quiet, guard.flag());
+  setup.look_again(graph, *optimizer, options.optimizer, stop, progress, std::ref(of_guess),
+                   summary);
   for (std::string& note : notes_on_the_end(summary, stop, graph))
     summary.notes.push_back(std::move(note));
   if (summary.status != Status::interrupted && summary.status != Status::converged) {
@@ -509,7 +513,7 @@ int run(MarginalsOptions options, Session& session) {
     session.note(fmt::format("initial guess {}: {}", options.problem.initial, note));
   }
   const std::optional<Summary> summary =
-      optimize(loaded.graph, optimizer.get(), options, *guard, session);
+      optimize(loaded.graph, optimizer.get(), setup, options, *guard, session);
   if (guard->interrupted()) return kExitInterrupted;
   guard.reset();  // what follows has nothing to write before its end
   const Answer answer =

@@ -109,13 +109,15 @@ std::string times_text(const Seconds& seconds) {
 }
 
 std::string summary_text(const OptimizeOptions& options, const LoadedGraph& loaded,
-                         const Summary& summary, const DiagonalCovariances& covariances,
-                         const Results& results, const Session& session) {
+                         const InitialEstimate& initial, const Summary& summary,
+                         const DiagonalCovariances& covariances, const Results& results,
+                         const Session& session) {
   Table table({{"", Table::Align::left}, {"", Table::Align::left}});
   table.add({"graph", fmt::format("{}: {}, {}", loaded.label,
                                   plural(loaded.graph.variable_count(), "variable"),
                                   plural(loaded.graph.factor_count(), "factor"))});
   add_metric(table, loaded.graph, session);
+  if (!initial.notes.empty()) table.add({"start", initial.notes.front()});
   table.add({"solver", summary.linear_solver.empty()
                            ? summary.optimizer
                            : fmt::format("{} with {}", summary.optimizer, summary.linear_solver)});
@@ -150,15 +152,20 @@ std::string in_words(const ComponentSpec& optimizer) {
 }
 
 /// `recording`: made here if one is asked for, to be finished when the results are written.
-Summary solve(Graph& graph, Optimizer& optimizer, const OptimizeOptions& options,
-              const InterruptGuard& guard, const Session& session,
+Summary solve(Graph& graph, Optimizer& optimizer, const ProblemSetup& setup,
+              const OptimizeOptions& options, const InterruptGuard& guard, const Session& session,
               std::optional<RecordingWriter>& recording) {
   Stop stop = options.problem.stop;
   stop.interrupt = &guard.flag();
   OptimizationProgress progress(session.common.quiet, stop.max_iterations);
-  if (options.record.empty()) return optimizer.optimize(graph, stop, progress);
-  recording.emplace(options.record, options.optimizer, options.graph, &progress);
-  return optimizer.optimize(graph, stop, *recording);
+  if (!options.record.empty())
+    recording.emplace(options.record, options.optimizer, options.graph, &progress);
+  Observer& observer = recording ? static_cast<Observer&>(*recording) : progress;
+  Summary summary = optimizer.optimize(graph, stop, observer);
+  GuessProgress of_guess(session.common.quiet, guard.flag());
+  setup.look_again(graph, optimizer, options.optimizer, stop, observer, std::ref(of_guess),
+                   summary);
+  return summary;
 }
 
 int run(const OptimizeOptions& options, Session& session) {
@@ -178,7 +185,7 @@ int run(const OptimizeOptions& options, Session& session) {
   std::optional<RecordingWriter> recording;
   Summary summary = call_plugin(
       [&] { return in_words(spec); },
-      [&] { return solve(loaded.graph, *optimizer, options, guard, session, recording); });
+      [&] { return solve(loaded.graph, *optimizer, setup, options, guard, session, recording); });
   Results results(session);
   results.write(options.output, [&] {
     const std::string format = output_format(options.output, options.output_format);
@@ -199,7 +206,8 @@ int run(const OptimizeOptions& options, Session& session) {
   results.add(
       [&] { session.write_json(report_json(options, loaded, initial, summary, covariances)); });
   results.add([&] {
-    session.print(summary_text(options, loaded, summary, covariances, results, session));
+    session.print(
+        summary_text(options, loaded, initial, summary, covariances, results, session));
   });
   results.finish();
   const int code = exit_code(summary, stop);

@@ -80,6 +80,13 @@ std::vector<std::string> ProblemSetup::apply(Graph& graph, WatchedGuess::GoOn go
   return notes;
 }
 
+void ProblemSetup::look_again(Graph& graph, Optimizer& optimizer, std::string_view name,
+                              const Stop& stop, Observer& observer, WatchedGuess::GoOn go_on,
+                              Summary& summary) const {
+  cairn::look_again(graph, {optimizer, name, initial_.get(), initial_name_}, stop, observer,
+                    std::move(go_on), summary);
+}
+
 std::vector<std::string> notes_on_the_end(const Summary& summary, const Stop& stop,
                                           const Graph& graph) {
   return cairn::notes_on_the_end(summary, stop, graph, "--iterations");

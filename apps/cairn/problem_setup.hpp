@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "arguments.hpp"
@@ -44,6 +45,9 @@ class ProblemSetup {
   /// Gives the graph its loss and its initial estimate. Returns notes for the user. `go_on`: shows
   /// the progress of a guess that takes long, and may end it.
   std::vector<std::string> apply(Graph& graph, WatchedGuess::GoOn go_on = {}) const;
+  /// After an optimisation from there: `look_again` of the initial guess.
+  void look_again(Graph& graph, Optimizer& optimizer, std::string_view name, const Stop& stop,
+                  Observer& observer, WatchedGuess::GoOn go_on, Summary& summary) const;
 
   const std::shared_ptr<const Loss>& loss() const { return loss_; }
   const FactorSelector& loss_selector() const { return selector_; }

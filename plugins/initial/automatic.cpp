@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
 #include <cmath>
 #include <functional>
+#include <map>
+#include <memory>
 #include <optional>
 #include <string_view>
 #include <utility>
@@ -8,10 +11,13 @@
 #include <fmt/core.h>
 
 #include "cairn/evaluation/plausibility.hpp"
+#include "cairn/evaluation/second_look.hpp"
 #include "cairn/evaluation/watched_guess.hpp"
 #include "cairn/graph/gauge.hpp"
 #include "cairn/runtime/error.hpp"
 #include "guesses.hpp"
+#include "other_minima.hpp"
+#include "trial_losses.hpp"
 
 namespace cairn::initial {
 namespace {
@@ -33,9 +39,18 @@ class Until final : public Observer {
 ///
 /// The chordal relaxation takes two linear solves. If its chi2 is below that of the states as
 /// given, it is the better start. If not, these may be optimised already, perhaps in a local
-/// minimum: a few iterations from both decide. Where chi2 of the better start is not plausible, not
+/// minimum: a few iterations from both decide, and where these speak for the start whose chi2 is
+/// higher, the minima to which both lead. Where chi2 of the better start is not plausible, not
 /// even after some iterations from it, the slow and thorough incremental estimate is compared too.
-class Automatic final : public InitialGuess, public WatchedGuess {
+///
+/// A bounded loss leaves dead reckoning, which contradicts loop closures alone, a chi2 that is
+/// hardly higher than that of the right estimate. Starts are then chosen by a loss that grows, and
+/// the loss is tightened from there.
+///
+/// How the optimisation went that follows tells more (`look_again`): where poses disagree with
+/// measurements by a large angle, or by some angle and chi2 fell by far, or where a loss is
+/// bounded, other minima are looked for.
+class Automatic final : public InitialGuess, public WatchedGuess, public SecondLook {
  public:
   Automatic(int iterations, Candidates candidates)
       : stop_{.max_iterations = iterations}, candidates_(std::move(candidates)) {}
@@ -47,33 +62,36 @@ class Automatic final : public InitialGuess, public WatchedGuess {
       incremental->watch(std::move(go_on));
   }
   void* ability(std::string_view name) override {
-    return name == WatchedGuess::kAbility ? static_cast<WatchedGuess*>(this) : nullptr;
+    if (name == WatchedGuess::kAbility) return static_cast<WatchedGuess*>(this);
+    return name == SecondLook::kAbility ? static_cast<SecondLook*>(this) : nullptr;
   }
 
   std::vector<std::string> compute(Graph& graph) override {
     wanted_ = true;
     given_ = graph.values();
-    best_ = {"as_given", chi2(graph), graph.values(), {}};
-    tried_ = {best_name()};
-    if (std::optional<Start> chordal = compute("chordal", candidates_.chordal.get(), graph)) {
-      if (is_better(*chordal, graph)) best_ = std::move(*chordal);
-    }
-    const std::int64_t dof = degrees_of_freedom(graph, resolve_gauge(graph));
-    if (!is_plausible(best_.chi2, dof) && candidates_.optimizer) {
-      const double reached = optimized(best_, stop_, graph, [&](const Iteration& iteration) {
-        return is_plausible(iteration.chi2, dof);
-      });
-      std::optional<Start> slow;
-      if (!is_plausible(reached, dof))
-        slow = compute("incremental", candidates_.incremental.get(), graph);
-      if (slow && !(reached <= slow->chi2)) best_ = std::move(*slow);
-    }
-    graph.set_values(std::move(best_.states));
     std::vector<std::string> notes;
-    if (tried_.size() > 1) notes.push_back(best_name() + rejected());
-    for (std::string& note : best_.notes) notes.push_back(std::move(note));
+    if (has_bounded_losses(graph) && candidates_.optimizer) {
+      const KeptLosses losses(graph);
+      notes = choose_by_a_loss_that_grows(graph, losses);
+    } else {
+      notes = choose(graph);
+    }
     if (!wanted_) notes.push_back("interrupted: not all starts were tried");
     return notes;
+  }
+
+  Result look_again(Graph& graph, const Summary& summary) override {
+    wanted_ = true;
+    const std::string reason = reason_to_look_again(graph, summary);
+    if (reason.empty()) return {};
+    const std::vector<NamedStart> starts = {
+        {"as_given", [&](Graph& of) { of.set_values(given_); }},
+        {"spanning_tree", [&](Graph& of) { make_spanning_tree({})->compute(of); }},
+        {"incremental", [&](Graph& of) { small_steps(of); }, 75}};
+    const OtherMinima found =
+        search_other_minima(graph, starts, *candidates_.optimizer,
+                            [&](double part) { return wanted("other starts", part); });
+    return {.lower = !found.found_by.empty(), .notes = in_words(found, reason)};
   }
 
  private:
@@ -82,17 +100,77 @@ class Automatic final : public InitialGuess, public WatchedGuess {
     double chi2 = 0.0;
     Values states;
     std::vector<std::string> notes;
+    /// After a trial: how many iterations, and what they reached.
+    int iterations = 0;
+    double reached = 0.0;
+
+    /// "chordal (chi2 31.2)", "as_given (chi2 31.2, after 5 iterations 7.1)"
+    std::string in_words() const {
+      const std::string trial =
+          iterations > 0 ? fmt::format(", after {} iterations {:.4g}", iterations, reached) : "";
+      return fmt::format("{} (chi2 {:.4g}{})", name, chi2, trial);
+    }
   };
 
-  std::string best_name() const { return fmt::format("{} (chi2 {:.4g})", best_.name, best_.chi2); }
+  // The start ------------------------------------------------------------------------------------
 
-  /// "; not as_given (chi2 3.1e+07)"
-  std::string rejected() const {
-    std::string text;
-    for (const std::string& start : tried_) {
-      if (start != best_name()) text += fmt::format("{} {}", text.empty() ? "; not" : ",", start);
+  std::vector<std::string> choose(Graph& graph) {
+    rejected_.clear();
+    Start best{"as_given", chi2(graph), graph.values(), {}};
+    if (std::optional<Start> chordal = compute("chordal", candidates_.chordal.get(), graph))
+      keep_better(best, std::move(*chordal), graph);
+    const std::int64_t dof = degrees_of_freedom(graph, resolve_gauge(graph));
+    if (!is_plausible(best.chi2, dof) && candidates_.optimizer) {
+      try_out(best, stop_, graph,
+              [&](const Iteration& iteration) { return is_plausible(iteration.chi2, dof); });
+      std::optional<Start> slow;
+      if (!is_plausible(best.reached, dof))
+        slow = compute("incremental", candidates_.incremental.get(), graph);
+      if (slow) replace_if(!(best.reached <= slow->chi2), best, std::move(*slow));
     }
-    return text;
+    graph.set_values(std::move(best.states));
+    std::vector<std::string> notes;
+    if (!rejected_.empty()) notes.push_back(best.in_words() + "; not " + rejected_);
+    for (std::string& note : best.notes) notes.push_back(std::move(note));
+    return notes;
+  }
+
+  /// By a Cauchy loss in the place of each bounded one, whose scale is then tightened.
+  std::vector<std::string> choose_by_a_loss_that_grows(Graph& graph, const KeptLosses& losses) {
+    const auto set_losses = [&](const auto& make) {
+      std::map<const Loss*, std::shared_ptr<const Loss>> made;
+      for (int f = 0; f < graph.factor_count(); ++f) {
+        const std::shared_ptr<const Loss>& own = losses.losses()[static_cast<std::size_t>(f)];
+        if (!own || !is_bounded(*own)) continue;
+        std::shared_ptr<const Loss>& instead = made[own.get()];
+        if (!instead) instead = make(own);
+        graph.set_loss(f, instead);
+      }
+    };
+    const auto cauchy = make_cauchy(kCauchySquare);
+    set_losses([&](const auto&) { return cauchy; });
+    std::vector<std::string> notes = choose(graph);
+    optimise(kToAMinimum, graph);
+    for (const double k : {4.0, 2.0}) {
+      set_losses([&](const auto& own) { return make_wider(own, k); });
+      optimise(kOnTheWay, graph);
+    }
+    if (!notes.empty()) notes.front() += ", by a cauchy loss that was tightened to the bounded one";
+    return notes;
+  }
+
+  void optimise(const Stop& stop, Graph& graph) {
+    Until observer([&](const Iteration&) { return !wanted("robust loss", 0.5); });
+    if (wanted_) candidates_.optimizer->optimize(graph, stop, observer);
+  }
+
+  void reject(std::string_view start) {
+    rejected_ += fmt::format("{}{}", rejected_.empty() ? "" : ", ", start);
+  }
+
+  void replace_if(bool better, Start& best, Start other) {
+    if (better) std::swap(best, other);
+    reject(other.in_words());
   }
 
   /// Empty where there is no such guess, or it cannot be computed, or chi2 there is not finite.
@@ -103,35 +181,78 @@ class Automatic final : public InitialGuess, public WatchedGuess {
       std::vector<std::string> notes = guess->compute(graph);
       static_cast<void>(wanted(name, 1.0));
       Start start{name, chi2(graph), graph.values(), std::move(notes)};
-      tried_.push_back(fmt::format("{} (chi2 {:.4g})", name, start.chi2));
       if (std::isfinite(start.chi2)) return start;
+      reject(start.in_words());
     } catch (const Error& error) {
       if (error.code() != ErrorCode::input && error.code() != ErrorCode::numerical) throw;
-      tried_.push_back(fmt::format("{} ({})", name, error.what()));
+      reject(fmt::format("{} ({})", name, error.what()));
     }
     return std::nullopt;
   }
 
-  /// Whether `start` leads to a lower chi2 than the best one so far, as far as a few iterations can
-  /// tell. One per thousand is no difference.
-  bool is_better(const Start& start, Graph& graph) {
-    if (!(best_.chi2 <= start.chi2)) return true;
-    if (!candidates_.optimizer || start.states.pools == best_.states.pools) return false;
-    const Stop few{.max_iterations = kFewIterations};
-    const auto never = [](const Iteration&) { return false; };
-    const double reached = optimized(best_, few, graph, never);
-    return optimized(start, few, graph, never) < 0.999 * reached && wanted_;
+  /// Of the best start so far and another one, that from which a lower chi2 is reached. One per
+  /// thousand is no difference.
+  void keep_better(Start& best, Start other, Graph& graph) {
+    if (!(best.chi2 <= other.chi2)) return replace_if(true, best, std::move(other));
+    if (candidates_.optimizer && other.states.pools != best.states.pools) {
+      const auto never = [](const Iteration&) { return false; };
+      // Minima are compared where the start whose chi2 is lower seems to fall behind.
+      for (const int iterations : {kFewIterations, kToAMinimum.max_iterations}) {
+        const Stop stop{.max_iterations = iterations, .tolerance = kToAMinimum.tolerance};
+        try_out(best, stop, graph, never);
+        try_out(other, stop, graph, never);
+        if (!(other.reached < 0.999 * best.reached) || !wanted_) break;
+      }
+    }
+    const bool better = other.iterations > 0 && other.reached < 0.999 * best.reached && wanted_;
+    replace_if(better, best, std::move(other));
   }
 
-  /// chi2 after some iterations from `start`, until one of them is enough.
-  double optimized(const Start& start, const Stop& stop, Graph& graph,
-                   const Until::Enough& enough) {
+  /// Notes what some iterations from `start` reach, until one of them is enough.
+  void try_out(Start& start, const Stop& stop, Graph& graph, const Until::Enough& enough) {
     graph.set_values(start.states);
     Until observer([&](const Iteration& iteration) {
       return enough(iteration) ||
              !wanted(start.name, static_cast<double>(iteration.number) / stop.max_iterations);
     });
-    return candidates_.optimizer->optimize(graph, stop, observer).final_chi2;
+    const Summary summary = candidates_.optimizer->optimize(graph, stop, observer);
+    start.reached = summary.final_chi2;
+    start.iterations = static_cast<int>(summary.iterations.size());
+  }
+
+  // The second look ------------------------------------------------------------------------------
+
+  std::string reason_to_look_again(const Graph& graph, const Summary& summary) const {
+    if (!candidates_.optimizer || graph.variable_count() > kMostVariables) return {};
+    const double fall = summary.initial_chi2 / summary.final_chi2;
+    if (!(fall < kToNothing)) return {};  // an exact solution: none is lower
+    if (has_bounded_losses(graph)) return "since the loss is bounded";
+    const double angle = largest_turn(graph);
+    if (fall > kLargeFall && angle > kSmallAngle)
+      return fmt::format("since chi2 fell {:.3g} times from the start", fall);
+    if (!(angle > kLargeAngle)) return {};
+    return fmt::format("since poses disagree with a measurement by {:.2g} rad", angle);
+  }
+
+  void small_steps(Graph& graph) {
+    if (!candidates_.small_steps) throw Error(ErrorCode::input, "there is no such guess");
+    candidates_.small_steps->compute(graph);
+  }
+
+  static std::vector<std::string> in_words(const OtherMinima& found, const std::string& reason) {
+    std::vector<std::string> notes;
+    if (!found.found_by.empty()) {
+      notes.push_back(
+          fmt::format("looked for other minima, {}: {} leads to chi2 {:.6g} instead of {:.6g}",
+                      reason, found.found_by, found.chi2, found.before));
+    }
+    if (found.until_the_end) {
+      notes.push_back(
+          fmt::format("{} of {} starts ended in other minima, and lower ones were found until the "
+                      "end: there may be a lower one than chi2 {:.6g}",
+                      found.elsewhere, found.starts, found.chi2));
+    }
+    return notes;
   }
 
   /// Whether to go on; once it is not, it never is.
@@ -140,12 +261,19 @@ class Automatic final : public InitialGuess, public WatchedGuess {
   }
 
   static constexpr int kFewIterations = 5;
+  static constexpr Stop kToAMinimum{.max_iterations = 100, .tolerance = 1e-6};
+  static constexpr Stop kOnTheWay{.max_iterations = 30, .tolerance = 1e-4};
+  static constexpr double kCauchySquare = 2.3849 * 2.3849;  // as the loss `cauchy` by default
+  // Other minima differ by turns: where no residual turns far, chi2 is nearly convex. Where they
+  // turn a little, a start near the minimum is another sign that all is well.
+  static constexpr double kLargeFall = 2.5;
+  static constexpr double kSmallAngle = 0.1, kLargeAngle = 0.9;  // [rad]
+  static constexpr double kToNothing = 1e10;
 
   Stop stop_;
   Candidates candidates_;
   Values given_;
-  Start best_;
-  std::vector<std::string> tried_;
+  std::string rejected_;  // starts, with the numbers that decided
   GoOn go_on_;
   bool wanted_ = true;
 };

@@ -77,8 +77,10 @@ struct IncrementalOptions {
   }
 };
 
+/// `least_step`: of the poses between two optimisations where these are a part of all (step 0).
 std::unique_ptr<InitialGuess> make_incremental(const IncrementalOptions& options,
-                                               std::unique_ptr<Optimizer> optimizer);
+                                               std::unique_ptr<Optimizer> optimizer,
+                                               int least_step = 100);
 
 struct AutomaticOptions {
   std::string linear_solver = "block_cholesky";
@@ -90,7 +92,7 @@ struct AutomaticOptions {
     return OptionFields<O>()
         .component<LinearSolver>("linear_solver", &O::linear_solver, "of the chordal relaxation")
         .component<Optimizer>("optimizer", &O::optimizer,
-                              "tries a start whose chi2 is implausible, and is that of incremental")
+                              "tries starts, and is that of incremental")
         .integer("iterations", &O::iterations, 1, 1e6, "maximum number of iterations of the trial");
   }
 };
@@ -100,6 +102,7 @@ struct Candidates {
   std::unique_ptr<InitialGuess> chordal;
   std::unique_ptr<Optimizer> optimizer;  ///< for trials
   std::unique_ptr<InitialGuess> incremental;
+  std::unique_ptr<InitialGuess> small_steps;  ///< incremental, with 50 optimisations
 };
 
 std::unique_ptr<InitialGuess> make_automatic(const AutomaticOptions& options,

@@ -34,8 +34,8 @@ class WhileWanted final : public Observer {
 /// where an optimizer goes astray.
 class Incremental final : public InitialGuess, public WatchedGuess {
  public:
-  Incremental(int step, Stop stop, std::unique_ptr<Optimizer> optimizer)
-      : step_(step), stop_(stop), optimizer_(std::move(optimizer)) {}
+  Incremental(int step, int least_step, Stop stop, std::unique_ptr<Optimizer> optimizer)
+      : step_(step), least_step_(least_step), stop_(stop), optimizer_(std::move(optimizer)) {}
 
   void watch(GoOn go_on) override { go_on_ = std::move(go_on); }
   void* ability(std::string_view name) override {
@@ -45,7 +45,8 @@ class Incremental final : public InitialGuess, public WatchedGuess {
   std::vector<std::string> compute(Graph& graph) override {
     Growth growth(graph);
     const std::vector<int> poses = poses_by_id(graph);
-    const int step = step_ > 0 ? step_ : std::max(100, static_cast<int>(std::ssize(poses) / 50));
+    const int step =
+        step_ > 0 ? step_ : std::max(least_step_, static_cast<int>(std::ssize(poses) / 50));
     int since = 0, rounds = 0;
     std::size_t added = 0;
     bool wanted = true;
@@ -189,7 +190,7 @@ class Incremental final : public InitialGuess, public WatchedGuess {
     return order;
   }
 
-  int step_;
+  int step_, least_step_;
   Stop stop_;
   std::unique_ptr<Optimizer> optimizer_;
   GoOn go_on_;
@@ -198,9 +199,10 @@ class Incremental final : public InitialGuess, public WatchedGuess {
 }  // namespace
 
 std::unique_ptr<InitialGuess> make_incremental(const IncrementalOptions& options,
-                                               std::unique_ptr<Optimizer> optimizer) {
+                                               std::unique_ptr<Optimizer> optimizer,
+                                               int least_step) {
   const Stop stop{.max_iterations = options.iterations, .tolerance = 1e-4};
-  return std::make_unique<Incremental>(options.step, stop, std::move(optimizer));
+  return std::make_unique<Incremental>(options.step, least_step, stop, std::move(optimizer));
 }
 
 }  // namespace cairn::initial

@@ -31,6 +31,8 @@ Candidates candidates(const AutomaticOptions& options, Registry& registry) {
   result.optimizer = made_if_there(same_optimizer, optimizer);
   result.incremental =
       made_if_there(same_optimizer, [&] { return make_incremental({.step = 0}, optimizer()); });
+  result.small_steps =
+      made_if_there(same_optimizer, [&] { return make_incremental({.step = 0}, optimizer(), 1); });
   return result;
 }
 

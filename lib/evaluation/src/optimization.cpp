@@ -1,13 +1,17 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "cairn/evaluation/optimization.hpp"
 
+#include <algorithm>
+#include <chrono>
 #include <iterator>
 #include <utility>
 
 #include <fmt/core.h>
 
 #include "cairn/evaluation/plausibility.hpp"
+#include "cairn/evaluation/second_look.hpp"
 #include "cairn/runtime/plugin_call.hpp"
+#include "cairn/runtime/timed.hpp"
 
 namespace cairn {
 
@@ -18,15 +22,92 @@ std::vector<std::string> compute_guess(Graph& graph, InitialGuess& guess, std::s
                      [&] { return guess.compute(graph); });
 }
 
+namespace {
+
+/// Counts the iterations of an optimisation on from those of the one before.
+class Continued final : public Observer {
+ public:
+  Continued(Observer& observer, int before) : observer_(observer), before_(before) {}
+  bool on_iteration(const Iteration& iteration, const Graph& graph, const Values& values) override {
+    Iteration later = iteration;
+    later.number += before_;
+    return observer_.on_iteration(later, graph, values);
+  }
+
+ private:
+  Observer& observer_;
+  int before_;
+};
+
+void add(const Seconds& more, Seconds& seconds) {
+  seconds.total += more.total;
+  seconds.linearize += more.linearize;
+  seconds.analyze += more.analyze;
+  seconds.factorize += more.factorize;
+  seconds.solve += more.solve;
+  seconds.update += more.update;
+}
+
+/// Goes on from the graph's states, to the end of what `summary` begins.
+void go_on_from(Graph& graph, const Optimization& of, const Stop& stop, Observer& observer,
+                Summary& summary) {
+  const auto before = static_cast<int>(summary.iterations.size());
+  Continued continued(observer, before);
+  Summary more = call_plugin([&] { return fmt::format("optimizer '{}'", of.optimizer_name); },
+                             [&] { return of.optimizer.optimize(graph, stop, continued); });
+  for (Iteration& iteration : more.iterations) {
+    iteration.number += before;
+    summary.iterations.push_back(iteration);
+  }
+  for (std::string& note : more.notes) {
+    if (std::ranges::find(summary.notes, note) == summary.notes.end())
+      summary.notes.push_back(std::move(note));
+  }
+  add(more.seconds, summary.seconds);
+  summary.status = more.status;
+  summary.final_chi2 = more.final_chi2;
+  summary.solver = more.solver;
+}
+
+bool is_interrupted(const Stop& stop) { return stop.interrupt && stop.interrupt->load(); }
+
+}  // namespace
+
+void look_again(Graph& graph, const Optimization& of, const Stop& stop, Observer& observer,
+                WatchedGuess::GoOn go_on, Summary& summary) {
+  auto* second = of.guess ? query<SecondLook>(*of.guess) : nullptr;
+  if (!second || summary.status != Status::converged || !(stop.tolerance > 0.0)) return;
+  const auto begin = std::chrono::steady_clock::now();
+  const double limit = stop.max_seconds - summary.seconds.total;
+  if (auto* watched = query<WatchedGuess>(*of.guess)) {
+    watched->watch([&](std::string_view what, double part) {
+      return !is_interrupted(stop) && (!go_on || go_on(what, part)) &&
+             (stop.max_seconds <= 0.0 || seconds_since(begin) < limit);
+    });
+  }
+  SecondLook::Result found =
+      call_plugin([&] { return fmt::format("initial guess '{}'", of.guess_name); },
+                  [&] { return second->look_again(graph, summary); });
+  if (auto* watched = query<WatchedGuess>(*of.guess)) watched->watch({});
+  summary.seconds.total += seconds_since(begin);
+  if (is_interrupted(stop)) summary.status = Status::interrupted;
+  for (const std::string& note : found.notes)
+    summary.notes.push_back(fmt::format("initial guess {}: {}", of.guess_name, note));
+  if (found.lower && summary.status == Status::converged)
+    go_on_from(graph, of, stop, observer, summary);
+  if (found.lower && summary.status == Status::interrupted) summary.final_chi2 = chi2(graph);
+}
+
 Summary optimize(Graph& graph, const Optimization& of, const Stop& stop, Observer& observer,
                  WatchedGuess::GoOn go_on) {
   if (!go_on && stop.interrupt)
     go_on = [interrupt = stop.interrupt](std::string_view, double) { return !interrupt->load(); };
   std::vector<std::string> notes;
-  if (of.guess) notes = compute_guess(graph, *of.guess, of.guess_name, std::move(go_on));
+  if (of.guess) notes = compute_guess(graph, *of.guess, of.guess_name, go_on);
   for (std::string& note : notes) note = fmt::format("initial guess {}: {}", of.guess_name, note);
   Summary summary = call_plugin([&] { return fmt::format("optimizer '{}'", of.optimizer_name); },
                                 [&] { return of.optimizer.optimize(graph, stop, observer); });
+  look_again(graph, of, stop, observer, std::move(go_on), summary);
   for (std::string& note : notes_on_the_end(summary, stop, graph))
     summary.notes.push_back(std::move(note));
   summary.notes.insert(summary.notes.begin(), notes.begin(), notes.end());
@@ -47,8 +128,8 @@ std::vector<std::string> notes_on_the_end(const Summary& summary, const Stop& st
     notes.push_back(
         fmt::format("stopped by {} {} before it converged", max_iterations, stop.max_iterations));
   }
-  for (std::string& doubt : reasons_for_doubt(graph, summary.final_chi2))
-    notes.push_back(std::move(doubt));
+  for (std::string& note : notes_on_estimate(graph, summary.final_chi2))
+    notes.push_back(std::move(note));
   return notes;
 }
 

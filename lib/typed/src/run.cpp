@@ -12,42 +12,33 @@ namespace cairn {
 namespace {
 
 constexpr std::string_view kInitialGuess = "auto";
+/// How it says that it has left the graph's states as they were, which is no news.
+constexpr std::string_view kKept = "initial guess auto: as_given (";
 
 bool is_interrupted(const Stop& stop) { return stop.interrupt && *stop.interrupt; }
 
-/// Lets `auto` replace the states. Returns its notes, or none where it leaves them as they are.
-std::vector<std::string> choose_start(Graph& graph, const Stop& stop, Registry& registry) {
-  if (!registry.has(InitialGuess::kKind, kInitialGuess)) return {};
-  const auto guess = registry.make<InitialGuess>(kInitialGuess);
-  const Values given = graph.values();
-  std::vector<std::string> notes =
-      compute_guess(graph, *guess, kInitialGuess,
-                    [&](std::string_view, double) { return !is_interrupted(stop); });
-  if (graph.values().pools == given.pools) return {};
-  for (std::string& note : notes) note = "initial guess auto: " + note;
-  return notes;
-}
-
-/// From the graph's states.
-Summary run(Graph& graph, Optimizer& optimizer, std::string_view name, const Stop& stop) {
-  Observer silent;
-  return optimize(graph, Optimization{optimizer, name, nullptr, {}}, stop, silent);
+bool has_guess(const Stop& stop, Registry& registry) {
+  return !is_interrupted(stop) && registry.has(InitialGuess::kKind, kInitialGuess);
 }
 
 }  // namespace
 
 Summary optimize_from_states(Graph& graph, std::string_view optimizer, const Stop& stop,
                              Registry& registry) {
-  return run(graph, *registry.make<Optimizer>(optimizer), optimizer, stop);
+  const auto made = registry.make<Optimizer>(optimizer);
+  Observer silent;
+  return optimize(graph, Optimization{*made, optimizer, nullptr, {}}, stop, silent);
 }
 
 Summary optimize(Graph& graph, std::string_view optimizer, const Stop& stop, Registry& registry) {
   const auto made =
       registry.make<Optimizer>(optimizer);  // a wrong name is an error before the work
-  std::vector<std::string> notes;
-  if (!is_interrupted(stop)) notes = choose_start(graph, stop, registry);
-  Summary summary = run(graph, *made, optimizer, stop);
-  summary.notes.insert(summary.notes.begin(), notes.begin(), notes.end());
+  if (!has_guess(stop, registry)) return optimize_from_states(graph, optimizer, stop, registry);
+  const auto guess = registry.make<InitialGuess>(kInitialGuess);
+  Observer silent;
+  Summary summary =
+      optimize(graph, Optimization{*made, optimizer, guess.get(), kInitialGuess}, stop, silent);
+  std::erase_if(summary.notes, [](const std::string& note) { return note.starts_with(kKept); });
   return summary;
 }
 

@@ -6,7 +6,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "cairn/evaluation/optimization.hpp"
 #include "cairn/evaluation/plausibility.hpp"
+#include "cairn/evaluation/second_look.hpp"
+#include "cairn/evaluation/watched_guess.hpp"
 #include "cairn/graph/gauge.hpp"
 #include "cairn/io/generator.hpp"
 #include "cairn/plugin/registry.hpp"
@@ -18,6 +21,7 @@ namespace cairn {
 namespace {
 
 using testing::AllOf;
+using testing::Contains;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
@@ -124,6 +128,139 @@ TEST_F(Automatic, IncrementalEstimatesKeepTheLossOfEachFactor) {
   guess("incremental", graph);
   EXPECT_LT(chi2(graph), 1.01 * minimum);
 }
+
+// Minima that others do not reach ---------------------------------------------------------------
+
+/// chi2 of what `cairn optimize` does by default, and its notes.
+Summary optimize_by_default(Registry& registry, Graph& graph) {
+  const auto guess = registry.make<InitialGuess>("auto");
+  const auto optimizer = registry.make<Optimizer>("levenberg_marquardt");
+  Observer silent;
+  return optimize(graph, {*optimizer, "levenberg_marquardt", guess.get(), "auto"}, {}, silent);
+}
+
+class OtherMinimaOf : public Automatic {
+ protected:
+  Simulation simulate(const std::string& world, std::uint64_t seed) {
+    return registry.make<Generator>(world)->generate(registry, seed);
+  }
+  double from(Graph graph, const Values& states) {
+    graph.set_values(states);
+    return optimize(graph).final_chi2;
+  }
+};
+
+TEST_F(OtherMinimaOf, GivenStatesThatLeadLowerAreKept) {
+  // A few iterations from the truth are behind as many from the chordal start.
+  Simulation simulation = simulate("city:poses=131,block=6,noise=1.94,rotation_sigma=0.119", 102);
+  Graph& graph = simulation.graph;
+  const double best = from(graph.clone(), simulation.truth.values());
+  Graph chordal = graph.clone();
+  guess("chordal", chordal);
+  ASSERT_GT(optimize(chordal).final_chi2, 1.05 * best);
+  graph.set_values(simulation.truth.values());
+  const std::vector<std::string> notes = guess("auto", graph);
+  EXPECT_THAT(notes, ElementsAre(AllOf(StartsWith("as_given (chi2 524.5, after"),
+                                       HasSubstr(" iterations 107.8)"),
+                                       HasSubstr("; not chordal (chi2 1806, after"))));
+  EXPECT_LT(optimize(graph).final_chi2, 1.001 * best);
+}
+
+TEST_F(OtherMinimaOf, ATrajectoryWithNoisyHeadingsAreFound) {
+  // Loops that few measurements close, whose headings are known up to full turns.
+  struct Case {
+    const char* world;
+    std::uint64_t seed;
+  };
+  for (const Case& one : {Case{"ring:poses=183,noise=2.19,rotation_sigma=0.1", 926},
+                          Case{"ring:poses=100,noise=2.97,rotation_sigma=0.1", 943},
+                          Case{"ring:poses=155,noise=2.81,rotation_sigma=0.1", 969},
+                          Case{"ellipse3d:poses=84,noise=2.90,rotation_sigma=0.1", 482}}) {
+    SCOPED_TRACE(one.world);
+    if (!registry.has("types", "slam3d")) GTEST_SKIP() << "there are no types slam3d";
+    Simulation simulation = simulate(one.world, one.seed);
+    const double best = from(simulation.graph.clone(), simulation.truth.values());
+    Graph chordal = simulation.graph.clone();
+    guess("chordal", chordal);
+    ASSERT_GT(optimize(chordal).final_chi2, 1.01 * best);
+    const Summary summary = optimize_by_default(registry, simulation.graph);
+    EXPECT_LT(summary.final_chi2, 1.001 * best);
+    EXPECT_EQ(summary.final_chi2, chi2(simulation.graph));
+    EXPECT_EQ(summary.status, Status::converged);
+    EXPECT_THAT(summary.notes,
+                Contains(AllOf(StartsWith("initial guess auto: looked for other"),
+                               HasSubstr("since chi2 fell"), HasSubstr("instead of"))));
+    for (std::size_t k = 0; k < summary.iterations.size(); ++k)
+      EXPECT_EQ(summary.iterations[k].number, static_cast<int>(k) + 1);
+  }
+}
+
+TEST_F(OtherMinimaOf, AGraphThatStartsNearItsMinimumAreNotSought) {
+  Graph graph = std::move(simulate("manhattan:poses=400", 7).graph);
+  int looks = 0;
+  const auto made = registry.make<InitialGuess>("auto");
+  query<WatchedGuess>(*made)->watch([&](std::string_view what, double) {
+    looks += what == "other starts";
+    return true;
+  });
+  made->compute(graph);
+  const Summary summary = optimize(graph);
+  const SecondLook::Result result = query<SecondLook>(*made)->look_again(graph, summary);
+  EXPECT_FALSE(result.lower);
+  EXPECT_THAT(result.notes, IsEmpty());
+  EXPECT_EQ(looks, 0);
+}
+
+TEST_F(OtherMinimaOf, ASearchThatIsEndedLeavesTheBestSoFar) {
+  Simulation simulation = simulate("ring:poses=100,noise=2.97,rotation_sigma=0.1", 943);
+  Graph& graph = simulation.graph;
+  const auto made = registry.make<InitialGuess>("auto");
+  made->compute(graph);
+  const Summary summary = optimize(graph);
+  const Values before = graph.values();
+  query<WatchedGuess>(*made)->watch(
+      [](std::string_view what, double) { return what != "other starts"; });
+  EXPECT_FALSE(query<SecondLook>(*made)->look_again(graph, summary).lower);
+  EXPECT_EQ(graph.values().pools, before.pools);
+}
+
+class BoundedLoss : public OtherMinimaOf, public testing::WithParamInterface<const char*> {
+ protected:
+  void SetUp() override {
+    OtherMinimaOf::SetUp();
+    if (!registry.has("loss", GetParam())) GTEST_SKIP() << "there is no loss " << GetParam();
+  }
+  /// chi2 by default against that from the truth.
+  void reaches_what_the_truth_leads_to(const std::string& world, std::uint64_t seed) {
+    SCOPED_TRACE(world);
+    Simulation simulation = simulate(world, seed);
+    Graph& graph = simulation.graph;
+    graph.set_loss(registry.make<Loss>(GetParam()), FactorSelector::loops());
+    std::vector<const Loss*> before;
+    for (int f = 0; f < graph.factor_count(); ++f) before.push_back(graph.loss(f));
+    const double best = from(graph.clone(), simulation.truth.values());
+    const Summary summary = optimize_by_default(registry, graph);
+    EXPECT_LT(summary.final_chi2, 1.001 * best);
+    EXPECT_THAT(summary.notes, Not(Contains(HasSubstr("hardly"))));
+    for (int f = 0; f < graph.factor_count(); ++f) EXPECT_EQ(graph.loss(f), before[f]);
+  }
+};
+
+TEST_P(BoundedLoss, OfRightLoopClosuresLeavesTheEstimateInItsMinimum) {
+  if (!registry.has("types", "slam3d")) GTEST_SKIP() << "there are no types slam3d";
+  reaches_what_the_truth_leads_to("torus:turns=4,poses_per_turn=14", 11);
+  reaches_what_the_truth_leads_to("torus:turns=8,poses_per_turn=8", 5);
+  reaches_what_the_truth_leads_to("ellipse3d:poses=64", 118);
+}
+
+TEST_P(BoundedLoss, FindsTheMinimumAmongWrongLoopClosures) {
+  reaches_what_the_truth_leads_to("ring:poses=170,outliers=5", 104);
+  reaches_what_the_truth_leads_to("ring:poses=45,outliers=7", 70);
+  reaches_what_the_truth_leads_to("ring:poses=147,outliers=7", 40);
+}
+
+INSTANTIATE_TEST_SUITE_P(Losses, BoundedLoss,
+                         testing::Values("dcs", "geman_mcclure", "tukey", "welsch"));
 
 TEST(Plausibility, IsChi2PerDegreeOfFreedom) {
   EXPECT_TRUE(is_plausible(2500.0, 100));

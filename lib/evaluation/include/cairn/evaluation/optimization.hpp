@@ -27,10 +27,18 @@ CAIRN_API std::vector<std::string> compute_guess(Graph& graph, InitialGuess& gue
                                                  std::string_view name,
                                                  WatchedGuess::GoOn go_on = {});
 
-/// The initial guess, then the optimizer. The summary's notes are those of the guess, each after
-/// "initial guess NAME: ", those of the optimizer, and those on the end (`notes_on_the_end`).
-/// `go_on`: as above; none: what `stop.interrupt` says.
-/// What a component throws names it.
+/// After an optimisation that has converged from what `of.guess` computed: lets a guess that can
+/// (`SecondLook`) compare that minimum with others, and goes on from a lower one, so that the
+/// summary is that of both: iterations follow one another, and the notes are completed. Does
+/// nothing where there is no such guess, or where there was no tolerance to reach.
+/// `stop.max_seconds` is the limit of both. `go_on`: as above.
+CAIRN_API void look_again(Graph& graph, const Optimization& of, const Stop& stop,
+                          Observer& observer, WatchedGuess::GoOn go_on, Summary& summary);
+
+/// The initial guess, then the optimizer, then `look_again`. The summary's notes are those of the
+/// guess, each after "initial guess NAME: ", those of the optimizer, and those on the end
+/// (`notes_on_the_end`). `go_on`: as above; none: what `stop.interrupt` says. What a component
+/// throws names it.
 CAIRN_API Summary optimize(Graph& graph, const Optimization& of, const Stop& stop,
                            Observer& observer, WatchedGuess::GoOn go_on = {});
 

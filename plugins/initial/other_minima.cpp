@@ -1,0 +1,226 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "other_minima.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <random>
+#include <utility>
+
+#include <fmt/core.h>
+
+#include "cairn/geometry/pose.hpp"
+#include "cairn/graph/gauge.hpp"
+#include "cairn/runtime/error.hpp"
+#include "trial_losses.hpp"
+
+namespace cairn::initial {
+namespace {
+
+constexpr double kLower = 1e-4;            // a smaller fraction of chi2 is no lower minimum
+constexpr double kElsewhere = 1e-3;        // nor is this another one
+constexpr double kIterations = 200'000.0;  // of one variable
+constexpr int kLeavingOut = 16;            // random starts
+constexpr Stop kOnTheWay{.max_iterations = 30, .tolerance = 1e-4};
+constexpr Stop kToAMinimum{.max_iterations = 60, .tolerance = 1e-6};
+
+class WhileWanted final : public Observer {
+ public:
+  explicit WhileWanted(const std::function<bool()>& wanted) : wanted_(wanted) {}
+  bool on_iteration(const Iteration&, const Graph&, const Values&) override { return wanted_(); }
+
+ private:
+  const std::function<bool()>& wanted_;
+};
+
+/// Half of the squared norms are smaller.
+double median(std::vector<double> norms) {
+  const auto middle = norms.begin() + std::ssize(norms) / 2;
+  std::ranges::nth_element(norms, middle);
+  return *middle;
+}
+
+class Search {
+ public:
+  Search(Graph& graph, Optimizer& optimizer, const std::function<bool(double)>& wanted)
+      : graph_(graph),
+        losses_(graph),
+        gauge_(resolve_gauge(graph)),
+        optimizer_(optimizer),
+        given_(graph.values()),
+        best_(graph.values()) {
+    found_.chi2 = found_.before = chi2(graph);
+    most_ = kIterations / std::max(1, graph.variable_count());
+    wanted_ = [this, wanted] { return go_on_ = go_on_ && wanted(spent_ / most_); };
+  }
+
+  OtherMinima run(const std::vector<NamedStart>& starts) {
+    if (graph_.variable_count() > kMostVariables) return found_;
+    for (const NamedStart& start : starts) {
+      if (start.iterations == 0.0) try_start(start);
+    }
+    try_robust("cauchy", make_cauchy, 1.0);
+    try_robust("geman_mcclure", make_geman_mcclure, 4.0);
+    for (const double turns : {1.0, -1.0}) try_turned(turns, 0);
+    if (found_.elsewhere > 0 || !found_.found_by.empty()) try_more(starts);
+    graph_.set_values(std::move(best_));
+    found_.until_the_end = !found_.found_by.empty() && found_.starts - last_ <= found_.starts / 4;
+    return found_;
+  }
+
+ private:
+  void try_start(const NamedStart& start) {
+    attempt(start.name, [&] {
+      graph_.set_values(given_);
+      start.compute(graph_);
+      spent_ += start.iterations;
+    });
+  }
+
+  void try_more(const std::vector<NamedStart>& starts) {
+    for (const NamedStart& start : starts) {
+      if (start.iterations > 0.0) try_start(start);
+    }
+    for (const double turns : {2.0, -2.0}) try_turned(turns, 0);
+    try_robust("geman_mcclure", make_geman_mcclure, 1.0);
+    try_robust("cauchy", make_cauchy, 0.1);
+    for (const int axis : {1, 2}) {
+      for (const double turns : {1.0, -1.0}) try_turned(turns, axis);
+    }
+    for (int k = 0; k < kLeavingOut; ++k) try_without_some();
+  }
+
+  template <class Make>
+  void try_robust(const char* name, const Make& make, double part) {
+    attempt(fmt::format("a {} estimate", name), [&] {
+      const double q = part * median(squared_norms(graph_));
+      if (!(q > 0.0)) return;
+      graph_.set_loss(make(q));
+      optimise(kOnTheWay);
+    });
+  }
+
+  /// Further turns about an axis of the poses, the last of their tangent space first, spread over
+  /// all poses in the order of their ids.
+  void try_turned(double turns, int axis) {
+    if (!turns_about(axis)) return;
+    attempt("a trajectory with further turns", [&] { turn(turns, axis); });
+  }
+
+  bool turns_about(int axis) const {
+    return std::ranges::any_of(graph_.variable_pools(), [&](const VariablePool& pool) {
+      return pool.variables.size() > 1 && is_pose(*pool.type) &&
+             (axis == 0 || pool.type->placement()->dimension() == 3);
+    });
+  }
+
+  void turn(double turns, int axis) {
+    for (const VariablePool& pool : graph_.variable_pools()) {
+      if (!is_pose(*pool.type) || pool.variables.size() < 2) continue;
+      std::vector<int> order(pool.variables.begin(), pool.variables.end());
+      std::ranges::sort(order, {}, [&](int v) { return graph_.id(v); });
+      turn(*pool.type, order, turns, axis);
+    }
+  }
+
+  void turn(const VariableType& type, const std::vector<int>& order, double turns, int axis) {
+    const LieGroup& group = *type.lie_group();
+    const auto n = static_cast<std::size_t>(type.ambient_size());
+    std::vector<double> tangent(static_cast<std::size_t>(type.tangent_size()));
+    if (axis >= static_cast<int>(tangent.size())) return;
+    tangent[tangent.size() - 1 - static_cast<std::size_t>(axis)] =
+        2.0 * std::numbers::pi * turns / static_cast<double>(order.size());
+    std::vector<double> step(n), inverse(n), motion(n), turned(n), next(n);
+    group.exp(tangent.data(), step.data());
+    std::vector<double> before(graph_.state(order[0]).begin(), graph_.state(order[0]).end());
+    std::vector<double> at = before;
+    for (std::size_t k = 1; k < order.size(); ++k) {
+      const std::vector<double> old(graph_.state(order[k]).begin(), graph_.state(order[k]).end());
+      group.inverse(before.data(), inverse.data());
+      group.compose(inverse.data(), old.data(), motion.data());
+      group.compose(motion.data(), step.data(), turned.data());
+      group.compose(at.data(), turned.data(), next.data());
+      before = old;
+      at = gauge_.held[static_cast<std::size_t>(order[k])] ? old : next;
+      if (!type.normalize(at.data()).empty()) return;
+      graph_.set_state(order[k], at);
+    }
+  }
+
+  void try_without_some() {
+    attempt("an estimate without a part of the factors", [&] {
+      for (int f = 0; f < graph_.factor_count(); ++f) {
+        if (random_() % 5 == 0) graph_.set_loss(f, hardly_);
+      }
+      optimise(kOnTheWay);
+    });
+  }
+
+  /// Lets `move` change the states and the losses from the best minimum so far, and optimises.
+  template <class Move>
+  void attempt(const std::string& name, const Move& move) {
+    if (spent_ >= most_ || !wanted_()) return;
+    graph_.set_values(best_);
+    double reached = 0.0;
+    try {
+      move();
+      losses_.put_back();
+      reached = optimise(kToAMinimum);
+    } catch (const Error& error) {
+      losses_.put_back();
+      if (error.code() != ErrorCode::input && error.code() != ErrorCode::numerical) throw;
+      return;
+    }
+    if (!go_on_) return;
+    ++found_.starts;
+    if (std::abs(reached - found_.chi2) > kElsewhere * found_.chi2) ++found_.elsewhere;
+    if (!(reached < (1.0 - kLower) * found_.chi2)) return;
+    found_.chi2 = reached;
+    found_.found_by = name;
+    last_ = found_.starts;
+    best_ = graph_.values();
+  }
+
+  double optimise(const Stop& stop) {
+    WhileWanted observer(wanted_);
+    const Summary summary = optimizer_.optimize(graph_, stop, observer);
+    spent_ += static_cast<double>(summary.iterations.size());
+    return summary.final_chi2;
+  }
+
+  Graph& graph_;
+  KeptLosses losses_;
+  Gauge gauge_;
+  Optimizer& optimizer_;
+  std::function<bool()> wanted_;
+  Values given_, best_;
+  OtherMinima found_;
+  std::shared_ptr<const Loss> hardly_ = make_weight(0.01);
+  std::mt19937_64 random_{1};        // the same for every graph, on every machine
+  double spent_ = 0.0, most_ = 0.0;  // iterations
+  int last_ = 0;                     // the start that led to the best so far
+  bool go_on_ = true;
+};
+
+}  // namespace
+
+OtherMinima search_other_minima(Graph& graph, const std::vector<NamedStart>& starts,
+                                Optimizer& optimizer, const std::function<bool(double)>& wanted) {
+  return Search(graph, optimizer, wanted).run(starts);
+}
+
+double largest_turn(const Graph& graph) {
+  double least = 3.0;  // the trace of a rotation by an angle: 1 + 2 cos(angle)
+  for (int f = 0; f < graph.factor_count(); ++f) {
+    if (!graph.factor_type(f).is_relative()) continue;
+    const auto on = graph.factor_variables(f);
+    const VariableType& type = graph.type(on[0]);
+    if (!is_pose(type)) continue;
+    const Pose from = pose_of(type, graph.state(on[0])), to = pose_of(type, graph.state(on[1]));
+    const Pose measured = pose_of(type, graph.measurement(f));
+    least = std::min(least, (from.R * measured.R).cwiseProduct(to.R).sum());
+  }
+  return std::acos(std::clamp(0.5 * (least - 1.0), -1.0, 1.0));
+}
+
+}  // namespace cairn::initial
