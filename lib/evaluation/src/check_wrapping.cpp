@@ -58,7 +58,8 @@ std::optional<AngleJump> find_angle_jump(const ErrorsAlong& errors, double begin
     before = std::move(after);
   }
   for (std::size_t row = 0; turn && row < first.size(); ++row) {
-    if (std::abs(std::abs(before[row] - first[row]) - kTurn) < kSame)
+    const bool by_a_turn = std::abs(std::abs(before[row] - first[row]) - kTurn) < kSame;
+    if (by_a_turn && std::abs(before[row] + first[row]) > kUnlikePi)  // not from −π to π
       return AngleJump{static_cast<int>(row), first[row], before[row], end, true};
   }
   return std::nullopt;
