@@ -86,6 +86,23 @@ struct HalfRefuses final : Wrapped {
   }
 };
 
+/// Has taken in the variables when a factor throws while it is evaluated.
+struct KeepsHalves final : Wrapped {
+  using Wrapped::Wrapped;
+  UpdateReport update(const GraphUpdate& update, const UpdateOptions& options) override {
+    try {
+      return Wrapped::update(update, options);
+    } catch (const Error& error) {
+      if (error.code() == ErrorCode::plugin) {
+        GraphUpdate half;
+        half.variables = update.variables;
+        Wrapped::update(half, {.defer = true});
+      }
+      throw;
+    }
+  }
+};
+
 /// A copy is the same map under another name.
 struct SharesCopies final : Wrapped {
   using Wrapped::Wrapped;
@@ -142,6 +159,7 @@ void add(Registrar& registrar, const char* name) {
 void cairn_register(Registrar& registrar) {
   add<StaleCovariances>(registrar, "stale_covariances");
   add<HalfRefuses>(registrar, "half_refuses");
+  add<KeepsHalves>(registrar, "keeps_halves");
   add<SharesCopies>(registrar, "shares_copies");
   add<Keeps>(registrar, "keeps_what_leaves");
   add<RemovesNoFactor>(registrar, "removes_no_factor");
