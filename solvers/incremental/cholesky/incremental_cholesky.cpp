@@ -107,13 +107,12 @@ void IncrementalCholesky::refuse_if_lost() const {
 }
 
 /// Whether something in the update, if it is evaluated, may throw.
-bool IncrementalCholesky::may_throw(const GraphUpdate& update) const {
-  const FactorType* last = nullptr;
+bool IncrementalCholesky::may_throw(const GraphUpdate& update) {
   for (const Factor& factor : update.factors) {
     if (factor.loss && !dynamic_cast<const NeverThrows*>(factor.loss.get())) return true;
-    if (factor.type.get() == last) continue;
-    last = factor.type.get();
-    if (last && !dynamic_cast<const NeverThrows*>(last)) return true;
+    if (!factor.type || factor.type == harmless_) continue;
+    if (!dynamic_cast<const NeverThrows*>(factor.type.get())) return true;
+    harmless_ = factor.type;
   }
   return false;
 }

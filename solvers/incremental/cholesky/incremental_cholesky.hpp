@@ -116,7 +116,7 @@ class IncrementalCholesky final : public Estimator {
   void refuse_if_lost() const;
   Engine& engine() { return refuse_if_lost(), *engine_; }
   const Engine& engine() const { return refuse_if_lost(), *engine_; }
-  bool may_throw(const GraphUpdate& update) const;
+  bool may_throw(const GraphUpdate& update);
   void begin_step(const UpdateOptions& options);
   void forget_step();
   void keep_answers(Answers* answers);
@@ -160,6 +160,7 @@ class IncrementalCholesky final : public Estimator {
   std::unique_ptr<IncrementalCholesky> before_;  ///< a copy, made for this update
   bool may_throw_ = false;          ///< something of the graph may throw where it is evaluated, …
   std::unique_ptr<Record> record_;  ///< … and then there is this
+  std::shared_ptr<const FactorType> harmless_;  ///< the last type that never throws
   AnswersKept answers_;
   bool lost_ = false;  ///< an update has failed that could not be undone
 };

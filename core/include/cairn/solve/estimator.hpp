@@ -73,14 +73,11 @@ enum class KeptMarginals {
 /// Keeps the maximum likelihood estimate of a graph, with covariances, up to date while the graph
 /// grows and changes.
 ///
-/// A variable is known by its `Id` and a factor by its `FactorId`. Every update is atomic: an
-/// `Error` leaves the estimator as it was, and has no part in any later result, to the last bit.
-/// What an update asks for is checked before anything changes (input: an unknown id, a duplicate, a
-/// wrong size, …); where a factor or a loss throws while it is evaluated, however late (plugin,
-/// with the factor's name), what was done is undone. What cannot be undone, such as where memory
-/// ends, leaves one whose every call but `reset` throws `Error` (usage). A component of the graph
-/// without a fixed variable or prior gets its first pose anchored, as by `resolve_gauge`, which a
-/// note reports. It minimises the sum of ρ(‖r‖²), as an `Optimizer` does.
+/// Variables are known by `Id`, factors by `FactorId`. Updates are atomic: an `Error` (input: what
+/// is asked for; plugin: a factor throws, however late) leaves the estimator as it was, to the last
+/// bit; where that cannot be, as when memory ends, all but `reset` throws `Error` (usage). Of a
+/// component without fixed variable or prior the first pose is anchored, as by `resolve_gauge`,
+/// which a note reports. It minimises the sum of ρ(‖r‖²), as an `Optimizer` does.
 class CAIRN_API Estimator : public Component {
  public:
   static constexpr std::string_view kKind = "estimator";
