@@ -22,15 +22,24 @@ std::string lower(std::string_view text) {
   return small;
 }
 
-/// What stands between commas, or between blanks where there are no commas.
+/// What stands between commas, or between blanks where there are no commas. A unit in brackets goes
+/// with the name before it: "p_x [m]".
 std::vector<std::string> fields_of(std::string_view line) {
   const std::string_view separators = line.find(',') == std::string_view::npos ? kBlanks : ",";
   std::vector<std::string> fields;
+  bool in_unit = false;
   while (!line.empty()) {
     const std::size_t end = std::min(line.find_first_of(separators), line.size());
-    const std::string_view field = trimmed(line.substr(0, end));
-    if (!field.empty() || separators == ",") fields.push_back(lower(field));
+    const std::string field = lower(trimmed(line.substr(0, end)));
     line.remove_prefix(std::min(end + 1, line.size()));
+    if (separators == ",") {
+      fields.push_back(field);
+      continue;
+    }
+    if (field.empty()) continue;
+    in_unit = in_unit || (field.front() == '[' && !fields.empty());
+    in_unit ? fields.back() += " " + field : fields.emplace_back(field);
+    if (field.back() == ']') in_unit = false;
   }
   return fields;
 }

@@ -30,12 +30,14 @@ constexpr double kRotationTolerance = 1e-3;
 /// Where w of the quaternion is, counted from 0.
 constexpr int kTumW = 7, kEurocW = 4;
 
-/// The names of the columns say that the quaternion is not where the format has it.
-[[noreturn]] void fail_order(const Scanner& scanner, int column) {
+/// Refuses a file whose names of columns have w of the quaternion where the format has it not.
+void check_order(const RowText& rows, const Scanner& scanner, int expected) {
+  const int column = rows.column_of_w().value_or(expected);
+  if (column == expected) return;
   scanner.fail(fmt::format(
-      "the names of the columns have w of the quaternion in column {}; expected it in column {} "
-      "(format tum) or {} (format euroc)",
-      column + 1, kTumW + 1, kEurocW + 1));
+      "the names of the columns have w of the quaternion in column {}; expected column {} (format "
+      "tum has it in column {}, euroc in column {})",
+      column + 1, expected + 1, kTumW + 1, kEurocW + 1));
 }
 
 bool is_rotation(const Eigen::Matrix3d& R) {
@@ -55,7 +57,7 @@ Graph read_tum(std::string_view text, const std::string& name, Registry& types,
   StampedRows stamps;
   while (scanner.next_line()) {
     scanner.expect_row({0, 8, 0}, "a TUM row");
-    if (rows.column_of_w().value_or(kTumW) != kTumW) fail_order(scanner, *rows.column_of_w());
+    check_order(rows, scanner, kTumW);
     stamps.add(scanner.tag(), scanner.read_number());
     scanner.read_numbers(draft.add_variable(pose, 0, scanner.line()));
     scanner.end_line();
@@ -80,7 +82,7 @@ Graph read_euroc(std::string_view text, const std::string& name, Registry& types
       others.resize(static_cast<std::size_t>(columns - 8));
     }
     scanner.expect_row({0, columns, 0}, "an EuRoC row");
-    if (rows.column_of_w().value_or(kEurocW) != kEurocW) fail_order(scanner, *rows.column_of_w());
+    check_order(rows, scanner, kEurocW);
     stamps.add(scanner.tag(), scanner.read_number());
     const std::span<double> pose = draft.add_variable(kind, 0, scanner.line());
     scanner.read_numbers(pose.first(3));

@@ -102,8 +102,8 @@ TEST(Trajectory, TumMayHaveCommasAndNamesOfItsColumns) {
             "file:2: a TUM row with 7 fields; expected 8 fields (8 numbers)");
   EXPECT_THAT(
       refusal("tum", "#time,x,y,z,qw,qx,qy,qz\n1.5,1,2,3,1,0,0,0\n"),
-      HasSubstr("w of the quaternion in column 5; expected it in column 8 (format tum) or 5 "
-                "(format euroc)"));
+      HasSubstr("w of the quaternion in column 5; expected column 8 (format tum has it in column "
+                "8, euroc in column 5)"));
 }
 
 // EuRoC -------------------------------------------------------------------------------------------
@@ -142,14 +142,15 @@ TEST(Trajectory, EurocMayEndWithTheQuaternion) {
   EXPECT_THAT(r.report.stamps, ElementsAre(0.005, 0.01));
   EXPECT_THAT(r.state(0), ElementsAre(1, 2, 3, 0, 0.6, 0, 0.8));
   EXPECT_EQ(detected("1403636580838555648,1,2,3,0.8,0,0.6,0\n"), "euroc");
-  // Names that say seconds, and fields between blanks.
-  const std::string seconds = "# time [s] x y z qw qx qy qz\n";
-  EXPECT_EQ(detected(seconds + "0.5 1 2 3 0.8 0 0.6 0\n0.75 1 2 3 1 0 0 0\n"), "tum");
-  const std::string spaced =
-      "# time x y z qw qx qy qz\n0.5 1 2 3 0.8 0 0.6 0\n0.75 1 2 3 1 0 0 0\n";
-  EXPECT_EQ(detected(spaced), "euroc");
-  EXPECT_THAT(read("euroc", spaced).report.stamps, ElementsAre(0.5, 0.75));
-  EXPECT_THAT(read("euroc", spaced).state(0), ElementsAre(1, 2, 3, 0, 0.6, 0, 0.8));
+  // Names that say seconds, or nothing, and blanks between fields.
+  for (const char* time : {"time [s]", "time"}) {
+    const std::string spaced = std::string("# ") + time +
+                               " x [m] y [m] z [m] qw qx qy qz v_x [m s^-1]\n"
+                               "0.5 1 2 3 0.8 0 0.6 0 9\n0.75 1 2 3 1 0 0 0 9\n";
+    EXPECT_EQ(detected(spaced), "euroc");
+    EXPECT_THAT(read("euroc", spaced).report.stamps, ElementsAre(0.5, 0.75));
+    EXPECT_THAT(read("euroc", spaced).state(0), ElementsAre(1, 2, 3, 0, 0.6, 0, 0.8));
+  }
 }
 
 TEST(Trajectory, PositionsAloneAreNoTrajectoryOfEuroc) {
