@@ -25,11 +25,6 @@ set(CAIRN_PLUGIN_TEMPLATE_FOLDER ${CMAKE_CURRENT_LIST_DIR})
 
 # Settings of another project's plugins.
 macro(cairn_third_party_defaults)
-  get_property(multi_config GLOBAL PROPERTY GENERATOR_IS_MULTI_CONFIG)
-  if(NOT CMAKE_BUILD_TYPE AND NOT multi_config)
-    message(STATUS "cairn: no build type given, so it is Release")
-    set(CMAKE_BUILD_TYPE Release CACHE STRING "Release, Debug, RelWithDebInfo or MinSizeRel" FORCE)
-  endif()
   set(user_data "$ENV{XDG_DATA_HOME}")
   if(NOT IS_ABSOLUTE "${user_data}")
     set(user_data "$ENV{HOME}/.local/share")

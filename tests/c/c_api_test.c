@@ -133,6 +133,7 @@ static void names_what_is_wrong(cairn_registry* registry) {
   fails(cairn_graph_chi2(NULL, &number), CAIRN_USAGE, "graph is NULL");
   fails(cairn_graph_chi2(graph, NULL), CAIRN_USAGE, "chi2 is NULL");
   fails(cairn_graph_add_variable(graph, "VERTEX_SE9", 2, origin, 3, 0), CAIRN_PLUGIN, "VERTEX_SE9");
+  fails(cairn_graph_add_variable(graph, "VERTEX_SE2", -1, origin, 3, 0), CAIRN_USAGE, "the id -1 is below 0");
   fails(cairn_graph_add_variable(graph, NULL, 2, origin, 3, 0), CAIRN_USAGE, "tag is NULL");
   fails(cairn_graph_add_variable(graph, "VERTEX_SE2", 1, origin, 3, 0), CAIRN_INPUT, "1");
   fails(cairn_graph_add_variable(graph, "VERTEX_SE2", 2, origin, 2, 0), CAIRN_USAGE, "the state");
@@ -234,6 +235,7 @@ static void estimates_while_a_graph_grows(cairn_registry* registry) {
   cairn_estimator* estimator = NULL;
   fails(cairn_estimator_new(registry, "none", &estimator), CAIRN_PLUGIN, "none");
   EXPECT_OK(cairn_estimator_new(registry, NULL, &estimator));
+  fails(cairn_estimator_add_variable(estimator, "VERTEX_SE2", INT64_MIN, origin, 3, 1), CAIRN_USAGE, "below 0");
   EXPECT_OK(cairn_estimator_add_variable(estimator, "VERTEX_SE2", 0, origin, 3, 1));
   EXPECT_OK(cairn_estimator_add_variable(estimator, "VERTEX_SE2", 1, NULL, 0, 0));
   EXPECT_OK(cairn_estimator_add_factor(estimator, "EDGE_SE2", ends, 2, near, 3, unit_information, 6));

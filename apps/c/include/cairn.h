@@ -82,7 +82,7 @@ CAIRN_C_API void cairn_graph_free(cairn_graph* graph);
 /* What is worth knowing of the last reading or optimisation, one sentence per line; "" if nothing is. */
 CAIRN_C_API const char* cairn_graph_notes(const cairn_graph* graph);
 
-/* Adds a variable by the tag of its type ("VERTEX_SE2": x, y, theta). `fixed`: it is not estimated. */
+/* Adds a variable by the tag of its type ("VERTEX_SE2": x, y, theta). `id`: from 0. `fixed`: it is not estimated. */
 CAIRN_C_API cairn_code cairn_graph_add_variable(cairn_graph* graph, const char* tag, int64_t id, const double* state,
                                                 size_t state_size, int fixed);
 /* Adds a factor by the tag of its type ("EDGE_SE2") on variables by id. `information`: the upper triangle row by row,

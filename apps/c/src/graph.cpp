@@ -18,6 +18,10 @@ namespace cairn::c {
 Variable variable_of(Registry& registry, const char* tag, Id id, std::span<const double> state,
                      bool fixed) {
   auto type = registry.variable_type(&given(tag, "tag"));
+  if (id < 0) {
+    throw Error(ErrorCode::usage,
+                fmt::format("the id {} is below 0: ids are from 0, as in files", id));
+  }
   if (!state.empty())
     expect_size(state.size(), static_cast<std::size_t>(type->ambient_size()), "the state");
   return {std::move(type), id, {state.begin(), state.end()}, fixed};
