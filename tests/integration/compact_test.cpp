@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <csignal>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -519,6 +521,14 @@ TEST_F(Compact, SaysWhatWouldHelpWhereTheSelectionIsOfNoUse) {
               Not(HasSubstr("of the poses are kept")));
   EXPECT_THAT(run({"--loop-gain", "1000"}),
               AllOf(HasSubstr("no loop closure is used: "), HasSubstr("; --loop-gain ")));
+}
+
+TEST_F(Compact, AnInterruptWhileThresholdsAreSoughtSelectsNothing) {
+  const Outcome outcome = cairn_interrupted(
+      {"compact", "@manhattan:poses=3000", "-o", folder_.file("few.g2o")}, "sample, gains", SIGINT);
+  EXPECT_EQ(outcome.exit_code, 130) << outcome.err;
+  EXPECT_THAT(outcome.err, HasSubstr("interrupted before anything was selected"));
+  EXPECT_TRUE(folder_.contents().empty());
 }
 
 TEST_F(Compact, AdviceThatFollowsASearchAsksForItAgain) {

@@ -432,6 +432,26 @@ TEST(Usage, IntegersAreDecimalAndInRange) {
   EXPECT_EQ(parse_json(zero.out).at("iterations").as_array().size(), 10);
 }
 
+TEST(Usage, AStaticConstructorOrDestructorOfAPluginHurtsNobody) {
+  const TemporaryFolder folder;
+  const Arguments arguments{"optimize", "@ring:poses=30",
+                            "--loss",   "eager",
+                            "--plugin", bad_plugins() + "/static_constructor/eager.so",
+                            "-o",       folder.file("best.g2o")};
+  expect_error(cairn(arguments, {{"CAIRN_TEST_CONSTRUCTOR", "throws"}}), kPlugin, "eager.so");
+  EXPECT_TRUE(folder.contents().empty());
+#if !defined(CAIRN_SANITIZED) && !defined(CAIRN_COVERAGE)  // where static destructors do run
+  const Outcome outcome = cairn(arguments, {{"CAIRN_TEST_CONSTRUCTOR", "crashes at the end"}});
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_EQ(folder.contents(), (std::vector<std::string>{"best.g2o"}));
+#endif
+}
+
+TEST(Usage, AToleranceThatNoSolverCanMeetIsRefused) {
+  expect_error(cairn({"optimize", "@ring:poses=9", "--linear-solver", "pcg:tolerance=1"}), kUsage,
+               "option 'tolerance' is '1'");
+}
+
 TEST(Usage, NumbersAreDecimalFiniteAndNotTooSmall) {
   for (const char* number : {"1e-400", "1e400", "inf", "nan", "0x1p-3", " 1", "1 ", "0,1", "++1"}) {
     expect_error(cairn({"optimize", "@ring:poses=9", "--tolerance", number}), kUsage,

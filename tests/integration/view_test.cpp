@@ -95,6 +95,17 @@ TEST_F(ViewCommand, ARecordingShowsByItself) {
   EXPECT_EQ(page.at("graphs").at(0).at("recordings").as_array().size(), 1U);
 }
 
+TEST_F(ViewCommand, ReplacesNoneOfItsInputs) {
+  optimize();
+  for (const std::string& file : {recording_, report_}) {
+    const std::string before = read_text(file);
+    const Outcome outcome = cairn({"view", file, "-o", file});
+    EXPECT_EQ(outcome.exit_code, 2);
+    EXPECT_THAT(outcome.err, HasSubstr("is read, and an output would replace it"));
+    EXPECT_EQ(read_text(file), before);
+  }
+}
+
 TEST_F(ViewCommand, TakesATrajectoryForTheTruth) {
   const std::string tum = folder_.file("truth.tum");
   run({"convert", truth_, tum});

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Does in a static constructor what the environment variable CAIRN_TEST_CONSTRUCTOR names.
+// Does in a static constructor, or destructor, what CAIRN_TEST_CONSTRUCTOR names in the
+// environment.
 #include <csignal>
 #include <cstdlib>
 #include <stdexcept>
@@ -18,7 +19,14 @@ struct Eager {
     if (what == "exits") std::exit(0);
     if (what == "ends at once") std::_Exit(3);
     if (what == "crashes") static_cast<void>(std::raise(SIGSEGV));
+    crashes_at_the_end_ = what == "crashes at the end";
   }
+  ~Eager() {
+    if (crashes_at_the_end_) static_cast<void>(std::raise(SIGSEGV));
+  }
+
+ private:
+  bool crashes_at_the_end_ = false;
 } const eager;
 
 }  // namespace
