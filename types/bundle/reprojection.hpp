@@ -160,7 +160,10 @@ struct Reprojection {
     if (in_plane<double>(P)) return "the point is in the plane of the camera, and has no image";
     return P[2] > 0.0 ? "the point is behind the camera, which cannot see it" : "";
   }
-  static double reach(const double* const* x) { return seen(x).norm(); }
+  static double reach(const double* const* x) {
+    const Vector<double, 3> P = seen(x);
+    return P[2] < 0.0 && !in_plane<double>(P) ? P.norm() : -P.norm();
+  }
   /// The point on the ray of its image, as without distortion.
   static bool place(int target, const double* const* x, const double* z, double reach,
                     double* out) {

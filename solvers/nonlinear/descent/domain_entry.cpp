@@ -20,7 +20,7 @@
 namespace cairn {
 namespace {
 
-/// Factors with smaller squared residuals, by number of them, may be mirrored images that fit.
+/// Factors with smaller squared residuals may be mirrored images that fit.
 constexpr double kLarge = 2500.0;
 /// So many times farther than others, a point is as good as at infinity.
 constexpr double kFar = 30.0;
@@ -43,6 +43,14 @@ std::vector<const double*> states_in(const Graph& graph, const Values& values, i
   for (const std::int32_t v : graph.factor_variables(factor))
     all.push_back(state_in(graph, values, v).data());
   return all;
+}
+
+double squared_norm(const Graph& graph, int factor, const std::vector<const double*>& x) {
+  const FactorType& type = graph.factor_type(factor);
+  Eigen::VectorXd r(type.residual_size());
+  type.evaluate(x.data(), graph.measurement(factor).data(), graph.sqrt_information(factor).data(),
+                r.data(), nullptr);
+  return r.squaredNorm();
 }
 
 /// One variable, all others constant.
@@ -133,34 +141,34 @@ double Alone::descend(State& x) const {
 }
 
 /// The factors of one type with a domain: how far their variables are from each other inside of it,
-/// and which are outside, or much farther.
+/// and which are outside, or much farther, and have a large residual.
 struct Survey {
   const Domain* domain = nullptr;
   std::vector<int> astray;  ///< positions in the graph
   double reach = 1.0;       ///< median
 };
 
-Survey survey(const Graph& graph, const FactorPool& pool, const Values& values) {
+Survey survey(const Graph& graph, int of_pool, const Values& values) {
+  const FactorPool& pool = graph.factor_pools()[static_cast<std::size_t>(of_pool)];
   Survey result;
   result.domain = dynamic_cast<const Domain*>(pool.type.get());
   if (!result.domain) return result;
-  std::vector<std::pair<double, int>> reaches;
-  for (const std::int32_t f : pool.sequence) {
-    const std::vector<const double*> x = states_in(graph, values, f);
-    if (!result.domain->outside(x.data()).empty()) {
-      result.astray.push_back(f);
-    } else {
-      reaches.emplace_back(result.domain->reach(x.data()), f);
-    }
+  std::vector<const double*> states;
+  std::vector<double> reaches(pool.size());
+  result.domain->reaches(graph.view(of_pool, values, states), reaches.data());
+  std::vector<double> inside;
+  inside.reserve(reaches.size());
+  std::ranges::copy_if(reaches, std::back_inserter(inside), [](double r) { return r > 0.0; });
+  if (!inside.empty()) {
+    const auto middle = inside.begin() + std::ssize(inside) / 2;
+    std::ranges::nth_element(inside, middle);
+    result.reach = *middle;
   }
-  if (reaches.empty()) return result;
-  const auto middle = reaches.begin() + std::ssize(reaches) / 2;
-  std::ranges::nth_element(reaches, middle);
-  result.reach = middle->first;
-  for (const auto& [reach, f] : reaches) {
-    if (reach > kFar * result.reach) result.astray.push_back(f);
+  for (std::size_t entry = 0; entry < reaches.size(); ++entry) {
+    const int f = pool.sequence[entry];
+    if (reaches[entry] > 0.0 && reaches[entry] <= kFar * result.reach) continue;
+    if (squared_norm(graph, f, states_in(graph, values, f)) > kLarge) result.astray.push_back(f);
   }
-  std::ranges::sort(result.astray);
   return result;
 }
 
@@ -169,9 +177,8 @@ Survey survey(const Graph& graph, const FactorPool& pool, const Values& values) 
 std::optional<State> better_inside(const Graph& graph, const Alone& alone, int variable,
                                    double reach) {
   const State now(alone.now().begin(), alone.now().end());
-  double least = alone.chi2(now);
-  if (least <= kLarge * static_cast<double>(alone.factors().size())) return std::nullopt;
   std::optional<State> best;
+  double least = -1.0;  // not known yet
   for (const int f : alone.factors()) {
     const auto* domain = dynamic_cast<const Domain*>(&graph.factor_type(f));
     const auto on = graph.factor_variables(f);
@@ -181,6 +188,7 @@ std::optional<State> better_inside(const Graph& graph, const Alone& alone, int v
       if (!domain || !domain->place(target, alone.states(f, now).data(),
                                     graph.measurement(f).data(), share * reach, x.data()))
         break;
+      if (least < 0.0) least = alone.chi2(now);
       const double reached = alone.descend(x);
       if (!(reached < least) || !alone.is_inside(x)) continue;
       least = reached;
@@ -202,7 +210,7 @@ std::string in_words(const Graph& graph, const Domain& domain, const Values& val
 
 std::string enter_domains(const Graph& graph, const std::vector<bool>& held, Values& values) {
   std::vector<Survey> surveys;
-  for (const FactorPool& pool : graph.factor_pools())
+  for (int pool = 0; pool < static_cast<int>(graph.factor_pools().size()); ++pool)
     surveys.push_back(survey(graph, pool, values));
   if (std::ranges::all_of(surveys, [](const Survey& s) { return s.astray.empty(); })) return {};
 
