@@ -37,6 +37,17 @@ constexpr std::string_view kXyzOfEither = "EDGE_POINTXYZ_PRIOR";   // pose or po
 constexpr std::string_view kPlanarPriorXy = "EDGE_SE2_PRIORXY";    // pose, x y
 constexpr std::array kPositionTags{kHorizontal, kXyzPrior, kXyzOfEither, kPlanarPriorXy};
 
+/// I11 I12 I22 of x and y: none on z.
+const Arrangement kHorizontalRows{
+    .to_rows = [](std::span<const double> in, std::span<double> rows) {
+      std::ranges::copy(std::array{in[0], in[1], 0.0, in[2], 0.0, 0.0}, rows.begin());
+    }};
+/// I11 I12 I21 I22, symmetric.
+const Arrangement kWholeMatrix{
+    .to_rows = [](std::span<const double> in, std::span<double> rows) {
+      std::ranges::copy(std::array{in[0], in[1], in[3]}, rows.begin());
+    }};
+
 /// g2o has parameters of many kinds, all called PARAMS_ and a word in capitals.
 bool is_parameter_tag(std::string_view tag) {
   return tag.starts_with("PARAMS_") &&
@@ -194,7 +205,6 @@ class G2oReader {
       if (own == kPlanarPosition) return read_planar_position(kind);
       of_pose_or_point_.push_back(draft_.factors().size());
       read_factor(scanner_, draft_, kind);
-      draft_.finish_factor();
     });
     return true;
   }
@@ -203,7 +213,6 @@ class G2oReader {
     // g2o has the id of a parameter after that of the pose, some who write its tag have none.
     if (fields_of_line() == 1 + 3 + 6) {
       read_factor(scanner_, draft_, kind);
-      draft_.finish_factor();
     } else {
       read_with_parameter(kind);
     }
@@ -216,19 +225,15 @@ class G2oReader {
     const Draft::FactorSlots slots = draft_.add_factor(kind, scanner_.line());
     slots.ids[0] = scanner_.read_id();
     scanner_.read_numbers(slots.measurement.first<2>());
-    std::array<double, 3> information;
-    scanner_.read_numbers(information);
-    scanner_.end_line();
     slots.measurement[2] = 0.0;
-    const auto& [xx, xy, yy] = information;
-    std::ranges::copy(std::array{xx, xy, 0.0, yy, 0.0, 0.0}, slots.information.begin());
-    draft_.finish_factor();
+    read_information(scanner_, draft_, kHorizontalRows);
+    slots.information.back() = 0.0;  // where it is taken as unit, too
   }
   /// g2o reads the upper triangle, and has long written the whole matrix.
   void read_planar_position(std::int32_t kind) {
     if (fields_of_line() != 1 + 2 + 4) {
       read_factor(scanner_, draft_, kind);
-      return draft_.finish_factor();
+      return;
     }
     scanner_.expect({1, 2, 4});
     const Draft::FactorSlots slots = draft_.add_factor(kind, scanner_.line());
@@ -244,8 +249,8 @@ class G2oReader {
                       "I22, or I11 I12 I12 I22",
                       xy, yx));
     }
-    std::ranges::copy(std::array{xx, xy, yy}, slots.information.begin());
-    draft_.finish_factor();
+    kWholeMatrix.to_rows(information, slots.information);
+    draft_.finish_factor(scanner_, kWholeMatrix);
   }
   /// The tag of g2o's prior on a point is that of a position where others put a pose.
   void find_positions_of_poses() {
