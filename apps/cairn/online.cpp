@@ -12,6 +12,7 @@
 
 #include "arguments.hpp"
 #include "cairn/evaluation/plausibility.hpp"
+#include "cairn/evaluation/undetermined.hpp"
 #include "cairn/io/format.hpp"
 #include "cairn/online/conversation.hpp"
 #include "cairn/online/journal.hpp"
@@ -420,7 +421,9 @@ int run(OnlineOptions options, Session& session) {
       const Graph graph = lines.estimator().graph();
       write_map(graph, options.output, session);
       if (!failure) {  // within an update it may have been left in part
-        for (const std::string& doubt : notes_on_estimate(graph, chi2(graph))) session.note(doubt);
+        std::vector<std::string> notes = notes_on_estimate(graph, chi2(graph));
+        note_what_is_free(graph, notes);
+        for (const std::string& note : notes) session.note(note);
       }
     }
   } catch (const std::exception& error) {

@@ -14,6 +14,7 @@
 #include "arguments.hpp"
 #include "cairn/evaluation/batch_comparison.hpp"
 #include "cairn/evaluation/plausibility.hpp"
+#include "cairn/evaluation/undetermined.hpp"
 #include "cairn/online/recorded_graph.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
@@ -139,7 +140,9 @@ void replay_all(const Graph& whole, const std::vector<Arrival>& arrivals, Estima
     replay.estimate += step.estimate;
     replay.total += step.seconds;
     replay.failed += !step.report.ok;
-    for (const std::string& note : step.report.notes) replay.notes.push_back(note);
+    for (const std::string& note : step.report.notes) {  // what is free is said at every update
+      if (std::ranges::find(replay.notes, note) == replay.notes.end()) replay.notes.push_back(note);
+    }
     if (checker) checker->add(arrivals[k]);
     if (sampled[k]) {
       replay.checks.push_back(checker->check(k + 1, estimator));
@@ -243,6 +246,7 @@ int run(const ReplayOptions& options, Session& session) {
   if (!replay.interrupted) {
     for (std::string& doubt : notes_on_estimate(estimator->graph(), chi2))
       replay.notes.push_back(std::move(doubt));
+    note_what_is_free(estimator->graph(), replay.notes);
   }
   results.add(
       [&] { session.write_json(report_json(options, loaded, sorted, replay, *estimator, chi2)); });

@@ -37,6 +37,11 @@ Factorization GraphMarginals::factorize() {
   diagonal_.clear();
   if (size() == 0) return {};
   equations_.linearize(graph_->values());
+  free_ = find_free_directions(*graph_, gauge(), graph_->values());
+  if (!free_.empty()) {
+    const int variable = free_.directions.front().moves.front().variable;
+    return {.ok = false, .failed_block = equations_.linearizer().block_of(variable)};
+  }
   Factorization factorization = equations_.factorize();
   if (!factorization.ok) return factorization;
   const BlockStructure& structure = equations_.linearizer().structure();
@@ -67,6 +72,11 @@ Factorization GraphMarginals::factorize() {
 }
 
 std::string GraphMarginals::explain(const Factorization& failure) const {
+  if (!free_.empty()) {
+    const auto count = std::ssize(free_.directions);
+    return fmt::format("H is singular: {} gauge freedom{} likely; {}", count,
+                       count == 1 ? " is" : "s are", free_.describe(*graph_));
+  }
   if (!singular_) return equations_.explain(failure);
   const int free = equations_.free_directions();
   return fmt::format(

@@ -7,6 +7,7 @@
 #include <fmt/core.h>
 #include <Eigen/SparseCholesky>
 
+#include "cairn/graph/free_directions.hpp"
 #include "cairn/runtime/timed.hpp"
 #include "dense/eigenvalues.hpp"
 
@@ -105,6 +106,12 @@ Factorization NormalEquations::factorize_damped(std::span<const double> damping)
   return factorization;
 }
 
+Factorization NormalEquations::factorize_pinned(std::span<const double> pins) {
+  const Factorization factorization = factorize_damped(pins);
+  damped_.clear();
+  return factorization;
+}
+
 void NormalEquations::solve(std::span<double> step) {
   const Timed timed(seconds_.solve);
   if (jacobian_solver_) {
@@ -174,12 +181,11 @@ std::string NormalEquations::explain(const Factorization& failure) const {
     text += fmt::format("; {} gauge freedom{} likely", free, free == 1 ? " is" : "s are");
   }
   if (diagonal_block(H_, block).isZero(0.0)) {
-    return text + fmt::format(
-                      "; no factor of {} has any weight (is its information zero, or has the loss "
-                      "switched it off?)",
-                      name);
-  }
-  if (const int free = free_directions_of_block(H_, block); free > 0) {
+    text += fmt::format(
+        "; no factor of {} has any weight (is its information zero, or has the loss switched it "
+        "off?)",
+        name);
+  } else if (const int free = free_directions_of_block(H_, block); free > 0) {
     text += fmt::format("; the factors of {} leave {} of its {} directions free", name, free,
                         linearizer_.structure().block_size(block));
   }
@@ -189,6 +195,10 @@ std::string NormalEquations::explain(const Factorization& failure) const {
         "; only {} is constant in its component, which does not determine its rotation: fix a pose",
         held);
   }
+  if (const std::string free =
+          find_free_directions(*graph_, gauge_, graph_->values()).describe(*graph_);
+      !free.empty())
+    text += "; " + free;
   return text;
 }
 

@@ -13,6 +13,7 @@
 
 #include "cairn/evaluation/fixed_variables.hpp"
 #include "cairn/evaluation/plausibility.hpp"
+#include "cairn/evaluation/undetermined.hpp"
 #include "cairn/geometry/pose.hpp"
 
 namespace cairn {
@@ -221,6 +222,7 @@ GraphSurvey survey_graph(const Graph& graph) {
   find_worst(graph, norms, s);
   suspect_structure(graph, s);
   suspect_parts_of_rotations(graph, s);
+  note_what_is_free(graph, s.suspicions);
   suspect_numbers(s);
   return s;
 }

@@ -8,6 +8,7 @@
 #include <fmt/core.h>
 
 #include "cairn/evaluation/batch_step.hpp"
+#include "cairn/graph/free_directions.hpp"
 #include "cairn/graph/gauge.hpp"
 #include "cairn/graph/id_text.hpp"
 #include "cairn/linear/normal_equations.hpp"
@@ -172,6 +173,7 @@ void BatchEstimator::batch_step(const UpdateOptions& options, UpdateReport& repo
   for (const std::string& sentence : summary.notes) note(sentence, report);
   const std::string why = report_batch_step(summary, stop_, options, graph_.factor_count(), report);
   if (!why.empty()) note(why, report, options.full);
+  report_free(find_free_directions(graph_), report);
   report.affected_variables = report.iterations * graph_.variable_count();
   if (report.iterations > 0)
     report.relinearized_factors = std::max(0, graph_.factor_count() - unsolved_factors_);
@@ -193,8 +195,9 @@ void BatchEstimator::linear_step(UpdateReport& report) {
     note(gauge, report);
   if (equations.size() == 0) return;
   equations.linearize(linearized_at_);
+  report_free(find_free_directions(graph_, equations.gauge(), linearized_at_), report);
   const Factorization factorization = equations.factorize();
-  report.ok = factorization.ok;
+  report.ok = report.ok && factorization.ok;
   if (report.ok) {
     std::vector<double> step(static_cast<std::size_t>(equations.size()));
     equations.solve(step);
@@ -206,7 +209,7 @@ void BatchEstimator::linear_step(UpdateReport& report) {
     graph_.set_values(std::move(values));
     report.affected_variables = graph_.variable_count();
     unsolved_factors_ = 0;
-  } else {
+  } else if (!factorization.ok) {
     note(equations.explain(factorization), report);
   }
   add_seconds(equations.seconds(), report.seconds);
@@ -226,6 +229,16 @@ void BatchEstimator::extend_linearization_points() {
 
 void BatchEstimator::note(const std::string& sentence, UpdateReport& report, bool again) {
   if (told_.insert(sentence).second || again) report.notes.push_back(sentence);
+}
+
+/// An update after which something is free is not ok, and every one says what.
+void BatchEstimator::report_free(const FreeDirections& free, UpdateReport& report) {
+  if (free.empty()) return;
+  report.ok = false;
+  std::string sentence = find_free_directions(graph_).describe(graph_);
+  if (sentence.empty()) sentence = free.describe(graph_);
+  if (std::ranges::find(report.notes, sentence) == report.notes.end())
+    report.notes.push_back(std::move(sentence));
 }
 
 void BatchEstimator::compute_kept(UpdateReport& report) {

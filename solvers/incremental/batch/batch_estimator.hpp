@@ -107,6 +107,7 @@ class BatchEstimator final : public Estimator {
   void extend_linearization_points();
   /// Once, or `again` each time.
   void note(const std::string& sentence, UpdateReport& report, bool again = false);
+  void report_free(const FreeDirections& free, UpdateReport& report);
   void compute_kept(UpdateReport& report);
   int index(Id id) const;
   void keep_diagonal(GraphMarginals& all);

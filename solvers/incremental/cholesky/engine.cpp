@@ -70,7 +70,7 @@ void Engine::rescue(UpdateReport& report, double tolerance) {
     }
     load(std::move(graph), live_ids());
   }
-  broken_ = !bring_factor_up_to_date(report);
+  broken_ = !bring_factor_up_to_date(report) || undetermined_;
   report.ok = !broken_;
   if (!broken_) step_and_look(report);
 }

@@ -97,7 +97,9 @@ struct EngineState {
   std::int64_t time_ = 0;
   bool structure_changed_ = false;
   bool broken_ = false;
-  bool exhausted_ = false;  // the last solution has used up its iterations
+  bool undetermined_ = false;  // see `set_undetermined`
+  std::int64_t loads_ = 0;     // so many times everything was numbered anew
+  bool exhausted_ = false;     // the last solution has used up its iterations
   bool gauge_is_old_ = false;
   int dead_ = 0;
   int live_factors_ = 0;
@@ -214,6 +216,16 @@ class Engine : private EngineState {
   /// What factors, the rescuer and the clock answer is recorded there, or taken from there; null:
   /// neither. A copy of the engine does neither.
   void keep_answers(Answers* answers);
+  /// Whether the factors leave something free: then no factorisation of H is trusted, whatever
+  /// rounding makes of its pivots, and the estimate is that of the rescuer.
+  void set_undetermined(bool undetermined) {
+    undetermined_ = undetermined;
+    broken_ = broken_ || undetermined;
+  }
+  /// Whether factors that were added wait for a job to end.
+  bool has_waiting() const { return admitted_ < models_.size(); }
+  /// Changes whenever variables and factors are numbered anew.
+  std::int64_t loads() const { return loads_; }
   /// Relinearises everything at the current estimate, with a new order, until it has converged.
   void solve_fully(UpdateReport& report);
   /// Σ ρ(‖r‖²) at the current estimate.

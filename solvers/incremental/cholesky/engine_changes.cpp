@@ -57,6 +57,7 @@ void Engine::load(Graph graph, std::vector<FactorId> ids) {
   disconnected_.clear();
   checked_at_.clear();
   positions_.clear();
+  ++loads_;
   broken_ = exhausted_ = gauge_is_old_ = rounding_is_old_ = false;
   dead_ = live_factors_ = 0;
   cost_ = decrease_ = gained_ = rounding_scale_ = 0.0;

@@ -285,7 +285,7 @@ void Engine::factorized(UpdateReport& report) {
     case Job::Damped::tried:
       break;
     case Job::Damped::last:
-      broken_ = false;
+      broken_ = undetermined_;
       if (job_.converged) break;
       report.converged = false;
       report.notes.push_back(fmt::format("not converged after {} iterations", job_.rounds));

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <functional>
 #include <optional>
 #include <utility>
@@ -14,6 +15,7 @@
 #include "cairn/memory/small_pages.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/timed.hpp"
+#include "cairn/types/factor_call.hpp"
 #include "cairn/types/never_throws.hpp"
 #include "cairn/update/elimination.hpp"
 #include "cairn/update/graph_update.hpp"
@@ -79,6 +81,8 @@ IncrementalCholesky::IncrementalCholesky(const IncrementalCholesky& other)
       kept_(other.kept_),
       told_(other.told_),
       has_removed_(other.has_removed_),
+      watch_(other.watch_),
+      watched_load_(other.watched_load_),
       may_throw_(other.may_throw_) {}
 
 IncrementalCholesky::~IncrementalCholesky() = default;
@@ -93,6 +97,8 @@ void IncrementalCholesky::become(IncrementalCholesky&& other) {
   kept_ = other.kept_;
   told_ = std::move(other.told_);
   has_removed_ = other.has_removed_;
+  watch_ = other.watch_;
+  watched_load_ = other.watched_load_;
   forget_what_was_read();
 }
 
@@ -202,6 +208,8 @@ UpdateReport IncrementalCholesky::carry_out(const GraphUpdate& update,
 
   ++since_solved_;
   ++since_full_;
+  if (takes_out(update)) watch_.forget();
+  if (full || (!options.defer && since_solved_ >= options_.solve_every)) look_for_freedom();
   if (full) {
     engine_->solve_fully(report);
     since_full_ = since_solved_ = 0;
@@ -213,6 +221,7 @@ UpdateReport IncrementalCholesky::carry_out(const GraphUpdate& update,
     since_solved_ = 0;
   }
   small_pages.reset();
+  report_free(report);
   if (report.ok && since_solved_ == 0 && engine_->up_to_date() &&
       engine_->covariances().keeps_anything()) {
     const Clock::time_point covariances_begin = Clock::now();
@@ -223,6 +232,62 @@ UpdateReport IncrementalCholesky::carry_out(const GraphUpdate& update,
   changes_ = false;
   report.seconds.total = seconds_since(begin);
   return report;
+}
+
+/// Before a solution: whether there is one.
+void IncrementalCholesky::look_for_freedom() {
+  if (engine_->has_waiting()) return;
+  if (std::exchange(watched_load_, engine_->loads()) != engine_->loads()) watch_.forget();
+  engine_->settle_gauge();
+  const auto jacobian = [this](int f, std::span<double> J) {
+    const Graph& graph = engine_->graph();
+    const FactorType& type = graph.factor_type(f);
+    std::vector<std::vector<double>> x;
+    std::vector<const double*> at;
+    std::vector<double*> blocks;
+    std::vector<double> residual(static_cast<std::size_t>(type.residual_size()));
+    double* next = J.data();
+    const auto on = graph.factor_variables(f);
+    for (std::size_t k = 0; k < on.size(); ++k) {
+      at.push_back(x.emplace_back(engine_->x(on[k])).data());
+      blocks.push_back(next);
+      next += residual.size() * static_cast<std::size_t>(type.tangent_size(static_cast<int>(k)));
+    }
+    const auto evaluate = [&] {
+      call_factor(
+          type, [&] { return graph.describe_factor(f); },
+          [&] {
+            type.evaluate(at.data(), graph.measurement(f).data(), graph.sqrt_information(f).data(),
+                          residual.data(), blocks.data());
+          });
+      if (!graph.loss(f)) return;
+      double norm = 0.0, weight = 1.0;
+      for (const double r : residual) norm += r * r;
+      const FactorRef ref = graph.ref(f);
+      graph.weigh(ref.pool, static_cast<std::size_t>(ref.entry), {&norm, 1}, {}, {&weight, 1});
+      for (double& entry : J) entry *= std::sqrt(weight);
+    };
+    if (answers_)
+      answers_->write({J}, evaluate);
+    else
+      evaluate();
+  };
+  watch_.look({.graph = engine_->graph(),
+               .held = [this](int v) { return engine_->held(v); },
+               .live = [this](int f) { return engine_->live_factor(f); },
+               .jacobian = jacobian});
+  engine_->set_undetermined(!watch_.free().empty());
+}
+
+/// Every update after which something is free says what.
+void IncrementalCholesky::report_free(UpdateReport& report) {
+  if (watch_.free().empty() || (answers_ && answers_->repeats())) return;
+  const Graph graph = engine_->snapshot();
+  const std::string sentence = find_free_directions(graph).describe(graph);
+  if (sentence.empty()) return;
+  report.ok = false;
+  if (std::ranges::find(report.notes, sentence) == report.notes.end())
+    report.notes.push_back(sentence);
 }
 
 /// The update with its new variables placed by the estimate, if it is one that can be carried out.
@@ -406,6 +471,7 @@ void IncrementalCholesky::set_loss(std::shared_ptr<const Loss> loss, const Facto
   engine_ = std::move(next);
   record_.reset();
   forget_what_was_read();
+  watch_.forget();
   has_removed_ = false;
 }
 
@@ -542,6 +608,7 @@ void IncrementalCholesky::reset() {
   engine_->covariances().keep(kept_);
   variables_ = factors_ = since_solved_ = since_full_ = 0;
   has_removed_ = false;
+  watch_.forget();
   losses_.clear();
   told_.clear();
   forget_what_was_read();

@@ -15,6 +15,7 @@
 #include "cairn/plugin/option_fields.hpp"
 #include "cairn/solve/estimator.hpp"
 #include "cairn/solve/optimizer.hpp"
+#include "cairn/update/freedom_watch.hpp"
 #include "cairn/update/loss_rule.hpp"
 #include "engine.hpp"
 
@@ -137,6 +138,8 @@ class IncrementalCholesky final : public Estimator {
   GraphUpdate placed(const GraphUpdate& update);
   double end_solution(bool full, UpdateReport& report);
   void note_gauge(UpdateReport& report);
+  void look_for_freedom();
+  void report_free(UpdateReport& report);
 
   IncrementalCholeskyOptions options_;
   std::shared_ptr<Rescuer> rescuer_;
@@ -154,6 +157,8 @@ class IncrementalCholesky final : public Estimator {
   /// Something has been removed, not marginalised, and is still in the engine's arrays: the next
   /// update without a time limit takes it out.
   bool has_removed_ = false;
+  FreedomWatch watch_;
+  std::int64_t watched_load_ = 0;  // of the engine, whose numbers the watch has
 
   // What is gone back to where an update fails while it is carried out:
   bool changes_ = false;                         ///< one is being carried out, and is so in part

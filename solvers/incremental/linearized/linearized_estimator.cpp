@@ -376,6 +376,7 @@ void LinearizedEstimator::take_models() {
     sizes.push_back(state_.graph.type(v).tangent_size());
   }
   if (state_.rebuild) {
+    watch_.forget();
     form_->begin(variables, sizes, rows);
   } else {
     for (std::size_t k = 0; k < variables.size(); ++k) form_->add_variable(variables[k], sizes[k]);
@@ -388,7 +389,30 @@ void LinearizedEstimator::take_models() {
     form_->set_newest(state_.graph.id(v));
     break;
   }
-  determined_ = form_->settle();
+  look_for_freedom();
+  determined_ = form_->settle() && watch_.free().empty();
+}
+
+void LinearizedEstimator::look_for_freedom() {
+  watch_.look({.graph = state_.graph,
+               .held = [this](int v) { return is_held(v); },
+               .live = [](int) { return true; },
+               .jacobian =
+                   [this](int f, std::span<double> J) {
+                     std::ranges::copy(state_.models[static_cast<std::size_t>(f)].rows.J.reshaped(),
+                                       J.begin());
+                   }});
+}
+
+/// Every update after which something is free says what.
+void LinearizedEstimator::report_free(UpdateReport& report) const {
+  if (watch_.free().empty()) return;
+  report.ok = false;
+  // In the words of all others: where the factors are now, not where they were linearised.
+  std::string sentence = find_free_directions(state_.graph).describe(state_.graph);
+  if (sentence.empty()) sentence = watch_.free().describe(state_.graph);
+  if (std::ranges::find(report.notes, sentence) == report.notes.end())
+    report.notes.push_back(std::move(sentence));
 }
 
 void LinearizedEstimator::move_estimate() {
@@ -426,9 +450,13 @@ void LinearizedEstimator::solve(UpdateReport& report) {
     report.iterations = 1;
     report.affected_variables = state_.graph.variable_count();
   } else {
+    const FreeDirections& free = watch_.free();
+    const int variable = free.empty() ? *state_.graph.find(form_->undetermined())
+                                      : free.directions.front().moves.front().variable;
     note(fmt::format("{} is not determined: the estimate stays until it is",
-                     state_.graph.describe_variable(*state_.graph.find(form_->undetermined()))),
+                     state_.graph.describe_variable(variable)),
          report);
+    report_free(report);
   }
   report.seconds.factorize = seconds_since(begin);
 }
@@ -459,6 +487,7 @@ void LinearizedEstimator::batch_step(const UpdateOptions& options, UpdateReport&
   }
   linearize_all();
   take_models();
+  report_free(report);
   since_batch_ = 0;
   must_batch_ = report.owed > 0;
 }
@@ -609,6 +638,7 @@ void LinearizedEstimator::reset() {
   state_.losses = std::move(losses);
   form_->begin({}, {}, {});
   gauge_ = {};
+  watch_.forget();
   since_batch_ = 0;
   must_batch_ = determined_ = true;
   reported_.clear();
@@ -621,6 +651,7 @@ std::unique_ptr<Estimator> LinearizedEstimator::clone() const {
   copy->determined_ = determined_;
   copy->since_batch_ = since_batch_;
   copy->gauge_ = gauge_;
+  copy->watch_ = watch_;
   copy->reported_ = reported_;
   return copy;
 }

@@ -13,6 +13,7 @@
 #include "cairn/solve/estimator.hpp"
 #include "cairn/solve/optimizer.hpp"
 #include "cairn/update/elimination.hpp"
+#include "cairn/update/freedom_watch.hpp"
 #include "cairn/update/graph_update.hpp"
 #include "linear_model.hpp"
 
@@ -105,6 +106,9 @@ class LinearizedEstimator final : public Estimator {
   /// Brings the form up to date with the models, sets `determined_`. Every update ends with it, so
   /// that what is asked in between has no part in the order of sums.
   void take_models();
+  /// What the models leave free, whatever the rounding of a pivot is.
+  void look_for_freedom();
+  void report_free(UpdateReport& report) const;
   void move_estimate();
   void solve(UpdateReport& report);
   void batch_step(const UpdateOptions& options, UpdateReport& report);
@@ -126,6 +130,7 @@ class LinearizedEstimator final : public Estimator {
   bool determined_ = true;  ///< the models determine everything
   int since_batch_ = 0;
   Gauge gauge_;
+  FreedomWatch watch_;
   std::set<std::string> reported_;  ///< notes are reported once
 };
 

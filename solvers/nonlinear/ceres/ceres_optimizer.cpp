@@ -12,6 +12,7 @@
 #include <fmt/core.h>
 
 #include "blas_threads.hpp"
+#include "cairn/graph/free_directions.hpp"
 #include "cairn/graph/gauge.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/threads.hpp"
@@ -208,6 +209,7 @@ Summary CeresOptimizer::optimize(Graph& graph, const Stop& stop, Observer& obser
     // A step may be short because the trust region is, or beside states far from the origin.
     const NewtonStep left = NewtonDecrement(graph, gauge).at(graph.values());
     if (left.decrease > kCeresRounding * summary.final_chi2 &&
+        find_free_directions(graph, gauge, graph.values()).empty() &&
         left.norm > kCeresRounding * state_extent(graph, gauge, graph.values())) {
       summary.status = Status::diverged;
       summary.notes.push_back(
@@ -216,6 +218,7 @@ Summary CeresOptimizer::optimize(Graph& graph, const Stop& stop, Observer& obser
                       left.decrease));
     }
   }
+  note_free_directions(graph, gauge, summary);
   summary.solver.note = fmt::format(
       "{}, {}", ceres::LinearSolverTypeToString(report.linear_solver_type_used),
       ceres::SparseLinearAlgebraLibraryTypeToString(report.sparse_linear_algebra_library_type));

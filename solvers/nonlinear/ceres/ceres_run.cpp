@@ -8,6 +8,7 @@
 
 #include <glog/logging.h>
 
+#include "cairn/graph/free_directions.hpp"
 #include "domain_entry.hpp"
 
 namespace cairn {
@@ -26,6 +27,12 @@ Summary begin_summary(std::string_view optimizer, std::string_view linear_solver
     summary.notes.push_back("nothing to optimise: every variable is constant");
   for (const std::string& sentence : summary.notes) observer.on_message(sentence);
   return summary;
+}
+
+void note_free_directions(const Graph& graph, const Gauge& gauge, Summary& summary) {
+  if (!std::isfinite(summary.final_chi2)) return;
+  std::string sentence = find_free_directions(graph, gauge, graph.values()).describe(graph);
+  if (!sentence.empty()) summary.notes.push_back(std::move(sentence));
 }
 
 bool ends_at_once(const Graph& graph, const Gauge& gauge, const Stop& stop, Observer& observer,

@@ -30,6 +30,9 @@ inline constexpr double kCeresRounding = 1e-6;
 Summary begin_summary(std::string_view optimizer, std::string_view linear_solver,
                       const Graph& graph, const Gauge& gauge, Observer& observer);
 
+/// Adds what the measurements leave free at the graph's states to the notes.
+void note_free_directions(const Graph& graph, const Gauge& gauge, Summary& summary);
+
 /// Whether there is nothing to do, because every variable is constant, no iteration is allowed, or
 /// chi2 is not finite: then summary and observer have been completed, but for the total time. The
 /// initial chi2 is in the summary either way.

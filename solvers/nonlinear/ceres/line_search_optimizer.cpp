@@ -26,6 +26,10 @@
 namespace cairn {
 namespace {
 
+/// A step of this fraction of the states is none: chi2 = 0 is never reached to a relative
+/// tolerance.
+constexpr double kNegligible = 1e-9;
+
 using Clock = std::chrono::steady_clock;
 
 template <class Enum>
@@ -158,14 +162,20 @@ void Run::record(const ceres::IterationSummary& ceres) {
   }
   // A factorisation costs as much as some ten iterations: it is worth that where an iteration gains
   // less than the tolerance, and after a tenth more iterations each time.
-  if (stop_.tolerance > 0.0 && fall <= stop_.tolerance * chi2 && iterations() >= next_check_) {
+  const bool short_step =
+      iteration.step_norm <= kNegligible * state_extent(graph_, gauge_, values_);
+  if (stop_.tolerance > 0.0 && (fall <= stop_.tolerance * chi2 || short_step) &&
+      iterations() >= next_check_) {
     next_check_ = iterations() + 1 + iterations() / 10;
     if (converged()) status_ = Status::converged;
   }
 }
 
 bool Run::converged() {
-  return std::isfinite(chi2_) && decrement_.at(values_).decrease <= stop_.tolerance * chi2_;
+  if (!std::isfinite(chi2_)) return false;
+  const NewtonStep step = decrement_.at(values_);
+  return step.decrease <= stop_.tolerance * chi2_ ||
+         step.norm <= kNegligible * state_extent(graph_, gauge_, values_);
 }
 
 /// Ceres has found no step that lowers chi2, not even along the gradient.
@@ -276,6 +286,7 @@ Summary LineSearchOptimizer::optimize(Graph& graph, const Stop& stop, Observer& 
     summary.final_chi2 = chi2(graph);
     if (summary.status == Status::converged && !std::isfinite(summary.final_chi2))
       summary.status = Status::diverged;
+    note_free_directions(graph, gauge, summary);
     summary.seconds.factorize = factorize;
     summary.solver.note = fmt::format("{}, {}", options_.direction, options_.line_search);
   }

@@ -7,13 +7,16 @@
 #include <limits>
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 
+#include "cairn/graph/free_directions.hpp"
 #include "cairn/runtime/timed.hpp"
 
 namespace cairn {
 namespace {
 
-constexpr double kFreeDamping = 1e-9;           ///< of the diagonal of H
+constexpr double kFreeDamping = 1e-9;  ///< of the diagonal of H
+constexpr double kNothing = 1e-14;     ///< of its largest entry: what is smaller is rounding
 constexpr double kLargestBackwardError = 1e-6;  ///< of a step that solves its system
 constexpr double kSmallestOfABlock = 1e-9;      ///< of its largest diagonal entry
 
@@ -23,11 +26,23 @@ double largest(std::span<const double> numbers) {
   return result;
 }
 
+/// Directions of a variable that nothing measures get the largest eigenvalue: else rounding of the
+/// gradient, in their coordinates, would be a slope.
+Eigen::MatrixXd without_free_directions(const Eigen::MatrixXd& B) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(B);
+  const double most = eigen.eigenvalues().maxCoeff();
+  if (eigen.eigenvalues().minCoeff() > kNothing * most) return B;
+  const Eigen::VectorXd values = eigen.eigenvalues().unaryExpr(
+      [&](double value) { return value > kNothing * most ? value : most; });
+  return eigen.eigenvectors() * values.asDiagonal() * eigen.eigenvectors().transpose();
+}
+
 }  // namespace
 
 NewtonDecrement::NewtonDecrement(const Graph& graph, const Gauge& gauge)
     : linearizer_(graph, gauge.held),
-      free_(!gauge.left_free.empty()),
+      free_(!gauge.left_free.empty() ||
+            !find_free_directions(graph, gauge, graph.values()).empty()),
       H_(linearizer_.structure()),
       g_(static_cast<std::size_t>(linearizer_.structure().size())),
       product_(g_.size()),
@@ -58,7 +73,8 @@ bool NewtonDecrement::factorize(double damping) {
   if (damping > 0.0) {
     std::vector<double> diagonal(g_.size());
     H_.diagonal(diagonal);
-    for (double& entry : diagonal) entry *= 1.0 + damping;
+    const double most = largest(diagonal);
+    for (double& entry : diagonal) entry += damping * (entry > kNothing * most ? entry : most);
     H_.set_diagonal(diagonal);
   }
   pattern_.scatter(H_, {lower_.valuePtr(), static_cast<std::size_t>(pattern_.nonzeros())});
@@ -89,6 +105,7 @@ TangentScaling NewtonDecrement::block_jacobi(const Graph& graph, const Values& v
     Eigen::MatrixXd B = Eigen::Map<const Eigen::MatrixXd>(H_.block(diagonal), n, n);
     const double top = B.diagonal().maxCoeff();
     if (!(top > 0.0) || !std::isfinite(top)) B.setIdentity();
+    B = without_free_directions(B);
     B.diagonal().array() += kSmallestOfABlock * B.diagonal().maxCoeff();
     Eigen::MatrixXd Lt = B.llt().matrixU();
     if (!(Lt.diagonal().minCoeff() > 0.0)) Lt.setIdentity();

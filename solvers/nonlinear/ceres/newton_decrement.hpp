@@ -31,8 +31,9 @@ class NewtonDecrement {
   NewtonDecrement(const Graph& graph, const Gauge& gauge);
 
   /// The step at these states; NaN where H is not positive definite, or the step does not solve
-  /// H δ = g to a backward error of 10⁻⁶. A gauge that is free in part gets a damping of 10⁻⁹ of
-  /// H's diagonal, as Levenberg-Marquardt has it.
+  /// H δ = g to a backward error of 10⁻⁶. A gauge that is free in part, and what else the
+  /// measurements left free at the first states, gets a damping of 10⁻⁹ of H's diagonal, as
+  /// Levenberg-Marquardt has it.
   NewtonStep at(const Values& values);
 
   /// Lᵀ and L⁻ᵀ of H's diagonal blocks at these states (block Jacobi), divided by `residual_scale`.
@@ -47,7 +48,7 @@ class NewtonDecrement {
   double backward_error(std::span<const double> step);
 
   Linearizer linearizer_;
-  bool free_;  ///< the gauge, in part
+  bool free_;  ///< H is singular
   BlockMatrix H_;
   std::vector<double> g_, product_;
   ScalarPattern pattern_;

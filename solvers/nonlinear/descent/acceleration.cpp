@@ -46,7 +46,7 @@ void Acceleration::follow(const Descent& run) {
 void Acceleration::look_back(const Descent& run) {
   if (!chi2_before_) return;
   const double before = *std::exchange(chi2_before_, std::nullopt);
-  const bool may_help = !run.exact() && !run.gauge_is_left_free();
+  const bool may_help = !run.exact() && !run.gauge_is_left_free() && run.free().empty();
   little_ = may_help && before - run.chi2 <= kLittle * before ? little_ + 1 : 0;
   if (little_ == 0) pairs_.clear();
   if (!begun_ || little_ < kRemember) return;

@@ -22,8 +22,8 @@ class Descent;
 ///
 /// A step of that kind is taken only if it lowers chi2. Pairs are remembered only once several
 /// steps in a row have lowered chi2 by little: by then steps are short, and the tangent spaces of
-/// one estimate and the next count as one. Not where the gauge is left free, as of cameras and
-/// points: there what is slow is the way of points to infinity, which no curvature shows.
+/// one estimate and the next count as one. Not where something is free, as the gauge of cameras and
+/// points is: there what is slow is the way of points to infinity, which no curvature shows.
 class Acceleration {
  public:
   /// Computes the step from the present linearisation, if there is to be one. To be called with

@@ -14,6 +14,7 @@
 
 #include "cairn/linear/iterative_solver.hpp"
 #include "cairn/runtime/timed.hpp"
+#include "convergence.hpp"
 #include "domain_entry.hpp"
 
 namespace cairn {
@@ -100,6 +101,7 @@ Descent::Descent(std::string optimizer, std::string linear_solver, LinearSolver&
     trial = estimate;
     chi2 = summary_.initial_chi2 = equations_->linearize(estimate);
     begin_inside();
+    if (std::isfinite(chi2)) find_free();
   }
   state_extent_ = cairn::state_extent(graph, equations_->gauge(), estimate);
   best_ = estimate;
@@ -123,6 +125,22 @@ void Descent::begin_inside() {
   estimate = trial;
   chi2 = equations_->linearize(estimate);
   note(std::move(moved));
+}
+
+void Descent::find_free() {
+  free_ = find_free_directions(graph_, equations_->gauge(), estimate);
+  free_space_ = FreeSpace(graph_, free_, equations_->linearizer(), equations_->diagonal());
+}
+
+/// Which directions are free may change with the estimate, where some are.
+void Descent::linearize() {
+  chi2 = equations_->linearize(estimate);
+  if (!free_.empty()) find_free();
+}
+
+Factorization Descent::factorize() {
+  return free_space_.empty() ? equations_->factorize()
+                             : equations_->factorize_pinned(free_space_.pins());
 }
 
 bool Descent::next_iteration() {
@@ -170,6 +188,7 @@ void Descent::record(double step_norm, double lambda, bool accepted) {
 
 bool Descent::solve(std::span<double> out) {
   equations_->solve(out);
+  free_space_.project(out);
   step_norm_ = norm(out);
   if (!std::isfinite(step_norm_)) return false;
   if (number_ != sampled_ && is_sampled(number_) && !query<IterativeSolver>(solver_)) {
@@ -328,6 +347,17 @@ void Descent::end_not_positive_definite(const Factorization& failure) {
   end(Status::not_positive_definite);
 }
 
+bool Descent::fits_exactly(double step_norm) const {
+  return !exact() && Convergence::negligible(step_norm, state_extent_) &&
+         chi2 <= coordinate_rounding();
+}
+
+void Descent::end_undetermined() {
+  const int variable = free_.directions.front().moves.front().variable;
+  end_not_positive_definite(
+      {.ok = false, .failed_block = equations_->linearizer().block_of(variable)});
+}
+
 Summary Descent::finish() {
   summary_.status = status_.value_or(Status::max_iterations);
   summary_.final_chi2 = best_chi2_;
@@ -346,6 +376,20 @@ Summary Descent::finish() {
   }
   summary_.solver = solver_.stats();
   graph_.set_values(std::move(best_));
+  if (std::isfinite(best_chi2_) && equations_->size() > 0) {
+    if (!free_.everywhere)
+      free_ = find_free_directions(graph_, equations_->gauge(), graph_.values());
+    if (summary_.status == Status::converged && !free_.finite) {
+      note("the Jacobian of a factor is not finite at the estimate");
+      summary_.status = Status::diverged;
+    }
+    std::string sentence = free_.describe(graph_);
+    const auto has_it = [&](const std::string& note) {
+      return note.find(sentence) != std::string::npos;
+    };
+    if (!sentence.empty() && std::ranges::none_of(summary_.notes, has_it))
+      note(std::move(sentence));
+  }
   const double total = seconds_since(begin_);
   summary_.seconds = equations_->seconds();
   summary_.seconds.total = total;

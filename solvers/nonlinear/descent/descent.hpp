@@ -7,8 +7,10 @@
 #include <string>
 #include <vector>
 
+#include "cairn/graph/free_directions.hpp"
 #include "cairn/linear/normal_equations.hpp"
 #include "cairn/solve/optimizer.hpp"
+#include "free_space.hpp"
 #include "state_extent.hpp"
 
 namespace cairn {
@@ -60,6 +62,19 @@ class Descent {
   /// Checks the interrupt flag and the clock, between the parts of an iteration; ends the run if it
   /// must stop.
   bool must_stop();
+
+  /// H and g at the estimate; sets chi2.
+  void linearize();
+  /// Factorises H, pinned where directions are free: the step then leaves these alone.
+  Factorization factorize();
+  /// What the measurements leave free at the estimate.
+  const FreeDirections& free() const { return free_; }
+  const FreeSpace& free_space() const { return free_space_; }
+  /// Whether chi2 is what rounding of the states makes of zero, which a relative tolerance never
+  /// reaches: asked where a step of this length is negligible.
+  bool fits_exactly(double step_norm) const;
+  /// Ends the run because it needs an H that is regular.
+  void end_undetermined();
 
   /// Solves for `out` with what was factorised last. False if the result has numbers that are not
   /// finite, which more damping may cure. In the first iteration and some others a note names a
@@ -119,6 +134,7 @@ class Descent {
   /// the state.
   double coordinate_rounding() const;
   bool is_solution(std::span<const double> out);
+  void find_free();
   void note_wrong_step(const std::string& residual);
   /// ‖Hx − g‖ / ‖g‖ of the last step, in the worse of the two norms.
   double relative_residual() const;
@@ -135,6 +151,8 @@ class Descent {
   Clock::time_point begin_;
   Clock::time_point iteration_begin_;
   std::optional<NormalEquations> equations_;
+  FreeDirections free_;
+  FreeSpace free_space_;
   Values best_;
   double best_chi2_ = 0.0;
   int number_ = 0;

@@ -40,7 +40,9 @@ class Run {
       newton_promise_ = dot(equations_.g(), path_.newton());
       newton_norm_ = run_.step_norm();
       acceleration_.aim(run_);
-      arrived = convergence_.arrived(newton_promise_, run_.chi2) && acceleration_.may_end(run_);
+      arrived =
+          (convergence_.arrived(newton_promise_, run_.chi2) || run_.fits_exactly(newton_norm_)) &&
+          acceleration_.may_end(run_);
       if (arrived && !run_.solves(path_.newton())) return;
     }
     const double radius = radius_;
@@ -77,7 +79,7 @@ class Run {
   /// Factorises H, or where it is singular H + μD with the smallest μ that does: the path then ends
   /// at a damped step. False if none does.
   bool factorize() {
-    Factorization factorization = equations_.factorize();
+    Factorization factorization = run_.factorize();
     is_damped_ = !factorization.ok;
     if (factorization.ok) return true;
     if (!explained_) run_.note(equations_.explain(factorization) + "; steps are regularised");
@@ -101,7 +103,8 @@ class Run {
     acceleration_.follow(run_);
     std::swap(run_.estimate, run_.trial);
     const bool final = run_.ended() || run_.last_iteration();
-    run_.chi2 = final ? trial_chi2 : equations_.linearize(run_.estimate);
+    run_.chi2 = trial_chi2;
+    if (!final) run_.linearize();
     run_.keep_if_best();
     path_is_current_ = false;
   }

@@ -7,6 +7,7 @@
 #include <fmt/core.h>
 
 #include "acceleration.hpp"
+#include "cairn/linear/iterative_solver.hpp"
 #include "convergence.hpp"
 #include "descent.hpp"
 
@@ -35,8 +36,13 @@ Summary GaussNewton::optimize(Graph& graph, const Stop& stop, Observer& observer
   NormalEquations& equations = run.equations();
   bool best = true;
   int rises = 0;
+  const bool regular = run.free().empty() || query<IterativeSolver>(*solver_);
   while (run.next_iteration()) {
-    if (const Factorization factorization = equations.factorize(); !factorization.ok) {
+    if (!regular) {
+      run.end_undetermined();
+      break;
+    }
+    if (const Factorization factorization = run.factorize(); !factorization.ok) {
       run.end_not_positive_definite(factorization);
       break;
     }
@@ -47,8 +53,9 @@ Summary GaussNewton::optimize(Graph& graph, const Stop& stop, Observer& observer
     }
     const double before = run.chi2;
     acceleration.aim(run);
-    const bool arrived =
-        convergence.arrived(dot(equations.g(), run.step), before) && acceleration.may_end(run);
+    const bool arrived = (convergence.arrived(dot(equations.g(), run.step), before) ||
+                          run.fits_exactly(run.step_norm())) &&
+                         acceleration.may_end(run);
     const bool may_end =
         arrived || (!run.exact() && Convergence::negligible(run.step_norm(), run.state_extent()));
     if (may_end && !run.solves(run.step)) break;

@@ -33,9 +33,10 @@ double initial_lambda(const LevenbergMarquardtOptions& options, Descent& descent
   return descent.has_losses() ? 1e-6 : 1e-10;
 }
 
-/// Undamped steps need an H that is not singular.
-bool may_go_undamped(const LevenbergMarquardtOptions& options, const Gauge& gauge) {
-  return options.endgame && gauge.left_free.empty();
+/// Undamped steps need an H that is not singular, or one whose null space is known.
+bool may_go_undamped(const LevenbergMarquardtOptions& options, Descent& descent) {
+  return options.endgame && (descent.equations().gauge().left_free.empty() ||
+                             (descent.free().complete && !descent.free().empty()));
 }
 
 /// One run: the state that its iterations hand on.
@@ -46,7 +47,7 @@ class Run {
         equations_(descent.equations()),
         damping_(initial_lambda(options, descent), 1e-20, options.largest_lambda,
                  is_hopeful(descent)),
-        may_go_undamped_(may_go_undamped(options, equations_.gauge())),
+        may_go_undamped_(may_go_undamped(options, descent)),
         endgame_(may_go_undamped_ ? std::sqrt(descent.stop().tolerance) : 0.0),
         convergence_(descent.stop().tolerance),
         damped_by_(descent.step.size()),
@@ -77,6 +78,7 @@ class Run {
     }
     acceleration_.aim(run_);
     bool arrived = undamped ? convergence_.arrived(promise, run_.chi2) : damped_arrival(promise);
+    arrived = arrived || run_.fits_exactly(step_norm);
     arrived = arrived && acceleration_.may_end(run_) && run_.solves(run_.step);
 
     const std::optional<double> faster = acceleration_.take(run_);
@@ -111,7 +113,10 @@ class Run {
     for (std::size_t k = 0; k < damped_by_.size(); ++k) {
       damped_by_[k] = lambda * std::max(diagonal[k], min_diagonal_[k]);
     }
-    return lambda > 0.0 ? equations_.factorize_damped(damped_by_) : equations_.factorize();
+    const std::span<const double> metric = run_.free_space().metric();
+    for (std::size_t k = 0; k < metric.size(); ++k)
+      damped_by_[k] = std::max(damped_by_[k], lambda * metric[k]);
+    return lambda > 0.0 ? equations_.factorize_damped(damped_by_) : run_.factorize();
   }
 
   /// λ δᵀ D δ: with it the promise gᵀδ + λ δᵀDδ is what the undamped model says of the damped step.
@@ -134,7 +139,8 @@ class Run {
     acceleration_.follow(run_);
     std::swap(run_.estimate, run_.trial);
     const bool final = run_.ended() || run_.last_iteration();
-    run_.chi2 = final ? trial_chi2 : equations_.linearize(run_.estimate);
+    run_.chi2 = trial_chi2;
+    if (!final) run_.linearize();
     run_.keep_if_best();
     first_trial_ = true;
   }

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "cairn/graph/free_directions.hpp"
 #include "cairn/graph/graph.hpp"
 #include "cairn/linear/linear_solver.hpp"
 #include "cairn/linear/marginals.hpp"
@@ -38,8 +39,9 @@ class CAIRN_API GraphMarginals {
   GraphMarginals(const Graph& graph, LinearSolver& solver);
 
   /// Linearises at the graph's states, factorises H and computes the block diagonal of Σ. It fails,
-  /// too, where its factorisation succeeds and H is singular to rounding (`kFewestDigits`). If it
-  /// fails, `explain` says why, and nothing below may be called.
+  /// too, where a direction is free (`FreeDirections`), whatever rounding makes of its pivot, and
+  /// where H is singular to rounding (`kFewestDigits`). If it fails, `explain` says why, and
+  /// nothing below may be called.
   Factorization factorize();
   std::string explain(const Factorization& failure) const;
 
@@ -65,6 +67,7 @@ class CAIRN_API GraphMarginals {
   std::vector<double> diagonal_;  ///< blocks of Σ, of the variables that are not constant
   bool of_jacobian_;              ///< the solver works on J, not on H
   bool singular_ = false;         ///< to rounding
+  FreeDirections free_;
   double diagonal_seconds_ = 0.0;
 };
 

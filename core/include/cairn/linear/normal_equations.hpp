@@ -54,6 +54,10 @@ class CAIRN_API NormalEquations {
   Factorization factorize();
   /// Factorises H + diag(damping), damping being size() doubles; H itself stays as it is.
   Factorization factorize_damped(std::span<const double> damping);
+  /// Factorises H + diag(pins) where H is singular and g has no part in its null space: with as
+  /// many pins as that has dimensions, one in each, any solution solves H δ = g, and is checked as
+  /// such by `backward_error`.
+  Factorization factorize_pinned(std::span<const double> pins);
   /// step = (what was factorised)⁻¹ g.
   void solve(std::span<double> step);
   /// ‖A step − g‖ / (h ‖step‖ + ‖g‖) in the maximum norm, A being what was factorised last and h
@@ -63,8 +67,8 @@ class CAIRN_API NormalEquations {
   std::span<const double> solve_residual() const { return residual_; }  ///< its |A step − g|
 
   /// A sentence on why a factorisation of H failed: the variable at which it stopped, the likely
-  /// number of gauge freedoms, and why that variable is not determined. Takes about as long as a
-  /// factorisation.
+  /// number of gauge freedoms, why that variable is not determined, and what is free at the graph's
+  /// states (`FreeDirections`). Takes about as long as a factorisation.
   std::string explain(const Factorization& failure) const;
   /// Directions in which chi2 hardly changes: eigenvalues below 1e-12 of H scaled to unit diagonal,
   /// counted by Sylvester's law of inertia on an LDLᵀ. -1 if they cannot be counted, as when H has
