@@ -87,13 +87,13 @@ void vote_on_edge(Scanner& scanner, int measured, Votes& votes) {
     ++votes.toro_or_isam;
     return;
   }
-  bool toro = false, isam = false;
+  bool toro = false, isam = true;
   if constexpr (Numbers == 6) {
     toro = fits_toro(last);
     isam = fits_isam(last);
   } else {
     toro = is_positive_definite(6, last);
-    for (int row = 0; row < 6; ++row) isam = isam || last[triangle_index(6, row, row)] > 0.0;
+    for (int row = 0; row < 6; ++row) isam = isam && last[triangle_index(6, row, row)] > 0.0;
   }
   ++(toro == isam ? votes.toro_or_isam : toro ? votes.toro : votes.isam);
 }

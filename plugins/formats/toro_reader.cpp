@@ -164,9 +164,10 @@ class ToroReader {
     std::stable_sort(landmarks_.begin(), landmarks_.end(),
                      [](const Landmark& a, const Landmark& b) { return a.id < b.id; });
     const std::int32_t point = draft_.variable_kind("VERTEX_XY");
+    const std::int32_t planar = draft_.variable_kind("VERTEX_SE2");
     std::int64_t angles = 0;
     for (Draft::Variable& variable : draft_.variables()) {
-      if (!find_landmark(variable.id)) continue;
+      if (variable.kind != planar || !find_landmark(variable.id)) continue;
       variable.kind = point;
       if (draft_.number(variable.numbers + 2) != 0.0) ++angles;
     }
@@ -175,10 +176,10 @@ class ToroReader {
           "{} landmarks have a vertex with an angle, which a point does not keep", angles));
     }
     for (const Draft::Factor& factor : draft_.factors()) check_poses(factor);
-    if (!draft_.variables().empty()) add_landmarks_without_vertex(point);
+    if (!draft_.variables().empty()) add_landmarks_without_vertex(point, planar);
   }
   /// BR may see landmarks that have no vertex: they are where they are seen first.
-  void add_landmarks_without_vertex(std::int32_t point) {
+  void add_landmarks_without_vertex(std::int32_t point, std::int32_t planar) {
     std::set<Id> there;
     for (const Draft::Variable& variable : draft_.variables()) there.insert(variable.id);
     std::int64_t made = 0;
@@ -186,8 +187,9 @@ class ToroReader {
       if (factor.kind != bearing_and_range_) continue;
       const Draft::FactorSlots seen = draft_.slots(factor);
       const Id pose = seen.ids[0], landmark = seen.ids[1];
+      if (there.contains(landmark)) continue;
       const auto from = std::ranges::find(draft_.variables(), pose, &Draft::Variable::id);
-      if (there.contains(landmark) || from == draft_.variables().end()) continue;
+      if (from == draft_.variables().end() || from->kind != planar) continue;
       const std::array<double, 3> x{draft_.number(from->numbers), draft_.number(from->numbers + 1),
                                     draft_.number(from->numbers + 2)};
       const double angle = x[2] + seen.measurement[0], range = seen.measurement[1];

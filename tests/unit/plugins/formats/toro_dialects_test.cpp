@@ -175,6 +175,8 @@ TEST(ToroBearingAndRange, RefusesWhatIsNone) {
   const std::string poses = "VERTEX2 0 0 0 0\n";
   EXPECT_THAT(refusal("toro", poses + "BR 0 7 0 -2 0.1 0.5\n"),
               HasSubstr("file:2: BR with range -2"));
+  EXPECT_EQ(refusal("toro", poses + "VERTEX3 7 0 0 0 0 0 0\nBR 0 7 0 2 0.1 0.5\n"),
+            "file:3: BR 0 7: 7 is a VERTEX_SE3:QUAT by line 2; expected a VERTEX_XY");
   for (const char* sigmas : {"0 0.5", "0.1 -1", "1e-200 1"}) {
     EXPECT_THAT(refusal("toro", poses + "BR 0 7 0 2 " + sigmas + "\n"),
                 HasSubstr("file:2: BR with the standard deviation"));
