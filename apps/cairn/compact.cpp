@@ -15,6 +15,7 @@
 #include "arguments.hpp"
 #include "cairn/evaluation/plausibility.hpp"
 #include "cairn/geometry/pose.hpp"
+#include "cairn/io/losses_not_written.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/policy/policy_run.hpp"
 #include "cairn/policy/selection_check.hpp"
@@ -380,6 +381,8 @@ int run_compact(const CompactOptions& options, Session& session) {
   results.write(options.output, [&] {
     write_graph(shown.compact, options.output, registry,
                 output_format(options.output, options.output_format));
+    if (const std::string lost = losses_not_written(shown.compact); !lost.empty())
+      session.note(lost);
   });
   results.write(options.trajectory, [&] {
     write_graph(shown.trajectory, options.trajectory, registry,

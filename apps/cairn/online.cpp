@@ -14,6 +14,7 @@
 #include "cairn/evaluation/plausibility.hpp"
 #include "cairn/evaluation/undetermined.hpp"
 #include "cairn/io/format.hpp"
+#include "cairn/io/losses_not_written.hpp"
 #include "cairn/online/conversation.hpp"
 #include "cairn/online/journal.hpp"
 #include "cairn/online/line_server.hpp"
@@ -420,6 +421,7 @@ int run(OnlineOptions options, Session& session) {
     if (!options.output.empty() && !nothing_came) {
       const Graph graph = lines.estimator().graph();
       write_map(graph, options.output, session);
+      if (const std::string lost = losses_not_written(graph); !lost.empty()) session.note(lost);
       if (!failure) {  // within an update it may have been left in part
         std::vector<std::string> notes = notes_on_estimate(graph, chi2(graph));
         note_what_is_free(graph, notes);

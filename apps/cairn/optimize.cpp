@@ -11,6 +11,7 @@
 #include <fmt/core.h>
 
 #include "arguments.hpp"
+#include "cairn/io/losses_not_written.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/report/recording.hpp"
 #include "cairn/runtime/error.hpp"
@@ -191,6 +192,8 @@ int run(const OptimizeOptions& options, Session& session) {
     const std::string format = output_format(options.output, options.output_format);
     note_poses_alone(loaded.graph, options.output, format, session);
     write_graph(loaded.graph, options.output, registry, format);
+    if (std::string lost = losses_not_written(loaded.graph); !lost.empty())
+      summary.notes.push_back(std::move(lost));
   });
   const Stop& stop = options.problem.stop;
   for (std::string& note : notes_on_the_end(summary, stop, loaded.graph))

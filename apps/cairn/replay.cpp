@@ -15,6 +15,7 @@
 #include "cairn/evaluation/batch_comparison.hpp"
 #include "cairn/evaluation/plausibility.hpp"
 #include "cairn/evaluation/undetermined.hpp"
+#include "cairn/io/losses_not_written.hpp"
 #include "cairn/online/recorded_graph.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
@@ -232,9 +233,12 @@ int run(const ReplayOptions& options, Session& session) {
   Results results(session);
   if (failure) results.add([&] { std::rethrow_exception(failure); });
   results.write(options.output, [&] {
+    const Graph graph = estimator->graph();
     const std::string format = output_format(options.output, options.output_format);
-    note_poses_alone(estimator->graph(), options.output, format, session);
-    write_graph(estimator->graph(), options.output, registry, format);
+    note_poses_alone(graph, options.output, format, session);
+    write_graph(graph, options.output, registry, format);
+    if (std::string lost = losses_not_written(graph); !lost.empty())
+      replay.notes.push_back(std::move(lost));
   });
   results.write(options.steps, [&] { write_file(options.steps, steps_csv(replay)); });
   if (failure) results.finish();  // throws

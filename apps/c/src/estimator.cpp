@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -9,6 +10,7 @@
 #include "cairn/runtime/error.hpp"
 #include "cairn/runtime/plugin_call.hpp"
 #include "cairn/solve/estimator.hpp"
+#include "cairn/update/rejected_factors.hpp"
 #include "calls.hpp"
 #include "objects.hpp"
 
@@ -99,7 +101,11 @@ cairn_code cairn_estimator_update(cairn_estimator* estimator, const cairn_update
     const cairn::GraphUpdate update = std::exchange(of.collected, {});
     cairn::UpdateOptions how;
     if (options) how = {options->defer != 0, options->full != 0, options->max_seconds};
-    const cairn::UpdateReport did = call(of, [&] { return of.estimator->update(update, how); });
+    cairn::UpdateReport did = call(of, [&] { return of.estimator->update(update, how); });
+    if (how.full) {
+      std::string note = cairn::in_words(cairn::rejected_factors(of.estimator->graph()));
+      if (!note.empty()) did.notes.push_back(std::move(note));
+    }
     of.notes = joined(did.notes);
     if (!report) return;
     *report = {did.ok ? 1 : 0, did.converged ? 1 : 0, did.first_factor, did.iterations,

@@ -18,6 +18,7 @@
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/typed/symbol.hpp"
+#include "cairn/update/rejected_factors.hpp"
 #include "component_names.hpp"
 #include "factors.hpp"
 #include "ids.hpp"
@@ -103,13 +104,23 @@ void change(BoundEstimator& bound, FactorId factor, const py::object& values,
   bound.pending().changed.push_back(std::move(changed));
 }
 
+/// A note on what robust losses have rejected of the whole estimate.
+void add_rejected(Estimator& estimator, UpdateReport& report) {
+  std::string note = in_words(rejected_factors(estimator.graph()));
+  if (!note.empty()) report.notes.push_back(std::move(note));
+}
+
 UpdateReport update(BoundEstimator& bound, bool full, bool defer, double max_seconds) {
   if (!(max_seconds >= 0.0))
     throw Error(ErrorCode::usage, "max_seconds: expected 0 (no limit) or more");
   const GraphUpdate what = std::exchange(bound.pending(), {});
   const EstimatorUse use(bound);
   const py::gil_scoped_release unlocked;
-  return use.estimator().update(what, {.defer = defer, .full = full, .max_seconds = max_seconds});
+  Estimator& estimator = use.estimator();
+  UpdateReport report =
+      estimator.update(what, {.defer = defer, .full = full, .max_seconds = max_seconds});
+  if (full) add_rejected(estimator, report);
+  return report;
 }
 
 // Copies

@@ -15,6 +15,7 @@
 #include "cairn/evaluation/trajectory.hpp"
 #include "cairn/io/format.hpp"
 #include "cairn/io/generator.hpp"
+#include "cairn/io/losses_not_written.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/error.hpp"
 #include "component_names.hpp"
@@ -61,8 +62,13 @@ std::unique_ptr<BoundGraph> read(const std::filesystem::path& path, const std::s
 
 void write(BoundGraph& bound, const std::filesystem::path& path, const std::string& format) {
   const GraphUse use(bound);
-  const py::gil_scoped_release unlocked;
-  write_graph(use.graph(), path, default_registry(), format, bound.stamps);
+  {
+    const py::gil_scoped_release unlocked;
+    write_graph(use.graph(), path, default_registry(), format, bound.stamps);
+  }
+  const std::string note = losses_not_written(use.graph());
+  if (!note.empty() && PyErr_WarnEx(PyExc_UserWarning, note.c_str(), 1) != 0)
+    throw py::error_already_set();
 }
 
 std::pair<std::unique_ptr<BoundGraph>, std::unique_ptr<BoundGraph>> generate(
@@ -97,7 +103,8 @@ The true states, where the file has them beside (format pyfg), are `Graph.truth`
 
 format: a name of `cairn.components("format")`; empty: by the ending of the name, before .gz, which packs. The file is
 written beside and renamed, so that a failure never leaves half a file. Trajectory formats (tum, kitti) get the poses
-alone; tum with `Graph.stamps` where there are any, else with the ids as stamps.)");
+alone; tum with `Graph.stamps` where there are any, else with the ids as stamps. No format has robust losses: a graph
+with some is written without them, with a UserWarning.)");
   const py::object graph = module.attr("Graph");
   graph.attr("write") =
       py::cpp_function(&write, py::name("write"), py::is_method(graph), py::arg("path"),

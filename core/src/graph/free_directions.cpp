@@ -11,8 +11,8 @@
 
 #include <Eigen/Core>
 
+#include "cairn/types/factor_call.hpp"
 #include "dense/eigenvalues.hpp"
-#include "factor_call.hpp"
 
 namespace cairn {
 

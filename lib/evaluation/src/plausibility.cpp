@@ -5,7 +5,6 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <string_view>
 #include <utility>
 
 #include <fmt/format.h>
@@ -173,64 +172,26 @@ std::string losses_weigh_nothing(const Graph& graph) {
 
 namespace {
 
-constexpr double kRejected = 0.01;  // of the weight without a loss
-
-/// "3 of 120 loop closures"
-std::string counted(std::int64_t rejected, std::int64_t all, std::string_view what) {
-  return fmt::format("{} of {} {}{}", rejected, all, what, all == 1 ? "" : "s");
-}
-
-std::string in_words(const RejectedFactors& of) {
-  if (of.rejected_loops + of.rejected_others == 0) return {};
-  std::string text;
-  if (of.rejected_loops > 0) text = counted(of.rejected_loops, of.loops, "loop closure");
-  if (of.rejected_others > 0) {
-    const char* what = of.loops > 0 ? "other factor" : "factor";
-    text += (text.empty() ? "" : " and ") + counted(of.rejected_others, of.others, what);
-  }
-  return fmt::format("the loss leaves {} less than 1 % of their weight", text);
-}
-
-std::string loops_rejected(const Graph& graph, const RejectedFactors& of) {
-  if (!of.nearly_all_loops() || !losses_weigh_nothing(graph).empty()) return {};
-  return in_words(of) +
-         ": the estimate is nearly that without loop closures, which is hardly the right one if "
-         "most "
-         "of them are right; a larger scale of the loss, or one that grows (cauchy), uses them";
+/// Where losses weigh nothing at all, that is said.
+std::string rejection(const Graph& graph, bool nearly_all) {
+  const RejectedFactors rejected = rejected_factors(graph);
+  if (rejected.nearly_all_loops() != nearly_all || !losses_weigh_nothing(graph).empty()) return {};
+  return in_words(rejected);
 }
 
 }  // namespace
 
-RejectedFactors rejected_factors(const Graph& graph) {
-  RejectedFactors result;
-  if (!graph.has_losses()) return result;
-  const std::vector<double> norms = squared_norms(graph);
-  const std::vector<bool> loops = loop_closures(graph);
-  for (int f = 0; f < graph.factor_count(); ++f) {
-    if (!graph.loss(f)) continue;
-    double weight = 1.0;
-    graph.loss(f)->evaluate({&norms[f], 1}, {}, {&weight, 1});
-    const bool rejected = weight < kRejected;
-    ++(loops[f] ? result.loops : result.others);
-    (loops[f] ? result.rejected_loops : result.rejected_others) += rejected;
-  }
-  return result;
-}
-
 std::vector<std::string> notes_on_estimate(const Graph& graph, double chi2) {
   std::vector<std::string> sentences = reasons_for_doubt(graph, chi2);
-  const RejectedFactors rejected = rejected_factors(graph);
-  const bool said = rejected.nearly_all_loops() || !losses_weigh_nothing(graph).empty();
-  if (const std::string sentence = in_words(rejected); !sentence.empty() && !said)
-    sentences.push_back(sentence);
+  if (std::string sentence = rejection(graph, false); !sentence.empty())
+    sentences.push_back(std::move(sentence));
   return sentences;
 }
 
 std::vector<std::string> reasons_for_doubt(const Graph& graph, double chi2) {
   std::vector<std::string> sentences;
-  for (const std::string& sentence :
-       {implausible_estimate(graph, chi2), residual_not_finite(graph), losses_weigh_nothing(graph),
-        loops_rejected(graph, rejected_factors(graph))}) {
+  for (const std::string& sentence : {implausible_estimate(graph, chi2), residual_not_finite(graph),
+                                      losses_weigh_nothing(graph), rejection(graph, true)}) {
     if (!sentence.empty()) sentences.push_back(sentence);
   }
   for (std::string& outside : outside_of_domains(graph)) sentences.push_back(std::move(outside));

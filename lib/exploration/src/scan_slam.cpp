@@ -5,6 +5,7 @@
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <string>
 #include <utility>
 
 #include <fmt/core.h>
@@ -13,6 +14,7 @@
 #include "cairn/geometry/motion.hpp"
 #include "cairn/runtime/timed.hpp"
 #include "cairn/typed/build.hpp"
+#include "cairn/update/rejected_factors.hpp"
 #include "odometry_scale.hpp"
 #include "scan_poses.hpp"
 
@@ -143,6 +145,8 @@ bool ScanSlam::finish() {
   const bool converged = parts_.policy.finish();
   follow_estimate();
   estimate_ = poses().back();
+  const std::string rejected = in_words(rejected_factors(parts_.policy.estimator().graph()));
+  if (!rejected.empty()) counts_.notes.push_back(rejected);
   return converged;
 }
 

@@ -12,6 +12,7 @@
 #include "cairn/runtime/error.hpp"
 #include "cairn/text/spelling.hpp"
 #include "cairn/update/marginal_prior.hpp"
+#include "cairn/update/rejected_factors.hpp"
 
 namespace cairn {
 OnlineSession::OnlineSession(Estimator& estimator, StreamFormat& format, Registry& registry,
@@ -382,6 +383,9 @@ void OnlineSession::solve_fully(const Words& words, Reply& reply) {
   expect_words(words, 1, "FULL");
   note_waiting(reply);
   solve_now({}, true, reply);
+  if (silent()) return;
+  const std::string rejected = in_words(rejected_factors(estimator_.graph()));
+  if (!rejected.empty()) reply.text = fmt::format("NOTE {}\n", rejected) + reply.text;
 }
 
 void OnlineSession::report_covariance(const Words& words, Reply& reply) {

@@ -8,6 +8,7 @@
 #include "cairn/graph/gauge.hpp"
 #include "cairn/graph/graph.hpp"
 #include "cairn/runtime/api.hpp"
+#include "cairn/update/rejected_factors.hpp"
 
 namespace cairn {
 
@@ -47,17 +48,6 @@ CAIRN_API std::vector<std::string> outside_of_domains(const Graph& graph);
 /// A sentence where robust losses take the weight of every factor at the graph's states (ρ′ below
 /// 1e-9): H is then zero to rounding. Empty else.
 CAIRN_API std::string losses_weigh_nothing(const Graph& graph);
-
-/// How many factors robust losses have all but taken from an estimate: whose weight ρ′ at the
-/// graph's states is below one per cent.
-struct RejectedFactors {
-  std::int64_t loops = 0, rejected_loops = 0;    ///< loop closures with a loss; those of them
-  std::int64_t others = 0, rejected_others = 0;  ///< other factors with a loss; those of them
-  /// Nearly all loop closures (nine in ten or more, three at least): what is left is dead
-  /// reckoning, and contradicts nothing.
-  bool nearly_all_loops() const { return rejected_loops >= 3 && 10 * rejected_loops >= 9 * loops; }
-};
-CAIRN_API RejectedFactors rejected_factors(const Graph& graph);
 
 /// What speaks against an optimised estimate of this chi2, a sentence each: `implausible_estimate`,
 /// `residual_not_finite`, `losses_weigh_nothing`, loop closures that are rejected nearly all

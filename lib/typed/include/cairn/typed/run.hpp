@@ -3,10 +3,12 @@
 
 #include <filesystem>
 #include <memory>
+#include <string>
 #include <string_view>
 
 #include "cairn/graph/graph.hpp"
 #include "cairn/io/format.hpp"
+#include "cairn/io/losses_not_written.hpp"
 #include "cairn/plugin/registry.hpp"
 #include "cairn/runtime/api.hpp"
 #include "cairn/solve/optimizer.hpp"
@@ -44,10 +46,12 @@ inline Graph read(const std::filesystem::path& file, Registry& registry = defaul
   return read_graph(file, registry);
 }
 
-/// Writes a graph, as `write_graph`: the format is known by the file's ending.
-inline void write(const Graph& graph, const std::filesystem::path& file,
-                  Registry& registry = default_registry()) {
+/// Writes a graph, as `write_graph`: the format is known by the file's ending. Returns what of the
+/// graph is not in the file (`losses_not_written`), or an empty text.
+inline std::string write(const Graph& graph, const std::filesystem::path& file,
+                         Registry& registry = default_registry()) {
   write_graph(graph, file, registry);
+  return losses_not_written(graph);
 }
 
 }  // namespace cairn
