@@ -114,8 +114,9 @@ TEST_F(Undetermined, NamesPosesThatTurnTogether) {
 
 TEST_F(Undetermined, IsSingularOnlineWithTheNameWhateverTheEstimator) {
   const std::string lines =
-      "VERTEX_SE2 0 0 0 0\nFIX 0\nEDGE_SE2 0 7 1 0 0 100 0 0 100 0 100\nVERTEX_XY 2 4 4\n"
-      "EDGE_BEARING_RANGE_SE2_XY 7 2 0.95 5 400 0 0\nSOLVE\nCOVARIANCE 7\nQUIT\n";
+      "VERTEX_SE2 0 0 0 0\nFIX 0\nNEW VERTEX_SE2 7\nEDGE_SE2 0 7 1 0 0 100 0 0 100 0 100\n"
+      "VERTEX_XY 2 4 4\n"
+      "EDGE_BEARING_RANGE_SE2_XY 7 2 0.95 5 400 0 0\nSOLVE\nQUIT\n";
   for (const char* estimator : {"batch", "periodic_batch", "incremental_cholesky", "incremental_qr",
                                 "ekf", "eif", "seif"}) {
     if (!Registry().has("estimator", estimator)) continue;
@@ -127,7 +128,8 @@ TEST_F(Undetermined, IsSingularOnlineWithTheNameWhateverTheEstimator) {
 
 TEST_F(Undetermined, IsOverWithTheNextMeasurement) {
   const std::string lines =
-      "VERTEX_SE2 0 0 0 0\nFIX 0\nEDGE_SE2 0 7 1 0 0 100 0 0 100 0 100\nVERTEX_XY 2 4 4\n"
+      "VERTEX_SE2 0 0 0 0\nFIX 0\nNEW VERTEX_SE2 7\nEDGE_SE2 0 7 1 0 0 100 0 0 100 0 100\n"
+      "VERTEX_XY 2 4 4\n"
       "EDGE_BEARING_RANGE_SE2_XY 7 2 0.95 5 400 0 0\n"
       "EDGE_BEARING_RANGE_SE2_XY 0 2 0.8 5 400 0 0\nSOLVE\nQUIT\n";
   for (const char* estimator : {"batch", "periodic_batch", "incremental_cholesky", "incremental_qr",

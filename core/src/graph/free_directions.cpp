@@ -35,6 +35,8 @@ constexpr double kResolved = 1e-6;
 constexpr double kFree = 1e-13;
 /// Information below this part of the largest of all is none.
 constexpr double kNothing = 1e-28;
+/// What a factor says of a direction is rounding below this part of what all say of its variables.
+constexpr double kBarely = 1e-18;
 /// Of scaled Gram matrices: what is smaller is rounding.
 constexpr double kRounding = 1e-14;
 /// So many parameters that depend on each other are followed.
@@ -442,11 +444,50 @@ class Search {
     const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(S);
     Eigen::Index free = 0;
     while (free < n && eigen.eigenvalues()[free] <= kFree) ++free;
-    MatrixXd A = W * eigen.eigenvectors().leftCols(free);
+    MatrixXd A = unseen(movers, part, W * eigen.eigenvectors().leftCols(free));
     // In units of the scaled parameters, so that numbers can be compared.
     A = scale.cwiseInverse().asDiagonal() * A;
     eliminate(A);
     return scale.asDiagonal() * A;
+  }
+
+  /// Of those α that rows hardly see beside all that moves with them, the ones that no row sees
+  /// beside what it could see of the variables that it is on: one prior at the end of a long chain
+  /// is little, and no rounding.
+  MatrixXd unseen(std::span<const std::int32_t> movers, const Part& part, const MatrixXd& A) {
+    if (A.cols() == 0) return A;
+    std::vector<std::int32_t> factors;
+    for (const std::int32_t v : movers) {
+      const auto of = factors_of(v);
+      factors.insert(factors.end(), of.begin(), of.end());
+    }
+    std::ranges::sort(factors);
+    const auto repeated = std::ranges::unique(factors);
+    factors.erase(repeated.begin(), repeated.end());
+    MatrixXd S = MatrixXd::Zero(A.cols(), A.cols());
+    for (const std::int32_t k : factors) {
+      if (!evaluate(k)) return MatrixXd(A.rows(), 0);
+      MatrixXd R = MatrixXd::Zero(J_.rows(), A.cols());
+      double most = 0.0, of_all = 0.0;
+      Eigen::Index at = 0;
+      for (const std::int32_t v : rows_.variables(factors_[static_cast<std::size_t>(k)])) {
+        MatrixXd moved = MatrixXd::Zero(size(v), A.cols());
+        for (const Column& column : moves(v)) moved += column.delta * A.row(place(part, column));
+        const auto J = J_.middleCols(at, size(v));
+        const VectorXd D = largest_of_unit(v, J.colwise().squaredNorm().transpose());
+        const VectorXd& diagonal = diagonal_[static_cast<std::size_t>(v)];
+        if (diagonal.size() > 0) of_all += (diagonal.asDiagonal() * moved.cwiseAbs2()).sum();
+        R += J * moved;
+        most += (D.asDiagonal() * moved.cwiseAbs2()).sum();
+        at += size(v);
+      }
+      most = std::max(most, kBarely * of_all);
+      if (most > 0.0) S += R.transpose() * R / most;
+    }
+    const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(S);
+    Eigen::Index free = 0;
+    while (free < A.cols() && eigen.eigenvalues()[free] <= kFree) ++free;
+    return A * eigen.eigenvectors().leftCols(free);
   }
 
   static Eigen::Index place(const Part& part, const Column& column) {

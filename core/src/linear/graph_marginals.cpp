@@ -74,7 +74,7 @@ Factorization GraphMarginals::factorize() {
 std::string GraphMarginals::explain(const Factorization& failure) const {
   if (!free_.empty()) {
     const auto count = std::ssize(free_.directions);
-    return fmt::format("H is singular: {} gauge freedom{} likely; {}", count,
+    return fmt::format("H is not positive definite: {} gauge freedom{} likely; {}", count,
                        count == 1 ? " is" : "s are", free_.describe(*graph_));
   }
   if (!singular_) return equations_.explain(failure);

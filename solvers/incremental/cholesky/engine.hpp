@@ -217,7 +217,7 @@ class Engine : private EngineState {
   /// neither. A copy of the engine does neither.
   void keep_answers(Answers* answers);
   /// Whether the factors leave something free: then no factorisation of H is trusted, whatever
-  /// rounding makes of its pivots, and the estimate is that of the rescuer.
+  /// rounding makes of its pivots, and the estimate is that of the fallback optimizer.
   void set_undetermined(bool undetermined) {
     undetermined_ = undetermined;
     broken_ = broken_ || undetermined;

@@ -27,7 +27,7 @@ class Run {
         radius_(std::max(options.initial_radius, std::sqrt(descent.chi2))) {}
 
   void iterate() {
-    bool arrived = false;
+    bool arrived = false, fits = false;
     const bool is_new = !path_is_current_;
     if (!path_is_current_) {
       if (!factorize() || run_.must_stop()) return;
@@ -40,9 +40,9 @@ class Run {
       newton_promise_ = dot(equations_.g(), path_.newton());
       newton_norm_ = run_.step_norm();
       acceleration_.aim(run_);
-      arrived =
-          (convergence_.arrived(newton_promise_, run_.chi2) || run_.fits_exactly(newton_norm_)) &&
-          acceleration_.may_end(run_);
+      fits = run_.fits_exactly(newton_norm_);  // chi2 is zero: the minimum, damped or not
+      arrived = (convergence_.arrived(newton_promise_, run_.chi2) || fits) &&
+                acceleration_.may_end(run_);
       if (arrived && !run_.solves(path_.newton())) return;
     }
     const double radius = radius_;
@@ -65,7 +65,7 @@ class Run {
     const bool lowered = trial_chi2 < run_.chi2;  // false for what is not a number
     const bool exhausted = convergence_.exhausted(lowered, step_norm, run_.state_extent());
     if (arrived) {
-      run_.end_converged(is_damped());
+      run_.end_converged(!fits && is_damped());
     } else if (exhausted && run_.solves(path_.newton())) {
       run_.end_without_descent(newton_promise_, newton_norm_, is_damped());
     }

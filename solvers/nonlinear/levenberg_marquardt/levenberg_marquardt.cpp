@@ -78,8 +78,8 @@ class Run {
     }
     acceleration_.aim(run_);
     bool arrived = undamped ? convergence_.arrived(promise, run_.chi2) : damped_arrival(promise);
-    arrived = arrived || run_.fits_exactly(step_norm);
-    arrived = arrived && acceleration_.may_end(run_) && run_.solves(run_.step);
+    const bool fits = run_.fits_exactly(step_norm);  // chi2 is zero: the minimum, damped or not
+    arrived = (arrived || fits) && acceleration_.may_end(run_) && run_.solves(run_.step);
 
     const std::optional<double> faster = acceleration_.take(run_);
     if (faster) {
@@ -93,7 +93,7 @@ class Run {
     const bool lowered = trial_chi2 < run_.chi2;  // false for what is not a number
     const double gained = run_.chi2 - trial_chi2;
     const bool exhausted = convergence_.exhausted(lowered, step_norm, run_.state_extent());
-    if (!run_.ended() && arrived) run_.end_converged(!undamped && may_go_undamped_);
+    if (!run_.ended() && arrived) run_.end_converged(!fits && !undamped && may_go_undamped_);
     if (!run_.ended() && exhausted && run_.solves(run_.step)) end_without_descent();
 
     const double before = run_.chi2;

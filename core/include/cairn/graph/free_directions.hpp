@@ -31,8 +31,8 @@ struct CAIRN_API FreeDirections {
   /// False where the search was given up: too many directions depend on each other, as where
   /// cameras and points determine each other only all together, or Jacobians are not finite.
   bool complete = true;
-  bool finite = true;  ///< so were all Jacobians that were looked at
-  /// No Jacobian was looked at: the answer is the same at all states.
+  bool finite = true;  ///< so were all Jacobians that were evaluated
+  /// No Jacobian was evaluated: the answer is the same at all states.
   bool everywhere = true;
 
   bool empty() const { return directions.empty(); }

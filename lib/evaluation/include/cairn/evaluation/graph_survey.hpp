@@ -49,9 +49,9 @@ struct GraphSurvey {
 
 /// Surveys a graph. Among the suspicions are: no factors, variables without any factor, parts that
 /// no factor joins, doubled factors, gaps in the odometry, priors on a part of an orientation in
-/// space, what the measurements leave free, more unknowns than measurements, chi2
-/// above 100 times or below 1/100 of its degrees of freedom, and (from 100 factors on) five factors
-/// that make more than half of chi2. Takes one evaluation of all residuals.
+/// space, what the measurements leave free, more unknowns than measurements, chi2 above 100 times
+/// or below 1/100 of its degrees of freedom, and (from 100 factors on) five factors that make more
+/// than half of chi2. Takes one evaluation of all residuals.
 CAIRN_API GraphSurvey survey_graph(const Graph& graph);
 
 }  // namespace cairn

@@ -13,7 +13,7 @@
 namespace cairn {
 
 /// What an estimator's factors leave free, from one update to the next: as long as factors and
-/// variables are only added, and everything was determined before, only what is new is looked at.
+/// variables are only added, and everything was determined before, only what is new is searched.
 class CAIRN_API FreedomWatch {
  public:
   /// The linear system of the estimator, by variables and factors of its graph.
@@ -39,7 +39,7 @@ class CAIRN_API FreedomWatch {
   FreeDirections free_;
   bool determined_ = false;          ///< everything, at the last look
   bool given_up_ = false;            ///< that look found no answer, and the next would not
-  int variables_ = 0, factors_ = 0;  ///< that were looked at
+  int variables_ = 0, factors_ = 0;  ///< that were searched
   std::set<int> idle_;               ///< variables of these without a factor
   std::vector<int> anchors_;         ///< of these, that were held and are not fixed
 };
