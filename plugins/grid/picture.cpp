@@ -35,6 +35,11 @@ class PgmHead {
     return value;
   }
   std::size_t at() const { return at_; }
+  /// Behind the last level in words: comments and white space alone.
+  bool at_end() {
+    skip_space();
+    return at_ == bytes_.size();
+  }
 
  private:
   void skip_space() {
@@ -54,8 +59,14 @@ class PgmHead {
   std::size_t at_ = 2;  // behind the magic number
 };
 
-std::uint8_t scaled(int value, int white) {
-  return static_cast<std::uint8_t>((255 * std::min(value, white) + white / 2) / white);
+std::uint8_t scaled(int value, int white, const std::string& name) {
+  if (value > white)
+    refuse(name, fmt::format("a level of {}, and the largest is {} by its head", value, white));
+  return static_cast<std::uint8_t>((255 * value + white / 2) / white);
+}
+
+bool is_white_space(std::string_view bytes) {
+  return std::ranges::all_of(bytes, [](unsigned char c) { return std::isspace(c) != 0; });
 }
 
 }  // namespace
@@ -87,13 +98,15 @@ Picture decode_pgm(std::string_view bytes, const std::string& name) {
   picture.grey.resize(count);
   for (std::size_t k = 0; k < count; ++k) {
     if (in_words) {
-      picture.grey[k] = scaled(head.number("level"), white);
+      picture.grey[k] = scaled(head.number("level"), white, name);
       continue;
     }
     int value = static_cast<unsigned char>(body[each * k]);
     if (each == 2) value = 256 * value + static_cast<unsigned char>(body[2 * k + 1]);
-    picture.grey[k] = scaled(value, white);
+    picture.grey[k] = scaled(value, white, name);
   }
+  if (in_words ? !head.at_end() : !is_white_space(body.substr(each * count)))
+    refuse(name, "bytes behind the image: another size is meant, or another image follows");
   return picture;
 }
 

@@ -29,7 +29,10 @@ class MapKeys {
     if (text.size() > kMost)
       fail(fmt::format("{} bytes, expected the few lines of a map", text.size()));
     try {
-      keys_ = YAML::Load(text);
+      const std::vector<YAML::Node> documents = YAML::LoadAll(text);
+      if (documents.size() > 1)
+        fail("more than one document of YAML, expected the keys of one map");
+      if (!documents.empty()) keys_ = documents.front();
     } catch (const YAML::Exception& error) {
       fail(fmt::format("line {}: no YAML: {}", error.mark.line + 1, error.msg));
     }

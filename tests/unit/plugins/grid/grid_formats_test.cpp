@@ -143,6 +143,8 @@ TEST_F(GridFormats, BadFilesAreRefusedWithWhatIsWrong) {
       {keys + "free_thresh: 0.7\n", "the first must be the smaller one"},
       {"image: [good.pgm\n", "no YAML"},
       {"a line\n", "expected the keys"},
+      {keys + "---\nimage: other.pgm\n", "more than one document"},
+      {"", "expected the keys"},
       {std::string(100000, '['), "no YAML"}};
   for (const auto& [content, expected] : cases)
     EXPECT_THAT(refusal(text("bad.yaml", content)), HasSubstr(expected)) << content.substr(0, 80);
@@ -151,6 +153,14 @@ TEST_F(GridFormats, BadFilesAreRefusedWithWhatIsWrong) {
               HasSubstr("not a whole PNG"));
   EXPECT_THAT(refusal(text("vast.pgm", "P5\n99999999 99999999\n255\n") + ":resolution=1"),
               HasSubstr("pixels"));
+  for (const char* bytes : {"P2 2 1 99 98 100\n", "P5 2 1 99\n\x62\x64"}) {
+    EXPECT_THAT(refusal(text("white.pgm", bytes) + ":resolution=1"),
+                HasSubstr("a level of 100, and the largest is 99"));
+  }
+  for (const char* bytes :
+       {"P2 1 1 255 254 253\n", "P5 1 1 255\naa", "P5 1 1 255\na\nP5 1 1 255\na"}) {
+    EXPECT_THAT(refusal(text("more.pgm", bytes) + ":resolution=1"), HasSubstr("behind the image"));
+  }
   EXPECT_THAT(refusal(text("no.png", "GIF89a") + ":resolution=1"), HasSubstr("neither"));
   EXPECT_THAT(refusal(file("good.pgm")), HasSubstr("resolution=0.05"));
   EXPECT_THAT(refusal(file("floor.tiff")), HasSubstr(".yaml"));
