@@ -8,7 +8,8 @@
     graph.write("optimized.g2o")
 
 Lengths are metres, angles radians. Solvers, formats, losses and types are plugins chosen by name: `cairn.kinds()` and
-`cairn.components(kind)` list them. Whatever cannot be done raises `cairn.Error`, whose message says what would work.
+`cairn.components(kind)` list them. Whatever cannot be done raises `cairn.Error`, whose message says what would work; it is
+a `FileNotFoundError`, a `KeyError` (of ids) or a `ValueError` as well where it is one.
 """
 from ._cairn import (
     BearingRange,
@@ -26,12 +27,15 @@ from ._cairn import (
     Floor,
     Frontier,
     Graph,
+    InvalidError,
     Iteration,
     L,
     LandmarkReport,
     LinkReport,
     MatchProposal,
     Measurement,
+    MissingFileError,
+    MissingKeyError,
     Observation,
     Option,
     Orientation,
@@ -93,12 +97,15 @@ __all__ = [
     "Floor",
     "Frontier",
     "Graph",
+    "InvalidError",
     "Iteration",
     "L",
     "LandmarkReport",
     "LinkReport",
     "MatchProposal",
     "Measurement",
+    "MissingFileError",
+    "MissingKeyError",
     "Observation",
     "Option",
     "Orientation",

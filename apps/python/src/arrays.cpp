@@ -26,9 +26,34 @@ py::object with_states(const py::object& given) {
   return states;
 }
 
+/// NumPy drops the mask of an array that has one, and turns times and complex numbers into others.
+void refuse_what_is_no_number(const py::object& given, const char* what) {
+  if (py::hasattr(given, "mask") && py::hasattr(given, "filled") &&
+      py::module_::import("numpy").attr("any")(given.attr("mask")).cast<bool>()) {
+    throw Error(ErrorCode::usage,
+                fmt::format("{}: some entries are masked; fill them, or leave them out", what));
+  }
+  if (!py::isinstance<py::array>(given)) return;
+  const char kind = py::reinterpret_borrow<py::array>(given).dtype().kind();
+  if (kind == 'M' || kind == 'm' || kind == 'c') {
+    throw Error(ErrorCode::usage,
+                fmt::format("{}: expected numbers, not {}", what,
+                            kind == 'c' ? "complex ones" : "times; divide by a unit of time"));
+  }
+}
+
 }  // namespace
 
+bool is_one_id(const py::object& ids) {
+  return PyIndex_Check(ids.ptr()) != 0 && !py::isinstance<py::array>(ids);
+}
+
+Ids one_or_several(const py::object& ids, const std::string& what) {
+  return ids_of(is_one_id(ids) ? py::make_tuple(ids) : ids, what);
+}
+
 Ids ids_of(const py::object& sequence, const std::string& what, int dimensions) {
+  refuse_what_is_no_number(sequence, what.c_str());
   const py::array numbers = py::array::ensure(sequence);
   if (!numbers) {
     PyErr_Clear();
@@ -58,7 +83,15 @@ Ids ids_of(const py::object& sequence, const std::string& what, int dimensions) 
 
 Doubles doubles_of(const py::object& given, const std::string& what) {
   const py::object sequence = with_states(given);
-  Doubles numbers = Doubles::ensure(sequence);
+  // As what they are first: of a list, the type is known only then.
+  const py::object any =
+      py::isinstance<py::array>(sequence) ? sequence : py::object(py::array::ensure(sequence));
+  Doubles numbers;
+  if (any) {
+    refuse_what_is_no_number(sequence, what.c_str());
+    refuse_what_is_no_number(any, what.c_str());
+    numbers = Doubles::ensure(any);
+  }
   if (!numbers) {
     PyErr_Clear();
     throw Error(ErrorCode::usage, fmt::format("{}: expected numbers", what));

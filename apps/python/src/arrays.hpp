@@ -32,6 +32,11 @@ inline std::span<const Id> span_of(const Ids& array) {
 /// are not integers, and for another number of dimensions than `dimensions`.
 Ids ids_of(const py::object& sequence, const std::string& what, int dimensions = 1);
 
+/// Whether it is a single id, an `int` or an integer of NumPy, instead of several.
+bool is_one_id(const py::object& ids);
+/// The same of one id as well.
+Ids one_or_several(const py::object& ids, const std::string& what);
+
 /// Doubles of any sequence of numbers. Throws `Error` (usage), which names `what`.
 Doubles doubles_of(const py::object& sequence, const std::string& what);
 

@@ -33,4 +33,7 @@ void bind_exploration(py::module_& module);
 void bind_pictures(py::module_& module);
 void bind_components(py::module_& module);
 
+/// After these: using an object that `__new__` has made without `__init__` is a TypeError.
+void refuse_objects_without_init(py::module_& module);
+
 }  // namespace cairn::python

@@ -11,6 +11,7 @@
 #include "cairn/graph/packed.hpp"
 #include "cairn/runtime/error.hpp"
 #include "cairn/typed/symbol.hpp"
+#include "missing.hpp"
 
 namespace cairn::python {
 namespace {
@@ -61,8 +62,8 @@ class IndexTable {
   int at(Id id, std::size_t factor) const {
     const int index = table_.empty() ? graph_->find(id).value_or(-1) : looked_up(id);
     if (index < 0) {
-      throw Error(ErrorCode::usage, fmt::format("ids[{}]: there is no variable {} in the graph",
-                                                factor, id_text(id)));
+      throw MissingKey(
+          fmt::format("ids[{}]: there is no variable {} in the graph", factor, id_text(id)));
     }
     return index;
   }

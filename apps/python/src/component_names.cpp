@@ -18,6 +18,13 @@
 namespace cairn::python {
 namespace {
 
+/// Losses by the names that they were made from. Under the interpreter's lock, as all that has
+/// Python objects.
+std::map<std::string, std::weak_ptr<const Loss>>& made_losses() {
+  static std::map<std::string, std::weak_ptr<const Loss>> losses;
+  return losses;
+}
+
 std::string text_of(const std::string& name, const py::handle& value) {
   if (py::isinstance<py::bool_>(value)) return option_text(value.cast<bool>());
   if (py::isinstance<py::str>(value)) return value.cast<std::string>();
@@ -114,12 +121,20 @@ std::shared_ptr<const Loss> loss_of(const py::object& name) {
     throw Error(ErrorCode::usage,
                 "a loss is given by its name and options, such as 'cauchy:scale=2'");
   }
-  // Under the interpreter's lock, as all that has Python objects.
-  static std::map<std::string, std::weak_ptr<const Loss>> losses;
-  std::weak_ptr<const Loss>& known = losses[name.cast<std::string>()];
+  std::weak_ptr<const Loss>& known = made_losses()[name.cast<std::string>()];
   std::shared_ptr<const Loss> loss = known.lock();
   if (!loss) known = loss = default_registry().make<Loss>(name.cast<std::string>());
   return loss;
+}
+
+py::object name_of_loss(const Loss* loss) {
+  if (!loss) return py::none();
+  for (const auto& [name, made] : made_losses()) {
+    if (made.lock().get() == loss) return py::str(name);
+  }
+  throw Error(ErrorCode::usage,
+              "a graph cannot be pickled whose losses were not given by name: give them with "
+              "set_loss");
 }
 
 FactorSelector selector_of(const std::string& which) {

@@ -31,6 +31,10 @@ ComponentSpec component_spec(const std::string& text, const py::kwargs& options,
 /// same text, so that factors that are added one by one share it.
 std::shared_ptr<const Loss> loss_of(const py::object& name);
 
+/// The name with options that a loss was made from; None: there is none. Throws `Error` (usage) for
+/// one that was not made by `loss_of`.
+py::object name_of_loss(const Loss* loss);
+
 /// "all", "loops", or the tag of a factor type. Throws `Error` (usage) for any other text.
 FactorSelector selector_of(const std::string& which);
 

@@ -15,6 +15,7 @@
 #include "cairn/runtime/error.hpp"
 #include "cairn/typed/covariance.hpp"
 #include "cairn/typed/symbol.hpp"
+#include "missing.hpp"
 
 namespace cairn::python {
 namespace {
@@ -24,9 +25,10 @@ using Pairs = std::vector<std::pair<Id, Id>>;
 /// The tangent size of all variables on one side of the pairs, which must be the same.
 int common_size(const Graph& graph, const Pairs& pairs, Id std::pair<Id, Id>::*side) {
   if (pairs.empty()) return 0;
-  const int size = cairn::detail::tangent_size(graph, pairs.front().*side);
+  const auto size_of = [&](Id id) { return graph.type(index_of(graph, id)).tangent_size(); };
+  const int size = size_of(pairs.front().*side);
   for (const auto& pair : pairs) {
-    const int other = cairn::detail::tangent_size(graph, pair.*side);
+    const int other = size_of(pair.*side);
     if (other == size) continue;
     throw Error(ErrorCode::usage,
                 fmt::format("an array has blocks of one size, and that of variable {} is {}, of {} "
@@ -50,11 +52,12 @@ py::array_t<double> blocks(BoundGraph& bound, const Pairs& pairs, const std::str
   return blocks_of(numbers, static_cast<std::size_t>(rows), static_cast<std::size_t>(columns));
 }
 
-py::array_t<double> marginals(BoundGraph& bound, const py::object& ids, const std::string& solver) {
+py::object marginals(BoundGraph& bound, const py::object& ids, const std::string& solver) {
   Pairs pairs;
-  const Ids names = ids_of(ids, "ids");
+  const Ids names = one_or_several(ids, "ids");
   for (const Id id : span_of(names)) pairs.emplace_back(id, id);
-  return blocks(bound, pairs, solver);
+  py::object all = blocks(bound, pairs, solver);
+  return is_one_id(ids) ? all[py::int_(0)] : all;
 }
 
 py::array_t<double> cross_covariances(BoundGraph& bound, const py::object& ids,
@@ -76,7 +79,7 @@ void bind_covariances(py::module_& module) {
   module.def(
       "marginals", &marginals, py::arg("graph"), py::arg("ids"), py::kw_only(),
       py::arg("linear_solver") = "block_cholesky",
-      R"(Marginal covariances of variables of one tangent size d, at the present estimate: (n, d, d).
+      R"(Marginal covariances of variables of one tangent size d, at the present estimate: (d, d) of one id, (n, d, d) of several.
 
 They are of the step delta with x_true = x.retract(delta): for a pose metres along its own axes, then radians. Fixed and
 anchored variables are certain, and all others uncertain relative to them. Factorises once for all; an Error ("numerical")

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "cairn/runtime/error.hpp"
 
+#include <cerrno>
 #include <cstddef>
 #include <exception>
 #include <string>
 #include <string_view>
 
 #include "bindings.hpp"
+#include "missing.hpp"
 
 namespace cairn::python {
 namespace {
@@ -17,7 +19,11 @@ const char* const kDoc =
 How an optimisation ended is no exception: see `Summary.status`.
 
 kind: "usage" (a bad call: an unknown name, option or argument), "input" (a bad file or bad data), "numerical" (a number
-was asked for that does not exist) or "plugin" (a plugin that is missing, broken or does not fit).)";
+was asked for that does not exist) or "plugin" (a plugin that is missing, broken or does not fit).
+
+An error is an exception of Python's kind as well where there is one: a file that is not there is a FileNotFoundError
+(cairn.MissingFileError), an id that is not there a KeyError (cairn.MissingKeyError), and any other bad value, shape or
+file a ValueError (cairn.InvalidError).)";
 
 const char* kind_of(ErrorCode code) {
   switch (code) {
@@ -43,27 +49,60 @@ std::string in_words_of_python(std::string message) {
   return message;
 }
 
-// The translator of exceptions is a plain function, so the class has to be where it can find it. It
-// lives as long as the process, as modules do.
-PyObject* error_class = nullptr;
+// The translator of exceptions is a plain function, so the classes have to be where it can find
+// them. They live as long as the process, as modules do.
+struct Classes {
+  PyObject *error, *invalid, *missing_key, *missing_file;
+} classes{};
+
+py::object made(PyObject* type, const Error& error) {
+  py::object instance = py::handle(type)(in_words_of_python(error.what()));
+  instance.attr("kind") = kind_of(error.code());
+  return instance;
+}
 
 void translate(std::exception_ptr thrown) {
   try {
     if (thrown) std::rethrow_exception(thrown);
+  } catch (const MissingFile& error) {
+    const py::object instance = made(classes.missing_file, error);
+    instance.attr("errno") = ENOENT;
+    instance.attr("filename") = error.file().string();
+    PyErr_SetObject(classes.missing_file, instance.ptr());
+  } catch (const MissingKey& error) {
+    PyErr_SetObject(classes.missing_key, made(classes.missing_key, error).ptr());
   } catch (const Error& error) {
-    const py::object instance = py::handle(error_class)(in_words_of_python(error.what()));
-    instance.attr("kind") = kind_of(error.code());
-    PyErr_SetObject(error_class, instance.ptr());
+    const bool invalid = error.code() == ErrorCode::usage || error.code() == ErrorCode::input;
+    PyObject* const type = invalid ? classes.invalid : classes.error;
+    PyErr_SetObject(type, made(type, error).ptr());
   }
+}
+
+/// A class that is an Error and a built-in one, and is shown as the text that it was made with.
+PyObject* add_class(py::module_& module, const char* name, PyObject* built_in, const char* doc) {
+  py::dict members;
+  members["__str__"] = py::handle(PyExc_BaseException).attr("__str__");  // a KeyError quotes it
+  const py::tuple bases = py::make_tuple(py::handle(classes.error), py::handle(built_in));
+  PyObject* const made = PyErr_NewExceptionWithDoc((std::string("cairn.") + name).c_str(), doc,
+                                                   bases.ptr(), members.ptr());
+  if (!made) throw py::error_already_set();
+  module.add_object(name, made);
+  return made;
 }
 
 }  // namespace
 
 void bind_errors(py::module_& module) {
-  error_class = PyErr_NewExceptionWithDoc("cairn.Error", kDoc, PyExc_RuntimeError, nullptr);
-  if (!error_class) throw py::error_already_set();
-  py::handle(error_class).attr("kind") = "usage";  // of one that Python code raises itself
-  module.add_object("Error", error_class);
+  classes.error = PyErr_NewExceptionWithDoc("cairn.Error", kDoc, PyExc_RuntimeError, nullptr);
+  if (!classes.error) throw py::error_already_set();
+  py::handle(classes.error).attr("kind") = "usage";  // of one that Python code raises itself
+  module.add_object("Error", classes.error);
+  classes.invalid = add_class(module, "InvalidError", PyExc_ValueError,
+                              "A value, shape, option or file that is not as it has to be.");
+  classes.missing_key = add_class(module, "MissingKeyError", PyExc_KeyError,
+                                  "An id, or the position of a factor, that is not there.");
+  classes.missing_file = add_class(module, "MissingFileError", PyExc_FileNotFoundError,
+                                   "A file, or the folder of one, that is not there.");
   py::register_exception_translator(&translate);
 }
 

@@ -15,10 +15,15 @@
 #include "cairn/runtime/error.hpp"
 #include "cairn/typed/symbol.hpp"
 #include "component_names.hpp"
+#include "missing.hpp"
 #include "types_of.hpp"
 
 namespace cairn::python {
 namespace {
+
+void expect_variable(const Estimator& estimator, Id id) {
+  if (!estimator.has(id)) throw MissingKey("there is no variable " + id_text(id));
+}
 
 py::array_t<Id> ids_of_type(HasEstimator& bound, const py::object& type) {
   Estimator& estimator = bound.get();
@@ -64,6 +69,8 @@ py::array_t<double> blocks(HasEstimator& bound, std::span<const Id> first,
   const EstimatorUse use(bound);
   Estimator& estimator = use.estimator();
   if (first.empty()) return blocks_of({}, 0, 0);
+  for (const Id id : first) expect_variable(estimator, id);
+  for (const Id id : second) expect_variable(estimator, id);
   const int rows = estimator.type(first[0])->tangent_size();
   const int columns = estimator.type(second[0])->tangent_size();
   const std::size_t size = static_cast<std::size_t>(rows) * static_cast<std::size_t>(columns);
@@ -88,10 +95,9 @@ py::array_t<double> blocks(HasEstimator& bound, std::span<const Id> first,
 }
 
 py::object covariance(HasEstimator& bound, const py::object& ids) {
-  const bool one = py::isinstance<py::int_>(ids);
-  const Ids names = one ? ids_of(py::make_tuple(ids), "ids") : ids_of(ids, "ids");
+  const Ids names = one_or_several(ids, "ids");
   py::object all = blocks(bound, span_of(names), span_of(names));
-  return one ? all[py::int_(0)] : all;
+  return is_one_id(ids) ? all[py::int_(0)] : all;
 }
 
 py::array_t<double> cross_covariances(HasEstimator& bound, const py::object& pairs) {
@@ -118,6 +124,7 @@ void bind_estimates(py::module_& module) {
           "estimate",
           [](HasEstimator& bound, Id id) {
             Estimator& e = bound.get();
+            expect_variable(e, id);
             return value_of(*e.type(id), e.state(id));
           },
           py::arg("id"),

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <limits>
 #include <string>
 #include <system_error>
 #include <vector>
@@ -25,6 +26,7 @@
 #include "component_names.hpp"
 #include "floors.hpp"
 #include "ids.hpp"
+#include "missing.hpp"
 
 namespace cairn::python {
 namespace {
@@ -35,6 +37,11 @@ const char* const kDoc =
 cells: (rows, columns) integers; row 0 is the lowest, x counts columns to the right and y rows upwards.
 resolution: the side of a cell [m].
 origin: x y [m] of the lower left corner of cell (0, 0), and the angle [rad] by which the grid is turned about it.)";
+
+/// Of an array, at most as many as an `int` can be, which no floor has.
+int count_of(py::ssize_t size) {
+  return static_cast<int>(std::min<py::ssize_t>(size, std::numeric_limits<int>::max()));
+}
 
 OccupancyGrid make(const py::object& given, double resolution, const std::vector<double>& origin) {
   const py::array of_any_type = py::array::ensure(given);
@@ -50,19 +57,19 @@ OccupancyGrid make(const py::object& given, double resolution, const std::vector
   }
   if (kind == 'u' && of_any_type.itemsize() == sizeof(std::uint64_t))
     throw Error(ErrorCode::usage, "cells: uint64 is too large for per cent; use int8");
-  const auto cells = py::array_t<std::int64_t, py::array::c_style>::ensure(of_any_type);
-  if (cells.ndim() != 2)
-    throw Error(ErrorCode::usage,
-                fmt::format("cells: the shape is {}, expected (rows, columns)", shape_text(cells)));
+  if (of_any_type.ndim() != 2)
+    throw Error(ErrorCode::usage, fmt::format("cells: the shape is {}, expected (rows, columns)",
+                                              shape_text(of_any_type)));
   if (origin.size() != 3)
     throw Error(ErrorCode::usage, "origin: expected x y [m] and an angle [rad]");
   OccupancyGrid floor;
-  floor.frame.height = static_cast<int>(cells.shape(0));
-  floor.frame.width = static_cast<int>(cells.shape(1));
+  floor.frame.height = count_of(of_any_type.shape(0));
+  floor.frame.width = count_of(of_any_type.shape(1));
   floor.frame.resolution = resolution;
   floor.frame.origin = {origin[0], origin[1]};
   floor.frame.yaw = origin[2];
-  check_frame(floor.frame, "Floor");
+  check_frame(floor.frame, "Floor");  // before the cells are copied
+  const auto cells = py::array_t<std::int64_t, py::array::c_style>::ensure(of_any_type);
   floor.occupancy.reserve(static_cast<std::size_t>(cells.size()));
   for (py::ssize_t k = 0; k < cells.size(); ++k) {
     const std::int64_t value = cells.data()[k];
@@ -86,13 +93,17 @@ py::array_t<std::int8_t> cells_of(const OccupancyGrid& floor) {
 void check_is_file(const std::string& name) {
   const ComponentSpec spec = parse_component(name.substr(0, name.find(':')));
   if (std::filesystem::exists(name) || !default_registry().has(FloorPlan::kKind, spec.name)) return;
-  throw Error(ErrorCode::input,
-              fmt::format("there is no file '{0}'; '@{0}' makes that floor plan", name));
+  throw MissingFile(
+      Error(ErrorCode::input,
+            fmt::format("there is no file '{0}'; '@{0}' makes that floor plan", name)),
+      name);
 }
 
 OccupancyGrid read(const std::filesystem::path& path) {
   const py::gil_scoped_release unlocked;
-  return read_grid(path.string(), default_registry());
+  const std::string name = path.string();
+  return with_file(path, name.substr(0, name.find(':')),  // options may follow
+                   [&] { return read_grid(name, default_registry()); });
 }
 
 OccupancyGrid generate(const std::string& plan, std::uint64_t seed, const py::kwargs& options) {
@@ -157,7 +168,8 @@ void bind_floors(py::module_& module) {
           "write",
           [](const OccupancyGrid& floor, const std::filesystem::path& path) {
             const py::gil_scoped_release unlocked;
-            write_grid(floor, path.string(), default_registry());
+            with_file(path, path.parent_path(),
+                      [&] { write_grid(floor, path.string(), default_registry()); });
           },
           py::arg("path"), "Writes it: floor.yaml, with floor.png beside it, as ROS' map server.")
       .def("__repr__", [](const OccupancyGrid& floor) {

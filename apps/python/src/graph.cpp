@@ -26,6 +26,8 @@
 #include "graph_arrays.hpp"
 #include "ids.hpp"
 #include "measured.hpp"
+#include "missing.hpp"
+#include "pickles.hpp"
 #include "types_of.hpp"
 
 namespace cairn::python {
@@ -67,30 +69,26 @@ int add_measurement(BoundGraph& bound, const Measured& measured, const py::objec
 /// The estimate of a variable as the value that its type stands for, else its numbers.
 py::object value_at(BoundGraph& bound, Id id) {
   const Graph& graph = bound.get();
-  const int index = cairn::detail::index_of(graph, id);
+  const int index = index_of(graph, id);
   return value_of(graph.type(index), graph.state(index));
 }
 
 Measured measured_at(BoundGraph& bound, int position) {
   const Graph& graph = bound.get();
   if (position < 0 || position >= graph.factor_count()) {
-    throw Error(ErrorCode::usage, fmt::format("there is no factor {}: the graph has {}", position,
-                                              graph.factor_count()));
+    throw MissingKey(
+        fmt::format("there is no factor {}: the graph has {}", position, graph.factor_count()));
   }
   Factor factor = graph.factor(position);
   return {std::string(factor.type->tag()), std::move(factor.variables),
           std::move(factor.measurement), std::move(factor.type)};
 }
 
-Ids one_or_several(const py::object& ids, const char* what) {
-  return ids_of(py::isinstance<py::int_>(ids) ? py::make_tuple(ids) : ids, what);
-}
-
 void fix(BoundGraph& bound, const py::object& ids, bool fixed) {
   Graph& graph = bound.get();
   const Ids which = one_or_several(ids, "ids");
   std::vector<int> indices;
-  for (const Id id : span_of(which)) indices.push_back(cairn::detail::index_of(graph, id));
+  for (const Id id : span_of(which)) indices.push_back(index_of(graph, id));
   for (const int index : indices) graph.set_fixed(index, fixed);
 }
 
@@ -116,10 +114,10 @@ void remove(BoundGraph& bound, const py::args& unnamed, const py::object& ids,
             variables = one_or_several(ids, "variables");
   for (const Id position : span_of(positions)) {
     if (position < 0 || position >= graph.factor_count())
-      throw Error(ErrorCode::usage, fmt::format("there is no factor {}", position));
+      throw MissingKey(fmt::format("there is no factor {}", position));
     factor_leaves[static_cast<std::size_t>(position)] = true;
   }
-  for (const Id id : span_of(variables)) variable_leaves[cairn::detail::index_of(graph, id)] = true;
+  for (const Id id : span_of(variables)) variable_leaves[index_of(graph, id)] = true;
   for (int f = 0; f < graph.factor_count(); ++f) {
     for (const int v : graph.factor_variables(f)) {
       if (variable_leaves[v]) factor_leaves[f] = true;
@@ -281,6 +279,7 @@ void bind_graph(py::module_& module) {
   bind_building(graph);
   bind_contents(graph);
   bind_graph_arrays(graph);
+  bind_pickles(graph);
 }
 
 }  // namespace cairn::python

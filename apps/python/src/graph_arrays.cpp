@@ -18,6 +18,7 @@
 #include "component_names.hpp"
 #include "ids.hpp"
 #include "measured.hpp"
+#include "missing.hpp"
 #include "types_of.hpp"
 
 namespace cairn::python {
@@ -60,7 +61,7 @@ std::shared_ptr<const FactorType> type_between(const Graph& graph, const py::obj
     return tags.size() == 1 ? factor_type_of(graph, tags.front()) : factor_type_of(graph, given);
   std::vector<std::string> joined;
   for (py::ssize_t k = 0; k < ids.shape(1); ++k)
-    joined.emplace_back(graph.type(cairn::detail::index_of(graph, ids.data()[k])).tag());
+    joined.emplace_back(graph.type(index_of(graph, ids.data()[k])).tag());
   for (const std::string& tag : tags) {
     auto type = factor_type_of(graph, tag);
     if (std::ranges::equal(type->variable_tags(), joined)) return type;
@@ -134,8 +135,7 @@ void set_states(BoundGraph& bound, const py::object& type, const py::object& sta
     for (const Id id : span_of(names)) {
       const auto v = graph.find(id);
       if (!v || graph.type_of(*v) != pool.type) {
-        throw Error(ErrorCode::usage,
-                    fmt::format("there is no {} {} in the graph", pool.type->tag(), id));
+        throw MissingKey(fmt::format("there is no {} {} in the graph", pool.type->tag(), id));
       }
       variables.push_back(*v);
     }

@@ -10,6 +10,7 @@
 #include "cairn/runtime/error.hpp"
 #include "cairn/typed/symbol.hpp"
 #include "measured.hpp"
+#include "missing.hpp"
 
 namespace cairn::python {
 
@@ -18,6 +19,11 @@ void check_new_ids(std::span<const Id> ids) {
   if (below == ids.end()) return;
   throw Error(ErrorCode::usage,
               fmt::format("the id {} is below 0: ids are from 0, as in files", *below));
+}
+
+int index_of(const Graph& graph, Id id) {
+  if (const auto index = graph.find(id)) return *index;
+  throw MissingKey("there is no variable " + id_text(id) + " in the graph");
 }
 
 std::string type_name(const py::object& object) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "bindings.hpp"
 #include "cairn/runtime/version.hpp"
+#include "pickles.hpp"
 
 PYBIND11_MODULE(_cairn, module) {
   namespace python = cairn::python;
@@ -26,4 +27,6 @@ PYBIND11_MODULE(_cairn, module) {
   python::bind_exploration(module);
   python::bind_pictures(module);
   python::bind_components(module);
+  python::refuse_objects_without_init(module);
+  python::take_all_protocols(module);
 }

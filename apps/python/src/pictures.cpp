@@ -22,6 +22,7 @@
 #include "cairn/runtime/error.hpp"
 #include "cairn/typed/symbol.hpp"
 #include "component_names.hpp"
+#include "missing.hpp"
 
 namespace cairn::python {
 namespace {
@@ -68,7 +69,7 @@ std::vector<ReportedCovariance> covariances_of(const py::object& given, const st
   for (const Id id : span_of(ids)) {
     const std::optional<int> variable = graph.find(id);
     if (!variable) {
-      throw Error(ErrorCode::usage, fmt::format("{}: there is no variable {}", what, id_text(id)));
+      throw MissingKey(fmt::format("{}: there is no variable {}", what, id_text(id)));
     }
     const std::span<const double> block = numbers.subspan(all.size() * size, size);
     const int d = graph.type(*variable).tangent_size();

@@ -229,6 +229,9 @@ void bind_space(py::module_& module) {
           },
           py::arg("roll"), py::arg("pitch"), py::arg("yaw"), "R_z(yaw) R_y(pitch) R_x(roll) [rad].")
       .def_static(
+          "yaw", [](double angle) { return Rot3::yaw(angle); }, py::arg("angle"),
+          "A turn about the z axis [rad].")
+      .def_static(
           "from_quaternion",
           [](double x, double y, double z, double w) {
             return Rot3(Eigen::Quaterniond(w, x, y, z));

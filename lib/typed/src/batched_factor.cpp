@@ -12,6 +12,7 @@
 namespace cairn {
 namespace {
 
+constexpr int kMostNumbers = 1000;  // of a residual or a measurement
 constexpr double kStep = 6e-6;  // the cube root of the rounding error: best for central differences
 
 std::size_t size_of(int n) { return static_cast<std::size_t>(n); }
@@ -134,9 +135,13 @@ BatchedFactorType::BatchedFactorType(Description description)
     throw Error(ErrorCode::usage, "factor type '" + description_.tag + "': " + what);
   };
   if (description_.tag.empty()) refuse("it needs a tag, such as EDGE_RANGE");
+  if (std::ranges::any_of(description_.tag, [](unsigned char c) { return c <= ' ' || c == 0x7f; }))
+    refuse("its tag has a blank or a control character, and is one word of a line in files");
   if (description_.variables.empty()) refuse("it needs the types of its variables");
   if (description_.residual_size < 1) refuse("its residual has at least one number");
+  if (description_.residual_size > kMostNumbers) refuse("its residual has at most 1000 numbers");
   if (description_.measurement_size < 0) refuse("the size of its measurement is negative");
+  if (description_.measurement_size > kMostNumbers) refuse("it measures at most 1000 numbers");
   for (const auto& type : description_.variables) {
     if (!type) refuse("the type of a variable is null");
     tags_.push_back(type->tag());
