@@ -172,8 +172,12 @@ LocalProblem crop(const WorkGraph& work, std::vector<int> removed, bool whole) {
                                                           [&](int v) { return !graph.fixed(v); });
   if (local.refusal.empty()) local.refusal = find_types(work, kinds, whole, local);
   if (!local.refusal.empty()) return local;
-  // Within the blanket: what determines only how its nodes lie to each other.
+  // Within the blanket: what determines only how its nodes lie to each other. Such a factor is on
+  // two of them at least, so that the one with most factors, as the middle of a star, is left out.
+  const auto most =
+      std::ranges::max_element(local.blanket, {}, [&](int v) { return work.on(v).size(); });
   for (const int v : local.blanket) {
+    if (v == *most) continue;
     for (const int f : work.on(v)) {
       const WorkFactor& factor = work.factor(f);
       const bool within = std::ranges::all_of(factor.variables, [&](int other) {

@@ -57,7 +57,10 @@ std::vector<int> WorkGraph::blanket(std::span<const int> variables) const {
 
 void WorkGraph::remove_factor(int f) {
   factors_[f].there = false;
-  for (const int v : factors_[f].variables) std::erase(on_[v], f);
+  for (const int v : factors_[f].variables) {
+    const auto place = std::ranges::lower_bound(on_[v], f);  // they rise
+    if (place != on_[v].end() && *place == f) on_[v].erase(place);
+  }
 }
 
 void WorkGraph::add(std::shared_ptr<const FactorType> type, std::vector<int> variables,
