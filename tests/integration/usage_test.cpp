@@ -354,7 +354,7 @@ TEST(Usage, AnExceptionInAPluginNamesThePluginsPart) {
                                "VERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 1 0 0\n"
                                "EDGE_SE2 0 1 1.1 0 0 1 0 0 1 0 1\nEDGE_BRITTLE 1 7 1\n"
                                "EDGE_BRITTLE 1 0.9 1\nCHI2\nESTIMATE ALL\n");
-  EXPECT_EQ(online.code, 0) << online.err;
+  EXPECT_EQ(online.exit_code, 0) << online.err;
   EXPECT_THAT(online.out, HasSubstr("ERROR line 4: factor 'EDGE_BRITTLE' failed: the measurement "
                                     "is out of my range (EDGE_BRITTLE 1)\n"));
   EXPECT_THAT(online.out, HasSubstr("OK 7 variables 2 factors 2 owed 0\n"));
