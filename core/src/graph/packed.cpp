@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "cairn/graph/packed.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "dense/cholesky.hpp"
@@ -9,9 +10,20 @@
 namespace cairn {
 namespace {
 
-/// A pivot of Cholesky's method above this share of its diagonal entry is one. What is below may be
-/// what rounding left of zero, where a small pivot before it has magnified that.
-constexpr double kSurePivot = 1e-8;
+/// Whether pivots of Cholesky's method are more than what rounding left of zero, which the small
+/// ones before them magnify. They are given as shares of their diagonal entries.
+class SurePivots {
+ public:
+  bool operator()(double share) {
+    constexpr double kRounding = 1e-14;
+    const bool sure = share > kRounding / smallest_;
+    smallest_ = std::min(smallest_, share);
+    return sure;
+  }
+
+ private:
+  double smallest_ = 1.0;
+};
 
 /// Cholesky's factor. False unless A is surely positive definite. `L` has the size of A.
 template <class Matrix>
@@ -24,9 +36,10 @@ bool cholesky(std::span<const double> A, Matrix L, std::span<double> U) {
   const Eigen::LLT<Matrix, Eigen::Lower> llt(L);
   if (llt.info() != Eigen::Success || !std::isfinite(llt.matrixLLT()(n - 1, n - 1))) return false;
   k = 0;
+  SurePivots is_sure;
   for (Eigen::Index row = 0; row < n; k += static_cast<std::size_t>(n - row++)) {
     const double pivot = llt.matrixLLT()(row, row);
-    if (!(pivot * pivot > kSurePivot * A[k])) return false;
+    if (!is_sure(pivot * (pivot / A[k]))) return false;
   }
   k = 0;
   for (Eigen::Index row = 0; row < n; ++row) {
@@ -54,9 +67,10 @@ bool cholesky_with_zeros(std::span<const double> A, int n, std::span<double> roo
   if (!rest.allFinite()) return false;
   const Eigen::VectorXd scale = rest.diagonal().cwiseAbs().cwiseSqrt();
   Eigen::MatrixXd U = Eigen::MatrixXd::Zero(n, n);
+  SurePivots is_sure;
   for (int k = 0; k < n; ++k) {
     if (rest(k, k) > kZeroPivot * scale(k) * scale(k)) {
-      if (!(rest(k, k) > kSurePivot * scale(k) * scale(k))) return false;
+      if (!is_sure(rest(k, k) / scale(k) / scale(k))) return false;
       U.row(k).tail(n - k) = rest.row(k).tail(n - k) / std::sqrt(rest(k, k));
       rest.bottomRightCorner(n - k, n - k) -=
           U.row(k).tail(n - k).transpose() * U.row(k).tail(n - k);
