@@ -119,7 +119,7 @@ void add_input_options(ArgumentParser cli, InputOptions& options) {
       .component({"format"})
       .type_name("FORMAT");
   cli.add_flag("--skip-unknown", options.read.skip_unknown,
-               "skip and count lines with unknown tags and factors on vertices that are skipped");
+               "skip and count lines with unknown tags, and what is on skipped vertices");
   cli.add_flag("--repair-information", options.read.repair_information,
                "repair known mistakes in information matrices");
   cli.add_flag("--unit-information", options.read.unit_information,

@@ -147,9 +147,9 @@ int run(const PlotOptions& options, Session& session) {
 Command add_plot(ArgumentParser program) {
   auto options = std::make_shared<PlotOptions>();  // lives as long as the parser and the run
   ArgumentParser cli = program.add_command("plot", "a static plot: SVG, PNG or PDF");
-  add_album_options(cli, options->album,
-                    "graphs (.gz too, @KIND to generate), trajectories, recordings, JSON of "
-                    "optimize, bench or replay, CSV");
+  add_album_options(
+      cli, options->album,
+      "graph, @KIND, trajectory, recording, CSV, JSON of optimize, bench, replay");
   cli.add_option("-o,--output", options->output,
                  "the plot: .svg, .png or .pdf [name of the first FILE, .svg]")
       .type_name("PICTURE");
