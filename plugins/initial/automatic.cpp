@@ -227,6 +227,9 @@ class Automatic final : public InitialGuess, public WatchedGuess, public SecondL
     const double fall = summary.initial_chi2 / summary.final_chi2;
     if (!(fall < kToNothing)) return {};  // an exact solution: none is lower
     if (has_bounded_losses(graph)) return "since the loss is bounded";
+    // Where measurements are wrong, minima are many, and none is the right one: that is said.
+    const std::int64_t dof = degrees_of_freedom(graph, resolve_gauge(graph));
+    if (!is_plausible(summary.final_chi2, dof)) return {};
     const double angle = largest_turn(graph);
     if (fall > kLargeFall && angle > kSmallAngle)
       return fmt::format("since chi2 fell {:.3g} times from the start", fall);

@@ -169,6 +169,26 @@ TEST_F(OptimizeCommand, ALossOnLoopsTamesOutliers) {
   EXPECT_THAT(none.err, HasSubstr("--loss-on selects no factor of this graph"));
 }
 
+TEST_F(OptimizeCommand, TheResultsShowWhichStartWasTakenAndWhatDecided) {
+  if (!Registry().has("initial_guess", "auto")) GTEST_SKIP() << "there is no initial guess auto";
+  const Outcome run = cairn({"optimize", graph(), "--quiet"});
+  EXPECT_EQ(run.exit_code, 0);
+  EXPECT_THAT(unfolded(run.out), HasSubstr("start chordal (chi2 "));
+  EXPECT_THAT(unfolded(run.out), HasSubstr("; not as_given (chi2 "));
+}
+
+TEST_F(OptimizeCommand, SaysHowManyLoopClosuresALossRejectsAndThatNoFileHasIt) {
+  if (!Registry().has("loss", "tukey")) GTEST_SKIP() << "there is no loss tukey";
+  const std::string file = folder_.file("best.g2o");
+  const auto report = report_of({"optimize", "@ring:poses=170,outliers=5", "--loss", "tukey",
+                                 "--loss-on", "loops", "-o", file});
+  std::string notes;
+  for (const auto& note : report.at("notes").as_array()) notes += note.as_string().c_str();
+  EXPECT_THAT(notes, HasSubstr("loop closures less than 1 % of their weight"));
+  EXPECT_THAT(notes, HasSubstr("are not in the file: no format has them"));
+  EXPECT_THAT(notes, Not(HasSubstr("hardly")));
+}
+
 TEST_F(OptimizeCommand, AnOptimizerThatTakesNoLinearSolverSaysWhatToUseInstead) {
   if (!Registry().has("optimizer", "ceres")) GTEST_SKIP() << "built without Ceres";
   const Outcome outcome =

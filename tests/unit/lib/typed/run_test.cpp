@@ -22,6 +22,7 @@ namespace {
 using testing::AllOf;
 using testing::Contains;
 using testing::HasSubstr;
+using testing::IsEmpty;
 using testing::Not;
 using testing::StartsWith;
 
@@ -81,6 +82,21 @@ TEST(Optimize, FindsTheMinimumWhereTheStatesEndInAnother) {
   EXPECT_NEAR(optimize(stuck).final_chi2, chosen.final_chi2, 1e-6 * chosen.final_chi2);
   // An optimised graph stays as it is, and nothing is said of a choice.
   EXPECT_THAT(optimize(graph).notes, Not(Contains(StartsWith("initial guess"))));
+}
+
+TEST(Write, SaysThatLossesAreNotInTheFile) {
+  CAIRN_NEEDS("format", "g2o");
+  CAIRN_NEEDS("loss", "cauchy");
+  const std::filesystem::path file =
+      std::filesystem::path(testing::TempDir()) / "losses_not_written.g2o";
+  Graph graph = drifted_square();
+  EXPECT_THAT(write(graph, file), IsEmpty());
+  graph.set_loss(0, make<Loss>("cauchy"));
+  EXPECT_THAT(write(graph, file), StartsWith("the losses of 1 factor are not in the file"));
+  EXPECT_FALSE(read(file).has_losses());
+  graph.set_loss(nullptr);
+  EXPECT_THAT(write(graph, file), IsEmpty());
+  std::filesystem::remove(file);
 }
 
 TEST(Optimize, SaysThatChi2IsImplausible) {

@@ -26,10 +26,10 @@ std::unique_ptr<Interface> make(std::string_view spec, Registry& registry = defa
 
 /// Minimises chi2, and leaves the best states found in the graph. The start is chosen by the
 /// initial guess `auto`, as `cairn optimize` does: the graph's states if they are good, else the
-/// best of others by chi2; a note says what was chosen where it is not the graph's states. Notes
-/// say as well if chi2 of the result is implausible (`reasons_for_doubt`). How it ended is
-/// `Summary::status`; not converging is no exception. Without the plugin of initial guesses it
-/// starts from the graph's states.
+/// best of others by chi2, and lower minima are looked for where that went far (`look_again`); a
+/// note says what was chosen where it is not the graph's states. Notes say as well what is to be
+/// said of the result (`notes_on_estimate`). How it ended is `Summary::status`; not converging is
+/// no exception. Without the plugin of initial guesses it starts from the graph's states.
 CAIRN_API Summary optimize(Graph& graph, std::string_view optimizer = "levenberg_marquardt",
                            const Stop& stop = {}, Registry& registry = default_registry());
 
