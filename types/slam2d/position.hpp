@@ -15,12 +15,12 @@ struct Position {
   using Variables = std::tuple<Se2>;
 
   template <class S>
-  static Vector<S, 2> residual(const Vector<S, 3>& x, const Measured<S, 2>& z) {
+  static Vector<S, 2> residual(const Vector<S, 3>& x, const Measured<S, 2>& z) noexcept {
     return {x[0] - z[0], x[1] - z[1]};
   }
   template <class S>
   static Vector<S, 2> evaluate(const Vector<S, 3>& x, const Vector<S, 2>& z,
-                               Eigen::Matrix<S, 2, 3>& J) {
+                               Eigen::Matrix<S, 2, 3>& J) noexcept {
     const so2::Rotation<S> R(x[2]);
     J << R.c, -R.s, S(0), R.s, R.c, S(0);
     return {x[0] - z[0], x[1] - z[1]};

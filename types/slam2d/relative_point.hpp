@@ -16,13 +16,13 @@ struct RelativePoint {
 
   template <class S>
   static Vector<S, 2> residual(const Vector<S, 2>& a, const Vector<S, 2>& b,
-                               const Measured<S, 2>& z) {
+                               const Measured<S, 2>& z) noexcept {
     return {b[0] - a[0] - z[0], b[1] - a[1] - z[1]};
   }
 
   template <class S>
   static Vector<S, 2> evaluate(const Vector<S, 2>& a, const Vector<S, 2>& b, const Vector<S, 2>& z,
-                               Eigen::Matrix<S, 2, 2>& J_a, Eigen::Matrix<S, 2, 2>& J_b) {
+                               Eigen::Matrix<S, 2, 2>& J_a, Eigen::Matrix<S, 2, 2>& J_b) noexcept {
     for (int k = 0; k < 4; ++k) {
       J_a.data()[k] = k % 3 == 0 ? -1.0 : 0.0;
       J_b.data()[k] = k % 3 == 0 ? 1.0 : 0.0;

@@ -18,14 +18,14 @@ struct Direction {
   using Variables = std::tuple<Se3>;
 
   template <class S>
-  static Vector<S, 3> residual(const Vector<S, 7>& x, const Measured<S, 6>& z) {
+  static Vector<S, 3> residual(const Vector<S, 7>& x, const Measured<S, 6>& z) noexcept {
     const Vector<S, 3> known{S(z[0]), S(z[1]), S(z[2])};
     const Vector<S, 3> seen = so3::rotate_back<S>(Se3::quaternion<S>(x), known);
     return {seen[0] - z[3], seen[1] - z[4], seen[2] - z[5]};
   }
   template <class S>
   static Vector<S, 3> evaluate(const Vector<S, 7>& x, const Vector<S, 6>& z,
-                               Eigen::Matrix<S, 3, 6>& J) {
+                               Eigen::Matrix<S, 3, 6>& J) noexcept {
     const Vector<S, 3> known(z[0], z[1], z[2]);
     const Vector<S, 3> seen = so3::rotate_back<S>(Se3::quaternion<S>(x), known);
     const so3::Matrix3<S> turning = so3::hat<S>(seen);

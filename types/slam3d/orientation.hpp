@@ -17,14 +17,14 @@ struct Orientation {
   using Variables = std::tuple<Se3>;
 
   template <class S>
-  static Vector<S, 3> residual(const Vector<S, 7>& x, const Measured<S, 4>& z) {
+  static Vector<S, 3> residual(const Vector<S, 7>& x, const Measured<S, 4>& z) noexcept {
     const Vector<S, 4> known = z.template cast<S>();
     const Vector<S, 6> e = Metric::template error<S>(turned<S>(x, known));
     return {e[3], e[4], e[5]};
   }
   template <class S>
   static Vector<S, 3> evaluate(const Vector<S, 7>& x, const Vector<S, 4>& z,
-                               Eigen::Matrix<S, 3, 6>& J) {
+                               Eigen::Matrix<S, 3, 6>& J) noexcept {
     ErrorDerivative<S> D;
     const Vector<S, 6> e = Metric::template derivative<S>(turned<S>(x, z), D);
     for (int k = 0; k < 9; ++k) {

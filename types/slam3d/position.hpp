@@ -16,12 +16,12 @@ struct Position {
   using Variables = std::tuple<Se3>;
 
   template <class S>
-  static Vector<S, 3> residual(const Vector<S, 7>& x, const Measured<S, 3>& z) {
+  static Vector<S, 3> residual(const Vector<S, 7>& x, const Measured<S, 3>& z) noexcept {
     return {x[0] - z[0], x[1] - z[1], x[2] - z[2]};
   }
   template <class S>
   static Vector<S, 3> evaluate(const Vector<S, 7>& x, const Vector<S, 3>& z,
-                               Eigen::Matrix<S, 3, 6>& J) {
+                               Eigen::Matrix<S, 3, 6>& J) noexcept {
     const so3::Matrix3<S> R = so3::matrix<S>(Se3::quaternion<S>(x));
     for (int k = 0; k < 9; ++k) {
       J.data()[k] = R.data()[k];

@@ -16,13 +16,13 @@ struct RelativePoint {
 
   template <class S>
   static Vector<S, 3> residual(const Vector<S, 3>& a, const Vector<S, 3>& b,
-                               const Measured<S, 3>& z) {
+                               const Measured<S, 3>& z) noexcept {
     return {b[0] - a[0] - z[0], b[1] - a[1] - z[1], b[2] - a[2] - z[2]};
   }
 
   template <class S>
   static Vector<S, 3> evaluate(const Vector<S, 3>& a, const Vector<S, 3>& b, const Vector<S, 3>& z,
-                               Eigen::Matrix<S, 3, 3>& J_a, Eigen::Matrix<S, 3, 3>& J_b) {
+                               Eigen::Matrix<S, 3, 3>& J_a, Eigen::Matrix<S, 3, 3>& J_b) noexcept {
     for (int k = 0; k < 9; ++k) {
       J_a.data()[k] = k % 4 == 0 ? -1.0 : 0.0;
       J_b.data()[k] = k % 4 == 0 ? 1.0 : 0.0;
