@@ -21,7 +21,7 @@ struct ConvertOptions {
   std::string input_file;
   std::string output_file;
   std::string output_format;
-  std::string axes;  ///< of IN
+  std::string axes;          ///< of IN
   std::string ground_truth;  ///< file, or empty
   InputOptions input;
 };

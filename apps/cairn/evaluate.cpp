@@ -474,9 +474,8 @@ Command add_evaluate(ArgumentParser program) {
   add_trajectory_options(cli, options->estimate, "", "ESTIMATE");
   add_trajectory_options(cli, options->truth, "truth-", "TRUTH");
   cli.add_flag("--planar", options->planar, "compare x, y and yaw only, as seen on a map");
-  cli.add_flag(
-      "--align-scale", options->scale,
-      "align with a scale, too, which the estimate of a single camera lacks, and print it");
+  cli.add_flag("--align-scale", options->scale,
+               "align with a scale too, which the estimate of one camera lacks");
   cli.add_flag("--kld", options->kld,
                "also the divergence D(TRUTH||ESTIMATE) of two graphs on the variables of both, in "
                "nats");

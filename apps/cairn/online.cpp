@@ -468,7 +468,7 @@ Command add_online(ArgumentParser program) {
                  "decides which poses are kept, such as compact_pose; default: all are")
       .component({"pose_policy"});
   cli.add_option("--thresholds", options->thresholds,
-                 "with --policy, take its thresholds from a file (cairn compact --save-thresholds)")
+                 "with --policy, take its thresholds from a file")
       .type_name("FILE");
   cli.add_option("--map", options->map,
                  "with --policy, continue this map; where on it is unknown at first")
@@ -509,8 +509,7 @@ Command add_online(ArgumentParser program) {
   cli.add_option("--journal", options->journal,
                  "restore the session from this journal, and append to it")
       .type_name("FILE");
-  cli.add_option("--sync", options->sync,
-                 "sync of the journal to disk: every line, batch (before answers) or none")
+  cli.add_option("--sync", options->sync, "sync of the journal to disk: every line, batch or none")
       .type_name("WHEN")
       .one_of({"every", "batch", "none"})
       .show_default();

@@ -209,8 +209,7 @@ int run(const OptimizeOptions& options, Session& session) {
   results.add(
       [&] { session.write_json(report_json(options, loaded, initial, summary, covariances)); });
   results.add([&] {
-    session.print(
-        summary_text(options, loaded, initial, summary, covariances, results, session));
+    session.print(summary_text(options, loaded, initial, summary, covariances, results, session));
   });
   results.finish();
   const int code = exit_code(summary, stop);

@@ -147,9 +147,8 @@ int run(const PlotOptions& options, Session& session) {
 Command add_plot(ArgumentParser program) {
   auto options = std::make_shared<PlotOptions>();  // lives as long as the parser and the run
   ArgumentParser cli = program.add_command("plot", "a static plot: SVG, PNG or PDF");
-  add_album_options(
-      cli, options->album,
-      "graph, @KIND, trajectory, recording, CSV, JSON of optimize, bench, replay");
+  add_album_options(cli, options->album,
+                    "graph, @KIND, trajectory, recording, CSV, JSON of optimize, bench, replay");
   cli.add_option("-o,--output", options->output,
                  "the plot: .svg, .png or .pdf [name of the first FILE, .svg]")
       .type_name("PICTURE");
@@ -200,7 +199,6 @@ Command add_plot(ArgumentParser program) {
       .component({"linear_solver"})
       .show_default();
   cli.footer(
-      "FILEs are laid together as by cairn view.\n\n"
       "Example:\n"
       "  cairn plot city.g2o best.g2o --truth truth.g2o -o city.svg\n"
       "  cairn plot run1.json run2.json --what convergence --x time -o curves.pdf\n"

@@ -43,10 +43,9 @@ const Arrangement kHorizontalRows{
       std::ranges::copy(std::array{in[0], in[1], 0.0, in[2], 0.0, 0.0}, rows.begin());
     }};
 /// I11 I12 I21 I22, symmetric.
-const Arrangement kWholeMatrix{
-    .to_rows = [](std::span<const double> in, std::span<double> rows) {
-      std::ranges::copy(std::array{in[0], in[1], in[3]}, rows.begin());
-    }};
+const Arrangement kWholeMatrix{.to_rows = [](std::span<const double> in, std::span<double> rows) {
+  std::ranges::copy(std::array{in[0], in[1], in[3]}, rows.begin());
+}};
 
 /// g2o has parameters of many kinds, all called PARAMS_ and a word in capitals.
 bool is_parameter_tag(std::string_view tag) {

@@ -25,12 +25,12 @@ std::shared_ptr<const Loss> make_weight(double w);
 std::shared_ptr<const Loss> make_wider(std::shared_ptr<const Loss> loss, double k);
 
 /// Whether ρ does not grow beyond some residual: chi2 is then hardly larger where all loop closures
-/// are wrong, so that it says little about a start.
+/// are wrong, so that it hardly depends on the start.
 bool is_bounded(const Loss& loss);
 /// Whether a graph has such a loss.
 bool has_bounded_losses(const Graph& graph);
 
-/// The losses of a graph, put back when this ends.
+/// What losses the factors have, put back when this ends.
 class KeptLosses {
  public:
   explicit KeptLosses(Graph& graph);

@@ -20,7 +20,9 @@ IMPLAUSIBLE = 25.0
 STARTS: List[Optional[str]] = [None, "odometry", "spanning_tree", "chordal", "incremental", "auto"]
 OPTIMIZERS = ["levenberg_marquardt", "dogleg"]
 """Notes that begin or go on like this inform: all others are doubts."""
-INFORMS = re.compile(r"initial guess \S+: |.*anchored|.*(is|are) free|.*stays? at the initial|converged at chi2 .* kept a better estimate")
+INFORMS = re.compile(
+    r"initial guess \S+: |.*anchored|.*gauge of a component is left free|.*(is|are) free|.*can (shift|turn|move)|without damping H is|"
+    r"the loss leaves [^:]*$|converged at chi2 .* kept a better estimate")
 
 
 @dataclass

@@ -8,7 +8,7 @@
 namespace cairn::slam2d {
 
 /// The position of a pose known to be z = (x y [m]), as from GNSS: error = t − z, along the axes of
-/// the world. Says nothing of the heading, so that it places no pose.
+/// the world. The heading is free, so that it places no pose.
 struct Position {
   static constexpr std::string_view kTag = "EDGE_PRIOR_SE2_XY";
   static constexpr int kResidual = 2, kMeasurement = 2;

@@ -8,7 +8,7 @@
 namespace cairn::slam3d {
 
 /// The position of a pose known to be z = (x y z [m]), as from GNSS or an altimeter: error = t − z,
-/// along the axes of the world and whatever the orientation. Says nothing of that, so that it
+/// along the axes of the world and whatever the orientation. The orientation is free, so that it
 /// places no pose.
 struct Position {
   static constexpr std::string_view kTag = "EDGE_SE3_PRIORXYZ";

@@ -42,9 +42,8 @@ std::unique_ptr<BoundGraph> read(const std::filesystem::path& path, const std::s
   const py::gil_scoped_release unlocked;
   ReadReport report;
   const ReadOptions options{skip_unknown, repair_information, unit_information, skip_dangling};
-  auto bound = std::make_unique<BoundGraph>(with_file(path, path, [&] {
-    return read_graph(path, default_registry(), options, report, format);
-  }));
+  auto bound = std::make_unique<BoundGraph>(with_file(
+      path, path, [&] { return read_graph(path, default_registry(), options, report, format); }));
   bound->notes = notes_of(report);
   if (report.truth) {
     bound->truth = std::make_unique<BoundGraph>(std::move(*report.truth));
@@ -66,9 +65,8 @@ void write(BoundGraph& bound, const std::filesystem::path& path, const std::stri
   const GraphUse use(bound);
   {
     const py::gil_scoped_release unlocked;
-    with_file(path, path.parent_path(), [&] {
-      write_graph(use.graph(), path, default_registry(), format, bound.stamps);
-    });
+    with_file(path, path.parent_path(),
+              [&] { write_graph(use.graph(), path, default_registry(), format, bound.stamps); });
   }
   const std::string note = losses_not_written(use.graph());
   if (!note.empty() && PyErr_WarnEx(PyExc_UserWarning, note.c_str(), 1) != 0)

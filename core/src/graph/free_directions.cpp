@@ -696,7 +696,23 @@ FreeDirections find_free_directions(const LinearRows& rows, const FreeSearch& se
   return Search(rows, search).run();
 }
 
+namespace {
+
+/// Cameras with unknown intrinsics and the points that they see: pixels, metres and coefficients of
+/// distortion span so many orders of magnitude that what is free cannot be told from what is weak.
+bool has_cameras(const Graph& graph) {
+  return std::ranges::any_of(graph.variable_pools(), [](const VariablePool& pool) {
+    const Placement* placement = pool.type->placement();
+    if (pool.variables.empty() || !placement || !placement->has_orientation()) return false;
+    const int rigid = placement->dimension() == 2 ? 3 : 6;
+    return pool.type->lie_group() == nullptr && pool.type->tangent_size() > rigid;
+  });
+}
+
+}  // namespace
+
 FreeDirections find_free_directions(const Graph& graph, const Gauge& gauge, const Values& values) {
+  if (has_cameras(graph)) return {};
   const std::vector<bool> determined = determined_by_whole_relative_poses(graph, gauge.held);
   const std::vector<std::int32_t> factors = factors_on_others(graph, determined);
   if (factors.empty()) return {};

@@ -131,7 +131,8 @@ std::vector<std::string> notes_on_the_end(const Summary& summary, const Stop& st
   }
   for (std::string& note : notes_on_estimate(graph, summary.final_chi2))
     notes.push_back(std::move(note));
-  std::vector<std::string> with_free = summary.notes;  // the optimizer may have said it
+  if (!losses_weigh_nothing(graph).empty()) return notes;  // everything is free
+  std::vector<std::string> with_free = summary.notes;      // the optimizer may have said it
   note_what_is_free(graph, with_free);
   if (with_free.size() > summary.notes.size()) notes.push_back(std::move(with_free.back()));
   return notes;

@@ -143,8 +143,8 @@ class Placer {
     return call_factor(
                *factor.type, [&] { return describe(factor); },
                [&] {
-                 return place_wholly(*factor.type, one.root, one.target, one.x.data(),
-                                     one.z.data(), placed.data());
+                 return place_wholly(*factor.type, one.root, one.target, one.x.data(), one.z.data(),
+                                     placed.data());
                }) &&
            take(*one.variable, std::move(placed));
   }

@@ -213,8 +213,8 @@ class Engine : private EngineState {
   void set_clock(Pace::Clock clock) { pace_.set_clock(std::move(clock)); }
   const Pace& pace() const { return pace_; }
   void set_pace(const Pace& pace) { pace_ = pace; }
-  /// What factors, the rescuer and the clock answer is recorded there, or taken from there; null:
-  /// neither. A copy of the engine does neither.
+  /// What factors, the fallback optimizer and the clock answer is recorded there, or taken from
+  /// there; null: neither. A copy of the engine does neither.
   void keep_answers(Answers* answers);
   /// Whether the factors leave something free: then no factorisation of H is trusted, whatever
   /// rounding makes of its pivots, and the estimate is that of the fallback optimizer.

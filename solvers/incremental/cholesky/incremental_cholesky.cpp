@@ -208,7 +208,6 @@ UpdateReport IncrementalCholesky::carry_out(const GraphUpdate& update,
 
   ++since_solved_;
   ++since_full_;
-  if (takes_out(update)) watch_.forget();
   if (full || (!options.defer && since_solved_ >= options_.solve_every)) look_for_freedom();
   if (full) {
     engine_->solve_fully(report);
@@ -279,9 +278,10 @@ void IncrementalCholesky::look_for_freedom() {
   engine_->set_undetermined(!watch_.free().empty());
 }
 
-/// Every update after which something is free says what.
+/// Every update after which something is free, or H singular, says what.
 void IncrementalCholesky::report_free(UpdateReport& report) {
-  if (watch_.free().empty() || (answers_ && answers_->repeats())) return;
+  if (report.ok && watch_.free().empty()) return;
+  if (answers_ && answers_->repeats()) return;
   const Graph graph = engine_->snapshot();
   const std::string sentence = find_free_directions(graph).describe(graph);
   if (sentence.empty()) return;
@@ -399,6 +399,7 @@ double IncrementalCholesky::change_graph(const GraphUpdate& update, bool full, b
     }
   }
   changes_ = true;
+  if (takes_out(checked)) watch_.forget();
   double of_solution = 0.0;
   if (ends) {
     of_solution = end_solution(full, report);

@@ -281,7 +281,8 @@ Summary LineSearchOptimizer::optimize(Graph& graph, const Stop& stop, Observer& 
     options.num_threads = threads();
     summary.status = run.minimise(options);
     const double factorize = run.decrement_seconds();
-    graph.set_values(run.take_values());  // the last that was accepted, also where something threw
+    Values accepted = run.take_values();  // the last, also where something threw
+    if (!accepted.pools.empty()) graph.set_values(std::move(accepted));
     run.rethrow();
     summary.final_chi2 = chi2(graph);
     if (summary.status == Status::converged && !std::isfinite(summary.final_chi2))

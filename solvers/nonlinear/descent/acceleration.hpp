@@ -32,7 +32,7 @@ class Acceleration {
   /// gᵀd of that step d: what chi2 is likely to fall by.
   double decrement() const { return decrement_; }
   /// Whether convergence may be claimed, as far as that is known here: after a step of this kind
-  /// the next one must promise as little as Gauss-Newton's.
+  /// the predicted decrease of the next one must be as small as Gauss-Newton's.
   bool may_end(const Descent& run) const;
   /// Puts that step in place of `run.step`, and the states that it leads to in `run.trial`, if chi2
   /// is lower there; returns chi2. Otherwise nothing, and `run.step` is as it was.

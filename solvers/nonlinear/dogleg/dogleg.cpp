@@ -41,8 +41,8 @@ class Run {
       newton_norm_ = run_.step_norm();
       acceleration_.aim(run_);
       fits = run_.fits_exactly(newton_norm_);  // chi2 is zero: the minimum, damped or not
-      arrived = (convergence_.arrived(newton_promise_, run_.chi2) || fits) &&
-                acceleration_.may_end(run_);
+      arrived =
+          (convergence_.arrived(newton_promise_, run_.chi2) || fits) && acceleration_.may_end(run_);
       if (arrived && !run_.solves(path_.newton())) return;
     }
     const double radius = radius_;

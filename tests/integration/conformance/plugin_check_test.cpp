@@ -247,7 +247,7 @@ TEST(WrongEstimator, IsNamed) {
               IsSupersetOf({"factors that are removed are gone, and no others",
                             "after a change, chi2 is near the minimum"}));
   EXPECT_THAT(checked.laws_of("solves_seldom"),
-              ElementsAre("an update that owes nothing leaves chi2 near the minimum"));
+              Contains("an update that is said to be solved leaves chi2 near the minimum"));
 }
 
 TEST(WrongFormat, IsNamed) {
@@ -325,8 +325,9 @@ TEST(PluginCheck, NamesAPluginThatCrashesWhenTheProcessEnds) {
 
 TEST(PluginCheck, NamesAPluginThatCrashesWhenItIsLoaded) {
   const Checked checked = check(wrong("wrong_from_the_start"));
-  EXPECT_THAT(checked.findings, ElementsAre(AllOf(HasSubstr("registration / loading returns"),
-                                                  HasSubstr("crashed"))));
+  EXPECT_THAT(checked.findings,
+              ElementsAre(AllOf(HasSubstr("registration / the plugin can be loaded"),
+                                HasSubstr("a static constructor crashed (Aborted)"))));
   EXPECT_EQ(checked.exit_code, kFindings);
 }
 

@@ -34,7 +34,11 @@ class CAIRN_API Domain {
 /// them, and `double reach(const double* const* x)` for one factor.
 template <FactorTraits F>
 std::shared_ptr<const FactorType> define_factor_with_domain() {
-  class Type final : public FactorType, public Domain {
+  class Type final : public FactorType,
+                     public Domain,
+                     public std::conditional_t<detail::never_throws<F>(
+                                                   static_cast<typename F::Variables*>(nullptr)),
+                                               NeverThrows, detail::MayThrow> {
    public:
     std::string outside(const double* const* x) const override { return F::outside(x); }
     void reaches(const FactorView& pool, double* out) const override {

@@ -42,6 +42,7 @@ class SlowConvergence : public testing::Test {
  protected:
   void SetUp() override {
     if (!registry.has("factor", "EDGE_SE3:QUAT")) GTEST_SKIP() << "there are no types slam3d";
+    registry.set_type_options(parse_component("slam3d:metric=logarithm"));
     pose = registry.variable_type("VERTEX_SE3:QUAT");
     relative = registry.factor_type("EDGE_SE3:QUAT");
   }

@@ -79,7 +79,7 @@ enum class RowPairing {
   none,       ///< both files have ids of their own
   complete,   ///< every pose has a partner
   partial,    ///< some have none: right only if both begin with the same pose and skip none
-  unfounded,  ///< the same, and one of the two has times, which tell that rows are no ids
+  unfounded,  ///< the same, and one of the two has times, so that rows are no ids
 };
 /// Of pairs by id; `estimate_rows`, `truth_rows`: whether the ids of that file are row numbers.
 CAIRN_API RowPairing row_pairing(const TrajectoryPairs& pairs, bool estimate_rows, bool truth_rows);

@@ -8,8 +8,8 @@
 #include "cairn/types/factor_type.hpp"
 #include "cairn/types/variable_type.hpp"
 
-/// Initial estimates from measurements. A component without information is a number that nobody
-/// measured, whatever stands in the file: it is never used for an initial estimate.
+/// Initial estimates from measurements. A component without information is a number that was
+/// not measured, whatever stands in the file: it is never used for an initial estimate.
 namespace cairn {
 
 /// Whether a measurement measures all components of its residual: whether the square root U of its
@@ -25,8 +25,8 @@ CAIRN_API bool place_wholly(const FactorType& type, std::span<const double> sqrt
 /// As much of a state as the measurement says, for variables that no measurement determines wholly:
 /// moves `state` by the least that makes the whitened residual zero (Gauss-Newton steps of least
 /// norm), so that what is not measured stays what it was. `x` are the states of the others; the
-/// entry of `target` is not read. False, with `state` as it was, if the measurement says nothing or
-/// what it says is not finite.
+/// entry of `target` is not read. False, with `state` as it was, if nothing is measured or
+/// what follows is not finite.
 CAIRN_API bool place_in_part(const FactorType& type, const VariableType& variable,
                              std::span<const double> sqrt_information, int target,
                              std::span<const double* const> x, const double* z,
