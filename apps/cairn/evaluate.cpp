@@ -125,10 +125,11 @@ bool match_by_stamp(const EvaluateOptions& options, const Trajectory& estimate,
 void warn_of_missing(std::int64_t count, const std::string& in, const std::string& not_in,
                      bool by_stamp, const Session& session) {
   if (count == 0) return;
+  const char* const be = count == 1 ? "is" : "are";
   const std::string verb = by_stamp ? (count == 1 ? "has no match" : "have no match")
-                                    : (count == 1 ? "is not" : "are not");
-  session.note(
-      fmt::format("{} of {} {} in {} and left out", plural(count, "pose"), in, verb, not_in));
+                                    : fmt::format("{} not", be);
+  session.note(fmt::format("{} of {} {} in {} and {} left out", plural(count, "pose"), in, verb,
+                           not_in, be));
 }
 
 /// Of poses as they are compared; graphs of the plane have no height to be wrong.

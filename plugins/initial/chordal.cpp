@@ -104,8 +104,11 @@ class ChordalPool {
         }
       }
     };
+    bool has_rest = false;
     for (int v = 0; v < graph_.variable_count(); ++v) {
-      if (linked[v] && placing_.placed(v)) reach(v);
+      if (!linked[v] || !placing_.placed(v)) continue;
+      has_rest = true;
+      reach(v);
     }
     spread();
     std::int64_t kept = 0;
@@ -128,7 +131,7 @@ class ChordalPool {
         variables_.push_back(v);
       }
     }
-    if (kept > 0) {
+    if (kept > (has_rest ? 0 : 1)) {
       notes.push_back(counted(kept, "group of poses has", "groups of poses have") +
                       " no relative pose to the rest; the first of each keeps its state (" +
                       graph_.describe_variable(first_kept) + (kept > 1 ? ", …)" : ")"));

@@ -21,7 +21,7 @@ STARTS: List[Optional[str]] = [None, "odometry", "spanning_tree", "chordal", "in
 OPTIMIZERS = ["levenberg_marquardt", "dogleg"]
 """Notes that begin or go on like this inform: all others are doubts."""
 INFORMS = re.compile(
-    r"initial guess \S+: |.*anchored|.*gauge of a component is left free|.*(is|are) free|.*can (shift|turn|move)|without damping H is|"
+    r"initial guess \S+: (?!.*there may be a lower one)|.*anchored|.*gauge of a component is left free|.*(is|are) free|.*can (shift|turn|move)|without damping H is|"
     r"the loss leaves [^:]*$|converged at chi2 .* kept a better estimate")
 
 

@@ -18,8 +18,8 @@ const char* const kDoc =
 
 How an optimisation ended is no exception: see `Summary.status`.
 
-kind: "usage" (a bad call: an unknown name, option or argument), "input" (a bad file or bad data), "numerical" (a number
-was asked for that does not exist) or "plugin" (a plugin that is missing, broken or does not fit).
+kind: "usage" (a bad call: an unknown option or argument), "input" (a bad file or bad data), "numerical" (a number was
+asked for that does not exist) or "plugin" (a name that no plugin offers, or a plugin that is broken or does not fit).
 
 An error is an exception of Python's kind as well where there is one: a file that is not there is a FileNotFoundError
 (cairn.MissingFileError), an id that is not there a KeyError (cairn.MissingKeyError), and any other bad value, shape or

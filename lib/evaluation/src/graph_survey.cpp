@@ -222,7 +222,10 @@ GraphSurvey survey_graph(const Graph& graph) {
   find_worst(graph, norms, s);
   suspect_structure(graph, s);
   suspect_parts_of_rotations(graph, s);
+  const std::size_t before = s.suspicions.size();
   note_what_is_free(graph, s.suspicions);
+  // Where an optimisation ends, other directions may be free.
+  if (s.suspicions.size() > before) s.suspicions.back() += " (at the states given)";
   suspect_numbers(s);
   return s;
 }
