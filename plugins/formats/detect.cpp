@@ -32,11 +32,12 @@ struct Votes {
 class BalVotes {
  public:
   void vote(Scanner& scanner) {
+    if (line_++ > 0 && !is_header_) return;
     scanner.expect_row({}, "");
     const int fields = scanner.count_fields();
-    if (line_++ == 0) {
+    if (line_ == 1) {
       is_header_ = fields == 3 && read_header(scanner);
-    } else if (is_header_) {
+    } else {
       fitting_ += fields == (line_ - 1 <= observations_ ? 4 : 1);
     }
   }
@@ -99,11 +100,10 @@ void vote_on_edge(Scanner& scanner, int measured, Votes& votes) {
 }
 
 /// Whether one of the first fields after the tag is a name, which PyFactorGraph has for ids.
-bool names_variable(Scanner& scanner) {
-  scanner.expect({});
-  std::array<std::string_view, 2> first;
+bool names_variable(const Scanner& scanner) {
+  std::array<std::string_view, 3> first;  // the tag before them: nothing was expected yet
   scanner.first_fields(first);
-  return std::ranges::any_of(first, [](std::string_view field) {
+  return std::any_of(first.begin() + 1, first.end(), [](std::string_view field) {
     return field.size() > 1 && std::isalpha(static_cast<unsigned char>(field[0])) != 0 &&
            std::isdigit(static_cast<unsigned char>(field[1])) != 0;
   });

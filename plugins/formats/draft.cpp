@@ -390,6 +390,12 @@ void Draft::hold_variables_of(Graph& graph) {
 
 namespace {
 
+/// Whether the last four numbers are of norm 1 but for rounding: most are, and a root takes longer.
+bool is_surely_unit(std::span<const double> numbers) {
+  const double* q = numbers.data() + numbers.size() - 4;
+  return std::abs(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3] - 1.0) < 1e-5;
+}
+
 /// Of the last four numbers.
 double norm_of(std::span<const double> numbers) {
   const double* q = numbers.data() + numbers.size() - 4;
@@ -405,7 +411,7 @@ bool is_off(double norm) {
 /// Whether a type makes the last four numbers, which are not of norm 1, a quaternion.
 template <class Type>
 bool would_normalize(const Type& type, std::span<const double> numbers) {
-  if (!is_off(norm_of(numbers))) return false;
+  if (is_surely_unit(numbers) || !is_off(norm_of(numbers))) return false;
   std::vector<double> copy(numbers.begin(), numbers.end());
   return type.normalize(copy.data()).empty() && !is_off(norm_of(copy));
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "scanner.hpp"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <cstring>
@@ -37,6 +38,13 @@ std::string_view take_field(std::string_view& text) {
 std::string_view without_plus(std::string_view field) {
   return field.size() > 1 && field[0] == '+' && field[1] != '-' && field[1] != '+' ? field.substr(1)
                                                                                    : field;
+}
+
+/// What `from_chars` takes of `digits`; false unless that is all of it.
+bool parse_whole(std::string_view digits, std::int64_t& whole) {
+  const char* const end = digits.data() + digits.size();
+  const auto result = std::from_chars(digits.data(), end, whole);
+  return result.ec == std::errc{} && result.ptr == end;
 }
 
 std::string expected_fields(const Layout& layout) {
@@ -153,11 +161,7 @@ std::int64_t Scanner::read_whole(std::string_view what, std::int64_t largest) {
   const std::string_view field = required_field();
   const std::string_view digits = without_plus(field);
   std::int64_t whole = 0;
-  const auto [end, problem] = std::from_chars(digits.data(), digits.data() + digits.size(), whole);
-  if (problem != std::errc{} || end != digits.data() + digits.size() || whole < 0 ||
-      whole > largest) {
-    fail_whole(field, what, largest);
-  }
+  if (!parse_whole(digits, whole) || whole < 0 || whole > largest) fail_whole(field, what, largest);
   return whole;
 }
 
@@ -173,8 +177,8 @@ void Scanner::read_numbers(std::span<double> out) {
 }
 
 bool Scanner::more() {
-  std::string_view ahead = fields_;
-  return !take_field(ahead).empty();
+  const auto next = std::ranges::find_if_not(fields_, is_blank);
+  return next != fields_.end() && *next != '#';
 }
 
 void Scanner::end_line() {
@@ -193,9 +197,7 @@ std::optional<Id> Scanner::id_after_tag() const {
   take_field(text);  // the tag: nothing of this line was expected yet
   const std::string_view digits = without_plus(take_field(text));
   Id id = 0;
-  const auto [end, problem] = std::from_chars(digits.data(), digits.data() + digits.size(), id);
-  const bool whole = problem == std::errc{} && end == digits.data() + digits.size() && id >= 0;
-  return whole && !digits.empty() ? std::optional(id) : std::nullopt;
+  return parse_whole(digits, id) && id >= 0 ? std::optional(id) : std::nullopt;
 }
 
 void Scanner::first_fields(std::span<std::string_view> out) const {

@@ -211,14 +211,25 @@ OtherMinima search_other_minima(Graph& graph, const std::vector<NamedStart>& sta
 
 double largest_turn(const Graph& graph) {
   double least = 3.0;  // the trace of a rotation by an angle: 1 + 2 cos(angle)
-  for (int f = 0; f < graph.factor_count(); ++f) {
-    if (!graph.factor_type(f).is_relative()) continue;
-    const auto on = graph.factor_variables(f);
-    const VariableType& type = graph.type(on[0]);
+  std::vector<std::vector<Eigen::Matrix3d>> rotations(graph.variable_pools().size());
+  for (const FactorPool& pool : graph.factor_pools()) {
+    if (!pool.type->is_relative() || pool.size() == 0) continue;
+    const auto p = static_cast<std::size_t>(pool.variable_pools[0]);
+    const VariableType& type = *graph.variable_pools()[p].type;
     if (!is_pose(type)) continue;
-    const Pose from = pose_of(type, graph.state(on[0])), to = pose_of(type, graph.state(on[1]));
-    const Pose measured = pose_of(type, graph.measurement(f));
-    least = std::min(least, (from.R * measured.R).cwiseProduct(to.R).sum());
+    const Placement& placement = *type.placement();
+    const auto size = static_cast<std::size_t>(type.ambient_size());
+    std::vector<Eigen::Matrix3d>& R = rotations[p];
+    const auto& states = graph.values().pools[p];
+    for (std::size_t v = R.size(); v < states.size() / size; ++v)
+      R.push_back(pose_of(placement, states.data() + v * size).R);
+    for (std::size_t f = 0; f < pool.size(); ++f) {
+      const Eigen::Matrix3d& from = R[static_cast<std::size_t>(pool.slots[2 * f])];
+      const Eigen::Matrix3d& to = R[static_cast<std::size_t>(pool.slots[2 * f + 1])];
+      const Pose measured = pose_of(placement, pool.measurements.data() + f * size);
+      // The trace of from · measured · toᵀ.
+      least = std::min(least, (from.transpose() * to).cwiseProduct(measured.R).sum());
+    }
   }
   return std::acos(std::clamp(0.5 * (least - 1.0), -1.0, 1.0));
 }

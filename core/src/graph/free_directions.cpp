@@ -663,6 +663,22 @@ std::vector<bool> determined_by_whole_relative_poses(const Graph& graph,
   return determined;
 }
 
+/// Whether all factors are fully measured relative poses without a loss, and every component has a
+/// constant variable: then nothing is free, as in most graphs of poses.
+bool all_are_whole_relative_poses(const Graph& graph, const Gauge& gauge) {
+  if (graph.has_losses()) return false;
+  for (const FactorPool& pool : graph.factor_pools()) {
+    const int n = pool.type->residual_size();
+    if (pool.size() > 0 && (!pool.type->is_relative() || pool.type->tangent_size(0) != n ||
+                            std::ranges::any_of(pool.ranks, [n](int rank) { return rank < n; })))
+      return false;
+  }
+  std::vector<bool> has_constant(static_cast<std::size_t>(gauge.components), false);
+  for (std::size_t v = 0; v < gauge.held.size(); ++v)
+    if (gauge.held[v]) has_constant[static_cast<std::size_t>(gauge.component[v])] = true;
+  return std::ranges::find(has_constant, false) == has_constant.end();
+}
+
 /// Positions of the factors that have a variable which is not determined, rising.
 std::vector<std::int32_t> factors_on_others(const Graph& graph,
                                             const std::vector<bool>& determined) {
@@ -712,7 +728,7 @@ bool has_cameras(const Graph& graph) {
 }  // namespace
 
 FreeDirections find_free_directions(const Graph& graph, const Gauge& gauge, const Values& values) {
-  if (has_cameras(graph)) return {};
+  if (has_cameras(graph) || all_are_whole_relative_poses(graph, gauge)) return {};
   const std::vector<bool> determined = determined_by_whole_relative_poses(graph, gauge.held);
   const std::vector<std::int32_t> factors = factors_on_others(graph, determined);
   if (factors.empty()) return {};

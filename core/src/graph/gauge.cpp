@@ -41,12 +41,13 @@ Gauge resolve_gauge(const Graph& graph) {
   std::vector<std::int64_t> prior_size(n, 0);
   for (const FactorPool& pool : graph.factor_pools()) {
     const std::size_t arity = static_cast<std::size_t>(pool.type->arity());
+    const bool absolute = pool.type->absolute_size() > 0;
     for (std::size_t k = 0; k < pool.variables.size(); k += arity) {
       for (std::size_t a = 0; a < arity; ++a) {
         touched[pool.variables[k + a]] = true;
         if (a > 0) forest.join(pool.variables[k], pool.variables[k + a]);
       }
-      prior_size[pool.variables[k]] += graph.absolute_size(pool.sequence[k / arity]);
+      if (absolute) prior_size[pool.variables[k]] += graph.absolute_size(pool.sequence[k / arity]);
     }
   }
 

@@ -29,12 +29,13 @@ std::int16_t Graph::loss_of(int position) const {
 
 void Graph::set_loss(int position, std::shared_ptr<const Loss> loss) {
   const FactorRef at = factors_[position];
-  factor_pools_[at.pool].losses[at.entry] =
-      loss_index(factor_type(position), for_size(std::move(loss), information_rank(position)));
+  if (loss) loss = for_size(std::move(loss), information_rank(position));
+  factor_pools_[at.pool].losses[at.entry] = loss_index(factor_type(position), loss);
 }
 
 void Graph::set_loss(const std::shared_ptr<const Loss>& loss, const FactorSelector& which) {
   const std::vector<bool> selected = select(*this, which);
+  if (!loss && !has_losses()) return;
   losses_.resize(1);
   for (int f = 0; f < factor_count(); ++f) set_loss(f, selected[f] ? loss : nullptr);
 }

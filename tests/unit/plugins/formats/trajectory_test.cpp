@@ -76,8 +76,7 @@ TEST(Trajectory, OfTumRowsWithOneStampTheFirstIsKept) {
 TEST(Trajectory, TumStampsInNanosecondsAreSecondsToTheLastBit) {
   const char* rows[] = {
       "1403715524907143168 1 2 3 0 0 0 1\n1403715525107143168 4 5 6 0 0 0 1\n",
-      "1.403715524907143168e18 1 2 3 0 0 0 1\n1.403715525107143168E+18 4 5 6 0 0 "
-      "0 1\n",
+      "1.403715524907143168e18 1 2 3 0 0 0 1\n1.403715525107143168E+18 4 5 6 0 0 0 1\n",
       "+1403715524907143168 1 2 3 0 0 0 1\n1403715525107143168.0 4 5 6 0 0 0 1\n"};
   for (const char* text : rows) {
     const Reading r = read("tum", text);
