@@ -126,8 +126,8 @@ void warn_of_missing(std::int64_t count, const std::string& in, const std::strin
                      bool by_stamp, const Session& session) {
   if (count == 0) return;
   const char* const be = count == 1 ? "is" : "are";
-  const std::string verb = by_stamp ? (count == 1 ? "has no match" : "have no match")
-                                    : fmt::format("{} not", be);
+  const std::string verb =
+      by_stamp ? (count == 1 ? "has no match" : "have no match") : fmt::format("{} not", be);
   session.note(fmt::format("{} of {} {} in {} and {} left out", plural(count, "pose"), in, verb,
                            not_in, be));
 }

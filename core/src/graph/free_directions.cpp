@@ -462,8 +462,7 @@ class Search {
       factors.insert(factors.end(), of.begin(), of.end());
     }
     std::ranges::sort(factors);
-    const auto repeated = std::ranges::unique(factors);
-    factors.erase(repeated.begin(), repeated.end());
+    factors.erase(std::unique(factors.begin(), factors.end()), factors.end());
     MatrixXd S = MatrixXd::Zero(A.cols(), A.cols());
     for (const std::int32_t k : factors) {
       if (!evaluate(k)) return MatrixXd(A.rows(), 0);

@@ -112,14 +112,15 @@ Trajectory with_stamps(Trajectory poses, const std::vector<double>& stamps,
                        std::vector<std::string>& notes) {
   assert(poses.size() == stamps.size());
   for (std::size_t k = 0; k < poses.size(); ++k) poses[k].stamp = stamps[k];
-  const auto same = std::ranges::unique(poses, {}, &TrajectoryPose::stamp);
-  if (!same.empty()) {
+  const auto same = std::unique(
+      poses.begin(), poses.end(),
+      [](const TrajectoryPose& a, const TrajectoryPose& b) { return a.stamp == b.stamp; });
+  if (const auto count = poses.end() - same; count > 0) {
     notes.push_back(
-        fmt::format("{} the stamp of the pose before: of poses with one stamp the "
-                    "first is kept",
-                    same.size() == 1 ? "1 pose has" : fmt::format("{} poses have", same.size())));
+        fmt::format("{} the stamp of the pose before: of poses with one stamp the first is kept",
+                    count == 1 ? "1 pose has" : fmt::format("{} poses have", count)));
   }
-  poses.erase(same.begin(), same.end());
+  poses.erase(same, poses.end());
   return poses;
 }
 

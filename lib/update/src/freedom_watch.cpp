@@ -21,8 +21,7 @@ class SomeRows final : public LinearRows {
       begin_.push_back(on_.size());
     }
     std::ranges::sort(variables_);
-    const auto repeated = std::ranges::unique(variables_);
-    variables_.erase(repeated.begin(), repeated.end());
+    variables_.erase(std::unique(variables_.begin(), variables_.end()), variables_.end());
     for (std::int32_t& v : on_) {
       v = static_cast<std::int32_t>(std::ranges::lower_bound(variables_, v) - variables_.begin());
     }

@@ -85,6 +85,7 @@ class AnswersKept {
  public:
   AnswersKept() = default;
   AnswersKept(const AnswersKept&) {}
+  // NOLINTNEXTLINE(bugprone-unhandled-self-assignment): nothing is assigned
   AnswersKept& operator=(const AnswersKept&) { return *this; }
   ~AnswersKept() = default;
 

@@ -50,7 +50,7 @@ void Acceleration::look_back(const Descent& run) {
   little_ = may_help && before - run.chi2 <= kLittle * before ? little_ + 1 : 0;
   if (little_ == 0) pairs_.clear();
   if (!begun_ || little_ < kRemember) return;
-  Pair pair = std::move(*begun_);
+  SecantPair pair = std::move(*begun_);
   begun_.reset();
   add(-1.0, run.equations().g(), pair.y);
   pair.curvature = dot(pair.s, pair.y);
@@ -71,7 +71,7 @@ void Acceleration::aim(Descent& run) {
   if (pairs_.empty() || little_ < kUse) return;
   const std::span<const double> g = run.equations().g();
   std::vector<double> q(g.begin(), g.end()), along;
-  for (const Pair& pair : pairs_) {
+  for (const SecantPair& pair : pairs_) {
     along.push_back(dot(pair.s, q) / pair.curvature);
     add(-along.back(), pair.y, q);
   }

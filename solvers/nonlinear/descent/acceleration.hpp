@@ -9,6 +9,12 @@ namespace cairn {
 
 class Descent;
 
+/// A step s, and the change y = g − g₊ of the gradient that it made.
+struct SecantPair {
+  std::vector<double> s, y;
+  double curvature = 0.0;  ///< sᵀy
+};
+
 /// Steps that also use what the last ones have shown of the curvature, where a run converges
 /// slowly; nothing at all, to the last bit, where it does not.
 ///
@@ -41,14 +47,10 @@ class Acceleration {
   void follow(const Descent& run);
 
  private:
-  struct Pair {
-    std::vector<double> s, y;
-    double curvature = 0.0;  // sᵀy
-  };
   void look_back(const Descent& run);
 
-  std::deque<Pair> pairs_;     // the newest first
-  std::optional<Pair> begun_;  // by the last step; y holds the gradient before it
+  std::deque<SecantPair> pairs_;     // the newest first
+  std::optional<SecantPair> begun_;  // by the last step; y holds the gradient before it
   std::optional<double> chi2_before_;
   std::vector<double> step_;
   double decrement_ = 0.0;  // 0: there is no step

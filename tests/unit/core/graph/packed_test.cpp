@@ -7,6 +7,7 @@
 #include <limits>
 
 #include <Eigen/Cholesky>
+#include <Eigen/QR>
 
 #include "support/sampling.hpp"
 

@@ -294,13 +294,13 @@ class RandomProblem {
     const auto [z, Omega] = measured(truth_[a].inverse() * truth_[b]);
     graph.add(Between(a, b, value(z, Pose())), Information::matrix(Omega));
     problem.add(
-        {a, b}, [=](const auto& x) { return error(z, x[a].inverse() * x[b]); }, Omega);
+        {a, b}, [a, b, z = z](const auto& x) { return error(z, x[a].inverse() * x[b]); }, Omega);
   }
   void add_prior(int k) {
     const auto [z, Omega] = measured(truth_[k]);
     graph.add(Prior(k, value(z, Pose())), Information::matrix(Omega));
     problem.add(
-        {k}, [=](const auto& x) { return error(z, x[k]); }, Omega);
+        {k}, [k, z = z](const auto& x) { return error(z, x[k]); }, Omega);
   }
   void add_position(int k) {
     const MatrixXd Omega = information(mask(kD));
